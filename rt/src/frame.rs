@@ -1,0 +1,254 @@
+//! CAN frames as values that can only be valid: 11- and 29-bit identifiers, data and remote frames of
+//! classic CAN (ISO 11898-1), and CAN FD frames of up to 64 bytes.
+
+/// An 11-bit (base) or 29-bit (extended) identifier.
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Id(u32);
+
+const EXTENDED: u32 = 1 << 31;
+const BASE_MASK: u32 = 0x7FF;
+const EXTENDED_MASK: u32 = 0x1FFF_FFFF;
+
+impl Id {
+    /// An 11-bit identifier, 0 to 0x7FF.
+    pub const fn base(id: u32) -> Result<Self, FrameError> {
+        if id <= BASE_MASK { Ok(Self(id)) } else { Err(FrameError::IdOutOfRange { id, limit: BASE_MASK }) }
+    }
+
+    /// A 29-bit identifier, 0 to 0x1FFF_FFFF.
+    pub const fn extended(id: u32) -> Result<Self, FrameError> {
+        if id <= EXTENDED_MASK {
+            Ok(Self(id | EXTENDED))
+        } else {
+            Err(FrameError::IdOutOfRange { id, limit: EXTENDED_MASK })
+        }
+    }
+
+    /// The identifier `function + node` of CANopen's pre-defined connection set (CiA 301, 7.3.3). Both are
+    /// masked to their fields, so the result is always a valid 11-bit identifier.
+    pub const fn canopen(function: u16, node: u8) -> Self {
+        Self((function as u32 & 0x780) | (node as u32 & 0x7F))
+    }
+
+    /// The bare identifier, without the mark that tells 11 from 29 bits.
+    pub const fn value(self) -> u32 {
+        self.0 & EXTENDED_MASK
+    }
+
+    /// Whether this is a 29-bit identifier.
+    pub const fn is_extended(self) -> bool {
+        self.0 & EXTENDED != 0
+    }
+
+    /// The order in which identifiers win arbitration: the smaller key wins. An 11-bit identifier wins
+    /// against the 29-bit ones that begin with the same 11 bits (its SRR/RTR and IDE bits are dominant).
+    pub const fn arbitration_key(self) -> u64 {
+        if self.is_extended() {
+            let id = self.value() as u64;
+            (id >> 18) << 20 | 1 << 19 | (id & 0x3_FFFF)
+        } else {
+            (self.value() as u64) << 20
+        }
+    }
+}
+
+impl core::fmt::Debug for Id {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        if self.is_extended() { write!(f, "{:08X}", self.value()) } else { write!(f, "{:03X}", self.value()) }
+    }
+}
+
+/// What is wrong with an identifier or a payload.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FrameError {
+    /// The identifier does not fit its field.
+    IdOutOfRange {
+        /// What was given.
+        id: u32,
+        /// The largest that fits.
+        limit: u32,
+    },
+    /// No frame of this kind can carry this many bytes.
+    Length {
+        /// How many bytes were given.
+        length: usize,
+    },
+}
+
+/// The four kinds of frame on a bus.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FrameKind {
+    /// A classic data frame, 0 to 8 bytes.
+    Data,
+    /// A classic remote frame (RTR): a length, no data.
+    Remote,
+    /// A CAN FD frame at one bit rate.
+    Fd,
+    /// A CAN FD frame whose data phase runs at the second, faster bit rate (BRS).
+    FdBitRateSwitch,
+}
+
+/// One CAN or CAN FD frame.
+#[derive(Clone, Copy)]
+pub struct Frame {
+    id: Id,
+    kind: FrameKind,
+    length: u8,
+    data: [u8; Frame::MAX_BYTES],
+}
+
+impl Frame {
+    /// The longest payload of any frame.
+    pub const MAX_BYTES: usize = 64;
+
+    /// A classic data frame of 0 to 8 bytes.
+    pub fn data(id: Id, bytes: &[u8]) -> Result<Self, FrameError> {
+        if bytes.len() > 8 {
+            return Err(FrameError::Length { length: bytes.len() });
+        }
+        Ok(Self::filled(id, FrameKind::Data, bytes))
+    }
+
+    /// A classic data frame of 0 to 8 bytes whose length is known when the program is written.
+    pub fn of<const N: usize>(id: Id, bytes: [u8; N]) -> Self {
+        const { assert!(N <= 8) };
+        Self::filled(id, FrameKind::Data, &bytes)
+    }
+
+    /// A remote frame that asks for `length` (0 to 8) bytes.
+    pub fn remote(id: Id, length: u8) -> Result<Self, FrameError> {
+        if length > 8 {
+            return Err(FrameError::Length { length: length.into() });
+        }
+        Ok(Self { id, kind: FrameKind::Remote, length, data: [0; Self::MAX_BYTES] })
+    }
+
+    /// A CAN FD frame. The length must be one the DLC can say: 0 to 8, 12, 16, 20, 24, 32, 48 or 64.
+    pub fn fd(id: Id, bytes: &[u8], bit_rate_switch: bool) -> Result<Self, FrameError> {
+        if !matches!(bytes.len(), 0..=8 | 12 | 16 | 20 | 24 | 32 | 48 | 64) {
+            return Err(FrameError::Length { length: bytes.len() });
+        }
+        let kind = if bit_rate_switch { FrameKind::FdBitRateSwitch } else { FrameKind::Fd };
+        Ok(Self::filled(id, kind, bytes))
+    }
+
+    fn filled(id: Id, kind: FrameKind, bytes: &[u8]) -> Self {
+        let mut data = [0; Self::MAX_BYTES];
+        for (to, from) in data.iter_mut().zip(bytes) {
+            *to = *from;
+        }
+        Self { id, kind, length: bytes.len().min(Self::MAX_BYTES) as u8, data }
+    }
+
+    /// The identifier.
+    pub const fn id(&self) -> Id {
+        self.id
+    }
+
+    /// Which of the four kinds this is.
+    pub const fn kind(&self) -> FrameKind {
+        self.kind
+    }
+
+    /// Whether this is a CAN FD frame, with or without bit-rate switching.
+    pub const fn is_fd(&self) -> bool {
+        matches!(self.kind, FrameKind::Fd | FrameKind::FdBitRateSwitch)
+    }
+
+    /// The length field in bytes: of the payload, or for a remote frame of the payload asked for.
+    pub const fn length(&self) -> usize {
+        self.length as usize
+    }
+
+    /// The payload; empty for a remote frame.
+    pub fn payload(&self) -> &[u8] {
+        let carried = if matches!(self.kind, FrameKind::Remote) { 0 } else { self.length() };
+        self.data.get(..carried).unwrap_or(&[])
+    }
+
+    /// The first eight payload bytes as a number, low byte first; absent bytes are zero. PDOs and SDOs are
+    /// decoded from this word without a bounds check.
+    pub fn first_word(&self) -> u64 {
+        let [a, b, c, d, e, f, g, h, ..] = self.data;
+        u64::from_le_bytes([a, b, c, d, e, f, g, h])
+    }
+}
+
+impl PartialEq for Frame {
+    fn eq(&self, other: &Self) -> bool {
+        self.id == other.id
+            && self.kind == other.kind
+            && self.length == other.length
+            && self.payload() == other.payload()
+    }
+}
+
+impl Eq for Frame {}
+
+impl core::fmt::Debug for Frame {
+    /// `181#37 12 00`, `601#R8`, `123##00 01` as candump and cansend write them.
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, "{:?}#", self.id)?;
+        match self.kind {
+            FrameKind::Remote => return write!(f, "R{}", self.length),
+            FrameKind::Fd => write!(f, "#0")?,
+            FrameKind::FdBitRateSwitch => write!(f, "#1")?,
+            FrameKind::Data => {}
+        }
+        self.payload().iter().try_for_each(|byte| write!(f, "{byte:02X}"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use super::*;
+    use std::format;
+
+    #[test]
+    fn identifiers_outside_their_field_are_refused() {
+        assert_eq!(Id::base(0x800), Err(FrameError::IdOutOfRange { id: 0x800, limit: 0x7FF }));
+        assert!(Id::base(0x7FF).is_ok());
+        assert!(Id::extended(0x2000_0000).is_err());
+        assert!(Id::extended(0x1FFF_FFFF).unwrap().is_extended());
+    }
+
+    #[test]
+    fn a_base_identifier_wins_against_the_extended_ones_that_begin_with_it() {
+        let base = Id::base(0x123).unwrap();
+        let extended = Id::extended(0x123 << 18).unwrap();
+        let stronger = Id::extended(0x122 << 18 | 0x3_FFFF).unwrap();
+        assert!(base.arbitration_key() < extended.arbitration_key());
+        assert!(stronger.arbitration_key() < base.arbitration_key());
+    }
+
+    #[test]
+    fn only_lengths_that_the_bus_can_carry_are_accepted() {
+        let id = Id::canopen(0x180, 5);
+        assert!(Frame::data(id, &[0; 9]).is_err());
+        assert!(Frame::remote(id, 9).is_err());
+        for length in 0..=65 {
+            let allowed = [0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64].contains(&length);
+            assert_eq!(Frame::fd(id, &[0; 65][..length], true).is_ok(), allowed, "{length} bytes");
+        }
+    }
+
+    #[test]
+    fn a_remote_frame_has_a_length_and_no_payload() {
+        let frame = Frame::remote(Id::canopen(0x700, 1), 1).unwrap();
+        assert_eq!((frame.length(), frame.payload()), (1, &[][..]));
+    }
+
+    #[test]
+    fn frames_print_as_candump_writes_them() {
+        let id = Id::base(0x181).unwrap();
+        assert_eq!(format!("{:?}", Frame::of(id, [0x37, 0x12])), "181#3712");
+        assert_eq!(format!("{:?}", Frame::remote(id, 8).unwrap()), "181#R8");
+        assert_eq!(format!("{:?}", Frame::fd(Id::extended(0x123).unwrap(), &[1], true).unwrap()), "00000123##101");
+    }
+
+    #[test]
+    fn the_first_word_is_little_endian() {
+        assert_eq!(Frame::of(Id::canopen(0x180, 1), [1, 2, 3]).first_word(), 0x03_02_01);
+    }
+}

@@ -1,0 +1,1 @@
+//! Linux: clock and thread set-up.

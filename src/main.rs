@@ -1,0 +1,2 @@
+//! takt.
+fn main() {}
