@@ -6,14 +6,15 @@
 #![no_std]
 #![deny(unsafe_code)]
 
-#[cfg(feature = "linux")]
-pub mod linux;
 pub mod cia402;
 pub mod door;
 pub mod frame;
+#[cfg(feature = "linux")]
+pub mod linux;
 pub mod pdo;
 pub mod plan;
 pub mod port;
 pub mod record;
+pub mod stop;
 pub mod time;
 pub mod units;
