@@ -117,6 +117,8 @@ pub struct Axis {
     pub missed_feedback_cycles: u16,
     /// Transmission type of the PDOs (1 = every SYNC).
     pub transmission_type: u8,
+    /// What the drive reports every cycle beside statusword and position.
+    pub feedback: Vec<Feedback>,
     /// Period of the drive's own heartbeat (object 1017); `None` leaves it off.
     pub heartbeat_ns: Option<u64>,
     /// What is known of the drive beforehand and compared at bring-up.
@@ -130,6 +132,21 @@ pub struct Axis {
 pub enum DriveFamily {
     /// ZeroErr eRob, CANopen firmware.
     ErobCanopen,
+}
+
+/// Something a drive can report every cycle beside statusword and position.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Feedback {
+    /// 6061, one byte.
+    OperationMode,
+    /// 606C, four bytes.
+    Velocity,
+    /// 6077, two bytes.
+    Torque,
+    /// 6078, two bytes.
+    Current,
+    /// 603F, two bytes.
+    ErrorCode,
 }
 
 /// How an axis is commanded.
