@@ -88,8 +88,9 @@ impl SimulatedBus {
     }
 
     /// The truth about a drive, as of the last call.
-    pub fn observe(&self, node: u8) -> Result<Observation, UnknownNode> {
-        self.station(node).map(|station| self.drives[station - 1].observe())
+    pub fn observe(&mut self, node: u8) -> Result<Observation, UnknownNode> {
+        let station = self.station(node)?;
+        Ok(self.drives[station - 1].observe(self.now_ns))
     }
 
     /// Breaks something in a drive.

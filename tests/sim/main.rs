@@ -1,5 +1,11 @@
 //! The simulated bus and the simulated eRob joint, as a master sees them.
 
 mod bench;
+mod device;
 mod motion;
+mod network;
+mod port;
+mod process_data;
+mod profiles;
+mod sdo;
 mod vectors;

@@ -102,7 +102,8 @@ impl Device {
         } else if word & controlword::FAULT_RESET == 0 {
             self.reset_since_ns = None;
         }
-        let is_held = self.reset_since_ns.is_some_and(|since_ns| now_ns - since_ns >= FAULT_RESET_NS);
+        let is_held =
+            self.reset_since_ns.is_some_and(|since_ns| now_ns.saturating_sub(since_ns) >= FAULT_RESET_NS);
         if !is_held || !is_cleared {
             return Change::None;
         }

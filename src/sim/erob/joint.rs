@@ -177,7 +177,7 @@ impl ErobJoint {
         let demand = match self.device.stop() {
             Some(stop) => {
                 let (demand, is_at_rest) = self.motion.step_stop(stop.deceleration, duration_s);
-                if is_at_rest && velocity.abs() < 0.01 * self.parameters.highest_velocity {
+                if is_at_rest {
                     self.device.stopped();
                 }
                 demand
@@ -483,6 +483,7 @@ impl Drive for ErobJoint {
 
     fn receive(&mut self, now_ns: Nanoseconds, frame: &Frame, mailbox: &mut Mailbox) {
         self.now_ns = now_ns;
+        self.run_loops(now_ns);
         self.take(now_ns, frame, mailbox);
         self.schedule(now_ns);
     }
@@ -510,7 +511,8 @@ impl Drive for ErobJoint {
         self.wake_ns
     }
 
-    fn observe(&self) -> Observation {
+    fn observe(&mut self, now_ns: Nanoseconds) -> Observation {
+        self.run_loops(now_ns);
         Observation {
             position: self.joint.position(),
             velocity: self.joint.velocity(),

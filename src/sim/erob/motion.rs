@@ -157,10 +157,12 @@ impl Motion {
         }
     }
 
-    /// Moves on by `duration_s` and says what the loops are to follow.
+    /// Moves on by `duration_s` and says what the loops are to follow: a position is that of the beginning of the
+    /// step, which is when the actual one was measured.
     pub fn step(&mut self, word: u16, actual: Actual, dictionary: &Dictionary, duration_s: f64) -> Demand {
         let is_halted = word & controlword::HALT != 0;
         let torque = dictionary.signed_real(at::TORQUE_OFFSET);
+        let position = self.position;
         match self.mode {
             Some(OperationMode::ProfilePosition | OperationMode::InterpolatedPosition) => {
                 if is_halted {
@@ -168,7 +170,7 @@ impl Motion {
                 } else {
                     self.step_profile(dictionary, duration_s);
                 }
-                Demand::Position { position: self.position, velocity: self.velocity, torque: 0.0 }
+                Demand::Position { position, velocity: self.velocity, torque: 0.0 }
             }
             Some(OperationMode::ProfileVelocity) => {
                 let wanted = if is_halted { 0.0 } else { dictionary.signed_real(at::TARGET_VELOCITY) };
@@ -188,7 +190,7 @@ impl Motion {
             Some(OperationMode::CyclicSynchronousPosition) => {
                 self.step_interpolation(dictionary, duration_s);
                 let velocity = self.forward + dictionary.signed_real(at::VELOCITY_OFFSET);
-                Demand::Position { position: self.position, velocity, torque }
+                Demand::Position { position, velocity, torque }
             }
             Some(OperationMode::CyclicSynchronousVelocity) => {
                 let wanted =
@@ -201,7 +203,7 @@ impl Motion {
                 self.torque = dictionary.signed_real(at::TARGET_TORQUE) + torque;
                 Demand::Torque(self.torque)
             }
-            _ => Demand::Position { position: self.position, velocity: 0.0, torque: 0.0 },
+            _ => Demand::Position { position, velocity: 0.0, torque: 0.0 },
         }
     }
 
