@@ -107,6 +107,25 @@ fn when_sync_stays_away_the_last_target_is_reached_and_held() {
 }
 
 #[test]
+fn syncs_that_come_late_do_not_shake_the_joint() {
+    let mut bench = Bench::new();
+    bench.enable(8, TARGET_POSITION, 0);
+    for cycle in 0..1_500i32 {
+        // 0 to 300 µs late, in no order.
+        let late_ns = (cycle * 7_919) % 300 * 1_000;
+        bench.run_ns(late_ns as u64);
+        bench.say(0x080, []);
+        let [a, b, c, d] = (150 * cycle).to_le_bytes();
+        bench.say(0x205, [0x0F, 0, a, b, c, d]);
+        bench.run_ns(MILLISECOND_NS - late_ns as u64);
+        if cycle > 300 {
+            let velocity = bench.observe().velocity * COUNTS_PER_RADIAN;
+            assert!((velocity - 150_000.0).abs() < 10_000.0, "{velocity} in cycle {cycle}");
+        }
+    }
+}
+
+#[test]
 fn csp_with_rpdos_that_act_at_once_follows_too() {
     let mut bench = Bench::new();
     bench.enable(8, TARGET_POSITION, 0);

@@ -1,5 +1,5 @@
-//! The eRob joint module with CANopen firmware, as `spec/erob-can` describes it and as real units behave: object
-//! dictionary, SDO, NMT, PDO, emergency messages, the CiA 402 machine, six modes of operation, and the joint.
+//! The eRob joint module with CANopen firmware, as the eRunner manual 1.7 and its EDS describe it and as real
+//! units behave: object dictionary, SDO, NMT, PDO, emergency messages, the CiA 402 machine, six modes of operation, and the joint.
 //!
 //! ```text
 //! objects ── dictionary ──┬── sdo            requests of the master
@@ -12,12 +12,14 @@
 //!
 //! Choices where neither manual nor traces say anything:
 //! - A CSP target latched at SYNC k is reached at SYNC k + 1: the drive interpolates over the period (1006, else
-//!   60C2), locks its loop to SYNC, and feeds the difference of the last two targets forward. When SYNC stays away
-//!   it holds the last target.
+//!   60C2), locks its loop to SYNC, and feeds the difference of the last two targets forward, two
+//!   periods at most. When SYNC stays away it holds the last target.
 //! - A write that the present state forbids (mapping of a PDO that exists, 6060 while enabled) is aborted with
 //!   0x0800_0022. A mode that 6502 does not name is accepted by 6060 but 6061 does not follow.
+//! - After 2242 = 1 a battery fault still wants its rising edge of bit 7.
 //! - Power is cut at once by electrical and encoder faults; the others decelerate by 605E first, whose default ramp
 //!   6085 = 200 counts/s² takes minutes: program 6085.
+//! - The following-error window 6065 is off (all ones) until it is written.
 //! - The brake works without delay. The controlword's transition 5 (disable operation) is immediate.
 //! - 6093, 6080, 607C, 2380 to 2382, 3B60 and the homing and interpolation objects can be written and read, and do
 //!   nothing.

@@ -34,6 +34,8 @@ struct Interpolation {
     left_s: f64,
     /// Velocity from the difference of the last two targets.
     velocity: f64,
+    /// For how long it goes on being fed forward.
+    forward_s: f64,
 }
 
 /// The set-points of profile position: one under way, one behind it.
@@ -48,6 +50,9 @@ struct SetPoints {
 
 /// The feed-forward of the velocity in CSP passes a low-pass of this time, since targets are whole counts.
 const FORWARD_FILTER_S: f64 = 1e-3;
+/// The velocity is fed forward for this many periods, so that a SYNC that is less than a period late does not shake
+/// the joint.
+const FORWARD_PERIODS: f64 = 2.0;
 /// Closer than this (counts) a profile has arrived.
 const ARRIVED: f64 = 0.01;
 
@@ -130,7 +135,8 @@ impl Motion {
         }
         let limit = self.velocity_limit(dictionary);
         let velocity = ((target - self.interpolation.target) / period_s).clamp(-limit, limit);
-        self.interpolation = Interpolation { target, left_s: period_s, velocity };
+        self.interpolation =
+            Interpolation { target, left_s: period_s, velocity, forward_s: FORWARD_PERIODS * period_s };
     }
 
     /// Evaluates the bits of the controlword that belong to profile position, in an enabled drive.
@@ -300,8 +306,8 @@ impl Motion {
     }
 
     fn is_profile_position(&self) -> bool {
-        // Mode 7, where a unit has it, moves like mode 1 (erob-can, 7.5 and A40: a move to an absolute target that
-        // bit 4 starts and profile velocity 0 stops).
+        // Mode 7, where a unit has it, moves like mode 1 (eRunner manual 1.7, 5.7: a move to an absolute
+        // target that bit 4 starts and profile velocity 0 stops).
         matches!(self.mode, Some(OperationMode::ProfilePosition | OperationMode::InterpolatedPosition))
     }
 
@@ -331,7 +337,7 @@ impl Motion {
     }
 
     fn step_interpolation(&mut self, dictionary: &Dictionary, duration_s: f64) {
-        let Interpolation { target, left_s, velocity } = self.interpolation;
+        let Interpolation { target, left_s, velocity, forward_s } = self.interpolation;
         let most = self.velocity_limit(dictionary) * duration_s;
         let distance = target - self.position;
         // Without a new target the last one is reached and held.
@@ -340,7 +346,8 @@ impl Motion {
         self.position += step;
         self.velocity = step / duration_s;
         self.interpolation.left_s = (left_s - duration_s).max(0.0);
-        let wanted = if left_s > 0.0 { velocity } else { 0.0 };
+        self.interpolation.forward_s = (forward_s - duration_s).max(0.0);
+        let wanted = if forward_s > 0.0 { velocity } else { 0.0 };
         self.forward += (wanted - self.forward) * duration_s / (FORWARD_FILTER_S + duration_s);
     }
 
