@@ -26,6 +26,9 @@ const DRIVE_MAILBOX: usize = 16;
 const MASTER: usize = 0;
 
 /// A bus with simulated drives.
+///
+/// The master's frames wait in one queue in the order of the calls, as in the kernel: what is handed over behind a
+/// set-point goes out behind it, however strong its identifier. Every drive offers its strongest frame first.
 pub struct SimulatedBus {
     medium: Medium,
     drives: Vec<Box<dyn Drive>>,

@@ -120,7 +120,7 @@ fn syncs_that_come_late_do_not_shake_the_joint() {
         bench.run_ns(MILLISECOND_NS - late_ns as u64);
         if cycle > 300 {
             let velocity = bench.observe().velocity * COUNTS_PER_RADIAN;
-            assert!((velocity - 150_000.0).abs() < 10_000.0, "{velocity} in cycle {cycle}");
+            assert!((velocity - 150_000.0).abs() < 2_000.0, "{velocity} in cycle {cycle}");
         }
     }
 }

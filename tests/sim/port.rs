@@ -1,5 +1,9 @@
 //! The simulated bus as a port of the real-time thread: timing, pauses, counters, determinism.
 
+use takt::config::{
+    Axis, Bus, Config, Control, Cycle, DriveFamily, FollowingError, Identity, Interface, Limits, Master,
+    Program, Realtime, SimulatedJoint, Simulation, Telemetry, Travel,
+};
 use takt::sim::erob::ErobJoint;
 use takt::sim::{BitRates, SimulatedBus, UnknownNode, WireLength};
 use takt_rt::frame::{Frame, Id};
@@ -176,4 +180,101 @@ fn the_same_calls_give_the_same_bytes_at_the_same_times() {
         heard
     };
     assert_eq!(run(), run());
+}
+
+/// A linear and a reversed rotary axis on the second of two buses, another one on the first.
+fn config() -> Config {
+    let axis = Axis {
+        name: "base".into(),
+        bus: 0,
+        node: 1,
+        drive: DriveFamily::ErobCanopen,
+        control: Control::Position,
+        travel: Travel::Rotary,
+        counts_per_turn: 524_288.0,
+        gear_ratio: 1.0,
+        reversed: false,
+        zero_counts: 0,
+        limits: Limits {
+            position_min: -3.0,
+            position_max: 3.0,
+            velocity: 2.0,
+            acceleration: 10.0,
+            deceleration: 10.0,
+            jerk: f64::INFINITY,
+            torque: 50.0,
+        },
+        following_error: FollowingError { limit: 0.1, time_ns: 10_000_000 },
+        missed_feedback_cycles: 5,
+        transmission_type: 1,
+        feedback: vec![],
+        heartbeat_ns: None,
+        identity: Identity::default(),
+        simulated: SimulatedJoint {
+            inertia: 0.4,
+            viscous_friction: 1.5,
+            coulomb_friction: 4.0,
+            rated_torque: 31.0,
+            peak_torque: 56.0,
+            initial_position: 0.5,
+            power_up_ns: 0,
+        },
+    };
+    let bus = |name: &str, bit_rate| Bus {
+        name: name.into(),
+        interface: Interface::Simulated,
+        bit_rate,
+        data_bit_rate: None,
+        service_frames_per_cycle: 4,
+    };
+    let axes = vec![
+        axis.clone(),
+        Axis { bus: 1, node: 2, reversed: true, zero_counts: 1000, ..axis.clone() },
+        Axis { bus: 1, node: 3, travel: Travel::Linear { lead_m: 0.01 }, gear_ratio: 2.0, ..axis },
+    ];
+    Config {
+        name: "test".into(),
+        cycle: Cycle { period_ns: 1_000_000, command_phase_ns: 550_000 },
+        realtime: Realtime {
+            priority: None,
+            cpu: None,
+            lock_memory: false,
+            hold_dma_latency: false,
+            spin_guard_ns: Some(0),
+        },
+        master: Master { node: 127, heartbeat_ns: None, heartbeat_timeout_ns: 0 },
+        buses: vec![bus("arm", 1_000_000), bus("gantry", 500_000)],
+        axes,
+        program: Program::default(),
+        telemetry: Telemetry {
+            directory: "runs".into(),
+            is_recorded: false,
+            is_candump_written: false,
+            ring_records: 16,
+        },
+        simulation: Simulation { seed: 1, longest_gap_ns: 5_000_000 },
+    }
+}
+
+#[test]
+fn a_configured_bus_has_a_drive_for_each_of_its_axes_with_the_axis_own_scale() {
+    let config = config();
+    assert_eq!(SimulatedBus::new(&config, 0).nodes().collect::<Vec<_>>(), [1]);
+    let mut bus = SimulatedBus::new(&config, 1);
+    assert_eq!(bus.nodes().collect::<Vec<_>>(), [2, 3]);
+    bus.send(0, &[]);
+    let counts = [2, 3].map(|node| bus.observe(node).unwrap().position_counts);
+    assert_eq!(counts, [1000 - 41_722, 52_428_800]);
+    // Half the bit rate, twice the time: the boot-up messages follow each other.
+    let boot_ups = received(&mut bus, 4 * MILLISECOND_NS);
+    let slow = BitRates { nominal: 500_000, data: None };
+    let duration_ns = slow.duration_ns(&Frame::of(Id::canopen(0x700, 3), [0]));
+    assert_eq!(boot_ups[1].0 - boot_ups[0].0, duration_ns);
+}
+
+#[test]
+fn a_simulated_bus_can_be_handed_to_another_thread() {
+    let bus = bus(u64::MAX);
+    let nodes = std::thread::spawn(move || bus.nodes().count());
+    assert_eq!(nodes.join().unwrap(), 1);
 }

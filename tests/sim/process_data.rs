@@ -2,7 +2,7 @@
 
 use takt_rt::frame::{Frame, Id};
 
-use super::bench::{Bench, MILLISECOND_NS, NODE};
+use super::bench::{Bench, NODE};
 
 const TARGET_POSITION: u32 = 0x607A_0020;
 
@@ -171,8 +171,7 @@ fn the_position_sampled_is_that_of_the_sync_and_not_of_the_sending() {
     for _ in 0..300 {
         bench.cycle(0x0F, 80_000);
     }
-    // Two drives' worth of other traffic does not change what is sampled: positions of equidistant SYNCs at a
-    // constant velocity are equidistant.
+    // At a constant velocity the positions of equidistant SYNCs are equidistant.
     let mut positions = vec![];
     for _ in 0..50 {
         positions.push(bench.cycle(0x0F, 80_000).1);
@@ -180,5 +179,4 @@ fn the_position_sampled_is_that_of_the_sync_and_not_of_the_sending() {
     for pair in positions.windows(2) {
         assert!((pair[1] - pair[0] - 80).abs() <= 1, "{}", pair[1] - pair[0]);
     }
-    assert_eq!(bench.now_ns % (100 * MILLISECOND_NS / 1000), 0);
 }

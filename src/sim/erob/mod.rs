@@ -1,5 +1,6 @@
-//! The eRob joint module with CANopen firmware, as the eRunner manual 1.7 and its EDS describe it and as real
-//! units behave: object dictionary, SDO, NMT, PDO, emergency messages, the CiA 402 machine, six modes of operation, and the joint.
+//! The eRob joint module with CANopen firmware, as the eRunner manual 1.7 and its EDS describe it and as real units
+//! behave: object dictionary, SDO, NMT, PDO, emergency messages, the CiA 402 machine, six modes of operation, and the
+//! joint.
 //!
 //! ```text
 //! objects ── dictionary ──┬── sdo            requests of the master
@@ -12,8 +13,8 @@
 //!
 //! Choices where neither manual nor traces say anything:
 //! - A CSP target latched at SYNC k is reached at SYNC k + 1: the drive interpolates over the period (1006, else
-//!   60C2), locks its loop to SYNC, and feeds the difference of the last two targets forward, two
-//!   periods at most. When SYNC stays away it holds the last target.
+//!   60C2), locks its loop to SYNC, and feeds the difference of the last two targets forward, for two periods
+//!   at most. When SYNC stays away it holds the last target.
 //! - A write that the present state forbids (mapping of a PDO that exists, 6060 while enabled) is aborted with
 //!   0x0800_0022. A mode that 6502 does not name is accepted by 6060 but 6061 does not follow.
 //! - After 2242 = 1 a battery fault still wants its rising edge of bit 7.
