@@ -2,6 +2,7 @@
 //! frames are handed out.
 //!
 //! - [`nmt`]: network management: commands, states, boot-up and heartbeat.
+//! - [`sdo`]: service data objects: what is on the wire, and a client that moves one object at a time.
 //! - [`emcy`]: emergency messages and what their codes mean.
 //! - [`sync`]: the SYNC message.
 //! - [`object`]: an object's address, type and name; [`objects`]: the standard ones used here.
@@ -10,6 +11,7 @@ pub mod emcy;
 pub mod nmt;
 pub mod object;
 pub mod objects;
+pub mod sdo;
 pub mod sync;
 
 /// Function codes of the pre-defined connection set (CiA 301, 7.3.3), to which the node number is added.
