@@ -64,8 +64,7 @@ impl ProgramRunner {
                 Step::Refused(self.begun)
             }
             State::Moving { .. } => {
-                let is_done =
-                    snapshot.finished_move == self.present_id() && snapshot.phase == Phase::Holding;
+                let is_done = snapshot.finished_move == self.present_id() && snapshot.phase == Phase::Holding;
                 if is_done {
                     let dwell_s = self.present().map_or(0.0, |present| present.dwell_s);
                     self.state = State::Dwelling { until_ns: now_ns + (dwell_s * 1e9) as u64 };
