@@ -1,0 +1,7 @@
+//! The logger over a run in virtual time: what it writes, what it reckons, and what it does when it cannot write.
+
+mod failures;
+mod reader;
+mod recording;
+mod run;
+mod thread;
