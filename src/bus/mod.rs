@@ -1,3 +1,4 @@
 //! bus.
 
+pub mod port;
 pub mod trace;

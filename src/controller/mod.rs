@@ -5,6 +5,7 @@ pub mod assemble;
 pub mod channels;
 mod program;
 pub mod realtime_thread;
+pub mod session;
 mod supervisor;
 mod virtual_time;
 

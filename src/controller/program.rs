@@ -26,12 +26,12 @@ enum State {
 }
 
 /// What the program wants now.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Step {
     /// Nothing but time.
     Wait,
     /// This move.
-    Begin(Move),
+    Begin(Box<Move>),
     /// The real-time thread has refused the move with this number, counted from 1.
     Refused(u64),
     /// Everything has been done.
@@ -57,7 +57,7 @@ impl ProgramRunner {
             State::Next => {
                 self.state = State::Moving { refused_before: snapshot.refused };
                 self.begun += 1;
-                Step::Begin(self.present_move())
+                Step::Begin(Box::new(self.present_move()))
             }
             State::Moving { refused_before } if snapshot.refused > refused_before => {
                 self.state = State::Finished;
@@ -139,7 +139,7 @@ mod tests {
         Snapshot { phase: Phase::Holding, finished_move: id, ..Snapshot::default() }
     }
 
-    fn begin(runner: &mut ProgramRunner, now_ns: u64, snapshot: &Snapshot) -> Option<Move> {
+    fn begin(runner: &mut ProgramRunner, now_ns: u64, snapshot: &Snapshot) -> Option<Box<Move>> {
         match runner.poll(now_ns, snapshot) {
             Step::Begin(begun) => Some(begun),
             _ => None,

@@ -55,6 +55,8 @@ pub enum Outcome {
         /// The move.
         number: u64,
     },
+    /// The real-time thread ended by itself, which only a defect of takt can bring about.
+    ThreadDied,
     /// The group did not get where it was told to in time.
     Stuck {
         /// What it was doing.
@@ -295,7 +297,7 @@ impl Supervisor {
         }
         match self.program.poll(now_ns, snapshot) {
             Step::Wait => {}
-            Step::Begin(begun) => self.outgoing.push_back(Request::Move(begun)),
+            Step::Begin(begun) => self.outgoing.push_back(Request::Move(*begun)),
             Step::Refused(number) => self.end(now_ns, Outcome::MoveRefused { number }),
             Step::Finished => self.end(now_ns, Outcome::Finished),
         }

@@ -190,6 +190,7 @@ mod tests {
         CycleRecord {
             timing: Timing { slot, slot_start_ns: slot * 1_000_000, ..Timing::default() },
             phase,
+            is_commanded: true,
             axis_count: 1,
             axes: [axis; MAX_AXES],
         }

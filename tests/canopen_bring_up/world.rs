@@ -122,6 +122,7 @@ fn bus(number: usize) -> Bus {
         bit_rate: 1_000_000,
         data_bit_rate: None,
         service_frames_per_cycle: FRAMES_PER_STEP,
+        sdo_while_enabled: false,
     }
 }
 
@@ -150,6 +151,7 @@ fn axis(number: usize, bus: usize, node: u8) -> Axis {
         missed_feedback_cycles: 3,
         transmission_type: 1,
         feedback: vec![Feedback::Torque],
+        feedback_delay_ns: 20_000,
         heartbeat_ns: Some(50_000_000),
         identity: Identity::default(),
         simulated: SimulatedJoint {
