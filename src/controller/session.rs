@@ -43,6 +43,8 @@ pub struct Session {
     pub begun: Begun,
     /// How the loop was; `None` if the thread died.
     pub ended: Option<Ended>,
+    /// How long the buses were open.
+    pub open_ns: u64,
     /// What the logger leaves behind.
     pub log: LogSummary,
 }
@@ -124,6 +126,7 @@ pub fn run(
         target: supervisor.target().map(<[f64]>::to_vec),
         begun,
         ended,
+        open_ns: clock.now_ns().saturating_sub(started_ns),
         log: logger.finish(),
     })
 }
