@@ -51,8 +51,10 @@ pub struct LogSummary {
     pub statistics: Statistics,
     /// Records that came through the ring.
     pub records: u64,
-    /// Records and events that found no room in their rings.
-    pub dropped: u64,
+    /// Records that found no room in the ring.
+    pub records_dropped: u64,
+    /// Events that found no room in the ring.
+    pub events_dropped: u64,
     /// Frames that found no room on their way to the candump log.
     pub frames_dropped: u64,
     /// The recording, if it was written to a file, even in part.
@@ -184,7 +186,8 @@ impl Logger {
             machine: self.machine,
             statistics: self.statistics,
             records: self.source.records_written(),
-            dropped: self.source.records_dropped() + self.source.events_dropped(),
+            records_dropped: self.source.records_dropped(),
+            events_dropped: self.source.events_dropped(),
             frames_dropped: self.traces.iter().map(Trace::dropped).sum(),
             recording,
             candump,

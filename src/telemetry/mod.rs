@@ -11,7 +11,9 @@ mod destination;
 mod logger;
 mod machine;
 mod messages;
+mod picture;
 mod recording;
+mod report;
 mod statistics;
 mod thread;
 mod wall_clock;
@@ -20,6 +22,10 @@ pub mod words;
 pub use destination::Destination;
 pub use logger::{LogSummary, Logger, LoggerOptions, Notice};
 pub use machine::{AxisDescription, BusDescription, Machine, Unit};
+pub use picture::Emphasis;
+pub use report::{
+    AxisReport, BusReport, LatencyReport, RealtimeReport, RunOutcome, RunReport, StopReport, TelemetryReport,
+};
 pub use statistics::{AxisStatistics, FollowingErrorMaximum, Latency, Statistics};
 pub use thread::LoggerThread;
 pub use wall_clock::WallClock;

@@ -3,5 +3,6 @@
 mod failures;
 mod reader;
 mod recording;
+mod report;
 mod run;
 mod thread;

@@ -27,9 +27,8 @@ fn record() -> Vec<u8> {
         EventKind::Emergency { axis: 1, code: 0x7305, register: 0x21, manufacturer: [1, 2, 3, 4, 5] },
     ));
     let summary = logger.finish();
-    assert_eq!((summary.records, summary.dropped, summary.not_written.len()), (20, 0, 0));
-    let bytes = disk.bytes.lock().unwrap().clone();
-    bytes
+    assert_eq!((summary.records, summary.records_dropped, summary.not_written.len()), (20, 0, 0));
+    disk.bytes.lock().unwrap().clone()
 }
 
 fn number(value: impl Into<f64>) -> Value {

@@ -24,7 +24,7 @@ fn the_thread_writes_all_that_was_handed_over_before_it_was_told_to_finish() {
     }
     assert!(rt.event(&last));
     let summary = thread.finish();
-    assert_eq!((summary.records, summary.dropped, summary.statistics.cycles), (1000, dropped, 1000));
+    assert_eq!((summary.records, summary.records_dropped, summary.statistics.cycles), (1000, dropped, 1000));
     assert_eq!(notices.all(), [Notice::Event(last)]);
     let recording = fs::read(summary.recording.unwrap()).unwrap();
     assert_eq!(messages(&recording, "/cycle").len(), 1000);
