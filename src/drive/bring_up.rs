@@ -38,7 +38,8 @@ impl Default for BringUpTiming {
     fn default() -> Self {
         Self {
             boot_up_timeout_ns: 12_000_000_000,
-            reset_repeat_ns: 1_000_000_000,
+            // No divisor of whole seconds: a drive that needs eight of them is not reset just when it has booted.
+            reset_repeat_ns: 700_000_000,
             confirm_timeout_ns: 2_000_000_000,
             sdo: sdo::Timing::default(),
         }

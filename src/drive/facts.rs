@@ -33,7 +33,8 @@ pub struct AxisFacts {
     pub emergency: Option<Emergency>,
     /// Optional objects that the drive has refused.
     pub absent: Vec<ObjectAddress>,
-    /// How often it has restarted in the middle of the bring-up.
+    /// How often it has booted again after its first boot-up, and was configured anew. A drive that is reset just when
+    /// it has powered up obeys late, which counts too.
     pub restarts: u8,
 }
 
