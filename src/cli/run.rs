@@ -1,6 +1,6 @@
 //! `takt run`: the main job.
 
-use std::io::{IsTerminal, stderr};
+use std::io::{IsTerminal, Write, stderr, stdout};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -10,12 +10,13 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 use signal_hook::consts::{SIGINT, SIGTERM};
-use takt::bus::schedule;
+
 use takt::config::Config;
 use takt::controller::realtime_thread::StartError;
 use takt::controller::session::{self, Session, SessionError, SessionOptions};
 use takt::controller::{Interrupt, Outcome, Progress};
-use takt::telemetry::{Destination, Machine, Notice, RealtimeReport, RunOutcome, RunReport, words};
+use takt::telemetry::{Destination, Emphasis, Machine, Notice, RealtimeReport, RunOutcome, RunReport, words};
+use takt_rt::record::{Event, EventKind};
 use takt_rt::stop::StopReason;
 
 use super::configuration::{self, BusOverride};
@@ -60,10 +61,6 @@ pub fn run(arguments: Arguments) -> Exit {
         Ok(config) => config,
         Err(exit) => return exit,
     };
-    if let Err(refused) = schedule::verify(&config) {
-        eprintln!("{refused}");
-        return Exit::Usage;
-    }
     let mut signals = match Signals::watch() {
         Ok(signals) => signals,
         Err(error) => {
@@ -120,16 +117,21 @@ fn report(config: &Config, session: &Session, as_json: bool) -> Exit {
     if as_json {
         let printed = Printed { report: &report, ended, failure };
         match serde_json::to_string(&printed) {
-            Ok(json) => println!("{json}"),
+            Ok(json) => print(&format!("{json}\n")),
             Err(error) => eprintln!("takt: the report cannot be written as JSON: {error}"),
         }
     } else {
-        println!("{report}");
-        if let Some(failure) = failure {
-            eprintln!("takt: {failure}");
+        match failure {
+            Some(failure) => eprintln!("takt: {failure}"),
+            None => print(&report.picture(if stdout().is_terminal() { Emphasis::Ansi } else { Emphasis::None })),
         }
     }
     exit
+}
+
+/// A reader that has seen enough (`| head`) is no failure of the run.
+fn print(text: &str) {
+    let _ = stdout().write_all(text.as_bytes());
 }
 
 fn stop_of(session: &Session) -> Option<StopReason> {
@@ -225,13 +227,18 @@ impl Drawn {
     }
 }
 
+/// What is no part of an ordinary run.
+fn is_urgent(event: &Event) -> bool {
+    matches!(event.kind, EventKind::Stop(_) | EventKind::Emergency { .. } | EventKind::Refused { .. })
+}
+
 /// Says at once what people should not have to wait for.
 fn notices(bar: &ProgressBar, machine: Machine) -> Box<dyn FnMut(&Notice) + Send> {
     let bar = bar.clone();
     Box::new(move |notice| {
         let text = match notice {
             Notice::NotWritten(text) => format!("takt: {text}"),
-            Notice::Event(event) if words::is_worth_saying(event) => words::event(event, &machine),
+            Notice::Event(event) if is_urgent(event) => words::event(event, &machine),
             Notice::Event(_) => return,
         };
         bar.suspend(|| eprintln!("{text}"));

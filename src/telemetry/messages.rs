@@ -35,7 +35,8 @@ pub fn encode_cycle(record: &CycleRecord, encoder: &mut CdrEncoder) {
         .u64(timing.compute_ns)
         .u64(timing.sent_ns)
         .u64(timing.missed_slots)
-        .u8(record.phase as u8);
+        .u8(record.phase as u8)
+        .u8(record.is_commanded.into());
 }
 
 /// Encodes an [`AXIS`].

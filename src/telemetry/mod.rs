@@ -12,6 +12,7 @@ mod logger;
 mod machine;
 mod messages;
 mod picture;
+mod realtime;
 mod recording;
 mod report;
 mod statistics;

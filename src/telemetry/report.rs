@@ -78,6 +78,8 @@ pub struct RealtimeReport {
     pub memory_locked: bool,
     /// Whether the kernel is PREEMPT_RT.
     pub preempt_rt: bool,
+    /// How long before a deadline the thread stopped sleeping and spun.
+    pub spin_guard_ns: u64,
     /// Page faults of the real-time thread, minor and major, from its first cycle to its last.
     pub page_faults: u64,
     /// Each step that was refused, with the reason.

@@ -75,6 +75,7 @@ fn every_field_of_every_record_can_be_read_by_the_schema_in_the_file() {
         ("sent_ns", number(4003)),
         ("missed_slots", number(1)),
         ("phase", number(4)),
+        ("is_commanded", number(0)),
     ];
     assert_eq!(*times, expected.map(|(name, value)| (name.to_owned(), value)).into());
 }

@@ -92,6 +92,7 @@ pub fn cycle(slot: u64) -> CycleRecord {
             missed_slots: u64::from(slot == 3),
         },
         phase: Phase::Moving,
+        is_commanded: slot != 3,
         axis_count: 2,
         axes,
     }
