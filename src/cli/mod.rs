@@ -1,8 +1,10 @@
 //! The command line: one file a subcommand, and what they share.
 
+mod check;
 mod configuration;
 mod exit;
 mod run;
+mod table;
 
 pub use exit::Exit;
 
@@ -19,6 +21,7 @@ pub struct CommandLine {
 #[derive(Subcommand, Debug)]
 enum Command {
     Run(run::Arguments),
+    Check(check::Arguments),
 }
 
 impl CommandLine {
@@ -26,6 +29,7 @@ impl CommandLine {
     pub fn execute(self) -> Exit {
         match self.command {
             Command::Run(arguments) => run::run(arguments),
+            Command::Check(arguments) => check::run(&arguments),
         }
     }
 }

@@ -11,6 +11,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 use signal_hook::consts::{SIGINT, SIGTERM};
 
+use takt::bus::schedule;
 use takt::config::Config;
 use takt::controller::realtime_thread::StartError;
 use takt::controller::session::{self, Session, SessionError, SessionOptions};
@@ -61,6 +62,10 @@ pub fn run(arguments: Arguments) -> Exit {
         Ok(config) => config,
         Err(exit) => return exit,
     };
+    if let Err(refused) = schedule::verify(&config) {
+        eprintln!("takt: {refused}");
+        return Exit::Usage;
+    }
     let mut signals = match Signals::watch() {
         Ok(signals) => signals,
         Err(error) => {
