@@ -5,12 +5,14 @@ mod failures;
 mod scripted_drive;
 mod world;
 
+use proptest::prelude::*;
 use scripted_drive::at;
 use takt::canopen::emcy::ErrorCode;
 use takt::canopen::nmt::NmtState;
 use takt::config::{Config, Control};
 use takt::drive::{BringUp, BringUpTiming, Leave, NotConfigured, Progress, Stage};
 use takt_rt::cia402::State;
+use takt_rt::frame::{Frame, Id};
 use world::{World, config};
 
 /// A world whose drives have been configured and started.
@@ -309,4 +311,39 @@ fn time_outs_are_those_of_the_caller() {
     let timing = BringUpTiming { boot_up_timeout_ns: 300_000_000, ..BringUpTiming::default() };
     world.run(&mut BringUp::with_timing(&config, timing)).unwrap_err();
     assert!(world.now_ns - begin < 2_000_000_000, "300 ms, and three questions of 500 ms each");
+}
+
+/// Frames that a drive might send, about objects that a bring-up touches.
+fn any_frame() -> impl Strategy<Value = Frame> {
+    let id = prop_oneof![6 => Just(0x582), 2 => Just(0x702), 1 => Just(0x082), 1 => 0..0x7FFu32];
+    let first = prop_oneof![Just(0x43), Just(0x4F), Just(0x60), Just(0x80), Just(0x41), any::<u8>()];
+    let object =
+        prop_oneof![Just([0x00, 0x10, 0]), Just([0x18, 0x10, 1]), Just([0x41, 0x60, 0]), any::<[u8; 3]>()];
+    let sdo = (first, object, any::<[u8; 4]>())
+        .prop_map(|(first, object, tail)| [&[first][..], &object, &tail].concat());
+    let payload = prop_oneof![3 => sdo, 1 => Just(vec![0]), 1 => prop::collection::vec(any::<u8>(), 0..=8)];
+    (id, payload).prop_map(|(id, payload)| Frame::data(Id::base(id).unwrap(), &payload).unwrap())
+}
+
+proptest! {
+    #[test]
+    fn a_bus_full_of_nonsense_neither_panics_nor_brings_a_drive_up(
+        frames in prop::collection::vec((any_frame(), 0..200_000_000u64), 0..200),
+    ) {
+        let config = config(&[(0, 2)]);
+        let mut bring_up = BringUp::new(&config);
+        let mut now_ns = 0;
+        for (frame, pause_ns) in frames {
+            let mut requests = 0;
+            bring_up.poll(now_ns, &mut |_, frame| {
+                // An abort expects no answer, so a request may follow it at once.
+                let is_abort = frame.payload().first() == Some(&0x80);
+                requests += usize::from(frame.id().value() == 0x602 && !is_abort);
+            });
+            prop_assert!(requests <= 1, "two SDO requests at once");
+            bring_up.receive(0, &frame);
+            now_ns += pause_ns;
+        }
+        prop_assert!(!matches!(bring_up.outcome(), Some(Ok(_))));
+    }
 }
