@@ -25,6 +25,7 @@ fn drive(node: u8) -> Box<dyn Drive> {
         peak_torque: 56.0,
         highest_velocity: 4.0,
         power_up_ns: 0,
+        feedback_delay_ns: 20_000,
         has_battery: true,
         has_interpolated_position: false,
         is_upload_segmented: false,

@@ -102,6 +102,8 @@ pub struct Snapshot {
     pub missed_slots: u64,
     /// Events and records that found no room, since the start.
     pub dropped: u64,
+    /// Requests that were refused, since the start.
+    pub refused: u64,
     /// The number of the last finished move; 0 before the first.
     pub finished_move: u32,
     /// Planned time left of the present move or stop, in seconds.
@@ -116,6 +118,26 @@ pub struct Snapshot {
     pub bus_count: u8,
     /// The buses in the order of the configuration.
     pub buses: [BusHealth; MAX_BUSES],
+}
+
+impl Default for Snapshot {
+    fn default() -> Self {
+        Self {
+            slot: 0,
+            at_ns: 0,
+            phase: Phase::default(),
+            missed_slots: 0,
+            dropped: 0,
+            refused: 0,
+            finished_move: 0,
+            remaining_s: 0.0,
+            stop: None,
+            axis_count: 0,
+            axes: [AxisSnapshot::default(); MAX_AXES],
+            bus_count: 0,
+            buses: [BusHealth::default(); MAX_BUSES],
+        }
+    }
 }
 
 /// One axis after a cycle.

@@ -6,11 +6,18 @@
 #![no_std]
 #![deny(unsafe_code)]
 
+pub mod axis;
 pub mod cia402;
+pub mod control;
+pub mod cycle;
+pub mod dispatch;
 pub mod door;
+pub mod engine;
 pub mod frame;
+pub mod guard;
 #[cfg(feature = "linux")]
 pub mod linux;
+mod motion;
 pub mod pdo;
 pub mod plan;
 pub mod port;

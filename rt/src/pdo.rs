@@ -237,6 +237,11 @@ impl Mapping {
         self.bytes.into()
     }
 
+    /// Whether a feedback mapping fills this slot.
+    pub fn carries(&self, slot: FeedbackSlot) -> bool {
+        self.fields.iter().any(|field| field.slot == slot as u8)
+    }
+
     /// Packs the image into a payload, of which the first [`Mapping::length`] bytes count.
     pub fn pack(&self, image: &ProcessImage) -> [u8; 8] {
         let mut word = 0u64;

@@ -75,6 +75,8 @@ pub struct CycleRecord {
     pub timing: Timing,
     /// What the group was doing.
     pub phase: Phase,
+    /// Whether set-points were sent in this cycle; if not, the drives hold the last ones.
+    pub is_commanded: bool,
     /// How many of `axes` count.
     pub axis_count: u8,
     /// The axes in the order of the configuration.
@@ -86,6 +88,7 @@ impl Default for CycleRecord {
         Self {
             timing: Timing::default(),
             phase: Phase::default(),
+            is_commanded: false,
             axis_count: 0,
             axes: [AxisRecord::default(); MAX_AXES],
         }

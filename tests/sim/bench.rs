@@ -27,6 +27,7 @@ pub fn parameters(node: u8) -> ErobParameters {
         peak_torque: 56.0,
         highest_velocity: 4.0,
         power_up_ns: 5 * MILLISECOND_NS,
+        feedback_delay_ns: 20_000,
         has_battery: true,
         has_interpolated_position: false,
         is_upload_segmented: false,

@@ -2,6 +2,7 @@
 
 mod bench;
 mod device;
+mod lengths;
 mod motion;
 mod network;
 mod port;

@@ -1,9 +1,6 @@
 //! The simulated bus as a port of the real-time thread: timing, pauses, counters, determinism.
 
-use takt::config::{
-    Axis, Bus, Config, Control, Cycle, DriveFamily, FollowingError, Identity, Interface, Limits, Master,
-    Program, Realtime, SimulatedJoint, Simulation, Telemetry, Travel,
-};
+use takt::config::{Config, Travel};
 use takt::sim::erob::ErobJoint;
 use takt::sim::{BitRates, SimulatedBus, UnknownNode, WireLength};
 use takt_rt::frame::{Frame, Id};
@@ -182,78 +179,20 @@ fn the_same_calls_give_the_same_bytes_at_the_same_times() {
     assert_eq!(run(), run());
 }
 
-/// A linear and a reversed rotary axis on the second of two buses, another one on the first.
+/// The example arm with a reversed axis that has an offset and a linear one on a second, slower bus.
 fn config() -> Config {
-    let axis = Axis {
-        name: "base".into(),
-        bus: 0,
-        node: 1,
-        drive: DriveFamily::ErobCanopen,
-        control: Control::Position,
-        travel: Travel::Rotary,
-        counts_per_turn: 524_288.0,
-        gear_ratio: 1.0,
-        reversed: false,
-        zero_counts: 0,
-        limits: Limits {
-            position_min: -3.0,
-            position_max: 3.0,
-            velocity: 2.0,
-            acceleration: 10.0,
-            deceleration: 10.0,
-            jerk: f64::INFINITY,
-            torque: 50.0,
-        },
-        following_error: FollowingError { limit: 0.1, time_ns: 10_000_000 },
-        missed_feedback_cycles: 5,
-        transmission_type: 1,
-        feedback: vec![],
-        heartbeat_ns: None,
-        identity: Identity::default(),
-        simulated: SimulatedJoint {
-            inertia: 0.4,
-            viscous_friction: 1.5,
-            coulomb_friction: 4.0,
-            rated_torque: 31.0,
-            peak_torque: 56.0,
-            initial_position: 0.5,
-            power_up_ns: 0,
-        },
-    };
-    let bus = |name: &str, bit_rate| Bus {
-        name: name.into(),
-        interface: Interface::Simulated,
-        bit_rate,
-        data_bit_rate: None,
-        service_frames_per_cycle: 4,
-    };
-    let axes = vec![
-        axis.clone(),
-        Axis { bus: 1, node: 2, reversed: true, zero_counts: 1000, ..axis.clone() },
-        Axis { bus: 1, node: 3, travel: Travel::Linear { lead_m: 0.01 }, gear_ratio: 2.0, ..axis },
-    ];
-    Config {
-        name: "test".into(),
-        cycle: Cycle { period_ns: 1_000_000, command_phase_ns: 550_000 },
-        realtime: Realtime {
-            priority: None,
-            cpu: None,
-            lock_memory: false,
-            hold_dma_latency: false,
-            spin_guard_ns: Some(0),
-        },
-        master: Master { node: 127, heartbeat_ns: None, heartbeat_timeout_ns: 0 },
-        buses: vec![bus("arm", 1_000_000), bus("gantry", 500_000)],
-        axes,
-        program: Program::default(),
-        telemetry: Telemetry {
-            directory: "runs".into(),
-            is_recorded: false,
-            is_candump_written: false,
-            ring_records: 16,
-        },
-        simulation: Simulation { seed: 1, longest_gap_ns: 5_000_000 },
+    let mut config = Config::parse("arm6-erob.toml", include_str!("../../configs/arm6-erob.toml")).unwrap();
+    config.axes.truncate(3);
+    config.buses[1].bit_rate = 500_000;
+    let [first, reversed, linear] = &mut config.axes[..] else { panic!("three axes") };
+    (first.bus, reversed.bus, linear.bus) = (0, 1, 1);
+    (reversed.reversed, reversed.zero_counts) = (true, 1000);
+    (linear.reversed, linear.travel, linear.gear_ratio) = (false, Travel::Linear { lead_m: 0.01 }, 2.0);
+    for axis in [first, reversed, linear] {
+        axis.simulated.initial_position = 0.5;
+        axis.simulated.power_up_ns = 0;
     }
+    config
 }
 
 #[test]

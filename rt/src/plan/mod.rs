@@ -1,12 +1,31 @@
 //! Trajectories: from any state to any state in minimum time within limits, for any number of axes at once.
+//!
+//! A [`Problem`] says where an axis is, where it shall be and what it must keep; its answer is a [`Profile`],
+//! an exact trajectory made of phases of constant jerk. [`synchronised`] plans all axes so that they arrive
+//! together, [`stop`] brings them to rest together. Planning anew in every cycle from the commanded state,
+//! `profile.sample(t)`, gives the same motion again.
+//!
+//! ```
+//! use takt_rt::plan::{Limits, Problem, Profile, State, Timing, synchronised};
+//! let limits = Limits::symmetric(2.0, 8.0, f64::INFINITY);
+//! let problems = [1.0, -0.25].map(|target| Problem { start: State::rest(0.0), target: State::rest(target), limits });
+//! let mut profiles = [Profile::hold(0.0); 2];
+//! let duration_s = synchronised(&problems, &mut profiles, Timing::default()).unwrap();
+//! assert_eq!(duration_s, 0.75);
+//! assert_eq!(profiles[1].sample(duration_s), State::rest(-0.25));
+//! ```
+//!
+//! The planner allocates nothing, panics on nothing and always ends: the number of steps has a fixed bound.
 
-/// Position, velocity and acceleration of an axis (rad or m, per second, per second squared).
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct State {
-    /// Position.
-    pub position: f64,
-    /// Velocity.
-    pub velocity: f64,
-    /// Acceleration.
-    pub acceleration: f64,
-}
+mod error;
+mod problem;
+mod profile;
+mod synchronisation;
+mod trapezoid;
+
+pub use error::{Limit, PlanError, Quantity};
+pub use problem::{Limits, Problem, State};
+pub use profile::{Blocked, Extrema, PHASES_MAX, Phase, Profile, Range};
+pub use synchronisation::{
+    Synchronisation, Timing, position, stop, synchronised, synchronised_velocity, velocity,
+};

@@ -23,8 +23,6 @@ use crate::sim::random::Random;
 
 /// The control loops and the plant run at 8 kHz.
 const STEP_NS: Nanoseconds = 125_000;
-/// From the arrival of SYNC to the TPDO in the controller.
-const TPDO_LATENCY_NS: Nanoseconds = 20_000;
 /// Without anything to do the drive looks up this often.
 const IDLE_NS: Nanoseconds = 1_000_000;
 /// Counts of the motor encoder for one of the output encoder.

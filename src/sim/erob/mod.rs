@@ -66,6 +66,8 @@ pub struct ErobParameters {
     pub highest_velocity: f64,
     /// From power-up or "reset node" to the boot-up message.
     pub power_up_ns: Nanoseconds,
+    /// From the arrival of SYNC until the feedback is ready to be sent.
+    pub feedback_delay_ns: Nanoseconds,
     /// Whether a battery keeps the multi-turn count; without one the position after power-up is single-turn.
     pub has_battery: bool,
     /// Whether mode 7 is followed by 6061, as one capture of the manual shows (Fig 5-38) although 6502 lacks it.
@@ -103,6 +105,7 @@ impl ErobParameters {
             peak_torque: joint.peak_torque,
             highest_velocity: 1.5 * axis.limits.velocity,
             power_up_ns: joint.power_up_ns,
+            feedback_delay_ns: axis.feedback_delay_ns,
             has_battery: true,
             has_interpolated_position: false,
             is_upload_segmented: false,

@@ -3,8 +3,8 @@
 use takt_rt::frame::{Frame, FrameKind, Id};
 use takt_rt::time::Nanoseconds;
 
+use super::ErobJoint;
 use super::access::{Objects, write_field};
-use super::{ErobJoint, TPDO_LATENCY_NS};
 use crate::sim::drive::{DriveFault, NmtState};
 use crate::sim::erob::dictionary::at;
 use crate::sim::erob::errors::Error;
@@ -85,7 +85,7 @@ impl ErobJoint {
         self.evaluate(now_ns);
         self.motion.latch(&self.dictionary);
         self.measure();
-        self.process_data.sample(now_ns, TPDO_LATENCY_NS, &self.dictionary);
+        self.process_data.sample(now_ns, self.parameters.feedback_delay_ns, &self.dictionary);
     }
 
     fn take_pdo(&mut self, now_ns: Nanoseconds, frame: &Frame) {

@@ -1,0 +1,152 @@
+//! The planning problem of one axis: where it is, where it shall be, what it must keep.
+
+use super::error::{Limit, PlanError, Quantity};
+
+/// The state of motion of one axis, in rad, rad/s and rad/s² (m, m/s and m/s² for a linear axis).
+///
+/// The planner itself is free of units: any consistent set will do.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct State {
+    /// Position.
+    pub position: f64,
+    /// Velocity.
+    pub velocity: f64,
+    /// Acceleration. Second-order planning neither reads it in a start state nor reaches it in a target state.
+    pub acceleration: f64,
+}
+
+impl State {
+    /// At rest at this position.
+    pub const fn rest(position: f64) -> Self {
+        Self { position, velocity: 0.0, acceleration: 0.0 }
+    }
+}
+
+/// What the motion of one axis must keep.
+///
+/// The upper limits of velocity and acceleration are positive and the lower ones negative. A limit may be far
+/// away, but not infinite, except for the position and the jerk.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limits {
+    /// Largest velocity, positive.
+    pub velocity_max: f64,
+    /// Smallest velocity, negative.
+    pub velocity_min: f64,
+    /// Largest acceleration, positive.
+    pub acceleration_max: f64,
+    /// Smallest acceleration, negative.
+    pub acceleration_min: f64,
+    /// Largest magnitude of the jerk, positive. `f64::INFINITY` gives the second-order problem: the
+    /// acceleration may jump.
+    pub jerk_max: f64,
+    /// Largest position; `f64::INFINITY` where there is none.
+    pub position_max: f64,
+    /// Smallest position; `f64::NEG_INFINITY` where there is none.
+    pub position_min: f64,
+}
+
+impl Limits {
+    /// The same limits in both directions, and no limit of position. All arguments are positive magnitudes.
+    pub const fn symmetric(velocity: f64, acceleration: f64, jerk: f64) -> Self {
+        Self::asymmetric(velocity, -velocity, acceleration, -acceleration, jerk)
+    }
+
+    /// Different limits in the two directions, and no limit of position. The minima are negative.
+    pub const fn asymmetric(
+        velocity_max: f64,
+        velocity_min: f64,
+        acceleration_max: f64,
+        acceleration_min: f64,
+        jerk_max: f64,
+    ) -> Self {
+        Self {
+            velocity_max,
+            velocity_min,
+            acceleration_max,
+            acceleration_min,
+            jerk_max,
+            position_max: f64::INFINITY,
+            position_min: f64::NEG_INFINITY,
+        }
+    }
+
+    /// The same limits with these limits of position.
+    pub const fn with_position(mut self, position_min: f64, position_max: f64) -> Self {
+        self.position_min = position_min;
+        self.position_max = position_max;
+        self
+    }
+
+    /// Checks signs and finiteness.
+    ///
+    /// # Errors
+    /// [`PlanError::InvalidLimit`] with axis 0 and the first limit that cannot be kept by any motion.
+    pub fn validate(&self) -> Result<(), PlanError> {
+        let positive = |value: f64| value > 0.0 && value.is_finite();
+        let checks = [
+            (positive(self.velocity_max), Limit::VelocityMax),
+            (positive(-self.velocity_min), Limit::VelocityMin),
+            (positive(self.acceleration_max), Limit::AccelerationMax),
+            (positive(-self.acceleration_min), Limit::AccelerationMin),
+            (self.jerk_max > 0.0, Limit::JerkMax),
+            (!self.position_max.is_nan(), Limit::PositionMax),
+            (self.position_min < self.position_max, Limit::PositionMin),
+        ];
+        match checks.iter().find(|(kept, _)| !kept) {
+            Some((_, limit)) => Err(PlanError::InvalidLimit { axis: 0, limit: *limit }),
+            None => Ok(()),
+        }
+    }
+}
+
+/// From where to where, within which limits: the problem of one axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Problem {
+    /// The state at time 0. It may be outside the limits: the motion then first returns into them.
+    pub start: State,
+    /// The state at the end. The velocity interface does not read its position.
+    pub target: State,
+    /// What the motion keeps.
+    pub limits: Limits,
+}
+
+impl Problem {
+    /// Checks that every number is finite, the limits are limits, and the target keeps them.
+    pub(super) fn validate(&self) -> Result<(), PlanError> {
+        self.limits.validate()?;
+        let second_order = self.limits.jerk_max == f64::INFINITY;
+        let (start, target) = (&self.start, &self.target);
+        let finite = |value: f64, quantity| {
+            if value.is_finite() { Ok(()) } else { Err(PlanError::NotFinite { axis: 0, quantity }) }
+        };
+        finite(start.position, Quantity::StartPosition)?;
+        finite(start.velocity, Quantity::StartVelocity)?;
+        finite(target.position, Quantity::TargetPosition)?;
+        finite(target.velocity, Quantity::TargetVelocity)?;
+        if !second_order {
+            finite(start.acceleration, Quantity::StartAcceleration)?;
+            finite(target.acceleration, Quantity::TargetAcceleration)?;
+        }
+        self.validate_target(second_order)
+    }
+
+    fn validate_target(&self, second_order: bool) -> Result<(), PlanError> {
+        let (target, limits) = (&self.target, &self.limits);
+        let beyond = |limit| Err(PlanError::TargetBeyondLimit { axis: 0, limit });
+        if target.velocity > limits.velocity_max {
+            return beyond(Limit::VelocityMax);
+        }
+        if target.velocity < limits.velocity_min {
+            return beyond(Limit::VelocityMin);
+        }
+        if !second_order {
+            if target.acceleration > limits.acceleration_max {
+                return beyond(Limit::AccelerationMax);
+            }
+            if target.acceleration < limits.acceleration_min {
+                return beyond(Limit::AccelerationMin);
+            }
+        }
+        Ok(())
+    }
+}

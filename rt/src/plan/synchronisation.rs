@@ -1,0 +1,239 @@
+//! Several axes, one duration (`otg.md` section 2, 4).
+
+use super::error::{Limit, PlanError};
+use super::problem::{Limits, Problem, State};
+use super::profile::Profile;
+use super::trapezoid;
+
+/// What the axes have in common.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Synchronisation {
+    /// All axes arrive at the same time, as soon as the slowest can.
+    #[default]
+    Time,
+    /// Every axis takes its own shortest time.
+    Independent,
+}
+
+/// When a motion shall end.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Timing {
+    /// What the axes have in common.
+    pub synchronisation: Synchronisation,
+    /// The motion takes at least this long, in s. 0 for as fast as possible.
+    pub minimum_duration_s: f64,
+    /// The duration is a multiple of this cycle, in s.
+    pub cycle_s: Option<f64>,
+}
+
+/// What is controlled: where an axis arrives, or only how fast it then is.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Interface {
+    Position,
+    Velocity,
+}
+
+/// Plans the motion of all axes to their targets and gives its duration in s.
+///
+/// Profile by profile: from the start state, back into the limits if it is outside of them, to exactly the
+/// target state, within the limits at every instant. A problem with an infinite jerk limit is planned in
+/// second order.
+///
+/// The work is bounded: each axis is solved at most twice, and the search for a duration that no axis blocks
+/// looks at each blocked interval at most once more than there are intervals.
+///
+/// # Errors
+/// The first thing that is wrong with a problem, with the index of its axis; the profiles are then of no use,
+/// except after [`PlanError::PositionBeyondLimit`], where they hold a coordinated [`stop`].
+pub fn synchronised(
+    problems: &[Problem],
+    profiles: &mut [Profile],
+    timing: Timing,
+) -> Result<f64, PlanError> {
+    let duration_s = plan(Interface::Position, problems, profiles, timing)?;
+    for (axis, (problem, profile)) in problems.iter().zip(profiles.iter()).enumerate() {
+        if let Some(limit) = position_limit_left(problem, profile) {
+            halt(problems.iter().map(|problem| (problem.start, problem.limits)), profiles)?;
+            return Err(PlanError::PositionBeyondLimit { axis, limit });
+        }
+    }
+    Ok(duration_s)
+}
+
+/// Plans the motion of all axes to their target velocities, wherever that leads, and gives its duration in s.
+///
+/// The target positions are not read. Position limits are not looked at: leaving them may be the only way to
+/// reach the velocity; see [`Profile::extrema`].
+///
+/// # Errors
+/// As [`synchronised`].
+pub fn synchronised_velocity(
+    problems: &[Problem],
+    profiles: &mut [Profile],
+    timing: Timing,
+) -> Result<f64, PlanError> {
+    plan(Interface::Velocity, problems, profiles, timing)
+}
+
+/// Plans the fastest coordinated stop: every axis comes to rest, all at the same time. Gives the duration in s.
+///
+/// # Errors
+/// As [`synchronised`].
+pub fn stop(starts: &[State], limits: &[Limits], profiles: &mut [Profile]) -> Result<f64, PlanError> {
+    expect_length(starts.len(), limits.len())?;
+    expect_length(starts.len(), profiles.len())?;
+    halt(starts.iter().copied().zip(limits.iter().copied()), profiles)
+}
+
+/// Plans one axis to its target in the shortest time.
+///
+/// # Errors
+/// As [`synchronised`], with axis 0.
+pub fn position(problem: &Problem) -> Result<Profile, PlanError> {
+    let mut profile = [Profile::hold(0.0)];
+    synchronised(&[*problem], &mut profile, Timing::default())?;
+    let [profile] = profile;
+    Ok(profile)
+}
+
+/// Plans one axis to its target velocity in the shortest time.
+///
+/// # Errors
+/// As [`synchronised`], with axis 0.
+pub fn velocity(problem: &Problem) -> Result<Profile, PlanError> {
+    let mut profile = Profile::hold(0.0);
+    fastest(Interface::Velocity, problem, &mut profile)?;
+    Ok(profile)
+}
+
+/// The coordinated stop from these states.
+fn halt(
+    axes: impl Iterator<Item = (State, Limits)> + Clone,
+    profiles: &mut [Profile],
+) -> Result<f64, PlanError> {
+    let target = State::rest(0.0);
+    let problems = axes.map(|(start, limits)| Problem { start, target, limits });
+    let mut duration_s: f64 = 0.0;
+    for (axis, (problem, profile)) in problems.clone().zip(profiles.iter_mut()).enumerate() {
+        let fastest_s =
+            fastest(Interface::Velocity, &problem, profile).map_err(|error| error.on_axis(axis))?;
+        duration_s = duration_s.max(fastest_s);
+    }
+    let duration_s = unblocked(duration_s, profiles, None);
+    for (axis, (problem, profile)) in problems.zip(profiles.iter_mut()).enumerate() {
+        lasting(Interface::Velocity, &problem, duration_s, profile).map_err(|error| error.on_axis(axis))?;
+    }
+    Ok(duration_s)
+}
+
+fn plan(
+    interface: Interface,
+    problems: &[Problem],
+    profiles: &mut [Profile],
+    timing: Timing,
+) -> Result<f64, PlanError> {
+    expect_length(problems.len(), profiles.len())?;
+    let cycle_valid = timing.cycle_s.is_none_or(|cycle_s| cycle_s > 0.0 && cycle_s.is_finite());
+    if !(timing.minimum_duration_s >= 0.0 && timing.minimum_duration_s.is_finite() && cycle_valid) {
+        return Err(PlanError::InvalidTiming);
+    }
+    let mut longest_s = timing.minimum_duration_s;
+    for (axis, (problem, profile)) in problems.iter().zip(profiles.iter_mut()).enumerate() {
+        let fastest_s = fastest(interface, problem, profile).map_err(|error| error.on_axis(axis))?;
+        longest_s = longest_s.max(fastest_s);
+    }
+    let common_s = match timing.synchronisation {
+        Synchronisation::Time => Some(unblocked(longest_s, profiles, timing.cycle_s)),
+        Synchronisation::Independent => None,
+    };
+    let mut duration_s: f64 = 0.0;
+    for (axis, (problem, profile)) in problems.iter().zip(profiles.iter_mut()).enumerate() {
+        let own_s = common_s.unwrap_or_else(|| {
+            let least_s = profile.duration_s().max(timing.minimum_duration_s);
+            unblocked(least_s, core::slice::from_ref(profile), timing.cycle_s)
+        });
+        lasting(interface, problem, own_s, profile).map_err(|error| error.on_axis(axis))?;
+        duration_s = duration_s.max(own_s);
+    }
+    Ok(duration_s)
+}
+
+fn expect_length(expected: usize, received: usize) -> Result<(), PlanError> {
+    if expected == received { Ok(()) } else { Err(PlanError::LengthMismatch { expected, received }) }
+}
+
+/// The fastest profile of one axis.
+fn fastest(interface: Interface, problem: &Problem, profile: &mut Profile) -> Result<f64, PlanError> {
+    problem.validate()?;
+    if problem.limits.jerk_max != f64::INFINITY {
+        return Err(PlanError::JerkLimited { axis: 0 });
+    }
+    match interface {
+        Interface::Position => trapezoid::fastest_position(problem, profile),
+        Interface::Velocity => trapezoid::fastest_velocity(problem, profile),
+    }?;
+    Ok(profile.duration_s())
+}
+
+/// The profile of one axis that lasts this long; it holds the fastest one before.
+fn lasting(
+    interface: Interface,
+    problem: &Problem,
+    duration_s: f64,
+    profile: &mut Profile,
+) -> Result<(), PlanError> {
+    if profile.duration_s() == duration_s {
+        return Ok(());
+    }
+    match interface {
+        Interface::Position => trapezoid::position_lasting(problem, duration_s, profile),
+        Interface::Velocity => trapezoid::velocity_lasting(problem, duration_s, profile),
+    }
+}
+
+/// The shortest duration from this one on that no axis blocks.
+///
+/// Every step jumps over at least one blocked interval and none comes back, so there are at most as many steps
+/// as intervals.
+fn unblocked(least_s: f64, profiles: &[Profile], cycle_s: Option<f64>) -> f64 {
+    // Durations that differ by rounding are the same: two axes with the same motion must not block each other.
+    const ROUNDING: f64 = 4096.0 * f64::EPSILON;
+    let mut duration_s = on_grid(least_s, cycle_s);
+    loop {
+        let blocking = profiles.iter().flat_map(Profile::blocked).find(|blocked| {
+            let rounding_s = ROUNDING * duration_s;
+            duration_s > blocked.after_s + rounding_s && duration_s < blocked.before_s - rounding_s
+        });
+        match blocking {
+            Some(blocked) => duration_s = on_grid(blocked.before_s, cycle_s),
+            None => return duration_s,
+        }
+    }
+}
+
+/// The first multiple of the cycle that is not less, apart from rounding.
+fn on_grid(duration_s: f64, cycle_s: Option<f64>) -> f64 {
+    match cycle_s {
+        Some(cycle_s) => libm::ceil(duration_s / cycle_s * (1.0 - 4.0 * f64::EPSILON)) * cycle_s,
+        None => duration_s,
+    }
+}
+
+/// The position limit that the profile leaves, if any. From a start outside of them it may only come back.
+fn position_limit_left(problem: &Problem, profile: &Profile) -> Option<Limit> {
+    const ROUNDING: f64 = 1e-12;
+    let Problem { start, target, limits } = problem;
+    if limits.position_max == f64::INFINITY && limits.position_min == f64::NEG_INFINITY {
+        return None;
+    }
+    let range = profile.extrema().position;
+    let rounding =
+        ROUNDING * (start.position.abs() + target.position.abs() + range.max.abs() + range.min.abs());
+    if range.max > limits.position_max.max(start.position) + rounding {
+        Some(Limit::PositionMax)
+    } else if range.min < limits.position_min.min(start.position) - rounding {
+        Some(Limit::PositionMin)
+    } else {
+        None
+    }
+}

@@ -1,0 +1,150 @@
+//! A judge of profiles that shares no code with the planner: it looks at the phases only.
+
+use takt_rt::plan::{Limits, Problem, Profile, State};
+
+/// What the profile must end in.
+#[derive(Clone, Copy, PartialEq)]
+pub enum Arrival {
+    /// At the target state.
+    State,
+    /// At the target velocity and acceleration, anywhere.
+    Velocity,
+}
+
+/// How far a number may be off, for each quantity, from the sizes that occur in the profile.
+struct Tolerance {
+    position: f64,
+    velocity: f64,
+    acceleration: f64,
+}
+
+impl Tolerance {
+    fn of(problem: &Problem, profile: &Profile) -> Self {
+        const RELATIVE: f64 = 1e-11;
+        let mut sizes = [0.0_f64; 3];
+        for state in profile.phases().map(|phase| phase.start).chain([problem.start, problem.target]) {
+            for (size, value) in sizes.iter_mut().zip([state.position, state.velocity, state.acceleration]) {
+                *size = size.max(value.abs());
+            }
+        }
+        let Limits { velocity_max, velocity_min, acceleration_max, acceleration_min, .. } = problem.limits;
+        let velocity = sizes[1].max(velocity_max).max(-velocity_min);
+        let reach = velocity * (profile.duration_s() + velocity / acceleration_max.min(-acceleration_min));
+        Self {
+            position: RELATIVE * (sizes[0] + reach),
+            velocity: RELATIVE * velocity,
+            acceleration: RELATIVE * sizes[2].max(acceleration_max).max(-acceleration_min),
+        }
+    }
+}
+
+fn polynomial(start: &State, jerk: f64, t: f64) -> State {
+    State {
+        position: start.position
+            + start.velocity * t
+            + start.acceleration * t * t / 2.0
+            + jerk * t * t * t / 6.0,
+        velocity: start.velocity + start.acceleration * t + jerk * t * t / 2.0,
+        acceleration: start.acceleration + jerk * t,
+    }
+}
+
+fn check(kept: bool, what: impl Fn() -> String) -> Result<(), String> {
+    if kept { Ok(()) } else { Err(what()) }
+}
+
+/// Says what is wrong with the profile as an answer to the problem.
+pub fn judge(problem: &Problem, profile: &Profile, arrival: Arrival) -> Result<(), String> {
+    let tolerance = Tolerance::of(problem, profile);
+    let second_order = problem.limits.jerk_max.is_infinite();
+    let (mut state, mut time_s) = (problem.start, 0.0);
+    let mut inside = Inside::default();
+    for (index, phase) in profile.phases().enumerate() {
+        let duration_s = phase.duration_s;
+        check(duration_s >= 0.0, || format!("phase {index} has a negative length"))?;
+        check((phase.start_s - time_s).abs() <= 1e-12 * (1.0 + time_s), || {
+            format!("phase {index} starts late")
+        })?;
+        check((phase.start.position - state.position).abs() <= tolerance.position, || {
+            format!("position jumps into phase {index}: {state:?} {phase:?}")
+        })?;
+        check((phase.start.velocity - state.velocity).abs() <= tolerance.velocity, || {
+            format!("velocity jumps into phase {index}: {state:?} {phase:?}")
+        })?;
+        check(
+            second_order || (phase.start.acceleration - state.acceleration).abs() <= tolerance.acceleration,
+            || format!("acceleration jumps into phase {index}: {state:?} {phase:?}"),
+        )?;
+        check(phase.jerk.abs() <= problem.limits.jerk_max * (1.0 + 1e-11), || {
+            format!("jerk in phase {index}")
+        })?;
+        inside.look(&problem.limits, &phase.start, phase.jerk, duration_s, &tolerance, second_order)?;
+        state = polynomial(&phase.start, phase.jerk, duration_s);
+        time_s = phase.start_s + duration_s;
+    }
+    check((time_s - profile.duration_s()).abs() <= 1e-12 * (1.0 + time_s), || "phases end elsewhere".into())?;
+    arrives(problem, profile, &state, &tolerance, arrival, second_order)
+}
+
+fn arrives(
+    problem: &Problem,
+    profile: &Profile,
+    state: &State,
+    tolerance: &Tolerance,
+    arrival: Arrival,
+    second_order: bool,
+) -> Result<(), String> {
+    let target = &problem.target;
+    let end = profile.sample(profile.duration_s());
+    if arrival == Arrival::State {
+        check(end.position == target.position, || "the end is not the target".into())?;
+        let miss = state.position - target.position;
+        check(miss.abs() <= tolerance.position, || format!("the target is missed by {miss:e}"))?;
+    }
+    check(end.velocity == target.velocity, || "the final velocity is not the target's".into())?;
+    let miss = state.velocity - target.velocity;
+    check(miss.abs() <= tolerance.velocity, || format!("the target velocity is missed by {miss:e}"))?;
+    let miss = state.acceleration - target.acceleration;
+    check(second_order || miss.abs() <= tolerance.acceleration, || format!("acceleration missed by {miss:e}"))
+}
+
+/// Whether the motion has come into the limits yet: from then on it must keep them.
+#[derive(Default)]
+struct Inside {
+    velocity: bool,
+    acceleration: bool,
+}
+
+impl Inside {
+    fn look(
+        &mut self,
+        limits: &Limits,
+        start: &State,
+        jerk: f64,
+        duration_s: f64,
+        tolerance: &Tolerance,
+        second_order: bool,
+    ) -> Result<(), String> {
+        let end = polynomial(start, jerk, duration_s);
+        let turn_s = -start.acceleration / jerk;
+        let turn = if turn_s > 0.0 && turn_s < duration_s { turn_s } else { 0.0 };
+        let velocities = [start.velocity, polynomial(start, jerk, turn).velocity, end.velocity];
+        let (low, high) =
+            (limits.velocity_min - tolerance.velocity, limits.velocity_max + tolerance.velocity);
+        for velocity in velocities {
+            let kept = (low..=high).contains(&velocity);
+            check(kept || !self.velocity, || format!("velocity {velocity} in {start:?}"))?;
+            self.velocity |= kept;
+        }
+        let (low, high) = (
+            limits.acceleration_min - tolerance.acceleration,
+            limits.acceleration_max + tolerance.acceleration,
+        );
+        for acceleration in [start.acceleration, end.acceleration] {
+            let kept = (low..=high).contains(&acceleration);
+            check(kept || !(self.acceleration || second_order), || format!("acceleration {acceleration}"))?;
+            self.acceleration |= kept;
+        }
+        Ok(())
+    }
+}
