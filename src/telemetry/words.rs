@@ -144,7 +144,7 @@ pub fn stop_cause(stop: &StopReason, machine: &Machine) -> String {
         }
         Rule::NotTransmitted => {
             let of = stop.axis.map_or_else(String::new, |_| format!(" of {axis}"));
-            format!("set-points{of} are not getting onto the wire: {value:.0} frames still wait")
+            format!("set-points{of} are not getting onto the wire for {}", cycles(value))
         }
     }
 }
