@@ -251,7 +251,7 @@ mod tests {
                 None,
                 6.0,
                 0.0,
-                "set-points are not getting onto the wire: 6 frames still wait",
+                "set-points are not getting onto the wire for 6 cycles",
             ),
         ];
         for (rule, axis, value, limit, words) in cases {
