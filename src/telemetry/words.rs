@@ -246,13 +246,7 @@ mod tests {
                 "the drive of axis 9 did not reach operation enabled within 2000 cycles (2.0 s)",
             ),
             (Rule::BusLost, None, 0.0, 0.0, "bus left is bus-off or its interface is down"),
-            (
-                Rule::NotTransmitted,
-                None,
-                6.0,
-                0.0,
-                "set-points are not getting onto the wire for 6 cycles",
-            ),
+            (Rule::NotTransmitted, None, 6.0, 0.0, "set-points are not getting onto the wire for 6 cycles"),
         ];
         for (rule, axis, value, limit, words) in cases {
             assert_eq!(stop_cause(&reason(rule, axis, value, limit), &machine()), words);
