@@ -76,12 +76,6 @@ pub enum PlanError {
         /// The axis.
         axis: usize,
     },
-    /// Jerk-limited trajectories need a finite [`Limits::jerk_max`](super::Limits::jerk_max); only the
-    /// second-order case (`f64::INFINITY`) is planned.
-    JerkLimited {
-        /// The axis.
-        axis: usize,
-    },
     /// The slices that belong together differ in length.
     LengthMismatch {
         /// The number of problems or start states.
@@ -101,8 +95,7 @@ impl PlanError {
             | Self::InvalidLimit { axis, .. }
             | Self::TargetBeyondLimit { axis, .. }
             | Self::PositionBeyondLimit { axis, .. }
-            | Self::NotRepresentable { axis }
-            | Self::JerkLimited { axis } => *axis = index,
+            | Self::NotRepresentable { axis } => *axis = index,
             Self::LengthMismatch { .. } | Self::InvalidTiming => {}
         }
         self

@@ -18,6 +18,7 @@
 //! The planner allocates nothing, panics on nothing and always ends: the number of steps has a fixed bound.
 
 mod error;
+mod jerk_limited;
 mod problem;
 mod profile;
 mod synchronisation;
@@ -27,5 +28,5 @@ pub use error::{Limit, PlanError, Quantity};
 pub use problem::{Limits, Problem, State};
 pub use profile::{Blocked, Extrema, PHASES_MAX, Phase, Profile, Range};
 pub use synchronisation::{
-    Synchronisation, Timing, position, stop, synchronised, synchronised_velocity, velocity,
+    Return, Synchronisation, Timing, position, stop, synchronised, synchronised_velocity, velocity,
 };

@@ -77,6 +77,11 @@ impl Limits {
         self
     }
 
+    /// Whether the jerk is unlimited.
+    pub(super) fn is_second_order(&self) -> bool {
+        self.jerk_max == f64::INFINITY
+    }
+
     /// Checks signs and finiteness.
     ///
     /// # Errors
@@ -99,6 +104,9 @@ impl Limits {
     }
 }
 
+/// Relative to a limit, being beyond it by this much is rounding.
+const ROUNDING: f64 = 1e-13;
+
 /// From where to where, within which limits: the problem of one axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Problem {
@@ -114,7 +122,7 @@ impl Problem {
     /// Checks that every number is finite, the limits are limits, and the target keeps them.
     pub(super) fn validate(&self) -> Result<(), PlanError> {
         self.limits.validate()?;
-        let second_order = self.limits.jerk_max == f64::INFINITY;
+        let second_order = self.limits.is_second_order();
         let (start, target) = (&self.start, &self.target);
         let finite = |value: f64, quantity| {
             if value.is_finite() { Ok(()) } else { Err(PlanError::NotFinite { axis: 0, quantity }) }
@@ -148,5 +156,22 @@ impl Problem {
             }
         }
         Ok(())
+    }
+    /// Checks that the target can be reached without breaking a velocity limit just before.
+    pub(super) fn validate_approach(&self) -> Result<(), PlanError> {
+        let (target, limits) = (&self.target, &self.limits);
+        if limits.is_second_order() {
+            return Ok(());
+        }
+        // At least this was the velocity when the jerk began to build up the acceleration.
+        let before =
+            target.velocity - 0.5 * target.acceleration * target.acceleration.abs() / limits.jerk_max;
+        if before > limits.velocity_max * (1.0 + ROUNDING) {
+            Err(PlanError::TargetBeyondLimit { axis: 0, limit: Limit::VelocityMax })
+        } else if before < limits.velocity_min * (1.0 + ROUNDING) {
+            Err(PlanError::TargetBeyondLimit { axis: 0, limit: Limit::VelocityMin })
+        } else {
+            Ok(())
+        }
     }
 }

@@ -239,7 +239,17 @@ impl Profile {
         self.append(duration_s, acceleration, 0.0);
     }
 
-    /// Appends a phase that starts with this acceleration, and gives the state behind it.
+    /// Appends a phase of constant jerk; one that is not longer than 0 s is left out.
+    pub(super) fn shift(&mut self, duration_s: f64, jerk: f64) {
+        self.append(duration_s, self.end.acceleration, jerk);
+    }
+
+    /// Takes away what rounding has put the acceleration beyond its limits.
+    pub(super) fn limit_acceleration(&mut self, min: f64, max: f64) {
+        self.end.acceleration = self.end.acceleration.clamp(min, max);
+    }
+
+    /// Appends a phase that starts with this acceleration.
     fn append(&mut self, duration_s: f64, acceleration: f64, jerk: f64) {
         self.end.acceleration = acceleration;
         if duration_s <= 0.0 {

@@ -3,7 +3,7 @@
 use super::error::{Limit, PlanError};
 use super::problem::{Limits, Problem, State};
 use super::profile::Profile;
-use super::trapezoid;
+use super::{jerk_limited, trapezoid};
 
 /// What the axes have in common.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -11,11 +11,24 @@ pub enum Synchronisation {
     /// All axes arrive at the same time, as soon as the slowest can.
     #[default]
     Time,
-    /// Every axis takes its own shortest time.
+    /// Every axis takes its own shortest time, and goes on with its target velocity until all have arrived.
     Independent,
 }
 
-/// When a motion shall end.
+/// How a velocity beyond its limit, as after a limit was lowered in motion, comes back to it.
+///
+/// Second-order planning makes no difference: its deceleration can end in an instant.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Return {
+    /// As fast as possible. At the limit the deceleration is still large, so the velocity goes on below it
+    /// before the motion to the target can take over, even to a reversal.
+    #[default]
+    Fastest,
+    /// Such that the velocity ends at the limit without deceleration, and never went below.
+    Settled,
+}
+
+/// When a motion shall end, and how it gets there.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Timing {
     /// What the axes have in common.
@@ -24,12 +37,14 @@ pub struct Timing {
     pub minimum_duration_s: f64,
     /// The duration is a multiple of this cycle, in s.
     pub cycle_s: Option<f64>,
+    /// How a velocity beyond its limit comes back to it.
+    pub return_to_limits: Return,
 }
 
 /// What is controlled: where an axis arrives, or only how fast it then is.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Interface {
-    Position,
+    Position(Return),
     Velocity,
 }
 
@@ -50,7 +65,7 @@ pub fn synchronised(
     profiles: &mut [Profile],
     timing: Timing,
 ) -> Result<f64, PlanError> {
-    let duration_s = plan(Interface::Position, problems, profiles, timing)?;
+    let duration_s = plan(Interface::Position(timing.return_to_limits), problems, profiles, timing)?;
     for (axis, (problem, profile)) in problems.iter().zip(profiles.iter()).enumerate() {
         if let Some(limit) = position_limit_left(problem, profile) {
             halt(problems.iter().map(|problem| (problem.start, problem.limits)), profiles)?;
@@ -62,7 +77,7 @@ pub fn synchronised(
 
 /// Plans the motion of all axes to their target velocities, wherever that leads, and gives its duration in s.
 ///
-/// The target positions are not read. Position limits are not looked at: leaving them may be the only way to
+/// The target positions are not read. Limits of position and velocity are not looked at: leaving them may be the only way to
 /// reach the velocity; see [`Profile::extrema`].
 ///
 /// # Errors
@@ -146,11 +161,10 @@ fn plan(
         Synchronisation::Time => Some(unblocked(longest_s, profiles, timing.cycle_s)),
         Synchronisation::Independent => None,
     };
-    let mut duration_s: f64 = 0.0;
+    let mut duration_s = on_grid(timing.minimum_duration_s, timing.cycle_s);
     for (axis, (problem, profile)) in problems.iter().zip(profiles.iter_mut()).enumerate() {
         let own_s = common_s.unwrap_or_else(|| {
-            let least_s = profile.duration_s().max(timing.minimum_duration_s);
-            unblocked(least_s, core::slice::from_ref(profile), timing.cycle_s)
+            unblocked(profile.duration_s(), core::slice::from_ref(profile), timing.cycle_s)
         });
         lasting(interface, problem, own_s, profile).map_err(|error| error.on_axis(axis))?;
         duration_s = duration_s.max(own_s);
@@ -165,12 +179,14 @@ fn expect_length(expected: usize, received: usize) -> Result<(), PlanError> {
 /// The fastest profile of one axis.
 fn fastest(interface: Interface, problem: &Problem, profile: &mut Profile) -> Result<f64, PlanError> {
     problem.validate()?;
-    if problem.limits.jerk_max != f64::INFINITY {
-        return Err(PlanError::JerkLimited { axis: 0 });
+    if interface != Interface::Velocity {
+        problem.validate_approach()?;
     }
-    match interface {
-        Interface::Position => trapezoid::fastest_position(problem, profile),
-        Interface::Velocity => trapezoid::fastest_velocity(problem, profile),
+    match (interface, problem.limits.is_second_order()) {
+        (Interface::Position(_), true) => trapezoid::fastest_position(problem, profile),
+        (Interface::Velocity, true) => trapezoid::fastest_velocity(problem, profile),
+        (Interface::Position(manner), false) => jerk_limited::fastest_position(problem, manner, profile),
+        (Interface::Velocity, false) => jerk_limited::fastest_velocity(problem, profile),
     }?;
     Ok(profile.duration_s())
 }
@@ -185,11 +201,18 @@ fn lasting(
     if profile.duration_s() == duration_s {
         return Ok(());
     }
-    match interface {
-        Interface::Position => trapezoid::position_lasting(problem, duration_s, profile),
-        Interface::Velocity => trapezoid::velocity_lasting(problem, duration_s, profile),
+    match (interface, problem.limits.is_second_order()) {
+        (Interface::Position(_), true) => trapezoid::position_lasting(problem, duration_s, profile),
+        (Interface::Velocity, true) => trapezoid::velocity_lasting(problem, duration_s, profile),
+        (Interface::Position(manner), false) => {
+            jerk_limited::position_lasting(problem, manner, duration_s, profile)
+        }
+        (Interface::Velocity, false) => jerk_limited::velocity_lasting(problem, duration_s, profile),
     }
 }
+
+/// Relative to a duration, a difference up to this is rounding.
+const ROUNDING: f64 = 1024.0 * f64::EPSILON;
 
 /// The shortest duration from this one on that no axis blocks.
 ///
@@ -197,7 +220,6 @@ fn lasting(
 /// as intervals.
 fn unblocked(least_s: f64, profiles: &[Profile], cycle_s: Option<f64>) -> f64 {
     // Durations that differ by rounding are the same: two axes with the same motion must not block each other.
-    const ROUNDING: f64 = 4096.0 * f64::EPSILON;
     let mut duration_s = on_grid(least_s, cycle_s);
     loop {
         let blocking = profiles.iter().flat_map(Profile::blocked).find(|blocked| {
@@ -213,8 +235,9 @@ fn unblocked(least_s: f64, profiles: &[Profile], cycle_s: Option<f64>) -> f64 {
 
 /// The first multiple of the cycle that is not less, apart from rounding.
 fn on_grid(duration_s: f64, cycle_s: Option<f64>) -> f64 {
+    const ROUNDING: f64 = 1e-11;
     match cycle_s {
-        Some(cycle_s) => libm::ceil(duration_s / cycle_s * (1.0 - 4.0 * f64::EPSILON)) * cycle_s,
+        Some(cycle_s) => libm::ceil(duration_s / cycle_s * (1.0 - ROUNDING)) * cycle_s,
         None => duration_s,
     }
 }

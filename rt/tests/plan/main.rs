@@ -1,5 +1,6 @@
 //! The planner: what its trajectories keep and where they arrive.
 
 mod checker;
+mod jerk_limited;
 mod oracle;
 mod trapezoid;
