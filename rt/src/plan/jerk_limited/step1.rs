@@ -78,9 +78,9 @@ impl Edges {
         let mirrored = original.velocity_before_target() < original.velocity_behind_start();
         let motion = if mirrored { original.mirrored() } else { *original };
         let (behind_start, before_target) = (motion.velocity_behind_start(), motion.velocity_before_target());
-        let Motion { v0, a0, vf, af, .. } = motion;
+        let Motion { a0, af, vmax, vmin, .. } = motion;
         // The root of the gap goes into times and distances, so a rounding error must not open it.
-        let gap_rounding = GAP_ROUNDING * (v0.abs() + vf.abs() + a0 * a0 + af * af);
+        let gap_rounding = GAP_ROUNDING * (vmax - vmin + a0 * a0 + af * af);
         let gap = before_target - behind_start;
         let gap = if gap > gap_rounding { gap } else { 0.0 };
         let upper = Crossing::new(&motion, before_target, gap + square_positive(a0), square_positive(-af));
