@@ -87,7 +87,12 @@ impl Limits {
     /// # Errors
     /// [`PlanError::InvalidLimit`] with axis 0 and the first limit that cannot be kept by any motion.
     pub fn validate(&self) -> Result<(), PlanError> {
-        let positive = |value: f64| value > 0.0 && value.is_finite();
+        let positive = |value: f64| value > 0.0 && value < f64::INFINITY;
+        let velocity = positive(self.velocity_max) & positive(-self.velocity_min);
+        let acceleration = positive(self.acceleration_max) & positive(-self.acceleration_min);
+        if velocity & acceleration & (self.jerk_max > 0.0) & (self.position_min < self.position_max) {
+            return Ok(());
+        }
         let checks = [
             (positive(self.velocity_max), Limit::VelocityMax),
             (positive(-self.velocity_min), Limit::VelocityMin),
@@ -124,6 +129,12 @@ impl Problem {
         self.limits.validate()?;
         let second_order = self.limits.is_second_order();
         let (start, target) = (&self.start, &self.target);
+        let sum = start.position.abs() + start.velocity.abs() + target.position.abs() + target.velocity.abs();
+        let accelerations =
+            if second_order { 0.0 } else { start.acceleration.abs() + target.acceleration.abs() };
+        if sum + accelerations < f64::INFINITY {
+            return self.validate_target(second_order);
+        }
         let finite = |value: f64, quantity| {
             if value.is_finite() { Ok(()) } else { Err(PlanError::NotFinite { axis: 0, quantity }) }
         };

@@ -149,10 +149,15 @@ impl Profile {
             };
         }
         let time_s = if time_s > 0.0 { time_s } else { 0.0 };
-        let mut index = 0;
-        for start_s in self.starts_s.iter().skip(1) {
-            index += usize::from(*start_s <= time_s);
+        // Few profiles have more than eight phases.
+        let (first_half, second_half) = self.starts_s.split_at(PHASES_MAX / 2);
+        let begun =
+            |starts_s: &[f64]| starts_s.iter().map(|start_s| usize::from(*start_s <= time_s)).sum::<usize>();
+        let mut count = begun(first_half);
+        if self.count > PHASES_MAX / 2 {
+            count += begun(second_half);
         }
+        let index = count.wrapping_sub(1);
         match (self.phases.get(index), self.starts_s.get(index)) {
             (Some(phase), Some(start_s)) => integrate(&phase.start, phase.jerk, time_s - start_s),
             _ => self.end,
@@ -228,7 +233,9 @@ impl Extrema {
 impl Profile {
     /// Forgets the phases and starts at this state. What durations are possible is kept.
     pub(super) fn begin(&mut self, start: State) {
-        self.starts_s = [f64::INFINITY; PHASES_MAX];
+        for start_s in self.starts_s.iter_mut().take(self.count) {
+            *start_s = f64::INFINITY;
+        }
         self.count = 0;
         self.duration_s = 0.0;
         self.end = start;
