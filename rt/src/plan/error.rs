@@ -71,6 +71,11 @@ pub enum PlanError {
         /// The position limit that would be left.
         limit: Limit,
     },
+    /// The axis is not in proportion to the others, so the motion is not on a straight line.
+    NotStraight {
+        /// The axis.
+        axis: usize,
+    },
     /// The numbers are so large or so small that the trajectory cannot be represented.
     NotRepresentable {
         /// The axis.
@@ -95,6 +100,7 @@ impl PlanError {
             | Self::InvalidLimit { axis, .. }
             | Self::TargetBeyondLimit { axis, .. }
             | Self::PositionBeyondLimit { axis, .. }
+            | Self::NotStraight { axis }
             | Self::NotRepresentable { axis } => *axis = index,
             Self::LengthMismatch { .. } | Self::InvalidTiming => {}
         }

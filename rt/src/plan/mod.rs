@@ -21,6 +21,7 @@ mod error;
 mod jerk_limited;
 mod problem;
 mod profile;
+mod straight;
 mod synchronisation;
 mod trapezoid;
 

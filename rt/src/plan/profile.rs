@@ -308,4 +308,30 @@ impl Profile {
             self.blocked_count += 1;
         }
     }
+
+    /// Stretches the profile in space, from this start to this target.
+    pub(super) fn scale(&mut self, ratio: f64, start_position: f64, target: State) {
+        let from = self.start().position;
+        for phase in self.phases.iter_mut().take(self.count) {
+            let State { position, velocity, acceleration } = phase.start;
+            phase.start = State {
+                position: start_position + ratio * (position - from),
+                velocity: ratio * velocity,
+                acceleration: ratio * acceleration,
+            };
+            phase.jerk *= ratio;
+        }
+        self.end = target;
+    }
+
+    /// What durations are possible.
+    pub(super) fn possible(&self) -> (f64, ([Blocked; BLOCKED_MAX], usize)) {
+        (self.minimum_duration_s, (self.blocked, self.blocked_count))
+    }
+
+    /// Sets what durations are possible.
+    pub(super) fn set_possible(&mut self, minimum_duration_s: f64, blocked: ([Blocked; BLOCKED_MAX], usize)) {
+        self.minimum_duration_s = minimum_duration_s;
+        (self.blocked, self.blocked_count) = blocked;
+    }
 }

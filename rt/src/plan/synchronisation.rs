@@ -3,6 +3,7 @@
 use super::error::{Limit, PlanError};
 use super::problem::{Limits, Problem, State};
 use super::profile::Profile;
+use super::straight::Line;
 use super::{jerk_limited, trapezoid};
 
 /// What the axes have in common.
@@ -11,6 +12,10 @@ pub enum Synchronisation {
     /// All axes arrive at the same time, as soon as the slowest can.
     #[default]
     Time,
+    /// As [`Time`](Self::Time), and on a straight line where that takes no longer.
+    Phase,
+    /// On a straight line, be it slower; an error where start and target are not on one.
+    Straight,
     /// Every axis takes its own shortest time, and goes on with its target velocity until all have arrived.
     Independent,
 }
@@ -158,7 +163,9 @@ fn plan(
         longest_s = longest_s.max(fastest_s);
     }
     let common_s = match timing.synchronisation {
-        Synchronisation::Time => Some(unblocked(longest_s, profiles, timing.cycle_s)),
+        Synchronisation::Time | Synchronisation::Phase | Synchronisation::Straight => {
+            Some(unblocked(longest_s, profiles, timing.cycle_s))
+        }
         Synchronisation::Independent => None,
     };
     let mut duration_s = on_grid(timing.minimum_duration_s, timing.cycle_s);
@@ -169,6 +176,42 @@ fn plan(
         lasting(interface, problem, own_s, profile).map_err(|error| error.on_axis(axis))?;
         duration_s = duration_s.max(own_s);
     }
+    match (timing.synchronisation, interface) {
+        (Synchronisation::Phase, Interface::Position(_)) => follow_line(problems, profiles),
+        (Synchronisation::Straight, Interface::Position(_)) => {
+            duration_s = straight(interface, problems, profiles, &timing)?;
+        }
+        _ => {}
+    }
+    Ok(duration_s)
+}
+
+/// Puts the axes on a straight line if the one with the longest way is on a profile that all can follow.
+fn follow_line(problems: &[Problem], profiles: &mut [Profile]) {
+    if let Ok(line) = Line::of(problems)
+        && let Some(reference) = profiles.get(line.reference()).copied()
+        && line.keeps_limits(&reference, problems)
+    {
+        line.follow(&reference, problems, profiles);
+    }
+}
+
+/// Plans the motion on a straight line, within the limits of all axes projected on it.
+fn straight(
+    interface: Interface,
+    problems: &[Problem],
+    profiles: &mut [Profile],
+    timing: &Timing,
+) -> Result<f64, PlanError> {
+    let line = Line::of(problems)?;
+    let projected = line.projected(problems);
+    let on_line = |error: PlanError| error.on_axis(line.reference());
+    let mut profile = Profile::hold(0.0);
+    let fastest_s = fastest(interface, &projected, &mut profile).map_err(on_line)?;
+    let least_s = fastest_s.max(timing.minimum_duration_s);
+    let duration_s = unblocked(least_s, core::slice::from_ref(&profile), timing.cycle_s);
+    lasting(interface, &projected, duration_s, &mut profile).map_err(on_line)?;
+    line.follow(&profile, problems, profiles);
     Ok(duration_s)
 }
 

@@ -5,7 +5,8 @@ use super::checker::{Arrival, judge};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use takt_rt::plan::{
-    Limits, Problem, Profile, Return, State, Synchronisation, Timing, position, stop, synchronised, velocity,
+    Limits, PlanError, Problem, Profile, Return, State, Synchronisation, Timing, position, stop,
+    synchronised, velocity,
 };
 
 fn state(position: f64, velocity: f64, acceleration: f64) -> State {
@@ -333,7 +334,7 @@ fn discrete_durations_hit_a_moving_target_in_every_mode() {
         limits: Limits::symmetric(1.0, 3.0, 30.0),
     };
     let other = Problem { target: state(-0.3, 0.1, 0.0), ..moving };
-    for synchronisation in [Synchronisation::Time, Synchronisation::Independent] {
+    for synchronisation in [Synchronisation::Time, Synchronisation::Phase, Synchronisation::Independent] {
         let timing = Timing { cycle_s: Some(0.001), synchronisation, ..Timing::default() };
         for (problem, profile) in [moving, other].iter().zip(plan(&[moving, other], timing).1) {
             assert_eq!(judge(problem, &profile, Arrival::State), Ok(()));
@@ -341,6 +342,57 @@ fn discrete_durations_hit_a_moving_target_in_every_mode() {
             assert!((cycles - cycles.round()).abs() < 1e-9);
         }
     }
+}
+
+/// `otg.md` section 4, 7.
+#[test]
+fn a_straight_line_is_kept_by_random_motions_from_rest_to_rest_and_planned_anew_on_the_line() {
+    let all_limits = [
+        Limits::symmetric(2.0, 10.0, 300.0),
+        Limits::asymmetric(1.0, -0.5, 8.0, -4.0, 100.0),
+        Limits::symmetric(3.0, 5.0, 1000.0),
+    ];
+    let from = [0.1, -0.4, 1.0];
+    for turn in 0..200 {
+        let angle = f64::from(turn) * 0.31;
+        let direction = [angle.cos(), 0.7 * angle.sin(), 0.3 * (2.0 * angle).cos()];
+        let mut problems: Vec<Problem> = (0..3)
+            .map(|axis| Problem {
+                start: State::rest(from[axis]),
+                target: State::rest(from[axis] + direction[axis]),
+                limits: all_limits[axis],
+            })
+            .collect();
+        let timing = Timing { synchronisation: Synchronisation::Straight, ..Timing::default() };
+        let (total_s, mut profiles) = plan(&problems, timing);
+        for cycle in 0..20 {
+            for ((axis, problem), profile) in problems.iter_mut().enumerate().zip(&profiles) {
+                assert_eq!(judge(problem, profile, Arrival::State), Ok(()));
+                problem.start = profile.sample(total_s / 40.0);
+                let along = (problem.start.position - from[axis]) * direction[0];
+                let along_first = (problems_first(&profiles, total_s / 40.0) - from[0]) * direction[axis];
+                assert!((along - along_first).abs() < 1e-12, "axis {axis} in cycle {cycle}");
+            }
+            let (remaining_s, anew) = plan(&problems, timing);
+            let arrival_s = remaining_s + total_s * f64::from(cycle + 1) / 40.0;
+            assert!((arrival_s - total_s).abs() < 1e-6 * total_s, "{arrival_s} {total_s}");
+            profiles = anew;
+        }
+    }
+}
+
+fn problems_first(profiles: &[Profile], time_s: f64) -> f64 {
+    profiles[0].sample(time_s).position
+}
+
+#[test]
+fn a_motion_off_the_line_is_refused_in_the_strict_mode_with_its_axis() {
+    let limits = Limits::symmetric(1.0, 3.0, 30.0);
+    let good = Problem { start: State::rest(0.0), target: State::rest(1.0), limits };
+    let bad = Problem { start: state(0.0, 0.3, 0.0), target: State::rest(0.5), limits };
+    let timing = Timing { synchronisation: Synchronisation::Straight, ..Timing::default() };
+    let answer = synchronised(&[good, bad], &mut [Profile::hold(0.0); 2], timing);
+    assert_eq!(answer, Err(PlanError::NotStraight { axis: 1 }));
 }
 
 #[test]

@@ -48,6 +48,7 @@ fn compare(line: &Value) -> Result<(), String> {
     let timing = Timing {
         synchronisation: match line["sync"].as_str() {
             Some("none") => Synchronisation::Independent,
+            Some("phase") => Synchronisation::Phase,
             _ => Synchronisation::Time,
         },
         minimum_duration_s: line["min_duration"].as_f64().unwrap_or(0.0),
