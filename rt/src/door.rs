@@ -1,1 +1,158 @@
-//! door.
+//! The door between the real-time thread and everything else: a handful of bounded, lock-free channels, seen from
+//! inside as this one trait. No call waits; a full channel drops, and says so.
+
+use crate::frame::Frame;
+use crate::plan;
+use crate::port::{BusHealth, Received};
+use crate::record::{CycleRecord, Event, MAX_AXES, MAX_BUSES};
+use crate::stop::{Phase, StopCategory, StopReason};
+use crate::time::Nanoseconds;
+
+/// What the real-time thread asks of and tells the outside.
+pub trait Door {
+    /// The oldest request that waits.
+    fn request(&mut self) -> Option<Request>;
+
+    /// The newest streamed command, if one has come since the last call.
+    fn stream(&mut self) -> Option<StreamCommand>;
+
+    /// The oldest service frame (NMT, SDO …) that waits to be sent on this bus.
+    fn service_frame(&mut self, bus: usize) -> Option<Frame>;
+
+    /// Hands over a frame that is not process data. Returns whether there was room.
+    fn received(&mut self, bus: usize, frame: &Received) -> bool;
+
+    /// Hands over the record of a cycle. Returns whether there was room.
+    fn record(&mut self, record: &CycleRecord) -> bool;
+
+    /// Hands over an event. Returns whether there was room.
+    fn event(&mut self, event: &Event) -> bool;
+
+    /// Shows the present state to whoever looks.
+    fn publish(&mut self, snapshot: &Snapshot);
+}
+
+/// What can be asked of the group.
+#[expect(clippy::large_enum_variant, reason = "it lives in a ring of fixed slots, where size is set once")]
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Request {
+    /// Begin to send SYNC (`true`) or cease (`false`).
+    Sync(bool),
+    /// Use what the drive has reported about itself.
+    RatedTorque {
+        /// The axis.
+        axis: u8,
+        /// Object 6076 in N·m (N for a linear axis).
+        torque: f64,
+    },
+    /// Leave [`Phase::Passive`]: begin to send set-points, with the drives disabled.
+    Activate,
+    /// Bring every drive to operation enabled; set-points follow the actual positions until it is.
+    Enable,
+    /// Move to a target, now: a move under way is re-planned from where it is.
+    Move(Move),
+    /// Follow [`Door::stream`].
+    Stream,
+    /// Stop by this category.
+    Stop(StopCategory),
+    /// Bring every drive to ready to switch on, decelerating first if need be.
+    Disable,
+    /// Clear latched faults: raise controlword bit 7 for some cycles. Refused while any drive is enabled.
+    ResetFaults,
+    /// Leave the loop after this cycle. The drives get no more set-points.
+    Leave,
+}
+
+/// A coordinated move of every axis, to rest unless a velocity is given.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Move {
+    /// A number of the caller's, shown in [`Snapshot::finished_move`] when the move is done.
+    pub id: u32,
+    /// Where to (rad or m), an axis each.
+    pub target: [f64; MAX_AXES],
+    /// Velocity at the target (rad/s or m/s). A move that ends in motion goes over into a stop at the limits.
+    pub target_velocity: [f64; MAX_AXES],
+    /// Fraction of each axis' velocity limit, above 0 up to 1.
+    pub velocity_scale: f64,
+    /// Fraction of each axis' acceleration (and jerk) limit, above 0 up to 1.
+    pub acceleration_scale: f64,
+    /// The move takes at least this long.
+    pub minimum_duration_s: f64,
+}
+
+/// One streamed set-point for every axis, with the time at which it loses its meaning.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StreamCommand {
+    /// When this command expires; after that the group decelerates and holds.
+    pub valid_until_ns: Nanoseconds,
+    /// Position, velocity and acceleration, an axis each. The position counts; the others are fed forward.
+    pub set_points: [plan::State; MAX_AXES],
+}
+
+/// The state of the controller after a cycle, for any number of observers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Snapshot {
+    /// The slot that it describes.
+    pub slot: u64,
+    /// The time at which it was made.
+    pub at_ns: Nanoseconds,
+    /// What the group is doing.
+    pub phase: Phase,
+    /// Slots that passed unused since the start.
+    pub missed_slots: u64,
+    /// Events and records that found no room, since the start.
+    pub dropped: u64,
+    /// Requests that were refused, since the start.
+    pub refused: u64,
+    /// The number of the last finished move; 0 before the first.
+    pub finished_move: u32,
+    /// Planned time left of the present move or stop, in seconds.
+    pub remaining_s: f64,
+    /// Why the group stopped or is stopping; `None` again after it has been re-enabled.
+    pub stop: Option<StopReason>,
+    /// How many of `axes` count.
+    pub axis_count: u8,
+    /// The axes in the order of the configuration.
+    pub axes: [AxisSnapshot; MAX_AXES],
+    /// How many of `buses` count.
+    pub bus_count: u8,
+    /// The buses in the order of the configuration.
+    pub buses: [BusHealth; MAX_BUSES],
+}
+
+impl Default for Snapshot {
+    fn default() -> Self {
+        Self {
+            slot: 0,
+            at_ns: 0,
+            phase: Phase::default(),
+            missed_slots: 0,
+            dropped: 0,
+            refused: 0,
+            finished_move: 0,
+            remaining_s: 0.0,
+            stop: None,
+            axis_count: 0,
+            axes: [AxisSnapshot::default(); MAX_AXES],
+            bus_count: 0,
+            buses: [BusHealth::default(); MAX_BUSES],
+        }
+    }
+}
+
+/// One axis after a cycle.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct AxisSnapshot {
+    /// Set-point (rad or m).
+    pub position_set: f64,
+    /// Actual position (rad or m).
+    pub position: f64,
+    /// Actual velocity (rad/s or m/s).
+    pub velocity: f64,
+    /// Object 6041.
+    pub statusword: u16,
+    /// Object 603F or the code of the last emergency message.
+    pub error_code: u16,
+    /// Whether the drive has reported since the controller became active.
+    pub is_heard: bool,
+}

@@ -244,7 +244,10 @@ mod tests {
         let id = Id::base(0x181).unwrap();
         assert_eq!(format!("{:?}", Frame::of(id, [0x37, 0x12])), "181#3712");
         assert_eq!(format!("{:?}", Frame::remote(id, 8).unwrap()), "181#R8");
-        assert_eq!(format!("{:?}", Frame::fd(Id::extended(0x123).unwrap(), &[1], true).unwrap()), "00000123##101");
+        assert_eq!(
+            format!("{:?}", Frame::fd(Id::extended(0x123).unwrap(), &[1], true).unwrap()),
+            "00000123##101"
+        );
     }
 
     #[test]

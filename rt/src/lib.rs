@@ -6,14 +6,22 @@
 #![no_std]
 #![deny(unsafe_code)]
 
+pub mod axis;
+pub mod cia402;
+pub mod control;
+pub mod cycle;
+pub mod dispatch;
+pub mod door;
+pub mod engine;
+pub mod frame;
+pub mod guard;
 #[cfg(feature = "linux")]
 pub mod linux;
-pub mod cia402;
-pub mod door;
-pub mod frame;
+mod motion;
 pub mod pdo;
 pub mod plan;
 pub mod port;
 pub mod record;
+pub mod stop;
 pub mod time;
 pub mod units;

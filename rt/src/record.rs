@@ -1,1 +1,161 @@
-//! record.
+//! What one cycle leaves behind: a record of fixed size, copied to the logger through a lock-free ring.
+
+use crate::cia402;
+use crate::stop::{Phase, StopReason};
+use crate::time::Nanoseconds;
+
+/// The most axes one controller moves.
+pub const MAX_AXES: usize = 32;
+/// The most buses one controller owns.
+pub const MAX_BUSES: usize = 16;
+
+/// The times of one cycle.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Timing {
+    /// The number of the slot on the grid.
+    pub slot: u64,
+    /// Its start on the grid.
+    pub slot_start_ns: Nanoseconds,
+    /// How late the timer woke the thread for the slot, against the instant that it was set to.
+    pub wake_ns: u64,
+    /// How late SYNC was handed to the first interface, against the start of the slot.
+    pub sync_ns: u64,
+    /// What the computation from feedback to set-points took, without any I/O.
+    pub compute_ns: u64,
+    /// When the last set-point had been handed over, after the start of the slot.
+    pub sent_ns: u64,
+    /// Slots that had passed unused when this one began (0 in an undisturbed run).
+    pub missed_slots: u64,
+}
+
+/// One axis in one cycle. SI units: rad (m), rad/s, rad/s², N·m (N).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct AxisRecord {
+    /// The set-point of this cycle.
+    pub position_set: f64,
+    /// What the drive reported for this cycle's SYNC.
+    pub position: f64,
+    /// Set-point of the velocity.
+    pub velocity_set: f32,
+    /// Set-point of the acceleration.
+    pub acceleration_set: f32,
+    /// Actual velocity: reported, or else derived from the positions.
+    pub velocity: f32,
+    /// Torque sent: the command in CST, else the feed-forward; 0 when none is sent.
+    pub torque_set: f32,
+    /// Torque that the drive reported; 0 when it does not.
+    pub torque: f32,
+    /// Distance between the set-point that was in force at this cycle's SYNC and the position reported for it.
+    pub following_error: f32,
+    /// Object 6040 as sent.
+    pub controlword: u16,
+    /// Object 6041 as received.
+    pub statusword: u16,
+    /// Object 603F if it is mapped or was announced by an emergency message; else 0.
+    pub error_code: u16,
+    /// Cycles since the drive last reported.
+    pub feedback_age: u16,
+    /// The command on the wire in drive units: counts, counts/s or per mille, by mode.
+    pub command_raw: i32,
+    /// The position on the wire in counts.
+    pub position_raw: i32,
+}
+
+impl AxisRecord {
+    /// The drive's state.
+    pub fn state(&self) -> cia402::State {
+        cia402::State::decode(self.statusword)
+    }
+}
+
+/// One cycle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CycleRecord {
+    /// When.
+    pub timing: Timing,
+    /// What the group was doing.
+    pub phase: Phase,
+    /// Whether set-points were sent in this cycle; if not, the drives hold the last ones.
+    pub is_commanded: bool,
+    /// How many of `axes` count.
+    pub axis_count: u8,
+    /// The axes in the order of the configuration.
+    pub axes: [AxisRecord; MAX_AXES],
+}
+
+impl Default for CycleRecord {
+    fn default() -> Self {
+        Self {
+            timing: Timing::default(),
+            phase: Phase::default(),
+            is_commanded: false,
+            axis_count: 0,
+            axes: [AxisRecord::default(); MAX_AXES],
+        }
+    }
+}
+
+impl CycleRecord {
+    /// The axes that count.
+    pub fn axes(&self) -> &[AxisRecord] {
+        self.axes.get(..self.axis_count.into()).unwrap_or(&self.axes)
+    }
+}
+
+/// Something that happened, for the logger and for people.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Event {
+    /// The slot in which it was seen.
+    pub slot: u64,
+    /// The time at which it was seen.
+    pub at_ns: Nanoseconds,
+    /// What it was.
+    pub kind: EventKind,
+}
+
+/// The kinds of events.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum EventKind {
+    /// The group went from one phase to another.
+    PhaseChanged {
+        /// The phase that ended.
+        from: Phase,
+        /// The phase that began.
+        to: Phase,
+    },
+    /// A stop began; exactly one for each stop.
+    Stop(StopReason),
+    /// A move was finished.
+    MoveFinished {
+        /// The number that the move was given.
+        id: u32,
+    },
+    /// A drive's state changed.
+    DriveState {
+        /// The axis.
+        axis: u8,
+        /// The statusword that showed it.
+        statusword: u16,
+    },
+    /// A drive sent an emergency message (CiA 301, 7.2.7).
+    Emergency {
+        /// The axis.
+        axis: u8,
+        /// The error code; 0 = all errors gone.
+        code: u16,
+        /// The error register, object 1001.
+        register: u8,
+        /// The manufacturer's five bytes.
+        manufacturer: [u8; 5],
+    },
+    /// Slots passed unused because the thread was late.
+    MissedSlots {
+        /// How many.
+        count: u64,
+    },
+    /// A request was refused and changed nothing.
+    Refused {
+        /// The phase that forbade it.
+        phase: Phase,
+    },
+}

@@ -1,1 +1,199 @@
-//! units.
+//! SI on our side, drive units on the wire.
+//!
+//! A position becomes counts by one multiplication and one rounding of the absolute value, never by adding up
+//! rounded steps, so the error is at most half a count for ever.
+
+/// What a drive counts in, against what the joint does.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ScaleParameters {
+    /// Counts of one turn of the drive's position (the side that it reports).
+    pub counts_per_turn: f64,
+    /// Turns of the drive's position for one turn of the joint; 1 where the drive reports the output side.
+    pub gear_ratio: f64,
+    /// What the joint moves in one turn: 2π rad, or metres for a linear axis.
+    pub travel_per_turn: f64,
+    /// Whether positive counts are negative travel.
+    pub reversed: bool,
+    /// The count at which the joint's position is zero.
+    pub zero_counts: f64,
+    /// The joint torque (N·m, or N for a linear axis) that the drive calls 1000 per mille (object 6076).
+    pub rated_torque: f64,
+}
+
+/// Compiled conversion between SI and drive units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Scale {
+    counts_per_unit: f64,
+    units_per_count: f64,
+    zero_counts: f64,
+    direction: f64,
+    per_mille_per_torque: f64,
+    torque_per_per_mille: f64,
+}
+
+/// A parameter of a scale that is not a positive, finite number (or, for the zero, not finite).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ScaleError {
+    /// [`ScaleParameters::counts_per_turn`]
+    CountsPerTurn,
+    /// [`ScaleParameters::gear_ratio`]
+    GearRatio,
+    /// [`ScaleParameters::travel_per_turn`]
+    TravelPerTurn,
+    /// [`ScaleParameters::zero_counts`]
+    ZeroCounts,
+    /// [`ScaleParameters::rated_torque`]
+    RatedTorque,
+}
+
+impl Scale {
+    /// Checks and compiles.
+    pub fn new(parameters: ScaleParameters) -> Result<Self, ScaleError> {
+        let positive =
+            |value: f64, error| if value.is_finite() && value > 0.0 { Ok(value) } else { Err(error) };
+        let counts = positive(parameters.counts_per_turn, ScaleError::CountsPerTurn)?;
+        let gear = positive(parameters.gear_ratio, ScaleError::GearRatio)?;
+        let travel = positive(parameters.travel_per_turn, ScaleError::TravelPerTurn)?;
+        if !parameters.zero_counts.is_finite() {
+            return Err(ScaleError::ZeroCounts);
+        }
+        let direction = if parameters.reversed { -1.0 } else { 1.0 };
+        let scale = Self {
+            counts_per_unit: direction * counts * gear / travel,
+            units_per_count: direction * travel / (counts * gear),
+            zero_counts: parameters.zero_counts,
+            direction,
+            per_mille_per_torque: 0.0,
+            torque_per_per_mille: 0.0,
+        };
+        scale.with_rated_torque(parameters.rated_torque)
+    }
+
+    /// The same scale with the rated torque that the drive has reported.
+    pub fn with_rated_torque(self, rated_torque: f64) -> Result<Self, ScaleError> {
+        if !(rated_torque.is_finite() && rated_torque > 0.0) {
+            return Err(ScaleError::RatedTorque);
+        }
+        Ok(Self {
+            per_mille_per_torque: self.direction * 1000.0 / rated_torque,
+            torque_per_per_mille: self.direction * rated_torque / 1000.0,
+            ..self
+        })
+    }
+
+    /// Counts per radian (or metre), without the sign of the direction.
+    pub fn resolution(&self) -> f64 {
+        self.counts_per_unit.abs()
+    }
+
+    /// Position (rad or m) to counts, to the nearest; beyond 32 bits the nearest end.
+    pub fn position_to_counts(&self, position: f64) -> i32 {
+        nearest(position * self.counts_per_unit + self.zero_counts)
+    }
+
+    /// Counts to position (rad or m).
+    pub fn position_from_counts(&self, counts: i32) -> f64 {
+        (f64::from(counts) - self.zero_counts) * self.units_per_count
+    }
+
+    /// Velocity (rad/s or m/s) to counts per second.
+    pub fn velocity_to_counts(&self, velocity: f64) -> i32 {
+        nearest(velocity * self.counts_per_unit)
+    }
+
+    /// Counts per second to velocity (rad/s or m/s).
+    pub fn velocity_from_counts(&self, counts_per_second: i32) -> f64 {
+        f64::from(counts_per_second) * self.units_per_count
+    }
+
+    /// Torque (N·m or N) to per mille of the rated torque, as far as 16 bits go.
+    pub fn torque_to_per_mille(&self, torque: f64) -> i32 {
+        nearest(torque * self.per_mille_per_torque).clamp(i16::MIN.into(), i16::MAX.into())
+    }
+
+    /// Per mille of the rated torque to torque (N·m or N).
+    pub fn torque_from_per_mille(&self, per_mille: i32) -> f64 {
+        f64::from(per_mille) * self.torque_per_per_mille
+    }
+}
+
+/// The nearest 32-bit integer. The cast saturates and takes NaN to 0, so no value can panic or wrap.
+fn nearest(value: f64) -> i32 {
+    libm::rint(value) as i32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use core::f64::consts::TAU;
+    use proptest::prelude::*;
+
+    const EROB: ScaleParameters = ScaleParameters {
+        counts_per_turn: 524_288.0,
+        gear_ratio: 1.0,
+        travel_per_turn: TAU,
+        reversed: false,
+        zero_counts: 0.0,
+        rated_torque: 31.0,
+    };
+
+    #[test]
+    fn an_erob_counts_83443_027_a_radian() {
+        let scale = Scale::new(EROB).unwrap();
+        assert_eq!(libm::rint(scale.resolution() * 1000.0) as i64, 83_443_027);
+        assert_eq!(scale.position_to_counts(1.0), 83_443);
+        assert_eq!(scale.position_to_counts(TAU), 524_288);
+    }
+
+    #[test]
+    fn a_reversed_joint_turns_position_velocity_and_torque_round() {
+        let scale = Scale::new(ScaleParameters { reversed: true, ..EROB }).unwrap();
+        assert_eq!(scale.position_to_counts(TAU), -524_288);
+        assert_eq!(scale.velocity_to_counts(TAU), -524_288);
+        assert_eq!(scale.torque_to_per_mille(31.0), -1000);
+        assert_eq!(scale.torque_from_per_mille(-1000), 31.0);
+    }
+
+    #[test]
+    fn torque_beyond_16_bits_and_positions_beyond_32_saturate() {
+        let scale = Scale::new(EROB).unwrap();
+        assert_eq!(scale.torque_to_per_mille(1e9), 32_767);
+        assert_eq!(scale.position_to_counts(-1e9), i32::MIN);
+    }
+
+    #[test]
+    fn impossible_parameters_are_named() {
+        for bad in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            assert_eq!(Scale::new(ScaleParameters { gear_ratio: bad, ..EROB }), Err(ScaleError::GearRatio));
+            assert_eq!(
+                Scale::new(ScaleParameters { rated_torque: bad, ..EROB }),
+                Err(ScaleError::RatedTorque)
+            );
+        }
+        assert_eq!(
+            Scale::new(ScaleParameters { zero_counts: f64::NAN, ..EROB }),
+            Err(ScaleError::ZeroCounts)
+        );
+    }
+
+    proptest! {
+        #[test]
+        fn counts_survive_the_way_to_si_and_back(
+            counts: i32, turns in 1.0f64..1e7, gear in 0.01f64..200.0, zero in -1_000_000i32..1_000_000, reversed: bool,
+        ) {
+            let scale = Scale::new(ScaleParameters {
+                counts_per_turn: turns, gear_ratio: gear, reversed, zero_counts: zero.into(), ..EROB
+            }).unwrap();
+            prop_assert_eq!(scale.position_to_counts(scale.position_from_counts(counts)), counts);
+            prop_assert_eq!(scale.velocity_to_counts(scale.velocity_from_counts(counts)), counts);
+        }
+
+        #[test]
+        fn a_sum_of_small_steps_never_leaves_the_nearest_count(step in 1e-9f64..1e-4, steps in 1usize..20_000) {
+            let scale = Scale::new(EROB).unwrap();
+            let position = step * steps as f64;
+            let exact = position * scale.resolution();
+            prop_assert!((f64::from(scale.position_to_counts(position)) - exact).abs() <= 0.5);
+        }
+    }
+}

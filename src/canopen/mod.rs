@@ -1,1 +1,35 @@
-//! canopen.
+//! The CANopen services (CiA 301) as a master needs them, without input and output: time and frames are handed in,
+//! frames are handed out.
+//!
+//! - [`nmt`]: network management: commands, states, boot-up and heartbeat.
+//! - [`sdo`]: service data objects: what is on the wire, and a client that moves one object at a time,
+//!   expedited, segmented or in blocks.
+//! - [`emcy`]: emergency messages and what their codes mean.
+//! - [`sync`]: the SYNC message.
+//! - [`object`]: an object's address, type and name; [`objects`]: the standard ones used here.
+
+pub mod emcy;
+pub mod nmt;
+pub mod object;
+pub mod objects;
+pub mod sdo;
+pub mod sync;
+
+/// Function codes of the pre-defined connection set (CiA 301, 7.3.3), to which the node number is added.
+pub mod function_code {
+    /// EMCY of a device (0x080 itself is SYNC).
+    pub const EMERGENCY: u16 = 0x080;
+    /// SDO server to client.
+    pub const SDO_RESPONSE: u16 = 0x580;
+    /// SDO client to server.
+    pub const SDO_REQUEST: u16 = 0x600;
+    /// Boot-up and heartbeat.
+    pub const ERROR_CONTROL: u16 = 0x700;
+}
+
+/// The node of a frame that carries `function`'s 11-bit identifier; `None` for every other frame.
+fn node_of(frame: &takt_rt::frame::Frame, function: u16) -> Option<u8> {
+    let id = frame.id();
+    let node = id.value().checked_sub(function.into())?;
+    (!id.is_extended() && (1..=0x7F).contains(&node)).then_some(node as u8)
+}

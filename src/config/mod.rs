@@ -1,1 +1,89 @@
-//! config.
+//! The configuration of a controller: what the TOML file says, checked, in SI units.
+//!
+//! [`Config::load`] reads a file and either gives a configuration in which every value is possible, or a
+//! [`ConfigError`] with every problem of the file, each with its line and a way out. Quantities are bare numbers in SI
+//! units or texts with a unit (`"137 deg/s"`). `configs/reference.toml` is the description of the format.
+
+mod defaults;
+mod error;
+mod interface;
+mod model;
+mod quantity;
+mod read;
+mod spelling;
+
+use std::path::Path;
+
+pub use error::{ConfigError, InterfaceError, Problem, ProblemKind};
+pub use model::*;
+pub use quantity::{Dimension, Quantity};
+
+use thiserror::Error;
+
+impl Config {
+    /// Reads a file and checks it. Whether the buses can carry what it asks for is a question for
+    /// [`crate::bus::schedule::verify`].
+    pub fn load(path: &Path) -> Result<Self, ConfigError> {
+        let name = path.display().to_string();
+        match std::fs::read_to_string(path) {
+            Ok(text) => Self::parse(&name, &text),
+            Err(error) => {
+                let kind = ProblemKind::Unreadable { reason: error.to_string() };
+                Err(ConfigError::new(&name, "", vec![Problem { kind, span: None, first_line: None }]))
+            }
+        }
+    }
+
+    /// Reads and checks the text of a configuration. `source_name` is what messages call it.
+    pub fn parse(source_name: &str, text: &str) -> Result<Self, ConfigError> {
+        read::parse(source_name, text)
+    }
+
+    /// Connects a bus to another interface than the file says, as `--bus NAME=INTERFACE` does.
+    pub fn override_interface(&mut self, name: &str, interface: &str) -> Result<(), OverrideError> {
+        let interface: Interface = interface.parse()?;
+        if interface != Interface::Simulated
+            && let Some(owner) = self.buses.iter().find(|bus| bus.interface == interface && bus.name != name)
+        {
+            return Err(OverrideError::InterfaceTaken { interface, bus: owner.name.clone() });
+        }
+        let known = || self.buses.iter().map(|bus| bus.name.as_str()).collect::<Vec<_>>().join(", ");
+        match self.buses.iter().position(|bus| bus.name == name) {
+            None => Err(OverrideError::UnknownBus { name: name.to_owned(), known: known() }),
+            Some(bus) => {
+                if let Some(bus) = self.buses.get_mut(bus) {
+                    bus.interface = interface;
+                }
+                Ok(())
+            }
+        }
+    }
+}
+
+/// Why a bus cannot be connected to another interface.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub enum OverrideError {
+    /// There is no such bus.
+    #[error("there is no bus called {name:?}; the buses are: {known}")]
+    UnknownBus {
+        /// The name.
+        name: String,
+        /// The buses that are there.
+        known: String,
+    },
+    /// There is no such interface.
+    #[error("{reason}: {}", reason.help())]
+    Interface {
+        /// Why.
+        #[from]
+        reason: InterfaceError,
+    },
+    /// Another bus is connected to it.
+    #[error("the interface {interface} already belongs to the bus {bus:?}")]
+    InterfaceTaken {
+        /// The interface.
+        interface: Interface,
+        /// The bus that it belongs to.
+        bus: String,
+    },
+}

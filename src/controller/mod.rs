@@ -1,1 +1,14 @@
-//! controller.
+//! A running controller: the engine of a configuration, the real-time thread that paces it, and the life cycle
+//! around it.
+
+pub mod assemble;
+pub mod channels;
+mod program;
+pub mod realtime_thread;
+pub mod session;
+mod supervisor;
+mod virtual_time;
+
+pub use program::{ProgramRunner, Step};
+pub use supervisor::{Interrupt, Outcome, Progress, Supervisor};
+pub use virtual_time::{VirtualClock, VirtualRun};

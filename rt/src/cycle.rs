@@ -1,0 +1,165 @@
+//! The paced loop: waits for each slot, releases SYNC, takes the feedback, lets the engine think, sends.
+//!
+//! ```text
+//! slot k                                                                     slot k+1
+//! |SYNC|  feedback arrives          |receive → compute → set-points → services| |SYNC|
+//! 0                           command phase                             all sent
+//! ```
+//!
+//! A late wake-up never bursts and never loses phase: slots that have passed are skipped and counted, and the
+//! trajectory goes on by one nominal period.
+
+use arrayvec::ArrayVec;
+
+use crate::door::Door;
+use crate::engine::{Engine, SendBatch, Transmission};
+use crate::port::{BusHealth, BusPort, Clock, ReceiveBatch};
+use crate::record::{MAX_BUSES, Timing};
+use crate::time::{Grid, Nanoseconds};
+
+/// When things happen inside a slot, in nanoseconds after its start.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SlotPlan {
+    /// SYNC that cannot leave by then is not sent: the slot is skipped, since drives would latch late and the
+    /// feedback would miss the command phase.
+    pub latest_sync_ns: Nanoseconds,
+    /// The beginning of the command phase.
+    pub command_phase_ns: Nanoseconds,
+    /// Set-points that are not ready by then are not sent: they would run into the next SYNC.
+    pub latest_set_points_ns: Nanoseconds,
+}
+
+impl SlotPlan {
+    /// The usual plan for a period: SYNC within a tenth of it, set-points ready no later than a quarter of it
+    /// after the command phase begins.
+    pub const fn usual(period_ns: Nanoseconds, command_phase_ns: Nanoseconds) -> Self {
+        let quarter = command_phase_ns + period_ns / 4;
+        let end = period_ns / 20 * 19;
+        Self {
+            latest_sync_ns: period_ns / 10,
+            command_phase_ns,
+            latest_set_points_ns: if quarter < end { quarter } else { end },
+        }
+    }
+}
+
+/// Whether the loop is to go on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Flow {
+    /// There is a next cycle.
+    Continue,
+    /// The loop was asked to end.
+    Leave,
+}
+
+/// The loop's place on the grid.
+#[derive(Clone, Copy, Debug)]
+pub struct Cycle {
+    grid: Grid,
+    plan: SlotPlan,
+    next_slot: u64,
+}
+
+impl Cycle {
+    /// A loop that begins with slot 0 of `grid`.
+    pub const fn new(grid: Grid, plan: SlotPlan) -> Self {
+        Self { grid, plan, next_slot: 0 }
+    }
+
+    /// One whole cycle.
+    pub fn run<C: Clock, P: BusPort, D: Door>(
+        &mut self,
+        engine: &mut Engine,
+        clock: &mut C,
+        ports: &mut [P],
+        door: &mut D,
+    ) -> Flow {
+        let mut timing = self.reach_slot(clock);
+        timing.sync_ns = clock.now_ns().saturating_sub(timing.slot_start_ns);
+        for (bus, port) in ports.iter_mut().enumerate() {
+            if let Some(sync) = engine.sync(bus) {
+                let now_ns = clock.now_ns();
+                port.send(now_ns, &[sync]);
+            }
+        }
+
+        let wake = clock.wait_until(timing.slot_start_ns + self.plan.command_phase_ns);
+        let is_blocked = take_feedback(engine, ports, wake.now_ns, door);
+        let health = health_of(ports);
+        let began_ns = clock.now_ns();
+        let transmission = if is_blocked {
+            Transmission::Blocked
+        } else if began_ns > timing.slot_start_ns + self.plan.latest_set_points_ns {
+            Transmission::TooLate
+        } else {
+            Transmission::Free
+        };
+        let has_commands = engine.compute(timing.slot, began_ns, &health, transmission, door);
+        timing.compute_ns = clock.now_ns().saturating_sub(began_ns);
+
+        for (bus, port) in ports.iter_mut().enumerate() {
+            let mut batch = SendBatch::new();
+            if has_commands {
+                engine.set_points(bus, &mut batch);
+            }
+            engine.services(bus, door, &mut batch);
+            if !batch.is_empty() {
+                port.send(clock.now_ns(), &batch);
+            }
+        }
+        let finished_ns = clock.now_ns();
+        timing.sent_ns = finished_ns.saturating_sub(timing.slot_start_ns);
+        engine.finish(timing, finished_ns, &health, door);
+        if engine.is_leaving() { Flow::Leave } else { Flow::Continue }
+    }
+
+    /// Waits for the next slot that can be used.
+    fn reach_slot(&mut self, clock: &mut impl Clock) -> Timing {
+        loop {
+            let now_ns = clock.now_ns();
+            let mut slot = self.next_slot;
+            if now_ns > self.grid.slot_start_ns(slot) + self.plan.latest_sync_ns {
+                slot = slot.max(self.grid.next_slot(now_ns));
+            }
+            let slot_start_ns = self.grid.slot_start_ns(slot);
+            let wake = clock.wait_until(slot_start_ns);
+            if wake.now_ns <= slot_start_ns + self.plan.latest_sync_ns {
+                self.next_slot = slot + 1;
+                return Timing { slot, slot_start_ns, wake_ns: wake.timer_latency_ns, ..Timing::default() };
+            }
+            self.next_slot = slot + 1;
+        }
+    }
+}
+
+/// Hands everything that has arrived to the engine. Returns whether own frames still wait for the wire anywhere.
+fn take_feedback<P: BusPort>(
+    engine: &mut Engine,
+    ports: &mut [P],
+    now_ns: Nanoseconds,
+    door: &mut impl Door,
+) -> bool {
+    let mut is_blocked = false;
+    let mut batch = ReceiveBatch::new();
+    for (bus, port) in ports.iter_mut().enumerate() {
+        // Bounded: whoever floods the bus with more than a bus can carry in one slot is heard next time.
+        for _ in 0..RECEIVES_PER_CYCLE {
+            batch.clear();
+            port.receive(now_ns, &mut batch);
+            for received in &batch {
+                engine.receive(bus, received, door);
+            }
+            if !batch.is_full() {
+                break;
+            }
+        }
+        is_blocked |= port.unconfirmed(now_ns) > 0;
+    }
+    is_blocked
+}
+
+const RECEIVES_PER_CYCLE: usize = 4;
+
+fn health_of<P: BusPort>(ports: &mut [P]) -> ArrayVec<BusHealth, MAX_BUSES> {
+    ports.iter_mut().take(MAX_BUSES).map(BusPort::health).collect()
+}

@@ -1,0 +1,133 @@
+//! Which axis and PDO a received identifier belongs to, found by one look into a table.
+
+use crate::frame::{Frame, FrameKind, Id};
+use crate::record::MAX_AXES;
+
+/// What a received frame is to the engine.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Destination {
+    /// Feedback: PDO `pdo` of axis `axis`.
+    Feedback {
+        /// The axis.
+        axis: u8,
+        /// Its feedback PDO, from 0.
+        pdo: u8,
+    },
+    /// An emergency message of axis `axis`.
+    Emergency {
+        /// The axis.
+        axis: u8,
+    },
+    /// Something that is not process data.
+    Service,
+}
+
+const IDS: usize = 0x800;
+const NOBODY: u16 = 0;
+const EMERGENCY: u8 = 7;
+
+/// The table of one bus: for each 11-bit identifier `1 + axis · 8 + pdo`, with PDO 7 for emergencies.
+#[derive(Clone, Debug)]
+pub struct Dispatch {
+    entries: [u16; IDS],
+}
+
+impl Default for Dispatch {
+    fn default() -> Self {
+        Self { entries: [NOBODY; IDS] }
+    }
+}
+
+/// The identifier is in use already, or cannot be dispatched.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct IdTaken {
+    /// The identifier.
+    pub id: Id,
+}
+
+impl Dispatch {
+    /// Enters a feedback PDO (0 to 3) of an axis (0 to 31).
+    pub fn feedback(&mut self, id: Id, axis: u8, pdo: u8) -> Result<(), IdTaken> {
+        self.enter(id, axis, pdo.min(EMERGENCY - 1))
+    }
+
+    /// Enters the emergency message of an axis.
+    pub fn emergency(&mut self, id: Id, axis: u8) -> Result<(), IdTaken> {
+        self.enter(id, axis, EMERGENCY)
+    }
+
+    fn enter(&mut self, id: Id, axis: u8, kind: u8) -> Result<(), IdTaken> {
+        let taken = IdTaken { id };
+        if id.is_extended() || usize::from(axis) >= MAX_AXES {
+            return Err(taken);
+        }
+        match self.entries.get_mut(id.value() as usize) {
+            Some(entry) if *entry == NOBODY => {
+                *entry = 1 + u16::from(axis) * 8 + u16::from(kind);
+                Ok(())
+            }
+            _ => Err(taken),
+        }
+    }
+
+    /// Where a frame goes.
+    pub fn destination(&self, frame: &Frame) -> Destination {
+        let id = frame.id();
+        if id.is_extended() || frame.kind() == FrameKind::Remote {
+            return Destination::Service;
+        }
+        match self.entries.get(id.value() as usize) {
+            None | Some(&NOBODY) => Destination::Service,
+            Some(&entry) => {
+                let (axis, pdo) = (((entry - 1) / 8) as u8, ((entry - 1) % 8) as u8);
+                if pdo == EMERGENCY {
+                    Destination::Emergency { axis }
+                } else {
+                    Destination::Feedback { axis, pdo }
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_axis_and_pdo_is_found_by_its_identifier_alone() {
+        let mut table = Dispatch::default();
+        for axis in 0..32u8 {
+            let node = axis + 1;
+            table.emergency(Id::canopen(0x080, node), axis).unwrap();
+            for pdo in 0..4u8 {
+                table.feedback(Id::canopen(0x180 + 0x100 * u16::from(pdo), node), axis, pdo).unwrap();
+            }
+        }
+        for axis in 0..32u8 {
+            let node = axis + 1;
+            let to = |function| table.destination(&Frame::of(Id::canopen(function, node), [0; 8]));
+            assert_eq!(to(0x080), Destination::Emergency { axis });
+            assert_eq!(to(0x280), Destination::Feedback { axis, pdo: 1 });
+            assert_eq!(to(0x580), Destination::Service);
+        }
+    }
+
+    #[test]
+    fn one_identifier_has_one_owner() {
+        let mut table = Dispatch::default();
+        let id = Id::canopen(0x180, 1);
+        table.feedback(id, 0, 0).unwrap();
+        assert_eq!(table.feedback(id, 1, 0), Err(IdTaken { id }));
+    }
+
+    #[test]
+    fn remote_and_extended_frames_are_no_feedback() {
+        let mut table = Dispatch::default();
+        let id = Id::canopen(0x180, 1);
+        table.feedback(id, 0, 0).unwrap();
+        assert_eq!(table.destination(&Frame::remote(id, 8).unwrap()), Destination::Service);
+        let extended = Frame::of(Id::extended(0x181).unwrap(), [0; 8]);
+        assert_eq!(table.destination(&extended), Destination::Service);
+    }
+}

@@ -1,0 +1,206 @@
+//! The last look at every set-point, whoever made it, before it becomes a frame.
+
+use crate::plan::State;
+use crate::stop::Rule;
+
+/// What an axis may never be asked to do. rad (m) and seconds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AxisLimits {
+    /// Lowest position.
+    pub position_min: f64,
+    /// Highest position.
+    pub position_max: f64,
+    /// Highest speed.
+    pub velocity: f64,
+    /// Highest acceleration.
+    pub acceleration: f64,
+    /// Highest deceleration.
+    pub deceleration: f64,
+    /// Highest jerk; infinite for trapezoids.
+    pub jerk: f64,
+    /// Highest torque in N·m (force in N).
+    pub torque: f64,
+}
+
+impl AxisLimits {
+    /// Whether every limit is a number that can be kept.
+    pub fn are_possible(&self) -> bool {
+        let positive = |value: f64| value > 0.0 && value.is_finite();
+        self.position_min.is_finite()
+            && self.position_max.is_finite()
+            && self.position_min < self.position_max
+            && positive(self.velocity)
+            && positive(self.acceleration)
+            && positive(self.deceleration)
+            && self.jerk > 0.0
+            && positive(self.torque)
+    }
+
+    /// Whether `position` may be a target.
+    pub fn contain(&self, position: f64) -> bool {
+        self.position_min <= position && position <= self.position_max
+    }
+}
+
+/// A set-point that would have broken a rule.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Violation {
+    /// Which rule.
+    pub rule: Rule,
+    /// What was asked for, in the unit of the rule.
+    pub value: f64,
+    /// What is allowed.
+    pub limit: f64,
+}
+
+/// Room for the rounding of floating-point differences, relative to the limit.
+const TOLERANCE: f64 = 1e-6;
+
+/// Checks the step from the set-points of the last two cycles to the next one.
+///
+/// Velocity and acceleration are judged by what the drive will see, the differences of the positions, and not by
+/// what the set-point says of itself. Outside the position limits a step is allowed only if it leads back.
+pub fn check(
+    limits: &AxisLimits,
+    period_s: f64,
+    before_last: f64,
+    last: f64,
+    next: &State,
+) -> Result<(), Violation> {
+    if !(next.position.is_finite() && next.velocity.is_finite() && next.acceleration.is_finite()) {
+        return Err(Violation { rule: Rule::NotFinite, value: next.position, limit: 0.0 });
+    }
+    let room = TOLERANCE * (limits.position_max - limits.position_min);
+    for (limit, beyond, deeper) in [
+        (limits.position_max, next.position > limits.position_max + room, next.position > last),
+        (limits.position_min, next.position < limits.position_min - room, next.position < last),
+    ] {
+        if beyond && deeper {
+            return Err(Violation { rule: Rule::PositionLimit, value: next.position, limit });
+        }
+    }
+    let velocity = (next.position - last) / period_s;
+    if velocity.abs() > limits.velocity * (1.0 + TOLERANCE) {
+        return Err(Violation { rule: Rule::VelocityLimit, value: velocity, limit: limits.velocity });
+    }
+    let last_velocity = (last - before_last) / period_s;
+    let acceleration = (velocity - last_velocity) / period_s;
+    let limit = limits.acceleration.max(limits.deceleration);
+    // Positions of some radians are known to some 1e-16 of a radian, which the division by the squared period
+    // turns into visible acceleration.
+    let noise = 4.0 * f64::EPSILON * (1.0 + next.position.abs()) / (period_s * period_s);
+    if acceleration.abs() > limit * (1.0 + TOLERANCE) + noise {
+        return Err(Violation { rule: Rule::AccelerationLimit, value: acceleration, limit });
+    }
+    Ok(())
+}
+
+/// Watches how long a joint has been too far from its set-point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FollowingErrorGuard {
+    limit: f64,
+    allowed_cycles: u32,
+    cycles: u32,
+}
+
+impl FollowingErrorGuard {
+    /// Allows an error beyond `limit` (rad or m) for `allowed_cycles` cycles in a row.
+    pub const fn new(limit: f64, allowed_cycles: u32) -> Self {
+        Self { limit, allowed_cycles, cycles: 0 }
+    }
+
+    /// Takes the error of this cycle.
+    pub fn check(&mut self, error: f64) -> Result<(), Violation> {
+        self.cycles = if error.abs() > self.limit { self.cycles.saturating_add(1) } else { 0 };
+        if self.cycles > self.allowed_cycles {
+            return Err(Violation { rule: Rule::FollowingError, value: error, limit: self.limit });
+        }
+        Ok(())
+    }
+
+    /// Forgets what was.
+    pub fn reset(&mut self) {
+        self.cycles = 0;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const LIMITS: AxisLimits = AxisLimits {
+        position_min: -1.0,
+        position_max: 2.0,
+        velocity: 3.0,
+        acceleration: 10.0,
+        deceleration: 20.0,
+        jerk: f64::INFINITY,
+        torque: 50.0,
+    };
+    const PERIOD_S: f64 = 0.001;
+
+    fn at(position: f64) -> State {
+        State { position, ..State::default() }
+    }
+
+    fn rule(before_last: f64, last: f64, next: State) -> Option<Rule> {
+        check(&LIMITS, PERIOD_S, before_last, last, &next).err().map(|violation| violation.rule)
+    }
+
+    #[test]
+    fn a_number_that_is_none_is_never_passed_on() {
+        for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+            assert_eq!(rule(0.0, 0.0, at(bad)), Some(Rule::NotFinite));
+            assert_eq!(rule(0.0, 0.0, State { velocity: bad, ..at(0.0) }), Some(Rule::NotFinite));
+            assert_eq!(rule(0.0, 0.0, State { acceleration: bad, ..at(0.0) }), Some(Rule::NotFinite));
+        }
+    }
+
+    #[test]
+    fn beyond_a_position_limit_only_the_way_back_is_open() {
+        assert_eq!(rule(2.0, 2.0, at(2.000_01)), Some(Rule::PositionLimit));
+        assert_eq!(rule(2.5, 2.5, at(2.499_99)), None);
+        assert_eq!(rule(2.5, 2.5, at(2.5)), None);
+        assert_eq!(rule(-1.5, -1.5, at(-1.500_01)), Some(Rule::PositionLimit));
+    }
+
+    #[test]
+    fn the_step_counts_and_not_what_the_set_point_says_of_itself() {
+        let lying = State { velocity: 0.1, ..at(0.0031) };
+        assert_eq!(rule(-0.0031, 0.0, lying), Some(Rule::VelocityLimit));
+        assert_eq!(rule(-0.003, 0.0, at(0.003)), None);
+    }
+
+    #[test]
+    fn acceleration_is_the_difference_of_two_steps() {
+        assert_eq!(rule(0.0, 0.0, at(20.0 * PERIOD_S * PERIOD_S)), None);
+        assert_eq!(rule(0.0, 0.0, at(20.1 * PERIOD_S * PERIOD_S)), Some(Rule::AccelerationLimit));
+    }
+
+    #[test]
+    fn a_following_error_may_be_short_but_not_long() {
+        let mut guard = FollowingErrorGuard::new(0.1, 3);
+        for _ in 0..3 {
+            assert_eq!(guard.check(-0.2), Ok(()));
+        }
+        assert_eq!(guard.check(0.05), Ok(()));
+        for _ in 0..3 {
+            assert_eq!(guard.check(0.2), Ok(()));
+        }
+        assert_eq!(guard.check(0.2), Err(Violation { rule: Rule::FollowingError, value: 0.2, limit: 0.1 }));
+    }
+
+    proptest! {
+        #[test]
+        fn no_triple_that_passes_breaks_a_limit(a in -2.0f64..3.0, b in -0.01f64..0.01, c in -0.01f64..0.01) {
+            let (last, next) = (a + b, a + b + c);
+            if check(&LIMITS, PERIOD_S, a, last, &at(next)).is_ok() {
+                prop_assert!((next - last).abs() <= 3.0 * PERIOD_S * 1.001);
+                prop_assert!((next - 2.0 * last + a).abs() <= 20.0 * PERIOD_S * PERIOD_S * 1.001);
+                prop_assert!(next <= 2.001 || next <= last);
+                prop_assert!(next >= -1.001 || next >= last);
+            }
+        }
+    }
+}

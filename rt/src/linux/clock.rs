@@ -1,0 +1,186 @@
+//! The kernel's monotonic clock.
+
+use super::spin_guard::SpinGuard;
+use crate::port::{Clock, Wake};
+use crate::time::{NANOSECONDS_PER_SECOND, Nanoseconds};
+
+/// `CLOCK_MONOTONIC`, waited on by an absolute sleep that ends the guard time before the deadline and a spin for
+/// the rest.
+///
+/// The sleep is absolute (`clock_nanosleep` with `TIMER_ABSTIME`), so that being interrupted between reading the
+/// clock and going to sleep delays nothing. A thread woken by the timer is late by the kernel's latency; the
+/// guard time absorbs it, and what remains is the spin's own granularity of some ten nanoseconds.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct MonotonicClock {
+    guard_ns: Nanoseconds,
+}
+
+impl MonotonicClock {
+    /// A clock that wakes `guard_ns` before each deadline and spins until then. With 0 it only sleeps.
+    pub const fn new(guard_ns: Nanoseconds) -> Self {
+        Self { guard_ns }
+    }
+
+    /// How long before a deadline the sleep ends.
+    pub const fn guard_ns(&self) -> Nanoseconds {
+        self.guard_ns
+    }
+
+    /// Sets how long before a deadline the sleep ends; 0 to only sleep.
+    pub const fn set_guard_ns(&mut self, guard_ns: Nanoseconds) {
+        self.guard_ns = guard_ns;
+    }
+
+    /// Takes the guard time over from what has been measured.
+    pub fn follow(&mut self, guard: &SpinGuard) {
+        self.guard_ns = guard.guard_ns();
+    }
+}
+
+impl Clock for MonotonicClock {
+    fn now_ns(&mut self) -> Nanoseconds {
+        monotonic_ns()
+    }
+
+    fn wait_until(&mut self, deadline_ns: Nanoseconds) -> Wake {
+        let timer_ns = deadline_ns.saturating_sub(self.guard_ns);
+        let mut wake = Wake { now_ns: monotonic_ns(), timer_latency_ns: 0 };
+        if wake.now_ns < timer_ns {
+            sleep_until(timer_ns);
+            wake.now_ns = monotonic_ns();
+            wake.timer_latency_ns = wake.now_ns.saturating_sub(timer_ns);
+        }
+        while wake.now_ns < deadline_ns {
+            core::hint::spin_loop();
+            wake.now_ns = monotonic_ns();
+        }
+        wake
+    }
+}
+
+/// Reads the clock; through the vDSO, so it costs no system call.
+pub(super) fn monotonic_ns() -> Nanoseconds {
+    read_clock(libc::CLOCK_MONOTONIC)
+}
+
+/// Reads a clock of the kernel.
+fn read_clock(clock: libc::clockid_t) -> Nanoseconds {
+    let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
+    // SAFETY: `time` is valid for writing; the call fails only for a clock that does not exist.
+    unsafe { libc::clock_gettime(clock, &mut time) };
+    nanoseconds_of(&time)
+}
+
+/// A kernel time as nanoseconds; what lies before zero is zero.
+fn nanoseconds_of(time: &libc::timespec) -> Nanoseconds {
+    let seconds = u64::try_from(time.tv_sec).unwrap_or(0);
+    let nanoseconds = u64::try_from(time.tv_nsec).unwrap_or(0);
+    seconds.saturating_mul(NANOSECONDS_PER_SECOND).saturating_add(nanoseconds)
+}
+
+/// Sleeps until the clock reads `deadline_ns`; a signal handled meanwhile does not end the sleep.
+fn sleep_until(deadline_ns: Nanoseconds) {
+    let time = libc::timespec {
+        tv_sec: libc::time_t::try_from(deadline_ns / NANOSECONDS_PER_SECOND).unwrap_or(libc::time_t::MAX),
+        tv_nsec: (deadline_ns % NANOSECONDS_PER_SECOND) as libc::c_long,
+    };
+    // SAFETY: `time` is a valid time for reading; an absolute sleep writes no remainder, so null is allowed.
+    // The loop ends: the time is absolute, and every other error is returned without sleeping (the caller spins).
+    while unsafe {
+        libc::clock_nanosleep(libc::CLOCK_MONOTONIC, libc::TIMER_ABSTIME, &time, core::ptr::null_mut())
+    } == libc::EINTR
+    {}
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use super::*;
+
+    #[test]
+    fn time_never_runs_backwards() {
+        let mut clock = MonotonicClock::default();
+        let mut before_ns = clock.now_ns();
+        for _ in 0..10_000 {
+            let now_ns = clock.now_ns();
+            assert!(now_ns >= before_ns);
+            before_ns = now_ns;
+        }
+    }
+
+    #[test]
+    fn a_wait_never_ends_early_with_any_guard() {
+        for guard_ns in [0, 1, 20_000, 200_000, 5_000_000, u64::MAX] {
+            let mut clock = MonotonicClock::new(guard_ns);
+            for step_ns in [0, 1, 999, 50_000, 300_000, 1_000_000] {
+                let deadline_ns = clock.now_ns() + step_ns;
+                let wake = clock.wait_until(deadline_ns);
+                assert!(wake.now_ns >= deadline_ns, "guard {guard_ns}, step {step_ns}");
+                assert!(clock.now_ns() >= wake.now_ns);
+            }
+        }
+    }
+
+    #[test]
+    fn a_deadline_that_has_passed_costs_no_sleep() {
+        let mut clock = MonotonicClock::default();
+        let now_ns = clock.now_ns();
+        assert_eq!(clock.wait_until(now_ns).timer_latency_ns, 0);
+        assert_eq!(clock.wait_until(0).timer_latency_ns, 0);
+    }
+
+    #[test]
+    fn with_a_guard_longer_than_the_wait_there_is_only_a_spin() {
+        let mut clock = MonotonicClock::new(60 * NANOSECONDS_PER_SECOND);
+        let deadline_ns = clock.now_ns() + 100_000;
+        let wake = clock.wait_until(deadline_ns);
+        assert_eq!(wake.timer_latency_ns, 0);
+        assert!(wake.now_ns >= deadline_ns);
+    }
+
+    #[test]
+    fn after_a_sleep_without_a_guard_the_timer_latency_is_the_whole_lateness() {
+        let mut clock = MonotonicClock::new(0);
+        let deadline_ns = clock.now_ns() + 2_000_000;
+        let wake = clock.wait_until(deadline_ns);
+        assert_eq!(wake.now_ns - deadline_ns, wake.timer_latency_ns);
+    }
+
+    #[test]
+    fn a_signal_handled_during_the_sleep_does_not_end_it() {
+        extern "C" fn ignore(_: libc::c_int) {}
+        // SAFETY: an all-zero sigaction is valid, and the handler does nothing. No SA_RESTART: the sleep is
+        // interrupted, and must be taken up again.
+        unsafe {
+            let mut action: libc::sigaction = core::mem::zeroed();
+            action.sa_sigaction = ignore as *const () as libc::sighandler_t;
+            assert_eq!(libc::sigaction(libc::SIGUSR1, &action, core::ptr::null_mut()), 0);
+        }
+        // SAFETY: pthread_self always succeeds.
+        let sleeper = unsafe { libc::pthread_self() };
+        let (done, stop) = std::sync::mpsc::channel::<()>();
+        std::thread::scope(|scope| {
+            scope.spawn(move || {
+                while stop.try_recv().is_err() {
+                    // SAFETY: the sleeping thread outlives this scope.
+                    unsafe { libc::pthread_kill(sleeper, libc::SIGUSR1) };
+                    std::thread::sleep(std::time::Duration::from_millis(1));
+                }
+            });
+            let mut clock = MonotonicClock::new(0);
+            let deadline_ns = clock.now_ns() + 30_000_000;
+            assert!(clock.wait_until(deadline_ns).now_ns >= deadline_ns);
+            done.send(()).unwrap();
+        });
+    }
+
+    #[test]
+    fn the_clock_follows_the_measured_guard() {
+        let mut clock = MonotonicClock::default();
+        let mut guard = SpinGuard::new(64_000);
+        guard.record(10_500);
+        clock.follow(&guard);
+        assert_eq!(clock.guard_ns(), guard.guard_ns());
+        assert!(clock.guard_ns() > 10_500);
+    }
+}

@@ -1,0 +1,116 @@
+//! Policy, priority and CPU of the calling thread.
+//!
+//! The scheduling calls are made directly: they concern one thread, and musl's wrappers of them answer ENOSYS
+//! because POSIX asks for a whole process.
+
+use super::step::Outcome;
+
+/// A scheduling policy (sched(7)).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Policy {
+    /// The ordinary time-sharing policy.
+    Other,
+    /// Time-sharing for batch work.
+    Batch,
+    /// Time-sharing when nothing else wants to run.
+    Idle,
+    /// First in, first out: runs until it blocks or a higher priority wants to.
+    Fifo,
+    /// FIFO with a time slice among equals.
+    RoundRobin,
+    /// Earliest deadline first.
+    Deadline,
+    /// One that this program does not know.
+    Unknown {
+        /// The kernel's number for it.
+        number: u32,
+    },
+}
+
+impl Policy {
+    fn of_number(number: u32) -> Self {
+        match i32::try_from(number) {
+            Ok(libc::SCHED_OTHER) => Self::Other,
+            Ok(libc::SCHED_BATCH) => Self::Batch,
+            Ok(libc::SCHED_IDLE) => Self::Idle,
+            Ok(libc::SCHED_FIFO) => Self::Fifo,
+            Ok(libc::SCHED_RR) => Self::RoundRobin,
+            Ok(libc::SCHED_DEADLINE) => Self::Deadline,
+            _ => Self::Unknown { number },
+        }
+    }
+}
+
+/// How a thread is scheduled, as read back from the kernel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Scheduling {
+    /// The policy.
+    pub policy: Policy,
+    /// The real-time priority, 1 to 99; 0 under a time-sharing policy.
+    pub priority: u8,
+    /// Whether threads and processes that this thread starts fall back to the time-sharing policy.
+    pub reset_on_fork: bool,
+}
+
+impl Scheduling {
+    /// That of the calling thread.
+    pub fn of_this_thread() -> Self {
+        let mut attributes = empty_attributes();
+        // SAFETY: `attributes` is valid for writing and as long as is said; the kernel writes no more than that.
+        // It fails only for a thread that does not exist, and then leaves the time-sharing policy in place.
+        unsafe { libc::syscall(libc::SYS_sched_getattr, 0, &raw mut attributes, attributes.size, 0) };
+        Self {
+            policy: Policy::of_number(attributes.sched_policy),
+            priority: u8::try_from(attributes.sched_priority).unwrap_or(u8::MAX),
+            reset_on_fork: attributes.sched_flags & RESET_ON_FORK != 0,
+        }
+    }
+}
+
+const RESET_ON_FORK: u64 = libc::SCHED_FLAG_RESET_ON_FORK as u64;
+
+fn empty_attributes() -> libc::sched_attr {
+    // SAFETY: all-zero bytes are a valid `sched_attr`: it holds numbers only.
+    let mut attributes: libc::sched_attr = unsafe { core::mem::zeroed() };
+    attributes.size = size_of::<libc::sched_attr>() as u32;
+    attributes
+}
+
+/// Gives the calling thread `SCHED_FIFO` at `priority`; what it starts later does not inherit it.
+pub(super) fn set_fifo(priority: u8) -> Outcome {
+    let mut attributes = empty_attributes();
+    attributes.sched_policy = libc::SCHED_FIFO as u32;
+    attributes.sched_priority = priority.into();
+    attributes.sched_flags = RESET_ON_FORK;
+    // SAFETY: `attributes` is valid for reading and says its own size; thread 0 is the caller.
+    Outcome::of(unsafe { libc::syscall(libc::SYS_sched_setattr, 0, &raw const attributes, 0) })
+}
+
+/// Pins the calling thread to `cpu`.
+pub(super) fn pin_to(cpu: usize) -> Outcome {
+    if cpu >= libc::CPU_SETSIZE as usize {
+        return Outcome::Refused { errno: libc::EINVAL };
+    }
+    // SAFETY: all-zero bytes are the empty set.
+    let mut set: libc::cpu_set_t = unsafe { core::mem::zeroed() };
+    // SAFETY: `cpu` lies within the set, as checked above.
+    unsafe { libc::CPU_SET(cpu, &mut set) };
+    // SAFETY: `set` is valid for reading and as long as is said; thread 0 is the caller.
+    Outcome::of(unsafe { libc::sched_setaffinity(0, size_of::<libc::cpu_set_t>(), &set) })
+}
+
+/// The CPU that the calling thread is bound to; `None` when it may run on several.
+pub(super) fn pinned_cpu() -> Option<usize> {
+    // SAFETY: all-zero bytes are the empty set.
+    let mut set: libc::cpu_set_t = unsafe { core::mem::zeroed() };
+    // SAFETY: `set` is valid for writing and as long as is said; thread 0 is the caller.
+    if unsafe { libc::sched_getaffinity(0, size_of::<libc::cpu_set_t>(), &mut set) } < 0 {
+        return None;
+    }
+    // SAFETY: every number asked for lies within the set.
+    let mut allowed = (0..libc::CPU_SETSIZE as usize).filter(|cpu| unsafe { libc::CPU_ISSET(*cpu, &set) });
+    match (allowed.next(), allowed.next()) {
+        (Some(cpu), None) => Some(cpu),
+        _ => None,
+    }
+}

@@ -1,0 +1,117 @@
+//! How long before a deadline the sleep must end.
+
+use crate::time::Nanoseconds;
+
+/// Resolution of the measurement: the cap is divided into this many buckets.
+const BUCKETS: usize = 64;
+
+/// One sample in this many may be later than the guard time absorbs.
+const TOLERATED: u64 = 1_000;
+
+/// Computes the guard time from measured wake-up latencies: the shortest that would have absorbed all but one
+/// wake-up in a thousand, and one bucket (1/64 of the cap) for the way from the timer to the spin.
+///
+/// A percentile, not the maximum: a single stall of milliseconds, as virtual machines have them, must not turn
+/// the rest of the run into spinning. The cap bounds the processor time that is given away, and a machine whose
+/// latency lies above it everywhere does not get better by spinning.
+#[derive(Clone, Debug)]
+pub struct SpinGuard {
+    cap_ns: Nanoseconds,
+    samples: u64,
+    within: [u32; BUCKETS],
+}
+
+impl SpinGuard {
+    /// A guard time of at most `cap_ns`; a tenth of the period is a good measure. With 0 there is never a spin.
+    pub const fn new(cap_ns: Nanoseconds) -> Self {
+        Self { cap_ns, samples: 0, within: [0; BUCKETS] }
+    }
+
+    /// Takes in by how much a wake-up was late against its timer.
+    pub fn record(&mut self, timer_latency_ns: Nanoseconds) {
+        self.samples += 1;
+        // Later than the cap falls out of the array, and is in `samples` alone.
+        let bucket = timer_latency_ns / self.bucket_ns();
+        if let Some(count) = usize::try_from(bucket).ok().and_then(|index| self.within.get_mut(index)) {
+            *count = count.saturating_add(1);
+        }
+    }
+
+    /// The guard time: 0 before the first sample, at most the cap.
+    pub fn guard_ns(&self) -> Nanoseconds {
+        if self.samples == 0 {
+            return 0;
+        }
+        let tolerated = self.samples / TOLERATED;
+        let mut covered = 0;
+        let mut edge_ns = self.bucket_ns();
+        for count in self.within {
+            covered += u64::from(count);
+            edge_ns = edge_ns.saturating_add(self.bucket_ns());
+            if covered + tolerated >= self.samples {
+                break;
+            }
+        }
+        edge_ns.min(self.cap_ns)
+    }
+
+    fn bucket_ns(&self) -> Nanoseconds {
+        self.cap_ns.div_ceil(BUCKETS as u64).max(1)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::SpinGuard;
+    use proptest::prelude::*;
+
+    #[test]
+    fn without_a_measurement_there_is_no_spin() {
+        assert_eq!(SpinGuard::new(64_000).guard_ns(), 0);
+    }
+
+    #[test]
+    fn a_cap_of_zero_switches_the_spin_off() {
+        let mut guard = SpinGuard::new(0);
+        guard.record(7_000);
+        assert_eq!(guard.guard_ns(), 0);
+    }
+
+    #[test]
+    fn the_guard_covers_the_usual_latency_with_a_bucket_to_spare() {
+        let mut guard = SpinGuard::new(64_000);
+        for _ in 0..100 {
+            guard.record(4_500);
+        }
+        assert_eq!(guard.guard_ns(), 6_000);
+    }
+
+    #[test]
+    fn a_single_stall_in_a_thousand_cycles_does_not_lengthen_the_guard() {
+        let mut guard = SpinGuard::new(64_000);
+        for _ in 0..999 {
+            guard.record(4_500);
+        }
+        guard.record(30_000_000);
+        assert_eq!(guard.guard_ns(), 6_000);
+        guard.record(30_000_000);
+        assert_eq!(guard.guard_ns(), 64_000);
+    }
+
+    proptest! {
+        #[test]
+        fn the_guard_is_capped_and_covers_all_but_one_in_a_thousand(
+            cap in 0u64..200_000,
+            latencies in proptest::collection::vec(0u64..250_000, 1..400),
+        ) {
+            let mut guard = SpinGuard::new(cap);
+            for latency in &latencies {
+                guard.record(*latency);
+            }
+            let guard_ns = guard.guard_ns();
+            prop_assert!(guard_ns <= cap);
+            let later = latencies.iter().filter(|latency| **latency > guard_ns).count();
+            prop_assert!(guard_ns == cap || later * 1_000 <= latencies.len());
+        }
+    }
+}

@@ -1,0 +1,127 @@
+//! The motion of the whole group: one trajectory for every axis, with one time.
+
+use arrayvec::ArrayVec;
+
+use crate::guard::AxisLimits;
+use crate::plan::{self, Limits, PlanError, Problem, Profile, State, Timing};
+use crate::record::MAX_AXES;
+
+/// The trajectory that the group is on.
+#[derive(Clone, Debug)]
+pub struct Motion {
+    profiles: [Profile; MAX_AXES],
+    duration_s: f64,
+    time_s: f64,
+}
+
+/// What a move is made of, an axis each.
+#[derive(Clone, Copy, Debug)]
+pub struct Leg<'a> {
+    /// From where.
+    pub start: State,
+    /// To where.
+    pub target: State,
+    /// Within what.
+    pub limits: &'a AxisLimits,
+}
+
+impl Default for Motion {
+    fn default() -> Self {
+        Self { profiles: [Profile::hold(0.0); MAX_AXES], duration_s: 0.0, time_s: 0.0 }
+    }
+}
+
+impl Motion {
+    /// Plans a coordinated move within fractions of the limits. On error the present motion goes on.
+    pub fn move_to<'a>(
+        &mut self,
+        legs: impl Iterator<Item = Leg<'a>>,
+        velocity_scale: f64,
+        acceleration_scale: f64,
+        minimum_duration_s: f64,
+    ) -> Result<(), PlanError> {
+        let problems: ArrayVec<Problem, MAX_AXES> = legs
+            .take(MAX_AXES)
+            .map(|leg| Problem {
+                start: leg.start,
+                target: leg.target,
+                limits: move_limits(&leg, velocity_scale, acceleration_scale),
+            })
+            .collect();
+        let mut profiles = self.profiles;
+        let count = problems.len();
+        let timing = Timing { minimum_duration_s, ..Timing::default() };
+        let duration_s =
+            plan::synchronised(&problems, profiles.get_mut(..count).unwrap_or_default(), timing)?;
+        *self = Self { profiles, duration_s, time_s: 0.0 };
+        Ok(())
+    }
+
+    /// Plans the fastest coordinated stop. On error the present motion goes on.
+    pub fn stop<'a>(&mut self, axes: impl Iterator<Item = (State, &'a AxisLimits)>) -> Result<(), PlanError> {
+        let mut starts: ArrayVec<State, MAX_AXES> = ArrayVec::new();
+        let mut limits: ArrayVec<Limits, MAX_AXES> = ArrayVec::new();
+        for (start, axis) in axes.take(MAX_AXES) {
+            starts.push(start);
+            limits.push(stop_limits(start.velocity, axis));
+        }
+        let mut profiles = self.profiles;
+        let count = starts.len();
+        let duration_s = plan::stop(&starts, &limits, profiles.get_mut(..count).unwrap_or_default())?;
+        *self = Self { profiles, duration_s, time_s: 0.0 };
+        Ok(())
+    }
+
+    /// Goes on by one period.
+    pub fn advance(&mut self, period_s: f64) {
+        self.time_s += period_s;
+    }
+
+    /// Where the axes are to be now, in their order; behind the last one more, at rest.
+    pub fn states(&self) -> impl Iterator<Item = State> + '_ {
+        let is_finished = self.is_finished();
+        self.profiles
+            .iter()
+            .map(move |profile| if is_finished { profile.end() } else { profile.sample(self.time_s) })
+    }
+
+    /// Whether the end has been reached.
+    pub fn is_finished(&self) -> bool {
+        self.time_s >= self.duration_s
+    }
+
+    /// Time left, in seconds.
+    pub fn remaining_s(&self) -> f64 {
+        (self.duration_s - self.time_s).max(0.0)
+    }
+}
+
+/// Speeding up and slowing down have limits of their own, the planner's have signs. From rest the direction of
+/// the way tells which is which; in motion the smaller one holds for both.
+fn move_limits(leg: &Leg<'_>, velocity_scale: f64, acceleration_scale: f64) -> Limits {
+    let axis = leg.limits;
+    let (acceleration, deceleration) =
+        (axis.acceleration * acceleration_scale, axis.deceleration * acceleration_scale);
+    let (rising, falling) = if leg.start.velocity != 0.0 || leg.target.velocity != 0.0 {
+        (acceleration.min(deceleration), acceleration.min(deceleration))
+    } else if leg.target.position >= leg.start.position {
+        (acceleration, deceleration)
+    } else {
+        (deceleration, acceleration)
+    };
+    let velocity = axis.velocity * velocity_scale;
+    // Who stands outside the position limits may move, as long as the way leads back.
+    let lowest = axis.position_min.min(leg.start.position);
+    let highest = axis.position_max.max(leg.start.position);
+    Limits::asymmetric(velocity, -velocity, rising, -falling, axis.jerk * acceleration_scale)
+        .with_position(lowest, highest)
+}
+
+fn stop_limits(velocity: f64, axis: &AxisLimits) -> Limits {
+    let (rising, falling) = if velocity >= 0.0 {
+        (axis.acceleration, axis.deceleration)
+    } else {
+        (axis.deceleration, axis.acceleration)
+    };
+    Limits::asymmetric(axis.velocity, -axis.velocity, rising, -falling, axis.jerk)
+}

@@ -1,0 +1,380 @@
+//! The group of axes from power-up to motion and back, and every way in which it stops.
+
+mod fixture;
+
+use fixture::{PERIOD_NS, Rig, parameters, scale};
+use proptest::prelude::*;
+use takt_rt::axis::AxisParameters;
+use takt_rt::cia402::State as DriveState;
+use takt_rt::door::{Move, Request};
+use takt_rt::engine::{Engine, SetUpError};
+use takt_rt::frame::{Frame, Id};
+use takt_rt::port::BusState;
+use takt_rt::record::{EventKind, MAX_AXES};
+use takt_rt::stop::{Phase, Rule, StopCategory};
+
+fn rules(rig: &Rig) -> Vec<Rule> {
+    rig.stops().iter().map(|stop| stop.rule).collect()
+}
+
+#[test]
+fn a_passive_group_sends_no_set_points() {
+    let mut rig = Rig::new(3);
+    rig.run(50);
+    assert!(rig.buses[0].sent.iter().all(|(_, frame)| frame.id().value() & 0x780 != 0x200));
+}
+
+#[test]
+fn enabling_does_not_move_an_axis_by_a_single_count() {
+    let mut rig = Rig::new(6);
+    let before: Vec<i32> = (0..6).map(|axis| rig.drive(axis).position).collect();
+    rig.door.requests.extend([Request::Sync(true), Request::Activate]);
+    rig.run(5);
+    rig.request(Request::Enable);
+    rig.run_until(Phase::Holding, 50);
+    rig.run(100);
+    let after: Vec<i32> = (0..6).map(|axis| rig.drive(axis).position).collect();
+    assert_eq!(before, after);
+}
+
+#[test]
+fn a_move_arrives_on_the_count_and_says_so() {
+    let mut rig = Rig::enabled(6);
+    rig.move_to(1.25);
+    assert_eq!(rig.phase(), Phase::Moving);
+    rig.run_until(Phase::Holding, 5_000);
+    rig.run(3);
+    assert_eq!(rig.door.snapshot.finished_move, 7);
+    for axis in 0..6 {
+        assert_eq!(rig.drive(axis).position, scale().position_to_counts(1.25));
+    }
+    rig.assert_limits_kept();
+}
+
+#[test]
+fn a_move_can_be_replanned_in_every_cycle_of_the_one_before() {
+    let mut rig = Rig::enabled(3);
+    for cycle in 0..600 {
+        let target = if cycle % 7 < 4 { 1.0 } else { -0.5 };
+        rig.move_to(target);
+    }
+    rig.move_to(0.25);
+    rig.run_until(Phase::Holding, 5_000);
+    rig.run(3);
+    rig.assert_limits_kept();
+    assert_eq!(rig.stops(), []);
+    assert_eq!(rig.drive(0).position, scale().position_to_counts(0.25));
+}
+
+#[test]
+fn what_cannot_be_done_is_refused_and_changes_nothing() {
+    let mut rig = Rig::enabled(3);
+    let good = Move {
+        id: 9,
+        target: [0.5; MAX_AXES],
+        target_velocity: [0.0; MAX_AXES],
+        velocity_scale: 1.0,
+        acceleration_scale: 1.0,
+        minimum_duration_s: 0.0,
+    };
+    let refused = [
+        Request::Move(Move { target: [3.1; MAX_AXES], ..good }),
+        Request::Move(Move { target: [f64::NAN; MAX_AXES], ..good }),
+        Request::Move(Move { velocity_scale: 0.0, ..good }),
+        Request::Move(Move { velocity_scale: 1.5, ..good }),
+        Request::Move(Move { acceleration_scale: f64::NAN, ..good }),
+        Request::Move(Move { minimum_duration_s: f64::INFINITY, ..good }),
+        Request::Move(Move { target_velocity: [f64::NAN; MAX_AXES], ..good }),
+        Request::Enable,
+        Request::Activate,
+        Request::RatedTorque { axis: 0, torque: -1.0 },
+        Request::RatedTorque { axis: 200, torque: 1.0 },
+    ];
+    for (count, request) in (1..).zip(refused) {
+        rig.request(request);
+        assert_eq!(rig.door.snapshot.refused, count, "{request:?}");
+        assert_eq!(rig.phase(), Phase::Holding, "{request:?}");
+    }
+}
+
+#[test]
+fn a_category_2_stop_decelerates_at_the_limits_and_holds() {
+    let mut rig = Rig::enabled(3);
+    rig.move_to(2.5);
+    rig.run(400);
+    rig.request(Request::Stop(StopCategory::Two));
+    rig.run_until(Phase::Holding, 400);
+    rig.assert_limits_kept();
+    assert_eq!(rig.stops().len(), 1);
+    assert_eq!(rig.drive(0).state, DriveState::OperationEnabled);
+    rig.move_to(0.0);
+    assert_eq!(rig.phase(), Phase::Moving, "a requested stop needs no reset");
+}
+
+#[test]
+fn a_category_1_stop_decelerates_and_then_disables() {
+    let mut rig = Rig::enabled(3);
+    rig.move_to(2.5);
+    rig.run(400);
+    rig.request(Request::Stop(StopCategory::One));
+    rig.run_until(Phase::Disabled, 500);
+    rig.assert_limits_kept();
+    assert!((0..3).all(|axis| rig.drive(axis).state == DriveState::ReadyToSwitchOn));
+}
+
+#[test]
+fn a_category_0_stop_takes_the_power_at_once() {
+    let mut rig = Rig::enabled(3);
+    rig.move_to(2.5);
+    rig.run(400);
+    rig.request(Request::Stop(StopCategory::Zero));
+    rig.run(4);
+    assert_eq!(rig.phase(), Phase::Disabled);
+    assert_eq!(rig.stops().len(), 1);
+}
+
+#[test]
+fn a_fault_of_one_axis_stops_all_with_one_reason_and_needs_a_reset() {
+    let mut rig = Rig::enabled(6);
+    rig.move_to(2.5);
+    rig.run(400);
+    rig.buses[0].inject(Frame::of(Id::canopen(0x080, 2), [0x11, 0x32, 0x04, 1, 2, 3, 4, 5]));
+    rig.drive(1).state = DriveState::Fault;
+    rig.run_until(Phase::Disabled, 1_000);
+    let stops = rig.stops();
+    assert_eq!(stops.len(), 1);
+    assert_eq!(
+        (stops[0].rule, stops[0].axis, stops[0].value),
+        (Rule::DriveFault, Some(1), f64::from(0x3211))
+    );
+    assert_eq!(stops[0].phase, Phase::Moving);
+    assert!(
+        (0..6).filter(|axis| *axis != 1).all(|axis| rig.drive(axis).state == DriveState::ReadyToSwitchOn)
+    );
+
+    rig.request(Request::Enable);
+    assert_eq!((rig.phase(), rig.door.snapshot.refused), (Phase::Disabled, 1), "the fault is latched");
+    rig.request(Request::ResetFaults);
+    rig.run(30);
+    rig.request(Request::Enable);
+    rig.run_until(Phase::Holding, 50);
+    assert_eq!(rig.door.snapshot.stop, None);
+}
+
+#[test]
+fn an_emergency_message_is_an_event_and_goes_through_the_door() {
+    let mut rig = Rig::enabled(3);
+    let emergency = Frame::of(Id::canopen(0x080, 3), [0x0F, 0x73, 0x81, 1, 2, 3, 4, 5]);
+    rig.buses[0].inject(emergency);
+    rig.run(1);
+    let kind = EventKind::Emergency { axis: 2, code: 0x730F, register: 0x81, manufacturer: [1, 2, 3, 4, 5] };
+    assert!(rig.door.events.iter().any(|event| event.kind == kind));
+    assert_eq!(rig.door.received, [emergency]);
+    assert_eq!(rig.door.snapshot.axes[2].error_code, 0x730F);
+}
+
+#[test]
+fn a_silent_drive_is_bridged_for_the_allowed_cycles_and_then_stops_the_group() {
+    let mut rig = Rig::enabled(3);
+    rig.move_to(2.5);
+    rig.run(300);
+    rig.drive(0).is_silent = true;
+    rig.run(3);
+    rig.drive(0).is_silent = false;
+    rig.run(5);
+    assert_eq!(rules(&rig), []);
+    rig.drive(0).is_silent = true;
+    rig.run_until(Phase::Stopping, 5);
+    assert_eq!(rules(&rig), [Rule::MissedFeedback]);
+    rig.assert_limits_kept();
+}
+
+#[test]
+fn a_joint_that_does_not_follow_stops_the_group() {
+    let mut rig = Rig::enabled(3);
+    rig.drive(2).is_stuck = true;
+    rig.move_to(2.5);
+    rig.run_until(Phase::Stopping, 500);
+    let stop = rig.stops()[0];
+    assert_eq!((stop.rule, stop.axis), (Rule::FollowingError, Some(2)));
+    assert!(stop.value.abs() > 0.05 && stop.limit == 0.05);
+    rig.run_until(Phase::Disabled, 1_000);
+}
+
+#[test]
+fn a_drive_that_leaves_operation_enabled_stops_the_group() {
+    let mut rig = Rig::enabled(3);
+    rig.move_to(2.5);
+    rig.run(300);
+    rig.drive(1).state = DriveState::SwitchOnDisabled;
+    rig.run_until(Phase::Stopping, 3);
+    assert_eq!(rules(&rig), [Rule::DriveDisabled]);
+}
+
+#[test]
+fn a_drive_that_cannot_be_enabled_ends_the_attempt() {
+    let mut rig = Rig::new(3);
+    rig.door.requests.extend([Request::Sync(true), Request::Activate]);
+    rig.run(5);
+    rig.drive(1).state = DriveState::NotReadyToSwitchOn;
+    rig.request(Request::Enable);
+    rig.run_until(Phase::Disabled, 600);
+    let stop = rig.stops()[0];
+    assert_eq!((stop.rule, stop.axis), (Rule::EnableTimeout, Some(1)));
+}
+
+#[test]
+fn a_lost_bus_stops_the_group() {
+    for state in [BusState::BusOff, BusState::Down] {
+        let mut rig = Rig::enabled(6);
+        rig.move_to(2.0);
+        rig.run(100);
+        rig.buses[1].state = state;
+        rig.run(1);
+        assert_eq!(rules(&rig), [Rule::BusLost]);
+        assert_eq!(rig.phase(), Phase::Stopping);
+    }
+}
+
+#[test]
+fn nothing_is_queued_behind_set_points_that_wait_for_the_wire() {
+    let mut rig = Rig::enabled(3);
+    rig.move_to(2.0);
+    rig.run(100);
+    rig.buses[0].unconfirmed = 3;
+    let before = rig.buses[0].sent.len();
+    let set_before = rig.door.snapshot.axes[0].position_set;
+    rig.run(4);
+    assert!(rig.buses[0].sent[before..].iter().all(|(_, frame)| frame.id().value() & 0x780 != 0x200));
+    assert_eq!(rig.door.snapshot.axes[0].position_set, set_before, "the trajectory waits, too");
+    rig.buses[0].unconfirmed = 0;
+    rig.run(10);
+    assert_eq!(rules(&rig), []);
+    rig.assert_limits_kept();
+    rig.buses[0].unconfirmed = 3;
+    rig.run(7);
+    assert_eq!(rules(&rig), [Rule::NotTransmitted]);
+}
+
+#[test]
+fn a_stream_is_followed_while_it_lasts_and_its_end_is_a_stop_at_the_limits() {
+    let mut rig = Rig::enabled(3);
+    rig.move_to(0.0);
+    rig.run_until(Phase::Holding, 5_000);
+    rig.request(Request::Stream);
+    let period_s = PERIOD_NS as f64 * 1e-9;
+    let (mut position, mut velocity) = (0.0, 0.0_f64);
+    for _ in 0..200 {
+        velocity = (velocity + 5.0 * period_s).min(0.5);
+        position += velocity * period_s;
+        rig.stream(position, velocity, 5 * PERIOD_NS);
+        rig.run(1);
+        assert_eq!(rig.phase(), Phase::Streaming);
+        assert_eq!(rig.door.snapshot.axes[0].position_set, position);
+    }
+    rig.run(4);
+    assert_eq!(rig.phase(), Phase::Streaming, "a few lost commands are bridged at the last velocity");
+    rig.run_until(Phase::Holding, 200);
+    assert_eq!(rules(&rig), [Rule::StaleCommand]);
+    rig.assert_limits_kept();
+    rig.move_to(0.0);
+    assert_eq!(rig.phase(), Phase::Holding, "a stale stream is latched");
+    rig.request(Request::ResetFaults);
+    rig.move_to(0.0);
+    assert_eq!(rig.phase(), Phase::Moving);
+}
+
+#[test]
+fn a_stream_may_not_jump() {
+    for (bad, rule) in
+        [(0.1, Rule::VelocityLimit), (f64::NAN, Rule::NotFinite), (0.001, Rule::AccelerationLimit)]
+    {
+        let mut rig = Rig::enabled(1);
+        rig.move_to(0.0);
+        rig.run_until(Phase::Holding, 5_000);
+        rig.request(Request::Stream);
+        rig.stream(bad, 0.0, 5 * PERIOD_NS);
+        rig.run(2);
+        assert_eq!(rules(&rig), [rule]);
+        assert_eq!(rig.phase(), Phase::Holding);
+        rig.assert_limits_kept();
+    }
+}
+
+#[test]
+fn impossible_parameters_are_refused_with_the_axis() {
+    let with = |change: fn(&mut AxisParameters)| {
+        let mut parameters = parameters(2);
+        change(&mut parameters.axes[1]);
+        Engine::new(parameters).err()
+    };
+    assert_eq!(with(|axis| axis.bus = 9), Some(SetUpError::UnknownBus { axis: 1 }));
+    assert_eq!(with(|axis| axis.commands.clear()), Some(SetUpError::NoPdo { axis: 1 }));
+    assert_eq!(with(|axis| axis.limits.velocity = f64::NAN), Some(SetUpError::ImpossibleLimits { axis: 1 }));
+    let taken = with(|axis| axis.node = 1);
+    assert_eq!(taken, Some(SetUpError::IdTaken { axis: 1, id: Id::canopen(0x080, 1) }));
+    let mut none = parameters(1);
+    none.axes.clear();
+    assert_eq!(Engine::new(none).err(), Some(SetUpError::NoAxis));
+}
+
+fn any_request() -> impl Strategy<Value = Request> {
+    let number = prop_oneof![4 => -3.5f64..3.5, 1 => Just(f64::NAN), 1 => Just(1e300)];
+    prop_oneof![
+        Just(Request::Enable),
+        Just(Request::Disable),
+        Just(Request::Activate),
+        Just(Request::Stream),
+        Just(Request::ResetFaults),
+        Just(Request::Sync(true)),
+        Just(Request::Stop(StopCategory::Zero)),
+        Just(Request::Stop(StopCategory::One)),
+        Just(Request::Stop(StopCategory::Two)),
+        (number, -2.0f64..2.0, 0.0f64..1.1).prop_map(|(target, velocity, scale)| Request::Move(Move {
+            id: 1,
+            target: [target; MAX_AXES],
+            target_velocity: [if velocity.abs() < 1.0 { 0.0 } else { velocity }; MAX_AXES],
+            velocity_scale: scale,
+            acceleration_scale: scale,
+            minimum_duration_s: 0.0,
+        })),
+    ]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(60))]
+
+    #[test]
+    fn no_sequence_of_requests_streams_and_faults_moves_an_axis_beyond_its_limits(
+        steps in prop::collection::vec((any_request(), 0usize..120, 0u8..12, -0.01f64..0.01), 1..60),
+    ) {
+        let mut rig = Rig::enabled(3);
+        for (request, cycles, fault, step) in steps {
+            rig.request(request);
+            match fault {
+                0 => rig.drive(0).state = DriveState::Fault,
+                1 => rig.drive(1).is_silent = true,
+                2 => rig.drive(1).is_silent = false,
+                3 => rig.buses[0].inject(Frame::of(Id::canopen(0x180, 1), [0xFF; 3])),
+                4 => rig.clock.lateness_ns.extend([0, 7_300_000]),
+                5 => {
+                    let at = rig.door.snapshot.axes[0].position_set + step;
+                    rig.stream(at, step * 10.0, 3 * PERIOD_NS);
+                }
+                _ => {}
+            }
+            rig.run(cycles);
+        }
+        rig.assert_limits_kept();
+    }
+
+    #[test]
+    fn frames_of_any_content_are_taken_without_a_panic(ids in prop::collection::vec((0u32..0x800, any::<u64>(), 0usize..9), 0..200)) {
+        let mut rig = Rig::enabled(2);
+        for (id, word, length) in ids {
+            rig.buses[0].inject(Frame::data(Id::base(id).unwrap(), &word.to_le_bytes()[..length]).unwrap());
+            rig.run(1);
+        }
+        prop_assert!(rig.door.snapshot.axes.iter().all(|axis| axis.position.is_finite()));
+    }
+}

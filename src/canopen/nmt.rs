@@ -1,0 +1,257 @@
+//! Network management (CiA 301, 7.2.8): the master's commands, the states of a node, and its boot-up and heartbeat
+//! messages with a consumer that notices when they cease.
+
+use std::fmt;
+
+use takt_rt::frame::{Frame, Id};
+use takt_rt::time::Nanoseconds;
+
+use super::{function_code, node_of};
+
+/// A command of the NMT master (CiA 301, 7.2.8.2.1).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[repr(u8)]
+pub enum NmtCommand {
+    /// Enter operational: every service runs.
+    Start = 0x01,
+    /// Enter stopped: only NMT and error control run; the SDO server is silent.
+    Stop = 0x02,
+    /// Enter pre-operational: SDO runs, PDO does not.
+    EnterPreOperational = 0x80,
+    /// Restart the whole application.
+    ResetNode = 0x81,
+    /// Set the communication parameters back to their stored values and boot.
+    ResetCommunication = 0x82,
+}
+
+impl NmtCommand {
+    /// Every command.
+    pub const ALL: [Self; 5] =
+        [Self::Start, Self::Stop, Self::EnterPreOperational, Self::ResetNode, Self::ResetCommunication];
+
+    /// The frame that gives this command.
+    pub fn frame(self, target: NmtTarget) -> Frame {
+        let node = match target {
+            NmtTarget::All => 0,
+            NmtTarget::Node(node) => node,
+        };
+        Frame::of(Id::canopen(0, 0), [self as u8, node])
+    }
+
+    /// Reads a command frame; `None` when it is none.
+    pub fn decode(frame: &Frame) -> Option<(Self, NmtTarget)> {
+        let (0, false, &[command, node]) = (frame.id().value(), frame.id().is_extended(), frame.payload())
+        else {
+            return None;
+        };
+        let command = Self::ALL.into_iter().find(|known| *known as u8 == command)?;
+        match node {
+            0 => Some((command, NmtTarget::All)),
+            1..=0x7F => Some((command, NmtTarget::Node(node))),
+            _ => None,
+        }
+    }
+}
+
+/// Who obeys a command.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum NmtTarget {
+    /// Every node of the bus.
+    All,
+    /// One node, 1 to 127.
+    Node(u8),
+}
+
+/// The state of a node as its error control messages tell it (CiA 301, 7.2.8.3.2.2).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[repr(u8)]
+pub enum NmtState {
+    /// It has just booted and is now pre-operational.
+    BootUp = 0x00,
+    /// Only NMT and error control run.
+    Stopped = 0x04,
+    /// Every service runs.
+    Operational = 0x05,
+    /// SDO runs, PDO does not.
+    PreOperational = 0x7F,
+}
+
+impl NmtState {
+    /// Every state.
+    pub const ALL: [Self; 4] = [Self::BootUp, Self::Stopped, Self::Operational, Self::PreOperational];
+}
+
+impl fmt::Display for NmtState {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::BootUp => "boot-up",
+            Self::Stopped => "stopped",
+            Self::Operational => "operational",
+            Self::PreOperational => "pre-operational",
+        })
+    }
+}
+
+/// A boot-up or heartbeat message.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ErrorControl {
+    /// Who sends it, 1 to 127.
+    pub node: u8,
+    /// The sender's state.
+    pub state: NmtState,
+}
+
+impl ErrorControl {
+    /// Reads a message; `None` when it is none, or names a state that does not exist. The top bit, which toggles
+    /// in answers to node guarding, does not count.
+    pub fn decode(frame: &Frame) -> Option<Self> {
+        let node = node_of(frame, function_code::ERROR_CONTROL)?;
+        let &[byte] = frame.payload() else { return None };
+        let state = NmtState::ALL.into_iter().find(|state| *state as u8 == byte & 0x7F)?;
+        Some(Self { node, state })
+    }
+
+    /// The message as a frame: the heartbeat that a producer sends.
+    pub fn frame(self) -> Frame {
+        Frame::of(Id::canopen(function_code::ERROR_CONTROL, self.node), [self.state as u8])
+    }
+}
+
+/// Watches the heartbeat of one node (CiA 301, 7.2.8.2.2.2). The watch begins with the first message.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct HeartbeatConsumer {
+    node: u8,
+    timeout_ns: Nanoseconds,
+    state: Option<NmtState>,
+    heard_at_ns: Nanoseconds,
+    is_lost: bool,
+}
+
+/// What a heartbeat, or its absence, tells.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum HeartbeatEvent {
+    /// The node has booted: everything it was told over the bus is forgotten.
+    BootUp,
+    /// The node is in another state than before. Also the first message after silence.
+    Changed {
+        /// Its state before; `None` when it was not known.
+        from: Option<NmtState>,
+        /// Its state now.
+        to: NmtState,
+    },
+    /// Nothing was heard for the agreed time.
+    Lost {
+        /// The state of which the node told last.
+        last: NmtState,
+        /// How long nothing has been heard.
+        silence_ns: Nanoseconds,
+    },
+}
+
+impl HeartbeatConsumer {
+    /// Watches `node`, which must be heard at least every `timeout_ns`.
+    pub const fn new(node: u8, timeout_ns: Nanoseconds) -> Self {
+        Self { node, timeout_ns, state: None, heard_at_ns: 0, is_lost: false }
+    }
+
+    /// The state of which the node told last; `None` before its first message and after its loss.
+    pub fn state(&self) -> Option<NmtState> {
+        self.state.filter(|_| !self.is_lost)
+    }
+
+    /// Takes a frame that was received at `now_ns`; every other frame is passed over.
+    pub fn receive(&mut self, now_ns: Nanoseconds, frame: &Frame) -> Option<HeartbeatEvent> {
+        let message = ErrorControl::decode(frame).filter(|message| message.node == self.node)?;
+        let from = self.state();
+        self.state = Some(message.state);
+        self.heard_at_ns = now_ns;
+        self.is_lost = false;
+        match message.state {
+            NmtState::BootUp => Some(HeartbeatEvent::BootUp),
+            to if from == Some(to) => None,
+            to => Some(HeartbeatEvent::Changed { from, to }),
+        }
+    }
+
+    /// Tells once that the heartbeat has been lost.
+    pub fn poll(&mut self, now_ns: Nanoseconds) -> Option<HeartbeatEvent> {
+        let last = self.state()?;
+        let silence_ns = now_ns.saturating_sub(self.heard_at_ns);
+        // A node that has only booted need not produce heartbeats yet.
+        if last == NmtState::BootUp || silence_ns <= self.timeout_ns {
+            return None;
+        }
+        self.is_lost = true;
+        Some(HeartbeatEvent::Lost { last, silence_ns })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn heartbeat(state: NmtState) -> Frame {
+        ErrorControl { node: 2, state }.frame()
+    }
+
+    #[test]
+    fn commands_are_the_bytes_of_the_standard() {
+        assert_eq!(format!("{:?}", NmtCommand::ResetCommunication.frame(NmtTarget::Node(2))), "000#8202");
+        assert_eq!(format!("{:?}", NmtCommand::Start.frame(NmtTarget::All)), "000#0100");
+    }
+
+    #[test]
+    fn every_command_is_read_back_as_itself() {
+        for command in NmtCommand::ALL {
+            for target in [NmtTarget::All, NmtTarget::Node(1), NmtTarget::Node(127)] {
+                assert_eq!(NmtCommand::decode(&command.frame(target)), Some((command, target)));
+            }
+        }
+    }
+
+    #[test]
+    fn frames_that_are_no_command_are_not_taken_for_one() {
+        let nmt = Id::canopen(0, 0);
+        assert_eq!(NmtCommand::decode(&Frame::of(nmt, [0x03, 1])), None);
+        assert_eq!(NmtCommand::decode(&Frame::of(nmt, [0x01, 128])), None);
+        assert_eq!(NmtCommand::decode(&Frame::of(nmt, [0x01])), None);
+        assert_eq!(NmtCommand::decode(&Frame::of(Id::extended(0).unwrap(), [0x01, 1])), None);
+    }
+
+    #[test]
+    fn error_control_messages_are_read_by_node_and_state() {
+        let read = |bytes: &[u8]| ErrorControl::decode(&Frame::data(Id::canopen(0x700, 2), bytes).unwrap());
+        assert_eq!(read(&[0x00]), Some(ErrorControl { node: 2, state: NmtState::BootUp }));
+        assert_eq!(read(&[0x85]), Some(ErrorControl { node: 2, state: NmtState::Operational }));
+        assert_eq!(read(&[0x06]), None);
+        assert_eq!(read(&[]), None);
+        assert_eq!(read(&[5, 0]), None);
+        assert_eq!(ErrorControl::decode(&Frame::of(Id::canopen(0x700, 0), [5])), None);
+        assert_eq!(ErrorControl::decode(&Frame::of(Id::canopen(0x680, 0), [5])), None);
+    }
+
+    #[test]
+    fn a_consumer_tells_of_changes_and_of_silence_once() {
+        let mut consumer = HeartbeatConsumer::new(2, 100);
+        assert_eq!(consumer.poll(1_000), None, "nothing is watched before the first message");
+        assert_eq!(consumer.receive(1_000, &heartbeat(NmtState::BootUp)), Some(HeartbeatEvent::BootUp));
+        assert_eq!(consumer.poll(5_000), None, "a boot-up alone promises no heartbeat");
+        let changed = HeartbeatEvent::Changed { from: Some(NmtState::BootUp), to: NmtState::PreOperational };
+        assert_eq!(consumer.receive(5_000, &heartbeat(NmtState::PreOperational)), Some(changed));
+        assert_eq!(consumer.receive(5_050, &heartbeat(NmtState::PreOperational)), None);
+        assert_eq!(consumer.poll(5_150), None);
+        let lost = HeartbeatEvent::Lost { last: NmtState::PreOperational, silence_ns: 101 };
+        assert_eq!(consumer.poll(5_151), Some(lost));
+        assert_eq!((consumer.poll(9_000), consumer.state()), (None, None));
+        let back = HeartbeatEvent::Changed { from: None, to: NmtState::Operational };
+        assert_eq!(consumer.receive(9_000, &heartbeat(NmtState::Operational)), Some(back));
+        assert_eq!(consumer.state(), Some(NmtState::Operational));
+    }
+
+    #[test]
+    fn a_consumer_hears_its_own_node_only() {
+        let mut consumer = HeartbeatConsumer::new(2, 100);
+        let other = ErrorControl { node: 3, state: NmtState::Operational }.frame();
+        assert_eq!((consumer.receive(0, &other), consumer.state()), (None, None));
+    }
+}

@@ -1,0 +1,85 @@
+//! What holds where a file says nothing. `configs/reference.toml` shows every one of these values, and a test
+//! compares it with them.
+
+use super::model::Identity;
+
+/// `[cycle] period`
+pub const PERIOD_NS: u64 = 1_000_000;
+/// `[cycle] command_phase`, as a fraction of the period.
+pub const COMMAND_PHASE: f64 = 0.55;
+
+/// `[realtime] priority`
+pub const PRIORITY: u8 = 80;
+/// `[realtime] lock_memory`
+pub const LOCK_MEMORY: bool = true;
+/// `[realtime] hold_dma_latency`
+pub const HOLD_DMA_LATENCY: bool = true;
+
+/// `[master] node`
+pub const MASTER_NODE: u8 = 127;
+/// `[master] heartbeat`
+pub const MASTER_HEARTBEAT_NS: u64 = 100_000_000;
+/// `[master] heartbeat_timeout`
+pub const HEARTBEAT_TIMEOUT_NS: u64 = 500_000_000;
+
+/// `[[bus]] bit_rate`
+pub const BIT_RATE: u32 = 1_000_000;
+/// `[[bus]] service_frames_per_cycle`
+pub const SERVICE_FRAMES_PER_CYCLE: usize = 1;
+/// `[[bus]] sdo_while_enabled`
+pub const SDO_WHILE_ENABLED: bool = false;
+
+/// `[[axis]] counts_per_turn` of an eRob: 19 bits on the output side.
+pub const EROB_COUNTS_PER_TURN: f64 = 524_288.0;
+/// `[axis.identity]` of an eRob with CANopen firmware; the revision changes with the firmware and is not compared.
+pub const EROB_IDENTITY: Identity = Identity {
+    device_type: Some(0x0042_0192),
+    vendor: Some(0x5A65_726F),
+    product: Some(0x2648_3052),
+    revision: None,
+};
+/// `[[axis]] gear_ratio`
+pub const GEAR_RATIO: f64 = 1.0;
+/// `[[axis]] missed_feedback_cycles`
+pub const MISSED_FEEDBACK_CYCLES: u16 = 5;
+/// `[[axis]] transmission_type`
+pub const TRANSMISSION_TYPE: u8 = 1;
+/// `[[axis]] feedback_delay`
+pub const FEEDBACK_DELAY_NS: u64 = 20_000;
+/// `[axis.following_error] limit` of a rotary axis in rad.
+pub const FOLLOWING_ERROR_RAD: f64 = 0.1;
+/// `[axis.following_error] limit` of a linear axis in m.
+pub const FOLLOWING_ERROR_M: f64 = 0.01;
+/// `[axis.following_error] time`
+pub const FOLLOWING_ERROR_TIME_NS: u64 = 50_000_000;
+
+/// `[axis.velocity_loop] position_gain` in 1/s: a tenth of the bandwidth that a drive's velocity loop has at least,
+/// and stable with the two cycles of delay at 2 ms.
+pub const POSITION_GAIN: f64 = 20.0;
+/// `[axis.torque_loop] bandwidth` in rad/s, from which stiffness (inertia · bandwidth²) and damping (2 · inertia ·
+/// bandwidth: critical) follow. Two cycles of delay at 1 ms cost it less than 5° of phase.
+pub const TORQUE_LOOP_BANDWIDTH: f64 = 40.0;
+
+/// `[axis.simulated] inertia` in kg·m² (kg).
+pub const INERTIA: f64 = 1.0;
+/// `[axis.simulated] viscous_friction` in N·m·s/rad (N·s/m).
+pub const VISCOUS_FRICTION: f64 = 1.0;
+/// `[axis.simulated] coulomb_friction` in N·m (N).
+pub const COULOMB_FRICTION: f64 = 0.5;
+/// `[axis.simulated] peak_torque` in rated torques, as object 60B2 of the eRob allows (±3000 per mille).
+pub const PEAK_TO_RATED_TORQUE: f64 = 3.0;
+/// `[axis.simulated] power_up`. A real eRob asks for 8 s.
+pub const POWER_UP_NS: u64 = 200_000_000;
+
+/// `[program] repeat`
+pub const REPEAT: u32 = 1;
+
+/// `[telemetry] directory`
+pub const DIRECTORY: &str = "runs";
+/// `[telemetry] ring_records`
+pub const RING_RECORDS: usize = 4096;
+
+/// `[simulation] seed`
+pub const SEED: u64 = 1;
+/// `[simulation] longest_gap`
+pub const LONGEST_GAP_NS: u64 = 2_000_000;

@@ -1,0 +1,315 @@
+//! The checked configuration as plain data. Whoever holds a [`Config`] that was read from a file may rely on every
+//! value being possible. The defaults that are named here hold where the file says nothing; they are constants of
+//! `defaults.rs`, and `configs/reference.toml` shows them as a file.
+
+use std::path::PathBuf;
+
+use takt_rt::cia402::OperationMode;
+
+/// A whole controller: one cycle, its buses, its axes and what they are to do.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Config {
+    /// The name of the machine, for people and file names.
+    pub name: String,
+    /// The cycle.
+    pub cycle: Cycle,
+    /// What is asked of the operating system.
+    pub realtime: Realtime,
+    /// This controller as a CANopen node.
+    pub master: Master,
+    /// The buses, in the order of the file.
+    pub buses: Vec<Bus>,
+    /// The axes, in the order of the file.
+    pub axes: Vec<Axis>,
+    /// What `takt run` does with them.
+    pub program: Program,
+    /// What is written down.
+    pub telemetry: Telemetry,
+    /// How simulated buses behave.
+    pub simulation: Simulation,
+}
+
+/// The cycle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cycle {
+    /// Period of SYNC and set-points; 250 µs to 100 ms in whole microseconds. Default 1 ms.
+    pub period_ns: u64,
+    /// When the command phase begins, after the start of the slot; 5 % to 95 % of the period. Default 55 %.
+    pub command_phase_ns: u64,
+}
+
+/// What is asked of the operating system for the real-time thread.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Realtime {
+    /// SCHED_FIFO priority, 1 to 99; `None` leaves the thread in the normal class. Default 80.
+    pub priority: Option<u8>,
+    /// The CPU to pin the thread to; `None`, the default, lets takt take the last one it may use.
+    pub cpu: Option<usize>,
+    /// Whether to lock all memory. Default `true`.
+    pub lock_memory: bool,
+    /// Whether to hold the CPU out of deep idle states. Default `true`.
+    pub hold_dma_latency: bool,
+    /// How long before a deadline to stop sleeping and spin; `None`, the default, measures the wake-up latency and
+    /// chooses.
+    pub spin_guard_ns: Option<u64>,
+}
+
+/// This controller as a CANopen node.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Master {
+    /// Its own node number, under which its heartbeat is sent. Default 127.
+    pub node: u8,
+    /// Period of its heartbeat in whole milliseconds; `None` sends none. Default 100 ms.
+    pub heartbeat_ns: Option<u64>,
+    /// Time after which a drive that no longer hears it must react (object 1016 of the drives), in whole
+    /// milliseconds. Default 500 ms.
+    pub heartbeat_timeout_ns: u64,
+}
+
+/// One bus.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Bus {
+    /// Its name in the configuration and the report.
+    pub name: String,
+    /// What it is connected to. Default: simulated.
+    pub interface: Interface,
+    /// Bit rate (bit/s) of classic frames and of the arbitration phase. Default 1 Mbit/s.
+    pub bit_rate: u32,
+    /// Bit rate (bit/s) of the data phase of CAN FD frames; `None`, the default, on a classic bus.
+    pub data_bit_rate: Option<u32>,
+    /// The most service frames (heartbeat, NMT, SDO …) sent in one cycle while the axes are enabled. Default 1.
+    pub service_frames_per_cycle: usize,
+    /// Whether SDO transfers go on while the axes are enabled. A request and its answer then need room in the
+    /// worst cycle; else they wait until the axes are disabled. Default `false`.
+    pub sdo_while_enabled: bool,
+}
+
+/// What a bus is connected to.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Interface {
+    /// Simulated drives inside this process.
+    Simulated,
+    /// A SocketCAN network interface, by name.
+    SocketCan(String),
+}
+
+/// One axis.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Axis {
+    /// Its name in the configuration and the report.
+    pub name: String,
+    /// Its bus, an index into [`Config::buses`].
+    pub bus: usize,
+    /// Its CANopen node number, 1 to 127.
+    pub node: u8,
+    /// The family of the drive.
+    pub drive: DriveFamily,
+    /// How it is commanded, with the gains of the loop that the controller closes itself. Default: position.
+    pub control: Control,
+    /// Rotary (the default) or linear.
+    pub travel: Travel,
+    /// Counts of one turn of the position that the drive reports. Default: the family's (eRob: 524288).
+    pub counts_per_turn: f64,
+    /// Turns of the reported position for one turn of the joint. Default 1.
+    pub gear_ratio: f64,
+    /// Whether positive counts are negative travel. Default `false`.
+    pub reversed: bool,
+    /// The count at which the joint's position is zero. Default 0.
+    pub zero_counts: i32,
+    /// What may never be exceeded.
+    pub limits: Limits,
+    /// How far the joint may be from its set-point.
+    pub following_error: FollowingError,
+    /// Cycles without feedback before the group stops. Default 5.
+    pub missed_feedback_cycles: u16,
+    /// Transmission type of the PDOs (1 = every SYNC). Default 1.
+    pub transmission_type: u8,
+    /// What the drive reports every cycle beside statusword and position. Default: nothing.
+    pub feedback: Vec<Feedback>,
+    /// The longest time from SYNC until the drive has its feedback ready to be sent. Default 20 µs.
+    pub feedback_delay_ns: u64,
+    /// Period of the drive's own heartbeat (object 1017); `None`, the default, leaves it off: feedback in every cycle
+    /// proves the drive alive without loading the bus.
+    pub heartbeat_ns: Option<u64>,
+    /// What is known of the drive beforehand and compared at bring-up. Default: the family's, any revision.
+    pub identity: Identity,
+    /// The drive and joint that stand in on a simulated bus.
+    pub simulated: SimulatedJoint,
+}
+
+/// A family of drives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DriveFamily {
+    /// ZeroErr eRob, CANopen firmware.
+    ErobCanopen,
+}
+
+/// Something a drive can report every cycle beside statusword and position.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Feedback {
+    /// 6061, one byte.
+    OperationMode,
+    /// 606C, four bytes.
+    Velocity,
+    /// 6077, two bytes.
+    Torque,
+    /// 6078, two bytes.
+    Current,
+    /// 603F, two bytes.
+    ErrorCode,
+}
+
+/// How an axis is commanded.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Control {
+    /// Cyclic synchronous position: the drive closes every loop.
+    Position,
+    /// Cyclic synchronous velocity: the controller closes the position loop.
+    Velocity {
+        /// Gain of the position loop in 1/s. Default 20.
+        position_gain: f64,
+    },
+    /// Cyclic synchronous torque: the controller closes position and velocity loops.
+    Torque {
+        /// N·m/rad (N/m). Default: inertia · bandwidth², with a bandwidth of 40 rad/s unless the file says another.
+        stiffness: f64,
+        /// N·m·s/rad (N·s/m). Default: 2 · inertia · bandwidth.
+        damping: f64,
+        /// Feed-forward of the acceleration: kg·m² (kg). Default: that of the simulated joint.
+        inertia: f64,
+        /// Feed-forward of the velocity: N·m·s/rad (N·s/m). Default: that of the simulated joint.
+        viscous_friction: f64,
+        /// Feed-forward of the direction of motion: N·m (N). Default: that of the simulated joint.
+        coulomb_friction: f64,
+    },
+}
+
+impl Control {
+    /// The mode of operation that this needs in the drive.
+    pub fn operation_mode(self) -> OperationMode {
+        match self {
+            Self::Position => OperationMode::CyclicSynchronousPosition,
+            Self::Velocity { .. } => OperationMode::CyclicSynchronousVelocity,
+            Self::Torque { .. } => OperationMode::CyclicSynchronousTorque,
+        }
+    }
+}
+
+/// Whether an axis turns or slides.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Travel {
+    /// rad
+    Rotary,
+    /// m; so many in one turn.
+    Linear {
+        /// Lead in m.
+        lead_m: f64,
+    },
+}
+
+/// Limits of an axis in rad (m) and seconds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limits {
+    /// Lowest position.
+    pub position_min: f64,
+    /// Highest position.
+    pub position_max: f64,
+    /// Highest speed.
+    pub velocity: f64,
+    /// Highest acceleration.
+    pub acceleration: f64,
+    /// Highest deceleration. Default: the acceleration.
+    pub deceleration: f64,
+    /// Highest jerk; infinite, the default, plans trapezoids.
+    pub jerk: f64,
+    /// Highest torque in N·m (force in N).
+    pub torque: f64,
+}
+
+/// How far the joint may be from its set-point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FollowingError {
+    /// rad or m. Default 0.1 rad or 0.01 m.
+    pub limit: f64,
+    /// For how long it may be further. Default 50 ms.
+    pub time_ns: u64,
+}
+
+/// What a drive must say of itself; `None` accepts anything.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Identity {
+    /// Object 1000.
+    pub device_type: Option<u32>,
+    /// Object 1018:1.
+    pub vendor: Option<u32>,
+    /// Object 1018:2.
+    pub product: Option<u32>,
+    /// Object 1018:3.
+    pub revision: Option<u32>,
+}
+
+/// What `takt run` does: the moves one after the other, the whole list `repeat` times.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Program {
+    /// How often the list is run, at least once. Default 1.
+    pub repeat: u32,
+    /// The moves.
+    pub moves: Vec<ProgramMove>,
+}
+
+/// A coordinated move of every axis to rest.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ProgramMove {
+    /// Targets in rad (m), in the order of the axes.
+    pub target: Vec<f64>,
+    /// Fraction of the velocity limits. Default 1.
+    pub velocity_scale: f64,
+    /// Fraction of the acceleration and jerk limits. Default 1.
+    pub acceleration_scale: f64,
+    /// The move takes at least this long, in seconds. Default 0.
+    pub minimum_duration_s: f64,
+    /// Standstill after it, in seconds. Default 0.
+    pub dwell_s: f64,
+}
+
+/// What is written down.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Telemetry {
+    /// The folder for recordings. Default `runs`.
+    pub directory: PathBuf,
+    /// Whether a recording is made. Default `true`.
+    pub is_recorded: bool,
+    /// Whether the frames of every bus are written as candump logs. Default `false`.
+    pub is_candump_written: bool,
+    /// Cycle records that the ring to the logger can hold. Default 4096.
+    pub ring_records: usize,
+}
+
+/// How simulated buses behave.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Simulation {
+    /// Seed of everything random. Default 1.
+    pub seed: u64,
+    /// A pause of this process that is longer than this stops the simulated world too: the host's stalls are
+    /// not the bus's. Default 2 ms.
+    pub longest_gap_ns: u64,
+}
+
+/// The drive and joint that stand in for an axis on a simulated bus.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SimulatedJoint {
+    /// Rotor and load at the joint: kg·m² (kg). Default 1.
+    pub inertia: f64,
+    /// N·m·s/rad (N·s/m). Default 1.
+    pub viscous_friction: f64,
+    /// N·m (N). Default 0.5.
+    pub coulomb_friction: f64,
+    /// What the drive calls rated torque (object 6076): N·m (N). Default: the torque limit.
+    pub rated_torque: f64,
+    /// Peak torque: N·m (N). Default: three times the rated torque.
+    pub peak_torque: f64,
+    /// Position at power-up: rad (m). Default 0, or the limit nearest to it.
+    pub initial_position: f64,
+    /// From power-up to the first answer. Default 200 ms.
+    pub power_up_ns: u64,
+}

@@ -1,0 +1,487 @@
+//! `[[axis]]`, with `[defaults.axis]` behind each of them.
+
+use std::f64::consts::TAU;
+use std::ops::Range;
+
+use takt_rt::record::MAX_AXES;
+
+use super::bus::ReadBus;
+use super::entry::{Bounds, Entry, Problems};
+use super::machine::{boolean, heartbeat, node};
+use super::section::Section;
+use crate::config::defaults;
+use crate::config::error::ProblemKind;
+use crate::config::model::{
+    Axis, Control, DriveFamily, Feedback, FollowingError, Identity, Limits, Master, SimulatedJoint, Travel,
+};
+use crate::config::quantity::Quantity;
+use crate::config::spelling;
+
+/// The quantities of an axis by what it does: turn or slide.
+#[derive(Clone, Copy)]
+pub struct Quantities {
+    pub position: Quantity,
+    velocity: Quantity,
+    acceleration: Quantity,
+    jerk: Quantity,
+    effort: Quantity,
+    inertia: Quantity,
+    stiffness: Quantity,
+    damping: Quantity,
+}
+
+impl Quantities {
+    pub const ROTARY: Self = Self {
+        position: Quantity::ANGLE,
+        velocity: Quantity::ANGULAR_VELOCITY,
+        acceleration: Quantity::ANGULAR_ACCELERATION,
+        jerk: Quantity::ANGULAR_JERK,
+        effort: Quantity::TORQUE,
+        inertia: Quantity::MOMENT_OF_INERTIA,
+        stiffness: Quantity::ANGULAR_STIFFNESS,
+        damping: Quantity::ANGULAR_DAMPING,
+    };
+    pub const LINEAR: Self = Self {
+        position: Quantity::LENGTH,
+        velocity: Quantity::VELOCITY,
+        acceleration: Quantity::ACCELERATION,
+        jerk: Quantity::JERK,
+        effort: Quantity::FORCE,
+        inertia: Quantity::MASS,
+        stiffness: Quantity::STIFFNESS,
+        damping: Quantity::DAMPING,
+    };
+
+    pub fn of(travel: Travel) -> Self {
+        match travel {
+            Travel::Rotary => Self::ROTARY,
+            Travel::Linear { .. } => Self::LINEAR,
+        }
+    }
+}
+
+/// An axis as far as it could be read.
+pub struct ReadAxis {
+    pub name: Option<String>,
+    pub quantities: Quantities,
+    pub limits: Option<Limits>,
+    /// `None` when something about it is wrong.
+    pub axis: Option<Axis>,
+    place: Option<(usize, u8)>,
+    header: Range<usize>,
+}
+
+pub fn axes<'a>(
+    sections: Vec<Section<'a>>,
+    buses: &[ReadBus],
+    master: &Master,
+    problems: &'a Problems<'a>,
+) -> Vec<ReadAxis> {
+    let count = sections.len();
+    let mut axes: Vec<ReadAxis> = Vec::with_capacity(count);
+    for section in sections {
+        let header = section.header();
+        axes.push(axis(section, buses, master, &axes, problems));
+        if axes.len() == MAX_AXES + 1 {
+            problems.report(ProblemKind::TooMany { what: "axes", given: count, limit: MAX_AXES }, header);
+        }
+    }
+    axes
+}
+
+fn axis<'a>(
+    mut section: Section<'a>,
+    buses: &[ReadBus],
+    master: &Master,
+    earlier: &[ReadAxis],
+    problems: &'a Problems<'a>,
+) -> ReadAxis {
+    let header = section.header();
+    let name = section.require_own("name", "the name of the axis: name = \"joint1\"").and_then(|entry| {
+        let name = entry.name()?.to_owned();
+        if let Some(first) = earlier.iter().find(|axis| axis.name.as_ref() == Some(&name)) {
+            let kind = ProblemKind::DuplicateName { what: "axis", name: name.clone() };
+            problems.report_against(kind, entry.span.clone(), first.header.clone());
+        }
+        Some(name)
+    });
+    let bus = section.require("bus", "the name of its bus").and_then(|entry| bus_index(&entry, buses));
+    let node = section.require_own("node", "its node number, 1 to 127").and_then(|entry| {
+        let node = node(&entry)?;
+        check_node(&entry, node, bus, buses, master, earlier, problems);
+        Some(node)
+    });
+    let drive = section
+        .require("drive", "the family of the drive: drive = \"erob-canopen\"")
+        .and_then(|entry| entry.choice(&[("erob-canopen", DriveFamily::ErobCanopen)]));
+    check_bit_rate(drive, bus.and_then(|bus| buses.get(bus)), problems);
+
+    let travel = travel(&mut section);
+    let quantities = Quantities::of(travel.unwrap_or(Travel::Rotary));
+    let counting = counting(&mut section);
+    let limits = limits(section.section("limits"), quantities, travel, &counting);
+    let following_error = following_error(section.section("following_error"), quantities);
+    let simulated = simulated(section.section("simulated"), quantities, limits.as_ref(), name.as_deref());
+    let control = control(&mut section, quantities, &simulated);
+    let feedback = feedback(&mut section);
+    let transmission_type = transmission_type(&mut section);
+    let missed = section.get("missed_feedback_cycles").and_then(|entry| entry.integer(1..1001));
+    let feedback_delay = section.get("feedback_delay").and_then(|entry| entry.nanoseconds(0.0, 0.01));
+    let heartbeat_ns = section.get("heartbeat").and_then(|entry| heartbeat(&entry));
+    let identity = identity(section.section("identity"), drive);
+    section.finish();
+
+    let place = bus.zip(node);
+    let build = || {
+        let (bus, node) = place?;
+        Some(Axis {
+            name: name.clone()?,
+            bus,
+            node,
+            drive: drive?,
+            control: control?,
+            travel: travel?,
+            counts_per_turn: counting.counts_per_turn,
+            gear_ratio: counting.gear_ratio,
+            reversed: counting.reversed,
+            zero_counts: counting.zero_counts,
+            limits: limits?,
+            following_error,
+            missed_feedback_cycles: missed
+                .and_then(|cycles| u16::try_from(cycles).ok())
+                .unwrap_or(defaults::MISSED_FEEDBACK_CYCLES),
+            transmission_type,
+            feedback,
+            feedback_delay_ns: feedback_delay.unwrap_or(defaults::FEEDBACK_DELAY_NS),
+            heartbeat_ns,
+            identity,
+            simulated,
+        })
+    };
+    let axis = build();
+    ReadAxis { name, quantities, limits, axis, place, header }
+}
+
+fn bus_index(entry: &Entry<'_>, buses: &[ReadBus]) -> Option<usize> {
+    let given = entry.text()?;
+    let found = buses.iter().position(|bus| bus.name.as_deref() == Some(given));
+    if found.is_none() && buses.iter().all(|bus| bus.name.is_some()) {
+        let known: Vec<String> = buses.iter().filter_map(|bus| bus.name.clone()).collect();
+        let nearest = spelling::nearest(given, known.iter().map(String::as_str)).map(str::to_owned);
+        entry.report(ProblemKind::UnknownBus { name: given.to_owned(), nearest, known });
+    }
+    found
+}
+
+fn check_node(
+    entry: &Entry<'_>,
+    node: u8,
+    bus: Option<usize>,
+    buses: &[ReadBus],
+    master: &Master,
+    earlier: &[ReadAxis],
+    problems: &Problems<'_>,
+) {
+    let Some(bus) = bus else { return };
+    let bus_name = buses.get(bus).and_then(|bus| bus.name.clone()).unwrap_or_default();
+    let kind = ProblemKind::DuplicateNode { bus: bus_name, node };
+    if let Some(first) = earlier.iter().find(|axis| axis.place == Some((bus, node))) {
+        problems.report_against(kind, entry.span.clone(), first.header.clone());
+    } else if node == master.node {
+        entry.report(kind);
+    }
+}
+
+/// An eRob knows one bit rate (eRunner manual, section 1 of the specification).
+fn check_bit_rate(drive: Option<DriveFamily>, bus: Option<&ReadBus>, problems: &Problems<'_>) {
+    if let (Some(DriveFamily::ErobCanopen), Some(bus)) = (drive, bus)
+        && let Some(span) = bus.bit_rate_span.clone()
+        && bus.bit_rate != 1_000_000
+    {
+        let kind = ProblemKind::OutOfRange {
+            key: "bus.bit_rate".to_owned(),
+            value: Quantity::BIT_RATE.show(bus.bit_rate.into()),
+            allowed: "1 Mbit/s, the one bit rate of the eRobs on this bus".to_owned(),
+        };
+        problems.report(kind, span);
+    }
+}
+
+fn travel(section: &mut Section<'_>) -> Option<Travel> {
+    let lead = section.get("lead");
+    let is_linear = match section.get("travel") {
+        None => false,
+        Some(entry) => entry.choice(&[("rotary", false), ("linear", true)])?,
+    };
+    if !is_linear {
+        return Some(Travel::Rotary);
+    }
+    let Some(lead) = lead else {
+        section.require("lead", "what a linear axis moves in one turn: lead = \"5 mm\"");
+        return None;
+    };
+    lead.quantity(Quantity::LENGTH, Bounds::Positive).map(|lead_m| Travel::Linear { lead_m })
+}
+
+struct Counting {
+    counts_per_turn: f64,
+    gear_ratio: f64,
+    reversed: bool,
+    zero_counts: i32,
+}
+
+impl Counting {
+    /// Counts per rad (m). An axis whose travel could not be read counts nothing.
+    fn counts_per_unit(&self, travel: Option<Travel>) -> f64 {
+        let counts = self.counts_per_turn * self.gear_ratio;
+        match travel {
+            Some(Travel::Rotary) => counts / TAU,
+            Some(Travel::Linear { lead_m }) => counts / lead_m,
+            None => 0.0,
+        }
+    }
+
+    fn position(&self, position: f64, travel: Option<Travel>) -> f64 {
+        let direction = if self.reversed { -1.0 } else { 1.0 };
+        direction * position * self.counts_per_unit(travel) + f64::from(self.zero_counts)
+    }
+}
+
+fn counting(section: &mut Section<'_>) -> Counting {
+    let counts_per_turn =
+        section.get("counts_per_turn").and_then(|entry| entry.number(Bounds::Between(1.0, 1e12)));
+    let gear_ratio = section.get("gear_ratio").and_then(|entry| entry.number(Bounds::Between(1e-6, 1e6)));
+    let zero =
+        section.get("zero_counts").and_then(|entry| entry.integer(i32::MIN.into()..1 + i64::from(i32::MAX)));
+    Counting {
+        counts_per_turn: counts_per_turn.unwrap_or(defaults::EROB_COUNTS_PER_TURN),
+        gear_ratio: gear_ratio.unwrap_or(defaults::GEAR_RATIO),
+        reversed: boolean(section, "reversed", false),
+        zero_counts: zero.and_then(|zero| i32::try_from(zero).ok()).unwrap_or(0),
+    }
+}
+
+fn limits(
+    mut section: Section<'_>,
+    q: Quantities,
+    travel: Option<Travel>,
+    counting: &Counting,
+) -> Option<Limits> {
+    let position = section
+        .require("position", "lowest and highest position: position = [\"-170 deg\", \"170 deg\"]")
+        .and_then(|entry| {
+            let (low, high) = position_range(&entry, q)?;
+            check_counts(&entry, &[low, high].map(|position| counting.position(position, travel)));
+            Some((low, high))
+        });
+    let velocity = section.require("velocity", "highest speed: velocity = \"137 deg/s\"").and_then(|entry| {
+        let velocity = entry.quantity(q.velocity, Bounds::Positive)?;
+        check_counts(&entry, &[velocity * counting.counts_per_unit(travel)]);
+        Some(velocity)
+    });
+    let acceleration = section
+        .require("acceleration", "highest acceleration: acceleration = \"8 rad/s^2\"")
+        .and_then(|entry| entry.quantity(q.acceleration, Bounds::Positive));
+    let deceleration =
+        section.get("deceleration").map(|entry| entry.quantity(q.acceleration, Bounds::Positive));
+    let jerk = section.get("jerk").map(|entry| entry.quantity(q.jerk, Bounds::PositiveOrInfinite));
+    let torque = section
+        .require("torque", "highest torque, or force of a linear axis: torque = \"87 Nm\"")
+        .and_then(|entry| entry.quantity(q.effort, Bounds::Positive));
+    section.finish();
+    let (position_min, position_max) = position?;
+    Some(Limits {
+        position_min,
+        position_max,
+        velocity: velocity?,
+        acceleration: acceleration?,
+        deceleration: deceleration.unwrap_or(acceleration)?,
+        jerk: jerk.unwrap_or(Some(f64::INFINITY))?,
+        torque: torque?,
+    })
+}
+
+fn position_range(entry: &Entry<'_>, q: Quantities) -> Option<(f64, f64)> {
+    let list = entry.list()?;
+    let [low, high] = list.as_slice() else {
+        entry.report_range(
+            format!("a list of {}", list.len()),
+            "the lowest and the highest position".to_owned(),
+        );
+        return None;
+    };
+    let (low, high) = (low.quantity(q.position, Bounds::Finite), high.quantity(q.position, Bounds::Finite));
+    let (low, high) = (low?, high?);
+    if low < high {
+        return Some((low, high));
+    }
+    entry.report(ProblemKind::EmptyRange { low: q.position.show(low), high: q.position.show(high) });
+    None
+}
+
+/// A drive counts positions and speeds in 32 bits.
+fn check_counts(entry: &Entry<'_>, counts: &[f64]) {
+    if let Some(&counts) = counts.iter().find(|counts| counts.abs() > f64::from(i32::MAX)) {
+        entry.report(ProblemKind::BeyondCounts { key: entry.path.clone(), counts });
+    }
+}
+
+fn following_error(mut section: Section<'_>, q: Quantities) -> FollowingError {
+    let limit = section.get("limit").and_then(|entry| entry.quantity(q.position, Bounds::Positive));
+    let time_ns = section.get("time").and_then(|entry| entry.nanoseconds(0.0, 10.0));
+    section.finish();
+    let default = if q.position == Quantity::ANGLE {
+        defaults::FOLLOWING_ERROR_RAD
+    } else {
+        defaults::FOLLOWING_ERROR_M
+    };
+    FollowingError {
+        limit: limit.unwrap_or(default),
+        time_ns: time_ns.unwrap_or(defaults::FOLLOWING_ERROR_TIME_NS),
+    }
+}
+
+fn simulated(
+    mut section: Section<'_>,
+    q: Quantities,
+    limits: Option<&Limits>,
+    name: Option<&str>,
+) -> SimulatedJoint {
+    let mut value = |key, quantity, bounds| {
+        section.get(key).and_then(|entry: Entry<'_>| entry.quantity(quantity, bounds))
+    };
+    let inertia = value("inertia", q.inertia, Bounds::Positive);
+    let viscous_friction = value("viscous_friction", q.damping, Bounds::NotNegative);
+    let coulomb_friction = value("coulomb_friction", q.effort, Bounds::NotNegative);
+    let rated_torque = value("rated_torque", q.effort, Bounds::Positive);
+    let peak_torque = value("peak_torque", q.effort, Bounds::Positive);
+    let power_up_ns = section.get("power_up").and_then(|entry| entry.nanoseconds(0.0, 60.0));
+    let initial = section.get("initial_position").and_then(|entry| {
+        let position = entry.quantity(q.position, Bounds::Finite)?;
+        if let Some(limits) = limits.filter(|limits| !contains(limits, position)) {
+            entry.report(ProblemKind::InitialPositionOutsideLimits {
+                axis: name.unwrap_or_default().to_owned(),
+                value: q.position.show(position),
+                allowed: show_range(limits, q),
+            });
+        }
+        Some(position)
+    });
+    section.finish();
+    let torque_limit = limits.map_or(1.0, |limits| limits.torque);
+    let rated_torque = rated_torque.unwrap_or(torque_limit);
+    SimulatedJoint {
+        inertia: inertia.unwrap_or(defaults::INERTIA),
+        viscous_friction: viscous_friction.unwrap_or(defaults::VISCOUS_FRICTION),
+        coulomb_friction: coulomb_friction.unwrap_or(defaults::COULOMB_FRICTION),
+        rated_torque,
+        peak_torque: peak_torque.unwrap_or(defaults::PEAK_TO_RATED_TORQUE * rated_torque),
+        initial_position: initial.unwrap_or_else(|| {
+            limits.map_or(0.0, |limits| 0.0_f64.max(limits.position_min).min(limits.position_max))
+        }),
+        power_up_ns: power_up_ns.unwrap_or(defaults::POWER_UP_NS),
+    }
+}
+
+/// Whether a position is within the limits.
+pub fn contains(limits: &Limits, position: f64) -> bool {
+    (limits.position_min..=limits.position_max).contains(&position)
+}
+
+/// The position limits for people.
+pub fn show_range(limits: &Limits, q: Quantities) -> String {
+    format!("{} to {}", q.position.show(limits.position_min), q.position.show(limits.position_max))
+}
+
+/// The mode, with the gains of the loop that it needs. The gains of the other loops are checked and not used, so that
+/// the mode can be changed in one line.
+fn control(section: &mut Section<'_>, q: Quantities, joint: &SimulatedJoint) -> Option<Control> {
+    let velocity_loop = velocity_loop(section.section("velocity_loop"));
+    let torque_loop = torque_loop(section.section("torque_loop"), q, joint);
+    let modes = [("csp", Control::Position), ("csv", velocity_loop), ("cst", torque_loop)];
+    match section.get("mode") {
+        Some(entry) => entry.choice(&modes),
+        None => Some(Control::Position),
+    }
+}
+
+fn velocity_loop(mut section: Section<'_>) -> Control {
+    let gain =
+        section.get("position_gain").and_then(|entry| entry.quantity(Quantity::GAIN, Bounds::Positive));
+    section.finish();
+    Control::Velocity { position_gain: gain.unwrap_or(defaults::POSITION_GAIN) }
+}
+
+fn torque_loop(mut section: Section<'_>, q: Quantities, joint: &SimulatedJoint) -> Control {
+    let mut value = |key, quantity, bounds| {
+        section.get(key).and_then(|entry: Entry<'_>| entry.quantity(quantity, bounds))
+    };
+    let bandwidth =
+        value("bandwidth", Quantity::GAIN, Bounds::Positive).unwrap_or(defaults::TORQUE_LOOP_BANDWIDTH);
+    let inertia = value("inertia", q.inertia, Bounds::NotNegative).unwrap_or(joint.inertia);
+    let stiffness = value("stiffness", q.stiffness, Bounds::Positive);
+    let damping = value("damping", q.damping, Bounds::NotNegative);
+    let viscous_friction = value("viscous_friction", q.damping, Bounds::NotNegative);
+    let coulomb_friction = value("coulomb_friction", q.effort, Bounds::NotNegative);
+    section.finish();
+    Control::Torque {
+        stiffness: stiffness.unwrap_or(inertia * bandwidth * bandwidth),
+        damping: damping.unwrap_or(2.0 * inertia * bandwidth),
+        inertia,
+        viscous_friction: viscous_friction.unwrap_or(joint.viscous_friction),
+        coulomb_friction: coulomb_friction.unwrap_or(joint.coulomb_friction),
+    }
+}
+
+fn feedback(section: &mut Section<'_>) -> Vec<Feedback> {
+    let choices = [
+        ("operation_mode", Feedback::OperationMode),
+        ("velocity", Feedback::Velocity),
+        ("torque", Feedback::Torque),
+        ("current", Feedback::Current),
+        ("error_code", Feedback::ErrorCode),
+    ];
+    let mut feedback = vec![];
+    for entry in section.get("feedback").and_then(|entry| entry.list()).into_iter().flatten() {
+        let Some(object) = entry.choice(&choices) else { continue };
+        if feedback.contains(&object) {
+            let given = entry.text().unwrap_or_default().to_owned();
+            entry.report(ProblemKind::Repeated { key: entry.path.clone(), given });
+        } else {
+            feedback.push(object);
+        }
+    }
+    feedback
+}
+
+/// 1 to 240: every so many SYNCs; 254 and 255: on the drive's own events (CiA 301, 7.5.2.36 and 7.5.2.38).
+fn transmission_type(section: &mut Section<'_>) -> u8 {
+    let read = section.get("transmission_type").and_then(|entry| {
+        let value = u8::try_from(entry.integer(1..256)?).ok()?;
+        if matches!(value, 241..=253) {
+            entry.report_range(value.to_string(), "1 to 240 (SYNC), 254 or 255 (event)".to_owned());
+        }
+        Some(value)
+    });
+    read.unwrap_or(defaults::TRANSMISSION_TYPE)
+}
+
+fn identity(mut section: Section<'_>, drive: Option<DriveFamily>) -> Identity {
+    let default = match drive {
+        Some(DriveFamily::ErobCanopen) => defaults::EROB_IDENTITY,
+        None => Identity::default(),
+    };
+    let mut value = |key, default| match section.get(key) {
+        None => default,
+        Some(entry) if entry.is_word("any") => None,
+        Some(entry) => entry.integer(0..1 << 32).and_then(|value| u32::try_from(value).ok()),
+    };
+    let identity = Identity {
+        device_type: value("device_type", default.device_type),
+        vendor: value("vendor", default.vendor),
+        product: value("product", default.product),
+        revision: value("revision", default.revision),
+    };
+    section.finish();
+    identity
+}

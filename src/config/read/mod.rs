@@ -1,0 +1,78 @@
+//! From the text of a file to a checked [`Config`].
+//!
+//! `toml` gives the tree with the place of every key and value. It is read here key by key rather than by derived
+//! `serde` code, because that would end at the first problem; a person who sets up a machine wants to hear of all of
+//! them at once.
+
+mod axis;
+mod bus;
+mod entry;
+mod machine;
+mod program;
+mod section;
+
+use toml::de::DeTable;
+
+use super::error::{ConfigError, Problem, ProblemKind};
+use super::model::Config;
+use entry::Problems;
+use section::Section;
+
+/// Reads and checks a configuration.
+pub fn parse(source_name: &str, text: &str) -> Result<Config, ConfigError> {
+    let refuse = |problems| ConfigError::new(source_name, text, problems);
+    let (document, errors) = DeTable::parse_recoverable(text);
+    if !errors.is_empty() {
+        return Err(refuse(errors.iter().map(|error| syntax_problem(error, text)).collect()));
+    }
+    let problems = Problems::new(text);
+    let config = read(document.get_ref(), &problems);
+    let problems = problems.into_vec();
+    match config {
+        Some(config) if problems.is_empty() => Ok(config),
+        _ => Err(refuse(problems)),
+    }
+}
+
+fn syntax_problem(error: &toml::de::Error, text: &str) -> Problem {
+    let kind = ProblemKind::Syntax { message: error.message().to_owned() };
+    Problem { kind, span: Some(error.span().unwrap_or(text.len()..text.len())), first_line: None }
+}
+
+/// Reads every section, even after one has failed.
+fn read<'a>(document: &'a DeTable<'a>, problems: &'a Problems<'a>) -> Option<Config> {
+    let mut root = Section::new("", 0..0, document, problems);
+    let name =
+        root.require("name", "the name of the machine: name = \"arm6\"").and_then(|entry| entry.name());
+    let cycle = machine::cycle(root.section("cycle"));
+    let realtime = machine::realtime(root.section("realtime"), cycle.period_ns);
+    let master = machine::master(root.section("master"));
+    let telemetry = machine::telemetry(root.section("telemetry"));
+    let simulation = machine::simulation(root.section("simulation"));
+
+    root.require("bus", "at least one [[bus]]");
+    let buses = bus::buses(root.sections("bus"), problems);
+
+    let mut defaults = root.section("defaults");
+    let axis_defaults = defaults.get("axis").and_then(|entry| entry.table());
+    defaults.finish();
+    root.require("axis", "at least one [[axis]]");
+    let axes =
+        root.sections("axis").into_iter().map(|section| section.with_defaults(axis_defaults)).collect();
+    let axes = axis::axes(axes, &buses, &master, problems);
+
+    let program = program::program(root.section("program"), &axes);
+    root.finish();
+
+    Some(Config {
+        name: name?.to_owned(),
+        cycle,
+        realtime,
+        master,
+        buses: buses.into_iter().map(|bus| bus.bus).collect::<Option<_>>()?,
+        axes: axes.into_iter().map(|axis| axis.axis).collect::<Option<_>>()?,
+        program,
+        telemetry,
+        simulation,
+    })
+}

@@ -1,0 +1,172 @@
+//! A table of the file, with the table of defaults that stands behind it.
+
+use std::ops::Range;
+
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+use super::entry::{Entry, Problems};
+use crate::config::error::ProblemKind;
+use crate::config::spelling;
+
+/// A table that is being read. It remembers which keys were asked for: what is left over at the end is unknown, and
+/// what was asked for in vain is missing.
+pub struct Section<'a> {
+    path: String,
+    header: Range<usize>,
+    /// The table itself, then the one with its defaults, as far as they are there.
+    own: Option<&'a DeTable<'a>>,
+    defaults: Option<&'a DeTable<'a>>,
+    known: Vec<&'static str>,
+    known_in_defaults: Vec<&'static str>,
+    missing: Vec<(&'static str, &'static str)>,
+    /// Whether something else stands where the table should: what it lacks is not the problem then.
+    is_no_table: bool,
+    problems: &'a Problems<'a>,
+}
+
+impl<'a> Section<'a> {
+    pub fn new(path: &str, header: Range<usize>, own: &'a DeTable<'a>, problems: &'a Problems<'a>) -> Self {
+        Self {
+            path: path.to_owned(),
+            header,
+            own: Some(own),
+            defaults: None,
+            known: vec![],
+            known_in_defaults: vec![],
+            missing: vec![],
+            is_no_table: false,
+            problems,
+        }
+    }
+
+    /// The same section with a table of defaults behind it.
+    pub fn with_defaults(self, defaults: Option<&'a DeTable<'a>>) -> Self {
+        Self { defaults, ..self }
+    }
+
+    /// Where the section begins, for problems that concern all of it.
+    pub fn header(&self) -> Range<usize> {
+        self.header.clone()
+    }
+
+    /// Reports a problem of the section as a whole.
+    pub fn report_here(&self, kind: ProblemKind) {
+        self.problems.report(kind, self.header());
+    }
+
+    /// Reports a value that no key of the file states: a default that the rest of the file makes impossible.
+    pub fn report_default_out_of_range(&self, key: &str, value: String, allowed: String) {
+        self.report_here(ProblemKind::OutOfRange { key: self.path_of(key), value, allowed });
+    }
+
+    /// What a key says, here or else in the defaults.
+    pub fn get(&mut self, key: &'static str) -> Option<Entry<'a>> {
+        self.know(key, true);
+        let found = find(self.own, key).or_else(|| find(self.defaults, key))?;
+        Some(self.entry(key, found))
+    }
+
+    /// What a key says here, whatever the defaults are; it is not allowed in them.
+    pub fn own(&mut self, key: &'static str) -> Option<Entry<'a>> {
+        self.know(key, false);
+        Some(self.entry(key, find(self.own, key)?))
+    }
+
+    /// As [`Self::get`]; an absent key is a problem, explained by what the key `says`.
+    pub fn require(&mut self, key: &'static str, says: &'static str) -> Option<Entry<'a>> {
+        self.get(key).or_else(|| {
+            self.missing.push((key, says));
+            None
+        })
+    }
+
+    /// As [`Self::own`]; an absent key is a problem.
+    pub fn require_own(&mut self, key: &'static str, says: &'static str) -> Option<Entry<'a>> {
+        self.own(key).or_else(|| {
+            self.missing.push((key, says));
+            None
+        })
+    }
+
+    /// A table within this one, with the defaults of that name behind it. It may be absent.
+    pub fn section(&mut self, key: &'static str) -> Section<'a> {
+        self.know(key, true);
+        let own = find(self.own, key).map(|found| self.entry(key, found));
+        let defaults = find(self.defaults, key).map(|found| self.entry(key, found));
+        let header = own.as_ref().map_or_else(|| self.header(), |entry| entry.span.clone());
+        let own_table = own.as_ref().and_then(|entry| entry.table());
+        let default_table = defaults.as_ref().and_then(|entry| entry.table());
+        Section {
+            path: self.path_of(key),
+            header,
+            own: own_table,
+            defaults: default_table,
+            is_no_table: own.is_some() != own_table.is_some()
+                || defaults.is_some() != default_table.is_some(),
+            known: vec![],
+            known_in_defaults: vec![],
+            missing: vec![],
+            problems: self.problems,
+        }
+    }
+
+    /// The tables of a list of tables (`[[bus]]`), in the order of the file; none when the key is absent.
+    pub fn sections(&mut self, key: &'static str) -> Vec<Section<'a>> {
+        let Some(list) = self.get(key).and_then(|entry| entry.tables()) else { return vec![] };
+        list.into_iter()
+            .filter_map(|entry| {
+                Some(Section::new(&entry.path, entry.span.clone(), entry.table()?, self.problems))
+            })
+            .collect()
+    }
+
+    /// Reports what is unknown and what is missing. A missing key that an unknown one was probably meant to be is
+    /// not reported beside it.
+    pub fn finish(self) {
+        let mut meant = vec![];
+        for (table, known) in [(self.own, &self.known), (self.defaults, &self.known_in_defaults)] {
+            for (key, _) in table.into_iter().flat_map(DeTable::iter) {
+                if known.iter().any(|known| known == key.get_ref()) {
+                    continue;
+                }
+                let absent = known.iter().copied().filter(|known| find(table, known).is_none());
+                let nearest = spelling::nearest(key.get_ref(), absent);
+                meant.extend(nearest);
+                let kind = ProblemKind::UnknownKey {
+                    key: self.path_of(key.get_ref()),
+                    nearest,
+                    known: known.clone(),
+                };
+                self.problems.report(kind, key.span());
+            }
+        }
+        for (key, says) in &self.missing {
+            if !meant.contains(key) && !self.is_no_table {
+                let kind = ProblemKind::MissingKey { key: self.path_of(key), says };
+                self.problems.report(kind, self.header());
+            }
+        }
+    }
+
+    fn know(&mut self, key: &'static str, is_known_in_defaults: bool) {
+        if !self.known.contains(&key) {
+            self.known.push(key);
+        }
+        if is_known_in_defaults && !self.known_in_defaults.contains(&key) {
+            self.known_in_defaults.push(key);
+        }
+    }
+
+    fn entry(&self, key: &str, value: &'a Spanned<DeValue<'a>>) -> Entry<'a> {
+        Entry::new(self.path_of(key), value, self.problems)
+    }
+
+    fn path_of(&self, key: &str) -> String {
+        if self.path.is_empty() { key.to_owned() } else { format!("{}.{key}", self.path) }
+    }
+}
+
+fn find<'a>(table: Option<&'a DeTable<'a>>, key: &str) -> Option<&'a Spanned<DeValue<'a>>> {
+    table?.iter().find(|(name, _)| name.get_ref() == key).map(|(_, value)| value)
+}

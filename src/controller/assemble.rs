@@ -1,0 +1,177 @@
+//! From the checked configuration to what the real-time thread works with.
+
+use std::f64::consts::TAU;
+
+use takt_rt::axis::{AxisParameters, Pdo};
+use takt_rt::control::ControlLaw;
+use takt_rt::cycle::SlotPlan;
+use takt_rt::engine::{BusParameters, Engine, EngineParameters, Heartbeat, SetUpError};
+use takt_rt::frame::Id;
+use takt_rt::guard::AxisLimits;
+use takt_rt::pdo::{Mapping, MappingError};
+use takt_rt::record::{MAX_AXES, MAX_BUSES};
+use takt_rt::units::{Scale, ScaleError, ScaleParameters};
+
+use crate::config::{Axis, Config, Control, Travel};
+use crate::drive::{PdoPlan, ProcessData};
+
+/// How long the drives may take from the first controlword to operation enabled.
+const ENABLE_TIMEOUT_NS: u64 = 5_000_000_000;
+/// How long set-points may fail to get onto the wire before the group stops.
+const NOT_TRANSMITTED_NS: u64 = 10_000_000;
+/// The most service frames on a bus in one cycle before set-points are sent.
+const SERVICE_FRAMES_PASSIVE: usize = 6;
+
+/// What a configuration asks for that the real-time thread cannot do.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum AssembleError {
+    /// More axes than one controller moves.
+    #[error("{given} axes: one controller moves at most {limit}")]
+    TooManyAxes {
+        /// How many there are.
+        given: usize,
+        /// How many there may be.
+        limit: usize,
+    },
+    /// More buses than one controller owns.
+    #[error("{given} buses: one controller owns at most {limit}")]
+    TooManyBuses {
+        /// How many there are.
+        given: usize,
+        /// How many there may be.
+        limit: usize,
+    },
+    /// A mapping that cannot be.
+    #[error("axis {axis}: its process data cannot be mapped ({error:?})")]
+    Mapping {
+        /// The axis.
+        axis: usize,
+        /// Why.
+        error: MappingError,
+    },
+    /// A scale that cannot be.
+    #[error("axis {axis}: its units cannot be converted ({error:?})")]
+    Scale {
+        /// The axis.
+        axis: usize,
+        /// Why.
+        error: ScaleError,
+    },
+    /// Refused by the engine.
+    #[error("the cycle cannot be set up ({0:?})")]
+    Engine(SetUpError),
+}
+
+/// The plan of a slot.
+pub fn slot_plan(config: &Config) -> SlotPlan {
+    SlotPlan::usual(config.cycle.period_ns, config.cycle.command_phase_ns)
+}
+
+/// The engine of a configuration.
+///
+/// # Errors
+/// What the configuration asks for that cannot be done. A configuration that passed its checks has none of it.
+pub fn engine(config: &Config) -> Result<Engine, AssembleError> {
+    let (axes, buses) = (config.axes.len(), config.buses.len());
+    if axes > MAX_AXES {
+        return Err(AssembleError::TooManyAxes { given: axes, limit: MAX_AXES });
+    }
+    if buses > MAX_BUSES {
+        return Err(AssembleError::TooManyBuses { given: buses, limit: MAX_BUSES });
+    }
+    let period_ns = config.cycle.period_ns;
+    let cycles = |ns: u64| u32::try_from(ns.div_ceil(period_ns.max(1))).unwrap_or(u32::MAX);
+    let axes = config
+        .axes
+        .iter()
+        .enumerate()
+        .map(|(index, axis)| axis_parameters(index, axis, &cycles))
+        .collect::<Result<_, _>>()?;
+    let buses = config.buses.iter().map(|bus| BusParameters {
+        sync_id: Id::canopen(0x080, 0),
+        service_frames_active: bus.service_frames_per_cycle,
+        service_frames_passive: SERVICE_FRAMES_PASSIVE.max(bus.service_frames_per_cycle),
+    });
+    let heartbeat = config
+        .master
+        .heartbeat_ns
+        .map(|ns| Heartbeat { node: config.master.node, cycles: cycles(ns).max(1) });
+    Engine::new(EngineParameters {
+        period_ns,
+        axes,
+        buses: buses.collect(),
+        heartbeat,
+        enable_timeout_cycles: cycles(ENABLE_TIMEOUT_NS),
+        not_transmitted_cycles: cycles(NOT_TRANSMITTED_NS),
+    })
+    .map_err(AssembleError::Engine)
+}
+
+fn axis_parameters(
+    index: usize,
+    axis: &Axis,
+    cycles: &impl Fn(u64) -> u32,
+) -> Result<AxisParameters, AssembleError> {
+    let data = ProcessData::of(axis);
+    let compile = |plans: &[PdoPlan], compile: fn(&[_]) -> Result<Mapping, MappingError>| {
+        plans
+            .iter()
+            .map(|plan| Ok(Pdo { id: plan.id, mapping: compile(&plan.objects)? }))
+            .collect::<Result<_, _>>()
+            .map_err(|error| AssembleError::Mapping { axis: index, error })
+    };
+    Ok(AxisParameters {
+        bus: u8::try_from(axis.bus).unwrap_or(u8::MAX),
+        node: axis.node,
+        commands: compile(&data.commands, Mapping::commands)?,
+        feedback: compile(&data.feedback, Mapping::feedback)?,
+        law: control_law(axis.control),
+        scale: scale(axis).map_err(|error| AssembleError::Scale { axis: index, error })?,
+        limits: limits(axis),
+        following_error_limit: axis.following_error.limit,
+        following_error_cycles: cycles(axis.following_error.time_ns),
+        missed_feedback_cycles: axis.missed_feedback_cycles,
+    })
+}
+
+/// SI to the drive units of an axis. The rated torque is the configured one until the drive has been asked.
+///
+/// # Errors
+/// A parameter that is not possible.
+pub fn scale(axis: &Axis) -> Result<Scale, ScaleError> {
+    let travel_per_turn = match axis.travel {
+        Travel::Rotary => TAU,
+        Travel::Linear { lead_m } => lead_m,
+    };
+    Scale::new(ScaleParameters {
+        counts_per_turn: axis.counts_per_turn,
+        gear_ratio: axis.gear_ratio,
+        travel_per_turn,
+        reversed: axis.reversed,
+        zero_counts: axis.zero_counts.into(),
+        rated_torque: axis.simulated.rated_torque,
+    })
+}
+
+fn limits(axis: &Axis) -> AxisLimits {
+    let limits = axis.limits;
+    AxisLimits {
+        position_min: limits.position_min,
+        position_max: limits.position_max,
+        velocity: limits.velocity,
+        acceleration: limits.acceleration,
+        deceleration: limits.deceleration,
+        jerk: limits.jerk,
+        torque: limits.torque,
+    }
+}
+
+fn control_law(control: Control) -> ControlLaw {
+    match control {
+        Control::Position => ControlLaw::Position,
+        Control::Velocity { position_gain } => ControlLaw::Velocity { position_gain },
+        Control::Torque { stiffness, damping, inertia, viscous_friction, coulomb_friction } => {
+            ControlLaw::Torque { stiffness, damping, inertia, viscous_friction, coulomb_friction }
+        }
+    }
+}

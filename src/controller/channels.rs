@@ -1,0 +1,350 @@
+//! The door between the real-time thread and everything else, as seen from outside: [`channels`] makes every
+//! channel with all its memory and hands out its three sides.
+//!
+//! ```text
+//! HostSide ── requests, newest streamed command, service frames ──▶ RtSide (takt_rt::door::Door)
+//! HostSide ◀── service frames, newest snapshot (any number of observers) ── RtSide
+//! LogSide  ◀── cycle records, events ── RtSide
+//! ```
+//!
+//! No call on [`RtSide`] allocates, locks or waits, whatever the other threads do or however long they have been
+//! preempted in the middle of something.
+
+mod latest;
+mod records;
+mod ring;
+mod words;
+
+use takt_rt::door::{Door, Request, Snapshot, StreamCommand};
+use takt_rt::frame::Frame;
+use takt_rt::port::Received;
+use takt_rt::record::{CycleRecord, Event};
+
+use crate::config::Config;
+use latest::{Attempt, Reader, Writer};
+use records::{RecordConsumer, RecordProducer};
+
+pub use ring::{Consumer, Producer, ring};
+
+/// How much each channel can hold.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ChannelSizes {
+    /// Axes of the controller, up to [`takt_rt::record::MAX_AXES`].
+    pub axes: usize,
+    /// Buses of the controller, up to [`takt_rt::record::MAX_BUSES`].
+    pub buses: usize,
+    /// Cycle records on the way to the logger.
+    pub records: usize,
+    /// Events on the way to the logger.
+    pub events: usize,
+    /// Requests that wait for the next cycle.
+    pub requests: usize,
+    /// Service frames that wait to be sent, for each bus.
+    pub service_out: usize,
+    /// Service frames that were received and wait to be taken, all buses together.
+    pub service_in: usize,
+}
+
+impl ChannelSizes {
+    /// Sizes for a configuration: the record ring as configured; room for a burst of SDO traffic of every node, and
+    /// for more events than a logger that is late by a second can miss.
+    pub fn of(config: &Config) -> Self {
+        Self {
+            axes: config.axes.len(),
+            buses: config.buses.len(),
+            records: config.telemetry.ring_records,
+            events: 1024,
+            requests: 16,
+            service_out: 256,
+            service_in: 1024,
+        }
+    }
+}
+
+/// Why something was not handed over.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ChannelError {
+    /// The channel holds all that it can: the real-time thread does not take, or is given too much.
+    #[error("the channel to the real-time thread is full")]
+    Full,
+    /// No bus has this number.
+    #[error("there is no bus {bus}: the controller has {buses}")]
+    NoSuchBus {
+        /// The number asked for.
+        bus: usize,
+        /// How many there are.
+        buses: usize,
+    },
+}
+
+/// Makes the channels. All their memory is allocated, and touched, here.
+pub fn channels(sizes: &ChannelSizes) -> (RtSide, HostSide, LogSide) {
+    let (request_in, request_out) = ring(sizes.requests);
+    let (stream_in, stream_out) = latest::latest(words::stream_words(sizes.axes));
+    let (snapshot_in, snapshot_out) = latest::latest(words::snapshot_words(sizes.axes, sizes.buses));
+    let (service_in, service_out) = (0..sizes.buses).map(|_| ring(sizes.service_out)).unzip();
+    let (received_in, received_out) = ring(sizes.service_in);
+    let (record_in, record_out) = records::record_ring(sizes.records);
+    let (event_in, event_out) = ring(sizes.events);
+    let rt = RtSide {
+        axes: sizes.axes,
+        requests: request_out,
+        stream: stream_out,
+        stream_seen: 0,
+        service: service_out,
+        received: received_in,
+        records: record_in,
+        events: event_in,
+        snapshot: snapshot_in,
+    };
+    let host = HostSide {
+        axes: sizes.axes,
+        requests: request_in,
+        stream: stream_in,
+        service: service_in,
+        received: received_out,
+        observer: Observer { snapshot: snapshot_out },
+    };
+    (rt, host, LogSide { records: record_out, events: event_out })
+}
+
+/// The real-time thread's side.
+pub struct RtSide {
+    axes: usize,
+    requests: Consumer<Request>,
+    stream: Reader,
+    stream_seen: u64,
+    service: Vec<Consumer<Frame>>,
+    received: Producer<(usize, Received)>,
+    records: RecordProducer,
+    events: Producer<Event>,
+    snapshot: Writer,
+}
+
+/// Attempts to read the streamed command in one cycle. One is enough unless the host writes several commands within
+/// the fraction of a microsecond that a read takes.
+const STREAM_ATTEMPTS: usize = 3;
+
+impl Door for RtSide {
+    fn request(&mut self) -> Option<Request> {
+        self.requests.pop()
+    }
+
+    fn stream(&mut self) -> Option<StreamCommand> {
+        for _ in 0..STREAM_ATTEMPTS {
+            let decode = |words: &mut latest::Words<'_>| words::take_stream(self.axes, words);
+            match self.stream.attempt(self.stream_seen, decode) {
+                Attempt::Whole(command, number) => {
+                    self.stream_seen = number;
+                    return Some(command);
+                }
+                Attempt::Nothing => return None,
+                Attempt::Torn => {}
+            }
+        }
+        None
+    }
+
+    fn service_frame(&mut self, bus: usize) -> Option<Frame> {
+        self.service.get_mut(bus)?.pop()
+    }
+
+    fn received(&mut self, bus: usize, frame: &Received) -> bool {
+        self.received.push((bus, *frame))
+    }
+
+    fn record(&mut self, record: &CycleRecord) -> bool {
+        self.records.push(record)
+    }
+
+    fn event(&mut self, event: &Event) -> bool {
+        self.events.push(*event)
+    }
+
+    fn publish(&mut self, snapshot: &Snapshot) {
+        self.snapshot.write(|words| words::put_snapshot(snapshot, words));
+    }
+}
+
+/// The side of whoever commands the controller.
+pub struct HostSide {
+    axes: usize,
+    requests: Producer<Request>,
+    stream: Writer,
+    service: Vec<Producer<Frame>>,
+    received: Consumer<(usize, Received)>,
+    observer: Observer,
+}
+
+impl HostSide {
+    /// Asks for something. It is taken up in the next cycle, requests in their order.
+    ///
+    /// # Errors
+    /// [`ChannelError::Full`]; nothing has been asked then.
+    pub fn request(&mut self, request: Request) -> Result<(), ChannelError> {
+        if self.requests.push(request) { Ok(()) } else { Err(ChannelError::Full) }
+    }
+
+    /// Replaces the streamed command; the real-time thread takes the newest one at its next cycle. Set-points
+    /// beyond the axes of the controller are not carried.
+    pub fn stream(&mut self, command: &StreamCommand) {
+        self.stream.write(|words| words::put_stream(command, self.axes, words));
+    }
+
+    /// Hands over a service frame to be sent after the set-points of a coming cycle.
+    ///
+    /// # Errors
+    /// [`ChannelError::Full`] or [`ChannelError::NoSuchBus`]; the frame will not be sent then.
+    pub fn send_service(&mut self, bus: usize, frame: Frame) -> Result<(), ChannelError> {
+        let buses = self.service.len();
+        let ring = self.service.get_mut(bus).ok_or(ChannelError::NoSuchBus { bus, buses })?;
+        if ring.push(frame) { Ok(()) } else { Err(ChannelError::Full) }
+    }
+
+    /// The oldest received frame that is not process data, with its bus.
+    pub fn take_service(&mut self) -> Option<(usize, Received)> {
+        self.received.pop()
+    }
+
+    /// Received service frames that found no room since the start.
+    pub fn service_dropped(&self) -> u64 {
+        self.received.dropped()
+    }
+
+    /// The state after the newest complete cycle.
+    pub fn snapshot(&self) -> Snapshot {
+        self.observer.snapshot()
+    }
+
+    /// A handle for somebody else who wants to see the state.
+    pub fn observer(&self) -> Observer {
+        self.observer.clone()
+    }
+}
+
+/// Sees the state of the controller at any time, without disturbing it. Clone it for every thread.
+#[derive(Clone)]
+pub struct Observer {
+    snapshot: Reader,
+}
+
+impl Observer {
+    /// The state after the newest complete cycle; before the first one, a passive controller without axes.
+    pub fn snapshot(&self) -> Snapshot {
+        loop {
+            match self.snapshot.attempt(0, words::take_snapshot) {
+                Attempt::Whole(snapshot, _) => return snapshot,
+                Attempt::Nothing => return words::NO_SNAPSHOT,
+                // Three cycles have passed during the read: this thread was not running.
+                Attempt::Torn => std::hint::spin_loop(),
+            }
+        }
+    }
+}
+
+/// The logger's side.
+pub struct LogSide {
+    records: RecordConsumer,
+    events: Consumer<Event>,
+}
+
+impl LogSide {
+    /// Shows the oldest cycle record that waits to `look`, in place. Axes that do not count may hold anything.
+    pub fn next_record<T>(&mut self, look: impl FnOnce(&CycleRecord) -> T) -> Option<T> {
+        self.records.next(look)
+    }
+
+    /// The oldest event that waits.
+    pub fn take_event(&mut self) -> Option<Event> {
+        self.events.pop()
+    }
+
+    /// Records handed over since the start.
+    pub fn records_written(&self) -> u64 {
+        self.records.pushed()
+    }
+
+    /// Records that found no room since the start.
+    pub fn records_dropped(&self) -> u64 {
+        self.records.dropped()
+    }
+
+    /// Events that found no room since the start.
+    pub fn events_dropped(&self) -> u64 {
+        self.events.dropped()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use takt_rt::frame::Id;
+    use takt_rt::plan;
+    use takt_rt::record::{EventKind, MAX_AXES};
+    use takt_rt::stop::{Phase, StopCategory};
+
+    const SIZES: ChannelSizes =
+        ChannelSizes { axes: 2, buses: 2, records: 4, events: 2, requests: 2, service_out: 2, service_in: 2 };
+
+    fn command(valid_until_ns: u64) -> StreamCommand {
+        StreamCommand { valid_until_ns, set_points: [plan::State::default(); MAX_AXES] }
+    }
+
+    #[test]
+    fn requests_arrive_in_order_and_one_too_many_is_refused() {
+        let (mut rt, mut host, _log) = channels(&SIZES);
+        host.request(Request::Enable).unwrap();
+        host.request(Request::Stop(StopCategory::Two)).unwrap();
+        assert_eq!(host.request(Request::Leave), Err(ChannelError::Full));
+        assert_eq!(rt.request(), Some(Request::Enable));
+        assert_eq!(rt.request(), Some(Request::Stop(StopCategory::Two)));
+        assert_eq!(rt.request(), None);
+    }
+
+    #[test]
+    fn only_the_newest_streamed_command_is_seen_and_only_once() {
+        let (mut rt, mut host, _log) = channels(&SIZES);
+        assert_eq!(rt.stream(), None);
+        (1..=9).for_each(|valid_until_ns| host.stream(&command(valid_until_ns)));
+        assert_eq!(rt.stream(), Some(command(9)));
+        assert_eq!(rt.stream(), None);
+    }
+
+    #[test]
+    fn service_frames_keep_to_their_bus_in_both_directions() {
+        let (mut rt, mut host, _log) = channels(&SIZES);
+        let frame = Frame::of(Id::canopen(0x600, 5), [0x40, 0x00, 0x10, 0x00]);
+        host.send_service(1, frame).unwrap();
+        assert_eq!(host.send_service(2, frame), Err(ChannelError::NoSuchBus { bus: 2, buses: 2 }));
+        assert_eq!((rt.service_frame(0), rt.service_frame(2)), (None, None));
+        assert_eq!(rt.service_frame(1), Some(frame));
+
+        let received = Received { frame, at_ns: 77 };
+        assert_eq!([0, 1, 1].map(|bus| rt.received(bus, &received)), [true, true, false]);
+        assert_eq!(host.take_service(), Some((0, received)));
+        assert_eq!(host.take_service(), Some((1, received)));
+        assert_eq!((host.take_service(), host.service_dropped()), (None, 1));
+    }
+
+    #[test]
+    fn every_observer_sees_the_newest_snapshot() {
+        let (mut rt, host, _log) = channels(&SIZES);
+        let observer = host.observer();
+        assert_eq!(observer.snapshot(), words::NO_SNAPSHOT);
+        let snapshot = Snapshot { slot: 9, phase: Phase::Holding, axis_count: 2, ..words::NO_SNAPSHOT };
+        rt.publish(&snapshot);
+        assert_eq!((observer.snapshot(), host.snapshot()), (snapshot, snapshot));
+    }
+
+    #[test]
+    fn the_log_side_gets_records_and_events_and_learns_what_was_dropped() {
+        let (mut rt, _host, mut log) = channels(&SIZES);
+        let record = CycleRecord { axis_count: 2, ..CycleRecord::default() };
+        assert_eq!((0..6).filter(|_| rt.record(&record)).count(), 4);
+        let event = |slot| Event { slot, at_ns: 0, kind: EventKind::MoveFinished { id: 1 } };
+        assert_eq!((0..3).filter(|slot| rt.event(&event(*slot))).count(), 2);
+        assert_eq!(log.next_record(|seen| *seen), Some(record));
+        assert_eq!(log.take_event(), Some(event(0)));
+        assert_eq!((log.records_written(), log.records_dropped(), log.events_dropped()), (4, 2, 1));
+    }
+}

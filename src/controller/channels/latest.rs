@@ -1,0 +1,183 @@
+//! The newest value of something, from one writer to any number of readers: the writer never waits, no reader can
+//! disturb it, and a reader gets a whole value or knows that it did not.
+//!
+//! A value is an array of 64-bit words, each an atomic, so that no reader ever sees half a word and no `unsafe` is
+//! needed. It is a sequence lock (Boehm, "Can seqlocks get along with programming language memory models?", MSPC
+//! 2012) over four slots in turn: a reader uses the last complete slot, so even a writer that was preempted
+//! half-way through costs it nothing. A read is torn only when the writer has come round to the same slot meanwhile.
+
+use std::slice;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering, fence};
+
+const SLOTS: u64 = 4;
+
+struct Shared {
+    /// How many values have been completed; value `n` is in slot `n % SLOTS`.
+    completed: AtomicU64,
+    slots: Box<[Box<[AtomicU64]>]>,
+}
+
+impl Shared {
+    fn slot(&self, number: u64) -> &[AtomicU64] {
+        self.slots.get((number % SLOTS) as usize).map_or(&[], |slot| slot)
+    }
+}
+
+/// A place for values of up to `words` words, as its two ends.
+pub fn latest(words: usize) -> (Writer, Reader) {
+    let slot = || (0..words).map(|_| AtomicU64::new(0)).collect();
+    let slots = (0..SLOTS).map(|_| slot()).collect();
+    let shared = Arc::new(Shared { completed: AtomicU64::new(0), slots });
+    (Writer { shared: Arc::clone(&shared), completed: 0 }, Reader { shared })
+}
+
+/// The only end that writes.
+pub struct Writer {
+    shared: Arc<Shared>,
+    completed: u64,
+}
+
+impl Writer {
+    /// Writes a value, word by word, and shows it.
+    pub fn write(&mut self, encode: impl FnOnce(&mut Words<'_>)) {
+        let number = self.completed + 1;
+        // Whoever sees one of the words stored below also sees the `completed` stored before.
+        fence(Ordering::Release);
+        encode(&mut Words(self.shared.slot(number).iter()));
+        self.completed = number;
+        self.shared.completed.store(number, Ordering::Release);
+    }
+}
+
+/// An end that reads; clone it for every reader.
+#[derive(Clone)]
+pub struct Reader {
+    shared: Arc<Shared>,
+}
+
+/// What came of one attempt to read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Attempt<T> {
+    /// No newer value has been written.
+    Nothing,
+    /// A whole value, and its number.
+    Whole(T, u64),
+    /// The writer has overwritten the value while it was read.
+    Torn,
+}
+
+impl Reader {
+    /// One attempt to read a value newer than number `seen` (0 = any). Never waits.
+    pub fn attempt<T>(&self, seen: u64, decode: impl FnOnce(&mut Words<'_>) -> T) -> Attempt<T> {
+        let number = self.shared.completed.load(Ordering::Acquire);
+        if number <= seen {
+            return Attempt::Nothing;
+        }
+        let value = decode(&mut Words(self.shared.slot(number).iter()));
+        fence(Ordering::Acquire);
+        // The writer begins to overwrite this slot after it has completed the SLOTS − 1 values that follow.
+        let completed = self.shared.completed.load(Ordering::Relaxed);
+        if completed - number < SLOTS - 1 { Attempt::Whole(value, number) } else { Attempt::Torn }
+    }
+}
+
+/// The words of one value, in order.
+pub struct Words<'a>(slice::Iter<'a, AtomicU64>);
+
+impl Words<'_> {
+    /// Stores the next word. Beyond the last one nothing happens.
+    pub fn put(&mut self, word: u64) {
+        if let Some(cell) = self.0.next() {
+            cell.store(word, Ordering::Relaxed);
+        }
+    }
+
+    /// Loads the next word; 0 beyond the last one.
+    pub fn take(&mut self) -> u64 {
+        self.0.next().map_or(0, |cell| cell.load(Ordering::Relaxed))
+    }
+
+    /// Stores a number by its bits.
+    pub fn put_f64(&mut self, number: f64) {
+        self.put(number.to_bits());
+    }
+
+    /// Loads a number by its bits.
+    pub fn take_f64(&mut self) -> f64 {
+        f64::from_bits(self.take())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::atomic::AtomicUsize;
+
+    #[test]
+    fn a_value_is_new_once() {
+        let (mut writer, reader) = latest(1);
+        assert_eq!(reader.attempt(0, |words| words.take()), Attempt::Nothing);
+        writer.write(|words| words.put(7));
+        writer.write(|words| words.put(8));
+        assert_eq!(reader.attempt(0, |words| words.take()), Attempt::Whole(8, 2));
+        assert_eq!(reader.attempt(2, |words| words.take()), Attempt::Nothing);
+    }
+
+    #[test]
+    fn a_half_written_value_leaves_the_last_whole_one_readable() {
+        let (mut writer, reader) = latest(2);
+        writer.write(|words| [1, 1].into_iter().for_each(|word| words.put(word)));
+        writer.write(|words| {
+            words.put(2);
+            assert_eq!(reader.attempt(0, |words| [words.take(), words.take()]), Attempt::Whole([1, 1], 1));
+            words.put(2);
+        });
+        assert_eq!(reader.attempt(0, |words| [words.take(), words.take()]), Attempt::Whole([2, 2], 2));
+    }
+
+    #[test]
+    fn a_reader_that_was_overtaken_in_its_slot_knows_it() {
+        for (overtaken_by, is_whole) in [(0, true), (2, true), (3, false), (9, false)] {
+            let (mut writer, reader) = latest(1);
+            writer.write(|words| words.put(5));
+            let attempt = reader.attempt(0, |words| {
+                for later in 0..overtaken_by {
+                    writer.write(|words| words.put(later));
+                }
+                words.take()
+            });
+            assert_eq!(attempt != Attempt::Torn, is_whole, "overtaken by {overtaken_by}");
+        }
+    }
+
+    #[test]
+    fn no_reader_ever_takes_a_mixture_for_a_whole_value() {
+        const WORDS: usize = 64;
+        const READERS: usize = 3;
+        let (mut writer, reader) = latest(WORDS);
+        let done = AtomicUsize::new(0);
+        std::thread::scope(|scope| {
+            for _ in 0..READERS {
+                let (reader, done) = (reader.clone(), &done);
+                scope.spawn(move || {
+                    let (mut seen, mut whole) = (0, 0);
+                    while whole < 20_000 {
+                        let read = reader.attempt(0, |words| [(); WORDS].map(|()| words.take()));
+                        if let Attempt::Whole(value, number) = read {
+                            assert_eq!(value, [number; WORDS]);
+                            assert!(number >= seen);
+                            (seen, whole) = (number, whole + 1);
+                        }
+                    }
+                    done.fetch_add(1, Ordering::Relaxed);
+                });
+            }
+            let mut number = 0;
+            while done.load(Ordering::Relaxed) < READERS {
+                number += 1;
+                writer.write(|words| (0..WORDS).for_each(|_| words.put(number)));
+            }
+        });
+    }
+}

@@ -1,0 +1,132 @@
+//! The way of the cycle records to the logger. A record of 32 axes is almost 2 kB, and a ring that takes it by value
+//! copies it two or three times. Here the slots themselves travel: the real-time thread fills in the axes that count,
+//! and the logger sends the slot back. The slot that came back last is used first, so that as long as the logger
+//! keeps up, a handful of slots go round and stay in the cache, however many there are.
+
+use takt_rt::record::CycleRecord;
+
+use super::ring::{Consumer, Producer, ring};
+
+/// A ring for `capacity` (at least 1) records.
+pub fn record_ring(capacity: usize) -> (RecordProducer, RecordConsumer) {
+    let (empty_in, empty_out) = ring(capacity);
+    let (full_in, full_out) = ring(capacity);
+    let at_hand = (0..capacity.max(1)).map(|_| Box::default()).collect();
+    (
+        RecordProducer { at_hand, empty: empty_out, full: full_in },
+        RecordConsumer { empty: empty_in, full: full_out },
+    )
+}
+
+/// The end of the real-time thread.
+pub struct RecordProducer {
+    /// Empty slots, the warmest last. It has room for every slot there is, so it never grows.
+    #[expect(clippy::vec_box, reason = "the boxes are what goes through the rings")]
+    at_hand: Vec<Box<CycleRecord>>,
+    empty: Consumer<Box<CycleRecord>>,
+    full: Producer<Box<CycleRecord>>,
+}
+
+impl RecordProducer {
+    /// Copies a record into the ring. Returns whether there was room.
+    pub fn push(&mut self, record: &CycleRecord) -> bool {
+        // Two for the one that is used, so that none stays away for long.
+        for _ in 0..2 {
+            self.at_hand.extend(self.empty.pop());
+        }
+        let Some(mut slot) = self.at_hand.pop() else {
+            self.full.count_dropped();
+            return false;
+        };
+        slot.timing = record.timing;
+        slot.phase = record.phase;
+        slot.is_commanded = record.is_commanded;
+        slot.axis_count = record.axis_count;
+        if let Some(axes) = slot.axes.get_mut(..record.axes().len()) {
+            axes.copy_from_slice(record.axes());
+        }
+        self.full.push(slot)
+    }
+}
+
+/// The end of the logger.
+pub struct RecordConsumer {
+    empty: Producer<Box<CycleRecord>>,
+    full: Consumer<Box<CycleRecord>>,
+}
+
+impl RecordConsumer {
+    /// Shows the oldest record that waits to `look`, and frees its slot. Axes that do not count may hold anything.
+    pub fn next<T>(&mut self, look: impl FnOnce(&CycleRecord) -> T) -> Option<T> {
+        let slot = self.full.pop()?;
+        let seen = look(&slot);
+        self.empty.push(slot);
+        Some(seen)
+    }
+
+    /// Records that were put in since the start.
+    pub fn pushed(&self) -> u64 {
+        self.full.pushed()
+    }
+
+    /// Records that found no room since the start.
+    pub fn dropped(&self) -> u64 {
+        self.full.dropped()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use takt_rt::record::{AxisRecord, MAX_AXES, Timing};
+    use takt_rt::stop::Phase;
+
+    fn record(slot: u64, axis_count: u8) -> CycleRecord {
+        let axis = AxisRecord { position: slot as f64, ..AxisRecord::default() };
+        CycleRecord {
+            timing: Timing { slot, ..Timing::default() },
+            phase: Phase::Moving,
+            is_commanded: true,
+            axis_count,
+            axes: [axis; MAX_AXES],
+        }
+    }
+
+    #[test]
+    fn records_arrive_in_order_with_every_axis_that_counts() {
+        let (mut producer, mut consumer) = record_ring(2);
+        for slot in 0..10 {
+            assert!(producer.push(&record(slot, 6)));
+            let arrived = consumer.next(|arrived| *arrived).unwrap();
+            assert_eq!((arrived.timing.slot, arrived.phase), (slot, Phase::Moving));
+            assert_eq!(arrived.axes(), record(slot, 6).axes());
+            assert_eq!(arrived.axes().len(), 6);
+        }
+        assert_eq!(consumer.next(|_| ()), None);
+    }
+
+    #[test]
+    fn a_full_ring_drops_and_counts_the_newest_record_and_goes_on_when_there_is_room() {
+        let (mut producer, mut consumer) = record_ring(2);
+        let taken = [0, 1, 2, 3].map(|slot| producer.push(&record(slot, 1)));
+        assert_eq!(taken, [true, true, false, false]);
+        assert_eq!((consumer.pushed(), consumer.dropped()), (2, 2));
+        assert_eq!(consumer.next(|arrived| arrived.timing.slot), Some(0));
+        assert!(producer.push(&record(4, 1)));
+        assert_eq!(consumer.next(|arrived| arrived.timing.slot), Some(1));
+        assert_eq!(consumer.next(|arrived| arrived.timing.slot), Some(4));
+    }
+
+    #[test]
+    fn after_every_way_of_filling_and_emptying_all_slots_are_there_and_no_memory_was_asked_for() {
+        let (mut producer, mut consumer) = record_ring(16);
+        let room = producer.at_hand.capacity();
+        for fill in (0..=16).chain([3, 16, 1, 16]) {
+            assert_eq!((0..20).filter(|slot| producer.push(&record(*slot, 1))).count(), 16);
+            let emptied = (0..fill).map_while(|_| consumer.next(|_| ())).count();
+            assert_eq!((0..20).filter(|slot| producer.push(&record(*slot, 1))).count(), emptied);
+            while consumer.next(|_| ()).is_some() {}
+        }
+        assert_eq!(producer.at_hand.capacity(), room);
+    }
+}

@@ -1,0 +1,333 @@
+//! How a snapshot and a streamed command are laid out in 64-bit words.
+
+use takt_rt::door::{AxisSnapshot, Snapshot, StreamCommand};
+use takt_rt::plan;
+use takt_rt::port::{BusHealth, BusState};
+use takt_rt::record::{MAX_AXES, MAX_BUSES};
+use takt_rt::stop::{Phase, Rule, StopCategory, StopReason};
+
+use super::latest::Words;
+
+/// Words of a snapshot of so many axes and buses.
+pub const fn snapshot_words(axes: usize, buses: usize) -> usize {
+    11 + 4 * axes + 7 * buses
+}
+
+/// Words of a streamed command for so many axes.
+pub const fn stream_words(axes: usize) -> usize {
+    1 + 3 * axes
+}
+
+/// The snapshot before the first cycle: passive, of no axes and no buses.
+pub const NO_SNAPSHOT: Snapshot = Snapshot {
+    slot: 0,
+    at_ns: 0,
+    phase: Phase::Passive,
+    missed_slots: 0,
+    dropped: 0,
+    refused: 0,
+    finished_move: 0,
+    remaining_s: 0.0,
+    stop: None,
+    axis_count: 0,
+    axes: [AxisSnapshot {
+        position_set: 0.0,
+        position: 0.0,
+        velocity: 0.0,
+        statusword: 0,
+        error_code: 0,
+        is_heard: false,
+    }; MAX_AXES],
+    bus_count: 0,
+    buses: [BusHealth {
+        state: BusState::ErrorActive,
+        tx_frames: 0,
+        rx_frames: 0,
+        tx_overruns: 0,
+        rx_overruns: 0,
+        errors: 0,
+        busy_ns: 0,
+    }; MAX_BUSES],
+};
+
+pub fn put_snapshot(snapshot: &Snapshot, words: &mut Words<'_>) {
+    words.put(snapshot.slot);
+    words.put(snapshot.at_ns);
+    words.put(
+        pack([
+            snapshot.phase as u8,
+            snapshot.axis_count,
+            snapshot.bus_count,
+            u8::from(snapshot.stop.is_some()),
+        ]) | u64::from(snapshot.finished_move) << 32,
+    );
+    words.put(snapshot.missed_slots);
+    words.put(snapshot.dropped);
+    words.put(snapshot.refused);
+    words.put_f64(snapshot.remaining_s);
+    if let Some(stop) = snapshot.stop {
+        put_stop(&stop, words);
+    }
+    for axis in snapshot.axes.iter().take(snapshot.axis_count.into()) {
+        put_axis(axis, words);
+    }
+    for bus in snapshot.buses.iter().take(snapshot.bus_count.into()) {
+        put_bus(bus, words);
+    }
+}
+
+pub fn take_snapshot(words: &mut Words<'_>) -> Snapshot {
+    let (slot, at_ns, packed) = (words.take(), words.take(), words.take());
+    let [phase, axis_count, bus_count, has_stop] = unpack(packed);
+    let mut snapshot = Snapshot {
+        slot,
+        at_ns,
+        phase: phase_of(phase),
+        missed_slots: words.take(),
+        dropped: words.take(),
+        refused: words.take(),
+        finished_move: (packed >> 32) as u32,
+        remaining_s: words.take_f64(),
+        stop: (has_stop == 1).then(|| take_stop(words)),
+        axis_count,
+        bus_count,
+        ..NO_SNAPSHOT
+    };
+    for axis in snapshot.axes.iter_mut().take(axis_count.into()) {
+        *axis = take_axis(words);
+    }
+    for bus in snapshot.buses.iter_mut().take(bus_count.into()) {
+        *bus = take_bus(words);
+    }
+    snapshot
+}
+
+pub fn put_stream(command: &StreamCommand, axes: usize, words: &mut Words<'_>) {
+    words.put(command.valid_until_ns);
+    for set_point in command.set_points.iter().take(axes) {
+        words.put_f64(set_point.position);
+        words.put_f64(set_point.velocity);
+        words.put_f64(set_point.acceleration);
+    }
+}
+
+pub fn take_stream(axes: usize, words: &mut Words<'_>) -> StreamCommand {
+    let mut command = StreamCommand {
+        valid_until_ns: words.take(),
+        set_points: [plan::State { position: 0.0, velocity: 0.0, acceleration: 0.0 }; MAX_AXES],
+    };
+    for set_point in command.set_points.iter_mut().take(axes) {
+        *set_point = plan::State {
+            position: words.take_f64(),
+            velocity: words.take_f64(),
+            acceleration: words.take_f64(),
+        };
+    }
+    command
+}
+
+fn put_stop(stop: &StopReason, words: &mut Words<'_>) {
+    let axis = stop.axis.map_or(0, |axis| u64::from(axis) << 32 | 1 << 40);
+    words.put(pack([stop.category as u8, stop.rule as u8, stop.phase as u8, 0]) | axis);
+    words.put_f64(stop.value);
+    words.put_f64(stop.limit);
+    words.put(stop.slot);
+}
+
+fn take_stop(words: &mut Words<'_>) -> StopReason {
+    let packed = words.take();
+    let [category, rule, phase, _] = unpack(packed);
+    StopReason {
+        category: match category {
+            0 => StopCategory::Zero,
+            1 => StopCategory::One,
+            _ => StopCategory::Two,
+        },
+        rule: Rule::ALL.get(usize::from(rule)).copied().unwrap_or(Rule::Requested),
+        axis: (packed >> 40 & 1 == 1).then_some((packed >> 32) as u8),
+        value: words.take_f64(),
+        limit: words.take_f64(),
+        slot: words.take(),
+        phase: phase_of(phase),
+    }
+}
+
+fn put_axis(axis: &AxisSnapshot, words: &mut Words<'_>) {
+    words.put_f64(axis.position_set);
+    words.put_f64(axis.position);
+    words.put_f64(axis.velocity);
+    let is_heard = u64::from(axis.is_heard) << 32;
+    words.put(u64::from(axis.statusword) | u64::from(axis.error_code) << 16 | is_heard);
+}
+
+fn take_axis(words: &mut Words<'_>) -> AxisSnapshot {
+    let (position_set, position, velocity) = (words.take_f64(), words.take_f64(), words.take_f64());
+    let packed = words.take();
+    AxisSnapshot {
+        position_set,
+        position,
+        velocity,
+        statusword: packed as u16,
+        error_code: (packed >> 16) as u16,
+        is_heard: packed >> 32 & 1 == 1,
+    }
+}
+
+fn put_bus(bus: &BusHealth, words: &mut Words<'_>) {
+    words.put(match bus.state {
+        BusState::ErrorActive => 0,
+        BusState::ErrorPassive => 1,
+        BusState::BusOff => 2,
+        BusState::Down => 3,
+    });
+    for counter in [bus.tx_frames, bus.rx_frames, bus.tx_overruns, bus.rx_overruns, bus.errors, bus.busy_ns] {
+        words.put(counter);
+    }
+}
+
+fn take_bus(words: &mut Words<'_>) -> BusHealth {
+    BusHealth {
+        state: match words.take() {
+            0 => BusState::ErrorActive,
+            1 => BusState::ErrorPassive,
+            2 => BusState::BusOff,
+            _ => BusState::Down,
+        },
+        tx_frames: words.take(),
+        rx_frames: words.take(),
+        tx_overruns: words.take(),
+        rx_overruns: words.take(),
+        errors: words.take(),
+        busy_ns: words.take(),
+    }
+}
+
+fn phase_of(number: u8) -> Phase {
+    Phase::ALL.get(usize::from(number)).copied().unwrap_or_default()
+}
+
+fn pack([a, b, c, d]: [u8; 4]) -> u64 {
+    u32::from_le_bytes([a, b, c, d]).into()
+}
+
+fn unpack(word: u64) -> [u8; 4] {
+    (word as u32).to_le_bytes()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::controller::channels::latest::{Attempt, latest};
+    use proptest::prelude::*;
+
+    fn stop_reasons() -> impl Strategy<Value = StopReason> {
+        let categories = prop::sample::select(vec![StopCategory::Zero, StopCategory::One, StopCategory::Two]);
+        let (rules, phases) = (prop::sample::select(&Rule::ALL[..]), prop::sample::select(&Phase::ALL[..]));
+        (categories, rules, any::<Option<u8>>(), any::<(f64, f64, u64)>(), phases).prop_map(
+            |(category, rule, axis, (value, limit, slot), phase)| StopReason {
+                category,
+                rule,
+                axis,
+                value,
+                limit,
+                slot,
+                phase,
+            },
+        )
+    }
+
+    fn axes() -> impl Strategy<Value = AxisSnapshot> {
+        any::<(f64, f64, f64, u16, u16, bool)>().prop_map(
+            |(position_set, position, velocity, statusword, error_code, is_heard)| AxisSnapshot {
+                position_set,
+                position,
+                velocity,
+                statusword,
+                error_code,
+                is_heard,
+            },
+        )
+    }
+
+    fn buses() -> impl Strategy<Value = BusHealth> {
+        let states = vec![BusState::ErrorActive, BusState::ErrorPassive, BusState::BusOff, BusState::Down];
+        (prop::sample::select(states), any::<[u64; 6]>()).prop_map(
+            |(state, [tx_frames, rx_frames, tx_overruns, rx_overruns, errors, busy_ns])| BusHealth {
+                state,
+                tx_frames,
+                rx_frames,
+                tx_overruns,
+                rx_overruns,
+                errors,
+                busy_ns,
+            },
+        )
+    }
+
+    fn snapshots() -> impl Strategy<Value = Snapshot> {
+        let counted = (
+            prop::collection::vec(axes(), 0..=MAX_AXES),
+            prop::collection::vec(buses(), 0..=MAX_BUSES),
+            prop::option::of(stop_reasons()),
+            prop::sample::select(&Phase::ALL[..]),
+        );
+        (counted, any::<(u64, u64, u64, u64, u32, f64)>()).prop_map(
+            |(
+                (axes, buses, stop, phase),
+                (slot, at_ns, missed_slots, dropped, finished_move, remaining_s),
+            )| {
+                let mut snapshot = Snapshot {
+                    slot,
+                    at_ns,
+                    phase,
+                    missed_slots,
+                    dropped,
+                    finished_move,
+                    remaining_s,
+                    stop,
+                    axis_count: axes.len() as u8,
+                    bus_count: buses.len() as u8,
+                    ..NO_SNAPSHOT
+                };
+                snapshot.axes[..axes.len()].copy_from_slice(&axes);
+                snapshot.buses[..buses.len()].copy_from_slice(&buses);
+                snapshot
+            },
+        )
+    }
+
+    proptest! {
+        #[test]
+        fn a_snapshot_comes_out_as_it_went_in(before in snapshots(), snapshot in snapshots()) {
+            let words = snapshot_words(MAX_AXES, MAX_BUSES);
+            let (mut writer, reader) = latest(words);
+            // What an earlier, longer value has left in a slot must not show.
+            (0..4).for_each(|_| writer.write(|words| put_snapshot(&before, words)));
+            writer.write(|words| put_snapshot(&snapshot, words));
+            prop_assert_eq!(reader.attempt(4, take_snapshot), Attempt::Whole(snapshot, 5));
+        }
+
+        #[test]
+        fn a_snapshot_fits_the_words_reckoned_for_it(snapshot in snapshots()) {
+            let words = snapshot_words(snapshot.axis_count.into(), snapshot.bus_count.into());
+            let (mut writer, reader) = latest(words);
+            writer.write(|words| put_snapshot(&snapshot, words));
+            prop_assert_eq!(reader.attempt(0, take_snapshot), Attempt::Whole(snapshot, 1));
+        }
+
+        #[test]
+        fn a_streamed_command_comes_out_as_it_went_in(
+            valid_until_ns in any::<u64>(),
+            numbers in prop::collection::vec(any::<[f64; 3]>(), 1..=MAX_AXES),
+        ) {
+            let axes = numbers.len();
+            let mut command = StreamCommand { valid_until_ns, set_points: Default::default() };
+            for (to, [position, velocity, acceleration]) in command.set_points.iter_mut().zip(numbers) {
+                *to = plan::State { position, velocity, acceleration };
+            }
+            let (mut writer, reader) = latest(stream_words(axes));
+            writer.write(|words| put_stream(&command, axes, words));
+            prop_assert_eq!(reader.attempt(0, |words| take_stream(axes, words)), Attempt::Whole(command, 1));
+        }
+    }
+}

@@ -1,0 +1,382 @@
+//! The whole drive: frames and time come in, the parts do their work, frames go out.
+
+mod access;
+mod frames;
+
+use takt_rt::cia402::{OperationMode, State};
+use takt_rt::frame::Frame;
+use takt_rt::time::{NANOSECONDS_PER_SECOND, Nanoseconds};
+
+use super::ErobParameters;
+use super::device::{Change, Device};
+use super::dictionary::{Dictionary, at};
+use super::errors::{Error, Errors};
+use super::motion::{Actual, Demand, Motion};
+use super::network::Network;
+use super::process_data::ProcessData;
+use super::sdo::SdoServer;
+use super::servo::Servo;
+use crate::sim::drive::{Drive, DriveFault, Observation};
+use crate::sim::mailbox::Mailbox;
+use crate::sim::plant::Joint;
+use crate::sim::random::Random;
+
+/// The control loops and the plant run at 8 kHz.
+const STEP_NS: Nanoseconds = 125_000;
+/// Without anything to do the drive looks up this often.
+const IDLE_NS: Nanoseconds = 1_000_000;
+/// Counts of the motor encoder for one of the output encoder.
+const MOTOR_ENCODER_RATIO: f64 = 100.0;
+/// Rated torque for one ampere, from the ratings of the 80H120I (31 N·m at 6.3 A).
+const TORQUE_PER_AMPERE: f64 = 31.0 / 6.3;
+const NEVER: Nanoseconds = Nanoseconds::MAX;
+
+/// A simulated eRob joint module with CANopen firmware.
+#[derive(Clone, Debug)]
+pub struct ErobJoint {
+    parameters: ErobParameters,
+    dictionary: Dictionary,
+    network: Network,
+    sdo: SdoServer,
+    process_data: ProcessData,
+    errors: Errors,
+    device: Device,
+    motion: Motion,
+    servo: Servo,
+    joint: Joint,
+    torque: f64,
+    /// What is added to the encoder's counts, because turns were lost.
+    counts_offset: i32,
+    has_battery_fault: bool,
+    has_pdo_error: bool,
+    /// What broke since the last look.
+    injected: Option<DriveFault>,
+    save_ns: Nanoseconds,
+    /// How far the loops have come.
+    stepped_ns: Nanoseconds,
+    now_ns: Nanoseconds,
+    wake_ns: Nanoseconds,
+}
+
+impl ErobJoint {
+    /// A module whose supply comes on at time 0.
+    pub fn new(parameters: ErobParameters) -> Self {
+        let mut dictionary = Dictionary::new(parameters.node);
+        dictionary.set_factory(at::RATED_TORQUE, (1000.0 * parameters.rated_torque).round() as u32);
+        let rated_current_ma = 1000.0 * parameters.rated_torque / TORQUE_PER_AMPERE;
+        dictionary.set_factory(at::RATED_CURRENT, rated_current_ma.round() as u32);
+        dictionary.set_factory(at::TEMPERATURE, 35);
+        let mut random = Random::new(parameters.seed, parameters.node);
+        let has_warning = random.next() & 1 == 1;
+        let velocity_limit = parameters.highest_velocity;
+        let counts_per_second = parameters.encoder.counts_per_second(velocity_limit).abs();
+        let mut module = Self {
+            parameters,
+            dictionary,
+            network: Network::starting(parameters.node, parameters.power_up_ns),
+            sdo: SdoServer::new(random, parameters.is_upload_segmented),
+            process_data: ProcessData::default(),
+            errors: Errors::default(),
+            device: Device::starting(has_warning),
+            motion: Motion::new(counts_per_second),
+            servo: Servo::new(parameters.joint.inertia, parameters.peak_torque, velocity_limit),
+            joint: Joint::new(parameters.joint, parameters.initial_position),
+            torque: 0.0,
+            counts_offset: 0,
+            has_battery_fault: false,
+            has_pdo_error: false,
+            injected: None,
+            save_ns: NEVER,
+            stepped_ns: 0,
+            now_ns: 0,
+            wake_ns: 0,
+        };
+        module.process_data.compile(&module.dictionary);
+        if !parameters.has_battery {
+            module.lose_turns();
+        }
+        module
+    }
+
+    fn direction(&self) -> f64 {
+        1f64.copysign(self.parameters.encoder.counts_per_unit)
+    }
+
+    fn counts(&self) -> i32 {
+        self.parameters.encoder.counts(self.joint.position()).wrapping_add(self.counts_offset)
+    }
+
+    fn actual(&self) -> Actual {
+        let velocity = self.parameters.encoder.counts_per_second(self.joint.velocity());
+        Actual { position: self.counts().into(), velocity }
+    }
+
+    /// The mode in force, as 6061 shows it.
+    fn mode(&self) -> Option<OperationMode> {
+        OperationMode::from_number(self.dictionary.signed(at::OPERATION_MODE_DISPLAY) as i8)
+    }
+
+    /// Runs the loops on their grid up to `now_ns`.
+    fn run_loops(&mut self, now_ns: Nanoseconds) {
+        while self.stepped_ns + STEP_NS <= now_ns {
+            self.step(STEP_NS);
+        }
+    }
+
+    /// Runs the loops up to exactly `now_ns` and starts their grid anew there: the lock to SYNC.
+    fn lock_loops(&mut self, now_ns: Nanoseconds) {
+        self.run_loops(now_ns);
+        if now_ns > self.stepped_ns {
+            self.step(now_ns - self.stepped_ns);
+        }
+    }
+
+    fn step(&mut self, duration_ns: Nanoseconds) {
+        let duration_s = duration_ns as f64 / NANOSECONDS_PER_SECOND as f64;
+        self.stepped_ns += duration_ns;
+        self.evaluate(self.stepped_ns);
+        let is_driven = self.device.state().has_torque();
+        if is_driven {
+            self.drive(duration_s);
+        } else {
+            self.torque = 0.0;
+        }
+        self.joint.step(duration_s, self.torque * self.direction(), !is_driven);
+        let actual = self.actual();
+        if is_driven {
+            self.check_following_error(actual);
+        } else {
+            self.motion.follow(actual);
+        }
+        let word = self.device.controlword();
+        let bits = self.motion.status_bits(actual, word, &self.dictionary, duration_s);
+        self.dictionary.set(at::STATUSWORD, self.device.statusword(bits).into());
+    }
+
+    /// Set-point, loops, torque of one step.
+    fn drive(&mut self, duration_s: f64) {
+        let actual = self.actual();
+        let velocity = self.joint.velocity() * self.direction();
+        let demand = match self.device.stop() {
+            Some(stop) => {
+                let (demand, is_at_rest) = self.motion.step_stop(stop.deceleration, duration_s);
+                if is_at_rest {
+                    self.device.stopped();
+                }
+                demand
+            }
+            None => self.motion.step(self.device.controlword(), actual, &self.dictionary, duration_s),
+        };
+        let unit = 1.0 / self.parameters.encoder.counts_per_unit.abs();
+        let per_mille = self.parameters.rated_torque / 1000.0;
+        self.torque = match demand {
+            Demand::Position { position, velocity: forward, torque } => {
+                let error = (position - actual.position) * unit;
+                self.servo.position(error, forward * unit, velocity, torque * per_mille, duration_s)
+            }
+            Demand::Velocity { velocity: wanted, torque } => {
+                self.servo.velocity(wanted * unit, velocity, torque * per_mille, duration_s)
+            }
+            Demand::Torque(torque) => self.servo.torque(torque * per_mille, velocity),
+        };
+        if !self.device.state().has_torque() {
+            self.torque = 0.0;
+        }
+    }
+
+    fn check_following_error(&mut self, actual: Actual) {
+        let window = self.dictionary.signed_real(at::FOLLOWING_ERROR_WINDOW);
+        let error = self.motion.position() - actual.position;
+        let is_watched = window >= 0.0 && self.motion.follows_position() && self.device.stop().is_none();
+        if is_watched && error.abs() > window {
+            self.fail(Error::PositionLost);
+        }
+    }
+
+    /// Lets the state machine and the profile handshake see the present controlword.
+    fn evaluate(&mut self, now_ns: Nanoseconds) {
+        let previous = self.device.controlword();
+        let had_stop = self.device.stop().is_some();
+        match self.device.evaluate(now_ns, &self.dictionary, !self.has_battery_fault) {
+            Change::Enabled => {
+                self.servo.reset();
+                let (mode, actual) = (self.mode(), self.actual());
+                self.motion.engage(mode, actual, &self.dictionary);
+            }
+            Change::FaultReset => {
+                self.dictionary.set(at::ERROR_CODE, 0);
+                self.errors.clear(&mut self.dictionary);
+            }
+            Change::None => {}
+        }
+        if !had_stop && self.device.stop().is_some() {
+            self.motion.begin_stop(self.actual());
+        }
+        if self.device.state() == State::OperationEnabled {
+            self.motion.evaluate(self.device.controlword(), previous, &self.dictionary);
+        }
+    }
+
+    /// 6061 follows 6060 in a drive that is not enabled, if the unit has the mode.
+    fn follow_mode(&mut self) {
+        if self.device.state().has_torque() {
+            return;
+        }
+        let number = self.dictionary.signed(at::OPERATION_MODE) as i8;
+        let supported = self.dictionary.get(at::SUPPORTED_MODES);
+        let is_supported = OperationMode::from_number(number).is_some_and(|mode| {
+            supported & mode.supported_bit() != 0
+                || mode == OperationMode::InterpolatedPosition && self.parameters.has_interpolated_position
+        });
+        if is_supported {
+            self.dictionary.set(at::OPERATION_MODE_DISPLAY, number as u8 as u32);
+        }
+    }
+
+    /// A fault: error code, emergency message, reaction.
+    fn fail(&mut self, error: Error) {
+        self.dictionary.set(at::ERROR_CODE, error.code().into());
+        self.errors.raise(error, &mut self.dictionary);
+        self.device.fault(error.cuts_power(), &self.dictionary);
+        if self.device.stop().is_some() {
+            self.motion.begin_stop(self.actual());
+        } else {
+            self.torque = 0.0;
+        }
+    }
+
+    /// Brings measured quantities into the dictionary.
+    fn measure(&mut self) {
+        let actual = self.actual();
+        let per_mille = 1000.0 * self.torque / self.parameters.rated_torque;
+        let motor = (self.joint.position() * self.parameters.encoder.counts_per_unit * MOTOR_ENCODER_RATIO)
+            .round_ties_even();
+        let difference = self.motion.position() - actual.position;
+        let counts = self.counts();
+        let statusword = self.statusword();
+        let dictionary = &mut self.dictionary;
+        dictionary.set(at::POSITION, counts as u32);
+        dictionary.set_real(at::VELOCITY, actual.velocity);
+        dictionary.set_real(at::TORQUE, per_mille);
+        dictionary.set_real(at::CURRENT, per_mille);
+        dictionary.set_real(at::TORQUE_ESTIMATE, 1000.0 * self.torque);
+        dictionary.set(at::MOTOR_ENCODER, motor as i64 as u32);
+        dictionary.set_real(at::POSITION_DEMAND, self.motion.position());
+        dictionary.set_real(at::VELOCITY_DEMAND, self.motion.velocity());
+        dictionary.set_real(at::TORQUE_DEMAND, per_mille);
+        dictionary.set_real(at::FOLLOWING_ERROR, difference);
+        dictionary.set(at::STATUSWORD, statusword.into());
+    }
+
+    fn statusword(&self) -> u16 {
+        // Bits 10 to 13 are those of the last step; the state may have changed since.
+        let bits = self.dictionary.get(at::STATUSWORD) as u16 & 0x3C00;
+        self.device.statusword(bits)
+    }
+
+    /// What a start leaves of the drive: everything but the joint and the store.
+    fn start(&mut self, now_ns: Nanoseconds) {
+        self.dictionary.restore(0..=u16::MAX);
+        if !self.parameters.has_battery {
+            self.lose_turns();
+        }
+        let Self { parameters, dictionary, .. } = self;
+        self.network = Network::starting(parameters.node, now_ns + parameters.power_up_ns);
+        self.sdo.reset();
+        self.errors.reset();
+        self.process_data.compile(dictionary);
+        self.device = self.device.restarted();
+        self.servo.reset();
+        self.torque = 0.0;
+        self.has_pdo_error = false;
+        self.save_ns = NEVER;
+    }
+
+    /// The multi-turn count becomes 0.
+    fn lose_turns(&mut self) {
+        let turn = self.parameters.counts_per_turn.max(1.0) as i64;
+        let single = i64::from(self.counts()).rem_euclid(turn);
+        self.counts_offset = self.counts_offset.wrapping_add((single - i64::from(self.counts())) as i32);
+    }
+
+    fn schedule(&mut self, now_ns: Nanoseconds) {
+        let has_message = self.errors.is_pending() && self.network.has_services();
+        let due_ns = [
+            now_ns + IDLE_NS,
+            self.network.due_ns(),
+            self.sdo.due_ns().unwrap_or(NEVER),
+            self.process_data.due_ns(),
+            self.save_ns,
+            if has_message { now_ns } else { NEVER },
+        ];
+        self.wake_ns = due_ns.into_iter().min().unwrap_or(NEVER).max(now_ns + 1);
+    }
+}
+
+impl Drive for ErobJoint {
+    fn node(&self) -> u8 {
+        self.parameters.node
+    }
+
+    fn receive(&mut self, now_ns: Nanoseconds, frame: &Frame, mailbox: &mut Mailbox) {
+        self.now_ns = now_ns;
+        self.run_loops(now_ns);
+        self.take(now_ns, frame, mailbox);
+        self.schedule(now_ns);
+    }
+
+    fn advance(&mut self, now_ns: Nanoseconds, mailbox: &mut Mailbox) {
+        self.now_ns = now_ns;
+        self.run_loops(now_ns);
+        if let Some(fault) = self.injected.take() {
+            self.has_battery_fault |= fault == DriveFault::MultiTurnBattery;
+            self.fail(Error::Fault(fault));
+        }
+        if self.network.loses_master(now_ns, &self.dictionary) {
+            self.fail(Error::MasterLost);
+            self.rest();
+        }
+        if now_ns >= self.save_ns {
+            self.save_ns = NEVER;
+            self.dictionary.save();
+        }
+        self.send_due(now_ns, mailbox);
+        self.schedule(now_ns);
+    }
+
+    fn wake_ns(&self) -> Nanoseconds {
+        self.wake_ns
+    }
+
+    fn observe(&mut self, now_ns: Nanoseconds) -> Observation {
+        self.run_loops(now_ns);
+        Observation {
+            position: self.joint.position(),
+            velocity: self.joint.velocity(),
+            torque: self.torque * self.direction(),
+            position_counts: self.counts(),
+            state: self.device.state(),
+            statusword: self.statusword(),
+            error_code: self.dictionary.get(at::ERROR_CODE) as u16,
+            operation_mode: self.dictionary.signed(at::OPERATION_MODE_DISPLAY) as i8,
+            nmt: self.network.state(),
+            is_braked: !self.device.state().has_torque(),
+        }
+    }
+
+    fn inject(&mut self, fault: DriveFault) {
+        self.injected = Some(fault);
+        self.wake_ns = self.now_ns + 1;
+    }
+
+    fn power_cycle(&mut self, now_ns: Nanoseconds, mailbox: &mut Mailbox) {
+        self.run_loops(now_ns);
+        mailbox.clear();
+        self.start(now_ns);
+        self.schedule(now_ns);
+    }
+
+    fn set_load_torque(&mut self, torque: f64) {
+        self.joint.set_load_torque(torque);
+    }
+}

@@ -1,0 +1,247 @@
+//! The configurations that come with takt, and how values of a configuration are read.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use takt::config::{Config, Control, Feedback, Interface, OverrideError, ProblemKind, Travel};
+
+fn configs() -> Vec<PathBuf> {
+    let mut paths: Vec<_> = fs::read_dir(config("")).unwrap().map(|entry| entry.unwrap().path()).collect();
+    paths.sort();
+    paths
+}
+
+fn config(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("configs").join(name)
+}
+
+fn load(path: &Path) -> Config {
+    Config::load(path).unwrap_or_else(|error| panic!("{:?}", miette::Report::new(error)))
+}
+
+fn parse(text: &str) -> Config {
+    Config::parse("test.toml", text).unwrap_or_else(|error| panic!("{:?}", miette::Report::new(error)))
+}
+
+#[test]
+fn every_configuration_that_comes_with_takt_loads() {
+    let paths = configs();
+    assert!(paths.len() >= 6, "{paths:?}");
+    for path in paths {
+        assert_eq!(load(&path).name, path.file_stem().unwrap().to_str().unwrap());
+    }
+}
+
+#[test]
+fn the_three_arms_differ_in_the_line_of_the_mode_alone() {
+    let lines = |name: &str| -> Vec<String> {
+        let text = fs::read_to_string(config(name)).unwrap();
+        let counts = |line: &&str| !line.starts_with('#') && !line.starts_with("name = \"arm6");
+        text.lines().filter(counts).map(str::to_owned).collect()
+    };
+    let csp = lines("arm6-erob.toml");
+    for (name, mode) in [("arm6-erob-csv.toml", "mode = \"csv\""), ("arm6-erob-cst.toml", "mode = \"cst\"")] {
+        let other = lines(name);
+        let differences: Vec<_> = csp.iter().zip(&other).filter(|(a, b)| a != b).collect();
+        assert_eq!(csp.len(), other.len());
+        assert_eq!(differences, [(&"mode = \"csp\"".to_owned(), &mode.to_owned())]);
+    }
+}
+
+#[test]
+#[expect(clippy::approx_constant, reason = "a limit that happens to be close to half a turn")]
+fn the_arm_is_the_one_of_the_field_notes() {
+    let arm = load(&config("arm6-erob.toml"));
+    let reversed: Vec<_> = arm.axes.iter().map(|axis| axis.reversed).collect();
+    assert_eq!(reversed, [true, true, true, false, true, false]);
+    let limits: Vec<_> = arm.axes.iter().map(|a| (a.limits.position_min, a.limits.position_max)).collect();
+    assert_eq!(
+        limits,
+        [
+            (-2.9671, 2.9671),
+            (-1.8326, 1.8326),
+            (-1.9671, 1.9671),
+            (-3.1416, 0.0873),
+            (-2.9671, 2.9671),
+            (-0.0873, 3.8223)
+        ]
+    );
+    assert_eq!(arm.axes.iter().map(|axis| axis.bus).collect::<Vec<_>>(), [0, 0, 0, 1, 1, 1]);
+    assert!(arm.program.moves.len() >= 4);
+    assert!(arm.axes.iter().all(|axis| axis.control == Control::Position));
+}
+
+#[test]
+fn the_joints_of_the_arm_have_the_torque_for_their_acceleration_and_speed() {
+    for axis in load(&config("arm6-erob.toml")).axes {
+        let (joint, limits) = (axis.simulated, axis.limits);
+        let needed = joint.inertia * limits.acceleration
+            + joint.viscous_friction * limits.velocity
+            + joint.coulomb_friction;
+        assert!(needed <= joint.rated_torque, "{} needs {needed} N·m", axis.name);
+        assert!(joint.peak_torque >= limits.torque, "{}", axis.name);
+    }
+}
+
+/// The reference states every default in a line that ends in `# default`: without any of these lines, and without all
+/// of them, the configuration is the same.
+#[test]
+fn every_default_of_the_reference_is_the_one_that_is_built_in() {
+    let text = fs::read_to_string(config("reference.toml")).unwrap();
+    let full = parse(&text);
+    let is_default = |line: &str| {
+        line.split_once('#').is_some_and(|(_, comment)| comment.trim_start().starts_with("default"))
+    };
+    let lines: Vec<&str> = text.lines().collect();
+    let stated: Vec<usize> = (0..lines.len()).filter(|&index| is_default(lines[index])).collect();
+    assert!(stated.len() > 50, "only {} defaults are stated", stated.len());
+    for &left_out in &stated {
+        let rest: Vec<_> =
+            lines.iter().enumerate().filter(|(i, _)| *i != left_out).map(|(_, l)| *l).collect();
+        assert_eq!(parse(&rest.join("\n")), full, "without {:?}", lines[left_out]);
+    }
+    let rest: Vec<_> = lines.iter().filter(|line| !is_default(line)).copied().collect();
+    assert_eq!(parse(&rest.join("\n")), full);
+}
+
+#[test]
+fn the_reference_shows_every_key_there_is() {
+    let text = fs::read_to_string(config("reference.toml")).unwrap();
+    let places =
+        text.lines().filter(|line| line.starts_with('[') || line.starts_with("name = \"reference\""));
+    for place in places {
+        let (before, after) = text.split_at(text.find(place).unwrap() + place.len());
+        let error = Config::parse("reference.toml", &format!("{before}\nqqq = 1{after}")).unwrap_err();
+        let known = error.problems().iter().find_map(|problem| match &problem.kind {
+            ProblemKind::UnknownKey { key, known, .. } if key.ends_with("qqq") => Some(known.clone()),
+            _ => None,
+        });
+        for key in known.unwrap_or_else(|| panic!("{place} takes any key: {:?}", error.problems())) {
+            let is_shown = text.lines().any(|line| {
+                let line = line.trim_start_matches("# ");
+                let header = line.split_once(']').map_or("", |(header, _)| header.trim_start_matches('['));
+                line.starts_with(&format!("{key} =")) || header.split('.').any(|part| part == key)
+            });
+            assert!(is_shown, "{place}: {key} is not in the reference");
+        }
+    }
+}
+
+const SMALL: &str = r#"
+name = "small"
+[[bus]]
+name = "b"
+[[axis]]
+name = "a"
+bus = "b"
+node = 1
+drive = "erob-canopen"
+limits = { position = ["-90 deg", "0.25 turn"], velocity = 2, acceleration = "10 rad/s^2", torque = "20 Nm" }
+"#;
+
+fn with(additions: &str) -> Config {
+    parse(&format!("{SMALL}\n{additions}"))
+}
+
+#[test]
+fn a_number_is_si_and_a_text_has_its_unit() {
+    let limits = with("").axes[0].limits;
+    assert_eq!(limits.position_min, -std::f64::consts::FRAC_PI_2);
+    assert_eq!(limits.position_max, std::f64::consts::FRAC_PI_2);
+    assert_eq!((limits.velocity, limits.acceleration, limits.deceleration), (2.0, 10.0, 10.0));
+    assert!(limits.jerk.is_infinite());
+}
+
+#[test]
+fn the_command_phase_is_a_fraction_or_a_time() {
+    for phase in ["0.6", "\"60 %\"", "\"1.2 ms\"", "\"1200 us\""] {
+        let cycle = with(&format!("[cycle]\nperiod = \"2 ms\"\ncommand_phase = {phase}")).cycle;
+        assert_eq!((cycle.period_ns, cycle.command_phase_ns), (2_000_000, 1_200_000), "{phase}");
+    }
+    assert_eq!(with("[cycle]\nperiod = \"2 ms\"").cycle.command_phase_ns, 1_100_000);
+}
+
+#[test]
+fn an_axis_overrides_the_defaults_key_by_key() {
+    let defaults =
+        "[defaults.axis]\nmode = \"csv\"\ntransmission_type = 255\nlimits = { jerk = 500, torque = 1 }\n";
+    let axis = &parse(&SMALL.replace("[[bus]]", &format!("{defaults}[[bus]]"))).axes[0];
+    assert_eq!((axis.limits.jerk, axis.limits.torque, axis.transmission_type), (500.0, 20.0, 255));
+    assert_eq!(axis.control, Control::Velocity { position_gain: 20.0 });
+}
+
+#[test]
+fn the_gains_of_the_torque_loop_follow_from_inertia_and_bandwidth() {
+    let torque_loop = "[axis.torque_loop]\nbandwidth = 10\ninertia = 2\nviscous_friction = 3\n";
+    let joint = "[axis.simulated]\ninertia = 7\ncoulomb_friction = \"300 mNm\"\n";
+    assert_eq!(with(&format!("{torque_loop}{joint}")).axes[0].control, Control::Position);
+    assert_eq!(
+        with(&format!("mode = \"cst\"\n{torque_loop}{joint}")).axes[0].control,
+        Control::Torque {
+            stiffness: 200.0,
+            damping: 40.0,
+            inertia: 2.0,
+            viscous_friction: 3.0,
+            coulomb_friction: 0.3
+        }
+    );
+}
+
+#[test]
+fn a_linear_axis_is_read_in_metres_and_newtons() {
+    let config = parse(
+        r#"
+name = "slide"
+[[bus]]
+name = "b"
+[[axis]]
+name = "x"
+bus = "b"
+node = 1
+drive = "erob-canopen"
+travel = "linear"
+lead = "5 mm"
+feedback = ["torque", "error_code"]
+limits = { position = [0, "500 mm"], velocity = "100 mm/s", acceleration = "1 m/s^2", torque = "400 N" }
+[program]
+move = [{ to = "250 mm" }, { to = [0.1] }]
+"#,
+    );
+    let axis = &config.axes[0];
+    assert_eq!(axis.travel, Travel::Linear { lead_m: 0.005 });
+    assert_eq!(
+        (axis.limits.position_max, axis.limits.torque, axis.following_error.limit),
+        (0.5, 400.0, 0.01)
+    );
+    assert_eq!(axis.feedback, [Feedback::Torque, Feedback::ErrorCode]);
+    assert_eq!(config.program.moves[0].target, [0.25]);
+    assert_eq!(config.program.moves[1].target, [0.1]);
+}
+
+#[test]
+fn words_stand_for_what_has_no_number() {
+    let config = with(
+        "[realtime]\npriority = \"off\"\nspin_guard = 0\ncpu = 3\n[master]\nheartbeat = \"off\"\n\
+         [axis.identity]\nvendor = \"any\"",
+    );
+    let realtime = config.realtime;
+    assert_eq!((realtime.priority, realtime.spin_guard_ns, realtime.cpu), (None, Some(0), Some(3)));
+    assert_eq!((config.master.heartbeat_ns, config.axes[0].identity.vendor), (None, None));
+    assert_eq!(config.axes[0].identity.product, Some(0x2648_3052));
+}
+
+#[test]
+fn a_bus_can_be_connected_elsewhere_than_the_file_says() {
+    let mut config = load(&config("arm6-erob.toml"));
+    config.override_interface("base", "vcan0").unwrap();
+    assert_eq!(config.buses[0].interface, Interface::SocketCan("vcan0".to_owned()));
+    assert_eq!(config.buses[1].interface, Interface::Simulated);
+    let taken = config.override_interface("wrist", "vcan0");
+    assert!(matches!(taken, Err(OverrideError::InterfaceTaken { bus, .. }) if bus == "base"));
+    let unknown = config.override_interface("elbow", "vcan1");
+    assert!(matches!(unknown, Err(OverrideError::UnknownBus { .. })));
+    let serial = config.override_interface("wrist", "slcan:/dev/ttyACM0");
+    assert!(matches!(serial, Err(OverrideError::Interface { .. })));
+    config.override_interface("base", "sim").unwrap();
+    assert_eq!(config.buses[0].interface, Interface::Simulated);
+}

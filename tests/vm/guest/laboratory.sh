@@ -1,0 +1,61 @@
+# What the guest's scripts share: interfaces, background load, and recordings of a periodic frame. To be sourced.
+
+guest=tests/vm/guest
+
+# Brings a virtual interface up.
+vcan_up() {
+    ip link show "$1" >/dev/null 2>&1 || ip link add dev "$1" type vcan
+    ip link set "$1" up
+}
+
+# Brings both emulated SJA1000 controllers up at 1 Mbit/s. They sit on one bus and acknowledge each other.
+controllers_up() {
+    local interface
+    for interface in can0 can1; do
+        ip link set "$interface" up type can bitrate 1000000 restart-ms 100
+    done
+}
+
+load_pids=()
+
+# background COMMAND...: repeats a command at ordinary priority until load_off.
+background() {
+    chrt --other 0 bash -c 'while :; do "$@"; done' background "$@" >/dev/null 2>&1 &
+    load_pids+=($!)
+}
+
+# Loads disk, file system, scheduler, memory and the CAN interface given, until load_off.
+load_on() {
+    background dd if=/dev/zero of="$OUT/../share/scratch" bs=64k count=16 conv=fsync
+    background ls -lR /usr/lib /usr/share
+    background hackbench --groups 2 --fds 10 --loops 100
+    background stress-ng --timeout 5 --switch 1 --timer 1 --mmap 1 --mmap-bytes 16m --fork 1
+    background cangen "$1" -g 1 -I 6AA -L 8 -i
+}
+
+load_off() {
+    local pid
+    for pid in "${load_pids[@]}"; do
+        kill "$pid"
+        pkill -P "$pid"
+        wait "$pid"
+    done 2>/dev/null
+    load_pids=()
+    rm -f "$OUT/../share/scratch"
+}
+
+# record INTERFACE FRAMES FILE: so many SYNC frames (080) with kernel time stamps, by a listener that has nothing to do with the sender.
+record() {
+    chrt --fifo 1 candump -L -r 4000000 -n "$2" "$1,080:7FF" > "$3"
+}
+
+# periods FILE PERIOD_US
+periods() {
+    awk -v nominal="$2" -f $guest/periods.awk "$1"
+}
+
+# cyclictest_row CYCLES: shortest, mean and longest wake-up latency in microseconds.
+cyclictest_row() {
+    cyclictest --mlockall --quiet --priority=90 --interval=1000 --loops="$1" \
+        | sed -n 's/.*Min: *\([0-9]*\).*Avg: *\([0-9]*\).*Max: *\([0-9]*\).*/\1 \2 \3/p'
+}
