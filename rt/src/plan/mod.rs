@@ -24,6 +24,7 @@ mod profile;
 mod straight;
 mod synchronisation;
 mod trapezoid;
+mod travel;
 
 pub use error::{Limit, PlanError, Quantity};
 pub use problem::{Limits, Problem, State};

@@ -334,4 +334,21 @@ impl Profile {
         self.minimum_duration_s = minimum_duration_s;
         (self.blocked, self.blocked_count) = blocked;
     }
+
+    /// At rest at its end, the profile stays there until this time.
+    pub(super) fn rest_until(&mut self, time_s: f64) {
+        let target = self.end;
+        self.append(time_s - self.duration_s, 0.0, 0.0);
+        self.end = target;
+        self.duration_s = self.duration_s.max(time_s);
+    }
+
+    /// Goes on with this profile, which starts where this one ends.
+    pub(super) fn join(&mut self, next: &Self) {
+        for phase in next.phases() {
+            self.end = phase.start;
+            self.append(phase.duration_s, phase.start.acceleration, phase.jerk);
+        }
+        self.end = next.end;
+    }
 }

@@ -1,10 +1,10 @@
 //! Several axes, one duration (`otg.md` section 2, 4).
 
-use super::error::{Limit, PlanError};
+use super::error::PlanError;
 use super::problem::{Limits, Problem, State};
 use super::profile::Profile;
 use super::straight::Line;
-use super::{jerk_limited, trapezoid};
+use super::{jerk_limited, trapezoid, travel};
 
 /// What the axes have in common.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -71,13 +71,65 @@ pub fn synchronised(
     timing: Timing,
 ) -> Result<f64, PlanError> {
     let duration_s = plan(Interface::Position(timing.return_to_limits), problems, profiles, timing)?;
-    for (axis, (problem, profile)) in problems.iter().zip(profiles.iter()).enumerate() {
-        if let Some(limit) = position_limit_left(problem, profile) {
-            halt(problems.iter().map(|problem| (problem.start, problem.limits)), profiles)?;
-            return Err(PlanError::PositionBeyondLimit { axis, limit });
+    let refuse = |error: PlanError, profiles: &mut [Profile]| {
+        halt(problems.iter().map(|problem| (problem.start, problem.limits)), profiles)?;
+        Err(error)
+    };
+    match first_left(problems, profiles) {
+        None => Ok(duration_s),
+        Some(error) if timing.synchronisation == Synchronisation::Straight => refuse(error, profiles),
+        Some(_) => match keep_travel(problems, profiles, timing, duration_s) {
+            Ok(duration_s) => Ok(duration_s),
+            Err(error) => refuse(error, profiles),
+        },
+    }
+}
+
+/// The first position limit that is left.
+fn first_left(problems: &[Problem], profiles: &[Profile]) -> Option<PlanError> {
+    let mut axes = problems.iter().zip(profiles).enumerate();
+    axes.find_map(|(axis, (problem, profile))| {
+        travel::limit_left(problem, profile).map(|limit| PlanError::PositionBeyondLimit { axis, limit })
+    })
+}
+
+/// Replaces the motions that leave a position limit. Where that takes longer, all axes are planned once more for the
+/// longer time.
+fn keep_travel(
+    problems: &[Problem],
+    profiles: &mut [Profile],
+    timing: Timing,
+    duration_s: f64,
+) -> Result<f64, PlanError> {
+    let manner = timing.return_to_limits;
+    let own_time = timing.synchronisation == Synchronisation::Independent;
+    let mut duration_s = duration_s;
+    for _ in 0..ROUNDS_MAX {
+        let mut longest_s = duration_s;
+        for (axis, (problem, profile)) in problems.iter().zip(profiles.iter_mut()).enumerate() {
+            if travel::limit_left(problem, profile).is_none() {
+                continue;
+            }
+            let on_axis = |error: PlanError| error.on_axis(axis);
+            let least_s = if own_time { profile.duration_s() } else { duration_s };
+            travel::motion_within(problem, manner, least_s, profile).map_err(on_axis)?;
+            let own_s = on_grid(profile.duration_s(), timing.cycle_s);
+            if own_s > profile.duration_s() {
+                travel::motion_within(problem, manner, own_s, profile).map_err(on_axis)?;
+            }
+            longest_s = longest_s.max(profile.duration_s());
+        }
+        if own_time || longest_s == duration_s {
+            return first_left(problems, profiles).map_or(Ok(longest_s), Err);
+        }
+        let timing =
+            Timing { minimum_duration_s: longest_s, synchronisation: Synchronisation::Time, ..timing };
+        duration_s = plan(Interface::Position(manner), problems, profiles, timing)?;
+        if first_left(problems, profiles).is_none() {
+            return Ok(duration_s);
         }
     }
-    Ok(duration_s)
+    Err(first_left(problems, profiles).unwrap_or(PlanError::InvalidTiming))
 }
 
 /// Plans the motion of all axes to their target velocities, wherever that leads, and gives its duration in s.
@@ -96,6 +148,9 @@ pub fn synchronised_velocity(
 }
 
 /// Plans the fastest coordinated stop: every axis comes to rest, all at the same time. Gives the duration in s.
+///
+/// An axis that would leave its position limits that way stops sooner by itself, on a shorter way, and waits for the
+/// others. Where no way is short enough it takes the shortest; see [`Profile::extrema`].
 ///
 /// # Errors
 /// As [`synchronised`].
@@ -140,10 +195,19 @@ fn halt(
         duration_s = duration_s.max(fastest_s);
     }
     let duration_s = unblocked(duration_s, profiles, None);
-    for (axis, (problem, profile)) in problems.zip(profiles.iter_mut()).enumerate() {
-        lasting(Interface::Velocity, &problem, duration_s, profile).map_err(|error| error.on_axis(axis))?;
+    let mut longest_s = duration_s;
+    for (axis, (problem, profile)) in problems.clone().zip(profiles.iter_mut()).enumerate() {
+        let on_axis = |error: PlanError| error.on_axis(axis);
+        lasting(Interface::Velocity, &problem, duration_s, profile).map_err(on_axis)?;
+        if travel::limit_left(&problem, profile).is_some() {
+            travel::stop_within(problem.start, &problem.limits, profile).map_err(on_axis)?;
+            longest_s = longest_s.max(profile.duration_s());
+        }
     }
-    Ok(duration_s)
+    for profile in profiles.iter_mut() {
+        profile.rest_until(longest_s);
+    }
+    Ok(longest_s)
 }
 
 fn plan(
@@ -254,6 +318,9 @@ fn lasting(
     }
 }
 
+/// How often a longer time for one axis may ask for a longer time for another.
+const ROUNDS_MAX: u32 = 3;
+
 /// Relative to a duration, a difference up to this is rounding.
 const ROUNDING: f64 = 1024.0 * f64::EPSILON;
 
@@ -282,24 +349,5 @@ fn on_grid(duration_s: f64, cycle_s: Option<f64>) -> f64 {
     match cycle_s {
         Some(cycle_s) => libm::ceil(duration_s / cycle_s * (1.0 - ROUNDING)) * cycle_s,
         None => duration_s,
-    }
-}
-
-/// The position limit that the profile leaves, if any. From a start outside of them it may only come back.
-fn position_limit_left(problem: &Problem, profile: &Profile) -> Option<Limit> {
-    const ROUNDING: f64 = 1e-12;
-    let Problem { start, target, limits } = problem;
-    if limits.position_max == f64::INFINITY && limits.position_min == f64::NEG_INFINITY {
-        return None;
-    }
-    let range = profile.extrema().position;
-    let rounding =
-        ROUNDING * (start.position.abs() + target.position.abs() + range.max.abs() + range.min.abs());
-    if range.max > limits.position_max.max(start.position) + rounding {
-        Some(Limit::PositionMax)
-    } else if range.min < limits.position_min.min(start.position) - rounding {
-        Some(Limit::PositionMin)
-    } else {
-        None
     }
 }

@@ -225,6 +225,78 @@ proptest! {
     }
 
     #[test]
+    fn a_position_limit_is_kept_or_the_error_carries_a_stop(problems in prop::collection::vec(problem(), 1..4), room in 0.01..3.0_f64) {
+        let problems: Vec<Problem> = problems
+            .into_iter()
+            .map(|problem| {
+                let low = problem.start.position.min(problem.target.position) - room;
+                let high = problem.start.position.max(problem.target.position) + room;
+                Problem { limits: problem.limits.with_position(low, high), ..problem }
+            })
+            .collect();
+        let mut profiles = vec![Profile::hold(0.0); problems.len()];
+        match synchronised(&problems, &mut profiles, Timing::default()) {
+            Ok(duration_s) => {
+                for (problem, profile) in problems.iter().zip(&profiles) {
+                    prop_assert_eq!(profile.duration_s(), duration_s);
+                    let range = profile.extrema().position;
+                    prop_assert!(range.max <= problem.limits.position_max + 1e-9 && range.min >= problem.limits.position_min - 1e-9);
+                    prop_assert_eq!(judge(problem, profile, if starts_inside(problem) { Arrival::State } else { Arrival::Velocity }), Ok(()));
+                }
+            }
+            Err(PlanError::PositionBeyondLimit { .. }) => {
+                for (problem, profile) in problems.iter().zip(&profiles) {
+                    prop_assert_eq!(profile.end(), State::rest(profile.end().position));
+                    prop_assert_eq!(profile.start().position, problem.start.position);
+                }
+            }
+            Err(error) => prop_assert!(false, "{error:?}"),
+        }
+    }
+
+    #[test]
+    fn a_target_at_rest_within_the_position_limits_is_reached_whenever_the_axis_can_stop_within_them(
+        problem in problem(), room in 0.01..3.0_f64,
+    ) {
+        let problem = Problem { target: State::rest(problem.target.position), ..problem };
+        if !starts_inside(&problem) {
+            return Ok(());
+        }
+        let low = problem.start.position.min(problem.target.position) - room;
+        let high = problem.start.position.max(problem.target.position) + room;
+        let problem = Problem { limits: problem.limits.with_position(low, high), ..problem };
+        let mut profiles = [Profile::hold(0.0)];
+        stop(&[problem.start], &[problem.limits], &mut profiles).unwrap();
+        let (range, speeds) = (profiles[0].extrema().position, profiles[0].extrema().velocity);
+        let keeps_velocity =
+            speeds.max <= problem.limits.velocity_max && speeds.min >= problem.limits.velocity_min;
+        let can_stop = range.max <= high && range.min >= low && keeps_velocity;
+        let answer = synchronised(&[problem], &mut profiles, Timing::default());
+        prop_assert!(answer.is_ok() || !can_stop, "{answer:?}");
+    }
+
+    #[test]
+    fn no_stop_is_shorter_than_the_shortest_which_is_taken_where_the_position_limit_asks_for_it(problem in problem()) {
+        if !starts_inside(&problem) || problem.start.velocity <= 0.0 {
+            return Ok(());
+        }
+        let Problem { start, limits, .. } = problem;
+        // Full deceleration, in small steps, until the motion turns around.
+        let (mut state, step_s) = (start, 1e-4);
+        while state.velocity > 0.0 {
+            let acceleration = (state.acceleration - limits.jerk_max * step_s).max(limits.acceleration_min);
+            state.position += state.velocity * step_s + 0.25 * (acceleration + state.acceleration) * step_s * step_s;
+            state.velocity += 0.5 * (acceleration + state.acceleration) * step_s;
+            state.acceleration = acceleration;
+        }
+        let mut profiles = [Profile::hold(0.0)];
+        let tight = limits.with_position(f64::NEG_INFINITY, start.position);
+        stop(&[start], &[tight], &mut profiles).unwrap();
+        prop_assert_eq!(judge(&Problem { target: profiles[0].end(), ..problem }, &profiles[0], Arrival::Velocity), Ok(()));
+        prop_assert!((profiles[0].extrema().position.max - state.position).abs() < 1e-4 * (1.0 + state.position.abs()));
+    }
+
+    #[test]
     fn a_lowered_velocity_limit_is_reached_without_going_below(
         vmax in 0.1..2.0_f64, excess in 0.0..3.0_f64, a0 in -1.0..1.0_f64, amax in 0.5..12.0_f64, jmax in 0.5..100.0_f64,
     ) {

@@ -141,10 +141,10 @@ fn mix(inside: &Inside, first: &Shape, second: &Shape, share: f64, jerk_max: f64
     }
 }
 
-/// The velocity interface is the second-order problem one order lower.
+/// The velocity interface is the second-order problem one order lower. From where the profile is.
 fn velocity_ramp(problem: &Problem, profile: &mut Profile) -> Result<Ramp, PlanError> {
-    let Problem { start, target, limits } = problem;
-    profile.begin(*start);
+    let Problem { target, limits, .. } = problem;
+    let start = profile.reached();
     let acceleration = start.acceleration.clamp(limits.acceleration_min, limits.acceleration_max);
     let excess = start.acceleration - acceleration;
     profile.shift(excess.abs() / limits.jerk_max, -libm::copysign(limits.jerk_max, excess));
@@ -170,6 +170,33 @@ fn velocity_ramp(problem: &Problem, profile: &mut Profile) -> Result<Ramp, PlanE
     })
 }
 
+/// The stop that goes the least far: decelerate fully until the motion turns around, then come to rest.
+pub(super) fn shortest_stop(problem: &Problem, profile: &mut Profile) -> Result<(), PlanError> {
+    let Problem { start, limits, .. } = problem;
+    profile.begin(*start);
+    // A motion that is slowing down at full rate already may turn around before it can be made to stop.
+    let behind = start.velocity + 0.5 * start.acceleration * start.acceleration.abs() / limits.jerk_max;
+    let sign = libm::copysign(1.0, if start.velocity == 0.0 { behind } else { start.velocity });
+    let deceleration_max = if sign > 0.0 { -limits.acceleration_min } else { limits.acceleration_max };
+    let (speed, deceleration) = (sign * start.velocity, -sign * start.acceleration);
+    if speed > 0.0 && deceleration <= deceleration_max {
+        // On the arc of full jerk the speed is `peak − deceleration²/2J`.
+        let peak = speed + 0.5 * deceleration * deceleration / limits.jerk_max;
+        let at_rest = libm::sqrt(2.0 * limits.jerk_max * peak).min(deceleration_max);
+        profile.shift((at_rest - deceleration) / limits.jerk_max, -sign * limits.jerk_max);
+        profile.shift(sign * profile.reached().velocity / deceleration_max, 0.0);
+    }
+    let brake_s = profile.duration_s();
+    let ramp = velocity_ramp(problem, profile)?;
+    let ramp_s = profile.duration_s() - brake_s;
+    let fastest = ramp.fastest();
+    drive_stretches(&fastest.stretches, profile);
+    let position = profile.reached().position;
+    profile.finish_at(State::rest(position), brake_s + ramp_s + fastest.duration)?;
+    profile.set_minimum_duration(profile.duration_s());
+    Ok(())
+}
+
 fn drive_stretches(stretches: &Stretches, profile: &mut Profile) {
     for (duration_s, jerk) in stretches.durations.iter().zip(&stretches.slopes) {
         profile.shift(*duration_s, *jerk);
@@ -178,6 +205,7 @@ fn drive_stretches(stretches: &Stretches, profile: &mut Profile) {
 
 /// The fastest profile to the target velocity and acceleration, wherever that leads.
 pub(super) fn fastest_velocity(problem: &Problem, profile: &mut Profile) -> Result<(), PlanError> {
+    profile.begin(problem.start);
     let ramp = velocity_ramp(problem, profile)?;
     let brake_s = profile.duration_s();
     let fastest = ramp.fastest();
@@ -197,6 +225,7 @@ pub(super) fn velocity_lasting(
     duration_s: f64,
     profile: &mut Profile,
 ) -> Result<(), PlanError> {
+    profile.begin(problem.start);
     let ramp = velocity_ramp(problem, profile)?;
     let stretches = ramp.lasting(duration_s - profile.duration_s());
     drive_stretches(&stretches, profile);
