@@ -3,4 +3,5 @@
 mod checker;
 mod jerk_limited;
 mod oracle;
+mod tracking;
 mod trapezoid;
