@@ -3,6 +3,7 @@
 mod check;
 mod configuration;
 mod exit;
+mod plan;
 mod run;
 mod table;
 
@@ -22,6 +23,7 @@ pub struct CommandLine {
 enum Command {
     Run(run::Arguments),
     Check(check::Arguments),
+    Plan(plan::Arguments),
 }
 
 impl CommandLine {
@@ -30,6 +32,7 @@ impl CommandLine {
         match self.command {
             Command::Run(arguments) => run::run(arguments),
             Command::Check(arguments) => check::run(&arguments),
+            Command::Plan(arguments) => plan::run(&arguments),
         }
     }
 }

@@ -1,5 +1,7 @@
 //! The planner: what its trajectories keep and where they arrive.
 
 mod checker;
+mod jerk_limited;
 mod oracle;
+mod tracking;
 mod trapezoid;
