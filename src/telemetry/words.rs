@@ -187,11 +187,17 @@ pub fn event(event: &Event, machine: &Machine) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::super::machine::SetPointMagnitudes;
     use super::*;
     use crate::telemetry::machine::{AxisDescription, BusDescription};
 
     fn machine() -> Machine {
-        let axis = |name: &str, unit| AxisDescription { name: name.to_owned(), unit, counts_per_unit: 1.0 };
+        let axis = |name: &str, unit| AxisDescription {
+            name: name.to_owned(),
+            unit,
+            counts_per_unit: 1.0,
+            limits: SetPointMagnitudes::default(),
+        };
         Machine {
             name: "arm".to_owned(),
             cycle_ns: 1_000_000,
