@@ -63,6 +63,11 @@ pub(super) fn monotonic_ns() -> Nanoseconds {
     read_clock(libc::CLOCK_MONOTONIC)
 }
 
+/// The time of day, which may be set while the program runs.
+pub(super) fn real_time_ns() -> Nanoseconds {
+    read_clock(libc::CLOCK_REALTIME)
+}
+
 /// Reads a clock of the kernel.
 fn read_clock(clock: libc::clockid_t) -> Nanoseconds {
     let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
@@ -72,7 +77,7 @@ fn read_clock(clock: libc::clockid_t) -> Nanoseconds {
 }
 
 /// A kernel time as nanoseconds; what lies before zero is zero.
-fn nanoseconds_of(time: &libc::timespec) -> Nanoseconds {
+pub(super) fn nanoseconds_of(time: &libc::timespec) -> Nanoseconds {
     let seconds = u64::try_from(time.tv_sec).unwrap_or(0);
     let nanoseconds = u64::try_from(time.tv_nsec).unwrap_or(0);
     seconds.saturating_mul(NANOSECONDS_PER_SECOND).saturating_add(nanoseconds)
