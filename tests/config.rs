@@ -49,6 +49,7 @@ fn the_three_arms_differ_in_the_line_of_the_mode_alone() {
 }
 
 #[test]
+#[expect(clippy::approx_constant, reason = "a limit that happens to be close to half a turn")]
 fn the_arm_is_the_one_of_the_field_notes() {
     let arm = load(&config("arm6-erob.toml"));
     let reversed: Vec<_> = arm.axes.iter().map(|axis| axis.reversed).collect();

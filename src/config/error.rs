@@ -45,9 +45,13 @@ impl ConfigError {
 
     /// The line of a problem, counted from 1; `None` where the file could not even be read.
     pub fn line(&self, problem: &Problem) -> Option<usize> {
-        let before = self.0.text.get(..problem.span.as_ref()?.start)?;
-        Some(before.matches('\n').count() + 1)
+        Some(line_of(&self.0.text, problem.span.as_ref()?.start))
     }
+}
+
+/// The line in which a byte stands, counted from 1.
+pub(super) fn line_of(text: &str, at: usize) -> usize {
+    text.bytes().take(at).filter(|byte| *byte == b'\n').count() + 1
 }
 
 impl fmt::Display for ConfigError {
@@ -82,8 +86,8 @@ pub struct Problem {
     pub kind: ProblemKind,
     /// The bytes of the file that are wrong; `None` where the file could not even be read.
     pub span: Option<Range<usize>>,
-    /// The bytes of the file that these contradict.
-    pub contradicts: Option<Range<usize>>,
+    /// The line that this one contradicts, counted from 1.
+    pub first_line: Option<usize>,
 }
 
 /// The kinds of problems. `key` is the whole path of a key, as in `axis.limits.velocity`.
@@ -160,8 +164,7 @@ pub enum ProblemKind {
         quantity: Quantity,
     },
     /// A unit of another quantity.
-    #[error("`{key}` is {a} {name} in {si}, but {unit:?} is something else", a = article(quantity.name),
-        name = quantity.name, si = if quantity.unit.is_empty() { "%" } else { quantity.unit })]
+    #[error("`{key}` is {}, and {unit:?} is not a unit of that", article_of(quantity.name))]
     WrongUnit {
         /// The key.
         key: String,
@@ -209,7 +212,7 @@ pub enum ProblemKind {
         given: String,
     },
     /// Two buses or two axes of the same name.
-    #[error("there is already {what} called {name:?}", what = article_of(.what))]
+    #[error("there is already {} called {name:?}", article_of(what))]
     DuplicateName {
         /// `bus` or `axis`.
         what: &'static str,
@@ -454,9 +457,10 @@ impl Diagnostic for Problem {
     }
 
     fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
-        let label = |span: &Range<usize>, text: &str| LabeledSpan::at(span.clone(), text);
-        let here = self.span.as_ref().map(|span| label(span, self.kind.label()));
-        let there = self.contradicts.as_ref().map(|span| label(span, "first here"));
-        Some(Box::new(there.into_iter().chain(here)))
+        let text = match self.first_line {
+            Some(line) => format!("{}; first in line {line}", self.kind.label()),
+            None => self.kind.label().to_owned(),
+        };
+        Some(Box::new(self.span.iter().map(move |span| LabeledSpan::at(span.clone(), text.clone()))))
     }
 }

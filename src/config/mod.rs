@@ -29,7 +29,7 @@ impl Config {
             Ok(text) => Self::parse(&name, &text),
             Err(error) => {
                 let kind = ProblemKind::Unreadable { reason: error.to_string() };
-                Err(ConfigError::new(&name, "", vec![Problem { kind, span: None, contradicts: None }]))
+                Err(ConfigError::new(&name, "", vec![Problem { kind, span: None, first_line: None }]))
             }
         }
     }

@@ -75,7 +75,7 @@ pub fn axes<'a>(
     sections: Vec<Section<'a>>,
     buses: &[ReadBus],
     master: &Master,
-    problems: &'a Problems,
+    problems: &'a Problems<'a>,
 ) -> Vec<ReadAxis> {
     let count = sections.len();
     let mut axes: Vec<ReadAxis> = Vec::with_capacity(count);
@@ -94,7 +94,7 @@ fn axis<'a>(
     buses: &[ReadBus],
     master: &Master,
     earlier: &[ReadAxis],
-    problems: &'a Problems,
+    problems: &'a Problems<'a>,
 ) -> ReadAxis {
     let header = section.header();
     let name = section.require_own("name", "the name of the axis: name = \"joint1\"").and_then(|entry| {
@@ -114,15 +114,12 @@ fn axis<'a>(
     let drive = section
         .require("drive", "the family of the drive: drive = \"erob-canopen\"")
         .and_then(|entry| entry.choice(&[("erob-canopen", DriveFamily::ErobCanopen)]));
-    check_bit_rate(drive, bus, buses, &section);
+    check_bit_rate(drive, bus.and_then(|bus| buses.get(bus)), problems);
 
     let travel = travel(&mut section);
     let quantities = Quantities::of(travel.unwrap_or(Travel::Rotary));
     let counting = counting(&mut section);
-    let limits = limits(section.section("limits"), quantities);
-    if let (Some(limits), Some(travel)) = (&limits, travel) {
-        check_counts(&section, limits, &counting, travel);
-    }
+    let limits = limits(section.section("limits"), quantities, travel, &counting);
     let following_error = following_error(section.section("following_error"), quantities);
     let simulated = simulated(section.section("simulated"), quantities, limits.as_ref(), name.as_deref());
     let control = control(&mut section, quantities, &simulated);
@@ -168,7 +165,7 @@ fn axis<'a>(
 fn bus_index(entry: &Entry<'_>, buses: &[ReadBus]) -> Option<usize> {
     let given = entry.text()?;
     let found = buses.iter().position(|bus| bus.name.as_deref() == Some(given));
-    if found.is_none() {
+    if found.is_none() && buses.iter().all(|bus| bus.name.is_some()) {
         let known: Vec<String> = buses.iter().filter_map(|bus| bus.name.clone()).collect();
         let nearest = spelling::nearest(given, known.iter().map(String::as_str)).map(str::to_owned);
         entry.report(ProblemKind::UnknownBus { name: given.to_owned(), nearest, known });
@@ -183,7 +180,7 @@ fn check_node(
     buses: &[ReadBus],
     master: &Master,
     earlier: &[ReadAxis],
-    problems: &Problems,
+    problems: &Problems<'_>,
 ) {
     let Some(bus) = bus else { return };
     let bus_name = buses.get(bus).and_then(|bus| bus.name.clone()).unwrap_or_default();
@@ -196,13 +193,17 @@ fn check_node(
 }
 
 /// An eRob knows one bit rate (eRunner manual, section 1 of the specification).
-fn check_bit_rate(drive: Option<DriveFamily>, bus: Option<usize>, buses: &[ReadBus], section: &Section<'_>) {
-    let rate = bus.and_then(|bus| buses.get(bus)).map(|bus| bus.bit_rate);
-    if let (Some(DriveFamily::ErobCanopen), Some(rate)) = (drive, rate)
-        && rate != 1_000_000
+fn check_bit_rate(drive: Option<DriveFamily>, bus: Option<&ReadBus>, problems: &Problems<'_>) {
+    if let (Some(DriveFamily::ErobCanopen), Some(bus)) = (drive, bus)
+        && let Some(span) = bus.bit_rate_span.clone()
+        && bus.bit_rate != 1_000_000
     {
-        let value = format!("\"erob-canopen\" on a bus of {}", Quantity::BIT_RATE.show(rate.into()));
-        section.report_default_out_of_range("drive", value, "an eRob on a bus of 1 Mbit/s".to_owned());
+        let kind = ProblemKind::OutOfRange {
+            key: "bus.bit_rate".to_owned(),
+            value: Quantity::BIT_RATE.show(bus.bit_rate.into()),
+            allowed: "1 Mbit/s, the one bit rate of the eRobs on this bus".to_owned(),
+        };
+        problems.report(kind, span);
     }
 }
 
@@ -229,6 +230,23 @@ struct Counting {
     zero_counts: i32,
 }
 
+impl Counting {
+    /// Counts per rad (m). An axis whose travel could not be read counts nothing.
+    fn counts_per_unit(&self, travel: Option<Travel>) -> f64 {
+        let counts = self.counts_per_turn * self.gear_ratio;
+        match travel {
+            Some(Travel::Rotary) => counts / TAU,
+            Some(Travel::Linear { lead_m }) => counts / lead_m,
+            None => 0.0,
+        }
+    }
+
+    fn position(&self, position: f64, travel: Option<Travel>) -> f64 {
+        let direction = if self.reversed { -1.0 } else { 1.0 };
+        direction * position * self.counts_per_unit(travel) + f64::from(self.zero_counts)
+    }
+}
+
 fn counting(section: &mut Section<'_>) -> Counting {
     let counts_per_turn =
         section.get("counts_per_turn").and_then(|entry| entry.number(Bounds::Between(1.0, 1e12)));
@@ -243,13 +261,24 @@ fn counting(section: &mut Section<'_>) -> Counting {
     }
 }
 
-fn limits(mut section: Section<'_>, q: Quantities) -> Option<Limits> {
+fn limits(
+    mut section: Section<'_>,
+    q: Quantities,
+    travel: Option<Travel>,
+    counting: &Counting,
+) -> Option<Limits> {
     let position = section
         .require("position", "lowest and highest position: position = [\"-170 deg\", \"170 deg\"]")
-        .and_then(|entry| position_range(&entry, q));
-    let velocity = section
-        .require("velocity", "highest speed: velocity = \"137 deg/s\"")
-        .and_then(|entry| entry.quantity(q.velocity, Bounds::Positive));
+        .and_then(|entry| {
+            let (low, high) = position_range(&entry, q)?;
+            check_counts(&entry, &[low, high].map(|position| counting.position(position, travel)));
+            Some((low, high))
+        });
+    let velocity = section.require("velocity", "highest speed: velocity = \"137 deg/s\"").and_then(|entry| {
+        let velocity = entry.quantity(q.velocity, Bounds::Positive)?;
+        check_counts(&entry, &[velocity * counting.counts_per_unit(travel)]);
+        Some(velocity)
+    });
     let acceleration = section
         .require("acceleration", "highest acceleration: acceleration = \"8 rad/s^2\"")
         .and_then(|entry| entry.quantity(q.acceleration, Bounds::Positive));
@@ -291,23 +320,9 @@ fn position_range(entry: &Entry<'_>, q: Quantities) -> Option<(f64, f64)> {
 }
 
 /// A drive counts positions and speeds in 32 bits.
-fn check_counts(section: &Section<'_>, limits: &Limits, counting: &Counting, travel: Travel) {
-    let per_turn = match travel {
-        Travel::Rotary => TAU,
-        Travel::Linear { lead_m } => lead_m,
-    };
-    let counts_per_unit = counting.counts_per_turn * counting.gear_ratio / per_turn;
-    let direction = if counting.reversed { -1.0 } else { 1.0 };
-    let fits = |counts: f64| counts.abs() <= i32::MAX.into();
-    for position in [limits.position_min, limits.position_max] {
-        let counts = direction * position * counts_per_unit + f64::from(counting.zero_counts);
-        if !fits(counts) {
-            section.report_here(ProblemKind::BeyondCounts { key: "axis.limits.position".to_owned(), counts });
-        }
-    }
-    let counts = limits.velocity * counts_per_unit;
-    if !fits(counts) {
-        section.report_here(ProblemKind::BeyondCounts { key: "axis.limits.velocity".to_owned(), counts });
+fn check_counts(entry: &Entry<'_>, counts: &[f64]) {
+    if let Some(&counts) = counts.iter().find(|counts| counts.abs() > f64::from(i32::MAX)) {
+        entry.report(ProblemKind::BeyondCounts { key: entry.path.clone(), counts });
     }
 }
 

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use takt_rt::record::MAX_BUSES;
 
-use super::entry::{Bounds, Problems};
+use super::entry::{Bounds, Entry, Problems};
 use super::machine::boolean;
 use super::section::Section;
 use crate::config::defaults;
@@ -19,12 +19,14 @@ const CLASSIC_RATES: [f64; 8] = [10e3, 20e3, 50e3, 125e3, 250e3, 500e3, 800e3, 1
 pub struct ReadBus {
     pub name: Option<String>,
     pub bit_rate: u32,
+    /// Where the bit rate stands, if it does.
+    pub bit_rate_span: Option<Range<usize>>,
     /// `None` when something about it is wrong.
     pub bus: Option<Bus>,
     header: Range<usize>,
 }
 
-pub fn buses<'a>(sections: Vec<Section<'a>>, problems: &'a Problems) -> Vec<ReadBus> {
+pub fn buses<'a>(sections: Vec<Section<'a>>, problems: &'a Problems<'a>) -> Vec<ReadBus> {
     let count = sections.len();
     let mut buses: Vec<ReadBus> = Vec::with_capacity(count);
     for section in sections {
@@ -38,7 +40,7 @@ pub fn buses<'a>(sections: Vec<Section<'a>>, problems: &'a Problems) -> Vec<Read
     buses
 }
 
-fn bus<'a>(mut section: Section<'a>, earlier: &[ReadBus], problems: &'a Problems) -> ReadBus {
+fn bus<'a>(mut section: Section<'a>, earlier: &[ReadBus], problems: &'a Problems<'a>) -> ReadBus {
     let header = section.header();
     let name_entry = section.require_own("name", "the name of the bus: name = \"left\"");
     let name = name_entry.as_ref().and_then(|entry| entry.name());
@@ -65,7 +67,8 @@ fn bus<'a>(mut section: Section<'a>, earlier: &[ReadBus], problems: &'a Problems
         problems.report_against(kind, entry.span.clone(), owner.header.clone());
     }
 
-    let bit_rate = bit_rate(&mut section);
+    let bit_rate_entry = section.get("bit_rate");
+    let bit_rate = bit_rate_entry.as_ref().and_then(bit_rate).unwrap_or(defaults::BIT_RATE);
     let data_bit_rate = section.get("data_bit_rate").and_then(|entry| {
         entry
             .quantity(Quantity::BIT_RATE, Bounds::Between(bit_rate.into(), 8e6))
@@ -84,18 +87,21 @@ fn bus<'a>(mut section: Section<'a>, earlier: &[ReadBus], problems: &'a Problems
             .unwrap_or(defaults::SERVICE_FRAMES_PER_CYCLE),
         sdo_while_enabled,
     });
-    ReadBus { name: name.map(str::to_owned), bit_rate, bus, header }
+    ReadBus {
+        name: name.map(str::to_owned),
+        bit_rate,
+        bit_rate_span: bit_rate_entry.map(|entry| entry.span),
+        bus,
+        header,
+    }
 }
 
-fn bit_rate(section: &mut Section<'_>) -> u32 {
-    let read = section.get("bit_rate").and_then(|entry| {
-        let rate = entry.quantity(Quantity::BIT_RATE, Bounds::Positive)?;
-        if !CLASSIC_RATES.iter().any(|allowed| (allowed - rate).abs() < 1.0) {
-            let allowed = CLASSIC_RATES.map(|rate| Quantity::BIT_RATE.show(rate)).join(", ");
-            entry.report_range(Quantity::BIT_RATE.show(rate), allowed);
-            return None;
-        }
-        Some(rate.round() as u32)
-    });
-    read.unwrap_or(defaults::BIT_RATE)
+fn bit_rate(entry: &Entry<'_>) -> Option<u32> {
+    let rate = entry.quantity(Quantity::BIT_RATE, Bounds::Positive)?;
+    if !CLASSIC_RATES.iter().any(|allowed| (allowed - rate).abs() < 1.0) {
+        let allowed = CLASSIC_RATES.map(|rate| Quantity::BIT_RATE.show(rate)).join(", ");
+        entry.report_range(Quantity::BIT_RATE.show(rate), allowed);
+        return None;
+    }
+    Some(rate.round() as u32)
 }

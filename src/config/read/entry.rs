@@ -6,25 +6,33 @@ use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeArray, DeInteger, DeTable, DeValue};
 
-use crate::config::error::{Problem, ProblemKind};
+use crate::config::error::{Problem, ProblemKind, line_of};
 use crate::config::quantity::{Quantity, QuantityError, Short};
 use crate::config::spelling;
 
 /// The problems found so far. Reading goes on after one, so that a person hears of all of them at once.
-#[derive(Default)]
-pub struct Problems(RefCell<Vec<Problem>>);
+pub struct Problems<'a> {
+    text: &'a str,
+    found: RefCell<Vec<Problem>>,
+}
 
-impl Problems {
-    pub fn report(&self, kind: ProblemKind, span: Range<usize>) {
-        self.0.borrow_mut().push(Problem { kind, span: Some(span), contradicts: None });
+impl<'a> Problems<'a> {
+    pub fn new(text: &'a str) -> Self {
+        Self { text, found: RefCell::default() }
     }
 
-    pub fn report_against(&self, kind: ProblemKind, span: Range<usize>, contradicts: Range<usize>) {
-        self.0.borrow_mut().push(Problem { kind, span: Some(span), contradicts: Some(contradicts) });
+    pub fn report(&self, kind: ProblemKind, span: Range<usize>) {
+        self.found.borrow_mut().push(Problem { kind, span: Some(span), first_line: None });
+    }
+
+    /// Reports what contradicts something earlier in the file.
+    pub fn report_against(&self, kind: ProblemKind, span: Range<usize>, first: Range<usize>) {
+        let first_line = Some(line_of(self.text, first.start));
+        self.found.borrow_mut().push(Problem { kind, span: Some(span), first_line });
     }
 
     pub fn into_vec(self) -> Vec<Problem> {
-        self.0.into_inner()
+        self.found.into_inner()
     }
 }
 
@@ -75,11 +83,11 @@ pub struct Entry<'a> {
     pub path: String,
     pub span: Range<usize>,
     value: &'a DeValue<'a>,
-    problems: &'a Problems,
+    problems: &'a Problems<'a>,
 }
 
 impl<'a> Entry<'a> {
-    pub fn new(path: String, value: &'a Spanned<DeValue<'a>>, problems: &'a Problems) -> Self {
+    pub fn new(path: String, value: &'a Spanned<DeValue<'a>>, problems: &'a Problems<'a>) -> Self {
         Self { path, span: value.span(), value: value.get_ref(), problems }
     }
 

@@ -25,7 +25,7 @@ pub fn parse(source_name: &str, text: &str) -> Result<Config, ConfigError> {
     if !errors.is_empty() {
         return Err(refuse(errors.iter().map(|error| syntax_problem(error, text)).collect()));
     }
-    let problems = Problems::default();
+    let problems = Problems::new(text);
     let config = read(document.get_ref(), &problems);
     let problems = problems.into_vec();
     match config {
@@ -36,11 +36,11 @@ pub fn parse(source_name: &str, text: &str) -> Result<Config, ConfigError> {
 
 fn syntax_problem(error: &toml::de::Error, text: &str) -> Problem {
     let kind = ProblemKind::Syntax { message: error.message().to_owned() };
-    Problem { kind, span: Some(error.span().unwrap_or(text.len()..text.len())), contradicts: None }
+    Problem { kind, span: Some(error.span().unwrap_or(text.len()..text.len())), first_line: None }
 }
 
 /// Reads every section, even after one has failed.
-fn read<'a>(document: &'a DeTable<'a>, problems: &'a Problems) -> Option<Config> {
+fn read<'a>(document: &'a DeTable<'a>, problems: &'a Problems<'a>) -> Option<Config> {
     let mut root = Section::new("", 0..0, document, problems);
     let name =
         root.require("name", "the name of the machine: name = \"arm6\"").and_then(|entry| entry.name());

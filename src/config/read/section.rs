@@ -20,11 +20,13 @@ pub struct Section<'a> {
     known: Vec<&'static str>,
     known_in_defaults: Vec<&'static str>,
     missing: Vec<(&'static str, &'static str)>,
-    problems: &'a Problems,
+    /// Whether something else stands where the table should: what it lacks is not the problem then.
+    is_no_table: bool,
+    problems: &'a Problems<'a>,
 }
 
 impl<'a> Section<'a> {
-    pub fn new(path: &str, header: Range<usize>, own: &'a DeTable<'a>, problems: &'a Problems) -> Self {
+    pub fn new(path: &str, header: Range<usize>, own: &'a DeTable<'a>, problems: &'a Problems<'a>) -> Self {
         Self {
             path: path.to_owned(),
             header,
@@ -33,6 +35,7 @@ impl<'a> Section<'a> {
             known: vec![],
             known_in_defaults: vec![],
             missing: vec![],
+            is_no_table: false,
             problems,
         }
     }
@@ -92,12 +95,17 @@ impl<'a> Section<'a> {
         self.known.push(key);
         self.known_in_defaults.push(key);
         let own = find(self.own, key).map(|found| self.entry(key, found));
-        let defaults = find(self.defaults, key).and_then(|found| self.entry(key, found).table());
+        let defaults = find(self.defaults, key).map(|found| self.entry(key, found));
+        let header = own.as_ref().map_or_else(|| self.header(), |entry| entry.span.clone());
+        let own_table = own.as_ref().and_then(|entry| entry.table());
+        let default_table = defaults.as_ref().and_then(|entry| entry.table());
         Section {
             path: self.path_of(key),
-            header: own.as_ref().map_or_else(|| self.header(), |entry| entry.span.clone()),
-            own: own.and_then(|entry| entry.table()),
-            defaults,
+            header,
+            own: own_table,
+            defaults: default_table,
+            is_no_table: own.is_some() != own_table.is_some()
+                || defaults.is_some() != default_table.is_some(),
             known: vec![],
             known_in_defaults: vec![],
             missing: vec![],
@@ -136,7 +144,7 @@ impl<'a> Section<'a> {
             }
         }
         for (key, says) in &self.missing {
-            if !meant.contains(key) {
+            if !meant.contains(key) && !self.is_no_table {
                 let kind = ProblemKind::MissingKey { key: self.path_of(key), says };
                 self.problems.report(kind, self.header());
             }

@@ -31,6 +31,7 @@ impl RecordProducer {
         };
         slot.timing = record.timing;
         slot.phase = record.phase;
+        slot.is_commanded = record.is_commanded;
         slot.axis_count = record.axis_count;
         if let Some(axes) = slot.axes.get_mut(..record.axes().len()) {
             axes.copy_from_slice(record.axes());
@@ -76,6 +77,7 @@ mod tests {
         CycleRecord {
             timing: Timing { slot, ..Timing::default() },
             phase: Phase::Moving,
+            is_commanded: true,
             axis_count,
             axes: [axis; MAX_AXES],
         }

@@ -10,7 +10,7 @@ use super::latest::Words;
 
 /// Words of a snapshot of so many axes and buses.
 pub const fn snapshot_words(axes: usize, buses: usize) -> usize {
-    10 + 4 * axes + 7 * buses
+    11 + 4 * axes + 7 * buses
 }
 
 /// Words of a streamed command for so many axes.
@@ -25,6 +25,7 @@ pub const NO_SNAPSHOT: Snapshot = Snapshot {
     phase: Phase::Passive,
     missed_slots: 0,
     dropped: 0,
+    refused: 0,
     finished_move: 0,
     remaining_s: 0.0,
     stop: None,
@@ -62,6 +63,7 @@ pub fn put_snapshot(snapshot: &Snapshot, words: &mut Words<'_>) {
     );
     words.put(snapshot.missed_slots);
     words.put(snapshot.dropped);
+    words.put(snapshot.refused);
     words.put_f64(snapshot.remaining_s);
     if let Some(stop) = snapshot.stop {
         put_stop(&stop, words);
@@ -83,6 +85,7 @@ pub fn take_snapshot(words: &mut Words<'_>) -> Snapshot {
         phase: phase_of(phase),
         missed_slots: words.take(),
         dropped: words.take(),
+        refused: words.take(),
         finished_move: (packed >> 32) as u32,
         remaining_s: words.take_f64(),
         stop: (has_stop == 1).then(|| take_stop(words)),

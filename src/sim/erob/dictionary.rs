@@ -1,0 +1,253 @@
+//! The values behind the object dictionary, and the non-volatile store under them.
+
+use super::objects::{Access, DataType, Missing, OBJECTS, find, place};
+
+/// The SDO abort codes that this drive gives (CiA 301, 7.2.4.3.17).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum AbortCode {
+    /// Toggle bit not alternated.
+    Toggle = 0x0503_0000,
+    /// Command specifier not valid or unknown.
+    Command = 0x0504_0001,
+    /// Attempt to read a write-only object.
+    WriteOnly = 0x0601_0001,
+    /// Attempt to write a read-only object.
+    ReadOnly = 0x0601_0002,
+    /// Object does not exist in the object dictionary.
+    NoObject = 0x0602_0000,
+    /// Object cannot be mapped to the PDO.
+    NotMappable = 0x0604_0041,
+    /// The number and length of the objects to be mapped would exceed PDO length.
+    PdoTooLong = 0x0604_0042,
+    /// Data type does not match, length of service parameter too high.
+    LengthTooHigh = 0x0607_0012,
+    /// Data type does not match, length of service parameter too low.
+    LengthTooLow = 0x0607_0013,
+    /// Sub-index does not exist.
+    NoSubindex = 0x0609_0011,
+    /// Invalid value for parameter.
+    Value = 0x0609_0030,
+    /// Data cannot be transferred or stored to the application.
+    CannotStore = 0x0800_0020,
+    /// Data cannot be transferred or stored to the application because of the present device state.
+    DeviceState = 0x0800_0022,
+    /// No data available.
+    NoData = 0x0800_0024,
+}
+
+impl From<Missing> for AbortCode {
+    fn from(missing: Missing) -> Self {
+        match missing {
+            Missing::Index => Self::NoObject,
+            Missing::Subindex => Self::NoSubindex,
+        }
+    }
+}
+
+/// The values of all entries, each as the bits that an SDO would carry, in the order of [`OBJECTS`].
+#[derive(Clone, Debug)]
+pub struct Dictionary {
+    values: [u32; OBJECTS.len()],
+    saved: [u32; OBJECTS.len()],
+}
+
+impl Dictionary {
+    /// The dictionary of a new drive with this node number.
+    pub fn new(node: u8) -> Self {
+        let values = OBJECTS.map(|object| {
+            mask(object.data_type, object.default + if object.adds_node { node.into() } else { 0 })
+        });
+        Self { values, saved: values }
+    }
+
+    /// Sets what a drive of this build has from the factory, so that it is there after every start.
+    pub fn set_factory(&mut self, at: usize, value: u32) {
+        self.set(at, value);
+        self.saved[at] = self.values[at];
+    }
+
+    /// What "save" does: keeps every parameter.
+    pub fn save(&mut self) {
+        for ((object, saved), value) in OBJECTS.iter().zip(&mut self.saved).zip(&self.values) {
+            if object.is_saved {
+                *saved = *value;
+            }
+        }
+    }
+
+    /// What a start does: every entry whose index is in `indices` gets back what was saved or its default.
+    pub fn restore(&mut self, indices: std::ops::RangeInclusive<u16>) {
+        for ((object, value), saved) in OBJECTS.iter().zip(&mut self.values).zip(&self.saved) {
+            if indices.contains(&object.index) {
+                *value = *saved;
+            }
+        }
+    }
+
+    /// Where an entry stands, for a reader.
+    pub fn for_reading(index: u16, subindex: u8) -> Result<usize, AbortCode> {
+        let at = find(index, subindex)?;
+        if OBJECTS[at].access == Access::WriteOnly { Err(AbortCode::WriteOnly) } else { Ok(at) }
+    }
+
+    /// Where an entry stands, for a writer.
+    pub fn for_writing(index: u16, subindex: u8) -> Result<usize, AbortCode> {
+        let at = find(index, subindex)?;
+        if OBJECTS[at].access == Access::ReadOnly { Err(AbortCode::ReadOnly) } else { Ok(at) }
+    }
+
+    /// The bits of an entry.
+    pub fn get(&self, at: usize) -> u32 {
+        self.values[at]
+    }
+
+    /// The value of a signed entry.
+    pub fn signed(&self, at: usize) -> i32 {
+        let value = self.values[at];
+        match OBJECTS[at].data_type {
+            DataType::I8 => i32::from(value as u8 as i8),
+            DataType::I16 => i32::from(value as u16 as i16),
+            _ => value as i32,
+        }
+    }
+
+    /// The value of an unsigned entry, as a real number.
+    pub fn real(&self, at: usize) -> f64 {
+        f64::from(self.values[at])
+    }
+
+    /// The value of a signed entry, as a real number.
+    pub fn signed_real(&self, at: usize) -> f64 {
+        f64::from(self.signed(at))
+    }
+
+    /// Sets an entry; bits beyond its type are cut off.
+    pub fn set(&mut self, at: usize, value: u32) {
+        self.values[at] = mask(OBJECTS[at].data_type, value);
+    }
+
+    /// Sets a signed entry to the nearest value that it can hold.
+    pub fn set_real(&mut self, at: usize, value: f64) {
+        let nearest = value.round_ties_even();
+        let value = match OBJECTS[at].data_type {
+            DataType::I8 => (nearest as i8).into(),
+            DataType::I16 => (nearest as i16).into(),
+            _ => nearest as i32,
+        };
+        self.set(at, value as u32);
+    }
+}
+
+fn mask(data_type: DataType, value: u32) -> u32 {
+    match data_type.bytes() {
+        1 => value & 0xFF,
+        2 => value & 0xFFFF,
+        _ => value,
+    }
+}
+
+/// Places of the entries that the drive itself works with, by what they mean.
+pub mod at {
+    use super::place;
+
+    macro_rules! places {
+        ($($(#[$meta:meta])* $name:ident = $index:literal : $subindex:literal;)*) => {
+            $($(#[$meta])* #[doc = concat!("Object ", stringify!($index), ":", stringify!($subindex))]
+            pub const $name: usize = place($index, $subindex);)*
+        };
+    }
+
+    places! {
+        ERROR_REGISTER = 0x1001:0;
+        ERROR_HISTORY = 0x1003:0;
+        SYNC_ID = 0x1005:0;
+        CYCLE_PERIOD = 0x1006:0;
+        GUARD_TIME = 0x100C:0;
+        LIFE_TIME_FACTOR = 0x100D:0;
+        CONSUMER_HEARTBEAT = 0x1016:1;
+        PRODUCER_HEARTBEAT = 0x1017:0;
+        ERROR_BEHAVIOUR = 0x1029:1;
+        MOTOR_ENCODER = 0x2240:0;
+        ENCODER_DIFFERENCE = 0x2241:0;
+        BATTERY_RESET = 0x2242:0;
+        TEMPERATURE = 0x22A2:0;
+        TORQUE_ESTIMATE = 0x3B69:0;
+        ERROR_CODE = 0x603F:0;
+        CONTROLWORD = 0x6040:0;
+        STATUSWORD = 0x6041:0;
+        SHUTDOWN_OPTION = 0x605B:0;
+        FAULT_REACTION_OPTION = 0x605E:0;
+        OPERATION_MODE = 0x6060:0;
+        OPERATION_MODE_DISPLAY = 0x6061:0;
+        POSITION_DEMAND = 0x6062:0;
+        POSITION = 0x6064:0;
+        FOLLOWING_ERROR_WINDOW = 0x6065:0;
+        POSITION_WINDOW = 0x6067:0;
+        POSITION_WINDOW_TIME = 0x6068:0;
+        VELOCITY_DEMAND = 0x606B:0;
+        VELOCITY = 0x606C:0;
+        VELOCITY_WINDOW = 0x606D:0;
+        VELOCITY_WINDOW_TIME = 0x606E:0;
+        TARGET_TORQUE = 0x6071:0;
+        TORQUE_DEMAND = 0x6074:0;
+        RATED_CURRENT = 0x6075:0;
+        RATED_TORQUE = 0x6076:0;
+        TORQUE = 0x6077:0;
+        CURRENT = 0x6078:0;
+        TARGET_POSITION = 0x607A:0;
+        POSITION_MIN = 0x607D:1;
+        POSITION_MAX = 0x607D:2;
+        MAX_PROFILE_VELOCITY = 0x607F:0;
+        PROFILE_VELOCITY = 0x6081:0;
+        PROFILE_ACCELERATION = 0x6083:0;
+        PROFILE_DECELERATION = 0x6084:0;
+        QUICK_STOP_DECELERATION = 0x6085:0;
+        TORQUE_SLOPE = 0x6087:0;
+        POSITION_OFFSET = 0x60B0:0;
+        VELOCITY_OFFSET = 0x60B1:0;
+        TORQUE_OFFSET = 0x60B2:0;
+        INTERPOLATION_PERIOD = 0x60C2:1;
+        INTERPOLATION_EXPONENT = 0x60C2:2;
+        MAX_ACCELERATION = 0x60C5:0;
+        MAX_DECELERATION = 0x60C6:0;
+        FOLLOWING_ERROR = 0x60F4:0;
+        TARGET_VELOCITY = 0x60FF:0;
+        SUPPORTED_MODES = 0x6502:0;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn defaults_with_the_node_number_carry_it() {
+        let dictionary = Dictionary::new(5);
+        assert_eq!(dictionary.get(place(0x1400, 1)), 0x205);
+        assert_eq!(dictionary.get(place(0x1801, 1)), 0x8000_0285);
+        assert_eq!(dictionary.get(place(0x1014, 0)), 0x85);
+    }
+
+    #[test]
+    fn saved_parameters_come_back_and_set_points_do_not() {
+        let mut dictionary = Dictionary::new(5);
+        dictionary.set(at::PROFILE_VELOCITY, 77);
+        dictionary.set(at::TARGET_POSITION, 88);
+        dictionary.save();
+        dictionary.set(at::PROFILE_VELOCITY, 1);
+        dictionary.restore(0..=0xFFFF);
+        assert_eq!((dictionary.get(at::PROFILE_VELOCITY), dictionary.get(at::TARGET_POSITION)), (77, 0));
+    }
+
+    #[test]
+    fn signed_values_keep_their_sign_and_saturate() {
+        let mut dictionary = Dictionary::new(5);
+        dictionary.set_real(at::TORQUE, -5.0);
+        assert_eq!((dictionary.get(at::TORQUE), dictionary.signed(at::TORQUE)), (0xFFFB, -5));
+        dictionary.set_real(at::TORQUE, 1e9);
+        assert_eq!(dictionary.signed(at::TORQUE), 32_767);
+        dictionary.set_real(at::POSITION, -1e12);
+        assert_eq!(dictionary.signed(at::POSITION), i32::MIN);
+    }
+}

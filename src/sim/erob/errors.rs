@@ -1,0 +1,118 @@
+//! Errors of the drive: emergency messages, the error register and the error history (CiA 301, 7.2.7, 7.5.2.2,
+//! 7.5.2.4).
+
+use super::dictionary::{Dictionary, at};
+use crate::sim::drive::DriveFault;
+
+/// Emergency messages that can wait to be sent.
+const PENDING: usize = 8;
+/// Entries of the error history 1003.
+const HISTORY: usize = 4;
+
+/// What can be wrong, from outside or from within.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Error {
+    /// Something broke.
+    Fault(DriveFault),
+    /// The heartbeat or the guarding of the master has stayed away.
+    MasterLost,
+    /// A PDO was shorter than its mapping.
+    PdoLength,
+    /// The position has left the following-error window.
+    PositionLost,
+}
+
+impl Error {
+    /// The emergency error code.
+    pub const fn code(self) -> u16 {
+        match self {
+            Self::Fault(DriveFault::OverCurrent) => 0x2310,
+            Self::Fault(DriveFault::OverVoltage) => 0x3210,
+            Self::Fault(DriveFault::UnderVoltage) => 0x3220,
+            Self::Fault(DriveFault::OverTemperature) => 0x4310,
+            Self::Fault(DriveFault::Encoder) => 0x7305,
+            Self::Fault(DriveFault::MultiTurnBattery) => 0x730F,
+            Self::MasterLost => 0x8130,
+            Self::PdoLength => 0x8210,
+            Self::PositionLost => 0x8611,
+        }
+    }
+
+    /// The bits of the error register, the generic one included.
+    const fn register(self) -> u32 {
+        1 | match self.code() >> 12 {
+            2 => 1 << 1,
+            3 => 1 << 2,
+            4 => 1 << 3,
+            8 if self.code() < 0x8300 => 1 << 4,
+            _ => 1 << 5,
+        }
+    }
+
+    /// Whether power must be cut at once, because no controlled deceleration is possible any more.
+    pub const fn cuts_power(self) -> bool {
+        !matches!(
+            self,
+            Self::Fault(DriveFault::OverTemperature)
+                | Self::MasterLost
+                | Self::PdoLength
+                | Self::PositionLost
+        )
+    }
+}
+
+/// Emergency messages on their way.
+#[derive(Clone, Debug, Default)]
+pub struct Errors {
+    pending: [[u8; 8]; PENDING],
+    count: usize,
+}
+
+impl Errors {
+    /// Notes an error: register, history, and an emergency message.
+    pub fn raise(&mut self, error: Error, dictionary: &mut Dictionary) {
+        let register = dictionary.get(at::ERROR_REGISTER) | error.register();
+        dictionary.set(at::ERROR_REGISTER, register);
+        for at in (at::ERROR_HISTORY + 2..=at::ERROR_HISTORY + HISTORY).rev() {
+            dictionary.set(at, dictionary.get(at - 1));
+        }
+        dictionary.set(at::ERROR_HISTORY + 1, error.code().into());
+        let count = dictionary.get(at::ERROR_HISTORY) + 1;
+        dictionary.set(at::ERROR_HISTORY, count.min(HISTORY as u32));
+        self.queue(error.code(), register);
+    }
+
+    /// Notes that no error is left.
+    pub fn clear(&mut self, dictionary: &mut Dictionary) {
+        if dictionary.get(at::ERROR_REGISTER) != 0 {
+            dictionary.set(at::ERROR_REGISTER, 0);
+            self.queue(0, 0);
+        }
+    }
+
+    /// Whether an emergency message waits.
+    pub fn is_pending(&self) -> bool {
+        self.count > 0
+    }
+
+    /// The oldest emergency message that waits.
+    pub fn next(&mut self) -> Option<[u8; 8]> {
+        let first = *self.pending.first().filter(|_| self.count > 0)?;
+        self.pending.rotate_left(1);
+        self.count -= 1;
+        Some(first)
+    }
+
+    /// Forgets what waits.
+    pub fn reset(&mut self) {
+        self.count = 0;
+    }
+
+    fn queue(&mut self, code: u16, register: u32) {
+        let [low, high] = code.to_le_bytes();
+        if let Some(free) = self.pending.get_mut(self.count) {
+            *free = [low, high, register as u8, 0, 0, 0, 0, 0];
+            self.count += 1;
+        }
+    }
+}

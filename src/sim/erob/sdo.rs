@@ -1,0 +1,221 @@
+//! The SDO server: one transfer at a time, expedited or segmented (CiA 301, 7.2.4). Block transfer is refused.
+//!
+//! The server holds the state of a transfer and speaks its frames; what an object's value is and whether it may be
+//! written is asked of the [`Access`] that is handed in with each request.
+
+use takt_rt::time::Nanoseconds;
+
+use super::dictionary::AbortCode;
+use crate::sim::random::Random;
+
+/// Shortest and longest time from a request to its answer (field notes, section 1).
+const LATENCY_NS: std::ops::Range<Nanoseconds> = 300_000..1_000_000;
+
+/// The objects behind the server.
+pub trait Access {
+    /// The value of an entry, as its bytes with the low one first, and how many they are.
+    fn read(&mut self, index: u16, subindex: u8) -> Result<([u8; 4], usize), AbortCode>;
+
+    /// Checks that an entry can be written, before its value is there. Returns its size in bytes.
+    fn check_write(&self, index: u16, subindex: u8) -> Result<usize, AbortCode>;
+
+    /// Writes an entry, all of whose bytes are there.
+    fn write(&mut self, index: u16, subindex: u8, value: [u8; 4]) -> Result<(), AbortCode>;
+}
+
+/// A transfer in segments.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Transfer {
+    Download {
+        index: u16,
+        subindex: u8,
+        size: usize,
+        received: usize,
+        value: [u8; 4],
+        toggle: bool,
+    },
+    /// Every value fits one segment, so its toggle bit is always 0.
+    Upload {
+        index: u16,
+        subindex: u8,
+        size: usize,
+        value: [u8; 4],
+    },
+}
+
+/// An answer that waits for its time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Answer {
+    due_ns: Nanoseconds,
+    bytes: [u8; 8],
+}
+
+/// The server of one node.
+#[derive(Clone, Debug)]
+pub struct SdoServer {
+    transfer: Option<Transfer>,
+    answer: Option<Answer>,
+    latency: Random,
+    is_upload_segmented: bool,
+}
+
+impl SdoServer {
+    /// A server at rest. `is_upload_segmented` lets it answer every upload in segments, as CiA 301 permits, although
+    /// no object of this drive is longer than four bytes.
+    pub fn new(latency: Random, is_upload_segmented: bool) -> Self {
+        Self { transfer: None, answer: None, latency, is_upload_segmented }
+    }
+
+    /// Forgets everything.
+    pub fn reset(&mut self) {
+        self.transfer = None;
+        self.answer = None;
+    }
+
+    /// When the pending answer is due.
+    pub fn due_ns(&self) -> Option<Nanoseconds> {
+        self.answer.map(|answer| answer.due_ns)
+    }
+
+    /// The answer, when it is due.
+    pub fn answer(&mut self, now_ns: Nanoseconds) -> Option<[u8; 8]> {
+        let answer = self.answer.filter(|answer| answer.due_ns <= now_ns)?;
+        self.answer = None;
+        Some(answer.bytes)
+    }
+
+    /// Takes a request. One that comes before the last one was answered is lost, as the drive has one buffer.
+    pub fn request(&mut self, now_ns: Nanoseconds, request: [u8; 8], access: &mut impl Access) {
+        if self.answer.is_some() {
+            return;
+        }
+        let index = u16::from_le_bytes([request[1], request[2]]);
+        let subindex = request[3];
+        let reply = match request[0] >> 5 {
+            0 => self.download_segment(request, access),
+            1 => self.download(request, index, subindex, access),
+            2 => self.upload(index, subindex, access),
+            3 => self.upload_segment(request),
+            4 => {
+                self.transfer = None;
+                return;
+            }
+            _ => Err(AbortCode::Command),
+        };
+        let bytes = reply.unwrap_or_else(|code| {
+            let (index, subindex) = self.transfer.take().map_or((index, subindex), Transfer::multiplexer);
+            aborted(index, subindex, code)
+        });
+        self.answer = Some(Answer { due_ns: now_ns + self.latency.within(LATENCY_NS), bytes });
+    }
+
+    fn download(
+        &mut self,
+        request: [u8; 8],
+        index: u16,
+        subindex: u8,
+        access: &mut impl Access,
+    ) -> Result<[u8; 8], AbortCode> {
+        self.transfer = None;
+        let size = access.check_write(index, subindex)?;
+        let is_expedited = request[0] & 0b10 != 0;
+        let is_size_indicated = request[0] & 0b01 != 0;
+        let data = [request[4], request[5], request[6], request[7]];
+        let announced = match (is_expedited, is_size_indicated) {
+            (true, true) => Some(4 - usize::from(request[0] >> 2 & 0b11)),
+            (false, true) => Some(u32::from_le_bytes(data) as usize),
+            (_, false) => None,
+        };
+        match announced {
+            Some(announced) if announced > size => return Err(AbortCode::LengthTooHigh),
+            Some(announced) if announced < size => return Err(AbortCode::LengthTooLow),
+            _ => {}
+        }
+        if is_expedited {
+            access.write(index, subindex, data)?;
+        } else {
+            let transfer =
+                Transfer::Download { index, subindex, size, received: 0, value: [0; 4], toggle: false };
+            self.transfer = Some(transfer);
+        }
+        Ok(addressed(0x60, index, subindex, [0; 4]))
+    }
+
+    fn download_segment(&mut self, request: [u8; 8], access: &mut impl Access) -> Result<[u8; 8], AbortCode> {
+        let Some(Transfer::Download { index, subindex, size, received, mut value, toggle }) = self.transfer
+        else {
+            return Err(AbortCode::Command);
+        };
+        if (request[0] & 0x10 != 0) != toggle {
+            return Err(AbortCode::Toggle);
+        }
+        let length = 7 - usize::from(request[0] >> 1 & 0b111);
+        let ended = received + length;
+        if ended > size {
+            return Err(AbortCode::LengthTooHigh);
+        }
+        for (to, from) in value.iter_mut().skip(received).zip(request.iter().skip(1).take(length)) {
+            *to = *from;
+        }
+        let is_last = request[0] & 1 != 0;
+        if is_last {
+            if ended < size {
+                return Err(AbortCode::LengthTooLow);
+            }
+            access.write(index, subindex, value)?;
+            self.transfer = None;
+        } else {
+            let toggle = !toggle;
+            self.transfer =
+                Some(Transfer::Download { index, subindex, size, received: ended, value, toggle });
+        }
+        Ok([0x20 | u8::from(toggle) << 4, 0, 0, 0, 0, 0, 0, 0])
+    }
+
+    fn upload(&mut self, index: u16, subindex: u8, access: &mut impl Access) -> Result<[u8; 8], AbortCode> {
+        self.transfer = None;
+        let (value, size) = access.read(index, subindex)?;
+        if self.is_upload_segmented {
+            self.transfer = Some(Transfer::Upload { index, subindex, size, value });
+            return Ok(addressed(0x41, index, subindex, (size as u32).to_le_bytes()));
+        }
+        let unused = 4 - size.min(4) as u8;
+        Ok(addressed(0x43 | unused << 2, index, subindex, value))
+    }
+
+    fn upload_segment(&mut self, request: [u8; 8]) -> Result<[u8; 8], AbortCode> {
+        let Some(Transfer::Upload { size, value, .. }) = self.transfer else {
+            return Err(AbortCode::Command);
+        };
+        if request[0] & 0x10 != 0 {
+            return Err(AbortCode::Toggle);
+        }
+        let mut answer = [0; 8];
+        answer[0] = (7 - size.min(7) as u8) << 1 | 1;
+        for (to, from) in answer.iter_mut().skip(1).zip(value.iter().take(size)) {
+            *to = *from;
+        }
+        self.transfer = None;
+        Ok(answer)
+    }
+}
+
+impl Transfer {
+    fn multiplexer(self) -> (u16, u8) {
+        match self {
+            Self::Download { index, subindex, .. } | Self::Upload { index, subindex, .. } => {
+                (index, subindex)
+            }
+        }
+    }
+}
+
+fn addressed(command: u8, index: u16, subindex: u8, data: [u8; 4]) -> [u8; 8] {
+    let [low, high] = index.to_le_bytes();
+    let [a, b, c, d] = data;
+    [command, low, high, subindex, a, b, c, d]
+}
+
+fn aborted(index: u16, subindex: u8, code: AbortCode) -> [u8; 8] {
+    addressed(0x80, index, subindex, (code as u32).to_le_bytes())
+}

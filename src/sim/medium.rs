@@ -1,0 +1,204 @@
+//! One CAN bus: who may send next, for how long the wire is taken, and when a frame has arrived.
+//!
+//! Whenever the wire is free, every station with a frame waiting takes part in the arbitration; the strongest
+//! identifier wins and the others wait for the end of it. There are no bit errors, and every frame is
+//! acknowledged (there is always another receiver). Two stations that send the same identifier at once would
+//! destroy each other's frames on a real bus; here the one with the lower number goes first.
+
+use takt_rt::frame::Frame;
+use takt_rt::time::Nanoseconds;
+
+use super::mailbox::{Mailbox, Order, priority};
+use super::wire::{INTERMISSION_BITS, WireLength, bits_ns};
+
+/// The bit rates of a bus in bit/s.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct BitRates {
+    /// Of classic frames and of the arbitration phase.
+    pub nominal: u32,
+    /// Of the data phase of CAN FD frames with bit-rate switching.
+    pub data: Option<u32>,
+}
+
+impl BitRates {
+    /// How long a frame occupies the wire, intermission included.
+    pub fn duration_ns(self, frame: &Frame) -> Nanoseconds {
+        WireLength::of(frame).duration_ns(self.nominal, self.data)
+    }
+}
+
+/// A frame on the wire.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Transmission {
+    /// The frame.
+    pub frame: Frame,
+    /// Who sends it, by the number of its mailbox.
+    pub sender: usize,
+    /// When it has arrived: the end of its last bit before the intermission.
+    pub arrives_ns: Nanoseconds,
+    /// When the wire is free for the next one.
+    pub free_ns: Nanoseconds,
+}
+
+/// The wire and the mailboxes of the stations on it.
+#[derive(Debug)]
+pub struct Medium {
+    rates: BitRates,
+    mailboxes: Vec<Mailbox>,
+    is_connected: Vec<bool>,
+    on_wire: Option<Transmission>,
+    free_ns: Nanoseconds,
+    busy_ns: Nanoseconds,
+}
+
+impl Medium {
+    /// A free bus with one station for each mailbox.
+    pub fn new(rates: BitRates, mailboxes: Vec<Mailbox>) -> Self {
+        let is_connected = vec![true; mailboxes.len()];
+        Self { rates, mailboxes, is_connected, on_wire: None, free_ns: 0, busy_ns: 0 }
+    }
+
+    /// The usual bus: station 0 is the master with a queue like a network interface's, and so many drives with a
+    /// buffer for each message follow.
+    pub fn with_master(rates: BitRates, master_frames: usize, drives: usize, drive_frames: usize) -> Self {
+        let master = Mailbox::new(Order::FirstInFirstOut, master_frames);
+        let drives = (0..drives).map(|_| Mailbox::new(Order::Priority, drive_frames));
+        Self::new(rates, std::iter::once(master).chain(drives).collect())
+    }
+
+    /// The mailbox of a station, which must exist.
+    pub fn mailbox(&self, station: usize) -> &Mailbox {
+        &self.mailboxes[station]
+    }
+
+    /// The mailbox of a station, which must exist.
+    pub fn mailbox_mut(&mut self, station: usize) -> &mut Mailbox {
+        &mut self.mailboxes[station]
+    }
+
+    /// Cuts a station off or connects it again. What it had begun to send still arrives.
+    pub fn disconnect(&mut self, station: usize, is_cut_off: bool) {
+        self.is_connected[station] = !is_cut_off;
+    }
+
+    /// Whether a station hears and is heard.
+    pub fn is_connected(&self, station: usize) -> bool {
+        self.is_connected[station]
+    }
+
+    /// The frame on the wire.
+    pub fn on_wire(&self) -> Option<&Transmission> {
+        self.on_wire.as_ref()
+    }
+
+    /// For how long the wire has been occupied.
+    pub fn busy_ns(&self) -> Nanoseconds {
+        self.busy_ns
+    }
+
+    /// When the next thing happens here: the frame on the wire arrives, or a waiting one can start. `None` when
+    /// nothing waits.
+    pub fn next_ns(&self, now_ns: Nanoseconds) -> Option<Nanoseconds> {
+        match &self.on_wire {
+            Some(transmission) => Some(transmission.arrives_ns),
+            None => self.offers().next().map(|_| self.free_ns.max(now_ns)),
+        }
+    }
+
+    /// Does what is due at `now_ns`: returns the frame that has just arrived, or else holds an arbitration when
+    /// the wire is free.
+    pub fn step(&mut self, now_ns: Nanoseconds) -> Option<Transmission> {
+        if let Some(transmission) = self.on_wire {
+            if transmission.arrives_ns > now_ns {
+                return None;
+            }
+            self.on_wire = None;
+            return Some(transmission);
+        }
+        if self.free_ns <= now_ns {
+            self.arbitrate(now_ns);
+        }
+        None
+    }
+
+    /// What the connected stations have to send.
+    fn offers(&self) -> impl Iterator<Item = (usize, &Frame)> {
+        let stations = self.mailboxes.iter().zip(&self.is_connected).enumerate();
+        stations
+            .filter(|(_, (_, is_connected))| **is_connected)
+            .filter_map(|(station, (mailbox, _))| mailbox.head().map(|frame| (station, frame)))
+    }
+
+    fn arbitrate(&mut self, now_ns: Nanoseconds) {
+        let Some((_, sender)) = self.offers().map(|(station, frame)| (priority(frame), station)).min() else {
+            return;
+        };
+        let Some(frame) = self.mailboxes[sender].pop() else { return };
+        let duration_ns = self.rates.duration_ns(&frame);
+        self.busy_ns += duration_ns;
+        self.free_ns = now_ns + duration_ns;
+        let arrives_ns = self.free_ns - bits_ns(INTERMISSION_BITS, self.rates.nominal).min(duration_ns);
+        self.on_wire = Some(Transmission { frame, sender, arrives_ns, free_ns: self.free_ns });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use takt_rt::frame::Id;
+
+    const RATES: BitRates = BitRates { nominal: 1_000_000, data: None };
+
+    fn frame(id: u32) -> Frame {
+        Frame::of(Id::base(id).unwrap(), [0x55; 8])
+    }
+
+    /// Runs the bus until nothing waits and returns what arrived: when, from whom, which identifier.
+    fn run(medium: &mut Medium) -> Vec<(Nanoseconds, usize, u32)> {
+        let mut arrived = vec![];
+        let mut now_ns = 0;
+        while let Some(next_ns) = medium.next_ns(now_ns) {
+            now_ns = next_ns;
+            if let Some(transmission) = medium.step(now_ns) {
+                arrived.push((now_ns, transmission.sender, transmission.frame.id().value()));
+            }
+        }
+        arrived
+    }
+
+    #[test]
+    fn the_strongest_identifier_of_all_stations_goes_first() {
+        let mut medium = Medium::with_master(RATES, 8, 2, 8);
+        for (station, id) in [(1, 0x581), (1, 0x181), (2, 0x182), (0, 0x201), (0, 0x080)] {
+            assert!(medium.mailbox_mut(station).push(frame(id)));
+        }
+        let order: Vec<_> = run(&mut medium).into_iter().map(|(_, station, id)| (station, id)).collect();
+        // The master's queue offers 0x201 until it is gone, although 0x080 behind it is stronger than everything.
+        assert_eq!(order, [(1, 0x181), (2, 0x182), (0, 0x201), (0, 0x080), (1, 0x581)]);
+    }
+
+    #[test]
+    fn frames_follow_each_other_without_a_gap_and_arrive_before_the_intermission() {
+        let mut medium = Medium::with_master(RATES, 8, 0, 8);
+        for id in [0x201, 0x202, 0x203] {
+            medium.mailbox_mut(0).push(frame(id));
+        }
+        let mut start_ns = 0;
+        for (arrived_ns, _, id) in run(&mut medium) {
+            let duration_ns = RATES.duration_ns(&frame(id));
+            assert_eq!(arrived_ns, start_ns + duration_ns - 3_000);
+            start_ns += duration_ns;
+        }
+        assert_eq!(medium.busy_ns(), start_ns);
+    }
+
+    #[test]
+    fn a_frame_that_comes_late_does_not_interrupt_the_one_on_the_wire() {
+        let mut medium = Medium::with_master(RATES, 8, 1, 8);
+        medium.mailbox_mut(1).push(frame(0x701));
+        medium.step(0);
+        medium.mailbox_mut(0).push(frame(0x080));
+        let order: Vec<_> = run(&mut medium).into_iter().map(|(_, _, id)| id).collect();
+        assert_eq!(order, [0x701, 0x080]);
+    }
+}

@@ -1,0 +1,189 @@
+//! The mechanics of one joint: inertia, friction, brake, and the encoder on it. SI units; for a linear axis read
+//! metres and newtons.
+
+/// A joint as it is built. All values are at the output side.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JointParameters {
+    /// Rotor and load: kg·m² (kg).
+    pub inertia: f64,
+    /// N·m·s/rad (N·s/m).
+    pub viscous_friction: f64,
+    /// N·m (N), the same at rest and in motion.
+    pub coulomb_friction: f64,
+    /// What the engaged brake holds or, in motion, takes: N·m (N).
+    pub brake_torque: f64,
+}
+
+/// The mechanical state of a joint.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Joint {
+    parameters: JointParameters,
+    position: f64,
+    velocity: f64,
+    /// Torque from outside: gravity, contact.
+    load_torque: f64,
+}
+
+impl Joint {
+    /// A joint at rest.
+    pub fn new(parameters: JointParameters, position: f64) -> Self {
+        Self { parameters, position, velocity: 0.0, load_torque: 0.0 }
+    }
+
+    /// Position in rad (m).
+    pub fn position(&self) -> f64 {
+        self.position
+    }
+
+    /// Velocity in rad/s (m/s).
+    pub fn velocity(&self) -> f64 {
+        self.velocity
+    }
+
+    /// Sets the torque from outside (N·m, N), which lasts until it is set again.
+    pub fn set_load_torque(&mut self, torque: f64) {
+        self.load_torque = torque;
+    }
+
+    /// Moves on by `duration_s` under a constant motor torque.
+    ///
+    /// Friction is taken exactly: where the velocity would change its sign within the step, the step is cut at
+    /// the standstill, and the joint stays there as long as the friction can hold it. So it neither creeps nor
+    /// chatters at rest. Viscous friction is taken implicitly, which is stable for any coefficient.
+    pub fn step(&mut self, duration_s: f64, motor_torque: f64, is_braked: bool) {
+        let brake = if is_braked { self.parameters.brake_torque } else { 0.0 };
+        let friction = self.parameters.coulomb_friction + brake;
+        let torque = motor_torque + self.load_torque;
+        let mut left_s = duration_s;
+        if self.velocity != 0.0 {
+            let ended = self.accelerated(torque - friction.copysign(self.velocity), left_s);
+            if ended * self.velocity > 0.0 {
+                self.travel(ended, left_s);
+                return;
+            }
+            let stopping_s = left_s * self.velocity / (self.velocity - ended);
+            self.travel(0.0, stopping_s);
+            left_s -= stopping_s;
+        }
+        if torque.abs() > friction {
+            let ended = self.accelerated(torque - friction.copysign(torque), left_s);
+            self.travel(ended, left_s);
+        }
+    }
+
+    /// The velocity after `duration_s` under a constant torque and viscous friction.
+    fn accelerated(&self, torque: f64, duration_s: f64) -> f64 {
+        let JointParameters { inertia, viscous_friction, .. } = self.parameters;
+        (inertia * self.velocity + torque * duration_s) / (inertia + viscous_friction * duration_s)
+    }
+
+    fn travel(&mut self, ended: f64, duration_s: f64) {
+        self.position += 0.5 * (self.velocity + ended) * duration_s;
+        self.velocity = ended;
+    }
+}
+
+/// The encoder that a drive reports its position from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Encoder {
+    /// Counts per rad (m); negative where positive counts are negative travel.
+    pub counts_per_unit: f64,
+    /// The count at which the joint's position is zero.
+    pub zero_counts: f64,
+}
+
+impl Encoder {
+    /// The count that shows at a position, in the 32 bits of the position objects, which wrap.
+    pub fn counts(&self, position: f64) -> i32 {
+        ((position * self.counts_per_unit + self.zero_counts).round_ties_even() as i64) as i32
+    }
+
+    /// Counts per second at a velocity.
+    pub fn counts_per_second(&self, velocity: f64) -> f64 {
+        velocity * self.counts_per_unit
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const PARAMETERS: JointParameters =
+        JointParameters { inertia: 0.3, viscous_friction: 2.0, coulomb_friction: 4.0, brake_torque: 60.0 };
+    const STEP_S: f64 = 125e-6;
+
+    #[test]
+    fn a_torque_below_the_friction_moves_nothing_at_all() {
+        let mut joint = Joint::new(PARAMETERS, 0.5);
+        for _ in 0..10_000 {
+            joint.step(STEP_S, 3.999, false);
+        }
+        assert_eq!((joint.position(), joint.velocity()), (0.5, 0.0));
+    }
+
+    #[test]
+    fn a_constant_torque_leads_to_the_velocity_at_which_friction_balances_it() {
+        let mut joint = Joint::new(PARAMETERS, 0.0);
+        for _ in 0..80_000 {
+            joint.step(STEP_S, 10.0, false);
+        }
+        assert!((joint.velocity() - 3.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_coasting_joint_stops_and_stays_without_chatter() {
+        let mut joint = Joint::new(PARAMETERS, 0.0);
+        while joint.velocity() < 2.0 {
+            joint.step(STEP_S, 50.0, false);
+        }
+        for _ in 0..8_000 {
+            joint.step(STEP_S, 0.0, false);
+        }
+        let rest = joint.position();
+        joint.step(STEP_S, 0.0, false);
+        assert_eq!((joint.position(), joint.velocity()), (rest, 0.0));
+    }
+
+    #[test]
+    fn the_brake_holds_what_the_friction_cannot() {
+        let mut joint = Joint::new(PARAMETERS, 0.0);
+        joint.set_load_torque(50.0);
+        joint.step(STEP_S, 0.0, true);
+        assert_eq!(joint.velocity(), 0.0);
+        joint.step(STEP_S, 0.0, false);
+        assert!(joint.velocity() > 0.0);
+    }
+
+    #[test]
+    fn a_reversal_passes_through_standstill_within_one_step() {
+        let mut joint = Joint::new(JointParameters { viscous_friction: 0.0, ..PARAMETERS }, 0.0);
+        joint.velocity = 0.001;
+        joint.step(0.001, -10.0, false);
+        // 14 N·m brake 0.001 rad/s in 21.4 µs, then 6 N·m accelerate for the rest.
+        let stopping_s = 0.3 * 0.001 / 14.0;
+        let expected = -6.0 / 0.3 * (0.001 - stopping_s);
+        assert!((joint.velocity() - expected).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_encoder_shows_the_nearest_count_and_wraps_at_32_bits() {
+        let encoder = Encoder { counts_per_unit: -100.0, zero_counts: 7.0 };
+        assert_eq!(encoder.counts(0.0249), 5);
+        assert_eq!(encoder.counts(-21_474_837.0), i32::MIN + 59);
+    }
+
+    proptest! {
+        #[test]
+        fn friction_alone_never_gains_speed(velocity in -10.0f64..10.0, step_s in 1e-9f64..1e-3) {
+            let mut joint = Joint::new(PARAMETERS, 0.0);
+            joint.velocity = velocity;
+            for _ in 0..100 {
+                let before = joint.velocity();
+                joint.step(step_s, 0.0, false);
+                prop_assert!(joint.velocity().abs() <= before.abs());
+                prop_assert!(joint.velocity() * before >= 0.0);
+            }
+        }
+    }
+}

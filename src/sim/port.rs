@@ -1,0 +1,219 @@
+//! A simulated bus as the real-time thread sees it: the drives, the wire between them, and the queues of the
+//! interface, behind [`BusPort`].
+//!
+//! The world inside has a time of its own that starts with the first call and is carried on by the present that
+//! every call names, in virtual time or on a wall clock alike. It runs on the caller's thread and takes no heap
+//! memory after its construction.
+
+use std::collections::VecDeque;
+
+use takt_rt::frame::Frame;
+use takt_rt::port::{BusHealth, BusPort, BusState, ReceiveBatch, Received};
+use takt_rt::time::Nanoseconds;
+
+use super::drive::{Drive, DriveFault, Observation};
+use super::erob::{ErobJoint, ErobParameters};
+use super::medium::{BitRates, Medium, Transmission};
+use crate::config::{Axis, Config, DriveFamily, Simulation};
+
+/// Frames the interface's transmit queue holds.
+const TRANSMIT_QUEUE: usize = 256;
+/// Frames the interface's receive queue holds.
+const RECEIVE_QUEUE: usize = 1024;
+/// Frames a drive's controller holds.
+const DRIVE_MAILBOX: usize = 16;
+/// The master's station on the bus; the drives follow.
+const MASTER: usize = 0;
+
+/// A bus with simulated drives.
+pub struct SimulatedBus {
+    medium: Medium,
+    drives: Vec<Box<dyn Drive>>,
+    received: VecDeque<Received>,
+    health: BusHealth,
+    longest_gap_ns: Nanoseconds,
+    /// The caller's present at the last call.
+    called_ns: Option<Nanoseconds>,
+    /// What the caller's clock is ahead of the world's: where it began, and all pauses.
+    offset_ns: Nanoseconds,
+    paused_ns: Nanoseconds,
+    now_ns: Nanoseconds,
+}
+
+/// The drive that stands in for an axis.
+fn simulated(axis: &Axis, simulation: &Simulation) -> Box<dyn Drive> {
+    match axis.drive {
+        DriveFamily::ErobCanopen => Box::new(ErobJoint::new(ErobParameters::of(axis, simulation))),
+    }
+}
+
+/// There is no drive with this node number on the bus.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("no simulated drive with node number {node} on this bus")]
+pub struct UnknownNode {
+    /// The number that was asked for.
+    pub node: u8,
+}
+
+impl SimulatedBus {
+    /// The bus with this index in the configuration, with a drive for every axis on it.
+    pub fn new(config: &Config, bus: usize) -> Self {
+        let rates = config.buses.get(bus).map_or(BitRates { nominal: 1_000_000, data: None }, |bus| {
+            BitRates { nominal: bus.bit_rate, data: bus.data_bit_rate }
+        });
+        let axes = config.axes.iter().filter(|axis| axis.bus == bus);
+        let drives = axes.map(|axis| simulated(axis, &config.simulation)).collect();
+        Self::with_drives(rates, config.simulation.longest_gap_ns, drives)
+    }
+
+    /// A bus with these drives, whose supply comes on at the first call. When a call names a present more than
+    /// `longest_gap_ns` after the one before, the world inside stands still for what is beyond.
+    pub fn with_drives(rates: BitRates, longest_gap_ns: Nanoseconds, drives: Vec<Box<dyn Drive>>) -> Self {
+        Self {
+            medium: Medium::with_master(rates, TRANSMIT_QUEUE, drives.len(), DRIVE_MAILBOX),
+            drives,
+            received: VecDeque::with_capacity(RECEIVE_QUEUE),
+            health: BusHealth { state: BusState::ErrorActive, ..BusHealth::default() },
+            longest_gap_ns,
+            called_ns: None,
+            offset_ns: 0,
+            paused_ns: 0,
+            now_ns: 0,
+        }
+    }
+
+    /// The node numbers of the drives on this bus.
+    pub fn nodes(&self) -> impl Iterator<Item = u8> + '_ {
+        self.drives.iter().map(|drive| drive.node())
+    }
+
+    /// The truth about a drive, as of the last call.
+    pub fn observe(&self, node: u8) -> Result<Observation, UnknownNode> {
+        self.station(node).map(|station| self.drives[station - 1].observe())
+    }
+
+    /// Breaks something in a drive.
+    pub fn inject(&mut self, node: u8, fault: DriveFault) -> Result<(), UnknownNode> {
+        let station = self.station(node)?;
+        self.drives[station - 1].inject(fault);
+        Ok(())
+    }
+
+    /// Cuts a drive off from the bus or connects it again. It lives on meanwhile.
+    pub fn silence(&mut self, node: u8, is_silent: bool) -> Result<(), UnknownNode> {
+        let station = self.station(node)?;
+        self.medium.disconnect(station, is_silent);
+        Ok(())
+    }
+
+    /// Cuts a drive's supply and restores it at once.
+    pub fn power_cycle(&mut self, node: u8) -> Result<(), UnknownNode> {
+        let station = self.station(node)?;
+        self.drives[station - 1].power_cycle(self.now_ns, self.medium.mailbox_mut(station));
+        Ok(())
+    }
+
+    /// Sets a torque from outside on a joint (N·m, N), until it is set again.
+    pub fn set_load_torque(&mut self, node: u8, torque: f64) -> Result<(), UnknownNode> {
+        let station = self.station(node)?;
+        self.drives[station - 1].set_load_torque(torque);
+        Ok(())
+    }
+
+    /// For how long the world has stood still because the caller was away, in total.
+    pub fn paused_ns(&self) -> Nanoseconds {
+        self.paused_ns
+    }
+
+    /// The number of the station of a drive; the drive itself is one before.
+    fn station(&self, node: u8) -> Result<usize, UnknownNode> {
+        let at = self.drives.iter().position(|drive| drive.node() == node);
+        at.map(|at| at + 1).ok_or(UnknownNode { node })
+    }
+
+    /// Carries the world on to the caller's present.
+    fn advance_to(&mut self, called_ns: Nanoseconds) {
+        let before_ns = *self.called_ns.get_or_insert_with(|| {
+            self.offset_ns = called_ns;
+            called_ns
+        });
+        let beyond_ns = called_ns.saturating_sub(before_ns).saturating_sub(self.longest_gap_ns);
+        self.offset_ns += beyond_ns;
+        self.paused_ns += beyond_ns;
+        self.called_ns = Some(called_ns.max(before_ns));
+        let until_ns = called_ns.saturating_sub(self.offset_ns);
+        while let Some(now_ns) = self.next_ns().filter(|next_ns| *next_ns <= until_ns) {
+            self.now_ns = now_ns;
+            self.step(now_ns);
+        }
+        self.now_ns = self.now_ns.max(until_ns);
+    }
+
+    /// When the next thing happens in the world.
+    fn next_ns(&self) -> Option<Nanoseconds> {
+        let wire = self.medium.next_ns(self.now_ns);
+        let drives = self.drives.iter().map(|drive| drive.wake_ns().max(self.now_ns));
+        drives.chain(wire).min()
+    }
+
+    /// Everything that happens at one instant: the drives first, so that what they have to send takes part in the
+    /// arbitration.
+    fn step(&mut self, now_ns: Nanoseconds) {
+        for (drive, station) in self.drives.iter_mut().zip(1..) {
+            if drive.wake_ns() <= now_ns {
+                drive.advance(now_ns, self.medium.mailbox_mut(station));
+            }
+        }
+        if let Some(transmission) = self.medium.step(now_ns) {
+            self.deliver(now_ns, &transmission);
+        }
+    }
+
+    fn deliver(&mut self, now_ns: Nanoseconds, transmission: &Transmission) {
+        let Transmission { frame, sender, .. } = transmission;
+        for (drive, station) in self.drives.iter_mut().zip(1..) {
+            if station != *sender && self.medium.is_connected(station) {
+                drive.receive(now_ns, frame, self.medium.mailbox_mut(station));
+            }
+        }
+        if *sender == MASTER {
+            self.health.tx_frames += 1;
+            return;
+        }
+        self.health.rx_frames += 1;
+        if self.received.len() < RECEIVE_QUEUE {
+            self.received.push_back(Received { frame: *frame, at_ns: now_ns + self.offset_ns });
+        } else {
+            self.health.rx_overruns += 1;
+        }
+    }
+}
+
+impl BusPort for SimulatedBus {
+    fn send(&mut self, now_ns: Nanoseconds, frames: &[Frame]) -> usize {
+        self.advance_to(now_ns);
+        let mailbox = self.medium.mailbox_mut(MASTER);
+        let taken = frames.iter().take_while(|frame| mailbox.push(**frame)).count();
+        self.health.tx_overruns += (frames.len() - taken) as u64;
+        taken
+    }
+
+    fn receive(&mut self, now_ns: Nanoseconds, batch: &mut ReceiveBatch) {
+        self.advance_to(now_ns);
+        while !batch.is_full()
+            && let Some(received) = self.received.pop_front()
+        {
+            batch.push(received);
+        }
+    }
+
+    fn unconfirmed(&mut self, now_ns: Nanoseconds) -> usize {
+        self.advance_to(now_ns);
+        let is_on_wire = self.medium.on_wire().is_some_and(|transmission| transmission.sender == MASTER);
+        self.medium.mailbox(MASTER).len() + usize::from(is_on_wire)
+    }
+
+    fn health(&mut self) -> BusHealth {
+        BusHealth { busy_ns: self.medium.busy_ns(), ..self.health }
+    }
+}
