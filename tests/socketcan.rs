@@ -6,7 +6,7 @@ use std::thread::sleep;
 use std::time::Duration;
 
 use takt::bus::{
-    BitRates, InterfaceError, SocketCanOptions, interface_status, open_socketcan, prepare_interface,
+    InterfaceError, InterfaceSettings, SocketCanOptions, interface_status, open_socketcan, prepare_interface,
 };
 use takt_rt::frame::{Frame, Id};
 use takt_rt::linux::{MonotonicClock, SocketCanPort};
@@ -24,11 +24,7 @@ impl VirtualCan {
     }
 
     fn port(&self, identifiers: &[Id]) -> SocketCanPort {
-        self.port_with(&SocketCanOptions {
-            identifiers: identifiers.to_vec(),
-            transmit_frames: 32,
-            receive_frames: 256,
-        })
+        self.port_with(&SocketCanOptions { identifiers: identifiers.to_vec(), ..SocketCanOptions::default() })
     }
 
     fn port_with(&self, options: &SocketCanOptions) -> SocketCanPort {
@@ -162,7 +158,7 @@ fn an_interface_that_is_removed_is_down_for_good() {
 #[test]
 fn received_frames_that_are_lost_are_counted() {
     let bus = VirtualCan::new("takt-flood");
-    let options = SocketCanOptions { identifiers: vec![], transmit_frames: 64, receive_frames: 16 };
+    let options = SocketCanOptions { receive_frames: 16, ..SocketCanOptions::default() };
     let (mut reader, mut sender) = (bus.port_with(&options), bus.port(&[]));
     const SENT: u64 = 500;
     for _ in 0..SENT {
@@ -181,7 +177,7 @@ fn received_frames_that_are_lost_are_counted() {
 #[test]
 fn lost_confirmations_hold_nothing_back() {
     let bus = VirtualCan::new("takt-lost");
-    let options = SocketCanOptions { identifiers: vec![], transmit_frames: 64, receive_frames: 16 };
+    let options = SocketCanOptions { receive_frames: 16, ..SocketCanOptions::default() };
     let mut port = bus.port_with(&options);
     for _ in 0..100 {
         assert_eq!(port.send(0, &[frame(5)]), 1);
@@ -217,7 +213,8 @@ fn arrivals_carry_the_kernels_time_on_the_monotonic_clock() {
     assert!(between > 25, "{between} of 50");
 }
 
-const RATES: BitRates = BitRates { bit_rate: 1_000_000, data_bit_rate: None, restart_ms: 100 };
+const SETTINGS: InterfaceSettings =
+    InterfaceSettings { bit_rate: 1_000_000, data_bit_rate: None, restart_ms: 100 };
 
 #[test]
 fn a_virtual_interface_is_brought_up_for_classic_and_for_fd_frames() {
@@ -225,10 +222,10 @@ fn a_virtual_interface_is_brought_up_for_classic_and_for_fd_frames() {
     run(&["ip", "link", "set", bus.0, "down"]);
     run(&["ip", "link", "set", bus.0, "mtu", "16"]);
     assert_eq!(interface_status(bus.0).unwrap().state, BusState::Down);
-    let status = prepare_interface(bus.0, &RATES).unwrap();
+    let status = prepare_interface(bus.0, &SETTINGS).unwrap();
     assert!(status.is_up && !status.has_fd && !status.has_controller);
     assert_eq!((status.timing, status.restart_ms), (None, None));
-    let flexible = BitRates { data_bit_rate: Some(4_000_000), ..RATES };
+    let flexible = InterfaceSettings { data_bit_rate: Some(4_000_000), ..SETTINGS };
     assert!(matches!(prepare_interface(bus.0, &flexible), Err(InterfaceError::NoFd { .. })));
     run(&["ip", "link", "set", bus.0, "down"]);
     assert!(prepare_interface(bus.0, &flexible).unwrap().has_fd);
@@ -245,13 +242,13 @@ impl Controllers {
             return None;
         }
         for name in ["can0", "can1"] {
-            prepare_interface(name, &RATES).unwrap();
+            prepare_interface(name, &SETTINGS).unwrap();
         }
         Some(Self)
     }
 
     fn port(&self, name: &str) -> SocketCanPort {
-        let options = SocketCanOptions { identifiers: vec![], transmit_frames: 16, receive_frames: 256 };
+        let options = SocketCanOptions { transmit_frames: 16, ..SocketCanOptions::default() };
         open_socketcan(name, &options).unwrap()
     }
 }
@@ -276,7 +273,7 @@ fn controllers_are_configured_and_another_bit_rate_is_refused_while_they_run() {
         assert_eq!(status.restart_ms, Some(100));
         assert_eq!(status.state, BusState::ErrorActive);
     }
-    let slower = BitRates { bit_rate: 500_000, ..RATES };
+    let slower = InterfaceSettings { bit_rate: 500_000, ..SETTINGS };
     let refusal = prepare_interface("can0", &slower).unwrap_err();
     assert!(matches!(refusal, InterfaceError::BitRateDiffers { found: 1_000_000, wanted: 500_000, .. }));
 }

@@ -14,7 +14,7 @@ const CAN_HARDWARE_TYPE: &str = "280";
 
 /// How fast a bus is to be, and how its controller recovers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct BitRates {
+pub struct InterfaceSettings {
     /// Bit/s of classic frames and of the arbitration phase.
     pub bit_rate: u32,
     /// Bit/s of the data phase of CAN FD frames; `None` for a classic bus.
@@ -122,30 +122,33 @@ pub fn interface_status(name: &str) -> Result<InterfaceStatus, InterfaceError> {
     Ok(status_of(name, &details))
 }
 
-/// Brings an interface up at the bit rates given, as far as that is needed and this process may, and returns how
+/// Brings an interface up as the settings say, as far as that is needed and this process may, and returns how
 /// it is then. One that is up already is only compared: it belongs to whoever brought it up.
-pub fn prepare_interface(name: &str, rates: &BitRates) -> Result<InterfaceStatus, InterfaceError> {
+pub fn prepare_interface(
+    name: &str,
+    settings: &InterfaceSettings,
+) -> Result<InterfaceStatus, InterfaceError> {
     let status = interface_status(name)?;
     if status.is_up {
-        compare(&status, rates)?;
+        compare(&status, settings)?;
         return Ok(status);
     }
     let interface = open(name)?;
     let is_controller = status.has_controller;
     let refused = |action, error: &socketcan::Error| match permission_error(error) {
-        true => InterfaceError::NotPermitted { name: name.into(), command: command(&status, rates) },
+        true => InterfaceError::NotPermitted { name: name.into(), command: command(&status, settings) },
         false => system(name, action, error),
     };
     if is_controller {
         interface
-            .set_can_params(&parameters(rates))
+            .set_can_params(&parameters(settings))
             .map_err(|error| refused("setting the bit rate", &error))?;
-    } else if rates.data_bit_rate.is_some() {
+    } else if settings.data_bit_rate.is_some() {
         interface.set_mtu(Mtu::Fd).map_err(|error| refused("allowing CAN FD frames", &error))?;
     }
     interface.bring_up().map_err(|error| refused("bringing it up", &error))?;
     let status = interface_status(name)?;
-    compare(&status, rates)?;
+    compare(&status, settings)?;
     Ok(status)
 }
 
@@ -193,20 +196,20 @@ fn timing_of(timing: CanBitTiming) -> Option<Timing> {
 
 /// The kernel chooses the sample point as CiA recommends (75 % above 800 kbit/s, 80 % above 500 kbit/s, else 87.5 %),
 /// or as near to it as the controller's clock allows.
-fn parameters(rates: &BitRates) -> InterfaceCanParams {
+fn parameters(settings: &InterfaceSettings) -> InterfaceCanParams {
     let timing = |bitrate| CanBitTiming { bitrate, ..CanBitTiming::default() };
     InterfaceCanParams {
-        bit_timing: Some(timing(rates.bit_rate)),
-        data_bit_timing: rates.data_bit_rate.map(timing),
-        ctrl_mode: rates.data_bit_rate.map(|_| CanCtrlModes::from_mode(CanCtrlMode::Fd, true)),
-        restart_ms: Some(rates.restart_ms),
+        bit_timing: Some(timing(settings.bit_rate)),
+        data_bit_timing: settings.data_bit_rate.map(timing),
+        ctrl_mode: settings.data_bit_rate.map(|_| CanCtrlModes::from_mode(CanCtrlMode::Fd, true)),
+        restart_ms: Some(settings.restart_ms),
         ..InterfaceCanParams::default()
     }
 }
 
 /// Whether an interface that is up is as it is to be. A virtual one has no bit rate and takes any.
-fn compare(status: &InterfaceStatus, rates: &BitRates) -> Result<(), InterfaceError> {
-    let pairs = [(status.timing, Some(rates.bit_rate)), (status.data_timing, rates.data_bit_rate)];
+fn compare(status: &InterfaceStatus, settings: &InterfaceSettings) -> Result<(), InterfaceError> {
+    let pairs = [(status.timing, Some(settings.bit_rate)), (status.data_timing, settings.data_bit_rate)];
     for (timing, wanted) in pairs {
         if let (Some(timing), Some(wanted)) = (timing, wanted)
             && timing.bit_rate != wanted
@@ -215,25 +218,25 @@ fn compare(status: &InterfaceStatus, rates: &BitRates) -> Result<(), InterfaceEr
                 name: status.name.clone(),
                 found: timing.bit_rate,
                 wanted,
-                command: command(status, rates),
+                command: command(status, settings),
             });
         }
     }
-    if rates.data_bit_rate.is_some() && !status.has_fd {
-        return Err(InterfaceError::NoFd { name: status.name.clone(), command: command(status, rates) });
+    if settings.data_bit_rate.is_some() && !status.has_fd {
+        return Err(InterfaceError::NoFd { name: status.name.clone(), command: command(status, settings) });
     }
     Ok(())
 }
 
 /// The command that brings the interface up as it is to be.
-fn command(status: &InterfaceStatus, rates: &BitRates) -> String {
+fn command(status: &InterfaceStatus, settings: &InterfaceSettings) -> String {
     let name = &status.name;
-    match (status.has_controller, rates.data_bit_rate) {
+    match (status.has_controller, settings.data_bit_rate) {
         (false, None) => format!("sudo ip link set {name} up"),
         (false, Some(_)) => format!("sudo ip link set {name} mtu 72 up"),
         (true, data_bit_rate) => {
             let data = data_bit_rate.map(|rate| format!(" dbitrate {rate} fd on")).unwrap_or_default();
-            let BitRates { bit_rate, restart_ms, .. } = rates;
+            let InterfaceSettings { bit_rate, restart_ms, .. } = settings;
             format!("sudo ip link set {name} up type can bitrate {bit_rate}{data} restart-ms {restart_ms}")
         }
     }
@@ -271,8 +274,9 @@ mod tests {
         }
     }
 
-    const CLASSIC: BitRates = BitRates { bit_rate: 1_000_000, data_bit_rate: None, restart_ms: 100 };
-    const FLEXIBLE: BitRates = BitRates { data_bit_rate: Some(5_000_000), ..CLASSIC };
+    const CLASSIC: InterfaceSettings =
+        InterfaceSettings { bit_rate: 1_000_000, data_bit_rate: None, restart_ms: 100 };
+    const FLEXIBLE: InterfaceSettings = InterfaceSettings { data_bit_rate: Some(5_000_000), ..CLASSIC };
 
     #[test]
     fn a_missing_interface_and_one_that_is_no_can_are_told_apart() {

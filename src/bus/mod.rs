@@ -3,5 +3,5 @@
 mod interface;
 mod socketcan;
 
-pub use interface::{BitRates, InterfaceError, InterfaceStatus, interface_status, prepare_interface};
+pub use interface::{InterfaceSettings, InterfaceError, InterfaceStatus, interface_status, prepare_interface};
 pub use socketcan::{OpenError, SocketCanOptions, open_socketcan};

@@ -21,12 +21,29 @@ pub struct SocketCanOptions {
     /// The identifiers of all data frames that are received **and sent**: own frames come back through the same
     /// filters, and one that does not would never count as sent. Empty: no filter.
     pub identifiers: Vec<Id>,
+    /// Bit/s of classic frames and of the arbitration phase; only the report of the bus load depends on it.
+    pub bit_rate: u32,
+    /// Bit/s of the data phase of CAN FD frames.
+    pub data_bit_rate: Option<u32>,
     /// How many frames may wait in the interface's queue; more are not taken. Not much above what is sent in a
     /// cycle: set-points that wait longer are stale.
     pub transmit_frames: usize,
     /// How many received frames the kernel keeps while nobody reads. The kernel may grant less
     /// (`net.core.rmem_max`) to a process without the right to go beyond.
     pub receive_frames: usize,
+}
+
+impl Default for SocketCanOptions {
+    /// Everything is received, 1 Mbit/s, 32 frames may wait to be sent and 1024 to be read.
+    fn default() -> Self {
+        Self {
+            identifiers: vec![],
+            bit_rate: 1_000_000,
+            data_bit_rate: None,
+            transmit_frames: 32,
+            receive_frames: 1_024,
+        }
+    }
 }
 
 /// Why an interface could not be opened.
@@ -55,7 +72,7 @@ pub fn open_socketcan(interface: &str, options: &SocketCanOptions) -> Result<Soc
     socket
         .set_socket_option_int(libc::SOL_SOCKET, libc::SO_RXQ_OVFL, 1)
         .map_err(failed("asking for the overflow counter"))?;
-    SocketCanPort::new(socket.as_raw_fd())
+    SocketCanPort::new(socket.as_raw_fd(), options.bit_rate, options.data_bit_rate)
         .map_err(io::Error::from_raw_os_error)
         .map_err(failed("duplicating the socket"))
 }
@@ -105,7 +122,8 @@ mod tests {
 
     #[test]
     fn an_interface_that_does_not_exist_is_named() {
-        let options = SocketCanOptions { identifiers: vec![], transmit_frames: 8, receive_frames: 8 };
+        let options =
+            SocketCanOptions { transmit_frames: 8, receive_frames: 8, ..SocketCanOptions::default() };
         let error = open_socketcan("takt-none", &options).unwrap_err();
         assert_eq!(error.interface, "takt-none");
     }

@@ -51,10 +51,9 @@ mod medium;
 pub mod plant;
 mod port;
 mod random;
-mod wire;
 
 pub use drive::{Drive, DriveFault, NmtState, Observation};
 pub use mailbox::{Mailbox, Order};
 pub use medium::{BitRates, Medium, Transmission};
 pub use port::{SimulatedBus, UnknownNode};
-pub use wire::{INTERMISSION_BITS, WireLength, bits_ns};
+pub use takt_rt::wire::{INTERMISSION_BITS, WireLength, bits_ns};

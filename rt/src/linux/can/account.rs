@@ -5,6 +5,7 @@ use super::error_frame;
 use super::wire_format::Message;
 use crate::frame::{Frame, FrameKind};
 use crate::port::{BusHealth, BusState};
+use crate::wire::WireLength;
 
 /// Counters and states of one port.
 #[derive(Clone, Copy, Debug, Default)]
@@ -14,9 +15,16 @@ pub(super) struct Account {
     unconfirmed: usize,
     /// The socket's overflow counter when it was last seen.
     lost: u32,
+    bit_rate: u32,
+    data_bit_rate: Option<u32>,
 }
 
 impl Account {
+    /// The account of a port on a bus of these bit rates (bit/s), of which only the wire's occupation depends.
+    pub(super) fn new(bit_rate: u32, data_bit_rate: Option<u32>) -> Self {
+        Self { bit_rate, data_bit_rate, ..Self::default() }
+    }
+
     pub(super) const fn unconfirmed(&self) -> usize {
         self.unconfirmed
     }
@@ -53,6 +61,9 @@ impl Account {
     /// A message of the socket; returns the frame when it is one from somebody else.
     pub(super) fn arrived(&mut self, arrival: &Arrival) -> Option<Frame> {
         self.count_losses(arrival.lost);
+        if let Message::Frame(frame) = &arrival.message {
+            self.health.busy_ns += WireLength::of(frame).duration_ns(self.bit_rate, self.data_bit_rate);
+        }
         match arrival.message {
             Message::Frame(frame) if arrival.is_own => {
                 if frame.kind() != FrameKind::Remote {
@@ -192,6 +203,18 @@ mod tests {
         with_losses.lost = Some(1);
         account.arrived(&with_losses);
         assert_eq!((account.health.rx_overruns, account.unconfirmed()), (u64::from(u32::MAX) + 2, 0));
+    }
+
+    #[test]
+    fn the_wire_is_occupied_by_frames_of_either_side_for_as_long_as_they_are() {
+        let mut account = Account::new(1_000_000, None);
+        let length_ns = WireLength::of(&frame(1)).duration_ns(1_000_000, None);
+        account.taken(&[frame(1)]);
+        assert_eq!(account.health.busy_ns, 0);
+        account.arrived(&arrival(Message::Frame(frame(1)), true));
+        account.arrived(&arrival(Message::Frame(frame(1)), false));
+        account.arrived(&error(libc::CAN_ERR_ACK));
+        assert_eq!(account.health.busy_ns, 2 * length_ns);
     }
 
     #[test]

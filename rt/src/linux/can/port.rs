@@ -29,15 +29,16 @@ pub struct SocketCanPort {
 }
 
 impl SocketCanPort {
-    /// A port on the socket `descriptor`, which is duplicated: the caller keeps and closes its own. The error is
-    /// the system's number.
-    pub fn new(descriptor: i32) -> Result<Self, i32> {
+    /// A port on the socket `descriptor`, which is duplicated: the caller keeps and closes its own. From the bit
+    /// rates (bit/s; the second for the data phase of CAN FD frames) follows how long frames occupy the wire. The
+    /// error is the system's number.
+    pub fn new(descriptor: i32, bit_rate: u32, data_bit_rate: Option<u32>) -> Result<Self, i32> {
         // SAFETY: duplicates a number; one that is no descriptor is refused.
         let descriptor = unsafe { libc::fcntl(descriptor, libc::F_DUPFD_CLOEXEC, 0) };
         if descriptor < 0 {
             return Err(errno());
         }
-        Ok(Self { descriptor, batch: Batch::new(), account: Account::default() })
+        Ok(Self { descriptor, batch: Batch::new(), account: Account::new(bit_rate, data_bit_rate) })
     }
 }
 
@@ -176,7 +177,7 @@ mod tests {
                 );
                 assert_eq!(set, 0);
             }
-            let port = SocketCanPort::new(end).unwrap();
+            let port = SocketCanPort::new(end, 1_000_000, None).unwrap();
             // SAFETY: as above.
             unsafe { libc::close(end) };
             port
@@ -254,7 +255,7 @@ mod tests {
 
     #[test]
     fn a_descriptor_that_is_none_is_refused() {
-        assert_eq!(SocketCanPort::new(-1).err(), Some(libc::EBADF));
+        assert_eq!(SocketCanPort::new(-1, 1_000_000, None).err(), Some(libc::EBADF));
     }
 
     #[test]
