@@ -1,17 +1,21 @@
 //! What the real-time thread pays for being seen: handing a cycle record to the logger (bar: below 100 ns) and
-//! publishing the snapshot.
+//! publishing the snapshot; and what the logger, which is not real-time, pays for each record.
 #![allow(missing_docs, reason = "criterion_main makes undocumented items")]
 
 use std::hint::black_box;
+use std::io;
 use std::time::{Duration, Instant};
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use takt::controller::channels::{ChannelSizes, HostSide, LogSide, RtSide, channels};
+use takt::telemetry::{AxisDescription, Destination, Logger, LoggerOptions, Machine, Unit, WallClock};
 use takt_rt::door::{Door, Snapshot};
 use takt_rt::record::CycleRecord;
 
-/// Eight seconds of records at 1 ms: more than the caches hold.
+/// The ring holds eight seconds of records at 1 ms.
 const RECORDS: usize = 8192;
+/// The logger comes round after so many.
+const PUSHES: u64 = 32;
 
 fn sides(axes: usize) -> (RtSide, HostSide, LogSide) {
     channels(&ChannelSizes {
@@ -35,7 +39,7 @@ fn record_push(criterion: &mut Criterion) {
                 let mut elapsed = Duration::ZERO;
                 let mut left = iterations;
                 while left > 0 {
-                    let pushes = left.min(RECORDS as u64);
+                    let pushes = left.min(PUSHES);
                     let start = Instant::now();
                     for _ in 0..pushes {
                         assert!(rt.record(black_box(&record)));
@@ -66,5 +70,49 @@ fn snapshot(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, record_push, snapshot);
+fn logger(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("logger per record");
+    for (axes, is_recorded) in [(6, false), (6, true), (32, true)] {
+        let (mut rt, _host, log) = sides(axes);
+        let axis = |index| AxisDescription {
+            name: format!("joint{index}"),
+            unit: Unit::Radian,
+            counts_per_unit: 83_443.0,
+        };
+        let options = LoggerOptions {
+            machine: Machine {
+                name: "bench".to_owned(),
+                cycle_ns: 1_000_000,
+                axes: (0..axes).map(axis).collect(),
+                buses: Vec::new(),
+            },
+            wall_clock: WallClock::fixed(0),
+            started_ns: 0,
+            recording: is_recorded.then(|| Destination::Stream("nowhere".to_owned(), Box::new(io::sink()))),
+            candump: None,
+            traces: Vec::new(),
+        };
+        let mut logger = Logger::new(log, options, Box::new(|_| ()));
+        let record = CycleRecord { axis_count: axes as u8, ..CycleRecord::default() };
+        let name = format!("{axes} axes, {}", if is_recorded { "MCAP" } else { "statistics only" });
+        group.bench_function(name, |bencher| {
+            bencher.iter_custom(|iterations| {
+                let mut elapsed = Duration::ZERO;
+                let mut left = iterations;
+                while left > 0 {
+                    let pushes = left.min(RECORDS as u64);
+                    (0..pushes).for_each(|_| assert!(rt.record(&record)));
+                    let start = Instant::now();
+                    assert_eq!(logger.drain() as u64, pushes);
+                    elapsed += start.elapsed();
+                    left -= pushes;
+                }
+                elapsed
+            });
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, record_push, snapshot, logger);
 criterion_main!(benches);

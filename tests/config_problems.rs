@@ -155,6 +155,11 @@ cases! {
         "[cycle]\nperiod = \"1 ms\"\ncommand_phase = 0.55" => "cycle = \"1 ms\"", at "cycle": WrongType { key, .. } if key == "cycle",
     }
 
+    a_table_that_should_be_one_of_a_list_is_named {
+        "[[axis]]\nname = \"second\"" => "[master.axis]\n[[axis]]\nname = \"second\"", at "[master.axis]": UnknownKey { .. },
+        "[program]\nrepeat = 1\n\n[[program.move]]\nto = [\"30 deg\", 0.5]\nvelocity = \"80 %\"\ndwell = \"200 ms\"\n\n[[program.move]]" => "[program.move]", at "[program.move]": WrongType { expected, found: "a table", .. } if expected.contains("[[double brackets]]"),
+    }
+
     wrong_units_are_named {
         "velocity = \"100 deg/s\"" => "velocity = \"100 deg\"", at "\"100 deg\"": WrongUnit { unit, quantity, .. } if unit == "deg" && quantity.unit == "rad/s",
         "torque = \"31 Nm\"" => "torque = \"31 N\"", at "31 N\"": WrongUnit { quantity, .. } if quantity.unit == "Nm",

@@ -1,7 +1,11 @@
-//! CAN interfaces of this machine: what state they are in, bringing them up, and opening them as bus ports.
+//! The buses: what they are connected to, how long frames take, and whether everything fits.
 
+pub mod frame_time;
 mod interface;
+pub mod port;
+pub mod schedule;
 mod socketcan;
+pub mod trace;
 
-pub use interface::{InterfaceSettings, InterfaceError, InterfaceStatus, interface_status, prepare_interface};
+pub use interface::{InterfaceError, InterfaceSettings, InterfaceStatus, Timing, interface_status, prepare_interface};
 pub use socketcan::{OpenError, SocketCanOptions, open_socketcan};

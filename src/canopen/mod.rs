@@ -2,7 +2,8 @@
 //! frames are handed out.
 //!
 //! - [`nmt`]: network management: commands, states, boot-up and heartbeat.
-//! - [`sdo`]: service data objects: what is on the wire, and a client that moves one object at a time.
+//! - [`sdo`]: service data objects: what is on the wire, and a client that moves one object at a time,
+//!   expedited, segmented or in blocks.
 //! - [`emcy`]: emergency messages and what their codes mean.
 //! - [`sync`]: the SYNC message.
 //! - [`object`]: an object's address, type and name; [`objects`]: the standard ones used here.

@@ -19,7 +19,7 @@ pub const VENDOR_ID: Object = Object::new(0x1018, 1, DataType::U32, "vendor id")
 pub const PRODUCT_CODE: Object = Object::new(0x1018, 2, DataType::U32, "product code");
 /// 1018:3
 pub const REVISION_NUMBER: Object = Object::new(0x1018, 3, DataType::U32, "revision number");
-/// 1029:1: the NMT state to enter on a communication error: 0 pre-operational, 1 no change, 2 stopped.
+/// 1029:1: the NMT state to enter on a communication error, see [`error_behaviour`].
 pub const COMMUNICATION_ERROR_BEHAVIOUR: Object =
     Object::new(0x1029, 1, DataType::U8, "error behaviour on communication error");
 
@@ -50,6 +50,14 @@ pub const MOTOR_RATED_CURRENT: Object = Object::new(0x6075, 0, DataType::U32, "m
 pub const MOTOR_RATED_TORQUE: Object = Object::new(0x6076, 0, DataType::U32, "motor rated torque");
 /// 607A
 pub const TARGET_POSITION: Object = Object::new(0x607A, 0, DataType::I32, "target position");
+/// 6081
+pub const PROFILE_VELOCITY: Object = Object::new(0x6081, 0, DataType::U32, "profile velocity");
+/// 6083
+pub const PROFILE_ACCELERATION: Object = Object::new(0x6083, 0, DataType::U32, "profile acceleration");
+/// 6084
+pub const PROFILE_DECELERATION: Object = Object::new(0x6084, 0, DataType::U32, "profile deceleration");
+/// 6085
+pub const QUICK_STOP_DECELERATION: Object = Object::new(0x6085, 0, DataType::U32, "quick stop deceleration");
 /// 60B0
 pub const POSITION_OFFSET: Object = Object::new(0x60B0, 0, DataType::I32, "position offset");
 /// 60B1
@@ -65,6 +73,16 @@ pub const INTERPOLATION_TIME_INDEX: Object = Object::new(0x60C2, 2, DataType::I8
 pub const TARGET_VELOCITY: Object = Object::new(0x60FF, 0, DataType::I32, "target velocity");
 /// 6502: a bit for each mode.
 pub const SUPPORTED_DRIVE_MODES: Object = Object::new(0x6502, 0, DataType::U32, "supported drive modes");
+
+/// Values of [`COMMUNICATION_ERROR_BEHAVIOUR`].
+pub mod error_behaviour {
+    /// Enter pre-operational, from operational.
+    pub const PRE_OPERATIONAL: u8 = 0;
+    /// No change.
+    pub const NO_CHANGE: u8 = 1;
+    /// Enter stopped.
+    pub const STOPPED: u8 = 2;
+}
 
 /// 1008: a text.
 pub const DEVICE_NAME: ObjectAddress = ObjectAddress::new(0x1008, 0);

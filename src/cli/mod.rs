@@ -1,1 +1,35 @@
-//! cli.
+//! The command line: one file a subcommand, and what they share.
+
+mod check;
+mod configuration;
+mod exit;
+mod run;
+mod table;
+
+pub use exit::Exit;
+
+use clap::{Parser, Subcommand};
+
+/// Hard-real-time joint-motion controller for CAN drives.
+#[derive(Parser, Debug)]
+#[command(version, arg_required_else_help = true)]
+pub struct CommandLine {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand, Debug)]
+enum Command {
+    Run(run::Arguments),
+    Check(check::Arguments),
+}
+
+impl CommandLine {
+    /// Does what the command line says.
+    pub fn execute(self) -> Exit {
+        match self.command {
+            Command::Run(arguments) => run::run(arguments),
+            Command::Check(arguments) => check::run(&arguments),
+        }
+    }
+}

@@ -92,8 +92,10 @@ pub fn engine(config: &Config) -> Result<Engine, AssembleError> {
         service_frames_active: bus.service_frames_per_cycle,
         service_frames_passive: SERVICE_FRAMES_PASSIVE.max(bus.service_frames_per_cycle),
     });
-    let heartbeat =
-        config.master.heartbeat_ns.map(|ns| Heartbeat { node: config.master.node, cycles: cycles(ns).max(1) });
+    let heartbeat = config
+        .master
+        .heartbeat_ns
+        .map(|ns| Heartbeat { node: config.master.node, cycles: cycles(ns).max(1) });
     Engine::new(EngineParameters {
         period_ns,
         axes,

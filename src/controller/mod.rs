@@ -3,5 +3,12 @@
 
 pub mod assemble;
 pub mod channels;
-pub mod program;
+mod program;
 pub mod realtime_thread;
+pub mod session;
+mod supervisor;
+mod virtual_time;
+
+pub use program::{ProgramRunner, Step};
+pub use supervisor::{Interrupt, Outcome, Progress, Supervisor};
+pub use virtual_time::{VirtualClock, VirtualRun};

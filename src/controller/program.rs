@@ -26,12 +26,12 @@ enum State {
 }
 
 /// What the program wants now.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Step {
     /// Nothing but time.
     Wait,
     /// This move.
-    Begin(Move),
+    Begin(Box<Move>),
     /// The real-time thread has refused the move with this number, counted from 1.
     Refused(u64),
     /// Everything has been done.
@@ -57,15 +57,14 @@ impl ProgramRunner {
             State::Next => {
                 self.state = State::Moving { refused_before: snapshot.refused };
                 self.begun += 1;
-                Step::Begin(self.present_move())
+                Step::Begin(Box::new(self.present_move()))
             }
             State::Moving { refused_before } if snapshot.refused > refused_before => {
                 self.state = State::Finished;
                 Step::Refused(self.begun)
             }
             State::Moving { .. } => {
-                let is_done =
-                    snapshot.finished_move == self.present_id() && snapshot.phase == Phase::Holding;
+                let is_done = snapshot.finished_move == self.present_id() && snapshot.phase == Phase::Holding;
                 if is_done {
                     let dwell_s = self.present().map_or(0.0, |present| present.dwell_s);
                     self.state = State::Dwelling { until_ns: now_ns + (dwell_s * 1e9) as u64 };
@@ -140,7 +139,7 @@ mod tests {
         Snapshot { phase: Phase::Holding, finished_move: id, ..Snapshot::default() }
     }
 
-    fn begin(runner: &mut ProgramRunner, now_ns: u64, snapshot: &Snapshot) -> Option<Move> {
+    fn begin(runner: &mut ProgramRunner, now_ns: u64, snapshot: &Snapshot) -> Option<Box<Move>> {
         match runner.poll(now_ns, snapshot) {
             Step::Begin(begun) => Some(begun),
             _ => None,

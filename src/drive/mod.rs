@@ -1,5 +1,19 @@
 //! What differs from one family of drives to the next: process data, bring-up, parameters.
+//!
+//! A family writes its procedures down as lists of steps (`erob_canopen`, `step`); one machine carries them out for
+//! every family (`axis_run`), for all axes at once ([`BringUp`], [`Leave`]); what was learnt is in [`AxisFacts`], what
+//! went wrong in [`BringUpError`].
 
+mod axis_run;
+mod bring_up;
+pub mod erob_canopen;
+mod facts;
+mod failure;
 mod process_data;
+mod step;
 
+pub use bring_up::{BringUp, BringUpTiming, Leave, NotConfigured, Progress, Stage};
+pub use facts::{AxisFacts, DeviceIdentity, DeviceTexts};
+pub use failure::{Answered, AxisFailure, BringUpError, Cause};
 pub use process_data::{PdoPlan, ProcessData};
+pub use step::{Access, Check, mode_words};

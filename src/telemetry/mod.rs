@@ -1,1 +1,32 @@
-//! telemetry.
+//! What becomes visible of a run: statistics, recordings, the report, and everything said in words.
+//!
+//! The real-time thread leaves a record of every cycle and an event for whatever happens in lock-free rings
+//! ([`crate::controller::channels`]). A [`Logger`] empties them: as a thread of its own that is not real-time
+//! ([`LoggerThread`]), or step by step in virtual time. Nothing that goes wrong here ever reaches the motion: a full
+//! ring drops and counts, a full disk ends the recording with one message.
+
+mod candump;
+mod cdr;
+mod destination;
+mod logger;
+mod machine;
+mod messages;
+mod picture;
+mod realtime;
+mod recording;
+mod report;
+mod statistics;
+mod thread;
+mod wall_clock;
+pub mod words;
+
+pub use destination::Destination;
+pub use logger::{LogSummary, Logger, LoggerOptions, Notice};
+pub use machine::{AxisDescription, BusDescription, Machine, Unit};
+pub use picture::Emphasis;
+pub use report::{
+    AxisReport, BusReport, LatencyReport, RealtimeReport, RunOutcome, RunReport, StopReport, TelemetryReport,
+};
+pub use statistics::{AxisStatistics, FollowingErrorMaximum, Latency, Statistics};
+pub use thread::LoggerThread;
+pub use wall_clock::WallClock;

@@ -3,7 +3,10 @@
 use takt_rt::frame::{Frame, Id};
 
 use super::abort::AbortCode;
-use super::wire::{self, EXPEDITED, Expedited, LAST, SPECIFIER_SHIFT, Segment, TOGGLE};
+use super::wire::{
+    self, BLOCK_CONSUMER, BLOCK_PRODUCER, BlockSize, CRC_SUPPORTED, EXPEDITED, Expedited, LAST,
+    SPECIFIER_SHIFT, Segment, TOGGLE,
+};
 use crate::canopen::object::ObjectAddress;
 use crate::canopen::{function_code, node_of};
 
@@ -49,6 +52,40 @@ pub enum Response {
         /// That of the request.
         toggle: bool,
     },
+    /// The object's value will come in blocks.
+    BlockUpload {
+        /// The object.
+        object: ObjectAddress,
+        /// How many bytes will come, if that is told.
+        size: Option<u32>,
+        /// Whether the server can make the checksum.
+        has_crc: bool,
+    },
+    /// All blocks have been sent.
+    BlockUploadEnd {
+        /// How many bytes of the last segment do not count: 0 to 7.
+        unused: u8,
+        /// The checksum of all data; 0 when it was not agreed on.
+        crc: u16,
+    },
+    /// Blocks may come.
+    BlockDownload {
+        /// The object.
+        object: ObjectAddress,
+        /// How many segments to send before waiting for an acknowledgement.
+        block_size: BlockSize,
+        /// Whether the server can check the checksum.
+        has_crc: bool,
+    },
+    /// A block has come, or the beginning of it.
+    BlockAcknowledge {
+        /// The last segment that came in order; 0 for none.
+        last: u8,
+        /// How many segments the next block may have.
+        block_size: BlockSize,
+    },
+    /// All blocks have come and are right.
+    BlockDownloadEnd,
     /// The transfer is given up.
     Abort {
         /// The object that was being transferred.
@@ -72,6 +109,15 @@ impl Response {
                 let toggle = if toggle { TOGGLE } else { 0 };
                 [DOWNLOAD_SEGMENT << SPECIFIER_SHIFT | toggle, 0, 0, 0, 0, 0, 0, 0]
             }
+            Self::BlockUpload { object, size, has_crc } => {
+                wire::block_producer_initiation(object, size, has_crc)
+            }
+            Self::BlockUploadEnd { unused, crc } => wire::block_end(unused, crc),
+            Self::BlockDownload { object, block_size, has_crc } => {
+                wire::block_consumer_initiation(object, block_size, has_crc)
+            }
+            Self::BlockAcknowledge { last, block_size } => wire::block_acknowledgement(last, block_size),
+            Self::BlockDownloadEnd => [BLOCK_CONSUMER << SPECIFIER_SHIFT | 1, 0, 0, 0, 0, 0, 0, 0],
             Self::Abort { object, code } => {
                 wire::with_address(wire::ABORT << SPECIFIER_SHIFT, object, code.number().to_le_bytes())
             }
@@ -79,7 +125,8 @@ impl Response {
         Frame::of(Id::canopen(function_code::SDO_RESPONSE, node), bytes)
     }
 
-    /// Reads the node and the response of a frame; `None` when it is none, or one of the block transfer.
+    /// Reads the node and the response of a frame; `None` when it is none. The segments of a block look like other
+    /// responses: they are read with [`BlockSegment`](super::BlockSegment) where they are due.
     pub fn decode(frame: &Frame) -> Option<(u8, Self)> {
         let node = node_of(frame, function_code::SDO_RESPONSE)?;
         Some((node, Self::from_bytes(wire::eight_bytes(frame)?)?))
@@ -98,9 +145,28 @@ impl Response {
             }
             UPLOAD => Self::UploadSegmented { object, size: wire::size(bytes) },
             DOWNLOAD => Self::DownloadAccepted { object },
-            wire::ABORT => {
+            wire::ABORT if bytes[0] == wire::ABORT << SPECIFIER_SHIFT => {
                 let code = AbortCode::from_number(u32::from_le_bytes(wire::tail(bytes)));
                 Self::Abort { object, code }
+            }
+            BLOCK_CONSUMER => match bytes[0] & 0x03 {
+                0 => Self::BlockDownload {
+                    object,
+                    block_size: BlockSize::new(bytes[4])?,
+                    has_crc: bytes[0] & CRC_SUPPORTED != 0,
+                },
+                1 => Self::BlockDownloadEnd,
+                2 => Self::BlockAcknowledge { last: bytes[1], block_size: BlockSize::new(bytes[2])? },
+                _ => return None,
+            },
+            BLOCK_PRODUCER if bytes[0] & 0x01 == 0 => Self::BlockUpload {
+                object,
+                size: wire::block_size_told(bytes),
+                has_crc: bytes[0] & CRC_SUPPORTED != 0,
+            },
+            BLOCK_PRODUCER => {
+                let (unused, crc) = wire::read_block_end(bytes);
+                Self::BlockUploadEnd { unused, crc }
             }
             _ => return None,
         })
@@ -127,7 +193,7 @@ mod tests {
     fn frames_that_cannot_be_responses_are_refused() {
         let id = Id::canopen(function_code::SDO_RESPONSE, 2);
         assert_eq!(Response::decode(&Frame::of(id, [0x60, 0x60, 0x60, 0])), None, "four bytes");
-        assert_eq!(Response::decode(&Frame::of(id, [0xC0, 0, 0, 0, 0, 0, 0, 0])), None, "block upload");
+        assert_eq!(Response::decode(&Frame::of(id, [0xE0, 0, 0, 0, 0, 0, 0, 0])), None, "no such specifier");
         assert_eq!(Response::decode(&Frame::of(Id::canopen(0x580, 0), [0x60; 8])), None, "no node");
     }
 }

@@ -17,6 +17,15 @@ pub(super) const LAST: u8 = 0x01;
 /// The specifier of an abort, in both directions.
 pub(super) const ABORT: u8 = 4;
 
+/// The specifier of what the server of a block download sends, and the client of a block upload.
+pub(super) const BLOCK_CONSUMER: u8 = 5;
+/// The specifier of what the server of a block upload sends, and the client of a block download.
+pub(super) const BLOCK_PRODUCER: u8 = 6;
+/// Bit 2 of the first byte of a block initiation: the sender can make the checksum.
+pub(super) const CRC_SUPPORTED: u8 = 0x04;
+/// Bit 1 of the first byte of a block initiation by the producer: the size is told.
+pub(super) const BLOCK_SIZE_INDICATED: u8 = 0x02;
+
 /// The eight bytes of an SDO frame; every other frame is none.
 pub(super) fn eight_bytes(frame: &Frame) -> Option<[u8; 8]> {
     if frame.kind() != FrameKind::Data {
@@ -133,4 +142,110 @@ impl Segment {
     pub(super) fn decode([first, a, b, c, d, e, f, g]: [u8; 8]) -> Self {
         Self { bytes: [a, b, c, d, e, f, g], length: Self::MAX_BYTES as u8 - (first >> 1 & 0x07) }
     }
+}
+
+/// How many segments a block has: 1 to 127.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct BlockSize(u8);
+
+impl BlockSize {
+    /// What the client asks of a server: few enough segments to leave the bus to others (32 frames last 4 ms at
+    /// 1 Mbit/s), and with them the first byte of a segment that comes late is never that of an initiation.
+    pub(super) const OF_UPLOADS: Self = Self(32);
+
+    /// `None` outside 1 to 127.
+    pub const fn new(segments: u8) -> Option<Self> {
+        match segments {
+            1..=127 => Some(Self(segments)),
+            _ => None,
+        }
+    }
+
+    /// The number of segments.
+    pub const fn segments(self) -> u8 {
+        self.0
+    }
+}
+
+/// One segment of a block. Its bytes can mean anything else outside of a block, so it is read only where one is due.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct BlockSegment {
+    number: u8,
+    data: [u8; 7],
+    is_last: bool,
+}
+
+impl BlockSegment {
+    const LAST: u8 = 0x80;
+
+    /// Segment `number` of its block, with the first seven bytes of `data` (missing ones are zero). `is_last` tells that
+    /// no more segments follow in the whole transfer. `None` when the number is not 1 to 127.
+    pub fn new(number: u8, data: &[u8], is_last: bool) -> Option<Self> {
+        let number = BlockSize::new(number)?.segments();
+        let mut bytes = [0; 7];
+        bytes.iter_mut().zip(data).for_each(|(to, from)| *to = *from);
+        Some(Self { number, data: bytes, is_last })
+    }
+
+    /// Its number in the block, counted from 1.
+    pub const fn number(self) -> u8 {
+        self.number
+    }
+
+    /// Its seven bytes, of which those of the last segment need not all count.
+    pub const fn data(self) -> [u8; 7] {
+        self.data
+    }
+
+    /// Whether it is the last one of the transfer.
+    pub const fn is_last(self) -> bool {
+        self.is_last
+    }
+
+    /// Its eight bytes on the wire.
+    pub const fn encode(self) -> [u8; 8] {
+        let [a, b, c, d, e, f, g] = self.data;
+        let last = if self.is_last { Self::LAST } else { 0 };
+        [self.number | last, a, b, c, d, e, f, g]
+    }
+
+    /// Reads it from eight bytes; `None` when the number is 0, which in a block can only be an abort.
+    pub fn decode([first, a, b, c, d, e, f, g]: [u8; 8]) -> Option<Self> {
+        Self::new(first & !Self::LAST, &[a, b, c, d, e, f, g], first & Self::LAST != 0)
+    }
+}
+
+/// The end of a producer's blocks: how many bytes of the last segment do not count, and the checksum.
+pub(super) fn block_end(unused: u8, crc: u16) -> [u8; 8] {
+    let [low, high] = crc.to_le_bytes();
+    [BLOCK_PRODUCER << SPECIFIER_SHIFT | (unused & 0x07) << 2 | 1, low, high, 0, 0, 0, 0, 0]
+}
+
+/// Unused bytes and checksum of the end of a producer's blocks.
+pub(super) fn read_block_end([first, low, high, ..]: [u8; 8]) -> (u8, u16) {
+    (first >> 2 & 0x07, u16::from_le_bytes([low, high]))
+}
+
+/// The beginning of a producer's blocks.
+pub(super) fn block_producer_initiation(object: ObjectAddress, size: Option<u32>, has_crc: bool) -> [u8; 8] {
+    let crc = if has_crc { CRC_SUPPORTED } else { 0 };
+    let indicated = if size.is_some() { BLOCK_SIZE_INDICATED } else { 0 };
+    let first = BLOCK_PRODUCER << SPECIFIER_SHIFT | crc | indicated;
+    with_address(first, object, size.unwrap_or(0).to_le_bytes())
+}
+
+/// The size that the beginning of a producer's blocks tells, if it does.
+pub(super) fn block_size_told(bytes: [u8; 8]) -> Option<u32> {
+    (bytes[0] & BLOCK_SIZE_INDICATED != 0).then(|| u32::from_le_bytes(tail(bytes)))
+}
+
+/// The beginning of a consumer's blocks.
+pub(super) fn block_consumer_initiation(object: ObjectAddress, size: BlockSize, has_crc: bool) -> [u8; 8] {
+    let crc = if has_crc { CRC_SUPPORTED } else { 0 };
+    with_address(BLOCK_CONSUMER << SPECIFIER_SHIFT | crc, object, [size.segments(), 0, 0, 0])
+}
+
+/// A consumer's acknowledgement: the last segment that came in order, and the size of the next block.
+pub(super) fn block_acknowledgement(last: u8, next: BlockSize) -> [u8; 8] {
+    [BLOCK_CONSUMER << SPECIFIER_SHIFT | 2, last, next.segments(), 0, 0, 0, 0, 0]
 }

@@ -201,6 +201,14 @@ impl<'a> Entry<'a> {
         Some(self.elements(list))
     }
 
+    /// The tables of a list of tables.
+    pub fn tables(&self) -> Option<Vec<Entry<'a>>> {
+        let DeValue::Array(list) = self.value else {
+            return self.wrong_type("a list of tables, each headed by its name in [[double brackets]]");
+        };
+        Some(self.elements(list))
+    }
+
     pub fn table(&self) -> Option<&'a DeTable<'a>> {
         match self.value {
             DeValue::Table(table) => Some(table),

@@ -62,15 +62,14 @@ impl<'a> Section<'a> {
 
     /// What a key says, here or else in the defaults.
     pub fn get(&mut self, key: &'static str) -> Option<Entry<'a>> {
-        self.known.push(key);
-        self.known_in_defaults.push(key);
+        self.know(key, true);
         let found = find(self.own, key).or_else(|| find(self.defaults, key))?;
         Some(self.entry(key, found))
     }
 
     /// What a key says here, whatever the defaults are; it is not allowed in them.
     pub fn own(&mut self, key: &'static str) -> Option<Entry<'a>> {
-        self.known.push(key);
+        self.know(key, false);
         Some(self.entry(key, find(self.own, key)?))
     }
 
@@ -92,8 +91,7 @@ impl<'a> Section<'a> {
 
     /// A table within this one, with the defaults of that name behind it. It may be absent.
     pub fn section(&mut self, key: &'static str) -> Section<'a> {
-        self.known.push(key);
-        self.known_in_defaults.push(key);
+        self.know(key, true);
         let own = find(self.own, key).map(|found| self.entry(key, found));
         let defaults = find(self.defaults, key).map(|found| self.entry(key, found));
         let header = own.as_ref().map_or_else(|| self.header(), |entry| entry.span.clone());
@@ -115,7 +113,7 @@ impl<'a> Section<'a> {
 
     /// The tables of a list of tables (`[[bus]]`), in the order of the file; none when the key is absent.
     pub fn sections(&mut self, key: &'static str) -> Vec<Section<'a>> {
-        let Some(list) = self.get(key).and_then(|entry| entry.list()) else { return vec![] };
+        let Some(list) = self.get(key).and_then(|entry| entry.tables()) else { return vec![] };
         list.into_iter()
             .filter_map(|entry| {
                 Some(Section::new(&entry.path, entry.span.clone(), entry.table()?, self.problems))
@@ -148,6 +146,15 @@ impl<'a> Section<'a> {
                 let kind = ProblemKind::MissingKey { key: self.path_of(key), says };
                 self.problems.report(kind, self.header());
             }
+        }
+    }
+
+    fn know(&mut self, key: &'static str, is_known_in_defaults: bool) {
+        if !self.known.contains(&key) {
+            self.known.push(key);
+        }
+        if is_known_in_defaults && !self.known_in_defaults.contains(&key) {
+            self.known_in_defaults.push(key);
         }
     }
 

@@ -163,10 +163,10 @@ mod tests {
                 scope.spawn(move || {
                     let (mut seen, mut whole) = (0, 0);
                     while whole < 20_000 {
-                        let read = reader.attempt(seen, |words| [(); WORDS].map(|()| words.take()));
+                        let read = reader.attempt(0, |words| [(); WORDS].map(|()| words.take()));
                         if let Attempt::Whole(value, number) = read {
                             assert_eq!(value, [number; WORDS]);
-                            assert!(number > seen);
+                            assert!(number >= seen);
                             (seen, whole) = (number, whole + 1);
                         }
                     }

@@ -1,6 +1,7 @@
 //! The way of the cycle records to the logger. A record of 32 axes is almost 2 kB, and a ring that takes it by value
-//! copies it two or three times. Here the slots themselves travel: the logger sends them out empty, the real-time
-//! thread fills in the axes that count, and sends them back.
+//! copies it two or three times. Here the slots themselves travel: the real-time thread fills in the axes that count,
+//! and the logger sends the slot back. The slot that came back last is used first, so that as long as the logger
+//! keeps up, a handful of slots go round and stay in the cache, however many there are.
 
 use takt_rt::record::CycleRecord;
 
@@ -8,16 +9,20 @@ use super::ring::{Consumer, Producer, ring};
 
 /// A ring for `capacity` (at least 1) records.
 pub fn record_ring(capacity: usize) -> (RecordProducer, RecordConsumer) {
-    let (mut empty_in, empty_out) = ring(capacity);
+    let (empty_in, empty_out) = ring(capacity);
     let (full_in, full_out) = ring(capacity);
-    for _ in 0..capacity.max(1) {
-        empty_in.push(Box::default());
-    }
-    (RecordProducer { empty: empty_out, full: full_in }, RecordConsumer { empty: empty_in, full: full_out })
+    let at_hand = (0..capacity.max(1)).map(|_| Box::default()).collect();
+    (
+        RecordProducer { at_hand, empty: empty_out, full: full_in },
+        RecordConsumer { empty: empty_in, full: full_out },
+    )
 }
 
 /// The end of the real-time thread.
 pub struct RecordProducer {
+    /// Empty slots, the warmest last. It has room for every slot there is, so it never grows.
+    #[expect(clippy::vec_box, reason = "the boxes are what goes through the rings")]
+    at_hand: Vec<Box<CycleRecord>>,
     empty: Consumer<Box<CycleRecord>>,
     full: Producer<Box<CycleRecord>>,
 }
@@ -25,7 +30,11 @@ pub struct RecordProducer {
 impl RecordProducer {
     /// Copies a record into the ring. Returns whether there was room.
     pub fn push(&mut self, record: &CycleRecord) -> bool {
-        let Some(mut slot) = self.empty.pop() else {
+        // Two for the one that is used, so that none stays away for long.
+        for _ in 0..2 {
+            self.at_hand.extend(self.empty.pop());
+        }
+        let Some(mut slot) = self.at_hand.pop() else {
             self.full.count_dropped();
             return false;
         };
@@ -106,5 +115,18 @@ mod tests {
         assert!(producer.push(&record(4, 1)));
         assert_eq!(consumer.next(|arrived| arrived.timing.slot), Some(1));
         assert_eq!(consumer.next(|arrived| arrived.timing.slot), Some(4));
+    }
+
+    #[test]
+    fn after_every_way_of_filling_and_emptying_all_slots_are_there_and_no_memory_was_asked_for() {
+        let (mut producer, mut consumer) = record_ring(16);
+        let room = producer.at_hand.capacity();
+        for fill in (0..=16).chain([3, 16, 1, 16]) {
+            assert_eq!((0..20).filter(|slot| producer.push(&record(*slot, 1))).count(), 16);
+            let emptied = (0..fill).map_while(|_| consumer.next(|_| ())).count();
+            assert_eq!((0..20).filter(|slot| producer.push(&record(*slot, 1))).count(), emptied);
+            while consumer.next(|_| ()).is_some() {}
+        }
+        assert_eq!(producer.at_hand.capacity(), room);
     }
 }

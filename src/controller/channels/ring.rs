@@ -125,8 +125,8 @@ mod tests {
 
     #[test]
     fn between_two_threads_nothing_is_lost_reordered_or_seen_twice() {
-        const ITEMS: u64 = 200_000;
-        let (mut producer, mut consumer) = ring(7);
+        const ITEMS: u64 = 20_000;
+        let (mut producer, mut consumer) = ring(61);
         std::thread::scope(|scope| {
             scope.spawn(move || {
                 for item in 0..ITEMS {

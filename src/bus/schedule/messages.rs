@@ -1,0 +1,151 @@
+//! Every message that a configuration puts on a bus.
+
+use serde::Serialize;
+use takt_rt::frame::Id;
+
+use crate::bus::frame_time::FrameShape;
+use crate::config::{Axis, Config};
+use crate::drive::ProcessData;
+
+/// What a message is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum MessageKind {
+    /// SYNC of the controller (CiA 301, 7.2.5).
+    Sync,
+    /// Emergency of a drive (7.2.7).
+    Emergency,
+    /// TPDO of a drive.
+    Feedback,
+    /// RPDO of a drive.
+    SetPoint,
+    /// Answer of a drive's SDO server.
+    SdoResponse,
+    /// Request of the controller's SDO client.
+    SdoRequest,
+    /// Heartbeat of a drive (7.2.8).
+    DriveHeartbeat,
+    /// Heartbeat of the controller.
+    MasterHeartbeat,
+}
+
+impl MessageKind {
+    /// Sent besides the process data, and less important than it by identifier.
+    pub(super) fn is_background(self) -> bool {
+        matches!(self, Self::SdoResponse | Self::SdoRequest | Self::DriveHeartbeat | Self::MasterHeartbeat)
+    }
+
+    /// Sent by the controller, so that it stands in the controller's own queue.
+    pub(super) fn is_ours(self) -> bool {
+        matches!(self, Self::Sync | Self::SetPoint | Self::SdoRequest | Self::MasterHeartbeat)
+    }
+
+    pub(super) fn is_sdo(self) -> bool {
+        matches!(self, Self::SdoResponse | Self::SdoRequest)
+    }
+}
+
+/// A message before it is analysed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct BusMessage {
+    pub kind: MessageKind,
+    /// The index of the axis that sends or is sent to.
+    pub axis: Option<usize>,
+    pub id: Id,
+    pub shape: FrameShape,
+    /// Shortest time between two.
+    pub period_ns: u64,
+    /// How much later than its period it may be queued.
+    pub jitter_ns: u64,
+    /// When it must have arrived, after it was queued; `None` where being late does no harm.
+    pub deadline_ns: Option<u64>,
+    /// Whether it comes when the drive likes instead of with SYNC.
+    pub is_asynchronous: bool,
+}
+
+/// An emergency stops the group; a second one within this time finds nothing left to disturb.
+const EMERGENCY_INTERVAL_NS: u64 = 1_000_000_000;
+
+const SDO_BYTES: usize = 8;
+const EMERGENCY_BYTES: usize = 8;
+const HEARTBEAT_BYTES: usize = 1;
+/// Transmission types above this are sent on events of the drive (CiA 301, 7.5.2.38).
+const LAST_SYNCHRONOUS_TYPE: u8 = 240;
+
+/// The messages of a bus by priority, highest first.
+pub(super) fn messages(config: &Config, bus_index: usize) -> Vec<BusMessage> {
+    let Some(bus) = config.buses.get(bus_index) else { return vec![] };
+    let period_ns = config.cycle.period_ns;
+    let mut messages = vec![message(MessageKind::Sync, None, Id::canopen(0x080, 0), 0, period_ns)];
+    if let Some(heartbeat_ns) = config.master.heartbeat_ns {
+        let id = Id::canopen(0x700, config.master.node);
+        // It is sent in a cycle, so up to one cycle late.
+        messages.push(BusMessage {
+            jitter_ns: period_ns,
+            ..message(MessageKind::MasterHeartbeat, None, id, HEARTBEAT_BYTES, heartbeat_ns)
+        });
+    }
+    let axes = || config.axes.iter().enumerate().filter(|(_, axis)| axis.bus == bus_index);
+    for (index, axis) in axes() {
+        messages.extend(axis_messages(index, axis, period_ns));
+    }
+    messages.extend(axes().take(bus.service_frames_per_cycle).flat_map(|(i, axis)| sdo(i, axis, period_ns)));
+    messages.sort_by_key(|message| message.id.arbitration_key());
+    messages
+}
+
+fn message(kind: MessageKind, axis: Option<usize>, id: Id, length: usize, period_ns: u64) -> BusMessage {
+    BusMessage {
+        kind,
+        axis,
+        id,
+        shape: FrameShape::classic(length),
+        period_ns,
+        jitter_ns: 0,
+        deadline_ns: Some(period_ns),
+        is_asynchronous: false,
+    }
+}
+
+fn axis_messages(index: usize, axis: &Axis, period_ns: u64) -> Vec<BusMessage> {
+    let data = ProcessData::of(axis);
+    let is_asynchronous = axis.transmission_type > LAST_SYNCHRONOUS_TYPE;
+    let mut messages = vec![BusMessage {
+        deadline_ns: None,
+        ..message(
+            MessageKind::Emergency,
+            Some(index),
+            Id::canopen(0x080, axis.node),
+            EMERGENCY_BYTES,
+            EMERGENCY_INTERVAL_NS,
+        )
+    }];
+    messages.extend(data.feedback.iter().map(|pdo| BusMessage {
+        jitter_ns: axis.feedback_delay_ns,
+        is_asynchronous,
+        ..message(MessageKind::Feedback, Some(index), pdo.id, pdo.length(), period_ns)
+    }));
+    messages.extend(
+        data.commands
+            .iter()
+            .map(|pdo| message(MessageKind::SetPoint, Some(index), pdo.id, pdo.length(), period_ns)),
+    );
+    messages.extend(axis.heartbeat_ns.map(|heartbeat_ns| {
+        let id = Id::canopen(0x700, axis.node);
+        message(MessageKind::DriveHeartbeat, Some(index), id, HEARTBEAT_BYTES, heartbeat_ns)
+    }));
+    messages
+}
+
+/// One transfer at a time for each node, at most one request in a cycle for each service frame that the bus allows.
+/// A drive answers after 0.3 to 1 ms, so two of its answers may follow each other more closely than a cycle.
+fn sdo(index: usize, axis: &Axis, period_ns: u64) -> [BusMessage; 2] {
+    let request =
+        message(MessageKind::SdoRequest, Some(index), Id::canopen(0x600, axis.node), SDO_BYTES, period_ns);
+    let response =
+        message(MessageKind::SdoResponse, Some(index), Id::canopen(0x580, axis.node), SDO_BYTES, period_ns);
+    [
+        BusMessage { deadline_ns: None, ..request },
+        BusMessage { deadline_ns: None, jitter_ns: period_ns, ..response },
+    ]
+}

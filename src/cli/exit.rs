@@ -1,0 +1,30 @@
+//! How a subcommand ends, as the shell sees it.
+
+use std::process::{ExitCode, Termination};
+
+/// The exit codes of every subcommand.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Exit {
+    /// Everything was done.
+    Done,
+    /// The run ended in a stop or a fault, or a check found something that forbids what was asked.
+    Stopped,
+    /// The configuration or the command line is wrong; nothing was done.
+    Usage,
+    /// Real-time set-up was required and refused.
+    RealtimeRefused,
+    /// Ctrl-C or SIGTERM; the axes were stopped in control.
+    Interrupted,
+}
+
+impl Termination for Exit {
+    fn report(self) -> ExitCode {
+        ExitCode::from(match self {
+            Self::Done => 0,
+            Self::Stopped => 1,
+            Self::Usage => 2,
+            Self::RealtimeRefused => 3,
+            Self::Interrupted => 130,
+        })
+    }
+}

@@ -1,0 +1,251 @@
+//! `takt run`: the main job.
+
+use std::io::{IsTerminal, Write, stderr, stdout};
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+use serde::Serialize;
+use signal_hook::consts::{SIGINT, SIGTERM};
+
+use takt::bus::schedule;
+use takt::config::Config;
+use takt::controller::realtime_thread::StartError;
+use takt::controller::session::{self, Session, SessionError, SessionOptions};
+use takt::controller::{Interrupt, Outcome, Progress};
+use takt::telemetry::{Destination, Emphasis, Machine, Notice, RealtimeReport, RunOutcome, RunReport, words};
+use takt_rt::record::{Event, EventKind};
+use takt_rt::stop::StopReason;
+
+use super::configuration::{self, BusOverride};
+use super::exit::Exit;
+
+/// Bring the drives up, run the motion program of a configuration, stop in control, and report.
+#[derive(Args, Debug)]
+pub struct Arguments {
+    /// The configuration (TOML)
+    config: PathBuf,
+    /// Connect a bus to another interface than the configuration says: sim, can0, vcan0 …
+    #[arg(long = "bus", value_name = "NAME=INTERFACE")]
+    buses: Vec<BusOverride>,
+    /// Repeat the program until this many seconds are over
+    #[arg(long, value_name = "S", value_parser = configuration::seconds)]
+    duration: Option<Duration>,
+    /// Record to this file instead of a new one in the configured folder
+    #[arg(long, value_name = "FILE.mcap")]
+    record: Option<PathBuf>,
+    /// End with exit code 3 before anything moves if the system refuses a step of the real-time set-up
+    #[arg(long)]
+    require_realtime: bool,
+    /// Print the report as one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+/// The report, and how the run ended.
+#[derive(Serialize)]
+struct Printed<'a> {
+    #[serde(flatten)]
+    report: &'a RunReport,
+    /// `finished`, `interrupted`, `stopped` or `failed`.
+    ended: &'static str,
+    /// Why the run failed, in words, where it was not a stop of the group.
+    failure: Option<String>,
+}
+
+/// Runs it.
+pub fn run(arguments: Arguments) -> Exit {
+    let config = match configuration::load(&arguments.config, &arguments.buses) {
+        Ok(config) => config,
+        Err(exit) => return exit,
+    };
+    if let Err(refused) = schedule::verify(&config) {
+        eprintln!("takt: {refused}");
+        return Exit::Usage;
+    }
+    let mut signals = match Signals::watch() {
+        Ok(signals) => signals,
+        Err(error) => {
+            eprintln!("takt: cannot watch for Ctrl-C: {error}");
+            return Exit::Stopped;
+        }
+    };
+    let bar = progress_bar(&config);
+    let options = SessionOptions {
+        duration_ns: arguments.duration.map(|duration| duration.as_nanos() as u64),
+        recording: arguments.record.map(Destination::File),
+        is_realtime_required: arguments.require_realtime,
+    };
+    let notify = notices(&bar, Machine::of(&config));
+    let mut drawn = Drawn::new(bar.clone());
+    let session = session::run(&config, options, notify, |_, progress| {
+        drawn.show(&progress);
+        signals.next()
+    });
+    bar.finish_and_clear();
+    match session {
+        Ok(session) => report(&config, &session, arguments.json),
+        Err(error) => refuse(&error),
+    }
+}
+
+fn refuse(error: &SessionError) -> Exit {
+    eprintln!("takt: {error}");
+    let SessionError::Start(StartError::Refused(report)) = error else { return Exit::Usage };
+    let realtime = RealtimeReport::new(report, 0, 0);
+    realtime.refused.iter().for_each(|refused| eprintln!("  refused: {refused}"));
+    realtime.grant_with.iter().for_each(|command| eprintln!("  grant it with: {command}"));
+    Exit::RealtimeRefused
+}
+
+fn report(config: &Config, session: &Session, as_json: bool) -> Exit {
+    let faults = session.ended.map_or(0, |ended| ended.page_faults.minor + ended.page_faults.major);
+    let begun = session.begun;
+    let outcome = RunOutcome {
+        realtime: RealtimeReport::new(&begun.report, begun.spin_guard_ns, faults),
+        last: session.snapshot,
+        buses_open_ns: session.open_ns,
+        targets: session.target.clone(),
+        stop: stop_of(session),
+    };
+    let report = RunReport::new(&session.log, &outcome);
+    let failure = failure(config, &session.outcome);
+    let (ended, exit) = match session.outcome {
+        Outcome::Finished => ("finished", Exit::Done),
+        Outcome::Interrupted => ("interrupted", Exit::Interrupted),
+        Outcome::Stopped(_) => ("stopped", Exit::Stopped),
+        _ => ("failed", Exit::Stopped),
+    };
+    if as_json {
+        let printed = Printed { report: &report, ended, failure };
+        match serde_json::to_string(&printed) {
+            Ok(json) => print(&format!("{json}\n")),
+            Err(error) => eprintln!("takt: the report cannot be written as JSON: {error}"),
+        }
+    } else {
+        match failure {
+            Some(failure) => eprintln!("takt: {failure}"),
+            None => print(&report.picture(if stdout().is_terminal() { Emphasis::Ansi } else { Emphasis::None })),
+        }
+    }
+    exit
+}
+
+/// A reader that has seen enough (`| head`) is no failure of the run.
+fn print(text: &str) {
+    let _ = stdout().write_all(text.as_bytes());
+}
+
+fn stop_of(session: &Session) -> Option<StopReason> {
+    match session.outcome {
+        Outcome::Stopped(stop) => Some(stop),
+        Outcome::Interrupted => session.snapshot.stop,
+        _ => None,
+    }
+}
+
+fn failure(config: &Config, outcome: &Outcome) -> Option<String> {
+    let name = |axis: usize| config.axes.get(axis).map_or("?", |axis| axis.name.as_str());
+    match outcome {
+        Outcome::Finished | Outcome::Interrupted | Outcome::Stopped(_) => None,
+        Outcome::BringUpFailed(error) => Some(error.to_string()),
+        Outcome::FaultPersists { axis, code } => Some(format!(
+            "{}: the drive is in a fault ({code:#06x}) that a fault reset does not clear",
+            name(*axis)
+        )),
+        Outcome::NotHeard { axis } => Some(format!(
+            "{}: the drive is operational but sends no feedback; is another master changing its PDOs?",
+            name(*axis)
+        )),
+        Outcome::MoveRefused { number } => Some(format!(
+            "move {number} of the program was refused: its target or a fraction lies outside the limits"
+        )),
+        Outcome::Stuck { phase } => {
+            Some(format!("the group did not get any further while it was {}", words::phase(*phase)))
+        }
+        Outcome::ThreadDied => {
+            Some("the real-time thread ended by itself; this is a defect of takt, please report it".to_owned())
+        }
+    }
+}
+
+/// Ctrl-C and SIGTERM. The first asks for a controlled stop, the second for an immediate one.
+struct Signals {
+    arrived: Arc<AtomicBool>,
+    next: Interrupt,
+}
+
+impl Signals {
+    fn watch() -> std::io::Result<Self> {
+        let arrived = Arc::new(AtomicBool::new(false));
+        for signal in [SIGINT, SIGTERM] {
+            signal_hook::flag::register(signal, Arc::clone(&arrived))?;
+        }
+        Ok(Self { arrived, next: Interrupt::Controlled })
+    }
+
+    fn next(&mut self) -> Option<Interrupt> {
+        let has_arrived = self.arrived.swap(false, Ordering::Relaxed);
+        has_arrived.then(|| std::mem::replace(&mut self.next, Interrupt::Immediate))
+    }
+}
+
+const BAR_STEPS: u64 = 1000;
+
+fn progress_bar(config: &Config) -> ProgressBar {
+    if !stderr().is_terminal() {
+        return ProgressBar::hidden();
+    }
+    let bar = ProgressBar::new(BAR_STEPS);
+    if let Ok(style) = ProgressStyle::with_template("{prefix}  [{bar:40}]  {elapsed}  {wide_msg}") {
+        bar.set_style(style.progress_chars("━╸─"));
+    }
+    bar.set_prefix(config.name.clone());
+    bar
+}
+
+/// A progress bar that is redrawn some times a second at most, and only when it has changed.
+struct Drawn {
+    bar: ProgressBar,
+    last: Option<(Instant, Progress)>,
+}
+
+impl Drawn {
+    const INTERVAL: Duration = Duration::from_millis(100);
+
+    fn new(bar: ProgressBar) -> Self {
+        Self { bar, last: None }
+    }
+
+    fn show(&mut self, progress: &Progress) {
+        if self.last.as_ref().is_some_and(|(at, _)| at.elapsed() < Self::INTERVAL) {
+            return;
+        }
+        if let Some(fraction) = progress.fraction {
+            self.bar.set_position((fraction * BAR_STEPS as f64) as u64);
+        }
+        self.bar.set_message(progress.what.clone());
+        self.last = Some((Instant::now(), progress.clone()));
+    }
+}
+
+/// What is no part of an ordinary run.
+fn is_urgent(event: &Event) -> bool {
+    matches!(event.kind, EventKind::Stop(_) | EventKind::Emergency { .. } | EventKind::Refused { .. })
+}
+
+/// Says at once what people should not have to wait for.
+fn notices(bar: &ProgressBar, machine: Machine) -> Box<dyn FnMut(&Notice) + Send> {
+    let bar = bar.clone();
+    Box::new(move |notice| {
+        let text = match notice {
+            Notice::NotWritten(text) => format!("takt: {text}"),
+            Notice::Event(event) if is_urgent(event) => words::event(event, &machine),
+            Notice::Event(_) => return,
+        };
+        bar.suspend(|| eprintln!("{text}"));
+    })
+}

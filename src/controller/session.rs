@@ -1,0 +1,148 @@
+//! A controller in real time, from the configuration to what is left of the run.
+
+use std::thread;
+use std::time::Duration;
+
+use takt_rt::door::Snapshot;
+use takt_rt::linux::MonotonicClock;
+use takt_rt::port::Clock;
+
+use super::assemble::{self, AssembleError};
+use super::channels::{ChannelSizes, channels};
+use super::realtime_thread::{self, Begun, Ended, StartError, Work};
+use super::supervisor::{Interrupt, Outcome, Progress, Supervisor};
+use crate::bus::port::{OpenError, Port};
+use crate::bus::trace::Trace;
+use crate::config::Config;
+use crate::telemetry::{Destination, LogSummary, Logger, LoggerOptions, LoggerThread, Machine, Notice, WallClock};
+
+/// A pause between two looks at the controller.
+const PAUSE: Duration = Duration::from_millis(1);
+
+/// What a run is asked for beside its configuration.
+#[derive(Default)]
+pub struct SessionOptions {
+    /// Repeat the program until this time is over.
+    pub duration_ns: Option<u64>,
+    /// Where to record to, instead of where the configuration says.
+    pub recording: Option<Destination>,
+    /// Whether a refused step of the real-time set-up ends the run before anything moves.
+    pub is_realtime_required: bool,
+}
+
+/// What is left of a run.
+#[derive(Clone, Debug)]
+pub struct Session {
+    /// How it ended.
+    pub outcome: Outcome,
+    /// The state after the last cycle.
+    pub snapshot: Snapshot,
+    /// Where the last move led (rad or m), an axis each.
+    pub target: Option<Vec<f64>>,
+    /// What came of the real-time set-up.
+    pub begun: Begun,
+    /// How the loop was; `None` if the thread died.
+    pub ended: Option<Ended>,
+    /// How long the buses were open.
+    pub open_ns: u64,
+    /// What the logger leaves behind.
+    pub log: LogSummary,
+}
+
+/// Why there was no run.
+#[derive(Debug, thiserror::Error)]
+pub enum SessionError {
+    /// The configuration asks for what cannot be done.
+    #[error(transparent)]
+    Assemble(#[from] AssembleError),
+    /// A bus cannot be opened.
+    #[error(transparent)]
+    Open(#[from] OpenError),
+    /// The logger has no thread.
+    #[error("the logger could not be started: {0}")]
+    Logger(std::io::Error),
+    /// The real-time thread does not run.
+    #[error(transparent)]
+    Start(#[from] StartError),
+}
+
+/// Runs the program of a configuration. `notify` hears what the logger has to say, from its thread. `watch` is called
+/// about once in a millisecond with what the run is doing, and may ask it to end.
+///
+/// # Errors
+/// See [`SessionError`]; nothing has moved then.
+pub fn run(
+    config: &Config,
+    options: SessionOptions,
+    notify: Box<dyn FnMut(&Notice) + Send>,
+    mut watch: impl FnMut(&Supervisor, Progress) -> Option<Interrupt>,
+) -> Result<Session, SessionError> {
+    let mut clock = MonotonicClock::default();
+    let engine = Box::new(assemble::engine(config)?);
+    let (ports, traces) = open_ports(config)?;
+    let (rt, mut host, log) = channels(&ChannelSizes::of(config));
+    let mut supervisor = Supervisor::new(config, options.duration_ns);
+
+    let own = |is_wanted: bool| is_wanted.then(|| Destination::Directory(config.telemetry.directory.clone()));
+    let started_ns = clock.now_ns();
+    let logger_options = LoggerOptions {
+        machine: Machine::of(config),
+        wall_clock: WallClock::starting_now(started_ns),
+        started_ns,
+        recording: options.recording.or_else(|| own(config.telemetry.is_recorded)),
+        candump: own(config.telemetry.is_candump_written),
+        traces,
+    };
+    // The logger's thread starts before the real-time thread is elevated and inherits nothing of it.
+    let logger =
+        LoggerThread::start(Logger::new(log, logger_options, notify)).map_err(SessionError::Logger)?;
+    let work = Work {
+        engine,
+        plan: assemble::slot_plan(config),
+        ports,
+        door: rt,
+        spin_guard_ns: config.realtime.spin_guard_ns,
+        is_realtime_required: options.is_realtime_required,
+    };
+    let running = match realtime_thread::start(realtime_thread::thread_config(&config.realtime), work) {
+        Ok(running) => running,
+        Err(error) => {
+            logger.finish();
+            return Err(error.into());
+        }
+    };
+    let begun = running.begun();
+    while !running.is_finished() {
+        supervisor.poll(clock.now_ns(), &mut host);
+        if let Some(interrupt) = watch(&supervisor, supervisor.progress()) {
+            supervisor.interrupt(interrupt);
+        }
+        thread::sleep(PAUSE);
+    }
+    let ended = running.join();
+    Ok(Session {
+        outcome: supervisor.outcome().cloned().unwrap_or(Outcome::ThreadDied),
+        snapshot: host.snapshot(),
+        target: supervisor.target().map(<[f64]>::to_vec),
+        begun,
+        ended,
+        open_ns: clock.now_ns().saturating_sub(started_ns),
+        log: logger.finish(),
+    })
+}
+
+fn open_ports(config: &Config) -> Result<(Vec<Port>, Vec<Trace>), OpenError> {
+    let mut ports = Vec::with_capacity(config.buses.len());
+    let mut traces = Vec::new();
+    for (index, bus) in config.buses.iter().enumerate() {
+        let port = Port::open(config, index)?;
+        ports.push(if config.telemetry.is_candump_written {
+            let (port, trace) = port.traced(&bus.name);
+            traces.push(trace);
+            port
+        } else {
+            port
+        });
+    }
+    Ok((ports, traces))
+}

@@ -1,0 +1,142 @@
+//! A whole controller in virtual time: the same engine, cycle, channels, life cycle and logger as in the real-time
+//! thread, but in one thread and on a clock that jumps, so that hours of motion take seconds and the same
+//! configuration gives the same run bit for bit.
+
+use takt_rt::cycle::{Cycle, Flow};
+use takt_rt::door::Snapshot;
+use takt_rt::engine::Engine;
+use takt_rt::port::{BusPort, Clock, Wake};
+use takt_rt::time::Grid;
+
+use super::assemble::{self, AssembleError};
+use super::channels::{ChannelSizes, HostSide, LogSide, RtSide, channels};
+use super::supervisor::{Interrupt, Outcome, Supervisor};
+use crate::config::Config;
+use crate::sim::SimulatedBus;
+
+/// A clock that is always on time, unless it is told to be late.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct VirtualClock {
+    now_ns: u64,
+    stall_ns: u64,
+}
+
+impl VirtualClock {
+    /// The next wait ends this much later than asked for.
+    pub fn stall(&mut self, ns: u64) {
+        self.stall_ns += ns;
+    }
+}
+
+impl Clock for VirtualClock {
+    fn now_ns(&mut self) -> u64 {
+        self.now_ns
+    }
+
+    fn wait_until(&mut self, deadline_ns: u64) -> Wake {
+        let timer_latency_ns = std::mem::take(&mut self.stall_ns);
+        self.now_ns = self.now_ns.max(deadline_ns) + timer_latency_ns;
+        Wake { now_ns: self.now_ns, timer_latency_ns }
+    }
+}
+
+/// A controller in virtual time on any kind of port.
+pub struct VirtualRun<P> {
+    engine: Box<Engine>,
+    cycle: Cycle,
+    clock: VirtualClock,
+    ports: Vec<P>,
+    rt: RtSide,
+    host: HostSide,
+    supervisor: Supervisor,
+    is_over: bool,
+}
+
+impl VirtualRun<SimulatedBus> {
+    /// A controller of this configuration on simulated buses, and the side for its logger.
+    ///
+    /// # Errors
+    /// See [`assemble::engine`].
+    pub fn simulated(config: &Config) -> Result<(Self, LogSide), AssembleError> {
+        let ports = (0..config.buses.len()).map(|bus| SimulatedBus::new(config, bus)).collect();
+        Self::new(config, ports)
+    }
+}
+
+impl<P: BusPort> VirtualRun<P> {
+    /// A controller of this configuration on these ports, and the side for its logger.
+    ///
+    /// # Errors
+    /// See [`assemble::engine`].
+    pub fn new(config: &Config, ports: Vec<P>) -> Result<(Self, LogSide), AssembleError> {
+        let engine = Box::new(assemble::engine(config)?);
+        let (rt, host, log) = channels(&ChannelSizes::of(config));
+        let period_ns = config.cycle.period_ns.max(1);
+        let grid =
+            Grid::new(period_ns, period_ns).unwrap_or_else(|| unreachable!("the period is at least 1 ns"));
+        let run = Self {
+            engine,
+            cycle: Cycle::new(grid, assemble::slot_plan(config)),
+            clock: VirtualClock::default(),
+            ports,
+            rt,
+            host,
+            supervisor: Supervisor::new(config, None),
+            is_over: false,
+        };
+        Ok((run, log))
+    }
+
+    /// One cycle and what the life cycle has to do after it. Returns `false` once the loop has ended.
+    pub fn step(&mut self) -> bool {
+        if self.is_over {
+            return false;
+        }
+        let flow = self.cycle.run(&mut self.engine, &mut self.clock, &mut self.ports, &mut self.rt);
+        self.supervisor.poll(self.clock.now_ns, &mut self.host);
+        self.is_over = flow == Flow::Leave;
+        !self.is_over
+    }
+
+    /// Runs to the end of the life cycle, or for `at_most` cycles. Calls `each` after every cycle.
+    pub fn run(&mut self, at_most: u64, mut each: impl FnMut(&mut Self)) -> Option<Outcome> {
+        for _ in 0..at_most {
+            let goes_on = self.step();
+            each(self);
+            if !goes_on {
+                break;
+            }
+        }
+        self.supervisor.outcome().cloned()
+    }
+
+    /// Asks the run to end.
+    pub fn interrupt(&mut self, interrupt: Interrupt) {
+        self.supervisor.interrupt(interrupt);
+    }
+
+    /// The state after the last cycle.
+    pub fn snapshot(&self) -> Snapshot {
+        self.host.snapshot()
+    }
+
+    /// The life cycle.
+    pub fn supervisor(&self) -> &Supervisor {
+        &self.supervisor
+    }
+
+    /// The host's side of the door, to command the group directly.
+    pub fn host(&mut self) -> &mut HostSide {
+        &mut self.host
+    }
+
+    /// The clock, to make it late.
+    pub fn clock(&mut self) -> &mut VirtualClock {
+        &mut self.clock
+    }
+
+    /// The ports, to look at the simulated drives or to break something.
+    pub fn ports(&mut self) -> &mut [P] {
+        &mut self.ports
+    }
+}

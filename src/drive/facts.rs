@@ -1,0 +1,112 @@
+//! What a bring-up learns of a drive.
+
+use takt_rt::cia402::State;
+
+use super::step::{Fact, TextFact};
+use crate::canopen::emcy::{Emergency, ErrorCode};
+use crate::canopen::object::ObjectAddress;
+
+/// What a drive has said of itself. Numbers are as of the last time they were read.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct AxisFacts {
+    /// Who it is.
+    pub identity: DeviceIdentity,
+    /// What it calls itself and its parts, where it does.
+    pub texts: DeviceTexts,
+    /// Object 6502: a bit for each mode.
+    pub supported_modes: u32,
+    /// Object 6041.
+    pub statusword: u16,
+    /// Object 603F.
+    pub error_code: ErrorCode,
+    /// Object 6064 in counts.
+    pub position_counts: i32,
+    /// Object 6076 in N·m: 1000 per mille of torque objects. `None` when the drive does not tell.
+    pub rated_torque: Option<f64>,
+    /// Object 6075 in A: 1000 per mille of current objects. `None` when the drive does not tell.
+    pub rated_current_a: Option<f64>,
+    /// Object 6072 in per mille of the rated torque. `None` when the drive has none.
+    pub max_torque_per_mille: Option<u16>,
+    /// Object 605A. `None` when the drive has none.
+    pub quick_stop_option_code: Option<i16>,
+    /// The last emergency message, unless it told that the error has gone.
+    pub emergency: Option<Emergency>,
+    /// Optional objects that the drive has refused.
+    pub absent: Vec<ObjectAddress>,
+    /// How often it has booted again after its first boot-up, and was configured anew. A drive that is reset just when
+    /// it has powered up obeys late, which counts too.
+    pub restarts: u8,
+}
+
+/// Objects 1000 and 1018.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct DeviceIdentity {
+    /// Object 1000.
+    pub device_type: u32,
+    /// Object 1018:1.
+    pub vendor_id: u32,
+    /// Object 1018:2.
+    pub product_code: u32,
+    /// Object 1018:3.
+    pub revision_number: u32,
+}
+
+/// Objects 1008, 1009 and 100A, each where the drive has it.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct DeviceTexts {
+    /// Object 1008.
+    pub device_name: Option<String>,
+    /// Object 1009.
+    pub hardware_version: Option<String>,
+    /// Object 100A.
+    pub software_version: Option<String>,
+}
+
+impl AxisFacts {
+    /// The state in the last statusword.
+    pub const fn state(&self) -> State {
+        State::decode(self.statusword)
+    }
+
+    /// What is wrong, when the drive is in a fault: object 603F, or when that is zero the code of the last emergency.
+    pub fn fault(&self) -> Option<ErrorCode> {
+        let reported = match self.error_code {
+            ErrorCode::NONE => self.emergency.map_or(ErrorCode::NONE, |emergency| emergency.code),
+            code => code,
+        };
+        self.state().is_faulted().then_some(reported)
+    }
+
+    /// Keeps a number. The number fits: it was decoded by the object's type.
+    pub(super) fn keep(&mut self, fact: Fact, value: i64) {
+        let thousandths = |value: i64| (value > 0).then_some(value as f64 / 1000.0);
+        match fact {
+            Fact::DeviceType => self.identity.device_type = value as u32,
+            Fact::VendorId => self.identity.vendor_id = value as u32,
+            Fact::ProductCode => self.identity.product_code = value as u32,
+            Fact::RevisionNumber => self.identity.revision_number = value as u32,
+            Fact::SupportedModes => self.supported_modes = value as u32,
+            Fact::Statusword => self.statusword = value as u16,
+            Fact::ErrorCode => self.error_code = ErrorCode(value as u16),
+            Fact::Position => self.position_counts = value as i32,
+            Fact::RatedCurrent => self.rated_current_a = thousandths(value),
+            Fact::RatedTorque => self.rated_torque = thousandths(value),
+            Fact::MaxTorque => self.max_torque_per_mille = Some(value as u16),
+            Fact::QuickStopOptionCode => self.quick_stop_option_code = Some(value as i16),
+        }
+    }
+
+    pub(super) fn keep_text(&mut self, fact: TextFact, text: String) {
+        let place = match fact {
+            TextFact::DeviceName => &mut self.texts.device_name,
+            TextFact::HardwareVersion => &mut self.texts.hardware_version,
+            TextFact::SoftwareVersion => &mut self.texts.software_version,
+        };
+        *place = Some(text);
+    }
+
+    pub(super) fn keep_emergency(&mut self, emergency: Emergency) {
+        let is_gone = emergency.code.0 & 0xFF00 == 0;
+        self.emergency = (!is_gone).then_some(emergency);
+    }
+}

@@ -1,0 +1,60 @@
+//! A log of every frame in the format of `candump -l`: `(1700000000.000123) can0 181#3712`, `##` for CAN FD.
+//! `canplayer`, `log2asc`, python-can, SavvyCAN and Wireshark read it.
+
+use std::io::{self, BufWriter, Write};
+
+use takt_rt::time::{NANOSECONDS_PER_SECOND, Nanoseconds};
+
+use super::destination::Opened;
+use super::wall_clock::WallClock;
+use crate::bus::trace::{Trace, TracedFrame};
+
+/// Received frames are read some time after they arrived, when others have been sent, and the buses are read one
+/// after the other: frames wait this long before they are written, so that the log is in the order of time.
+const REORDER_NS: Nanoseconds = 20_000_000;
+
+/// A log that is being written.
+pub struct CandumpLog {
+    /// What to call it in messages.
+    pub label: String,
+    writer: BufWriter<Box<dyn Write + Send>>,
+    wall_clock: WallClock,
+    waiting: Vec<(TracedFrame, usize)>,
+}
+
+impl CandumpLog {
+    pub fn new(opened: Opened, wall_clock: WallClock) -> Self {
+        let writer = BufWriter::new(opened.writer);
+        Self { label: opened.label, writer, wall_clock, waiting: Vec::new() }
+    }
+
+    /// Takes what the traces hold and writes what is old enough.
+    pub fn drain(&mut self, traces: &mut [Trace]) -> io::Result<()> {
+        for (bus, trace) in traces.iter_mut().enumerate() {
+            while let Some(frame) = trace.take() {
+                self.waiting.push((frame, bus));
+            }
+        }
+        self.waiting.sort_by_key(|(frame, _)| frame.at_ns);
+        let newest_ns = self.waiting.last().map_or(0, |(frame, _)| frame.at_ns);
+        self.write_until(newest_ns.saturating_sub(REORDER_NS), traces)
+    }
+
+    /// Writes the rest.
+    pub fn finish(mut self, traces: &mut [Trace]) -> io::Result<()> {
+        self.drain(traces)?;
+        self.write_until(Nanoseconds::MAX, traces)?;
+        self.writer.flush()
+    }
+
+    fn write_until(&mut self, until_ns: Nanoseconds, traces: &[Trace]) -> io::Result<()> {
+        let ready = self.waiting.partition_point(|(frame, _)| frame.at_ns <= until_ns);
+        for (traced, bus) in self.waiting.drain(..ready) {
+            let name = traces.get(bus).map_or("can", Trace::name);
+            let unix_ns = self.wall_clock.unix_ns(traced.at_ns);
+            let (seconds, rest_ns) = (unix_ns / NANOSECONDS_PER_SECOND, unix_ns % NANOSECONDS_PER_SECOND);
+            writeln!(self.writer, "({seconds}.{:06}) {name} {:?}", rest_ns / 1000, traced.frame)?;
+        }
+        Ok(())
+    }
+}

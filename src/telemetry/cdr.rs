@@ -1,0 +1,111 @@
+//! The encoding of ROS 2 messages: OMG CDR, little-endian, in the encapsulation of DDSI-RTPS 10.2 (a header of four
+//! bytes, then every number aligned to its size, counted from behind the header).
+
+/// Encodes one message after the other into the same memory.
+#[derive(Default)]
+pub struct CdrEncoder {
+    bytes: Vec<u8>,
+}
+
+/// CDR_LE, no options.
+const HEADER: [u8; 4] = [0x00, 0x01, 0x00, 0x00];
+
+impl CdrEncoder {
+    /// Forgets the last message and begins the next.
+    pub fn begin(&mut self) -> &mut Self {
+        self.bytes.clear();
+        self.bytes.extend_from_slice(&HEADER);
+        self
+    }
+
+    /// The message so far.
+    pub fn bytes(&self) -> &[u8] {
+        &self.bytes
+    }
+
+    fn put<const N: usize>(&mut self, little_endian: [u8; N]) -> &mut Self {
+        let behind_header = self.bytes.len() - HEADER.len();
+        self.bytes.resize(HEADER.len() + behind_header.next_multiple_of(N), 0);
+        self.bytes.extend_from_slice(&little_endian);
+        self
+    }
+
+    /// `uint8`
+    pub fn u8(&mut self, value: u8) -> &mut Self {
+        self.put([value])
+    }
+
+    /// `uint16`
+    pub fn u16(&mut self, value: u16) -> &mut Self {
+        self.put(value.to_le_bytes())
+    }
+
+    /// `int16`
+    pub fn i16(&mut self, value: i16) -> &mut Self {
+        self.put(value.to_le_bytes())
+    }
+
+    /// `uint32`
+    pub fn u32(&mut self, value: u32) -> &mut Self {
+        self.put(value.to_le_bytes())
+    }
+
+    /// `int32`
+    pub fn i32(&mut self, value: i32) -> &mut Self {
+        self.put(value.to_le_bytes())
+    }
+
+    /// `uint64`
+    pub fn u64(&mut self, value: u64) -> &mut Self {
+        self.put(value.to_le_bytes())
+    }
+
+    /// `float32`
+    pub fn f32(&mut self, value: f32) -> &mut Self {
+        self.put(value.to_le_bytes())
+    }
+
+    /// `float64`
+    pub fn f64(&mut self, value: f64) -> &mut Self {
+        self.put(value.to_le_bytes())
+    }
+
+    /// `uint8[N]`: an array of fixed length has no length in front.
+    pub fn octets<const N: usize>(&mut self, values: [u8; N]) -> &mut Self {
+        self.bytes.extend_from_slice(&values);
+        self
+    }
+
+    /// `string`: its length with the closing zero, then its bytes.
+    pub fn string(&mut self, text: &str) -> &mut Self {
+        self.u32(text.len() as u32 + 1);
+        self.bytes.extend_from_slice(text.as_bytes());
+        self.bytes.push(0);
+        self
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_number_is_aligned_to_its_size_behind_the_header() {
+        let mut encoder = CdrEncoder::default();
+        encoder.begin().u8(1).u16(0x0302).u8(4).u64(5).u8(6).i32(-2);
+        let expected: &[&[u8]] = &[
+            &[0, 1, 0, 0],
+            &[1, 0, 2, 3, 4, 0, 0, 0],
+            &[5, 0, 0, 0, 0, 0, 0, 0],
+            &[6, 0, 0, 0, 0xFE, 0xFF, 0xFF, 0xFF],
+        ];
+        assert_eq!(encoder.bytes(), expected.concat());
+    }
+
+    #[test]
+    fn a_string_has_its_length_with_the_closing_zero_and_an_array_has_none() {
+        let mut encoder = CdrEncoder::default();
+        encoder.begin().u64(9).begin().string("ab").octets([7, 8]);
+        assert_eq!(encoder.bytes(), [0, 1, 0, 0, 3, 0, 0, 0, b'a', b'b', 0, 7, 8]);
+    }
+}

@@ -1,0 +1,109 @@
+//! Where a recording goes. An existing file is never overwritten.
+
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+/// Where a recording or a log is written.
+pub enum Destination {
+    /// A new file in this folder, named after the machine and the time. The folder is made if it does not exist.
+    Directory(PathBuf),
+    /// This file; with `-2`, `-3` … before its extension if it exists already. Its folder is made if need be.
+    File(PathBuf),
+    /// Anything that takes bytes, and what to call it in messages.
+    Stream(String, Box<dyn Write + Send>),
+}
+
+/// Something open for writing.
+pub struct Opened {
+    /// What to call it in messages.
+    pub label: String,
+    /// The file, if it is one.
+    pub path: Option<PathBuf>,
+    /// Takes the bytes.
+    pub writer: Box<dyn Write + Send>,
+}
+
+/// What could not be opened, and why.
+#[derive(Debug, thiserror::Error)]
+#[error("{path}: {reason}")]
+pub struct OpenError {
+    path: String,
+    reason: io::Error,
+}
+
+impl Destination {
+    /// Opens it; `stem` and `extension` make the file name where the destination leaves it open.
+    pub fn open(self, stem: &str, extension: &str) -> Result<Opened, OpenError> {
+        let path = match self {
+            Self::Directory(directory) => directory.join(format!("{}.{extension}", file_name(stem))),
+            Self::File(path) => path,
+            Self::Stream(label, writer) => return Ok(Opened { label, path: None, writer }),
+        };
+        let (path, file) =
+            create_new(&path).map_err(|reason| OpenError { path: path.display().to_string(), reason })?;
+        Ok(Opened { label: path.display().to_string(), path: Some(path), writer: Box::new(file) })
+    }
+}
+
+/// Replaces what may not stand in a file name.
+fn file_name(stem: &str) -> String {
+    stem.chars()
+        .map(|letter| if letter.is_alphanumeric() || "-_.".contains(letter) { letter } else { '_' })
+        .collect()
+}
+
+fn create_new(path: &Path) -> io::Result<(PathBuf, File)> {
+    if let Some(directory) = path.parent() {
+        fs::create_dir_all(directory)?;
+    }
+    let mut candidate = path.to_owned();
+    for number in 2_u32.. {
+        match OpenOptions::new().write(true).create_new(true).open(&candidate) {
+            Ok(file) => return Ok((candidate, file)),
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {
+                candidate = numbered(path, number);
+            }
+            Err(error) => return Err(error),
+        }
+    }
+    Err(io::ErrorKind::AlreadyExists.into())
+}
+
+/// `run.mcap` → `run-2.mcap`
+fn numbered(path: &Path, number: u32) -> PathBuf {
+    let mut name = path.file_stem().unwrap_or_default().to_owned();
+    name.push(format!("-{number}"));
+    if let Some(extension) = path.extension() {
+        name.push(".");
+        name.push(extension);
+    }
+    path.with_file_name(name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_folder_is_made_and_an_existing_file_is_left_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let open = || {
+            let mut opened =
+                Destination::Directory(folder.path().join("a/b")).open("arm 6/x", "mcap").unwrap();
+            opened.writer.write_all(b"!").unwrap();
+            opened.path.unwrap()
+        };
+        let names = [open(), open(), open()].map(|path| path.file_name().unwrap().to_owned());
+        assert_eq!(names, ["arm_6_x.mcap", "arm_6_x-2.mcap", "arm_6_x-3.mcap"]);
+    }
+
+    #[test]
+    fn a_file_in_place_of_the_folder_is_an_error_that_names_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let obstacle = folder.path().join("runs");
+        fs::write(&obstacle, "in the way").unwrap();
+        let error = Destination::Directory(obstacle.clone()).open("arm", "mcap").err().unwrap();
+        assert!(error.to_string().starts_with(&format!("{}/arm.mcap: ", obstacle.display())), "{error}");
+    }
+}

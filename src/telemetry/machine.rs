@@ -1,0 +1,109 @@
+//! What people call the parts of the machine that records and events know by number.
+
+use std::f64::consts::TAU;
+
+use crate::config::{Axis, Config, Interface, Travel};
+
+/// Names and units of a controller.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Machine {
+    /// The name of the machine.
+    pub name: String,
+    /// Period of the cycle.
+    pub cycle_ns: u64,
+    /// The axes in the order of the configuration.
+    pub axes: Vec<AxisDescription>,
+    /// The buses in the order of the configuration.
+    pub buses: Vec<BusDescription>,
+}
+
+/// Name, unit and resolution of an axis.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AxisDescription {
+    /// Its name in the configuration.
+    pub name: String,
+    /// Whether it turns or slides.
+    pub unit: Unit,
+    /// Counts per rad (m) of the position that the drive reports.
+    pub counts_per_unit: f64,
+}
+
+/// Names of a bus.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct BusDescription {
+    /// Its name in the configuration.
+    pub name: String,
+    /// What it is connected to: `sim`, or the name of a network interface.
+    pub interface: String,
+}
+
+/// The unit of an axis' position.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Unit {
+    /// rad, and N·m
+    Radian,
+    /// m, and N
+    Metre,
+}
+
+impl Unit {
+    /// `rad` or `m`.
+    pub const fn symbol(self) -> &'static str {
+        match self {
+            Self::Radian => "rad",
+            Self::Metre => "m",
+        }
+    }
+
+    /// `mrad` or `mm`.
+    pub const fn milli_symbol(self) -> &'static str {
+        match self {
+            Self::Radian => "mrad",
+            Self::Metre => "mm",
+        }
+    }
+}
+
+impl Machine {
+    /// The names in a configuration.
+    pub fn of(config: &Config) -> Self {
+        let bus = |bus: &crate::config::Bus| BusDescription {
+            name: bus.name.clone(),
+            interface: match &bus.interface {
+                Interface::Simulated => "sim".to_owned(),
+                Interface::SocketCan(interface) => interface.clone(),
+            },
+        };
+        Self {
+            name: config.name.clone(),
+            cycle_ns: config.cycle.period_ns,
+            axes: config.axes.iter().map(AxisDescription::of).collect(),
+            buses: config.buses.iter().map(bus).collect(),
+        }
+    }
+
+    /// The name of an axis; its number when it has none.
+    pub fn axis_name(&self, axis: u8) -> String {
+        self.axes.get(usize::from(axis)).map_or_else(|| format!("axis {axis}"), |axis| axis.name.clone())
+    }
+
+    /// The unit of an axis.
+    pub fn axis_unit(&self, axis: u8) -> Unit {
+        self.axes.get(usize::from(axis)).map_or(Unit::Radian, |axis| axis.unit)
+    }
+}
+
+impl AxisDescription {
+    /// The description of a configured axis.
+    pub fn of(axis: &Axis) -> Self {
+        let (unit, travel_per_turn) = match axis.travel {
+            Travel::Rotary => (Unit::Radian, TAU),
+            Travel::Linear { lead_m } => (Unit::Metre, lead_m),
+        };
+        Self {
+            name: axis.name.clone(),
+            unit,
+            counts_per_unit: axis.counts_per_turn * axis.gear_ratio / travel_per_turn,
+        }
+    }
+}

@@ -1,0 +1,204 @@
+//! What stands in a recording: three ROS 2 messages, as text for the schemas and as CDR for the data. Foxglove,
+//! PlotJuggler and the ROS 2 tools read them without knowing takt.
+
+use takt_rt::record::{AxisRecord, CycleRecord, Event, EventKind};
+
+use super::cdr::CdrEncoder;
+
+/// A message type: its name, and its definition in the ROS 2 interface language.
+pub struct MessageType {
+    pub name: &'static str,
+    pub definition: &'static str,
+}
+
+/// The times of a cycle.
+pub const CYCLE: MessageType =
+    MessageType { name: "takt_msgs/msg/Cycle", definition: include_str!("messages/Cycle.msg") };
+
+/// One axis in a cycle.
+pub const AXIS: MessageType =
+    MessageType { name: "takt_msgs/msg/Axis", definition: include_str!("messages/Axis.msg") };
+
+/// An event.
+pub const EVENT: MessageType =
+    MessageType { name: "takt_msgs/msg/Event", definition: include_str!("messages/Event.msg") };
+
+/// Encodes a [`CYCLE`].
+pub fn encode_cycle(record: &CycleRecord, encoder: &mut CdrEncoder) {
+    let timing = &record.timing;
+    encoder
+        .begin()
+        .u64(timing.slot)
+        .u64(timing.slot_start_ns)
+        .u64(timing.wake_ns)
+        .u64(timing.sync_ns)
+        .u64(timing.compute_ns)
+        .u64(timing.sent_ns)
+        .u64(timing.missed_slots)
+        .u8(record.phase as u8)
+        .u8(record.is_commanded.into());
+}
+
+/// Encodes an [`AXIS`].
+pub fn encode_axis(slot: u64, axis: &AxisRecord, encoder: &mut CdrEncoder) {
+    encoder
+        .begin()
+        .u64(slot)
+        .f64(axis.position_set)
+        .f64(axis.position)
+        .f32(axis.velocity_set)
+        .f32(axis.acceleration_set)
+        .f32(axis.velocity)
+        .f32(axis.torque_set)
+        .f32(axis.torque)
+        .f32(axis.following_error)
+        .i32(axis.command_raw)
+        .i32(axis.position_raw)
+        .u16(axis.controlword)
+        .u16(axis.statusword)
+        .u16(axis.error_code)
+        .u16(axis.feedback_age)
+        .u8(axis.state() as u8);
+}
+
+/// The fields of an [`EVENT`] that only some kinds use.
+#[derive(Default)]
+struct EventFields {
+    kind: u8,
+    axis: Option<u8>,
+    phase_from: u8,
+    phase_to: u8,
+    category: u8,
+    rule: u8,
+    value: f64,
+    limit: f64,
+    move_id: u32,
+    missed_slots: u64,
+    statusword: u16,
+    error_code: u16,
+    error_register: u8,
+    manufacturer: [u8; 5],
+}
+
+impl EventFields {
+    fn of(kind: &EventKind) -> Self {
+        let none = Self::default();
+        match *kind {
+            EventKind::PhaseChanged { from, to } => {
+                Self { kind: 0, phase_from: from as u8, phase_to: to as u8, ..none }
+            }
+            EventKind::Stop(stop) => Self {
+                kind: 1,
+                axis: stop.axis,
+                phase_from: stop.phase as u8,
+                category: stop.category as u8,
+                rule: stop.rule as u8,
+                value: stop.value,
+                limit: stop.limit,
+                ..none
+            },
+            EventKind::MoveFinished { id } => Self { kind: 2, move_id: id, ..none },
+            EventKind::DriveState { axis, statusword } => {
+                Self { kind: 3, axis: Some(axis), statusword, ..none }
+            }
+            EventKind::Emergency { axis, code, register, manufacturer } => Self {
+                kind: 4,
+                axis: Some(axis),
+                error_code: code,
+                error_register: register,
+                manufacturer,
+                ..none
+            },
+            EventKind::MissedSlots { count } => Self { kind: 5, missed_slots: count, ..none },
+            EventKind::Refused { phase } => Self { kind: 6, phase_from: phase as u8, ..none },
+        }
+    }
+}
+
+/// Encodes an [`EVENT`]; `text` says it in words.
+pub fn encode_event(event: &Event, text: &str, encoder: &mut CdrEncoder) {
+    let fields = EventFields::of(&event.kind);
+    encoder
+        .begin()
+        .u64(event.slot)
+        .u64(event.at_ns)
+        .u8(fields.kind)
+        .string(text)
+        .i16(fields.axis.map_or(-1, i16::from))
+        .u8(fields.phase_from)
+        .u8(fields.phase_to)
+        .u8(fields.category)
+        .u8(fields.rule)
+        .f64(fields.value)
+        .f64(fields.limit)
+        .u32(fields.move_id)
+        .u64(fields.missed_slots)
+        .u16(fields.statusword)
+        .u16(fields.error_code)
+        .u8(fields.error_register)
+        .octets(fields.manufacturer);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use takt_rt::cia402::State;
+    use takt_rt::stop::{Phase, Rule};
+
+    /// The constants of a definition that stand in front of `field`, with the names as Rust writes them.
+    fn constants(message: &MessageType, field: &str) -> Vec<(String, u8)> {
+        let mut constants = Vec::new();
+        for line in message.definition.lines().filter(|line| !line.starts_with('#')) {
+            match line.split_once(' ') {
+                Some((_, name)) if name == field => return constants,
+                Some(("uint8", constant)) if constant.contains('=') => {
+                    let (name, number) = constant.split_once('=').unwrap();
+                    let camel = name.split('_').map(|word| {
+                        let (first, rest) = word.split_at(1);
+                        first.to_owned() + &rest.to_lowercase()
+                    });
+                    constants.push((camel.collect(), number.parse().unwrap()));
+                }
+                _ => constants.clear(),
+            }
+        }
+        panic!("{} has no field {field}", message.name);
+    }
+
+    #[test]
+    fn the_constants_in_the_schemas_are_those_of_the_records() {
+        let phases = Phase::ALL.map(|phase| (format!("{phase:?}"), phase as u8));
+        assert_eq!(constants(&CYCLE, "phase"), phases);
+        let states = State::ALL.map(|state| (format!("{state:?}"), state as u8));
+        assert_eq!(constants(&AXIS, "state"), states);
+        let rules = Rule::ALL.map(|rule| (format!("{rule:?}"), rule as u8));
+        assert_eq!(constants(&EVENT, "rule"), rules);
+    }
+
+    #[test]
+    fn the_constants_of_the_event_kinds_are_those_that_are_encoded() {
+        let kinds = [
+            EventKind::PhaseChanged { from: Phase::Passive, to: Phase::Disabled },
+            EventKind::Stop(takt_rt::stop::StopReason {
+                category: takt_rt::stop::StopCategory::One,
+                rule: Rule::DriveFault,
+                axis: Some(3),
+                value: 0.0,
+                limit: 0.0,
+                slot: 0,
+                phase: Phase::Moving,
+            }),
+            EventKind::MoveFinished { id: 1 },
+            EventKind::DriveState { axis: 0, statusword: 0 },
+            EventKind::Emergency { axis: 0, code: 0, register: 0, manufacturer: [0; 5] },
+            EventKind::MissedSlots { count: 1 },
+            EventKind::Refused { phase: Phase::Moving },
+        ];
+        let encoded = kinds.map(|kind| {
+            let name = format!("{kind:?}");
+            let name = name.split([' ', '(']).next().unwrap().to_owned();
+            (name, EventFields::of(&kind).kind)
+        });
+        assert_eq!(constants(&EVENT, "kind"), encoded);
+    }
+}

@@ -1,0 +1,124 @@
+//! The MCAP recording: `/cycle` with the times, `/axis/<name>` for each axis, `/events`. Every message has the start
+//! of its slot, as time of day, for its time.
+
+use std::collections::BTreeMap;
+use std::io::{BufWriter, Write};
+
+use mcap::records::{MessageHeader, Metadata};
+use mcap::write::NoSeek;
+use mcap::{McapError, McapResult, WriteOptions};
+use takt_rt::record::{CycleRecord, Event};
+use takt_rt::stop::Phase;
+
+use super::cdr::CdrEncoder;
+use super::destination::Opened;
+use super::machine::Machine;
+use super::messages::{self, MessageType};
+use super::wall_clock::WallClock;
+
+/// Chunks of this size reach the file in one go: a third of a second of six axes at 1 ms, which is what a crash of
+/// the whole machine costs.
+const CHUNK_BYTES: u64 = 256 * 1024;
+
+/// A recording that is being written.
+pub struct Recording {
+    /// What to call it in messages.
+    pub label: String,
+    writer: mcap::Writer<NoSeek<BufWriter<Box<dyn Write + Send>>>>,
+    encoder: CdrEncoder,
+    wall_clock: WallClock,
+    cycle_channel: u16,
+    event_channel: u16,
+    axis_channels: Vec<u16>,
+    last_phase: Phase,
+}
+
+impl Recording {
+    /// Writes the beginning: schemas, channels, and what the machine is.
+    pub fn begin(opened: Opened, machine: &Machine, wall_clock: WallClock) -> McapResult<Self> {
+        let mut writer = WriteOptions::new()
+            .profile("ros2")
+            .library(concat!("takt ", env!("CARGO_PKG_VERSION")))
+            .compression(None)
+            .chunk_size(Some(CHUNK_BYTES))
+            .disable_seeking(true)
+            .create(NoSeek::new(BufWriter::new(opened.writer)))?;
+        writer.write_metadata(&Metadata { name: "takt".to_owned(), metadata: describe(machine) })?;
+        let mut schema =
+            |message: &MessageType| writer.add_schema(message.name, "ros2msg", message.definition.as_bytes());
+        let (cycle, axis, event) =
+            (schema(&messages::CYCLE)?, schema(&messages::AXIS)?, schema(&messages::EVENT)?);
+        let mut channel = |schema, topic: &str, metadata: &BTreeMap<_, _>| {
+            writer.add_channel(schema, topic, "cdr", metadata)
+        };
+        let cycle_channel = channel(cycle, "/cycle", &BTreeMap::new())?;
+        let event_channel = channel(event, "/events", &BTreeMap::new())?;
+        let mut axis_channels = Vec::new();
+        for (index, description) in machine.axes.iter().enumerate() {
+            let metadata = BTreeMap::from([
+                ("index".to_owned(), index.to_string()),
+                ("name".to_owned(), description.name.clone()),
+                ("unit".to_owned(), description.unit.symbol().to_owned()),
+                ("counts_per_unit".to_owned(), description.counts_per_unit.to_string()),
+            ]);
+            axis_channels.push(channel(axis, &format!("/axis/{}", description.name), &metadata)?);
+        }
+        // An empty recording shows at once whether it can be written, and can be opened while it grows.
+        writer.flush()?;
+        Ok(Self {
+            label: opened.label,
+            writer,
+            encoder: CdrEncoder::default(),
+            wall_clock,
+            cycle_channel,
+            event_channel,
+            axis_channels,
+            last_phase: Phase::default(),
+        })
+    }
+
+    /// Writes a cycle.
+    pub fn cycle(&mut self, record: &CycleRecord) -> McapResult<()> {
+        let (slot, start_ns) = (record.timing.slot, record.timing.slot_start_ns);
+        messages::encode_cycle(record, &mut self.encoder);
+        self.write(self.cycle_channel, slot, start_ns)?;
+        for (index, axis) in record.axes().iter().enumerate() {
+            let Some(&channel) = self.axis_channels.get(index) else { break };
+            messages::encode_axis(slot, axis, &mut self.encoder);
+            self.write(channel, slot, start_ns)?;
+        }
+        // What led to a stop is what somebody will look for, whatever happens next.
+        let begins_to_stop = record.phase == Phase::Stopping && self.last_phase != Phase::Stopping;
+        self.last_phase = record.phase;
+        if begins_to_stop { self.writer.flush() } else { Ok(()) }
+    }
+
+    /// Writes an event, which is also said in words.
+    pub fn event(&mut self, event: &Event, text: &str) -> McapResult<()> {
+        messages::encode_event(event, text, &mut self.encoder);
+        self.write(self.event_channel, event.slot, event.at_ns)
+    }
+
+    fn write(&mut self, channel_id: u16, slot: u64, at_ns: u64) -> McapResult<()> {
+        let time = self.wall_clock.unix_ns(at_ns);
+        let header = MessageHeader { channel_id, sequence: slot as u32, log_time: time, publish_time: time };
+        self.writer.write_to_known_channel(&header, self.encoder.bytes())
+    }
+
+    /// Writes the end: statistics and index.
+    pub fn finish(mut self) -> McapResult<()> {
+        self.writer.finish()?;
+        self.writer.into_inner().into_inner().flush().map_err(McapError::Io)
+    }
+}
+
+fn describe(machine: &Machine) -> BTreeMap<String, String> {
+    let list = |names: &mut dyn Iterator<Item = &String>| names.cloned().collect::<Vec<_>>().join("\n");
+    BTreeMap::from([
+        ("version".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
+        ("machine".to_owned(), machine.name.clone()),
+        ("cycle_ns".to_owned(), machine.cycle_ns.to_string()),
+        ("axes".to_owned(), list(&mut machine.axes.iter().map(|axis| &axis.name))),
+        ("buses".to_owned(), list(&mut machine.buses.iter().map(|bus| &bus.name))),
+    ])
+}

@@ -1,0 +1,322 @@
+//! The report of a run as data: what `takt run --json` prints.
+
+use std::fs;
+use std::path::PathBuf;
+
+use serde::Serialize;
+use takt_rt::door::Snapshot;
+use takt_rt::port::{BusHealth, BusState};
+use takt_rt::stop::StopReason;
+use takt_rt::time::{NANOSECONDS_PER_SECOND, Nanoseconds};
+
+use super::logger::LogSummary;
+use super::machine::{AxisDescription, BusDescription, Machine};
+use super::statistics::{AxisStatistics, Latency};
+use super::words;
+
+/// A whole run.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct RunReport {
+    /// The name of the machine.
+    pub machine: String,
+    /// From the first cycle to the end of the last one.
+    pub duration_s: f64,
+    /// Period of the cycle.
+    pub cycle_ns: u64,
+    /// Cycles that ran.
+    pub cycles: u64,
+    /// Slots that passed unused because the thread was late.
+    pub missed_slots: u64,
+    /// How late the timer woke the thread.
+    pub wake_ns: LatencyReport,
+    /// SYNC release error: how late SYNC was handed over, against the grid.
+    pub sync_ns: LatencyReport,
+    /// From feedback to set-points, without I/O.
+    pub compute_ns: LatencyReport,
+    /// When the last set-point had been handed over, after the start of the slot.
+    pub sent_ns: LatencyReport,
+    /// What the operating system granted.
+    pub realtime: RealtimeReport,
+    /// The axes in the order of the configuration.
+    pub axes: Vec<AxisReport>,
+    /// The buses in the order of the configuration.
+    pub buses: Vec<BusReport>,
+    /// What was written down.
+    pub telemetry: TelemetryReport,
+    /// Why the run ended before its program; `None` when the program finished.
+    pub stop: Option<StopReport>,
+}
+
+/// The distribution of a time in nanoseconds; minimum and maximum are exact, quantiles have three digits.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct LatencyReport {
+    /// Median.
+    pub p50: u64,
+    /// 99 %
+    pub p99: u64,
+    /// 99.9 %
+    pub p999: u64,
+    /// Maximum.
+    pub max: u64,
+    /// Minimum.
+    pub min: u64,
+    /// How many cycles lay in each range: six ranges a decade from 100 ns to 100 ms. The first holds everything
+    /// below it too, the last everything above.
+    pub histogram: Vec<u64>,
+}
+
+/// What the operating system granted the real-time thread.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct RealtimeReport {
+    /// `SCHED_FIFO` or `SCHED_OTHER`.
+    pub policy: String,
+    /// Real-time priority, 1 to 99; `None` in the normal class.
+    pub priority: Option<u8>,
+    /// The CPU that the thread was pinned to.
+    pub cpu: Option<usize>,
+    /// Whether all memory was locked.
+    pub memory_locked: bool,
+    /// Whether the kernel is PREEMPT_RT.
+    pub preempt_rt: bool,
+    /// How long before a deadline the thread stopped sleeping and spun.
+    pub spin_guard_ns: u64,
+    /// Page faults of the real-time thread, minor and major, from its first cycle to its last.
+    pub page_faults: u64,
+    /// Each step that was refused, with the reason.
+    pub refused: Vec<String>,
+    /// Commands that grant what was refused.
+    pub grant_with: Vec<String>,
+}
+
+/// One axis; rad for a rotary axis, m for a linear one.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct AxisReport {
+    /// Its name in the configuration.
+    pub name: String,
+    /// `rad` or `m`.
+    pub unit: &'static str,
+    /// The largest following error while the axis was enabled; `None` when it never was.
+    pub following_error_max: Option<f64>,
+    /// When that was, after the first cycle.
+    pub following_error_at_s: Option<f64>,
+    /// The velocity asked for then, per second.
+    pub following_error_velocity: Option<f64>,
+    /// The last position under power.
+    pub final_position: f64,
+    /// Where it was to be.
+    pub target_position: f64,
+    /// The difference between the two in counts of the encoder.
+    pub final_error_counts: f64,
+}
+
+/// One bus.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct BusReport {
+    /// Its name in the configuration.
+    pub name: String,
+    /// `sim`, or the name of a network interface.
+    pub interface: String,
+    /// The part of the time during which the wire was occupied.
+    pub load_percent: f64,
+    /// Frames sent and seen on the wire.
+    pub tx_frames: u64,
+    /// Frames received.
+    pub rx_frames: u64,
+    /// Frames that the interface had no room for.
+    pub tx_overruns: u64,
+    /// Received frames that were lost before they could be read.
+    pub rx_overruns: u64,
+    /// Error frames and bus errors.
+    pub errors: u64,
+    /// The fault confinement state at the end, in words.
+    pub state: &'static str,
+}
+
+/// What was written down.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct TelemetryReport {
+    /// Cycle records that reached the logger.
+    pub records: u64,
+    /// Cycle records and events that found no room.
+    pub dropped: u64,
+    /// Frames that found no room on their way to the candump log.
+    pub frames_dropped: u64,
+    /// The recording.
+    pub recording: Option<PathBuf>,
+    /// Its size.
+    pub recording_bytes: Option<u64>,
+    /// The candump log.
+    pub candump: Option<PathBuf>,
+    /// What was not written, or not to its end, and why.
+    pub not_written: Vec<String>,
+}
+
+/// Why a run ended before its program.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct StopReport {
+    /// IEC 60204-1: 0, 1 or 2.
+    pub category: u8,
+    /// In words.
+    pub reason: String,
+    /// The rule by its key: `following_error` …
+    pub rule: &'static str,
+    /// The axis concerned.
+    pub axis: Option<String>,
+    /// What was seen, in the unit of the rule.
+    pub value: f64,
+    /// What would have been allowed.
+    pub limit: f64,
+    /// The slot in which it was seen.
+    pub slot: u64,
+    /// What the group was doing.
+    pub phase: &'static str,
+}
+
+/// What the report needs beside the logger's summary.
+#[derive(Clone, Debug)]
+pub struct RunOutcome {
+    /// What the operating system granted.
+    pub realtime: RealtimeReport,
+    /// The state after the last cycle, with the counters of the buses.
+    pub last: Snapshot,
+    /// How long the buses were open, for their load.
+    pub buses_open_ns: Nanoseconds,
+    /// The targets of the program's last move, in rad (m); `None` takes the last set-points.
+    pub targets: Option<Vec<f64>>,
+    /// Why the run ended before its program.
+    pub stop: Option<StopReason>,
+}
+
+/// Ranges in a decade of [`LatencyReport::histogram`].
+pub(super) const RANGES_PER_DECADE: usize = 6;
+/// Decades of [`LatencyReport::histogram`].
+pub(super) const DECADES: usize = 6;
+/// Where [`LatencyReport::histogram`] begins.
+const SHORTEST_NS: f64 = 100.0;
+
+impl RunReport {
+    /// Puts the report together.
+    pub fn new(log: &LogSummary, outcome: &RunOutcome) -> Self {
+        let (machine, statistics, last) = (&log.machine, &log.statistics, &outcome.last);
+        let covered_ns = statistics.last_ns.saturating_sub(statistics.first_ns) + machine.cycle_ns;
+        let axis = |(index, (description, axis)): (usize, (&AxisDescription, &AxisStatistics))| {
+            let target = outcome.targets.as_ref().and_then(|targets| targets.get(index).copied());
+            AxisReport::new(description, axis, statistics.first_ns, target)
+        };
+        let bus = |(description, health)| BusReport::new(description, health, outcome.buses_open_ns);
+        Self {
+            machine: machine.name.clone(),
+            duration_s: if statistics.cycles == 0 { 0.0 } else { seconds(covered_ns) },
+            cycle_ns: machine.cycle_ns,
+            cycles: statistics.cycles + log.records_dropped,
+            // A record that was dropped took its missed slots with it; the snapshot has counted them.
+            missed_slots: statistics.missed_slots.max(last.missed_slots),
+            wake_ns: LatencyReport::new(&statistics.wake),
+            sync_ns: LatencyReport::new(&statistics.sync),
+            compute_ns: LatencyReport::new(&statistics.compute),
+            sent_ns: LatencyReport::new(&statistics.sent),
+            realtime: outcome.realtime.clone(),
+            axes: machine.axes.iter().zip(&statistics.axes).enumerate().map(axis).collect(),
+            buses: machine.buses.iter().zip(&last.buses).map(bus).collect(),
+            telemetry: TelemetryReport::new(log),
+            stop: outcome.stop.as_ref().map(|stop| StopReport::new(stop, machine)),
+        }
+    }
+}
+
+fn seconds(ns: Nanoseconds) -> f64 {
+    ns as f64 / NANOSECONDS_PER_SECOND as f64
+}
+
+impl LatencyReport {
+    fn new(latency: &Latency) -> Self {
+        let bound = |index: usize| {
+            let decades = index as f64 / RANGES_PER_DECADE as f64;
+            (SHORTEST_NS * 10_f64.powf(decades)).round() as u64
+        };
+        let bounds_ns: Vec<u64> = (0..=RANGES_PER_DECADE * DECADES).map(bound).collect();
+        Self {
+            p50: latency.quantile_ns(0.5),
+            p99: latency.quantile_ns(0.99),
+            p999: latency.quantile_ns(0.999),
+            max: latency.max_ns(),
+            min: latency.min_ns(),
+            histogram: latency.counts(&bounds_ns),
+        }
+    }
+}
+
+impl AxisReport {
+    fn new(
+        description: &AxisDescription,
+        axis: &AxisStatistics,
+        first_ns: Nanoseconds,
+        target: Option<f64>,
+    ) -> Self {
+        let largest = axis.following_error_max;
+        let target_position = target.unwrap_or(axis.position_set);
+        let error_counts = (axis.position - target_position) * description.counts_per_unit;
+        Self {
+            name: description.name.clone(),
+            unit: description.unit.symbol(),
+            following_error_max: largest.map(|largest| largest.error),
+            following_error_at_s: largest.map(|largest| seconds(largest.at_ns.saturating_sub(first_ns))),
+            following_error_velocity: largest.map(|largest| largest.velocity_set),
+            final_position: axis.position,
+            target_position,
+            final_error_counts: (error_counts * 10.0).round() / 10.0,
+        }
+    }
+}
+
+impl BusReport {
+    fn new(description: &BusDescription, health: &BusHealth, open_ns: Nanoseconds) -> Self {
+        let load = 100.0 * health.busy_ns as f64 / open_ns.max(1) as f64;
+        Self {
+            name: description.name.clone(),
+            interface: description.interface.clone(),
+            load_percent: (load * 100.0).round() / 100.0,
+            tx_frames: health.tx_frames,
+            rx_frames: health.rx_frames,
+            tx_overruns: health.tx_overruns,
+            rx_overruns: health.rx_overruns,
+            errors: health.errors,
+            state: match health.state {
+                BusState::ErrorActive => "error active",
+                BusState::ErrorPassive => "error passive",
+                BusState::BusOff => "bus off",
+                BusState::Down => "down",
+            },
+        }
+    }
+}
+
+impl TelemetryReport {
+    fn new(log: &LogSummary) -> Self {
+        let size = |path: &PathBuf| fs::metadata(path).ok().map(|metadata| metadata.len());
+        Self {
+            records: log.records,
+            dropped: log.records_dropped + log.events_dropped,
+            frames_dropped: log.frames_dropped,
+            recording_bytes: log.recording.as_ref().and_then(size),
+            recording: log.recording.clone(),
+            candump: log.candump.clone(),
+            not_written: log.not_written.clone(),
+        }
+    }
+}
+
+impl StopReport {
+    fn new(stop: &StopReason, machine: &Machine) -> Self {
+        Self {
+            category: stop.category as u8,
+            reason: words::stop_cause(stop, machine),
+            rule: words::rule_key(stop.rule),
+            axis: stop.axis.map(|axis| machine.axis_name(axis)),
+            value: stop.value,
+            limit: stop.limit,
+            slot: stop.slot,
+            phase: words::phase(stop.phase),
+        }
+    }
+}

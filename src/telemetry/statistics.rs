@@ -1,0 +1,261 @@
+//! What is reckoned from the cycle records while they pass.
+
+use hdrhistogram::Histogram;
+use takt_rt::record::{AxisRecord, CycleRecord, Timing};
+use takt_rt::stop::Phase;
+use takt_rt::time::Nanoseconds;
+
+/// Times are told apart to three digits, up to a minute; a longer one counts as a minute, except in the maximum.
+const LONGEST_NS: u64 = 60_000_000_000;
+
+/// The distribution of a time.
+#[derive(Clone, Debug)]
+pub struct Latency {
+    histogram: Option<Histogram<u64>>,
+    count: u64,
+    min_ns: u64,
+    max_ns: u64,
+}
+
+impl Default for Latency {
+    fn default() -> Self {
+        // The bounds are constants that the histogram accepts; without it there would be no quantiles.
+        let histogram = Histogram::new_with_bounds(1, LONGEST_NS, 3).ok();
+        Self { histogram, count: 0, min_ns: u64::MAX, max_ns: 0 }
+    }
+}
+
+impl Latency {
+    /// Adds a time.
+    pub fn add(&mut self, ns: u64) {
+        if let Some(histogram) = &mut self.histogram {
+            histogram.saturating_record(ns.min(LONGEST_NS));
+        }
+        self.count += 1;
+        self.min_ns = self.min_ns.min(ns);
+        self.max_ns = self.max_ns.max(ns);
+    }
+
+    /// How many times were added.
+    pub fn count(&self) -> u64 {
+        self.count
+    }
+
+    /// The shortest, exactly; 0 when there is none.
+    pub fn min_ns(&self) -> u64 {
+        self.min_ns.min(self.max_ns)
+    }
+
+    /// The longest, exactly; 0 when there is none.
+    pub fn max_ns(&self) -> u64 {
+        self.max_ns
+    }
+
+    /// The time that the fraction `quantile` (0 to 1) of all did not exceed, to three digits.
+    pub fn quantile_ns(&self, quantile: f64) -> u64 {
+        let value = self.histogram.as_ref().map_or(0, |histogram| histogram.value_at_quantile(quantile));
+        value.clamp(self.min_ns(), self.max_ns)
+    }
+
+    /// The mean, to three digits.
+    pub fn mean_ns(&self) -> f64 {
+        self.histogram.as_ref().map_or(0.0, Histogram::mean)
+    }
+
+    /// How many lay in each of the ranges between neighbouring `bounds_ns` (ascending; a bound belongs to the range
+    /// above it). What lies outside is counted in the first and the last.
+    pub fn counts(&self, bounds_ns: &[u64]) -> Vec<u64> {
+        let mut counts = vec![0; bounds_ns.len().saturating_sub(1)];
+        for step in self.histogram.iter().flat_map(Histogram::iter_recorded) {
+            let above = bounds_ns.partition_point(|bound| *bound <= step.value_iterated_to());
+            let range = above.saturating_sub(1).min(counts.len().saturating_sub(1));
+            if let Some(count) = counts.get_mut(range) {
+                *count += step.count_at_value();
+            }
+        }
+        counts
+    }
+}
+
+/// The largest following error of an axis, and the circumstances, which usually explain it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct FollowingErrorMaximum {
+    /// rad (m), without sign.
+    pub error: f64,
+    /// Start of the cycle in which it was seen.
+    pub at_ns: Nanoseconds,
+    /// What the group was doing then.
+    pub phase: Phase,
+    /// The velocity asked for then, in rad/s (m/s).
+    pub velocity_set: f64,
+    /// The acceleration asked for then, in rad/s² (m/s²).
+    pub acceleration_set: f64,
+}
+
+/// An axis over the whole run.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct AxisStatistics {
+    /// The largest following error while the axis was enabled; `None` when it never was.
+    pub following_error_max: Option<FollowingErrorMaximum>,
+    /// The last set-point while enabled, in rad (m); without ever being enabled, the last one of all.
+    pub position_set: f64,
+    /// The position reported together with it.
+    pub position: f64,
+    was_enabled: bool,
+}
+
+impl AxisStatistics {
+    fn add(&mut self, timing: &Timing, phase: Phase, axis: &AxisRecord) {
+        let is_enabled = is_enabled(phase);
+        if is_enabled || !self.was_enabled {
+            self.position_set = axis.position_set;
+            self.position = axis.position;
+        }
+        if !is_enabled {
+            return;
+        }
+        self.was_enabled = true;
+        let error = f64::from(axis.following_error).abs();
+        if !error.is_nan() && self.following_error_max.is_none_or(|largest| error > largest.error) {
+            self.following_error_max = Some(FollowingErrorMaximum {
+                error,
+                at_ns: timing.slot_start_ns,
+                phase,
+                velocity_set: axis.velocity_set.into(),
+                acceleration_set: axis.acceleration_set.into(),
+            });
+        }
+    }
+}
+
+/// Whether the drives follow set-points in this phase, on purpose and all of them.
+const fn is_enabled(phase: Phase) -> bool {
+    matches!(phase, Phase::Holding | Phase::Moving | Phase::Streaming | Phase::Stopping)
+}
+
+/// A whole run.
+#[derive(Clone, Debug, Default)]
+pub struct Statistics {
+    /// Cycles seen.
+    pub cycles: u64,
+    /// Slots that passed unused.
+    pub missed_slots: u64,
+    /// Start of the first cycle seen.
+    pub first_ns: Nanoseconds,
+    /// Start of the last cycle seen.
+    pub last_ns: Nanoseconds,
+    /// [`Timing::wake_ns`]
+    pub wake: Latency,
+    /// [`Timing::sync_ns`]
+    pub sync: Latency,
+    /// [`Timing::compute_ns`]
+    pub compute: Latency,
+    /// [`Timing::sent_ns`]
+    pub sent: Latency,
+    /// The axes in the order of the configuration.
+    pub axes: Vec<AxisStatistics>,
+}
+
+impl Statistics {
+    /// Statistics for so many axes.
+    pub fn new(axes: usize) -> Self {
+        Self { axes: vec![AxisStatistics::default(); axes], ..Self::default() }
+    }
+
+    /// Adds a cycle.
+    pub fn add(&mut self, record: &CycleRecord) {
+        let timing = &record.timing;
+        if self.cycles == 0 {
+            self.first_ns = timing.slot_start_ns;
+        }
+        self.last_ns = timing.slot_start_ns;
+        self.cycles += 1;
+        self.missed_slots += timing.missed_slots;
+        self.wake.add(timing.wake_ns);
+        self.sync.add(timing.sync_ns);
+        self.compute.add(timing.compute_ns);
+        self.sent.add(timing.sent_ns);
+        for (statistics, axis) in self.axes.iter_mut().zip(record.axes()) {
+            statistics.add(timing, record.phase, axis);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use takt_rt::record::MAX_AXES;
+
+    fn record(slot: u64, phase: Phase, axis: AxisRecord) -> CycleRecord {
+        CycleRecord {
+            timing: Timing { slot, slot_start_ns: slot * 1_000_000, ..Timing::default() },
+            phase,
+            is_commanded: true,
+            axis_count: 1,
+            axes: [axis; MAX_AXES],
+        }
+    }
+
+    #[test]
+    fn quantiles_are_those_of_the_times_and_the_extremes_are_exact() {
+        let mut latency = Latency::default();
+        (1..=100_000).for_each(|ns| latency.add(ns));
+        latency.add(123_456_789);
+        assert_eq!((latency.count(), latency.min_ns(), latency.max_ns()), (100_001, 1, 123_456_789));
+        for (quantile, exact) in [(0.5, 50_000.0), (0.99, 99_000.0), (0.999, 99_900.0)] {
+            let found = latency.quantile_ns(quantile) as f64;
+            assert!((found / exact - 1.0).abs() < 1e-3, "{quantile}: {found}");
+        }
+        assert_eq!(latency.quantile_ns(1.0), 123_456_789);
+    }
+
+    #[test]
+    fn nothing_measured_is_all_zero() {
+        let latency = Latency::default();
+        assert_eq!((latency.min_ns(), latency.max_ns(), latency.quantile_ns(0.99)), (0, 0, 0));
+        assert_eq!(latency.counts(&[1, 10, 100]), [0, 0]);
+    }
+
+    #[test]
+    fn a_stall_longer_than_the_histogram_is_kept_in_the_maximum() {
+        let mut latency = Latency::default();
+        latency.add(3 * LONGEST_NS);
+        assert_eq!(latency.max_ns(), 3 * LONGEST_NS);
+    }
+
+    #[test]
+    fn every_time_is_counted_in_one_range() {
+        let mut latency = Latency::default();
+        [0, 5, 9, 10, 99, 100, 5_000].into_iter().for_each(|ns| latency.add(ns));
+        assert_eq!(latency.counts(&[1, 10, 100, 1000]), [3, 2, 2]);
+    }
+
+    #[test]
+    fn following_error_counts_while_enabled_only_and_tells_where_it_was() {
+        let mut statistics = Statistics::new(1);
+        let axis = |following_error, velocity_set| AxisRecord {
+            following_error,
+            velocity_set,
+            ..AxisRecord::default()
+        };
+        statistics.add(&record(1, Phase::Enabling, axis(9.0, 0.0)));
+        statistics.add(&record(2, Phase::Holding, axis(f32::NAN, 0.0)));
+        statistics.add(&record(3, Phase::Moving, axis(-0.5, 2.0)));
+        statistics.add(&record(4, Phase::Moving, axis(0.25, 1.0)));
+        statistics.add(&record(5, Phase::Disabling, axis(7.0, 0.0)));
+        let largest = statistics.axes[0].following_error_max.unwrap();
+        assert_eq!((largest.error, largest.at_ns, largest.velocity_set), (0.5, 3_000_000, 2.0));
+    }
+
+    #[test]
+    fn the_final_position_is_the_last_one_under_power() {
+        let mut statistics = Statistics::new(1);
+        let axis = |position_set, position| AxisRecord { position_set, position, ..AxisRecord::default() };
+        statistics.add(&record(1, Phase::Disabled, axis(0.5, 0.5)));
+        assert_eq!(statistics.axes[0].position, 0.5);
+        statistics.add(&record(2, Phase::Holding, axis(1.0, 0.99)));
+        statistics.add(&record(3, Phase::Disabled, axis(0.8, 0.8)));
+        assert_eq!((statistics.axes[0].position_set, statistics.axes[0].position), (1.0, 0.99));
+        assert_eq!((statistics.cycles, statistics.first_ns, statistics.last_ns), (3, 1_000_000, 3_000_000));
+    }
+}

@@ -1,0 +1,309 @@
+//! Stops, phases and events in words, with the names of the axes and the units of the values.
+//!
+//! What [`StopReason::value`] and [`StopReason::limit`] mean follows from the rule: rad (m) and their derivatives for
+//! the limits and the following error; cycles for a stale command, missed feedback and an enable time-out; the error
+//! code for a drive fault; the statusword for a drive that has disabled itself; object 6061 against 6060 for a
+//! changed mode; the number of the bus for a lost bus; frames not yet on the wire for set-points not transmitted.
+
+use takt_rt::cia402::{OperationMode, State};
+use takt_rt::record::{Event, EventKind};
+use takt_rt::stop::{Phase, Rule, StopCategory, StopReason};
+
+use super::machine::{Machine, Unit};
+
+/// What the group was doing, as a verb: "moving".
+pub const fn phase(phase: Phase) -> &'static str {
+    match phase {
+        Phase::Passive => "passive",
+        Phase::Disabled => "disabled",
+        Phase::Enabling => "enabling",
+        Phase::Holding => "holding",
+        Phase::Moving => "moving",
+        Phase::Streaming => "streaming",
+        Phase::Stopping => "stopping",
+        Phase::Disabling => "disabling",
+    }
+}
+
+/// A rule by its key in reports: `following_error`.
+pub const fn rule_key(rule: Rule) -> &'static str {
+    match rule {
+        Rule::Requested => "requested",
+        Rule::NotFinite => "not_finite",
+        Rule::PositionLimit => "position_limit",
+        Rule::VelocityLimit => "velocity_limit",
+        Rule::AccelerationLimit => "acceleration_limit",
+        Rule::FollowingError => "following_error",
+        Rule::StaleCommand => "stale_command",
+        Rule::MissedFeedback => "missed_feedback",
+        Rule::DriveFault => "drive_fault",
+        Rule::DriveDisabled => "drive_disabled",
+        Rule::ModeChanged => "mode_changed",
+        Rule::EnableTimeout => "enable_timeout",
+        Rule::NoTrajectory => "no_trajectory",
+        Rule::BusLost => "bus_lost",
+        Rule::NotTransmitted => "not_transmitted",
+    }
+}
+
+/// What a category does (IEC 60204-1, 9.2.2).
+pub const fn category(category: StopCategory) -> &'static str {
+    match category {
+        StopCategory::Zero => "category 0: power removed at once",
+        StopCategory::One => "category 1: decelerated, then power removed",
+        StopCategory::Two => "category 2: decelerated, held under power",
+    }
+}
+
+/// A state of a drive (CiA 402).
+pub const fn state(state: State) -> &'static str {
+    match state {
+        State::NotReadyToSwitchOn => "not ready to switch on",
+        State::SwitchOnDisabled => "switch on disabled",
+        State::ReadyToSwitchOn => "ready to switch on",
+        State::SwitchedOn => "switched on",
+        State::OperationEnabled => "operation enabled",
+        State::QuickStopActive => "quick stop active",
+        State::FaultReactionActive => "fault reaction active",
+        State::Fault => "fault",
+        State::Undefined => "no state of CiA 402",
+    }
+}
+
+/// A mode of operation by its number.
+fn mode(number: f64) -> String {
+    let name = match OperationMode::from_number(number as i8) {
+        Some(OperationMode::ProfilePosition) => "profile position",
+        Some(OperationMode::Velocity) => "velocity",
+        Some(OperationMode::ProfileVelocity) => "profile velocity",
+        Some(OperationMode::ProfileTorque) => "profile torque",
+        Some(OperationMode::Homing) => "homing",
+        Some(OperationMode::InterpolatedPosition) => "interpolated position",
+        Some(OperationMode::CyclicSynchronousPosition) => "cyclic synchronous position",
+        Some(OperationMode::CyclicSynchronousVelocity) => "cyclic synchronous velocity",
+        Some(OperationMode::CyclicSynchronousTorque) => "cyclic synchronous torque",
+        None => return format!("mode {number:.0}"),
+    };
+    format!("mode {number:.0} ({name})")
+}
+
+/// Why the group stopped, without how and when: "joint3 was 0.0214 rad from its set-point (allowed: 0.0200 rad)".
+pub fn stop_cause(stop: &StopReason, machine: &Machine) -> String {
+    let axis = stop.axis.map_or_else(|| "an axis".to_owned(), |axis| machine.axis_name(axis));
+    let unit = stop.axis.map_or(Unit::Radian, |axis| machine.axis_unit(axis)).symbol();
+    let (value, limit) = (stop.value, stop.limit);
+    match stop.rule {
+        Rule::Requested => "a stop was asked for".to_owned(),
+        Rule::NotFinite => format!("the set-point of {axis} was not a finite number ({value})"),
+        Rule::PositionLimit => format!(
+            "the set-point of {axis}, {value:.4} {unit}, lay outside its position limit of {limit:.4} {unit}"
+        ),
+        Rule::VelocityLimit => {
+            format!("the set-point of {axis} asked for {value:.3} {unit}/s (allowed: {limit:.3} {unit}/s)")
+        }
+        Rule::AccelerationLimit => {
+            format!("the set-point of {axis} asked for {value:.2} {unit}/s² (allowed: {limit:.2} {unit}/s²)")
+        }
+        Rule::FollowingError => {
+            format!("{axis} was {value:.4} {unit} from its set-point (allowed: {limit:.4} {unit})")
+        }
+        Rule::StaleCommand => {
+            "the stream of set-points ended: its last command expired and no newer one came".to_owned()
+        }
+        Rule::MissedFeedback => {
+            format!("{axis} has not reported for {} (allowed: {limit:.0})", cycles(value))
+        }
+        Rule::DriveFault => {
+            let code = value as u32;
+            if code == 0 {
+                format!("the drive of {axis} reports a fault without an error code")
+            } else {
+                format!("the drive of {axis} reports fault 0x{code:04X}")
+            }
+        }
+        Rule::DriveDisabled => format!(
+            "the drive of {axis} left operation enabled by itself: it is now in \"{}\"",
+            state(State::decode(value as u16))
+        ),
+        Rule::ModeChanged => {
+            format!("the drive of {axis} shows {} instead of {}", mode(value), mode(limit))
+        }
+        Rule::EnableTimeout => format!(
+            "the drive of {axis} did not reach operation enabled within {} ({:.1} s)",
+            cycles(limit),
+            limit * machine.cycle_ns as f64 * 1e-9
+        ),
+        Rule::NoTrajectory => match stop.axis {
+            Some(_) => format!("no trajectory leads {axis} to what was asked"),
+            None => "no trajectory leads to what was asked".to_owned(),
+        },
+        Rule::BusLost => {
+            let bus = machine.buses.get(value as usize);
+            let name = bus.map_or_else(|| format!("{value:.0}"), |bus| bus.name.clone());
+            format!("bus {name} is bus-off or its interface is down")
+        }
+        Rule::NotTransmitted => {
+            let of = stop.axis.map_or_else(String::new, |_| format!(" of {axis}"));
+            format!("set-points{of} are not getting onto the wire: {value:.0} frames still wait")
+        }
+    }
+}
+
+fn cycles(count: f64) -> String {
+    if count == 1.0 { "1 cycle".to_owned() } else { format!("{count:.0} cycles") }
+}
+
+/// The whole story of a stop: cause, what was going on, and how.
+pub fn stop(stop: &StopReason, machine: &Machine) -> String {
+    format!("{} while {}; {}", stop_cause(stop, machine), phase(stop.phase), category(stop.category))
+}
+
+/// An event as one line, without its time.
+pub fn event(event: &Event, machine: &Machine) -> String {
+    match event.kind {
+        EventKind::PhaseChanged { from, to } => format!("{} → {}", phase(from), phase(to)),
+        EventKind::Stop(reason) => format!("stop: {}", stop(&reason, machine)),
+        EventKind::MoveFinished { id } => format!("move {id} finished"),
+        EventKind::DriveState { axis, statusword } => format!(
+            "{}: {} (statusword 0x{statusword:04X})",
+            machine.axis_name(axis),
+            state(State::decode(statusword))
+        ),
+        EventKind::Emergency { axis, code: 0, .. } => {
+            format!("{}: emergency message: all errors gone", machine.axis_name(axis))
+        }
+        EventKind::Emergency { axis, code, register, manufacturer: [a, b, c, d, e] } => format!(
+            "{}: emergency message: error 0x{code:04X}, register 0x{register:02X}, \
+             manufacturer {a:02X} {b:02X} {c:02X} {d:02X} {e:02X}",
+            machine.axis_name(axis)
+        ),
+        EventKind::MissedSlots { count: 1 } => "1 slot passed unused: the thread was late".to_owned(),
+        EventKind::MissedSlots { count } => format!("{count} slots passed unused: the thread was late"),
+        EventKind::Refused { phase: forbade } => {
+            format!("a request was refused: not possible while {}", phase(forbade))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::telemetry::machine::{AxisDescription, BusDescription};
+
+    fn machine() -> Machine {
+        let axis = |name: &str, unit| AxisDescription { name: name.to_owned(), unit, counts_per_unit: 1.0 };
+        Machine {
+            name: "arm".to_owned(),
+            cycle_ns: 1_000_000,
+            axes: vec![axis("shoulder", Unit::Radian), axis("slide", Unit::Metre)],
+            buses: vec![BusDescription { name: "left".to_owned(), interface: "can0".to_owned() }],
+        }
+    }
+
+    fn reason(rule: Rule, axis: Option<u8>, value: f64, limit: f64) -> StopReason {
+        StopReason { category: StopCategory::One, rule, axis, value, limit, slot: 9, phase: Phase::Moving }
+    }
+
+    #[test]
+    fn every_cause_names_its_axis_and_its_unit() {
+        let cases = [
+            (
+                Rule::FollowingError,
+                Some(0),
+                0.0214,
+                0.02,
+                "shoulder was 0.0214 rad from its set-point (allowed: 0.0200 rad)",
+            ),
+            (
+                Rule::VelocityLimit,
+                Some(1),
+                2.5,
+                2.0,
+                "the set-point of slide asked for 2.500 m/s (allowed: 2.000 m/s)",
+            ),
+            (Rule::MissedFeedback, Some(1), 4.0, 3.0, "slide has not reported for 4 cycles (allowed: 3)"),
+            (Rule::DriveFault, Some(0), 0x730F.into(), 0.0, "the drive of shoulder reports fault 0x730F"),
+            (
+                Rule::DriveDisabled,
+                Some(0),
+                0x1250.into(),
+                0.0,
+                "the drive of shoulder left operation enabled by itself: it is now in \"switch on disabled\"",
+            ),
+            (
+                Rule::ModeChanged,
+                Some(0),
+                1.0,
+                8.0,
+                "the drive of shoulder shows mode 1 (profile position) instead of \
+              mode 8 (cyclic synchronous position)",
+            ),
+            (
+                Rule::EnableTimeout,
+                Some(9),
+                0.0,
+                2000.0,
+                "the drive of axis 9 did not reach operation enabled within 2000 cycles (2.0 s)",
+            ),
+            (Rule::BusLost, None, 0.0, 0.0, "bus left is bus-off or its interface is down"),
+            (
+                Rule::NotTransmitted,
+                None,
+                6.0,
+                0.0,
+                "set-points are not getting onto the wire: 6 frames still wait",
+            ),
+        ];
+        for (rule, axis, value, limit, words) in cases {
+            assert_eq!(stop_cause(&reason(rule, axis, value, limit), &machine()), words);
+        }
+    }
+
+    #[test]
+    fn a_stop_tells_cause_phase_and_category() {
+        assert_eq!(
+            stop(&reason(Rule::Requested, None, 0.0, 0.0), &machine()),
+            "a stop was asked for while moving; category 1: decelerated, then power removed"
+        );
+    }
+
+    #[test]
+    fn no_two_rules_share_a_key_or_a_cause() {
+        let causes = Rule::ALL.map(|rule| stop_cause(&reason(rule, Some(0), 1.0, 2.0), &machine()));
+        let keys = Rule::ALL.map(rule_key);
+        for (index, rule) in Rule::ALL.into_iter().enumerate() {
+            assert!(!causes[..index].contains(&causes[index]), "{rule:?}");
+            assert!(!keys[..index].contains(&keys[index]), "{rule:?}");
+        }
+    }
+
+    #[test]
+    fn events_read_as_sentences() {
+        let words = |kind| event(&Event { slot: 1, at_ns: 2, kind }, &machine());
+        assert_eq!(
+            words(EventKind::PhaseChanged { from: Phase::Enabling, to: Phase::Holding }),
+            "enabling → holding"
+        );
+        assert_eq!(
+            words(EventKind::DriveState { axis: 0, statusword: 0x1637 }),
+            "shoulder: operation enabled (statusword 0x1637)"
+        );
+        assert_eq!(
+            words(EventKind::Emergency {
+                axis: 1,
+                code: 0x7305,
+                register: 0x21,
+                manufacturer: [1, 2, 3, 4, 0xFF]
+            }),
+            "slide: emergency message: error 0x7305, register 0x21, manufacturer 01 02 03 04 FF"
+        );
+        assert_eq!(
+            words(EventKind::MissedSlots { count: 30 }),
+            "30 slots passed unused: the thread was late"
+        );
+        assert_eq!(
+            words(EventKind::Refused { phase: Phase::Moving }),
+            "a request was refused: not possible while moving"
+        );
+    }
+}

@@ -1,0 +1,92 @@
+//! `takt check` as a person or a script sees it.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use serde_json::Value;
+
+fn configs() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("configs")
+}
+
+fn check(config: &Path, options: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_takt")).arg("check").arg(config).args(options).output().unwrap()
+}
+
+fn standard_output(output: &Output) -> String {
+    String::from_utf8(output.stdout.clone()).unwrap()
+}
+
+fn json(output: &Output) -> Value {
+    serde_json::from_slice(&output.stdout)
+        .unwrap_or_else(|error| panic!("{error}: {}", standard_output(output)))
+}
+
+/// The arm with all of its axes on one bus.
+fn six_on_one_bus(folder: &Path) -> PathBuf {
+    let arm = std::fs::read_to_string(configs().join("arm6-erob.toml")).unwrap();
+    let path = folder.join("six.toml");
+    std::fs::write(&path, arm.replace("bus = \"wrist\"", "bus = \"base\"")).unwrap();
+    path
+}
+
+#[test]
+fn a_configuration_that_fits_is_shown_with_limits_units_and_buses_and_exit_code_0() {
+    let output = check(&configs().join("arm6-erob.toml"), &[]);
+    let text = standard_output(&output);
+    assert_eq!(output.status.code(), Some(0), "{text}");
+    for part in [
+        "arm6-erob: 6 axes on 2 buses",
+        "-2.9671   2.9671",
+        "83443.027 per rad",
+        "199.6",
+        "745 µs = 55 SYNC + 345 feedback + 345 set-points",
+        "command phase may lie from 485 to 590 µs",
+        "Every bus carries its traffic in the worst case.",
+    ] {
+        assert!(text.contains(part), "{part:?} is missing in\n{text}");
+    }
+}
+
+#[test]
+fn a_script_reads_the_same_as_one_json_object() {
+    let output = check(&configs().join("arm6-erob.toml"), &["--json"]);
+    assert_eq!(output.status.code(), Some(0));
+    let value = json(&output);
+    assert_eq!(value["fits"], true);
+    assert_eq!(value["axes"].as_array().map(Vec::len), Some(6));
+    assert_eq!(value["axes"][3]["counts_range"][1], 7285.0);
+    assert_eq!(value["buses"][1]["slot"]["set_points_done_ns"], 895_000);
+}
+
+#[test]
+fn buses_that_cannot_carry_their_traffic_end_in_exit_code_2_and_what_would_fit() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = six_on_one_bus(folder.path());
+    let output = check(&path, &[]);
+    let text = standard_output(&output);
+    assert_eq!(output.status.code(), Some(2), "{text}");
+    assert!(text.contains("1435 µs = 55 SYNC + 690 feedback + 690 set-points"), "{text}");
+    assert!(text.contains("what would fit: 2 buses: 3 of these axes fit one"), "{text}");
+    let output = check(&path, &["--json"]);
+    assert_eq!((output.status.code(), &json(&output)["fits"]), (Some(2), &Value::Bool(false)));
+}
+
+#[test]
+fn a_bad_configuration_ends_in_exit_code_2_and_its_lines() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("bad.toml");
+    std::fs::write(&path, "name = \"bad\"\n[cycle]\nperiod = \"1 m\"\n").unwrap();
+    let output = check(&path, &[]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(standard_output(&output).is_empty());
+    let text = String::from_utf8(output.stderr).unwrap();
+    assert!(text.contains("period = \"1 m\"") && text.contains("`bus` is missing"), "{text}");
+
+    let output = check(&path, &["--json"]);
+    let value = json(&output);
+    assert_eq!(output.status.code(), Some(2));
+    let problems = value["problems"].as_array().unwrap();
+    assert!(problems.iter().any(|problem| problem["line"] == 3), "{problems:?}");
+    assert_eq!(problems.len(), 3);
+}

@@ -1,0 +1,39 @@
+#!/usr/bin/env python3
+"""Reads a recording of takt with the reader that the MCAP project itself publishes, and says what is in it.
+
+    pip install mcap mcap-ros2-support
+    tests/read_recording.py runs/arm6-erob-20250131T120000Z.mcap
+
+Ends with an error when the file, its index, a schema or a message cannot be read, when slots go backwards, or when
+an axis has not as many messages as there are cycles.
+"""
+
+import sys
+from collections import Counter
+
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
+
+
+def main(path):
+    with open(path, "rb") as file:
+        reader = make_reader(file, validate_crcs=True, decoder_factories=[DecoderFactory()])
+        header, summary = reader.get_header(), reader.get_summary()
+        metadata = {record.name: record.metadata for record in reader.iter_metadata()}["takt"]
+        print(f"{header.library}, profile {header.profile}: {metadata['machine']}, {metadata['cycle_ns']} ns")
+        counts, last_slot, last_message = Counter(), {}, {}
+        for schema, channel, message, decoded in reader.iter_decoded_messages():
+            assert decoded.slot >= last_slot.get(channel.topic, 0), f"{channel.topic}: slots go backwards"
+            counts[channel.topic] += 1
+            last_slot[channel.topic] = decoded.slot
+            last_message[channel.topic] = decoded
+    assert sum(counts.values()) == summary.statistics.message_count, "the statistics miscount"
+    for axis in metadata["axes"].splitlines():
+        topic = f"/axis/{axis}"
+        assert counts[topic] == counts["/cycle"], f"{topic}: {counts[topic]} of {counts['/cycle']} cycles"
+    for topic in sorted(channel.topic for channel in summary.channels.values()):
+        print(f"{topic}: {counts[topic]} messages; last: {last_message.get(topic)}")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])

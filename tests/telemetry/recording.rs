@@ -1,0 +1,220 @@
+use std::fs;
+use std::path::Path;
+
+use takt::bus::trace::traced;
+use takt::telemetry::{Destination, Logger};
+use takt_rt::door::Door;
+use takt_rt::frame::{Frame, Id};
+use takt_rt::port::{BusHealth, BusPort, ReceiveBatch, Received};
+use takt_rt::record::EventKind;
+use takt_rt::stop::Phase;
+
+use crate::reader::{Value, messages};
+use crate::run::{
+    CYCLE_NS, Disk, EPOCH_NS, Notices, STOP, UNIX_AT_ZERO_NS, cycle, event, machine, options, run, sides,
+};
+
+/// Records twenty cycles and some events; returns the bytes.
+fn record() -> Vec<u8> {
+    let (mut rt, _host, log) = sides(8);
+    let disk = Disk::new(usize::MAX);
+    let mut logger = Logger::new(log, options(Some(disk.destination())), Notices::default().sink());
+    rt.event(&event(1, EventKind::PhaseChanged { from: Phase::Holding, to: Phase::Moving }));
+    run(&mut rt, &mut logger, 0..20);
+    rt.event(&event(7, EventKind::Stop(STOP)));
+    rt.event(&event(
+        8,
+        EventKind::Emergency { axis: 1, code: 0x7305, register: 0x21, manufacturer: [1, 2, 3, 4, 5] },
+    ));
+    let summary = logger.finish();
+    assert_eq!((summary.records, summary.records_dropped, summary.not_written.len()), (20, 0, 0));
+    disk.bytes.lock().unwrap().clone()
+}
+
+fn number(value: impl Into<f64>) -> Value {
+    Value::Number(value.into())
+}
+
+#[test]
+fn every_field_of_every_record_can_be_read_by_the_schema_in_the_file() {
+    let recording = record();
+    for (index, name) in ["shoulder", "slide"].into_iter().enumerate() {
+        let messages = messages(&recording, &format!("/axis/{name}"));
+        assert_eq!(messages.len(), 20);
+        for (slot, (time, fields)) in messages.iter().enumerate() {
+            let axis = cycle(slot as u64).axes[index];
+            assert_eq!(*time, UNIX_AT_ZERO_NS + EPOCH_NS + slot as u64 * CYCLE_NS);
+            let expected = [
+                ("slot", number(slot as f64)),
+                ("position_set", number(axis.position_set)),
+                ("position", number(axis.position)),
+                ("velocity_set", number(axis.velocity_set)),
+                ("acceleration_set", number(axis.acceleration_set)),
+                ("velocity", number(axis.velocity)),
+                ("torque_set", number(axis.torque_set)),
+                ("torque", number(axis.torque)),
+                ("following_error", number(axis.following_error)),
+                ("command_raw", number(axis.command_raw)),
+                ("position_raw", number(axis.position_raw)),
+                ("controlword", number(axis.controlword)),
+                ("statusword", number(axis.statusword)),
+                ("error_code", number(axis.error_code)),
+                ("feedback_age", number(axis.feedback_age)),
+                ("state", number(4)),
+            ];
+            assert_eq!(*fields, expected.map(|(name, value)| (name.to_owned(), value)).into());
+        }
+    }
+    let (_, times) = &messages(&recording, "/cycle")[3];
+    let expected = [
+        ("slot", number(3)),
+        ("slot_start_ns", number((EPOCH_NS + 3 * CYCLE_NS) as f64)),
+        ("wake_ns", number(1003)),
+        ("sync_ns", number(2003)),
+        ("compute_ns", number(3003)),
+        ("sent_ns", number(4003)),
+        ("missed_slots", number(1)),
+        ("phase", number(4)),
+        ("is_commanded", number(0)),
+    ];
+    assert_eq!(*times, expected.map(|(name, value)| (name.to_owned(), value)).into());
+}
+
+#[test]
+fn events_are_recorded_in_words_and_in_numbers() {
+    let events = messages(&record(), "/events");
+    let texts: Vec<_> = events.iter().map(|(_, fields)| fields["text"].clone()).collect();
+    let expected = [
+        "holding → moving",
+        "stop: slide was 0.2500 m from its set-point (allowed: 0.1250 m) while moving; \
+         category 1: decelerated, then power removed",
+        "slide: emergency message: error 0x7305, register 0x21, manufacturer 01 02 03 04 05",
+    ];
+    assert_eq!(texts, expected.map(|text| Value::Text(text.to_owned())));
+    let (time, stop) = &events[1];
+    assert_eq!(*time, UNIX_AT_ZERO_NS + EPOCH_NS + 7 * CYCLE_NS);
+    for (field, value) in [("kind", 1.0), ("axis", 1.0), ("rule", 5.0), ("value", 0.25), ("limit", 0.125)] {
+        assert_eq!(stop[field], number(value), "{field}");
+    }
+    let (_, emergency) = &events[2];
+    for (field, value) in [("error_code", 0x7305), ("error_register", 0x21), ("manufacturer[4]", 5)] {
+        assert_eq!(emergency[field], number(value), "{field}");
+    }
+    assert_eq!(events[0].1["axis"], number(-1));
+}
+
+#[test]
+fn a_recording_has_an_index_and_tells_what_the_machine_is() {
+    let recording = record();
+    let summary = mcap::Summary::read(&recording).unwrap().unwrap();
+    let statistics = summary.stats.unwrap();
+    assert_eq!((statistics.message_count, statistics.channel_count), (20 * 3 + 3, 4));
+    let slide = summary.channels.values().find(|channel| channel.topic == "/axis/slide").unwrap();
+    let expected = [("counts_per_unit", "83443"), ("index", "1"), ("name", "slide"), ("unit", "m")];
+    assert_eq!(slide.metadata, expected.map(|(key, value)| (key.to_owned(), value.to_owned())).into());
+    let metadata = mcap::read::metadata(&recording, &summary.metadata_indexes[0]).unwrap();
+    assert_eq!((&*metadata.name, &*metadata.metadata["axes"]), ("takt", "shoulder\nslide"));
+    assert_eq!(metadata.metadata["cycle_ns"], "1000000");
+}
+
+#[test]
+fn the_same_run_leaves_the_same_bytes() {
+    assert_eq!(record(), record());
+}
+
+#[test]
+fn a_recording_that_is_cut_off_can_be_read_up_to_its_last_chunk() {
+    let (mut rt, _host, log) = sides(8);
+    let disk = Disk::new(usize::MAX);
+    let mut logger = Logger::new(log, options(Some(disk.destination())), Notices::default().sink());
+    run(&mut rt, &mut logger, 0..3000);
+    let written = disk.bytes.lock().unwrap().clone();
+    let whole =
+        mcap::read::MessageStream::new_with_options(&written, mcap::read::Options::IgnoreEndMagic.into());
+    let read = whole.unwrap().map_while(Result::ok).filter(|message| message.channel.topic == "/cycle");
+    let read = read.count();
+    assert!((2000..3000).contains(&read), "{read} cycles");
+}
+
+#[test]
+fn recordings_are_named_after_machine_and_time_and_never_overwritten() {
+    let folder = tempfile::tempdir().unwrap();
+    let record = || {
+        let (mut rt, _host, log) = sides(8);
+        let directory = Destination::Directory(folder.path().join("runs"));
+        let mut logger = Logger::new(log, options(Some(directory)), Notices::default().sink());
+        run(&mut rt, &mut logger, 0..5);
+        logger.finish().recording.unwrap()
+    };
+    let paths = [record(), record()];
+    let names = paths.each_ref().map(|path| path.file_name().unwrap().to_owned());
+    assert_eq!(names, ["arm-20231114T221320Z.mcap", "arm-20231114T221320Z-2.mcap"]);
+    for path in &paths {
+        assert_eq!(messages(&fs::read(path).unwrap(), "/cycle").len(), 5);
+    }
+}
+
+/// Brings one frame that arrived 50 µs earlier.
+struct Port;
+
+impl BusPort for Port {
+    fn send(&mut self, _now_ns: u64, frames: &[Frame]) -> usize {
+        frames.len()
+    }
+
+    fn receive(&mut self, now_ns: u64, batch: &mut ReceiveBatch) {
+        let frame = Frame::of(Id::canopen(0x180, 1), [0x37, 0x16]);
+        batch.push(Received { frame, at_ns: now_ns - 50_000 });
+    }
+
+    fn unconfirmed(&mut self, _now_ns: u64) -> usize {
+        0
+    }
+
+    fn health(&mut self) -> BusHealth {
+        BusHealth::default()
+    }
+}
+
+#[test]
+fn a_candump_log_has_every_frame_of_every_bus_in_the_order_of_time() {
+    let folder = tempfile::tempdir().unwrap();
+    let (_rt, _host, log) = sides(8);
+    let ((mut left, left_trace), (mut right, right_trace)) =
+        (traced(Port, "can0", 64), traced(Port, "sim right", 64));
+    let mut options = options(None);
+    options.candump = Some(Destination::Directory(folder.path().to_owned()));
+    options.traces = vec![left_trace, right_trace];
+    let mut logger = Logger::new(log, options, Notices::default().sink());
+
+    let sync = [Frame::of(Id::canopen(0x080, 0), [])];
+    left.send(1_000_000, &sync);
+    right.send(1_010_000, &sync);
+    left.receive(1_070_000, &mut ReceiveBatch::new());
+    right.receive(1_055_000, &mut ReceiveBatch::new());
+    logger.drain();
+    let fd = Frame::fd(Id::extended(0x123).unwrap(), &[1, 2], true).unwrap();
+    left.send(2_000_000, &[fd, Frame::remote(Id::base(0x701).unwrap(), 1).unwrap()]);
+
+    let path = logger.finish().candump.unwrap();
+    assert_eq!(path.file_name().unwrap(), Path::new("arm-20231114T221320Z.log"));
+    let expected = "(1700000000.001000) can0 080#\n\
+                    (1700000000.001005) sim_right 181#3716\n\
+                    (1700000000.001010) sim_right 080#\n\
+                    (1700000000.001020) can0 181#3716\n\
+                    (1700000000.002000) can0 00000123##10102\n\
+                    (1700000000.002000) can0 701#R1\n";
+    assert_eq!(fs::read_to_string(path).unwrap(), expected);
+}
+
+#[test]
+fn a_machine_without_axes_can_be_recorded() {
+    let (_rt, _host, log) = sides(8);
+    let disk = Disk::new(usize::MAX);
+    let mut options = options(Some(disk.destination()));
+    options.machine.axes.clear();
+    let summary = Logger::new(log, options, Notices::default().sink()).finish();
+    assert_eq!(summary.not_written, [""; 0]);
+    assert_eq!(messages(&disk.bytes.lock().unwrap(), "/cycle").len(), 0);
+    assert_eq!(machine().axis_name(7), "axis 7");
+}

@@ -1,0 +1,32 @@
+use std::fs;
+
+use takt::telemetry::{Destination, Logger, LoggerThread, Notice};
+use takt_rt::door::Door;
+use takt_rt::record::EventKind;
+
+use crate::reader::messages;
+use crate::run::{Notices, cycle, event, options, sides};
+
+#[test]
+fn the_thread_writes_all_that_was_handed_over_before_it_was_told_to_finish() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut rt, _host, log) = sides(64);
+    let notices = Notices::default();
+    let options = options(Some(Destination::File(folder.path().join("run.mcap"))));
+    let thread = LoggerThread::start(Logger::new(log, options, notices.sink())).unwrap();
+    let last = event(999, EventKind::MoveFinished { id: 4 });
+    let mut dropped = 0;
+    for slot in 0..1000 {
+        while !rt.record(&cycle(slot)) {
+            dropped += 1;
+            std::thread::yield_now();
+        }
+    }
+    assert!(rt.event(&last));
+    let summary = thread.finish();
+    assert_eq!((summary.records, summary.records_dropped, summary.statistics.cycles), (1000, dropped, 1000));
+    assert_eq!(notices.all(), [Notice::Event(last)]);
+    let recording = fs::read(summary.recording.unwrap()).unwrap();
+    assert_eq!(messages(&recording, "/cycle").len(), 1000);
+    assert_eq!(messages(&recording, "/events").len(), 1);
+}
