@@ -7,5 +7,7 @@ pub mod schedule;
 mod socketcan;
 pub mod trace;
 
-pub use interface::{InterfaceError, InterfaceSettings, InterfaceStatus, Timing, interface_status, prepare_interface};
-pub use socketcan::{OpenError, SocketCanOptions, open_socketcan};
+pub use interface::{
+    InterfaceError, InterfaceSettings, InterfaceStatus, Timing, interface_status, prepare_interface,
+};
+pub use socketcan::{SocketCanError, SocketCanOptions, open_socketcan};

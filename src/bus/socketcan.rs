@@ -8,6 +8,8 @@ use takt_rt::frame::Id;
 use takt_rt::linux::SocketCanPort;
 use thiserror::Error;
 
+use crate::config::Config;
+
 /// What the kernel reserves for one frame that waits in a socket's buffer: the frame with its bookkeeping, 768
 /// bytes on Linux 6.1, up to 960 since 6.3.
 const BYTES_PER_FRAME: usize = 1_024;
@@ -33,6 +35,39 @@ pub struct SocketCanOptions {
     pub receive_frames: usize,
 }
 
+impl SocketCanOptions {
+    /// For bus number `bus` of a configuration, as its master: every identifier that CANopen gives to the nodes on
+    /// it (CiA 301, 7.3.3), in both directions.
+    pub fn of_master(config: &Config, bus: usize) -> Self {
+        let nodes = config.axes.iter().filter(|axis| axis.bus == bus).map(|axis| axis.node);
+        let functions = (1..=0xE).map(|function| function << 7);
+        let of_node = |node: u8| functions.clone().map(move |function| Id::canopen(function, node));
+        let broadcast = [NMT, SYNC, TIME].map(|function| Id::canopen(function, 0));
+        let own = Id::canopen(HEARTBEAT, config.master.node);
+        let commands = nodes.clone().count() * COMMANDS_PER_AXIS;
+        let settings = config.buses.get(bus);
+        Self {
+            identifiers: nodes.flat_map(of_node).chain(broadcast).chain([own]).collect(),
+            bit_rate: settings.map_or(1_000_000, |bus| bus.bit_rate),
+            data_bit_rate: settings.and_then(|bus| bus.data_bit_rate),
+            transmit_frames: commands + SERVICE_FRAMES,
+            receive_frames: RECEIVE_FRAMES,
+        }
+    }
+}
+
+const NMT: u16 = 0x000;
+const SYNC: u16 = 0x080;
+const TIME: u16 = 0x100;
+const HEARTBEAT: u16 = 0x700;
+
+/// Set-points of an axis in a cycle, at most: as many as a drive has PDOs for them.
+const COMMANDS_PER_AXIS: usize = 4;
+/// SYNC and services in a cycle, at most.
+const SERVICE_FRAMES: usize = 8;
+/// A reader that is stalled for 30 ms on a full bus misses nothing.
+const RECEIVE_FRAMES: usize = 1_024;
+
 impl Default for SocketCanOptions {
     /// Everything is received, 1 Mbit/s, 32 frames may wait to be sent and 1024 to be read.
     fn default() -> Self {
@@ -41,7 +76,7 @@ impl Default for SocketCanOptions {
             bit_rate: 1_000_000,
             data_bit_rate: None,
             transmit_frames: 32,
-            receive_frames: 1_024,
+            receive_frames: RECEIVE_FRAMES,
         }
     }
 }
@@ -49,7 +84,7 @@ impl Default for SocketCanOptions {
 /// Why an interface could not be opened.
 #[derive(Debug, Error)]
 #[error("{interface}: {action}: {error}")]
-pub struct OpenError {
+pub struct SocketCanError {
     /// The interface.
     pub interface: String,
     /// What was tried.
@@ -61,8 +96,8 @@ pub struct OpenError {
 
 /// Opens an interface, which must exist, as a port: CAN FD frames and error frames on, own frames received back as
 /// confirmations, kernel time stamps and overflow counter on.
-pub fn open_socketcan(interface: &str, options: &SocketCanOptions) -> Result<SocketCanPort, OpenError> {
-    let failed = |action| move |error| OpenError { interface: interface.into(), action, error };
+pub fn open_socketcan(interface: &str, options: &SocketCanOptions) -> Result<SocketCanPort, SocketCanError> {
+    let failed = |action| move |error| SocketCanError { interface: interface.into(), action, error };
     let socket = CanFdSocket::open(interface).map_err(failed("opening a socket"))?;
     set_filters(&socket, &options.identifiers).map_err(failed("setting the filters"))?;
     socket.set_error_filter_accept_all().map_err(failed("asking for error frames"))?;
@@ -108,6 +143,8 @@ fn set_buffers(socket: &CanFdSocket, options: &SocketCanOptions) -> io::Result<(
 
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+
     use super::*;
 
     #[test]
@@ -118,6 +155,22 @@ mod tests {
         let extended = filter(Id::extended(0x181).unwrap());
         assert_eq!(extended.as_ref().can_id, 0x8000_0181);
         assert_eq!(extended.as_ref().can_mask, 0xDFFF_FFFF);
+    }
+
+    #[test]
+    fn a_master_hears_every_identifier_of_its_nodes_and_its_own() {
+        let config = Config::load(Path::new("configs/arm6-erob.toml")).unwrap();
+        let options = SocketCanOptions::of_master(&config, 0);
+        let node = config.axes.iter().find(|axis| axis.bus == 0).map(|axis| axis.node).unwrap();
+        for function in [0x080, 0x180, 0x200, 0x480, 0x500, 0x580, 0x600, 0x700] {
+            assert!(options.identifiers.contains(&Id::canopen(function, node)), "{function:X}");
+        }
+        for id in [Id::canopen(NMT, 0), Id::canopen(SYNC, 0), Id::canopen(HEARTBEAT, config.master.node)] {
+            assert!(options.identifiers.contains(&id), "{id:?}");
+        }
+        let elsewhere = config.axes.iter().find(|axis| axis.bus == 1).map(|axis| axis.node).unwrap();
+        assert!(!options.identifiers.contains(&Id::canopen(0x180, elsewhere)));
+        assert!(options.identifiers.len() <= FILTER_LIMIT);
     }
 
     #[test]

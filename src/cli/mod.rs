@@ -4,6 +4,7 @@ mod check;
 mod configuration;
 mod exit;
 mod run;
+mod sim;
 mod table;
 
 pub use exit::Exit;
@@ -22,6 +23,7 @@ pub struct CommandLine {
 enum Command {
     Run(run::Arguments),
     Check(check::Arguments),
+    Sim(sim::Arguments),
 }
 
 impl CommandLine {
@@ -30,6 +32,7 @@ impl CommandLine {
         match self.command {
             Command::Run(arguments) => run::run(arguments),
             Command::Check(arguments) => check::run(&arguments),
+            Command::Sim(arguments) => sim::run(&arguments),
         }
     }
 }

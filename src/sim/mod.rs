@@ -46,6 +46,7 @@
 
 mod drive;
 pub mod erob;
+mod live;
 mod mailbox;
 mod medium;
 pub mod plant;
@@ -53,6 +54,7 @@ mod port;
 mod random;
 
 pub use drive::{Drive, DriveFault, NmtState, Observation};
+pub use live::LiveDrives;
 pub use mailbox::{Mailbox, Order};
 pub use medium::{BitRates, Medium, Transmission};
 pub use port::{SimulatedBus, UnknownNode};

@@ -83,12 +83,17 @@ pub(super) fn nanoseconds_of(time: &libc::timespec) -> Nanoseconds {
     seconds.saturating_mul(NANOSECONDS_PER_SECOND).saturating_add(nanoseconds)
 }
 
+/// Nanoseconds as a kernel time.
+pub(super) fn timespec_of(time_ns: Nanoseconds) -> libc::timespec {
+    libc::timespec {
+        tv_sec: libc::time_t::try_from(time_ns / NANOSECONDS_PER_SECOND).unwrap_or(libc::time_t::MAX),
+        tv_nsec: (time_ns % NANOSECONDS_PER_SECOND) as libc::c_long,
+    }
+}
+
 /// Sleeps until the clock reads `deadline_ns`; a signal handled meanwhile does not end the sleep.
 fn sleep_until(deadline_ns: Nanoseconds) {
-    let time = libc::timespec {
-        tv_sec: libc::time_t::try_from(deadline_ns / NANOSECONDS_PER_SECOND).unwrap_or(libc::time_t::MAX),
-        tv_nsec: (deadline_ns % NANOSECONDS_PER_SECOND) as libc::c_long,
-    };
+    let time = timespec_of(deadline_ns);
     // SAFETY: `time` is a valid time for reading; an absolute sleep writes no remainder, so null is allowed.
     // The loop ends: the time is absolute, and every other error is returned without sleeping (the caller spins).
     while unsafe {

@@ -1,6 +1,6 @@
 //! The port: one system call to send, one to receive.
 
-use super::super::clock::{monotonic_ns, real_time_ns};
+use super::super::clock::{monotonic_ns, real_time_ns, timespec_of};
 use super::super::errno;
 use super::account::Account;
 use super::batch::{self, Batch, SEND_BATCH};
@@ -39,6 +39,16 @@ impl SocketCanPort {
             return Err(errno());
         }
         Ok(Self { descriptor, batch: Batch::new(), account: Account::new(bit_rate, data_bit_rate) })
+    }
+
+    /// Waits until something has arrived, but no longer than `timeout_ns`. For whoever lives by the frames that
+    /// come, as a simulated drive does; the cycle lives by the clock.
+    pub fn wait(&self, timeout_ns: Nanoseconds) {
+        let mut entry = libc::pollfd { fd: self.descriptor, events: libc::POLLIN, revents: 0 };
+        let timeout = timespec_of(timeout_ns);
+        // SAFETY: one entry and the time are valid for the call; no signal mask is given. However the wait ends, the
+        // caller looks for itself.
+        unsafe { libc::ppoll(&mut entry, 1, &timeout, core::ptr::null()) };
     }
 }
 
