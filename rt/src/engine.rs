@@ -639,8 +639,8 @@ impl Engine {
             return;
         };
         if now_ns > command.valid_until_ns {
-            let age_s = (now_ns - command.valid_until_ns) as f64 / NANOSECONDS_PER_SECOND as f64;
-            self.begin_stop(Rule::StaleCommand, None, None, age_s, 0.0, now_ns, door);
+            let age_cycles = (now_ns - command.valid_until_ns).div_ceil(self.period_ns);
+            self.begin_stop(Rule::StaleCommand, None, None, age_cycles as f64, 0.0, now_ns, door);
             return self.follow_motion_if_stopping(now_ns, door);
         }
         let next: ArrayVec<State, MAX_AXES> =

@@ -128,7 +128,9 @@ fn report(config: &Config, session: &Session, as_json: bool) -> Exit {
     } else {
         match failure {
             Some(failure) => eprintln!("takt: {failure}"),
-            None => print(&report.picture(if stdout().is_terminal() { Emphasis::Ansi } else { Emphasis::None })),
+            None => {
+                print(&report.picture(if stdout().is_terminal() { Emphasis::Ansi } else { Emphasis::None }))
+            }
         }
     }
     exit
@@ -166,9 +168,9 @@ fn failure(config: &Config, outcome: &Outcome) -> Option<String> {
         Outcome::Stuck { phase } => {
             Some(format!("the group did not get any further while it was {}", words::phase(*phase)))
         }
-        Outcome::ThreadDied => {
-            Some("the real-time thread ended by itself; this is a defect of takt, please report it".to_owned())
-        }
+        Outcome::ThreadDied => Some(
+            "the real-time thread ended by itself; this is a defect of takt, please report it".to_owned(),
+        ),
     }
 }
 

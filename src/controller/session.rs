@@ -14,7 +14,9 @@ use super::supervisor::{Interrupt, Outcome, Progress, Supervisor};
 use crate::bus::port::{OpenError, Port};
 use crate::bus::trace::Trace;
 use crate::config::Config;
-use crate::telemetry::{Destination, LogSummary, Logger, LoggerOptions, LoggerThread, Machine, Notice, WallClock};
+use crate::telemetry::{
+    Destination, LogSummary, Logger, LoggerOptions, LoggerThread, Machine, Notice, WallClock,
+};
 
 /// A pause between two looks at the controller.
 const PAUSE: Duration = Duration::from_millis(1);

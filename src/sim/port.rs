@@ -26,6 +26,9 @@ pub(super) const DRIVE_MAILBOX: usize = 16;
 const MASTER: usize = 0;
 
 /// A bus with simulated drives.
+///
+/// The master's frames wait in one queue in the order of the calls, as in the kernel: what is handed over behind a
+/// set-point goes out behind it, however strong its identifier. Every drive offers its strongest frame first.
 pub struct SimulatedBus {
     medium: Medium,
     drives: Vec<Box<dyn Drive>>,
@@ -92,8 +95,9 @@ impl SimulatedBus {
     }
 
     /// The truth about a drive, as of the last call.
-    pub fn observe(&self, node: u8) -> Result<Observation, UnknownNode> {
-        self.station(node).map(|station| self.drives[station - 1].observe())
+    pub fn observe(&mut self, node: u8) -> Result<Observation, UnknownNode> {
+        let station = self.station(node)?;
+        Ok(self.drives[station - 1].observe(self.now_ns))
     }
 
     /// Breaks something in a drive.

@@ -64,7 +64,8 @@ fn commands(report: &ThreadReport) -> Vec<String> {
         capabilities.push("cap_ipc_lock");
     }
     if !capabilities.is_empty() {
-        let program = env::current_exe().map_or_else(|_| "takt".to_owned(), |path| path.display().to_string());
+        let program =
+            env::current_exe().map_or_else(|_| "takt".to_owned(), |path| path.display().to_string());
         commands.push(format!("sudo setcap {}=ep {program}", capabilities.join(",")));
     }
     if is_refused(Step::DmaLatency) {

@@ -144,7 +144,7 @@ pub fn stop_cause(stop: &StopReason, machine: &Machine) -> String {
         }
         Rule::NotTransmitted => {
             let of = stop.axis.map_or_else(String::new, |_| format!(" of {axis}"));
-            format!("set-points{of} are not getting onto the wire: {value:.0} frames still wait")
+            format!("set-points{of} are not getting onto the wire for {}", cycles(value))
         }
     }
 }
@@ -246,13 +246,7 @@ mod tests {
                 "the drive of axis 9 did not reach operation enabled within 2000 cycles (2.0 s)",
             ),
             (Rule::BusLost, None, 0.0, 0.0, "bus left is bus-off or its interface is down"),
-            (
-                Rule::NotTransmitted,
-                None,
-                6.0,
-                0.0,
-                "set-points are not getting onto the wire: 6 frames still wait",
-            ),
+            (Rule::NotTransmitted, None, 6.0, 0.0, "set-points are not getting onto the wire for 6 cycles"),
         ];
         for (rule, axis, value, limit, words) in cases {
             assert_eq!(stop_cause(&reason(rule, axis, value, limit), &machine()), words);

@@ -27,7 +27,7 @@ impl Cursor<'_> {
 
     fn value(&mut self, kind: &str) -> Value {
         Value::Number(match kind {
-            "uint8" => u8::from_le_bytes(self.take()).into(),
+            "bool" | "uint8" => u8::from_le_bytes(self.take()).into(),
             "uint16" => u16::from_le_bytes(self.take()).into(),
             "int16" => i16::from_le_bytes(self.take()).into(),
             "uint32" => u32::from_le_bytes(self.take()).into(),

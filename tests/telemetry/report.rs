@@ -70,7 +70,7 @@ fn the_report_has_the_keys_of_the_contract_with_the_values_of_the_run() {
     }
     let expected = json!({
         "policy": "SCHED_OTHER", "priority": null, "cpu": null, "memory_locked": false, "preempt_rt": false,
-        "page_faults": 2, "refused": ["SCHED_FIFO priority 80: operation not permitted"],
+        "spin_guard_ns": 0, "page_faults": 2, "refused": ["SCHED_FIFO priority 80: operation not permitted"],
         "grant_with": ["sudo setcap cap_sys_nice+ep target/release/takt"],
     });
     assert_eq!(report["realtime"], expected);

@@ -1,0 +1,129 @@
+//! A program without the standard library and without an allocator that runs cycles of the real-time half. That it
+//! links is the proof that nothing in there allocates; that it exits with 0, that it works.
+#![no_std]
+#![no_main]
+
+use core::f64::consts::TAU;
+
+use takt_rt::axis::{AxisParameters, Pdo};
+use takt_rt::control::ControlLaw;
+use takt_rt::door::{Door, Request, Snapshot, StreamCommand};
+use takt_rt::engine::{BusParameters, Engine, EngineParameters, SendBatch, Transmission};
+use takt_rt::frame::{Frame, Id};
+use takt_rt::guard::AxisLimits;
+use takt_rt::pdo::{MappedObject, Mapping};
+use takt_rt::port::{BusHealth, Received};
+use takt_rt::record::{CycleRecord, Event, Timing};
+use takt_rt::stop::Phase;
+use takt_rt::units::{Scale, ScaleParameters};
+
+// The C library gives the program its entry; nothing else of it is used.
+#[link(name = "c")]
+unsafe extern "C" {}
+
+#[panic_handler]
+fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
+    // SAFETY: `_exit` only ends the process.
+    unsafe { libc::_exit(101) }
+}
+
+/// Unwinding is switched off, but the core library was built with it and names this symbol.
+#[unsafe(no_mangle)]
+extern "C" fn rust_eh_personality() {}
+
+#[derive(Default)]
+struct Silent {
+    requests: [Option<Request>; 3],
+}
+
+impl Door for Silent {
+    fn request(&mut self) -> Option<Request> {
+        self.requests.iter_mut().find_map(Option::take)
+    }
+    fn stream(&mut self) -> Option<StreamCommand> {
+        None
+    }
+    fn service_frame(&mut self, _: usize) -> Option<Frame> {
+        None
+    }
+    fn received(&mut self, _: usize, _: &Received) -> bool {
+        true
+    }
+    fn record(&mut self, _: &CycleRecord) -> bool {
+        true
+    }
+    fn event(&mut self, _: &Event) -> bool {
+        true
+    }
+    fn publish(&mut self, _: &Snapshot) {}
+}
+
+fn axis() -> Option<AxisParameters> {
+    let commands = [MappedObject::new(0x6040, 0, 16), MappedObject::new(0x607A, 0, 32)];
+    let feedback = [MappedObject::new(0x6041, 0, 16), MappedObject::new(0x6064, 0, 32)];
+    let scale = ScaleParameters {
+        counts_per_turn: 524_288.0,
+        gear_ratio: 1.0,
+        travel_per_turn: TAU,
+        reversed: false,
+        zero_counts: 0.0,
+        rated_torque: 31.0,
+    };
+    let pdo = |function, mapping| Pdo { id: Id::canopen(function, 1), mapping };
+    Some(AxisParameters {
+        bus: 0,
+        node: 1,
+        commands: [pdo(0x200, Mapping::commands(&commands).ok()?)].into_iter().collect(),
+        feedback: [pdo(0x180, Mapping::feedback(&feedback).ok()?)].into_iter().collect(),
+        law: ControlLaw::Position,
+        scale: Scale::new(scale).ok()?,
+        limits: AxisLimits {
+            position_min: -3.0,
+            position_max: 3.0,
+            velocity: 2.0,
+            acceleration: 10.0,
+            deceleration: 10.0,
+            jerk: f64::INFINITY,
+            torque: 40.0,
+        },
+        following_error_limit: 0.1,
+        following_error_cycles: 50,
+        missed_feedback_cycles: 5,
+    })
+}
+
+fn cycles() -> Option<Phase> {
+    let bus = BusParameters {
+        sync_id: Id::canopen(0x080, 0),
+        service_frames_active: 1,
+        service_frames_passive: 6,
+    };
+    let parameters = EngineParameters {
+        period_ns: 1_000_000,
+        axes: [axis()?].into_iter().collect(),
+        buses: [bus].into_iter().collect(),
+        heartbeat: None,
+        enable_timeout_cycles: 100,
+        not_transmitted_cycles: 5,
+    };
+    let mut engine = Engine::new(parameters).ok()?;
+    let requests = [Some(Request::Sync(true)), Some(Request::Activate), Some(Request::Enable)];
+    let mut door = Silent { requests };
+    let health = [BusHealth::default()];
+    for slot in 0..10 {
+        let at_ns = slot * 1_000_000;
+        let frame = Frame::of(Id::canopen(0x180, 1), [0x37, 0x12, 1, 0, 0, 0]);
+        engine.receive(0, &Received { frame, at_ns }, &mut door);
+        engine.compute(slot, at_ns, &health, Transmission::Free, &mut door);
+        let mut batch = SendBatch::new();
+        engine.set_points(0, &mut batch);
+        engine.finish(Timing { slot, ..Timing::default() }, at_ns, &health, &mut door);
+    }
+    Some(engine.phase())
+}
+
+/// Called by the C start-up code.
+#[unsafe(no_mangle)]
+extern "C" fn main() -> i32 {
+    if cycles() == Some(Phase::Holding) { 0 } else { 1 }
+}

@@ -1,0 +1,263 @@
+//! `takt` as a user meets it: what it prints, what it leaves behind, and how it ends.
+
+use std::fs;
+use std::os::unix::fs::PermissionsExt;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use nix::sys::signal::{Signal, kill};
+use nix::unistd::Pid;
+use serde_json::Value;
+use tempfile::TempDir;
+
+/// A folder with the six-axis arm and two of its moves, recording into `runs` beside it.
+struct Place {
+    folder: TempDir,
+}
+
+impl Place {
+    fn new() -> Self {
+        let place = Self { folder: tempfile::tempdir().unwrap() };
+        // Somebody else than the owner reads it when the rights are dropped.
+        fs::set_permissions(place.folder.path(), fs::Permissions::from_mode(0o777)).unwrap();
+        let example = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/arm6-erob.toml");
+        let text = fs::read_to_string(example).unwrap();
+        let moves: Vec<&str> = text.split("[[program.move]]").collect();
+        let shortened = moves[..3].join("[[program.move]]");
+        let runs = place.folder.path().join("runs");
+        fs::write(place.config(), format!("{shortened}\n[telemetry]\ndirectory = {runs:?}\n")).unwrap();
+        place
+    }
+
+    fn config(&self) -> PathBuf {
+        self.folder.path().join("arm.toml")
+    }
+
+    fn change(&self, from: &str, to: &str) {
+        let text = fs::read_to_string(self.config()).unwrap();
+        assert!(text.contains(from), "{from}");
+        fs::write(self.config(), text.replace(from, to)).unwrap();
+    }
+
+    fn run(&self, options: &[&str]) -> Child {
+        Command::new(env!("CARGO_BIN_EXE_takt"))
+            .arg("run")
+            .arg(self.config())
+            .args(options)
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap()
+    }
+
+    fn run_to_end(&self, options: &[&str]) -> Output {
+        self.run(options).wait_with_output().unwrap()
+    }
+
+    /// Runs without any right that real time needs, whoever runs the tests.
+    fn run_unprivileged(&self, options: &[&str]) -> Output {
+        // Where the binary lies may be closed to others, so a copy runs.
+        let program = self.folder.path().join("takt");
+        fs::copy(env!("CARGO_BIN_EXE_takt"), &program).unwrap();
+        let mut command = if nix::unistd::geteuid().is_root() {
+            let mut command = Command::new("setpriv");
+            command.args(["--reuid=65534", "--regid=65534", "--clear-groups", "--bounding-set=-all"]);
+            command.arg("prlimit").args(["--rtprio=0:0", "--memlock=65536:65536"]).arg(&program);
+            command
+        } else {
+            let mut command = Command::new("prlimit");
+            command.args(["--rtprio=0:0", "--memlock=65536:65536"]).arg(&program);
+            command
+        };
+        command.arg("run").arg(self.config()).args(options).stdin(Stdio::null()).output().unwrap()
+    }
+}
+
+fn report(output: &Output) -> Value {
+    let text = String::from_utf8(output.stdout.clone()).unwrap();
+    serde_json::from_str(&text).unwrap_or_else(|error| panic!("not one JSON object: {error}: {text}"))
+}
+
+fn errors(output: &Output) -> String {
+    String::from_utf8(output.stderr.clone()).unwrap()
+}
+
+fn signal(child: &Child, signal: Signal) {
+    kill(Pid::from_raw(i32::try_from(child.id()).unwrap()), signal).unwrap();
+}
+
+#[test]
+fn a_run_ends_with_0_and_every_axis_within_two_counts_of_its_target() {
+    let output = Place::new().run_to_end(&["--json"]);
+    assert_eq!(output.status.code(), Some(0), "{}", errors(&output));
+    let report = report(&output);
+    assert_eq!(report["ended"], "finished");
+    assert_eq!(report["stop"], Value::Null);
+    assert_eq!(report["telemetry"]["dropped"], 0);
+    assert_eq!(report["cycle_ns"], 1_000_000);
+    let axes = report["axes"].as_array().unwrap();
+    assert_eq!(axes.len(), 6);
+    for axis in axes {
+        let counts = axis["final_error_counts"].as_f64().unwrap();
+        assert!(counts.abs() <= 2.0, "{axis}");
+        let following = axis["following_error_max"].as_f64().unwrap();
+        assert!(following > 0.0 && following < 0.1, "{axis}");
+    }
+    for bus in report["buses"].as_array().unwrap() {
+        assert!(bus["load_percent"].as_f64().unwrap() > 20.0, "{bus}");
+        assert_eq!((&bus["tx_overruns"], &bus["errors"]), (&Value::from(0), &Value::from(0)));
+    }
+    for key in ["wake_ns", "sync_ns", "compute_ns"] {
+        for quantile in ["p50", "p99", "p999", "max"] {
+            assert!(report[key][quantile].is_u64(), "{key}.{quantile}");
+        }
+    }
+    for key in ["policy", "priority", "cpu", "memory_locked", "preempt_rt", "page_faults"] {
+        assert!(report["realtime"].get(key).is_some(), "realtime.{key}");
+    }
+}
+
+#[test]
+fn a_run_leaves_a_recording_and_a_report_for_people() {
+    let place = Place::new();
+    let output = place.run_to_end(&[]);
+    assert_eq!(output.status.code(), Some(0), "{}", errors(&output));
+    let text = String::from_utf8(output.stdout).unwrap();
+    for part in
+        ["program finished", "wake-up latency", "SYNC release error", "joint6", "missed slots", "real-time"]
+    {
+        assert!(text.contains(part), "{part:?} is not in\n{text}");
+    }
+    let recordings: Vec<_> = fs::read_dir(place.folder.path().join("runs")).unwrap().collect();
+    assert_eq!(recordings.len(), 1);
+}
+
+#[test]
+fn without_rights_the_run_is_done_all_the_same_and_says_what_was_refused_and_how_to_grant_it() {
+    let place = Place::new();
+    let output = place.run_unprivileged(&["--json"]);
+    assert_eq!(output.status.code(), Some(0), "{}", errors(&output));
+    let realtime = &report(&output)["realtime"];
+    assert_eq!((&realtime["priority"], &realtime["memory_locked"]), (&Value::Null, &Value::Bool(false)));
+    let commands = realtime["grant_with"].to_string();
+    assert!(commands.contains("sudo setcap cap_sys_nice,cap_ipc_lock=ep "), "{commands}");
+    assert!(realtime["refused"].to_string().contains("SCHED_FIFO"), "{realtime}");
+}
+
+#[test]
+fn required_real_time_that_is_refused_ends_with_3_before_anything_moves() {
+    let place = Place::new();
+    let output = place.run_unprivileged(&["--require-realtime"]);
+    assert_eq!(output.status.code(), Some(3));
+    assert!(output.stdout.is_empty());
+    assert!(errors(&output).contains("sudo setcap"), "{}", errors(&output));
+}
+
+#[test]
+fn a_wrong_configuration_ends_with_2_and_the_line() {
+    let place = Place::new();
+    place.change("velocity = \"2.3925 rad/s\"", "velocity = \"2.3925 kg\"");
+    let output = place.run_to_end(&[]);
+    assert_eq!(output.status.code(), Some(2));
+    let errors = errors(&output);
+    assert!(errors.contains("arm.toml:") && errors.contains("2.3925 kg"), "{errors}");
+}
+
+#[test]
+fn a_bus_that_cannot_carry_its_traffic_is_refused_with_the_sums() {
+    let place = Place::new();
+    place.change("bus = \"wrist\"", "bus = \"base\"");
+    let output = place.run_to_end(&[]);
+    assert_eq!(output.status.code(), Some(2));
+    let errors = errors(&output);
+    assert!(errors.contains("base") && errors.contains("1435"), "{errors}");
+}
+
+#[test]
+fn an_unknown_bus_on_the_command_line_is_refused() {
+    let output = Place::new().run_to_end(&["--bus", "tail=can7"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(errors(&output).contains("tail"), "{}", errors(&output));
+}
+
+#[test]
+fn ctrl_c_and_sigterm_stop_in_control_and_end_with_130() {
+    for which in [Signal::SIGINT, Signal::SIGTERM] {
+        let place = Place::new();
+        let child = place.run(&["--json"]);
+        // Power-up and bring-up take about half a second, the first move more than one.
+        thread::sleep(Duration::from_millis(1_500));
+        signal(&child, which);
+        let output = child.wait_with_output().unwrap();
+        assert_eq!(output.status.code(), Some(130), "{}", errors(&output));
+        let report = report(&output);
+        assert_eq!(report["ended"], "interrupted");
+        assert_eq!(report["stop"]["category"], 2, "{report}");
+        assert_eq!(report["telemetry"]["dropped"], 0);
+    }
+}
+
+#[test]
+fn a_second_ctrl_c_ends_at_once() {
+    let place = Place::new();
+    place.change("velocity = \"80 %\"", "velocity = \"5 %\"");
+    let child = place.run(&[]);
+    thread::sleep(Duration::from_millis(1_500));
+    let began = Instant::now();
+    signal(&child, Signal::SIGINT);
+    thread::sleep(Duration::from_millis(20));
+    signal(&child, Signal::SIGINT);
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(130), "{} after {:?}", errors(&output), began.elapsed());
+}
+
+#[test]
+fn a_process_that_is_frozen_in_motion_goes_on_and_counts_what_it_missed() {
+    let place = Place::new();
+    let child = place.run(&["--json"]);
+    thread::sleep(Duration::from_millis(1_500));
+    signal(&child, Signal::SIGSTOP);
+    thread::sleep(Duration::from_millis(200));
+    signal(&child, Signal::SIGCONT);
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", errors(&output));
+    let report = report(&output);
+    assert!(report["missed_slots"].as_u64().unwrap() >= 150, "{}", report["missed_slots"]);
+    for axis in report["axes"].as_array().unwrap() {
+        assert!(axis["final_error_counts"].as_f64().unwrap().abs() <= 2.0, "{axis}");
+    }
+}
+
+#[test]
+fn a_folder_that_cannot_be_written_costs_the_recording_and_one_message_and_nothing_else() {
+    let place = Place::new();
+    fs::write(place.folder.path().join("runs"), "in the way").unwrap();
+    let output = place.run_to_end(&["--json"]);
+    assert_eq!(output.status.code(), Some(0), "{}", errors(&output));
+    assert_eq!(errors(&output).lines().count(), 1, "{}", errors(&output));
+    assert!(errors(&output).contains("runs/"), "{}", errors(&output));
+    assert_eq!(report(&output)["telemetry"]["recording"], Value::Null);
+}
+
+#[test]
+fn check_says_whether_a_configuration_fits() {
+    let place = Place::new();
+    let check = |options: &[&str]| {
+        Command::new(env!("CARGO_BIN_EXE_takt"))
+            .arg("check")
+            .arg(place.config())
+            .args(options)
+            .output()
+            .unwrap()
+    };
+    let output = check(&["--json"]);
+    assert_eq!(output.status.code(), Some(0), "{}", errors(&output));
+    assert_eq!(report(&output)["fits"], true);
+    place.change("bus = \"wrist\"", "bus = \"base\"");
+    let output = check(&["--json"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert_eq!(report(&output)["fits"], false);
+}
