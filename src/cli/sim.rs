@@ -58,7 +58,7 @@ pub fn run(arguments: &Arguments) -> Exit {
         let threads: Vec<_> = drives
             .into_iter()
             .map(|(name, mut drives)| {
-                let nodes: Vec<String> = drives.observe().map(|(node, _)| node.to_string()).collect();
+                let nodes: Vec<String> = drives.nodes().map(|node| node.to_string()).collect();
                 eprintln!("bus `{name}`: nodes {}; Ctrl-C ends them", nodes.join(", "));
                 let is_stopped = Arc::clone(&is_stopped);
                 scope.spawn(move || drives.run(&is_stopped))

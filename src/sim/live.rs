@@ -7,7 +7,7 @@ use takt_rt::linux::{MonotonicClock, SocketCanPort};
 use takt_rt::port::{BusHealth, BusPort, Clock, ReceiveBatch};
 use takt_rt::time::Nanoseconds;
 
-use super::drive::{Drive, Observation};
+use super::drive::Drive;
 use super::mailbox::{Mailbox, Order};
 use super::port::{DRIVE_MAILBOX, drives_of};
 use crate::config::Config;
@@ -46,21 +46,22 @@ impl LiveDrives {
     /// Does what is due now, and returns when something will be due again if no frame comes before.
     pub fn turn(&mut self) -> Nanoseconds {
         let now_ns = self.clock.now_ns();
-        self.hear(now_ns);
+        // As on the simulated bus: what was due comes before what has arrived.
         for (drive, mailbox) in &mut self.stations {
             if drive.wake_ns() <= now_ns {
                 drive.advance(now_ns, mailbox);
             }
         }
+        self.hear(now_ns);
         self.speak(now_ns);
         let due_ns = self.stations.iter().map(|(drive, _)| drive.wake_ns()).min().unwrap_or(u64::MAX);
         // What found no room is offered again soon.
         if self.leaving.is_empty() { due_ns } else { due_ns.min(now_ns + RETRY_NS) }
     }
 
-    /// The truth about the drives, in the order of the configuration.
-    pub fn observe(&self) -> impl Iterator<Item = (u8, Observation)> + '_ {
-        self.stations.iter().map(|(drive, _)| (drive.node(), drive.observe()))
+    /// Their node numbers, in the order of the configuration.
+    pub fn nodes(&self) -> impl Iterator<Item = u8> + '_ {
+        self.stations.iter().map(|(drive, _)| drive.node())
     }
 
     /// The state of the interface.
@@ -127,7 +128,8 @@ mod tests {
     /// The drives of the first bus of a configuration on one end of a pair of sockets, and the other end. Everything
     /// but the interface is as it is on a real one.
     fn connected() -> (LiveDrives, SocketCanPort) {
-        let config = Config::load(Path::new("configs/arm6-erob.toml")).unwrap();
+        let mut config = Config::load(Path::new("configs/arm6-erob.toml")).unwrap();
+        config.axes.iter_mut().for_each(|axis| axis.simulated.power_up_ns = 1_000_000);
         let (ours, theirs) = UnixDatagram::pair().unwrap();
         let port = |socket: &UnixDatagram| SocketCanPort::new(socket.as_raw_fd(), 1_000_000, None).unwrap();
         (LiveDrives::new(&config, 0, port(&ours)), port(&theirs))
@@ -151,7 +153,7 @@ mod tests {
     #[test]
     fn drives_boot_and_answer_whoever_asks() {
         let (mut drives, mut master) = connected();
-        let nodes: Vec<u8> = drives.observe().map(|(node, _)| node).collect();
+        let nodes: Vec<u8> = drives.nodes().collect();
         let boot_up: Vec<Frame> =
             nodes.iter().map(|node| Frame::of(Id::canopen(0x700, *node), [0])).collect();
         assert_eq!(heard(&mut drives, &mut master, nodes.len()), boot_up);
