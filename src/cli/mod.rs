@@ -3,6 +3,7 @@
 mod check;
 mod configuration;
 mod exit;
+mod jitter;
 mod run;
 mod sim;
 mod table;
@@ -24,6 +25,7 @@ enum Command {
     Run(run::Arguments),
     Check(check::Arguments),
     Sim(sim::Arguments),
+    Jitter(jitter::Arguments),
 }
 
 impl CommandLine {
@@ -33,6 +35,7 @@ impl CommandLine {
             Command::Run(arguments) => run::run(arguments),
             Command::Check(arguments) => check::run(&arguments),
             Command::Sim(arguments) => sim::run(&arguments),
+            Command::Jitter(arguments) => jitter::run(&arguments),
         }
     }
 }

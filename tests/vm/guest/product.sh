@@ -1,5 +1,5 @@
 # takt itself: six axes on two interfaces, `takt sim` as the other side, SYNC seen by a listener of its own, idle and under load. TAKT names
-# the program; CYCLES and LOAD_CYCLES set how long. Leaves product.txt (the table), the recordings and the reports. Fails when the mean period
+# the program; CYCLES and LOAD_CYCLES set how long. Leaves product.txt (the table), jitter.txt (`takt jitter`), the recordings and the reports. Fails when the mean period
 # is off by more than a nanosecond in a microsecond, a slot was missed, or the largest deviation is far above what cyclictest finds.
 . tests/vm/guest/laboratory.sh
 cycles=${CYCLES:-10000} load_cycles=${LOAD_CYCLES:-2000}
@@ -47,6 +47,8 @@ chrt --fifo --pid 1 $$ >/dev/null
 vcan_up vcan0
 vcan_up vcan1
 row "(microseconds)" bus load frames mean min max range deviation missed
+"$TAKT" jitter --bus vcan0 --cycles 2000 > "$OUT/jitter.txt" || exit
+sed -n 1,5p "$OUT/jitter.txt"
 drives_on vcan0 vcan1
 measure idle "$cycles" $idle_allowance vcan0 vcan1 || exit
 load_on vcan0
