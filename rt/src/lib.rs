@@ -38,3 +38,4 @@ pub mod record;
 pub mod stop;
 pub mod time;
 pub mod units;
+pub mod wire;

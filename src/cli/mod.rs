@@ -4,7 +4,9 @@ mod check;
 mod configuration;
 mod exit;
 mod plan;
+mod jitter;
 mod run;
+mod sim;
 mod table;
 
 pub use exit::Exit;
@@ -24,6 +26,8 @@ enum Command {
     Run(run::Arguments),
     Check(check::Arguments),
     Plan(plan::Arguments),
+    Sim(sim::Arguments),
+    Jitter(jitter::Arguments),
 }
 
 impl CommandLine {
@@ -33,6 +37,8 @@ impl CommandLine {
             Command::Run(arguments) => run::run(arguments),
             Command::Check(arguments) => check::run(&arguments),
             Command::Plan(arguments) => plan::run(&arguments),
+            Command::Sim(arguments) => sim::run(&arguments),
+            Command::Jitter(arguments) => jitter::run(&arguments),
         }
     }
 }

@@ -193,6 +193,13 @@ impl RunReport {
     }
 }
 
+impl LatencyReport {
+    /// The distribution as lines of text: a title, the bars, and the axis with its labels.
+    pub fn picture(&self, title: &str) -> Vec<String> {
+        histogram(title, self)
+    }
+}
+
 /// The rows of a histogram: a title, the bars, and the axis with its labels. Both axes are logarithmic, so that one
 /// late cycle among millions still shows.
 fn histogram(title: &str, latency: &LatencyReport) -> Vec<String> {

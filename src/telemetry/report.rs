@@ -233,7 +233,8 @@ fn seconds(ns: Nanoseconds) -> f64 {
 }
 
 impl LatencyReport {
-    fn new(latency: &Latency) -> Self {
+    /// What a distribution says.
+    pub fn new(latency: &Latency) -> Self {
         let bound = |index: usize| {
             let decades = index as f64 / RANGES_PER_DECADE as f64;
             (SHORTEST_NS * 10_f64.powf(decades)).round() as u64
