@@ -6,5 +6,6 @@ pub mod canopen;
 pub mod config;
 pub mod controller;
 pub mod drive;
+pub mod jitter;
 pub mod sim;
 pub mod telemetry;

@@ -3,6 +3,8 @@
 mod check;
 mod configuration;
 mod exit;
+mod interruption;
+mod jitter;
 mod run;
 mod table;
 
@@ -22,6 +24,7 @@ pub struct CommandLine {
 enum Command {
     Run(run::Arguments),
     Check(check::Arguments),
+    Jitter(jitter::Arguments),
 }
 
 impl CommandLine {
@@ -30,6 +33,7 @@ impl CommandLine {
         match self.command {
             Command::Run(arguments) => run::run(arguments),
             Command::Check(arguments) => check::run(&arguments),
+            Command::Jitter(arguments) => jitter::run(&arguments),
         }
     }
 }

@@ -229,7 +229,8 @@ fn seconds(ns: Nanoseconds) -> f64 {
 }
 
 impl LatencyReport {
-    fn new(latency: &Latency) -> Self {
+    /// Puts a distribution in numbers.
+    pub fn new(latency: &Latency) -> Self {
         let bound = |index: usize| {
             let decades = index as f64 / RANGES_PER_DECADE as f64;
             (SHORTEST_NS * 10_f64.powf(decades)).round() as u64
