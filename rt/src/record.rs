@@ -16,7 +16,8 @@ pub struct Timing {
     pub slot: u64,
     /// Its start on the grid.
     pub slot_start_ns: Nanoseconds,
-    /// How late the timer woke the thread for the slot, against the instant that it was set to.
+    /// How late the timer woke the thread for the slot, against the instant that it was set to. When that was too
+    /// late to use a slot, the latest of the wake-ups since the cycle before.
     pub wake_ns: u64,
     /// How late SYNC was handed to the first interface, against the start of the slot.
     pub sync_ns: u64,

@@ -1,173 +1,149 @@
-//! `takt jitter`: how good this machine is at keeping time.
+//! `takt jitter`: how evenly this machine paces the loop.
+
+use std::fs;
+use std::io::{IsTerminal, Write, stderr, stdout};
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::Args;
-use serde::Serialize;
+use indicatif::{ProgressBar, ProgressStyle};
 
-use takt::bus::{SocketCanOptions, open_socketcan};
-use takt::config::Realtime;
-use takt::controller::realtime_thread::thread_config;
-use takt::jitter::{JitterOptions, JitterReport, JitterRun, measure};
-use takt::telemetry::{LatencyReport, RealtimeReport};
-use takt_rt::frame::{Frame, Id};
-use takt_rt::linux::SocketCanPort;
+use takt::config::Interface;
+use takt::jitter::{self, JitterOptions, JitterReport, Measurement, Pacing};
+use takt::telemetry::Emphasis;
 
 use super::exit::Exit;
-use super::table::Table;
+use super::interruption;
 
-/// Measure how exactly this machine keeps a period: wake-up latency and SYNC release error, sleeping alone against
-/// sleeping and then spinning.
+/// Measure how evenly this machine paces the loop: sleeping only, and sleeping, then spinning.
 #[derive(Args, Debug)]
 pub struct Arguments {
-    /// Send SYNC (identifier 080) on this CAN interface, which must be up
-    #[arg(long, value_name = "INTERFACE")]
-    bus: Option<String>,
-    /// The period in microseconds
-    #[arg(long, value_name = "US", default_value_t = 1_000, value_parser = clap::value_parser!(u64).range(50..=1_000_000))]
+    /// Send SYNC to this interface in every slot: can0, vcan0, sim. Drives on it that are enabled will see it
+    #[arg(long, value_name = "INTERFACE", value_parser = interface)]
+    bus: Option<Interface>,
+    /// Period of the cycle, in whole microseconds
+    #[arg(long, value_name = "N", default_value_t = 1_000, value_parser = clap::value_parser!(u64).range(250..=100_000))]
     period_us: u64,
-    /// How many periods, in each of the two runs
-    #[arg(long, value_name = "N", default_value_t = 5_000, value_parser = clap::value_parser!(u32).range(1..=100_000_000))]
-    cycles: u32,
-    /// How long before a slot to stop sleeping and spin, in microseconds, instead of choosing it by measurement
-    #[arg(long, value_name = "US")]
-    spin_guard_us: Option<u64>,
-    /// SCHED_FIFO priority
-    #[arg(long, value_name = "1-99", default_value_t = 80, value_parser = clap::value_parser!(u8).range(1..=99))]
+    /// Cycles to measure, of each way of waiting
+    #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = clap::value_parser!(u64).range(1..))]
+    cycles: u64,
+    /// SCHED_FIFO priority; 0 stays in the normal class
+    #[arg(long, value_name = "P", default_value_t = 80, value_parser = clap::value_parser!(u8).range(0..=99))]
     priority: u8,
-    /// Stay on this CPU instead of the last one that may be used
-    #[arg(long)]
+    /// The CPU to stay on [default: the last one, with SCHED_FIFO]
+    #[arg(long, value_name = "C")]
     cpu: Option<usize>,
-    /// Print the figures as one JSON object
+    /// Draw the histograms into this file
+    #[arg(long, value_name = "FILE.svg")]
+    svg: Option<PathBuf>,
+    /// Print the report as one JSON object
     #[arg(long)]
     json: bool,
 }
 
-/// Measures and prints.
+fn interface(text: &str) -> Result<Interface, String> {
+    text.parse().map_err(|error: takt::config::InterfaceError| format!("{error}: {}", error.help()))
+}
+
+impl Arguments {
+    fn options(&self) -> JitterOptions {
+        let mut options = JitterOptions {
+            period_ns: self.period_us * 1_000,
+            cycles: self.cycles,
+            interface: self.bus.clone(),
+            ..JitterOptions::default()
+        };
+        options.realtime.priority = (self.priority > 0).then_some(self.priority);
+        options.realtime.cpu = self.cpu;
+        options
+    }
+}
+
+/// Runs it.
 pub fn run(arguments: &Arguments) -> Exit {
-    let port = match arguments.bus.as_deref().map(open).transpose() {
-        Ok(port) => port,
+    let interrupted = match interruption::watch() {
+        Ok(interrupted) => interrupted,
         Err(error) => {
-            eprintln!("takt: {error}");
-            return Exit::Usage;
+            eprintln!("takt: cannot watch for Ctrl-C: {error}");
+            return Exit::Stopped;
         }
     };
-    let realtime = Realtime {
-        priority: Some(arguments.priority),
-        cpu: arguments.cpu,
-        lock_memory: true,
-        hold_dma_latency: true,
-        spin_guard_ns: None,
-    };
-    let options = JitterOptions {
-        period_ns: arguments.period_us * 1_000,
-        cycles: usize::try_from(arguments.cycles).unwrap_or(usize::MAX),
-        spin_guard_ns: arguments.spin_guard_us.map(|guard| guard.saturating_mul(1_000)),
-        thread: thread_config(&realtime),
-    };
-    match measure(&options, Frame::of(Id::canopen(0x080, 0), []), port) {
-        Ok(report) => {
-            let printed = Printed::new(arguments, &report);
-            if arguments.json { printed.json() } else { printed.text() }
-        }
-        Err(error) => {
-            eprintln!("takt: {error}");
-            Exit::Stopped
-        }
-    }
-}
-
-fn open(interface: &str) -> Result<SocketCanPort, takt::bus::SocketCanError> {
-    let options =
-        SocketCanOptions { identifiers: vec![Id::canopen(0x080, 0)], ..SocketCanOptions::default() };
-    open_socketcan(interface, &options)
-}
-
-/// The report, as it is printed.
-#[derive(Serialize)]
-struct Printed<'a> {
-    period_ns: u64,
-    cycles: u32,
-    interface: Option<&'a str>,
-    sleep_only: Run,
-    sleep_then_spin: Run,
-    realtime: RealtimeReport,
-}
-
-#[derive(Serialize)]
-struct Run {
-    guard_ns: u64,
-    missed_slots: u64,
-    /// How late the timer was.
-    wake_ns: LatencyReport,
-    /// How late SYNC was released, against the grid.
-    release_ns: LatencyReport,
-}
-
-impl Run {
-    fn new(run: &JitterRun) -> Self {
-        Self {
-            guard_ns: run.guard_ns,
-            missed_slots: run.missed_slots,
-            wake_ns: LatencyReport::new(&run.wake),
-            release_ns: LatencyReport::new(&run.release),
-        }
-    }
-}
-
-impl<'a> Printed<'a> {
-    fn new(arguments: &'a Arguments, report: &JitterReport) -> Self {
-        let faults = [&report.sleep_only, &report.sleep_then_spin].map(|run| run.page_faults);
-        let faults = faults.iter().map(|faults| faults.minor + faults.major).sum();
-        Self {
-            period_ns: arguments.period_us * 1_000,
-            cycles: arguments.cycles,
-            interface: arguments.bus.as_deref(),
-            sleep_only: Run::new(&report.sleep_only),
-            sleep_then_spin: Run::new(&report.sleep_then_spin),
-            realtime: RealtimeReport::new(&report.thread, report.sleep_then_spin.guard_ns, faults),
-        }
-    }
-
-    fn json(&self) -> Exit {
-        match serde_json::to_string(self) {
-            Ok(json) => {
-                println!("{json}");
-                Exit::Done
-            }
+    let options = arguments.options();
+    let mut measurements = Vec::new();
+    for pacing in [Pacing::Sleep, Pacing::SleepThenSpin] {
+        match measure(&options, pacing, &interrupted) {
+            Ok(measurement) => measurements.push(measurement),
             Err(error) => {
-                eprintln!("takt: the figures cannot be written as JSON: {error}");
-                Exit::Stopped
+                eprintln!("takt: {error}");
+                return Exit::Usage;
             }
+        }
+        if interrupted.load(Ordering::Relaxed) {
+            break;
         }
     }
-
-    fn text(&self) -> Exit {
-        let mut table =
-            Table::new(["µs", ">guard", ">min", ">median", ">99 %", ">99.9 %", ">max", ">missed"]);
-        for (name, run) in [("sleep only", &self.sleep_only), ("sleep, then spin", &self.sleep_then_spin)] {
-            for (what, latency) in [("wake-up", &run.wake_ns), ("SYNC release", &run.release_ns)] {
-                let [min, median, p99, p999, max] =
-                    [latency.min, latency.p50, latency.p99, latency.p999, latency.max].map(microseconds);
-                let guard = microseconds(run.guard_ns);
-                let name = format!("{name}: {what}");
-                table.row([name, guard, min, median, p99, p999, max, run.missed_slots.to_string()]);
-            }
-        }
-        print!("{table}");
-        for (name, run) in [("sleep only", &self.sleep_only), ("sleep, then spin", &self.sleep_then_spin)] {
-            println!();
-            let title = format!("SYNC release error, {name} (cycles, logarithmic)");
-            run.release_ns.picture(&title).iter().for_each(|line| println!("{}", line.trim_end()));
-        }
-        println!();
-        self.realtime.refused.iter().for_each(|refused| println!("refused: {refused}"));
-        self.realtime.grant_with.iter().for_each(|command| println!("grant it with: {command}"));
-        if !self.realtime.preempt_rt {
-            println!("this kernel is not PREEMPT_RT: its latency has no bound");
-        }
-        Exit::Done
+    let is_drawn = arguments.svg.as_ref().is_none_or(|path| draw(path, &options, &measurements));
+    if let Some(report) = JitterReport::new(&options, &measurements) {
+        print(&report, arguments.json);
+    }
+    match (interrupted.load(Ordering::Relaxed), is_drawn) {
+        (true, _) => Exit::Interrupted,
+        (false, true) => Exit::Done,
+        (false, false) => Exit::Stopped,
     }
 }
 
-fn microseconds(ns: u64) -> String {
-    format!("{:.2}", ns as f64 * 1e-3)
+fn measure(
+    options: &JitterOptions,
+    pacing: Pacing,
+    interrupted: &AtomicBool,
+) -> Result<Measurement, jitter::JitterError> {
+    let bar = progress_bar(options.cycles, pacing);
+    let measurement = jitter::measure(options, pacing, |cycles| {
+        bar.set_position(cycles);
+        !interrupted.load(Ordering::Relaxed)
+    });
+    bar.finish_and_clear();
+    measurement
+}
+
+fn progress_bar(cycles: u64, pacing: Pacing) -> ProgressBar {
+    if !stderr().is_terminal() {
+        return ProgressBar::hidden();
+    }
+    let bar = ProgressBar::new(cycles);
+    if let Ok(style) = ProgressStyle::with_template("{prefix:<16}  [{bar:40}]  {pos} of {len} cycles") {
+        bar.set_style(style.progress_chars("━╸─"));
+    }
+    bar.set_prefix(match pacing {
+        Pacing::Sleep => "sleep only",
+        Pacing::SleepThenSpin => "sleep, then spin",
+    });
+    bar
+}
+
+fn draw(path: &PathBuf, options: &JitterOptions, measurements: &[Measurement]) -> bool {
+    let bus = options.interface.as_ref().map_or_else(String::new, |bus| format!(", SYNC on {bus}"));
+    let title = format!("{} cycles of {} µs{bus}", options.cycles, options.period_ns / 1_000);
+    let written = fs::write(path, jitter::drawing(&title, measurements));
+    if let Err(error) = &written {
+        eprintln!("takt: {} cannot be written: {error}", path.display());
+    }
+    written.is_ok()
+}
+
+/// A reader that has seen enough (`| head`) is no failure.
+fn print(report: &JitterReport, as_json: bool) {
+    let text = if as_json {
+        match serde_json::to_string(report) {
+            Ok(json) => format!("{json}\n"),
+            Err(error) => {
+                eprintln!("takt: the report cannot be written as JSON: {error}");
+                return;
+            }
+        }
+    } else {
+        report.picture(if stdout().is_terminal() { Emphasis::Ansi } else { Emphasis::None })
+    };
+    let _ = stdout().write_all(text.as_bytes());
 }

@@ -3,8 +3,9 @@
 mod check;
 mod configuration;
 mod exit;
-mod plan;
+mod interruption;
 mod jitter;
+mod plan;
 mod run;
 mod sim;
 mod table;

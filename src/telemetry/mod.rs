@@ -11,7 +11,7 @@ mod destination;
 mod logger;
 mod machine;
 mod messages;
-mod picture;
+pub(crate) mod picture;
 mod realtime;
 mod recording;
 mod report;

@@ -233,7 +233,7 @@ fn seconds(ns: Nanoseconds) -> f64 {
 }
 
 impl LatencyReport {
-    /// What a distribution says.
+    /// Puts a distribution in numbers.
     pub fn new(latency: &Latency) -> Self {
         let bound = |index: usize| {
             let decades = index as f64 / RANGES_PER_DECADE as f64;
