@@ -1,7 +1,7 @@
 //! The trajectory of one axis: phases of constant jerk.
 
 use super::error::PlanError;
-use super::problem::State;
+use super::problem::{SIZE_MAX, State};
 
 /// The most phases a profile can have: two of the brake, and those of two seven-phase profiles laid over
 /// each other.
@@ -283,7 +283,7 @@ impl Profile {
         let reached = self.end;
         self.end = target;
         self.duration_s = duration_s;
-        let finite = duration_s.is_finite() && reached.position.is_finite() && reached.velocity.is_finite();
+        let finite = duration_s < SIZE_MAX && reached.position.is_finite() && reached.velocity.is_finite();
         if finite { Ok(()) } else { Err(PlanError::NotRepresentable { axis: 0 }) }
     }
 

@@ -47,7 +47,10 @@ impl Inside {
         let mut edges = Edges::of(&motion);
         // A rounding error beside the direct motion must not turn into a detour.
         edges.round(ROUNDING * (reached.position.abs() + target.position.abs()) / scale.distance);
-        let representable = scale.distance > 0.0 && distance.is_finite() && motion.distance.is_finite();
+        let representable = scale.distance > 0.0
+            && scale.distance.is_finite()
+            && distance.is_finite()
+            && motion.distance.is_finite();
         if representable {
             Ok(Self { edges, scale, brake_s: profile.duration_s() })
         } else {
