@@ -109,6 +109,9 @@ impl Limits {
     }
 }
 
+/// Larger numbers are refused: their powers would leave the range of `f64`.
+pub(super) const SIZE_MAX: f64 = 1e100;
+
 /// Relative to a limit, being beyond it by this much is rounding.
 const ROUNDING: f64 = 1e-13;
 
@@ -132,7 +135,7 @@ impl Problem {
         let sum = start.position.abs() + start.velocity.abs() + target.position.abs() + target.velocity.abs();
         let accelerations =
             if second_order { 0.0 } else { start.acceleration.abs() + target.acceleration.abs() };
-        if sum + accelerations < f64::INFINITY {
+        if sum + accelerations < SIZE_MAX {
             return self.validate_target(second_order);
         }
         let finite = |value: f64, quantity| {
@@ -146,7 +149,7 @@ impl Problem {
             finite(start.acceleration, Quantity::StartAcceleration)?;
             finite(target.acceleration, Quantity::TargetAcceleration)?;
         }
-        self.validate_target(second_order)
+        Err(PlanError::NotRepresentable { axis: 0 })
     }
 
     fn validate_target(&self, second_order: bool) -> Result<(), PlanError> {

@@ -1,7 +1,7 @@
 //! The trajectory of one axis: phases of constant jerk.
 
 use super::error::PlanError;
-use super::problem::State;
+use super::problem::{SIZE_MAX, State};
 
 /// The most phases a profile can have: two of the brake, and those of two seven-phase profiles laid over
 /// each other.
@@ -93,6 +93,7 @@ struct Coefficients {
 
 const NO_PHASE: Coefficients = Coefficients { start: State::rest(0.0), jerk: 0.0 };
 
+#[inline]
 fn integrate(start: &State, jerk: f64, elapsed_s: f64) -> State {
     let State { position, velocity, acceleration } = *start;
     State {
@@ -138,6 +139,7 @@ impl Profile {
     ///
     /// Before the start it is the start state. At the end it is exactly the target state, and from then on
     /// the axis goes on with the target velocity and without acceleration.
+    #[inline]
     pub fn sample(&self, time_s: f64) -> State {
         if time_s >= self.duration_s {
             let State { position, velocity, acceleration } = self.end;
@@ -149,15 +151,12 @@ impl Profile {
             };
         }
         let time_s = if time_s > 0.0 { time_s } else { 0.0 };
-        // Few profiles have more than eight phases.
-        let (first_half, second_half) = self.starts_s.split_at(PHASES_MAX / 2);
-        let begun =
-            |starts_s: &[f64]| starts_s.iter().map(|start_s| usize::from(*start_s <= time_s)).sum::<usize>();
-        let mut count = begun(first_half);
-        if self.count > PHASES_MAX / 2 {
-            count += begun(second_half);
+        // A binary search over 16 start times, without a branch to guess.
+        let mut index = 0;
+        for step in [8, 4, 2, 1] {
+            let begun = self.starts_s.get(index + step).is_some_and(|start_s| *start_s <= time_s);
+            index += if begun { step } else { 0 };
         }
-        let index = count.wrapping_sub(1);
         match (self.phases.get(index), self.starts_s.get(index)) {
             (Some(phase), Some(start_s)) => integrate(&phase.start, phase.jerk, time_s - start_s),
             _ => self.end,
@@ -283,7 +282,7 @@ impl Profile {
         let reached = self.end;
         self.end = target;
         self.duration_s = duration_s;
-        let finite = duration_s.is_finite() && reached.position.is_finite() && reached.velocity.is_finite();
+        let finite = duration_s < SIZE_MAX && reached.position.is_finite() && reached.velocity.is_finite();
         if finite { Ok(()) } else { Err(PlanError::NotRepresentable { axis: 0 }) }
     }
 

@@ -2,7 +2,7 @@
 
 use super::error::PlanError;
 use super::problem::{Limits, Problem, State};
-use super::profile::Profile;
+use super::profile::{BLOCKED_MAX, Profile};
 use super::straight::Line;
 use super::{jerk_limited, trapezoid, travel};
 
@@ -318,6 +318,9 @@ fn lasting(
     }
 }
 
+/// Relative to a duration, being above a multiple of the cycle by this much is rounding.
+const GRID_ROUNDING: f64 = 1e-11;
+
 /// How often a longer time for one axis may ask for a longer time for another.
 const ROUNDS_MAX: u32 = 3;
 
@@ -330,24 +333,25 @@ const ROUNDING: f64 = 1024.0 * f64::EPSILON;
 /// as intervals.
 fn unblocked(least_s: f64, profiles: &[Profile], cycle_s: Option<f64>) -> f64 {
     // Durations that differ by rounding are the same: two axes with the same motion must not block each other.
+    let rounding = if cycle_s.is_some() { GRID_ROUNDING } else { ROUNDING };
     let mut duration_s = on_grid(least_s, cycle_s);
-    loop {
+    for _ in 0..=profiles.len().saturating_mul(BLOCKED_MAX) {
         let blocking = profiles.iter().flat_map(Profile::blocked).find(|blocked| {
-            let rounding_s = ROUNDING * duration_s;
-            duration_s > blocked.after_s + rounding_s && duration_s < blocked.before_s - rounding_s
+            let rounding_s = rounding * duration_s;
+            duration_s > blocked.after_s + rounding_s && duration_s < blocked.before_s - 2.0 * rounding_s
         });
         match blocking {
             Some(blocked) => duration_s = on_grid(blocked.before_s, cycle_s),
-            None => return duration_s,
+            None => break,
         }
     }
+    duration_s
 }
 
 /// The first multiple of the cycle that is not less, apart from rounding.
 fn on_grid(duration_s: f64, cycle_s: Option<f64>) -> f64 {
-    const ROUNDING: f64 = 1e-11;
     match cycle_s {
-        Some(cycle_s) => libm::ceil(duration_s / cycle_s * (1.0 - ROUNDING)) * cycle_s,
+        Some(cycle_s) => libm::ceil(duration_s / cycle_s * (1.0 - GRID_ROUNDING)) * cycle_s,
         None => duration_s,
     }
 }

@@ -1,6 +1,8 @@
 //! Following a target that moves.
 
 use nalgebra::vector;
+use proptest::prelude::*;
+use proptest::test_runner::RngSeed;
 use takt_rt::plan::{GroupState, Limit, Limits, PlanError, Problem, State, Timing, Trajectory};
 
 /// The limits of a joint of an arm.
@@ -62,6 +64,31 @@ fn a_target_beyond_the_position_limit_is_awaited_at_it() {
         assert!(command.position <= 1.0 + 1e-9);
     }
     assert!((command.position - 1.0).abs() < 1e-9 && command.velocity.abs() < 1e-9);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, rng_seed: RngSeed::Fixed(3), ..ProptestConfig::default() })]
+
+    #[test]
+    fn whatever_the_target_does_the_command_keeps_the_limits(
+        targets in prop::collection::vec((-2.0..2.0, -4.0..4.0, -30.0..30.0_f64), 1..20), jerk in 50.0..5000.0_f64,
+    ) {
+        let limits = Limits { jerk_max: jerk, ..ARM }.with_position(-1.0, 1.0);
+        let mut command = State::rest(0.0);
+        for (position, velocity, acceleration) in targets {
+            for cycle in 0..50_u32 {
+                let t = f64::from(cycle) * CYCLE_S;
+                let target = state(position + velocity * t + 0.5 * acceleration * t * t, velocity + acceleration * t, acceleration);
+                let next = Problem { start: command, target, limits }.track(CYCLE_S).unwrap();
+                prop_assert!(next.velocity.abs() <= 2.5 * (1.0 + 1e-6), "{next:?}");
+                prop_assert!(next.acceleration.abs() <= 15.0 * (1.0 + 1e-6), "{next:?}");
+                prop_assert!(next.position.abs() <= 1.0 + 1e-6, "{next:?}");
+                // The jerk limit holds but for the change of the target's acceleration, which is followed.
+                prop_assert!((next.position - command.position).abs() <= 2.5 * CYCLE_S * (1.0 + 1e-6));
+                command = next;
+            }
+        }
+    }
 }
 
 #[test]

@@ -25,6 +25,9 @@ use step2::Slower;
 /// Relative to the sizes of a problem, differences up to this are rounding.
 const ROUNDING: f64 = 1024.0 * f64::EPSILON;
 
+/// Relative to a duration, being this near to a blocked interval is to be on its edge.
+const EDGE: f64 = 3e-11;
+
 /// The rest of a problem behind the brake.
 struct Inside {
     edges: Edges,
@@ -47,7 +50,10 @@ impl Inside {
         let mut edges = Edges::of(&motion);
         // A rounding error beside the direct motion must not turn into a detour.
         edges.round(ROUNDING * (reached.position.abs() + target.position.abs()) / scale.distance);
-        let representable = scale.distance > 0.0 && distance.is_finite() && motion.distance.is_finite();
+        let representable = scale.distance > 0.0
+            && scale.distance.is_finite()
+            && distance.is_finite()
+            && motion.distance.is_finite();
         if representable {
             Ok(Self { edges, scale, brake_s: profile.duration_s() })
         } else {
@@ -94,7 +100,7 @@ pub(super) fn position_lasting(
     profile: &mut Profile,
 ) -> Result<(), PlanError> {
     let edge = profile.blocked().iter().any(|blocked| {
-        let rounding_s = ROUNDING * duration_s;
+        let rounding_s = EDGE * duration_s;
         (blocked.before_s - duration_s).abs() <= rounding_s
             || (blocked.after_s - duration_s).abs() <= rounding_s
     });
