@@ -3,7 +3,7 @@
 use arrayvec::ArrayVec;
 
 use crate::guard::AxisLimits;
-use crate::plan::{self, Limits, PlanError, Problem, Profile, State, Timing};
+use crate::plan::{self, Limits, PlanError, Problem, Profile, Return, State, Timing};
 use crate::record::MAX_AXES;
 
 /// The trajectory that the group is on.
@@ -54,7 +54,8 @@ impl Motion {
                 limits: move_limits(&leg, velocity_scale, acceleration_scale),
             })
             .collect();
-        let timing = Timing { minimum_duration_s, ..Timing::default() };
+        // Where a limit has just been lowered, slow down to it and no further.
+        let timing = Timing { minimum_duration_s, return_to_limits: Return::Settled, ..Timing::default() };
         let duration_s = plan::synchronised(&problems, self.free(problems.len()), timing)?;
         self.begin(duration_s);
         Ok(())
