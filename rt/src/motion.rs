@@ -87,6 +87,11 @@ impl Motion {
         self.time_s = 0.0;
     }
 
+    /// Gives the present trajectory up: there is nothing left to follow.
+    pub fn cancel(&mut self) {
+        self.time_s = self.duration_s;
+    }
+
     /// Goes on by one period.
     pub fn advance(&mut self, period_s: f64) {
         self.time_s += period_s;

@@ -172,6 +172,32 @@ fn a_category_0_stop_takes_the_power_at_once() {
     assert_eq!(rig.stops().len(), 1);
 }
 
+/// What was left of the way to rest when the power went must not be taken up at the next enabling.
+#[test]
+fn after_a_category_0_stop_in_motion_nothing_of_the_old_motion_comes_back() {
+    let mut rig = Rig::enabled(3);
+    rig.move_to(2.5);
+    rig.run(400);
+    rig.request(Request::Stop(StopCategory::Zero));
+    rig.run_until(Phase::Disabled, 10);
+    rig.request(Request::Enable);
+    rig.run(3);
+    rig.drive(1).is_silent = true;
+    rig.run_until(Phase::Disabling, 10);
+    rig.drive(1).is_silent = false;
+    rig.run_until(Phase::Disabled, 10);
+    rig.assert_limits_kept();
+}
+
+#[test]
+fn a_drive_that_never_answers_again_is_not_waited_for_without_end() {
+    let mut rig = Rig::enabled(3);
+    rig.drive(1).is_silent = true;
+    rig.run_until(Phase::Disabling, 10);
+    rig.run_until(Phase::Disabled, 510);
+    assert_eq!(rules(&rig), [Rule::MissedFeedback]);
+}
+
 #[test]
 fn a_fault_of_one_axis_stops_all_with_one_reason_and_needs_a_reset() {
     let mut rig = Rig::enabled(6);
