@@ -556,7 +556,7 @@ impl Engine {
     fn act(&mut self, now_ns: Nanoseconds, door: &mut impl Door) {
         match self.phase {
             Phase::Passive => {}
-            Phase::Disabled => self.axes.iter_mut().for_each(Axis::follow_actual),
+            Phase::Disabled => self.hold(),
             Phase::Enabling => self.wait_for_drives(now_ns, door),
             Phase::Holding => self.hold(),
             Phase::Moving | Phase::Stopping => self.follow_motion(now_ns, door),
@@ -564,9 +564,9 @@ impl Engine {
             Phase::Disabling => {
                 self.come_to_rest();
                 // A drive that has fallen silent never shows that it has obeyed; it is not waited for without end.
-                let is_waited_enough = self.phase_cycles > self.enable_timeout_cycles;
-                if is_waited_enough || !self.axes.iter().any(|axis| axis.drive_state().has_torque()) {
-                    self.axes.iter_mut().for_each(Axis::follow_actual);
+                let is_patient =
+                    !self.motion.is_finished() || self.phase_cycles <= self.enable_timeout_cycles;
+                if !(is_patient && self.axes.iter().any(|axis| axis.drive_state().has_torque())) {
                     self.motion.cancel();
                     self.goal = Goal::Disabled;
                     self.enter(Phase::Disabled, now_ns, door);
