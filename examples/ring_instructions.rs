@@ -11,7 +11,8 @@ use takt_rt::record::CycleRecord;
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let work = arguments.first().and_then(|work| work.split_once('-'));
-    let numbers = (work.and_then(|(_, axes)| axes.parse::<u8>().ok()), arguments.get(1).and_then(|n| n.parse().ok()));
+    let numbers =
+        (work.and_then(|(_, axes)| axes.parse::<u8>().ok()), arguments.get(1).and_then(|n| n.parse().ok()));
     let (Some((work, _)), (Some(axes), Some(repetitions))) = (work, numbers) else {
         eprintln!("usage: ring_instructions push-AXES|publish-AXES REPETITIONS");
         std::process::exit(2);
