@@ -10,8 +10,8 @@
 //! where it does not, they stand in the queue before SYNC and wait there for everything else.
 //!
 //! The sums are those of a punctual controller. What is left of the slot is its reserve: for SYNC that leaves late,
-//! and for waking up, computing and handing over the set-points. Within it every bound here and every response time
-//! holds.
+//! and for waking up, computing and handing over the set-points. Within it everything
+//! is in time.
 
 use serde::Serialize;
 
