@@ -113,8 +113,9 @@ impl Cycle {
         if engine.is_leaving() { Flow::Leave } else { Flow::Continue }
     }
 
-    /// Waits for the next slot that can be used.
+    /// Waits for the next slot that can be used. The wake-ups that came too late for theirs are among the latency.
     fn reach_slot(&mut self, clock: &mut impl Clock) -> Timing {
+        let mut wake_ns = 0;
         loop {
             let now_ns = clock.now_ns();
             let mut slot = self.next_slot;
@@ -123,9 +124,10 @@ impl Cycle {
             }
             let slot_start_ns = self.grid.slot_start_ns(slot);
             let wake = clock.wait_until(slot_start_ns);
+            wake_ns = wake.timer_latency_ns.max(wake_ns);
             if wake.now_ns <= slot_start_ns + self.plan.latest_sync_ns {
                 self.next_slot = slot + 1;
-                return Timing { slot, slot_start_ns, wake_ns: wake.timer_latency_ns, ..Timing::default() };
+                return Timing { slot, slot_start_ns, wake_ns, ..Timing::default() };
             }
             self.next_slot = slot + 1;
         }

@@ -755,7 +755,7 @@ impl Engine {
         self.record.timing = Timing { missed_slots, ..timing };
         self.record.phase = self.phase;
         for (axis, record) in self.axes.iter().zip(&mut self.record.axes) {
-            axis.record(record);
+            axis.record(self.period_s, record);
         }
         if !door.record(&self.record) {
             self.dropped += 1;

@@ -16,7 +16,8 @@ pub struct Timing {
     pub slot: u64,
     /// Its start on the grid.
     pub slot_start_ns: Nanoseconds,
-    /// How late the timer woke the thread for the slot, against the instant that it was set to.
+    /// How late the timer woke the thread for the slot, against the instant that it was set to. When that was too
+    /// late to use a slot, the latest of the wake-ups since the cycle before.
     pub wake_ns: u64,
     /// How late SYNC was handed to the first interface, against the start of the slot.
     pub sync_ns: u64,
@@ -39,6 +40,8 @@ pub struct AxisRecord {
     pub velocity_set: f32,
     /// Set-point of the acceleration.
     pub acceleration_set: f32,
+    /// Change of the acceleration set-point from the last cycle to this one, per second.
+    pub jerk_set: f32,
     /// Actual velocity: reported, or else derived from the positions.
     pub velocity: f32,
     /// Torque sent: the command in CST, else the feed-forward; 0 when none is sent.

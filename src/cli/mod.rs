@@ -3,7 +3,11 @@
 mod check;
 mod configuration;
 mod exit;
+mod interruption;
+mod jitter;
+mod plan;
 mod run;
+mod sim;
 mod table;
 
 pub use exit::Exit;
@@ -22,6 +26,9 @@ pub struct CommandLine {
 enum Command {
     Run(run::Arguments),
     Check(check::Arguments),
+    Plan(plan::Arguments),
+    Sim(sim::Arguments),
+    Jitter(jitter::Arguments),
 }
 
 impl CommandLine {
@@ -30,6 +37,9 @@ impl CommandLine {
         match self.command {
             Command::Run(arguments) => run::run(arguments),
             Command::Check(arguments) => check::run(&arguments),
+            Command::Plan(arguments) => plan::run(&arguments),
+            Command::Sim(arguments) => sim::run(&arguments),
+            Command::Jitter(arguments) => jitter::run(&arguments),
         }
     }
 }

@@ -9,7 +9,6 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
-use signal_hook::consts::{SIGINT, SIGTERM};
 
 use takt::bus::schedule;
 use takt::config::Config;
@@ -22,6 +21,7 @@ use takt_rt::stop::StopReason;
 
 use super::configuration::{self, BusOverride};
 use super::exit::Exit;
+use super::interruption;
 
 /// Bring the drives up, run the motion program of a configuration, stop in control, and report.
 #[derive(Args, Debug)]
@@ -182,11 +182,7 @@ struct Signals {
 
 impl Signals {
     fn watch() -> std::io::Result<Self> {
-        let arrived = Arc::new(AtomicBool::new(false));
-        for signal in [SIGINT, SIGTERM] {
-            signal_hook::flag::register(signal, Arc::clone(&arrived))?;
-        }
-        Ok(Self { arrived, next: Interrupt::Controlled })
+        Ok(Self { arrived: interruption::watch()?, next: Interrupt::Controlled })
     }
 
     fn next(&mut self) -> Option<Interrupt> {

@@ -46,15 +46,16 @@
 
 mod drive;
 pub mod erob;
+mod live;
 mod mailbox;
 mod medium;
 pub mod plant;
 mod port;
 mod random;
-mod wire;
 
 pub use drive::{Drive, DriveFault, NmtState, Observation};
+pub use live::LiveDrives;
 pub use mailbox::{Mailbox, Order};
 pub use medium::{BitRates, Medium, Transmission};
 pub use port::{SimulatedBus, UnknownNode};
-pub use wire::{INTERMISSION_BITS, WireLength, bits_ns};
+pub use takt_rt::wire::{INTERMISSION_BITS, WireLength, bits_ns};

@@ -1,8 +1,11 @@
-//! The report of a run for people: at most 100 columns, histograms of block characters, colours only on request.
+//! The report of a run for people, and the parts of it that other reports show too: at most 100 columns, histograms of block characters, colours only on request.
 
 use std::fmt::Write;
 
-use super::report::{AxisReport, BusReport, DECADES, LatencyReport, RANGES_PER_DECADE, RunReport};
+use super::machine::SetPointMagnitudes;
+use super::report::{
+    AxisReport, BusReport, DECADES, LatencyReport, RANGES_PER_DECADE, RealtimeReport, RunReport,
+};
 
 /// Rows of a histogram.
 const ROWS: usize = 4;
@@ -31,15 +34,15 @@ impl Emphasis {
         }
     }
 
-    fn heading(self, text: &str) -> String {
+    pub(crate) fn heading(self, text: &str) -> String {
         self.apply("1", text)
     }
 
-    fn good(self, text: &str) -> String {
+    pub(crate) fn good(self, text: &str) -> String {
         self.apply("32", text)
     }
 
-    fn bad(self, text: &str) -> String {
+    pub(crate) fn bad(self, text: &str) -> String {
         self.apply("1;31", text)
     }
 }
@@ -76,28 +79,16 @@ impl RunReport {
 
     fn latencies(&self, text: &mut String, emphasis: Emphasis) {
         line(text, "");
-        let left = histogram("wake-up latency (cycles, logarithmic)", &self.wake_ns);
-        let right = histogram("SYNC release error", &self.sync_ns);
-        for (row, (left, right)) in left.iter().zip(&right).enumerate() {
-            let both = format!("{left:<HISTOGRAM_COLUMNS$} {right}");
-            line(text, &if row == 0 { emphasis.heading(&both) } else { both });
-        }
+        histograms(text, emphasis, &self.wake_ns, &self.sync_ns);
         line(text, "");
-        let titles = ["latency", "min", "median", "99 %", "99.9 %", "max"].map(str::to_owned);
-        line(text, &emphasis.heading(&latency_row(titles)));
-        for (name, latency) in [
+        let rows = [
             ("wake-up", &self.wake_ns),
             ("SYNC release", &self.sync_ns),
             ("computing", &self.compute_ns),
             ("set-points out at", &self.sent_ns),
-        ] {
-            let times = [latency.min, latency.p50, latency.p99, latency.p999, latency.max].map(duration);
-            let [min, p50, p99, p999, max] = times;
-            line(text, &latency_row([name.to_owned(), min, p50, p99, p999, max]));
-        }
-        let missed = format!("{} of {}", self.missed_slots, self.cycles + self.missed_slots);
-        let missed = format!("{:<20}{missed:>12}", "missed slots");
-        line(text, &if self.missed_slots == 0 { missed } else { emphasis.bad(&missed) });
+        ];
+        latency_table(text, emphasis, &rows);
+        missed_slots(text, emphasis, self.missed_slots, self.cycles);
     }
 
     fn axis_table(&self, text: &mut String, emphasis: Emphasis) {
@@ -115,6 +106,21 @@ impl RunReport {
         for axis in &self.axes {
             line(text, &axis_row(axis));
         }
+        let parts: Vec<String> = [
+            ("velocity", self.largest_part(|of| of.velocity)),
+            ("acceleration", self.largest_part(|of| of.acceleration)),
+            ("jerk", self.largest_part(|of| of.jerk)),
+        ]
+        .into_iter()
+        .filter_map(|(what, part)| part.map(|part| format!("{:.1} % of the {what}", 100.0 * part)))
+        .collect();
+        line(text, &format!("set-points reached {} limits", parts.join(", ")));
+    }
+
+    /// The largest part of its limit that any axis was asked for; `None` where no axis has such a limit.
+    fn largest_part(&self, of: impl Fn(&SetPointMagnitudes) -> f64) -> Option<f64> {
+        let limited = self.axes.iter().filter(|axis| of(&axis.limits).is_finite() && of(&axis.limits) > 0.0);
+        limited.map(|axis| of(&axis.set_point_max) / of(&axis.limits)).reduce(f64::max)
     }
 
     fn bus_table(&self, text: &mut String, emphasis: Emphasis) {
@@ -151,30 +157,62 @@ impl RunReport {
         lines.extend(telemetry.candump.iter().map(|path| path.display().to_string()));
         lines.extend(telemetry.not_written.iter().cloned());
         wrap(text, &emphasis.heading("telemetry"), 9, &lines);
-        wrap(text, &emphasis.heading("real-time"), 9, &self.realtime_lines());
-        for command in &self.realtime.grant_with {
-            line(text, &format!("{:INDENT$}  {command}", ""));
-        }
+        realtime(text, emphasis, &self.realtime);
     }
+}
 
-    fn realtime_lines(&self) -> Vec<String> {
-        let realtime = &self.realtime;
-        let mut thread = realtime.policy.clone();
-        if let Some(priority) = realtime.priority {
-            let _ = write!(thread, " {priority}");
-        }
-        if let Some(cpu) = realtime.cpu {
-            let _ = write!(thread, " on CPU {cpu}");
-        }
-        let memory = if realtime.memory_locked { "memory locked" } else { "memory not locked" };
-        let kernel = if realtime.preempt_rt { "PREEMPT_RT kernel" } else { "kernel without PREEMPT_RT" };
-        let mut lines = vec![format!("{thread}, {memory}, {kernel}, {} page faults", realtime.page_faults)];
-        lines.extend(realtime.refused.iter().map(|step| format!("refused: {step}")));
-        if !realtime.grant_with.is_empty() {
-            lines.push("to grant it:".to_owned());
-        }
-        lines
+/// The histograms of wake-up latency and SYNC release error, side by side.
+pub(crate) fn histograms(text: &mut String, emphasis: Emphasis, wake: &LatencyReport, sync: &LatencyReport) {
+    let left = histogram("wake-up latency (cycles, logarithmic)", wake);
+    let right = histogram("SYNC release error", sync);
+    for (row, (left, right)) in left.iter().zip(&right).enumerate() {
+        let both = format!("{left:<HISTOGRAM_COLUMNS$} {right}");
+        line(text, &if row == 0 { emphasis.heading(&both) } else { both });
     }
+}
+
+/// A table of latencies, a row each.
+pub(crate) fn latency_table(text: &mut String, emphasis: Emphasis, rows: &[(&str, &LatencyReport)]) {
+    let titles = ["latency", "min", "median", "99 %", "99.9 %", "max"].map(str::to_owned);
+    line(text, &emphasis.heading(&latency_row(titles)));
+    for (name, latency) in rows {
+        let times = [latency.min, latency.p50, latency.p99, latency.p999, latency.max].map(duration);
+        let [min, p50, p99, p999, max] = times;
+        line(text, &latency_row([(*name).to_owned(), min, p50, p99, p999, max]));
+    }
+}
+
+/// How many slots passed unused beside so many cycles that ran.
+pub(crate) fn missed_slots(text: &mut String, emphasis: Emphasis, missed: u64, cycles: u64) {
+    let words = format!("{missed} of {}", cycles + missed);
+    let words = format!("{:<20}{words:>12}", "missed slots");
+    line(text, &if missed == 0 { words } else { emphasis.bad(&words) });
+}
+
+/// What the operating system granted, and the commands that grant the rest.
+pub(crate) fn realtime(text: &mut String, emphasis: Emphasis, realtime: &RealtimeReport) {
+    wrap(text, &emphasis.heading("real-time"), 9, &realtime_lines(realtime));
+    for command in &realtime.grant_with {
+        line(text, &format!("{:INDENT$}  {command}", ""));
+    }
+}
+
+fn realtime_lines(realtime: &RealtimeReport) -> Vec<String> {
+    let mut thread = realtime.policy.clone();
+    if let Some(priority) = realtime.priority {
+        let _ = write!(thread, " {priority}");
+    }
+    if let Some(cpu) = realtime.cpu {
+        let _ = write!(thread, " on CPU {cpu}");
+    }
+    let memory = if realtime.memory_locked { "memory locked" } else { "memory not locked" };
+    let kernel = if realtime.preempt_rt { "PREEMPT_RT kernel" } else { "kernel without PREEMPT_RT" };
+    let mut lines = vec![format!("{thread}, {memory}, {kernel}, {} page faults", realtime.page_faults)];
+    lines.extend(realtime.refused.iter().map(|step| format!("refused: {step}")));
+    if !realtime.grant_with.is_empty() {
+        lines.push("to grant it:".to_owned());
+    }
+    lines
 }
 
 /// The rows of a histogram: a title, the bars, and the axis with its labels. Both axes are logarithmic, so that one
@@ -231,7 +269,9 @@ fn axis_row(axis: &AxisReport) -> String {
             }
             _ => ("never enabled".to_owned(), String::new()),
         };
-    let position = format!("{:.5} {}", axis.final_position, axis.unit);
+    // Rounded before it is printed, and 0 added, so that nothing prints as -0.
+    let rounded = (axis.final_position * 1e5).round() / 1e5 + 0.0;
+    let position = format!("{rounded:.5} {}", axis.unit);
     let off = format!("{:+.1}", axis.final_error_counts);
     let name = shortened(&axis.name, 16);
     format!("{name:<16}{largest:>16}   {circumstances:<36}{position:>16}{off:>12}")
@@ -265,7 +305,7 @@ fn short_count(count: u64) -> String {
 }
 
 /// A time with three digits and its unit.
-fn duration(ns: u64) -> String {
+pub(crate) fn duration(ns: u64) -> String {
     let (value, unit) = match ns {
         0..=999 => return format!("{ns} ns"),
         1_000..=999_999 => (ns as f64 * 1e-3, "µs"),
@@ -286,13 +326,13 @@ fn bytes(count: u64) -> String {
     }
 }
 
-fn line(text: &mut String, line: &str) {
+pub(crate) fn line(text: &mut String, line: &str) {
     text.push_str(line.trim_end());
     text.push('\n');
 }
 
 /// Writes lines behind a label (of so many visible characters), each broken between words where it gets too long.
-fn wrap(text: &mut String, label: &str, label_columns: usize, lines: &[String]) {
+pub(crate) fn wrap(text: &mut String, label: &str, label_columns: usize, lines: &[String]) {
     let mut current = format!("{label}{:width$}", "", width = INDENT - label_columns);
     let mut columns = INDENT;
     for paragraph in lines {

@@ -1,0 +1,149 @@
+//! `takt jitter`: how evenly this machine paces the loop.
+
+use std::fs;
+use std::io::{IsTerminal, Write, stderr, stdout};
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+
+use takt::config::Interface;
+use takt::jitter::{self, JitterOptions, JitterReport, Measurement, Pacing};
+use takt::telemetry::Emphasis;
+
+use super::exit::Exit;
+use super::interruption;
+
+/// Measure how evenly this machine paces the loop: sleeping only, and sleeping, then spinning.
+#[derive(Args, Debug)]
+pub struct Arguments {
+    /// Send SYNC to this interface in every slot: can0, vcan0, sim. Drives on it that are enabled will see it
+    #[arg(long, value_name = "INTERFACE", value_parser = interface)]
+    bus: Option<Interface>,
+    /// Period of the cycle, in whole microseconds
+    #[arg(long, value_name = "N", default_value_t = 1_000, value_parser = clap::value_parser!(u64).range(250..=100_000))]
+    period_us: u64,
+    /// Cycles to measure, of each way of waiting
+    #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = clap::value_parser!(u64).range(1..))]
+    cycles: u64,
+    /// SCHED_FIFO priority; 0 stays in the normal class
+    #[arg(long, value_name = "P", default_value_t = 80, value_parser = clap::value_parser!(u8).range(0..=99))]
+    priority: u8,
+    /// The CPU to stay on [default: the last one, with SCHED_FIFO]
+    #[arg(long, value_name = "C")]
+    cpu: Option<usize>,
+    /// Draw the histograms into this file
+    #[arg(long, value_name = "FILE.svg")]
+    svg: Option<PathBuf>,
+    /// Print the report as one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+fn interface(text: &str) -> Result<Interface, String> {
+    text.parse().map_err(|error: takt::config::InterfaceError| format!("{error}: {}", error.help()))
+}
+
+impl Arguments {
+    fn options(&self) -> JitterOptions {
+        let mut options = JitterOptions {
+            period_ns: self.period_us * 1_000,
+            cycles: self.cycles,
+            interface: self.bus.clone(),
+            ..JitterOptions::default()
+        };
+        options.realtime.priority = (self.priority > 0).then_some(self.priority);
+        options.realtime.cpu = self.cpu;
+        options
+    }
+}
+
+/// Runs it.
+pub fn run(arguments: &Arguments) -> Exit {
+    let interrupted = match interruption::watch() {
+        Ok(interrupted) => interrupted,
+        Err(error) => {
+            eprintln!("takt: cannot watch for Ctrl-C: {error}");
+            return Exit::Stopped;
+        }
+    };
+    let options = arguments.options();
+    let mut measurements = Vec::new();
+    for pacing in [Pacing::Sleep, Pacing::SleepThenSpin] {
+        match measure(&options, pacing, &interrupted) {
+            Ok(measurement) => measurements.push(measurement),
+            Err(error) => {
+                eprintln!("takt: {error}");
+                return Exit::Usage;
+            }
+        }
+        if interrupted.load(Ordering::Relaxed) {
+            break;
+        }
+    }
+    let is_drawn = arguments.svg.as_ref().is_none_or(|path| draw(path, &options, &measurements));
+    if let Some(report) = JitterReport::new(&options, &measurements) {
+        print(&report, arguments.json);
+    }
+    match (interrupted.load(Ordering::Relaxed), is_drawn) {
+        (true, _) => Exit::Interrupted,
+        (false, true) => Exit::Done,
+        (false, false) => Exit::Stopped,
+    }
+}
+
+fn measure(
+    options: &JitterOptions,
+    pacing: Pacing,
+    interrupted: &AtomicBool,
+) -> Result<Measurement, jitter::JitterError> {
+    let bar = progress_bar(options.cycles, pacing);
+    let measurement = jitter::measure(options, pacing, |cycles| {
+        bar.set_position(cycles);
+        !interrupted.load(Ordering::Relaxed)
+    });
+    bar.finish_and_clear();
+    measurement
+}
+
+fn progress_bar(cycles: u64, pacing: Pacing) -> ProgressBar {
+    if !stderr().is_terminal() {
+        return ProgressBar::hidden();
+    }
+    let bar = ProgressBar::new(cycles);
+    if let Ok(style) = ProgressStyle::with_template("{prefix:<16}  [{bar:40}]  {pos} of {len} cycles") {
+        bar.set_style(style.progress_chars("━╸─"));
+    }
+    bar.set_prefix(match pacing {
+        Pacing::Sleep => "sleep only",
+        Pacing::SleepThenSpin => "sleep, then spin",
+    });
+    bar
+}
+
+fn draw(path: &PathBuf, options: &JitterOptions, measurements: &[Measurement]) -> bool {
+    let bus = options.interface.as_ref().map_or_else(String::new, |bus| format!(", SYNC on {bus}"));
+    let title = format!("{} cycles of {} µs{bus}", options.cycles, options.period_ns / 1_000);
+    let written = fs::write(path, jitter::drawing(&title, measurements));
+    if let Err(error) = &written {
+        eprintln!("takt: {} cannot be written: {error}", path.display());
+    }
+    written.is_ok()
+}
+
+/// A reader that has seen enough (`| head`) is no failure.
+fn print(report: &JitterReport, as_json: bool) {
+    let text = if as_json {
+        match serde_json::to_string(report) {
+            Ok(json) => format!("{json}\n"),
+            Err(error) => {
+                eprintln!("takt: the report cannot be written as JSON: {error}");
+                return;
+            }
+        }
+    } else {
+        report.picture(if stdout().is_terminal() { Emphasis::Ansi } else { Emphasis::None })
+    };
+    let _ = stdout().write_all(text.as_bytes());
+}

@@ -1,0 +1,215 @@
+//! The loop with nothing to do but to be on time.
+
+use std::thread;
+use std::time::Duration;
+
+use takt_rt::cycle::SlotPlan;
+use takt_rt::door::Request;
+use takt_rt::port::BusHealth;
+
+use crate::bus::port::{OpenError, Port};
+use crate::config::{Config, ConfigError, Interface, Realtime};
+use crate::controller::assemble::{self, AssembleError};
+use crate::controller::channels::{ChannelSizes, LogSide, channels};
+use crate::controller::realtime_thread::{self, Begun, StartError, Work};
+use crate::telemetry::Statistics;
+
+/// A pause between two looks at the loop; the ring of cycle records holds many times as much.
+const PAUSE: Duration = Duration::from_millis(5);
+
+/// One axis, since a loop without any cannot be. It is never activated.
+const PASSIVE: &str = r#"
+name = "jitter"
+master = { heartbeat = "off" }
+
+[[bus]]
+name = "bus"
+
+[[axis]]
+name = "passive"
+bus = "bus"
+node = 1
+drive = "erob-canopen"
+limits = { position = [-1, 1], velocity = 1, acceleration = 1, torque = 1 }
+"#;
+
+/// What is measured.
+#[derive(Clone, Debug, PartialEq)]
+pub struct JitterOptions {
+    /// The period of the cycle.
+    pub period_ns: u64,
+    /// How many cycles.
+    pub cycles: u64,
+    /// The interface that SYNC is sent to; `None` leaves it out.
+    pub interface: Option<Interface>,
+    /// What is asked of the operating system. Its spin guard counts for [`Pacing::SleepThenSpin`] only.
+    pub realtime: Realtime,
+}
+
+impl Default for JitterOptions {
+    /// Ten thousand cycles of 1 ms without a bus, under the real-time set-up that a configuration asks for when it
+    /// says nothing else.
+    fn default() -> Self {
+        Self {
+            period_ns: 1_000_000,
+            cycles: 10_000,
+            interface: None,
+            realtime: Realtime {
+                priority: Some(80),
+                cpu: None,
+                lock_memory: true,
+                hold_dma_latency: true,
+                spin_guard_ns: None,
+            },
+        }
+    }
+}
+
+/// How the loop waits for a slot.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Pacing {
+    /// By an absolute sleep until the slot.
+    Sleep,
+    /// By an absolute sleep that ends before it, and a spin for the rest.
+    SleepThenSpin,
+}
+
+/// What was measured.
+#[derive(Clone, Debug)]
+pub struct Measurement {
+    /// How the loop waited.
+    pub pacing: Pacing,
+    /// What the operating system granted, and the spin guard in force.
+    pub begun: Begun,
+    /// Wake-up latency and SYNC release error of every cycle, and the slots that passed unused.
+    pub statistics: Statistics,
+    /// Cycles that ran and are not among the statistics.
+    pub records_dropped: u64,
+    /// Page faults of the loop.
+    pub page_faults: u64,
+    /// The counters of the interface at the end.
+    pub bus: Option<BusHealth>,
+    /// Whether all cycles asked for are there; not when it was interrupted.
+    pub is_whole: bool,
+}
+
+/// Why nothing was measured.
+#[derive(Debug, thiserror::Error)]
+pub enum JitterError {
+    /// The period is none that a cycle can have.
+    #[error("{0}")]
+    Config(#[from] ConfigError),
+    /// The cycle cannot be set up.
+    #[error(transparent)]
+    Assemble(#[from] AssembleError),
+    /// The interface cannot be opened.
+    #[error(transparent)]
+    Open(#[from] OpenError),
+    /// There is no thread.
+    #[error(transparent)]
+    Start(#[from] StartError),
+    /// The loop ended by itself, which only a defect of takt can bring about.
+    #[error("the real-time thread ended by itself; this is a defect of takt, please report it")]
+    Died,
+}
+
+/// Runs the loop for the cycles asked for. `watch` is called some two hundred times a second with the number of cycles
+/// done, and ends the measurement early by `false`.
+///
+/// # Errors
+/// See [`JitterError`].
+pub fn measure(
+    options: &JitterOptions,
+    pacing: Pacing,
+    mut watch: impl FnMut(u64) -> bool,
+) -> Result<Measurement, JitterError> {
+    let config = config(options)?;
+    let ports = match options.interface {
+        Some(_) => vec![Port::open(&config, 0)?],
+        None => vec![],
+    };
+    let has_bus = !ports.is_empty();
+    let (door, mut host, mut log) = channels(&ChannelSizes::of(&config));
+    let work = Work {
+        engine: Box::new(assemble::engine(&config)?),
+        plan: SlotPlan::usual(config.cycle.period_ns, config.cycle.command_phase_ns),
+        ports,
+        door,
+        spin_guard_ns: match pacing {
+            Pacing::Sleep => Some(0),
+            Pacing::SleepThenSpin => options.realtime.spin_guard_ns,
+        },
+        is_realtime_required: false,
+    };
+    // The ring of requests is empty: there is room for this one, and later for that to leave.
+    let _ = host.request(Request::Sync(has_bus));
+    let running = realtime_thread::start(realtime_thread::thread_config(&options.realtime), work)?;
+    let begun = running.begun();
+    let mut statistics = Statistics::new(0);
+    while !running.is_finished() {
+        collect(&mut log, &mut statistics, options.cycles);
+        let done = statistics.cycles + log.records_dropped();
+        if done >= options.cycles || !watch(done) {
+            let _ = host.request(Request::Leave);
+        }
+        thread::sleep(PAUSE);
+    }
+    let ended = running.join().ok_or(JitterError::Died)?;
+    collect(&mut log, &mut statistics, options.cycles);
+    let done = statistics.cycles + log.records_dropped();
+    Ok(Measurement {
+        pacing,
+        begun,
+        records_dropped: log.records_dropped(),
+        page_faults: ended.page_faults.minor + ended.page_faults.major,
+        bus: has_bus.then(|| host.snapshot().buses[0]),
+        is_whole: done >= options.cycles,
+        statistics,
+    })
+}
+
+/// Takes the records that wait, as far as they are asked for; the loop runs a little longer.
+fn collect(log: &mut LogSide, statistics: &mut Statistics, cycles: u64) {
+    let is_wanted = |statistics: &Statistics| statistics.cycles < cycles;
+    while is_wanted(statistics) && log.next_record(|record| statistics.add(record)).is_some() {}
+    while log.take_event().is_some() {}
+}
+
+/// The passive machine with the period and the interface of the options.
+fn config(options: &JitterOptions) -> Result<Config, ConfigError> {
+    let period_us = options.period_ns / 1_000;
+    let text = format!("{PASSIVE}\n[cycle]\nperiod = \"{period_us} us\"\n");
+    let mut config = Config::parse("takt jitter", &text)?;
+    if let (Some(bus), Some(interface)) = (config.buses.first_mut(), &options.interface) {
+        bus.interface = interface.clone();
+        bus.name = interface.to_string();
+    }
+    config.realtime = options.realtime;
+    Ok(config)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_passive_machine_has_the_period_and_the_interface_asked_for_and_sends_nothing_of_its_own() {
+        let interface = Interface::SocketCan("vcan0".to_owned());
+        let options = JitterOptions {
+            period_ns: 2_000_000,
+            interface: Some(interface.clone()),
+            ..JitterOptions::default()
+        };
+        let config = config(&options).unwrap();
+        assert_eq!((config.cycle.period_ns, &config.buses[0].interface), (2_000_000, &interface));
+        assert_eq!(config.master.heartbeat_ns, None);
+        assert_eq!(assemble::engine(&config).unwrap().bus_count(), 1);
+    }
+
+    #[test]
+    fn the_defaults_are_those_of_a_configuration_that_says_nothing() {
+        let config = Config::parse("test", PASSIVE).unwrap();
+        let options = JitterOptions::default();
+        assert_eq!((options.period_ns, options.realtime), (config.cycle.period_ns, config.realtime));
+    }
+}
