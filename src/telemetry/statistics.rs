@@ -157,13 +157,13 @@ pub struct Statistics {
     pub first_ns: Nanoseconds,
     /// Start of the last cycle seen.
     pub last_ns: Nanoseconds,
-    /// [`Timing::wake_ns`]
+    /// [`Timing::wake_ns`](takt_rt::record::Timing::wake_ns)
     pub wake: Latency,
-    /// [`Timing::sync_ns`]
+    /// [`Timing::sync_ns`](takt_rt::record::Timing::sync_ns)
     pub sync: Latency,
-    /// [`Timing::compute_ns`]
+    /// [`Timing::compute_ns`](takt_rt::record::Timing::compute_ns)
     pub compute: Latency,
-    /// [`Timing::sent_ns`]
+    /// [`Timing::sent_ns`](takt_rt::record::Timing::sent_ns)
     pub sent: Latency,
     /// The axes in the order of the configuration.
     pub axes: Vec<AxisStatistics>,
