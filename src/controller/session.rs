@@ -39,7 +39,7 @@ pub struct Session {
     pub outcome: Outcome,
     /// The state after the last cycle.
     pub snapshot: Snapshot,
-    /// Where the last move led (rad or m), an axis each.
+    /// Where the last move led (rad or m), an axis each; `None` if the program did not finish.
     pub target: Option<Vec<f64>>,
     /// What came of the real-time set-up.
     pub begun: Begun,
@@ -122,10 +122,12 @@ pub fn run(
         quiet::sleep(PAUSE, config.cycle.period_ns);
     }
     let ended = running.join();
+    let outcome = supervisor.outcome().cloned().unwrap_or(Outcome::ThreadDied);
+    let target = supervisor.target().filter(|_| outcome == Outcome::Finished && options.duration_ns.is_none());
     Ok(Session {
-        outcome: supervisor.outcome().cloned().unwrap_or(Outcome::ThreadDied),
         snapshot: host.snapshot(),
-        target: supervisor.target().map(<[f64]>::to_vec),
+        target: target.map(<[f64]>::to_vec),
+        outcome,
         begun,
         ended,
         open_ns: clock.now_ns().saturating_sub(started_ns),
