@@ -2,6 +2,7 @@
 
 mod check;
 mod configuration;
+mod doctor;
 mod exit;
 mod interruption;
 mod jitter;
@@ -24,6 +25,7 @@ pub struct CommandLine {
 enum Command {
     Run(run::Arguments),
     Check(check::Arguments),
+    Doctor(doctor::Arguments),
     Jitter(jitter::Arguments),
 }
 
@@ -33,6 +35,7 @@ impl CommandLine {
         match self.command {
             Command::Run(arguments) => run::run(arguments),
             Command::Check(arguments) => check::run(&arguments),
+            Command::Doctor(arguments) => doctor::run(&arguments),
             Command::Jitter(arguments) => jitter::run(&arguments),
         }
     }
