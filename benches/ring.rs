@@ -8,7 +8,9 @@ use std::time::{Duration, Instant};
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use takt::controller::channels::{ChannelSizes, HostSide, LogSide, RtSide, channels};
-use takt::telemetry::{AxisDescription, Destination, Logger, LoggerOptions, Machine, Unit, WallClock};
+use takt::telemetry::{
+    AxisDescription, Destination, Logger, LoggerOptions, Machine, SetPointMagnitudes, Unit, WallClock,
+};
 use takt_rt::door::{Door, Snapshot};
 use takt_rt::record::CycleRecord;
 
@@ -78,6 +80,7 @@ fn logger(criterion: &mut Criterion) {
             name: format!("joint{index}"),
             unit: Unit::Radian,
             counts_per_unit: 83_443.0,
+            limits: SetPointMagnitudes::default(),
         };
         let options = LoggerOptions {
             machine: Machine {

@@ -1,4 +1,20 @@
 //! takt: a hard-real-time joint-motion controller for CAN drives.
+//!
+//! This is the half that is not real-time: set-up, configuration, files, people, simulation. What runs inside the
+//! real-time thread is the crate [`takt_rt`], which is `no_std` and links no allocator. Between the two is a door of
+//! bounded, lock-free channels ([`controller::channels`]), and nothing else.
+//!
+//! A tour, in the order in which a run meets the parts:
+//!
+//! - [`config`]: TOML to checked plain data in SI units; what is wrong is shown at its line.
+//! - [`bus`]: what a bus is connected to, how long frames take, and whether everything fits in the worst case.
+//! - [`drive`] and [`canopen`]: bring-up of each family of drives over the services of CiA 301, without I/O.
+//! - [`controller`]: assembles the engine, paces it in the real-time thread or in virtual time, and leads it through its
+//!   life: bring-up, enable, program, stop, disable, leave.
+//! - [`sim`]: buses and drives that behave like the manuals and the field notes say, quirks included.
+//! - [`telemetry`]: the logger that empties the rings: statistics, recordings, the report.
+//!
+//! To embed takt, see `examples/` and [`controller::session::run`].
 #![deny(unsafe_code)]
 
 pub mod bus;

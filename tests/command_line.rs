@@ -105,6 +105,11 @@ fn a_run_ends_with_0_and_every_axis_within_two_counts_of_its_target() {
         assert!(counts.abs() <= 2.0, "{axis}");
         let following = axis["following_error_max"].as_f64().unwrap();
         assert!(following > 0.0 && following < 0.1, "{axis}");
+        for derivative in ["velocity", "acceleration", "jerk"] {
+            let (reached, limit) = (&axis["set_point_max"][derivative], &axis["limits"][derivative]);
+            let part = reached.as_f64().unwrap() / limit.as_f64().unwrap();
+            assert!(part > 0.01 && part <= 1.000_01, "{derivative} of {axis}");
+        }
     }
     for bus in report["buses"].as_array().unwrap() {
         assert!(bus["load_percent"].as_f64().unwrap() > 20.0, "{bus}");

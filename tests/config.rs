@@ -162,6 +162,32 @@ fn the_command_phase_is_a_fraction_or_a_time() {
 }
 
 #[test]
+fn an_automatic_command_phase_is_resolved_when_the_file_is_read() {
+    let auto = with("[cycle]\ncommand_phase = \"auto\"");
+    // SYNC, 20 µs, feedback: 190 µs; set-points and heartbeat: 180 µs; no more than 100 µs for a SYNC that is late.
+    assert_eq!(auto.cycle.command_phase_ns, 290_000);
+    let arm = fs::read_to_string(config("arm6-erob.toml")).unwrap();
+    let arm = parse(&arm.replace("command_phase = 0.55", "command_phase = \"auto\""));
+    // From 420 to 590 µs: 75 µs for either wake-up, 20 µs for computing.
+    assert_eq!(arm.cycle.command_phase_ns, 495_000);
+    for bus in takt::bus::schedule::verify(&arm).unwrap() {
+        assert!(!bus.is_narrow());
+        assert_eq!((bus.slot.sync_reserve_ns, bus.slot.set_points_reserve_ns), (75_000, 95_000));
+    }
+}
+
+#[test]
+fn an_automatic_command_phase_suits_the_fullest_bus_in_every_cycle() {
+    let text = fs::read_to_string(config("axes32-erob.toml")).unwrap();
+    for (period, expected_ns) in [("1 ms", 495_000), ("2 ms", 620_000), ("4 ms", 820_000)] {
+        let cycle = format!("[cycle]\nperiod = {period:?}\ncommand_phase = \"auto\"\n[telemetry]");
+        let config = parse(&text.replace("[telemetry]", &cycle));
+        assert_eq!(config.cycle.command_phase_ns, expected_ns, "{period}");
+        assert!(takt::bus::schedule::verify(&config).is_ok());
+    }
+}
+
+#[test]
 fn an_axis_overrides_the_defaults_key_by_key() {
     let defaults =
         "[defaults.axis]\nmode = \"csv\"\ntransmission_type = 255\nlimits = { jerk = 500, torque = 1 }\n";

@@ -41,7 +41,7 @@ fn a_configuration_that_fits_is_shown_with_limits_units_and_buses_and_exit_code_
         "83443.027 per rad",
         "199.6",
         "745 µs = 55 SYNC + 345 feedback + 345 set-points",
-        "command phase may lie from 485 to 590 µs",
+        "420 to 590              fits",
         "Every bus carries its traffic in the worst case.",
     ] {
         assert!(text.contains(part), "{part:?} is missing in\n{text}");
@@ -89,4 +89,40 @@ fn a_bad_configuration_ends_in_exit_code_2_and_its_lines() {
     let problems = value["problems"].as_array().unwrap();
     assert!(problems.iter().any(|problem| problem["line"] == 3), "{problems:?}");
     assert_eq!(problems.len(), 3);
+}
+
+#[test]
+fn an_automatic_command_phase_is_shown_and_explained_where_there_is_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("auto.toml");
+    let arm = std::fs::read_to_string(configs().join("arm6-erob.toml")).unwrap();
+    let auto = arm.replace("command_phase = 0.55", "command_phase = \"auto\"");
+    std::fs::write(&path, &auto).unwrap();
+    let text = standard_output(&check(&path, &[]));
+    assert!(text.contains("the command phase at 495 µs (as \"auto\" has it)"), "{text}");
+    assert_eq!(json(&check(&path, &["--json"]))["command_phase_ns"], 495_000);
+
+    std::fs::write(&path, auto.replace("bus = \"wrist\"", "bus = \"base\"")).unwrap();
+    let output = check(&path, &["--json"]);
+    assert_eq!(output.status.code(), Some(2));
+    let problem = &json(&output)["problems"][0];
+    assert_eq!(problem["message"], "no command phase suits every bus");
+    let help = problem["help"].as_str().unwrap();
+    assert!(help.contains("765 µs at the earliest") && help.contains("245 µs at the latest"), "{help}");
+    assert!(help.contains("2 buses: 3 of these axes fit one"), "{help}");
+}
+
+#[test]
+fn thirty_two_axes_that_are_alike_are_shown_once() {
+    let text = standard_output(&check(&configs().join("axes32-erob.toml"), &[]));
+    assert!(text.lines().count() < 60, "{text}");
+    for part in ["axis1 … axis32 (32)", "bus1 … bus10 (10)", "Bus bus1, and 9 alike", "Bus bus11 (times"]
+    {
+        assert!(text.contains(part), "{part:?} is missing in\n{text}");
+    }
+    assert!(text.lines().all(|line| line.chars().count() <= 145), "{text}");
+    let json = json(&check(&configs().join("axes32-erob.toml"), &["--json"]));
+    assert_eq!(json["axes"].as_array().map(Vec::len), Some(32));
+    assert_eq!(json["buses"].as_array().map(Vec::len), Some(11));
+    assert_eq!(json["buses"][0]["messages"][0]["in_slot_ns"], 55_000);
 }

@@ -182,6 +182,7 @@ cases! {
         "period = \"1 ms\"" => "period = \"1000.5 us\"", at "1000.5": OutOfRange { allowed, .. } if allowed == "whole microseconds",
         "command_phase = 0.55" => "command_phase = 1.2", at "command_phase": OutOfRange { value, allowed, .. } if value == "120 %" && allowed == "5 % to 95 %",
         "command_phase = 0.55" => "command_phase = \"2 ms\"", at "command_phase": OutOfRange { allowed, .. } if allowed == "50 µs to 950 µs",
+        "command_phase = 0.55" => "command_phase = \"automatic\"", at "automatic": NotAQuantity { .. },
         "priority = 80" => "priority = 100", at "priority": OutOfRange { value, allowed, .. } if value == "100" && allowed == "1 to 99",
         "cpu = 1" => "cpu = -1", at "cpu": OutOfRange { .. },
         "spin_guard = \"50 us\"" => "spin_guard = \"600 us\"", at "spin_guard": OutOfRange { allowed, .. } if allowed == "0 s to 500 µs",
@@ -418,4 +419,40 @@ proptest! {
             prop_assert!(!rendered(&error).is_empty());
         }
     }
+}
+
+/// A bus that can carry its axes at no command phase, and two that would need different ones.
+#[test]
+fn an_automatic_command_phase_that_does_not_exist_is_refused_with_the_sums() {
+    let auto = SOUND.replace("command_phase = 0.55", "command_phase = \"auto\"");
+    assert!(Config::parse("auto.toml", &auto).is_ok());
+    let help = |text: &str| {
+        let error = Config::parse("auto.toml", text).unwrap_err();
+        let [problem] = error.problems() else { panic!("{:?}", error.problems()) };
+        assert!(matches!(problem.kind, NoCommandPhase { .. }), "{problem:?}");
+        assert_eq!(&text[problem.span.clone().unwrap()], "\"auto\"");
+        problem.kind.help()
+    };
+
+    let slow = help(&auto.replace("gear_ratio = 1.0", "feedback_delay = \"600 us\""));
+    assert!(slow.starts_with("the bus \"left\" needs it at "), "{slow}");
+    assert!(slow.contains("600 drives' delay") && slow.contains("what would fit:\n    - "), "{slow}");
+    assert!(slow.contains("a cycle of 2 ms"), "{slow}");
+
+    // The one is late with its feedback, the other has much to send.
+    let late = auto.replace("gear_ratio = 1.0", "feedback_delay = \"400 us\"");
+    let other = late.replace("bus = \"left\"\nnode = 2", "bus = \"right\"\nnode = 2");
+    assert!(Config::parse("auto.toml", &other).is_ok());
+    let axis = |node: usize| {
+        format!(
+            "[[axis]]\nname = \"x{node}\"\nbus = \"right\"\nnode = {node}\n\
+             limits = {{ position = [-1, 1], velocity = 1.0, acceleration = 5, torque = 20 }}\n"
+        )
+    };
+    let axes = axis(11) + &axis(12);
+    let program = other.find("[program]").unwrap();
+    let targets = other[program..].replace("to = [\"30 deg\", 0.5]", "to = 0");
+    let both = help(&format!("{}{axes}{targets}", &other[..program]));
+    assert_eq!(both.lines().count(), 2, "{both}");
+    assert!(both.contains("\"left\" needs it") && both.contains("\"right\" needs it"), "{both}");
 }

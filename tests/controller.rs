@@ -1,12 +1,15 @@
 //! The whole controller against the simulated arm, in virtual time.
 
+use std::f64::consts::TAU;
+use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::Path;
 
 use takt::config::{Config, Control};
 use takt::controller::{Interrupt, Outcome, VirtualRun};
-use takt::sim::SimulatedBus;
+use takt::sim::{DriveFault, SimulatedBus};
 use takt_rt::cia402::State;
-use takt_rt::stop::Phase;
+use takt_rt::port::{BusPort, Clock, ReceiveBatch};
+use takt_rt::stop::{Phase, Rule};
 
 /// A minute is more than any of these programs takes.
 const CYCLES_AT_MOST: u64 = 60_000;
@@ -32,8 +35,7 @@ fn run_and_measure(config: &Config) -> Vec<f64> {
                 .zip(&snapshot.axes)
                 .zip(&config.axes)
                 .map(|((target, axis), config)| {
-                    (axis.position - target) * config.counts_per_turn * config.gear_ratio
-                        / std::f64::consts::TAU
+                    (axis.position - target) * config.counts_per_turn * config.gear_ratio / TAU
                 })
                 .collect();
         }
@@ -63,8 +65,7 @@ fn the_same_program_runs_in_cyclic_synchronous_torque() {
     let errors = run_and_measure(&config);
     for (error, axis) in errors.iter().zip(&config.axes) {
         let Control::Torque { stiffness, .. } = axis.control else { panic!("{} is not in CST", axis.name) };
-        let bound =
-            axis.simulated.coulomb_friction / stiffness * axis.counts_per_turn / std::f64::consts::TAU;
+        let bound = axis.simulated.coulomb_friction / stiffness * axis.counts_per_turn / TAU;
         assert!(error.abs() <= bound + 2.0, "{}: {error} counts, at most {bound} are friction", axis.name);
     }
 }
@@ -119,4 +120,148 @@ fn a_second_ctrl_c_takes_the_power_at_once() {
     run.interrupt(Interrupt::Immediate);
     let outcome = run.run(200, |_| {});
     assert_eq!(outcome, Some(Outcome::Interrupted));
+}
+
+/// Every record of a run, as one number.
+fn fingerprint(config: &Config) -> u64 {
+    let (mut run, mut log) = VirtualRun::simulated(config).unwrap();
+    let mut hasher = DefaultHasher::new();
+    run.run(CYCLES_AT_MOST, |_| {
+        while log
+            .next_record(|record| format!("{:?}{:?}", record.timing, record.axes()).hash(&mut hasher))
+            .is_some()
+        {}
+    });
+    hasher.finish()
+}
+
+#[test]
+fn the_same_configuration_gives_the_same_run_bit_for_bit() {
+    let mut config = load("arm6-erob.toml");
+    config.program.moves.truncate(1);
+    assert_eq!(fingerprint(&config), fingerprint(&config));
+    config.axes[0].simulated.coulomb_friction *= 1.001;
+    assert_ne!(fingerprint(&config), fingerprint(&load("arm6-erob.toml")), "the fingerprint sees something");
+}
+
+#[test]
+fn an_hour_of_motion_ends_as_exactly_as_a_minute_and_takes_seconds() {
+    let mut config = load("single-erob.toml");
+    config.program.repeat = 700;
+    let mut run = start(&config);
+    let mut largest_counts = 0.0_f64;
+    let mut holding = 0;
+    let outcome = run.run(4_500_000, |run| {
+        let snapshot = run.snapshot();
+        holding = if snapshot.phase == Phase::Holding { holding + 1 } else { 0 };
+        // A tenth of a second after each move the joint has settled.
+        if let (100, Some(target)) = (holding, run.supervisor().target()) {
+            let counts = (snapshot.axes[0].position - target[0]) * config.axes[0].counts_per_turn / TAU;
+            largest_counts = largest_counts.max(counts.abs());
+        }
+    });
+    assert_eq!(outcome, Some(Outcome::Finished));
+    let slots = run.snapshot().slot;
+    assert!(slots > 3_600_000, "{slots} ms");
+    assert!(largest_counts <= 2.0, "{largest_counts}");
+}
+
+#[test]
+fn stalls_of_the_host_are_counted_and_the_program_still_arrives() {
+    let config = load("arm6-erob.toml");
+    let mut run = start(&config);
+    let mut cycle = 0;
+    let outcome = run.run(CYCLES_AT_MOST, |run| {
+        cycle += 1;
+        if cycle % 700 == 0 {
+            run.clock().stall(30_000_000);
+        }
+    });
+    assert_eq!(outcome, Some(Outcome::Finished));
+    let missed = run.snapshot().missed_slots;
+    assert!(missed >= 10 * 29, "{missed}");
+}
+
+/// Runs until well into a move, breaks something, and goes on to the end.
+fn run_and_break(config: &Config, break_it: impl FnOnce(&mut SimulatedBus)) -> (Option<Outcome>, Vec<Phase>) {
+    let mut run = start(config);
+    while run.snapshot().phase != Phase::Moving {
+        assert!(run.step());
+    }
+    run.run(300, |_| {});
+    break_it(&mut run.ports()[0]);
+    let mut phases = vec![];
+    let outcome = run.run(CYCLES_AT_MOST, |run| {
+        let phase = run.snapshot().phase;
+        if phases.last() != Some(&phase) {
+            phases.push(phase);
+        }
+    });
+    (outcome, phases)
+}
+
+fn rule_and_axis(outcome: Option<Outcome>) -> (Rule, Option<u8>) {
+    match outcome {
+        Some(Outcome::Stopped(stop)) => (stop.rule, stop.axis),
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn a_fault_of_one_drive_stops_the_whole_arm_in_a_coordinated_way() {
+    let config = load("arm6-erob.toml");
+    let (outcome, phases) = run_and_break(&config, |bus| bus.inject(2, DriveFault::OverCurrent).unwrap());
+    assert_eq!(rule_and_axis(outcome), (Rule::DriveFault, Some(1)));
+    // Seen in the very cycle in which the drive reports it.
+    assert_eq!(phases, [Phase::Stopping, Phase::Disabling, Phase::Disabled]);
+}
+
+#[test]
+fn a_drive_that_falls_silent_stops_the_whole_arm() {
+    let config = load("arm6-erob.toml");
+    let (outcome, _) = run_and_break(&config, |bus| bus.silence(3, true).unwrap());
+    assert_eq!(rule_and_axis(outcome), (Rule::MissedFeedback, Some(2)));
+}
+
+#[test]
+fn a_drive_that_restarts_in_motion_stops_the_whole_arm() {
+    let config = load("arm6-erob.toml");
+    let (outcome, _) = run_and_break(&config, |bus| bus.power_cycle(1).unwrap());
+    assert_eq!(rule_and_axis(outcome), (Rule::MissedFeedback, Some(0)));
+}
+
+#[test]
+fn a_joint_that_is_held_fast_stops_the_whole_arm() {
+    let config = load("arm6-erob.toml");
+    let (outcome, _) = run_and_break(&config, |bus| bus.set_load_torque(1, 1e4).unwrap());
+    let (rule, axis) = rule_and_axis(outcome);
+    assert!(matches!(rule, Rule::FollowingError | Rule::DriveFault), "{rule:?}");
+    assert_eq!(axis, Some(0));
+}
+
+/// The controller is gone without a farewell, as after `kill -9`: the drives' own watchdogs stop the arm.
+#[test]
+fn when_the_controller_dies_the_drives_stop_by_themselves() {
+    let config = load("arm6-erob.toml");
+    let mut run = start(&config);
+    while run.snapshot().phase != Phase::Moving {
+        assert!(run.step());
+    }
+    run.run(300, |_| {});
+    let mut now_ns = run.clock().now_ns();
+    let end_ns = now_ns + config.master.heartbeat_timeout_ns + 300_000_000;
+    while now_ns < end_ns {
+        now_ns += 1_000_000;
+        for port in run.ports() {
+            port.receive(now_ns, &mut ReceiveBatch::new());
+        }
+    }
+    for port in run.ports() {
+        let nodes: Vec<u8> = port.nodes().collect();
+        for node in nodes {
+            let seen = port.observe(node).unwrap();
+            assert!(!seen.state.has_torque(), "node {node}: {:?}", seen.state);
+            assert!(seen.velocity.abs() < 1e-3, "node {node}: {}", seen.velocity);
+        }
+    }
 }

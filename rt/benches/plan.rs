@@ -1,37 +1,94 @@
-//! The time that planning and sampling take (second order; rest to rest, as a motion program asks for it, and
-//! motion).
+//! The time that planning and sampling take, over 1024 random problems in motion, in the distribution of Ruckig's own
+//! benchmark; beside the same problems solved by `rsruckig`.
 
 use criterion::{Criterion, criterion_group, criterion_main};
+use rsruckig::prelude::{
+    ControlInterface, DataArrayOrVec, InputParameter, Ruckig, ThrowErrorHandler, Trajectory,
+};
 use std::hint::black_box;
-use takt_rt::plan::{Problem, Profile, State, Timing, synchronised};
+use std::time::Duration;
+use takt_rt::plan::{Problem, Profile, State, Timing, synchronised, synchronised_velocity};
 
 mod plan_problems;
 use plan_problems::{Order, problems};
 
-fn plan(criterion: &mut Criterion) {
-    for axes in [1, 3, 6, 7] {
-        let sets: Vec<Vec<Problem>> = (0..256).map(|seed| problems(seed, axes, Order::Second)).collect();
-        let mut profiles = vec![Profile::hold(0.0); axes];
-        let mut next = sets.iter().cycle();
-        criterion.bench_function(&format!("trapezoid/plan/{axes}"), |bencher| {
-            bencher.iter(|| {
-                let problems = next.next().map(Vec::as_slice).unwrap_or_default();
-                synchronised(black_box(problems), &mut profiles, Timing::default())
-            });
+const SETS: u64 = 1024;
+
+type Planner = fn(&[Problem], &mut [Profile], Timing) -> Result<f64, takt_rt::plan::PlanError>;
+
+/// Plans the sets in turn, by our planner and by `rsruckig`.
+fn compare<const AXES: usize>(criterion: &mut Criterion, name: &str, planner: Planner, order: Order) {
+    let sets: Vec<Vec<Problem>> = (0..SETS).map(|seed| problems(seed, AXES, order)).collect();
+    let mut profiles = [Profile::hold(0.0); AXES];
+    let mut next = sets.iter().cycle();
+    criterion.bench_function(&format!("plan/{name}/{AXES}"), |bencher| {
+        bencher.iter(|| {
+            let problems = next.next().map(Vec::as_slice).unwrap_or_default();
+            planner(black_box(problems), &mut profiles, Timing::default())
         });
+    });
+    let inputs: Vec<_> = sets.iter().map(|set| input::<AXES>(set, name == "velocity")).collect();
+    let mut ruckig = Ruckig::<AXES, ThrowErrorHandler>::new(None, 0.001);
+    let mut trajectory = Trajectory::<AXES>::new(None);
+    let mut next = inputs.iter().cycle();
+    criterion.bench_function(&format!("rsruckig/{name}/{AXES}"), |bencher| {
+        bencher.iter(|| next.next().map(|input| ruckig.calculate(black_box(input), &mut trajectory).is_ok()));
+    });
+}
+
+/// The same problem for `rsruckig`.
+fn input<const AXES: usize>(problems: &[Problem], velocity: bool) -> InputParameter<AXES> {
+    let all = |of: fn(&Problem) -> f64| {
+        let mut values = DataArrayOrVec::<f64, AXES>::new(None, 0.0);
+        for (axis, problem) in problems.iter().enumerate() {
+            values[axis] = of(problem);
+        }
+        values
+    };
+    let mut input = InputParameter::new(None);
+    if velocity {
+        input.control_interface = ControlInterface::Velocity;
     }
+    input.current_position = all(|problem| problem.start.position);
+    input.current_velocity = all(|problem| problem.start.velocity);
+    input.current_acceleration = all(|problem| problem.start.acceleration);
+    input.target_position = all(|problem| problem.target.position);
+    input.target_velocity = all(|problem| problem.target.velocity);
+    input.target_acceleration = all(|problem| problem.target.acceleration);
+    input.max_velocity = all(|problem| problem.limits.velocity_max);
+    input.max_acceleration = all(|problem| problem.limits.acceleration_max);
+    input.max_jerk = all(|problem| problem.limits.jerk_max);
+    input
+}
+
+fn position(criterion: &mut Criterion) {
+    compare::<1>(criterion, "position", synchronised, Order::Third);
+    compare::<3>(criterion, "position", synchronised, Order::Third);
+    compare::<6>(criterion, "position", synchronised, Order::Third);
+    compare::<7>(criterion, "position", synchronised, Order::Third);
+}
+
+fn velocity(criterion: &mut Criterion) {
+    compare::<3>(criterion, "velocity", synchronised_velocity, Order::Third);
+    compare::<7>(criterion, "velocity", synchronised_velocity, Order::Third);
+}
+
+fn trapezoid(criterion: &mut Criterion) {
+    compare::<1>(criterion, "trapezoid", synchronised, Order::Second);
+    compare::<3>(criterion, "trapezoid", synchronised, Order::Second);
+    compare::<7>(criterion, "trapezoid", synchronised, Order::Second);
 }
 
 fn sample(criterion: &mut Criterion) {
     for axes in [1, 7] {
         let mut profiles = vec![Profile::hold(0.0); axes];
-        let duration_s =
-            synchronised(&problems(1, axes, Order::Second), &mut profiles, Timing::default()).unwrap();
+        let set = problems(1, axes, Order::Third);
+        let duration_s = synchronised(&set, &mut profiles, Timing::default()).unwrap_or_default();
         let mut states = vec![State::default(); axes];
         let mut cycle = 0_u32;
         criterion.bench_function(&format!("sample/{axes}"), |bencher| {
             bencher.iter(|| {
-                cycle = (cycle + 617) % 1024;
+                cycle = (cycle + 1) % 1024;
                 let time_s = duration_s * f64::from(cycle) / 1024.0;
                 for (state, profile) in states.iter_mut().zip(&profiles) {
                     *state = profile.sample(black_box(time_s));
@@ -42,5 +99,12 @@ fn sample(criterion: &mut Criterion) {
     }
 }
 
-criterion_group!(benches, plan, sample);
+fn quick() -> Criterion {
+    Criterion::default()
+        .sample_size(20)
+        .warm_up_time(Duration::from_millis(200))
+        .measurement_time(Duration::from_millis(800))
+}
+
+criterion_group!(name = benches; config = quick(); targets = position, velocity, trapezoid, sample);
 criterion_main!(benches);

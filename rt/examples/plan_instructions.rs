@@ -4,11 +4,12 @@
 //! valgrind --tool=callgrind target/release/examples/plan_instructions trapezoid-7 1000
 //! ```
 //!
-//! The work is named by the first argument (`trapezoid-AXES` or `sample-AXES`) and repeated as often as the second
+//! The work is named by the first argument (`trapezoid-AXES`, `jerk-AXES`, `velocity-AXES` or
+//! `sample-AXES`) and repeated as often as the second
 //! says; the difference between two repetition counts is free of the start-up.
 
 use std::hint::black_box;
-use takt_rt::plan::{Profile, Timing, synchronised};
+use takt_rt::plan::{Profile, Timing, synchronised, synchronised_velocity};
 
 #[path = "../benches/plan_problems/mod.rs"]
 mod plan_problems;
@@ -19,11 +20,12 @@ fn main() {
     let work = arguments.first().and_then(|work| work.split_once('-'));
     let repetitions = arguments.get(1).and_then(|count| count.parse::<u32>().ok());
     let (Some((work, axes)), Some(repetitions)) = (work, repetitions) else {
-        eprintln!("usage: plan_instructions trapezoid-AXES|sample-AXES REPETITIONS");
+        eprintln!("usage: plan_instructions trapezoid-AXES|jerk-AXES|velocity-AXES|sample-AXES REPETITIONS");
         std::process::exit(2);
     };
     let axes = axes.parse().unwrap_or(7);
-    let sets: Vec<_> = (0..64).map(|seed| problems(seed, axes, Order::Second)).collect();
+    let order = if work == "trapezoid" { Order::Second } else { Order::Third };
+    let sets: Vec<_> = (0..64).map(|seed| problems(seed, axes, order)).collect();
     let mut profiles = vec![Profile::hold(0.0); axes];
     for (repetition, set) in (0..repetitions).zip(sets.iter().cycle()) {
         if work == "sample" && repetition > 0 {
@@ -31,6 +33,8 @@ fn main() {
             for profile in &profiles {
                 black_box(profile.sample(black_box(time_s)));
             }
+        } else if work == "velocity" {
+            let _ = black_box(synchronised_velocity(black_box(set), &mut profiles, Timing::default()));
         } else {
             let _ = black_box(synchronised(black_box(set), &mut profiles, Timing::default()));
         }

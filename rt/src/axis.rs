@@ -261,13 +261,14 @@ impl Axis {
     }
 
     /// What this cycle leaves behind.
-    pub fn record(&self, record: &mut AxisRecord) {
+    pub fn record(&self, period_s: f64, record: &mut AxisRecord) {
         let torque = self.feedback.feedback(FeedbackSlot::Torque);
         *record = AxisRecord {
             position_set: self.set[0].position,
             position: self.position,
             velocity_set: self.set[0].velocity as f32,
             acceleration_set: self.set[0].acceleration as f32,
+            jerk_set: ((self.set[0].acceleration - self.set[1].acceleration) / period_s) as f32,
             velocity: self.velocity as f32,
             torque_set: self.torque_set as f32,
             torque: self.parameters.scale.torque_from_per_mille(torque) as f32,

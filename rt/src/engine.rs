@@ -523,7 +523,9 @@ impl Engine {
             (_, StopCategory::Zero) => {
                 // While the power goes, the set-points go on to rest at the limits: a drive that is slow to obey
                 // gets no step. Without a trajectory to rest they stay where they are.
-                let _ = self.plan_stop();
+                if self.plan_stop().is_err() {
+                    self.motion.cancel();
+                }
                 self.goal = Goal::NoVoltage;
                 self.enter(Phase::Disabling, now_ns, door);
             }
@@ -536,6 +538,7 @@ impl Engine {
                     self.enter(Phase::Stopping, now_ns, door);
                 } else {
                     // No trajectory to rest can be computed: the drives' own brakes are what is left.
+                    self.motion.cancel();
                     self.goal = Goal::NoVoltage;
                     self.enter(Phase::Disabling, now_ns, door);
                 }
@@ -553,15 +556,18 @@ impl Engine {
     fn act(&mut self, now_ns: Nanoseconds, door: &mut impl Door) {
         match self.phase {
             Phase::Passive => {}
-            Phase::Disabled => self.axes.iter_mut().for_each(Axis::follow_actual),
+            Phase::Disabled => self.hold(),
             Phase::Enabling => self.wait_for_drives(now_ns, door),
             Phase::Holding => self.hold(),
             Phase::Moving | Phase::Stopping => self.follow_motion(now_ns, door),
             Phase::Streaming => self.follow_stream(now_ns, door),
             Phase::Disabling => {
                 self.come_to_rest();
-                if !self.axes.iter().any(|axis| axis.drive_state().has_torque()) {
-                    self.axes.iter_mut().for_each(Axis::follow_actual);
+                // A drive that has fallen silent never shows that it has obeyed; it is not waited for without end.
+                let is_patient =
+                    !self.motion.is_finished() || self.phase_cycles <= self.enable_timeout_cycles;
+                if !(is_patient && self.axes.iter().any(|axis| axis.drive_state().has_torque())) {
+                    self.motion.cancel();
                     self.goal = Goal::Disabled;
                     self.enter(Phase::Disabled, now_ns, door);
                 }
@@ -755,7 +761,7 @@ impl Engine {
         self.record.timing = Timing { missed_slots, ..timing };
         self.record.phase = self.phase;
         for (axis, record) in self.axes.iter().zip(&mut self.record.axes) {
-            axis.record(record);
+            axis.record(self.period_s, record);
         }
         if !door.record(&self.record) {
             self.dropped += 1;

@@ -3,6 +3,19 @@
 //! This crate is `no_std` and does not link an allocator, so the loop cannot allocate. It formats nothing, takes
 //! no lock, and never panics on data from outside. It is sans-I/O: time and frames are handed in, frames are
 //! handed out; the only place that touches an operating system is `linux`, behind a feature.
+//!
+//! From the wire inwards:
+//!
+//! - [`time`], [`frame`]: integer nanoseconds and the grid; CAN frames that can only be valid.
+//! - [`port`], [`door`]: what the cycle needs from the world, and what it shares with the rest of the program, as
+//!   small traits.
+//! - [`pdo`], [`units`], [`cia402`]: process data compiled to shifts and masks; SI to drive units; the state machine of
+//!   drives.
+//! - [`plan`], [`guard`], [`control`], [`stop`]: trajectories, the last look at every set-point, the loops closed here,
+//!   and the reasons to stop.
+//! - [`axis`], [`engine`]: one joint, and the group that moves together; [`engine::Engine::compute`] is a cycle's thinking.
+//! - [`cycle`]: the paced loop around it: SYNC, feedback, set-points, skip and never burst.
+//! - [`record`]: what each cycle leaves behind.
 #![no_std]
 #![deny(unsafe_code)]
 
@@ -25,3 +38,4 @@ pub mod record;
 pub mod stop;
 pub mod time;
 pub mod units;
+pub mod wire;

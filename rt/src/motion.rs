@@ -3,13 +3,18 @@
 use arrayvec::ArrayVec;
 
 use crate::guard::AxisLimits;
-use crate::plan::{self, Limits, PlanError, Problem, Profile, State, Timing};
+use crate::plan::{self, Limits, PlanError, Problem, Profile, Return, State, Timing};
 use crate::record::MAX_AXES;
 
 /// The trajectory that the group is on.
+///
+/// There is room for two: the next one is planned beside the present one and takes its place only when all of it is
+/// there, without being copied.
 #[derive(Clone, Debug)]
 pub struct Motion {
-    profiles: [Profile; MAX_AXES],
+    first: [Profile; MAX_AXES],
+    second: [Profile; MAX_AXES],
+    is_second_present: bool,
     duration_s: f64,
     time_s: f64,
 }
@@ -27,7 +32,8 @@ pub struct Leg<'a> {
 
 impl Default for Motion {
     fn default() -> Self {
-        Self { profiles: [Profile::hold(0.0); MAX_AXES], duration_s: 0.0, time_s: 0.0 }
+        let hold = [Profile::hold(0.0); MAX_AXES];
+        Self { first: hold, second: hold, is_second_present: false, duration_s: 0.0, time_s: 0.0 }
     }
 }
 
@@ -48,12 +54,10 @@ impl Motion {
                 limits: move_limits(&leg, velocity_scale, acceleration_scale),
             })
             .collect();
-        let mut profiles = self.profiles;
-        let count = problems.len();
-        let timing = Timing { minimum_duration_s, ..Timing::default() };
-        let duration_s =
-            plan::synchronised(&problems, profiles.get_mut(..count).unwrap_or_default(), timing)?;
-        *self = Self { profiles, duration_s, time_s: 0.0 };
+        // Where a limit has just been lowered, slow down to it and no further.
+        let timing = Timing { minimum_duration_s, return_to_limits: Return::Settled, ..Timing::default() };
+        let duration_s = plan::synchronised(&problems, self.free(problems.len()), timing)?;
+        self.begin(duration_s);
         Ok(())
     }
 
@@ -65,11 +69,27 @@ impl Motion {
             starts.push(start);
             limits.push(stop_limits(start.velocity, axis));
         }
-        let mut profiles = self.profiles;
-        let count = starts.len();
-        let duration_s = plan::stop(&starts, &limits, profiles.get_mut(..count).unwrap_or_default())?;
-        *self = Self { profiles, duration_s, time_s: 0.0 };
+        let duration_s = plan::stop(&starts, &limits, self.free(starts.len()))?;
+        self.begin(duration_s);
         Ok(())
+    }
+
+    /// Where the next trajectory of so many axes is planned.
+    fn free(&mut self, axes: usize) -> &mut [Profile] {
+        let free = if self.is_second_present { &mut self.first } else { &mut self.second };
+        free.get_mut(..axes).unwrap_or_default()
+    }
+
+    /// The trajectory that was planned last becomes the present one.
+    fn begin(&mut self, duration_s: f64) {
+        self.is_second_present = !self.is_second_present;
+        self.duration_s = duration_s;
+        self.time_s = 0.0;
+    }
+
+    /// Gives the present trajectory up: there is nothing left to follow.
+    pub fn cancel(&mut self) {
+        self.time_s = self.duration_s;
     }
 
     /// Goes on by one period.
@@ -80,7 +100,8 @@ impl Motion {
     /// Where the axes are to be now, in their order; behind the last one more, at rest.
     pub fn states(&self) -> impl Iterator<Item = State> + '_ {
         let is_finished = self.is_finished();
-        self.profiles
+        let present = if self.is_second_present { &self.second } else { &self.first };
+        present
             .iter()
             .map(move |profile| if is_finished { profile.end() } else { profile.sample(self.time_s) })
     }

@@ -40,6 +40,8 @@ pub struct AxisRecord {
     pub velocity_set: f32,
     /// Set-point of the acceleration.
     pub acceleration_set: f32,
+    /// Change of the acceleration set-point from the last cycle to this one, per second.
+    pub jerk_set: f32,
     /// Actual velocity: reported, or else derived from the positions.
     pub velocity: f32,
     /// Torque sent: the command in CST, else the feed-forward; 0 when none is sent.

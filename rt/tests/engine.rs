@@ -2,7 +2,7 @@
 
 mod fixture;
 
-use fixture::{PERIOD_NS, Rig, parameters, scale};
+use fixture::{PERIOD_NS, Rig, jerk_limited, parameters, scale};
 use proptest::prelude::*;
 use takt_rt::axis::AxisParameters;
 use takt_rt::cia402::State as DriveState;
@@ -64,6 +64,45 @@ fn a_move_can_be_replanned_in_every_cycle_of_the_one_before() {
     rig.assert_limits_kept();
     assert_eq!(rig.stops(), []);
     assert_eq!(rig.drive(0).position, scale().position_to_counts(0.25));
+}
+
+#[test]
+fn a_limit_that_is_lowered_in_motion_is_approached_without_undershoot_or_reversal() {
+    let mut rig = Rig::of(jerk_limited(1, 20.0)).enable();
+    let at_scale = |velocity_scale| {
+        Request::Move(Move {
+            id: 3,
+            target: [2.9; MAX_AXES],
+            target_velocity: [0.0; MAX_AXES],
+            velocity_scale,
+            acceleration_scale: 1.0,
+            minimum_duration_s: 0.0,
+        })
+    };
+    rig.request(Request::Move(Move { target: [-2.9; MAX_AXES], ..moving(at_scale(1.0)) }));
+    rig.run_until(Phase::Holding, 10_000);
+    rig.request(at_scale(1.0));
+    rig.run(1_000);
+    let begun = rig.door.records.len();
+    rig.request(at_scale(0.25));
+    rig.run(1_500);
+    let velocities: Vec<f64> =
+        rig.door.records[begun..].iter().map(|cycle| cycle.axes[0].velocity_set.into()).collect();
+    assert!(velocities[0] > 1.9);
+    assert!(
+        velocities.iter().all(|velocity| *velocity > 0.5 - 1e-6),
+        "{:?}",
+        velocities.iter().copied().reduce(f64::min)
+    );
+    assert!((velocities[velocities.len() - 1] - 0.5).abs() < 1e-6);
+    rig.assert_limits_kept();
+}
+
+fn moving(request: Request) -> Move {
+    match request {
+        Request::Move(parameters) => parameters,
+        other => panic!("{other:?}"),
+    }
 }
 
 #[test]
@@ -131,6 +170,32 @@ fn a_category_0_stop_takes_the_power_at_once() {
     rig.run(4);
     assert_eq!(rig.phase(), Phase::Disabled);
     assert_eq!(rig.stops().len(), 1);
+}
+
+/// What was left of the way to rest when the power went must not be taken up at the next enabling.
+#[test]
+fn after_a_category_0_stop_in_motion_nothing_of_the_old_motion_comes_back() {
+    let mut rig = Rig::enabled(3);
+    rig.move_to(2.5);
+    rig.run(400);
+    rig.request(Request::Stop(StopCategory::Zero));
+    rig.run_until(Phase::Disabled, 10);
+    rig.request(Request::Enable);
+    rig.run(3);
+    rig.drive(1).is_silent = true;
+    rig.run_until(Phase::Disabling, 10);
+    rig.drive(1).is_silent = false;
+    rig.run_until(Phase::Disabled, 10);
+    rig.assert_limits_kept();
+}
+
+#[test]
+fn a_drive_that_never_answers_again_is_not_waited_for_without_end() {
+    let mut rig = Rig::enabled(3);
+    rig.drive(1).is_silent = true;
+    rig.run_until(Phase::Disabling, 10);
+    rig.run_until(Phase::Disabled, 510);
+    assert_eq!(rules(&rig), [Rule::MissedFeedback]);
 }
 
 #[test]
@@ -347,8 +412,9 @@ proptest! {
     #[test]
     fn no_sequence_of_requests_streams_and_faults_moves_an_axis_beyond_its_limits(
         steps in prop::collection::vec((any_request(), 0usize..120, 0u8..12, -0.01f64..0.01), 1..60),
+        jerk in prop_oneof![Just(f64::INFINITY), 20.0f64..2_000.0],
     ) {
-        let mut rig = Rig::enabled(3);
+        let mut rig = Rig::of(jerk_limited(3, jerk)).enable();
         for (request, cycles, fault, step) in steps {
             rig.request(request);
             match fault {

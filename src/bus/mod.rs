@@ -1,6 +1,13 @@
 //! The buses: what they are connected to, how long frames take, and whether everything fits.
 
 pub mod frame_time;
+mod interface;
 pub mod port;
 pub mod schedule;
+mod socketcan;
 pub mod trace;
+
+pub use interface::{
+    InterfaceError, InterfaceSettings, InterfaceStatus, Timing, interface_status, prepare_interface,
+};
+pub use socketcan::{SocketCanError, SocketCanOptions, open_socketcan};

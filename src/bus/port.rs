@@ -1,9 +1,12 @@
 //! The port of a configured bus, whatever it is connected to.
 
 use takt_rt::frame::Frame;
+use takt_rt::linux::SocketCanPort;
 use takt_rt::port::{BusHealth, BusPort, ReceiveBatch};
 use takt_rt::time::Nanoseconds;
 
+use super::interface::{InterfaceError, InterfaceSettings, prepare_interface};
+use super::socketcan::{SocketCanError, SocketCanOptions, open_socketcan};
 use super::trace::{Trace, TracedPort, traced};
 use crate::config::{Config, Interface};
 use crate::sim::SimulatedBus;
@@ -15,20 +18,32 @@ const TRACE_FRAMES: usize = 1 << 14;
 pub enum Port {
     /// Simulated drives inside this process.
     Simulated(Box<SimulatedBus>),
+    /// A CAN interface of this machine.
+    SocketCan(Box<SocketCanPort>),
     /// Any port whose frames are also logged.
     Traced(Box<TracedPort<Port>>),
 }
 
 /// A bus that cannot be opened.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, thiserror::Error)]
 pub enum OpenError {
-    /// The interface is of a kind that this build cannot open.
-    #[error("bus `{bus}`: cannot open `{interface}`")]
-    NotSupported {
+    /// The interface is not as it must be.
+    #[error("bus `{bus}`: {error}")]
+    Interface {
         /// The bus.
         bus: String,
-        /// What it was to be connected to.
-        interface: String,
+        /// Why.
+        #[source]
+        error: InterfaceError,
+    },
+    /// There is no socket on the interface.
+    #[error("bus `{bus}`: {error}")]
+    Socket {
+        /// The bus.
+        bus: String,
+        /// Why.
+        #[source]
+        error: SocketCanError,
     },
 }
 
@@ -38,11 +53,10 @@ impl Port {
     /// # Errors
     /// See [`OpenError`].
     pub fn open(config: &Config, bus: usize) -> Result<Self, OpenError> {
-        match config.buses.get(bus).map(|bus| (&bus.name, &bus.interface)) {
-            Some((name, Interface::SocketCan(interface))) => {
-                Err(OpenError::NotSupported { bus: name.clone(), interface: interface.clone() })
-            }
-            _ => Ok(Self::Simulated(Box::new(SimulatedBus::new(config, bus)))),
+        let options = SocketCanOptions::of_master(config, bus);
+        match open_configured(config, bus, &options)? {
+            Some(port) => Ok(Self::SocketCan(Box::new(port))),
+            None => Ok(Self::Simulated(Box::new(SimulatedBus::new(config, bus)))),
         }
     }
 
@@ -53,10 +67,38 @@ impl Port {
     }
 }
 
+/// Brings the interface of bus number `bus` up, as far as that is needed and permitted, and opens it. `None` when the
+/// bus is a simulated one.
+///
+/// # Errors
+/// See [`OpenError`].
+pub fn open_configured(
+    config: &Config,
+    bus: usize,
+    options: &SocketCanOptions,
+) -> Result<Option<SocketCanPort>, OpenError> {
+    let Some(bus) = config.buses.get(bus) else { return Ok(None) };
+    let Interface::SocketCan(interface) = &bus.interface else { return Ok(None) };
+    let settings = InterfaceSettings {
+        bit_rate: bus.bit_rate,
+        data_bit_rate: bus.data_bit_rate,
+        restart_ms: RESTART_MS,
+    };
+    prepare_interface(interface, &settings)
+        .map_err(|error| OpenError::Interface { bus: bus.name.clone(), error })?;
+    let port = open_socketcan(interface, options)
+        .map_err(|error| OpenError::Socket { bus: bus.name.clone(), error })?;
+    Ok(Some(port))
+}
+
+/// How soon a controller that has gone off the bus comes back, when it was this program that brought it up.
+const RESTART_MS: u32 = 100;
+
 impl BusPort for Port {
     fn send(&mut self, now_ns: Nanoseconds, frames: &[Frame]) -> usize {
         match self {
             Self::Simulated(port) => port.send(now_ns, frames),
+            Self::SocketCan(port) => port.send(now_ns, frames),
             Self::Traced(port) => port.send(now_ns, frames),
         }
     }
@@ -64,6 +106,7 @@ impl BusPort for Port {
     fn receive(&mut self, now_ns: Nanoseconds, batch: &mut ReceiveBatch) {
         match self {
             Self::Simulated(port) => port.receive(now_ns, batch),
+            Self::SocketCan(port) => port.receive(now_ns, batch),
             Self::Traced(port) => port.receive(now_ns, batch),
         }
     }
@@ -71,6 +114,7 @@ impl BusPort for Port {
     fn unconfirmed(&mut self, now_ns: Nanoseconds) -> usize {
         match self {
             Self::Simulated(port) => port.unconfirmed(now_ns),
+            Self::SocketCan(port) => port.unconfirmed(now_ns),
             Self::Traced(port) => port.unconfirmed(now_ns),
         }
     }
@@ -78,6 +122,7 @@ impl BusPort for Port {
     fn health(&mut self) -> BusHealth {
         match self {
             Self::Simulated(port) => port.health(),
+            Self::SocketCan(port) => port.health(),
             Self::Traced(port) => port.health(),
         }
     }

@@ -1,18 +1,17 @@
 //! `takt check`: everything that can be known before motion.
 
+mod text;
+
 use std::f64::consts::TAU;
-use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::PathBuf;
 
 use clap::Args;
 use serde::Serialize;
-use takt::bus::schedule::text::{message_name, microseconds, remedy, shortfall, sums};
-use takt::bus::schedule::{self, BusSchedule, MessageSchedule};
-use takt::config::{Axis, Bus, Config, ConfigError, Control, Travel};
+use takt::bus::schedule::{self, BusSchedule};
+use takt::config::{Axis, Config, ConfigError, Control, Travel};
 
 use super::exit::Exit;
-use super::table::Table;
 
 /// Check a configuration: limits, units, bus load, and the worst-case response time of every message
 #[derive(Args, Clone, Debug)]
@@ -34,7 +33,7 @@ pub fn run(arguments: &Arguments) -> Exit {
     if arguments.json {
         print_json(&check)
     } else {
-        print(&check.to_text(&config))
+        print(&text::whole(&check, &config))
     }
     if check.fits { Exit::Done } else { Exit::Usage }
 }
@@ -97,12 +96,14 @@ struct Check {
     fits: bool,
     cycle_ns: u64,
     command_phase_ns: u64,
+    /// What `command_phase = "auto"` stands for; `None` where no command phase suits every bus.
+    automatic_command_phase_ns: Option<u64>,
     axes: Vec<AxisCheck>,
     buses: Vec<BusSchedule>,
 }
 
 /// Limits and units of an axis, in rad (m), seconds and N·m (N).
-#[derive(Serialize)]
+#[derive(Clone, PartialEq, Serialize)]
 struct AxisCheck {
     name: String,
     bus: String,
@@ -136,33 +137,10 @@ impl Check {
             fits: buses.iter().all(BusSchedule::fits),
             cycle_ns: config.cycle.period_ns,
             command_phase_ns: config.cycle.command_phase_ns,
+            automatic_command_phase_ns: schedule::automatic_command_phase(config).ok(),
             axes: config.axes.iter().map(|axis| AxisCheck::of(axis, config)).collect(),
             buses,
         }
-    }
-
-    fn to_text(&self, config: &Config) -> String {
-        let mut text = format!(
-            "{}: {} axes on {} buses, a cycle of {} µs with the command phase at {} µs\n\nLimits\n{}\nUnits\n{}",
-            self.name,
-            self.axes.len(),
-            self.buses.len(),
-            microseconds(self.cycle_ns),
-            microseconds(self.command_phase_ns),
-            limits_table(&self.axes),
-            units_table(&self.axes),
-        );
-        for (schedule, bus) in self.buses.iter().zip(&config.buses) {
-            text.push('\n');
-            text.push_str(&bus_text(schedule, bus));
-        }
-        let verdict = if self.fits {
-            "Every bus carries its traffic"
-        } else {
-            "REFUSED: not every bus carries its traffic"
-        };
-        let _ = writeln!(text, "\n{verdict} in the worst case.");
-        text
     }
 }
 
@@ -207,129 +185,4 @@ impl AxisCheck {
     fn unit(&self) -> &'static str {
         if self.is_linear { "m" } else { "rad" }
     }
-}
-
-fn limits_table(axes: &[AxisCheck]) -> Table {
-    let mut table = Table::new([
-        "axis",
-        "bus",
-        ">node",
-        "mode",
-        "unit",
-        ">lowest",
-        ">highest",
-        ">velocity",
-        ">acceleration",
-        ">deceleration",
-        ">jerk",
-        ">torque",
-        "following error",
-    ]);
-    for axis in axes {
-        table.row([
-            axis.name.clone(),
-            axis.bus.clone(),
-            axis.node.to_string(),
-            axis.mode.to_owned(),
-            axis.unit().to_owned(),
-            format!("{:.4}", axis.position_min),
-            format!("{:.4}", axis.position_max),
-            format!("{:.4}", axis.velocity),
-            format!("{:.2}", axis.acceleration),
-            format!("{:.2}", axis.deceleration),
-            axis.jerk.map_or("none".to_owned(), |jerk| format!("{jerk:.1}")),
-            format!("{:.1} {}", axis.torque, if axis.is_linear { "N" } else { "Nm" }),
-            format!("{:.4} for {} ms", axis.following_error, axis.following_error_time_ns as f64 / 1e6),
-        ]);
-    }
-    table
-}
-
-fn units_table(axes: &[AxisCheck]) -> Table {
-    let mut table =
-        Table::new(["axis", "counts per unit", "one count", "counts per cycle at full speed", "counts"]);
-    for axis in axes {
-        let [lowest, highest] = axis.counts_range;
-        table.row([
-            axis.name.clone(),
-            format!("{:.3} per {}", axis.counts_per_unit, axis.unit()),
-            format!("{:.3} µ{}", axis.resolution * 1e6, axis.unit()),
-            format!("{:.1}", axis.counts_per_cycle),
-            format!("{lowest} to {highest}"),
-        ]);
-    }
-    table
-}
-
-fn bus_text(schedule: &BusSchedule, bus: &Bus) -> String {
-    let mut text = format!(
-        "Bus {} on {}, {} kbit/s, load {:.1} % (times in µs)\n{}",
-        schedule.name,
-        bus.interface,
-        f64::from(schedule.bit_rate) / 1e3,
-        schedule.load_percent,
-        message_table(&schedule.messages),
-    );
-    for line in sums(schedule) {
-        let _ = writeln!(text, "  {line}");
-    }
-    if let Some((earliest, latest)) = schedule.slot.command_phases_ns {
-        let _ = writeln!(
-            text,
-            "  command phase may lie from {} to {} µs",
-            microseconds(earliest),
-            microseconds(latest)
-        );
-    }
-    if schedule.fits() {
-        text.push_str("  fits\n");
-    }
-    for line in schedule.shortfalls.iter().map(shortfall) {
-        let _ = writeln!(text, "  DOES NOT FIT: {line}");
-    }
-    for line in schedule.remedies.iter().map(remedy) {
-        let _ = writeln!(text, "  what would fit: {line}");
-    }
-    text
-}
-
-fn message_table(messages: &[MessageSchedule]) -> Table {
-    let mut table = Table::new([
-        "id",
-        "message",
-        "axis",
-        ">bytes",
-        ">bits",
-        ">period",
-        ">jitter",
-        ">on the wire",
-        ">response",
-        ">with emergency",
-        ">due",
-    ]);
-    for message in messages {
-        let bound = |ns: Option<u64>| match ns {
-            Some(ns) => microseconds(ns),
-            None if message.is_sent_while_enabled => "no bound".to_owned(),
-            None => "-".to_owned(),
-        };
-        table.row([
-            format!("{:03X}", message.id),
-            message_name(message.kind).to_owned(),
-            message.axis.clone().unwrap_or_default(),
-            message.length.to_string(),
-            message.bits.to_string(),
-            if message.is_sent_while_enabled {
-                microseconds(message.period_ns)
-            } else {
-                "while disabled".to_owned()
-            },
-            microseconds(message.jitter_ns),
-            microseconds(message.transmission_ns),
-            bound(message.response_ns),
-            bound(message.response_with_emergency_ns),
-            message.deadline_ns.map_or("-".to_owned(), microseconds),
-        ]);
-    }
-    table
 }

@@ -6,7 +6,9 @@ mod doctor;
 mod exit;
 mod interruption;
 mod jitter;
+mod plan;
 mod run;
+mod sim;
 mod table;
 
 pub use exit::Exit;
@@ -25,6 +27,8 @@ pub struct CommandLine {
 enum Command {
     Run(run::Arguments),
     Check(check::Arguments),
+    Plan(plan::Arguments),
+    Sim(sim::Arguments),
     Doctor(doctor::Arguments),
     Jitter(jitter::Arguments),
 }
@@ -35,6 +39,8 @@ impl CommandLine {
         match self.command {
             Command::Run(arguments) => run::run(arguments),
             Command::Check(arguments) => check::run(&arguments),
+            Command::Plan(arguments) => plan::run(&arguments),
+            Command::Sim(arguments) => sim::run(&arguments),
             Command::Doctor(arguments) => doctor::run(&arguments),
             Command::Jitter(arguments) => jitter::run(&arguments),
         }

@@ -6,6 +6,8 @@ use std::ops::Range;
 use miette::{Diagnostic, LabeledSpan, NamedSource, SourceCode};
 use thiserror::Error;
 
+use crate::bus::schedule::NoCommandPhase;
+
 use super::quantity::{self, Quantity};
 
 /// A configuration that cannot be used, with all of its problems in the order of the file. `miette` shows each of
@@ -294,6 +296,12 @@ pub enum ProblemKind {
         /// The value in counts or counts per second.
         counts: f64,
     },
+    /// `command_phase = "auto"` where none is possible.
+    #[error("no command phase suits every bus")]
+    NoCommandPhase {
+        /// The sums of the buses that are the cause.
+        cause: NoCommandPhase,
+    },
     /// More than one controller can do.
     #[error("{given} {what} are more than the {limit} that one controller can do")]
     TooMany {
@@ -395,6 +403,7 @@ impl ProblemKind {
             }
             Self::EmptyRange { .. } => "the lowest position comes first".into(),
             Self::BeyondCounts { .. } => "check counts_per_turn, gear_ratio, lead and zero_counts".into(),
+            Self::NoCommandPhase { cause } => cause.to_string(),
             Self::TooMany { .. } => "divide the machine between several controllers".into(),
         }
     }

@@ -4,6 +4,7 @@
 
 use std::path::PathBuf;
 
+use serde::Serialize;
 use takt_rt::cia402::OperationMode;
 
 /// A whole controller: one cycle, its buses, its axes and what they are to do.
@@ -34,7 +35,9 @@ pub struct Config {
 pub struct Cycle {
     /// Period of SYNC and set-points; 250 µs to 100 ms in whole microseconds. Default 1 ms.
     pub period_ns: u64,
-    /// When the command phase begins, after the start of the slot; 5 % to 95 % of the period. Default 55 %.
+    /// When the command phase begins, after the start of the slot; 5 % to 95 % of the period. Default 55 %. A file
+    /// may leave it to [`automatic_command_phase`](crate::bus::schedule::automatic_command_phase); what that finds
+    /// stands here.
     pub command_phase_ns: u64,
 }
 
@@ -77,7 +80,8 @@ pub struct Bus {
     pub bit_rate: u32,
     /// Bit rate (bit/s) of the data phase of CAN FD frames; `None`, the default, on a classic bus.
     pub data_bit_rate: Option<u32>,
-    /// The most service frames (heartbeat, NMT, SDO …) sent in one cycle while the axes are enabled. Default 1.
+    /// The most service frames (NMT, SDO …) sent in one cycle while the axes are enabled, beside the heartbeat.
+    /// Default 1.
     pub service_frames_per_cycle: usize,
     /// Whether SDO transfers go on while the axes are enabled. A request and its answer then need room in the
     /// worst cycle; else they wait until the axes are disabled. Default `false`.
@@ -145,7 +149,8 @@ pub enum DriveFamily {
 }
 
 /// Something a drive can report every cycle beside statusword and position.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Feedback {
     /// 6061, one byte.
     OperationMode,
@@ -157,6 +162,32 @@ pub enum Feedback {
     Current,
     /// 603F, two bytes.
     ErrorCode,
+}
+
+impl Feedback {
+    /// All of them.
+    pub const ALL: [Self; 5] =
+        [Self::OperationMode, Self::Velocity, Self::Torque, Self::Current, Self::ErrorCode];
+
+    /// The word for it in a configuration.
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::OperationMode => "operation_mode",
+            Self::Velocity => "velocity",
+            Self::Torque => "torque",
+            Self::Current => "current",
+            Self::ErrorCode => "error_code",
+        }
+    }
+
+    /// Its size in a PDO, in bytes.
+    pub const fn bytes(self) -> usize {
+        match self {
+            Self::OperationMode => 1,
+            Self::Velocity => 4,
+            Self::Torque | Self::Current | Self::ErrorCode => 2,
+        }
+    }
 }
 
 /// How an axis is commanded.

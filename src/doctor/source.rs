@@ -34,6 +34,11 @@ impl Source {
         Self { root: root.to_owned(), answers: Some(answers) }
     }
 
+    /// Whether this is the machine that the program runs on, whose kernel can be asked.
+    pub(super) fn is_this_machine(&self) -> bool {
+        self.answers.is_none()
+    }
+
     fn path(&self, path: &str) -> PathBuf {
         self.root.join(path.trim_start_matches('/'))
     }

@@ -13,7 +13,7 @@ pub trait Drive: Send {
     /// Its node number.
     fn node(&self) -> u8;
 
-    /// Takes a frame of another station, whose last bit came at `now_ns`. Includes [`Drive::advance`].
+    /// Takes a frame of another station, whose last bit came at `now_ns`.
     fn receive(&mut self, now_ns: Nanoseconds, frame: &Frame, mailbox: &mut Mailbox);
 
     /// Lives on until `now_ns` and does what is due.
@@ -22,8 +22,8 @@ pub trait Drive: Send {
     /// When it wants to be advanced next, always after the present that it was last told.
     fn wake_ns(&self) -> Nanoseconds;
 
-    /// What an observer with eyes for everything sees, as of the present that it was last told.
-    fn observe(&self) -> Observation;
+    /// What an observer with eyes for everything sees at `now_ns`. Looking changes nothing.
+    fn observe(&mut self, now_ns: Nanoseconds) -> Observation;
 
     /// Something breaks. The drive notices it when it is advanced next.
     fn inject(&mut self, fault: DriveFault);

@@ -30,7 +30,7 @@
 //! #         joint: JointParameters { inertia: 0.3, viscous_friction: 1.0, coulomb_friction: 3.0, brake_torque: 60.0 },
 //! #         encoder: Encoder { counts_per_unit: 83_443.0, zero_counts: 0.0 },
 //! #         counts_per_turn: 524_288.0, initial_position: 0.0, rated_torque: 31.0, peak_torque: 60.0,
-//! #         highest_velocity: 3.0, power_up_ns: 1_000_000, has_battery: true,
+//! #         highest_velocity: 3.0, power_up_ns: 1_000_000, feedback_delay_ns: 20_000, has_battery: true,
 //! #         has_interpolated_position: false, is_upload_segmented: false, seed: 1,
 //! #     }
 //! # }
@@ -46,15 +46,16 @@
 
 mod drive;
 pub mod erob;
+mod live;
 mod mailbox;
 mod medium;
 pub mod plant;
 mod port;
 mod random;
-mod wire;
 
 pub use drive::{Drive, DriveFault, NmtState, Observation};
+pub use live::LiveDrives;
 pub use mailbox::{Mailbox, Order};
 pub use medium::{BitRates, Medium, Transmission};
 pub use port::{SimulatedBus, UnknownNode};
-pub use wire::{INTERMISSION_BITS, WireLength, bits_ns};
+pub use takt_rt::wire::{INTERMISSION_BITS, WireLength, bits_ns};

@@ -21,11 +21,14 @@ const TRANSMIT_QUEUE: usize = 256;
 /// Frames the interface's receive queue holds.
 const RECEIVE_QUEUE: usize = 1024;
 /// Frames a drive's controller holds.
-const DRIVE_MAILBOX: usize = 16;
+pub(super) const DRIVE_MAILBOX: usize = 16;
 /// The master's station on the bus; the drives follow.
 const MASTER: usize = 0;
 
 /// A bus with simulated drives.
+///
+/// The master's frames wait in one queue in the order of the calls, as in the kernel: what is handed over behind a
+/// set-point goes out behind it, however strong its identifier. Every drive offers its strongest frame first.
 pub struct SimulatedBus {
     medium: Medium,
     drives: Vec<Box<dyn Drive>>,
@@ -47,6 +50,12 @@ fn simulated(axis: &Axis, simulation: &Simulation) -> Box<dyn Drive> {
     }
 }
 
+/// The drives that stand in for the axes of a bus.
+pub(super) fn drives_of(config: &Config, bus: usize) -> Vec<Box<dyn Drive>> {
+    let axes = config.axes.iter().filter(|axis| axis.bus == bus);
+    axes.map(|axis| simulated(axis, &config.simulation)).collect()
+}
+
 /// There is no drive with this node number on the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("no simulated drive with node number {node} on this bus")]
@@ -61,9 +70,7 @@ impl SimulatedBus {
         let rates = config.buses.get(bus).map_or(BitRates { nominal: 1_000_000, data: None }, |bus| {
             BitRates { nominal: bus.bit_rate, data: bus.data_bit_rate }
         });
-        let axes = config.axes.iter().filter(|axis| axis.bus == bus);
-        let drives = axes.map(|axis| simulated(axis, &config.simulation)).collect();
-        Self::with_drives(rates, config.simulation.longest_gap_ns, drives)
+        Self::with_drives(rates, config.simulation.longest_gap_ns, drives_of(config, bus))
     }
 
     /// A bus with these drives, whose supply comes on at the first call. When a call names a present more than
@@ -88,8 +95,9 @@ impl SimulatedBus {
     }
 
     /// The truth about a drive, as of the last call.
-    pub fn observe(&self, node: u8) -> Result<Observation, UnknownNode> {
-        self.station(node).map(|station| self.drives[station - 1].observe())
+    pub fn observe(&mut self, node: u8) -> Result<Observation, UnknownNode> {
+        let station = self.station(node)?;
+        Ok(self.drives[station - 1].observe(self.now_ns))
     }
 
     /// Breaks something in a drive.

@@ -2,6 +2,8 @@
 
 use std::f64::consts::TAU;
 
+use serde::Serialize;
+
 use crate::config::{Axis, Config, Interface, Travel};
 
 /// Names and units of a controller.
@@ -26,6 +28,19 @@ pub struct AxisDescription {
     pub unit: Unit,
     /// Counts per rad (m) of the position that the drive reports.
     pub counts_per_unit: f64,
+    /// What its set-points may reach.
+    pub limits: SetPointMagnitudes,
+}
+
+/// How large the derivatives of a set-point are, or may be, in rad (m) and seconds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct SetPointMagnitudes {
+    /// rad/s (m/s)
+    pub velocity: f64,
+    /// rad/s² (m/s²)
+    pub acceleration: f64,
+    /// rad/s³ (m/s³); infinite where it is not limited.
+    pub jerk: f64,
 }
 
 /// Names of a bus.
@@ -104,6 +119,11 @@ impl AxisDescription {
             name: axis.name.clone(),
             unit,
             counts_per_unit: axis.counts_per_turn * axis.gear_ratio / travel_per_turn,
+            limits: SetPointMagnitudes {
+                velocity: axis.limits.velocity,
+                acceleration: axis.limits.acceleration.max(axis.limits.deceleration),
+                jerk: axis.limits.jerk,
+            },
         }
     }
 }

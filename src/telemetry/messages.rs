@@ -48,6 +48,7 @@ pub fn encode_axis(slot: u64, axis: &AxisRecord, encoder: &mut CdrEncoder) {
         .f64(axis.position)
         .f32(axis.velocity_set)
         .f32(axis.acceleration_set)
+        .f32(axis.jerk_set)
         .f32(axis.velocity)
         .f32(axis.torque_set)
         .f32(axis.torque)

@@ -22,7 +22,7 @@ pub mod words;
 
 pub use destination::Destination;
 pub use logger::{LogSummary, Logger, LoggerOptions, Notice};
-pub use machine::{AxisDescription, BusDescription, Machine, Unit};
+pub use machine::{AxisDescription, BusDescription, Machine, SetPointMagnitudes, Unit};
 pub use picture::Emphasis;
 pub use report::{
     AxisReport, BusReport, LatencyReport, RealtimeReport, RunOutcome, RunReport, StopReport, TelemetryReport,

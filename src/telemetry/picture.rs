@@ -2,6 +2,7 @@
 
 use std::fmt::Write;
 
+use super::machine::SetPointMagnitudes;
 use super::report::{
     AxisReport, BusReport, DECADES, LatencyReport, RANGES_PER_DECADE, RealtimeReport, RunReport,
 };
@@ -105,6 +106,21 @@ impl RunReport {
         for axis in &self.axes {
             line(text, &axis_row(axis));
         }
+        let parts: Vec<String> = [
+            ("velocity", self.largest_part(|of| of.velocity)),
+            ("acceleration", self.largest_part(|of| of.acceleration)),
+            ("jerk", self.largest_part(|of| of.jerk)),
+        ]
+        .into_iter()
+        .filter_map(|(what, part)| part.map(|part| format!("{:.1} % of the {what}", 100.0 * part)))
+        .collect();
+        line(text, &format!("set-points reached {} limits", parts.join(", ")));
+    }
+
+    /// The largest part of its limit that any axis was asked for; `None` where no axis has such a limit.
+    fn largest_part(&self, of: impl Fn(&SetPointMagnitudes) -> f64) -> Option<f64> {
+        let limited = self.axes.iter().filter(|axis| of(&axis.limits).is_finite() && of(&axis.limits) > 0.0);
+        limited.map(|axis| of(&axis.set_point_max) / of(&axis.limits)).reduce(f64::max)
     }
 
     fn bus_table(&self, text: &mut String, emphasis: Emphasis) {
@@ -253,7 +269,9 @@ fn axis_row(axis: &AxisReport) -> String {
             }
             _ => ("never enabled".to_owned(), String::new()),
         };
-    let position = format!("{:.5} {}", axis.final_position, axis.unit);
+    // Rounded before it is printed, and 0 added, so that nothing prints as -0.
+    let rounded = (axis.final_position * 1e5).round() / 1e5 + 0.0;
+    let position = format!("{rounded:.5} {}", axis.unit);
     let off = format!("{:+.1}", axis.final_error_counts);
     let name = shortened(&axis.name, 16);
     format!("{name:<16}{largest:>16}   {circumstances:<36}{position:>16}{off:>12}")

@@ -10,7 +10,7 @@ use takt_rt::stop::StopReason;
 use takt_rt::time::{NANOSECONDS_PER_SECOND, Nanoseconds};
 
 use super::logger::LogSummary;
-use super::machine::{AxisDescription, BusDescription, Machine};
+use super::machine::{AxisDescription, BusDescription, Machine, SetPointMagnitudes};
 use super::statistics::{AxisStatistics, Latency};
 use super::words;
 
@@ -101,6 +101,10 @@ pub struct AxisReport {
     pub following_error_at_s: Option<f64>,
     /// The velocity asked for then, per second.
     pub following_error_velocity: Option<f64>,
+    /// The largest velocity, acceleration and jerk of its set-points.
+    pub set_point_max: SetPointMagnitudes,
+    /// What they may be; the jerk is `null` where it is not limited.
+    pub limits: SetPointMagnitudes,
     /// The last position under power.
     pub final_position: f64,
     /// Where it was to be.
@@ -263,9 +267,12 @@ impl AxisReport {
             following_error_max: largest.map(|largest| largest.error),
             following_error_at_s: largest.map(|largest| seconds(largest.at_ns.saturating_sub(first_ns))),
             following_error_velocity: largest.map(|largest| largest.velocity_set),
+            set_point_max: axis.set_point_max,
+            limits: description.limits,
             final_position: axis.position,
             target_position,
-            final_error_counts: (error_counts * 10.0).round() / 10.0,
+            // Adding 0 turns -0 into 0.
+            final_error_counts: (error_counts * 10.0).round() / 10.0 + 0.0,
         }
     }
 }

@@ -1,9 +1,11 @@
 //! What is reckoned from the cycle records while they pass.
 
 use hdrhistogram::Histogram;
-use takt_rt::record::{AxisRecord, CycleRecord, Timing};
+use takt_rt::record::{AxisRecord, CycleRecord};
 use takt_rt::stop::Phase;
 use takt_rt::time::Nanoseconds;
+
+use super::machine::SetPointMagnitudes;
 
 /// Times are told apart to three digits, up to a minute; a longer one counts as a minute, except in the maximum.
 const LONGEST_NS: u64 = 60_000_000_000;
@@ -97,6 +99,8 @@ pub struct FollowingErrorMaximum {
 pub struct AxisStatistics {
     /// The largest following error while the axis was enabled; `None` when it never was.
     pub following_error_max: Option<FollowingErrorMaximum>,
+    /// The largest magnitudes of the set-points that were sent while the axis was enabled.
+    pub set_point_max: SetPointMagnitudes,
     /// The last set-point while enabled, in rad (m); without ever being enabled, the last one of all.
     pub position_set: f64,
     /// The position reported together with it.
@@ -105,7 +109,8 @@ pub struct AxisStatistics {
 }
 
 impl AxisStatistics {
-    fn add(&mut self, timing: &Timing, phase: Phase, axis: &AxisRecord) {
+    fn add(&mut self, cycle: &CycleRecord, axis: &AxisRecord) {
+        let (timing, phase) = (&cycle.timing, cycle.phase);
         let is_enabled = is_enabled(phase);
         if is_enabled || !self.was_enabled {
             self.position_set = axis.position_set;
@@ -115,6 +120,14 @@ impl AxisStatistics {
             return;
         }
         self.was_enabled = true;
+        if cycle.is_commanded {
+            let larger = |known: f64, seen: f32| known.max(f64::from(seen.abs()));
+            self.set_point_max = SetPointMagnitudes {
+                velocity: larger(self.set_point_max.velocity, axis.velocity_set),
+                acceleration: larger(self.set_point_max.acceleration, axis.acceleration_set),
+                jerk: larger(self.set_point_max.jerk, axis.jerk_set),
+            };
+        }
         let error = f64::from(axis.following_error).abs();
         if !error.is_nan() && self.following_error_max.is_none_or(|largest| error > largest.error) {
             self.following_error_max = Some(FollowingErrorMaximum {
@@ -144,13 +157,13 @@ pub struct Statistics {
     pub first_ns: Nanoseconds,
     /// Start of the last cycle seen.
     pub last_ns: Nanoseconds,
-    /// [`Timing::wake_ns`]
+    /// [`Timing::wake_ns`](takt_rt::record::Timing::wake_ns)
     pub wake: Latency,
-    /// [`Timing::sync_ns`]
+    /// [`Timing::sync_ns`](takt_rt::record::Timing::sync_ns)
     pub sync: Latency,
-    /// [`Timing::compute_ns`]
+    /// [`Timing::compute_ns`](takt_rt::record::Timing::compute_ns)
     pub compute: Latency,
-    /// [`Timing::sent_ns`]
+    /// [`Timing::sent_ns`](takt_rt::record::Timing::sent_ns)
     pub sent: Latency,
     /// The axes in the order of the configuration.
     pub axes: Vec<AxisStatistics>,
@@ -176,7 +189,7 @@ impl Statistics {
         self.compute.add(timing.compute_ns);
         self.sent.add(timing.sent_ns);
         for (statistics, axis) in self.axes.iter_mut().zip(record.axes()) {
-            statistics.add(timing, record.phase, axis);
+            statistics.add(record, axis);
         }
     }
 }
@@ -184,7 +197,7 @@ impl Statistics {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use takt_rt::record::MAX_AXES;
+    use takt_rt::record::{MAX_AXES, Timing};
 
     fn record(slot: u64, phase: Phase, axis: AxisRecord) -> CycleRecord {
         CycleRecord {

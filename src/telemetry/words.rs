@@ -187,11 +187,17 @@ pub fn event(event: &Event, machine: &Machine) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::super::machine::SetPointMagnitudes;
     use super::*;
     use crate::telemetry::machine::{AxisDescription, BusDescription};
 
     fn machine() -> Machine {
-        let axis = |name: &str, unit| AxisDescription { name: name.to_owned(), unit, counts_per_unit: 1.0 };
+        let axis = |name: &str, unit| AxisDescription {
+            name: name.to_owned(),
+            unit,
+            counts_per_unit: 1.0,
+            limits: SetPointMagnitudes::default(),
+        };
         Machine {
             name: "arm".to_owned(),
             cycle_ns: 1_000_000,
@@ -246,13 +252,7 @@ mod tests {
                 "the drive of axis 9 did not reach operation enabled within 2000 cycles (2.0 s)",
             ),
             (Rule::BusLost, None, 0.0, 0.0, "bus left is bus-off or its interface is down"),
-            (
-                Rule::NotTransmitted,
-                None,
-                6.0,
-                0.0,
-                "set-points are not getting onto the wire: 6 frames still wait",
-            ),
+            (Rule::NotTransmitted, None, 6.0, 0.0, "set-points are not getting onto the wire for 6 cycles"),
         ];
         for (rule, axis, value, limit, words) in cases {
             assert_eq!(stop_cause(&reason(rule, axis, value, limit), &machine()), words);

@@ -27,6 +27,7 @@ pub fn parameters(node: u8) -> ErobParameters {
         peak_torque: 56.0,
         highest_velocity: 4.0,
         power_up_ns: 5 * MILLISECOND_NS,
+        feedback_delay_ns: 20_000,
         has_battery: true,
         has_interpolated_position: false,
         is_upload_segmented: false,
@@ -51,6 +52,7 @@ impl Bench {
         let rates = BitRates { nominal: 1_000_000, data: None };
         let bus = SimulatedBus::with_drives(rates, u64::MAX, drives);
         let mut bench = Self { bus, now_ns: 0, heard: vec![] };
+        bench.run_ns(0);
         bench.run_ms(10);
         bench.heard.clear();
         bench
@@ -185,7 +187,7 @@ impl Bench {
         assert_eq!(self.observe().state, takt_rt::cia402::State::OperationEnabled);
     }
 
-    pub fn observe(&self) -> Observation {
+    pub fn observe(&mut self) -> Observation {
         self.bus.observe(NODE).unwrap()
     }
 }

@@ -1,5 +1,12 @@
 //! The simulated bus and the simulated eRob joint, as a master sees them.
 
 mod bench;
+mod device;
+mod lengths;
 mod motion;
+mod network;
+mod port;
+mod process_data;
+mod profiles;
+mod sdo;
 mod vectors;

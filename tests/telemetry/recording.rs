@@ -50,6 +50,7 @@ fn every_field_of_every_record_can_be_read_by_the_schema_in_the_file() {
                 ("position", number(axis.position)),
                 ("velocity_set", number(axis.velocity_set)),
                 ("acceleration_set", number(axis.acceleration_set)),
+                ("jerk_set", number(axis.jerk_set)),
                 ("velocity", number(axis.velocity)),
                 ("torque_set", number(axis.torque_set)),
                 ("torque", number(axis.torque)),

@@ -5,7 +5,8 @@ use std::sync::{Arc, Mutex};
 
 use takt::controller::channels::{ChannelSizes, HostSide, LogSide, RtSide, channels};
 use takt::telemetry::{
-    AxisDescription, BusDescription, Destination, Logger, LoggerOptions, Machine, Notice, Unit, WallClock,
+    AxisDescription, BusDescription, Destination, Logger, LoggerOptions, Machine, Notice, SetPointMagnitudes,
+    Unit, WallClock,
 };
 use takt_rt::door::Door;
 use takt_rt::record::{AxisRecord, CycleRecord, Event, EventKind, MAX_AXES, Timing};
@@ -39,7 +40,12 @@ pub fn sides(records: usize) -> (RtSide, HostSide, LogSide) {
 }
 
 pub fn machine() -> Machine {
-    let axis = |name: &str, unit| AxisDescription { name: name.to_owned(), unit, counts_per_unit: 83_443.0 };
+    let axis = |name: &str, unit| AxisDescription {
+        name: name.to_owned(),
+        unit,
+        counts_per_unit: 83_443.0,
+        limits: SetPointMagnitudes { velocity: 2.0, acceleration: 10.0, jerk: 50.0 },
+    };
     Machine {
         name: "arm".to_owned(),
         cycle_ns: CYCLE_NS,
@@ -69,6 +75,7 @@ pub fn cycle(slot: u64) -> CycleRecord {
             position: step - 0.0625,
             velocity_set: 1.5,
             acceleration_set: -2.5,
+            jerk_set: 40.0,
             velocity: 1.25,
             torque_set: 7.5,
             torque: -8.5,

@@ -7,6 +7,8 @@ use takt_rt::plan::{Limits, Problem, State};
 pub enum Order {
     /// Acceleration.
     Second,
+    /// Jerk.
+    Third,
 }
 
 /// SplitMix64: small, and the same on every machine.
@@ -42,17 +44,25 @@ pub fn problems(seed: u64, axes: usize, order: Order) -> Vec<Problem> {
 }
 
 fn problem(random: &mut Random, order: Order) -> Problem {
-    let _ = order;
     loop {
         let (p0, pf) = (random.gaussian(4.0), random.gaussian(4.0));
-        let (v0, vf) = (random.sometimes(0.9), random.sometimes(0.7));
-        let velocity = random.uniform(0.1, 12.0) + f64::abs(vf);
-        let acceleration = random.uniform(0.1, 12.0);
-        if f64::abs(v0) <= velocity {
+        let (v0, mut a0, vf, mut af) =
+            (random.sometimes(0.9), random.sometimes(0.8), random.sometimes(0.7), random.sometimes(0.6));
+        let mut limit = |admitted: f64| random.uniform(0.1, 12.0) + f64::abs(admitted);
+        let (velocity, acceleration, mut jerk) = (limit(vf), limit(af), limit(0.0));
+        if order == Order::Second {
+            (a0, af, jerk) = (0.0, 0.0, f64::INFINITY);
+        }
+        let bound =
+            |velocity: f64, acceleration: f64| velocity + acceleration * acceleration.abs() / (2.0 * jerk);
+        let inside = |value: f64, limit: f64| value.abs() <= limit;
+        let start_inside =
+            inside(v0, velocity) && inside(a0, acceleration) && inside(bound(v0, a0), velocity);
+        if start_inside && inside(bound(vf, -af), velocity) {
             return Problem {
-                start: State { position: p0, velocity: v0, acceleration: 0.0 },
-                target: State { position: pf, velocity: vf, acceleration: 0.0 },
-                limits: Limits::symmetric(velocity, acceleration, f64::INFINITY),
+                start: State { position: p0, velocity: v0, acceleration: a0 },
+                target: State { position: pf, velocity: vf, acceleration: af },
+                limits: Limits::symmetric(velocity, acceleration, jerk),
             };
         }
     }

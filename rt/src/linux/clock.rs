@@ -63,6 +63,11 @@ pub(super) fn monotonic_ns() -> Nanoseconds {
     read_clock(libc::CLOCK_MONOTONIC)
 }
 
+/// The time of day, which may be set while the program runs.
+pub(super) fn real_time_ns() -> Nanoseconds {
+    read_clock(libc::CLOCK_REALTIME)
+}
+
 /// Reads a clock of the kernel.
 fn read_clock(clock: libc::clockid_t) -> Nanoseconds {
     let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
@@ -72,18 +77,23 @@ fn read_clock(clock: libc::clockid_t) -> Nanoseconds {
 }
 
 /// A kernel time as nanoseconds; what lies before zero is zero.
-fn nanoseconds_of(time: &libc::timespec) -> Nanoseconds {
+pub(super) fn nanoseconds_of(time: &libc::timespec) -> Nanoseconds {
     let seconds = u64::try_from(time.tv_sec).unwrap_or(0);
     let nanoseconds = u64::try_from(time.tv_nsec).unwrap_or(0);
     seconds.saturating_mul(NANOSECONDS_PER_SECOND).saturating_add(nanoseconds)
 }
 
+/// Nanoseconds as a kernel time.
+pub(super) fn timespec_of(time_ns: Nanoseconds) -> libc::timespec {
+    libc::timespec {
+        tv_sec: libc::time_t::try_from(time_ns / NANOSECONDS_PER_SECOND).unwrap_or(libc::time_t::MAX),
+        tv_nsec: (time_ns % NANOSECONDS_PER_SECOND) as libc::c_long,
+    }
+}
+
 /// Sleeps until the clock reads `deadline_ns`; a signal handled meanwhile does not end the sleep.
 fn sleep_until(deadline_ns: Nanoseconds) {
-    let time = libc::timespec {
-        tv_sec: libc::time_t::try_from(deadline_ns / NANOSECONDS_PER_SECOND).unwrap_or(libc::time_t::MAX),
-        tv_nsec: (deadline_ns % NANOSECONDS_PER_SECOND) as libc::c_long,
-    };
+    let time = timespec_of(deadline_ns);
     // SAFETY: `time` is a valid time for reading; an absolute sleep writes no remainder, so null is allowed.
     // The loop ends: the time is absolute, and every other error is returned without sleeping (the caller spins).
     while unsafe {

@@ -2,10 +2,12 @@
 //!
 //! - [`MonotonicClock`]: absolute sleep, then spin; [`SpinGuard`] computes how long the spin must be.
 //! - [`RealtimeThread`]: elevates the calling thread step by step and keeps what came of each step.
+//! - [`SocketCanPort`]: a raw CAN socket as a bus port.
 //!
 //! Nothing here formats, allocates or decides: refusals are plain data, and the user's side puts them in words.
 #![allow(unsafe_code)] // System calls cannot be made without it; every one says why it is sound.
 
+mod can;
 mod clock;
 mod kernel;
 mod latency;
@@ -15,6 +17,7 @@ mod spin_guard;
 mod step;
 mod thread;
 
+pub use can::SocketCanPort;
 pub use clock::MonotonicClock;
 pub use kernel::{is_preempt_rt, is_preempt_rt_version};
 pub use memory::{PREFAULT_LIMIT_BYTES, PageFaults};

@@ -71,14 +71,13 @@ pub enum PlanError {
         /// The position limit that would be left.
         limit: Limit,
     },
-    /// The numbers are so large or so small that the trajectory cannot be represented.
-    NotRepresentable {
+    /// The axis is not in proportion to the others, so the motion is not on a straight line.
+    NotStraight {
         /// The axis.
         axis: usize,
     },
-    /// Jerk-limited trajectories need a finite [`Limits::jerk_max`](super::Limits::jerk_max); only the
-    /// second-order case (`f64::INFINITY`) is planned.
-    JerkLimited {
+    /// The numbers are so large or so small that the trajectory cannot be represented.
+    NotRepresentable {
         /// The axis.
         axis: usize,
     },
@@ -101,8 +100,8 @@ impl PlanError {
             | Self::InvalidLimit { axis, .. }
             | Self::TargetBeyondLimit { axis, .. }
             | Self::PositionBeyondLimit { axis, .. }
-            | Self::NotRepresentable { axis }
-            | Self::JerkLimited { axis } => *axis = index,
+            | Self::NotStraight { axis }
+            | Self::NotRepresentable { axis } => *axis = index,
             Self::LengthMismatch { .. } | Self::InvalidTiming => {}
         }
         self

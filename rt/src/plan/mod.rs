@@ -18,14 +18,20 @@
 //! The planner allocates nothing, panics on nothing and always ends: the number of steps has a fixed bound.
 
 mod error;
+mod group;
+mod jerk_limited;
 mod problem;
 mod profile;
+mod straight;
 mod synchronisation;
+mod tracking;
 mod trapezoid;
+mod travel;
 
 pub use error::{Limit, PlanError, Quantity};
+pub use group::{GroupState, Refusal, Trajectory};
 pub use problem::{Limits, Problem, State};
 pub use profile::{Blocked, Extrema, PHASES_MAX, Phase, Profile, Range};
 pub use synchronisation::{
-    Synchronisation, Timing, position, stop, synchronised, synchronised_velocity, velocity,
+    Return, Synchronisation, Timing, position, stop, synchronised, synchronised_velocity, velocity,
 };

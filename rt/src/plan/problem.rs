@@ -77,12 +77,22 @@ impl Limits {
         self
     }
 
+    /// Whether the jerk is unlimited.
+    pub(super) fn is_second_order(&self) -> bool {
+        self.jerk_max == f64::INFINITY
+    }
+
     /// Checks signs and finiteness.
     ///
     /// # Errors
     /// [`PlanError::InvalidLimit`] with axis 0 and the first limit that cannot be kept by any motion.
     pub fn validate(&self) -> Result<(), PlanError> {
-        let positive = |value: f64| value > 0.0 && value.is_finite();
+        let positive = |value: f64| value > 0.0 && value < f64::INFINITY;
+        let velocity = positive(self.velocity_max) & positive(-self.velocity_min);
+        let acceleration = positive(self.acceleration_max) & positive(-self.acceleration_min);
+        if velocity & acceleration & (self.jerk_max > 0.0) & (self.position_min < self.position_max) {
+            return Ok(());
+        }
         let checks = [
             (positive(self.velocity_max), Limit::VelocityMax),
             (positive(-self.velocity_min), Limit::VelocityMin),
@@ -99,6 +109,12 @@ impl Limits {
     }
 }
 
+/// Larger numbers are refused: their powers would leave the range of `f64`.
+pub(super) const SIZE_MAX: f64 = 1e100;
+
+/// Relative to a limit, being beyond it by this much is rounding.
+const ROUNDING: f64 = 1e-13;
+
 /// From where to where, within which limits: the problem of one axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Problem {
@@ -114,8 +130,14 @@ impl Problem {
     /// Checks that every number is finite, the limits are limits, and the target keeps them.
     pub(super) fn validate(&self) -> Result<(), PlanError> {
         self.limits.validate()?;
-        let second_order = self.limits.jerk_max == f64::INFINITY;
+        let second_order = self.limits.is_second_order();
         let (start, target) = (&self.start, &self.target);
+        let sum = start.position.abs() + start.velocity.abs() + target.position.abs() + target.velocity.abs();
+        let accelerations =
+            if second_order { 0.0 } else { start.acceleration.abs() + target.acceleration.abs() };
+        if sum + accelerations < SIZE_MAX {
+            return self.validate_target(second_order);
+        }
         let finite = |value: f64, quantity| {
             if value.is_finite() { Ok(()) } else { Err(PlanError::NotFinite { axis: 0, quantity }) }
         };
@@ -127,7 +149,7 @@ impl Problem {
             finite(start.acceleration, Quantity::StartAcceleration)?;
             finite(target.acceleration, Quantity::TargetAcceleration)?;
         }
-        self.validate_target(second_order)
+        Err(PlanError::NotRepresentable { axis: 0 })
     }
 
     fn validate_target(&self, second_order: bool) -> Result<(), PlanError> {
@@ -148,5 +170,22 @@ impl Problem {
             }
         }
         Ok(())
+    }
+    /// Checks that the target can be reached without breaking a velocity limit just before.
+    pub(super) fn validate_approach(&self) -> Result<(), PlanError> {
+        let (target, limits) = (&self.target, &self.limits);
+        if limits.is_second_order() {
+            return Ok(());
+        }
+        // At least this was the velocity when the jerk began to build up the acceleration.
+        let before =
+            target.velocity - 0.5 * target.acceleration * target.acceleration.abs() / limits.jerk_max;
+        if before > limits.velocity_max * (1.0 + ROUNDING) {
+            Err(PlanError::TargetBeyondLimit { axis: 0, limit: Limit::VelocityMax })
+        } else if before < limits.velocity_min * (1.0 + ROUNDING) {
+            Err(PlanError::TargetBeyondLimit { axis: 0, limit: Limit::VelocityMin })
+        } else {
+            Ok(())
+        }
     }
 }

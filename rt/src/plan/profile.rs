@@ -1,7 +1,7 @@
 //! The trajectory of one axis: phases of constant jerk.
 
 use super::error::PlanError;
-use super::problem::State;
+use super::problem::{SIZE_MAX, State};
 
 /// The most phases a profile can have: two of the brake, and those of two seven-phase profiles laid over
 /// each other.
@@ -93,6 +93,7 @@ struct Coefficients {
 
 const NO_PHASE: Coefficients = Coefficients { start: State::rest(0.0), jerk: 0.0 };
 
+#[inline]
 fn integrate(start: &State, jerk: f64, elapsed_s: f64) -> State {
     let State { position, velocity, acceleration } = *start;
     State {
@@ -138,6 +139,7 @@ impl Profile {
     ///
     /// Before the start it is the start state. At the end it is exactly the target state, and from then on
     /// the axis goes on with the target velocity and without acceleration.
+    #[inline]
     pub fn sample(&self, time_s: f64) -> State {
         if time_s >= self.duration_s {
             let State { position, velocity, acceleration } = self.end;
@@ -149,9 +151,11 @@ impl Profile {
             };
         }
         let time_s = if time_s > 0.0 { time_s } else { 0.0 };
+        // A binary search over 16 start times, without a branch to guess.
         let mut index = 0;
-        for start_s in self.starts_s.iter().skip(1) {
-            index += usize::from(*start_s <= time_s);
+        for step in [8, 4, 2, 1] {
+            let begun = self.starts_s.get(index + step).is_some_and(|start_s| *start_s <= time_s);
+            index += if begun { step } else { 0 };
         }
         match (self.phases.get(index), self.starts_s.get(index)) {
             (Some(phase), Some(start_s)) => integrate(&phase.start, phase.jerk, time_s - start_s),
@@ -228,7 +232,9 @@ impl Extrema {
 impl Profile {
     /// Forgets the phases and starts at this state. What durations are possible is kept.
     pub(super) fn begin(&mut self, start: State) {
-        self.starts_s = [f64::INFINITY; PHASES_MAX];
+        for start_s in self.starts_s.iter_mut().take(self.count) {
+            *start_s = f64::INFINITY;
+        }
         self.count = 0;
         self.duration_s = 0.0;
         self.end = start;
@@ -239,7 +245,17 @@ impl Profile {
         self.append(duration_s, acceleration, 0.0);
     }
 
-    /// Appends a phase that starts with this acceleration, and gives the state behind it.
+    /// Appends a phase of constant jerk; one that is not longer than 0 s is left out.
+    pub(super) fn shift(&mut self, duration_s: f64, jerk: f64) {
+        self.append(duration_s, self.end.acceleration, jerk);
+    }
+
+    /// Takes away what rounding has put the acceleration beyond its limits.
+    pub(super) fn limit_acceleration(&mut self, min: f64, max: f64) {
+        self.end.acceleration = self.end.acceleration.clamp(min, max);
+    }
+
+    /// Appends a phase that starts with this acceleration.
     fn append(&mut self, duration_s: f64, acceleration: f64, jerk: f64) {
         self.end.acceleration = acceleration;
         if duration_s <= 0.0 {
@@ -266,7 +282,7 @@ impl Profile {
         let reached = self.end;
         self.end = target;
         self.duration_s = duration_s;
-        let finite = duration_s.is_finite() && reached.position.is_finite() && reached.velocity.is_finite();
+        let finite = duration_s < SIZE_MAX && reached.position.is_finite() && reached.velocity.is_finite();
         if finite { Ok(()) } else { Err(PlanError::NotRepresentable { axis: 0 }) }
     }
 
@@ -290,5 +306,48 @@ impl Profile {
             *slot = Blocked { after_s, before_s };
             self.blocked_count += 1;
         }
+    }
+
+    /// Stretches the profile in space, from this start to this target.
+    pub(super) fn scale(&mut self, ratio: f64, start_position: f64, target: State) {
+        let from = self.start().position;
+        for phase in self.phases.iter_mut().take(self.count) {
+            let State { position, velocity, acceleration } = phase.start;
+            phase.start = State {
+                position: start_position + ratio * (position - from),
+                velocity: ratio * velocity,
+                acceleration: ratio * acceleration,
+            };
+            phase.jerk *= ratio;
+        }
+        self.end = target;
+    }
+
+    /// What durations are possible.
+    pub(super) fn possible(&self) -> (f64, ([Blocked; BLOCKED_MAX], usize)) {
+        (self.minimum_duration_s, (self.blocked, self.blocked_count))
+    }
+
+    /// Sets what durations are possible.
+    pub(super) fn set_possible(&mut self, minimum_duration_s: f64, blocked: ([Blocked; BLOCKED_MAX], usize)) {
+        self.minimum_duration_s = minimum_duration_s;
+        (self.blocked, self.blocked_count) = blocked;
+    }
+
+    /// At rest at its end, the profile stays there until this time.
+    pub(super) fn rest_until(&mut self, time_s: f64) {
+        let target = self.end;
+        self.append(time_s - self.duration_s, 0.0, 0.0);
+        self.end = target;
+        self.duration_s = self.duration_s.max(time_s);
+    }
+
+    /// Goes on with this profile, which starts where this one ends.
+    pub(super) fn join(&mut self, next: &Self) {
+        for phase in next.phases() {
+            self.end = phase.start;
+            self.append(phase.duration_s, phase.start.acceleration, phase.jerk);
+        }
+        self.end = next.end;
     }
 }

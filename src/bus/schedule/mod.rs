@@ -5,9 +5,18 @@
 //! sent before the next SYNC (`slot`)? The second decides about process data, since their moments in the slot are
 //! known; the first about all else.
 //!
-//! Emergency messages are not part of the sums: a drive that sends one has stopped obeying, the group stops, and what
-//! one such frame delays by a cycle does no harm. The effect of one is shown beside the regular case.
+//! Emergency messages are not part of the sums. A drive that sends one has stopped obeying or is about to, the group
+//! stops, and one such frame does no harm: feedback that misses the command phase is one missed cycle of the several
+//! that `missed_feedback_cycles` allows, and set-points that are pushed beyond the slot are sent before the SYNC that
+//! then leaves late. To demand room for an emergency in every slot would cost every third eRob its place on a bus at
+//! 1 ms. What one does to a slot is shown beside the regular case ([`EmergencyEffect`]).
+//!
+//! The sums are those of a punctual controller, and what they leave is shown as its reserve; a fit with less than
+//! [`WAKE_UP_RESERVE_NS`] (and [`COMPUTE_RESERVE_NS`] before the set-points) is called narrow, not refused, since what
+//! is enough depends on the machine: `takt jitter` measures it.
 
+mod bound;
+mod command_phase;
 mod messages;
 mod remedy;
 mod response_time;
@@ -19,8 +28,10 @@ use thiserror::Error;
 
 use super::frame_time::{BitRates, worst_case_bits};
 use crate::config::Config;
+use bound::Traffic;
 use messages::BusMessage;
 
+pub use command_phase::{NoCommandPhase, automatic_command_phase};
 pub use messages::MessageKind;
 pub use remedy::Remedy;
 pub use response_time::{Message, response_time};
@@ -43,6 +54,8 @@ pub struct BusSchedule {
     pub load_percent: f64,
     /// The worst slot.
     pub slot: Slot,
+    /// What one emergency message does to that slot; `None` on a bus without drives.
+    pub emergency: Option<EmergencyEffect>,
     /// What does not fit; empty when all does.
     pub shortfalls: Vec<Shortfall>,
     /// What would make it fit; empty when it does.
@@ -54,10 +67,51 @@ impl BusSchedule {
     pub fn fits(&self) -> bool {
         self.shortfalls.is_empty()
     }
+
+    /// Whether it fits with less reserve than a controller can be expected to need.
+    pub fn is_narrow(&self) -> bool {
+        let is_sync_narrow = self.slot.sync_reserve_ns < WAKE_UP_RESERVE_NS;
+        let is_rest_narrow = self.slot.set_points_reserve_ns < WAKE_UP_RESERVE_NS + COMPUTE_RESERVE_NS;
+        self.fits() && (is_sync_narrow || is_rest_narrow)
+    }
+}
+
+/// The wake-up latency that a slot should allow for: somewhat more than the worst of a PREEMPT_RT kernel on a machine
+/// that is set up for it.
+pub const WAKE_UP_RESERVE_NS: u64 = 20_000;
+/// What a slot should allow for between the second wake-up and the set-points in the queue: receiving, computing and
+/// the system calls.
+pub const COMPUTE_RESERVE_NS: u64 = 20_000;
+
+/// What one emergency message does to the worst slot.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct EmergencyEffect {
+    /// How long it is on the wire.
+    pub transmission_ns: u64,
+    /// By how much feedback can then miss the command phase; 0 where it is still in time.
+    pub feedback_late_ns: u64,
+    /// By how much the next SYNC can then be late, behind the last of what was queued before it; 0 where it is not.
+    pub next_sync_late_ns: u64,
+}
+
+impl EmergencyEffect {
+    /// Whether it finds room in the slot.
+    pub fn fits(self) -> bool {
+        self.feedback_late_ns == 0 && self.next_sync_late_ns == 0
+    }
+
+    fn on(slot: &Slot, command_phase_ns: u64) -> Option<Self> {
+        let transmission_ns = slot.emergency_ns;
+        (transmission_ns > 0).then(|| Self {
+            transmission_ns,
+            feedback_late_ns: (slot.feedback_done_ns + transmission_ns).saturating_sub(command_phase_ns),
+            next_sync_late_ns: transmission_ns.saturating_sub(slot.set_points_reserve_ns),
+        })
+    }
 }
 
 /// What was found out about one message. Times are in ns.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct MessageSchedule {
     /// What it is.
     pub kind: MessageKind,
@@ -80,9 +134,11 @@ pub struct MessageSchedule {
     /// The longest time from the event that queues it until it has been received; `None` where there is no bound, or
     /// where it is not sent while the axes are enabled.
     pub response_ns: Option<u64>,
-    /// The same while one drive sends an emergency message.
-    pub response_with_emergency_ns: Option<u64>,
-    /// The longest response time that does no harm; `None` where any does none.
+    /// The latest moment, counted from the start of the slot, at which it has arrived; `None` where it is not tied to
+    /// a moment in the slot.
+    pub in_slot_ns: Option<u64>,
+    /// What `in_slot_ns`, or the response time where that is `None`, must not exceed; `None` where being late does no
+    /// harm.
     pub deadline_ns: Option<u64>,
 }
 
@@ -146,6 +202,7 @@ pub fn verify(config: &Config) -> Result<Vec<BusSchedule>, ScheduleError> {
 
 fn analyse_bus(config: &Config, index: usize) -> BusSchedule {
     let bus = config.buses.get(index);
+    let cycle = config.cycle;
     let bit_rate = bus.map_or(0, |bus| bus.bit_rate);
     let rates =
         BitRates { nominal: bit_rate, data: bus.and_then(|bus| bus.data_bit_rate).unwrap_or(bit_rate) };
@@ -154,21 +211,20 @@ fn analyse_bus(config: &Config, index: usize) -> BusSchedule {
     let is_sent_while_enabled = |message: &BusMessage| allows_sdo || !message.kind.is_sdo();
     let enabled: Vec<&BusMessage> = all.iter().filter(|message| is_sent_while_enabled(message)).collect();
 
-    let feedback_delay_ns = config
-        .axes
-        .iter()
-        .filter(|axis| axis.bus == index)
-        .map(|axis| axis.feedback_delay_ns)
-        .max()
-        .unwrap_or(0);
-    let service_frames = bus.map_or(0, |bus| bus.service_frames_per_cycle);
-    let slot = slot::worst_slot(&enabled, feedback_delay_ns, service_frames, config.cycle, rates);
-    let first_emergency = all.iter().position(|message| message.kind == MessageKind::Emergency);
+    let on_bus = config.axes.iter().filter(|axis| axis.bus == index);
+    let feedback_delay_ns = on_bus.map(|axis| axis.feedback_delay_ns).max().unwrap_or(0);
+    let slot = slot::worst_slot(&enabled, feedback_delay_ns, cycle, rates);
+    let is_queue_empty_at_sync = slot.is_queue_empty_at_sync;
+    let response_ns = |at: usize| {
+        let (messages, place) = beside(&enabled, at);
+        Traffic { messages: &messages, is_queue_empty_at_sync, rates }.response_time(place)
+    };
     let messages: Vec<MessageSchedule> = all
         .iter()
-        .enumerate()
-        .map(|(at, message)| {
+        .map(|message| {
             let bits = worst_case_bits(message.shape);
+            let at = enabled.iter().position(|other| std::ptr::eq(*other, message));
+            let (in_slot_ns, deadline_ns) = in_slot(message, &enabled, &slot, config, rates);
             MessageSchedule {
                 kind: message.kind,
                 axis: message.axis.and_then(|axis| config.axes.get(axis)).map(|axis| axis.name.clone()),
@@ -178,23 +234,47 @@ fn analyse_bus(config: &Config, index: usize) -> BusSchedule {
                 period_ns: message.period_ns,
                 jitter_ns: message.jitter_ns,
                 transmission_ns: rates.duration_ns(bits),
-                is_sent_while_enabled: is_sent_while_enabled(message),
-                response_ns: response(&all, at, allows_sdo, None, rates),
-                response_with_emergency_ns: response(&all, at, allows_sdo, first_emergency, rates),
-                deadline_ns: message.deadline_ns,
+                is_sent_while_enabled: at.is_some(),
+                response_ns: at.and_then(response_ns),
+                in_slot_ns,
+                deadline_ns,
             }
         })
         .collect();
     BusSchedule {
         name: bus.map(|bus| bus.name.clone()).unwrap_or_default(),
         bit_rate,
-        period_ns: config.cycle.period_ns,
-        command_phase_ns: config.cycle.command_phase_ns,
+        period_ns: cycle.period_ns,
+        command_phase_ns: cycle.command_phase_ns,
         load_percent: load_percent(&messages),
         shortfalls: shortfalls(&messages, &slot, config),
         messages,
         slot,
+        emergency: EmergencyEffect::on(&slot, cycle.command_phase_ns),
         remedies: vec![],
+    }
+}
+
+/// When a message has arrived in the slot, if it has a moment there, and when it must have.
+fn in_slot(
+    message: &BusMessage,
+    all: &[&BusMessage],
+    slot: &Slot,
+    config: &Config,
+    rates: BitRates,
+) -> (Option<u64>, Option<u64>) {
+    let cycle = config.cycle;
+    match message.kind {
+        // Its lateness is part of the feedback's.
+        MessageKind::Sync => (Some(slot.wait_before_sync_ns + slot.sync_ns), None),
+        MessageKind::Feedback => (Some(slot.feedback_done_ns), Some(cycle.command_phase_ns)),
+        MessageKind::SetPoint => {
+            let up_to = all.iter().filter(|other| other.kind == message.kind && other.axis <= message.axis);
+            let sent_ns: u64 = up_to.map(|other| rates.duration_ns(worst_case_bits(other.shape))).sum();
+            let done_ns = cycle.command_phase_ns + slot.wait_before_set_points_ns + sent_ns;
+            (Some(done_ns), Some(cycle.period_ns))
+        }
+        _ => (None, message.deadline_ns),
     }
 }
 
@@ -225,29 +305,11 @@ fn shortfalls(messages: &[MessageSchedule], slot: &Slot, config: &Config) -> Vec
     feedback.into_iter().chain(set_points).chain(others).collect()
 }
 
-/// The response time of one message among those that are sent while the axes are enabled. An emergency is looked at
-/// as the only one of its kind; for the others the one at `emergency` comes in addition.
-fn response(
-    all: &[BusMessage],
-    at: usize,
-    allows_sdo: bool,
-    emergency: Option<usize>,
-    rates: BitRates,
-) -> Option<u64> {
-    let own = all.get(at)?;
-    let is_counted = |index: usize, message: &BusMessage| match message.kind {
-        MessageKind::Emergency if own.kind == MessageKind::Emergency => index == at,
-        MessageKind::Emergency => emergency == Some(index),
-        kind => allows_sdo || !kind.is_sdo(),
-    };
-    let counted = || all.iter().enumerate().filter(|(index, message)| is_counted(*index, message));
-    let set: Vec<Message> = counted()
-        .map(|(_, message)| Message {
-            period_ns: message.period_ns,
-            jitter_ns: message.jitter_ns,
-            transmission_ns: rates.duration_ns(worst_case_bits(message.shape)),
-        })
-        .collect();
-    let place = counted().position(|(index, _)| index == at)?;
-    response_time(&set, place, rates.bit_ns())
+/// The messages that the response time of one is found among: an emergency is looked at as the only one, and the
+/// others without any. Gives the place of the message there too.
+fn beside<'a>(all: &[&'a BusMessage], at: usize) -> (Vec<&'a BusMessage>, usize) {
+    let counts = |index: usize, message: &BusMessage| index == at || message.kind != MessageKind::Emergency;
+    let counted = || all.iter().enumerate().filter(|(index, message)| counts(*index, message));
+    let place = counted().take_while(|(index, _)| *index < at).count();
+    (counted().map(|(_, message)| *message).collect(), place)
 }

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use super::messages::MessageKind;
-use super::{BusSchedule, Remedy, Shortfall};
+use super::{BusSchedule, COMPUTE_RESERVE_NS, Remedy, Shortfall, WAKE_UP_RESERVE_NS};
 
 /// A length of time in microseconds.
 pub fn microseconds(ns: u64) -> String {
@@ -25,6 +25,12 @@ pub fn message_name(kind: MessageKind) -> &'static str {
     }
 }
 
+/// The terms that are not zero, with a plus between them.
+fn sum(terms: &[(u64, &str)]) -> String {
+    let shown = terms.iter().filter(|(ns, _)| *ns > 0);
+    shown.map(|(ns, what)| format!("{} {what}", microseconds(*ns))).collect::<Vec<_>>().join(" + ")
+}
+
 /// The sums of the worst slot, one line each.
 pub fn sums(bus: &BusSchedule) -> Vec<String> {
     let slot = &bus.slot;
@@ -37,34 +43,77 @@ pub fn sums(bus: &BusSchedule) -> Vec<String> {
         }
     };
     let process_data = format!(
-        "process data  {} µs = {} SYNC + {} feedback + {} set-points, in {} µs",
+        "process data  {} µs = {}, in {} µs",
         us(slot.process_data_ns),
-        us(slot.sync_ns),
-        us(slot.feedback_ns),
-        us(slot.set_points_ns),
+        sum(&[(slot.sync_ns, "SYNC"), (slot.feedback_ns, "feedback"), (slot.set_points_ns, "set-points")]),
         us(bus.period_ns),
     );
     let feedback = format!(
-        "feedback      {} µs = {} wait + {} SYNC + {} drives' delay + {} wait + {} frames; command phase at {} µs: {}",
+        "feedback      {} µs = {}; command phase at {} µs: {}",
         us(slot.feedback_done_ns),
-        us(slot.wait_before_sync_ns),
-        us(slot.sync_ns),
-        us(slot.feedback_delay_ns),
-        us(slot.wait_before_feedback_ns),
-        us(slot.feedback_ns),
+        sum(&[
+            (slot.wait_before_sync_ns, "wait"),
+            (slot.sync_ns, "SYNC"),
+            (slot.feedback_delay_ns, "drives' delay"),
+            (slot.wait_before_feedback_ns, "wait"),
+            (slot.feedback_ns, "feedback"),
+        ]),
         us(bus.command_phase_ns),
         verdict(slot.feedback_done_ns, bus.command_phase_ns),
     );
     let set_points = format!(
-        "set-points    {} µs = {} command phase + {} wait + {} frames; next SYNC at {} µs: {}",
+        "set-points    {} µs = {}; next SYNC at {} µs: {}",
         us(slot.set_points_done_ns),
-        us(bus.command_phase_ns),
-        us(slot.wait_before_set_points_ns),
-        us(slot.set_points_ns),
+        sum(&[
+            (bus.command_phase_ns, "command phase"),
+            (slot.wait_before_set_points_ns, "wait"),
+            (slot.set_points_ns, "set-points")
+        ]),
         us(bus.period_ns),
         verdict(slot.set_points_done_ns, bus.period_ns),
     );
     vec![process_data, feedback, set_points]
+}
+
+/// What is left of the slot: for the controller, and for an emergency. Says nothing of a bus that does not fit.
+pub fn reserve(bus: &BusSchedule) -> Vec<String> {
+    if !bus.fits() {
+        return vec![];
+    }
+    let slot = &bus.slot;
+    let us = microseconds;
+    let mut lines = vec![format!(
+        "reserve       SYNC may leave {} µs late; set-points may take {} µs for wake-up latency and computing",
+        us(slot.sync_reserve_ns),
+        us(slot.set_points_reserve_ns),
+    )];
+    lines.extend(bus.emergency.map(|emergency| {
+        let effect = if emergency.fits() {
+            "finds room too".to_owned()
+        } else {
+            let feedback = (emergency.feedback_late_ns > 0).then(|| {
+                format!("feedback up to {} µs late, a missed cycle", us(emergency.feedback_late_ns))
+            });
+            let sync = (emergency.next_sync_late_ns > 0)
+                .then(|| format!("the next SYNC up to {} µs late", us(emergency.next_sync_late_ns)));
+            let effects: Vec<_> = feedback.into_iter().chain(sync).collect();
+            format!("makes {} (it is harmless once)", effects.join(", "))
+        };
+        format!("emergency     one of {} µs {effect}", us(emergency.transmission_ns))
+    }));
+    lines
+}
+
+/// Why a fit is narrow.
+pub fn narrow(bus: &BusSchedule) -> Option<String> {
+    let us = microseconds;
+    bus.is_narrow().then(|| {
+        format!(
+            "less reserve than a controller should have: {} µs for SYNC, {} µs for wake-up and computing",
+            us(WAKE_UP_RESERVE_NS),
+            us(WAKE_UP_RESERVE_NS + COMPUTE_RESERVE_NS),
+        )
+    })
 }
 
 /// What does not fit.
@@ -100,7 +149,18 @@ pub fn remedy(remedy: &Remedy) -> String {
         Remedy::DriveHeartbeatsOff => {
             "no heartbeats of the drives, whose feedback shows that they live: heartbeat = \"off\"".to_owned()
         }
-        Remedy::SmallerFeedback => "statusword and position only: feedback = []".to_owned(),
+        Remedy::ServiceFrames { frames } => {
+            format!("fewer service frames: service_frames_per_cycle = {frames}")
+        }
+        Remedy::SmallerFeedback { without } => {
+            let words: Vec<_> = without.iter().map(|object| format!("{:?}", object.word())).collect();
+            format!("feedback without {}", words.join(", "))
+        }
+        Remedy::MasterHeartbeatOff => {
+            "no heartbeat of the controller, though no drive then notices that it has \
+                                       died: [master] heartbeat = \"off\""
+                .to_owned()
+        }
         Remedy::MoreBuses { axes_per_bus, buses } => {
             format!("{buses} buses: {axes_per_bus} of these axes fit one")
         }
@@ -121,11 +181,50 @@ pub(super) fn refusal(buses: &[BusSchedule]) -> String {
         for line in bus.shortfalls.iter().map(shortfall) {
             let _ = writeln!(text, "  {line}");
         }
-        let remedies: Vec<_> = bus.remedies.iter().map(|way| format!("    - {}", remedy(way))).collect();
-        if remedies.is_empty() {
-            let _ = writeln!(text, "  no single change that was tried makes it fit");
-        } else {
-            let _ = writeln!(text, "  what would fit:\n{}", remedies.join("\n"));
+        write_remedies(&mut text, &bus.remedies);
+    }
+    text.truncate(text.trim_end().len());
+    text
+}
+
+fn write_remedies(text: &mut String, remedies: &[Remedy]) {
+    let lines: Vec<_> = remedies.iter().map(|way| format!("    - {}", remedy(way))).collect();
+    if lines.is_empty() {
+        let _ = writeln!(text, "  no single change that was tried makes it fit");
+    } else {
+        let _ = writeln!(text, "  what would fit:\n{}", lines.join("\n"));
+    }
+}
+
+/// Why there is no command phase: for each bus that is a cause, from when to when it would have to be.
+pub(super) fn no_command_phase(buses: &[BusSchedule]) -> String {
+    let us = microseconds;
+    let mut text = String::new();
+    for bus in buses {
+        let slot = &bus.slot;
+        let latest = match bus.period_ns.checked_sub(slot.after_command_phase_ns) {
+            Some(latest_ns) => format!("at {} µs at the latest", us(latest_ns)),
+            None => "never early enough".to_owned(),
+        };
+        let _ = writeln!(
+            text,
+            "the bus {:?} needs it at {} µs at the earliest ({}), {latest} ({} period - {} until the next SYNC)",
+            bus.name,
+            us(slot.earliest_command_phase_ns),
+            sum(&[
+                (slot.sync_ns, "SYNC"),
+                (slot.feedback_delay_ns, "drives' delay"),
+                (slot.feedback_ns, "feedback"),
+                (
+                    slot.earliest_command_phase_ns - slot.sync_ns - slot.feedback_delay_ns - slot.feedback_ns,
+                    "waits"
+                ),
+            ]),
+            us(bus.period_ns),
+            us(slot.after_command_phase_ns),
+        );
+        if slot.command_phases_ns.is_none() {
+            write_remedies(&mut text, &bus.remedies);
         }
     }
     text.truncate(text.trim_end().len());

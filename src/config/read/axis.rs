@@ -434,13 +434,7 @@ fn torque_loop(mut section: Section<'_>, q: Quantities, joint: &SimulatedJoint) 
 }
 
 fn feedback(section: &mut Section<'_>) -> Vec<Feedback> {
-    let choices = [
-        ("operation_mode", Feedback::OperationMode),
-        ("velocity", Feedback::Velocity),
-        ("torque", Feedback::Torque),
-        ("current", Feedback::Current),
-        ("error_code", Feedback::ErrorCode),
-    ];
+    let choices = Feedback::ALL.map(|feedback| (feedback.word(), feedback));
     let mut feedback = vec![];
     for entry in section.get("feedback").and_then(|entry| entry.list()).into_iter().flatten() {
         let Some(object) = entry.choice(&choices) else { continue };

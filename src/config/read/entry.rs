@@ -31,6 +31,10 @@ impl<'a> Problems<'a> {
         self.found.borrow_mut().push(Problem { kind, span: Some(span), first_line });
     }
 
+    pub fn is_empty(&self) -> bool {
+        self.found.borrow().is_empty()
+    }
+
     pub fn into_vec(self) -> Vec<Problem> {
         self.found.into_inner()
     }

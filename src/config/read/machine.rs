@@ -4,14 +4,17 @@ use std::path::PathBuf;
 
 use super::entry::{Bounds, Entry};
 use super::section::Section;
+use crate::bus::schedule::automatic_command_phase;
 use crate::config::defaults;
-use crate::config::model::{Cycle, Master, Realtime, Simulation, Telemetry};
+use crate::config::error::ProblemKind;
+use crate::config::model::{Config, Cycle, Master, Realtime, Simulation, Telemetry};
 use crate::config::quantity::Quantity;
 
 /// The cycle must leave room on both sides of the command phase.
 const COMMAND_PHASE_RANGE: (f64, f64) = (0.05, 0.95);
 
-pub fn cycle(mut section: Section<'_>) -> Cycle {
+/// The cycle, and where the file leaves its command phase to the analysis of the buses.
+pub fn cycle(mut section: Section<'_>) -> (Cycle, Option<Entry<'_>>) {
     let period = section.get("period");
     let period_ns = period.as_ref().and_then(|entry| entry.nanoseconds(250e-6, 0.1));
     if let (Some(entry), Some(ns)) = (&period, period_ns)
@@ -21,10 +24,21 @@ pub fn cycle(mut section: Section<'_>) -> Cycle {
         entry.report_range(Quantity::DURATION.show(ns as f64 / 1e9), "whole microseconds".to_owned());
     }
     let period_ns = period_ns.unwrap_or(defaults::PERIOD_NS);
-    let command_phase = section.get("command_phase").and_then(|entry| fraction_of_period(&entry, period_ns));
+    let (automatic, command_phase) = match section.get("command_phase") {
+        Some(entry) if entry.is_word("auto") => (Some(entry), None),
+        entry => (None, entry.and_then(|entry| fraction_of_period(&entry, period_ns))),
+    };
     section.finish();
     let default_phase = (defaults::COMMAND_PHASE * period_ns as f64).round() as u64;
-    Cycle { period_ns, command_phase_ns: command_phase.unwrap_or(default_phase) }
+    (Cycle { period_ns, command_phase_ns: command_phase.unwrap_or(default_phase) }, automatic)
+}
+
+/// Resolves `command_phase = "auto"`, once everything else that counts is known.
+pub fn resolve_command_phase(config: &mut Config, automatic: &Entry<'_>) {
+    match automatic_command_phase(config) {
+        Ok(command_phase_ns) => config.cycle.command_phase_ns = command_phase_ns,
+        Err(cause) => automatic.report(ProblemKind::NoCommandPhase { cause }),
+    }
 }
 
 /// A bare number or a percentage is a fraction of the period, anything else a duration.

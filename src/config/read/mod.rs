@@ -44,7 +44,7 @@ fn read<'a>(document: &'a DeTable<'a>, problems: &'a Problems<'a>) -> Option<Con
     let mut root = Section::new("", 0..0, document, problems);
     let name =
         root.require("name", "the name of the machine: name = \"arm6\"").and_then(|entry| entry.name());
-    let cycle = machine::cycle(root.section("cycle"));
+    let (cycle, automatic_phase) = machine::cycle(root.section("cycle"));
     let realtime = machine::realtime(root.section("realtime"), cycle.period_ns);
     let master = machine::master(root.section("master"));
     let telemetry = machine::telemetry(root.section("telemetry"));
@@ -64,7 +64,7 @@ fn read<'a>(document: &'a DeTable<'a>, problems: &'a Problems<'a>) -> Option<Con
     let program = program::program(root.section("program"), &axes);
     root.finish();
 
-    Some(Config {
+    let mut config = Config {
         name: name?.to_owned(),
         cycle,
         realtime,
@@ -74,5 +74,9 @@ fn read<'a>(document: &'a DeTable<'a>, problems: &'a Problems<'a>) -> Option<Con
         program,
         telemetry,
         simulation,
-    })
+    };
+    if let Some(automatic_phase) = automatic_phase.filter(|_| problems.is_empty()) {
+        machine::resolve_command_phase(&mut config, &automatic_phase);
+    }
+    Some(config)
 }

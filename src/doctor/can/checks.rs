@@ -73,7 +73,8 @@ pub fn state(link: &Link, wanted: Option<&WantedBus>) -> Finding {
         return down(name, wanted);
     }
     match link.state.as_deref() {
-        None | Some("ERROR-ACTIVE") => STATE.good("up, error active").applied(true),
+        None => STATE.good("up").applied(true),
+        Some("ERROR-ACTIVE") => STATE.good("up, error active").applied(true),
         Some(state @ "BUS-OFF") => STATE.forbids(state.to_lowercase()).mend(format!(
             "sudo ip link set {name} type can restart   # after the cause is found: see the errors"
         )),
@@ -184,16 +185,24 @@ pub fn errors(link: &Link) -> Finding {
 
 pub fn queue(link: &Link) -> Finding {
     let name = &link.name;
-    let queueing = link.queueing.as_deref().unwrap_or("?");
-    let length = link.queue_length.unwrap_or(0);
+    let Some(length) = link.queue_length else { return QUEUE.not_known("its length is not told") };
+    let Some(queueing) = link.queueing.as_deref() else {
+        return queue_of_length(name, format!("{length} frames"), length);
+    };
     if matches!(queueing, "noqueue" | "noop") {
         return QUEUE.good("none");
     }
     let read = format!("{length} frames, {queueing}");
-    let keeps_order = matches!(queueing, "pfifo_fast" | "pfifo" | "pfifo_head_drop" | "prio" | "mq" | "?");
+    let keeps_order = matches!(queueing, "pfifo_fast" | "pfifo" | "pfifo_head_drop" | "prio" | "mq");
     if !keeps_order {
         QUEUE.could_be_better(read).mend(format!("sudo tc qdisc replace dev {name} root pfifo limit 32"))
-    } else if QUEUE_LENGTHS.contains(&length) {
+    } else {
+        queue_of_length(name, read, length)
+    }
+}
+
+fn queue_of_length(name: &str, read: String, length: u64) -> Finding {
+    if QUEUE_LENGTHS.contains(&length) {
         QUEUE.good(read)
     } else {
         QUEUE.could_be_better(read).mend(format!("sudo ip link set {name} txqueuelen 32"))
@@ -275,6 +284,9 @@ mod tests {
         assert_eq!(queue(&with(1_000, "pfifo_fast")).mend, ["sudo ip link set can0 txqueuelen 32"]);
         assert_eq!(queue(&with(10, "fq_codel")).mend, ["sudo tc qdisc replace dev can0 root pfifo limit 32"]);
         assert_eq!(queue(&with(1, "pfifo")).verdict, Verdict::CouldBeBetter);
+        let without_ip = Link { queueing: None, queue_length: Some(10), ..can0() };
+        assert_eq!(queue(&without_ip).read, "10 frames");
+        assert_eq!(queue(&Link { queue_length: None, ..without_ip }).verdict, Verdict::NotKnown);
     }
 
     #[test]

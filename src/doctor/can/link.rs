@@ -1,6 +1,9 @@
-//! What `ip -details -statistics -json link show` says of CAN interfaces.
+//! What `ip -details -statistics -json link show` says of CAN interfaces; without `ip`, what the kernel says itself.
 
 use serde_json::Value;
+use takt_rt::port::BusState;
+
+use crate::bus::{self, InterfaceStatus};
 
 /// A CAN interface as the kernel describes it. What is not told is `None`.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -32,6 +35,33 @@ pub struct Timing {
     pub bit_rate: u64,
     /// Where in the bit its level is sampled, 0 to 1.
     pub sample_point: f64,
+}
+
+impl Link {
+    /// What the kernel tells over netlink without the help of `ip`: less.
+    pub fn of_status(status: &InterfaceStatus, queue_length: Option<u64>) -> Self {
+        let timing = |timing: bus::Timing| Timing {
+            bit_rate: timing.bit_rate.into(),
+            sample_point: timing.sample_point,
+        };
+        let state = match status.state {
+            BusState::ErrorActive => "ERROR-ACTIVE",
+            BusState::ErrorPassive => "ERROR-PASSIVE",
+            BusState::BusOff => "BUS-OFF",
+            BusState::Down => "STOPPED",
+        };
+        Self {
+            name: status.name.clone(),
+            is_up: status.is_up,
+            queue_length,
+            state: Some(state.to_owned()),
+            restart_ms: status.restart_ms.map(Into::into),
+            timing: status.timing.map(timing),
+            data_timing: status.data_timing.map(timing),
+            error_counters: status.error_counters.map(|(tx, rx)| (tx.into(), rx.into())),
+            ..Self::default()
+        }
+    }
 }
 
 /// The CAN interfaces of the list. Text that is no list has none.
@@ -127,6 +157,25 @@ pub mod tests {
         assert_eq!((links[0].is_up, links[0].timing, links[0].restart_ms), (false, None, Some(0)));
         assert_eq!((links[1].state.as_deref(), links[1].kind.as_deref()), (None, Some("vcan")));
         assert_eq!(links[2].timing.map(|timing| timing.sample_point), Some(0.875));
+    }
+
+    #[test]
+    fn the_kernels_own_answer_gives_the_same_picture_with_less_in_it() {
+        let status = InterfaceStatus {
+            name: "can0".to_owned(),
+            is_up: true,
+            has_fd: false,
+            timing: Some(bus::Timing { bit_rate: 1_000_000, sample_point: 0.75 }),
+            data_timing: None,
+            restart_ms: Some(100),
+            state: BusState::ErrorPassive,
+            error_counters: Some((128, 0)),
+            has_controller: true,
+        };
+        let link = Link::of_status(&status, Some(10));
+        assert_eq!(link.timing, Some(Timing { bit_rate: 1_000_000, sample_point: 0.75 }));
+        assert_eq!((link.state.as_deref(), link.restart_ms), (Some("ERROR-PASSIVE"), Some(100)));
+        assert_eq!((link.error_counters, link.queue_length), (Some((128, 0)), Some(10)));
     }
 
     #[test]

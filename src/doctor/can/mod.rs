@@ -10,6 +10,7 @@ use super::finding::{Check, Finding, Group};
 use super::source::Source;
 use super::subject::{Subject, WantedBus};
 use super::threads::Thread;
+use crate::bus::interface_status;
 use link::Link;
 
 const INTERFACE: Check = Check {
@@ -49,8 +50,9 @@ pub fn findings(source: &Source, subject: &Subject, threads: &[Thread]) -> Vec<F
             findings.push(missing(source, name));
             continue;
         }
-        let link = links.iter().find(|link| link.name == *name);
-        let own = of_interface(source, name, wanted, link, subject, threads);
+        let link = links.iter().find(|link| link.name == *name).cloned();
+        let link = link.or_else(|| asked_of_the_kernel(source, name));
+        let own = of_interface(source, name, wanted, link.as_ref(), subject, threads);
         findings.extend(own.into_iter().map(|finding| finding.on(name)));
     }
     findings
@@ -62,6 +64,13 @@ fn present(source: &Source) -> Vec<String> {
     let is_can =
         |name: &String| source.text(&format!("/sys/class/net/{name}/type")).as_deref() == Some(HARDWARE_TYPE);
     names.filter(is_can).collect()
+}
+
+/// Without `ip`, or with one that cannot write JSON: what the kernel tells this program.
+fn asked_of_the_kernel(source: &Source, name: &str) -> Option<Link> {
+    let status = source.is_this_machine().then(|| interface_status(name).ok()).flatten()?;
+    let queue = source.text(&format!("/sys/class/net/{name}/tx_queue_len"));
+    Some(Link::of_status(&status, queue.and_then(|length| length.parse().ok())))
 }
 
 fn none(source: &Source, subject: &Subject, present: &[String]) -> Finding {

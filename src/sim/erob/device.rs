@@ -6,7 +6,7 @@ use takt_rt::time::Nanoseconds;
 
 use super::dictionary::{Dictionary, at};
 
-/// For how long bit 7 must stay high to reset a fault (field notes, section 1: "held for several cycles").
+/// For how long bit 7 must stay high to reset a fault (real units want it "held for several cycles").
 const FAULT_RESET_NS: Nanoseconds = 3_000_000;
 /// Statusword bit 4: voltage on the power stage.
 const VOLTAGE_ENABLED: u16 = 0x10;
@@ -102,7 +102,8 @@ impl Device {
         } else if word & controlword::FAULT_RESET == 0 {
             self.reset_since_ns = None;
         }
-        let is_held = self.reset_since_ns.is_some_and(|since_ns| now_ns - since_ns >= FAULT_RESET_NS);
+        let is_held =
+            self.reset_since_ns.is_some_and(|since_ns| now_ns.saturating_sub(since_ns) >= FAULT_RESET_NS);
         if !is_held || !is_cleared {
             return Change::None;
         }
@@ -158,7 +159,7 @@ impl Device {
         self.state = if self.stop.is_some() { State::FaultReactionActive } else { State::Fault };
     }
 
-    /// The statusword as real units set it (field notes, section 1): bit 9 always, bit 4 as long as there is no
+    /// The statusword as real units set it: bit 9 always, bit 4 as long as there is no
     /// fault, bit 7 on some units, bit 12 always but in an enabled profile position mode. `mode_bits` are bits 10 to
     /// 13 as the mode of an enabled drive sets them.
     pub fn statusword(&self, mode_bits: u16) -> u16 {

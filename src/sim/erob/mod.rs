@@ -1,5 +1,6 @@
-//! The eRob joint module with CANopen firmware, as `spec/erob-can` describes it and as real units behave: object
-//! dictionary, SDO, NMT, PDO, emergency messages, the CiA 402 machine, six modes of operation, and the joint.
+//! The eRob joint module with CANopen firmware, as the eRunner manual 1.7 and its EDS describe it and as real units
+//! behave: object dictionary, SDO, NMT, PDO, emergency messages, the CiA 402 machine, six modes of operation, and the
+//! joint.
 //!
 //! ```text
 //! objects ── dictionary ──┬── sdo            requests of the master
@@ -12,12 +13,14 @@
 //!
 //! Choices where neither manual nor traces say anything:
 //! - A CSP target latched at SYNC k is reached at SYNC k + 1: the drive interpolates over the period (1006, else
-//!   60C2), locks its loop to SYNC, and feeds the difference of the last two targets forward. When SYNC stays away
-//!   it holds the last target.
+//!   60C2), locks its loop to SYNC, and feeds the difference of the last two targets forward, for two periods
+//!   at most. When SYNC stays away it holds the last target.
 //! - A write that the present state forbids (mapping of a PDO that exists, 6060 while enabled) is aborted with
 //!   0x0800_0022. A mode that 6502 does not name is accepted by 6060 but 6061 does not follow.
+//! - After 2242 = 1 a battery fault still wants its rising edge of bit 7.
 //! - Power is cut at once by electrical and encoder faults; the others decelerate by 605E first, whose default ramp
 //!   6085 = 200 counts/s² takes minutes: program 6085.
+//! - The following-error window 6065 is off (all ones) until it is written.
 //! - The brake works without delay. The controlword's transition 5 (disable operation) is immediate.
 //! - 6093, 6080, 607C, 2380 to 2382, 3B60 and the homing and interpolation objects can be written and read, and do
 //!   nothing.
@@ -63,6 +66,8 @@ pub struct ErobParameters {
     pub highest_velocity: f64,
     /// From power-up or "reset node" to the boot-up message.
     pub power_up_ns: Nanoseconds,
+    /// From the arrival of SYNC until the feedback is ready to be sent.
+    pub feedback_delay_ns: Nanoseconds,
     /// Whether a battery keeps the multi-turn count; without one the position after power-up is single-turn.
     pub has_battery: bool,
     /// Whether mode 7 is followed by 6061, as one capture of the manual shows (Fig 5-38) although 6502 lacks it.
@@ -100,6 +105,7 @@ impl ErobParameters {
             peak_torque: joint.peak_torque,
             highest_velocity: 1.5 * axis.limits.velocity,
             power_up_ns: joint.power_up_ns,
+            feedback_delay_ns: axis.feedback_delay_ns,
             has_battery: true,
             has_interpolated_position: false,
             is_upload_segmented: false,

@@ -34,6 +34,8 @@ struct Interpolation {
     left_s: f64,
     /// Velocity from the difference of the last two targets.
     velocity: f64,
+    /// For how long it goes on being fed forward.
+    forward_s: f64,
 }
 
 /// The set-points of profile position: one under way, one behind it.
@@ -48,6 +50,9 @@ struct SetPoints {
 
 /// The feed-forward of the velocity in CSP passes a low-pass of this time, since targets are whole counts.
 const FORWARD_FILTER_S: f64 = 1e-3;
+/// The velocity is fed forward for this many periods, so that a SYNC that is less than a period late does not shake
+/// the joint.
+const FORWARD_PERIODS: f64 = 2.0;
 /// Closer than this (counts) a profile has arrived.
 const ARRIVED: f64 = 0.01;
 
@@ -130,7 +135,8 @@ impl Motion {
         }
         let limit = self.velocity_limit(dictionary);
         let velocity = ((target - self.interpolation.target) / period_s).clamp(-limit, limit);
-        self.interpolation = Interpolation { target, left_s: period_s, velocity };
+        self.interpolation =
+            Interpolation { target, left_s: period_s, velocity, forward_s: FORWARD_PERIODS * period_s };
     }
 
     /// Evaluates the bits of the controlword that belong to profile position, in an enabled drive.
@@ -157,10 +163,12 @@ impl Motion {
         }
     }
 
-    /// Moves on by `duration_s` and says what the loops are to follow.
+    /// Moves on by `duration_s` and says what the loops are to follow: a position is that of the beginning of the
+    /// step, which is when the actual one was measured.
     pub fn step(&mut self, word: u16, actual: Actual, dictionary: &Dictionary, duration_s: f64) -> Demand {
         let is_halted = word & controlword::HALT != 0;
         let torque = dictionary.signed_real(at::TORQUE_OFFSET);
+        let position = self.position;
         match self.mode {
             Some(OperationMode::ProfilePosition | OperationMode::InterpolatedPosition) => {
                 if is_halted {
@@ -168,7 +176,7 @@ impl Motion {
                 } else {
                     self.step_profile(dictionary, duration_s);
                 }
-                Demand::Position { position: self.position, velocity: self.velocity, torque: 0.0 }
+                Demand::Position { position, velocity: self.velocity, torque: 0.0 }
             }
             Some(OperationMode::ProfileVelocity) => {
                 let wanted = if is_halted { 0.0 } else { dictionary.signed_real(at::TARGET_VELOCITY) };
@@ -188,7 +196,7 @@ impl Motion {
             Some(OperationMode::CyclicSynchronousPosition) => {
                 self.step_interpolation(dictionary, duration_s);
                 let velocity = self.forward + dictionary.signed_real(at::VELOCITY_OFFSET);
-                Demand::Position { position: self.position, velocity, torque }
+                Demand::Position { position, velocity, torque }
             }
             Some(OperationMode::CyclicSynchronousVelocity) => {
                 let wanted =
@@ -201,7 +209,7 @@ impl Motion {
                 self.torque = dictionary.signed_real(at::TARGET_TORQUE) + torque;
                 Demand::Torque(self.torque)
             }
-            _ => Demand::Position { position: self.position, velocity: 0.0, torque: 0.0 },
+            _ => Demand::Position { position, velocity: 0.0, torque: 0.0 },
         }
     }
 
@@ -298,8 +306,8 @@ impl Motion {
     }
 
     fn is_profile_position(&self) -> bool {
-        // Mode 7, where a unit has it, moves like mode 1 (erob-can, 7.5 and A40: a move to an absolute target that
-        // bit 4 starts and profile velocity 0 stops).
+        // Mode 7, where a unit has it, moves like mode 1 (eRunner manual 1.7, 5.7: a move to an absolute
+        // target that bit 4 starts and profile velocity 0 stops).
         matches!(self.mode, Some(OperationMode::ProfilePosition | OperationMode::InterpolatedPosition))
     }
 
@@ -329,7 +337,7 @@ impl Motion {
     }
 
     fn step_interpolation(&mut self, dictionary: &Dictionary, duration_s: f64) {
-        let Interpolation { target, left_s, velocity } = self.interpolation;
+        let Interpolation { target, left_s, velocity, forward_s } = self.interpolation;
         let most = self.velocity_limit(dictionary) * duration_s;
         let distance = target - self.position;
         // Without a new target the last one is reached and held.
@@ -338,7 +346,8 @@ impl Motion {
         self.position += step;
         self.velocity = step / duration_s;
         self.interpolation.left_s = (left_s - duration_s).max(0.0);
-        let wanted = if left_s > 0.0 { velocity } else { 0.0 };
+        self.interpolation.forward_s = (forward_s - duration_s).max(0.0);
+        let wanted = if forward_s > 0.0 { velocity } else { 0.0 };
         self.forward += (wanted - self.forward) * duration_s / (FORWARD_FILTER_S + duration_s);
     }
 

@@ -6,7 +6,7 @@ use takt_rt::time::Nanoseconds;
 use super::dictionary::{Dictionary, at};
 use crate::sim::drive::NmtState;
 
-/// From "reset communication" to the boot-up message (erob-can, 2.7: 0 to 1 ms).
+/// From "reset communication" to the boot-up message (0 to 1 ms in the manual's captures).
 const RESET_COMMUNICATION_NS: Nanoseconds = 500_000;
 const NEVER: Nanoseconds = Nanoseconds::MAX;
 const MILLISECOND_NS: Nanoseconds = 1_000_000;

@@ -1,5 +1,5 @@
-//! The object dictionary of the eRob's CANopen firmware as data (field notes, section 1). What is not listed there
-//! does not exist here either. Defaults that are not known are 0, or what is noted beside them.
+//! The object dictionary of the eRob's CANopen firmware as data, as its EDS lists it. What is not listed there does
+//! not exist here either. Defaults that are not known are 0, or what is noted beside them.
 
 /// The data type of an object (CiA 301, 7.4.7).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

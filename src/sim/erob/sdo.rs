@@ -8,7 +8,7 @@ use takt_rt::time::Nanoseconds;
 use super::dictionary::AbortCode;
 use crate::sim::random::Random;
 
-/// Shortest and longest time from a request to its answer (field notes, section 1).
+/// Shortest and longest time from a request to its answer as seen on real units.
 const LATENCY_NS: std::ops::Range<Nanoseconds> = 300_000..1_000_000;
 
 /// The objects behind the server.

@@ -20,7 +20,7 @@ load_pids=()
 
 # background COMMAND...: repeats a command at ordinary priority until load_off.
 background() {
-    chrt --other 0 bash -c 'while :; do "$@"; done' background "$@" >/dev/null 2>&1 &
+    setsid chrt --other 0 bash -c 'while :; do "$@"; done' background "$@" >/dev/null 2>&1 &
     load_pids+=($!)
 }
 
@@ -36,8 +36,8 @@ load_on() {
 load_off() {
     local pid
     for pid in "${load_pids[@]}"; do
-        kill "$pid"
-        pkill -P "$pid"
+        # Each leads a process group of its own (setsid).
+        kill -KILL -- "-$pid"
         wait "$pid"
     done 2>/dev/null
     load_pids=()

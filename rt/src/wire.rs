@@ -1,8 +1,8 @@
 //! How long a frame is on the wire, bit by bit (ISO 11898-1): the stuff bits are counted from the frame's own
 //! content, its CRC included, so two frames of one length may take different times, as they do on a real bus.
 
-use takt_rt::frame::{Frame, FrameKind};
-use takt_rt::time::{NANOSECONDS_PER_SECOND, Nanoseconds};
+use crate::frame::{Frame, FrameKind};
+use crate::time::{NANOSECONDS_PER_SECOND, Nanoseconds};
 
 /// Bits between a frame and the next one. They belong to every length here, as in the worst-case formula of
 /// Davis, Burns, Bril and Lukkien (Real-Time Systems 35, 2007).
@@ -208,9 +208,12 @@ impl Crc15 {
 
 #[cfg(test)]
 mod tests {
+    extern crate std;
     use super::*;
+    use crate::frame::Id;
     use proptest::prelude::*;
-    use takt_rt::frame::Id;
+    use std::vec;
+    use std::vec::Vec;
 
     /// The bits of a classic frame up to and with the CRC, one by one, as the standard writes them.
     fn bits_of(frame: &Frame) -> Vec<bool> {

@@ -1,0 +1,228 @@
+//! What has become of every frame: the port's counters and states, without any input or output.
+
+use super::batch::Arrival;
+use super::error_frame;
+use super::wire_format::Message;
+use crate::frame::{Frame, FrameKind};
+use crate::port::{BusHealth, BusState};
+use crate::wire::WireLength;
+
+/// Counters and states of one port.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Account {
+    pub(super) health: BusHealth,
+    /// Frames that the kernel took and that have not come back from the wire.
+    unconfirmed: usize,
+    /// The socket's overflow counter when it was last seen.
+    lost: u32,
+    bit_rate: u32,
+    data_bit_rate: Option<u32>,
+}
+
+impl Account {
+    /// The account of a port on a bus of these bit rates (bit/s), of which only the wire's occupation depends.
+    pub(super) fn new(bit_rate: u32, data_bit_rate: Option<u32>) -> Self {
+        Self { bit_rate, data_bit_rate, ..Self::default() }
+    }
+
+    pub(super) const fn unconfirmed(&self) -> usize {
+        self.unconfirmed
+    }
+
+    /// Frames that the kernel took. Remote frames are not waited for: the kernel's fast filters, one for each
+    /// identifier, let data frames pass alone, so that remote frames do not come back.
+    pub(super) fn taken(&mut self, frames: &[Frame]) {
+        let remote = frames.iter().filter(|frame| frame.kind() == FrameKind::Remote).count();
+        self.health.tx_frames += remote as u64;
+        self.unconfirmed += frames.len() - remote;
+        if self.health.state == BusState::Down && !frames.is_empty() {
+            self.health.state = BusState::ErrorActive;
+        }
+    }
+
+    /// Frames that the kernel did not take, and its reason. No room in the socket's buffer and no room in the
+    /// interface's queue are one condition: what was sent before is still waiting for the bus.
+    pub(super) fn refused(&mut self, frames: usize, errno: i32) {
+        match errno {
+            libc::EAGAIN | libc::ENOBUFS => self.health.tx_overruns += frames as u64,
+            libc::ENETDOWN | libc::ENODEV | libc::ENXIO => self.down(),
+            _ => self.health.errors += frames as u64,
+        }
+    }
+
+    /// A receive call that failed.
+    pub(super) fn receive_failed(&mut self, errno: i32) {
+        match errno {
+            libc::ENETDOWN | libc::ENODEV | libc::ENXIO => self.down(),
+            _ => self.health.errors += 1,
+        }
+    }
+
+    /// A message of the socket; returns the frame when it is one from somebody else.
+    pub(super) fn arrived(&mut self, arrival: &Arrival) -> Option<Frame> {
+        self.count_losses(arrival.lost);
+        if let Message::Frame(frame) = &arrival.message {
+            self.health.busy_ns += WireLength::of(frame).duration_ns(self.bit_rate, self.data_bit_rate);
+        }
+        match arrival.message {
+            Message::Frame(frame) if arrival.is_own => {
+                if frame.kind() != FrameKind::Remote {
+                    self.unconfirmed = self.unconfirmed.saturating_sub(1);
+                    self.health.tx_frames += 1;
+                }
+                None
+            }
+            Message::Frame(frame) => {
+                self.health.rx_frames += 1;
+                Some(frame)
+            }
+            Message::Error { class, details } => {
+                self.reported(error_frame::read(class, details));
+                None
+            }
+            Message::Unknown => {
+                self.health.errors += 1;
+                None
+            }
+        }
+    }
+
+    fn reported(&mut self, report: error_frame::Report) {
+        if let Some(state) = report.state {
+            self.health.state = state;
+        }
+        if report.has_dropped_transmissions {
+            self.unconfirmed = 0;
+        }
+        self.health.errors += u64::from(report.is_error);
+        self.health.rx_overruns += u64::from(report.has_lost_received);
+    }
+
+    /// Any of the lost messages may have been a confirmation. Counting all of them as such errs on the side that
+    /// mends itself: a confirmation too many is ignored, one too few would hold the set-points back for ever.
+    fn count_losses(&mut self, lost: Option<u32>) {
+        let Some(lost) = lost else { return };
+        let more = lost.wrapping_sub(self.lost);
+        self.lost = lost;
+        self.health.rx_overruns += u64::from(more);
+        self.unconfirmed = self.unconfirmed.saturating_sub(usize::try_from(more).unwrap_or(usize::MAX));
+    }
+
+    /// An interface that goes down drops what it still had to send.
+    fn down(&mut self) {
+        self.health.state = BusState::Down;
+        self.unconfirmed = 0;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frame::Id;
+
+    fn frame(node: u8) -> Frame {
+        Frame::of(Id::canopen(0x200, node), [1, 2, 3])
+    }
+
+    fn arrival(message: Message, is_own: bool) -> Arrival {
+        Arrival { message, is_own, real_time_ns: None, lost: None }
+    }
+
+    fn error(class: u32) -> Arrival {
+        arrival(Message::Error { class, details: [0; 8] }, false)
+    }
+
+    #[test]
+    fn a_frame_counts_as_sent_when_it_has_come_back() {
+        let mut account = Account::default();
+        account.taken(&[frame(1), frame(2)]);
+        assert_eq!((account.unconfirmed(), account.health.tx_frames), (2, 0));
+        assert_eq!(account.arrived(&arrival(Message::Frame(frame(1)), true)), None);
+        assert_eq!((account.unconfirmed(), account.health.tx_frames), (1, 1));
+        assert_eq!(account.arrived(&arrival(Message::Frame(frame(7)), false)), Some(frame(7)));
+        assert_eq!((account.unconfirmed(), account.health.rx_frames), (1, 1));
+    }
+
+    #[test]
+    fn remote_frames_are_not_waited_for_whether_they_come_back_or_not() {
+        let mut account = Account::default();
+        let remote = Frame::remote(Id::canopen(0x700, 1), 1).unwrap();
+        account.taken(&[remote, frame(1)]);
+        assert_eq!(account.unconfirmed(), 1);
+        account.arrived(&arrival(Message::Frame(remote), true));
+        assert_eq!((account.unconfirmed(), account.health.tx_frames), (1, 1));
+    }
+
+    #[test]
+    fn a_full_socket_and_a_full_interface_are_one_condition() {
+        let mut account = Account::default();
+        account.refused(2, libc::EAGAIN);
+        account.refused(3, libc::ENOBUFS);
+        assert_eq!(account.health, BusHealth { tx_overruns: 5, ..BusHealth::default() });
+    }
+
+    #[test]
+    fn an_interface_that_goes_down_forgets_what_was_queued_and_is_up_when_it_takes_frames_again() {
+        let mut account = Account::default();
+        account.taken(&[frame(1)]);
+        account.receive_failed(libc::ENETDOWN);
+        assert_eq!((account.health.state, account.unconfirmed()), (BusState::Down, 0));
+        account.refused(1, libc::ENETDOWN);
+        assert_eq!(account.health.state, BusState::Down);
+        assert_eq!(account.health.tx_overruns, 0);
+        account.taken(&[]);
+        assert_eq!(account.health.state, BusState::Down);
+        account.taken(&[frame(1)]);
+        assert_eq!(account.health.state, BusState::ErrorActive);
+    }
+
+    #[test]
+    fn bus_off_drops_what_was_queued_and_lasts_until_the_restart() {
+        let mut account = Account::default();
+        account.taken(&[frame(1), frame(2)]);
+        account.arrived(&error(libc::CAN_ERR_BUSOFF));
+        assert_eq!((account.health.state, account.unconfirmed()), (BusState::BusOff, 0));
+        account.taken(&[frame(1)]);
+        assert_eq!(account.health.state, BusState::BusOff);
+        account.arrived(&error(libc::CAN_ERR_RESTARTED));
+        assert_eq!((account.health.state, account.unconfirmed()), (BusState::ErrorActive, 0));
+        assert_eq!(account.health.errors, 1);
+    }
+
+    #[test]
+    fn lost_messages_are_counted_once_and_hold_nothing_back() {
+        let mut account = Account::default();
+        account.taken(&[frame(1), frame(2), frame(3)]);
+        let mut with_losses = arrival(Message::Frame(frame(9)), false);
+        with_losses.lost = Some(2);
+        account.arrived(&with_losses);
+        account.arrived(&with_losses);
+        assert_eq!((account.health.rx_overruns, account.unconfirmed()), (2, 1));
+        with_losses.lost = Some(u32::MAX);
+        account.arrived(&with_losses);
+        with_losses.lost = Some(1);
+        account.arrived(&with_losses);
+        assert_eq!((account.health.rx_overruns, account.unconfirmed()), (u64::from(u32::MAX) + 2, 0));
+    }
+
+    #[test]
+    fn the_wire_is_occupied_by_frames_of_either_side_for_as_long_as_they_are() {
+        let mut account = Account::new(1_000_000, None);
+        let length_ns = WireLength::of(&frame(1)).duration_ns(1_000_000, None);
+        account.taken(&[frame(1)]);
+        assert_eq!(account.health.busy_ns, 0);
+        account.arrived(&arrival(Message::Frame(frame(1)), true));
+        account.arrived(&arrival(Message::Frame(frame(1)), false));
+        account.arrived(&error(libc::CAN_ERR_ACK));
+        assert_eq!(account.health.busy_ns, 2 * length_ns);
+    }
+
+    #[test]
+    fn what_is_no_frame_is_an_error() {
+        let mut account = Account::default();
+        assert_eq!(account.arrived(&arrival(Message::Unknown, false)), None);
+        account.refused(2, libc::EINVAL);
+        account.receive_failed(libc::EIO);
+        assert_eq!(account.health.errors, 4);
+    }
+}

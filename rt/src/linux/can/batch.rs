@@ -1,0 +1,139 @@
+//! Many frames a system call: `sendmmsg` and `recvmmsg` on a raw CAN socket.
+
+use super::super::clock::nanoseconds_of;
+use super::super::errno;
+use super::wire_format::{self, EMPTY, Message};
+use crate::frame::Frame;
+use crate::port::RECEIVE_BATCH;
+use crate::time::Nanoseconds;
+
+/// The most frames handed to the kernel in one call.
+pub(super) const SEND_BATCH: usize = 64;
+
+/// Room for a time stamp and the overflow counter, with their headers.
+const CONTROL_BYTES: usize = 64;
+
+#[derive(Clone, Copy)]
+#[repr(C, align(8))]
+struct Control([u8; CONTROL_BYTES]);
+
+/// The buffers of one socket. The descriptor is somebody else's.
+pub(super) struct Batch {
+    frames: [libc::canfd_frame; RECEIVE_BATCH],
+    control: [Control; RECEIVE_BATCH],
+}
+
+/// One message as the kernel handed it over.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Arrival {
+    /// What it holds.
+    pub(super) message: Message,
+    /// Whether it is one of this socket's own frames, back from the wire (`MSG_CONFIRM`).
+    pub(super) is_own: bool,
+    /// When the kernel saw it, on `CLOCK_REALTIME`; `None` without a time stamp.
+    pub(super) real_time_ns: Option<Nanoseconds>,
+    /// How many messages this socket has lost so far for want of room (`SO_RXQ_OVFL`), modulo 2³².
+    pub(super) lost: Option<u32>,
+}
+
+impl Batch {
+    pub(super) const fn new() -> Self {
+        Self { frames: [EMPTY; RECEIVE_BATCH], control: [Control([0; CONTROL_BYTES]); RECEIVE_BATCH] }
+    }
+
+    /// Takes up to `limit` messages without waiting, hands each to `take`, and returns how many there were. The
+    /// error is the system's number; an empty queue is not an error.
+    pub(super) fn receive(
+        &mut self,
+        descriptor: libc::c_int,
+        limit: usize,
+        mut take: impl FnMut(Arrival),
+    ) -> Result<usize, i32> {
+        let mut vectors = [NO_VECTOR; RECEIVE_BATCH];
+        let mut headers = [NO_HEADER; RECEIVE_BATCH];
+        let buffers = self.frames.iter_mut().zip(&mut self.control);
+        for ((header, vector), (frame, control)) in headers.iter_mut().zip(&mut vectors).zip(buffers) {
+            vector.iov_base = (&raw mut *frame).cast();
+            vector.iov_len = libc::CANFD_MTU;
+            header.msg_hdr.msg_iov = vector;
+            header.msg_hdr.msg_iovlen = 1;
+            header.msg_hdr.msg_control = control.0.as_mut_ptr().cast();
+            header.msg_hdr.msg_controllen = CONTROL_BYTES as _;
+        }
+        let limit = limit.min(RECEIVE_BATCH);
+        // SAFETY: the first `limit` headers point to buffers of the lengths they say, which live and are not
+        // touched otherwise until the call has returned. There is no time-out to point to.
+        let count = unsafe {
+            libc::recvmmsg(
+                descriptor,
+                headers.as_mut_ptr(),
+                limit as libc::c_uint,
+                libc::MSG_DONTWAIT as _,
+                core::ptr::null_mut(),
+            )
+        };
+        let Ok(count) = usize::try_from(count) else {
+            return match errno() {
+                libc::EAGAIN | libc::EINTR => Ok(0),
+                number => Err(number),
+            };
+        };
+        for (header, frame) in headers.iter().zip(&self.frames).take(count) {
+            let (real_time_ns, lost) = ancillary(&header.msg_hdr);
+            take(Arrival {
+                message: wire_format::read(frame, header.msg_len as usize),
+                is_own: header.msg_hdr.msg_flags & libc::MSG_CONFIRM != 0,
+                real_time_ns,
+                lost,
+            });
+        }
+        Ok(count)
+    }
+}
+
+/// Hands frames to the kernel without waiting, the first one first, and returns how many it took. An error means
+/// that it took none, and is the system's number. A batch longer than [`SEND_BATCH`] is taken up to there.
+pub(super) fn send(descriptor: libc::c_int, frames: &[Frame]) -> Result<usize, i32> {
+    let mut buffers = [EMPTY; SEND_BATCH];
+    let mut vectors = [NO_VECTOR; SEND_BATCH];
+    let mut headers = [NO_HEADER; SEND_BATCH];
+    let places = headers.iter_mut().zip(&mut vectors).zip(&mut buffers);
+    for (((header, vector), buffer), frame) in places.zip(frames) {
+        vector.iov_len = wire_format::write(frame, buffer);
+        vector.iov_base = (&raw mut *buffer).cast();
+        header.msg_hdr.msg_iov = vector;
+        header.msg_hdr.msg_iovlen = 1;
+    }
+    let count = frames.len().min(SEND_BATCH) as libc::c_uint;
+    // SAFETY: the first `count` headers point to buffers of the lengths they say, which outlive the call.
+    let sent = unsafe { libc::sendmmsg(descriptor, headers.as_mut_ptr(), count, libc::MSG_DONTWAIT as _) };
+    usize::try_from(sent).map_err(|_| errno())
+}
+
+const NO_VECTOR: libc::iovec = libc::iovec { iov_base: core::ptr::null_mut(), iov_len: 0 };
+
+const NO_HEADER: libc::mmsghdr = {
+    // SAFETY: it holds numbers and pointers that may be null.
+    unsafe { core::mem::zeroed() }
+};
+
+/// The time stamp and the overflow counter that came with a message.
+fn ancillary(header: &libc::msghdr) -> (Option<Nanoseconds>, Option<u32>) {
+    let (mut stamp, mut lost) = (None, None);
+    // SAFETY: the kernel has filled the control buffer and set its length; the macros stay within it.
+    let mut next = unsafe { libc::CMSG_FIRSTHDR(header) };
+    // SAFETY: a header that the macros return lies within the control buffer, which is aligned for it.
+    while let Some(entry) = unsafe { next.as_ref() } {
+        if entry.cmsg_level == libc::SOL_SOCKET && entry.cmsg_type == libc::SCM_TIMESTAMPNS {
+            // SAFETY: this type carries a `timespec`, for which the buffer has room; it need not be aligned.
+            let time = unsafe { libc::CMSG_DATA(entry).cast::<libc::timespec>().read_unaligned() };
+            stamp = Some(nanoseconds_of(&time));
+        } else if entry.cmsg_level == libc::SOL_SOCKET && entry.cmsg_type == libc::SO_RXQ_OVFL {
+            // SAFETY: this type carries 32 bits, for which the buffer has room; they need not be aligned.
+            lost = Some(unsafe { libc::CMSG_DATA(entry).cast::<u32>().read_unaligned() });
+        }
+        // SAFETY: as for the first one.
+        next = unsafe { libc::CMSG_NXTHDR(header, entry) };
+    }
+    (stamp, lost)
+}

@@ -1,0 +1,240 @@
+//! Third order: jerk-limited motions after L. Berscheid and T. Kröger, "Jerk-limited Real-time Trajectory Generation
+//! with Arbitrary Target States", RSS 2021 (`otg.md` sections 1 to 4).
+//!
+//! [`brake`] brings the start inside the limits, [`step1`] finds the fastest motion and the blocked durations,
+//! [`step2`] a motion of given duration. In place of the paper's enumeration of profile types, both follow families
+//! of motions ([`crossing`], [`passage`]) between points known in closed form, see there.
+
+mod brake;
+mod crossing;
+mod motion;
+mod passage;
+mod roots;
+mod step1;
+mod step2;
+
+use super::error::PlanError;
+use super::problem::{Problem, State};
+use super::profile::Profile;
+use super::synchronisation::Return;
+use super::trapezoid::{Bounds, Ramp, Stretches};
+use motion::{Scale, Shape};
+use step1::Edges;
+use step2::Slower;
+
+/// Relative to the sizes of a problem, differences up to this are rounding.
+const ROUNDING: f64 = 1024.0 * f64::EPSILON;
+
+/// Relative to a duration, being this near to a blocked interval is to be on its edge.
+const EDGE: f64 = 3e-11;
+
+/// The rest of a problem behind the brake.
+struct Inside {
+    edges: Edges,
+    scale: Scale,
+    brake_s: f64,
+}
+
+impl Inside {
+    fn of(problem: &Problem, manner: Return, profile: &mut Profile) -> Result<Self, PlanError> {
+        let Problem { start, target, limits } = problem;
+        profile.begin(*start);
+        match manner {
+            Return::Fastest => brake::brake(limits, profile),
+            Return::Settled => brake::settle(limits, profile),
+        }
+        let reached = profile.reached();
+        let scale = Scale::of(limits);
+        let distance = target.position - reached.position;
+        let motion = scale.motion(&reached, distance, target, limits);
+        let mut edges = Edges::of(&motion);
+        // A rounding error beside the direct motion must not turn into a detour.
+        edges.round(ROUNDING * (reached.position.abs() + target.position.abs()) / scale.distance);
+        let representable = scale.distance > 0.0
+            && scale.distance.is_finite()
+            && distance.is_finite()
+            && motion.distance.is_finite();
+        if representable {
+            Ok(Self { edges, scale, brake_s: profile.duration_s() })
+        } else {
+            Err(PlanError::NotRepresentable { axis: 0 })
+        }
+    }
+
+    fn drive(&self, shape: &Shape, jerk_max: f64, profile: &mut Profile) {
+        for (duration, jerk) in shape.durations.iter().zip(&shape.jerks) {
+            profile.shift(duration * self.scale.time_s, jerk * jerk_max);
+        }
+    }
+}
+
+/// The fastest profile to the target state, with its blocked intervals.
+pub(super) fn fastest_position(
+    problem: &Problem,
+    manner: Return,
+    profile: &mut Profile,
+) -> Result<(), PlanError> {
+    let mut inside = Inside::of(problem, manner, profile)?;
+    let ways = inside.edges.ways();
+    let Some((fastest, others)) = ways.split_first() else {
+        return Err(PlanError::NotRepresentable { axis: 0 });
+    };
+    inside.drive(&inside.edges.shape(fastest), problem.limits.jerk_max, profile);
+    let duration_s = |duration: f64| inside.brake_s + duration * inside.scale.time_s;
+    profile.finish_at(problem.target, duration_s(fastest.duration))?;
+    profile.set_minimum_duration(profile.duration_s());
+    for pair in others.chunks_exact(2) {
+        if let [after, before] = pair {
+            let rounding = ROUNDING * (1.0 + after.duration);
+            profile.block(duration_s(after.duration + rounding), duration_s(before.duration));
+        }
+    }
+    Ok(())
+}
+
+/// The profile to the target state that lasts this long; the profile holds the fastest one before.
+pub(super) fn position_lasting(
+    problem: &Problem,
+    manner: Return,
+    duration_s: f64,
+    profile: &mut Profile,
+) -> Result<(), PlanError> {
+    let edge = profile.blocked().iter().any(|blocked| {
+        let rounding_s = EDGE * duration_s;
+        (blocked.before_s - duration_s).abs() <= rounding_s
+            || (blocked.after_s - duration_s).abs() <= rounding_s
+    });
+    let mut inside = Inside::of(problem, manner, profile)?;
+    let duration = (duration_s - inside.brake_s) / inside.scale.time_s;
+    let jerk_max = problem.limits.jerk_max;
+    // Next to a blocked interval the motion is the one on the edge.
+    let ways = if edge { inside.edges.ways() } else { Default::default() };
+    let apart = |way: &step1::Way| (way.duration - duration).abs();
+    match ways.iter().min_by(|one, other| apart(one).total_cmp(&apart(other))) {
+        Some(way) => inside.drive(&inside.edges.shape(way), jerk_max, profile),
+        None => match inside.edges.lasting(duration) {
+            Slower::Plain(shape) => inside.drive(&shape, jerk_max, profile),
+            Slower::Mixture { first, second, share } => {
+                mix(&inside, &first, &second, share, jerk_max, profile);
+            }
+        },
+    }
+    profile.finish_at(problem.target, duration_s)
+}
+
+/// Drives `share · first + (1 − share) · second`.
+fn mix(inside: &Inside, first: &Shape, second: &Shape, share: f64, jerk_max: f64, profile: &mut Profile) {
+    let mut phases = [first, second]
+        .map(|shape| shape.durations.iter().zip(&shape.jerks).filter(|(duration, _)| **duration > 0.0));
+    let [first, second] = &mut phases;
+    let (mut one, mut other) = (first.next(), second.next());
+    let (mut one_left, mut other_left) =
+        (one.map_or(0.0, |(duration, _)| *duration), other.map_or(0.0, |(duration, _)| *duration));
+    while let (Some((_, jerk)), Some((_, other_jerk))) = (one, other) {
+        let duration = one_left.min(other_left);
+        let mixed = share * jerk + (1.0 - share) * other_jerk;
+        profile.shift(duration * inside.scale.time_s, mixed * jerk_max);
+        one_left -= duration;
+        other_left -= duration;
+        if one_left <= 0.0 {
+            one = first.next();
+            one_left = one.map_or(0.0, |(duration, _)| *duration);
+        }
+        if other_left <= 0.0 {
+            other = second.next();
+            other_left = other.map_or(0.0, |(duration, _)| *duration);
+        }
+    }
+}
+
+/// The velocity interface is the second-order problem one order lower. From where the profile is.
+fn velocity_ramp(problem: &Problem, profile: &mut Profile) -> Result<Ramp, PlanError> {
+    let Problem { target, limits, .. } = problem;
+    let start = profile.reached();
+    let acceleration = start.acceleration.clamp(limits.acceleration_min, limits.acceleration_max);
+    let excess = start.acceleration - acceleration;
+    profile.shift(excess.abs() / limits.jerk_max, -libm::copysign(limits.jerk_max, excess));
+    profile.limit_acceleration(limits.acceleration_min, limits.acceleration_max);
+    let State { velocity, .. } = profile.reached();
+    let acceleration_size = limits.acceleration_max.max(-limits.acceleration_min);
+    let swing = acceleration_size * acceleration_size / limits.jerk_max;
+    let rounding = ROUNDING * (velocity.abs() + target.velocity.abs() + swing);
+    if !rounding.is_finite() {
+        return Err(PlanError::NotRepresentable { axis: 0 });
+    }
+    Ok(Ramp {
+        distance: target.velocity - velocity,
+        rounding,
+        start: acceleration,
+        target: target.acceleration,
+        bounds: Bounds {
+            rate_max: limits.acceleration_max,
+            rate_min: limits.acceleration_min,
+            slope_max: limits.jerk_max,
+            slope_min: -limits.jerk_max,
+        },
+    })
+}
+
+/// The stop that goes the least far: decelerate fully until the motion turns around, then come to rest.
+pub(super) fn shortest_stop(problem: &Problem, profile: &mut Profile) -> Result<(), PlanError> {
+    let Problem { start, limits, .. } = problem;
+    profile.begin(*start);
+    // A motion that is slowing down at full rate already may turn around before it can be made to stop.
+    let behind = start.velocity + 0.5 * start.acceleration * start.acceleration.abs() / limits.jerk_max;
+    let sign = libm::copysign(1.0, if start.velocity == 0.0 { behind } else { start.velocity });
+    let deceleration_max = if sign > 0.0 { -limits.acceleration_min } else { limits.acceleration_max };
+    let (speed, deceleration) = (sign * start.velocity, -sign * start.acceleration);
+    if speed > 0.0 && deceleration <= deceleration_max {
+        // On the arc of full jerk the speed is `peak − deceleration²/2J`.
+        let peak = speed + 0.5 * deceleration * deceleration / limits.jerk_max;
+        let at_rest = libm::sqrt(2.0 * limits.jerk_max * peak).min(deceleration_max);
+        profile.shift((at_rest - deceleration) / limits.jerk_max, -sign * limits.jerk_max);
+        profile.shift(sign * profile.reached().velocity / deceleration_max, 0.0);
+    }
+    let brake_s = profile.duration_s();
+    let ramp = velocity_ramp(problem, profile)?;
+    let ramp_s = profile.duration_s() - brake_s;
+    let fastest = ramp.fastest();
+    drive_stretches(&fastest.stretches, profile);
+    let position = profile.reached().position;
+    profile.finish_at(State::rest(position), brake_s + ramp_s + fastest.duration)?;
+    profile.set_minimum_duration(profile.duration_s());
+    Ok(())
+}
+
+fn drive_stretches(stretches: &Stretches, profile: &mut Profile) {
+    for (duration_s, jerk) in stretches.durations.iter().zip(&stretches.slopes) {
+        profile.shift(*duration_s, *jerk);
+    }
+}
+
+/// The fastest profile to the target velocity and acceleration, wherever that leads.
+pub(super) fn fastest_velocity(problem: &Problem, profile: &mut Profile) -> Result<(), PlanError> {
+    profile.begin(problem.start);
+    let ramp = velocity_ramp(problem, profile)?;
+    let brake_s = profile.duration_s();
+    let fastest = ramp.fastest();
+    drive_stretches(&fastest.stretches, profile);
+    let position = profile.reached().position;
+    profile.finish_at(State { position, ..problem.target }, brake_s + fastest.duration)?;
+    profile.set_minimum_duration(profile.duration_s());
+    if let Some((after, before)) = fastest.blocked {
+        profile.block(brake_s + after, brake_s + before);
+    }
+    Ok(())
+}
+
+/// The profile to the target velocity and acceleration that lasts this long.
+pub(super) fn velocity_lasting(
+    problem: &Problem,
+    duration_s: f64,
+    profile: &mut Profile,
+) -> Result<(), PlanError> {
+    profile.begin(problem.start);
+    let ramp = velocity_ramp(problem, profile)?;
+    let stretches = ramp.lasting(duration_s - profile.duration_s());
+    drive_stretches(&stretches, profile);
+    let position = profile.reached().position;
+    profile.finish_at(State { position, ..problem.target }, duration_s)
+}

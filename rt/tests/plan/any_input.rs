@@ -1,0 +1,93 @@
+//! Any input at all: an answer or an error, in bounded time, and never a number that is none.
+
+use proptest::prelude::*;
+use proptest::test_runner::RngSeed;
+use takt_rt::plan::{
+    Limits, Problem, Profile, Return, State, Synchronisation, Timing, stop, synchronised,
+    synchronised_velocity,
+};
+
+/// Numbers of all sizes, with those at which programs break.
+fn number() -> impl Strategy<Value = f64> {
+    prop_oneof![
+        4 => -10.0..10.0_f64,
+        2 => any::<f64>(),
+        2 => prop::sample::select(vec![0.0, -0.0, 1.0, -1.0, 2.0, 0.5, 1e-300, 1e300, -1e300, 1e-12, 1e12, f64::MAX, f64::MIN_POSITIVE, f64::INFINITY, f64::NAN]),
+        2 => (-12.0..12.0_f64, any::<bool>()).prop_map(|(exponent, negative)| if negative { -(10_f64.powf(exponent)) } else { 10_f64.powf(exponent) }),
+    ]
+}
+
+fn state() -> impl Strategy<Value = State> {
+    (number(), number(), number()).prop_map(|(position, velocity, acceleration)| State {
+        position,
+        velocity,
+        acceleration,
+    })
+}
+
+fn problem() -> impl Strategy<Value = Problem> {
+    let limits = (number(), number(), number(), number(), number(), number(), number());
+    (state(), state(), limits, any::<[bool; 2]>()).prop_map(|(start, target, limits, [signed, travel])| {
+        let (vmax, vmin, amax, amin, jmax, pmin, pmax) = limits;
+        let limits = if signed {
+            Limits::asymmetric(vmax, vmin, amax, amin, jmax)
+        } else {
+            Limits::asymmetric(vmax.abs(), -vmin.abs(), amax.abs(), -amin.abs(), jmax.abs())
+        };
+        Problem { start, target, limits: if travel { limits.with_position(pmin, pmax) } else { limits } }
+    })
+}
+
+fn timing() -> impl Strategy<Value = Timing> {
+    let modes = vec![
+        Synchronisation::Time,
+        Synchronisation::Phase,
+        Synchronisation::Straight,
+        Synchronisation::Independent,
+    ];
+    (prop::sample::select(modes), number(), prop::option::of(number()), any::<[bool; 2]>()).prop_map(
+        |(synchronisation, minimum_duration_s, cycle_s, [settled, minimum])| Timing {
+            synchronisation,
+            minimum_duration_s: if minimum { minimum_duration_s } else { 0.0 },
+            cycle_s,
+            return_to_limits: if settled { Return::Settled } else { Return::Fastest },
+        },
+    )
+}
+
+fn are_numbers(profiles: &[Profile]) -> bool {
+    profiles.iter().all(|profile| {
+        let times = [-1.0, 0.0, 0.3, 0.5, 0.9, 1.0].map(|part| part * profile.duration_s());
+        let extrema = profile.extrema();
+        profile.duration_s() >= 0.0
+            && times.into_iter().all(|time_s| {
+                let State { position, velocity, acceleration } = profile.sample(time_s);
+                position.is_finite() && velocity.is_finite() && acceleration.is_finite()
+            })
+            && extrema.position.max.is_finite()
+            && extrema.velocity.max.is_finite()
+    })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 5000, failure_persistence: None, rng_seed: RngSeed::Fixed(4), ..ProptestConfig::default() })]
+
+    #[test]
+    fn an_answer_is_a_number_everywhere(problems in prop::collection::vec(problem(), 1..4), timing in timing()) {
+        let mut profiles = vec![Profile::hold(0.0); problems.len()];
+        if let Ok(duration_s) = synchronised(&problems, &mut profiles, timing) {
+            prop_assert!(duration_s.is_finite() && are_numbers(&profiles));
+        }
+        if let Ok(duration_s) = synchronised_velocity(&problems, &mut profiles, timing) {
+            prop_assert!(duration_s.is_finite() && are_numbers(&profiles));
+        }
+        let starts: Vec<State> = problems.iter().map(|problem| problem.start).collect();
+        let limits: Vec<Limits> = problems.iter().map(|problem| problem.limits).collect();
+        if let Ok(duration_s) = stop(&starts, &limits, &mut profiles) {
+            prop_assert!(duration_s.is_finite() && are_numbers(&profiles));
+        }
+        if let Ok(next) = problems[0].track(0.001) {
+            prop_assert!(next.position.is_finite() && next.velocity.is_finite() && next.acceleration.is_finite());
+        }
+    }
+}

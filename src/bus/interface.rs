@@ -1,0 +1,321 @@
+//! A CAN network interface of Linux: its state and bit timing, read and set over netlink.
+
+use std::fs;
+use std::io;
+use std::path::Path;
+
+use socketcan::nl::{CanBitTiming, CanCtrlModes, CanState, InterfaceDetails, Mtu};
+use socketcan::{CanCtrlMode, CanInterface, InterfaceCanParams};
+use takt_rt::port::BusState;
+use thiserror::Error;
+
+/// The hardware type of CAN interfaces (`ARPHRD_CAN`), as `/sys/class/net/NAME/type` gives it.
+const CAN_HARDWARE_TYPE: &str = "280";
+
+/// How fast a bus is to be, and how its controller recovers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct InterfaceSettings {
+    /// Bit/s of classic frames and of the arbitration phase.
+    pub bit_rate: u32,
+    /// Bit/s of the data phase of CAN FD frames; `None` for a classic bus.
+    pub data_bit_rate: Option<u32>,
+    /// After how many milliseconds a controller that has gone off the bus comes back by itself; 0 never.
+    pub restart_ms: u32,
+}
+
+/// What an interface is and how it is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct InterfaceStatus {
+    /// Its name.
+    pub name: String,
+    /// Whether it is up.
+    pub is_up: bool,
+    /// Whether it carries CAN FD frames.
+    pub has_fd: bool,
+    /// The bit timing of its controller; `None` for a virtual interface, which has none, and for a controller
+    /// that was never configured.
+    pub timing: Option<Timing>,
+    /// That of the data phase.
+    pub data_timing: Option<Timing>,
+    /// After how many milliseconds the controller comes back from bus-off by itself; 0 never. `None` for a
+    /// virtual interface.
+    pub restart_ms: Option<u32>,
+    /// The controller's state.
+    pub state: BusState,
+    /// The controller's transmit and receive error counters, where the driver tells them.
+    pub error_counters: Option<(u16, u16)>,
+    /// Whether there is a controller behind it, in contrast to vcan, vxcan and slcan.
+    pub has_controller: bool,
+}
+
+/// The bit timing in force.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Timing {
+    /// Bit/s.
+    pub bit_rate: u32,
+    /// Where in the bit its level is sampled, 0 to 1.
+    pub sample_point: f64,
+}
+
+/// Why an interface cannot be used. The text ends with the command that mends it.
+#[derive(Debug, Error)]
+pub enum InterfaceError {
+    /// There is none of that name.
+    #[error(
+        "there is no interface {name}; `ip -brief link` lists those there are (for a virtual one: sudo ip link add dev {name} type vcan)"
+    )]
+    Missing {
+        /// The name asked for.
+        name: String,
+    },
+    /// It is another kind of network.
+    #[error("{name} is not a CAN interface")]
+    NotCan {
+        /// The name asked for.
+        name: String,
+    },
+    /// It runs, at another bit rate. A running bus is not stopped behind the back of others that use it.
+    #[error(
+        "{name} runs at {found} bit/s and {wanted} are configured; to change it: sudo ip link set {name} down && {command}"
+    )]
+    BitRateDiffers {
+        /// The interface.
+        name: String,
+        /// Bit/s in force.
+        found: u32,
+        /// Bit/s asked for.
+        wanted: u32,
+        /// The command that sets it up, once it is down.
+        command: String,
+    },
+    /// It does not carry CAN FD frames and is to do so.
+    #[error("{name} does not carry CAN FD frames; to change it: sudo ip link set {name} down && {command}")]
+    NoFd {
+        /// The interface.
+        name: String,
+        /// The command that sets it up, once it is down.
+        command: String,
+    },
+    /// This process may not configure it.
+    #[error("{name} is down and this process may not bring it up; to do so: {command}")]
+    NotPermitted {
+        /// The interface.
+        name: String,
+        /// The command that brings it up.
+        command: String,
+    },
+    /// The system refused for another reason.
+    #[error("{name}: {action}: {reason}")]
+    System {
+        /// The interface.
+        name: String,
+        /// What was tried.
+        action: &'static str,
+        /// What the system said.
+        reason: String,
+    },
+}
+
+/// Reads what an interface is and how it is. Needs no right.
+pub fn interface_status(name: &str) -> Result<InterfaceStatus, InterfaceError> {
+    let details = open(name)?.details().map_err(|error| system(name, "reading its state", &error))?;
+    Ok(status_of(name, &details))
+}
+
+/// Brings an interface up as the settings say, as far as that is needed and this process may, and returns how
+/// it is then. One that is up already is only compared: it belongs to whoever brought it up.
+pub fn prepare_interface(
+    name: &str,
+    settings: &InterfaceSettings,
+) -> Result<InterfaceStatus, InterfaceError> {
+    let status = interface_status(name)?;
+    if status.is_up {
+        compare(&status, settings)?;
+        return Ok(status);
+    }
+    let interface = open(name)?;
+    let is_controller = status.has_controller;
+    let refused = |action, error: &socketcan::Error| match permission_error(error) {
+        true => InterfaceError::NotPermitted { name: name.into(), command: command(&status, settings) },
+        false => system(name, action, error),
+    };
+    if is_controller {
+        interface
+            .set_can_params(&parameters(settings))
+            .map_err(|error| refused("setting the bit rate", &error))?;
+    } else if settings.data_bit_rate.is_some() {
+        interface.set_mtu(Mtu::Fd).map_err(|error| refused("allowing CAN FD frames", &error))?;
+    }
+    interface.bring_up().map_err(|error| refused("bringing it up", &error))?;
+    let status = interface_status(name)?;
+    compare(&status, settings)?;
+    Ok(status)
+}
+
+fn open(name: &str) -> Result<CanInterface, InterfaceError> {
+    let folder = Path::new("/sys/class/net").join(name);
+    // A name with a slash is none of an interface's, and is not one of a file's either.
+    if name.is_empty() || name.contains('/') || !folder.exists() {
+        return Err(InterfaceError::Missing { name: name.into() });
+    }
+    let kind = fs::read_to_string(folder.join("type")).unwrap_or_default();
+    if kind.trim() != CAN_HARDWARE_TYPE {
+        return Err(InterfaceError::NotCan { name: name.into() });
+    }
+    CanInterface::open(name).map_err(|error| system(name, "opening it", &error))
+}
+
+fn status_of(name: &str, details: &InterfaceDetails) -> InterfaceStatus {
+    let can = &details.can;
+    let has_controller = can.clock.is_some();
+    let state = match can.state {
+        _ if !details.is_up => BusState::Down,
+        Some(CanState::ErrorPassive) => BusState::ErrorPassive,
+        Some(CanState::BusOff) => BusState::BusOff,
+        Some(CanState::Stopped | CanState::Sleeping) => BusState::Down,
+        Some(CanState::ErrorActive | CanState::ErrorWarning) | None => BusState::ErrorActive,
+    };
+    InterfaceStatus {
+        name: name.into(),
+        is_up: details.is_up,
+        has_fd: details.mtu == Some(Mtu::Fd),
+        timing: can.bit_timing.and_then(timing_of),
+        data_timing: can.data_bit_timing.and_then(timing_of),
+        restart_ms: can.restart_ms.filter(|_| has_controller),
+        state,
+        error_counters: can.berr_counter.map(|counter| (counter.txerr, counter.rxerr)),
+        has_controller,
+    }
+}
+
+/// A controller that was never configured has a bit rate of zero. The kernel gives the sample point in thousandths.
+fn timing_of(timing: CanBitTiming) -> Option<Timing> {
+    (timing.bitrate != 0)
+        .then(|| Timing { bit_rate: timing.bitrate, sample_point: f64::from(timing.sample_point) / 1_000.0 })
+}
+
+/// The kernel chooses the sample point as CiA recommends (75 % above 800 kbit/s, 80 % above 500 kbit/s, else 87.5 %),
+/// or as near to it as the controller's clock allows.
+fn parameters(settings: &InterfaceSettings) -> InterfaceCanParams {
+    let timing = |bitrate| CanBitTiming { bitrate, ..CanBitTiming::default() };
+    InterfaceCanParams {
+        bit_timing: Some(timing(settings.bit_rate)),
+        data_bit_timing: settings.data_bit_rate.map(timing),
+        ctrl_mode: settings.data_bit_rate.map(|_| CanCtrlModes::from_mode(CanCtrlMode::Fd, true)),
+        restart_ms: Some(settings.restart_ms),
+        ..InterfaceCanParams::default()
+    }
+}
+
+/// Whether an interface that is up is as it is to be. A virtual one has no bit rate and takes any.
+fn compare(status: &InterfaceStatus, settings: &InterfaceSettings) -> Result<(), InterfaceError> {
+    let pairs = [(status.timing, Some(settings.bit_rate)), (status.data_timing, settings.data_bit_rate)];
+    for (timing, wanted) in pairs {
+        if let (Some(timing), Some(wanted)) = (timing, wanted)
+            && timing.bit_rate != wanted
+        {
+            return Err(InterfaceError::BitRateDiffers {
+                name: status.name.clone(),
+                found: timing.bit_rate,
+                wanted,
+                command: command(status, settings),
+            });
+        }
+    }
+    if settings.data_bit_rate.is_some() && !status.has_fd {
+        return Err(InterfaceError::NoFd { name: status.name.clone(), command: command(status, settings) });
+    }
+    Ok(())
+}
+
+/// The command that brings the interface up as it is to be.
+fn command(status: &InterfaceStatus, settings: &InterfaceSettings) -> String {
+    let name = &status.name;
+    match (status.has_controller, settings.data_bit_rate) {
+        (false, None) => format!("sudo ip link set {name} up"),
+        (false, Some(_)) => format!("sudo ip link set {name} mtu 72 up"),
+        (true, data_bit_rate) => {
+            let data = data_bit_rate.map(|rate| format!(" dbitrate {rate} fd on")).unwrap_or_default();
+            let InterfaceSettings { bit_rate, restart_ms, .. } = settings;
+            format!("sudo ip link set {name} up type can bitrate {bit_rate}{data} restart-ms {restart_ms}")
+        }
+    }
+}
+
+fn permission_error(error: &socketcan::Error) -> bool {
+    let kind = match error {
+        socketcan::Error::Io(error) => Some(error.kind()),
+        socketcan::Error::Nl(error) => error.io_kind(),
+        socketcan::Error::Can(_) => None,
+    };
+    kind == Some(io::ErrorKind::PermissionDenied)
+}
+
+fn system(name: &str, action: &'static str, error: &socketcan::Error) -> InterfaceError {
+    InterfaceError::System { name: name.into(), action, reason: error.to_string() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn up(timing: Option<u32>) -> InterfaceStatus {
+        let timing = timing.map(|bit_rate| Timing { bit_rate, sample_point: 0.875 });
+        InterfaceStatus {
+            name: "can0".into(),
+            is_up: true,
+            has_fd: false,
+            timing,
+            data_timing: None,
+            restart_ms: timing.map(|_| 100),
+            state: BusState::ErrorActive,
+            error_counters: None,
+            has_controller: timing.is_some(),
+        }
+    }
+
+    const CLASSIC: InterfaceSettings =
+        InterfaceSettings { bit_rate: 1_000_000, data_bit_rate: None, restart_ms: 100 };
+    const FLEXIBLE: InterfaceSettings = InterfaceSettings { data_bit_rate: Some(5_000_000), ..CLASSIC };
+
+    #[test]
+    fn a_missing_interface_and_one_that_is_no_can_are_told_apart() {
+        for name in ["takt-none", "", "..", "../lo"] {
+            let error = interface_status(name).unwrap_err();
+            assert!(
+                matches!(error, InterfaceError::Missing { .. } | InterfaceError::NotCan { .. }),
+                "{error}"
+            );
+        }
+        assert!(matches!(interface_status("lo"), Err(InterfaceError::NotCan { .. })));
+        let text = interface_status("vcan9").unwrap_err().to_string();
+        assert!(text.contains("sudo ip link add dev vcan9 type vcan"), "{text}");
+    }
+
+    #[test]
+    fn a_running_bus_at_another_bit_rate_is_refused_with_the_command_that_changes_it() {
+        let text = compare(&up(Some(500_000)), &CLASSIC).unwrap_err().to_string();
+        assert!(text.contains("runs at 500000 bit/s and 1000000 are configured"), "{text}");
+        let command =
+            "sudo ip link set can0 down && sudo ip link set can0 up type can bitrate 1000000 restart-ms 100";
+        assert!(text.ends_with(command), "{text}");
+        assert!(compare(&up(Some(1_000_000)), &CLASSIC).is_ok());
+    }
+
+    #[test]
+    fn a_virtual_interface_takes_any_bit_rate_and_needs_room_for_fd_frames() {
+        assert!(compare(&up(None), &CLASSIC).is_ok());
+        let text = compare(&up(None), &FLEXIBLE).unwrap_err().to_string();
+        assert!(text.ends_with("sudo ip link set can0 mtu 72 up"), "{text}");
+        assert!(compare(&InterfaceStatus { has_fd: true, ..up(None) }, &FLEXIBLE).is_ok());
+    }
+
+    #[test]
+    fn the_command_for_a_flexible_bus_names_both_rates() {
+        let text = command(&up(Some(1)), &FLEXIBLE);
+        assert_eq!(
+            text,
+            "sudo ip link set can0 up type can bitrate 1000000 dbitrate 5000000 fd on restart-ms 100"
+        );
+    }
+}

@@ -1,0 +1,309 @@
+//! What `takt check` found out, for people. Axes and buses that are alike are shown once.
+
+use std::fmt::Write as _;
+
+use takt::bus::schedule::text::{message_name, microseconds, narrow, remedy, reserve, shortfall, sums};
+use takt::bus::schedule::{BusSchedule, MessageSchedule};
+use takt::config::{Bus, Config};
+
+use super::{AxisCheck, Check};
+use crate::cli::table::Table;
+
+/// All of it.
+pub fn whole(check: &Check, config: &Config) -> String {
+    let mut text = format!(
+        "{}: {} axes on {} buses, a cycle of {} with the command phase at {} µs{}\n",
+        check.name,
+        check.axes.len(),
+        check.buses.len(),
+        time(check.cycle_ns),
+        microseconds(check.command_phase_ns),
+        automatic(check),
+    );
+    let axes = alike(&check.axes, is_shown_alike);
+    let _ = write!(text, "\nLimits\n{}\nUnits\n{}", limits_table(&axes), units_table(&axes));
+
+    let both: Vec<_> = check.buses.iter().zip(&config.buses).collect();
+    let groups = groups(&both);
+    let _ = write!(
+        text,
+        "\nBuses in the worst slot (times in µs after its SYNC is due)\n{}",
+        buses_table(&groups)
+    );
+    for group in &groups {
+        text.push('\n');
+        text.push_str(&bus_text(group));
+    }
+    text.push_str(
+        "\nresponse: from being queued until received, whatever else is queued when (Davis, Burns, Bril, Lukkien \
+         2007)\nin slot by: after SYNC is due, with everything in its place in the slot\n",
+    );
+    let _ = writeln!(text, "\n{}", verdict(check));
+    text
+}
+
+fn verdict(check: &Check) -> &'static str {
+    if !check.fits {
+        "REFUSED: not every bus carries its traffic in the worst case."
+    } else if check.buses.iter().any(BusSchedule::is_narrow) {
+        "Every bus carries its traffic in the worst case, but with little reserve."
+    } else {
+        "Every bus carries its traffic in the worst case."
+    }
+}
+
+fn automatic(check: &Check) -> String {
+    match check.automatic_command_phase_ns {
+        Some(phase_ns) if phase_ns == check.command_phase_ns => " (as \"auto\" has it)".to_owned(),
+        Some(phase_ns) => format!(" (\"auto\": {} µs)", microseconds(phase_ns)),
+        None => String::new(),
+    }
+}
+
+/// The elements that follow each other and are alike.
+fn alike<T>(elements: &[T], are_alike: impl Fn(&T, &T) -> bool) -> Vec<&[T]> {
+    elements.chunk_by(are_alike).collect()
+}
+
+/// `a`, or `a, b`, or `a … z`; each name once where it is repeated.
+fn span<'a>(names: impl Iterator<Item = &'a str>) -> String {
+    let mut different: Vec<&str> = names.collect();
+    different.dedup();
+    match different[..] {
+        [first, _, .., last] if different.len() > 2 => format!("{first} … {last}"),
+        _ => different.join(", "),
+    }
+}
+
+/// The same with how many there are, where not all of them are named.
+fn counted_span<'a>(names: impl ExactSizeIterator<Item = &'a str>) -> String {
+    let count = names.len();
+    let span = span(names);
+    if count > 2 { format!("{span} ({count})") } else { span }
+}
+
+fn is_shown_alike(first: &AxisCheck, second: &AxisCheck) -> bool {
+    let anonymous =
+        |axis: &AxisCheck| AxisCheck { name: String::new(), bus: String::new(), node: 0, ..axis.clone() };
+    anonymous(first) == anonymous(second)
+}
+
+fn limits_table(axes: &[&[AxisCheck]]) -> Table {
+    let mut table = Table::new([
+        "axis",
+        "bus",
+        ">node",
+        "mode",
+        "unit",
+        ">lowest",
+        ">highest",
+        ">velocity",
+        ">acceleration",
+        ">deceleration",
+        ">jerk",
+        ">torque",
+        "following error",
+    ]);
+    for (group, axis) in axes.iter().filter_map(|group| Some((group, group.first()?))) {
+        let (lowest, highest) =
+            group.iter().fold((u8::MAX, 0), |(low, high), axis| (low.min(axis.node), high.max(axis.node)));
+        table.row([
+            counted_span(group.iter().map(|axis| axis.name.as_str())),
+            span(group.iter().map(|axis| axis.bus.as_str())),
+            if lowest == highest { lowest.to_string() } else { format!("{lowest} to {highest}") },
+            axis.mode.to_owned(),
+            axis.unit().to_owned(),
+            format!("{:.4}", axis.position_min),
+            format!("{:.4}", axis.position_max),
+            format!("{:.4}", axis.velocity),
+            format!("{:.2}", axis.acceleration),
+            format!("{:.2}", axis.deceleration),
+            axis.jerk.map_or("none".to_owned(), |jerk| format!("{jerk:.1}")),
+            format!("{:.1} {}", axis.torque, if axis.is_linear { "N" } else { "Nm" }),
+            format!("{:.4} for {}", axis.following_error, time(axis.following_error_time_ns)),
+        ]);
+    }
+    table
+}
+
+fn units_table(axes: &[&[AxisCheck]]) -> Table {
+    let mut table =
+        Table::new(["axis", "counts per unit", "one count", "counts per cycle at full speed", "counts"]);
+    for (group, axis) in axes.iter().filter_map(|group| Some((group, group.first()?))) {
+        let [lowest, highest] = axis.counts_range;
+        table.row([
+            counted_span(group.iter().map(|axis| axis.name.as_str())),
+            format!("{:.3} per {}", axis.counts_per_unit, axis.unit()),
+            format!("{:.3} µ{}", axis.resolution * 1e6, axis.unit()),
+            format!("{:.1}", axis.counts_per_cycle),
+            format!("{lowest} to {highest}"),
+        ]);
+    }
+    table
+}
+
+/// Buses that differ in names and identifiers alone.
+type Group<'a> = Vec<(&'a BusSchedule, &'a Bus)>;
+
+fn groups<'a>(buses: &[(&'a BusSchedule, &'a Bus)]) -> Vec<Group<'a>> {
+    let mut groups: Vec<(BusSchedule, Group<'a>)> = vec![];
+    for &(schedule, bus) in buses {
+        let anonymous = without_names(schedule);
+        match groups.iter_mut().find(|(known, _)| *known == anonymous) {
+            Some((_, group)) => group.push((schedule, bus)),
+            None => groups.push((anonymous, vec![(schedule, bus)])),
+        }
+    }
+    groups.into_iter().map(|(_, group)| group).collect()
+}
+
+/// What decides whether two buses are alike. What is late follows from it.
+fn without_names(schedule: &BusSchedule) -> BusSchedule {
+    let mut schedule = BusSchedule { name: String::new(), shortfalls: vec![], ..schedule.clone() };
+    for message in &mut schedule.messages {
+        message.axis = None;
+        message.id = 0;
+    }
+    schedule
+}
+
+fn names(group: &Group<'_>) -> String {
+    counted_span(group.iter().map(|(schedule, _)| schedule.name.as_str()))
+}
+
+fn buses_table(groups: &[Group<'_>]) -> Table {
+    let mut table = Table::new([
+        "bus",
+        "interface",
+        ">kbit/s",
+        ">load",
+        ">feedback by",
+        ">command phase",
+        ">set-points by",
+        ">next SYNC",
+        "command phase possible",
+        "verdict",
+    ]);
+    for (group, (schedule, _)) in groups.iter().filter_map(|group| Some((group, group.first()?))) {
+        let interfaces: Vec<String> = group.iter().map(|(_, bus)| bus.interface.to_string()).collect();
+        let phases = schedule.slot.command_phases_ns.map_or("none".to_owned(), |(earliest, latest)| {
+            format!("{} to {}", microseconds(earliest), microseconds(latest))
+        });
+        table.row([
+            names(group),
+            span(interfaces.iter().map(String::as_str)),
+            (schedule.bit_rate / 1000).to_string(),
+            format!("{:.1} %", schedule.load_percent),
+            microseconds(schedule.slot.feedback_done_ns),
+            microseconds(schedule.command_phase_ns),
+            microseconds(schedule.slot.set_points_done_ns),
+            microseconds(schedule.period_ns),
+            phases,
+            match (schedule.fits(), schedule.is_narrow()) {
+                (true, false) => "fits",
+                (true, true) => "fits narrowly",
+                (false, _) => "DOES NOT FIT",
+            }
+            .to_owned(),
+        ]);
+    }
+    table
+}
+
+fn bus_text(group: &Group<'_>) -> String {
+    let Some((schedule, _)) = group.first() else { return String::new() };
+    let whose = match group.len() {
+        1 => String::new(),
+        alike => {
+            format!(", and {} alike", if alike == 2 { "one".to_owned() } else { (alike - 1).to_string() })
+        }
+    };
+    let mut text =
+        format!("Bus {}{whose} (times in µs)\n{}", schedule.name, message_table(&schedule.messages));
+    for line in sums(schedule).into_iter().chain(reserve(schedule)) {
+        let _ = writeln!(text, "  {line}");
+    }
+    match narrow(schedule) {
+        Some(why) => {
+            let _ = writeln!(text, "  fits narrowly: {why}");
+        }
+        None if schedule.fits() => text.push_str("  fits\n"),
+        None => {}
+    }
+    for line in schedule.shortfalls.iter().map(shortfall) {
+        let _ = writeln!(text, "  DOES NOT FIT: {line}");
+    }
+    for line in schedule.remedies.iter().map(remedy) {
+        let _ = writeln!(text, "  what would fit: {line}");
+    }
+    text
+}
+
+fn message_table(messages: &[MessageSchedule]) -> Table {
+    let mut table = Table::new([
+        "id",
+        "message",
+        "axis",
+        ">bytes",
+        ">bits",
+        ">on the wire",
+        ">period",
+        ">response",
+        ">in slot by",
+        ">due",
+        ">early",
+    ]);
+    for group in alike(messages, are_shown_alike) {
+        let [message, ..] = group else { continue };
+        let first_id = format!("{:03X}", message.id);
+        let id = match group {
+            [_, .., last] => format!("{first_id}-{:03X}", last.id),
+            _ => first_id,
+        };
+        let bound = |ns: Option<u64>| match ns {
+            Some(ns) => microseconds(ns),
+            None if message.is_sent_while_enabled => "no bound".to_owned(),
+            None => "-".to_owned(),
+        };
+        table.row([
+            id,
+            message_name(message.kind).to_owned(),
+            span(group.iter().filter_map(|message| message.axis.as_deref())),
+            message.length.to_string(),
+            message.bits.to_string(),
+            microseconds(message.transmission_ns),
+            if message.is_sent_while_enabled { time(message.period_ns) } else { "while disabled".to_owned() },
+            bound(message.response_ns),
+            message.in_slot_ns.map_or("-".to_owned(), microseconds),
+            message.deadline_ns.map_or("-".to_owned(), microseconds),
+            earliness(message),
+        ]);
+    }
+    table
+}
+
+/// How much earlier than due.
+fn earliness(message: &MessageSchedule) -> String {
+    let Some(deadline_ns) = message.deadline_ns else { return "-".to_owned() };
+    match message.in_slot_ns.or(message.response_ns) {
+        Some(ns) if ns <= deadline_ns => microseconds(deadline_ns - ns),
+        Some(ns) => format!("{} LATE", microseconds(ns - deadline_ns)),
+        None => "LATE".to_owned(),
+    }
+}
+
+fn are_shown_alike(first: &MessageSchedule, second: &MessageSchedule) -> bool {
+    let anonymous = |message: &MessageSchedule| MessageSchedule { axis: None, id: 0, ..message.clone() };
+    anonymous(first) == anonymous(second)
+}
+
+/// A length of time in the unit that suits it.
+fn time(ns: u64) -> String {
+    if ns >= 1_000_000_000 && ns.is_multiple_of(100_000_000) {
+        format!("{} s", ns as f64 / 1e9)
+    } else if ns >= 1_000_000 && ns.is_multiple_of(100_000) {
+        format!("{} ms", ns as f64 / 1e6)
+    } else {
+        format!("{} µs", microseconds(ns))
+    }
+}

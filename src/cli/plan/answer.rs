@@ -1,0 +1,98 @@
+//! An answer as it is written in a line.
+
+use serde::Serialize;
+use takt_rt::plan::{Extrema, PlanError, Profile};
+
+/// The number of sample times, from the start to the end.
+const SAMPLES: u32 = 16;
+
+/// The answer to one problem.
+#[derive(Serialize, Debug)]
+pub struct Answer {
+    id: serde_json::Value,
+    /// `ok`, or the name of the error.
+    result: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    message: Option<String>,
+    #[serde(flatten, skip_serializing_if = "Option::is_none")]
+    trajectory: Option<Trajectory>,
+}
+
+/// Times in s; one number an axis, or a list of these for each sample time.
+#[derive(Serialize, Debug)]
+struct Trajectory {
+    duration: f64,
+    t_min: Vec<f64>,
+    t: Vec<f64>,
+    p: Vec<Vec<f64>>,
+    v: Vec<Vec<f64>>,
+    a: Vec<Vec<f64>>,
+    pmin: Vec<f64>,
+    pmax: Vec<f64>,
+}
+
+impl Answer {
+    /// There is a trajectory.
+    pub fn planned(id: serde_json::Value, duration_s: f64, profiles: &[Profile]) -> Self {
+        let times: Vec<f64> =
+            (0..SAMPLES).map(|k| duration_s * f64::from(k) / f64::from(SAMPLES - 1)).collect();
+        let states: Vec<Vec<_>> = times
+            .iter()
+            .map(|time_s| profiles.iter().map(|profile| profile.sample(*time_s)).collect())
+            .collect();
+        let extrema: Vec<Extrema> = profiles.iter().map(Profile::extrema).collect();
+        let trajectory = Trajectory {
+            duration: duration_s,
+            t_min: profiles.iter().map(Profile::minimum_duration_s).collect(),
+            p: states.iter().map(|states| states.iter().map(|state| state.position).collect()).collect(),
+            v: states.iter().map(|states| states.iter().map(|state| state.velocity).collect()).collect(),
+            a: states.iter().map(|states| states.iter().map(|state| state.acceleration).collect()).collect(),
+            t: times,
+            pmin: extrema.iter().map(|extrema| extrema.position.min).collect(),
+            pmax: extrema.iter().map(|extrema| extrema.position.max).collect(),
+        };
+        Self { id, result: "ok".into(), message: None, trajectory: Some(trajectory) }
+    }
+
+    /// There is none.
+    pub fn refused(id: serde_json::Value, error: PlanError) -> Self {
+        let (name, message) = words(error);
+        Self { id, result: name.into(), message: Some(message), trajectory: None }
+    }
+
+    /// The line is not a problem.
+    pub fn malformed(line: usize, message: String) -> Self {
+        let message = Some(format!("line {line}: {message}"));
+        Self { id: serde_json::Value::Null, result: "malformed".into(), message, trajectory: None }
+    }
+}
+
+/// The name of the error, and what it says.
+fn words(error: PlanError) -> (&'static str, String) {
+    match error {
+        PlanError::NotFinite { axis, quantity } => {
+            ("not_finite", format!("axis {axis}: the {quantity:?} is not a finite number"))
+        }
+        PlanError::InvalidLimit { axis, limit } => {
+            ("invalid_limit", format!("axis {axis}: {limit:?} is no limit of this kind"))
+        }
+        PlanError::TargetBeyondLimit { axis, limit } => {
+            ("target_beyond_limit", format!("axis {axis}: the target cannot be reached within {limit:?}"))
+        }
+        PlanError::PositionBeyondLimit { axis, limit } => {
+            ("position_beyond_limit", format!("axis {axis}: no trajectory to the target keeps {limit:?}"))
+        }
+        PlanError::NotStraight { axis } => {
+            ("not_straight", format!("axis {axis} is not in proportion to the others"))
+        }
+        PlanError::NotRepresentable { axis } => {
+            ("not_representable", format!("axis {axis}: the numbers are too large or too small"))
+        }
+        PlanError::LengthMismatch { expected, received } => {
+            ("length_mismatch", format!("{received} axes in place of {expected}"))
+        }
+        PlanError::InvalidTiming => {
+            ("invalid_timing", "`min_duration` or `dt` is negative or not a finite number".into())
+        }
+    }
+}

@@ -1,0 +1,156 @@
+//! A problem as it is written in a line.
+
+use serde::Deserialize;
+use takt_rt::plan::{
+    Limits, Problem, Profile, State, Synchronisation, Timing, synchronised, synchronised_velocity,
+};
+
+use super::answer::Answer;
+
+/// The problem, one number an axis in every list. What is left out is zero, or unlimited for a position or a jerk.
+#[derive(Deserialize, Debug)]
+pub struct Question {
+    #[serde(default)]
+    id: serde_json::Value,
+    #[serde(default)]
+    interface: Interface,
+    #[serde(default)]
+    sync: Sync,
+    /// The duration is a multiple of this.
+    dt: Option<f64>,
+    min_duration: Option<f64>,
+    p0: Vec<f64>,
+    #[serde(default)]
+    v0: Vec<f64>,
+    #[serde(default)]
+    a0: Vec<f64>,
+    #[serde(default)]
+    pf: Vec<f64>,
+    #[serde(default)]
+    vf: Vec<f64>,
+    #[serde(default)]
+    af: Vec<f64>,
+    vmax: Vec<f64>,
+    /// Minus `vmax` when left out.
+    vmin: Option<Vec<f64>>,
+    amax: Vec<f64>,
+    /// Minus `amax` when left out.
+    amin: Option<Vec<f64>>,
+    #[serde(default)]
+    jmax: Vec<Option<f64>>,
+    #[serde(default)]
+    pmin: Vec<Option<f64>>,
+    #[serde(default)]
+    pmax: Vec<Option<f64>>,
+}
+
+#[derive(Deserialize, Clone, Copy, Debug, Default)]
+#[serde(rename_all = "lowercase")]
+enum Interface {
+    #[default]
+    Position,
+    Velocity,
+}
+
+#[derive(Deserialize, Clone, Copy, Debug, Default)]
+#[serde(rename_all = "lowercase")]
+enum Sync {
+    #[default]
+    Time,
+    Phase,
+    Straight,
+    None,
+}
+
+impl Question {
+    /// Reads a line and checks that the lists belong together.
+    pub fn parse(line: &str) -> Result<Self, String> {
+        let question: Self = serde_json::from_str(line).map_err(|error| error.to_string())?;
+        question.check_lengths()?;
+        Ok(question)
+    }
+
+    fn check_lengths(&self) -> Result<(), String> {
+        let axes = self.p0.len();
+        let required = [("vmax", self.vmax.len()), ("amax", self.amax.len())];
+        let optional = [
+            ("v0", self.v0.len()),
+            ("a0", self.a0.len()),
+            ("pf", self.pf.len()),
+            ("vf", self.vf.len()),
+            ("af", self.af.len()),
+            ("vmin", self.vmin.as_ref().map_or(0, Vec::len)),
+            ("amin", self.amin.as_ref().map_or(0, Vec::len)),
+            ("jmax", self.jmax.len()),
+            ("pmin", self.pmin.len()),
+            ("pmax", self.pmax.len()),
+        ];
+        let wrong = required
+            .iter()
+            .find(|(_, length)| *length != axes)
+            .or_else(|| optional.iter().find(|(_, length)| *length != 0 && *length != axes));
+        match wrong {
+            Some((name, length)) => Err(format!("`{name}` has {length} numbers, `p0` has {axes}")),
+            None => Ok(()),
+        }
+    }
+
+    /// The problems of the axes.
+    pub fn problems(&self) -> Vec<Problem> {
+        let or_zero = |list: &[f64], axis: usize| list.get(axis).copied().unwrap_or(0.0);
+        let negative = |list: &Option<Vec<f64>>, max: f64, axis: usize| {
+            list.as_ref().and_then(|list| list.get(axis).copied()).unwrap_or(-max)
+        };
+        let or = |list: &[Option<f64>], axis: usize, otherwise: f64| {
+            list.get(axis).copied().flatten().unwrap_or(otherwise)
+        };
+        let state = |axis: usize, [position, velocity, acceleration]: [&[f64]; 3]| State {
+            position: or_zero(position, axis),
+            velocity: or_zero(velocity, axis),
+            acceleration: or_zero(acceleration, axis),
+        };
+        let limits = self.vmax.iter().zip(&self.amax).enumerate().map(|(axis, (vmax, amax))| {
+            Limits::asymmetric(
+                *vmax,
+                negative(&self.vmin, *vmax, axis),
+                *amax,
+                negative(&self.amin, *amax, axis),
+                or(&self.jmax, axis, f64::INFINITY),
+            )
+            .with_position(or(&self.pmin, axis, f64::NEG_INFINITY), or(&self.pmax, axis, f64::INFINITY))
+        });
+        limits
+            .enumerate()
+            .map(|(axis, limits)| Problem {
+                start: state(axis, [&self.p0, &self.v0, &self.a0]),
+                target: state(axis, [&self.pf, &self.vf, &self.af]),
+                limits,
+            })
+            .collect()
+    }
+
+    /// The answer, and the trajectory if there is one.
+    pub fn solve(&self) -> (Answer, Option<Vec<Profile>>) {
+        let problems = self.problems();
+        let mut profiles = vec![Profile::hold(0.0); problems.len()];
+        let timing = Timing {
+            synchronisation: match self.sync {
+                Sync::Time => Synchronisation::Time,
+                Sync::Phase => Synchronisation::Phase,
+                Sync::Straight => Synchronisation::Straight,
+                Sync::None => Synchronisation::Independent,
+            },
+            minimum_duration_s: self.min_duration.unwrap_or(0.0),
+            cycle_s: self.dt,
+            ..Timing::default()
+        };
+        let planned = match self.interface {
+            Interface::Position => synchronised(&problems, &mut profiles, timing),
+            Interface::Velocity => synchronised_velocity(&problems, &mut profiles, timing),
+        };
+        match planned {
+            Ok(duration_s) => (Answer::planned(self.id.clone(), duration_s, &profiles), Some(profiles)),
+            Err(error) => (Answer::refused(self.id.clone(), error), None),
+        }
+    }
+}

@@ -1,0 +1,94 @@
+//! `takt sim`: the configured drives, simulated on real interfaces.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+
+use clap::Args;
+use signal_hook::consts::{SIGINT, SIGTERM};
+
+use takt::bus::SocketCanOptions;
+use takt::bus::port::{OpenError, open_configured};
+use takt::config::Config;
+use takt::sim::LiveDrives;
+
+use super::configuration::{self, BusOverride};
+use super::exit::Exit;
+
+/// Put the drives of a configuration, simulated, on real interfaces, for any master to talk to.
+#[derive(Args, Debug)]
+pub struct Arguments {
+    /// The configuration (TOML)
+    config: PathBuf,
+    /// Connect a bus to another interface than the configuration says: can0, vcan0 …
+    #[arg(long = "bus", value_name = "NAME=INTERFACE")]
+    buses: Vec<BusOverride>,
+}
+
+/// Runs until Ctrl-C or SIGTERM.
+pub fn run(arguments: &Arguments) -> Exit {
+    let config = match configuration::load(&arguments.config, &arguments.buses) {
+        Ok(config) => config,
+        Err(exit) => return exit,
+    };
+    let drives = match open(&config) {
+        Ok(drives) => drives,
+        Err(error) => {
+            eprintln!("takt: {error}");
+            return Exit::Usage;
+        }
+    };
+    if drives.is_empty() {
+        eprintln!(
+            "takt: no bus has a real interface; name one, for example: --bus {}=vcan0",
+            first_bus(&config)
+        );
+        return Exit::Usage;
+    }
+    let is_stopped = Arc::new(AtomicBool::new(false));
+    for signal in [SIGINT, SIGTERM] {
+        if let Err(error) = signal_hook::flag::register(signal, Arc::clone(&is_stopped)) {
+            eprintln!("takt: cannot watch for Ctrl-C: {error}");
+            return Exit::Stopped;
+        }
+    }
+    let has_panicked = AtomicBool::new(false);
+    thread::scope(|scope| {
+        let threads: Vec<_> = drives
+            .into_iter()
+            .map(|(name, mut drives)| {
+                let nodes: Vec<String> = drives.nodes().map(|node| node.to_string()).collect();
+                eprintln!("bus `{name}`: nodes {}; Ctrl-C ends them", nodes.join(", "));
+                let is_stopped = Arc::clone(&is_stopped);
+                scope.spawn(move || drives.run(&is_stopped))
+            })
+            .collect();
+        for thread in threads {
+            if thread.join().is_err() {
+                has_panicked.store(true, Ordering::Relaxed);
+            }
+        }
+    });
+    if has_panicked.into_inner() { Exit::Stopped } else { Exit::Done }
+}
+
+/// The drives of every bus that has a real interface. They hear everything, as a node on a bus does.
+fn open(config: &Config) -> Result<Vec<(String, LiveDrives)>, OpenError> {
+    let mut all = vec![];
+    for (index, bus) in config.buses.iter().enumerate() {
+        let options = SocketCanOptions {
+            bit_rate: bus.bit_rate,
+            data_bit_rate: bus.data_bit_rate,
+            ..SocketCanOptions::default()
+        };
+        if let Some(port) = open_configured(config, index, &options)? {
+            all.push((bus.name.clone(), LiveDrives::new(config, index, port)));
+        }
+    }
+    Ok(all)
+}
+
+fn first_bus(config: &Config) -> &str {
+    config.buses.first().map_or("NAME", |bus| &bus.name)
+}

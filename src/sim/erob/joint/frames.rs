@@ -1,0 +1,157 @@
+//! Frames in, frames out.
+
+use takt_rt::frame::{Frame, FrameKind, Id};
+use takt_rt::time::Nanoseconds;
+
+use super::ErobJoint;
+use super::access::{Objects, write_field};
+use crate::sim::drive::{DriveFault, NmtState};
+use crate::sim::erob::dictionary::at;
+use crate::sim::erob::errors::Error;
+use crate::sim::erob::network::Reset;
+use crate::sim::erob::process_data::Received;
+use crate::sim::mailbox::Mailbox;
+
+impl ErobJoint {
+    pub(super) fn take(&mut self, now_ns: Nanoseconds, frame: &Frame, mailbox: &mut Mailbox) {
+        if frame.id().is_extended() || frame.is_fd() {
+            return;
+        }
+        if frame.kind() == FrameKind::Remote {
+            return self.take_remote(now_ns, frame, mailbox);
+        }
+        let node = u32::from(self.parameters.node);
+        let id = frame.id().value();
+        match id {
+            0x000 => self.take_nmt(now_ns, frame.payload()),
+            0x701..=0x77F => self.network.heard(now_ns, (id & 0x7F) as u8, &self.dictionary),
+            _ if id == 0x600 + node => {
+                if self.network.has_services()
+                    && let Ok(request) = frame.payload().try_into()
+                {
+                    self.take_request(now_ns, request);
+                }
+            }
+            _ if self.network.state() != NmtState::Operational => {}
+            _ if id == self.dictionary.get(at::SYNC_ID) & 0x7FF => self.take_sync(now_ns),
+            _ => self.take_pdo(now_ns, frame),
+        }
+    }
+
+    fn take_remote(&mut self, now_ns: Nanoseconds, frame: &Frame, mailbox: &mut Mailbox) {
+        if frame.id() == Id::canopen(0x700, self.parameters.node) {
+            if let Some(byte) = self.network.guarded(now_ns, &self.dictionary) {
+                mailbox.push(Frame::of(frame.id(), [byte]));
+            }
+        } else if self.network.state() == NmtState::Operational {
+            self.measure();
+            if let Some(answer) = self.process_data.requested(frame.id(), &self.dictionary) {
+                mailbox.put(answer);
+            }
+        }
+    }
+
+    fn take_nmt(&mut self, now_ns: Nanoseconds, payload: &[u8]) {
+        let &[command, node] = payload else { return };
+        if node != 0 && node != self.parameters.node || self.network.state() == NmtState::Initialising {
+            return;
+        }
+        match self.network.command(now_ns, command) {
+            Some(Reset::Node) => self.start(now_ns),
+            Some(Reset::Communication) => {
+                // The error register and history tell of the drive, not of the communication.
+                self.dictionary.restore(0x1005..=0x1FFF);
+                self.process_data.compile(&self.dictionary);
+            }
+            None => {}
+        }
+        self.rest();
+    }
+
+    /// Stops what the NMT state no longer allows.
+    pub(super) fn rest(&mut self) {
+        if self.network.state() != NmtState::Operational {
+            self.process_data.rest();
+        }
+        if !self.network.has_services() {
+            self.sdo.reset();
+        }
+    }
+
+    fn take_sync(&mut self, now_ns: Nanoseconds) {
+        self.lock_loops(now_ns);
+        self.process_data.apply_latched(&mut self.dictionary, write_field);
+        self.follow_mode();
+        self.evaluate(now_ns);
+        self.motion.latch(&self.dictionary);
+        self.measure();
+        self.process_data.sample(now_ns, self.parameters.feedback_delay_ns, &self.dictionary);
+    }
+
+    fn take_pdo(&mut self, now_ns: Nanoseconds, frame: &Frame) {
+        let target = self.dictionary.get(at::TARGET_POSITION);
+        match self.process_data.receive(frame, &mut self.dictionary, write_field) {
+            Received::NotMine => {}
+            Received::TooShort => {
+                // One message for a row of them.
+                if !self.has_pdo_error {
+                    self.has_pdo_error = true;
+                    self.errors.raise(Error::PdoLength, &mut self.dictionary);
+                }
+            }
+            Received::Latched => self.clear_pdo_error(),
+            Received::Applied => {
+                self.clear_pdo_error();
+                self.follow_mode();
+                self.evaluate(now_ns);
+                if self.dictionary.get(at::TARGET_POSITION) != target {
+                    self.motion.latch(&self.dictionary);
+                }
+            }
+        }
+    }
+
+    fn clear_pdo_error(&mut self) {
+        if self.has_pdo_error && !self.device.state().is_faulted() {
+            self.has_pdo_error = false;
+            self.errors.clear(&mut self.dictionary);
+        }
+    }
+
+    fn take_request(&mut self, now_ns: Nanoseconds, request: [u8; 8]) {
+        // The server is taken out for the time of the call, since it works on the rest of the drive.
+        let mut server = self.sdo.clone();
+        server.request(now_ns, request, &mut Objects { module: self, now_ns });
+        self.sdo = server;
+    }
+
+    /// Sends what is due.
+    pub(super) fn send_due(&mut self, now_ns: Nanoseconds, mailbox: &mut Mailbox) {
+        let node = self.parameters.node;
+        if self.network.boots(now_ns, &self.dictionary) {
+            self.device.started();
+            if self.has_battery_fault {
+                self.fail(Error::Fault(DriveFault::MultiTurnBattery));
+            }
+            mailbox.push(Frame::of(Id::canopen(0x700, node), [0]));
+        }
+        if let Some(byte) = self.network.heartbeat(now_ns, &self.dictionary) {
+            mailbox.push(Frame::of(Id::canopen(0x700, node), [byte]));
+        }
+        if self.network.has_services() {
+            if let Some(answer) = self.sdo.answer(now_ns) {
+                mailbox.push(Frame::of(Id::canopen(0x580, node), answer));
+            }
+            while let Some(message) = self.errors.next() {
+                mailbox.push(Frame::of(Id::canopen(0x080, node), message));
+            }
+        }
+        if self.network.state() == NmtState::Operational {
+            self.measure();
+            self.process_data.sample_events(now_ns, &self.dictionary);
+            while let Some(frame) = self.process_data.next(now_ns) {
+                mailbox.put(frame);
+            }
+        }
+    }
+}

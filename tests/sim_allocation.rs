@@ -1,0 +1,137 @@
+//! The simulated bus runs inside the real-time thread, so after its construction it takes no heap memory, whatever
+//! happens on it.
+#![allow(unsafe_code, reason = "a global allocator that counts cannot be written without")]
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+
+use takt::sim::erob::{ErobJoint, ErobParameters};
+use takt::sim::plant::{Encoder, JointParameters};
+use takt::sim::{BitRates, Drive, DriveFault, SimulatedBus};
+use takt_rt::frame::{Frame, Id};
+use takt_rt::port::{BusPort, ReceiveBatch};
+
+thread_local! {
+    static ALLOCATIONS: Cell<u64> = const { Cell::new(0) };
+}
+
+/// The system's allocator, with a count for each thread.
+struct Counting;
+
+// SAFETY: every call is handed on unchanged to the system's allocator; the count touches no memory of the heap.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        let _ = ALLOCATIONS.try_with(|count| count.set(count.get() + 1));
+        // SAFETY: the caller keeps the contract of `alloc`, which is the same here.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        // SAFETY: `pointer` came from `System` with this layout.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+
+    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        let _ = ALLOCATIONS.try_with(|count| count.set(count.get() + 1));
+        // SAFETY: `pointer` came from `System` with this layout, and the caller keeps the contract of `realloc`.
+        unsafe { System.realloc(pointer, layout, size) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+fn allocations() -> u64 {
+    ALLOCATIONS.with(Cell::get)
+}
+
+fn drive(node: u8) -> Box<dyn Drive> {
+    Box::new(ErobJoint::new(ErobParameters {
+        node,
+        joint: JointParameters {
+            inertia: 0.4,
+            viscous_friction: 1.5,
+            coulomb_friction: 4.0,
+            brake_torque: 110.0,
+        },
+        encoder: Encoder { counts_per_unit: 83_443.0, zero_counts: 0.0 },
+        counts_per_turn: 524_288.0,
+        initial_position: 0.0,
+        rated_torque: 31.0,
+        peak_torque: 56.0,
+        highest_velocity: 4.0,
+        power_up_ns: 5_000_000,
+        feedback_delay_ns: 20_000,
+        has_battery: true,
+        has_interpolated_position: false,
+        is_upload_segmented: false,
+        seed: 7,
+    }))
+}
+
+/// A second of a master's life: bring-up by SDO, SYNC, set-points, requests in between, a fault, a power cycle, and
+/// more frames than the queues hold.
+fn live(bus: &mut SimulatedBus, received: &mut usize) {
+    let mut batch = ReceiveBatch::new();
+    let request = |node: u8, bytes: [u8; 8]| Frame::of(Id::canopen(0x600, node), bytes);
+    let bring_up = [
+        [0x2F, 0x60, 0x60, 0, 8, 0, 0, 0],
+        [0x2B, 0x17, 0x10, 0, 10, 0, 0, 0],
+        [0x2F, 0x00, 0x14, 2, 1, 0, 0, 0],
+        [0x2F, 0x00, 0x18, 2, 1, 0, 0, 0],
+        [0x40, 0x72, 0x60, 0, 0, 0, 0, 0],
+    ];
+    for cycle in 0..1000u64 {
+        let now_ns = cycle * 1_000_000;
+        bus.send(now_ns, &[Frame::of(Id::canopen(0x080, 0), [])]);
+        let at = cycle as usize / 4;
+        for node in 1..=3 {
+            if let Some(bytes) = bring_up.get(at) {
+                bus.send(now_ns, &[request(node, *bytes)]);
+            }
+            if cycle == 60 {
+                bus.send(now_ns, &[Frame::of(Id::canopen(0x000, 0), [1, node])]);
+            }
+            let controlword = match cycle {
+                0..200 => 0x06,
+                200..300 => 0x07,
+                _ => 0x0F,
+            };
+            bus.send(now_ns + 600_000, &[Frame::of(Id::canopen(0x200, node), [controlword, 0])]);
+        }
+        match cycle {
+            500 => bus.inject(1, DriveFault::Encoder).unwrap(),
+            600 => bus.power_cycle(2).unwrap(),
+            700 => bus.silence(3, true).unwrap(),
+            800 => {
+                bus.send(now_ns + 700_000, &[Frame::of(Id::canopen(0x200, 99), []); 300]);
+            }
+            _ => {}
+        }
+        assert!(bus.unconfirmed(now_ns + 900_000) < 600);
+        loop {
+            batch.clear();
+            bus.receive(now_ns + 999_000, &mut batch);
+            *received += batch.len();
+            if !batch.is_full() {
+                break;
+            }
+        }
+        assert_eq!(bus.health().rx_overruns, 0);
+    }
+}
+
+#[test]
+fn a_second_on_the_simulated_bus_takes_no_heap_memory() {
+    let before = allocations();
+    let drives = [1, 2, 3].map(drive).into();
+    let mut bus = SimulatedBus::with_drives(BitRates { nominal: 1_000_000, data: None }, 5_000_000, drives);
+    let built = allocations();
+    assert!(built > before, "the allocator counts");
+    let mut received = 0;
+    live(&mut bus, &mut received);
+    assert_eq!(allocations(), built);
+    // Two thousand TPDOs and more, so it was not silence that needed no memory.
+    assert!(received > 2_000, "{received}");
+    assert_eq!(bus.observe(1).unwrap().error_code, 0x7305);
+}

@@ -1,0 +1,339 @@
+//! The SocketCAN port on a kernel's own interfaces. Needs root and vcan: `tests/vm/all` runs this in an emulated
+//! machine, `tests/vm/all --host` on this one.
+
+use std::process::Command;
+use std::thread::sleep;
+use std::time::Duration;
+
+use takt::bus::{
+    InterfaceError, InterfaceSettings, SocketCanOptions, interface_status, open_socketcan, prepare_interface,
+};
+use takt_rt::frame::{Frame, Id};
+use takt_rt::linux::{MonotonicClock, SocketCanPort};
+use takt_rt::port::{BusPort, BusState, Clock, ReceiveBatch, Received};
+
+/// A virtual interface of its own for each test, so that they can run side by side.
+struct VirtualCan(&'static str);
+
+impl VirtualCan {
+    fn new(name: &'static str) -> Self {
+        let _ = Command::new("ip").args(["link", "del", name]).output();
+        run(&["ip", "link", "add", "dev", name, "type", "vcan"]);
+        run(&["ip", "link", "set", name, "mtu", "72", "up"]);
+        Self(name)
+    }
+
+    fn port(&self, identifiers: &[Id]) -> SocketCanPort {
+        self.port_with(&SocketCanOptions { identifiers: identifiers.to_vec(), ..SocketCanOptions::default() })
+    }
+
+    fn port_with(&self, options: &SocketCanOptions) -> SocketCanPort {
+        open_socketcan(self.0, options).expect("the interface was just made")
+    }
+}
+
+impl Drop for VirtualCan {
+    fn drop(&mut self) {
+        let _ = Command::new("ip").args(["link", "del", self.0]).output();
+    }
+}
+
+fn run(command: &[&str]) {
+    let output = Command::new(command[0]).args(&command[1..]).output().expect("the program exists");
+    assert!(output.status.success(), "{command:?}: {}", String::from_utf8_lossy(&output.stderr));
+}
+
+fn id(number: u32) -> Id {
+    Id::base(number).unwrap()
+}
+
+fn frame(number: u32) -> Frame {
+    Frame::of(id(number), [1, 2, 3, 4])
+}
+
+fn received(port: &mut SocketCanPort) -> Vec<Received> {
+    let mut all = vec![];
+    loop {
+        let mut batch = ReceiveBatch::new();
+        port.receive(0, &mut batch);
+        all.extend(batch.iter().copied());
+        if batch.remaining_capacity() > 0 {
+            return all;
+        }
+    }
+}
+
+fn frames(port: &mut SocketCanPort) -> Vec<Frame> {
+    received(port).iter().map(|received| received.frame).collect()
+}
+
+/// Reads until `done`, for what another part of the kernel does in its own time. Generous: an emulated machine is
+/// slow, and what does not happen fails however long one waits.
+fn wait_for(port: &mut SocketCanPort, what: &str, mut done: impl FnMut(&mut SocketCanPort) -> bool) {
+    for _ in 0..2_000 {
+        frames(port);
+        if done(port) {
+            return;
+        }
+        sleep(Duration::from_millis(5));
+    }
+    panic!("waited in vain for {what}: {port:?}");
+}
+
+#[test]
+fn frames_of_all_kinds_cross_and_own_ones_only_confirm() {
+    let bus = VirtualCan::new("takt-kinds");
+    let (mut left, mut right) = (bus.port(&[]), bus.port(&[]));
+    let long = Id::extended(0x1ABC_DEF0).unwrap();
+    let sent = [
+        frame(0x201),
+        Frame::remote(long, 4).unwrap(),
+        Frame::data(long, &[]).unwrap(),
+        Frame::fd(id(0x7FF), &[9; 64], true).unwrap(),
+        Frame::fd(long, &[9; 12], false).unwrap(),
+    ];
+    assert_eq!(left.send(0, &sent), sent.len());
+    assert_eq!(frames(&mut right), sent);
+    assert_eq!(frames(&mut left), []);
+    assert_eq!(left.unconfirmed(0), 0);
+    assert_eq!((left.health().tx_frames, left.health().rx_frames), (5, 0));
+    assert_eq!((right.health().tx_frames, right.health().rx_frames), (0, 5));
+}
+
+#[test]
+fn the_kernel_filters_what_is_not_ours() {
+    let bus = VirtualCan::new("takt-filter");
+    let (mut ours, mut other) = (bus.port(&[id(0x181), id(0x201)]), bus.port(&[]));
+    let alike = Frame::of(Id::extended(0x181).unwrap(), [0]);
+    assert_eq!(other.send(0, &[frame(0x180), frame(0x181), alike, frame(0x182)]), 4);
+    assert_eq!(frames(&mut ours), [frame(0x181)]);
+    assert_eq!(ours.health().rx_frames, 1);
+    assert_eq!(ours.send(0, &[frame(0x201)]), 1);
+    frames(&mut ours);
+    assert_eq!(ours.unconfirmed(0), 0);
+}
+
+#[test]
+fn a_batch_larger_than_one_call_crosses_whole() {
+    let bus = VirtualCan::new("takt-batch");
+    let (mut left, mut right) = (bus.port(&[]), bus.port(&[]));
+    let sent: Vec<Frame> = (0..150).map(frame).collect();
+    assert_eq!(left.send(0, &sent), sent.len());
+    assert_eq!(frames(&mut right), sent);
+    frames(&mut left);
+    assert_eq!((left.unconfirmed(0), left.health().tx_frames), (0, 150));
+}
+
+#[test]
+fn an_interface_that_goes_down_is_a_state_and_comes_back() {
+    let bus = VirtualCan::new("takt-down");
+    let (mut port, mut other) = (bus.port(&[]), bus.port(&[]));
+    run(&["ip", "link", "set", bus.0, "down"]);
+    frames(&mut port);
+    assert_eq!(port.health().state, BusState::Down);
+    assert_eq!(port.send(0, &[frame(1), frame(2)]), 0);
+    assert_eq!((port.health().state, port.unconfirmed(0)), (BusState::Down, 0));
+    assert_eq!(port.health().tx_overruns, 0);
+    run(&["ip", "link", "set", bus.0, "up"]);
+    assert_eq!(port.send(0, &[frame(3)]), 1);
+    assert_eq!(port.health().state, BusState::ErrorActive);
+    frames(&mut port);
+    assert_eq!((port.unconfirmed(0), port.health().tx_frames), (0, 1));
+    assert_eq!(frames(&mut other), []);
+    assert_eq!(frames(&mut other), [frame(3)]);
+}
+
+#[test]
+fn an_interface_that_is_removed_is_down_for_good() {
+    let bus = VirtualCan::new("takt-gone");
+    let mut port = bus.port(&[]);
+    assert_eq!(port.send(0, &[frame(1)]), 1);
+    run(&["ip", "link", "del", bus.0]);
+    frames(&mut port);
+    assert_eq!(port.health().state, BusState::Down);
+    assert_eq!(port.send(0, &[frame(2)]), 0);
+    assert_eq!((port.health().state, port.unconfirmed(0)), (BusState::Down, 0));
+}
+
+#[test]
+fn received_frames_that_are_lost_are_counted() {
+    let bus = VirtualCan::new("takt-flood");
+    let options = SocketCanOptions { receive_frames: 16, ..SocketCanOptions::default() };
+    let (mut reader, mut sender) = (bus.port_with(&options), bus.port(&[]));
+    const SENT: u64 = 500;
+    for _ in 0..SENT {
+        assert_eq!(sender.send(0, &[frame(5)]), 1);
+        frames(&mut sender);
+    }
+    assert!(!frames(&mut reader).is_empty());
+    // The counter travels with the next frame that finds room.
+    sender.send(0, &[frame(6)]);
+    assert_eq!(frames(&mut reader), [frame(6)]);
+    let health = reader.health();
+    assert!(health.rx_overruns > 0);
+    assert_eq!(health.rx_frames + health.rx_overruns, SENT + 1);
+}
+
+#[test]
+fn lost_confirmations_hold_nothing_back() {
+    let bus = VirtualCan::new("takt-lost");
+    let options = SocketCanOptions { receive_frames: 16, ..SocketCanOptions::default() };
+    let mut port = bus.port_with(&options);
+    for _ in 0..100 {
+        assert_eq!(port.send(0, &[frame(5)]), 1);
+    }
+    assert_eq!(port.unconfirmed(0), 100);
+    frames(&mut port);
+    port.send(0, &[frame(6)]);
+    frames(&mut port);
+    assert_eq!(port.unconfirmed(0), 0);
+}
+
+#[test]
+fn arrivals_carry_the_kernels_time_on_the_monotonic_clock() {
+    let bus = VirtualCan::new("takt-time");
+    let (mut left, mut right) = (bus.port(&[]), bus.port(&[]));
+    let mut clock = MonotonicClock::default();
+    // Stamping begins a moment after the first socket of a machine asks for it.
+    sleep(Duration::from_millis(100));
+    let mut between = 0;
+    for _ in 0..50 {
+        let before_ns = clock.now_ns();
+        left.send(0, &[frame(1)]);
+        let sent_ns = clock.now_ns();
+        // What lies between sending and reading must not be part of the time of arrival.
+        sleep(Duration::from_millis(2));
+        let arrival = received(&mut right);
+        assert_eq!(arrival.len(), 1);
+        // The two clocks are read one after the other; half the way between them is the error.
+        let error_ns = 200_000;
+        between += usize::from((before_ns - error_ns..sent_ns + error_ns).contains(&arrival[0].at_ns));
+    }
+    // A machine may stall between the two readings, not always.
+    assert!(between > 25, "{between} of 50");
+}
+
+const SETTINGS: InterfaceSettings =
+    InterfaceSettings { bit_rate: 1_000_000, data_bit_rate: None, restart_ms: 100 };
+
+#[test]
+fn a_virtual_interface_is_brought_up_for_classic_and_for_fd_frames() {
+    let bus = VirtualCan::new("takt-prepare");
+    run(&["ip", "link", "set", bus.0, "down"]);
+    run(&["ip", "link", "set", bus.0, "mtu", "16"]);
+    assert_eq!(interface_status(bus.0).unwrap().state, BusState::Down);
+    let status = prepare_interface(bus.0, &SETTINGS).unwrap();
+    assert!(status.is_up && !status.has_fd && !status.has_controller);
+    assert_eq!((status.timing, status.restart_ms), (None, None));
+    let flexible = InterfaceSettings { data_bit_rate: Some(4_000_000), ..SETTINGS };
+    assert!(matches!(prepare_interface(bus.0, &flexible), Err(InterfaceError::NoFd { .. })));
+    run(&["ip", "link", "set", bus.0, "down"]);
+    assert!(prepare_interface(bus.0, &flexible).unwrap().has_fd);
+}
+
+/// The two SJA1000 controllers of the emulated machine, `can0` and `can1`, on one bus. Another machine need not have
+/// any, and if it has, they may be in use: there, what needs them is left out, and says so.
+struct Controllers;
+
+impl Controllers {
+    fn up() -> Option<Self> {
+        if std::env::var("TAKT_VM").is_ok_and(|vm| vm == "host") {
+            eprintln!("needs the emulated machine's controllers, and is left out on this one");
+            return None;
+        }
+        for name in ["can0", "can1"] {
+            prepare_interface(name, &SETTINGS).unwrap();
+        }
+        Some(Self)
+    }
+
+    fn port(&self, name: &str) -> SocketCanPort {
+        let options = SocketCanOptions { transmit_frames: 16, ..SocketCanOptions::default() };
+        open_socketcan(name, &options).unwrap()
+    }
+}
+
+impl Drop for Controllers {
+    fn drop(&mut self) {
+        for name in ["can0", "can1"] {
+            let _ = Command::new("tc").args(["qdisc", "del", "dev", name, "root"]).output();
+            let _ = Command::new("ip").args(["link", "set", name, "down"]).output();
+        }
+    }
+}
+
+#[test]
+fn controllers_are_configured_and_another_bit_rate_is_refused_while_they_run() {
+    let Some(_controllers) = Controllers::up() else { return };
+    for name in ["can0", "can1"] {
+        let status = interface_status(name).unwrap();
+        assert!(status.is_up && status.has_controller && !status.has_fd);
+        assert_eq!(status.timing.unwrap().bit_rate, 1_000_000);
+        assert_eq!(status.timing.unwrap().sample_point, 0.75);
+        assert_eq!(status.restart_ms, Some(100));
+        assert_eq!(status.state, BusState::ErrorActive);
+    }
+    let slower = InterfaceSettings { bit_rate: 500_000, ..SETTINGS };
+    let refusal = prepare_interface("can0", &slower).unwrap_err();
+    assert!(matches!(refusal, InterfaceError::BitRateDiffers { found: 1_000_000, wanted: 500_000, .. }));
+}
+
+#[test]
+fn controllers_exchange_frames_and_confirm_them() {
+    let Some(controllers) = Controllers::up() else { return };
+    let (mut left, mut right) = (controllers.port("can0"), controllers.port("can1"));
+    let sent: Vec<Frame> = (0x201..0x209).map(frame).collect();
+    assert_eq!(left.send(0, &sent), sent.len());
+    let mut arrived = vec![];
+    for _ in 0..2_000 {
+        arrived.extend(frames(&mut right));
+        frames(&mut left);
+        if arrived.len() >= sent.len() && left.unconfirmed(0) == 0 {
+            break;
+        }
+        sleep(Duration::from_millis(5));
+    }
+    assert_eq!(arrived, sent);
+    assert_eq!((left.unconfirmed(0), left.health().tx_frames), (0, 8));
+}
+
+#[test]
+fn frames_that_wait_for_the_bus_are_unconfirmed_and_what_finds_no_room_is_counted() {
+    let Some(controllers) = Controllers::up() else { return };
+    // A bucket of a few frames that fills at 125 byte/s stands in for a bus on which nobody acknowledges.
+    run(&[
+        "tc", "qdisc", "add", "dev", "can0", "root", "tbf", "rate", "1kbit", "burst", "80", "limit",
+        "1000000",
+    ]);
+    let mut port = controllers.port("can0");
+    let burst: Vec<Frame> = (0..60).map(frame).collect();
+    let taken = port.send(0, &burst);
+    assert!((16..40).contains(&taken), "{taken} frames were taken with room for 16 to wait");
+    assert_eq!(port.health().tx_overruns as usize, burst.len() - taken);
+    frames(&mut port);
+    assert!(port.unconfirmed(0) > 0);
+    // A frame or two may have left meanwhile, and their places be taken; nobody waits for more.
+    let taken = taken + port.send(0, &burst);
+    assert!(taken < 50, "{taken}");
+    assert_eq!(port.health().tx_overruns as usize, 2 * burst.len() - taken);
+    assert_eq!(port.health().state, BusState::ErrorActive);
+    wait_for(&mut port, "the queue to drain", |port| port.unconfirmed(0) == 0);
+    assert_eq!(port.health().tx_frames as usize, taken);
+}
+
+#[test]
+fn an_interface_that_goes_down_forgets_what_was_queued() {
+    let Some(controllers) = Controllers::up() else { return };
+    run(&[
+        "tc", "qdisc", "add", "dev", "can0", "root", "tbf", "rate", "1kbit", "burst", "80", "limit",
+        "1000000",
+    ]);
+    let mut port = controllers.port("can0");
+    let burst: Vec<Frame> = (0..12).map(frame).collect();
+    assert_eq!(port.send(0, &burst), burst.len());
+    frames(&mut port);
+    assert!(port.unconfirmed(0) > 0);
+    run(&["ip", "link", "set", "can0", "down"]);
+    frames(&mut port);
+    assert_eq!((port.health().state, port.unconfirmed(0)), (BusState::Down, 0));
+}
