@@ -4,6 +4,7 @@
 pub mod assemble;
 pub mod channels;
 mod program;
+pub mod quiet;
 pub mod realtime_thread;
 pub mod session;
 mod supervisor;

@@ -10,6 +10,7 @@ use takt_rt::linux::{MonotonicClock, PageFaults, RealtimeThread, SpinGuard, Thre
 use takt_rt::port::{BusPort, Clock};
 use takt_rt::time::Grid;
 
+use super::quiet;
 use crate::config::Realtime;
 
 /// Stack that the thread touches before it begins; the cycle uses a small part of it.
@@ -138,7 +139,7 @@ fn loop_body<P: BusPort, D: Door>(
     };
     let _ = say.send(Ok(Begun { report, spin_guard_ns }));
     let mut clock = MonotonicClock::new(spin_guard_ns);
-    let epoch_ns = clock.now_ns() + LEAD_IN_NS;
+    let epoch_ns = quiet::first_slot_after(clock.now_ns() + LEAD_IN_NS, period_ns);
     let mut cycle = Cycle::new(Grid::new(epoch_ns, period_ns)?, work.plan);
     let before = realtime.page_faults();
     while cycle.run(&mut work.engine, &mut clock, &mut work.ports, &mut work.door) == Flow::Continue {}

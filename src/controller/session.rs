@@ -1,6 +1,5 @@
 //! A controller in real time, from the configuration to what is left of the run.
 
-use std::thread;
 use std::time::Duration;
 
 use takt_rt::door::Snapshot;
@@ -9,6 +8,7 @@ use takt_rt::port::Clock;
 
 use super::assemble::{self, AssembleError};
 use super::channels::{ChannelSizes, channels};
+use super::quiet;
 use super::realtime_thread::{self, Begun, Ended, StartError, Work};
 use super::supervisor::{Interrupt, Outcome, Progress, Supervisor};
 use crate::bus::port::{OpenError, Port};
@@ -119,7 +119,7 @@ pub fn run(
         if let Some(interrupt) = watch(&supervisor, supervisor.progress()) {
             supervisor.interrupt(interrupt);
         }
-        thread::sleep(PAUSE);
+        quiet::sleep(PAUSE, config.cycle.period_ns);
     }
     let ended = running.join();
     Ok(Session {

@@ -1,6 +1,5 @@
 //! The loop with nothing to do but to be on time.
 
-use std::thread;
 use std::time::Duration;
 
 use takt_rt::cycle::SlotPlan;
@@ -12,6 +11,7 @@ use crate::bus::port::{OpenError, Port};
 use crate::config::{Config, ConfigError, Interface, Realtime};
 use crate::controller::assemble::{self, AssembleError};
 use crate::controller::channels::{ChannelSizes, LogSide, channels};
+use crate::controller::quiet;
 use crate::controller::realtime_thread::{self, Begun, StartError, Work};
 use crate::telemetry::Statistics;
 
@@ -153,7 +153,7 @@ pub fn measure(
         if done >= options.cycles || !watch(done) {
             let _ = host.request(Request::Leave);
         }
-        thread::sleep(PAUSE);
+        quiet::sleep(PAUSE, options.period_ns);
     }
     let ended = running.join().ok_or(JitterError::Died)?;
     collect(&mut log, &mut statistics, options.cycles);

@@ -126,6 +126,11 @@ impl Logger {
         }
     }
 
+    /// Period of the cycle whose records come here.
+    pub fn period_ns(&self) -> Nanoseconds {
+        self.machine.cycle_ns
+    }
+
     /// Takes and works off all that waits. Returns how many records and events that was.
     pub fn drain(&mut self) -> usize {
         let mut taken = 0;

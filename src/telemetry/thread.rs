@@ -8,6 +8,7 @@ use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use super::logger::{LogSummary, Logger};
+use crate::controller::quiet;
 
 /// A pause between two looks at the rings; at 1 ms, five records.
 const PAUSE: Duration = Duration::from_millis(5);
@@ -27,10 +28,11 @@ impl LoggerThread {
     pub fn start(mut logger: Logger) -> io::Result<Self> {
         let is_over = Arc::new(AtomicBool::new(false));
         let told = Arc::clone(&is_over);
+        let period_ns = logger.period_ns();
         let thread = thread::Builder::new().name("takt-logger".to_owned()).spawn(move || {
             while !told.load(Ordering::Acquire) {
                 logger.drain();
-                thread::park_timeout(PAUSE);
+                thread::park_timeout(quiet::pause(PAUSE, period_ns));
             }
             logger.finish()
         })?;

@@ -1,0 +1,31 @@
+//! Runs a configuration against its simulated drives in virtual time: ten seconds of motion in a tenth of a second, the
+//! same every time. For testing a motion program before it meets hardware.
+//!
+//! ```text
+//! cargo run --release --example virtual_time configs/arm6-erob.toml
+//! ```
+
+use std::error::Error;
+use std::path::PathBuf;
+
+use takt::config::Config;
+use takt::controller::VirtualRun;
+
+const CYCLES_AT_MOST: u64 = 10_000_000;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let path = std::env::args().nth(1).map_or_else(|| PathBuf::from("configs/arm6-erob.toml"), PathBuf::from);
+    let config = Config::load(&path).map_err(miette::Report::new)?;
+    let (mut run, _log) = VirtualRun::simulated(&config)?;
+    let mut largest = vec![0.0_f64; config.axes.len()];
+    let outcome = run.run(CYCLES_AT_MOST, |run| {
+        for (largest, axis) in largest.iter_mut().zip(run.snapshot().axes) {
+            *largest = largest.max(axis.velocity.abs());
+        }
+    });
+    println!("{outcome:?} after {} slots", run.snapshot().slot);
+    for (axis, largest) in config.axes.iter().zip(largest) {
+        println!("{:<10} reached {largest:.3} of {:.3} per second", axis.name, axis.limits.velocity);
+    }
+    Ok(())
+}
