@@ -21,6 +21,7 @@ pub mod bus;
 pub mod canopen;
 pub mod config;
 pub mod controller;
+pub mod doctor;
 pub mod drive;
 pub mod jitter;
 pub mod sim;

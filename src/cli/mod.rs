@@ -2,6 +2,7 @@
 
 mod check;
 mod configuration;
+mod doctor;
 mod exit;
 mod interruption;
 mod jitter;
@@ -28,6 +29,7 @@ enum Command {
     Check(check::Arguments),
     Plan(plan::Arguments),
     Sim(sim::Arguments),
+    Doctor(doctor::Arguments),
     Jitter(jitter::Arguments),
 }
 
@@ -39,6 +41,7 @@ impl CommandLine {
             Command::Check(arguments) => check::run(&arguments),
             Command::Plan(arguments) => plan::run(&arguments),
             Command::Sim(arguments) => sim::run(&arguments),
+            Command::Doctor(arguments) => doctor::run(&arguments),
             Command::Jitter(arguments) => jitter::run(&arguments),
         }
     }

@@ -6,6 +6,7 @@ use takt_rt::cycle::SlotPlan;
 use takt_rt::door::Request;
 use takt_rt::port::BusHealth;
 
+use crate::bus::interface_status;
 use crate::bus::port::{OpenError, Port};
 use crate::config::{Config, ConfigError, Interface, Realtime};
 use crate::controller::assemble::{self, AssembleError};
@@ -183,6 +184,12 @@ fn config(options: &JitterOptions) -> Result<Config, ConfigError> {
     if let (Some(bus), Some(interface)) = (config.buses.first_mut(), &options.interface) {
         bus.interface = interface.clone();
         bus.name = interface.to_string();
+        // SYNC is the same at any bit rate: a bus that is up is taken as it is.
+        if let Ok(status) = interface_status(&bus.name)
+            && let Some(timing) = status.timing.filter(|_| status.is_up)
+        {
+            bus.bit_rate = timing.bit_rate;
+        }
     }
     config.realtime = options.realtime;
     Ok(config)

@@ -1,0 +1,111 @@
+//! `takt doctor`: is this machine fit for the loop?
+
+use std::io::{IsTerminal, Write, stderr, stdout};
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+
+use takt::doctor::{Examination, SelfTest, Source, Subject, Verdict, attempt, examine};
+use takt::jitter::{self, JitterOptions, Pacing};
+use takt::telemetry::Emphasis;
+
+use super::configuration;
+use super::exit::Exit;
+use super::interruption;
+
+/// Say whether this machine is fit for the loop, and how to make it so. Ends with 1 when something forbids real time.
+#[derive(Args, Debug)]
+pub struct Arguments {
+    /// A configuration: its priority, CPU, period and CAN interfaces count. Without it, the usual ones and every CAN
+    /// interface there is
+    config: Option<PathBuf>,
+    /// Run the loop itself for so many seconds and grade it; 0 leaves that out
+    #[arg(long, value_name = "S", default_value_t = 10, value_parser = clap::value_parser!(u64).range(0..=86_400))]
+    self_test_s: u64,
+    /// Print what was found as one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs it.
+pub fn run(arguments: &Arguments) -> Exit {
+    let config = match arguments.config.as_deref().map(|path| configuration::load(path, &[])).transpose() {
+        Ok(config) => config,
+        Err(exit) => return exit,
+    };
+    let interrupted = match interruption::watch() {
+        Ok(interrupted) => interrupted,
+        Err(error) => {
+            eprintln!("takt: cannot watch for Ctrl-C: {error}");
+            return Exit::Stopped;
+        }
+    };
+    let subject = Subject::new(config.as_ref());
+    let Some(attempted) = attempt(&subject) else {
+        eprintln!("takt: the system has no thread for an attempt at real time");
+        return Exit::Stopped;
+    };
+    let mut examination = examine(&Source::this_machine(), &subject, &attempted);
+    if arguments.self_test_s > 0 {
+        match self_test(&subject, arguments.self_test_s, &interrupted) {
+            Ok(Some(result)) => examination = examination.with_self_test(result),
+            Ok(None) => eprintln!("takt: the self-test did not get to a single cycle"),
+            Err(error) => eprintln!("takt: no self-test: {error}"),
+        }
+    }
+    print(&examination, arguments.json);
+    if interrupted.load(Ordering::Relaxed) {
+        Exit::Interrupted
+    } else if examination.verdict == Verdict::ForbidsRealTime {
+        Exit::Stopped
+    } else {
+        Exit::Done
+    }
+}
+
+/// Runs the loop of the subject, without a bus.
+fn self_test(
+    subject: &Subject,
+    duration_s: u64,
+    interrupted: &AtomicBool,
+) -> Result<Option<SelfTest>, jitter::JitterError> {
+    let cycles = (duration_s * 1_000_000_000).div_ceil(subject.period_ns);
+    let options =
+        JitterOptions { period_ns: subject.period_ns, cycles, interface: None, realtime: subject.realtime };
+    let bar = progress_bar(cycles);
+    let measurement = jitter::measure(&options, Pacing::SleepThenSpin, |done| {
+        bar.set_position(done);
+        !interrupted.load(Ordering::Relaxed)
+    });
+    bar.finish_and_clear();
+    Ok(SelfTest::new(&measurement?, subject.period_ns))
+}
+
+fn progress_bar(cycles: u64) -> ProgressBar {
+    if !stderr().is_terminal() {
+        return ProgressBar::hidden();
+    }
+    let bar = ProgressBar::new(cycles);
+    if let Ok(style) = ProgressStyle::with_template("self-test  [{bar:40}]  {pos} of {len} cycles") {
+        bar.set_style(style.progress_chars("━╸─"));
+    }
+    bar
+}
+
+/// A reader that has seen enough (`| head`) is no failure.
+fn print(examination: &Examination, as_json: bool) {
+    let text = if as_json {
+        match serde_json::to_string(examination) {
+            Ok(json) => format!("{json}\n"),
+            Err(error) => {
+                eprintln!("takt: the report cannot be written as JSON: {error}");
+                return;
+            }
+        }
+    } else {
+        examination.picture(if stdout().is_terminal() { Emphasis::Ansi } else { Emphasis::None })
+    };
+    let _ = stdout().write_all(text.as_bytes());
+}

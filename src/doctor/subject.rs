@@ -1,0 +1,54 @@
+//! What the machine is to be fit for.
+
+use crate::config::{Config, Interface, Realtime};
+use crate::controller::realtime_thread;
+use crate::jitter::JitterOptions;
+
+/// The loop that is to run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Subject {
+    /// Its period.
+    pub period_ns: u64,
+    /// What it asks of the operating system.
+    pub realtime: Realtime,
+    /// The CPU that it runs on.
+    pub cpu: usize,
+    /// The interfaces that it needs; empty without a configuration: those there are count then.
+    pub buses: Vec<WantedBus>,
+    /// Whether there is a configuration.
+    pub is_configured: bool,
+}
+
+/// An interface that the loop needs.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct WantedBus {
+    /// Its name.
+    pub interface: String,
+    /// Bit/s of classic frames and of the arbitration phase.
+    pub bit_rate: u32,
+    /// Bit/s of the data phase of CAN FD frames.
+    pub data_bit_rate: Option<u32>,
+}
+
+impl Subject {
+    /// The loop of a configuration, or else the one that a configuration has when it says nothing.
+    pub fn new(config: Option<&Config>) -> Self {
+        let usual = JitterOptions::default();
+        let realtime = config.map_or(usual.realtime, |config| config.realtime);
+        let wanted = |bus: &crate::config::Bus| match &bus.interface {
+            Interface::SocketCan(interface) => Some(WantedBus {
+                interface: interface.clone(),
+                bit_rate: bus.bit_rate,
+                data_bit_rate: bus.data_bit_rate,
+            }),
+            Interface::Simulated => None,
+        };
+        Self {
+            period_ns: config.map_or(usual.period_ns, |config| config.cycle.period_ns),
+            cpu: realtime_thread::thread_config(&realtime).cpu.unwrap_or(0),
+            realtime,
+            buses: config.iter().flat_map(|config| &config.buses).filter_map(wanted).collect(),
+            is_configured: config.is_some(),
+        }
+    }
+}
