@@ -167,7 +167,7 @@ fn an_automatic_command_phase_is_resolved_when_the_file_is_read() {
     // SYNC, 20 µs, feedback: 190 µs; set-points and heartbeat: 180 µs; no more than 100 µs for a SYNC that is late.
     assert_eq!(auto.cycle.command_phase_ns, 290_000);
     let arm = fs::read_to_string(config("arm6-erob.toml")).unwrap();
-    let arm = parse(&arm.replace("command_phase = 0.55", "command_phase = \"auto\""));
+    let arm = parse(&arm.replace("command_phase = 0.5", "command_phase = \"auto\""));
     // From 420 to 590 µs: 75 µs for either wake-up, 20 µs for computing.
     assert_eq!(arm.cycle.command_phase_ns, 495_000);
     for bus in takt::bus::schedule::verify(&arm).unwrap() {

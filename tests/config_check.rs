@@ -56,7 +56,7 @@ fn a_script_reads_the_same_as_one_json_object() {
     assert_eq!(value["fits"], true);
     assert_eq!(value["axes"].as_array().map(Vec::len), Some(6));
     assert_eq!(value["axes"][3]["counts_range"][1], 7285.0);
-    assert_eq!(value["buses"][1]["slot"]["set_points_done_ns"], 895_000);
+    assert_eq!(value["buses"][1]["slot"]["set_points_done_ns"], 845_000);
 }
 
 #[test]
@@ -96,7 +96,7 @@ fn an_automatic_command_phase_is_shown_and_explained_where_there_is_none() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("auto.toml");
     let arm = std::fs::read_to_string(configs().join("arm6-erob.toml")).unwrap();
-    let auto = arm.replace("command_phase = 0.55", "command_phase = \"auto\"");
+    let auto = arm.replace("command_phase = 0.5", "command_phase = \"auto\"");
     std::fs::write(&path, &auto).unwrap();
     let text = standard_output(&check(&path, &[]));
     assert!(text.contains("the command phase at 495 µs (as \"auto\" has it)"), "{text}");

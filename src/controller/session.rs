@@ -123,7 +123,8 @@ pub fn run(
     }
     let ended = running.join();
     let outcome = supervisor.outcome().cloned().unwrap_or(Outcome::ThreadDied);
-    let target = supervisor.target().filter(|_| outcome == Outcome::Finished && options.duration_ns.is_none());
+    let target =
+        supervisor.target().filter(|_| outcome == Outcome::Finished && options.duration_ns.is_none());
     Ok(Session {
         snapshot: host.snapshot(),
         target: target.map(<[f64]>::to_vec),
