@@ -16,6 +16,7 @@ use takt::controller::realtime_thread::StartError;
 use takt::controller::session::{self, Session, SessionError, SessionOptions};
 use takt::controller::{Interrupt, Outcome, Progress};
 use takt::telemetry::{Destination, Emphasis, Machine, Notice, RealtimeReport, RunOutcome, RunReport, words};
+use takt_rt::door::Snapshot;
 use takt_rt::record::{Event, EventKind};
 use takt_rt::stop::StopReason;
 
@@ -81,8 +82,10 @@ pub fn run(arguments: Arguments) -> Exit {
     };
     let notify = notices(&bar, Machine::of(&config));
     let mut drawn = Drawn::new(bar.clone());
-    let session = session::run(&config, options, notify, |_, progress| {
+    let mut hints = Hints::new(&config);
+    let session = session::run(&config, options, notify, |snapshot, progress| {
         drawn.show(&progress);
+        hints.look(snapshot).for_each(|hint| bar.suspend(|| eprintln!("takt: {hint}")));
         signals.next()
     });
     bar.finish_and_clear();
@@ -230,6 +233,32 @@ impl Drawn {
     }
 }
 
+/// Says once for each bus what is the likely cause of frames that find no room.
+struct Hints {
+    /// The buses that nothing has been said of.
+    silent: Vec<(usize, String)>,
+}
+
+impl Hints {
+    fn new(config: &Config) -> Self {
+        Self { silent: config.buses.iter().map(|bus| bus.name.clone()).enumerate().collect() }
+    }
+
+    fn look(&mut self, snapshot: &Snapshot) -> impl Iterator<Item = String> {
+        let has_overrun =
+            |bus: &(usize, String)| snapshot.buses.get(bus.0).is_some_and(|health| health.tx_overruns > 0);
+        let (said, silent) = std::mem::take(&mut self.silent).into_iter().partition(has_overrun);
+        self.silent = silent;
+        let said: Vec<(usize, String)> = said;
+        said.into_iter().map(|(_, name)| {
+            format!(
+                "bus {name} takes no more frames: nobody acknowledges them. Is the drives' power on, is the bus \
+                 terminated, is the bit rate right?"
+            )
+        })
+    }
+}
+
 /// What is no part of an ordinary run.
 fn is_urgent(event: &Event) -> bool {
     matches!(event.kind, EventKind::Stop(_) | EventKind::Emergency { .. } | EventKind::Refused { .. })
@@ -246,4 +275,25 @@ fn notices(bar: &ProgressBar, machine: Machine) -> Box<dyn FnMut(&Notice) + Send
         };
         bar.suspend(|| eprintln!("{text}"));
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    #[test]
+    fn frames_that_find_no_room_are_explained_once_for_each_bus() {
+        let arm = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/arm6-erob.toml");
+        let Ok(config) = Config::load(&arm) else { panic!("the example is sound") };
+        let mut hints = Hints::new(&config);
+        let mut snapshot = Snapshot::default();
+        assert_eq!(hints.look(&snapshot).count(), 0);
+        snapshot.buses[1].tx_overruns = 1;
+        let said: Vec<String> = hints.look(&snapshot).collect();
+        assert!(said.len() == 1 && said[0].starts_with("bus wrist "), "{said:?}");
+        assert_eq!(hints.look(&snapshot).count(), 0);
+        snapshot.buses[0].tx_overruns = 1;
+        assert_eq!(hints.look(&snapshot).count(), 1);
+    }
 }

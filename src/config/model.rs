@@ -5,7 +5,11 @@
 use std::path::PathBuf;
 
 use serde::Serialize;
-use takt_rt::cia402::OperationMode;
+/// How an axis is commanded. Defaults of the gains: a position gain of 20 1/s; in CST a stiffness of inertia · bandwidth² and
+/// a damping of 2 · inertia · bandwidth with a bandwidth of 40 rad/s, and the inertia and friction of the simulated joint.
+pub use takt_rt::control::ControlLaw as Control;
+/// Limits of an axis in rad (m) and seconds. Defaults: the deceleration is the acceleration, the jerk is infinite.
+pub use takt_rt::guard::AxisLimits as Limits;
 
 /// A whole controller: one cycle, its buses, its axes and what they are to do.
 #[derive(Clone, Debug, PartialEq)]
@@ -190,42 +194,6 @@ impl Feedback {
     }
 }
 
-/// How an axis is commanded.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Control {
-    /// Cyclic synchronous position: the drive closes every loop.
-    Position,
-    /// Cyclic synchronous velocity: the controller closes the position loop.
-    Velocity {
-        /// Gain of the position loop in 1/s. Default 20.
-        position_gain: f64,
-    },
-    /// Cyclic synchronous torque: the controller closes position and velocity loops.
-    Torque {
-        /// N·m/rad (N/m). Default: inertia · bandwidth², with a bandwidth of 40 rad/s unless the file says another.
-        stiffness: f64,
-        /// N·m·s/rad (N·s/m). Default: 2 · inertia · bandwidth.
-        damping: f64,
-        /// Feed-forward of the acceleration: kg·m² (kg). Default: that of the simulated joint.
-        inertia: f64,
-        /// Feed-forward of the velocity: N·m·s/rad (N·s/m). Default: that of the simulated joint.
-        viscous_friction: f64,
-        /// Feed-forward of the direction of motion: N·m (N). Default: that of the simulated joint.
-        coulomb_friction: f64,
-    },
-}
-
-impl Control {
-    /// The mode of operation that this needs in the drive.
-    pub fn operation_mode(self) -> OperationMode {
-        match self {
-            Self::Position => OperationMode::CyclicSynchronousPosition,
-            Self::Velocity { .. } => OperationMode::CyclicSynchronousVelocity,
-            Self::Torque { .. } => OperationMode::CyclicSynchronousTorque,
-        }
-    }
-}
-
 /// Whether an axis turns or slides.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Travel {
@@ -236,25 +204,6 @@ pub enum Travel {
         /// Lead in m.
         lead_m: f64,
     },
-}
-
-/// Limits of an axis in rad (m) and seconds.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Limits {
-    /// Lowest position.
-    pub position_min: f64,
-    /// Highest position.
-    pub position_max: f64,
-    /// Highest speed.
-    pub velocity: f64,
-    /// Highest acceleration.
-    pub acceleration: f64,
-    /// Highest deceleration. Default: the acceleration.
-    pub deceleration: f64,
-    /// Highest jerk; infinite, the default, plans trapezoids.
-    pub jerk: f64,
-    /// Highest torque in N·m (force in N).
-    pub torque: f64,
 }
 
 /// How far the joint may be from its set-point.

@@ -3,16 +3,14 @@
 use std::f64::consts::TAU;
 
 use takt_rt::axis::{AxisParameters, Pdo};
-use takt_rt::control::ControlLaw;
 use takt_rt::cycle::SlotPlan;
 use takt_rt::engine::{BusParameters, Engine, EngineParameters, Heartbeat, SetUpError};
 use takt_rt::frame::Id;
-use takt_rt::guard::AxisLimits;
 use takt_rt::pdo::{Mapping, MappingError};
 use takt_rt::record::{MAX_AXES, MAX_BUSES};
 use takt_rt::units::{Scale, ScaleError, ScaleParameters};
 
-use crate::config::{Axis, Config, Control, Travel};
+use crate::config::{Axis, Config, Travel};
 use crate::drive::{PdoPlan, ProcessData};
 
 /// How long the drives may take from the first controlword to operation enabled.
@@ -125,9 +123,9 @@ fn axis_parameters(
         node: axis.node,
         commands: compile(&data.commands, Mapping::commands)?,
         feedback: compile(&data.feedback, Mapping::feedback)?,
-        law: control_law(axis.control),
+        law: axis.control,
         scale: scale(axis).map_err(|error| AssembleError::Scale { axis: index, error })?,
-        limits: limits(axis),
+        limits: axis.limits,
         following_error_limit: axis.following_error.limit,
         following_error_cycles: cycles(axis.following_error.time_ns),
         missed_feedback_cycles: axis.missed_feedback_cycles,
@@ -151,27 +149,4 @@ pub fn scale(axis: &Axis) -> Result<Scale, ScaleError> {
         zero_counts: axis.zero_counts.into(),
         rated_torque: axis.simulated.rated_torque,
     })
-}
-
-fn limits(axis: &Axis) -> AxisLimits {
-    let limits = axis.limits;
-    AxisLimits {
-        position_min: limits.position_min,
-        position_max: limits.position_max,
-        velocity: limits.velocity,
-        acceleration: limits.acceleration,
-        deceleration: limits.deceleration,
-        jerk: limits.jerk,
-        torque: limits.torque,
-    }
-}
-
-fn control_law(control: Control) -> ControlLaw {
-    match control {
-        Control::Position => ControlLaw::Position,
-        Control::Velocity { position_gain } => ControlLaw::Velocity { position_gain },
-        Control::Torque { stiffness, damping, inertia, viscous_friction, coulomb_friction } => {
-            ControlLaw::Torque { stiffness, damping, inertia, viscous_friction, coulomb_friction }
-        }
-    }
 }

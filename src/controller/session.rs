@@ -69,7 +69,7 @@ pub enum SessionError {
 }
 
 /// Runs the program of a configuration. `notify` hears what the logger has to say, from its thread. `watch` is called
-/// about once in a millisecond with what the run is doing, and may ask it to end.
+/// about once in a millisecond with the newest state and what the run is doing, and may ask it to end.
 ///
 /// # Errors
 /// See [`SessionError`]; nothing has moved then.
@@ -77,7 +77,7 @@ pub fn run(
     config: &Config,
     options: SessionOptions,
     notify: Box<dyn FnMut(&Notice) + Send>,
-    mut watch: impl FnMut(&Supervisor, Progress) -> Option<Interrupt>,
+    mut watch: impl FnMut(&Snapshot, Progress) -> Option<Interrupt>,
 ) -> Result<Session, SessionError> {
     let mut clock = MonotonicClock::default();
     let engine = Box::new(assemble::engine(config)?);
@@ -116,7 +116,7 @@ pub fn run(
     let begun = running.begun();
     while !running.is_finished() {
         supervisor.poll(clock.now_ns(), &mut host);
-        if let Some(interrupt) = watch(&supervisor, supervisor.progress()) {
+        if let Some(interrupt) = watch(&host.snapshot(), supervisor.progress()) {
             supervisor.interrupt(interrupt);
         }
         quiet::sleep(PAUSE, config.cycle.period_ns);
