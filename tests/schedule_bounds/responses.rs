@@ -120,24 +120,6 @@ proptest! {
             prop_assert!(longest <= bound && longest * 100 >= bound * 85, "message {at}: {longest} of {bound}");
         }
     }
-
-    /// Any periods, so that several instances of one message meet others: with the exact lengths of the frames, since
-    /// a bit less can be one instance less.
-    #[test]
-    fn the_worst_moment_comes_within_15_percent_of_the_bound_for_exact_lengths(
-        set in prop::collection::vec((400_000u64..4_000_000, 0usize..=8), 2..8),
-    ) {
-        let set: Vec<_> = set.iter().map(|&(period, length)| (period, length, 0)).collect();
-        let mut senders = senders(&set, FrameKind::Data, CLASSIC);
-        for sender in &mut senders {
-            sender.message.transmission_ns = simulated(CLASSIC).duration_ns(&sender.frame);
-        }
-        for (at, bound) in bounds_ns(&senders, CLASSIC).into_iter().enumerate() {
-            let Some(bound) = bound else { continue };
-            let longest = critical_response_ns(&senders, at, CLASSIC, 30_000_000);
-            prop_assert!(longest <= bound && longest * 100 >= bound * 85, "message {at}: {longest} of {bound}");
-        }
-    }
 }
 
 /// The example by which Davis, Burns, Bril and Lukkien refuted the analysis before theirs, on the wire: three frames
