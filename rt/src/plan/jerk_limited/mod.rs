@@ -62,9 +62,8 @@ impl Inside {
     }
 
     fn drive(&self, shape: &Shape, jerk_max: f64, profile: &mut Profile) {
-        for (duration, jerk) in shape.durations.iter().zip(&shape.jerks) {
-            profile.shift(duration * self.scale.time_s, jerk * jerk_max);
-        }
+        let durations_s = shape.durations.map(|duration| duration * self.scale.time_s);
+        profile.shift_all(&durations_s, &shape.jerks.map(|jerk| jerk * jerk_max));
     }
 }
 
@@ -152,9 +151,11 @@ fn velocity_ramp(problem: &Problem, profile: &mut Profile) -> Result<Ramp, PlanE
     let Problem { target, limits, .. } = problem;
     let start = profile.reached();
     let acceleration = start.acceleration.clamp(limits.acceleration_min, limits.acceleration_max);
-    let excess = start.acceleration - acceleration;
-    profile.shift(excess.abs() / limits.jerk_max, -libm::copysign(limits.jerk_max, excess));
-    profile.limit_acceleration(limits.acceleration_min, limits.acceleration_max);
+    if acceleration != start.acceleration {
+        let excess = start.acceleration - acceleration;
+        profile.shift(excess.abs() / limits.jerk_max, -libm::copysign(limits.jerk_max, excess));
+        profile.limit_acceleration(limits.acceleration_min, limits.acceleration_max);
+    }
     let State { velocity, .. } = profile.reached();
     let acceleration_size = limits.acceleration_max.max(-limits.acceleration_min);
     let swing = acceleration_size * acceleration_size / limits.jerk_max;
@@ -204,9 +205,7 @@ pub(super) fn shortest_stop(problem: &Problem, profile: &mut Profile) -> Result<
 }
 
 fn drive_stretches(stretches: &Stretches, profile: &mut Profile) {
-    for (duration_s, jerk) in stretches.durations.iter().zip(&stretches.slopes) {
-        profile.shift(*duration_s, *jerk);
-    }
+    profile.shift_all(&stretches.durations, &stretches.slopes);
 }
 
 /// The fastest profile to the target velocity and acceleration, wherever that leads.
