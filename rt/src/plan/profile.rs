@@ -92,11 +92,11 @@ struct Coefficients {
 
 const NO_PHASE: Coefficients = Coefficients { start: State::rest(0.0), jerk: 0.0 };
 
-/// `one` where the condition holds, else `other`, without a branch to guess.
+/// `one` where the condition holds, else `other`. With a comparison of numbers as the condition it compiles to a mask,
+/// not to a branch to guess.
 #[inline]
 pub(super) fn select(condition: bool, one: f64, other: f64) -> f64 {
-    let both = [other, one];
-    both[usize::from(condition)]
+    if condition { one } else { other }
 }
 
 #[inline]
@@ -262,11 +262,7 @@ impl Profile {
 
     /// Appends phases of constant jerk, leaving out those that are not longer than 0 s.
     #[inline]
-    pub(super) fn shift_all<const COUNT: usize>(
-        &mut self,
-        durations_s: &[f64; COUNT],
-        jerks: &[f64; COUNT],
-    ) {
+    pub(super) fn shift_all<const COUNT: usize>(&mut self, durations_s: &[f64; COUNT], jerks: &[f64; COUNT]) {
         self.append_all(durations_s, jerks, |reached, jerk| (reached, jerk));
     }
 
@@ -298,10 +294,9 @@ impl Profile {
             if let (Some(phase), Some(start_s)) = (self.phases.get_mut(count), self.starts_s.get_mut(count)) {
                 *phase = Coefficients { start: end, jerk };
                 // Not the other way round: what is not a number must not look like no time.
-                let left_out = *duration_s <= 0.0;
-                *start_s = select(left_out, f64::INFINITY, time_s);
-                count += usize::from(!left_out);
-                let elapsed_s = select(left_out, 0.0, *duration_s);
+                *start_s = select(*duration_s <= 0.0, f64::INFINITY, time_s);
+                let elapsed_s = select(*duration_s <= 0.0, 0.0, *duration_s);
+                count += 1 - usize::from(*duration_s <= 0.0);
                 time_s += elapsed_s;
                 end = integrate(&end, jerk, elapsed_s);
             }
@@ -321,6 +316,12 @@ impl Profile {
         self.duration_s = duration_s;
         let finite = duration_s < SIZE_MAX && reached.position.is_finite() && reached.velocity.is_finite();
         if finite { Ok(()) } else { Err(PlanError::NotRepresentable { axis: 0 }) }
+    }
+
+    /// Leaves the profile without its phases: it would last `duration_s`, and a longer one takes its place.
+    pub(super) fn leave_open(&mut self, duration_s: f64) -> Result<(), PlanError> {
+        self.duration_s = f64::INFINITY;
+        if duration_s < SIZE_MAX { Ok(()) } else { Err(PlanError::NotRepresentable { axis: 0 }) }
     }
 
     /// Where the building has arrived.

@@ -67,15 +67,15 @@ impl Ramp {
         ROUNDING * (self.start.abs() + self.target.abs()) / slope_max.min(-slope_min)
     }
 
-    /// The bounds as seen in the direction of `down`.
+    /// The bounds as seen in this direction, 1 or −1.
     #[inline]
-    fn bounds_towards(&self, down: bool) -> Bounds {
+    fn bounds_towards(&self, sign: f64) -> Bounds {
         let Bounds { rate_max, rate_min, slope_max, slope_min } = self.bounds;
         Bounds {
-            rate_max: select(down, -rate_min, rate_max),
-            rate_min: select(down, -rate_max, rate_min),
-            slope_max: select(down, -slope_min, slope_max),
-            slope_min: select(down, -slope_max, slope_min),
+            rate_max: select(sign < 0.0, -rate_min, rate_max),
+            rate_min: select(sign < 0.0, -rate_max, rate_min),
+            slope_max: select(sign < 0.0, -slope_min, slope_max),
+            slope_min: select(sign < 0.0, -slope_max, slope_min),
         }
     }
 
@@ -90,11 +90,12 @@ impl Ramp {
         // With both rates of one sign, being a rounding error beside the direct motion on the wrong side costs
         // the time to go back and try again. Otherwise it costs the square root of the error: still much for
         // the others, which may be about to pass through their targets. So the error stays in the distance.
-        let passing = larger(low, -high);
-        let lost =
-            (passing > 0.0) & (0.5 * passing * passing > self.rounding * larger(slope_max, -slope_min));
-        let rounding =
-            select(lost, self.rounding, smaller(self.rounding * (1.0 / 64.0), 1e-6 * self.distance.abs()));
+        let passing = larger(larger(low, -high), 0.0);
+        let rounding = select(
+            0.5 * passing * passing > self.rounding * larger(slope_max, -slope_min),
+            self.rounding,
+            smaller(self.rounding * (1.0 / 64.0), 1e-6 * self.distance.abs()),
+        );
         let excess = if excess.abs() <= rounding { 0.0 } else { excess };
         Direct { duration, excess, high, low, slope }
     }
@@ -104,11 +105,11 @@ impl Ramp {
     pub(super) fn fastest(&self) -> Fastest {
         let direct = self.direct();
         // Everything below is as seen in the direction of the detour: in place of downwards it is upwards there.
-        let down = (direct.excess < 0.0) | ((direct.excess == 0.0) & (direct.high < 0.0));
-        let sign = select(down, -1.0, 1.0);
+        let sign = libm::copysign(1.0, if direct.excess == 0.0 { direct.high } else { direct.excess });
         let excess = sign * direct.excess;
-        let (high, low) = (select(down, -direct.low, direct.high), select(down, -direct.high, direct.low));
-        let bounds = self.bounds_towards(down);
+        let (one, other) = (sign * self.start, sign * self.target);
+        let (high, low) = (larger(one, other), smaller(one, other));
+        let bounds = self.bounds_towards(sign);
         let Bounds { rate_max, slope_max, slope_min, .. } = bounds;
         let (up, fall) = (1.0 / slope_max, -1.0 / slope_min);
         let k = 0.5 * (up + fall);
@@ -117,13 +118,12 @@ impl Ramp {
         // peak − high without cancellation
         let detour = select(high > 0.0, step / (peak + high), peak - high);
         let room = rate_max - high;
-        let reached = detour > room;
-        let detour = select(reached, room, detour);
-        let cruise = select(reached, (excess - k * room * (rate_max + high)) / rate_max, 0.0);
+        let cruise = select(detour > room, (excess - k * room * (rate_max + high)) / rate_max, 0.0);
+        let detour = smaller(detour, room);
         let duration = direct.duration + 2.0 * k * detour + cruise;
         let rate = high + detour;
         let stretches = Stretches {
-            durations: [(rate - sign * self.start) * up, cruise, (rate - sign * self.target) * fall],
+            durations: [(rate - one) * up, cruise, (rate - other) * fall],
             slopes: [sign * slope_max, 0.0, sign * slope_min],
         };
         // The other end of what is possible in a given time dips to a rate below both: for a moment that
@@ -161,9 +161,8 @@ impl Ramp {
         let spare = larger(duration - direct_duration, 0.0);
         let (above, below) = (excess - high * spare, low * spare - excess);
         if above > 0.0 || below > 0.0 {
-            let down = above <= 0.0;
-            let (base, lacking) = (select(down, -low, high), select(down, below, above));
-            self.detour(down, spare, base, lacking)
+            let base = select(above > 0.0, high, -low);
+            self.detour(select(above > 0.0, 1.0, -1.0), spare, base, larger(above, below))
         } else {
             let rate = if spare > 0.0 { (excess / spare).clamp(low, high) } else { self.start };
             Stretches {
@@ -173,11 +172,10 @@ impl Ramp {
         }
     }
 
-    /// By way of a cruise beyond both rates, in the direction of `down`, where the outer one is `base`.
+    /// By way of a cruise beyond both rates in this direction, 1 or −1, where the outer one is `base`.
     #[inline]
-    fn detour(&self, down: bool, spare: f64, base: f64, lacking: f64) -> Stretches {
-        let sign = select(down, -1.0, 1.0);
-        let Bounds { rate_max, slope_max, slope_min, .. } = self.bounds_towards(down);
+    fn detour(&self, sign: f64, spare: f64, base: f64, lacking: f64) -> Stretches {
+        let Bounds { rate_max, slope_max, slope_min, .. } = self.bounds_towards(sign);
         let (up, fall) = (1.0 / slope_max, -1.0 / slope_min);
         let k = 0.5 * (up + fall);
         // The detour by x beyond the base costs 2·k·x of the spare time, and no more than all of it.
@@ -193,7 +191,7 @@ impl Ramp {
 
 /// The larger number, in one instruction: what is not a number is found at the end, see [`Profile::finish_at`].
 #[inline]
-fn larger(one: f64, other: f64) -> f64 {
+pub(super) fn larger(one: f64, other: f64) -> f64 {
     if one > other { one } else { other }
 }
 
@@ -204,19 +202,21 @@ fn smaller(one: f64, other: f64) -> f64 {
 }
 
 /// Brings the velocity back to its limit, and gives the rest of the problem.
+#[inline]
 fn brake(problem: &Problem, profile: &mut Profile) -> Result<Ramp, PlanError> {
     let Problem { start, target, limits } = problem;
     profile.begin(State { acceleration: 0.0, ..*start });
-    let velocity = start.velocity.clamp(limits.velocity_min, limits.velocity_max);
-    if velocity != start.velocity {
+    let mut velocity = start.velocity;
+    if velocity > limits.velocity_max || velocity < limits.velocity_min {
+        velocity = velocity.clamp(limits.velocity_min, limits.velocity_max);
         let acceleration =
             if velocity < start.velocity { limits.acceleration_min } else { limits.acceleration_max };
         profile.accelerate((velocity - start.velocity) / acceleration, acceleration);
     }
     let position = profile.reached().position;
     // The state may have gone through many cycles of sampling and planning.
-    let weakest = limits.acceleration_max.min(-limits.acceleration_min);
-    let fastest = limits.velocity_max.max(-limits.velocity_min);
+    let weakest = smaller(limits.acceleration_max, -limits.acceleration_min);
+    let fastest = larger(limits.velocity_max, -limits.velocity_min);
     let braking_distance = fastest * fastest / weakest;
     let rounding = ROUNDING * (position.abs() + target.position.abs() + braking_distance);
     if !rounding.is_finite() {
@@ -244,18 +244,26 @@ fn target(problem: &Problem) -> State {
     State { acceleration: 0.0, ..problem.target }
 }
 
-/// The fastest profile to the target position and velocity, with its blocked interval.
-pub(super) fn fastest_position(problem: &Problem, profile: &mut Profile) -> Result<(), PlanError> {
+/// The fastest profile to the target position and velocity, with its blocked interval. Its phases are left out where it
+/// lasts less than `least_s`.
+pub(super) fn fastest_position(
+    problem: &Problem,
+    least_s: f64,
+    profile: &mut Profile,
+) -> Result<(), PlanError> {
     let ramp = brake(problem, profile)?;
     let brake_s = profile.duration_s();
     let fastest = ramp.fastest();
-    drive(&fastest.stretches, profile);
-    profile.finish_at(target(problem), brake_s + fastest.duration)?;
-    profile.set_minimum_duration(profile.duration_s());
+    let fastest_s = brake_s + fastest.duration;
+    profile.set_minimum_duration(fastest_s);
     if let Some((after, before)) = fastest.blocked {
         profile.block(brake_s + after, brake_s + before);
     }
-    Ok(())
+    if fastest_s < least_s {
+        return profile.leave_open(fastest_s);
+    }
+    drive(&fastest.stretches, profile);
+    profile.finish_at(target(problem), fastest_s)
 }
 
 /// The profile to the target position and velocity that lasts this long.
