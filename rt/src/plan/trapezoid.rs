@@ -72,10 +72,10 @@ impl Ramp {
     fn bounds_towards(&self, sign: f64) -> Bounds {
         let Bounds { rate_max, rate_min, slope_max, slope_min } = self.bounds;
         Bounds {
-            rate_max: select(sign < 0.0, -rate_min, rate_max),
-            rate_min: select(sign < 0.0, -rate_max, rate_min),
-            slope_max: select(sign < 0.0, -slope_min, slope_max),
-            slope_min: select(sign < 0.0, -slope_max, slope_min),
+            rate_max: larger(sign * rate_max, sign * rate_min),
+            rate_min: smaller(sign * rate_max, sign * rate_min),
+            slope_max: larger(sign * slope_max, sign * slope_min),
+            slope_min: smaller(sign * slope_max, sign * slope_min),
         }
     }
 
@@ -83,7 +83,8 @@ impl Ramp {
     fn direct(&self) -> Direct {
         let (start, target) = (self.start, self.target);
         let Bounds { slope_max, slope_min, .. } = self.bounds;
-        let slope = select(target >= start, slope_max, slope_min);
+        let sign = libm::copysign(1.0, target - start);
+        let slope = sign * larger(sign * slope_max, sign * slope_min);
         let duration = (target - start) / slope;
         let excess = self.distance - 0.5 * (start + target) * duration;
         let (high, low) = (larger(start, target), smaller(start, target));
@@ -202,7 +203,7 @@ fn smaller(one: f64, other: f64) -> f64 {
 }
 
 /// Brings the velocity back to its limit, and gives the rest of the problem.
-#[inline]
+#[inline(always)]
 fn brake(problem: &Problem, profile: &mut Profile) -> Result<Ramp, PlanError> {
     let Problem { start, target, limits } = problem;
     profile.begin(State { acceleration: 0.0, ..*start });

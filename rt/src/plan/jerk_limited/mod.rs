@@ -154,7 +154,7 @@ fn mix(inside: &Inside, first: &Shape, second: &Shape, share: f64, jerk_max: f64
 }
 
 /// The velocity interface is the second-order problem one order lower. From where the profile is.
-#[inline]
+#[inline(always)]
 fn velocity_ramp(problem: &Problem, profile: &mut Profile) -> Result<Ramp, PlanError> {
     let Problem { target, limits, .. } = problem;
     let start = profile.reached();
