@@ -17,8 +17,13 @@ const SETS: u64 = 1024;
 type Planner = fn(&[Problem], &mut [Profile], Timing) -> Result<f64, takt_rt::plan::PlanError>;
 
 /// Plans the sets in turn, by our planner and by `rsruckig`.
-fn compare<const AXES: usize>(criterion: &mut Criterion, name: &str, planner: Planner, order: Order) {
-    let sets: Vec<Vec<Problem>> = (0..SETS).map(|seed| problems(seed, AXES, order)).collect();
+fn compare<const AXES: usize>(
+    criterion: &mut Criterion,
+    name: &str,
+    planner: Planner,
+    draw: fn(u64, usize) -> Vec<Problem>,
+) {
+    let sets: Vec<Vec<Problem>> = (0..SETS).map(|seed| draw(seed, AXES)).collect();
     let mut profiles = [Profile::hold(0.0); AXES];
     let mut next = sets.iter().cycle();
     criterion.bench_function(&format!("plan/{name}/{AXES}"), |bencher| {
@@ -34,6 +39,14 @@ fn compare<const AXES: usize>(criterion: &mut Criterion, name: &str, planner: Pl
     criterion.bench_function(&format!("rsruckig/{name}/{AXES}"), |bencher| {
         bencher.iter(|| next.next().map(|input| ruckig.calculate(black_box(input), &mut trajectory).is_ok()));
     });
+}
+
+fn third_order(seed: u64, axes: usize) -> Vec<Problem> {
+    problems(seed, axes, Order::Third)
+}
+
+fn second_order(seed: u64, axes: usize) -> Vec<Problem> {
+    problems(seed, axes, Order::Second)
 }
 
 /// The same problem for `rsruckig`.
@@ -62,21 +75,38 @@ fn input<const AXES: usize>(problems: &[Problem], velocity: bool) -> InputParame
 }
 
 fn position(criterion: &mut Criterion) {
-    compare::<1>(criterion, "position", synchronised, Order::Third);
-    compare::<3>(criterion, "position", synchronised, Order::Third);
-    compare::<6>(criterion, "position", synchronised, Order::Third);
-    compare::<7>(criterion, "position", synchronised, Order::Third);
+    compare::<1>(criterion, "position", synchronised, third_order);
+    compare::<3>(criterion, "position", synchronised, third_order);
+    compare::<6>(criterion, "position", synchronised, third_order);
+    compare::<7>(criterion, "position", synchronised, third_order);
 }
 
 fn velocity(criterion: &mut Criterion) {
-    compare::<3>(criterion, "velocity", synchronised_velocity, Order::Third);
-    compare::<7>(criterion, "velocity", synchronised_velocity, Order::Third);
+    compare::<3>(criterion, "velocity", synchronised_velocity, third_order);
+    compare::<7>(criterion, "velocity", synchronised_velocity, third_order);
 }
 
 fn trapezoid(criterion: &mut Criterion) {
-    compare::<1>(criterion, "trapezoid", synchronised, Order::Second);
-    compare::<3>(criterion, "trapezoid", synchronised, Order::Second);
-    compare::<7>(criterion, "trapezoid", synchronised, Order::Second);
+    compare::<1>(criterion, "trapezoid", synchronised, second_order);
+    compare::<3>(criterion, "trapezoid", synchronised, second_order);
+    compare::<6>(criterion, "trapezoid", synchronised, second_order);
+    compare::<7>(criterion, "trapezoid", synchronised, second_order);
+}
+
+/// From the state a tenth of the way along each motion, to the same target: what a controller does that plans anew.
+fn planned_anew(seed: u64, axes: usize) -> Vec<Problem> {
+    let mut set = problems(seed, axes, Order::Third);
+    let mut profiles = vec![Profile::hold(0.0); axes];
+    let duration_s = synchronised(&set, &mut profiles, Timing::default()).unwrap_or_default();
+    for (problem, profile) in set.iter_mut().zip(&profiles) {
+        problem.start = profile.sample(0.1 * duration_s);
+    }
+    set
+}
+
+fn replan(criterion: &mut Criterion) {
+    compare::<6>(criterion, "replan", synchronised, planned_anew);
+    compare::<7>(criterion, "replan", synchronised, planned_anew);
 }
 
 fn sample(criterion: &mut Criterion) {
@@ -106,5 +136,5 @@ fn quick() -> Criterion {
         .measurement_time(Duration::from_millis(800))
 }
 
-criterion_group!(name = benches; config = quick(); targets = position, velocity, trapezoid, sample);
+criterion_group!(name = benches; config = quick(); targets = position, velocity, trapezoid, replan, sample);
 criterion_main!(benches);

@@ -86,11 +86,19 @@ impl Limits {
     ///
     /// # Errors
     /// [`PlanError::InvalidLimit`] with axis 0 and the first limit that cannot be kept by any motion.
+    #[inline]
     pub fn validate(&self) -> Result<(), PlanError> {
         let positive = |value: f64| value > 0.0 && value < f64::INFINITY;
-        let velocity = positive(self.velocity_max) & positive(-self.velocity_min);
-        let acceleration = positive(self.acceleration_max) & positive(-self.acceleration_min);
-        if velocity & acceleration & (self.jerk_max > 0.0) & (self.position_min < self.position_max) {
+        // The usual case at once: a sum is finite only if all of its numbers are.
+        let signs = (self.velocity_max > 0.0)
+            & (self.velocity_min < 0.0)
+            & (self.acceleration_max > 0.0)
+            & (self.acceleration_min < 0.0)
+            & (self.jerk_max > 0.0)
+            & (self.position_min < self.position_max);
+        let widths =
+            (self.velocity_max - self.velocity_min) + (self.acceleration_max - self.acceleration_min);
+        if signs & (widths < f64::INFINITY) {
             return Ok(());
         }
         let checks = [
@@ -128,6 +136,7 @@ pub struct Problem {
 
 impl Problem {
     /// Checks that every number is finite, the limits are limits, and the target keeps them.
+    #[inline]
     pub(super) fn validate(&self) -> Result<(), PlanError> {
         self.limits.validate()?;
         let second_order = self.limits.is_second_order();

@@ -73,8 +73,7 @@ pub(super) const BLOCKED_MAX: usize = 4;
 /// The trajectory of one axis: up to [`PHASES_MAX`] phases of constant jerk, then the target state.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Profile {
-    // Start times apart from the rest, infinite behind the last phase, so that finding a phase is a handful
-    // of packed comparisons.
+    // Start times apart from the rest, infinite behind the last phase, so that finding a phase reads little.
     starts_s: [f64; PHASES_MAX],
     phases: [Coefficients; PHASES_MAX],
     count: usize,
@@ -92,6 +91,13 @@ struct Coefficients {
 }
 
 const NO_PHASE: Coefficients = Coefficients { start: State::rest(0.0), jerk: 0.0 };
+
+/// `one` where the condition holds, else `other`. With a comparison of numbers as the condition it compiles to a mask,
+/// not to a branch to guess.
+#[inline]
+pub(super) fn select(condition: bool, one: f64, other: f64) -> f64 {
+    if condition { one } else { other }
+}
 
 #[inline]
 fn integrate(start: &State, jerk: f64, elapsed_s: f64) -> State {
@@ -151,12 +157,8 @@ impl Profile {
             };
         }
         let time_s = if time_s > 0.0 { time_s } else { 0.0 };
-        // A binary search over 16 start times, without a branch to guess.
-        let mut index = 0;
-        for step in [8, 4, 2, 1] {
-            let begun = self.starts_s.get(index + step).is_some_and(|start_s| *start_s <= time_s);
-            index += if begun { step } else { 0 };
-        }
+        // From one cycle to the next the phase is the same: the processor guesses every comparison right.
+        let index = self.starts_s.iter().skip(1).take_while(|start_s| **start_s <= time_s).count();
         match (self.phases.get(index), self.starts_s.get(index)) {
             (Some(phase), Some(start_s)) => integrate(&phase.start, phase.jerk, time_s - start_s),
             _ => self.end,
@@ -232,9 +234,7 @@ impl Extrema {
 impl Profile {
     /// Forgets the phases and starts at this state. What durations are possible is kept.
     pub(super) fn begin(&mut self, start: State) {
-        for start_s in self.starts_s.iter_mut().take(self.count) {
-            *start_s = f64::INFINITY;
-        }
+        self.starts_s = [f64::INFINITY; PHASES_MAX];
         self.count = 0;
         self.duration_s = 0.0;
         self.end = start;
@@ -245,9 +245,25 @@ impl Profile {
         self.append(duration_s, acceleration, 0.0);
     }
 
+    /// Appends phases of constant acceleration, leaving out those that are not longer than 0 s.
+    #[inline]
+    pub(super) fn accelerate_all<const COUNT: usize>(
+        &mut self,
+        durations_s: &[f64; COUNT],
+        accelerations: &[f64; COUNT],
+    ) {
+        self.append_all(durations_s, accelerations, |_, acceleration| (acceleration, 0.0));
+    }
+
     /// Appends a phase of constant jerk; one that is not longer than 0 s is left out.
     pub(super) fn shift(&mut self, duration_s: f64, jerk: f64) {
         self.append(duration_s, self.end.acceleration, jerk);
+    }
+
+    /// Appends phases of constant jerk, leaving out those that are not longer than 0 s.
+    #[inline]
+    pub(super) fn shift_all<const COUNT: usize>(&mut self, durations_s: &[f64; COUNT], jerks: &[f64; COUNT]) {
+        self.append_all(durations_s, jerks, |reached, jerk| (reached, jerk));
     }
 
     /// Takes away what rounding has put the acceleration beyond its limits.
@@ -257,19 +273,35 @@ impl Profile {
 
     /// Appends a phase that starts with this acceleration.
     fn append(&mut self, duration_s: f64, acceleration: f64, jerk: f64) {
-        self.end.acceleration = acceleration;
-        if duration_s <= 0.0 {
-            return;
+        self.append_all(&[duration_s], &[jerk], |_, jerk| (acceleration, jerk));
+    }
+
+    /// Appends phases. `rates` gives the acceleration at the start and the jerk, from the acceleration reached and
+    /// the parameter of the phase.
+    ///
+    /// Whether a phase is left out is a coin toss, so it is written in any case and only the count depends on it.
+    #[inline]
+    fn append_all<const COUNT: usize>(
+        &mut self,
+        durations_s: &[f64; COUNT],
+        parameters: &[f64; COUNT],
+        rates: impl Fn(f64, f64) -> (f64, f64),
+    ) {
+        let (mut end, mut time_s, mut count) = (self.end, self.duration_s, self.count);
+        for (duration_s, parameter) in durations_s.iter().zip(parameters) {
+            let (acceleration, jerk) = rates(end.acceleration, *parameter);
+            end.acceleration = acceleration;
+            if let (Some(phase), Some(start_s)) = (self.phases.get_mut(count), self.starts_s.get_mut(count)) {
+                *phase = Coefficients { start: end, jerk };
+                // Not the other way round: what is not a number must not look like no time.
+                *start_s = select(*duration_s <= 0.0, f64::INFINITY, time_s);
+                let elapsed_s = select(*duration_s <= 0.0, 0.0, *duration_s);
+                count += 1 - usize::from(*duration_s <= 0.0);
+                time_s += elapsed_s;
+                end = integrate(&end, jerk, elapsed_s);
+            }
         }
-        if let (Some(phase), Some(start_s)) =
-            (self.phases.get_mut(self.count), self.starts_s.get_mut(self.count))
-        {
-            *phase = Coefficients { start: self.end, jerk };
-            *start_s = self.duration_s;
-            self.count += 1;
-            self.duration_s += duration_s;
-            self.end = integrate(&phase.start, jerk, duration_s);
-        }
+        (self.end, self.duration_s, self.count) = (end, time_s, count);
     }
 
     /// The profile is complete: at its end it is exactly at the target.
@@ -284,6 +316,12 @@ impl Profile {
         self.duration_s = duration_s;
         let finite = duration_s < SIZE_MAX && reached.position.is_finite() && reached.velocity.is_finite();
         if finite { Ok(()) } else { Err(PlanError::NotRepresentable { axis: 0 }) }
+    }
+
+    /// Leaves the profile without its phases: it would last `duration_s`, and a longer one takes its place.
+    pub(super) fn leave_open(&mut self, duration_s: f64) -> Result<(), PlanError> {
+        self.duration_s = f64::INFINITY;
+        if duration_s < SIZE_MAX { Ok(()) } else { Err(PlanError::NotRepresentable { axis: 0 }) }
     }
 
     /// Where the building has arrived.

@@ -177,7 +177,7 @@ pub fn position(problem: &Problem) -> Result<Profile, PlanError> {
 /// As [`synchronised`], with axis 0.
 pub fn velocity(problem: &Problem) -> Result<Profile, PlanError> {
     let mut profile = Profile::hold(0.0);
-    fastest(Interface::Velocity, problem, &mut profile)?;
+    fastest(Interface::Velocity, problem, 0.0, &mut profile)?;
     Ok(profile)
 }
 
@@ -190,8 +190,8 @@ fn halt(
     let problems = axes.map(|(start, limits)| Problem { start, target, limits });
     let mut duration_s: f64 = 0.0;
     for (axis, (problem, profile)) in problems.clone().zip(profiles.iter_mut()).enumerate() {
-        let fastest_s =
-            fastest(Interface::Velocity, &problem, profile).map_err(|error| error.on_axis(axis))?;
+        let fastest_s = fastest(Interface::Velocity, &problem, duration_s, profile)
+            .map_err(|error| error.on_axis(axis))?;
         duration_s = duration_s.max(fastest_s);
     }
     let duration_s = unblocked(duration_s, profiles, None);
@@ -223,7 +223,9 @@ fn plan(
     }
     let mut longest_s = timing.minimum_duration_s;
     for (axis, (problem, profile)) in problems.iter().zip(profiles.iter_mut()).enumerate() {
-        let fastest_s = fastest(interface, problem, profile).map_err(|error| error.on_axis(axis))?;
+        // An axis that will be made to last longer needs no phases yet.
+        let least_s = if timing.synchronisation == Synchronisation::Independent { 0.0 } else { longest_s };
+        let fastest_s = fastest(interface, problem, least_s, profile).map_err(|error| error.on_axis(axis))?;
         longest_s = longest_s.max(fastest_s);
     }
     let common_s = match timing.synchronisation {
@@ -271,7 +273,7 @@ fn straight(
     let projected = line.projected(problems);
     let on_line = |error: PlanError| error.on_axis(line.reference());
     let mut profile = Profile::hold(0.0);
-    let fastest_s = fastest(interface, &projected, &mut profile).map_err(on_line)?;
+    let fastest_s = fastest(interface, &projected, 0.0, &mut profile).map_err(on_line)?;
     let least_s = fastest_s.max(timing.minimum_duration_s);
     let duration_s = unblocked(least_s, core::slice::from_ref(&profile), timing.cycle_s);
     lasting(interface, &projected, duration_s, &mut profile).map_err(on_line)?;
@@ -283,22 +285,29 @@ fn expect_length(expected: usize, received: usize) -> Result<(), PlanError> {
     if expected == received { Ok(()) } else { Err(PlanError::LengthMismatch { expected, received }) }
 }
 
-/// The fastest profile of one axis.
-fn fastest(interface: Interface, problem: &Problem, profile: &mut Profile) -> Result<f64, PlanError> {
+/// The fastest profile of one axis, and its duration in s. Its phases are left out where it lasts less than `least_s`.
+fn fastest(
+    interface: Interface,
+    problem: &Problem,
+    least_s: f64,
+    profile: &mut Profile,
+) -> Result<f64, PlanError> {
     problem.validate()?;
     if interface != Interface::Velocity {
         problem.validate_approach()?;
     }
     match (interface, problem.limits.is_second_order()) {
-        (Interface::Position(_), true) => trapezoid::fastest_position(problem, profile),
+        (Interface::Position(_), true) => trapezoid::fastest_position(problem, least_s, profile),
         (Interface::Velocity, true) => trapezoid::fastest_velocity(problem, profile),
-        (Interface::Position(manner), false) => jerk_limited::fastest_position(problem, manner, profile),
-        (Interface::Velocity, false) => jerk_limited::fastest_velocity(problem, profile),
+        (Interface::Position(manner), false) => {
+            jerk_limited::fastest_position(problem, manner, least_s, profile)
+        }
+        (Interface::Velocity, false) => jerk_limited::fastest_velocity(problem, least_s, profile),
     }?;
-    Ok(profile.duration_s())
+    Ok(profile.minimum_duration_s())
 }
 
-/// The profile of one axis that lasts this long; it holds the fastest one before.
+/// The profile of one axis that lasts this long; it holds the fastest one before, unless that is shorter.
 fn lasting(
     interface: Interface,
     problem: &Problem,

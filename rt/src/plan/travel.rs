@@ -37,7 +37,7 @@ pub(super) fn stop_within(start: State, limits: &Limits, profile: &mut Profile) 
     if limits.is_second_order() {
         return trapezoid::fastest_velocity(&problem, profile);
     }
-    jerk_limited::fastest_velocity(&problem, profile)?;
+    jerk_limited::fastest_velocity(&problem, 0.0, profile)?;
     if limit_left(&problem, profile).is_some() {
         jerk_limited::shortest_stop(&problem, profile)?;
     }
@@ -57,9 +57,9 @@ pub(super) fn motion_within(
     let Problem { start, target, limits } = problem;
     let fastest = |problem: &Problem, profile: &mut Profile| {
         if limits.is_second_order() {
-            trapezoid::fastest_position(problem, profile)
+            trapezoid::fastest_position(problem, 0.0, profile)
         } else {
-            jerk_limited::fastest_position(problem, manner, profile)
+            jerk_limited::fastest_position(problem, manner, 0.0, profile)
         }
     };
     fastest(problem, profile)?;

@@ -32,8 +32,11 @@ impl Tolerance {
         let second_order = jerk_max.is_infinite();
         let velocity = sizes[1].max(velocity_max).max(-velocity_min);
         let reach = velocity * (profile.duration_s() + velocity / acceleration_max.min(-acceleration_min));
-        // Times, too, have only so many digits.
-        let time = if second_order { 0.0 } else { 4.0 * f64::EPSILON * profile.duration_s() };
+        // Times, too, have only so many digits; and where the way is short beside the positions, the digits of these
+        // leave the times open, so that a multiple of the cycle may be met a little early.
+        let digits = 4.0 * f64::EPSILON;
+        let open = (digits * sizes[0] / sizes[1].max(f64::MIN_POSITIVE)).min(1e-11 * profile.duration_s());
+        let time = if second_order { 0.0 } else { digits * profile.duration_s() + open };
         Self {
             position: RELATIVE * (sizes[0] + reach),
             velocity: RELATIVE * velocity + time * sizes[2].max(acceleration_max).max(-acceleration_min),

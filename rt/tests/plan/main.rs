@@ -2,7 +2,10 @@
 
 mod any_input;
 mod checker;
+mod counts;
 mod jerk_limited;
+mod many;
 mod oracle;
+mod small_integers;
 mod tracking;
 mod trapezoid;

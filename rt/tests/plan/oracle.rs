@@ -111,3 +111,21 @@ fn the_answers_in_a_file_of_one_s_own_are_those_of_ruckig() {
         compare_all(&std::fs::read_to_string(path).unwrap());
     }
 }
+
+/// Fresh problems from the generator itself, which needs Python and the package `ruckig`:
+/// `TAKT_ORACLE_GENERATOR="python3 otg_oracle.py" TAKT_ORACLE_SEED=7 TAKT_ORACLE_PROBLEMS=10000 cargo test oracle`.
+#[test]
+fn fresh_answers_of_the_generator_are_those_of_ruckig() {
+    let Ok(generator) = std::env::var("TAKT_ORACLE_GENERATOR") else { return };
+    let or = |name: &str, otherwise: &str| std::env::var(name).unwrap_or_else(|_| otherwise.into());
+    let mut words = generator.split_whitespace();
+    let output = std::process::Command::new(words.next().unwrap())
+        .args(words)
+        .args([or("TAKT_ORACLE_SEED", "1"), or("TAKT_ORACLE_PROBLEMS", "1200")])
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let lines = String::from_utf8(output.stdout).unwrap();
+    assert!(!lines.is_empty());
+    compare_all(&lines);
+}

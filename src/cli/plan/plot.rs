@@ -7,6 +7,7 @@ const WIDTH: f64 = 900.0;
 const PANEL: f64 = 180.0;
 const LEFT: f64 = 80.0;
 const GAP: f64 = 34.0;
+const MARGIN: f64 = 8.0;
 const STEPS: u32 = 800;
 const COLOURS: [&str; 8] =
     ["#1f77b4", "#d62728", "#2ca02c", "#9467bd", "#ff7f0e", "#17becf", "#8c564b", "#e377c2"];
@@ -50,12 +51,28 @@ pub fn draw(problems: &[Problem], profiles: &[Profile]) -> String {
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {height}\" font-family=\"sans-serif\" \
          font-size=\"12\">\n<rect width=\"{WIDTH}\" height=\"{height}\" fill=\"white\"/>\n"
     );
+    for axis in 0..problems.len() {
+        let x = WIDTH - 20.0 - 60.0 * (problems.len() - axis) as f64;
+        // Writing to a string cannot fail.
+        let _ = writeln!(
+            svg,
+            "<text x=\"{x}\" y=\"16\" fill=\"{}\">axis {axis}</text>",
+            COLOURS[axis % COLOURS.len()]
+        );
+    }
     for (index, panel) in PANELS.iter().enumerate() {
         let top = GAP + index as f64 * (PANEL + GAP);
         draw_panel(&mut svg, panel, top, duration_s, problems, profiles);
     }
     svg.push_str("</svg>\n");
     svg
+}
+
+/// Four significant digits, without trailing zeros.
+fn number(value: f64) -> String {
+    let digits = if value == 0.0 { 0.0 } else { 3.0 - value.abs().log10().floor() };
+    let factor = 10_f64.powf(digits.clamp(-300.0, 300.0));
+    format!("{}", (value * factor).round() / factor)
 }
 
 fn draw_panel(
@@ -77,23 +94,40 @@ fn draw_panel(
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
     let span = if high > low { high - low } else { 1.0 };
     let x = |time_s: f64| LEFT + (right - LEFT) * if duration_s > 0.0 { time_s / duration_s } else { 0.0 };
-    let y = |value: f64| top + PANEL * (1.0 - (value - low) / span);
+    // A line at a limit must not lie on the frame.
+    let y = |value: f64| top + MARGIN + (PANEL - 2.0 * MARGIN) * (1.0 - (value - low) / span);
     let bottom = top + PANEL;
     // Writing to a string cannot fail.
     let _ = writeln!(
         svg,
         "<path d=\"M{LEFT} {top}V{bottom}H{right}\" fill=\"none\" stroke=\"#888\"/>\
          <text x=\"{LEFT}\" y=\"{}\">{}</text>\
-         <text x=\"{}\" y=\"{}\" text-anchor=\"end\">{high:.4}</text>\
-         <text x=\"{}\" y=\"{bottom}\" text-anchor=\"end\">{low:.4}</text>\
-         <text x=\"{right}\" y=\"{}\" text-anchor=\"end\">{duration_s:.4} s</text>",
+         <text x=\"{}\" y=\"{:.2}\" text-anchor=\"end\">{}</text>\
+         <text x=\"{}\" y=\"{:.2}\" text-anchor=\"end\">{}</text>\
+         <text x=\"{LEFT}\" y=\"{}\">0 s</text>\
+         <text x=\"{right}\" y=\"{}\" text-anchor=\"end\">{} s</text>",
         top - 6.0,
         panel.name,
         LEFT - 6.0,
-        top + 10.0,
+        y(high) + 4.0,
+        number(high),
         LEFT - 6.0,
+        y(low) + 4.0,
+        number(low),
         bottom + 14.0,
+        bottom + 14.0,
+        number(duration_s),
     );
+    if low < 0.0 && high > 0.0 {
+        let _ = writeln!(
+            svg,
+            "<path d=\"M{LEFT} {0:.2}H{right}\" stroke=\"#ddd\"/>\
+             <text x=\"{1}\" y=\"{2:.2}\" text-anchor=\"end\">0</text>",
+            y(0.0),
+            LEFT - 6.0,
+            y(0.0) + 4.0,
+        );
+    }
     for (axis, (problem, profile)) in problems.iter().zip(profiles).enumerate() {
         let colour = COLOURS[axis % COLOURS.len()];
         for limit in (panel.limits)(&problem.limits).into_iter().filter(|limit| limit.is_finite()) {
@@ -132,5 +166,12 @@ mod tests {
         // Velocity, acceleration and jerk have two limits each, the position has none.
         assert_eq!(svg.matches("stroke-dasharray").count(), 12);
         assert!(!svg.contains("NaN") && !svg.contains("inf"));
+        assert!(svg.contains(">axis 0<") && svg.contains(">axis 1<") && !svg.contains(">axis 2<"));
+    }
+
+    #[test]
+    fn numbers_beside_the_panels_have_four_digits_at_most() {
+        let numbers = [1.5, -10.0, 1.563_764, 12_345.6, 0.001_234_56, 0.0].map(number);
+        assert_eq!(numbers, ["1.5", "-10", "1.564", "12350", "0.001235", "0"]);
     }
 }

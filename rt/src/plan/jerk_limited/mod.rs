@@ -17,7 +17,7 @@ use super::error::PlanError;
 use super::problem::{Problem, State};
 use super::profile::Profile;
 use super::synchronisation::Return;
-use super::trapezoid::{Bounds, Ramp, Stretches};
+use super::trapezoid::{Bounds, Ramp, Stretches, larger};
 use motion::{Scale, Shape};
 use step1::Edges;
 use step2::Slower;
@@ -62,16 +62,17 @@ impl Inside {
     }
 
     fn drive(&self, shape: &Shape, jerk_max: f64, profile: &mut Profile) {
-        for (duration, jerk) in shape.durations.iter().zip(&shape.jerks) {
-            profile.shift(duration * self.scale.time_s, jerk * jerk_max);
-        }
+        let durations_s = shape.durations.map(|duration| duration * self.scale.time_s);
+        profile.shift_all(&durations_s, &shape.jerks.map(|jerk| jerk * jerk_max));
     }
 }
 
-/// The fastest profile to the target state, with its blocked intervals.
+/// The fastest profile to the target state, with its blocked intervals. Its phases are left out where it lasts less than
+/// `least_s`.
 pub(super) fn fastest_position(
     problem: &Problem,
     manner: Return,
+    least_s: f64,
     profile: &mut Profile,
 ) -> Result<(), PlanError> {
     let mut inside = Inside::of(problem, manner, profile)?;
@@ -79,10 +80,15 @@ pub(super) fn fastest_position(
     let Some((fastest, others)) = ways.split_first() else {
         return Err(PlanError::NotRepresentable { axis: 0 });
     };
-    inside.drive(&inside.edges.shape(fastest), problem.limits.jerk_max, profile);
     let duration_s = |duration: f64| inside.brake_s + duration * inside.scale.time_s;
-    profile.finish_at(problem.target, duration_s(fastest.duration))?;
-    profile.set_minimum_duration(profile.duration_s());
+    let fastest_s = duration_s(fastest.duration);
+    profile.set_minimum_duration(fastest_s);
+    if fastest_s < least_s {
+        profile.leave_open(fastest_s)?;
+    } else {
+        inside.drive(&inside.edges.shape(fastest), problem.limits.jerk_max, profile);
+        profile.finish_at(problem.target, fastest_s)?;
+    }
     for pair in others.chunks_exact(2) {
         if let [after, before] = pair {
             let rounding = ROUNDING * (1.0 + after.duration);
@@ -148,15 +154,19 @@ fn mix(inside: &Inside, first: &Shape, second: &Shape, share: f64, jerk_max: f64
 }
 
 /// The velocity interface is the second-order problem one order lower. From where the profile is.
+#[inline(always)]
 fn velocity_ramp(problem: &Problem, profile: &mut Profile) -> Result<Ramp, PlanError> {
     let Problem { target, limits, .. } = problem;
     let start = profile.reached();
-    let acceleration = start.acceleration.clamp(limits.acceleration_min, limits.acceleration_max);
-    let excess = start.acceleration - acceleration;
-    profile.shift(excess.abs() / limits.jerk_max, -libm::copysign(limits.jerk_max, excess));
-    profile.limit_acceleration(limits.acceleration_min, limits.acceleration_max);
+    let mut acceleration = start.acceleration;
+    if acceleration > limits.acceleration_max || acceleration < limits.acceleration_min {
+        acceleration = acceleration.clamp(limits.acceleration_min, limits.acceleration_max);
+        let excess = start.acceleration - acceleration;
+        profile.shift(excess.abs() / limits.jerk_max, -libm::copysign(limits.jerk_max, excess));
+        profile.limit_acceleration(limits.acceleration_min, limits.acceleration_max);
+    }
     let State { velocity, .. } = profile.reached();
-    let acceleration_size = limits.acceleration_max.max(-limits.acceleration_min);
+    let acceleration_size = larger(limits.acceleration_max, -limits.acceleration_min);
     let swing = acceleration_size * acceleration_size / limits.jerk_max;
     let rounding = ROUNDING * (velocity.abs() + target.velocity.abs() + swing);
     if !rounding.is_finite() {
@@ -204,25 +214,31 @@ pub(super) fn shortest_stop(problem: &Problem, profile: &mut Profile) -> Result<
 }
 
 fn drive_stretches(stretches: &Stretches, profile: &mut Profile) {
-    for (duration_s, jerk) in stretches.durations.iter().zip(&stretches.slopes) {
-        profile.shift(*duration_s, *jerk);
-    }
+    profile.shift_all(&stretches.durations, &stretches.slopes);
 }
 
-/// The fastest profile to the target velocity and acceleration, wherever that leads.
-pub(super) fn fastest_velocity(problem: &Problem, profile: &mut Profile) -> Result<(), PlanError> {
+/// The fastest profile to the target velocity and acceleration, wherever that leads. Its phases are left out where it
+/// lasts less than `least_s`.
+pub(super) fn fastest_velocity(
+    problem: &Problem,
+    least_s: f64,
+    profile: &mut Profile,
+) -> Result<(), PlanError> {
     profile.begin(problem.start);
     let ramp = velocity_ramp(problem, profile)?;
     let brake_s = profile.duration_s();
     let fastest = ramp.fastest();
-    drive_stretches(&fastest.stretches, profile);
-    let position = profile.reached().position;
-    profile.finish_at(State { position, ..problem.target }, brake_s + fastest.duration)?;
-    profile.set_minimum_duration(profile.duration_s());
+    let fastest_s = brake_s + fastest.duration;
+    profile.set_minimum_duration(fastest_s);
     if let Some((after, before)) = fastest.blocked {
         profile.block(brake_s + after, brake_s + before);
     }
-    Ok(())
+    if fastest_s < least_s {
+        return profile.leave_open(fastest_s);
+    }
+    drive_stretches(&fastest.stretches, profile);
+    let position = profile.reached().position;
+    profile.finish_at(State { position, ..problem.target }, fastest_s)
 }
 
 /// The profile to the target velocity and acceleration that lasts this long.

@@ -1,0 +1,73 @@
+//! Commands in the counts of an encoder (`otg.md` section 4, 8).
+
+use core::f64::consts::TAU;
+use takt_rt::plan::{Limits, Problem, Profile, State, Timing, position, synchronised};
+use takt_rt::units::{Scale, ScaleParameters};
+
+const CYCLE_S: f64 = 0.001;
+
+fn scale(counts_per_turn: f64, reversed: bool) -> Scale {
+    Scale::new(ScaleParameters {
+        counts_per_turn,
+        gear_ratio: 1.0,
+        travel_per_turn: TAU,
+        reversed,
+        zero_counts: 1234.0,
+        rated_torque: 1.0,
+    })
+    .unwrap()
+}
+
+/// The largest step of a velocity limit in one cycle.
+fn step_max(scale: &Scale, limits: &Limits) -> i32 {
+    (limits.velocity_max * CYCLE_S * scale.resolution()).ceil() as i32
+}
+
+#[test]
+fn counts_are_half_a_count_off_at_most_and_step_no_further_than_the_velocity_limit_allows() {
+    let limits = Limits::asymmetric(2.5, -2.5, 15.0, -10.0, 1000.0);
+    for (bits, reversed) in [(12, false), (15, true), (17, false), (20, true), (23, false)] {
+        let scale = scale(f64::from(1_u32 << bits), reversed);
+        let target = State { position: 1.7, velocity: -0.4, acceleration: 0.0 };
+        let problem =
+            Problem { start: State { position: -0.3, velocity: 1.1, acceleration: 2.0 }, target, limits };
+        let profile = position(&problem).unwrap();
+        let mut last = scale.position_to_counts(profile.sample(0.0).position);
+        let mut cycle = 0_u32;
+        while f64::from(cycle) * CYCLE_S < profile.duration_s() {
+            cycle += 1;
+            let state = profile.sample(f64::from(cycle) * CYCLE_S);
+            let counts = scale.position_to_counts(state.position);
+            let error = (scale.position_from_counts(counts) - state.position) * scale.resolution();
+            assert!(error.abs() <= 0.5 + 1e-9, "{error} counts in cycle {cycle} with {bits} bits");
+            let step = counts - last;
+            assert!(
+                step.abs() <= step_max(&scale, &limits),
+                "{step} counts in cycle {cycle} with {bits} bits"
+            );
+            last = counts;
+        }
+        assert!(cycle > 1000);
+    }
+}
+
+/// Sent there and back for a long time, from the own command and never from what was rounded.
+#[test]
+fn counts_do_not_drift() {
+    let limits = Limits::symmetric(2.5, 15.0, 1000.0);
+    let scale = scale(f64::from(1_u32 << 15), false);
+    let ends = [0.1, 1.1].map(|position| (position, scale.position_to_counts(position)));
+    let mut command = State::rest(0.1);
+    let mut profiles = [Profile::hold(0.0)];
+    for (target, counts) in ends.iter().cycle().skip(1).take(200) {
+        let problem = |start| [Problem { start, target: State::rest(*target), limits }];
+        let mut cycles = 0_u32;
+        while command != State::rest(*target) {
+            synchronised(&problem(command), &mut profiles, Timing::default()).unwrap();
+            command = profiles[0].sample(CYCLE_S);
+            cycles += 1;
+            assert!(cycles < 2000, "{command:?}");
+        }
+        assert_eq!(scale.position_to_counts(command.position), *counts);
+    }
+}
