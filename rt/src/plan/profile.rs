@@ -314,7 +314,9 @@ impl Profile {
         let reached = self.end;
         self.end = target;
         self.duration_s = duration_s;
-        let finite = duration_s < SIZE_MAX && reached.position.is_finite() && reached.velocity.is_finite();
+        let State { position, velocity, acceleration } = reached;
+        let finite =
+            duration_s < SIZE_MAX && position.is_finite() && velocity.is_finite() && acceleration.is_finite();
         if finite { Ok(()) } else { Err(PlanError::NotRepresentable { axis: 0 }) }
     }
 
