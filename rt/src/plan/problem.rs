@@ -91,6 +91,14 @@ impl Limits {
         smaller(smaller(velocity, acceleration), self.jerk_max)
     }
 
+    /// Whether no limit but an infinite jerk is too large.
+    #[inline]
+    fn is_moderate(&self) -> bool {
+        let widths =
+            (self.velocity_max - self.velocity_min) + (self.acceleration_max - self.acceleration_min);
+        widths < SIZE_MAX && (self.jerk_max < SIZE_MAX || self.is_second_order())
+    }
+
     /// Checks signs and finiteness.
     ///
     /// # Errors
@@ -126,7 +134,7 @@ impl Limits {
     }
 }
 
-/// Larger numbers are refused, and limits smaller than its inverse: their powers would leave the range of `f64`.
+/// Larger numbers are refused, limits too, and limits smaller than its inverse: their powers would leave the range of `f64`.
 pub(super) const SIZE_MAX: f64 = 1e100;
 
 /// Relative to a limit, being beyond it by this much is rounding.
@@ -154,7 +162,7 @@ impl Problem {
         let accelerations =
             if second_order { 0.0 } else { start.acceleration.abs() + target.acceleration.abs() };
         if sum + accelerations < SIZE_MAX {
-            if self.limits.least() < 1.0 / SIZE_MAX {
+            if self.limits.least() < 1.0 / SIZE_MAX || !self.limits.is_moderate() {
                 return Err(PlanError::NotRepresentable { axis: 0 });
             }
             return self.validate_target(second_order);

@@ -105,3 +105,12 @@ fn limits_that_are_next_to_nothing_are_refused() {
     assert_eq!(synchronised_velocity(&[problem], &mut profiles, Timing::default()), refused);
     assert_eq!(stop(&[start], &[limits], &mut profiles), refused);
 }
+
+/// Found by the fuzzer, too.
+#[test]
+fn limits_that_are_beyond_all_measure_are_refused() {
+    let limits = Limits::symmetric(8.2e136, 8.2e136, 6.8e136);
+    let problem = Problem { start: State::rest(0.0), target: State::rest(0.0), limits };
+    let answer = synchronised(&[problem], &mut [Profile::hold(0.0)], Timing::default());
+    assert_eq!(answer, Err(PlanError::NotRepresentable { axis: 0 }));
+}
