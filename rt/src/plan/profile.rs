@@ -322,7 +322,8 @@ impl Profile {
 
     /// Leaves the profile without its phases: it would last `duration_s`, and a longer one takes its place.
     pub(super) fn leave_open(&mut self, duration_s: f64) -> Result<(), PlanError> {
-        self.duration_s = f64::INFINITY;
+        // Equal to no duration, not even to one that has overflowed.
+        self.duration_s = f64::NAN;
         if duration_s < SIZE_MAX { Ok(()) } else { Err(PlanError::NotRepresentable { axis: 0 }) }
     }
 
