@@ -1,6 +1,7 @@
 //! The planning problem of one axis: where it is, where it shall be, what it must keep.
 
 use super::error::{Limit, PlanError, Quantity};
+use super::trapezoid::smaller;
 
 /// The state of motion of one axis, in rad, rad/s and rad/s² (m, m/s and m/s² for a linear axis).
 ///
@@ -82,6 +83,22 @@ impl Limits {
         self.jerk_max == f64::INFINITY
     }
 
+    /// The smallest magnitude among the limits of velocity, acceleration and jerk.
+    #[inline]
+    fn least(&self) -> f64 {
+        let velocity = smaller(self.velocity_max, -self.velocity_min);
+        let acceleration = smaller(self.acceleration_max, -self.acceleration_min);
+        smaller(smaller(velocity, acceleration), self.jerk_max)
+    }
+
+    /// Whether no limit but an infinite jerk is too large.
+    #[inline]
+    fn is_moderate(&self) -> bool {
+        let widths =
+            (self.velocity_max - self.velocity_min) + (self.acceleration_max - self.acceleration_min);
+        widths < SIZE_MAX && (self.jerk_max < SIZE_MAX || self.is_second_order())
+    }
+
     /// Checks signs and finiteness.
     ///
     /// # Errors
@@ -117,7 +134,7 @@ impl Limits {
     }
 }
 
-/// Larger numbers are refused: their powers would leave the range of `f64`.
+/// Larger numbers are refused, limits too, and limits smaller than its inverse: their powers would leave the range of `f64`.
 pub(super) const SIZE_MAX: f64 = 1e100;
 
 /// Relative to a limit, being beyond it by this much is rounding.
@@ -145,6 +162,9 @@ impl Problem {
         let accelerations =
             if second_order { 0.0 } else { start.acceleration.abs() + target.acceleration.abs() };
         if sum + accelerations < SIZE_MAX {
+            if self.limits.least() < 1.0 / SIZE_MAX || !self.limits.is_moderate() {
+                return Err(PlanError::NotRepresentable { axis: 0 });
+            }
             return self.validate_target(second_order);
         }
         let finite = |value: f64, quantity| {

@@ -314,13 +314,16 @@ impl Profile {
         let reached = self.end;
         self.end = target;
         self.duration_s = duration_s;
-        let finite = duration_s < SIZE_MAX && reached.position.is_finite() && reached.velocity.is_finite();
+        let State { position, velocity, acceleration } = reached;
+        let finite =
+            duration_s < SIZE_MAX && position.is_finite() && velocity.is_finite() && acceleration.is_finite();
         if finite { Ok(()) } else { Err(PlanError::NotRepresentable { axis: 0 }) }
     }
 
     /// Leaves the profile without its phases: it would last `duration_s`, and a longer one takes its place.
     pub(super) fn leave_open(&mut self, duration_s: f64) -> Result<(), PlanError> {
-        self.duration_s = f64::INFINITY;
+        // Equal to no duration, not even to one that has overflowed.
+        self.duration_s = f64::NAN;
         if duration_s < SIZE_MAX { Ok(()) } else { Err(PlanError::NotRepresentable { axis: 0 }) }
     }
 

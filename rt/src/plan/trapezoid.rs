@@ -198,7 +198,7 @@ pub(super) fn larger(one: f64, other: f64) -> f64 {
 
 /// The smaller number, in one instruction.
 #[inline]
-fn smaller(one: f64, other: f64) -> f64 {
+pub(super) fn smaller(one: f64, other: f64) -> f64 {
     if one < other { one } else { other }
 }
 

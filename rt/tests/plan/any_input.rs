@@ -3,7 +3,7 @@
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use takt_rt::plan::{
-    Limits, Problem, Profile, Return, State, Synchronisation, Timing, stop, synchronised,
+    Limits, PlanError, Problem, Profile, Return, State, Synchronisation, Timing, stop, synchronised,
     synchronised_velocity,
 };
 
@@ -90,4 +90,27 @@ proptest! {
             prop_assert!(next.position.is_finite() && next.velocity.is_finite() && next.acceleration.is_finite());
         }
     }
+}
+
+/// Found by the fuzzer: limits whose powers are too small for a number.
+#[test]
+fn limits_that_are_next_to_nothing_are_refused() {
+    let tiny = 1.249_785_523_836_551_2e-221;
+    let start = State { position: tiny, velocity: tiny, acceleration: tiny };
+    let limits = Limits::asymmetric(1.27e-221, -tiny, 3.4e-161, -2.57e-289, 3.6e-135);
+    let problem = Problem { start, target: State { acceleration: 1.6e-303, ..start }, limits };
+    let refused = Err(PlanError::NotRepresentable { axis: 0 });
+    let mut profiles = [Profile::hold(0.0)];
+    assert_eq!(synchronised(&[problem], &mut profiles, Timing::default()), refused);
+    assert_eq!(synchronised_velocity(&[problem], &mut profiles, Timing::default()), refused);
+    assert_eq!(stop(&[start], &[limits], &mut profiles), refused);
+}
+
+/// Found by the fuzzer, too.
+#[test]
+fn limits_that_are_beyond_all_measure_are_refused() {
+    let limits = Limits::symmetric(8.2e136, 8.2e136, 6.8e136);
+    let problem = Problem { start: State::rest(0.0), target: State::rest(0.0), limits };
+    let answer = synchronised(&[problem], &mut [Profile::hold(0.0)], Timing::default());
+    assert_eq!(answer, Err(PlanError::NotRepresentable { axis: 0 }));
 }
