@@ -135,7 +135,7 @@ impl Limits {
 }
 
 /// Larger numbers are refused, limits too, and limits smaller than its inverse: their powers would leave the range of `f64`.
-pub(super) const SIZE_MAX: f64 = 1e100;
+pub(super) const SIZE_MAX: f64 = 1e30;
 
 /// Relative to a limit, being beyond it by this much is rounding.
 const ROUNDING: f64 = 1e-13;

@@ -14,6 +14,7 @@ fn number() -> impl Strategy<Value = f64> {
         2 => any::<f64>(),
         2 => prop::sample::select(vec![0.0, -0.0, 1.0, -1.0, 2.0, 0.5, 1e-300, 1e300, -1e300, 1e-12, 1e12, f64::MAX, f64::MIN_POSITIVE, f64::INFINITY, f64::NAN]),
         2 => (-12.0..12.0_f64, any::<bool>()).prop_map(|(exponent, negative)| if negative { -(10_f64.powf(exponent)) } else { 10_f64.powf(exponent) }),
+        1 => (-110.0..110.0_f64, any::<bool>()).prop_map(|(exponent, negative)| if negative { -(10_f64.powf(exponent)) } else { 10_f64.powf(exponent) }),
     ]
 }
 
@@ -104,6 +105,15 @@ fn limits_that_are_next_to_nothing_are_refused() {
     assert_eq!(synchronised(&[problem], &mut profiles, Timing::default()), refused);
     assert_eq!(synchronised_velocity(&[problem], &mut profiles, Timing::default()), refused);
     assert_eq!(stop(&[start], &[limits], &mut profiles), refused);
+}
+
+/// Found by the fuzzer: each number is far below the end of the range, the products of some are beyond it.
+#[test]
+fn states_and_limits_whose_products_overflow_are_refused() {
+    let limits = Limits::symmetric(3.5e59, 3.5e59, 3.4e59);
+    let problem = Problem { start: State::rest(-3.4e59), target: State::rest(3.5e59), limits };
+    let answer = synchronised(&[problem], &mut [Profile::hold(0.0)], Timing::default());
+    assert_eq!(answer, Err(PlanError::NotRepresentable { axis: 0 }));
 }
 
 /// Found by the fuzzer, too.
