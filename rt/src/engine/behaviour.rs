@@ -1,0 +1,154 @@
+//! What the group does in each phase: where every axis is to be next.
+
+use arrayvec::ArrayVec;
+
+use super::Engine;
+use crate::axis::Axis;
+use crate::cia402::Goal;
+use crate::door::Door;
+use crate::plan::State;
+use crate::record::{EventKind, MAX_AXES};
+use crate::stop::{Phase, Rule, StopCategory};
+use crate::time::Nanoseconds;
+
+impl Engine {
+    pub(super) fn act(&mut self, now_ns: Nanoseconds, door: &mut impl Door) {
+        match self.phase {
+            Phase::Passive => {}
+            Phase::Disabled => self.hold(),
+            Phase::Enabling => self.wait_for_drives(now_ns, door),
+            Phase::Holding => self.hold(),
+            Phase::Moving | Phase::Stopping => self.follow_motion(now_ns, door),
+            Phase::Streaming => self.follow_stream(now_ns, door),
+            Phase::Disabling => {
+                self.come_to_rest();
+                // A drive that has fallen silent never shows that it has obeyed; it is not waited for without end.
+                let is_patient =
+                    !self.motion.is_finished() || self.phase_cycles <= self.enable_timeout_cycles;
+                if !(is_patient && self.axes.iter().any(|axis| axis.drive_state().has_torque())) {
+                    self.motion.cancel();
+                    self.goal = Goal::Disabled;
+                    self.enter(Phase::Disabled, now_ns, door);
+                }
+            }
+        }
+    }
+
+    fn wait_for_drives(&mut self, now_ns: Nanoseconds, door: &mut impl Door) {
+        self.hold();
+        if self.axes.iter().all(Axis::is_enabled) {
+            self.enter(Phase::Holding, now_ns, door);
+        } else if self.phase_cycles > self.enable_timeout_cycles {
+            let axis = self.axes.iter().position(|axis| !axis.is_enabled()).map(|axis| axis as u8);
+            let (value, limit) = (self.phase_cycles.into(), self.enable_timeout_cycles.into());
+            self.begin_stop(Rule::EnableTimeout, None, axis, value, limit, now_ns, door);
+        }
+    }
+
+    /// Enabled axes stay on their set-point; the set-point of the others follows them.
+    fn hold(&mut self) {
+        for axis in &mut self.axes {
+            if axis.is_enabled() {
+                axis.advance(State { position: axis.set_point().position, ..State::default() });
+            } else {
+                axis.follow_actual();
+            }
+        }
+    }
+
+    /// As [`Engine::hold`], but what is still on its way to rest goes on.
+    fn come_to_rest(&mut self) {
+        if self.motion.is_finished() {
+            return self.hold();
+        }
+        self.motion.advance(self.period_s);
+        for (axis, next) in self.axes.iter_mut().zip(self.motion.states()) {
+            if axis.is_enabled() { axis.advance(next) } else { axis.follow_actual() }
+        }
+    }
+
+    fn follow_motion(&mut self, now_ns: Nanoseconds, door: &mut impl Door) {
+        self.motion.advance(self.period_s);
+        let next: ArrayVec<State, MAX_AXES> = self.motion.states().take(self.axes.len()).collect();
+        if !self.advance_guarded(&next, now_ns, door) || !self.motion.is_finished() {
+            return;
+        }
+        if self.phase == Phase::Moving {
+            let is_at_rest = next.iter().all(|state| state.velocity == 0.0);
+            if is_at_rest {
+                self.finished_move = self.move_id;
+                self.happened(now_ns, EventKind::MoveFinished { id: self.move_id }, door);
+                self.enter(Phase::Holding, now_ns, door);
+            } else {
+                self.begin_stop(Rule::Requested, Some(StopCategory::Two), None, 0.0, 0.0, now_ns, door);
+            }
+            return;
+        }
+        match self.stop.map(|stop| stop.category) {
+            Some(StopCategory::Two) => self.enter(Phase::Holding, now_ns, door),
+            _ => {
+                self.goal = Goal::Disabled;
+                self.enter(Phase::Disabling, now_ns, door);
+            }
+        }
+    }
+
+    fn follow_stream(&mut self, now_ns: Nanoseconds, door: &mut impl Door) {
+        let Some(command) = self.stream else {
+            // Nothing has come yet: the owner has one enable time-out to begin.
+            self.hold();
+            if self.phase_cycles > self.enable_timeout_cycles {
+                let (value, limit) = (self.phase_cycles.into(), self.enable_timeout_cycles.into());
+                self.begin_stop(Rule::StaleCommand, None, None, value, limit, now_ns, door);
+            }
+            return;
+        };
+        if now_ns > command.valid_until_ns {
+            let age_cycles = (now_ns - command.valid_until_ns).div_ceil(self.period_ns);
+            self.begin_stop(Rule::StaleCommand, None, None, age_cycles as f64, 0.0, now_ns, door);
+            return self.follow_motion_if_stopping(now_ns, door);
+        }
+        let next: ArrayVec<State, MAX_AXES> =
+            command.set_points.iter().take(self.axes.len()).copied().collect();
+        if self.advance_guarded(&next, now_ns, door) {
+            // Until the next command comes the present one is carried on at its velocity, up to its expiry.
+            let period_s = self.period_s;
+            if let Some(held) = &mut self.stream {
+                held.set_points.iter_mut().for_each(|point| point.position += point.velocity * period_s);
+            }
+        }
+    }
+
+    /// Takes the next set-points of all axes if the guard agrees to each. If not, the group stops from where it
+    /// was, in this same cycle. Returns whether they were taken.
+    fn advance_guarded(&mut self, next: &[State], now_ns: Nanoseconds, door: &mut impl Door) -> bool {
+        let refusal = self.axes.iter().zip(next).enumerate().find_map(|(index, (axis, state))| {
+            let violation = axis.is_enabled().then(|| axis.check(state, self.period_s).err()).flatten();
+            violation.map(|violation| (index as u8, violation))
+        });
+        if let Some((axis, violation)) = refusal {
+            let was_stopping = self.phase == Phase::Stopping;
+            let category = was_stopping.then_some(StopCategory::Zero);
+            let (rule, value, limit) = (violation.rule, violation.value, violation.limit);
+            self.begin_stop(rule, category, Some(axis), value, limit, now_ns, door);
+            if was_stopping {
+                self.hold();
+            } else {
+                self.follow_motion_if_stopping(now_ns, door);
+            }
+            return false;
+        }
+        for (axis, state) in self.axes.iter_mut().zip(next) {
+            if axis.is_enabled() { axis.advance(*state) } else { axis.follow_actual() }
+        }
+        true
+    }
+
+    fn follow_motion_if_stopping(&mut self, now_ns: Nanoseconds, door: &mut impl Door) {
+        if self.phase == Phase::Stopping {
+            self.follow_motion(now_ns, door);
+        } else {
+            self.hold();
+        }
+    }
+}

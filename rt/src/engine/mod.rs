@@ -1,0 +1,396 @@
+//! The cycle as pure computation: frames and time in, frames out.
+//!
+//! [`Engine`] holds the axes and the phase that the group is in. Each slot it gives SYNC, takes what the drives
+//! report, decides in [`Engine::compute`] (requests, supervision, motion, guard, commands), and gives the set-points.
+//! It knows neither clocks nor buses; [`crate::cycle`] drives it.
+
+mod behaviour;
+mod parameters;
+mod requests;
+mod stops;
+
+use arrayvec::ArrayVec;
+
+use crate::axis::{Axis, AxisParameters};
+use crate::cia402::{Goal, controlword};
+use crate::dispatch::{Destination, Dispatch, IdTaken};
+use crate::door::{AxisSnapshot, Door, Snapshot, StreamCommand};
+use crate::frame::{Frame, Id};
+use crate::motion::Motion;
+use crate::port::{BusHealth, Received};
+use crate::record::{CycleRecord, Event, EventKind, MAX_AXES, MAX_BUSES, Timing};
+use crate::stop::{Phase, StopReason};
+use crate::time::{NANOSECONDS_PER_SECOND, Nanoseconds};
+
+pub use parameters::{BusParameters, EngineParameters, Heartbeat, SetUpError};
+
+/// The most frames the engine hands to one bus in one cycle.
+pub const SEND_BATCH: usize = 64;
+
+/// Frames for one bus.
+pub type SendBatch = ArrayVec<Frame, SEND_BATCH>;
+
+/// Requests looked at in one cycle; the rest waits, so that a flood costs a bounded time.
+const REQUESTS_PER_CYCLE: usize = 4;
+/// How long controlword bit 7 is held low before, and high in, a fault reset.
+const FAULT_RESET_CYCLES: u32 = 10;
+
+/// Whether the set-points of a cycle can leave.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Transmission {
+    /// They can.
+    Free,
+    /// It is too late in the slot: they would run into the next SYNC. Counts as a missed slot.
+    TooLate,
+    /// Set-points of an earlier cycle are still waiting for the wire somewhere; more behind them would be stale
+    /// when they get there.
+    Blocked,
+}
+
+/// The group of axes that move together.
+#[derive(Debug)]
+pub struct Engine {
+    period_ns: Nanoseconds,
+    period_s: f64,
+    axes: ArrayVec<Axis, MAX_AXES>,
+    buses: ArrayVec<BusParameters, MAX_BUSES>,
+    dispatch: [Dispatch; MAX_BUSES],
+    heartbeat: Option<Heartbeat>,
+    enable_timeout_cycles: u32,
+    not_transmitted_cycles: u32,
+
+    phase: Phase,
+    phase_cycles: u32,
+    is_sync_on: bool,
+    is_leaving: bool,
+    goal: Goal,
+    motion: Motion,
+    /// The move under way: its number and whether it ends in motion.
+    move_id: u32,
+    finished_move: u32,
+    refused: u64,
+    stream: Option<StreamCommand>,
+    stop: Option<StopReason>,
+    fault_reset: u32,
+    heartbeat_due: u32,
+    blocked_cycles: u32,
+    last_slot: Option<u64>,
+    missed_slots: u64,
+    dropped: u64,
+    drive_states: [crate::cia402::State; MAX_AXES],
+    record: CycleRecord,
+    snapshot: Snapshot,
+}
+
+impl Engine {
+    /// Checks the parameters. The engine begins in [`Phase::Passive`].
+    pub fn new(parameters: EngineParameters) -> Result<Self, SetUpError> {
+        if parameters.period_ns == 0 {
+            return Err(SetUpError::NoPeriod);
+        }
+        if parameters.axes.is_empty() {
+            return Err(SetUpError::NoAxis);
+        }
+        let mut dispatch: [Dispatch; MAX_BUSES] = core::array::from_fn(|_| Dispatch::default());
+        for (axis, own) in parameters.axes.iter().enumerate() {
+            let is_bus_known = usize::from(own.bus) < parameters.buses.len();
+            let table = dispatch.get_mut(usize::from(own.bus)).filter(|_| is_bus_known);
+            enter(table.ok_or(SetUpError::UnknownBus { axis })?, axis, own)?;
+        }
+        let record = CycleRecord { axis_count: parameters.axes.len() as u8, ..CycleRecord::default() };
+        let snapshot = Snapshot {
+            axis_count: parameters.axes.len() as u8,
+            bus_count: parameters.buses.len() as u8,
+            ..Snapshot::default()
+        };
+        Ok(Self {
+            period_ns: parameters.period_ns,
+            period_s: parameters.period_ns as f64 / NANOSECONDS_PER_SECOND as f64,
+            axes: parameters.axes.into_iter().map(Axis::new).collect(),
+            buses: parameters.buses,
+            dispatch,
+            heartbeat: parameters.heartbeat,
+            enable_timeout_cycles: parameters.enable_timeout_cycles,
+            not_transmitted_cycles: parameters.not_transmitted_cycles,
+            phase: Phase::Passive,
+            phase_cycles: 0,
+            is_sync_on: false,
+            is_leaving: false,
+            goal: Goal::Disabled,
+            motion: Motion::default(),
+            move_id: 0,
+            finished_move: 0,
+            refused: 0,
+            stream: None,
+            stop: None,
+            fault_reset: 0,
+            heartbeat_due: 0,
+            blocked_cycles: 0,
+            last_slot: None,
+            missed_slots: 0,
+            dropped: 0,
+            drive_states: Default::default(),
+            record,
+            snapshot,
+        })
+    }
+
+    /// How many buses there are.
+    pub fn bus_count(&self) -> usize {
+        self.buses.len()
+    }
+
+    /// The period of the cycle.
+    pub fn period_ns(&self) -> Nanoseconds {
+        self.period_ns
+    }
+
+    /// What the group is doing.
+    pub fn phase(&self) -> Phase {
+        self.phase
+    }
+
+    /// The axes.
+    pub fn axes(&self) -> &[Axis] {
+        &self.axes
+    }
+
+    /// Whether the loop is to end after this cycle.
+    pub fn is_leaving(&self) -> bool {
+        self.is_leaving
+    }
+
+    /// The SYNC of a bus, if it is to be sent.
+    pub fn sync(&self, bus: usize) -> Option<Frame> {
+        if !self.is_sync_on {
+            return None;
+        }
+        self.buses.get(bus).map(|parameters| Frame::of(parameters.sync_id, []))
+    }
+
+    /// Takes a frame that arrived on a bus.
+    pub fn receive(&mut self, bus: usize, received: &Received, door: &mut impl Door) {
+        let Some(table) = self.dispatch.get(bus) else { return };
+        match table.destination(&received.frame) {
+            Destination::Feedback { axis, pdo } => {
+                if let Some(axis) = self.axes.get_mut(usize::from(axis)) {
+                    // One that is too short counts as not received, which the feedback's age then shows.
+                    let _ = axis.receive(pdo.into(), &received.frame);
+                }
+            }
+            Destination::Emergency { axis } => {
+                let [low, high, register, manufacturer @ ..] = received.frame.first_word().to_le_bytes();
+                let code = u16::from_le_bytes([low, high]);
+                if let Some(axis) = self.axes.get_mut(usize::from(axis)) {
+                    axis.receive_emergency(code);
+                }
+                self.happened(
+                    received.at_ns,
+                    EventKind::Emergency { axis, code, register, manufacturer },
+                    door,
+                );
+                self.hand_over(bus, received, door);
+            }
+            Destination::Service => self.hand_over(bus, received, door),
+        }
+    }
+
+    fn hand_over(&mut self, bus: usize, received: &Received, door: &mut impl Door) {
+        if !door.received(bus, received) {
+            self.dropped += 1;
+        }
+    }
+
+    fn happened(&mut self, at_ns: Nanoseconds, kind: EventKind, door: &mut impl Door) {
+        let slot = self.last_slot.unwrap_or(0);
+        if !door.event(&Event { slot, at_ns, kind }) {
+            self.dropped += 1;
+        }
+    }
+
+    /// The thinking of one cycle. Nothing moves on unless the set-points can leave.
+    ///
+    /// Returns whether there are set-points to send.
+    pub fn compute(
+        &mut self,
+        slot: u64,
+        now_ns: Nanoseconds,
+        buses: &[BusHealth],
+        transmission: Transmission,
+        door: &mut impl Door,
+    ) -> bool {
+        let elapsed = self.last_slot.map_or(1, |last| slot.saturating_sub(last));
+        self.count_slot(slot, elapsed, transmission, now_ns, door);
+        for axis in &mut self.axes {
+            axis.begin_cycle(self.period_s * elapsed as f64);
+        }
+        self.notice_drive_states(now_ns, door);
+        for _ in 0..REQUESTS_PER_CYCLE {
+            match door.request() {
+                Some(request) => self.take(request, now_ns, door),
+                None => break,
+            }
+        }
+        if let Some(command) = door.stream() {
+            self.stream = Some(command);
+        }
+        self.supervise(buses, transmission, now_ns, door);
+        let has_commands = transmission == Transmission::Free && self.phase != Phase::Passive;
+        if has_commands {
+            self.act(now_ns, door);
+            self.write_commands();
+        }
+        self.phase_cycles = self.phase_cycles.saturating_add(1);
+        self.record.is_commanded = has_commands;
+        has_commands
+    }
+
+    fn count_slot(
+        &mut self,
+        slot: u64,
+        elapsed: u64,
+        transmission: Transmission,
+        now_ns: Nanoseconds,
+        door: &mut impl Door,
+    ) {
+        let missed = elapsed.saturating_sub(1) + u64::from(transmission == Transmission::TooLate);
+        self.last_slot = Some(slot);
+        self.record.timing.missed_slots = missed;
+        if missed > 0 {
+            self.missed_slots += missed;
+            self.happened(now_ns, EventKind::MissedSlots { count: missed }, door);
+        }
+    }
+
+    fn notice_drive_states(&mut self, now_ns: Nanoseconds, door: &mut impl Door) {
+        for index in 0..self.axes.len() {
+            let (Some(axis), Some(known)) = (self.axes.get(index), self.drive_states.get_mut(index)) else {
+                continue;
+            };
+            let (state, statusword) = (axis.drive_state(), axis.statusword());
+            if *known != state {
+                *known = state;
+                self.happened(now_ns, EventKind::DriveState { axis: index as u8, statusword }, door);
+            }
+        }
+    }
+
+    fn write_commands(&mut self) {
+        let resetting = self.fault_reset;
+        self.fault_reset = resetting.saturating_sub(1);
+        for axis in &mut self.axes {
+            let word = if resetting > 0 && axis.drive_state().is_faulted() {
+                // Low first, so that what follows is an edge whatever was sent before.
+                if resetting > FAULT_RESET_CYCLES {
+                    controlword::DISABLE_VOLTAGE
+                } else {
+                    controlword::FAULT_RESET
+                }
+            } else {
+                axis.controlword_towards(self.goal)
+            };
+            axis.command(word, axis.is_enabled());
+        }
+    }
+
+    fn enter(&mut self, phase: Phase, now_ns: Nanoseconds, door: &mut impl Door) {
+        if phase != self.phase {
+            let kind = EventKind::PhaseChanged { from: self.phase, to: phase };
+            self.happened(now_ns, kind, door);
+            self.phase = phase;
+        }
+        self.phase_cycles = 0;
+    }
+
+    /// The set-points of a bus.
+    pub fn set_points(&self, bus: usize, batch: &mut SendBatch) {
+        for axis in self.axes.iter().filter(|axis| usize::from(axis.parameters().bus) == bus) {
+            for frame in axis.frames() {
+                let _ = batch.try_push(frame);
+            }
+        }
+    }
+
+    /// The heartbeat when it is due, and service frames as far as the budget goes: what follows the set-points.
+    pub fn services(&self, bus: usize, door: &mut impl Door, batch: &mut SendBatch) {
+        if let Some(heartbeat) = self.heartbeat.filter(|_| self.heartbeat_due == 0) {
+            let _ = batch.try_push(Frame::of(Id::canopen(0x700, heartbeat.node), [NMT_OPERATIONAL]));
+        }
+        let Some(parameters) = self.buses.get(bus) else { return };
+        let budget = match self.phase {
+            Phase::Passive => parameters.service_frames_passive,
+            _ => parameters.service_frames_active,
+        };
+        for _ in 0..budget.min(batch.remaining_capacity()) {
+            match door.service_frame(bus) {
+                Some(frame) => batch.push(frame),
+                None => break,
+            }
+        }
+    }
+
+    /// Ends the cycle: leaves its record and shows the new state.
+    pub fn finish(&mut self, timing: Timing, now_ns: Nanoseconds, buses: &[BusHealth], door: &mut impl Door) {
+        if let Some(heartbeat) = self.heartbeat {
+            self.heartbeat_due = match self.heartbeat_due {
+                0 => heartbeat.cycles.saturating_sub(1),
+                cycles => cycles - 1,
+            };
+        }
+        let missed_slots = self.record.timing.missed_slots;
+        self.record.timing = Timing { missed_slots, ..timing };
+        self.record.phase = self.phase;
+        for (axis, record) in self.axes.iter().zip(&mut self.record.axes) {
+            axis.record(self.period_s, record);
+        }
+        if !door.record(&self.record) {
+            self.dropped += 1;
+        }
+        self.show(timing.slot, now_ns, buses);
+        door.publish(&self.snapshot);
+    }
+
+    fn show(&mut self, slot: u64, now_ns: Nanoseconds, buses: &[BusHealth]) {
+        let snapshot = &mut self.snapshot;
+        snapshot.slot = slot;
+        snapshot.at_ns = now_ns;
+        snapshot.phase = self.phase;
+        snapshot.missed_slots = self.missed_slots;
+        snapshot.dropped = self.dropped;
+        snapshot.refused = self.refused;
+        snapshot.finished_move = self.finished_move;
+        let is_on_way = matches!(self.phase, Phase::Moving | Phase::Stopping);
+        snapshot.remaining_s = if is_on_way { self.motion.remaining_s() } else { 0.0 };
+        snapshot.stop = self.stop;
+        for (axis, shown) in self.axes.iter().zip(&mut snapshot.axes) {
+            *shown = AxisSnapshot {
+                position_set: axis.set_point().position,
+                position: axis.position(),
+                velocity: axis.velocity(),
+                statusword: axis.statusword(),
+                error_code: axis.error_code(),
+                is_heard: axis.is_heard(),
+            };
+        }
+        for (shown, health) in snapshot.buses.iter_mut().zip(buses) {
+            *shown = *health;
+        }
+    }
+}
+
+const NMT_OPERATIONAL: u8 = 5;
+
+fn enter(table: &mut Dispatch, axis: usize, own: &AxisParameters) -> Result<(), SetUpError> {
+    if own.commands.is_empty() || own.feedback.is_empty() {
+        return Err(SetUpError::NoPdo { axis });
+    }
+    if !own.limits.are_possible() {
+        return Err(SetUpError::ImpossibleLimits { axis });
+    }
+    let taken = |taken: IdTaken| SetUpError::IdTaken { axis, id: taken.id };
+    table.emergency(Id::canopen(0x080, own.node), axis as u8).map_err(taken)?;
+    for (number, pdo) in own.feedback.iter().enumerate() {
+        table.feedback(pdo.id, axis as u8, number as u8).map_err(taken)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,75 @@
+//! Everything about the group that does not change while it runs, and why it may be refused.
+
+use arrayvec::ArrayVec;
+
+use crate::axis::AxisParameters;
+use crate::frame::Id;
+use crate::record::{MAX_AXES, MAX_BUSES};
+use crate::time::Nanoseconds;
+
+/// A bus as the engine knows it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct BusParameters {
+    /// Identifier of SYNC.
+    pub sync_id: Id,
+    /// The most service frames in a cycle while set-points are sent.
+    pub service_frames_active: usize,
+    /// The most service frames in a cycle before that.
+    pub service_frames_passive: usize,
+}
+
+/// The heartbeat of this controller.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Heartbeat {
+    /// Its node number.
+    pub node: u8,
+    /// Cycles from one to the next.
+    pub cycles: u32,
+}
+
+/// Everything about the group that does not change while it runs.
+#[derive(Clone, Debug)]
+pub struct EngineParameters {
+    /// The period of the cycle.
+    pub period_ns: Nanoseconds,
+    /// The axes.
+    pub axes: ArrayVec<AxisParameters, MAX_AXES>,
+    /// The buses.
+    pub buses: ArrayVec<BusParameters, MAX_BUSES>,
+    /// The heartbeat, if one is sent.
+    pub heartbeat: Option<Heartbeat>,
+    /// Cycles within which every drive must reach operation enabled.
+    pub enable_timeout_cycles: u32,
+    /// Cycles in a row in which set-points may fail to get onto the wire.
+    pub not_transmitted_cycles: u32,
+}
+/// Why an engine cannot be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SetUpError {
+    /// The period is zero.
+    NoPeriod,
+    /// There is no axis.
+    NoAxis,
+    /// An axis names a bus that is not there.
+    UnknownBus {
+        /// The axis.
+        axis: usize,
+    },
+    /// An axis has no PDO in one of the directions.
+    NoPdo {
+        /// The axis.
+        axis: usize,
+    },
+    /// A limit of an axis is not a number that can be kept.
+    ImpossibleLimits {
+        /// The axis.
+        axis: usize,
+    },
+    /// Two axes of a bus expect the same identifier.
+    IdTaken {
+        /// The axis that came second.
+        axis: usize,
+        /// The identifier.
+        id: Id,
+    },
+}

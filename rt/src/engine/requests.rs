@@ -1,0 +1,124 @@
+//! What is asked of the group, and what of it is possible now.
+
+use super::{Engine, FAULT_RESET_CYCLES};
+use crate::cia402::Goal;
+use crate::door::{Door, Move, Request};
+use crate::motion::Leg;
+use crate::plan::State;
+use crate::record::EventKind;
+use crate::stop::{Phase, Rule, StopCategory};
+use crate::time::Nanoseconds;
+
+impl Engine {
+    pub(super) fn take(&mut self, request: Request, now_ns: Nanoseconds, door: &mut impl Door) {
+        let is_latched = self.stop.is_some_and(|stop| stop.rule != Rule::Requested);
+        let is_done = match request {
+            Request::Sync(on) => {
+                self.is_sync_on = on;
+                true
+            }
+            Request::RatedTorque { axis, torque } => {
+                self.axes.get_mut(usize::from(axis)).is_some_and(|axis| axis.set_rated_torque(torque))
+            }
+            Request::Activate => self.activate(now_ns, door),
+            Request::Enable if self.phase == Phase::Disabled && !is_latched => {
+                self.stop = None;
+                self.goal = Goal::Enabled;
+                self.enter(Phase::Enabling, now_ns, door);
+                true
+            }
+            Request::Move(parameters) if !is_latched => self.begin_move(&parameters, now_ns, door),
+            Request::Stream if self.phase == Phase::Holding && !is_latched => {
+                self.stop = None;
+                self.stream = None;
+                self.enter(Phase::Streaming, now_ns, door);
+                true
+            }
+            Request::Stop(category) => {
+                self.begin_stop(Rule::Requested, Some(category), None, 0.0, 0.0, now_ns, door);
+                true
+            }
+            Request::Disable => self.begin_disable(now_ns, door),
+            Request::ResetFaults => self.reset_faults(),
+            Request::Leave => {
+                self.is_leaving = true;
+                true
+            }
+            Request::Enable | Request::Move(_) | Request::Stream => false,
+        };
+        if !is_done {
+            self.refused += 1;
+            self.happened(now_ns, EventKind::Refused { phase: self.phase }, door);
+        }
+    }
+
+    fn activate(&mut self, now_ns: Nanoseconds, door: &mut impl Door) -> bool {
+        if self.phase != Phase::Passive {
+            return false;
+        }
+        self.goal = Goal::Disabled;
+        self.enter(Phase::Disabled, now_ns, door);
+        true
+    }
+
+    fn begin_move(&mut self, parameters: &Move, now_ns: Nanoseconds, door: &mut impl Door) -> bool {
+        let scale = |value: f64| value > 0.0 && value <= 1.0;
+        let is_possible = matches!(self.phase, Phase::Holding | Phase::Moving)
+            && scale(parameters.velocity_scale)
+            && scale(parameters.acceleration_scale)
+            && parameters.minimum_duration_s.is_finite()
+            && self.axes.iter().zip(parameters.target).all(|(axis, to)| axis.parameters().limits.contain(to));
+        if !is_possible {
+            return false;
+        }
+        let targets = parameters.target.into_iter().zip(parameters.target_velocity);
+        let legs = self.axes.iter().zip(targets).map(|(axis, (position, velocity))| Leg {
+            start: axis.set_point(),
+            target: State { position, velocity, acceleration: 0.0 },
+            limits: &axis.parameters().limits,
+        });
+        let planned = self.motion.move_to(
+            legs,
+            parameters.velocity_scale,
+            parameters.acceleration_scale,
+            parameters.minimum_duration_s,
+        );
+        if planned.is_err() {
+            return false;
+        }
+        self.stop = None;
+        self.move_id = parameters.id;
+        self.enter(Phase::Moving, now_ns, door);
+        true
+    }
+
+    fn begin_disable(&mut self, now_ns: Nanoseconds, door: &mut impl Door) -> bool {
+        match self.phase {
+            Phase::Passive => return false,
+            Phase::Disabled | Phase::Disabling => {}
+            Phase::Enabling | Phase::Holding => {
+                self.goal = Goal::Disabled;
+                self.enter(Phase::Disabling, now_ns, door);
+            }
+            Phase::Moving | Phase::Streaming | Phase::Stopping => {
+                self.begin_stop(Rule::Requested, Some(StopCategory::One), None, 0.0, 0.0, now_ns, door);
+            }
+        }
+        true
+    }
+
+    fn reset_faults(&mut self) -> bool {
+        match self.phase {
+            Phase::Disabled => {
+                self.fault_reset = 2 * FAULT_RESET_CYCLES;
+                for axis in &mut self.axes {
+                    axis.receive_emergency(0);
+                }
+            }
+            Phase::Holding => {}
+            _ => return false,
+        }
+        self.stop = None;
+        true
+    }
+}

@@ -1,0 +1,135 @@
+//! What is wrong with the group, and how it stops.
+
+use super::{Engine, Transmission};
+use crate::axis::Axis;
+use crate::cia402::Goal;
+use crate::door::Door;
+use crate::plan::PlanError;
+use crate::port::{BusHealth, BusState};
+use crate::record::EventKind;
+use crate::stop::{Phase, Rule, StopCategory, StopReason};
+use crate::time::Nanoseconds;
+
+impl Engine {
+    pub(super) fn supervise(
+        &mut self,
+        buses: &[BusHealth],
+        transmission: Transmission,
+        now_ns: Nanoseconds,
+        door: &mut impl Door,
+    ) {
+        let is_blocked = transmission == Transmission::Blocked;
+        self.blocked_cycles = if is_blocked { self.blocked_cycles.saturating_add(1) } else { 0 };
+        if !has_power(self.phase) {
+            return;
+        }
+        for (bus, health) in buses.iter().enumerate().take(self.buses.len()) {
+            if matches!(health.state, BusState::BusOff | BusState::Down) {
+                self.begin_stop(Rule::BusLost, None, None, bus as f64, 0.0, now_ns, door);
+            }
+        }
+        if self.blocked_cycles > self.not_transmitted_cycles {
+            let (cycles, limit) = (self.blocked_cycles.into(), self.not_transmitted_cycles.into());
+            self.begin_stop(Rule::NotTransmitted, None, None, cycles, limit, now_ns, door);
+        }
+        for index in 0..self.axes.len() {
+            let Some((rule, value, limit)) =
+                self.axes.get_mut(index).and_then(|axis| complaint(axis, self.phase))
+            else {
+                continue;
+            };
+            self.begin_stop(rule, None, Some(index as u8), value, limit, now_ns, door);
+        }
+    }
+
+    /// Begins a stop. The first reason stays the reason; a later one can only make the stop harder.
+    #[expect(clippy::too_many_arguments, reason = "they are the fields of the reason")]
+    pub(super) fn begin_stop(
+        &mut self,
+        rule: Rule,
+        category: Option<StopCategory>,
+        axis: Option<u8>,
+        value: f64,
+        limit: f64,
+        now_ns: Nanoseconds,
+        door: &mut impl Door,
+    ) {
+        let wanted = category.unwrap_or(rule.default_category());
+        let slot = self.last_slot.unwrap_or(0);
+        let reason = StopReason { category: wanted, rule, axis, value, limit, slot, phase: self.phase };
+        let is_under_way = matches!(self.phase, Phase::Stopping | Phase::Disabling);
+        match self.stop {
+            Some(present) if is_under_way || present.rule != Rule::Requested => {
+                if wanted >= present.category {
+                    return;
+                }
+                self.stop = Some(StopReason { category: wanted, ..present });
+            }
+            _ => {
+                self.stop = Some(reason);
+                self.happened(now_ns, EventKind::Stop(reason), door);
+            }
+        }
+        self.carry_out(wanted, now_ns, door);
+    }
+
+    fn carry_out(&mut self, category: StopCategory, now_ns: Nanoseconds, door: &mut impl Door) {
+        match (self.phase, category) {
+            (Phase::Passive | Phase::Disabled, _) => {}
+            (_, StopCategory::Zero) => {
+                // While the power goes, the set-points go on to rest at the limits: a drive that is slow to obey
+                // gets no step. Without a trajectory to rest they stay where they are.
+                if self.plan_stop().is_err() {
+                    self.motion.cancel();
+                }
+                self.goal = Goal::NoVoltage;
+                self.enter(Phase::Disabling, now_ns, door);
+            }
+            (Phase::Enabling, _) | (Phase::Holding, StopCategory::One) => {
+                self.goal = Goal::Disabled;
+                self.enter(Phase::Disabling, now_ns, door);
+            }
+            (Phase::Moving | Phase::Streaming, _) => {
+                if self.plan_stop().is_ok() {
+                    self.enter(Phase::Stopping, now_ns, door);
+                } else {
+                    // No trajectory to rest can be computed: the drives' own brakes are what is left.
+                    self.motion.cancel();
+                    self.goal = Goal::NoVoltage;
+                    self.enter(Phase::Disabling, now_ns, door);
+                }
+            }
+            (Phase::Stopping | Phase::Disabling | Phase::Holding, _) => {}
+        }
+    }
+
+    fn plan_stop(&mut self) -> Result<(), PlanError> {
+        self.motion.stop(self.axes.iter().map(|axis| (axis.set_point(), &axis.parameters().limits)))
+    }
+}
+
+const fn has_power(phase: Phase) -> bool {
+    !matches!(phase, Phase::Passive | Phase::Disabled)
+}
+
+/// What is wrong with an axis, if anything: rule, value, limit.
+fn complaint(axis: &mut Axis, phase: Phase) -> Option<(Rule, f64, f64)> {
+    let missed_limit = axis.parameters().missed_feedback_cycles;
+    if axis.feedback_age() > missed_limit {
+        return Some((Rule::MissedFeedback, axis.feedback_age().into(), missed_limit.into()));
+    }
+    if axis.drive_state().is_faulted() {
+        return Some((Rule::DriveFault, axis.error_code().into(), 0.0));
+    }
+    if let Some(mode) = axis.foreign_mode().filter(|_| phase != Phase::Disabling) {
+        let ours = axis.parameters().law.operation_mode() as i8;
+        return Some((Rule::ModeChanged, mode.into(), ours.into()));
+    }
+    if matches!(phase, Phase::Enabling | Phase::Disabling) {
+        return None;
+    }
+    if !axis.is_enabled() {
+        return Some((Rule::DriveDisabled, axis.statusword().into(), 0.0));
+    }
+    axis.check_following().err().map(|violation| (violation.rule, violation.value, violation.limit))
+}
