@@ -43,6 +43,7 @@ pub struct EngineParameters {
     /// Cycles in a row in which set-points may fail to get onto the wire.
     pub not_transmitted_cycles: u32,
 }
+
 /// Why an engine cannot be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SetUpError {
