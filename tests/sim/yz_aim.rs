@@ -1,8 +1,11 @@
 //! The simulated YZ-AIM servo, as a master sees it.
 
+mod alarms;
+mod homing;
 mod interpolation;
 mod network;
 mod position;
+mod set_up;
 
 use std::f64::consts::TAU;
 

@@ -55,9 +55,10 @@ const fn ro(index: u16, subindex: u8, bits: u8, default: i64) -> Object {
     }
 }
 
-/// Measured, with a sign.
-const fn signed(index: u16, bits: u8) -> Object {
-    Object { lowest: -(1 << (bits - 1)), highest: (1 << (bits - 1)) - 1, ..ro(index, 0, bits, 0) }
+/// Measured: read-only within a range.
+const fn measured(index: u16, bits: u8, range: [i64; 2]) -> Object {
+    let [lowest, highest] = range;
+    Object { lowest, highest, ..ro(index, 0, bits, 0) }
 }
 
 /// A command, set-point or switch: read and written, never stored.
@@ -153,23 +154,23 @@ pub const OBJECTS: [Object; 109] = [
     rw(0x260B, 0, 16, [1, 65_535], 8192),     // Electronic gear denominator
     command(0x260C, 0, 32, SIGNED_32, 0),     // Incremental position
     ro(0x260E, 0, 16, 0),                     // Alarm code
-    ro(0x2612, 0, 16, 0),                     // System temperature
-    signed(0x2613, 16),                       // System output PWM
+    measured(0x2612, 16, [0, 100]),           // System temperature
+    measured(0x2613, 16, [-32_768, 32_767]),  // System output PWM
     command(0x2614, 0, 16, [0, 2], 0),        // Parameter save flag
     rw(0x2615, 0, 16, [1, 127], 1),           // Device address (node id)
     rw(0x2618, 0, 16, [0, 609], 603),         // Maximum output at standstill
     rw(0x2619, 0, 16, [0, 32_768], 0),        // Special function
     rw(0x261C, 0, 16, FULL_16, 0),            // CAN communication sync control word
     rw(0x261D, 0, 16, [0, 10_009], 10_000),   // Maximum allowed current
-    ro(0x261E, 0, 16, 0),                     // Multi-turn battery level
+    measured(0x261E, 16, [0, 10]),            // Multi-turn battery level
     command(0x6040, 0, 16, FULL_16, 0),       // Controlword
     ro(0x6041, 0, 16, 0),                     // Statusword
     command(0x6060, 0, 8, [1, 7], 1),         // Mode of operation
-    signed(0x6063, 32),                       // Actual position (internal)
-    signed(0x6064, 32),                       // Actual position
-    signed(0x606C, 16),                       // Actual velocity
-    ro(0x6078, 0, 16, 0),                     // Actual current
-    ro(0x6079, 0, 16, 0),                     // System (DC link) voltage
+    measured(0x6063, 32, SIGNED_32),          // Actual position (internal)
+    measured(0x6064, 32, SIGNED_32),          // Actual position
+    measured(0x606C, 16, [-30_000, 30_000]),  // Actual velocity
+    measured(0x6078, 16, [0, 32_767]),        // Actual current
+    measured(0x6079, 16, [0, 32_767]),        // System (DC link) voltage
     command(0x607A, 0, 32, SIGNED_32, 0),     // Target position buffer
     rw(0x6081, 0, 32, [0, 3000], 1000),       // Profile (trapezoid) velocity
     rw(0x6083, 0, 32, FULL_16, 20_000),       // Motor acceleration

@@ -48,7 +48,7 @@ impl YzAimJoint {
         let is_at_limit = torque > 0.0 && torque >= AT_LIMIT * self.torque_limit();
         let is_at_current_limit = torque > 0.0 && torque >= AT_LIMIT * self.current_limit();
         let is_at_rest = self.is_at_rest();
-        let behind = self.motion.velocity().abs() - self.actual().velocity.abs();
+        let behind = (self.motion.velocity() - self.actual().velocity).abs();
         let is_behind = is_at_limit && !is_at_rest && behind > STALL_SHARE * self.parameters.highest_speed();
         let after = |seconds: f64, goes_on: bool| if goes_on { seconds + duration_s } else { 0.0 };
         self.watch = Watch {
