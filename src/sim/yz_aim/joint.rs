@@ -421,13 +421,13 @@ impl Drive for YzAimJoint {
 
     fn observe(&mut self, now_ns: Nanoseconds) -> Observation {
         self.run_loops(now_ns);
-        let state = self.device.level().state();
+        let is_stopped = self.alarms.is_stopped() || self.network.is_master_lost();
         Observation {
             position: self.joint.position(),
             velocity: self.joint.velocity(),
             torque: self.torque * self.direction(),
             position_counts: self.counts(),
-            state: if self.shows_alarm() { State::Fault } else { state },
+            state: if is_stopped { State::Fault } else { self.device.level().state() },
             statusword: self.statusword(),
             error_code: self.alarm_code(),
             operation_mode: self.mode() as i8,

@@ -153,6 +153,37 @@ fn an_rpdo2_moves_only_what_is_enabled_with_bit_5() {
 }
 
 #[test]
+fn tpdo3_says_the_velocity_in_r_min_or_in_tenths_as_the_unit_is() {
+    for (has_fine_velocity_in_tpdo3, expected) in [(false, -600), (true, -6_000)] {
+        let quirks = Quirks { has_fine_velocity_in_tpdo3, ..Quirks::none() };
+        let mut bench = bench(YzAimParameters { quirks, ..parameters(NODE) });
+        bench.nmt(0x01);
+        for _ in 0..300 {
+            bench.say(0x405, [0x0F, 0, 3, 0xA8, 0xFD, 0xFF, 0xFF]);
+            bench.run_ms(1);
+        }
+        let answer = bench.take(0x385).pop().unwrap();
+        assert_eq!(answer[4..], i32::to_le_bytes(expected));
+        assert_eq!(bench.read(0x606C, 0), Ok(-6_000i16 as u16 as u32));
+    }
+}
+
+#[test]
+fn a_change_of_mode_in_full_flight_ends_the_old_motion() {
+    let mut bench = bench(by_the_manual(NODE));
+    bench.control(0x2F);
+    bench.write(0x607A, 0, 4, 3_276_800).unwrap();
+    bench.run_ms(300);
+    bench.write(0x6060, 0, 1, 3).unwrap();
+    bench.run_ms(300);
+    assert_eq!((bench.statusword(), bench.observe().velocity.abs() < 1e-3), (0x0437, true));
+    let rest = bench.position();
+    bench.write(0x6060, 0, 1, 1).unwrap();
+    bench.run_ms(300);
+    assert!((bench.position() - rest).abs() < 5, "the old target is forgotten");
+}
+
+#[test]
 fn without_its_quirks_a_drive_answers_unknown_objects_with_an_abort() {
     let mut bench: Bench = bench(YzAimParameters {
         quirks: Quirks { is_silent_on_unknown_objects: false, ..Quirks::default() },

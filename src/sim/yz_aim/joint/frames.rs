@@ -86,11 +86,7 @@ impl YzAimJoint {
     /// Sends what is due. At a wrong bit rate nothing reaches the bus.
     pub(super) fn send_due(&mut self, now_ns: Nanoseconds, mailbox: &mut Mailbox) {
         let is_on_bus = self.is_on_bus();
-        let mut send = |frame| {
-            if is_on_bus {
-                mailbox.push(frame);
-            }
-        };
+        let mut send = |frame| is_on_bus && mailbox.push(frame);
         let has_alarm = self.shows_alarm();
         if let Some(boot_up) = self.network.boots(now_ns, &self.dictionary) {
             if boot_up.is_announced {
@@ -108,7 +104,9 @@ impl YzAimJoint {
             let feedback = self.feedback();
             self.process_data.run_events(now_ns, feedback, &self.dictionary);
             while let Some(frame) = self.process_data.next(now_ns, self.node, &self.dictionary) {
-                send(frame);
+                if is_on_bus {
+                    mailbox.put(frame);
+                }
             }
         }
     }
