@@ -212,6 +212,24 @@ mod tests {
     }
 
     #[test]
+    fn two_axes_stay_on_their_straight_line_within_one_count() {
+        const SHARE: f64 = -0.37;
+        let mut axes = [Motion::new(1e6); 2];
+        for cycle in 0..400 {
+            let travelled = 3.3 * f64::from(cycle) * f64::from(cycle.min(150));
+            for (axis, share) in axes.iter_mut().zip([1.0, SHARE]) {
+                axis.interpolate_to((travelled * share).round());
+            }
+            for _ in 0..16 {
+                let [first, second] = axes.each_mut().map(|axis| {
+                    axis.step(Order::Interpolate, f64::INFINITY, AT_REST, STEP_S).position.unwrap()
+                });
+                assert!((first * SHARE - second).abs() <= 1.0, "{first} {second}");
+            }
+        }
+    }
+
+    #[test]
     fn too_long_a_step_is_followed_at_the_highest_speed() {
         let mut motion = Motion::new(10_000.0);
         motion.interpolate_to(50.0);
