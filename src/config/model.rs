@@ -12,6 +12,9 @@ use takt_rt::dialect::Dialect;
 /// Limits of an axis in rad (m) and seconds. Defaults: the deceleration is the acceleration, the jerk is infinite.
 pub use takt_rt::guard::AxisLimits as Limits;
 
+pub use takt_rt::guard::OnViolation;
+pub use takt_rt::stop::StopCategories;
+
 use super::defaults;
 
 /// A whole controller: one cycle, its buses, its axes and what they are to do.
@@ -21,6 +24,10 @@ pub struct Config {
     pub name: String,
     /// The cycle.
     pub cycle: Cycle,
+    /// When missed slots are too many.
+    pub missed_slots: MissedSlots,
+    /// How each rule stops the group. Default: see [`takt_rt::stop::Rule::default_category`].
+    pub stops: StopCategories,
     /// What is asked of the operating system.
     pub realtime: Realtime,
     /// This controller as a CANopen node.
@@ -54,6 +61,19 @@ impl Config {
         let divider = self.buses.get(bus).map_or(1, |bus| bus.divider.max(1));
         Cycle { period_ns: self.cycle.period_ns * u64::from(divider), ..self.cycle }
     }
+}
+
+/// When missed slots are too many: a bucket that every missed slot fills by one and that loses one in a while.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MissedSlots {
+    /// Slots in the bucket from which on it is told. Default 10.
+    pub warning: u32,
+    /// Slots from which on no stream is begun. Default 50.
+    pub degraded: u32,
+    /// Slots from which on the group stops, unless all of its buses are simulated. Default 250.
+    pub stop: u32,
+    /// The time in which the bucket loses one. Default 10 ms.
+    pub leak_ns: u64,
 }
 
 /// What is asked of the operating system for the real-time thread.
@@ -142,6 +162,10 @@ pub struct Axis {
     pub limits: Limits,
     /// How far the joint may be from its set-point.
     pub following_error: FollowingError,
+    /// How far from the joint a stream of set-points may begin: rad (m). Default 0.02 rad or 0.002 m.
+    pub start_tolerance: f64,
+    /// What is done with set-points of a stream that break a limit. Default: the group stops.
+    pub on_violation: OnViolation,
     /// Cycles without feedback before the group stops. Default 5.
     pub missed_feedback_cycles: u16,
     /// Transmission type of the PDOs (1 = every SYNC). Default 1.

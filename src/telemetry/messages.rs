@@ -75,6 +75,7 @@ struct EventFields {
     limit: f64,
     move_id: u32,
     missed_slots: u64,
+    timing_level: u8,
     statusword: u16,
     error_code: u16,
     error_register: u8,
@@ -111,6 +112,7 @@ impl EventFields {
                 ..none
             },
             EventKind::MissedSlots { count } => Self { kind: 5, missed_slots: count, ..none },
+            EventKind::Timing { level } => Self { kind: 7, timing_level: level as u8, ..none },
             EventKind::Refused { phase } => Self { kind: 6, phase_from: phase as u8, ..none },
         }
     }
@@ -134,6 +136,7 @@ pub fn encode_event(event: &Event, text: &str, encoder: &mut CdrEncoder) {
         .f64(fields.limit)
         .u32(fields.move_id)
         .u64(fields.missed_slots)
+        .u8(fields.timing_level)
         .u16(fields.statusword)
         .u16(fields.error_code)
         .u8(fields.error_register)
@@ -145,6 +148,7 @@ mod tests {
     use super::*;
     use takt_rt::cia402::State;
     use takt_rt::stop::{Phase, Rule};
+    use takt_rt::watch::TimingLevel;
 
     /// The constants of a definition that stand in front of `field`, with the names as Rust writes them.
     fn constants(message: &MessageType, field: &str) -> Vec<(String, u8)> {
@@ -194,6 +198,7 @@ mod tests {
             EventKind::Emergency { axis: 0, code: 0, register: 0, manufacturer: [0; 5] },
             EventKind::MissedSlots { count: 1 },
             EventKind::Refused { phase: Phase::Moving },
+            EventKind::Timing { level: TimingLevel::Normal },
         ];
         let encoded = kinds.map(|kind| {
             let name = format!("{kind:?}");

@@ -94,6 +94,8 @@ pub fn config(axes: &[(usize, u8)]) -> Config {
     Config {
         name: "test".into(),
         cycle: Cycle { period_ns: 1_000_000, command_phase_ns: 550_000 },
+        missed_slots: MissedSlots { warning: 10, degraded: 100, stop: 500, leak_ns: 10_000_000 },
+        stops: Default::default(),
         realtime: Realtime {
             priority: None,
             cpu: None,
@@ -153,6 +155,8 @@ fn axis(number: usize, bus: usize, node: u8) -> Axis {
         transmission_type: 1,
         feedback: vec![Feedback::Torque],
         answers_sync: true,
+        start_tolerance: 0.02,
+        on_violation: Default::default(),
         feedback_delay_ns: 20_000,
         heartbeat_ns: Some(50_000_000),
         identity: Identity::default(),

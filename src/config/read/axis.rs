@@ -12,7 +12,8 @@ use super::section::Section;
 use crate::config::defaults;
 use crate::config::error::ProblemKind;
 use crate::config::model::{
-    Axis, Control, DriveFamily, Feedback, FollowingError, Identity, Limits, Master, SimulatedJoint, Travel,
+    Axis, Control, DriveFamily, Feedback, FollowingError, Identity, Limits, Master, OnViolation,
+    SimulatedJoint, Travel,
 };
 use crate::config::quantity::Quantity;
 use crate::config::spelling;
@@ -139,6 +140,12 @@ fn axis<'a>(
     let feedback = feedback(&mut section, drive);
     let answers_sync = boolean(&mut section, "answers_sync", defaults::ANSWERS_SYNC);
     let transmission_type = transmission_type(&mut section);
+    let start_tolerance = section
+        .get("start_tolerance")
+        .and_then(|entry| entry.quantity(quantities.position, Bounds::Positive));
+    let on_violation = section
+        .get("on_violation")
+        .and_then(|entry| entry.choice(&[("reject", OnViolation::Reject), ("clamp", OnViolation::Clamp)]));
     let missed = section.get("missed_feedback_cycles").and_then(|entry| entry.integer(1..1001));
     let feedback_delay = section.get("feedback_delay").and_then(|entry| entry.nanoseconds(0.0, 0.01));
     let heartbeat_ns = section.get("heartbeat").and_then(|entry| heartbeat(&entry));
@@ -161,6 +168,11 @@ fn axis<'a>(
             zero_counts: counting.zero_counts,
             limits: limits?,
             following_error,
+            start_tolerance: start_tolerance.unwrap_or(match travel? {
+                Travel::Rotary => defaults::START_TOLERANCE_RAD,
+                Travel::Linear { .. } => defaults::START_TOLERANCE_M,
+            }),
+            on_violation: on_violation.unwrap_or_default(),
             missed_feedback_cycles: missed
                 .and_then(|cycles| u16::try_from(cycles).ok())
                 .unwrap_or(defaults::MISSED_FEEDBACK_CYCLES),
