@@ -74,13 +74,8 @@ pub fn traced<P: BusPort>(port: P, name: &str, capacity: usize) -> (TracedPort<P
     let (piece_in, piece_out) = ring(capacity);
     let (change_in, change_out) = ring(HEALTH_CHANGES);
     let name = name.split_whitespace().collect::<Vec<_>>().join("_");
-    let port = TracedPort {
-        port,
-        pieces: piece_in,
-        changes: change_in,
-        told: BusHealth::default(),
-        now_ns: 0,
-    };
+    let port =
+        TracedPort { port, pieces: piece_in, changes: change_in, told: BusHealth::default(), now_ns: 0 };
     let payload = [0; Frame::MAX_BYTES];
     (port, Trace { name, pieces: piece_out, changes: change_out, begun: None, payload, broken: 0 })
 }

@@ -76,6 +76,13 @@ impl CdrEncoder {
         self
     }
 
+    /// `uint8[]`: its length, then its bytes.
+    pub fn octet_sequence(&mut self, bytes: &[u8]) -> &mut Self {
+        self.u32(bytes.len() as u32);
+        self.bytes.extend_from_slice(bytes);
+        self
+    }
+
     /// `string`: its length with the closing zero, then its bytes.
     pub fn string(&mut self, text: &str) -> &mut Self {
         self.u32(text.len() as u32 + 1);

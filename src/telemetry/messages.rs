@@ -1,9 +1,11 @@
-//! What stands in a recording: three ROS 2 messages, as text for the schemas and as CDR for the data. Foxglove,
+//! What stands in a recording: ROS 2 messages, as text for the schemas and as CDR for the data. Foxglove,
 //! PlotJuggler and the ROS 2 tools read them without knowing takt.
 
+use takt_rt::frame::FrameKind;
 use takt_rt::record::{AxisRecord, CycleRecord, Event, EventKind};
 
 use super::cdr::CdrEncoder;
+use crate::bus::trace::{TracedFrame, TracedHealth};
 
 /// A message type: its name, and its definition in the ROS 2 interface language.
 pub struct MessageType {
@@ -22,6 +24,14 @@ pub const AXIS: MessageType =
 /// An event.
 pub const EVENT: MessageType =
     MessageType { name: "takt_msgs/msg/Event", definition: include_str!("messages/Event.msg") };
+
+/// A frame on a bus.
+pub const FRAME: MessageType =
+    MessageType { name: "takt_msgs/msg/Frame", definition: include_str!("messages/Frame.msg") };
+
+/// The health of a bus.
+pub const BUS: MessageType =
+    MessageType { name: "takt_msgs/msg/Bus", definition: include_str!("messages/Bus.msg") };
 
 /// Encodes a [`CYCLE`].
 pub fn encode_cycle(record: &CycleRecord, encoder: &mut CdrEncoder) {
@@ -140,10 +150,40 @@ pub fn encode_event(event: &Event, text: &str, encoder: &mut CdrEncoder) {
         .octets(fields.manufacturer);
 }
 
+/// Encodes a [`FRAME`].
+pub fn encode_frame(TracedFrame { at_ns, is_sent, frame }: &TracedFrame, encoder: &mut CdrEncoder) {
+    encoder
+        .begin()
+        .u64(*at_ns)
+        .u8((*is_sent).into())
+        .u32(frame.id().value())
+        .u8(frame.id().is_extended().into())
+        .u8((frame.kind() == FrameKind::Remote).into())
+        .u8(frame.is_fd().into())
+        .u8((frame.kind() == FrameKind::FdBitRateSwitch).into())
+        .u8(frame.length() as u8)
+        .octet_sequence(frame.payload())
+        .string(&format!("{frame:?}"));
+}
+
+/// Encodes a [`BUS`].
+pub fn encode_bus(TracedHealth { at_ns, health }: &TracedHealth, encoder: &mut CdrEncoder) {
+    encoder
+        .begin()
+        .u64(*at_ns)
+        .u8(health.state as u8)
+        .u64(health.errors)
+        .u64(health.tx_overruns)
+        .u64(health.rx_overruns)
+        .u64(health.tx_frames)
+        .u64(health.rx_frames);
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use takt_rt::cia402::State;
+    use takt_rt::port::BusState;
     use takt_rt::stop::{Phase, Rule};
 
     /// The constants of a definition that stand in front of `field`, with the names as Rust writes them.
@@ -172,6 +212,8 @@ mod tests {
         assert_eq!(constants(&CYCLE, "phase"), phases);
         let states = State::ALL.map(|state| (format!("{state:?}"), state as u8));
         assert_eq!(constants(&AXIS, "state"), states);
+        let buses = [BusState::ErrorActive, BusState::ErrorPassive, BusState::BusOff, BusState::Down];
+        assert_eq!(constants(&BUS, "state"), buses.map(|state| (format!("{state:?}"), state as u8)));
         let rules = Rule::ALL.map(|rule| (format!("{rule:?}"), rule as u8));
         assert_eq!(constants(&EVENT, "rule"), rules);
     }

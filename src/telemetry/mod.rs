@@ -5,12 +5,15 @@
 //! ([`LoggerThread`]), or step by step in virtual time. Nothing that goes wrong here ever reaches the motion: a full
 //! ring drops and counts, a full disk ends the recording with one message.
 
+mod black_box;
 mod candump;
 mod cdr;
 mod destination;
+mod listener;
 mod logger;
 mod machine;
 mod messages;
+mod past;
 pub(crate) mod picture;
 mod realtime;
 mod recording;
@@ -20,12 +23,15 @@ mod thread;
 mod wall_clock;
 pub mod words;
 
+pub use black_box::{BlackBoxOptions, Fault};
 pub use destination::Destination;
-pub use logger::{LogSummary, Logger, LoggerOptions, Notice};
+pub use listener::panic_message;
+pub use logger::{BlackBoxes, LogSummary, Logger, LoggerOptions, Notice};
 pub use machine::{AxisDescription, BusDescription, Machine, SetPointMagnitudes, Unit};
 pub use picture::Emphasis;
 pub use report::{
-    AxisReport, BusReport, LatencyReport, RealtimeReport, RunOutcome, RunReport, StopReport, TelemetryReport,
+    AxisReport, BusReport, LatencyReport, RealtimeReport, RunOutcome, RunReport, SetPointParts, StopReport,
+    TelemetryReport,
 };
 pub use statistics::{AxisStatistics, FollowingErrorMaximum, Latency, Statistics};
 pub use thread::LoggerThread;
