@@ -1,11 +1,15 @@
 //! What stands in a recording: ROS 2 messages, as text for the schemas and as CDR for the data. Foxglove,
 //! PlotJuggler and the ROS 2 tools read them without knowing takt.
 
+mod decode;
+
 use takt_rt::frame::FrameKind;
 use takt_rt::record::{AxisRecord, CycleRecord, Event, EventKind};
 
 use super::cdr::CdrEncoder;
 use crate::bus::trace::{TracedFrame, TracedHealth};
+
+pub use decode::{decode_axis, decode_bus, decode_cycle, decode_event};
 
 /// A message type: its name, and its definition in the ROS 2 interface language.
 pub struct MessageType {
@@ -32,6 +36,15 @@ pub const FRAME: MessageType =
 /// The health of a bus.
 pub const BUS: MessageType =
     MessageType { name: "takt_msgs/msg/Bus", definition: include_str!("messages/Bus.msg") };
+
+/// The messages that are read again.
+pub const READ: [&MessageType; 4] = [&CYCLE, &AXIS, &EVENT, &BUS];
+
+/// What of a definition settles where the fields are: everything but comments and constants.
+pub fn layout(definition: &str) -> Vec<&str> {
+    let lines = definition.lines().map(str::trim);
+    lines.filter(|line| !line.is_empty() && !line.starts_with('#') && !line.contains('=')).collect()
+}
 
 /// Encodes a [`CYCLE`].
 pub fn encode_cycle(record: &CycleRecord, encoder: &mut CdrEncoder) {
@@ -183,8 +196,7 @@ pub fn encode_bus(TracedHealth { at_ns, health }: &TracedHealth, encoder: &mut C
 mod tests {
     use super::*;
     use takt_rt::cia402::State;
-    use takt_rt::port::BusState;
-    use takt_rt::stop::{Phase, Rule};
+    use takt_rt::stop::{Phase, Rule, StopCategory, StopReason};
 
     /// The constants of a definition that stand in front of `field`, with the names as Rust writes them.
     fn constants(message: &MessageType, field: &str) -> Vec<(String, u8)> {
@@ -212,8 +224,10 @@ mod tests {
         assert_eq!(constants(&CYCLE, "phase"), phases);
         let states = State::ALL.map(|state| (format!("{state:?}"), state as u8));
         assert_eq!(constants(&AXIS, "state"), states);
-        let buses = [BusState::ErrorActive, BusState::ErrorPassive, BusState::BusOff, BusState::Down];
-        assert_eq!(constants(&BUS, "state"), buses.map(|state| (format!("{state:?}"), state as u8)));
+        assert_eq!(
+            constants(&BUS, "state"),
+            decode::BUS_STATES.map(|state| (format!("{state:?}"), state as u8))
+        );
         let rules = Rule::ALL.map(|rule| (format!("{rule:?}"), rule as u8));
         assert_eq!(constants(&EVENT, "rule"), rules);
     }
@@ -222,8 +236,8 @@ mod tests {
     fn the_constants_of_the_event_kinds_are_those_that_are_encoded() {
         let kinds = [
             EventKind::PhaseChanged { from: Phase::Passive, to: Phase::Disabled },
-            EventKind::Stop(takt_rt::stop::StopReason {
-                category: takt_rt::stop::StopCategory::One,
+            EventKind::Stop(StopReason {
+                category: StopCategory::One,
                 rule: Rule::DriveFault,
                 axis: Some(3),
                 value: 0.0,

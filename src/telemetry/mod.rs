@@ -16,7 +16,9 @@ mod messages;
 mod past;
 pub(crate) mod picture;
 mod realtime;
+mod recorded;
 mod recording;
+mod recording_report;
 mod report;
 mod statistics;
 mod thread;
@@ -29,6 +31,10 @@ pub use listener::panic_message;
 pub use logger::{BlackBoxes, LogSummary, Logger, LoggerOptions, Notice};
 pub use machine::{AxisDescription, BusDescription, Machine, SetPointMagnitudes, Unit};
 pub use picture::Emphasis;
+pub use recorded::{Recorded, RecordedError, RecordedEvent, WalkError};
+pub use recording_report::{
+    AxisCycle, AxisCycles, AxisSummary, BusChange, Cause, RecordingReport, ReportedEvent,
+};
 pub use report::{
     AxisReport, BusReport, LatencyReport, RealtimeReport, RunOutcome, RunReport, SetPointParts, StopReport,
     TelemetryReport,

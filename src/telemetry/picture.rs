@@ -282,12 +282,14 @@ fn axis_row(axis: &AxisReport) -> String {
     format!("{name:<16}{largest:>16}   {circumstances:<36}{position:>16}{off:>12}")
 }
 
+/// A part of a limit.
+pub(super) fn part(part: Option<f64>) -> String {
+    part.map_or_else(|| "no limit".to_owned(), |part| format!("{:.2} %", 100.0 * part))
+}
+
 fn part_row(axis: &AxisReport) -> String {
-    let shown = |part: Option<f64>| {
-        part.map_or_else(|| "no limit".to_owned(), |part| format!("{:.2} %", 100.0 * part))
-    };
     let SetPointParts { velocity, acceleration, jerk } = axis.set_point_part;
-    let [velocity, acceleration, jerk] = [velocity, acceleration, jerk].map(shown);
+    let [velocity, acceleration, jerk] = [velocity, acceleration, jerk].map(part);
     format!("{:<16}{velocity:>16}{acceleration:>16}{jerk:>16}", shortened(&axis.name, 16))
 }
 
@@ -301,7 +303,7 @@ fn bus_row(bus: &BusReport) -> String {
 }
 
 /// A name that leaves a space in a column of so many characters.
-fn shortened(name: &str, columns: usize) -> String {
+pub(super) fn shortened(name: &str, columns: usize) -> String {
     if name.chars().count() < columns {
         return name.to_owned();
     }

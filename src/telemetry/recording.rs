@@ -23,6 +23,9 @@ use crate::bus::trace::{TracedFrame, TracedHealth};
 /// the whole machine costs.
 const CHUNK_BYTES: u64 = 256 * 1024;
 
+/// The name of the metadata record that says what the machine is.
+pub const METADATA: &str = "takt";
+
 /// A recording that is being written.
 pub struct Recording {
     /// What to call it in messages.
@@ -53,7 +56,7 @@ impl Recording {
             .chunk_size(Some(CHUNK_BYTES))
             .disable_seeking(true)
             .create(NoSeek::new(BufWriter::new(opened.writer)))?;
-        writer.write_metadata(&Metadata { name: "takt".to_owned(), metadata: describe(machine) })?;
+        writer.write_metadata(&Metadata { name: METADATA.to_owned(), metadata: describe(machine) })?;
         let mut schema =
             |message: &MessageType| writer.add_schema(message.name, "ros2msg", message.definition.as_bytes());
         let (cycle, axis, event) =

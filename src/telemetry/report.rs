@@ -127,7 +127,7 @@ pub struct SetPointParts {
 }
 
 impl SetPointParts {
-    fn new(reached: &SetPointMagnitudes, limits: &SetPointMagnitudes) -> Self {
+    pub(super) fn new(reached: &SetPointMagnitudes, limits: &SetPointMagnitudes) -> Self {
         let part = |reached: f64, limit: f64| (limit.is_finite() && limit > 0.0).then_some(reached / limit);
         Self {
             velocity: part(reached.velocity, limits.velocity),
@@ -307,6 +307,16 @@ impl AxisReport {
 }
 
 impl BusReport {
+    /// A fault confinement state in words.
+    pub(super) const fn state_words(state: BusState) -> &'static str {
+        match state {
+            BusState::ErrorActive => "error active",
+            BusState::ErrorPassive => "error passive",
+            BusState::BusOff => "bus off",
+            BusState::Down => "down",
+        }
+    }
+
     fn new(description: &BusDescription, health: &BusHealth, open_ns: Nanoseconds) -> Self {
         let load = 100.0 * health.busy_ns as f64 / open_ns.max(1) as f64;
         Self {
@@ -318,12 +328,7 @@ impl BusReport {
             tx_overruns: health.tx_overruns,
             rx_overruns: health.rx_overruns,
             errors: health.errors,
-            state: match health.state {
-                BusState::ErrorActive => "error active",
-                BusState::ErrorPassive => "error passive",
-                BusState::BusOff => "bus off",
-                BusState::Down => "down",
-            },
+            state: Self::state_words(health.state),
         }
     }
 }
