@@ -9,6 +9,9 @@ const RIGHT: f64 = WIDTH - 20.0;
 const GAP: f64 = 34.0;
 const MARGIN: f64 = 8.0;
 const LETTER: f64 = 7.0;
+const LINE: f64 = 14.0;
+/// What of a title there is room for.
+const TITLE_LETTERS: usize = 118;
 
 /// The colours of curves, for as many as can be told apart.
 pub const COLOURS: [&str; 8] =
@@ -60,7 +63,11 @@ impl Chart {
         );
         if !self.title.is_empty() {
             // Writing to a string cannot fail.
-            let _ = writeln!(svg, "<text x=\"20\" y=\"24\" font-size=\"14\">{}</text>", escaped(&self.title));
+            let mut title: String = self.title.chars().take(TITLE_LETTERS).collect();
+            if title.len() < self.title.len() {
+                title.push('…');
+            }
+            let _ = writeln!(svg, "<text x=\"20\" y=\"24\" font-size=\"14\">{}</text>", escaped(&title));
         }
         for (index, panel) in self.panels.iter().enumerate() {
             self.draw_panel(&mut svg, panel, top + GAP + index as f64 * (PANEL + GAP));
@@ -110,14 +117,16 @@ impl Chart {
         );
         draw_legend(svg, &panel.legend, top - 6.0);
         if low < 0.0 && high > 0.0 {
-            let _ = writeln!(
-                svg,
-                "<path d=\"M{LEFT} {0:.2}H{RIGHT}\" stroke=\"#ddd\"/>\
-                 <text x=\"{1}\" y=\"{2:.2}\" text-anchor=\"end\">0</text>",
-                y(0.0),
-                LEFT - 6.0,
-                y(0.0) + 4.0,
-            );
+            let _ = writeln!(svg, "<path d=\"M{LEFT} {:.2}H{RIGHT}\" stroke=\"#ddd\"/>", y(0.0));
+            let is_apart = [low, high].iter().all(|end| (y(*end) - y(0.0)).abs() > LINE);
+            if is_apart {
+                let _ = writeln!(
+                    svg,
+                    "<text x=\"{}\" y=\"{:.2}\" text-anchor=\"end\">0</text>",
+                    LEFT - 6.0,
+                    y(0.0) + 4.0
+                );
+            }
         }
         if let Some(mark_s) = self.mark_s {
             let _ = writeln!(svg, "<path d=\"M{:.2} {top}V{bottom}\" stroke=\"#d62728\"/>", self.x(mark_s));
