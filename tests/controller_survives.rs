@@ -12,6 +12,8 @@ use nix::unistd::Pid;
 use serde_json::Value;
 use takt::config::Config;
 use takt::telemetry::Recorded;
+use takt_rt::record::CycleRecord;
+use takt_rt::stop::Phase;
 use tempfile::TempDir;
 
 /// A folder with the six-axis arm and two of its moves, recording into `runs` beside it.
@@ -199,6 +201,19 @@ fn with_the_black_box_off_a_fault_leaves_nothing() {
     assert!(!place.runs().exists());
 }
 
+#[test]
+fn what_a_killed_controller_has_recorded_can_be_read() {
+    let place = Place::new(&[]);
+    let mut child = place.start_and_wait_for_motion();
+    child.kill().unwrap();
+    child.wait().unwrap();
+    let recorded = Recorded::open(&place.files()[0]).unwrap();
+    assert!(recorded.warnings[0].contains("cut off"), "{:?}", recorded.warnings);
+    assert!(recorded.statistics.cycles > 200, "{} cycles", recorded.statistics.cycles);
+    let report = takt().arg("report").arg(&place.files()[0]).output().unwrap();
+    assert_eq!(report.status.code(), Some(0), "{}", errors(&report));
+}
+
 /// From cycle to cycle no set-point leaves its limits: position by velocity, velocity by acceleration. It is one
 /// period of the trajectory from one cycle to the next, however many slots have passed between them.
 #[test]
@@ -224,7 +239,7 @@ fn a_process_that_is_frozen_in_motion_goes_on_smoothly() {
     let mut moved = 0.0_f64;
     for pair in cycles.windows(2) {
         let [before, after] = pair else { continue };
-        if !takt_is_enabled(before) || !takt_is_enabled(after) {
+        if !is_enabled(before) || !is_enabled(after) {
             continue;
         }
         for ((axis, from), to) in config.axes.iter().zip(before.axes()).zip(after.axes()) {
@@ -240,7 +255,6 @@ fn a_process_that_is_frozen_in_motion_goes_on_smoothly() {
 }
 
 /// Whether the drives follow set-points.
-fn takt_is_enabled(record: &takt_rt::record::CycleRecord) -> bool {
-    use takt_rt::stop::Phase;
+fn is_enabled(record: &CycleRecord) -> bool {
     matches!(record.phase, Phase::Holding | Phase::Moving | Phase::Stopping)
 }

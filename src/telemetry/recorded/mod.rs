@@ -1,5 +1,6 @@
 //! Reads a recording or a black box: what it is of, what happened in it, how the timing was, and any of its cycles.
 
+mod cause;
 mod walk;
 
 use std::collections::{BTreeMap, HashMap};
@@ -21,6 +22,7 @@ use super::statistics::Statistics;
 use super::wall_clock::WallClock;
 use crate::bus::trace::TracedHealth;
 
+pub use cause::Cause;
 pub use walk::WalkError;
 
 /// Why a file cannot be read.
