@@ -233,6 +233,11 @@ fn a_panic_of_the_callers_notify_is_caught_and_stops_the_group_in_category_1() {
             assert!(!begins, "a mistake in notify");
         }
     };
-    let session = session::run(&config, SessionOptions::default(), Box::new(notify), |_, _| None);
+    let mut last_watched = Phase::Passive;
+    let session = session::run(&config, SessionOptions::default(), Box::new(notify), |snapshot, _| {
+        last_watched = snapshot.phase;
+        None
+    });
     assert_stopped_in_control(&session.unwrap(), "a mistake in notify");
+    assert_eq!(last_watched, Phase::Disabled, "watch was sound and has seen the end");
 }

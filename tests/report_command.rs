@@ -171,6 +171,37 @@ fn the_picture_has_position_velocity_following_error_and_timing_and_marks_the_st
 }
 
 #[test]
+fn a_run_without_a_stop_is_shown_up_to_its_end() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/single-erob.toml");
+    let config = Config::load(&path).unwrap();
+    let (mut run, log) = VirtualRun::simulated(&config).unwrap();
+    let options = LoggerOptions {
+        machine: Machine::of(&config),
+        wall_clock: WallClock::fixed(UNIX_AT_ZERO_NS),
+        started_ns: 0,
+        recording: Some(Destination::File(folder.path().join("run.mcap"))),
+        candump: None,
+        black_box: None,
+        traces: vec![],
+    };
+    let mut logger = Logger::new(log, options, Box::new(|_| {}));
+    let outcome = run.run(60_000, |_| {
+        logger.drain();
+    });
+    assert_eq!(outcome, Some(Outcome::Finished));
+    let recording = logger.finish().recording.unwrap();
+    let told = json(&report(&recording, &["--json", "--cycles", "5"]));
+    assert_eq!(told["cause"], Value::Null);
+    let cycles = told["axis"]["cycles"].as_array().unwrap();
+    assert_eq!((cycles.len(), &cycles[4]["slot"]), (5, &run.snapshot().slot.into()));
+    let svg = folder.path().join("end.svg");
+    let output = report(&recording, &["--svg", svg.to_str().unwrap()]);
+    assert!(text(&output).contains("the last 20 cycles at the end"), "{}", text(&output));
+    assert!(!fs::read_to_string(svg).unwrap().contains("NaN"));
+}
+
+#[test]
 fn a_recording_that_was_cut_off_anywhere_is_read_as_far_as_it_goes() {
     let left = stopped_run();
     let bytes = fs::read(&left.recording).unwrap();

@@ -74,8 +74,7 @@ pub enum SessionError {
 /// Runs the program of a configuration. `notify` hears what the logger has to say, from its thread. `watch` is called
 /// about once in a millisecond with the newest state and what the run is doing, and may ask it to end.
 ///
-/// When `notify` or `watch` panics, the panic is caught, neither is called again if it was the one, and the group stops
-/// in category 1; the run then ends as [`Outcome::CallbackPanicked`].
+/// When `notify` or `watch` panics, the panic is caught, that one is not called again, and the group stops in category 1; the run then ends as [`Outcome::CallbackPanicked`].
 ///
 /// # Errors
 /// See [`SessionError`]; nothing has moved then.
@@ -124,21 +123,24 @@ pub fn run(
         }
     };
     let begun = running.begun();
-    let mut panicked = None;
+    let (mut panicked, mut is_watched) = (None, true);
     while !running.is_finished() {
         supervisor.poll(clock.now_ns(), &mut host);
-        if panicked.is_none() {
-            // What the caller's function has left half done is the caller's; it is never called again.
+        let mut panics_now = None;
+        if is_watched {
+            // What the caller's function has left half done is the caller's; it is not called again.
             match catch_unwind(AssertUnwindSafe(|| watch(&host.snapshot(), supervisor.progress()))) {
-                Ok(Some(interrupt)) => supervisor.interrupt(interrupt),
-                Ok(None) => {}
+                Ok(interrupt) => interrupt.into_iter().for_each(|interrupt| supervisor.interrupt(interrupt)),
                 Err(payload) => {
                     let message = panic_message(&*payload);
                     logger.fault(Fault::CallbackPanicked(message.clone()));
-                    panicked = Some(message);
+                    is_watched = false;
+                    panics_now = Some(message);
                 }
             }
-            panicked = panicked.or_else(|| logger.panic().map(str::to_owned));
+        }
+        if panicked.is_none() {
+            panicked = panics_now.or_else(|| logger.panic().map(str::to_owned));
             if panicked.is_some() {
                 // The queue is emptied in every cycle; were it full, the way out below disables the group as well.
                 let _ = host.request(Request::Stop(StopCategory::One));

@@ -95,12 +95,12 @@ impl Fault {
         }
     }
 
-    fn metadata(&self, machine: &Machine, (slot, at_ns): (u64, Nanoseconds)) -> BTreeMap<String, String> {
+    /// `last_slot` is the last one that was seen, where the fault has none of its own.
+    fn metadata(&self, machine: &Machine, last_slot: u64) -> BTreeMap<String, String> {
         let mut metadata = BTreeMap::from([
             ("rule".to_owned(), self.key().to_owned()),
             ("reason".to_owned(), self.words(machine)),
-            ("slot".to_owned(), slot.to_string()),
-            ("at_ns".to_owned(), at_ns.to_string()),
+            ("slot".to_owned(), last_slot.to_string()),
         ]);
         let mut add = |key: &str, value: String| metadata.insert(key.to_owned(), value);
         match self {
@@ -220,7 +220,7 @@ impl BlackBox {
         let (slot, at_ns) = self.past.last_slot().unwrap_or((0, self.started_ns));
         if let Some(open) = &mut self.open {
             open.until_ns = (at_ns + AFTER_NS).min(open.latest_ns);
-            let metadata = fault.metadata(machine, (slot, at_ns));
+            let metadata = fault.metadata(machine, slot);
             return self.write(|recording| recording.metadata(METADATA, metadata));
         }
         if let Some(last) = self.files.get(FILES - 1) {
@@ -239,7 +239,7 @@ impl BlackBox {
         let label = opened.label.clone();
         let begun = Recording::begin(opened, machine, self.wall_clock).and_then(|mut recording| {
             recording.add_buses(machine)?;
-            recording.metadata(METADATA, fault.metadata(machine, (slot, at_ns)))?;
+            recording.metadata(METADATA, fault.metadata(machine, slot))?;
             write_past(&self.past, &mut recording, machine)?;
             Ok(recording)
         });

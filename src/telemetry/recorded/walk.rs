@@ -125,3 +125,82 @@ impl<'a> Chunk<'a> {
         Some(Self { crc: u32::from_le_bytes(*crc), compression, records })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn record(opcode: u8, body: &[u8]) -> Vec<u8> {
+        [&[opcode][..], &(body.len() as u64).to_le_bytes(), body].concat()
+    }
+
+    fn chunk(compression: &str, crc: u32, records: &[u8]) -> Vec<u8> {
+        let size = (records.len() as u64).to_le_bytes();
+        let name = (compression.len() as u32).to_le_bytes();
+        let head = [&[0; 16][..], &size, &crc.to_le_bytes(), &name, compression.as_bytes(), &size].concat();
+        record(op::CHUNK, &[&head[..], records].concat())
+    }
+
+    fn file(parts: &[&[u8]]) -> Vec<u8> {
+        [MAGIC, &parts.concat()].concat()
+    }
+
+    /// The bodies of the records that are seen, and the condition.
+    fn seen(file: &[u8]) -> Result<(Vec<Vec<u8>>, Condition), WalkError> {
+        let mut bodies = vec![];
+        let condition = walk(file, |_, body| bodies.push(body.to_vec()))?;
+        Ok((bodies, condition))
+    }
+
+    #[test]
+    fn records_are_seen_in_and_between_chunks_up_to_the_end_of_the_data() {
+        let inner = [record(op::MESSAGE, b"b"), record(op::MESSAGE, b"c")].concat();
+        let chunk = chunk("", crc32fast::hash(&inner), &inner);
+        let end = record(op::DATA_END, &[0; 4]);
+        let file = file(&[&record(op::HEADER, b"a"), &chunk, &end, &record(op::STATISTICS, b"d")]);
+        let (bodies, condition) = seen(&file).unwrap();
+        assert_eq!(bodies, [b"a", b"b", b"c"]);
+        assert_eq!(condition, Condition { is_whole: true, damaged_chunks: 0 });
+    }
+
+    #[test]
+    fn a_chunk_that_is_cut_off_gives_its_whole_records_and_a_damaged_one_none() {
+        let inner = [record(op::MESSAGE, b"one"), record(op::MESSAGE, b"two")].concat();
+        let sound = chunk("", crc32fast::hash(&inner), &inner);
+        let (bodies, condition) = seen(&file(&[&sound[..sound.len() - 1]])).unwrap();
+        assert_eq!((bodies, condition.is_whole), (vec![b"one".to_vec()], false));
+        let damaged = chunk("", 1, &inner);
+        let (bodies, condition) = seen(&file(&[&damaged, &sound])).unwrap();
+        assert_eq!((bodies.len(), condition.damaged_chunks), (2, 1));
+    }
+
+    #[test]
+    fn compressed_chunks_and_other_files_are_refused() {
+        let compressed = seen(&file(&[&chunk("zstd", 0, b"...")]));
+        assert!(matches!(compressed, Err(WalkError::Compressed(name)) if name == "zstd"));
+        assert!(matches!(seen(b""), Err(WalkError::Empty)));
+        assert!(matches!(seen(b"\x89MCAP1\r\n"), Err(WalkError::NotMcap)));
+    }
+
+    proptest! {
+        #[test]
+        fn no_bytes_bring_it_down(
+            parts in prop::collection::vec((0u8..0x12, prop::collection::vec(any::<u8>(), 0..80)), 0..6),
+            cut in 0usize..400,
+            at in 0usize..400,
+            with in any::<u8>(),
+        ) {
+            let parts: Vec<Vec<u8>> = parts.iter().map(|(opcode, body)| record(*opcode, body)).collect();
+            let mut bytes = file(&parts.iter().map(Vec::as_slice).collect::<Vec<_>>());
+            if let Some(byte) = bytes.get_mut(MAGIC.len() + at) {
+                *byte ^= with;
+            }
+            bytes.truncate(bytes.len().saturating_sub(cut).max(MAGIC.len()));
+            let longest = bytes.len();
+            if let Ok((bodies, _)) = seen(&bytes) {
+                prop_assert!(bodies.iter().all(|body| body.len() < longest));
+            }
+        }
+    }
+}
