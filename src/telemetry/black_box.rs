@@ -192,7 +192,7 @@ impl BlackBox {
                 // Under power the engine stops the group and says why. Before the bring-up is over, a fault is an old one.
                 let is_new = known.is_some_and(|known| !known.is_faulted()) && state.is_faulted();
                 let code = self.past.last_error_code(axis.into());
-                (is_new && phase == Phase::Disabled).then_some(Fault::Drive {
+                (is_new && matches!(phase, Phase::Disabled | Phase::Disabling)).then_some(Fault::Drive {
                     axis,
                     code,
                     slot: event.slot,

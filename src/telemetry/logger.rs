@@ -201,8 +201,12 @@ impl Logger {
                 faults.extend(self.listener.fault());
             }
         }
-        // The file bears the name of the stop, if there is one: the other faults of this moment belong to it.
+        // The file bears the name of the stop, if there is one. A drive whose fault made the group stop may be without
+        // power by now, which makes it no second fault.
         faults.sort_by_key(|fault| !matches!(fault, Fault::Stop(_)));
+        if matches!(faults.first(), Some(Fault::Stop(_))) {
+            faults.retain(|fault| !matches!(fault, Fault::Drive { .. }));
+        }
         faults.iter().for_each(|fault| self.fault(fault));
         taken
     }

@@ -3,7 +3,12 @@
 //! The real-time thread leaves a record of every cycle and an event for whatever happens in lock-free rings
 //! ([`crate::controller::channels`]). A [`Logger`] empties them: as a thread of its own that is not real-time
 //! ([`LoggerThread`]), or step by step in virtual time. Nothing that goes wrong here ever reaches the motion: a full
-//! ring drops and counts, a full disk ends the recording with one message.
+//! ring drops and counts, a full disk ends the recording with one message, a caller's function that panics is not called
+//! again.
+//!
+//! The last seconds are also kept in memory, frames included, and written to a file of their own at every [`Fault`]:
+//! the black box ([`BlackBoxOptions`]). [`Recorded`] reads such files and recordings again, and [`RecordingReport`] says
+//! what they tell.
 
 mod black_box;
 mod candump;

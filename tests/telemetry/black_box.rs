@@ -2,11 +2,12 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use takt::bus::trace::{TracedPort, traced};
+use takt::controller::channels::RtSide;
 use takt::telemetry::{BlackBoxOptions, Fault, LogSummary, Logger, LoggerOptions, Notice};
 use takt_rt::door::Door;
 use takt_rt::frame::{Frame, Id};
 use takt_rt::port::{BusHealth, BusPort, BusState, ReceiveBatch, Received};
-use takt_rt::record::EventKind;
+use takt_rt::record::{CycleRecord, EventKind};
 use takt_rt::stop::{Phase, Rule, StopReason};
 
 use crate::reader::{Value, messages};
@@ -47,7 +48,7 @@ const SPAN_NS: u64 = 1_000_000_000;
 
 /// A run whose black box keeps a second.
 struct Run {
-    rt: takt::controller::channels::RtSide,
+    rt: RtSide,
     logger: Logger,
     port: TracedPort<Bus>,
     notices: Notices,
@@ -247,7 +248,7 @@ fn a_drive_that_faults_without_power_is_a_fault_and_one_that_was_faulted_before_
     let faulted = |slot| event(slot, EventKind::DriveState { axis: 0, statusword: 0x0008 });
     let disabled = |run: &mut Run, count: u64| {
         for _ in 0..count {
-            let record = takt_rt::record::CycleRecord { phase: Phase::Disabled, ..cycle(run.slot) };
+            let record = CycleRecord { phase: Phase::Disabled, ..cycle(run.slot) };
             assert!(run.rt.record(&record));
             run.logger.drain();
             run.slot += 1;
@@ -266,6 +267,21 @@ fn a_drive_that_faults_without_power_is_a_fault_and_one_that_was_faulted_before_
     let metadata = &metadata(&bytes)[0];
     assert_eq!((&*metadata["axis"], &*metadata["phase"]), ("shoulder", "disabled"));
     assert_eq!(metadata["value"], 0x7305.to_string());
+}
+
+#[test]
+fn a_drive_whose_fault_stops_the_group_is_one_fault_even_if_the_power_is_gone_when_it_is_seen() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut run = Run::new(folder.path());
+    run.rt.event(&event(0, EventKind::DriveState { axis: 1, statusword: 0x0237 }));
+    run.cycles(10);
+    run.rt.event(&event(10, EventKind::DriveState { axis: 1, statusword: 0x0008 }));
+    run.stop(Rule::DriveFault);
+    run.rt.record(&CycleRecord { phase: Phase::Disabled, ..cycle(10) });
+    let summary = run.finish();
+    let bytes = fs::read(&summary.black_boxes.files[0]).unwrap();
+    assert_eq!((summary.black_boxes.files.len(), metadata(&bytes).len()), (1, 1));
+    assert_eq!(metadata(&bytes)[0]["phase"], "moving");
 }
 
 #[test]
