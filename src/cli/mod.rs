@@ -1,5 +1,6 @@
 //! The command line: one file a subcommand, and what they share.
 
+mod chart;
 mod check;
 mod configuration;
 mod doctor;
@@ -7,6 +8,7 @@ mod exit;
 mod interruption;
 mod jitter;
 mod plan;
+mod report;
 mod run;
 mod sim;
 mod table;
@@ -26,6 +28,7 @@ pub struct CommandLine {
 #[derive(Subcommand, Debug)]
 enum Command {
     Run(run::Arguments),
+    Report(report::Arguments),
     Check(check::Arguments),
     Plan(plan::Arguments),
     Sim(sim::Arguments),
@@ -38,6 +41,7 @@ impl CommandLine {
     pub fn execute(self) -> Exit {
         match self.command {
             Command::Run(arguments) => run::run(arguments),
+            Command::Report(arguments) => report::run(&arguments),
             Command::Check(arguments) => check::run(&arguments),
             Command::Plan(arguments) => plan::run(&arguments),
             Command::Sim(arguments) => sim::run(&arguments),

@@ -96,6 +96,8 @@ pub const REPEAT: u32 = 1;
 
 /// `[telemetry] directory`
 pub const DIRECTORY: &str = "runs";
+/// `[telemetry] black_box`
+pub const BLACK_BOX_NS: u64 = 5_000_000_000;
 /// `[telemetry] ring_records`
 pub const RING_RECORDS: usize = 4096;
 

@@ -360,6 +360,9 @@ pub struct Telemetry {
     pub is_recorded: bool,
     /// Whether the frames of every bus are written as candump logs. Default `false`.
     pub is_candump_written: bool,
+    /// How much of the past the black box keeps and writes at a fault; 100 ms to 60 s, `None` has no black box.
+    /// Default 5 s.
+    pub black_box_ns: Option<u64>,
     /// Cycle records that the ring to the logger can hold. Default 4096.
     pub ring_records: usize,
 }

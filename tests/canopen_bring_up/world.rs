@@ -111,6 +111,7 @@ pub fn config(axes: &[(usize, u8)]) -> Config {
             directory: PathBuf::from("runs"),
             is_recorded: false,
             is_candump_written: false,
+            black_box_ns: None,
             ring_records: 16,
         },
         simulation: Simulation { seed: 1, longest_gap_ns: 1_000_000 },
