@@ -6,12 +6,16 @@
 //!   expedited, segmented or in blocks.
 //! - [`emcy`]: emergency messages and what their codes mean.
 //! - [`sync`]: the SYNC message.
+//! - [`eds`]: electronic data sheets and device configuration files.
+//! - [`pdo_configuration`]: how a PDO is configured, as a device or a file tells it.
 //! - [`object`]: an object's address, type and name; [`objects`]: the standard ones used here.
 
+pub mod eds;
 pub mod emcy;
 pub mod nmt;
 pub mod object;
 pub mod objects;
+pub mod pdo_configuration;
 pub mod sdo;
 pub mod sync;
 

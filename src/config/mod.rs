@@ -10,7 +10,7 @@ mod interface;
 mod model;
 mod quantity;
 mod read;
-mod spelling;
+pub(crate) mod spelling;
 
 use std::path::Path;
 
