@@ -6,10 +6,12 @@
 //!   expedited, segmented or in blocks.
 //! - [`emcy`]: emergency messages and what their codes mean.
 //! - [`sync`]: the SYNC message.
+//! - [`dcf`]: what a configuration file has written to a device, and in which order.
 //! - [`eds`]: electronic data sheets and device configuration files.
 //! - [`pdo_configuration`]: how a PDO is configured, as a device or a file tells it.
 //! - [`object`]: an object's address, type and name; [`objects`]: the standard ones used here.
 
+pub mod dcf;
 pub mod eds;
 pub mod emcy;
 pub mod nmt;

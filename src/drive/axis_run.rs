@@ -5,13 +5,14 @@ use takt_rt::frame::{Frame, Id};
 use takt_rt::time::Nanoseconds;
 
 use super::facts::AxisFacts;
-use super::failure::{Answered, Cause};
+use super::failure::{Answered, Cause, Content};
 use super::step::{Access, Action, Check, Fact, ReadBack, Source, Step, When};
+use crate::canopen::dcf::Download;
 use crate::canopen::emcy::Emergency;
 use crate::canopen::nmt::{ErrorControl, NmtState, NmtTarget};
-use crate::canopen::object::Object;
+use crate::canopen::object::{Object, ObjectAddress};
 use crate::canopen::objects::DEVICE_TYPE;
-use crate::canopen::sdo::{Client, Completed, SdoError, Timing, Transfer};
+use crate::canopen::sdo::{AbortCode, Client, Completed, SdoError, Timing, Transfer, Uploaded};
 
 /// How long to wait between two readings of an object that is waited for.
 const AWAIT_PAUSE_NS: Nanoseconds = 5_000_000;
@@ -62,6 +63,8 @@ enum Phase {
     Transfer { began_ns: Nanoseconds },
     /// The client is reading back what was written.
     ReadBack { written: i64 },
+    /// The client is reading back bytes that were written.
+    Verify,
     /// A number was not yet as wanted.
     Pause { began_ns: Nanoseconds, until_ns: Nanoseconds },
     /// A state was commanded.
@@ -194,7 +197,7 @@ impl AxisRun {
     }
 
     fn action(&self) -> Option<Action> {
-        self.steps.get(self.current).map(|step| step.action)
+        self.steps.get(self.current).map(|step| step.action.clone())
     }
 
     fn next_step(&mut self) {
@@ -219,7 +222,7 @@ impl AxisRun {
 
     /// What is due by time alone.
     fn advance(&mut self, now_ns: Nanoseconds, send: &mut impl FnMut(Frame)) -> Progress {
-        let Some(Step { when, action, .. }) = self.steps.get(self.current).copied() else {
+        let Some(Step { when, action, .. }) = self.steps.get(self.current).cloned() else {
             self.phase = Phase::Over;
             return Ok(());
         };
@@ -284,6 +287,7 @@ impl AxisRun {
                 Transfer::Upload { object: object.address }
             }
             Action::ReadText { object, .. } => Transfer::Upload { object },
+            Action::WriteBytes(Download { object, data }) => Transfer::Download { object, data },
             Action::Nmt { .. } => return Ok(()),
         };
         self.start(transfer);
@@ -330,6 +334,10 @@ impl AxisRun {
                 self.next_step();
                 Ok(())
             }
+            (Phase::Transfer { .. }, Some(Action::WriteBytes(download))) => {
+                self.bytes_written(&download, outcome)
+            }
+            (Phase::Verify, Some(Action::WriteBytes(download))) => self.verify(&download, outcome),
             (Phase::Transfer { began_ns }, Some(Action::Await { object, check, keep, within_ns })) => {
                 let received = self.number(object, Access::Read, outcome)?;
                 self.keep(keep, received);
@@ -420,6 +428,41 @@ impl AxisRun {
         Ok(())
     }
 
+    fn bytes_written(&mut self, download: &Download, outcome: Result<Completed, SdoError>) -> Progress {
+        let Download { object, data } = download;
+        outcome.map_err(|error| Cause::ConfigurationTransfer {
+            object: *object,
+            written: Content::of(data),
+            is_reading_back: false,
+            error,
+        })?;
+        self.start(Transfer::Upload { object: *object });
+        self.phase = Phase::Verify;
+        Ok(())
+    }
+
+    fn verify(&mut self, download: &Download, outcome: Result<Completed, SdoError>) -> Progress {
+        let Download { object, data } = download;
+        let (object, written) = (*object, Content::of(data));
+        let received = match outcome {
+            Ok(Completed::Uploaded(uploaded)) => uploaded,
+            // It cannot be read.
+            Ok(Completed::Downloaded) | Err(SdoError::Aborted(AbortCode::WriteOnly)) => {
+                self.next_step();
+                return Ok(());
+            }
+            Err(error) => {
+                return Err(Cause::ConfigurationTransfer { object, written, is_reading_back: true, error });
+            }
+        };
+        if !is_same(object, data, &received) {
+            let received = Content::of(&received.bytes);
+            return Err(Cause::ConfigurationDiffers { object, written, received });
+        }
+        self.next_step();
+        Ok(())
+    }
+
     fn number(
         &self,
         object: Object,
@@ -440,5 +483,19 @@ impl AxisRun {
         if let Some(fact) = fact {
             self.facts.keep(fact, value);
         }
+    }
+}
+
+/// Whether an object holds what was written to it. Devices force bit 30 of a PDO's identifier (no RTR).
+fn is_same(object: ObjectAddress, written: &[u8], received: &Uploaded) -> bool {
+    const NO_RTR: u32 = 1 << 30;
+    let counted = if received.is_size_known { received.bytes.len() } else { written.len() };
+    let Some(bytes) = received.bytes.get(..counted) else { return false };
+    let is_cob_id = matches!(object.index, 0x1400..=0x15FF | 0x1800..=0x19FF) && object.subindex == 1;
+    match (<[u8; 4]>::try_from(written), <[u8; 4]>::try_from(bytes)) {
+        (Ok(written), Ok(bytes)) if is_cob_id => {
+            (u32::from_le_bytes(written) ^ u32::from_le_bytes(bytes)) & !NO_RTR == 0
+        }
+        _ => written == bytes,
     }
 }

@@ -69,6 +69,7 @@ pub(super) fn configure(config: &Config, axis: &Axis, timing: &BringUpTiming) ->
     );
     identity(&mut list, axis);
     come_to_rest(&mut list, axis, timing);
+    device_configuration(&mut list, axis);
     synchronisation(&mut list, config.cycle.period_ns);
     process_data(&mut list, axis);
     mode(&mut list, axis, timing);
@@ -161,6 +162,17 @@ fn come_to_rest(list: &mut List, axis: &Axis, timing: &BringUpTiming) {
         keep: Some(Fact::Statusword),
         within_ns: timing.confirm_timeout_ns,
     });
+}
+
+/// Before all that the controller itself needs to be set, so that this has the last word.
+fn device_configuration(list: &mut List, axis: &Axis) {
+    list.about(
+        "configuration file",
+        "the file named by `dcf` does not suit this drive: correct it there, or leave the object out",
+    );
+    for download in axis.dcf.iter().flat_map(|configuration| &configuration.downloads) {
+        list.push(Action::WriteBytes(download.clone()));
+    }
 }
 
 fn synchronisation(list: &mut List, period_ns: Nanoseconds) {
