@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 use takt::config::{Config, Control, Feedback, Interface, OverrideError, ProblemKind, Travel};
 
 fn configs() -> Vec<PathBuf> {
-    let mut paths: Vec<_> = fs::read_dir(config("")).unwrap().map(|entry| entry.unwrap().path()).collect();
+    let paths = fs::read_dir(config("")).unwrap().map(|entry| entry.unwrap().path());
+    let mut paths: Vec<_> = paths.filter(|path| path.extension().is_some_and(|end| end == "toml")).collect();
     paths.sort();
     paths
 }

@@ -6,6 +6,7 @@
 //!   expedited, segmented or in blocks.
 //! - [`emcy`]: emergency messages and what their codes mean.
 //! - [`sync`]: the SYNC message.
+//! - [`lss`]: layer setting services: node numbers and bit rates for devices that have none.
 //! - [`dcf`]: what a configuration file has written to a device, and in which order.
 //! - [`eds`]: electronic data sheets and device configuration files.
 //! - [`pdo_configuration`]: how a PDO is configured, as a device or a file tells it.
@@ -14,6 +15,7 @@
 pub mod dcf;
 pub mod eds;
 pub mod emcy;
+pub mod lss;
 pub mod nmt;
 pub mod object;
 pub mod objects;
@@ -23,7 +25,11 @@ pub mod sync;
 
 /// Function codes of the pre-defined connection set (CiA 301, 7.3.3), to which the node number is added.
 pub mod function_code {
-    /// EMCY of a device (0x080 itself is SYNC).
+    /// SYNC, without a node number.
+    pub const SYNC: u16 = 0x080;
+    /// TIME, without a node number.
+    pub const TIME: u16 = 0x100;
+    /// EMCY of a device.
     pub const EMERGENCY: u16 = 0x080;
     /// SDO server to client.
     pub const SDO_RESPONSE: u16 = 0x580;

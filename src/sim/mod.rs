@@ -47,6 +47,7 @@
 mod drive;
 pub mod erob;
 mod live;
+pub mod lss;
 mod mailbox;
 mod medium;
 pub mod plant;
