@@ -5,7 +5,8 @@
 //! - [`sdo`]: service data objects: what is on the wire, and a client that moves one object at a time,
 //!   expedited, segmented or in blocks.
 //! - [`emcy`]: emergency messages and what their codes mean.
-//! - [`sync`]: the SYNC message.
+//! - [`sync`]: the SYNC message; [`time`]: the TIME message.
+//! - [`heartbeat`]: the nodes whose heartbeat is watched.
 //! - [`lss`]: layer setting services: node numbers and bit rates for devices that have none.
 //! - [`dcf`]: what a configuration file has written to a device, and in which order.
 //! - [`eds`]: electronic data sheets and device configuration files.
@@ -15,6 +16,7 @@
 pub mod dcf;
 pub mod eds;
 pub mod emcy;
+pub mod heartbeat;
 pub mod lss;
 pub mod nmt;
 pub mod object;
@@ -22,6 +24,7 @@ pub mod objects;
 pub mod pdo_configuration;
 pub mod sdo;
 pub mod sync;
+pub mod time;
 
 /// Function codes of the pre-defined connection set (CiA 301, 7.3.3), to which the node number is added.
 pub mod function_code {
