@@ -10,7 +10,7 @@
 //! - [`lss`]: layer setting services: node numbers and bit rates for devices that have none.
 //! - [`dcf`]: what a configuration file has written to a device, and in which order.
 //! - [`eds`]: electronic data sheets and device configuration files.
-//! - [`pdo_configuration`]: how a PDO is configured, as a device or a file tells it.
+//! - [`pdo_configuration`]: how a PDO is configured, as a device or a file tells it; [`pdo_inquiry`] asks a device.
 //! - [`object`]: an object's address, type and name; [`objects`]: the standard ones used here.
 
 pub mod dcf;
@@ -22,6 +22,7 @@ pub mod nmt;
 pub mod object;
 pub mod objects;
 pub mod pdo_configuration;
+pub mod pdo_inquiry;
 pub mod sdo;
 pub mod sync;
 pub mod time;
