@@ -10,7 +10,7 @@ mod interface;
 mod model;
 mod quantity;
 mod read;
-pub(crate) mod spelling;
+mod spelling;
 
 use std::path::Path;
 

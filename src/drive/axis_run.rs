@@ -10,9 +10,9 @@ use super::step::{Access, Action, Check, Fact, ReadBack, Source, Step, When};
 use crate::canopen::dcf::Download;
 use crate::canopen::emcy::Emergency;
 use crate::canopen::nmt::{ErrorControl, NmtState, NmtTarget};
-use crate::canopen::object::{Object, ObjectAddress};
+use crate::canopen::object::Object;
 use crate::canopen::objects::DEVICE_TYPE;
-use crate::canopen::sdo::{AbortCode, Client, Completed, SdoError, Timing, Transfer, Uploaded};
+use crate::canopen::sdo::{AbortCode, Client, Completed, SdoError, Timing, Transfer};
 
 /// How long to wait between two readings of an object that is waited for.
 const AWAIT_PAUSE_NS: Nanoseconds = 5_000_000;
@@ -455,7 +455,7 @@ impl AxisRun {
                 return Err(Cause::ConfigurationTransfer { object, written, is_reading_back: true, error });
             }
         };
-        if !is_same(object, data, &received) {
+        if !download.is_held_by(&received) {
             let received = Content::of(&received.bytes);
             return Err(Cause::ConfigurationDiffers { object, written, received });
         }
@@ -483,19 +483,5 @@ impl AxisRun {
         if let Some(fact) = fact {
             self.facts.keep(fact, value);
         }
-    }
-}
-
-/// Whether an object holds what was written to it. Devices force bit 30 of a PDO's identifier (no RTR).
-fn is_same(object: ObjectAddress, written: &[u8], received: &Uploaded) -> bool {
-    const NO_RTR: u32 = 1 << 30;
-    let counted = if received.is_size_known { received.bytes.len() } else { written.len() };
-    let Some(bytes) = received.bytes.get(..counted) else { return false };
-    let is_cob_id = matches!(object.index, 0x1400..=0x15FF | 0x1800..=0x19FF) && object.subindex == 1;
-    match (<[u8; 4]>::try_from(written), <[u8; 4]>::try_from(bytes)) {
-        (Ok(written), Ok(bytes)) if is_cob_id => {
-            (u32::from_le_bytes(written) ^ u32::from_le_bytes(bytes)) & !NO_RTR == 0
-        }
-        _ => written == bytes,
     }
 }

@@ -208,6 +208,7 @@ fn odd_keys_and_sections() {
         &[warning(10, "hexadecimal digits")],
         |_| true,
     );
+    check("a maker's own key", variable("Description=x").as_bytes(), &[], |_| true);
     check("a vendor's own section", format!("{}[AcmeStuff]\nx=1\n", variable("")).as_bytes(), &[], |_| true);
 }
 

@@ -4,12 +4,12 @@ use std::ops::Range;
 
 use super::data_type::DataType;
 use super::dictionary::{AccessType, DictionaryEntry, Stated};
+use super::findings::Reporter;
 use super::ini::{Pair, Section};
 use super::number::{self, Oddity};
-use super::problem::{ProblemKind, Reporter};
+use super::problem::ProblemKind;
 use super::value::{Misfit, Value};
 use crate::canopen::object::ObjectAddress;
-use crate::config::spelling;
 
 /// Keys of objects and sub-objects.
 const KEYS: [&str; 20] = [
@@ -75,11 +75,20 @@ pub(super) fn check_keys(section: &Section<'_>, known: &[&'static str], reporter
         if known.iter().any(|known| known.eq_ignore_ascii_case(pair.key)) {
             continue;
         }
-        if let Some(nearest) = spelling::nearest(pair.key, known.iter().copied()) {
+        if let Some(nearest) = slip_of(pair.key, known) {
             reporter
                 .report(ProblemKind::UnknownKey { key: pair.key.to_owned(), nearest }, pair.key_span.clone());
         }
     }
+}
+
+/// The known word that a word is a slip of. Makers have words of their own, which are none.
+pub(super) fn slip_of(word: &str, known: &[&'static str]) -> Option<&'static str> {
+    const LETTERS: usize = 2;
+    let distance =
+        |known: &str| strsim::damerau_levenshtein(&word.to_ascii_lowercase(), &known.to_ascii_lowercase());
+    let nearest = known.iter().map(|known| (distance(known), *known)).min()?;
+    (nearest.0 <= LETTERS && word.len() > 2 * LETTERS).then_some(nearest.1)
 }
 
 /// Reads a whole number that depends on no node; a problem where it is something else.

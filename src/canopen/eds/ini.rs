@@ -3,7 +3,8 @@
 use std::collections::HashMap;
 use std::ops::Range;
 
-use super::problem::{ProblemKind, Reporter};
+use super::findings::Reporter;
+use super::problem::ProblemKind;
 
 /// The sections of a file in its order; those of the same name are one.
 #[derive(Debug, Default)]

@@ -4,9 +4,10 @@ use std::collections::BTreeMap;
 
 use super::dictionary::{ObjectDictionary, ObjectList};
 use super::entry;
+use super::findings::Reporter;
 use super::ini::{Document, Pair, Section};
 use super::number;
-use super::problem::{ProblemKind, Reporter};
+use super::problem::ProblemKind;
 
 const LISTS: [(&str, ObjectList); 3] = [
     ("MandatoryObjects", ObjectList::Mandatory),

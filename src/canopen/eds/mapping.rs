@@ -4,7 +4,8 @@ use takt_rt::pdo::MappedObject;
 
 use super::data_type::{DataType, ValueKind};
 use super::dictionary::{DictionaryEntry, ObjectDictionary};
-use super::problem::{ProblemKind, Reporter};
+use super::findings::Reporter;
+use super::problem::ProblemKind;
 use crate::canopen::object::ObjectAddress;
 
 /// The indices of simple data types, which are mapped to leave a gap.

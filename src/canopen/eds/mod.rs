@@ -24,6 +24,7 @@ mod compact_pdo;
 mod data_type;
 mod dictionary;
 mod entry;
+mod findings;
 mod ini;
 mod lists;
 mod mapping;
@@ -42,8 +43,9 @@ pub use dictionary::{
     AccessType, DeviceCommissioning, DeviceInfo, DictionaryEntry, DictionaryObject, FileInfo,
     ObjectDictionary, ObjectList, ObjectType, Stated,
 };
-pub use number::Number;
-pub use problem::{Findings, Place, Problem, ProblemKind, Severity};
+pub use findings::{Findings, Place};
+pub use number::{Number, Oddity};
+pub use problem::{Problem, ProblemKind, Severity};
 pub use value::Value;
 
 /// A file that could be read.

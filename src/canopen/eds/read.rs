@@ -4,14 +4,14 @@ use super::compact_pdo;
 use super::data_type::DataType;
 use super::dictionary::{DeviceCommissioning, DeviceInfo, FileInfo, ObjectDictionary};
 use super::entry::{self, check_keys};
+use super::findings::Reporter;
 use super::ini::{Document, Section};
 use super::lists;
 use super::mapping;
 use super::number;
 use super::objects;
-use super::problem::{Problem, ProblemKind, Reporter};
+use super::problem::{Problem, ProblemKind};
 use super::section_name::SectionName;
-use crate::config::spelling;
 
 /// Sections beside those of objects (CiA 306), as the standard spells them, and those of modular devices.
 const SECTIONS: [&str; 15] = [
@@ -95,7 +95,7 @@ fn check_sections(document: &Document<'_>, reporter: &mut Reporter) {
             SectionName::Malformed => None,
             SectionName::Other => {
                 let is_known = SECTIONS.iter().any(|known| known.eq_ignore_ascii_case(section.name));
-                let Some(nearest) = spelling::nearest(section.name, SECTIONS).filter(|_| !is_known) else {
+                let Some(nearest) = entry::slip_of(section.name, &SECTIONS).filter(|_| !is_known) else {
                     continue;
                 };
                 Some(nearest)
