@@ -2,6 +2,7 @@
 
 use std::fs;
 use std::path::Path;
+use std::process::Command;
 
 use takt::canopen::object::ObjectAddress;
 use takt::config::{Config, ConfigError};
@@ -70,4 +71,17 @@ fn a_file_that_is_not_there_configures_nothing_or_is_for_another_node_is_refused
     assert!(message(Some(variable("DefaultValue=1").as_bytes())).contains("configures nothing"));
     let other = variable("ParameterValue=1") + "[DeviceComissioning]\nNodeID=6\n";
     assert!(message(Some(other.as_bytes())).contains("made for node 6, not for node 5"));
+}
+
+#[test]
+fn takt_check_tells_what_of_the_file_is_not_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("small.toml");
+    fs::write(&path, CONFIG).unwrap();
+    let file = variable("ParameterValue=1") + &variable("ParameterValue=15").replace("609A", "60FF");
+    fs::write(folder.path().join("shoulder.dcf"), file).unwrap();
+    let output = Command::new(env!("CARGO_BIN_EXE_takt")).arg("check").arg(&path).output().unwrap();
+    let text = String::from_utf8(output.stdout).unwrap();
+    assert!(text.contains("shoulder: 1 writes from"), "{text}");
+    assert!(text.contains("not written: 60FF:00 (set-points are the controller's alone)"), "{text}");
 }
