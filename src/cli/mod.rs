@@ -4,6 +4,7 @@ mod chart;
 mod check;
 mod configuration;
 mod doctor;
+mod eds;
 mod exit;
 mod interruption;
 mod jitter;
@@ -33,6 +34,7 @@ enum Command {
     Plan(plan::Arguments),
     Sim(sim::Arguments),
     Doctor(doctor::Arguments),
+    Eds(eds::Arguments),
     Jitter(jitter::Arguments),
 }
 
@@ -46,6 +48,7 @@ impl CommandLine {
             Command::Plan(arguments) => plan::run(&arguments),
             Command::Sim(arguments) => sim::run(&arguments),
             Command::Doctor(arguments) => doctor::run(&arguments),
+            Command::Eds(arguments) => eds::run(&arguments),
             Command::Jitter(arguments) => jitter::run(&arguments),
         }
     }

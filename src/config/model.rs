@@ -16,6 +16,7 @@ pub use takt_rt::guard::OnViolation;
 pub use takt_rt::stop::StopCategories;
 
 use super::defaults;
+use crate::canopen::dcf::DeviceConfiguration;
 
 /// A whole controller: one cycle, its buses, its axes and what they are to do.
 #[derive(Clone, Debug, PartialEq)]
@@ -182,6 +183,9 @@ pub struct Axis {
     pub heartbeat_ns: Option<u64>,
     /// What is known of the drive beforehand and compared at bring-up. Default: the family's, any revision.
     pub identity: Identity,
+    /// What a configuration file (DCF or concise DCF) has written to the drive at bring-up, before the controller writes
+    /// what it needs itself. Default: none.
+    pub dcf: Option<DeviceConfiguration>,
     /// The drive and joint that stand in on a simulated bus.
     pub simulated: SimulatedJoint,
 }

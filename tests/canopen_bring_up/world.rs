@@ -161,6 +161,7 @@ fn axis(number: usize, bus: usize, node: u8) -> Axis {
         feedback_delay_ns: 20_000,
         heartbeat_ns: Some(50_000_000),
         identity: Identity::default(),
+        dcf: None,
         simulated: SimulatedJoint {
             inertia: 0.1,
             viscous_friction: 0.1,

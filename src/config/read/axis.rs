@@ -9,6 +9,7 @@ use super::bus::ReadBus;
 use super::entry::{Bounds, Entry, Problems};
 use super::machine::{boolean, heartbeat, node};
 use super::section::Section;
+use crate::canopen::dcf::DeviceConfiguration;
 use crate::config::defaults;
 use crate::config::error::ProblemKind;
 use crate::config::model::{
@@ -150,6 +151,7 @@ fn axis<'a>(
     let feedback_delay = section.get("feedback_delay").and_then(|entry| entry.nanoseconds(0.0, 0.01));
     let heartbeat_ns = section.get("heartbeat").and_then(|entry| heartbeat(&entry));
     let identity = identity(section.section("identity"), drive);
+    let dcf = section.get("dcf").and_then(|entry| dcf(&entry, node));
     section.finish();
 
     let place = bus.zip(node);
@@ -182,6 +184,7 @@ fn axis<'a>(
             feedback_delay_ns: feedback_delay.unwrap_or(defaults::FEEDBACK_DELAY_NS),
             heartbeat_ns,
             identity,
+            dcf,
             simulated,
         })
     };
@@ -541,6 +544,11 @@ fn transmission_type(section: &mut Section<'_>) -> u8 {
         Some(value)
     });
     read.unwrap_or(defaults::TRANSMISSION_TYPE)
+}
+
+fn dcf(entry: &Entry<'_>, node: Option<u8>) -> Option<DeviceConfiguration> {
+    let path = entry.path_from_file()?;
+    DeviceConfiguration::load(&path, node?).map_err(|reason| entry.report(ProblemKind::Dcf { reason })).ok()
 }
 
 fn identity(mut section: Section<'_>, drive: Option<DriveFamily>) -> Identity {

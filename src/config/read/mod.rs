@@ -26,7 +26,7 @@ pub fn parse(source_name: &str, text: &str) -> Result<Config, ConfigError> {
     if !errors.is_empty() {
         return Err(refuse(errors.iter().map(|error| syntax_problem(error, text)).collect()));
     }
-    let problems = Problems::new(text);
+    let problems = Problems::new(source_name, text);
     let config = read(document.get_ref(), &problems);
     let problems = problems.into_vec();
     match config {
