@@ -8,8 +8,8 @@ use std::sync::Arc;
 
 use takt::bus::port::Port;
 use takt::faults::{
-    Course, Cue, DriveTrouble, Effect, Fault, FaultyPort, ForeignFrames, FrameEffect, Heard, InterfaceEffect,
-    Part, Selection, Window,
+    Course, Cue, DriveTrouble, Effect, Fault, FaultyPort, ForeignFrames, FrameEffect, InterfaceEffect, Part,
+    Selection, Window,
 };
 use takt::sim::erob::{ErobJoint, ErobParameters};
 use takt::sim::plant::{Encoder, JointParameters};
