@@ -8,7 +8,7 @@ use std::sync::OnceLock;
 
 use takt::config::{Config, Control};
 use takt::controller::assemble;
-use takt::drive::ProcessData;
+use takt::drive::{PdoPlan, ProcessData};
 use takt_rt::cia402::{Command, State};
 use takt_rt::door::{Door, Move, Request, Snapshot, StreamCommand};
 use takt_rt::engine::{Engine, SendBatch, Transmission};
@@ -21,7 +21,7 @@ use takt_rt::stop::{Phase, StopCategory};
 use super::input::Input;
 
 /// Cycles that one input can last.
-const CYCLES_AT_MOST: u64 = 20_000;
+const CYCLES_AT_MOST: u64 = 4_000;
 
 /// The smallest bound of a streamed step: rad.
 const STREAM_STEP: f64 = 3e-6;
@@ -107,6 +107,8 @@ struct Machine {
     engine: Engine,
     hall: Hall,
     drives: Vec<ObedientDrive>,
+    /// What each of them reports.
+    feedback: Vec<Vec<PdoPlan>>,
     /// The target on the wire of the last cycle, of each axis that the engine holds for enabled.
     targets: Vec<Option<i32>>,
     slot: u64,
@@ -122,6 +124,7 @@ impl Machine {
             engine: assemble::engine(config).expect("the example is sound"),
             hall: Hall::default(),
             drives: vec![drive; config.axes.len()],
+            feedback: config.axes.iter().map(|axis| ProcessData::of(axis).feedback).collect(),
             targets: vec![None; config.axes.len()],
             slot: 0,
             phases: vec![Phase::Passive],
@@ -269,11 +272,11 @@ impl Machine {
 
     /// Every drive that speaks says its state and position.
     fn report(&mut self) {
-        for (axis, drive) in self.config.axes.iter().zip(&self.drives) {
+        for ((axis, drive), feedback) in self.config.axes.iter().zip(&self.drives).zip(&self.feedback) {
             if drive.is_silent {
                 continue;
             }
-            for pdo in ProcessData::of(axis).feedback {
+            for pdo in feedback {
                 let values = pdo.objects.iter().map(|object| match object.index {
                     0x6041 => u64::from(drive.state.statusword_bits()),
                     0x6064 => u64::from(drive.counts as u32),

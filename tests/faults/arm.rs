@@ -8,6 +8,7 @@ use takt::bus::port::Port;
 use takt::config::{Axis, Config, Feedback};
 use takt::controller::{Outcome, VirtualRun};
 use takt::faults::{Rehearsal, Scenario, Tidings};
+use takt::sim::Observation;
 use takt_rt::cia402::State;
 use takt_rt::door::AxisSnapshot;
 use takt_rt::record::EventKind;
@@ -56,6 +57,8 @@ pub struct Played {
     /// The largest step of any set-point between two cycles in which the drive really was enabled, in velocity limits
     /// of its axis.
     pub largest_step: f64,
+    /// The largest acceleration of each joint in truth, from cycle to cycle, in acceleration limits of its axis.
+    pub accelerations: Vec<f64>,
     /// From the beginning of the last fault to the command phase in which the first stop was begun.
     pub detection_ms: Option<f64>,
     /// The last state of each bus.
@@ -76,6 +79,8 @@ pub fn play_scenario(config: &Config, scenario: Scenario) -> Played {
     let (mut phases, mut stops, mut emergencies, mut news) = (vec![], vec![], vec![], vec![]);
     let mut last: Vec<Option<f64>> = vec![None; config.axes.len()];
     let mut largest_step = 0.0_f64;
+    let mut velocities = vec![0.0; config.axes.len()];
+    let mut accelerations = vec![0.0_f64; config.axes.len()];
     let outcome = run.run(CYCLES_AT_MOST, |run| {
         while log
             .next_record(|record| format!("{:?}{:?}", record.timing, record.axes()).hash(&mut hasher))
@@ -94,13 +99,19 @@ pub fn play_scenario(config: &Config, scenario: Scenario) -> Played {
             phases.push(snapshot.phase);
         }
         let now = enabled_set_points(config, run);
+        let period_s = config.cycle.period_ns as f64 * 1e-9;
         for ((now, last), axis) in now.iter().zip(&last).zip(&config.axes) {
             if let (Some(now), Some(last)) = (now, last) {
-                let period_s = config.cycle.period_ns as f64 * 1e-9;
                 largest_step = largest_step.max((now - last).abs() / period_s / axis.limits.velocity);
             }
         }
         last = now;
+        for (index, axis) in config.axes.iter().enumerate() {
+            let velocity = truth(run, axis).velocity;
+            let acceleration = (velocity - velocities[index]).abs() / period_s / axis.limits.acceleration;
+            accelerations[index] = accelerations[index].max(acceleration);
+            velocities[index] = velocity;
+        }
     });
     let snapshot = run.snapshot();
     let began_ns = rehearsal.courses().filter_map(|(_, course)| course.began_ns()).max();
@@ -117,11 +128,12 @@ pub fn play_scenario(config: &Config, scenario: Scenario) -> Played {
         frames: rehearsal.courses().map(|(_, course)| course.frames()).collect(),
         fingerprint: hasher.finish(),
         largest_step,
+        accelerations,
         detection_ms: began_ns
             .zip(stopped_ns)
             .map(|(began_ns, stopped_ns)| (stopped_ns as f64 - began_ns as f64) * 1e-6),
         health: snapshot.buses[..config.buses.len()].to_vec(),
-        speed_at_end: speed(config, run.ports()),
+        speed_at_end: config.axes.iter().map(|axis| truth(&mut run, axis).velocity.abs()).fold(0.0, f64::max),
     }
 }
 
@@ -129,17 +141,13 @@ pub fn play_scenario(config: &Config, scenario: Scenario) -> Played {
 fn enabled_set_points(config: &Config, run: &mut VirtualRun<Port>) -> Vec<Option<f64>> {
     let snapshot = run.snapshot();
     let of = |(axis, shown): (&Axis, &AxisSnapshot)| {
-        let bus = run.ports()[axis.bus].simulated_mut().unwrap();
-        let is_enabled = bus.observe(axis.node).unwrap().state == State::OperationEnabled;
+        let is_enabled = truth(run, axis).state == State::OperationEnabled;
         is_enabled.then_some(shown.position_set)
     };
     config.axes.iter().zip(&snapshot.axes).map(of).collect()
 }
 
-fn speed(config: &Config, ports: &mut [Port]) -> f64 {
-    let speeds = config.axes.iter().map(|axis| {
-        let bus = ports[axis.bus].simulated_mut().unwrap();
-        bus.observe(axis.node).unwrap().velocity.abs()
-    });
-    speeds.fold(0.0, f64::max)
+/// The truth about the drive of an axis.
+fn truth(run: &mut VirtualRun<Port>, axis: &Axis) -> Observation {
+    run.ports()[axis.bus].simulated_mut().unwrap().observe(axis.node).unwrap()
 }

@@ -87,6 +87,31 @@ fn every_fault_with_a_rule_stops_the_whole_arm_in_time_and_says_why() {
     }
 }
 
+/// Faults of one axis or one bus, in the middle of the fast part of a move, and the axes that still obey.
+const COORDINATED: [(&str, std::ops::Range<usize>); 8] = [
+    ("kind = \"alarm\"\naxis = \"joint1\"\ncode = 0x4310", 1..6),
+    ("kind = \"over-current\"\naxis = \"joint1\"", 1..6),
+    ("kind = \"reboot\"\naxis = \"joint1\"", 1..6),
+    ("kind = \"silent-node\"\naxis = \"joint1\"", 1..6),
+    ("kind = \"stall\"\naxis = \"joint1\"", 1..6),
+    ("kind = \"mode-display\"\naxis = \"joint1\"\nmode = 1", 0..6),
+    ("kind = \"foreign-nmt\"\naxis = \"joint1\"\ncommand = \"pre-operational\"", 1..6),
+    ("kind = \"bus-off\"\nbus = \"base\"", 3..6),
+];
+
+#[test]
+fn the_axes_that_still_obey_decelerate_within_their_limits() {
+    for (fault, obeying) in COORDINATED {
+        let text = format!("[[fault]]\n{fault}\nwhen = \"moving\"\nat = \"900 ms\"");
+        let played = play(&arm(), &text);
+        let Some(Outcome::Stopped(stop)) = &played.outcome else { panic!("{fault}: {:?}", played.outcome) };
+        assert_eq!(stop.category, StopCategory::One, "{fault}: the stop became harder on its way");
+        // The loops of the drives overshoot a little when the acceleration changes.
+        let largest = played.accelerations[obeying].iter().copied().fold(0.0, f64::max);
+        assert!(largest < 1.6, "{fault}: {:?} acceleration limits", played.accelerations);
+    }
+}
+
 #[test]
 fn the_code_of_an_alarm_is_the_value_of_the_stop() {
     let played = in_motion("kind = \"alarm\"\naxis = \"joint4\"\ncode = 0x7500");
