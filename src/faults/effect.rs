@@ -53,6 +53,13 @@ pub enum FrameEffect {
     FullQueue,
 }
 
+impl FrameEffect {
+    /// Whether it can only happen to what is sent.
+    pub const fn is_of_sending(self) -> bool {
+        matches!(self, Self::EchoLoss | Self::FullQueue)
+    }
+}
+
 /// A part of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {

@@ -114,7 +114,6 @@ impl<P: Breakable> FaultyPort<P> {
         match self.effect {
             Effect::Interface(effect) => {
                 self.added.errors += u64::from(effect != InterfaceEffect::Down);
-                self.timer.course().count_frame();
             }
             Effect::Drive { node, trouble } => {
                 if self.port.trouble(node, trouble, true).is_err() {
@@ -163,7 +162,8 @@ impl<P: Breakable> FaultyPort<P> {
     /// What becomes of a frame.
     fn fate(&mut self, now_ns: Nanoseconds, frame: &Frame, direction: Direction) -> Fate {
         let Effect::Frames(effect) = self.effect else { return Fate::Copies(*frame, 1) };
-        if !self.timer.is_active() || !self.selector.picks(frame, direction) {
+        let is_possible = direction == Direction::Sent || !effect.is_of_sending();
+        if !self.timer.is_active() || !is_possible || !self.selector.picks(frame, direction) {
             return Fate::Copies(*frame, 1);
         }
         self.timer.course().count_frame();

@@ -152,6 +152,8 @@ fn lost_echoes_stay_unconfirmed_as_long_as_the_fault_is_there() {
     let effect = Effect::Frames(FrameEffect::EchoLoss);
     let (mut port, _) = wrapped(effect, Selection::default(), Some(100));
     assert_eq!(port.send(0, &numbered(3)), 3);
+    hears(&mut port, &numbered(5), 10);
+    assert_eq!(received(&mut port, 20).len(), 5);
     assert_eq!((sent(&mut port).len(), port.unconfirmed(50), port.unconfirmed(100)), (3, 3, 0));
 }
 
