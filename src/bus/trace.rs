@@ -162,6 +162,13 @@ impl<P> TracedPort<P> {
     }
 }
 
+impl<P> TracedPort<P> {
+    /// The port within.
+    pub fn inner_mut(&mut self) -> &mut P {
+        &mut self.port
+    }
+}
+
 impl<P: BusPort> BusPort for TracedPort<P> {
     fn send(&mut self, now_ns: Nanoseconds, frames: &[Frame]) -> usize {
         let taken = self.port.send(now_ns, frames);

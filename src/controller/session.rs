@@ -1,6 +1,7 @@
 //! A controller in real time, from the configuration to what is left of the run.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
 use std::time::Duration;
 
 use takt_rt::door::{Request, Snapshot};
@@ -16,6 +17,7 @@ use super::supervisor::{Interrupt, Outcome, Progress, Supervisor};
 use crate::bus::port::{OpenError, Port};
 use crate::bus::trace::Trace;
 use crate::config::Config;
+use crate::faults::Rehearsal;
 use crate::telemetry::{
     BlackBoxOptions, Destination, Fault, LogSummary, Logger, LoggerOptions, LoggerThread, Machine, Notice,
     WallClock, panic_message,
@@ -33,6 +35,8 @@ pub struct SessionOptions {
     pub recording: Option<Destination>,
     /// Whether a refused step of the real-time set-up ends the run before anything moves.
     pub is_realtime_required: bool,
+    /// Faults that are played on the buses.
+    pub rehearsal: Option<Arc<Rehearsal>>,
 }
 
 /// What is left of a run.
@@ -86,7 +90,7 @@ pub fn run(
 ) -> Result<Session, SessionError> {
     let mut clock = MonotonicClock::default();
     let engine = Box::new(assemble::engine(config)?);
-    let (ports, traces) = open_ports(config)?;
+    let (ports, traces) = open_ports(config, options.rehearsal.as_deref())?;
     let (rt, mut host, log) = channels(&ChannelSizes::of(config));
     let mut supervisor = Supervisor::new(config, options.duration_ns);
 
@@ -126,6 +130,9 @@ pub fn run(
     let (mut panicked, mut is_watched) = (None, true);
     while !running.is_finished() {
         supervisor.poll(clock.now_ns(), &mut host);
+        if let Some(rehearsal) = &options.rehearsal {
+            rehearsal.observe(&host.snapshot());
+        }
         let mut panics_now = None;
         if is_watched {
             // What the caller's function has left half done is the caller's; it is not called again.
@@ -170,12 +177,16 @@ pub fn run(
     })
 }
 
-fn open_ports(config: &Config) -> Result<(Vec<Port>, Vec<Trace>), OpenError> {
+fn open_ports(config: &Config, rehearsal: Option<&Rehearsal>) -> Result<(Vec<Port>, Vec<Trace>), OpenError> {
     let mut ports = Vec::with_capacity(config.buses.len());
     let mut traces = Vec::new();
     let is_traced = config.telemetry.is_candump_written || config.telemetry.black_box_ns.is_some();
     for (index, bus) in config.buses.iter().enumerate() {
         let port = Port::open(config, index)?;
+        let port = match rehearsal {
+            Some(rehearsal) => rehearsal.wrap(index, port),
+            None => port,
+        };
         ports.push(if is_traced {
             let (port, trace) = port.traced(&bus.name);
             traces.push(trace);

@@ -6,10 +6,10 @@
 
 mod axis;
 mod bus;
-mod entry;
+pub(crate) mod entry;
 mod machine;
 mod program;
-mod section;
+pub(crate) mod section;
 mod stops;
 
 use toml::de::DeTable;
@@ -21,16 +21,25 @@ use section::Section;
 
 /// Reads and checks a configuration.
 pub fn parse(source_name: &str, text: &str) -> Result<Config, ConfigError> {
+    document(source_name, text, read)
+}
+
+/// What `read` makes of a TOML document, or else every problem that it has reported.
+pub(crate) fn document<T>(
+    source_name: &str,
+    text: &str,
+    read: impl for<'a> FnOnce(&'a DeTable<'a>, &'a Problems<'a>) -> Option<T>,
+) -> Result<T, ConfigError> {
     let refuse = |problems| ConfigError::new(source_name, text, problems);
     let (document, errors) = DeTable::parse_recoverable(text);
     if !errors.is_empty() {
         return Err(refuse(errors.iter().map(|error| syntax_problem(error, text)).collect()));
     }
     let problems = Problems::new(source_name, text);
-    let config = read(document.get_ref(), &problems);
+    let found = read(document.get_ref(), &problems);
     let problems = problems.into_vec();
-    match config {
-        Some(config) if problems.is_empty() => Ok(config),
+    match found {
+        Some(found) if problems.is_empty() => Ok(found),
         _ => Err(refuse(problems)),
     }
 }
