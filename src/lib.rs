@@ -19,6 +19,7 @@
 
 pub mod bus;
 pub mod canopen;
+pub mod commission;
 pub mod config;
 pub mod controller;
 pub mod doctor;

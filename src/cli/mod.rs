@@ -3,6 +3,7 @@
 mod check;
 mod configuration;
 mod doctor;
+mod drive;
 mod exit;
 mod interruption;
 mod jitter;
@@ -30,6 +31,7 @@ enum Command {
     Plan(plan::Arguments),
     Sim(sim::Arguments),
     Doctor(doctor::Arguments),
+    Drive(drive::Arguments),
     Jitter(jitter::Arguments),
 }
 
@@ -42,6 +44,7 @@ impl CommandLine {
             Command::Plan(arguments) => plan::run(&arguments),
             Command::Sim(arguments) => sim::run(&arguments),
             Command::Doctor(arguments) => doctor::run(&arguments),
+            Command::Drive(arguments) => drive::run(&arguments),
             Command::Jitter(arguments) => jitter::run(&arguments),
         }
     }

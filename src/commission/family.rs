@@ -1,0 +1,95 @@
+//! The families of drives that can be commissioned.
+
+use takt_rt::frame::Frame;
+
+use super::conversation::Manners;
+use super::dictionary::Entry;
+use super::subject::Subject;
+use super::{erob_canopen, yz_aim};
+use crate::canopen::object::Object;
+use crate::canopen::sdo::Timing;
+use crate::config::DriveFamily;
+
+/// A family of drives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Family {
+    /// ZeroErr eRob, CANopen firmware.
+    ErobCanopen,
+    /// YZ-AIM integrated servo, CANopen edition.
+    YzAim,
+}
+
+impl Family {
+    /// Every family.
+    pub const ALL: [Self; 2] = [Self::ErobCanopen, Self::YzAim];
+
+    /// The family of a configured drive.
+    pub const fn of(drive: DriveFamily) -> Self {
+        match drive {
+            DriveFamily::ErobCanopen => Self::ErobCanopen,
+        }
+    }
+
+    /// The word for it in a configuration and on the command line.
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::ErobCanopen => "erob-canopen",
+            Self::YzAim => "yz-aim",
+        }
+    }
+
+    /// Counts of one turn of the position that a drive of this family reports: eRob 19 bits on the output side, YZ-AIM
+    /// 15 bits on the motor side.
+    pub const fn counts_per_turn(self) -> f64 {
+        match self {
+            Self::ErobCanopen => 524_288.0,
+            Self::YzAim => 32_768.0,
+        }
+    }
+
+    /// Whether velocities are in r/min, not in counts/s.
+    pub const fn counts_revolutions(self) -> bool {
+        matches!(self, Self::YzAim)
+    }
+
+    /// Object 1018:1.
+    pub const fn vendor_id(self) -> u32 {
+        match self {
+            Self::ErobCanopen => 0x5A65_726F,
+            Self::YzAim => 0x331,
+        }
+    }
+
+    /// How its SDO server wants to be spoken to. A YZ-AIM drops requests that overlap or come too soon.
+    pub const fn manners(self) -> Manners {
+        let timing = Timing { reply_timeout_ns: 100_000_000, retries: 2 };
+        match self {
+            Self::ErobCanopen => Manners { timing, gap_ns: 0, has_short_replies: false },
+            Self::YzAim => Manners { timing, gap_ns: 2_000_000, has_short_replies: true },
+        }
+    }
+
+    /// The objects that a drive of this family has.
+    pub const fn objects(self) -> &'static [Entry] {
+        match self {
+            Self::ErobCanopen => erob_canopen::OBJECTS,
+            Self::YzAim => yz_aim::OBJECTS,
+        }
+    }
+
+    /// What a PDO of the drive holds, where its mapping cannot be changed.
+    pub fn process_data_words(self, subject: &Subject, frame: &Frame) -> Option<String> {
+        match self {
+            Self::ErobCanopen => None,
+            Self::YzAim => yz_aim::process_data_words(subject, frame),
+        }
+    }
+
+    /// What a value of an object means, in words, where it has more meaning than its number.
+    pub fn meaning(self, object: &Object, value: i64) -> Option<String> {
+        match self {
+            Self::ErobCanopen => erob_canopen::meaning(object, value),
+            Self::YzAim => yz_aim::meaning(object, value),
+        }
+    }
+}
