@@ -227,10 +227,20 @@ impl Conversation {
     /// # Errors
     /// [`Failure::Interrupted`]
     pub async fn listen(&self, duration_ns: Nanoseconds) -> Result<Vec<Frame>, Failure> {
-        self.line_mut().heard = Some(vec![]);
+        self.begin_listening();
         let paused = self.pause(duration_ns).await;
-        let heard = self.line_mut().heard.take().unwrap_or_default();
+        let heard = self.end_listening();
         paused.map(|()| heard)
+    }
+
+    /// Collects every frame of the bus from now on.
+    pub fn begin_listening(&self) {
+        self.line_mut().heard = Some(vec![]);
+    }
+
+    /// What was collected.
+    pub fn end_listening(&self) -> Vec<Frame> {
+        self.line_mut().heard.take().unwrap_or_default()
     }
 
     /// Moves one object.

@@ -27,6 +27,8 @@ pub enum Unit {
     Distance,
     /// The drive's unit of velocity.
     Velocity,
+    /// A tenth of it.
+    VelocityTenth,
     /// The drive's unit of acceleration.
     Acceleration,
     /// Per mille of the rated torque.
@@ -64,6 +66,7 @@ impl Entry {
             Unit::Position => shown(subject.position_quantity(), subject.position(value)),
             Unit::Distance => shown(subject.position_quantity(), value as f64 / subject.scale.resolution()),
             Unit::Velocity => shown(subject.velocity_quantity(), subject.velocity(value as f64)),
+            Unit::VelocityTenth => shown(subject.velocity_quantity(), subject.velocity(value as f64 / 10.0)),
             Unit::Acceleration => shown(subject.acceleration_quantity(), subject.acceleration(value as f64)),
             Unit::Of(factor, unit) => {
                 let value = value as f64 * factor;
@@ -89,7 +92,7 @@ impl Entry {
             Unit::Position | Unit::Distance => subject.position_quantity(),
             Unit::Velocity => subject.velocity_quantity(),
             Unit::Acceleration => subject.acceleration_quantity(),
-            Unit::Torque | Unit::Of(..) | Unit::None => {
+            Unit::Torque | Unit::Of(..) | Unit::VelocityTenth | Unit::None => {
                 let reason = match self.unit {
                     Unit::Torque => "give per mille of the rated torque with `--raw`".to_owned(),
                     Unit::Of(factor, unit) => {

@@ -28,6 +28,7 @@ mod pace;
 mod procedure;
 mod report;
 mod request;
+mod scan;
 mod subject;
 pub mod yz_aim;
 

@@ -84,6 +84,16 @@ impl Subject {
         Err(Failure::AtLimit { quantity: self.position_quantity(), value: reading.position, low, high })
     }
 
+    /// Checks that an axis that rests at `counts` may go in the direction of a velocity in drive units: at a limit, only
+    /// away from it.
+    ///
+    /// # Errors
+    /// [`Failure::AtLimit`]
+    pub fn check_way(&self, counts: i64, velocity: i64) -> Result<(), Failure> {
+        let hardly = self.velocity(velocity as f64).signum() * f64::MIN_POSITIVE;
+        self.check_room(&Reading { position: self.position(counts), velocity: hardly, ..Reading::default() })
+    }
+
     /// How long a move may take at most: half as long again as its profile, and then some for the drive.
     pub(super) fn longest_ns(&self, distance: i64, velocity: i64, acceleration: i64) -> Nanoseconds {
         let (velocity, acceleration) =

@@ -142,7 +142,12 @@ pub struct ReadObject {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Course {
     /// To a position.
-    Absolute(Amount),
+    Absolute {
+        /// The position.
+        to: Amount,
+        /// Whether the drive takes the target over at once, also while it moves. A YZ-AIM always does.
+        is_immediate: bool,
+    },
     /// By a distance.
     Relative(Amount),
     /// To a position and back, so many times.

@@ -50,6 +50,9 @@ enum CourseArguments {
         /// "90 deg", "0.2 m"; --raw: counts
         #[arg(allow_hyphen_values = true)]
         position: String,
+        /// Let the drive take the target over at once (controlword bit 5; a YZ-AIM always does)
+        #[arg(long)]
+        immediate: bool,
         #[command(flatten)]
         pace: PaceArguments,
     },
@@ -203,7 +206,9 @@ impl CourseArguments {
     fn request(&self, subject: &Subject, is_raw: bool) -> Result<Request, Failure> {
         let position = subject.position_quantity();
         let (course, pace) = match self {
-            Self::Absolute { position: to, pace } => (Course::Absolute(read(to, position, is_raw)?), pace),
+            Self::Absolute { position: to, immediate, pace } => {
+                (Course::Absolute { to: read(to, position, is_raw)?, is_immediate: *immediate }, pace)
+            }
             Self::Relative { distance, pace } => (Course::Relative(read(distance, position, is_raw)?), pace),
             Self::Reciprocate { position: to, times, dwell, pace } => {
                 let dwell_ns = nanoseconds(*dwell).unwrap_or(0);

@@ -176,7 +176,9 @@ impl Output {
             Failure::Interrupted if self.action == "watch" => {}
             Failure::Interrupted => eprintln!("takt: {name}: interrupted in `{}`", failed.step),
             failure => {
-                eprintln!("takt: {name}, {}: {failure}", failed.step);
+                // What is refused before the first word with the drive has no step.
+                let step = if failure.is_refusal() { String::new() } else { format!(", {}", failed.step) };
+                eprintln!("takt: {name}{step}: {failure}");
                 if let Some(advice) = failure.advice() {
                     eprintln!("  try: {advice}");
                 }

@@ -4,8 +4,8 @@ use takt_rt::cia402::{State, controlword};
 use takt_rt::time::Nanoseconds;
 
 use super::enabling::state;
-use super::objects::MULTI_TURN_RESET;
 use super::reading::{advice, error_code, in_words, summary};
+use super::upkeep::clear_turns;
 use crate::canopen::objects::*;
 use crate::commission::contact;
 use crate::commission::conversation::Conversation;
@@ -40,7 +40,7 @@ pub async fn clear(c: &Conversation, s: &Subject, is_agreed: bool) -> Result<Rep
             });
         }
         c.step("clear the count of turns");
-        c.write(&MULTI_TURN_RESET, 1).await?;
+        clear_turns(c).await?;
     }
     c.step("fault reset");
     c.write(&CONTROLWORD, controlword::DISABLE_VOLTAGE.into()).await?;

@@ -22,7 +22,7 @@ pub const STORE: Object = Object::new(0x1010, 1, DataType::U32, "store parameter
 /// 22A2: °C.
 pub const TEMPERATURE: Object = Object::new(0x22A2, 0, DataType::U16, "temperature");
 /// 2242: 1 clears the fault of the multi-turn battery, and the count of turns.
-pub const MULTI_TURN_RESET: Object = Object::new(0x2242, 0, DataType::U8, "reset of the multi-turn count");
+pub const MULTI_TURN_RESET: Object = Object::new(0x2242, 0, DataType::U16, "reset of the multi-turn count");
 /// 6065: the joint calls this INTEGER32.
 pub const FOLLOWING_ERROR_WINDOW: Object = Object::new(0x6065, 0, DataType::I32, "following error window");
 /// 6077: per mille of the rated torque.

@@ -5,7 +5,9 @@ use takt_rt::time::Nanoseconds;
 use super::enabling::state;
 use super::objects::{MULTI_TURN_RESET, STORE};
 use super::state::SAVE_SIGNATURE;
+use crate::canopen::object::{DataType, Object};
 use crate::canopen::objects::*;
+use crate::canopen::sdo::{AbortCode, SdoError};
 use crate::commission::contact;
 use crate::commission::conversation::Conversation;
 use crate::commission::failure::Failure;
@@ -33,7 +35,7 @@ pub async fn zero(c: &Conversation, s: &Subject, is_agreed: bool) -> Result<Repo
     }
     let before = c.read(&POSITION_ACTUAL_VALUE).await?;
     c.step("clear the count of turns");
-    c.write(&MULTI_TURN_RESET, 1).await?;
+    clear_turns(c).await?;
     let turn = s.counts_per_turn as i64;
     let within = |counts: i64| (0..turn).contains(&counts);
     let after = c.wait_for(&POSITION_ACTUAL_VALUE, "a position within one turn", ZEROING_NS, within).await?;
@@ -45,6 +47,26 @@ pub async fn zero(c: &Conversation, s: &Subject, is_agreed: bool) -> Result<Repo
         "to make this position the joint's zero, set `zero_counts = {after}` in the configuration"
     ));
     Ok(report)
+}
+
+/// 2242 = 1. Its type is not published: what is told to be too long or too short is tried in another length.
+pub async fn clear_turns(c: &Conversation) -> Result<(), Failure> {
+    let mut outcome = c.write(&MULTI_TURN_RESET, 1).await;
+    for data_type in [DataType::U8, DataType::U32] {
+        if !matches!(
+            outcome,
+            Err(Failure::Transfer {
+                error: SdoError::Aborted(
+                    AbortCode::LengthMismatch | AbortCode::LengthTooHigh | AbortCode::LengthTooLow
+                ),
+                ..
+            })
+        ) {
+            break;
+        }
+        outcome = c.write(&Object { data_type, ..MULTI_TURN_RESET }, 1).await;
+    }
+    outcome
 }
 
 /// `save`: 1010:1 = "save", and three seconds of patience.

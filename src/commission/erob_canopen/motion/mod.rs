@@ -9,6 +9,7 @@ use takt_rt::time::Nanoseconds;
 use super::{enabling, reading};
 use crate::canopen::objects::*;
 use crate::commission::conversation::Conversation;
+use crate::commission::event::Reading;
 use crate::commission::failure::Failure;
 use crate::commission::guarded::guarded;
 use crate::commission::pace::{Pace, Profile};
@@ -104,7 +105,7 @@ async fn run_at(
 ) -> Result<Report, Failure> {
     let rated = begin(c, s, OperationMode::ProfileVelocity, &profile).await?;
     let began = enabling::enable(c, s).await?;
-    check_way_out(s, began, raw)?;
+    s.check_way(began, raw)?;
     c.step("run");
     c.write(&TARGET_VELOCITY, raw).await?;
     let mut fastest = 0.0_f64;
@@ -135,16 +136,6 @@ async fn run_at(
     Ok(report)
 }
 
-/// An axis at its limit may only move away from it.
-fn check_way_out(s: &Subject, counts: i64, raw: i64) -> Result<(), Failure> {
-    let reading = crate::commission::event::Reading {
-        position: s.position(counts),
-        velocity: s.velocity(raw as f64) * 1e-6,
-        ..Default::default()
-    };
-    s.check_room(&reading)
-}
-
 /// [`enabling::prepare`], and the rated torque.
 async fn begin(
     c: &Conversation,
@@ -163,7 +154,7 @@ async fn tend(
     rated: Option<f64>,
     duration_ns: Option<Nanoseconds>,
     every_ns: Nanoseconds,
-    mut look: impl FnMut(&crate::commission::event::Reading) -> Result<(), Failure>,
+    mut look: impl FnMut(&Reading) -> Result<(), Failure>,
 ) -> Result<(), Failure> {
     let began_ns = c.now_ns();
     loop {

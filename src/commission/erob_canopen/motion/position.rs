@@ -26,16 +26,17 @@ pub async fn run(
 ) -> Result<Report, Failure> {
     let profile = s.profile(&pace)?;
     // What is known to be outside before the drive is asked is refused before.
-    if let Course::Absolute(to) | Course::Reciprocate { to, .. } = course {
+    if let Course::Absolute { to, .. } | Course::Reciprocate { to, .. } = course {
         s.check_position(s.position_counts(to))?;
     }
+    let is_immediate = matches!(course, Course::Absolute { is_immediate: true, .. });
     let work = async {
         let rated = begin(c, s, OperationMode::ProfilePosition, &profile).await?;
         let profile = complete(c, profile).await?;
         c.step("way");
         let here = c.read(&POSITION_ACTUAL_VALUE).await?;
         let (target, stops, dwell_ns) = match course {
-            Course::Absolute(to) => (s.position_counts(to), 1, 0),
+            Course::Absolute { to, .. } => (s.position_counts(to), 1, 0),
             Course::Relative(by) => (here.saturating_add(s.distance_counts(by)), 1, 0),
             Course::Reciprocate { to, times, dwell_ns } => (s.position_counts(to), 2 * times, dwell_ns),
             Course::Continuous { .. } => {
@@ -49,7 +50,7 @@ pub async fn run(
         let mut at = enabling::enable(c, s).await?;
         for stop in 0..stops {
             let next = if stop % 2 == 0 { target } else { here };
-            set_point(c, next).await?;
+            set_point(c, next, is_immediate).await?;
             arrive(c, s, rated, &profile, at, next).await?;
             at = next;
             c.pause(dwell_ns).await?;
@@ -59,7 +60,7 @@ pub async fn run(
         }
         let reached = c.read(&POSITION_ACTUAL_VALUE).await?;
         let mut report = Report::new();
-        let (from, to) = (s.position(here), s.position(at));
+        let (from, to) = (s.position(here), s.position(target));
         report.add("from", "from", from, s.position_quantity().show(from));
         report.add("target", "target", to, s.position_quantity().show(to));
         report.add("moves", "moves", stops, stops.to_string());
@@ -85,12 +86,13 @@ async fn complete(c: &Conversation, profile: Profile) -> Result<Profile, Failure
     Ok(Profile { velocity: Some(velocity), acceleration: Some(acceleration.max(1)), ..profile })
 }
 
-async fn set_point(c: &Conversation, target: i64) -> Result<(), Failure> {
+async fn set_point(c: &Conversation, target: i64, is_immediate: bool) -> Result<(), Failure> {
     c.step("set-point");
     c.write(&TARGET_POSITION, target).await?;
     let is_acknowledged = |word: i64| word as u16 & statusword::BIT_12 != 0;
     let word = controlword::ENABLE_OPERATION;
-    c.write(&CONTROLWORD, (word | controlword::BIT_4).into()).await?;
+    let change = if is_immediate { controlword::BIT_5 } else { 0 };
+    c.write(&CONTROLWORD, (word | controlword::BIT_4 | change).into()).await?;
     c.wait_for(&STATUSWORD, "the acknowledgement of the set-point", ACKNOWLEDGE_NS, is_acknowledged).await?;
     c.write(&CONTROLWORD, word.into()).await?;
     let what = "the end of the acknowledgement";
