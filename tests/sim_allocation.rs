@@ -7,6 +7,7 @@ use std::cell::Cell;
 
 use takt::sim::erob::{ErobJoint, ErobParameters};
 use takt::sim::plant::{Encoder, JointParameters};
+use takt::sim::yz_aim::{Gearing, Model, YzAimJoint, YzAimParameters};
 use takt::sim::{BitRates, Drive, DriveFault, SimulatedBus};
 use takt_rt::frame::{Frame, Id};
 use takt_rt::port::{BusPort, ReceiveBatch};
@@ -134,4 +135,56 @@ fn a_second_on_the_simulated_bus_takes_no_heap_memory() {
     // Two thousand TPDOs and more, so it was not silence that needed no memory.
     assert!(received > 2_000, "{received}");
     assert_eq!(bus.observe(1).unwrap().error_code, 0x7305);
+}
+
+fn servo(node: u8) -> Box<dyn Drive> {
+    let gearing =
+        Gearing { ratio: 10.0, travel_per_turn: std::f64::consts::TAU, is_reversed: false, zero_counts: 0.0 };
+    let joint =
+        JointParameters { inertia: 0.02, viscous_friction: 0.1, coulomb_friction: 0.5, brake_torque: 0.0 };
+    Box::new(YzAimJoint::new(YzAimParameters {
+        power_up_ns: 5_000_000,
+        special_function: 7,
+        ..YzAimParameters::new(node, Model::Aim57x30C, gearing, joint)
+    }))
+}
+
+#[test]
+fn a_second_of_interpolation_with_alarms_and_power_cycles_takes_no_heap_memory() {
+    let drives = [1, 2, 3].map(servo).into();
+    let mut bus = SimulatedBus::with_drives(BitRates { nominal: 1_000_000, data: None }, 5_000_000, drives);
+    let built = allocations();
+    let mut batch = ReceiveBatch::new();
+    let mut received = 0;
+    for cycle in 0..500u64 {
+        let now_ns = cycle * 2_000_000;
+        let sdo = match cycle {
+            10 => Some([0x2F, 0x60, 0x60, 0, 7, 0, 0, 0]),
+            20 => Some([0x2B, 0x40, 0x60, 0, 0x06, 0, 0, 0]),
+            40 => Some([0x2B, 0x40, 0x60, 0, 0x07, 0, 0, 0]),
+            60 => Some([0x2B, 0x40, 0x60, 0, 0x0F, 0, 0, 0]),
+            300 => Some([0x2B, 0x14, 0x26, 0, 1, 0, 0, 0]),
+            _ => None,
+        };
+        match cycle {
+            15 => assert_eq!(bus.send(now_ns, &[Frame::of(Id::canopen(0x000, 0), [1, 0])]), 1),
+            200 => bus.inject(1, DriveFault::Stall).unwrap(),
+            400 => bus.power_cycle(2).unwrap(),
+            _ => {}
+        }
+        for node in 1..=3 {
+            if let Some(request) = sdo {
+                bus.send(now_ns, &[Frame::of(Id::canopen(0x600, node), request)]);
+            }
+            bus.send(now_ns, &[Frame::of(Id::canopen(0x500, node), (cycle as i32 * 100).to_le_bytes())]);
+        }
+        bus.send(now_ns + 1_000_000, &[Frame::of(Id::canopen(0x080, 0), [])]);
+        batch.clear();
+        bus.receive(now_ns + 1_999_000, &mut batch);
+        received += batch.len();
+    }
+    assert_eq!(allocations(), built);
+    assert!(received > 2_000, "{received}");
+    assert_eq!(bus.observe(1).unwrap().error_code, 0x14);
+    assert!(bus.observe(3).unwrap().position_counts > 30_000);
 }

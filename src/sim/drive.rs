@@ -102,4 +102,8 @@ pub enum DriveFault {
     Encoder,
     /// The battery of the multi-turn encoder is empty: 0x730F. A fault reset does not clear it.
     MultiTurnBattery,
+    /// Something holds the rotor: 0x7121. Power is cut at once.
+    BlockedRotor,
+    /// The motor does not come to the demanded speed: 0x8400. Power is cut at once.
+    Stall,
 }

@@ -8,9 +8,11 @@
 //!     medium               drive ── Drive: what every simulated drive is to its bus
 //!     who sends, when       │
 //!       │                  erob ── the eRob joint: dictionary, SDO, NMT, PDO, CiA 402, modes, loops
-//!     mailbox  wire         │
-//!     frames   bits,      plant ── inertia, friction, brake, encoder
-//!     waiting  stuffing
+//!     mailbox  wire        yz_aim ── the YZ-AIM servo: the same, its own controlword, homing, alarms
+//!     frames   bits,        │
+//!     waiting  stuffing   servo ── position, velocity and torque loops
+//!                           │
+//!                         plant ── inertia, friction, brake, end stops, encoder; homing switches
 //! ```
 //!
 //! Everything is passive: there are no threads and no clocks. Time is a number that is handed in, so the same code
@@ -46,12 +48,15 @@
 
 mod drive;
 pub mod erob;
+pub mod homing_switches;
 mod live;
 mod mailbox;
 mod medium;
 pub mod plant;
 mod port;
 mod random;
+mod servo;
+pub mod yz_aim;
 
 pub use drive::{Drive, DriveFault, NmtState, Observation};
 pub use live::LiveDrives;

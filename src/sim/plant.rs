@@ -14,6 +14,15 @@ pub struct JointParameters {
     pub brake_torque: f64,
 }
 
+/// Where the travel of a joint ends at something solid.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EndStops {
+    /// rad (m)
+    pub lowest: f64,
+    /// rad (m)
+    pub highest: f64,
+}
+
 /// The mechanical state of a joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Joint {
@@ -22,12 +31,18 @@ pub struct Joint {
     velocity: f64,
     /// Torque from outside: gravity, contact.
     load_torque: f64,
+    stops: Option<EndStops>,
 }
 
 impl Joint {
     /// A joint at rest.
     pub fn new(parameters: JointParameters, position: f64) -> Self {
-        Self { parameters, position, velocity: 0.0, load_torque: 0.0 }
+        Self { parameters, position, velocity: 0.0, load_torque: 0.0, stops: None }
+    }
+
+    /// The same joint between end stops, which take every torque and give nothing back.
+    pub fn between(self, stops: Option<EndStops>) -> Self {
+        Self { stops, ..self }
     }
 
     /// Position in rad (m).
@@ -80,6 +95,13 @@ impl Joint {
     fn travel(&mut self, ended: f64, duration_s: f64) {
         self.position += 0.5 * (self.velocity + ended) * duration_s;
         self.velocity = ended;
+        if let Some(EndStops { lowest, highest }) = self.stops {
+            let within = self.position.min(highest).max(lowest);
+            if within != self.position {
+                self.position = within;
+                self.velocity = 0.0;
+            }
+        }
     }
 }
 
@@ -153,6 +175,20 @@ mod tests {
         assert_eq!(joint.velocity(), 0.0);
         joint.step(STEP_S, 0.0, false);
         assert!(joint.velocity() > 0.0);
+    }
+
+    #[test]
+    fn an_end_stop_takes_every_torque_and_lets_the_joint_go_back() {
+        let stops = EndStops { lowest: -1.0, highest: 0.5 };
+        let mut joint = Joint::new(PARAMETERS, 0.4).between(Some(stops));
+        for _ in 0..8_000 {
+            joint.step(STEP_S, 500.0, false);
+        }
+        assert_eq!(joint.position(), 0.5);
+        for _ in 0..8_000 {
+            joint.step(STEP_S, -20.0, false);
+        }
+        assert_eq!(joint.position(), -1.0);
     }
 
     #[test]

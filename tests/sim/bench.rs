@@ -49,6 +49,11 @@ impl Bench {
         for module in modules {
             drives.push(Box::new(ErobJoint::new(module)));
         }
+        Self::of(drives)
+    }
+
+    /// A bus with any drives that boot within 10 ms.
+    pub fn of(drives: Vec<Box<dyn Drive>>) -> Self {
         let rates = BitRates { nominal: 1_000_000, data: None };
         let bus = SimulatedBus::with_drives(rates, u64::MAX, drives);
         let mut bench = Self { bus, now_ns: 0, heard: vec![] };

@@ -1,4 +1,4 @@
-//! The simulated bus and the simulated eRob joint, as a master sees them.
+//! The simulated bus and the simulated drives, as a master sees them.
 
 mod bench;
 mod device;
@@ -10,3 +10,4 @@ mod process_data;
 mod profiles;
 mod sdo;
 mod vectors;
+mod yz_aim;

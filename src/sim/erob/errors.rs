@@ -32,6 +32,8 @@ impl Error {
             Self::Fault(DriveFault::OverTemperature) => 0x4310,
             Self::Fault(DriveFault::Encoder) => 0x7305,
             Self::Fault(DriveFault::MultiTurnBattery) => 0x730F,
+            Self::Fault(DriveFault::BlockedRotor) => 0x7121,
+            Self::Fault(DriveFault::Stall) => 0x8400,
             Self::MasterLost => 0x8130,
             Self::PdoLength => 0x8210,
             Self::PositionLost => 0x8611,

@@ -15,11 +15,11 @@ use super::motion::{Actual, Demand, Motion};
 use super::network::Network;
 use super::process_data::ProcessData;
 use super::sdo::SdoServer;
-use super::servo::Servo;
 use crate::sim::drive::{Drive, DriveFault, Observation};
 use crate::sim::mailbox::Mailbox;
 use crate::sim::plant::Joint;
 use crate::sim::random::Random;
+use crate::sim::servo::Servo;
 
 /// The control loops and the plant run at 8 kHz.
 const STEP_NS: Nanoseconds = 125_000;

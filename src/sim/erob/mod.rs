@@ -34,7 +34,6 @@ mod network;
 mod objects;
 mod process_data;
 mod sdo;
-mod servo;
 
 pub use dictionary::AbortCode;
 pub use joint::ErobJoint;

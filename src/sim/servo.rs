@@ -21,6 +21,11 @@ impl Servo {
         Self { inertia, torque_limit, velocity_limit, integral: 0.0 }
     }
 
+    /// Sets another torque limit.
+    pub fn set_torque_limit(&mut self, torque_limit: f64) {
+        self.torque_limit = torque_limit;
+    }
+
     /// Forgets the past, as at every enabling.
     pub fn reset(&mut self) {
         self.integral = 0.0;

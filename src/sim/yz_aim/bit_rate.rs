@@ -1,0 +1,65 @@
+//! The procedure that changes the bit rate: four writes in order (manual 5.13).
+
+use super::objects::at;
+
+/// How much of the procedure has been written.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum BitRateChange {
+    /// Nothing.
+    #[default]
+    None,
+    /// 2600h = 1.
+    Begun,
+    /// 6083h = the code of this rate (bit/s).
+    Chosen(u32),
+    /// 2604h = 129.
+    Confirmed(u32),
+}
+
+impl BitRateChange {
+    /// Sees a write. Returns the new bit rate (bit/s) with the last one of the procedure; it counts from the next
+    /// power-up on.
+    pub fn written(&mut self, at: usize, value: i64) -> Option<u32> {
+        let (next, rate) = match (*self, at, value) {
+            (_, at::MODBUS_ENABLE, 1) => (Self::Begun, None),
+            (Self::Begun | Self::Chosen(_), at::ACCELERATION, 800..=803) => {
+                (Self::Chosen(125_000 << (value - 800)), None)
+            }
+            (Self::Chosen(rate), at::FLUX_WEAKENING_ANGLE, 129) => (Self::Confirmed(rate), None),
+            (Self::Confirmed(rate), at::MODBUS_ENABLE, 506) => (Self::None, Some(rate)),
+            (_, at::MODBUS_ENABLE | at::ACCELERATION | at::FLUX_WEAKENING_ANGLE, _) => (Self::None, None),
+            (unchanged, _, _) => (unchanged, None),
+        };
+        *self = next;
+        rate
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn after(writes: &[(usize, i64)]) -> Option<u32> {
+        let mut change = BitRateChange::default();
+        writes.iter().fold(None, |_, (at, value)| change.written(*at, *value))
+    }
+
+    #[test]
+    fn only_the_four_writes_in_order_change_the_rate() {
+        let write = |code| {
+            [
+                (at::MODBUS_ENABLE, 1),
+                (at::ACCELERATION, code),
+                (at::FLUX_WEAKENING_ANGLE, 129),
+                (at::MODBUS_ENABLE, 506),
+            ]
+        };
+        let rates = [800, 801, 802, 803].map(|code| after(&write(code)));
+        assert_eq!(rates, [125_000, 250_000, 500_000, 1_000_000].map(Some));
+        assert_eq!(after(&write(804)), None);
+        assert_eq!(after(&write(802)[1..]), None);
+        let [begin, choose, confirm, end] = write(802);
+        assert_eq!(after(&[begin, confirm, choose, end]), None);
+        assert_eq!(after(&[begin, choose, confirm, (at::ACCELERATION, 20_000), end]), None);
+    }
+}

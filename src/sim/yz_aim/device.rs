@@ -1,0 +1,182 @@
+//! Controlword in, statusword out (manual 5.04). This drive has no CiA 402 machine: there is only how far its controlword has
+//! led it.
+
+use takt_rt::cia402::{State, controlword};
+use takt_rt::time::Nanoseconds;
+
+use super::parameters::Quirks;
+
+/// How far the controlword has led the drive.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Level {
+    /// No controlword has come since power-up; the shaft is held.
+    Cold,
+    /// Off: the shaft is free.
+    Off,
+    /// 0006h: the shaft is free.
+    Ready,
+    /// 0007h: the shaft is free.
+    SwitchedOn,
+    /// 000Fh: set-points are followed.
+    Enabled,
+}
+
+impl Level {
+    fn wanted(word: u16) -> Self {
+        const VOLTAGE_AND_QUICK_STOP: u16 = 0x06;
+        match word & 0x0F {
+            bits if bits & VOLTAGE_AND_QUICK_STOP != VOLTAGE_AND_QUICK_STOP => Self::Off,
+            0x0F => Self::Enabled,
+            0x07 => Self::SwitchedOn,
+            _ => Self::Ready,
+        }
+    }
+
+    /// As a state of CiA 402, for an observer.
+    pub fn state(self) -> State {
+        match self {
+            Self::Cold | Self::Off => State::SwitchOnDisabled,
+            Self::Ready => State::ReadyToSwitchOn,
+            Self::SwitchedOn => State::SwitchedOn,
+            Self::Enabled => State::OperationEnabled,
+        }
+    }
+}
+
+/// Bits of the statusword that come from elsewhere.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Conditions {
+    /// Bit 2: the motor stage works.
+    pub is_energised: bool,
+    /// Bit 3.
+    pub has_alarm: bool,
+    /// Bit 10.
+    pub is_target_reached: bool,
+    /// Bit 4 in mode 6, in which the motor turns without any controlword.
+    pub is_homing: bool,
+    /// Bit 12.
+    pub is_homed: bool,
+    /// Bit 13.
+    pub has_homing_error: bool,
+}
+
+/// What the controlword has made of the drive.
+#[derive(Clone, Copy, Debug)]
+pub struct Device {
+    level: Level,
+    /// Whether 0006h has come since power-up.
+    has_shut_down: bool,
+    word: u16,
+    raised_ns: Option<Nanoseconds>,
+}
+
+impl Device {
+    /// A drive after power-up.
+    pub const fn cold() -> Self {
+        Self { level: Level::Cold, has_shut_down: false, word: 0, raised_ns: None }
+    }
+
+    /// How far the controlword has led it.
+    pub fn level(&self) -> Level {
+        self.level
+    }
+
+    /// Whether bit 8 stops the motion.
+    pub fn is_halted(&self) -> bool {
+        self.level == Level::Enabled && self.word & controlword::HALT != 0
+    }
+
+    /// Bit 5: a target moves the motor when it is written.
+    pub fn is_immediate(&self) -> bool {
+        self.word & controlword::BIT_5 != 0
+    }
+
+    /// Bit 6: targets are distances.
+    pub fn is_relative(&self) -> bool {
+        self.word & controlword::RELATIVE != 0
+    }
+
+    /// Takes a controlword.
+    ///
+    /// One that leads further than a cold drive goes, or that comes too soon after the one before, has no effect, as
+    /// the quirks say.
+    pub fn take(&mut self, now_ns: Nanoseconds, word: u16, quirks: &Quirks) {
+        let wanted = Level::wanted(word);
+        let is_raising = wanted > self.level.max(Level::Off);
+        let is_too_soon = self
+            .raised_ns
+            .is_some_and(|raised_ns| now_ns.saturating_sub(raised_ns) < quirks.controlword_interval_ns);
+        let is_too_far = quirks.needs_shutdown_first && !self.has_shut_down && wanted > Level::Ready;
+        if is_raising && (is_too_soon || is_too_far) {
+            return;
+        }
+        if is_raising {
+            self.raised_ns = Some(now_ns);
+        }
+        self.has_shut_down |= wanted == Level::Ready;
+        self.level = wanted;
+        self.word = word;
+    }
+
+    /// The statusword. Bits 6 to 9, 11, 14 and 15 do not exist.
+    pub fn statusword(&self, conditions: Conditions) -> u16 {
+        let is_ready = self.level >= Level::Ready;
+        let bits = [
+            (is_ready, 0),
+            (self.level >= Level::SwitchedOn, 1),
+            (conditions.is_energised, 2),
+            (conditions.has_alarm, 3),
+            (is_ready || conditions.is_homing, 4),
+            (is_ready, 5),
+            (conditions.is_target_reached, 10),
+            (conditions.is_homed, 12),
+            (conditions.has_homing_error, 13),
+        ];
+        bits.into_iter().fold(0, |word, (is_set, bit)| word | u16::from(is_set) << bit)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MILLISECOND_NS: Nanoseconds = 1_000_000;
+
+    fn energised() -> Conditions {
+        Conditions { is_energised: true, is_target_reached: true, ..Conditions::default() }
+    }
+
+    #[test]
+    fn a_cold_drive_takes_no_notice_of_0007_and_000f_before_0006() {
+        let mut device = Device::cold();
+        for word in [0x07, 0x0F, 0x2F] {
+            device.take(0, word, &Quirks::default());
+            assert_eq!(device.statusword(energised()), 0x0404);
+        }
+        let steps = [(0x06, Level::Ready), (0x07, Level::SwitchedOn), (0x0F, Level::Enabled)];
+        for ((word, level), now_ns) in steps.into_iter().zip([100, 120, 140]) {
+            device.take(now_ns * MILLISECOND_NS, word, &Quirks::default());
+            assert_eq!(device.level(), level);
+        }
+        assert_eq!(device.statusword(energised()), 0x0437);
+    }
+
+    #[test]
+    fn a_controlword_that_comes_too_soon_is_lost_and_one_that_leads_down_never() {
+        let mut device = Device::cold();
+        device.take(0, 0x06, &Quirks::default());
+        device.take(19 * MILLISECOND_NS, 0x07, &Quirks::default());
+        assert_eq!(device.level(), Level::Ready);
+        device.take(20 * MILLISECOND_NS, 0x07, &Quirks::default());
+        assert_eq!(device.level(), Level::SwitchedOn);
+        device.take(21 * MILLISECOND_NS, 0x00, &Quirks::default());
+        assert_eq!(device.level(), Level::Off);
+    }
+
+    #[test]
+    fn by_the_manual_000f_alone_enables() {
+        let mut device = Device::cold();
+        device.take(0, 0x0F, &Quirks::none());
+        assert_eq!(device.level(), Level::Enabled);
+    }
+}

@@ -1,0 +1,139 @@
+//! Homing on a switch (manual 5.09, with the directions of CiA 402-2).
+
+/// The input that a method watches.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Input {
+    /// DIR
+    Dir,
+    /// PU
+    Pu,
+}
+
+/// What a method looks for: the point where the switch changes while the motor goes in one direction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Search {
+    input: Input,
+    /// The direction in which the edge is looked for: 1 or −1.
+    direction: f64,
+    /// Whether the switch closes at the edge, and does not open.
+    closes: bool,
+}
+
+impl Search {
+    fn of(method: i64, has_undescribed_methods: bool) -> Option<Self> {
+        let (input, direction, closes) = match method {
+            17 | 21 => (Input::Dir, 1.0, false),
+            18 => (Input::Pu, -1.0, false),
+            19 => (Input::Dir, -1.0, false),
+            20 if has_undescribed_methods => (Input::Dir, 1.0, true),
+            22 if has_undescribed_methods => (Input::Dir, -1.0, true),
+            _ => return None,
+        };
+        Some(Self { input, direction, closes })
+    }
+}
+
+/// How far a homing has come.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum State {
+    Idle,
+    /// Fast, against the direction of the search, to the other side of the edge.
+    Approaching(Search),
+    /// Slowly in the direction of the search; whether the other side of the edge has been seen on the way.
+    Searching(Search, bool),
+    /// The zero is set; the motor comes to rest.
+    Settling,
+    Done,
+    Failed,
+}
+
+/// A homing.
+#[derive(Clone, Copy, Debug)]
+pub struct Homing {
+    state: State,
+    elapsed_s: f64,
+}
+
+impl Homing {
+    /// None.
+    pub const fn idle() -> Self {
+        Self { state: State::Idle, elapsed_s: 0.0 }
+    }
+
+    /// Begins. A method that the unit does not have fails at once.
+    pub fn start(method: i64, has_undescribed_methods: bool) -> Self {
+        let search = Search::of(method, has_undescribed_methods);
+        Self { state: search.map_or(State::Failed, State::Approaching), elapsed_s: 0.0 }
+    }
+
+    /// Gives up.
+    pub fn fail(&mut self) {
+        if self.is_running() {
+            self.state = State::Failed;
+        }
+    }
+
+    /// Whether it is under way.
+    pub fn is_running(&self) -> bool {
+        matches!(self.state, State::Approaching(_) | State::Searching(..) | State::Settling)
+    }
+
+    /// Whether it has been begun, and perhaps ended, since the mode was set.
+    pub fn is_begun(&self) -> bool {
+        self.state != State::Idle
+    }
+
+    /// Bit 12.
+    pub fn is_done(&self) -> bool {
+        self.state == State::Done
+    }
+
+    /// Bit 13.
+    pub fn has_failed(&self) -> bool {
+        self.state == State::Failed
+    }
+
+    /// The input to watch.
+    pub fn input(&self) -> Option<Input> {
+        match self.state {
+            State::Approaching(search) | State::Searching(search, _) => Some(search.input),
+            _ => None,
+        }
+    }
+
+    /// For how long it has been under way.
+    pub fn elapsed_s(&self) -> f64 {
+        self.elapsed_s
+    }
+
+    /// The velocity that it wants, in units of the fast speed.
+    pub fn speed(&self) -> Option<f64> {
+        match self.state {
+            State::Approaching(search) => Some(-search.direction),
+            State::Searching(search, _) => Some(0.1 * search.direction),
+            State::Settling => Some(0.0),
+            _ => None,
+        }
+    }
+
+    /// Looks at the switch after `duration_s` more, while the motor turns at `velocity`. Returns whether this is the zero.
+    pub fn step(&mut self, is_closed: bool, velocity: f64, is_at_rest: bool, duration_s: f64) -> bool {
+        self.elapsed_s += duration_s;
+        match self.state {
+            State::Approaching(search) if is_closed != search.closes => {
+                self.state = State::Searching(search, false);
+            }
+            // On the way back from where the approach has overshot.
+            State::Searching(search, has_seen) if velocity * search.direction > 0.0 => {
+                if has_seen && is_closed == search.closes {
+                    self.state = State::Settling;
+                    return true;
+                }
+                self.state = State::Searching(search, has_seen || is_closed != search.closes);
+            }
+            State::Settling if is_at_rest => self.state = State::Done,
+            _ => {}
+        }
+        false
+    }
+}

@@ -1,0 +1,341 @@
+//! The whole drive: frames and time come in, the parts do their work, frames go out.
+
+mod access;
+mod commands;
+mod frames;
+mod loops;
+mod measurement;
+mod watch;
+
+use takt_rt::cia402::State;
+use takt_rt::frame::Frame;
+use takt_rt::time::Nanoseconds;
+
+use super::alarms::{Alarms, StoppingAlarm};
+use super::bit_rate::BitRateChange;
+use super::device::{Device, Level};
+use super::dictionary::Dictionary;
+use super::homing::Homing;
+use super::motion::{Actual, Motion};
+use super::network::Network;
+use super::objects::at;
+use super::parameters::{COUNTS_PER_SECOND_PER_RPM, COUNTS_PER_TURN, YzAimParameters};
+use super::process_data::ProcessData;
+use super::sdo::SdoServer;
+use crate::sim::drive::{Drive, DriveFault, NmtState, Observation};
+use crate::sim::mailbox::Mailbox;
+use crate::sim::plant::Joint;
+use crate::sim::random::Random;
+use crate::sim::servo::Servo;
+use watch::Watch;
+
+/// Without anything to do the drive looks up this often.
+const IDLE_NS: Nanoseconds = 1_000_000;
+/// What the loops may add to the highest speed to catch up.
+const SPEED_RESERVE: f64 = 1.1;
+/// Slower than this the motor stands: r/min.
+const STANDSTILL_RPM: f64 = 1.0;
+const NEVER: Nanoseconds = Nanoseconds::MAX;
+
+/// The modes of operation in 6060h.
+mod mode {
+    pub const PROFILE_POSITION: i64 = 1;
+    pub const VELOCITY: i64 = 3;
+    pub const HOMING: i64 = 6;
+    pub const INTERPOLATION: i64 = 7;
+}
+
+/// A simulated YZ-AIM integrated servo with CANopen.
+#[derive(Clone, Debug)]
+pub struct YzAimJoint {
+    parameters: YzAimParameters,
+    dictionary: Dictionary,
+    network: Network,
+    sdo: SdoServer,
+    process_data: ProcessData,
+    device: Device,
+    alarms: Alarms,
+    motion: Motion,
+    homing: Homing,
+    servo: Servo,
+    joint: Joint,
+    watch: Watch,
+    bit_rate_change: BitRateChange,
+    random: Random,
+    /// The node number in force.
+    node: u8,
+    /// The bit rate in force, and the one from the next power-up on.
+    bit_rate: u32,
+    next_bit_rate: u32,
+    /// The special function in force: what was stored when the supply came on.
+    special_function: i64,
+    torque: f64,
+    /// What is added to the encoder's counts.
+    counts_offset: i32,
+    /// Whether the first target after enabling is still to come, and to be ignored.
+    ignores_target: bool,
+    /// The speed of a move that the drive makes by itself after power-up: counts/s.
+    power_up_speed: Option<f64>,
+    has_started: bool,
+    is_starting_cold: bool,
+    was_energised: bool,
+    /// 260Ah = 60006 has been written.
+    is_zero_armed: bool,
+    injected: Option<DriveFault>,
+    save_ns: Nanoseconds,
+    /// How far the loops have come.
+    stepped_ns: Nanoseconds,
+    now_ns: Nanoseconds,
+    wake_ns: Nanoseconds,
+}
+
+impl YzAimJoint {
+    /// A servo whose supply comes on at time 0.
+    pub fn new(parameters: YzAimParameters) -> Self {
+        let mut dictionary = Dictionary::new(parameters.node);
+        dictionary.set_factory(at::SPECIAL_FUNCTION, parameters.special_function.into());
+        dictionary.set_factory(at::ACCELERATION, parameters.acceleration.into());
+        dictionary.set_factory(at::TEMPERATURE, 35);
+        let random = Random::new(parameters.seed, parameters.node);
+        let highest_speed = parameters.highest_speed();
+        let velocity_limit = SPEED_RESERVE * highest_speed / parameters.encoder.counts_per_unit.abs();
+        let joint = Joint::new(parameters.joint, parameters.initial_position).between(parameters.end_stops);
+        let mut unit = Self {
+            parameters,
+            dictionary,
+            network: Network::starting(NEVER, NmtState::PreOperational, false),
+            sdo: SdoServer::new(random),
+            process_data: ProcessData::at_rest(),
+            device: Device::cold(),
+            alarms: Alarms::default(),
+            motion: Motion::new(highest_speed),
+            homing: Homing::idle(),
+            servo: Servo::new(parameters.joint.inertia, parameters.peak_torque, velocity_limit),
+            joint,
+            watch: Watch::default(),
+            bit_rate_change: BitRateChange::None,
+            random,
+            node: parameters.node,
+            bit_rate: parameters.bit_rate,
+            next_bit_rate: parameters.bit_rate,
+            special_function: 0,
+            torque: 0.0,
+            counts_offset: 0,
+            ignores_target: false,
+            power_up_speed: None,
+            has_started: false,
+            is_starting_cold: false,
+            was_energised: false,
+            is_zero_armed: false,
+            injected: None,
+            save_ns: NEVER,
+            stepped_ns: 0,
+            now_ns: 0,
+            wake_ns: 0,
+        };
+        unit.power_up(0);
+        unit
+    }
+
+    /// The bit rate at which it listens and speaks: bit/s. At another one than its bus has it is deaf and mute.
+    pub fn bit_rate(&self) -> u32 {
+        self.bit_rate
+    }
+
+    fn is_on_bus(&self) -> bool {
+        self.bit_rate == self.parameters.bit_rate
+    }
+
+    fn direction(&self) -> f64 {
+        1f64.copysign(self.parameters.encoder.counts_per_unit)
+    }
+
+    fn encoder_counts(&self) -> i32 {
+        self.parameters.encoder.counts(self.joint.position())
+    }
+
+    fn counts(&self) -> i32 {
+        self.encoder_counts().wrapping_add(self.counts_offset)
+    }
+
+    fn actual(&self) -> Actual {
+        let velocity = self.parameters.encoder.counts_per_second(self.joint.velocity());
+        Actual { position: self.counts().into(), velocity }
+    }
+
+    fn velocity_rpm(&self) -> f64 {
+        self.actual().velocity / COUNTS_PER_SECOND_PER_RPM
+    }
+
+    fn is_at_rest(&self) -> bool {
+        self.velocity_rpm().abs() < STANDSTILL_RPM
+    }
+
+    fn mode(&self) -> i64 {
+        self.dictionary.get(at::OPERATION_MODE)
+    }
+
+    fn is_in_mode(&self, mode: i64) -> bool {
+        self.mode() == mode && self.device.level() == Level::Enabled
+    }
+
+    /// Whether targets are taken at every SYNC: 2619h was stored as 7 before the supply came on.
+    fn interpolates(&self) -> bool {
+        self.is_in_mode(mode::INTERPOLATION) && self.special_function == mode::INTERPOLATION
+    }
+
+    /// Whether the motor stage works. A cold drive holds its shaft; homing wants no controlword.
+    fn is_energised(&self) -> bool {
+        let is_commanded = matches!(self.device.level(), Level::Cold | Level::Enabled)
+            || self.mode() == mode::HOMING && self.homing.is_begun();
+        self.has_started
+            && is_commanded
+            && self.dictionary.get(at::OUTPUT_ENABLE) == 1
+            && !self.alarms.is_stopped()
+    }
+
+    /// The alarm code in 260Eh.
+    fn alarm_code(&self) -> u16 {
+        self.alarms.code(self.network.is_master_lost())
+    }
+
+    /// Whether heartbeat and statusword show an alarm.
+    fn shows_alarm(&self) -> bool {
+        self.alarms.is_stopped()
+            || self.network.is_master_lost()
+            || self.alarms.has_lost_battery && self.parameters.quirks.shows_battery_alarm
+    }
+
+    /// Lets the present position be this count.
+    fn set_counts(&mut self, counts: i32) {
+        let before = self.counts();
+        self.counts_offset = counts.wrapping_sub(self.encoder_counts());
+        self.motion.shift(f64::from(counts) - f64::from(before));
+    }
+
+    /// An alarm that stops the motor: the output goes off until the alarm is cleared.
+    fn fail(&mut self, now_ns: Nanoseconds, alarm: StoppingAlarm) {
+        self.alarms.raise(now_ns, alarm);
+        self.dictionary.set(at::OUTPUT_ENABLE, 0);
+    }
+
+    /// The supply comes on.
+    fn power_up(&mut self, now_ns: Nanoseconds) {
+        self.alarms = self.alarms.after_power_up();
+        self.node = self.dictionary.stored(at::NODE_ADDRESS) as u8;
+        self.dictionary.address(self.node);
+        self.bit_rate = self.next_bit_rate;
+        self.special_function = self.dictionary.stored(at::SPECIAL_FUNCTION);
+        if !self.parameters.has_battery || self.alarms.has_lost_battery {
+            let counts = self.encoder_counts();
+            self.counts_offset = counts.rem_euclid(COUNTS_PER_TURN as i32).wrapping_sub(counts);
+        }
+        let state =
+            if self.parameters.starts_operational { NmtState::Operational } else { NmtState::PreOperational };
+        self.start(now_ns, state, self.parameters.quirks.announces_power_up);
+        self.is_starting_cold = true;
+    }
+
+    /// What power-up and "reset node" have in common: what was stored is back, and the drive is cold.
+    fn start(&mut self, now_ns: Nanoseconds, state: NmtState, is_announced: bool) {
+        self.dictionary.restore(0..=u16::MAX);
+        if self.dictionary.get(at::GEAR_NUMERATOR) == 0 {
+            self.dictionary.set(at::MODBUS_ENABLE, 1);
+        }
+        if self.alarms.is_stopped() {
+            self.dictionary.set(at::OUTPUT_ENABLE, 0);
+        }
+        self.network = Network::starting(now_ns + self.parameters.power_up_ns, state, is_announced);
+        self.sdo.reset();
+        self.process_data = ProcessData::at_rest();
+        self.device = Device::cold();
+        self.homing = Homing::idle();
+        self.bit_rate_change = BitRateChange::None;
+        self.has_started = false;
+        self.was_energised = false;
+        self.is_starting_cold = false;
+        self.power_up_speed = None;
+        self.is_zero_armed = false;
+        self.ignores_target = false;
+        self.save_ns = NEVER;
+    }
+
+    fn schedule(&mut self, now_ns: Nanoseconds) {
+        let due_ns = [
+            now_ns + IDLE_NS,
+            self.network.due_ns(),
+            self.sdo.due_ns().unwrap_or(NEVER),
+            self.process_data.due_ns(),
+            self.save_ns,
+        ];
+        self.wake_ns = due_ns.into_iter().min().unwrap_or(NEVER).max(now_ns + 1);
+    }
+}
+
+impl Drive for YzAimJoint {
+    fn node(&self) -> u8 {
+        self.node
+    }
+
+    fn receive(&mut self, now_ns: Nanoseconds, frame: &Frame, _mailbox: &mut Mailbox) {
+        self.now_ns = now_ns;
+        self.run_loops(now_ns);
+        if self.is_on_bus() {
+            self.take(now_ns, frame);
+        }
+        self.schedule(now_ns);
+    }
+
+    fn advance(&mut self, now_ns: Nanoseconds, mailbox: &mut Mailbox) {
+        self.now_ns = now_ns;
+        self.run_loops(now_ns);
+        if let Some(fault) = self.injected.take() {
+            self.break_down(now_ns, fault);
+        }
+        self.network.watch_master(now_ns);
+        if now_ns >= self.save_ns {
+            self.save_ns = NEVER;
+            self.dictionary.store();
+            self.dictionary.set(at::SAVE_FLAG, 2);
+        }
+        self.send_due(now_ns, mailbox);
+        self.schedule(now_ns);
+    }
+
+    fn wake_ns(&self) -> Nanoseconds {
+        self.wake_ns
+    }
+
+    fn observe(&mut self, now_ns: Nanoseconds) -> Observation {
+        self.run_loops(now_ns);
+        let is_stopped = self.alarms.is_stopped() || self.network.is_master_lost();
+        Observation {
+            position: self.joint.position(),
+            velocity: self.joint.velocity(),
+            torque: self.torque * self.direction(),
+            position_counts: self.counts(),
+            state: if is_stopped { State::Fault } else { self.device.level().state() },
+            statusword: self.statusword(),
+            error_code: self.alarm_code(),
+            operation_mode: self.mode() as i8,
+            nmt: self.network.state(),
+            is_braked: false,
+        }
+    }
+
+    fn inject(&mut self, fault: DriveFault) {
+        self.injected = Some(fault);
+        self.wake_ns = self.now_ns + 1;
+    }
+
+    fn power_cycle(&mut self, now_ns: Nanoseconds, mailbox: &mut Mailbox) {
+        self.run_loops(now_ns);
+        mailbox.clear();
+        self.power_up(now_ns);
+        self.schedule(now_ns);
+    }
+
+    fn set_load_torque(&mut self, torque: f64) {
+        self.joint.set_load_torque(torque);
+    }
+}

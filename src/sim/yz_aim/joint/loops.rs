@@ -1,0 +1,127 @@
+//! The control loops on their grid: from the order of the moment to torque, and the joint under it.
+
+use takt_rt::time::{NANOSECONDS_PER_SECOND, Nanoseconds};
+
+use super::watch::Watch;
+use super::{COUNTS_PER_SECOND_PER_RPM, NEVER, YzAimJoint, mode};
+use crate::sim::yz_aim::device::Level;
+use crate::sim::yz_aim::homing::Input;
+use crate::sim::yz_aim::motion::Order;
+use crate::sim::yz_aim::objects::at;
+
+/// The control loops and the plant run at 8 kHz.
+const STEP_NS: Nanoseconds = 125_000;
+/// 6083h from here on: no ramp (manual IV.1).
+const NO_RAMP: i64 = 60_000;
+
+impl YzAimJoint {
+    /// Runs the loops on their grid up to `now_ns`.
+    pub(super) fn run_loops(&mut self, now_ns: Nanoseconds) {
+        while self.stepped_ns + STEP_NS <= now_ns {
+            self.step(STEP_NS);
+        }
+    }
+
+    /// Runs the loops up to exactly `now_ns` and starts their grid anew there: the lock to SYNC.
+    pub(super) fn lock_loops(&mut self, now_ns: Nanoseconds) {
+        self.run_loops(now_ns);
+        if now_ns > self.stepped_ns {
+            self.step(now_ns - self.stepped_ns);
+        }
+    }
+
+    fn step(&mut self, duration_ns: Nanoseconds) {
+        let duration_s = duration_ns as f64 / NANOSECONDS_PER_SECOND as f64;
+        self.stepped_ns += duration_ns;
+        let is_energised = self.is_energised();
+        if is_energised && !self.was_energised {
+            self.engage();
+        }
+        self.was_energised = is_energised;
+        if is_energised {
+            self.step_homing(duration_s);
+            self.drive(duration_s);
+        } else {
+            self.homing.fail();
+            self.torque = 0.0;
+        }
+        self.joint.step(duration_s, self.torque * self.direction(), false);
+        if is_energised {
+            self.watch(duration_s);
+        } else {
+            self.motion.engage(self.actual());
+        }
+    }
+
+    /// Torque comes on, or another order begins: everything starts where the joint is.
+    pub(super) fn engage(&mut self) {
+        if !self.was_energised {
+            self.servo.reset();
+            self.watch = Watch::default();
+        }
+        self.motion.engage(self.actual());
+    }
+
+    fn order(&self) -> Order {
+        if self.network.is_master_lost() || self.device.is_halted() {
+            return Order::Stop;
+        }
+        if let Some(speed) = self.homing.speed() {
+            return Order::Velocity(speed * self.parameters.homing.speed_rpm * COUNTS_PER_SECOND_PER_RPM);
+        }
+        let profile_speed = self.dictionary.real(at::PROFILE_VELOCITY) * COUNTS_PER_SECOND_PER_RPM;
+        match (self.device.level(), self.mode()) {
+            (Level::Cold, _) => Order::Profile(self.power_up_speed.unwrap_or(profile_speed)),
+            (Level::Enabled, mode::PROFILE_POSITION) => Order::Profile(profile_speed),
+            (Level::Enabled, mode::VELOCITY) => {
+                Order::Velocity(self.dictionary.real(at::TARGET_VELOCITY) * COUNTS_PER_SECOND_PER_RPM)
+            }
+            (Level::Enabled, _) if self.interpolates() => Order::Interpolate,
+            _ => Order::Stop,
+        }
+    }
+
+    /// The ramp of the drive: counts/s².
+    fn acceleration(&self) -> f64 {
+        match self.dictionary.get(at::ACCELERATION) {
+            NO_RAMP.. => f64::INFINITY,
+            // A ramp of none at all would never stop the motor.
+            slope => slope.max(1) as f64 * COUNTS_PER_SECOND_PER_RPM,
+        }
+    }
+
+    /// Order, loops, torque of one step.
+    fn drive(&mut self, duration_s: f64) {
+        let actual = self.actual();
+        let demand = self.motion.step(self.order(), self.acceleration(), actual, duration_s);
+        let unit = 1.0 / self.parameters.encoder.counts_per_unit.abs();
+        let velocity = self.joint.velocity() * self.direction();
+        self.servo.set_torque_limit(self.torque_limit());
+        self.torque = match demand.position {
+            Some(position) => {
+                let error = (position - actual.position) * unit;
+                self.servo.position(error, demand.velocity * unit, velocity, 0.0, duration_s)
+            }
+            None => self.servo.velocity(demand.velocity * unit, velocity, 0.0, duration_s),
+        };
+    }
+
+    fn step_homing(&mut self, duration_s: f64) {
+        if !self.homing.is_running() {
+            return;
+        }
+        let is_closed = match self.homing.input() {
+            Some(Input::Dir) => self.parameters.switches.dir(self.joint.position()),
+            Some(Input::Pu) => self.parameters.switches.pu(self.joint.position()),
+            None => false,
+        };
+        let (velocity, is_at_rest) = (self.actual().velocity, self.is_at_rest());
+        if self.homing.step(is_closed, velocity, is_at_rest, duration_s) {
+            self.set_counts(0);
+        }
+        let gives_up_ns = self.parameters.homing.gives_up_ns.unwrap_or(NEVER);
+        if self.homing.elapsed_s() * NANOSECONDS_PER_SECOND as f64 > gives_up_ns as f64 {
+            self.homing.fail();
+        }
+    }
+}

@@ -1,0 +1,262 @@
+//! One YZ-AIM servo as it is built, mounted and set up.
+
+use std::f64::consts::TAU;
+
+use takt_rt::time::Nanoseconds;
+
+use crate::sim::homing_switches::HomingSwitches;
+use crate::sim::plant::{Encoder, EndStops, JointParameters};
+
+/// Counts of one turn of the motor.
+pub const COUNTS_PER_TURN: f64 = 32_768.0;
+/// Counts per second at one r/min.
+pub(super) const COUNTS_PER_SECOND_PER_RPM: f64 = COUNTS_PER_TURN / 60.0;
+
+/// The models of the manual's table (chapter II) that differ to a controller.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Model {
+    /// 42AIM10C: 0.33 N·m, single-turn.
+    Aim42x10C,
+    /// 42AIM15C: 0.48 N·m, single-turn.
+    Aim42x15C,
+    /// 57AIM15C: 0.48 N·m, multi-turn.
+    Aim57x15C,
+    /// 57AIM15CH: 0.24 N·m, 2500 r/min, multi-turn.
+    Aim57x15CH,
+    /// 57AIM30C: 0.96 N·m, multi-turn.
+    Aim57x30C,
+    /// 57AIM30CH: 0.48 N·m, 2500 r/min, multi-turn.
+    Aim57x30CH,
+    /// 60AIM25C: 2 N·m, single-turn.
+    Aim60x25C,
+    /// 60AIM25CH: 1 N·m, 2500 r/min, single-turn.
+    Aim60x25CH,
+}
+
+/// The figures of a model, at the motor.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ratings {
+    /// N·m
+    pub torque: f64,
+    /// A
+    pub current: f64,
+    /// r/min
+    pub maximum_speed_rpm: f64,
+    /// V
+    pub supply_voltage: f64,
+    /// Whether a battery keeps the multi-turn position.
+    pub has_battery: bool,
+}
+
+impl Model {
+    /// Its figures.
+    pub const fn ratings(self) -> Ratings {
+        let (torque, current, maximum_speed_rpm, supply_voltage, has_battery) = match self {
+            Self::Aim42x10C => (0.33, 1.6, 1500.0, 24.0, false),
+            Self::Aim42x15C => (0.48, 2.2, 1500.0, 24.0, false),
+            Self::Aim57x15C => (0.48, 2.2, 1500.0, 24.0, true),
+            Self::Aim57x15CH => (0.24, 2.2, 2500.0, 24.0, true),
+            Self::Aim57x30C => (0.96, 4.4, 1500.0, 24.0, true),
+            Self::Aim57x30CH => (0.48, 4.4, 2500.0, 24.0, true),
+            Self::Aim60x25C => (2.0, 7.0, 1500.0, 36.0, false),
+            Self::Aim60x25CH => (1.0, 7.0, 2500.0, 36.0, false),
+        };
+        Ratings { torque, current, maximum_speed_rpm, supply_voltage, has_battery }
+    }
+}
+
+/// How the motor turns the joint.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gearing {
+    /// Turns of the motor for one of the gear's output.
+    pub ratio: f64,
+    /// Travel of the joint for one turn of the gear's output: 2π rad, or the lead in m.
+    pub travel_per_turn: f64,
+    /// Whether positive counts are negative travel.
+    pub is_reversed: bool,
+    /// The count at the joint's zero, if the drive counts turns.
+    pub zero_counts: f64,
+}
+
+impl Gearing {
+    /// Turns of the motor for one rad (m) of the joint.
+    fn turns_per_unit(&self) -> f64 {
+        self.ratio / self.travel_per_turn
+    }
+}
+
+/// What real units do beside the manual. All of it can be switched off.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Quirks {
+    /// An unknown object gets neither value nor abort.
+    pub is_silent_on_unknown_objects: bool,
+    /// A cold drive takes no notice of 0007h and 000Fh before it has had 0006h.
+    pub needs_shutdown_first: bool,
+    /// A controlword that leads further sooner than this after the last one that did is lost.
+    pub controlword_interval_ns: Nanoseconds,
+    /// The first target after enabling is not followed.
+    pub ignores_first_target: bool,
+    /// Whether the battery alarm 10h, which does not stop the motor, shows in statusword and heartbeat.
+    pub shows_battery_alarm: bool,
+    /// Whether sub-indices 02, 03 and 05 of 14xxh and 18xxh can be written.
+    pub has_settable_pdos: bool,
+    /// Whether TPDO3 carries 0.1 r/min per bit, like 606Ch read by SDO, and not 1 r/min as in the manual's example.
+    pub has_fine_velocity_in_tpdo3: bool,
+    /// Whether a boot-up message is sent at power-up too, and not only after NMT 81h and 82h.
+    pub announces_power_up: bool,
+}
+
+impl Default for Quirks {
+    /// As seen on real units.
+    fn default() -> Self {
+        Self {
+            is_silent_on_unknown_objects: true,
+            needs_shutdown_first: true,
+            controlword_interval_ns: 20_000_000,
+            ignores_first_target: true,
+            shows_battery_alarm: true,
+            has_settable_pdos: true,
+            has_fine_velocity_in_tpdo3: false,
+            announces_power_up: true,
+        }
+    }
+}
+
+impl Quirks {
+    /// As the manual's examples show it.
+    pub fn none() -> Self {
+        Self {
+            is_silent_on_unknown_objects: false,
+            needs_shutdown_first: false,
+            controlword_interval_ns: 0,
+            ignores_first_target: false,
+            ..Self::default()
+        }
+    }
+}
+
+/// How the unit homes, since there are no objects for it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HomingBehaviour {
+    /// Speed towards the switch: r/min. The edge is looked for at a tenth of it.
+    pub speed_rpm: f64,
+    /// After this time without the switch comes the homing error; `None`: never.
+    pub gives_up_ns: Option<Nanoseconds>,
+    /// Whether methods 20 and 22 work as in CiA 402; otherwise they end in the homing error at once.
+    pub has_undescribed_methods: bool,
+}
+
+impl Default for HomingBehaviour {
+    fn default() -> Self {
+        Self { speed_rpm: 300.0, gives_up_ns: Some(30_000_000_000), has_undescribed_methods: false }
+    }
+}
+
+/// One servo as it is built, mounted and set up.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct YzAimParameters {
+    /// Node number, 1 to 127, that is stored in 2615h.
+    pub node: u8,
+    /// Bit rate of the bus it is on: bit/s. The drive begins with the same one.
+    pub bit_rate: u32,
+    /// The mechanics at the joint, the rotor's inertia included. There is no brake.
+    pub joint: JointParameters,
+    /// Where the travel ends at something solid.
+    pub end_stops: Option<EndStops>,
+    /// Switches along the travel.
+    pub switches: HomingSwitches,
+    /// The motor's encoder, seen from the joint: 32768 counts per turn of the motor.
+    pub encoder: Encoder,
+    /// Position at the first power-up: rad (m).
+    pub initial_position: f64,
+    /// Torque at the joint with rated current: N·m (N).
+    pub rated_torque: f64,
+    /// Highest torque at the joint: N·m (N).
+    pub peak_torque: f64,
+    /// A
+    pub rated_current: f64,
+    /// The highest speed of the motor: r/min.
+    pub maximum_speed_rpm: f64,
+    /// V
+    pub supply_voltage: f64,
+    /// Whether a battery keeps the multi-turn position; without one the position after power-up is within one turn.
+    pub has_battery: bool,
+    /// What is stored in 2619h; interpolation wants 7.
+    pub special_function: u16,
+    /// What is stored in 6083h: (r/min)/s; from 60000 on there is no ramp.
+    pub acceleration: u16,
+    /// From power-up or "reset node" until the drive is there.
+    pub power_up_ns: Nanoseconds,
+    /// Whether the drive is operational after power-up, and not pre-operational.
+    pub starts_operational: bool,
+    /// From a frame until the PDO that answers it is ready to be sent.
+    pub feedback_delay_ns: Nanoseconds,
+    /// Homing.
+    pub homing: HomingBehaviour,
+    /// Quirks.
+    pub quirks: Quirks,
+    /// Seed of what differs from unit to unit and from time to time: SDO latencies, the digit after a zeroing.
+    pub seed: u64,
+}
+
+impl YzAimParameters {
+    /// A new unit of a model on a bus at 1 Mbit/s, that turns a joint through a gear. The peak torque is three times the
+    /// rated one.
+    pub fn new(node: u8, model: Model, gearing: Gearing, joint: JointParameters) -> Self {
+        let ratings = model.ratings();
+        let direction = if gearing.is_reversed { -1.0 } else { 1.0 };
+        let torque = ratings.torque * gearing.turns_per_unit() * TAU;
+        Self {
+            node,
+            bit_rate: 1_000_000,
+            joint,
+            end_stops: None,
+            switches: HomingSwitches::default(),
+            encoder: Encoder {
+                counts_per_unit: direction * COUNTS_PER_TURN * gearing.turns_per_unit(),
+                zero_counts: gearing.zero_counts,
+            },
+            initial_position: 0.0,
+            rated_torque: torque,
+            peak_torque: 3.0 * torque,
+            rated_current: ratings.current,
+            maximum_speed_rpm: ratings.maximum_speed_rpm,
+            supply_voltage: ratings.supply_voltage,
+            has_battery: ratings.has_battery,
+            special_function: 0,
+            acceleration: 20_000,
+            power_up_ns: 100_000_000,
+            starts_operational: false,
+            feedback_delay_ns: 50_000,
+            homing: HomingBehaviour::default(),
+            quirks: Quirks::default(),
+            seed: 0,
+        }
+    }
+
+    /// The highest speed: counts/s.
+    pub(super) fn highest_speed(&self) -> f64 {
+        self.maximum_speed_rpm * COUNTS_PER_SECOND_PER_RPM
+    }
+
+    /// Torque at the joint for one ampere.
+    pub(super) fn torque_per_ampere(&self) -> f64 {
+        self.rated_torque / self.rated_current
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_gear_turns_counts_and_torque_into_those_of_the_joint() {
+        let joint =
+            JointParameters { inertia: 1.0, viscous_friction: 0.0, coulomb_friction: 0.0, brake_torque: 0.0 };
+        let screw = Gearing { ratio: 2.0, travel_per_turn: 0.005, is_reversed: true, zero_counts: 7.0 };
+        let parameters = YzAimParameters::new(3, Model::Aim57x30C, screw, joint);
+        assert_eq!(parameters.encoder.counts(0.005), -65_536 + 7);
+        // 0.96 N·m do the work of 2π rad on 2.5 mm.
+        assert!((parameters.rated_torque * 0.0025 - 0.96 * TAU).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,184 @@
+//! The four RPDOs and four TPDOs, whose mapping is fixed, and when they act (manual 5.08).
+
+use takt_rt::frame::{Frame, Id};
+use takt_rt::time::Nanoseconds;
+
+use super::dictionary::Dictionary;
+use super::objects::at;
+
+/// PDOs in each direction.
+pub const PDOS: usize = 4;
+/// RPDO4, whose data wait for SYNC, and TPDO4, its answer.
+pub const PDO4: usize = 3;
+/// What each RPDO carries.
+pub const RPDO_MAPPING: [&[usize]; PDOS] = [
+    &[at::CONTROLWORD, at::OPERATION_MODE, at::TARGET_POSITION],
+    &[at::TARGET_POSITION, at::PROFILE_VELOCITY],
+    &[at::CONTROLWORD, at::OPERATION_MODE, at::TARGET_VELOCITY],
+    &[at::TARGET_POSITION],
+];
+const RPDO: [usize; PDOS] = [at::RPDO1, at::RPDO2, at::RPDO3, at::RPDO4];
+const TPDO: [usize; PDOS] = [at::TPDO1, at::TPDO2, at::TPDO3, at::TPDO4];
+const RPDO_ID: [u16; PDOS] = [0x200, 0x300, 0x400, 0x500];
+const TPDO_ID: [u16; PDOS] = [0x180, 0x280, 0x380, 0x480];
+/// TPDO3 carries the velocity in place of the statusword.
+const TPDO3: usize = 2;
+const INHIBIT_UNIT_NS: Nanoseconds = 100_000;
+const EVENT_UNIT_NS: Nanoseconds = 1_000_000;
+/// Transmission types up to this one act at SYNC.
+const LAST_SYNCHRONOUS: i64 = 240;
+const NEVER: Nanoseconds = Nanoseconds::MAX;
+
+/// What TPDOs say.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Feedback {
+    /// 6064h
+    pub position: i32,
+    /// 6041h
+    pub statusword: u16,
+    /// 606Ch in the scale of TPDO3.
+    pub velocity: i32,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Outbound {
+    /// What is to be sent.
+    sampled: Feedback,
+    /// When it is to be sent.
+    due_ns: Nanoseconds,
+    /// When the inhibit time is over.
+    free_ns: Nanoseconds,
+    /// When the event timer ends.
+    event_ns: Nanoseconds,
+    syncs: i64,
+}
+
+const AT_REST: Outbound = Outbound {
+    sampled: Feedback { position: 0, statusword: 0, velocity: 0 },
+    due_ns: NEVER,
+    free_ns: 0,
+    event_ns: NEVER,
+    syncs: 0,
+};
+
+/// All PDOs of the drive.
+#[derive(Clone, Copy, Debug)]
+pub struct ProcessData {
+    held: [Option<[u8; 8]>; PDOS],
+    outbound: [Outbound; PDOS],
+}
+
+impl ProcessData {
+    /// Nothing held, nothing to send.
+    pub const fn at_rest() -> Self {
+        Self { held: [None; PDOS], outbound: [AT_REST; PDOS] }
+    }
+
+    /// Operational begins: the event timers run.
+    pub fn start(&mut self, now_ns: Nanoseconds, dictionary: &Dictionary) {
+        *self = Self::at_rest();
+        self.schedule_events(now_ns, dictionary);
+    }
+
+    /// Starts the event timers anew, as after a change of theirs.
+    pub fn schedule_events(&mut self, now_ns: Nanoseconds, dictionary: &Dictionary) {
+        for (outbound, parameters) in self.outbound.iter_mut().zip(TPDO) {
+            outbound.event_ns = event_ns(now_ns, parameters, dictionary);
+        }
+    }
+
+    /// Which RPDO an identifier belongs to.
+    pub fn number(id: Id, node: u8) -> Option<usize> {
+        RPDO_ID.iter().position(|function| Id::canopen(*function, node) == id)
+    }
+
+    /// Whether the data of an RPDO wait for SYNC.
+    pub fn waits_for_sync(number: usize, dictionary: &Dictionary) -> bool {
+        dictionary.get(RPDO[number] + 2) <= LAST_SYNCHRONOUS
+    }
+
+    /// Holds the data of an RPDO until SYNC, in place of older ones.
+    pub fn hold(&mut self, number: usize, data: [u8; 8]) {
+        self.held[number] = Some(data);
+    }
+
+    /// Gives out what an RPDO has held.
+    pub fn release(&mut self, number: usize) -> Option<[u8; 8]> {
+        self.held[number].take()
+    }
+
+    /// Has a TPDO sent `latency_ns` from now, or when its inhibit time is over.
+    pub fn answer(
+        &mut self,
+        number: usize,
+        now_ns: Nanoseconds,
+        latency_ns: Nanoseconds,
+        feedback: Feedback,
+    ) {
+        let outbound = &mut self.outbound[number];
+        outbound.sampled = feedback;
+        outbound.due_ns = outbound.due_ns.min((now_ns + latency_ns).max(outbound.free_ns));
+    }
+
+    /// SYNC has come: the TPDOs with a synchronous type are due with what is measured now.
+    pub fn sync(
+        &mut self,
+        now_ns: Nanoseconds,
+        latency_ns: Nanoseconds,
+        feedback: Feedback,
+        dictionary: &Dictionary,
+    ) {
+        for (number, parameters) in TPDO.into_iter().enumerate() {
+            let every = dictionary.get(parameters + 2);
+            let outbound = &mut self.outbound[number];
+            outbound.syncs += 1;
+            if every <= LAST_SYNCHRONOUS && outbound.syncs >= every {
+                outbound.syncs = 0;
+                self.answer(number, now_ns, latency_ns, feedback);
+            }
+        }
+    }
+
+    /// Has every TPDO sent whose event timer has ended.
+    pub fn run_events(&mut self, now_ns: Nanoseconds, feedback: Feedback, dictionary: &Dictionary) {
+        for (number, parameters) in TPDO.into_iter().enumerate() {
+            if self.outbound[number].event_ns <= now_ns {
+                self.outbound[number].event_ns = event_ns(now_ns, parameters, dictionary);
+                self.answer(number, now_ns, 0, feedback);
+            }
+        }
+    }
+
+    /// When something is due.
+    pub fn due_ns(&self) -> Nanoseconds {
+        let due = self.outbound.iter().map(|outbound| outbound.due_ns.min(outbound.event_ns));
+        due.min().unwrap_or(NEVER)
+    }
+
+    /// A TPDO that is to be sent now.
+    pub fn next(&mut self, now_ns: Nanoseconds, node: u8, dictionary: &Dictionary) -> Option<Frame> {
+        let number = self.outbound.iter().position(|outbound| outbound.due_ns <= now_ns)?;
+        let outbound = &mut self.outbound[number];
+        let inhibit = dictionary.get(TPDO[number] + 3) as Nanoseconds;
+        outbound.due_ns = NEVER;
+        outbound.free_ns = now_ns + inhibit * INHIBIT_UNIT_NS;
+        Some(pack(Id::canopen(TPDO_ID[number], node), number, outbound.sampled))
+    }
+}
+
+fn event_ns(now_ns: Nanoseconds, parameters: usize, dictionary: &Dictionary) -> Nanoseconds {
+    match dictionary.get(parameters + 5) as Nanoseconds {
+        0 => NEVER,
+        period_ms => now_ns + period_ms * EVENT_UNIT_NS,
+    }
+}
+
+fn pack(id: Id, number: usize, feedback: Feedback) -> Frame {
+    let [a, b, c, d] = feedback.position.to_le_bytes();
+    if number == TPDO3 {
+        let [e, f, g, h] = feedback.velocity.to_le_bytes();
+        return Frame::of(id, [a, b, c, d, e, f, g, h]);
+    }
+    let [low, high] = feedback.statusword.to_le_bytes();
+    Frame::of(id, [a, b, c, d, low, high])
+}
