@@ -66,14 +66,16 @@ impl Subject {
         self.limits.map(|limits| self.acceleration_raw(Amount::Joint(limits.deceleration)))
     }
 
-    /// Checks that the axis can still be stopped within its limits when it is decelerated as far as those permit.
+    /// Checks that the axis can still be stopped within its limits, by a deceleration in drive units, or by that of the
+    /// limits.
     ///
     /// # Errors
     /// [`Failure::AtLimit`]
-    pub fn check_room(&self, reading: &Reading) -> Result<(), Failure> {
+    pub fn check_room(&self, reading: &Reading, deceleration: Option<i64>) -> Result<(), Failure> {
         let Some(limits) = self.limits else { return Ok(()) };
+        let deceleration = deceleration.map_or(limits.deceleration, |raw| self.acceleration(raw as f64));
         let speed = reading.velocity.abs();
-        let way = speed * speed / (2.0 * limits.deceleration) + speed * REACTION_S;
+        let way = speed * speed / (2.0 * deceleration) + speed * REACTION_S;
         let rest = reading.position + way.copysign(reading.velocity);
         let is_leaving = (rest > limits.position_max && reading.velocity > 0.0)
             || (rest < limits.position_min && reading.velocity < 0.0);
@@ -91,7 +93,8 @@ impl Subject {
     /// [`Failure::AtLimit`]
     pub fn check_way(&self, counts: i64, velocity: i64) -> Result<(), Failure> {
         let hardly = self.velocity(velocity as f64).signum() * f64::MIN_POSITIVE;
-        self.check_room(&Reading { position: self.position(counts), velocity: hardly, ..Reading::default() })
+        let reading = Reading { position: self.position(counts), velocity: hardly, ..Reading::default() };
+        self.check_room(&reading, None)
     }
 
     /// How long a move may take at most: half as long again as its profile, and then some for the drive.

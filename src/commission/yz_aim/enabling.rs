@@ -117,15 +117,26 @@ pub async fn enable(c: &Conversation, s: &Subject) -> Result<i64, Failure> {
     if moved.abs() > permitted { Err(Failure::Jumped { counts: moved }) } else { Ok(position) }
 }
 
-/// From any motion to rest without torque: the velocity ramps down, other modes halt.
+/// From any motion to rest without torque: the velocity ramps down, other modes halt. A drive that has never been enabled
+/// homes all the same and may take no notice of a halt: position mode ends its homing.
 pub async fn come_to_rest(c: &Conversation, s: &Subject) -> Result<(), Failure> {
     c.step("stop in control");
     c.write(&TARGET_VELOCITY, 0).await?;
-    if c.read(&MODES_OF_OPERATION).await? != mode::VELOCITY {
+    let is_ramping = c.read(&MODES_OF_OPERATION).await? == mode::VELOCITY;
+    if !is_ramping {
         c.write(&CONTROLWORD, control::HALT).await?;
     }
-    standstill(c, s).await?;
-    torque_off(c).await
+    let mut rested = standstill(c, s).await;
+    if !is_ramping && matches!(rested, Err(Failure::NotInTime { .. })) {
+        c.step("stop by position mode");
+        c.write(&MODES_OF_OPERATION, mode::POSITION).await?;
+        rested = standstill(c, s).await;
+    }
+    if matches!(rested, Err(Failure::Interrupted)) {
+        return rested;
+    }
+    torque_off(c).await?;
+    rested
 }
 
 /// Waits for the end of a ramp: v/a, and 200 ms.

@@ -87,7 +87,8 @@ async fn wait(c: &Conversation, s: &Subject, began: i64, within_ns: Nanoseconds)
             return Err(Failure::Homing("the drive reports a homing error (statusword bit 13)"));
         }
         if word & words::HOMING_COMPLETE != 0 {
-            return Ok(reading.position_counts);
+            // The position of this reading may be older than the zero.
+            return c.read(&POSITION_ACTUAL_VALUE).await;
         }
         let waited_ns = c.now_ns().saturating_sub(began_ns);
         if waited_ns >= within_ns {

@@ -228,13 +228,14 @@ async fn run_at(
     enabling::prepare(c, s, mode::VELOCITY, &profile).await?;
     let began = enabling::enable(c, s).await?;
     s.check_way(began, raw)?;
+    let acceleration = c.read(&ACCELERATION).await?.max(1);
     c.step("run");
     c.write(&TARGET_VELOCITY, raw).await?;
     c.write(&CONTROLWORD, control::ENABLE).await?;
     let mut fastest = 0.0_f64;
     tend(c, s, duration_ns, |reading| {
         fastest = if reading.velocity.abs() > fastest.abs() { reading.velocity } else { fastest };
-        s.check_room(reading)
+        s.check_room(reading, Some(acceleration))
     })
     .await?;
     c.step("ramp to standstill");
@@ -250,13 +251,12 @@ async fn run_at(
     Ok(report)
 }
 
-/// The drive has one acceleration for both directions: the lower one that was asked for.
+/// The drive has one acceleration for both directions: the lower one of those that were asked for.
 fn profile(s: &Subject, pace: &Pace) -> Result<Profile, Failure> {
-    let profile = s.profile(pace)?;
-    let slower = match (profile.acceleration, profile.deceleration) {
-        (Some(acceleration), Some(deceleration)) => Some(acceleration.min(deceleration)),
-        (acceleration, deceleration) => acceleration.or(deceleration),
-    };
+    let acceleration = pace.acceleration.or(pace.deceleration);
+    let deceleration = pace.deceleration.or(pace.acceleration);
+    let profile = s.profile(&Pace { velocity: pace.velocity, acceleration, deceleration })?;
+    let slower = profile.acceleration.min(profile.deceleration);
     Ok(Profile { acceleration: slower, deceleration: None, ..profile })
 }
 

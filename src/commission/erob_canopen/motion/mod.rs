@@ -111,7 +111,7 @@ async fn run_at(
     let mut fastest = 0.0_f64;
     tend(c, s, rated, duration_ns, LOOK_NS, |reading| {
         fastest = if reading.velocity.abs() > fastest.abs() { reading.velocity } else { fastest };
-        s.check_room(reading)
+        s.check_room(reading, None)
     })
     .await?;
     c.step("ramp to standstill");

@@ -53,7 +53,7 @@ pub async fn run(
         let mut fastest = 0.0_f64;
         tend(c, s, Some(rated), duration_ns, LOOK_NS, |reading| {
             fastest = if reading.velocity.abs() > fastest.abs() { reading.velocity } else { fastest };
-            s.check_room(reading)?;
+            s.check_room(reading, None)?;
             if reading.velocity.abs() <= limit {
                 return Ok(());
             }

@@ -1,172 +1,31 @@
-//! Commissioning procedures against the simulated eRob, in virtual time.
+//! Against the simulated eRob.
 
 use std::path::Path;
 
-use takt::commission::bus_session::{self, Seen};
 use takt::commission::dictionary::{self, Choice};
-use takt::commission::{
-    Amount, Course, Event, Failed, Failure, Pace, ReadObject, Report, Request, Subject, procedure,
-};
+use takt::commission::{Amount, Course, Failure, Family, Pace, Request, Subject};
 use takt::config::Config;
-use takt::controller::VirtualClock;
-use takt::sim::{DriveFault, Observation, SimulatedBus};
+use takt::sim::{DriveFault, SimulatedBus};
 use takt_rt::cia402::State;
 use takt_rt::frame::{Frame, Id};
-use takt_rt::port::{BusPort, Clock, ReceiveBatch};
+use takt_rt::port::{BusPort, Clock};
 
-const MS: u64 = 1_000_000;
-const SECOND: u64 = 1_000 * MS;
-const NODE: u8 = 1;
+use super::bench::*;
 
-/// A joint on a bench, and everything that was seen.
-struct Bench {
-    config: Config,
-    bus: SimulatedBus,
-    clock: VirtualClock,
-    sent: Vec<Frame>,
-    steps: Vec<&'static str>,
-    notes: Vec<String>,
-    /// The highest speed of the joint that a reading has shown: rad/s.
-    fastest: f64,
+fn bench() -> Bench {
+    changed(|_| {})
 }
 
-impl Bench {
-    fn new() -> Self {
-        Self::changed(|_| {})
-    }
-
-    fn changed(change: impl FnOnce(&mut Config)) -> Self {
-        let mut config = Config::load(Path::new("configs/single-erob.toml")).unwrap();
-        config.simulation.longest_gap_ns = u64::MAX;
-        change(&mut config);
-        let bus = SimulatedBus::new(&config, 0);
-        let clock = VirtualClock::default();
-        Self { config, bus, clock, sent: vec![], steps: vec![], notes: vec![], fastest: 0.0 }
-    }
-
-    fn subject(&self) -> Subject {
-        Subject::of(&self.config.axes[0]).unwrap()
-    }
-
-    fn run(&mut self, request: Request) -> Result<Report, Failed> {
-        self.run_interrupted(request, |_| 0)
-    }
-
-    /// `interruptions` tells how many requests to end there have been at a time since the beginning.
-    fn run_interrupted(
-        &mut self,
-        request: Request,
-        interruptions: impl Fn(&str) -> usize,
-    ) -> Result<Report, Failed> {
-        let subject = self.subject();
-        self.run_as(subject, request, interruptions)
-    }
-
-    fn run_as(
-        &mut self,
-        subject: Subject,
-        request: Request,
-        interruptions: impl Fn(&str) -> usize,
-    ) -> Result<Report, Failed> {
-        let Self { bus, clock, sent, steps, notes, fastest, .. } = self;
-        sent.clear();
-        steps.clear();
-        let step = std::cell::Cell::new("");
-        let mut asked = 0;
-        let is_interrupted = || {
-            let is_more = interruptions(step.get()) > asked;
-            asked += usize::from(is_more);
-            is_more
-        };
-        bus_session::run(procedure(subject, request), bus, clock, is_interrupted, |_, seen| match seen {
-            Seen::Event(Event::Step(name)) => {
-                step.set(name);
-                steps.push(name);
-            }
-            Seen::Event(Event::Note(text)) => notes.push(text),
-            Seen::Event(Event::Reading(reading)) => *fastest = fastest.max(reading.velocity.abs()),
-            Seen::Sent(frame) => sent.push(frame),
-            Seen::Received(_) => {}
-        })
-    }
-
-    /// Runs a procedure for a time at most; `touch` may do something to the bus meanwhile.
-    fn run_for(
-        &mut self,
-        request: Request,
-        until_ns: u64,
-        mut touch: impl FnMut(&mut SimulatedBus, u64),
-    ) -> Option<Result<Report, Failed>> {
-        let mut procedure = procedure(self.subject(), request);
-        for now_ns in (0..until_ns).step_by((MS / 2) as usize) {
-            touch(&mut self.bus, now_ns);
-            let mut batch = ReceiveBatch::new();
-            self.bus.receive(now_ns, &mut batch);
-            batch.iter().for_each(|received| procedure.receive(&received.frame));
-            let mut frames = vec![];
-            procedure.poll(now_ns, &mut |frame| frames.push(frame));
-            self.bus.send(now_ns, &frames);
-            if let Some(outcome) = procedure.outcome() {
-                return Some(outcome.clone());
-            }
-        }
-        None
-    }
-
-    fn observe(&mut self) -> Observation {
-        self.bus.observe(NODE).unwrap()
-    }
-
-    /// Position of this controlword among the frames that were sent.
-    fn sent_at(&self, frame: Frame) -> usize {
-        let found = self.sent.iter().position(|sent| *sent == frame);
-        found.unwrap_or_else(|| panic!("{frame:?} was not sent: {:?}", self.sent))
-    }
-}
-
-fn degrees(degrees: f64) -> Amount {
-    Amount::Joint(degrees.to_radians())
-}
-
-fn move_to(course: Course) -> Request {
-    Request::Move { course, pace: brisk(), keeps_enabled: false }
-}
-
-fn absolute(position: f64) -> Course {
-    Course::Absolute { to: degrees(position), is_immediate: false }
-}
-
-fn brisk() -> Pace {
-    Pace {
-        velocity: Some(degrees(60.0)),
-        acceleration: Some(degrees(200.0)),
-        deceleration: Some(degrees(200.0)),
-    }
-}
-
-fn write_u16(index: u16, value: u16) -> Frame {
-    let ([low, high], [a, b]) = (index.to_le_bytes(), value.to_le_bytes());
-    Frame::of(Id::canopen(0x600, NODE), [0x2B, low, high, 0, a, b, 0, 0])
-}
-
-fn number(report: &Report, key: &str) -> f64 {
-    report.get(key).and_then(serde_json::Value::as_f64).unwrap_or_else(|| panic!("{key} of {report:?}"))
-}
-
-fn read(bench: &mut Bench, name: &str) -> i64 {
-    let Ok(Choice::Known(entry)) = dictionary::find(bench.subject().family, name) else { panic!("{name}") };
-    let object = ReadObject { address: entry.object.address, entry: Some(entry), data_type: None };
-    let report = bench.run(Request::Read { objects: vec![object] }).unwrap();
-    report_value(&report)["raw"].as_i64().unwrap()
-}
-
-fn report_value(report: &Report) -> serde_json::Value {
-    serde_json::to_value(report).unwrap()["objects"][0].clone()
+fn changed(change: impl FnOnce(&mut Config)) -> Bench {
+    let mut config = Config::load(Path::new("configs/single-erob.toml")).unwrap();
+    config.simulation.longest_gap_ns = u64::MAX;
+    change(&mut config);
+    Bench::of(Subject::of(&config.axes[0]).unwrap(), SimulatedBus::new(&config, 0))
 }
 
 #[test]
 fn info_tells_who_the_drive_is_and_how_it_fares() {
-    let mut bench = Bench::new();
+    let mut bench = bench();
     let report = bench.run(Request::Info).unwrap();
     assert_eq!(report.get("vendor_id"), Some(&0x5A65_726F_u32.into()));
     assert_eq!(report.get("state"), Some(&"switch on disabled".into()));
@@ -181,7 +40,7 @@ fn info_tells_who_the_drive_is_and_how_it_fares() {
 
 #[test]
 fn an_absolute_move_makes_the_handshake_and_ends_at_the_target_without_torque() {
-    let mut bench = Bench::new();
+    let mut bench = bench();
     let report = bench.run(move_to(absolute(30.0))).unwrap();
     let seen = bench.observe();
     assert!((seen.position - 30_f64.to_radians()).abs() < 1e-4, "{seen:?}");
@@ -198,7 +57,7 @@ fn an_absolute_move_makes_the_handshake_and_ends_at_the_target_without_torque() 
 
 #[test]
 fn without_a_pace_a_move_takes_a_tenth_of_the_limits() {
-    let mut bench = Bench::new();
+    let mut bench = bench();
     let request = Request::Move { course: absolute(10.0), pace: Pace::default(), keeps_enabled: false };
     bench.run(request).unwrap();
     assert!((8.9..9.2).contains(&bench.fastest.to_degrees()), "{}", bench.fastest.to_degrees());
@@ -206,7 +65,7 @@ fn without_a_pace_a_move_takes_a_tenth_of_the_limits() {
 
 #[test]
 fn relative_and_reciprocating_moves_count_from_where_the_axis_is() {
-    let mut bench = Bench::new();
+    let mut bench = bench();
     bench.run(move_to(absolute(20.0))).unwrap();
     bench.run(move_to(Course::Relative(degrees(-5.0)))).unwrap();
     assert!((bench.observe().position.to_degrees() - 15.0).abs() < 0.01);
@@ -220,7 +79,7 @@ fn relative_and_reciprocating_moves_count_from_where_the_axis_is() {
 
 #[test]
 fn a_reversed_geared_and_shifted_axis_moves_in_the_joints_own_units() {
-    let mut bench = Bench::changed(|config| {
+    let mut bench = changed(|config| {
         let axis = &mut config.axes[0];
         (axis.reversed, axis.gear_ratio, axis.zero_counts) = (true, 2.0, 1000);
     });
@@ -235,7 +94,7 @@ fn a_reversed_geared_and_shifted_axis_moves_in_the_joints_own_units() {
 
 #[test]
 fn what_is_outside_the_limits_is_refused_and_nothing_moves() {
-    let mut bench = Bench::new();
+    let mut bench = bench();
     bench.run(move_to(absolute(100.0))).unwrap();
     let before = bench.observe().position;
     let too_fast = Pace { velocity: Some(degrees(91.0)), ..brisk() };
@@ -263,7 +122,7 @@ fn what_is_outside_the_limits_is_refused_and_nothing_moves() {
 
 #[test]
 fn a_velocity_lasts_its_time_and_ends_in_a_ramp_to_rest() {
-    let mut bench = Bench::new();
+    let mut bench = bench();
     let request = Request::Velocity {
         velocity: degrees(-40.0),
         pace: brisk(),
@@ -280,7 +139,7 @@ fn a_velocity_lasts_its_time_and_ends_in_a_ramp_to_rest() {
 
 #[test]
 fn an_axis_that_runs_towards_a_limit_stops_before_it() {
-    let mut bench = Bench::new();
+    let mut bench = bench();
     let pace = Pace { velocity: Some(degrees(80.0)), ..brisk() };
     let course = Course::Continuous { is_forward: false, duration_ns: None };
     let failed = bench.run(Request::Move { course, pace, keeps_enabled: true }).unwrap_err();
@@ -293,7 +152,7 @@ fn an_axis_that_runs_towards_a_limit_stops_before_it() {
 
 #[test]
 fn a_torque_is_per_mille_of_the_rated_one_and_ends_at_rest() {
-    let mut bench = Bench::new();
+    let mut bench = bench();
     let request =
         Request::Torque { torque: Amount::Joint(0.93), velocity_limit: None, duration_ns: Some(SECOND / 2) };
     let report = bench.run(request).unwrap();
@@ -306,7 +165,7 @@ fn a_torque_is_per_mille_of_the_rated_one_and_ends_at_rest() {
 
 #[test]
 fn a_torque_that_makes_the_axis_too_fast_is_ended() {
-    let mut bench = Bench::new();
+    let mut bench = bench();
     let limit = degrees(10.0);
     let request =
         Request::Torque { torque: Amount::Joint(10.0), velocity_limit: Some(limit), duration_ns: None };
@@ -318,7 +177,7 @@ fn a_torque_that_makes_the_axis_too_fast_is_ended() {
 
 #[test]
 fn ctrl_c_stops_a_motion_in_control_and_disables() {
-    let mut bench = Bench::new();
+    let mut bench = bench();
     let course = Course::Continuous { is_forward: true, duration_ns: None };
     for keeps_enabled in [false, true] {
         let request = Request::Move { course, pace: brisk(), keeps_enabled };
@@ -334,7 +193,7 @@ fn ctrl_c_stops_a_motion_in_control_and_disables() {
 
 #[test]
 fn a_second_ctrl_c_takes_the_torque_away_at_once() {
-    let mut bench = Bench::changed(|config| config.axes[0].limits.deceleration = 0.2);
+    let mut bench = changed(|config| config.axes[0].limits.deceleration = 0.2);
     let pace = Pace { deceleration: None, ..brisk() };
     let request =
         Request::Velocity { velocity: degrees(30.0), pace, duration_ns: Some(SECOND), keeps_enabled: false };
@@ -351,7 +210,7 @@ fn a_second_ctrl_c_takes_the_torque_away_at_once() {
 
 #[test]
 fn torque_stays_on_only_when_that_is_asked_for() {
-    let mut bench = Bench::new();
+    let mut bench = bench();
     bench.run(Request::Enable { hold_ns: Some(SECOND / 5), keeps_enabled: false }).unwrap();
     assert!(!bench.observe().state.has_torque());
     bench.run(Request::Enable { hold_ns: None, keeps_enabled: true }).unwrap();
@@ -372,7 +231,7 @@ fn torque_stays_on_only_when_that_is_asked_for() {
 
 #[test]
 fn a_drive_whose_master_dies_in_a_motion_stops_by_itself() {
-    let mut bench = Bench::new();
+    let mut bench = bench();
     let velocity = degrees(20.0);
     let request = Request::Velocity { velocity, pace: brisk(), duration_ns: None, keeps_enabled: false };
     // The program runs for two seconds and is then gone.
@@ -385,7 +244,7 @@ fn a_drive_whose_master_dies_in_a_motion_stops_by_itself() {
 
 #[test]
 fn a_drive_in_a_fault_is_not_moved_and_the_fault_is_named() {
-    let mut bench = Bench::new();
+    let mut bench = bench();
     bench.run(Request::Info).unwrap();
     bench.bus.inject(NODE, DriveFault::OverVoltage).unwrap();
     let failed = bench.run(move_to(absolute(10.0))).unwrap_err();
@@ -399,7 +258,7 @@ fn a_drive_in_a_fault_is_not_moved_and_the_fault_is_named() {
 
 #[test]
 fn a_fault_in_the_middle_of_a_motion_ends_it_and_is_named() {
-    let mut bench = Bench::new();
+    let mut bench = bench();
     let breaks = |bus: &mut SimulatedBus, now_ns: u64| {
         if now_ns == SECOND {
             bus.inject(NODE, DriveFault::OverTemperature).unwrap();
@@ -415,7 +274,7 @@ fn a_fault_in_the_middle_of_a_motion_ends_it_and_is_named() {
 
 #[test]
 fn the_battery_fault_is_cleared_with_consent_only() {
-    let mut bench = Bench::new();
+    let mut bench = bench();
     bench.run(move_to(Course::Relative(degrees(-40.0)))).unwrap();
     bench.bus.inject(NODE, DriveFault::MultiTurnBattery).unwrap();
     let failed = bench.run(Request::ClearFault { is_agreed: false }).unwrap_err();
@@ -429,7 +288,7 @@ fn the_battery_fault_is_cleared_with_consent_only() {
 
 #[test]
 fn zero_clears_the_turns_with_consent_and_never_under_torque() {
-    let mut bench = Bench::new();
+    let mut bench = bench();
     assert!(bench.run(Request::Zero { is_agreed: false }).unwrap_err().failure.is_refusal());
     bench.run(move_to(absolute(-90.0))).unwrap();
     bench.run(Request::Enable { hold_ns: None, keeps_enabled: true }).unwrap();
@@ -444,11 +303,9 @@ fn zero_clears_the_turns_with_consent_and_never_under_torque() {
 
 #[test]
 fn what_was_saved_is_there_after_a_power_cycle_and_nothing_else() {
-    let mut bench = Bench::new();
+    let mut bench = bench();
     let write = |name: &str, value| {
-        let Ok(Choice::Known(entry)) = dictionary::find(takt::commission::Family::ErobCanopen, name) else {
-            panic!("{name}")
-        };
+        let Ok(Choice::Known(entry)) = dictionary::find(Family::ErobCanopen, name) else { panic!("{name}") };
         Request::Write { object: entry.object, value, entry: Some(entry) }
     };
     bench.run(write("profile velocity", 12_345)).unwrap();
@@ -461,8 +318,8 @@ fn what_was_saved_is_there_after_a_power_cycle_and_nothing_else() {
 
 #[test]
 fn a_node_that_is_not_there_is_named_and_a_stopped_one_is_woken() {
-    let mut bench = Bench::new();
-    let absent = Subject { node: 9, ..bench.subject() };
+    let mut bench = bench();
+    let absent = Subject { node: 9, ..bench.subject.clone() };
     let failed = bench.run_as(absent, Request::Info, |_| 0).unwrap_err();
     assert!(matches!(failed.failure, Failure::Silent { node: 9, other_protocol: None, .. }), "{failed:?}");
     bench.sent_at(Frame::of(Id::base(0x649).unwrap(), [0x00, 0x02]));
@@ -475,8 +332,8 @@ fn a_node_that_is_not_there_is_named_and_a_stopped_one_is_woken() {
 
 #[test]
 fn a_drive_of_another_family_is_looked_at_but_not_moved() {
-    let mut bench = Bench::new();
-    let other = Subject { family: takt::commission::Family::YzAim, ..bench.subject() };
+    let mut bench = bench();
+    let other = Subject { family: Family::YzAim, ..bench.subject.clone() };
     let request = Request::Move { course: absolute(1.0), pace: brisk(), keeps_enabled: false };
     let failed = bench.run_as(other, request, |_| 0).unwrap_err();
     assert!(matches!(failed.failure, Failure::OtherDrive { expected: 0x331, .. }), "{failed:?}");
@@ -485,7 +342,7 @@ fn a_drive_of_another_family_is_looked_at_but_not_moved() {
 
 #[test]
 fn homing_is_refused_by_the_name_of_what_the_drive_has() {
-    let mut bench = Bench::new();
+    let mut bench = bench();
     let home = |method| Request::Home { method, within_ns: SECOND, is_forced: false };
     let words = bench.run(home(None)).unwrap_err().failure.to_string();
     assert!(words.contains("does not declare homing: 6502 names profile position"), "{words}");
@@ -495,7 +352,7 @@ fn homing_is_refused_by_the_name_of_what_the_drive_has() {
 
 #[test]
 fn what_only_the_other_family_can_do_is_refused_with_a_way() {
-    let mut bench = Bench::new();
+    let mut bench = bench();
     for (request, way) in [
         (Request::SetId { node: 5 }, "object 0043"),
         (Request::SetBitRate { bit_rate: 500_000 }, "1 Mbit/s"),
@@ -512,7 +369,7 @@ fn what_only_the_other_family_can_do_is_refused_with_a_way() {
 #[test]
 fn the_same_procedure_twice_sends_the_same_frames() {
     let once = || {
-        let mut bench = Bench::new();
+        let mut bench = bench();
         bench.run(move_to(absolute(30.0))).unwrap();
         bench.sent
     };
