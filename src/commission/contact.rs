@@ -32,6 +32,7 @@ pub async fn reach(c: &Conversation, subject: &Subject) -> Result<(), Failure> {
                 c.pause(NMT_PAUSE_NS).await?;
             }
             Err(SdoError::NoReply { .. }) => {
+                c.go_on_with("contact");
                 let other_protocol = other_protocol(c, subject).await?;
                 let reported = c.nmt_state();
                 return Err(Failure::Silent { node: subject.node, reported, other_protocol });
@@ -59,7 +60,6 @@ async fn other_protocol(c: &Conversation, subject: &Subject) -> Result<Option<&'
     if subject.family != Family::ErobCanopen || !(1..=63).contains(&node) {
         return Ok(None);
     }
-    c.step("question in the vendor's own protocol");
     let id = |base: u32| Id::base(base + u32::from(node));
     let (Ok(question), Ok(answer)) = (id(0x640), id(0x5C0)) else { return Ok(None) };
     c.send(Frame::of(question, [0x00, 0x02]));

@@ -143,6 +143,11 @@ impl Conversation {
         line.events.push_back(Event::Step(name));
     }
 
+    /// What follows belongs to an earlier step again.
+    pub fn go_on_with(&self, name: &'static str) {
+        self.line_mut().step = name;
+    }
+
     /// The present step is the one that failed, whatever is done afterwards.
     pub fn keep_failing_step(&self) {
         let mut line = self.line_mut();

@@ -77,10 +77,10 @@ impl Family {
         }
     }
 
-    /// What a PDO of the drive holds, where its mapping cannot be changed.
+    /// What a PDO of the drive holds, where that is known.
     pub fn process_data_words(self, subject: &Subject, frame: &Frame) -> Option<String> {
         match self {
-            Self::ErobCanopen => None,
+            Self::ErobCanopen => erob_canopen::process_data_words(subject, frame),
             Self::YzAim => yz_aim::process_data_words(subject, frame),
         }
     }

@@ -1,8 +1,11 @@
 //! Whatever happens to a motion, its axis is brought to rest and disabled.
 
+use serde_json::Value;
+
 use super::conversation::Conversation;
 use super::failure::Failure;
 use super::report::Report;
+use super::subject::Subject;
 
 /// Does `work`; then, unless that succeeded and torque is to stay on, does `rest`. A second request to end cuts `rest`
 /// short and does `cut` at once.
@@ -38,5 +41,28 @@ pub async fn guarded(
         (Err(failure), Ok(())) => Err(failure),
         (Ok(_), Err(trouble)) => Err(trouble),
         (Ok(report), Ok(())) => Ok(report),
+    }
+}
+
+/// Adds where the axis has ended: to the report, or as a note to what went wrong.
+pub fn tell_end(
+    c: &Conversation,
+    subject: &Subject,
+    ended: Result<Report, Failure>,
+    summary: Result<Report, Failure>,
+) -> Result<Report, Failure> {
+    match (ended, summary) {
+        (Ok(mut report), Ok(summary)) => {
+            report.append(summary);
+            Ok(report)
+        }
+        (Ok(_), Err(failure)) => Err(failure),
+        (Err(failure), Ok(summary)) => {
+            let position = summary.get("position").and_then(Value::as_f64).unwrap_or_default();
+            let state = summary.get("state").and_then(Value::as_str).unwrap_or_default();
+            c.note(format!("the axis is at {}, {state}", subject.position_quantity().show(position)));
+            Err(failure)
+        }
+        (Err(failure), Err(_)) => Err(failure),
     }
 }

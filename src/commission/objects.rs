@@ -35,7 +35,13 @@ pub async fn read(c: &Conversation, subject: &Subject, objects: &[ReadObject]) -
             report.add("", &address.to_string(), serde_json::Value::Null, text);
             continue;
         };
-        let value = number(&object, &uploaded)?;
+        // A type that was told must be that of what comes; the table's is only a guess of the length.
+        let value = match wanted.data_type {
+            Some(data_type) => uploaded
+                .number(data_type)
+                .ok_or(Failure::Length { object, received: uploaded.bytes.len() })?,
+            None => number(&object, &uploaded)?,
+        };
         let physical = wanted.entry.and_then(|entry| entry.physical(subject, value));
         let meaning = subject.family.meaning(&object, value);
         let mut text = object.show(value);

@@ -16,8 +16,6 @@ use super::Options;
 use super::output::Output;
 use super::target::Bus;
 
-/// The bit rate of an interface that no configuration tells of: the default of every family.
-const BIT_RATE: u32 = 1_000_000;
 /// How soon a controller that has gone off the bus comes back.
 const RESTART_MS: u32 = 100;
 
@@ -69,23 +67,27 @@ fn open(bus: &Bus) -> Result<Port, OpenError> {
         Bus::Configured { config, bus } => {
             let settings = config.buses.get(*bus);
             let socket = SocketCanOptions {
-                bit_rate: settings.map_or(BIT_RATE, |bus| bus.bit_rate),
                 data_bit_rate: settings.and_then(|bus| bus.data_bit_rate),
-                ..SocketCanOptions::default()
+                ..of_bit_rate(settings.map(|bus| bus.bit_rate))
             };
             Ok(match open_configured(config, *bus, &socket)? {
                 Some(port) => Port::SocketCan(Box::new(port)),
                 None => Port::Simulated(Box::new(SimulatedBus::new(config, *bus))),
             })
         }
-        Bus::Interface(name) => {
+        Bus::Interface { name, bit_rate } => {
             let settings =
-                InterfaceSettings { bit_rate: BIT_RATE, data_bit_rate: None, restart_ms: RESTART_MS };
+                InterfaceSettings { bit_rate: *bit_rate, data_bit_rate: None, restart_ms: RESTART_MS };
             prepare_interface(name, &settings)
                 .map_err(|error| OpenError::Interface { bus: name.clone(), error })?;
-            let port = open_socketcan(name, &SocketCanOptions::default())
+            let port = open_socketcan(name, &of_bit_rate(Some(*bit_rate)))
                 .map_err(|error| OpenError::Socket { bus: name.clone(), error })?;
             Ok(Port::SocketCan(Box::new(port)))
         }
     }
+}
+
+fn of_bit_rate(bit_rate: Option<u32>) -> SocketCanOptions {
+    let usual = SocketCanOptions::default();
+    SocketCanOptions { bit_rate: bit_rate.unwrap_or(usual.bit_rate), ..usual }
 }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use takt::commission::{Family, Subject};
-use takt::config::{Config, Interface};
+use takt::config::{Config, Interface, Quantity};
 
 use super::super::configuration;
 use super::super::exit::Exit;
@@ -26,6 +26,14 @@ pub struct Target {
     /// The family: erob-canopen, yz-aim
     #[arg(long, value_name = "FAMILY", global = true, value_parser = family)]
     family: Option<Family>,
+    /// The bit rate of an interface without a configuration
+    #[arg(long, value_name = "RATE", global = true, value_parser = bit_rate, default_value = "1 Mbit/s")]
+    bit_rate: u32,
+}
+
+fn bit_rate(text: &str) -> Result<u32, String> {
+    let rate = Quantity::BIT_RATE.parse(text).ok().filter(|rate| (10_000.0..=1_000_000.0).contains(rate));
+    rate.map(|rate| rate as u32).ok_or_else(|| "write it as \"500 kbit/s\", at most 1 Mbit/s".to_owned())
 }
 
 /// Where the drive's bus is.
@@ -38,7 +46,12 @@ pub enum Bus {
         bus: usize,
     },
     /// An interface of this machine.
-    Interface(String),
+    Interface {
+        /// Its name.
+        name: String,
+        /// bit/s
+        bit_rate: u32,
+    },
 }
 
 fn family(text: &str) -> Result<Family, String> {
@@ -75,7 +88,7 @@ impl Target {
             Ok(Interface::SocketCan(name)) => {
                 let subject = Subject::unconfigured(node, family)
                     .map_err(|error| refuse(&format!("the units cannot be converted ({error:?})")))?;
-                Ok((subject, Bus::Interface(name)))
+                Ok((subject, Bus::Interface { name, bit_rate: self.bit_rate }))
             }
             Ok(Interface::Simulated) => Err(refuse(
                 "a simulated drive needs a configuration that says what it is: takt drive CONFIG AXIS …",

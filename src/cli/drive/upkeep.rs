@@ -22,7 +22,7 @@ pub enum Action {
     #[command(name = "set-bitrate")]
     SetBitRate {
         /// "500 kbit/s"
-        bit_rate: String,
+        rate: String,
     },
     /// Clear the fault or alarm that the drive is in
     ClearFault(Agreement),
@@ -71,7 +71,7 @@ pub struct Gains {
     velocity_integration: Option<u16>,
 }
 
-/// How long a bit lasts at most: the slowest rate of CAN is 10 kbit/s.
+/// A bit rate of CAN, 10 kbit/s to 1 Mbit/s.
 fn bit_rate(text: &str, is_raw: bool) -> Result<u32, Failure> {
     let unsuitable = || {
         Failure::Unsuitable(format!(
@@ -117,7 +117,7 @@ impl Action {
             Self::Zero(agreement) => Request::Zero { is_agreed: agreement.yes },
             Self::Save => Request::Save,
             Self::SetId { id } => Request::SetId { node: *id },
-            Self::SetBitRate { bit_rate: text } => Request::SetBitRate { bit_rate: bit_rate(text, is_raw)? },
+            Self::SetBitRate { rate } => Request::SetBitRate { bit_rate: bit_rate(rate, is_raw)? },
             Self::ClearFault(agreement) => Request::ClearFault { is_agreed: agreement.yes },
             Self::Gains(gains) => Request::Gains {
                 position_proportional: gains.position_proportional.map(i64::from),

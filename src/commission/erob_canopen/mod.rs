@@ -10,7 +10,7 @@ mod reading;
 mod state;
 mod upkeep;
 
-pub use objects::{OBJECTS, meaning};
+pub use objects::{OBJECTS, meaning, process_data_words};
 
 use super::conversation::Conversation;
 use super::failure::Failure;

@@ -3,10 +3,12 @@
 use crate::canopen::object::{DataType, Object};
 use crate::canopen::objects::*;
 use crate::commission::dictionary::{Entry, Unit};
+use crate::commission::subject::Subject;
 use crate::drive::mode_words;
 
 use super::state;
 use takt_rt::cia402::OperationMode;
+use takt_rt::frame::{Frame, Id};
 
 /// 1001
 pub const ERROR_REGISTER: Object = Object::new(0x1001, 0, DataType::U8, "error register");
@@ -147,9 +149,20 @@ pub fn meaning(object: &Object, value: i64) -> Option<String> {
         0x603F => Some(state::error_words(value as u16).to_owned()),
         0x1003 if object.address.subindex > 0 => Some(state::error_words(value as u16).to_owned()),
         0x1001 => Some(crate::canopen::emcy::ErrorRegister(value as u8).to_string()),
+        0x1016 if object.address.subindex == 1 => Some(match value & 0xFFFF {
+            0 => "no master is watched".to_owned(),
+            time_ms => format!("node {} is watched, {time_ms} ms", value >> 16 & 0x7F),
+        }),
         0x1010 if value == state::SAVE_SIGNATURE => Some("\"save\"".to_owned()),
         _ => None,
     }
+}
+
+/// What TPDO1 holds, as it is mapped by default and by takt: the statusword first.
+pub fn process_data_words(s: &Subject, frame: &Frame) -> Option<String> {
+    let word = u16::from_le_bytes(frame.payload().get(..2)?.try_into().ok()?);
+    (frame.id() == Id::canopen(0x180, s.node))
+        .then(|| format!("TPDO1: statusword 0x{word:04X}: {}", state::statusword_words(word)))
 }
 
 #[cfg(test)]

@@ -23,6 +23,12 @@ const NMT_PAUSE_NS: Nanoseconds = 100_000_000;
 const STATE_NS: Nanoseconds = 1_000_000_000;
 /// After a ramp to standstill, before the torque goes.
 const REST_NS: Nanoseconds = 200_000_000;
+/// A ramp may take so much longer than it should.
+const RAMP_NS: Nanoseconds = 2_000_000_000;
+/// A halt, which may not be obeyed at all.
+const HALT_NS: Nanoseconds = 300_000_000;
+/// Slower than this (r/min) is standstill.
+const STANDING_RPM: f64 = 1.0;
 /// From here on 6083 is no ramp: the drive stops as fast as it can.
 const NO_RAMP: i64 = 60_000;
 /// The node under which the drive is watched over.
@@ -65,7 +71,7 @@ pub async fn greet(c: &Conversation, s: &Subject) -> Result<(), Failure> {
 /// watch over the master that it had before.
 pub async fn prepare(c: &Conversation, s: &Subject, mode: i64, profile: &Profile) -> Result<(), Failure> {
     if words::is_enabled(statusword(c).await?) {
-        come_to_rest(c, s).await?;
+        come_to_rest(c).await?;
     }
     c.step("NMT start");
     c.command(NmtCommand::Start);
@@ -119,18 +125,19 @@ pub async fn enable(c: &Conversation, s: &Subject) -> Result<i64, Failure> {
 
 /// From any motion to rest without torque: the velocity ramps down, other modes halt. A drive that has never been enabled
 /// homes all the same and may take no notice of a halt: position mode ends its homing.
-pub async fn come_to_rest(c: &Conversation, s: &Subject) -> Result<(), Failure> {
+pub async fn come_to_rest(c: &Conversation) -> Result<(), Failure> {
     c.step("stop in control");
     c.write(&TARGET_VELOCITY, 0).await?;
     let is_ramping = c.read(&MODES_OF_OPERATION).await? == mode::VELOCITY;
     if !is_ramping {
         c.write(&CONTROLWORD, control::HALT).await?;
     }
-    let mut rested = standstill(c, s).await;
+    let patience_ns = if is_ramping { RAMP_NS } else { HALT_NS };
+    let mut rested = standstill(c, patience_ns).await;
     if !is_ramping && matches!(rested, Err(Failure::NotInTime { .. })) {
         c.step("stop by position mode");
         c.write(&MODES_OF_OPERATION, mode::POSITION).await?;
-        rested = standstill(c, s).await;
+        rested = standstill(c, RAMP_NS).await;
     }
     if matches!(rested, Err(Failure::Interrupted)) {
         return rested;
@@ -139,16 +146,19 @@ pub async fn come_to_rest(c: &Conversation, s: &Subject) -> Result<(), Failure> 
     rested
 }
 
-/// Waits for the end of a ramp: v/a, and 200 ms.
-pub async fn standstill(c: &Conversation, s: &Subject) -> Result<(), Failure> {
+/// Waits for the end of a ramp: v/a and `patience_ns` at most, and 200 ms after it.
+async fn standstill(c: &Conversation, patience_ns: Nanoseconds) -> Result<(), Failure> {
     let velocity = (c.read(&VELOCITY).await? as f64 * TENTHS).abs();
     let acceleration = c.read(&ACCELERATION).await?.clamp(1, NO_RAMP);
     let ramp_ns = (velocity / acceleration as f64 * 1e9) as Nanoseconds;
-    let within_ns = ramp_ns.saturating_add(s.stopping_ns(0, 1));
-    // One turn in a minute is standstill.
-    c.wait_for(&VELOCITY, "standstill", within_ns, |velocity| (velocity as f64 * TENTHS).abs() <= 1.0)
-        .await?;
+    let is_standing = |velocity: i64| (velocity as f64 * TENTHS).abs() <= STANDING_RPM;
+    c.wait_for(&VELOCITY, "standstill", ramp_ns.saturating_add(patience_ns), is_standing).await?;
     c.pause(REST_NS).await
+}
+
+/// Waits for the end of a ramp that was commanded.
+pub async fn ramp_down(c: &Conversation) -> Result<(), Failure> {
+    standstill(c, RAMP_NS).await
 }
 
 /// Torque off at once.
@@ -164,8 +174,8 @@ pub async fn torque_off(c: &Conversation) -> Result<(), Failure> {
 
 /// What a motion is ended with: rest, no torque, and the watch over the master as the drive had it: armed by the next
 /// heartbeat.
-pub async fn leave(c: &Conversation, s: &Subject, watch: i64) -> Result<(), Failure> {
-    come_to_rest(c, s).await?;
+pub async fn leave(c: &Conversation, watch: i64) -> Result<(), Failure> {
+    come_to_rest(c).await?;
     c.step("farewell");
     c.write(&MODES_OF_OPERATION, mode::POSITION).await?;
     release(c, watch).await
@@ -184,7 +194,7 @@ pub async fn disable(c: &Conversation, s: &Subject) -> Result<Report, Failure> {
     c.step("state");
     let was_enabled = words::is_enabled(statusword(c).await?);
     if was_enabled {
-        come_to_rest(c, s).await?;
+        come_to_rest(c).await?;
     } else {
         torque_off(c).await?;
     }

@@ -10,7 +10,7 @@ use crate::canopen::objects::*;
 use crate::commission::conversation::Conversation;
 use crate::commission::event::Reading;
 use crate::commission::failure::Failure;
-use crate::commission::guarded::guarded;
+use crate::commission::guarded::{guarded, tell_end};
 use crate::commission::pace::{Pace, Profile};
 use crate::commission::report::Report;
 use crate::commission::request::Course;
@@ -40,10 +40,9 @@ pub async fn with_torque(
         }
         Ok(report)
     };
-    let leave = enabling::leave(c, s, watch);
-    let mut report = guarded(c, keeps_enabled, work, leave, enabling::torque_off(c)).await?;
-    report.append(reading::summary(c, s).await?);
-    Ok(report)
+    let leave = enabling::leave(c, watch);
+    let ended = guarded(c, keeps_enabled, work, leave, enabling::torque_off(c)).await;
+    tell_end(c, s, ended, reading::summary(c, s).await)
 }
 
 /// `enable`
@@ -240,7 +239,7 @@ async fn run_at(
     .await?;
     c.step("ramp to standstill");
     c.write(&TARGET_VELOCITY, 0).await?;
-    enabling::standstill(c, s).await?;
+    enabling::ramp_down(c).await?;
     let ended = c.read(&POSITION_ACTUAL_VALUE).await?;
     let way = s.position(ended) - s.position(began);
     let commanded = s.velocity(raw as f64);

@@ -11,7 +11,7 @@ use crate::canopen::objects::*;
 use crate::commission::conversation::Conversation;
 use crate::commission::event::Reading;
 use crate::commission::failure::Failure;
-use crate::commission::guarded::guarded;
+use crate::commission::guarded::{guarded, tell_end};
 use crate::commission::pace::{Pace, Profile};
 use crate::commission::report::Report;
 use crate::commission::subject::{Amount, Subject};
@@ -27,9 +27,8 @@ pub(super) async fn with_torque(
     work: impl Future<Output = Result<Report, Failure>>,
 ) -> Result<Report, Failure> {
     enabling::greet(c, s).await?;
-    let mut report = guarded(c, keeps_enabled, work, enabling::leave(c, s), enabling::torque_off(c)).await?;
-    report.append(reading::summary(c, s).await?);
-    Ok(report)
+    let ended = guarded(c, keeps_enabled, work, enabling::leave(c, s), enabling::torque_off(c)).await;
+    tell_end(c, s, ended, reading::summary(c, s).await)
 }
 
 /// `enable`
