@@ -5,7 +5,7 @@ use crate::config::Quantity;
 
 use super::failure::Failure;
 use super::family::Family;
-use super::subject::{Amount, Subject};
+use super::subject::Subject;
 
 /// What may be done with an object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -193,13 +193,6 @@ pub fn data_type(name: &str) -> Option<DataType> {
         "i32" | "integer32" => DataType::I32,
         _ => return None,
     })
-}
-
-impl Subject {
-    /// A value asked for in a unit of the joint, or of the drive.
-    pub fn describe_velocity(&self, amount: Amount) -> String {
-        self.velocity_quantity().show(self.velocity(self.velocity_raw(amount) as f64))
-    }
 }
 
 #[cfg(test)]

@@ -2,8 +2,8 @@
 
 use takt_rt::frame::Frame;
 
-use super::conversation::Manners;
 use super::dictionary::Entry;
+use super::line::Manners;
 use super::subject::Subject;
 use super::{erob_canopen, yz_aim};
 use crate::canopen::object::Object;

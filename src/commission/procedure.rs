@@ -8,9 +8,10 @@ use std::task::{Context, Poll, Waker};
 use takt_rt::frame::Frame;
 use takt_rt::time::Nanoseconds;
 
-use super::conversation::{Conversation, Manners};
+use super::conversation::Conversation;
 use super::event::Event;
 use super::failure::Failure;
+use super::line::Manners;
 use super::report::Report;
 
 /// Why a procedure has ended before its end, and in which step.

@@ -56,6 +56,13 @@ fn an_absolute_move_makes_the_handshake_and_ends_at_the_target_without_torque() 
 }
 
 #[test]
+fn an_immediate_target_is_marked_by_bit_5() {
+    let mut bench = bench();
+    bench.run(move_to(Course::Absolute { to: degrees(5.0), is_immediate: true })).unwrap();
+    bench.sent_at(write_u16(0x6040, 0x3F));
+}
+
+#[test]
 fn without_a_pace_a_move_takes_a_tenth_of_the_limits() {
     let mut bench = bench();
     let request = Request::Move { course: absolute(10.0), pace: Pace::default(), keeps_enabled: false };

@@ -216,6 +216,25 @@ fn torque_stays_on_only_when_that_is_asked_for() {
 }
 
 #[test]
+fn an_axis_that_is_enabled_already_is_not_let_go_for_the_next_motion() {
+    let mut bench = bench();
+    bench.run(Request::Enable { hold_ns: None, keeps_enabled: true }).unwrap();
+    let velocity = Request::Velocity {
+        velocity: Amount::Drive(300),
+        pace: pace(),
+        duration_ns: Some(SECOND / 2),
+        keeps_enabled: true,
+    };
+    let course = Course::Relative(Amount::Drive(20_000));
+    for request in [velocity, Request::Move { course, pace: pace(), keeps_enabled: true }] {
+        bench.run(request).unwrap();
+        let shutdown = Frame::of(Id::canopen(0x600, NODE), [0x2B, 0x40, 0x60, 0, 0x06, 0, 0, 0]);
+        assert!(!bench.sent.contains(&shutdown), "{:?}", bench.sent);
+        assert!(is_enabled(&mut bench));
+    }
+}
+
+#[test]
 fn a_drive_whose_master_dies_in_a_motion_stops_by_itself() {
     let mut bench = bench();
     let request = Request::Velocity {

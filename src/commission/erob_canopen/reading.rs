@@ -11,6 +11,7 @@ use crate::commission::contact;
 use crate::commission::conversation::Conversation;
 use crate::commission::event::Reading;
 use crate::commission::failure::Failure;
+use crate::commission::looking;
 use crate::commission::report::Report;
 use crate::commission::subject::Subject;
 use crate::drive::erob_canopen::MULTI_TURN_BATTERY;
@@ -81,7 +82,7 @@ pub fn advice(code: ErrorCode) -> Option<&'static str> {
     )
 }
 
-/// Shows readings until it is time.
+/// `watch`
 pub async fn watch(
     c: &Conversation,
     s: &Subject,
@@ -90,34 +91,10 @@ pub async fn watch(
 ) -> Result<Report, Failure> {
     contact::reach(c, s).await?;
     let rated = rated_torque(c).await?;
-    c.step("watch");
-    let began_ns = c.now_ns();
-    let mut looks = 0_u64;
-    loop {
-        let begun_ns = c.now_ns();
-        c.show(read(c, s, rated).await?);
-        looks += 1;
-        if duration_ns.is_some_and(|duration_ns| c.now_ns().saturating_sub(began_ns) >= duration_ns) {
-            break;
-        }
-        c.pause(every_ns.saturating_sub(c.now_ns().saturating_sub(begun_ns))).await?;
-    }
-    let mut report = Report::new();
-    report.add("readings", "readings", looks, looks.to_string());
-    Ok(report)
+    looking::watch(c, every_ns, duration_ns, async || read(c, s, rated).await).await
 }
 
 /// Position and state in the end.
 pub async fn summary(c: &Conversation, s: &Subject) -> Result<Report, Failure> {
-    let reading = read(c, s, None).await?;
-    let mut report = Report::new();
-    report.add("position", "position", reading.position, s.position_quantity().show(reading.position));
-    report.add(
-        "position_counts",
-        "position counts",
-        reading.position_counts,
-        reading.position_counts.to_string(),
-    );
-    report.add("state", "state", reading.state, reading.state);
-    Ok(report)
+    Ok(looking::summary(s, &read(c, s, None).await?))
 }

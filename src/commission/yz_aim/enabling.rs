@@ -67,11 +67,11 @@ pub async fn greet(c: &Conversation, s: &Subject) -> Result<(), Failure> {
     if has_alarm || alarm != Alarm::None { Err(reading::faulted(alarm)) } else { Ok(()) }
 }
 
-/// The drive at rest, in this mode, with this profile, and stopping by itself when takt falls silent. Gives the
-/// watch over the master that it had before.
+/// The drive at rest, in this mode, with this profile, and stopping by itself when takt falls silent.
 pub async fn prepare(c: &Conversation, s: &Subject, mode: i64, profile: &Profile) -> Result<(), Failure> {
+    // An axis that is enabled already is stopped and not let go: a loaded one would fall.
     if words::is_enabled(statusword(c).await?) {
-        come_to_rest(c).await?;
+        stop(c).await?;
     }
     c.step("NMT start");
     c.command(NmtCommand::Start);
@@ -123,27 +123,33 @@ pub async fn enable(c: &Conversation, s: &Subject) -> Result<i64, Failure> {
     if moved.abs() > permitted { Err(Failure::Jumped { counts: moved }) } else { Ok(position) }
 }
 
-/// From any motion to rest without torque: the velocity ramps down, other modes halt. A drive that has never been enabled
-/// homes all the same and may take no notice of a halt: position mode ends its homing.
+/// From any motion to rest without torque.
 pub async fn come_to_rest(c: &Conversation) -> Result<(), Failure> {
-    c.step("stop in control");
-    c.write(&TARGET_VELOCITY, 0).await?;
-    let is_ramping = c.read(&MODES_OF_OPERATION).await? == mode::VELOCITY;
-    if !is_ramping {
-        c.write(&CONTROLWORD, control::HALT).await?;
-    }
-    let patience_ns = if is_ramping { RAMP_NS } else { HALT_NS };
-    let mut rested = standstill(c, patience_ns).await;
-    if !is_ramping && matches!(rested, Err(Failure::NotInTime { .. })) {
-        c.step("stop by position mode");
-        c.write(&MODES_OF_OPERATION, mode::POSITION).await?;
-        rested = standstill(c, RAMP_NS).await;
-    }
-    if matches!(rested, Err(Failure::Interrupted)) {
+    let rested = stop(c).await;
+    if rested == Err(Failure::Interrupted) {
         return rested;
     }
     torque_off(c).await?;
     rested
+}
+
+/// From any motion to rest: the velocity ramps down, other modes halt. A drive that has never been enabled homes all the
+/// same and may take no notice of a halt: position mode ends its homing.
+async fn stop(c: &Conversation) -> Result<(), Failure> {
+    c.step("stop in control");
+    c.write(&TARGET_VELOCITY, 0).await?;
+    if c.read(&MODES_OF_OPERATION).await? == mode::VELOCITY {
+        return standstill(c, RAMP_NS).await;
+    }
+    c.write(&CONTROLWORD, control::HALT).await?;
+    match standstill(c, HALT_NS).await {
+        Err(Failure::NotInTime { .. }) => {
+            c.step("stop by position mode");
+            c.write(&MODES_OF_OPERATION, mode::POSITION).await?;
+            standstill(c, RAMP_NS).await
+        }
+        other => other,
+    }
 }
 
 /// Waits for the end of a ramp: v/a and `patience_ns` at most, and 200 ms after it.

@@ -11,6 +11,7 @@ use crate::commission::conversation::Conversation;
 use crate::commission::event::Reading;
 use crate::commission::failure::Failure;
 use crate::commission::guarded::{guarded, tell_end};
+use crate::commission::looking;
 use crate::commission::pace::{Pace, Profile};
 use crate::commission::report::Report;
 use crate::commission::request::Course;
@@ -117,13 +118,7 @@ pub async fn position(
         // Without bit 5 no later write of the target moves the axis.
         c.write(&CONTROLWORD, control::ENABLE).await?;
         let reached = c.read(&POSITION_ACTUAL_VALUE).await?;
-        let (from, to) = (s.position(here), s.position(target));
-        let mut report = Report::new();
-        report.add("from", "from", from, s.position_quantity().show(from));
-        report.add("target", "target", to, s.position_quantity().show(to));
-        report.add("moves", "moves", stops, stops.to_string());
-        report.add("error_counts", "error", reached - at, format!("{} counts", reached - at));
-        Ok(report)
+        Ok(looking::move_report(s, here, target, stops, reached - at))
     };
     with_torque(c, s, keeps_enabled, work).await
 }
@@ -241,13 +236,7 @@ async fn run_at(
     c.write(&TARGET_VELOCITY, 0).await?;
     enabling::ramp_down(c).await?;
     let ended = c.read(&POSITION_ACTUAL_VALUE).await?;
-    let way = s.position(ended) - s.position(began);
-    let commanded = s.velocity(raw as f64);
-    let mut report = Report::new();
-    report.add("commanded_velocity", "commanded velocity", commanded, s.velocity_quantity().show(commanded));
-    report.add("highest_velocity", "highest velocity", fastest, s.velocity_quantity().show(fastest));
-    report.add("travelled", "travelled", way, s.position_quantity().show(way));
-    Ok(report)
+    Ok(looking::run_report(s, raw, fastest, began, ended))
 }
 
 /// The drive has one acceleration for both directions: the lower one of those that were asked for.
@@ -280,17 +269,7 @@ async fn tend(
     c: &Conversation,
     s: &Subject,
     duration_ns: Option<Nanoseconds>,
-    mut look: impl FnMut(&Reading) -> Result<(), Failure>,
+    look: impl FnMut(&Reading) -> Result<(), Failure>,
 ) -> Result<(), Failure> {
-    let began_ns = c.now_ns();
-    loop {
-        let reading = reading::read_enabled(c, s).await?;
-        look(&reading)?;
-        let left_ns =
-            duration_ns.map(|duration_ns| duration_ns.saturating_sub(c.now_ns().saturating_sub(began_ns)));
-        if left_ns == Some(0) {
-            return Ok(());
-        }
-        c.pause(LOOK_NS.min(left_ns.unwrap_or(LOOK_NS))).await?;
-    }
+    looking::tend(c, LOOK_NS, duration_ns, async || reading::read_enabled(c, s).await, look).await
 }

@@ -10,6 +10,7 @@ use crate::commission::contact;
 use crate::commission::conversation::Conversation;
 use crate::commission::event::Reading;
 use crate::commission::failure::Failure;
+use crate::commission::looking;
 use crate::commission::report::Report;
 use crate::commission::subject::Subject;
 
@@ -57,7 +58,7 @@ pub fn faulted(alarm: Alarm) -> Failure {
     Failure::Faulted { what: format!("alarm {alarm}"), advice: alarm.advice() }
 }
 
-/// Shows readings until it is time.
+/// `watch`
 pub async fn watch(
     c: &Conversation,
     s: &Subject,
@@ -65,30 +66,10 @@ pub async fn watch(
     duration_ns: Option<Nanoseconds>,
 ) -> Result<Report, Failure> {
     contact::reach(c, s).await?;
-    c.step("watch");
-    let began_ns = c.now_ns();
-    let mut looks = 0_u64;
-    loop {
-        let begun_ns = c.now_ns();
-        c.show(read(c, s).await?);
-        looks += 1;
-        if duration_ns.is_some_and(|duration_ns| c.now_ns().saturating_sub(began_ns) >= duration_ns) {
-            break;
-        }
-        c.pause(every_ns.saturating_sub(c.now_ns().saturating_sub(begun_ns))).await?;
-    }
-    let mut report = Report::new();
-    report.add("readings", "readings", looks, looks.to_string());
-    Ok(report)
+    looking::watch(c, every_ns, duration_ns, async || read(c, s).await).await
 }
 
 /// Position and state in the end.
 pub async fn summary(c: &Conversation, s: &Subject) -> Result<Report, Failure> {
-    let reading = read(c, s).await?;
-    let mut report = Report::new();
-    report.add("position", "position", reading.position, s.position_quantity().show(reading.position));
-    let counts = reading.position_counts;
-    report.add("position_counts", "position counts", counts, counts.to_string());
-    report.add("state", "state", reading.state, reading.state);
-    Ok(report)
+    Ok(looking::summary(s, &read(c, s).await?))
 }

@@ -12,6 +12,7 @@ use crate::commission::conversation::Conversation;
 use crate::commission::event::Reading;
 use crate::commission::failure::Failure;
 use crate::commission::guarded::{guarded, tell_end};
+use crate::commission::looking;
 use crate::commission::pace::{Pace, Profile};
 use crate::commission::report::Report;
 use crate::commission::subject::{Amount, Subject};
@@ -126,13 +127,7 @@ async fn run_at(
         c.write(&CONSUMER_HEARTBEAT_TIME, 0).await?;
     }
     let ended = c.read(&POSITION_ACTUAL_VALUE).await?;
-    let mut report = Report::new();
-    let way = s.position(ended) - s.position(began);
-    let commanded = s.velocity(raw as f64);
-    report.add("commanded_velocity", "commanded velocity", commanded, s.velocity_quantity().show(commanded));
-    report.add("highest_velocity", "highest velocity", fastest, s.velocity_quantity().show(fastest));
-    report.add("travelled", "travelled", way, s.position_quantity().show(way));
-    Ok(report)
+    Ok(looking::run_report(s, raw, fastest, began, ended))
 }
 
 /// [`enabling::prepare`], and the rated torque.
@@ -153,17 +148,8 @@ async fn tend(
     rated: Option<f64>,
     duration_ns: Option<Nanoseconds>,
     every_ns: Nanoseconds,
-    mut look: impl FnMut(&Reading) -> Result<(), Failure>,
+    look: impl FnMut(&Reading) -> Result<(), Failure>,
 ) -> Result<(), Failure> {
-    let began_ns = c.now_ns();
-    loop {
-        let reading = reading::read_enabled(c, s, rated).await?;
-        look(&reading)?;
-        let left_ns =
-            duration_ns.map(|duration_ns| duration_ns.saturating_sub(c.now_ns().saturating_sub(began_ns)));
-        if left_ns == Some(0) {
-            return Ok(());
-        }
-        c.pause(every_ns.min(left_ns.unwrap_or(every_ns))).await?;
-    }
+    let read = async || reading::read_enabled(c, s, rated).await;
+    looking::tend(c, every_ns, duration_ns, read, look).await
 }

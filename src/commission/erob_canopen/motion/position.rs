@@ -8,6 +8,7 @@ use crate::canopen::objects::*;
 use crate::commission::conversation::Conversation;
 use crate::commission::erob_canopen::{enabling, reading};
 use crate::commission::failure::Failure;
+use crate::commission::looking;
 use crate::commission::pace::{Pace, Profile};
 use crate::commission::report::Report;
 use crate::commission::request::Course;
@@ -59,13 +60,7 @@ pub async fn run(
             c.write(&CONSUMER_HEARTBEAT_TIME, 0).await?;
         }
         let reached = c.read(&POSITION_ACTUAL_VALUE).await?;
-        let mut report = Report::new();
-        let (from, to) = (s.position(here), s.position(target));
-        report.add("from", "from", from, s.position_quantity().show(from));
-        report.add("target", "target", to, s.position_quantity().show(to));
-        report.add("moves", "moves", stops, stops.to_string());
-        report.add("error_counts", "error", reached - at, format!("{} counts", reached - at));
-        Ok(report)
+        Ok(looking::move_report(s, here, target, stops, reached - at))
     };
     with_torque(c, s, keeps_enabled, work).await
 }
