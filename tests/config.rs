@@ -3,10 +3,14 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use takt::config::{Config, Control, Feedback, Interface, OverrideError, ProblemKind, Travel};
+use takt::config::{Config, Control, Feedback, Interface, OverrideError, ProblemKind, ProgramTarget, Travel};
 
+/// The configurations that come with takt; other folders in there hold other things.
 fn configs() -> Vec<PathBuf> {
-    let mut paths: Vec<_> = fs::read_dir(config("")).unwrap().map(|entry| entry.unwrap().path()).collect();
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs");
+    let in_folder = |folder: PathBuf| fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    let mut paths: Vec<_> = in_folder(folder.clone()).chain(in_folder(folder.join("erob-modes"))).collect();
+    paths.retain(|path| path.extension().is_some_and(|extension| extension == "toml"));
     paths.sort();
     paths
 }
@@ -240,8 +244,8 @@ move = [{ to = "250 mm" }, { to = [0.1] }]
         (0.5, 400.0, 0.01)
     );
     assert_eq!(axis.feedback, [Feedback::Torque, Feedback::ErrorCode]);
-    assert_eq!(config.program.moves[0].target, [0.25]);
-    assert_eq!(config.program.moves[1].target, [0.1]);
+    assert_eq!(config.program.moves[0].target, ProgramTarget::Position(vec![0.25]));
+    assert_eq!(config.program.moves[1].target, ProgramTarget::Position(vec![0.1]));
 }
 
 #[test]

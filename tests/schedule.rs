@@ -1,7 +1,7 @@
 //! Which configurations the buses can carry, and what is said of those that they cannot.
 
 use std::fmt::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use takt::bus::schedule::{self, BusSchedule, MessageKind, Remedy, Shortfall};
 use takt::config::{Config, Feedback};
@@ -25,7 +25,9 @@ fn analyse(config: &Config) -> BusSchedule {
 #[test]
 fn every_configuration_that_comes_with_takt_fits() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs");
-    for path in std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
+    let files = |folder| std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    let is_configuration = |path: &PathBuf| path.extension().is_some_and(|extension| extension == "toml");
+    for path in files(folder.clone()).chain(files(folder.join("erob-modes"))).filter(is_configuration) {
         let config = Config::load(&path).unwrap_or_else(|error| panic!("{:?}", miette::Report::new(error)));
         let buses = schedule::verify(&config).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
         assert_eq!(buses.len(), config.buses.len());

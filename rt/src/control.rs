@@ -1,9 +1,10 @@
-//! From a set-point to the number on the wire, by mode: in CSP the drive closes every loop, in CSV the position
-//! loop is closed here, in CST the velocity loop too.
+//! From a set-point to the number on the wire, by mode: in CSP and IP the drive closes every loop, in CSV the position
+//! loop is closed here, in CST the velocity loop too. In the profile modes the drive makes its own way as well, see
+//! [`crate::profile`].
 
 use crate::cia402::OperationMode;
 use crate::guard::AxisLimits;
-use crate::pdo::{CommandSlot, ProcessImage};
+use crate::pdo::CommandSlot;
 use crate::plan::State;
 use crate::units::Scale;
 
@@ -30,6 +31,14 @@ pub enum ControlLaw {
         /// N·m
         coulomb_friction: f64,
     },
+    /// Interpolated position: as cyclic synchronous position, with the drive's own interpolation between targets.
+    Interpolated,
+    /// Profile position: the drive moves to a target by its own profile.
+    ProfilePosition,
+    /// Profile velocity: the drive ramps to a velocity by its own profile.
+    ProfileVelocity,
+    /// Profile torque: the drive ramps to a torque.
+    ProfileTorque,
 }
 
 /// Below this speed (rad/s or m/s) the Coulomb feed-forward fades out in proportion, so that it does not switch
@@ -56,26 +65,40 @@ impl ControlLaw {
             Self::Position => OperationMode::CyclicSynchronousPosition,
             Self::Velocity { .. } => OperationMode::CyclicSynchronousVelocity,
             Self::Torque { .. } => OperationMode::CyclicSynchronousTorque,
+            Self::Interpolated => OperationMode::InterpolatedPosition,
+            Self::ProfilePosition => OperationMode::ProfilePosition,
+            Self::ProfileVelocity => OperationMode::ProfileVelocity,
+            Self::ProfileTorque => OperationMode::ProfileTorque,
         }
     }
 
-    /// Writes the target of this cycle into the image. Returns the number on the wire and the torque (N·m, N)
-    /// that is commanded with it, 0 where none is.
-    pub fn command(
-        &self,
-        input: &LoopInput,
-        scale: &Scale,
-        limits: &AxisLimits,
-        image: &mut ProcessImage,
-    ) -> (i32, f64) {
-        let (slot, raw, torque) = match *self {
-            Self::Position => {
-                (CommandSlot::TargetPosition, scale.position_to_counts(input.set.position), 0.0)
+    /// Whether the drive makes its own way to a target, instead of following a set-point of every cycle.
+    pub const fn is_profile(&self) -> bool {
+        matches!(self, Self::ProfilePosition | Self::ProfileVelocity | Self::ProfileTorque)
+    }
+
+    /// The number on the wire that is the target.
+    pub const fn target_slot(&self) -> CommandSlot {
+        match self {
+            Self::Position | Self::Interpolated | Self::ProfilePosition => CommandSlot::TargetPosition,
+            Self::Velocity { .. } | Self::ProfileVelocity => CommandSlot::TargetVelocity,
+            Self::Torque { .. } | Self::ProfileTorque => CommandSlot::TargetTorque,
+        }
+    }
+
+    /// The target of this cycle in drive units, and the torque (N·m, N) that is commanded with it, 0 where none is.
+    /// In a profile mode the set-point itself is not for the wire: see [`crate::profile::ProfileCommand`].
+    pub fn target(&self, input: &LoopInput, scale: &Scale, limits: &AxisLimits) -> (i32, f64) {
+        match *self {
+            Self::Position | Self::Interpolated | Self::ProfilePosition => {
+                (scale.position_to_counts(input.set.position), 0.0)
             }
+            Self::ProfileVelocity => (scale.velocity_to_drive(input.set.velocity), 0.0),
+            Self::ProfileTorque => (0, 0.0),
             Self::Velocity { position_gain } => {
                 let velocity = input.set.velocity + position_gain * (input.due.position - input.position);
                 let velocity = velocity.clamp(-limits.velocity, limits.velocity);
-                (CommandSlot::TargetVelocity, scale.velocity_to_counts(velocity), 0.0)
+                (scale.velocity_to_drive(velocity), 0.0)
             }
             Self::Torque { stiffness, damping, inertia, viscous_friction, coulomb_friction } => {
                 let direction = (input.set.velocity / COULOMB_FADE).clamp(-1.0, 1.0);
@@ -85,23 +108,18 @@ impl ControlLaw {
                     + viscous_friction * input.set.velocity
                     + coulomb_friction * direction;
                 let torque = torque.clamp(-limits.torque, limits.torque);
-                (CommandSlot::TargetTorque, scale.torque_to_per_mille(torque), torque)
+                (scale.torque_to_per_mille(torque), torque)
             }
-        };
-        image.set(slot, raw);
-        (raw, torque)
+        }
     }
 
-    /// Writes the target of an axis that gets no torque: the actual position, no velocity, no torque. A drive that
-    /// is enabled on it stays where it is.
-    pub fn idle(&self, position_counts: i32, image: &mut ProcessImage) -> i32 {
-        let (slot, raw) = match self {
-            Self::Position => (CommandSlot::TargetPosition, position_counts),
-            Self::Velocity { .. } => (CommandSlot::TargetVelocity, 0),
-            Self::Torque { .. } => (CommandSlot::TargetTorque, 0),
-        };
-        image.set(slot, raw);
-        raw
+    /// The target of an axis that gets no torque: the actual position, no velocity, no torque. A drive that is enabled
+    /// on it stays where it is.
+    pub const fn idle(&self, position_counts: i32) -> i32 {
+        match self.target_slot() {
+            CommandSlot::TargetPosition => position_counts,
+            _ => 0,
+        }
     }
 }
 
@@ -124,6 +142,7 @@ mod tests {
     fn scale() -> Scale {
         Scale::new(ScaleParameters {
             counts_per_turn: 524_288.0,
+            velocity_units_per_turn: 524_288.0,
             gear_ratio: 1.0,
             travel_per_turn: TAU,
             reversed: false,
@@ -145,19 +164,16 @@ mod tests {
 
     #[test]
     fn the_velocity_loop_adds_the_position_error_to_the_feed_forward() {
-        let mut image = ProcessImage::default();
         let law = ControlLaw::Velocity { position_gain: 10.0 };
-        let (raw, _) = law.command(&input(0.01, 0.5), &scale(), &LIMITS, &mut image);
-        assert_eq!(raw, scale().velocity_to_counts(0.6));
-        assert_eq!(image.command(CommandSlot::TargetVelocity), raw);
+        let (raw, _) = law.target(&input(0.01, 0.5), &scale(), &LIMITS);
+        assert_eq!(raw, scale().velocity_to_drive(0.6));
     }
 
     #[test]
     fn velocity_and_torque_are_held_inside_their_limits() {
-        let mut image = ProcessImage::default();
         let law = ControlLaw::Velocity { position_gain: 10.0 };
-        let (raw, _) = law.command(&input(-5.0, 0.0), &scale(), &LIMITS, &mut image);
-        assert_eq!(raw, scale().velocity_to_counts(-2.0));
+        let (raw, _) = law.target(&input(-5.0, 0.0), &scale(), &LIMITS);
+        assert_eq!(raw, scale().velocity_to_drive(-2.0));
         let law = ControlLaw::Torque {
             stiffness: 1000.0,
             damping: 10.0,
@@ -165,18 +181,20 @@ mod tests {
             viscous_friction: 1.0,
             coulomb_friction: 2.0,
         };
-        let (_, torque) = law.command(&input(1.0, 0.5), &scale(), &LIMITS, &mut image);
+        let (_, torque) = law.target(&input(1.0, 0.5), &scale(), &LIMITS);
         assert_eq!(torque, 40.0);
-        let (raw, torque) = law.command(&input(0.01, 0.5), &scale(), &LIMITS, &mut image);
+        let (raw, torque) = law.target(&input(0.01, 0.5), &scale(), &LIMITS);
         assert!((torque - (10.0 + 5.0 + 0.6 + 0.5 + 2.0)).abs() < 1e-12);
         assert_eq!(raw, scale().torque_to_per_mille(torque));
     }
 
     #[test]
     fn an_idle_axis_is_commanded_to_stay_where_it_is() {
-        let mut image = ProcessImage::default();
-        assert_eq!(ControlLaw::Position.idle(1234, &mut image), 1234);
-        assert_eq!(image.command(CommandSlot::TargetPosition), 1234);
-        assert_eq!(ControlLaw::Velocity { position_gain: 1.0 }.idle(1234, &mut image), 0);
+        for law in [ControlLaw::Position, ControlLaw::Interpolated, ControlLaw::ProfilePosition] {
+            assert_eq!(law.idle(1234), 1234);
+        }
+        for law in [ControlLaw::Velocity { position_gain: 1.0 }, ControlLaw::ProfileTorque] {
+            assert_eq!(law.idle(1234), 0);
+        }
     }
 }

@@ -77,7 +77,7 @@ impl Cycle {
         let mut timing = self.reach_slot(clock);
         timing.sync_ns = clock.now_ns().saturating_sub(timing.slot_start_ns);
         for (bus, port) in ports.iter_mut().enumerate() {
-            if let Some(sync) = engine.sync(bus) {
+            if let Some(sync) = engine.sync(bus, timing.slot) {
                 let now_ns = clock.now_ns();
                 port.send(now_ns, &[sync]);
             }
@@ -100,7 +100,7 @@ impl Cycle {
         for (bus, port) in ports.iter_mut().enumerate() {
             let mut batch = SendBatch::new();
             if has_commands {
-                engine.set_points(bus, &mut batch);
+                engine.set_points(bus, timing.slot, &mut batch);
             }
             engine.services(bus, door, &mut batch);
             if !batch.is_empty() {

@@ -18,15 +18,19 @@ pub enum Destination {
         /// The axis.
         axis: u8,
     },
+    /// Process data that carries nothing new.
+    Unused,
     /// Something that is not process data.
     Service,
 }
 
 const IDS: usize = 0x800;
 const NOBODY: u16 = 0;
+const UNUSED: u8 = 6;
 const EMERGENCY: u8 = 7;
 
-/// The table of one bus: for each 11-bit identifier `1 + axis · 8 + pdo`, with PDO 7 for emergencies.
+/// The table of one bus: for each 11-bit identifier `1 + axis · 8 + pdo`, with PDO 7 for emergencies and 6 for what
+/// is not looked at.
 #[derive(Clone, Debug)]
 pub struct Dispatch {
     entries: [u16; IDS],
@@ -48,12 +52,17 @@ pub struct IdTaken {
 impl Dispatch {
     /// Enters a feedback PDO (0 to 3) of an axis (0 to 31).
     pub fn feedback(&mut self, id: Id, axis: u8, pdo: u8) -> Result<(), IdTaken> {
-        self.enter(id, axis, pdo.min(EMERGENCY - 1))
+        self.enter(id, axis, pdo.min(UNUSED - 1))
     }
 
     /// Enters the emergency message of an axis.
     pub fn emergency(&mut self, id: Id, axis: u8) -> Result<(), IdTaken> {
         self.enter(id, axis, EMERGENCY)
+    }
+
+    /// Enters a message of an axis that is passed over.
+    pub fn unused(&mut self, id: Id, axis: u8) -> Result<(), IdTaken> {
+        self.enter(id, axis, UNUSED)
     }
 
     fn enter(&mut self, id: Id, axis: u8, kind: u8) -> Result<(), IdTaken> {
@@ -80,10 +89,10 @@ impl Dispatch {
             None | Some(&NOBODY) => Destination::Service,
             Some(&entry) => {
                 let (axis, pdo) = (((entry - 1) / 8) as u8, ((entry - 1) % 8) as u8);
-                if pdo == EMERGENCY {
-                    Destination::Emergency { axis }
-                } else {
-                    Destination::Feedback { axis, pdo }
+                match pdo {
+                    EMERGENCY => Destination::Emergency { axis },
+                    UNUSED => Destination::Unused,
+                    _ => Destination::Feedback { axis, pdo },
                 }
             }
         }

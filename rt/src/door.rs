@@ -1,9 +1,11 @@
 //! The door between the real-time thread and everything else: a handful of bounded, lock-free channels, seen from
 //! inside as this one trait. No call waits; a full channel drops, and says so.
 
+use crate::cia402;
 use crate::frame::Frame;
 use crate::plan;
 use crate::port::{BusHealth, Received};
+use crate::profile::ProfileTarget;
 use crate::record::{CycleRecord, Event, MAX_AXES, MAX_BUSES};
 use crate::stop::{Phase, StopCategory, StopReason};
 use crate::time::Nanoseconds;
@@ -51,6 +53,9 @@ pub enum Request {
     Enable,
     /// Move to a target, now: a move under way is re-planned from where it is.
     Move(Move),
+    /// Give a drive in a profile mode a target. The group is moving until all its targets are reached, and as long as a
+    /// velocity or a torque is wanted.
+    SetProfileTarget(ProfileMove),
     /// Follow [`Door::stream`].
     Stream,
     /// Stop by this category.
@@ -78,6 +83,19 @@ pub struct Move {
     pub acceleration_scale: f64,
     /// The move takes at least this long.
     pub minimum_duration_s: f64,
+}
+
+/// A target for one drive in a profile mode.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ProfileMove {
+    /// A number of the caller's, shown in [`Snapshot::finished_move`] when the target has been reached.
+    pub id: u32,
+    /// The axis.
+    pub axis: u8,
+    /// Where to, how fast, or how strongly.
+    pub target: ProfileTarget,
+    /// When a velocity or a torque that is not zero expires; after that the group stops. A position does not expire.
+    pub valid_until_ns: Nanoseconds,
 }
 
 /// One streamed set-point for every axis, with the time at which it loses its meaning.
@@ -151,6 +169,8 @@ pub struct AxisSnapshot {
     pub velocity: f64,
     /// Object 6041.
     pub statusword: u16,
+    /// What it says of the drive.
+    pub drive_state: cia402::State,
     /// Object 603F or the code of the last emergency message.
     pub error_code: u16,
     /// Whether the drive has reported since the controller became active.

@@ -9,8 +9,8 @@
 //! - [`time`], [`frame`]: integer nanoseconds and the grid; CAN frames that can only be valid.
 //! - [`port`], [`door`]: what the cycle needs from the world, and what it shares with the rest of the program, as
 //!   small traits.
-//! - [`pdo`], [`units`], [`cia402`]: process data compiled to shifts and masks; SI to drive units; the state machine of
-//!   drives.
+//! - [`pdo`], [`units`], [`cia402`], [`dialect`], [`profile`]: process data compiled to shifts and masks; SI to drive
+//!   units; the state machine of drives, those that speak otherwise, and those that make their own way to a target.
 //! - [`plan`], [`guard`], [`control`], [`stop`]: trajectories, the last look at every set-point, the loops closed here,
 //!   and the reasons to stop.
 //! - [`axis`], [`engine`]: one joint, and the group that moves together; [`engine::Engine::compute`] is a cycle's thinking.
@@ -23,6 +23,7 @@ pub mod axis;
 pub mod cia402;
 pub mod control;
 pub mod cycle;
+pub mod dialect;
 pub mod dispatch;
 pub mod door;
 pub mod engine;
@@ -34,6 +35,7 @@ mod motion;
 pub mod pdo;
 pub mod plan;
 pub mod port;
+pub mod profile;
 pub mod record;
 pub mod stop;
 pub mod time;

@@ -30,6 +30,14 @@ pub struct Leg<'a> {
     pub limits: &'a AxisLimits,
 }
 
+impl<'a> Leg<'a> {
+    /// One that stays where it is.
+    pub fn standing(position: f64, limits: &'a AxisLimits) -> Self {
+        let rest = State { position, ..State::default() };
+        Self { start: rest, target: rest, limits }
+    }
+}
+
 impl Default for Motion {
     fn default() -> Self {
         let hold = [Profile::hold(0.0); MAX_AXES];

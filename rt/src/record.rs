@@ -50,6 +50,8 @@ pub struct AxisRecord {
     pub torque: f32,
     /// Distance between the set-point that was in force at this cycle's SYNC and the position reported for it.
     pub following_error: f32,
+    /// What the statusword says of the drive.
+    pub drive_state: cia402::State,
     /// Object 6040 as sent.
     pub controlword: u16,
     /// Object 6041 as received.
@@ -62,13 +64,6 @@ pub struct AxisRecord {
     pub command_raw: i32,
     /// The position on the wire in counts.
     pub position_raw: i32,
-}
-
-impl AxisRecord {
-    /// The drive's state.
-    pub fn state(&self) -> cia402::State {
-        cia402::State::decode(self.statusword)
-    }
 }
 
 /// One cycle.
@@ -137,6 +132,8 @@ pub enum EventKind {
     DriveState {
         /// The axis.
         axis: u8,
+        /// The new one.
+        state: cia402::State,
         /// The statusword that showed it.
         statusword: u16,
     },

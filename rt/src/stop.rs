@@ -46,11 +46,13 @@ pub enum Rule {
     BusLost = 13,
     /// Own frames are not getting onto the wire.
     NotTransmitted = 14,
+    /// A drive in profile position does not acknowledge its target.
+    NotAcknowledged = 15,
 }
 
 impl Rule {
     /// Every rule, in the order of their numbers.
-    pub const ALL: [Self; 15] = [
+    pub const ALL: [Self; 16] = [
         Self::Requested,
         Self::NotFinite,
         Self::PositionLimit,
@@ -66,6 +68,7 @@ impl Rule {
         Self::NoTrajectory,
         Self::BusLost,
         Self::NotTransmitted,
+        Self::NotAcknowledged,
     ];
 
     /// The stop that this rule asks for unless a configuration says otherwise. A drive that no longer obeys, or
@@ -87,7 +90,8 @@ impl Rule {
             | Self::ModeChanged
             | Self::EnableTimeout
             | Self::BusLost
-            | Self::NotTransmitted => StopCategory::One,
+            | Self::NotTransmitted
+            | Self::NotAcknowledged => StopCategory::One,
         }
     }
 }

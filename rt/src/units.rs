@@ -8,6 +8,9 @@
 pub struct ScaleParameters {
     /// Counts of one turn of the drive's position (the side that it reports).
     pub counts_per_turn: f64,
+    /// What the drive calls one turn of its position in a second: [`ScaleParameters::counts_per_turn`] where it counts
+    /// velocities in counts per second, 60 where it counts in r/min.
+    pub velocity_units_per_turn: f64,
     /// Turns of the drive's position for one turn of the joint; 1 where the drive reports the output side.
     pub gear_ratio: f64,
     /// What the joint moves in one turn: 2π rad, or metres for a linear axis.
@@ -25,6 +28,8 @@ pub struct ScaleParameters {
 pub struct Scale {
     counts_per_unit: f64,
     units_per_count: f64,
+    drive_velocity_per_velocity: f64,
+    velocity_per_drive_velocity: f64,
     zero_counts: f64,
     direction: f64,
     per_mille_per_torque: f64,
@@ -36,6 +41,8 @@ pub struct Scale {
 pub enum ScaleError {
     /// [`ScaleParameters::counts_per_turn`]
     CountsPerTurn,
+    /// [`ScaleParameters::velocity_units_per_turn`]
+    VelocityUnitsPerTurn,
     /// [`ScaleParameters::gear_ratio`]
     GearRatio,
     /// [`ScaleParameters::travel_per_turn`]
@@ -52,6 +59,7 @@ impl Scale {
         let positive =
             |value: f64, error| if value.is_finite() && value > 0.0 { Ok(value) } else { Err(error) };
         let counts = positive(parameters.counts_per_turn, ScaleError::CountsPerTurn)?;
+        let velocity_units = positive(parameters.velocity_units_per_turn, ScaleError::VelocityUnitsPerTurn)?;
         let gear = positive(parameters.gear_ratio, ScaleError::GearRatio)?;
         let travel = positive(parameters.travel_per_turn, ScaleError::TravelPerTurn)?;
         if !parameters.zero_counts.is_finite() {
@@ -61,6 +69,8 @@ impl Scale {
         let scale = Self {
             counts_per_unit: direction * counts * gear / travel,
             units_per_count: direction * travel / (counts * gear),
+            drive_velocity_per_velocity: direction * velocity_units * gear / travel,
+            velocity_per_drive_velocity: direction * travel / (velocity_units * gear),
             zero_counts: parameters.zero_counts,
             direction,
             per_mille_per_torque: 0.0,
@@ -96,14 +106,14 @@ impl Scale {
         (f64::from(counts) - self.zero_counts) * self.units_per_count
     }
 
-    /// Velocity (rad/s or m/s) to counts per second.
-    pub fn velocity_to_counts(&self, velocity: f64) -> i32 {
-        nearest(velocity * self.counts_per_unit)
+    /// Velocity (rad/s or m/s) to the drive's unit.
+    pub fn velocity_to_drive(&self, velocity: f64) -> i32 {
+        nearest(velocity * self.drive_velocity_per_velocity)
     }
 
-    /// Counts per second to velocity (rad/s or m/s).
-    pub fn velocity_from_counts(&self, counts_per_second: i32) -> f64 {
-        f64::from(counts_per_second) * self.units_per_count
+    /// A velocity in the drive's unit to rad/s or m/s.
+    pub fn velocity_from_drive(&self, units: i32) -> f64 {
+        f64::from(units) * self.velocity_per_drive_velocity
     }
 
     /// Torque (N·m or N) to per mille of the rated torque, as far as 16 bits go.
@@ -130,6 +140,7 @@ mod tests {
 
     const EROB: ScaleParameters = ScaleParameters {
         counts_per_turn: 524_288.0,
+        velocity_units_per_turn: 524_288.0,
         gear_ratio: 1.0,
         travel_per_turn: TAU,
         reversed: false,
@@ -149,7 +160,7 @@ mod tests {
     fn a_reversed_joint_turns_position_velocity_and_torque_round() {
         let scale = Scale::new(ScaleParameters { reversed: true, ..EROB }).unwrap();
         assert_eq!(scale.position_to_counts(TAU), -524_288);
-        assert_eq!(scale.velocity_to_counts(TAU), -524_288);
+        assert_eq!(scale.velocity_to_drive(TAU), -524_288);
         assert_eq!(scale.torque_to_per_mille(31.0), -1000);
         assert_eq!(scale.torque_from_per_mille(-1000), 31.0);
     }
@@ -185,7 +196,7 @@ mod tests {
                 counts_per_turn: turns, gear_ratio: gear, reversed, zero_counts: zero.into(), ..EROB
             }).unwrap();
             prop_assert_eq!(scale.position_to_counts(scale.position_from_counts(counts)), counts);
-            prop_assert_eq!(scale.velocity_to_counts(scale.velocity_from_counts(counts)), counts);
+            prop_assert_eq!(scale.velocity_to_drive(scale.velocity_from_drive(counts)), counts);
         }
 
         #[test]

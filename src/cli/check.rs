@@ -159,6 +159,10 @@ impl AxisCheck {
             Control::Position => "csp",
             Control::Velocity { .. } => "csv",
             Control::Torque { .. } => "cst",
+            Control::Interpolated => "ip",
+            Control::ProfilePosition => "pp",
+            Control::ProfileVelocity => "pv",
+            Control::ProfileTorque => "pt",
         };
         Self {
             name: axis.name.clone(),
@@ -177,7 +181,10 @@ impl AxisCheck {
             following_error_time_ns: axis.following_error.time_ns,
             counts_per_unit,
             resolution: 1.0 / counts_per_unit,
-            counts_per_cycle: axis.limits.velocity * counts_per_unit * config.cycle.period_ns as f64 / 1e9,
+            counts_per_cycle: axis.limits.velocity
+                * counts_per_unit
+                * config.bus_cycle(axis.bus).period_ns as f64
+                / 1e9,
             counts_range: [first.min(second), first.max(second)],
         }
     }

@@ -38,6 +38,13 @@ pub const EROB_IDENTITY: Identity = Identity {
     product: Some(0x2648_3052),
     revision: None,
 };
+/// `[[axis]] counts_per_turn` of a YZ-AIM: 15 bits on the motor side.
+pub const YZ_AIM_COUNTS_PER_TURN: f64 = 32_768.0;
+/// `[axis.identity]` of a YZ-AIM.
+pub const YZ_AIM_IDENTITY: Identity =
+    Identity { device_type: Some(0x0002_0192), vendor: Some(0x331), product: Some(1), revision: None };
+/// `[[axis]] answers_sync`
+pub const ANSWERS_SYNC: bool = true;
 /// `[[axis]] gear_ratio`
 pub const GEAR_RATIO: f64 = 1.0;
 /// `[[axis]] missed_feedback_cycles`

@@ -8,8 +8,11 @@ use serde::Serialize;
 /// How an axis is commanded. Defaults of the gains: a position gain of 20 1/s; in CST a stiffness of inertia · bandwidth² and
 /// a damping of 2 · inertia · bandwidth with a bandwidth of 40 rad/s, and the inertia and friction of the simulated joint.
 pub use takt_rt::control::ControlLaw as Control;
+use takt_rt::dialect::Dialect;
 /// Limits of an axis in rad (m) and seconds. Defaults: the deceleration is the acceleration, the jerk is infinite.
 pub use takt_rt::guard::AxisLimits as Limits;
+
+use super::defaults;
 
 /// A whole controller: one cycle, its buses, its axes and what they are to do.
 #[derive(Clone, Debug, PartialEq)]
@@ -43,6 +46,14 @@ pub struct Cycle {
     /// may leave it to [`automatic_command_phase`](crate::bus::schedule::automatic_command_phase); what that finds
     /// stands here.
     pub command_phase_ns: u64,
+}
+
+impl Config {
+    /// The cycle of a bus: as the controller's, or a multiple of it. A bus that is not there has the controller's.
+    pub fn bus_cycle(&self, bus: usize) -> Cycle {
+        let divider = self.buses.get(bus).map_or(1, |bus| bus.divider.max(1));
+        Cycle { period_ns: self.cycle.period_ns * u64::from(divider), ..self.cycle }
+    }
 }
 
 /// What is asked of the operating system for the real-time thread.
@@ -80,6 +91,9 @@ pub struct Bus {
     pub name: String,
     /// What it is connected to. Default: simulated.
     pub interface: Interface,
+    /// Cycles of the controller in one cycle of this bus (SYNC, feedback, set-points). Default 1: a file gives the
+    /// period.
+    pub divider: u32,
     /// Bit rate (bit/s) of classic frames and of the arbitration phase. Default 1 Mbit/s.
     pub bit_rate: u32,
     /// Bit rate (bit/s) of the data phase of CAN FD frames; `None`, the default, on a classic bus.
@@ -116,7 +130,7 @@ pub struct Axis {
     pub control: Control,
     /// Rotary (the default) or linear.
     pub travel: Travel,
-    /// Counts of one turn of the position that the drive reports. Default: the family's (eRob: 524288).
+    /// Counts of one turn of the position that the drive reports. Default: the family's (eRob: 524288, YZ-AIM: 32768).
     pub counts_per_turn: f64,
     /// Turns of the reported position for one turn of the joint. Default 1.
     pub gear_ratio: f64,
@@ -134,6 +148,9 @@ pub struct Axis {
     pub transmission_type: u8,
     /// What the drive reports every cycle beside statusword and position. Default: nothing.
     pub feedback: Vec<Feedback>,
+    /// Whether a YZ-AIM answers SYNC with its position (TPDO2), the default, or set-points alone (TPDO4), which spares
+    /// the bus a frame and makes the feedback a cycle older. Other drives always answer SYNC.
+    pub answers_sync: bool,
     /// The longest time from SYNC until the drive has its feedback ready to be sent. Default 20 µs.
     pub feedback_delay_ns: u64,
     /// Period of the drive's own heartbeat (object 1017); `None`, the default, leaves it off: feedback in every cycle
@@ -150,6 +167,43 @@ pub struct Axis {
 pub enum DriveFamily {
     /// ZeroErr eRob, CANopen firmware.
     ErobCanopen,
+    /// YZ-AIM integrated servo, CANopen edition.
+    YzAim,
+}
+
+impl DriveFamily {
+    /// The word for it in a configuration.
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::ErobCanopen => "erob-canopen",
+            Self::YzAim => "yz-aim",
+        }
+    }
+
+    /// How its drives speak through controlword and statusword.
+    pub const fn dialect(self) -> Dialect {
+        match self {
+            Self::ErobCanopen => Dialect::Cia402,
+            Self::YzAim => Dialect::YzAim,
+        }
+    }
+
+    /// Counts of one turn of the position that its drives report.
+    pub const fn counts_per_turn(self) -> f64 {
+        match self {
+            Self::ErobCanopen => defaults::EROB_COUNTS_PER_TURN,
+            Self::YzAim => defaults::YZ_AIM_COUNTS_PER_TURN,
+        }
+    }
+
+    /// What its drives call a speed of one turn of their position in a second.
+    pub const fn velocity_units_per_turn(self, counts_per_turn: f64) -> f64 {
+        match self {
+            Self::ErobCanopen => counts_per_turn,
+            // r/min
+            Self::YzAim => 60.0,
+        }
+    }
 }
 
 /// Something a drive can report every cycle beside statusword and position.
@@ -237,11 +291,11 @@ pub struct Program {
     pub moves: Vec<ProgramMove>,
 }
 
-/// A coordinated move of every axis to rest.
+/// A coordinated move of every axis to rest, or for drives in profile velocity or torque a time at one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ProgramMove {
-    /// Targets in rad (m), in the order of the axes.
-    pub target: Vec<f64>,
+    /// What is wanted of the axes, in their order.
+    pub target: ProgramTarget,
     /// Fraction of the velocity limits. Default 1.
     pub velocity_scale: f64,
     /// Fraction of the acceleration and jerk limits. Default 1.
@@ -250,6 +304,27 @@ pub struct ProgramMove {
     pub minimum_duration_s: f64,
     /// Standstill after it, in seconds. Default 0.
     pub dwell_s: f64,
+}
+
+/// What a move wants of every axis.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ProgramTarget {
+    /// To be there: rad (m).
+    Position(Vec<f64>),
+    /// Drives in profile velocity go at a speed for a time, and stop.
+    Velocity {
+        /// rad/s (m/s); 0 for axes in other modes.
+        velocity: Vec<f64>,
+        /// In seconds, from when it has been reached.
+        duration_s: f64,
+    },
+    /// Drives in profile torque push with a torque for a time, and let go.
+    Torque {
+        /// N·m (N); 0 for axes in other modes.
+        torque: Vec<f64>,
+        /// In seconds, from when it has been reached.
+        duration_s: f64,
+    },
 }
 
 /// What is written down.

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use takt_rt::axis::{AxisParameters, Pdo};
+use takt_rt::axis::{AxisParameters, CommandPdo, Pdo};
 use takt_rt::cycle::SlotPlan;
 use takt_rt::engine::{BusParameters, Engine, EngineParameters, Heartbeat, SetUpError};
 use takt_rt::frame::Id;
@@ -10,11 +10,13 @@ use takt_rt::pdo::{Mapping, MappingError};
 use takt_rt::record::{MAX_AXES, MAX_BUSES};
 use takt_rt::units::{Scale, ScaleError, ScaleParameters};
 
-use crate::config::{Axis, Config, Travel};
-use crate::drive::{PdoPlan, ProcessData};
+use crate::config::{Axis, Config, DriveFamily, Travel};
+use crate::drive::{PdoPlan, ProcessData, yz_aim};
 
 /// How long the drives may take from the first controlword to operation enabled.
 const ENABLE_TIMEOUT_NS: u64 = 5_000_000_000;
+/// How long a drive may take to acknowledge a target in profile position.
+const ACKNOWLEDGE_TIMEOUT_NS: u64 = 500_000_000;
 /// How long set-points may fail to get onto the wire before the group stops.
 const NOT_TRANSMITTED_NS: u64 = 10_000_000;
 /// The most service frames on a bus in one cycle before set-points are sent.
@@ -83,10 +85,11 @@ pub fn engine(config: &Config) -> Result<Engine, AssembleError> {
         .axes
         .iter()
         .enumerate()
-        .map(|(index, axis)| axis_parameters(index, axis, &cycles))
+        .map(|(index, axis)| axis_parameters(index, axis, config, &cycles))
         .collect::<Result<_, _>>()?;
     let buses = config.buses.iter().map(|bus| BusParameters {
         sync_id: Id::canopen(0x080, 0),
+        divider: bus.divider,
         service_frames_active: bus.service_frames_per_cycle,
         service_frames_passive: SERVICE_FRAMES_PASSIVE.max(bus.service_frames_per_cycle),
     });
@@ -101,6 +104,7 @@ pub fn engine(config: &Config) -> Result<Engine, AssembleError> {
         heartbeat,
         enable_timeout_cycles: cycles(ENABLE_TIMEOUT_NS),
         not_transmitted_cycles: cycles(NOT_TRANSMITTED_NS),
+        acknowledge_timeout_cycles: cycles(ACKNOWLEDGE_TIMEOUT_NS),
     })
     .map_err(AssembleError::Engine)
 }
@@ -108,21 +112,31 @@ pub fn engine(config: &Config) -> Result<Engine, AssembleError> {
 fn axis_parameters(
     index: usize,
     axis: &Axis,
+    config: &Config,
     cycles: &impl Fn(u64) -> u32,
 ) -> Result<AxisParameters, AssembleError> {
     let data = ProcessData::of(axis);
-    let compile = |plans: &[PdoPlan], compile: fn(&[_]) -> Result<Mapping, MappingError>| {
-        plans
-            .iter()
-            .map(|plan| Ok(Pdo { id: plan.id, mapping: compile(&plan.objects)? }))
-            .collect::<Result<_, _>>()
-            .map_err(|error| AssembleError::Mapping { axis: index, error })
+    let wrong_mapping = |error| AssembleError::Mapping { axis: index, error };
+    let command = |plan: &PdoPlan| -> Result<CommandPdo, MappingError> {
+        let pdo = Pdo { id: plan.id, mapping: Mapping::commands(&plan.objects)? };
+        Ok(CommandPdo { pdo, cadence: plan.cadence })
+    };
+    let feedback = |plan: &PdoPlan| Ok(Pdo { id: plan.id, mapping: Mapping::feedback(&plan.objects)? });
+    let spacing_ns = match axis.drive {
+        DriveFamily::ErobCanopen => 0,
+        DriveFamily::YzAim => yz_aim::CONTROLWORD_SPACING_NS,
     };
     Ok(AxisParameters {
         bus: u8::try_from(axis.bus).unwrap_or(u8::MAX),
         node: axis.node,
-        commands: compile(&data.commands, Mapping::commands)?,
-        feedback: compile(&data.feedback, Mapping::feedback)?,
+        commands: data.commands.iter().map(command).collect::<Result<_, _>>().map_err(wrong_mapping)?,
+        feedback: data.feedback.iter().map(feedback).collect::<Result<_, _>>().map_err(wrong_mapping)?,
+        unused: data.unused.iter().map(|plan| plan.id).collect(),
+        dialect: axis.drive.dialect(),
+        controlword_spacing_cycles: u32::try_from(
+            spacing_ns.div_ceil(config.bus_cycle(axis.bus).period_ns.max(1)),
+        )
+        .unwrap_or(u32::MAX),
         law: axis.control,
         scale: scale(axis).map_err(|error| AssembleError::Scale { axis: index, error })?,
         limits: axis.limits,
@@ -143,6 +157,7 @@ pub fn scale(axis: &Axis) -> Result<Scale, ScaleError> {
     };
     Scale::new(ScaleParameters {
         counts_per_turn: axis.counts_per_turn,
+        velocity_units_per_turn: axis.drive.velocity_units_per_turn(axis.counts_per_turn),
         gear_ratio: axis.gear_ratio,
         travel_per_turn,
         reversed: axis.reversed,

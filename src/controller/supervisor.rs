@@ -10,7 +10,6 @@
 
 use std::collections::VecDeque;
 
-use takt_rt::cia402;
 use takt_rt::door::{AxisSnapshot, Request, Snapshot};
 use takt_rt::frame::Frame;
 use takt_rt::stop::{Phase, Rule, StopCategory, StopReason};
@@ -297,7 +296,7 @@ impl Supervisor {
         }
         match self.program.poll(now_ns, snapshot) {
             Step::Wait => {}
-            Step::Begin(begun) => self.outgoing.push_back(Request::Move(*begun)),
+            Step::Begin(requests) => self.outgoing.extend(requests),
             Step::Refused(number) => self.end(now_ns, Outcome::MoveRefused { number }),
             Step::Finished => self.end(now_ns, Outcome::Finished),
         }
@@ -361,9 +360,8 @@ impl Supervisor {
     }
 
     fn faulted(&self, snapshot: &Snapshot) -> Option<(usize, u16)> {
-        let is_faulted = |word| cia402::State::decode(word).is_faulted();
         let axes = self.shown(snapshot);
-        axes.iter().position(|axis| is_faulted(axis.statusword)).map(|axis| (axis, axes[axis].error_code))
+        axes.iter().position(|axis| axis.drive_state.is_faulted()).map(|axis| (axis, axes[axis].error_code))
     }
 
     /// What the run is doing.

@@ -1,6 +1,7 @@
 //! Carries out a list of steps on one drive. No input and output: frames and time are handed in, frames are handed
 //! out; every wait is bounded.
 
+use takt_rt::dialect::Dialect;
 use takt_rt::frame::{Frame, Id};
 use takt_rt::time::Nanoseconds;
 
@@ -12,6 +13,7 @@ use crate::canopen::nmt::{ErrorControl, NmtState, NmtTarget};
 use crate::canopen::object::Object;
 use crate::canopen::objects::DEVICE_TYPE;
 use crate::canopen::sdo::{Client, Completed, SdoError, Timing, Transfer};
+use crate::config::Axis;
 
 /// How long to wait between two readings of an object that is waited for.
 const AWAIT_PAUSE_NS: Nanoseconds = 5_000_000;
@@ -77,22 +79,22 @@ type Progress = Result<(), Cause>;
 
 impl AxisRun {
     pub fn new(
-        node: u8,
+        axis: &Axis,
         timing: Timing,
         steps: Vec<Step>,
         policy: Policy,
         other_protocol: Option<OtherProtocol>,
     ) -> Self {
         Self {
-            node,
+            node: axis.node,
             policy,
             other_protocol,
             steps,
             current: 0,
             phase: Phase::Begin,
-            client: Client::new(node, timing),
+            client: Client::new(axis.node, timing),
             reported: None,
-            facts: AxisFacts::default(),
+            facts: AxisFacts { dialect: axis.drive.dialect(), ..AxisFacts::default() },
             failure: None,
         }
     }
@@ -353,6 +355,15 @@ impl AxisRun {
         }
     }
 
+    /// Whether an error says that the drive has no such object. A YZ-AIM says so by silence.
+    fn means_absent(&self, error: SdoError) -> bool {
+        match error {
+            SdoError::Aborted(code) => code.means_absent(),
+            SdoError::NoReply { .. } => self.facts.dialect == Dialect::YzAim,
+            _ => false,
+        }
+    }
+
     fn read(
         &mut self,
         object: Object,
@@ -385,7 +396,7 @@ impl AxisRun {
         outcome: Result<Completed, SdoError>,
     ) -> Progress {
         match outcome {
-            Err(SdoError::Aborted(code)) if is_optional && code.means_absent() => {
+            Err(error) if is_optional && self.means_absent(error) => {
                 self.facts.absent.push(object.address);
                 self.next_step();
             }

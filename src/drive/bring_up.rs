@@ -18,6 +18,7 @@ use super::erob_canopen;
 use super::facts::AxisFacts;
 use super::failure::{AxisFailure, BringUpError};
 use super::step::Step;
+use super::yz_aim;
 use crate::canopen::sdo;
 use crate::config::{Axis, Config, DriveFamily};
 
@@ -92,12 +93,14 @@ impl BringUp {
                 DriveFamily::ErobCanopen => {
                     (erob_canopen::configure(config, axis, &timing), erob_canopen::other_protocol(axis.node))
                 }
+                DriveFamily::YzAim => (yz_aim::configure(config, axis, &timing), None),
             };
             // A drive that has restarted has already obeyed the first step, the reset.
-            AxisRun::new(axis.node, timing.sdo, steps, Policy::RestartFrom(1), other_protocol)
+            AxisRun::new(axis, timing.sdo, steps, Policy::RestartFrom(1), other_protocol)
         });
         let start_steps = config.axes.iter().map(|axis| match axis.drive {
             DriveFamily::ErobCanopen => erob_canopen::start(axis, &timing),
+            DriveFamily::YzAim => yz_aim::start(axis, &timing),
         });
         Self { group, start_steps: start_steps.collect(), stage: Stage::Configure }
     }
@@ -163,8 +166,9 @@ impl Leave {
         let group = Group::new(config, |axis| {
             let steps = match axis.drive {
                 DriveFamily::ErobCanopen => erob_canopen::leave(axis, &timing),
+                DriveFamily::YzAim => yz_aim::leave(axis, &timing),
             };
-            AxisRun::new(axis.node, timing.sdo, steps, Policy::BestEffort, None)
+            AxisRun::new(axis, timing.sdo, steps, Policy::BestEffort, None)
         });
         Self { group }
     }

@@ -1,30 +1,27 @@
 //! ZeroErr eRob joints with CANopen firmware (eRunner manual 1.7, chapter 5; what real units add to it): the steps that
 //! bring one up, start it and leave it, and what its own error codes mean.
 
-use std::f64::consts::TAU;
-
 use takt_rt::cia402::controlword;
 use takt_rt::frame::{Frame, Id};
+use takt_rt::pdo::CommandSlot;
 use takt_rt::time::Nanoseconds;
 
 use super::axis_run::OtherProtocol;
 use super::bring_up::BringUpTiming;
 use super::process_data::{PdoPlan, ProcessData};
 use super::step::{Action, Check, Fact, ReadBack, Source, Step, TextFact, When};
+use super::step_list::{List, counts, rounded_up, watched_heartbeat};
 use crate::canopen::emcy::ErrorCode;
 use crate::canopen::nmt::{NmtCommand, NmtState};
 use crate::canopen::object::{DataType, Object};
-use crate::canopen::objects::{
-    self, PDO_IDENTITY, PDO_INVALID, PdoDirection, PdoParameters, error_behaviour,
-};
-use crate::config::{Axis, Config, Control, Travel};
+use crate::canopen::objects::{self, PDO_INVALID, PdoDirection, PdoParameters, error_behaviour};
+use crate::config::{Axis, Config, Control};
 
 /// The fault of a joint whose multi-turn battery is empty or was disconnected.
 pub const MULTI_TURN_BATTERY: ErrorCode = ErrorCode(0x730F);
 
 /// RPDOs and TPDOs that the drive has, each.
 const PDO_COUNT: u8 = 4;
-const PROFILE_CIA402: u16 = 402;
 /// The joint calls this INTEGER32, where the standard says UNSIGNED32.
 const FOLLOWING_ERROR_WINDOW: Object = Object::new(0x6065, 0, DataType::I32, "following error window");
 
@@ -69,7 +66,7 @@ pub(super) fn configure(config: &Config, axis: &Axis, timing: &BringUpTiming) ->
     );
     identity(&mut list, axis);
     come_to_rest(&mut list, axis, timing);
-    synchronisation(&mut list, config.cycle.period_ns);
+    synchronisation(&mut list, config.bus_cycle(axis.bus).period_ns);
     process_data(&mut list, axis);
     mode(&mut list, axis, timing);
     ratings(&mut list, axis);
@@ -102,18 +99,7 @@ pub(super) fn leave(axis: &Axis, timing: &BringUpTiming) -> Vec<Step> {
 }
 
 fn identity(list: &mut List, axis: &Axis) {
-    list.about(
-        "identity",
-        "another drive than configured answers under this node number: check the wiring and the node numbers, or \
-         correct `identity` in the configuration",
-    );
-    let expected = |value: Option<u32>| value.map_or(Check::Any, |value| Check::Equals(value.into()));
-    let device_type = axis.identity.device_type;
-    let profile = device_type.map_or(Check::Profile(PROFILE_CIA402), |value| Check::Equals(value.into()));
-    list.read(objects::DEVICE_TYPE, profile, Fact::DeviceType);
-    list.read(objects::VENDOR_ID, expected(axis.identity.vendor), Fact::VendorId);
-    list.read(objects::PRODUCT_CODE, expected(axis.identity.product), Fact::ProductCode);
-    list.read(objects::REVISION_NUMBER, expected(axis.identity.revision), Fact::RevisionNumber);
+    list.identity(axis);
     for (object, keep) in [
         (objects::DEVICE_NAME, TextFact::DeviceName),
         (objects::HARDWARE_VERSION, TextFact::HardwareVersion),
@@ -125,11 +111,12 @@ fn identity(list: &mut List, axis: &Axis) {
         "supported modes",
         "choose another control mode for this axis, or load firmware that has this one",
     );
-    list.read(
-        objects::SUPPORTED_DRIVE_MODES,
-        Check::Supports(axis.control.operation_mode()),
-        Fact::SupportedModes,
-    );
+    // Some units follow mode 7 although they do not announce it (eRunner manual, figure 5-38): 6061 will tell.
+    let check = match axis.control {
+        Control::Interpolated => Check::Any,
+        control => Check::Supports(control.operation_mode()),
+    };
+    list.read(objects::SUPPORTED_DRIVE_MODES, check, Fact::SupportedModes);
 }
 
 /// A drive may have been left enabled, even moving: its communication is new, its motion is not.
@@ -186,7 +173,7 @@ fn interpolation_time(period_ns: Nanoseconds) -> Option<(i64, i64)> {
 }
 
 fn process_data(list: &mut List, axis: &Axis) {
-    let ProcessData { commands, feedback } = ProcessData::of(axis);
+    let ProcessData { commands, feedback, .. } = ProcessData::of(axis);
     for (direction, plans, name) in [
         (PdoDirection::Receive, commands, "RPDO mapping"),
         (PdoDirection::Transmit, feedback, "TPDO mapping"),
@@ -234,10 +221,14 @@ fn unused_id(direction: PdoDirection, number: u8, node: u8) -> u32 {
 }
 
 fn mode(list: &mut List, axis: &Axis, timing: &BringUpTiming) {
-    list.about(
-        "mode of operation",
-        "choose another control mode for this axis; clear the drive's fault if it has one",
-    );
+    let advice = match axis.control {
+        Control::Interpolated => {
+            "this firmware has no interpolated position (object 6502 does not announce it, and the drive does not \
+             follow): set mode = \"csp\" for this axis"
+        }
+        _ => "choose another control mode for this axis; clear the drive's fault if it has one",
+    };
+    list.about("mode of operation", advice);
     let mode = axis.control.operation_mode() as i64;
     list.write(objects::MODES_OF_OPERATION, mode);
     list.push(Action::Await {
@@ -253,10 +244,8 @@ fn ratings(list: &mut List, axis: &Axis) {
         "ratings",
         "torque cannot be commanded without the drive's rated torque: choose another control mode",
     );
-    let torque = match axis.control {
-        Control::Torque { .. } => Check::Positive,
-        Control::Position | Control::Velocity { .. } => Check::Any,
-    };
+    let is_torque_sent = axis.control.target_slot() == CommandSlot::TargetTorque;
+    let torque = if is_torque_sent { Check::Positive } else { Check::Any };
     list.read(objects::MOTOR_RATED_CURRENT, Check::Any, Fact::RatedCurrent);
     list.read(objects::MOTOR_RATED_TORQUE, torque, Fact::RatedTorque);
     list.read_optional(objects::MAX_TORQUE, Fact::MaxTorque);
@@ -268,12 +257,14 @@ fn ratings(list: &mut List, axis: &Axis) {
 fn limits(list: &mut List, axis: &Axis) {
     list.about("limits", "choose limits for this axis that its drive accepts");
     let limits = &axis.limits;
-    if axis.control == Control::Position {
-        let window = counts(axis, 2.0 * axis.following_error.limit).min(i32::MAX.into());
-        list.write_optional(FOLLOWING_ERROR_WINDOW, window);
+    let target = axis.control.target_slot();
+    if target == CommandSlot::TargetPosition {
+        // In profile position the drive follows its own profile, whose lag is not ours to judge.
+        let error = if axis.control.is_profile() { f64::INFINITY } else { 2.0 * axis.following_error.limit };
+        list.write_optional(FOLLOWING_ERROR_WINDOW, counts(axis, error).min(i32::MAX.into()));
         list.write_optional(objects::PROFILE_VELOCITY, counts(axis, limits.velocity));
     }
-    if !matches!(axis.control, Control::Torque { .. }) {
+    if target != CommandSlot::TargetTorque {
         list.write_optional(objects::PROFILE_ACCELERATION, counts(axis, limits.acceleration));
         list.write_optional(objects::PROFILE_DECELERATION, counts(axis, limits.deceleration));
     }
@@ -311,93 +302,7 @@ fn heartbeats(list: &mut List, config: &Config, axis: &Axis) {
         let behaviour = objects::COMMUNICATION_ERROR_BEHAVIOUR;
         list.write_and_read_back(behaviour, error_behaviour::STOPPED.into());
     }
-    let watched = config.master.heartbeat_ns.map_or(0, |_| {
-        let timeout_ms = rounded_up(config.master.heartbeat_timeout_ns, 1_000_000).min(u16::MAX.into());
-        i64::from(config.master.node) << 16 | timeout_ms
-    });
-    list.write_and_read_back(objects::CONSUMER_HEARTBEAT_TIME, watched);
-}
-
-/// A distance (rad, m), or one per second (per second), in drive units; at least 1, at most what 32 bits hold.
-fn counts(axis: &Axis, distance: f64) -> i64 {
-    let travel_per_turn = match axis.travel {
-        Travel::Rotary => TAU,
-        Travel::Linear { lead_m } => lead_m,
-    };
-    let counts = distance / travel_per_turn * axis.gear_ratio * axis.counts_per_turn;
-    counts.abs().round().clamp(1.0, u32::MAX.into()) as i64
-}
-
-fn rounded_up(ns: Nanoseconds, unit_ns: Nanoseconds) -> i64 {
-    i64::try_from(ns.div_ceil(unit_ns)).unwrap_or(i64::MAX)
-}
-
-/// Steps under construction: each belongs to the subject that was named last.
-struct List {
-    steps: Vec<Step>,
-    name: &'static str,
-    advice: &'static str,
-    when: When,
-}
-
-impl List {
-    fn new(name: &'static str, advice: &'static str) -> Self {
-        Self { steps: vec![], name, advice, when: When::Always }
-    }
-
-    fn about(&mut self, name: &'static str, advice: &'static str) {
-        (self.name, self.advice) = (name, advice);
-    }
-
-    fn push(&mut self, action: Action) {
-        self.steps.push(Step { name: self.name, advice: self.advice, when: self.when, action });
-    }
-
-    fn nmt(
-        &mut self,
-        command: NmtCommand,
-        awaited: Option<NmtState>,
-        within_ns: Nanoseconds,
-        repeat_ns: Nanoseconds,
-    ) {
-        self.push(Action::Nmt { command, awaited, within_ns, repeat_ns });
-    }
-
-    /// Commands a state that the drive's heartbeat, if it has one, must report.
-    fn nmt_reported(&mut self, command: NmtCommand, state: NmtState, axis: &Axis, timing: &BringUpTiming) {
-        let period_ns = axis.heartbeat_ns.unwrap_or(0);
-        let awaited = axis.heartbeat_ns.map(|_| state);
-        let within_ns = timing.confirm_timeout_ns.saturating_add(period_ns.saturating_mul(3));
-        self.nmt(command, awaited, within_ns, within_ns / 3);
-    }
-
-    fn read(&mut self, object: Object, check: Check, keep: Fact) {
-        self.push(Action::Read { object, check, keep: Some(keep), is_optional: false });
-    }
-
-    fn read_optional(&mut self, object: Object, keep: Fact) {
-        self.push(Action::Read { object, check: Check::Any, keep: Some(keep), is_optional: true });
-    }
-
-    fn write_with(&mut self, object: Object, value: i64, read_back: ReadBack, is_optional: bool) {
-        self.push(Action::Write { object, value: Source::Value(value), read_back, is_optional });
-    }
-
-    fn write(&mut self, object: Object, value: i64) {
-        self.write_with(object, value, ReadBack::No, false);
-    }
-
-    fn write_and_read_back(&mut self, object: Object, value: i64) {
-        self.write_with(object, value, ReadBack::EXACT, false);
-    }
-
-    fn write_optional(&mut self, object: Object, value: i64) {
-        self.write_with(object, value, ReadBack::No, true);
-    }
-
-    fn write_cob_id(&mut self, parameters: PdoParameters, value: u32) {
-        self.write_with(parameters.cob_id(), value.into(), ReadBack::Masked(PDO_IDENTITY), false);
-    }
+    list.write_and_read_back(objects::CONSUMER_HEARTBEAT_TIME, watched_heartbeat(config));
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! What a bring-up learns of a drive.
 
 use takt_rt::cia402::State;
+use takt_rt::dialect::Dialect;
 
 use super::step::{Fact, TextFact};
 use crate::canopen::emcy::{Emergency, ErrorCode};
@@ -9,6 +10,8 @@ use crate::canopen::object::ObjectAddress;
 /// What a drive has said of itself. Numbers are as of the last time they were read.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct AxisFacts {
+    /// How it speaks.
+    pub dialect: Dialect,
     /// Who it is.
     pub identity: DeviceIdentity,
     /// What it calls itself and its parts, where it does.
@@ -65,7 +68,7 @@ pub struct DeviceTexts {
 impl AxisFacts {
     /// The state in the last statusword.
     pub const fn state(&self) -> State {
-        State::decode(self.statusword)
+        self.dialect.state(self.statusword)
     }
 
     /// What is wrong, when the drive is in a fault: object 603F, or when that is zero the code of the last emergency.

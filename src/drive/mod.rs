@@ -1,6 +1,6 @@
 //! What differs from one family of drives to the next: process data, bring-up, parameters.
 //!
-//! A family writes its procedures down as lists of steps (`erob_canopen`, `step`); one machine carries them out for
+//! A family writes its procedures down as lists of steps (`erob_canopen`, `yz_aim`, `step_list`, `step`); one machine carries them out for
 //! every family (`axis_run`), for all axes at once ([`BringUp`], [`Leave`]); what was learnt is in [`AxisFacts`], what
 //! went wrong in [`BringUpError`].
 
@@ -11,6 +11,8 @@ mod facts;
 mod failure;
 mod process_data;
 mod step;
+mod step_list;
+pub mod yz_aim;
 
 pub use bring_up::{BringUp, BringUpTiming, Leave, NotConfigured, Progress, Stage};
 pub use facts::{AxisFacts, DeviceIdentity, DeviceTexts};

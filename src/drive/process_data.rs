@@ -1,14 +1,16 @@
 //! Which objects travel in which PDO. Bring-up programs it, the cycle compiles it, and the bus arithmetic counts it.
 
+use takt_rt::axis::Cadence;
 use takt_rt::frame::Id;
-use takt_rt::pdo::MappedObject;
+use takt_rt::pdo::{CommandSlot, MappedObject};
 
-use crate::config::{Axis, Control, Feedback};
+use crate::config::{Axis, Control, DriveFamily, Feedback};
 
 const CONTROLWORD: MappedObject = MappedObject::new(0x6040, 0, 16);
 const TARGET_POSITION: MappedObject = MappedObject::new(0x607A, 0, 32);
 const TARGET_VELOCITY: MappedObject = MappedObject::new(0x60FF, 0, 32);
 const TARGET_TORQUE: MappedObject = MappedObject::new(0x6071, 0, 16);
+const OPERATION_MODE: MappedObject = MappedObject::new(0x6060, 0, 8);
 const STATUSWORD: MappedObject = MappedObject::new(0x6041, 0, 16);
 const POSITION: MappedObject = MappedObject::new(0x6064, 0, 32);
 
@@ -25,6 +27,8 @@ pub struct PdoPlan {
     pub transmission_type: u8,
     /// What it carries, in order.
     pub objects: Vec<MappedObject>,
+    /// When it is sent, if by us.
+    pub cadence: Cadence,
 }
 
 impl PdoPlan {
@@ -37,20 +41,30 @@ impl PdoPlan {
 /// The PDOs of one axis.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ProcessData {
-    /// What we send each cycle (RPDOs of the drive).
+    /// What we send (RPDOs of the drive).
     pub commands: Vec<PdoPlan>,
-    /// What the drive sends each cycle (its TPDOs).
+    /// What the drive sends each cycle and the controller works with (its TPDOs).
     pub feedback: Vec<PdoPlan>,
+    /// What the drive sends beside that.
+    pub unused: Vec<PdoPlan>,
 }
 
 impl ProcessData {
-    /// The process data of an axis. A command fits one PDO; feedback takes as many as it needs, statusword and
-    /// position first.
+    /// The process data of an axis.
     pub fn of(axis: &Axis) -> Self {
-        let target = match axis.control {
-            Control::Position => TARGET_POSITION,
-            Control::Velocity { .. } => TARGET_VELOCITY,
-            Control::Torque { .. } => TARGET_TORQUE,
+        match axis.drive {
+            DriveFamily::ErobCanopen => Self::mapped_freely(axis),
+            DriveFamily::YzAim => Self::of_yz_aim(axis),
+        }
+    }
+
+    /// A drive that is mapped as we like. A command fits one PDO; feedback takes as many as it needs, statusword and
+    /// position first.
+    fn mapped_freely(axis: &Axis) -> Self {
+        let target = match axis.control.target_slot() {
+            CommandSlot::TargetVelocity => TARGET_VELOCITY,
+            CommandSlot::TargetTorque => TARGET_TORQUE,
+            _ => TARGET_POSITION,
         };
         let mut feedback = vec![vec![]];
         for object in [STATUSWORD, POSITION].into_iter().chain(axis.feedback.iter().copied().map(mapped)) {
@@ -63,17 +77,63 @@ impl ProcessData {
                 objects.push(object);
             }
         }
-        let plan = |function: u16, number: u8, objects| PdoPlan {
-            number,
-            id: Id::canopen(function + 0x100 * (u16::from(number) - 1), axis.node),
-            transmission_type: axis.transmission_type,
-            objects,
+        let transmission_type = axis.transmission_type;
+        let receive = |number, objects| PdoPlan {
+            transmission_type,
+            ..pdo(0x200, number, axis.node, objects, Cadence::EveryCycle)
+        };
+        let transmit = |(number, objects)| PdoPlan {
+            transmission_type,
+            ..pdo(0x180, number, axis.node, objects, Cadence::EveryCycle)
         };
         Self {
-            commands: vec![plan(0x200, 1, vec![CONTROLWORD, target])],
-            feedback: (1..).zip(feedback).map(|(number, objects)| plan(0x180, number, objects)).collect(),
+            commands: vec![receive(1, vec![CONTROLWORD, target])],
+            feedback: (1..).zip(feedback).map(transmit).collect(),
+            unused: vec![],
         }
     }
+
+    /// The fixed PDOs of a YZ-AIM (manual, 5.08): it answers RPDO n with TPDO n at once, and SYNC with TPDO 2.
+    fn of_yz_aim(axis: &Axis) -> Self {
+        let receive = |number, objects, cadence| PdoPlan {
+            transmission_type: if number == 4 { 1 } else { 255 },
+            ..pdo(0x200, number, axis.node, objects, cadence)
+        };
+        let transmit = |number: u8| {
+            let objects = vec![POSITION, if number == 3 { mapped(Feedback::Velocity) } else { STATUSWORD }];
+            let answers_sync = number == 2 && axis.answers_sync;
+            PdoPlan {
+                transmission_type: if answers_sync { 1 } else { 255 },
+                ..pdo(0x180, number, axis.node, objects, Cadence::EveryCycle)
+            }
+        };
+        let position = vec![CONTROLWORD, OPERATION_MODE, TARGET_POSITION];
+        let (commands, answer) = match axis.control {
+            Control::ProfileVelocity => {
+                let velocity = vec![CONTROLWORD, OPERATION_MODE, TARGET_VELOCITY];
+                (vec![receive(3, velocity, Cadence::EveryCycle)], 3)
+            }
+            Control::ProfilePosition => (vec![receive(1, position, Cadence::EveryCycle)], 1),
+            _ => {
+                let interpolated = receive(4, vec![TARGET_POSITION], Cadence::EveryCycle);
+                (vec![receive(1, position, Cadence::OnControlword), interpolated], 4)
+            }
+        };
+        let feedback = if axis.answers_sync { 2 } else { answer };
+        let unused = (1..=4).filter(|number| *number != feedback).map(transmit).collect();
+        Self { commands, feedback: vec![transmit(feedback)], unused }
+    }
+
+    /// The PDO among the unused ones with which the drive answers each command at once.
+    pub fn answer(&self) -> Option<&PdoPlan> {
+        let command = self.commands.iter().find(|command| command.cadence == Cadence::EveryCycle)?;
+        self.unused.iter().find(|pdo| pdo.number == command.number)
+    }
+}
+
+fn pdo(function: u16, number: u8, node: u8, objects: Vec<MappedObject>, cadence: Cadence) -> PdoPlan {
+    let id = Id::canopen(function + 0x100 * (u16::from(number) - 1), node);
+    PdoPlan { number, id, transmission_type: 0, objects, cadence }
 }
 
 fn mapped(feedback: Feedback) -> MappedObject {

@@ -14,7 +14,8 @@ use takt_rt::time::Nanoseconds;
 use super::drive::{Drive, DriveFault, Observation};
 use super::erob::{ErobJoint, ErobParameters};
 use super::medium::{BitRates, Medium, Transmission};
-use crate::config::{Axis, Config, DriveFamily, Simulation};
+use super::yz_aim::{YzAimJoint, YzAimParameters};
+use crate::config::{Axis, Config, DriveFamily};
 
 /// Frames the interface's transmit queue holds.
 const TRANSMIT_QUEUE: usize = 256;
@@ -44,16 +45,21 @@ pub struct SimulatedBus {
 }
 
 /// The drive that stands in for an axis.
-fn simulated(axis: &Axis, simulation: &Simulation) -> Box<dyn Drive> {
+fn simulated(axis: &Axis, config: &Config) -> Box<dyn Drive> {
+    let simulation = &config.simulation;
     match axis.drive {
         DriveFamily::ErobCanopen => Box::new(ErobJoint::new(ErobParameters::of(axis, simulation))),
+        DriveFamily::YzAim => {
+            let bit_rate = config.buses.get(axis.bus).map_or(1_000_000, |bus| bus.bit_rate);
+            Box::new(YzAimJoint::new(YzAimParameters::of(axis, bit_rate, simulation)))
+        }
     }
 }
 
 /// The drives that stand in for the axes of a bus.
 pub(super) fn drives_of(config: &Config, bus: usize) -> Vec<Box<dyn Drive>> {
     let axes = config.axes.iter().filter(|axis| axis.bus == bus);
-    axes.map(|axis| simulated(axis, &config.simulation)).collect()
+    axes.map(|axis| simulated(axis, config)).collect()
 }
 
 /// There is no drive with this node number on the bus.

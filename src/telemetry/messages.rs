@@ -59,7 +59,7 @@ pub fn encode_axis(slot: u64, axis: &AxisRecord, encoder: &mut CdrEncoder) {
         .u16(axis.statusword)
         .u16(axis.error_code)
         .u16(axis.feedback_age)
-        .u8(axis.state() as u8);
+        .u8(axis.drive_state as u8);
 }
 
 /// The fields of an [`EVENT`] that only some kinds use.
@@ -99,7 +99,7 @@ impl EventFields {
                 ..none
             },
             EventKind::MoveFinished { id } => Self { kind: 2, move_id: id, ..none },
-            EventKind::DriveState { axis, statusword } => {
+            EventKind::DriveState { axis, statusword, .. } => {
                 Self { kind: 3, axis: Some(axis), statusword, ..none }
             }
             EventKind::Emergency { axis, code, register, manufacturer } => Self {
@@ -190,7 +190,7 @@ mod tests {
                 phase: Phase::Moving,
             }),
             EventKind::MoveFinished { id: 1 },
-            EventKind::DriveState { axis: 0, statusword: 0 },
+            EventKind::DriveState { axis: 0, state: State::NotReadyToSwitchOn, statusword: 0 },
             EventKind::Emergency { axis: 0, code: 0, register: 0, manufacturer: [0; 5] },
             EventKind::MissedSlots { count: 1 },
             EventKind::Refused { phase: Phase::Moving },

@@ -43,6 +43,7 @@ pub const fn rule_key(rule: Rule) -> &'static str {
         Rule::NoTrajectory => "no_trajectory",
         Rule::BusLost => "bus_lost",
         Rule::NotTransmitted => "not_transmitted",
+        Rule::NotAcknowledged => "not_acknowledged",
     }
 }
 
@@ -122,11 +123,14 @@ pub fn stop_cause(stop: &StopReason, machine: &Machine) -> String {
             }
         }
         Rule::DriveDisabled => format!(
-            "the drive of {axis} left operation enabled by itself: it is now in \"{}\"",
-            state(State::decode(value as u16))
+            "the drive of {axis} left operation enabled by itself (statusword 0x{:04X})",
+            value as u16
         ),
         Rule::ModeChanged => {
             format!("the drive of {axis} shows {} instead of {}", mode(value), mode(limit))
+        }
+        Rule::NotAcknowledged => {
+            format!("the drive of {axis} did not acknowledge its target within {}", cycles(limit))
         }
         Rule::EnableTimeout => format!(
             "the drive of {axis} did not reach operation enabled within {} ({:.1} s)",
@@ -164,11 +168,9 @@ pub fn event(event: &Event, machine: &Machine) -> String {
         EventKind::PhaseChanged { from, to } => format!("{} → {}", phase(from), phase(to)),
         EventKind::Stop(reason) => format!("stop: {}", stop(&reason, machine)),
         EventKind::MoveFinished { id } => format!("move {id} finished"),
-        EventKind::DriveState { axis, statusword } => format!(
-            "{}: {} (statusword 0x{statusword:04X})",
-            machine.axis_name(axis),
-            state(State::decode(statusword))
-        ),
+        EventKind::DriveState { axis, state: to, statusword } => {
+            format!("{}: {} (statusword 0x{statusword:04X})", machine.axis_name(axis), state(to))
+        }
         EventKind::Emergency { axis, code: 0, .. } => {
             format!("{}: emergency message: all errors gone", machine.axis_name(axis))
         }
@@ -234,7 +236,7 @@ mod tests {
                 Some(0),
                 0x1250.into(),
                 0.0,
-                "the drive of shoulder left operation enabled by itself: it is now in \"switch on disabled\"",
+                "the drive of shoulder left operation enabled by itself (statusword 0x1250)",
             ),
             (
                 Rule::ModeChanged,
@@ -253,6 +255,13 @@ mod tests {
             ),
             (Rule::BusLost, None, 0.0, 0.0, "bus left is bus-off or its interface is down"),
             (Rule::NotTransmitted, None, 6.0, 0.0, "set-points are not getting onto the wire for 6 cycles"),
+            (
+                Rule::NotAcknowledged,
+                Some(0),
+                501.0,
+                500.0,
+                "the drive of shoulder did not acknowledge its target within 500 cycles",
+            ),
         ];
         for (rule, axis, value, limit, words) in cases {
             assert_eq!(stop_cause(&reason(rule, axis, value, limit), &machine()), words);
@@ -285,7 +294,7 @@ mod tests {
             "enabling → holding"
         );
         assert_eq!(
-            words(EventKind::DriveState { axis: 0, statusword: 0x1637 }),
+            words(EventKind::DriveState { axis: 0, state: State::OperationEnabled, statusword: 0x1637 }),
             "shoulder: operation enabled (statusword 0x1637)"
         );
         assert_eq!(

@@ -119,6 +119,7 @@ fn bus(number: usize) -> Bus {
     Bus {
         name: format!("bus{number}"),
         interface: Interface::Simulated,
+        divider: 1,
         bit_rate: 1_000_000,
         data_bit_rate: None,
         service_frames_per_cycle: FRAMES_PER_STEP,
@@ -151,6 +152,7 @@ fn axis(number: usize, bus: usize, node: u8) -> Axis {
         missed_feedback_cycles: 3,
         transmission_type: 1,
         feedback: vec![Feedback::Torque],
+        answers_sync: true,
         feedback_delay_ns: 20_000,
         heartbeat_ns: Some(50_000_000),
         identity: Identity::default(),

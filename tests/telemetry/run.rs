@@ -8,6 +8,7 @@ use takt::telemetry::{
     AxisDescription, BusDescription, Destination, Logger, LoggerOptions, Machine, Notice, SetPointMagnitudes,
     Unit, WallClock,
 };
+use takt_rt::cia402;
 use takt_rt::door::Door;
 use takt_rt::record::{AxisRecord, CycleRecord, Event, EventKind, MAX_AXES, Timing};
 use takt_rt::stop::{Phase, Rule, StopCategory, StopReason};
@@ -81,6 +82,7 @@ pub fn cycle(slot: u64) -> CycleRecord {
             torque: -8.5,
             following_error: 0.0625 * slot as f32,
             controlword: 0x0F,
+            drive_state: cia402::State::OperationEnabled,
             statusword: 0x1637,
             error_code: 0x7305,
             feedback_age: axis as u16,

@@ -68,20 +68,48 @@ impl Engine {
     }
 
     fn follow_motion(&mut self, now_ns: Nanoseconds, door: &mut impl Door) {
+        let is_driven = self.axes.iter().any(Axis::is_driven);
+        if self.phase == Phase::Moving && is_driven && now_ns > self.drive_until_ns {
+            let age_cycles = (now_ns - self.drive_until_ns).div_ceil(self.period_ns);
+            self.begin_stop(Rule::StaleCommand, None, None, age_cycles as f64, 0.0, now_ns, door);
+        }
         self.motion.advance(self.period_s);
         let next: ArrayVec<State, MAX_AXES> = self.motion.states().take(self.axes.len()).collect();
         if !self.advance_guarded(&next, now_ns, door) || !self.motion.is_finished() {
             return;
         }
-        if self.phase == Phase::Moving {
-            let is_at_rest = next.iter().all(|state| state.velocity == 0.0);
-            if is_at_rest {
-                self.finished_move = self.move_id;
-                self.happened(now_ns, EventKind::MoveFinished { id: self.move_id }, door);
-                self.enter(Phase::Holding, now_ns, door);
-            } else {
-                self.begin_stop(Rule::Requested, Some(StopCategory::Two), None, 0.0, 0.0, now_ns, door);
+        match self.phase {
+            Phase::Moving => {
+                let is_planned_to_rest = next.iter().all(|state| state.velocity == 0.0);
+                self.finish_move(is_planned_to_rest, now_ns, door);
             }
+            _ => self.finish_stop(now_ns, door),
+        }
+    }
+
+    /// The planned part of a move is over; drives in profile modes may still be on their way.
+    fn finish_move(&mut self, is_planned_to_rest: bool, now_ns: Nanoseconds, door: &mut impl Door) {
+        if !is_planned_to_rest {
+            self.begin_stop(Rule::Requested, Some(StopCategory::Two), None, 0.0, 0.0, now_ns, door);
+            return;
+        }
+        if !self.axes.iter().all(Axis::is_target_reached) {
+            return;
+        }
+        if self.finished_move != self.move_id {
+            self.finished_move = self.move_id;
+            self.happened(now_ns, EventKind::MoveFinished { id: self.move_id }, door);
+        }
+        if !self.axes.iter().any(Axis::is_driven) {
+            self.enter(Phase::Holding, now_ns, door);
+        }
+    }
+
+    /// The planned part of a stop is over; a joint in a profile mode gets the time that its limits allow for.
+    fn finish_stop(&mut self, now_ns: Nanoseconds, door: &mut impl Door) {
+        let slowest_s =
+            self.axes.iter().filter(|axis| !axis.is_at_rest()).map(stopping_s).fold(0.0, f64::max);
+        if f64::from(self.phase_cycles) * self.period_s < slowest_s {
             return;
         }
         match self.stop.map(|stop| stop.category) {
@@ -123,7 +151,8 @@ impl Engine {
     /// was, in this same cycle. Returns whether they were taken.
     fn advance_guarded(&mut self, next: &[State], now_ns: Nanoseconds, door: &mut impl Door) -> bool {
         let refusal = self.axes.iter().zip(next).enumerate().find_map(|(index, (axis, state))| {
-            let violation = axis.is_enabled().then(|| axis.check(state, self.period_s).err()).flatten();
+            let is_guarded = axis.is_enabled() && !axis.is_profile();
+            let violation = is_guarded.then(|| axis.check(state, self.period_s).err()).flatten();
             violation.map(|violation| (index as u8, violation))
         });
         if let Some((axis, violation)) = refusal {
@@ -151,4 +180,10 @@ impl Engine {
             self.hold();
         }
     }
+}
+
+/// From full speed to rest at the limits, with some patience for the drive's own profile.
+fn stopping_s(axis: &Axis) -> f64 {
+    let limits = &axis.parameters().limits;
+    1.5 * limits.velocity / limits.deceleration + 0.5
 }

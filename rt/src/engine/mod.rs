@@ -58,6 +58,7 @@ pub struct Engine {
     heartbeat: Option<Heartbeat>,
     enable_timeout_cycles: u32,
     not_transmitted_cycles: u32,
+    acknowledge_timeout_cycles: u32,
 
     phase: Phase,
     phase_cycles: u32,
@@ -70,6 +71,8 @@ pub struct Engine {
     finished_move: u32,
     refused: u64,
     stream: Option<StreamCommand>,
+    /// When the velocities and torques of drives in profile modes expire.
+    drive_until_ns: Nanoseconds,
     stop: Option<StopReason>,
     fault_reset: u32,
     heartbeat_due: u32,
@@ -90,6 +93,9 @@ impl Engine {
         }
         if parameters.axes.is_empty() {
             return Err(SetUpError::NoAxis);
+        }
+        if let Some(bus) = parameters.buses.iter().position(|bus| bus.divider == 0) {
+            return Err(SetUpError::NoDivider { bus });
         }
         let mut dispatch: [Dispatch; MAX_BUSES] = core::array::from_fn(|_| Dispatch::default());
         for (axis, own) in parameters.axes.iter().enumerate() {
@@ -112,6 +118,7 @@ impl Engine {
             heartbeat: parameters.heartbeat,
             enable_timeout_cycles: parameters.enable_timeout_cycles,
             not_transmitted_cycles: parameters.not_transmitted_cycles,
+            acknowledge_timeout_cycles: parameters.acknowledge_timeout_cycles,
             phase: Phase::Passive,
             phase_cycles: 0,
             is_sync_on: false,
@@ -122,6 +129,7 @@ impl Engine {
             finished_move: 0,
             refused: 0,
             stream: None,
+            drive_until_ns: 0,
             stop: None,
             fault_reset: 0,
             heartbeat_due: 0,
@@ -160,12 +168,10 @@ impl Engine {
         self.is_leaving
     }
 
-    /// The SYNC of a bus, if it is to be sent.
-    pub fn sync(&self, bus: usize) -> Option<Frame> {
-        if !self.is_sync_on {
-            return None;
-        }
-        self.buses.get(bus).map(|parameters| Frame::of(parameters.sync_id, []))
+    /// The SYNC of a bus, if one is to be sent in this slot.
+    pub fn sync(&self, bus: usize, slot: u64) -> Option<Frame> {
+        let parameters = self.buses.get(bus)?;
+        (self.is_sync_on && has_cycle(parameters, slot)).then(|| Frame::of(parameters.sync_id, []))
     }
 
     /// Takes a frame that arrived on a bus.
@@ -191,6 +197,7 @@ impl Engine {
                 );
                 self.hand_over(bus, received, door);
             }
+            Destination::Unused => {}
             Destination::Service => self.hand_over(bus, received, door),
         }
     }
@@ -221,8 +228,10 @@ impl Engine {
     ) -> bool {
         let elapsed = self.last_slot.map_or(1, |last| slot.saturating_sub(last));
         self.count_slot(slot, elapsed, transmission, now_ns, door);
+        let elapsed_s = self.period_s * elapsed as f64;
         for axis in &mut self.axes {
-            axis.begin_cycle(self.period_s * elapsed as f64);
+            let has_cycle = has_cycle_of(&self.buses, axis, slot);
+            if has_cycle { axis.begin_cycle(elapsed_s) } else { axis.wait(elapsed_s) }
         }
         self.notice_drive_states(now_ns, door);
         for _ in 0..REQUESTS_PER_CYCLE {
@@ -238,7 +247,7 @@ impl Engine {
         let has_commands = transmission == Transmission::Free && self.phase != Phase::Passive;
         if has_commands {
             self.act(now_ns, door);
-            self.write_commands();
+            self.write_commands(slot);
         }
         self.phase_cycles = self.phase_cycles.saturating_add(1);
         self.record.is_commanded = has_commands;
@@ -270,26 +279,24 @@ impl Engine {
             let (state, statusword) = (axis.drive_state(), axis.statusword());
             if *known != state {
                 *known = state;
-                self.happened(now_ns, EventKind::DriveState { axis: index as u8, statusword }, door);
+                self.happened(now_ns, EventKind::DriveState { axis: index as u8, state, statusword }, door);
             }
         }
     }
 
-    fn write_commands(&mut self) {
+    fn write_commands(&mut self, slot: u64) {
         let resetting = self.fault_reset;
         self.fault_reset = resetting.saturating_sub(1);
+        // Low first, so that what follows is an edge whatever was sent before.
+        let reset_word = match resetting {
+            0 => None,
+            1..=FAULT_RESET_CYCLES => Some(controlword::FAULT_RESET),
+            _ => Some(controlword::DISABLE_VOLTAGE),
+        };
         for axis in &mut self.axes {
-            let word = if resetting > 0 && axis.drive_state().is_faulted() {
-                // Low first, so that what follows is an edge whatever was sent before.
-                if resetting > FAULT_RESET_CYCLES {
-                    controlword::DISABLE_VOLTAGE
-                } else {
-                    controlword::FAULT_RESET
-                }
-            } else {
-                axis.controlword_towards(self.goal)
-            };
-            axis.command(word, axis.is_enabled());
+            if has_cycle_of(&self.buses, axis, slot) {
+                axis.command(self.goal, reset_word.filter(|_| axis.drive_state().is_faulted()));
+            }
         }
     }
 
@@ -302,8 +309,11 @@ impl Engine {
         self.phase_cycles = 0;
     }
 
-    /// The set-points of a bus.
-    pub fn set_points(&self, bus: usize, batch: &mut SendBatch) {
+    /// The set-points of a bus, if it has a cycle in this slot.
+    pub fn set_points(&self, bus: usize, slot: u64, batch: &mut SendBatch) {
+        if !self.buses.get(bus).is_some_and(|parameters| has_cycle(parameters, slot)) {
+            return;
+        }
         for axis in self.axes.iter().filter(|axis| usize::from(axis.parameters().bus) == bus) {
             for frame in axis.frames() {
                 let _ = batch.try_push(frame);
@@ -368,6 +378,7 @@ impl Engine {
                 position: axis.position(),
                 velocity: axis.velocity(),
                 statusword: axis.statusword(),
+                drive_state: axis.drive_state(),
                 error_code: axis.error_code(),
                 is_heard: axis.is_heard(),
             };
@@ -380,6 +391,14 @@ impl Engine {
 
 const NMT_OPERATIONAL: u8 = 5;
 
+const fn has_cycle(bus: &BusParameters, slot: u64) -> bool {
+    slot.is_multiple_of(bus.divider as u64)
+}
+
+fn has_cycle_of(buses: &[BusParameters], axis: &Axis, slot: u64) -> bool {
+    buses.get(usize::from(axis.parameters().bus)).is_some_and(|bus| has_cycle(bus, slot))
+}
+
 fn enter(table: &mut Dispatch, axis: usize, own: &AxisParameters) -> Result<(), SetUpError> {
     if own.commands.is_empty() || own.feedback.is_empty() {
         return Err(SetUpError::NoPdo { axis });
@@ -391,6 +410,9 @@ fn enter(table: &mut Dispatch, axis: usize, own: &AxisParameters) -> Result<(), 
     table.emergency(Id::canopen(0x080, own.node), axis as u8).map_err(taken)?;
     for (number, pdo) in own.feedback.iter().enumerate() {
         table.feedback(pdo.id, axis as u8, number as u8).map_err(taken)?;
+    }
+    for id in &own.unused {
+        table.unused(*id, axis as u8).map_err(taken)?;
     }
     Ok(())
 }

@@ -12,6 +12,9 @@ use crate::time::Nanoseconds;
 pub struct BusParameters {
     /// Identifier of SYNC.
     pub sync_id: Id,
+    /// Slots in one cycle of this bus, at least 1: it has SYNC, feedback and set-points in every slot whose number this
+    /// divides.
+    pub divider: u32,
     /// The most service frames in a cycle while set-points are sent.
     pub service_frames_active: usize,
     /// The most service frames in a cycle before that.
@@ -38,6 +41,8 @@ pub struct EngineParameters {
     pub buses: ArrayVec<BusParameters, MAX_BUSES>,
     /// The heartbeat, if one is sent.
     pub heartbeat: Option<Heartbeat>,
+    /// Cycles within which a drive must acknowledge a set-point of profile position.
+    pub acknowledge_timeout_cycles: u32,
     /// Cycles within which every drive must reach operation enabled.
     pub enable_timeout_cycles: u32,
     /// Cycles in a row in which set-points may fail to get onto the wire.
@@ -51,6 +56,11 @@ pub enum SetUpError {
     NoPeriod,
     /// There is no axis.
     NoAxis,
+    /// The cycle of a bus has no slot.
+    NoDivider {
+        /// The bus.
+        bus: usize,
+    },
     /// An axis names a bus that is not there.
     UnknownBus {
         /// The axis.

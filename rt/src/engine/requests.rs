@@ -1,10 +1,13 @@
 //! What is asked of the group, and what of it is possible now.
 
 use super::{Engine, FAULT_RESET_CYCLES};
+use crate::axis::Axis;
 use crate::cia402::Goal;
-use crate::door::{Door, Move, Request};
+use crate::control::ControlLaw;
+use crate::door::{Door, Move, ProfileMove, Request};
 use crate::motion::Leg;
 use crate::plan::State;
+use crate::profile::ProfileTarget;
 use crate::record::EventKind;
 use crate::stop::{Phase, Rule, StopCategory};
 use crate::time::Nanoseconds;
@@ -28,6 +31,9 @@ impl Engine {
                 true
             }
             Request::Move(parameters) if !is_latched => self.begin_move(&parameters, now_ns, door),
+            Request::SetProfileTarget(target) if !is_latched => {
+                self.set_profile_target(&target, now_ns, door)
+            }
             Request::Stream if self.phase == Phase::Holding && !is_latched => {
                 self.stop = None;
                 self.stream = None;
@@ -44,7 +50,7 @@ impl Engine {
                 self.is_leaving = true;
                 true
             }
-            Request::Enable | Request::Move(_) | Request::Stream => false,
+            Request::Enable | Request::Move(_) | Request::SetProfileTarget(_) | Request::Stream => false,
         };
         if !is_done {
             self.refused += 1;
@@ -67,15 +73,21 @@ impl Engine {
             && scale(parameters.velocity_scale)
             && scale(parameters.acceleration_scale)
             && parameters.minimum_duration_s.is_finite()
-            && self.axes.iter().zip(parameters.target).all(|(axis, to)| axis.parameters().limits.contain(to));
+            && self.axes.iter().zip(parameters.target).all(|(axis, to)| is_target(axis, to));
         if !is_possible {
             return false;
         }
         let targets = parameters.target.into_iter().zip(parameters.target_velocity);
-        let legs = self.axes.iter().zip(targets).map(|(axis, (position, velocity))| Leg {
-            start: axis.set_point(),
-            target: State { position, velocity, acceleration: 0.0 },
-            limits: &axis.parameters().limits,
+        let legs = self.axes.iter().zip(targets).map(|(axis, (position, velocity))| {
+            let start = axis.set_point();
+            let target = State { position, velocity, acceleration: 0.0 };
+            let limits = &axis.parameters().limits;
+            // A drive in a profile mode makes its own way: nothing is planned for it.
+            if axis.is_profile() {
+                Leg::standing(start.position, limits)
+            } else {
+                Leg { start, target, limits }
+            }
         });
         let planned = self.motion.move_to(
             legs,
@@ -86,8 +98,35 @@ impl Engine {
         if planned.is_err() {
             return false;
         }
+        for (axis, position) in self.axes.iter_mut().zip(parameters.target) {
+            if axis.accepts(ProfileTarget::Position(position)) {
+                axis.set_profile_target(ProfileTarget::Position(position));
+            }
+        }
         self.stop = None;
         self.move_id = parameters.id;
+        self.enter(Phase::Moving, now_ns, door);
+        true
+    }
+
+    fn set_profile_target(
+        &mut self,
+        wanted: &ProfileMove,
+        now_ns: Nanoseconds,
+        door: &mut impl Door,
+    ) -> bool {
+        let is_possible = matches!(self.phase, Phase::Holding | Phase::Moving);
+        let axis = self.axes.get_mut(usize::from(wanted.axis));
+        let Some(axis) = axis.filter(|axis| is_possible && axis.accepts(wanted.target)) else {
+            return false;
+        };
+        axis.set_profile_target(wanted.target);
+        self.drive_until_ns = wanted.valid_until_ns;
+        if self.phase == Phase::Holding {
+            self.motion.cancel();
+        }
+        self.stop = None;
+        self.move_id = wanted.id;
         self.enter(Phase::Moving, now_ns, door);
         true
     }
@@ -120,5 +159,14 @@ impl Engine {
         }
         self.stop = None;
         true
+    }
+}
+
+/// Whether an axis can be sent to a position. One that is driven by velocity or torque has none to go to, and is left
+/// as it is.
+fn is_target(axis: &Axis, position: f64) -> bool {
+    match axis.parameters().law {
+        ControlLaw::ProfileVelocity | ControlLaw::ProfileTorque => true,
+        _ => axis.parameters().limits.contain(position),
     }
 }

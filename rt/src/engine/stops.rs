@@ -3,8 +3,9 @@
 use super::{Engine, Transmission};
 use crate::axis::Axis;
 use crate::cia402::Goal;
+use crate::control::ControlLaw;
 use crate::door::Door;
-use crate::plan::PlanError;
+use crate::plan::{PlanError, State};
 use crate::port::{BusHealth, BusState};
 use crate::record::EventKind;
 use crate::stop::{Phase, Rule, StopCategory, StopReason};
@@ -32,9 +33,10 @@ impl Engine {
             let (cycles, limit) = (self.blocked_cycles.into(), self.not_transmitted_cycles.into());
             self.begin_stop(Rule::NotTransmitted, None, None, cycles, limit, now_ns, door);
         }
+        let acknowledge_limit = self.acknowledge_timeout_cycles;
         for index in 0..self.axes.len() {
             let Some((rule, value, limit)) =
-                self.axes.get_mut(index).and_then(|axis| complaint(axis, self.phase))
+                self.axes.get_mut(index).and_then(|axis| complaint(axis, self.phase, acknowledge_limit))
             else {
                 continue;
             };
@@ -54,7 +56,7 @@ impl Engine {
         now_ns: Nanoseconds,
         door: &mut impl Door,
     ) {
-        let wanted = category.unwrap_or(rule.default_category());
+        let wanted = self.possible(category.unwrap_or(rule.default_category()));
         let slot = self.last_slot.unwrap_or(0);
         let reason = StopReason { category: wanted, rule, axis, value, limit, slot, phase: self.phase };
         let is_under_way = matches!(self.phase, Phase::Stopping | Phase::Disabling);
@@ -71,6 +73,15 @@ impl Engine {
             }
         }
         self.carry_out(wanted, now_ns, door);
+    }
+
+    /// A joint in profile torque cannot be held where it is: its drive closes no position loop. The brake holds it.
+    fn possible(&self, category: StopCategory) -> StopCategory {
+        let is_unheld = self.axes.iter().any(|axis| axis.parameters().law == ControlLaw::ProfileTorque);
+        match category {
+            StopCategory::Two if is_unheld && self.phase == Phase::Moving => StopCategory::One,
+            category => category,
+        }
     }
 
     fn carry_out(&mut self, category: StopCategory, now_ns: Nanoseconds, door: &mut impl Door) {
@@ -104,7 +115,12 @@ impl Engine {
     }
 
     fn plan_stop(&mut self) -> Result<(), PlanError> {
-        self.motion.stop(self.axes.iter().map(|axis| (axis.set_point(), &axis.parameters().limits)))
+        self.axes.iter_mut().for_each(Axis::stop_profile);
+        self.motion.stop(self.axes.iter().map(|axis| {
+            let start = axis.set_point();
+            let standing = State { position: start.position, ..State::default() };
+            (if axis.is_profile() { standing } else { start }, &axis.parameters().limits)
+        }))
     }
 }
 
@@ -113,7 +129,7 @@ const fn has_power(phase: Phase) -> bool {
 }
 
 /// What is wrong with an axis, if anything: rule, value, limit.
-fn complaint(axis: &mut Axis, phase: Phase) -> Option<(Rule, f64, f64)> {
+fn complaint(axis: &mut Axis, phase: Phase, acknowledge_limit: u32) -> Option<(Rule, f64, f64)> {
     let missed_limit = axis.parameters().missed_feedback_cycles;
     if axis.feedback_age() > missed_limit {
         return Some((Rule::MissedFeedback, axis.feedback_age().into(), missed_limit.into()));
@@ -131,5 +147,10 @@ fn complaint(axis: &mut Axis, phase: Phase) -> Option<(Rule, f64, f64)> {
     if !axis.is_enabled() {
         return Some((Rule::DriveDisabled, axis.statusword().into(), 0.0));
     }
-    axis.check_following().err().map(|violation| (violation.rule, violation.value, violation.limit))
+    if axis.unacknowledged_cycles() > acknowledge_limit {
+        let (cycles, limit) = (axis.unacknowledged_cycles().into(), acknowledge_limit.into());
+        return Some((Rule::NotAcknowledged, cycles, limit));
+    }
+    let checked = axis.check_following().and_then(|()| axis.check_profile());
+    checked.err().map(|violation| (violation.rule, violation.value, violation.limit))
 }

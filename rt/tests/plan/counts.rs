@@ -9,6 +9,7 @@ const CYCLE_S: f64 = 0.001;
 fn scale(counts_per_turn: f64, reversed: bool) -> Scale {
     Scale::new(ScaleParameters {
         counts_per_turn,
+        velocity_units_per_turn: counts_per_turn,
         gear_ratio: 1.0,
         travel_per_turn: TAU,
         reversed,

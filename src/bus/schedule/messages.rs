@@ -1,11 +1,12 @@
 //! Every message that a configuration puts on a bus.
 
 use serde::Serialize;
+use takt_rt::axis::Cadence;
 use takt_rt::frame::Id;
 
 use crate::bus::frame_time::FrameShape;
-use crate::config::{Axis, Config};
-use crate::drive::ProcessData;
+use crate::config::{Axis, Config, DriveFamily};
+use crate::drive::{PdoPlan, ProcessData};
 
 /// What a message is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -19,6 +20,8 @@ pub enum MessageKind {
     Feedback,
     /// RPDO of a drive.
     SetPoint,
+    /// TPDO with which a drive answers a set-point at once.
+    Answer,
     /// Answer of a drive's SDO server.
     SdoResponse,
     /// Request of the controller's SDO client.
@@ -76,13 +79,13 @@ const LAST_SYNCHRONOUS_TYPE: u8 = 240;
 /// The messages of a bus by priority, highest first.
 pub(super) fn messages(config: &Config, bus_index: usize) -> Vec<BusMessage> {
     let Some(bus) = config.buses.get(bus_index) else { return vec![] };
-    let period_ns = config.cycle.period_ns;
+    let period_ns = config.bus_cycle(bus_index).period_ns;
     let mut messages = vec![message(MessageKind::Sync, None, Id::canopen(0x080, 0), 0, period_ns)];
     if let Some(heartbeat_ns) = config.master.heartbeat_ns {
         let id = Id::canopen(0x700, config.master.node);
-        // It is sent in a cycle, so up to one cycle late.
+        // It is sent in a cycle of the controller, so up to one cycle late.
         messages.push(BusMessage {
-            jitter_ns: period_ns,
+            jitter_ns: config.cycle.period_ns,
             ..message(MessageKind::MasterHeartbeat, None, id, HEARTBEAT_BYTES, heartbeat_ns)
         });
     }
@@ -90,7 +93,9 @@ pub(super) fn messages(config: &Config, bus_index: usize) -> Vec<BusMessage> {
     for (index, axis) in axes() {
         messages.extend(axis_messages(index, axis, period_ns));
     }
-    messages.extend(axes().take(bus.service_frames_per_cycle).flat_map(|(i, axis)| sdo(i, axis, period_ns)));
+    messages.extend(
+        axes().take(bus.service_frames_per_cycle).flat_map(|(i, axis)| sdo(i, axis, config.cycle.period_ns)),
+    );
     messages.sort_by_key(|message| message.id.arbitration_key());
     messages
 }
@@ -110,29 +115,35 @@ fn message(kind: MessageKind, axis: Option<usize>, id: Id, length: usize, period
 
 fn axis_messages(index: usize, axis: &Axis, period_ns: u64) -> Vec<BusMessage> {
     let data = ProcessData::of(axis);
-    let is_asynchronous = axis.transmission_type > LAST_SYNCHRONOUS_TYPE;
-    let mut messages = vec![BusMessage {
-        deadline_ns: None,
-        ..message(
-            MessageKind::Emergency,
-            Some(index),
-            Id::canopen(0x080, axis.node),
-            EMERGENCY_BYTES,
-            EMERGENCY_INTERVAL_NS,
-        )
-    }];
-    // Which SYNCs a drive answers that answers every second one cannot be known: the slot counts its feedback always.
-    let syncs = if is_asynchronous { 1 } else { u64::from(axis.transmission_type.max(1)) };
-    messages.extend(data.feedback.iter().map(|pdo| BusMessage {
-        jitter_ns: axis.feedback_delay_ns,
-        is_asynchronous,
-        ..message(MessageKind::Feedback, Some(index), pdo.id, pdo.length(), syncs * period_ns)
+    let of_axis =
+        |kind, pdo: &PdoPlan, period_ns| message(kind, Some(index), pdo.id, pdo.length(), period_ns);
+    let mut messages = vec![];
+    // A YZ-AIM has no emergency object.
+    if axis.drive != DriveFamily::YzAim {
+        let (id, kind) = (Id::canopen(0x080, axis.node), MessageKind::Emergency);
+        messages.push(message(kind, Some(index), id, EMERGENCY_BYTES, EMERGENCY_INTERVAL_NS));
+    }
+    messages.extend(data.feedback.iter().map(|pdo| {
+        let is_asynchronous = pdo.transmission_type > LAST_SYNCHRONOUS_TYPE;
+        let answers_set_points = axis.drive == DriveFamily::YzAim && is_asynchronous;
+        // Which SYNCs a drive answers that answers every second one cannot be known: the slot counts its feedback
+        // always.
+        let syncs = if is_asynchronous { 1 } else { u64::from(pdo.transmission_type.max(1)) };
+        let kind = if answers_set_points { MessageKind::Answer } else { MessageKind::Feedback };
+        BusMessage {
+            jitter_ns: axis.feedback_delay_ns,
+            is_asynchronous: is_asynchronous && !answers_set_points,
+            ..of_axis(kind, pdo, syncs * period_ns)
+        }
     }));
-    messages.extend(
-        data.commands
-            .iter()
-            .map(|pdo| message(MessageKind::SetPoint, Some(index), pdo.id, pdo.length(), period_ns)),
-    );
+    messages.extend(data.answer().map(|pdo| BusMessage {
+        jitter_ns: axis.feedback_delay_ns,
+        ..of_axis(MessageKind::Answer, pdo, period_ns)
+    }));
+    // A controlword that is sent when it changes goes to one axis in a cycle while they are enabled, and the group
+    // stands still then: its delay does no harm, and it is not part of the sums.
+    let every_cycle = data.commands.iter().filter(|pdo| pdo.cadence == Cadence::EveryCycle);
+    messages.extend(every_cycle.map(|pdo| of_axis(MessageKind::SetPoint, pdo, period_ns)));
     messages.extend(axis.heartbeat_ns.map(|heartbeat_ns| {
         let id = Id::canopen(0x700, axis.node);
         message(MessageKind::DriveHeartbeat, Some(index), id, HEARTBEAT_BYTES, heartbeat_ns)

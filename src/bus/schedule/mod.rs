@@ -27,7 +27,7 @@ use serde::Serialize;
 use thiserror::Error;
 
 use super::frame_time::{BitRates, worst_case_bits};
-use crate::config::Config;
+use crate::config::{Config, Cycle};
 use bound::Traffic;
 use messages::BusMessage;
 
@@ -202,7 +202,7 @@ pub fn verify(config: &Config) -> Result<Vec<BusSchedule>, ScheduleError> {
 
 fn analyse_bus(config: &Config, index: usize) -> BusSchedule {
     let bus = config.buses.get(index);
-    let cycle = config.cycle;
+    let cycle = config.bus_cycle(index);
     let bit_rate = bus.map_or(0, |bus| bus.bit_rate);
     let rates =
         BitRates { nominal: bit_rate, data: bus.and_then(|bus| bus.data_bit_rate).unwrap_or(bit_rate) };
@@ -224,7 +224,7 @@ fn analyse_bus(config: &Config, index: usize) -> BusSchedule {
         .map(|message| {
             let bits = worst_case_bits(message.shape);
             let at = enabled.iter().position(|other| std::ptr::eq(*other, message));
-            let (in_slot_ns, deadline_ns) = in_slot(message, &enabled, &slot, config, rates);
+            let (in_slot_ns, deadline_ns) = in_slot(message, &enabled, &slot, cycle, rates);
             MessageSchedule {
                 kind: message.kind,
                 axis: message.axis.and_then(|axis| config.axes.get(axis)).map(|axis| axis.name.clone()),
@@ -247,7 +247,7 @@ fn analyse_bus(config: &Config, index: usize) -> BusSchedule {
         period_ns: cycle.period_ns,
         command_phase_ns: cycle.command_phase_ns,
         load_percent: load_percent(&messages),
-        shortfalls: shortfalls(&messages, &slot, config),
+        shortfalls: shortfalls(&messages, &slot, cycle),
         messages,
         slot,
         emergency: EmergencyEffect::on(&slot, cycle.command_phase_ns),
@@ -260,20 +260,21 @@ fn in_slot(
     message: &BusMessage,
     all: &[&BusMessage],
     slot: &Slot,
-    config: &Config,
+    cycle: Cycle,
     rates: BitRates,
 ) -> (Option<u64>, Option<u64>) {
-    let cycle = config.cycle;
     match message.kind {
         // Its lateness is part of the feedback's.
         MessageKind::Sync => (Some(slot.wait_before_sync_ns + slot.sync_ns), None),
         MessageKind::Feedback => (Some(slot.feedback_done_ns), Some(cycle.command_phase_ns)),
         MessageKind::SetPoint => {
-            let up_to = all.iter().filter(|other| other.kind == message.kind && other.axis <= message.axis);
+            let counts = |kind| matches!(kind, MessageKind::SetPoint | MessageKind::Answer);
+            let up_to = all.iter().filter(|other| counts(other.kind) && other.axis <= message.axis);
             let sent_ns: u64 = up_to.map(|other| rates.duration_ns(worst_case_bits(other.shape))).sum();
             let done_ns = cycle.command_phase_ns + slot.wait_before_set_points_ns + sent_ns;
             (Some(done_ns), Some(cycle.period_ns))
         }
+        MessageKind::Answer => (Some(slot.set_points_done_ns), Some(cycle.period_ns)),
         _ => (None, message.deadline_ns),
     }
 }
@@ -286,8 +287,8 @@ fn load_percent(messages: &[MessageSchedule]) -> f64 {
         .sum()
 }
 
-fn shortfalls(messages: &[MessageSchedule], slot: &Slot, config: &Config) -> Vec<Shortfall> {
-    let (period_ns, command_phase_ns) = (config.cycle.period_ns, config.cycle.command_phase_ns);
+fn shortfalls(messages: &[MessageSchedule], slot: &Slot, cycle: Cycle) -> Vec<Shortfall> {
+    let (period_ns, command_phase_ns) = (cycle.period_ns, cycle.command_phase_ns);
     let feedback = (slot.feedback_done_ns > command_phase_ns)
         .then_some(Shortfall::FeedbackLate { done_ns: slot.feedback_done_ns, command_phase_ns });
     let set_points = (slot.set_points_done_ns > period_ns)

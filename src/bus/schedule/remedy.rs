@@ -8,7 +8,7 @@
 use serde::Serialize;
 
 use super::{BusSchedule, analyse_bus, command_phase};
-use crate::config::{Axis, Config, Feedback};
+use crate::config::{Axis, Config, DriveFamily, Feedback};
 
 /// A change that makes a bus fit, alone.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -30,6 +30,8 @@ pub enum Remedy {
     SdoWhileDisabled,
     /// No heartbeats of the drives: their feedback shows that they live.
     DriveHeartbeatsOff,
+    /// No answers to SYNC: the drives' answers to set-points are feedback enough, a cycle older.
+    NoAnswersToSync,
     /// Less feedback.
     SmallerFeedback {
         /// What to leave out: as few objects as possible, and the smallest of them.
@@ -75,7 +77,8 @@ fn other_command_phase(config: &Config, bus: usize) -> Option<Remedy> {
 fn analyse_at_own_phase(config: &Config, bus: usize) -> Option<BusSchedule> {
     let (earliest_ns, latest_ns) = analyse_bus(config, bus).slot.command_phases_ns?;
     let mut config = config.clone();
-    config.cycle.command_phase_ns = command_phase::divide(config.cycle.period_ns, earliest_ns, latest_ns)?;
+    let period_ns = config.bus_cycle(bus).period_ns;
+    config.cycle.command_phase_ns = command_phase::divide(period_ns, earliest_ns, latest_ns)?;
     Some(analyse_bus(&config, bus))
 }
 
@@ -93,6 +96,7 @@ impl Trial<'_> {
             self.service_frames(),
             self.sdo_while_disabled(),
             self.drive_heartbeats_off(),
+            self.no_answers_to_sync(),
             self.smaller_feedback(),
             self.master_heartbeat_off(),
             self.more_buses(),
@@ -137,6 +141,13 @@ impl Trial<'_> {
         let fits =
             || self.fits_with(|config| config.axes.iter_mut().for_each(|axis| axis.heartbeat_ns = None));
         (has_any && fits()).then_some(Remedy::DriveHeartbeatsOff)
+    }
+
+    fn no_answers_to_sync(self) -> Option<Remedy> {
+        let has_any = self.axes().any(|axis| axis.drive == DriveFamily::YzAim && axis.answers_sync);
+        let fits =
+            || self.fits_with(|config| config.axes.iter_mut().for_each(|axis| axis.answers_sync = false));
+        (has_any && fits()).then_some(Remedy::NoAnswersToSync)
     }
 
     /// Every choice of what the axes report, the smallest first; there are five objects at the most.

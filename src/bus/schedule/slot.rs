@@ -131,7 +131,8 @@ pub(super) fn worst_slot(
     };
     let total = |kind| times(&|message| message.kind == kind).iter().sum::<u64>();
     let (sync_ns, feedback_ns) = (total(MessageKind::Sync), total(MessageKind::Feedback));
-    let set_points_ns = total(MessageKind::SetPoint);
+    // What answers a set-point must be sent in the same time, and has precedence over the set-points behind it.
+    let set_points_ns = total(MessageKind::SetPoint) + total(MessageKind::Answer);
     let emergency_ns =
         times(&|message| message.kind == MessageKind::Emergency).into_iter().max().unwrap_or(0);
     let background = Background::of(messages, cycle.period_ns, rates);

@@ -18,6 +18,7 @@ pub fn message_name(kind: MessageKind) -> &'static str {
         MessageKind::Emergency => "emergency",
         MessageKind::Feedback => "feedback",
         MessageKind::SetPoint => "set-point",
+        MessageKind::Answer => "answer",
         MessageKind::SdoResponse => "SDO answer",
         MessageKind::SdoRequest => "SDO request",
         MessageKind::DriveHeartbeat => "heartbeat",
@@ -151,6 +152,10 @@ pub fn remedy(remedy: &Remedy) -> String {
         }
         Remedy::ServiceFrames { frames } => {
             format!("fewer service frames: service_frames_per_cycle = {frames}")
+        }
+        Remedy::NoAnswersToSync => {
+            "no answers to SYNC, at the price of feedback that is a cycle older: answers_sync = false"
+                .to_owned()
         }
         Remedy::SmallerFeedback { without } => {
             let words: Vec<_> = without.iter().map(|object| format!("{:?}", object.word())).collect();

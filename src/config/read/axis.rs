@@ -16,15 +16,22 @@ use crate::config::model::{
 };
 use crate::config::quantity::Quantity;
 use crate::config::spelling;
+use crate::drive::yz_aim;
+
+/// The families of drives by their words.
+const DRIVES: [(&str, DriveFamily); 2] = [
+    (DriveFamily::ErobCanopen.word(), DriveFamily::ErobCanopen),
+    (DriveFamily::YzAim.word(), DriveFamily::YzAim),
+];
 
 /// The quantities of an axis by what it does: turn or slide.
 #[derive(Clone, Copy)]
 pub struct Quantities {
     pub position: Quantity,
-    velocity: Quantity,
+    pub velocity: Quantity,
     acceleration: Quantity,
     jerk: Quantity,
-    effort: Quantity,
+    pub effort: Quantity,
     inertia: Quantity,
     stiffness: Quantity,
     damping: Quantity,
@@ -74,6 +81,7 @@ pub struct ReadAxis {
 pub fn axes<'a>(
     sections: Vec<Section<'a>>,
     buses: &[ReadBus],
+    cycle_ns: u64,
     master: &Master,
     problems: &'a Problems<'a>,
 ) -> Vec<ReadAxis> {
@@ -81,7 +89,7 @@ pub fn axes<'a>(
     let mut axes: Vec<ReadAxis> = Vec::with_capacity(count);
     for section in sections {
         let header = section.header();
-        axes.push(axis(section, buses, master, &axes, problems));
+        axes.push(axis(section, buses, cycle_ns, master, &axes, problems));
         if axes.len() == MAX_AXES + 1 {
             problems.report(ProblemKind::TooMany { what: "axes", given: count, limit: MAX_AXES }, header);
         }
@@ -92,6 +100,7 @@ pub fn axes<'a>(
 fn axis<'a>(
     mut section: Section<'a>,
     buses: &[ReadBus],
+    cycle_ns: u64,
     master: &Master,
     earlier: &[ReadAxis],
     problems: &'a Problems<'a>,
@@ -113,17 +122,22 @@ fn axis<'a>(
     });
     let drive = section
         .require("drive", "the family of the drive: drive = \"erob-canopen\"")
-        .and_then(|entry| entry.choice(&[("erob-canopen", DriveFamily::ErobCanopen)]));
+        .and_then(|entry| entry.choice(&DRIVES));
     check_bit_rate(drive, bus.and_then(|bus| buses.get(bus)), problems);
 
     let travel = travel(&mut section);
     let quantities = Quantities::of(travel.unwrap_or(Travel::Rotary));
-    let counting = counting(&mut section);
+    let counting = counting(&mut section, drive);
     let limits = limits(section.section("limits"), quantities, travel, &counting);
     let following_error = following_error(section.section("following_error"), quantities);
     let simulated = simulated(section.section("simulated"), quantities, limits.as_ref(), name.as_deref());
-    let control = control(&mut section, quantities, &simulated);
-    let feedback = feedback(&mut section);
+    let control = control(&mut section, drive, quantities, &simulated);
+    if drive == Some(DriveFamily::YzAim) {
+        check_period(control, bus.and_then(|bus| buses.get(bus)), cycle_ns, problems);
+        check_speed(&section, limits.as_ref(), &counting, travel, quantities);
+    }
+    let feedback = feedback(&mut section, drive);
+    let answers_sync = boolean(&mut section, "answers_sync", defaults::ANSWERS_SYNC);
     let transmission_type = transmission_type(&mut section);
     let missed = section.get("missed_feedback_cycles").and_then(|entry| entry.integer(1..1001));
     let feedback_delay = section.get("feedback_delay").and_then(|entry| entry.nanoseconds(0.0, 0.01));
@@ -152,6 +166,7 @@ fn axis<'a>(
                 .unwrap_or(defaults::MISSED_FEEDBACK_CYCLES),
             transmission_type,
             feedback,
+            answers_sync,
             feedback_delay_ns: feedback_delay.unwrap_or(defaults::FEEDBACK_DELAY_NS),
             heartbeat_ns,
             identity,
@@ -192,18 +207,51 @@ fn check_node(
     }
 }
 
-/// An eRob knows one bit rate (eRunner manual, section 1 of the specification).
+/// An eRob knows one bit rate (eRunner manual, section 1 of the specification), a YZ-AIM four (manual, 5.13).
 fn check_bit_rate(drive: Option<DriveFamily>, bus: Option<&ReadBus>, problems: &Problems<'_>) {
-    if let (Some(DriveFamily::ErobCanopen), Some(bus)) = (drive, bus)
+    let (rates, allowed): (&[u32], _) = match drive {
+        Some(DriveFamily::ErobCanopen) => {
+            (&[1_000_000], "1 Mbit/s, the one bit rate of the eRobs on this bus")
+        }
+        Some(DriveFamily::YzAim) => (
+            &[125_000, 250_000, 500_000, 1_000_000],
+            "125, 250 or 500 kbit/s or 1 Mbit/s, the bit rates of the YZ-AIMs on this bus",
+        ),
+        None => return,
+    };
+    if let Some(bus) = bus.filter(|bus| !rates.contains(&bus.bit_rate))
         && let Some(span) = bus.bit_rate_span.clone()
-        && bus.bit_rate != 1_000_000
     {
-        let kind = ProblemKind::OutOfRange {
-            key: "bus.bit_rate".to_owned(),
-            value: Quantity::BIT_RATE.show(bus.bit_rate.into()),
-            allowed: "1 Mbit/s, the one bit rate of the eRobs on this bus".to_owned(),
-        };
-        problems.report(kind, span);
+        let (key, value) = ("bus.bit_rate".to_owned(), Quantity::BIT_RATE.show(bus.bit_rate.into()));
+        problems.report(ProblemKind::OutOfRange { key, value, allowed: allowed.to_owned() }, span);
+    }
+}
+
+/// A YZ-AIM interpolates from target to target in 2 ms (manual, 5.10.3).
+fn check_period(control: Option<Control>, bus: Option<&ReadBus>, cycle_ns: u64, problems: &Problems<'_>) {
+    let (Some(Control::Interpolated), Some(bus)) = (control, bus) else { return };
+    let period_ns = cycle_ns * u64::from(bus.divider);
+    if period_ns != yz_aim::INTERPOLATION_PERIOD_NS {
+        let (key, value) = ("bus.period".to_owned(), Quantity::DURATION.show(period_ns as f64 / 1e9));
+        let allowed = "2 ms, the period of a YZ-AIM that interpolates: period = \"2 ms\"".to_owned();
+        problems.report(ProblemKind::OutOfRange { key, value, allowed }, bus.header.clone());
+    }
+}
+
+/// Objects 6081 and 60FF of a YZ-AIM end at 3000 r/min of the motor.
+fn check_speed(
+    section: &Section<'_>,
+    limits: Option<&Limits>,
+    counting: &Counting,
+    travel: Option<Travel>,
+    q: Quantities,
+) {
+    let Some(limits) = limits else { return };
+    let turns_per_unit = counting.counts_per_unit(travel) / counting.counts_per_turn;
+    let highest = yz_aim::HIGHEST_SPEED_RPM / 60.0 / turns_per_unit;
+    if limits.velocity > highest * (1.0 + 1e-9) {
+        let allowed = format!("at most {}, 3000 r/min of the motor", q.velocity.show(highest));
+        section.report_default_out_of_range("limits.velocity", q.velocity.show(limits.velocity), allowed);
     }
 }
 
@@ -247,14 +295,15 @@ impl Counting {
     }
 }
 
-fn counting(section: &mut Section<'_>) -> Counting {
+fn counting(section: &mut Section<'_>, drive: Option<DriveFamily>) -> Counting {
     let counts_per_turn =
         section.get("counts_per_turn").and_then(|entry| entry.number(Bounds::Between(1.0, 1e12)));
     let gear_ratio = section.get("gear_ratio").and_then(|entry| entry.number(Bounds::Between(1e-6, 1e6)));
     let zero =
         section.get("zero_counts").and_then(|entry| entry.integer(i32::MIN.into()..1 + i64::from(i32::MAX)));
     Counting {
-        counts_per_turn: counts_per_turn.unwrap_or(defaults::EROB_COUNTS_PER_TURN),
+        counts_per_turn: counts_per_turn
+            .unwrap_or(drive.unwrap_or(DriveFamily::ErobCanopen).counts_per_turn()),
         gear_ratio: gear_ratio.unwrap_or(defaults::GEAR_RATIO),
         reversed: boolean(section, "reversed", false),
         zero_counts: zero.and_then(|zero| i32::try_from(zero).ok()).unwrap_or(0),
@@ -395,13 +444,31 @@ pub fn show_range(limits: &Limits, q: Quantities) -> String {
 
 /// The mode, with the gains of the loop that it needs. The gains of the other loops are checked and not used, so that
 /// the mode can be changed in one line.
-fn control(section: &mut Section<'_>, q: Quantities, joint: &SimulatedJoint) -> Option<Control> {
+fn control(
+    section: &mut Section<'_>,
+    drive: Option<DriveFamily>,
+    q: Quantities,
+    joint: &SimulatedJoint,
+) -> Option<Control> {
     let velocity_loop = velocity_loop(section.section("velocity_loop"));
     let torque_loop = torque_loop(section.section("torque_loop"), q, joint);
-    let modes = [("csp", Control::Position), ("csv", velocity_loop), ("cst", torque_loop)];
-    match section.get("mode") {
-        Some(entry) => entry.choice(&modes),
-        None => Some(Control::Position),
+    let modes = [
+        ("csp", Control::Position),
+        ("csv", velocity_loop),
+        ("cst", torque_loop),
+        ("ip", Control::Interpolated),
+        ("pp", Control::ProfilePosition),
+        ("pv", Control::ProfileVelocity),
+        ("pt", Control::ProfileTorque),
+    ];
+    match (section.get("mode"), drive) {
+        (Some(entry), Some(DriveFamily::YzAim)) => {
+            let own: Vec<_> = modes.into_iter().filter(|(_, control)| yz_aim::has_mode(control)).collect();
+            entry.choice(&own)
+        }
+        (Some(entry), _) => entry.choice(&modes),
+        (None, Some(DriveFamily::YzAim)) => Some(Control::Interpolated),
+        (None, _) => Some(Control::Position),
     }
 }
 
@@ -433,11 +500,15 @@ fn torque_loop(mut section: Section<'_>, q: Quantities, joint: &SimulatedJoint) 
     }
 }
 
-fn feedback(section: &mut Section<'_>) -> Vec<Feedback> {
+fn feedback(section: &mut Section<'_>, drive: Option<DriveFamily>) -> Vec<Feedback> {
     let choices = Feedback::ALL.map(|feedback| (feedback.word(), feedback));
     let mut feedback = vec![];
     for entry in section.get("feedback").and_then(|entry| entry.list()).into_iter().flatten() {
         let Some(object) = entry.choice(&choices) else { continue };
+        if drive == Some(DriveFamily::YzAim) {
+            let given = entry.text().unwrap_or_default().to_owned();
+            entry.report_range(given, "nothing, since the PDOs of a YZ-AIM are fixed".to_owned());
+        }
         if feedback.contains(&object) {
             let given = entry.text().unwrap_or_default().to_owned();
             entry.report(ProblemKind::Repeated { key: entry.path.clone(), given });
@@ -463,6 +534,7 @@ fn transmission_type(section: &mut Section<'_>) -> u8 {
 fn identity(mut section: Section<'_>, drive: Option<DriveFamily>) -> Identity {
     let default = match drive {
         Some(DriveFamily::ErobCanopen) => defaults::EROB_IDENTITY,
+        Some(DriveFamily::YzAim) => defaults::YZ_AIM_IDENTITY,
         None => Identity::default(),
     };
     let mut value = |key, default| match section.get(key) {

@@ -19,19 +19,21 @@ const CLASSIC_RATES: [f64; 8] = [10e3, 20e3, 50e3, 125e3, 250e3, 500e3, 800e3, 1
 pub struct ReadBus {
     pub name: Option<String>,
     pub bit_rate: u32,
+    /// Cycles of the controller in one of this bus.
+    pub divider: u32,
     /// Where the bit rate stands, if it does.
     pub bit_rate_span: Option<Range<usize>>,
     /// `None` when something about it is wrong.
     pub bus: Option<Bus>,
-    header: Range<usize>,
+    pub header: Range<usize>,
 }
 
-pub fn buses<'a>(sections: Vec<Section<'a>>, problems: &'a Problems<'a>) -> Vec<ReadBus> {
+pub fn buses<'a>(sections: Vec<Section<'a>>, cycle_ns: u64, problems: &'a Problems<'a>) -> Vec<ReadBus> {
     let count = sections.len();
     let mut buses: Vec<ReadBus> = Vec::with_capacity(count);
     for section in sections {
         let header = section.header();
-        buses.push(bus(section, &buses, problems));
+        buses.push(bus(section, cycle_ns, &buses, problems));
         if buses.len() == MAX_BUSES + 1 {
             let kind = ProblemKind::TooMany { what: "buses", given: count, limit: MAX_BUSES };
             problems.report(kind, header);
@@ -40,7 +42,12 @@ pub fn buses<'a>(sections: Vec<Section<'a>>, problems: &'a Problems<'a>) -> Vec<
     buses
 }
 
-fn bus<'a>(mut section: Section<'a>, earlier: &[ReadBus], problems: &'a Problems<'a>) -> ReadBus {
+fn bus<'a>(
+    mut section: Section<'a>,
+    cycle_ns: u64,
+    earlier: &[ReadBus],
+    problems: &'a Problems<'a>,
+) -> ReadBus {
     let header = section.header();
     let name_entry = section.require_own("name", "the name of the bus: name = \"left\"");
     let name = name_entry.as_ref().and_then(|entry| entry.name());
@@ -74,12 +81,14 @@ fn bus<'a>(mut section: Section<'a>, earlier: &[ReadBus], problems: &'a Problems
             .quantity(Quantity::BIT_RATE, Bounds::Between(bit_rate.into(), 8e6))
             .map(|rate| rate.round() as u32)
     });
+    let divider = section.get("period").and_then(|entry| divider(&entry, cycle_ns)).unwrap_or(1);
     let service_frames = section.get("service_frames_per_cycle").and_then(|entry| entry.integer(1..33));
     let sdo_while_enabled = boolean(&mut section, "sdo_while_enabled", defaults::SDO_WHILE_ENABLED);
     section.finish();
     let bus = name.zip(interface).map(|(name, interface)| Bus {
         name: name.to_owned(),
         interface,
+        divider,
         bit_rate,
         data_bit_rate,
         service_frames_per_cycle: service_frames
@@ -90,10 +99,25 @@ fn bus<'a>(mut section: Section<'a>, earlier: &[ReadBus], problems: &'a Problems
     ReadBus {
         name: name.map(str::to_owned),
         bit_rate,
+        divider,
         bit_rate_span: bit_rate_entry.map(|entry| entry.span),
         bus,
         header,
     }
+}
+
+/// A bus may have one cycle in several of the controller's.
+fn divider(entry: &Entry<'_>, cycle_ns: u64) -> Option<u32> {
+    let period_ns = entry.nanoseconds(cycle_ns as f64 / 1e9, 0.1)?;
+    if !period_ns.is_multiple_of(cycle_ns) {
+        let period = Quantity::DURATION.show(cycle_ns as f64 / 1e9);
+        entry.report_range(
+            Quantity::DURATION.show(period_ns as f64 / 1e9),
+            format!("a multiple of the cycle's period, {period}"),
+        );
+        return None;
+    }
+    u32::try_from(period_ns / cycle_ns).ok()
 }
 
 fn bit_rate(entry: &Entry<'_>) -> Option<u32> {

@@ -51,7 +51,7 @@ fn read<'a>(document: &'a DeTable<'a>, problems: &'a Problems<'a>) -> Option<Con
     let simulation = machine::simulation(root.section("simulation"));
 
     root.require("bus", "at least one [[bus]]");
-    let buses = bus::buses(root.sections("bus"), problems);
+    let buses = bus::buses(root.sections("bus"), cycle.period_ns, problems);
 
     let mut defaults = root.section("defaults");
     let axis_defaults = defaults.get("axis").and_then(|entry| entry.table());
@@ -59,7 +59,7 @@ fn read<'a>(document: &'a DeTable<'a>, problems: &'a Problems<'a>) -> Option<Con
     root.require("axis", "at least one [[axis]]");
     let axes =
         root.sections("axis").into_iter().map(|section| section.with_defaults(axis_defaults)).collect();
-    let axes = axis::axes(axes, &buses, &master, problems);
+    let axes = axis::axes(axes, &buses, cycle.period_ns, &master, problems);
 
     let program = program::program(root.section("program"), &axes);
     root.finish();

@@ -5,7 +5,7 @@ use super::entry::{Bounds, Entry};
 use super::section::Section;
 use crate::config::defaults;
 use crate::config::error::ProblemKind;
-use crate::config::model::{Program, ProgramMove};
+use crate::config::model::{Control, Limits, Program, ProgramMove, ProgramTarget};
 use crate::config::quantity::Quantity;
 
 /// Moves and rests longer than this are slips of the unit.
@@ -23,9 +23,7 @@ pub fn program(mut section: Section<'_>, axes: &[ReadAxis]) -> Program {
 }
 
 fn program_move(mut section: Section<'_>, axes: &[ReadAxis]) -> Option<ProgramMove> {
-    let target = section
-        .require("to", "a target for every axis, to = [\"30 deg\", …], or one for all of them")
-        .and_then(|entry| target(&entry, axes));
+    let target = program_target(&mut section, axes);
     let mut share =
         |key| section.get(key).and_then(|entry: Entry<'_>| entry.quantity(Quantity::FRACTION, Bounds::Share));
     let (velocity_scale, acceleration_scale) = (share("velocity"), share("acceleration"));
@@ -45,14 +43,78 @@ fn program_move(mut section: Section<'_>, axes: &[ReadAxis]) -> Option<ProgramMo
     })
 }
 
-fn target(entry: &Entry<'_>, axes: &[ReadAxis]) -> Option<Vec<f64>> {
+/// One of `to`, `speed` and `torque`; the latter two last for a time.
+fn program_target(section: &mut Section<'_>, axes: &[ReadAxis]) -> Option<ProgramTarget> {
+    let (speed, torque) = (section.get("speed"), section.get("torque"));
+    let duration = section.get("for");
+    let duration_s = |section: &mut Section<'_>| match &duration {
+        Some(entry) => entry.quantity(Quantity::DURATION, Bounds::Between(0.0, LONGEST_S)),
+        None => {
+            section.require("for", "how long to go on: for = \"2 s\"");
+            None
+        }
+    };
+    match (speed, torque) {
+        (Some(entry), _) => {
+            let velocity = target(&entry, axes, driven_at_speed);
+            let duration_s = duration_s(section);
+            Some(ProgramTarget::Velocity { velocity: velocity?, duration_s: duration_s? })
+        }
+        (None, Some(entry)) => {
+            let torque = target(&entry, axes, driven_with_torque);
+            let duration_s = duration_s(section);
+            Some(ProgramTarget::Torque { torque: torque?, duration_s: duration_s? })
+        }
+        (None, None) => section
+            .require("to", "a target for every axis, to = [\"30 deg\", …], or one for all of them")
+            .and_then(|entry| target(&entry, axes, axis_target))
+            .map(ProgramTarget::Position),
+    }
+}
+
+fn target(
+    entry: &Entry<'_>,
+    axes: &[ReadAxis],
+    read: fn(&Entry<'_>, &ReadAxis) -> Option<f64>,
+) -> Option<Vec<f64>> {
     let entries = if entry.is_list() { entry.list()? } else { vec![entry.clone(); axes.len()] };
     if entries.len() != axes.len() {
         entry.report(ProblemKind::TargetCount { given: entries.len(), axes: axes.len() });
         return None;
     }
-    let targets: Vec<_> = entries.iter().zip(axes).map(|(entry, axis)| axis_target(entry, axis)).collect();
+    let targets: Vec<_> = entries.iter().zip(axes).map(|(entry, axis)| read(entry, axis)).collect();
     targets.into_iter().collect()
+}
+
+fn driven_at_speed(entry: &Entry<'_>, axis: &ReadAxis) -> Option<f64> {
+    driven(entry, axis, axis.quantities.velocity, Control::ProfileVelocity, |limits| limits.velocity)
+}
+
+fn driven_with_torque(entry: &Entry<'_>, axis: &ReadAxis) -> Option<f64> {
+    driven(entry, axis, axis.quantities.effort, Control::ProfileTorque, |limits| limits.torque)
+}
+
+/// A speed or a torque within the limit of an axis, whose mode must take one unless it is 0.
+fn driven(
+    entry: &Entry<'_>,
+    axis: &ReadAxis,
+    quantity: Quantity,
+    mode: Control,
+    limit: fn(&Limits) -> f64,
+) -> Option<f64> {
+    let value = entry.quantity(quantity, Bounds::Finite)?;
+    let name = axis.name.as_deref().unwrap_or_default();
+    if value != 0.0 && axis.axis.as_ref().is_some_and(|axis| axis.control != mode) {
+        let word = if mode == Control::ProfileTorque { "pt" } else { "pv" };
+        entry.report_range(quantity.show(value), format!("0, since {name} is not in mode = \"{word}\""));
+    }
+    if let Some(limit) = axis.limits.as_ref().map(limit).filter(|limit| value.abs() > *limit) {
+        entry.report_range(
+            quantity.show(value),
+            format!("at most {}, the limit of {name}", quantity.show(limit)),
+        );
+    }
+    Some(value)
 }
 
 fn axis_target(entry: &Entry<'_>, axis: &ReadAxis) -> Option<f64> {

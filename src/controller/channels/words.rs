@@ -1,5 +1,6 @@
 //! How a snapshot and a streamed command are laid out in 64-bit words.
 
+use takt_rt::cia402;
 use takt_rt::door::{AxisSnapshot, Snapshot, StreamCommand};
 use takt_rt::plan;
 use takt_rt::port::{BusHealth, BusState};
@@ -35,6 +36,7 @@ pub const NO_SNAPSHOT: Snapshot = Snapshot {
         position: 0.0,
         velocity: 0.0,
         statusword: 0,
+        drive_state: cia402::State::NotReadyToSwitchOn,
         error_code: 0,
         is_heard: false,
     }; MAX_AXES],
@@ -157,7 +159,8 @@ fn put_axis(axis: &AxisSnapshot, words: &mut Words<'_>) {
     words.put_f64(axis.position);
     words.put_f64(axis.velocity);
     let is_heard = u64::from(axis.is_heard) << 32;
-    words.put(u64::from(axis.statusword) | u64::from(axis.error_code) << 16 | is_heard);
+    let drive_state = (axis.drive_state as u64) << 40;
+    words.put(u64::from(axis.statusword) | u64::from(axis.error_code) << 16 | is_heard | drive_state);
 }
 
 fn take_axis(words: &mut Words<'_>) -> AxisSnapshot {
@@ -168,6 +171,7 @@ fn take_axis(words: &mut Words<'_>) -> AxisSnapshot {
         position,
         velocity,
         statusword: packed as u16,
+        drive_state: drive_state_of((packed >> 40) as u8),
         error_code: (packed >> 16) as u16,
         is_heard: packed >> 32 & 1 == 1,
     }
@@ -206,6 +210,10 @@ fn phase_of(number: u8) -> Phase {
     Phase::ALL.get(usize::from(number)).copied().unwrap_or_default()
 }
 
+fn drive_state_of(number: u8) -> cia402::State {
+    cia402::State::ALL.get(usize::from(number)).copied().unwrap_or_default()
+}
+
 fn pack([a, b, c, d]: [u8; 4]) -> u64 {
     u32::from_le_bytes([a, b, c, d]).into()
 }
@@ -237,14 +245,18 @@ mod tests {
     }
 
     fn axes() -> impl Strategy<Value = AxisSnapshot> {
-        any::<(f64, f64, f64, u16, u16, bool)>().prop_map(
-            |(position_set, position, velocity, statusword, error_code, is_heard)| AxisSnapshot {
-                position_set,
-                position,
-                velocity,
-                statusword,
-                error_code,
-                is_heard,
+        let states = prop::sample::select(&cia402::State::ALL[..]);
+        (any::<(f64, f64, f64, u16, u16, bool)>(), states).prop_map(
+            |((position_set, position, velocity, statusword, error_code, is_heard), drive_state)| {
+                AxisSnapshot {
+                    position_set,
+                    position,
+                    velocity,
+                    statusword,
+                    drive_state,
+                    error_code,
+                    is_heard,
+                }
             },
         )
     }

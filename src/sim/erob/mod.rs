@@ -39,7 +39,7 @@ pub use dictionary::AbortCode;
 pub use joint::ErobJoint;
 pub use objects::{Access, DataType, OBJECTS, Object};
 
-use crate::config::{Axis, Simulation, Travel};
+use crate::config::{Axis, Control, Simulation, Travel};
 use takt_rt::time::Nanoseconds;
 
 use super::plant::{Encoder, JointParameters};
@@ -106,7 +106,7 @@ impl ErobParameters {
             power_up_ns: joint.power_up_ns,
             feedback_delay_ns: axis.feedback_delay_ns,
             has_battery: true,
-            has_interpolated_position: false,
+            has_interpolated_position: axis.control == Control::Interpolated,
             is_upload_segmented: false,
             seed: simulation.seed,
         }

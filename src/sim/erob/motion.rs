@@ -53,6 +53,9 @@ const FORWARD_FILTER_S: f64 = 1e-3;
 /// The velocity is fed forward for this many periods, so that a SYNC that is less than a period late does not shake
 /// the joint.
 const FORWARD_PERIODS: f64 = 2.0;
+/// A target of interpolated position that is further away than this many of the steps that the profile velocity allows
+/// is not one of a stream, but a move.
+const STREAMED_REACH: f64 = 1.5;
 /// Closer than this (counts) a profile has arrived.
 const ARRIVED: f64 = 0.01;
 
@@ -66,6 +69,8 @@ pub struct Motion {
     torque: f64,
     forward: f64,
     interpolation: Interpolation,
+    /// Whether targets of interpolated position come as a stream, each within reach of the last.
+    is_streamed: bool,
     set_points: SetPoints,
     /// For how long the actual value has been within its window.
     in_window_s: f64,
@@ -92,6 +97,7 @@ impl Motion {
             torque: 0.0,
             forward: 0.0,
             interpolation: Interpolation::default(),
+            is_streamed: false,
             set_points: SetPoints::default(),
             in_window_s: 0.0,
             is_limited: false,
@@ -119,11 +125,13 @@ impl Motion {
         self.torque = 0.0;
     }
 
-    /// Takes the target of CSP from the dictionary: at SYNC, or when it has been written in between. It is reached
+    /// Takes the target of CSP, or of interpolated position while bit 4 is set, from the dictionary: at SYNC, or when it has been written in between. It is reached
     /// at the end of the interpolation period, so at the next SYNC. The same target again changes nothing while it is
     /// still under way.
     pub fn latch(&mut self, dictionary: &Dictionary) {
-        if self.mode != Some(OperationMode::CyclicSynchronousPosition) {
+        let is_interpolating = self.mode == Some(OperationMode::InterpolatedPosition)
+            && dictionary.get(at::CONTROLWORD) as u16 & controlword::BIT_4 != 0;
+        if self.mode != Some(OperationMode::CyclicSynchronousPosition) && !is_interpolating {
             return;
         }
         let period_s = interpolation_period_s(dictionary);
@@ -132,6 +140,17 @@ impl Motion {
         let target = self.within_software_limits(wanted, dictionary);
         if target == self.interpolation.target && self.interpolation.left_s > 0.0 {
             return;
+        }
+        if is_interpolating {
+            let reach = dictionary.real(at::PROFILE_VELOCITY).min(self.velocity_limit(dictionary)) * period_s;
+            let is_in_reach = (target - self.position).abs() <= STREAMED_REACH * reach;
+            if !self.is_streamed && is_in_reach {
+                self.interpolation.target = self.position;
+            }
+            self.is_streamed = is_in_reach;
+            if !is_in_reach {
+                return;
+            }
         }
         let limit = self.velocity_limit(dictionary);
         let velocity = ((target - self.interpolation.target) / period_s).clamp(-limit, limit);
@@ -170,6 +189,10 @@ impl Motion {
         let torque = dictionary.signed_real(at::TORQUE_OFFSET);
         let position = self.position;
         match self.mode {
+            Some(OperationMode::InterpolatedPosition) if self.is_streamed && !is_halted => {
+                self.step_interpolation(dictionary, duration_s);
+                Demand::Position { position, velocity: self.forward, torque: 0.0 }
+            }
             Some(OperationMode::ProfilePosition | OperationMode::InterpolatedPosition) => {
                 if is_halted {
                     self.ramp_velocity(0.0, dictionary, duration_s);
@@ -307,7 +330,7 @@ impl Motion {
 
     fn is_profile_position(&self) -> bool {
         // Mode 7, where a unit has it, moves like mode 1 (eRunner manual 1.7, 5.7: a move to an absolute
-        // target that bit 4 starts and profile velocity 0 stops).
+        // target that bit 4 starts and profile velocity 0 stops), unless the targets come as a stream.
         matches!(self.mode, Some(OperationMode::ProfilePosition | OperationMode::InterpolatedPosition))
     }
 

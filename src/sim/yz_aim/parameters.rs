@@ -4,7 +4,8 @@ use std::f64::consts::TAU;
 
 use takt_rt::time::Nanoseconds;
 
-use crate::sim::homing_switches::HomingSwitches;
+use crate::config::{Axis, Control, Simulation, Travel};
+use crate::sim::homing_switches::{HomingSwitches, Switch};
 use crate::sim::plant::{Encoder, EndStops, JointParameters};
 
 /// Counts of one turn of the motor.
@@ -231,6 +232,51 @@ impl YzAimParameters {
             homing: HomingBehaviour::default(),
             quirks: Quirks::default(),
             seed: 0,
+        }
+    }
+
+    /// The unit that stands in for an axis of a configuration. Interpolation is stored where the axis wants it; limit
+    /// switches stand just beyond the axis' limits, the lower one at DIR and the upper one at PU, and end stops behind
+    /// them.
+    pub fn of(axis: &Axis, bit_rate: u32, simulation: &Simulation) -> Self {
+        let travel_per_turn = match axis.travel {
+            Travel::Rotary => TAU,
+            Travel::Linear { lead_m } => lead_m,
+        };
+        let gearing = Gearing {
+            ratio: axis.gear_ratio,
+            travel_per_turn,
+            is_reversed: axis.reversed,
+            zero_counts: axis.zero_counts.into(),
+        };
+        let own = &axis.simulated;
+        let joint = JointParameters {
+            inertia: own.inertia,
+            viscous_friction: own.viscous_friction,
+            coulomb_friction: own.coulomb_friction,
+            brake_torque: 0.0,
+        };
+        let limits = &axis.limits;
+        let margin = 0.02 * (limits.position_max - limits.position_min);
+        Self {
+            bit_rate,
+            end_stops: Some(EndStops {
+                lowest: limits.position_min - 2.0 * margin,
+                highest: limits.position_max + 2.0 * margin,
+            }),
+            switches: HomingSwitches {
+                dir: Some(Switch::below(limits.position_min - margin)),
+                pu: Some(Switch::above(limits.position_max + margin)),
+            },
+            initial_position: own.initial_position,
+            rated_torque: own.rated_torque,
+            peak_torque: own.peak_torque,
+            maximum_speed_rpm: 3000.0,
+            special_function: if axis.control == Control::Interpolated { 7 } else { 0 },
+            power_up_ns: own.power_up_ns,
+            feedback_delay_ns: axis.feedback_delay_ns,
+            seed: simulation.seed,
+            ..Self::new(axis.node, Model::Aim57x30C, gearing, joint)
         }
     }
 

@@ -5,8 +5,9 @@
 
 use core::f64::consts::TAU;
 
-use takt_rt::axis::{AxisParameters, Pdo};
+use takt_rt::axis::{AxisParameters, CommandPdo, Pdo};
 use takt_rt::control::ControlLaw;
+use takt_rt::dialect::Dialect;
 use takt_rt::door::{Door, Request, Snapshot, StreamCommand};
 use takt_rt::engine::{BusParameters, Engine, EngineParameters, SendBatch, Transmission};
 use takt_rt::frame::{Frame, Id};
@@ -63,6 +64,7 @@ fn axis() -> Option<AxisParameters> {
     let feedback = [MappedObject::new(0x6041, 0, 16), MappedObject::new(0x6064, 0, 32)];
     let scale = ScaleParameters {
         counts_per_turn: 524_288.0,
+        velocity_units_per_turn: 524_288.0,
         gear_ratio: 1.0,
         travel_per_turn: TAU,
         reversed: false,
@@ -73,8 +75,11 @@ fn axis() -> Option<AxisParameters> {
     Some(AxisParameters {
         bus: 0,
         node: 1,
-        commands: [pdo(0x200, Mapping::commands(&commands).ok()?)].into_iter().collect(),
+        commands: [CommandPdo::every_cycle(pdo(0x200, Mapping::commands(&commands).ok()?))].into_iter().collect(),
         feedback: [pdo(0x180, Mapping::feedback(&feedback).ok()?)].into_iter().collect(),
+        dialect: Dialect::Cia402,
+        controlword_spacing_cycles: 0,
+        unused: Default::default(),
         law: ControlLaw::Position,
         scale: Scale::new(scale).ok()?,
         limits: AxisLimits {
@@ -95,6 +100,7 @@ fn axis() -> Option<AxisParameters> {
 fn cycles() -> Option<Phase> {
     let bus = BusParameters {
         sync_id: Id::canopen(0x080, 0),
+                divider: 1,
         service_frames_active: 1,
         service_frames_passive: 6,
     };
@@ -105,6 +111,7 @@ fn cycles() -> Option<Phase> {
         heartbeat: None,
         enable_timeout_cycles: 100,
         not_transmitted_cycles: 5,
+        acknowledge_timeout_cycles: 500,
     };
     let mut engine = Engine::new(parameters).ok()?;
     let requests = [Some(Request::Sync(true)), Some(Request::Activate), Some(Request::Enable)];
@@ -116,7 +123,7 @@ fn cycles() -> Option<Phase> {
         engine.receive(0, &Received { frame, at_ns }, &mut door);
         engine.compute(slot, at_ns, &health, Transmission::Free, &mut door);
         let mut batch = SendBatch::new();
-        engine.set_points(0, &mut batch);
+        engine.set_points(0, slot, &mut batch);
         engine.finish(Timing { slot, ..Timing::default() }, at_ns, &health, &mut door);
     }
     Some(engine.phase())

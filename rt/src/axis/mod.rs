@@ -1,13 +1,17 @@
 //! One axis: what its drive reported, where it is to be, and the numbers that go onto the wire.
 
+mod profile_mode;
+
 use arrayvec::ArrayVec;
 
-use crate::cia402::{self, State as DriveState};
+use crate::cia402::{Goal, State as DriveState, controlword};
 use crate::control::{ControlLaw, LoopInput};
+use crate::dialect::Dialect;
 use crate::frame::{Frame, Id};
 use crate::guard::{self, AxisLimits, FollowingErrorGuard, Violation};
 use crate::pdo::{CommandSlot, FeedbackSlot, Mapping, ProcessImage, TooShort};
 use crate::plan::State;
+use crate::profile::{ProfileCommand, ProfileTarget};
 use crate::record::AxisRecord;
 use crate::units::Scale;
 
@@ -23,6 +27,31 @@ pub struct Pdo {
     pub mapping: Mapping,
 }
 
+/// When a command is sent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Cadence {
+    /// In every cycle of its bus.
+    EveryCycle,
+    /// When the controlword changes, and again while the drive does not follow it.
+    OnControlword,
+}
+
+/// A PDO that is sent to the drive.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CommandPdo {
+    /// What.
+    pub pdo: Pdo,
+    /// When.
+    pub cadence: Cadence,
+}
+
+impl CommandPdo {
+    /// One that is sent in every cycle of its bus.
+    pub const fn every_cycle(pdo: Pdo) -> Self {
+        Self { pdo, cadence: Cadence::EveryCycle }
+    }
+}
+
 /// Everything about an axis that does not change while it runs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AxisParameters {
@@ -30,10 +59,17 @@ pub struct AxisParameters {
     pub bus: u8,
     /// The node number.
     pub node: u8,
-    /// What is sent each cycle, in order.
-    pub commands: ArrayVec<Pdo, MAX_PDOS>,
-    /// What is expected each cycle.
+    /// What is sent, in order.
+    pub commands: ArrayVec<CommandPdo, MAX_PDOS>,
+    /// What is expected each cycle of the bus.
     pub feedback: ArrayVec<Pdo, MAX_PDOS>,
+    /// Identifiers of process data that the drive sends beside that, which carries nothing new.
+    pub unused: ArrayVec<Id, MAX_PDOS>,
+    /// How it speaks.
+    pub dialect: Dialect,
+    /// Cycles of the bus from one controlword to the next on the way to operation enabled; 0 where the drive shows how
+    /// far it has come.
+    pub controlword_spacing_cycles: u32,
     /// How it is commanded.
     pub law: ControlLaw,
     /// SI to drive units.
@@ -44,7 +80,7 @@ pub struct AxisParameters {
     pub following_error_limit: f64,
     /// Cycles in a row that the following error may be larger.
     pub following_error_cycles: u32,
-    /// Cycles in a row without feedback that are bridged.
+    /// Cycles of the bus in a row without feedback that are bridged.
     pub missed_feedback_cycles: u16,
 }
 
@@ -56,17 +92,27 @@ pub struct Axis {
     feedback: ProcessImage,
     /// Set-points, newest first: of this cycle, the last, and the one before.
     set: [State; 3],
+    /// The same of the cycles in which they were sent.
+    sent: [State; 3],
+    profile: ProfileCommand,
+    /// What `profile` stands for; `None` before the first target since the drive was enabled.
+    profile_target: Option<ProfileTarget>,
     position: f64,
     position_raw: i32,
     velocity: f64,
     /// Which feedback PDOs have come since the last command phase, a bit each.
     arrived: u8,
     age: u16,
+    /// Time since the feedback before.
+    span_s: f64,
     is_heard: bool,
     emergency_code: u16,
     following_error: f64,
     following_guard: FollowingErrorGuard,
-    command_raw: i32,
+    /// Bits 0 to 3 and 7 of the last controlword.
+    base_word: u16,
+    since_controlword: u32,
+    is_controlword_due: bool,
     torque_set: f64,
 }
 
@@ -82,16 +128,22 @@ impl Axis {
             command,
             feedback: ProcessImage::default(),
             set: [State::default(); 3],
+            sent: [State::default(); 3],
+            profile: ProfileCommand::default(),
+            profile_target: None,
             position: 0.0,
             position_raw: 0,
             velocity: 0.0,
             arrived: 0,
             age: 0,
+            span_s: 0.0,
             is_heard: false,
             emergency_code: 0,
             following_error: 0.0,
             following_guard,
-            command_raw: 0,
+            base_word: 0,
+            since_controlword: 0,
+            is_controlword_due: false,
             torque_set: 0.0,
         }
     }
@@ -125,28 +177,35 @@ impl Axis {
         self.emergency_code = code;
     }
 
-    /// Begins a command phase with what has arrived. `elapsed_s` is the time since the last one.
+    /// Lets time pass in a slot in which the axis' bus has no cycle.
+    pub fn wait(&mut self, elapsed_s: f64) {
+        self.span_s += elapsed_s;
+    }
+
+    /// Begins a command phase with what has arrived. `elapsed_s` is the time since the last slot.
     pub fn begin_cycle(&mut self, elapsed_s: f64) {
+        self.span_s += elapsed_s;
         let expected = (1u8 << self.parameters.feedback.len().min(7)) - 1;
         if self.arrived & expected != expected {
             self.age = self.age.saturating_add(1);
             return;
         }
-        let span_s = elapsed_s * f64::from(self.age.saturating_add(1));
+        let span_s = self.span_s;
+        self.span_s = 0.0;
         self.arrived = 0;
         self.age = 0;
         let last = self.position;
         self.position_raw = self.feedback.feedback(FeedbackSlot::Position);
         self.position = self.parameters.scale.position_from_counts(self.position_raw);
         self.velocity = if self.reports(FeedbackSlot::Velocity) {
-            self.parameters.scale.velocity_from_counts(self.feedback.feedback(FeedbackSlot::Velocity))
+            self.parameters.scale.velocity_from_drive(self.feedback.feedback(FeedbackSlot::Velocity))
         } else if self.is_heard && span_s > 0.0 {
             (self.position - last) / span_s
         } else {
             0.0
         };
         self.is_heard = true;
-        self.following_error = self.set[2].position - self.position;
+        self.following_error = if self.is_profile() { 0.0 } else { self.sent[2].position - self.position };
     }
 
     fn reports(&self, slot: FeedbackSlot) -> bool {
@@ -165,7 +224,11 @@ impl Axis {
 
     /// The drive's state by its last statusword.
     pub fn drive_state(&self) -> DriveState {
-        if self.is_heard { DriveState::decode(self.statusword()) } else { DriveState::NotReadyToSwitchOn }
+        if self.is_heard {
+            self.parameters.dialect.state(self.statusword())
+        } else {
+            DriveState::NotReadyToSwitchOn
+        }
     }
 
     /// Object 6041 as last received.
@@ -211,6 +274,7 @@ impl Axis {
     /// Makes the actual position the set-point, as if it had always been.
     pub fn follow_actual(&mut self) {
         self.set = [State { position: self.position, ..State::default() }; 3];
+        self.sent = self.set;
         self.following_error = 0.0;
         self.following_guard.reset();
     }
@@ -225,26 +289,84 @@ impl Axis {
         if self.age > 0 { Ok(()) } else { self.following_guard.check(self.following_error) }
     }
 
-    /// Takes the next set-point.
+    /// Takes the next set-point. In a profile mode there is none: the target stays.
     pub fn advance(&mut self, next: State) {
+        let next = if self.is_profile() { self.shown_set_point() } else { next };
         self.set = [next, self.set[0], self.set[1]];
     }
 
-    /// Writes the command of this cycle: a controlword, and the target of an axis with or without torque.
-    pub fn command(&mut self, controlword: u16, has_torque: bool) {
-        self.command.set(CommandSlot::Controlword, controlword.into());
-        (self.command_raw, self.torque_set) = if has_torque {
+    /// Writes the command of this cycle of the axis' bus: one step towards `goal`, unless another controlword is to be
+    /// sent, and the target.
+    pub fn command(&mut self, goal: Goal, other_word: Option<u16>) {
+        let is_enabled = self.is_enabled();
+        let word = other_word.unwrap_or_else(|| self.word_towards(goal));
+        let is_repeated = self.parameters.controlword_spacing_cycles > 0
+            && self.since_controlword >= self.parameters.controlword_spacing_cycles
+            && is_enabled != (goal == Goal::Enabled);
+        self.is_controlword_due = word != self.base_word || is_repeated;
+        self.since_controlword =
+            if self.is_controlword_due { 0 } else { self.since_controlword.saturating_add(1) };
+        self.base_word = word;
+        self.sent = [self.set[0], self.sent[0], self.sent[1]];
+
+        let parameters = &self.parameters;
+        let law = parameters.law;
+        let raw = if !is_enabled {
+            self.profile.rest(law.idle(self.position_raw));
+            self.profile_target = None;
+            self.torque_set = 0.0;
+            self.profile.target_raw()
+        } else if law.is_profile() {
+            self.torque_set = match self.profile_target {
+                Some(ProfileTarget::Torque(torque)) => torque,
+                _ => 0.0,
+            };
+            self.profile.target_raw()
+        } else {
             let input = LoopInput {
                 set: self.set[0],
-                due: self.set[2],
+                due: self.sent[2],
                 position: self.position,
                 velocity: self.velocity,
             };
-            let parameters = &self.parameters;
-            parameters.law.command(&input, &parameters.scale, &parameters.limits, &mut self.command)
-        } else {
-            (self.parameters.law.idle(self.position_raw, &mut self.command), 0.0)
+            let (raw, torque) = law.target(&input, &parameters.scale, &parameters.limits);
+            self.torque_set = torque;
+            raw
         };
+        self.command.set(law.target_slot(), raw);
+        let mode_bits = if is_enabled { self.mode_bits() } else { 0 };
+        self.command.set(CommandSlot::Controlword, (word | mode_bits).into());
+    }
+
+    /// The controlword that brings the drive one step nearer to `goal`.
+    fn word_towards(&self, goal: Goal) -> u16 {
+        let is_too_early = goal == Goal::Enabled
+            && !self.is_enabled()
+            && self.base_word != 0
+            && self.since_controlword < self.parameters.controlword_spacing_cycles;
+        if is_too_early {
+            return self.base_word;
+        }
+        self.parameters.dialect.controlword(self.drive_state(), goal, self.base_word)
+    }
+
+    /// What the mode of operation adds to the controlword of an enabled drive.
+    fn mode_bits(&mut self) -> u16 {
+        let has_handshake = self.parameters.dialect.acknowledges_set_points();
+        match self.parameters.law {
+            ControlLaw::ProfilePosition if has_handshake => self.profile.position_bits(self.statusword()),
+            ControlLaw::ProfilePosition => {
+                self.profile.pass();
+                controlword::BIT_5
+            }
+            ControlLaw::ProfileVelocity | ControlLaw::ProfileTorque => {
+                self.profile.pass();
+                0
+            }
+            // Interpolate (CiA 402-2, interpolated position mode).
+            ControlLaw::Interpolated if has_handshake => controlword::BIT_4,
+            _ => 0,
+        }
     }
 
     /// The controlword that was written last.
@@ -254,9 +376,10 @@ impl Axis {
 
     /// The frames of this cycle's command.
     pub fn frames(&self) -> impl Iterator<Item = Frame> {
-        self.parameters.commands.iter().filter_map(|pdo| {
-            let payload = pdo.mapping.pack(&self.command);
-            Frame::data(pdo.id, payload.get(..pdo.mapping.length())?).ok()
+        let due = |command: &&CommandPdo| command.cadence == Cadence::EveryCycle || self.is_controlword_due;
+        self.parameters.commands.iter().filter(due).filter_map(|command| {
+            let payload = command.pdo.mapping.pack(&self.command);
+            Frame::data(command.pdo.id, payload.get(..command.pdo.mapping.length())?).ok()
         })
     }
 
@@ -266,6 +389,7 @@ impl Axis {
         *record = AxisRecord {
             position_set: self.set[0].position,
             position: self.position,
+            drive_state: self.drive_state(),
             velocity_set: self.set[0].velocity as f32,
             acceleration_set: self.set[0].acceleration as f32,
             jerk_set: ((self.set[0].acceleration - self.set[1].acceleration) / period_s) as f32,
@@ -277,13 +401,8 @@ impl Axis {
             statusword: self.statusword(),
             error_code: self.error_code(),
             feedback_age: self.age,
-            command_raw: self.command_raw,
+            command_raw: self.command.command(self.parameters.law.target_slot()),
             position_raw: self.position_raw,
         };
-    }
-
-    /// The controlword that brings the drive one step nearer to `goal`.
-    pub fn controlword_towards(&self, goal: cia402::Goal) -> u16 {
-        self.drive_state().controlword_towards(goal)
     }
 }

@@ -1,0 +1,124 @@
+//! An axis in a profile mode: targets instead of set-points.
+
+use super::Axis;
+use crate::control::ControlLaw;
+use crate::guard::Violation;
+use crate::plan::State;
+use crate::profile::ProfileTarget;
+use crate::stop::Rule;
+
+/// A joint slower than this fraction of its velocity limit stands.
+const AT_REST: f64 = 0.02;
+/// How far the velocity of a profile may overshoot its limit: the drive's own loop makes it.
+const VELOCITY_OVERSHOOT: f64 = 1.2;
+
+impl Axis {
+    /// Whether the drive makes its own way to a target.
+    pub fn is_profile(&self) -> bool {
+        self.parameters.law.is_profile()
+    }
+
+    /// Whether a target is of the kind that the axis' mode takes, and within its limits.
+    pub fn accepts(&self, target: ProfileTarget) -> bool {
+        let limits = &self.parameters.limits;
+        match (self.parameters.law, target) {
+            (ControlLaw::ProfilePosition, ProfileTarget::Position(position)) => limits.contain(position),
+            (ControlLaw::ProfileVelocity, ProfileTarget::Velocity(velocity)) => {
+                velocity.abs() <= limits.velocity
+            }
+            (ControlLaw::ProfileTorque, ProfileTarget::Torque(torque)) => torque.abs() <= limits.torque,
+            _ => false,
+        }
+    }
+
+    /// Takes a target that [`Axis::accepts`].
+    pub fn set_profile_target(&mut self, target: ProfileTarget) {
+        let scale = &self.parameters.scale;
+        let (raw, needs_handshake) = match target {
+            ProfileTarget::Position(position) => {
+                (scale.position_to_counts(position), self.parameters.dialect.acknowledges_set_points())
+            }
+            ProfileTarget::Velocity(velocity) => (scale.velocity_to_drive(velocity), false),
+            ProfileTarget::Torque(torque) => (scale.torque_to_per_mille(torque), false),
+        };
+        self.profile.set(raw, needs_handshake);
+        self.profile_target = Some(target);
+    }
+
+    /// Makes rest the target: the nearest position at which the joint can stand, no velocity, no torque.
+    pub fn stop_profile(&mut self) {
+        let target = match self.parameters.law {
+            ControlLaw::ProfilePosition => ProfileTarget::Position(self.nearest_rest()),
+            ControlLaw::ProfileVelocity => ProfileTarget::Velocity(0.0),
+            ControlLaw::ProfileTorque => ProfileTarget::Torque(0.0),
+            _ => return,
+        };
+        self.set_profile_target(target);
+    }
+
+    /// Where the joint comes to rest if it decelerates from now on.
+    fn nearest_rest(&self) -> f64 {
+        let limits = &self.parameters.limits;
+        let distance = self.velocity * self.velocity.abs() / (2.0 * limits.deceleration);
+        let (lowest, highest) =
+            (limits.position_min.min(self.position), limits.position_max.max(self.position));
+        (self.position + distance).clamp(lowest, highest)
+    }
+
+    /// Whether the drive has its target and says that it has reached it; an axis that follows set-points always has.
+    pub fn is_target_reached(&self) -> bool {
+        !self.is_profile() || self.profile.is_reached(self.parameters.dialect, self.statusword())
+    }
+
+    /// Whether the drive is asked to go on moving without end: a velocity or a torque that is not zero.
+    pub fn is_driven(&self) -> bool {
+        match self.profile_target {
+            Some(ProfileTarget::Velocity(value) | ProfileTarget::Torque(value)) => value != 0.0,
+            _ => false,
+        }
+    }
+
+    /// Whether the joint of an axis in a profile mode stands; one that follows set-points is where they are.
+    pub fn is_at_rest(&self) -> bool {
+        !self.is_profile() || self.velocity.abs() <= AT_REST * self.parameters.limits.velocity
+    }
+
+    /// Cycles that the drive has left a set-point unacknowledged.
+    pub fn unacknowledged_cycles(&self) -> u32 {
+        self.profile.waiting_cycles()
+    }
+
+    /// Watches what the drive makes of its target, since no set-point passes the guard: the joint must be able to come
+    /// to rest before a position limit, and keep to its velocity limit.
+    pub fn check_profile(&self) -> Result<(), Violation> {
+        let limits = &self.parameters.limits;
+        if !self.is_profile() || self.age > 0 {
+            return Ok(());
+        }
+        if self.velocity.abs() > VELOCITY_OVERSHOOT * limits.velocity {
+            return Err(Violation {
+                rule: Rule::VelocityLimit,
+                value: self.velocity,
+                limit: limits.velocity,
+            });
+        }
+        if !self.is_driven() {
+            return Ok(());
+        }
+        let distance = self.velocity * self.velocity.abs() / (2.0 * limits.deceleration);
+        let rest = self.position + distance;
+        let limit = if distance > 0.0 { limits.position_max } else { limits.position_min };
+        let is_beyond = (distance > 0.0 && rest > limit) || (distance < 0.0 && rest < limit);
+        if is_beyond { Err(Violation { rule: Rule::PositionLimit, value: rest, limit }) } else { Ok(()) }
+    }
+
+    /// What the set-points of an axis in a profile mode are, for whoever looks.
+    pub(super) fn shown_set_point(&self) -> State {
+        let rest = State { position: self.position, ..State::default() };
+        match self.profile_target {
+            Some(ProfileTarget::Position(position)) => State { position, ..rest },
+            Some(ProfileTarget::Velocity(velocity)) => State { velocity, ..rest },
+            Some(ProfileTarget::Torque(_)) | None => rest,
+        }
+    }
+}

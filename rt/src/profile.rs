@@ -1,0 +1,144 @@
+//! The profile modes (CiA 402: PP, PV, PT), in which the drive makes its own way to a target: how a target is handed
+//! over and when it has been reached.
+
+use crate::cia402::{controlword, statusword};
+use crate::dialect::Dialect;
+
+/// A target of a profile mode.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ProfileTarget {
+    /// Profile position: rad (m).
+    Position(f64),
+    /// Profile velocity: rad/s (m/s).
+    Velocity(f64),
+    /// Profile torque: N·m (N).
+    Torque(f64),
+}
+
+/// Cycles after a target was set in which the statusword may still tell of the one before: it is sent in one cycle,
+/// taken over at the next SYNC, and reported at the one after that.
+const STALE_CYCLES: u32 = 3;
+
+/// Where the handshake of profile position stands (CiA 402-2, 8.3.2): bit 4 of the controlword rises, the drive
+/// answers with bit 12 of the statusword, both fall.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Handshake {
+    #[default]
+    Idle,
+    /// Bit 4 is low until nothing that is still under way can be about the set-point before.
+    Clearing,
+    Offering,
+    Withdrawing,
+}
+
+/// The target of a drive in a profile mode, in drive units, on its way to the drive.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ProfileCommand {
+    target_raw: i32,
+    handshake: Handshake,
+    cycles: u32,
+    waiting_cycles: u32,
+}
+
+impl ProfileCommand {
+    /// The target in drive units.
+    pub const fn target_raw(&self) -> i32 {
+        self.target_raw
+    }
+
+    /// A new target. `needs_handshake` where the drive acknowledges it.
+    pub fn set(&mut self, target_raw: i32, needs_handshake: bool) {
+        let handshake = if needs_handshake { Handshake::Clearing } else { Handshake::Idle };
+        // Without a handshake under way there is nothing to wait for but the drive's bit 12.
+        let cycles = if needs_handshake && self.handshake == Handshake::Idle { STALE_CYCLES } else { 0 };
+        *self = Self { target_raw, handshake, cycles, waiting_cycles: 0 };
+    }
+
+    /// What a drive without torque is given, which needs no handshake: nothing is to move.
+    pub fn rest(&mut self, target_raw: i32) {
+        *self = Self { target_raw, cycles: STALE_CYCLES, ..Self::default() };
+    }
+
+    /// Goes on by one cycle of the drive's bus, with its newest statusword, and gives the bits that the controlword of
+    /// an enabled drive in profile position needs beside bits 0 to 3.
+    pub fn position_bits(&mut self, word: u16) -> u16 {
+        let is_acknowledged = word & statusword::BIT_12 != 0;
+        let next = match self.handshake {
+            Handshake::Clearing if self.cycles >= STALE_CYCLES && !is_acknowledged => Handshake::Offering,
+            Handshake::Offering if is_acknowledged => Handshake::Withdrawing,
+            Handshake::Withdrawing if !is_acknowledged => Handshake::Idle,
+            same => same,
+        };
+        self.cycles = if next == self.handshake { self.cycles.saturating_add(1) } else { 0 };
+        self.waiting_cycles = if next == Handshake::Idle { 0 } else { self.waiting_cycles.saturating_add(1) };
+        self.handshake = next;
+        if next == Handshake::Offering { controlword::BIT_4 | controlword::BIT_5 } else { 0 }
+    }
+
+    /// Goes on by one cycle of the drive's bus in a mode without a handshake.
+    pub fn pass(&mut self) {
+        self.cycles = self.cycles.saturating_add(1);
+    }
+
+    /// Cycles that the handshake has taken so far; 0 when none is under way.
+    pub const fn waiting_cycles(&self) -> u32 {
+        self.waiting_cycles
+    }
+
+    /// Whether the drive has the target and says that it has reached it.
+    pub fn is_reached(&self, dialect: Dialect, word: u16) -> bool {
+        self.handshake == Handshake::Idle && self.cycles >= STALE_CYCLES && dialect.is_target_reached(word)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const OFFER: u16 = controlword::BIT_4 | controlword::BIT_5;
+    const ACKNOWLEDGED: u16 = statusword::BIT_12;
+
+    #[test]
+    fn a_set_point_is_offered_until_it_is_acknowledged_and_then_withdrawn() {
+        let mut command = ProfileCommand::default();
+        command.set(1000, true);
+        let words = [0, 0, ACKNOWLEDGED, ACKNOWLEDGED, 0, 0];
+        assert_eq!(words.map(|word| command.position_bits(word)), [OFFER, OFFER, 0, 0, 0, 0]);
+        assert_eq!(command.waiting_cycles(), 0);
+    }
+
+    #[test]
+    fn an_acknowledgement_of_the_target_before_is_not_taken_for_this_ones() {
+        let mut command = ProfileCommand::default();
+        command.set(1000, true);
+        for waited in 1..5 {
+            assert_eq!(command.position_bits(ACKNOWLEDGED), 0);
+            assert_eq!(command.waiting_cycles(), waited);
+        }
+        assert_eq!(command.position_bits(0), OFFER);
+    }
+
+    #[test]
+    fn target_reached_counts_only_once_it_can_be_about_this_target() {
+        let mut command = ProfileCommand::default();
+        command.set(7, false);
+        assert!(!command.is_reached(Dialect::YzAim, statusword::TARGET_REACHED));
+        for _ in 0..STALE_CYCLES {
+            command.pass();
+        }
+        assert!(command.is_reached(Dialect::YzAim, statusword::TARGET_REACHED));
+        assert!(!command.is_reached(Dialect::YzAim, 0));
+    }
+
+    #[test]
+    fn a_target_in_the_middle_of_a_handshake_waits_until_the_old_one_cannot_answer_any_more() {
+        let mut command = ProfileCommand::default();
+        command.set(1, true);
+        assert_eq!(command.position_bits(0), OFFER);
+        command.set(2, true);
+        // The drive has seen the first offer and acknowledges it while bit 4 is low again.
+        let words = [0, ACKNOWLEDGED, ACKNOWLEDGED, 0, 0];
+        assert_eq!(words.map(|word| command.position_bits(word)), [0, 0, 0, OFFER, OFFER]);
+        assert_eq!(command.target_raw(), 2);
+    }
+}
