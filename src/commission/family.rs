@@ -1,4 +1,4 @@
-//! The families of drives that can be commissioned.
+//! What commissioning knows of the families of drives.
 
 use takt_rt::frame::Frame;
 
@@ -8,49 +8,12 @@ use super::subject::Subject;
 use super::{erob_canopen, yz_aim};
 use crate::canopen::object::Object;
 use crate::canopen::sdo::Timing;
-use crate::config::DriveFamily;
 
-/// A family of drives.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Family {
-    /// ZeroErr eRob, CANopen firmware.
-    ErobCanopen,
-    /// YZ-AIM integrated servo, CANopen edition.
-    YzAim,
-}
+pub use crate::config::DriveFamily as Family;
 
 impl Family {
     /// Every family.
     pub const ALL: [Self; 2] = [Self::ErobCanopen, Self::YzAim];
-
-    /// The family of a configured drive.
-    pub const fn of(drive: DriveFamily) -> Self {
-        match drive {
-            DriveFamily::ErobCanopen => Self::ErobCanopen,
-        }
-    }
-
-    /// The word for it in a configuration and on the command line.
-    pub const fn word(self) -> &'static str {
-        match self {
-            Self::ErobCanopen => "erob-canopen",
-            Self::YzAim => "yz-aim",
-        }
-    }
-
-    /// Counts of one turn of the position that a drive of this family reports: eRob 19 bits on the output side, YZ-AIM
-    /// 15 bits on the motor side.
-    pub const fn counts_per_turn(self) -> f64 {
-        match self {
-            Self::ErobCanopen => 524_288.0,
-            Self::YzAim => 32_768.0,
-        }
-    }
-
-    /// Whether velocities are in r/min, not in counts/s.
-    pub const fn counts_revolutions(self) -> bool {
-        matches!(self, Self::YzAim)
-    }
 
     /// Object 1018:1.
     pub const fn vendor_id(self) -> u32 {

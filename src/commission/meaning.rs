@@ -3,6 +3,7 @@
 use takt_rt::frame::Frame;
 
 use super::dictionary::Entry;
+use super::family::Family;
 use super::subject::Subject;
 use crate::canopen::emcy::Emergency;
 use crate::canopen::nmt::{ErrorControl, NmtCommand, NmtState, NmtTarget};
@@ -25,7 +26,7 @@ pub fn of(subject: &Subject, frame: &Frame) -> String {
         let words = match message.state {
             NmtState::BootUp => "boot-up".to_owned(),
             // This drive's heartbeat says so when it has an alarm.
-            NmtState::Stopped if subject.family.counts_revolutions() && message.node == subject.node => {
+            NmtState::Stopped if subject.family == Family::YzAim && message.node == subject.node => {
                 "heartbeat: alarm".to_owned()
             }
             state => format!("heartbeat: {state}"),

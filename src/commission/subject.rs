@@ -9,6 +9,7 @@ use takt_rt::units::{Scale, ScaleError, ScaleParameters};
 use super::failure::Failure;
 use super::family::Family;
 use crate::config::{Axis, Limits, Quantity, Travel};
+use crate::controller::assemble;
 
 /// A value as it was asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,17 +53,10 @@ impl Subject {
         Ok(Self {
             name: axis.name.clone(),
             node: axis.node,
-            family: Family::of(axis.drive),
+            family: axis.drive,
             travel: axis.travel,
             counts_per_turn: axis.counts_per_turn,
-            scale: Scale::new(ScaleParameters {
-                counts_per_turn: axis.counts_per_turn,
-                gear_ratio: axis.gear_ratio,
-                travel_per_turn: travel_per_turn(axis.travel),
-                reversed: axis.reversed,
-                zero_counts: axis.zero_counts.into(),
-                rated_torque: axis.simulated.rated_torque,
-            })?,
+            scale: assemble::scale(axis)?,
             limits: Some(axis.limits),
             patience_ns: PATIENCE_NS.saturating_add(axis.simulated.power_up_ns),
         })
@@ -82,6 +76,7 @@ impl Subject {
             counts_per_turn,
             scale: Scale::new(ScaleParameters {
                 counts_per_turn,
+                velocity_units_per_turn: family.velocity_units_per_turn(counts_per_turn),
                 gear_ratio: 1.0,
                 travel_per_turn: TAU,
                 reversed: false,
@@ -125,11 +120,6 @@ impl Subject {
         }
     }
 
-    /// Drive units of velocity for one count per second: r/min where the drive counts those, else 1.
-    fn per_count_s(&self) -> f64 {
-        if self.family.counts_revolutions() { 60.0 / self.counts_per_turn } else { 1.0 }
-    }
-
     /// rad (m) of a position in counts.
     pub fn position(&self, counts: i64) -> f64 {
         self.scale.position_from_counts(clamped(counts))
@@ -137,8 +127,7 @@ impl Subject {
 
     /// rad/s (m/s) of a velocity in drive units.
     pub fn velocity(&self, raw: f64) -> f64 {
-        let per_count = self.scale.velocity_from_counts(1);
-        raw / self.per_count_s() * per_count
+        raw * self.scale.velocity_from_drive(1)
     }
 
     /// rad/s² (m/s²) of an acceleration in drive units.
@@ -157,7 +146,10 @@ impl Subject {
     /// Counts of a distance, with its sign in the drive's direction.
     pub fn distance_counts(&self, distance: Amount) -> i64 {
         match distance {
-            Amount::Joint(distance) => self.scale.velocity_to_counts(distance).into(),
+            Amount::Joint(distance) => {
+                let counts = |position| i64::from(self.scale.position_to_counts(position));
+                counts(distance) - counts(0.0)
+            }
             Amount::Drive(counts) => counts,
         }
     }
@@ -166,10 +158,7 @@ impl Subject {
     /// zero by rounding.
     pub fn velocity_raw(&self, velocity: Amount) -> i64 {
         match velocity {
-            Amount::Joint(velocity) => {
-                let counts_s = velocity / self.scale.velocity_from_counts(1);
-                away_from_zero(counts_s * self.per_count_s())
-            }
+            Amount::Joint(velocity) => away_from_zero(velocity / self.scale.velocity_from_drive(1)),
             Amount::Drive(raw) => raw,
         }
     }
@@ -231,14 +220,6 @@ impl Subject {
             return Ok(());
         }
         Err(Failure::OutsideLimits { quantity, value, low: -most, high: most })
-    }
-}
-
-/// What the joint moves in one turn: rad or m.
-fn travel_per_turn(travel: Travel) -> f64 {
-    match travel {
-        Travel::Rotary => TAU,
-        Travel::Linear { lead_m } => lead_m,
     }
 }
 

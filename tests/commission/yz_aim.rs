@@ -52,6 +52,7 @@ fn limits() -> Limits {
 fn with(drives: Vec<YzAimParameters>) -> Bench {
     let scale = ScaleParameters {
         counts_per_turn: 32_768.0,
+        velocity_units_per_turn: 60.0,
         gear_ratio: RATIO,
         travel_per_turn: TAU,
         reversed: false,
