@@ -2,11 +2,14 @@
 
 use takt_rt::time::Nanoseconds;
 
+use super::contact;
 use super::conversation::Conversation;
 use super::event::Reading;
 use super::failure::Failure;
 use super::report::Report;
+use super::request::Course;
 use super::subject::Subject;
+use crate::canopen::objects::POSITION_ACTUAL_VALUE;
 
 /// Shows what `read` reads until it is time.
 pub async fn watch(
@@ -48,6 +51,21 @@ pub async fn tend(
         }
         let pause_ns = every_ns.saturating_sub(since(begun_ns));
         c.pause(pause_ns.min(left_ns.unwrap_or(pause_ns))).await?;
+    }
+}
+
+/// Checks where a course leads before anything is changed: a drive that is not moved is left as it is.
+pub async fn check_course(c: &Conversation, s: &Subject, course: Course) -> Result<(), Failure> {
+    if let Course::Absolute { to, .. } | Course::Reciprocate { to, .. } = course {
+        s.check_position(s.position_counts(to))?;
+    }
+    contact::reach_family(c, s).await?;
+    c.step("way");
+    let here = c.read(&POSITION_ACTUAL_VALUE).await?;
+    match course {
+        Course::Relative(by) => s.check_position(here.saturating_add(s.distance_counts(by))),
+        Course::Reciprocate { .. } => s.check_position(here),
+        Course::Absolute { .. } | Course::Continuous { .. } => Ok(()),
     }
 }
 

@@ -154,6 +154,20 @@ fn a_relative_move_is_that_of_the_manual_and_is_made_once() {
 }
 
 #[test]
+fn a_target_outside_the_limits_is_refused_and_the_drive_is_left_as_it_is() {
+    let mut bench = bench();
+    for course in [
+        Course::Absolute { to: Amount::Joint(20.1), is_immediate: false },
+        Course::Relative(Amount::Joint(-20.1)),
+        Course::Reciprocate { to: Amount::Joint(21.0), times: 1, dwell_ns: 0 },
+    ] {
+        let failed = bench.run(move_to(course)).unwrap_err();
+        assert!(matches!(failed.failure, Failure::OutsideLimits { .. }), "{failed:?}");
+        assert!(bench.sent.iter().all(|frame| frame.payload()[0] == 0x40), "{:?}", bench.sent);
+    }
+}
+
+#[test]
 fn a_velocity_is_that_of_the_manual_and_ends_in_a_ramp() {
     let mut bench = bench();
     let request = Request::Velocity {

@@ -81,10 +81,7 @@ pub async fn position(
     keeps_enabled: bool,
 ) -> Result<Report, Failure> {
     let profile = profile(s, &pace)?;
-    // What is known to be outside before the drive is asked is refused before.
-    if let Course::Absolute { to, .. } | Course::Reciprocate { to, .. } = course {
-        s.check_position(s.position_counts(to))?;
-    }
+    looking::check_course(c, s, course).await?;
     let work = async {
         enabling::prepare(c, s, mode::POSITION, &profile).await?;
         let profile = complete(c, profile).await?;
@@ -102,9 +99,6 @@ pub async fn position(
             }
         };
         s.check_position(target)?;
-        if stops > 1 {
-            s.check_position(here)?;
-        }
         let mut at = enabling::enable(c, s).await?;
         for stop in 0..stops {
             let next = if stop % 2 == 0 { target } else { here };

@@ -26,10 +26,7 @@ pub async fn run(
     keeps_enabled: bool,
 ) -> Result<Report, Failure> {
     let profile = s.profile(&pace)?;
-    // What is known to be outside before the drive is asked is refused before.
-    if let Course::Absolute { to, .. } | Course::Reciprocate { to, .. } = course {
-        s.check_position(s.position_counts(to))?;
-    }
+    looking::check_course(c, s, course).await?;
     let is_immediate = matches!(course, Course::Absolute { is_immediate: true, .. });
     let work = async {
         let rated = begin(c, s, OperationMode::ProfilePosition, &profile).await?;
@@ -45,9 +42,6 @@ pub async fn run(
             }
         };
         s.check_position(target)?;
-        if stops > 1 {
-            s.check_position(here)?;
-        }
         let mut at = enabling::enable(c, s).await?;
         for stop in 0..stops {
             let next = if stop % 2 == 0 { target } else { here };
