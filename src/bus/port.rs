@@ -11,8 +11,8 @@ use super::trace::{Trace, TracedPort, traced};
 use crate::config::{Config, Interface};
 use crate::sim::SimulatedBus;
 
-/// Frames on their way to the candump log: a second of a full bus.
-const TRACE_FRAMES: usize = 1 << 14;
+/// Frames on their way to the logger: almost a second of a full bus of 1 Mbit/s.
+const TRACE_FRAMES: usize = 1 << 13;
 
 /// A bus port of any kind.
 pub enum Port {
@@ -20,7 +20,7 @@ pub enum Port {
     Simulated(Box<SimulatedBus>),
     /// A CAN interface of this machine.
     SocketCan(Box<SocketCanPort>),
-    /// Any port whose frames are also logged.
+    /// Any port whose frames the logger sees too.
     Traced(Box<TracedPort<Port>>),
 }
 

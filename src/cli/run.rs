@@ -130,7 +130,14 @@ fn report(config: &Config, session: &Session, as_json: bool) -> Exit {
         }
     } else {
         match failure {
-            Some(failure) => eprintln!("takt: {failure}"),
+            Some(failure) => {
+                eprintln!("takt: {failure}");
+                report
+                    .telemetry
+                    .black_boxes
+                    .iter()
+                    .for_each(|path| eprintln!("black box: {}", path.display()));
+            }
             None => {
                 print(&report.picture(if stdout().is_terminal() { Emphasis::Ansi } else { Emphasis::None }))
             }
@@ -168,6 +175,9 @@ fn failure(config: &Config, outcome: &Outcome) -> Option<String> {
         Outcome::MoveRefused { number } => Some(format!(
             "move {number} of the program was refused: its target or a fraction lies outside the limits"
         )),
+        Outcome::CallbackPanicked { message } => {
+            Some(format!("a defect of takt (please report it) ended the run in a controlled stop: {message}"))
+        }
         Outcome::Stuck { phase } => {
             Some(format!("the group did not get any further while it was {}", words::phase(*phase)))
         }

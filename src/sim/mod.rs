@@ -50,6 +50,7 @@ mod drive;
 pub mod erob;
 pub mod homing_switches;
 mod live;
+pub mod lss;
 mod mailbox;
 mod medium;
 pub mod plant;

@@ -10,6 +10,7 @@ mod entry;
 mod machine;
 mod program;
 mod section;
+mod stops;
 
 use toml::de::DeTable;
 
@@ -25,7 +26,7 @@ pub fn parse(source_name: &str, text: &str) -> Result<Config, ConfigError> {
     if !errors.is_empty() {
         return Err(refuse(errors.iter().map(|error| syntax_problem(error, text)).collect()));
     }
-    let problems = Problems::new(text);
+    let problems = Problems::new(source_name, text);
     let config = read(document.get_ref(), &problems);
     let problems = problems.into_vec();
     match config {
@@ -44,7 +45,10 @@ fn read<'a>(document: &'a DeTable<'a>, problems: &'a Problems<'a>) -> Option<Con
     let mut root = Section::new("", 0..0, document, problems);
     let name =
         root.require("name", "the name of the machine: name = \"arm6\"").and_then(|entry| entry.name());
-    let (cycle, automatic_phase) = machine::cycle(root.section("cycle"));
+    let mut cycle = root.section("cycle");
+    let missed_slots = stops::missed_slots(cycle.section("missed_slots"));
+    let (cycle, automatic_phase) = machine::cycle(cycle);
+    let stops = stops::stops(root.section("stops"));
     let realtime = machine::realtime(root.section("realtime"), cycle.period_ns);
     let master = machine::master(root.section("master"));
     let telemetry = machine::telemetry(root.section("telemetry"));
@@ -67,6 +71,8 @@ fn read<'a>(document: &'a DeTable<'a>, problems: &'a Problems<'a>) -> Option<Con
     let mut config = Config {
         name: name?.to_owned(),
         cycle,
+        missed_slots,
+        stops,
         realtime,
         master,
         buses: buses.into_iter().map(|bus| bus.bus).collect::<Option<_>>()?,
