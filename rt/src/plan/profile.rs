@@ -311,6 +311,10 @@ impl Profile {
 
     /// The profile is complete, and lasts exactly this long; the last phase takes up the rounding.
     pub(super) fn finish_at(&mut self, target: State, duration_s: f64) -> Result<(), PlanError> {
+        if self.count == 0 && duration_s > 0.0 {
+            // A time that is itself rounding: every phase of it was none.
+            self.append(duration_s, self.end.acceleration, 0.0);
+        }
         let reached = self.end;
         self.end = target;
         self.duration_s = duration_s;

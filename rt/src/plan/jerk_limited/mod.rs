@@ -7,6 +7,7 @@
 
 mod brake;
 mod crossing;
+mod drift;
 mod motion;
 mod passage;
 mod roots;
