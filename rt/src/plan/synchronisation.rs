@@ -1,7 +1,7 @@
 //! Several axes, one duration (`otg.md` section 2, 4).
 
 use super::error::PlanError;
-use super::problem::{Limits, Problem, State};
+use super::problem::{Limits, Problem, SIZE_MAX, State};
 use super::profile::{BLOCKED_MAX, Profile};
 use super::straight::Line;
 use super::{jerk_limited, trapezoid, travel};
@@ -44,6 +44,14 @@ pub struct Timing {
     pub cycle_s: Option<f64>,
     /// How a velocity beyond its limit comes back to it.
     pub return_to_limits: Return,
+}
+
+impl Timing {
+    fn validate(&self) -> Result<(), PlanError> {
+        let least_valid = self.minimum_duration_s >= 0.0 && self.minimum_duration_s < SIZE_MAX;
+        let cycle_valid = self.cycle_s.is_none_or(|cycle_s| cycle_s > 1.0 / SIZE_MAX && cycle_s < SIZE_MAX);
+        if least_valid && cycle_valid { Ok(()) } else { Err(PlanError::InvalidTiming) }
+    }
 }
 
 /// What is controlled: where an axis arrives, or only how fast it then is.
@@ -217,10 +225,7 @@ fn plan(
     timing: Timing,
 ) -> Result<f64, PlanError> {
     expect_length(problems.len(), profiles.len())?;
-    let cycle_valid = timing.cycle_s.is_none_or(|cycle_s| cycle_s > 0.0 && cycle_s.is_finite());
-    if !(timing.minimum_duration_s >= 0.0 && timing.minimum_duration_s.is_finite() && cycle_valid) {
-        return Err(PlanError::InvalidTiming);
-    }
+    timing.validate()?;
     let mut longest_s = timing.minimum_duration_s;
     for (axis, (problem, profile)) in problems.iter().zip(profiles.iter_mut()).enumerate() {
         // An axis that will be made to last longer needs no phases yet.
