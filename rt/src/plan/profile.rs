@@ -99,8 +99,9 @@ pub(super) fn select(condition: bool, one: f64, other: f64) -> f64 {
     if condition { one } else { other }
 }
 
+/// The state after this time of constant jerk.
 #[inline]
-fn integrate(start: &State, jerk: f64, elapsed_s: f64) -> State {
+pub(super) fn integrate(start: &State, jerk: f64, elapsed_s: f64) -> State {
     let State { position, velocity, acceleration } = *start;
     State {
         position: position

@@ -157,8 +157,17 @@ pub fn synchronised_velocity(
 
 /// Plans the fastest coordinated stop: every axis comes to rest, all at the same time. Gives the duration in s.
 ///
-/// An axis that would leave its position limits that way stops sooner by itself, on a shorter way, and waits for the
-/// others. Where no way is short enough it takes the shortest; see [`Profile::extrema`].
+/// An axis that would leave its position limits that way stops by itself and waits for the others: as fast as it can or,
+/// where that leads beyond a limit, by decelerating further, so that it turns around just there and swings back. From
+/// a start within the limits of acceleration,
+///
+/// - the position limit it runs towards is kept whenever any motion within the limits of acceleration and jerk keeps it; where none does,
+///   the way beyond it is the shortest;
+/// - the velocity limits are kept, too, whenever any such motion keeps them together with that position limit; where
+///   none does, the position comes first and the swing back is as slow as it can be.
+///
+/// Where both position limits are nearer to each other than such a swing is wide, it may leave the other one. What the
+/// motion does keep in the end is in [`Profile::extrema`].
 ///
 /// # Errors
 /// As [`synchronised`].

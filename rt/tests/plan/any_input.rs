@@ -155,3 +155,14 @@ fn a_motion_that_lasts_next_to_no_time_is_where_it_should_be() {
     }
     assert_eq!(profiles[0].phases().count(), 1);
 }
+
+/// Found by the fuzzer: rounding had made the duration negative, and then it was no number.
+#[test]
+fn a_motion_that_takes_no_time_beyond_a_position_limit_is_waited_for_or_refused() {
+    let limits = Limits::symmetric(1.0, 5.1e8, 1.3e-13).with_position(-1.0, 5.6e-319);
+    let target = State { position: 2.2e-106, velocity: 0.0, acceleration: 1.3e-302 };
+    let problem = Problem { start: State::rest(0.0), target, limits };
+    let mut profiles = [Profile::hold(0.0)];
+    let _answer_or_refusal = synchronised(&[problem], &mut profiles, Timing::default());
+    assert!(profiles[0].duration_s() >= 0.0 && are_numbers(&profiles));
+}

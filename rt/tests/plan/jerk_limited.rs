@@ -297,6 +297,37 @@ proptest! {
     }
 
     #[test]
+    fn a_stop_keeps_the_velocity_limits_too_where_that_keeps_the_position_limit(problem in problem(), room in 0.0..1.0_f64) {
+        let Problem { start, limits, .. } = problem;
+        let turns_anyway = start.velocity + start.acceleration * start.acceleration.abs() / (2.0 * limits.jerk_max) < 0.0;
+        if !starts_inside(&problem) || start.velocity <= 0.0 || turns_anyway {
+            return Ok(());
+        }
+        // How far the axis comes at least: decelerating fully until it turns around, in the first case only so much that
+        // the swing back keeps the velocity limit.
+        let swing = (-2.0 * limits.jerk_max * limits.velocity_min).sqrt().min(-limits.acceleration_min);
+        let full = (2.0 * limits.jerk_max * start.velocity + start.acceleration.powi(2)).sqrt().min(-limits.acceleration_min);
+        let turn = |deceleration: f64| {
+            velocity(&Problem { target: state(0.0, 0.0, -deceleration), ..problem }).unwrap().end().position
+        };
+        let (keeping_both, shortest) = (turn(swing.min(full)), turn(full));
+        let end = velocity(&Problem { target: State::rest(0.0), ..problem }).unwrap().end().position;
+        let high = shortest + room * (end - shortest);
+        let mut profiles = [Profile::hold(0.0)];
+        stop(&[start], &[limits.with_position(f64::NEG_INFINITY, high)], &mut profiles).unwrap();
+        prop_assert_eq!(judge(&Problem { target: profiles[0].end(), ..problem }, &profiles[0], Arrival::Velocity), Ok(()));
+        let extrema = profiles[0].extrema();
+        let rounding = 1e-9 * (1.0 + high.abs());
+        prop_assert!(extrema.position.max <= high.max(start.position) + rounding, "{extrema:?}");
+        if keeping_both <= high {
+            prop_assert!(extrema.velocity.min >= limits.velocity_min * (1.0 + 1e-9), "{extrema:?}");
+        } else {
+            // Position comes first; the swing back is as slow as it can be, for the axis turns around only just there.
+            prop_assert!(extrema.position.max >= high - rounding, "{extrema:?}");
+        }
+    }
+
+    #[test]
     fn a_lowered_velocity_limit_is_reached_without_going_below(
         vmax in 0.1..2.0_f64, excess in 0.0..3.0_f64, a0 in -1.0..1.0_f64, amax in 0.5..12.0_f64, jmax in 0.5..100.0_f64,
     ) {
