@@ -9,7 +9,7 @@ use takt_rt::plan::{
     synchronised, velocity,
 };
 
-fn state(position: f64, velocity: f64, acceleration: f64) -> State {
+pub fn state(position: f64, velocity: f64, acceleration: f64) -> State {
     State { position, velocity, acceleration }
 }
 
@@ -22,7 +22,7 @@ fn limits() -> impl Strategy<Value = Limits> {
 }
 
 /// Any start, also outside the limits, and any target that can be reached within them.
-fn problem() -> impl Strategy<Value = Problem> {
+pub fn problem() -> impl Strategy<Value = Problem> {
     let or_zero = |range: core::ops::Range<f64>| prop_oneof![1 => Just(0.0), 3 => range];
     let start = (-4.0..4.0, or_zero(-3.0..3.0), or_zero(-3.0..3.0));
     let target = (-4.0..4.0, or_zero(-1.0..1.0), or_zero(-1.0..1.0));
@@ -73,7 +73,7 @@ fn reversed(problem: &Problem) -> Problem {
 }
 
 /// The same problem in a unit that is so many times smaller.
-fn scaled(problem: &Problem, factor: f64) -> Problem {
+pub fn scaled(problem: &Problem, factor: f64) -> Problem {
     let scale = |of: &State| state(of.position * factor, of.velocity * factor, of.acceleration * factor);
     let Limits { velocity_max, velocity_min, acceleration_max, acceleration_min, jerk_max, .. } =
         problem.limits;
@@ -91,7 +91,7 @@ fn scaled(problem: &Problem, factor: f64) -> Problem {
 }
 
 /// Whether the start is within the limits and can stay there.
-fn starts_inside(problem: &Problem) -> bool {
+pub fn starts_inside(problem: &Problem) -> bool {
     let Problem { start, limits, .. } = problem;
     let bound_for = start.velocity + start.acceleration * start.acceleration.abs() / (2.0 * limits.jerk_max);
     let velocities = limits.velocity_min..=limits.velocity_max;
@@ -184,29 +184,6 @@ proptest! {
             let cycles = profile.duration_s() / 0.004;
             prop_assert!(profile.duration_s() <= duration_s && (cycles - cycles.round()).abs() < 1e-6);
             prop_assert_eq!(judge(problem, profile, Arrival::State), Ok(()));
-        }
-    }
-
-    #[test]
-    fn planning_anew_in_every_cycle_arrives_at_the_same_time(problem in problem(), cycles in 5..200_u32) {
-        // On the way to a target with acceleration there may be states that are bound for the velocity limit.
-        // Seen by themselves, these have to brake.
-        if !starts_inside(&problem) || problem.target.acceleration != 0.0 {
-            return Ok(());
-        }
-        let mut profile = position(&problem).unwrap();
-        let total_s = profile.duration_s();
-        if total_s < 1e-3 {
-            return Ok(());
-        }
-        let cycle_s = total_s / f64::from(cycles);
-        let mut problem = problem;
-        for cycle in 1..cycles {
-            problem.start = profile.sample(cycle_s);
-            profile = position(&problem).unwrap();
-            let arrival_s = f64::from(cycle) * cycle_s + profile.duration_s();
-            // At the end of a stop a rounding error of the position costs its third root in time.
-            prop_assert!((arrival_s - total_s).abs() <= 1e-4 * total_s, "{arrival_s} {total_s} {cycle}");
         }
     }
 
