@@ -35,15 +35,16 @@ impl Edges {
     pub(super) fn but_for_drift(&self, fastest: f64) -> Option<(Self, Ways)> {
         let drift = Drift::of(self);
         let [one, other] = self.in_lens(&drift);
-        let direct = [self.closed(&drift), *self]
-            .map(|edges| (edges.over(edges.direct_distance), edges.direct_duration));
-        let candidates = [one, other].into_iter().flatten().chain(direct);
+        let direct = self
+            .nearly_direct(&drift)
+            .map(|edges| Some((edges?.over(edges?.direct_distance), edges?.direct_duration)));
+        let candidates = [one, other].into_iter().chain(direct).flatten();
         candidates.into_iter().find_map(|(edges, duration)| {
             let error = (edges.motion.distance - self.motion.distance).abs();
             // At rest, an error of the distance costs its third root in time: that is no detour.
             let is_detour = |duration: f64| {
                 let lost = fastest - duration;
-                lost * lost * lost > DETOUR * error
+                lost * lost * lost > DETOUR * (error + f64::EPSILON * drift.distance)
             };
             if error > drift.distance || !is_detour(duration) {
                 return None;
@@ -61,6 +62,18 @@ impl Edges {
     fn over(mut self, distance: f64) -> Self {
         self.motion.distance = distance;
         self
+    }
+
+    /// The edges over the distance of the direct motion, with and without drift of the velocities, if it may be that.
+    fn nearly_direct(&self, drift: &Drift) -> [Option<Self>; 2] {
+        let Motion { v0, a0, vf, af, distance, .. } = self.motion;
+        // A gap that closes takes no more time away than this, at no more than this speed.
+        let speed = v0.abs() + vf.abs() + a0 * a0 + af * af;
+        let reach = drift.distance + 2.0 * libm::sqrt(drift.velocity) * speed;
+        if (self.direct_distance - distance).abs() > reach {
+            return [None; 2];
+        }
+        [(self.gap > 0.0).then(|| self.closed(drift)), Some(*self)]
     }
 
     /// The edges when the velocities at both ends are nearer by as much of their drift as the direct motion is too far.
