@@ -1,17 +1,20 @@
 //! Linux: the only part of this crate that touches the operating system.
 //!
-//! - [`MonotonicClock`]: absolute sleep, then spin; [`SpinGuard`] computes how long the spin must be.
+//! - [`MonotonicClock`]: absolute sleep; [`PacedClock`]: the same and a spin, for the loop; [`SpinGuard`] computes how
+//!   long the spin must be.
 //! - [`RealtimeThread`]: elevates the calling thread step by step and keeps what came of each step.
 //! - [`SocketCanPort`]: a raw CAN socket as a bus port.
 //!
 //! Nothing here formats, allocates or decides: refusals are plain data, and the user's side puts them in words.
 #![allow(unsafe_code)] // System calls cannot be made without it; every one says why it is sound.
 
+mod bottom_half;
 mod can;
 mod clock;
 mod kernel;
 mod latency;
 mod memory;
+mod paced_clock;
 mod scheduling;
 mod spin_guard;
 mod step;
@@ -21,6 +24,7 @@ pub use can::SocketCanPort;
 pub use clock::MonotonicClock;
 pub use kernel::{is_preempt_rt, is_preempt_rt_version};
 pub use memory::{PREFAULT_LIMIT_BYTES, PageFaults};
+pub use paced_clock::PacedClock;
 pub use scheduling::{Policy, Scheduling};
 pub use spin_guard::SpinGuard;
 pub use step::{Outcome, STEP_COUNT, Step, StepResult};
