@@ -6,7 +6,7 @@ use crate::time::{NANOSECONDS_PER_SECOND, Nanoseconds};
 /// `CLOCK_MONOTONIC`, waited on by an absolute sleep (`clock_nanosleep` with `TIMER_ABSTIME`), so that being interrupted
 /// between reading the clock and going to sleep delays nothing.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct MonotonicClock;
+pub struct MonotonicClock {}
 
 impl Clock for MonotonicClock {
     fn now_ns(&mut self) -> Nanoseconds {
@@ -80,7 +80,7 @@ mod tests {
 
     #[test]
     fn time_never_runs_backwards() {
-        let mut clock = MonotonicClock;
+        let mut clock = MonotonicClock::default();
         let mut before_ns = clock.now_ns();
         for _ in 0..10_000 {
             let now_ns = clock.now_ns();
@@ -91,7 +91,7 @@ mod tests {
 
     #[test]
     fn a_wait_never_ends_early() {
-        let mut clock = MonotonicClock;
+        let mut clock = MonotonicClock::default();
         for step_ns in [0, 1, 999, 50_000, 300_000, 1_000_000] {
             let deadline_ns = clock.now_ns() + step_ns;
             let wake = clock.wait_until(deadline_ns);
@@ -102,7 +102,7 @@ mod tests {
 
     #[test]
     fn a_deadline_that_has_passed_costs_no_sleep() {
-        let mut clock = MonotonicClock;
+        let mut clock = MonotonicClock::default();
         let now_ns = clock.now_ns();
         assert_eq!(clock.wait_until(now_ns).timer_latency_ns, 0);
         assert_eq!(clock.wait_until(0).timer_latency_ns, 0);
@@ -110,7 +110,7 @@ mod tests {
 
     #[test]
     fn after_a_sleep_the_timer_latency_is_the_whole_lateness() {
-        let mut clock = MonotonicClock;
+        let mut clock = MonotonicClock::default();
         let deadline_ns = clock.now_ns() + 2_000_000;
         let wake = clock.wait_until(deadline_ns);
         assert_eq!(wake.now_ns - deadline_ns, wake.timer_latency_ns);
@@ -137,7 +137,7 @@ mod tests {
                     std::thread::sleep(std::time::Duration::from_millis(1));
                 }
             });
-            let mut clock = MonotonicClock;
+            let mut clock = MonotonicClock::default();
             let deadline_ns = clock.now_ns() + 30_000_000;
             assert!(clock.wait_until(deadline_ns).now_ns >= deadline_ns);
             done.send(()).unwrap();

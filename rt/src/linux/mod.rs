@@ -8,7 +8,6 @@
 //! Nothing here formats, allocates or decides: refusals are plain data, and the user's side puts them in words.
 #![allow(unsafe_code)] // System calls cannot be made without it; every one says why it is sound.
 
-mod bottom_half;
 mod can;
 mod clock;
 mod kernel;
@@ -16,6 +15,7 @@ mod latency;
 mod memory;
 mod paced_clock;
 mod scheduling;
+mod send_path;
 mod spin_guard;
 mod step;
 mod thread;
