@@ -27,6 +27,7 @@ heartbeat_timeout = "500 ms"
 name = "left"
 interface = "sim"
 bit_rate = "1 Mbit/s"
+restart_ms = 250
 service_frames_per_cycle = 1
 
 [[bus]]
@@ -192,6 +193,8 @@ cases! {
         "heartbeat_timeout = \"500 ms\"" => "heartbeat_timeout = \"100 ms\"", at "heartbeat_timeout": OutOfRange { allowed, .. } if allowed == "longer than heartbeat, 100 ms",
         "heartbeat_timeout = \"500 ms\"" => "heartbeat_timeout = \"66 s\"", at "66 s": OutOfRange { .. },
         "bit_rate = \"1 Mbit/s\"" => "bit_rate = 999999", at "999999": OutOfRange { key, .. } if key == "bus.bit_rate",
+        "restart_ms = 250" => "restart_ms = 60001", at "restart": OutOfRange { allowed, .. } if allowed == "0 to 60000",
+        "restart_ms = 250" => "restart_ms = \"100 ms\"", at "restart": WrongType { .. },
         "service_frames_per_cycle = 1" => "service_frames_per_cycle = 0", at "service": OutOfRange { .. },
         "bit_rate = \"1 Mbit/s\"" => "data_bit_rate = \"500 kbit/s\"", at "data_bit": OutOfRange { allowed, .. } if allowed == "1 Mbit/s to 8 Mbit/s",
         "transmission_type = 1" => "transmission_type = 241", at "241": OutOfRange { .. },

@@ -121,6 +121,7 @@ fn bus(number: usize) -> Bus {
         interface: Interface::Simulated,
         bit_rate: 1_000_000,
         data_bit_rate: None,
+        restart_ms: 100,
         service_frames_per_cycle: FRAMES_PER_STEP,
         sdo_while_enabled: false,
     }
