@@ -124,7 +124,7 @@ impl Cycle {
                 slot = slot.max(self.grid.next_slot(now_ns));
             }
             let slot_start_ns = self.grid.slot_start_ns(slot);
-            let wake = clock.wait_until(slot_start_ns);
+            let wake = clock.wait_to_send(slot_start_ns);
             wake_ns = wake.timer_latency_ns.max(wake_ns);
             if wake.now_ns <= slot_start_ns + self.plan.latest_sync_ns {
                 self.next_slot = slot + 1;
