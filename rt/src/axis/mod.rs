@@ -13,6 +13,7 @@ use crate::pdo::{CommandSlot, FeedbackSlot, Mapping, ProcessImage, TooShort};
 use crate::plan::State;
 use crate::profile::{ProfileCommand, ProfileTarget};
 use crate::record::AxisRecord;
+use crate::time::Nanoseconds;
 use crate::units::Scale;
 
 /// The PDOs that a CANopen drive has in each direction here.
@@ -97,6 +98,8 @@ pub struct Axis {
     profile: ProfileCommand,
     /// What `profile` stands for; `None` before the first target since the drive was enabled.
     profile_target: Option<ProfileTarget>,
+    /// When a velocity or a torque expires.
+    profile_until_ns: Nanoseconds,
     position: f64,
     position_raw: i32,
     velocity: f64,
@@ -106,6 +109,8 @@ pub struct Axis {
     /// Time since the feedback before.
     span_s: f64,
     is_heard: bool,
+    /// Whether `position_raw` is what the drive has said.
+    is_position_known: bool,
     emergency_code: u16,
     following_error: f64,
     following_guard: FollowingErrorGuard,
@@ -131,6 +136,7 @@ impl Axis {
             sent: [State::default(); 3],
             profile: ProfileCommand::default(),
             profile_target: None,
+            profile_until_ns: 0,
             position: 0.0,
             position_raw: 0,
             velocity: 0.0,
@@ -138,6 +144,7 @@ impl Axis {
             age: 0,
             span_s: 0.0,
             is_heard: false,
+            is_position_known: false,
             emergency_code: 0,
             following_error: 0.0,
             following_guard,
@@ -205,7 +212,17 @@ impl Axis {
             0.0
         };
         self.is_heard = true;
+        self.is_position_known = true;
         self.following_error = if self.is_profile() { 0.0 } else { self.sent[2].position - self.position };
+    }
+
+    /// Takes the position that the drive has reported otherwise than by process data, if there has been none.
+    pub fn set_reported_position(&mut self, counts: i32) {
+        if !self.is_heard {
+            self.position_raw = counts;
+            self.position = self.parameters.scale.position_from_counts(counts);
+            self.is_position_known = true;
+        }
     }
 
     fn reports(&self, slot: FeedbackSlot) -> bool {
@@ -374,10 +391,12 @@ impl Axis {
         self.command.command(CommandSlot::Controlword) as u16
     }
 
-    /// The frames of this cycle's command.
+    /// The frames of this cycle's command; none while it is not known where the drive is.
     pub fn frames(&self) -> impl Iterator<Item = Frame> {
-        let due = |command: &&CommandPdo| command.cadence == Cadence::EveryCycle || self.is_controlword_due;
-        self.parameters.commands.iter().filter(due).filter_map(|command| {
+        let is_due = |command: &CommandPdo| {
+            self.is_position_known && (command.cadence == Cadence::EveryCycle || self.is_controlword_due)
+        };
+        self.parameters.commands.iter().filter(move |command| is_due(command)).filter_map(|command| {
             let payload = command.pdo.mapping.pack(&self.command);
             Frame::data(command.pdo.id, payload.get(..command.pdo.mapping.length())?).ok()
         })

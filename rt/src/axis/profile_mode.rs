@@ -6,6 +6,7 @@ use crate::guard::Violation;
 use crate::plan::State;
 use crate::profile::ProfileTarget;
 use crate::stop::Rule;
+use crate::time::Nanoseconds;
 
 /// A joint slower than this fraction of its velocity limit stands.
 const AT_REST: f64 = 0.02;
@@ -31,8 +32,8 @@ impl Axis {
         }
     }
 
-    /// Takes a target that [`Axis::accepts`].
-    pub fn set_profile_target(&mut self, target: ProfileTarget) {
+    /// Takes a target that [`Axis::accepts`]. A velocity or a torque that is not zero expires.
+    pub fn set_profile_target(&mut self, target: ProfileTarget, valid_until_ns: Nanoseconds) {
         let scale = &self.parameters.scale;
         let (raw, needs_handshake) = match target {
             ProfileTarget::Position(position) => {
@@ -43,6 +44,7 @@ impl Axis {
         };
         self.profile.set(raw, needs_handshake);
         self.profile_target = Some(target);
+        self.profile_until_ns = valid_until_ns;
     }
 
     /// Makes rest the target: the nearest position at which the joint can stand, no velocity, no torque.
@@ -53,7 +55,7 @@ impl Axis {
             ControlLaw::ProfileTorque => ProfileTarget::Torque(0.0),
             _ => return,
         };
-        self.set_profile_target(target);
+        self.set_profile_target(target, Nanoseconds::MAX);
     }
 
     /// Where the joint comes to rest if it decelerates from now on.
@@ -76,6 +78,12 @@ impl Axis {
             Some(ProfileTarget::Velocity(value) | ProfileTarget::Torque(value)) => value != 0.0,
             _ => false,
         }
+    }
+
+    /// For how long the velocity or torque that the drive is asked for has been expired; 0 if it is valid or there is
+    /// none.
+    pub fn expired_ns(&self, now_ns: Nanoseconds) -> Nanoseconds {
+        if self.is_driven() { now_ns.saturating_sub(self.profile_until_ns) } else { 0 }
     }
 
     /// Whether the joint of an axis in a profile mode stands; one that follows set-points is where they are.

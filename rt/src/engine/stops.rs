@@ -114,6 +114,14 @@ impl Engine {
         }
     }
 
+    /// Every axis stays on its set-point.
+    pub(super) fn plan_standstill(&mut self) -> Result<(), PlanError> {
+        self.motion.stop(self.axes.iter().map(|axis| {
+            let standing = State { position: axis.set_point().position, ..State::default() };
+            (standing, &axis.parameters().limits)
+        }))
+    }
+
     fn plan_stop(&mut self) -> Result<(), PlanError> {
         self.axes.iter_mut().for_each(Axis::stop_profile);
         self.motion.stop(self.axes.iter().map(|axis| {
