@@ -90,15 +90,14 @@ pub fn load(name: &str) -> Config {
     parse(&text_of(name))
 }
 
-/// One YZ-AIM on a ball screw in this mode, and one step of its program.
+/// One YZ-AIM on a ball screw in this mode, on a bus at half the rate of the controller, and one step of its program.
 pub fn one_yz_aim(mode: &str, step: &str) -> String {
     format!(
         r#"
 name = "one"
-[cycle]
-period = "2 ms"
 [[bus]]
 name = "can"
+period = "2 ms"
 [[axis]]
 name = "x"
 bus = "can"
