@@ -5,5 +5,8 @@ mod world;
 
 mod arrival;
 mod interpolation;
+mod profile_position;
+mod profile_torque;
+mod profile_velocity;
 mod quirks;
 mod silence;

@@ -48,10 +48,12 @@ fn largest_way_to_the_end(world: &mut World, from: &[f64]) -> f64 {
 /// A YZ-AIM shows its alarm in process data, and is led down as soon as it does; its last word may be repeated until then.
 fn assert_nobody_enables_after(world: &mut World, since_ns: u64) {
     let axes = world.config.axes.iter().filter(|axis| axis.drive == DriveFamily::YzAim);
-    let rpdos = [0x200, 0x400].map(|function| axes.clone().map(move |axis| (axis.bus, id(function, axis.node))));
+    let rpdos =
+        [0x200, 0x400].map(|function| axes.clone().map(move |axis| (axis.bus, id(function, axis.node))));
     for (bus, id) in rpdos.into_iter().flatten().collect::<Vec<_>>() {
         let sent = world.port(bus).sent_with(id);
-        let words: Vec<u16> = sent.iter().filter(|(at, _)| *at > since_ns).map(|(_, data)| word(data)).collect();
+        let words: Vec<u16> =
+            sent.iter().filter(|(at, _)| *at > since_ns).map(|(_, data)| word(data)).collect();
         let up = words.iter().rposition(|word| word & 0x0F == 0x0F).map_or(0, |last| last + 1);
         assert!(up <= 3 && words[..up].iter().all(|word| word & 0x0F == 0x0F), "{:x?}", &words[..up]);
     }

@@ -135,7 +135,13 @@ impl World {
     }
 
     /// A controller that holds where its axes are for an hour, to be commanded by the test.
-    pub fn holding(mut config: Config) -> Self {
+    pub fn holding(config: Config) -> Self {
+        let buses = (0..config.buses.len()).map(|bus| SimulatedBus::new(&config, bus)).collect();
+        Self::holding_on(config, buses)
+    }
+
+    /// The same on these buses in place of those of the configuration.
+    pub fn holding_on(mut config: Config, buses: Vec<SimulatedBus>) -> Self {
         let position = config.axes.iter().map(|axis| axis.simulated.initial_position).collect();
         config.program.repeat = 1;
         config.program.moves = vec![ProgramMove {
@@ -145,7 +151,7 @@ impl World {
             minimum_duration_s: 0.0,
             dwell_s: 3600.0,
         }];
-        let mut world = Self::new(config);
+        let mut world = Self::on(config, buses);
         world.run_until(|world| world.run.snapshot().finished_move == 1);
         world.run_until(|world| world.phase() == Phase::Holding);
         world.run_for(50);

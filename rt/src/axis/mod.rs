@@ -108,6 +108,8 @@ pub struct Axis {
     age: u16,
     /// Time since the feedback before.
     span_s: f64,
+    /// The last such time between two feedbacks.
+    cycle_s: f64,
     is_heard: bool,
     /// Whether `position_raw` is what the drive has said.
     is_position_known: bool,
@@ -143,6 +145,7 @@ impl Axis {
             arrived: 0,
             age: 0,
             span_s: 0.0,
+            cycle_s: 0.0,
             is_heard: false,
             is_position_known: false,
             emergency_code: 0,
@@ -199,6 +202,7 @@ impl Axis {
         }
         let span_s = self.span_s;
         self.span_s = 0.0;
+        self.cycle_s = span_s;
         self.arrived = 0;
         self.age = 0;
         let last = self.position;

@@ -2,6 +2,7 @@
 
 use super::Axis;
 use crate::control::ControlLaw;
+use crate::dialect::Dialect;
 use crate::guard::Violation;
 use crate::plan::State;
 use crate::profile::ProfileTarget;
@@ -10,6 +11,9 @@ use crate::time::Nanoseconds;
 
 /// A joint slower than this fraction of its velocity limit stands.
 const AT_REST: f64 = 0.02;
+/// Cycles of the bus from the position that is reported to a drive that acts on what was made of it: one on the way, and
+/// one that the drive may take.
+const REACTION_CYCLES: u32 = 2;
 /// How far the velocity of a profile may overshoot its limit: the drive's own loop makes it.
 const VELOCITY_OVERSHOOT: f64 = 1.2;
 
@@ -58,13 +62,38 @@ impl Axis {
         self.set_profile_target(target, Nanoseconds::MAX);
     }
 
-    /// Where the joint comes to rest if it decelerates from now on.
+    /// How far the joint goes on, in its direction, when it is told to come to rest now: until the drive has heard that,
+    /// which in profile position waits for the handshake, and while it decelerates.
+    fn way_to_rest(&self) -> f64 {
+        let limits = &self.parameters.limits;
+        // A YZ-AIM has one ramp for both.
+        let deceleration = match self.parameters.dialect {
+            Dialect::Cia402 => limits.deceleration,
+            Dialect::YzAim => limits.deceleration.min(limits.acceleration),
+        };
+        let reaction_s = f64::from(REACTION_CYCLES + self.profile.cycles_to_offer()) * self.cycle_s;
+        // It may still be speeding up.
+        let speed = self.velocity.abs();
+        let highest = (speed + limits.acceleration * reaction_s).min(limits.velocity.max(speed));
+        let distance = highest * reaction_s + highest * highest / (2.0 * deceleration);
+        if self.velocity == 0.0 { 0.0 } else { distance.copysign(self.velocity) }
+    }
+
+    /// Where the joint comes to rest if it is told to now; not beyond where it is going, nor beyond its limits.
     fn nearest_rest(&self) -> f64 {
         let limits = &self.parameters.limits;
-        let distance = self.velocity * self.velocity.abs() / (2.0 * limits.deceleration);
         let (lowest, highest) =
             (limits.position_min.min(self.position), limits.position_max.max(self.position));
-        (self.position + distance).clamp(lowest, highest)
+        let rest = (self.position + self.way_to_rest()).clamp(lowest, highest);
+        match self.profile_target {
+            Some(ProfileTarget::Position(target)) if self.velocity > 0.0 && target > self.position => {
+                rest.min(target)
+            }
+            Some(ProfileTarget::Position(target)) if self.velocity < 0.0 && target < self.position => {
+                rest.max(target)
+            }
+            _ => rest,
+        }
     }
 
     /// Whether the drive has its target and says that it has reached it; an axis that follows set-points always has.
@@ -113,7 +142,7 @@ impl Axis {
         if !self.is_driven() {
             return Ok(());
         }
-        let distance = self.velocity * self.velocity.abs() / (2.0 * limits.deceleration);
+        let distance = self.way_to_rest();
         let rest = self.position + distance;
         let limit = if distance > 0.0 { limits.position_max } else { limits.position_min };
         let is_beyond = (distance > 0.0 && rest > limit) || (distance < 0.0 && rest < limit);
