@@ -28,10 +28,11 @@ fn commands_since(world: &mut World, since_ns: u64) -> Vec<(u64, u16, i32)> {
     since.map(|(at_ns, data)| (*at_ns, word(data), counts(&data[2..6]))).collect()
 }
 
-/// Runs until the joint is at more than half of its speed limit on a long way, and gives the present.
+/// Runs until the joint is at its speed limit on a long way, and gives the present.
 fn in_motion(world: &mut World) -> u64 {
     world.drive_to(7, 0, ProfileTarget::Position(2.5));
     world.run_until(|world| world.observe(0).velocity > 0.9 * world.config.axes[0].limits.velocity);
+    world.run_for(100);
     world.run.snapshot().at_ns
 }
 
@@ -127,7 +128,9 @@ fn a_stop_of_category_2_comes_to_rest_at_the_deceleration_limit_and_never_starts
         world.run_for(1);
         velocities.push(world.observe(0).velocity);
     }
-    let steepest = velocities.windows(10).map(|pair| (pair[0] - pair[9]) / 9e-3).fold(0.0, f64::max);
+    // Over 50 ms, in which the joint's own loops have come after.
+    let slopes = velocities.windows(51).map(|span| (span[0] - span[50]) / 50e-3);
+    let steepest = slopes.fold(0.0, f64::max);
     assert!(steepest <= 1.05 * limits.deceleration, "{steepest}");
     let most_negative = velocities.iter().copied().fold(0.0, f64::min);
     assert!(most_negative > -0.01 * speed, "it went back: {most_negative}");

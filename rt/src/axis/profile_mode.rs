@@ -11,9 +11,9 @@ use crate::time::Nanoseconds;
 
 /// A joint slower than this fraction of its velocity limit stands.
 const AT_REST: f64 = 0.02;
-/// Cycles of the bus from the position that is reported to a drive that acts on what was made of it: one on the way, and
-/// one that the drive may take.
-const REACTION_CYCLES: u32 = 2;
+/// Cycles of the bus from the position that is reported to a drive that acts on what was made of it: one for which a
+/// drive's answer to a command has waited, one on the way, and one that the drive may take.
+const REACTION_CYCLES: u32 = 3;
 /// How far the velocity of a profile may overshoot its limit: the drive's own loop makes it.
 const VELOCITY_OVERSHOOT: f64 = 1.2;
 
