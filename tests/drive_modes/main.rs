@@ -4,6 +4,7 @@
 mod world;
 
 mod arrival;
+mod bus_budget;
 mod interpolation;
 mod profile_position;
 mod profile_torque;
