@@ -129,6 +129,21 @@ fn a_set_point_that_is_not_acknowledged_stops_the_group() {
     assert_eq!(rig.stops().len(), 1);
 }
 
+#[test]
+fn on_a_bus_with_fewer_cycles_the_acknowledgement_is_due_in_the_same_time() {
+    let mut own = parameters(6);
+    own.axes[4] = axis_in(ControlLaw::ProfilePosition, 1, 2);
+    own.buses[1].divider = 2;
+    let mut rig = Rig::of(own).enable();
+    rig.drive(4).is_deaf_to_set_points = true;
+    drive_to(&mut rig, 4, ProfileTarget::Position(0.5), 0);
+    rig.run(490);
+    assert_eq!(rig.stops(), []);
+    rig.run(20);
+    let stop = rig.stops()[0];
+    assert_eq!((stop.rule, stop.axis, stop.value), (Rule::NotAcknowledged, Some(4), 251.0));
+}
+
 /// The others decelerate meanwhile; what has fallen out is not led back by that.
 #[test]
 fn a_drive_that_falls_out_of_operation_enabled_is_not_enabled_again_by_the_stop() {

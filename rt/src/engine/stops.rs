@@ -33,11 +33,13 @@ impl Engine {
             let (cycles, limit) = (self.blocked_cycles.into(), self.not_transmitted_cycles.into());
             self.begin_stop(Rule::NotTransmitted, None, None, cycles, limit, now_ns, door);
         }
-        let acknowledge_limit = self.acknowledge_timeout_cycles;
         for index in 0..self.axes.len() {
-            let Some((rule, value, limit)) =
-                self.axes.get_mut(index).and_then(|axis| complaint(axis, self.phase, acknowledge_limit))
-            else {
+            let Some(axis) = self.axes.get_mut(index) else { continue };
+            let bus = self.buses.get(usize::from(axis.parameters().bus));
+            // An axis counts in cycles of its bus.
+            let acknowledge_limit =
+                self.acknowledge_timeout_cycles.div_ceil(bus.map_or(1, |bus| bus.divider.max(1)));
+            let Some((rule, value, limit)) = complaint(axis, self.phase, acknowledge_limit) else {
                 continue;
             };
             self.begin_stop(rule, None, Some(index as u8), value, limit, now_ns, door);
