@@ -2,10 +2,11 @@
 
 use takt::config::{Config, ProgramTarget};
 use takt::controller::Outcome;
-use takt_rt::frame::Frame;
 use takt_rt::stop::Phase;
 
-use crate::world::{MILLISECOND_NS, Watched, World, counts, counts_per_unit, id, load, parse, text_of, word};
+use crate::world::{
+    MILLISECOND_NS, Sent, Watched, World, counts, counts_per_unit, id, load, parse, text_of, word,
+};
 
 const SYNC: u32 = 0x080;
 const HEARTBEAT: u32 = 0x77F;
@@ -19,7 +20,7 @@ fn gantry_at(position: &str) -> Config {
 
 /// The first and the last cycle in which the group was enabled, and everything that was handed over in between, from
 /// SYNC to SYNC.
-fn cycles_while_enabled(config: Config, bus: usize) -> (World, Vec<Vec<(u64, Frame, usize)>>) {
+fn cycles_while_enabled(config: Config, bus: usize) -> Vec<Vec<Sent>> {
     let mut world = World::new(config);
     let mut span: Option<(usize, usize)> = None;
     let outcome = world.run_to_the_end(|world| {
@@ -33,11 +34,10 @@ fn cycles_while_enabled(config: Config, bus: usize) -> (World, Vec<Vec<(u64, Fra
     let frames = &world.port(bus).sent[first..last];
     let syncs = frames.iter().enumerate().filter(|(_, (_, frame, _))| frame.id().value() == SYNC);
     let at: Vec<usize> = syncs.map(|(at, _)| at).collect();
-    let cycles = at.windows(2).map(|pair| frames[pair[0]..pair[1]].to_vec()).collect();
-    (world, cycles)
+    at.windows(2).map(|pair| frames[pair[0]..pair[1]].to_vec()).collect()
 }
 
-fn ids(cycle: &[(u64, Frame, usize)]) -> Vec<u32> {
+fn ids(cycle: &[Sent]) -> Vec<u32> {
     cycle.iter().map(|(_, frame, _)| frame.id().value()).collect()
 }
 
@@ -50,7 +50,7 @@ fn assert_sync_leaves_every(port: &Watched, period_ns: u64) {
 /// Our heartbeat may follow the targets; nothing comes between them, and nothing waits when SYNC is handed over.
 #[test]
 fn in_every_cycle_each_axis_gets_its_target_by_rpdo4_and_then_sync_leaves_with_nothing_before_it() {
-    let (_, cycles) = cycles_while_enabled(load("gantry-yz-aim.toml"), 0);
+    let cycles = cycles_while_enabled(load("gantry-yz-aim.toml"), 0);
     assert!(cycles.len() > 2_000);
     for cycle in &cycles {
         let ids = ids(cycle);
@@ -73,7 +73,7 @@ fn sync_leaves_every_2_ms_on_the_divided_bus_and_every_millisecond_on_the_other(
 
 #[test]
 fn on_the_divided_bus_too_every_axis_gets_its_target_in_every_cycle() {
-    let (_, cycles) = cycles_while_enabled(load("mixed-arm.toml"), 1);
+    let cycles = cycles_while_enabled(load("mixed-arm.toml"), 1);
     assert!(cycles.len() > 2_000);
     for cycle in &cycles {
         let ids = ids(cycle);
@@ -99,8 +99,8 @@ fn the_targets_of_one_sync_are_within_one_count_of_the_straight_line_of_the_move
             other => panic!("{other:?}"),
         })
         .collect();
-    let (_, cycles) = cycles_while_enabled(config, 0);
-    let targets_of = |cycle: &[(u64, Frame, usize)]| -> Vec<f64> {
+    let cycles = cycles_while_enabled(config, 0);
+    let targets_of = |cycle: &[Sent]| -> Vec<f64> {
         cycle[1..4].iter().map(|(_, frame, _)| f64::from(counts(frame.payload()))).collect()
     };
     let mut start = targets_of(&cycles[0]);
@@ -147,7 +147,7 @@ fn axes_with_the_same_way_move_as_one() {
 #[test]
 fn no_controlword_is_sent_while_nothing_changes() {
     for (name, bus) in [("gantry-yz-aim.toml", 0), ("mixed-arm.toml", 1)] {
-        let (_, cycles) = cycles_while_enabled(load(name), bus);
+        let cycles = cycles_while_enabled(load(name), bus);
         let is_controlword = |id: u32| (0x201..=0x203).contains(&id);
         assert!(!cycles.iter().any(|cycle| ids(cycle).into_iter().any(is_controlword)), "{name}");
     }

@@ -38,6 +38,20 @@ fn a_stop_is_velocity_0_and_holds() {
     assert_eq!(world.stops().len(), 1);
 }
 
+/// Its answer to a velocity shows no statusword, so it answers SYNC, whatever is wanted to spare the bus.
+#[test]
+fn a_yz_aim_turns_and_stops_also_where_answers_to_sync_are_not_wanted() {
+    let mut config = parse(&one_yz_aim("pv", "to = 0"));
+    config.axes[0].answers_sync = false;
+    let mut world = World::holding(config);
+    turn(&mut world, 0.1);
+    world.request(Request::Stop(StopCategory::Two));
+    world.run_until(|world| world.phase() == Phase::Holding);
+    world.run_for(300);
+    assert!(world.observe(0).velocity.abs() < 1e-3);
+    assert_eq!(world.stops().len(), 1);
+}
+
 #[test]
 fn a_velocity_that_nobody_renews_expires_and_the_group_stops() {
     for mut world in [erob(), yz_aim()] {

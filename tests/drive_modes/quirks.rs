@@ -87,10 +87,9 @@ fn a_gantry_that_does_not_answer_sync_is_heard_by_its_answers_to_targets() {
         }
     });
     assert_eq!(outcome, Outcome::Finished, "{:?}", world.stops());
-    for axis in 0..3 {
+    for (axis, (targets, answers, _)) in while_moving.into_iter().enumerate() {
         let seen = world.observe(axis).position * counts_per_unit(&world.config.axes[axis]);
         assert!(seen.abs() <= 2.0, "{seen}");
-        let (targets, answers, _) = while_moving[axis];
         assert!(targets > 1000 && (0..=1).contains(&(targets - answers)), "{targets} {answers}");
         let answers_to_sync = count(&mut world, axis as u8 + 1).2;
         assert_eq!(answers_to_sync, 0);

@@ -21,11 +21,13 @@ pub const CYCLES_AT_MOST: u64 = 60_000;
 /// What a port may do to a frame of a drive before the controller sees it.
 type Alter = Box<dyn FnMut(Frame) -> Frame>;
 
+/// When the controller handed over what, and how many of its frames were waiting for the wire then.
+pub type Sent = (u64, Frame, usize);
+
 /// A simulated bus on which everything is written down.
 pub struct Watched {
     pub bus: SimulatedBus,
-    /// When the controller handed over what, and how many of its frames were waiting for the wire then.
-    pub sent: Vec<(u64, Frame, usize)>,
+    pub sent: Vec<Sent>,
     /// When what came from the drives.
     pub received: Vec<(u64, Frame)>,
     pub alter: Option<Alter>,
