@@ -93,6 +93,7 @@ fn logger(criterion: &mut Criterion) {
             started_ns: 0,
             recording: is_recorded.then(|| Destination::Stream("nowhere".to_owned(), Box::new(io::sink()))),
             candump: None,
+            black_box: None,
             traces: Vec::new(),
         };
         let mut logger = Logger::new(log, options, Box::new(|_| ()));

@@ -1,12 +1,56 @@
-//! Hands cycle records to the logger's ring and publishes snapshots, for counting instructions; see
-//! `benches/instructions`.
+//! Hands cycle records to the logger's ring, publishes snapshots, and passes the frames of a cycle through a traced
+//! port and a plain one, for counting instructions; see `benches/instructions`.
 //!
-//! The work is named by the first argument (`push-AXES`, `publish-AXES`) and repeated as often as the second says; the
-//! difference between two repetition counts is free of the start-up. Each pushed record is also taken again.
+//! The work is named by the first argument (`push-AXES`, `publish-AXES`, `traced-AXES`, `untraced-AXES`) and repeated as
+//! often as the second says; the difference between two repetition counts is free of the start-up. What was pushed is
+//! also taken again, but for frames, since that is the logger's work: the trace holds those of all repetitions.
 
+use std::hint::black_box;
+
+use takt::bus::trace::traced;
 use takt::controller::channels::{ChannelSizes, channels};
 use takt_rt::door::{Door, Snapshot};
+use takt_rt::frame::{Frame, Id};
+use takt_rt::port::{BusHealth, BusPort, ReceiveBatch, Received};
 use takt_rt::record::CycleRecord;
+
+/// A bus on which so many drives answer SYNC.
+struct Answering {
+    drives: u8,
+}
+
+impl BusPort for Answering {
+    fn send(&mut self, _now_ns: u64, frames: &[Frame]) -> usize {
+        frames.len()
+    }
+
+    fn receive(&mut self, now_ns: u64, batch: &mut ReceiveBatch) {
+        for node in 1..=self.drives {
+            let frame = Frame::of(Id::canopen(0x180, node), [0x37, 0x16, 1, 2, 3, 4]);
+            batch.push(Received { frame, at_ns: now_ns });
+        }
+    }
+
+    fn unconfirmed(&mut self, _now_ns: u64) -> usize {
+        0
+    }
+
+    fn health(&mut self) -> BusHealth {
+        BusHealth::default()
+    }
+}
+
+/// The frames of one cycle: SYNC, an answer and a set-point for every drive.
+fn exchange(port: &mut impl BusPort, drives: u8, now_ns: u64) {
+    port.send(now_ns, &[Frame::of(Id::canopen(0x080, 0), [])]);
+    let mut batch = ReceiveBatch::new();
+    port.receive(now_ns, &mut batch);
+    black_box(&batch);
+    black_box(port.health());
+    let set_points: Vec<Frame> =
+        (1..=drives).map(|node| Frame::of(Id::canopen(0x200, node), [0x0F, 0, 1, 2, 3, 4])).collect();
+    port.send(now_ns, &set_points);
+}
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -14,7 +58,7 @@ fn main() {
     let numbers =
         (work.and_then(|(_, axes)| axes.parse::<u8>().ok()), arguments.get(1).and_then(|n| n.parse().ok()));
     let (Some((work, _)), (Some(axes), Some(repetitions))) = (work, numbers) else {
-        eprintln!("usage: ring_instructions push-AXES|publish-AXES REPETITIONS");
+        eprintln!("usage: ring_instructions push-AXES|publish-AXES|traced-AXES|untraced-AXES REPETITIONS");
         std::process::exit(2);
     };
     let repetitions: u32 = repetitions;
@@ -30,12 +74,17 @@ fn main() {
     });
     let record = CycleRecord { axis_count: axes, ..CycleRecord::default() };
     let snapshot = Snapshot { axis_count: axes, bus_count: buses as u8, ..Snapshot::default() };
-    for _ in 0..repetitions {
-        if work == "push" {
-            rt.record(&record);
-            log.next_record(|_| ());
-        } else {
-            rt.publish(&snapshot);
+    let mut plain = Answering { drives: axes };
+    let (mut port, _trace) = traced(Answering { drives: axes }, "bus", 1 << 18);
+    for now_ns in 0..repetitions.into() {
+        match work {
+            "push" => {
+                rt.record(&record);
+                log.next_record(|_| ());
+            }
+            "traced" => exchange(&mut port, axes, now_ns),
+            "untraced" => exchange(&mut plain, axes, now_ns),
+            _ => rt.publish(&snapshot),
         }
     }
 }

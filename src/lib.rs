@@ -12,6 +12,7 @@
 //! - [`controller`]: assembles the engine, paces it in the real-time thread or in virtual time, and leads it through its
 //!   life: bring-up, enable, program, stop, disable, leave.
 //! - [`sim`]: buses and drives that behave like the manuals and the field notes say, quirks included.
+//! - [`faults`]: what can go wrong on a bus or in a drive, on purpose, from a scenario file.
 //! - [`telemetry`]: the logger that empties the rings: statistics, recordings, the report.
 //!
 //! To embed takt, see `examples/` and [`controller::session::run`].
@@ -23,6 +24,7 @@ pub mod config;
 pub mod controller;
 pub mod doctor;
 pub mod drive;
+pub mod faults;
 pub mod jitter;
 pub mod sim;
 pub mod telemetry;

@@ -87,6 +87,7 @@ to = 0
 [telemetry]
 directory = "runs"
 record = true
+black_box = "5 s"
 ring_records = 4096
 
 [simulation]
@@ -210,6 +211,7 @@ cases! {
         "velocity = \"80 %\"" => "velocity = \"180 %\"", at "180 %": OutOfRange { value, .. } if value == "180 %",
         "dwell = \"200 ms\"" => "dwell = \"-1 s\"", at "dwell": OutOfRange { .. },
         "repeat = 1" => "repeat = 0", at "repeat": OutOfRange { .. },
+        "black_box = \"5 s\"" => "black_box = \"5 ms\"", at "5 ms": OutOfRange { .. },
         "ring_records = 4096" => "ring_records = 1", at "ring": OutOfRange { .. },
         "directory = \"runs\"" => "directory = \"\"", at "directory": OutOfRange { .. },
         "seed = 1" => "seed = 99999999999999999999", at "seed": OutOfRange { .. },

@@ -12,7 +12,7 @@ use takt::config::Config;
 use takt::controller::channels::{ChannelSizes, channels};
 use takt::controller::realtime_thread::{self, Work};
 use takt::controller::{Outcome, Supervisor, assemble};
-use takt::telemetry::{Logger, LoggerOptions, LoggerThread, Machine, WallClock};
+use takt::telemetry::{BlackBoxOptions, Logger, LoggerOptions, LoggerThread, Machine, WallClock};
 use takt_rt::frame::Frame;
 use takt_rt::linux::MonotonicClock;
 use takt_rt::port::{BusHealth, BusPort, Clock, ReceiveBatch};
@@ -119,6 +119,7 @@ fn the_real_loop_allocates_nothing_from_bring_up_to_the_last_cycle() {
         started_ns,
         recording: None,
         candump: None,
+        black_box: Some(BlackBoxOptions { span_ns: 5_000_000_000, directory: "/nonexistent".into() }),
         traces,
     };
     let logger = LoggerThread::start(Logger::new(log, options, Box::new(|_| {}))).unwrap();

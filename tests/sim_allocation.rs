@@ -4,11 +4,17 @@
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
+use std::sync::Arc;
 
+use takt::bus::port::Port;
+use takt::faults::{
+    Course, Cue, DriveTrouble, Effect, Fault, FaultyPort, ForeignFrames, FrameEffect, InterfaceEffect, Part,
+    Selection, Window,
+};
 use takt::sim::erob::{ErobJoint, ErobParameters};
 use takt::sim::plant::{Encoder, JointParameters};
 use takt::sim::yz_aim::{Gearing, Model, YzAimJoint, YzAimParameters};
-use takt::sim::{BitRates, Drive, DriveFault, SimulatedBus};
+use takt::sim::{BitRates, Defect, Drive, DriveFault, SimulatedBus};
 use takt_rt::frame::{Frame, Id};
 use takt_rt::port::{BusPort, ReceiveBatch};
 
@@ -72,7 +78,7 @@ fn drive(node: u8) -> Box<dyn Drive> {
 
 /// A second of a master's life: bring-up by SDO, SYNC, set-points, requests in between, a fault, a power cycle, and
 /// more frames than the queues hold.
-fn live(bus: &mut SimulatedBus, received: &mut usize) {
+fn live<P: BusPort>(bus: &mut P, received: &mut usize, mut breaks: impl FnMut(&mut P, u64)) {
     let mut batch = ReceiveBatch::new();
     let request = |node: u8, bytes: [u8; 8]| Frame::of(Id::canopen(0x600, node), bytes);
     let bring_up = [
@@ -101,15 +107,12 @@ fn live(bus: &mut SimulatedBus, received: &mut usize) {
             bus.send(now_ns + 600_000, &[Frame::of(Id::canopen(0x200, node), [controlword, 0])]);
         }
         match cycle {
-            500 => bus.inject(1, DriveFault::Encoder).unwrap(),
-            600 => bus.power_cycle(2).unwrap(),
-            700 => bus.silence(3, true).unwrap(),
             800 => {
                 bus.send(now_ns + 700_000, &[Frame::of(Id::canopen(0x200, 99), []); 300]);
             }
-            _ => {}
+            _ => breaks(bus, cycle),
         }
-        assert!(bus.unconfirmed(now_ns + 900_000) < 600);
+        assert!(bus.unconfirmed(now_ns + 900_000) < 5000);
         loop {
             batch.clear();
             bus.receive(now_ns + 999_000, &mut batch);
@@ -130,7 +133,12 @@ fn a_second_on_the_simulated_bus_takes_no_heap_memory() {
     let built = allocations();
     assert!(built > before, "the allocator counts");
     let mut received = 0;
-    live(&mut bus, &mut received);
+    live(&mut bus, &mut received, |bus, cycle| match cycle {
+        500 => bus.inject(1, DriveFault::Encoder).unwrap(),
+        600 => bus.power_cycle(2).unwrap(),
+        700 => bus.silence(3, true).unwrap(),
+        _ => {}
+    });
     assert_eq!(allocations(), built);
     // Two thousand TPDOs and more, so it was not silence that needed no memory.
     assert!(received > 2_000, "{received}");
@@ -187,4 +195,57 @@ fn a_second_of_interpolation_with_alarms_and_power_cycles_takes_no_heap_memory()
     assert!(received > 2_000, "{received}");
     assert_eq!(bus.observe(1).unwrap().error_code, 0x14);
     assert!(bus.observe(3).unwrap().position_counts > 30_000);
+}
+
+/// Every effect, one after the other for 70 ms each.
+fn every_effect() -> Vec<Effect> {
+    let foreign = |frames| Effect::Foreign(frames);
+    let drive = |node, trouble| Effect::Drive { node, trouble };
+    vec![
+        Effect::Frames(FrameEffect::Delay { by_ns: 3_300_000 }),
+        Effect::Frames(FrameEffect::Duplicate { copies: 8 }),
+        Effect::Frames(FrameEffect::Corrupt { bits: 3, part: Part::Payload }),
+        Effect::Frames(FrameEffect::Corrupt { bits: 1, part: Part::Identifier }),
+        Effect::Frames(FrameEffect::Reorder),
+        Effect::Frames(FrameEffect::Drop),
+        Effect::Frames(FrameEffect::EchoLoss),
+        Effect::Frames(FrameEffect::FullQueue),
+        Effect::Interface(InterfaceEffect::BusOff),
+        foreign(ForeignFrames::DuplicateNode { node: 1, period_ns: 1_000_000 }),
+        foreign(ForeignFrames::SetPoints { id: Id::canopen(0x200, 1), period_ns: 400_000 }),
+        foreign(ForeignFrames::Frame {
+            frame: Frame::of(Id::canopen(0, 1), [0; 8]),
+            period_ns: Some(50_000),
+        }),
+        drive(1, DriveTrouble::Defect(Defect::OtherObjectMapped)),
+        drive(2, DriveTrouble::Defect(Defect::Alarm { code: 0x2310 })),
+        drive(3, DriveTrouble::Reboot),
+    ]
+}
+
+#[test]
+fn a_second_with_faults_of_every_kind_takes_no_heap_memory() {
+    let drives = [1, 2, 3].map(drive).into();
+    let bus = SimulatedBus::with_drives(BitRates { nominal: 1_000_000, data: None }, 5_000_000, drives);
+    let mut port = Port::Simulated(Box::new(bus));
+    let mut courses = vec![];
+    for (effect, number) in every_effect().into_iter().zip(0..) {
+        let window =
+            Window { cue: Cue::Start, after_ns: 1_000_000 * (10 + 65 * number), lasts_ns: Some(70_000_000) };
+        let selection = Selection { probability: 0.5, ..Selection::default() };
+        let fault = Fault { kind: "", place: String::new(), line: 1, bus: 0, window, selection, effect };
+        let course = Arc::new(Course::default());
+        courses.push(Arc::clone(&course));
+        port = Port::Faulty(Box::new(FaultyPort::new(port, &fault, Arc::default(), course)));
+    }
+    let built = allocations();
+    let mut received = 0;
+    live(&mut port, &mut received, |_, _| {});
+    assert_eq!(allocations(), built);
+    assert!(received > 1_000, "{received}");
+    for (course, effect) in courses.iter().zip(every_effect()) {
+        assert!(course.began_ns().is_some() && !course.is_impossible(), "{effect:?}");
+        let is_of_frames = matches!(effect, Effect::Frames(_) | Effect::Foreign(_));
+        assert!(!is_of_frames || course.frames() > 0, "{effect:?}");
+    }
 }

@@ -2,10 +2,8 @@
 //! none.
 //!
 //! ```text
-//! cargo +nightly fuzz run plan
+//! fuzz/run 60 plan
 //! ```
-//!
-//! It builds on a stable compiler, too (`cargo build` in this folder), without the instrumentation that guides the fuzzer.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

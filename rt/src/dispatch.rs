@@ -18,6 +18,13 @@ pub enum Destination {
         /// The axis.
         axis: u8,
     },
+    /// The boot-up message or heartbeat of axis `axis`.
+    ErrorControl {
+        /// The axis.
+        axis: u8,
+    },
+    /// Something that only the master of this bus may send, and somebody else did.
+    Foreign,
     /// Process data that carries nothing new.
     Unused,
     /// Something that is not process data.
@@ -26,11 +33,13 @@ pub enum Destination {
 
 const IDS: usize = 0x800;
 const NOBODY: u16 = 0;
+const FOREIGN: u16 = u16::MAX;
+const ERROR_CONTROL: u8 = 5;
 const UNUSED: u8 = 6;
 const EMERGENCY: u8 = 7;
 
-/// The table of one bus: for each 11-bit identifier `1 + axis · 8 + pdo`, with PDO 7 for emergencies and 6 for what
-/// is not looked at.
+/// The table of one bus: for each 11-bit identifier `1 + axis · 8 + pdo`, with PDO 7 for emergencies, 6 for what
+/// is not looked at, and 5 for error control.
 #[derive(Clone, Debug)]
 pub struct Dispatch {
     entries: [u16; IDS],
@@ -52,12 +61,24 @@ pub struct IdTaken {
 impl Dispatch {
     /// Enters a feedback PDO (0 to 3) of an axis (0 to 31).
     pub fn feedback(&mut self, id: Id, axis: u8, pdo: u8) -> Result<(), IdTaken> {
-        self.enter(id, axis, pdo.min(UNUSED - 1))
+        self.enter(id, axis, pdo.min(ERROR_CONTROL - 1))
     }
 
     /// Enters the emergency message of an axis.
     pub fn emergency(&mut self, id: Id, axis: u8) -> Result<(), IdTaken> {
         self.enter(id, axis, EMERGENCY)
+    }
+
+    /// Enters the error control messages of an axis.
+    pub fn error_control(&mut self, id: Id, axis: u8) -> Result<(), IdTaken> {
+        self.enter(id, axis, ERROR_CONTROL)
+    }
+
+    /// Enters an identifier that nobody else may send under. One that is in use keeps its use.
+    pub fn foreign(&mut self, id: Id) {
+        if let Some(entry) = self.entries.get_mut(id.value() as usize).filter(|entry| **entry == NOBODY) {
+            *entry = FOREIGN;
+        }
     }
 
     /// Enters a message of an axis that is passed over.
@@ -87,10 +108,12 @@ impl Dispatch {
         }
         match self.entries.get(id.value() as usize) {
             None | Some(&NOBODY) => Destination::Service,
+            Some(&FOREIGN) => Destination::Foreign,
             Some(&entry) => {
                 let (axis, pdo) = (((entry - 1) / 8) as u8, ((entry - 1) % 8) as u8);
                 match pdo {
                     EMERGENCY => Destination::Emergency { axis },
+                    ERROR_CONTROL => Destination::ErrorControl { axis },
                     UNUSED => Destination::Unused,
                     _ => Destination::Feedback { axis, pdo },
                 }

@@ -9,6 +9,7 @@ use crate::profile::ProfileTarget;
 use crate::record::{CycleRecord, Event, MAX_AXES, MAX_BUSES};
 use crate::stop::{Phase, StopCategory, StopReason};
 use crate::time::Nanoseconds;
+use crate::watch::TimingLevel;
 
 /// What the real-time thread asks of and tells the outside.
 pub trait Door {
@@ -126,6 +127,10 @@ pub struct Snapshot {
     pub phase: Phase,
     /// Slots that passed unused since the start.
     pub missed_slots: u64,
+    /// How late the controller has been of late.
+    pub timing: TimingLevel,
+    /// Set-points of streams that were replaced by the nearest ones within the limits, since the start.
+    pub clamped: u64,
     /// Events and records that found no room, since the start.
     pub dropped: u64,
     /// Requests that were refused, since the start.
@@ -153,6 +158,8 @@ impl Default for Snapshot {
             at_ns: 0,
             phase: Phase::default(),
             missed_slots: 0,
+            timing: TimingLevel::Normal,
+            clamped: 0,
             dropped: 0,
             refused: 0,
             finished_move: 0,

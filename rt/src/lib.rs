@@ -14,6 +14,7 @@
 //! - [`plan`], [`guard`], [`control`], [`stop`]: trajectories, the last look at every set-point, the loops closed here,
 //!   and the reasons to stop.
 //! - [`axis`], [`engine`]: one joint, and the group that moves together; [`engine::Engine::compute`] is a cycle's thinking.
+//! - [`watch`]: what is watched over time: missed slots, nodes that fall silent, two nodes with one number.
 //! - [`cycle`]: the paced loop around it: SYNC, feedback, set-points, skip and never burst.
 //! - [`record`]: what each cycle leaves behind.
 #![no_std]
@@ -40,4 +41,5 @@ pub mod record;
 pub mod stop;
 pub mod time;
 pub mod units;
+pub mod watch;
 pub mod wire;

@@ -3,6 +3,7 @@
 use crate::cia402;
 use crate::stop::{Phase, StopReason};
 use crate::time::Nanoseconds;
+use crate::watch::TimingLevel;
 
 /// The most axes one controller moves.
 pub const MAX_AXES: usize = 32;
@@ -152,6 +153,11 @@ pub enum EventKind {
     MissedSlots {
         /// How many.
         count: u64,
+    },
+    /// Slots have been missed more often, or less often, than before.
+    Timing {
+        /// The level from now on.
+        level: TimingLevel,
     },
     /// A request was refused and changed nothing.
     Refused {

@@ -48,11 +48,31 @@ pub enum Rule {
     NotTransmitted = 14,
     /// A drive in profile position does not acknowledge its target.
     NotAcknowledged = 15,
+    /// A node's heartbeat has not come for too long.
+    NodeLost = 16,
+    /// A node is in another state than operational.
+    NodeNotOperational = 17,
+    /// A node has started anew while it was to work.
+    UnexpectedBootUp = 18,
+    /// A drive has sent an emergency message, and shows no fault that would explain it.
+    EmergencyMessage = 19,
+    /// Two nodes answer under one number.
+    DuplicateNode = 20,
+    /// Somebody else sends SYNC, set-points or commands to nodes on our bus.
+    ForeignMaster = 21,
+    /// Slots passed unused too often.
+    TimingUnfit = 22,
+    /// A stream began too far from where the joint is.
+    StartPose = 23,
+    /// A set-point of a stream asked for more than the jerk limit.
+    JerkLimit = 24,
+    /// The error counters of an interface are near bus-off.
+    BusErrorPassive = 25,
 }
 
 impl Rule {
     /// Every rule, in the order of their numbers.
-    pub const ALL: [Self; 16] = [
+    pub const ALL: [Self; 26] = [
         Self::Requested,
         Self::NotFinite,
         Self::PositionLimit,
@@ -69,7 +89,49 @@ impl Rule {
         Self::BusLost,
         Self::NotTransmitted,
         Self::NotAcknowledged,
+        Self::NodeLost,
+        Self::NodeNotOperational,
+        Self::UnexpectedBootUp,
+        Self::EmergencyMessage,
+        Self::DuplicateNode,
+        Self::ForeignMaster,
+        Self::TimingUnfit,
+        Self::StartPose,
+        Self::JerkLimit,
+        Self::BusErrorPassive,
     ];
+
+    /// Its word in configurations and reports.
+    pub const fn key(self) -> &'static str {
+        match self {
+            Self::Requested => "requested",
+            Self::NotFinite => "not_finite",
+            Self::PositionLimit => "position_limit",
+            Self::VelocityLimit => "velocity_limit",
+            Self::AccelerationLimit => "acceleration_limit",
+            Self::FollowingError => "following_error",
+            Self::StaleCommand => "stale_command",
+            Self::MissedFeedback => "missed_feedback",
+            Self::DriveFault => "drive_fault",
+            Self::DriveDisabled => "drive_disabled",
+            Self::ModeChanged => "mode_changed",
+            Self::EnableTimeout => "enable_timeout",
+            Self::NoTrajectory => "no_trajectory",
+            Self::BusLost => "bus_lost",
+            Self::NotTransmitted => "not_transmitted",
+            Self::NotAcknowledged => "not_acknowledged",
+            Self::NodeLost => "node_lost",
+            Self::NodeNotOperational => "node_not_operational",
+            Self::UnexpectedBootUp => "unexpected_boot_up",
+            Self::EmergencyMessage => "emergency_message",
+            Self::DuplicateNode => "duplicate_node",
+            Self::ForeignMaster => "foreign_master",
+            Self::TimingUnfit => "timing_unfit",
+            Self::StartPose => "start_pose",
+            Self::JerkLimit => "jerk_limit",
+            Self::BusErrorPassive => "bus_error_passive",
+        }
+    }
 
     /// The stop that this rule asks for unless a configuration says otherwise. A drive that no longer obeys, or
     /// whose obedience cannot be seen, gets its power removed with the others' in a controlled stop; a bad
@@ -82,7 +144,10 @@ impl Rule {
             | Self::VelocityLimit
             | Self::AccelerationLimit
             | Self::StaleCommand
-            | Self::NoTrajectory => StopCategory::Two,
+            | Self::NoTrajectory
+            | Self::StartPose
+            | Self::JerkLimit
+            | Self::BusErrorPassive => StopCategory::Two,
             Self::FollowingError
             | Self::MissedFeedback
             | Self::DriveFault
@@ -91,7 +156,38 @@ impl Rule {
             | Self::EnableTimeout
             | Self::BusLost
             | Self::NotTransmitted
-            | Self::NotAcknowledged => StopCategory::One,
+            | Self::NotAcknowledged
+            | Self::NodeLost
+            | Self::NodeNotOperational
+            | Self::UnexpectedBootUp
+            | Self::EmergencyMessage
+            | Self::DuplicateNode
+            | Self::ForeignMaster
+            | Self::TimingUnfit => StopCategory::One,
+        }
+    }
+}
+
+/// The category of the stop for each rule.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct StopCategories([StopCategory; Rule::ALL.len()]);
+
+impl Default for StopCategories {
+    fn default() -> Self {
+        Self(Rule::ALL.map(Rule::default_category))
+    }
+}
+
+impl StopCategories {
+    /// The category of a rule.
+    pub fn of(&self, rule: Rule) -> StopCategory {
+        self.0.get(rule as usize).copied().unwrap_or(StopCategory::One)
+    }
+
+    /// Sets the category of a rule.
+    pub fn set(&mut self, rule: Rule, category: StopCategory) {
+        if let Some(present) = self.0.get_mut(rule as usize) {
+            *present = category;
         }
     }
 }

@@ -351,9 +351,12 @@ fn a_stream_is_followed_while_it_lasts_and_its_end_is_a_stop_at_the_limits() {
 
 #[test]
 fn a_stream_may_not_jump() {
-    for (bad, rule) in
-        [(0.1, Rule::VelocityLimit), (f64::NAN, Rule::NotFinite), (0.001, Rule::AccelerationLimit)]
-    {
+    for (bad, rule) in [
+        (0.1, Rule::StartPose),
+        (0.01, Rule::VelocityLimit),
+        (f64::NAN, Rule::NotFinite),
+        (0.001, Rule::AccelerationLimit),
+    ] {
         let mut rig = Rig::enabled(1);
         rig.move_to(0.0);
         rig.run_until(Phase::Holding, 5_000);

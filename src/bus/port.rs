@@ -9,10 +9,11 @@ use super::interface::{InterfaceError, InterfaceSettings, prepare_interface};
 use super::socketcan::{SocketCanError, SocketCanOptions, open_socketcan};
 use super::trace::{Trace, TracedPort, traced};
 use crate::config::{Config, Interface};
+use crate::faults::{Breakable, CannotBreak, DriveTrouble, FaultyPort, Heard};
 use crate::sim::SimulatedBus;
 
-/// Frames on their way to the candump log: a second of a full bus.
-const TRACE_FRAMES: usize = 1 << 14;
+/// Frames on their way to the logger: almost a second of a full bus of 1 Mbit/s.
+const TRACE_FRAMES: usize = 1 << 13;
 
 /// A bus port of any kind.
 pub enum Port {
@@ -20,8 +21,10 @@ pub enum Port {
     Simulated(Box<SimulatedBus>),
     /// A CAN interface of this machine.
     SocketCan(Box<SocketCanPort>),
-    /// Any port whose frames are also logged.
+    /// Any port whose frames the logger sees too.
     Traced(Box<TracedPort<Port>>),
+    /// Any port with a fault on purpose.
+    Faulty(Box<FaultyPort<Port>>),
 }
 
 /// A bus that cannot be opened.
@@ -57,6 +60,16 @@ impl Port {
         match open_configured(config, bus, &options)? {
             Some(port) => Ok(Self::SocketCan(Box::new(port))),
             None => Ok(Self::Simulated(Box::new(SimulatedBus::new(config, bus)))),
+        }
+    }
+
+    /// The simulated bus behind it, if it is one.
+    pub fn simulated_mut(&mut self) -> Option<&mut SimulatedBus> {
+        match self {
+            Self::Simulated(bus) => Some(bus),
+            Self::SocketCan(_) => None,
+            Self::Traced(port) => port.inner_mut().simulated_mut(),
+            Self::Faulty(port) => port.inner_mut().simulated_mut(),
         }
     }
 
@@ -100,6 +113,7 @@ impl BusPort for Port {
             Self::Simulated(port) => port.send(now_ns, frames),
             Self::SocketCan(port) => port.send(now_ns, frames),
             Self::Traced(port) => port.send(now_ns, frames),
+            Self::Faulty(port) => port.send(now_ns, frames),
         }
     }
 
@@ -108,6 +122,7 @@ impl BusPort for Port {
             Self::Simulated(port) => port.receive(now_ns, batch),
             Self::SocketCan(port) => port.receive(now_ns, batch),
             Self::Traced(port) => port.receive(now_ns, batch),
+            Self::Faulty(port) => port.receive(now_ns, batch),
         }
     }
 
@@ -116,6 +131,7 @@ impl BusPort for Port {
             Self::Simulated(port) => port.unconfirmed(now_ns),
             Self::SocketCan(port) => port.unconfirmed(now_ns),
             Self::Traced(port) => port.unconfirmed(now_ns),
+            Self::Faulty(port) => port.unconfirmed(now_ns),
         }
     }
 
@@ -124,6 +140,30 @@ impl BusPort for Port {
             Self::Simulated(port) => port.health(),
             Self::SocketCan(port) => port.health(),
             Self::Traced(port) => port.health(),
+            Self::Faulty(port) => port.health(),
+        }
+    }
+}
+
+impl Breakable for Port {
+    fn say(&mut self, now_ns: Nanoseconds, frame: &Frame) -> Heard {
+        match self {
+            Self::Simulated(port) => Breakable::say(port.as_mut(), now_ns, frame),
+            Self::SocketCan(port) => {
+                port.send(now_ns, &[*frame]);
+                Heard::ByOthers
+            }
+            Self::Traced(port) => port.say(now_ns, frame),
+            Self::Faulty(port) => port.say(now_ns, frame),
+        }
+    }
+
+    fn trouble(&mut self, node: u8, trouble: DriveTrouble, is_present: bool) -> Result<(), CannotBreak> {
+        match self {
+            Self::Simulated(port) => port.trouble(node, trouble, is_present),
+            Self::SocketCan(_) => Err(CannotBreak::NotSimulated),
+            Self::Traced(port) => port.trouble(node, trouble, is_present),
+            Self::Faulty(port) => port.trouble(node, trouble, is_present),
         }
     }
 }

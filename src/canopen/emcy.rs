@@ -114,7 +114,7 @@ impl fmt::Display for ErrorCode {
 }
 
 /// Codes with a meaning of their own.
-const SPECIFIC: [(u16, &str); 91] = [
+const SPECIFIC: [(u16, &str); 92] = [
     (0x0000, "no error"),
     (0x2110, "short circuit or earth leakage at the input"),
     (0x2120, "earth leakage at the input"),
@@ -200,6 +200,7 @@ const SPECIFIC: [(u16, &str); 91] = [
     (0x8150, "CAN identifier collision"),
     (0x8210, "PDO not processed, wrong length"),
     (0x8220, "PDO length exceeded"),
+    (0x8230, "DAM MPDO not processed, no such object"),
     (0x8240, "unexpected SYNC data length"),
     (0x8250, "RPDO not received in time"),
     (0x8311, "excess torque"),
@@ -291,6 +292,66 @@ mod tests {
         assert_eq!(ErrorCode(0x3999).words(), "voltage");
         assert_eq!(ErrorCode(0xFF12).words(), "specific to the manufacturer");
         assert_eq!(ErrorCode(0xA000).words(), "unknown error");
+    }
+
+    #[test]
+    fn every_class_of_table_26_has_its_words() {
+        let table = [
+            (0x0000, "no error"),
+            (0x1000, "generic error"),
+            (0x2000, "current"),
+            (0x2100, "current at the input"),
+            (0x2200, "current inside the device"),
+            (0x2300, "current at the output"),
+            (0x3000, "voltage"),
+            (0x3100, "mains voltage"),
+            (0x3200, "voltage inside the device"),
+            (0x3300, "output voltage"),
+            (0x4000, "temperature"),
+            (0x4100, "ambient temperature"),
+            (0x4200, "temperature of the device"),
+            (0x5000, "device hardware"),
+            (0x6000, "device software"),
+            (0x6100, "internal software"),
+            (0x6200, "user software"),
+            (0x6300, "data set"),
+            (0x7000, "additional module"),
+            (0x8000, "monitoring"),
+            (0x8100, "communication"),
+            (0x8110, "CAN overrun, messages lost"),
+            (0x8120, "CAN in error passive mode"),
+            (0x8130, "heartbeat or life guard of the master lost"),
+            (0x8140, "recovered from bus off"),
+            (0x8150, "CAN identifier collision"),
+            (0x8200, "protocol"),
+            (0x8210, "PDO not processed, wrong length"),
+            (0x8220, "PDO length exceeded"),
+            (0x8230, "DAM MPDO not processed, no such object"),
+            (0x8240, "unexpected SYNC data length"),
+            (0x8250, "RPDO not received in time"),
+            (0x9000, "external error"),
+            (0xF000, "additional function"),
+            (0xFF00, "specific to the manufacturer"),
+        ];
+        for (code, words) in table {
+            assert_eq!(ErrorCode(code).words(), words, "{code:04X}");
+        }
+    }
+
+    #[test]
+    fn every_bit_of_the_register_that_the_standard_names_has_its_word() {
+        let named: Vec<String> =
+            (0..8).map(|bit| ErrorRegister(1 << bit).to_string()).filter(|name| name != "no error").collect();
+        let expected = [
+            "generic",
+            "current",
+            "voltage",
+            "temperature",
+            "communication",
+            "device profile",
+            "manufacturer",
+        ];
+        assert_eq!(named, expected, "bit 6 is reserved");
     }
 
     #[test]

@@ -5,19 +5,35 @@
 //! - [`sdo`]: service data objects: what is on the wire, and a client that moves one object at a time,
 //!   expedited, segmented or in blocks.
 //! - [`emcy`]: emergency messages and what their codes mean.
-//! - [`sync`]: the SYNC message.
+//! - [`sync`]: the SYNC message; [`time`]: the TIME message.
+//! - [`heartbeat`]: the nodes whose heartbeat is watched.
+//! - [`lss`]: layer setting services: node numbers and bit rates for devices that have none.
+//! - [`dcf`]: what a configuration file has written to a device, and in which order.
+//! - [`eds`]: electronic data sheets and device configuration files.
+//! - [`pdo_configuration`]: how a PDO is configured, as a device or a file tells it; [`pdo_inquiry`] asks a device.
 //! - [`object`]: an object's address, type and name; [`objects`]: the standard ones used here.
 
+pub mod dcf;
+pub mod eds;
 pub mod emcy;
+pub mod heartbeat;
+pub mod lss;
 pub mod nmt;
 pub mod object;
 pub mod objects;
+pub mod pdo_configuration;
+pub mod pdo_inquiry;
 pub mod sdo;
 pub mod sync;
+pub mod time;
 
 /// Function codes of the pre-defined connection set (CiA 301, 7.3.3), to which the node number is added.
 pub mod function_code {
-    /// EMCY of a device (0x080 itself is SYNC).
+    /// SYNC, without a node number.
+    pub const SYNC: u16 = 0x080;
+    /// TIME, without a node number.
+    pub const TIME: u16 = 0x100;
+    /// EMCY of a device.
     pub const EMERGENCY: u16 = 0x080;
     /// SDO server to client.
     pub const SDO_RESPONSE: u16 = 0x580;

@@ -116,7 +116,12 @@ pub struct PdoParameters {
 impl PdoParameters {
     /// Those of PDO `number`, counted from 1. Number 0 is taken for 1.
     pub const fn of(direction: PdoDirection, number: u8) -> Self {
-        let offset = number.saturating_sub(1) as u16;
+        Self::at(direction, number as u16)
+    }
+
+    /// As [`PdoParameters::of`], for all 512 that there may be; numbers beyond are taken for 512.
+    pub const fn at(direction: PdoDirection, number: u16) -> Self {
+        let offset = if number > 512 { 511 } else { number.saturating_sub(1) };
         match direction {
             PdoDirection::Receive => Self { communication: 0x1400 + offset, mapping: 0x1600 + offset },
             PdoDirection::Transmit => Self { communication: 0x1800 + offset, mapping: 0x1A00 + offset },

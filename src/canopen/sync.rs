@@ -1,6 +1,37 @@
 //! The SYNC message (CiA 301, 7.2.5): without data, or with a counter from 1 up to an agreed overflow value.
 
-use takt_rt::frame::{Frame, Id};
+use takt_rt::frame::{Frame, FrameKind, Id};
+
+use super::function_code;
+
+/// A SYNC message as it is received.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Sync {
+    /// Its counter, 1 to 240; `None` in a message without data.
+    pub counter: Option<u8>,
+}
+
+impl Sync {
+    /// Reads a message on the pre-defined identifier 0x80; `None` when it is none, or has a counter that cannot be.
+    pub fn decode(frame: &Frame) -> Option<Self> {
+        if frame.id() != Id::canopen(function_code::SYNC, 0) || frame.kind() != FrameKind::Data {
+            return None;
+        }
+        match frame.payload() {
+            [] => Some(Self { counter: None }),
+            &[counter @ 1..=240] => Some(Self { counter: Some(counter) }),
+            _ => None,
+        }
+    }
+
+    /// How many messages are missing between the one before and this one, by their counters and the overflow value
+    /// (object 1019, 2 to 240); 0 where one of them has no counter.
+    pub fn missing_since(self, before: Self, overflow: u8) -> u8 {
+        let (Some(now), Some(before)) = (self.counter, before.counter) else { return 0 };
+        let due = if before >= overflow { 1 } else { before + 1 };
+        if now >= due { now - due } else { (overflow.saturating_sub(due) + now).min(overflow) }
+    }
+}
 
 /// Produces SYNC messages.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -38,7 +69,7 @@ impl SyncProducer {
 
     /// The next SYNC message.
     pub fn next_frame(&mut self) -> Frame {
-        let id = Id::canopen(super::function_code::EMERGENCY, 0);
+        let id = Id::canopen(function_code::SYNC, 0);
         match &mut self.counter {
             None => Frame::of(id, []),
             Some(counter) => {
@@ -66,6 +97,22 @@ mod tests {
         assert_eq!([next(), next(), next(), next()], [[1], [2], [3], [1]]);
         sync.restart();
         assert_eq!(sync.next_frame().payload(), [1]);
+    }
+
+    #[test]
+    fn what_is_produced_is_read_again_and_gaps_are_counted() {
+        let mut producer = SyncProducer::with_counter(5).unwrap();
+        let syncs: Vec<Sync> = (0..8).map(|_| Sync::decode(&producer.next_frame()).unwrap()).collect();
+        for pair in syncs.windows(2) {
+            assert_eq!(pair[1].missing_since(pair[0], 5), 0);
+        }
+        assert_eq!(syncs[4].missing_since(syncs[2], 5), 1);
+        assert_eq!(syncs[6].missing_since(syncs[3], 5), 2, "4, then 2 after the overflow");
+        assert_eq!(Sync::decode(&SyncProducer::new().next_frame()), Some(Sync { counter: None }));
+        for payload in [&[0][..], &[241], &[1, 2]] {
+            assert_eq!(Sync::decode(&Frame::data(Id::canopen(0x80, 0), payload).unwrap()), None);
+        }
+        assert_eq!(Sync::decode(&Frame::of(Id::canopen(0x80, 1), [])), None, "an emergency identifier");
     }
 
     #[test]

@@ -1,12 +1,15 @@
 //! The command line: one file a subcommand, and what they share.
 
+mod chart;
 mod check;
 mod configuration;
 mod doctor;
+mod eds;
 mod exit;
 mod interruption;
 mod jitter;
 mod plan;
+mod report;
 mod run;
 mod sim;
 mod table;
@@ -26,10 +29,12 @@ pub struct CommandLine {
 #[derive(Subcommand, Debug)]
 enum Command {
     Run(run::Arguments),
+    Report(report::Arguments),
     Check(check::Arguments),
     Plan(plan::Arguments),
     Sim(sim::Arguments),
     Doctor(doctor::Arguments),
+    Eds(eds::Arguments),
     Jitter(jitter::Arguments),
 }
 
@@ -38,10 +43,12 @@ impl CommandLine {
     pub fn execute(self) -> Exit {
         match self.command {
             Command::Run(arguments) => run::run(arguments),
+            Command::Report(arguments) => report::run(&arguments),
             Command::Check(arguments) => check::run(&arguments),
             Command::Plan(arguments) => plan::run(&arguments),
             Command::Sim(arguments) => sim::run(&arguments),
             Command::Doctor(arguments) => doctor::run(&arguments),
+            Command::Eds(arguments) => eds::run(&arguments),
             Command::Jitter(arguments) => jitter::run(&arguments),
         }
     }

@@ -1,7 +1,7 @@
 //! `takt run`: the main job.
 
 use std::io::{IsTerminal, Write, stderr, stdout};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -11,10 +11,11 @@ use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
 use takt::bus::schedule;
-use takt::config::Config;
+use takt::config::{Config, Interface};
 use takt::controller::realtime_thread::StartError;
 use takt::controller::session::{self, Session, SessionError, SessionOptions};
 use takt::controller::{Interrupt, Outcome, Progress};
+use takt::faults::{Fault, Rehearsal, Scenario, ScenarioError, Tidings};
 use takt::telemetry::{Destination, Emphasis, Machine, Notice, RealtimeReport, RunOutcome, RunReport, words};
 use takt_rt::door::Snapshot;
 use takt_rt::record::{Event, EventKind};
@@ -38,6 +39,9 @@ pub struct Arguments {
     /// Record to this file instead of a new one in the configured folder
     #[arg(long, value_name = "FILE.mcap")]
     record: Option<PathBuf>,
+    /// Play the faults of this scenario (TOML), to see what they lead to; configs/faults has examples
+    #[arg(long, value_name = "FILE.toml")]
+    faults: Option<PathBuf>,
     /// End with exit code 3 before anything moves if the system refuses a step of the real-time set-up
     #[arg(long)]
     require_realtime: bool,
@@ -67,6 +71,10 @@ pub fn run(arguments: Arguments) -> Exit {
         eprintln!("takt: {refused}");
         return Exit::Usage;
     }
+    let rehearsal = match arguments.faults.as_deref().map(|path| rehearsal(path, &config)).transpose() {
+        Ok(rehearsal) => rehearsal,
+        Err(exit) => return exit,
+    };
     let mut signals = match Signals::watch() {
         Ok(signals) => signals,
         Err(error) => {
@@ -79,20 +87,49 @@ pub fn run(arguments: Arguments) -> Exit {
         duration_ns: arguments.duration.map(|duration| duration.as_nanos() as u64),
         recording: arguments.record.map(Destination::File),
         is_realtime_required: arguments.require_realtime,
+        rehearsal: rehearsal.clone(),
     };
     let notify = notices(&bar, Machine::of(&config));
     let mut drawn = Drawn::new(bar.clone());
     let mut hints = Hints::new(&config);
+    let mut tidings = Tidings::default();
+    let mut tell = || {
+        let news = rehearsal.as_deref().map_or_else(Vec::new, |rehearsal| tidings.next(rehearsal));
+        news.iter().for_each(|tiding| bar.suspend(|| eprintln!("takt: {tiding}")));
+    };
     let session = session::run(&config, options, notify, |snapshot, progress| {
         drawn.show(&progress);
         hints.look(snapshot).for_each(|hint| bar.suspend(|| eprintln!("takt: {hint}")));
+        tell();
         signals.next()
     });
+    tell();
     bar.finish_and_clear();
     match session {
         Ok(session) => report(&config, &session, arguments.json),
         Err(error) => refuse(&error),
     }
+}
+
+/// Reads a scenario. What is wrong is printed, and what a person should know before it is played on real drives.
+fn rehearsal(path: &Path, config: &Config) -> Result<Arc<Rehearsal>, Exit> {
+    let scenario = Scenario::load(path, config).map_err(|error| {
+        match error {
+            ScenarioError::Wrong(error) => eprintln!("{:?}", miette::Report::new(error)),
+            unreadable @ ScenarioError::Unreadable { .. } => eprintln!("takt: {unreadable}"),
+        }
+        Exit::Usage
+    })?;
+    let is_real =
+        |fault: &Fault| config.buses.get(fault.bus).is_some_and(|bus| bus.interface != Interface::Simulated);
+    if let Some(fault) = scenario.faults.iter().find(|fault| is_real(fault)) {
+        eprintln!(
+            "takt: fault `{}` (line {}) is played on real drives: keep away from them, and keep the emergency stop in \
+             your hand",
+            fault.kind, fault.line
+        );
+    }
+    Ok(Arc::new(Rehearsal::new(scenario)))
 }
 
 fn refuse(error: &SessionError) -> Exit {
@@ -130,7 +167,14 @@ fn report(config: &Config, session: &Session, as_json: bool) -> Exit {
         }
     } else {
         match failure {
-            Some(failure) => eprintln!("takt: {failure}"),
+            Some(failure) => {
+                eprintln!("takt: {failure}");
+                report
+                    .telemetry
+                    .black_boxes
+                    .iter()
+                    .for_each(|path| eprintln!("black box: {}", path.display()));
+            }
             None => {
                 print(&report.picture(if stdout().is_terminal() { Emphasis::Ansi } else { Emphasis::None }))
             }
@@ -168,6 +212,9 @@ fn failure(config: &Config, outcome: &Outcome) -> Option<String> {
         Outcome::MoveRefused { number } => Some(format!(
             "move {number} of the program was refused: its target or a fraction lies outside the limits"
         )),
+        Outcome::CallbackPanicked { message } => {
+            Some(format!("a defect of takt (please report it) ended the run in a controlled stop: {message}"))
+        }
         Outcome::Stuck { phase } => {
             Some(format!("the group did not get any further while it was {}", words::phase(*phase)))
         }
@@ -280,7 +327,6 @@ fn notices(bar: &ProgressBar, machine: Machine) -> Box<dyn FnMut(&Notice) + Send
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::path::Path;
 
     #[test]
     fn frames_that_find_no_room_are_explained_once_for_each_bus() {

@@ -8,6 +8,15 @@ pub const PERIOD_NS: u64 = 1_000_000;
 /// `[cycle] command_phase`, as a fraction of the period.
 pub const COMMAND_PHASE: f64 = 0.55;
 
+/// `[cycle.missed_slots] warning`
+pub const MISSED_SLOTS_WARNING: u32 = 10;
+/// `[cycle.missed_slots] degraded`
+pub const MISSED_SLOTS_DEGRADED: u32 = 50;
+/// `[cycle.missed_slots] stop`
+pub const MISSED_SLOTS_STOP: u32 = 250;
+/// `[cycle.missed_slots] leak`
+pub const MISSED_SLOTS_LEAK_NS: u64 = 10_000_000;
+
 /// `[realtime] priority`
 pub const PRIORITY: u8 = 80;
 /// `[realtime] lock_memory`
@@ -53,6 +62,10 @@ pub const MISSED_FEEDBACK_CYCLES: u16 = 5;
 pub const TRANSMISSION_TYPE: u8 = 1;
 /// `[[axis]] feedback_delay`
 pub const FEEDBACK_DELAY_NS: u64 = 20_000;
+/// `[[axis]] start_tolerance` of a rotary axis in rad.
+pub const START_TOLERANCE_RAD: f64 = 0.02;
+/// `[[axis]] start_tolerance` of a linear axis in m.
+pub const START_TOLERANCE_M: f64 = 0.002;
 /// `[axis.following_error] limit` of a rotary axis in rad.
 pub const FOLLOWING_ERROR_RAD: f64 = 0.1;
 /// `[axis.following_error] limit` of a linear axis in m.
@@ -83,6 +96,8 @@ pub const REPEAT: u32 = 1;
 
 /// `[telemetry] directory`
 pub const DIRECTORY: &str = "runs";
+/// `[telemetry] black_box`
+pub const BLACK_BOX_NS: u64 = 5_000_000_000;
 /// `[telemetry] ring_records`
 pub const RING_RECORDS: usize = 4096;
 

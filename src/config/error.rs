@@ -7,6 +7,7 @@ use miette::{Diagnostic, LabeledSpan, NamedSource, SourceCode};
 use thiserror::Error;
 
 use crate::bus::schedule::NoCommandPhase;
+use crate::canopen::dcf::DcfError;
 
 use super::quantity::{self, Quantity};
 
@@ -296,6 +297,12 @@ pub enum ProblemKind {
         /// The value in counts or counts per second.
         counts: f64,
     },
+    /// A device configuration file that cannot be used.
+    #[error("{reason}")]
+    Dcf {
+        /// Why.
+        reason: DcfError,
+    },
     /// `command_phase = "auto"` where none is possible.
     #[error("no command phase suits every bus")]
     NoCommandPhase {
@@ -403,6 +410,7 @@ impl ProblemKind {
             }
             Self::EmptyRange { .. } => "the lowest position comes first".into(),
             Self::BeyondCounts { .. } => "check counts_per_turn, gear_ratio, lead and zero_counts".into(),
+            Self::Dcf { reason } => reason.help().into(),
             Self::NoCommandPhase { cause } => cause.to_string(),
             Self::TooMany { .. } => "divide the machine between several controllers".into(),
         }
@@ -461,6 +469,13 @@ fn article_of(noun: &str) -> String {
 }
 
 impl Diagnostic for Problem {
+    /// What is wrong with a file that the configuration names, at its lines.
+    fn related<'a>(&'a self) -> Option<Box<dyn Iterator<Item = &'a dyn Diagnostic> + 'a>> {
+        let ProblemKind::Dcf { reason: DcfError::File(findings) } = &self.kind else { return None };
+        let findings: &dyn Diagnostic = findings;
+        Some(Box::new(std::iter::once(findings)))
+    }
+
     fn help<'a>(&'a self) -> Option<Box<dyn fmt::Display + 'a>> {
         Some(Box::new(self.kind.help()))
     }

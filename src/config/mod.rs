@@ -9,7 +9,7 @@ mod error;
 mod interface;
 mod model;
 mod quantity;
-mod read;
+pub(crate) mod read;
 mod spelling;
 
 use std::path::Path;

@@ -12,7 +12,11 @@ use takt_rt::dialect::Dialect;
 /// Limits of an axis in rad (m) and seconds. Defaults: the deceleration is the acceleration, the jerk is infinite.
 pub use takt_rt::guard::AxisLimits as Limits;
 
+pub use takt_rt::guard::OnViolation;
+pub use takt_rt::stop::StopCategories;
+
 use super::defaults;
+use crate::canopen::dcf::DeviceConfiguration;
 
 /// A whole controller: one cycle, its buses, its axes and what they are to do.
 #[derive(Clone, Debug, PartialEq)]
@@ -21,6 +25,10 @@ pub struct Config {
     pub name: String,
     /// The cycle.
     pub cycle: Cycle,
+    /// When missed slots are too many.
+    pub missed_slots: MissedSlots,
+    /// How each rule stops the group. Default: see [`takt_rt::stop::Rule::default_category`].
+    pub stops: StopCategories,
     /// What is asked of the operating system.
     pub realtime: Realtime,
     /// This controller as a CANopen node.
@@ -54,6 +62,19 @@ impl Config {
         let divider = self.buses.get(bus).map_or(1, |bus| bus.divider.max(1));
         Cycle { period_ns: self.cycle.period_ns * u64::from(divider), ..self.cycle }
     }
+}
+
+/// When missed slots are too many: a bucket that every missed slot fills by one and that loses one in a while.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MissedSlots {
+    /// Slots in the bucket from which on it is told. Default 10.
+    pub warning: u32,
+    /// Slots from which on no stream is begun. Default 50.
+    pub degraded: u32,
+    /// Slots from which on the group stops, unless all of its buses are simulated. Default 250.
+    pub stop: u32,
+    /// The time in which the bucket loses one. Default 10 ms.
+    pub leak_ns: u64,
 }
 
 /// What is asked of the operating system for the real-time thread.
@@ -142,6 +163,10 @@ pub struct Axis {
     pub limits: Limits,
     /// How far the joint may be from its set-point.
     pub following_error: FollowingError,
+    /// How far from the joint a stream of set-points may begin: rad (m). Default 0.02 rad or 0.002 m.
+    pub start_tolerance: f64,
+    /// What is done with set-points of a stream that break a limit. Default: the group stops.
+    pub on_violation: OnViolation,
     /// Cycles without feedback before the group stops. Default 5.
     pub missed_feedback_cycles: u16,
     /// Transmission type of the PDOs (1 = every SYNC). Default 1.
@@ -158,6 +183,9 @@ pub struct Axis {
     pub heartbeat_ns: Option<u64>,
     /// What is known of the drive beforehand and compared at bring-up. Default: the family's, any revision.
     pub identity: Identity,
+    /// What a configuration file (DCF or concise DCF) has written to the drive at bring-up, before the controller writes
+    /// what it needs itself. Default: none.
+    pub dcf: Option<DeviceConfiguration>,
     /// The drive and joint that stand in on a simulated bus.
     pub simulated: SimulatedJoint,
 }
@@ -336,6 +364,9 @@ pub struct Telemetry {
     pub is_recorded: bool,
     /// Whether the frames of every bus are written as candump logs. Default `false`.
     pub is_candump_written: bool,
+    /// How much of the past the black box keeps and writes at a fault; 100 ms to 60 s, `None` has no black box.
+    /// Default 5 s.
+    pub black_box_ns: Option<u64>,
     /// Cycle records that the ring to the logger can hold. Default 4096.
     pub ring_records: usize,
 }

@@ -9,8 +9,9 @@ use takt_rt::frame::Id;
 use takt_rt::pdo::{Mapping, MappingError};
 use takt_rt::record::{MAX_AXES, MAX_BUSES};
 use takt_rt::units::{Scale, ScaleError, ScaleParameters};
+use takt_rt::watch::TimingLadder;
 
-use crate::config::{Axis, Config, DriveFamily, Travel};
+use crate::config::{Axis, Config, DriveFamily, Interface, Travel};
 use crate::drive::{PdoPlan, ProcessData, yz_aim};
 
 /// How long the drives may take from the first controlword to operation enabled.
@@ -93,6 +94,7 @@ pub fn engine(config: &Config) -> Result<Engine, AssembleError> {
         service_frames_active: bus.service_frames_per_cycle,
         service_frames_passive: SERVICE_FRAMES_PASSIVE.max(bus.service_frames_per_cycle),
     });
+    let is_simulated = config.buses.iter().all(|bus| bus.interface == Interface::Simulated);
     let heartbeat = config
         .master
         .heartbeat_ns
@@ -104,6 +106,14 @@ pub fn engine(config: &Config) -> Result<Engine, AssembleError> {
         heartbeat,
         enable_timeout_cycles: cycles(ENABLE_TIMEOUT_NS),
         not_transmitted_cycles: cycles(NOT_TRANSMITTED_NS),
+        categories: config.stops,
+        timing: TimingLadder {
+            warning: config.missed_slots.warning,
+            degraded: config.missed_slots.degraded,
+            // Simulated drives stand still while the process does: nothing is lost by a slot that they miss as well.
+            unfit: if is_simulated { u32::MAX } else { config.missed_slots.stop },
+            leak_cycles: cycles(config.missed_slots.leak_ns).max(1),
+        },
         acknowledge_timeout_cycles: cycles(ACKNOWLEDGE_TIMEOUT_NS),
     })
     .map_err(AssembleError::Engine)
@@ -140,6 +150,10 @@ fn axis_parameters(
         law: axis.control,
         scale: scale(axis).map_err(|error| AssembleError::Scale { axis: index, error })?,
         limits: axis.limits,
+        start_tolerance: axis.start_tolerance,
+        on_violation: axis.on_violation,
+        // A heartbeat that comes a little late is not one that is lost.
+        heartbeat_timeout_cycles: axis.heartbeat_ns.map(|period_ns| cycles(3 * period_ns)),
         following_error_limit: axis.following_error.limit,
         following_error_cycles: cycles(axis.following_error.time_ns),
         missed_feedback_cycles: axis.missed_feedback_cycles,

@@ -1,10 +1,13 @@
 //! A controller in real time, from the configuration to what is left of the run.
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
 use std::time::Duration;
 
-use takt_rt::door::Snapshot;
+use takt_rt::door::{Request, Snapshot};
 use takt_rt::linux::MonotonicClock;
 use takt_rt::port::Clock;
+use takt_rt::stop::StopCategory;
 
 use super::assemble::{self, AssembleError};
 use super::channels::{ChannelSizes, channels};
@@ -14,8 +17,10 @@ use super::supervisor::{Interrupt, Outcome, Progress, Supervisor};
 use crate::bus::port::{OpenError, Port};
 use crate::bus::trace::Trace;
 use crate::config::Config;
+use crate::faults::Rehearsal;
 use crate::telemetry::{
-    Destination, LogSummary, Logger, LoggerOptions, LoggerThread, Machine, Notice, WallClock,
+    BlackBoxOptions, Destination, Fault, LogSummary, Logger, LoggerOptions, LoggerThread, Machine, Notice,
+    WallClock, panic_message,
 };
 
 /// A pause between two looks at the controller.
@@ -30,6 +35,8 @@ pub struct SessionOptions {
     pub recording: Option<Destination>,
     /// Whether a refused step of the real-time set-up ends the run before anything moves.
     pub is_realtime_required: bool,
+    /// Faults that are played on the buses.
+    pub rehearsal: Option<Arc<Rehearsal>>,
 }
 
 /// What is left of a run.
@@ -71,6 +78,8 @@ pub enum SessionError {
 /// Runs the program of a configuration. `notify` hears what the logger has to say, from its thread. `watch` is called
 /// about once in a millisecond with the newest state and what the run is doing, and may ask it to end.
 ///
+/// When `notify` or `watch` panics, the panic is caught, that one is not called again, and the group stops in category 1; the run then ends as [`Outcome::CallbackPanicked`].
+///
 /// # Errors
 /// See [`SessionError`]; nothing has moved then.
 pub fn run(
@@ -81,7 +90,7 @@ pub fn run(
 ) -> Result<Session, SessionError> {
     let mut clock = MonotonicClock::default();
     let engine = Box::new(assemble::engine(config)?);
-    let (ports, traces) = open_ports(config)?;
+    let (ports, traces) = open_ports(config, options.rehearsal.as_deref())?;
     let (rt, mut host, log) = channels(&ChannelSizes::of(config));
     let mut supervisor = Supervisor::new(config, options.duration_ns);
 
@@ -93,6 +102,10 @@ pub fn run(
         started_ns,
         recording: options.recording.or_else(|| own(config.telemetry.is_recorded)),
         candump: own(config.telemetry.is_candump_written),
+        black_box: config
+            .telemetry
+            .black_box_ns
+            .map(|span_ns| BlackBoxOptions { span_ns, directory: config.telemetry.directory.clone() }),
         traces,
     };
     // The logger's thread starts before the real-time thread is elevated and inherits nothing of it.
@@ -114,15 +127,43 @@ pub fn run(
         }
     };
     let begun = running.begun();
+    let (mut panicked, mut is_watched) = (None, true);
     while !running.is_finished() {
         supervisor.poll(clock.now_ns(), &mut host);
-        if let Some(interrupt) = watch(&host.snapshot(), supervisor.progress()) {
-            supervisor.interrupt(interrupt);
+        if let Some(rehearsal) = &options.rehearsal {
+            rehearsal.observe(&host.snapshot());
+        }
+        let mut panics_now = None;
+        if is_watched {
+            // What the caller's function has left half done is the caller's; it is not called again.
+            match catch_unwind(AssertUnwindSafe(|| watch(&host.snapshot(), supervisor.progress()))) {
+                Ok(interrupt) => interrupt.into_iter().for_each(|interrupt| supervisor.interrupt(interrupt)),
+                Err(payload) => {
+                    let message = panic_message(&*payload);
+                    logger.fault(Fault::CallbackPanicked(message.clone()));
+                    is_watched = false;
+                    panics_now = Some(message);
+                }
+            }
+        }
+        if panicked.is_none() {
+            panicked = panics_now.or_else(|| logger.panic().map(str::to_owned));
+            if panicked.is_some() {
+                // The queue is emptied in every cycle; were it full, the way out below disables the group as well.
+                let _ = host.request(Request::Stop(StopCategory::One));
+                supervisor.interrupt(Interrupt::Controlled);
+            }
         }
         quiet::sleep(PAUSE, config.cycle.period_ns);
     }
     let ended = running.join();
-    let outcome = supervisor.outcome().cloned().unwrap_or(Outcome::ThreadDied);
+    if ended.is_none() {
+        logger.fault(Fault::ThreadDied);
+    }
+    let outcome = match (supervisor.outcome().cloned().unwrap_or(Outcome::ThreadDied), panicked) {
+        (Outcome::Interrupted | Outcome::Finished, Some(message)) => Outcome::CallbackPanicked { message },
+        (outcome, _) => outcome,
+    };
     let target =
         supervisor.target().filter(|_| outcome == Outcome::Finished && options.duration_ns.is_none());
     Ok(Session {
@@ -136,12 +177,17 @@ pub fn run(
     })
 }
 
-fn open_ports(config: &Config) -> Result<(Vec<Port>, Vec<Trace>), OpenError> {
+fn open_ports(config: &Config, rehearsal: Option<&Rehearsal>) -> Result<(Vec<Port>, Vec<Trace>), OpenError> {
     let mut ports = Vec::with_capacity(config.buses.len());
     let mut traces = Vec::new();
+    let is_traced = config.telemetry.is_candump_written || config.telemetry.black_box_ns.is_some();
     for (index, bus) in config.buses.iter().enumerate() {
         let port = Port::open(config, index)?;
-        ports.push(if config.telemetry.is_candump_written {
+        let port = match rehearsal {
+            Some(rehearsal) => rehearsal.wrap(index, port),
+            None => port,
+        };
+        ports.push(if is_traced {
             let (port, trace) = port.traced(&bus.name);
             traces.push(trace);
             port

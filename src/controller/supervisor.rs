@@ -54,6 +54,11 @@ pub enum Outcome {
         /// The move.
         number: u64,
     },
+    /// A function that the caller gave to the run panicked, and the axes were stopped in control.
+    CallbackPanicked {
+        /// What the panic said.
+        message: String,
+    },
     /// The real-time thread ended by itself, which only a defect of takt can bring about.
     ThreadDied,
     /// The group did not get where it was told to in time.

@@ -2,6 +2,8 @@
 //! thread, but in one thread and on a clock that jumps, so that hours of motion take seconds and the same
 //! configuration gives the same run bit for bit.
 
+use std::sync::Arc;
+
 use takt_rt::cycle::{Cycle, Flow};
 use takt_rt::door::Snapshot;
 use takt_rt::engine::Engine;
@@ -11,7 +13,9 @@ use takt_rt::time::Grid;
 use super::assemble::{self, AssembleError};
 use super::channels::{ChannelSizes, HostSide, LogSide, RtSide, channels};
 use super::supervisor::{Interrupt, Outcome, Supervisor};
+use crate::bus::port::Port;
 use crate::config::Config;
+use crate::faults::Rehearsal;
 use crate::sim::SimulatedBus;
 
 /// A clock that is always on time, unless it is told to be late.
@@ -49,6 +53,7 @@ pub struct VirtualRun<P> {
     rt: RtSide,
     host: HostSide,
     supervisor: Supervisor,
+    rehearsal: Option<Arc<Rehearsal>>,
     is_over: bool,
 }
 
@@ -60,6 +65,19 @@ impl VirtualRun<SimulatedBus> {
     pub fn simulated(config: &Config) -> Result<(Self, LogSide), AssembleError> {
         let ports = (0..config.buses.len()).map(|bus| SimulatedBus::new(config, bus)).collect();
         Self::new(config, ports)
+    }
+}
+
+impl VirtualRun<Port> {
+    /// A controller of this configuration on simulated buses on which a scenario is played, and the side for its logger.
+    ///
+    /// # Errors
+    /// See [`assemble::engine`].
+    pub fn rehearsed(config: &Config, rehearsal: Arc<Rehearsal>) -> Result<(Self, LogSide), AssembleError> {
+        let simulated = |bus| Port::Simulated(Box::new(SimulatedBus::new(config, bus)));
+        let ports = (0..config.buses.len()).map(|bus| rehearsal.wrap(bus, simulated(bus))).collect();
+        let (run, log) = Self::new(config, ports)?;
+        Ok((Self { rehearsal: Some(rehearsal), ..run }, log))
     }
 }
 
@@ -82,6 +100,7 @@ impl<P: BusPort> VirtualRun<P> {
             rt,
             host,
             supervisor: Supervisor::new(config, None),
+            rehearsal: None,
             is_over: false,
         };
         Ok((run, log))
@@ -94,6 +113,9 @@ impl<P: BusPort> VirtualRun<P> {
         }
         let flow = self.cycle.run(&mut self.engine, &mut self.clock, &mut self.ports, &mut self.rt);
         self.supervisor.poll(self.clock.now_ns, &mut self.host);
+        if let Some(rehearsal) = &self.rehearsal {
+            rehearsal.observe(&self.host.snapshot());
+        }
         self.is_over = flow == Flow::Leave;
         !self.is_over
     }

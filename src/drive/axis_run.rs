@@ -6,13 +6,14 @@ use takt_rt::frame::{Frame, Id};
 use takt_rt::time::Nanoseconds;
 
 use super::facts::AxisFacts;
-use super::failure::{Answered, Cause};
+use super::failure::{Answered, Cause, Content};
 use super::step::{Access, Action, Check, Fact, ReadBack, Source, Step, When};
+use crate::canopen::dcf::Download;
 use crate::canopen::emcy::Emergency;
 use crate::canopen::nmt::{ErrorControl, NmtState, NmtTarget};
 use crate::canopen::object::Object;
 use crate::canopen::objects::DEVICE_TYPE;
-use crate::canopen::sdo::{Client, Completed, SdoError, Timing, Transfer};
+use crate::canopen::sdo::{AbortCode, Client, Completed, SdoError, Timing, Transfer};
 use crate::config::Axis;
 
 /// How long to wait between two readings of an object that is waited for.
@@ -64,6 +65,8 @@ enum Phase {
     Transfer { began_ns: Nanoseconds },
     /// The client is reading back what was written.
     ReadBack { written: i64 },
+    /// The client is reading back bytes that were written.
+    Verify,
     /// A number was not yet as wanted.
     Pause { began_ns: Nanoseconds, until_ns: Nanoseconds },
     /// A state was commanded.
@@ -196,7 +199,7 @@ impl AxisRun {
     }
 
     fn action(&self) -> Option<Action> {
-        self.steps.get(self.current).map(|step| step.action)
+        self.steps.get(self.current).map(|step| step.action.clone())
     }
 
     fn next_step(&mut self) {
@@ -221,7 +224,7 @@ impl AxisRun {
 
     /// What is due by time alone.
     fn advance(&mut self, now_ns: Nanoseconds, send: &mut impl FnMut(Frame)) -> Progress {
-        let Some(Step { when, action, .. }) = self.steps.get(self.current).copied() else {
+        let Some(Step { when, action, .. }) = self.steps.get(self.current).cloned() else {
             self.phase = Phase::Over;
             return Ok(());
         };
@@ -286,6 +289,7 @@ impl AxisRun {
                 Transfer::Upload { object: object.address }
             }
             Action::ReadText { object, .. } => Transfer::Upload { object },
+            Action::WriteBytes(Download { object, data }) => Transfer::Download { object, data },
             Action::Nmt { .. } => return Ok(()),
         };
         self.start(transfer);
@@ -332,6 +336,10 @@ impl AxisRun {
                 self.next_step();
                 Ok(())
             }
+            (Phase::Transfer { .. }, Some(Action::WriteBytes(download))) => {
+                self.bytes_written(&download, outcome)
+            }
+            (Phase::Verify, Some(Action::WriteBytes(download))) => self.verify(&download, outcome),
             (Phase::Transfer { began_ns }, Some(Action::Await { object, check, keep, within_ns })) => {
                 let received = self.number(object, Access::Read, outcome)?;
                 self.keep(keep, received);
@@ -426,6 +434,41 @@ impl AxisRun {
         };
         if !expected.passes(received) {
             return Err(Cause::Value { object, access, expected, received, waited_ns: 0 });
+        }
+        self.next_step();
+        Ok(())
+    }
+
+    fn bytes_written(&mut self, download: &Download, outcome: Result<Completed, SdoError>) -> Progress {
+        let Download { object, data } = download;
+        outcome.map_err(|error| Cause::ConfigurationTransfer {
+            object: *object,
+            written: Content::of(data),
+            is_reading_back: false,
+            error,
+        })?;
+        self.start(Transfer::Upload { object: *object });
+        self.phase = Phase::Verify;
+        Ok(())
+    }
+
+    fn verify(&mut self, download: &Download, outcome: Result<Completed, SdoError>) -> Progress {
+        let Download { object, data } = download;
+        let (object, written) = (*object, Content::of(data));
+        let received = match outcome {
+            Ok(Completed::Uploaded(uploaded)) => uploaded,
+            // It cannot be read.
+            Ok(Completed::Downloaded) | Err(SdoError::Aborted(AbortCode::WriteOnly)) => {
+                self.next_step();
+                return Ok(());
+            }
+            Err(error) => {
+                return Err(Cause::ConfigurationTransfer { object, written, is_reading_back: true, error });
+            }
+        };
+        if !download.is_held_by(&received) {
+            let received = Content::of(&received.bytes);
+            return Err(Cause::ConfigurationDiffers { object, written, received });
         }
         self.next_step();
         Ok(())

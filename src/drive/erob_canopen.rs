@@ -66,6 +66,7 @@ pub(super) fn configure(config: &Config, axis: &Axis, timing: &BringUpTiming) ->
     );
     identity(&mut list, axis);
     come_to_rest(&mut list, axis, timing);
+    list.configuration_file(axis);
     synchronisation(&mut list, config.bus_cycle(axis.bus).period_ns);
     process_data(&mut list, axis);
     mode(&mut list, axis, timing);

@@ -118,6 +118,26 @@ pub enum Cause {
         /// How long was waited for it; 0 when it was read once.
         waited_ns: Nanoseconds,
     },
+    /// Writing a configured value, or reading it back, failed.
+    ConfigurationTransfer {
+        /// The object.
+        object: ObjectAddress,
+        /// What was to be written.
+        written: Content,
+        /// Whether it had been written and was being read back.
+        is_reading_back: bool,
+        /// Why it failed.
+        error: SdoError,
+    },
+    /// A configured value reads back as another one.
+    ConfigurationDiffers {
+        /// The object.
+        object: ObjectAddress,
+        /// What was written.
+        written: Content,
+        /// What came.
+        received: Content,
+    },
     /// A value does not fit the object.
     DoesNotFit {
         /// The object.
@@ -130,6 +150,37 @@ pub enum Cause {
         /// How often.
         times: u8,
     },
+}
+
+/// The bytes of an object, as far as they are shown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Content {
+    /// How many there are.
+    pub length: usize,
+    /// The first of them.
+    pub first: [u8; 8],
+}
+
+impl Content {
+    /// Of these bytes.
+    pub fn of(bytes: &[u8]) -> Self {
+        let mut first = [0; 8];
+        for (place, byte) in first.iter_mut().zip(bytes) {
+            *place = *byte;
+        }
+        Self { length: bytes.len(), first }
+    }
+}
+
+impl fmt::Display for Content {
+    /// Numbers as such, low byte first; longer ones byte by byte.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.length {
+            0 => f.write_str("nothing"),
+            length @ 1..=8 => write!(f, "0x{:0width$X}", u64::from_le_bytes(self.first), width = 2 * length),
+            length => write!(f, "{length} bytes {:02X?}…", self.first),
+        }
+    }
 }
 
 /// Who answered a node's silence when asked otherwise.
@@ -186,6 +237,15 @@ impl fmt::Display for Cause {
                 }
                 Ok(())
             }
+            Self::ConfigurationTransfer { object, written, is_reading_back: false, error } => {
+                write!(f, "writing {written} to {object}: expected it to be accepted, got {error}")
+            }
+            Self::ConfigurationTransfer { object, written, is_reading_back: true, error } => {
+                write!(f, "reading {object} back after writing {written}: expected a value, got {error}")
+            }
+            Self::ConfigurationDiffers { object, written, received } => {
+                write!(f, "reading {object} back after writing {written}: got {received}")
+            }
             Self::DoesNotFit { object, value } => {
                 let bits = 8 * object.data_type.length();
                 write!(f, "writing {value} to {object}: it does not fit {bits} bits")
@@ -208,6 +268,7 @@ impl Cause {
                 "the drive runs but does not obey NMT: look for a second master on the bus, and power-cycle the drive",
             ),
             Self::Transfer { error: SdoError::NoReply { .. }, .. }
+            | Self::ConfigurationTransfer { error: SdoError::NoReply { .. }, .. }
             | Self::TextTransfer { error: SdoError::NoReply { .. }, .. } => Some(
                 "the drive has fallen silent: check its supply, the wiring and the bus load, and that no other master \
                  stops it",

@@ -16,6 +16,6 @@ pub mod yz_aim;
 
 pub use bring_up::{BringUp, BringUpTiming, Leave, NotConfigured, Progress, Stage};
 pub use facts::{AxisFacts, DeviceIdentity, DeviceTexts};
-pub use failure::{Answered, AxisFailure, BringUpError, Cause};
+pub use failure::{Answered, AxisFailure, BringUpError, Cause, Content};
 pub use process_data::{PdoPlan, ProcessData};
 pub use step::{Access, Check, mode_words};

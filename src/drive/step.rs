@@ -4,11 +4,12 @@
 use takt_rt::cia402::{OperationMode, State};
 use takt_rt::time::Nanoseconds;
 
+use crate::canopen::dcf::Download;
 use crate::canopen::nmt::{NmtCommand, NmtState};
 use crate::canopen::object::{Object, ObjectAddress};
 
 /// One step.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Step {
     /// What it is about, for progress and failures.
     pub name: &'static str,
@@ -30,7 +31,7 @@ pub(super) enum When {
 }
 
 /// What a step does.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) enum Action {
     /// Commands a state and waits until the node reports it.
     Nmt {
@@ -60,6 +61,8 @@ pub(super) enum Action {
         /// Whether the drive may say that it has no such object: then it is noted as absent.
         is_optional: bool,
     },
+    /// Writes bytes, and reads them back where they can be read.
+    WriteBytes(Download),
     /// Reads a number again and again until it is as wanted.
     Await { object: Object, check: Check, keep: Option<Fact>, within_ns: Nanoseconds },
 }

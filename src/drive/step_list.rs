@@ -92,6 +92,18 @@ impl List {
         self.push(Action::Read { object, check: Check::Any, keep: Some(keep), is_optional: true });
     }
 
+    /// What the configuration file of the axis has written: before all that the controller itself needs to be set, so
+    /// that this has the last word.
+    pub fn configuration_file(&mut self, axis: &Axis) {
+        self.about(
+            "configuration file",
+            "the file named by `dcf` does not suit this drive: correct it there, or leave the object out",
+        );
+        for download in axis.dcf.iter().flat_map(|configuration| &configuration.downloads) {
+            self.push(Action::WriteBytes(download.clone()));
+        }
+    }
+
     /// Compares what the drive says of itself with what is configured.
     pub fn identity(&mut self, axis: &Axis) {
         self.about(

@@ -72,6 +72,7 @@ pub(super) fn configure(config: &Config, axis: &Axis, timing: &BringUpTiming) ->
     );
     list.identity(axis);
     come_to_rest(&mut list, timing);
+    list.configuration_file(axis);
     process_data(&mut list, axis);
     motion(&mut list, axis);
     target_at_actual_position(&mut list, axis);

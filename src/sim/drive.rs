@@ -6,6 +6,7 @@ use takt_rt::cia402::State;
 use takt_rt::frame::Frame;
 use takt_rt::time::Nanoseconds;
 
+use super::defect::{Defect, Unsupported};
 use super::mailbox::Mailbox;
 
 /// A simulated drive on a CAN bus. Time never runs backwards between calls, and no call takes heap memory.
@@ -34,6 +35,16 @@ pub trait Drive: Send {
 
     /// Sets a torque from outside on the joint: N·m (N). It lasts until it is set again.
     fn set_load_torque(&mut self, torque: f64);
+
+    /// Something about the drive or its joint is wrong from `now_ns` on (`is_present`), or is well again. An event just
+    /// happens when it comes, and has nothing to mend.
+    ///
+    /// # Errors
+    /// [`Unsupported`] when this drive cannot be broken in this way; nothing has changed then.
+    fn afflict(&mut self, now_ns: Nanoseconds, defect: Defect, is_present: bool) -> Result<(), Unsupported> {
+        let _ = (now_ns, is_present);
+        Err(Unsupported { defect })
+    }
 }
 
 /// The truth about a simulated drive and its joint.

@@ -46,21 +46,24 @@
 //! assert_eq!(batch[0].frame, Frame::of(Id::canopen(0x700, 5), [0])); // boot-up
 //! ```
 
+mod defect;
 mod drive;
 pub mod erob;
 pub mod homing_switches;
 mod live;
+pub mod lss;
 mod mailbox;
 mod medium;
 pub mod plant;
 mod port;
-mod random;
+pub(crate) mod random;
 mod servo;
 pub mod yz_aim;
 
+pub use defect::{Defect, Unsupported};
 pub use drive::{Drive, DriveFault, NmtState, Observation};
 pub use live::LiveDrives;
 pub use mailbox::{Mailbox, Order};
 pub use medium::{BitRates, Medium, Transmission};
-pub use port::{SimulatedBus, UnknownNode};
+pub use port::{AfflictError, SimulatedBus, UnknownNode};
 pub use takt_rt::wire::{INTERMISSION_BITS, WireLength, bits_ns};

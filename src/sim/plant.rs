@@ -60,6 +60,11 @@ impl Joint {
         self.load_torque = torque;
     }
 
+    /// Stands still at once, as a joint that hits something hard.
+    pub fn halt(&mut self) {
+        self.velocity = 0.0;
+    }
+
     /// Moves on by `duration_s` under a constant motor torque.
     ///
     /// Friction is taken exactly: where the velocity would change its sign within the step, the step is cut at

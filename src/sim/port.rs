@@ -11,6 +11,7 @@ use takt_rt::frame::Frame;
 use takt_rt::port::{BusHealth, BusPort, BusState, ReceiveBatch, Received};
 use takt_rt::time::Nanoseconds;
 
+use super::defect::{Defect, Unsupported};
 use super::drive::{Drive, DriveFault, Observation};
 use super::erob::{ErobJoint, ErobParameters};
 use super::medium::{BitRates, Medium, Transmission};
@@ -23,7 +24,7 @@ const TRANSMIT_QUEUE: usize = 256;
 const RECEIVE_QUEUE: usize = 1024;
 /// Frames a drive's controller holds.
 pub(super) const DRIVE_MAILBOX: usize = 16;
-/// The master's station on the bus; the drives follow.
+/// The master's station on the bus; the drives follow, and behind them one for whoever else speaks.
 const MASTER: usize = 0;
 
 /// A bus with simulated drives.
@@ -70,6 +71,17 @@ pub struct UnknownNode {
     pub node: u8,
 }
 
+/// Why a drive has not been given a defect.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum AfflictError {
+    /// It is not there.
+    #[error(transparent)]
+    UnknownNode(#[from] UnknownNode),
+    /// It cannot have it.
+    #[error(transparent)]
+    Unsupported(#[from] Unsupported),
+}
+
 impl SimulatedBus {
     /// The bus with this index in the configuration, with a drive for every axis on it.
     pub fn new(config: &Config, bus: usize) -> Self {
@@ -83,7 +95,7 @@ impl SimulatedBus {
     /// `longest_gap_ns` after the one before, the world inside stands still for what is beyond.
     pub fn with_drives(rates: BitRates, longest_gap_ns: Nanoseconds, drives: Vec<Box<dyn Drive>>) -> Self {
         Self {
-            medium: Medium::with_master(rates, TRANSMIT_QUEUE, drives.len(), DRIVE_MAILBOX),
+            medium: Medium::with_master(rates, TRANSMIT_QUEUE, drives.len() + 1, DRIVE_MAILBOX),
             drives,
             received: VecDeque::with_capacity(RECEIVE_QUEUE),
             health: BusHealth { state: BusState::ErrorActive, ..BusHealth::default() },
@@ -111,6 +123,22 @@ impl SimulatedBus {
         let station = self.station(node)?;
         self.drives[station - 1].inject(fault);
         Ok(())
+    }
+
+    /// Gives a drive a defect, or mends it.
+    ///
+    /// # Errors
+    /// See [`AfflictError`]; nothing has changed then.
+    pub fn afflict(&mut self, node: u8, defect: Defect, is_present: bool) -> Result<(), AfflictError> {
+        let station = self.station(node)?;
+        Ok(self.drives[station - 1].afflict(self.now_ns, defect, is_present)?)
+    }
+
+    /// Lets a station that is neither the master nor one of the drives send a frame: it takes part in the arbitration,
+    /// and everybody hears it. Returns whether that station had room for it.
+    pub fn say(&mut self, now_ns: Nanoseconds, frame: &Frame) -> bool {
+        self.advance_to(now_ns);
+        self.medium.mailbox_mut(self.drives.len() + 1).push(*frame)
     }
 
     /// Cuts a drive off from the bus or connects it again. It lives on meanwhile.

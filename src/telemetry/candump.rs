@@ -6,6 +6,7 @@ use std::io::{self, BufWriter, Write};
 use takt_rt::time::{NANOSECONDS_PER_SECOND, Nanoseconds};
 
 use super::destination::Opened;
+use super::past::OnBus;
 use super::wall_clock::WallClock;
 use crate::bus::trace::{Trace, TracedFrame};
 
@@ -28,21 +29,21 @@ impl CandumpLog {
         Self { label: opened.label, writer, wall_clock, waiting: Vec::new() }
     }
 
-    /// Takes what the traces hold and writes what is old enough.
-    pub fn drain(&mut self, traces: &mut [Trace]) -> io::Result<()> {
-        for (bus, trace) in traces.iter_mut().enumerate() {
-            while let Some(frame) = trace.take() {
-                self.waiting.push((frame, bus));
-            }
-        }
+    /// Takes a frame.
+    pub fn add(&mut self, OnBus { bus, what }: &OnBus<TracedFrame>) {
+        self.waiting.push((*what, *bus));
+    }
+
+    /// Writes what is old enough.
+    pub fn write(&mut self, traces: &[Trace]) -> io::Result<()> {
         self.waiting.sort_by_key(|(frame, _)| frame.at_ns);
         let newest_ns = self.waiting.last().map_or(0, |(frame, _)| frame.at_ns);
         self.write_until(newest_ns.saturating_sub(REORDER_NS), traces)
     }
 
     /// Writes the rest.
-    pub fn finish(mut self, traces: &mut [Trace]) -> io::Result<()> {
-        self.drain(traces)?;
+    pub fn finish(mut self, traces: &[Trace]) -> io::Result<()> {
+        self.write(traces)?;
         self.write_until(Nanoseconds::MAX, traces)?;
         self.writer.flush()
     }

@@ -76,12 +76,94 @@ impl CdrEncoder {
         self
     }
 
+    /// `uint8[]`: its length, then its bytes.
+    pub fn octet_sequence(&mut self, bytes: &[u8]) -> &mut Self {
+        self.u32(bytes.len() as u32);
+        self.bytes.extend_from_slice(bytes);
+        self
+    }
+
     /// `string`: its length with the closing zero, then its bytes.
     pub fn string(&mut self, text: &str) -> &mut Self {
         self.u32(text.len() as u32 + 1);
         self.bytes.extend_from_slice(text.as_bytes());
         self.bytes.push(0);
         self
+    }
+}
+
+/// Decodes a message field by field; `None` where it ends too early.
+pub struct CdrDecoder<'a> {
+    body: &'a [u8],
+    at: usize,
+}
+
+impl<'a> CdrDecoder<'a> {
+    /// Begins with the first field, if this is little-endian CDR.
+    pub fn begin(message: &'a [u8]) -> Option<Self> {
+        Some(Self { body: message.strip_prefix(&HEADER)?, at: 0 })
+    }
+
+    fn take<const N: usize>(&mut self) -> Option<[u8; N]> {
+        let from = self.at.next_multiple_of(N);
+        let bytes = self.body.get(from..)?.first_chunk::<N>()?;
+        self.at = from + N;
+        Some(*bytes)
+    }
+
+    /// `uint8`
+    pub fn u8(&mut self) -> Option<u8> {
+        self.take::<1>().map(|[byte]| byte)
+    }
+
+    /// `uint16`
+    pub fn u16(&mut self) -> Option<u16> {
+        self.take().map(u16::from_le_bytes)
+    }
+
+    /// `int16`
+    pub fn i16(&mut self) -> Option<i16> {
+        self.take().map(i16::from_le_bytes)
+    }
+
+    /// `uint32`
+    pub fn u32(&mut self) -> Option<u32> {
+        self.take().map(u32::from_le_bytes)
+    }
+
+    /// `int32`
+    pub fn i32(&mut self) -> Option<i32> {
+        self.take().map(i32::from_le_bytes)
+    }
+
+    /// `uint64`
+    pub fn u64(&mut self) -> Option<u64> {
+        self.take().map(u64::from_le_bytes)
+    }
+
+    /// `float32`
+    pub fn f32(&mut self) -> Option<f32> {
+        self.take().map(f32::from_le_bytes)
+    }
+
+    /// `float64`
+    pub fn f64(&mut self) -> Option<f64> {
+        self.take().map(f64::from_le_bytes)
+    }
+
+    /// `uint8[N]`
+    pub fn octets<const N: usize>(&mut self) -> Option<[u8; N]> {
+        let bytes = self.body.get(self.at..)?.first_chunk::<N>()?;
+        self.at += N;
+        Some(*bytes)
+    }
+
+    /// `string`
+    pub fn string(&mut self) -> Option<String> {
+        let length = self.u32()? as usize;
+        let bytes = self.body.get(self.at..)?.get(..length)?;
+        self.at += length;
+        Some(String::from_utf8_lossy(bytes.strip_suffix(&[0])?).into_owned())
     }
 }
 

@@ -1,9 +1,15 @@
-//! What stands in a recording: three ROS 2 messages, as text for the schemas and as CDR for the data. Foxglove,
+//! What stands in a recording: ROS 2 messages, as text for the schemas and as CDR for the data. Foxglove,
 //! PlotJuggler and the ROS 2 tools read them without knowing takt.
 
+mod decode;
+
+use takt_rt::frame::FrameKind;
 use takt_rt::record::{AxisRecord, CycleRecord, Event, EventKind};
 
 use super::cdr::CdrEncoder;
+use crate::bus::trace::{TracedFrame, TracedHealth};
+
+pub use decode::{decode_axis, decode_bus, decode_cycle, decode_event};
 
 /// A message type: its name, and its definition in the ROS 2 interface language.
 pub struct MessageType {
@@ -22,6 +28,23 @@ pub const AXIS: MessageType =
 /// An event.
 pub const EVENT: MessageType =
     MessageType { name: "takt_msgs/msg/Event", definition: include_str!("messages/Event.msg") };
+
+/// A frame on a bus.
+pub const FRAME: MessageType =
+    MessageType { name: "takt_msgs/msg/Frame", definition: include_str!("messages/Frame.msg") };
+
+/// The health of a bus.
+pub const BUS: MessageType =
+    MessageType { name: "takt_msgs/msg/Bus", definition: include_str!("messages/Bus.msg") };
+
+/// The messages that are read again.
+pub const READ: [&MessageType; 4] = [&CYCLE, &AXIS, &EVENT, &BUS];
+
+/// What of a definition settles where the fields are: everything but comments and constants.
+pub fn layout(definition: &str) -> Vec<&str> {
+    let lines = definition.lines().map(str::trim);
+    lines.filter(|line| !line.is_empty() && !line.starts_with('#') && !line.contains('=')).collect()
+}
 
 /// Encodes a [`CYCLE`].
 pub fn encode_cycle(record: &CycleRecord, encoder: &mut CdrEncoder) {
@@ -75,6 +98,8 @@ struct EventFields {
     limit: f64,
     move_id: u32,
     missed_slots: u64,
+    timing_level: u8,
+    drive_state: u8,
     statusword: u16,
     error_code: u16,
     error_register: u8,
@@ -99,8 +124,8 @@ impl EventFields {
                 ..none
             },
             EventKind::MoveFinished { id } => Self { kind: 2, move_id: id, ..none },
-            EventKind::DriveState { axis, statusword, .. } => {
-                Self { kind: 3, axis: Some(axis), statusword, ..none }
+            EventKind::DriveState { axis, state, statusword } => {
+                Self { kind: 3, axis: Some(axis), drive_state: state as u8, statusword, ..none }
             }
             EventKind::Emergency { axis, code, register, manufacturer } => Self {
                 kind: 4,
@@ -111,6 +136,7 @@ impl EventFields {
                 ..none
             },
             EventKind::MissedSlots { count } => Self { kind: 5, missed_slots: count, ..none },
+            EventKind::Timing { level } => Self { kind: 7, timing_level: level as u8, ..none },
             EventKind::Refused { phase } => Self { kind: 6, phase_from: phase as u8, ..none },
         }
     }
@@ -134,17 +160,49 @@ pub fn encode_event(event: &Event, text: &str, encoder: &mut CdrEncoder) {
         .f64(fields.limit)
         .u32(fields.move_id)
         .u64(fields.missed_slots)
+        .u8(fields.timing_level)
+        .u8(fields.drive_state)
         .u16(fields.statusword)
         .u16(fields.error_code)
         .u8(fields.error_register)
         .octets(fields.manufacturer);
 }
 
+/// Encodes a [`FRAME`].
+pub fn encode_frame(TracedFrame { at_ns, is_sent, frame }: &TracedFrame, encoder: &mut CdrEncoder) {
+    encoder
+        .begin()
+        .u64(*at_ns)
+        .u8((*is_sent).into())
+        .u32(frame.id().value())
+        .u8(frame.id().is_extended().into())
+        .u8((frame.kind() == FrameKind::Remote).into())
+        .u8(frame.is_fd().into())
+        .u8((frame.kind() == FrameKind::FdBitRateSwitch).into())
+        .u8(frame.length() as u8)
+        .octet_sequence(frame.payload())
+        .string(&format!("{frame:?}"));
+}
+
+/// Encodes a [`BUS`].
+pub fn encode_bus(TracedHealth { at_ns, health }: &TracedHealth, encoder: &mut CdrEncoder) {
+    encoder
+        .begin()
+        .u64(*at_ns)
+        .u8(health.state as u8)
+        .u64(health.errors)
+        .u64(health.tx_overruns)
+        .u64(health.rx_overruns)
+        .u64(health.tx_frames)
+        .u64(health.rx_frames);
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use takt_rt::cia402::State;
-    use takt_rt::stop::{Phase, Rule};
+    use takt_rt::stop::{Phase, Rule, StopCategory, StopReason};
+    use takt_rt::watch::TimingLevel;
 
     /// The constants of a definition that stand in front of `field`, with the names as Rust writes them.
     fn constants(message: &MessageType, field: &str) -> Vec<(String, u8)> {
@@ -172,6 +230,10 @@ mod tests {
         assert_eq!(constants(&CYCLE, "phase"), phases);
         let states = State::ALL.map(|state| (format!("{state:?}"), state as u8));
         assert_eq!(constants(&AXIS, "state"), states);
+        assert_eq!(
+            constants(&BUS, "state"),
+            decode::BUS_STATES.map(|state| (format!("{state:?}"), state as u8))
+        );
         let rules = Rule::ALL.map(|rule| (format!("{rule:?}"), rule as u8));
         assert_eq!(constants(&EVENT, "rule"), rules);
     }
@@ -180,8 +242,8 @@ mod tests {
     fn the_constants_of_the_event_kinds_are_those_that_are_encoded() {
         let kinds = [
             EventKind::PhaseChanged { from: Phase::Passive, to: Phase::Disabled },
-            EventKind::Stop(takt_rt::stop::StopReason {
-                category: takt_rt::stop::StopCategory::One,
+            EventKind::Stop(StopReason {
+                category: StopCategory::One,
                 rule: Rule::DriveFault,
                 axis: Some(3),
                 value: 0.0,
@@ -194,6 +256,7 @@ mod tests {
             EventKind::Emergency { axis: 0, code: 0, register: 0, manufacturer: [0; 5] },
             EventKind::MissedSlots { count: 1 },
             EventKind::Refused { phase: Phase::Moving },
+            EventKind::Timing { level: TimingLevel::Normal },
         ];
         let encoded = kinds.map(|kind| {
             let name = format!("{kind:?}");

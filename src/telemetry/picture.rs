@@ -2,9 +2,9 @@
 
 use std::fmt::Write;
 
-use super::machine::SetPointMagnitudes;
 use super::report::{
     AxisReport, BusReport, DECADES, LatencyReport, RANGES_PER_DECADE, RealtimeReport, RunReport,
+    SetPointParts,
 };
 
 /// Rows of a histogram.
@@ -106,21 +106,17 @@ impl RunReport {
         for axis in &self.axes {
             line(text, &axis_row(axis));
         }
-        let parts: Vec<String> = [
-            ("velocity", self.largest_part(|of| of.velocity)),
-            ("acceleration", self.largest_part(|of| of.acceleration)),
-            ("jerk", self.largest_part(|of| of.jerk)),
-        ]
-        .into_iter()
-        .filter_map(|(what, part)| part.map(|part| format!("{:.1} % of the {what}", 100.0 * part)))
-        .collect();
-        line(text, &format!("set-points reached {} limits", parts.join(", ")));
-    }
-
-    /// The largest part of its limit that any axis was asked for; `None` where no axis has such a limit.
-    fn largest_part(&self, of: impl Fn(&SetPointMagnitudes) -> f64) -> Option<f64> {
-        let limited = self.axes.iter().filter(|axis| of(&axis.limits).is_finite() && of(&axis.limits) > 0.0);
-        limited.map(|axis| of(&axis.set_point_max) / of(&axis.limits)).reduce(f64::max)
+        line(text, "");
+        line(
+            text,
+            &emphasis.heading(&format!(
+                "{:<16}{:>16}{:>16}{:>16}   {}",
+                "set-points", "velocity", "acceleration", "jerk", "the largest, of the limit"
+            )),
+        );
+        for axis in &self.axes {
+            line(text, &part_row(axis));
+        }
     }
 
     fn bus_table(&self, text: &mut String, emphasis: Emphasis) {
@@ -147,7 +143,7 @@ impl RunReport {
         let telemetry = &self.telemetry;
         let mut lines = vec![format!("{} records, {} dropped", telemetry.records, telemetry.dropped)];
         if telemetry.frames_dropped > 0 {
-            lines.push(format!("{} frames dropped from the candump log", telemetry.frames_dropped));
+            lines.push(format!("{} frames dropped", telemetry.frames_dropped));
         }
         if let Some(path) = &telemetry.recording {
             let size =
@@ -157,6 +153,15 @@ impl RunReport {
         lines.extend(telemetry.candump.iter().map(|path| path.display().to_string()));
         lines.extend(telemetry.not_written.iter().cloned());
         wrap(text, &emphasis.heading("telemetry"), 9, &lines);
+        if !telemetry.black_boxes.is_empty() {
+            let mut lines: Vec<String> =
+                telemetry.black_boxes.iter().map(|path| path.display().to_string()).collect();
+            if telemetry.black_boxes_replaced > 0 {
+                lines.push(format!("{} between the last two are not kept", telemetry.black_boxes_replaced));
+            }
+            lines.push("`takt report FILE` tells what is in it".to_owned());
+            wrap(text, &emphasis.heading("black box"), 9, &lines);
+        }
         realtime(text, emphasis, &self.realtime);
     }
 }
@@ -277,6 +282,17 @@ fn axis_row(axis: &AxisReport) -> String {
     format!("{name:<16}{largest:>16}   {circumstances:<36}{position:>16}{off:>12}")
 }
 
+/// A part of a limit.
+pub(super) fn part(part: Option<f64>) -> String {
+    part.map_or_else(|| "no limit".to_owned(), |part| format!("{:.2} %", 100.0 * part))
+}
+
+fn part_row(axis: &AxisReport) -> String {
+    let SetPointParts { velocity, acceleration, jerk } = axis.set_point_part;
+    let [velocity, acceleration, jerk] = [velocity, acceleration, jerk].map(part);
+    format!("{:<16}{velocity:>16}{acceleration:>16}{jerk:>16}", shortened(&axis.name, 16))
+}
+
 fn bus_row(bus: &BusReport) -> String {
     let (name, interface) = (shortened(&bus.name, 16), shortened(&bus.interface, 12));
     let (load, overruns) = (format!("{:.1} %", bus.load_percent), bus.tx_overruns + bus.rx_overruns);
@@ -287,7 +303,7 @@ fn bus_row(bus: &BusReport) -> String {
 }
 
 /// A name that leaves a space in a column of so many characters.
-fn shortened(name: &str, columns: usize) -> String {
+pub(super) fn shortened(name: &str, columns: usize) -> String {
     if name.chars().count() < columns {
         return name.to_owned();
     }

@@ -1,5 +1,6 @@
-//! The MCAP recording: `/cycle` with the times, `/axis/<name>` for each axis, `/events`. Every message has the start
-//! of its slot, as time of day, for its time.
+//! The MCAP recording: `/cycle` with the times, `/axis/<name>` for each axis, `/events`, and where the buses are recorded
+//! too, `/bus/<name>` with their health and `/frames/<name>`. Every message has the start of its slot, or the time of
+//! what it tells, as time of day, for its time.
 
 use std::collections::BTreeMap;
 use std::io::{BufWriter, Write};
@@ -14,11 +15,16 @@ use super::cdr::CdrEncoder;
 use super::destination::Opened;
 use super::machine::Machine;
 use super::messages::{self, MessageType};
+use super::past::OnBus;
 use super::wall_clock::WallClock;
+use crate::bus::trace::{TracedFrame, TracedHealth};
 
 /// Chunks of this size reach the file in one go: a third of a second of six axes at 1 ms, which is what a crash of
 /// the whole machine costs.
 const CHUNK_BYTES: u64 = 256 * 1024;
+
+/// The name of the metadata record that says what the machine is.
+pub const METADATA: &str = "takt";
 
 /// A recording that is being written.
 pub struct Recording {
@@ -30,7 +36,14 @@ pub struct Recording {
     cycle_channel: u16,
     event_channel: u16,
     axis_channels: Vec<u16>,
+    bus_channels: Vec<BusChannels>,
     last_phase: Phase,
+}
+
+/// The channels of one bus.
+struct BusChannels {
+    health: u16,
+    frames: u16,
 }
 
 impl Recording {
@@ -43,7 +56,7 @@ impl Recording {
             .chunk_size(Some(CHUNK_BYTES))
             .disable_seeking(true)
             .create(NoSeek::new(BufWriter::new(opened.writer)))?;
-        writer.write_metadata(&Metadata { name: "takt".to_owned(), metadata: describe(machine) })?;
+        writer.write_metadata(&Metadata { name: METADATA.to_owned(), metadata: describe(machine) })?;
         let mut schema =
             |message: &MessageType| writer.add_schema(message.name, "ros2msg", message.definition.as_bytes());
         let (cycle, axis, event) =
@@ -60,6 +73,9 @@ impl Recording {
                 ("name".to_owned(), description.name.clone()),
                 ("unit".to_owned(), description.unit.symbol().to_owned()),
                 ("counts_per_unit".to_owned(), description.counts_per_unit.to_string()),
+                ("velocity_limit".to_owned(), description.limits.velocity.to_string()),
+                ("acceleration_limit".to_owned(), description.limits.acceleration.to_string()),
+                ("jerk_limit".to_owned(), description.limits.jerk.to_string()),
             ]);
             axis_channels.push(channel(axis, &format!("/axis/{}", description.name), &metadata)?);
         }
@@ -73,8 +89,54 @@ impl Recording {
             cycle_channel,
             event_channel,
             axis_channels,
+            bus_channels: Vec::new(),
             last_phase: Phase::default(),
         })
+    }
+
+    /// Adds the channels of the buses.
+    pub fn add_buses(&mut self, machine: &Machine) -> McapResult<()> {
+        let mut schema = |message: &MessageType| {
+            self.writer.add_schema(message.name, "ros2msg", message.definition.as_bytes())
+        };
+        let (frame, bus) = (schema(&messages::FRAME)?, schema(&messages::BUS)?);
+        for (index, description) in machine.buses.iter().enumerate() {
+            let metadata = BTreeMap::from([
+                ("index".to_owned(), index.to_string()),
+                ("name".to_owned(), description.name.clone()),
+                ("interface".to_owned(), description.interface.clone()),
+            ]);
+            let mut channel = |schema, kind: &str| {
+                self.writer.add_channel(schema, &format!("/{kind}/{}", description.name), "cdr", &metadata)
+            };
+            self.bus_channels
+                .push(BusChannels { health: channel(bus, "bus")?, frames: channel(frame, "frames")? });
+        }
+        Ok(())
+    }
+
+    /// Writes a metadata record.
+    pub fn metadata(&mut self, name: &str, metadata: BTreeMap<String, String>) -> McapResult<()> {
+        self.writer.write_metadata(&Metadata { name: name.to_owned(), metadata })
+    }
+
+    /// Writes a frame, if its bus is recorded.
+    pub fn frame(&mut self, OnBus { bus, what }: &OnBus<TracedFrame>) -> McapResult<()> {
+        let Some(channels) = self.bus_channels.get(*bus) else { return Ok(()) };
+        messages::encode_frame(what, &mut self.encoder);
+        self.write(channels.frames, 0, what.at_ns)
+    }
+
+    /// Writes how a bus is, if it is recorded.
+    pub fn health(&mut self, OnBus { bus, what }: &OnBus<TracedHealth>) -> McapResult<()> {
+        let Some(channels) = self.bus_channels.get(*bus) else { return Ok(()) };
+        messages::encode_bus(what, &mut self.encoder);
+        self.write(channels.health, 0, what.at_ns)
+    }
+
+    /// Lets everything that was written reach the file.
+    pub fn flush(&mut self) -> McapResult<()> {
+        self.writer.flush()
     }
 
     /// Writes a cycle.

@@ -105,12 +105,36 @@ pub struct AxisReport {
     pub set_point_max: SetPointMagnitudes,
     /// What they may be; the jerk is `null` where it is not limited.
     pub limits: SetPointMagnitudes,
+    /// The one as a part of the other: 1 is a limit that was reached; the jerk is `null` where it is not limited.
+    pub set_point_part: SetPointParts,
     /// The last position under power.
     pub final_position: f64,
     /// Where it was to be.
     pub target_position: f64,
     /// The difference between the two in counts of the encoder.
     pub final_error_counts: f64,
+}
+
+/// The largest derivatives of an axis' set-points as parts of their limits.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct SetPointParts {
+    /// Of the velocity limit.
+    pub velocity: Option<f64>,
+    /// Of the acceleration limit.
+    pub acceleration: Option<f64>,
+    /// Of the jerk limit.
+    pub jerk: Option<f64>,
+}
+
+impl SetPointParts {
+    pub(super) fn new(reached: &SetPointMagnitudes, limits: &SetPointMagnitudes) -> Self {
+        let part = |reached: f64, limit: f64| (limit.is_finite() && limit > 0.0).then_some(reached / limit);
+        Self {
+            velocity: part(reached.velocity, limits.velocity),
+            acceleration: part(reached.acceleration, limits.acceleration),
+            jerk: part(reached.jerk, limits.jerk),
+        }
+    }
 }
 
 /// One bus.
@@ -143,7 +167,7 @@ pub struct TelemetryReport {
     pub records: u64,
     /// Cycle records and events that found no room.
     pub dropped: u64,
-    /// Frames that found no room on their way to the candump log.
+    /// Frames that found no room on their way to the candump log and the black box.
     pub frames_dropped: u64,
     /// The recording.
     pub recording: Option<PathBuf>,
@@ -151,6 +175,10 @@ pub struct TelemetryReport {
     pub recording_bytes: Option<u64>,
     /// The candump log.
     pub candump: Option<PathBuf>,
+    /// What the black box has written, a file a fault, the oldest first.
+    pub black_boxes: Vec<PathBuf>,
+    /// Files of the black box that had to make room for later ones.
+    pub black_boxes_replaced: u64,
     /// What was not written, or not to its end, and why.
     pub not_written: Vec<String>,
 }
@@ -269,6 +297,7 @@ impl AxisReport {
             following_error_velocity: largest.map(|largest| largest.velocity_set),
             set_point_max: axis.set_point_max,
             limits: description.limits,
+            set_point_part: SetPointParts::new(&axis.set_point_max, &description.limits),
             final_position: axis.position,
             target_position,
             // Adding 0 turns -0 into 0.
@@ -278,6 +307,16 @@ impl AxisReport {
 }
 
 impl BusReport {
+    /// A fault confinement state in words.
+    pub(super) const fn state_words(state: BusState) -> &'static str {
+        match state {
+            BusState::ErrorActive => "error active",
+            BusState::ErrorPassive => "error passive",
+            BusState::BusOff => "bus off",
+            BusState::Down => "down",
+        }
+    }
+
     fn new(description: &BusDescription, health: &BusHealth, open_ns: Nanoseconds) -> Self {
         let load = 100.0 * health.busy_ns as f64 / open_ns.max(1) as f64;
         Self {
@@ -289,12 +328,7 @@ impl BusReport {
             tx_overruns: health.tx_overruns,
             rx_overruns: health.rx_overruns,
             errors: health.errors,
-            state: match health.state {
-                BusState::ErrorActive => "error active",
-                BusState::ErrorPassive => "error passive",
-                BusState::BusOff => "bus off",
-                BusState::Down => "down",
-            },
+            state: Self::state_words(health.state),
         }
     }
 }
@@ -309,6 +343,8 @@ impl TelemetryReport {
             recording_bytes: log.recording.as_ref().and_then(size),
             recording: log.recording.clone(),
             candump: log.candump.clone(),
+            black_boxes: log.black_boxes.files.clone(),
+            black_boxes_replaced: log.black_boxes.replaced,
             not_written: log.not_written.clone(),
         }
     }

@@ -2,11 +2,15 @@
 
 use std::io;
 use std::panic;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{self, Sender};
+use std::sync::{Arc, OnceLock};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
+use nix::sys::signal::{SigSet, Signal};
+
+use super::black_box::Fault;
 use super::logger::{LogSummary, Logger};
 use crate::controller::quiet;
 
@@ -17,6 +21,8 @@ const PAUSE: Duration = Duration::from_millis(5);
 /// the priority nor the CPU.
 pub struct LoggerThread {
     is_over: Arc<AtomicBool>,
+    faults: Sender<Fault>,
+    panic: Arc<OnceLock<String>>,
     thread: JoinHandle<LogSummary>,
 }
 
@@ -29,14 +35,31 @@ impl LoggerThread {
         let is_over = Arc::new(AtomicBool::new(false));
         let told = Arc::clone(&is_over);
         let period_ns = logger.period_ns();
+        let panic = logger.panic();
+        let (faults, told_faults) = mpsc::channel::<Fault>();
         let thread = thread::Builder::new().name("takt-logger".to_owned()).spawn(move || {
+            survive_size_limits();
             while !told.load(Ordering::Acquire) {
                 logger.drain();
+                told_faults.try_iter().for_each(|fault| logger.fault(&fault));
                 thread::park_timeout(quiet::pause(PAUSE, period_ns));
             }
+            logger.drain();
+            told_faults.try_iter().for_each(|fault| logger.fault(&fault));
             logger.finish()
         })?;
-        Ok(Self { is_over, thread })
+        Ok(Self { is_over, faults, panic, thread })
+    }
+
+    /// Has the black box written because of something that the records do not show.
+    pub fn fault(&self, fault: Fault) {
+        // A logger that is gone has said why itself.
+        let _ = self.faults.send(fault);
+    }
+
+    /// What `notify` said when it panicked, if it has.
+    pub fn panic(&self) -> Option<&str> {
+        self.panic.get().map(String::as_str)
     }
 
     /// Lets the thread work off what waits and close its files. Call it when nothing more will be handed over.
@@ -45,4 +68,13 @@ impl LoggerThread {
         self.thread.thread().unpark();
         self.thread.join().unwrap_or_else(|payload| panic::resume_unwind(payload))
     }
+}
+
+/// A file that grows beyond what the process may write (`RLIMIT_FSIZE`) is a full disk, not a reason to die in motion:
+/// the kernel's signal for it, which comes to the thread that writes, is not taken, and the call fails instead.
+fn survive_size_limits() {
+    let mut signals = SigSet::empty();
+    signals.add(Signal::SIGXFSZ);
+    // It can only fail for a signal that does not exist.
+    let _ = signals.thread_block();
 }

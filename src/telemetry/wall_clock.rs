@@ -32,10 +32,20 @@ impl WallClock {
 
     /// An instant of the monotonic clock as `20250131T235959Z`, for file names.
     pub fn file_stamp(self, at_ns: Nanoseconds) -> String {
-        let seconds = self.unix_ns(at_ns) / NANOSECONDS_PER_SECOND;
-        let (year, month, day) = civil_date(seconds / 86_400);
-        let (hour, minute, second) = (seconds / 3600 % 24, seconds / 60 % 60, seconds % 60);
+        let ([year, month, day], [hour, minute, second]) = self.date_and_time(at_ns);
         format!("{year:04}{month:02}{day:02}T{hour:02}{minute:02}{second:02}Z")
+    }
+
+    /// An instant of the monotonic clock as `2025-01-31 23:59:59.123 UTC`, for people.
+    pub fn moment(self, at_ns: Nanoseconds) -> String {
+        let ([year, month, day], [hour, minute, second]) = self.date_and_time(at_ns);
+        let milliseconds = self.unix_ns(at_ns) % NANOSECONDS_PER_SECOND / 1_000_000;
+        format!("{year:04}-{month:02}-{day:02} {hour:02}:{minute:02}:{second:02}.{milliseconds:03} UTC")
+    }
+
+    fn date_and_time(self, at_ns: Nanoseconds) -> ([u64; 3], [u64; 3]) {
+        let seconds = self.unix_ns(at_ns) / NANOSECONDS_PER_SECOND;
+        (civil_date(seconds / 86_400).into(), [seconds / 3600 % 24, seconds / 60 % 60, seconds % 60])
     }
 }
 
@@ -87,6 +97,7 @@ mod tests {
     fn a_file_stamp_is_utc_to_the_second() {
         let clock = WallClock::fixed(1_700_000_000 * NANOSECONDS_PER_SECOND);
         assert_eq!(clock.file_stamp(0), "20231114T221320Z");
+        assert_eq!(clock.moment(123_999_999), "2023-11-14 22:13:20.123 UTC");
         assert_eq!(clock.file_stamp(39 * NANOSECONDS_PER_SECOND + 999_999_999), "20231114T221359Z");
     }
 

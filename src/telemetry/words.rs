@@ -8,6 +8,7 @@
 use takt_rt::cia402::{OperationMode, State};
 use takt_rt::record::{Event, EventKind};
 use takt_rt::stop::{Phase, Rule, StopCategory, StopReason};
+use takt_rt::watch::TimingLevel;
 
 use super::machine::{Machine, Unit};
 
@@ -27,24 +28,7 @@ pub const fn phase(phase: Phase) -> &'static str {
 
 /// A rule by its key in reports: `following_error`.
 pub const fn rule_key(rule: Rule) -> &'static str {
-    match rule {
-        Rule::Requested => "requested",
-        Rule::NotFinite => "not_finite",
-        Rule::PositionLimit => "position_limit",
-        Rule::VelocityLimit => "velocity_limit",
-        Rule::AccelerationLimit => "acceleration_limit",
-        Rule::FollowingError => "following_error",
-        Rule::StaleCommand => "stale_command",
-        Rule::MissedFeedback => "missed_feedback",
-        Rule::DriveFault => "drive_fault",
-        Rule::DriveDisabled => "drive_disabled",
-        Rule::ModeChanged => "mode_changed",
-        Rule::EnableTimeout => "enable_timeout",
-        Rule::NoTrajectory => "no_trajectory",
-        Rule::BusLost => "bus_lost",
-        Rule::NotTransmitted => "not_transmitted",
-        Rule::NotAcknowledged => "not_acknowledged",
-    }
+    rule.key()
 }
 
 /// What a category does (IEC 60204-1, 9.2.2).
@@ -132,6 +116,38 @@ pub fn stop_cause(stop: &StopReason, machine: &Machine) -> String {
         Rule::NotAcknowledged => {
             format!("the drive of {axis} did not acknowledge its target within {}", cycles(limit))
         }
+        Rule::NodeLost => {
+            format!("no heartbeat of {axis} has come for {} (allowed: {limit:.0})", cycles(value))
+        }
+        Rule::NodeNotOperational => {
+            format!(
+                "the node of {axis} is no longer operational: its heartbeat shows state 0x{:02X}",
+                value as u8
+            )
+        }
+        Rule::UnexpectedBootUp => format!("the drive of {axis} has started anew in the middle of its work"),
+        Rule::EmergencyMessage => {
+            format!("the drive of {axis} sent emergency message 0x{:04X} and shows no fault", value as u16)
+        }
+        Rule::DuplicateNode => {
+            format!("two nodes answer under the number of {axis}, {value:.0}: its feedback comes twice")
+        }
+        Rule::ForeignMaster => format!(
+            "somebody else sends what only this controller may: a frame with identifier 0x{:03X}",
+            value as u32
+        ),
+        Rule::TimingUnfit => {
+            format!("the controller misses its slots too often: {value:.0} of late (allowed: {limit:.0})")
+        }
+        Rule::StartPose => format!(
+            "the stream of set-points began {value:.4} {unit} from where {axis} is (allowed: {limit:.4} {unit})"
+        ),
+        Rule::JerkLimit => {
+            format!("the set-point of {axis} asked for {value:.1} {unit}/s³ (allowed: {limit:.1} {unit}/s³)")
+        }
+        Rule::BusErrorPassive => {
+            format!("bus {} is error-passive: hardly a frame gets through", bus_name(value, machine))
+        }
         Rule::EnableTimeout => format!(
             "the drive of {axis} did not reach operation enabled within {} ({:.1} s)",
             cycles(limit),
@@ -142,9 +158,7 @@ pub fn stop_cause(stop: &StopReason, machine: &Machine) -> String {
             None => "no trajectory leads to what was asked".to_owned(),
         },
         Rule::BusLost => {
-            let bus = machine.buses.get(value as usize);
-            let name = bus.map_or_else(|| format!("{value:.0}"), |bus| bus.name.clone());
-            format!("bus {name} is bus-off or its interface is down")
+            format!("bus {} is bus-off or its interface is down", bus_name(value, machine))
         }
         Rule::NotTransmitted => {
             let of = stop.axis.map_or_else(String::new, |_| format!(" of {axis}"));
@@ -179,12 +193,22 @@ pub fn event(event: &Event, machine: &Machine) -> String {
              manufacturer {a:02X} {b:02X} {c:02X} {d:02X} {e:02X}",
             machine.axis_name(axis)
         ),
+        EventKind::Timing { level: TimingLevel::Normal } => "slots are hardly missed any more".to_owned(),
+        EventKind::Timing { level: TimingLevel::Warning } => "slots are missed often".to_owned(),
+        EventKind::Timing { level: TimingLevel::Degraded } => {
+            "slots are missed so often that no stream is begun".to_owned()
+        }
+        EventKind::Timing { level: TimingLevel::Unfit } => "slots are missed too often to go on".to_owned(),
         EventKind::MissedSlots { count: 1 } => "1 slot passed unused: the thread was late".to_owned(),
         EventKind::MissedSlots { count } => format!("{count} slots passed unused: the thread was late"),
         EventKind::Refused { phase: forbade } => {
             format!("a request was refused: not possible while {}", phase(forbade))
         }
     }
+}
+
+fn bus_name(number: f64, machine: &Machine) -> String {
+    machine.buses.get(number as usize).map_or_else(|| format!("{number:.0}"), |bus| bus.name.clone())
 }
 
 #[cfg(test)]
@@ -255,6 +279,56 @@ mod tests {
             ),
             (Rule::BusLost, None, 0.0, 0.0, "bus left is bus-off or its interface is down"),
             (Rule::NotTransmitted, None, 6.0, 0.0, "set-points are not getting onto the wire for 6 cycles"),
+            (
+                Rule::StartPose,
+                Some(1),
+                0.5,
+                0.002,
+                "the stream of set-points began 0.5000 m from where slide is (allowed: 0.0020 m)",
+            ),
+            (
+                Rule::JerkLimit,
+                Some(0),
+                250.0,
+                100.0,
+                "the set-point of shoulder asked for 250.0 rad/s³ (allowed: 100.0 rad/s³)",
+            ),
+            (
+                Rule::NodeLost,
+                Some(0),
+                301.0,
+                300.0,
+                "no heartbeat of shoulder has come for 301 cycles (allowed: 300)",
+            ),
+            (
+                Rule::NodeNotOperational,
+                Some(0),
+                127.0,
+                5.0,
+                "the node of shoulder is no longer operational: its heartbeat shows state 0x7F",
+            ),
+            (
+                Rule::EmergencyMessage,
+                Some(0),
+                0x4310.into(),
+                0.0,
+                "the drive of shoulder sent emergency message 0x4310 and shows no fault",
+            ),
+            (
+                Rule::ForeignMaster,
+                None,
+                0x080.into(),
+                0.0,
+                "somebody else sends what only this controller may: a frame with identifier 0x080",
+            ),
+            (
+                Rule::TimingUnfit,
+                None,
+                250.0,
+                250.0,
+                "the controller misses its slots too often: 250 of late (allowed: 250)",
+            ),
+            (Rule::BusErrorPassive, None, 0.0, 0.0, "bus left is error-passive: hardly a frame gets through"),
             (
                 Rule::NotAcknowledged,
                 Some(0),

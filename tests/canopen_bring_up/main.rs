@@ -1,6 +1,7 @@
 //! The bring-up of eRob joints against drives with an object dictionary: what is set, what is learnt, and what is said
 //! when something goes wrong.
 
+mod configuration_file;
 mod failures;
 mod scripted_drive;
 mod world;

@@ -94,6 +94,8 @@ pub fn config(axes: &[(usize, u8)]) -> Config {
     Config {
         name: "test".into(),
         cycle: Cycle { period_ns: 1_000_000, command_phase_ns: 550_000 },
+        missed_slots: MissedSlots { warning: 10, degraded: 100, stop: 500, leak_ns: 10_000_000 },
+        stops: Default::default(),
         realtime: Realtime {
             priority: None,
             cpu: None,
@@ -109,6 +111,7 @@ pub fn config(axes: &[(usize, u8)]) -> Config {
             directory: PathBuf::from("runs"),
             is_recorded: false,
             is_candump_written: false,
+            black_box_ns: None,
             ring_records: 16,
         },
         simulation: Simulation { seed: 1, longest_gap_ns: 1_000_000 },
@@ -153,9 +156,12 @@ fn axis(number: usize, bus: usize, node: u8) -> Axis {
         transmission_type: 1,
         feedback: vec![Feedback::Torque],
         answers_sync: true,
+        start_tolerance: 0.02,
+        on_violation: Default::default(),
         feedback_delay_ns: 20_000,
         heartbeat_ns: Some(50_000_000),
         identity: Identity::default(),
+        dcf: None,
         simulated: SimulatedJoint {
             inertia: 0.1,
             viscous_friction: 0.1,

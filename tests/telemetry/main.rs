@@ -1,5 +1,6 @@
 //! The logger over a run in virtual time: what it writes, what it reckons, and what it does when it cannot write.
 
+mod black_box;
 mod failures;
 mod reader;
 mod recording;

@@ -57,7 +57,11 @@ pub fn decode(definition: &str, message: &[u8]) -> Fields {
         let Some((kind, name)) = line.split_once(' ').filter(|_| is_field) else { continue };
         match kind.split_once('[') {
             Some((element, length)) => {
-                for index in 0..length.trim_end_matches(']').parse().unwrap() {
+                let count = match length.trim_end_matches(']') {
+                    "" => u32::from_le_bytes(cursor.take()),
+                    fixed => fixed.parse().unwrap(),
+                };
+                for index in 0..count {
                     fields.insert(format!("{name}[{index}]"), cursor.value(element));
                 }
             }

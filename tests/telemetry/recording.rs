@@ -111,7 +111,15 @@ fn a_recording_has_an_index_and_tells_what_the_machine_is() {
     let statistics = summary.stats.unwrap();
     assert_eq!((statistics.message_count, statistics.channel_count), (20 * 3 + 3, 4));
     let slide = summary.channels.values().find(|channel| channel.topic == "/axis/slide").unwrap();
-    let expected = [("counts_per_unit", "83443"), ("index", "1"), ("name", "slide"), ("unit", "m")];
+    let expected = [
+        ("acceleration_limit", "10"),
+        ("counts_per_unit", "83443"),
+        ("index", "1"),
+        ("jerk_limit", "50"),
+        ("name", "slide"),
+        ("unit", "m"),
+        ("velocity_limit", "2"),
+    ];
     assert_eq!(slide.metadata, expected.map(|(key, value)| (key.to_owned(), value.to_owned())).into());
     let metadata = mcap::read::metadata(&recording, &summary.metadata_indexes[0]).unwrap();
     assert_eq!((&*metadata.name, &*metadata.metadata["axes"]), ("takt", "shoulder\nslide"));

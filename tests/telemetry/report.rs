@@ -80,6 +80,7 @@ fn the_report_has_the_keys_of_the_contract_with_the_values_of_the_run() {
         "final_error_counts": -5215.2,
         "set_point_max": { "velocity": 1.5, "acceleration": 2.5, "jerk": 40.0 },
         "limits": { "velocity": 2.0, "acceleration": 10.0, "jerk": 50.0 },
+        "set_point_part": { "velocity": 0.75, "acceleration": 0.25, "jerk": 0.8 },
     });
     assert_eq!(report["axes"][1], expected);
     let expected = json!({
@@ -124,7 +125,7 @@ fn the_picture_says_what_a_person_needs_to_know() {
         "slide was 0.2500 m from its set-point (allowed: 0.1250 m) while moving (slot 7)",
         "missed slots             3 of 23",
         "slide                1062.500 mm   0.02 s, +1.50 m/s = 708.3 ms late         17.43750 m     -5215.2",
-        "set-points reached 75.0 % of the velocity, 25.0 % of the acceleration, 80.0 % of the jerk limits",
+        "slide                    75.00 %         25.00 %         80.00 %",
         "left            can0           50.0 %          80          40          5        6  error passive",
         "18 records, 2 dropped",
         "no recording: cannot write the disk: ",

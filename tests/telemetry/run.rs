@@ -62,6 +62,7 @@ pub fn options(recording: Option<Destination>) -> LoggerOptions {
         started_ns: EPOCH_NS,
         recording,
         candump: None,
+        black_box: None,
         traces: Vec::new(),
     }
 }

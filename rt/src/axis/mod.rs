@@ -8,14 +8,18 @@ use crate::cia402::{Goal, State as DriveState, controlword};
 use crate::control::{ControlLaw, LoopInput};
 use crate::dialect::Dialect;
 use crate::frame::{Frame, Id};
-use crate::guard::{self, AxisLimits, FollowingErrorGuard, Violation};
+use crate::guard::{self, AxisLimits, Course, FollowingErrorGuard, OnViolation, Violation};
 use crate::pdo::{CommandSlot, FeedbackSlot, Mapping, ProcessImage, TooShort};
 use crate::plan::State;
 use crate::profile::{ProfileCommand, ProfileTarget};
 use crate::record::AxisRecord;
+use crate::stop::Rule;
 use crate::time::Nanoseconds;
 use crate::units::Scale;
+use crate::watch::{DuplicateWatch, NodeComplaint, NodeWatch};
 
+/// A fault shows in the statusword within this many slots of the emergency message that announces it.
+const EMERGENCY_GRACE_CYCLES: u8 = 3;
 /// The PDOs that a CANopen drive has in each direction here.
 pub const MAX_PDOS: usize = 4;
 
@@ -77,6 +81,12 @@ pub struct AxisParameters {
     pub scale: Scale,
     /// What it may never be asked to do.
     pub limits: AxisLimits,
+    /// How far from the joint a stream may begin (rad or m).
+    pub start_tolerance: f64,
+    /// What is done with set-points of a stream that break a limit.
+    pub on_violation: OnViolation,
+    /// Slots without a heartbeat of the node that are allowed; `None` where it sends none.
+    pub heartbeat_timeout_cycles: Option<u32>,
     /// Following error that is allowed at any time (rad or m).
     pub following_error_limit: f64,
     /// Cycles in a row that the following error may be larger.
@@ -114,6 +124,10 @@ pub struct Axis {
     /// Whether `position_raw` is what the drive has said.
     is_position_known: bool,
     emergency_code: u16,
+    /// Cycles since an emergency message came.
+    since_emergency: Option<u8>,
+    node_watch: NodeWatch,
+    duplicate_watch: DuplicateWatch,
     following_error: f64,
     following_guard: FollowingErrorGuard,
     /// Bits 0 to 3 and 7 of the last controlword.
@@ -149,6 +163,9 @@ impl Axis {
             is_heard: false,
             is_position_known: false,
             emergency_code: 0,
+            since_emergency: None,
+            node_watch: NodeWatch::default(),
+            duplicate_watch: DuplicateWatch::default(),
             following_error: 0.0,
             following_guard,
             base_word: 0,
@@ -178,13 +195,52 @@ impl Axis {
     pub fn receive(&mut self, pdo: usize, frame: &Frame) -> Result<(), TooShort> {
         let Some(parameters) = self.parameters.feedback.get(pdo) else { return Ok(()) };
         parameters.mapping.unpack(frame.first_word(), frame.payload().len(), &mut self.feedback)?;
-        self.arrived |= 1 << (pdo & 7);
+        let bit = 1 << (pdo & 7);
+        if self.arrived & bit != 0 {
+            self.duplicate_watch.again();
+        }
+        self.arrived |= bit;
         Ok(())
     }
 
     /// Takes the error code of an emergency message; 0 says that all errors are gone.
     pub fn receive_emergency(&mut self, code: u16) {
         self.emergency_code = code;
+        self.since_emergency = (code != 0).then_some(0);
+    }
+
+    /// Takes the state in a boot-up message or heartbeat.
+    pub fn receive_error_control(&mut self, state: u8) {
+        self.node_watch.receive(state);
+    }
+
+    /// Begins to watch the node anew.
+    pub fn begin_watch(&mut self) {
+        self.node_watch.begin();
+        self.duplicate_watch = DuplicateWatch::default();
+        self.since_emergency = None;
+    }
+
+    /// Lets a slot pass for what is watched over time.
+    pub fn watch(&mut self) {
+        self.node_watch.pass();
+        self.duplicate_watch.pass();
+        self.since_emergency = self.since_emergency.map(|cycles| cycles.saturating_add(1));
+    }
+
+    /// What the node's error control messages say against it.
+    pub fn node_complaint(&self) -> Option<NodeComplaint> {
+        self.node_watch.complaint(self.parameters.heartbeat_timeout_cycles)
+    }
+
+    /// Whether another node answers under the same number.
+    pub fn is_duplicate(&self) -> bool {
+        self.duplicate_watch.is_duplicate()
+    }
+
+    /// The code of an emergency message that the statusword has had time to explain by a fault.
+    pub fn unexplained_emergency(&self) -> Option<u16> {
+        self.since_emergency.filter(|cycles| *cycles >= EMERGENCY_GRACE_CYCLES).map(|_| self.emergency_code)
     }
 
     /// Lets time pass in a slot in which the axis' bus has no cycle.
@@ -303,6 +359,31 @@ impl Axis {
     /// Checks the next set-point against the guard.
     pub fn check(&self, next: &State, period_s: f64) -> Result<(), Violation> {
         guard::check(&self.parameters.limits, period_s, self.set[1].position, self.set[0].position, next)
+    }
+
+    /// Checks the next set-point of a stream, beyond [`Axis::check`].
+    pub fn check_stream(&self, next: &State, period_s: f64) -> Result<(), Violation> {
+        guard::check_stream(&self.parameters.limits, &self.course(next, period_s))
+    }
+
+    /// The set-point within the limits that is nearest to one of a stream.
+    pub fn clamped(&self, next: &State, period_s: f64) -> State {
+        guard::clamp(&self.parameters.limits, &self.course(next, period_s))
+    }
+
+    fn course(&self, next: &State, period_s: f64) -> Course {
+        let sent = [self.set[0].position, self.set[1].position, self.set[2].position];
+        Course { sent, next: next.position, period_s }
+    }
+
+    /// Checks that a stream begins where the joint is. What is no number is left to [`Axis::check`].
+    pub fn check_start(&self, first: &State) -> Result<(), Violation> {
+        let (distance, limit) = ((first.position - self.position).abs(), self.parameters.start_tolerance);
+        if distance > limit {
+            Err(Violation { rule: Rule::StartPose, value: distance, limit })
+        } else {
+            Ok(())
+        }
     }
 
     /// Checks the following error of this cycle, if there was feedback.

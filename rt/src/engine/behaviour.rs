@@ -6,6 +6,7 @@ use super::Engine;
 use crate::axis::Axis;
 use crate::cia402::Goal;
 use crate::door::Door;
+use crate::guard::{OnViolation, Violation};
 use crate::plan::State;
 use crate::record::{EventKind, MAX_AXES};
 use crate::stop::{Phase, Rule, StopCategory};
@@ -137,8 +138,14 @@ impl Engine {
             self.begin_stop(Rule::StaleCommand, None, None, age_cycles as f64, 0.0, now_ns, door);
             return self.follow_motion_if_stopping(now_ns, door);
         }
-        let next: ArrayVec<State, MAX_AXES> =
-            command.set_points.iter().take(self.axes.len()).copied().collect();
+        if !self.is_stream_begun {
+            self.is_stream_begun = true;
+            if let Some((axis, violation)) = self.violation(&command.set_points, Axis::check_start) {
+                self.refuse(axis, violation, now_ns, door);
+                return self.follow_motion_if_stopping(now_ns, door);
+            }
+        }
+        let Some(next) = self.streamed(&command.set_points, now_ns, door) else { return };
         if self.advance_guarded(&next, now_ns, door) {
             // Until the next command comes the present one is carried on at its velocity, up to its expiry.
             let period_s = self.period_s;
@@ -148,19 +155,64 @@ impl Engine {
         }
     }
 
+    /// The set-points of a stream as the guard lets them pass. If it does not, the group stops in this same cycle.
+    fn streamed(
+        &mut self,
+        wanted: &[State],
+        now_ns: Nanoseconds,
+        door: &mut impl Door,
+    ) -> Option<ArrayVec<State, MAX_AXES>> {
+        let period_s = self.period_s;
+        let check = |axis: &Axis, next: &State| {
+            axis.check(next, period_s).and_then(|()| axis.check_stream(next, period_s))
+        };
+        let mut next: ArrayVec<State, MAX_AXES> = ArrayVec::new();
+        for (axis, wanted) in self.axes.iter().zip(wanted) {
+            let is_clamped = axis.parameters().on_violation == OnViolation::Clamp
+                && axis.is_enabled()
+                && !axis.is_profile()
+                && check(axis, wanted).is_err();
+            self.clamped += u64::from(is_clamped);
+            next.push(if is_clamped { axis.clamped(wanted, period_s) } else { *wanted });
+        }
+        let rejecting = |axis: &Axis, next: &State| match axis.parameters().on_violation {
+            OnViolation::Reject => check(axis, next),
+            OnViolation::Clamp => Ok(()),
+        };
+        if let Some((axis, violation)) = self.violation(&next, rejecting) {
+            self.refuse(axis, violation, now_ns, door);
+            self.follow_motion_if_stopping(now_ns, door);
+            return None;
+        }
+        Some(next)
+    }
+
+    /// The first axis that follows set-points and whose next one does not pass a check.
+    fn violation(
+        &self,
+        next: &[State],
+        check: impl Fn(&Axis, &State) -> Result<(), Violation>,
+    ) -> Option<(u8, Violation)> {
+        self.axes.iter().zip(next).enumerate().find_map(|(index, (axis, state))| {
+            let is_guarded = axis.is_enabled() && !axis.is_profile();
+            let violation = is_guarded.then(|| check(axis, state).err()).flatten();
+            violation.map(|violation| (index as u8, violation))
+        })
+    }
+
+    fn refuse(&mut self, axis: u8, violation: Violation, now_ns: Nanoseconds, door: &mut impl Door) {
+        let category = (self.phase == Phase::Stopping).then_some(StopCategory::Zero);
+        let (rule, value, limit) = (violation.rule, violation.value, violation.limit);
+        self.begin_stop(rule, category, Some(axis), value, limit, now_ns, door);
+    }
+
     /// Takes the next set-points of all axes if the guard agrees to each. If not, the group stops from where it
     /// was, in this same cycle. Returns whether they were taken.
     fn advance_guarded(&mut self, next: &[State], now_ns: Nanoseconds, door: &mut impl Door) -> bool {
-        let refusal = self.axes.iter().zip(next).enumerate().find_map(|(index, (axis, state))| {
-            let is_guarded = axis.is_enabled() && !axis.is_profile();
-            let violation = is_guarded.then(|| axis.check(state, self.period_s).err()).flatten();
-            violation.map(|violation| (index as u8, violation))
-        });
-        if let Some((axis, violation)) = refusal {
+        let period_s = self.period_s;
+        if let Some((axis, violation)) = self.violation(next, |axis, state| axis.check(state, period_s)) {
             let was_stopping = self.phase == Phase::Stopping;
-            let category = was_stopping.then_some(StopCategory::Zero);
-            let (rule, value, limit) = (violation.rule, violation.value, violation.limit);
-            self.begin_stop(rule, category, Some(axis), value, limit, now_ns, door);
+            self.refuse(axis, violation, now_ns, door);
             if was_stopping {
                 self.hold();
             } else {

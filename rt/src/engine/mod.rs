@@ -19,8 +19,9 @@ use crate::frame::{Frame, Id};
 use crate::motion::Motion;
 use crate::port::{BusHealth, Received};
 use crate::record::{CycleRecord, Event, EventKind, MAX_AXES, MAX_BUSES, Timing};
-use crate::stop::{Phase, StopReason};
+use crate::stop::{Phase, StopCategories, StopReason};
 use crate::time::{NANOSECONDS_PER_SECOND, Nanoseconds};
+use crate::watch::{LeakyBucket, TimingLadder, TimingLevel};
 
 pub use parameters::{BusParameters, EngineParameters, Heartbeat, SetUpError};
 
@@ -63,6 +64,8 @@ pub struct Engine {
     enable_timeout_cycles: u32,
     not_transmitted_cycles: u32,
     acknowledge_timeout_cycles: u32,
+    categories: StopCategories,
+    ladder: TimingLadder,
 
     phase: Phase,
     phase_cycles: u32,
@@ -75,6 +78,15 @@ pub struct Engine {
     finished_move: u32,
     refused: u64,
     stream: Option<StreamCommand>,
+    /// Whether a command of the present stream has been taken.
+    is_stream_begun: bool,
+    clamped: u64,
+    missed: LeakyBucket,
+    timing_level: TimingLevel,
+    /// What was sent by somebody who may not.
+    foreign_id: Option<u32>,
+    /// Frames that each interface had refused up to the last cycle.
+    overruns: [u64; MAX_BUSES],
     stop: Option<StopReason>,
     fault_reset: u32,
     heartbeat_due: u32,
@@ -105,6 +117,13 @@ impl Engine {
             let table = dispatch.get_mut(usize::from(own.bus)).filter(|_| is_bus_known);
             enter(table.ok_or(SetUpError::UnknownBus { axis })?, axis, own)?;
         }
+        for (bus, table) in parameters.buses.iter().zip(&mut dispatch) {
+            table.foreign(NMT);
+            table.foreign(bus.sync_id);
+            if let Some(heartbeat) = parameters.heartbeat {
+                table.foreign(Id::canopen(0x700, heartbeat.node));
+            }
+        }
         let record = CycleRecord { axis_count: parameters.axes.len() as u8, ..CycleRecord::default() };
         let snapshot = Snapshot {
             axis_count: parameters.axes.len() as u8,
@@ -121,6 +140,8 @@ impl Engine {
             enable_timeout_cycles: parameters.enable_timeout_cycles,
             not_transmitted_cycles: parameters.not_transmitted_cycles,
             acknowledge_timeout_cycles: parameters.acknowledge_timeout_cycles,
+            categories: parameters.categories,
+            ladder: parameters.timing,
             phase: Phase::Passive,
             phase_cycles: 0,
             is_sync_on: false,
@@ -131,6 +152,12 @@ impl Engine {
             finished_move: 0,
             refused: 0,
             stream: None,
+            is_stream_begun: false,
+            clamped: 0,
+            missed: LeakyBucket::default(),
+            timing_level: TimingLevel::Normal,
+            foreign_id: None,
+            overruns: [0; MAX_BUSES],
             stop: None,
             fault_reset: 0,
             heartbeat_due: 0,
@@ -198,6 +225,17 @@ impl Engine {
                 );
                 self.hand_over(bus, received, door);
             }
+            Destination::ErrorControl { axis } => {
+                let state = received.frame.payload().first().copied();
+                if let (Some(axis), Some(state)) = (self.axes.get_mut(usize::from(axis)), state) {
+                    axis.receive_error_control(state);
+                }
+                self.hand_over(bus, received, door);
+            }
+            Destination::Foreign => {
+                self.foreign_id.get_or_insert(received.frame.id().value());
+                self.hand_over(bus, received, door);
+            }
             Destination::Unused => {}
             Destination::Service => self.hand_over(bus, received, door),
         }
@@ -232,7 +270,12 @@ impl Engine {
         let elapsed_s = self.period_s * elapsed as f64;
         for axis in &mut self.axes {
             let has_cycle = has_cycle_of(&self.buses, axis, slot);
-            if has_cycle { axis.begin_cycle(elapsed_s) } else { axis.wait(elapsed_s) }
+            if has_cycle {
+                axis.begin_cycle(elapsed_s)
+            } else {
+                axis.wait(elapsed_s)
+            }
+            axis.watch();
         }
         self.notice_drive_states(now_ns, door);
         for _ in 0..REQUESTS_PER_CYCLE {
@@ -270,6 +313,11 @@ impl Engine {
         if missed > 0 {
             self.missed_slots += missed;
             self.happened(now_ns, EventKind::MissedSlots { count: missed }, door);
+        }
+        let level = self.ladder.level(self.missed.take(missed, self.ladder.leak_cycles));
+        if level != self.timing_level {
+            self.timing_level = level;
+            self.happened(now_ns, EventKind::Timing { level }, door);
         }
     }
 
@@ -384,6 +432,8 @@ impl Engine {
         snapshot.at_ns = now_ns;
         snapshot.phase = self.phase;
         snapshot.missed_slots = self.missed_slots;
+        snapshot.timing = self.timing_level;
+        snapshot.clamped = self.clamped;
         snapshot.dropped = self.dropped;
         snapshot.refused = self.refused;
         snapshot.finished_move = self.finished_move;
@@ -407,6 +457,7 @@ impl Engine {
     }
 }
 
+const NMT: Id = Id::canopen(0x000, 0);
 const NMT_OPERATIONAL: u8 = 5;
 
 const fn has_cycle(bus: &BusParameters, slot: u64) -> bool {
@@ -428,6 +479,10 @@ fn enter(table: &mut Dispatch, axis: usize, own: &AxisParameters) -> Result<(), 
     table.emergency(Id::canopen(0x080, own.node), axis as u8).map_err(taken)?;
     for (number, pdo) in own.feedback.iter().enumerate() {
         table.feedback(pdo.id, axis as u8, number as u8).map_err(taken)?;
+    }
+    table.error_control(Id::canopen(0x700, own.node), axis as u8).map_err(taken)?;
+    for command in &own.commands {
+        table.foreign(command.pdo.id);
     }
     for id in &own.unused {
         table.unused(*id, axis as u8).map_err(taken)?;

@@ -5,7 +5,9 @@ use arrayvec::ArrayVec;
 use crate::axis::AxisParameters;
 use crate::frame::Id;
 use crate::record::{MAX_AXES, MAX_BUSES};
+use crate::stop::StopCategories;
 use crate::time::Nanoseconds;
+use crate::watch::TimingLadder;
 
 /// A bus as the engine knows it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,6 +43,10 @@ pub struct EngineParameters {
     pub buses: ArrayVec<BusParameters, MAX_BUSES>,
     /// The heartbeat, if one is sent.
     pub heartbeat: Option<Heartbeat>,
+    /// How each rule stops the group.
+    pub categories: StopCategories,
+    /// How many missed slots are too many.
+    pub timing: TimingLadder,
     /// Cycles within which a drive must acknowledge a set-point of profile position.
     pub acknowledge_timeout_cycles: u32,
     /// Cycles within which every drive must reach operation enabled.

@@ -11,6 +11,7 @@ use crate::profile::ProfileTarget;
 use crate::record::EventKind;
 use crate::stop::{Phase, Rule, StopCategory};
 use crate::time::Nanoseconds;
+use crate::watch::TimingLevel;
 
 impl Engine {
     pub(super) fn take(&mut self, request: Request, now_ns: Nanoseconds, door: &mut impl Door) {
@@ -29,6 +30,7 @@ impl Engine {
             Request::Activate => self.activate(now_ns, door),
             Request::Enable if self.phase == Phase::Disabled && !is_latched => {
                 self.stop = None;
+                self.begin_watch();
                 self.goal = Goal::Enabled;
                 self.enter(Phase::Enabling, now_ns, door);
                 true
@@ -37,9 +39,10 @@ impl Engine {
             Request::SetProfileTarget(target) if !is_latched => {
                 self.set_profile_target(&target, now_ns, door)
             }
-            Request::Stream if self.phase == Phase::Holding && !is_latched => {
+            Request::Stream if self.phase == Phase::Holding && !is_latched && self.is_punctual() => {
                 self.stop = None;
                 self.stream = None;
+                self.is_stream_begun = false;
                 self.enter(Phase::Streaming, now_ns, door);
                 true
             }
@@ -59,6 +62,18 @@ impl Engine {
             self.refused += 1;
             self.happened(now_ns, EventKind::Refused { phase: self.phase }, door);
         }
+    }
+
+    /// Whether whoever streams set-points can count on the slots.
+    fn is_punctual(&self) -> bool {
+        self.timing_level < TimingLevel::Degraded
+    }
+
+    /// Forgets what was seen while nothing could move.
+    fn begin_watch(&mut self) {
+        self.axes.iter_mut().for_each(Axis::begin_watch);
+        self.foreign_id = None;
+        self.missed.empty();
     }
 
     fn activate(&mut self, now_ns: Nanoseconds, door: &mut impl Door) -> bool {

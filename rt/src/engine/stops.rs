@@ -10,6 +10,7 @@ use crate::port::{BusHealth, BusState};
 use crate::record::EventKind;
 use crate::stop::{Phase, Rule, StopCategory, StopReason};
 use crate::time::Nanoseconds;
+use crate::watch::{NodeComplaint, TimingLevel, node_state};
 
 impl Engine {
     pub(super) fn supervise(
@@ -19,15 +20,25 @@ impl Engine {
         now_ns: Nanoseconds,
         door: &mut impl Door,
     ) {
-        let is_blocked = transmission == Transmission::Blocked;
+        let is_blocked = transmission == Transmission::Blocked || self.is_queue_full(buses);
         self.blocked_cycles = if is_blocked { self.blocked_cycles.saturating_add(1) } else { 0 };
         if !has_power(self.phase) {
             return;
         }
         for (bus, health) in buses.iter().enumerate().take(self.buses.len()) {
-            if matches!(health.state, BusState::BusOff | BusState::Down) {
-                self.begin_stop(Rule::BusLost, None, None, bus as f64, 0.0, now_ns, door);
-            }
+            let rule = match health.state {
+                BusState::BusOff | BusState::Down => Rule::BusLost,
+                BusState::ErrorPassive => Rule::BusErrorPassive,
+                BusState::ErrorActive => continue,
+            };
+            self.begin_stop(rule, None, None, bus as f64, 0.0, now_ns, door);
+        }
+        if let Some(id) = self.foreign_id.take() {
+            self.begin_stop(Rule::ForeignMaster, None, None, id.into(), 0.0, now_ns, door);
+        }
+        if self.timing_level == TimingLevel::Unfit {
+            let (slots, limit) = (self.missed.filled().into(), self.ladder.unfit.into());
+            self.begin_stop(Rule::TimingUnfit, None, None, slots, limit, now_ns, door);
         }
         if self.blocked_cycles > self.not_transmitted_cycles {
             let (cycles, limit) = (self.blocked_cycles.into(), self.not_transmitted_cycles.into());
@@ -46,6 +57,16 @@ impl Engine {
         }
     }
 
+    /// Whether an interface has refused frames since the last cycle.
+    fn is_queue_full(&mut self, buses: &[BusHealth]) -> bool {
+        let mut is_full = false;
+        for (known, health) in self.overruns.iter_mut().zip(buses) {
+            is_full |= health.tx_overruns > *known;
+            *known = health.tx_overruns;
+        }
+        is_full
+    }
+
     /// Begins a stop. The first reason stays the reason; a later one can only make the stop harder.
     #[expect(clippy::too_many_arguments, reason = "they are the fields of the reason")]
     pub(super) fn begin_stop(
@@ -58,7 +79,7 @@ impl Engine {
         now_ns: Nanoseconds,
         door: &mut impl Door,
     ) {
-        let wanted = self.possible(category.unwrap_or(rule.default_category()));
+        let wanted = self.possible(category.unwrap_or(self.categories.of(rule)));
         let slot = self.last_slot.unwrap_or(0);
         let reason = StopReason { category: wanted, rule, axis, value, limit, slot, phase: self.phase };
         let is_under_way = matches!(self.phase, Phase::Stopping | Phase::Disabling);
@@ -147,12 +168,28 @@ fn complaint(axis: &mut Axis, phase: Phase, acknowledge_limit: u32) -> Option<(R
     if axis.drive_state().is_faulted() {
         return Some((Rule::DriveFault, axis.error_code().into(), 0.0));
     }
+    if let Some(complaint) = axis.node_complaint() {
+        let timeout = axis.parameters().heartbeat_timeout_cycles.unwrap_or(0);
+        return Some(match complaint {
+            NodeComplaint::BootUp => (Rule::UnexpectedBootUp, 0.0, 0.0),
+            NodeComplaint::NotOperational { state } => {
+                (Rule::NodeNotOperational, state.into(), node_state::OPERATIONAL.into())
+            }
+            NodeComplaint::Silent { cycles } => (Rule::NodeLost, cycles.into(), timeout.into()),
+        });
+    }
+    if axis.is_duplicate() {
+        return Some((Rule::DuplicateNode, axis.parameters().node.into(), 0.0));
+    }
     if let Some(mode) = axis.foreign_mode().filter(|_| phase != Phase::Disabling) {
         let ours = axis.parameters().law.operation_mode() as i8;
         return Some((Rule::ModeChanged, mode.into(), ours.into()));
     }
     if matches!(phase, Phase::Enabling | Phase::Disabling) {
         return None;
+    }
+    if let Some(code) = axis.unexplained_emergency() {
+        return Some((Rule::EmergencyMessage, code.into(), 0.0));
     }
     if !axis.is_enabled() {
         return Some((Rule::DriveDisabled, axis.statusword().into(), 0.0));

@@ -23,6 +23,7 @@ pub fn whole(check: &Check, config: &Config) -> String {
     let axes = alike(&check.axes, is_shown_alike);
     let _ = write!(text, "\nLimits\n{}\nUnits\n{}", limits_table(&axes), units_table(&axes));
 
+    text.push_str(&configuration_files(config));
     let both: Vec<_> = check.buses.iter().zip(&config.buses).collect();
     let groups = groups(&both);
     let _ = write!(
@@ -39,6 +40,23 @@ pub fn whole(check: &Check, config: &Config) -> String {
          2007)\nin slot by: after SYNC is due, with everything in its place in the slot\n",
     );
     let _ = writeln!(text, "\n{}", verdict(check));
+    text
+}
+
+/// What the configuration files of the axes have written, and what of them is left out.
+fn configuration_files(config: &Config) -> String {
+    let mut text = String::new();
+    for axis in &config.axes {
+        let Some(file) = &axis.dcf else { continue };
+        if text.is_empty() {
+            text.push_str("\nConfiguration files\n");
+        }
+        let (path, count) = (file.path.display(), file.downloads.len());
+        let _ = writeln!(text, "  {}: {count} writes from {path}", axis.name);
+        for (object, omission) in &file.omitted {
+            let _ = writeln!(text, "    not written: {object} ({omission})");
+        }
+    }
     text
 }
 

@@ -9,10 +9,12 @@ use super::bus::ReadBus;
 use super::entry::{Bounds, Entry, Problems};
 use super::machine::{boolean, heartbeat, node};
 use super::section::Section;
+use crate::canopen::dcf::DeviceConfiguration;
 use crate::config::defaults;
 use crate::config::error::ProblemKind;
 use crate::config::model::{
-    Axis, Control, DriveFamily, Feedback, FollowingError, Identity, Limits, Master, SimulatedJoint, Travel,
+    Axis, Control, DriveFamily, Feedback, FollowingError, Identity, Limits, Master, OnViolation,
+    SimulatedJoint, Travel,
 };
 use crate::config::quantity::Quantity;
 use crate::config::spelling;
@@ -139,10 +141,17 @@ fn axis<'a>(
     let feedback = feedback(&mut section, drive);
     let answers_sync = boolean(&mut section, "answers_sync", defaults::ANSWERS_SYNC);
     let transmission_type = transmission_type(&mut section);
+    let start_tolerance = section
+        .get("start_tolerance")
+        .and_then(|entry| entry.quantity(quantities.position, Bounds::Positive));
+    let on_violation = section
+        .get("on_violation")
+        .and_then(|entry| entry.choice(&[("reject", OnViolation::Reject), ("clamp", OnViolation::Clamp)]));
     let missed = section.get("missed_feedback_cycles").and_then(|entry| entry.integer(1..1001));
     let feedback_delay = section.get("feedback_delay").and_then(|entry| entry.nanoseconds(0.0, 0.01));
     let heartbeat_ns = section.get("heartbeat").and_then(|entry| heartbeat(&entry));
     let identity = identity(section.section("identity"), drive);
+    let dcf = section.get("dcf").and_then(|entry| dcf(&entry, node));
     section.finish();
 
     let place = bus.zip(node);
@@ -161,6 +170,11 @@ fn axis<'a>(
             zero_counts: counting.zero_counts,
             limits: limits?,
             following_error,
+            start_tolerance: start_tolerance.unwrap_or(match travel? {
+                Travel::Rotary => defaults::START_TOLERANCE_RAD,
+                Travel::Linear { .. } => defaults::START_TOLERANCE_M,
+            }),
+            on_violation: on_violation.unwrap_or_default(),
             missed_feedback_cycles: missed
                 .and_then(|cycles| u16::try_from(cycles).ok())
                 .unwrap_or(defaults::MISSED_FEEDBACK_CYCLES),
@@ -170,6 +184,7 @@ fn axis<'a>(
             feedback_delay_ns: feedback_delay.unwrap_or(defaults::FEEDBACK_DELAY_NS),
             heartbeat_ns,
             identity,
+            dcf,
             simulated,
         })
     };
@@ -529,6 +544,11 @@ fn transmission_type(section: &mut Section<'_>) -> u8 {
         Some(value)
     });
     read.unwrap_or(defaults::TRANSMISSION_TYPE)
+}
+
+fn dcf(entry: &Entry<'_>, node: Option<u8>) -> Option<DeviceConfiguration> {
+    let path = entry.path_from_file()?;
+    DeviceConfiguration::load(&path, node?).map_err(|reason| entry.report(ProblemKind::Dcf { reason })).ok()
 }
 
 fn identity(mut section: Section<'_>, drive: Option<DriveFamily>) -> Identity {

@@ -2,6 +2,7 @@
 
 use std::cell::RefCell;
 use std::ops::Range;
+use std::path::{Path, PathBuf};
 
 use toml::Spanned;
 use toml::de::{DeArray, DeInteger, DeTable, DeValue};
@@ -13,12 +14,15 @@ use crate::config::spelling;
 /// The problems found so far. Reading goes on after one, so that a person hears of all of them at once.
 pub struct Problems<'a> {
     text: &'a str,
+    /// Where relative paths begin.
+    directory: PathBuf,
     found: RefCell<Vec<Problem>>,
 }
 
 impl<'a> Problems<'a> {
-    pub fn new(text: &'a str) -> Self {
-        Self { text, found: RefCell::default() }
+    pub fn new(source_name: &str, text: &'a str) -> Self {
+        let directory = Path::new(source_name).parent().unwrap_or(Path::new("")).to_owned();
+        Self { text, directory, found: RefCell::default() }
     }
 
     pub fn report(&self, kind: ProblemKind, span: Range<usize>) {
@@ -121,6 +125,11 @@ impl<'a> Entry<'a> {
             DeValue::String(text) => Some(text),
             _ => self.wrong_type("a text in quotes"),
         }
+    }
+
+    /// The path of a file; a relative one begins at the folder of the configuration.
+    pub fn path_from_file(&self) -> Option<PathBuf> {
+        Some(self.problems.directory.join(self.text()?))
     }
 
     /// A name of a bus, an axis or a machine.

@@ -138,11 +138,15 @@ pub fn telemetry(mut section: Section<'_>) -> Telemetry {
         }
         Some(PathBuf::from(text))
     });
+    let black_box_ns = section
+        .get("black_box")
+        .map(|entry| if entry.is_word("off") { None } else { entry.nanoseconds(0.1, 60.0) });
     let ring_records = section.get("ring_records").and_then(|entry| entry.integer(64..1_048_577));
     let telemetry = Telemetry {
         directory: directory.unwrap_or_else(|| PathBuf::from(defaults::DIRECTORY)),
         is_recorded: boolean(&mut section, "record", true),
         is_candump_written: boolean(&mut section, "candump", false),
+        black_box_ns: black_box_ns.unwrap_or(Some(defaults::BLACK_BOX_NS)),
         ring_records: ring_records
             .and_then(|value| usize::try_from(value).ok())
             .unwrap_or(defaults::RING_RECORDS),

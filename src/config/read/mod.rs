@@ -6,10 +6,11 @@
 
 mod axis;
 mod bus;
-mod entry;
+pub(crate) mod entry;
 mod machine;
 mod program;
-mod section;
+pub(crate) mod section;
+mod stops;
 
 use toml::de::DeTable;
 
@@ -20,16 +21,25 @@ use section::Section;
 
 /// Reads and checks a configuration.
 pub fn parse(source_name: &str, text: &str) -> Result<Config, ConfigError> {
+    document(source_name, text, read)
+}
+
+/// What `read` makes of a TOML document, or else every problem that it has reported.
+pub(crate) fn document<T>(
+    source_name: &str,
+    text: &str,
+    read: impl for<'a> FnOnce(&'a DeTable<'a>, &'a Problems<'a>) -> Option<T>,
+) -> Result<T, ConfigError> {
     let refuse = |problems| ConfigError::new(source_name, text, problems);
     let (document, errors) = DeTable::parse_recoverable(text);
     if !errors.is_empty() {
         return Err(refuse(errors.iter().map(|error| syntax_problem(error, text)).collect()));
     }
-    let problems = Problems::new(text);
-    let config = read(document.get_ref(), &problems);
+    let problems = Problems::new(source_name, text);
+    let found = read(document.get_ref(), &problems);
     let problems = problems.into_vec();
-    match config {
-        Some(config) if problems.is_empty() => Ok(config),
+    match found {
+        Some(found) if problems.is_empty() => Ok(found),
         _ => Err(refuse(problems)),
     }
 }
@@ -44,7 +54,10 @@ fn read<'a>(document: &'a DeTable<'a>, problems: &'a Problems<'a>) -> Option<Con
     let mut root = Section::new("", 0..0, document, problems);
     let name =
         root.require("name", "the name of the machine: name = \"arm6\"").and_then(|entry| entry.name());
-    let (cycle, automatic_phase) = machine::cycle(root.section("cycle"));
+    let mut cycle = root.section("cycle");
+    let missed_slots = stops::missed_slots(cycle.section("missed_slots"));
+    let (cycle, automatic_phase) = machine::cycle(cycle);
+    let stops = stops::stops(root.section("stops"));
     let realtime = machine::realtime(root.section("realtime"), cycle.period_ns);
     let master = machine::master(root.section("master"));
     let telemetry = machine::telemetry(root.section("telemetry"));
@@ -67,6 +80,8 @@ fn read<'a>(document: &'a DeTable<'a>, problems: &'a Problems<'a>) -> Option<Con
     let mut config = Config {
         name: name?.to_owned(),
         cycle,
+        missed_slots,
+        stops,
         realtime,
         master,
         buses: buses.into_iter().map(|bus| bus.bus).collect::<Option<_>>()?,

@@ -6,12 +6,13 @@ use takt_rt::plan;
 use takt_rt::port::{BusHealth, BusState};
 use takt_rt::record::{MAX_AXES, MAX_BUSES};
 use takt_rt::stop::{Phase, Rule, StopCategory, StopReason};
+use takt_rt::watch::TimingLevel;
 
 use super::latest::Words;
 
 /// Words of a snapshot of so many axes and buses.
 pub const fn snapshot_words(axes: usize, buses: usize) -> usize {
-    11 + 4 * axes + 7 * buses
+    12 + 4 * axes + 7 * buses
 }
 
 /// Words of a streamed command for so many axes.
@@ -25,6 +26,8 @@ pub const NO_SNAPSHOT: Snapshot = Snapshot {
     at_ns: 0,
     phase: Phase::Passive,
     missed_slots: 0,
+    timing: TimingLevel::Normal,
+    clamped: 0,
     dropped: 0,
     refused: 0,
     finished_move: 0,
@@ -60,10 +63,11 @@ pub fn put_snapshot(snapshot: &Snapshot, words: &mut Words<'_>) {
             snapshot.phase as u8,
             snapshot.axis_count,
             snapshot.bus_count,
-            u8::from(snapshot.stop.is_some()),
+            u8::from(snapshot.stop.is_some()) | (snapshot.timing as u8) << 1,
         ]) | u64::from(snapshot.finished_move) << 32,
     );
     words.put(snapshot.missed_slots);
+    words.put(snapshot.clamped);
     words.put(snapshot.dropped);
     words.put(snapshot.refused);
     words.put_f64(snapshot.remaining_s);
@@ -80,17 +84,19 @@ pub fn put_snapshot(snapshot: &Snapshot, words: &mut Words<'_>) {
 
 pub fn take_snapshot(words: &mut Words<'_>) -> Snapshot {
     let (slot, at_ns, packed) = (words.take(), words.take(), words.take());
-    let [phase, axis_count, bus_count, has_stop] = unpack(packed);
+    let [phase, axis_count, bus_count, flags] = unpack(packed);
     let mut snapshot = Snapshot {
         slot,
         at_ns,
         phase: phase_of(phase),
         missed_slots: words.take(),
+        clamped: words.take(),
+        timing: TimingLevel::ALL.get(usize::from(flags >> 1)).copied().unwrap_or_default(),
         dropped: words.take(),
         refused: words.take(),
         finished_move: (packed >> 32) as u32,
         remaining_s: words.take_f64(),
-        stop: (has_stop == 1).then(|| take_stop(words)),
+        stop: (flags & 1 == 1).then(|| take_stop(words)),
         axis_count,
         bus_count,
         ..NO_SNAPSHOT

@@ -143,6 +143,14 @@ impl Device {
         }
     }
 
+    /// The torque is gone without a fault, as after safe torque off.
+    pub fn lose_torque(&mut self) {
+        if self.state.has_torque() && !self.state.is_faulted() {
+            self.state = State::SwitchOnDisabled;
+            self.stop = None;
+        }
+    }
+
     /// A fault has been noticed. Without torque, or when power must be cut, the reaction is over at once; otherwise
     /// the drive decelerates as object 605E says first.
     pub fn fault(&mut self, cuts_power: bool, dictionary: &Dictionary) {

@@ -14,6 +14,8 @@ const HISTORY: usize = 4;
 pub enum Error {
     /// Something broke.
     Fault(DriveFault),
+    /// Something broke that only its code is known of.
+    Alarm(u16),
     /// The heartbeat or the guarding of the master has stayed away.
     MasterLost,
     /// A PDO was shorter than its mapping.
@@ -34,6 +36,7 @@ impl Error {
             Self::Fault(DriveFault::MultiTurnBattery) => 0x730F,
             Self::Fault(DriveFault::BlockedRotor) => 0x7121,
             Self::Fault(DriveFault::Stall) => 0x8400,
+            Self::Alarm(code) => code,
             Self::MasterLost => 0x8130,
             Self::PdoLength => 0x8210,
             Self::PositionLost => 0x8611,
@@ -51,15 +54,17 @@ impl Error {
         }
     }
 
-    /// Whether power must be cut at once, because no controlled deceleration is possible any more.
+    /// Whether power must be cut at once, because no controlled deceleration is possible any more: after faults of
+    /// current (2xxx), voltage (3xxx), hardware (5xxx) and sensors (73xx).
     pub const fn cuts_power(self) -> bool {
-        !matches!(
-            self,
+        match self {
             Self::Fault(DriveFault::OverTemperature)
-                | Self::MasterLost
-                | Self::PdoLength
-                | Self::PositionLost
-        )
+            | Self::MasterLost
+            | Self::PdoLength
+            | Self::PositionLost => false,
+            Self::Fault(_) => true,
+            Self::Alarm(code) => matches!(code >> 8, 0x20..=0x3F | 0x50..=0x5F | 0x73),
+        }
     }
 }
 

@@ -8,6 +8,7 @@ use takt_rt::frame::Frame;
 use takt_rt::time::{NANOSECONDS_PER_SECOND, Nanoseconds};
 
 use super::ErobParameters;
+use super::defects::Defects;
 use super::device::{Change, Device};
 use super::dictionary::{Dictionary, at};
 use super::errors::{Error, Errors};
@@ -15,6 +16,7 @@ use super::motion::{Actual, Demand, Motion};
 use super::network::Network;
 use super::process_data::ProcessData;
 use super::sdo::SdoServer;
+use crate::sim::defect::{Defect, Unsupported};
 use crate::sim::drive::{Drive, DriveFault, Observation};
 use crate::sim::mailbox::Mailbox;
 use crate::sim::plant::Joint;
@@ -51,6 +53,7 @@ pub struct ErobJoint {
     has_pdo_error: bool,
     /// What broke since the last look.
     injected: Option<DriveFault>,
+    defects: Defects,
     save_ns: Nanoseconds,
     /// How far the loops have come.
     stepped_ns: Nanoseconds,
@@ -86,6 +89,7 @@ impl ErobJoint {
             has_battery_fault: false,
             has_pdo_error: false,
             injected: None,
+            defects: Defects::default(),
             save_ns: NEVER,
             stepped_ns: 0,
             now_ns: 0,
@@ -96,6 +100,10 @@ impl ErobJoint {
             module.lose_turns();
         }
         module
+    }
+
+    fn is_braked(&self) -> bool {
+        !self.device.state().has_torque() || self.defects.is_brake_stuck
     }
 
     fn direction(&self) -> f64 {
@@ -141,7 +149,12 @@ impl ErobJoint {
         } else {
             self.torque = 0.0;
         }
-        self.joint.step(duration_s, self.torque * self.direction(), !is_driven);
+        if self.defects.is_joint_blocked {
+            self.joint.halt();
+        } else {
+            let is_braked = self.is_braked();
+            self.joint.step(duration_s, self.torque * self.direction(), is_braked);
+        }
         let actual = self.actual();
         if is_driven {
             self.check_following_error(actual);
@@ -268,6 +281,16 @@ impl ErobJoint {
         dictionary.set(at::STATUSWORD, statusword.into());
     }
 
+    /// Brings measured quantities into the dictionary and lets the PDOs take from it what they are to carry, with
+    /// what is wrong about that.
+    fn report<T>(&mut self, take: impl FnOnce(&mut ProcessData, &Dictionary) -> T) -> T {
+        self.measure();
+        let truth = self.defects.forge(&mut self.dictionary);
+        let taken = take(&mut self.process_data, &self.dictionary);
+        truth.restore(&mut self.dictionary);
+        taken
+    }
+
     fn statusword(&self) -> u16 {
         // Bits 10 to 13 are those of the last step; the state may have changed since.
         let bits = self.dictionary.get(at::STATUSWORD) as u16 & 0x3C00;
@@ -360,7 +383,7 @@ impl Drive for ErobJoint {
             error_code: self.dictionary.get(at::ERROR_CODE) as u16,
             operation_mode: self.dictionary.signed(at::OPERATION_MODE_DISPLAY) as i8,
             nmt: self.network.state(),
-            is_braked: !self.device.state().has_torque(),
+            is_braked: self.is_braked(),
         }
     }
 
@@ -378,5 +401,27 @@ impl Drive for ErobJoint {
 
     fn set_load_torque(&mut self, torque: f64) {
         self.joint.set_load_torque(torque);
+    }
+
+    fn afflict(&mut self, now_ns: Nanoseconds, defect: Defect, is_present: bool) -> Result<(), Unsupported> {
+        self.run_loops(now_ns);
+        self.defects.set(defect, is_present);
+        match defect {
+            Defect::EncoderJump { distance } if is_present => {
+                let counts = (distance * self.parameters.encoder.counts_per_unit).round() as i64 as i32;
+                self.counts_offset = self.counts_offset.wrapping_add(counts);
+            }
+            Defect::Alarm { code } if is_present => self.fail(Error::Alarm(code)),
+            Defect::Emergency { code } if is_present => {
+                self.errors.raise(Error::Alarm(code), &mut self.dictionary);
+            }
+            Defect::TorqueOff if is_present => {
+                self.device.lose_torque();
+                self.torque = 0.0;
+            }
+            _ => {}
+        }
+        self.wake_ns = self.now_ns + 1;
+        Ok(())
     }
 }

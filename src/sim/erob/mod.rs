@@ -7,6 +7,7 @@
 //!                         ├── process_data   RPDO, TPDO, SYNC
 //!                         ├── network        NMT, heartbeat, guarding
 //!                         ├── errors         emergency messages, error history
+//!                         ├── defects        what is wrong, and how the feedback shows it
 //!                         ├── device         CiA 402: controlword → state → statusword
 //!                         └── motion → servo → plant    set-points → loops → torque → joint
 //! ```
@@ -25,6 +26,7 @@
 //! - 6093, 6080, 607C, 2380 to 2382, 3B60 and the homing and interpolation objects can be written and read, and do
 //!   nothing.
 
+mod defects;
 mod device;
 mod dictionary;
 mod errors;

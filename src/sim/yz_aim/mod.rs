@@ -47,4 +47,3 @@ mod sdo;
 pub use joint::YzAimJoint;
 pub use objects::{OBJECTS, Object};
 pub use parameters::{COUNTS_PER_TURN, Gearing, HomingBehaviour, Model, Quirks, Ratings, YzAimParameters};
-pub use sdo::AbortCode;

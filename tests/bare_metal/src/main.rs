@@ -11,11 +11,12 @@ use takt_rt::dialect::Dialect;
 use takt_rt::door::{Door, Request, Snapshot, StreamCommand};
 use takt_rt::engine::{BusParameters, Engine, EngineParameters, SendBatch, Transmission};
 use takt_rt::frame::{Frame, Id};
-use takt_rt::guard::AxisLimits;
+use takt_rt::guard::{AxisLimits, OnViolation};
 use takt_rt::pdo::{MappedObject, Mapping};
 use takt_rt::port::{BusHealth, Received};
 use takt_rt::record::{CycleRecord, Event, Timing};
-use takt_rt::stop::Phase;
+use takt_rt::stop::{Phase, StopCategories};
+use takt_rt::watch::TimingLadder;
 use takt_rt::units::{Scale, ScaleParameters};
 
 // The C library gives the program its entry; nothing else of it is used.
@@ -91,6 +92,9 @@ fn axis() -> Option<AxisParameters> {
             jerk: f64::INFINITY,
             torque: 40.0,
         },
+        start_tolerance: 0.02,
+        on_violation: OnViolation::Reject,
+        heartbeat_timeout_cycles: None,
         following_error_limit: 0.1,
         following_error_cycles: 50,
         missed_feedback_cycles: 5,
@@ -112,6 +116,8 @@ fn cycles() -> Option<Phase> {
         enable_timeout_cycles: 100,
         not_transmitted_cycles: 5,
         acknowledge_timeout_cycles: 500,
+        categories: StopCategories::default(),
+        timing: TimingLadder { warning: 10, degraded: 50, unfit: 250, leak_cycles: 20 },
     };
     let mut engine = Engine::new(parameters).ok()?;
     let requests = [Some(Request::Sync(true)), Some(Request::Activate), Some(Request::Enable)];

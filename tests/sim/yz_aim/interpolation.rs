@@ -191,6 +191,30 @@ fn all_axes_take_their_target_at_the_same_sync() {
 }
 
 #[test]
+fn the_loops_begin_anew_with_sync_wherever_it_falls() {
+    // Between two SYNCs it would show how many steps of the loops there have been.
+    let positions = |phase_ns: u64| {
+        let mut bench = interpolating();
+        // Nothing else on the bus may delay SYNC.
+        for (index, subindex) in [(0x1017, 0), (0x1800, 5), (0x1802, 5)] {
+            bench.write(index, subindex, 2, 0).unwrap();
+        }
+        bench.run_ns(phase_ns);
+        let mut answers = vec![];
+        for cycle in 0i32..100 {
+            answers.push(bench.hold_target(cycle.pow(2)).0);
+            bench.say(0x080, []);
+            bench.run_ns(1_500_000);
+        }
+        answers
+    };
+    let first = positions(0);
+    for phase_ns in [30_000, 60_000, 90_000] {
+        assert_eq!(positions(phase_ns), first);
+    }
+}
+
+#[test]
 fn without_interpolation_sync_starts_profiles_together() {
     let mut bench = three_axes(by_the_manual);
     for node in [NODE, 6, 7].map(u32::from) {

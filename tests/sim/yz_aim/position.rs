@@ -1,5 +1,8 @@
 //! Profile position and velocity.
 
+use takt::sim::plant::JointParameters;
+use takt::sim::yz_aim::{Gearing, Model};
+
 use super::{Bench, NODE, Quirks, YzAimParameters, bench, by_the_manual, parameters};
 
 #[test]
@@ -89,6 +92,26 @@ fn velocity_follows_60ff_and_bit_8_stops_it_with_the_shaft_held() {
     bench.run_ms(300);
     assert_eq!(bench.statusword(), 0x0437);
     assert!(bench.position() < rest - 50_000);
+}
+
+#[test]
+fn a_reversed_spindle_counts_backwards() {
+    let spindle = Gearing { ratio: 2.0, travel_per_turn: 0.005, is_reversed: true, zero_counts: 1_000.0 };
+    // 100 kg on the spindle, seen from the nut.
+    let nut = JointParameters {
+        inertia: 100.0,
+        viscous_friction: 200.0,
+        coulomb_friction: 30.0,
+        brake_torque: 0.0,
+    };
+    let servo = YzAimParameters::new(NODE, Model::Aim57x30C, spindle, nut);
+    let mut bench = bench(YzAimParameters { power_up_ns: 1_000_000, quirks: Quirks::none(), ..servo });
+    assert_eq!(bench.position(), 1_000);
+    bench.control(0x2F);
+    bench.write(0x607A, 0, 4, 66_536).unwrap();
+    bench.run_ms(1_500);
+    assert_eq!((bench.position(), bench.statusword()), (66_536, 0x0437));
+    assert!((bench.observe().position + 0.005).abs() < 1e-7);
 }
 
 #[test]

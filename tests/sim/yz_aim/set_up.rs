@@ -126,6 +126,16 @@ fn special_functions_from_30_on_turn_to_an_angle() {
 }
 
 #[test]
+fn after_its_own_move_the_drive_makes_others_as_fast_as_6081_says() {
+    let mut bench = after_power_up(6, 20_000);
+    bench.run_ms(2_000);
+    bench.write(0x260C, 0, 4, 100_000).unwrap();
+    bench.run_ms(300);
+    let rpm = bench.observe().velocity * super::RATIO * 60.0 / super::TAU;
+    assert!((rpm - 1_000.0).abs() < 2.0, "{rpm}");
+}
+
+#[test]
 fn a_controlword_ends_the_move_after_power_up() {
     let mut bench = after_power_up(6, 20_000);
     bench.run_ms(100);

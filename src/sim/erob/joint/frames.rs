@@ -27,6 +27,7 @@ impl ErobJoint {
             0x701..=0x77F => self.network.heard(now_ns, (id & 0x7F) as u8, &self.dictionary),
             _ if id == 0x600 + node => {
                 if self.network.has_services()
+                    && !self.defects.is_sdo_silent
                     && let Ok(request) = frame.payload().try_into()
                 {
                     self.take_request(now_ns, request);
@@ -44,9 +45,9 @@ impl ErobJoint {
                 mailbox.push(Frame::of(frame.id(), [byte]));
             }
         } else if self.network.state() == NmtState::Operational {
-            self.measure();
-            if let Some(answer) = self.process_data.requested(frame.id(), &self.dictionary) {
-                mailbox.put(answer);
+            let answer = self.report(|data, dictionary| data.requested(frame.id(), dictionary));
+            if let Some(answer) = answer {
+                mailbox.put(self.defects.sent(answer));
             }
         }
     }
@@ -84,8 +85,8 @@ impl ErobJoint {
         self.follow_mode();
         self.evaluate(now_ns);
         self.motion.latch(&self.dictionary);
-        self.measure();
-        self.process_data.sample(now_ns, self.parameters.feedback_delay_ns, &self.dictionary);
+        let delay_ns = self.parameters.feedback_delay_ns;
+        self.report(|data, dictionary| data.sample(now_ns, delay_ns, dictionary));
     }
 
     fn take_pdo(&mut self, now_ns: Nanoseconds, frame: &Frame) {
@@ -147,10 +148,9 @@ impl ErobJoint {
             }
         }
         if self.network.state() == NmtState::Operational {
-            self.measure();
-            self.process_data.sample_events(now_ns, &self.dictionary);
+            self.report(|data, dictionary| data.sample_events(now_ns, dictionary));
             while let Some(frame) = self.process_data.next(now_ns) {
-                mailbox.put(frame);
+                mailbox.put(self.defects.sent(frame));
             }
         }
     }

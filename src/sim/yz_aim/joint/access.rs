@@ -1,5 +1,6 @@
 //! The dictionary as the master reaches it, by SDO and by RPDO.
 
+use takt_rt::cia402::controlword;
 use takt_rt::time::Nanoseconds;
 
 use super::YzAimJoint;
@@ -97,7 +98,7 @@ impl YzAimJoint {
         if carries(at::CONTROLWORD) {
             self.take_controlword(now_ns);
         }
-        let has_started = carries(at::CONTROLWORD) && word & takt_rt::cia402::controlword::BIT_4 != 0;
+        let has_started = carries(at::CONTROLWORD) && word & controlword::BIT_4 != 0;
         if number == PDO4 && ProcessData::waits_for_sync(number, &self.dictionary) {
             self.interpolate();
         } else if carries(at::TARGET_POSITION) && !has_started {

@@ -29,7 +29,6 @@ impl YzAimJoint {
         self.device.take(now_ns, word, &self.parameters.quirks);
         let level = self.device.level();
         if level != before {
-            self.power_up_speed = None;
             self.engage();
             self.ignores_target = level == Level::Enabled && self.parameters.quirks.ignores_first_target;
         }
@@ -121,6 +120,7 @@ impl YzAimJoint {
         if !is_positioning || !self.is_energised() {
             return;
         }
+        self.power_up_speed = None;
         // A numerator of 0 is a switch and no ratio.
         let numerator = self.dictionary.real(at::GEAR_NUMERATOR);
         let gear = if numerator > 0.0 { numerator / self.dictionary.real(at::GEAR_DENOMINATOR) } else { 1.0 };

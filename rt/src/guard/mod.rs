@@ -1,7 +1,11 @@
 //! The last look at every set-point, whoever made it, before it becomes a frame.
 
+mod stream;
+
 use crate::plan::State;
 use crate::stop::Rule;
+
+pub use stream::{Course, OnViolation, braking_distance, check_stream, clamp};
 
 /// What an axis may never be asked to do. rad (m) and seconds.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,0 +1,9 @@
+//! The reader of configurations, given any text.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+
+#[path = "../subjects/mod.rs"]
+mod subjects;
+
+fuzz_target!(|bytes: &[u8]| subjects::configuration::run(bytes));

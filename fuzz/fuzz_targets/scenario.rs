@@ -1,0 +1,9 @@
+//! The reader of fault scenarios, given any text, and the ports that play what it takes.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+
+#[path = "../subjects/mod.rs"]
+mod subjects;
+
+fuzz_target!(|bytes: &[u8]| subjects::scenario::run(bytes));

@@ -1,0 +1,9 @@
+//! Everything that is decoded from the wire, given any frames: emergency messages, NMT, SDO from both sides, PDO.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+
+#[path = "../subjects/mod.rs"]
+mod subjects;
+
+fuzz_target!(|bytes: &[u8]| subjects::wire::run(bytes));

@@ -1,0 +1,58 @@
+//! The reader of scenarios, given any text, and the ports that play what it takes.
+
+use std::sync::OnceLock;
+
+use takt::bus::port::Port;
+use takt::config::Config;
+use takt::faults::{Rehearsal, Scenario};
+use takt::sim::SimulatedBus;
+use takt_rt::door::Snapshot;
+use takt_rt::frame::{Frame, Id};
+use takt_rt::port::{BusPort, ReceiveBatch};
+use takt_rt::stop::Phase;
+
+use super::configuration::assert_explained;
+
+fn arm() -> &'static Config {
+    static ARM: OnceLock<Config> = OnceLock::new();
+    ARM.get_or_init(|| {
+        let text = include_str!("../../configs/arm6-erob.toml");
+        Config::parse("arm6-erob.toml", text).expect("the example is sound")
+    })
+}
+
+/// Reads a text as a scenario, and plays for some cycles what is taken.
+pub fn run(bytes: &[u8]) {
+    let Ok(text) = std::str::from_utf8(bytes) else { return };
+    match Scenario::parse("fuzz", text, arm()) {
+        Err(error) => assert_explained(text, &error),
+        Ok(scenario) => play(scenario),
+    }
+}
+
+fn play(scenario: Scenario) {
+    let rehearsal = Rehearsal::new(scenario);
+    let mut ports: Vec<Port> = (0..arm().buses.len())
+        .map(|bus| rehearsal.wrap(bus, Port::Simulated(Box::new(SimulatedBus::new(arm(), bus)))))
+        .collect();
+    let set_points: Vec<Frame> =
+        (1..=6).map(|node| Frame::of(Id::canopen(0x200, node), [0x0F, 0, node, 0, 0, 0])).collect();
+    for (slot, phase) in [Phase::Passive, Phase::Holding, Phase::Moving, Phase::Stopping, Phase::Disabled]
+        .into_iter()
+        .cycle()
+        .take(20)
+        .enumerate()
+    {
+        let at_ns = slot as u64 * 1_000_000;
+        for port in &mut ports {
+            port.send(at_ns, &[Frame::of(Id::canopen(0x080, 0), [])]);
+            let mut batch = ReceiveBatch::new();
+            port.receive(at_ns + 500_000, &mut batch);
+            assert!(batch.iter().all(|received| received.at_ns <= at_ns + 500_000));
+            port.unconfirmed(at_ns + 500_000);
+            assert!(port.send(at_ns + 500_000, &set_points) <= set_points.len());
+            port.health();
+        }
+        rehearsal.observe(&Snapshot { phase, at_ns: at_ns + 510_000, ..Snapshot::default() });
+    }
+}

@@ -1,0 +1,161 @@
+//! Everything that is decoded from the wire, given any frames.
+
+use std::sync::OnceLock;
+
+use takt::canopen::emcy::Emergency;
+use takt::canopen::nmt::{ErrorControl, HeartbeatConsumer, NmtCommand};
+use takt::canopen::object::ObjectAddress;
+use takt::canopen::sdo::{Client, Request, Response, Timing, Transfer};
+use takt::config::Config;
+use takt::sim::SimulatedBus;
+use takt_rt::cia402::State;
+use takt_rt::frame::{Frame, Id};
+use takt_rt::pdo::{MAX_OBJECTS, MappedObject, Mapping, ProcessImage};
+use takt_rt::port::{BusPort, ReceiveBatch};
+
+use super::input::Input;
+
+const NODE: u8 = 2;
+
+/// What is decoded can be encoded and is the same again; the SDO client always comes to an end; the drive always lives on
+/// and speaks properly; process data are taken or refused.
+pub fn run(bytes: &[u8]) {
+    let Some((kind, rest)) = bytes.split_first() else { return };
+    let input = Input::new(rest);
+    match kind % 4 {
+        0 => decode(input),
+        1 => ask(input),
+        2 => talk_to_drive(input),
+        _ => unpack(input),
+    }
+}
+
+fn decode(mut input: Input<'_>) {
+    while !input.is_empty() {
+        let frame = input.frame();
+        if let Some(emergency) = Emergency::decode(&frame) {
+            assert_eq!(Emergency::decode(&emergency.frame()), Some(emergency));
+        }
+        if let Some((command, target)) = NmtCommand::decode(&frame) {
+            assert_eq!(NmtCommand::decode(&command.frame(target)), Some((command, target)));
+        }
+        if let Some(control) = ErrorControl::decode(&frame) {
+            assert_eq!(ErrorControl::decode(&control.frame()), Some(control));
+        }
+        if let Some((node, request)) = Request::decode(&frame) {
+            assert_eq!(Request::decode(&request.frame(node)), Some((node, request)), "{frame:?}");
+        }
+        if let Some((node, response)) = Response::decode(&frame) {
+            assert_eq!(Response::decode(&response.frame(node)), Some((node, response)), "{frame:?}");
+        }
+        State::decode(frame.first_word() as u16);
+        let mut consumer = HeartbeatConsumer::new(NODE, 1_000_000);
+        for now_ns in [0, u64::from(input.word()), u64::MAX] {
+            let _ = consumer.receive(now_ns, &frame);
+            let _ = consumer.poll(now_ns);
+        }
+    }
+}
+
+/// The longest that a client may go on with a server that says whatever it likes.
+const POLLS_AT_MOST: usize = 10_000;
+
+fn ask(mut input: Input<'_>) {
+    let object = ObjectAddress { index: input.short(), subindex: input.byte() };
+    let transfer = match input.byte() % 4 {
+        0 => Transfer::Upload { object },
+        1 => Transfer::BlockUpload { object },
+        kind => {
+            let data: Vec<u8> = (0..input.byte()).collect();
+            if kind == 2 {
+                Transfer::Download { object, data }
+            } else {
+                Transfer::BlockDownload { object, data }
+            }
+        }
+    };
+    let mut client = Client::new(NODE, Timing { reply_timeout_ns: 1_000_000, retries: 2 });
+    assert!(client.start(transfer).is_ok());
+    let mut now_ns = 0;
+    for _ in 0..POLLS_AT_MOST {
+        while let Some(frame) = client.poll(now_ns) {
+            // A segment of a block has no command, so only this much can be said of every frame.
+            assert_eq!((frame.id(), frame.payload().len()), (Id::canopen(0x600, NODE), 8), "{frame:?}");
+        }
+        if client.take_outcome().is_some() {
+            return;
+        }
+        if input.is_empty() {
+            now_ns += 1_000_000;
+            continue;
+        }
+        now_ns += u64::from(input.short());
+        let answer = Frame::of(Id::canopen(0x580, NODE), input.bytes::<8>());
+        client.receive(&answer);
+    }
+    panic!("the client does not come to an end");
+}
+
+fn one_drive() -> &'static Config {
+    static CONFIG: OnceLock<Config> = OnceLock::new();
+    CONFIG.get_or_init(|| {
+        let text = include_str!("../../configs/single-erob.toml");
+        let mut config = Config::parse("single-erob.toml", text).expect("the example is sound");
+        config.axes.iter_mut().for_each(|axis| {
+            axis.node = NODE;
+            axis.simulated.power_up_ns = 100_000;
+        });
+        config
+    })
+}
+
+fn talk_to_drive(mut input: Input<'_>) {
+    let mut bus = SimulatedBus::new(one_drive(), 0);
+    let mut now_ns = 0;
+    for _ in 0..FRAMES_AT_MOST {
+        if input.is_empty() {
+            break;
+        }
+        now_ns += 10 * u64::from(input.short());
+        bus.send(now_ns, &[input.frame()]);
+        let mut batch = ReceiveBatch::new();
+        bus.receive(now_ns, &mut batch);
+        for received in &batch {
+            let id = received.frame.id();
+            if id.value() & 0x780 == 0x580 && !id.is_extended() {
+                assert!(Response::decode(&received.frame).is_some(), "{:?}", received.frame);
+            }
+        }
+    }
+    let seen = bus.observe(NODE).expect("the drive is there");
+    assert!(seen.position.is_finite() && seen.velocity.is_finite() && seen.torque.is_finite(), "{seen:?}");
+}
+
+const FRAMES_AT_MOST: usize = 200;
+
+fn unpack(mut input: Input<'_>) {
+    let count = usize::from(input.byte()) % (MAX_OBJECTS + 2);
+    let objects: Vec<MappedObject> = (0..count)
+        .map(|_| match input.byte() % 6 {
+            0 => MappedObject::new(0x6041, 0, 16),
+            1 => MappedObject::new(0x6064, 0, 32),
+            2 => MappedObject::new(0x6061, 0, 8),
+            3 => MappedObject::new(0x6040, 0, 16),
+            4 => MappedObject::new(0x607A, 0, 32),
+            _ => MappedObject::from_parameter(input.word()),
+        })
+        .collect();
+    let bits: usize = objects.iter().map(|object| usize::from(object.bits)).sum();
+    if let Ok(mapping) = Mapping::feedback(&objects) {
+        assert_eq!(8 * mapping.length(), bits);
+        let mut image = ProcessImage::default();
+        let length = usize::from(input.byte()) % 9;
+        let word = u64::from_le_bytes(input.bytes());
+        let is_taken = mapping.unpack(word, length, &mut image).is_ok();
+        assert_eq!(is_taken, length >= mapping.length());
+    }
+    if let Ok(mapping) = Mapping::commands(&objects) {
+        let payload = mapping.pack(&ProcessImage::default());
+        assert!(mapping.length() <= payload.len());
+    }
+}

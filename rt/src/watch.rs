@@ -1,0 +1,245 @@
+//! What is watched over time: slots that pass unused, nodes that fall silent or start anew, identifiers that come twice.
+
+/// How late the controller has been of late.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[repr(u8)]
+pub enum TimingLevel {
+    /// Hardly ever.
+    #[default]
+    Normal = 0,
+    /// Often enough to be told.
+    Warning = 1,
+    /// So often that no stream is begun, since its owner counts on every slot.
+    Degraded = 2,
+    /// Too often to go on.
+    Unfit = 3,
+}
+
+impl TimingLevel {
+    /// Every level, in the order of their numbers.
+    pub const ALL: [Self; 4] = [Self::Normal, Self::Warning, Self::Degraded, Self::Unfit];
+}
+
+/// When missed slots are too many: a bucket that every missed slot fills by one and that loses one in
+/// `leak_cycles` cycles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TimingLadder {
+    /// Slots in the bucket from which on it is told.
+    pub warning: u32,
+    /// Slots from which on no stream is begun.
+    pub degraded: u32,
+    /// Slots from which on the group stops.
+    pub unfit: u32,
+    /// Cycles in which the bucket loses one; 0 never.
+    pub leak_cycles: u32,
+}
+
+/// The bucket of a [`TimingLadder`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct LeakyBucket {
+    filled: u32,
+    cycles: u32,
+}
+
+impl LeakyBucket {
+    /// Takes the slots that were missed in one cycle, 0 as a rule, and gives what is in the bucket then.
+    pub fn take(&mut self, missed: u64, leak_cycles: u32) -> u32 {
+        self.cycles += 1;
+        if leak_cycles > 0 && self.cycles >= leak_cycles {
+            self.cycles = 0;
+            self.filled = self.filled.saturating_sub(1);
+        }
+        self.filled = self.filled.saturating_add(u32::try_from(missed).unwrap_or(u32::MAX));
+        self.filled
+    }
+
+    /// What is in it.
+    pub const fn filled(&self) -> u32 {
+        self.filled
+    }
+
+    /// Forgets what was.
+    pub fn empty(&mut self) {
+        *self = Self::default();
+    }
+}
+
+impl TimingLadder {
+    /// The level that so many slots in the bucket stand for.
+    pub const fn level(&self, filled: u32) -> TimingLevel {
+        if filled >= self.unfit {
+            TimingLevel::Unfit
+        } else if filled >= self.degraded {
+            TimingLevel::Degraded
+        } else if filled >= self.warning {
+            TimingLevel::Warning
+        } else {
+            TimingLevel::Normal
+        }
+    }
+}
+
+/// A state of a node that its heartbeat shows (CiA 301, 7.2.8.3.2.2).
+pub mod node_state {
+    /// It has just started.
+    pub const BOOT_UP: u8 = 0;
+    /// Process data flows.
+    pub const OPERATIONAL: u8 = 5;
+}
+
+/// What the error control messages of a drive tell while it is to work.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct NodeWatch {
+    silent_cycles: u32,
+    has_booted: bool,
+    left_operational: Option<u8>,
+}
+
+/// What is wrong with a node.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum NodeComplaint {
+    /// It has started anew.
+    BootUp,
+    /// It is in another state than operational.
+    NotOperational {
+        /// Which.
+        state: u8,
+    },
+    /// It has been silent for so many cycles.
+    Silent {
+        /// How many.
+        cycles: u32,
+    },
+}
+
+impl NodeWatch {
+    /// Takes the state in an error control message.
+    pub fn receive(&mut self, state: u8) {
+        self.silent_cycles = 0;
+        match state {
+            node_state::BOOT_UP => self.has_booted = true,
+            // Bit 7 toggles in answers to node guarding.
+            state if state & 0x7F == node_state::OPERATIONAL => self.left_operational = None,
+            state => self.left_operational = Some(state & 0x7F),
+        }
+    }
+
+    /// Lets a cycle pass.
+    pub fn pass(&mut self) {
+        self.silent_cycles = self.silent_cycles.saturating_add(1);
+    }
+
+    /// What is wrong, with the longest silence that is allowed; `None` where no heartbeat is expected.
+    pub fn complaint(&self, timeout_cycles: Option<u32>) -> Option<NodeComplaint> {
+        if self.has_booted {
+            return Some(NodeComplaint::BootUp);
+        }
+        if let Some(state) = self.left_operational {
+            return Some(NodeComplaint::NotOperational { state });
+        }
+        let cycles = self.silent_cycles;
+        timeout_cycles.filter(|timeout| cycles > *timeout).map(|_| NodeComplaint::Silent { cycles })
+    }
+
+    /// Forgets what was: the node is about to be watched.
+    pub fn begin(&mut self) {
+        *self = Self::default();
+    }
+}
+
+/// Two nodes with one number answer the same SYNC twice. Feedback that comes late makes two in one cycle as well, so
+/// only a run of them counts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct DuplicateWatch {
+    filled: u16,
+}
+
+const DUPLICATE_LIMIT: u16 = 12;
+const DUPLICATE_STEP: u16 = 3;
+
+impl DuplicateWatch {
+    /// Feedback came that was there already in this cycle.
+    pub fn again(&mut self) {
+        self.filled = self.filled.saturating_add(DUPLICATE_STEP);
+    }
+
+    /// Lets a cycle pass.
+    pub fn pass(&mut self) {
+        self.filled = self.filled.saturating_sub(1);
+    }
+
+    /// Whether it has gone on for too long to be lateness.
+    pub const fn is_duplicate(&self) -> bool {
+        self.filled >= DUPLICATE_LIMIT
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use super::*;
+    use std::vec::Vec;
+
+    const LADDER: TimingLadder = TimingLadder { warning: 3, degraded: 10, unfit: 30, leak_cycles: 10 };
+
+    #[test]
+    fn a_missed_slot_now_and_then_leaks_away() {
+        let mut bucket = LeakyBucket::default();
+        for cycle in 0..10_000 {
+            let filled = bucket.take(u64::from(cycle % 10 == 0), LADDER.leak_cycles);
+            assert_eq!(LADDER.level(filled), TimingLevel::Normal);
+        }
+    }
+
+    #[test]
+    fn missed_slots_that_come_faster_than_they_leak_climb_the_ladder_step_by_step() {
+        let mut bucket = LeakyBucket::default();
+        let levels: Vec<TimingLevel> =
+            (0..100).map(|_| LADDER.level(bucket.take(1, LADDER.leak_cycles))).collect();
+        assert!(levels.is_sorted());
+        for level in TimingLevel::ALL {
+            assert!(levels.contains(&level), "{level:?}");
+        }
+        bucket.empty();
+        assert_eq!(LADDER.level(bucket.take(0, LADDER.leak_cycles)), TimingLevel::Normal);
+    }
+
+    #[test]
+    fn a_long_pause_is_unfit_at_once() {
+        assert_eq!(LADDER.level(LeakyBucket::default().take(u64::MAX, 10)), TimingLevel::Unfit);
+    }
+
+    #[test]
+    fn a_node_that_boots_leaves_operational_or_falls_silent_is_noticed() {
+        let mut watch = NodeWatch::default();
+        watch.receive(node_state::OPERATIONAL);
+        assert_eq!(watch.complaint(Some(3)), None);
+        (0..4).for_each(|_| watch.pass());
+        assert_eq!(watch.complaint(None), None);
+        assert_eq!(watch.complaint(Some(3)), Some(NodeComplaint::Silent { cycles: 4 }));
+        watch.receive(0x7F);
+        assert_eq!(watch.complaint(Some(3)), Some(NodeComplaint::NotOperational { state: 0x7F }));
+        watch.receive(0x80 | node_state::OPERATIONAL);
+        assert_eq!(watch.complaint(Some(3)), None);
+        watch.receive(node_state::BOOT_UP);
+        assert_eq!(watch.complaint(None), Some(NodeComplaint::BootUp));
+        watch.begin();
+        assert_eq!(watch.complaint(None), None);
+    }
+
+    #[test]
+    fn feedback_that_comes_twice_in_every_cycle_is_a_second_node_and_twice_at_times_is_not() {
+        let mut watch = DuplicateWatch::default();
+        for _ in 0..100 {
+            watch.again();
+            (0..DUPLICATE_STEP).for_each(|_| watch.pass());
+            assert!(!watch.is_duplicate());
+        }
+        let needed = (1..100).find(|_| {
+            watch.again();
+            watch.pass();
+            watch.is_duplicate()
+        });
+        assert!(needed.is_some_and(|cycles| cycles < 10));
+    }
+}

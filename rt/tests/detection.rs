@@ -1,0 +1,207 @@
+//! What is detected beside the set-points and the feedback: nodes that start anew or fall silent, others who send what
+//! only the master may, two nodes with one number, a thread that is late too often.
+
+mod fixture;
+
+use fixture::{PERIOD_NS, Rig, parameters};
+use takt_rt::door::Request;
+use takt_rt::frame::{Frame, Id};
+use takt_rt::guard::OnViolation;
+use takt_rt::port::BusState;
+use takt_rt::record::EventKind;
+use takt_rt::stop::{Phase, Rule, StopCategory};
+use takt_rt::watch::TimingLevel;
+
+fn moving() -> Rig {
+    let mut rig = Rig::enabled(3);
+    rig.move_to(2.0);
+    rig.run(200);
+    assert_eq!(rig.phase(), Phase::Moving);
+    rig
+}
+
+/// The one reason for which the group has stopped, with its value.
+fn reason(rig: &Rig) -> (Rule, Option<u8>, f64) {
+    let stops = rig.stops();
+    assert_eq!(stops.len(), 1, "{stops:?}");
+    (stops[0].rule, stops[0].axis, stops[0].value)
+}
+
+#[test]
+fn a_drive_that_boots_in_motion_stops_the_group() {
+    let mut rig = moving();
+    rig.buses[0].inject(Frame::of(Id::canopen(0x700, 2), [0]));
+    rig.run(2);
+    assert_eq!(reason(&rig), (Rule::UnexpectedBootUp, Some(1), 0.0));
+    rig.run_until(Phase::Disabled, 3_000);
+    rig.assert_limits_kept();
+}
+
+#[test]
+fn a_boot_up_before_the_drives_are_enabled_is_no_reason_to_stop() {
+    let mut rig = Rig::new(3);
+    rig.request(Request::Sync(true));
+    rig.request(Request::Activate);
+    rig.run(20);
+    rig.buses[0].inject(Frame::of(Id::canopen(0x700, 2), [0]));
+    rig.run(5);
+    rig.request(Request::Enable);
+    rig.run_until(Phase::Holding, 500);
+    assert!(rig.stops().is_empty());
+}
+
+#[test]
+fn a_node_that_leaves_operational_or_whose_heartbeat_ceases_stops_the_group() {
+    let mut rig = moving();
+    rig.buses[0].inject(Frame::of(Id::canopen(0x700, 3), [0x7F]));
+    rig.run(2);
+    assert_eq!(reason(&rig), (Rule::NodeNotOperational, Some(2), 127.0));
+
+    let mut watched = parameters(3);
+    watched.axes[1].heartbeat_timeout_cycles = Some(50);
+    let mut rig = Rig::of(watched).enable();
+    for _ in 0..5 {
+        rig.buses[0].inject(Frame::of(Id::canopen(0x700, 2), [5]));
+        rig.run(40);
+    }
+    assert!(rig.stops().is_empty());
+    rig.run(60);
+    assert_eq!(reason(&rig).0, Rule::NodeLost);
+}
+
+#[test]
+fn whoever_else_sends_sync_set_points_or_commands_stops_the_group_and_is_named_by_the_identifier() {
+    for id in [Id::canopen(0x080, 0), Id::canopen(0x200, 2), Id::canopen(0x000, 0), Id::canopen(0x700, 127)] {
+        let mut rig = moving();
+        rig.buses[0].inject(Frame::of(id, [0x81, 0]));
+        rig.run(2);
+        assert_eq!(reason(&rig), (Rule::ForeignMaster, None, id.value().into()));
+        rig.run_until(Phase::Disabled, 3_000);
+        rig.assert_limits_kept();
+    }
+}
+
+#[test]
+fn two_nodes_with_one_number_are_told_from_feedback_that_comes_late() {
+    let twice = |rig: &mut Rig, every: usize| {
+        for cycle in 0..300 {
+            if cycle % every == 0 {
+                let position = rig.drive(0).position.to_le_bytes();
+                let [a, b, c, d] = position;
+                rig.buses[0].inject(Frame::of(Id::canopen(0x180, 1), [0x37, 0x12, a, b, c, d]));
+            }
+            rig.run(1);
+        }
+    };
+    let mut rig = Rig::enabled(3);
+    twice(&mut rig, 10);
+    assert!(rig.stops().is_empty());
+    twice(&mut rig, 1);
+    assert_eq!(reason(&rig), (Rule::DuplicateNode, Some(0), 1.0));
+}
+
+#[test]
+fn an_emergency_message_without_a_fault_stops_the_group_with_its_code() {
+    let mut rig = moving();
+    rig.buses[0].inject(Frame::of(Id::canopen(0x080, 2), [0x10, 0x43, 0x09, 0, 0, 0, 0, 0]));
+    rig.run(6);
+    assert_eq!(reason(&rig), (Rule::EmergencyMessage, Some(1), f64::from(0x4310)));
+}
+
+#[test]
+fn an_error_passive_interface_stops_the_group_where_it_is() {
+    let mut rig = moving();
+    rig.buses[0].state = BusState::ErrorPassive;
+    rig.run(2);
+    assert_eq!(reason(&rig).0, Rule::BusErrorPassive);
+    rig.run_until(Phase::Holding, 3_000);
+    rig.assert_limits_kept();
+}
+
+#[test]
+fn slots_missed_too_often_are_told_then_keep_streams_away_and_then_stop_the_group() {
+    let mut rig = Rig::enabled(3);
+    let stall = |rig: &mut Rig, cycles: usize| {
+        for _ in 0..cycles {
+            rig.clock.lateness_ns.push_back(PERIOD_NS + PERIOD_NS / 2);
+            rig.run(1);
+        }
+    };
+    stall(&mut rig, 12);
+    assert_eq!(rig.door.snapshot.timing, TimingLevel::Warning);
+    stall(&mut rig, 45);
+    assert_eq!(rig.door.snapshot.timing, TimingLevel::Degraded);
+    let refused = rig.door.snapshot.refused;
+    rig.request(Request::Stream);
+    rig.run(1);
+    assert_eq!((rig.door.snapshot.refused, rig.phase()), (refused + 1, Phase::Holding));
+    stall(&mut rig, 300);
+    assert_eq!(reason(&rig).0, Rule::TimingUnfit);
+    let levels: Vec<TimingLevel> = (rig.door.events.iter())
+        .filter_map(|event| match event.kind {
+            EventKind::Timing { level } => Some(level),
+            _ => None,
+        })
+        .collect();
+    assert_eq!(levels[..3], [TimingLevel::Warning, TimingLevel::Degraded, TimingLevel::Unfit]);
+    rig.assert_limits_kept();
+}
+
+#[test]
+fn the_category_of_a_rule_is_the_configured_one() {
+    let configured = |category| {
+        let mut parameters = parameters(3);
+        parameters.categories.set(Rule::UnexpectedBootUp, category);
+        let mut rig = Rig::of(parameters).enable();
+        rig.buses[0].inject(Frame::of(Id::canopen(0x700, 2), [0]));
+        rig.run(2);
+        assert_eq!(rig.stops()[0].category, category);
+        rig.run(1_000);
+        rig.phase()
+    };
+    assert_eq!(configured(StopCategory::Two), Phase::Holding);
+    assert_eq!(configured(StopCategory::One), Phase::Disabled);
+    assert_eq!(configured(StopCategory::Zero), Phase::Disabled);
+}
+
+#[test]
+fn a_stream_that_asks_for_too_much_is_followed_as_far_as_the_limits_go_where_it_is_to_be_clamped() {
+    let mut parameters = parameters(3);
+    parameters.axes.iter_mut().for_each(|axis| axis.on_violation = OnViolation::Clamp);
+    let mut rig = Rig::of(parameters).enable();
+    rig.move_to(0.0);
+    rig.run_until(Phase::Holding, 5_000);
+    rig.request(Request::Stream);
+    rig.stream(0.0, 0.0, 5 * PERIOD_NS);
+    rig.run(2);
+    for _ in 0..3_000 {
+        rig.stream(9.0, 0.0, 5 * PERIOD_NS);
+        rig.run(1);
+    }
+    assert!(rig.stops().is_empty());
+    assert!(rig.door.snapshot.clamped > 3_000);
+    let reached = rig.door.snapshot.axes[0].position_set;
+    assert!((2.9..=3.0).contains(&reached), "{reached}");
+    rig.assert_limits_kept();
+}
+
+#[test]
+fn a_stream_that_could_not_stop_before_its_limit_any_more_is_stopped_in_time() {
+    let mut rig = Rig::enabled(1);
+    rig.move_to(2.0);
+    rig.run_until(Phase::Holding, 5_000);
+    rig.request(Request::Stream);
+    let period_s = PERIOD_NS as f64 * 1e-9;
+    let (mut position, mut velocity) = (2.0, 0.0_f64);
+    for _ in 0..2_000 {
+        velocity = (velocity + 5.0 * period_s).min(1.9);
+        position += velocity * period_s;
+        rig.stream(position, velocity, 5 * PERIOD_NS);
+        rig.run(1);
+    }
+    assert_eq!(reason(&rig).0, Rule::PositionLimit);
+    assert_eq!(rig.phase(), Phase::Holding);
+    let rest = rig.door.snapshot.axes[0].position_set;
+    assert!(rest <= 3.0 + 1e-6 && rest > 2.9, "{rest}");
+    rig.assert_limits_kept();
+}

@@ -1,0 +1,181 @@
+//! The problems of a file with their places: collected while it is read, and shown at their lines.
+
+use std::fmt;
+use std::ops::Range;
+use std::sync::Arc;
+
+use miette::{Diagnostic, NamedSource, SourceCode};
+
+use super::problem::{Problem, ProblemKind, Severity};
+
+/// The most problems that are shown with their lines; [`Findings::problems`] has all of them.
+const MOST_SHOWN: usize = 100;
+
+/// What was found in a file, in its order. `miette` shows each problem with its line.
+#[derive(Clone)]
+pub struct Findings(Arc<Inner>);
+
+struct Inner {
+    source: NamedSource<String>,
+    line_starts: Vec<usize>,
+    problems: Vec<Problem>,
+}
+
+/// A place in a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Place {
+    /// The line, counted from 1.
+    pub line: usize,
+    /// The character in the line, counted from 1.
+    pub column: usize,
+}
+
+impl Findings {
+    pub(super) fn new(source_name: &str, text: String, mut problems: Vec<Problem>) -> Self {
+        problems.sort_by_key(|problem| (problem.span.start, problem.span.end));
+        let line_starts = std::iter::once(0).chain(text.match_indices('\n').map(|(at, _)| at + 1)).collect();
+        Self(Arc::new(Inner { source: NamedSource::new(source_name, text), line_starts, problems }))
+    }
+
+    pub(super) fn unreadable(source_name: &str, reason: String) -> Self {
+        let kind = ProblemKind::Unreadable { reason };
+        Self::new(source_name, String::new(), vec![Problem { kind, span: 0..0, first_line: None }])
+    }
+
+    /// Every problem in the order of the file.
+    pub fn problems(&self) -> &[Problem] {
+        &self.0.problems
+    }
+
+    /// The name of the file.
+    pub fn source_name(&self) -> &str {
+        self.0.source.name()
+    }
+
+    /// Whether the file is not usable.
+    pub fn has_errors(&self) -> bool {
+        self.problems().iter().any(|problem| problem.kind.severity() == Severity::Error)
+    }
+
+    /// Whether nothing was found.
+    pub fn is_empty(&self) -> bool {
+        self.problems().is_empty()
+    }
+
+    /// Where a problem is.
+    pub fn place(&self, problem: &Problem) -> Place {
+        let text = self.0.source.inner();
+        let at = problem.span.start.min(text.len());
+        let line = self.0.line_starts.partition_point(|start| *start <= at);
+        let start = line.checked_sub(1).and_then(|line| self.0.line_starts.get(line)).copied().unwrap_or(0);
+        let column = text.get(start..at).map_or(0, |before| before.chars().count()) + 1;
+        Place { line, column }
+    }
+
+    /// The line that a problem is in, without blanks at its ends.
+    pub fn source_line(&self, problem: &Problem) -> &str {
+        let text = self.0.source.inner();
+        let start = problem.span.start.min(text.len());
+        let from = text.get(..start).and_then(|before| before.rfind('\n')).map_or(0, |at| at + 1);
+        text.get(from..).and_then(|rest| rest.lines().next()).unwrap_or("").trim()
+    }
+}
+
+impl fmt::Debug for Findings {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("Findings").field(&self.source_name()).field(&self.problems()).finish()
+    }
+}
+
+impl PartialEq for Findings {
+    fn eq(&self, other: &Self) -> bool {
+        self.source_name() == other.source_name()
+            && self.0.source.inner() == other.0.source.inner()
+            && self.problems() == other.problems()
+    }
+}
+
+impl fmt::Display for Findings {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let of =
+            |severity| self.problems().iter().filter(|problem| problem.kind.severity() == severity).count();
+        let counted = |count: usize, what: &str| match count {
+            1 => format!("1 {what}"),
+            _ => format!("{count} {what}s"),
+        };
+        let (errors, warnings) = (of(Severity::Error), of(Severity::Warning));
+        let name = self.source_name();
+        match (errors, warnings) {
+            (0, 0) => write!(f, "{name} is in order")?,
+            (0, _) => write!(f, "{name} is usable: {}", counted(warnings, "warning"))?,
+            (_, 0) => write!(f, "{name} cannot be used: {}", counted(errors, "error"))?,
+            _ => write!(
+                f,
+                "{name} cannot be used: {}, {}",
+                counted(errors, "error"),
+                counted(warnings, "warning")
+            )?,
+        }
+        if self.problems().len() > MOST_SHOWN {
+            write!(f, "; the first {MOST_SHOWN} are shown")?;
+        }
+        Ok(())
+    }
+}
+
+impl std::error::Error for Findings {}
+
+impl Diagnostic for Findings {
+    fn severity(&self) -> Option<miette::Severity> {
+        Some(if self.has_errors() { miette::Severity::Error } else { miette::Severity::Warning })
+    }
+
+    fn source_code(&self) -> Option<&dyn SourceCode> {
+        Some(&self.0.source)
+    }
+
+    /// The first of them; errors before warnings, should there be many.
+    fn related<'a>(&'a self) -> Option<Box<dyn Iterator<Item = &'a dyn Diagnostic> + 'a>> {
+        fn diagnostic(problem: &Problem) -> &dyn Diagnostic {
+            problem
+        }
+        let is_many = self.problems().len() > MOST_SHOWN;
+        let is_error = |problem: &&Problem| problem.kind.severity() == Severity::Error;
+        let first = self.problems().iter().filter(move |problem| !is_many || is_error(problem));
+        let then = self.problems().iter().filter(move |problem| is_many && !is_error(problem));
+        Some(Box::new(first.chain(then).take(MOST_SHOWN).map(diagnostic)))
+    }
+}
+
+/// Collects problems while a file is read.
+#[derive(Debug)]
+pub(super) struct Reporter {
+    line_starts: Vec<usize>,
+    problems: Vec<Problem>,
+}
+
+impl Reporter {
+    pub fn new(text: &str) -> Self {
+        let line_starts = std::iter::once(0).chain(text.match_indices('\n').map(|(at, _)| at + 1)).collect();
+        Self { line_starts, problems: vec![] }
+    }
+
+    pub fn report(&mut self, kind: ProblemKind, span: Range<usize>) {
+        self.problems.push(Problem { kind, span, first_line: None });
+    }
+
+    /// Reports what contradicts or repeats something that begins at `first`.
+    pub fn report_against(&mut self, kind: ProblemKind, span: Range<usize>, first: usize) {
+        let first_line = Some(self.line_of(first));
+        self.problems.push(Problem { kind, span, first_line });
+    }
+
+    /// The line of a byte, counted from 1.
+    pub fn line_of(&self, at: usize) -> usize {
+        self.line_starts.partition_point(|start| *start <= at)
+    }
+
+    pub fn into_problems(self) -> Vec<Problem> {
+        self.problems
+    }
+}

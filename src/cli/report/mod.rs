@@ -1,0 +1,75 @@
+//! `takt report`: what a recording or a black box tells.
+
+mod drawing;
+
+use std::fs;
+use std::io::{IsTerminal, Write, stdout};
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use takt::telemetry::{Emphasis, Recorded, RecordedError, RecordingReport};
+
+use super::exit::Exit;
+
+/// Tell from a recording or a black box why the group stopped, what led to it, and how the timing was
+#[derive(Args, Debug)]
+pub struct Arguments {
+    /// The recording, or a file of the black box; one that was cut off is read as far as it goes
+    recording: PathBuf,
+    /// Show this axis instead of the one concerned
+    #[arg(long, value_name = "NAME")]
+    axis: Option<String>,
+    /// Show so many cycles up to the stop
+    #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u64).range(1..=10_000))]
+    cycles: u64,
+    /// Draw position, velocity, following error and timing around the stop into this file
+    #[arg(long, value_name = "FILE.svg")]
+    svg: Option<PathBuf>,
+    /// Print the report as one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs it. The exit code is 2 when there is nothing to be read, 1 when the picture cannot be written, else 0: that
+/// the group stopped is no failure of the report.
+pub fn run(arguments: &Arguments) -> Exit {
+    match tell(arguments) {
+        Ok(exit) => exit,
+        Err(message) => {
+            eprintln!("takt: {message}");
+            Exit::Usage
+        }
+    }
+}
+
+fn tell(arguments: &Arguments) -> Result<Exit, String> {
+    let words = |error: RecordedError| error.to_string();
+    let recorded = Recorded::open(&arguments.recording).map_err(words)?;
+    let axis = recorded.axis(arguments.axis.as_deref());
+    if let (Some(name), None) = (&arguments.axis, axis) {
+        let names: Vec<&str> = recorded.machine.axes.iter().map(|axis| axis.name.as_str()).collect();
+        return Err(format!("there is no axis {name:?} in it; there are {}", names.join(", ")));
+    }
+    let report = RecordingReport::new(&recorded, axis, arguments.cycles).map_err(words)?;
+    let is_drawn = match &arguments.svg {
+        Some(path) => write(path, &drawing::draw(&recorded, axis).map_err(words)?),
+        None => true,
+    };
+    let text = if arguments.json {
+        let json = serde_json::to_string(&report);
+        format!("{}\n", json.map_err(|error| format!("the report cannot be written as JSON: {error}"))?)
+    } else {
+        report.picture(if stdout().is_terminal() { Emphasis::Ansi } else { Emphasis::None })
+    };
+    // A reader that has seen enough (`| head`) is no failure.
+    let _ = stdout().write_all(text.as_bytes());
+    Ok(if is_drawn { Exit::Done } else { Exit::Stopped })
+}
+
+fn write(path: &Path, svg: &str) -> bool {
+    let written = fs::write(path, svg);
+    if let Err(error) = &written {
+        eprintln!("takt: {} cannot be written: {error}", path.display());
+    }
+    written.is_ok()
+}

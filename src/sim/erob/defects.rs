@@ -1,0 +1,81 @@
+//! What is wrong with the module or its joint, and how that shows in its feedback.
+
+use takt_rt::frame::Frame;
+
+use super::dictionary::{Dictionary, at};
+use crate::sim::defect::Defect;
+
+/// The lasting defects of one module.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Defects {
+    /// The joint does not move.
+    pub is_joint_blocked: bool,
+    /// The brake does not open.
+    pub is_brake_stuck: bool,
+    /// The SDO server is mute.
+    pub is_sdo_silent: bool,
+    is_other_object_mapped: bool,
+    is_feedback_short: bool,
+    statusword: Option<(u16, u16)>,
+    operation_mode: Option<i8>,
+}
+
+/// The entries that a defect can show wrongly in the feedback.
+const SHOWN: [usize; 3] = [at::STATUSWORD, at::OPERATION_MODE_DISPLAY, at::POSITION];
+
+/// What these entries hold in truth.
+#[derive(Clone, Copy, Debug)]
+pub struct Truth([u32; SHOWN.len()]);
+
+impl Defects {
+    /// A lasting defect comes or goes; events leave nothing here.
+    pub fn set(&mut self, defect: Defect, is_present: bool) {
+        match defect {
+            Defect::BlockedJoint => self.is_joint_blocked = is_present,
+            Defect::StuckBrake => self.is_brake_stuck = is_present,
+            Defect::SilentSdoServer => self.is_sdo_silent = is_present,
+            Defect::OtherObjectMapped => self.is_other_object_mapped = is_present,
+            Defect::ShortFeedback => self.is_feedback_short = is_present,
+            Defect::Statusword { set, clear } => self.statusword = is_present.then_some((set, clear)),
+            Defect::OperationModeDisplay { mode } => self.operation_mode = is_present.then_some(mode),
+            Defect::EncoderJump { .. }
+            | Defect::Alarm { .. }
+            | Defect::Emergency { .. }
+            | Defect::TorqueOff => {}
+        }
+    }
+
+    /// Puts into the dictionary what the feedback is to show; [`Truth::restore`] takes it out again.
+    pub fn forge(&self, dictionary: &mut Dictionary) -> Truth {
+        let truth = Truth(SHOWN.map(|at| dictionary.get(at)));
+        if let Some((set, clear)) = self.statusword {
+            let word = dictionary.get(at::STATUSWORD) & !u32::from(clear) | u32::from(set);
+            dictionary.set(at::STATUSWORD, word);
+        }
+        if let Some(mode) = self.operation_mode {
+            dictionary.set(at::OPERATION_MODE_DISPLAY, mode as u8 as u32);
+        }
+        if self.is_other_object_mapped {
+            dictionary.set(at::POSITION, dictionary.get(at::MOTOR_ENCODER));
+        }
+        truth
+    }
+
+    /// A feedback PDO as it leaves the drive.
+    pub fn sent(&self, frame: Frame) -> Frame {
+        let bytes = frame.payload();
+        match bytes.split_last() {
+            Some((_, shorter)) if self.is_feedback_short => Frame::data(frame.id(), shorter).unwrap_or(frame),
+            _ => frame,
+        }
+    }
+}
+
+impl Truth {
+    /// Puts the entries back.
+    pub fn restore(self, dictionary: &mut Dictionary) {
+        for (at, value) in SHOWN.into_iter().zip(self.0) {
+            dictionary.set(at, value);
+        }
+    }
+}

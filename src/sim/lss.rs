@@ -1,0 +1,208 @@
+//! A device that can be given its node number and bit rate by LSS (CiA 305), and does nothing else.
+
+use takt_rt::frame::Frame;
+
+use crate::canopen::lss::{BitTiming, Inquiry, LssAddress, LssMode, LssRequest, LssResponse, LssResult};
+use crate::canopen::nmt::{ErrorControl, NmtState};
+
+/// The node number of a device that has none.
+const NO_NODE: u8 = 0xFF;
+/// The value of `lowest_bit` that begins a scan.
+const SCAN_BEGINS: u8 = 0x80;
+
+/// What the device keeps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Settings {
+    node: Option<u8>,
+    bit_timing: BitTiming,
+}
+
+/// The device.
+#[derive(Clone, Copy, Debug)]
+pub struct LssDevice {
+    address: LssAddress,
+    mode: LssMode,
+    /// What it is on the bus.
+    active: Settings,
+    /// What it will be.
+    pending: Settings,
+    /// What it will be after power-up.
+    stored: Settings,
+    /// How many values of a selection, or of a span of identities, have been right in their order.
+    selected: u8,
+    identified: u8,
+    /// The value that the fast scan asks for next.
+    scan_part: u8,
+    /// Whether it can store.
+    pub can_store: bool,
+}
+
+impl LssDevice {
+    /// A device with this identity, and the node number that it has stored.
+    pub fn new(address: LssAddress, node: Option<u8>) -> Self {
+        let settings = Settings { node, bit_timing: BitTiming::Kilobits1000 };
+        Self {
+            address,
+            mode: LssMode::Waiting,
+            active: settings,
+            pending: settings,
+            stored: settings,
+            selected: 0,
+            identified: 0,
+            scan_part: 0,
+            can_store: true,
+        }
+    }
+
+    /// Its node number; `None` while it has none and is silent.
+    pub fn node(&self) -> Option<u8> {
+        self.active.node
+    }
+
+    /// The bit rate that it uses.
+    pub fn bit_timing(&self) -> BitTiming {
+        self.active.bit_timing
+    }
+
+    /// Whether it waits or obeys.
+    pub fn mode(&self) -> LssMode {
+        self.mode
+    }
+
+    /// The supply returns: it has what it had stored, and boots when that is a node number.
+    pub fn power_cycle(&mut self) -> Option<Frame> {
+        *self = Self { can_store: self.can_store, ..Self::new(self.address, None).with(self.stored) };
+        self.boot_up()
+    }
+
+    fn with(self, settings: Settings) -> Self {
+        Self { active: settings, pending: settings, stored: settings, ..self }
+    }
+
+    /// Takes a frame of the master; returns what it says to it.
+    pub fn receive(&mut self, frame: &Frame) -> Option<Frame> {
+        let request = LssRequest::decode(frame)?;
+        let answer = match request {
+            LssRequest::SwitchGlobal(mode) => return self.switch(mode),
+            LssRequest::SwitchSelective { part, value } => self.select(part, value)?,
+            LssRequest::IdentifyRemote { part, value } => self.identify(part, value)?,
+            LssRequest::IdentifyUnconfigured if self.active.node.is_none() => {
+                LssResponse::IdentifiedUnconfigured
+            }
+            LssRequest::FastScan { value, lowest_bit, part, next } => {
+                self.scan(value, lowest_bit, part, next)?
+            }
+            LssRequest::IdentifyUnconfigured => return None,
+            _ if self.mode == LssMode::Waiting => return None,
+            LssRequest::ConfigureNode(node) => LssResponse::NodeConfigured(self.configure_node(node)),
+            LssRequest::ConfigureBitTiming(BitTiming::Automatic) => {
+                LssResponse::BitTimingConfigured(LssResult::REFUSED)
+            }
+            LssRequest::ConfigureBitTiming(timing) => {
+                self.pending.bit_timing = timing;
+                LssResponse::BitTimingConfigured(LssResult::OK)
+            }
+            LssRequest::ActivateBitTiming { .. } => {
+                self.active.bit_timing = self.pending.bit_timing;
+                return None;
+            }
+            LssRequest::Store if self.can_store => {
+                self.stored = self.pending;
+                LssResponse::Stored(LssResult::OK)
+            }
+            LssRequest::Store => LssResponse::Stored(LssResult::REFUSED),
+            LssRequest::Inquire(inquiry) => LssResponse::Told(inquiry, self.told(inquiry)),
+        };
+        Some(answer.frame())
+    }
+
+    fn told(&self, inquiry: Inquiry) -> u32 {
+        match inquiry {
+            Inquiry::Vendor => self.address.vendor,
+            Inquiry::Product => self.address.product,
+            Inquiry::Revision => self.address.revision,
+            Inquiry::Serial => self.address.serial,
+            Inquiry::Node => self.active.node.unwrap_or(NO_NODE).into(),
+        }
+    }
+
+    /// A device that had no node number boots with the one that it was given.
+    fn switch(&mut self, mode: LssMode) -> Option<Frame> {
+        self.mode = mode;
+        self.selected = 0;
+        if mode == LssMode::Configuration || self.active.node.is_some() {
+            return None;
+        }
+        self.active.node = self.pending.node;
+        self.boot_up()
+    }
+
+    fn boot_up(&self) -> Option<Frame> {
+        Some(ErrorControl { node: self.active.node?, state: NmtState::BootUp }.frame())
+    }
+
+    fn select(&mut self, part: u8, value: u32) -> Option<LssResponse> {
+        let is_right =
+            self.mode == LssMode::Waiting && self.address.values().get(usize::from(part)) == Some(&value);
+        self.selected = match part {
+            0 if is_right => 1,
+            part if is_right && part == self.selected => self.selected + 1,
+            _ => 0,
+        };
+        if self.selected < 4 {
+            return None;
+        }
+        self.selected = 0;
+        self.mode = LssMode::Configuration;
+        Some(LssResponse::Switched)
+    }
+
+    fn identify(&mut self, part: u8, value: u32) -> Option<LssResponse> {
+        let LssAddress { vendor, product, revision, serial } = self.address;
+        let is_right = match part {
+            0 => vendor == value,
+            1 => product == value,
+            2 => revision >= value,
+            3 => revision <= value,
+            4 => serial >= value,
+            _ => serial <= value,
+        };
+        self.identified = match part {
+            0 if is_right => 1,
+            part if is_right && part == self.identified => self.identified + 1,
+            _ => 0,
+        };
+        (self.identified == 6).then_some(LssResponse::Identified)
+    }
+
+    fn scan(&mut self, value: u32, lowest_bit: u8, part: u8, next: u8) -> Option<LssResponse> {
+        if self.active.node.is_some() || self.pending.node.is_some() || self.mode == LssMode::Configuration {
+            return None;
+        }
+        if lowest_bit == SCAN_BEGINS {
+            self.scan_part = 0;
+            return Some(LssResponse::Identified);
+        }
+        let own = self.address.values().get(usize::from(part)).copied()?;
+        let counted = u32::MAX.checked_shl(lowest_bit.into())?;
+        if part != self.scan_part || (own ^ value) & counted != 0 {
+            return None;
+        }
+        if lowest_bit == 0 {
+            self.scan_part = next;
+            if next < part {
+                self.mode = LssMode::Configuration;
+            }
+        }
+        Some(LssResponse::Identified)
+    }
+
+    fn configure_node(&mut self, node: u8) -> LssResult {
+        self.pending.node = match node {
+            1..=127 => Some(node),
+            NO_NODE => None,
+            _ => return LssResult::REFUSED,
+        };
+        LssResult::OK
+    }
+}

@@ -1,0 +1,181 @@
+//! From the messages of a recording back to records.
+
+use takt_rt::cia402::State;
+use takt_rt::port::{BusHealth, BusState};
+use takt_rt::record::{AxisRecord, CycleRecord, EventKind, Timing};
+use takt_rt::stop::{Phase, Rule, StopCategory, StopReason};
+use takt_rt::watch::TimingLevel;
+
+use super::EventFields;
+use crate::bus::trace::TracedHealth;
+use crate::telemetry::cdr::CdrDecoder;
+use crate::telemetry::recorded::RecordedEvent;
+
+/// Decodes a [`CYCLE`](super::CYCLE), without its axes.
+pub fn decode_cycle(message: &[u8]) -> Option<CycleRecord> {
+    let mut fields = CdrDecoder::begin(message)?;
+    let timing = Timing {
+        slot: fields.u64()?,
+        slot_start_ns: fields.u64()?,
+        wake_ns: fields.u64()?,
+        sync_ns: fields.u64()?,
+        compute_ns: fields.u64()?,
+        sent_ns: fields.u64()?,
+        missed_slots: fields.u64()?,
+    };
+    let (phase, is_commanded) = (phase(fields.u8()?)?, fields.u8()? != 0);
+    Some(CycleRecord { timing, phase, is_commanded, ..CycleRecord::default() })
+}
+
+/// Decodes an [`AXIS`](super::AXIS), with its slot.
+pub fn decode_axis(message: &[u8]) -> Option<(u64, AxisRecord)> {
+    let mut fields = CdrDecoder::begin(message)?;
+    let slot = fields.u64()?;
+    let mut axis = AxisRecord {
+        position_set: fields.f64()?,
+        position: fields.f64()?,
+        velocity_set: fields.f32()?,
+        acceleration_set: fields.f32()?,
+        jerk_set: fields.f32()?,
+        velocity: fields.f32()?,
+        torque_set: fields.f32()?,
+        torque: fields.f32()?,
+        following_error: fields.f32()?,
+        command_raw: fields.i32()?,
+        position_raw: fields.i32()?,
+        controlword: fields.u16()?,
+        statusword: fields.u16()?,
+        error_code: fields.u16()?,
+        feedback_age: fields.u16()?,
+        ..AxisRecord::default()
+    };
+    axis.drive_state = drive_state(fields.u8()?)?;
+    Some((slot, axis))
+}
+
+/// Decodes an [`EVENT`](super::EVENT).
+pub fn decode_event(message: &[u8]) -> Option<RecordedEvent> {
+    let mut fields = CdrDecoder::begin(message)?;
+    let (slot, at_ns, kind, text) = (fields.u64()?, fields.u64()?, fields.u8()?, fields.string()?);
+    let of_kind = EventFields {
+        kind,
+        axis: u8::try_from(fields.i16()?).ok(),
+        phase_from: fields.u8()?,
+        phase_to: fields.u8()?,
+        category: fields.u8()?,
+        rule: fields.u8()?,
+        value: fields.f64()?,
+        limit: fields.f64()?,
+        move_id: fields.u32()?,
+        missed_slots: fields.u64()?,
+        timing_level: fields.u8()?,
+        drive_state: fields.u8()?,
+        statusword: fields.u16()?,
+        error_code: fields.u16()?,
+        error_register: fields.u8()?,
+        manufacturer: fields.octets()?,
+    };
+    Some(RecordedEvent { slot, at_ns, text, kind: of_kind.kind(slot) })
+}
+
+/// Decodes a [`BUS`](super::BUS).
+pub fn decode_bus(message: &[u8]) -> Option<TracedHealth> {
+    let mut fields = CdrDecoder::begin(message)?;
+    let at_ns = fields.u64()?;
+    let state = *BUS_STATES.get(usize::from(fields.u8()?))?;
+    let health = BusHealth {
+        state,
+        errors: fields.u64()?,
+        tx_overruns: fields.u64()?,
+        rx_overruns: fields.u64()?,
+        tx_frames: fields.u64()?,
+        rx_frames: fields.u64()?,
+        busy_ns: 0,
+    };
+    Some(TracedHealth { at_ns, health })
+}
+
+pub(super) const BUS_STATES: [BusState; 4] =
+    [BusState::ErrorActive, BusState::ErrorPassive, BusState::BusOff, BusState::Down];
+const CATEGORIES: [StopCategory; 3] = [StopCategory::Zero, StopCategory::One, StopCategory::Two];
+
+fn drive_state(number: u8) -> Option<State> {
+    State::ALL.get(usize::from(number)).copied()
+}
+
+fn phase(number: u8) -> Option<Phase> {
+    Phase::ALL.get(usize::from(number)).copied()
+}
+
+impl EventFields {
+    /// The event that these are the fields of, if this version knows it.
+    fn kind(&self, slot: u64) -> Option<EventKind> {
+        Some(match self.kind {
+            0 => EventKind::PhaseChanged { from: phase(self.phase_from)?, to: phase(self.phase_to)? },
+            1 => EventKind::Stop(StopReason {
+                category: *CATEGORIES.get(usize::from(self.category))?,
+                rule: *Rule::ALL.get(usize::from(self.rule))?,
+                axis: self.axis,
+                value: self.value,
+                limit: self.limit,
+                slot,
+                phase: phase(self.phase_from)?,
+            }),
+            2 => EventKind::MoveFinished { id: self.move_id },
+            3 => EventKind::DriveState {
+                axis: self.axis?,
+                state: drive_state(self.drive_state)?,
+                statusword: self.statusword,
+            },
+            4 => EventKind::Emergency {
+                axis: self.axis?,
+                code: self.error_code,
+                register: self.error_register,
+                manufacturer: self.manufacturer,
+            },
+            5 => EventKind::MissedSlots { count: self.missed_slots },
+            6 => EventKind::Refused { phase: phase(self.phase_from)? },
+            7 => EventKind::Timing { level: *TimingLevel::ALL.get(usize::from(self.timing_level))? },
+            _ => return None,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::telemetry::cdr::CdrEncoder;
+    use crate::telemetry::messages::encode_event;
+    use takt_rt::record::Event;
+
+    #[test]
+    fn every_kind_of_event_is_read_as_it_was_written() {
+        let stop = StopReason {
+            category: StopCategory::Two,
+            rule: Rule::FollowingError,
+            axis: Some(3),
+            value: 0.25,
+            limit: -1.5,
+            slot: 77,
+            phase: Phase::Streaming,
+        };
+        let mut encoder = CdrEncoder::default();
+        for kind in [
+            EventKind::PhaseChanged { from: Phase::Passive, to: Phase::Disabled },
+            EventKind::Stop(stop),
+            EventKind::Stop(StopReason { axis: None, ..stop }),
+            EventKind::MoveFinished { id: 9 },
+            EventKind::DriveState { axis: 2, state: State::OperationEnabled, statusword: 0x1637 },
+            EventKind::Timing { level: TimingLevel::Degraded },
+            EventKind::Emergency { axis: 1, code: 0x7305, register: 0x21, manufacturer: [1, 2, 3, 4, 5] },
+            EventKind::MissedSlots { count: 30 },
+            EventKind::Refused { phase: Phase::Moving },
+        ] {
+            encode_event(&Event { slot: 77, at_ns: 88, kind }, "in words", &mut encoder);
+            let expected =
+                RecordedEvent { slot: 77, at_ns: 88, text: "in words".to_owned(), kind: Some(kind) };
+            assert_eq!(decode_event(encoder.bytes()), Some(expected));
+            assert_eq!(decode_event(&encoder.bytes()[..encoder.bytes().len() - 1]), None);
+        }
+    }
+}

@@ -1,0 +1,100 @@
+//! Why the group stopped, as a recording tells it, and where to look for what led to it.
+
+use std::ops::RangeInclusive;
+
+use serde::Serialize;
+use takt_rt::record::EventKind;
+use takt_rt::stop::{Rule, StopReason};
+
+use super::Recorded;
+use crate::telemetry::words;
+
+/// Why the group stopped.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Cause {
+    /// In words.
+    pub reason: String,
+    /// The rule by its key.
+    pub rule: String,
+    /// IEC 60204-1: 0, 1 or 2; `None` when there was nothing to stop.
+    pub category: Option<u8>,
+    /// The axis concerned.
+    pub axis: Option<String>,
+    /// What was seen, in the unit of the rule.
+    pub value: Option<f64>,
+    /// What would have been allowed.
+    pub limit: Option<f64>,
+    /// The slot in which it was seen.
+    pub slot: u64,
+    /// What the group was doing.
+    pub phase: Option<String>,
+}
+
+impl Recorded {
+    /// Why the group stopped: what the black box was written for, else the first stop that nobody had asked for, else
+    /// the first that somebody had.
+    pub fn cause(&self) -> Option<Cause> {
+        if let Some(fault) = self.faults.first() {
+            let text = |key: &str| fault.get(key).cloned();
+            let number = |key: &str| fault.get(key)?.parse::<f64>().ok();
+            return Some(Cause {
+                reason: text("reason").unwrap_or_default(),
+                rule: text("rule").unwrap_or_default(),
+                category: number("category").map(|category| category as u8),
+                axis: text("axis"),
+                value: number("value"),
+                limit: number("limit"),
+                slot: fault.get("slot").and_then(|slot| slot.parse().ok()).unwrap_or(0),
+                phase: text("phase"),
+            });
+        }
+        let stops = || {
+            self.events.iter().filter_map(|event| match event.kind {
+                Some(EventKind::Stop(stop)) => Some((event.slot, stop)),
+                _ => None,
+            })
+        };
+        let unrequested = stops().find(|(_, stop)| stop.rule != Rule::Requested);
+        unrequested.or_else(|| stops().next()).map(|(slot, stop)| self.cause_of(slot, &stop))
+    }
+
+    fn cause_of(&self, slot: u64, stop: &StopReason) -> Cause {
+        Cause {
+            reason: words::stop(stop, &self.machine),
+            rule: words::rule_key(stop.rule).to_owned(),
+            category: Some(stop.category as u8),
+            axis: stop.axis.map(|axis| self.machine.axis_name(axis)),
+            value: Some(stop.value),
+            limit: Some(stop.limit),
+            slot,
+            phase: Some(words::phase(stop.phase).to_owned()),
+        }
+    }
+
+    /// The slots from so many before the cause (or the end, when there is none) to so many after it.
+    pub fn slots_around_cause(&self, before: u64, after: u64) -> RangeInclusive<u64> {
+        let (first, last) = self.slots.unwrap_or((0, 0));
+        let slot = self.cause().map_or(last, |cause| cause.slot).clamp(first, last);
+        slot.saturating_sub(before).max(first)..=slot.saturating_add(after).min(last)
+    }
+
+    /// The number of the axis with this name; without a name, of the axis concerned, or else of the one that was
+    /// furthest from its set-points.
+    pub fn axis(&self, name: Option<&str>) -> Option<usize> {
+        let position = |name: &str| self.machine.axes.iter().position(|axis| axis.name == name);
+        if let Some(name) = name {
+            return position(name);
+        }
+        let error = |axis: &usize| {
+            let largest = self.statistics.axes.get(*axis).and_then(|axis| axis.following_error_max);
+            largest.map_or(0.0, |largest| largest.error)
+        };
+        let furthest =
+            || (0..self.machine.axes.len()).max_by(|a, b| error(a).total_cmp(&error(b)).then(b.cmp(a)));
+        self.cause().and_then(|cause| position(&cause.axis?)).or_else(furthest)
+    }
+
+    pub(in crate::telemetry) fn seconds(&self, at_ns: u64) -> f64 {
+        (at_ns as f64 - self.statistics.first_ns as f64) * 1e-9
+    }
+}

@@ -1,0 +1,336 @@
+//! Reads a recording or a black box: what it is of, what happened in it, how the timing was, and any of its cycles.
+
+mod cause;
+mod walk;
+
+use std::collections::{BTreeMap, HashMap};
+use std::fs::File;
+use std::io::BufReader;
+use std::ops::RangeInclusive;
+use std::path::{Path, PathBuf};
+
+use mcap::records::Record;
+use takt_rt::record::{CycleRecord, EventKind};
+use takt_rt::time::Nanoseconds;
+
+use super::black_box;
+use super::machine::{AxisDescription, BusDescription, Machine, SetPointMagnitudes, Unit};
+use super::messages::{self, MessageType};
+use super::past::OnBus;
+use super::recording;
+use super::statistics::Statistics;
+use super::wall_clock::WallClock;
+use crate::bus::trace::TracedHealth;
+
+pub use cause::Cause;
+pub use walk::WalkError;
+
+/// Why a file cannot be read.
+#[derive(Debug, thiserror::Error)]
+pub enum RecordedError {
+    /// It is none that can be read.
+    #[error("{path}: {error}")]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        #[source]
+        error: WalkError,
+    },
+    /// It is an MCAP file of something else.
+    #[error("{path}: no recording of takt (it was written by {library:?})")]
+    Foreign {
+        /// The file.
+        path: PathBuf,
+        /// What the file says of its writer.
+        library: String,
+    },
+    /// Its messages have other fields.
+    #[error("{path}: written by takt {version}, whose {message} has other fields; read it with that version")]
+    OtherVersion {
+        /// The file.
+        path: PathBuf,
+        /// The version that wrote it.
+        version: String,
+        /// The message.
+        message: &'static str,
+    },
+}
+
+/// An event with what the recording says of it in words.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RecordedEvent {
+    /// The slot in which it was seen.
+    pub slot: u64,
+    /// When, on the monotonic clock of the run.
+    pub at_ns: Nanoseconds,
+    /// In words.
+    pub text: String,
+    /// What it was; `None` when it is of a kind that this version does not know.
+    pub kind: Option<EventKind>,
+}
+
+/// A recording, but for its cycles.
+#[derive(Clone, Debug)]
+pub struct Recorded {
+    /// The file.
+    pub path: PathBuf,
+    /// The version of takt that wrote it.
+    pub version: String,
+    /// Names, units and limits.
+    pub machine: Machine,
+    /// The faults for which a black box was written, each with its keys; none in an ordinary recording.
+    pub faults: Vec<BTreeMap<String, String>>,
+    /// What happened, in the order of the file.
+    pub events: Vec<RecordedEvent>,
+    /// How the buses were, whenever that changed, with the number of the bus.
+    pub health: Vec<(usize, TracedHealth)>,
+    /// Timing and following errors of the whole recording.
+    pub statistics: Statistics,
+    /// The first and the last slot.
+    pub slots: Option<(u64, u64)>,
+    /// The time of day.
+    pub wall_clock: Option<WallClock>,
+    /// What is not as it should be with the file.
+    pub warnings: Vec<String>,
+}
+
+impl Recorded {
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// See [`RecordedError`]. A file that is cut off or damaged in parts is read as far as it goes, with a warning.
+    pub fn open(path: &Path) -> Result<Self, RecordedError> {
+        let mut recorded = Self {
+            path: path.to_owned(),
+            version: String::new(),
+            machine: Machine { name: String::new(), cycle_ns: 0, axes: Vec::new(), buses: Vec::new() },
+            faults: Vec::new(),
+            events: Vec::new(),
+            health: Vec::new(),
+            statistics: Statistics::default(),
+            slots: None,
+            wall_clock: None,
+            warnings: Vec::new(),
+        };
+        let decoder = recorded.read(|recorded, item| recorded.take(item))?;
+        recorded.machine.axes = decoder.axes.into_values().collect();
+        Ok(recorded)
+    }
+
+    /// The cycles of these slots, in their order.
+    ///
+    /// # Errors
+    /// See [`RecordedError`].
+    pub fn cycles(&self, slots: &RangeInclusive<u64>) -> Result<Vec<CycleRecord>, RecordedError> {
+        let mut cycles = Vec::new();
+        let mut copy = Self { warnings: Vec::new(), ..self.clone() };
+        copy.read(|_, item| {
+            if let Item::Cycle(record, _) = item
+                && slots.contains(&record.timing.slot)
+            {
+                cycles.push(*record);
+            }
+        })?;
+        Ok(cycles)
+    }
+
+    fn take(&mut self, item: Item<'_>) {
+        match item {
+            Item::Machine(mut described) => {
+                let mut text = |key: &str| described.remove(key).unwrap_or_default();
+                self.version = text("version");
+                self.machine.name = text("machine");
+                self.machine.cycle_ns = text("cycle_ns").parse().unwrap_or(0);
+                let bus = |name: &str| BusDescription { name: name.to_owned(), interface: String::new() };
+                self.machine.buses = text("buses").lines().map(bus).collect();
+            }
+            Item::Fault(fault) => self.faults.push(fault),
+            Item::Cycle(record, log_time_ns) => {
+                let (slot, start_ns) = (record.timing.slot, record.timing.slot_start_ns);
+                if self.statistics.axes.is_empty() {
+                    self.statistics = Statistics::new(record.axis_count.into());
+                }
+                self.statistics.add(record);
+                self.wall_clock =
+                    self.wall_clock.or_else(|| Some(WallClock::fixed(log_time_ns.saturating_sub(start_ns))));
+                self.slots = Some((self.slots.map_or(slot, |(first, _)| first), slot));
+            }
+            Item::Event(event) => self.events.push(event),
+            Item::Health(OnBus { bus, what }) => self.health.push((bus, what)),
+        }
+    }
+
+    /// Shows everything in the file to `take`.
+    fn read(&mut self, mut take: impl FnMut(&mut Self, Item<'_>)) -> Result<Decoder, RecordedError> {
+        let path = self.path.clone();
+        let unreadable = |error| RecordedError::Unreadable { path: path.clone(), error };
+        let file = File::open(&path).map_err(|error| unreadable(error.into()))?;
+        let mut decoder = Decoder::default();
+        let condition = walk::walk(BufReader::new(file), |opcode, body| {
+            decoder.record(opcode, body, &mut |item| take(self, item));
+        })
+        .map_err(unreadable)?;
+        decoder.finish(&mut |item| take(self, item));
+        if let Some(message) = decoder.other_layout {
+            return Err(RecordedError::OtherVersion { path, version: self.version.clone(), message });
+        }
+        if !decoder.is_of_takt {
+            let library = decoder.library;
+            return Err(RecordedError::Foreign { path, library });
+        }
+        if !condition.is_whole {
+            self.warnings.push("the file is cut off; this is what there is of it".to_owned());
+        }
+        if condition.damaged_chunks > 0 {
+            self.warnings.push(format!("{} damaged parts were left out", condition.damaged_chunks));
+        }
+        if decoder.malformed > 0 {
+            self.warnings.push(format!("{} malformed messages were left out", decoder.malformed));
+        }
+        Ok(decoder)
+    }
+}
+
+/// What a recording consists of.
+enum Item<'a> {
+    Machine(BTreeMap<String, String>),
+    Fault(BTreeMap<String, String>),
+    /// With its time of day.
+    Cycle(&'a CycleRecord, u64),
+    Event(RecordedEvent),
+    Health(OnBus<TracedHealth>),
+}
+
+/// What a channel carries.
+#[derive(Clone, Copy)]
+enum Carries {
+    Cycles,
+    Axis(usize),
+    Events,
+    Health(usize),
+}
+
+/// From records to items.
+#[derive(Default)]
+struct Decoder {
+    library: String,
+    is_of_takt: bool,
+    other_layout: Option<&'static str>,
+    schemas: HashMap<u16, &'static MessageType>,
+    channels: HashMap<u16, Carries>,
+    axes: BTreeMap<usize, AxisDescription>,
+    /// The cycle whose axes follow, its time of day, and how many of them have been seen.
+    cycle: Option<(Box<CycleRecord>, u64, usize)>,
+    malformed: u64,
+}
+
+impl Decoder {
+    fn record(&mut self, opcode: u8, body: &[u8], give: &mut impl FnMut(Item<'_>)) {
+        use mcap::records::op;
+        if !matches!(opcode, op::HEADER | op::SCHEMA | op::CHANNEL | op::MESSAGE | op::METADATA) {
+            return;
+        }
+        match mcap::parse_record(opcode, body) {
+            Ok(Record::Header(header)) => self.library = header.library,
+            Ok(Record::Schema { header, data }) => self.schema(header.id, &header.name, &data),
+            Ok(Record::Channel(channel)) => self.channel(&channel),
+            Ok(Record::Metadata(metadata)) if metadata.name == recording::METADATA => {
+                self.is_of_takt = true;
+                give(Item::Machine(metadata.metadata));
+            }
+            Ok(Record::Metadata(metadata)) if metadata.name == black_box::METADATA => {
+                give(Item::Fault(metadata.metadata));
+            }
+            Ok(Record::Message { header, data }) => {
+                if let Some(carries) = self.channels.get(&header.channel_id)
+                    && self.message(*carries, header.log_time, &data, give).is_none()
+                {
+                    self.malformed += 1;
+                }
+            }
+            Ok(_) => {}
+            Err(_) => self.malformed += 1,
+        }
+    }
+
+    fn schema(&mut self, id: u16, name: &str, definition: &[u8]) {
+        let known = messages::READ.iter().find(|message| message.name == name);
+        let Some(known) = known else { return };
+        if messages::layout(&String::from_utf8_lossy(definition)) == messages::layout(known.definition) {
+            self.schemas.insert(id, known);
+        } else {
+            self.other_layout = Some(known.name);
+        }
+    }
+
+    fn channel(&mut self, channel: &mcap::records::Channel) {
+        let Some(schema) = self.schemas.get(&channel.schema_id) else { return };
+        let text = |key: &str| channel.metadata.get(key).map_or("", String::as_str);
+        let number = |key: &str| text(key).parse().unwrap_or(f64::INFINITY);
+        let index = text("index").parse::<usize>().ok();
+        let carries = match (schema.name, index) {
+            (name, _) if name == messages::CYCLE.name => Carries::Cycles,
+            (name, _) if name == messages::EVENT.name => Carries::Events,
+            (name, Some(index)) if name == messages::AXIS.name => {
+                let description = AxisDescription {
+                    name: text("name").to_owned(),
+                    unit: if text("unit") == Unit::Metre.symbol() { Unit::Metre } else { Unit::Radian },
+                    counts_per_unit: number("counts_per_unit"),
+                    limits: SetPointMagnitudes {
+                        velocity: number("velocity_limit"),
+                        acceleration: number("acceleration_limit"),
+                        jerk: number("jerk_limit"),
+                    },
+                };
+                self.axes.insert(index, description);
+                Carries::Axis(index)
+            }
+            (name, Some(index)) if name == messages::BUS.name => Carries::Health(index),
+            _ => return,
+        };
+        self.channels.insert(channel.id, carries);
+    }
+
+    fn message(
+        &mut self,
+        carries: Carries,
+        log_time_ns: u64,
+        data: &[u8],
+        give: &mut impl FnMut(Item<'_>),
+    ) -> Option<()> {
+        match carries {
+            Carries::Cycles => {
+                let mut record = Box::new(messages::decode_cycle(data)?);
+                record.axis_count = u8::try_from(self.axes.len()).ok()?;
+                self.finish(give);
+                self.cycle = Some((record, log_time_ns, 0));
+                if self.axes.is_empty() {
+                    self.finish(give);
+                }
+            }
+            Carries::Axis(index) => {
+                let (slot, axis) = messages::decode_axis(data)?;
+                let (record, _, seen) = self.cycle.as_mut()?;
+                if record.timing.slot == slot {
+                    *record.axes.get_mut(index)? = axis;
+                    *seen += 1;
+                }
+            }
+            Carries::Events => {
+                give(Item::Event(messages::decode_event(data)?));
+            }
+            Carries::Health(bus) => give(Item::Health(OnBus { bus, what: messages::decode_bus(data)? })),
+        }
+        Some(())
+    }
+
+    /// Gives the last cycle, unless some of its axes are missing.
+    fn finish(&mut self, give: &mut impl FnMut(Item<'_>)) {
+        if let Some((record, log_time_ns, seen)) = self.cycle.take()
+            && seen == self.axes.len()
+        {
+            give(Item::Cycle(&record, log_time_ns));
+        }
+    }
+}

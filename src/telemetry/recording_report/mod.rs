@@ -1,0 +1,240 @@
+//! What a recording or a black box tells: why the group stopped, what led to it, how the timing was.
+
+mod picture;
+
+use std::path::PathBuf;
+
+use serde::Serialize;
+use takt_rt::record::{AxisRecord, CycleRecord, EventKind};
+
+use super::machine::SetPointMagnitudes;
+use super::recorded::{Cause, Recorded, RecordedError};
+use super::report::{BusReport, LatencyReport, SetPointParts};
+use super::words;
+
+/// Events that are told before the cause, and after it.
+const EVENTS: (usize, usize) = (24, 12);
+
+/// A recording in numbers and words.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct RecordingReport {
+    /// The file.
+    pub recording: PathBuf,
+    /// The version of takt that wrote it.
+    pub version: String,
+    /// The name of the machine.
+    pub machine: String,
+    /// Period of the cycle.
+    pub cycle_ns: u64,
+    /// When it begins, in UTC.
+    pub begins: Option<String>,
+    /// Cycles in it.
+    pub cycles: u64,
+    /// Whether it is the file of a black box.
+    pub is_black_box: bool,
+    /// What is not as it should be with the file.
+    pub warnings: Vec<String>,
+    /// Why the group stopped; `None` when it did not.
+    pub cause: Option<Cause>,
+    /// The axis concerned, or the one that was asked for; `None` when there is no cycle.
+    pub axis: Option<AxisCycles>,
+    /// What happened around the cause, or at last.
+    pub events: Vec<ReportedEvent>,
+    /// Every emergency message of a drive.
+    pub emergencies: Vec<ReportedEvent>,
+    /// How late the timer woke the thread.
+    pub wake_ns: LatencyReport,
+    /// SYNC release error.
+    pub sync_ns: LatencyReport,
+    /// From feedback to set-points, without I/O.
+    pub compute_ns: LatencyReport,
+    /// When the last set-point had been handed over, after the start of the slot.
+    pub sent_ns: LatencyReport,
+    /// Slots that passed unused.
+    pub missed_slots: u64,
+    /// The axes in the order of the configuration.
+    pub axes: Vec<AxisSummary>,
+    /// What became worse on the buses; an ordinary recording does not have it.
+    pub buses: Vec<BusChange>,
+}
+
+/// The cycles of one axis that led to the cause.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct AxisCycles {
+    /// Its name.
+    pub name: String,
+    /// `rad` or `m`.
+    pub unit: &'static str,
+    /// The last cycles, up to the one of the cause.
+    pub cycles: Vec<AxisCycle>,
+}
+
+/// One axis in one cycle; rad for a rotary axis, m for a linear one.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct AxisCycle {
+    /// The slot.
+    pub slot: u64,
+    /// What the group was doing.
+    pub phase: &'static str,
+    /// The set-point.
+    pub position_set: f64,
+    /// What the drive reported.
+    pub position: f64,
+    /// The velocity that was asked for.
+    pub velocity_set: f32,
+    /// Actual velocity.
+    pub velocity: f32,
+    /// Distance between the set-point in force and the position reported for it.
+    pub following_error: f32,
+    /// Object 6041.
+    pub statusword: u16,
+    /// The state of the drive that the statusword shows.
+    pub state: &'static str,
+    /// Object 6040.
+    pub controlword: u16,
+    /// Object 603F.
+    pub error_code: u16,
+    /// Cycles since the drive last reported.
+    pub feedback_age: u16,
+}
+
+/// One axis over the whole recording.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct AxisSummary {
+    /// Its name.
+    pub name: String,
+    /// `rad` or `m`.
+    pub unit: &'static str,
+    /// The largest following error while enabled.
+    pub following_error_max: Option<f64>,
+    /// The largest velocity, acceleration and jerk of its set-points.
+    pub set_point_max: SetPointMagnitudes,
+    /// As parts of their limits.
+    pub set_point_part: SetPointParts,
+}
+
+/// Something that happened.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ReportedEvent {
+    /// The slot in which it was seen.
+    pub slot: u64,
+    /// After the beginning of the recording; negative for what was before it.
+    pub at_s: f64,
+    /// In words.
+    pub text: String,
+}
+
+/// A change of a bus.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct BusChange {
+    /// Its name.
+    pub name: String,
+    /// After the beginning of the recording.
+    pub at_s: f64,
+    /// The fault confinement state.
+    pub state: &'static str,
+    /// Error frames and bus errors since the run began.
+    pub errors: u64,
+    /// Frames that the interface had no room for.
+    pub tx_overruns: u64,
+    /// Received frames that were lost.
+    pub rx_overruns: u64,
+}
+
+impl RecordingReport {
+    /// Puts it together, with so many cycles of the axis concerned, or of `axis`.
+    ///
+    /// # Errors
+    /// See [`RecordedError`].
+    pub fn new(recorded: &Recorded, axis: Option<usize>, cycles: u64) -> Result<Self, RecordedError> {
+        let (machine, statistics) = (&recorded.machine, &recorded.statistics);
+        let window = recorded.cycles(&recorded.slots_around_cause(cycles.saturating_sub(1), 0))?;
+        let shown = axis.or_else(|| recorded.axis(None)).and_then(|axis| {
+            let description = machine.axes.get(axis)?;
+            let row = |record: &CycleRecord| Some(AxisCycle::new(record, record.axes().get(axis)?));
+            Some(AxisCycles {
+                name: description.name.clone(),
+                unit: description.unit.symbol(),
+                cycles: window.iter().filter_map(row).collect(),
+            })
+        });
+        let events: Vec<ReportedEvent> = recorded
+            .events
+            .iter()
+            .map(|event| ReportedEvent {
+                slot: event.slot,
+                at_s: recorded.seconds(event.at_ns),
+                text: event.text.clone(),
+            })
+            .collect();
+        let is_emergency = |index: &usize| {
+            matches!(
+                recorded.events.get(*index).and_then(|event| event.kind),
+                Some(EventKind::Emergency { .. })
+            )
+        };
+        let emergencies =
+            (0..events.len()).filter(is_emergency).filter_map(|index| events.get(index).cloned()).collect();
+        let cause = recorded.cause();
+        let end = match &cause {
+            Some(cause) => events.partition_point(|event| event.slot <= cause.slot) + EVENTS.1,
+            None => events.len(),
+        };
+        let begin = end.saturating_sub(EVENTS.0 + EVENTS.1);
+        let axes = machine.axes.iter().zip(&statistics.axes).map(|(description, axis)| AxisSummary {
+            name: description.name.clone(),
+            unit: description.unit.symbol(),
+            following_error_max: axis.following_error_max.map(|largest| largest.error),
+            set_point_max: axis.set_point_max,
+            set_point_part: SetPointParts::new(&axis.set_point_max, &description.limits),
+        });
+        let buses = recorded.health.iter().map(|(bus, traced)| BusChange {
+            name: machine.buses.get(*bus).map_or_else(|| format!("bus {bus}"), |bus| bus.name.clone()),
+            at_s: recorded.seconds(traced.at_ns),
+            state: BusReport::state_words(traced.health.state),
+            errors: traced.health.errors,
+            tx_overruns: traced.health.tx_overruns,
+            rx_overruns: traced.health.rx_overruns,
+        });
+        Ok(Self {
+            recording: recorded.path.clone(),
+            version: recorded.version.clone(),
+            machine: machine.name.clone(),
+            cycle_ns: machine.cycle_ns,
+            begins: recorded.wall_clock.map(|clock| clock.moment(statistics.first_ns)),
+            cycles: statistics.cycles,
+            is_black_box: !recorded.faults.is_empty(),
+            warnings: recorded.warnings.clone(),
+            cause,
+            axis: shown,
+            events: events.into_iter().take(end).skip(begin).collect(),
+            emergencies,
+            wake_ns: LatencyReport::new(&statistics.wake),
+            sync_ns: LatencyReport::new(&statistics.sync),
+            compute_ns: LatencyReport::new(&statistics.compute),
+            sent_ns: LatencyReport::new(&statistics.sent),
+            missed_slots: statistics.missed_slots,
+            axes: axes.collect(),
+            buses: buses.collect(),
+        })
+    }
+}
+
+impl AxisCycle {
+    fn new(record: &CycleRecord, axis: &AxisRecord) -> Self {
+        Self {
+            slot: record.timing.slot,
+            phase: words::phase(record.phase),
+            position_set: axis.position_set,
+            position: axis.position,
+            velocity_set: axis.velocity_set,
+            velocity: axis.velocity,
+            following_error: axis.following_error,
+            statusword: axis.statusword,
+            state: words::state(axis.drive_state),
+            controlword: axis.controlword,
+            error_code: axis.error_code,
+            feedback_age: axis.feedback_age,
+        }
+    }
+}

@@ -1,0 +1,179 @@
+//! The LSS master against simulated devices, several at once.
+
+use proptest::prelude::*;
+use takt::canopen::lss::{
+    BitTiming, Inquiry, LssAddress, LssBusy, LssError, LssMaster, LssMode, LssOutcome, LssResult, LssTask,
+    LssTiming,
+};
+use takt::sim::lss::LssDevice;
+use takt_rt::frame::Frame;
+
+const MILLISECOND_NS: u64 = 1_000_000;
+
+struct Bus {
+    now_ns: u64,
+    master: LssMaster,
+    devices: Vec<LssDevice>,
+    /// What the devices said beside answers: boot-up messages.
+    heard: Vec<Frame>,
+}
+
+impl Bus {
+    fn new(devices: impl IntoIterator<Item = LssDevice>) -> Self {
+        Self {
+            now_ns: 7_000_000_000,
+            master: LssMaster::new(LssTiming::default()),
+            devices: devices.into_iter().collect(),
+            heard: vec![],
+        }
+    }
+
+    fn run(&mut self, task: LssTask) -> Result<LssOutcome, LssError> {
+        self.master.start(task).unwrap();
+        for _ in 0..20_000 {
+            while let Some(frame) = self.master.poll(self.now_ns) {
+                for device in &mut self.devices {
+                    let Some(answer) = device.receive(&frame) else { continue };
+                    if answer.id().value() != 0x7E4 {
+                        self.heard.push(answer);
+                    } else {
+                        self.master.receive(&answer);
+                    }
+                }
+            }
+            if let Some(outcome) = self.master.take_outcome() {
+                return outcome;
+            }
+            self.now_ns += MILLISECOND_NS;
+        }
+        panic!("no end after 20 s");
+    }
+}
+
+fn address(serial: u32) -> LssAddress {
+    LssAddress { vendor: 0x331, product: 1, revision: 0x100, serial }
+}
+
+fn unconfigured(serials: &[u32]) -> Bus {
+    Bus::new(serials.iter().map(|serial| LssDevice::new(address(*serial), None)))
+}
+
+#[test]
+fn a_device_is_selected_by_its_identity_configured_stored_and_boots() {
+    let mut bus = unconfigured(&[10, 11]);
+    assert_eq!(bus.run(LssTask::SwitchSelective(address(11))), Ok(LssOutcome::Done));
+    assert_eq!(bus.run(LssTask::InquireAddress), Ok(LssOutcome::Device(address(11))));
+    assert_eq!(bus.run(LssTask::Inquire(Inquiry::Node)), Ok(LssOutcome::Told(255)));
+    assert_eq!(bus.run(LssTask::ConfigureNode(5)), Ok(LssOutcome::Done));
+    assert_eq!(bus.run(LssTask::ConfigureBitTiming(BitTiming::Kilobits500)), Ok(LssOutcome::Done));
+    assert_eq!(bus.run(LssTask::Store), Ok(LssOutcome::Done));
+    assert_eq!(bus.run(LssTask::ActivateBitTiming { delay_ms: 100 }), Ok(LssOutcome::Done));
+    assert!(bus.heard.is_empty(), "it is silent until it is switched");
+    assert_eq!(bus.run(LssTask::SwitchGlobal(LssMode::Waiting)), Ok(LssOutcome::Done));
+    assert_eq!(format!("{:?}", bus.heard), "[705#00]");
+    assert_eq!((bus.devices[0].node(), bus.devices[1].node()), (None, Some(5)));
+    assert_eq!(bus.devices[1].bit_timing(), BitTiming::Kilobits500);
+    let boot_up = bus.devices[1].power_cycle();
+    assert_eq!(format!("{boot_up:?}"), "Some(705#00)");
+}
+
+#[test]
+fn what_is_refused_or_not_answered_is_an_error() {
+    let mut bus = unconfigured(&[10]);
+    let silence = Err(LssError::NoReply { reply_timeout_ns: 500 * MILLISECOND_NS });
+    assert_eq!(bus.run(LssTask::SwitchSelective(address(9))), silence);
+    assert_eq!(bus.run(LssTask::ConfigureNode(5)), silence, "it is not in configuration");
+    assert_eq!(bus.run(LssTask::SwitchGlobal(LssMode::Configuration)), Ok(LssOutcome::Done));
+    let refused = Err(LssError::Refused { result: LssResult::REFUSED });
+    assert_eq!(bus.run(LssTask::ConfigureNode(128)), refused);
+    assert_eq!(bus.run(LssTask::ConfigureBitTiming(BitTiming::Automatic)), refused);
+    bus.devices[0].can_store = false;
+    assert_eq!(bus.run(LssTask::Store), refused);
+    bus.master.start(LssTask::Store).unwrap();
+    assert_eq!(bus.master.start(LssTask::Store), Err(LssBusy));
+}
+
+#[test]
+fn devices_are_found_by_a_span_of_identities_and_by_having_no_node_number() {
+    let mut bus = unconfigured(&[10]);
+    bus.devices.push(LssDevice::new(address(20), Some(3)));
+    let mut exists = |low, high| {
+        bus.run(LssTask::IdentifyRemote { lowest: address(low), highest: address(high) }).unwrap()
+    };
+    assert_eq!(exists(5, 15), LssOutcome::Exists(true));
+    assert_eq!(exists(11, 19), LssOutcome::Exists(false));
+    assert_eq!(exists(20, 20), LssOutcome::Exists(true));
+    assert_eq!(bus.run(LssTask::IdentifyUnconfigured), Ok(LssOutcome::Exists(true)));
+    bus.devices.remove(0);
+    assert_eq!(bus.run(LssTask::IdentifyUnconfigured), Ok(LssOutcome::Exists(false)));
+    assert_eq!(bus.run(LssTask::FastScan([None; 4])), Ok(LssOutcome::Nobody));
+}
+
+#[test]
+fn fast_scan_finds_one_device_after_the_other_and_gives_each_a_node_number() {
+    let mut bus = unconfigured(&[0xDEAD_BEEF, 3, 0xFFFF_FFFF, 0x8000_0000, 0]);
+    let mut found = vec![];
+    for node in 1.. {
+        match bus.run(LssTask::FastScan([None; 4])).unwrap() {
+            LssOutcome::Device(address) => found.push(address.serial),
+            outcome => {
+                assert_eq!(outcome, LssOutcome::Nobody);
+                break;
+            }
+        }
+        assert_eq!(bus.run(LssTask::ConfigureNode(node)), Ok(LssOutcome::Done));
+        assert_eq!(bus.run(LssTask::SwitchGlobal(LssMode::Waiting)), Ok(LssOutcome::Done));
+    }
+    assert_eq!(found, [0, 3, 0x8000_0000, 0xDEAD_BEEF, 0xFFFF_FFFF], "the lowest identity first");
+    assert_eq!(bus.heard.len(), 5);
+}
+
+#[test]
+fn what_is_known_beforehand_is_asked_for_at_once() {
+    let known = [Some(0x331), Some(1), Some(0x100), None];
+    let mut bus = unconfigured(&[42]);
+    let began_ns = bus.now_ns;
+    assert_eq!(bus.run(LssTask::FastScan(known)), Ok(LssOutcome::Device(address(42))));
+    let questions = (bus.now_ns - began_ns) / LssTiming::default().scan_timeout_ns;
+    assert_eq!(questions, 1 + 3 + 32 + 1);
+    assert_eq!(bus.devices[0].mode(), LssMode::Configuration);
+    let other = [Some(0x332), None, None, None];
+    assert_eq!(unconfigured(&[42]).run(LssTask::FastScan(other)), Ok(LssOutcome::Nobody));
+}
+
+#[test]
+fn an_identity_put_together_from_lost_answers_is_nobodys() {
+    let mut bus = unconfigured(&[42]);
+    // The answer to the first question comes, and then one is lost.
+    bus.master.start(LssTask::FastScan([None; 4])).unwrap();
+    let mut asked = 0;
+    let outcome = loop {
+        if let Some(frame) = bus.master.poll(bus.now_ns) {
+            asked += 1;
+            match bus.devices[0].receive(&frame) {
+                Some(answer) if asked != 2 => bus.master.receive(&answer),
+                _ => {}
+            }
+        }
+        if let Some(outcome) = bus.master.take_outcome() {
+            break outcome;
+        }
+        bus.now_ns += MILLISECOND_NS;
+    };
+    assert_eq!(outcome, Err(LssError::ScanLost));
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(40))]
+    #[test]
+    fn fast_scan_finds_the_lowest_of_any_identities(
+        identities in prop::collection::btree_set(any::<[u32; 4]>(), 1..5),
+    ) {
+        let devices = identities.iter().map(|values| LssDevice::new(LssAddress::from_values(*values), None));
+        let mut bus = Bus::new(devices);
+        let lowest = identities.first().copied().map(LssAddress::from_values).unwrap();
+        prop_assert_eq!(bus.run(LssTask::FastScan([None; 4])), Ok(LssOutcome::Device(lowest)));
+        let obeying = bus.devices.iter().filter(|device| device.mode() == LssMode::Configuration).count();
+        prop_assert_eq!(obeying, 1);
+    }
+}

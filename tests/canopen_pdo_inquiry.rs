@@ -1,0 +1,131 @@
+//! The PDO configuration is read back from a device, and process data is decoded by it.
+
+use std::path::Path;
+
+use takt::canopen::eds;
+use takt::canopen::object::ObjectAddress;
+use takt::canopen::objects::PdoDirection;
+use takt::canopen::pdo_configuration::PdoConfiguration;
+use takt::canopen::pdo_inquiry::{PdoInquiry, PdoInquiryError};
+use takt::canopen::sdo::{Expedited, Request, SdoError, Timing};
+use takt::sim::erob::{ErobJoint, ErobParameters};
+use takt::sim::plant::{Encoder, JointParameters};
+use takt::sim::{BitRates, SimulatedBus};
+use takt_rt::frame::{Frame, Id};
+use takt_rt::port::{BusPort, ReceiveBatch};
+
+const NODE: u8 = 5;
+const MILLISECOND_NS: u64 = 1_000_000;
+
+struct Bench {
+    bus: SimulatedBus,
+    now_ns: u64,
+}
+
+impl Bench {
+    fn new() -> Self {
+        let drive = ErobJoint::new(ErobParameters {
+            node: NODE,
+            joint: JointParameters {
+                inertia: 0.3,
+                viscous_friction: 1.0,
+                coulomb_friction: 3.0,
+                brake_torque: 60.0,
+            },
+            encoder: Encoder { counts_per_unit: 83_443.0, zero_counts: 0.0 },
+            counts_per_turn: 524_288.0,
+            initial_position: 0.0,
+            rated_torque: 31.0,
+            peak_torque: 60.0,
+            highest_velocity: 3.0,
+            power_up_ns: MILLISECOND_NS,
+            feedback_delay_ns: 20_000,
+            has_battery: true,
+            has_interpolated_position: false,
+            is_upload_segmented: false,
+            seed: 1,
+        });
+        let rates = BitRates { nominal: 1_000_000, data: None };
+        let mut bus = SimulatedBus::with_drives(rates, u64::MAX, vec![Box::new(drive)]);
+        bus.send(0, &[]);
+        let mut bench = Self { bus, now_ns: 0 };
+        bench.pass(10);
+        bench
+    }
+
+    /// Lets milliseconds pass and returns what was heard.
+    fn pass(&mut self, milliseconds: u64) -> Vec<Frame> {
+        let mut heard = vec![];
+        let mut batch = ReceiveBatch::new();
+        for _ in 0..milliseconds {
+            self.now_ns += MILLISECOND_NS;
+            self.bus.receive(self.now_ns, &mut batch);
+            heard.extend(batch.drain(..).map(|received| received.frame));
+        }
+        heard
+    }
+
+    fn ask(&mut self, mut inquiry: PdoInquiry) -> Result<Vec<PdoConfiguration>, PdoInquiryError> {
+        for _ in 0..10_000 {
+            while let Some(frame) = inquiry.poll(self.now_ns) {
+                self.bus.send(self.now_ns, &[frame]);
+            }
+            if let Some(outcome) = inquiry.outcome() {
+                return outcome;
+            }
+            for frame in self.pass(1) {
+                inquiry.receive(&frame);
+            }
+        }
+        panic!("no end after 10 s");
+    }
+}
+
+#[test]
+fn what_the_drive_reports_is_what_its_data_sheet_says() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/eds/erob-canopen.eds");
+    let described = eds::load(&path).unwrap().dictionary.pdos(Some(NODE));
+    let reported = Bench::new().ask(PdoInquiry::of_first_four(NODE, Timing::default())).unwrap();
+    assert_eq!(reported.len(), 8);
+    for (reported, described) in reported.iter().zip(&described) {
+        // The data sheet leaves these open.
+        let described =
+            PdoConfiguration { inhibit_time_100us: Some(0), event_timer_ms: Some(0), ..described.clone() };
+        assert_eq!(*reported, described);
+    }
+}
+
+#[test]
+fn process_data_is_decoded_by_what_the_drive_reports() {
+    let mut bench = Bench::new();
+    // TPDO2 of the drive carries 6041 and 6064; it is switched on and the drive made operational.
+    for (subindex, value) in [(1, &0x285_u32.to_le_bytes()[..]), (2, &[1])] {
+        let object = ObjectAddress::new(0x1801, subindex);
+        let data = Expedited::of(value).unwrap();
+        bench.bus.send(bench.now_ns, &[Request::DownloadExpedited { object, data }.frame(NODE)]);
+        bench.pass(5);
+    }
+    bench.bus.send(bench.now_ns, &[Frame::of(Id::canopen(0, 0), [1, NODE])]);
+    bench.pass(5);
+    let inquiry = PdoInquiry::new(NODE, Timing::default(), [(PdoDirection::Transmit, 2)]);
+    let tpdo2 = bench.ask(inquiry).unwrap().remove(0);
+    assert_eq!((tpdo2.is_valid, tpdo2.length()), (true, 6));
+    bench.bus.send(bench.now_ns, &[Frame::of(Id::canopen(0x80, 0), [])]);
+    let heard = bench.pass(3);
+    let values: Vec<_> = heard.iter().filter_map(|frame| tpdo2.values(frame)).flatten().collect();
+    let indices: Vec<u16> = values.iter().map(|(object, _)| object.index).collect();
+    assert_eq!(indices, [0x6041, 0x6064], "{heard:?}");
+    assert_eq!(values[0].1 & 0x4F, 0x40, "switch on disabled");
+    assert_eq!(values[1].1, 0, "at its initial position");
+}
+
+#[test]
+fn pdos_that_the_drive_does_not_have_are_left_out_and_silence_is_a_failure() {
+    let mut bench = Bench::new();
+    let pdos = [(PdoDirection::Receive, 5), (PdoDirection::Receive, 2)];
+    let reported = bench.ask(PdoInquiry::new(NODE, Timing::default(), pdos)).unwrap();
+    assert_eq!(reported.iter().map(|pdo| pdo.number).collect::<Vec<_>>(), [2]);
+    let failure = bench.ask(PdoInquiry::of_first_four(9, Timing::default())).unwrap_err();
+    assert_eq!(failure.object.to_string(), "1400:00");
+    assert!(matches!(failure.error, SdoError::NoReply { .. }));
+}

@@ -1,0 +1,92 @@
+//! Whole files.
+
+use takt::canopen::eds::{self, AccessType, DataType, DictionaryEntry, Loaded, ObjectType};
+use takt::canopen::object::ObjectAddress;
+use takt::canopen::objects::PdoDirection;
+use takt::sim::erob;
+
+fn load(name: &str) -> Loaded {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(name);
+    eds::load(&path).unwrap_or_else(|findings| panic!("{:?}", miette::Report::new(findings)))
+}
+
+fn lengths(loaded: &Loaded, direction: PdoDirection) -> Vec<usize> {
+    let pdos = loaded.dictionary.pdos(Some(1));
+    pdos.iter().filter(|pdo| pdo.direction == direction).map(|pdo| pdo.length()).collect()
+}
+
+#[test]
+fn the_yz_aim_file_has_its_objects_entries_and_pdo_lengths() {
+    let loaded = load("tests/eds/yz-aim.eds");
+    assert_eq!(loaded.warnings.problems(), [], "nothing is wrong with it");
+    assert_eq!(loaded.dictionary.objects.len(), 55);
+    assert_eq!(loaded.dictionary.entries().count(), 109);
+    assert_eq!(lengths(&loaded, PdoDirection::Receive), [7, 8, 7, 4]);
+    assert_eq!(lengths(&loaded, PdoDirection::Transmit), [6, 6, 8, 6]);
+    assert_eq!(loaded.dictionary.comments.len(), 5);
+}
+
+#[test]
+fn the_yz_aim_identifiers_follow_the_node() {
+    let dictionary = load("configs/eds/yz-aim.eds").dictionary;
+    let ids = |node| -> Vec<u32> {
+        dictionary.pdos(Some(node)).iter().filter_map(|pdo| Some(pdo.id?.value())).collect()
+    };
+    assert_eq!(ids(5), [0x205, 0x305, 0x405, 0x505, 0x185, 0x285, 0x385, 0x485]);
+    let unknown = dictionary.pdos(None);
+    assert!(unknown.iter().all(|pdo| pdo.id.is_none() && !pdo.is_valid), "without a node there are none");
+}
+
+#[test]
+fn the_erob_file_is_in_order_and_maps_what_the_drive_maps_by_default() {
+    let loaded = load("configs/eds/erob-canopen.eds");
+    assert_eq!(loaded.warnings.problems(), []);
+    let dictionary = &loaded.dictionary;
+    assert_eq!(dictionary.number(ObjectAddress::new(0x1000, 0), None), Some(0x0042_0192));
+    assert_eq!(dictionary.number(ObjectAddress::new(0x1018, 1), None), Some(0x5A65_726F));
+    assert_eq!(dictionary.device.product_number, Some(0x2648_3052));
+    assert_eq!(lengths(&loaded, PdoDirection::Receive), [2, 6, 6, 0]);
+    assert_eq!(lengths(&loaded, PdoDirection::Transmit), [2, 6, 6, 0]);
+    let valid: Vec<u32> = dictionary
+        .pdos(Some(2))
+        .iter()
+        .filter(|pdo| pdo.is_valid)
+        .filter_map(|pdo| Some(pdo.id?.value()))
+        .collect();
+    assert_eq!(valid, [0x202, 0x182]);
+    assert_eq!(dictionary.object(0x60C1).map(|object| object.object_type), Some(ObjectType::Array));
+    assert!(dictionary.object(0x6072).is_none() && dictionary.object(0x1011).is_none());
+}
+
+#[test]
+fn the_erob_file_agrees_with_the_simulated_drive_entry_for_entry() {
+    let dictionary = load("configs/eds/erob-canopen.eds").dictionary;
+    let entries: Vec<&DictionaryEntry> = dictionary.entries().collect();
+    assert_eq!(entries.len(), erob::OBJECTS.len());
+    for object in &erob::OBJECTS {
+        let address = ObjectAddress::new(object.index, object.subindex);
+        let entry = dictionary.entry(address).unwrap_or_else(|| panic!("{address} is missing"));
+        let code = match object.data_type {
+            erob::DataType::I8 => 2,
+            erob::DataType::I16 => 3,
+            erob::DataType::I32 => 4,
+            erob::DataType::U8 => 5,
+            erob::DataType::U16 => 6,
+            erob::DataType::U32 => 7,
+        };
+        let access = match object.access {
+            erob::Access::ReadOnly => AccessType::ReadOnly,
+            erob::Access::ReadWrite => AccessType::ReadWrite,
+            erob::Access::WriteOnly => AccessType::WriteOnly,
+        };
+        assert_eq!((entry.data_type, entry.access), (Some(DataType(code)), access), "{address}");
+        assert_eq!(entry.is_mappable, object.is_mappable, "{address}");
+        // A default that the file leaves open is one that nobody knows.
+        if let Some(bytes) = entry.default.as_ref().map(|stated| stated.value.encode(DataType(code), Some(2)))
+        {
+            let default = object.default + if object.adds_node { 2 } else { 0 };
+            let length = object.data_type.bytes();
+            assert_eq!(bytes.as_deref(), default.to_le_bytes().get(..length), "{address}");
+        }
+    }
+}

@@ -1,0 +1,40 @@
+//! `takt run --faults`.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+use crate::arm::folder;
+
+fn run(faults: &Path) -> Output {
+    let place = tempfile::tempdir().unwrap();
+    let text = fs::read_to_string(folder().join("arm6-erob.toml")).unwrap();
+    let config = place.path().join("arm.toml");
+    fs::write(&config, format!("{text}\n[telemetry]\nrecord = false\n")).unwrap();
+    Command::new(env!("CARGO_BIN_EXE_takt"))
+        .args(["run", "--json", "--faults"])
+        .args([faults, &config])
+        .output()
+        .unwrap()
+}
+
+#[test]
+fn a_rehearsal_says_when_each_fault_began_and_the_run_ends_in_the_stop() {
+    let output = run(&folder().join("faults/drive-reboots.toml"));
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(said.contains("fault `reboot` on axis joint3 (line 5) has begun"), "{said}");
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(report["ended"], "stopped", "{report}");
+}
+
+#[test]
+fn a_wrong_scenario_is_refused_before_anything_moves() {
+    let place = tempfile::tempdir().unwrap();
+    let faults = place.path().join("wrong.toml");
+    fs::write(&faults, "[[fault]]\nkind = \"stall\"\naxis = \"elbow\"\n").unwrap();
+    let output = run(&faults);
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert!(said.contains("elbow") && said.contains("joint1") && said.contains("wrong.toml"), "{said}");
+}

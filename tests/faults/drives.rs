@@ -1,0 +1,93 @@
+//! What is wrong with the simulated drives, seen from the bus.
+
+use std::path::Path;
+
+use takt::config::Config;
+use takt::sim::{AfflictError, Defect, SimulatedBus};
+use takt_rt::frame::{Frame, Id};
+use takt_rt::port::{BusPort, ReceiveBatch};
+
+fn bus() -> SimulatedBus {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/arm6-erob.toml");
+    let mut config = Config::load(&path).unwrap();
+    config.axes.iter_mut().for_each(|axis| axis.simulated.power_up_ns = 1_000_000);
+    config.simulation.longest_gap_ns = u64::MAX;
+    let mut bus = SimulatedBus::new(&config, 0);
+    heard(&mut bus, 0);
+    heard(&mut bus, 3_000_000);
+    bus
+}
+
+fn heard(bus: &mut SimulatedBus, now_ns: u64) -> Vec<Frame> {
+    let mut batch = ReceiveBatch::new();
+    bus.receive(now_ns, &mut batch);
+    batch.iter().map(|received| received.frame).collect()
+}
+
+const READ_DEVICE_TYPE: [u8; 8] = [0x40, 0x00, 0x10, 0, 0, 0, 0, 0];
+
+#[test]
+fn a_mute_sdo_server_gives_no_reply_until_it_is_mended() {
+    let mut bus = bus();
+    bus.afflict(1, Defect::SilentSdoServer, true).unwrap();
+    bus.send(4_000_000, &[Frame::of(Id::canopen(0x600, 1), READ_DEVICE_TYPE)]);
+    assert_eq!(heard(&mut bus, 8_000_000), []);
+    bus.afflict(1, Defect::SilentSdoServer, false).unwrap();
+    bus.send(9_000_000, &[Frame::of(Id::canopen(0x600, 1), READ_DEVICE_TYPE)]);
+    assert_eq!(heard(&mut bus, 12_000_000).len(), 1);
+}
+
+#[test]
+fn an_emergency_message_is_sent_without_a_fault_and_an_alarm_with_one() {
+    for (defect, code, is_fault) in
+        [(Defect::Emergency { code: 0x4210 }, 0x4210, false), (Defect::Alarm { code: 0x7500 }, 0x7500, true)]
+    {
+        let mut bus = bus();
+        bus.afflict(2, defect, true).unwrap();
+        let frames = heard(&mut bus, 6_000_000);
+        assert_eq!((frames.len(), frames[0].id()), (1, Id::canopen(0x080, 2)));
+        assert_eq!(frames[0].first_word() as u16, code);
+        let seen = bus.observe(2).unwrap();
+        assert_eq!((seen.state.is_faulted(), seen.error_code == code), (is_fault, is_fault));
+    }
+}
+
+#[test]
+fn an_encoder_jump_moves_the_counts_and_not_the_joint() {
+    let mut bus = bus();
+    let before = bus.observe(3).unwrap();
+    bus.afflict(3, Defect::EncoderJump { distance: 0.1 }, true).unwrap();
+    let after = bus.observe(3).unwrap();
+    assert_eq!(after.position, before.position);
+    // This axis is reversed.
+    let counts = -(0.1 * 524_288.0 / std::f64::consts::TAU).round() as i32;
+    assert_eq!(after.position_counts - before.position_counts, counts);
+}
+
+#[test]
+fn a_blocked_joint_withstands_any_torque() {
+    let mut bus = bus();
+    let before = bus.observe(1).unwrap().position;
+    bus.afflict(1, Defect::BlockedJoint, true).unwrap();
+    bus.set_load_torque(1, 1e6).unwrap();
+    heard(&mut bus, 100_000_000);
+    assert_eq!(bus.observe(1).unwrap().position, before);
+    bus.afflict(1, Defect::BlockedJoint, false).unwrap();
+    heard(&mut bus, 110_000_000);
+    assert_ne!(bus.observe(1).unwrap().position, before);
+}
+
+#[test]
+fn a_foreigner_is_heard_by_the_master_and_by_the_drives() {
+    let mut bus = bus();
+    let start = Frame::of(Id::canopen(0, 0), [1, 0]);
+    assert!(bus.say(4_000_000, &start));
+    assert_eq!(heard(&mut bus, 5_000_000)[0], start);
+    assert_eq!(bus.observe(1).unwrap().nmt, takt::sim::NmtState::Operational);
+}
+
+#[test]
+fn a_node_that_is_not_there_is_named() {
+    let error = bus().afflict(99, Defect::StuckBrake, true);
+    assert!(matches!(error, Err(AfflictError::UnknownNode(unknown)) if unknown.node == 99), "{error:?}");
+}

@@ -1,0 +1,9 @@
+//! Faults on purpose: the wrapper, the files, and what the controller does about each kind, in virtual time.
+
+mod arm;
+mod command;
+mod drives;
+mod files;
+mod reactions;
+mod repeatability;
+mod wrapper;

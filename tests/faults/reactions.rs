@@ -1,0 +1,205 @@
+//! What the controller does about each fault, for which there is a rule; and what holds whatever happens.
+
+use takt::controller::Outcome;
+use takt_rt::port::BusState;
+use takt_rt::stop::{Phase, Rule, StopCategory};
+
+use crate::arm::{Played, arm, play};
+
+/// Well into the first move.
+const IN_MOTION: &str = "when = \"moving\"\nat = \"300 ms\"";
+
+fn in_motion(fault: &str) -> Played {
+    play(&arm(), &format!("[[fault]]\n{fault}\n{IN_MOTION}"))
+}
+
+/// What holds whatever goes wrong. A velocity limit is kept to the last bits of a sum.
+fn assert_safe(fault: &str, played: &Played) {
+    assert!(played.outcome.is_some(), "{fault}: the run does not end");
+    assert!(played.stops.len() <= 1, "{fault}: {:?}", played.stops);
+    assert!(played.largest_step <= 1.0 + 1e-6, "{fault}: {} velocity limits", played.largest_step);
+    assert!(played.speed_at_end < 1e-3, "{fault}: {} rad/s at the end", played.speed_at_end);
+    assert_eq!(played.missed_slots, 0, "{fault}");
+}
+
+/// The stop that a fault leads to, and in how many milliseconds it is begun at the latest.
+struct Stops(&'static str, Rule, Option<u8>, f64);
+
+const STOPS: [Stops; 25] = {
+    use Rule::*;
+    [
+        // Feedback may be missing for five cycles; the sixth is one too many.
+        Stops("kind = \"drop\"\nbus = \"base\"\nfunction = \"tpdo\"", MissedFeedback, Some(0), 6.0),
+        Stops("kind = \"drop\"\naxis = \"joint5\"\nfunction = \"tpdo\"", MissedFeedback, Some(4), 6.0),
+        Stops("kind = \"drop\"\nbus = \"base\"\nfunction = \"sync\"", MissedFeedback, Some(0), 7.0),
+        Stops("kind = \"full-queue\"\nbus = \"base\"", MissedFeedback, Some(0), 7.0),
+        Stops("kind = \"flood\"\nbus = \"base\"\nfor = \"20 ms\"", MissedFeedback, Some(0), 7.0),
+        Stops("kind = \"silent-node\"\naxis = \"joint2\"", MissedFeedback, Some(1), 6.0),
+        Stops("kind = \"reboot\"\naxis = \"joint6\"", MissedFeedback, Some(5), 6.0),
+        Stops(
+            "kind = \"wrong-mapping\"\naxis = \"joint1\"\ncontents = \"short\"",
+            MissedFeedback,
+            Some(0),
+            6.0,
+        ),
+        Stops("kind = \"foreign-nmt\"\nbus = \"wrist\"\ncommand = \"stop\"", MissedFeedback, Some(3), 7.0),
+        Stops(
+            "kind = \"foreign-nmt\"\naxis = \"joint3\"\ncommand = \"pre-operational\"",
+            MissedFeedback,
+            Some(2),
+            7.0,
+        ),
+        Stops(
+            "kind = \"foreign-nmt\"\naxis = \"joint3\"\ncommand = \"reset-node\"",
+            MissedFeedback,
+            Some(2),
+            7.0,
+        ),
+        Stops("kind = \"echo-loss\"\nbus = \"wrist\"\nfor = \"100 ms\"", NotTransmitted, None, 12.0),
+        Stops("kind = \"bus-off\"\nbus = \"wrist\"", BusLost, None, 1.0),
+        Stops("kind = \"bus-off\"\nbus = \"wrist\"\nrestart = \"100 ms\"", BusLost, None, 1.0),
+        Stops("kind = \"interface-down\"\nbus = \"base\"\nfor = \"100 ms\"", BusLost, None, 1.0),
+        // The window of the following error is 50 ms; before that the joint must fall behind by 0.1 rad.
+        Stops("kind = \"stall\"\naxis = \"joint1\"", FollowingError, Some(0), 200.0),
+        Stops("kind = \"stuck-brake\"\naxis = \"joint1\"", FollowingError, Some(0), 200.0),
+        Stops("kind = \"wrong-mapping\"\naxis = \"joint1\"", FollowingError, Some(0), 52.0),
+        Stops("kind = \"mode-display\"\naxis = \"joint4\"\nmode = 1", ModeChanged, Some(3), 2.0),
+        Stops("kind = \"torque-off\"\naxis = \"joint4\"", DriveDisabled, Some(3), 2.0),
+        Stops("kind = \"alarm\"\naxis = \"joint4\"\ncode = 0x7500", DriveFault, Some(3), 2.0),
+        Stops("kind = \"over-voltage\"\naxis = \"joint2\"", DriveFault, Some(1), 2.0),
+        Stops("kind = \"over-temperature\"\naxis = \"joint2\"", DriveFault, Some(1), 2.0),
+        Stops("kind = \"battery\"\naxis = \"joint2\"", DriveFault, Some(1), 2.0),
+        Stops("kind = \"statusword\"\naxis = \"joint2\"\nset = 0x0008", DriveFault, Some(1), 2.0),
+    ]
+};
+
+#[test]
+fn every_fault_with_a_rule_stops_the_whole_arm_in_time_and_says_why() {
+    for Stops(fault, rule, axis, within_ms) in STOPS {
+        let played = in_motion(fault);
+        assert_safe(fault, &played);
+        let [stop] = played.stops.as_slice() else { panic!("{fault}: {:?}", played.outcome) };
+        assert_eq!((stop.rule, stop.axis), (rule, axis), "{fault}");
+        assert_eq!((stop.category, stop.phase), (StopCategory::One, Phase::Moving), "{fault}");
+        assert!(played.detection_ms.is_some_and(|ms| (0.0..=within_ms).contains(&ms)), "{fault}: {played:?}");
+        assert_eq!(played.phases.last(), Some(&Phase::Disabled), "{fault}: {:?}", played.phases);
+        assert!(matches!(played.outcome, Some(Outcome::Stopped(_))), "{fault}: {:?}", played.outcome);
+    }
+}
+
+/// Faults of one axis or one bus, in the middle of the fast part of a move, and the axes that still obey.
+const COORDINATED: [(&str, std::ops::Range<usize>); 8] = [
+    ("kind = \"alarm\"\naxis = \"joint1\"\ncode = 0x4310", 1..6),
+    ("kind = \"over-current\"\naxis = \"joint1\"", 1..6),
+    ("kind = \"reboot\"\naxis = \"joint1\"", 1..6),
+    ("kind = \"silent-node\"\naxis = \"joint1\"", 1..6),
+    ("kind = \"stall\"\naxis = \"joint1\"", 1..6),
+    ("kind = \"mode-display\"\naxis = \"joint1\"\nmode = 1", 0..6),
+    ("kind = \"foreign-nmt\"\naxis = \"joint1\"\ncommand = \"pre-operational\"", 1..6),
+    ("kind = \"bus-off\"\nbus = \"base\"", 3..6),
+];
+
+#[test]
+fn the_axes_that_still_obey_decelerate_within_their_limits() {
+    for (fault, obeying) in COORDINATED {
+        let text = format!("[[fault]]\n{fault}\nwhen = \"moving\"\nat = \"900 ms\"");
+        let played = play(&arm(), &text);
+        let Some(Outcome::Stopped(stop)) = &played.outcome else { panic!("{fault}: {:?}", played.outcome) };
+        assert_eq!(stop.category, StopCategory::One, "{fault}: the stop became harder on its way");
+        // The loops of the drives overshoot a little when the acceleration changes.
+        let largest = played.accelerations[obeying].iter().copied().fold(0.0, f64::max);
+        assert!(largest < 1.6, "{fault}: {:?} acceleration limits", played.accelerations);
+    }
+}
+
+#[test]
+fn the_code_of_an_alarm_is_the_value_of_the_stop() {
+    let played = in_motion("kind = \"alarm\"\naxis = \"joint4\"\ncode = 0x7500");
+    assert_eq!(played.stops[0].value, f64::from(0x7500));
+    assert_eq!(played.emergencies, [(3, 0x7500)]);
+}
+
+/// Faults that are within what the machine must bear.
+const BORNE: [&str; 11] = [
+    "kind = \"drop\"\nbus = \"base\"\nfunction = \"tpdo\"\nfor = \"5 cycles\"",
+    "kind = \"drop\"\nbus = \"base\"\nfunction = \"tpdo\"\nprobability = \"2 %\"",
+    "kind = \"duplicate\"\nbus = \"base\"",
+    "kind = \"reorder\"\nbus = \"base\"",
+    "kind = \"delay\"\nbus = \"base\"\nfunction = \"rpdo\"\nby = \"30 us\"",
+    "kind = \"echo-loss\"\nbus = \"base\"\nfor = \"5 cycles\"",
+    "kind = \"error-passive\"\nbus = \"wrist\"\nfor = \"0.5 s\"",
+    "kind = \"stall\"\naxis = \"joint1\"\nfor = \"20 ms\"",
+    "kind = \"load\"\naxis = \"joint1\"\ntorque = \"20 Nm\"",
+    "kind = \"emergency\"\naxis = \"joint1\"\ncode = 0x4210",
+    "kind = \"stuck-sdo\"\naxis = \"joint1\"\nfor = \"0.5 s\"",
+];
+
+#[test]
+fn what_the_machine_must_bear_does_not_stop_it() {
+    for fault in BORNE {
+        let played = in_motion(fault);
+        assert_safe(fault, &played);
+        assert_eq!(played.outcome, Some(Outcome::Finished), "{fault}");
+    }
+}
+
+/// Faults for which there is no rule that must see them; whatever the controller makes of them, it is safe.
+const WITHOUT_A_RULE: [&str; 13] = [
+    "kind = \"drop\"\nbus = \"base\"\nfunction = \"rpdo\"",
+    "kind = \"drop\"\nbus = \"base\"\nfunction = \"heartbeat\"",
+    "kind = \"full-queue\"\nbus = \"base\"\nfunction = \"rpdo\"",
+    "kind = \"delay\"\nbus = \"base\"\nby = \"300 us\"",
+    "kind = \"corrupt\"\nbus = \"base\"\nfunction = \"rpdo\"\ncount = 20",
+    "kind = \"corrupt\"\nbus = \"base\"\npart = \"identifier\"\nprobability = \"10 %\"",
+    "kind = \"foreign-sync\"\nbus = \"base\"\nperiod = \"1.3 ms\"",
+    "kind = \"foreign-set-points\"\naxis = \"joint1\"\nfor = \"0.2 s\"",
+    "kind = \"foreign-nmt\"\naxis = \"joint1\"\ncommand = \"reset-communication\"",
+    "kind = \"duplicate-node\"\naxis = \"joint1\"",
+    "kind = \"foreign-frame\"\nbus = \"base\"\nid = 0x123\nperiod = \"1 ms\"",
+    "kind = \"encoder-jump\"\naxis = \"joint1\"\nby = \"3 deg\"",
+    "kind = \"statusword\"\naxis = \"joint1\"\nset = 0x0080",
+];
+
+#[test]
+fn whatever_happens_no_set_point_leaps_and_the_arm_is_at_rest_in_the_end() {
+    for fault in WITHOUT_A_RULE {
+        assert_safe(fault, &in_motion(fault));
+    }
+}
+
+#[test]
+fn a_node_that_starts_again_in_motion_does_not_take_part_any_more() {
+    let played = in_motion("kind = \"reboot\"\naxis = \"joint6\"");
+    let stopping = played.phases.iter().position(|phase| *phase == Phase::Stopping).unwrap();
+    assert!(!played.phases[stopping..].contains(&Phase::Enabling), "{:?}", played.phases);
+}
+
+#[test]
+fn the_state_of_an_interface_is_shown_while_it_lasts_and_its_errors_stay() {
+    let shown = |fault: &str| in_motion(fault).health[1];
+    let passive = shown("kind = \"error-passive\"\nbus = \"wrist\"");
+    assert_eq!((passive.state, passive.errors), (BusState::ErrorPassive, 1));
+    let recovered = shown("kind = \"error-passive\"\nbus = \"wrist\"\nfor = \"100 ms\"");
+    assert_eq!((recovered.state, recovered.errors), (BusState::ErrorActive, 1));
+    assert_eq!(shown("kind = \"bus-off\"\nbus = \"wrist\"").state, BusState::BusOff);
+    assert_eq!(shown("kind = \"interface-down\"\nbus = \"wrist\"").state, BusState::Down);
+}
+
+#[test]
+fn a_drive_without_sdo_replies_cannot_be_brought_up() {
+    let played = play(&arm(), "[[fault]]\nkind = \"stuck-sdo\"\naxis = \"joint2\"\nwhen = \"start\"");
+    assert!(matches!(played.outcome, Some(Outcome::BringUpFailed(_))), "{:?}", played.outcome);
+}
+
+#[test]
+fn a_second_fault_while_stopping_does_not_become_the_reason() {
+    let played = play(
+        &arm(),
+        "[[fault]]\nkind = \"torque-off\"\naxis = \"joint5\"\nwhen = \"moving\"\nat = \"300 ms\"\n\
+         [[fault]]\nkind = \"over-voltage\"\naxis = \"joint1\"\nwhen = \"stopping\"\nat = \"20 cycles\"",
+    );
+    assert_safe("two at once", &played);
+    assert_eq!((played.stops[0].rule, played.stops[0].axis), (Rule::DriveDisabled, Some(4)));
+    assert_eq!(played.emergencies, [(0, 0x3210)]);
+    assert!(!played.phases.contains(&Phase::Holding) || played.phases.last() == Some(&Phase::Disabled));
+}

@@ -1,0 +1,91 @@
+//! What is fuzzed for hours elsewhere (`fuzz/run`), for a moment here: the inputs that are kept in `fuzz/seeds`, and some
+//! thousands of random ones.
+
+use std::path::Path;
+
+use proptest::prelude::*;
+use takt_rt::stop::Phase;
+
+#[path = "../fuzz/subjects/mod.rs"]
+mod subjects;
+
+fn seeds(name: &str) -> Vec<Vec<u8>> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/seeds").join(name);
+    let mut paths: Vec<_> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    paths.sort();
+    assert!(!paths.is_empty(), "no seeds for {name}");
+    paths.into_iter().map(|path| std::fs::read(path).unwrap()).collect()
+}
+
+/// A seed with some bytes replaced and its end cut off: what lies near something sound goes further than noise does.
+fn mutated(name: &str) -> impl Strategy<Value = Vec<u8>> + use<> {
+    let changes = proptest::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 0..8);
+    (prop::sample::select(seeds(name)), changes, any::<prop::sample::Index>(), any::<bool>()).prop_map(
+        |(mut bytes, changes, cut, is_cut)| {
+            for (at, byte) in changes {
+                let at = at.index(bytes.len().max(1));
+                if let Some(place) = bytes.get_mut(at) {
+                    *place = byte;
+                }
+            }
+            if is_cut {
+                bytes.truncate(cut.index(bytes.len() + 1));
+            }
+            bytes
+        },
+    )
+}
+
+/// Any characters that mean something in a TOML file.
+const TOML: &str = "[\\[\\]=\", .0-9a-z_\n#'{}-]{0,200}";
+
+#[test]
+fn every_kept_input_is_borne() {
+    type Subject = fn(&[u8]);
+    let subjects: [(&str, Subject); 4] = [
+        ("configuration", subjects::configuration::run),
+        ("scenario", subjects::scenario::run),
+        ("wire", subjects::wire::run),
+        ("engine", |bytes| drop(subjects::engine::run(bytes))),
+    ];
+    for (name, run) in subjects {
+        seeds(name).iter().for_each(|bytes| run(bytes));
+    }
+}
+
+/// Else it would be no wonder that nothing goes wrong.
+#[test]
+fn the_kept_inputs_lead_the_group_through_every_phase() {
+    let phases: Vec<Phase> = seeds("engine").iter().flat_map(|bytes| subjects::engine::run(bytes)).collect();
+    for phase in Phase::ALL {
+        assert!(phases.contains(&phase), "{phase:?}");
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 1000, ..ProptestConfig::default() })]
+
+    #[test]
+    fn any_text_is_a_configuration_or_is_explained(text in TOML, seed in mutated("configuration")) {
+        subjects::configuration::run(text.as_bytes());
+        subjects::configuration::run(&seed);
+    }
+
+    #[test]
+    fn any_text_is_a_scenario_or_is_explained(text in TOML, seed in mutated("scenario")) {
+        subjects::scenario::run(text.as_bytes());
+        subjects::scenario::run(&seed);
+    }
+
+    #[test]
+    fn any_frames_are_decoded_or_refused(bytes in proptest::collection::vec(any::<u8>(), 0..400), seed in mutated("wire")) {
+        subjects::wire::run(&bytes);
+        subjects::wire::run(&seed);
+    }
+
+    #[test]
+    fn the_engine_bears_anything(bytes in proptest::collection::vec(any::<u8>(), 0..400), seed in mutated("engine")) {
+        subjects::engine::run(&bytes);
+        subjects::engine::run(&seed);
+    }
+}

@@ -1,0 +1,243 @@
+//! The real loop, in its real-time thread, on simulated buses, when everything around it fails.
+
+use std::cell::Cell;
+use std::fs;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::thread;
+use std::time::Duration;
+
+use takt::bus::port::Port;
+use takt::bus::trace::Trace;
+use takt::config::Config;
+use takt::controller::channels::{ChannelSizes, HostSide, LogSide, channels};
+use takt::controller::realtime_thread::{self, Ended, Work};
+use takt::controller::session::{self, Session, SessionOptions};
+use takt::controller::{Outcome, Supervisor, assemble};
+use takt::telemetry::{
+    BlackBoxOptions, Fault, Logger, LoggerOptions, LoggerThread, Machine, Notice, Recorded, WallClock,
+};
+use takt_rt::door::{Request, Snapshot, StreamCommand};
+use takt_rt::frame::Frame;
+use takt_rt::linux::MonotonicClock;
+use takt_rt::plan;
+use takt_rt::port::{BusHealth, BusPort, Clock, ReceiveBatch};
+use takt_rt::record::{EventKind, MAX_AXES};
+use takt_rt::stop::{Phase, StopCategory};
+
+fn arm(directory: &Path) -> Config {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/arm6-erob.toml");
+    let mut config = Config::load(&path).unwrap();
+    config.program.moves.truncate(2);
+    config.telemetry.directory = directory.to_owned();
+    config.telemetry.is_recorded = false;
+    config
+}
+
+/// What is left of a run in the real-time thread.
+struct Left {
+    outcome: Option<Outcome>,
+    ended: Option<Ended>,
+    snapshot: Snapshot,
+    log: LogSide,
+    traces: Vec<Trace>,
+}
+
+/// Runs the program; `each` is called about once in a millisecond, and `wrap` may put something in front of the ports.
+fn run<P: BusPort + Send + 'static>(
+    config: &Config,
+    wrap: impl Fn(Port) -> P,
+    mut each: impl FnMut(&mut HostSide),
+) -> Left {
+    let (rt, mut host, log) = channels(&ChannelSizes::of(config));
+    let mut clock = MonotonicClock::default();
+    let (ports, traces) = (0..config.buses.len())
+        .map(|bus| {
+            let (port, trace) = Port::open(config, bus).unwrap().traced(&config.buses[bus].name);
+            (wrap(port), trace)
+        })
+        .unzip();
+    let work = Work {
+        engine: Box::new(assemble::engine(config).unwrap()),
+        plan: assemble::slot_plan(config),
+        ports,
+        door: rt,
+        spin_guard_ns: None,
+        is_realtime_required: false,
+    };
+    let running = realtime_thread::start(realtime_thread::thread_config(&config.realtime), work).unwrap();
+    let mut supervisor = Supervisor::new(config, None);
+    while !running.is_finished() {
+        supervisor.poll(clock.now_ns(), &mut host);
+        each(&mut host);
+        thread::sleep(Duration::from_millis(1));
+    }
+    let ended = running.join();
+    Left { outcome: supervisor.outcome().cloned(), ended, snapshot: host.snapshot(), log, traces }
+}
+
+/// Counts the cycles: each asks for the health of each bus once.
+struct Counted {
+    port: Port,
+    cycles: Arc<AtomicU64>,
+}
+
+impl BusPort for Counted {
+    fn send(&mut self, now_ns: u64, frames: &[Frame]) -> usize {
+        self.port.send(now_ns, frames)
+    }
+
+    fn receive(&mut self, now_ns: u64, batch: &mut ReceiveBatch) {
+        self.port.receive(now_ns, batch);
+    }
+
+    fn unconfirmed(&mut self, now_ns: u64) -> usize {
+        self.port.unconfirmed(now_ns)
+    }
+
+    fn health(&mut self) -> BusHealth {
+        self.cycles.fetch_add(1, Ordering::Relaxed);
+        self.port.health()
+    }
+}
+
+#[test]
+fn a_logger_that_is_stuck_costs_records_and_frames_that_are_counted_and_nothing_else() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut config = arm(folder.path());
+    config.telemetry.ring_records = 64;
+    let asked = Arc::new(AtomicU64::new(0));
+    let mut left = run(&config, |port| Counted { port, cycles: Arc::clone(&asked) }, |_| {});
+    assert_eq!(left.outcome, Some(Outcome::Finished));
+    assert!(left.ended.is_some());
+    let cycles = asked.load(Ordering::Relaxed) / config.buses.len() as u64;
+    assert_eq!(left.log.records_written(), 64);
+    assert_eq!(left.log.records_dropped(), cycles - 64);
+    for trace in &mut left.traces {
+        let kept = std::iter::from_fn(|| trace.take()).count() as u64;
+        assert!(kept > 1_000 && trace.dropped() > cycles, "{kept} kept, {} dropped", trace.dropped());
+    }
+}
+
+#[test]
+fn a_client_that_floods_the_queue_and_the_stream_does_not_keep_the_program_from_finishing() {
+    let folder = tempfile::tempdir().unwrap();
+    let config = arm(folder.path());
+    let command = StreamCommand { valid_until_ns: u64::MAX, set_points: [plan::State::default(); MAX_AXES] };
+    let refused = Cell::new(0_u64);
+    let left = run(
+        &config,
+        |port| port,
+        |host| {
+            for _ in 0..100 {
+                host.stream(&command);
+                // What the group accepts at any time, and changes nothing in this mode.
+                if host.request(Request::RatedTorque { axis: 0, torque: 87.0 }).is_err() {
+                    refused.set(refused.get() + 1);
+                }
+            }
+        },
+    );
+    assert_eq!(left.outcome, Some(Outcome::Finished));
+    assert!(refused.get() > 10_000, "the queue was full {} times", refused.get());
+}
+
+/// A port that is a defect of the real-time thread after so many frames.
+struct Fatal {
+    port: Port,
+    sends: u32,
+}
+
+impl BusPort for Fatal {
+    fn send(&mut self, now_ns: u64, frames: &[Frame]) -> usize {
+        self.sends += 1;
+        assert!(self.sends < 2_000, "a defect");
+        self.port.send(now_ns, frames)
+    }
+
+    fn receive(&mut self, now_ns: u64, batch: &mut ReceiveBatch) {
+        self.port.receive(now_ns, batch);
+    }
+
+    fn unconfirmed(&mut self, now_ns: u64) -> usize {
+        self.port.unconfirmed(now_ns)
+    }
+
+    fn health(&mut self) -> BusHealth {
+        self.port.health()
+    }
+}
+
+#[test]
+fn when_the_real_time_thread_dies_its_last_cycles_and_frames_are_in_the_black_box() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut config = arm(folder.path());
+    config.telemetry.ring_records = 8_192;
+    let left = run(&config, |port| Fatal { port, sends: 0 }, |_| {});
+    assert!(left.ended.is_none() && left.outcome.is_none());
+    let options = LoggerOptions {
+        machine: Machine::of(&config),
+        wall_clock: WallClock::fixed(0),
+        started_ns: 0,
+        recording: None,
+        candump: None,
+        black_box: Some(BlackBoxOptions { span_ns: 5_000_000_000, directory: folder.path().to_owned() }),
+        traces: left.traces,
+    };
+    let logger = LoggerThread::start(Logger::new(left.log, options, Box::new(|_| {}))).unwrap();
+    logger.fault(Fault::ThreadDied);
+    let files = logger.finish().black_boxes.files;
+    let recorded = Recorded::open(&files[0]).unwrap();
+    assert_eq!(recorded.cause().unwrap().rule, "thread_died");
+    assert_eq!(recorded.slots.unwrap().1, left.snapshot.slot);
+    let bytes = fs::read(&files[0]).unwrap();
+    let messages = mcap::MessageStream::new(&bytes).unwrap().map(Result::unwrap);
+    assert!(messages.filter(|message| message.channel.topic == "/frames/base").count() > 1_000);
+}
+
+/// Whatever panicked, the group was stopped in category 1 and its drives are without power.
+fn assert_stopped_in_control(session: &Session, said: &str) {
+    assert_eq!(session.outcome, Outcome::CallbackPanicked { message: said.to_owned() });
+    assert_eq!(session.snapshot.stop.map(|stop| stop.category), Some(StopCategory::One));
+    assert_eq!(session.snapshot.phase, Phase::Disabled);
+    assert!(session.ended.is_some(), "the real-time thread has ended as it should");
+    let recorded = Recorded::open(&session.log.black_boxes.files[0]).unwrap();
+    assert_eq!(recorded.cause().unwrap().rule, "callback_panicked");
+    let decelerated = recorded.events.iter().any(|event| {
+        event.kind == Some(EventKind::PhaseChanged { from: Phase::Moving, to: Phase::Stopping })
+    });
+    assert!(decelerated, "{:?}", recorded.events);
+}
+
+#[test]
+fn a_panic_of_the_callers_watch_is_caught_and_stops_the_group_in_category_1() {
+    let folder = tempfile::tempdir().unwrap();
+    let config = arm(folder.path());
+    let mut calls_in_motion = 0;
+    let session = session::run(&config, SessionOptions::default(), Box::new(|_| {}), |snapshot, _| {
+        calls_in_motion += u32::from(snapshot.phase == Phase::Moving);
+        assert!(calls_in_motion < 100, "a mistake in watch");
+        None
+    });
+    assert_stopped_in_control(&session.unwrap(), "a mistake in watch");
+}
+
+#[test]
+fn a_panic_of_the_callers_notify_is_caught_and_stops_the_group_in_category_1() {
+    let folder = tempfile::tempdir().unwrap();
+    let config = arm(folder.path());
+    let notify = |notice: &Notice| {
+        if let Notice::Event(event) = notice {
+            let begins = matches!(event.kind, EventKind::PhaseChanged { to: Phase::Moving, .. });
+            assert!(!begins, "a mistake in notify");
+        }
+    };
+    let mut last_watched = Phase::Passive;
+    let session = session::run(&config, SessionOptions::default(), Box::new(notify), |snapshot, _| {
+        last_watched = snapshot.phase;
+        None
+    });
+    assert_stopped_in_control(&session.unwrap(), "a mistake in notify");
+    assert_eq!(last_watched, Phase::Disabled, "watch was sound and has seen the end");
+}

@@ -1,0 +1,286 @@
+//! `takt report` on what a run leaves behind, whole or not.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use serde_json::Value;
+use takt::bus::trace::traced;
+use takt::config::Config;
+use takt::controller::{Outcome, VirtualRun};
+use takt::sim::SimulatedBus;
+use takt::telemetry::{BlackBoxOptions, Destination, Logger, LoggerOptions, Machine, Recorded, WallClock};
+use takt_rt::stop::Rule;
+use tempfile::TempDir;
+
+/// 2023-11-14 22:13:20 UTC
+const UNIX_AT_ZERO_NS: u64 = 1_700_000_000_000_000_000;
+
+/// What a run in virtual time has left, whose arm lags behind further than is allowed.
+struct Left {
+    folder: TempDir,
+    recording: PathBuf,
+    black_box: PathBuf,
+}
+
+fn stopped_run() -> Left {
+    let folder = tempfile::tempdir().unwrap();
+    let mut config =
+        Config::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/arm6-erob.toml")).unwrap();
+    config.axes[2].following_error.limit = 0.002;
+    config.axes[2].following_error.time_ns = 5_000_000;
+    let (ports, traces) = (0..config.buses.len())
+        .map(|bus| traced(SimulatedBus::new(&config, bus), &config.buses[bus].name, 256))
+        .unzip();
+    let (mut run, log) = VirtualRun::new(&config, ports).unwrap();
+    let options = LoggerOptions {
+        machine: Machine::of(&config),
+        wall_clock: WallClock::fixed(UNIX_AT_ZERO_NS),
+        started_ns: 0,
+        recording: Some(Destination::File(folder.path().join("run.mcap"))),
+        candump: None,
+        black_box: Some(BlackBoxOptions { span_ns: 5_000_000_000, directory: folder.path().to_owned() }),
+        traces,
+    };
+    let mut logger = Logger::new(log, options, Box::new(|_| {}));
+    let outcome = run.run(60_000, |_| {
+        logger.drain();
+    });
+    assert!(
+        matches!(outcome, Some(Outcome::Stopped(stop)) if stop.rule == Rule::FollowingError),
+        "{outcome:?}"
+    );
+    let summary = logger.finish();
+    Left { folder, recording: summary.recording.unwrap(), black_box: summary.black_boxes.files[0].clone() }
+}
+
+fn report(file: &Path, options: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_takt")).arg("report").arg(file).args(options).output().unwrap()
+}
+
+fn text(output: &Output) -> String {
+    String::from_utf8(output.stdout.clone()).unwrap()
+}
+
+fn errors(output: &Output) -> String {
+    String::from_utf8(output.stderr.clone()).unwrap()
+}
+
+fn json(output: &Output) -> Value {
+    assert_eq!(output.status.code(), Some(0), "{}", errors(output));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+#[test]
+fn a_black_box_tells_the_reason_the_axis_and_its_last_cycles_the_events_and_the_timing() {
+    let left = stopped_run();
+    let output = report(&left.black_box, &["--cycles", "7"]);
+    assert_eq!(output.status.code(), Some(0), "{}", errors(&output));
+    let text = text(&output);
+    for part in [
+        "black box of ",
+        "joint3 was 0.0",
+        "(allowed: 0.0020 rad) while moving",
+        "joint3, the last 7 cycles up to the stop",
+        "moving → stopping",
+        "operation enabled",
+        "computing",
+        "missed slots           0 of ",
+        "2023-11-14 22:13:20",
+    ] {
+        assert!(text.contains(part), "{part:?} is not in\n{text}");
+    }
+    assert!(text.lines().all(|line| line.chars().count() <= 100), "{text}");
+}
+
+#[test]
+fn the_recording_and_the_black_box_of_a_run_tell_the_same_of_the_stop() {
+    let left = stopped_run();
+    let [recording, black_box] =
+        [&left.recording, &left.black_box].map(|file| json(&report(file, &["--json"])));
+    assert_eq!((&recording["is_black_box"], &black_box["is_black_box"]), (&false.into(), &true.into()));
+    for key in ["reason", "rule", "category", "axis", "value", "limit", "slot", "phase"] {
+        assert_eq!(recording["cause"][key], black_box["cause"][key], "{key}");
+    }
+    assert_eq!(black_box["cause"]["rule"], "following_error");
+    assert_eq!(recording["axis"], black_box["axis"]);
+    let cycles = black_box["axis"]["cycles"].as_array().unwrap();
+    assert_eq!((cycles.len(), &cycles[19]["slot"]), (20, &black_box["cause"]["slot"]));
+    assert!(cycles.iter().rev().skip(1).all(|cycle| cycle["phase"] == "moving"));
+    let largest = cycles.iter().map(|cycle| cycle["following_error"].as_f64().unwrap().abs());
+    assert!(largest.fold(0.0, f64::max) > 0.002);
+}
+
+#[test]
+fn the_cycles_that_are_read_are_those_that_were_recorded() {
+    let left = stopped_run();
+    let recorded = Recorded::open(&left.recording).unwrap();
+    let (first, last) = recorded.slots.unwrap();
+    let cycles = recorded.cycles(&(first..=last)).unwrap();
+    assert_eq!(cycles.len() as u64, recorded.statistics.cycles);
+    assert_eq!((recorded.machine.axes.len(), recorded.machine.axes[5].name.as_str()), (6, "joint6"));
+    let bytes = fs::read(&left.recording).unwrap();
+    let messages = mcap::MessageStream::new(&bytes).unwrap().map(Result::unwrap);
+    let written: Vec<f64> = messages
+        .filter(|message| message.channel.topic == "/axis/joint4")
+        // Behind the header of CDR, the slot and the set-point.
+        .map(|message| f64::from_le_bytes(message.data[20..28].try_into().unwrap()))
+        .collect();
+    let read: Vec<f64> = cycles.iter().map(|cycle| cycle.axes[3].position).collect();
+    assert_eq!(read, written);
+    assert!(read.iter().any(|position| position.abs() > 0.1), "the joint has moved");
+}
+
+#[test]
+fn another_axis_can_be_asked_for_and_one_that_is_not_there_is_told_with_those_that_are() {
+    let left = stopped_run();
+    let shown = json(&report(&left.black_box, &["--json", "--axis", "joint6", "--cycles", "3"]));
+    assert_eq!((&shown["axis"]["name"], &shown["cause"]["axis"]), (&"joint6".into(), &"joint3".into()));
+    assert_eq!(shown["axis"]["cycles"].as_array().unwrap().len(), 3);
+    let output = report(&left.black_box, &["--axis", "elbow"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(
+        errors(&output).contains("elbow") && errors(&output).contains("joint1, joint2"),
+        "{}",
+        errors(&output)
+    );
+}
+
+#[test]
+fn the_picture_has_position_velocity_following_error_and_timing_and_marks_the_stop() {
+    let left = stopped_run();
+    let svg = left.folder.path().join("stop.svg");
+    let output = report(&left.black_box, &["--svg", svg.to_str().unwrap()]);
+    assert_eq!(output.status.code(), Some(0), "{}", errors(&output));
+    let svg = fs::read_to_string(svg).unwrap();
+    for part in [
+        "joint3: position, rad",
+        "joint3: velocity",
+        "joint3: following error, mrad",
+        "timing, µs",
+        "wake-up",
+    ] {
+        assert!(svg.contains(part), "{part}");
+    }
+    // Set and actual twice, the following error, three times.
+    assert_eq!(svg.matches("<polyline").count(), 8);
+    assert!(svg.contains("-1 s") && !svg.contains("NaN"));
+    let unwritable = report(&left.black_box, &["--svg", "/nonexistent/stop.svg"]);
+    assert_eq!(unwritable.status.code(), Some(1));
+    assert!(text(&unwritable).contains("joint3 was"), "the text is there all the same");
+}
+
+#[test]
+fn a_run_without_a_stop_is_shown_up_to_its_end() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/single-erob.toml");
+    let config = Config::load(&path).unwrap();
+    let (mut run, log) = VirtualRun::simulated(&config).unwrap();
+    let options = LoggerOptions {
+        machine: Machine::of(&config),
+        wall_clock: WallClock::fixed(UNIX_AT_ZERO_NS),
+        started_ns: 0,
+        recording: Some(Destination::File(folder.path().join("run.mcap"))),
+        candump: None,
+        black_box: None,
+        traces: vec![],
+    };
+    let mut logger = Logger::new(log, options, Box::new(|_| {}));
+    let outcome = run.run(60_000, |_| {
+        logger.drain();
+    });
+    assert_eq!(outcome, Some(Outcome::Finished));
+    let recording = logger.finish().recording.unwrap();
+    let told = json(&report(&recording, &["--json", "--cycles", "5"]));
+    assert_eq!(told["cause"], Value::Null);
+    let cycles = told["axis"]["cycles"].as_array().unwrap();
+    assert_eq!((cycles.len(), &cycles[4]["slot"]), (5, &run.snapshot().slot.into()));
+    let svg = folder.path().join("end.svg");
+    let output = report(&recording, &["--svg", svg.to_str().unwrap()]);
+    assert!(text(&output).contains("the last 20 cycles at the end"), "{}", text(&output));
+    assert!(!fs::read_to_string(svg).unwrap().contains("NaN"));
+}
+
+#[test]
+fn a_recording_that_was_cut_off_anywhere_is_read_as_far_as_it_goes() {
+    let left = stopped_run();
+    let bytes = fs::read(&left.recording).unwrap();
+    let whole = Recorded::open(&left.recording).unwrap();
+    assert_eq!(whole.warnings, [""; 0]);
+    let cut = left.folder.path().join("cut.mcap");
+    let mut last = 0;
+    for part in 1..=40 {
+        let length = bytes.len() * part / 41;
+        fs::write(&cut, &bytes[..length]).unwrap();
+        let read = Recorded::open(&cut).unwrap_or_else(|error| panic!("{length} bytes: {error}"));
+        let cycles = read.statistics.cycles;
+        // A cycle of six axes takes 900 bytes: no more than a few are lost at the end.
+        assert!(cycles >= last && (cycles + 10) * 1000 > length as u64, "{cycles} cycles in {length} bytes");
+        last = cycles;
+        // Behind the data is only the index, which nothing here needs.
+        assert!(
+            cycles == whole.statistics.cycles || read.warnings[0].contains("cut off"),
+            "{:?}",
+            read.warnings
+        );
+    }
+    fs::write(&cut, &bytes[..bytes.len() / 2]).unwrap();
+    let output = report(&cut, &[]);
+    assert_eq!(output.status.code(), Some(0), "{}", errors(&output));
+    assert!(text(&output).contains("cut off"), "{}", text(&output));
+}
+
+#[test]
+fn damaged_bytes_never_bring_it_down_and_a_damaged_part_is_left_out_with_a_warning() {
+    let left = stopped_run();
+    let bytes = fs::read(&left.recording).unwrap();
+    let whole = Recorded::open(&left.recording).unwrap().statistics.cycles;
+    let damaged = left.folder.path().join("damaged.mcap");
+    let mut warned = 0;
+    for round in 0..60 {
+        let mut broken = bytes.clone();
+        // Spread over the file, and close together at its beginning.
+        let at = if round < 30 { broken.len() / 30 * round + 17 } else { round * 13 };
+        broken[at] ^= 0x5A;
+        fs::write(&damaged, &broken).unwrap();
+        if let Ok(read) = Recorded::open(&damaged) {
+            assert!(read.statistics.cycles <= whole);
+            warned += usize::from(!read.warnings.is_empty());
+            read.cycles(&(0..=u64::MAX)).unwrap();
+        }
+    }
+    assert!(warned >= 25, "{warned} of 30 damaged chunks were told");
+}
+
+#[test]
+fn what_is_no_recording_is_refused_with_its_name_and_the_reason() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("file");
+    let mut foreign = vec![];
+    let mut writer = mcap::WriteOptions::new()
+        .library("another")
+        .compression(None)
+        .disable_seeking(true)
+        .create(mcap::write::NoSeek::new(&mut foreign))
+        .unwrap();
+    writer.finish().unwrap();
+    drop(writer);
+    for (content, reason) in [
+        (&b""[..], "empty"),
+        (b"(1700000000.001000) can0 080#\n", "no MCAP file"),
+        (&foreign[..], "no recording of takt"),
+        (&foreign[..4], "no MCAP file"),
+    ] {
+        fs::write(&file, content).unwrap();
+        let output = report(&file, &[]);
+        assert_eq!(output.status.code(), Some(2));
+        let said = errors(&output);
+        assert!(said.contains(reason) && said.contains(file.to_str().unwrap()), "{said}");
+        assert!(output.stdout.is_empty());
+    }
+    for absent in [folder.path().join("absent"), folder.path().to_owned()] {
+        let output = report(&absent, &[]);
+        assert_eq!(output.status.code(), Some(2));
+        assert!(errors(&output).contains(absent.to_str().unwrap()), "{}", errors(&output));
+    }
+}
