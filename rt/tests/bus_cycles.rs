@@ -45,9 +45,9 @@ fn one_move_leads_the_axes_of_both_buses_to_their_targets_at_one_time() {
         fastest.iter_mut().zip(shown).for_each(|(fastest, axis)| *fastest = fastest.max(axis.velocity));
     }
     rig.run(4);
-    for axis in 0..6 {
+    for (axis, fastest) in fastest.into_iter().enumerate() {
         assert_eq!(rig.drive(axis).position, fixture::scale().position_to_counts(1.25));
-        assert!((fastest[axis] - LIMITS.velocity).abs() < 0.1, "axis {axis} was seen at {}", fastest[axis]);
+        assert!((fastest - LIMITS.velocity).abs() < 0.1, "axis {axis} was seen at {fastest}");
     }
     assert_eq!(rig.stops(), []);
     rig.assert_limits_kept();
