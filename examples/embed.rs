@@ -1,33 +1,82 @@
-//! Embeds the controller in a program of one's own: runs a configuration in real time, looks on while it runs, asks it to
-//! stop after three seconds, and reads what is left.
+//! Embeds the controller in a program of one's own: moves the arm, looks at it on the way, and streams set-points of its
+//! own making, a slow circle of the first two joints.
 //!
 //! ```text
 //! cargo run --release --example embed configs/arm6-erob.toml
 //! ```
 
 use std::error::Error;
+use std::f64::consts::TAU;
 use std::path::PathBuf;
-use std::time::{Duration, Instant};
+use std::thread;
+use std::time::Duration;
 
-use takt::config::Config;
-use takt::controller::Interrupt;
-use takt::controller::session::{self, SessionOptions};
+use takt::config::{Config, OnViolation};
+use takt::controller::Controller;
+use takt::controller::session::SessionOptions;
+use takt_rt::plan::State;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let path = std::env::args().nth(1).map_or_else(|| PathBuf::from("configs/arm6-erob.toml"), PathBuf::from);
-    let config = Config::load(&path).map_err(miette::Report::new)?;
-    let begun = Instant::now();
-    let mut said = String::new();
-    let session = session::run(&config, SessionOptions::default(), Box::new(|_| {}), |_, progress| {
-        if progress.what != said {
-            println!("{:5.2} s  {}", begun.elapsed().as_secs_f64(), progress.what);
-            said = progress.what;
+    let mut config = Config::load(&path).map_err(miette::Report::new)?;
+    // This thread is not real-time: it makes its set-points unevenly, and what comes of that is held to the limits.
+    config.axes.iter_mut().for_each(|axis| axis.on_violation = OnViolation::Clamp);
+    let cycle_ns = config.cycle.period_ns;
+    let mut arm = Controller::start(config, SessionOptions::default())?;
+
+    let middle = |axis: &takt::config::Axis| 0.5 * (axis.limits.position_min + axis.limits.position_max);
+    let targets: Vec<f64> = arm.axes().iter().map(middle).collect();
+    let motion = arm.move_to(&targets)?;
+    arm.wait(motion, Duration::from_secs(30))?;
+    show(&arm, "moved");
+
+    // A set-point for every axis in every slot, made for the time of that slot and not for the time at which this thread
+    // happens to run: what the drives get is then as smooth as what is computed.
+    arm.begin_stream()?;
+    let period_s = cycle_ns as f64 * 1e-9;
+    let (first, mut last) = (arm.state().slot, 0);
+    while last - first.min(last) < (3.0 / period_s) as u64 {
+        let slot = arm.state().slot;
+        if slot == last {
+            thread::sleep(Duration::from_micros(100));
+            continue;
         }
-        (begun.elapsed() > Duration::from_secs(3)).then_some(Interrupt::Controlled)
-    })?;
-    println!("{:?} after {} cycles", session.outcome, session.log.statistics.cycles);
-    for (axis, state) in config.axes.iter().zip(session.snapshot.axes) {
-        println!("{:<10} {:+.4}", axis.name, state.position);
+        last = slot;
+        let at = |slot: f64| circle(&targets, (slot - first as f64) * period_s);
+        // With the velocity, so that a set-point that comes too late is bridged smoothly.
+        let (now, next) = (at(slot as f64), at(slot as f64 + 0.01));
+        let set_points: Vec<State> = (now.iter().zip(next))
+            .map(|(&position, next)| State {
+                position,
+                velocity: (next - position) / (0.01 * period_s),
+                acceleration: 0.0,
+            })
+            .collect();
+        arm.stream(&set_points, Duration::from_millis(50))?;
     }
+    show(&arm, "streamed");
+    println!("{} set-points were held to the limits", arm.state().clamped);
+
+    let session = arm.finish()?;
+    println!("{:?} after {} cycles", session.outcome, session.log.statistics.cycles);
     Ok(())
+}
+
+/// The first two joints swing around their targets, from rest and to rest: the amplitude grows and fades with the fourth
+/// power of a sine.
+fn circle(targets: &[f64], time_s: f64) -> Vec<f64> {
+    let amplitude = 0.1 * (TAU / 6.0 * time_s).sin().max(0.0).powi(4);
+    let mut positions = targets.to_vec();
+    for (position, phase) in positions.iter_mut().zip([0.0, TAU / 4.0]) {
+        *position += amplitude * (TAU / 3.0 * time_s + phase).sin();
+    }
+    positions
+}
+
+fn show(arm: &Controller, what: &str) {
+    let state = arm.state();
+    println!("{what}: {:?}{}", state.phase, state.stop.map_or(String::new(), |stop| format!(", {stop:?}")));
+    for (axis, now) in arm.axes().iter().zip(state.axes) {
+        println!("  {:<10} {:+.4}", axis.name, now.position);
+    }
 }

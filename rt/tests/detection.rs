@@ -205,3 +205,24 @@ fn a_stream_that_could_not_stop_before_its_limit_any_more_is_stopped_in_time() {
     assert!(rest <= 3.0 + 1e-6 && rest > 2.9, "{rest}");
     rig.assert_limits_kept();
 }
+
+#[test]
+fn a_stream_that_lies_about_its_velocity_is_stopped_from_the_velocity_that_it_has() {
+    let mut rig = Rig::enabled(1);
+    rig.move_to(0.0);
+    rig.run_until(Phase::Holding, 5_000);
+    rig.request(Request::Stream);
+    let period_s = PERIOD_NS as f64 * 1e-9;
+    let (mut position, mut velocity) = (0.0, 0.0_f64);
+    for _ in 0..300 {
+        velocity = (velocity + 5.0 * period_s).min(1.0);
+        position += velocity * period_s;
+        rig.stream(position, 0.0, 5 * PERIOD_NS);
+        rig.run(1);
+    }
+    rig.stream(position + 0.1, 0.0, 5 * PERIOD_NS);
+    rig.run_until(Phase::Holding, 1_000);
+    let stops = rig.stops();
+    assert_eq!((stops.len(), stops[0].category), (1, StopCategory::Two), "{stops:?}");
+    rig.assert_limits_kept();
+}

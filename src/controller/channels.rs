@@ -98,9 +98,8 @@ pub fn channels(sizes: &ChannelSizes) -> (RtSide, HostSide, LogSide) {
         snapshot: snapshot_in,
     };
     let host = HostSide {
-        axes: sizes.axes,
         requests: request_in,
-        stream: stream_in,
+        streamer: Some(Streamer { axes: sizes.axes, stream: stream_in }),
         service: service_in,
         received: received_out,
         observer: Observer { snapshot: snapshot_out },
@@ -168,9 +167,8 @@ impl Door for RtSide {
 
 /// The side of whoever commands the controller.
 pub struct HostSide {
-    axes: usize,
     requests: Producer<Request>,
-    stream: Writer,
+    streamer: Option<Streamer>,
     service: Vec<Producer<Frame>>,
     received: Consumer<(usize, Received)>,
     observer: Observer,
@@ -188,7 +186,14 @@ impl HostSide {
     /// Replaces the streamed command; the real-time thread takes the newest one at its next cycle. Set-points
     /// beyond the axes of the controller are not carried.
     pub fn stream(&mut self, command: &StreamCommand) {
-        self.stream.write(|words| words::put_stream(command, self.axes, words));
+        if let Some(streamer) = &mut self.streamer {
+            streamer.stream(command);
+        }
+    }
+
+    /// Hands the streaming over to another thread; [`HostSide::stream`] does nothing from then on.
+    pub fn take_streamer(&mut self) -> Option<Streamer> {
+        self.streamer.take()
     }
 
     /// Hands over a service frame to be sent after the set-points of a coming cycle.
@@ -219,6 +224,19 @@ impl HostSide {
     /// A handle for somebody else who wants to see the state.
     pub fn observer(&self) -> Observer {
         self.observer.clone()
+    }
+}
+
+/// The end of the mailbox of streamed commands, of which the real-time thread takes the newest.
+pub struct Streamer {
+    axes: usize,
+    stream: Writer,
+}
+
+impl Streamer {
+    /// Replaces the streamed command. Set-points beyond the axes of the controller are not carried.
+    pub fn stream(&mut self, command: &StreamCommand) {
+        self.stream.write(|words| words::put_stream(command, self.axes, words));
     }
 }
 

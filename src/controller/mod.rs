@@ -3,6 +3,7 @@
 
 pub mod assemble;
 pub mod channels;
+mod handle;
 mod program;
 pub mod quiet;
 pub mod realtime_thread;
@@ -10,6 +11,7 @@ pub mod session;
 mod supervisor;
 mod virtual_time;
 
+pub use handle::{CommandError, Controller, Motion, MotionError, MoveOptions, StartFailure};
 pub use program::{ProgramRunner, Step};
 pub use supervisor::{Interrupt, Outcome, Progress, Supervisor};
 pub use virtual_time::{VirtualClock, VirtualRun};

@@ -1,7 +1,8 @@
 //! A controller in real time, from the configuration to what is left of the run.
 
+use std::collections::VecDeque;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::Arc;
+use std::sync::{Arc, mpsc};
 use std::time::Duration;
 
 use takt_rt::door::{Request, Snapshot};
@@ -10,7 +11,7 @@ use takt_rt::port::Clock;
 use takt_rt::stop::StopCategory;
 
 use super::assemble::{self, AssembleError};
-use super::channels::{ChannelSizes, channels};
+use super::channels::{ChannelSizes, Observer, Streamer, channels};
 use super::quiet;
 use super::realtime_thread::{self, Begun, Ended, StartError, Work};
 use super::supervisor::{Interrupt, Outcome, Progress, Supervisor};
@@ -86,13 +87,35 @@ pub fn run(
     config: &Config,
     options: SessionOptions,
     notify: Box<dyn FnMut(&Notice) + Send>,
+    watch: impl FnMut(&Snapshot, Progress) -> Option<Interrupt>,
+) -> Result<Session, SessionError> {
+    lead(config, options, notify, watch, None)
+}
+
+/// Somebody who commands the group from another thread, in place of the program.
+pub(super) struct Remote {
+    /// What is asked of the group, in order.
+    pub requests: mpsc::Receiver<Request>,
+    /// Where the ways to see the state and to stream are handed out, once the real-time thread runs.
+    pub introduce: mpsc::SyncSender<(Observer, Streamer)>,
+}
+
+/// As [`run`]; with a remote, the group does what that asks for.
+pub(super) fn lead(
+    config: &Config,
+    options: SessionOptions,
+    notify: Box<dyn FnMut(&Notice) + Send>,
     mut watch: impl FnMut(&Snapshot, Progress) -> Option<Interrupt>,
+    remote: Option<Remote>,
 ) -> Result<Session, SessionError> {
     let mut clock = MonotonicClock::default();
     let engine = Box::new(assemble::engine(config)?);
     let (ports, traces) = open_ports(config, options.rehearsal.as_deref())?;
     let (rt, mut host, log) = channels(&ChannelSizes::of(config));
-    let mut supervisor = Supervisor::new(config, options.duration_ns);
+    let mut supervisor = match remote {
+        Some(_) => Supervisor::serving(config),
+        None => Supervisor::new(config, options.duration_ns),
+    };
 
     let own = |is_wanted: bool| is_wanted.then(|| Destination::Directory(config.telemetry.directory.clone()));
     let started_ns = clock.now_ns();
@@ -127,9 +150,18 @@ pub fn run(
         }
     };
     let begun = running.begun();
+    if let (Some(remote), Some(streamer)) = (&remote, host.take_streamer()) {
+        // Whoever no longer waits for it has given up; the run then ends as it was told to.
+        let _ = remote.introduce.send((host.observer(), streamer));
+    }
+    let mut asked = VecDeque::new();
     let (mut panicked, mut is_watched) = (None, true);
     while !running.is_finished() {
         supervisor.poll(clock.now_ns(), &mut host);
+        asked.extend(remote.iter().flat_map(|remote| remote.requests.try_iter()));
+        while asked.front().is_some_and(|request| host.request(*request).is_ok()) {
+            asked.pop_front();
+        }
         if let Some(rehearsal) = &options.rehearsal {
             rehearsal.observe(&host.snapshot());
         }

@@ -118,6 +118,8 @@ pub struct Supervisor {
     outcome: Option<Outcome>,
     deadline_ns: Option<u64>,
     duration_ns: Option<u64>,
+    /// Whether somebody else commands the group once it is enabled.
+    is_serving: bool,
 }
 
 impl Supervisor {
@@ -136,7 +138,14 @@ impl Supervisor {
             outcome: None,
             deadline_ns: None,
             duration_ns,
+            is_serving: false,
         }
+    }
+
+    /// A group that is brought up and enabled, and then left to somebody else's requests until it is interrupted. A stop
+    /// does not end the run: whoever commands the group decides what follows it.
+    pub fn serving(config: &Config) -> Self {
+        Self { is_serving: true, ..Self::new(config, None) }
     }
 
     /// Asks the run to end. A harder interrupt overtakes a softer one.
@@ -297,6 +306,9 @@ impl Supervisor {
     }
 
     fn run(&mut self, now_ns: u64, snapshot: &Snapshot) {
+        if self.is_serving {
+            return;
+        }
         if let Some(stop) = own_stop(snapshot) {
             return self.end(now_ns, Outcome::Stopped(stop));
         }

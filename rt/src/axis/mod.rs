@@ -379,6 +379,17 @@ impl Axis {
         self.set[0]
     }
 
+    /// The newest set-point, with velocity and acceleration as the steps of the positions give them.
+    pub fn stepped(&self, period_s: f64) -> State {
+        let [newest, last, before] = self.set.map(|state| state.position);
+        let limits = &self.parameters.limits;
+        let acceleration = ((newest - last) - (last - before)) / (period_s * period_s);
+        let acceleration = acceleration.clamp(-limits.deceleration, limits.acceleration);
+        // The step is what the velocity was in the middle of the cycle.
+        let velocity = (newest - last) / period_s + acceleration * period_s / 2.0;
+        State { position: newest, velocity: velocity.clamp(-limits.velocity, limits.velocity), acceleration }
+    }
+
     /// The actual position (rad or m).
     pub fn position(&self) -> f64 {
         self.position
@@ -410,9 +421,13 @@ impl Axis {
         guard::check(&self.parameters.limits, period_s, self.set[1].position, self.set[0].position, next)
     }
 
-    /// Checks the next set-point of a stream, beyond [`Axis::check`].
-    pub fn check_stream(&self, next: &State, period_s: f64) -> Result<(), Violation> {
-        guard::check_stream(&self.parameters.limits, &self.course(next, period_s))
+    /// Checks the next set-point of a stream, beyond [`Axis::check`]. After a command that did not come and was bridged the
+    /// jerk is not the stream's own, and is not judged.
+    pub fn check_stream(&self, next: &State, period_s: f64, is_bridged: bool) -> Result<(), Violation> {
+        let limits = &self.parameters.limits;
+        let jerk = if is_bridged { f64::INFINITY } else { limits.jerk };
+        guard::check_jerk(jerk, &self.course(next, period_s))?;
+        guard::check_braking(limits, &self.course(next, period_s))
     }
 
     /// The set-point within the limits that is nearest to one of a stream.

@@ -162,9 +162,9 @@ impl Engine {
         now_ns: Nanoseconds,
         door: &mut impl Door,
     ) -> Option<ArrayVec<State, MAX_AXES>> {
-        let period_s = self.period_s;
+        let (period_s, is_bridged) = (self.period_s, self.bridged_cycles > 0);
         let check = |axis: &Axis, next: &State| {
-            axis.check(next, period_s).and_then(|()| axis.check_stream(next, period_s))
+            axis.check(next, period_s).and_then(|()| axis.check_stream(next, period_s, is_bridged))
         };
         let mut next: ArrayVec<State, MAX_AXES> = ArrayVec::new();
         for (axis, wanted) in self.axes.iter().zip(wanted) {

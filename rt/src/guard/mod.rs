@@ -5,7 +5,7 @@ mod stream;
 use crate::plan::State;
 use crate::stop::Rule;
 
-pub use stream::{Course, OnViolation, braking_distance, check_stream, clamp};
+pub use stream::{Course, OnViolation, braking_distance, check_braking, check_jerk, clamp};
 
 /// What an axis may never be asked to do. rad (m) and seconds.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,0 +1,461 @@
+//! A controller to embed: brought up and enabled by [`Controller::start`], commanded by a program's own threads, brought
+//! to rest and left by [`Controller::finish`].
+//!
+//! ```no_run
+//! use std::time::Duration;
+//! use takt::config::Config;
+//! use takt::controller::Controller;
+//! use takt::controller::session::SessionOptions;
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let config = Config::load("configs/arm6-erob.toml".as_ref()).map_err(miette::Report::new)?;
+//! let mut arm = Controller::start(config, SessionOptions::default())?;
+//! let there = arm.move_to(&[0.3, -0.2, 0.1, -0.5, 0.0, 0.4])?;
+//! arm.wait(there, Duration::from_secs(10))?;
+//! let session = arm.finish()?;
+//! println!("{:?}", session.outcome);
+//! # Ok(())
+//! # }
+//! ```
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc;
+use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant};
+
+use takt_rt::control::ControlLaw;
+use takt_rt::door::{Move, ProfileMove, Request, Snapshot, StreamCommand};
+use takt_rt::linux::MonotonicClock;
+use takt_rt::plan::State;
+use takt_rt::port::Clock;
+use takt_rt::profile::ProfileTarget;
+use takt_rt::record::MAX_AXES;
+use takt_rt::stop::{Phase, StopCategory, StopReason};
+
+use super::channels::{Observer, Streamer};
+use super::session::{self, Remote, Session, SessionError, SessionOptions};
+use super::supervisor::{Interrupt, Outcome};
+use crate::config::{Axis, Config};
+
+/// Between two looks at the state by whoever waits.
+const LOOK: Duration = Duration::from_millis(1);
+/// Enabling takes the drives' power-up time at the most, and somewhat longer for all of them.
+const ENABLE_PATIENCE: Duration = Duration::from_secs(60);
+
+/// A group of axes that is enabled and obeys. Dropping it brings the axes to rest, disables and leaves them.
+pub struct Controller {
+    axes: Vec<Axis>,
+    requests: mpsc::Sender<Request>,
+    observer: Observer,
+    streamer: Streamer,
+    is_ending: Arc<AtomicBool>,
+    thread: Option<JoinHandle<Result<Session, SessionError>>>,
+    last_id: u32,
+}
+
+/// Why there is no controller.
+#[derive(Debug, thiserror::Error)]
+pub enum StartFailure {
+    /// Nothing was begun.
+    #[error(transparent)]
+    Session(#[from] SessionError),
+    /// The drives could not be brought up or enabled; what is left of the attempt.
+    #[error("the drives could not be enabled: {:?}", .0.outcome)]
+    NotEnabled(Box<Session>),
+    /// The thread that leads the controller has died, which only a defect of takt can bring about.
+    #[error("the thread that leads the controller has died")]
+    Died,
+}
+
+/// Why a command was not given; nothing has changed then.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum CommandError {
+    /// A value for each axis is needed.
+    #[error("{given} values for {axes} axes")]
+    Count {
+        /// How many there were.
+        given: usize,
+        /// How many there are to be.
+        axes: usize,
+    },
+    /// There is no such axis.
+    #[error("there is no axis {axis}: the controller has {axes}")]
+    NoSuchAxis {
+        /// The number asked for.
+        axis: usize,
+        /// How many there are.
+        axes: usize,
+    },
+    /// The value is outside the limits of the axis, or no number.
+    #[error("{axis}: {value} is outside {lowest} to {highest}")]
+    OutsideLimits {
+        /// The axis.
+        axis: String,
+        /// What was asked for: rad, rad/s, N·m (m, m/s, N).
+        value: f64,
+        /// The lowest that is allowed.
+        lowest: f64,
+        /// The highest that is allowed.
+        highest: f64,
+    },
+    /// The axis is not in the mode that takes this.
+    #[error("{axis} is not in {needed}")]
+    WrongMode {
+        /// The axis.
+        axis: String,
+        /// The mode that takes it.
+        needed: &'static str,
+    },
+    /// The controller has ended.
+    #[error("the controller has ended")]
+    Ended,
+}
+
+/// Why a motion did not get to its end.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum MotionError {
+    /// The group has stopped.
+    #[error("the group has stopped: {0:?}")]
+    Stopped(StopReason),
+    /// The real-time thread refused it: another phase, or a latched fault.
+    #[error("the motion was refused while {phase:?}")]
+    Refused {
+        /// The phase that the group was in.
+        phase: Phase,
+    },
+    /// It was not over in time; it goes on.
+    #[error("the motion was not over in time")]
+    NotInTime,
+    /// The controller has ended.
+    #[error("the controller has ended")]
+    Ended,
+}
+
+/// A motion that was asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Motion {
+    id: u32,
+    refused_before: u64,
+    slot: u64,
+    ends_at_rest: bool,
+}
+
+/// How a move is made.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MoveOptions {
+    /// Fraction of the velocity limits, above 0 up to 1.
+    pub velocity_scale: f64,
+    /// Fraction of the acceleration and jerk limits, above 0 up to 1.
+    pub acceleration_scale: f64,
+    /// It takes at least this long, in seconds.
+    pub minimum_duration_s: f64,
+}
+
+impl Default for MoveOptions {
+    fn default() -> Self {
+        Self { velocity_scale: 1.0, acceleration_scale: 1.0, minimum_duration_s: 0.0 }
+    }
+}
+
+impl Controller {
+    /// Brings the drives up and enables them. Returns when the axes hold their position.
+    ///
+    /// # Errors
+    /// See [`StartFailure`]; nothing has moved then.
+    pub fn start(config: Config, options: SessionOptions) -> Result<Self, StartFailure> {
+        let (requests, remote_requests) = mpsc::channel();
+        let (introduce, introduced) = mpsc::sync_channel(1);
+        let remote = Remote { requests: remote_requests, introduce };
+        let is_ending = Arc::new(AtomicBool::new(false));
+        let axes = config.axes.clone();
+        let thread = {
+            let is_ending = Arc::clone(&is_ending);
+            let watch =
+                move |_: &Snapshot, _| is_ending.load(Ordering::Relaxed).then_some(Interrupt::Controlled);
+            let lead = move || session::lead(&config, options, Box::new(|_| {}), watch, Some(remote));
+            thread::Builder::new().name("takt-lead".into()).spawn(lead)
+        };
+        let thread = thread.map_err(SessionError::Logger)?;
+        let Ok((observer, streamer)) = introduced.recv() else {
+            return Err(failed(thread));
+        };
+        let thread = Some(thread);
+        let mut controller = Self { axes, requests, observer, streamer, is_ending, thread, last_id: 0 };
+        let begun = Instant::now();
+        while controller.state().phase != Phase::Holding {
+            if controller.has_ended() || begun.elapsed() > ENABLE_PATIENCE {
+                controller.is_ending.store(true, Ordering::Relaxed);
+                return Err(controller.thread.take().map_or(StartFailure::Died, failed));
+            }
+            thread::sleep(LOOK);
+        }
+        Ok(controller)
+    }
+
+    /// The axes, in the order of the configuration.
+    pub fn axes(&self) -> &[Axis] {
+        &self.axes
+    }
+
+    /// The state after the newest complete cycle.
+    pub fn state(&self) -> Snapshot {
+        self.observer.snapshot()
+    }
+
+    /// A handle for another thread that wants to see the state.
+    pub fn observer(&self) -> Observer {
+        self.observer.clone()
+    }
+
+    /// Moves every axis to its target (rad or m), coordinated, to rest. A move under way is re-planned from where it is.
+    /// Drives in profile position make their own way; those in profile velocity and torque are left as they are.
+    ///
+    /// # Errors
+    /// See [`CommandError`]; nothing has changed then.
+    pub fn move_to(&mut self, target: &[f64]) -> Result<Motion, CommandError> {
+        self.move_with(target, MoveOptions::default())
+    }
+
+    /// As [`Controller::move_to`], within fractions of the limits.
+    ///
+    /// # Errors
+    /// See [`CommandError`]; nothing has changed then.
+    pub fn move_with(&mut self, target: &[f64], options: MoveOptions) -> Result<Motion, CommandError> {
+        if target.len() != self.axes.len() {
+            return Err(CommandError::Count { given: target.len(), axes: self.axes.len() });
+        }
+        for (axis, value) in self.axes.iter().zip(target) {
+            let is_positioned =
+                !matches!(axis.control, ControlLaw::ProfileVelocity | ControlLaw::ProfileTorque);
+            if is_positioned {
+                within(axis, *value, axis.limits.position_min, axis.limits.position_max)?;
+            }
+        }
+        let mut all = [0.0; MAX_AXES];
+        all.iter_mut().zip(target).for_each(|(to, from)| *to = *from);
+        let id = self.next_id();
+        let request = Request::Move(Move {
+            id,
+            target: all,
+            target_velocity: [0.0; MAX_AXES],
+            velocity_scale: options.velocity_scale,
+            acceleration_scale: options.acceleration_scale,
+            minimum_duration_s: options.minimum_duration_s,
+        });
+        self.begin(id, request, true)
+    }
+
+    /// Lets a drive in profile velocity go at a speed (rad/s or m/s). When that has not been renewed within `valid_for`,
+    /// the group stops.
+    ///
+    /// # Errors
+    /// See [`CommandError`]; nothing has changed then.
+    pub fn velocity(
+        &mut self,
+        axis: usize,
+        velocity: f64,
+        valid_for: Duration,
+    ) -> Result<Motion, CommandError> {
+        let own = self.axis(axis, ControlLaw::ProfileVelocity, "profile velocity, mode = \"pv\"")?;
+        within(own, velocity, -own.limits.velocity, own.limits.velocity)?;
+        self.drive(axis, ProfileTarget::Velocity(velocity), velocity == 0.0, valid_for)
+    }
+
+    /// Lets a drive in profile torque push with a torque (N·m or N). When that has not been renewed within `valid_for`,
+    /// the group stops.
+    ///
+    /// # Errors
+    /// See [`CommandError`]; nothing has changed then.
+    pub fn torque(&mut self, axis: usize, torque: f64, valid_for: Duration) -> Result<Motion, CommandError> {
+        let own = self.axis(axis, ControlLaw::ProfileTorque, "profile torque, mode = \"pt\"")?;
+        within(own, torque, -own.limits.torque, own.limits.torque)?;
+        self.drive(axis, ProfileTarget::Torque(torque), torque == 0.0, valid_for)
+    }
+
+    /// Begins to follow [`Controller::stream`]. The first set-points must come within the time that enabling may take, and
+    /// begin where the joints are.
+    ///
+    /// # Errors
+    /// [`CommandError::Ended`].
+    pub fn begin_stream(&mut self) -> Result<(), CommandError> {
+        self.ask(Request::Stream)
+    }
+
+    /// Replaces the streamed set-points, one for each axis; the real-time thread takes the newest ones. They expire after
+    /// `valid_for`: then the group decelerates and holds.
+    ///
+    /// # Errors
+    /// [`CommandError::Count`].
+    pub fn stream(&mut self, set_points: &[State], valid_for: Duration) -> Result<(), CommandError> {
+        if set_points.len() != self.axes.len() {
+            return Err(CommandError::Count { given: set_points.len(), axes: self.axes.len() });
+        }
+        let mut all = [State::default(); MAX_AXES];
+        all.iter_mut().zip(set_points).for_each(|(to, from)| *to = *from);
+        self.streamer.stream(&StreamCommand { valid_until_ns: expiry_ns(valid_for), set_points: all });
+        Ok(())
+    }
+
+    /// Stops the group by this category.
+    ///
+    /// # Errors
+    /// [`CommandError::Ended`].
+    pub fn stop(&mut self, category: StopCategory) -> Result<(), CommandError> {
+        self.ask(Request::Stop(category))
+    }
+
+    /// Brings the axes to rest if need be, and disables them.
+    ///
+    /// # Errors
+    /// [`CommandError::Ended`].
+    pub fn disable(&mut self) -> Result<(), CommandError> {
+        self.ask(Request::Disable)
+    }
+
+    /// Enables the axes again, after [`Controller::disable`], or after a fault and [`Controller::reset_faults`].
+    ///
+    /// # Errors
+    /// [`CommandError::Ended`].
+    pub fn enable(&mut self) -> Result<(), CommandError> {
+        self.ask(Request::Enable)
+    }
+
+    /// Clears latched faults. Refused in motion.
+    ///
+    /// # Errors
+    /// [`CommandError::Ended`].
+    pub fn reset_faults(&mut self) -> Result<(), CommandError> {
+        self.ask(Request::ResetFaults)
+    }
+
+    /// Waits until a motion is over: until the axes are at rest at their targets, or a speed or torque has been reached.
+    ///
+    /// # Errors
+    /// See [`MotionError`].
+    pub fn wait(&self, motion: Motion, at_most: Duration) -> Result<(), MotionError> {
+        let begun = Instant::now();
+        loop {
+            let state = self.state();
+            if state.finished_move == motion.id && (!motion.ends_at_rest || state.phase == Phase::Holding) {
+                return Ok(());
+            }
+            if let Some(reason) = state.stop.filter(|reason| reason.slot >= motion.slot) {
+                return Err(MotionError::Stopped(reason));
+            }
+            if state.refused > motion.refused_before {
+                return Err(MotionError::Refused { phase: state.phase });
+            }
+            if self.has_ended() {
+                return Err(MotionError::Ended);
+            }
+            if begun.elapsed() > at_most {
+                return Err(MotionError::NotInTime);
+            }
+            thread::sleep(LOOK);
+        }
+    }
+
+    /// Waits for a phase. Returns whether it came in time.
+    pub fn wait_for(&self, phase: Phase, at_most: Duration) -> bool {
+        let begun = Instant::now();
+        while self.state().phase != phase {
+            if self.has_ended() || begun.elapsed() > at_most {
+                return false;
+            }
+            thread::sleep(LOOK);
+        }
+        true
+    }
+
+    /// Brings the axes to rest, disables and leaves them, and tells what is left of the run.
+    ///
+    /// # Errors
+    /// [`StartFailure::Died`] when the thread that leads the controller did not end by itself.
+    pub fn finish(mut self) -> Result<Session, StartFailure> {
+        self.is_ending.store(true, Ordering::Relaxed);
+        let Some(thread) = self.thread.take() else { return Err(StartFailure::Died) };
+        match thread.join() {
+            // To be asked to end is how such a run is over.
+            Ok(Ok(session)) if session.outcome == Outcome::Interrupted => {
+                Ok(Session { outcome: Outcome::Finished, ..session })
+            }
+            Ok(session) => Ok(session?),
+            Err(_) => Err(StartFailure::Died),
+        }
+    }
+
+    fn has_ended(&self) -> bool {
+        self.thread.as_ref().is_none_or(JoinHandle::is_finished)
+    }
+
+    fn next_id(&mut self) -> u32 {
+        // Never 0, which stands for "none yet".
+        self.last_id = self.last_id.checked_add(1).unwrap_or(1);
+        self.last_id
+    }
+
+    fn axis(&self, axis: usize, mode: ControlLaw, needed: &'static str) -> Result<&Axis, CommandError> {
+        let own = self.axes.get(axis).ok_or(CommandError::NoSuchAxis { axis, axes: self.axes.len() })?;
+        if own.control == mode {
+            Ok(own)
+        } else {
+            Err(CommandError::WrongMode { axis: own.name.clone(), needed })
+        }
+    }
+
+    fn drive(
+        &mut self,
+        axis: usize,
+        target: ProfileTarget,
+        ends_at_rest: bool,
+        valid_for: Duration,
+    ) -> Result<Motion, CommandError> {
+        let id = self.next_id();
+        // An axis that exists has a number that fits.
+        let axis = axis as u8;
+        let wanted = ProfileMove { id, axis, target, valid_until_ns: expiry_ns(valid_for) };
+        self.begin(id, Request::SetProfileTarget(wanted), ends_at_rest)
+    }
+
+    fn begin(&self, id: u32, request: Request, ends_at_rest: bool) -> Result<Motion, CommandError> {
+        let before = self.state();
+        self.ask(request)?;
+        Ok(Motion { id, refused_before: before.refused, slot: before.slot, ends_at_rest })
+    }
+
+    fn ask(&self, request: Request) -> Result<(), CommandError> {
+        self.requests.send(request).map_err(|_| CommandError::Ended)
+    }
+}
+
+impl Drop for Controller {
+    fn drop(&mut self) {
+        self.is_ending.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            // Its outcome interests nobody any more.
+            let _ = thread.join();
+        }
+    }
+}
+
+fn failed(thread: JoinHandle<Result<Session, SessionError>>) -> StartFailure {
+    match thread.join() {
+        Ok(Ok(session)) => StartFailure::NotEnabled(Box::new(session)),
+        Ok(Err(error)) => error.into(),
+        Err(_) => StartFailure::Died,
+    }
+}
+
+fn within(axis: &Axis, value: f64, lowest: f64, highest: f64) -> Result<(), CommandError> {
+    if (lowest..=highest).contains(&value) {
+        Ok(())
+    } else {
+        Err(CommandError::OutsideLimits { axis: axis.name.clone(), value, lowest, highest })
+    }
+}
+
+fn expiry_ns(valid_for: Duration) -> u64 {
+    let valid_ns = u64::try_from(valid_for.as_nanos()).unwrap_or(u64::MAX);
+    MonotonicClock::default().now_ns().saturating_add(valid_ns)
+}

@@ -1,0 +1,96 @@
+//! The controller as a program embeds it: commanded by calls, on simulated buses, in real time.
+
+use std::path::Path;
+use std::time::Duration;
+
+use takt::config::Config;
+use takt::controller::session::SessionOptions;
+use takt::controller::{CommandError, Controller, MotionError, MoveOptions, Outcome, StartFailure};
+use takt_rt::plan::State;
+use takt_rt::stop::{Phase, Rule, StopCategory};
+
+const PATIENCE: Duration = Duration::from_secs(30);
+
+fn start(name: &str) -> Controller {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs").join(name);
+    let mut config = Config::load(&path).unwrap();
+    config.telemetry.is_recorded = false;
+    config.telemetry.black_box_ns = None;
+    Controller::start(config, SessionOptions::default()).unwrap()
+}
+
+#[test]
+fn an_arm_is_moved_by_calls_and_left_politely() {
+    let mut arm = start("arm6-erob.toml");
+    let home: Vec<f64> = arm.state().axes[..6].iter().map(|axis| axis.position_set).collect();
+    let target: Vec<f64> = home.iter().map(|position| position + 0.05).collect();
+    let options = MoveOptions { velocity_scale: 0.5, ..MoveOptions::default() };
+    let motion = arm.move_with(&target, options).unwrap();
+    assert_eq!(arm.wait(motion, PATIENCE), Ok(()));
+    for (axis, target) in arm.state().axes.iter().zip(&target) {
+        assert!((axis.position_set - target).abs() < 1e-9);
+    }
+    assert_eq!(arm.finish().unwrap().outcome, Outcome::Finished);
+}
+
+#[test]
+fn what_cannot_be_is_refused_before_it_is_asked() {
+    let mut arm = start("erob-modes/erob-pv.toml");
+    assert_eq!(arm.move_to(&[0.0, 0.0]), Err(CommandError::Count { given: 2, axes: 1 }));
+    assert!(matches!(arm.torque(0, 1.0, PATIENCE), Err(CommandError::WrongMode { .. })));
+    assert!(matches!(arm.velocity(0, 99.0, PATIENCE), Err(CommandError::OutsideLimits { .. })));
+    assert!(matches!(arm.velocity(0, f64::NAN, PATIENCE), Err(CommandError::OutsideLimits { .. })));
+    assert_eq!(arm.velocity(7, 0.1, PATIENCE), Err(CommandError::NoSuchAxis { axis: 7, axes: 1 }));
+    assert_eq!((arm.state().phase, arm.state().stop), (Phase::Holding, None));
+}
+
+#[test]
+fn a_speed_is_reached_kept_and_ended_and_one_that_is_not_renewed_stops_the_group() {
+    let mut joint = start("erob-modes/erob-pv.toml");
+    let going = joint.velocity(0, 0.5, PATIENCE).unwrap();
+    assert_eq!(joint.wait(going, PATIENCE), Ok(()));
+    assert_eq!(joint.state().phase, Phase::Moving);
+    let ending = joint.velocity(0, 0.0, PATIENCE).unwrap();
+    assert_eq!(joint.wait(ending, PATIENCE), Ok(()));
+    joint.velocity(0, 0.2, Duration::from_millis(300)).unwrap();
+    assert!(joint.wait_for(Phase::Stopping, PATIENCE) || joint.state().stop.is_some());
+    assert!(joint.wait_for(Phase::Holding, PATIENCE));
+    assert_eq!(joint.state().stop.map(|stop| stop.rule), Some(Rule::StaleCommand));
+}
+
+#[test]
+fn after_a_stop_nothing_moves_before_the_fault_is_reset() {
+    let mut joint = start("single-erob.toml");
+    joint.begin_stream().unwrap();
+    let far = State { position: 1.0, ..State::default() };
+    joint.stream(&[far], PATIENCE).unwrap();
+    let begun = std::time::Instant::now();
+    while joint.state().stop.is_none() && begun.elapsed() < PATIENCE {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    assert_eq!(joint.state().stop.map(|stop| stop.rule), Some(Rule::StartPose));
+    assert!(joint.wait_for(Phase::Holding, PATIENCE));
+    let refused = joint.move_to(&[0.2]).unwrap();
+    assert!(matches!(joint.wait(refused, PATIENCE), Err(MotionError::Refused { .. })));
+    joint.reset_faults().unwrap();
+    let motion = joint.move_to(&[0.2]).unwrap();
+    assert_eq!(joint.wait(motion, PATIENCE), Ok(()));
+    joint.stop(StopCategory::One).unwrap();
+    assert!(joint.wait_for(Phase::Disabled, PATIENCE));
+    joint.enable().unwrap();
+    assert!(joint.wait_for(Phase::Holding, PATIENCE));
+}
+
+#[test]
+fn drives_that_cannot_be_brought_up_are_named() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/single-erob.toml");
+    let mut config = Config::load(&path).unwrap();
+    config.telemetry.is_recorded = false;
+    config.axes[0].identity.vendor = Some(0x1234);
+    match Controller::start(config, SessionOptions::default()).err() {
+        Some(StartFailure::NotEnabled(session)) => {
+            assert!(matches!(session.outcome, Outcome::BringUpFailed(_)), "{:?}", session.outcome);
+        }
+        other => panic!("{other:?}"),
+    }
+}
