@@ -38,7 +38,7 @@ def run(network, interface, case):
         case("boots", lambda: boot_up(node, states))
         case("is as its data sheet says, object by object", lambda: data_sheet(node))
         case("reads, writes and refuses by SDO", lambda: service_data(node))
-        case("sends its heartbeat and follows NMT", lambda: network_management(node, states))
+        case("sends its heartbeat, answers guarding and follows NMT", lambda: network_management(node, states))
         case("has the process data that are read from it", lambda: default_process_data(node))
         case("takes another mapping", lambda: map_process_data(node))
         case("is led by the package's own CiA 402 helper", lambda: state_machine(node))
@@ -82,6 +82,13 @@ def network_management(node, states):
     for state, code in (("OPERATIONAL", 5), ("STOPPED", 4), ("PRE-OPERATIONAL", 0x7F)):
         node.nmt.state = state
         wait_until(f"heartbeat of a node that is {state}", lambda: states[-1] == code)
+    node.sdo["Producer heartbeat time"].raw = 0
+    states.clear()
+    node.nmt.start_node_guarding(0.05)
+    wait_until("answers to the guarding of a pre-operational node", lambda: len(states) >= 3)
+    expect("states by node guarding", set(states), {0x7F})
+    node.nmt.stop_node_guarding()
+    node.sdo["Producer heartbeat time"].raw = 50
     for command in ("RESET COMMUNICATION", "RESET"):
         states.clear()
         node.nmt.state = command
@@ -182,21 +189,21 @@ def cyclic_position(network, node):
     node.state = "OPERATION ENABLED"
     positions = []
     feedback.add_callback(lambda pdo: positions.append(pdo[0x6064].raw))
-    cycles, distance = 200, 60_000
-    due = time.monotonic()
+    cycles, step = 200, 300
+    end = start + step * cycles
     for cycle in range(1, cycles + 1):
+        due = time.monotonic() + CYCLE_S
         command[0x6040].raw = 0x0F
-        command[0x607A].raw = start + distance * cycle // cycles
+        command[0x607A].raw = start + step * cycle
         command.transmit()
         network.sync.transmit()
         wait_until(f"answer to SYNC {cycle}", lambda: len(positions) >= cycle)
-        due = max(due + CYCLE_S, time.monotonic() - CYCLE_S)
         time.sleep(max(0.0, due - time.monotonic()))
-    wait_until("target reached", lambda: abs(node.sdo[0x6064].raw - start - distance) <= 100)
-    time.sleep(0.1)
+    wait_until("target reached", lambda: abs(node.sdo[0x6064].raw - end) <= 100)
     expect("answers to SYNC", len(positions), cycles)
-    if any(later < earlier - 100 for earlier, later in zip(positions, positions[1:])):
-        raise Difference("the joint went back on its way forward")
+    # At a SYNC the target of the last one has been reached, give or take what SYNCs of a program like this are early and late.
+    for before, position in enumerate(positions):
+        expect_near(f"position at SYNC {before + 1}", position, start + step * before, 5 * step)
     node.state = "SWITCH ON DISABLED"
 
 
@@ -205,8 +212,7 @@ def following_error(node):
     node.rpdo_pointers[0x607A].raw = node.sdo[0x6064].raw
     node.state = "OPERATION ENABLED"
     node.sdo[0x6065].raw = 0
-    set_target = node.sdo[0x6064].raw + COUNTS_PER_TURN // 8
-    node.rpdo_pointers[0x607A].raw = set_target
+    node.rpdo_pointers[0x607A].raw = node.sdo[0x6064].raw + COUNTS_PER_TURN // 8
     node.controlword = 0x1F
     emergency = node.emcy.wait(0x8611, timeout=30)
     if emergency is None:

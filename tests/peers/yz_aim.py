@@ -42,6 +42,7 @@ def run(network, interface, case):
         case("refuses to write what is read-only, and does not answer about what it has not", lambda: refusals(first))
         case("sends its heartbeat, and none when stopped", lambda: network_management(first))
         case("has the process data that are read from it", lambda: process_data(nodes))
+        case("stores parameters, and has them again after a reset of the node (manual 5.12)", lambda: store(first, booted))
         case("homes on its negative limit switch (17)", lambda: home(first))
         case("moves to a position by SDO (manual 5.06.1)", lambda: absolute_position(first))
         case("moves on by a distance by SDO (5.06.2)", lambda: relative_position(first))
@@ -90,6 +91,19 @@ def network_management(node):
     node.nmt.state = "RESET COMMUNICATION"
     wait_until("boot-up after a reset of the communication", lambda: 0 in states)
     expect("heartbeat time after a reset of the communication", node.sdo[0x1017].raw, 1000)
+
+
+def store(node, booted):
+    gain = node.sdo[0x60FB][1]
+    before = gain.raw
+    gain.raw = before + 100
+    node.sdo[0x2614].raw = 1
+    wait_until("parameters stored", lambda: node.sdo[0x2614].raw == 2)
+    gain.raw = before + 200
+    booted[node.id] = False
+    node.nmt.state = "RESET"
+    wait_until("boot-up after a reset of the node", lambda: booted[node.id])
+    expect("gain after a reset of the node", gain.raw, before + 100)
 
 
 def process_data(nodes):
@@ -282,7 +296,7 @@ def master_lost(network, node):
     heartbeat = network.send_periodic(0x700 + MASTER, [5], 0.05)
     # A move of some seconds, under way when the master is lost.
     start = position(node)
-    target = start + 1_000_000
+    target = start + 600_000
     node.sdo[0x6081].raw = 300
     node.sdo[0x607A].raw = start
     node.sdo[0x6040].raw = 0x2F
