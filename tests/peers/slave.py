@@ -23,10 +23,12 @@ NAME = "a slave that is written in Python"
 COUNTS_PER_TURN = 524_288
 COMMUNICATION = range(0x1005, 0x2000)
 UPLOAD_SEGMENT = 0x60
+# Error code and error register of an emergency message.
+BLOCKED_ROTOR, GENERIC_AND_CURRENT = 0x7121, 0x03
 RESET_NODE, RESET_COMMUNICATION, START, ENTER_PRE_OPERATIONAL = 129, 130, 1, 128
 
 # Statusword after a controlword (its bits 0 to 3 and 7), from one of the statuswords named.
-SWITCH_ON_DISABLED, READY, SWITCHED_ON, ENABLED = 0x0240, 0x0231, 0x0233, 0x0237
+SWITCH_ON_DISABLED, READY, SWITCHED_ON, ENABLED, FAULT = 0x0240, 0x0231, 0x0233, 0x0237, 0x0208
 TRANSITIONS = {
     0x06: {SWITCH_ON_DISABLED: READY, SWITCHED_ON: READY, ENABLED: READY},
     0x07: {READY: SWITCHED_ON, ENABLED: SWITCHED_ON},
@@ -47,6 +49,7 @@ class Slave:
         self.writes = []
         self.states = []
         self.segments = 0
+        self.breaks_above = None
         self.start_from_defaults(range(0, 0x10000))
         self.node.sdo[0x6076].raw = 31_000
         self.node.sdo[0x6075].raw = 6_300
@@ -73,7 +76,7 @@ class Slave:
             self.mode = od.decode_raw(data)
 
     def control(self, word):
-        if word & 0x02 == 0:
+        if word & 0x02 == 0 and (self.statusword != FAULT or word & 0x80):
             self.statusword = SWITCH_ON_DISABLED
         self.statusword = TRANSITIONS.get(word & 0x8F, {}).get(self.statusword, self.statusword)
         if self.states[-1:] != [self.statusword]:
@@ -104,9 +107,15 @@ class Slave:
             self.control(command[0x6040].raw)
             if self.statusword == ENABLED:
                 self.position = command[0x607A].raw
+                self.watch()
         for variable in feedback:
             variable.raw = self.node.sdo[variable.index].raw
         feedback.transmit()
+
+    def watch(self):
+        if self.breaks_above is not None and self.position > self.breaks_above:
+            self.statusword = FAULT
+            self.node.emcy.send(BLOCKED_ROTOR, GENERIC_AND_CURRENT)
 
     def last_written(self, index, subindex=0):
         values = [value for *place, value in self.writes if place == [index, subindex]]
@@ -118,18 +127,19 @@ class Slave:
 def run(network, interface, case):
     slave = Slave(network)
     report = {}
-    case("is brought up, moved and left by `takt run`", lambda: report.update(takt_run(interface)))
+    case("is brought up, moved and left by `takt run`", lambda: report.update(takt_run(interface, 0)))
     case("has got its communication parameters", lambda: communication(slave))
     case("has got its process data, mapped as the standard wants it", lambda: mapping(slave))
     case("has got its mode, target and limits", lambda: drive(slave))
     case("was led through the states, and is where the report says", lambda: motion(slave, report))
+    case("stops `takt run` by an emergency message", lambda: emergency(slave, interface))
 
 
-def takt_run(interface):
+def takt_run(interface, exit_code):
     command = [simulated.TAKT, "run", os.path.abspath(CONFIG), "--bus", f"can={interface}", "--json"]
     # There it leaves its own log of the bus.
     result = subprocess.run(command, cwd=os.environ["OUT"], capture_output=True, text=True, timeout=120)
-    if result.returncode != 0:
+    if result.returncode != exit_code:
         raise Difference(f"`takt run` ended with {result.returncode}: {result.stderr.strip()} {result.stdout.strip()}")
     return json.loads(result.stdout)
 
@@ -175,3 +185,11 @@ def motion(slave, report):
     counts_per_rad = COUNTS_PER_TURN / 6.283185307179586
     expect_near("final position in the report", joint["final_position"] * counts_per_rad, slave.position, 1)
     expect("reason of a stop", report["stop"], None)
+
+
+def emergency(slave, interface):
+    slave.position = 0
+    slave.breaks_above = COUNTS_PER_TURN * 5 // 360
+    stop = takt_run(interface, 1)["stop"]
+    # Its error code object stays 0: only the message tells.
+    expect("why the run stopped", (stop["rule"], stop["axis"], stop["value"]), ("drive_fault", "joint", BLOCKED_ROTOR))
