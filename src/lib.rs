@@ -11,6 +11,7 @@
 //! - [`drive`] and [`canopen`]: bring-up of each family of drives over the services of CiA 301, without I/O.
 //! - [`controller`]: assembles the engine, paces it in the real-time thread or in virtual time, and leads it through its
 //!   life: bring-up, enable, program, stop, disable, leave.
+//! - [`commission`]: what a single drive is set up, moved and looked at with, apart from any run.
 //! - [`sim`]: buses and drives that behave like the manuals and the field notes say, quirks included.
 //! - [`faults`]: what can go wrong on a bus or in a drive, on purpose, from a scenario file.
 //! - [`telemetry`]: the logger that empties the rings: statistics, recordings, the report.
@@ -20,6 +21,7 @@
 
 pub mod bus;
 pub mod canopen;
+pub mod commission;
 pub mod config;
 pub mod controller;
 pub mod doctor;

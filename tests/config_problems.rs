@@ -27,6 +27,7 @@ heartbeat_timeout = "500 ms"
 name = "left"
 interface = "sim"
 bit_rate = "1 Mbit/s"
+restart_ms = 250
 service_frames_per_cycle = 1
 
 [[bus]]
@@ -193,6 +194,8 @@ cases! {
         "heartbeat_timeout = \"500 ms\"" => "heartbeat_timeout = \"100 ms\"", at "heartbeat_timeout": OutOfRange { allowed, .. } if allowed == "longer than heartbeat, 100 ms",
         "heartbeat_timeout = \"500 ms\"" => "heartbeat_timeout = \"66 s\"", at "66 s": OutOfRange { .. },
         "bit_rate = \"1 Mbit/s\"" => "bit_rate = 999999", at "999999": OutOfRange { key, .. } if key == "bus.bit_rate",
+        "restart_ms = 250" => "restart_ms = 60001", at "restart": OutOfRange { allowed, .. } if allowed == "0 to 60000",
+        "restart_ms = 250" => "restart_ms = \"100 ms\"", at "restart": WrongType { .. },
         "service_frames_per_cycle = 1" => "service_frames_per_cycle = 0", at "service": OutOfRange { .. },
         "bit_rate = \"1 Mbit/s\"" => "data_bit_rate = \"500 kbit/s\"", at "data_bit": OutOfRange { allowed, .. } if allowed == "1 Mbit/s to 8 Mbit/s",
         "transmission_type = 1" => "transmission_type = 241", at "241": OutOfRange { .. },
@@ -374,23 +377,23 @@ fn a_person_reads_the_line_what_is_wrong_with_it_and_what_to_do() {
 
 Error: 
   × `axis.limits.velocity` is an angular velocity, and "deg" is not a unit of that
-    ╭─[machine.toml:43:12]
- 42 │ position = ["-90 deg", "90 deg"]
- 43 │ velocity = "100 deg"
+    ╭─[machine.toml:44:12]
+ 43 │ position = ["-90 deg", "90 deg"]
+ 44 │ velocity = "100 deg"
     ·            ────┬────
     ·                ╰── wrong unit
- 44 │ acceleration = "8 rad/s^2"
+ 45 │ acceleration = "8 rad/s^2"
     ╰────
   help: write an angular velocity, as in "137 deg/s", or a bare number in rad/s
 
 Error: 
   × node 1 is already taken on the bus "left"
-    ╭─[machine.toml:65:8]
- 64 │ bus = "left"
- 65 │ node = 1
+    ╭─[machine.toml:66:8]
+ 65 │ bus = "left"
+ 66 │ node = 1
     ·        ┬
-    ·        ╰── again; first in line 32
- 66 │ limits = { position = [-1, 1], velocity = 1.0, acceleration = 5, torque = 20 }
+    ·        ╰── again; first in line 33
+ 67 │ limits = { position = [-1, 1], velocity = 1.0, acceleration = 5, torque = 20 }
     ╰────
   help: give each node of a bus a number of its own, 1 to 127; the controller itself is [master]
         node on every bus

@@ -235,7 +235,9 @@ fn a_joint_that_is_held_fast_stops_the_whole_arm() {
     let config = load("arm6-erob.toml");
     let (outcome, _) = run_and_break(&config, |bus| bus.set_load_torque(1, 1e4).unwrap());
     let (rule, axis) = rule_and_axis(outcome);
-    assert!(matches!(rule, Rule::FollowingError | Rule::DriveFault), "{rule:?}");
+    // So much torque moves it faster than any joint can be believed to move.
+    let seen = [Rule::FollowingError, Rule::DriveFault, Rule::ImplausibleFeedback];
+    assert!(seen.contains(&rule), "{rule:?}");
     assert_eq!(axis, Some(0));
 }
 

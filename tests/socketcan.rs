@@ -5,9 +5,11 @@ use std::process::Command;
 use std::thread::sleep;
 use std::time::Duration;
 
+use takt::bus::port::Port;
 use takt::bus::{
     InterfaceError, InterfaceSettings, SocketCanOptions, interface_status, open_socketcan, prepare_interface,
 };
+use takt::config::Config;
 use takt_rt::frame::{Frame, Id};
 use takt_rt::linux::{MonotonicClock, SocketCanPort};
 use takt_rt::port::{BusPort, BusState, Clock, ReceiveBatch, Received};
@@ -276,6 +278,21 @@ fn controllers_are_configured_and_another_bit_rate_is_refused_while_they_run() {
     let slower = InterfaceSettings { bit_rate: 500_000, ..SETTINGS };
     let refusal = prepare_interface("can0", &slower).unwrap_err();
     assert!(matches!(refusal, InterfaceError::BitRateDiffers { found: 1_000_000, wanted: 500_000, .. }));
+}
+
+#[test]
+fn the_configuration_says_when_a_controller_comes_back_from_bus_off() {
+    let Some(_controllers) = Controllers::up() else { return };
+    run(&["ip", "link", "set", "can0", "down"]);
+    let reference = concat!(env!("CARGO_MANIFEST_DIR"), "/configs/reference.toml");
+    let mut config = Config::load(reference.as_ref()).unwrap();
+    config.override_interface("left", "can0").unwrap();
+    for restart_ms in [250, 0] {
+        config.buses[0].restart_ms = restart_ms;
+        drop(Port::open(&config, 0).unwrap());
+        assert_eq!(interface_status("can0").unwrap().restart_ms, Some(restart_ms));
+        run(&["ip", "link", "set", "can0", "down"]);
+    }
 }
 
 #[test]

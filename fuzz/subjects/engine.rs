@@ -11,7 +11,7 @@ use takt::controller::assemble;
 use takt::drive::{PdoPlan, ProcessData};
 use takt_rt::cia402::{Command, State};
 use takt_rt::door::{Door, Move, Request, Snapshot, StreamCommand};
-use takt_rt::engine::{Engine, SendBatch, Transmission};
+use takt_rt::engine::{BusSet, Engine, SendBatch, Transmission};
 use takt_rt::frame::{Frame, Id};
 use takt_rt::plan;
 use takt_rt::port::{BusHealth, BusState, Received};
@@ -24,7 +24,7 @@ use super::input::Input;
 const CYCLES_AT_MOST: u64 = 4_000;
 
 /// The smallest bound of a streamed step: rad.
-const STREAM_STEP: f64 = 3e-6;
+const STREAM_STEP: f64 = 2e-8;
 
 fn configurations() -> &'static [Config; 3] {
     static CONFIGURATIONS: OnceLock<[Config; 3]> = OnceLock::new();
@@ -225,8 +225,8 @@ impl Machine {
     fn stream(&self, input: &mut Input<'_>) -> StreamCommand {
         let is_near = input.byte() > 32;
         let valid_until_ns = self.now_ns() + 1_000_000 * u64::from(input.byte());
-        // From steps that the acceleration limits allow from rest to ones that nothing allows.
-        let largest_step = STREAM_STEP * f64::from(1u16 << (input.byte() % 12));
+        // From steps that the jerk limits allow from rest to ones that nothing allows.
+        let largest_step = STREAM_STEP * f64::from(1u32 << (input.byte() % 20));
         let mut set_points = [plan::State::default(); MAX_AXES];
         for (axis, point) in self.engine.axes().iter().zip(&mut set_points) {
             *point = if is_near {
@@ -248,14 +248,20 @@ impl Machine {
         let now_ns = self.now_ns();
         self.report();
         let before = self.engine.phase();
+        let mut held_back = BusSet::default();
+        if transmission == Transmission::Blocked {
+            (0..self.buses.len()).for_each(|bus| held_back.insert(bus));
+        }
+        self.engine.hold_back(held_back);
         let has_commands = self.engine.compute(self.slot, now_ns, &self.buses, transmission, &mut self.hall);
-        assert!(!has_commands || transmission == Transmission::Free);
+        assert!(!has_commands || transmission != Transmission::TooLate);
         let mut sent = vec![SendBatch::new(); self.buses.len()];
         for (bus, batch) in sent.iter_mut().enumerate() {
             if has_commands {
                 self.engine.set_points(bus, self.slot, batch);
             }
         }
+        assert!(transmission == Transmission::Free || sent.iter().all(|batch| batch.is_empty()));
         self.obey(&sent, before);
         for (bus, batch) in sent.iter_mut().enumerate() {
             self.engine.services(bus, &mut self.hall, batch);

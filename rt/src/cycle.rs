@@ -12,7 +12,7 @@
 use arrayvec::ArrayVec;
 
 use crate::door::Door;
-use crate::engine::{Engine, SendBatch, Transmission};
+use crate::engine::{BusSet, Engine, SendBatch, Transmission};
 use crate::port::{BusHealth, BusPort, Clock, ReceiveBatch};
 use crate::record::{MAX_BUSES, Timing};
 use crate::time::{Grid, Nanoseconds};
@@ -84,10 +84,11 @@ impl Cycle {
         }
 
         let wake = clock.wait_until(timing.slot_start_ns + self.plan.command_phase_ns);
-        let is_blocked = take_feedback(engine, ports, wake.now_ns, door);
+        let held_back = take_feedback(engine, ports, wake.now_ns, door);
+        engine.hold_back(held_back);
         let health = health_of(ports);
         let began_ns = clock.now_ns();
-        let transmission = if is_blocked {
+        let transmission = if held_back.is_every_of(ports.len()) {
             Transmission::Blocked
         } else if began_ns > timing.slot_start_ns + self.plan.latest_set_points_ns {
             Transmission::TooLate
@@ -103,8 +104,8 @@ impl Cycle {
                 engine.set_points(bus, timing.slot, &mut batch);
             }
             engine.services(bus, door, &mut batch);
-            if !batch.is_empty() {
-                port.send(clock.now_ns(), &batch);
+            if !batch.is_empty() && port.send(clock.now_ns(), &batch) < batch.len() {
+                engine.not_taken();
             }
         }
         let finished_ns = clock.now_ns();
@@ -123,7 +124,7 @@ impl Cycle {
                 slot = slot.max(self.grid.next_slot(now_ns));
             }
             let slot_start_ns = self.grid.slot_start_ns(slot);
-            let wake = clock.wait_until(slot_start_ns);
+            let wake = clock.wait_to_send(slot_start_ns);
             wake_ns = wake.timer_latency_ns.max(wake_ns);
             if wake.now_ns <= slot_start_ns + self.plan.latest_sync_ns {
                 self.next_slot = slot + 1;
@@ -134,14 +135,14 @@ impl Cycle {
     }
 }
 
-/// Hands everything that has arrived to the engine. Returns whether own frames still wait for the wire anywhere.
+/// Hands everything that has arrived to the engine. Returns the buses on which own frames still wait for the wire.
 fn take_feedback<P: BusPort>(
     engine: &mut Engine,
     ports: &mut [P],
     now_ns: Nanoseconds,
     door: &mut impl Door,
-) -> bool {
-    let mut is_blocked = false;
+) -> BusSet {
+    let mut held_back = BusSet::default();
     let mut batch = ReceiveBatch::new();
     for (bus, port) in ports.iter_mut().enumerate() {
         // Bounded: whoever floods the bus with more than a bus can carry in one slot is heard next time.
@@ -155,9 +156,11 @@ fn take_feedback<P: BusPort>(
                 break;
             }
         }
-        is_blocked |= port.unconfirmed(now_ns) > 0;
+        if port.unconfirmed(now_ns) > 0 {
+            held_back.insert(bus);
+        }
     }
-    is_blocked
+    held_back
 }
 
 const RECEIVES_PER_CYCLE: usize = 4;

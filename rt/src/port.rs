@@ -16,6 +16,12 @@ pub trait Clock {
 
     /// Returns at `deadline_ns` or as soon after it as the system allows; at once when it has passed.
     fn wait_until(&mut self, deadline_ns: Nanoseconds) -> Wake;
+
+    /// As [`Clock::wait_until`], where a frame must leave at `deadline_ns`: whatever can be done beforehand to be on
+    /// time is done.
+    fn wait_to_send(&mut self, deadline_ns: Nanoseconds) -> Wake {
+        self.wait_until(deadline_ns)
+    }
 }
 
 /// How a wait ended.

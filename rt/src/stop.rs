@@ -68,11 +68,13 @@ pub enum Rule {
     JerkLimit = 24,
     /// The error counters of an interface are near bus-off.
     BusErrorPassive = 25,
+    /// A joint was reported where it cannot have got to.
+    ImplausibleFeedback = 26,
 }
 
 impl Rule {
     /// Every rule, in the order of their numbers.
-    pub const ALL: [Self; 26] = [
+    pub const ALL: [Self; 27] = [
         Self::Requested,
         Self::NotFinite,
         Self::PositionLimit,
@@ -99,6 +101,7 @@ impl Rule {
         Self::StartPose,
         Self::JerkLimit,
         Self::BusErrorPassive,
+        Self::ImplausibleFeedback,
     ];
 
     /// Its word in configurations and reports.
@@ -130,6 +133,7 @@ impl Rule {
             Self::StartPose => "start_pose",
             Self::JerkLimit => "jerk_limit",
             Self::BusErrorPassive => "bus_error_passive",
+            Self::ImplausibleFeedback => "implausible_feedback",
         }
     }
 
@@ -163,7 +167,8 @@ impl Rule {
             | Self::EmergencyMessage
             | Self::DuplicateNode
             | Self::ForeignMaster
-            | Self::TimingUnfit => StopCategory::One,
+            | Self::TimingUnfit
+            | Self::ImplausibleFeedback => StopCategory::One,
         }
     }
 }

@@ -95,7 +95,7 @@ pub fn open_configured(
     let settings = InterfaceSettings {
         bit_rate: bus.bit_rate,
         data_bit_rate: bus.data_bit_rate,
-        restart_ms: RESTART_MS,
+        restart_ms: bus.restart_ms,
     };
     prepare_interface(interface, &settings)
         .map_err(|error| OpenError::Interface { bus: bus.name.clone(), error })?;
@@ -103,9 +103,6 @@ pub fn open_configured(
         .map_err(|error| OpenError::Socket { bus: bus.name.clone(), error })?;
     Ok(Some(port))
 }
-
-/// How soon a controller that has gone off the bus comes back, when it was this program that brought it up.
-const RESTART_MS: u32 = 100;
 
 impl BusPort for Port {
     fn send(&mut self, now_ns: Nanoseconds, frames: &[Frame]) -> usize {

@@ -4,6 +4,7 @@ mod chart;
 mod check;
 mod configuration;
 mod doctor;
+mod drive;
 mod eds;
 mod exit;
 mod interruption;
@@ -34,6 +35,7 @@ enum Command {
     Plan(plan::Arguments),
     Sim(sim::Arguments),
     Doctor(doctor::Arguments),
+    Drive(drive::Arguments),
     Eds(eds::Arguments),
     Jitter(jitter::Arguments),
 }
@@ -48,6 +50,7 @@ impl CommandLine {
             Command::Plan(arguments) => plan::run(&arguments),
             Command::Sim(arguments) => sim::run(&arguments),
             Command::Doctor(arguments) => doctor::run(&arguments),
+            Command::Drive(arguments) => drive::run(&arguments),
             Command::Eds(arguments) => eds::run(&arguments),
             Command::Jitter(arguments) => jitter::run(&arguments),
         }

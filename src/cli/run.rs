@@ -143,9 +143,9 @@ fn refuse(error: &SessionError) -> Exit {
 
 fn report(config: &Config, session: &Session, as_json: bool) -> Exit {
     let faults = session.ended.map_or(0, |ended| ended.page_faults.minor + ended.page_faults.major);
-    let begun = session.begun;
+    let spin_guard_ns = session.ended.map_or(0, |ended| ended.spin_guard_ns);
     let outcome = RunOutcome {
-        realtime: RealtimeReport::new(&begun.report, begun.spin_guard_ns, faults),
+        realtime: RealtimeReport::new(&session.begun.report, spin_guard_ns, faults),
         last: session.snapshot,
         buses_open_ns: session.open_ns,
         targets: session.target.clone(),

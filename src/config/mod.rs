@@ -16,7 +16,7 @@ use std::path::Path;
 
 pub use error::{ConfigError, InterfaceError, Problem, ProblemKind};
 pub use model::*;
-pub use quantity::{Dimension, Quantity};
+pub use quantity::{Dimension, Quantity, QuantityError};
 
 use thiserror::Error;
 

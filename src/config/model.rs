@@ -119,6 +119,9 @@ pub struct Bus {
     pub bit_rate: u32,
     /// Bit rate (bit/s) of the data phase of CAN FD frames; `None`, the default, on a classic bus.
     pub data_bit_rate: Option<u32>,
+    /// How long (ms) after a controller has gone off the bus the kernel restarts it; 0 leaves it off. It holds where takt
+    /// brings the interface up itself. Default 100 ms.
+    pub restart_ms: u32,
     /// The most service frames (NMT, SDO …) sent in one cycle while the axes are enabled, beside the heartbeat.
     /// Default 1.
     pub service_frames_per_cycle: usize,

@@ -19,7 +19,7 @@ const ENABLE_TIMEOUT_NS: u64 = 5_000_000_000;
 /// How long a drive may take to acknowledge a target in profile position.
 const ACKNOWLEDGE_TIMEOUT_NS: u64 = 500_000_000;
 /// How long set-points may fail to get onto the wire before the group stops.
-const NOT_TRANSMITTED_NS: u64 = 10_000_000;
+const NOT_TRANSMITTED_NS: u64 = 4_000_000;
 /// The most service frames on a bus in one cycle before set-points are sent.
 const SERVICE_FRAMES_PASSIVE: usize = 6;
 

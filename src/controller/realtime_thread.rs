@@ -6,7 +6,7 @@ use std::thread::{Builder, JoinHandle};
 use takt_rt::cycle::{Cycle, Flow, SlotPlan};
 use takt_rt::door::Door;
 use takt_rt::engine::Engine;
-use takt_rt::linux::{MonotonicClock, PageFaults, RealtimeThread, SpinGuard, ThreadConfig, ThreadReport};
+use takt_rt::linux::{PacedClock, PageFaults, RealtimeThread, ThreadConfig, ThreadReport};
 use takt_rt::port::{BusPort, Clock};
 use takt_rt::time::Grid;
 
@@ -40,8 +40,6 @@ pub fn thread_config(realtime: &Realtime) -> ThreadConfig {
 pub struct Begun {
     /// What was asked, what was granted, what is in force.
     pub report: ThreadReport,
-    /// How long before a deadline the thread stops sleeping and spins.
-    pub spin_guard_ns: u64,
 }
 
 /// The end: how it was.
@@ -49,6 +47,8 @@ pub struct Begun {
 pub struct Ended {
     /// Page faults that the loop took between its first and its last cycle.
     pub page_faults: PageFaults,
+    /// How long before a slot the thread stopped sleeping and spun, at the end.
+    pub spin_guard_ns: u64,
 }
 
 /// What the thread works with. All of it is made, and its memory touched, before the thread is elevated.
@@ -61,7 +61,7 @@ pub struct Work<P, D> {
     pub ports: Vec<P>,
     /// The door to the rest.
     pub door: D,
-    /// A fixed spin guard; `None` measures.
+    /// A fixed spin guard; `None` measures, a tenth of the period at most.
     pub spin_guard_ns: Option<u64>,
     /// Whether a refused step ends the thread before its first cycle.
     pub is_realtime_required: bool,
@@ -133,27 +133,25 @@ fn loop_body<P: BusPort, D: Door>(
         return None;
     }
     let period_ns = work.engine.period_ns();
-    let spin_guard_ns = match work.spin_guard_ns {
-        Some(fixed_ns) => fixed_ns.min(period_ns / 2),
-        None => measure_spin_guard(period_ns),
+    let mut clock = match work.spin_guard_ns {
+        Some(fixed_ns) => PacedClock::fixed(fixed_ns.min(period_ns / 2)),
+        None => measured_clock(period_ns / 10),
     };
-    let _ = say.send(Ok(Begun { report, spin_guard_ns }));
-    let mut clock = MonotonicClock::new(spin_guard_ns);
+    let _ = say.send(Ok(Begun { report }));
     let epoch_ns = quiet::first_slot_after(clock.now_ns() + LEAD_IN_NS, period_ns);
     let mut cycle = Cycle::new(Grid::new(epoch_ns, period_ns)?, work.plan);
     let before = realtime.page_faults();
     while cycle.run(&mut work.engine, &mut clock, &mut work.ports, &mut work.door) == Flow::Continue {}
-    Some(Ended { page_faults: realtime.page_faults().since(before) })
+    let page_faults = realtime.page_faults().since(before);
+    Some(Ended { page_faults, spin_guard_ns: clock.guard_ns() })
 }
 
-/// Sleeps some times and chooses the guard that would have absorbed the wake-up latency, a tenth of the period at
-/// most.
-fn measure_spin_guard(period_ns: u64) -> u64 {
-    let mut guard = SpinGuard::new(period_ns / 10);
-    let mut clock = MonotonicClock::new(0);
+/// A clock that has slept some times, so that its guard is of use in the first slot.
+fn measured_clock(cap_ns: u64) -> PacedClock {
+    let mut clock = PacedClock::measured(cap_ns);
     for _ in 0..MEASURED_WAKE_UPS {
         let deadline_ns = clock.now_ns() + MEASURED_SLEEP_NS;
-        guard.record(clock.wait_until(deadline_ns).timer_latency_ns);
+        clock.wait_to_send(deadline_ns);
     }
-    guard.guard_ns()
+    clock
 }

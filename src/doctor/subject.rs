@@ -28,6 +28,8 @@ pub struct WantedBus {
     pub bit_rate: u32,
     /// Bit/s of the data phase of CAN FD frames.
     pub data_bit_rate: Option<u32>,
+    /// How long (ms) after bus-off the controller is to come back; 0 for never.
+    pub restart_ms: u32,
 }
 
 impl Subject {
@@ -40,6 +42,7 @@ impl Subject {
                 interface: interface.clone(),
                 bit_rate: bus.bit_rate,
                 data_bit_rate: bus.data_bit_rate,
+                restart_ms: bus.restart_ms,
             }),
             Interface::Simulated => None,
         };

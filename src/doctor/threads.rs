@@ -88,9 +88,11 @@ fn allowed(status: &str) -> String {
     list.unwrap_or_default().trim().to_owned()
 }
 
-/// Those that the kernel cannot do without, and that run only when it needs them.
+/// Those that the kernel cannot do without, and that run only when it needs them; and those of interrupts, which are above
+/// the loop where somebody has put them there, as that of a CAN interface should be.
 fn is_the_kernels_own(thread: &Thread) -> bool {
-    thread.is_kernel && (thread.name.starts_with("migration/") || thread.name.starts_with("stopper/"))
+    let is_named = |start| thread.name.starts_with(start);
+    thread.is_kernel && ["migration/", "stopper/", "irq/"].into_iter().any(is_named)
 }
 
 pub fn findings(threads: &[Thread], cpu: usize, priority: u8, own_process: u32) -> Vec<Finding> {
@@ -160,6 +162,7 @@ mod tests {
         };
         let harmless = [
             Thread { is_kernel: true, ..thread("migration/3", FIFO, 99, "3") },
+            Thread { is_kernel: true, ..thread("irq/16-can0", FIFO, 85, "3") },
             thread("irq/8-rtc0", FIFO, 50, "0-3"),
             thread("elsewhere", FIFO, 99, "0-2"),
             thread("ordinary", 0, 0, ""),

@@ -118,7 +118,7 @@ fn legend(svg: &mut String, left: f64, pass: &Measurement) {
     let name = match pass.pacing {
         Pacing::Sleep => "sleep only".to_owned(),
         Pacing::SleepThenSpin => {
-            format!("sleep, then spin for the last {}", duration(pass.begun.spin_guard_ns))
+            format!("sleep, then spin for the last {}", duration(pass.spin_guard_ns))
         }
     };
     text(svg, (left + 22.0, top + 12.0), "start", "font-weight=\"bold\"", &name);

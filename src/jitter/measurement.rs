@@ -80,8 +80,10 @@ pub enum Pacing {
 pub struct Measurement {
     /// How the loop waited.
     pub pacing: Pacing,
-    /// What the operating system granted, and the spin guard in force.
+    /// What the operating system granted.
     pub begun: Begun,
+    /// How long before a slot the thread stopped sleeping and spun, at the end.
+    pub spin_guard_ns: u64,
     /// Wake-up latency and SYNC release error of every cycle, and the slots that passed unused.
     pub statistics: Statistics,
     /// Cycles that ran and are not among the statistics.
@@ -161,6 +163,7 @@ pub fn measure(
     Ok(Measurement {
         pacing,
         begun,
+        spin_guard_ns: ended.spin_guard_ns,
         records_dropped: log.records_dropped(),
         page_faults: ended.page_faults.minor + ended.page_faults.major,
         bus: has_bus.then(|| host.snapshot().buses[0]),

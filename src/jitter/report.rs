@@ -60,7 +60,7 @@ impl JitterReport {
             cycles: options.cycles,
             is_whole: measurements.iter().all(|measurement| measurement.is_whole),
             bus: options.interface.as_ref().map(ToString::to_string),
-            realtime: RealtimeReport::new(&last.begun.report, last.begun.spin_guard_ns, page_faults),
+            realtime: RealtimeReport::new(&last.begun.report, last.spin_guard_ns, page_faults),
             passes: measurements.iter().map(PassReport::new).collect(),
         })
     }
@@ -76,7 +76,7 @@ impl PassReport {
                 Pacing::Sleep => "sleep",
                 Pacing::SleepThenSpin => "sleep_then_spin",
             },
-            spin_guard_ns: measurement.begun.spin_guard_ns,
+            spin_guard_ns: measurement.spin_guard_ns,
             cycles: statistics.cycles + measurement.records_dropped,
             missed_slots: statistics.missed_slots,
             records_dropped: measurement.records_dropped,

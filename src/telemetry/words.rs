@@ -145,6 +145,9 @@ pub fn stop_cause(stop: &StopReason, machine: &Machine) -> String {
         Rule::JerkLimit => {
             format!("the set-point of {axis} asked for {value:.1} {unit}/s³ (allowed: {limit:.1} {unit}/s³)")
         }
+        Rule::ImplausibleFeedback => format!(
+            "{axis} was reported {value:.4} {unit} from where it was a cycle before (its speed allows {limit:.4} {unit})"
+        ),
         Rule::BusErrorPassive => {
             format!("bus {} is error-passive: hardly a frame gets through", bus_name(value, machine))
         }

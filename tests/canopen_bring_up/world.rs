@@ -125,6 +125,7 @@ fn bus(number: usize) -> Bus {
         divider: 1,
         bit_rate: 1_000_000,
         data_bit_rate: None,
+        restart_ms: 100,
         service_frames_per_cycle: FRAMES_PER_STEP,
         sdo_while_enabled: false,
     }

@@ -17,6 +17,10 @@ use crate::stop::Rule;
 use crate::units::Scale;
 use crate::watch::{DuplicateWatch, NodeComplaint, NodeWatch};
 
+/// A joint that seems faster than this many times its velocity limit has not moved: its encoder, or its drive's report,
+/// is wrong. The counts are for limits so low that a count is more than they allow in a cycle.
+const IMPLAUSIBLE_SPEED: f64 = 4.0;
+const IMPLAUSIBLE_COUNTS: f64 = 64.0;
 /// A fault shows in the statusword within this many slots of the emergency message that announces it.
 const EMERGENCY_GRACE_CYCLES: u8 = 3;
 /// The PDOs that a CANopen drive has in each direction here.
@@ -116,6 +120,14 @@ pub struct Axis {
     /// Time since the feedback before.
     span_s: f64,
     is_heard: bool,
+    /// What the statuswords have shown, see [`Axis::drive_state`].
+    state: DriveState,
+    /// Statuswords in a row that do not show operation enabled, after one that did.
+    contradictions: u8,
+    /// Whether the drive left operation enabled by itself and must not be led back to it.
+    is_lost: bool,
+    /// How far the joint has jumped between two reports, where no joint can.
+    jump: Option<f64>,
     emergency_code: u16,
     /// Cycles since an emergency message came.
     since_emergency: Option<u8>,
@@ -152,6 +164,10 @@ impl Axis {
             age: 0,
             span_s: 0.0,
             is_heard: false,
+            state: DriveState::NotReadyToSwitchOn,
+            contradictions: 0,
+            is_lost: false,
+            jump: None,
             emergency_code: 0,
             since_emergency: None,
             node_watch: NodeWatch::default(),
@@ -206,6 +222,7 @@ impl Axis {
 
     /// Begins to watch the node anew.
     pub fn begin_watch(&mut self) {
+        self.is_lost = false;
         self.node_watch.begin();
         self.duplicate_watch = DuplicateWatch::default();
         self.since_emergency = None;
@@ -260,7 +277,12 @@ impl Axis {
         } else {
             0.0
         };
+        let farthest = IMPLAUSIBLE_SPEED * self.parameters.limits.velocity * span_s
+            + IMPLAUSIBLE_COUNTS / self.parameters.scale.resolution();
+        let distance = (self.position - last).abs();
+        self.jump = (self.is_heard && distance > farthest).then_some(distance);
         self.is_heard = true;
+        self.notice_state();
         self.following_error = if self.is_profile() { 0.0 } else { self.sent[2].position - self.position };
     }
 
@@ -278,13 +300,32 @@ impl Axis {
         self.age
     }
 
-    /// The drive's state by its last statusword.
-    pub fn drive_state(&self) -> DriveState {
-        if self.is_heard {
-            self.parameters.dialect.state(self.statusword())
-        } else {
-            DriveState::NotReadyToSwitchOn
+    /// A drive that was enabled is taken for disabled only when it says so again: one false statusword would let its
+    /// set-point follow the joint while the drive still obeys, and disable it. A fault counts at once.
+    fn notice_state(&mut self) {
+        let shown = self.parameters.dialect.state(self.statusword());
+        let contradicts = self.state == DriveState::OperationEnabled
+            && shown != DriveState::OperationEnabled
+            && !shown.is_faulted();
+        self.contradictions = if contradicts { self.contradictions.saturating_add(1) } else { 0 };
+        if self.contradictions != 1 {
+            self.state = shown;
         }
+    }
+
+    /// The drive's state by its statuswords.
+    pub fn drive_state(&self) -> DriveState {
+        self.state
+    }
+
+    /// The drive has left operation enabled by itself: it is not led back to it before it is watched anew.
+    pub fn give_up(&mut self) {
+        self.is_lost = true;
+    }
+
+    /// Whether the joint has jumped since the report before, and how far: rad (m).
+    pub fn jump(&self) -> Option<f64> {
+        self.jump.filter(|_| self.age == 0)
     }
 
     /// Object 6041 as last received.
@@ -309,7 +350,7 @@ impl Axis {
 
     /// Whether the drive follows set-points.
     pub fn is_enabled(&self) -> bool {
-        self.drive_state() == DriveState::OperationEnabled
+        self.drive_state() == DriveState::OperationEnabled && !self.is_lost
     }
 
     /// The newest set-point.
@@ -328,7 +369,15 @@ impl Axis {
     }
 
     /// Makes the actual position the set-point, as if it had always been.
+    ///
+    /// The set-point of an axis that has been given up stays where it was: nobody follows it, and nothing is to look like
+    /// a step.
     pub fn follow_actual(&mut self) {
+        if self.is_lost {
+            self.set = [State { position: self.set[0].position, ..State::default() }; 3];
+            self.following_error = 0.0;
+            return;
+        }
         self.set = [State { position: self.position, ..State::default() }; 3];
         self.sent = self.set;
         self.following_error = 0.0;
@@ -380,6 +429,7 @@ impl Axis {
     /// sent, and the target.
     pub fn command(&mut self, goal: Goal, other_word: Option<u16>) {
         let is_enabled = self.is_enabled();
+        let goal = if self.is_lost && goal == Goal::Enabled { Goal::Disabled } else { goal };
         let word = other_word.unwrap_or_else(|| self.word_towards(goal));
         let is_repeated = self.parameters.controlword_spacing_cycles > 0
             && self.since_controlword >= self.parameters.controlword_spacing_cycles

@@ -19,7 +19,7 @@ use crate::frame::{Frame, Id};
 use crate::motion::Motion;
 use crate::port::{BusHealth, Received};
 use crate::record::{CycleRecord, Event, EventKind, MAX_AXES, MAX_BUSES, Timing};
-use crate::stop::{Phase, StopCategories, StopReason};
+use crate::stop::{Phase, Rule, StopCategories, StopReason};
 use crate::time::{NANOSECONDS_PER_SECOND, Nanoseconds};
 use crate::watch::{LeakyBucket, TimingLadder, TimingLevel};
 
@@ -43,9 +43,35 @@ pub enum Transmission {
     Free,
     /// It is too late in the slot: they would run into the next SYNC. Counts as a missed slot.
     TooLate,
-    /// Set-points of an earlier cycle are still waiting for the wire somewhere; more behind them would be stale
+    /// Set-points of an earlier cycle are still waiting for the wire on every bus; more behind them would be stale
     /// when they get there.
     Blocked,
+}
+
+/// Some of the buses.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct BusSet(u32);
+
+impl BusSet {
+    /// Adds a bus.
+    pub fn insert(&mut self, bus: usize) {
+        self.0 |= 1 << (bus & 31);
+    }
+
+    /// Whether a bus is among them.
+    pub const fn contains(self, bus: usize) -> bool {
+        self.0 >> (bus & 31) & 1 == 1
+    }
+
+    /// Whether there is none.
+    pub const fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+
+    /// Whether all of so many buses, at least one, are among them.
+    pub const fn is_every_of(self, buses: usize) -> bool {
+        buses > 0 && self.0.count_ones() as usize >= buses
+    }
 }
 
 /// The group of axes that move together.
@@ -81,8 +107,9 @@ pub struct Engine {
     timing_level: TimingLevel,
     /// What was sent by somebody who may not.
     foreign_id: Option<u32>,
-    /// Frames that each interface had refused up to the last cycle.
-    overruns: [u64; MAX_BUSES],
+    /// Whether an interface has refused frames since the last cycle.
+    is_not_taken: bool,
+    held_back: BusSet,
     /// When the velocities and torques of drives in profile modes expire.
     drive_until_ns: Nanoseconds,
     stop: Option<StopReason>,
@@ -155,7 +182,8 @@ impl Engine {
             missed: LeakyBucket::default(),
             timing_level: TimingLevel::Normal,
             foreign_id: None,
-            overruns: [0; MAX_BUSES],
+            is_not_taken: false,
+            held_back: BusSet::default(),
             drive_until_ns: 0,
             stop: None,
             fault_reset: 0,
@@ -253,7 +281,13 @@ impl Engine {
         }
     }
 
-    /// The thinking of one cycle. Nothing moves on unless the set-points can leave.
+    /// Names the buses on which own frames still wait for the wire, before [`Engine::compute`]: they get no set-points.
+    /// The axes on the others go on.
+    pub fn hold_back(&mut self, buses: BusSet) {
+        self.held_back = buses;
+    }
+
+    /// The thinking of one cycle. Nothing moves on unless set-points can leave.
     ///
     /// Returns whether there are set-points to send.
     pub fn compute(
@@ -287,7 +321,14 @@ impl Engine {
             self.stream = Some(command);
         }
         self.supervise(buses, transmission, now_ns, door);
-        let has_commands = transmission == Transmission::Free && self.phase != Phase::Passive;
+        // Once the group stops because its set-points do not get out, it does not wait for them any longer.
+        let is_given_up = self.stop.is_some_and(|stop| stop.rule == Rule::NotTransmitted);
+        let can_leave = match transmission {
+            Transmission::Free => true,
+            Transmission::TooLate => false,
+            Transmission::Blocked => is_given_up,
+        };
+        let has_commands = can_leave && self.phase != Phase::Passive;
         if has_commands {
             self.act(now_ns, door);
             self.write_commands(slot);
@@ -342,7 +383,8 @@ impl Engine {
             _ => Some(controlword::DISABLE_VOLTAGE),
         };
         for axis in &mut self.axes {
-            if has_cycle_of(&self.buses, axis, slot) {
+            let is_held_back = self.held_back.contains(axis.parameters().bus.into());
+            if has_cycle_of(&self.buses, axis, slot) && !is_held_back {
                 axis.command(self.goal, reset_word.filter(|_| axis.drive_state().is_faulted()));
             }
         }
@@ -359,7 +401,8 @@ impl Engine {
 
     /// The set-points of a bus, if it has a cycle in this slot.
     pub fn set_points(&self, bus: usize, slot: u64, batch: &mut SendBatch) {
-        if !self.buses.get(bus).is_some_and(|parameters| has_cycle(parameters, slot)) {
+        let has_cycle = self.buses.get(bus).is_some_and(|parameters| has_cycle(parameters, slot));
+        if !has_cycle || self.held_back.contains(bus) {
             return;
         }
         for axis in self.axes.iter().filter(|axis| usize::from(axis.parameters().bus) == bus) {
@@ -385,6 +428,11 @@ impl Engine {
                 None => break,
             }
         }
+    }
+
+    /// An interface had no room for all that it was handed: set-points may be missing.
+    pub fn not_taken(&mut self) {
+        self.is_not_taken = true;
     }
 
     /// Ends the cycle: leaves its record and shows the new state.

@@ -20,7 +20,9 @@ impl Engine {
         now_ns: Nanoseconds,
         door: &mut impl Door,
     ) {
-        let is_blocked = transmission == Transmission::Blocked || self.is_queue_full(buses);
+        let is_held_back = transmission == Transmission::Blocked || !self.held_back.is_empty();
+        let is_blocked = is_held_back || self.is_not_taken;
+        self.is_not_taken = false;
         self.blocked_cycles = if is_blocked { self.blocked_cycles.saturating_add(1) } else { 0 };
         if !has_power(self.phase) {
             return;
@@ -42,27 +44,25 @@ impl Engine {
         }
         if self.blocked_cycles > self.not_transmitted_cycles {
             let (cycles, limit) = (self.blocked_cycles.into(), self.not_transmitted_cycles.into());
+            // Their drives are where the last set-point left them, and get no other before they are disabled.
+            for axis in &mut self.axes {
+                if self.held_back.contains(axis.parameters().bus.into()) {
+                    axis.give_up();
+                }
+            }
             self.begin_stop(Rule::NotTransmitted, None, None, cycles, limit, now_ns, door);
         }
         let acknowledge_limit = self.acknowledge_timeout_cycles;
         for index in 0..self.axes.len() {
-            let Some((rule, value, limit)) =
-                self.axes.get_mut(index).and_then(|axis| complaint(axis, self.phase, acknowledge_limit))
+            let Some((rule, value, limit)) = self
+                .axes
+                .get_mut(index)
+                .and_then(|axis| complaint(axis, self.phase, acknowledge_limit, self.period_s))
             else {
                 continue;
             };
             self.begin_stop(rule, None, Some(index as u8), value, limit, now_ns, door);
         }
-    }
-
-    /// Whether an interface has refused frames since the last cycle.
-    fn is_queue_full(&mut self, buses: &[BusHealth]) -> bool {
-        let mut is_full = false;
-        for (known, health) in self.overruns.iter_mut().zip(buses) {
-            is_full |= health.tx_overruns > *known;
-            *known = health.tx_overruns;
-        }
-        is_full
     }
 
     /// Begins a stop. The first reason stays the reason; a later one can only make the stop harder.
@@ -150,12 +150,18 @@ const fn has_power(phase: Phase) -> bool {
 }
 
 /// What is wrong with an axis, if anything: rule, value, limit.
-fn complaint(axis: &mut Axis, phase: Phase, acknowledge_limit: u32) -> Option<(Rule, f64, f64)> {
+fn complaint(
+    axis: &mut Axis,
+    phase: Phase,
+    acknowledge_limit: u32,
+    period_s: f64,
+) -> Option<(Rule, f64, f64)> {
     let missed_limit = axis.parameters().missed_feedback_cycles;
     if axis.feedback_age() > missed_limit {
         return Some((Rule::MissedFeedback, axis.feedback_age().into(), missed_limit.into()));
     }
     if axis.drive_state().is_faulted() {
+        axis.give_up();
         return Some((Rule::DriveFault, axis.error_code().into(), 0.0));
     }
     if let Some(complaint) = axis.node_complaint() {
@@ -182,7 +188,12 @@ fn complaint(axis: &mut Axis, phase: Phase, acknowledge_limit: u32) -> Option<(R
         return Some((Rule::EmergencyMessage, code.into(), 0.0));
     }
     if !axis.is_enabled() {
+        axis.give_up();
         return Some((Rule::DriveDisabled, axis.statusword().into(), 0.0));
+    }
+    if let Some(distance) = axis.jump() {
+        let limit = axis.parameters().limits.velocity * period_s;
+        return Some((Rule::ImplausibleFeedback, distance, limit));
     }
     if axis.unacknowledged_cycles() > acknowledge_limit {
         let (cycles, limit) = (axis.unacknowledged_cycles().into(), acknowledge_limit.into());

@@ -1,41 +1,12 @@
 //! The kernel's monotonic clock.
 
-use super::spin_guard::SpinGuard;
 use crate::port::{Clock, Wake};
 use crate::time::{NANOSECONDS_PER_SECOND, Nanoseconds};
 
-/// `CLOCK_MONOTONIC`, waited on by an absolute sleep that ends the guard time before the deadline and a spin for
-/// the rest.
-///
-/// The sleep is absolute (`clock_nanosleep` with `TIMER_ABSTIME`), so that being interrupted between reading the
-/// clock and going to sleep delays nothing. A thread woken by the timer is late by the kernel's latency; the
-/// guard time absorbs it, and what remains is the spin's own granularity of some ten nanoseconds.
+/// `CLOCK_MONOTONIC`, waited on by an absolute sleep (`clock_nanosleep` with `TIMER_ABSTIME`), so that being interrupted
+/// between reading the clock and going to sleep delays nothing.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct MonotonicClock {
-    guard_ns: Nanoseconds,
-}
-
-impl MonotonicClock {
-    /// A clock that wakes `guard_ns` before each deadline and spins until then. With 0 it only sleeps.
-    pub const fn new(guard_ns: Nanoseconds) -> Self {
-        Self { guard_ns }
-    }
-
-    /// How long before a deadline the sleep ends.
-    pub const fn guard_ns(&self) -> Nanoseconds {
-        self.guard_ns
-    }
-
-    /// Sets how long before a deadline the sleep ends; 0 to only sleep.
-    pub const fn set_guard_ns(&mut self, guard_ns: Nanoseconds) {
-        self.guard_ns = guard_ns;
-    }
-
-    /// Takes the guard time over from what has been measured.
-    pub fn follow(&mut self, guard: &SpinGuard) {
-        self.guard_ns = guard.guard_ns();
-    }
-}
+pub struct MonotonicClock {}
 
 impl Clock for MonotonicClock {
     fn now_ns(&mut self) -> Nanoseconds {
@@ -43,18 +14,18 @@ impl Clock for MonotonicClock {
     }
 
     fn wait_until(&mut self, deadline_ns: Nanoseconds) -> Wake {
-        let timer_ns = deadline_ns.saturating_sub(self.guard_ns);
-        let mut wake = Wake { now_ns: monotonic_ns(), timer_latency_ns: 0 };
-        if wake.now_ns < timer_ns {
-            sleep_until(timer_ns);
-            wake.now_ns = monotonic_ns();
-            wake.timer_latency_ns = wake.now_ns.saturating_sub(timer_ns);
+        let now_ns = monotonic_ns();
+        if now_ns >= deadline_ns {
+            return Wake { now_ns, timer_latency_ns: 0 };
         }
-        while wake.now_ns < deadline_ns {
+        sleep_until(deadline_ns);
+        // Should the kernel refuse to sleep, the time is waited for all the same.
+        let mut now_ns = monotonic_ns();
+        while now_ns < deadline_ns {
             core::hint::spin_loop();
-            wake.now_ns = monotonic_ns();
+            now_ns = monotonic_ns();
         }
-        wake
+        Wake { now_ns, timer_latency_ns: now_ns - deadline_ns }
     }
 }
 
@@ -119,15 +90,13 @@ mod tests {
     }
 
     #[test]
-    fn a_wait_never_ends_early_with_any_guard() {
-        for guard_ns in [0, 1, 20_000, 200_000, 5_000_000, u64::MAX] {
-            let mut clock = MonotonicClock::new(guard_ns);
-            for step_ns in [0, 1, 999, 50_000, 300_000, 1_000_000] {
-                let deadline_ns = clock.now_ns() + step_ns;
-                let wake = clock.wait_until(deadline_ns);
-                assert!(wake.now_ns >= deadline_ns, "guard {guard_ns}, step {step_ns}");
-                assert!(clock.now_ns() >= wake.now_ns);
-            }
+    fn a_wait_never_ends_early() {
+        let mut clock = MonotonicClock::default();
+        for step_ns in [0, 1, 999, 50_000, 300_000, 1_000_000] {
+            let deadline_ns = clock.now_ns() + step_ns;
+            let wake = clock.wait_until(deadline_ns);
+            assert!(wake.now_ns >= deadline_ns, "step {step_ns}");
+            assert!(clock.now_ns() >= wake.now_ns);
         }
     }
 
@@ -140,17 +109,8 @@ mod tests {
     }
 
     #[test]
-    fn with_a_guard_longer_than_the_wait_there_is_only_a_spin() {
-        let mut clock = MonotonicClock::new(60 * NANOSECONDS_PER_SECOND);
-        let deadline_ns = clock.now_ns() + 100_000;
-        let wake = clock.wait_until(deadline_ns);
-        assert_eq!(wake.timer_latency_ns, 0);
-        assert!(wake.now_ns >= deadline_ns);
-    }
-
-    #[test]
-    fn after_a_sleep_without_a_guard_the_timer_latency_is_the_whole_lateness() {
-        let mut clock = MonotonicClock::new(0);
+    fn after_a_sleep_the_timer_latency_is_the_whole_lateness() {
+        let mut clock = MonotonicClock::default();
         let deadline_ns = clock.now_ns() + 2_000_000;
         let wake = clock.wait_until(deadline_ns);
         assert_eq!(wake.now_ns - deadline_ns, wake.timer_latency_ns);
@@ -177,20 +137,10 @@ mod tests {
                     std::thread::sleep(std::time::Duration::from_millis(1));
                 }
             });
-            let mut clock = MonotonicClock::new(0);
+            let mut clock = MonotonicClock::default();
             let deadline_ns = clock.now_ns() + 30_000_000;
             assert!(clock.wait_until(deadline_ns).now_ns >= deadline_ns);
             done.send(()).unwrap();
         });
-    }
-
-    #[test]
-    fn the_clock_follows_the_measured_guard() {
-        let mut clock = MonotonicClock::default();
-        let mut guard = SpinGuard::new(64_000);
-        guard.record(10_500);
-        clock.follow(&guard);
-        assert_eq!(clock.guard_ns(), guard.guard_ns());
-        assert!(clock.guard_ns() > 10_500);
     }
 }

@@ -1,6 +1,7 @@
 //! Linux: the only part of this crate that touches the operating system.
 //!
-//! - [`MonotonicClock`]: absolute sleep, then spin; [`SpinGuard`] computes how long the spin must be.
+//! - [`MonotonicClock`]: absolute sleep; [`PacedClock`]: the same and a spin, for the loop; [`SpinGuard`] computes how
+//!   long the spin must be.
 //! - [`RealtimeThread`]: elevates the calling thread step by step and keeps what came of each step.
 //! - [`SocketCanPort`]: a raw CAN socket as a bus port.
 //!
@@ -12,7 +13,9 @@ mod clock;
 mod kernel;
 mod latency;
 mod memory;
+mod paced_clock;
 mod scheduling;
+mod send_path;
 mod spin_guard;
 mod step;
 mod thread;
@@ -21,6 +24,7 @@ pub use can::SocketCanPort;
 pub use clock::MonotonicClock;
 pub use kernel::{is_preempt_rt, is_preempt_rt_version};
 pub use memory::{PREFAULT_LIMIT_BYTES, PageFaults};
+pub use paced_clock::PacedClock;
 pub use scheduling::{Policy, Scheduling};
 pub use spin_guard::SpinGuard;
 pub use step::{Outcome, STEP_COUNT, Step, StepResult};

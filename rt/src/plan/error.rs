@@ -88,7 +88,8 @@ pub enum PlanError {
         /// The length of the slice that differs.
         received: usize,
     },
-    /// The minimum duration is negative or not finite, or the cycle is not a positive finite number.
+    /// The minimum duration is negative, the cycle is not positive, or one of them is no number or of no size that can be
+    /// reckoned with.
     InvalidTiming,
 }
 

@@ -99,8 +99,9 @@ pub(super) fn select(condition: bool, one: f64, other: f64) -> f64 {
     if condition { one } else { other }
 }
 
+/// The state after this time of constant jerk.
 #[inline]
-fn integrate(start: &State, jerk: f64, elapsed_s: f64) -> State {
+pub(super) fn integrate(start: &State, jerk: f64, elapsed_s: f64) -> State {
     let State { position, velocity, acceleration } = *start;
     State {
         position: position
@@ -311,6 +312,10 @@ impl Profile {
 
     /// The profile is complete, and lasts exactly this long; the last phase takes up the rounding.
     pub(super) fn finish_at(&mut self, target: State, duration_s: f64) -> Result<(), PlanError> {
+        if self.count == 0 && duration_s > 0.0 {
+            // A time that is itself rounding: every phase of it was none.
+            self.append(duration_s, self.end.acceleration, 0.0);
+        }
         let reached = self.end;
         self.end = target;
         self.duration_s = duration_s;

@@ -1,7 +1,7 @@
 //! Several axes, one duration (`otg.md` section 2, 4).
 
 use super::error::PlanError;
-use super::problem::{Limits, Problem, State};
+use super::problem::{Limits, Problem, SIZE_MAX, State};
 use super::profile::{BLOCKED_MAX, Profile};
 use super::straight::Line;
 use super::{jerk_limited, trapezoid, travel};
@@ -44,6 +44,14 @@ pub struct Timing {
     pub cycle_s: Option<f64>,
     /// How a velocity beyond its limit comes back to it.
     pub return_to_limits: Return,
+}
+
+impl Timing {
+    fn validate(&self) -> Result<(), PlanError> {
+        let least_valid = self.minimum_duration_s >= 0.0 && self.minimum_duration_s < SIZE_MAX;
+        let cycle_valid = self.cycle_s.is_none_or(|cycle_s| cycle_s > 1.0 / SIZE_MAX && cycle_s < SIZE_MAX);
+        if least_valid && cycle_valid { Ok(()) } else { Err(PlanError::InvalidTiming) }
+    }
 }
 
 /// What is controlled: where an axis arrives, or only how fast it then is.
@@ -149,8 +157,17 @@ pub fn synchronised_velocity(
 
 /// Plans the fastest coordinated stop: every axis comes to rest, all at the same time. Gives the duration in s.
 ///
-/// An axis that would leave its position limits that way stops sooner by itself, on a shorter way, and waits for the
-/// others. Where no way is short enough it takes the shortest; see [`Profile::extrema`].
+/// An axis that would leave its position limits that way stops by itself and waits for the others: as fast as it can or,
+/// where that leads beyond a limit, by decelerating further, so that it turns around just there and swings back. From
+/// a start within the limits of acceleration,
+///
+/// - the position limit it runs towards is kept whenever any motion within the limits of acceleration and jerk keeps it; where none does,
+///   the way beyond it is the shortest;
+/// - the velocity limits are kept, too, whenever any such motion keeps them together with that position limit; where
+///   none does, the position comes first and the swing back is as slow as it can be.
+///
+/// Where both position limits are nearer to each other than such a swing is wide, it may leave the other one. What the
+/// motion does keep in the end is in [`Profile::extrema`].
 ///
 /// # Errors
 /// As [`synchronised`].
@@ -217,10 +234,7 @@ fn plan(
     timing: Timing,
 ) -> Result<f64, PlanError> {
     expect_length(problems.len(), profiles.len())?;
-    let cycle_valid = timing.cycle_s.is_none_or(|cycle_s| cycle_s > 0.0 && cycle_s.is_finite());
-    if !(timing.minimum_duration_s >= 0.0 && timing.minimum_duration_s.is_finite() && cycle_valid) {
-        return Err(PlanError::InvalidTiming);
-    }
+    timing.validate()?;
     let mut longest_s = timing.minimum_duration_s;
     for (axis, (problem, profile)) in problems.iter().zip(profiles.iter_mut()).enumerate() {
         // An axis that will be made to last longer needs no phases yet.

@@ -32,7 +32,8 @@ impl Problem {
     /// `target` is where the target is now, how fast and with what acceleration it moves; what it asks for beyond the
     /// limits is cut off at them. Called in every cycle with its last answer as the start, it follows any target that
     /// keeps the limits, with an error that stems from the change of the target's acceleration within a cycle only.
-    /// The position limits are kept whenever a stop from the start keeps them.
+    /// The position limits are kept whenever a stop from the start keeps them, and from one cycle to the next the position
+    /// changes by no more than the velocity limit allows.
     ///
     /// # Errors
     /// As [`synchronised`], with axis 0.
@@ -47,7 +48,7 @@ impl Problem {
         })?;
         let target = self.feasible_target(cycle_s);
         let met = self.relative_step(&target, cycle_s)?;
-        if self.can_go_on(&met)? {
+        if self.keeps_step(&met, cycle_s) && self.can_go_on(&met)? {
             return Ok(met);
         }
         // The target is bound for a limit, and following it as closely as possible would be, too.
@@ -90,6 +91,18 @@ impl Problem {
             velocity: then.velocity + relative.velocity,
             acceleration: then.acceleration + relative.acceleration,
         })
+    }
+
+    /// Whether the position changes in the cycle by no more than the velocity limits allow.
+    ///
+    /// Seen from a target that accelerates, a velocity may swing and be back within the cycle; on the axis it must not.
+    fn keeps_step(&self, next: &State, cycle_s: f64) -> bool {
+        let Self { start, limits, .. } = self;
+        let step = next.position - start.position;
+        let rounding = ROUNDING * cycle_s * (limits.velocity_max - limits.velocity_min)
+            + 4.0 * f64::EPSILON * start.position.abs();
+        step <= cycle_s * limits.velocity_max.max(start.velocity) + rounding
+            && step >= cycle_s * limits.velocity_min.min(start.velocity) - rounding
     }
 
     /// Whether the axis can keep its limits from this state on.

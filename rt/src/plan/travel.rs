@@ -1,8 +1,8 @@
 //! Position limits: what to do where the fastest motion, or the coordinated stop, would leave them.
 //!
 //! In place of a motion that swings beyond a limit, the axis arrives early and waits, or first stops and then goes to
-//! the target from rest. In place of a stop that runs on to be coordinated, it stops as fast as it can, or on the
-//! shortest way, which is to decelerate fully until the motion turns around.
+//! the target from rest. In place of a stop that runs on to be coordinated, it stops as fast as it can, or on a
+//! shorter way, on which it still decelerates when the motion turns around.
 
 use super::error::{Limit, PlanError};
 use super::problem::{Limits, Problem, State};
@@ -30,16 +30,16 @@ pub(super) fn limit_left(problem: &Problem, profile: &Profile) -> Option<Limit> 
     }
 }
 
-/// A stop that keeps the position limits if any does, else the one on the shortest way. The shortest way swings back
-/// behind its turning point, at whatever velocity that takes.
+/// The fastest stop, or where that leaves a position limit the one that turns around at it: see
+/// [`stop`](super::stop) for what it keeps.
 pub(super) fn stop_within(start: State, limits: &Limits, profile: &mut Profile) -> Result<(), PlanError> {
     let problem = Problem { start, target: State::rest(start.position), limits: *limits };
     if limits.is_second_order() {
         return trapezoid::fastest_velocity(&problem, profile);
     }
     jerk_limited::fastest_velocity(&problem, 0.0, profile)?;
-    if limit_left(&problem, profile).is_some() {
-        jerk_limited::shortest_stop(&problem, profile)?;
+    if let Some(limit) = limit_left(&problem, profile) {
+        jerk_limited::stop_turning(&problem, limit, profile)?;
     }
     Ok(())
 }

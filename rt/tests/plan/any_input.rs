@@ -124,3 +124,48 @@ fn limits_that_are_beyond_all_measure_are_refused() {
     let answer = synchronised(&[problem], &mut [Profile::hold(0.0)], Timing::default());
     assert_eq!(answer, Err(PlanError::NotRepresentable { axis: 0 }));
 }
+
+/// Found by the fuzzer: more cycles than a number can count.
+#[test]
+fn a_cycle_that_is_next_to_nothing_is_refused() {
+    let limits = Limits::symmetric(1.0, 1.0, 1.0);
+    let problem = Problem { start: State::rest(0.0), target: State::rest(1.0), limits };
+    for (cycle_s, minimum_duration_s) in [(4.8e-299, 1.6e11), (1e-31, 0.0), (1e31, 0.0), (0.001, 1e31)] {
+        let synchronisation = Synchronisation::Independent;
+        let timing =
+            Timing { cycle_s: Some(cycle_s), minimum_duration_s, synchronisation, ..Timing::default() };
+        let answer = synchronised(&[problem], &mut [Profile::hold(0.0)], timing);
+        assert_eq!(answer, Err(PlanError::InvalidTiming));
+    }
+}
+
+/// Found by the fuzzer: every phase of a motion that lasts 2e-307 s is too short to be one.
+#[test]
+fn a_motion_that_lasts_next_to_no_time_is_where_it_should_be() {
+    let start = State { position: 1.5e11, velocity: 3.399_986_479_566_3e-311, acceleration: 1.5e11 };
+    let target = State { velocity: 3.399_986_479_656e-311, ..start };
+    let problem = Problem { start, target, limits: Limits::symmetric(1.6e11, 1.6e11, 1.6e11) };
+    let timing = Timing { minimum_duration_s: 2e-307, ..Timing::default() };
+    let mut profiles = [Profile::hold(0.0)];
+    synchronised_velocity(&[problem], &mut profiles, timing).unwrap();
+    for part in [0.0, 0.5, 1.0] {
+        let State { position, velocity, .. } = profiles[0].sample(part * profiles[0].duration_s());
+        assert_eq!(position, 1.5e11);
+        assert!(velocity.abs() < 1e-295, "{velocity}");
+    }
+    assert_eq!(profiles[0].phases().count(), 1);
+}
+
+/// Found by the fuzzer: rounding had made the duration negative, and then it was no number.
+#[test]
+fn a_motion_that_takes_no_time_beyond_a_position_limit_is_waited_for_or_refused() {
+    let limits =
+        Limits::asymmetric(6.4e10, -1.6e11, 507_658_818.258_823_6, -1.6e11, 1.297_367_442_234_912_3e-13)
+            .with_position(-3.5e-11, 5.6e-319);
+    let target = State { position: 2.2e-106, velocity: 0.0, acceleration: 1.331_267_540_180_239_4e-302 };
+    let problem = Problem { start: State::rest(0.0), target, limits };
+    let mut profiles = [Profile::hold(0.0)];
+    let answer = synchronised(&[problem], &mut profiles, Timing::default());
+    assert!(answer.is_ok() || matches!(answer, Err(PlanError::PositionBeyondLimit { .. })), "{answer:?}");
+    assert!(profiles[0].duration_s() >= 0.0 && are_numbers(&profiles));
+}

@@ -9,7 +9,7 @@ use takt_rt::plan::{
     synchronised, velocity,
 };
 
-fn state(position: f64, velocity: f64, acceleration: f64) -> State {
+pub fn state(position: f64, velocity: f64, acceleration: f64) -> State {
     State { position, velocity, acceleration }
 }
 
@@ -22,7 +22,7 @@ fn limits() -> impl Strategy<Value = Limits> {
 }
 
 /// Any start, also outside the limits, and any target that can be reached within them.
-fn problem() -> impl Strategy<Value = Problem> {
+pub fn problem() -> impl Strategy<Value = Problem> {
     let or_zero = |range: core::ops::Range<f64>| prop_oneof![1 => Just(0.0), 3 => range];
     let start = (-4.0..4.0, or_zero(-3.0..3.0), or_zero(-3.0..3.0));
     let target = (-4.0..4.0, or_zero(-1.0..1.0), or_zero(-1.0..1.0));
@@ -73,7 +73,7 @@ fn reversed(problem: &Problem) -> Problem {
 }
 
 /// The same problem in a unit that is so many times smaller.
-fn scaled(problem: &Problem, factor: f64) -> Problem {
+pub fn scaled(problem: &Problem, factor: f64) -> Problem {
     let scale = |of: &State| state(of.position * factor, of.velocity * factor, of.acceleration * factor);
     let Limits { velocity_max, velocity_min, acceleration_max, acceleration_min, jerk_max, .. } =
         problem.limits;
@@ -91,7 +91,7 @@ fn scaled(problem: &Problem, factor: f64) -> Problem {
 }
 
 /// Whether the start is within the limits and can stay there.
-fn starts_inside(problem: &Problem) -> bool {
+pub fn starts_inside(problem: &Problem) -> bool {
     let Problem { start, limits, .. } = problem;
     let bound_for = start.velocity + start.acceleration * start.acceleration.abs() / (2.0 * limits.jerk_max);
     let velocities = limits.velocity_min..=limits.velocity_max;
@@ -188,29 +188,6 @@ proptest! {
     }
 
     #[test]
-    fn planning_anew_in_every_cycle_arrives_at_the_same_time(problem in problem(), cycles in 5..200_u32) {
-        // On the way to a target with acceleration there may be states that are bound for the velocity limit.
-        // Seen by themselves, these have to brake.
-        if !starts_inside(&problem) || problem.target.acceleration != 0.0 {
-            return Ok(());
-        }
-        let mut profile = position(&problem).unwrap();
-        let total_s = profile.duration_s();
-        if total_s < 1e-3 {
-            return Ok(());
-        }
-        let cycle_s = total_s / f64::from(cycles);
-        let mut problem = problem;
-        for cycle in 1..cycles {
-            problem.start = profile.sample(cycle_s);
-            profile = position(&problem).unwrap();
-            let arrival_s = f64::from(cycle) * cycle_s + profile.duration_s();
-            // At the end of a stop a rounding error of the position costs its third root in time.
-            prop_assert!((arrival_s - total_s).abs() <= 1e-4 * total_s, "{arrival_s} {total_s} {cycle}");
-        }
-    }
-
-    #[test]
     fn a_stop_brings_all_axes_to_rest_together(problems in prop::collection::vec(problem(), 1..8)) {
         let starts: Vec<State> = problems.iter().map(|problem| problem.start).collect();
         let limits: Vec<Limits> = problems.iter().map(|problem| problem.limits).collect();
@@ -294,6 +271,37 @@ proptest! {
         stop(&[start], &[tight], &mut profiles).unwrap();
         prop_assert_eq!(judge(&Problem { target: profiles[0].end(), ..problem }, &profiles[0], Arrival::Velocity), Ok(()));
         prop_assert!((profiles[0].extrema().position.max - state.position).abs() < 1e-4 * (1.0 + state.position.abs()));
+    }
+
+    #[test]
+    fn a_stop_keeps_the_velocity_limits_too_where_that_keeps_the_position_limit(problem in problem(), room in 0.0..1.0_f64) {
+        let Problem { start, limits, .. } = problem;
+        let turns_anyway = start.velocity + start.acceleration * start.acceleration.abs() / (2.0 * limits.jerk_max) < 0.0;
+        if !starts_inside(&problem) || start.velocity <= 0.0 || turns_anyway {
+            return Ok(());
+        }
+        // How far the axis comes at least: decelerating fully until it turns around, in the first case only so much that
+        // the swing back keeps the velocity limit.
+        let swing = (-2.0 * limits.jerk_max * limits.velocity_min).sqrt().min(-limits.acceleration_min);
+        let full = (2.0 * limits.jerk_max * start.velocity + start.acceleration.powi(2)).sqrt().min(-limits.acceleration_min);
+        let turn = |deceleration: f64| {
+            velocity(&Problem { target: state(0.0, 0.0, -deceleration), ..problem }).unwrap().end().position
+        };
+        let (keeping_both, shortest) = (turn(swing.min(full)), turn(full));
+        let end = velocity(&Problem { target: State::rest(0.0), ..problem }).unwrap().end().position;
+        let high = shortest + room * (end - shortest);
+        let mut profiles = [Profile::hold(0.0)];
+        stop(&[start], &[limits.with_position(f64::NEG_INFINITY, high)], &mut profiles).unwrap();
+        prop_assert_eq!(judge(&Problem { target: profiles[0].end(), ..problem }, &profiles[0], Arrival::Velocity), Ok(()));
+        let extrema = profiles[0].extrema();
+        let rounding = 1e-9 * (1.0 + high.abs());
+        prop_assert!(extrema.position.max <= high.max(start.position) + rounding, "{extrema:?}");
+        if keeping_both <= high {
+            prop_assert!(extrema.velocity.min >= limits.velocity_min * (1.0 + 1e-9), "{extrema:?}");
+        } else {
+            // Position comes first; the swing back is as slow as it can be, for the axis turns around only just there.
+            prop_assert!(extrema.position.max >= high - rounding, "{extrema:?}");
+        }
     }
 
     #[test]

@@ -6,6 +6,7 @@ mod counts;
 mod jerk_limited;
 mod many;
 mod oracle;
+mod planning_anew;
 mod small_integers;
 mod tracking;
 mod trapezoid;

@@ -103,3 +103,13 @@ fn a_group_that_would_leave_its_position_limits_is_refused_with_a_stop() {
     assert_eq!((end.velocity, end.acceleration), (vector![0.0, 0.0], vector![0.0, 0.0]));
     assert_eq!(stop.extrema()[1].velocity.max, 2.0);
 }
+
+/// Found by random search: the velocity went beyond its limit within the cycle and was back at its end.
+#[test]
+fn the_step_of_a_cycle_at_the_velocity_limit_is_not_too_far_while_the_target_accelerates() {
+    let limits = Limits { jerk_max: 4127.0, ..ARM }.with_position(-1.0, 1.0);
+    let start = state(0.5153011208264682, 2.5, 0.0);
+    let target = state(0.70845470786804, -0.8256510783529238, 22.54566159916036);
+    let next = Problem { start, target, limits }.track(CYCLE_S).unwrap();
+    assert!(next.position - start.position <= 2.5 * CYCLE_S * (1.0 + 1e-9), "{next:?}");
+}

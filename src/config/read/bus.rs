@@ -15,6 +15,9 @@ use crate::config::quantity::Quantity;
 /// The bit rates of CiA 301, 5.3, which every adapter and every drive here divides its clock to.
 const CLASSIC_RATES: [f64; 8] = [10e3, 20e3, 50e3, 125e3, 250e3, 500e3, 800e3, 1e6];
 
+/// Longer than anybody waits for a bus.
+const RESTART_LIMIT_MS: i64 = 60_000;
+
 /// A bus as far as it could be read.
 pub struct ReadBus {
     pub name: Option<String>,
@@ -82,6 +85,7 @@ fn bus<'a>(
             .map(|rate| rate.round() as u32)
     });
     let divider = section.get("period").and_then(|entry| divider(&entry, cycle_ns)).unwrap_or(1);
+    let restart_ms = section.get("restart_ms").and_then(|entry| entry.integer(0..RESTART_LIMIT_MS + 1));
     let service_frames = section.get("service_frames_per_cycle").and_then(|entry| entry.integer(1..33));
     let sdo_while_enabled = boolean(&mut section, "sdo_while_enabled", defaults::SDO_WHILE_ENABLED);
     section.finish();
@@ -91,6 +95,7 @@ fn bus<'a>(
         divider,
         bit_rate,
         data_bit_rate,
+        restart_ms: restart_ms.and_then(|time| u32::try_from(time).ok()).unwrap_or(defaults::RESTART_MS),
         service_frames_per_cycle: service_frames
             .and_then(|frames| usize::try_from(frames).ok())
             .unwrap_or(defaults::SERVICE_FRAMES_PER_CYCLE),

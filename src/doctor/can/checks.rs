@@ -57,7 +57,8 @@ fn bring_up(name: &str, wanted: Option<&WantedBus>) -> String {
     let data = wanted
         .and_then(|bus| bus.data_bit_rate)
         .map_or(String::new(), |rate| format!(" dbitrate {rate} fd on"));
-    format!("sudo ip link set {name} up type can bitrate {bit_rate}{data} restart-ms 100")
+    let restart_ms = wanted.map_or(100, |bus| bus.restart_ms);
+    format!("sudo ip link set {name} up type can bitrate {bit_rate}{data} restart-ms {restart_ms}")
 }
 
 /// Takes the interface down, changes it and brings it up again; a running one cannot be changed.
@@ -158,13 +159,15 @@ fn recommended_sample_point(bit_rate: u64) -> f64 {
 
 const SAMPLE_POINT_TOLERANCE: f64 = 0.051;
 
-pub fn restart(link: &Link) -> Finding {
+pub fn restart(link: &Link, wanted: Option<&WantedBus>) -> Finding {
+    let wanted_ms = wanted.map_or(100, |bus| bus.restart_ms);
     match link.restart_ms {
         None => RESTART.not_known("the driver does not tell"),
+        Some(0) if wanted_ms == 0 => RESTART.good("never by itself, as configured").applied(true),
         Some(0) => RESTART
             .could_be_better("never by itself")
             .applied(false)
-            .mend(change(&link.name, "restart-ms 100")),
+            .mend(change(&link.name, &format!("restart-ms {wanted_ms}"))),
         Some(ms) => RESTART.good(format!("{ms} ms after bus-off")).applied(true),
     }
 }
@@ -220,7 +223,7 @@ mod tests {
     }
 
     fn wanted(bit_rate: u32, data_bit_rate: Option<u32>) -> WantedBus {
-        WantedBus { interface: "can0".to_owned(), bit_rate, data_bit_rate }
+        WantedBus { interface: "can0".to_owned(), bit_rate, data_bit_rate, restart_ms: 250 }
     }
 
     #[test]
@@ -242,7 +245,7 @@ mod tests {
         assert_eq!(needed.verdict, Verdict::ForbidsRealTime);
         assert_eq!(
             needed.mend,
-            ["sudo ip link set can0 up type can bitrate 500000 dbitrate 2000000 fd on restart-ms 100"]
+            ["sudo ip link set can0 up type can bitrate 500000 dbitrate 2000000 fd on restart-ms 250"]
         );
     }
 
@@ -303,8 +306,13 @@ mod tests {
 
     #[test]
     fn a_controller_that_does_not_come_back_is_told() {
-        assert_eq!(restart(&can0()).read, "100 ms after bus-off");
-        assert_eq!(restart(&Link { restart_ms: Some(0), ..can0() }).verdict, Verdict::CouldBeBetter);
-        assert_eq!(restart(&Link { restart_ms: None, ..can0() }).verdict, Verdict::NotKnown);
+        assert_eq!(restart(&can0(), None).read, "100 ms after bus-off");
+        assert_eq!(restart(&Link { restart_ms: None, ..can0() }, None).verdict, Verdict::NotKnown);
+        let never = Link { restart_ms: Some(0), ..can0() };
+        assert_eq!(restart(&never, None).verdict, Verdict::CouldBeBetter);
+        let finding = restart(&never, Some(&wanted(1_000_000, None)));
+        assert!(finding.mend[0].contains("type can restart-ms 250 "), "{:?}", finding.mend);
+        let as_configured = WantedBus { restart_ms: 0, ..wanted(1_000_000, None) };
+        assert_eq!(restart(&never, Some(&as_configured)).verdict, Verdict::Good);
     }
 }

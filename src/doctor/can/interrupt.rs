@@ -9,11 +9,14 @@ const INTERRUPT: Check = Check {
     group: Group::Can,
     title: "interrupt",
     source: "/proc/interrupts, threads irq/*",
-    why: "the driver's interrupt thread waits behind those of disks and networks when it has no more priority than they have; above the loop's it delays SYNC",
+    why: "the driver's interrupt thread waits behind those of disks and networks when it has no more priority than they have, and SYNC behind a frame of somebody else that it has yet to finish",
 };
 
 /// The priority that the kernel gives every interrupt thread.
 const USUAL_PRIORITY: u32 = 50;
+
+/// What is above belongs to the kernel's watchdogs and migration.
+const HIGHEST_PRIORITY: u32 = 95;
 
 pub fn finding(name: &str, device: &Device, table: &str, threads: &[Thread], priority: u8) -> Finding {
     let shared = if device.class == Class::Usb { " (the USB host's)" } else { "" };
@@ -27,15 +30,24 @@ pub fn finding(name: &str, device: &Device, table: &str, threads: &[Thread], pri
             .not_known(format!("number {number}{shared}; it has no thread, or none that can be seen"));
     };
     let read = format!("{}{shared} at priority {}", thread.name, thread.priority);
-    let best = u32::from(priority).saturating_sub(1).clamp(1, USUAL_PRIORITY + 20);
+    let best = best_priority(device, priority);
     let finding = if thread.priority <= USUAL_PRIORITY && best > USUAL_PRIORITY {
         INTERRUPT.could_be_better(format!("{read}, as every other interrupt"))
-    } else if priority > 0 && thread.priority >= priority.into() {
+    } else if device.class == Class::Usb && priority > 0 && thread.priority >= priority.into() {
         INTERRUPT.could_be_better(format!("{read}, not below the loop's {priority}"))
     } else {
         return INTERRUPT.good(read).applied(true);
     };
     finding.applied(false).mend(format!("sudo chrt --fifo --pid {best} {}", thread.id))
+}
+
+/// Above the loop's: the handler is short, and without it the controller sends no frame after the one that it has. But
+/// that of a USB host serves other devices as well, and stays below.
+fn best_priority(device: &Device, loop_priority: u8) -> u32 {
+    match device.class {
+        Class::Usb => u32::from(loop_priority).saturating_sub(1).clamp(1, USUAL_PRIORITY + 20),
+        _ => (u32::from(loop_priority) + 5).min(HIGHEST_PRIORITY),
+    }
 }
 
 /// The interrupts of an interface from `/proc/interrupts`: those named after it, after the address of its device or
@@ -81,14 +93,19 @@ mod tests {
     }
 
     #[test]
-    fn the_thread_belongs_above_other_interrupts_and_below_the_loop() {
-        let at = |priority| {
+    fn the_thread_belongs_above_other_interrupts_and_that_of_a_usb_host_below_the_loop() {
+        let native = |priority| {
             finding("can0", &device(Class::Native, ""), TABLE, &[thread("irq/16-can0", priority)], 80)
         };
-        assert_eq!(at(50).verdict, Verdict::CouldBeBetter);
-        assert_eq!(at(50).mend, ["sudo chrt --fifo --pid 70 333"]);
-        assert_eq!(at(70).verdict, Verdict::Good);
-        assert_eq!(at(80).verdict, Verdict::CouldBeBetter);
+        assert_eq!(native(50).verdict, Verdict::CouldBeBetter);
+        assert_eq!(native(50).mend, ["sudo chrt --fifo --pid 85 333"]);
+        assert_eq!(native(85).verdict, Verdict::Good);
+        let usb = |priority| {
+            finding("can5", &device(Class::Usb, ""), TABLE, &[thread("irq/125-xhci_hcd", priority)], 80)
+        };
+        assert_eq!(usb(50).mend, ["sudo chrt --fifo --pid 70 333"]);
+        assert_eq!(usb(70).verdict, Verdict::Good);
+        assert_eq!(usb(80).verdict, Verdict::CouldBeBetter);
         let none = finding("can0", &device(Class::Native, ""), TABLE, &[thread("irq/160-can9", 50)], 80);
         assert_eq!(none.verdict, Verdict::NotKnown);
         // A loop at 40 cannot have the interrupt above all others and below itself.

@@ -117,7 +117,7 @@ fn of_interface(
             findings.push(checks::state(link, wanted));
             if device.has_bit_timing() {
                 findings.push(checks::bit_rate(link, wanted));
-                findings.push(checks::restart(link));
+                findings.push(checks::restart(link, wanted));
                 findings.push(checks::errors(link));
             }
             findings.push(checks::queue(link));

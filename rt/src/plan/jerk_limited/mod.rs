@@ -7,11 +7,13 @@
 
 mod brake;
 mod crossing;
+mod drift;
 mod motion;
 mod passage;
 mod roots;
 mod step1;
 mod step2;
+mod turn;
 
 use super::error::PlanError;
 use super::problem::{Problem, State};
@@ -21,6 +23,8 @@ use super::trapezoid::{Bounds, Ramp, Stretches, larger};
 use motion::{Scale, Shape};
 use step1::Edges;
 use step2::Slower;
+
+pub(super) use turn::stop_turning;
 
 /// Relative to the sizes of a problem, differences up to this are rounding.
 const ROUNDING: f64 = 1024.0 * f64::EPSILON;
@@ -80,7 +84,8 @@ pub(super) fn fastest_position(
     let Some((fastest, others)) = ways.split_first() else {
         return Err(PlanError::NotRepresentable { axis: 0 });
     };
-    let duration_s = |duration: f64| inside.brake_s + duration * inside.scale.time_s;
+    // What rounding takes from no time at all must not make it less.
+    let duration_s = |duration: f64| inside.brake_s + larger(duration, 0.0) * inside.scale.time_s;
     let fastest_s = duration_s(fastest.duration);
     profile.set_minimum_duration(fastest_s);
     if fastest_s < least_s {
@@ -184,33 +189,6 @@ fn velocity_ramp(problem: &Problem, profile: &mut Profile) -> Result<Ramp, PlanE
             slope_min: -limits.jerk_max,
         },
     })
-}
-
-/// The stop that goes the least far: decelerate fully until the motion turns around, then come to rest.
-pub(super) fn shortest_stop(problem: &Problem, profile: &mut Profile) -> Result<(), PlanError> {
-    let Problem { start, limits, .. } = problem;
-    profile.begin(*start);
-    // A motion that is slowing down at full rate already may turn around before it can be made to stop.
-    let behind = start.velocity + 0.5 * start.acceleration * start.acceleration.abs() / limits.jerk_max;
-    let sign = libm::copysign(1.0, if start.velocity == 0.0 { behind } else { start.velocity });
-    let deceleration_max = if sign > 0.0 { -limits.acceleration_min } else { limits.acceleration_max };
-    let (speed, deceleration) = (sign * start.velocity, -sign * start.acceleration);
-    if speed > 0.0 && deceleration <= deceleration_max {
-        // On the arc of full jerk the speed is `peak − deceleration²/2J`.
-        let peak = speed + 0.5 * deceleration * deceleration / limits.jerk_max;
-        let at_rest = libm::sqrt(2.0 * limits.jerk_max * peak).min(deceleration_max);
-        profile.shift((at_rest - deceleration) / limits.jerk_max, -sign * limits.jerk_max);
-        profile.shift(sign * profile.reached().velocity / deceleration_max, 0.0);
-    }
-    let brake_s = profile.duration_s();
-    let ramp = velocity_ramp(problem, profile)?;
-    let ramp_s = profile.duration_s() - brake_s;
-    let fastest = ramp.fastest();
-    drive_stretches(&fastest.stretches, profile);
-    let position = profile.reached().position;
-    profile.finish_at(State::rest(position), brake_s + ramp_s + fastest.duration)?;
-    profile.set_minimum_duration(profile.duration_s());
-    Ok(())
 }
 
 fn drive_stretches(stretches: &Stretches, profile: &mut Profile) {

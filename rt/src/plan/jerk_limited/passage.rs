@@ -25,7 +25,7 @@ pub(super) struct Passage {
 pub(super) struct Dip {
     pub(super) distance: f64,
     pub(super) duration: f64,
-    slope: f64,
+    pub(super) slope: f64,
     duration_slope: f64,
     first: Swing,
 }

@@ -13,6 +13,7 @@
 //! Accelerations of one sign at both ends allow, besides, motions that never lose that sign, in a closed lens
 //! of durations and distances of its own.
 
+use super::ROUNDING;
 use super::crossing::Crossing;
 use super::motion::{Motion, Shape, Swing, square_positive};
 use super::passage::Passage;
@@ -21,17 +22,11 @@ use arrayvec::ArrayVec;
 /// The most roots: two on each edge of the crossings, five on each of four passages.
 const WAYS_MAX: usize = 24;
 
-/// Relative to the sizes of a problem, differences up to this are rounding.
-const ROUNDING: f64 = 1024.0 * f64::EPSILON;
-
 /// Relative to the sizes of velocities, differences up to this are rounding.
 const GAP_ROUNDING: f64 = 64.0 * f64::EPSILON;
 
 /// Relative to the distance, the error that is left in it to keep the duration free of rounding.
 const DISTANCE_ERROR: f64 = 1e-7;
-
-/// A fastest motion this much later than the direct one, in relative terms, is not that but for rounding.
-const MISSED: f64 = 1e-3;
 
 /// A motion on an edge.
 #[derive(Clone, Copy, Debug)]
@@ -50,6 +45,16 @@ enum Kind {
     Lens { lower: bool, least: f64 },
 }
 
+/// What an end of the lens that covers just the distance is judged against, so that it is found as a motion: it counts
+/// as on the other side.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum LensEnd {
+    /// The other end of the lens, so that both edges have an odd number of motions.
+    BesideOther,
+    /// What is next to it on the edge.
+    BesideNext,
+}
+
 /// All motions on an edge over the wanted distance, the fastest first.
 pub(super) type Ways = ArrayVec<Way, WAYS_MAX>;
 
@@ -59,13 +64,17 @@ pub(super) type Ways = ArrayVec<Way, WAYS_MAX>;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Edges {
     pub(super) motion: Motion,
-    mirrored: bool,
+    pub(super) mirrored: bool,
+    /// By how much the velocity before the target exceeds the one behind the start.
+    pub(super) gap: f64,
     /// How wrong the distance may be.
-    rounding: f64,
+    pub(super) rounding: f64,
+    /// How wrong the velocities may be where they decide whether there is a lens.
+    pub(super) lens_rounding: f64,
     pub(super) upper: Crossing,
     /// In the mirror.
     pub(super) lower: Crossing,
-    direct_distance: f64,
+    pub(super) direct_distance: f64,
     pub(super) direct_duration: f64,
     /// Distance and duration of the crossings that only just have a peak at the velocity before the target, and
     /// a valley at the velocity behind the start.
@@ -77,12 +86,17 @@ impl Edges {
     pub(super) fn of(original: &Motion) -> Self {
         let mirrored = original.velocity_before_target() < original.velocity_behind_start();
         let motion = if mirrored { original.mirrored() } else { *original };
-        let (behind_start, before_target) = (motion.velocity_behind_start(), motion.velocity_before_target());
         let Motion { a0, af, vmax, vmin, .. } = motion;
         // The root of the gap goes into times and distances, so a rounding error must not open it.
         let gap_rounding = GAP_ROUNDING * (vmax - vmin + a0 * a0 + af * af);
-        let gap = before_target - behind_start;
-        let gap = if gap > gap_rounding { gap } else { 0.0 };
+        let gap = motion.velocity_before_target() - motion.velocity_behind_start();
+        Self::across(if gap > gap_rounding { gap } else { 0.0 }, motion, mirrored)
+    }
+
+    /// The edges, where the velocity before the target exceeds the one behind the start by this gap.
+    pub(super) fn across(gap: f64, motion: Motion, mirrored: bool) -> Self {
+        let (behind_start, before_target) = (motion.velocity_behind_start(), motion.velocity_before_target());
+        let Motion { v0, a0, vf, af, .. } = motion;
         let upper = Crossing::new(&motion, before_target, gap + square_positive(a0), square_positive(-af));
         let lower =
             Crossing::new(&motion.mirrored(), -behind_start, square_positive(-a0), gap + square_positive(af));
@@ -105,7 +119,9 @@ impl Edges {
             },
             motion,
             mirrored,
+            gap,
             rounding: 0.0,
+            lens_rounding: ROUNDING * (v0.abs() + vf.abs() + a0 * a0 + af * af),
             upper,
             lower,
             direct_distance,
@@ -138,32 +154,21 @@ impl Edges {
 
     /// Every motion on an edge over the wanted distance, the fastest first.
     pub(super) fn ways(&mut self) -> Ways {
-        let excess = self.direct_distance - self.motion.distance;
-        let ways = self.ways_seen(excess > 0.0);
-        // A rounding error beside the direct motion must not cost the time to go back and try again. And where it
-        // covers just the distance, it is found when its distance is judged such that the edges meet the
-        // distance there and not only later.
-        let missed = ways
-            .first()
-            .is_none_or(|way| way.duration > self.direct_duration + MISSED * (1.0 + way.duration));
-        if missed && excess.abs() <= self.rounding {
-            self.motion.distance = self.direct_distance;
-            return [false, true]
-                .map(|above| self.ways_seen(above))
-                .into_iter()
-                .min_by(|one, other| {
-                    let duration = |ways: &Ways| ways.first().map_or(f64::INFINITY, |way| way.duration);
-                    duration(one).total_cmp(&duration(other))
-                })
-                .unwrap_or(ways);
+        let ways = self.ways_seen(self.direct_distance > self.motion.distance, LensEnd::BesideOther);
+        let fastest = ways.first().map_or(f64::INFINITY, |way| way.duration);
+        match self.but_for_drift(fastest) {
+            Some((edges, earlier)) => {
+                *self = edges;
+                earlier
+            }
+            None => ways,
         }
-        ways
     }
 
     /// The same, when the distance of the direct motion is taken for too far or not.
-    fn ways_seen(&self, direct_is_above: bool) -> Ways {
+    pub(super) fn ways_seen(&self, direct_is_above: bool, lens_end: LensEnd) -> Ways {
         let mut ways = Ways::new();
-        self.lens_ways(&mut ways);
+        self.lens_ways(lens_end, &mut ways);
         self.upper_ways(direct_is_above, &mut ways);
         self.lower_ways(direct_is_above, &mut ways);
         ways.sort_unstable_by(|one, other| one.duration.total_cmp(&other.duration));
@@ -212,26 +217,41 @@ impl Edges {
         Passage::new(&reversed, reversed.target_root() - reversed.start_root())
     }
 
-    fn lens_ways(&self, ways: &mut Ways) {
+    fn lens_ways(&self, end: LensEnd, ways: &mut Ways) {
         let Some(lens) = self.lens() else { return };
-        let (fastest, slowest) = lens.ends();
         let distance = lens.motion.distance;
-        // An end of the lens that covers just the distance is a motion, be it the only one in the lens.
-        let fastest_is_above = if fastest == distance { slowest < distance } else { fastest > distance };
-        let slowest_is_above = if slowest == distance { !fastest_is_above } else { slowest > distance };
-        let ends_are_above = [slowest_is_above, fastest_is_above];
-        lens.upper.solve(distance, lens.least, ends_are_above, |least, duration| {
+        let (fastest, slowest) = lens.ends();
+        let ends_are_above = |edge: &Passage, last: f64, distance: f64, [slowest, fastest]: [f64; 2]| {
+            let rises = |least: f64| edge.dip(least).slope > 0.0;
+            let fastest_is_above = match (fastest == distance, end) {
+                (true, LensEnd::BesideOther) => slowest < distance,
+                (true, LensEnd::BesideNext) => rises(last),
+                (false, _) => fastest > distance,
+            };
+            let slowest_is_above = match (slowest == distance, end) {
+                (true, LensEnd::BesideOther) => !fastest_is_above,
+                (true, LensEnd::BesideNext) => !rises(lens.least),
+                (false, _) => slowest > distance,
+            };
+            [slowest_is_above, fastest_is_above]
+        };
+        let ends = ends_are_above(&lens.upper, lens.motion.af, distance, [slowest, fastest]);
+        lens.upper.solve(distance, lens.least, ends, |least, duration| {
             add(ways, Way { duration, kind: Kind::Lens { lower: false, least } });
         });
-        let ends_are_above = ends_are_above.map(|above| !above);
-        lens.lower.solve(-distance, lens.least, ends_are_above, |least, duration| {
+        let ends = ends_are_above(&lens.lower, lens.motion.a0, -distance, [-slowest, -fastest]);
+        lens.lower.solve(-distance, lens.least, ends, |least, duration| {
             add(ways, Way { duration, kind: Kind::Lens { lower: true, least } });
         });
     }
 
     /// The lens, if there is one.
     pub(super) fn lens(&self) -> Option<Lens> {
-        if self.motion.a0 < 0.0 && self.motion.af < 0.0 { Lens::of(&self.motion.mirrored()) } else { None }
+        if self.motion.a0 < 0.0 && self.motion.af < 0.0 {
+            Lens::of(&self.motion.mirrored(), self.lens_rounding)
+        } else {
+            None
+        }
     }
 
     /// The phases of a way.
@@ -274,11 +294,10 @@ pub(super) struct Lens {
 }
 
 impl Lens {
-    fn of(motion: &Motion) -> Option<Self> {
+    fn of(motion: &Motion, rounding: f64) -> Option<Self> {
         let Motion { v0, a0, vf, af, .. } = motion;
         // Directly up from the one acceleration to the other, the velocity already grows by this much.
         // Often it does so just: then one arc leads from start to target, and rounding must not deny it.
-        let rounding = ROUNDING * (v0.abs() + vf.abs() + a0 * a0 + af * af);
         let exists = vf - v0 >= 0.5 * (af * af - a0 * a0).abs() - rounding;
         exists.then(|| Self::at(motion))
     }
@@ -295,7 +314,7 @@ impl Lens {
     }
 
     /// The distances at the fastest and at the slowest end.
-    fn ends(&self) -> (f64, f64) {
+    pub(super) fn ends(&self) -> (f64, f64) {
         (self.upper.dip(self.motion.af).distance, self.upper.dip(self.least).distance)
     }
 }

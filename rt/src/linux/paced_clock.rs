@@ -1,0 +1,136 @@
+//! The clock of the loop: when a frame must leave on time, it is ready before.
+
+use super::clock::{MonotonicClock, monotonic_ns};
+use super::kernel::is_preempt_rt;
+use super::send_path::SendPath;
+use super::spin_guard::SpinGuard;
+use crate::port::{Clock, Wake};
+use crate::time::Nanoseconds;
+
+/// `CLOCK_MONOTONIC`, waited on by an absolute sleep; where a frame must leave on time
+/// ([`Clock::wait_to_send`]) the sleep ends the guard time earlier, and the rest is a spin.
+///
+/// A thread woken by the timer is late by the kernel's latency. On a PREEMPT_RT kernel it may then have to wait for the
+/// locks that sending takes; that is done before the spin, so that the guard time absorbs both, and what remains is the
+/// spin's own granularity of some ten nanoseconds.
+#[derive(Debug)]
+pub struct PacedClock {
+    clock: MonotonicClock,
+    guard: Guard,
+    send_path: Option<SendPath>,
+}
+
+#[derive(Debug)]
+#[expect(clippy::large_enum_variant, reason = "there is one, and no allocator to put it elsewhere")]
+enum Guard {
+    Fixed { guard_ns: Nanoseconds },
+    Measured { latencies: SpinGuard },
+}
+
+impl PacedClock {
+    /// With a guard time of `guard_ns`; with 0 it only sleeps.
+    pub fn fixed(guard_ns: Nanoseconds) -> Self {
+        Self::new(Guard::Fixed { guard_ns }, guard_ns > 0)
+    }
+
+    /// With a guard time that follows what each wait to send turns out to need, `cap_ns` at most. The first waits only
+    /// sleep: make some before it matters.
+    pub fn measured(cap_ns: Nanoseconds) -> Self {
+        Self::new(Guard::Measured { latencies: SpinGuard::new(cap_ns) }, cap_ns > 0)
+    }
+
+    /// Other kernels have no such locks. Without CAN there is nothing to walk.
+    fn new(guard: Guard, has_spin: bool) -> Self {
+        let has_locks = has_spin && is_preempt_rt();
+        let send_path = has_locks.then(SendPath::new).and_then(Result::ok);
+        Self { clock: MonotonicClock::default(), guard, send_path }
+    }
+
+    /// How long before an instant of sending the sleep ends.
+    pub fn guard_ns(&self) -> Nanoseconds {
+        match &self.guard {
+            Guard::Fixed { guard_ns } => *guard_ns,
+            Guard::Measured { latencies } => latencies.guard_ns(),
+        }
+    }
+}
+
+impl Clock for PacedClock {
+    fn now_ns(&mut self) -> Nanoseconds {
+        monotonic_ns()
+    }
+
+    fn wait_until(&mut self, deadline_ns: Nanoseconds) -> Wake {
+        self.clock.wait_until(deadline_ns)
+    }
+
+    fn wait_to_send(&mut self, deadline_ns: Nanoseconds) -> Wake {
+        let timer_ns = deadline_ns.saturating_sub(self.guard_ns());
+        let has_time_to_sleep = monotonic_ns() < timer_ns;
+        let mut wake = self.clock.wait_until(timer_ns);
+        if let Some(path) = &self.send_path {
+            path.walk();
+            wake.now_ns = monotonic_ns();
+        }
+        if let Guard::Measured { latencies } = &mut self.guard
+            && has_time_to_sleep
+        {
+            latencies.record(wake.now_ns.saturating_sub(timer_ns));
+        }
+        while wake.now_ns < deadline_ns {
+            core::hint::spin_loop();
+            wake.now_ns = monotonic_ns();
+        }
+        wake
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use super::*;
+    use crate::time::NANOSECONDS_PER_SECOND;
+
+    #[test]
+    fn no_wait_ends_early_with_any_guard() {
+        let fixed = [0, 1, 20_000, 200_000, 5_000_000, u64::MAX].map(PacedClock::fixed);
+        let measured = [0, 1, 100_000].map(PacedClock::measured);
+        for mut clock in fixed.into_iter().chain(measured) {
+            for step_ns in [0, 1, 999, 50_000, 300_000, 1_000_000] {
+                let deadline_ns = clock.now_ns() + step_ns;
+                assert!(clock.wait_to_send(deadline_ns).now_ns >= deadline_ns, "{clock:?}, step {step_ns}");
+                let deadline_ns = clock.now_ns() + step_ns;
+                assert!(clock.wait_until(deadline_ns).now_ns >= deadline_ns, "{clock:?}, step {step_ns}");
+            }
+        }
+    }
+
+    #[test]
+    fn with_a_guard_longer_than_the_wait_there_is_only_a_spin() {
+        let mut clock = PacedClock::fixed(60 * NANOSECONDS_PER_SECOND);
+        let deadline_ns = clock.now_ns() + 100_000;
+        let wake = clock.wait_to_send(deadline_ns);
+        assert_eq!(wake.timer_latency_ns, 0);
+        assert!(wake.now_ns >= deadline_ns);
+    }
+
+    #[test]
+    fn without_a_guard_the_timer_latency_is_the_whole_lateness() {
+        let mut clock = PacedClock::fixed(0);
+        let deadline_ns = clock.now_ns() + 2_000_000;
+        let wake = clock.wait_to_send(deadline_ns);
+        assert_eq!(wake.now_ns - deadline_ns, wake.timer_latency_ns);
+    }
+
+    #[test]
+    fn a_measured_guard_comes_from_the_waits_to_send_alone() {
+        let cap_ns = 200_000;
+        let mut clock = PacedClock::measured(cap_ns);
+        let deadline_ns = clock.now_ns() + 1_000_000;
+        clock.wait_until(deadline_ns);
+        assert_eq!(clock.guard_ns(), 0);
+        let deadline_ns = clock.now_ns() + 1_000_000;
+        clock.wait_to_send(deadline_ns);
+        assert!(clock.guard_ns() > 0 && clock.guard_ns() <= cap_ns);
+    }
+}

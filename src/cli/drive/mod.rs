@@ -1,0 +1,90 @@
+//! `takt drive`: commissioning of a single drive.
+
+mod inspection;
+mod motion;
+mod output;
+mod session;
+mod target;
+mod upkeep;
+
+use clap::{Args, Subcommand};
+
+use takt::commission::{Failure, Request, Subject};
+
+use super::exit::Exit;
+
+/// Commission one drive: look at it, move it, set it up
+///
+/// The drive is an axis of a configuration (`takt drive CONFIG AXIS …`; the axis may be left out where there is only
+/// one), or a node on an interface (`takt drive --bus can0 --node 1 --family erob-canopen …`), of which no limits are
+/// known. Values have a unit and are the joint's ("90 deg", "20 deg/s"); with --raw they are whole numbers of the
+/// drive's own. Every motion ends at rest without torque, also after Ctrl-C, unless --keep-enabled is given.
+#[derive(Args, Debug)]
+#[command(subcommand_value_name = "ACTION", subcommand_help_heading = "Actions")]
+pub struct Arguments {
+    #[command(flatten)]
+    target: target::Target,
+    #[command(flatten)]
+    options: Options,
+    #[command(subcommand)]
+    action: Action,
+}
+
+/// What every action knows.
+#[derive(Args, Clone, Copy, Debug)]
+struct Options {
+    /// Values are whole numbers of the drive's own units
+    #[arg(long, global = true)]
+    raw: bool,
+    /// Show every step and every frame with its meaning
+    #[arg(short, long, global = true)]
+    verbose: bool,
+    /// Print the result as one JSON object (watch: one for each reading)
+    #[arg(long, global = true)]
+    json: bool,
+    /// Let the time of a simulated bus run as fast as it can
+    #[arg(long, global = true)]
+    fast: bool,
+}
+
+#[derive(Subcommand, Debug)]
+enum Action {
+    #[command(flatten)]
+    Inspect(inspection::Action),
+    #[command(flatten)]
+    Motion(motion::Action),
+    #[command(flatten)]
+    Upkeep(upkeep::Action),
+}
+
+impl Action {
+    /// Its name on the command line.
+    const fn name(&self) -> &'static str {
+        match self {
+            Self::Inspect(action) => action.name(),
+            Self::Motion(action) => action.name(),
+            Self::Upkeep(action) => action.name(),
+        }
+    }
+
+    fn request(&self, subject: &Subject, is_raw: bool) -> Result<Request, Failure> {
+        match self {
+            Self::Inspect(action) => action.request(subject, is_raw),
+            Self::Motion(action) => action.request(subject, is_raw),
+            Self::Upkeep(action) => action.request(is_raw),
+        }
+    }
+}
+
+/// Does it.
+pub fn run(arguments: &Arguments) -> Exit {
+    let (subject, bus) = match arguments.target.resolve() {
+        Ok(resolved) => resolved,
+        Err(exit) => return exit,
+    };
+    let mut output = output::Output::new(&subject, arguments.action.name(), arguments.options);
+    match arguments.action.request(&subject, arguments.options.raw) {
+        Ok(request) => session::run(subject, request, bus, arguments.options, output),
+        Err(failure) => output.refuse(&failure),
+    }
+}

@@ -1,0 +1,249 @@
+//! `takt drive … enable | disable | move | velocity | torque | home`
+
+use std::time::Duration;
+
+use clap::{Args, Subcommand, ValueEnum};
+
+use takt::commission::amount::{self, AmountError};
+use takt::commission::{Amount, Course, Failure, Pace, Request, Subject};
+use takt::config::Quantity;
+
+use super::super::configuration;
+
+/// Moving a drive.
+#[derive(Subcommand, Debug)]
+pub enum Action {
+    /// Torque on at the present position, held until Ctrl-C (or left on with --keep-enabled)
+    Enable(Enable),
+    /// Stop in control, then torque off
+    Disable,
+    /// Move: absolute, relative, reciprocate, continuous
+    Move(Move),
+    /// Run at a velocity until Ctrl-C
+    Velocity(Velocity),
+    /// Apply a torque until Ctrl-C, with an eye on the velocity
+    Torque(Torque),
+    /// Find the home position
+    Home(Home),
+}
+
+#[derive(Args, Debug)]
+pub struct Enable {
+    /// Hold for this many seconds
+    #[arg(long, value_name = "S", value_parser = configuration::seconds)]
+    duration: Option<Duration>,
+    /// Leave the torque on
+    #[arg(long, conflicts_with = "duration")]
+    keep_enabled: bool,
+}
+
+#[derive(Args, Debug)]
+pub struct Move {
+    #[command(subcommand)]
+    course: CourseArguments,
+}
+
+#[derive(Subcommand, Debug)]
+enum CourseArguments {
+    /// To a position
+    Absolute {
+        /// "90 deg", "0.2 m"; --raw: counts
+        #[arg(allow_hyphen_values = true)]
+        position: String,
+        /// Let the drive take the target over at once (controlword bit 5; a YZ-AIM always does)
+        #[arg(long)]
+        immediate: bool,
+        #[command(flatten)]
+        pace: PaceArguments,
+    },
+    /// By a distance
+    Relative {
+        /// "-5 deg"; --raw: counts
+        #[arg(allow_hyphen_values = true)]
+        distance: String,
+        #[command(flatten)]
+        pace: PaceArguments,
+    },
+    /// To a position and back
+    Reciprocate {
+        /// "90 deg", "0.2 m"; --raw: counts
+        #[arg(allow_hyphen_values = true)]
+        position: String,
+        /// So many times
+        #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+        times: u32,
+        /// Seconds of standstill at each end
+        #[arg(long, value_name = "S", value_parser = configuration::seconds)]
+        dwell: Option<Duration>,
+        #[command(flatten)]
+        pace: PaceArguments,
+    },
+    /// On and on in one direction, until Ctrl-C or a limit
+    Continuous {
+        /// Which way
+        direction: Direction,
+        /// Stop after this many seconds
+        #[arg(long, value_name = "S", value_parser = configuration::seconds)]
+        duration: Option<Duration>,
+        #[command(flatten)]
+        pace: PaceArguments,
+    },
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Direction {
+    Forward,
+    Backward,
+}
+
+/// How fast. What is not given is a tenth of the axis' limit, or what the drive has where no limits are known.
+#[derive(Args, Debug)]
+struct PaceArguments {
+    /// Profile velocity: "20 deg/s" [default: a tenth of the axis' limit]
+    #[arg(long, value_name = "V")]
+    velocity: Option<String>,
+    #[command(flatten)]
+    ramps: RampArguments,
+    /// Leave the torque on at the end
+    #[arg(long)]
+    keep_enabled: bool,
+}
+
+#[derive(Args, Debug)]
+struct RampArguments {
+    /// Profile acceleration: "90 deg/s^2" [default: a tenth of the axis' limit]
+    #[arg(long, value_name = "A")]
+    acceleration: Option<String>,
+    /// Profile deceleration [default: a tenth of the axis' limit]
+    #[arg(long, value_name = "A")]
+    deceleration: Option<String>,
+}
+
+#[derive(Args, Debug)]
+pub struct Velocity {
+    /// "-10 deg/s"; --raw: the drive's unit
+    #[arg(allow_hyphen_values = true)]
+    velocity: String,
+    /// Stop after this many seconds
+    #[arg(long, value_name = "S", value_parser = configuration::seconds)]
+    duration: Option<Duration>,
+    #[command(flatten)]
+    ramps: RampArguments,
+    /// Leave the torque on at the end, at standstill
+    #[arg(long)]
+    keep_enabled: bool,
+}
+
+#[derive(Args, Debug)]
+pub struct Torque {
+    /// "2.5 Nm"; --raw: per mille of the rated torque
+    #[arg(allow_hyphen_values = true)]
+    torque: String,
+    /// Faster than this the axis is stopped: "10 deg/s" [default: a quarter of the axis' limit]
+    #[arg(long, value_name = "V")]
+    max_velocity: Option<String>,
+    /// End after this many seconds
+    #[arg(long, value_name = "S", value_parser = configuration::seconds)]
+    duration: Option<Duration>,
+}
+
+#[derive(Args, Debug)]
+pub struct Home {
+    /// Homing method (object 6098)
+    #[arg(long, value_name = "N", allow_hyphen_values = true)]
+    method: Option<i8>,
+    /// Give up and stop after this many seconds
+    #[arg(long, value_name = "S", default_value = "60", value_parser = configuration::seconds)]
+    within: Duration,
+    /// Try a method that the drive's manual does not describe
+    #[arg(long)]
+    force: bool,
+}
+
+impl Action {
+    /// Its name on the command line.
+    pub const fn name(&self) -> &'static str {
+        match self {
+            Self::Enable(_) => "enable",
+            Self::Disable => "disable",
+            Self::Move(_) => "move",
+            Self::Velocity(_) => "velocity",
+            Self::Torque(_) => "torque",
+            Self::Home(_) => "home",
+        }
+    }
+
+    /// What is asked of the drive.
+    pub fn request(&self, subject: &Subject, is_raw: bool) -> Result<Request, Failure> {
+        let read = |text: &str, quantity| read(text, quantity, is_raw);
+        Ok(match self {
+            Self::Enable(enable) => {
+                Request::Enable { hold_ns: nanoseconds(enable.duration), keeps_enabled: enable.keep_enabled }
+            }
+            Self::Disable => Request::Disable,
+            Self::Move(arguments) => arguments.course.request(subject, is_raw)?,
+            Self::Velocity(arguments) => Request::Velocity {
+                velocity: read(&arguments.velocity, subject.velocity_quantity())?,
+                pace: arguments.ramps.pace(subject, None, is_raw)?,
+                duration_ns: nanoseconds(arguments.duration),
+                keeps_enabled: arguments.keep_enabled,
+            },
+            Self::Torque(arguments) => Request::Torque {
+                torque: read(&arguments.torque, subject.effort_quantity())?,
+                velocity_limit: optional(&arguments.max_velocity, subject.velocity_quantity(), is_raw)?,
+                duration_ns: nanoseconds(arguments.duration),
+            },
+            Self::Home(arguments) => Request::Home {
+                method: arguments.method,
+                within_ns: arguments.within.as_nanos() as u64,
+                is_forced: arguments.force,
+            },
+        })
+    }
+}
+
+impl CourseArguments {
+    fn request(&self, subject: &Subject, is_raw: bool) -> Result<Request, Failure> {
+        let position = subject.position_quantity();
+        let (course, pace) = match self {
+            Self::Absolute { position: to, immediate, pace } => {
+                (Course::Absolute { to: read(to, position, is_raw)?, is_immediate: *immediate }, pace)
+            }
+            Self::Relative { distance, pace } => (Course::Relative(read(distance, position, is_raw)?), pace),
+            Self::Reciprocate { position: to, times, dwell, pace } => {
+                let dwell_ns = nanoseconds(*dwell).unwrap_or(0);
+                (Course::Reciprocate { to: read(to, position, is_raw)?, times: *times, dwell_ns }, pace)
+            }
+            Self::Continuous { direction, duration, pace } => {
+                let is_forward = matches!(direction, Direction::Forward);
+                (Course::Continuous { is_forward, duration_ns: nanoseconds(*duration) }, pace)
+            }
+        };
+        let keeps_enabled = pace.keep_enabled;
+        let pace = pace.ramps.pace(subject, pace.velocity.as_ref(), is_raw)?;
+        Ok(Request::Move { course, pace, keeps_enabled })
+    }
+}
+
+impl RampArguments {
+    fn pace(&self, subject: &Subject, velocity: Option<&String>, is_raw: bool) -> Result<Pace, Failure> {
+        let acceleration = subject.acceleration_quantity();
+        Ok(Pace {
+            velocity: velocity.map(|text| read(text, subject.velocity_quantity(), is_raw)).transpose()?,
+            acceleration: optional(&self.acceleration, acceleration, is_raw)?,
+            deceleration: optional(&self.deceleration, acceleration, is_raw)?,
+        })
+    }
+}
+
+fn nanoseconds(duration: Option<Duration>) -> Option<u64> {
+    duration.map(|duration| duration.as_nanos() as u64)
+}
+
+fn read(text: &str, quantity: Quantity, is_raw: bool) -> Result<Amount, Failure> {
+    amount::parse(text, quantity, is_raw).map_err(|error: AmountError| Failure::Unsuitable(error.to_string()))
+}
+
+fn optional(text: &Option<String>, quantity: Quantity, is_raw: bool) -> Result<Option<Amount>, Failure> {
+    text.as_ref().map(|text| read(text, quantity, is_raw)).transpose()
+}

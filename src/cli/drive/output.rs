@@ -1,0 +1,204 @@
+//! What is shown while a procedure runs, and in the end.
+
+use std::io::{IsTerminal, Write, stderr, stdout};
+
+use indicatif::{ProgressBar, ProgressStyle};
+use serde::Serialize;
+use serde_json::json;
+
+use takt::commission::bus_session::Seen;
+use takt::commission::{Event, Failed, Failure, Reading, Report, Subject, meaning};
+use takt_rt::frame::Frame;
+use takt_rt::time::Nanoseconds;
+
+use super::super::exit::Exit;
+use super::Options;
+
+/// Where everything that is to be shown goes.
+pub struct Output {
+    subject: Subject,
+    action: &'static str,
+    options: Options,
+    line: ProgressBar,
+    step: &'static str,
+    notes: Vec<String>,
+}
+
+#[derive(Serialize)]
+struct Printed<'a> {
+    axis: &'a str,
+    node: u8,
+    family: &'static str,
+    action: &'static str,
+    /// `done`, `interrupted`, `refused` or `failed`.
+    ended: &'static str,
+    /// The step that failed.
+    step: Option<&'static str>,
+    failure: Option<String>,
+    advice: Option<&'static str>,
+    notes: &'a [String],
+    result: Option<&'a Report>,
+}
+
+impl Output {
+    /// For one action on one drive.
+    pub fn new(subject: &Subject, action: &'static str, options: Options) -> Self {
+        let line = if stderr().is_terminal() && !options.verbose {
+            let line = ProgressBar::new_spinner();
+            if let Ok(style) = ProgressStyle::with_template("{prefix}  {wide_msg}") {
+                line.set_style(style);
+            }
+            line.set_prefix(subject.name.clone());
+            line
+        } else {
+            ProgressBar::hidden()
+        };
+        Self { subject: subject.clone(), action, options, line, step: "", notes: vec![] }
+    }
+
+    /// Shows something that has just happened.
+    pub fn see(&mut self, at_ns: Nanoseconds, seen: Seen) {
+        match seen {
+            Seen::Event(Event::Step(name)) => {
+                self.step = name;
+                self.line.set_message(name);
+                if self.options.verbose {
+                    eprintln!("{} ── {name}", seconds(at_ns));
+                }
+            }
+            Seen::Event(Event::Note(text)) => self.hint(&text),
+            Seen::Event(Event::Reading(reading)) => self.read(at_ns, &reading),
+            Seen::Sent(frame) => self.frame(at_ns, '>', &frame),
+            Seen::Received(frame) => self.frame(at_ns, '<', &frame),
+        }
+    }
+
+    /// Says something that people should know.
+    pub fn hint(&mut self, text: &str) {
+        self.notes.push(text.to_owned());
+        if !self.options.json {
+            self.line.suspend(|| eprintln!("note: {text}"));
+        }
+    }
+
+    fn frame(&self, at_ns: Nanoseconds, direction: char, frame: &Frame) {
+        if self.options.verbose {
+            let (frame, words) = (format!("{frame:?}"), meaning::of(&self.subject, frame));
+            eprintln!("{} {direction} {frame:<21}  {words}", seconds(at_ns));
+        }
+    }
+
+    fn read(&self, at_ns: Nanoseconds, reading: &Reading) {
+        let is_watched = self.action == "watch";
+        if is_watched && self.options.json {
+            print(&format!("{}\n", self.reading_json(at_ns, reading)));
+        } else if is_watched && self.line.is_hidden() {
+            print(&format!("{}  {}\n", seconds(at_ns), self.reading_words(reading)));
+        } else {
+            self.line.set_message(format!("{}: {}", self.step, self.reading_words(reading)));
+        }
+    }
+
+    fn reading_json(&self, at_ns: Nanoseconds, reading: &Reading) -> serde_json::Value {
+        json!({
+            "time_s": at_ns as f64 / 1e9, "position": reading.position,
+            "position_counts": reading.position_counts, "velocity": reading.velocity,
+            "torque": reading.torque, "current_a": reading.current_a,
+            "statusword": reading.statusword, "state": reading.state,
+        })
+    }
+
+    fn reading_words(&self, reading: &Reading) -> String {
+        let position = self.subject.position_quantity().show(reading.position);
+        let velocity = self.subject.velocity_quantity().show(reading.velocity);
+        let mut words = format!("{position}  {velocity}");
+        if let Some(torque) = reading.torque {
+            words = format!("{words}  {}", self.subject.effort_quantity().show(torque));
+        }
+        if let Some(current) = reading.current_a {
+            words = format!("{words}  {current:.3} A");
+        }
+        format!("{words}  0x{:04X} {}", reading.statusword, reading.state)
+    }
+
+    /// Nothing was begun.
+    pub fn refuse(&mut self, failure: &Failure) -> Exit {
+        self.finish(&Err(Failed { step: "command line", failure: failure.clone() }))
+    }
+
+    /// Shows how it has ended.
+    pub fn finish(&mut self, outcome: &Result<Report, Failed>) -> Exit {
+        self.line.finish_and_clear();
+        let (ended, exit) = match outcome {
+            Ok(_) => ("done", Exit::Done),
+            Err(Failed { failure: Failure::Interrupted, .. }) => ("interrupted", Exit::Interrupted),
+            Err(failed) if failed.failure.is_refusal() => ("refused", Exit::Usage),
+            Err(_) => ("failed", Exit::Stopped),
+        };
+        if self.options.json {
+            self.finish_json(outcome, ended);
+        } else {
+            match outcome {
+                Ok(report) => print(&picture(report)),
+                Err(failed) => self.say_failed(failed),
+            }
+        }
+        exit
+    }
+
+    fn finish_json(&self, outcome: &Result<Report, Failed>, ended: &'static str) {
+        let failed = outcome.as_ref().err();
+        // A watch has printed its readings, one object each; only what went wrong is left to say.
+        if self.action == "watch" && failed.is_none_or(|failed| failed.failure == Failure::Interrupted) {
+            return;
+        }
+        let printed = Printed {
+            axis: &self.subject.name,
+            node: self.subject.node,
+            family: self.subject.family.word(),
+            action: self.action,
+            ended,
+            step: failed.map(|failed| failed.step),
+            failure: failed.map(|failed| failed.failure.to_string()),
+            advice: failed.and_then(|failed| failed.failure.advice()),
+            notes: &self.notes,
+            result: outcome.as_ref().ok(),
+        };
+        match serde_json::to_string(&printed) {
+            Ok(json) => print(&format!("{json}\n")),
+            Err(error) => eprintln!("takt: the result cannot be written as JSON: {error}"),
+        }
+    }
+
+    fn say_failed(&self, failed: &Failed) {
+        let name = &self.subject.name;
+        match &failed.failure {
+            Failure::Interrupted if self.action == "watch" => {}
+            Failure::Interrupted => eprintln!("takt: {name}: interrupted in `{}`", failed.step),
+            failure => {
+                // What is refused before the first word with the drive has no step.
+                let step = if failure.is_refusal() { String::new() } else { format!(", {}", failed.step) };
+                eprintln!("takt: {name}{step}: {failure}");
+                if let Some(advice) = failure.advice() {
+                    eprintln!("  try: {advice}");
+                }
+            }
+        }
+    }
+}
+
+fn seconds(at_ns: Nanoseconds) -> String {
+    format!("{:11.6}", at_ns as f64 / 1e9)
+}
+
+/// A reader that has seen enough (`| head`) is no failure.
+fn print(text: &str) {
+    let _ = stdout().write_all(text.as_bytes());
+}
+
+fn picture(report: &Report) -> String {
+    let findings = report.findings();
+    let width = findings.iter().map(|finding| finding.label.chars().count()).max().unwrap_or(0);
+    let lines = findings.iter().map(|finding| format!("  {:<width$}  {}\n", finding.label, finding.text));
+    lines.collect()
+}

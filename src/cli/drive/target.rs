@@ -1,0 +1,137 @@
+//! Which drive: an axis of a configuration, or a node on an interface.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+
+use takt::commission::{Family, Subject};
+use takt::config::{Config, Interface, Quantity};
+
+use super::super::configuration;
+use super::super::exit::Exit;
+
+/// The drive.
+#[derive(Args, Debug)]
+pub struct Target {
+    /// The configuration (TOML)
+    config: Option<PathBuf>,
+    /// The axis, by its name; may be left out where there is only one
+    axis: Option<String>,
+    /// The interface: can0, vcan0 …; with a configuration also NAME=INTERFACE or sim
+    #[arg(long, value_name = "INTERFACE", global = true)]
+    bus: Option<String>,
+    /// The node number
+    #[arg(long, value_name = "N", global = true, value_parser = clap::value_parser!(u8).range(1..=127))]
+    node: Option<u8>,
+    /// The family: erob-canopen, yz-aim
+    #[arg(long, value_name = "FAMILY", global = true, value_parser = family)]
+    family: Option<Family>,
+    /// The bit rate of an interface without a configuration
+    #[arg(long, value_name = "RATE", global = true, value_parser = bit_rate, default_value = "1 Mbit/s")]
+    bit_rate: u32,
+}
+
+fn bit_rate(text: &str) -> Result<u32, String> {
+    let rate = Quantity::BIT_RATE.parse(text).ok().filter(|rate| (10_000.0..=1_000_000.0).contains(rate));
+    rate.map(|rate| rate as u32).ok_or_else(|| "write it as \"500 kbit/s\", at most 1 Mbit/s".to_owned())
+}
+
+/// Where the drive's bus is.
+pub enum Bus {
+    /// A bus of a configuration.
+    Configured {
+        /// The configuration.
+        config: Box<Config>,
+        /// The index of the bus.
+        bus: usize,
+    },
+    /// An interface of this machine.
+    Interface {
+        /// Its name.
+        name: String,
+        /// bit/s
+        bit_rate: u32,
+    },
+}
+
+fn family(text: &str) -> Result<Family, String> {
+    let known = || Family::ALL.map(Family::word).join(", ");
+    Family::ALL
+        .into_iter()
+        .find(|family| family.word() == text)
+        .ok_or_else(|| format!("the families are {}", known()))
+}
+
+fn refuse(text: &str) -> Exit {
+    eprintln!("takt: {text}");
+    Exit::Usage
+}
+
+impl Target {
+    /// The drive and its bus. What is wrong is printed.
+    pub fn resolve(&self) -> Result<(Subject, Bus), Exit> {
+        let (subject, bus) = match &self.config {
+            Some(config) => self.of_configuration(config)?,
+            None => self.of_interface()?,
+        };
+        Ok((subject, bus))
+    }
+
+    fn of_interface(&self) -> Result<(Subject, Bus), Exit> {
+        let (Some(bus), Some(node), Some(family)) = (&self.bus, self.node, self.family) else {
+            return Err(refuse(
+                "name the drive: CONFIG AXIS, or --bus INTERFACE --node N --family FAMILY (all three)",
+            ));
+        };
+        let interface = bus.parse::<Interface>();
+        match interface {
+            Ok(Interface::SocketCan(name)) => {
+                let subject = Subject::unconfigured(node, family)
+                    .map_err(|error| refuse(&format!("the units cannot be converted ({error:?})")))?;
+                Ok((subject, Bus::Interface { name, bit_rate: self.bit_rate }))
+            }
+            Ok(Interface::Simulated) => Err(refuse(
+                "a simulated drive needs a configuration that says what it is: takt drive CONFIG AXIS …",
+            )),
+            Err(error) => Err(refuse(&format!("--bus {bus}: {error}: {}", error.help()))),
+        }
+    }
+
+    fn of_configuration(&self, path: &Path) -> Result<(Subject, Bus), Exit> {
+        let mut config = configuration::load(path, &[])?;
+        let known: Vec<&str> = config.axes.iter().map(|axis| axis.name.as_str()).collect();
+        let index = match (&self.axis, known.as_slice()) {
+            (None, [_]) => Some(0),
+            (None, _) => None,
+            (Some(name), _) => known.iter().position(|axis| axis == name),
+        };
+        let Some(axis) = index.and_then(|index| config.axes.get(index)).cloned() else {
+            let problem = match &self.axis {
+                Some(name) => format!("there is no axis {name:?}"),
+                None => "say which axis".to_owned(),
+            };
+            return Err(refuse(&format!("{problem}; the axes are: {}", known.join(", "))));
+        };
+        if let Some(bus) = &self.bus {
+            let own = config.buses.get(axis.bus).map(|bus| bus.name.clone()).unwrap_or_default();
+            let (name, interface) = bus.split_once('=').unwrap_or((&own, bus));
+            config
+                .override_interface(name, interface)
+                .map_err(|error| refuse(&format!("--bus {bus}: {error}")))?;
+        }
+        let mut subject = Subject::of(&axis).map_err(|error| {
+            refuse(&format!("axis {}: its units cannot be converted ({error:?})", axis.name))
+        })?;
+        if let Some(family) = self.family.filter(|family| *family != subject.family) {
+            return Err(refuse(&format!(
+                "the axis {} is configured as {}, not {}",
+                axis.name,
+                subject.family.word(),
+                family.word()
+            )));
+        }
+        // A drive that still has its factory's number is reached under that one.
+        subject.node = self.node.unwrap_or(subject.node);
+        Ok((subject, Bus::Configured { config: Box::new(config), bus: axis.bus }))
+    }
+}

@@ -1,0 +1,134 @@
+//! `takt drive … zero | save | set-id | set-bitrate | clear-fault | gains | gear | auto-home | interpolation`
+
+use clap::{Args, Subcommand, ValueEnum};
+
+use takt::commission::{Failure, Request};
+use takt::config::Quantity;
+
+/// Setting a drive up.
+#[derive(Subcommand, Debug)]
+pub enum Action {
+    /// Make the present position the encoder's zero (eRob: clear the count of turns)
+    Zero(Agreement),
+    /// Store the parameters in the drive
+    Save,
+    /// Give the drive another node number
+    SetId {
+        /// The new node number
+        #[arg(value_parser = clap::value_parser!(u8).range(1..=127))]
+        id: u8,
+    },
+    /// Give the drive another bit rate
+    #[command(name = "set-bitrate")]
+    SetBitRate {
+        /// "500 kbit/s"
+        rate: String,
+    },
+    /// Clear the fault or alarm that the drive is in
+    ClearFault(Agreement),
+    /// Read the gains of the loops, or change some (YZ-AIM)
+    Gains(Gains),
+    /// Read the electronic gear of the pulse input, or change it (YZ-AIM)
+    Gear {
+        /// Numerator:denominator, reduced: "4:1"
+        #[arg(value_parser = ratio)]
+        ratio: Option<(u16, u16)>,
+    },
+    /// Whether the drive moves to its multi-turn zero by itself at power-up (YZ-AIM)
+    AutoHome {
+        /// On or off
+        switch: Switch,
+        #[command(flatten)]
+        agreement: Agreement,
+    },
+    /// Set the drive up for interpolated position over the bus, and store it (YZ-AIM)
+    Interpolation,
+}
+
+#[derive(Args, Clone, Copy, Debug)]
+pub struct Agreement {
+    /// Agree to what cannot be undone
+    #[arg(long)]
+    yes: bool,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum Switch {
+    On,
+    Off,
+}
+
+#[derive(Args, Debug)]
+pub struct Gains {
+    /// Position loop, proportional (60FB:01): 60 to 30000
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(60..=30_000))]
+    position_proportional: Option<u16>,
+    /// Velocity loop, proportional (60F9:01): 0 to 10000 thousandths
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(0..=10_000))]
+    velocity_proportional: Option<u16>,
+    /// Velocity loop, integration time (60F9:02): 2 to 2000 ms
+    #[arg(long, value_name = "MS", value_parser = clap::value_parser!(u16).range(2..=2_000))]
+    velocity_integration: Option<u16>,
+}
+
+/// A bit rate of CAN, 10 kbit/s to 1 Mbit/s.
+fn bit_rate(text: &str, is_raw: bool) -> Result<u32, Failure> {
+    let unsuitable = || {
+        Failure::Unsuitable(format!(
+            "`{text}` is no bit rate: write for example \"{}\"",
+            Quantity::BIT_RATE.example
+        ))
+    };
+    let rate = if is_raw {
+        text.parse::<f64>().map_err(|_| unsuitable())?
+    } else {
+        Quantity::BIT_RATE.parse(text).map_err(|_| unsuitable())?
+    };
+    let is_possible = (10_000.0..=1_000_000.0).contains(&rate) && rate.fract() == 0.0;
+    if is_possible { Ok(rate as u32) } else { Err(unsuitable()) }
+}
+
+fn ratio(text: &str) -> Result<(u16, u16), String> {
+    let wrong = || "write it as NUMERATOR:DENOMINATOR, both 1 to 65535, for example 4:1".to_owned();
+    let (numerator, denominator) = text.split_once(':').ok_or_else(wrong)?;
+    let number = |text: &str| text.trim().parse::<u16>().ok().filter(|number| *number > 0);
+    number(numerator).zip(number(denominator)).ok_or_else(wrong)
+}
+
+impl Action {
+    /// Its name on the command line.
+    pub const fn name(&self) -> &'static str {
+        match self {
+            Self::Zero(_) => "zero",
+            Self::Save => "save",
+            Self::SetId { .. } => "set-id",
+            Self::SetBitRate { .. } => "set-bitrate",
+            Self::ClearFault(_) => "clear-fault",
+            Self::Gains(_) => "gains",
+            Self::Gear { .. } => "gear",
+            Self::AutoHome { .. } => "auto-home",
+            Self::Interpolation => "interpolation",
+        }
+    }
+
+    /// What is asked of the drive.
+    pub fn request(&self, is_raw: bool) -> Result<Request, Failure> {
+        Ok(match self {
+            Self::Zero(agreement) => Request::Zero { is_agreed: agreement.yes },
+            Self::Save => Request::Save,
+            Self::SetId { id } => Request::SetId { node: *id },
+            Self::SetBitRate { rate } => Request::SetBitRate { bit_rate: bit_rate(rate, is_raw)? },
+            Self::ClearFault(agreement) => Request::ClearFault { is_agreed: agreement.yes },
+            Self::Gains(gains) => Request::Gains {
+                position_proportional: gains.position_proportional.map(i64::from),
+                velocity_proportional: gains.velocity_proportional.map(i64::from),
+                velocity_integration: gains.velocity_integration.map(i64::from),
+            },
+            Self::Gear { ratio } => Request::Gear { ratio: *ratio },
+            Self::AutoHome { switch, agreement } => {
+                Request::AutoHome { is_on: matches!(switch, Switch::On), is_agreed: agreement.yes }
+            }
+            Self::Interpolation => Request::Interpolation,
+        })
+    }
+}

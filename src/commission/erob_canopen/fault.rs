@@ -1,0 +1,63 @@
+//! Clearing a fault: the rising edge of controlword bit 7, and for the multi-turn battery what goes before it.
+
+use takt_rt::cia402::{State, controlword};
+use takt_rt::time::Nanoseconds;
+
+use super::enabling::state;
+use super::reading::{advice, error_code, in_words, summary};
+use super::upkeep::clear_turns;
+use crate::canopen::objects::*;
+use crate::commission::contact;
+use crate::commission::conversation::Conversation;
+use crate::commission::failure::Failure;
+use crate::commission::report::Report;
+use crate::commission::subject::Subject;
+use crate::drive::erob_canopen::MULTI_TURN_BATTERY;
+
+/// The edge must stay for several cycles of the drive.
+const EDGE_NS: Nanoseconds = 50_000_000;
+/// The fault reaction may still run; then the fault goes.
+const CLEARING_NS: Nanoseconds = 1_000_000_000;
+
+/// `clear-fault`
+pub async fn clear(c: &Conversation, s: &Subject, is_agreed: bool) -> Result<Report, Failure> {
+    contact::reach_family(c, s).await?;
+    c.step("fault");
+    let mut report = Report::new();
+    if !state(c).await?.is_faulted() {
+        report.add("fault", "fault", serde_json::Value::Null, "none, nothing to clear");
+        report.append(summary(c, s).await?);
+        return Ok(report);
+    }
+    let code = error_code(c).await?;
+    report.add("fault", "fault", format!("0x{:04X}", code.0), in_words(code));
+    if code == MULTI_TURN_BATTERY {
+        if !is_agreed {
+            return Err(Failure::NeedsConsent {
+                consequence: "the battery of the multi-turn encoder is empty or was disconnected; clearing this fault \
+                              (2242 = 1) clears the count of turns too, and the joint's zero must be set again",
+                option: "--yes",
+            });
+        }
+        c.step("clear the count of turns");
+        clear_turns(c).await?;
+    }
+    c.step("fault reset");
+    c.write(&CONTROLWORD, controlword::DISABLE_VOLTAGE.into()).await?;
+    c.write(&CONTROLWORD, controlword::FAULT_RESET.into()).await?;
+    c.pause(EDGE_NS).await?;
+    let is_gone = |word: i64| !State::decode(word as u16).is_faulted();
+    let cleared = c.wait_for(&STATUSWORD, "the end of the fault", CLEARING_NS, is_gone).await;
+    c.write(&CONTROLWORD, controlword::DISABLE_VOLTAGE.into()).await?;
+    match cleared {
+        Err(Failure::NotInTime { .. }) => {
+            let code = error_code(c).await?;
+            let known = advice(code).or(Some("remove its cause; if it stays, power-cycle the drive"));
+            return Err(Failure::FaultPersists { what: in_words(code), advice: known });
+        }
+        other => other?,
+    };
+    report.add("cleared", "cleared", true, "yes");
+    report.append(summary(c, s).await?);
+    Ok(report)
+}

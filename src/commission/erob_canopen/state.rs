@@ -1,0 +1,86 @@
+//! Statusword, controlword, modes and errors of an eRob in words.
+
+use takt_rt::cia402::{Command, OperationMode, State, controlword, statusword};
+
+use crate::canopen::emcy::ErrorCode;
+use crate::drive::{erob_canopen, mode_words};
+
+/// What 1010:1 must be given, "save" in the order of the wire.
+pub const SAVE_SIGNATURE: i64 = 0x6576_6173;
+
+/// The state of the drive in words.
+pub const fn state_words(state: State) -> &'static str {
+    match state {
+        State::NotReadyToSwitchOn => "not ready to switch on",
+        State::SwitchOnDisabled => "switch on disabled",
+        State::ReadyToSwitchOn => "ready to switch on",
+        State::SwitchedOn => "switched on",
+        State::OperationEnabled => "operation enabled",
+        State::QuickStopActive => "quick stop active",
+        State::FaultReactionActive => "fault reaction active",
+        State::Fault => "fault",
+        State::Undefined => "undefined",
+    }
+}
+
+/// State and bits of a statusword. Bit 7 and bit 12 are often set without a reason on this drive.
+pub fn statusword_words(word: u16) -> String {
+    let bits = [
+        (statusword::WARNING, "warning"),
+        (statusword::TARGET_REACHED, "target reached"),
+        (statusword::INTERNAL_LIMIT, "internal limit"),
+        (statusword::BIT_13, "following error"),
+    ];
+    let set = bits.iter().filter(|(bit, _)| word & bit != 0).map(|(_, name)| *name);
+    let words: Vec<&str> = std::iter::once(state_words(State::decode(word))).chain(set).collect();
+    words.join(", ")
+}
+
+/// Command and bits of a controlword.
+pub fn controlword_words(word: u16) -> String {
+    let command = match Command::decode(word) {
+        Command::Shutdown => "shutdown",
+        Command::SwitchOn => "switch on",
+        Command::EnableOperation => "enable operation",
+        Command::DisableVoltage => "disable voltage",
+        Command::QuickStop => "quick stop",
+    };
+    let bits = [
+        (controlword::BIT_4, "new set-point"),
+        (controlword::BIT_5, "change immediately"),
+        (controlword::RELATIVE, "relative"),
+        (controlword::FAULT_RESET, "fault reset"),
+        (controlword::HALT, "halt"),
+    ];
+    let set = bits.iter().filter(|(bit, _)| word & bit != 0).map(|(_, name)| *name);
+    std::iter::once(command).chain(set).collect::<Vec<_>>().join(", ")
+}
+
+/// The modes of object 6502.
+pub fn modes_words(supported: u32) -> String {
+    let modes = OperationMode::ALL.into_iter().filter(|mode| supported & mode.supported_bit() != 0);
+    modes.map(mode_words).collect::<Vec<_>>().join(", ")
+}
+
+/// An error code in words.
+pub fn error_words(code: u16) -> &'static str {
+    erob_canopen::error_words(ErrorCode(code))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_of_status_and_control_are_read_by_their_masks() {
+        assert_eq!(statusword_words(0x16B7), "operation enabled, warning, target reached");
+        assert_eq!(statusword_words(0x1208), "fault");
+        assert_eq!(controlword_words(0x1F), "enable operation, new set-point");
+        assert_eq!(controlword_words(0x06), "shutdown");
+        assert_eq!(
+            modes_words(909),
+            "profile position, profile velocity, profile torque, cyclic synchronous position, \
+             cyclic synchronous velocity, cyclic synchronous torque"
+        );
+    }
+}

@@ -1,0 +1,116 @@
+//! Reading and writing any object.
+
+use serde_json::json;
+
+use super::contact;
+use super::conversation::{Conversation, number};
+use super::dictionary::{Entry, Permission};
+use super::failure::Failure;
+use super::report::Report;
+use super::request::ReadObject;
+use super::subject::Subject;
+use crate::canopen::object::Object;
+use crate::canopen::sdo::Uploaded;
+
+/// Reads objects, one after the other.
+pub async fn read(c: &Conversation, subject: &Subject, objects: &[ReadObject]) -> Result<Report, Failure> {
+    contact::reach(c, subject).await?;
+    c.step("read");
+    let mut values = vec![];
+    let mut report = Report::new();
+    for wanted in objects {
+        let address = wanted.address;
+        let uploaded =
+            c.upload(address).await?.map_err(|error| Failure::TextTransfer { object: address, error })?;
+        let object = wanted.data_type.map_or(wanted.entry.map(|entry| entry.object), |data_type| {
+            Some(Object {
+                address,
+                data_type,
+                name: wanted.entry.map_or("object", |entry| entry.object.name),
+            })
+        });
+        let Some(object) = object else {
+            let text = bytes_in_words(&uploaded);
+            values.push(json!({ "object": address.to_string(), "bytes": uploaded.bytes }));
+            report.add("", &address.to_string(), serde_json::Value::Null, text);
+            continue;
+        };
+        // A type that was told must be that of what comes; the table's is only a guess of the length.
+        let value = match wanted.data_type {
+            Some(data_type) => uploaded
+                .number(data_type)
+                .ok_or(Failure::Length { object, received: uploaded.bytes.len() })?,
+            None => number(&object, &uploaded)?,
+        };
+        let physical = wanted.entry.and_then(|entry| entry.physical(subject, value));
+        let meaning = subject.family.meaning(&object, value);
+        let mut text = object.show(value);
+        if let Some((_, shown)) = &physical {
+            text = format!("{text} = {shown}");
+        }
+        if let Some(meaning) = &meaning {
+            text = format!("{text}: {meaning}");
+        }
+        values.push(json!({
+            "object": address.to_string(), "name": object.name, "raw": value,
+            "value": physical.map(|(value, _)| value), "meaning": meaning,
+        }));
+        report.add("", &object.to_string(), serde_json::Value::Null, text);
+    }
+    Ok(report.under("objects", values.into()))
+}
+
+/// Writes an object and reads it back.
+pub async fn write(
+    c: &Conversation,
+    subject: &Subject,
+    object: Object,
+    value: i64,
+    entry: Option<Entry>,
+) -> Result<Report, Failure> {
+    if entry.is_some_and(|entry| entry.permission == Permission::Read) {
+        return Err(Failure::Unsuitable(format!("{object} can only be read")));
+    }
+    object.data_type.encode(value).ok_or(Failure::DoesNotFit { object, value })?;
+    contact::reach(c, subject).await?;
+    c.step("write");
+    c.write(&object, value).await?;
+    c.step("read back");
+    let back = c.read_optional(&object).await?;
+    let mut report = Report::new();
+    report.add("object", "object", object.address.to_string(), object.to_string());
+    report.add("written", "written", value, object.show(value));
+    if let Some(back) = back {
+        let meaning = subject.family.meaning(&object, back);
+        let mut text = object.show(back);
+        if let Some((_, shown)) = entry.and_then(|entry| entry.physical(subject, back)) {
+            text = format!("{text} = {shown}");
+        }
+        if let Some(meaning) = meaning {
+            text = format!("{text}: {meaning}");
+        }
+        report.add("read_back", "read back", back, text);
+        if back != value {
+            c.note("the drive has another value than was written: it may be a command, or out of the drive's range");
+        }
+    }
+    Ok(report)
+}
+
+fn bytes_in_words(uploaded: &Uploaded) -> String {
+    let bytes = uploaded.bytes.iter().map(|byte| format!("{byte:02X}")).collect::<Vec<_>>().join(" ");
+    let mut numbers = vec![];
+    let data: [u8; 4] = std::array::from_fn(|at| uploaded.bytes.get(at).copied().unwrap_or(0));
+    let length = uploaded.bytes.len();
+    let unsigned = u32::from_le_bytes(data);
+    if (1..=4).contains(&length) {
+        numbers.push(format!("unsigned {unsigned}"));
+        let shift = 32 - 8 * length as u32;
+        numbers.push(format!("signed {}", (unsigned << shift).cast_signed() >> shift));
+    }
+    if length > 4 && uploaded.bytes.iter().all(|byte| byte.is_ascii_graphic() || *byte == b' ' || *byte == 0)
+    {
+        numbers.push(format!("text {:?}", uploaded.text()));
+    }
+    format!("{length} bytes {bytes} ({})", numbers.join(", "))
+}

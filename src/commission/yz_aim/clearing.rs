@@ -1,0 +1,115 @@
+//! Clearing an alarm, each in its own way (manual IIb.3, 5.11.2). The targets are withdrawn first: a drive that has
+//! lost its master resumes its motion by itself when the heartbeat returns.
+
+use takt_rt::time::Nanoseconds;
+
+use super::alarm::{Alarm, Clearing};
+use super::enabling::statusword;
+use super::objects::*;
+use super::words::{self, control};
+use super::{reading, storing};
+use crate::canopen::nmt::{ErrorControl, NmtState};
+use crate::canopen::objects::*;
+use crate::commission::contact;
+use crate::commission::conversation::Conversation;
+use crate::commission::failure::Failure;
+use crate::commission::report::Report;
+use crate::commission::subject::Subject;
+
+/// The drive takes its time to see a controlword.
+const CONTROL_NS: Nanoseconds = 20_000_000;
+/// An alarm goes within this.
+const CLEARING_NS: Nanoseconds = 500_000_000;
+/// Above this voltage (V) the over-voltage alarm comes at once again.
+const HIGHEST_VOLTAGE: f64 = 52.0;
+/// The node that the drive watches when its consumer names none.
+const MASTER: u8 = 127;
+
+/// `clear-fault`
+pub async fn clear(c: &Conversation, s: &Subject, is_agreed: bool) -> Result<Report, Failure> {
+    contact::reach_family(c, s).await?;
+    c.step("alarm");
+    let alarm = reading::alarm(c).await?;
+    let has_alarm = statusword(c).await? & words::ALARM != 0 || alarm != Alarm::None;
+    let mut report = Report::new();
+    if !has_alarm {
+        report.add("fault", "alarm", serde_json::Value::Null, "none, nothing to clear");
+        report.append(reading::summary(c, s).await?);
+        return Ok(report);
+    }
+    report.add("fault", "alarm", alarm.code(), alarm.to_string());
+    if alarm.clearing() == Clearing::Zero && !is_agreed {
+        return Err(Failure::NeedsConsent {
+            consequence: "the multi-turn position is lost; clearing this alarm makes the present position the \
+                          multi-turn zero",
+            option: "--yes",
+        });
+    }
+    withdraw(c).await?;
+    match alarm.clearing() {
+        Clearing::Zero => report.append(storing::set_zero(c).await?),
+        Clearing::Heartbeat => heartbeat(c).await?,
+        Clearing::Reset => reset(c, alarm).await?,
+    }
+    c.step("verification");
+    if !is_gone(c).await? {
+        let alarm = reading::alarm(c).await?;
+        return Err(Failure::FaultPersists { what: format!("alarm {alarm}"), advice: alarm.advice() });
+    }
+    report.add("cleared", "cleared", true, "yes");
+    report.append(reading::summary(c, s).await?);
+    Ok(report)
+}
+
+/// Nothing is to move when the alarm goes: targets at the actual position, velocity 0, not enabled.
+async fn withdraw(c: &Conversation) -> Result<(), Failure> {
+    c.step("withdraw the targets");
+    c.write(&TARGET_VELOCITY, 0).await?;
+    c.write(&CONTROLWORD, 0).await?;
+    let position = c.read(&POSITION_ACTUAL_VALUE).await?;
+    c.write(&TARGET_POSITION, position).await
+}
+
+async fn reset(c: &Conversation, alarm: Alarm) -> Result<(), Failure> {
+    if alarm == Alarm::OverVoltage {
+        let voltage = c.read(&VOLTAGE).await? as f64 / 327.0;
+        if voltage > HIGHEST_VOLTAGE {
+            let what = format!("alarm {alarm}, the supply is at {voltage:.1} V");
+            return Err(Failure::FaultPersists { what, advice: alarm.advice() });
+        }
+    }
+    c.step("fault reset");
+    c.write(&CONTROLWORD, control::RESET).await?;
+    c.pause(CONTROL_NS).await?;
+    c.write(&CONTROLWORD, 0).await?;
+    if !is_gone(c).await? {
+        c.step("drive output enable");
+        c.write(&OUTPUT_ENABLE, 1).await?;
+    }
+    Ok(())
+}
+
+/// The drive waits for a heartbeat and would want more of them: it watches nobody from then on.
+async fn heartbeat(c: &Conversation) -> Result<(), Failure> {
+    c.step("heartbeat");
+    let watched = c.read(&CONSUMER_HEARTBEAT_TIME).await?;
+    let node = u8::try_from(watched >> 16 & 0x7F).unwrap_or(MASTER);
+    let node = if node == 0 { MASTER } else { node };
+    c.send(ErrorControl { node, state: NmtState::Operational }.frame());
+    c.pause(CONTROL_NS).await?;
+    c.write(&CONSUMER_HEARTBEAT_TIME, 0).await?;
+    c.send(ErrorControl { node, state: NmtState::Operational }.frame());
+    c.note(format!(
+        "the drive does not watch its master any more (1016:01 = 0, it was 0x{watched:08X}) until a master sets it, or it \
+         is reset: do not store that"
+    ));
+    Ok(())
+}
+
+async fn is_gone(c: &Conversation) -> Result<bool, Failure> {
+    match c.wait_for(&ALARM, "no alarm", CLEARING_NS, |code| code == 0).await {
+        Ok(_) => Ok(statusword(c).await? & words::ALARM == 0),
+        Err(Failure::NotInTime { .. }) => Ok(false),
+        Err(failure) => Err(failure),
+    }
+}

@@ -1,0 +1,159 @@
+//! Gains, electronic gear, what the drive does at power-up, and the set-up for interpolation.
+
+use super::enabling::refuse_enabled;
+use super::objects::*;
+use super::storing::store;
+use super::words;
+use crate::commission::contact;
+use crate::commission::conversation::Conversation;
+use crate::commission::failure::Failure;
+use crate::commission::report::Report;
+use crate::commission::subject::Subject;
+
+/// 2619: return to the multi-turn zero at power-up.
+const RETURN_TO_ZERO: i64 = 6;
+/// 2619: interpolation.
+const INTERPOLATION: i64 = 7;
+/// 6083: no ramp of the drive's own. Its last digit is the speed of the return to zero: 100 r/min.
+const NO_RAMP: i64 = 60_000;
+
+/// `gains`
+pub async fn gains(
+    c: &Conversation,
+    s: &Subject,
+    position_proportional: Option<i64>,
+    velocity_proportional: Option<i64>,
+    velocity_integration: Option<i64>,
+) -> Result<Report, Failure> {
+    contact::reach_family(c, s).await?;
+    let wanted = [
+        ("position_proportional", POSITION_PROPORTIONAL, position_proportional),
+        ("velocity_proportional", VELOCITY_PROPORTIONAL, velocity_proportional),
+        ("velocity_integration_ms", VELOCITY_INTEGRATION, velocity_integration),
+    ];
+    let is_changed = wanted.iter().any(|(_, _, value)| value.is_some());
+    let mut report = Report::new();
+    for (key, object, value) in wanted {
+        c.step(object.name);
+        if let Some(value) = value {
+            c.write_and_check(&object, value).await?;
+        }
+        let value = c.read(&object).await?;
+        report.add(key, object.name, value, value.to_string());
+    }
+    if position_proportional.is_some() {
+        c.note(
+            "the last digit of the position gain is the polarity of the alarm output: even opens, odd closes",
+        );
+    }
+    if velocity_proportional.is_some() {
+        c.note("the last digit of the velocity gain is the active edge of the pulse input: even off, odd on");
+    }
+    if is_changed {
+        c.note("this is lost at power-off unless it is stored with `save`");
+    }
+    Ok(report)
+}
+
+/// `gear`: of the pulse input. Whether it also scales the positions of the bus is not said; the manual's examples show
+/// none.
+pub async fn gear(c: &Conversation, s: &Subject, ratio: Option<(u16, u16)>) -> Result<Report, Failure> {
+    if let Some((numerator, _)) = ratio
+        && let Some(key) = words::gear_key(numerator.into())
+    {
+        return Err(Failure::Unsuitable(format!("{numerator} is no numerator but a key: {key}")));
+    }
+    contact::reach_family(c, s).await?;
+    c.step("electronic gear");
+    if let Some((numerator, denominator)) = ratio {
+        c.write_and_check(&GEAR_NUMERATOR, numerator.into()).await?;
+        c.write_and_check(&GEAR_DENOMINATOR, denominator.into()).await?;
+        if greatest_common_divisor(numerator, denominator) > 1 {
+            c.note("reduce the ratio: a large numerator degrades following");
+        }
+        c.note("this is lost at power-off unless it is stored with `save`");
+    }
+    let (numerator, denominator) = (c.read(&GEAR_NUMERATOR).await?, c.read(&GEAR_DENOMINATOR).await?);
+    let mut report = Report::new();
+    report.add("numerator", "numerator", numerator, numerator.to_string());
+    report.add("denominator", "denominator", denominator, denominator.to_string());
+    if numerator > 0 {
+        let pulses = 32_768.0 * denominator as f64 / numerator as f64;
+        report.add("pulses_per_turn", "pulses per turn of the motor", pulses, pulses.to_string());
+    }
+    Ok(report)
+}
+
+fn greatest_common_divisor(a: u16, b: u16) -> u16 {
+    if b == 0 { a } else { greatest_common_divisor(b, a % b) }
+}
+
+/// `auto-home`
+pub async fn auto_home(
+    c: &Conversation,
+    s: &Subject,
+    is_on: bool,
+    is_agreed: bool,
+) -> Result<Report, Failure> {
+    if is_on && !is_agreed {
+        return Err(Failure::NeedsConsent {
+            consequence: "the motor will move to its multi-turn zero by itself whenever its supply comes on",
+            option: "--yes",
+        });
+    }
+    contact::reach_family(c, s).await?;
+    refuse_enabled(c).await?;
+    c.step("special function");
+    let before = c.read(&SPECIAL_FUNCTION).await?;
+    if before == INTERPOLATION {
+        c.note("interpolation (7) is given up: the drive has one special function");
+    }
+    let function = if is_on { RETURN_TO_ZERO } else { 0 };
+    c.write_and_check(&SPECIAL_FUNCTION, function).await?;
+    store(c).await?;
+    let mut report = special_function(before, function);
+    if is_on {
+        let digit = c.read(&ACCELERATION).await? % 10;
+        let speed = (digit + 1) * 100;
+        report.add("return_speed_rpm", "speed of the return", speed, format!("{speed} r/min"));
+        c.note("the speed is the last digit of 6083: 0 to 9 for 100 to 1000 r/min");
+    }
+    Ok(report)
+}
+
+/// `interpolation`
+pub async fn interpolation(c: &Conversation, s: &Subject) -> Result<Report, Failure> {
+    contact::reach_family(c, s).await?;
+    refuse_enabled(c).await?;
+    c.step("special function");
+    let before = c.read(&SPECIAL_FUNCTION).await?;
+    if before == RETURN_TO_ZERO {
+        c.note("the return to zero at power-up (6) is given up: the drive has one special function");
+    }
+    c.write_and_check(&SPECIAL_FUNCTION, INTERPOLATION).await?;
+    c.step("no ramp of the drive's own");
+    let acceleration = c.read(&ACCELERATION).await?;
+    if acceleration < NO_RAMP {
+        c.write_and_check(&ACCELERATION, NO_RAMP).await?;
+    }
+    store(c).await?;
+    let mut report = special_function(before, INTERPOLATION);
+    let acceleration = c.read(&ACCELERATION).await?;
+    report.add(
+        "acceleration",
+        "acceleration",
+        acceleration,
+        format!("{acceleration}: no ramp of the drive's own"),
+    );
+    c.note("power-cycle the drive: the special function must be stored before it is used");
+    Ok(report)
+}
+
+fn special_function(before: i64, after: i64) -> Report {
+    let mut report = Report::new();
+    for (key, label, value) in [("before", "before", before), ("special_function", "special function", after)]
+    {
+        report.add(key, label, value, format!("{value}: {}", words::special_function(value)));
+    }
+    report
+}

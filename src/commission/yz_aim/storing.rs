@@ -1,0 +1,147 @@
+//! Storing parameters, and what is stored: the multi-turn zero, node address, bit rate (manual V.2, V.3.B, 5.04, 5.13).
+
+use takt_rt::time::Nanoseconds;
+
+use super::alarm::Alarm;
+use super::enabling::refuse_enabled;
+use super::objects::*;
+use super::reading;
+use crate::canopen::objects::*;
+use crate::commission::contact;
+use crate::commission::conversation::Conversation;
+use crate::commission::failure::Failure;
+use crate::commission::report::Report;
+use crate::commission::scan;
+use crate::commission::subject::Subject;
+
+/// The manual gives no time for storing.
+const STORING_NS: Nanoseconds = 10_000_000_000;
+/// 260A returns to its stored value, and the position to zero, within this.
+const ZEROING_NS: Nanoseconds = 1_000_000_000;
+/// How often the two keys are written.
+const ZERO_ATTEMPTS: u8 = 3;
+/// "0 or plus a single digit"
+const ZERO_COUNTS: std::ops::RangeInclusive<i64> = 0..=9;
+
+/// Starts storing and waits for its end.
+pub async fn store(c: &Conversation) -> Result<(), Failure> {
+    c.step("store");
+    c.write(&SAVE_FLAG, 1).await?;
+    c.wait_for(&SAVE_FLAG, "stored (2)", STORING_NS, |flag| flag == 2).await.map(|_| ())
+}
+
+/// `save`
+pub async fn save(c: &Conversation, s: &Subject) -> Result<Report, Failure> {
+    contact::reach_family(c, s).await?;
+    refuse_enabled(c).await?;
+    store(c).await?;
+    let mut report = Report::new();
+    report.add("stored", "stored", true, "the parameters that can be stored");
+    Ok(report)
+}
+
+/// `zero`
+pub async fn zero(c: &Conversation, s: &Subject, is_agreed: bool) -> Result<Report, Failure> {
+    if !is_agreed {
+        return Err(Failure::NeedsConsent {
+            consequence: "this makes the present position the multi-turn zero: every stored position gets another \
+                          meaning",
+            option: "--yes",
+        });
+    }
+    contact::reach_family(c, s).await?;
+    refuse_enabled(c).await?;
+    set_zero(c).await
+}
+
+/// 260A = 60006, then 60016; success is that 260A has its stored value again and the position is zero.
+pub async fn set_zero(c: &Conversation) -> Result<Report, Failure> {
+    let before = c.read(&POSITION_ACTUAL_VALUE).await?;
+    let numerator = c.read(&GEAR_NUMERATOR).await?;
+    for attempt in 1..=ZERO_ATTEMPTS {
+        c.step("multi-turn zero");
+        c.write(&GEAR_NUMERATOR, 60_006).await?;
+        c.write(&GEAR_NUMERATOR, 60_016).await?;
+        c.step("verification");
+        let back = c.wait_for(&GEAR_NUMERATOR, "the numerator", ZEROING_NS, |value| value == numerator);
+        let is_back = match back.await {
+            Ok(_) => true,
+            Err(Failure::NotInTime { .. }) => false,
+            Err(failure) => return Err(failure),
+        };
+        let after = c.read(&POSITION_ACTUAL_VALUE).await?;
+        let alarm = reading::alarm(c).await?;
+        if is_back && ZERO_COUNTS.contains(&after) && alarm != Alarm::Battery {
+            let mut report = Report::new();
+            report.add("before_counts", "before", before, format!("{before} counts"));
+            report.add("after_counts", "after", after, format!("{after} counts"));
+            return Ok(report);
+        }
+        if attempt < ZERO_ATTEMPTS {
+            c.note(format!("the position is {after} counts, the alarm {alarm}: once more"));
+        }
+    }
+    if c.read(&GEAR_NUMERATOR).await? != numerator {
+        c.write(&GEAR_NUMERATOR, numerator).await?;
+    }
+    Err(Failure::Contradicted(format!(
+        "the drive did not take the multi-turn zero after {ZERO_ATTEMPTS} attempts: has this model a battery?"
+    )))
+}
+
+/// `set-id`
+pub async fn set_id(c: &Conversation, s: &Subject, node: u8) -> Result<Report, Failure> {
+    contact::reach_family(c, s).await?;
+    refuse_enabled(c).await?;
+    let others = scan::others(c).await?;
+    if !others.is_empty() {
+        let nodes: Vec<String> = others.iter().map(u8::to_string).collect();
+        return Err(Failure::Unsuitable(format!(
+            "there are other nodes on this bus ({}): connect the one drive alone, since two drives with the same number \
+             cannot be told apart",
+            nodes.join(", ")
+        )));
+    }
+    c.step("node address");
+    c.write_and_check(&NODE_ADDRESS, node.into()).await?;
+    store(c).await?;
+    let mut report = Report::new();
+    report.add("node", "node after a power cycle", node, node.to_string());
+    c.note(format!("power-cycle the drive: until then it is node {}, afterwards node {node}", s.node));
+    Ok(report)
+}
+
+/// The bit rates and their codes.
+const BIT_RATES: [(u32, i64); 4] = [(1_000_000, 803), (500_000, 802), (250_000, 801), (125_000, 800)];
+
+/// `set-bitrate`: four writes in this order, and a power cycle. No storing: the manual lists none.
+pub async fn set_bit_rate(c: &Conversation, s: &Subject, bit_rate: u32) -> Result<Report, Failure> {
+    let Some((_, code)) = BIT_RATES.iter().find(|(known, _)| *known == bit_rate) else {
+        return Err(Failure::Unsupported {
+            what: format!("this drive has no bit rate of {bit_rate} bit/s"),
+            instead: "it has 1 Mbit/s, 500, 250 and 125 kbit/s".to_owned(),
+        });
+    };
+    contact::reach_family(c, s).await?;
+    refuse_enabled(c).await?;
+    c.step("mailboxes as they are");
+    let mut before = vec![];
+    for object in [ACCELERATION, FLUX_WEAKENING_ANGLE, MODBUS_ENABLE] {
+        before.push((object, c.read(&object).await?));
+    }
+    c.step("bit rate");
+    for (object, value) in
+        [(MODBUS_ENABLE, 1), (ACCELERATION, *code), (FLUX_WEAKENING_ANGLE, 129), (MODBUS_ENABLE, 506)]
+    {
+        c.write(&object, value).await?;
+    }
+    let mut report = Report::new();
+    report.add("bit_rate", "bit rate after a power cycle", bit_rate, format!("{bit_rate} bit/s"));
+    let values: Vec<String> =
+        before.iter().map(|(object, value)| format!("{} = {value}", object.address)).collect();
+    c.note(format!(
+        "power-cycle the drive, then see whether it still has what it had before ({}) and write back what has changed",
+        values.join(", ")
+    ));
+    Ok(report)
+}
