@@ -48,6 +48,14 @@ pub enum Request {
         /// Object 6076 in N·m (N for a linear axis).
         torque: f64,
     },
+    /// Where the drive has said that it is, for as long as it has not reported it by process data: nothing is sent to a
+    /// drive of which this is not known.
+    Position {
+        /// The axis.
+        axis: u8,
+        /// Object 6064 in counts.
+        counts: i32,
+    },
     /// Leave [`Phase::Passive`]: begin to send set-points, with the drives disabled.
     Activate,
     /// Bring every drive to operation enabled; set-points follow the actual positions until it is.

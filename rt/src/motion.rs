@@ -3,7 +3,7 @@
 use arrayvec::ArrayVec;
 
 use crate::guard::AxisLimits;
-use crate::plan::{self, Limits, PlanError, Problem, Profile, Return, State, Timing};
+use crate::plan::{self, Limits, PlanError, Problem, Profile, Return, State, Synchronisation, Timing};
 use crate::record::MAX_AXES;
 
 /// The trajectory that the group is on.
@@ -46,7 +46,8 @@ impl Default for Motion {
 }
 
 impl Motion {
-    /// Plans a coordinated move within fractions of the limits. On error the present motion goes on.
+    /// Plans a coordinated move within fractions of the limits: on a straight line from rest to rest, and otherwise where
+    /// that takes no longer. On error the present motion goes on.
     pub fn move_to<'a>(
         &mut self,
         legs: impl Iterator<Item = Leg<'a>>,
@@ -62,8 +63,14 @@ impl Motion {
                 limits: move_limits(&leg, velocity_scale, acceleration_scale),
             })
             .collect();
+        let is_at_rest = |state: &State| state.velocity == 0.0 && state.acceleration == 0.0;
+        let is_from_rest_to_rest =
+            problems.iter().all(|problem| is_at_rest(&problem.start) && is_at_rest(&problem.target));
+        let synchronisation =
+            if is_from_rest_to_rest { Synchronisation::Straight } else { Synchronisation::Phase };
         // Where a limit has just been lowered, slow down to it and no further.
-        let timing = Timing { minimum_duration_s, return_to_limits: Return::Settled, ..Timing::default() };
+        let return_to_limits = Return::Settled;
+        let timing = Timing { synchronisation, minimum_duration_s, return_to_limits, ..Timing::default() };
         let duration_s = plan::synchronised(&problems, self.free(problems.len()), timing)?;
         self.begin(duration_s);
         Ok(())

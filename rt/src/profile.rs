@@ -37,7 +37,9 @@ pub struct ProfileCommand {
     target_raw: i32,
     handshake: Handshake,
     cycles: u32,
+    /// Cycles for which a handshake has been under way and bit 12 has not changed.
     waiting_cycles: u32,
+    was_acknowledged: bool,
 }
 
 impl ProfileCommand {
@@ -48,10 +50,20 @@ impl ProfileCommand {
 
     /// A new target. `needs_handshake` where the drive acknowledges it.
     pub fn set(&mut self, target_raw: i32, needs_handshake: bool) {
-        let handshake = if needs_handshake { Handshake::Clearing } else { Handshake::Idle };
-        // Without a handshake under way there is nothing to wait for but the drive's bit 12.
-        let cycles = if needs_handshake && self.handshake == Handshake::Idle { STALE_CYCLES } else { 0 };
-        *self = Self { target_raw, handshake, cycles, waiting_cycles: 0 };
+        self.target_raw = target_raw;
+        if !needs_handshake {
+            self.handshake = Handshake::Idle;
+            self.cycles = 0;
+            return;
+        }
+        self.cycles = match self.handshake {
+            // Without a handshake under way there is nothing to wait for but the drive's bit 12.
+            Handshake::Idle => STALE_CYCLES,
+            // Not offered yet: the drive never sees the target before.
+            Handshake::Clearing => self.cycles,
+            Handshake::Offering | Handshake::Withdrawing => 0,
+        };
+        self.handshake = Handshake::Clearing;
     }
 
     /// What a drive without torque is given, which needs no handshake: nothing is to move.
@@ -70,7 +82,9 @@ impl ProfileCommand {
             same => same,
         };
         self.cycles = if next == self.handshake { self.cycles.saturating_add(1) } else { 0 };
-        self.waiting_cycles = if next == Handshake::Idle { 0 } else { self.waiting_cycles.saturating_add(1) };
+        let is_answered = next == Handshake::Idle || is_acknowledged != self.was_acknowledged;
+        self.waiting_cycles = if is_answered { 0 } else { self.waiting_cycles.saturating_add(1) };
+        self.was_acknowledged = is_acknowledged;
         self.handshake = next;
         if next == Handshake::Offering { controlword::BIT_4 | controlword::BIT_5 } else { 0 }
     }
@@ -80,9 +94,14 @@ impl ProfileCommand {
         self.cycles = self.cycles.saturating_add(1);
     }
 
-    /// Cycles that the handshake has taken so far; 0 when none is under way.
+    /// Cycles for which the drive has owed an answer to the handshake; 0 when none is under way.
     pub const fn waiting_cycles(&self) -> u32 {
         self.waiting_cycles
+    }
+
+    /// Cycles from setting a target now to the one in which it is offered, if the drive answers as it should.
+    pub fn cycles_to_offer(&self) -> u32 {
+        if self.handshake == Handshake::Idle { 0 } else { 2 * STALE_CYCLES }
     }
 
     /// Whether the drive has the target and says that it has reached it.
@@ -111,11 +130,31 @@ mod tests {
     fn an_acknowledgement_of_the_target_before_is_not_taken_for_this_ones() {
         let mut command = ProfileCommand::default();
         command.set(1000, true);
-        for waited in 1..5 {
+        for waited in 0..5 {
             assert_eq!(command.position_bits(ACKNOWLEDGED), 0);
             assert_eq!(command.waiting_cycles(), waited);
         }
         assert_eq!(command.position_bits(0), OFFER);
+    }
+
+    #[test]
+    fn targets_in_every_cycle_are_offered_again_and_again_and_an_answer_is_waited_for_once() {
+        // The drive acknowledges an offer one cycle after it was sent, and lets go one cycle after that.
+        let run = |answers: bool| {
+            let mut command = ProfileCommand::default();
+            let (mut word, mut offers, mut longest) = (0, 0, 0);
+            for target in 0..100 {
+                command.set(target, true);
+                let bits = command.position_bits(word);
+                word = if answers && bits == OFFER { ACKNOWLEDGED } else { 0 };
+                offers += u32::from(bits == OFFER);
+                longest = longest.max(command.waiting_cycles());
+            }
+            (offers, longest)
+        };
+        let (offers, longest) = run(true);
+        assert!(offers >= 15 && longest <= 10, "{offers} {longest}");
+        assert_eq!(run(false).1, 100);
     }
 
     #[test]

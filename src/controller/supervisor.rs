@@ -241,7 +241,12 @@ impl Supervisor {
         match self.bring_up.outcome() {
             None => {}
             Some(Err(error)) => self.end(now_ns, Outcome::BringUpFailed(error)),
-            Some(Ok(_)) => {
+            Some(Ok(facts)) => {
+                // Some drives report by process data only when they are given a target.
+                let positions = (0..)
+                    .zip(&facts)
+                    .map(|(axis, facts)| Request::Position { axis, counts: facts.position_counts });
+                self.outgoing.extend(positions);
                 self.outgoing.push_back(Request::Activate);
                 self.enter(Stage::Activate, now_ns);
             }

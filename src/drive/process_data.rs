@@ -4,6 +4,7 @@ use takt_rt::axis::Cadence;
 use takt_rt::frame::Id;
 use takt_rt::pdo::{CommandSlot, MappedObject};
 
+use super::yz_aim;
 use crate::config::{Axis, Control, DriveFamily, Feedback};
 
 const CONTROLWORD: MappedObject = MappedObject::new(0x6040, 0, 16);
@@ -101,7 +102,7 @@ impl ProcessData {
         };
         let transmit = |number: u8| {
             let objects = vec![POSITION, if number == 3 { mapped(Feedback::Velocity) } else { STATUSWORD }];
-            let answers_sync = number == 2 && axis.answers_sync;
+            let answers_sync = number == 2 && yz_aim::answers_sync(axis);
             PdoPlan {
                 transmission_type: if answers_sync { 1 } else { 255 },
                 ..pdo(0x180, number, axis.node, objects, Cadence::EveryCycle)
@@ -119,7 +120,7 @@ impl ProcessData {
                 (vec![receive(1, position, Cadence::OnControlword), interpolated], 4)
             }
         };
-        let feedback = if axis.answers_sync { 2 } else { answer };
+        let feedback = if yz_aim::answers_sync(axis) { 2 } else { answer };
         let unused = (1..=4).filter(|number| *number != feedback).map(transmit).collect();
         Self { commands, feedback: vec![transmit(feedback)], unused }
     }

@@ -134,7 +134,7 @@ fn come_to_rest(list: &mut List, timing: &BringUpTiming) {
 fn process_data(list: &mut List, axis: &Axis) {
     list.about("reports", "let the drive answer SYNC: answers_sync = true");
     let transmit = |number| PdoParameters::of(PdoDirection::Transmit, number);
-    let answers: i64 = if axis.answers_sync { 1 } else { 255 };
+    let answers: i64 = if answers_sync(axis) { 1 } else { 255 };
     list.write_and_read_back(transmit(2).transmission_type(), answers);
     list.write_optional(transmit(1).event_timer(), 0);
     list.write_optional(transmit(3).event_timer(), 0);
@@ -189,6 +189,11 @@ fn target_at_actual_position(list: &mut List, axis: &Axis) {
 /// Off where none is configured: feedback in every cycle shows that the drive lives, and its alarms.
 fn own_heartbeat_ms(axis: &Axis) -> i64 {
     axis.heartbeat_ns.map_or(0, |period_ns| rounded_up(period_ns, 1_000_000))
+}
+
+/// Whether the drive reports at SYNC. In profile velocity it must: its answer to a command shows no statusword.
+pub fn answers_sync(axis: &Axis) -> bool {
+    axis.answers_sync || axis.control == Control::ProfileVelocity
 }
 
 /// Whether a mode can be commanded.

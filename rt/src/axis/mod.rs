@@ -14,6 +14,7 @@ use crate::plan::State;
 use crate::profile::{ProfileCommand, ProfileTarget};
 use crate::record::AxisRecord;
 use crate::stop::Rule;
+use crate::time::Nanoseconds;
 use crate::units::Scale;
 use crate::watch::{DuplicateWatch, NodeComplaint, NodeWatch};
 
@@ -111,6 +112,8 @@ pub struct Axis {
     profile: ProfileCommand,
     /// What `profile` stands for; `None` before the first target since the drive was enabled.
     profile_target: Option<ProfileTarget>,
+    /// When a velocity or a torque expires.
+    profile_until_ns: Nanoseconds,
     position: f64,
     position_raw: i32,
     velocity: f64,
@@ -119,6 +122,8 @@ pub struct Axis {
     age: u16,
     /// Time since the feedback before.
     span_s: f64,
+    /// The last such time between two feedbacks.
+    cycle_s: f64,
     is_heard: bool,
     /// What the statuswords have shown, see [`Axis::drive_state`].
     state: DriveState,
@@ -128,6 +133,8 @@ pub struct Axis {
     is_lost: bool,
     /// How far the joint has jumped between two reports, where no joint can.
     jump: Option<f64>,
+    /// Whether `position_raw` is what the drive has said.
+    is_position_known: bool,
     emergency_code: u16,
     /// Cycles since an emergency message came.
     since_emergency: Option<u8>,
@@ -157,17 +164,20 @@ impl Axis {
             sent: [State::default(); 3],
             profile: ProfileCommand::default(),
             profile_target: None,
+            profile_until_ns: 0,
             position: 0.0,
             position_raw: 0,
             velocity: 0.0,
             arrived: 0,
             age: 0,
             span_s: 0.0,
+            cycle_s: 0.0,
             is_heard: false,
             state: DriveState::NotReadyToSwitchOn,
             contradictions: 0,
             is_lost: false,
             jump: None,
+            is_position_known: false,
             emergency_code: 0,
             since_emergency: None,
             node_watch: NodeWatch::default(),
@@ -265,6 +275,7 @@ impl Axis {
         }
         let span_s = self.span_s;
         self.span_s = 0.0;
+        self.cycle_s = span_s;
         self.arrived = 0;
         self.age = 0;
         let last = self.position;
@@ -283,7 +294,17 @@ impl Axis {
         self.jump = (self.is_heard && distance > farthest).then_some(distance);
         self.is_heard = true;
         self.notice_state();
+        self.is_position_known = true;
         self.following_error = if self.is_profile() { 0.0 } else { self.sent[2].position - self.position };
+    }
+
+    /// Takes the position that the drive has reported otherwise than by process data, if there has been none.
+    pub fn set_reported_position(&mut self, counts: i32) {
+        if !self.is_heard {
+            self.position_raw = counts;
+            self.position = self.parameters.scale.position_from_counts(counts);
+            self.is_position_known = true;
+        }
     }
 
     fn reports(&self, slot: FeedbackSlot) -> bool {
@@ -505,10 +526,12 @@ impl Axis {
         self.command.command(CommandSlot::Controlword) as u16
     }
 
-    /// The frames of this cycle's command.
+    /// The frames of this cycle's command; none while it is not known where the drive is.
     pub fn frames(&self) -> impl Iterator<Item = Frame> {
-        let due = |command: &&CommandPdo| command.cadence == Cadence::EveryCycle || self.is_controlword_due;
-        self.parameters.commands.iter().filter(due).filter_map(|command| {
+        let is_due = |command: &CommandPdo| {
+            self.is_position_known && (command.cadence == Cadence::EveryCycle || self.is_controlword_due)
+        };
+        self.parameters.commands.iter().filter(move |command| is_due(command)).filter_map(|command| {
             let payload = command.pdo.mapping.pack(&self.command);
             Frame::data(command.pdo.id, payload.get(..command.pdo.mapping.length())?).ok()
         })

@@ -2,13 +2,18 @@
 
 use super::Axis;
 use crate::control::ControlLaw;
+use crate::dialect::Dialect;
 use crate::guard::Violation;
 use crate::plan::State;
 use crate::profile::ProfileTarget;
 use crate::stop::Rule;
+use crate::time::Nanoseconds;
 
 /// A joint slower than this fraction of its velocity limit stands.
 const AT_REST: f64 = 0.02;
+/// Cycles of the bus from the position that is reported to a drive that acts on what was made of it: one for which a
+/// drive's answer to a command has waited, one on the way, and one that the drive may take.
+const REACTION_CYCLES: u32 = 3;
 /// How far the velocity of a profile may overshoot its limit: the drive's own loop makes it.
 const VELOCITY_OVERSHOOT: f64 = 1.2;
 
@@ -31,8 +36,8 @@ impl Axis {
         }
     }
 
-    /// Takes a target that [`Axis::accepts`].
-    pub fn set_profile_target(&mut self, target: ProfileTarget) {
+    /// Takes a target that [`Axis::accepts`]. A velocity or a torque that is not zero expires.
+    pub fn set_profile_target(&mut self, target: ProfileTarget, valid_until_ns: Nanoseconds) {
         let scale = &self.parameters.scale;
         let (raw, needs_handshake) = match target {
             ProfileTarget::Position(position) => {
@@ -43,6 +48,7 @@ impl Axis {
         };
         self.profile.set(raw, needs_handshake);
         self.profile_target = Some(target);
+        self.profile_until_ns = valid_until_ns;
     }
 
     /// Makes rest the target: the nearest position at which the joint can stand, no velocity, no torque.
@@ -53,16 +59,41 @@ impl Axis {
             ControlLaw::ProfileTorque => ProfileTarget::Torque(0.0),
             _ => return,
         };
-        self.set_profile_target(target);
+        self.set_profile_target(target, Nanoseconds::MAX);
     }
 
-    /// Where the joint comes to rest if it decelerates from now on.
+    /// How far the joint goes on, in its direction, when it is told to come to rest now: until the drive has heard that,
+    /// which in profile position waits for the handshake, and while it decelerates.
+    fn way_to_rest(&self) -> f64 {
+        let limits = &self.parameters.limits;
+        // A YZ-AIM has one ramp for both.
+        let deceleration = match self.parameters.dialect {
+            Dialect::Cia402 => limits.deceleration,
+            Dialect::YzAim => limits.deceleration.min(limits.acceleration),
+        };
+        let reaction_s = f64::from(REACTION_CYCLES + self.profile.cycles_to_offer()) * self.cycle_s;
+        // It may still be speeding up.
+        let speed = self.velocity.abs();
+        let highest = (speed + limits.acceleration * reaction_s).min(limits.velocity.max(speed));
+        let distance = highest * reaction_s + highest * highest / (2.0 * deceleration);
+        if self.velocity == 0.0 { 0.0 } else { distance.copysign(self.velocity) }
+    }
+
+    /// Where the joint comes to rest if it is told to now; not beyond where it is going, nor beyond its limits.
     fn nearest_rest(&self) -> f64 {
         let limits = &self.parameters.limits;
-        let distance = self.velocity * self.velocity.abs() / (2.0 * limits.deceleration);
         let (lowest, highest) =
             (limits.position_min.min(self.position), limits.position_max.max(self.position));
-        (self.position + distance).clamp(lowest, highest)
+        let rest = (self.position + self.way_to_rest()).clamp(lowest, highest);
+        match self.profile_target {
+            Some(ProfileTarget::Position(target)) if self.velocity > 0.0 && target > self.position => {
+                rest.min(target)
+            }
+            Some(ProfileTarget::Position(target)) if self.velocity < 0.0 && target < self.position => {
+                rest.max(target)
+            }
+            _ => rest,
+        }
     }
 
     /// Whether the drive has its target and says that it has reached it; an axis that follows set-points always has.
@@ -76,6 +107,12 @@ impl Axis {
             Some(ProfileTarget::Velocity(value) | ProfileTarget::Torque(value)) => value != 0.0,
             _ => false,
         }
+    }
+
+    /// For how long the velocity or torque that the drive is asked for has been expired; 0 if it is valid or there is
+    /// none.
+    pub fn expired_ns(&self, now_ns: Nanoseconds) -> Nanoseconds {
+        if self.is_driven() { now_ns.saturating_sub(self.profile_until_ns) } else { 0 }
     }
 
     /// Whether the joint of an axis in a profile mode stands; one that follows set-points is where they are.
@@ -105,7 +142,7 @@ impl Axis {
         if !self.is_driven() {
             return Ok(());
         }
-        let distance = self.velocity * self.velocity.abs() / (2.0 * limits.deceleration);
+        let distance = self.way_to_rest();
         let rest = self.position + distance;
         let limit = if distance > 0.0 { limits.position_max } else { limits.position_min };
         let is_beyond = (distance > 0.0 && rest > limit) || (distance < 0.0 && rest < limit);

@@ -69,10 +69,11 @@ impl Engine {
     }
 
     fn follow_motion(&mut self, now_ns: Nanoseconds, door: &mut impl Door) {
-        let is_driven = self.axes.iter().any(Axis::is_driven);
-        if self.phase == Phase::Moving && is_driven && now_ns > self.drive_until_ns {
-            let age_cycles = (now_ns - self.drive_until_ns).div_ceil(self.period_ns);
-            self.begin_stop(Rule::StaleCommand, None, None, age_cycles as f64, 0.0, now_ns, door);
+        let expired = self.axes.iter().position(|axis| axis.expired_ns(now_ns) > 0);
+        if let Some(index) = expired.filter(|_| self.phase == Phase::Moving) {
+            let age_ns = self.axes.get(index).map_or(0, |axis| axis.expired_ns(now_ns));
+            let age_cycles = age_ns.div_ceil(self.period_ns) as f64;
+            self.begin_stop(Rule::StaleCommand, None, Some(index as u8), age_cycles, 0.0, now_ns, door);
         }
         self.motion.advance(self.period_s);
         let next: ArrayVec<State, MAX_AXES> = self.motion.states().take(self.axes.len()).collect();

@@ -35,6 +35,10 @@ pub type SendBatch = ArrayVec<Frame, SEND_BATCH>;
 const REQUESTS_PER_CYCLE: usize = 4;
 /// How long controlword bit 7 is held low before, and high in, a fault reset.
 const FAULT_RESET_CYCLES: u32 = 10;
+/// Cycles of the slowest bus for which the heartbeat waits after the controller was away for more than its period.
+/// A drive that has stopped for want of it may go on with its old target once it is back: until then what the drives
+/// report must have been heard, and their targets and controlwords be new ones.
+const HEARTBEAT_HELD_BUS_CYCLES: u32 = 4;
 
 /// Whether the set-points of a cycle can leave.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -110,8 +114,6 @@ pub struct Engine {
     /// Whether an interface has refused frames since the last cycle.
     is_not_taken: bool,
     held_back: BusSet,
-    /// When the velocities and torques of drives in profile modes expire.
-    drive_until_ns: Nanoseconds,
     stop: Option<StopReason>,
     fault_reset: u32,
     heartbeat_due: u32,
@@ -184,7 +186,6 @@ impl Engine {
             foreign_id: None,
             is_not_taken: false,
             held_back: BusSet::default(),
-            drive_until_ns: 0,
             stop: None,
             fault_reset: 0,
             heartbeat_due: 0,
@@ -348,6 +349,7 @@ impl Engine {
     ) {
         let missed = elapsed.saturating_sub(1) + u64::from(transmission == Transmission::TooLate);
         self.last_slot = Some(slot);
+        self.hold_heartbeat_back(elapsed, transmission);
         self.record.timing.missed_slots = missed;
         if missed > 0 {
             self.missed_slots += missed;
@@ -358,6 +360,19 @@ impl Engine {
             self.timing_level = level;
             self.happened(now_ns, EventKind::Timing { level }, door);
         }
+    }
+
+    /// After an absence that a drive may have noticed, the heartbeat waits.
+    fn hold_heartbeat_back(&mut self, elapsed: u64, transmission: Transmission) {
+        let was_away = self.heartbeat.is_some_and(|heartbeat| elapsed > heartbeat.cycles.into());
+        let held = if was_away {
+            let slowest = self.buses.iter().map(|bus| bus.divider).max().unwrap_or(1);
+            HEARTBEAT_HELD_BUS_CYCLES.saturating_mul(slowest)
+        } else {
+            // Only the next slot shows how long the absence was.
+            u32::from(transmission == Transmission::TooLate)
+        };
+        self.heartbeat_due = self.heartbeat_due.max(held);
     }
 
     fn notice_drive_states(&mut self, now_ns: Nanoseconds, door: &mut impl Door) {
@@ -385,7 +400,10 @@ impl Engine {
         for axis in &mut self.axes {
             let is_held_back = self.held_back.contains(axis.parameters().bus.into());
             if has_cycle_of(&self.buses, axis, slot) && !is_held_back {
-                axis.command(self.goal, reset_word.filter(|_| axis.drive_state().is_faulted()));
+                // A drive that falls out of operation enabled is not led back by what the others are still to do.
+                let is_led_up = self.phase == Phase::Enabling || axis.is_enabled();
+                let goal = if self.goal == Goal::Enabled && !is_led_up { Goal::Disabled } else { self.goal };
+                axis.command(goal, reset_word.filter(|_| axis.drive_state().is_faulted()));
             }
         }
     }

@@ -24,6 +24,9 @@ impl Engine {
             Request::RatedTorque { axis, torque } => {
                 self.axes.get_mut(usize::from(axis)).is_some_and(|axis| axis.set_rated_torque(torque))
             }
+            Request::Position { axis, counts } => {
+                self.axes.get_mut(usize::from(axis)).map(|axis| axis.set_reported_position(counts)).is_some()
+            }
             Request::Activate => self.activate(now_ns, door),
             Request::Enable if self.phase == Phase::Disabled && !is_latched => {
                 self.stop = None;
@@ -115,7 +118,7 @@ impl Engine {
         }
         for (axis, position) in self.axes.iter_mut().zip(parameters.target) {
             if axis.accepts(ProfileTarget::Position(position)) {
-                axis.set_profile_target(ProfileTarget::Position(position));
+                axis.set_profile_target(ProfileTarget::Position(position), Nanoseconds::MAX);
             }
         }
         self.stop = None;
@@ -130,15 +133,17 @@ impl Engine {
         now_ns: Nanoseconds,
         door: &mut impl Door,
     ) -> bool {
+        let index = usize::from(wanted.axis);
         let is_possible = matches!(self.phase, Phase::Holding | Phase::Moving);
-        let axis = self.axes.get_mut(usize::from(wanted.axis));
-        let Some(axis) = axis.filter(|axis| is_possible && axis.accepts(wanted.target)) else {
+        if !(is_possible && self.axes.get(index).is_some_and(|axis| axis.accepts(wanted.target))) {
             return false;
-        };
-        axis.set_profile_target(wanted.target);
-        self.drive_until_ns = wanted.valid_until_ns;
-        if self.phase == Phase::Holding {
-            self.motion.cancel();
+        }
+        // The other axes stay where they are, not where the last trajectory ended.
+        if self.phase == Phase::Holding && self.plan_standstill().is_err() {
+            return false;
+        }
+        if let Some(axis) = self.axes.get_mut(index) {
+            axis.set_profile_target(wanted.target, wanted.valid_until_ns);
         }
         self.stop = None;
         self.move_id = wanted.id;

@@ -52,13 +52,14 @@ impl Engine {
             }
             self.begin_stop(Rule::NotTransmitted, None, None, cycles, limit, now_ns, door);
         }
-        let acknowledge_limit = self.acknowledge_timeout_cycles;
         for index in 0..self.axes.len() {
-            let Some((rule, value, limit)) = self
-                .axes
-                .get_mut(index)
-                .and_then(|axis| complaint(axis, self.phase, acknowledge_limit, self.period_s))
-            else {
+            let Some(axis) = self.axes.get_mut(index) else { continue };
+            let bus = self.buses.get(usize::from(axis.parameters().bus));
+            // An axis counts in cycles of its bus.
+            let acknowledge_limit =
+                self.acknowledge_timeout_cycles.div_ceil(bus.map_or(1, |bus| bus.divider.max(1)));
+            let complaint = complaint(axis, self.phase, acknowledge_limit, self.period_s);
+            let Some((rule, value, limit)) = complaint else {
                 continue;
             };
             self.begin_stop(rule, None, Some(index as u8), value, limit, now_ns, door);
@@ -133,6 +134,14 @@ impl Engine {
             }
             (Phase::Stopping | Phase::Disabling | Phase::Holding, _) => {}
         }
+    }
+
+    /// Every axis stays on its set-point.
+    pub(super) fn plan_standstill(&mut self) -> Result<(), PlanError> {
+        self.motion.stop(self.axes.iter().map(|axis| {
+            let standing = State { position: axis.set_point().position, ..State::default() };
+            (standing, &axis.parameters().limits)
+        }))
     }
 
     fn plan_stop(&mut self) -> Result<(), PlanError> {

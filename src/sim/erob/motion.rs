@@ -125,9 +125,9 @@ impl Motion {
         self.torque = 0.0;
     }
 
-    /// Takes the target of CSP, or of interpolated position while bit 4 is set, from the dictionary: at SYNC, or when it has been written in between. It is reached
-    /// at the end of the interpolation period, so at the next SYNC. The same target again changes nothing while it is
-    /// still under way.
+    /// Takes the target of CSP, or of interpolated position while bit 4 is set, from the dictionary: at SYNC, or when it
+    /// has been written in between. It is reached at the end of the interpolation period, so at the next SYNC. The same
+    /// target again changes nothing while it is still under way.
     pub fn latch(&mut self, dictionary: &Dictionary) {
         let is_interpolating = self.mode == Some(OperationMode::InterpolatedPosition)
             && dictionary.get(at::CONTROLWORD) as u16 & controlword::BIT_4 != 0;

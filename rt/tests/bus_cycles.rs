@@ -1,0 +1,149 @@
+//! Buses whose cycle has several slots, and what the controller does around an absence.
+
+mod fixture;
+
+use fixture::{LIMITS, PERIOD_NS, Rig, parameters};
+use takt_rt::door::Request;
+use takt_rt::engine::EngineParameters;
+use takt_rt::frame::Id;
+use takt_rt::stop::{Phase, Rule};
+
+/// Three axes on a bus with a cycle in every slot, three on one with a cycle in every second.
+fn two_rates() -> EngineParameters {
+    let mut parameters = parameters(6);
+    parameters.buses[1].divider = 2;
+    parameters
+}
+
+fn times_of(rig: &Rig, bus: usize, id: Id) -> Vec<u64> {
+    rig.buses[bus].sent.iter().filter(|(_, frame)| frame.id() == id).map(|(at, _)| *at).collect()
+}
+
+#[test]
+fn each_bus_has_sync_and_set_points_in_its_own_cycles_on_one_grid() {
+    let mut rig = Rig::of(two_rates()).enable();
+    rig.run(200);
+    for (bus, period_ns) in [(0, PERIOD_NS), (1, 2 * PERIOD_NS)] {
+        for id in [Id::canopen(0x080, 0), Id::canopen(0x200, 2)] {
+            let times = times_of(&rig, bus, id);
+            assert!(times.len() > 90);
+            assert!(times.windows(2).all(|pair| pair[1] - pair[0] == period_ns), "{id:?} on bus {bus}");
+        }
+    }
+    let fast = times_of(&rig, 0, Id::canopen(0x080, 0));
+    assert!(times_of(&rig, 1, Id::canopen(0x080, 0)).iter().all(|at| fast.contains(at)));
+}
+
+#[test]
+fn one_move_leads_the_axes_of_both_buses_to_their_targets_at_one_time() {
+    let mut rig = Rig::of(two_rates()).enable();
+    rig.move_to(1.25);
+    let mut fastest = [0.0_f64; 6];
+    while rig.phase() == Phase::Moving {
+        rig.run(1);
+        let shown = rig.door.snapshot.axes;
+        fastest.iter_mut().zip(shown).for_each(|(fastest, axis)| *fastest = fastest.max(axis.velocity));
+    }
+    rig.run(4);
+    for (axis, fastest) in fastest.into_iter().enumerate() {
+        assert_eq!(rig.drive(axis).position, fixture::scale().position_to_counts(1.25));
+        assert!((fastest - LIMITS.velocity).abs() < 0.1, "axis {axis} was seen at {fastest}");
+    }
+    assert_eq!(rig.stops(), []);
+    rig.assert_limits_kept();
+}
+
+/// Without that a path between axes with different limits would be bent.
+#[test]
+fn from_rest_to_rest_the_axes_stay_on_a_straight_line_whatever_their_limits() {
+    let mut own = parameters(3);
+    for (axis, factor) in own.axes.iter_mut().zip([1.0, 0.3, 2.0]) {
+        axis.limits.velocity *= factor;
+        axis.limits.acceleration /= factor;
+        axis.limits.jerk = 50.0;
+    }
+    let mut rig = Rig::of(own).enable();
+    let start: Vec<f64> = rig.door.snapshot.axes[..3].iter().map(|axis| axis.position_set).collect();
+    let mut request = fixture::move_to(0.5);
+    let ends = [1.0, -0.4, 0.25];
+    request.target[..3].copy_from_slice(&ends);
+    rig.request(Request::Move(request));
+    let mut on_the_way = 0;
+    while rig.phase() == Phase::Moving {
+        rig.run(1);
+        let set: Vec<f64> = rig.door.snapshot.axes[..3].iter().map(|axis| axis.position_set).collect();
+        let share = (set[0] - start[0]) / (ends[0] - start[0]);
+        on_the_way += usize::from(share > 0.01 && share < 0.99);
+        for axis in 0..3 {
+            let error = set[axis] - (start[axis] + share * (ends[axis] - start[axis]));
+            assert!(error.abs() < 1e-9, "axis {axis} at {share}: {error}");
+        }
+    }
+    assert!(on_the_way > 100);
+}
+
+#[test]
+fn missed_feedback_is_counted_in_cycles_of_the_own_bus() {
+    let mut rig = Rig::of(two_rates()).enable();
+    rig.drive(4).is_silent = true;
+    // Three cycles are bridged; the fourth ends the eighth slot at the latest.
+    rig.run(6);
+    assert_eq!(rig.stops(), []);
+    rig.run(3);
+    assert_eq!(
+        rig.stops().iter().map(|stop| (stop.rule, stop.axis)).collect::<Vec<_>>(),
+        [(Rule::MissedFeedback, Some(4))]
+    );
+}
+
+#[test]
+fn a_drive_of_which_the_position_is_not_known_is_sent_nothing_until_bring_up_tells_it() {
+    let mut rig = Rig::new(2);
+    rig.drive(1).is_silent = true;
+    rig.door.requests.extend([Request::Sync(true), Request::Activate]);
+    rig.run(20);
+    assert!(!times_of(&rig, 0, Id::canopen(0x200, 1)).is_empty());
+    assert!(times_of(&rig, 0, Id::canopen(0x200, 2)).is_empty());
+    rig.request(Request::Position { axis: 1, counts: 2_345 });
+    rig.run(3);
+    let id = Id::canopen(0x200, 2);
+    let targets: Vec<i32> = rig.buses[0]
+        .sent
+        .iter()
+        .filter(|(_, frame)| frame.id() == id)
+        .map(|(_, frame)| (frame.first_word() >> 16) as i32)
+        .collect();
+    assert!(targets.len() >= 3 && targets.iter().all(|target| *target == 2_345), "{targets:?}");
+    rig.request(Request::Position { axis: 2, counts: 0 });
+    assert_eq!(rig.door.snapshot.refused, 1, "there is no such axis");
+}
+
+#[test]
+fn what_has_been_reported_counts_more_than_what_bring_up_tells() {
+    let mut rig = Rig::enabled(1);
+    rig.request(Request::Position { axis: 0, counts: 77_777 });
+    rig.run(5);
+    assert_eq!((rig.drive(0).position, rig.stops().len()), (1_000, 0));
+}
+
+/// A drive that has stopped for want of our heartbeat may go on with its old target when it returns.
+#[test]
+fn after_an_absence_set_points_leave_on_every_bus_before_the_heartbeat_does() {
+    // Stopped before a slot, or between SYNC and the set-points, with the heartbeat due in any of 50 slots.
+    for stall in [vec![3_000_000_000], vec![0, 3_000_000_000]] {
+        for before in 0..50 {
+            let mut rig = Rig::of(two_rates()).enable();
+            rig.run(before);
+            let gone_ns = rig.clock.now_ns;
+            rig.clock.lateness_ns.extend(stall.iter().copied());
+            rig.run(100);
+            for bus in 0..2 {
+                let later =
+                    |id| times_of(&rig, bus, id).into_iter().filter(|at| *at > gone_ns + 2_000_000_000);
+                let beat_ns = later(Id::canopen(0x700, 127)).next().unwrap();
+                let set_points = later(Id::canopen(0x200, 1)).filter(|at| *at < beat_ns).count();
+                assert!(set_points >= 3, "{set_points} on bus {bus}, {stall:?}, {before}");
+            }
+        }
+    }
+}

@@ -1,0 +1,13 @@
+//! Whole controllers in virtual time against simulated drives: interpolated position on YZ-AIMs, every mode of operation
+//! of an eRob, what comes on the wire, and what happens when the controller falls silent.
+
+mod world;
+
+mod arrival;
+mod bus_budget;
+mod interpolation;
+mod profile_position;
+mod profile_torque;
+mod profile_velocity;
+mod quirks;
+mod silence;

@@ -1,0 +1,99 @@
+//! Profile torque: within its limit, by the rated torque that the drive reports, and let go when the joint is too fast.
+
+use takt::config::Config;
+use takt::controller::Outcome;
+use takt::sim::erob::{ErobJoint, ErobParameters};
+use takt::sim::{BitRates, Drive, SimulatedBus};
+use takt_rt::door::{ProfileMove, Request};
+use takt_rt::profile::ProfileTarget;
+use takt_rt::stop::{Phase, Rule, StopCategory};
+
+use crate::world::{World, load, word};
+
+/// One eRob that differs from what the configuration says of it.
+fn erob_with(config: Config, change: impl Fn(&mut ErobParameters)) -> (Config, Vec<SimulatedBus>) {
+    let mut parameters = ErobParameters::of(&config.axes[0], &config.simulation);
+    change(&mut parameters);
+    let drive: Box<dyn Drive> = Box::new(ErobJoint::new(parameters));
+    let rates = BitRates { nominal: 1_000_000, data: None };
+    let bus = SimulatedBus::with_drives(rates, config.simulation.longest_gap_ns, vec![drive]);
+    (config, vec![bus])
+}
+
+fn last_torque(world: &mut World) -> i16 {
+    word(&world.port(0).sent_with(0x201).last().unwrap().1[2..4]) as i16
+}
+
+#[test]
+fn torque_is_converted_by_the_rated_torque_that_the_drive_reports() {
+    let config = load("erob-modes/erob-pt.toml");
+    let configured = config.axes[0].simulated.rated_torque;
+    let (config, buses) = erob_with(config, |parameters| parameters.rated_torque = 2.0 * configured);
+    let mut world = World::holding_on(config, buses);
+    world.drive_to(7, 0, ProfileTarget::Torque(2.0));
+    // The drive has a ramp of its own to the torque.
+    world.run_for(60);
+    assert_eq!(last_torque(&mut world), (1000.0 * 2.0 / (2.0 * configured)).round() as i16);
+    let seen = world.observe(0).torque;
+    assert!((seen - 2.0).abs() < 0.05, "{seen} N·m for 2 N·m");
+}
+
+#[test]
+fn a_torque_beyond_the_limit_is_refused_and_nothing_is_pushed() {
+    let mut world = World::holding(load("erob-modes/erob-pt.toml"));
+    let limit = world.config.axes[0].limits.torque;
+    for (count, target) in (1..).zip([
+        ProfileTarget::Torque(1.001 * limit),
+        ProfileTarget::Torque(-1.001 * limit),
+        ProfileTarget::Torque(f64::NAN),
+        ProfileTarget::Velocity(0.1),
+        ProfileTarget::Position(0.1),
+    ]) {
+        let wanted = ProfileMove { id: 7, axis: 0, target, valid_until_ns: u64::MAX };
+        world.request(Request::SetProfileTarget(wanted));
+        world.run_for(3);
+        assert_eq!((world.run.snapshot().refused, last_torque(&mut world)), (count, 0), "{target:?}");
+    }
+}
+
+#[test]
+fn a_joint_that_gets_too_fast_is_let_go_and_braked() {
+    let mut world = World::holding(load("erob-modes/erob-pt.toml"));
+    let limit = world.config.axes[0].limits.velocity;
+    world.drive_to(7, 0, ProfileTarget::Torque(3.0));
+    let mut fastest = 0.0_f64;
+    let outcome = world.run_to_the_end(|world| fastest = fastest.max(world.observe(0).velocity));
+    let Outcome::Stopped(stop) = outcome else { panic!("{outcome:?}") };
+    assert_eq!((stop.rule, stop.axis, stop.category), (Rule::VelocityLimit, Some(0), StopCategory::One));
+    assert!(fastest < 1.3 * limit, "{fastest}");
+    assert_eq!(world.stops().len(), 1);
+    let seen = world.observe(0);
+    assert!(seen.is_braked && seen.velocity == 0.0, "{seen:?}");
+}
+
+/// Its drive closes no loop that would hold the joint.
+#[test]
+fn a_stop_of_category_2_in_motion_becomes_one_of_category_1() {
+    let mut world = World::holding(load("erob-modes/erob-pt.toml"));
+    world.drive_to(7, 0, ProfileTarget::Torque(1.5));
+    world.run_for(500);
+    assert_eq!(world.phase(), Phase::Moving);
+    world.request(Request::Stop(StopCategory::Two));
+    world.run_until(|world| world.phase() == Phase::Disabled);
+    world.run_for(5);
+    assert_eq!(world.stops()[0].category, StopCategory::One);
+    assert!(world.observe(0).is_braked);
+}
+
+#[test]
+fn firmware_without_interpolated_position_is_named() {
+    let config = load("erob-modes/erob-ip.toml");
+    let (config, buses) = erob_with(config, |parameters| parameters.has_interpolated_position = false);
+    let mut world = World::on(config, buses);
+    let outcome = world.run_to_the_end(|_| ());
+    let Outcome::BringUpFailed(error) = outcome else { panic!("{outcome:?}") };
+    let text = error.to_string();
+    for part in ["firmware", "interpolated position", "6502", "mode = \"csp\""] {
+        assert!(text.contains(part), "{part} is not in: {text}");
+    }
+}
