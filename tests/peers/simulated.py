@@ -1,0 +1,23 @@
+"""`takt sim` as the other side of a bus."""
+
+import contextlib
+import os
+import subprocess
+import sys
+
+TAKT = os.environ["TAKT"]
+
+
+@contextlib.contextmanager
+def drives(config, bus, interface):
+    """The drives of a configuration, for as long as the context lasts."""
+    messages = os.path.join(os.environ["OUT"], f"sim-{interface}.txt")
+    with open(messages, "wb") as stderr:
+        process = subprocess.Popen([TAKT, "sim", config, "--bus", f"{bus}={interface}"], stderr=stderr)
+    try:
+        yield
+    finally:
+        process.terminate()
+        if process.wait(timeout=30) != 0:
+            with open(messages, encoding="utf-8") as said:
+                print(f"`takt sim` ended with {process.returncode}: {said.read()}", file=sys.stderr)
