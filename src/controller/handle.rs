@@ -273,13 +273,27 @@ impl Controller {
         self.drive(axis, ProfileTarget::Torque(torque), torque == 0.0, valid_for)
     }
 
-    /// Begins to follow [`Controller::stream`]. The first set-points must come within the time that enabling may take, and
-    /// begin where the joints are.
+    /// Begins to follow [`Controller::stream`]: what is streamed from now on counts. The first set-points must come within
+    /// the time that enabling may take, and begin where the joints are.
     ///
     /// # Errors
-    /// [`CommandError::Ended`].
-    pub fn begin_stream(&mut self) -> Result<(), CommandError> {
-        self.ask(Request::Stream)
+    /// [`MotionError::Refused`] unless the group holds its position and is punctual, [`MotionError::Ended`].
+    pub fn begin_stream(&mut self) -> Result<(), MotionError> {
+        let refused_before = self.state().refused;
+        self.ask(Request::Stream).map_err(|_| MotionError::Ended)?;
+        loop {
+            let state = self.state();
+            if state.phase == Phase::Streaming {
+                return Ok(());
+            }
+            if state.refused > refused_before {
+                return Err(MotionError::Refused { phase: state.phase });
+            }
+            if self.has_ended() {
+                return Err(MotionError::Ended);
+            }
+            thread::sleep(LOOK);
+        }
     }
 
     /// Replaces the streamed set-points, one for each axis; the real-time thread takes the newest ones. They expire after
@@ -340,7 +354,7 @@ impl Controller {
             if state.finished_move == motion.id && (!motion.ends_at_rest || state.phase == Phase::Holding) {
                 return Ok(());
             }
-            if let Some(reason) = state.stop.filter(|reason| reason.slot >= motion.slot) {
+            if let Some(reason) = state.stop.filter(|reason| reason.slot > motion.slot) {
                 return Err(MotionError::Stopped(reason));
             }
             if state.refused > motion.refused_before {
