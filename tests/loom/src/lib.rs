@@ -3,8 +3,9 @@
 //!
 //! What is proven here holds for the bounds that each test names. Loom knows the relaxed, acquire and release accesses
 //! and fences that the channels use, and keeps the last seven values of an atomic; no test here writes more. It does
-//! not let a load see a store that is executed later (load buffering). In the mailbox that cannot happen, for only
-//! one end stores; in a ring, an end stores only after the acquire load that allowed it to.
+//! not let a load see a store that is executed later (load buffering). The mailbox has no such executions, for
+//! only one end stores, nor has the ring, for what an end stores for the other is a release store, which no earlier
+//! access of its thread can come after.
 //!
 //! [`without_fences`] and [`all_relaxed`] are the same sources once more with the ordering taken away. They must
 //! fail: that shows that the tests would notice.
