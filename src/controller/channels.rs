@@ -11,6 +11,7 @@
 //! preempted in the middle of something.
 
 mod latest;
+mod primitives;
 mod records;
 mod ring;
 mod words;

@@ -8,7 +8,8 @@
 
 use std::slice;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering, fence};
+
+use super::primitives::{AtomicU64, Ordering, fence};
 
 const SLOTS: u64 = 4;
 

@@ -6,10 +6,10 @@
 //! and touch the queue only where the other end is known to be done with the slot: every call is wait-free.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
 
-use crossbeam::queue::ArrayQueue;
 use crossbeam::utils::CachePadded;
+
+use super::primitives::{ArrayQueue, AtomicU64, Ordering};
 
 struct Shared<T> {
     queue: ArrayQueue<T>,

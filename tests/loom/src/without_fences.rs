@@ -1,0 +1,10 @@
+//! The mailbox with fences that do nothing.
+
+#[path = "../../../src/controller/channels/latest.rs"]
+pub mod latest;
+
+mod primitives {
+    pub use loom::sync::atomic::{AtomicU64, Ordering};
+
+    pub fn fence(_: Ordering) {}
+}

@@ -1,0 +1,159 @@
+//! The mailbox of the newest value. Two words are enough for a mixture; the second use of a slot, which is what a read
+//! can be torn by, comes with the fifth value.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use loom::thread;
+use takt_loom::latest::{Attempt, Reader, Words, Writer, latest};
+use takt_loom::{all_relaxed, without_fences};
+
+const WORDS: usize = 2;
+
+fn write(writer: &mut Writer, number: u64) {
+    writer.write(|words| [number; WORDS].into_iter().for_each(|word| words.put(word)));
+}
+
+fn take(words: &mut Words<'_>) -> [u64; WORDS] {
+    [(); WORDS].map(|()| words.take())
+}
+
+/// A mailbox that has seen `written` values, each made of its own number.
+fn mailbox(written: u64) -> (Writer, Reader) {
+    let (mut writer, reader) = latest(WORDS);
+    (1..=written).for_each(|number| write(&mut writer, number));
+    (writer, reader)
+}
+
+/// What a reader sees in so many attempts, each of which may only be whole and newer, nothing, or torn. Returns the
+/// number of the newest value, and how many attempts were torn.
+fn follow(reader: &Reader, attempts: usize) -> (u64, u64) {
+    let (mut seen, mut torn, mut is_after_torn) = (0, 0, false);
+    for _ in 0..attempts {
+        let attempt = reader.attempt(seen, take);
+        assert!(!is_after_torn || attempt != Attempt::Nothing, "nothing new after a torn read");
+        is_after_torn = attempt == Attempt::Torn;
+        match attempt {
+            Attempt::Whole(value, number) => {
+                assert_eq!(value, [number; WORDS], "words of two values");
+                assert!(number > seen, "an older value after a newer one");
+                seen = number;
+            }
+            Attempt::Nothing => {}
+            Attempt::Torn => torn += 1,
+        }
+    }
+    (seen, torn)
+}
+
+/// One reader makes `attempts` while a mailbox that has `before` values gets values up to number `last`. Returns how
+/// many attempts were torn in the worst of all schedules.
+fn reader_beside_writer(before: u64, last: u64, attempts: usize) -> u64 {
+    let worst = Arc::new(AtomicU64::new(0));
+    let worst_so_far = Arc::clone(&worst);
+    loom::model(move || {
+        let (mut writer, reader) = mailbox(before);
+        let observer = reader.clone();
+        let following = thread::spawn(move || follow(&observer, attempts));
+        (before + 1..=last).for_each(|number| write(&mut writer, number));
+        let (_, torn) = following.join().unwrap();
+        // A read is torn only by three values that were completed meanwhile.
+        assert!(torn <= (last - before) / 3, "{torn} torn reads");
+        assert_eq!(reader.attempt(0, take), Attempt::Whole([last; WORDS], last));
+        worst_so_far.fetch_max(torn, Ordering::Relaxed);
+    });
+    worst.load(Ordering::Relaxed)
+}
+
+#[test]
+fn a_reader_from_the_first_value_on_sees_whole_values_each_newer_than_the_last() {
+    assert_eq!(reader_beside_writer(0, 3, 3), 0);
+}
+
+#[test]
+fn a_reader_whose_slot_is_used_again_sees_a_whole_value_or_knows_that_it_did_not_and_next_time_does() {
+    assert_eq!(reader_beside_writer(1, 5, 3), 1);
+}
+
+#[test]
+fn two_readers_do_not_disturb_each_other() {
+    loom::model(|| {
+        let (mut writer, reader) = mailbox(1);
+        let readers = [reader.clone(), reader.clone()];
+        let following = readers.map(|reader| thread::spawn(move || follow(&reader, 1)));
+        (2..=3).for_each(|number| write(&mut writer, number));
+        for reader in following {
+            let (seen, torn) = reader.join().unwrap();
+            assert!(seen >= 1 && torn == 0);
+        }
+        assert_eq!(reader.attempt(0, take), Attempt::Whole([3; WORDS], 3));
+    });
+}
+
+#[test]
+fn a_reader_does_not_wait_for_a_writer_that_was_preempted_in_the_middle_of_a_value() {
+    for before in 1..=5 {
+        loom::model(move || {
+            let (mut writer, reader) = mailbox(before);
+            let reading = thread::spawn(move || follow(&reader, 2));
+            writer.write(|words| {
+                words.put(before + 1);
+                // The rest of the value comes only when the reader has finished.
+                assert_eq!(reading.join().unwrap(), (before, 0));
+                words.put(before + 1);
+            });
+        });
+    }
+}
+
+#[test]
+fn a_writer_does_not_wait_for_a_reader_that_was_preempted_in_the_middle_of_a_value() {
+    for (values, is_whole) in [(2, true), (3, false), (4, false)] {
+        loom::model(move || {
+            let (mut writer, reader) = mailbox(1);
+            let attempt = reader.attempt(0, |words| {
+                let first = words.take();
+                let writing =
+                    thread::spawn(move || (2..2 + values).for_each(|number| write(&mut writer, number)));
+                // The rest of the value is read only when the writer has finished.
+                writing.join().unwrap();
+                [first, words.take()]
+            });
+            assert_eq!(attempt, if is_whole { Attempt::Whole([1; WORDS], 1) } else { Attempt::Torn });
+            assert_eq!(follow(&reader, 1), (1 + values, 0));
+        });
+    }
+}
+
+/// The same as above, short, for a mailbox that is not as it should be.
+macro_rules! reader_beside_writer_of {
+    ($latest:ident, $before:literal..=$last:literal) => {
+        loom::model(|| {
+            let (mut writer, reader) = $latest::latest::latest(WORDS);
+            let mut write = move |number| {
+                writer.write(|words| [number; WORDS].map(|word| words.put(word)).into_iter().collect())
+            };
+            (1..=$before).for_each(&mut write);
+            let reading = thread::spawn(move || {
+                let attempt = reader.attempt(0, |words| [(); WORDS].map(|()| words.take()));
+                if let $latest::latest::Attempt::Whole(value, number) = attempt {
+                    assert_eq!(value, [number; WORDS], "words of two values");
+                }
+            });
+            ($before + 1..=$last).for_each(&mut write);
+            reading.join().unwrap();
+        })
+    };
+}
+
+#[test]
+#[should_panic(expected = "words of two values")]
+fn without_its_fences_the_mailbox_fails() {
+    reader_beside_writer_of!(without_fences, 1..=5);
+}
+
+#[test]
+#[should_panic(expected = "words of two values")]
+fn with_every_access_relaxed_the_mailbox_fails() {
+    reader_beside_writer_of!(all_relaxed, 0..=1);
+}
