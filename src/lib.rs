@@ -16,7 +16,7 @@
 //! - [`faults`]: what can go wrong on a bus or in a drive, on purpose, from a scenario file.
 //! - [`telemetry`]: the logger that empties the rings: statistics, recordings, the report.
 //!
-//! To embed takt, see `examples/` and [`controller::session::run`].
+//! To embed takt, see `examples/` and [`controller::Controller`].
 #![deny(unsafe_code)]
 
 pub mod bus;

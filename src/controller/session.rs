@@ -79,7 +79,8 @@ pub enum SessionError {
 /// Runs the program of a configuration. `notify` hears what the logger has to say, from its thread. `watch` is called
 /// about once in a millisecond with the newest state and what the run is doing, and may ask it to end.
 ///
-/// When `notify` or `watch` panics, the panic is caught, that one is not called again, and the group stops in category 1; the run then ends as [`Outcome::CallbackPanicked`].
+/// When `notify` or `watch` panics, the panic is caught, that one is not called again, and the group stops in category 1;
+/// the run then ends as [`Outcome::CallbackPanicked`].
 ///
 /// # Errors
 /// See [`SessionError`]; nothing has moved then.

@@ -1,7 +1,7 @@
 //! What differs from one family of drives to the next: process data, bring-up, parameters.
 //!
-//! A family writes its procedures down as lists of steps (`erob_canopen`, `yz_aim`, `step_list`, `step`); one machine carries them out for
-//! every family (`axis_run`), for all axes at once ([`BringUp`], [`Leave`]); what was learnt is in [`AxisFacts`], what
+//! A family writes its procedures down as lists of steps (`erob_canopen`, `yz_aim`, `step_list`, `step`); one machine
+//! carries them out for every family (`axis_run`), for all axes at once ([`BringUp`], [`Leave`]); what was learnt is in [`AxisFacts`], what
 //! went wrong in [`BringUpError`].
 
 mod axis_run;
