@@ -41,3 +41,21 @@ fn a_drive_that_is_given_up_while_it_still_follows_is_not_stepped_to_where_it_is
     let delayed = delay("axis = \"pitch\"", 2312, 312) + &delay("bus = \"arm\"", 2293, 439);
     play(&moving("mixed-arm", &delayed)).unwrap();
 }
+
+#[test]
+fn a_stop_ends_whose_set_points_are_never_confirmed_whatever_its_reason() {
+    let two = "[[fault]]\nkind = \"duplicate\"\nbus = \"can\"\ncopies = 2\nwhen = \"moving\"\nat = \"118 ms\"\n\
+               [[fault]]\nkind = \"echo-loss\"\nbus = \"can\"\nwhen = \"moving\"\nat = \"132 ms\"\n";
+    play(&moving("erob-modes/erob-ip", two)).unwrap();
+}
+
+#[test]
+fn a_bus_that_is_lost_soon_after_the_axes_are_enabled_is_noticed_by_its_drives() {
+    for at_ms in (5..100).step_by(20) {
+        let lost = format!(
+            "[[fault]]\nkind = \"bus-off\"\nbus = \"wrist\"\nwhen = \"moving\"\nat = \"{at_ms} ms\"\n"
+        );
+        let played = play(&moving("arm6-erob-cst", &lost));
+        assert!(played.is_ok(), "at {at_ms} ms: {played:?}");
+    }
+}
