@@ -19,7 +19,7 @@ use crate::frame::{Frame, Id};
 use crate::motion::Motion;
 use crate::port::{BusHealth, Received};
 use crate::record::{CycleRecord, Event, EventKind, MAX_AXES, MAX_BUSES, Timing};
-use crate::stop::{Phase, Rule, StopCategories, StopReason};
+use crate::stop::{Phase, StopCategories, StopReason};
 use crate::time::{NANOSECONDS_PER_SECOND, Nanoseconds};
 use crate::watch::{LeakyBucket, TimingLadder, TimingLevel};
 
