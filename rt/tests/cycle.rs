@@ -97,7 +97,9 @@ fn the_heartbeat_leaves_once_in_its_period_behind_the_set_points() {
     rig.run(500);
     let beats = times_of(&rig, Id::canopen(0x700, 127));
     assert!(beats.len() >= 10);
-    assert!(beats.windows(2).all(|pair| pair[1] - pair[0] == 50 * PERIOD_NS));
+    let gaps: Vec<u64> = beats.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    assert!(gaps[0] < 50 * PERIOD_NS, "enabling hastens it, so that the drives watch before anything moves");
+    assert!(gaps[1..].iter().all(|gap| *gap == 50 * PERIOD_NS), "{gaps:?}");
     let position = |id| rig.buses[0].sent.iter().rposition(|(_, frame)| frame.id() == id).unwrap();
     let beat = position(Id::canopen(0x700, 127));
     let behind =

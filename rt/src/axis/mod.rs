@@ -482,7 +482,13 @@ impl Axis {
             self.profile.rest(law.idle(self.position_raw));
             self.profile_target = None;
             self.torque_set = 0.0;
-            self.profile.target_raw()
+            // One that has been given up may still follow its target until it takes the controlword that disables it: a
+            // position stays what it was, so that this is no step by the following error.
+            let still_follows = self.is_lost
+                && self.drive_state() == DriveState::OperationEnabled
+                && law.target_slot() == CommandSlot::TargetPosition
+                && !law.is_profile();
+            if still_follows { self.command.command(law.target_slot()) } else { self.profile.target_raw() }
         } else if law.is_profile() {
             self.torque_set = match self.profile_target {
                 Some(ProfileTarget::Torque(torque)) => torque,

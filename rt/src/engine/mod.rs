@@ -19,7 +19,7 @@ use crate::frame::{Frame, Id};
 use crate::motion::Motion;
 use crate::port::{BusHealth, Received};
 use crate::record::{CycleRecord, Event, EventKind, MAX_AXES, MAX_BUSES, Timing};
-use crate::stop::{Phase, Rule, StopCategories, StopReason};
+use crate::stop::{Phase, StopCategories, StopReason};
 use crate::time::{NANOSECONDS_PER_SECOND, Nanoseconds};
 use crate::watch::{LeakyBucket, TimingLadder, TimingLevel};
 
@@ -330,8 +330,8 @@ impl Engine {
             self.bridged_cycles = MARKED_BY_BRIDGE;
         }
         self.supervise(buses, transmission, now_ns, door);
-        // Once the group stops because its set-points do not get out, it does not wait for them any longer.
-        let is_given_up = self.stop.is_some_and(|stop| stop.rule == Rule::NotTransmitted);
+        // A group that stops and whose set-points do not get out does not wait for them any longer, whatever it stops for.
+        let is_given_up = self.stop.is_some() && self.blocked_cycles > self.not_transmitted_cycles;
         let can_leave = match transmission {
             Transmission::Free => true,
             Transmission::TooLate => false,
@@ -374,13 +374,23 @@ impl Engine {
     fn hold_heartbeat_back(&mut self, elapsed: u64, transmission: Transmission) {
         let was_away = self.heartbeat.is_some_and(|heartbeat| elapsed > heartbeat.cycles.into());
         let held = if was_away {
-            let slowest = self.buses.iter().map(|bus| bus.divider).max().unwrap_or(1);
-            HEARTBEAT_HELD_BUS_CYCLES.saturating_mul(slowest)
+            self.heartbeat_held_cycles()
         } else {
             // Only the next slot shows how long the absence was.
             u32::from(transmission == Transmission::TooLate)
         };
         self.heartbeat_due = self.heartbeat_due.max(held);
+    }
+
+    /// A drive watches the controller from the first heartbeat on that it hears after it has been set up: that comes before
+    /// anything moves, and not only after a whole period.
+    fn hasten_heartbeat(&mut self) {
+        self.heartbeat_due = self.heartbeat_due.min(self.heartbeat_held_cycles());
+    }
+
+    fn heartbeat_held_cycles(&self) -> u32 {
+        let slowest = self.buses.iter().map(|bus| bus.divider).max().unwrap_or(1);
+        HEARTBEAT_HELD_BUS_CYCLES.saturating_mul(slowest)
     }
 
     fn notice_drive_states(&mut self, now_ns: Nanoseconds, door: &mut impl Door) {

@@ -1,0 +1,28 @@
+//! What is stated of a stop: how long it takes and how far it leads.
+
+use takt::config::{Axis, Config};
+
+/// How far behind its set-point a joint may be that obeys.
+const LAG_S: f64 = 0.4;
+
+fn stopping_s(axis: &Axis) -> f64 {
+    let limits = &axis.limits;
+    // At full speed and in full acceleration: the acceleration is taken back, turned round, and taken back again.
+    let turning_s = (limits.acceleration + 2.0 * limits.deceleration) / limits.jerk;
+    limits.velocity / limits.deceleration + if turning_s.is_finite() { turning_s } else { 0.0 }
+}
+
+/// From the reason of a stop to rest of every joint that obeys: that of the slowest axis, since they stop together.
+pub fn to_rest_s(config: &Config) -> f64 {
+    config.axes.iter().map(stopping_s).fold(0.0, f64::max) + LAG_S
+}
+
+/// How far a joint may travel until then: rad (m).
+pub fn to_rest_distance(config: &Config, axis: &Axis) -> f64 {
+    axis.limits.velocity * (to_rest_s(config) + LAG_S) / 2.0
+}
+
+/// The most cycles in a phase that must pass by itself.
+pub fn cycles(config: &Config, seconds: f64) -> u64 {
+    (seconds * 1e9 / config.cycle.period_ns as f64) as u64
+}

@@ -1,0 +1,189 @@
+//! Somebody who asks the group for anything at any time.
+
+use takt::config::Config;
+use takt_rt::door::{Move, ProfileMove, Request, Snapshot, StreamCommand};
+use takt_rt::plan::State;
+use takt_rt::profile::ProfileTarget;
+use takt_rt::record::MAX_AXES;
+use takt_rt::stop::{Phase, StopCategory};
+
+use crate::dice::Dice;
+
+/// What the client wants in a cycle.
+#[derive(Default)]
+pub struct Wishes {
+    pub requests: Vec<Request>,
+    pub stream: Option<StreamCommand>,
+    /// How much too late the next wake-up is.
+    pub late_ns: u64,
+}
+
+/// A stream under way.
+#[derive(Clone, Copy)]
+struct Stream {
+    cycles_left: usize,
+    begun: [f64; MAX_AXES],
+    elapsed_s: f64,
+    swing: f64,
+    badness: Badness,
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Badness {
+    None,
+    Leap,
+    NotFinite,
+    Fast,
+}
+
+pub struct Client {
+    dice: Dice,
+    restlessness: f64,
+    stream: Option<Stream>,
+    last_id: u32,
+}
+
+impl Client {
+    pub fn new(mut dice: Dice) -> Self {
+        let restlessness = dice.pick(&[0.002, 0.01, 0.05]);
+        Self { dice, restlessness, stream: None, last_id: 1000 }
+    }
+
+    /// What it wants after a cycle.
+    pub fn wishes(&mut self, config: &Config, snapshot: &Snapshot) -> Wishes {
+        let mut wishes = Wishes { stream: self.streamed(config, snapshot), ..Wishes::default() };
+        if !self.dice.chance(self.restlessness) {
+            return wishes;
+        }
+        let request = match self.dice.below(20) {
+            0 => Request::Stop(self.dice.pick(&[StopCategory::Two, StopCategory::One, StopCategory::Zero])),
+            1 => Request::Stop(StopCategory::Two),
+            2 => Request::Disable,
+            3..=5 => Request::Enable,
+            6 => Request::ResetFaults,
+            7..=9 => {
+                self.begin_stream(config, snapshot);
+                Request::Stream
+            }
+            10..=12 => self.profile_target(config, snapshot),
+            13 => {
+                wishes.late_ns = (self.dice.between(0.1, 12.0) * config.cycle.period_ns as f64) as u64;
+                return wishes;
+            }
+            _ => self.random_move(config),
+        };
+        wishes.requests.push(request);
+        wishes
+    }
+
+    fn id(&mut self) -> u32 {
+        self.last_id += 1;
+        self.last_id
+    }
+
+    fn scale(&mut self) -> f64 {
+        if self.dice.chance(0.03) {
+            self.dice.pick(&[0.0, -1.0, 2.0, f64::NAN])
+        } else {
+            self.dice.between(0.05, 1.0)
+        }
+    }
+
+    fn random_move(&mut self, config: &Config) -> Request {
+        let (mut target, mut target_velocity) = ([0.0; MAX_AXES], [0.0; MAX_AXES]);
+        let is_passing = self.dice.chance(0.1);
+        for (index, axis) in config.axes.iter().enumerate() {
+            let (low, high) = (axis.limits.position_min, axis.limits.position_max);
+            target[index] = self.dice.between(low, high);
+            if is_passing {
+                target_velocity[index] = self.dice.between(-1.0, 1.0) * axis.limits.velocity;
+            }
+        }
+        if self.dice.chance(0.05) {
+            target[0] = self.dice.pick(&[f64::NAN, f64::INFINITY, 1e9, -1e9]);
+        }
+        let minimum_duration_s = if self.dice.chance(0.1) { self.dice.between(0.0, 2.0) } else { 0.0 };
+        let (velocity_scale, acceleration_scale) = (self.scale(), self.scale());
+        let id = self.id();
+        Request::Move(Move {
+            id,
+            target,
+            target_velocity,
+            velocity_scale,
+            acceleration_scale,
+            minimum_duration_s,
+        })
+    }
+
+    fn profile_target(&mut self, config: &Config, snapshot: &Snapshot) -> Request {
+        let axis = self.dice.below(config.axes.len());
+        let limits = &config.axes[axis].limits;
+        let share = self.dice.between(-1.1, 1.1);
+        let target = match self.dice.below(3) {
+            0 => ProfileTarget::Position(self.dice.between(limits.position_min, limits.position_max)),
+            1 => ProfileTarget::Velocity(share * limits.velocity),
+            _ => ProfileTarget::Torque(share * limits.torque * 0.2),
+        };
+        let valid_until_ns = snapshot.at_ns + self.dice.below(2_000_000_000) as u64;
+        Request::SetProfileTarget(ProfileMove { id: self.id(), axis: axis as u8, target, valid_until_ns })
+    }
+
+    fn begin_stream(&mut self, config: &Config, snapshot: &Snapshot) {
+        let mut begun = [0.0; MAX_AXES];
+        for (begun, axis) in begun.iter_mut().zip(&snapshot.axes[..config.axes.len()]) {
+            *begun = axis.position_set;
+        }
+        if self.dice.chance(0.05) {
+            begun[0] += 1.0;
+        }
+        let badness = self.dice.pick(&[
+            Badness::None,
+            Badness::None,
+            Badness::None,
+            Badness::Leap,
+            Badness::NotFinite,
+            Badness::Fast,
+        ]);
+        let (cycles_left, swing) = (1 + self.dice.below(1000), self.dice.between(-0.5, 0.5));
+        self.stream = Some(Stream { cycles_left, begun, elapsed_s: 0.0, swing, badness });
+    }
+
+    /// A swing to and fro from where the axes were, well within their limits as long as it is a good one.
+    fn streamed(&mut self, config: &Config, snapshot: &Snapshot) -> Option<StreamCommand> {
+        let stream = self.stream.as_mut()?;
+        let period_s = config.cycle.period_ns as f64 * 1e-9;
+        stream.elapsed_s += period_s;
+        stream.cycles_left = stream.cycles_left.saturating_sub(1);
+        let is_last = stream.cycles_left == 0;
+        let rate = if stream.badness == Badness::Fast { 12.0 } else { 3.0 };
+        let mut set_points = [State::default(); MAX_AXES];
+        for (index, axis) in config.axes.iter().enumerate() {
+            // Eases in with no velocity, no acceleration and little jerk.
+            let amplitude = stream.swing * axis.limits.velocity.min(axis.limits.acceleration) / 6.0;
+            let ease = (stream.elapsed_s / 0.5).min(1.0);
+            let ease = ease * ease * ease * (10.0 + ease * (6.0 * ease - 15.0));
+            let phase = rate * stream.elapsed_s;
+            let position = stream.begun[index] + amplitude * ease * (1.0 - phase.cos());
+            let velocity = amplitude * ease * rate * phase.sin();
+            set_points[index] = State { position, velocity, acceleration: 0.0 };
+        }
+        if is_last {
+            match stream.badness {
+                Badness::Leap => set_points[0].position += 0.5,
+                Badness::NotFinite => set_points[0].position = f64::NAN,
+                Badness::None | Badness::Fast => {}
+            }
+        }
+        let valid_until_ns = snapshot.at_ns + self.dice.between(0.5, 30.0) as u64 * config.cycle.period_ns;
+        if is_last {
+            self.stream = None;
+        }
+        Some(StreamCommand { valid_until_ns, set_points })
+    }
+}
+
+/// Whether the group can be asked for something at all: it has been enabled, and nothing has stopped it by itself.
+pub fn is_open(snapshot: &Snapshot) -> bool {
+    let has_own_stop = snapshot.stop.is_some_and(|stop| stop.rule != takt_rt::stop::Rule::Requested);
+    snapshot.phase != Phase::Passive && !has_own_stop
+}

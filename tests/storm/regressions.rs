@@ -1,0 +1,61 @@
+//! What storms have found, one case each.
+
+use takt::config::{ProgramMove, ProgramTarget};
+
+use crate::case::{Case, load, scenario};
+use crate::dice::Dice;
+use crate::run::play;
+
+/// A move of all axes of a configuration from the middle of the first half of their travel, with these faults.
+fn moving(name: &'static str, text: &str) -> Case {
+    let mut config = load(name);
+    let to = config.axes.iter().map(|axis| 0.75 * axis.limits.position_max);
+    config.program.moves = vec![ProgramMove {
+        target: ProgramTarget::Position(to.collect()),
+        velocity_scale: 1.0,
+        acceleration_scale: 1.0,
+        minimum_duration_s: 0.0,
+        dwell_s: 0.0,
+    }];
+    let scenario = scenario(text, &config);
+    Case {
+        name,
+        config,
+        text: text.to_owned(),
+        scenario,
+        has_client: false,
+        length: 3000,
+        is_cut: false,
+        dice: Dice::new(0),
+    }
+}
+
+#[test]
+fn a_drive_that_is_given_up_while_it_still_follows_is_not_stepped_to_where_it_is() {
+    // Set-points lie too long on both buses; the drives are enabled and a following error behind.
+    let delay = |place: &str, by_us: u32, at_ms: u32| {
+        format!(
+            "[[fault]]\nkind = \"delay\"\n{place}\nby = \"{by_us} us\"\nwhen = \"moving\"\nat = \"{at_ms} ms\"\n"
+        )
+    };
+    let delayed = delay("axis = \"pitch\"", 2312, 312) + &delay("bus = \"arm\"", 2293, 439);
+    play(&moving("mixed-arm", &delayed)).unwrap();
+}
+
+#[test]
+fn a_stop_ends_whose_set_points_are_never_confirmed_whatever_its_reason() {
+    let two = "[[fault]]\nkind = \"duplicate\"\nbus = \"can\"\ncopies = 2\nwhen = \"moving\"\nat = \"118 ms\"\n\
+               [[fault]]\nkind = \"echo-loss\"\nbus = \"can\"\nwhen = \"moving\"\nat = \"132 ms\"\n";
+    play(&moving("erob-modes/erob-ip", two)).unwrap();
+}
+
+#[test]
+fn a_bus_that_is_lost_soon_after_the_axes_are_enabled_is_noticed_by_its_drives() {
+    for at_ms in (5..100).step_by(20) {
+        let lost = format!(
+            "[[fault]]\nkind = \"bus-off\"\nbus = \"wrist\"\nwhen = \"moving\"\nat = \"{at_ms} ms\"\n"
+        );
+        let played = play(&moving("arm6-erob-cst", &lost));
+        assert!(played.is_ok(), "at {at_ms} ms: {played:?}");
+    }
+}

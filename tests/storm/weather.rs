@@ -1,0 +1,150 @@
+//! Random faults of every kind, as a user would write them down.
+
+use takt::config::{Axis, Config, Travel};
+
+use crate::dice::Dice;
+
+/// Every kind of `configs/faults/reference.toml`.
+pub const KINDS: [&str; 35] = [
+    "drop",
+    "delay",
+    "duplicate",
+    "corrupt",
+    "reorder",
+    "echo-loss",
+    "full-queue",
+    "bus-off",
+    "error-passive",
+    "interface-down",
+    "foreign-sync",
+    "foreign-set-points",
+    "foreign-nmt",
+    "duplicate-node",
+    "foreign-frame",
+    "flood",
+    "stall",
+    "stuck-brake",
+    "load",
+    "encoder-jump",
+    "silent-node",
+    "reboot",
+    "stuck-sdo",
+    "wrong-mapping",
+    "statusword",
+    "mode-display",
+    "torque-off",
+    "alarm",
+    "emergency",
+    "over-current",
+    "over-voltage",
+    "under-voltage",
+    "over-temperature",
+    "encoder-failure",
+    "battery",
+];
+
+/// What a fault needs to be told beside its kind.
+enum Place {
+    Bus,
+    Axis,
+}
+
+/// One fault, and when it comes unless that is given.
+pub fn fault(dice: &mut Dice, config: &Config, kind: &str, when: Option<&str>) -> String {
+    let axis = &config.axes[dice.below(config.axes.len())];
+    let bus = &config.buses[axis.bus].name;
+    let (place, lasts, keys) = particulars(dice, axis, kind);
+    let place = match place {
+        Place::Bus => format!("bus = \"{bus}\""),
+        Place::Axis => format!("axis = \"{}\"", axis.name),
+    };
+    let when = when.map_or_else(
+        || {
+            let (cue, at_most) = dice.pick(&[
+                ("enabled", 1200),
+                ("enabled", 300),
+                ("moving", 900),
+                ("moving", 900),
+                ("stopping", 300),
+            ]);
+            format!("when = \"{cue}\"\nat = \"{} ms\"", dice.below(at_most))
+        },
+        ToOwned::to_owned,
+    );
+    let lasts = match lasts && dice.chance(0.7) {
+        true => format!("for = \"{} ms\"", 1 + dice.below(600)),
+        false => String::new(),
+    };
+    format!("[[fault]]\nkind = \"{kind}\"\n{place}\n{keys}\n{when}\n{lasts}\n")
+}
+
+/// Where, whether it may end, and the keys of a fault.
+fn particulars(dice: &mut Dice, axis: &Axis, kind: &str) -> (Place, bool, String) {
+    let somewhere = if dice.chance(0.6) { Place::Axis } else { Place::Bus };
+    match kind {
+        "drop" => (somewhere, true, frames(dice, true)),
+        "delay" => (somewhere, true, format!("{}\nby = \"{} us\"", frames(dice, true), 1 + dice.below(3000))),
+        "duplicate" => (somewhere, true, format!("{}\ncopies = {}", frames(dice, true), 1 + dice.below(8))),
+        "corrupt" => {
+            let (bits, part) = (1 + dice.below(8), dice.pick(&["payload", "identifier"]));
+            (somewhere, true, format!("{}\nbits = {bits}\npart = \"{part}\"", frames(dice, true)))
+        }
+        "reorder" => (Place::Bus, true, frames(dice, true)),
+        "echo-loss" | "full-queue" => (Place::Bus, true, frames(dice, false)),
+        "bus-off" => {
+            let restart = if dice.chance(0.5) { "restart = \"100 ms\"" } else { "" };
+            (Place::Bus, false, restart.to_owned())
+        }
+        "error-passive" | "interface-down" => (Place::Bus, true, String::new()),
+        "foreign-sync" => (Place::Bus, true, format!("period = \"{} us\"", 500 + dice.below(5000))),
+        "foreign-set-points" => (Place::Axis, true, String::new()),
+        "foreign-nmt" => {
+            let command =
+                dice.pick(&["start", "stop", "pre-operational", "reset-node", "reset-communication"]);
+            (somewhere, false, format!("command = \"{command}\""))
+        }
+        "duplicate-node" => (Place::Axis, true, format!("period = \"{} ms\"", 10 + dice.below(200))),
+        "foreign-frame" => {
+            (Place::Bus, true, format!("id = {}\ndata = [1, 2, 3]\nperiod = \"3 ms\"", dice.below(0x800)))
+        }
+        "flood" => (Place::Bus, true, format!("period = \"{} us\"", 50 + dice.below(400))),
+        "stall" | "stuck-brake" | "silent-node" | "stuck-sdo" => (Place::Axis, true, String::new()),
+        "load" => {
+            let unit = if axis.travel == Travel::Rotary { "Nm" } else { "N" };
+            let torque = dice.between(-0.8, 0.8) * axis.limits.torque;
+            (Place::Axis, true, format!("torque = \"{torque:.2} {unit}\""))
+        }
+        "encoder-jump" => {
+            let unit = if axis.travel == Travel::Rotary { "deg" } else { "mm" };
+            (Place::Axis, false, format!("by = \"{:.3} {unit}\"", dice.between(-8.0, 8.0)))
+        }
+        "wrong-mapping" => (Place::Axis, true, format!("contents = \"{}\"", dice.pick(&["other", "short"]))),
+        "statusword" => {
+            let (set, clear) = (1 << dice.below(16), 1 << dice.below(16));
+            (Place::Axis, true, format!("set = {set}\nclear = {clear}"))
+        }
+        "mode-display" => (Place::Axis, true, "mode = 1".to_owned()),
+        "alarm" => (Place::Axis, false, "code = 0x7500".to_owned()),
+        "emergency" => (Place::Axis, false, "code = 0x4210".to_owned()),
+        _ => (Place::Axis, false, String::new()),
+    }
+}
+
+/// Which frames, how many of them.
+fn frames(dice: &mut Dice, has_direction: bool) -> String {
+    let mut keys = vec![format!("seed = {}", dice.below(1000))];
+    if dice.chance(0.6) {
+        let functions: &[&str] = match has_direction {
+            true => &["tpdo", "rpdo", "heartbeat", "sync", "emergency", "tpdo", "rpdo"],
+            false => &["rpdo", "sync"],
+        };
+        keys.push(format!("function = \"{}\"", dice.pick(functions)));
+    }
+    if dice.chance(0.6) {
+        keys.push(format!("probability = \"{} %\"", 1 + dice.below(99)));
+    }
+    if dice.chance(0.3) {
+        keys.push(format!("count = {}", 1 + dice.below(40)));
+    }
+    keys.join("\n")
+}
