@@ -63,3 +63,19 @@ cyclictest_row() {
     cyclictest --mlockall --quiet --priority=90 --interval=1000 --loops="$1" \
         | sed -n 's/.*Min: *\([0-9]*\).*Avg: *\([0-9]*\).*Max: *\([0-9]*\).*/\1 \2 \3/p'
 }
+
+# first_bus_only CONFIG: paragraph by paragraph, without the axes of the second bus.
+first_bus_only() {
+    awk -v RS= -v ORS='\n\n' '/^\[\[axis\]\]/ { is_left_out = /bus = "wrist"/ } /^\[\[program/ { is_left_out = 0 }
+        !is_left_out && !/name = "wrist"/' "$1" | sed -E 's/^(to = \[[^,]+,[^,]+,[^,]+),.*\]/\1]/'
+}
+
+# drives_on PRIORITY CONFIG LEFT [RIGHT]: the other side, until drives_off.
+drives=
+drives_on() {
+    local priority=$1
+    shift
+    chrt --fifo "$priority" "$TAKT" sim "$1" --bus base="$2" ${3:+--bus wrist=$3} 2> "$OUT/sim.txt" & drives=$!
+    sleep 1
+}
+drives_off() { kill "$drives"; wait "$drives"; }

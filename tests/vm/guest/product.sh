@@ -6,7 +6,7 @@
 # allowed (under load: more than a few of them), a set-point missed its slot, feedback was late, or there were more system calls than
 # there may be.
 . tests/vm/guest/laboratory.sh
-cycles=${CYCLES:-10000} load_cycles=${LOAD_CYCLES:-2000} other_cycles=${OTHER_CYCLES:-2000}
+cycles=${CYCLES:-10000} load_cycles=${LOAD_CYCLES:-2000} other_cycles=${OTHER_CYCLES:-1000}
 # Beyond cyclictest's maximum, in microseconds.
 idle_allowance=5 load_allowance=10
 # Further than any deviation: not limited.
@@ -16,9 +16,7 @@ mkdir -p "$OUT/configs"
 arm=$OUT/configs/arm.toml arm_2ms=$OUT/configs/arm-2ms.toml arm_sleep=$OUT/configs/arm-sleep.toml
 half=$OUT/configs/half.toml half_2ms=$OUT/configs/half-2ms.toml
 cp configs/arm6-erob.toml "$arm"
-# Paragraph by paragraph, without the axes of the second bus.
-awk -v RS= -v ORS='\n\n' '/^\[\[axis\]\]/ { is_left_out = /bus = "wrist"/ } /^\[\[program/ { is_left_out = 0 }
-    !is_left_out && !/name = "wrist"/' "$arm" | sed -E 's/^(to = \[[^,]+,[^,]+,[^,]+),.*\]/\1]/' > "$half"
+first_bus_only "$arm" > "$half"
 two_ms() { sed 's/^period = "1 ms"/period = "2 ms"/' "$1"; }
 two_ms "$arm" > "$arm_2ms"
 two_ms "$half" > "$half_2ms"
@@ -88,18 +86,9 @@ measure() { # NAME idle|load CYCLES ALLOWANCE PERIOD_US CONFIG LISTEN INTERFACE.
     return $status
 }
 
-drives=
-drives_on() { # PRIORITY CONFIG LEFT [RIGHT]
-    local priority=$1
-    shift
-    chrt --fifo "$priority" "$TAKT" sim "$1" --bus base="$2" ${3:+--bus wrist=$3} 2> "$OUT/sim.txt" & drives=$!
-    sleep 1
-}
-drives_off() { kill "$drives"; wait "$drives"; }
-
 # Both ways of waiting, as takt itself sees them.
 jitter() { # idle|load
-    "$TAKT" jitter --bus vcan0 --cycles 2000 2>/dev/null > "$OUT/jitter-$1.txt" || return
+    "$TAKT" jitter --bus vcan0 --cycles 1000 2>/dev/null > "$OUT/jitter-$1.txt" || return
     echo "takt jitter, $1" >> "$OUT/jitter.txt"
     grep -E '── |^latency|^wake-up|^SYNC release|^missed' "$OUT/jitter-$1.txt" >> "$OUT/jitter.txt"
     rm "$OUT/jitter-$1.txt"
