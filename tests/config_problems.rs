@@ -159,6 +159,7 @@ cases! {
 
     a_table_that_should_be_one_of_a_list_is_named {
         "[[axis]]\nname = \"second\"" => "[master.axis]\n[[axis]]\nname = \"second\"", at "[master.axis]": UnknownKey { .. },
+        "to = 0\n" => "speed = 0\nfor = \"1 s\"\n", at "speed = 0": OutOfRange { allowed, .. } if allowed.contains("for one of them"),
         "[program]\nrepeat = 1\n\n[[program.move]]\nto = [\"30 deg\", 0.5]\nvelocity = \"80 %\"\ndwell = \"200 ms\"\n\n[[program.move]]" => "[program.move]", at "[program.move]": WrongType { expected, found: "a table", .. } if expected.contains("[[double brackets]]"),
     }
 

@@ -380,7 +380,12 @@ impl AxisRun {
         is_optional: bool,
         outcome: Result<Completed, SdoError>,
     ) -> Progress {
-        if is_optional && matches!(outcome, Err(SdoError::Aborted(_))) {
+        let is_absent = match outcome {
+            Err(SdoError::Aborted(_)) => true,
+            Err(error) => self.means_absent(error),
+            Ok(_) => false,
+        };
+        if is_optional && is_absent {
             self.facts.absent.push(object.address);
             self.next_step();
             return Ok(());

@@ -2,6 +2,7 @@
 
 use takt::config::Config;
 use takt::controller::Outcome;
+use takt::sim::Defect;
 use takt_rt::cia402::{controlword, statusword};
 use takt_rt::door::{ProfileMove, Request};
 use takt_rt::frame::Frame;
@@ -245,4 +246,16 @@ fn a_yz_aim_moves_to_targets_by_its_own_profile_and_stops_without_going_back() {
         assert!(world.observe(0).position < 0.5 && world.observe(0).velocity.abs() < 1e-4);
         assert!(world.port(0).sent_with(id(0x500, 1)).is_empty(), "RPDO1 alone");
     }
+}
+
+#[test]
+fn a_joint_that_does_not_get_to_its_target_stops_the_group_instead_of_moving_for_ever() {
+    let mut world = World::holding(erob());
+    in_motion(&mut world);
+    world.port(0).bus.afflict(1, Defect::BlockedJoint, true).unwrap();
+    world.run_until(|world| !world.stops().is_empty());
+    let stops = world.stops();
+    let seen = [Rule::FollowingError, Rule::DriveFault, Rule::DriveDisabled];
+    assert!(seen.contains(&stops[0].rule) && stops[0].axis == Some(0), "{stops:?}");
+    world.run_until(|world| world.phase() == Phase::Disabled);
 }

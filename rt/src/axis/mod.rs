@@ -125,6 +125,8 @@ pub struct Axis {
     /// The last such time between two feedbacks.
     cycle_s: f64,
     is_heard: bool,
+    /// Cycles in which a drive in profile position has stood before its target.
+    stalled_cycles: u32,
     /// What the statuswords have shown, see [`Axis::drive_state`].
     state: DriveState,
     /// Statuswords in a row that do not show operation enabled, after one that did.
@@ -174,6 +176,7 @@ impl Axis {
             cycle_s: 0.0,
             is_heard: false,
             state: DriveState::NotReadyToSwitchOn,
+            stalled_cycles: 0,
             contradictions: 0,
             is_lost: false,
             jump: None,
@@ -240,6 +243,7 @@ impl Axis {
 
     /// Lets a slot pass for what is watched over time.
     pub fn watch(&mut self) {
+        self.watch_stall();
         self.node_watch.pass();
         self.duplicate_watch.pass();
         self.since_emergency = self.since_emergency.map(|cycles| cycles.saturating_add(1));

@@ -14,6 +14,9 @@ const AT_REST: f64 = 0.02;
 /// Cycles of the bus from the position that is reported to a drive that acts on what was made of it: one for which a
 /// drive's answer to a command has waited, one on the way, and one that the drive may take.
 const REACTION_CYCLES: u32 = 3;
+/// A drive that stands before its target for this many times the time that a following error may last does not get
+/// there: it needs some of it to begin, and to see that it has arrived.
+const STALL_PATIENCE: u32 = 20;
 /// How far the velocity of a profile may overshoot its limit: the drive's own loop makes it.
 const VELOCITY_OVERSHOOT: f64 = 1.2;
 
@@ -125,6 +128,17 @@ impl Axis {
         self.profile.waiting_cycles()
     }
 
+    /// Counts for how long a drive in profile position has stood still before its target.
+    pub(super) fn watch_stall(&mut self) {
+        let is_under_way = self.parameters.law == ControlLaw::ProfilePosition
+            && self.profile_target.is_some()
+            && self.is_enabled()
+            && self.profile.waiting_cycles() == 0
+            && !self.is_target_reached();
+        let is_stalled = is_under_way && self.is_at_rest();
+        self.stalled_cycles = if is_stalled { self.stalled_cycles.saturating_add(1) } else { 0 };
+    }
+
     /// Watches what the drive makes of its target, since no set-point passes the guard: the joint must be able to come
     /// to rest before a position limit, and keep to its velocity limit.
     pub fn check_profile(&self) -> Result<(), Violation> {
@@ -137,6 +151,14 @@ impl Axis {
                 rule: Rule::VelocityLimit,
                 value: self.velocity,
                 limit: limits.velocity,
+            });
+        }
+        if self.stalled_cycles > STALL_PATIENCE * self.parameters.following_error_cycles.max(1) {
+            let value = self.shown_set_point().position - self.position;
+            return Err(Violation {
+                rule: Rule::FollowingError,
+                value,
+                limit: self.parameters.following_error_limit,
             });
         }
         if !self.is_driven() {

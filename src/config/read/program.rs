@@ -56,12 +56,14 @@ fn program_target(section: &mut Section<'_>, axes: &[ReadAxis]) -> Option<Progra
     };
     match (speed, torque) {
         (Some(entry), _) => {
-            let velocity = target(&entry, axes, driven_at_speed);
+            let velocity =
+                target(&entry, axes, driven_at_speed).filter(|all| some_axis_is_driven(&entry, all));
             let duration_s = duration_s(section);
             Some(ProgramTarget::Velocity { velocity: velocity?, duration_s: duration_s? })
         }
         (None, Some(entry)) => {
-            let torque = target(&entry, axes, driven_with_torque);
+            let torque =
+                target(&entry, axes, driven_with_torque).filter(|all| some_axis_is_driven(&entry, all));
             let duration_s = duration_s(section);
             Some(ProgramTarget::Torque { torque: torque?, duration_s: duration_s? })
         }
@@ -84,6 +86,15 @@ fn target(
     }
     let targets: Vec<_> = entries.iter().zip(axes).map(|(entry, axis)| read(entry, axis)).collect();
     targets.into_iter().collect()
+}
+
+/// Zero is where such a step ends by itself.
+fn some_axis_is_driven(entry: &Entry<'_>, values: &[f64]) -> bool {
+    let is_any = values.iter().any(|value| *value != 0.0);
+    if !is_any {
+        entry.report_range("0 for every axis".to_owned(), "more or less than 0 for one of them".to_owned());
+    }
+    is_any
 }
 
 fn driven_at_speed(entry: &Entry<'_>, axis: &ReadAxis) -> Option<f64> {
