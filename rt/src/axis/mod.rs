@@ -469,7 +469,6 @@ impl Axis {
     /// sent, and the target.
     pub fn command(&mut self, goal: Goal, other_word: Option<u16>) {
         let is_enabled = self.is_enabled();
-        let goal = if self.is_lost && goal == Goal::Enabled { Goal::Disabled } else { goal };
         let word = other_word.unwrap_or_else(|| self.word_towards(goal));
         let is_repeated = self.parameters.controlword_spacing_cycles > 0
             && self.since_controlword >= self.parameters.controlword_spacing_cycles

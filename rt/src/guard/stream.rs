@@ -105,7 +105,8 @@ pub fn clamp(limits: &AxisLimits, course: &Course) -> State {
         .clamp(-limits.velocity, limits.velocity)
         .min(towards(limits.position_max, 1.0))
         .max(-towards(limits.position_min, -1.0))
-        .clamp(lowest, highest);
+        .max(lowest)
+        .min(highest);
     State {
         position: last + velocity * period_s,
         velocity,
