@@ -3,7 +3,8 @@
 use std::fmt;
 use std::str::FromStr;
 
-use super::error::InterfaceError;
+use thiserror::Error;
+
 use super::model::Interface;
 
 /// The longest name of a network interface of Linux (IFNAMSIZ less the final zero).
@@ -36,6 +37,40 @@ impl fmt::Display for Interface {
         match self {
             Self::Simulated => f.write_str("sim"),
             Self::SocketCan(name) => f.write_str(name),
+        }
+    }
+}
+
+/// What is wrong with the name of an interface.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub enum InterfaceError {
+    /// A serial-line adapter, which takt does not open itself.
+    #[error("takt does not open the serial adapter {device:?} itself")]
+    SerialLine {
+        /// The device.
+        device: String,
+    },
+    /// Not a name that a network interface of Linux can have.
+    #[error("{name:?} cannot be the name of a network interface")]
+    Name {
+        /// The name.
+        name: String,
+    },
+}
+
+impl InterfaceError {
+    /// What to do about it.
+    pub fn help(&self) -> String {
+        match self {
+            Self::SerialLine { device } => format!(
+                "make a network interface of it and name that one: `slcand -o -c -s8 {device} slcan0 && ip link set \
+                 slcan0 up`, then \"slcan0\""
+            ),
+            Self::Name { .. } => {
+                "\"sim\", or a name of at most 15 letters, digits and -_. as `ip link` shows it \
+                                  (\"can0\", \"vcan0\")"
+                    .to_owned()
+            }
         }
     }
 }

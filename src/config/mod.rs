@@ -8,14 +8,17 @@ mod defaults;
 mod error;
 mod interface;
 mod model;
+mod problem_kind;
 mod quantity;
 pub(crate) mod read;
 mod spelling;
 
 use std::path::Path;
 
-pub use error::{ConfigError, InterfaceError, Problem, ProblemKind};
+pub use error::{ConfigError, Problem};
+pub use interface::InterfaceError;
 pub use model::*;
+pub use problem_kind::ProblemKind;
 pub use quantity::{Dimension, Quantity, QuantityError};
 
 use thiserror::Error;

@@ -1,21 +1,22 @@
 //! `[[axis]]`, with `[defaults.axis]` behind each of them.
 
-use std::f64::consts::TAU;
 use std::ops::Range;
 
 use takt_rt::record::MAX_AXES;
 
 use super::bus::ReadBus;
+use super::control::control;
 use super::entry::{Bounds, Entry, Problems};
+use super::limits::{contains, following_error, limits, show_range};
 use super::machine::{boolean, heartbeat, node};
 use super::section::Section;
+use super::travel::{Counting, Quantities, counting, travel};
 use crate::canopen::dcf::DeviceConfiguration;
 use crate::config::defaults;
-use crate::config::error::ProblemKind;
 use crate::config::model::{
-    Axis, Control, DriveFamily, Feedback, FollowingError, Identity, Limits, Master, OnViolation,
-    SimulatedJoint, Travel,
+    Axis, Control, DriveFamily, Feedback, Identity, Limits, Master, OnViolation, SimulatedJoint, Travel,
 };
+use crate::config::problem_kind::ProblemKind;
 use crate::config::quantity::Quantity;
 use crate::config::spelling;
 use crate::drive::yz_aim;
@@ -25,49 +26,6 @@ const DRIVES: [(&str, DriveFamily); 2] = [
     (DriveFamily::ErobCanopen.word(), DriveFamily::ErobCanopen),
     (DriveFamily::YzAim.word(), DriveFamily::YzAim),
 ];
-
-/// The quantities of an axis by what it does: turn or slide.
-#[derive(Clone, Copy)]
-pub struct Quantities {
-    pub position: Quantity,
-    pub velocity: Quantity,
-    acceleration: Quantity,
-    jerk: Quantity,
-    pub effort: Quantity,
-    inertia: Quantity,
-    stiffness: Quantity,
-    damping: Quantity,
-}
-
-impl Quantities {
-    pub const ROTARY: Self = Self {
-        position: Quantity::ANGLE,
-        velocity: Quantity::ANGULAR_VELOCITY,
-        acceleration: Quantity::ANGULAR_ACCELERATION,
-        jerk: Quantity::ANGULAR_JERK,
-        effort: Quantity::TORQUE,
-        inertia: Quantity::MOMENT_OF_INERTIA,
-        stiffness: Quantity::ANGULAR_STIFFNESS,
-        damping: Quantity::ANGULAR_DAMPING,
-    };
-    pub const LINEAR: Self = Self {
-        position: Quantity::LENGTH,
-        velocity: Quantity::VELOCITY,
-        acceleration: Quantity::ACCELERATION,
-        jerk: Quantity::JERK,
-        effort: Quantity::FORCE,
-        inertia: Quantity::MASS,
-        stiffness: Quantity::STIFFNESS,
-        damping: Quantity::DAMPING,
-    };
-
-    pub fn of(travel: Travel) -> Self {
-        match travel {
-            Travel::Rotary => Self::ROTARY,
-            Travel::Linear { .. } => Self::LINEAR,
-        }
-    }
-}
 
 /// An axis as far as it could be read.
 pub struct ReadAxis {
@@ -270,141 +228,6 @@ fn check_speed(
     }
 }
 
-fn travel(section: &mut Section<'_>) -> Option<Travel> {
-    let lead = section.get("lead");
-    let is_linear = match section.get("travel") {
-        None => false,
-        Some(entry) => entry.choice(&[("rotary", false), ("linear", true)])?,
-    };
-    if !is_linear {
-        return Some(Travel::Rotary);
-    }
-    let Some(lead) = lead else {
-        section.require("lead", "what a linear axis moves in one turn: lead = \"5 mm\"");
-        return None;
-    };
-    lead.quantity(Quantity::LENGTH, Bounds::Positive).map(|lead_m| Travel::Linear { lead_m })
-}
-
-struct Counting {
-    counts_per_turn: f64,
-    gear_ratio: f64,
-    reversed: bool,
-    zero_counts: i32,
-}
-
-impl Counting {
-    /// Counts per rad (m). An axis whose travel could not be read counts nothing.
-    fn counts_per_unit(&self, travel: Option<Travel>) -> f64 {
-        let counts = self.counts_per_turn * self.gear_ratio;
-        match travel {
-            Some(Travel::Rotary) => counts / TAU,
-            Some(Travel::Linear { lead_m }) => counts / lead_m,
-            None => 0.0,
-        }
-    }
-
-    fn position(&self, position: f64, travel: Option<Travel>) -> f64 {
-        let direction = if self.reversed { -1.0 } else { 1.0 };
-        direction * position * self.counts_per_unit(travel) + f64::from(self.zero_counts)
-    }
-}
-
-fn counting(section: &mut Section<'_>, drive: Option<DriveFamily>) -> Counting {
-    let counts_per_turn =
-        section.get("counts_per_turn").and_then(|entry| entry.number(Bounds::Between(1.0, 1e12)));
-    let gear_ratio = section.get("gear_ratio").and_then(|entry| entry.number(Bounds::Between(1e-6, 1e6)));
-    let zero =
-        section.get("zero_counts").and_then(|entry| entry.integer(i32::MIN.into()..1 + i64::from(i32::MAX)));
-    Counting {
-        counts_per_turn: counts_per_turn
-            .unwrap_or(drive.unwrap_or(DriveFamily::ErobCanopen).counts_per_turn()),
-        gear_ratio: gear_ratio.unwrap_or(defaults::GEAR_RATIO),
-        reversed: boolean(section, "reversed", false),
-        zero_counts: zero.and_then(|zero| i32::try_from(zero).ok()).unwrap_or(0),
-    }
-}
-
-fn limits(
-    mut section: Section<'_>,
-    q: Quantities,
-    travel: Option<Travel>,
-    counting: &Counting,
-) -> Option<Limits> {
-    let position = section
-        .require("position", "lowest and highest position: position = [\"-170 deg\", \"170 deg\"]")
-        .and_then(|entry| {
-            let (low, high) = position_range(&entry, q)?;
-            check_counts(&entry, &[low, high].map(|position| counting.position(position, travel)));
-            Some((low, high))
-        });
-    let velocity = section.require("velocity", "highest speed: velocity = \"137 deg/s\"").and_then(|entry| {
-        let velocity = entry.quantity(q.velocity, Bounds::Positive)?;
-        check_counts(&entry, &[velocity * counting.counts_per_unit(travel)]);
-        Some(velocity)
-    });
-    let acceleration = section
-        .require("acceleration", "highest acceleration: acceleration = \"8 rad/s^2\"")
-        .and_then(|entry| entry.quantity(q.acceleration, Bounds::Positive));
-    let deceleration =
-        section.get("deceleration").map(|entry| entry.quantity(q.acceleration, Bounds::Positive));
-    let jerk = section.get("jerk").map(|entry| entry.quantity(q.jerk, Bounds::PositiveOrInfinite));
-    let torque = section
-        .require("torque", "highest torque, or force of a linear axis: torque = \"87 Nm\"")
-        .and_then(|entry| entry.quantity(q.effort, Bounds::Positive));
-    section.finish();
-    let (position_min, position_max) = position?;
-    Some(Limits {
-        position_min,
-        position_max,
-        velocity: velocity?,
-        acceleration: acceleration?,
-        deceleration: deceleration.unwrap_or(acceleration)?,
-        jerk: jerk.unwrap_or(Some(f64::INFINITY))?,
-        torque: torque?,
-    })
-}
-
-fn position_range(entry: &Entry<'_>, q: Quantities) -> Option<(f64, f64)> {
-    let list = entry.list()?;
-    let [low, high] = list.as_slice() else {
-        entry.report_range(
-            format!("a list of {}", list.len()),
-            "the lowest and the highest position".to_owned(),
-        );
-        return None;
-    };
-    let (low, high) = (low.quantity(q.position, Bounds::Finite), high.quantity(q.position, Bounds::Finite));
-    let (low, high) = (low?, high?);
-    if low < high {
-        return Some((low, high));
-    }
-    entry.report(ProblemKind::EmptyRange { low: q.position.show(low), high: q.position.show(high) });
-    None
-}
-
-/// A drive counts positions and speeds in 32 bits.
-fn check_counts(entry: &Entry<'_>, counts: &[f64]) {
-    if let Some(&counts) = counts.iter().find(|counts| counts.abs() > f64::from(i32::MAX)) {
-        entry.report(ProblemKind::BeyondCounts { key: entry.path.clone(), counts });
-    }
-}
-
-fn following_error(mut section: Section<'_>, q: Quantities) -> FollowingError {
-    let limit = section.get("limit").and_then(|entry| entry.quantity(q.position, Bounds::Positive));
-    let time_ns = section.get("time").and_then(|entry| entry.nanoseconds(0.0, 10.0));
-    section.finish();
-    let default = if q.position == Quantity::ANGLE {
-        defaults::FOLLOWING_ERROR_RAD
-    } else {
-        defaults::FOLLOWING_ERROR_M
-    };
-    FollowingError {
-        limit: limit.unwrap_or(default),
-        time_ns: time_ns.unwrap_or(defaults::FOLLOWING_ERROR_TIME_NS),
-    }
-}
-
 fn simulated(
     mut section: Section<'_>,
     q: Quantities,
@@ -444,74 +267,6 @@ fn simulated(
             limits.map_or(0.0, |limits| 0.0_f64.max(limits.position_min).min(limits.position_max))
         }),
         power_up_ns: power_up_ns.unwrap_or(defaults::POWER_UP_NS),
-    }
-}
-
-/// Whether a position is within the limits.
-pub fn contains(limits: &Limits, position: f64) -> bool {
-    (limits.position_min..=limits.position_max).contains(&position)
-}
-
-/// The position limits for people.
-pub fn show_range(limits: &Limits, q: Quantities) -> String {
-    format!("{} to {}", q.position.show(limits.position_min), q.position.show(limits.position_max))
-}
-
-/// The mode, with the gains of the loop that it needs. The gains of the other loops are checked and not used, so that
-/// the mode can be changed in one line.
-fn control(
-    section: &mut Section<'_>,
-    drive: Option<DriveFamily>,
-    q: Quantities,
-    joint: &SimulatedJoint,
-) -> Option<Control> {
-    let velocity_loop = velocity_loop(section.section("velocity_loop"));
-    let torque_loop = torque_loop(section.section("torque_loop"), q, joint);
-    let modes = [
-        ("csp", Control::Position),
-        ("csv", velocity_loop),
-        ("cst", torque_loop),
-        ("ip", Control::Interpolated),
-        ("pp", Control::ProfilePosition),
-        ("pv", Control::ProfileVelocity),
-        ("pt", Control::ProfileTorque),
-    ];
-    match (section.get("mode"), drive) {
-        (Some(entry), Some(DriveFamily::YzAim)) => {
-            let own: Vec<_> = modes.into_iter().filter(|(_, control)| yz_aim::has_mode(control)).collect();
-            entry.choice(&own)
-        }
-        (Some(entry), _) => entry.choice(&modes),
-        (None, Some(DriveFamily::YzAim)) => Some(Control::Interpolated),
-        (None, _) => Some(Control::Position),
-    }
-}
-
-fn velocity_loop(mut section: Section<'_>) -> Control {
-    let gain =
-        section.get("position_gain").and_then(|entry| entry.quantity(Quantity::GAIN, Bounds::Positive));
-    section.finish();
-    Control::Velocity { position_gain: gain.unwrap_or(defaults::POSITION_GAIN) }
-}
-
-fn torque_loop(mut section: Section<'_>, q: Quantities, joint: &SimulatedJoint) -> Control {
-    let mut value = |key, quantity, bounds| {
-        section.get(key).and_then(|entry: Entry<'_>| entry.quantity(quantity, bounds))
-    };
-    let bandwidth =
-        value("bandwidth", Quantity::GAIN, Bounds::Positive).unwrap_or(defaults::TORQUE_LOOP_BANDWIDTH);
-    let inertia = value("inertia", q.inertia, Bounds::NotNegative).unwrap_or(joint.inertia);
-    let stiffness = value("stiffness", q.stiffness, Bounds::Positive);
-    let damping = value("damping", q.damping, Bounds::NotNegative);
-    let viscous_friction = value("viscous_friction", q.damping, Bounds::NotNegative);
-    let coulomb_friction = value("coulomb_friction", q.effort, Bounds::NotNegative);
-    section.finish();
-    Control::Torque {
-        stiffness: stiffness.unwrap_or(inertia * bandwidth * bandwidth),
-        damping: damping.unwrap_or(2.0 * inertia * bandwidth),
-        inertia,
-        viscous_friction: viscous_friction.unwrap_or(joint.viscous_friction),
-        coulomb_friction: coulomb_friction.unwrap_or(joint.coulomb_friction),
     }
 }
 

@@ -8,8 +8,8 @@ use super::entry::{Bounds, Entry, Problems};
 use super::machine::boolean;
 use super::section::Section;
 use crate::config::defaults;
-use crate::config::error::ProblemKind;
 use crate::config::model::{Bus, Interface};
+use crate::config::problem_kind::ProblemKind;
 use crate::config::quantity::Quantity;
 
 /// The bit rates of CiA 301, 5.3, which every adapter and every drive here divides its clock to.

@@ -7,7 +7,8 @@ use std::path::{Path, PathBuf};
 use toml::Spanned;
 use toml::de::{DeArray, DeInteger, DeTable, DeValue};
 
-use crate::config::error::{Problem, ProblemKind, line_of};
+use crate::config::error::{Problem, line_of};
+use crate::config::problem_kind::ProblemKind;
 use crate::config::quantity::{Quantity, QuantityError, Short};
 use crate::config::spelling;
 

@@ -6,8 +6,8 @@ use super::entry::{Bounds, Entry};
 use super::section::Section;
 use crate::bus::schedule::automatic_command_phase;
 use crate::config::defaults;
-use crate::config::error::ProblemKind;
 use crate::config::model::{Config, Cycle, Master, Realtime, Simulation, Telemetry};
+use crate::config::problem_kind::ProblemKind;
 use crate::config::quantity::Quantity;
 
 /// The cycle must leave room on both sides of the command phase.

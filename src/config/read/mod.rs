@@ -6,16 +6,20 @@
 
 mod axis;
 mod bus;
+mod control;
 pub(crate) mod entry;
+mod limits;
 mod machine;
 mod program;
 pub(crate) mod section;
 mod stops;
+mod travel;
 
 use toml::de::DeTable;
 
-use super::error::{ConfigError, Problem, ProblemKind};
+use super::error::{ConfigError, Problem};
 use super::model::Config;
+use super::problem_kind::ProblemKind;
 use entry::Problems;
 use section::Section;
 

@@ -1,11 +1,12 @@
 //! `[program]`
 
-use super::axis::{ReadAxis, contains, show_range};
+use super::axis::ReadAxis;
 use super::entry::{Bounds, Entry};
+use super::limits::{contains, show_range};
 use super::section::Section;
 use crate::config::defaults;
-use crate::config::error::ProblemKind;
 use crate::config::model::{Control, Limits, Program, ProgramMove, ProgramTarget};
+use crate::config::problem_kind::ProblemKind;
 use crate::config::quantity::Quantity;
 
 /// Moves and rests longer than this are slips of the unit.

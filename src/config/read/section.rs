@@ -6,7 +6,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::entry::{Entry, Problems};
-use crate::config::error::ProblemKind;
+use crate::config::problem_kind::ProblemKind;
 use crate::config::spelling;
 
 /// A table that is being read. It remembers which keys were asked for: what is left over at the end is unknown, and

@@ -1,0 +1,350 @@
+//! The kinds of problems that a configuration can have, and what to do about each.
+
+use thiserror::Error;
+
+use crate::bus::schedule::NoCommandPhase;
+use crate::canopen::dcf::DcfError;
+
+use super::interface::InterfaceError;
+use super::quantity::{self, Quantity};
+
+/// The kinds of problems. `key` is the whole path of a key, as in `axis.limits.velocity`.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum ProblemKind {
+    /// The file cannot be read.
+    #[error("the file cannot be read: {reason}")]
+    Unreadable {
+        /// What the operating system said.
+        reason: String,
+    },
+    /// It is not TOML.
+    #[error("this is not TOML: {message}")]
+    Syntax {
+        /// What the parser said.
+        message: String,
+    },
+    /// A key that has no meaning.
+    #[error("`{key}` means nothing here")]
+    UnknownKey {
+        /// The key.
+        key: String,
+        /// What was probably meant.
+        nearest: Option<&'static str>,
+        /// The keys that mean something in this place.
+        known: Vec<&'static str>,
+    },
+    /// A key that is needed and not there.
+    #[error("`{key}` is missing")]
+    MissingKey {
+        /// The key.
+        key: String,
+        /// What it says and how it may be written.
+        says: &'static str,
+    },
+    /// A value of another type.
+    #[error("`{key}` must be {expected}, not {found}")]
+    WrongType {
+        /// The key.
+        key: String,
+        /// What belongs there.
+        expected: &'static str,
+        /// What was found.
+        found: &'static str,
+    },
+    /// A text that is not a number with a unit.
+    #[error("`{key}` must be a number with a unit; {given:?} does not begin with a number")]
+    NotAQuantity {
+        /// The key.
+        key: String,
+        /// The text.
+        given: String,
+        /// What is asked for.
+        quantity: Quantity,
+    },
+    /// A quantity in quotes without its unit.
+    #[error("{given:?} has no unit")]
+    MissingUnit {
+        /// The key.
+        key: String,
+        /// The text.
+        given: String,
+        /// What is asked for.
+        quantity: Quantity,
+    },
+    /// A unit that is not known.
+    #[error("the unit {symbol:?} of `{key}` is not known")]
+    UnknownUnit {
+        /// The key.
+        key: String,
+        /// The part of the unit that is not known.
+        symbol: String,
+        /// What is asked for.
+        quantity: Quantity,
+    },
+    /// A unit of another quantity.
+    #[error("`{key}` is {}, and {unit:?} is not a unit of that", article_of(quantity.name))]
+    WrongUnit {
+        /// The key.
+        key: String,
+        /// The unit as written.
+        unit: String,
+        /// What is asked for.
+        quantity: Quantity,
+    },
+    /// A value that cannot be.
+    #[error("`{key}` cannot be {value}")]
+    OutOfRange {
+        /// The key.
+        key: String,
+        /// The value.
+        value: String,
+        /// What it may be.
+        allowed: String,
+    },
+    /// A word that is not one of those that may stand here.
+    #[error("`{key}` cannot be {given:?}")]
+    UnknownChoice {
+        /// The key.
+        key: String,
+        /// The word.
+        given: String,
+        /// What was probably meant.
+        nearest: Option<&'static str>,
+        /// The words that may stand here.
+        choices: Vec<&'static str>,
+    },
+    /// A name that is empty or has characters that names cannot have.
+    #[error("`{key}` cannot be {given:?}")]
+    BadName {
+        /// The key.
+        key: String,
+        /// The name.
+        given: String,
+    },
+    /// The same thing twice in a list.
+    #[error("{given:?} stands twice in `{key}`")]
+    Repeated {
+        /// The key of the list.
+        key: String,
+        /// What stands twice.
+        given: String,
+    },
+    /// Two buses or two axes of the same name.
+    #[error("there is already {} called {name:?}", article_of(what))]
+    DuplicateName {
+        /// `bus` or `axis`.
+        what: &'static str,
+        /// The name.
+        name: String,
+    },
+    /// Two nodes of the same number on a bus.
+    #[error("node {node} is already taken on the bus {bus:?}")]
+    DuplicateNode {
+        /// The bus.
+        bus: String,
+        /// The node.
+        node: u8,
+    },
+    /// Two buses on the same interface.
+    #[error("the interface {interface:?} already belongs to another bus")]
+    DuplicateInterface {
+        /// The interface.
+        interface: String,
+    },
+    /// An axis on a bus that is not there.
+    #[error("there is no bus called {name:?}")]
+    UnknownBus {
+        /// The name.
+        name: String,
+        /// What was probably meant.
+        nearest: Option<String>,
+        /// The buses that are there.
+        known: Vec<String>,
+    },
+    /// An interface that takt cannot use.
+    #[error("{reason}")]
+    Interface {
+        /// Why.
+        #[source]
+        reason: InterfaceError,
+    },
+    /// A target that is not one number for every axis.
+    #[error("the move has {given} targets, but there are {axes} axes")]
+    TargetCount {
+        /// How many targets there are.
+        given: usize,
+        /// How many axes there are.
+        axes: usize,
+    },
+    /// A target that an axis may not go to.
+    #[error("{axis:?} may not go to {value}")]
+    TargetOutsideLimits {
+        /// The name of the axis.
+        axis: String,
+        /// The target.
+        value: String,
+        /// Where it may go.
+        allowed: String,
+    },
+    /// A simulated joint that begins where it may not be.
+    #[error("{axis:?} cannot begin at {value}")]
+    InitialPositionOutsideLimits {
+        /// The name of the axis.
+        axis: String,
+        /// The position.
+        value: String,
+        /// Where it may be.
+        allowed: String,
+    },
+    /// Limits that leave no room.
+    #[error("the lowest position {low} is not below the highest {high}")]
+    EmptyRange {
+        /// The lower limit.
+        low: String,
+        /// The upper limit.
+        high: String,
+    },
+    /// Something that does not fit the 32 bits that a drive counts in.
+    #[error("`{key}` is {counts:.0} counts, which does not fit the drive's 32 bits")]
+    BeyondCounts {
+        /// The key.
+        key: String,
+        /// The value in counts or counts per second.
+        counts: f64,
+    },
+    /// A device configuration file that cannot be used.
+    #[error("{reason}")]
+    Dcf {
+        /// Why.
+        reason: DcfError,
+    },
+    /// `command_phase = "auto"` where none is possible.
+    #[error("no command phase suits every bus")]
+    NoCommandPhase {
+        /// The sums of the buses that are the cause.
+        cause: NoCommandPhase,
+    },
+    /// More than one controller can do.
+    #[error("{given} {what} are more than the {limit} that one controller can do")]
+    TooMany {
+        /// `axes` or `buses`.
+        what: &'static str,
+        /// How many there are.
+        given: usize,
+        /// How many there may be.
+        limit: usize,
+    },
+}
+
+impl ProblemKind {
+    /// What to do about it.
+    pub fn help(&self) -> String {
+        match self {
+            Self::Unreadable { .. } => {
+                "give the path of a configuration; configs/reference.toml explains them".into()
+            }
+            Self::Syntax { .. } => {
+                "the TOML rules are at https://toml.io; texts and units stand in quotes".into()
+            }
+            Self::UnknownKey { nearest: Some(nearest), .. } => format!("did you mean `{nearest}`?"),
+            Self::UnknownKey { nearest: None, known, .. } => {
+                format!("what may stand here: {}", known.join(", "))
+            }
+            Self::MissingKey { says, .. } => (*says).into(),
+            Self::WrongType { expected, .. } => format!("write {expected}"),
+            Self::NotAQuantity { quantity, .. } | Self::WrongUnit { quantity, .. } => {
+                show_quantity(*quantity)
+            }
+            Self::MissingUnit { given, quantity, .. } => format!(
+                "add the unit, as in \"{}\"; without quotes, {given} is taken in {}",
+                quantity.example, quantity.unit
+            ),
+            Self::UnknownUnit { symbol, quantity, .. } => match quantity::nearest_unit(symbol) {
+                Some(unit) => format!("did you mean {unit:?}? {}", show_quantity(*quantity)),
+                None => show_quantity(*quantity),
+            },
+            Self::OutOfRange { allowed, .. } => format!("allowed: {allowed}"),
+            Self::UnknownChoice { nearest: Some(nearest), choices, .. } => {
+                format!("did you mean {nearest:?}? {}", show_choices(choices))
+            }
+            Self::UnknownChoice { nearest: None, choices, .. } => show_choices(choices),
+            Self::BadName { .. } => "a name has 1 to 32 letters, digits or -_.".into(),
+            Self::Repeated { .. } => "leave one of them out".into(),
+            Self::DuplicateName { what, .. } => format!("give each {what} a name of its own"),
+            Self::DuplicateNode { .. } => {
+                "give each node of a bus a number of its own, 1 to 127; the controller \
+                                           itself is [master] node on every bus"
+                    .into()
+            }
+            Self::DuplicateInterface { .. } => "give each bus an interface of its own".into(),
+            Self::UnknownBus { nearest: Some(nearest), .. } => format!("did you mean {nearest:?}?"),
+            Self::UnknownBus { nearest: None, known, .. } => format!("the buses are: {}", known.join(", ")),
+            Self::Interface { reason } => reason.help(),
+            Self::TargetCount { .. } => {
+                "one target for every axis in the order of the file, or one number for all \
+                                         of them"
+                    .into()
+            }
+            Self::TargetOutsideLimits { allowed, .. }
+            | Self::InitialPositionOutsideLimits { allowed, .. } => {
+                format!("allowed by its limits: {allowed}")
+            }
+            Self::EmptyRange { .. } => "the lowest position comes first".into(),
+            Self::BeyondCounts { .. } => "check counts_per_turn, gear_ratio, lead and zero_counts".into(),
+            Self::Dcf { reason } => reason.help().into(),
+            Self::NoCommandPhase { cause } => cause.to_string(),
+            Self::TooMany { .. } => "divide the machine between several controllers".into(),
+        }
+    }
+
+    /// What is written beside the place in the file.
+    pub(super) fn label(&self) -> &'static str {
+        match self {
+            Self::Syntax { .. } => "here",
+            Self::UnknownKey { .. } => "not known here",
+            Self::MissingKey { .. } => "missing in here",
+            Self::WrongType { .. } => "wrong type",
+            Self::UnknownUnit { .. } | Self::WrongUnit { .. } => "wrong unit",
+            Self::NotAQuantity { .. } => "no number",
+            Self::MissingUnit { .. } => "no unit",
+            Self::DuplicateName { .. } | Self::DuplicateNode { .. } | Self::DuplicateInterface { .. } => {
+                "again"
+            }
+            Self::TargetCount { .. } => "wrong length",
+            Self::TargetOutsideLimits { .. } | Self::InitialPositionOutsideLimits { .. } => {
+                "outside the limits"
+            }
+            _ => "this",
+        }
+    }
+}
+
+fn show_quantity(quantity: Quantity) -> String {
+    match quantity.unit {
+        "" => format!(
+            "write {} {}, as in {:?} or as a bare number",
+            article(quantity.name),
+            quantity.name,
+            quantity.example
+        ),
+        unit => format!(
+            "write {} {}, as in {:?}, or a bare number in {unit}",
+            article(quantity.name),
+            quantity.name,
+            quantity.example
+        ),
+    }
+}
+
+fn show_choices(choices: &[&str]) -> String {
+    let quoted: Vec<_> = choices.iter().map(|choice| format!("{choice:?}")).collect();
+    format!("what may stand here: {}", quoted.join(", "))
+}
+
+fn article(noun: &str) -> &'static str {
+    if noun.starts_with(['a', 'e', 'i', 'o', 'u']) { "an" } else { "a" }
+}
+
+fn article_of(noun: &str) -> String {
+    format!("{} {noun}", article(noun))
+}
