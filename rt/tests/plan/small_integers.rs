@@ -7,15 +7,15 @@ fn integers(range: core::ops::RangeInclusive<i32>) -> Vec<f64> {
     range.map(f64::from).collect()
 }
 
-/// Every velocity and acceleration from −2 to 2.
-fn rates() -> Vec<(f64, f64)> {
-    let values = integers(-2..=2);
+/// Every velocity and acceleration whose size is at most `largest`.
+fn rates(largest: i32) -> Vec<(f64, f64)> {
+    let values = integers(-largest..=largest);
     values.iter().flat_map(|velocity| values.iter().map(|acceleration| (*velocity, *acceleration))).collect()
 }
 
-/// Every set of limits from 1 to 3; the lower ones mirror the upper ones.
-fn limits() -> Vec<Limits> {
-    let sizes = integers(1..=3);
+/// Every set of limits from 1 to `largest`; the lower ones mirror the upper ones.
+fn limits(largest: i32) -> Vec<Limits> {
+    let sizes = integers(1..=largest);
     let mut all = Vec::new();
     for velocity in &sizes {
         for acceleration in &sizes {
@@ -37,12 +37,13 @@ fn state(position: f64, (velocity, acceleration): (f64, f64)) -> State {
     State { position, velocity, acceleration }
 }
 
-/// Solves all problems with these distances; gives how many there were, and how many started within the limits.
-fn solve(distances: &[f64]) -> (u32, u32) {
+/// Solves all problems with rates up to `rate`, limits up to `limit`, and these distances; gives how many there were, and
+/// how many started within the limits.
+fn solve(rate: i32, limit: i32, distances: &[f64]) -> (u32, u32) {
     let (mut solved, mut inside) = (0, 0);
-    for limits in limits() {
-        for target in rates() {
-            for start in rates() {
+    for limits in limits(limit) {
+        for target in rates(rate) {
+            for start in rates(rate) {
                 // Backwards in time a start is a target.
                 let starts_inside = is_target(&limits, (start.0, -start.1));
                 for distance in distances {
@@ -65,24 +66,31 @@ fn solve(distances: &[f64]) -> (u32, u32) {
 /// the same problem again.
 #[test]
 fn every_problem_of_small_integers_is_solved() {
-    let (solved, inside) = solve(&integers(-4..=4));
+    let (solved, inside) = solve(2, 3, &integers(-4..=4));
     assert_eq!((solved, inside), (97_875, 72_171));
 }
 
 /// Half integers, too, and longer ways: distances from −10 to 10 in steps of a half, velocities and accelerations from −2
-/// to 2, limits from 1 to 3. These are the problems of the grid above and more; `otg.md` section 4 counts 337,875 valid
-/// problems in its own, without saying which.
+/// to 2, limits from 1 to 3.
 #[test]
 fn every_problem_of_small_integers_over_half_an_integer_is_solved() {
     let halves: Vec<f64> = integers(-20..=20).into_iter().map(|step| step / 2.0).collect();
-    assert_eq!(solve(&halves), (445_875, 328_779));
+    assert_eq!(solve(2, 3, &halves), (445_875, 328_779));
+}
+
+/// Wider in everything: rates from −3 to 3, limits from 1 to 4, distances from −12 to 12. `otg.md` section 4 counts 337,875
+/// valid problems in its grid without saying which they are; any such grid of small integers is a part of this one, or of
+/// the one above.
+#[test]
+fn every_problem_of_integers_up_to_a_dozen_is_solved() {
+    assert_eq!(solve(3, 4, &integers(-12..=12)), (1_930_600, 1_213_400));
 }
 
 #[test]
 fn every_velocity_of_small_integers_is_reached() {
-    for limits in limits() {
+    for limits in limits(3) {
         for (start, target) in
-            rates().into_iter().flat_map(|start| rates().into_iter().map(move |target| (start, target)))
+            rates(2).into_iter().flat_map(|start| rates(2).into_iter().map(move |target| (start, target)))
         {
             let problem = Problem { start: state(0.0, start), target: state(0.0, target), limits };
             let Ok(profile) = velocity(&problem) else {
