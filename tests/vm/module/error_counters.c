@@ -33,6 +33,8 @@
 #define MOD_RM 0x01
 #define SR_ES 0x40
 #define SR_BS 0x80
+#define IR_RI 0x01
+#define IR_TI 0x02
 #define IR_EI 0x04
 #define IR_EPI 0x20
 
@@ -100,7 +102,11 @@ static u8 read_reg(const struct sja1000_priv *priv, int reg)
 			value |= SR_ES;
 		return value;
 	case REGISTER_IR:
-		value = chip->read_reg(priv, reg) | chip->interrupts;
+		value = chip->read_reg(priv, reg);
+		/* What the emulation has sent has failed. */
+		if (chip->is_off)
+			value &= ~(IR_TI | IR_RI);
+		value |= chip->interrupts;
 		chip->interrupts = 0;
 		return value;
 	default:
@@ -134,6 +140,11 @@ static void count(struct chip *chip, int *counter, int step)
 	if (was_passive != (worse_counter(chip) >= PASSIVE_LIMIT))
 		interrupts |= IR_EPI;
 	if (chip->transmit_errors >= BUS_OFF_LIMIT) {
+		/*
+		 * The frame that has failed for the last time occupies the only transmit buffer, and the driver has stopped
+		 * its queue: in the reset mode the buffer's place is that of the acceptance filter.
+		 */
+		netif_tx_disable(chip->dev);
 		chip->transmit_errors = COUNTER_WHEN_OFF;
 		chip->receive_errors = 0;
 		chip->is_off = true;
