@@ -122,7 +122,7 @@ pub enum EventKind {
         /// The phase that began.
         to: Phase,
     },
-    /// A stop began; exactly one for each stop.
+    /// A stop began; one for each stop, and a second one when a fault comes up on the way of a stop that was asked for.
     Stop(StopReason),
     /// A move was finished.
     MoveFinished {

@@ -16,7 +16,7 @@ pub enum StopCategory {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[repr(u8)]
 pub enum Rule {
-    /// Somebody asked for it.
+    /// Somebody asked for it. A fault that comes up before that stop is over takes its place.
     Requested = 0,
     /// A set-point was not a finite number.
     NotFinite = 1,
@@ -234,7 +234,7 @@ impl Phase {
     ];
 }
 
-/// The one reason of a stop.
+/// The one reason of a stop: the first fault, or that it was asked for where there is none.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StopReason {
     /// The category of the stop that it led to.

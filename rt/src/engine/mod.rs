@@ -426,12 +426,14 @@ impl Engine {
         }
     }
 
+    /// Begins a phase. One that is under way goes on, and what it may last counts from its first beginning.
     fn enter(&mut self, phase: Phase, now_ns: Nanoseconds, door: &mut impl Door) {
-        if phase != self.phase {
-            let kind = EventKind::PhaseChanged { from: self.phase, to: phase };
-            self.happened(now_ns, kind, door);
-            self.phase = phase;
+        if phase == self.phase {
+            return;
         }
+        let kind = EventKind::PhaseChanged { from: self.phase, to: phase };
+        self.happened(now_ns, kind, door);
+        self.phase = phase;
         self.phase_cycles = 0;
     }
 

@@ -66,7 +66,8 @@ impl Engine {
         }
     }
 
-    /// Begins a stop. The first reason stays the reason; a later one can only make the stop harder.
+    /// Begins a stop. The first fault stays the reason, and a later one can only make the stop harder. That somebody asked
+    /// for the stop is no fault: the first one that comes up on its way takes its place, and must be reset like any other.
     #[expect(clippy::too_many_arguments, reason = "they are the fields of the reason")]
     pub(super) fn begin_stop(
         &mut self,
@@ -82,19 +83,16 @@ impl Engine {
         let slot = self.last_slot.unwrap_or(0);
         let reason = StopReason { category: wanted, rule, axis, value, limit, slot, phase: self.phase };
         let is_under_way = matches!(self.phase, Phase::Stopping | Phase::Disabling);
-        match self.stop {
-            Some(present) if is_under_way || present.rule != Rule::Requested => {
-                if wanted >= present.category {
-                    return;
-                }
-                self.stop = Some(StopReason { category: wanted, ..present });
-            }
-            _ => {
-                self.stop = Some(reason);
-                self.happened(now_ns, EventKind::Stop(reason), door);
-            }
+        let present = self.stop.filter(|present| is_under_way || present.rule != Rule::Requested);
+        let hardest = present.map_or(wanted, |present| present.category.min(wanted));
+        let kept = present.filter(|present| present.rule != Rule::Requested || rule == Rule::Requested);
+        self.stop = Some(StopReason { category: hardest, ..kept.unwrap_or(reason) });
+        if kept.is_none() {
+            self.happened(now_ns, EventKind::Stop(StopReason { category: hardest, ..reason }), door);
         }
-        self.carry_out(wanted, now_ns, door);
+        if present.is_none_or(|present| wanted < present.category) {
+            self.carry_out(wanted, now_ns, door);
+        }
     }
 
     /// A joint in profile torque cannot be held where it is: its drive closes no position loop. The brake holds it.

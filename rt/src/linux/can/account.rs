@@ -108,6 +108,13 @@ impl Account {
         self.unconfirmed = self.unconfirmed.saturating_sub(usize::try_from(more).unwrap_or(usize::MAX));
     }
 
+    /// The interface does not send what it takes. One whose controller has left the bus does not either, and says more.
+    pub(super) fn link_lost(&mut self) {
+        if self.health.state != BusState::BusOff {
+            self.down();
+        }
+    }
+
     /// An interface that goes down drops what it still had to send.
     fn down(&mut self) {
         self.health.state = BusState::Down;
@@ -174,6 +181,39 @@ mod tests {
         assert_eq!(account.health.state, BusState::Down);
         account.taken(&[frame(1)]);
         assert_eq!(account.health.state, BusState::ErrorActive);
+    }
+
+    #[test]
+    fn whatever_says_that_there_is_no_interface_is_one_condition_at_once() {
+        for errno in [libc::ENETDOWN, libc::ENODEV, libc::ENXIO] {
+            let (mut sending, mut receiving) = (Account::default(), Account::default());
+            sending.taken(&[frame(1)]);
+            sending.refused(1, errno);
+            receiving.taken(&[frame(1)]);
+            receiving.receive_failed(errno);
+            for account in [sending, receiving] {
+                assert_eq!((account.health.state, account.unconfirmed()), (BusState::Down, 0));
+                assert_eq!((account.health.tx_overruns, account.health.errors), (0, 0));
+            }
+        }
+    }
+
+    #[test]
+    fn an_interface_that_drops_what_it_takes_is_down_unless_its_controller_has_left_the_bus() {
+        let mut account = Account::default();
+        account.taken(&[frame(1), frame(2)]);
+        account.link_lost();
+        assert_eq!((account.health.state, account.unconfirmed()), (BusState::Down, 0));
+        // It takes frames for as long as it goes down.
+        account.taken(&[frame(1)]);
+        account.link_lost();
+        assert_eq!((account.health.state, account.unconfirmed()), (BusState::Down, 0));
+
+        let mut account = Account::default();
+        account.arrived(&error(libc::CAN_ERR_BUSOFF));
+        account.taken(&[frame(1)]);
+        account.link_lost();
+        assert_eq!((account.health.state, account.unconfirmed()), (BusState::BusOff, 1));
     }
 
     #[test]

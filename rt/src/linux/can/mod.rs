@@ -4,6 +4,7 @@
 mod account;
 mod batch;
 mod error_frame;
+mod link;
 mod port;
 mod wire_format;
 

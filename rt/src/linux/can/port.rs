@@ -4,6 +4,7 @@ use super::super::clock::{monotonic_ns, real_time_ns, timespec_of};
 use super::super::errno;
 use super::account::Account;
 use super::batch::{self, Batch, SEND_BATCH};
+use super::link::Link;
 use crate::frame::Frame;
 use crate::port::{BusHealth, BusPort, RECEIVE_BATCH, ReceiveBatch, Received};
 use crate::time::{NANOSECONDS_PER_SECOND, Nanoseconds};
@@ -15,8 +16,8 @@ use crate::time::{NANOSECONDS_PER_SECOND, Nanoseconds};
 /// zero; and uses, where they are on: error frames, kernel time stamps (`SO_TIMESTAMPNS`), the overflow counter
 /// (`SO_RXQ_OVFL`), CAN FD frames. Its calls never wait, whether the socket is a blocking one or not.
 ///
-/// An interface that goes down is [`BusState::Down`](crate::port::BusState::Down) and comes back by itself; one
-/// that is removed (an adapter unplugged) unbinds the socket for good, and a new port must be made.
+/// An interface that goes down is [`BusState::Down`](crate::port::BusState::Down), from the first frame on that it has
+/// dropped, and comes back by itself; one that is removed (an adapter unplugged) unbinds the socket for good, and a new port must be made.
 ///
 /// # Time of arrival
 /// The kernel stamps frames on `CLOCK_REALTIME` when the driver hands them over. They are moved to the monotonic
@@ -24,6 +25,7 @@ use crate::time::{NANOSECONDS_PER_SECOND, Nanoseconds};
 /// which only a real-time clock that was set in between can cause, is replaced by the present.
 pub struct SocketCanPort {
     descriptor: libc::c_int,
+    link: Link,
     batch: Batch,
     account: Account,
 }
@@ -38,7 +40,12 @@ impl SocketCanPort {
         if descriptor < 0 {
             return Err(errno());
         }
-        Ok(Self { descriptor, batch: Batch::new(), account: Account::new(bit_rate, data_bit_rate) })
+        Ok(Self {
+            descriptor,
+            link: Link::of(descriptor),
+            batch: Batch::new(),
+            account: Account::new(bit_rate, data_bit_rate),
+        })
     }
 
     /// Waits until something has arrived, but no longer than `timeout_ns`. For whoever lives by the frames that
@@ -118,6 +125,10 @@ impl BusPort for SocketCanPort {
     }
 
     fn unconfirmed(&mut self, _now_ns: Nanoseconds) -> usize {
+        // Frames that do not come back may have been dropped by an interface that is being taken down.
+        if self.account.unconfirmed() > 0 && self.link.is_lost() {
+            self.account.link_lost();
+        }
         self.account.unconfirmed()
     }
 

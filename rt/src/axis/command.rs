@@ -1,0 +1,106 @@
+//! What is sent to the drive of an axis.
+
+use super::{Axis, Cadence, CommandPdo};
+use crate::cia402::{Goal, State as DriveState, controlword};
+use crate::control::{ControlLaw, LoopInput};
+use crate::frame::Frame;
+use crate::pdo::CommandSlot;
+use crate::profile::ProfileTarget;
+
+impl Axis {
+    /// Writes the command of this cycle of the axis' bus: one step towards `goal`, unless another controlword is to be
+    /// sent, and the target.
+    pub fn command(&mut self, goal: Goal, other_word: Option<u16>) {
+        let is_enabled = self.is_enabled();
+        let word = other_word.unwrap_or_else(|| self.word_towards(goal));
+        let is_repeated = self.parameters.controlword_spacing_cycles > 0
+            && self.since_controlword >= self.parameters.controlword_spacing_cycles
+            && is_enabled != (goal == Goal::Enabled);
+        self.is_controlword_due = word != self.base_word || is_repeated;
+        self.since_controlword =
+            if self.is_controlword_due { 0 } else { self.since_controlword.saturating_add(1) };
+        self.base_word = word;
+        self.sent = [self.set[0], self.sent[0], self.sent[1]];
+
+        let parameters = &self.parameters;
+        let law = parameters.law;
+        let raw = if !is_enabled {
+            self.profile.rest(law.idle(self.position_raw));
+            self.profile_target = None;
+            self.torque_set = 0.0;
+            // One that has been given up may still follow its target until it takes the controlword that disables it: a
+            // position stays what it was, so that this is no step by the following error.
+            let still_follows = self.is_lost
+                && self.drive_state() == DriveState::OperationEnabled
+                && law.target_slot() == CommandSlot::TargetPosition
+                && !law.is_profile();
+            if still_follows { self.command.command(law.target_slot()) } else { self.profile.target_raw() }
+        } else if law.is_profile() {
+            self.torque_set = match self.profile_target {
+                Some(ProfileTarget::Torque(torque)) => torque,
+                _ => 0.0,
+            };
+            self.profile.target_raw()
+        } else {
+            let input = LoopInput {
+                set: self.set[0],
+                due: self.sent[2],
+                position: self.position,
+                velocity: self.velocity,
+            };
+            let (raw, torque) = law.target(&input, &parameters.scale, &parameters.limits);
+            self.torque_set = torque;
+            raw
+        };
+        self.command.set(law.target_slot(), raw);
+        let mode_bits = if is_enabled { self.mode_bits() } else { 0 };
+        self.command.set(CommandSlot::Controlword, (word | mode_bits).into());
+    }
+
+    /// The controlword that brings the drive one step nearer to `goal`.
+    fn word_towards(&self, goal: Goal) -> u16 {
+        let is_too_early = goal == Goal::Enabled
+            && !self.is_enabled()
+            && self.base_word != 0
+            && self.since_controlword < self.parameters.controlword_spacing_cycles;
+        if is_too_early {
+            return self.base_word;
+        }
+        self.parameters.dialect.controlword(self.drive_state(), goal, self.base_word)
+    }
+
+    /// What the mode of operation adds to the controlword of an enabled drive.
+    fn mode_bits(&mut self) -> u16 {
+        let has_handshake = self.parameters.dialect.acknowledges_set_points();
+        match self.parameters.law {
+            ControlLaw::ProfilePosition if has_handshake => self.profile.position_bits(self.statusword()),
+            ControlLaw::ProfilePosition => {
+                self.profile.pass();
+                controlword::BIT_5
+            }
+            ControlLaw::ProfileVelocity | ControlLaw::ProfileTorque => {
+                self.profile.pass();
+                0
+            }
+            // Interpolate (CiA 402-2, interpolated position mode).
+            ControlLaw::Interpolated if has_handshake => controlword::BIT_4,
+            _ => 0,
+        }
+    }
+
+    /// The controlword that was written last.
+    pub fn controlword(&self) -> u16 {
+        self.command.command(CommandSlot::Controlword) as u16
+    }
+
+    /// The frames of this cycle's command; none while it is not known where the drive is.
+    pub fn frames(&self) -> impl Iterator<Item = Frame> {
+        let is_due = |command: &CommandPdo| {
+            self.is_position_known && (command.cadence == Cadence::EveryCycle || self.is_controlword_due)
+        };
+        self.parameters.commands.iter().filter(move |command| is_due(command)).filter_map(|command| {
+            let payload = command.pdo.mapping.pack(&self.command);
+            Frame::data(command.pdo.id, payload.get(..command.pdo.mapping.length())?).ok()
+        })
+    }
+}

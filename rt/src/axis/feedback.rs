@@ -1,0 +1,173 @@
+//! What the drive of an axis reports.
+
+use super::Axis;
+use crate::cia402::State as DriveState;
+use crate::frame::Frame;
+use crate::pdo::{FeedbackSlot, TooShort};
+use crate::watch::NodeComplaint;
+
+/// A joint that seems faster than this many times its velocity limit has not moved: its encoder, or its drive's report,
+/// is wrong. The counts are for limits so low that a count is more than they allow in a cycle.
+const IMPLAUSIBLE_SPEED: f64 = 4.0;
+const IMPLAUSIBLE_COUNTS: f64 = 64.0;
+/// A fault shows in the statusword within this many slots of the emergency message that announces it.
+const EMERGENCY_GRACE_CYCLES: u8 = 3;
+
+impl Axis {
+    /// Takes feedback PDO number `pdo` (from 0). One that is too short changes nothing.
+    pub fn receive(&mut self, pdo: usize, frame: &Frame) -> Result<(), TooShort> {
+        let Some(parameters) = self.parameters.feedback.get(pdo) else { return Ok(()) };
+        parameters.mapping.unpack(frame.first_word(), frame.payload().len(), &mut self.feedback)?;
+        let bit = 1 << (pdo & 7);
+        if self.arrived & bit != 0 {
+            self.duplicate_watch.again();
+        }
+        self.arrived |= bit;
+        Ok(())
+    }
+
+    /// Takes the error code of an emergency message; 0 says that all errors are gone.
+    pub fn receive_emergency(&mut self, code: u16) {
+        self.emergency_code = code;
+        self.since_emergency = (code != 0).then_some(0);
+    }
+
+    /// Takes the state in a boot-up message or heartbeat.
+    pub fn receive_error_control(&mut self, state: u8) {
+        self.node_watch.receive(state);
+    }
+
+    /// Lets time pass in a slot in which the axis' bus has no cycle.
+    pub fn wait(&mut self, elapsed_s: f64) {
+        self.span_s += elapsed_s;
+    }
+
+    /// Begins a command phase with what has arrived. `elapsed_s` is the time since the last slot.
+    pub fn begin_cycle(&mut self, elapsed_s: f64) {
+        self.span_s += elapsed_s;
+        let expected = (1u8 << self.parameters.feedback.len().min(7)) - 1;
+        if self.arrived & expected != expected {
+            self.age = self.age.saturating_add(1);
+            return;
+        }
+        let span_s = self.span_s;
+        self.span_s = 0.0;
+        self.cycle_s = span_s;
+        self.arrived = 0;
+        self.age = 0;
+        let last = self.position;
+        self.position_raw = self.feedback.feedback(FeedbackSlot::Position);
+        self.position = self.parameters.scale.position_from_counts(self.position_raw);
+        self.velocity = if self.reports(FeedbackSlot::Velocity) {
+            self.parameters.scale.velocity_from_drive(self.feedback.feedback(FeedbackSlot::Velocity))
+        } else if self.is_heard && span_s > 0.0 {
+            (self.position - last) / span_s
+        } else {
+            0.0
+        };
+        let farthest = IMPLAUSIBLE_SPEED * self.parameters.limits.velocity * span_s
+            + IMPLAUSIBLE_COUNTS / self.parameters.scale.resolution();
+        let distance = (self.position - last).abs();
+        self.jump = (self.is_heard && distance > farthest).then_some(distance);
+        self.is_heard = true;
+        self.notice_state();
+        self.is_position_known = true;
+        self.following_error = if self.is_profile() { 0.0 } else { self.sent[2].position - self.position };
+    }
+
+    /// Takes the position that the drive has reported otherwise than by process data, if there has been none.
+    pub fn set_reported_position(&mut self, counts: i32) {
+        if !self.is_heard {
+            self.position_raw = counts;
+            self.position = self.parameters.scale.position_from_counts(counts);
+            self.is_position_known = true;
+        }
+    }
+
+    fn reports(&self, slot: FeedbackSlot) -> bool {
+        self.parameters.feedback.iter().any(|pdo| pdo.mapping.carries(slot))
+    }
+
+    /// Whether the drive has reported at all.
+    pub fn is_heard(&self) -> bool {
+        self.is_heard
+    }
+
+    /// Cycles since the drive last reported.
+    pub fn feedback_age(&self) -> u16 {
+        self.age
+    }
+
+    /// A drive that was enabled is taken for disabled only when it says so again: one false statusword would let its
+    /// set-point follow the joint while the drive still obeys, and disable it. A fault counts at once.
+    fn notice_state(&mut self) {
+        let shown = self.parameters.dialect.state(self.statusword());
+        let contradicts = self.state == DriveState::OperationEnabled
+            && shown != DriveState::OperationEnabled
+            && !shown.is_faulted();
+        self.contradictions = if contradicts { self.contradictions.saturating_add(1) } else { 0 };
+        if self.contradictions != 1 {
+            self.state = shown;
+        }
+    }
+
+    /// The drive's state by its statuswords.
+    pub fn drive_state(&self) -> DriveState {
+        self.state
+    }
+
+    /// Whether the joint has jumped since the report before, and how far: rad (m).
+    pub fn jump(&self) -> Option<f64> {
+        self.jump.filter(|_| self.age == 0)
+    }
+
+    /// Object 6041 as last received.
+    pub fn statusword(&self) -> u16 {
+        self.feedback.feedback(FeedbackSlot::Statusword) as u16
+    }
+
+    /// Object 603F if it is reported, else the code of the last emergency message.
+    pub fn error_code(&self) -> u16 {
+        match self.feedback.feedback(FeedbackSlot::ErrorCode) as u16 {
+            0 => self.emergency_code,
+            code => code,
+        }
+    }
+
+    /// The mode that the drive shows, if it reports one that differs from ours.
+    pub fn foreign_mode(&self) -> Option<i8> {
+        let shown = self.feedback.feedback(FeedbackSlot::OperationModeDisplay) as i8;
+        let ours = self.parameters.law.operation_mode() as i8;
+        (self.reports(FeedbackSlot::OperationModeDisplay) && shown != ours).then_some(shown)
+    }
+
+    /// Whether the drive follows set-points.
+    pub fn is_enabled(&self) -> bool {
+        self.drive_state() == DriveState::OperationEnabled && !self.is_lost
+    }
+
+    /// The actual position (rad or m).
+    pub fn position(&self) -> f64 {
+        self.position
+    }
+
+    /// The actual velocity (rad/s or m/s).
+    pub fn velocity(&self) -> f64 {
+        self.velocity
+    }
+
+    /// What the node's error control messages say against it.
+    pub fn node_complaint(&self) -> Option<NodeComplaint> {
+        self.node_watch.complaint(self.parameters.heartbeat_timeout_cycles)
+    }
+
+    /// Whether another node answers under the same number.
+    pub fn is_duplicate(&self) -> bool {
+        self.duplicate_watch.is_duplicate()
+    }
+
+    /// The code of an emergency message that the statusword has had time to explain by a fault.
+    pub fn unexplained_emergency(&self) -> Option<u16> {
+        self.since_emergency.filter(|cycles| *cycles >= EMERGENCY_GRACE_CYCLES).map(|_| self.emergency_code)
+    }
+}

@@ -1,0 +1,85 @@
+//! Where an axis is to be.
+
+use super::Axis;
+use crate::guard::{self, Course, Violation};
+use crate::plan::State;
+use crate::stop::Rule;
+
+impl Axis {
+    /// The newest set-point.
+    pub fn set_point(&self) -> State {
+        self.set[0]
+    }
+
+    /// The newest set-point, with velocity and acceleration as the steps of the positions give them.
+    pub fn stepped(&self, period_s: f64) -> State {
+        let [newest, last, before] = self.set.map(|state| state.position);
+        let limits = &self.parameters.limits;
+        let acceleration = ((newest - last) - (last - before)) / (period_s * period_s);
+        let acceleration = acceleration.clamp(-limits.deceleration, limits.acceleration);
+        // The step is what the velocity was in the middle of the cycle.
+        let velocity = (newest - last) / period_s + acceleration * period_s / 2.0;
+        State { position: newest, velocity: velocity.clamp(-limits.velocity, limits.velocity), acceleration }
+    }
+
+    /// Makes the actual position the set-point, as if it had always been.
+    ///
+    /// The set-point of an axis that has been given up stays where it was: nobody follows it, and nothing is to look like
+    /// a step.
+    pub fn follow_actual(&mut self) {
+        if self.is_lost {
+            self.set = [State { position: self.set[0].position, ..State::default() }; 3];
+            self.following_error = 0.0;
+            return;
+        }
+        self.set = [State { position: self.position, ..State::default() }; 3];
+        self.sent = self.set;
+        self.following_error = 0.0;
+        self.following_guard.reset();
+    }
+
+    /// Checks the next set-point against the guard.
+    pub fn check(&self, next: &State, period_s: f64) -> Result<(), Violation> {
+        guard::check(&self.parameters.limits, period_s, self.set[1].position, self.set[0].position, next)
+    }
+
+    /// Checks the next set-point of a stream, beyond [`Axis::check`]. After a command that did not come and was bridged the
+    /// jerk is not the stream's own, and is not judged.
+    pub fn check_stream(&self, next: &State, period_s: f64, is_bridged: bool) -> Result<(), Violation> {
+        let limits = &self.parameters.limits;
+        let jerk = if is_bridged { f64::INFINITY } else { limits.jerk };
+        guard::check_jerk(jerk, &self.course(next, period_s))?;
+        guard::check_braking(limits, &self.course(next, period_s))
+    }
+
+    /// The set-point within the limits that is nearest to one of a stream.
+    pub fn clamped(&self, next: &State, period_s: f64) -> State {
+        guard::clamp(&self.parameters.limits, &self.course(next, period_s))
+    }
+
+    fn course(&self, next: &State, period_s: f64) -> Course {
+        let sent = [self.set[0].position, self.set[1].position, self.set[2].position];
+        Course { sent, next: next.position, period_s }
+    }
+
+    /// Checks that a stream begins where the joint is. What is no number is left to [`Axis::check`].
+    pub fn check_start(&self, first: &State) -> Result<(), Violation> {
+        let (distance, limit) = ((first.position - self.position).abs(), self.parameters.start_tolerance);
+        if distance > limit {
+            Err(Violation { rule: Rule::StartPose, value: distance, limit })
+        } else {
+            Ok(())
+        }
+    }
+
+    /// Checks the following error of this cycle, if there was feedback.
+    pub fn check_following(&mut self) -> Result<(), Violation> {
+        if self.age > 0 { Ok(()) } else { self.following_guard.check(self.following_error) }
+    }
+
+    /// Takes the next set-point. In a profile mode there is none: the target stays.
+    pub fn advance(&mut self, next: State) {
+        let next = if self.is_profile() { self.shown_set_point() } else { next };
+        self.set = [next, self.set[0], self.set[1]];
+    }
+}

@@ -1,0 +1,103 @@
+//! Whether the interface of a socket can send at all, from the kernel itself.
+//!
+//! While an interface is taken down, the kernel takes frames and drops them without a word for some milliseconds, before
+//! it tells the socket (`ENETDOWN`). Its flags show it from the beginning: `IFF_RUNNING` is gone as soon as the queue is
+//! closed. An interface that is removed unbinds the socket.
+
+/// The interface that a socket is bound to.
+#[derive(Clone, Copy)]
+pub(super) struct Link {
+    descriptor: libc::c_int,
+    /// Its name; `None` where the socket is no CAN socket that is bound to one interface.
+    name: Option<[libc::c_char; libc::IFNAMSIZ]>,
+}
+
+impl Link {
+    /// The interface of the socket `descriptor`, which must live as long as this is used.
+    pub(super) fn of(descriptor: libc::c_int) -> Self {
+        let name = bound_interface(descriptor).filter(|index| *index > 0).and_then(|index| {
+            let mut request = NO_REQUEST;
+            request.ifr_ifru.ifru_ifindex = index;
+            // SAFETY: this call reads the index from the request and writes the name into it.
+            let named = unsafe { libc::ioctl(descriptor, libc::SIOCGIFNAME as _, &raw mut request) };
+            (named == 0).then_some(request.ifr_name)
+        });
+        Self { descriptor, name }
+    }
+
+    /// Whether the interface is down, going down or gone. One of which nothing is known is not.
+    pub(super) fn is_lost(&self) -> bool {
+        let Some(name) = self.name else { return false };
+        // Asking for one that is gone by its name would have the kernel look for a module of that name.
+        if bound_interface(self.descriptor) == Some(0) {
+            return true;
+        }
+        let mut request = libc::ifreq { ifr_name: name, ..NO_REQUEST };
+        // SAFETY: this call reads the name from the request and writes the flags into it.
+        let answered = unsafe { libc::ioctl(self.descriptor, libc::SIOCGIFFLAGS as _, &raw mut request) };
+        // SAFETY: the kernel has written the flags if it has answered, and any bits are flags.
+        answered != 0 || !is_running(unsafe { request.ifr_ifru.ifru_flags })
+    }
+}
+
+/// Whether an interface with these flags sends what it takes.
+const fn is_running(flags: libc::c_short) -> bool {
+    let needed = libc::IFF_UP | libc::IFF_RUNNING;
+    flags as libc::c_int & needed == needed
+}
+
+/// The index of the interface that a CAN socket is bound to, 0 for none; `None` for another socket.
+fn bound_interface(descriptor: libc::c_int) -> Option<libc::c_int> {
+    // SAFETY: it holds numbers, of which any are possible.
+    let mut address: libc::sockaddr_can = unsafe { core::mem::zeroed() };
+    let mut length = size_of::<libc::sockaddr_can>() as libc::socklen_t;
+    // SAFETY: the kernel writes no more than `length` bytes.
+    let asked = unsafe { libc::getsockname(descriptor, (&raw mut address).cast(), &raw mut length) };
+    (asked == 0 && libc::c_int::from(address.can_family) == libc::AF_CAN).then_some(address.can_ifindex)
+}
+
+const NO_REQUEST: libc::ifreq = {
+    // SAFETY: it holds bytes and numbers, of which any are possible.
+    unsafe { core::mem::zeroed() }
+};
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_interface_is_lost_from_the_moment_at_which_its_queue_is_closed() {
+        assert!(is_running((libc::IFF_UP | libc::IFF_RUNNING | libc::IFF_NOARP) as libc::c_short));
+        assert!(!is_running((libc::IFF_UP | libc::IFF_NOARP) as libc::c_short));
+        assert!(!is_running(libc::IFF_RUNNING as libc::c_short));
+        assert!(!is_running(0));
+    }
+
+    #[test]
+    fn a_socket_of_another_family_or_none_has_no_interface_to_lose() {
+        let mut ends = [0; 2];
+        // SAFETY: `ends` has room for both descriptors.
+        assert_eq!(unsafe { libc::socketpair(libc::AF_UNIX, libc::SOCK_DGRAM, 0, ends.as_mut_ptr()) }, 0);
+        assert!(!Link::of(ends[0]).is_lost());
+        // SAFETY: both are ours.
+        unsafe { (libc::close(ends[0]), libc::close(ends[1])) };
+        assert!(!Link::of(-1).is_lost());
+    }
+
+    #[test]
+    fn the_kernel_tells_the_name_and_the_flags_of_an_interface() {
+        // The loopback is everywhere, and any socket may ask for it.
+        // SAFETY: makes a descriptor.
+        let socket = unsafe { libc::socket(libc::AF_UNIX, libc::SOCK_DGRAM, 0) };
+        let mut request = NO_REQUEST;
+        request.ifr_name[0] = b'l' as libc::c_char;
+        request.ifr_name[1] = b'o' as libc::c_char;
+        // SAFETY: as in `is_lost`.
+        assert_eq!(unsafe { libc::ioctl(socket, libc::SIOCGIFFLAGS as _, &raw mut request) }, 0);
+        // SAFETY: as in `is_lost`.
+        let flags = unsafe { request.ifr_ifru.ifru_flags };
+        assert!(i32::from(flags) & libc::IFF_LOOPBACK != 0, "{flags:#x}");
+        // SAFETY: it is ours.
+        unsafe { libc::close(socket) };
+    }
+}

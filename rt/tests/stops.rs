@@ -1,0 +1,123 @@
+//! What becomes of a stop while it is under way: it becomes harder, a fault comes up, a drive does not obey.
+
+mod fixture;
+
+use fixture::{Rig, move_to, parameters};
+use takt_rt::door::Request;
+use takt_rt::frame::{Frame, Id};
+use takt_rt::port::BusState;
+use takt_rt::stop::{Phase, Rule, StopCategory};
+
+/// The group is to be disabled, but the drive of the first axis has fallen silent in operation enabled: it never shows that
+/// it obeys.
+fn disabling_in_vain() -> Rig {
+    let mut parameters = parameters(3);
+    // What the silent drive lacks is no fault of its own here.
+    parameters.axes[0].missed_feedback_cycles = u16::MAX;
+    let mut rig = Rig::of(parameters).enable();
+    rig.drive(0).is_silent = true;
+    rig.request(Request::Disable);
+    rig.run_until(Phase::Disabling, 3);
+    rig
+}
+
+#[test]
+fn disabling_that_becomes_harder_on_its_way_lasts_no_longer() {
+    let cycles_of = |harder_after: Option<usize>| {
+        let mut rig = disabling_in_vain();
+        let mut cycles = 0;
+        while rig.phase() == Phase::Disabling {
+            if harder_after == Some(cycles) {
+                rig.door.requests.push_back(Request::Stop(StopCategory::Zero));
+            }
+            rig.run(1);
+            cycles += 1;
+            assert!(cycles < 10_000, "stuck");
+        }
+        cycles
+    };
+    let patience = cycles_of(None);
+    assert!((490..=510).contains(&patience), "{patience}");
+    for after in [1, 250, 490] {
+        assert_eq!(cycles_of(Some(after)), patience, "harder after {after} cycles");
+    }
+}
+
+/// The rules and categories of all stops that were told of.
+fn told(rig: &Rig) -> Vec<(Rule, StopCategory)> {
+    rig.stops().iter().map(|stop| (stop.rule, stop.category)).collect()
+}
+
+#[test]
+fn a_fault_on_the_way_of_a_stop_that_was_asked_for_takes_its_place_and_must_be_reset() {
+    for category in [StopCategory::Two, StopCategory::One, StopCategory::Zero] {
+        let mut rig = Rig::enabled(3);
+        rig.move_to(2.0);
+        rig.run(200);
+        rig.request(Request::Stop(category));
+        rig.buses[0].inject(Frame::of(Id::canopen(0x700, 2), [0]));
+        rig.run(2);
+        // The fault itself asks for category 1; what was asked for stays where it is harder.
+        let hardest = category.min(StopCategory::One);
+        assert_eq!(told(&rig), [(Rule::Requested, category), (Rule::UnexpectedBootUp, hardest)]);
+        let shown = rig.door.snapshot.stop.unwrap();
+        assert_eq!((shown.rule, shown.axis, shown.category), (Rule::UnexpectedBootUp, Some(1), hardest));
+        rig.run_until(Phase::Disabled, 3_000);
+        rig.assert_limits_kept();
+
+        rig.request(Request::Enable);
+        rig.run(5);
+        assert_eq!(rig.phase(), Phase::Disabled, "it is not enabled as if nothing had happened");
+        rig.request(Request::ResetFaults);
+        rig.request(Request::Enable);
+        rig.run_until(Phase::Holding, 600);
+    }
+}
+
+#[test]
+fn a_fault_while_a_requested_stop_disables_the_drives_is_latched() {
+    let mut rig = disabling_in_vain();
+    rig.request(Request::Stop(StopCategory::One));
+    rig.run(10);
+    rig.buses[0].state = BusState::BusOff;
+    rig.run(2);
+    assert_eq!(told(&rig), [(Rule::Requested, StopCategory::One), (Rule::BusLost, StopCategory::One)]);
+    assert_eq!(rig.stops()[1].phase, Phase::Disabling);
+    rig.buses[0].state = BusState::ErrorActive;
+    rig.drive(0).is_silent = false;
+    rig.run_until(Phase::Disabled, 600);
+    rig.request(Request::Enable);
+    rig.run(5);
+    assert_eq!(rig.phase(), Phase::Disabled);
+}
+
+#[test]
+fn what_is_asked_for_on_the_way_of_a_fault_does_not_take_its_place() {
+    let mut rig = Rig::enabled(3);
+    rig.move_to(2.0);
+    rig.run(200);
+    rig.buses[0].inject(Frame::of(Id::canopen(0x700, 2), [0]));
+    rig.run(3);
+    rig.request(Request::Stop(StopCategory::Zero));
+    rig.request(Request::Stop(StopCategory::Two));
+    rig.run(2);
+    assert_eq!(told(&rig), [(Rule::UnexpectedBootUp, StopCategory::One)]);
+    let shown = rig.door.snapshot.stop.unwrap();
+    assert_eq!((shown.rule, shown.category), (Rule::UnexpectedBootUp, StopCategory::Zero));
+    rig.run_until(Phase::Disabled, 3_000);
+}
+
+#[test]
+fn a_fault_of_the_standing_group_after_a_requested_stop_is_a_stop_of_its_own() {
+    let mut rig = Rig::enabled(3);
+    rig.request(Request::Move(move_to(1.0)));
+    rig.run(100);
+    rig.request(Request::Stop(StopCategory::Two));
+    rig.run_until(Phase::Holding, 3_000);
+    rig.buses[0].inject(Frame::of(Id::canopen(0x700, 2), [0]));
+    rig.run(2);
+    assert_eq!(
+        told(&rig),
+        [(Rule::Requested, StopCategory::Two), (Rule::UnexpectedBootUp, StopCategory::One)]
+    );
+}
