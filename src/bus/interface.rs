@@ -96,6 +96,14 @@ pub enum InterfaceError {
         /// The command that sets it up, once it is down.
         command: String,
     },
+    /// It is off the bus, and nothing brings it back by itself.
+    #[error(
+        "{name} is bus-off and never restarts by itself; after the cause is found: sudo ip link set {name} type can restart"
+    )]
+    IsOff {
+        /// The interface.
+        name: String,
+    },
     /// This process may not configure it.
     #[error("{name} is down and this process may not bring it up; to do so: {command}")]
     NotPermitted {
@@ -207,8 +215,11 @@ fn parameters(settings: &InterfaceSettings) -> InterfaceCanParams {
     }
 }
 
-/// Whether an interface that is up is as it is to be. A virtual one has no bit rate and takes any.
+/// Whether an interface that is up is as it is to be, or will be so by itself. A virtual one has no bit rate and takes any.
 fn compare(status: &InterfaceStatus, settings: &InterfaceSettings) -> Result<(), InterfaceError> {
+    if status.state == BusState::BusOff && status.restart_ms == Some(0) {
+        return Err(InterfaceError::IsOff { name: status.name.clone() });
+    }
     let pairs = [(status.timing, Some(settings.bit_rate)), (status.data_timing, settings.data_bit_rate)];
     for (timing, wanted) in pairs {
         if let (Some(timing), Some(wanted)) = (timing, wanted)
@@ -300,6 +311,14 @@ mod tests {
             "sudo ip link set can0 down && sudo ip link set can0 up type can bitrate 1000000 restart-ms 100";
         assert!(text.ends_with(command), "{text}");
         assert!(compare(&up(Some(1_000_000)), &CLASSIC).is_ok());
+    }
+
+    #[test]
+    fn a_controller_that_is_off_the_bus_for_good_is_refused_with_the_command_that_restarts_it() {
+        let off = InterfaceStatus { state: BusState::BusOff, restart_ms: Some(0), ..up(Some(1_000_000)) };
+        let text = compare(&off, &CLASSIC).unwrap_err().to_string();
+        assert!(text.ends_with("sudo ip link set can0 type can restart"), "{text}");
+        assert!(compare(&InterfaceStatus { restart_ms: Some(100), ..off }, &CLASSIC).is_ok());
     }
 
     #[test]

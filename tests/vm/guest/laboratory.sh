@@ -8,13 +8,19 @@ vcan_up() {
     ip link set "$1" up
 }
 
-# Brings both emulated SJA1000 controllers up at 1 Mbit/s. They sit on one bus and acknowledge each other. Their interrupt
-# threads come before takt: a frame of somebody else that has just been sent must make way for SYNC.
+# Brings both emulated SJA1000 controllers up at 1 Mbit/s. They sit on one bus and acknowledge each other.
 controllers_up() {
-    local interface thread
+    local interface
     for interface in can0 can1; do
         ip link set "$interface" up type can bitrate 1000000 restart-ms 100
     done
+    interrupts_first
+}
+
+# The interrupt threads of the controllers come before takt: a frame of somebody else that has just been sent must make way
+# for SYNC. A controller that goes down and up has a new one.
+interrupts_first() {
+    local thread
     for thread in $(pgrep '^irq/.*can'); do
         chrt --fifo --pid 85 "$thread"
     done

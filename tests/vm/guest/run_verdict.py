@@ -1,15 +1,29 @@
 """Judges how a run of takt ended, by what it printed (`takt run --json`), and what it left, by `takt report --json`.
 
-    python3 run_verdict.py TAKT RUN.json EXIT_CODE RULE...
+    python3 run_verdict.py TAKT RUN.json EXIT_CODE FAULT_AT RULE...
 
 The run must have stopped in motion by one of the rules and have left a black box that says the same, or, where `borne` is
-among them, have finished. Whatever happened, every cycle must be in the recording. Prints how it ended in a few words;
-ends with an error that says what is wrong.
+among them, have finished. Whatever happened, every cycle must be in the recording, and no set-point may be further from
+the one before than a cycle's motion at the limit of the velocity; with `records_lost` among the rules there is no such
+recording, and the run must have said so. Prints how it ended in a few words; ends with an error that says what is wrong.
+
+With FAULT_AT, the time of the fault in seconds of CLOCK_REALTIME (`-` without one), a stop is followed by a second line:
+its rule, its category, and after how many milliseconds it was noticed and all axes that are still heard were at rest.
 """
 
 import json
+import struct
 import subprocess
 import sys
+from collections import defaultdict
+
+from recording import messages
+
+# In takt_msgs/msg/Axis (src/telemetry/messages/Axis.msg).
+SLOT, POSITION_SET, POSITION, AGE, STATE = 0, 8, 16, 66, 68
+OPERATION_ENABLED = 4
+# Half a millimetre of a linear axis; of a rotary one, what it is at a radius of half a metre.
+AT_REST = {"rad": 1e-3, "m": 5e-4}
 
 
 def require(condition, sentence):
@@ -34,14 +48,57 @@ def judge_stop(takt, run, code, rules):
     return f"exit code 1, {stop['rule']}, category {stop['category']} in slot {stop['slot']}, black box written"
 
 
-def judge_records(takt, run):
+def judge_records(takt, run, must_be_lost):
     telemetry = run["telemetry"]
+    if must_be_lost:
+        require(telemetry["not_written"], "nothing is said of what could not be written")
+        return f"told: {telemetry['not_written'][0]}"
     require(not telemetry["not_written"], f"not written: {telemetry['not_written']}")
     found = recorded(takt, telemetry["recording"])["cycles"]
     require(
         found == telemetry["records"] == run["cycles"] and telemetry["dropped"] == 0,
         f"of {run['cycles']} cycles {telemetry['dropped']} records were dropped and {found} are in the recording",
     )
+    return f"{found} cycles recorded"
+
+
+def trajectories(run):
+    """For every axis the time, the set-point, the position and whether it was just reported, of all cycles under power."""
+    axes = defaultdict(list)
+    for topic, at_ns, axis in messages(run["telemetry"]["recording"]):
+        if topic.startswith("/axis/"):
+            slot, position_set, position = struct.unpack_from("<Qdd", axis)
+            is_heard = struct.unpack_from("<H", axis, AGE)[0] == 0
+            axes[topic[len("/axis/") :]].append((at_ns, slot, position_set, position, is_heard, axis[STATE] == OPERATION_ENABLED))
+    return axes
+
+
+def judge_steps(run, axes):
+    """A set-point may be as far from the one before as the axis goes in a period, however many slots were missed between."""
+    period_s = run["cycle_ns"] / 1e9
+    for axis in run["axes"]:
+        allowed = axis["limits"]["velocity"] * period_s * 1.00001
+        cycles = axes[axis["name"]]
+        for (_, _, before, _, _, was_on), (_, slot, after, _, _, is_on) in zip(cycles, cycles[1:]):
+            step = abs(after - before)
+            require(
+                step <= allowed or not (was_on and is_on),
+                f"{axis['name']}: the set-point jumped by {step} {axis['unit']} in slot {slot}; a cycle at the limit is {allowed}",
+            )
+
+
+def stop_times(run, axes, fault_at_s):
+    """When the fault was noticed, and when the last axis came within tolerance of where it came to rest, in ms after it."""
+    fault_at_ns = int(float(fault_at_s) * 1e9)
+    noticed_ns = rest_ns = 0
+    for axis in run["axes"]:
+        cycles = axes[axis["name"]]
+        noticed_ns = max(at_ns for at_ns, slot, *_ in cycles if slot <= run["stop"]["slot"])
+        heard = [(at_ns, position) for at_ns, _, _, position, is_heard, _ in cycles if is_heard]
+        last = heard[-1][1]
+        moving = [at_ns for at_ns, position in heard if abs(position - last) > AT_REST[axis["unit"]]]
+        rest_ns = max([rest_ns, *moving[-1:]])
+    return (noticed_ns - fault_at_ns) / 1e6, (rest_ns - fault_at_ns) / 1e6
 
 
 def anomalies(run):
@@ -53,7 +110,7 @@ def anomalies(run):
     return ", ".join(f"{what} {count}" for what, count in counted.items() if count)
 
 
-def main(takt, path, code, *rules):
+def main(takt, path, code, fault_at_s, *rules):
     with open(path, encoding="utf-8") as file:
         printed = file.read()
     require(printed, f"it ended with exit code {code} and without a report")
@@ -65,9 +122,16 @@ def main(takt, path, code, *rules):
     else:
         require(run["stop"] is not None, "nothing stopped it")
         ended = judge_stop(takt, run, int(code), rules)
-    judge_records(takt, run)
+    is_lost = "records_lost" in rules
+    records = judge_records(takt, run, is_lost)
+    axes = {} if is_lost else trajectories(run)
+    if axes:
+        judge_steps(run, axes)
     counted = anomalies(run)
-    print(f"{ended}, {run['cycles']} cycles recorded" + (f"; {counted}" if counted else ""))
+    print(f"{ended}, {records}" + (f"; {counted}" if counted else ""))
+    if run["stop"] and axes and fault_at_s != "-":
+        noticed_ms, rest_ms = stop_times(run, axes, fault_at_s)
+        print(f"{run['stop']['rule']} {run['stop']['category']} {noticed_ms:.1f} {rest_ms:.1f}")
 
 
 if __name__ == "__main__":

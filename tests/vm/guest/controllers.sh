@@ -1,0 +1,116 @@
+# What breaks between the emulated controllers and their bus, and in the controllers themselves: three axes on can0 and
+# can1, which only the emulated machine has; another one's controllers may be in use. Their error counters are those of
+# tests/vm/module. TAKT names the program.
+[ "$TAKT_VM" != host ] || exit 0
+. tests/vm/guest/faulted_run.sh
+half=$folder/half.toml restarting=$folder/restarting.toml
+restart_ms=150
+with_folder configs/arm6-erob.toml "$folder/fast.toml"
+with_long_moves "$folder/fast.toml" "$folder/arm.toml"
+first_bus_only "$folder/arm.toml" > "$half"
+sed "/^name = \"base\"/a restart_ms = $restart_ms" "$half" > "$restarting"
+
+errors() { echo "$1 $2 $3" > /sys/module/error_counters/parameters/errors; } # INTERFACE transmit|receive COUNT
+
+# What the kernel says of an interface: its state, its error counters, how soon it restarts, its bit rate.
+controller() { # INTERFACE
+    ip -details -json link show "$1" | python3 -c '
+import json, sys
+data = json.load(sys.stdin)[0]["linkinfo"]["info_data"]
+counters = data.get("berr_counter", {"tx": 0, "rx": 0})
+print(data["state"], counters["tx"], counters["rx"], data.get("restart_ms", 0), data["bittiming"]["bitrate"])'
+}
+
+expect() { # SENTENCE WANTED FOUND
+    if [ "$2" = "$3" ]; then passes "$1: $3"; else fails "$1: $3, and not $2"; fi
+}
+
+# The fault confinement state of the bus in the report of the last run.
+reported_state() { python3 -c 'import json, sys; print(json.load(open(sys.argv[1]))["buses"][0]["state"])' "$folder/$name.json"; }
+
+configured_by_takt() {
+    ip link set can0 down
+    begin "controller that is down when takt starts" 2 "$restarting" base=can0
+    end borne
+    expect "controller as takt has set it up (state, counters, restart, bit rate)" "ERROR-ACTIVE 0 0 $restart_ms 1000000" "$(controller can0)"
+    interrupts_first
+}
+
+warned() {
+    begin "controller at its warning level" 3 "$half" base=can0
+    in_motion can0
+    errors can0 transmit 12
+    expect "controller after 12 errors" "ERROR-WARNING 96 0 $restart_ms 1000000" "$(controller can0)"
+    errors can0 transmit -96
+    end borne
+}
+
+passive() { # transmit|receive ERRORS
+    begin "error-passive controller, errors on $1" 20 "$half" base=can0
+    in_motion can0
+    breaks_now
+    errors can0 "$1" "$2"
+    end bus_error_passive
+    expect "$name, in the report" "error passive" "$(reported_state)"
+    errors can0 "$1" -"$((8 * $2))"
+}
+
+# 32 transmissions in a row without an acknowledgement.
+bus_off() { # NAME
+    begin "$1" 20 "$half" base=can0
+    in_motion can0
+    breaks_now
+    errors can0 transmit 32
+    sleep 0.01
+    expect "$name, ten milliseconds later" "BUS-OFF 127 0" "$(controller can0 | cut -d ' ' -f -3)"
+    end bus_lost
+}
+
+moves_again() { # AFTER_WHAT
+    begin "motion after $1" 2 "$half" base=can0
+    end borne
+}
+
+stays_off() {
+    ip link set can0 down
+    ip link set can0 up type can bitrate 1000000 restart-ms 0
+    interrupts_first
+    bus_off "bus-off without a restart"
+    expect "$name, in the report" "bus off" "$(reported_state)"
+    "$TAKT" doctor --self-test-s 0 --json > "$folder/doctor.json"
+    expect "takt doctor on it (exit code, state, errors)" \
+        "1 forbids bus-off; counters of the controller: 127 sending, 0 receiving" \
+        "$? $(python3 -c '
+import json, sys
+checks = {c["check"]: c for c in json.load(open(sys.argv[1]))["checks"] if c["interface"] == "can0"}
+print(checks["can_state"]["verdict"], checks["can_state"]["read"], end="; ")
+print(", ".join(checks["can_errors"]["read"].split(", ")[:2]))' "$folder/doctor.json")"
+    if "$TAKT" run "$half" --bus base=can0 --duration 2 > "$folder/refused.txt" 2>&1; then
+        fails "takt run on a controller that is off the bus has found nothing wrong"
+    elif grep -q 'ip link set can0 type can restart' "$folder/refused.txt"; then
+        passes "takt run on it: $(tail -n 1 "$folder/refused.txt")"
+    else
+        fails "takt run on it does not say what mends it: $(tail -n 1 "$folder/refused.txt")"
+    fi
+    ip link set can0 type can restart
+    moves_again "a restart by hand"
+}
+
+chrt --fifo --pid 1 $$ >/dev/null
+busybox insmod "$OUT/../share/error_counters.ko" || exit
+controllers_up
+drives_on 40 "$half" can1
+configured_by_takt
+warned
+passive transmit 16
+passive receive 128
+bus_off "bus-off, restart after $restart_ms ms"
+sleep 0.2
+expect "$name, afterwards" "ERROR-ACTIVE 0 0" "$(controller can0 | cut -d ' ' -f -3)"
+moves_again "bus-off and restart"
+stays_off
+goes_down_and_up "controller down and up" "$half" can0 base=can0
+flood "flood of identifier 001 from the drives' controller" can1 "$half" base=can0
+flood "flood of identifier 001 from takt's controller" can0 "$half" base=can0
+drives_off
+exit $failed
