@@ -4,10 +4,12 @@ use std::fmt;
 
 use takt_rt::time::Nanoseconds;
 
+use super::reported_mapping::MappingProblem;
 use super::step::{Access, Check};
 use crate::canopen::emcy::Emergency;
 use crate::canopen::nmt::NmtState;
 use crate::canopen::object::{Object, ObjectAddress};
+use crate::canopen::pdo_inquiry::PdoInquiryError;
 use crate::canopen::sdo::{AbortCode, SdoError};
 
 /// The drives that could not be brought up (or left), each with its reason.
@@ -128,6 +130,8 @@ pub enum Cause {
         is_reading_back: bool,
         /// Why it failed.
         error: SdoError,
+        /// Whether this is how the drive says that it has no such object.
+        means_absent: bool,
     },
     /// A configured value reads back as another one.
     ConfigurationDiffers {
@@ -145,6 +149,10 @@ pub enum Cause {
         /// The value.
         value: i64,
     },
+    /// Reading how the PDOs are configured failed.
+    Inquiry(PdoInquiryError),
+    /// The PDOs that the drive reports do not suit the axis.
+    Mapping(MappingProblem),
     /// The node has restarted, and what it was told is lost.
     Restarted {
         /// How often.
@@ -237,10 +245,10 @@ impl fmt::Display for Cause {
                 }
                 Ok(())
             }
-            Self::ConfigurationTransfer { object, written, is_reading_back: false, error } => {
+            Self::ConfigurationTransfer { object, written, is_reading_back: false, error, .. } => {
                 write!(f, "writing {written} to {object}: expected it to be accepted, got {error}")
             }
-            Self::ConfigurationTransfer { object, written, is_reading_back: true, error } => {
+            Self::ConfigurationTransfer { object, written, is_reading_back: true, error, .. } => {
                 write!(f, "reading {object} back after writing {written}: expected a value, got {error}")
             }
             Self::ConfigurationDiffers { object, written, received } => {
@@ -250,6 +258,8 @@ impl fmt::Display for Cause {
                 let bits = 8 * object.data_type.length();
                 write!(f, "writing {value} to {object}: it does not fit {bits} bits")
             }
+            Self::Inquiry(error) => write!(f, "{error}"),
+            Self::Mapping(problem) => write!(f, "{problem}"),
             Self::Restarted { times } => {
                 write!(f, "expected it to keep running, it has restarted {times} times")
             }
@@ -267,8 +277,13 @@ impl Cause {
             Self::StateNotReached { answered: Answered::Sdo, .. } => Some(
                 "the drive runs but does not obey NMT: look for a second master on the bus, and power-cycle the drive",
             ),
+            Self::ConfigurationTransfer { error: SdoError::NoReply { .. }, means_absent: true, .. } => Some(
+                "this drive gives no answer at all for an object that it does not have: leave the object out of the file \
+                 named by `dcf`; if it has the object, check its supply and the wiring",
+            ),
             Self::Transfer { error: SdoError::NoReply { .. }, .. }
             | Self::ConfigurationTransfer { error: SdoError::NoReply { .. }, .. }
+            | Self::Inquiry(PdoInquiryError { error: SdoError::NoReply { .. }, .. })
             | Self::TextTransfer { error: SdoError::NoReply { .. }, .. } => Some(
                 "the drive has fallen silent: check its supply, the wiring and the bus load, and that no other master \
                  stops it",
@@ -276,6 +291,7 @@ impl Cause {
             Self::Transfer { error: SdoError::Aborted(AbortCode::PresentDeviceState), .. } => Some(
                 "the drive refuses this in its present state: clear its fault and disable it, then run again",
             ),
+            Self::Mapping(problem) => Some(problem.advice()),
             Self::Restarted { .. } => {
                 Some("check the drive's supply for dips, and that no other master resets it")
             }

@@ -5,9 +5,12 @@ mod world;
 
 mod arrival;
 mod bus_budget;
+mod configuration_file;
 mod interpolation;
 mod profile_position;
 mod profile_torque;
 mod profile_velocity;
 mod quirks;
+mod reported_mapping;
 mod silence;
+mod time_of_day;

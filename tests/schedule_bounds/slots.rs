@@ -15,7 +15,8 @@ const CONTROLLER: usize = 0;
 
 /// Axes on one bus, with the nodes in the order of the axes or in the opposite one.
 fn config(axes: usize, is_reversed: bool, cycle: &str, bus: &str, axis: &str) -> Config {
-    let mut text = format!("name = \"n\"\n[cycle]\n{cycle}\n[master]\nheartbeat = \"10 ms\"\n");
+    let mut text =
+        format!("name = \"n\"\n[cycle]\n{cycle}\n[master]\nheartbeat = \"10 ms\"\ntime = \"10 ms\"\n");
     text += &format!("[[bus]]\nname = \"b\"\n{bus}\n[defaults.axis]\ndrive = \"erob-canopen\"\n{axis}\n");
     for number in 1..=axes {
         let node = if is_reversed { axes + 1 - number } else { number };
@@ -44,6 +45,7 @@ fn sources(schedule: &BusSchedule) -> Vec<Source<'_>> {
                 | MessageKind::SetPoint
                 | MessageKind::SdoRequest
                 | MessageKind::MasterHeartbeat
+                | MessageKind::Time
         );
         let station = if is_ours { CONTROLLER } else { axis };
         let frame = longest(Id::base(message.id).unwrap(), FrameKind::Data, message.length);
@@ -112,7 +114,7 @@ fn simulate(schedule: &BusSchedule, chance: &Chance) -> Vec<Arrival> {
         for source in &set_points {
             traffic.release(handed_over_ns, CONTROLLER, source.frame);
         }
-        for source in of(MessageKind::MasterHeartbeat) {
+        for source in of(MessageKind::MasterHeartbeat).chain(of(MessageKind::Time)) {
             if (start_ns % source.message.period_ns) < schedule.period_ns {
                 traffic.release(handed_over_ns, CONTROLLER, source.frame);
             }

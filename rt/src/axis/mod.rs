@@ -6,6 +6,8 @@ mod parameters;
 mod profile_mode;
 mod set_point;
 
+use arrayvec::ArrayVec;
+
 use crate::cia402::State as DriveState;
 use crate::guard::FollowingErrorGuard;
 use crate::pdo::{CommandSlot, FeedbackSlot, ProcessImage};
@@ -126,6 +128,17 @@ impl Axis {
             }
             Err(_) => false,
         }
+    }
+
+    /// Exchanges other process data than it was set up for; before the first feedback.
+    pub fn set_process_data(
+        &mut self,
+        commands: ArrayVec<CommandPdo, MAX_PDOS>,
+        feedback: ArrayVec<Pdo, MAX_PDOS>,
+    ) {
+        self.parameters.commands = commands;
+        self.parameters.feedback = feedback;
+        self.arrived = 0;
     }
 
     /// Begins to watch the node anew.
