@@ -123,6 +123,7 @@ fn prepared() -> Machine {
         ("sys/devices/system/cpu/cpu3/cpuidle/state1/latency", "200\n"),
         ("sys/devices/system/cpu/cpu3/cpuidle/state1/disable", "0\n"),
         ("sys/kernel/mm/transparent_hugepage/enabled", "always [madvise] never\n"),
+        ("proc/zoneinfo", "  pagesets\n    cpu: 0\n              high:  252\n              batch: 63\n"),
         ("proc/interrupts", "      CPU0 CPU1 CPU2 CPU3\n 16:  9  0  0  0  IR-IO-APIC  16-fasteoi   can0\n"),
         ("proc/irq/16/effective_affinity_list", "0\n"),
         ("proc/irq/17/effective_affinity_list", "3\n"),
@@ -197,7 +198,7 @@ fn a_prepared_machine_is_good_in_every_respect() {
 
 #[test]
 fn each_thing_that_is_spoilt_is_found_and_nothing_else() {
-    let spoil: [(&str, &str, &[&str], Verdict); 11] = [
+    let spoil: [(&str, &str, &[&str], Verdict); 12] = [
         (
             "proc/version",
             "Linux version 6.8.0-60-generic (b@l) (gcc) #63-Ubuntu SMP PREEMPT_DYNAMIC Tue",
@@ -231,6 +232,12 @@ fn each_thing_that_is_spoilt_is_found_and_nothing_else() {
             "sys/kernel/mm/transparent_hugepage/enabled",
             "[always] madvise never",
             &["transparent_hugepage"],
+            Verdict::CouldBeBetter,
+        ),
+        (
+            "proc/zoneinfo",
+            "  pagesets\n    cpu: 0\n              high:  1211\n              batch: 63\n",
+            &["page_lists"],
             Verdict::CouldBeBetter,
         ),
         (
@@ -420,6 +427,7 @@ fn the_exit_code_follows_the_verdict_and_every_check_has_its_keys() {
         "irqbalance",
         "competing_threads",
         "transparent_hugepage",
+        "page_lists",
     ] {
         assert!(checks.iter().any(|check| check["check"] == key), "{key}");
     }
