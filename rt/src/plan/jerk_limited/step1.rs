@@ -186,7 +186,7 @@ impl Edges {
                 add(ways, Way { duration, kind: Kind::Passage { lower: false, least } });
             });
         }
-        self.upper.solve(distance, base_is_above, |above, cruise, duration| {
+        self.upper.solve(distance, base, base_is_above, |above, cruise, duration| {
             add(ways, Way { duration, kind: Kind::Crossing { lower: false, above, cruise } });
         });
     }
@@ -203,7 +203,7 @@ impl Edges {
                 add(ways, Way { duration, kind: Kind::Passage { lower: true, least } });
             });
         }
-        self.lower.solve(distance, base_is_above, |above, cruise, duration| {
+        self.lower.solve(distance, base, base_is_above, |above, cruise, duration| {
             add(ways, Way { duration, kind: Kind::Crossing { lower: true, above, cruise } });
         });
     }
