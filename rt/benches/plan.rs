@@ -2,15 +2,14 @@
 //! benchmark; beside the same problems solved by `rsruckig`.
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use rsruckig::prelude::{
-    ControlInterface, DataArrayOrVec, InputParameter, Ruckig, ThrowErrorHandler, Trajectory,
-};
+use rsruckig::prelude::{Ruckig, ThrowErrorHandler, Trajectory};
 use std::hint::black_box;
 use std::time::Duration;
 use takt_rt::plan::{Problem, Profile, State, Timing, synchronised, synchronised_velocity};
 
 mod plan_problems;
-use plan_problems::{Order, problems};
+use plan_problems::rsruckig::input;
+use plan_problems::{Order, planned_anew, problems};
 
 const SETS: u64 = 1024;
 
@@ -49,31 +48,6 @@ fn second_order(seed: u64, axes: usize) -> Vec<Problem> {
     problems(seed, axes, Order::Second)
 }
 
-/// The same problem for `rsruckig`.
-fn input<const AXES: usize>(problems: &[Problem], velocity: bool) -> InputParameter<AXES> {
-    let all = |of: fn(&Problem) -> f64| {
-        let mut values = DataArrayOrVec::<f64, AXES>::new(None, 0.0);
-        for (axis, problem) in problems.iter().enumerate() {
-            values[axis] = of(problem);
-        }
-        values
-    };
-    let mut input = InputParameter::new(None);
-    if velocity {
-        input.control_interface = ControlInterface::Velocity;
-    }
-    input.current_position = all(|problem| problem.start.position);
-    input.current_velocity = all(|problem| problem.start.velocity);
-    input.current_acceleration = all(|problem| problem.start.acceleration);
-    input.target_position = all(|problem| problem.target.position);
-    input.target_velocity = all(|problem| problem.target.velocity);
-    input.target_acceleration = all(|problem| problem.target.acceleration);
-    input.max_velocity = all(|problem| problem.limits.velocity_max);
-    input.max_acceleration = all(|problem| problem.limits.acceleration_max);
-    input.max_jerk = all(|problem| problem.limits.jerk_max);
-    input
-}
-
 fn position(criterion: &mut Criterion) {
     compare::<1>(criterion, "position", synchronised, third_order);
     compare::<3>(criterion, "position", synchronised, third_order);
@@ -82,7 +56,9 @@ fn position(criterion: &mut Criterion) {
 }
 
 fn velocity(criterion: &mut Criterion) {
+    compare::<1>(criterion, "velocity", synchronised_velocity, third_order);
     compare::<3>(criterion, "velocity", synchronised_velocity, third_order);
+    compare::<6>(criterion, "velocity", synchronised_velocity, third_order);
     compare::<7>(criterion, "velocity", synchronised_velocity, third_order);
 }
 
@@ -93,20 +69,18 @@ fn trapezoid(criterion: &mut Criterion) {
     compare::<7>(criterion, "trapezoid", synchronised, second_order);
 }
 
-/// From the state a tenth of the way along each motion, to the same target: what a controller does that plans anew.
-fn planned_anew(seed: u64, axes: usize) -> Vec<Problem> {
-    let mut set = problems(seed, axes, Order::Third);
-    let mut profiles = vec![Profile::hold(0.0); axes];
-    let duration_s = synchronised(&set, &mut profiles, Timing::default()).unwrap_or_default();
-    for (problem, profile) in set.iter_mut().zip(&profiles) {
-        problem.start = profile.sample(0.1 * duration_s);
-    }
-    set
+fn early(seed: u64, axes: usize) -> Vec<Problem> {
+    planned_anew(seed, axes, 0.1)
+}
+
+fn late(seed: u64, axes: usize) -> Vec<Problem> {
+    planned_anew(seed, axes, 0.9)
 }
 
 fn replan(criterion: &mut Criterion) {
-    compare::<6>(criterion, "replan", synchronised, planned_anew);
-    compare::<7>(criterion, "replan", synchronised, planned_anew);
+    compare::<6>(criterion, "replan", synchronised, early);
+    compare::<7>(criterion, "replan", synchronised, early);
+    compare::<7>(criterion, "replan late", synchronised, late);
 }
 
 fn sample(criterion: &mut Criterion) {

@@ -1,5 +1,5 @@
 //! The longest time that planning takes: every set of problems is planned in many passes, and its shortest time counts,
-//! so that what the machine does besides does not.
+//! so that what the machine does besides does not. Beside it, the same sets planned by `rsruckig` for 7 axes.
 //!
 //! ```text
 //! cargo run --release -p takt-rt --example plan_worst -- 7 200
@@ -9,11 +9,14 @@
 
 use std::hint::black_box;
 use std::time::{Duration, Instant};
+
+use ::rsruckig::prelude::{Ruckig, ThrowErrorHandler, Trajectory};
 use takt_rt::plan::{Problem, Profile, Timing, synchronised};
 
 #[path = "../benches/plan_problems/mod.rs"]
 mod plan_problems;
-use plan_problems::{Order, problems};
+use plan_problems::rsruckig::input;
+use plan_problems::{Order, planned_anew, problems};
 
 const SETS: u64 = 4096;
 
@@ -23,19 +26,47 @@ fn main() {
         eprintln!("usage: plan_worst AXES PASSES");
         std::process::exit(2);
     };
-    for (name, order) in [("third order", Order::Third), ("second order", Order::Second)] {
-        let sets: Vec<Vec<Problem>> = (0..SETS).map(|seed| problems(seed, axes, order)).collect();
-        let mut best = vec![Duration::MAX; sets.len()];
+    let draw = |problems: &dyn Fn(u64) -> Vec<Problem>| (0..SETS).map(problems).collect::<Vec<_>>();
+    let kinds = [
+        ("third order", draw(&|seed| problems(seed, axes, Order::Third))),
+        ("planned anew at 10 %", draw(&|seed| planned_anew(seed, axes, 0.1))),
+        ("planned anew at 90 %", draw(&|seed| planned_anew(seed, axes, 0.9))),
+        ("second order", draw(&|seed| problems(seed, axes, Order::Second))),
+    ];
+    for (name, sets) in kinds {
         let mut profiles = vec![Profile::hold(0.0); axes];
-        for _ in 0..passes {
-            for (best, set) in best.iter_mut().zip(&sets) {
-                let begun = Instant::now();
-                let _ = black_box(synchronised(black_box(set), &mut profiles, Timing::default()));
-                *best = begun.elapsed().min(*best);
-            }
+        let own = shortest(&sets, passes, |set| {
+            let _ = black_box(synchronised(black_box(set), &mut profiles, Timing::default()));
+        });
+        println!("{name}, {axes} axes: {}", spread(own));
+        if axes == 7 {
+            let inputs: Vec<_> = sets.iter().map(|set| input::<7>(set, false)).collect();
+            let mut ruckig = Ruckig::<7, ThrowErrorHandler>::new(None, 0.001);
+            let mut trajectory = Trajectory::<7>::new(None);
+            let other = shortest(&inputs, passes, |input| {
+                let _ = black_box(ruckig.calculate(black_box(input), &mut trajectory));
+            });
+            println!("{name}, {axes} axes, rsruckig: {}", spread(other));
         }
-        best.sort_unstable();
-        let at = |part: f64| best[((best.len() - 1) as f64 * part) as usize];
-        println!("{name}, {axes} axes: median {:?}, 99 % {:?}, worst {:?}", at(0.5), at(0.99), at(1.0));
     }
+}
+
+/// The shortest time of all passes for each of the sets.
+fn shortest<Set>(sets: &[Set], passes: usize, mut plan: impl FnMut(&Set)) -> Vec<Duration> {
+    let mut best = vec![Duration::MAX; sets.len()];
+    for _ in 0..passes {
+        for (best, set) in best.iter_mut().zip(sets) {
+            let begun = Instant::now();
+            plan(set);
+            *best = begun.elapsed().min(*best);
+        }
+    }
+    best
+}
+
+fn spread(mut times: Vec<Duration>) -> String {
+    times.sort_unstable();
+    let at = |part: f64| times[((times.len() - 1) as f64 * part) as usize];
+    let mean = times.iter().sum::<Duration>() / times.len() as u32;
+    format!("mean {mean:?}, median {:?}, 99 % {:?}, worst {:?}", at(0.5), at(0.99), at(1.0))
 }

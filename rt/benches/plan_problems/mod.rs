@@ -1,6 +1,8 @@
 //! Random problems from a fixed seed, in the distribution of Ruckig's own benchmark.
 
-use takt_rt::plan::{Limits, Problem, State};
+pub mod rsruckig;
+
+use takt_rt::plan::{Limits, Problem, Profile, State, Timing, synchronised};
 
 /// Which derivative is limited.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -41,6 +43,17 @@ impl Random {
 pub fn problems(seed: u64, axes: usize, order: Order) -> Vec<Problem> {
     let mut random = Random(seed);
     (0..axes).map(|_| problem(&mut random, order)).collect()
+}
+
+/// From the state at this part of the time of each motion, to the same target: what a controller does that plans anew.
+pub fn planned_anew(seed: u64, axes: usize, part: f64) -> Vec<Problem> {
+    let mut set = problems(seed, axes, Order::Third);
+    let mut profiles = vec![Profile::hold(0.0); axes];
+    let duration_s = synchronised(&set, &mut profiles, Timing::default()).unwrap_or_default();
+    for (problem, profile) in set.iter_mut().zip(&profiles) {
+        problem.start = profile.sample(part * duration_s);
+    }
+    set
 }
 
 fn problem(random: &mut Random, order: Order) -> Problem {

@@ -5,8 +5,9 @@
 //! `H = v + A·B/2` (the Hamiltonian of the optimal control problem: `A` and `B` are the accelerations reached
 //! on the way up and down). `H` grows with `v`, so the distance has at most one minimum.
 
+use super::super::trapezoid::smaller;
 use super::motion::{Motion, Shape, Swing};
-use super::roots::{Point, rising_root};
+use super::roots::{Point, excess, rising_root};
 
 /// The motions of one peak. The parameter is how far the peak is above `base`, the smallest that is possible.
 #[derive(Clone, Copy, Debug)]
@@ -31,6 +32,8 @@ pub(super) struct Crossing {
 pub(super) struct Peak {
     pub(super) velocity: f64,
     pub(super) distance: f64,
+    /// The size of the terms of the distance, to which its rounding error is relative.
+    size: f64,
     pub(super) duration: f64,
     /// Distance gained for a longer duration.
     pub(super) hamiltonian: f64,
@@ -64,11 +67,11 @@ impl Crossing {
         let velocity = self.base + above;
         let (s1, s2) = (first.duration(), second.duration());
         let hamiltonian = velocity + 0.5 * first.peak * second.peak;
+        let (up, down) = ((velocity - 0.5 * first_step) * s1, (velocity - 0.5 * second_step) * s2);
         Peak {
             velocity,
-            distance: (velocity - 0.5 * first_step) * s1
-                + (velocity - 0.5 * second_step) * s2
-                + self.distance_beside,
+            distance: up + down + self.distance_beside,
+            size: up.abs() + down.abs() + self.distance_beside.abs(),
             duration: s1 + s2 + self.duration_beside,
             hamiltonian,
             slope: hamiltonian * (first.peak + second.peak) / (first.peak * second.peak),
@@ -95,36 +98,68 @@ impl Crossing {
     }
 
     /// Calls `found` with peak, cruise and duration of every motion over this distance that goes to an edge of what
-    /// is possible in its time. `base_is_above` says whether the one that peaks at the base goes too far.
-    pub(super) fn solve(&self, distance: f64, base_is_above: bool, mut found: impl FnMut(f64, f64, f64)) {
-        let top = self.peak(self.room);
-        let mut low = 0.0;
+    /// is possible in its time. `base_distance` is that of the motion that peaks at the base, and `base_is_above` says
+    /// whether it counts as too far.
+    pub(super) fn solve(
+        &self,
+        distance: f64,
+        base_distance: f64,
+        base_is_above: bool,
+        mut found: impl FnMut(f64, f64, f64),
+    ) {
+        let (mut low, mut low_distance) = (0.0, base_distance);
         if base_is_above {
             // Only with a dip in between the distance can be met, twice then.
             if self.peak(0.0).hamiltonian >= 0.0 {
                 return;
             }
             low = self.lowest();
-            if self.peak(low).distance >= distance {
+            low_distance = self.peak(low).distance;
+            if low_distance >= distance {
                 return;
             }
-            let above = rising_root(low, 0.0, 0.5 * low, |above| {
+            let above = rising_root(low, 0.0, self.falling_by(base_distance - distance), |above| {
                 let peak = self.peak(above);
-                Point { value: peak.distance - distance, slope: peak.slope }
+                Point { value: excess(peak.distance, peak.size, distance), slope: peak.slope }
             });
             found(above, 0.0, self.peak(above).duration);
         }
+        let top = self.peak(self.room);
         if distance >= top.distance {
             let cruise = (distance - top.distance) / self.vmax;
             found(self.room, cruise, top.duration + cruise);
         } else {
-            let guess = self.room;
-            let above = rising_root(low, self.room, guess, |above| {
+            let above = rising_root(low, self.room, low + self.rising_by(distance - low_distance), |above| {
                 let peak = self.peak(above);
-                Point { value: peak.distance - distance, slope: peak.slope }
+                Point { value: excess(peak.distance, peak.size, distance), slope: peak.slope }
             });
             found(above, 0.0, self.peak(above).duration);
         }
+    }
+
+    /// About how far above the base, or above the lowest peak, the distance is larger by this. From more on Newton's method
+    /// comes down to the root.
+    fn rising_by(&self, distance: f64) -> f64 {
+        // The slope of the distance is at least `above·(1/limit + 1/limit)`, as the accelerations keep their limits.
+        let held = libm::sqrt(
+            2.0 * distance * self.first_limit * self.second_limit / (self.first_limit + self.second_limit),
+        );
+        if self.base > 0.0 {
+            smaller(held, self.in_arc(0.5 * distance / self.base))
+        } else {
+            held - 2.0 * self.base
+        }
+    }
+
+    /// About how far above the base, which is negative, the distance is smaller by this. From less on Newton's method comes
+    /// up to the root.
+    fn falling_by(&self, distance: f64) -> f64 {
+        self.in_arc(-0.25 * distance / self.base)
+    }
+
+    /// How far above the base an arc takes this much longer.
+    fn in_arc(&self, time: f64) -> f64 {
+        time * (time + 2.0 * libm::sqrt(smaller(self.first_step, self.second_step)))
     }
 
     /// Where the distance is smallest, given that it falls at the base.
@@ -151,8 +186,9 @@ impl Crossing {
             if cruise < 0.0 {
                 return Point { value: 1.0, slope: 0.0 };
             }
+            let cruised = peak.velocity * cruise;
             Point {
-                value: peak.distance + peak.velocity * cruise - distance,
+                value: excess(peak.distance + cruised, peak.size + cruised.abs(), distance),
                 slope: cruise + 0.5 * (peak.first.peak + peak.second.peak),
             }
         });

@@ -1,16 +1,19 @@
 //! Motions that only rounding denies.
 //!
-//! On the direct motion to its target, or where a lens is but one motion, an axis has nothing left to choose: the three
-//! numbers of its state must lie on one line. Planned anew in every cycle it drifts off that line, by the rounding of
-//! each cycle, and where it passes the target at speed, the next motion that meets it exactly has to go round again.
-//! So a state from which the target would be met but for that drift counts as on the line.
+//! With an acceleration that goes straight to one value, stays there if it is the limit, and goes straight on to that of the
+//! target, an axis has nothing left to choose: the three numbers of its state must lie on a surface. Such [`Turn`]s
+//! are the last two phases of every motion. Planned anew in every cycle, the state drifts off that surface by the
+//! rounding of each cycle, and where it passes the target at speed, the next motion that meets it exactly has to go
+//! round again. So a state from which the target would be met but for that drift counts as on the surface.
 //!
 //! How far it may have drifted depends on where it came from, not on how little is left of its way: the measure is the
-//! distance to brake from the largest velocity.
+//! distance to brake from the largest velocity. What the velocities have drifted weighs the more the smaller the
+//! acceleration at the turn, for that grows with their root. So where the turn that meets the velocity does not meet the
+//! position as nearly, it is the next one that does, as far as the drift of the velocities explains it.
 
 use super::ROUNDING;
-use super::motion::{Motion, Swing, square_positive};
-use super::step1::{Edges, LensEnd, Ways};
+use super::motion::{Motion, Shape, Swing, square_positive};
+use super::step1::Edges;
 
 /// How far many cycles of sampling and planning may have led a state astray.
 struct Drift {
@@ -30,76 +33,90 @@ impl Drift {
     }
 }
 
-impl Edges {
-    /// The edges and the ways as they would be but for drift, if that is why the fastest way takes this long.
-    pub(super) fn but_for_drift(&self, fastest: f64) -> Option<(Self, Ways)> {
-        let drift = Drift::of(self);
-        let [one, other] = self.in_lens(&drift);
-        let direct = self
-            .nearly_direct(&drift)
-            .map(|edges| Some((edges?.over(edges?.direct_distance), edges?.direct_duration)));
-        let candidates = [one, other].into_iter().chain(direct).flatten();
-        candidates.into_iter().find_map(|(edges, duration)| {
-            let error = (edges.motion.distance - self.motion.distance).abs();
-            // At rest, an error of the distance costs its third root in time: that is no detour.
-            let is_detour = |duration: f64| {
-                let lost = fastest - duration;
-                lost * lost * lost > DETOUR * (error + f64::EPSILON * drift.distance)
-            };
-            if error > drift.distance || !is_detour(duration) {
-                return None;
-            }
-            // The motion is found when its distance is judged such that the edges meet it there and not only later.
-            [LensEnd::BesideOther, LensEnd::BesideNext]
-                .into_iter()
-                .flat_map(|lens_end| [false, true].map(|is_above| edges.ways_seen(is_above, lens_end)))
-                .find(|ways| ways.first().is_some_and(|way| way.duration < 0.5 * (duration + fastest)))
-                .map(|ways| (edges, ways))
-        })
-    }
+/// Up to an acceleration, which is held if it is the limit, and down from it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Turn {
+    /// Down and up instead: everything else is as seen in the mirror.
+    mirrored: bool,
+    /// The acceleration at the turn. It is negative where a deceleration becomes less and then more again.
+    peak: f64,
+    hold: f64,
+}
 
-    /// The same edges over another distance.
-    fn over(mut self, distance: f64) -> Self {
-        self.motion.distance = distance;
-        self
-    }
+/// All turns of one motion whose peak is of one sign. The sum of the times of both arcs, seen from where they have, or would
+/// have, no acceleration, is proportional to the distance.
+struct Turns<'a> {
+    motion: &'a Motion,
+    mirrored: bool,
+    /// 1 or −1.
+    sign: f64,
+}
 
-    /// The edges over the distance of the direct motion, with and without drift of the velocities, if it may be that.
-    fn nearly_direct(&self, drift: &Drift) -> [Option<Self>; 2] {
-        let Motion { v0, a0, vf, af, distance, .. } = self.motion;
-        // A gap that closes takes no more time away than this, at no more than this speed.
-        let speed = v0.abs() + vf.abs() + a0 * a0 + af * af;
-        let reach = drift.distance + 2.0 * libm::sqrt(drift.velocity) * speed;
-        if (self.direct_distance - distance).abs() > reach {
-            return [None; 2];
+impl Turns<'_> {
+    /// The turn that comes nearest to the wanted distance, how far it is off, and how long it takes.
+    fn nearest(&self, drift: &Drift) -> Option<(Turn, f64, f64)> {
+        let Motion { a0, vf, af, up, distance, .. } = *self.motion;
+        let (first, last) = (self.motion.start_root(), vf + 0.5 * af * af);
+        let outer = a0.max(af);
+        // Both accelerations must be below the peak, whose square the step of the velocity is until the limit is reached.
+        let (least, most, limit) = if self.sign > 0.0 {
+            (square_positive(outer), f64::INFINITY, up)
+        } else {
+            (0.0, -outer * outer.abs(), f64::INFINITY)
+        };
+        let step = last - first;
+        let (low, high) = ((step - drift.velocity).max(least), (step + drift.velocity).min(most));
+        if low > high {
+            return None;
         }
-        [(self.gap > 0.0).then(|| self.closed(drift)), Some(*self)]
+        let speed = 0.5 * (first + last);
+        let beside = first * a0 + a0 * a0 * a0 / 6.0 + last * af - af * af * af / 6.0;
+        let arcs = |step: f64| self.sign * Swing::over(step, limit).duration();
+        let exact = arcs(step.clamp(low, high));
+        let miss = |arcs: f64| speed * arcs - beside - distance;
+        // No more than need be, for what is put into the velocities here is drift in the next cycle.
+        let tolerated = 0.5 * drift.distance;
+        let beyond = miss(exact) - miss(exact).clamp(-tolerated, tolerated);
+        let arcs = if beyond == 0.0 {
+            exact
+        } else {
+            let (one, other) = (arcs(low), arcs(high));
+            (exact - beyond / speed).min(one.max(other)).max(one.min(other))
+        };
+        let peak = (0.5 * arcs).min(limit);
+        let turn = Turn { mirrored: self.mirrored, peak, hold: arcs - 2.0 * peak };
+        Some((turn, miss(arcs).abs(), arcs - a0 - af))
     }
+}
 
-    /// The edges when the velocities at both ends are nearer by as much of their drift as the direct motion is too far.
-    fn closed(&self, drift: &Drift) -> Self {
-        let Motion { a0, vf, af, distance, up, .. } = self.motion;
-        let beside = square_positive(a0) + square_positive(af);
-        let speed = 0.5 * (self.motion.start_root() + vf + 0.5 * af * af);
-        let duration =
-            Swing::over(self.gap + beside, up).duration() - (self.direct_distance - distance) / speed;
-        let step = if duration > 2.0 * up { up * (duration - up) } else { 0.25 * square_positive(duration) };
-        let least = (self.gap - drift.velocity).max(0.0);
-        let mut closed = Self::across((step - beside).max(least).min(self.gap), self.motion, self.mirrored);
-        (closed.rounding, closed.lens_rounding) = (self.rounding, self.lens_rounding);
-        closed
+impl Turn {
+    /// The phases of the turn, from start to target of the motion.
+    pub(super) fn shape(&self, motion: &Motion) -> Shape {
+        let seen = if self.mirrored { motion.mirrored() } else { *motion };
+        let shape = Shape {
+            durations: [self.peak - seen.a0, self.hold, self.peak - seen.af, 0.0, 0.0, 0.0, 0.0],
+            jerks: [1.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0],
+        };
+        if self.mirrored { shape.mirrored() } else { shape }
     }
+}
 
-    /// The edges over the distances of both ends of the lens, and their durations, if there would be a lens but for
-    /// drift.
-    fn in_lens(&self, drift: &Drift) -> [Option<(Self, f64)>; 2] {
-        let mut edges = *self;
-        edges.lens_rounding = drift.velocity;
-        let Some(lens) = edges.lens() else { return [None; 2] };
-        let (fastest, slowest) = lens.ends();
-        let duration = |least: f64| lens.upper.dip(least).duration;
-        let ends = [(fastest, lens.motion.af), (slowest, lens.least)];
-        ends.map(|(distance, least)| Some((edges.over(-distance), duration(least))))
+impl Edges {
+    /// The turn that would be the fastest motion but for drift, and how long it takes, if the fastest one is a detour in place of
+    /// it.
+    pub(super) fn but_for_drift(&self, fastest: f64) -> Option<(Turn, f64)> {
+        let drift = Drift::of(self);
+        let mirrored = self.motion.mirrored();
+        let seen = [(&self.motion, false), (&mirrored, true)];
+        let turns = seen.into_iter().flat_map(|(motion, mirrored)| {
+            [1.0, -1.0].map(|sign| Turns { motion, mirrored, sign }.nearest(&drift))
+        });
+        let explained = turns.flatten().filter(|(_, error, duration)| {
+            // At rest, an error of the distance costs its third root in time: that is no detour.
+            let lost = fastest - duration;
+            *error <= drift.distance && lost * lost * lost > DETOUR * (error + f64::EPSILON * drift.distance)
+        });
+        explained.map(|(turn, _, duration)| (turn, duration)).min_by(|one, other| one.1.total_cmp(&other.1))
     }
 }
 

@@ -79,7 +79,7 @@ pub(super) fn fastest_position(
     least_s: f64,
     profile: &mut Profile,
 ) -> Result<(), PlanError> {
-    let mut inside = Inside::of(problem, manner, profile)?;
+    let inside = Inside::of(problem, manner, profile)?;
     let ways = inside.edges.ways();
     let Some((fastest, others)) = ways.split_first() else {
         return Err(PlanError::NotRepresentable { axis: 0 });
@@ -115,7 +115,7 @@ pub(super) fn position_lasting(
         (blocked.before_s - duration_s).abs() <= rounding_s
             || (blocked.after_s - duration_s).abs() <= rounding_s
     });
-    let mut inside = Inside::of(problem, manner, profile)?;
+    let inside = Inside::of(problem, manner, profile)?;
     let duration = (duration_s - inside.brake_s) / inside.scale.time_s;
     let jerk_max = problem.limits.jerk_max;
     // Next to a blocked interval the motion is the one on the edge.

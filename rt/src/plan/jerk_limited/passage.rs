@@ -6,7 +6,7 @@
 //! at most four extrema, at the roots of two quadratic equations.
 
 use super::motion::{Motion, Shape, Swing};
-use super::roots::{Point, rising_root};
+use super::roots::{Point, excess, rising_root};
 
 /// The motions of one passage. The parameter is the smallest acceleration between the two arcs of positive jerk.
 #[derive(Clone, Copy, Debug)]
@@ -24,6 +24,8 @@ pub(super) struct Passage {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Dip {
     pub(super) distance: f64,
+    /// The size of the terms of the distance, to which its rounding error is relative.
+    size: f64,
     pub(super) duration: f64,
     pub(super) slope: f64,
     duration_slope: f64,
@@ -49,9 +51,10 @@ impl Passage {
         let velocity = self.root + least * least;
         let duration_slope = if first.peak > 0.0 { 2.0 * (least / first.peak - 1.0) } else { -2.0 };
         let hamiltonian = velocity - 0.5 * first.peak * least;
+        let (up, down) = ((velocity - 0.5 * step) * first.duration(), (velocity + self.root) * least);
         Dip {
-            distance: (velocity - 0.5 * step) * first.duration() - (velocity + self.root) * least
-                + self.distance_beside,
+            distance: up - down + self.distance_beside,
+            size: up.abs() + down.abs() + self.distance_beside.abs(),
             duration: first.duration() - self.a0 + self.af - 2.0 * least,
             slope: hamiltonian * duration_slope,
             duration_slope,
@@ -101,7 +104,7 @@ impl Passage {
                 let (below, above) = if low.1 { (high.0, low.0) } else { (low.0, high.0) };
                 let dip = rising_root(below, above, 0.5 * (below + above), |least| {
                     let dip = self.dip(least);
-                    Point { value: dip.distance - distance, slope: dip.slope }
+                    Point { value: excess(dip.distance, dip.size, distance), slope: dip.slope }
                 });
                 found(dip, self.dip(dip).duration);
             }
@@ -136,7 +139,10 @@ impl Passage {
     pub(super) fn lasting(&self, least: f64, duration: f64) -> f64 {
         rising_root(self.af, least, 0.5 * (least + self.af), |least| {
             let dip = self.dip(least);
-            Point { value: dip.duration - duration, slope: dip.duration_slope }
+            Point {
+                value: excess(dip.duration, self.a0.abs() + self.af + least, duration),
+                slope: dip.duration_slope,
+            }
         })
     }
 }

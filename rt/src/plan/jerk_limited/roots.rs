@@ -1,5 +1,7 @@
 //! Roots of functions that are monotone between two points: Newton's method, kept in its bracket.
 
+use super::super::profile::select;
+
 /// The most evaluations for one root. Newton's method from a bracket ends after about five; when it leaves the
 /// bracket it is halved, and 64 halvings exhaust the 53 bits of a number.
 const EVALUATIONS_MAX: u32 = 96;
@@ -11,25 +13,57 @@ pub(super) struct Point {
     pub(super) slope: f64,
 }
 
+/// By how much a distance exceeds the one that is wanted: nothing, where it is no more than the rounding of terms of this
+/// size. Without that, a search would go on among digits that mean nothing.
+#[inline]
+pub(super) fn excess(distance: f64, size: f64, wanted: f64) -> f64 {
+    let excess = distance - wanted;
+    select(excess.abs() <= 4.0 * f64::EPSILON * (size + wanted.abs()), 0.0, excess)
+}
+
+/// An end of the bracket of a root.
+#[derive(Clone, Copy)]
+struct End {
+    at: f64,
+    /// Whether the function has been looked at there.
+    seen: bool,
+}
+
 /// Where `function` is zero, given that it rises from `low` (value not above 0) to `high` (not below 0).
-pub(super) fn rising_root(mut low: f64, mut high: f64, guess: f64, function: impl Fn(f64) -> Point) -> f64 {
+///
+/// A step of Newton's method that leaves the bracket goes to its end: the root often is there, and from there the method
+/// comes from the other side. Only when that has been tried the bracket is halved.
+#[inline]
+pub(super) fn rising_root(low: f64, high: f64, guess: f64, function: impl Fn(f64) -> Point) -> f64 {
     /// Newton's method doubles the digits: after a relative step this small, all are right.
     const LAST_STEP: f64 = 1e-9;
     let mut x = guess.clamp(low.min(high), high.max(low));
+    let (mut low, mut high) = (End { at: low, seen: false }, End { at: high, seen: false });
     for _ in 0..EVALUATIONS_MAX {
         let Point { value, slope } = function(x);
-        if value > 0.0 {
-            high = x;
+        let (this, other) = if value > 0.0 {
+            (&mut high, &low)
         } else if value < 0.0 {
-            low = x;
+            (&mut low, &high)
         } else {
             break;
+        };
+        // On the wrong side already at the end: rounding has put the root beyond it.
+        if x == other.at {
+            break;
         }
+        *this = End { at: x, seen: true };
         let newton = x - value / slope;
-        let inside = newton > low.min(high) && newton < low.max(high);
-        let next = if inside { newton } else { 0.5 * (low + high) };
+        let (least, most) = (low.at.min(high.at), low.at.max(high.at));
+        let inside = newton > least && newton < most;
+        let next = if inside {
+            newton
+        } else {
+            let end = if (newton <= least) == (low.at <= high.at) { low } else { high };
+            if end.seen { 0.5 * (low.at + high.at) } else { end.at }
+        };
         let step = (next - x).abs();
-        let exhausted = next == low || next == high;
+        let exhausted = (next == low.at && low.seen) || (next == high.at && high.seen);
         x = next;
         if exhausted || (inside && step <= LAST_STEP * x.abs()) {
             break;

@@ -15,12 +15,13 @@
 
 use super::ROUNDING;
 use super::crossing::Crossing;
+use super::drift::Turn;
 use super::motion::{Motion, Shape, Swing, square_positive};
 use super::passage::Passage;
 use arrayvec::ArrayVec;
 
-/// The most roots: two on each edge of the crossings, five on each of four passages.
-const WAYS_MAX: usize = 24;
+/// The most roots: two on each edge of the crossings, five on each of four passages, and a turn twice.
+const WAYS_MAX: usize = 26;
 
 /// Relative to the sizes of velocities, differences up to this are rounding.
 const GAP_ROUNDING: f64 = 64.0 * f64::EPSILON;
@@ -43,16 +44,8 @@ enum Kind {
     Passage { lower: bool, least: f64 },
     /// In the lens.
     Lens { lower: bool, least: f64 },
-}
-
-/// What an end of the lens that covers just the distance is judged against, so that it is found as a motion: it counts
-/// as on the other side.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum LensEnd {
-    /// The other end of the lens, so that both edges have an odd number of motions.
-    BesideOther,
-    /// What is next to it on the edge.
-    BesideNext,
+    /// The only one left to the target, but for drift.
+    Turn(Turn),
 }
 
 /// All motions on an edge over the wanted distance, the fastest first.
@@ -65,8 +58,6 @@ pub(super) type Ways = ArrayVec<Way, WAYS_MAX>;
 pub(super) struct Edges {
     pub(super) motion: Motion,
     pub(super) mirrored: bool,
-    /// By how much the velocity before the target exceeds the one behind the start.
-    pub(super) gap: f64,
     /// How wrong the distance may be.
     pub(super) rounding: f64,
     /// How wrong the velocities may be where they decide whether there is a lens.
@@ -86,17 +77,12 @@ impl Edges {
     pub(super) fn of(original: &Motion) -> Self {
         let mirrored = original.velocity_before_target() < original.velocity_behind_start();
         let motion = if mirrored { original.mirrored() } else { *original };
-        let Motion { a0, af, vmax, vmin, .. } = motion;
+        let Motion { v0, a0, vf, af, vmax, vmin, .. } = motion;
         // The root of the gap goes into times and distances, so a rounding error must not open it.
         let gap_rounding = GAP_ROUNDING * (vmax - vmin + a0 * a0 + af * af);
         let gap = motion.velocity_before_target() - motion.velocity_behind_start();
-        Self::across(if gap > gap_rounding { gap } else { 0.0 }, motion, mirrored)
-    }
-
-    /// The edges, where the velocity before the target exceeds the one behind the start by this gap.
-    pub(super) fn across(gap: f64, motion: Motion, mirrored: bool) -> Self {
+        let gap = if gap > gap_rounding { gap } else { 0.0 };
         let (behind_start, before_target) = (motion.velocity_behind_start(), motion.velocity_before_target());
-        let Motion { v0, a0, vf, af, .. } = motion;
         let upper = Crossing::new(&motion, before_target, gap + square_positive(a0), square_positive(-af));
         let lower =
             Crossing::new(&motion.mirrored(), -behind_start, square_positive(-a0), gap + square_positive(af));
@@ -119,7 +105,6 @@ impl Edges {
             },
             motion,
             mirrored,
-            gap,
             rounding: 0.0,
             lens_rounding: ROUNDING * (v0.abs() + vf.abs() + a0 * a0 + af * af),
             upper,
@@ -153,25 +138,23 @@ impl Edges {
     }
 
     /// Every motion on an edge over the wanted distance, the fastest first.
-    pub(super) fn ways(&mut self) -> Ways {
-        let ways = self.ways_seen(self.direct_distance > self.motion.distance, LensEnd::BesideOther);
-        let fastest = ways.first().map_or(f64::INFINITY, |way| way.duration);
-        match self.but_for_drift(fastest) {
-            Some((edges, earlier)) => {
-                *self = edges;
-                earlier
-            }
-            None => ways,
-        }
-    }
-
-    /// The same, when the distance of the direct motion is taken for too far or not.
-    pub(super) fn ways_seen(&self, direct_is_above: bool, lens_end: LensEnd) -> Ways {
+    pub(super) fn ways(&self) -> Ways {
         let mut ways = Ways::new();
-        self.lens_ways(lens_end, &mut ways);
+        let direct_is_above = self.direct_distance > self.motion.distance;
+        self.lens_ways(&mut ways);
         self.upper_ways(direct_is_above, &mut ways);
         self.lower_ways(direct_is_above, &mut ways);
         ways.sort_unstable_by(|one, other| one.duration.total_cmp(&other.duration));
+        let fastest = ways.first().map_or(f64::INFINITY, |way| way.duration);
+        if let Some((turn, duration)) = self.but_for_drift(fastest) {
+            // It is possible, and nothing between it and the detour.
+            let way = Way { duration, kind: Kind::Turn(turn) };
+            for _ in 0..2 {
+                if !ways.is_full() {
+                    ways.insert(0, way);
+                }
+            }
+        }
         ways
     }
 
@@ -186,7 +169,7 @@ impl Edges {
                 add(ways, Way { duration, kind: Kind::Passage { lower: false, least } });
             });
         }
-        self.upper.solve(distance, base_is_above, |above, cruise, duration| {
+        self.upper.solve(distance, base, base_is_above, |above, cruise, duration| {
             add(ways, Way { duration, kind: Kind::Crossing { lower: false, above, cruise } });
         });
     }
@@ -203,7 +186,7 @@ impl Edges {
                 add(ways, Way { duration, kind: Kind::Passage { lower: true, least } });
             });
         }
-        self.lower.solve(distance, base_is_above, |above, cruise, duration| {
+        self.lower.solve(distance, base, base_is_above, |above, cruise, duration| {
             add(ways, Way { duration, kind: Kind::Crossing { lower: true, above, cruise } });
         });
     }
@@ -217,29 +200,22 @@ impl Edges {
         Passage::new(&reversed, reversed.target_root() - reversed.start_root())
     }
 
-    fn lens_ways(&self, end: LensEnd, ways: &mut Ways) {
+    fn lens_ways(&self, ways: &mut Ways) {
         let Some(lens) = self.lens() else { return };
         let distance = lens.motion.distance;
         let (fastest, slowest) = lens.ends();
-        let ends_are_above = |edge: &Passage, last: f64, distance: f64, [slowest, fastest]: [f64; 2]| {
-            let rises = |least: f64| edge.dip(least).slope > 0.0;
-            let fastest_is_above = match (fastest == distance, end) {
-                (true, LensEnd::BesideOther) => slowest < distance,
-                (true, LensEnd::BesideNext) => rises(last),
-                (false, _) => fastest > distance,
-            };
-            let slowest_is_above = match (slowest == distance, end) {
-                (true, LensEnd::BesideOther) => !fastest_is_above,
-                (true, LensEnd::BesideNext) => !rises(lens.least),
-                (false, _) => slowest > distance,
-            };
+        // An end that covers just the distance counts as on the other side than the other end, so that it is found as a
+        // motion, and both edges have an odd number of them.
+        let ends_are_above = |distance: f64, [slowest, fastest]: [f64; 2]| {
+            let fastest_is_above = if fastest == distance { slowest < distance } else { fastest > distance };
+            let slowest_is_above = if slowest == distance { !fastest_is_above } else { slowest > distance };
             [slowest_is_above, fastest_is_above]
         };
-        let ends = ends_are_above(&lens.upper, lens.motion.af, distance, [slowest, fastest]);
+        let ends = ends_are_above(distance, [slowest, fastest]);
         lens.upper.solve(distance, lens.least, ends, |least, duration| {
             add(ways, Way { duration, kind: Kind::Lens { lower: false, least } });
         });
-        let ends = ends_are_above(&lens.lower, lens.motion.a0, -distance, [-slowest, -fastest]);
+        let ends = ends_are_above(-distance, [-slowest, -fastest]);
         lens.lower.solve(-distance, lens.least, ends, |least, duration| {
             add(ways, Way { duration, kind: Kind::Lens { lower: true, least } });
         });
@@ -261,6 +237,7 @@ impl Edges {
             Kind::Crossing { lower: true, above, cruise } => self.lower.shape(above, cruise).mirrored(),
             Kind::Passage { lower: false, least } => self.upper_passage().shape(least),
             Kind::Passage { lower: true, least } => self.lower_passage().shape(least).reversed(),
+            Kind::Turn(turn) => turn.shape(&self.motion),
             Kind::Lens { lower, least } => {
                 let lens = Lens::at(&self.motion.mirrored());
                 let shape = if lower { lens.lower.shape(least).reversed() } else { lens.upper.shape(least) };

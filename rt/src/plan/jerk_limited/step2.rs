@@ -7,7 +7,7 @@
 //! a motion within the limits.
 
 use super::motion::{Motion, Shape, Swing};
-use super::roots::{Point, rising_root};
+use super::roots::{Point, excess, rising_root};
 use super::step1::Edges;
 
 /// A motion of given duration.
@@ -69,7 +69,7 @@ impl Edges {
         }
         let velocity = rising_root(low, high, 0.5 * (low + high), |velocity| {
             let stage = rise.stage(velocity, duration);
-            Point { value: stage.distance - distance, slope: stage.slope }
+            Point { value: excess(stage.distance, stage.size, distance), slope: stage.slope }
         });
         let stage = rise.stage(velocity, duration);
         // A root that was cut off by the bound on evaluations is no root.
@@ -120,6 +120,8 @@ struct Stage {
     second: Swing,
     cruise: f64,
     distance: f64,
+    /// The size of the terms of the distance, to which its rounding error is relative.
+    size: f64,
     slope: f64,
 }
 
@@ -138,14 +140,18 @@ impl Rise {
         let second = Swing::over(self.target_root - velocity, self.limit);
         let (s1, s2) = (first.duration(), second.duration());
         let cruise = duration - (s1 - self.a0) - (s2 - self.af);
+        let terms = [
+            0.5 * (self.start_root + velocity) * s1,
+            0.5 * (velocity + self.target_root) * s2,
+            self.distance_beside,
+            velocity * cruise,
+        ];
         Stage {
             first,
             second,
             cruise,
-            distance: 0.5 * (self.start_root + velocity) * s1
-                + 0.5 * (velocity + self.target_root) * s2
-                + self.distance_beside
-                + velocity * cruise,
+            distance: terms.iter().sum(),
+            size: terms.iter().map(|term| term.abs()).sum(),
             slope: cruise + 0.5 * (first.peak + second.peak),
         }
     }
