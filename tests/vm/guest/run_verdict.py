@@ -20,7 +20,7 @@ from collections import defaultdict
 from recording import messages
 
 # In takt_msgs/msg/Axis (src/telemetry/messages/Axis.msg).
-SLOT, POSITION_SET, POSITION, AGE, STATE = 0, 8, 16, 66, 68
+AGE, STATE = 66, 68
 OPERATION_ENABLED = 4
 # Half a millimetre of a linear axis; of a rotary one, what it is at a radius of half a metre.
 AT_REST = {"rad": 1e-3, "m": 5e-4}
@@ -62,41 +62,42 @@ def judge_records(takt, run, must_be_lost):
     return f"{found} cycles recorded"
 
 
-def trajectories(run):
-    """For every axis the time, the set-point, the position and whether it was just reported, of all cycles under power."""
-    axes = defaultdict(list)
+def axis_cycles(run):
+    """The name of the axis, the time, the slot, the set-point, the position, whether it was just reported, and whether the
+    drive was under power, of every axis in every cycle."""
     for topic, at_ns, axis in messages(run["telemetry"]["recording"]):
         if topic.startswith("/axis/"):
             slot, position_set, position = struct.unpack_from("<Qdd", axis)
             is_heard = struct.unpack_from("<H", axis, AGE)[0] == 0
-            axes[topic[len("/axis/") :]].append((at_ns, slot, position_set, position, is_heard, axis[STATE] == OPERATION_ENABLED))
-    return axes
+            yield topic[len("/axis/") :], at_ns, slot, position_set, position, is_heard, axis[STATE] == OPERATION_ENABLED
 
 
-def judge_steps(run, axes):
+def judge_steps(run):
     """A set-point may be as far from the one before as the axis goes in a period, however many slots were missed between."""
-    period_s = run["cycle_ns"] / 1e9
-    for axis in run["axes"]:
-        allowed = axis["limits"]["velocity"] * period_s * 1.00001
-        cycles = axes[axis["name"]]
-        for (_, _, before, _, _, was_on), (_, slot, after, _, _, is_on) in zip(cycles, cycles[1:]):
-            step = abs(after - before)
-            require(
-                step <= allowed or not (was_on and is_on),
-                f"{axis['name']}: the set-point jumped by {step} {axis['unit']} in slot {slot}; a cycle at the limit is {allowed}",
-            )
+    allowed = {axis["name"]: axis["limits"]["velocity"] * run["cycle_ns"] / 1e9 * 1.00001 for axis in run["axes"]}
+    last = {}
+    for name, _, slot, position_set, _, _, is_on in axis_cycles(run):
+        before, was_on = last.get(name, (position_set, False))
+        step = abs(position_set - before)
+        require(
+            step <= allowed[name] or not (was_on and is_on),
+            f"{name}: the set-point jumped by {step} in slot {slot}; a cycle at the limit is {allowed[name]}",
+        )
+        last[name] = position_set, is_on
 
 
-def stop_times(run, axes, fault_at_s):
+def stop_times(run, fault_at_s):
     """When the fault was noticed, and when the last axis came within tolerance of where it came to rest, in ms after it."""
     fault_at_ns = int(float(fault_at_s) * 1e9)
-    noticed_ns = rest_ns = 0
+    noticed_ns, rest_ns, heard = fault_at_ns, fault_at_ns, defaultdict(list)
+    for name, at_ns, slot, _, position, is_heard, _ in axis_cycles(run):
+        if slot <= run["stop"]["slot"]:
+            noticed_ns = at_ns
+        if is_heard and at_ns > fault_at_ns:
+            heard[name].append((at_ns, position))
     for axis in run["axes"]:
-        cycles = axes[axis["name"]]
-        noticed_ns = max(at_ns for at_ns, slot, *_ in cycles if slot <= run["stop"]["slot"])
-        heard = [(at_ns, position) for at_ns, _, _, position, is_heard, _ in cycles if is_heard]
-        last = heard[-1][1]
-        moving = [at_ns for at_ns, position in heard if abs(position - last) > AT_REST[axis["unit"]]]
+        positions = heard[axis["name"]]
+        moving = [at_ns for at_ns, position in positions if abs(position - positions[-1][1]) > AT_REST[axis["unit"]]]
         rest_ns = max([rest_ns, *moving[-1:]])
     return (noticed_ns - fault_at_ns) / 1e6, (rest_ns - fault_at_ns) / 1e6
 
@@ -124,13 +125,12 @@ def main(takt, path, code, fault_at_s, *rules):
         ended = judge_stop(takt, run, int(code), rules)
     is_lost = "records_lost" in rules
     records = judge_records(takt, run, is_lost)
-    axes = {} if is_lost else trajectories(run)
-    if axes:
-        judge_steps(run, axes)
+    if not is_lost:
+        judge_steps(run)
     counted = anomalies(run)
     print(f"{ended}, {records}" + (f"; {counted}" if counted else ""))
-    if run["stop"] and axes and fault_at_s != "-":
-        noticed_ms, rest_ms = stop_times(run, axes, fault_at_s)
+    if run["stop"] and not is_lost and fault_at_s != "-":
+        noticed_ms, rest_ms = stop_times(run, fault_at_s)
         print(f"{run['stop']['rule']} {run['stop']['category']} {noticed_ms:.1f} {rest_ms:.1f}")
 
 

@@ -13,8 +13,9 @@ both="base=vcan0 wrist=vcan1"
 disk_on() { # SIZE
     recordings=/run/disk
     mkdir -p $recordings
+    rm -f /run/disk.image
     truncate -s "$1" /run/disk.image
-    mkfs.ext4 -q -F -O ^has_journal /run/disk.image && mount -o loop /run/disk.image $recordings
+    mkfs.ext4 -q -F -O ^has_journal /run/disk.image && mount -o loop,errors=remount-ro /run/disk.image $recordings
 }
 disk_off() {
     umount $recordings
@@ -44,7 +45,6 @@ disk_turns_read_only() {
     disk_on 64M
     begin_in_motion "file system that turns read-only"
     echo 1 > /sys/fs/ext4/loop0/trigger_fs_error
-    mount -o remount,ro,abort $recordings
     end borne records_lost
     disk_off
 }
@@ -62,13 +62,13 @@ disk_is_loaded() {
     load_off
 }
 
-# Longer than the bucket of missed slots has room for.
+# The bucket of missed slots stops the group from 250 on, and the drives miss the heartbeat after 500 ms.
 frozen() {
-    begin "process that is frozen for 200 ms" 20 "$arm" $both
+    begin "process that is frozen for 300 ms" 20 "$arm" $both
     in_motion vcan0
     breaks_now
     kill -STOP $run
-    sleep 0.2
+    sleep 0.3
     kill -CONT $run
     end timing_unfit
 }
@@ -107,15 +107,15 @@ chrt --fifo --pid 1 $$ >/dev/null
 vcan_up vcan0
 vcan_up vcan1
 drives_on 70 "$arm" vcan0 vcan1
+frozen
+killed "kill -9, eRob" "$arm" 201 base=vcan0=1,2,3 wrist=vcan1=4,5,6
+begin "motion of the same eRobs after it" 2 "$arm" $both
+end borne
 disk_hangs
 disk_is_full
 disk_turns_read_only
 recording_is_removed
 disk_is_loaded
-frozen
-killed "kill -9, eRob" "$arm" 201 base=vcan0=1,2,3 wrist=vcan1=4,5,6
-begin "motion of the same eRobs after it" 2 "$arm" $both
-end borne
 drives_off
 vcan_up vcan2
 chrt --fifo 70 "$TAKT" sim "$gantry" --bus gantry=vcan2 2>> "$OUT/sim.txt" & drives=$!
