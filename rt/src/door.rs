@@ -38,7 +38,6 @@ pub trait Door {
 }
 
 /// What can be asked of the group.
-#[expect(clippy::large_enum_variant, reason = "it lives in a ring of fixed slots, where size is set once")]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Request {
     /// Begin to send SYNC (`true`) or cease (`false`).

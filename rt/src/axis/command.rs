@@ -20,7 +20,7 @@ impl Axis {
         self.since_controlword =
             if self.is_controlword_due { 0 } else { self.since_controlword.saturating_add(1) };
         self.base_word = word;
-        self.sent = [self.set[0], self.sent[0], self.sent[1]];
+        self.sent = [self.delay.due(), self.sent[0], self.sent[1]];
 
         let parameters = &self.parameters;
         let law = parameters.law;
@@ -43,7 +43,7 @@ impl Axis {
             self.profile.target_raw()
         } else {
             let input = LoopInput {
-                set: self.set[0],
+                set: self.sent[0],
                 due: self.sent[2],
                 position: self.position,
                 velocity: self.velocity,

@@ -1,12 +1,15 @@
 //! One axis: what its drive reported, where it is to be, and the numbers that go onto the wire.
 
 mod command;
+mod delay;
 mod feedback;
 mod parameters;
 mod profile_mode;
 mod set_point;
 
 use arrayvec::ArrayVec;
+
+use self::delay::SetPointDelay;
 
 use crate::cia402::State as DriveState;
 use crate::guard::FollowingErrorGuard;
@@ -27,6 +30,8 @@ pub struct Axis {
     feedback: ProcessImage,
     /// Set-points, newest first: of this cycle, the last, and the one before.
     set: [State; 3],
+    /// Those that wait until the axes on slower buses are as far.
+    delay: SetPointDelay,
     /// The same of the cycles in which they were sent.
     sent: [State; 3],
     profile: ProfileCommand,
@@ -83,6 +88,7 @@ impl Axis {
             command,
             feedback: ProcessImage::default(),
             set: [State::default(); 3],
+            delay: SetPointDelay::default(),
             sent: [State::default(); 3],
             profile: ProfileCommand::default(),
             profile_target: None,

@@ -29,10 +29,12 @@ impl Axis {
     pub fn follow_actual(&mut self) {
         if self.is_lost {
             self.set = [State { position: self.set[0].position, ..State::default() }; 3];
+            self.delay.fill(self.set[0]);
             self.following_error = 0.0;
             return;
         }
         self.set = [State { position: self.position, ..State::default() }; 3];
+        self.delay.fill(self.set[0]);
         self.sent = self.set;
         self.following_error = 0.0;
         self.following_guard.reset();
@@ -77,9 +79,15 @@ impl Axis {
         if self.age > 0 { Ok(()) } else { self.following_guard.check(self.following_error) }
     }
 
+    /// Has set-points wait for so many cycles before they are sent, for the axes on slower buses.
+    pub fn delay_set_points(&mut self, cycles: u32) {
+        self.delay.set(cycles);
+    }
+
     /// Takes the next set-point. In a profile mode there is none: the target stays.
     pub fn advance(&mut self, next: State) {
         let next = if self.is_profile() { self.shown_set_point() } else { next };
         self.set = [next, self.set[0], self.set[1]];
+        self.delay.push(next);
     }
 }
