@@ -77,8 +77,8 @@ impl Cycle {
         let mut timing = self.reach_slot(clock);
         timing.sync_ns = clock.now_ns().saturating_sub(timing.slot_start_ns);
         for (bus, port) in ports.iter_mut().enumerate() {
-            if let Some(sync) = engine.sync(bus, timing.slot) {
-                let now_ns = clock.now_ns();
+            let now_ns = clock.now_ns();
+            if let Some(sync) = engine.sync(bus, timing.slot, now_ns) {
                 port.send(now_ns, &[sync]);
             }
         }

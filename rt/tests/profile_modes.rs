@@ -77,7 +77,7 @@ fn while_one_axis_is_given_a_target_the_others_stay_where_they_are() {
         }
         rig.run(10);
         rig.request(Request::Enable);
-        rig.run_until(Phase::Holding, 100);
+        rig.run_until(Phase::Holding, 400);
         rig.door.events.clear();
     }
 }

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use takt_rt::axis::{AxisParameters, CommandPdo, Pdo};
+use takt_rt::axis::{AxisParameters, CommandPdo, FeedbackSince, Pdo};
 use takt_rt::cycle::SlotPlan;
 use takt_rt::engine::{BusParameters, Engine, EngineParameters, Heartbeat, SetUpError};
 use takt_rt::frame::Id;
@@ -142,6 +142,7 @@ fn axis_parameters(
         node: axis.node,
         commands: data.commands.iter().map(command).collect::<Result<_, _>>().map_err(wrong_mapping)?,
         feedback: data.feedback.iter().map(feedback).collect::<Result<_, _>>().map_err(wrong_mapping)?,
+        feedback_since: feedback_since(&data.feedback),
         unused: data.unused.iter().map(|plan| plan.id).collect(),
         dialect: axis.drive.dialect(),
         controlword_spacing_cycles: u32::try_from(
@@ -159,6 +160,18 @@ fn axis_parameters(
         following_error_cycles: cycles(axis.following_error.time_ns),
         missed_feedback_cycles: axis.missed_feedback_cycles,
     })
+}
+
+/// Transmission types up to this one answer SYNC (CiA 301, 7.5.2.36).
+const LAST_SYNCHRONOUS: u8 = 240;
+
+/// What the feedback of a drive answers.
+fn feedback_since(feedback: &[PdoPlan]) -> FeedbackSince {
+    if feedback.iter().all(|pdo| pdo.transmission_type <= LAST_SYNCHRONOUS) {
+        FeedbackSince::Sync
+    } else {
+        FeedbackSince::CommandPhase
+    }
 }
 
 /// SI to the drive units of an axis. The rated torque is the configured one until the drive has been asked.

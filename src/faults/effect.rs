@@ -28,7 +28,8 @@ pub enum Effect {
 pub enum FrameEffect {
     /// It is lost on the way; a sent one counts as confirmed.
     Drop,
-    /// It comes so much later; what comes after it does not wait.
+    /// It comes so much later; what comes after it does not wait. A received one tells when it arrived, as one that lies in
+    /// the machine.
     Delay {
         /// How much.
         by_ns: Nanoseconds,

@@ -39,8 +39,8 @@ pub struct FaultyPort<P> {
     /// Sent frames that are held back, each with the time at which it leaves.
     held: VecDeque<(Nanoseconds, Frame)>,
     incoming: Box<ReceiveBatch>,
-    /// Received frames that are held back until the time of their arrival.
-    late: VecDeque<Received>,
+    /// Received frames that lie in the machine, each with the time at which it can be taken.
+    late: VecDeque<(Nanoseconds, Received)>,
     arrived: VecDeque<Received>,
     unconfirmed: usize,
     /// Places of frames that change them.
@@ -101,10 +101,7 @@ impl<P: Breakable> FaultyPort<P> {
                 self.added.tx_overruns += 1;
             }
         }
-        while let Some(received) = self.late.front().copied().filter(|late| late.at_ns <= now_ns) {
-            self.late.pop_front();
-            self.arrive(received);
-        }
+        self.release_late(now_ns);
         if self.timer.is_active() {
             self.let_foreigner_speak(now_ns);
         }
@@ -227,6 +224,13 @@ impl<P: Breakable> FaultyPort<P> {
         self.outgoing.get(taken).map_or(gone, |(number, _)| *number)
     }
 
+    fn release_late(&mut self, now_ns: Nanoseconds) {
+        while let Some((_, received)) = self.late.front().copied().filter(|(due_ns, _)| *due_ns <= now_ns) {
+            self.late.pop_front();
+            self.arrive(received);
+        }
+    }
+
     fn arrive(&mut self, received: Received) {
         if self.arrived.len() < HELD {
             self.arrived.push_back(received);
@@ -258,13 +262,16 @@ impl<P: Breakable> FaultyPort<P> {
                     self.arrive(received);
                 }
                 Fate::Late(by_ns) if self.late.len() < HELD => {
-                    self.late.push_back(Received { at_ns: received.at_ns.saturating_add(by_ns), ..received });
+                    // It has arrived when it did: nobody has come to take it yet.
+                    self.late.push_back((received.at_ns.saturating_add(by_ns), received));
                 }
                 Fate::Late(_) => self.added.rx_overruns += 1,
                 Fate::Lost | Fate::Refused => {}
             }
         }
         for_each_swap(&self.places, &mut self.selector, |a, b| self.arrived.swap(a, b));
+        // Some of it may have been late before anybody came for it.
+        self.release_late(now_ns);
         !self.incoming.is_empty()
     }
 }

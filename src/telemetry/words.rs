@@ -96,7 +96,7 @@ pub fn stop_cause(stop: &StopReason, machine: &Machine) -> String {
             "the stream of set-points ended: its last command expired and no newer one came".to_owned()
         }
         Rule::MissedFeedback => {
-            format!("{axis} has not reported for {} (allowed: {limit:.0})", cycles(value))
+            format!("{axis} has not reported in time for {} (allowed: {limit:.0})", cycles(value))
         }
         Rule::DriveFault => {
             let code = value as u32;
@@ -256,7 +256,13 @@ mod tests {
                 2.0,
                 "the set-point of slide asked for 2.500 m/s (allowed: 2.000 m/s)",
             ),
-            (Rule::MissedFeedback, Some(1), 4.0, 3.0, "slide has not reported for 4 cycles (allowed: 3)"),
+            (
+                Rule::MissedFeedback,
+                Some(1),
+                4.0,
+                3.0,
+                "slide has not reported in time for 4 cycles (allowed: 3)",
+            ),
             (Rule::DriveFault, Some(0), 0x730F.into(), 0.0, "the drive of shoulder reports fault 0x730F"),
             (
                 Rule::DriveDisabled,

@@ -25,13 +25,38 @@ fn assert_safe(fault: &str, played: &Played) {
 /// The stop that a fault leads to, and in how many milliseconds it is begun at the latest.
 struct Stops(&'static str, Rule, Option<u8>, f64);
 
-const STOPS: [Stops; 31] = {
+const STOPS: [Stops; 35] = {
     use Rule::*;
     [
         // Feedback may be missing for five cycles; the sixth is one too many.
         Stops("kind = \"drop\"\nbus = \"base\"\nfunction = \"tpdo\"", MissedFeedback, Some(0), 6.0),
         Stops("kind = \"drop\"\naxis = \"joint5\"\nfunction = \"tpdo\"", MissedFeedback, Some(4), 6.0),
         Stops("kind = \"drop\"\nbus = \"base\"\nfunction = \"sync\"", MissedFeedback, Some(0), 7.0),
+        // Late is missed, however regularly it comes.
+        Stops(
+            "kind = \"delay\"\nbus = \"base\"\nfunction = \"tpdo\"\nby = \"1 cycles\"",
+            MissedFeedback,
+            Some(0),
+            6.0,
+        ),
+        Stops(
+            "kind = \"delay\"\nbus = \"base\"\nfunction = \"tpdo\"\nby = \"2 cycles\"",
+            MissedFeedback,
+            Some(0),
+            6.0,
+        ),
+        Stops(
+            "kind = \"delay\"\naxis = \"joint5\"\nfunction = \"tpdo\"\nby = \"5 ms\"",
+            MissedFeedback,
+            Some(4),
+            6.0,
+        ),
+        Stops(
+            "kind = \"delay\"\nbus = \"wrist\"\nfunction = \"tpdo\"\nby = \"600 us\"",
+            MissedFeedback,
+            Some(3),
+            6.0,
+        ),
         Stops("kind = \"full-queue\"\nbus = \"base\"", NotTransmitted, None, 7.0),
         Stops("kind = \"full-queue\"\nbus = \"base\"\nfunction = \"rpdo\"", NotTransmitted, None, 7.0),
         Stops("kind = \"flood\"\nbus = \"base\"\nfor = \"20 ms\"", NotTransmitted, None, 7.0),
@@ -133,7 +158,10 @@ fn the_code_of_an_alarm_is_the_value_of_the_stop() {
 }
 
 /// Faults that are within what the machine must bear.
-const BORNE: [&str; 9] = [
+const BORNE: [&str; 12] = [
+    "kind = \"delay\"\nbus = \"base\"\nfunction = \"tpdo\"\nby = \"100 us\"",
+    "kind = \"delay\"\nbus = \"base\"\nfunction = \"tpdo\"\nby = \"1 cycles\"\nfor = \"5 cycles\"",
+    "kind = \"delay\"\nbus = \"wrist\"\nfunction = \"tpdo\"\nby = \"3 cycles\"\nprobability = \"2 %\"",
     "kind = \"drop\"\nbus = \"base\"\nfunction = \"tpdo\"\nfor = \"5 cycles\"",
     "kind = \"drop\"\nbus = \"base\"\nfunction = \"tpdo\"\nprobability = \"2 %\"",
     "kind = \"duplicate\"\nbus = \"base\"\nprobability = \"5 %\"",

@@ -106,12 +106,14 @@ fn a_delayed_frame_leaves_in_its_own_time_and_is_unconfirmed_until_then() {
 }
 
 #[test]
-fn a_late_arrival_is_received_at_its_later_time() {
+fn a_late_arrival_is_taken_later_and_tells_when_it_arrived() {
     let mut port = frames(FrameEffect::Delay { by_ns: 300 });
     hears(&mut port, &[frame(0x181, 1)], 1000);
     assert_eq!(received(&mut port, 1010), []);
     assert_eq!(received(&mut port, 1299), []);
-    assert_eq!(received(&mut port, 1300), [Received { frame: frame(0x181, 1), at_ns: 1300 }]);
+    assert_eq!(received(&mut port, 1300), [Received { frame: frame(0x181, 1), at_ns: 1000 }]);
+    hears(&mut port, &[frame(0x181, 2)], 2000);
+    assert_eq!(received(&mut port, 2400), [Received { frame: frame(0x181, 2), at_ns: 2000 }]);
 }
 
 #[test]

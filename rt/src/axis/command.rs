@@ -1,7 +1,7 @@
 //! What is sent to the drive of an axis.
 
 use super::{Axis, Cadence, CommandPdo};
-use crate::cia402::{Goal, State as DriveState, controlword};
+use crate::cia402::{Goal, controlword};
 use crate::control::{ControlLaw, LoopInput};
 use crate::frame::Frame;
 use crate::pdo::CommandSlot;
@@ -24,34 +24,28 @@ impl Axis {
 
         let parameters = &self.parameters;
         let law = parameters.law;
-        let raw = if !is_enabled {
-            self.profile.rest(law.idle(self.position_raw));
+        if !is_enabled {
+            self.profile.rest(law.idle(self.position_counts));
             self.profile_target = None;
-            self.torque_set = 0.0;
-            // One that has been given up may still follow its target until it takes the controlword that disables it: a
-            // position stays what it was, so that this is no step by the following error.
-            let still_follows = self.is_lost
-                && self.drive_state() == DriveState::OperationEnabled
-                && law.target_slot() == CommandSlot::TargetPosition
-                && !law.is_profile();
-            if still_follows { self.command.command(law.target_slot()) } else { self.profile.target_raw() }
-        } else if law.is_profile() {
-            self.torque_set = match self.profile_target {
+        }
+        let (raw, torque) = if law.is_profile() {
+            let torque = match self.profile_target {
                 Some(ProfileTarget::Torque(torque)) => torque,
                 _ => 0.0,
             };
-            self.profile.target_raw()
-        } else {
+            (self.profile.target_raw(), torque)
+        } else if is_enabled || law.target_slot() == CommandSlot::TargetPosition {
             let input = LoopInput {
                 set: self.sent[0],
                 due: self.sent[2],
                 position: self.position,
                 velocity: self.velocity,
             };
-            let (raw, torque) = law.target(&input, &parameters.scale, &parameters.limits);
-            self.torque_set = torque;
-            raw
+            law.target(&input, &parameters.scale, &parameters.limits)
+        } else {
+            (law.idle(self.position_counts), 0.0)
         };
+        self.torque_set = torque;
         self.command.set(law.target_slot(), raw);
         let mode_bits = if is_enabled { self.mode_bits() } else { 0 };
         self.command.set(CommandSlot::Controlword, (word | mode_bits).into());

@@ -1,21 +1,30 @@
 //! What the drive of an axis reports.
 
 use super::Axis;
+use super::position_watch::{Judgement, Reach};
 use crate::cia402::State as DriveState;
 use crate::frame::Frame;
 use crate::pdo::{FeedbackSlot, TooShort};
+use crate::time::Nanoseconds;
 use crate::watch::NodeComplaint;
 
-/// A joint that seems faster than this many times its velocity limit has not moved: its encoder, or its drive's report,
-/// is wrong. The counts are for limits so low that a count is more than they allow in a cycle.
-const IMPLAUSIBLE_SPEED: f64 = 4.0;
-const IMPLAUSIBLE_COUNTS: f64 = 64.0;
 /// A fault shows in the statusword within this many slots of the emergency message that announces it.
 const EMERGENCY_GRACE_CYCLES: u8 = 3;
 
 impl Axis {
-    /// Takes feedback PDO number `pdo` (from 0). One that is too short changes nothing.
-    pub fn receive(&mut self, pdo: usize, frame: &Frame) -> Result<(), TooShort> {
+    /// Begins to wait for the feedback of a cycle. What arrived before `now_ns` and has not been used is too late for its
+    /// own cycle, and is no feedback of this one.
+    pub fn expect_feedback(&mut self, now_ns: Nanoseconds) {
+        self.expected_since_ns = now_ns;
+        self.arrived = 0;
+    }
+
+    /// Takes feedback PDO number `pdo` (from 0) that arrived at `at_ns`. One that is late changes nothing, nor one that is
+    /// too short.
+    pub fn receive(&mut self, pdo: usize, frame: &Frame, at_ns: Nanoseconds) -> Result<(), TooShort> {
+        if at_ns < self.expected_since_ns {
+            return Ok(());
+        }
         let Some(parameters) = self.parameters.feedback.get(pdo) else { return Ok(()) };
         parameters.mapping.unpack(frame.first_word(), frame.payload().len(), &mut self.feedback)?;
         let bit = 1 << (pdo & 7);
@@ -55,32 +64,44 @@ impl Axis {
         self.cycle_s = span_s;
         self.arrived = 0;
         self.age = 0;
-        let last = self.position;
-        self.position_raw = self.feedback.feedback(FeedbackSlot::Position);
-        self.position = self.parameters.scale.position_from_counts(self.position_raw);
-        self.velocity = if self.reports(FeedbackSlot::Velocity) {
-            self.parameters.scale.velocity_from_drive(self.feedback.feedback(FeedbackSlot::Velocity))
-        } else if self.is_heard && span_s > 0.0 {
-            (self.position - last) / span_s
-        } else {
-            0.0
-        };
-        let farthest = IMPLAUSIBLE_SPEED * self.parameters.limits.velocity * span_s
-            + IMPLAUSIBLE_COUNTS / self.parameters.scale.resolution();
-        let distance = (self.position - last).abs();
-        self.jump = (self.is_heard && distance > farthest).then_some(distance);
+        self.judge_position(span_s);
         self.is_heard = true;
         self.notice_state();
-        self.is_position_known = true;
         self.following_error = if self.is_profile() { 0.0 } else { self.sent[2].position - self.position };
+    }
+
+    /// Takes the position of this cycle's report, and the velocity, unless the joint cannot be there.
+    fn judge_position(&mut self, span_s: f64) {
+        let scale = &self.parameters.scale;
+        let counts = self.feedback.feedback(FeedbackSlot::Position);
+        let position = scale.position_from_counts(counts);
+        let reach = Reach { velocity: self.parameters.limits.velocity, count: 1.0 / scale.resolution() };
+        match self.position_watch.judge(position, span_s, reach) {
+            Judgement::Believed { velocity } => {
+                self.jump = None;
+                self.velocity = if self.reports(FeedbackSlot::Velocity) {
+                    scale.velocity_from_drive(self.feedback.feedback(FeedbackSlot::Velocity))
+                } else {
+                    velocity
+                };
+                self.believe(position, counts);
+            }
+            Judgement::Doubtful { distance } => self.jump = Some(distance),
+        }
+    }
+
+    fn believe(&mut self, position: f64, counts: i32) {
+        (self.position, self.position_counts) = (position, counts);
+        if !self.is_position_known {
+            self.is_position_known = true;
+            self.start_from_actual();
+        }
     }
 
     /// Takes the position that the drive has reported otherwise than by process data, if there has been none.
     pub fn set_reported_position(&mut self, counts: i32) {
         if !self.is_heard {
-            self.position_raw = counts;
-            self.position = self.parameters.scale.position_from_counts(counts);
-            self.is_position_known = true;
+            self.believe(self.parameters.scale.position_from_counts(counts), counts);
         }
     }
 
@@ -93,7 +114,7 @@ impl Axis {
         self.is_heard
     }
 
-    /// Cycles since the drive last reported.
+    /// Cycles since the drive last reported in time.
     pub fn feedback_age(&self) -> u16 {
         self.age
     }
@@ -116,7 +137,8 @@ impl Axis {
         self.state
     }
 
-    /// Whether the joint has jumped since the report before, and how far: rad (m).
+    /// How far from where it was the joint has been reported in this cycle, where it cannot have got to: rad (m). It is not
+    /// believed to be there before the next report agrees.
     pub fn jump(&self) -> Option<f64> {
         self.jump.filter(|_| self.age == 0)
     }
@@ -146,7 +168,7 @@ impl Axis {
         self.drive_state() == DriveState::OperationEnabled && !self.is_lost
     }
 
-    /// The actual position (rad or m).
+    /// The actual position (rad or m): the last one that was believed.
     pub fn position(&self) -> f64 {
         self.position
     }

@@ -4,6 +4,7 @@ mod command;
 mod delay;
 mod feedback;
 mod parameters;
+mod position_watch;
 mod profile_mode;
 mod set_point;
 
@@ -20,7 +21,9 @@ use crate::record::AxisRecord;
 use crate::time::Nanoseconds;
 use crate::watch::{DuplicateWatch, NodeWatch};
 
-pub use parameters::{AxisParameters, Cadence, CommandPdo, MAX_PDOS, Pdo};
+use position_watch::PositionWatch;
+
+pub use parameters::{AxisParameters, Cadence, CommandPdo, FeedbackSince, MAX_PDOS, Pdo};
 
 /// An axis at run time.
 #[derive(Clone, Debug)]
@@ -39,10 +42,14 @@ pub struct Axis {
     profile_target: Option<ProfileTarget>,
     /// When a velocity or a torque expires.
     profile_until_ns: Nanoseconds,
+    position_watch: PositionWatch,
+    /// Where the joint is believed to be, in counts too, and how fast.
     position: f64,
-    position_raw: i32,
+    position_counts: i32,
     velocity: f64,
-    /// Which feedback PDOs have come since the last command phase, a bit each.
+    /// What arrived before this is no feedback of the present cycle.
+    expected_since_ns: Nanoseconds,
+    /// Which feedback PDOs have come since then, a bit each.
     arrived: u8,
     age: u16,
     /// Time since the feedback before.
@@ -58,9 +65,9 @@ pub struct Axis {
     contradictions: u8,
     /// Whether the drive left operation enabled by itself and must not be led back to it.
     is_lost: bool,
-    /// How far the joint has jumped between two reports, where no joint can.
+    /// How far the joint has been reported from where it was, where no joint can get.
     jump: Option<f64>,
-    /// Whether `position_raw` is what the drive has said.
+    /// Whether `position` is what the drive has said.
     is_position_known: bool,
     emergency_code: u16,
     /// Cycles since an emergency message came.
@@ -93,9 +100,11 @@ impl Axis {
             profile: ProfileCommand::default(),
             profile_target: None,
             profile_until_ns: 0,
+            position_watch: PositionWatch::default(),
             position: 0.0,
-            position_raw: 0,
+            position_counts: 0,
             velocity: 0.0,
+            expected_since_ns: 0,
             arrived: 0,
             age: 0,
             span_s: 0.0,
@@ -168,6 +177,11 @@ impl Axis {
         self.is_lost = true;
     }
 
+    /// The drive has no torque, or is not waited for any longer: its set-point follows the joint again.
+    pub fn let_go(&mut self) {
+        self.is_lost = false;
+    }
+
     /// What this cycle leaves behind.
     pub fn record(&self, period_s: f64, record: &mut AxisRecord) {
         let torque = self.feedback.feedback(FeedbackSlot::Torque);
@@ -187,7 +201,7 @@ impl Axis {
             error_code: self.error_code(),
             feedback_age: self.age,
             command_raw: self.command.command(self.parameters.law.target_slot()),
-            position_raw: self.position_raw,
+            position_raw: self.feedback.feedback(FeedbackSlot::Position),
         };
     }
 }

@@ -46,6 +46,17 @@ impl CommandPdo {
     }
 }
 
+/// Since when feedback must have arrived to be that of the present cycle. PDOs carry no number: the time of their arrival
+/// is what tells an answer of this cycle from one that is late.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum FeedbackSince {
+    /// The cycle's SYNC, which the drive answers.
+    #[default]
+    Sync,
+    /// The command phase of the cycle before: the drive answers set-points, or reports when it likes.
+    CommandPhase,
+}
+
 /// Everything about an axis that does not change while it runs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AxisParameters {
@@ -57,6 +68,8 @@ pub struct AxisParameters {
     pub commands: ArrayVec<CommandPdo, MAX_PDOS>,
     /// What is expected each cycle of the bus.
     pub feedback: ArrayVec<Pdo, MAX_PDOS>,
+    /// Since when it must have arrived.
+    pub feedback_since: FeedbackSince,
     /// Identifiers of process data that the drive sends beside that, which carries nothing new.
     pub unused: ArrayVec<Id, MAX_PDOS>,
     /// How it speaks.

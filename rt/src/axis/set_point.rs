@@ -22,18 +22,42 @@ impl Axis {
         State { position: newest, velocity: velocity.clamp(-limits.velocity, limits.velocity), acceleration }
     }
 
-    /// Makes the actual position the set-point, as if it had always been.
+    /// Makes the actual position the set-point, as if it had always been: for an axis whose drive has been sent none.
+    pub fn start_from_actual(&mut self) {
+        self.rest_at(self.position);
+    }
+
+    /// Lets the set-point follow the joint, as the target of a drive that may be enabled on it. It goes no faster than the
+    /// joint may, so that it leaps for nobody: not when the joint did, nor when the drive obeys although it says otherwise.
     ///
-    /// The set-point of an axis that has been given up stays where it was: nobody follows it, and nothing is to look like
-    /// a step.
-    pub fn follow_actual(&mut self) {
-        if self.is_lost {
-            self.set = [State { position: self.set[0].position, ..State::default() }; 3];
-            self.delay.fill(self.set[0]);
-            self.following_error = 0.0;
-            return;
+    /// The set-point of an axis that has been given up stays where it was.
+    pub fn follow_actual(&mut self, period_s: f64) {
+        let here = self.set[0].position;
+        let most = self.parameters.limits.velocity * period_s;
+        let way = (self.position - here).clamp(-most, most);
+        // The sum of the difference need not be the actual position to the last bit.
+        let is_there = way.abs() < most;
+        let next = if is_there { self.position } else { here + way };
+        self.rest_at(if self.is_lost { here } else { next });
+    }
+
+    /// Leaves the set-point where it is.
+    pub fn stay(&mut self) {
+        let position = self.set[0].position;
+        if self.is_enabled() {
+            self.advance(State { position, ..State::default() });
+        } else {
+            self.rest_at(position);
         }
-        self.set = [State { position: self.position, ..State::default() }; 3];
+    }
+
+    /// Whether the set-point is where the joint is, but for one step within the limits.
+    pub fn is_on_joint(&self, period_s: f64) -> bool {
+        (self.position - self.set[0].position).abs() <= self.parameters.limits.velocity * period_s
+    }
+
+    fn rest_at(&mut self, position: f64) {
+        self.set = [State { position, ..State::default() }; 3];
         self.delay.fill(self.set[0]);
         self.sent = self.set;
         self.following_error = 0.0;

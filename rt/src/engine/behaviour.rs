@@ -29,6 +29,7 @@ impl Engine {
                 if !(is_patient && self.axes.iter().any(|axis| axis.drive_state().has_torque())) {
                     self.motion.cancel();
                     self.goal = Goal::Disabled;
+                    self.axes.iter_mut().for_each(Axis::let_go);
                     self.enter(Phase::Disabled, now_ns, door);
                 }
             }
@@ -49,22 +50,17 @@ impl Engine {
     /// Enabled axes stay on their set-point; the set-point of the others follows them.
     fn hold(&mut self) {
         for axis in &mut self.axes {
-            if axis.is_enabled() {
-                axis.advance(State { position: axis.set_point().position, ..State::default() });
-            } else {
-                axis.follow_actual();
-            }
+            if axis.is_enabled() { axis.stay() } else { axis.follow_actual(self.period_s) }
         }
     }
 
-    /// As [`Engine::hold`], but what is still on its way to rest goes on.
+    /// What is still on its way to rest goes on, and everything else stays where it is. Nothing follows a joint: a drive
+    /// whose statusword is false still obeys.
     fn come_to_rest(&mut self) {
-        if self.motion.is_finished() {
-            return self.hold();
-        }
+        let is_on_way = !self.motion.is_finished();
         self.motion.advance(self.period_s);
         for (axis, next) in self.axes.iter_mut().zip(self.motion.states()) {
-            if axis.is_enabled() { axis.advance(next) } else { axis.follow_actual() }
+            if is_on_way && axis.is_enabled() { axis.advance(next) } else { axis.stay() }
         }
     }
 
@@ -136,13 +132,13 @@ impl Engine {
         if now_ns > command.valid_until_ns {
             let age_cycles = (now_ns - command.valid_until_ns).div_ceil(self.period_ns);
             self.begin_stop(Rule::StaleCommand, None, None, age_cycles as f64, 0.0, now_ns, door);
-            return self.follow_motion_if_stopping(now_ns, door);
+            return self.follow_stop(now_ns, door);
         }
         if !self.is_stream_begun {
             self.is_stream_begun = true;
             if let Some((axis, violation)) = self.violation(&command.set_points, Axis::check_start) {
                 self.refuse(axis, violation, now_ns, door);
-                return self.follow_motion_if_stopping(now_ns, door);
+                return self.follow_stop(now_ns, door);
             }
         }
         let Some(next) = self.streamed(&command.set_points, now_ns, door) else { return };
@@ -181,7 +177,7 @@ impl Engine {
         };
         if let Some((axis, violation)) = self.violation(&next, rejecting) {
             self.refuse(axis, violation, now_ns, door);
-            self.follow_motion_if_stopping(now_ns, door);
+            self.follow_stop(now_ns, door);
             return None;
         }
         Some(next)
@@ -214,23 +210,24 @@ impl Engine {
             let was_stopping = self.phase == Phase::Stopping;
             self.refuse(axis, violation, now_ns, door);
             if was_stopping {
-                self.hold();
+                self.come_to_rest();
             } else {
-                self.follow_motion_if_stopping(now_ns, door);
+                self.follow_stop(now_ns, door);
             }
             return false;
         }
         for (axis, state) in self.axes.iter_mut().zip(next) {
-            if axis.is_enabled() { axis.advance(*state) } else { axis.follow_actual() }
+            if axis.is_enabled() { axis.advance(*state) } else { axis.stay() }
         }
         true
     }
 
-    fn follow_motion_if_stopping(&mut self, now_ns: Nanoseconds, door: &mut impl Door) {
+    /// The first cycle of a stop that was begun instead of taking a set-point.
+    fn follow_stop(&mut self, now_ns: Nanoseconds, door: &mut impl Door) {
         if self.phase == Phase::Stopping {
             self.follow_motion(now_ns, door);
         } else {
-            self.hold();
+            self.come_to_rest();
         }
     }
 }

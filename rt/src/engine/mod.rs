@@ -12,7 +12,7 @@ mod stops;
 
 use arrayvec::ArrayVec;
 
-use crate::axis::{Axis, AxisParameters};
+use crate::axis::{Axis, AxisParameters, FeedbackSince};
 use crate::cia402::{Goal, controlword};
 use crate::dispatch::{Destination, Dispatch, IdTaken};
 use crate::door::{AxisSnapshot, Door, Snapshot, StreamCommand};
@@ -234,10 +234,18 @@ impl Engine {
         self.is_leaving
     }
 
-    /// The SYNC of a bus, if one is to be sent in this slot.
-    pub fn sync(&self, bus: usize, slot: u64) -> Option<Frame> {
+    /// The SYNC of a bus, if one is to be sent in this slot, now. Answers to an earlier one are late from now on.
+    pub fn sync(&mut self, bus: usize, slot: u64, now_ns: Nanoseconds) -> Option<Frame> {
         let parameters = self.buses.get(bus)?;
-        (self.is_sync_on && has_cycle(parameters, slot)).then(|| Frame::of(parameters.sync_id, []))
+        if !self.is_sync_on || !has_cycle(parameters, slot) {
+            return None;
+        }
+        for axis in self.axes.iter_mut().filter(|axis| usize::from(axis.parameters().bus) == bus) {
+            if axis.parameters().feedback_since == FeedbackSince::Sync {
+                axis.expect_feedback(now_ns);
+            }
+        }
+        Some(Frame::of(parameters.sync_id, []))
     }
 
     /// Takes a frame that arrived on a bus.
@@ -247,7 +255,7 @@ impl Engine {
             Destination::Feedback { axis, pdo } => {
                 if let Some(axis) = self.axes.get_mut(usize::from(axis)) {
                     // One that is too short counts as not received, which the feedback's age then shows.
-                    let _ = axis.receive(pdo.into(), &received.frame);
+                    let _ = axis.receive(pdo.into(), &received.frame, received.at_ns);
                 }
             }
             Destination::Emergency { axis } => {
@@ -318,7 +326,10 @@ impl Engine {
         for axis in &mut self.axes {
             let has_cycle = has_cycle_of(&self.buses, axis, slot);
             if has_cycle {
-                axis.begin_cycle(elapsed_s)
+                axis.begin_cycle(elapsed_s);
+                if axis.parameters().feedback_since == FeedbackSince::CommandPhase {
+                    axis.expect_feedback(now_ns);
+                }
             } else {
                 axis.wait(elapsed_s)
             }
@@ -426,8 +437,10 @@ impl Engine {
         for axis in &mut self.axes {
             let is_held_back = self.held_back.contains(axis.parameters().bus.into());
             if has_cycle_of(&self.buses, axis, slot) && !is_held_back {
-                // A drive that falls out of operation enabled is not led back by what the others are still to do.
-                let is_led_up = self.phase == Phase::Enabling || axis.is_enabled();
+                // A drive that falls out of operation enabled is not led back by what the others are still to do; and none
+                // is led up before its target is where the joint is.
+                let is_led_up =
+                    axis.is_enabled() || self.phase == Phase::Enabling && axis.is_on_joint(self.period_s);
                 let goal = match self.goal {
                     Goal::Enabled if self.phase == Phase::Stopping && axis.stops_by_itself() => {
                         Goal::QuickStop

@@ -86,6 +86,7 @@ impl Engine {
             return false;
         }
         self.goal = Goal::Disabled;
+        self.axes.iter_mut().for_each(Axis::start_from_actual);
         self.enter(Phase::Disabled, now_ns, door);
         true
     }

@@ -5,7 +5,7 @@
 
 use core::f64::consts::TAU;
 
-use takt_rt::axis::{AxisParameters, CommandPdo, Pdo};
+use takt_rt::axis::{AxisParameters, CommandPdo, FeedbackSince, Pdo};
 use takt_rt::control::ControlLaw;
 use takt_rt::dialect::Dialect;
 use takt_rt::door::{Door, Request, Snapshot, StreamCommand};
@@ -80,6 +80,7 @@ fn axis() -> Option<AxisParameters> {
         feedback: [pdo(0x180, Mapping::feedback(&feedback).ok()?)].into_iter().collect(),
         dialect: Dialect::Cia402,
         controlword_spacing_cycles: 0,
+        feedback_since: FeedbackSince::Sync,
         unused: Default::default(),
         law: ControlLaw::Position,
         scale: Scale::new(scale).ok()?,

@@ -1,0 +1,110 @@
+//! Feedback that comes too late: it counts as missed in its own cycle and is never taken for that of a later one, however
+//! regularly it comes.
+
+mod fixture;
+
+use fixture::{PERIOD_NS, Rig, parameters};
+use takt_rt::axis::FeedbackSince;
+use takt_rt::frame::{Frame, Id};
+use takt_rt::stop::{Phase, Rule};
+
+fn moving() -> Rig {
+    let mut rig = Rig::enabled(3);
+    rig.move_to(2.0);
+    rig.run(200);
+    assert_eq!(rig.phase(), Phase::Moving);
+    rig
+}
+
+#[test]
+fn feedback_that_is_late_by_whole_cycles_counts_as_missed_and_stops_the_group_after_the_hold_over() {
+    for late_cycles in [1, 2, 3, 7, 40] {
+        let mut rig = moving();
+        rig.buses[0].lies_ns = late_cycles * PERIOD_NS;
+        rig.run(3);
+        assert!(rig.stops().is_empty(), "{late_cycles} cycles late: three may be missing");
+        assert_eq!(rig.door.records.last().unwrap().axes[0].feedback_age, 3);
+        rig.run(1);
+        let stops = rig.stops();
+        assert_eq!((stops.len(), stops[0].rule), (1, Rule::MissedFeedback), "{late_cycles} cycles late");
+        assert_eq!((stops[0].value, stops[0].limit), (4.0, 3.0));
+        rig.run_until(Phase::Disabled, 3_000);
+        rig.assert_limits_kept();
+    }
+}
+
+#[test]
+fn feedback_that_misses_its_command_phase_by_a_little_counts_as_missed_too() {
+    let mut rig = moving();
+    rig.buses[0].lies_ns = 600_000;
+    rig.run(5);
+    assert_eq!(rig.stops()[0].rule, Rule::MissedFeedback);
+}
+
+#[test]
+fn feedback_that_comes_later_but_in_time_is_taken() {
+    let mut rig = moving();
+    rig.buses[0].lies_ns = 500_000;
+    rig.run(100);
+    assert!(rig.stops().is_empty());
+    assert_eq!(rig.door.records.last().unwrap().axes[0].feedback_age, 0);
+}
+
+#[test]
+fn feedback_that_is_late_for_a_few_cycles_is_borne_and_what_has_piled_up_is_neither_used_nor_another_node() {
+    let mut rig = moving();
+    for _ in 0..20 {
+        rig.buses[0].lies_ns = 3 * PERIOD_NS;
+        rig.run(3);
+        // All of it at once, the late and the fresh.
+        rig.buses[0].lies_ns = 0;
+        rig.run(1);
+        let record = rig.door.records.last().unwrap().axes[0];
+        assert_eq!(record.feedback_age, 0);
+        assert_eq!(record.position_raw, rig.drive(0).position);
+        rig.run(10);
+    }
+    assert!(rig.stops().is_empty());
+}
+
+#[test]
+fn a_late_report_of_where_the_joint_was_is_not_where_it_is() {
+    let mut rig = moving();
+    let old = rig.drive(0).position.to_le_bytes();
+    rig.run(1);
+    rig.drive(0).is_silent = true;
+    let before = rig.engine.axes()[0].position();
+    // It arrived before this cycle's SYNC, and is taken after it.
+    rig.buses[0].lies_ns = PERIOD_NS - 100_000;
+    let [a, b, c, d] = old;
+    rig.buses[0].inject(Frame::of(Id::canopen(0x180, 1), [0x37, 0x12, a, b, c, d]));
+    rig.run(1);
+    assert_eq!(rig.engine.axes()[0].position(), before);
+    assert_eq!(rig.engine.axes()[0].feedback_age(), 1);
+}
+
+#[test]
+fn a_drive_that_reports_by_itself_is_heard_from_one_command_phase_to_the_next() {
+    let mut parameters = parameters(1);
+    parameters.axes[0].feedback_since = FeedbackSince::CommandPhase;
+    let mut rig = Rig::of(parameters).enable();
+    rig.move_to(2.0);
+    let report = |rig: &mut Rig| {
+        let [a, b, c, d] = rig.drive(0).position.to_le_bytes();
+        rig.buses[0].inject(Frame::of(Id::canopen(0x180, 1), [0x37, 0x12, a, b, c, d]));
+    };
+    rig.drive(0).is_silent = true;
+    for _ in 0..200 {
+        // Between the command phase before and the present SYNC.
+        rig.buses[0].lies_ns = PERIOD_NS - 200_000;
+        report(&mut rig);
+        rig.run(1);
+        assert_eq!(rig.engine.axes()[0].feedback_age(), 0);
+    }
+    for _ in 0..4 {
+        rig.buses[0].lies_ns = PERIOD_NS + 200_000;
+        report(&mut rig);
+        rig.run(1);
+    }
+    assert_eq!((rig.stops().len(), rig.stops()[0].rule), (1, Rule::MissedFeedback));
+}
