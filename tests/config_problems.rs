@@ -193,6 +193,8 @@ cases! {
         "heartbeat = \"100 ms\"" => "heartbeat = \"1 ms\"", at "heartbeat = \"1 ms": OutOfRange { .. },
         "heartbeat = \"100 ms\"" => "heartbeat = \"10.5 ms\"", at "10.5": OutOfRange { allowed, .. } if allowed == "whole milliseconds",
         "heartbeat_timeout = \"500 ms\"" => "heartbeat_timeout = \"100 ms\"", at "heartbeat_timeout": OutOfRange { allowed, .. } if allowed == "longer than heartbeat, 100 ms",
+        "heartbeat = \"100 ms\"" => "time = \"1 ms\"", at "time = \"1 ms": OutOfRange { .. },
+        "heartbeat = \"100 ms\"" => "time = \"7200 s\"", at "7200 s": OutOfRange { .. },
         "heartbeat_timeout = \"500 ms\"" => "heartbeat_timeout = \"66 s\"", at "66 s": OutOfRange { .. },
         "bit_rate = \"1 Mbit/s\"" => "bit_rate = 999999", at "999999": OutOfRange { key, .. } if key == "bus.bit_rate",
         "restart_ms = 250" => "restart_ms = 60001", at "restart": OutOfRange { allowed, .. } if allowed == "0 to 60000",

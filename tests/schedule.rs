@@ -133,6 +133,15 @@ fn every_remedy_that_is_named_makes_the_bus_fit() {
 }
 
 #[test]
+fn where_time_does_not_fit_leaving_it_out_is_the_first_remedy() {
+    let mut told = erobs(3, "", "", "heartbeat = \"100 ms\"");
+    told.master.heartbeat_ns = None;
+    assert!(schedule::verify(&told).is_ok());
+    told.master.time_ns = Some(1_000_000_000);
+    assert_eq!(analyse(&told).remedies.first(), Some(&Remedy::TimeOff));
+}
+
+#[test]
 fn an_impossible_command_phase_is_answered_with_the_possible_ones() {
     let early = analyse(&erobs(3, "command_phase = 0.4", "", ""));
     assert_eq!(early.shortfalls.len(), 1);

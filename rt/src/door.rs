@@ -41,6 +41,11 @@ pub trait Door {
 pub enum Request {
     /// Begin to send SYNC (`true`) or cease (`false`).
     Sync(bool),
+    /// The time of day at zero of the cycle's clock, for TIME: nanoseconds after the beginning of 1984-01-01 UTC.
+    TimeOfDay {
+        /// ns
+        at_zero_ns: u64,
+    },
     /// Use what the drive has reported about itself.
     RatedTorque {
         /// The axis.

@@ -6,7 +6,8 @@
 //!
 //! From the wire inwards:
 //!
-//! - [`time`], [`frame`]: integer nanoseconds and the grid; CAN frames that can only be valid.
+//! - [`time`], [`time_of_day`], [`frame`]: integer nanoseconds and the grid; what the drives are told the time is; CAN
+//!   frames that can only be valid.
 //! - [`port`], [`door`]: what the cycle needs from the world, and what it shares with the rest of the program, as
 //!   small traits.
 //! - [`pdo`], [`units`], [`cia402`], [`dialect`], [`profile`]: process data compiled to shifts and masks; SI to drive
@@ -40,6 +41,7 @@ pub mod profile;
 pub mod record;
 pub mod stop;
 pub mod time;
+pub mod time_of_day;
 pub mod units;
 pub mod watch;
 pub mod wire;

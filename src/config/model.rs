@@ -103,6 +103,8 @@ pub struct Master {
     /// Time after which a drive that no longer hears it must react (object 1016 of the drives), in whole
     /// milliseconds. Default 500 ms.
     pub heartbeat_timeout_ns: u64,
+    /// Period of TIME, which tells the drives the time of day; `None`, the default, sends none.
+    pub time_ns: Option<u64>,
 }
 
 /// One bus.

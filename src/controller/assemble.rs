@@ -104,6 +104,7 @@ pub fn engine(config: &Config) -> Result<Engine, AssembleError> {
         axes,
         buses: buses.collect(),
         heartbeat,
+        time_cycles: config.master.time_ns.map(&cycles),
         enable_timeout_cycles: cycles(ENABLE_TIMEOUT_NS),
         not_transmitted_cycles: cycles(NOT_TRANSMITTED_NS),
         categories: config.stops,

@@ -9,6 +9,7 @@ pub mod quiet;
 pub mod realtime_thread;
 pub mod session;
 mod supervisor;
+mod time_of_day;
 mod virtual_time;
 
 pub use handle::{CommandError, Controller, Motion, MotionError, MoveOptions, StartFailure};

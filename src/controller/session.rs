@@ -15,6 +15,7 @@ use super::channels::{ChannelSizes, Observer, Streamer, channels};
 use super::quiet;
 use super::realtime_thread::{self, Begun, Ended, StartError, Work};
 use super::supervisor::{Interrupt, Outcome, Progress, Supervisor};
+use super::time_of_day::TimeOfDayKeeper;
 use crate::bus::port::{OpenError, Port};
 use crate::bus::trace::Trace;
 use crate::config::Config;
@@ -155,10 +156,13 @@ pub(super) fn lead(
         // Whoever no longer waits for it has given up; the run then ends as it was told to.
         let _ = remote.introduce.send((host.observer(), streamer));
     }
+    let mut time_of_day = TimeOfDayKeeper::of(config);
     let mut asked = VecDeque::new();
     let (mut panicked, mut is_watched) = (None, true);
     while !running.is_finished() {
         supervisor.poll(clock.now_ns(), &mut host);
+        let now_ns = clock.now_ns();
+        asked.extend(time_of_day.poll(now_ns, || WallClock::starting_now(now_ns)));
         asked.extend(remote.iter().flat_map(|remote| remote.requests.try_iter()));
         while asked.front().is_some_and(|request| host.request(*request).is_ok()) {
             asked.pop_front();

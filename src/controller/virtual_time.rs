@@ -13,10 +13,15 @@ use takt_rt::time::Grid;
 use super::assemble::{self, AssembleError};
 use super::channels::{ChannelSizes, HostSide, LogSide, RtSide, channels};
 use super::supervisor::{Interrupt, Outcome, Supervisor};
+use super::time_of_day::TimeOfDayKeeper;
 use crate::bus::port::Port;
 use crate::config::Config;
 use crate::faults::Rehearsal;
 use crate::sim::SimulatedBus;
+use crate::telemetry::WallClock;
+
+/// Zero of virtual time: 2000-01-01 00:00:00 UTC, in ns since 1970-01-01.
+const VIRTUAL_EPOCH_NS: u64 = 946_684_800_000_000_000;
 
 /// A clock that is always on time, unless it is told to be late.
 #[derive(Clone, Copy, Debug, Default)]
@@ -53,6 +58,7 @@ pub struct VirtualRun<P> {
     rt: RtSide,
     host: HostSide,
     supervisor: Supervisor,
+    time_of_day: TimeOfDayKeeper,
     rehearsal: Option<Arc<Rehearsal>>,
     is_over: bool,
 }
@@ -100,6 +106,7 @@ impl<P: BusPort> VirtualRun<P> {
             rt,
             host,
             supervisor: Supervisor::new(config, None),
+            time_of_day: TimeOfDayKeeper::of(config),
             rehearsal: None,
             is_over: false,
         };
@@ -113,6 +120,10 @@ impl<P: BusPort> VirtualRun<P> {
         }
         let flow = self.cycle.run(&mut self.engine, &mut self.clock, &mut self.ports, &mut self.rt);
         self.supervisor.poll(self.clock.now_ns, &mut self.host);
+        if let Some(time) = self.time_of_day.poll(self.clock.now_ns, || WallClock::fixed(VIRTUAL_EPOCH_NS)) {
+            // One that finds the queue full is told again in a minute.
+            let _ = self.host.request(time);
+        }
         if let Some(rehearsal) = &self.rehearsal {
             rehearsal.observe(&self.host.snapshot());
         }

@@ -103,7 +103,12 @@ pub fn config(axes: &[(usize, u8)]) -> Config {
             hold_dma_latency: false,
             spin_guard_ns: Some(0),
         },
-        master: Master { node: 127, heartbeat_ns: Some(20_000_000), heartbeat_timeout_ns: 100_000_000 },
+        master: Master {
+            node: 127,
+            heartbeat_ns: Some(20_000_000),
+            heartbeat_timeout_ns: 100_000_000,
+            time_ns: None,
+        },
         buses: (0..buses).map(bus).collect(),
         axes: axes.iter().enumerate().map(|(number, (bus, node))| axis(number, *bus, *node)).collect(),
         program: Program { repeat: 1, moves: vec![] },

@@ -11,3 +11,4 @@ mod profile_torque;
 mod profile_velocity;
 mod quirks;
 mod silence;
+mod time_of_day;

@@ -44,6 +44,7 @@ fn sources(schedule: &BusSchedule) -> Vec<Source<'_>> {
                 | MessageKind::SetPoint
                 | MessageKind::SdoRequest
                 | MessageKind::MasterHeartbeat
+                | MessageKind::Time
         );
         let station = if is_ours { CONTROLLER } else { axis };
         let frame = longest(Id::base(message.id).unwrap(), FrameKind::Data, message.length);
@@ -112,7 +113,7 @@ fn simulate(schedule: &BusSchedule, chance: &Chance) -> Vec<Arrival> {
         for source in &set_points {
             traffic.release(handed_over_ns, CONTROLLER, source.frame);
         }
-        for source in of(MessageKind::MasterHeartbeat) {
+        for source in of(MessageKind::MasterHeartbeat).chain(of(MessageKind::Time)) {
             if (start_ns % source.message.period_ns) < schedule.period_ns {
                 traffic.release(handed_over_ns, CONTROLLER, source.frame);
             }
@@ -185,8 +186,8 @@ fn fitting() -> impl Strategy<Value = BusSchedule> {
         0u64..120,
     );
     type Axis = (&'static str, bool, &'static str, u64);
-    type Drawn = ((u64, f64, bool), (usize, bool), bool, Axis);
-    let fits = |((period, phase, is_auto), (axes, is_reversed), has_sdo, axis): Drawn| {
+    type Drawn = ((u64, f64, bool), (usize, bool), (bool, bool), Axis);
+    let fits = |((period, phase, is_auto), (axes, is_reversed), (has_sdo, has_time), axis): Drawn| {
         let (mode, has_heartbeat, feedback, delay) = axis;
         let axis = format!(
             "mode = {mode:?}\nfeedback = [{feedback}]\nfeedback_delay = \"{delay} us\"\nheartbeat = \"{}\"",
@@ -195,12 +196,13 @@ fn fitting() -> impl Strategy<Value = BusSchedule> {
         let bus = format!("sdo_while_enabled = {has_sdo}");
         let cycle = format!("period = \"{period} ms\"\ncommand_phase = {phase}");
         let mut config = config(axes, is_reversed, &cycle, &bus, &axis);
+        config.master.time_ns = has_time.then_some(10_000_000);
         if is_auto {
             config.cycle.command_phase_ns = schedule::automatic_command_phase(&config).ok()?;
         }
         schedule::verify(&config).ok().map(|mut buses| buses.remove(0))
     };
-    (cycle, axes, prop::bool::weighted(0.3), axis).prop_filter_map("does not fit", fits)
+    (cycle, axes, (prop::bool::weighted(0.3), prop::bool::ANY), axis).prop_filter_map("does not fit", fits)
 }
 
 proptest! {

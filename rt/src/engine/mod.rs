@@ -21,6 +21,7 @@ use crate::port::{BusHealth, Received};
 use crate::record::{CycleRecord, Event, EventKind, MAX_AXES, MAX_BUSES, Timing};
 use crate::stop::{Phase, StopCategories, StopReason};
 use crate::time::{NANOSECONDS_PER_SECOND, Nanoseconds};
+use crate::time_of_day::TimeProducer;
 use crate::watch::{LeakyBucket, TimingLadder, TimingLevel};
 
 pub use parameters::{BusParameters, EngineParameters, Heartbeat, SetUpError};
@@ -89,6 +90,7 @@ pub struct Engine {
     buses: ArrayVec<BusParameters, MAX_BUSES>,
     dispatch: [Dispatch; MAX_BUSES],
     heartbeat: Option<Heartbeat>,
+    time: Option<TimeProducer>,
     enable_timeout_cycles: u32,
     not_transmitted_cycles: u32,
     acknowledge_timeout_cycles: u32,
@@ -168,6 +170,7 @@ impl Engine {
             buses: parameters.buses,
             dispatch,
             heartbeat: parameters.heartbeat,
+            time: parameters.time_cycles.map(TimeProducer::new),
             enable_timeout_cycles: parameters.enable_timeout_cycles,
             not_transmitted_cycles: parameters.not_transmitted_cycles,
             acknowledge_timeout_cycles: parameters.acknowledge_timeout_cycles,
@@ -306,6 +309,9 @@ impl Engine {
     ) -> bool {
         let elapsed = self.last_slot.map_or(1, |last| slot.saturating_sub(last));
         self.count_slot(slot, elapsed, transmission, now_ns, door);
+        if let Some(time) = &mut self.time {
+            time.pass(elapsed, now_ns);
+        }
         let elapsed_s = self.period_s * elapsed as f64;
         for axis in &mut self.axes {
             let has_cycle = has_cycle_of(&self.buses, axis, slot);
@@ -448,11 +454,14 @@ impl Engine {
         }
     }
 
-    /// The heartbeat when it is due, and service frames as far as the budget goes: what follows the set-points.
+    /// The heartbeat and TIME when they are due, and service frames as far as the budget goes: what follows the set-points.
     pub fn services(&self, bus: usize, door: &mut impl Door, batch: &mut SendBatch) {
         if let Some(heartbeat) = self.heartbeat.filter(|_| self.heartbeat_due == 0) {
             let _ = batch.try_push(Frame::of(Id::canopen(0x700, heartbeat.node), [NMT_OPERATIONAL]));
         }
+        // A bus that is behind is spared: the next one tells the time as well.
+        let time = self.time.filter(|_| !self.held_back.contains(bus)).and_then(|time| time.message());
+        batch.extend(time);
         let Some(parameters) = self.buses.get(bus) else { return };
         let budget = match self.phase {
             Phase::Passive => parameters.service_frames_passive,

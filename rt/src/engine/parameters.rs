@@ -43,6 +43,8 @@ pub struct EngineParameters {
     pub buses: ArrayVec<BusParameters, MAX_BUSES>,
     /// The heartbeat, if one is sent.
     pub heartbeat: Option<Heartbeat>,
+    /// Cycles from one TIME message to the next, where the drives are told the time of day.
+    pub time_cycles: Option<u32>,
     /// How each rule stops the group.
     pub categories: StopCategories,
     /// How many missed slots are too many.

@@ -21,6 +21,9 @@ impl Engine {
                 self.is_sync_on = on;
                 true
             }
+            Request::TimeOfDay { at_zero_ns } => {
+                self.time.as_mut().map(|time| time.set(at_zero_ns)).is_some()
+            }
             Request::RatedTorque { axis, torque } => {
                 self.axes.get_mut(usize::from(axis)).is_some_and(|axis| axis.set_rated_torque(torque))
             }

@@ -3,9 +3,10 @@
 use serde::Serialize;
 use takt_rt::axis::Cadence;
 use takt_rt::frame::Id;
+use takt_rt::time_of_day::TIME_ID;
 
 use crate::bus::frame_time::FrameShape;
-use crate::config::{Axis, Config, DriveFamily};
+use crate::config::{Axis, Config, DriveFamily, Master};
 use crate::drive::{PdoPlan, ProcessData};
 
 /// What a message is.
@@ -30,17 +31,27 @@ pub enum MessageKind {
     DriveHeartbeat,
     /// Heartbeat of the controller.
     MasterHeartbeat,
+    /// TIME of the controller (7.2.6).
+    Time,
 }
 
 impl MessageKind {
-    /// Sent besides the process data, and less important than it by identifier.
+    /// Sent besides the process data. What drives send of it is less important by its identifier; the controller's own
+    /// follows its set-points in one queue, so that TIME, whose identifier is more important, is none the sooner for it.
     pub(super) fn is_background(self) -> bool {
-        matches!(self, Self::SdoResponse | Self::SdoRequest | Self::DriveHeartbeat | Self::MasterHeartbeat)
+        match self {
+            Self::SdoResponse
+            | Self::SdoRequest
+            | Self::DriveHeartbeat
+            | Self::MasterHeartbeat
+            | Self::Time => true,
+            Self::Sync | Self::Emergency | Self::Feedback | Self::SetPoint | Self::Answer => false,
+        }
     }
 
     /// Sent by the controller, so that it stands in the controller's own queue.
     pub(super) fn is_ours(self) -> bool {
-        matches!(self, Self::Sync | Self::SetPoint | Self::SdoRequest | Self::MasterHeartbeat)
+        matches!(self, Self::Sync | Self::SetPoint | Self::SdoRequest | Self::MasterHeartbeat | Self::Time)
     }
 
     pub(super) fn is_sdo(self) -> bool {
@@ -73,6 +84,7 @@ const EMERGENCY_INTERVAL_NS: u64 = 1_000_000_000;
 const SDO_BYTES: usize = 8;
 const EMERGENCY_BYTES: usize = 8;
 const HEARTBEAT_BYTES: usize = 1;
+const TIME_BYTES: usize = 6;
 /// Transmission types above this are sent on events of the drive (CiA 301, 7.5.2.38).
 const LAST_SYNCHRONOUS_TYPE: u8 = 240;
 
@@ -81,14 +93,14 @@ pub(super) fn messages(config: &Config, bus_index: usize) -> Vec<BusMessage> {
     let Some(bus) = config.buses.get(bus_index) else { return vec![] };
     let period_ns = config.bus_cycle(bus_index).period_ns;
     let mut messages = vec![message(MessageKind::Sync, None, Id::canopen(0x080, 0), 0, period_ns)];
-    if let Some(heartbeat_ns) = config.master.heartbeat_ns {
-        let id = Id::canopen(0x700, config.master.node);
-        // It is sent in a cycle of the controller, so up to one cycle late.
-        messages.push(BusMessage {
-            jitter_ns: config.cycle.period_ns,
-            ..message(MessageKind::MasterHeartbeat, None, id, HEARTBEAT_BYTES, heartbeat_ns)
-        });
-    }
+    let Master { node, heartbeat_ns, time_ns, .. } = config.master;
+    let heartbeat = heartbeat_ns.map(|period_ns| {
+        message(MessageKind::MasterHeartbeat, None, Id::canopen(0x700, node), HEARTBEAT_BYTES, period_ns)
+    });
+    let time = time_ns.map(|period_ns| message(MessageKind::Time, None, TIME_ID, TIME_BYTES, period_ns));
+    // They are sent in a cycle of the controller, so up to one cycle late.
+    let own = heartbeat.into_iter().chain(time);
+    messages.extend(own.map(|message| BusMessage { jitter_ns: config.cycle.period_ns, ..message }));
     let axes = || config.axes.iter().enumerate().filter(|(_, axis)| axis.bus == bus_index);
     for (index, axis) in axes() {
         messages.extend(axis_messages(index, axis, period_ns));

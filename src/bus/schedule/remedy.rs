@@ -30,6 +30,8 @@ pub enum Remedy {
     SdoWhileDisabled,
     /// No heartbeats of the drives: their feedback shows that they live.
     DriveHeartbeatsOff,
+    /// No time of day.
+    TimeOff,
     /// No answers to SYNC: the drives' answers to set-points are feedback enough, a cycle older.
     NoAnswersToSync,
     /// Less feedback.
@@ -95,6 +97,7 @@ impl Trial<'_> {
         let ways = [
             self.service_frames(),
             self.sdo_while_disabled(),
+            self.time_off(),
             self.drive_heartbeats_off(),
             self.no_answers_to_sync(),
             self.smaller_feedback(),
@@ -134,6 +137,11 @@ impl Trial<'_> {
         let fits =
             || self.fits_with(|config| config.buses.iter_mut().for_each(|bus| bus.sdo_while_enabled = false));
         (is_enabled && fits()).then_some(Remedy::SdoWhileDisabled)
+    }
+
+    fn time_off(self) -> Option<Remedy> {
+        self.config.master.time_ns?;
+        self.fits_with(|config| config.master.time_ns = None).then_some(Remedy::TimeOff)
     }
 
     fn drive_heartbeats_off(self) -> Option<Remedy> {

@@ -23,6 +23,7 @@ pub fn message_name(kind: MessageKind) -> &'static str {
         MessageKind::SdoRequest => "SDO request",
         MessageKind::DriveHeartbeat => "heartbeat",
         MessageKind::MasterHeartbeat => "master heartbeat",
+        MessageKind::Time => "TIME",
     }
 }
 
@@ -165,6 +166,9 @@ pub fn remedy(remedy: &Remedy) -> String {
             "no heartbeat of the controller, though no drive then notices that it has \
                                        died: [master] heartbeat = \"off\""
                 .to_owned()
+        }
+        Remedy::TimeOff => {
+            "no TIME, where no drive needs the time of day: [master] time = \"off\"".to_owned()
         }
         Remedy::MoreBuses { axes_per_bus, buses } => {
             format!("{buses} buses: {axes_per_bus} of these axes fit one")

@@ -107,8 +107,9 @@ pub fn master(mut section: Section<'_>) -> Master {
             ),
         }
     }
+    let time_ns = section.get("time").and_then(|entry| time_period(&entry));
     section.finish();
-    Master { node: node.unwrap_or(defaults::MASTER_NODE), heartbeat_ns, heartbeat_timeout_ns }
+    Master { node: node.unwrap_or(defaults::MASTER_NODE), heartbeat_ns, heartbeat_timeout_ns, time_ns }
 }
 
 /// A node number of CANopen.
@@ -119,6 +120,11 @@ pub fn node(entry: &Entry<'_>) -> Option<u8> {
 /// The period of a heartbeat, or `"off"`.
 pub fn heartbeat(entry: &Entry<'_>) -> Option<u64> {
     if entry.is_word("off") { None } else { milliseconds(entry, 10e-3) }
+}
+
+/// The period of TIME, or `"off"`. More often than every 10 ms tells nobody more; seldom is up to an hour.
+fn time_period(entry: &Entry<'_>) -> Option<u64> {
+    if entry.is_word("off") { None } else { entry.nanoseconds(10e-3, 3600.0) }
 }
 
 /// Objects 1016 and 1017 hold whole milliseconds in 16 bits (CiA 301, 7.5.2.16 and 7.5.2.17).

@@ -113,6 +113,7 @@ fn cycles() -> Option<Phase> {
         axes: [axis()?].into_iter().collect(),
         buses: [bus].into_iter().collect(),
         heartbeat: None,
+        time_cycles: None,
         enable_timeout_cycles: 100,
         not_transmitted_cycles: 5,
         acknowledge_timeout_cycles: 500,
