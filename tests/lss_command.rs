@@ -85,7 +85,7 @@ fn a_device_tells_who_it_is_and_which_number_it_has() {
     assert_eq!((&known["device"]["vendor"], &known["node"]), (&0x5A65_726F_u32.into(), &9.into()));
     let found = result(&["inquire"]);
     assert_eq!((&found["device"]["serial"], &found["node"]), (&0x1234.into(), &Value::Null));
-    let output = lss(&["--bus", "sim", "--simulate", SECOND, "--only", "inquire"]);
+    let output = lss(&["--bus", "sim", "inquire", "--simulate", SECOND, "--only"]);
     ends_with(0, &output);
     assert!(said(&output).contains("0xFFFFFFFE"), "{}", said(&output));
 }

@@ -155,6 +155,14 @@ fn what_does_not_suit_the_mode_is_refused_by_object_type_and_number() {
     }
 }
 
+#[test]
+fn the_mapping_of_a_yz_aim_cannot_be_written() {
+    let text = one_yz_aim("ip", "to = 0").replace("mode = \"ip\"", "mode = \"ip\"\nmapping = \"written\"");
+    let error = Config::parse("test.toml", &text).unwrap_err();
+    let shown = format!("{:?}", miette::Report::new(error));
+    assert!(shown.contains("as-stored") && shown.contains("fixed"), "{shown}");
+}
+
 /// Drives whose firmware reports the statusword before the position, unlike the manual.
 fn state_first(config: Config) -> World {
     let drives = config.axes.iter().map(|axis| -> Box<dyn Drive> {

@@ -39,22 +39,22 @@ pub struct Arguments {
     #[arg(long, value_name = "INTERFACE")]
     bus: Interface,
     /// The bit rate of the interface
-    #[arg(long, value_name = "RATE", value_parser = bit_rate, default_value = "1 Mbit/s")]
+    #[arg(long, value_name = "RATE", global = true, value_parser = bit_rate, default_value = "1 Mbit/s")]
     bit_rate: u32,
     /// The device with this identity (1018:1 to 4): VENDOR:PRODUCT:REVISION:SERIAL
-    #[arg(long, value_name = "IDENTITY", value_parser = address)]
+    #[arg(long, value_name = "IDENTITY", global = true, value_parser = address)]
     device: Option<LssAddress>,
     /// The only device on the bus, whatever it is
-    #[arg(long, conflicts_with = "device")]
+    #[arg(long, global = true, conflicts_with = "device")]
     only: bool,
     /// A device on a simulated bus: IDENTITY, or IDENTITY@NODE where it has a node number already
-    #[arg(long, value_name = "DEVICE")]
+    #[arg(long, value_name = "DEVICE", global = true)]
     simulate: Vec<SimulatedDevice>,
     /// Show every frame
-    #[arg(short, long)]
+    #[arg(short, long, global = true)]
     verbose: bool,
     /// Print the result as one JSON object
-    #[arg(long)]
+    #[arg(long, global = true)]
     json: bool,
     #[command(subcommand)]
     action: Action,
