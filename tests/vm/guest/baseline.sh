@@ -1,7 +1,7 @@
 # The machine's own jitter, and that of other SYNC sources: cyclictest, the kernel's broadcast manager and a FIFO cangen, 1 ms each, idle
-# and under load. CYCLES and LOAD_CYCLES set how long. Leaves baseline.txt (the table) and the recordings.
+# and under load. CYCLES and LOAD_CYCLES set how long, up to 10000. Leaves baseline.txt (the table) and the recordings.
 . tests/vm/guest/laboratory.sh
-cycles=${CYCLES:-10000} load_cycles=${LOAD_CYCLES:-2000}
+cycles=$(at_most_ten_thousand "${CYCLES:-10000}") load_cycles=$(at_most_ten_thousand "${LOAD_CYCLES:-2000}")
 
 broadcast_manager() { # CYCLES FILE
     # bcmserver takes its commands over TCP: add a cyclic frame, every 0 s 1000 us, identifier 080, no data.
@@ -34,6 +34,7 @@ measure() { # idle|load CYCLES
 
 # Above the load and below all that is measured, so that the load does not starve this script.
 chrt --fifo --pid 1 $$
+shorten_page_lists
 vcan_up vcan0
 row "(microseconds)" load frames mean min max range deviation missed
 measure idle "$cycles"

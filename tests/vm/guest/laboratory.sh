@@ -8,6 +8,11 @@ vcan_up() {
     ip link set "$1" up
 }
 
+# What `takt doctor` advises where it finds long lists of free pages; another one's machine is left as it is.
+shorten_page_lists() {
+    [ "$TAKT_VM" = host ] || echo 1000000 > /proc/sys/vm/percpu_pagelist_high_fraction
+}
+
 # Brings both emulated SJA1000 controllers up at 1 Mbit/s. They sit on one bus and acknowledge each other.
 controllers_up() {
     local interface
@@ -62,6 +67,11 @@ record() {
 # periods FILE PERIOD_US
 periods() {
     awk -v nominal="$2" -f $guest/periods.awk "$1"
+}
+
+# at_most_ten_thousand CYCLES: for what takt is only compared with. Over more cycles the largest can only be larger.
+at_most_ten_thousand() {
+    echo $(($1 < 10000 ? $1 : 10000))
 }
 
 # cyclictest_row CYCLES: shortest, mean and longest wake-up latency in microseconds.
