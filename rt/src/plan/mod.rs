@@ -15,8 +15,14 @@
 //! assert_eq!(profiles[1].sample(duration_s), State::rest(-0.25));
 //! ```
 //!
-//! The planner allocates nothing, panics on nothing and always ends: the number of steps has a fixed bound.
+//! The planner allocates nothing, panics on nothing and always ends, for its work has a fixed bound. Planning an axis searches at
+//! most 32 roots, each with at most 96 evaluations of a polynomial with two square roots (five are usual); where position limits
+//! are left, motions within them are planned in at most three rounds, which makes at most 320 searches. A stop
+//! has none, but halves a range 48 times where it must turn around at a position limit. All of this once for every axis,
+//! and once more for a straight line.
 
+#[cfg(test)]
+mod bound;
 mod error;
 mod group;
 mod jerk_limited;

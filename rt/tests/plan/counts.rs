@@ -72,3 +72,31 @@ fn counts_do_not_drift() {
         assert_eq!(scale.position_to_counts(command.position), *counts);
     }
 }
+
+/// What a drive is fed forward is that of the trajectory: taken from the counts, the acceleration would break its limit.
+#[test]
+fn velocity_and_acceleration_for_the_drive_are_those_of_the_trajectory_and_not_of_the_counts() {
+    let limits = Limits::symmetric(2.5, 15.0, 1000.0);
+    let problem = Problem { start: State::rest(0.0), target: State::rest(1.7), limits };
+    let profile = position(&problem).unwrap();
+    for bits in [15, 17, 20] {
+        let scale = scale(f64::from(1_u32 << bits), false);
+        let at = |cycle: u32| profile.sample(f64::from(cycle) * CYCLE_S);
+        let rounded = |cycle: u32| scale.position_from_counts(scale.position_to_counts(at(cycle).position));
+        let (mut fed, mut counted) = (0.0_f64, 0.0_f64);
+        for cycle in 1..1000 {
+            fed = fed.max(at(cycle).acceleration.abs());
+            let second = rounded(cycle + 1) - 2.0 * rounded(cycle) + rounded(cycle - 1);
+            counted = counted.max((second / (CYCLE_S * CYCLE_S)).abs());
+            let step = (rounded(cycle + 1) - rounded(cycle)) / CYCLE_S;
+            let middle = 0.5 * (at(cycle).velocity + at(cycle + 1).velocity);
+            let count = 1.0 / (scale.resolution() * CYCLE_S);
+            assert!(
+                (step - middle).abs() <= count + 1000.0 * CYCLE_S * CYCLE_S,
+                "{bits} bits in cycle {cycle}"
+            );
+        }
+        assert!(fed <= limits.acceleration_max * (1.0 + 1e-12), "{fed}");
+        assert!(bits > 17 || counted > 2.0 * limits.acceleration_max, "{counted} with {bits} bits");
+    }
+}

@@ -164,6 +164,26 @@ proptest! {
         }
     }
 
+    /// `otg.md` section 4, 4.
+    #[test]
+    fn extrema_are_the_envelope_of_all_samples(problem in problem()) {
+        let profile = position(&problem).unwrap();
+        let extrema = profile.extrema();
+        let (mut low, mut high, mut fastest) = (f64::INFINITY, f64::NEG_INFINITY, 0.0_f64);
+        let samples = 2000;
+        for step in 0..=samples {
+            let now = profile.sample(profile.duration_s() * f64::from(step) / f64::from(samples));
+            (low, high) = (low.min(now.position), high.max(now.position));
+            fastest = fastest.max(now.acceleration.abs());
+            prop_assert!(now.velocity >= extrema.velocity.min - 1e-9 && now.velocity <= extrema.velocity.max + 1e-9);
+        }
+        // Samples miss a turn by at most half a step, where the position is quadratic in time.
+        let step_s = profile.duration_s() / f64::from(samples);
+        let slack = fastest * step_s * step_s + 1e-9 * (1.0 + high.abs() + low.abs());
+        prop_assert!(extrema.position.min <= low + 1e-9 && extrema.position.min >= low - slack, "{extrema:?} {low}");
+        prop_assert!(extrema.position.max >= high - 1e-9 && extrema.position.max <= high + slack, "{extrema:?} {high}");
+    }
+
     #[test]
     fn the_unit_of_length_does_not_matter(problem in problem()) {
         let in_radians = position(&problem).unwrap();
@@ -414,9 +434,17 @@ fn discrete_durations_hit_a_moving_target_in_every_mode() {
         limits: Limits::symmetric(1.0, 3.0, 30.0),
     };
     let other = Problem { target: state(-0.3, 0.1, 0.0), ..moving };
-    for synchronisation in [Synchronisation::Time, Synchronisation::Phase, Synchronisation::Independent] {
+    // On a straight line with the first.
+    let beside = Problem { start: state(0.5, -0.05, 0.0), target: state(0.0, -0.2, -0.1), ..moving };
+    for (problems, synchronisation) in [
+        ([moving, other], Synchronisation::Time),
+        ([moving, other], Synchronisation::Phase),
+        ([moving, other], Synchronisation::Independent),
+        ([moving, beside], Synchronisation::Phase),
+        ([moving, beside], Synchronisation::Straight),
+    ] {
         let timing = Timing { cycle_s: Some(0.001), synchronisation, ..Timing::default() };
-        for (problem, profile) in [moving, other].iter().zip(plan(&[moving, other], timing).1) {
+        for (problem, profile) in problems.iter().zip(plan(&problems, timing).1) {
             assert_eq!(judge(problem, &profile, Arrival::State), Ok(()));
             let cycles = profile.duration_s() / 0.001;
             assert!((cycles - cycles.round()).abs() < 1e-9);

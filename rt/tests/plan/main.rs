@@ -1,5 +1,6 @@
 //! The planner: what its trajectories keep and where they arrive.
 
+mod allocation;
 mod any_input;
 mod checker;
 mod counts;

@@ -87,8 +87,10 @@ fn follow_many(draw: impl Fn(u64) -> (Problem, u32)) {
                 failures.push(format!("{number}, {cycles} cycles: {why}"));
             }
         }
+        if (number + 1) % 50_000 == 0 {
+            println!("{followed} of {} motions followed, {} in vain", number + 1, failures.len());
+        }
     }
-    println!("{followed} motions followed");
     assert!(failures.is_empty(), "{} of {followed}: {failures:#?}", failures.len());
 }
 

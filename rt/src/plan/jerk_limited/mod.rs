@@ -4,13 +4,17 @@
 //! [`brake`] brings the start inside the limits, [`step1`] finds the fastest motion and the blocked durations,
 //! [`step2`] a motion of given duration. In place of the paper's enumeration of profile types, both follow families
 //! of motions ([`crossing`], [`passage`]) between points known in closed form, see there.
+//!
+//! The bound on the work of one axis: step 1 searches at most three roots in each of two crossings and five in each of two passages,
+//! step 2 no more than three, and a search evaluates its function at most [`roots::EVALUATIONS_MAX`] times. Everything else is
+//! in closed form.
 
 mod brake;
 mod crossing;
 mod drift;
 mod motion;
 mod passage;
-mod roots;
+pub(super) mod roots;
 mod step1;
 mod step2;
 mod turn;
@@ -28,6 +32,11 @@ pub(super) use turn::stop_turning;
 
 /// Relative to the sizes of a problem, differences up to this are rounding.
 const ROUNDING: f64 = 1024.0 * f64::EPSILON;
+
+/// The most searches for a root when one axis is planned: step 1 for the fastest motion, and once more where the duration of
+/// the other axes is next to a blocked interval.
+#[cfg(test)]
+pub(super) const SEARCHES_MAX: u32 = 2 * (2 * 3 + 2 * 5);
 
 /// Relative to a duration, being this near to a blocked interval is to be on its edge.
 const EDGE: f64 = 3e-11;

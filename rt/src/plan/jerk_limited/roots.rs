@@ -4,7 +4,7 @@ use super::super::profile::select;
 
 /// The most evaluations for one root. Newton's method from a bracket ends after about five; when it leaves the
 /// bracket it is halved, and 64 halvings exhaust the 53 bits of a number.
-const EVALUATIONS_MAX: u32 = 96;
+pub(in super::super) const EVALUATIONS_MAX: u32 = 96;
 
 /// A value and its derivative.
 #[derive(Clone, Copy, Debug)]
@@ -38,8 +38,12 @@ pub(super) fn rising_root(low: f64, high: f64, guess: f64, function: impl Fn(f64
     /// Newton's method doubles the digits: after a relative step this small, all are right.
     const LAST_STEP: f64 = 1e-9;
     let mut x = guess.clamp(low.min(high), high.max(low));
+    #[cfg(test)]
+    work::search();
     let (mut low, mut high) = (End { at: low, seen: false }, End { at: high, seen: false });
     for _ in 0..EVALUATIONS_MAX {
+        #[cfg(test)]
+        work::evaluate();
         let Point { value, slope } = function(x);
         let (this, other) = if value > 0.0 {
             (&mut high, &low)
@@ -70,4 +74,30 @@ pub(super) fn rising_root(low: f64, high: f64, guess: f64, function: impl Fn(f64
         }
     }
     x
+}
+
+/// What the searches of this thread have cost, for the tests of the bound.
+#[cfg(test)]
+pub(in super::super) mod work {
+    extern crate std;
+
+    use core::cell::Cell;
+
+    std::thread_local! {
+        static SEARCHES: Cell<u32> = const { Cell::new(0) };
+        static EVALUATIONS: Cell<u32> = const { Cell::new(0) };
+    }
+
+    pub(super) fn search() {
+        SEARCHES.set(SEARCHES.get() + 1);
+    }
+
+    pub(super) fn evaluate() {
+        EVALUATIONS.set(EVALUATIONS.get() + 1);
+    }
+
+    /// The searches and the evaluations since the last call.
+    pub(in super::super::super) fn take() -> (u32, u32) {
+        (SEARCHES.take(), EVALUATIONS.take())
+    }
 }
