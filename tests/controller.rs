@@ -8,7 +8,8 @@ use takt::config::{Config, Control};
 use takt::controller::{Interrupt, Outcome, VirtualRun};
 use takt::sim::{DriveFault, SimulatedBus};
 use takt_rt::cia402::State;
-use takt_rt::port::{BusPort, Clock, ReceiveBatch};
+use takt_rt::frame::Frame;
+use takt_rt::port::{BusHealth, BusPort, Clock, ReceiveBatch};
 use takt_rt::stop::{Phase, Rule};
 
 /// A minute is more than any of these programs takes.
@@ -265,5 +266,60 @@ fn when_the_controller_dies_the_drives_stop_by_themselves() {
             assert!(!seen.state.has_torque(), "node {node}: {:?}", seen.state);
             assert!(seen.velocity.abs() < 1e-3, "node {node}: {}", seen.velocity);
         }
+    }
+}
+
+/// A bus with a past: its time has begun before that of the controller.
+struct Later {
+    bus: SimulatedBus,
+    by_ns: u64,
+}
+
+impl BusPort for Later {
+    fn send(&mut self, now_ns: u64, frames: &[Frame]) -> usize {
+        self.bus.send(now_ns + self.by_ns, frames)
+    }
+
+    fn receive(&mut self, now_ns: u64, batch: &mut ReceiveBatch) {
+        self.bus.receive(now_ns + self.by_ns, batch);
+        batch.iter_mut().for_each(|received| received.at_ns = received.at_ns.saturating_sub(self.by_ns));
+    }
+
+    fn unconfirmed(&mut self, now_ns: u64) -> usize {
+        self.bus.unconfirmed(now_ns + self.by_ns)
+    }
+
+    fn health(&mut self) -> BusHealth {
+        self.bus.health()
+    }
+}
+
+/// Under power, stopped by their own watchdogs or not yet: whoever comes next finds them so.
+#[test]
+fn drives_that_a_dead_controller_has_left_are_brought_up_again() {
+    for (name, silence_ms) in [
+        ("arm6-erob.toml", 100),
+        ("arm6-erob.toml", 3_000),
+        ("gantry-yz-aim.toml", 100),
+        ("gantry-yz-aim.toml", 3_000),
+    ] {
+        let config = load(name);
+        let mut dead = start(&config);
+        while dead.snapshot().phase != Phase::Moving {
+            assert!(dead.step());
+        }
+        dead.run(300, |_| {});
+        let mut now_ns = dead.clock().now_ns();
+        let mut ports = vec![];
+        for (bus, port) in dead.ports().iter_mut().enumerate() {
+            ports.push(std::mem::replace(port, SimulatedBus::new(&config, bus)));
+        }
+        for _ in 0..silence_ms {
+            now_ns += 1_000_000;
+            ports.iter_mut().for_each(|port| port.receive(now_ns, &mut ReceiveBatch::new()));
+        }
+        let ports = ports.into_iter().map(|bus| Later { bus, by_ns: now_ns }).collect();
+        let mut next = VirtualRun::new(&config, ports).unwrap().0;
+        assert_eq!(next.run(CYCLES_AT_MOST, |_| {}), Some(Outcome::Finished), "{name}, {silence_ms} ms");
     }
 }

@@ -51,6 +51,20 @@ impl DataType {
         }
     }
 
+    /// The type of so many bytes whose sign is that of this one; `None` where there is none.
+    pub const fn of_length(self, length: usize) -> Option<Self> {
+        let is_signed = matches!(self, Self::I8 | Self::I16 | Self::I32);
+        Some(match (length, is_signed) {
+            (1, true) => Self::I8,
+            (1, false) => Self::U8,
+            (2, true) => Self::I16,
+            (2, false) => Self::U16,
+            (4, true) => Self::I32,
+            (4, false) => Self::U32,
+            _ => return None,
+        })
+    }
+
     /// The value on the wire, low byte first; `None` when it does not fit the type.
     pub fn encode(self, value: i64) -> Option<Vec<u8>> {
         Some(match self {

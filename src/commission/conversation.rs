@@ -16,7 +16,7 @@ use super::failure::Failure;
 use super::line::{Line, Manners, OwnHeartbeat};
 use crate::canopen::emcy::Emergency;
 use crate::canopen::nmt::{NmtCommand, NmtState, NmtTarget};
-use crate::canopen::object::{DataType, Object, ObjectAddress};
+use crate::canopen::object::{Object, ObjectAddress};
 use crate::canopen::sdo::{Client, Completed, SdoError, Timing, Transfer, Uploaded};
 use crate::drive::Access;
 
@@ -295,19 +295,7 @@ const POLL_NS: Nanoseconds = 5_000_000;
 
 /// The number in the bytes of an object: as its type says, or as many bytes as the drive has sent.
 pub(super) fn number(object: &Object, uploaded: &Uploaded) -> Result<i64, Failure> {
-    let of_other_length = || {
-        let is_signed = matches!(object.data_type, DataType::I8 | DataType::I16 | DataType::I32);
-        let data_type = match (uploaded.bytes.len(), is_signed) {
-            (1, true) => DataType::I8,
-            (1, false) => DataType::U8,
-            (2, true) => DataType::I16,
-            (2, false) => DataType::U16,
-            (4, true) => DataType::I32,
-            (4, false) => DataType::U32,
-            _ => return None,
-        };
-        uploaded.number(data_type)
-    };
+    let of_other_length = || uploaded.number(object.data_type.of_length(uploaded.bytes.len())?);
     let received = uploaded.bytes.len();
     uploaded
         .number(object.data_type)

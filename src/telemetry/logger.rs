@@ -1,5 +1,6 @@
 //! The logger: empties the rings, reckons, writes. It never waits and holds nothing that the motion needs.
 
+use std::fs::File;
 use std::path::PathBuf;
 use std::sync::{Arc, OnceLock};
 
@@ -291,14 +292,21 @@ impl Logger {
         }
     }
 
-    /// A file that somebody has removed during the run is none: writing to it goes on to the end, into nothing.
+    /// A file that somebody has removed during the run is none: writing to it goes on to the end, into nothing. So it does
+    /// on a disk that has failed or a file system that has turned read-only, which is not told before one asks.
     fn still_there(&mut self, path: Option<PathBuf>) -> Option<PathBuf> {
         let path = path?;
-        if path.exists() {
-            return Some(path);
+        if !path.exists() {
+            self.give_up(format!("{} was removed during the run", path.display()));
+            return None;
         }
-        self.give_up(format!("{} was removed during the run", path.display()));
-        None
+        if let Err(error) = File::open(&path).and_then(|file| file.sync_data()) {
+            self.give_up(format!(
+                "{} may not be whole: cannot bring it to the disk: {error}",
+                path.display()
+            ));
+        }
+        Some(path)
     }
 
     fn give_up(&mut self, message: String) {

@@ -227,7 +227,15 @@ impl AxisRun {
         match outcome {
             Ok(Completed::Uploaded(uploaded)) => {
                 let received = uploaded.bytes.len();
-                uploaded.number(object.data_type).ok_or(Cause::Length { object, received })
+                // The manual of a YZ-AIM gives 606C two lengths (A27): its answer says which is right.
+                let of_other_length = || {
+                    let data_type = object.data_type.of_length(received)?;
+                    uploaded.number(data_type).filter(|_| self.facts.dialect == Dialect::YzAim)
+                };
+                uploaded
+                    .number(object.data_type)
+                    .or_else(of_other_length)
+                    .ok_or(Cause::Length { object, received })
             }
             Ok(Completed::Downloaded) => Err(Cause::Length { object, received: 0 }),
             Err(error) => Err(Cause::Transfer { object, access, error }),

@@ -75,14 +75,14 @@ sdo_read() {
 }
 statusword=416000 position=646000
 
-# Nothing is under power, which bit 2 of the statusword says, and nothing moves.
+# Nothing moves, and nothing is enabled, as bit 2 of the statusword says, but with bit 3: a YZ-AIM in an alarm shows both.
 drives_at_rest() { # INTERFACE NODE...
     local interface=$1 node before word
     shift
     for node in "$@"; do
         word=$(sdo_read "$interface" "$node" $statusword)
         [ -n "$word" ] || { echo "node $node does not answer"; return 1; }
-        [ $((0x${word:0:2} & 4)) = 0 ] || { echo "node $node is still enabled, statusword ${word:2:2}${word:0:2}"; return 1; }
+        [ $((0x${word:0:2} & 12)) != 4 ] || { echo "node $node is still enabled, statusword ${word:2:2}${word:0:2}"; return 1; }
         before=$(sdo_read "$interface" "$node" $position)
         sleep 0.1
         [ "$before" = "$(sdo_read "$interface" "$node" $position)" ] || { echo "node $node still moves"; return 1; }

@@ -4,8 +4,8 @@ about every other millisecond, from when it is started until two seconds after t
     python3 standstill.py INTERFACE=NODE,NODE... [INTERFACE=...]
 
 Prints, in milliseconds after the last SYNC: when the last position had changed by more than the noise of an encoder, and
-when the last drive had let go or had fallen silent, as one does that is stopped (CiA 301). Ends with an error when one
-moved or kept its power to the end.
+when the last drive had let go, was in an alarm, or had fallen silent, as one does that is stopped (CiA 301). Ends with an
+error when one moved or was enabled to the end.
 """
 
 import select
@@ -19,7 +19,7 @@ SYNC, EMERGENCY, REQUEST, ANSWER = 0x080, 0x080, 0x600, 0x580
 POSITION, STATUSWORD = (0x6064, 0), (0x6041, 0)
 INTERVAL_S, WATCHED_S = 0.002, 2.0
 NOISE_COUNTS = 8
-# Ready to switch on, switched on, operation enabled (CiA 402).
+# Ready to switch on, switched on, operation enabled, and no fault (CiA 402).
 ENABLED_MASK, ENABLED = 0x006F, 0x0027
 
 
@@ -72,7 +72,7 @@ def main(*buses):
     if silent:
         sys.exit(f"never seen under power: {silent}")
     if end_s - max(moved_s, enabled_s) < WATCHED_S / 4:
-        sys.exit(f"a drive moved or had power until {(max(moved_s, enabled_s) - last_sync_s) * 1e3:.0f} ms after the last SYNC")
+        sys.exit(f"a drive moved or was enabled until {(max(moved_s, enabled_s) - last_sync_s) * 1e3:.0f} ms after the last SYNC")
     print(f"{(moved_s - last_sync_s) * 1e3:.1f} {(enabled_s - last_sync_s) * 1e3:.1f}")
 
 

@@ -89,7 +89,7 @@ killed() {
     kill -KILL $run; wait $run 2>/dev/null
     if wait $witness; then
         found=($(cat "$folder/standstill.txt"))
-        passes "$name: the last drive moved ${found[0]} ms after the last SYNC, and had power until ${found[1]} ms after it"
+        passes "$name: the last drive moved ${found[0]} ms after the last SYNC, and obeyed until ${found[1]} ms after it"
         stop_row "$name" "drive's own" - "${found[1]}" "${found[0]}"
     else
         fails "$name: $(tail -n 1 "$folder/standstill.txt")"
