@@ -8,9 +8,10 @@ use takt::config::{Config, Control};
 use takt::controller::{Interrupt, Outcome, VirtualRun};
 use takt::sim::{DriveFault, SimulatedBus};
 use takt_rt::cia402::State;
-use takt_rt::frame::Frame;
+use takt_rt::door::Request;
+use takt_rt::frame::{Frame, Id};
 use takt_rt::port::{BusHealth, BusPort, Clock, ReceiveBatch};
-use takt_rt::stop::{Phase, Rule};
+use takt_rt::stop::{Phase, Rule, StopCategory};
 
 /// A minute is more than any of these programs takes.
 const CYCLES_AT_MOST: u64 = 60_000;
@@ -322,4 +323,48 @@ fn drives_that_a_dead_controller_has_left_are_brought_up_again() {
         let mut next = VirtualRun::new(&config, ports).unwrap().0;
         assert_eq!(next.run(CYCLES_AT_MOST, |_| {}), Some(Outcome::Finished), "{name}, {silence_ms} ms");
     }
+}
+
+#[test]
+fn what_is_refused_to_another_client_does_not_end_the_program() {
+    let config = load("arm6-erob.toml");
+    let mut run = start(&config);
+    let outcome = run.run(CYCLES_AT_MOST, |run| {
+        if run.snapshot().phase == Phase::Moving {
+            // Enabled axes cannot be enabled.
+            let _ = run.host().request(Request::Enable);
+        }
+    });
+    assert_eq!(outcome, Some(Outcome::Finished));
+    assert!(run.snapshot().refused > 1000);
+}
+
+#[test]
+fn whoever_asks_finds_out_what_was_refused_by_its_number() {
+    let config = load("arm6-erob.toml");
+    let mut run = start(&config);
+    while run.snapshot().phase != Phase::Moving {
+        assert!(run.step());
+    }
+    let refused = run.host().request(Request::Enable).unwrap();
+    let taken = run.host().request(Request::Stop(StopCategory::Two)).unwrap();
+    run.run(2, |_| {});
+    let refusals = run.snapshot().refusals;
+    assert_eq!((refusals.contain(refused), refusals.contain(taken)), (true, false));
+}
+
+#[test]
+fn a_fault_while_the_drives_are_disabled_at_the_end_is_how_the_run_ended() {
+    let config = load("arm6-erob.toml");
+    let mut run = start(&config);
+    let mut is_disturbed = false;
+    let outcome = run.run(CYCLES_AT_MOST, |run| {
+        if run.snapshot().phase == Phase::Disabling && !is_disturbed {
+            is_disturbed = true;
+            let now_ns = run.clock().now_ns();
+            assert!(run.ports()[0].say(now_ns, &Frame::of(Id::canopen(0x080, 0), [])));
+        }
+    });
+    let Some(Outcome::Stopped(stop)) = outcome else { panic!("{outcome:?}") };
+    assert_eq!((stop.rule, stop.phase), (Rule::ForeignMaster, Phase::Disabling));
 }

@@ -10,7 +10,7 @@ use takt::config::{Config, Control};
 use takt::controller::assemble;
 use takt::drive::{PdoPlan, ProcessData};
 use takt_rt::cia402::{Command, State};
-use takt_rt::door::{Door, Move, Request, Snapshot, StreamCommand};
+use takt_rt::door::{Asked, Door, Move, Request, RequestId, Snapshot, StreamCommand};
 use takt_rt::engine::{BusSet, Engine, SendBatch, Transmission};
 use takt_rt::frame::{Frame, Id};
 use takt_rt::plan;
@@ -64,8 +64,8 @@ struct Hall {
 }
 
 impl Door for Hall {
-    fn request(&mut self) -> Option<Request> {
-        self.requests.pop_front()
+    fn request(&mut self) -> Option<Asked> {
+        self.requests.pop_front().map(|request| Asked { id: RequestId(1), request })
     }
 
     fn stream(&mut self) -> Option<StreamCommand> {

@@ -16,7 +16,7 @@ use crate::watch::TimingLevel;
 /// What the real-time thread asks of and tells the outside.
 pub trait Door {
     /// The oldest request that waits.
-    fn request(&mut self) -> Option<Request>;
+    fn request(&mut self) -> Option<Asked>;
 
     /// The newest streamed command, if one has come since the last call.
     fn stream(&mut self) -> Option<StreamCommand>;
@@ -35,6 +35,53 @@ pub trait Door {
 
     /// Shows the present state to whoever looks.
     fn publish(&mut self, snapshot: &Snapshot);
+}
+
+/// The number of a request, never given twice, whoever asks.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct RequestId(pub u64);
+
+/// A request with the number by which whoever asked finds out what came of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Asked {
+    /// The number.
+    pub id: RequestId,
+    /// The request.
+    pub request: Request,
+}
+
+/// Which of the last requests were refused: of the newest one, and of those with the [`Refusals::REMEMBERED`] numbers
+/// before it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Refusals {
+    /// The newest request that was taken up.
+    pub newest: RequestId,
+    /// Bit n stands for the request whose number is by n less than the newest.
+    pub refused: u128,
+}
+
+impl Refusals {
+    /// How far back is remembered.
+    pub const REMEMBERED: u64 = 127;
+
+    /// Takes note of a request.
+    pub fn note(&mut self, id: RequestId, is_refused: bool) {
+        let ahead = id.0.saturating_sub(self.newest.0);
+        if ahead > 0 {
+            self.refused = if ahead > Self::REMEMBERED { 0 } else { self.refused << ahead };
+            self.newest = id;
+        }
+        let behind = self.newest.0 - id.0;
+        if is_refused && behind <= Self::REMEMBERED {
+            self.refused |= 1 << behind;
+        }
+    }
+
+    /// Whether a request was refused, as far as that is remembered.
+    pub fn contain(&self, id: RequestId) -> bool {
+        let behind = self.newest.0.checked_sub(id.0).filter(|behind| *behind <= Self::REMEMBERED);
+        behind.is_some_and(|behind| self.refused >> behind & 1 == 1)
+    }
 }
 
 /// What can be asked of the group.
@@ -144,7 +191,8 @@ pub struct ProfileMove {
 pub struct StreamCommand {
     /// When this command expires; after that the group decelerates and holds.
     pub valid_until_ns: Nanoseconds,
-    /// Position, velocity and acceleration, an axis each. The position counts; the others are fed forward.
+    /// Position, velocity and acceleration, an axis each. The position counts; the others are fed forward as far as they
+    /// agree with its steps and the limits.
     pub set_points: [plan::State; MAX_AXES],
 }
 
@@ -167,6 +215,8 @@ pub struct Snapshot {
     pub dropped: u64,
     /// Requests that were refused, since the start.
     pub refused: u64,
+    /// Which of the last ones.
+    pub refusals: Refusals,
     /// The number of the last finished move; 0 before the first.
     pub finished_move: u32,
     /// Planned time left of the present move or stop, in seconds.
@@ -194,6 +244,7 @@ impl Default for Snapshot {
             clamped: 0,
             dropped: 0,
             refused: 0,
+            refusals: Refusals::default(),
             finished_move: 0,
             remaining_s: 0.0,
             stop: None,
@@ -222,4 +273,30 @@ pub struct AxisSnapshot {
     pub error_code: u16,
     /// Whether the drive has reported since the controller became active.
     pub is_heard: bool,
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use super::*;
+    use std::vec::Vec;
+
+    fn refused(noted: &[(u64, bool)]) -> Vec<u64> {
+        let mut refusals = Refusals::default();
+        noted.iter().for_each(|(id, is_refused)| refusals.note(RequestId(*id), *is_refused));
+        (0..1000).filter(|id| refusals.contain(RequestId(*id))).collect()
+    }
+
+    #[test]
+    fn each_request_is_found_by_its_number_in_whatever_order_they_came() {
+        assert_eq!(refused(&[(1, false), (2, true), (3, false), (4, true)]), [2, 4]);
+        assert_eq!(refused(&[(7, true), (5, true), (6, false), (9, false), (8, true)]), [5, 7, 8]);
+    }
+
+    #[test]
+    fn what_is_too_long_ago_is_forgotten_and_never_taken_for_another() {
+        assert_eq!(refused(&[(1, true), (128, false)]), [1]);
+        assert_eq!(refused(&[(1, true), (129, false)]), [0; 0]);
+        assert_eq!(refused(&[(1, true), (600, true), (2, true)]), [600]);
+    }
 }

@@ -13,10 +13,11 @@
 mod latest;
 mod primitives;
 mod records;
+mod request_numbers;
 mod ring;
 mod words;
 
-use takt_rt::door::{Door, Request, Snapshot, StreamCommand};
+use takt_rt::door::{Asked, Door, Request, RequestId, Snapshot, StreamCommand};
 use takt_rt::frame::Frame;
 use takt_rt::port::Received;
 use takt_rt::record::{CycleRecord, Event};
@@ -25,6 +26,7 @@ use crate::config::Config;
 use latest::{Attempt, Reader, Writer};
 use records::{RecordConsumer, RecordProducer};
 
+pub use request_numbers::RequestNumbers;
 pub use ring::{Consumer, Producer, ring};
 
 /// How much each channel can hold.
@@ -100,6 +102,7 @@ pub fn channels(sizes: &ChannelSizes) -> (RtSide, HostSide, LogSide) {
     };
     let host = HostSide {
         requests: request_in,
+        numbers: RequestNumbers::default(),
         streamer: Some(Streamer { axes: sizes.axes, stream: stream_in }),
         service: service_in,
         received: received_out,
@@ -111,7 +114,7 @@ pub fn channels(sizes: &ChannelSizes) -> (RtSide, HostSide, LogSide) {
 /// The real-time thread's side.
 pub struct RtSide {
     axes: usize,
-    requests: Consumer<Request>,
+    requests: Consumer<Asked>,
     stream: Reader,
     stream_seen: u64,
     service: Vec<Consumer<Frame>>,
@@ -126,7 +129,7 @@ pub struct RtSide {
 const STREAM_ATTEMPTS: usize = 3;
 
 impl Door for RtSide {
-    fn request(&mut self) -> Option<Request> {
+    fn request(&mut self) -> Option<Asked> {
         self.requests.pop()
     }
 
@@ -168,7 +171,8 @@ impl Door for RtSide {
 
 /// The side of whoever commands the controller.
 pub struct HostSide {
-    requests: Producer<Request>,
+    requests: Producer<Asked>,
+    numbers: RequestNumbers,
     streamer: Option<Streamer>,
     service: Vec<Producer<Frame>>,
     received: Consumer<(usize, Received)>,
@@ -176,12 +180,27 @@ pub struct HostSide {
 }
 
 impl HostSide {
-    /// Asks for something. It is taken up in the next cycle, requests in their order.
+    /// Asks for something. It is taken up in the next cycle, requests in their order. Returns the number by which
+    /// [`Snapshot::refusals`] tells of it.
     ///
     /// # Errors
     /// [`ChannelError::Full`]; nothing has been asked then.
-    pub fn request(&mut self, request: Request) -> Result<(), ChannelError> {
-        if self.requests.push(request) { Ok(()) } else { Err(ChannelError::Full) }
+    pub fn request(&mut self, request: Request) -> Result<RequestId, ChannelError> {
+        let id = self.numbers.next();
+        self.ask(Asked { id, request }).map(|()| id)
+    }
+
+    /// As [`HostSide::request`], under a number of [`HostSide::numbers`].
+    ///
+    /// # Errors
+    /// [`ChannelError::Full`]; nothing has been asked then.
+    pub fn ask(&mut self, asked: Asked) -> Result<(), ChannelError> {
+        if self.requests.push(asked) { Ok(()) } else { Err(ChannelError::Full) }
+    }
+
+    /// Where whoever asks takes the numbers of requests from.
+    pub fn numbers(&self) -> RequestNumbers {
+        self.numbers.clone()
     }
 
     /// Replaces the streamed command; the real-time thread takes the newest one at its next cycle. Set-points
@@ -312,11 +331,13 @@ mod tests {
     #[test]
     fn requests_arrive_in_order_and_one_too_many_is_refused() {
         let (mut rt, mut host, _log) = channels(&SIZES);
-        host.request(Request::Enable).unwrap();
-        host.request(Request::Stop(StopCategory::Two)).unwrap();
+        let first = host.request(Request::Enable).unwrap();
+        let second = host.request(Request::Stop(StopCategory::Two)).unwrap();
+        assert!(first < second);
         assert_eq!(host.request(Request::Leave), Err(ChannelError::Full));
-        assert_eq!(rt.request(), Some(Request::Enable));
-        assert_eq!(rt.request(), Some(Request::Stop(StopCategory::Two)));
+        assert_eq!(rt.request(), Some(Asked { id: first, request: Request::Enable }));
+        let request = Request::Stop(StopCategory::Two);
+        assert_eq!(rt.request(), Some(Asked { id: second, request }));
         assert_eq!(rt.request(), None);
     }
 

@@ -4,6 +4,7 @@
 pub mod assemble;
 pub mod channels;
 mod handle;
+mod outcome;
 mod program;
 pub mod quiet;
 pub mod realtime_thread;
@@ -13,6 +14,7 @@ mod time_of_day;
 mod virtual_time;
 
 pub use handle::{CommandError, Controller, Motion, MotionError, MoveOptions, StartFailure};
+pub use outcome::{Interrupt, Outcome, Progress};
 pub use program::{ProgramRunner, Step};
-pub use supervisor::{Interrupt, Outcome, Progress, Supervisor};
+pub use supervisor::Supervisor;
 pub use virtual_time::{VirtualClock, VirtualRun};

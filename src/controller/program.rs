@@ -1,10 +1,11 @@
 //! The motion program: which move is next, and when.
 
-use takt_rt::door::{Move, ProfileMove, Request, Snapshot};
+use takt_rt::door::{Asked, Move, ProfileMove, Request, RequestId, Snapshot};
 use takt_rt::profile::ProfileTarget;
 use takt_rt::record::MAX_AXES;
 use takt_rt::stop::Phase;
 
+use super::channels::RequestNumbers;
 use crate::config::{Program, ProgramMove, ProgramTarget};
 
 /// Runs through the moves of a configuration, one at a time.
@@ -15,24 +16,20 @@ pub struct ProgramRunner {
     repeat: Option<u64>,
     /// Moves begun so far.
     begun: u64,
-    /// The number of the last request.
-    last_id: u32,
+    /// The numbers of the requests of the present step.
+    asked: Vec<RequestId>,
     state: State,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum State {
     Next,
-    Moving {
-        refused_before: u64,
-    },
+    Moving,
     /// Drives go at a speed, or push with a torque.
     Driving {
         until_ns: u64,
     },
-    Stopping {
-        refused_before: u64,
-    },
+    Stopping,
     Dwelling {
         until_ns: u64,
     },
@@ -45,7 +42,7 @@ pub enum Step {
     /// Nothing but time.
     Wait,
     /// This, in this order.
-    Begin(Vec<Request>),
+    Begin(Vec<Asked>),
     /// The real-time thread has refused the move with this number, counted from 1.
     Refused(u64),
     /// Everything has been done.
@@ -63,12 +60,13 @@ impl ProgramRunner {
     pub fn new(program: &Program, endless: bool) -> Self {
         let repeat = (!endless).then(|| u64::from(program.repeat.max(1)));
         let state = if program.moves.is_empty() { State::Finished } else { State::Next };
-        Self { moves: program.moves.clone(), repeat, begun: 0, last_id: 0, state }
+        Self { moves: program.moves.clone(), repeat, begun: 0, asked: vec![], state }
     }
 
-    /// Takes the state of the group and says what is to happen.
-    pub fn poll(&mut self, now_ns: u64, snapshot: &Snapshot) -> Step {
-        let is_reached = snapshot.finished_move == self.last_id;
+    /// Takes the state of the group and says what is to happen. The requests of a step bear `numbers`, so that nobody
+    /// else's refusal is taken for theirs.
+    pub fn poll(&mut self, now_ns: u64, snapshot: &Snapshot, numbers: &RequestNumbers) -> Step {
+        let is_reached = self.asked.last().is_some_and(|last| snapshot.finished_move == move_number(*last));
         let is_done = is_reached && snapshot.phase == Phase::Holding;
         match self.state {
             State::Finished => Step::Finished,
@@ -78,16 +76,16 @@ impl ProgramRunner {
             }
             State::Next => {
                 self.begun += 1;
-                self.state = State::Moving { refused_before: snapshot.refused };
-                Step::Begin(self.present_requests(now_ns, 1.0))
+                self.state = State::Moving;
+                Step::Begin(self.present_requests(now_ns, 1.0, numbers))
             }
-            State::Moving { refused_before } | State::Stopping { refused_before }
-                if snapshot.refused > refused_before =>
+            State::Moving | State::Stopping
+                if self.asked.iter().any(|asked| snapshot.refusals.contain(*asked)) =>
             {
                 self.state = State::Finished;
                 Step::Refused(self.begun)
             }
-            State::Moving { .. } => {
+            State::Moving => {
                 match self.present_duration_ns() {
                     Some(duration_ns) if is_reached => {
                         self.state = State::Driving { until_ns: now_ns + duration_ns };
@@ -98,11 +96,11 @@ impl ProgramRunner {
                 Step::Wait
             }
             State::Driving { until_ns } if now_ns >= until_ns => {
-                self.state = State::Stopping { refused_before: snapshot.refused };
-                Step::Begin(self.present_requests(now_ns, 0.0))
+                self.state = State::Stopping;
+                Step::Begin(self.present_requests(now_ns, 0.0, numbers))
             }
             State::Driving { .. } => Step::Wait,
-            State::Stopping { .. } => {
+            State::Stopping => {
                 if is_done {
                     self.dwell(now_ns);
                 }
@@ -137,26 +135,34 @@ impl ProgramRunner {
         }
     }
 
-    /// The requests of the present move, its speeds and torques times `factor`, under a number of their own.
-    fn present_requests(&mut self, now_ns: u64, factor: f64) -> Vec<Request> {
-        // Never 0, which stands for "none yet".
-        self.last_id = self.last_id.checked_add(1).unwrap_or(1);
-        let (id, duration_ns) = (self.last_id, self.present_duration_ns().unwrap_or(0));
-        let valid_until_ns = now_ns + duration_ns + REACHING_NS + EXPIRY_NS;
+    /// The requests of the present move, its speeds and torques times `factor`. All of them are one move, which bears the
+    /// number of the last.
+    fn present_requests(&mut self, now_ns: u64, factor: f64, numbers: &RequestNumbers) -> Vec<Asked> {
+        let valid_until_ns = now_ns + self.present_duration_ns().unwrap_or(0) + REACHING_NS + EXPIRY_NS;
         let Some(present) = self.present() else { return vec![] };
-        let drive = |values: &[f64], target: fn(f64) -> ProfileTarget| {
+        let drive = |values: &[f64], target: fn(f64) -> ProfileTarget| -> Vec<Request> {
             let axes = (0..).zip(values).filter(|(_, value)| **value != 0.0);
             axes.map(|(axis, value)| {
                 let target = target(value * factor);
-                Request::SetProfileTarget(ProfileMove { id, axis, target, valid_until_ns })
+                Request::SetProfileTarget(ProfileMove { id: 0, axis, target, valid_until_ns })
             })
             .collect()
         };
-        match &present.target {
-            ProgramTarget::Position(position) => vec![Request::Move(move_of(id, present, position))],
+        let mut requests = match &present.target {
+            ProgramTarget::Position(position) => vec![Request::Move(move_of(present, position))],
             ProgramTarget::Velocity { velocity, .. } => drive(velocity, ProfileTarget::Velocity),
             ProgramTarget::Torque { torque, .. } => drive(torque, ProfileTarget::Torque),
+        };
+        self.asked = requests.iter().map(|_| numbers.next()).collect();
+        let number = self.asked.last().copied().map_or(0, move_number);
+        for request in &mut requests {
+            match request {
+                Request::Move(to) => to.id = number,
+                Request::SetProfileTarget(to) => to.id = number,
+                _ => {}
+            }
         }
+        self.asked.iter().zip(requests).map(|(id, request)| Asked { id: *id, request }).collect()
     }
 
     /// Where the present move leads (rad or m), an axis each; `None` before the first, and where it leads nowhere.
@@ -173,11 +179,16 @@ impl ProgramRunner {
     }
 }
 
-fn move_of(id: u32, present: &ProgramMove, position: &[f64]) -> Move {
+/// The number of the move that a request asks for: never 0, which stands for "none yet".
+pub(super) const fn move_number(request: RequestId) -> u32 {
+    (request.0 % u32::MAX as u64) as u32 + 1
+}
+
+fn move_of(present: &ProgramMove, position: &[f64]) -> Move {
     let mut target = [0.0; MAX_AXES];
     target.iter_mut().zip(position).for_each(|(to, from)| *to = *from);
     Move {
-        id,
+        id: 0,
         target,
         target_velocity: [0.0; MAX_AXES],
         velocity_scale: present.velocity_scale,
@@ -205,46 +216,77 @@ mod tests {
         Snapshot { phase: Phase::Holding, finished_move: id, ..Snapshot::default() }
     }
 
-    fn begin(runner: &mut ProgramRunner, now_ns: u64, snapshot: &Snapshot) -> Option<Move> {
-        match runner.poll(now_ns, snapshot) {
-            Step::Begin(requests) => match requests[..] {
-                [Request::Move(begun)] => Some(begun),
-                _ => panic!("{requests:?}"),
-            },
-            _ => None,
+    fn refusing(ids: &[RequestId]) -> Snapshot {
+        let mut snapshot = done(0);
+        for id in ids {
+            snapshot.refused += 1;
+            snapshot.refusals.note(*id, true);
+        }
+        snapshot
+    }
+
+    /// A program, and where it takes the numbers of its requests from.
+    struct Running(ProgramRunner, RequestNumbers);
+
+    impl Running {
+        fn new(program: &Program) -> Self {
+            Self(ProgramRunner::new(program, false), RequestNumbers::default())
+        }
+
+        fn poll(&mut self, now_ns: u64, snapshot: &Snapshot) -> Step {
+            self.0.poll(now_ns, snapshot, &self.1)
+        }
+
+        fn begin(&mut self, now_ns: u64, snapshot: &Snapshot) -> Option<(RequestId, Move)> {
+            match self.poll(now_ns, snapshot) {
+                Step::Begin(requests) => match requests[..] {
+                    [Asked { id, request: Request::Move(begun) }] => Some((id, begun)),
+                    _ => panic!("{requests:?}"),
+                },
+                _ => None,
+            }
         }
     }
 
     #[test]
     fn a_speed_is_held_for_its_time_and_then_set_to_zero() {
-        let target = ProgramTarget::Velocity { velocity: vec![0.0, 0.5], duration_s: 2.0 };
+        let target = ProgramTarget::Velocity { velocity: vec![0.3, 0.5], duration_s: 2.0 };
         let spin = ProgramMove { target, ..program(1).moves[0].clone() };
-        let mut runner = ProgramRunner::new(&Program { repeat: 1, moves: vec![spin] }, false);
+        let mut runner = Running::new(&Program { repeat: 1, moves: vec![spin] });
         let asked = |step| match step {
             Step::Begin(requests) => match requests[..] {
-                [Request::SetProfileTarget(wanted)] => (wanted.id, wanted.axis, wanted.target),
+                [
+                    Asked { request: Request::SetProfileTarget(first), .. },
+                    Asked { request: Request::SetProfileTarget(second), .. },
+                ] => {
+                    assert_eq!((first.id, first.axis, second.axis), (second.id, 0, 1));
+                    (second.id, first.target, second.target)
+                }
                 _ => panic!("{requests:?}"),
             },
             step => panic!("{step:?}"),
         };
-        assert_eq!(asked(runner.poll(0, &done(0))), (1, 1, ProfileTarget::Velocity(0.5)));
-        let driving = Snapshot { phase: Phase::Moving, ..done(1) };
+        let speeds = |first, second| (ProfileTarget::Velocity(first), ProfileTarget::Velocity(second));
+        let (spin, first, second) = asked(runner.poll(0, &done(0)));
+        assert_eq!((first, second), speeds(0.3, 0.5));
+        let driving = Snapshot { phase: Phase::Moving, ..done(spin) };
         assert_eq!(runner.poll(500_000_000, &driving), Step::Wait);
         assert_eq!(runner.poll(2_499_000_000, &driving), Step::Wait);
-        assert_eq!(asked(runner.poll(2_500_000_000, &driving)), (2, 1, ProfileTarget::Velocity(0.0)));
+        let (rest, first, second) = asked(runner.poll(2_500_000_000, &driving));
+        assert_eq!((first, second), speeds(0.0, 0.0));
         assert_eq!(runner.poll(2_600_000_000, &driving), Step::Wait);
-        assert_eq!(runner.poll(3_000_000_000, &done(2)), Step::Wait);
-        assert_eq!((runner.poll(3_100_000_000, &done(2)), runner.target()), (Step::Wait, None));
-        assert_eq!(runner.poll(3_100_000_000, &done(2)), Step::Finished);
+        assert_eq!(runner.poll(3_000_000_000, &done(rest)), Step::Wait);
+        assert_eq!((runner.poll(3_100_000_000, &done(rest)), runner.0.target()), (Step::Wait, None));
+        assert_eq!(runner.poll(3_100_000_000, &done(rest)), Step::Finished);
     }
 
     #[test]
     fn moves_follow_one_another_after_their_dwell_as_often_as_asked() {
-        let mut runner = ProgramRunner::new(&program(2), false);
+        let mut runner = Running::new(&program(2));
         let mut targets = vec![];
         let mut snapshot = done(0);
         for now_ms in 0..2_000 {
-            if let Some(begun) = begin(&mut runner, now_ms * 1_000_000, &snapshot) {
+            if let Some((_, begun)) = runner.begin(now_ms * 1_000_000, &snapshot) {
                 targets.push((now_ms, begun.target[0]));
                 snapshot = done(begun.id);
             }
@@ -257,8 +299,8 @@ mod tests {
 
     #[test]
     fn the_next_move_waits_for_the_present_one() {
-        let mut runner = ProgramRunner::new(&program(1), false);
-        let first = begin(&mut runner, 0, &done(0)).unwrap();
+        let mut runner = Running::new(&program(1));
+        let (_, first) = runner.begin(0, &done(0)).unwrap();
         assert_eq!((first.velocity_scale, first.acceleration_scale), (0.5, 0.25));
         let moving = Snapshot { phase: Phase::Moving, ..done(0) };
         for now_s in 0..100 {
@@ -268,15 +310,27 @@ mod tests {
 
     #[test]
     fn a_refused_move_ends_the_program_with_its_number() {
-        let mut runner = ProgramRunner::new(&program(1), false);
-        begin(&mut runner, 0, &done(0)).unwrap();
-        let refused = Snapshot { refused: 1, ..done(0) };
-        assert_eq!(runner.poll(1, &refused), Step::Refused(1));
-        assert_eq!(runner.poll(2, &refused), Step::Finished);
+        let mut runner = Running::new(&program(1));
+        let (asked, _) = runner.begin(0, &done(0)).unwrap();
+        assert_eq!(runner.poll(1, &refusing(&[asked])), Step::Refused(1));
+        assert_eq!(runner.poll(2, &refusing(&[asked])), Step::Finished);
+    }
+
+    #[test]
+    fn what_is_refused_to_somebody_else_is_not_the_program_s() {
+        let mut runner = Running::new(&program(1));
+        let before = runner.1.next();
+        let (asked, begun) = runner.begin(0, &done(0)).unwrap();
+        let others = [before, runner.1.next(), runner.1.next()];
+        assert_eq!(runner.poll(1, &refusing(&others)), Step::Wait);
+        let finished = Snapshot { finished_move: begun.id, ..refusing(&others) };
+        assert_eq!(runner.poll(2, &finished), Step::Wait);
+        assert!(runner.begin(200_000_000, &finished).is_none());
+        assert!(runner.begin(200_000_001, &finished).is_some_and(|(next, _)| next > asked));
     }
 
     #[test]
     fn a_program_without_moves_is_finished_at_once() {
-        assert_eq!(ProgramRunner::new(&Program::default(), true).poll(0, &done(0)), Step::Finished);
+        assert_eq!(Running::new(&Program::default()).poll(0, &done(0)), Step::Finished);
     }
 }

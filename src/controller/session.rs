@@ -5,16 +5,17 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, mpsc};
 use std::time::Duration;
 
-use takt_rt::door::{Request, Snapshot};
+use takt_rt::door::{Asked, Request, Snapshot};
 use takt_rt::linux::MonotonicClock;
 use takt_rt::port::Clock;
 use takt_rt::stop::StopCategory;
 
 use super::assemble::{self, AssembleError};
-use super::channels::{ChannelSizes, Observer, Streamer, channels};
+use super::channels::{ChannelSizes, Observer, RequestNumbers, Streamer, channels};
+use super::outcome::{Interrupt, Outcome, Progress};
 use super::quiet;
 use super::realtime_thread::{self, Begun, Ended, StartError, Work};
-use super::supervisor::{Interrupt, Outcome, Progress, Supervisor};
+use super::supervisor::Supervisor;
 use super::time_of_day::TimeOfDayKeeper;
 use crate::bus::port::{OpenError, Port};
 use crate::bus::trace::Trace;
@@ -97,9 +98,10 @@ pub fn run(
 /// Somebody who commands the group from another thread, in place of the program.
 pub(super) struct Remote {
     /// What is asked of the group, in order.
-    pub requests: mpsc::Receiver<Request>,
-    /// Where the ways to see the state and to stream are handed out, once the real-time thread runs.
-    pub introduce: mpsc::SyncSender<(Observer, Streamer)>,
+    pub requests: mpsc::Receiver<Asked>,
+    /// Where the ways to see the state and to stream are handed out, and the numbers of requests, once the real-time
+    /// thread runs.
+    pub introduce: mpsc::SyncSender<(Observer, Streamer, RequestNumbers)>,
 }
 
 /// As [`run`]; with a remote, the group does what that asks for.
@@ -154,17 +156,19 @@ pub(super) fn lead(
     let begun = running.begun();
     if let (Some(remote), Some(streamer)) = (&remote, host.take_streamer()) {
         // Whoever no longer waits for it has given up; the run then ends as it was told to.
-        let _ = remote.introduce.send((host.observer(), streamer));
+        let _ = remote.introduce.send((host.observer(), streamer, host.numbers()));
     }
     let mut time_of_day = TimeOfDayKeeper::of(config);
+    let numbers = host.numbers();
     let mut asked = VecDeque::new();
     let (mut panicked, mut is_watched) = (None, true);
     while !running.is_finished() {
         supervisor.poll(clock.now_ns(), &mut host);
         let now_ns = clock.now_ns();
-        asked.extend(time_of_day.poll(now_ns, || WallClock::starting_now(now_ns)));
+        let time = time_of_day.poll(now_ns, || WallClock::starting_now(now_ns));
+        asked.extend(time.map(|request| Asked { id: numbers.next(), request }));
         asked.extend(remote.iter().flat_map(|remote| remote.requests.try_iter()));
-        while asked.front().is_some_and(|request| host.request(*request).is_ok()) {
+        while asked.front().is_some_and(|asked| host.ask(*asked).is_ok()) {
             asked.pop_front();
         }
         if let Some(rehearsal) = &options.rehearsal {

@@ -10,14 +10,15 @@
 
 use std::collections::VecDeque;
 
-use takt_rt::door::{AxisSnapshot, Request, Snapshot};
+use takt_rt::door::{Asked, AxisSnapshot, Request, Snapshot};
 use takt_rt::frame::Frame;
 use takt_rt::stop::{Phase, Rule, StopCategory, StopReason};
 
-use super::channels::HostSide;
+use super::channels::{HostSide, RequestNumbers};
+use super::outcome::{Interrupt, Outcome, Progress};
 use super::program::{ProgramRunner, Step};
 use crate::config::Config;
-use crate::drive::{AxisFacts, BringUp, BringUpError, Leave};
+use crate::drive::{AxisFacts, BringUp, Leave};
 
 /// The group must get where it was told to within this time; the engine has time-outs of its own, which are shorter.
 const PATIENCE_NS: u64 = 8_000_000_000;
@@ -25,66 +26,6 @@ const PATIENCE_NS: u64 = 8_000_000_000;
 const CUT_NS: u64 = 100_000_000;
 /// Standstill before the brakes: the drives settle on their last set-point.
 const SETTLE_NS: u64 = 300_000_000;
-
-/// How a run ended.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Outcome {
-    /// The program was done, or its time was over.
-    Finished,
-    /// Somebody interrupted it; the axes were stopped in control unless it was asked otherwise.
-    Interrupted,
-    /// The group stopped by itself.
-    Stopped(StopReason),
-    /// The drives could not be brought up.
-    BringUpFailed(BringUpError),
-    /// A drive is in a fault that a reset does not clear.
-    FaultPersists {
-        /// The axis.
-        axis: usize,
-        /// Object 603F or the code of the emergency message.
-        code: u16,
-    },
-    /// A drive does not report.
-    NotHeard {
-        /// The axis.
-        axis: usize,
-    },
-    /// A move of the program was refused; counted from 1.
-    MoveRefused {
-        /// The move.
-        number: u64,
-    },
-    /// A function that the caller gave to the run panicked, and the axes were stopped in control.
-    CallbackPanicked {
-        /// What the panic said.
-        message: String,
-    },
-    /// The real-time thread ended by itself, which only a defect of takt can bring about.
-    ThreadDied,
-    /// The group did not get where it was told to in time.
-    Stuck {
-        /// What it was doing.
-        phase: Phase,
-    },
-}
-
-/// Who asks a run to end before its program does.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Interrupt {
-    /// Decelerate, hold, disable, leave.
-    Controlled,
-    /// Take the power now and leave without farewell.
-    Immediate,
-}
-
-/// What the run is doing, for a progress bar.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Progress {
-    /// In a few words.
-    pub what: String,
-    /// 0 to 1 where that is known.
-    pub fraction: Option<f64>,
-}
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Stage {
@@ -113,7 +54,8 @@ pub struct Supervisor {
     leave: Leave,
     program: ProgramRunner,
     facts: Vec<AxisFacts>,
-    outgoing: VecDeque<Request>,
+    outgoing: VecDeque<Asked>,
+    numbers: RequestNumbers,
     interrupt: Option<Interrupt>,
     outcome: Option<Outcome>,
     deadline_ns: Option<u64>,
@@ -134,6 +76,7 @@ impl Supervisor {
             program: ProgramRunner::new(&config.program, duration_ns.is_some()),
             facts: Vec::new(),
             outgoing: VecDeque::new(),
+            numbers: RequestNumbers::default(),
             interrupt: None,
             outcome: None,
             deadline_ns: None,
@@ -176,10 +119,11 @@ impl Supervisor {
         }
         let since_ns = *self.stage_since_ns.get_or_insert(now_ns);
         let snapshot = host.snapshot();
+        self.numbers = host.numbers();
         self.heed_interrupt(now_ns);
         self.step(now_ns, now_ns.saturating_sub(since_ns), &snapshot, host);
         while let Some(request) = self.outgoing.front() {
-            if host.request(*request).is_err() {
+            if host.ask(*request).is_err() {
                 break;
             }
             self.outgoing.pop_front();
@@ -206,6 +150,7 @@ impl Supervisor {
             }
             Stage::Disable => {
                 if matches!(snapshot.phase, Phase::Disabled | Phase::Passive) {
+                    self.note_fault_of_disabling(snapshot);
                     self.begin_leave(now_ns);
                 } else if elapsed_ns > PATIENCE_NS {
                     self.outcome.get_or_insert(Outcome::Stuck { phase: snapshot.phase });
@@ -217,7 +162,7 @@ impl Supervisor {
                 // The last controlwords take effect at the SYNC after them, so the loop goes on until it shows.
                 let is_off = matches!(snapshot.phase, Phase::Disabled | Phase::Passive);
                 if (is_off && elapsed_ns > 0) || elapsed_ns > CUT_NS {
-                    self.outgoing.push_back(Request::Leave);
+                    self.ask(Request::Leave);
                     self.enter(Stage::Done, now_ns);
                 }
             }
@@ -232,13 +177,15 @@ impl Supervisor {
             Some(Err(error)) => self.end(now_ns, Outcome::BringUpFailed(error)),
             Some(Ok(facts)) => {
                 for (axis, facts) in (0..).zip(&facts) {
-                    self.outgoing.extend(facts.process_data.as_ref().map(|data| data.request(axis)));
+                    if let Some(data) = &facts.process_data {
+                        self.ask(data.request(axis));
+                    }
                     if let Some(torque) = facts.rated_torque {
-                        self.outgoing.push_back(Request::RatedTorque { axis, torque });
+                        self.ask(Request::RatedTorque { axis, torque });
                     }
                 }
                 self.facts = facts;
-                self.outgoing.push_back(Request::Sync(true));
+                self.ask(Request::Sync(true));
                 // It has just succeeded, so the second stage can begin.
                 let _ = self.bring_up.start();
                 self.enter(Stage::Start, now_ns);
@@ -256,8 +203,8 @@ impl Supervisor {
                 let positions = (0..)
                     .zip(&facts)
                     .map(|(axis, facts)| Request::Position { axis, counts: facts.position_counts });
-                self.outgoing.extend(positions);
-                self.outgoing.push_back(Request::Activate);
+                positions.for_each(|position| self.ask(position));
+                self.ask(Request::Activate);
                 self.enter(Stage::Activate, now_ns);
             }
         }
@@ -268,7 +215,7 @@ impl Supervisor {
         match silent {
             None if snapshot.phase == Phase::Disabled => {
                 if self.faulted(snapshot).is_some() {
-                    self.outgoing.push_back(Request::ResetFaults);
+                    self.ask(Request::ResetFaults);
                     self.enter(Stage::ResetFaults, now_ns);
                 } else {
                     self.begin_enable(now_ns);
@@ -291,7 +238,7 @@ impl Supervisor {
     }
 
     fn begin_enable(&mut self, now_ns: u64) {
-        self.outgoing.push_back(Request::Enable);
+        self.ask(Request::Enable);
         self.enter(Stage::Enable, now_ns);
     }
 
@@ -314,10 +261,10 @@ impl Supervisor {
             return self.end(now_ns, Outcome::Stopped(stop));
         }
         if self.deadline_ns.is_some_and(|deadline_ns| now_ns >= deadline_ns) {
-            self.outgoing.push_back(Request::Stop(StopCategory::Two));
+            self.ask(Request::Stop(StopCategory::Two));
             return self.end(now_ns, Outcome::Finished);
         }
-        match self.program.poll(now_ns, snapshot) {
+        match self.program.poll(now_ns, snapshot, &self.numbers) {
             Step::Wait => {}
             Step::Begin(requests) => self.outgoing.extend(requests),
             Step::Refused(number) => self.end(now_ns, Outcome::MoveRefused { number }),
@@ -329,13 +276,13 @@ impl Supervisor {
         match (self.interrupt, self.stage) {
             (None, _) | (_, Stage::Done | Stage::Cut) => {}
             (Some(Interrupt::Immediate), _) => {
-                self.outgoing.push_back(Request::Stop(StopCategory::Zero));
+                self.ask(Request::Stop(StopCategory::Zero));
                 self.outcome.get_or_insert(Outcome::Interrupted);
                 self.enter(Stage::Cut, now_ns);
             }
             (Some(Interrupt::Controlled), Stage::Settle { .. } | Stage::Disable | Stage::Leave) => {}
             (Some(Interrupt::Controlled), Stage::Run) => {
-                self.outgoing.push_back(Request::Stop(StopCategory::Two));
+                self.ask(Request::Stop(StopCategory::Two));
                 self.end(now_ns, Outcome::Interrupted);
             }
             (Some(Interrupt::Controlled), _) => self.end(now_ns, Outcome::Interrupted),
@@ -357,8 +304,16 @@ impl Supervisor {
     }
 
     fn begin_disable(&mut self, now_ns: u64) {
-        self.outgoing.push_back(Request::Disable);
+        self.ask(Request::Disable);
         self.enter(Stage::Disable, now_ns);
+    }
+
+    /// A run that had been well so far was not, if the drives did not let themselves be disabled as they should.
+    fn note_fault_of_disabling(&mut self, snapshot: &Snapshot) {
+        let fault = own_stop(snapshot).filter(|stop| stop.phase == Phase::Disabling);
+        if let (Some(stop), Some(Outcome::Finished | Outcome::Interrupted)) = (fault, &self.outcome) {
+            self.outcome = Some(Outcome::Stopped(stop));
+        }
     }
 
     fn begin_leave(&mut self, now_ns: u64) {
@@ -368,9 +323,14 @@ impl Supervisor {
     fn say_farewell(&mut self, now_ns: u64, elapsed_ns: u64, host: &mut HostSide) {
         self.leave.poll(now_ns, &mut sending_through(host));
         if self.leave.outcome().is_some() || elapsed_ns > PATIENCE_NS {
-            self.outgoing.extend([Request::Sync(false), Request::Leave]);
+            self.ask(Request::Sync(false));
+            self.ask(Request::Leave);
             self.enter(Stage::Done, now_ns);
         }
+    }
+
+    fn ask(&mut self, request: Request) {
+        self.outgoing.push_back(Asked { id: self.numbers.next(), request });
     }
 
     fn enter(&mut self, stage: Stage, now_ns: u64) {

@@ -12,7 +12,8 @@ use takt_rt::time::Grid;
 
 use super::assemble::{self, AssembleError};
 use super::channels::{ChannelSizes, HostSide, LogSide, RtSide, channels};
-use super::supervisor::{Interrupt, Outcome, Supervisor};
+use super::outcome::{Interrupt, Outcome};
+use super::supervisor::Supervisor;
 use super::time_of_day::TimeOfDayKeeper;
 use crate::bus::port::Port;
 use crate::config::Config;

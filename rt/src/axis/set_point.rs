@@ -83,6 +83,24 @@ impl Axis {
         guard::clamp(&self.parameters.limits, &self.course(next, period_s))
     }
 
+    /// A set-point of a stream, of which the position counts: what it says of its velocity and acceleration is fed forward
+    /// as far as its step and the limits agree, so that nobody turns a joint by words alone. What is no number is left to
+    /// [`Axis::check`].
+    pub fn agreeing(&self, next: &State, period_s: f64) -> State {
+        let limits = &self.parameters.limits;
+        let most = limits.acceleration.max(limits.deceleration);
+        let (step, room) = ((next.position - self.set[0].position) / period_s, most * period_s);
+        let within = |value: f64, lowest: f64, highest: f64| value.max(lowest).min(highest);
+        if !(next.velocity.is_finite() && next.acceleration.is_finite() && step.is_finite()) {
+            return *next;
+        }
+        State {
+            position: next.position,
+            velocity: within(next.velocity, step - room, step + room),
+            acceleration: within(next.acceleration, -most, most),
+        }
+    }
+
     fn course(&self, next: &State, period_s: f64) -> Course {
         let sent = [self.set[0].position, self.set[1].position, self.set[2].position];
         Course { sent, next: next.position, period_s }

@@ -54,13 +54,22 @@ impl Engine {
         }
     }
 
-    /// What is still on its way to rest goes on, and everything else stays where it is. Nothing follows a joint: a drive
-    /// whose statusword is false still obeys.
+    /// What is still on its way to rest goes on as far as the guard agrees, and everything else stays where it is. Nothing
+    /// follows a joint: a drive whose statusword is false still obeys.
     fn come_to_rest(&mut self) {
-        let is_on_way = !self.motion.is_finished();
-        self.motion.advance(self.period_s);
-        for (axis, next) in self.axes.iter_mut().zip(self.motion.states()) {
-            if is_on_way && axis.is_enabled() { axis.advance(next) } else { axis.stay() }
+        let (period_s, is_on_way) = (self.period_s, !self.motion.is_finished());
+        self.motion.advance(period_s);
+        let next: ArrayVec<State, MAX_AXES> = self.motion.states().take(self.axes.len()).collect();
+        if !is_on_way || self.violation(&next, |axis, state| axis.check(state, period_s)).is_some() {
+            self.motion.cancel();
+            return self.axes.iter_mut().for_each(Axis::stay);
+        }
+        self.take_set_points(&next);
+    }
+
+    fn take_set_points(&mut self, next: &[State]) {
+        for (axis, state) in self.axes.iter_mut().zip(next) {
+            if axis.is_enabled() { axis.advance(*state) } else { axis.stay() }
         }
     }
 
@@ -169,7 +178,11 @@ impl Engine {
                 && !axis.is_profile()
                 && check(axis, wanted).is_err();
             self.clamped += u64::from(is_clamped);
-            next.push(if is_clamped { axis.clamped(wanted, period_s) } else { *wanted });
+            next.push(if is_clamped {
+                axis.clamped(wanted, period_s)
+            } else {
+                axis.agreeing(wanted, period_s)
+            });
         }
         let rejecting = |axis: &Axis, next: &State| match axis.parameters().on_violation {
             OnViolation::Reject => check(axis, next),
@@ -216,9 +229,7 @@ impl Engine {
             }
             return false;
         }
-        for (axis, state) in self.axes.iter_mut().zip(next) {
-            if axis.is_enabled() { axis.advance(*state) } else { axis.stay() }
-        }
+        self.take_set_points(next);
         true
     }
 

@@ -9,21 +9,23 @@ mod parameters;
 mod process_data;
 mod requests;
 mod stops;
+mod wire;
 
 use arrayvec::ArrayVec;
 
-use crate::axis::{Axis, AxisParameters, FeedbackSince};
-use crate::cia402::{Goal, controlword};
-use crate::dispatch::{Destination, Dispatch, IdTaken};
-use crate::door::{AxisSnapshot, Door, Snapshot, StreamCommand};
-use crate::frame::{Frame, Id};
+use crate::axis::{Axis, FeedbackSince};
+use crate::cia402::Goal;
+use crate::dispatch::Dispatch;
+use crate::door::{AxisSnapshot, Door, Refusals, Snapshot, StreamCommand};
+use crate::frame::Frame;
 use crate::motion::Motion;
-use crate::port::{BusHealth, Received};
+use crate::port::BusHealth;
 use crate::record::{CycleRecord, Event, EventKind, MAX_AXES, MAX_BUSES, Timing};
 use crate::stop::{Phase, StopCategories, StopReason};
 use crate::time::{NANOSECONDS_PER_SECOND, Nanoseconds};
 use crate::time_of_day::TimeProducer;
 use crate::watch::{LeakyBucket, TimingLadder, TimingLevel};
+use parameters::{axes_of, dispatch_of};
 
 pub use parameters::{BusParameters, EngineParameters, Heartbeat, SetUpError};
 
@@ -39,11 +41,6 @@ const MARKED_BY_BRIDGE: u8 = 4;
 const REQUESTS_PER_CYCLE: usize = 4;
 /// How long controlword bit 7 is held low before, and high in, a fault reset.
 const FAULT_RESET_CYCLES: u32 = 10;
-/// Cycles of the slowest bus for which the heartbeat waits after the controller was away for more than its period.
-/// A drive that has stopped for want of it may go on with its old target once it is back: until then what the drives
-/// report must have been heard, and their targets and controlwords be new ones.
-const HEARTBEAT_HELD_BUS_CYCLES: u32 = 4;
-
 /// Whether the set-points of a cycle can leave.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Transmission {
@@ -108,6 +105,7 @@ pub struct Engine {
     move_id: u32,
     finished_move: u32,
     refused: u64,
+    refusals: Refusals,
     stream: Option<StreamCommand>,
     /// Whether a command of the present stream has been taken.
     is_stream_begun: bool,
@@ -145,20 +143,8 @@ impl Engine {
         if let Some(bus) = parameters.buses.iter().position(|bus| bus.divider == 0) {
             return Err(SetUpError::NoDivider { bus });
         }
-        let mut dispatch: [Dispatch; MAX_BUSES] = core::array::from_fn(|_| Dispatch::default());
-        for (axis, own) in parameters.axes.iter().enumerate() {
-            let is_bus_known = usize::from(own.bus) < parameters.buses.len();
-            let table = dispatch.get_mut(usize::from(own.bus)).filter(|_| is_bus_known);
-            enter(table.ok_or(SetUpError::UnknownBus { axis })?, axis, own)?;
-        }
-        for (bus, table) in parameters.buses.iter().zip(&mut dispatch) {
-            table.foreign(NMT);
-            table.foreign(bus.sync_id);
-            if let Some(heartbeat) = parameters.heartbeat {
-                table.foreign(Id::canopen(0x700, heartbeat.node));
-            }
-        }
-        let axes = on_one_time(parameters.axes.iter().cloned().map(Axis::new).collect(), &parameters.buses);
+        let dispatch = dispatch_of(&parameters)?;
+        let axes = axes_of(&parameters);
         let record = CycleRecord { axis_count: parameters.axes.len() as u8, ..CycleRecord::default() };
         let snapshot = Snapshot {
             axis_count: parameters.axes.len() as u8,
@@ -187,6 +173,7 @@ impl Engine {
             move_id: 0,
             finished_move: 0,
             refused: 0,
+            refusals: Refusals::default(),
             stream: None,
             is_stream_begun: false,
             bridged_cycles: 0,
@@ -234,76 +221,11 @@ impl Engine {
         self.is_leaving
     }
 
-    /// The SYNC of a bus, if one is to be sent in this slot, now. Answers to an earlier one are late from now on.
-    pub fn sync(&mut self, bus: usize, slot: u64, now_ns: Nanoseconds) -> Option<Frame> {
-        let parameters = self.buses.get(bus)?;
-        if !self.is_sync_on || !has_cycle(parameters, slot) {
-            return None;
-        }
-        for axis in self.axes.iter_mut().filter(|axis| usize::from(axis.parameters().bus) == bus) {
-            if axis.parameters().feedback_since == FeedbackSince::Sync {
-                axis.expect_feedback(now_ns);
-            }
-        }
-        Some(Frame::of(parameters.sync_id, []))
-    }
-
-    /// Takes a frame that arrived on a bus.
-    pub fn receive(&mut self, bus: usize, received: &Received, door: &mut impl Door) {
-        let Some(table) = self.dispatch.get(bus) else { return };
-        match table.destination(&received.frame) {
-            Destination::Feedback { axis, pdo } => {
-                if let Some(axis) = self.axes.get_mut(usize::from(axis)) {
-                    // One that is too short counts as not received, which the feedback's age then shows.
-                    let _ = axis.receive(pdo.into(), &received.frame, received.at_ns);
-                }
-            }
-            Destination::Emergency { axis } => {
-                let [low, high, register, manufacturer @ ..] = received.frame.first_word().to_le_bytes();
-                let code = u16::from_le_bytes([low, high]);
-                if let Some(axis) = self.axes.get_mut(usize::from(axis)) {
-                    axis.receive_emergency(code);
-                }
-                self.happened(
-                    received.at_ns,
-                    EventKind::Emergency { axis, code, register, manufacturer },
-                    door,
-                );
-                self.hand_over(bus, received, door);
-            }
-            Destination::ErrorControl { axis } => {
-                let state = received.frame.payload().first().copied();
-                if let (Some(axis), Some(state)) = (self.axes.get_mut(usize::from(axis)), state) {
-                    axis.receive_error_control(state);
-                }
-                self.hand_over(bus, received, door);
-            }
-            Destination::Foreign => {
-                self.foreign_id.get_or_insert(received.frame.id().value());
-                self.hand_over(bus, received, door);
-            }
-            Destination::Unused => {}
-            Destination::Service => self.hand_over(bus, received, door),
-        }
-    }
-
-    fn hand_over(&mut self, bus: usize, received: &Received, door: &mut impl Door) {
-        if !door.received(bus, received) {
-            self.dropped += 1;
-        }
-    }
-
     fn happened(&mut self, at_ns: Nanoseconds, kind: EventKind, door: &mut impl Door) {
         let slot = self.last_slot.unwrap_or(0);
         if !door.event(&Event { slot, at_ns, kind }) {
             self.dropped += 1;
         }
-    }
-
-    /// Names the buses on which own frames still wait for the wire, before [`Engine::compute`]: they get no set-points.
-    /// The axes on the others go on.
-    pub fn hold_back(&mut self, buses: BusSet) {
-        self.held_back = buses;
     }
 
     /// The thinking of one cycle. Nothing moves on unless set-points can leave.
@@ -338,7 +260,7 @@ impl Engine {
         self.notice_drive_states(now_ns, door);
         for _ in 0..REQUESTS_PER_CYCLE {
             match door.request() {
-                Some(request) => self.take(request, now_ns, door),
+                Some(asked) => self.take(&asked, now_ns, door),
                 None => break,
             }
         }
@@ -389,29 +311,6 @@ impl Engine {
         }
     }
 
-    /// After an absence that a drive may have noticed, the heartbeat waits.
-    fn hold_heartbeat_back(&mut self, elapsed: u64, transmission: Transmission) {
-        let was_away = self.heartbeat.is_some_and(|heartbeat| elapsed > heartbeat.cycles.into());
-        let held = if was_away {
-            self.heartbeat_held_cycles()
-        } else {
-            // Only the next slot shows how long the absence was.
-            u32::from(transmission == Transmission::TooLate)
-        };
-        self.heartbeat_due = self.heartbeat_due.max(held);
-    }
-
-    /// A drive watches the controller from the first heartbeat on that it hears after it has been set up: that comes before
-    /// anything moves, and not only after a whole period.
-    fn hasten_heartbeat(&mut self) {
-        self.heartbeat_due = self.heartbeat_due.min(self.heartbeat_held_cycles());
-    }
-
-    fn heartbeat_held_cycles(&self) -> u32 {
-        let slowest = self.buses.iter().map(|bus| bus.divider).max().unwrap_or(1);
-        HEARTBEAT_HELD_BUS_CYCLES.saturating_mul(slowest)
-    }
-
     fn notice_drive_states(&mut self, now_ns: Nanoseconds, door: &mut impl Door) {
         for index in 0..self.axes.len() {
             let (Some(axis), Some(known)) = (self.axes.get(index), self.drive_states.get_mut(index)) else {
@@ -425,34 +324,6 @@ impl Engine {
         }
     }
 
-    fn write_commands(&mut self, slot: u64) {
-        let resetting = self.fault_reset;
-        self.fault_reset = resetting.saturating_sub(1);
-        // Low first, so that what follows is an edge whatever was sent before.
-        let reset_word = match resetting {
-            0 => None,
-            1..=FAULT_RESET_CYCLES => Some(controlword::FAULT_RESET),
-            _ => Some(controlword::DISABLE_VOLTAGE),
-        };
-        for axis in &mut self.axes {
-            let is_held_back = self.held_back.contains(axis.parameters().bus.into());
-            if has_cycle_of(&self.buses, axis, slot) && !is_held_back {
-                // A drive that falls out of operation enabled is not led back by what the others are still to do; and none
-                // is led up before its target is where the joint is.
-                let is_led_up =
-                    axis.is_enabled() || self.phase == Phase::Enabling && axis.is_on_joint(self.period_s);
-                let goal = match self.goal {
-                    Goal::Enabled if self.phase == Phase::Stopping && axis.stops_by_itself() => {
-                        Goal::QuickStop
-                    }
-                    Goal::Enabled if !is_led_up => Goal::Disabled,
-                    goal => goal,
-                };
-                axis.command(goal, reset_word.filter(|_| axis.drive_state().is_faulted()));
-            }
-        }
-    }
-
     /// Begins a phase. One that is under way goes on, and what it may last counts from its first beginning.
     fn enter(&mut self, phase: Phase, now_ns: Nanoseconds, door: &mut impl Door) {
         if phase == self.phase {
@@ -462,45 +333,6 @@ impl Engine {
         self.happened(now_ns, kind, door);
         self.phase = phase;
         self.phase_cycles = 0;
-    }
-
-    /// The set-points of a bus, if it has a cycle in this slot.
-    pub fn set_points(&self, bus: usize, slot: u64, batch: &mut SendBatch) {
-        let has_cycle = self.buses.get(bus).is_some_and(|parameters| has_cycle(parameters, slot));
-        if !has_cycle || self.held_back.contains(bus) {
-            return;
-        }
-        for axis in self.axes.iter().filter(|axis| usize::from(axis.parameters().bus) == bus) {
-            for frame in axis.frames() {
-                let _ = batch.try_push(frame);
-            }
-        }
-    }
-
-    /// The heartbeat and TIME when they are due, and service frames as far as the budget goes: what follows the set-points.
-    pub fn services(&self, bus: usize, door: &mut impl Door, batch: &mut SendBatch) {
-        if let Some(heartbeat) = self.heartbeat.filter(|_| self.heartbeat_due == 0) {
-            let _ = batch.try_push(Frame::of(Id::canopen(0x700, heartbeat.node), [NMT_OPERATIONAL]));
-        }
-        // A bus that is behind is spared: the next one tells the time as well.
-        let time = self.time.filter(|_| !self.held_back.contains(bus)).and_then(|time| time.message());
-        batch.extend(time);
-        let Some(parameters) = self.buses.get(bus) else { return };
-        let budget = match self.phase {
-            Phase::Passive => parameters.service_frames_passive,
-            _ => parameters.service_frames_active,
-        };
-        for _ in 0..budget.min(batch.remaining_capacity()) {
-            match door.service_frame(bus) {
-                Some(frame) => batch.push(frame),
-                None => break,
-            }
-        }
-    }
-
-    /// An interface had no room for all that it was handed: set-points may be missing.
-    pub fn not_taken(&mut self) {
-        self.is_not_taken = true;
     }
 
     /// Ends the cycle: leaves its record and shows the new state.
@@ -534,6 +366,7 @@ impl Engine {
         snapshot.clamped = self.clamped;
         snapshot.dropped = self.dropped;
         snapshot.refused = self.refused;
+        snapshot.refusals = self.refusals;
         snapshot.finished_move = self.finished_move;
         let is_on_way = matches!(self.phase, Phase::Moving | Phase::Stopping);
         snapshot.remaining_s = if is_on_way { self.motion.remaining_s() } else { 0.0 };
@@ -555,47 +388,10 @@ impl Engine {
     }
 }
 
-const NMT: Id = Id::canopen(0x000, 0);
-const NMT_OPERATIONAL: u8 = 5;
-
 const fn has_cycle(bus: &BusParameters, slot: u64) -> bool {
     slot.is_multiple_of(bus.divider as u64)
 }
 
 fn has_cycle_of(buses: &[BusParameters], axis: &Axis, slot: u64) -> bool {
     buses.get(usize::from(axis.parameters().bus)).is_some_and(|bus| has_cycle(bus, slot))
-}
-
-/// Has the set-points of axes on faster buses wait for those on the slowest: a joint is where the trajectory was two
-/// cycles of its bus ago.
-fn on_one_time(mut axes: ArrayVec<Axis, MAX_AXES>, buses: &[BusParameters]) -> ArrayVec<Axis, MAX_AXES> {
-    let divider = |axis: &Axis| buses.get(usize::from(axis.parameters().bus)).map_or(1, |bus| bus.divider);
-    // A drive in a profile mode gets no set-points that anybody would have to wait for.
-    let slowest = axes.iter().filter(|axis| !axis.is_profile()).map(divider).max().unwrap_or(1);
-    for axis in &mut axes {
-        axis.delay_set_points(slowest.saturating_sub(divider(axis)).saturating_mul(2));
-    }
-    axes
-}
-
-fn enter(table: &mut Dispatch, axis: usize, own: &AxisParameters) -> Result<(), SetUpError> {
-    if own.commands.is_empty() || own.feedback.is_empty() {
-        return Err(SetUpError::NoPdo { axis });
-    }
-    if !own.limits.are_possible() {
-        return Err(SetUpError::ImpossibleLimits { axis });
-    }
-    let taken = |taken: IdTaken| SetUpError::IdTaken { axis, id: taken.id };
-    table.emergency(Id::canopen(0x080, own.node), axis as u8).map_err(taken)?;
-    for (number, pdo) in own.feedback.iter().enumerate() {
-        table.feedback(pdo.id, axis as u8, number as u8).map_err(taken)?;
-    }
-    table.error_control(Id::canopen(0x700, own.node), axis as u8).map_err(taken)?;
-    for command in &own.commands {
-        table.foreign(command.pdo.id);
-    }
-    for id in &own.unused {
-        table.unused(*id, axis as u8).map_err(taken)?;
-    }
-    Ok(())
 }

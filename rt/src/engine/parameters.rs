@@ -2,7 +2,8 @@
 
 use arrayvec::ArrayVec;
 
-use crate::axis::AxisParameters;
+use crate::axis::{Axis, AxisParameters};
+use crate::dispatch::{Dispatch, IdTaken};
 use crate::frame::Id;
 use crate::record::{MAX_AXES, MAX_BUSES};
 use crate::stop::StopCategories;
@@ -92,3 +93,59 @@ pub enum SetUpError {
         id: Id,
     },
 }
+
+/// The axes. The set-points of those on faster buses wait for those on the slowest: a joint is where the trajectory was two
+/// cycles of its bus ago.
+pub(super) fn axes_of(parameters: &EngineParameters) -> ArrayVec<Axis, MAX_AXES> {
+    let mut axes: ArrayVec<Axis, MAX_AXES> = parameters.axes.iter().cloned().map(Axis::new).collect();
+    let divider =
+        |axis: &Axis| parameters.buses.get(usize::from(axis.parameters().bus)).map_or(1, |bus| bus.divider);
+    // A drive in a profile mode gets no set-points that anybody would have to wait for.
+    let slowest = axes.iter().filter(|axis| !axis.is_profile()).map(divider).max().unwrap_or(1);
+    for axis in &mut axes {
+        axis.delay_set_points(slowest.saturating_sub(divider(axis)).saturating_mul(2));
+    }
+    axes
+}
+
+/// Who is meant by each identifier, on each bus.
+pub(super) fn dispatch_of(parameters: &EngineParameters) -> Result<[Dispatch; MAX_BUSES], SetUpError> {
+    let mut dispatch: [Dispatch; MAX_BUSES] = core::array::from_fn(|_| Dispatch::default());
+    for (axis, own) in parameters.axes.iter().enumerate() {
+        let is_bus_known = usize::from(own.bus) < parameters.buses.len();
+        let table = dispatch.get_mut(usize::from(own.bus)).filter(|_| is_bus_known);
+        enter(table.ok_or(SetUpError::UnknownBus { axis })?, axis, own)?;
+    }
+    for (bus, table) in parameters.buses.iter().zip(&mut dispatch) {
+        table.foreign(NMT);
+        table.foreign(bus.sync_id);
+        if let Some(heartbeat) = parameters.heartbeat {
+            table.foreign(Id::canopen(0x700, heartbeat.node));
+        }
+    }
+    Ok(dispatch)
+}
+
+fn enter(table: &mut Dispatch, axis: usize, own: &AxisParameters) -> Result<(), SetUpError> {
+    if own.commands.is_empty() || own.feedback.is_empty() {
+        return Err(SetUpError::NoPdo { axis });
+    }
+    if !own.limits.are_possible() {
+        return Err(SetUpError::ImpossibleLimits { axis });
+    }
+    let taken = |taken: IdTaken| SetUpError::IdTaken { axis, id: taken.id };
+    table.emergency(Id::canopen(0x080, own.node), axis as u8).map_err(taken)?;
+    for (number, pdo) in own.feedback.iter().enumerate() {
+        table.feedback(pdo.id, axis as u8, number as u8).map_err(taken)?;
+    }
+    table.error_control(Id::canopen(0x700, own.node), axis as u8).map_err(taken)?;
+    for command in &own.commands {
+        table.foreign(command.pdo.id);
+    }
+    for id in &own.unused {
+        table.unused(*id, axis as u8).map_err(taken)?;
+    }
+    Ok(())
+}
+
+const NMT: Id = Id::canopen(0x000, 0);

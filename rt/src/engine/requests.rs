@@ -4,7 +4,7 @@ use super::{Engine, FAULT_RESET_CYCLES};
 use crate::axis::Axis;
 use crate::cia402::Goal;
 use crate::control::ControlLaw;
-use crate::door::{Door, Move, ProfileMove, Request};
+use crate::door::{Asked, Door, Move, ProfileMove, Request};
 use crate::motion::Leg;
 use crate::plan::State;
 use crate::profile::ProfileTarget;
@@ -14,9 +14,9 @@ use crate::time::Nanoseconds;
 use crate::watch::TimingLevel;
 
 impl Engine {
-    pub(super) fn take(&mut self, request: Request, now_ns: Nanoseconds, door: &mut impl Door) {
+    pub(super) fn take(&mut self, asked: &Asked, now_ns: Nanoseconds, door: &mut impl Door) {
         let is_latched = self.stop.is_some_and(|stop| stop.rule != Rule::Requested);
-        let is_done = match request {
+        let is_done = match asked.request {
             Request::Sync(on) => {
                 self.is_sync_on = on;
                 true
@@ -63,6 +63,7 @@ impl Engine {
             }
             Request::Enable | Request::Move(_) | Request::SetProfileTarget(_) | Request::Stream => false,
         };
+        self.refusals.note(asked.id, !is_done);
         if !is_done {
             self.refused += 1;
             self.happened(now_ns, EventKind::Refused { phase: self.phase }, door);

@@ -1,7 +1,7 @@
 //! How a snapshot and a streamed command are laid out in 64-bit words.
 
 use takt_rt::cia402;
-use takt_rt::door::{AxisSnapshot, Snapshot, StreamCommand};
+use takt_rt::door::{AxisSnapshot, Refusals, RequestId, Snapshot, StreamCommand};
 use takt_rt::plan;
 use takt_rt::port::{BusHealth, BusState};
 use takt_rt::record::{MAX_AXES, MAX_BUSES};
@@ -12,7 +12,7 @@ use super::latest::Words;
 
 /// Words of a snapshot of so many axes and buses.
 pub const fn snapshot_words(axes: usize, buses: usize) -> usize {
-    12 + 4 * axes + 7 * buses
+    15 + 4 * axes + 7 * buses
 }
 
 /// Words of a streamed command for so many axes.
@@ -30,6 +30,7 @@ pub const NO_SNAPSHOT: Snapshot = Snapshot {
     clamped: 0,
     dropped: 0,
     refused: 0,
+    refusals: Refusals { newest: RequestId(0), refused: 0 },
     finished_move: 0,
     remaining_s: 0.0,
     stop: None,
@@ -70,6 +71,9 @@ pub fn put_snapshot(snapshot: &Snapshot, words: &mut Words<'_>) {
     words.put(snapshot.clamped);
     words.put(snapshot.dropped);
     words.put(snapshot.refused);
+    words.put(snapshot.refusals.newest.0);
+    words.put(snapshot.refusals.refused as u64);
+    words.put((snapshot.refusals.refused >> 64) as u64);
     words.put_f64(snapshot.remaining_s);
     if let Some(stop) = snapshot.stop {
         put_stop(&stop, words);
@@ -94,6 +98,7 @@ pub fn take_snapshot(words: &mut Words<'_>) -> Snapshot {
         timing: TimingLevel::ALL.get(usize::from(flags >> 1)).copied().unwrap_or_default(),
         dropped: words.take(),
         refused: words.take(),
+        refusals: take_refusals(words),
         finished_move: (packed >> 32) as u32,
         remaining_s: words.take_f64(),
         stop: (flags & 1 == 1).then(|| take_stop(words)),
@@ -108,6 +113,11 @@ pub fn take_snapshot(words: &mut Words<'_>) -> Snapshot {
         *bus = take_bus(words);
     }
     snapshot
+}
+
+fn take_refusals(words: &mut Words<'_>) -> Refusals {
+    let newest = RequestId(words.take());
+    Refusals { newest, refused: u128::from(words.take()) | u128::from(words.take()) << 64 }
 }
 
 pub fn put_stream(command: &StreamCommand, axes: usize, words: &mut Words<'_>) {
@@ -289,10 +299,11 @@ mod tests {
             prop::option::of(stop_reasons()),
             prop::sample::select(&Phase::ALL[..]),
         );
-        (counted, any::<(u64, u64, u64, u64, u32, f64)>()).prop_map(
+        (counted, any::<(u64, u64, u64, u64, u32, f64)>(), any::<(u64, u64, u128)>()).prop_map(
             |(
                 (axes, buses, stop, phase),
                 (slot, at_ns, missed_slots, dropped, finished_move, remaining_s),
+                (refused, newest, refusals),
             )| {
                 let mut snapshot = Snapshot {
                     slot,
@@ -301,6 +312,8 @@ mod tests {
                     missed_slots,
                     dropped,
                     finished_move,
+                    refused,
+                    refusals: Refusals { newest: RequestId(newest), refused: refusals },
                     remaining_s,
                     stop,
                     axis_count: axes.len() as u8,

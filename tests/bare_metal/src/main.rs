@@ -8,7 +8,7 @@ use core::f64::consts::TAU;
 use takt_rt::axis::{AxisParameters, CommandPdo, FeedbackSince, Pdo};
 use takt_rt::control::ControlLaw;
 use takt_rt::dialect::Dialect;
-use takt_rt::door::{Door, Request, Snapshot, StreamCommand};
+use takt_rt::door::{Asked, Door, Request, RequestId, Snapshot, StreamCommand};
 use takt_rt::engine::{BusParameters, Engine, EngineParameters, SendBatch, Transmission};
 use takt_rt::frame::{Frame, Id};
 use takt_rt::guard::{AxisLimits, OnViolation};
@@ -39,8 +39,9 @@ struct Silent {
 }
 
 impl Door for Silent {
-    fn request(&mut self) -> Option<Request> {
-        self.requests.iter_mut().find_map(Option::take)
+    fn request(&mut self) -> Option<Asked> {
+        let numbered = self.requests.iter_mut().zip(1..);
+        numbered.filter_map(|(place, id)| Some(Asked { id: RequestId(id), request: place.take()? })).next()
     }
     fn stream(&mut self) -> Option<StreamCommand> {
         None

@@ -18,6 +18,8 @@
 //! # }
 //! ```
 
+mod error;
+
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc;
@@ -25,18 +27,21 @@ use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use takt_rt::control::ControlLaw;
-use takt_rt::door::{Move, ProfileMove, Request, Snapshot, StreamCommand};
+use takt_rt::door::{Asked, Move, ProfileMove, Request, RequestId, Snapshot, StreamCommand};
 use takt_rt::linux::MonotonicClock;
 use takt_rt::plan::State;
 use takt_rt::port::Clock;
 use takt_rt::profile::ProfileTarget;
 use takt_rt::record::MAX_AXES;
-use takt_rt::stop::{Phase, StopCategory, StopReason};
+use takt_rt::stop::{Phase, StopCategory};
 
-use super::channels::{Observer, Streamer};
+use super::channels::{Observer, RequestNumbers, Streamer};
+use super::outcome::{Interrupt, Outcome};
+use super::program::move_number;
 use super::session::{self, Remote, Session, SessionError, SessionOptions};
-use super::supervisor::{Interrupt, Outcome};
 use crate::config::{Axis, Config};
+
+pub use error::{CommandError, MotionError, StartFailure};
 
 /// Between two looks at the state by whoever waits.
 const LOOK: Duration = Duration::from_millis(1);
@@ -46,97 +51,18 @@ const ENABLE_PATIENCE: Duration = Duration::from_secs(60);
 /// A group of axes that is enabled and obeys. Dropping it brings the axes to rest, disables and leaves them.
 pub struct Controller {
     axes: Vec<Axis>,
-    requests: mpsc::Sender<Request>,
+    requests: mpsc::Sender<Asked>,
+    numbers: RequestNumbers,
     observer: Observer,
     streamer: Streamer,
     is_ending: Arc<AtomicBool>,
     thread: Option<JoinHandle<Result<Session, SessionError>>>,
-    last_id: u32,
-}
-
-/// Why there is no controller.
-#[derive(Debug, thiserror::Error)]
-pub enum StartFailure {
-    /// Nothing was begun.
-    #[error(transparent)]
-    Session(#[from] SessionError),
-    /// The drives could not be brought up or enabled; what is left of the attempt.
-    #[error("the drives could not be enabled: {:?}", .0.outcome)]
-    NotEnabled(Box<Session>),
-    /// The thread that leads the controller has died, which only a defect of takt can bring about.
-    #[error("the thread that leads the controller has died")]
-    Died,
-}
-
-/// Why a command was not given; nothing has changed then.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum CommandError {
-    /// A value for each axis is needed.
-    #[error("{given} values for {axes} axes")]
-    Count {
-        /// How many there were.
-        given: usize,
-        /// How many there are to be.
-        axes: usize,
-    },
-    /// There is no such axis.
-    #[error("there is no axis {axis}: the controller has {axes}")]
-    NoSuchAxis {
-        /// The number asked for.
-        axis: usize,
-        /// How many there are.
-        axes: usize,
-    },
-    /// The value is outside the limits of the axis, or no number.
-    #[error("{axis}: {value} is outside {lowest} to {highest}")]
-    OutsideLimits {
-        /// The axis.
-        axis: String,
-        /// What was asked for: rad, rad/s, N·m (m, m/s, N).
-        value: f64,
-        /// The lowest that is allowed.
-        lowest: f64,
-        /// The highest that is allowed.
-        highest: f64,
-    },
-    /// The axis is not in the mode that takes this.
-    #[error("{axis} is not in {needed}")]
-    WrongMode {
-        /// The axis.
-        axis: String,
-        /// The mode that takes it.
-        needed: &'static str,
-    },
-    /// The controller has ended.
-    #[error("the controller has ended")]
-    Ended,
-}
-
-/// Why a motion did not get to its end.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-pub enum MotionError {
-    /// The group has stopped.
-    #[error("the group has stopped: {0:?}")]
-    Stopped(StopReason),
-    /// The real-time thread refused it: another phase, or a latched fault.
-    #[error("the motion was refused while {phase:?}")]
-    Refused {
-        /// The phase that the group was in.
-        phase: Phase,
-    },
-    /// It was not over in time; it goes on.
-    #[error("the motion was not over in time")]
-    NotInTime,
-    /// The controller has ended.
-    #[error("the controller has ended")]
-    Ended,
 }
 
 /// A motion that was asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Motion {
-    id: u32,
-    refused_before: u64,
+    request: RequestId,
     slot: u64,
     ends_at_rest: bool,
 }
@@ -177,11 +103,11 @@ impl Controller {
             thread::Builder::new().name("takt-lead".into()).spawn(lead)
         };
         let thread = thread.map_err(SessionError::Logger)?;
-        let Ok((observer, streamer)) = introduced.recv() else {
+        let Ok((observer, streamer, numbers)) = introduced.recv() else {
             return Err(failed(thread));
         };
         let thread = Some(thread);
-        let mut controller = Self { axes, requests, observer, streamer, is_ending, thread, last_id: 0 };
+        let mut controller = Self { axes, requests, numbers, observer, streamer, is_ending, thread };
         let begun = Instant::now();
         while controller.state().phase != Phase::Holding {
             if controller.has_ended() || begun.elapsed() > ENABLE_PATIENCE {
@@ -234,9 +160,9 @@ impl Controller {
         }
         let mut all = [0.0; MAX_AXES];
         all.iter_mut().zip(target).for_each(|(to, from)| *to = *from);
-        let id = self.next_id();
+        let id = self.numbers.next();
         let request = Request::Move(Move {
-            id,
+            id: move_number(id),
             target: all,
             target_velocity: [0.0; MAX_AXES],
             velocity_scale: options.velocity_scale,
@@ -279,14 +205,13 @@ impl Controller {
     /// # Errors
     /// [`MotionError::Refused`] unless the group holds its position and is punctual, [`MotionError::Ended`].
     pub fn begin_stream(&mut self) -> Result<(), MotionError> {
-        let refused_before = self.state().refused;
-        self.ask(Request::Stream).map_err(|_| MotionError::Ended)?;
+        let asked = self.ask(Request::Stream).map_err(|_| MotionError::Ended)?;
         loop {
             let state = self.state();
             if state.phase == Phase::Streaming {
                 return Ok(());
             }
-            if state.refused > refused_before {
+            if state.refusals.contain(asked) {
                 return Err(MotionError::Refused { phase: state.phase });
             }
             if self.has_ended() {
@@ -316,7 +241,7 @@ impl Controller {
     /// # Errors
     /// [`CommandError::Ended`].
     pub fn stop(&mut self, category: StopCategory) -> Result<(), CommandError> {
-        self.ask(Request::Stop(category))
+        self.ask(Request::Stop(category)).map(drop)
     }
 
     /// Brings the axes to rest if need be, and disables them.
@@ -324,7 +249,7 @@ impl Controller {
     /// # Errors
     /// [`CommandError::Ended`].
     pub fn disable(&mut self) -> Result<(), CommandError> {
-        self.ask(Request::Disable)
+        self.ask(Request::Disable).map(drop)
     }
 
     /// Enables the axes again, after [`Controller::disable`], or after a fault and [`Controller::reset_faults`].
@@ -332,7 +257,7 @@ impl Controller {
     /// # Errors
     /// [`CommandError::Ended`].
     pub fn enable(&mut self) -> Result<(), CommandError> {
-        self.ask(Request::Enable)
+        self.ask(Request::Enable).map(drop)
     }
 
     /// Clears latched faults. Refused in motion.
@@ -340,7 +265,7 @@ impl Controller {
     /// # Errors
     /// [`CommandError::Ended`].
     pub fn reset_faults(&mut self) -> Result<(), CommandError> {
-        self.ask(Request::ResetFaults)
+        self.ask(Request::ResetFaults).map(drop)
     }
 
     /// Waits until a motion is over: until the axes are at rest at their targets, or a speed or torque has been reached.
@@ -351,13 +276,14 @@ impl Controller {
         let begun = Instant::now();
         loop {
             let state = self.state();
-            if state.finished_move == motion.id && (!motion.ends_at_rest || state.phase == Phase::Holding) {
+            let is_finished = state.finished_move == move_number(motion.request);
+            if is_finished && (!motion.ends_at_rest || state.phase == Phase::Holding) {
                 return Ok(());
             }
             if let Some(reason) = state.stop.filter(|reason| reason.slot > motion.slot) {
                 return Err(MotionError::Stopped(reason));
             }
-            if state.refused > motion.refused_before {
+            if state.refusals.contain(motion.request) {
                 return Err(MotionError::Refused { phase: state.phase });
             }
             if self.has_ended() {
@@ -403,12 +329,6 @@ impl Controller {
         self.thread.as_ref().is_none_or(JoinHandle::is_finished)
     }
 
-    fn next_id(&mut self) -> u32 {
-        // Never 0, which stands for "none yet".
-        self.last_id = self.last_id.checked_add(1).unwrap_or(1);
-        self.last_id
-    }
-
     fn axis(&self, axis: usize, mode: ControlLaw, needed: &'static str) -> Result<&Axis, CommandError> {
         let own = self.axes.get(axis).ok_or(CommandError::NoSuchAxis { axis, axes: self.axes.len() })?;
         if own.control == mode {
@@ -425,21 +345,22 @@ impl Controller {
         ends_at_rest: bool,
         valid_for: Duration,
     ) -> Result<Motion, CommandError> {
-        let id = self.next_id();
+        let id = self.numbers.next();
         // An axis that exists has a number that fits.
         let axis = axis as u8;
-        let wanted = ProfileMove { id, axis, target, valid_until_ns: expiry_ns(valid_for) };
+        let wanted = ProfileMove { id: move_number(id), axis, target, valid_until_ns: expiry_ns(valid_for) };
         self.begin(id, Request::SetProfileTarget(wanted), ends_at_rest)
     }
 
-    fn begin(&self, id: u32, request: Request, ends_at_rest: bool) -> Result<Motion, CommandError> {
-        let before = self.state();
-        self.ask(request)?;
-        Ok(Motion { id, refused_before: before.refused, slot: before.slot, ends_at_rest })
+    fn begin(&self, id: RequestId, request: Request, ends_at_rest: bool) -> Result<Motion, CommandError> {
+        let slot = self.state().slot;
+        self.requests.send(Asked { id, request }).map_err(|_| CommandError::Ended)?;
+        Ok(Motion { request: id, slot, ends_at_rest })
     }
 
-    fn ask(&self, request: Request) -> Result<(), CommandError> {
-        self.requests.send(request).map_err(|_| CommandError::Ended)
+    fn ask(&self, request: Request) -> Result<RequestId, CommandError> {
+        let id = self.numbers.next();
+        self.requests.send(Asked { id, request }).map(|()| id).map_err(|_| CommandError::Ended)
     }
 }
 

@@ -1,0 +1,133 @@
+//! Streams of set-points: what becomes of one that does not begin, that says of itself what is not so, that is not renewed.
+
+mod fixture;
+
+use fixture::{LIMITS, PERIOD_NS, Rig, axis_in, parameters};
+use takt_rt::control::ControlLaw;
+use takt_rt::door::{Request, StreamCommand};
+use takt_rt::guard::OnViolation;
+use takt_rt::plan::State;
+use takt_rt::record::MAX_AXES;
+use takt_rt::stop::{Phase, Rule, StopCategory};
+
+const VELOCITY: ControlLaw = ControlLaw::Velocity { position_gain: 20.0 };
+const TORQUE: ControlLaw = ControlLaw::Torque {
+    stiffness: 400.0,
+    damping: 40.0,
+    inertia: 1.0,
+    viscous_friction: 5.0,
+    coulomb_friction: 0.0,
+};
+
+/// One axis that follows a stream, standing at 0.
+fn streaming(law: ControlLaw, on_violation: OnViolation) -> Rig {
+    let mut parameters = parameters(1);
+    parameters.axes[0] = axis_in(law, 0, 1);
+    parameters.axes[0].on_violation = on_violation;
+    let mut rig = Rig::of(parameters).enable();
+    rig.move_to(0.0);
+    rig.run_until(Phase::Holding, 5_000);
+    rig.run(500);
+    rig.request(Request::Stream);
+    rig
+}
+
+fn stream(rig: &mut Rig, set_point: State) {
+    let valid_until_ns = rig.clock.now_ns + 5 * PERIOD_NS;
+    rig.door.stream = Some(StreamCommand { valid_until_ns, set_points: [set_point; MAX_AXES] });
+}
+
+#[test]
+fn a_stream_that_is_asked_for_and_never_begins_is_a_stop() {
+    let mut rig = Rig::enabled(3);
+    rig.request(Request::Stream);
+    rig.run(450);
+    assert_eq!(rig.phase(), Phase::Streaming);
+    rig.run(100);
+    let stops = rig.stops();
+    assert_eq!((stops.len(), stops[0].rule, stops[0].category), (1, Rule::StaleCommand, StopCategory::Two));
+    assert_eq!(rig.phase(), Phase::Holding);
+}
+
+#[test]
+fn a_command_that_had_expired_before_it_was_taken_moves_nothing() {
+    let mut rig = Rig::enabled(3);
+    rig.move_to(0.0);
+    rig.run_until(Phase::Holding, 5_000);
+    rig.run(10);
+    rig.request(Request::Stream);
+    let set_points = [State { position: 0.001, velocity: 1.0, acceleration: 0.0 }; MAX_AXES];
+    rig.door.stream = Some(StreamCommand { valid_until_ns: rig.clock.now_ns - 1, set_points });
+    rig.run(50);
+    assert_eq!(rig.stops()[0].rule, Rule::StaleCommand);
+    assert_eq!(rig.engine.axes()[0].set_point().position, 0.0);
+}
+
+#[test]
+fn what_a_standing_stream_says_of_its_velocity_and_acceleration_turns_no_joint() {
+    // More than the limits, as much as they allow, and the other way.
+    for (velocity, acceleration) in
+        [(1e9, 1e9), (LIMITS.velocity, LIMITS.acceleration), (-LIMITS.velocity, -1e300)]
+    {
+        for law in [VELOCITY, TORQUE] {
+            let mut rig = streaming(law, OnViolation::Reject);
+            for _ in 0..300 {
+                stream(&mut rig, State { position: 0.0, velocity, acceleration });
+                rig.run(1);
+                let turned = rig.engine.axes()[0].position().abs();
+                assert!(turned < 0.03, "{law:?}: {turned} rad");
+            }
+            assert!(rig.engine.axes()[0].velocity().abs() < 0.05);
+        }
+    }
+}
+
+#[test]
+fn a_stream_that_says_how_fast_it_is_is_followed_as_it_says() {
+    let mut rig = streaming(VELOCITY, OnViolation::Reject);
+    let period_s = PERIOD_NS as f64 * 1e-9;
+    let (mut position, mut velocity) = (0.0, 0.0_f64);
+    for _ in 0..400 {
+        let acceleration = if velocity < 1.0 { 5.0 } else { 0.0 };
+        velocity += acceleration * period_s;
+        position += velocity * period_s;
+        stream(&mut rig, State { position, velocity, acceleration });
+        rig.run(1);
+        let set = rig.engine.axes()[0].set_point();
+        assert_eq!((set.position, set.velocity), (position, velocity));
+    }
+    assert!(rig.stops().is_empty());
+}
+
+#[test]
+fn what_is_no_number_is_refused_whether_streams_are_clamped_or_not() {
+    for on_violation in [OnViolation::Reject, OnViolation::Clamp] {
+        for (velocity, acceleration) in [(f64::NAN, 0.0), (f64::INFINITY, 0.0), (0.0, f64::NEG_INFINITY)] {
+            let mut rig = streaming(TORQUE, on_violation);
+            stream(&mut rig, State { position: 0.0, velocity, acceleration });
+            rig.run(2);
+            let torque = rig.door.records.last().unwrap().axes[0].torque_set;
+            assert!(torque.abs() < 5.0, "{torque} N·m");
+            let is_stopped = rig.stops().iter().any(|stop| stop.rule == Rule::NotFinite);
+            assert_eq!(is_stopped, on_violation == OnViolation::Reject);
+            assert_eq!(rig.door.snapshot.clamped > 0, on_violation == OnViolation::Clamp);
+        }
+    }
+}
+
+#[test]
+fn a_flood_of_requests_is_taken_a_few_in_a_cycle_and_the_stream_goes_on() {
+    let mut rig = Rig::enabled(3);
+    rig.move_to(0.0);
+    rig.run_until(Phase::Holding, 5_000);
+    rig.request(Request::Stream);
+    for _ in 0..200 {
+        rig.door.requests.extend([Request::Enable; 16]);
+        rig.stream(0.0, 0.0, 5 * PERIOD_NS);
+        let before = rig.door.taken;
+        rig.run(1);
+        assert!(rig.door.taken - before <= 4);
+    }
+    assert_eq!(rig.phase(), Phase::Streaming);
+    assert!(rig.stops().is_empty());
+}
