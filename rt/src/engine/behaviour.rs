@@ -214,7 +214,7 @@ impl Engine {
             let was_stopping = self.phase == Phase::Stopping;
             self.refuse(axis, violation, now_ns, door);
             if was_stopping {
-                self.hold();
+                self.come_to_rest();
             } else {
                 self.follow_motion_if_stopping(now_ns, door);
             }
@@ -230,7 +230,7 @@ impl Engine {
         if self.phase == Phase::Stopping {
             self.follow_motion(now_ns, door);
         } else {
-            self.hold();
+            self.come_to_rest();
         }
     }
 }
