@@ -82,7 +82,7 @@ impl Motion {
         let mut limits: ArrayVec<Limits, MAX_AXES> = ArrayVec::new();
         for (start, axis) in axes.take(MAX_AXES) {
             starts.push(start);
-            limits.push(stop_limits(start.velocity, axis));
+            limits.push(stop_limits(&start, axis));
         }
         let duration_s = plan::stop(&starts, &limits, self.free(starts.len()))?;
         self.begin(duration_s);
@@ -153,11 +153,46 @@ fn move_limits(leg: &Leg<'_>, velocity_scale: f64, acceleration_scale: f64) -> L
         .with_position(lowest, highest)
 }
 
-fn stop_limits(velocity: f64, axis: &AxisLimits) -> Limits {
-    let (rising, falling) = if velocity >= 0.0 {
+/// A stop in coordination must not lead an axis that could stop sooner by itself beyond its position limits.
+fn stop_limits(start: &State, axis: &AxisLimits) -> Limits {
+    let (rising, falling) = if start.velocity >= 0.0 {
         (axis.acceleration, axis.deceleration)
     } else {
         (axis.deceleration, axis.acceleration)
     };
     Limits::asymmetric(axis.velocity, -axis.velocity, rising, -falling, axis.jerk)
+        .with_position(axis.position_min.min(start.position), axis.position_max.max(start.position))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LIMITS: AxisLimits = AxisLimits {
+        position_min: -3.0,
+        position_max: 3.0,
+        velocity: 2.0,
+        acceleration: 8.0,
+        deceleration: 8.0,
+        jerk: 100.0,
+        torque: 50.0,
+    };
+
+    #[test]
+    fn an_axis_that_can_stop_before_its_position_limit_is_not_led_beyond_it_by_a_slower_one() {
+        let at = |position: f64, velocity: f64| State { position, velocity, acceleration: 0.0 };
+        let slow = AxisLimits { deceleration: 1.0, ..LIMITS };
+        for jerk in [100.0, f64::INFINITY] {
+            let (quick, slow) = (AxisLimits { jerk, ..LIMITS }, AxisLimits { jerk, ..slow });
+            let mut motion = Motion::default();
+            // 0.5 rad/s at 8 rad/s² take less than 0.06 rad; in the 2 s of the other axis they would take 0.5 rad.
+            motion.stop([(at(2.9, 0.5), &quick), (at(0.0, 2.0), &slow)].into_iter()).unwrap();
+            let mut farthest: f64 = 2.9;
+            while !motion.is_finished() {
+                motion.advance(0.001);
+                farthest = farthest.max(motion.states().next().unwrap().position);
+            }
+            assert!(farthest > 2.9 && farthest <= 3.0, "{farthest} with jerk {jerk}");
+        }
+    }
 }

@@ -94,6 +94,23 @@ impl<P: BusPort> VirtualRun<P> {
     /// # Errors
     /// See [`assemble::engine`].
     pub fn new(config: &Config, ports: Vec<P>) -> Result<(Self, LogSide), AssembleError> {
+        Self::led_by(Supervisor::new(config, None), config, ports)
+    }
+
+    /// As [`VirtualRun::new`], for a group that is brought up and enabled and then left to whoever commands it through
+    /// [`VirtualRun::host`], until it is interrupted.
+    ///
+    /// # Errors
+    /// See [`assemble::engine`].
+    pub fn serving(config: &Config, ports: Vec<P>) -> Result<(Self, LogSide), AssembleError> {
+        Self::led_by(Supervisor::serving(config), config, ports)
+    }
+
+    fn led_by(
+        supervisor: Supervisor,
+        config: &Config,
+        ports: Vec<P>,
+    ) -> Result<(Self, LogSide), AssembleError> {
         let engine = Box::new(assemble::engine(config)?);
         let (rt, host, log) = channels(&ChannelSizes::of(config));
         let period_ns = config.cycle.period_ns.max(1);
@@ -106,7 +123,7 @@ impl<P: BusPort> VirtualRun<P> {
             ports,
             rt,
             host,
-            supervisor: Supervisor::new(config, None),
+            supervisor,
             time_of_day: TimeOfDayKeeper::of(config),
             rehearsal: None,
             is_over: false,

@@ -12,9 +12,14 @@ fn stopping_s(axis: &Axis) -> f64 {
     limits.velocity / limits.deceleration + if turning_s.is_finite() { turning_s } else { 0.0 }
 }
 
-/// From the reason of a stop to rest of every joint that obeys: that of the slowest axis, since they stop together.
+/// The longest trajectory of a stop: that of the slowest axis, since they stop together.
+pub fn planned_s(config: &Config) -> f64 {
+    config.axes.iter().map(stopping_s).fold(0.0, f64::max)
+}
+
+/// From the reason of a stop to rest of every joint that obeys.
 pub fn to_rest_s(config: &Config) -> f64 {
-    config.axes.iter().map(stopping_s).fold(0.0, f64::max) + LAG_S
+    planned_s(config) + LAG_S
 }
 
 /// How far a joint may travel until then: rad (m).

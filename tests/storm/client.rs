@@ -1,6 +1,6 @@
 //! Somebody who asks the group for anything at any time.
 
-use takt::config::Config;
+use takt::config::{Config, Control};
 use takt_rt::door::{Move, ProfileMove, Request, Snapshot, StreamCommand};
 use takt_rt::plan::State;
 use takt_rt::profile::ProfileTarget;
@@ -8,6 +8,18 @@ use takt_rt::record::MAX_AXES;
 use takt_rt::stop::{Phase, StopCategory};
 
 use crate::dice::Dice;
+
+/// What has been asked of the group up to a cycle, as far as invariants depend on it.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Asked {
+    /// A command of a stream has been handed over since the cycle before.
+    pub has_streamed: bool,
+    /// Somebody has asked for a reset of faults, not long ago.
+    pub has_reset_lately: bool,
+}
+
+/// The most requests in one cycle: more than the door holds.
+const REQUESTS_AT_MOST: usize = 24;
 
 /// What the client wants in a cycle.
 #[derive(Default)]
@@ -34,6 +46,10 @@ enum Badness {
     Leap,
     NotFinite,
     Fast,
+    /// Some commands do not come.
+    Patchy,
+    /// They come when they have expired.
+    Stale,
 }
 
 pub struct Client {
@@ -45,7 +61,7 @@ pub struct Client {
 
 impl Client {
     pub fn new(mut dice: Dice) -> Self {
-        let restlessness = dice.pick(&[0.002, 0.01, 0.05]);
+        let restlessness = dice.pick(&[0.002, 0.01, 0.05, 0.2]);
         Self { dice, restlessness, stream: None, last_id: 1000 }
     }
 
@@ -55,25 +71,37 @@ impl Client {
         if !self.dice.chance(self.restlessness) {
             return wishes;
         }
-        let request = match self.dice.below(20) {
+        if self.dice.chance(0.05) {
+            wishes.late_ns = (self.dice.between(0.1, 12.0) * config.cycle.period_ns as f64) as u64;
+            return wishes;
+        }
+        let requests = if self.dice.chance(0.01) { REQUESTS_AT_MOST } else { 1 };
+        for _ in 0..requests {
+            let request = self.request(config, snapshot);
+            wishes.requests.push(request);
+        }
+        wishes
+    }
+
+    fn request(&mut self, config: &Config, snapshot: &Snapshot) -> Request {
+        // Whoever finds the group stopped and disabled mostly wants it back, though not always in the right order.
+        if snapshot.phase == Phase::Disabled && self.dice.chance(0.8) {
+            return if self.dice.chance(0.5) { Request::Enable } else { Request::ResetFaults };
+        }
+        match self.dice.below(24) {
             0 => Request::Stop(self.dice.pick(&[StopCategory::Two, StopCategory::One, StopCategory::Zero])),
             1 => Request::Stop(StopCategory::Two),
             2 => Request::Disable,
-            3..=5 => Request::Enable,
-            6 => Request::ResetFaults,
-            7..=9 => {
+            3 => Request::Enable,
+            4..=5 => Request::ResetFaults,
+            6 => Request::Activate,
+            7..=11 => {
                 self.begin_stream(config, snapshot);
                 Request::Stream
             }
-            10..=12 => self.profile_target(config, snapshot),
-            13 => {
-                wishes.late_ns = (self.dice.between(0.1, 12.0) * config.cycle.period_ns as f64) as u64;
-                return wishes;
-            }
+            12..=14 => self.profile_target(config, snapshot),
             _ => self.random_move(config),
-        };
-        wishes.requests.push(request);
-        wishes
+        }
     }
 
     fn id(&mut self) -> u32 {
@@ -119,7 +147,13 @@ impl Client {
         let axis = self.dice.below(config.axes.len());
         let limits = &config.axes[axis].limits;
         let share = self.dice.between(-1.1, 1.1);
-        let target = match self.dice.below(3) {
+        let fitting = match config.axes[axis].control {
+            Control::ProfileVelocity => 1,
+            Control::ProfileTorque => 2,
+            _ => 0,
+        };
+        let kind = if self.dice.chance(0.8) { fitting } else { self.dice.below(3) };
+        let target = match kind {
             0 => ProfileTarget::Position(self.dice.between(limits.position_min, limits.position_max)),
             1 => ProfileTarget::Velocity(share * limits.velocity),
             _ => ProfileTarget::Torque(share * limits.torque * 0.2),
@@ -143,6 +177,8 @@ impl Client {
             Badness::Leap,
             Badness::NotFinite,
             Badness::Fast,
+            Badness::Patchy,
+            Badness::Stale,
         ]);
         let (cycles_left, swing) = (1 + self.dice.below(1000), self.dice.between(-0.5, 0.5));
         self.stream = Some(Stream { cycles_left, begun, elapsed_s: 0.0, swing, badness });
@@ -171,18 +207,21 @@ impl Client {
             match stream.badness {
                 Badness::Leap => set_points[0].position += 0.5,
                 Badness::NotFinite => set_points[0].position = f64::NAN,
-                Badness::None | Badness::Fast => {}
+                Badness::None | Badness::Fast | Badness::Patchy | Badness::Stale => {}
             }
         }
-        let valid_until_ns = snapshot.at_ns + self.dice.between(0.5, 30.0) as u64 * config.cycle.period_ns;
+        let is_left_out = stream.badness == Badness::Patchy && self.dice.chance(0.2);
+        let is_stale = stream.badness == Badness::Stale && is_last;
+        let at_ns = if is_stale { 0 } else { snapshot.at_ns };
+        let valid_until_ns = at_ns + self.dice.between(0.5, 30.0) as u64 * config.cycle.period_ns;
         if is_last {
             self.stream = None;
         }
-        Some(StreamCommand { valid_until_ns, set_points })
+        (!is_left_out).then_some(StreamCommand { valid_until_ns, set_points })
     }
 }
 
-/// Whether the group can be asked for something at all: it has been enabled, and nothing has stopped it by itself.
+/// Whether the group can be asked for something beside a program: nothing has stopped it by itself.
 pub fn is_open(snapshot: &Snapshot) -> bool {
     let has_own_stop = snapshot.stop.is_some_and(|stop| stop.rule != takt_rt::stop::Rule::Requested);
     snapshot.phase != Phase::Passive && !has_own_stop

@@ -9,6 +9,12 @@ impl Dice {
         Self(seed)
     }
 
+    /// Another stream, one for each number.
+    pub fn split(self, number: u64) -> Self {
+        let mut other = Self(self.0 ^ number.wrapping_mul(0xD6E8_FEB8_6659_FD93));
+        Self(other.next())
+    }
+
     fn next(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
         let mixed = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);

@@ -1,28 +1,40 @@
-//! Storms: random programs, requests and faults on the whole controller against the simulated drives, in virtual time.
+//! Storms: random machines, programs, requests and faults on the whole controller against the simulated drives, in
+//! virtual time.
 //!
-//! `TAKT_STORM_CYCLES=100000000` for a long one, `TAKT_STORM_SEED=…` for one case again, `TAKT_STORM_TABLE=1` for the
-//! table of reactions.
+//! `TAKT_STORM_CYCLES=100000000` for a long one (with `--release`), `TAKT_STORM_SEED=…` for one case again,
+//! `TAKT_STORM_TABLE=1` for the tables of what has been gone through and of the reactions.
 
 mod bounds;
 mod case;
 mod client;
+mod concern;
+mod coverage;
 mod dice;
+mod fingerprint;
 mod invariants;
+mod machine;
 mod regressions;
 mod run;
 mod table;
 mod tap;
 mod weather;
+mod wire;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::thread;
+use std::time::Instant;
 
 use case::Case;
+use coverage::Coverage;
 use run::{Done, play};
 
 /// In all of the shards together.
 const CYCLES: u64 = 1_040_000;
-const SHARDS: u64 = 8;
-/// So many failures are told of at once.
+/// Which seeds are played depends on the number of cycles alone, not on the number of processors.
+const SHARDS: u64 = 16;
+/// So many failures of a shard are told of at once.
 const FAILURES_AT_MOST: usize = 5;
 
 fn number(variable: &str) -> Option<u64> {
@@ -30,61 +42,81 @@ fn number(variable: &str) -> Option<u64> {
     Some(text.parse().unwrap_or_else(|_| panic!("{variable}={text} is no number")))
 }
 
-fn attempt(seed: u64) -> Result<Done, String> {
+fn attempt(seed: u64) -> Result<(Case, Done), String> {
     let played = catch_unwind(AssertUnwindSafe(|| {
         let case = Case::of(seed);
-        play(&case).map_err(|wrong| format!("{} {wrong}\n{}", case.name, case.text))
+        match play(&case) {
+            Ok(done) => Ok((case, done)),
+            Err(wrong) => Err(format!("{} {wrong}\n{}", case.config.name, case.text)),
+        }
     }));
     played
         .unwrap_or_else(|_| Err("it panics".to_owned()))
         .map_err(|wrong| format!("TAKT_STORM_SEED={seed}: {wrong}"))
 }
 
-/// Every so many seeds from one on, until there have been enough cycles.
-fn weather(shard: u64) {
-    let only = number("TAKT_STORM_SEED");
-    let budget = number("TAKT_STORM_CYCLES").unwrap_or(CYCLES) / SHARDS;
-    let (mut cycles, mut failures) = (0, vec![]);
+/// Every so many seeds from the number of the shard on, until there have been enough cycles.
+fn shard(shard: u64, budget: u64) -> (Coverage, Vec<String>) {
+    let (mut coverage, mut failures) = (Coverage::default(), vec![]);
     for seed in (shard..).step_by(SHARDS as usize) {
-        if cycles >= budget || failures.len() >= FAILURES_AT_MOST || only.is_some_and(|only| only < seed) {
+        if coverage.cycles >= budget || failures.len() >= FAILURES_AT_MOST {
             break;
         }
-        if only.is_some_and(|only| only != seed) {
-            continue;
-        }
         match attempt(seed) {
-            Ok(done) => cycles += done.cycles,
+            Ok((case, done)) => coverage.take(&case, &done),
             Err(failure) => failures.push(failure),
         }
     }
-    assert!(failures.is_empty(), "{}", failures.join("\n"));
-    eprintln!("{cycles} cycles");
+    (coverage, failures)
 }
 
-macro_rules! shards {
-    ($($name:ident: $shard:literal,)*) => {$(
-        #[test]
-        fn $name() {
-            weather($shard);
+/// All of the shards, on as many threads as there are processors.
+fn weather(cycles: u64) -> (Coverage, Vec<String>) {
+    let next = AtomicU64::new(0);
+    let all = Mutex::new((Coverage::default(), vec![]));
+    thread::scope(|scope| {
+        for _ in 0..thread::available_parallelism().map_or(1, usize::from) {
+            scope.spawn(|| {
+                loop {
+                    let number = next.fetch_add(1, Ordering::Relaxed);
+                    if number >= SHARDS {
+                        return;
+                    }
+                    let (coverage, failures) = shard(number, cycles / SHARDS);
+                    let mut all = all.lock().unwrap();
+                    all.0.add(&coverage);
+                    all.1.extend(failures);
+                }
+            });
         }
-    )*};
+    });
+    all.into_inner().unwrap()
 }
 
-shards! {
-    the_invariants_hold_in_every_storm_0: 0,
-    the_invariants_hold_in_every_storm_1: 1,
-    the_invariants_hold_in_every_storm_2: 2,
-    the_invariants_hold_in_every_storm_3: 3,
-    the_invariants_hold_in_every_storm_4: 4,
-    the_invariants_hold_in_every_storm_5: 5,
-    the_invariants_hold_in_every_storm_6: 6,
-    the_invariants_hold_in_every_storm_7: 7,
+#[test]
+fn the_invariants_hold_in_every_storm_and_every_fault_has_its_turn() {
+    if let Some(seed) = number("TAKT_STORM_SEED") {
+        if let Err(failure) = attempt(seed) {
+            panic!("{failure}");
+        }
+        return;
+    }
+    let began = Instant::now();
+    let cycles = number("TAKT_STORM_CYCLES").unwrap_or(CYCLES);
+    let (coverage, failures) = weather(cycles);
+    if number("TAKT_STORM_TABLE").is_some() {
+        let seconds = began.elapsed().as_secs_f64();
+        println!("{}\n{:.0} cycles a second", coverage.table(), coverage.cycles as f64 / seconds);
+    }
+    assert!(failures.is_empty(), "{}", failures.join("\n"));
+    let gaps = if cycles < CYCLES { vec![] } else { coverage.gaps() };
+    assert!(gaps.is_empty(), "never: {gaps:?}");
 }
 
 #[test]
 fn the_same_seed_is_the_same_storm_bit_for_bit() {
-    let fingerprints = |seed: u64| [(); 2].map(|()| attempt(seed).unwrap().fingerprint);
-    let all: Vec<[u64; 2]> = (100..106).map(fingerprints).collect();
+    let fingerprints = |seed: u64| [(); 2].map(|()| attempt(seed).unwrap().1.fingerprint);
+    let all: Vec<[u64; 2]> = (1_000_000..1_000_024).map(fingerprints).collect();
     assert!(all.iter().all(|[first, second]| first == second), "{all:?}");
     assert!(all.windows(2).all(|pair| pair[0] != pair[1]), "the fingerprint sees something: {all:?}");
 }

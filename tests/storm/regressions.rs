@@ -1,9 +1,11 @@
 //! What storms have found, one case each.
 
 use takt::config::{ProgramMove, ProgramTarget};
+use takt::controller::Interrupt;
 
-use crate::case::{Case, load, scenario};
+use crate::case::{Case, scenario};
 use crate::dice::Dice;
+use crate::machine::load;
 use crate::run::play;
 
 /// A move of all axes of a configuration from the middle of the first half of their travel, with these faults.
@@ -19,13 +21,14 @@ fn moving(name: &'static str, text: &str) -> Case {
     }];
     let scenario = scenario(text, &config);
     Case {
-        name,
         config,
         text: text.to_owned(),
         scenario,
-        has_client: false,
+        is_serving: false,
+        clients: 0,
         length: 3000,
-        is_cut: false,
+        interrupt: Interrupt::Controlled,
+        broken_off: None,
         dice: Dice::new(0),
     }
 }
@@ -57,5 +60,17 @@ fn a_bus_that_is_lost_soon_after_the_axes_are_enabled_is_noticed_by_its_drives()
         );
         let played = play(&moving("arm6-erob-cst", &lost));
         assert!(played.is_ok(), "at {at_ms} ms: {played:?}");
+    }
+}
+
+#[test]
+fn a_stop_in_coordination_leads_no_joint_beyond_its_position_limit() {
+    // The wrist is nearly there when the slower joints still have a long way to stop.
+    for length in (300..1500).step_by(25) {
+        let mut case = moving("arm6-erob", "");
+        let to = case.config.axes.iter().map(|axis| axis.limits.position_max - 1e-4);
+        case.config.program.moves[0].target = ProgramTarget::Position(to.collect());
+        let played = play(&Case { length, ..case });
+        assert!(played.is_ok(), "interrupted after {length} cycles: {played:?}");
     }
 }

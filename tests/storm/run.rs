@@ -1,32 +1,39 @@
 //! One case from power-up to the end.
 
-use std::hash::{DefaultHasher, Hasher};
 use std::sync::Arc;
 
 use takt::bus::port::Port;
 use takt::config::Config;
 use takt::controller::channels::LogSide;
-use takt::controller::{Interrupt, VirtualRun};
+use takt::controller::{Outcome, VirtualRun};
 use takt::faults::{Rehearsal, Scenario};
 use takt::sim::{Observation, SimulatedBus};
+use takt_rt::cia402::State;
+use takt_rt::door::{Request, Snapshot};
 use takt_rt::frame::Frame;
 use takt_rt::port::{BusPort, ReceiveBatch};
-use takt_rt::record::Event;
-use takt_rt::stop::Phase;
+use takt_rt::record::{Event, EventKind};
+use takt_rt::stop::{Phase, Rule};
 
 use crate::case::Case;
-use crate::client::{Client, is_open};
-use crate::invariants::{Invariants, REST};
+use crate::client::{Asked, Client, is_open};
+use crate::concern::Concerns;
+use crate::fingerprint::Fingerprint;
+use crate::invariants::{Invariants, REST, Seen};
 use crate::tap::Tap;
+use crate::wire::Wire;
 
 /// Bring-up, farewell and every patience of the life cycle together.
 const END_AT_MOST_S: f64 = 45.0;
+/// A request waits in the door and then takes so many cycles of the slowest bus to show.
+const RESET_CYCLES: u64 = 60;
 
 /// A controller in virtual time of which everything is seen.
 pub struct World {
     pub run: VirtualRun<Tap>,
     pub log: LogSide,
     pub rehearsal: Arc<Rehearsal>,
+    pub snapshot: Snapshot,
     /// Of the present cycle.
     pub sent: Vec<Vec<Frame>>,
     pub truth: Vec<Observation>,
@@ -34,19 +41,29 @@ pub struct World {
 }
 
 impl World {
+    /// A run of the program.
     pub fn new(config: &Config, scenario: &Scenario) -> Self {
+        Self::with(config, scenario, false)
+    }
+
+    fn with(config: &Config, scenario: &Scenario, is_serving: bool) -> Self {
         let rehearsal = Arc::new(Rehearsal::new(scenario.clone()));
         let simulated = |bus| Port::Simulated(Box::new(SimulatedBus::new(config, bus)));
         let ports =
             (0..config.buses.len()).map(|bus| Tap::new(rehearsal.wrap(bus, simulated(bus)))).collect();
-        let (run, log) = VirtualRun::new(config, ports).unwrap();
-        Self { run, log, rehearsal, sent: vec![vec![]; config.buses.len()], truth: vec![], events: vec![] }
+        let made =
+            if is_serving { VirtualRun::serving(config, ports) } else { VirtualRun::new(config, ports) };
+        let (run, log) = made.unwrap();
+        let snapshot = run.snapshot();
+        let sent = vec![vec![]; config.buses.len()];
+        Self { run, log, rehearsal, snapshot, sent, truth: vec![], events: vec![] }
     }
 
     /// One cycle. Returns whether the run goes on.
     pub fn step(&mut self, config: &Config) -> bool {
         let goes_on = self.run.step();
-        self.rehearsal.observe(&self.run.snapshot());
+        self.snapshot = self.run.snapshot();
+        self.rehearsal.observe(&self.snapshot);
         let ports = self.run.ports();
         for (sent, port) in self.sent.iter_mut().zip(ports.iter_mut()) {
             sent.clear();
@@ -62,12 +79,31 @@ impl World {
     }
 }
 
+/// How a fault went.
+#[derive(Clone, Copy, Debug)]
+pub struct Struck {
+    /// Its number in the scenario.
+    pub fault: usize,
+    /// What the group was doing when it began.
+    pub phase: Phase,
+    /// Whether the axes had been enabled before.
+    pub is_brought_up: bool,
+    /// The first stop that the group made by itself from then on, unless another fault came between.
+    pub stop: Option<Rule>,
+    /// Another fault came before anything stopped.
+    is_overtaken: bool,
+}
+
 /// What is left of a case.
 #[derive(Debug)]
 pub struct Done {
     pub cycles: u64,
     /// Of all records, events and frames.
     pub fingerprint: u64,
+    /// Every fault that has begun.
+    pub struck: Vec<Struck>,
+    /// Whether the drives could not be brought up.
+    pub is_bring_up_failed: bool,
 }
 
 /// Plays a case.
@@ -76,86 +112,130 @@ pub struct Done {
 /// The invariant that does not hold, and when.
 pub fn play(case: &Case) -> Result<Done, String> {
     let config = &case.config;
-    let mut world = World::new(config, &case.scenario);
-    let mut invariants = Invariants::new(config, &case.scenario);
-    let mut client = Client::new(case.dice);
-    let mut hasher = DefaultHasher::new();
+    let mut world = World::with(config, &case.scenario, case.is_serving);
+    let rehearsal = Arc::clone(&world.rehearsal);
+    let mut invariants = Invariants::new(config);
+    let mut concerns = Concerns::new(config, &rehearsal);
+    let mut wire = Wire::new(config);
+    let mut clients = Clients::new(case);
+    let mut fingerprint = Fingerprint::default();
+    let mut struck: Vec<Struck> = vec![];
     let at_most = case.length + (END_AT_MOST_S * 1e9 / config.cycle.period_ns as f64) as u64;
     let (mut enabled, mut cycles) = (None, 0);
     let mut goes_on = true;
     while goes_on {
+        let phase = world.snapshot.phase;
         goes_on = world.step(config);
         cycles += 1;
-        let snapshot = world.run.snapshot();
-        let wrong = |what: String| format!("cycle {cycles}, {:?}: {what}", snapshot.phase);
-        fingerprint(&mut hasher, &world);
-        invariants.check(config, &snapshot, &world.sent, &world.truth, &world.events).map_err(wrong)?;
-        while let Some(checked) = world.log.next_record(|record| {
-            hasher.write_u64(record.timing.slot);
-            for axis in record.axes() {
-                hasher.write_u64(axis.position_set.to_bits() ^ axis.position.to_bits().rotate_left(17));
-                hasher.write_i32(axis.command_raw);
-            }
-            invariants.check_record(config, record)
-        }) {
-            checked.map_err(wrong)?;
+        let wrong =
+            |snapshot: &Snapshot, what: String| format!("cycle {cycles}, {:?}: {what}", snapshot.phase);
+        wire.read(&world.sent);
+        concerns.observe(&rehearsal, |fault| {
+            struck
+                .iter_mut()
+                .filter(|struck| struck.stop.is_none())
+                .for_each(|struck| struck.is_overtaken = true);
+            struck.push(Struck {
+                fault,
+                phase,
+                is_brought_up: enabled.is_some(),
+                stop: None,
+                is_overtaken: false,
+            });
+        });
+        note_stop(&world.events, &mut struck);
+        fingerprint.take_cycle(&world);
+        let World { log, snapshot, truth, events, .. } = &mut world;
+        let mut look = |record: &_| {
+            fingerprint.take_record(record);
+            let (told, concerns, asked) = (&wire.told, &concerns.by_axis, clients.asked);
+            invariants.check(&Seen { config, snapshot, record, told, truth, events, concerns, asked })
+        };
+        while let Some(checked) = log.next_record(&mut look) {
+            checked.map_err(|what| wrong(snapshot, what))?;
         }
         if cycles > at_most {
-            return Err(wrong("the run does not end".to_owned()));
+            return Err(wrong(snapshot, "the run does not end".to_owned()));
         }
         if enabled.is_none() && snapshot.phase == Phase::Holding {
             enabled = Some(cycles);
         }
-        let Some(enabled) = enabled else { continue };
-        if cycles == enabled + case.length {
-            let interrupt = if case.is_cut { Interrupt::Immediate } else { Interrupt::Controlled };
-            world.run.interrupt(interrupt);
+        if case.broken_off == Some(cycles) || enabled.is_some_and(|enabled| cycles == enabled + case.length) {
+            world.run.interrupt(case.interrupt);
         }
-        if case.has_client && cycles < enabled + case.length && is_open(&snapshot) {
-            let wishes = client.wishes(config, &snapshot);
-            for request in wishes.requests {
-                let _ = world.run.host().request(request);
-            }
-            if let Some(command) = wishes.stream {
-                world.run.host().stream(&command);
-            }
-            world.run.clock().stall(wishes.late_ns);
+        let is_raging = enabled.is_some_and(|enabled| cycles < enabled + case.length);
+        clients.act(case, &mut world, is_raging);
+    }
+    at_rest(case, &concerns, &mut world)?;
+    let is_bring_up_failed = matches!(world.run.supervisor().outcome(), Some(Outcome::BringUpFailed(_)));
+    Ok(Done { cycles, fingerprint: fingerprint.value(), struck, is_bring_up_failed })
+}
+
+fn note_stop(events: &[Event], struck: &mut [Struck]) {
+    for event in events {
+        if let EventKind::Stop(reason) = event.kind
+            && reason.rule != Rule::Requested
+        {
+            struck.iter_mut().filter(|struck| !struck.is_overtaken).for_each(|struck| {
+                struck.stop.get_or_insert(reason.rule);
+            });
         }
     }
-    at_rest(case, &mut world)?;
-    Ok(Done { cycles, fingerprint: hasher.finish() })
+}
+
+/// Those who ask for things, all at one door.
+struct Clients {
+    all: Vec<Client>,
+    asked: Asked,
+    since_reset: u64,
+}
+
+impl Clients {
+    fn new(case: &Case) -> Self {
+        let all = (0..case.clients as u64).map(|number| Client::new(case.dice.split(number))).collect();
+        Self { all, asked: Asked::default(), since_reset: u64::MAX }
+    }
+
+    fn act(&mut self, case: &Case, world: &mut World, is_raging: bool) {
+        self.asked.has_streamed = false;
+        self.since_reset = self.since_reset.saturating_add(1);
+        let snapshot = &world.snapshot;
+        let is_waited_for = snapshot.phase == Phase::Passive || !case.is_serving && !is_open(snapshot);
+        if is_raging && !is_waited_for {
+            for client in &mut self.all {
+                let wishes = client.wishes(&case.config, snapshot);
+                for request in &wishes.requests {
+                    if world.run.host().request(*request).is_ok() && *request == Request::ResetFaults {
+                        self.since_reset = 0;
+                    }
+                }
+                if let Some(command) = wishes.stream {
+                    world.run.host().stream(&command);
+                    self.asked.has_streamed = true;
+                }
+                world.run.clock().stall(wishes.late_ns);
+            }
+        }
+        self.asked.has_reset_lately = self.since_reset < RESET_CYCLES;
+    }
 }
 
 /// Two seconds after the controller has gone, whatever it could not stop has been stopped by its own watchdog.
-fn at_rest(case: &Case, world: &mut World) -> Result<(), String> {
-    let end_ns = world.run.snapshot().at_ns;
+fn at_rest(case: &Case, concerns: &Concerns, world: &mut World) -> Result<(), String> {
+    let end_ns = world.snapshot.at_ns;
+    let mut batch = ReceiveBatch::new();
     for now_ns in (1..=2000).map(|passed_ms| end_ns + passed_ms * 1_000_000) {
         for port in world.run.ports() {
-            let mut batch = ReceiveBatch::new();
+            batch.clear();
             port.receive(now_ns, &mut batch);
         }
     }
-    let has_load = case.scenario.faults.iter().any(|fault| fault.kind == "load");
-    for axis in case.config.axes.iter().filter(|_| !has_load) {
+    for (axis, concern) in case.config.axes.iter().zip(&concerns.by_axis) {
         let truth = world.run.ports()[axis.bus].observe(axis.node);
-        if truth.velocity.abs() > REST {
+        let is_driven = truth.state == State::OperationEnabled;
+        if (truth.velocity.abs() > REST || is_driven) && !concern.is_loaded {
             return Err(format!("{} is not at rest in the end: {truth:?}", axis.name));
         }
     }
     Ok(())
-}
-
-fn fingerprint(hasher: &mut DefaultHasher, world: &World) {
-    for (bus, frames) in world.sent.iter().enumerate() {
-        for frame in frames {
-            hasher.write_u64(u64::from(frame.id().value()) << 8 | bus as u64);
-            hasher.write(frame.payload());
-        }
-    }
-    for event in &world.events {
-        hasher.write(format!("{event:?}").as_bytes());
-    }
-    for truth in &world.truth {
-        hasher.write_u64(truth.position.to_bits());
-    }
 }

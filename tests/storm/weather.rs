@@ -43,14 +43,44 @@ pub const KINDS: [&str; 35] = [
     "battery",
 ];
 
+/// Those that only the simulated eRob can have.
+pub const NEEDS_EROB: [&str; 10] = [
+    "stall",
+    "stuck-brake",
+    "encoder-jump",
+    "stuck-sdo",
+    "wrong-mapping",
+    "statusword",
+    "mode-display",
+    "torque-off",
+    "alarm",
+    "emergency",
+];
+
 /// What a fault needs to be told beside its kind.
 enum Place {
     Bus,
     Axis,
 }
 
-/// One fault, and when it comes unless that is given.
-pub fn fault(dice: &mut Dice, config: &Config, kind: &str, when: Option<&str>) -> String {
+/// When a fault comes, in a storm of so many milliseconds: anywhere from the opening of the buses to the end.
+pub fn when(dice: &mut Dice, length_ms: usize) -> String {
+    let (cue, at_most_ms) = dice.pick(&[
+        ("start", 400),
+        ("start", 1200),
+        ("enabled", length_ms),
+        ("enabled", length_ms / 4),
+        ("moving", length_ms),
+        ("moving", length_ms),
+        ("moving", length_ms / 4),
+        ("moving", length_ms / 2),
+        ("stopping", 300),
+    ]);
+    format!("when = \"{cue}\"\nat = \"{} ms\"", dice.below(at_most_ms.max(1)))
+}
+
+/// One fault of a kind.
+pub fn fault(dice: &mut Dice, config: &Config, kind: &str, when: &str) -> String {
     let axis = &config.axes[dice.below(config.axes.len())];
     let bus = &config.buses[axis.bus].name;
     let (place, lasts, keys) = particulars(dice, axis, kind);
@@ -58,19 +88,6 @@ pub fn fault(dice: &mut Dice, config: &Config, kind: &str, when: Option<&str>) -
         Place::Bus => format!("bus = \"{bus}\""),
         Place::Axis => format!("axis = \"{}\"", axis.name),
     };
-    let when = when.map_or_else(
-        || {
-            let (cue, at_most) = dice.pick(&[
-                ("enabled", 1200),
-                ("enabled", 300),
-                ("moving", 900),
-                ("moving", 900),
-                ("stopping", 300),
-            ]);
-            format!("when = \"{cue}\"\nat = \"{} ms\"", dice.below(at_most))
-        },
-        ToOwned::to_owned,
-    );
     let lasts = match lasts && dice.chance(0.7) {
         true => format!("for = \"{} ms\"", 1 + dice.below(600)),
         false => String::new(),
@@ -123,8 +140,8 @@ fn particulars(dice: &mut Dice, axis: &Axis, kind: &str) -> (Place, bool, String
             let (set, clear) = (1 << dice.below(16), 1 << dice.below(16));
             (Place::Axis, true, format!("set = {set}\nclear = {clear}"))
         }
-        "mode-display" => (Place::Axis, true, "mode = 1".to_owned()),
-        "alarm" => (Place::Axis, false, "code = 0x7500".to_owned()),
+        "mode-display" => (Place::Axis, true, format!("mode = {}", dice.pick(&[0, 1, 2, 3, 6, 8]))),
+        "alarm" => (Place::Axis, false, format!("code = {}", dice.pick(&[0x2310, 0x4310, 0x7500, 0xFF01]))),
         "emergency" => (Place::Axis, false, "code = 0x4210".to_owned()),
         _ => (Place::Axis, false, String::new()),
     }
@@ -135,7 +152,7 @@ fn frames(dice: &mut Dice, has_direction: bool) -> String {
     let mut keys = vec![format!("seed = {}", dice.below(1000))];
     if dice.chance(0.6) {
         let functions: &[&str] = match has_direction {
-            true => &["tpdo", "rpdo", "heartbeat", "sync", "emergency", "tpdo", "rpdo"],
+            true => &["tpdo", "rpdo", "heartbeat", "sync", "emergency", "sdo", "nmt", "tpdo", "rpdo"],
             false => &["rpdo", "sync"],
         };
         keys.push(format!("function = \"{}\"", dice.pick(functions)));

@@ -1,0 +1,160 @@
+//! What the storms have gone through: which faults, when, and what became of them.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Write;
+
+use takt::config::DriveFamily;
+use takt_rt::stop::Phase;
+
+use crate::case::Case;
+use crate::run::Done;
+use crate::weather::KINDS;
+
+/// How often a kind of fault has come in which situation, and what it led to.
+#[derive(Clone, Debug, Default)]
+struct Faced {
+    /// Before the axes were enabled for the first time.
+    bringing_up: u64,
+    /// While they were led up, held still, moved, and came to rest or were off.
+    enabling: u64,
+    holding: u64,
+    moving: u64,
+    ending: u64,
+    reactions: BTreeMap<&'static str, u64>,
+}
+
+impl Faced {
+    fn all(&self) -> u64 {
+        self.bringing_up + self.enabling + self.holding + self.moving + self.ending
+    }
+}
+
+#[derive(Clone, Debug, Default)]
+pub struct Coverage {
+    pub cycles: u64,
+    pub cases: u64,
+    faced: BTreeMap<&'static str, Faced>,
+    /// Family, mode, and the period of the bus in µs.
+    drives: BTreeMap<(&'static str, u8, u64), u64>,
+    serving: u64,
+    several_clients: u64,
+    several_faults: u64,
+}
+
+impl Coverage {
+    pub fn take(&mut self, case: &Case, done: &Done) {
+        self.cycles += done.cycles;
+        self.cases += 1;
+        self.serving += u64::from(case.is_serving);
+        self.several_clients += u64::from(case.clients > 1);
+        self.several_faults += u64::from(done.struck.len() > 1);
+        for axis in &case.config.axes {
+            let period_us =
+                case.config.cycle.period_ns * u64::from(case.config.buses[axis.bus].divider) / 1000;
+            let mode = axis.control.operation_mode() as u8;
+            *self.drives.entry((axis.drive.word(), mode, period_us)).or_default() += 1;
+        }
+        for struck in &done.struck {
+            let faced = self.faced.entry(case.scenario.faults[struck.fault].kind).or_default();
+            let count = match struck.phase {
+                Phase::Enabling => &mut faced.enabling,
+                _ if !struck.is_brought_up => &mut faced.bringing_up,
+                Phase::Holding => &mut faced.holding,
+                Phase::Moving | Phase::Streaming => &mut faced.moving,
+                Phase::Passive | Phase::Disabled | Phase::Stopping | Phase::Disabling => &mut faced.ending,
+            };
+            *count += 1;
+            let reaction = match struck.stop {
+                Some(rule) => rule.key(),
+                None if done.is_bring_up_failed && !struck.is_brought_up => "no bring-up",
+                None => "borne",
+            };
+            *faced.reactions.entry(reaction).or_default() += 1;
+        }
+    }
+
+    pub fn add(&mut self, other: &Self) {
+        self.cycles += other.cycles;
+        self.cases += other.cases;
+        self.serving += other.serving;
+        self.several_clients += other.several_clients;
+        self.several_faults += other.several_faults;
+        for (kind, faced) in &other.faced {
+            let sum = self.faced.entry(kind).or_default();
+            sum.bringing_up += faced.bringing_up;
+            sum.enabling += faced.enabling;
+            sum.holding += faced.holding;
+            sum.moving += faced.moving;
+            sum.ending += faced.ending;
+            faced.reactions.iter().for_each(|(rule, count)| *sum.reactions.entry(rule).or_default() += count);
+        }
+        other.drives.iter().for_each(|(drive, count)| *self.drives.entry(*drive).or_default() += count);
+    }
+
+    /// What has not occurred and should have.
+    pub fn gaps(&self) -> Vec<String> {
+        let mut gaps = vec![];
+        for kind in KINDS {
+            let faced = self.faced.get(kind).cloned().unwrap_or_default();
+            for (count, when) in [
+                (faced.bringing_up, "before the axes are enabled"),
+                (faced.holding + faced.moving, "with the axes enabled"),
+                (faced.moving, "in motion"),
+            ] {
+                if count == 0 {
+                    gaps.push(format!("{kind} {when}"));
+                }
+            }
+        }
+        let drives: BTreeSet<(&str, u8)> = self.drives.keys().map(|(word, mode, _)| (*word, *mode)).collect();
+        let all =
+            [(DriveFamily::ErobCanopen, &[1, 3, 4, 7, 8, 9, 10][..]), (DriveFamily::YzAim, &[1, 3, 7][..])];
+        for (family, modes) in all {
+            let missing = modes.iter().filter(|mode| !drives.contains(&(family.word(), **mode)));
+            gaps.extend(missing.map(|mode| format!("{} in mode {mode}", family.word())));
+        }
+        for (count, what) in [
+            (self.serving, "a group that clients command"),
+            (self.several_clients, "several clients"),
+            (self.several_faults, "several faults"),
+            (self.faced.values().map(|faced| faced.enabling).sum(), "a fault while the axes are led up"),
+        ] {
+            if count == 0 {
+                gaps.push(what.to_owned());
+            }
+        }
+        gaps
+    }
+
+    pub fn table(&self) -> String {
+        let mut text = format!(
+            "{} cycles, {} cases: {} with clients in charge, {} with several clients, {} with several faults\n\n\
+             | Fault | Cases | Bring-up | Enabling | Holding | Moving | Ending | Reactions |\n\
+             |---|---|---|---|---|---|---|---|\n",
+            self.cycles, self.cases, self.serving, self.several_clients, self.several_faults,
+        );
+        for kind in KINDS {
+            let faced = self.faced.get(kind).cloned().unwrap_or_default();
+            let mut reactions: Vec<_> = faced.reactions.iter().collect();
+            reactions.sort_by_key(|(_, count)| std::cmp::Reverse(**count));
+            let reactions: Vec<String> =
+                reactions.iter().map(|(rule, count)| format!("{rule} {count}")).collect();
+            let _ = writeln!(
+                text,
+                "| {kind} | {} | {} | {} | {} | {} | {} | {} |",
+                faced.all(),
+                faced.bringing_up,
+                faced.enabling,
+                faced.holding,
+                faced.moving,
+                faced.ending,
+                reactions.join(", "),
+            );
+        }
+        text.push_str("\n| Drive | Mode | Period of its bus | Axes |\n|---|---|---|---|\n");
+        for ((family, mode, period_us), count) in &self.drives {
+            let _ = writeln!(text, "| {family} | {mode} | {period_us} µs | {count} |");
+        }
+        text
+    }
+}

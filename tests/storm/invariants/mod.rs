@@ -1,0 +1,72 @@
+//! What holds after every cycle, whatever has been asked for and whatever has broken.
+
+mod course;
+mod phases;
+mod power;
+mod stops;
+
+use takt::config::Config;
+use takt::controller::assemble;
+use takt::sim::Observation;
+use takt_rt::door::Snapshot;
+use takt_rt::record::{CycleRecord, Event};
+
+use crate::client::Asked;
+use crate::concern::Concern;
+use crate::wire::Told;
+
+use course::Course;
+use phases::Phases;
+use power::Power;
+use stops::Stops;
+
+/// Slower than this is rest: rad/s (m/s).
+pub const REST: f64 = 2e-3;
+
+/// One cycle, from every side.
+pub struct Seen<'a> {
+    pub config: &'a Config,
+    /// The state that the controller shows after it.
+    pub snapshot: &'a Snapshot,
+    /// What it has left for the logger.
+    pub record: &'a CycleRecord,
+    /// What was told to the drives on the wire, an axis each.
+    pub told: &'a [Told],
+    /// What is true of the drives, an axis each.
+    pub truth: &'a [Observation],
+    /// What was told to people.
+    pub events: &'a [Event],
+    /// What cannot be expected of the joints any more, an axis each.
+    pub concerns: &'a [Concern],
+    /// What had been asked for before it.
+    pub asked: Asked,
+}
+
+pub struct Invariants {
+    courses: Vec<Course>,
+    power: Power,
+    phases: Phases,
+    stops: Stops,
+}
+
+impl Invariants {
+    pub fn new(config: &Config) -> Self {
+        let courses = config.axes.iter().map(|axis| Course::new(assemble::scale(axis).unwrap()));
+        Self {
+            courses: courses.collect(),
+            power: Power::new(config.axes.len()),
+            phases: Phases::default(),
+            stops: Stops::new(config.axes.len()),
+        }
+    }
+
+    /// Looks at a cycle.
+    pub fn check(&mut self, seen: &Seen<'_>) -> Result<(), String> {
+        for (axis, course) in self.courses.iter_mut().enumerate() {
+            course.check(seen, axis).map_err(|wrong| format!("{}: {wrong}", seen.config.axes[axis].name))?;
+        }
+        self.stops.check(seen)?;
+        self.power.check(seen)?;
+        self.phases.check(seen)
+    }
+}

@@ -1,0 +1,88 @@
+//! The group's state machine: it never stays where it must pass, and every stop has one reason.
+
+use takt::config::{Config, Control};
+use takt_rt::record::EventKind;
+use takt_rt::stop::{Phase, Rule};
+
+use super::Seen;
+use crate::bounds;
+
+#[derive(Default)]
+pub struct Phases {
+    phase: Phase,
+    cycles: u64,
+    is_latched: bool,
+}
+
+impl Phases {
+    pub fn check(&mut self, seen: &Seen<'_>) -> Result<(), String> {
+        self.check_reasons(seen)?;
+        let phase = seen.snapshot.phase;
+        if phase == self.phase {
+            self.cycles += 1;
+        } else {
+            (self.phase, self.cycles) = (phase, 0);
+        }
+        match longest_s(phase, seen.config) {
+            Some(longest_s) if self.cycles > bounds::cycles(seen.config, longest_s) => {
+                Err(format!("{phase:?} for {} cycles: stuck", self.cycles))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn check_reasons(&mut self, seen: &Seen<'_>) -> Result<(), String> {
+        let shown = seen.snapshot.stop.filter(|stop| stop.rule != Rule::Requested);
+        let was_latched = self.is_latched;
+        for event in seen.events {
+            match event.kind {
+                EventKind::Stop(reason) if reason.rule != Rule::Requested => {
+                    if self.is_latched && !seen.asked.has_reset_lately {
+                        return Err(format!("a second reason: {reason:?}, shown {:?}", seen.snapshot.stop));
+                    }
+                    self.is_latched = true;
+                }
+                EventKind::PhaseChanged { to: Phase::Enabling, .. }
+                    if was_latched && !seen.asked.has_reset_lately =>
+                {
+                    return Err("enabling while a fault is latched".to_owned());
+                }
+                _ => {}
+            }
+        }
+        if self.is_latched && shown.is_none() {
+            if !seen.asked.has_reset_lately {
+                return Err("the reason of a stop is gone, and nobody has asked for that".to_owned());
+            }
+            self.is_latched = false;
+        }
+        if shown.is_some() && !self.is_latched {
+            return Err(format!("nobody was told of {shown:?}"));
+        }
+        let must_have_reason = seen.snapshot.phase == Phase::Stopping;
+        match must_have_reason && seen.snapshot.stop.is_none() {
+            true => Err("it stops without a reason".to_owned()),
+            false => Ok(()),
+        }
+    }
+}
+
+/// How long a phase that must pass by itself may last.
+fn longest_s(phase: Phase, config: &Config) -> Option<f64> {
+    match phase {
+        Phase::Passive | Phase::Disabled | Phase::Holding => None,
+        // A velocity or a torque may be asked for again and again.
+        Phase::Moving if config.axes.iter().any(|axis| axis.control.is_profile()) => None,
+        Phase::Moving => Some(30.0),
+        Phase::Streaming => Some(10.0),
+        Phase::Enabling => Some(5.2),
+        Phase::Stopping => Some(2.0 * bounds::to_rest_s(config) + 1.0),
+        // A drive that never shows that it has obeyed is waited for once more when the stop becomes harder.
+        Phase::Disabling => Some(2.0 * (5.2 + bounds::to_rest_s(config))),
+    }
+}
+
+/// Whether nothing bounds the speed of a joint but friction.
+pub fn is_unbounded(control: &Control) -> bool {
+    matches!(control, Control::ProfileTorque)
+}

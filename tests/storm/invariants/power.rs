@@ -1,0 +1,121 @@
+//! Nothing is enabled, reset or moved that should not be.
+
+use takt_rt::cia402::State;
+use takt_rt::stop::Phase;
+
+use super::{REST, Seen};
+use crate::bounds;
+use takt::sim::Observation;
+
+/// Bit 7 of a controlword.
+const FAULT_RESET: u16 = 0x80;
+/// How far up a controlword leads: the same in both families.
+const SWITCHED_ON: u8 = 2;
+/// Cycles from a controlword on the wire to a drive that has taken it.
+const OBEYING_CYCLES: u64 = 12;
+
+/// 0 no voltage, 1 ready to switch on, 2 switched on, 3 operation enabled.
+const fn level(controlword: u16) -> u8 {
+    match controlword & 0xF {
+        0xF => 3,
+        0x7 => SWITCHED_ON,
+        0x6 | 0xE => 1,
+        _ => 0,
+    }
+}
+
+#[derive(Clone, Copy, Default)]
+struct Watched {
+    level: u8,
+    truth: Option<Observation>,
+}
+
+pub struct Power {
+    axes: Vec<Watched>,
+    has_enabled: bool,
+    since_enabling: u64,
+    /// Cycles for which the group has been disabled.
+    disabled: u64,
+}
+
+impl Power {
+    pub fn new(axes: usize) -> Self {
+        Self {
+            axes: vec![Watched::default(); axes],
+            has_enabled: false,
+            since_enabling: u64::MAX,
+            disabled: 0,
+        }
+    }
+
+    pub fn check(&mut self, seen: &Seen<'_>) -> Result<(), String> {
+        let phase = seen.record.phase;
+        self.has_enabled |= phase == Phase::Enabling;
+        let is_enabling = phase == Phase::Enabling;
+        self.since_enabling = if is_enabling { 0 } else { self.since_enabling.saturating_add(1) };
+        let is_disabled = matches!(phase, Phase::Disabled | Phase::Passive);
+        self.disabled = if is_disabled { self.disabled + 1 } else { 0 };
+        for index in 0..self.axes.len() {
+            let checked = self
+                .check_controlword(seen, index)
+                .and_then(|()| self.check_disabled(seen, index))
+                .and_then(|()| self.check_powerless(seen, index));
+            checked.map_err(|wrong| format!("{}: {wrong}", seen.config.axes[index].name))?;
+            self.axes[index].truth = Some(seen.truth[index]);
+        }
+        Ok(())
+    }
+
+    /// A drive is led up only while the group is being enabled, and reset only when somebody has asked for it.
+    fn check_controlword(&mut self, seen: &Seen<'_>, index: usize) -> Result<(), String> {
+        let Some(word) = seen.told[index].controlword else { return Ok(()) };
+        let (phase, new) = (seen.record.phase, level(word));
+        let last = std::mem::replace(&mut self.axes[index].level, new);
+        // The last of them may follow the phase: it ends as soon as the drives show that they are enabled.
+        if new >= SWITCHED_ON && new > last && self.since_enabling > OBEYING_CYCLES {
+            return Err(format!("led up by controlword {word:#06x} in phase {phase:?}"));
+        }
+        if new >= SWITCHED_ON && matches!(phase, Phase::Disabled | Phase::Passive) {
+            return Err(format!("controlword {word:#06x} in a disabled group"));
+        }
+        let is_reset = word & FAULT_RESET != 0;
+        match is_reset && self.has_enabled && !seen.asked.has_reset_lately {
+            true => Err(format!("reset by controlword {word:#06x}, and nobody has asked for that")),
+            false => Ok(()),
+        }
+    }
+
+    /// A disabled group has no enabled drive, and soon no joint that moves.
+    fn check_disabled(&self, seen: &Seen<'_>, index: usize) -> Result<(), String> {
+        let (concern, truth) = (&seen.concerns[index], &seen.truth[index]);
+        if concern.is_present || self.disabled <= OBEYING_CYCLES {
+            return Ok(());
+        }
+        if truth.state == State::OperationEnabled {
+            return Err(format!("enabled, {} cycles after the group was disabled", self.disabled));
+        }
+        let is_late = self.disabled > bounds::cycles(seen.config, bounds::to_rest_s(seen.config));
+        match is_late && truth.velocity.abs() > REST {
+            true => Err(format!("{} in a disabled group", truth.velocity)),
+            false => Ok(()),
+        }
+    }
+
+    /// A joint without torque does not speed up, and one that is braked and stands stays.
+    fn check_powerless(&self, seen: &Seen<'_>, index: usize) -> Result<(), String> {
+        let now = &seen.truth[index];
+        let Some(before) = self.axes[index].truth else { return Ok(()) };
+        if seen.concerns[index].is_driven_by_others {
+            return Ok(());
+        }
+        let was_powerless = !before.state.has_torque() && !now.state.has_torque();
+        if was_powerless && now.torque == 0.0 && now.velocity.abs() > before.velocity.abs() + 1e-9 {
+            return Err(format!("without torque from {before:?} to {now:?}"));
+        }
+        let stood = was_powerless && before.is_braked && now.is_braked && before.velocity == 0.0;
+        match stood && now.position != before.position {
+            true => Err(format!("braked, but moves from {before:?} to {now:?}")),
+            false => Ok(()),
+        }
+    }
+}

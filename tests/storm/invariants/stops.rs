@@ -1,0 +1,58 @@
+//! A stop is over within the time and the distance that are stated of it.
+
+use takt_rt::stop::Phase;
+
+use super::phases::is_unbounded;
+use super::{REST, Seen};
+use crate::bounds;
+
+pub struct Stops {
+    /// Where each joint was when the present stop began.
+    positions: Vec<f64>,
+    /// Cycles since the stop under way began.
+    cycles: Option<u64>,
+}
+
+impl Stops {
+    pub fn new(axes: usize) -> Self {
+        Self { positions: vec![0.0; axes], cycles: None }
+    }
+
+    pub fn check(&mut self, seen: &Seen<'_>) -> Result<(), String> {
+        let config = seen.config;
+        match (seen.snapshot.phase, self.cycles) {
+            (Phase::Moving | Phase::Streaming | Phase::Enabling, _) => self.cycles = None,
+            (Phase::Stopping, None) => {
+                self.cycles = Some(0);
+                let positions = self.positions.iter_mut().zip(seen.truth);
+                positions.for_each(|(position, truth)| *position = truth.position);
+                let (planned_s, stated_s) = (seen.snapshot.remaining_s, bounds::planned_s(config));
+                if planned_s > stated_s {
+                    return Err(format!("a stop of {planned_s} s, beyond the {stated_s} s that are stated"));
+                }
+            }
+            (_, Some(cycles)) => self.cycles = Some(cycles + 1),
+            _ => {}
+        }
+        let Some(cycles) = self.cycles else { return Ok(()) };
+        let is_over = cycles > bounds::cycles(config, bounds::to_rest_s(config));
+        for (index, axis) in
+            config.axes.iter().enumerate().filter(|(index, _)| !seen.concerns[*index].is_present)
+        {
+            let truth = &seen.truth[index];
+            let travelled = (truth.position - self.positions[index]).abs();
+            let limit = bounds::to_rest_distance(config, axis);
+            if travelled > limit && !is_unbounded(&axis.control) {
+                return Err(format!("{}: {travelled} since the stop began, beyond {limit}", axis.name));
+            }
+            // That one is braked once the group is disabled.
+            if is_over
+                && !is_unbounded(&axis.control)
+                && truth.velocity.abs() > REST.max(0.01 * axis.limits.velocity)
+            {
+                return Err(format!("{}: {} after the time to rest", axis.name, truth.velocity));
+            }
+        }
+        Ok(())
+    }
+}
