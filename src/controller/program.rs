@@ -16,7 +16,9 @@ pub struct ProgramRunner {
     repeat: Option<u64>,
     /// Moves begun so far.
     begun: u64,
-    /// The numbers of the requests of the present step.
+    /// The number of the last move that was asked for.
+    last_id: u32,
+    /// The numbers of the requests that ask for it.
     asked: Vec<RequestId>,
     state: State,
 }
@@ -60,13 +62,13 @@ impl ProgramRunner {
     pub fn new(program: &Program, endless: bool) -> Self {
         let repeat = (!endless).then(|| u64::from(program.repeat.max(1)));
         let state = if program.moves.is_empty() { State::Finished } else { State::Next };
-        Self { moves: program.moves.clone(), repeat, begun: 0, asked: vec![], state }
+        Self { moves: program.moves.clone(), repeat, begun: 0, last_id: 0, asked: vec![], state }
     }
 
     /// Takes the state of the group and says what is to happen. The requests of a step bear `numbers`, so that nobody
     /// else's refusal is taken for theirs.
     pub fn poll(&mut self, now_ns: u64, snapshot: &Snapshot, numbers: &RequestNumbers) -> Step {
-        let is_reached = self.asked.last().is_some_and(|last| snapshot.finished_move == move_number(*last));
+        let is_reached = snapshot.finished_move == self.last_id;
         let is_done = is_reached && snapshot.phase == Phase::Holding;
         match self.state {
             State::Finished => Step::Finished,
@@ -135,33 +137,28 @@ impl ProgramRunner {
         }
     }
 
-    /// The requests of the present move, its speeds and torques times `factor`. All of them are one move, which bears the
-    /// number of the last.
+    /// The requests of the present move, its speeds and torques times `factor`. All of them are one move with a number of
+    /// its own.
     fn present_requests(&mut self, now_ns: u64, factor: f64, numbers: &RequestNumbers) -> Vec<Asked> {
+        // Never 0, which stands for "none yet".
+        self.last_id = self.last_id.checked_add(1).unwrap_or(1);
+        let id = self.last_id;
         let valid_until_ns = now_ns + self.present_duration_ns().unwrap_or(0) + REACHING_NS + EXPIRY_NS;
         let Some(present) = self.present() else { return vec![] };
         let drive = |values: &[f64], target: fn(f64) -> ProfileTarget| -> Vec<Request> {
             let axes = (0..).zip(values).filter(|(_, value)| **value != 0.0);
             axes.map(|(axis, value)| {
                 let target = target(value * factor);
-                Request::SetProfileTarget(ProfileMove { id: 0, axis, target, valid_until_ns })
+                Request::SetProfileTarget(ProfileMove { id, axis, target, valid_until_ns })
             })
             .collect()
         };
-        let mut requests = match &present.target {
-            ProgramTarget::Position(position) => vec![Request::Move(move_of(present, position))],
+        let requests = match &present.target {
+            ProgramTarget::Position(position) => vec![Request::Move(move_of(id, present, position))],
             ProgramTarget::Velocity { velocity, .. } => drive(velocity, ProfileTarget::Velocity),
             ProgramTarget::Torque { torque, .. } => drive(torque, ProfileTarget::Torque),
         };
         self.asked = requests.iter().map(|_| numbers.next()).collect();
-        let number = self.asked.last().copied().map_or(0, move_number);
-        for request in &mut requests {
-            match request {
-                Request::Move(to) => to.id = number,
-                Request::SetProfileTarget(to) => to.id = number,
-                _ => {}
-            }
-        }
         self.asked.iter().zip(requests).map(|(id, request)| Asked { id: *id, request }).collect()
     }
 
@@ -179,16 +176,11 @@ impl ProgramRunner {
     }
 }
 
-/// The number of the move that a request asks for: never 0, which stands for "none yet".
-pub(super) const fn move_number(request: RequestId) -> u32 {
-    (request.0 % u32::MAX as u64) as u32 + 1
-}
-
-fn move_of(present: &ProgramMove, position: &[f64]) -> Move {
+fn move_of(id: u32, present: &ProgramMove, position: &[f64]) -> Move {
     let mut target = [0.0; MAX_AXES];
     target.iter_mut().zip(position).for_each(|(to, from)| *to = *from);
     Move {
-        id: 0,
+        id,
         target,
         target_velocity: [0.0; MAX_AXES],
         velocity_scale: present.velocity_scale,

@@ -37,7 +37,6 @@ use takt_rt::stop::{Phase, StopCategory};
 
 use super::channels::{Observer, RequestNumbers, Streamer};
 use super::outcome::{Interrupt, Outcome};
-use super::program::move_number;
 use super::session::{self, Remote, Session, SessionError, SessionOptions};
 use crate::config::{Axis, Config};
 
@@ -393,4 +392,9 @@ fn within(axis: &Axis, value: f64, lowest: f64, highest: f64) -> Result<(), Comm
 fn expiry_ns(valid_for: Duration) -> u64 {
     let valid_ns = u64::try_from(valid_for.as_nanos()).unwrap_or(u64::MAX);
     MonotonicClock::default().now_ns().saturating_add(valid_ns)
+}
+
+/// The number of the move that a request asks for: never 0, which stands for "none yet".
+const fn move_number(request: RequestId) -> u32 {
+    (request.0 % u32::MAX as u64) as u32 + 1
 }
