@@ -227,6 +227,7 @@ cases! {
     words_that_mean_nothing_are_refused {
         "mode = \"csp\"" => "mode = \"csq\"", at "csq": UnknownChoice { nearest: Some("csp" | "csv" | "cst"), .. },
         "drive = \"erob-canopen\"" => "drive = \"erob\"", at "\"erob\"": UnknownChoice { nearest: Some("erob-canopen"), .. },
+        "feedback = [\"velocity\"]" => "mapping = \"mine\"", at "mine": UnknownChoice { choices, .. } if choices.contains(&"as-stored"),
         "feedback = [\"velocity\"]" => "feedback = [\"colour\"]", at "colour": UnknownChoice { nearest: None, choices, .. } if choices.contains(&"torque"),
         "gear_ratio = 1.0" => "travel = \"sideways\"", at "sideways": UnknownChoice { .. },
         "feedback = [\"velocity\"]" => "feedback = [\"velocity\", \"velocity\"]", at "feedback": Repeated { .. },

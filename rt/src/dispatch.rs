@@ -86,6 +86,18 @@ impl Dispatch {
         self.enter(id, axis, UNUSED)
     }
 
+    /// Forgets the process data of an axis.
+    pub fn forget_process_data(&mut self, axis: u8) {
+        let first = 1 + u16::from(axis) * 8;
+        let of_axis = |entry: u16| entry.checked_sub(first).filter(|kind| *kind < 8);
+        let is_process_data = |kind: u16| kind < ERROR_CONTROL.into() || kind == UNUSED.into();
+        for entry in &mut self.entries {
+            if of_axis(*entry).is_some_and(is_process_data) {
+                *entry = NOBODY;
+            }
+        }
+    }
+
     fn enter(&mut self, id: Id, axis: u8, kind: u8) -> Result<(), IdTaken> {
         let taken = IdTaken { id };
         if id.is_extended() || usize::from(axis) >= MAX_AXES {
@@ -151,6 +163,29 @@ mod tests {
         let id = Id::canopen(0x180, 1);
         table.feedback(id, 0, 0).unwrap();
         assert_eq!(table.feedback(id, 1, 0), Err(IdTaken { id }));
+    }
+
+    #[test]
+    fn an_axis_whose_process_data_is_forgotten_keeps_its_other_messages_and_the_others_theirs() {
+        let mut table = Dispatch::default();
+        for axis in 0..3u8 {
+            let node = axis + 1;
+            table.emergency(Id::canopen(0x080, node), axis).unwrap();
+            table.error_control(Id::canopen(0x700, node), axis).unwrap();
+            table.feedback(Id::canopen(0x180, node), axis, 0).unwrap();
+            table.unused(Id::canopen(0x280, node), axis).unwrap();
+        }
+        table.foreign(Id::canopen(0x200, 2));
+        table.forget_process_data(1);
+        let to = |function, node| table.destination(&Frame::of(Id::canopen(function, node), [0; 8]));
+        assert_eq!([to(0x180, 2), to(0x280, 2)], [Destination::Service; 2]);
+        assert_eq!(to(0x080, 2), Destination::Emergency { axis: 1 });
+        assert_eq!(to(0x700, 2), Destination::ErrorControl { axis: 1 });
+        assert_eq!(to(0x200, 2), Destination::Foreign);
+        for (axis, node) in [(0, 1), (2, 3)] {
+            assert_eq!(to(0x180, node), Destination::Feedback { axis, pdo: 0 });
+            assert_eq!(to(0x280, node), Destination::Unused);
+        }
     }
 
     #[test]

@@ -1,8 +1,10 @@
 //! The door between the real-time thread and everything else: a handful of bounded, lock-free channels, seen from
 //! inside as this one trait. No call waits; a full channel drops, and says so.
 
+use crate::axis::{Cadence, MAX_PDOS};
 use crate::cia402;
-use crate::frame::Frame;
+use crate::frame::{Frame, Id};
+use crate::pdo::{MAX_OBJECTS, MappedObject};
 use crate::plan;
 use crate::port::{BusHealth, Received};
 use crate::profile::ProfileTarget;
@@ -36,7 +38,6 @@ pub trait Door {
 }
 
 /// What can be asked of the group.
-#[expect(clippy::large_enum_variant, reason = "it lives in a ring of fixed slots, where size is set once")]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Request {
     /// Begin to send SYNC (`true`) or cease (`false`).
@@ -53,6 +54,8 @@ pub enum Request {
         /// Object 6076 in N·m (N for a linear axis).
         torque: f64,
     },
+    /// Exchange this process data with an axis' drive, as the drive has reported it, before anything moves.
+    ProcessData(AxisProcessData),
     /// Where the drive has said that it is, for as long as it has not reported it by process data: nothing is sent to a
     /// drive of which this is not known.
     Position {
@@ -80,6 +83,30 @@ pub enum Request {
     ResetFaults,
     /// Leave the loop after this cycle. The drives get no more set-points.
     Leave,
+}
+
+/// The process data of one axis, to replace what it was set up with.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AxisProcessData {
+    /// The axis.
+    pub axis: u8,
+    /// What is sent, in order.
+    pub commands: [Option<MappedPdo>; MAX_PDOS],
+    /// What is expected each cycle of the bus.
+    pub feedback: [Option<MappedPdo>; MAX_PDOS],
+    /// What the drive sends beside that.
+    pub unused: [Option<Id>; MAX_PDOS],
+}
+
+/// A PDO by its mapping parameters.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MappedPdo {
+    /// The identifier.
+    pub id: Id,
+    /// When it is sent, if by us.
+    pub cadence: Cadence,
+    /// What it carries, in order.
+    pub objects: [Option<MappedObject>; MAX_OBJECTS],
 }
 
 /// A coordinated move of every axis, to rest unless a velocity is given.

@@ -28,6 +28,11 @@ impl MappedObject {
         Self { index: (value >> 16) as u16, subindex: (value >> 8) as u8, bits: value as u8 }
     }
 
+    /// Whether this is no object but a gap in a mapping: data types map as dummies (CiA 301, 7.4.7.1).
+    pub const fn is_dummy(self) -> bool {
+        matches!(self.index, 0x0001..=0x001F)
+    }
+
     /// The value of a mapping parameter sub-entry.
     pub const fn parameter(self) -> u32 {
         (self.index as u32) << 16 | (self.subindex as u32) << 8 | self.bits as u32
@@ -191,10 +196,10 @@ pub enum MappingError {
 }
 
 impl Mapping {
-    /// Compiles what we send to a drive (its RPDO).
+    /// Compiles what we send to a drive (its RPDO). Gaps are filled with zero.
     pub fn commands(objects: &[MappedObject]) -> Result<Self, MappingError> {
         Self::compile(objects, |object| match CommandSlot::of(object) {
-            CommandSlot::Zero => Err(MappingError::NothingToSend { object }),
+            CommandSlot::Zero if !object.is_dummy() => Err(MappingError::NothingToSend { object }),
             slot => Ok((slot as u8, false)),
         })
     }
@@ -328,6 +333,8 @@ mod tests {
         let unknown = MappedObject::new(0x2005, 1, 16);
         assert_eq!(Mapping::commands(&[unknown]), Err(MappingError::NothingToSend { object: unknown }));
         assert!(Mapping::feedback(&[unknown]).is_ok());
+        let gap = MappedObject::new(0x0005, 0, 8);
+        assert_eq!(Mapping::commands(&[gap, TARGET]).unwrap().length(), 5);
     }
 
     #[test]

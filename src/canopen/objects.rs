@@ -106,6 +106,16 @@ pub enum PdoDirection {
     Transmit,
 }
 
+impl PdoDirection {
+    /// What PDOs of this direction are called.
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Receive => "RPDO",
+            Self::Transmit => "TPDO",
+        }
+    }
+}
+
 /// The parameters of one PDO of a device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PdoParameters {

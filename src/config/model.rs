@@ -176,6 +176,8 @@ pub struct Axis {
     pub missed_feedback_cycles: u16,
     /// Transmission type of the PDOs (1 = every SYNC). Default 1.
     pub transmission_type: u8,
+    /// Whose mapping of the PDOs counts. Default: the controller's; of a YZ-AIM, which cannot be mapped, the drive's.
+    pub mapping: PdoMapping,
     /// What the drive reports every cycle beside statusword and position. Default: nothing.
     pub feedback: Vec<Feedback>,
     /// Whether a YZ-AIM answers SYNC with its position (TPDO2), the default, or set-points alone (TPDO4), which spares
@@ -237,6 +239,15 @@ impl DriveFamily {
             Self::YzAim => 60.0,
         }
     }
+}
+
+/// Whose mapping of a drive's PDOs counts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PdoMapping {
+    /// The controller writes it at bring-up.
+    Written,
+    /// The drive keeps what it has, tells it at bring-up, and the controller works with that.
+    AsStored,
 }
 
 /// Something a drive can report every cycle beside statusword and position.

@@ -232,6 +232,7 @@ impl Supervisor {
             Some(Err(error)) => self.end(now_ns, Outcome::BringUpFailed(error)),
             Some(Ok(facts)) => {
                 for (axis, facts) in (0..).zip(&facts) {
+                    self.outgoing.extend(facts.process_data.as_ref().map(|data| data.request(axis)));
                     if let Some(torque) = facts.rated_torque {
                         self.outgoing.push_back(Request::RatedTorque { axis, torque });
                     }

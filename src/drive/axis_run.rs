@@ -7,12 +7,14 @@ use takt_rt::time::Nanoseconds;
 
 use super::facts::AxisFacts;
 use super::failure::{Answered, Cause, Content};
+use super::process_data::ProcessData;
 use super::step::{Access, Action, Check, Fact, ReadBack, Source, Step, When};
 use crate::canopen::dcf::Download;
 use crate::canopen::emcy::Emergency;
 use crate::canopen::nmt::{ErrorControl, NmtState, NmtTarget};
 use crate::canopen::object::Object;
 use crate::canopen::objects::DEVICE_TYPE;
+use crate::canopen::pdo_inquiry::PdoInquiry;
 use crate::canopen::sdo::{AbortCode, Client, Completed, SdoError, Timing, Transfer};
 use crate::config::Axis;
 
@@ -52,6 +54,10 @@ pub(super) struct AxisRun {
     current: usize,
     phase: Phase,
     client: Client,
+    timing: Timing,
+    axis: Axis,
+    /// While the PDOs are being asked for.
+    inquiry: Option<PdoInquiry>,
     reported: Option<NmtState>,
     facts: AxisFacts,
     failure: Option<(usize, Cause)>,
@@ -96,6 +102,9 @@ impl AxisRun {
             current: 0,
             phase: Phase::Begin,
             client: Client::new(axis.node, timing),
+            timing,
+            axis: axis.clone(),
+            inquiry: None,
             reported: None,
             facts: AxisFacts { dialect: axis.drive.dialect(), ..AxisFacts::default() },
             failure: None,
@@ -140,11 +149,15 @@ impl AxisRun {
             while let Some(frame) = self.client.poll(now_ns) {
                 send(frame);
             }
+            while let Some(frame) = self.inquiry.as_mut().and_then(|inquiry| inquiry.poll(now_ns)) {
+                send(frame);
+            }
             let before = (self.current, self.phase, self.client.is_busy());
             let progress = match self.client.take_outcome() {
                 Some(outcome) => self.transferred(now_ns, outcome),
                 None => self.advance(now_ns, send),
             };
+            let progress = progress.and_then(|()| self.inquired());
             if let Err(cause) = progress {
                 self.fail(cause);
             }
@@ -160,6 +173,9 @@ impl AxisRun {
             return;
         }
         self.client.receive(frame);
+        if let Some(inquiry) = &mut self.inquiry {
+            inquiry.receive(frame);
+        }
         if let Some(message) = ErrorControl::decode(frame).filter(|message| message.node == self.node) {
             self.hear(message.state);
         }
@@ -191,6 +207,7 @@ impl AxisRun {
         match self.policy {
             Policy::RestartFrom(step) if times <= MAX_RESTARTS => {
                 self.client.reset();
+                self.inquiry = None;
                 self.current = step;
                 self.phase = Phase::Begin;
             }
@@ -211,6 +228,7 @@ impl AxisRun {
         let is_silent = matches!(
             cause,
             Cause::Transfer { error: SdoError::NoReply { .. }, .. }
+                | Cause::Inquiry(_)
                 | Cause::StateNotReached { answered: Answered::Nothing, .. }
                 | Cause::Restarted { .. }
         );
@@ -280,6 +298,11 @@ impl AxisRun {
 
     fn begin_transfer(&mut self, began_ns: Nanoseconds, action: Action) -> Progress {
         let transfer = match action {
+            Action::ReadProcessData => {
+                self.inquiry = Some(PdoInquiry::of_first_four(self.node, self.timing));
+                self.phase = Phase::Transfer { began_ns };
+                return Ok(());
+            }
             Action::Write { object, value, .. } => {
                 let value = self.value_of(value);
                 let data = object.data_type.encode(value).ok_or(Cause::DoesNotFit { object, value })?;
@@ -361,6 +384,24 @@ impl AxisRun {
             }
             _ => Ok(()),
         }
+    }
+
+    /// Settles the process data once the drive has told of it.
+    fn inquired(&mut self) -> Progress {
+        let Some(outcome) = self.inquiry.as_ref().and_then(PdoInquiry::outcome) else { return Ok(()) };
+        self.inquiry = None;
+        let reported = match outcome {
+            Ok(reported) => reported,
+            Err(failure) if self.means_absent(failure.error) => {
+                self.facts.absent.push(failure.object);
+                vec![]
+            }
+            Err(failure) => return Err(Cause::Inquiry(failure)),
+        };
+        let data = ProcessData::as_reported(&self.axis, &reported).map_err(Cause::Mapping)?;
+        self.facts.process_data = Some(data);
+        self.next_step();
+        Ok(())
     }
 
     /// Whether an error says that the drive has no such object. A YZ-AIM says so by silence.

@@ -8,14 +8,14 @@ use takt_rt::time::Nanoseconds;
 
 use super::axis_run::OtherProtocol;
 use super::bring_up::BringUpTiming;
-use super::process_data::{PdoPlan, ProcessData};
+use super::process_data::{PdoPlan, ProcessData, pdo_id};
 use super::step::{Action, Check, Fact, ReadBack, Source, Step, TextFact, When};
 use super::step_list::{List, counts, rounded_up, watched_heartbeat};
 use crate::canopen::emcy::ErrorCode;
 use crate::canopen::nmt::{NmtCommand, NmtState};
 use crate::canopen::object::{DataType, Object};
 use crate::canopen::objects::{self, PDO_INVALID, PdoDirection, PdoParameters, error_behaviour};
-use crate::config::{Axis, Config, Control};
+use crate::config::{Axis, Config, Control, PdoMapping};
 
 /// The fault of a joint whose multi-turn battery is empty or was disconnected.
 pub const MULTI_TURN_BATTERY: ErrorCode = ErrorCode(0x730F);
@@ -68,7 +68,10 @@ pub(super) fn configure(config: &Config, axis: &Axis, timing: &BringUpTiming) ->
     come_to_rest(&mut list, axis, timing);
     list.configuration_file(axis);
     synchronisation(&mut list, config.bus_cycle(axis.bus).period_ns);
-    process_data(&mut list, axis);
+    match axis.mapping {
+        PdoMapping::Written => process_data(&mut list, axis),
+        PdoMapping::AsStored => list.reported_process_data(),
+    }
     mode(&mut list, axis, timing);
     ratings(&mut list, axis);
     limits(&mut list, axis);
@@ -214,11 +217,7 @@ fn map(list: &mut List, direction: PdoDirection, plan: &PdoPlan) {
 
 /// The identifier of the pre-defined connection set, marked invalid.
 fn unused_id(direction: PdoDirection, number: u8, node: u8) -> u32 {
-    let first = match direction {
-        PdoDirection::Receive => 0x200,
-        PdoDirection::Transmit => 0x180,
-    };
-    PDO_INVALID | (first + 0x100 * (u32::from(number) - 1) + u32::from(node))
+    PDO_INVALID | pdo_id(direction, number, node).value()
 }
 
 fn mode(list: &mut List, axis: &Axis, timing: &BringUpTiming) {

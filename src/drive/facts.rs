@@ -3,6 +3,7 @@
 use takt_rt::cia402::State;
 use takt_rt::dialect::Dialect;
 
+use super::process_data::ProcessData;
 use super::step::{Fact, TextFact};
 use crate::canopen::emcy::{Emergency, ErrorCode};
 use crate::canopen::object::ObjectAddress;
@@ -34,6 +35,8 @@ pub struct AxisFacts {
     pub quick_stop_option_code: Option<i16>,
     /// The last emergency message, unless it told that the error has gone.
     pub emergency: Option<Emergency>,
+    /// The process data that the drive has reported, where that counts.
+    pub process_data: Option<ProcessData>,
     /// Optional objects that the drive has refused.
     pub absent: Vec<ObjectAddress>,
     /// How often it has booted again after its first boot-up, and was configured anew. A drive that is reset just when

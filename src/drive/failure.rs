@@ -4,10 +4,12 @@ use std::fmt;
 
 use takt_rt::time::Nanoseconds;
 
+use super::reported_mapping::MappingProblem;
 use super::step::{Access, Check};
 use crate::canopen::emcy::Emergency;
 use crate::canopen::nmt::NmtState;
 use crate::canopen::object::{Object, ObjectAddress};
+use crate::canopen::pdo_inquiry::PdoInquiryError;
 use crate::canopen::sdo::{AbortCode, SdoError};
 
 /// The drives that could not be brought up (or left), each with its reason.
@@ -145,6 +147,10 @@ pub enum Cause {
         /// The value.
         value: i64,
     },
+    /// Reading how the PDOs are configured failed.
+    Inquiry(PdoInquiryError),
+    /// The PDOs that the drive reports do not suit the axis.
+    Mapping(MappingProblem),
     /// The node has restarted, and what it was told is lost.
     Restarted {
         /// How often.
@@ -250,6 +256,8 @@ impl fmt::Display for Cause {
                 let bits = 8 * object.data_type.length();
                 write!(f, "writing {value} to {object}: it does not fit {bits} bits")
             }
+            Self::Inquiry(error) => write!(f, "{error}"),
+            Self::Mapping(problem) => write!(f, "{problem}"),
             Self::Restarted { times } => {
                 write!(f, "expected it to keep running, it has restarted {times} times")
             }
@@ -276,6 +284,7 @@ impl Cause {
             Self::Transfer { error: SdoError::Aborted(AbortCode::PresentDeviceState), .. } => Some(
                 "the drive refuses this in its present state: clear its fault and disable it, then run again",
             ),
+            Self::Mapping(problem) => Some(problem.advice()),
             Self::Restarted { .. } => {
                 Some("check the drive's supply for dips, and that no other master resets it")
             }

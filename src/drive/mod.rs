@@ -10,6 +10,7 @@ pub mod erob_canopen;
 mod facts;
 mod failure;
 mod process_data;
+mod reported_mapping;
 mod step;
 mod step_list;
 pub mod yz_aim;
@@ -18,4 +19,5 @@ pub use bring_up::{BringUp, BringUpTiming, Leave, NotConfigured, Progress, Stage
 pub use facts::{AxisFacts, DeviceIdentity, DeviceTexts};
 pub use failure::{Answered, AxisFailure, BringUpError, Cause, Content};
 pub use process_data::{PdoPlan, ProcessData};
+pub use reported_mapping::MappingProblem;
 pub use step::{Access, Check, mode_words};

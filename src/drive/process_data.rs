@@ -1,11 +1,13 @@
 //! Which objects travel in which PDO. Bring-up programs it, the cycle compiles it, and the bus arithmetic counts it.
 
-use takt_rt::axis::Cadence;
+use takt_rt::axis::{Cadence, MAX_PDOS};
+use takt_rt::door::{AxisProcessData, MappedPdo, Request};
 use takt_rt::frame::Id;
 use takt_rt::pdo::{CommandSlot, MappedObject};
 
 use super::yz_aim;
-use crate::config::{Axis, Control, DriveFamily, Feedback};
+use crate::canopen::objects::PdoDirection;
+use crate::config::{Axis, Control, DriveFamily, Feedback, PdoMapping};
 
 const CONTROLWORD: MappedObject = MappedObject::new(0x6040, 0, 16);
 const TARGET_POSITION: MappedObject = MappedObject::new(0x607A, 0, 32);
@@ -16,6 +18,8 @@ const STATUSWORD: MappedObject = MappedObject::new(0x6041, 0, 16);
 const POSITION: MappedObject = MappedObject::new(0x6064, 0, 32);
 
 const PDO_BITS: u32 = 64;
+/// A byte of a PDO of which nothing is known but that it may be there.
+const ANY_BYTE: MappedObject = MappedObject::new(0x0005, 0, 8);
 
 /// One PDO of a drive.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -51,24 +55,47 @@ pub struct ProcessData {
 }
 
 impl ProcessData {
-    /// The process data of an axis.
+    /// The process data of an axis. Where its drive's own mapping is to be used, it is known only when the drive has
+    /// told ([`ProcessData::as_reported`]): until then as many PDOs as would be written, with all the bytes that they
+    /// can have.
     pub fn of(axis: &Axis) -> Self {
         match axis.drive {
+            DriveFamily::ErobCanopen if axis.mapping == PdoMapping::AsStored => {
+                Self::mapped_freely(axis).filled_up()
+            }
             DriveFamily::ErobCanopen => Self::mapped_freely(axis),
             DriveFamily::YzAim => Self::of_yz_aim(axis),
         }
     }
 
-    /// A drive that is mapped as we like. A command fits one PDO; feedback takes as many as it needs, statusword and
-    /// position first.
-    fn mapped_freely(axis: &Axis) -> Self {
+    fn filled_up(mut self) -> Self {
+        for pdo in self.commands.iter_mut().chain(&mut self.feedback) {
+            let free_bytes = (PDO_BITS as usize / 8).saturating_sub(pdo.length());
+            pdo.objects.extend(std::iter::repeat_n(ANY_BYTE, free_bytes));
+        }
+        self
+    }
+
+    /// What a drive that is mapped freely must be sent in every cycle.
+    pub(super) fn needed_commands(axis: &Axis) -> Vec<MappedObject> {
         let target = match axis.control.target_slot() {
             CommandSlot::TargetVelocity => TARGET_VELOCITY,
             CommandSlot::TargetTorque => TARGET_TORQUE,
             _ => TARGET_POSITION,
         };
+        vec![CONTROLWORD, target]
+    }
+
+    /// What a drive that is mapped freely must report in every cycle.
+    pub(super) fn needed_feedback(axis: &Axis) -> Vec<MappedObject> {
+        [STATUSWORD, POSITION].into_iter().chain(axis.feedback.iter().copied().map(mapped)).collect()
+    }
+
+    /// A drive that is mapped as we like. A command fits one PDO; feedback takes as many as it needs, statusword and
+    /// position first.
+    fn mapped_freely(axis: &Axis) -> Self {
         let mut feedback = vec![vec![]];
-        for object in [STATUSWORD, POSITION].into_iter().chain(axis.feedback.iter().copied().map(mapped)) {
+        for object in Self::needed_feedback(axis) {
             let used: u32 =
                 feedback.last().into_iter().flatten().map(|o: &MappedObject| u32::from(o.bits)).sum();
             if used + u32::from(object.bits) > PDO_BITS {
@@ -81,14 +108,14 @@ impl ProcessData {
         let transmission_type = axis.transmission_type;
         let receive = |number, objects| PdoPlan {
             transmission_type,
-            ..pdo(0x200, number, axis.node, objects, Cadence::EveryCycle)
+            ..pdo(PdoDirection::Receive, number, axis.node, objects, Cadence::EveryCycle)
         };
         let transmit = |(number, objects)| PdoPlan {
             transmission_type,
-            ..pdo(0x180, number, axis.node, objects, Cadence::EveryCycle)
+            ..pdo(PdoDirection::Transmit, number, axis.node, objects, Cadence::EveryCycle)
         };
         Self {
-            commands: vec![receive(1, vec![CONTROLWORD, target])],
+            commands: vec![receive(1, Self::needed_commands(axis))],
             feedback: (1..).zip(feedback).map(transmit).collect(),
             unused: vec![],
         }
@@ -98,14 +125,14 @@ impl ProcessData {
     fn of_yz_aim(axis: &Axis) -> Self {
         let receive = |number, objects, cadence| PdoPlan {
             transmission_type: if number == 4 { 1 } else { 255 },
-            ..pdo(0x200, number, axis.node, objects, cadence)
+            ..pdo(PdoDirection::Receive, number, axis.node, objects, cadence)
         };
         let transmit = |number: u8| {
             let objects = vec![POSITION, if number == 3 { mapped(Feedback::Velocity) } else { STATUSWORD }];
             let answers_sync = number == 2 && yz_aim::answers_sync(axis);
             PdoPlan {
                 transmission_type: if answers_sync { 1 } else { 255 },
-                ..pdo(0x180, number, axis.node, objects, Cadence::EveryCycle)
+                ..pdo(PdoDirection::Transmit, number, axis.node, objects, Cadence::EveryCycle)
             }
         };
         let position = vec![CONTROLWORD, OPERATION_MODE, TARGET_POSITION];
@@ -125,6 +152,24 @@ impl ProcessData {
         Self { commands, feedback: vec![transmit(feedback)], unused }
     }
 
+    /// Tells the cycle to exchange this process data with the drive of an axis.
+    pub fn request(&self, axis: u8) -> Request {
+        fn each<T>(plans: &[PdoPlan], part: impl Fn(&PdoPlan) -> T) -> [Option<T>; MAX_PDOS] {
+            std::array::from_fn(|at| plans.get(at).map(&part))
+        }
+        let mapped = |plan: &PdoPlan| MappedPdo {
+            id: plan.id,
+            cadence: plan.cadence,
+            objects: std::array::from_fn(|at| plan.objects.get(at).copied()),
+        };
+        Request::ProcessData(AxisProcessData {
+            axis,
+            commands: each(&self.commands, mapped),
+            feedback: each(&self.feedback, mapped),
+            unused: each(&self.unused, |plan| plan.id),
+        })
+    }
+
     /// The PDO among the unused ones with which the drive answers each command at once.
     pub fn answer(&self) -> Option<&PdoPlan> {
         let command = self.commands.iter().find(|command| command.cadence == Cadence::EveryCycle)?;
@@ -132,9 +177,24 @@ impl ProcessData {
     }
 }
 
-fn pdo(function: u16, number: u8, node: u8, objects: Vec<MappedObject>, cadence: Cadence) -> PdoPlan {
-    let id = Id::canopen(function + 0x100 * (u16::from(number) - 1), node);
+fn pdo(
+    direction: PdoDirection,
+    number: u8,
+    node: u8,
+    objects: Vec<MappedObject>,
+    cadence: Cadence,
+) -> PdoPlan {
+    let id = pdo_id(direction, number, node);
     PdoPlan { number, id, transmission_type: 0, objects, cadence }
+}
+
+/// The identifier of PDO 1 to 4 in the pre-defined connection set.
+pub(super) fn pdo_id(direction: PdoDirection, number: u8, node: u8) -> Id {
+    let first = match direction {
+        PdoDirection::Receive => 0x200,
+        PdoDirection::Transmit => 0x180,
+    };
+    Id::canopen(first + 0x100 * (u16::from(number.clamp(1, 4)) - 1), node)
 }
 
 fn mapped(feedback: Feedback) -> MappedObject {

@@ -63,6 +63,8 @@ pub(super) enum Action {
     },
     /// Writes bytes, and reads them back where they can be read.
     WriteBytes(Download),
+    /// Reads how the PDOs are configured, and settles the process data by it.
+    ReadProcessData,
     /// Reads a number again and again until it is as wanted.
     Await { object: Object, check: Check, keep: Option<Fact>, within_ns: Nanoseconds },
 }

@@ -120,6 +120,12 @@ impl List {
         self.read(objects::REVISION_NUMBER, expected(axis.identity.revision), Fact::RevisionNumber);
     }
 
+    /// Reads how the drive's PDOs are configured, and works with that.
+    pub fn reported_process_data(&mut self) {
+        self.about("PDO mapping", "the drive's own mapping does not suit this axis");
+        self.push(Action::ReadProcessData);
+    }
+
     pub fn write_with(&mut self, object: Object, value: i64, read_back: ReadBack, is_optional: bool) {
         self.push(Action::Write { object, value: Source::Value(value), read_back, is_optional });
     }

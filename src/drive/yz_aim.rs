@@ -8,7 +8,6 @@ use takt_rt::cia402::controlword;
 use takt_rt::time::Nanoseconds;
 
 use super::bring_up::BringUpTiming;
-use super::process_data::ProcessData;
 use super::step::{Action, Check, Fact, ReadBack, Source, Step, When};
 use super::step_list::{List, rounded_up, turns, watched_heartbeat};
 use crate::canopen::emcy::ErrorCode;
@@ -131,8 +130,8 @@ fn come_to_rest(list: &mut List, timing: &BringUpTiming) {
     });
 }
 
-/// The mapping is fixed, and compared with what the manual says where the drive tells; what can be chosen is when the
-/// drive reports unasked.
+/// The mapping is fixed, but not in every edition of the firmware the same: what the drive tells of it counts. What can
+/// be chosen is when the drive reports unasked.
 fn process_data(list: &mut List, axis: &Axis) {
     list.about("reports", "let the drive answer SYNC: answers_sync = true");
     let transmit = |number| PdoParameters::of(PdoDirection::Transmit, number);
@@ -140,27 +139,7 @@ fn process_data(list: &mut List, axis: &Axis) {
     list.write_and_read_back(transmit(2).transmission_type(), answers);
     list.write_optional(transmit(1).event_timer(), 0);
     list.write_optional(transmit(3).event_timer(), 0);
-    list.about(
-        "PDO mapping",
-        "this firmware carries other objects in its PDOs than the manual says, so its numbers would be taken for others: \
-         use firmware of the manual's edition",
-    );
-    let data = ProcessData::of(axis);
-    for (direction, plans) in
-        [(PdoDirection::Receive, &data.commands), (PdoDirection::Transmit, &data.feedback)]
-    {
-        for plan in plans {
-            let parameters = PdoParameters::of(direction, plan.number);
-            for (position, object) in (1..).zip(&plan.objects) {
-                list.push(Action::Read {
-                    object: parameters.mapped_object(position),
-                    check: Check::Equals(object.parameter().into()),
-                    keep: None,
-                    is_optional: true,
-                });
-            }
-        }
-    }
+    list.reported_process_data();
 }
 
 fn motion(list: &mut List, axis: &Axis) {

@@ -161,6 +161,7 @@ fn axis(number: usize, bus: usize, node: u8) -> Axis {
         missed_feedback_cycles: 3,
         transmission_type: 1,
         feedback: vec![Feedback::Torque],
+        mapping: PdoMapping::Written,
         answers_sync: true,
         start_tolerance: 0.02,
         on_violation: Default::default(),

@@ -10,5 +10,6 @@ mod profile_position;
 mod profile_torque;
 mod profile_velocity;
 mod quirks;
+mod reported_mapping;
 mod silence;
 mod time_of_day;

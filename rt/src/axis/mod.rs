@@ -210,6 +210,17 @@ impl Axis {
         }
     }
 
+    /// Exchanges other process data than it was set up for; before the first feedback.
+    pub fn set_process_data(
+        &mut self,
+        commands: ArrayVec<CommandPdo, MAX_PDOS>,
+        feedback: ArrayVec<Pdo, MAX_PDOS>,
+    ) {
+        self.parameters.commands = commands;
+        self.parameters.feedback = feedback;
+        self.arrived = 0;
+    }
+
     /// Takes feedback PDO number `pdo` (from 0). One that is too short changes nothing.
     pub fn receive(&mut self, pdo: usize, frame: &Frame) -> Result<(), TooShort> {
         let Some(parameters) = self.parameters.feedback.get(pdo) else { return Ok(()) };

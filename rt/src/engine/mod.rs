@@ -6,6 +6,7 @@
 
 mod behaviour;
 mod parameters;
+mod process_data;
 mod requests;
 mod stops;
 

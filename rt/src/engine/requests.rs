@@ -27,6 +27,7 @@ impl Engine {
             Request::RatedTorque { axis, torque } => {
                 self.axes.get_mut(usize::from(axis)).is_some_and(|axis| axis.set_rated_torque(torque))
             }
+            Request::ProcessData(data) => self.set_process_data(&data).is_some(),
             Request::Position { axis, counts } => {
                 self.axes.get_mut(usize::from(axis)).map(|axis| axis.set_reported_position(counts)).is_some()
             }

@@ -13,7 +13,7 @@ use crate::canopen::dcf::DeviceConfiguration;
 use crate::config::defaults;
 use crate::config::error::ProblemKind;
 use crate::config::model::{
-    Axis, Control, DriveFamily, Feedback, FollowingError, Identity, Limits, Master, OnViolation,
+    Axis, Control, DriveFamily, Feedback, FollowingError, Identity, Limits, Master, OnViolation, PdoMapping,
     SimulatedJoint, Travel,
 };
 use crate::config::quantity::Quantity;
@@ -138,6 +138,7 @@ fn axis<'a>(
         check_period(control, bus.and_then(|bus| buses.get(bus)), cycle_ns, problems);
         check_speed(&section, limits.as_ref(), &counting, travel, quantities);
     }
+    let mapping = mapping(&mut section, drive);
     let feedback = feedback(&mut section, drive);
     let answers_sync = boolean(&mut section, "answers_sync", defaults::ANSWERS_SYNC);
     let transmission_type = transmission_type(&mut section);
@@ -179,6 +180,7 @@ fn axis<'a>(
                 .and_then(|cycles| u16::try_from(cycles).ok())
                 .unwrap_or(defaults::MISSED_FEEDBACK_CYCLES),
             transmission_type,
+            mapping,
             feedback,
             answers_sync,
             feedback_delay_ns: feedback_delay.unwrap_or(defaults::FEEDBACK_DELAY_NS),
@@ -513,6 +515,20 @@ fn torque_loop(mut section: Section<'_>, q: Quantities, joint: &SimulatedJoint) 
         viscous_friction: viscous_friction.unwrap_or(joint.viscous_friction),
         coulomb_friction: coulomb_friction.unwrap_or(joint.coulomb_friction),
     }
+}
+
+fn mapping(section: &mut Section<'_>, drive: Option<DriveFamily>) -> PdoMapping {
+    let is_fixed = drive == Some(DriveFamily::YzAim);
+    let choices = [("written", PdoMapping::Written), ("as-stored", PdoMapping::AsStored)];
+    let read = section.get("mapping").and_then(|entry| {
+        let mapping = entry.choice(&choices)?;
+        if is_fixed && mapping == PdoMapping::Written {
+            let allowed = "as-stored, since the PDOs of a YZ-AIM are fixed".to_owned();
+            entry.report_range("written".to_owned(), allowed);
+        }
+        Some(mapping)
+    });
+    read.unwrap_or(if is_fixed { PdoMapping::AsStored } else { PdoMapping::Written })
 }
 
 fn feedback(section: &mut Section<'_>, drive: Option<DriveFamily>) -> Vec<Feedback> {

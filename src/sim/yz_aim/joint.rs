@@ -20,7 +20,7 @@ use super::motion::{Actual, Motion};
 use super::network::Network;
 use super::objects::at;
 use super::parameters::{COUNTS_PER_SECOND_PER_RPM, COUNTS_PER_TURN, YzAimParameters};
-use super::process_data::ProcessData;
+use super::process_data::{ProcessData, report_state_first};
 use super::sdo::SdoServer;
 use crate::sim::drive::{Drive, DriveFault, NmtState, Observation};
 use crate::sim::mailbox::Mailbox;
@@ -96,6 +96,9 @@ impl YzAimJoint {
         dictionary.set_factory(at::SPECIAL_FUNCTION, parameters.special_function.into());
         dictionary.set_factory(at::ACCELERATION, parameters.acceleration.into());
         dictionary.set_factory(at::TEMPERATURE, 35);
+        if parameters.quirks.reports_state_first {
+            report_state_first(&mut dictionary);
+        }
         let random = Random::new(parameters.seed, parameters.node);
         let highest_speed = parameters.highest_speed();
         let velocity_limit = SPEED_RESERVE * highest_speed / parameters.encoder.counts_per_unit.abs();

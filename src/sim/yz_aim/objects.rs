@@ -226,6 +226,10 @@ pub mod at {
         TPDO2 = 0x1801:0;
         TPDO3 = 0x1802:0;
         TPDO4 = 0x1803:0;
+        TPDO1_MAPPING = 0x1A00:0;
+        TPDO2_MAPPING = 0x1A01:0;
+        TPDO3_MAPPING = 0x1A02:0;
+        TPDO4_MAPPING = 0x1A03:0;
         MODBUS_ENABLE = 0x2600:0;
         OUTPUT_ENABLE = 0x2601:0;
         FLUX_WEAKENING_ANGLE = 0x2604:0;

@@ -103,6 +103,9 @@ pub struct Quirks {
     pub has_settable_pdos: bool,
     /// Whether TPDO3 carries 0.1 r/min per bit, like 606Ch read by SDO, and not 1 r/min as in the manual's example.
     pub has_fine_velocity_in_tpdo3: bool,
+    /// The TPDOs begin with what the manual has last: the statusword before the position, and TPDO3 carries the velocity and
+    /// the statusword in place of the position and the velocity. Their mapping tells it.
+    pub reports_state_first: bool,
     /// Whether a boot-up message is sent at power-up too, and not only after NMT 81h and 82h.
     pub announces_power_up: bool,
 }
@@ -118,6 +121,7 @@ impl Default for Quirks {
             shows_battery_alarm: true,
             has_settable_pdos: true,
             has_fine_velocity_in_tpdo3: false,
+            reports_state_first: false,
             announces_power_up: true,
         }
     }

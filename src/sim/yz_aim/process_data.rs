@@ -21,8 +21,12 @@ const RPDO: [usize; PDOS] = [at::RPDO1, at::RPDO2, at::RPDO3, at::RPDO4];
 const TPDO: [usize; PDOS] = [at::TPDO1, at::TPDO2, at::TPDO3, at::TPDO4];
 const RPDO_ID: [u16; PDOS] = [0x200, 0x300, 0x400, 0x500];
 const TPDO_ID: [u16; PDOS] = [0x180, 0x280, 0x380, 0x480];
-/// TPDO3 carries the velocity in place of the statusword.
-const TPDO3: usize = 2;
+const TPDO_MAPPING: [usize; PDOS] =
+    [at::TPDO1_MAPPING, at::TPDO2_MAPPING, at::TPDO3_MAPPING, at::TPDO4_MAPPING];
+// Entries of a mapping: index, sub-index and length in bits.
+const STATUSWORD: i64 = 0x6041_0010;
+const POSITION: i64 = 0x6064_0020;
+const VELOCITY: i64 = 0x606C_0020;
 const INHIBIT_UNIT_NS: Nanoseconds = 100_000;
 const EVENT_UNIT_NS: Nanoseconds = 1_000_000;
 /// Transmission types up to this one act at SYNC.
@@ -162,7 +166,8 @@ impl ProcessData {
         let inhibit = dictionary.get(TPDO[number] + 3) as Nanoseconds;
         outbound.due_ns = NEVER;
         outbound.free_ns = now_ns + inhibit * INHIBIT_UNIT_NS;
-        Some(pack(Id::canopen(TPDO_ID[number], node), number, outbound.sampled))
+        let id = Id::canopen(TPDO_ID[number], node);
+        Some(pack(id, TPDO_MAPPING[number], outbound.sampled, dictionary))
     }
 }
 
@@ -173,12 +178,30 @@ fn event_ns(now_ns: Nanoseconds, parameters: usize, dictionary: &Dictionary) -> 
     }
 }
 
-fn pack(id: Id, number: usize, feedback: Feedback) -> Frame {
-    let [a, b, c, d] = feedback.position.to_le_bytes();
-    if number == TPDO3 {
-        let [e, f, g, h] = feedback.velocity.to_le_bytes();
-        return Frame::of(id, [a, b, c, d, e, f, g, h]);
+/// The TPDOs of firmware that reports its state first.
+pub fn report_state_first(dictionary: &mut Dictionary) {
+    for mapping in [at::TPDO1_MAPPING, at::TPDO2_MAPPING, at::TPDO4_MAPPING] {
+        dictionary.set_factory(mapping + 1, STATUSWORD);
+        dictionary.set_factory(mapping + 2, POSITION);
     }
-    let [low, high] = feedback.statusword.to_le_bytes();
-    Frame::of(id, [a, b, c, d, low, high])
+    dictionary.set_factory(at::TPDO3_MAPPING + 1, VELOCITY);
+    dictionary.set_factory(at::TPDO3_MAPPING + 2, STATUSWORD);
+}
+
+/// What the mapping says, in its order.
+fn pack(id: Id, mapping: usize, feedback: Feedback, dictionary: &Dictionary) -> Frame {
+    let mut payload = [0; 8];
+    let mut length = 0;
+    for entry in (mapping + 1..).take(dictionary.get(mapping) as usize) {
+        let (value, bytes) = match dictionary.get(entry) {
+            STATUSWORD => (feedback.statusword.into(), 2),
+            VELOCITY => (feedback.velocity, 4),
+            _ => (feedback.position, 4),
+        };
+        for (to, byte) in payload[length..].iter_mut().zip(&value.to_le_bytes()[..bytes]) {
+            *to = *byte;
+        }
+        length += bytes;
+    }
+    Frame::data(id, &payload[..length.min(8)]).unwrap_or_else(|_| Frame::of(id, payload))
 }
