@@ -492,6 +492,7 @@ impl AxisRun {
             written: Content::of(data),
             is_reading_back: false,
             error,
+            means_absent: self.means_absent(error),
         })?;
         self.start(Transfer::Upload { object: *object });
         self.phase = Phase::Verify;
@@ -509,7 +510,14 @@ impl AxisRun {
                 return Ok(());
             }
             Err(error) => {
-                return Err(Cause::ConfigurationTransfer { object, written, is_reading_back: true, error });
+                let means_absent = self.means_absent(error);
+                return Err(Cause::ConfigurationTransfer {
+                    object,
+                    written,
+                    is_reading_back: true,
+                    error,
+                    means_absent,
+                });
             }
         };
         if !download.is_held_by(&received) {

@@ -130,6 +130,8 @@ pub enum Cause {
         is_reading_back: bool,
         /// Why it failed.
         error: SdoError,
+        /// Whether this is how the drive says that it has no such object.
+        means_absent: bool,
     },
     /// A configured value reads back as another one.
     ConfigurationDiffers {
@@ -243,10 +245,10 @@ impl fmt::Display for Cause {
                 }
                 Ok(())
             }
-            Self::ConfigurationTransfer { object, written, is_reading_back: false, error } => {
+            Self::ConfigurationTransfer { object, written, is_reading_back: false, error, .. } => {
                 write!(f, "writing {written} to {object}: expected it to be accepted, got {error}")
             }
-            Self::ConfigurationTransfer { object, written, is_reading_back: true, error } => {
+            Self::ConfigurationTransfer { object, written, is_reading_back: true, error, .. } => {
                 write!(f, "reading {object} back after writing {written}: expected a value, got {error}")
             }
             Self::ConfigurationDiffers { object, written, received } => {
@@ -275,8 +277,13 @@ impl Cause {
             Self::StateNotReached { answered: Answered::Sdo, .. } => Some(
                 "the drive runs but does not obey NMT: look for a second master on the bus, and power-cycle the drive",
             ),
+            Self::ConfigurationTransfer { error: SdoError::NoReply { .. }, means_absent: true, .. } => Some(
+                "this drive gives no answer at all for an object that it does not have: leave the object out of the file \
+                 named by `dcf`; if it has the object, check its supply and the wiring",
+            ),
             Self::Transfer { error: SdoError::NoReply { .. }, .. }
             | Self::ConfigurationTransfer { error: SdoError::NoReply { .. }, .. }
+            | Self::Inquiry(PdoInquiryError { error: SdoError::NoReply { .. }, .. })
             | Self::TextTransfer { error: SdoError::NoReply { .. }, .. } => Some(
                 "the drive has fallen silent: check its supply, the wiring and the bus load, and that no other master \
                  stops it",

@@ -5,6 +5,7 @@ mod world;
 
 mod arrival;
 mod bus_budget;
+mod configuration_file;
 mod interpolation;
 mod profile_position;
 mod profile_torque;
