@@ -9,6 +9,7 @@ mod eds;
 mod exit;
 mod interruption;
 mod jitter;
+mod lss;
 mod plan;
 mod report;
 mod run;
@@ -37,6 +38,7 @@ enum Command {
     Doctor(doctor::Arguments),
     Drive(drive::Arguments),
     Eds(eds::Arguments),
+    Lss(lss::Arguments),
     Jitter(jitter::Arguments),
 }
 
@@ -52,6 +54,7 @@ impl CommandLine {
             Command::Doctor(arguments) => doctor::run(&arguments),
             Command::Drive(arguments) => drive::run(&arguments),
             Command::Eds(arguments) => eds::run(&arguments),
+            Command::Lss(arguments) => lss::run(&arguments),
             Command::Jitter(arguments) => jitter::run(&arguments),
         }
     }

@@ -10,7 +10,8 @@
 //!       subject, pace ── the joint's units and limits
 //! ```
 //!
-//! [`bus_session::run`] carries a procedure out on a bus, [`meaning`] tells what its frames mean.
+//! [`bus_session::run`] carries a procedure out on a bus, [`meaning`] tells what its frames mean. Devices that have no
+//! node number yet are set up by [`layer_settings`].
 
 pub mod amount;
 pub mod bus_session;
@@ -22,6 +23,7 @@ mod event;
 mod failure;
 mod family;
 mod guarded;
+pub mod layer_settings;
 mod line;
 mod looking;
 pub mod meaning;

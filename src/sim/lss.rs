@@ -1,6 +1,10 @@
 //! A device that can be given its node number and bit rate by LSS (CiA 305), and does nothing else.
 
+use std::collections::VecDeque;
+
 use takt_rt::frame::Frame;
+use takt_rt::port::{BusHealth, BusPort, ReceiveBatch, Received};
+use takt_rt::time::Nanoseconds;
 
 use crate::canopen::lss::{BitTiming, Inquiry, LssAddress, LssMode, LssRequest, LssResponse, LssResult};
 use crate::canopen::nmt::{ErrorControl, NmtState};
@@ -204,5 +208,54 @@ impl LssDevice {
             _ => return LssResult::REFUSED,
         };
         LssResult::OK
+    }
+}
+
+/// A bus with nothing but such devices on it, which answer at once.
+#[derive(Debug, Default)]
+pub struct LssBus {
+    devices: Vec<LssDevice>,
+    answers: VecDeque<Received>,
+    health: BusHealth,
+}
+
+impl LssBus {
+    /// With these devices.
+    pub fn new(devices: impl IntoIterator<Item = LssDevice>) -> Self {
+        Self { devices: devices.into_iter().collect(), ..Self::default() }
+    }
+
+    /// The devices.
+    pub fn devices(&self) -> &[LssDevice] {
+        &self.devices
+    }
+}
+
+impl BusPort for LssBus {
+    fn send(&mut self, now_ns: Nanoseconds, frames: &[Frame]) -> usize {
+        for frame in frames {
+            let answers = self.devices.iter_mut().filter_map(|device| device.receive(frame));
+            self.answers.extend(answers.map(|frame| Received { frame, at_ns: now_ns }));
+        }
+        self.health.tx_frames += frames.len() as u64;
+        frames.len()
+    }
+
+    fn receive(&mut self, _now_ns: Nanoseconds, batch: &mut ReceiveBatch) {
+        while let Some(answer) = self.answers.pop_front() {
+            if batch.try_push(answer).is_err() {
+                self.answers.push_front(answer);
+                return;
+            }
+            self.health.rx_frames += 1;
+        }
+    }
+
+    fn unconfirmed(&mut self, _now_ns: Nanoseconds) -> usize {
+        0
+    }
+
+    fn health(&mut self) -> BusHealth {
+        self.health
     }
 }

@@ -1,0 +1,315 @@
+//! `takt lss`: node numbers and bit rates for devices that are set up by their identity.
+
+mod output;
+
+use std::str::FromStr;
+use std::sync::atomic::Ordering;
+
+use clap::{Args, Subcommand};
+
+use takt::bus::{InterfaceSettings, SocketCanOptions, open_socketcan, prepare_interface};
+use takt::canopen::lss::{BitTiming, Inquiry, LssAddress, LssOutcome, LssTask};
+use takt::commission::layer_settings::{Choice, LayerSettingFailure, LayerSettings};
+use takt::config::{Interface, Quantity};
+use takt::controller::VirtualClock;
+use takt::sim::lss::{LssBus, LssDevice};
+use takt_rt::linux::MonotonicClock;
+use takt_rt::port::{BusPort, Clock};
+
+use super::exit::Exit;
+use super::interruption;
+use output::{Device, Output, Report};
+
+/// How soon a controller that has gone off the bus comes back.
+const RESTART_MS: u32 = 100;
+/// More devices than node numbers cannot be there.
+const MOST_DEVICES: usize = 127;
+/// A node number that says that there is none.
+const NO_NODE: u8 = 255;
+
+/// Give devices their node number and bit rate by their identity (LSS, CiA 305)
+///
+/// The device is the one with the identity after --device, or the only one on the bus (--only), or else one without a
+/// node number, which a scan finds. What is set is forgotten at power-down unless --store is given. Neither eRob nor
+/// YZ-AIM has LSS: theirs are `takt drive … set-id` and `set-bitrate`.
+#[derive(Args, Debug)]
+#[command(subcommand_value_name = "ACTION", subcommand_help_heading = "Actions")]
+pub struct Arguments {
+    /// The interface: can0, vcan0 …; or sim, with the devices of --simulate
+    #[arg(long, value_name = "INTERFACE")]
+    bus: Interface,
+    /// The bit rate of the interface
+    #[arg(long, value_name = "RATE", global = true, value_parser = bit_rate, default_value = "1 Mbit/s")]
+    bit_rate: u32,
+    /// The device with this identity (1018:1 to 4): VENDOR:PRODUCT:REVISION:SERIAL
+    #[arg(long, value_name = "IDENTITY", global = true, value_parser = address)]
+    device: Option<LssAddress>,
+    /// The only device on the bus, whatever it is
+    #[arg(long, global = true, conflicts_with = "device")]
+    only: bool,
+    /// A device on a simulated bus: IDENTITY, or IDENTITY@NODE where it has a node number already
+    #[arg(long, value_name = "DEVICE", global = true)]
+    simulate: Vec<SimulatedDevice>,
+    /// Show every frame
+    #[arg(short, long, global = true)]
+    verbose: bool,
+    /// Print the result as one JSON object
+    #[arg(long, global = true)]
+    json: bool,
+    #[command(subcommand)]
+    action: Action,
+}
+
+#[derive(Subcommand, Clone, Copy, Debug)]
+enum Action {
+    /// List the devices that have no node number
+    Scan,
+    /// Tell the identity and the node number of the device
+    Inquire,
+    /// Give the device a node number
+    SetId {
+        /// The node number; or none, to take it away
+        #[arg(value_parser = node)]
+        id: u8,
+        /// Keep it over power-down
+        #[arg(long)]
+        store: bool,
+    },
+    /// Give the device a bit rate, which holds from its next start, or from --activate on
+    #[command(name = "set-bitrate")]
+    SetBitRate {
+        /// "500 kbit/s"; one of 10, 20, 50, 125, 250, 500, 800 kbit/s and 1 Mbit/s
+        #[arg(value_parser = timing)]
+        rate: BitTiming,
+        /// Change to it now: everybody is silent for this many milliseconds before it and as many after it
+        #[arg(long, value_name = "MS")]
+        activate: Option<u16>,
+        /// Keep it over power-down
+        #[arg(long)]
+        store: bool,
+    },
+    /// Have the device keep its node number and bit rate over power-down
+    Store,
+    /// End configuration on every device, as after a change of the bit rate
+    Wait,
+}
+
+impl Action {
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Scan => "scan",
+            Self::Inquire => "inquire",
+            Self::SetId { .. } => "set-id",
+            Self::SetBitRate { .. } => "set-bitrate",
+            Self::Store => "store",
+            Self::Wait => "wait",
+        }
+    }
+}
+
+fn bit_rate(text: &str) -> Result<u32, String> {
+    let rate = Quantity::BIT_RATE.parse(text).ok().filter(|rate| (10_000.0..=1_000_000.0).contains(rate));
+    rate.map(|rate| rate as u32).ok_or_else(|| "write it as \"500 kbit/s\", at most 1 Mbit/s".to_owned())
+}
+
+fn timing(text: &str) -> Result<BitTiming, String> {
+    let rate = bit_rate(text)?;
+    BitTiming::of(rate)
+        .ok_or_else(|| "LSS knows 10, 20, 50, 125, 250, 500, 800 kbit/s and 1 Mbit/s".to_owned())
+}
+
+fn node(text: &str) -> Result<u8, String> {
+    let wrong = || "a node number is 1 to 127, or none".to_owned();
+    if text == "none" {
+        return Ok(NO_NODE);
+    }
+    text.parse().ok().filter(|node| (1..=127).contains(node)).ok_or_else(wrong)
+}
+
+fn address(text: &str) -> Result<LssAddress, String> {
+    let number = |text: &str| match text.strip_prefix("0x").or_else(|| text.strip_prefix("0X")) {
+        Some(digits) => u32::from_str_radix(digits, 16).ok(),
+        None => text.parse().ok(),
+    };
+    let values: Option<Vec<u32>> = text.split(':').map(number).collect();
+    let values = values.and_then(|values| <[u32; 4]>::try_from(values).ok());
+    values.map(LssAddress::from_values).ok_or_else(|| {
+        "write it as VENDOR:PRODUCT:REVISION:SERIAL, for example 0x331:1:0x100:12345".to_owned()
+    })
+}
+
+#[derive(Clone, Copy, Debug)]
+struct SimulatedDevice {
+    address: LssAddress,
+    node: Option<u8>,
+}
+
+impl FromStr for SimulatedDevice {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let (identity, number) = match text.split_once('@') {
+            Some((identity, number)) => (identity, Some(node(number)?)),
+            None => (text, None),
+        };
+        Ok(Self { address: address(identity)?, node: number.filter(|node| *node != NO_NODE) })
+    }
+}
+
+/// Does it.
+pub fn run(arguments: &Arguments) -> Exit {
+    let interrupted = match interruption::watch() {
+        Ok(interrupted) => interrupted,
+        Err(error) => {
+            eprintln!("takt: cannot watch for Ctrl-C: {error}");
+            return Exit::Stopped;
+        }
+    };
+    let is_interrupted = || interrupted.load(Ordering::Relaxed);
+    match &arguments.bus {
+        Interface::Simulated if arguments.simulate.is_empty() => {
+            eprintln!("takt: nobody is on a simulated bus: add --simulate IDENTITY");
+            Exit::Usage
+        }
+        Interface::Simulated => {
+            let devices = arguments.simulate.iter();
+            let mut bus = LssBus::new(devices.map(|device| LssDevice::new(device.address, device.node)));
+            lead(arguments, &mut bus, &mut VirtualClock::default(), is_interrupted)
+        }
+        Interface::SocketCan(_) if !arguments.simulate.is_empty() => {
+            eprintln!("takt: --simulate is for a simulated bus: --bus sim");
+            Exit::Usage
+        }
+        Interface::SocketCan(name) => {
+            let bit_rate = arguments.bit_rate;
+            let settings = InterfaceSettings { bit_rate, data_bit_rate: None, restart_ms: RESTART_MS };
+            if let Err(error) = prepare_interface(name, &settings) {
+                eprintln!("takt: bus {name}: {error}");
+                return Exit::Usage;
+            }
+            match open_socketcan(name, &SocketCanOptions { bit_rate, ..SocketCanOptions::default() }) {
+                Ok(mut port) => lead(arguments, &mut port, &mut MonotonicClock::default(), is_interrupted),
+                Err(error) => {
+                    eprintln!("takt: bus {name}: {error}");
+                    Exit::Usage
+                }
+            }
+        }
+    }
+}
+
+fn lead(
+    arguments: &Arguments,
+    port: &mut impl BusPort,
+    clock: &mut impl Clock,
+    mut is_interrupted: impl FnMut() -> bool,
+) -> Exit {
+    let output = Output { action: arguments.action.name(), is_json: arguments.json };
+    let is_verbose = arguments.verbose;
+    let mut see = |at_ns, seen| {
+        if is_verbose {
+            output::show(at_ns, &seen);
+        }
+    };
+    let mut report = Report::default();
+    let mut settings = LayerSettings::new(port, clock, &mut is_interrupted, &mut see);
+    let outcome = carry_out(arguments, &mut settings, &mut report);
+    output.finish(&report, outcome)
+}
+
+fn carry_out<P: BusPort, C: Clock>(
+    arguments: &Arguments,
+    settings: &mut LayerSettings<'_, P, C>,
+    report: &mut Report,
+) -> Result<(), LayerSettingFailure> {
+    let mut is_boot_up_awaited = false;
+    let outcome = act(arguments, settings, report, &mut is_boot_up_awaited);
+    if report.is_activated {
+        // A word at the old bit rate would only disturb the new one.
+        return outcome;
+    }
+    // Whatever has happened, nobody is left in configuration.
+    let released = settings.release(is_boot_up_awaited && outcome.is_ok());
+    outcome?;
+    report.booted_node = released?;
+    Ok(())
+}
+
+fn act<P: BusPort, C: Clock>(
+    arguments: &Arguments,
+    settings: &mut LayerSettings<'_, P, C>,
+    report: &mut Report,
+    is_boot_up_awaited: &mut bool,
+) -> Result<(), LayerSettingFailure> {
+    let choice = match (arguments.device, arguments.only) {
+        (Some(address), _) => Choice::Identity(address),
+        (None, true) => Choice::Only,
+        (None, false) => Choice::Unconfigured,
+    };
+    let mut is_stored = false;
+    match arguments.action {
+        Action::Wait => return Ok(()),
+        Action::Scan => {
+            settings.release(false)?;
+            let mut devices = vec![];
+            while let Some(address) = settings.scan()? {
+                devices.push(Device::from(address));
+                report.devices = Some(devices.clone());
+                if devices.len() >= MOST_DEVICES {
+                    break;
+                }
+            }
+            report.devices = Some(devices);
+            return Ok(());
+        }
+        Action::Inquire => {
+            settings.select(choice)?;
+            if let LssOutcome::Device(address) = settings.perform(LssTask::InquireAddress)? {
+                report.device = Some(address.into());
+            }
+            report.node = node_of(settings)?;
+            return Ok(());
+        }
+        Action::SetId { id, store } => {
+            report.device = settings.select(choice)?.map(Device::from);
+            let before = node_of(settings)?;
+            settings.perform(LssTask::ConfigureNode(id))?;
+            report.node = (id != NO_NODE).then_some(id);
+            // One that had a node number before keeps it until it is reset.
+            *is_boot_up_awaited = before.is_none() && report.node.is_some();
+            report.is_reset_needed = before.is_some();
+            is_stored = store;
+        }
+        Action::SetBitRate { rate, activate, store } => {
+            report.device = settings.select(choice)?.map(Device::from);
+            settings.perform(LssTask::ConfigureBitTiming(rate))?;
+            report.bit_rate = rate.bit_rate();
+            if store {
+                settings.perform(LssTask::Store)?;
+                report.is_stored = true;
+            }
+            if let Some(delay_ms) = activate {
+                settings.perform(LssTask::ActivateBitTiming { delay_ms })?;
+                report.is_activated = true;
+            }
+        }
+        Action::Store => {
+            report.device = settings.select(choice)?.map(Device::from);
+            is_stored = true;
+        }
+    }
+    if is_stored {
+        settings.perform(LssTask::Store)?;
+        report.is_stored = true;
+    }
+    Ok(())
+}
+
+fn node_of<P: BusPort, C: Clock>(
+    settings: &mut LayerSettings<'_, P, C>,
+) -> Result<Option<u8>, LayerSettingFailure> {
+    Ok(match settings.perform(LssTask::Inquire(Inquiry::Node))? {
+        LssOutcome::Told(number) => u8::try_from(number).ok().filter(|node| *node != NO_NODE),
+        _ => None,
+    })
+}

@@ -1,0 +1,177 @@
+//! What is shown of layer setting services.
+
+use std::io::Write as _;
+
+use serde::Serialize;
+
+use takt::canopen::lss::{LssAddress, LssError, LssRequest, LssResponse};
+use takt::commission::bus_session::Seen;
+use takt::commission::layer_settings::LayerSettingFailure;
+use takt_rt::time::Nanoseconds;
+
+use super::super::exit::Exit;
+
+/// The identity of a device.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Device {
+    vendor: u32,
+    product: u32,
+    revision: u32,
+    serial: u32,
+}
+
+impl From<LssAddress> for Device {
+    fn from(LssAddress { vendor, product, revision, serial }: LssAddress) -> Self {
+        Self { vendor, product, revision, serial }
+    }
+}
+
+impl Device {
+    fn words(self) -> String {
+        let Self { vendor, product, revision, serial } = self;
+        format!("0x{vendor:08X}:0x{product:08X}:0x{revision:08X}:0x{serial:08X}")
+    }
+}
+
+/// What has come of it.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Report {
+    /// The devices that a scan has found.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub devices: Option<Vec<Device>>,
+    /// The device that was meant, where it is known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub device: Option<Device>,
+    /// The node number that it has or was given.
+    pub node: Option<u8>,
+    /// The bit rate that it was given, in bit/s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bit_rate: Option<u32>,
+    /// Whether it has stored its settings.
+    pub is_stored: bool,
+    /// Whether it was told to change to the bit rate.
+    pub is_activated: bool,
+    /// Whether it goes by its old node number until it is reset.
+    pub is_reset_needed: bool,
+    /// The node number with which a device has booted.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub booted_node: Option<u8>,
+}
+
+/// Where it is shown.
+pub struct Output {
+    pub action: &'static str,
+    pub is_json: bool,
+}
+
+#[derive(Serialize)]
+struct Printed<'a> {
+    action: &'a str,
+    /// `done`, `interrupted` or `failed`.
+    ended: &'static str,
+    failure: Option<String>,
+    advice: Option<&'static str>,
+    result: &'a Report,
+}
+
+/// Shows a frame with what it says to LSS.
+pub fn show(at_ns: Nanoseconds, seen: &Seen) {
+    let (direction, frame, words) = match seen {
+        Seen::Sent(frame) => ('>', frame, LssRequest::decode(frame).map(|request| format!("{request:?}"))),
+        Seen::Received(frame) => {
+            ('<', frame, LssResponse::decode(frame).map(|response| format!("{response:?}")))
+        }
+        Seen::Event(_) => return,
+    };
+    let at_s = at_ns as f64 / 1e9;
+    eprintln!("{at_s:11.6} {direction} {:<22} {}", format!("{frame:?}"), words.unwrap_or_default());
+}
+
+fn advice(failure: LayerSettingFailure) -> Option<&'static str> {
+    match failure {
+        LayerSettingFailure::Nobody => Some(
+            "look at its supply, the wiring and the bit rate; a device that has a node number is named by --device or \
+             --only; a device without LSS cannot be found so",
+        ),
+        LayerSettingFailure::Task(LssError::NoReply { .. }) => {
+            Some("check the identity, the wiring and the bit rate; the device may not have this service")
+        }
+        LayerSettingFailure::Task(LssError::Refused { .. }) => {
+            Some("the device does not support this value or cannot store")
+        }
+        LayerSettingFailure::Task(LssError::ScanLost) => Some("scan again; the bus may be busy or disturbed"),
+        LayerSettingFailure::Interrupted => None,
+    }
+}
+
+impl Output {
+    /// Shows how it has ended.
+    pub fn finish(&self, report: &Report, outcome: Result<(), LayerSettingFailure>) -> Exit {
+        let failure = outcome.err();
+        let (ended, exit) = match failure {
+            None => ("done", Exit::Done),
+            Some(LayerSettingFailure::Interrupted) => ("interrupted", Exit::Interrupted),
+            Some(_) => ("failed", Exit::Stopped),
+        };
+        if self.is_json {
+            let printed = Printed {
+                action: self.action,
+                ended,
+                failure: failure.map(|failure| failure.to_string()),
+                advice: failure.and_then(advice),
+                result: report,
+            };
+            match serde_json::to_string(&printed) {
+                Ok(json) => print(&format!("{json}\n")),
+                Err(error) => eprintln!("takt: the result cannot be written as JSON: {error}"),
+            }
+            return exit;
+        }
+        print(&text(report));
+        match failure {
+            None => {}
+            Some(failure) => {
+                eprintln!("takt: {}: {failure}", self.action);
+                if let Some(advice) = advice(failure) {
+                    eprintln!("  try: {advice}");
+                }
+            }
+        }
+        exit
+    }
+}
+
+fn text(report: &Report) -> String {
+    let mut lines = vec![];
+    if let Some(devices) = &report.devices {
+        lines.extend(devices.iter().map(|device| format!("without a node number  {}", device.words())));
+        lines.push(match devices.len() {
+            0 => "no device without a node number".to_owned(),
+            1 => "1 device".to_owned(),
+            count => format!("{count} devices"),
+        });
+    }
+    lines.extend(report.device.map(|device| format!("device       {}", device.words())));
+    lines.extend(report.node.map(|node| format!("node number  {node}")));
+    lines.extend(report.bit_rate.map(|rate| format!("bit rate     {} kbit/s", rate / 1000)));
+    lines.extend(report.booted_node.map(|node| format!("booted       as node {node}")));
+    if report.is_stored {
+        lines.push("stored       yes".to_owned());
+    }
+    if report.is_reset_needed {
+        lines.push("note: the device goes by its old number until it is reset".to_owned());
+    }
+    if report.is_activated {
+        lines.push(
+            "note: the devices change to this bit rate and stay in configuration: change the interface as well, then \
+             `takt lss --bus … --bit-rate … wait`"
+                .to_owned(),
+        );
+    }
+    lines.into_iter().map(|line| format!("  {line}\n")).collect()
+}
+
+/// A reader that has seen enough (`| head`) is no failure.
+fn print(text: &str) {
+    let _ = std::io::stdout().write_all(text.as_bytes());
+}

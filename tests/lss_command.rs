@@ -1,0 +1,153 @@
+//! `takt lss` as a user meets it, on simulated devices.
+
+use std::process::{Command, Output, Stdio};
+
+use serde_json::Value;
+
+const FIRST: &str = "0x331:1:0x100:0x1234";
+const SECOND: &str = "0x331:1:0x100:0xFFFFFFFE";
+const KNOWN: &str = "0x5A65726F:2:3:4@9";
+
+fn lss(arguments: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_takt"));
+    command.arg("lss").args(arguments).stdin(Stdio::null()).output().unwrap()
+}
+
+/// On a bus with two devices without a node number and one that has one.
+fn simulated(arguments: &[&str]) -> Output {
+    let bus = ["--bus", "sim", "--simulate", FIRST, "--simulate", SECOND, "--simulate", KNOWN];
+    lss(&[&bus, arguments].concat())
+}
+
+fn said(output: &Output) -> String {
+    String::from_utf8(output.stdout.clone()).unwrap()
+}
+
+fn errors(output: &Output) -> String {
+    String::from_utf8(output.stderr.clone()).unwrap()
+}
+
+#[track_caller]
+fn ends_with(code: i32, output: &Output) {
+    assert_eq!(output.status.code(), Some(code), "{}{}", said(output), errors(output));
+}
+
+#[track_caller]
+fn result(arguments: &[&str]) -> Value {
+    let output = simulated(&[&["--json"], arguments].concat());
+    ends_with(0, &output);
+    let object: Value = serde_json::from_str(&said(&output)).unwrap();
+    assert_eq!(object["ended"], "done");
+    object["result"].clone()
+}
+
+#[test]
+fn a_scan_finds_every_device_that_has_no_node_number_and_no_other() {
+    let result = result(&["scan"]);
+    let serials: Vec<u64> = result["devices"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|device| device["serial"].as_u64().unwrap())
+        .collect();
+    assert_eq!(serials, [0x1234, 0xFFFF_FFFE]);
+    let output = simulated(&["scan"]);
+    assert!(said(&output).contains("without a node number  0x00000331:0x00000001:0x00000100:0x00001234"));
+    assert!(said(&output).contains("2 devices"), "{}", said(&output));
+}
+
+#[test]
+fn a_device_that_is_given_a_node_number_boots_with_it() {
+    let found = result(&["set-id", "5"]);
+    assert_eq!(
+        (&found["node"], &found["booted_node"], &found["is_stored"]),
+        (&5.into(), &5.into(), &false.into())
+    );
+    assert_eq!(found["device"]["serial"], 0x1234, "the first that the scan finds");
+    let named = result(&["--device", SECOND, "set-id", "7", "--store"]);
+    assert_eq!((&named["booted_node"], &named["is_stored"]), (&7.into(), &true.into()));
+    assert_eq!(named["device"]["serial"], 0xFFFF_FFFE_u32);
+}
+
+#[test]
+fn a_device_that_had_a_node_number_keeps_it_until_it_is_reset_which_is_said() {
+    let identity = KNOWN.split('@').next().unwrap();
+    let output = simulated(&["--device", identity, "set-id", "12"]);
+    ends_with(0, &output);
+    assert!(said(&output).contains("goes by its old number until it is reset"), "{}", said(&output));
+    assert!(!said(&output).contains("booted"), "{}", said(&output));
+}
+
+#[test]
+fn a_device_tells_who_it_is_and_which_number_it_has() {
+    let identity = KNOWN.split('@').next().unwrap();
+    let known = result(&["--device", identity, "inquire"]);
+    assert_eq!((&known["device"]["vendor"], &known["node"]), (&0x5A65_726F_u32.into(), &9.into()));
+    let found = result(&["inquire"]);
+    assert_eq!((&found["device"]["serial"], &found["node"]), (&0x1234.into(), &Value::Null));
+    let output = lss(&["--bus", "sim", "inquire", "--simulate", SECOND, "--only"]);
+    ends_with(0, &output);
+    assert!(said(&output).contains("0xFFFFFFFE"), "{}", said(&output));
+}
+
+#[test]
+fn a_bit_rate_is_set_stored_and_activated_with_word_of_what_is_to_be_done_next() {
+    let output = simulated(&[
+        "--device",
+        FIRST,
+        "--verbose",
+        "set-bitrate",
+        "500 kbit/s",
+        "--store",
+        "--activate",
+        "200",
+    ]);
+    ends_with(0, &output);
+    for words in ["bit rate     500 kbit/s", "stored       yes", "change the interface as well", "wait"] {
+        assert!(said(&output).contains(words), "{words}: {}", said(&output));
+    }
+    // Configured, stored, activated; and nothing after that at the old bit rate.
+    let sent: Vec<String> =
+        errors(&output).lines().filter(|line| line.contains(" > ")).map(str::to_owned).collect();
+    for (line, frame) in sent.iter().rev().zip(["7E5#15C800", "7E5#17", "7E5#130002"]) {
+        assert!(line.contains(frame), "{frame}: {sent:?}");
+    }
+    ends_with(0, &simulated(&["wait"]));
+    ends_with(0, &simulated(&["--device", FIRST, "store"]));
+}
+
+#[test]
+fn who_is_not_there_is_told_with_what_to_try() {
+    let output = simulated(&["--device", "1:2:3:4", "inquire"]);
+    ends_with(1, &output);
+    assert!(errors(&output).contains("inquire: no device answered within"), "{}", errors(&output));
+    assert!(errors(&output).contains("try: check the identity"), "{}", errors(&output));
+    let output = lss(&["--bus", "sim", "--simulate", KNOWN, "set-id", "5"]);
+    ends_with(1, &output);
+    assert!(errors(&output).contains("no device without a node number answers"), "{}", errors(&output));
+    let output = lss(&["--bus", "sim", "--simulate", KNOWN, "scan"]);
+    ends_with(0, &output);
+    assert!(said(&output).contains("no device without a node number"), "{}", said(&output));
+}
+
+#[test]
+fn bad_words_are_refused_before_anything_is_sent() {
+    for (arguments, words) in [
+        (vec!["--bus", "sim", "scan"], "add --simulate"),
+        (vec!["--bus", "can0", "--simulate", FIRST, "scan"], "--bus sim"),
+        (vec!["--bus", "takt-none", "scan"], "there is no interface takt-none"),
+        (vec!["--bus", "sim", "--simulate", "1:2:3", "scan"], "VENDOR:PRODUCT:REVISION:SERIAL"),
+        (vec!["--bus", "sim", "--simulate", FIRST, "set-id", "128"], "1 to 127, or none"),
+        (vec!["--bus", "sim", "--simulate", FIRST, "set-bitrate", "400 kbit/s"], "LSS knows 10, 20, 50"),
+        (
+            vec!["--bus", "sim", "--simulate", FIRST, "--only", "--device", FIRST, "inquire"],
+            "cannot be used with",
+        ),
+        (vec!["scan"], "--bus"),
+    ] {
+        let output = lss(&arguments);
+        ends_with(2, &output);
+        assert!(errors(&output).contains(words), "{words}: {}", errors(&output));
+        assert!(output.stdout.is_empty());
+    }
+}
