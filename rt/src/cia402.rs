@@ -107,6 +107,10 @@ impl State {
     pub const fn controlword_towards(self, goal: Goal) -> u16 {
         match goal {
             Goal::NoVoltage => controlword::DISABLE_VOLTAGE,
+            Goal::QuickStop => match self {
+                Self::OperationEnabled | Self::QuickStopActive => controlword::QUICK_STOP,
+                _ => controlword::SHUTDOWN,
+            },
             Goal::Disabled => match self {
                 Self::QuickStopActive => controlword::DISABLE_VOLTAGE,
                 _ => controlword::SHUTDOWN,
@@ -130,6 +134,8 @@ pub enum Goal {
     Disabled,
     /// Operation enabled.
     Enabled,
+    /// Brought to rest by the drive itself, which then takes its torque away.
+    QuickStop,
 }
 
 /// The device control commands, which the standard encodes in bits 0 to 3 of the controlword.

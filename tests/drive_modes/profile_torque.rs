@@ -4,6 +4,7 @@ use takt::config::Config;
 use takt::controller::Outcome;
 use takt::sim::erob::{ErobJoint, ErobParameters};
 use takt::sim::{BitRates, Drive, SimulatedBus};
+use takt_rt::cia402::State;
 use takt_rt::door::{ProfileMove, Request};
 use takt_rt::profile::ProfileTarget;
 use takt_rt::stop::{Phase, Rule, StopCategory};
@@ -69,6 +70,38 @@ fn a_joint_that_gets_too_fast_is_let_go_and_braked() {
     assert_eq!(world.stops().len(), 1);
     let seen = world.observe(0);
     assert!(seen.is_braked && seen.velocity == 0.0, "{seen:?}");
+}
+
+/// Torque 0, which is the manual's stop, would let the joint coast.
+#[test]
+fn a_stop_in_motion_decelerates_the_joint_by_the_drives_quick_stop_and_then_brakes_it() {
+    let mut world = World::holding(load("erob-modes/erob-pt.toml"));
+    let limits = world.config.axes[0].limits;
+    world.drive_to(7, 0, ProfileTarget::Torque(1.5));
+    world.run_for(500);
+    let speed = world.observe(0).velocity;
+    assert!(speed > 0.1 * limits.velocity, "{speed}");
+    world.request(Request::Stop(StopCategory::One));
+    let (mut cycles, mut last, mut states) = (0, speed, vec![]);
+    while world.phase() != Phase::Disabled {
+        world.run_for(1);
+        cycles += 1;
+        let seen = world.observe(0);
+        assert!(!seen.is_braked || seen.velocity.abs() < 0.1 * limits.velocity, "{seen:?}");
+        // The request is on its way for some cycles.
+        assert!(cycles < 10 || seen.velocity <= last + 1e-9, "{cycles}: {seen:?} after {last}");
+        last = seen.velocity;
+        if states.last() != Some(&seen.state) {
+            states.push(seen.state);
+        }
+    }
+    assert!(states.contains(&State::QuickStopActive), "{states:?}");
+    let needed_ms = 1000.0 * speed / limits.deceleration;
+    assert!(f64::from(cycles) < 1.1 * needed_ms + 20.0, "{cycles} ms, {needed_ms} ms at the limit");
+    world.run_for(5);
+    let seen = world.observe(0);
+    assert!(seen.is_braked && seen.velocity == 0.0 && !seen.state.has_torque(), "{seen:?}");
+    assert!(world.outcome().is_none() && world.stops().len() == 1, "{:?}", world.stops());
 }
 
 /// Its drive closes no loop that would hold the joint.

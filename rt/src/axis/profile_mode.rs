@@ -26,6 +26,12 @@ impl Axis {
         self.parameters.law.is_profile()
     }
 
+    /// Whether the drive must bring the joint to rest by its own quick stop (object 6085). The manual stops profile torque
+    /// with torque 0, which only lets go: the joint coasts, and nothing but friction slows it.
+    pub fn stops_by_itself(&self) -> bool {
+        self.parameters.law == ControlLaw::ProfileTorque
+    }
+
     /// Whether a target is of the kind that the axis' mode takes, and within its limits.
     pub fn accepts(&self, target: ProfileTarget) -> bool {
         let limits = &self.parameters.limits;
@@ -54,7 +60,8 @@ impl Axis {
         self.profile_until_ns = valid_until_ns;
     }
 
-    /// Makes rest the target: the nearest position at which the joint can stand, no velocity, no torque.
+    /// Makes rest the target: the nearest position at which the joint can stand, no velocity, no torque. See
+    /// [`Axis::stops_by_itself`] for the latter.
     pub fn stop_profile(&mut self) {
         let target = match self.parameters.law {
             ControlLaw::ProfilePosition => ProfileTarget::Position(self.nearest_rest()),

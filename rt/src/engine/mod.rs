@@ -427,7 +427,13 @@ impl Engine {
             if has_cycle_of(&self.buses, axis, slot) && !is_held_back {
                 // A drive that falls out of operation enabled is not led back by what the others are still to do.
                 let is_led_up = self.phase == Phase::Enabling || axis.is_enabled();
-                let goal = if self.goal == Goal::Enabled && !is_led_up { Goal::Disabled } else { self.goal };
+                let goal = match self.goal {
+                    Goal::Enabled if self.phase == Phase::Stopping && axis.stops_by_itself() => {
+                        Goal::QuickStop
+                    }
+                    Goal::Enabled if !is_led_up => Goal::Disabled,
+                    goal => goal,
+                };
                 axis.command(goal, reset_word.filter(|_| axis.drive_state().is_faulted()));
             }
         }

@@ -97,7 +97,8 @@ impl Engine {
         self.carry_out(wanted, now_ns, door);
     }
 
-    /// A joint in profile torque cannot be held where it is: its drive closes no position loop. The brake holds it.
+    /// A joint in profile torque cannot be held where it is: its drive closes no position loop. It stops by the drive's
+    /// quick stop, which ends without torque, and the brake holds it.
     fn possible(&self, category: StopCategory) -> StopCategory {
         let is_unheld = self.axes.iter().any(|axis| axis.parameters().law == ControlLaw::ProfileTorque);
         match category {
@@ -202,7 +203,8 @@ fn complaint(
     if let Some(code) = axis.unexplained_emergency() {
         return Some((Rule::EmergencyMessage, code.into(), 0.0));
     }
-    if !axis.is_enabled() {
+    let is_stopping_itself = phase == Phase::Stopping && axis.stops_by_itself();
+    if !axis.is_enabled() && !is_stopping_itself {
         axis.give_up();
         return Some((Rule::DriveDisabled, axis.statusword().into(), 0.0));
     }
