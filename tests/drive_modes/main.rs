@@ -14,3 +14,4 @@ mod quirks;
 mod reported_mapping;
 mod silence;
 mod time_of_day;
+mod trajectory_time;

@@ -1,8 +1,11 @@
 //! One axis: what its drive reported, where it is to be, and the numbers that go onto the wire.
 
+mod delay;
 mod profile_mode;
 
 use arrayvec::ArrayVec;
+
+use self::delay::SetPointDelay;
 
 use crate::cia402::{Goal, State as DriveState, controlword};
 use crate::control::{ControlLaw, LoopInput};
@@ -107,6 +110,8 @@ pub struct Axis {
     feedback: ProcessImage,
     /// Set-points, newest first: of this cycle, the last, and the one before.
     set: [State; 3],
+    /// Those that wait until the axes on slower buses are as far.
+    delay: SetPointDelay,
     /// The same of the cycles in which they were sent.
     sent: [State; 3],
     profile: ProfileCommand,
@@ -163,6 +168,7 @@ impl Axis {
             command,
             feedback: ProcessImage::default(),
             set: [State::default(); 3],
+            delay: SetPointDelay::default(),
             sent: [State::default(); 3],
             profile: ProfileCommand::default(),
             profile_target: None,
@@ -422,10 +428,12 @@ impl Axis {
     pub fn follow_actual(&mut self) {
         if self.is_lost {
             self.set = [State { position: self.set[0].position, ..State::default() }; 3];
+            self.delay.fill(self.set[0]);
             self.following_error = 0.0;
             return;
         }
         self.set = [State { position: self.position, ..State::default() }; 3];
+        self.delay.fill(self.set[0]);
         self.sent = self.set;
         self.following_error = 0.0;
         self.following_guard.reset();
@@ -470,10 +478,16 @@ impl Axis {
         if self.age > 0 { Ok(()) } else { self.following_guard.check(self.following_error) }
     }
 
+    /// Has set-points wait for so many cycles before they are sent, for the axes on slower buses.
+    pub fn delay_set_points(&mut self, cycles: u32) {
+        self.delay.set(cycles);
+    }
+
     /// Takes the next set-point. In a profile mode there is none: the target stays.
     pub fn advance(&mut self, next: State) {
         let next = if self.is_profile() { self.shown_set_point() } else { next };
         self.set = [next, self.set[0], self.set[1]];
+        self.delay.push(next);
     }
 
     /// Writes the command of this cycle of the axis' bus: one step towards `goal`, unless another controlword is to be
@@ -488,7 +502,7 @@ impl Axis {
         self.since_controlword =
             if self.is_controlword_due { 0 } else { self.since_controlword.saturating_add(1) };
         self.base_word = word;
-        self.sent = [self.set[0], self.sent[0], self.sent[1]];
+        self.sent = [self.delay.due(), self.sent[0], self.sent[1]];
 
         let parameters = &self.parameters;
         let law = parameters.law;
@@ -511,7 +525,7 @@ impl Axis {
             self.profile.target_raw()
         } else {
             let input = LoopInput {
-                set: self.set[0],
+                set: self.sent[0],
                 due: self.sent[2],
                 position: self.position,
                 velocity: self.velocity,

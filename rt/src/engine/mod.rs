@@ -158,6 +158,7 @@ impl Engine {
                 table.foreign(Id::canopen(0x700, heartbeat.node));
             }
         }
+        let axes = on_one_time(parameters.axes.iter().cloned().map(Axis::new).collect(), &parameters.buses);
         let record = CycleRecord { axis_count: parameters.axes.len() as u8, ..CycleRecord::default() };
         let snapshot = Snapshot {
             axis_count: parameters.axes.len() as u8,
@@ -167,7 +168,7 @@ impl Engine {
         Ok(Self {
             period_ns: parameters.period_ns,
             period_s: parameters.period_ns as f64 / NANOSECONDS_PER_SECOND as f64,
-            axes: parameters.axes.into_iter().map(Axis::new).collect(),
+            axes,
             buses: parameters.buses,
             dispatch,
             heartbeat: parameters.heartbeat,
@@ -548,6 +549,18 @@ const fn has_cycle(bus: &BusParameters, slot: u64) -> bool {
 
 fn has_cycle_of(buses: &[BusParameters], axis: &Axis, slot: u64) -> bool {
     buses.get(usize::from(axis.parameters().bus)).is_some_and(|bus| has_cycle(bus, slot))
+}
+
+/// Has the set-points of axes on faster buses wait for those on the slowest: a joint is where the trajectory was two
+/// cycles of its bus ago.
+fn on_one_time(mut axes: ArrayVec<Axis, MAX_AXES>, buses: &[BusParameters]) -> ArrayVec<Axis, MAX_AXES> {
+    let divider = |axis: &Axis| buses.get(usize::from(axis.parameters().bus)).map_or(1, |bus| bus.divider);
+    // A drive in a profile mode gets no set-points that anybody would have to wait for.
+    let slowest = axes.iter().filter(|axis| !axis.is_profile()).map(divider).max().unwrap_or(1);
+    for axis in &mut axes {
+        axis.delay_set_points(slowest.saturating_sub(divider(axis)).saturating_mul(2));
+    }
+    axes
 }
 
 fn enter(table: &mut Dispatch, axis: usize, own: &AxisParameters) -> Result<(), SetUpError> {
