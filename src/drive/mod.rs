@@ -2,7 +2,8 @@
 //!
 //! A family writes its procedures down as lists of steps (`erob_canopen`, `yz_aim`, `step_list`, `step`); one machine
 //! carries them out for every family (`axis_run`), for all axes at once ([`BringUp`], [`Leave`]); what was learnt is in [`AxisFacts`], what
-//! went wrong in [`BringUpError`].
+//! went wrong in [`BringUpError`]. Which objects travel in which PDO is in [`ProcessData`]: as it is written to the drive,
+//! or as the drive reports it (`reported_mapping`).
 
 mod axis_run;
 mod bring_up;
