@@ -43,7 +43,7 @@ fn commands_go_out_as_the_drive_maps_them() {
     assert_eq!(rig.door.snapshot.refused, 0);
     let sent = |id: u32| rig.buses[0].sent.iter().filter(move |(_, frame)| frame.id().value() == id);
     assert_eq!(sent(0x201).count(), 0, "nobody listens to RPDO 1 any more");
-    let (_, last) = sent(0x301).last().unwrap();
+    let (_, last) = sent(0x301).next_back().unwrap();
     // The target is where the drive is, and follows the joint; behind it the controlword that asks for nothing.
     assert_eq!(last.payload()[..4], 1000_i32.to_le_bytes());
     assert_eq!(last.payload()[4..], [0x06, 0x00]);
