@@ -36,6 +36,9 @@ impl SendPath {
     ///   finds that out and gives it back (`can_send`, net/can/af_can.c);
     /// - an option set to what it is: the kernel locks the socket, for which it takes the bottom-half lock
     ///   (`lock_sock_nested`, net/core/sock.c).
+    ///
+    /// Both are needed: of 8000 frames on a loaded CPU the latest was 22 µs late without them, 27 µs with the second call
+    /// alone, 22 µs with the first alone, and 7 µs with both.
     pub(super) fn walk(&self) {
         // SAFETY: all-zero bytes are a valid address and a valid frame.
         let (mut address, frame): (libc::sockaddr_can, libc::can_frame) = unsafe { core::mem::zeroed() };
