@@ -54,10 +54,10 @@ end() {
     rm -f "$recording"
 }
 
-# Waits until the set-points of node 1 change from cycle to cycle, and then for the middle of the move.
+# Waits until the set-points of node 1 change from cycle to cycle, and then for the middle of the move. For as long as the run
+# lives: where the guest waits for the host's files, its time flies.
 in_motion() { # INTERFACE [IDENTIFIER]
-    local tries
-    for tries in $(seq 100); do
+    while kill -0 $run 2>/dev/null; do
         [ "$(candump -L -T 500 -n 20 "$1,${2:-201}:7FF" | cut -d ' ' -f 3 | sort -u | wc -l)" -gt 15 ] && { sleep 0.3; return; }
     done
     fails "$name: the axes have not begun to move"
