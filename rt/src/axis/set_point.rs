@@ -33,7 +33,9 @@ impl Axis {
     /// The set-point of an axis that has been given up stays where it was.
     pub fn follow_actual(&mut self, period_s: f64) {
         let here = self.set[0].position;
-        let most = self.parameters.limits.velocity * period_s;
+        // In a profile mode the drive gets no set-points.
+        let fastest = if self.is_profile() { f64::INFINITY } else { self.parameters.limits.velocity };
+        let most = fastest * period_s;
         let way = (self.position - here).clamp(-most, most);
         // The sum of the difference need not be the actual position to the last bit.
         let is_there = way.abs() < most;
