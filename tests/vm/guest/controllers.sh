@@ -8,6 +8,7 @@ restart_ms=150
 with_folder configs/arm6-erob.toml "$folder/fast.toml"
 with_long_moves "$folder/fast.toml" "$folder/arm.toml"
 first_bus_only "$folder/arm.toml" > "$half"
+without_first_move "$half"
 sed "/^name = \"base\"/a restart_ms = $restart_ms" "$half" > "$restarting"
 
 errors() { echo "$1 $2 $3" > /sys/module/error_counters/parameters/errors; } # INTERFACE transmit|receive COUNT
@@ -55,7 +56,8 @@ passive() { # transmit|receive ERRORS
     errors can0 "$1" -"$((8 * $2))"
 }
 
-# 32 transmissions in a row without an acknowledgement.
+# 32 transmissions in a row without an acknowledgement. The controller is error-passive on the way, for some microseconds, and
+# a cycle that begins just then stops for that.
 bus_off() { # NAME
     begin "$1" 20 "$half" base=can0
     in_motion can0
@@ -63,7 +65,7 @@ bus_off() { # NAME
     errors can0 transmit 32
     sleep 0.01
     expect "$name, ten milliseconds later" "BUS-OFF 127 0" "$(controller can0 | cut -d ' ' -f -3)"
-    end bus_lost
+    end bus_lost bus_error_passive
 }
 
 moves_again() { # AFTER_WHAT
@@ -79,7 +81,7 @@ stays_off() {
     expect "$name, in the report" "bus off" "$(reported_state)"
     "$TAKT" doctor --self-test-s 0 --json > "$folder/doctor.json"
     expect "takt doctor on it (exit code, state, errors)" \
-        "1 forbids bus-off; counters of the controller: 127 sending, 0 receiving" \
+        "1 forbids_real_time bus-off; counters of the controller: 127 sending, 0 receiving" \
         "$? $(python3 -c '
 import json, sys
 checks = {c["check"]: c for c in json.load(open(sys.argv[1]))["checks"] if c["interface"] == "can0"}

@@ -21,16 +21,24 @@ stop_row() { # FAULT RULE CATEGORY NOTICED_MS REST_MS
 # with_folder CONFIG FILE: the same with its recordings and black boxes in `folder`.
 with_folder() { { cat "$1"; printf '\n[telemetry]\ndirectory = "%s"\n' "$folder"; } > "$2"; }
 
-# with_long_moves CONFIG FILE: so that whatever happens does so in motion.
-with_long_moves() { sed '/^\[\[program\.move\]\]/a minimum_duration = "6 s"' "$1" > "$2"; }
+# with_long_moves CONFIG FILE: so that whatever happens does so in motion. And without the first move, for every other run: a
+# run that is broken off in mid-move leaves the arm nearer to its target, and the next would have less and less to go.
+with_long_moves() {
+    sed '/^\[\[program\.move\]\]/a minimum_duration = "6 s"' "$1" > "$2"
+    without_first_move "$2"
+}
+without_first_move() { # FILE: leaves FILE.back
+    awk -v RS= -v ORS='\n\n' '!(/^\[\[program\.move\]\]/ && !moves++)' "$1" > "$1.back"
+}
 
 # Where the next runs record to; their black boxes stay in `folder`.
 recordings=$folder
-run= name= fault_at=- recording=
+is_back=0 run= name= fault_at=- recording=
 begin() { # NAME SECONDS CONFIG BUS=INTERFACE...
     local config=$3 seconds=$2
     name=$1 fault_at=- recording=$recordings/$1.mcap
     shift 3
+    [ ! -f "$config.back" ] || { is_back=$((1 - is_back)); [ $is_back = 0 ] || config=$config.back; }
     chrt --other 0 "$TAKT" run "$config" $(printf -- '--bus %s ' "$@") --require-realtime --duration "$seconds" --json \
         --record "$recording" > "$folder/$name.json" 2> "$folder/$name.txt" & run=$!
 }

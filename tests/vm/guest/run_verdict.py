@@ -15,7 +15,6 @@ import json
 import struct
 import subprocess
 import sys
-from collections import defaultdict
 
 from recording import messages
 
@@ -87,19 +86,24 @@ def judge_steps(run):
 
 
 def stop_times(run, fault_at_s):
-    """When the fault was noticed, and when the last axis came within tolerance of where it came to rest, in ms after it."""
+    """When the fault was noticed, and when the last axis came within tolerance of where it came to rest, in ms after it.
+    An axis that is silent for a while is known to be at rest when it is heard again; one that never is, is not known."""
     fault_at_ns = int(float(fault_at_s) * 1e9)
-    noticed_ns, rest_ns, heard = fault_at_ns, fault_at_ns, defaultdict(list)
+    noticed_ns, heard = fault_at_ns, {axis["name"]: [] for axis in run["axes"]}
     for name, at_ns, slot, _, position, is_heard, _ in axis_cycles(run):
         if slot <= run["stop"]["slot"]:
             noticed_ns = at_ns
-        if is_heard and at_ns > fault_at_ns:
+        elif is_heard:
             heard[name].append((at_ns, position))
+    noticed_ms = f"{(noticed_ns - fault_at_ns) / 1e6:.1f}"
+    rest_ns = noticed_ns
     for axis in run["axes"]:
         positions = heard[axis["name"]]
+        if not positions:
+            return noticed_ms, "-"
         moving = [at_ns for at_ns, position in positions if abs(position - positions[-1][1]) > AT_REST[axis["unit"]]]
-        rest_ns = max([rest_ns, *moving[-1:]])
-    return (noticed_ns - fault_at_ns) / 1e6, (rest_ns - fault_at_ns) / 1e6
+        rest_ns = max([rest_ns, positions[0][0], *moving[-1:]])
+    return noticed_ms, f"{(rest_ns - fault_at_ns) / 1e6:.1f}"
 
 
 def anomalies(run):
@@ -131,7 +135,7 @@ def main(takt, path, code, fault_at_s, *rules):
     print(f"{ended}, {records}" + (f"; {counted}" if counted else ""))
     if run["stop"] and not is_lost and fault_at_s != "-":
         noticed_ms, rest_ms = stop_times(run, fault_at_s)
-        print(f"{run['stop']['rule']} {run['stop']['category']} {noticed_ms:.1f} {rest_ms:.1f}")
+        print(f"{run['stop']['rule']} {run['stop']['category']} {noticed_ms} {rest_ms}")
 
 
 if __name__ == "__main__":
