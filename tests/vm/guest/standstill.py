@@ -5,7 +5,7 @@ about every other millisecond, from when it is started until two seconds after t
 
 Prints, in milliseconds after the last SYNC: when the last position had changed by more than the noise of an encoder, and
 when the last drive had let go, was in an alarm, or had fallen silent, as one does that is stopped (CiA 301). Ends with an
-error when one moved or was enabled to the end.
+error when one moved or was enabled to the end, or when there was no SYNC at all.
 """
 
 import select
@@ -17,7 +17,7 @@ import time
 FRAME = struct.Struct("<IB3x8s")
 SYNC, EMERGENCY, REQUEST, ANSWER = 0x080, 0x080, 0x600, 0x580
 POSITION, STATUSWORD = (0x6064, 0), (0x6041, 0)
-INTERVAL_S, WATCHED_S = 0.002, 2.0
+INTERVAL_S, WATCHED_S, PATIENCE_S = 0.002, 2.0, 10.0
 NOISE_COUNTS = 8
 # Ready to switch on, switched on, operation enabled, and no fault (CiA 402).
 ENABLED_MASK, ENABLED = 0x006F, 0x0027
@@ -49,9 +49,9 @@ def main(*buses):
         name, nodes = bus.split("=")
         interfaces.append((opened(name), name, [int(node) for node in nodes.split(",")]))
         drives.update({(name, int(node)): Drive() for node in nodes.split(",")})
-    last_sync_s, asked_s, wanted = 0.0, 0.0, POSITION
+    begun_s, last_sync_s, asked_s, wanted = time.time(), 0.0, 0.0, POSITION
     names = {bus: name for bus, name, _ in interfaces}
-    while not last_sync_s or time.time() < last_sync_s + WATCHED_S:
+    while time.time() < (last_sync_s + WATCHED_S if last_sync_s else begun_s + PATIENCE_S):
         if time.time() >= asked_s + INTERVAL_S:
             asked_s, wanted = time.time(), STATUSWORD if wanted is POSITION else POSITION
             for bus, _, nodes in interfaces:
@@ -65,6 +65,8 @@ def main(*buses):
             elif identifier & 0x780 == ANSWER and data[0] in (0x43, 0x4B):
                 index = struct.unpack_from("<H", data, 1)[0]
                 drives[names[bus], identifier & 0x7F].hears(index, struct.unpack_from("<i", data, 4)[0], now_s)
+    if not last_sync_s:
+        sys.exit("there was no SYNC")
     end_s = time.time()
     moved_s = max(drive.moved_s for drive in drives.values())
     enabled_s = max(drive.enabled_s for drive in drives.values())
