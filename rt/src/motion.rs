@@ -149,8 +149,19 @@ fn move_limits(leg: &Leg<'_>, velocity_scale: f64, acceleration_scale: f64) -> L
     // Who stands outside the position limits may move, as long as the way leads back.
     let lowest = axis.position_min.min(leg.start.position);
     let highest = axis.position_max.max(leg.start.position);
-    Limits::asymmetric(velocity, -velocity, rising, -falling, axis.jerk * acceleration_scale)
+    Limits::asymmetric(velocity, -velocity, rising, -falling, move_jerk(leg, acceleration_scale))
         .with_position(lowest, highest)
+}
+
+/// A fraction of the jerk limit, or more where the present acceleration would lead beyond the velocity limit before so
+/// little had taken it back.
+fn move_jerk(leg: &Leg<'_>, acceleration_scale: f64) -> f64 {
+    let (axis, State { velocity, acceleration, .. }) = (leg.limits, leg.start);
+    let wanted = axis.jerk * acceleration_scale;
+    let is_along = velocity * acceleration > 0.0;
+    let room = (axis.velocity - velocity.abs()).max(0.0);
+    let gain = acceleration * acceleration / 2.0;
+    if is_along && gain > room * wanted { axis.jerk.min(gain / room) } else { wanted }
 }
 
 /// A stop in coordination must not lead an axis that could stop sooner by itself beyond its position limits.
@@ -177,6 +188,19 @@ mod tests {
         jerk: 100.0,
         torque: 50.0,
     };
+
+    #[test]
+    fn a_move_that_is_to_be_gentle_takes_a_high_acceleration_back_before_the_velocity_limit() {
+        let start = State { position: 0.0, velocity: 1.9, acceleration: 4.0 };
+        let target = State { position: 2.5, ..State::default() };
+        let mut motion = Motion::default();
+        motion.move_to([Leg { start, target, limits: &LIMITS }].into_iter(), 1.0, 0.1, 0.0).unwrap();
+        while !motion.is_finished() {
+            motion.advance(0.001);
+            let velocity = motion.states().next().unwrap().velocity;
+            assert!(velocity <= LIMITS.velocity * (1.0 + 1e-9), "{velocity}");
+        }
+    }
 
     #[test]
     fn an_axis_that_can_stop_before_its_position_limit_is_not_led_beyond_it_by_a_slower_one() {

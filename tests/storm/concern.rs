@@ -10,9 +10,6 @@ pub struct Concern {
     pub is_present: bool,
     /// A torque from outside acts on it, or another master commands its drive between two looks.
     pub is_driven_by_others: bool,
-    /// Frames that pass the CRC with a wrong content can tell of a drive that is disabled and somewhere else, two cycles in
-    /// a row; its set-point then follows what they say. Nothing in the process data could show that they lie.
-    pub is_lied_about: bool,
     /// Something pushes the joint for as long as it lasts, also in the end.
     pub is_loaded: bool,
 }
@@ -22,7 +19,6 @@ impl Concern {
         Self {
             is_present: self.is_present || other.is_present,
             is_driven_by_others: self.is_driven_by_others || other.is_driven_by_others,
-            is_lied_about: self.is_lied_about || other.is_lied_about,
             is_loaded: self.is_loaded || other.is_loaded,
         }
     }
@@ -81,8 +77,6 @@ fn concern(axis: &Axis, fault: &takt::faults::Fault) -> Concern {
     Concern {
         is_present,
         is_driven_by_others: is_own && matches!(fault.kind, "load" | "foreign-set-points"),
-        is_lied_about: matches!(fault.effect, Effect::Frames(FrameEffect::Corrupt { part, .. })
-            if !is_at_another_axis || part == Part::Identifier),
         is_loaded: is_own && fault.kind == "load",
     }
 }

@@ -74,3 +74,21 @@ fn a_stop_in_coordination_leads_no_joint_beyond_its_position_limit() {
         assert!(played.is_ok(), "interrupted after {length} cycles: {played:?}");
     }
 }
+
+#[test]
+fn storms_that_have_failed_once_pass() {
+    let seeds = [
+        // An event timer that was set before operational woke a YZ-AIM in every nanosecond.
+        1875, // A YZ-AIM whose communication has been reset watches the controller for 2 s.
+        3022, // A clamped stream expired too near to a position limit for a stop with limited jerk.
+        823,  // A group was enabled anew while the controlwords that disabled it were under way.
+        898,  // A joint was enabled while it was coasting.
+        206,
+        // A stream was stopped with a joint in profile torque, and its drive's quick stop taken back.
+        613,
+    ];
+    for seed in seeds {
+        let played = play(&Case::of(seed));
+        assert!(played.is_ok(), "{seed}: {played:?}");
+    }
+}

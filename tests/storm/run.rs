@@ -25,6 +25,8 @@ use crate::wire::Wire;
 
 /// Bring-up, farewell and every patience of the life cycle together.
 const END_AT_MOST_S: f64 = 45.0;
+/// A YZ-AIM whose communication has been reset watches the controller for its factory setting of 2 s; then it stops.
+const WATCHDOG_MS: u64 = 3000;
 /// A request waits in the door and then takes so many cycles of the slowest bus to show.
 const RESET_CYCLES: u64 = 60;
 
@@ -220,11 +222,11 @@ impl Clients {
     }
 }
 
-/// Two seconds after the controller has gone, whatever it could not stop has been stopped by its own watchdog.
+/// Some time after the controller has gone, whatever it could not stop has been stopped by its own watchdog.
 fn at_rest(case: &Case, concerns: &Concerns, world: &mut World) -> Result<(), String> {
     let end_ns = world.snapshot.at_ns;
     let mut batch = ReceiveBatch::new();
-    for now_ns in (1..=2000).map(|passed_ms| end_ns + passed_ms * 1_000_000) {
+    for now_ns in (1..=WATCHDOG_MS).map(|passed_ms| end_ns + passed_ms * 1_000_000) {
         for port in world.run.ports() {
             batch.clear();
             port.receive(now_ns, &mut batch);

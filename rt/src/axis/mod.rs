@@ -12,7 +12,7 @@ use arrayvec::ArrayVec;
 
 use self::delay::SetPointDelay;
 
-use crate::cia402::State as DriveState;
+use crate::cia402::{State as DriveState, controlword};
 use crate::guard::FollowingErrorGuard;
 use crate::pdo::{CommandSlot, FeedbackSlot, ProcessImage};
 use crate::plan::State;
@@ -24,6 +24,9 @@ use crate::watch::{DuplicateWatch, NodeWatch};
 use position_watch::PositionWatch;
 
 pub use parameters::{AxisParameters, Cadence, CommandPdo, FeedbackSince, MAX_PDOS, Pdo};
+
+/// Cycles of its bus after which a drive has obeyed a controlword and has said so.
+const SETTLED_CYCLES: u32 = 4;
 
 /// An axis at run time.
 #[derive(Clone, Debug)]
@@ -65,6 +68,8 @@ pub struct Axis {
     contradictions: u8,
     /// Whether the drive left operation enabled by itself and must not be led back to it.
     is_lost: bool,
+    /// Whether it may be led up, see [`Axis::prepare_to_enable`].
+    is_ready: bool,
     /// How far the joint has been reported from where it was, where no joint can get.
     jump: Option<f64>,
     /// Whether `position` is what the drive has said.
@@ -114,6 +119,7 @@ impl Axis {
             stalled_cycles: 0,
             contradictions: 0,
             is_lost: false,
+            is_ready: false,
             jump: None,
             is_position_known: false,
             emergency_code: 0,
@@ -159,6 +165,7 @@ impl Axis {
     /// Begins to watch the node anew.
     pub fn begin_watch(&mut self) {
         self.is_lost = false;
+        self.is_ready = false;
         self.node_watch.begin();
         self.duplicate_watch = DuplicateWatch::default();
         self.since_emergency = None;
@@ -180,6 +187,22 @@ impl Axis {
     /// The drive has no torque, or is not waited for any longer: its set-point follows the joint again.
     pub fn let_go(&mut self) {
         self.is_lost = false;
+    }
+
+    /// Looks whether the drive may be led up: it has been disabled long enough for nothing older to be under way in either
+    /// direction, and its joint is at rest on the set-point. That remains so until the node is watched anew.
+    pub fn prepare_to_enable(&mut self, period_s: f64) {
+        self.is_ready |= self.age == 0
+            && !self.drive_state().has_torque()
+            && self.base_word == controlword::SHUTDOWN
+            && self.since_controlword >= SETTLED_CYCLES
+            && self.is_standing()
+            && self.is_on_joint(period_s);
+    }
+
+    /// Whether the drive may be led up.
+    pub fn is_ready(&self) -> bool {
+        self.is_ready
     }
 
     /// What this cycle leaves behind.

@@ -127,7 +127,12 @@ impl Axis {
 
     /// Whether the joint of an axis in a profile mode stands; one that follows set-points is where they are.
     pub fn is_at_rest(&self) -> bool {
-        !self.is_profile() || self.velocity.abs() <= AT_REST * self.parameters.limits.velocity
+        !self.is_profile() || self.is_standing()
+    }
+
+    /// Whether the joint is reported to stand.
+    pub(super) fn is_standing(&self) -> bool {
+        self.velocity.abs() <= AT_REST * self.parameters.limits.velocity
     }
 
     /// Cycles that the drive has left a set-point unacknowledged.

@@ -49,7 +49,10 @@ impl Axis {
         if self.is_enabled() {
             self.advance(State { position, ..State::default() });
         } else {
-            self.rest_at(position);
+            // What waits to be sent is still sent: a drive that obeys although it says otherwise gets no step.
+            self.set = [State { position, ..State::default() }; 3];
+            self.delay.push(self.set[0]);
+            self.following_guard.reset();
         }
     }
 

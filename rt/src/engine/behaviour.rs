@@ -38,7 +38,8 @@ impl Engine {
 
     fn wait_for_drives(&mut self, now_ns: Nanoseconds, door: &mut impl Door) {
         self.hold();
-        if self.axes.iter().all(Axis::is_enabled) {
+        self.axes.iter_mut().for_each(|axis| axis.prepare_to_enable(self.period_s));
+        if self.axes.iter().all(|axis| axis.is_ready() && axis.is_enabled()) {
             self.enter(Phase::Holding, now_ns, door);
         } else if self.phase_cycles > self.enable_timeout_cycles {
             let axis = self.axes.iter().position(|axis| !axis.is_enabled()).map(|axis| axis as u8);

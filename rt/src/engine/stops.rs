@@ -98,9 +98,10 @@ impl Engine {
     /// A joint in profile torque cannot be held where it is: its drive closes no position loop. It stops by the drive's
     /// quick stop, which ends without torque, and the brake holds it.
     fn possible(&self, category: StopCategory) -> StopCategory {
+        let is_on_way = matches!(self.phase, Phase::Moving | Phase::Streaming);
         let is_unheld = self.axes.iter().any(|axis| axis.parameters().law == ControlLaw::ProfileTorque);
         match category {
-            StopCategory::Two if is_unheld && self.phase == Phase::Moving => StopCategory::One,
+            StopCategory::Two if is_unheld && is_on_way => StopCategory::One,
             category => category,
         }
     }

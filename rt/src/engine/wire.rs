@@ -101,9 +101,13 @@ impl Engine {
             let is_held_back = self.held_back.contains(axis.parameters().bus.into());
             if has_cycle_of(&self.buses, axis, slot) && !is_held_back {
                 // A drive that falls out of operation enabled is not led back by what the others are still to do; and none
-                // is led up before its target is where the joint is.
-                let is_led_up =
-                    axis.is_enabled() || self.phase == Phase::Enabling && axis.is_on_joint(self.period_s);
+                // is led up before its joint is at rest and its target there.
+                let is_led_up = match self.phase {
+                    Phase::Enabling => {
+                        axis.is_ready() && (axis.is_enabled() || axis.is_on_joint(self.period_s))
+                    }
+                    _ => axis.is_enabled(),
+                };
                 let goal = match self.goal {
                     Goal::Enabled if self.phase == Phase::Stopping && axis.stops_by_itself() => {
                         Goal::QuickStop

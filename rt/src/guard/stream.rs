@@ -39,6 +39,30 @@ impl Course {
         (self.velocity() - self.last_velocity()) / self.period_s
     }
 
+    /// Velocity and acceleration at the end of the next step, which itself is what the velocity was in its middle.
+    fn end(&self) -> (f64, f64) {
+        let acceleration = self.acceleration();
+        (self.velocity() + acceleration * self.period_s / 2.0, acceleration)
+    }
+
+    /// The velocity of the joint, with its sign, once its acceleration has been taken back.
+    fn settled_velocity(&self, limits: &AxisLimits) -> f64 {
+        let (velocity, acceleration) = self.end();
+        // Without a limit of the jerk that takes no time.
+        if limits.jerk.is_finite() {
+            velocity + acceleration * acceleration.abs() / (2.0 * limits.jerk)
+        } else {
+            self.velocity()
+        }
+    }
+
+    /// The lowest and the highest position on the way to rest of a stop that begins after the next set-point.
+    fn turning_points(&self, limits: &AxisLimits) -> (f64, f64) {
+        let (velocity, acceleration) = self.end();
+        let down = braking_distance(limits, -velocity, -acceleration);
+        (self.next - down, self.next + braking_distance(limits, velocity, acceleration))
+    }
+
     fn jerk(&self) -> f64 {
         let before = (self.last_velocity() - (self.sent[1] - self.sent[2]) / self.period_s) / self.period_s;
         (self.acceleration() - before) / self.period_s
@@ -63,50 +87,69 @@ pub fn check_jerk(limit: f64, course: &Course) -> Result<(), Violation> {
     Ok(())
 }
 
-/// Checks that the joint can still come to rest within its position limits.
+/// Checks that the joint can still come to rest within its limits of position, and of velocity on the way.
 pub fn check_braking(limits: &AxisLimits, course: &Course) -> Result<(), Violation> {
-    let velocity = course.velocity();
-    let distance = braking_distance(limits, velocity, course.acceleration());
     let room = TOLERANCE * (limits.position_max - limits.position_min) + course.noise(0);
-    let rest = course.next + distance;
-    if velocity > 0.0 && rest > limits.position_max + room {
-        return Err(Violation { rule: Rule::PositionLimit, value: rest, limit: limits.position_max });
+    let settled = course.settled_velocity(limits);
+    if settled.abs() > limits.velocity * (1.0 + TOLERANCE) + course.noise(1) {
+        return Err(Violation { rule: Rule::VelocityLimit, value: settled, limit: limits.velocity });
     }
-    if velocity < 0.0 && rest < limits.position_min - room {
-        return Err(Violation { rule: Rule::PositionLimit, value: rest, limit: limits.position_min });
+    let (lowest, highest) = course.turning_points(limits);
+    if highest > limits.position_max.max(course.next) + room {
+        return Err(Violation { rule: Rule::PositionLimit, value: highest, limit: limits.position_max });
+    }
+    if lowest < limits.position_min.min(course.next) - room {
+        return Err(Violation { rule: Rule::PositionLimit, value: lowest, limit: limits.position_min });
     }
     Ok(())
 }
 
-/// How far a joint goes on at least when it is stopped at the limits, with its sign. Acceleration along the way must
-/// first be taken back, which speeds the joint up still.
+/// How far a joint goes on at most towards positive positions when it is stopped at the limits; 0 if it does not.
+/// Acceleration in that direction must first be taken back, which speeds the joint up still, or turns it round.
 pub fn braking_distance(limits: &AxisLimits, velocity: f64, acceleration: f64) -> f64 {
-    let direction = if velocity < 0.0 { -1.0 } else { 1.0 };
-    let (speed, along) = (velocity * direction, (acceleration * direction).max(0.0));
-    let (taking_back_s, is_jerk_limited) =
-        if limits.jerk.is_finite() { (along / limits.jerk, true) } else { (0.0, false) };
+    let along = acceleration.max(0.0);
+    let (taking_back_s, building_up_s) = match limits.jerk.is_finite() {
+        true => (along / limits.jerk, limits.deceleration / limits.jerk),
+        false => (0.0, 0.0),
+    };
+    let highest = velocity + along * taking_back_s / 2.0;
+    if highest <= 0.0 {
+        return 0.0;
+    }
     // During that time the acceleration falls evenly from `along` to 0.
-    let meanwhile = speed * taking_back_s + along * taking_back_s * taking_back_s / 3.0;
-    let highest = speed + along * taking_back_s / 2.0;
-    let building_up = if is_jerk_limited { highest * limits.deceleration / (2.0 * limits.jerk) } else { 0.0 };
-    direction * (meanwhile + highest * highest / (2.0 * limits.deceleration) + building_up)
+    let meanwhile = velocity * taking_back_s + along * taking_back_s * taking_back_s / 3.0;
+    (meanwhile + highest * highest / (2.0 * limits.deceleration) + highest * building_up_s / 2.0).max(0.0)
 }
 
-/// The set-point nearest to the one asked for that keeps the limits of velocity, acceleration and position. A target
-/// that is no number counts as the wish to stop.
+/// The set-point nearest to the one asked for that keeps the limits of velocity and acceleration, and from which a stop
+/// at all limits, that of the jerk too, stays within those of the position. A target that is no number counts as the
+/// wish to stop.
 pub fn clamp(limits: &AxisLimits, course: &Course) -> State {
-    let (period_s, last) = (course.period_s, course.sent[0]);
-    let last_velocity = course.last_velocity();
+    let (period_s, last, last_velocity) = (course.period_s, course.sent[0], course.last_velocity());
     let wanted = if course.next.is_finite() { course.velocity() } else { 0.0 };
-    let change = limits.acceleration.min(limits.deceleration) * period_s;
-    let (lowest, highest) = (last_velocity - change, last_velocity + change);
-    let towards = |limit: f64, direction: f64| highest_speed(limits, (limit - last) * direction, change);
-    let velocity = wanted
-        .clamp(-limits.velocity, limits.velocity)
-        .min(towards(limits.position_max, 1.0))
-        .max(-towards(limits.position_min, -1.0))
-        .max(lowest)
-        .min(highest);
+    let speeding_up = limits.acceleration * period_s;
+    let slowing_down = limits.deceleration * period_s;
+    let (lowest, highest) = match last_velocity > 0.0 {
+        true => ((last_velocity - slowing_down).max(-speeding_up), last_velocity + speeding_up),
+        false => (last_velocity - speeding_up, (last_velocity + slowing_down).min(speeding_up)),
+    };
+    let at = |velocity: f64| Course { next: last + velocity * period_s, ..*course };
+    let is_low_enough = |velocity: f64| {
+        let course = at(velocity);
+        course.turning_points(limits).1 <= limits.position_max
+            && course.settled_velocity(limits) <= limits.velocity
+    };
+    let is_high_enough = |velocity: f64| {
+        let course = at(velocity);
+        course.turning_points(limits).0 >= limits.position_min
+            && course.settled_velocity(limits) >= -limits.velocity
+    };
+    let within = wanted.clamp(-limits.velocity, limits.velocity).max(lowest).min(highest);
+    // The limit that the joint goes towards has the last word.
+    let velocity = match last_velocity > 0.0 {
+        true => nearest(nearest(within, highest, is_high_enough), lowest, is_low_enough),
+        false => nearest(nearest(within, lowest, is_low_enough), highest, is_high_enough),
+    };
     State {
         position: last + velocity * period_s,
         velocity,
@@ -114,16 +157,27 @@ pub fn clamp(limits: &AxisLimits, course: &Course) -> State {
     }
 }
 
-/// The highest speed towards a limit at this distance from which whole steps of the deceleration lead to rest before it.
-fn highest_speed(limits: &AxisLimits, distance: f64, change: f64) -> f64 {
-    let deceleration = limits.acceleration.min(limits.deceleration);
-    libm::sqrt(2.0 * deceleration * distance.max(0.0) + change * change / 4.0) - 1.5 * change
+/// Halvings of an interval until what is left of it is rounding.
+const HALVINGS: u32 = 48;
+
+/// The value nearest to `wanted`, on the way to `end`, that is possible; `end` if none before it is.
+fn nearest(wanted: f64, end: f64, is_possible: impl Fn(f64) -> bool) -> f64 {
+    if is_possible(wanted) {
+        return wanted;
+    }
+    let (mut impossible, mut possible) = (wanted, end);
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (impossible + possible);
+        if is_possible(middle) { possible = middle } else { impossible = middle }
+    }
+    possible
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::guard;
+    use crate::motion::Motion;
     use proptest::prelude::*;
 
     const LIMITS: AxisLimits = AxisLimits {
@@ -164,7 +218,10 @@ mod tests {
         // The deceleration builds up over 0.2 s: half of what that takes longer at 2 rad/s.
         assert!((braking_distance(&limits, 2.0, 0.0) - plain - 0.2).abs() < 1e-12);
         assert!(braking_distance(&limits, 2.0, 10.0) > braking_distance(&limits, 2.0, 0.0));
-        assert_eq!(braking_distance(&limits, -2.0, -10.0), -braking_distance(&limits, 2.0, 10.0));
+        assert_eq!(braking_distance(&limits, -2.0, 0.0), 0.0);
+        // The acceleration turns the joint round while it is taken back within 0.3 s: -0.6 + 0.9 rad, at 2.5 rad/s in the end.
+        let stop = braking_distance(&limits, 2.5, 0.0);
+        assert!((braking_distance(&limits, -2.0, 30.0) - 0.3 - stop).abs() < 1e-12);
     }
 
     #[test]
@@ -186,6 +243,29 @@ mod tests {
                 prop_assert!(passed.is_ok(), "{passed:?}");
                 prop_assert!(LIMITS.contain(next.position), "{next:?}");
                 sent = [next.position, sent[0], sent[1]];
+            }
+        }
+
+        #[test]
+        fn a_clamped_course_can_be_stopped_at_the_limit_of_the_jerk_within_those_of_the_position(
+            targets in prop::collection::vec((-5.0f64..5.0, 1usize..60), 1..40),
+        ) {
+            let limits = AxisLimits { jerk: 150.0, ..LIMITS };
+            let mut sent = [0.0; 3];
+            for target in targets.into_iter().flat_map(|(target, times)| core::iter::repeat_n(target, times)) {
+                let course = Course { sent, next: target, period_s: PERIOD_S };
+                let next = clamp(&limits, &course);
+                prop_assert!(guard::check(&limits, PERIOD_S, sent[1], sent[0], &next).is_ok());
+                sent = [next.position, sent[0], sent[1]];
+            }
+            let acceleration = (sent[0] - 2.0 * sent[1] + sent[2]) / (PERIOD_S * PERIOD_S);
+            let velocity = (sent[0] - sent[1]) / PERIOD_S + acceleration * PERIOD_S / 2.0;
+            let mut motion = Motion::default();
+            motion.stop([(State { position: sent[0], velocity, acceleration }, &limits)].into_iter()).unwrap();
+            while !motion.is_finished() {
+                motion.advance(PERIOD_S);
+                let position = motion.states().next().unwrap().position;
+                prop_assert!((-1.000_001..=2.000_001).contains(&position), "{position}");
             }
         }
     }

@@ -1,6 +1,7 @@
 //! NMT, heartbeat in both directions, PDO timing.
 
-use takt::sim::NmtState;
+use takt::sim::yz_aim::YzAimJoint;
+use takt::sim::{Drive, Mailbox, NmtState, Order};
 use takt_rt::frame::{Frame, Id};
 
 use super::{Bench, MILLISECOND_NS, NODE, Quirks, YzAimParameters, bench, by_the_manual, parameters};
@@ -128,6 +129,19 @@ fn tpdo1_and_tpdo3_come_every_100_ms_and_tpdo2_with_every_sync() {
         bench.run_ms(2);
     }
     assert_eq!([0x185, 0x285, 0x385].map(|id| bench.take(id).len()), [0, 0, 10]);
+}
+
+#[test]
+fn an_event_timer_that_is_set_before_operational_waits_for_it_and_wakes_nobody() {
+    let mut joint = YzAimJoint::new(parameters(NODE));
+    let mut mailbox = Mailbox::new(Order::FirstInFirstOut, 8);
+    joint.advance(10 * MILLISECOND_NS, &mut mailbox);
+    let write = Frame::of(Id::canopen(0x600, NODE), [0x2B, 0x00, 0x18, 5, 20, 0, 0, 0]);
+    joint.receive(11 * MILLISECOND_NS, &write, &mut mailbox);
+    for now_ms in 12..100 {
+        joint.advance(now_ms * MILLISECOND_NS, &mut mailbox);
+    }
+    assert!(joint.wake_ns() > 99 * MILLISECOND_NS + MILLISECOND_NS / 2, "{}", joint.wake_ns());
 }
 
 #[test]

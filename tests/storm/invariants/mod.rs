@@ -6,7 +6,6 @@ mod power;
 mod stops;
 
 use takt::config::Config;
-use takt::controller::assemble;
 use takt::sim::Observation;
 use takt_rt::door::Snapshot;
 use takt_rt::record::{CycleRecord, Event};
@@ -51,7 +50,7 @@ pub struct Invariants {
 
 impl Invariants {
     pub fn new(config: &Config) -> Self {
-        let courses = config.axes.iter().map(|axis| Course::new(assemble::scale(axis).unwrap()));
+        let courses = config.axes.iter().map(|axis| Course::new(config, axis));
         Self {
             courses: courses.collect(),
             power: Power::new(config.axes.len()),

@@ -77,8 +77,7 @@ fn longest_s(phase: Phase, config: &Config) -> Option<f64> {
         Phase::Streaming => Some(10.0),
         Phase::Enabling => Some(5.2),
         Phase::Stopping => Some(2.0 * bounds::to_rest_s(config) + 1.0),
-        // A drive that never shows that it has obeyed is waited for once more when the stop becomes harder.
-        Phase::Disabling => Some(2.0 * (5.2 + bounds::to_rest_s(config))),
+        Phase::Disabling => Some(5.2 + bounds::to_rest_s(config)),
     }
 }
 

@@ -4,6 +4,7 @@ use takt_rt::cia402::controlword;
 use takt_rt::time::Nanoseconds;
 
 use super::{COUNTS_PER_SECOND_PER_RPM, COUNTS_PER_TURN, YzAimJoint, mode};
+use crate::sim::drive::NmtState;
 use crate::sim::yz_aim::device::Level;
 use crate::sim::yz_aim::homing::Homing;
 use crate::sim::yz_aim::objects::at;
@@ -98,7 +99,10 @@ impl YzAimJoint {
             at::INCREMENTAL_POSITION => self.travel(value as f64),
             at::GEAR_NUMERATOR => self.take_gear_numerator(value),
             at::SAVE_FLAG if value == 1 => self.save_ns = now_ns + SAVE_NS,
-            _ if (at::TPDO1..=at::TPDO4 + 5).contains(&at) => {
+            // In other states no event timer runs: they start when the node becomes operational.
+            _ if (at::TPDO1..=at::TPDO4 + 5).contains(&at)
+                && self.network.state() == NmtState::Operational =>
+            {
                 self.process_data.schedule_events(now_ns, &self.dictionary);
             }
             _ => {}
