@@ -10,6 +10,9 @@ pub struct Concern {
     pub is_present: bool,
     /// A torque from outside acts on it, or another master commands its drive between two looks.
     pub is_driven_by_others: bool,
+    /// Another master has changed the state of its node. If that has reset its communication, the drive is deaf to process
+    /// data and has forgotten its watchdog: only a farewell by SDO disables it, and a run that is broken off has none.
+    pub is_deaf: bool,
     /// Something pushes the joint for as long as it lasts, also in the end.
     pub is_loaded: bool,
 }
@@ -19,6 +22,7 @@ impl Concern {
         Self {
             is_present: self.is_present || other.is_present,
             is_driven_by_others: self.is_driven_by_others || other.is_driven_by_others,
+            is_deaf: self.is_deaf || other.is_deaf,
             is_loaded: self.is_loaded || other.is_loaded,
         }
     }
@@ -77,6 +81,7 @@ fn concern(axis: &Axis, fault: &takt::faults::Fault) -> Concern {
     Concern {
         is_present,
         is_driven_by_others: is_own && matches!(fault.kind, "load" | "foreign-set-points"),
+        is_deaf: !is_at_another_axis && fault.kind == "foreign-nmt",
         is_loaded: is_own && fault.kind == "load",
     }
 }
