@@ -109,19 +109,30 @@ fn ctrl_c_in_the_middle_stops_in_control_and_disables() {
     assert_eq!(phases, [Phase::Moving, Phase::Stopping, Phase::Holding, Phase::Disabling, Phase::Disabled]);
 }
 
+/// The controlwords that take the power act at the SYNC after them: a run that ended before would leave a drive to turn on
+/// with the torque that it had last.
 #[test]
-fn a_second_ctrl_c_takes_the_power_at_once() {
-    let config = load("arm6-erob.toml");
-    let mut run = start(&config);
-    while run.snapshot().phase != Phase::Moving {
-        assert!(run.step());
+fn a_second_ctrl_c_takes_the_power_at_once_and_the_run_ends_when_it_is_off() {
+    for name in ["arm6-erob.toml", "arm6-erob-csv.toml", "arm6-erob-cst.toml", "gantry-yz-aim.toml"] {
+        let config = load(name);
+        for first in [Some(Interrupt::Controlled), None] {
+            let mut run = start(&config);
+            while run.snapshot().phase != Phase::Moving {
+                assert!(run.step());
+            }
+            run.run(300, |_| {});
+            if let Some(first) = first {
+                run.interrupt(first);
+                run.run(5, |_| {});
+            }
+            run.interrupt(Interrupt::Immediate);
+            assert_eq!(run.run(200, |_| {}), Some(Outcome::Interrupted), "{name}");
+            for axis in &config.axes {
+                let drive = run.ports()[axis.bus].observe(axis.node).unwrap();
+                assert!(!drive.state.has_torque(), "{name}: {} is {:?} in the end", axis.name, drive.state);
+            }
+        }
     }
-    run.run(300, |_| {});
-    run.interrupt(Interrupt::Controlled);
-    run.run(5, |_| {});
-    run.interrupt(Interrupt::Immediate);
-    let outcome = run.run(200, |_| {});
-    assert_eq!(outcome, Some(Outcome::Interrupted));
 }
 
 /// Every record of a run, as one number.

@@ -117,10 +117,10 @@ impl Supervisor {
             self.bring_up.receive(bus, &received.frame);
             self.leave.receive(bus, &received.frame);
         }
-        let since_ns = *self.stage_since_ns.get_or_insert(now_ns);
         let snapshot = host.snapshot();
         self.numbers = host.numbers();
         self.heed_interrupt(now_ns);
+        let since_ns = *self.stage_since_ns.get_or_insert(now_ns);
         self.step(now_ns, now_ns.saturating_sub(since_ns), &snapshot, host);
         while let Some(request) = self.outgoing.front() {
             if host.ask(*request).is_err() {
