@@ -16,8 +16,8 @@ use takt_rt::pdo::{MappedObject, Mapping};
 use takt_rt::port::{BusHealth, Received};
 use takt_rt::record::{CycleRecord, Event, Timing};
 use takt_rt::stop::{Phase, StopCategories};
-use takt_rt::watch::TimingLadder;
 use takt_rt::units::{Scale, ScaleParameters};
+use takt_rt::watch::TimingLadder;
 
 // The C library gives the program its entry; nothing else of it is used.
 #[link(name = "c")]
@@ -77,7 +77,9 @@ fn axis() -> Option<AxisParameters> {
     Some(AxisParameters {
         bus: 0,
         node: 1,
-        commands: [CommandPdo::every_cycle(pdo(0x200, Mapping::commands(&commands).ok()?))].into_iter().collect(),
+        commands: [CommandPdo::every_cycle(pdo(0x200, Mapping::commands(&commands).ok()?))]
+            .into_iter()
+            .collect(),
         feedback: [pdo(0x180, Mapping::feedback(&feedback).ok()?)].into_iter().collect(),
         dialect: Dialect::Cia402,
         controlword_spacing_cycles: 0,
@@ -106,7 +108,7 @@ fn axis() -> Option<AxisParameters> {
 fn cycles() -> Option<Phase> {
     let bus = BusParameters {
         sync_id: Id::canopen(0x080, 0),
-                divider: 1,
+        divider: 1,
         service_frames_active: 1,
         service_frames_passive: 6,
     };
@@ -126,9 +128,11 @@ fn cycles() -> Option<Phase> {
     let requests = [Some(Request::Sync(true)), Some(Request::Activate), Some(Request::Enable)];
     let mut door = Silent { requests };
     let health = [BusHealth::default()];
-    for slot in 0..10 {
+    for slot in 0..40 {
         let at_ns = slot * 1_000_000;
-        let frame = Frame::of(Id::canopen(0x180, 1), [0x37, 0x12, 1, 0, 0, 0]);
+        // Ready to switch on, and operation enabled a while later.
+        let statusword_low = if slot < 20 { 0x31 } else { 0x37 };
+        let frame = Frame::of(Id::canopen(0x180, 1), [statusword_low, 0x12, 1, 0, 0, 0]);
         engine.receive(0, &Received { frame, at_ns }, &mut door);
         engine.compute(slot, at_ns, &health, Transmission::Free, &mut door);
         let mut batch = SendBatch::new();
