@@ -112,13 +112,16 @@ impl Motion {
         self.time_s += period_s;
     }
 
-    /// Where the axes are to be now, in their order; behind the last one more, at rest.
+    /// Where the axes are to be now, in their order; behind the last one more, at rest. Targets that are passed at speed
+    /// are passed between two cycles: in the one after it the axes have gone on at that speed.
     pub fn states(&self) -> impl Iterator<Item = State> + '_ {
-        let is_finished = self.is_finished();
+        let since_end_s = self.time_s - self.duration_s;
         let present = if self.is_second_present { &self.second } else { &self.first };
-        present
-            .iter()
-            .map(move |profile| if is_finished { profile.end() } else { profile.sample(self.time_s) })
+        present.iter().map(move |profile| {
+            // By the end of all, so that none is a rounding short of its own.
+            let time_s = if since_end_s < 0.0 { self.time_s } else { profile.duration_s() + since_end_s };
+            profile.sample(time_s)
+        })
     }
 
     /// Whether the end has been reached.
@@ -217,6 +220,26 @@ mod tests {
                 farthest = farthest.max(motion.states().next().unwrap().position);
             }
             assert!(farthest > 2.9 && farthest <= 3.0, "{farthest} with jerk {jerk}");
+        }
+    }
+
+    #[test]
+    fn a_target_that_is_passed_at_speed_is_passed_without_a_step() {
+        for jerk in [100.0, f64::INFINITY] {
+            let limits = AxisLimits { jerk, ..LIMITS };
+            let start = State::default();
+            let target = State { position: 0.333, velocity: 1.1, acceleration: 0.0 };
+            let mut motion = Motion::default();
+            motion.move_to([Leg { start, target, limits: &limits }].into_iter(), 0.7, 0.7, 0.0).unwrap();
+            let (mut last, mut before) = (start, start);
+            while !motion.is_finished() {
+                motion.advance(0.001);
+                let next = motion.states().next().unwrap();
+                let acceleration = (next.position - 2.0 * last.position + before.position) / 1e-6;
+                assert!(acceleration.abs() <= limits.acceleration, "{acceleration} with jerk {jerk}");
+                (last, before) = (next, last);
+            }
+            assert!(last.position >= target.position && last.velocity == target.velocity);
         }
     }
 }
