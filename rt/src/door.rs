@@ -163,7 +163,8 @@ pub struct Move {
     pub id: u32,
     /// Where to (rad or m), an axis each.
     pub target: [f64; MAX_AXES],
-    /// Velocity at the target (rad/s or m/s). A move that ends in motion goes over into a stop at the limits.
+    /// Velocity at the target (rad/s or m/s). A move that ends in motion goes over into a stop at the limits, for which there
+    /// must be room within the position limits.
     pub target_velocity: [f64; MAX_AXES],
     /// Fraction of each axis' velocity limit, above 0 up to 1.
     pub velocity_scale: f64,

@@ -124,6 +124,9 @@ fn what_cannot_be_done_is_refused_and_changes_nothing() {
         Request::Move(Move { acceleration_scale: f64::NAN, ..good }),
         Request::Move(Move { minimum_duration_s: f64::INFINITY, ..good }),
         Request::Move(Move { target_velocity: [f64::NAN; MAX_AXES], ..good }),
+        // A stop from there ends at ±3.05 rad.
+        Request::Move(Move { target: [2.85; MAX_AXES], target_velocity: [2.0; MAX_AXES], ..good }),
+        Request::Move(Move { target: [-2.85; MAX_AXES], target_velocity: [-2.0; MAX_AXES], ..good }),
         Request::Enable,
         Request::Activate,
         Request::RatedTorque { axis: 0, torque: -1.0 },

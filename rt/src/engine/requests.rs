@@ -5,6 +5,7 @@ use crate::axis::Axis;
 use crate::cia402::Goal;
 use crate::control::ControlLaw;
 use crate::door::{Asked, Door, Move, ProfileMove, Request};
+use crate::guard;
 use crate::motion::Leg;
 use crate::plan::State;
 use crate::profile::ProfileTarget;
@@ -98,7 +99,11 @@ impl Engine {
             && scale(parameters.velocity_scale)
             && scale(parameters.acceleration_scale)
             && parameters.minimum_duration_s.is_finite()
-            && self.axes.iter().zip(parameters.target).all(|(axis, to)| is_target(axis, to));
+            && self
+                .axes
+                .iter()
+                .zip(parameters.target.into_iter().zip(parameters.target_velocity))
+                .all(|(axis, (position, velocity))| is_target(axis, position, velocity, self.period_s));
         if !is_possible {
             return false;
         }
@@ -189,11 +194,15 @@ impl Engine {
     }
 }
 
-/// Whether an axis can be sent to a position. One that is driven by velocity or torque has none to go to, and is left
-/// as it is.
-fn is_target(axis: &Axis, position: f64) -> bool {
+/// Whether an axis can be sent to a position, and be stopped behind it where it passes it at speed: up to a cycle later.
+/// One that is driven by velocity or torque has none to go to, and is left as it is.
+fn is_target(axis: &Axis, position: f64, velocity: f64, period_s: f64) -> bool {
+    let limits = &axis.parameters().limits;
+    let way = |velocity: f64| velocity.max(0.0) * period_s + guard::braking_distance(limits, velocity, 0.0);
     match axis.parameters().law {
         ControlLaw::ProfileVelocity | ControlLaw::ProfileTorque => true,
-        _ => axis.parameters().limits.contain(position),
+        ControlLaw::ProfilePosition => limits.contain(position),
+        _ if velocity == 0.0 => limits.contain(position),
+        _ => limits.contain(position + way(velocity)) && limits.contain(position - way(-velocity)),
     }
 }
