@@ -128,6 +128,9 @@ pub enum Request {
     Disable,
     /// Clear latched faults: raise controlword bit 7 for some cycles. Refused while any drive is enabled.
     ResetFaults,
+    /// Enable nothing any more, whoever asks for it: the run is on its way out, and the drives' watchdogs are to be switched
+    /// off.
+    Retire,
     /// Leave the loop after this cycle. The drives get no more set-points.
     Leave,
 }

@@ -140,6 +140,19 @@ fn what_cannot_be_done_is_refused_and_changes_nothing() {
 }
 
 #[test]
+fn nobody_enables_a_group_that_is_on_its_way_out() {
+    let mut rig = Rig::enabled(3);
+    rig.request(Request::Retire);
+    assert_eq!(rig.phase(), Phase::Holding, "what is enabled remains so until it is disabled");
+    rig.request(Request::Disable);
+    rig.run_until(Phase::Disabled, 400);
+    rig.run(60);
+    rig.request(Request::Enable);
+    rig.run(60);
+    assert_eq!((rig.phase(), rig.door.snapshot.refused), (Phase::Disabled, 1));
+}
+
+#[test]
 fn a_category_2_stop_decelerates_at_the_limits_and_holds() {
     let mut rig = Rig::enabled(3);
     rig.move_to(2.5);

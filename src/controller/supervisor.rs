@@ -276,6 +276,7 @@ impl Supervisor {
         match (self.interrupt, self.stage) {
             (None, _) | (_, Stage::Done | Stage::Cut) => {}
             (Some(Interrupt::Immediate), _) => {
+                self.ask(Request::Retire);
                 self.ask(Request::Stop(StopCategory::Zero));
                 self.outcome.get_or_insert(Outcome::Interrupted);
                 self.enter(Stage::Cut, now_ns);
@@ -304,6 +305,8 @@ impl Supervisor {
     }
 
     fn begin_disable(&mut self, now_ns: u64) {
+        // In this order, so that nobody enables what has just been disabled.
+        self.ask(Request::Retire);
         self.ask(Request::Disable);
         self.enter(Stage::Disable, now_ns);
     }

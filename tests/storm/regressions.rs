@@ -89,6 +89,8 @@ fn storms_that_have_failed_once_pass() {
         8727,
         // A move passed its target so fast, and so near to a position limit, that nothing could stop it before.
         21647,
+        // Another client enabled the group while the run said farewell to the drives, which took their watchdogs away.
+        43967,
     ];
     for seed in seeds {
         let played = play(&Case::of(seed));

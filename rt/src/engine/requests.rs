@@ -33,7 +33,7 @@ impl Engine {
                 self.axes.get_mut(usize::from(axis)).map(|axis| axis.set_reported_position(counts)).is_some()
             }
             Request::Activate => self.activate(now_ns, door),
-            Request::Enable if self.phase == Phase::Disabled && !is_latched => {
+            Request::Enable if self.phase == Phase::Disabled && !is_latched && !self.is_retired => {
                 self.stop = None;
                 self.begin_watch();
                 self.goal = Goal::Enabled;
@@ -58,6 +58,10 @@ impl Engine {
             }
             Request::Disable => self.begin_disable(now_ns, door),
             Request::ResetFaults => self.reset_faults(),
+            Request::Retire => {
+                self.is_retired = true;
+                true
+            }
             Request::Leave => {
                 self.is_leaving = true;
                 true
