@@ -7,7 +7,7 @@
 . tests/vm/guest/laboratory.sh
 cycles=${CYCLES:-10000} load_cycles=${LOAD_CYCLES:-2000} other_cycles=${OTHER_CYCLES:-1000}
 # Beyond cyclictest's maximum, in microseconds.
-idle_allowance=5 load_allowance=10
+idle_allowance=5 load_allowance=${LOAD_ALLOWANCE:-10}
 # Further than any deviation: not limited.
 any=100000
 
