@@ -1,5 +1,7 @@
 //! `takt drive` as a user meets it.
 
+mod printed;
+
 use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
 use std::thread;
@@ -8,6 +10,8 @@ use std::time::Duration;
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use serde_json::Value;
+
+use printed::{ends_with, errors, said};
 
 fn takt(arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_takt"));
@@ -26,19 +30,6 @@ fn drive(arguments: &[&str]) -> Output {
 fn json(output: &Output) -> Value {
     let text = String::from_utf8(output.stdout.clone()).unwrap();
     serde_json::from_str(&text).unwrap_or_else(|error| panic!("not one JSON object: {error}: {text}"))
-}
-
-fn said(output: &Output) -> String {
-    String::from_utf8(output.stdout.clone()).unwrap()
-}
-
-fn errors(output: &Output) -> String {
-    String::from_utf8(output.stderr.clone()).unwrap()
-}
-
-#[track_caller]
-fn ends_with(code: i32, output: &Output) {
-    assert_eq!(output.status.code(), Some(code), "{}{}", said(output), errors(output));
 }
 
 /// A refusal says so on standard error, names what is wrong, and does nothing.

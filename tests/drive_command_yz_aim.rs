@@ -1,8 +1,12 @@
 //! `takt drive` on a YZ-AIM as a user meets it: every action, in simulated time.
 
+mod printed;
+
 use std::process::{Command, Output, Stdio};
 
 use serde_json::Value;
+
+use printed::{ends_with, errors, said};
 
 /// A servo on a ball screw of 10 mm.
 const SERVO: &str = r#"
@@ -32,19 +36,6 @@ fn drive(arguments: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_takt"));
     command.arg("drive").arg(&config).args(["x", "--fast"]).args(arguments).stdin(Stdio::null());
     command.output().unwrap()
-}
-
-fn said(output: &Output) -> String {
-    String::from_utf8(output.stdout.clone()).unwrap()
-}
-
-fn errors(output: &Output) -> String {
-    String::from_utf8(output.stderr.clone()).unwrap()
-}
-
-#[track_caller]
-fn ends_with(code: i32, output: &Output) {
-    assert_eq!(output.status.code(), Some(code), "{}{}", said(output), errors(output));
 }
 
 #[track_caller]

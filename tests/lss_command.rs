@@ -1,8 +1,12 @@
 //! `takt lss` as a user meets it, on simulated devices.
 
+mod printed;
+
 use std::process::{Command, Output, Stdio};
 
 use serde_json::Value;
+
+use printed::{ends_with, errors, said};
 
 const FIRST: &str = "0x331:1:0x100:0x1234";
 const SECOND: &str = "0x331:1:0x100:0xFFFFFFFE";
@@ -17,19 +21,6 @@ fn lss(arguments: &[&str]) -> Output {
 fn simulated(arguments: &[&str]) -> Output {
     let bus = ["--bus", "sim", "--simulate", FIRST, "--simulate", SECOND, "--simulate", KNOWN];
     lss(&[&bus, arguments].concat())
-}
-
-fn said(output: &Output) -> String {
-    String::from_utf8(output.stdout.clone()).unwrap()
-}
-
-fn errors(output: &Output) -> String {
-    String::from_utf8(output.stderr.clone()).unwrap()
-}
-
-#[track_caller]
-fn ends_with(code: i32, output: &Output) {
-    assert_eq!(output.status.code(), Some(code), "{}{}", said(output), errors(output));
 }
 
 #[track_caller]

@@ -65,6 +65,10 @@ fn a_drive_whose_mapping_is_told_as_it_was_expected_moves_as_ever() {
 fn what_cannot_be_exchanged_or_comes_too_late_is_refused_and_changes_nothing() {
     let good = data(&[CONTROLWORD, TARGET], &[STATUSWORD, POSITION]);
     let unknown = MappedObject::new(0x2000, 1, 16);
+    // Nobody may give the identifier of its emergency messages up.
+    let mut taken = good;
+    taken.feedback[0] = Some(pdo(0x280, &[STATUSWORD, POSITION]));
+    taken.unused[0] = Some(Id::canopen(0x080, 1));
     let mut rig = Rig::new(1);
     for (count, impossible) in (1..).zip([
         AxisProcessData { axis: 7, ..good },
@@ -72,6 +76,7 @@ fn what_cannot_be_exchanged_or_comes_too_late_is_refused_and_changes_nothing() {
         AxisProcessData { commands: [None; MAX_PDOS], ..good },
         data(&[CONTROLWORD, unknown], &[STATUSWORD, POSITION]),
         data(&[CONTROLWORD, TARGET], &[MappedObject::new(0x6041, 0, 12)]),
+        taken,
     ]) {
         rig.request(Request::ProcessData(impossible));
         assert_eq!(rig.door.snapshot.refused, count, "{impossible:?}");

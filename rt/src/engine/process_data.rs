@@ -10,7 +10,8 @@ use crate::stop::Phase;
 
 impl Engine {
     /// Changes what is exchanged with an axis' drive. `None` where that cannot be: something moves already, the axis is
-    /// not there, it has no PDO in one direction, an object has no use or value, or an identifier has another one.
+    /// not there, it has no PDO in one direction, an object has no use or value, or an identifier has another one. Then
+    /// nothing is changed.
     pub(super) fn set_process_data(&mut self, data: &AxisProcessData) -> Option<()> {
         let axis = self.axes.get_mut(usize::from(data.axis)).filter(|_| self.phase == Phase::Passive)?;
         let table = self.dispatch.get_mut(usize::from(axis.parameters().bus))?;
@@ -21,16 +22,18 @@ impl Engine {
         if commands.is_empty() || feedback.is_empty() {
             return None;
         }
-        table.forget_process_data(data.axis);
+        let mut changed = table.clone();
+        changed.forget_process_data(data.axis);
         for (number, pdo) in (0..).zip(&feedback) {
-            table.feedback(pdo.id, data.axis, number).ok()?;
+            changed.feedback(pdo.id, data.axis, number).ok()?;
         }
         for id in data.unused.iter().flatten() {
-            table.unused(*id, data.axis).ok()?;
+            changed.unused(*id, data.axis).ok()?;
         }
         for command in &commands {
-            table.foreign(command.pdo.id);
+            changed.foreign(command.pdo.id);
         }
+        *table = changed;
         axis.set_process_data(commands, feedback);
         Some(())
     }
