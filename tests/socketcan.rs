@@ -12,7 +12,7 @@ use takt::bus::{
 use takt::config::Config;
 use takt_rt::frame::{Frame, Id};
 use takt_rt::linux::{MonotonicClock, SocketCanPort};
-use takt_rt::port::{BusPort, BusState, Clock, ReceiveBatch, Received};
+use takt_rt::port::{BusPort, BusState, Clock, Outgoing, ReceiveBatch, Received};
 
 /// A virtual interface of its own for each test, so that they can run side by side.
 struct VirtualCan(&'static str);
@@ -124,6 +124,70 @@ fn a_batch_larger_than_one_call_crosses_whole() {
     assert_eq!(frames(&mut right), sent);
     frames(&mut left);
     assert_eq!((left.unconfirmed(0), left.health().tx_frames), (0, 150));
+}
+
+/// Sends `frames[n]` on `ports[n]` together, and returns how many each took.
+fn send_together<const N: usize>(ports: [&mut SocketCanPort; N], frames: [&[Frame]; N]) -> [usize; N] {
+    let mut taken = [0; N];
+    let entries = ports.into_iter().zip(frames).zip(&mut taken);
+    let mut outgoing: Vec<_> =
+        entries.map(|((port, frames), taken)| Outgoing { port, frames, taken }).collect();
+    SocketCanPort::send_together(0, &mut outgoing);
+    taken
+}
+
+#[test]
+fn frames_that_are_sent_together_reach_each_its_own_bus_and_come_back_as_confirmations() {
+    let buses = ["takt-base", "takt-wrist", "takt-hand"].map(VirtualCan::new);
+    let [mut base, mut wrist, mut hand] = [0, 1, 2].map(|bus: usize| buses[bus].port(&[]));
+    let mut others = [0, 1, 2].map(|bus: usize| buses[bus].port(&[]));
+    let long = Frame::fd(id(0x300), &[9; 64], true).unwrap();
+    let sent = [&[frame(0x80), frame(0x201)][..], &[frame(0x80), long], &[frame(0x80)]];
+    assert_eq!(send_together([&mut base, &mut wrist, &mut hand], sent), [2, 2, 1]);
+    assert_eq!([base.unconfirmed(0), wrist.unconfirmed(0), hand.unconfirmed(0)], [2, 2, 1]);
+    for (other, sent) in others.iter_mut().zip(sent) {
+        assert_eq!(frames(other), sent);
+    }
+    for (port, count) in [(&mut base, 2), (&mut wrist, 2), (&mut hand, 1)] {
+        assert_eq!(frames(port), []);
+        assert_eq!((port.unconfirmed(0), port.health().tx_frames, port.health().rx_frames), (0, count, 0));
+    }
+    // SYNC leaves before the set-points of the slot before it have been read back.
+    assert_eq!(send_together([&mut base, &mut wrist], [&[frame(0x201)]; 2]), [1; 2]);
+    assert_eq!(send_together([&mut base, &mut wrist], [&[frame(0x80)]; 2]), [1; 2]);
+    assert_eq!((frames(&mut base), frames(&mut wrist)), (vec![], vec![]));
+    assert_eq!((base.unconfirmed(0), wrist.unconfirmed(0)), (0, 0));
+    // Another process' SYNC is nobody's confirmation.
+    others[1].send(0, &[frame(0x80)]);
+    assert_eq!(frames(&mut wrist), [frame(0x80)]);
+}
+
+#[test]
+fn of_buses_that_are_sent_to_together_one_that_is_down_holds_no_other_up() {
+    let buses = ["takt-left", "takt-middle", "takt-right"].map(VirtualCan::new);
+    for down in 0..3 {
+        let [mut left, mut middle, mut right] = [0, 1, 2].map(|bus: usize| buses[bus].port(&[]));
+        run(&["ip", "link", "set", buses[down].0, "down"]);
+        for _ in 0..3 {
+            let sent: &[Frame] = &[frame(0x80), frame(0x201)];
+            let taken = send_together([&mut left, &mut middle, &mut right], [sent; 3]);
+            for (bus, port) in [&mut left, &mut middle, &mut right].into_iter().enumerate() {
+                let is_down = bus == down;
+                assert_eq!(taken[bus], if is_down { 0 } else { 2 }, "bus {bus}, {down} is down");
+                assert_eq!((frames(port), port.unconfirmed(0)), (vec![], 0), "bus {bus}, {down} is down");
+                let state = if is_down { BusState::Down } else { BusState::ErrorActive };
+                assert_eq!(port.health().state, state, "bus {bus}, {down} is down");
+                assert_eq!(port.health().tx_overruns, 0);
+            }
+        }
+        run(&["ip", "link", "set", buses[down].0, "up"]);
+        let sent: &[Frame] = &[frame(0x80)];
+        assert_eq!(send_together([&mut left, &mut middle, &mut right], [sent; 3]), [1; 3]);
+        for port in [&mut left, &mut middle, &mut right] {
+            assert_eq!((frames(port), port.unconfirmed(0)), (vec![], 0));
+            assert_eq!(port.health().state, BusState::ErrorActive);
+        }
+    }
 }
 
 #[test]

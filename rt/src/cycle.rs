@@ -13,7 +13,8 @@ use arrayvec::ArrayVec;
 
 use crate::door::Door;
 use crate::engine::{BusSet, Engine, SendBatch, Transmission};
-use crate::port::{BusHealth, BusPort, Clock, ReceiveBatch};
+use crate::frame::Frame;
+use crate::port::{BusHealth, BusPort, Clock, Outgoing, ReceiveBatch};
 use crate::record::{MAX_BUSES, Timing};
 use crate::time::{Grid, Nanoseconds};
 
@@ -76,12 +77,7 @@ impl Cycle {
     ) -> Flow {
         let mut timing = self.reach_slot(clock);
         timing.sync_ns = clock.now_ns().saturating_sub(timing.slot_start_ns);
-        for (bus, port) in ports.iter_mut().enumerate() {
-            let now_ns = clock.now_ns();
-            if let Some(sync) = engine.sync(bus, timing.slot, now_ns) {
-                port.send(now_ns, &[sync]);
-            }
-        }
+        release_sync(engine, ports, timing.slot, clock.now_ns());
 
         let wake = clock.wait_until(timing.slot_start_ns + self.plan.command_phase_ns);
         let held_back = take_feedback(engine, ports, wake.now_ns, door);
@@ -98,15 +94,15 @@ impl Cycle {
         let has_commands = engine.compute(timing.slot, began_ns, &health, transmission, door);
         timing.compute_ns = clock.now_ns().saturating_sub(began_ns);
 
-        for (bus, port) in ports.iter_mut().enumerate() {
-            let mut batch = SendBatch::new();
+        let mut batches: [SendBatch; MAX_BUSES] = [const { SendBatch::new_const() }; MAX_BUSES];
+        for (bus, batch) in batches.iter_mut().enumerate().take(ports.len()) {
             if has_commands {
-                engine.set_points(bus, timing.slot, &mut batch);
+                engine.set_points(bus, timing.slot, batch);
             }
-            engine.services(bus, door, &mut batch);
-            if !batch.is_empty() && port.send(clock.now_ns(), &batch) < batch.len() {
-                engine.not_taken();
-            }
+            engine.services(bus, door, batch);
+        }
+        if !send(ports, &batches, clock.now_ns()) {
+            engine.not_taken();
         }
         let finished_ns = clock.now_ns();
         timing.sent_ns = finished_ns.saturating_sub(timing.slot_start_ns);
@@ -133,6 +129,27 @@ impl Cycle {
             self.next_slot = slot + 1;
         }
     }
+}
+
+/// SYNC on every bus that has it in this slot.
+fn release_sync<P: BusPort>(engine: &mut Engine, ports: &mut [P], slot: u64, now_ns: Nanoseconds) {
+    let syncs = (0..ports.len()).map(|bus| engine.sync(bus, slot, now_ns).into_iter().collect());
+    let syncs: ArrayVec<ArrayVec<Frame, 1>, MAX_BUSES> = syncs.take(MAX_BUSES).collect();
+    send(ports, &syncs, now_ns);
+}
+
+/// Sends to each bus its own frames. Returns whether all of them were taken.
+fn send<P: BusPort, const N: usize>(
+    ports: &mut [P],
+    batches: &[ArrayVec<Frame, N>],
+    now_ns: Nanoseconds,
+) -> bool {
+    let mut taken = [0; MAX_BUSES];
+    let entries = ports.iter_mut().zip(batches).zip(&mut taken).filter(|((_, frames), _)| !frames.is_empty());
+    let mut outgoing: ArrayVec<Outgoing<'_, P>, MAX_BUSES> =
+        entries.map(|((port, frames), taken)| Outgoing { port, frames, taken }).collect();
+    P::send_together(now_ns, &mut outgoing);
+    outgoing.iter().all(|entry| *entry.taken >= entry.frames.len())
 }
 
 /// Hands everything that has arrived to the engine. Returns the buses on which own frames still wait for the wire.

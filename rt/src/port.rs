@@ -46,11 +46,32 @@ pub struct Received {
 /// Frames taken from a bus in one go.
 pub type ReceiveBatch = arrayvec::ArrayVec<Received, RECEIVE_BATCH>;
 
+/// What one of several ports is to send.
+pub struct Outgoing<'a, P> {
+    /// The port.
+    pub port: &'a mut P,
+    /// The frames, the first one first.
+    pub frames: &'a [Frame],
+    /// Where it is written how many of them the port took.
+    pub taken: &'a mut usize,
+}
+
 /// One CAN interface as the real-time thread sees it. No call blocks.
 pub trait BusPort {
     /// Hands frames to the interface, the first one first, and returns how many it took; the rest is not sent
     /// and not kept.
     fn send(&mut self, now_ns: Nanoseconds, frames: &[Frame]) -> usize;
+
+    /// As [`BusPort::send`] on each of these ports (at most [`MAX_BUSES`](crate::record::MAX_BUSES)), in as few calls of
+    /// the system as they can share: then the frames of several buses leave closer together.
+    fn send_together(now_ns: Nanoseconds, outgoing: &mut [Outgoing<'_, Self>])
+    where
+        Self: Sized,
+    {
+        for entry in outgoing {
+            *entry.taken = entry.port.send(now_ns, entry.frames);
+        }
+    }
 
     /// Appends what has arrived up to `now_ns`, oldest first, as far as `batch` has room. Own frames are not
     /// among it. Fewer than the room left means that nothing more is waiting.

@@ -1,8 +1,10 @@
 //! The port of a configured bus, whatever it is connected to.
 
+use arrayvec::ArrayVec;
 use takt_rt::frame::Frame;
 use takt_rt::linux::SocketCanPort;
-use takt_rt::port::{BusHealth, BusPort, ReceiveBatch};
+use takt_rt::port::{BusHealth, BusPort, Outgoing, ReceiveBatch};
+use takt_rt::record::MAX_BUSES;
 use takt_rt::time::Nanoseconds;
 
 use super::interface::{InterfaceError, InterfaceSettings, prepare_interface};
@@ -111,6 +113,25 @@ impl BusPort for Port {
             Self::SocketCan(port) => port.send(now_ns, frames),
             Self::Traced(port) => port.send(now_ns, frames),
             Self::Faulty(port) => port.send(now_ns, frames),
+        }
+    }
+
+    fn send_together(now_ns: Nanoseconds, outgoing: &mut [Outgoing<'_, Self>]) {
+        let mut sockets = ArrayVec::<_, MAX_BUSES>::new();
+        let mut traced = ArrayVec::<_, MAX_BUSES>::new();
+        for Outgoing { port, frames, taken } in outgoing.iter_mut().take(MAX_BUSES) {
+            match port {
+                Self::SocketCan(port) => sockets.push(Outgoing { port: port.as_mut(), frames, taken }),
+                Self::Traced(port) => traced.push(Outgoing { port: port.as_mut(), frames, taken }),
+                Self::Simulated(port) => **taken = port.send(now_ns, frames),
+                Self::Faulty(port) => **taken = port.send(now_ns, frames),
+            }
+        }
+        if !sockets.is_empty() {
+            SocketCanPort::send_together(now_ns, &mut sockets);
+        }
+        if !traced.is_empty() {
+            TracedPort::send_together(now_ns, &mut traced);
         }
     }
 

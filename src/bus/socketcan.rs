@@ -27,8 +27,8 @@ pub struct SocketCanOptions {
     pub bit_rate: u32,
     /// Bit/s of the data phase of CAN FD frames.
     pub data_bit_rate: Option<u32>,
-    /// How many frames may wait in the interface's queue; more are not taken. Not much above what is sent in a
-    /// cycle: set-points that wait longer are stale.
+    /// How many frames of this socket may wait in the interfaces' queues; more are not taken. Not much above what is
+    /// sent in a cycle: set-points that wait longer are stale.
     pub transmit_frames: usize,
     /// How many received frames the kernel keeps while nobody reads. The kernel may grant less
     /// (`net.core.rmem_max`) to a process without the right to go beyond.
@@ -44,13 +44,13 @@ impl SocketCanOptions {
         let of_node = |node: u8| functions.clone().map(move |function| Id::canopen(function, node));
         let broadcast = [NMT, SYNC, TIME].map(|function| Id::canopen(function, 0));
         let own = Id::canopen(HEARTBEAT, config.master.node);
-        let commands = nodes.clone().count() * COMMANDS_PER_AXIS;
         let settings = config.buses.get(bus);
         Self {
             identifiers: nodes.flat_map(of_node).chain(broadcast).chain([own]).collect(),
             bit_rate: settings.map_or(1_000_000, |bus| bus.bit_rate),
             data_bit_rate: settings.and_then(|bus| bus.data_bit_rate),
-            transmit_frames: commands + SERVICE_FRAMES,
+            // Of all buses: one socket can carry what the others send in the same call, and on a bus that is stuck it lies.
+            transmit_frames: config.axes.len() * COMMANDS_PER_AXIS + config.buses.len() * SERVICE_FRAMES,
             receive_frames: RECEIVE_FRAMES,
         }
     }

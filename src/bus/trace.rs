@@ -4,8 +4,10 @@
 //! A frame of up to eight bytes travels as 24 bytes instead of the 88 that the longest frame takes; a longer one as
 //! several pieces.
 
+use arrayvec::ArrayVec;
 use takt_rt::frame::{Frame, FrameKind, Id};
-use takt_rt::port::{BusHealth, BusPort, ReceiveBatch};
+use takt_rt::port::{BusHealth, BusPort, Outgoing, ReceiveBatch};
+use takt_rt::record::MAX_BUSES;
 use takt_rt::time::Nanoseconds;
 
 use crate::controller::channels::{Consumer, Producer, ring};
@@ -176,6 +178,20 @@ impl<P: BusPort> BusPort for TracedPort<P> {
             self.trace(now_ns, true, frame);
         }
         taken
+    }
+
+    fn send_together(now_ns: Nanoseconds, outgoing: &mut [Outgoing<'_, Self>]) {
+        let within = outgoing.iter_mut().map(|entry| Outgoing {
+            port: &mut entry.port.port,
+            frames: entry.frames,
+            taken: entry.taken,
+        });
+        P::send_together(now_ns, &mut within.take(MAX_BUSES).collect::<ArrayVec<_, MAX_BUSES>>());
+        for entry in outgoing {
+            for frame in entry.frames.iter().take(*entry.taken) {
+                entry.port.trace(now_ns, true, frame);
+            }
+        }
     }
 
     fn receive(&mut self, now_ns: Nanoseconds, batch: &mut ReceiveBatch) {

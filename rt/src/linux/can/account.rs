@@ -1,6 +1,8 @@
 //! What has become of every frame: the port's counters and states, without any input or output.
 
-use super::batch::Arrival;
+use arrayvec::ArrayVec;
+
+use super::batch::{Arrival, SEND_BATCH, Sender};
 use super::error_frame;
 use super::wire_format::Message;
 use crate::frame::{Frame, FrameKind};
@@ -8,11 +10,15 @@ use crate::port::{BusHealth, BusState};
 use crate::wire::WireLength;
 
 /// Counters and states of one port.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Account {
     pub(super) health: BusHealth,
     /// Frames that the kernel took and that have not come back from the wire.
     unconfirmed: usize,
+    /// Those of them that another socket sent, oldest first: the kernel does not mark them as our own when they come back.
+    sent_by_another: ArrayVec<Frame, SEND_BATCH>,
+    /// Whether any of them was sent before the socket was last read empty.
+    is_behind: bool,
     /// The socket's overflow counter when it was last seen.
     lost: u32,
     bit_rate: u32,
@@ -29,6 +35,16 @@ impl Account {
         self.unconfirmed
     }
 
+    /// Everything that had arrived has been read.
+    pub(super) const fn read_empty(&mut self) {
+        self.is_behind = self.unconfirmed > 0;
+    }
+
+    /// Whether the bus was last seen with frames that still waited for the wire.
+    pub(super) const fn is_behind(&self) -> bool {
+        self.is_behind
+    }
+
     /// Frames that the kernel took. Remote frames are not waited for: the kernel's fast filters, one for each
     /// identifier, let data frames pass alone, so that remote frames do not come back.
     pub(super) fn taken(&mut self, frames: &[Frame]) {
@@ -37,6 +53,20 @@ impl Account {
         self.unconfirmed += frames.len() - remote;
         if self.health.state == BusState::Down && !frames.is_empty() {
             self.health.state = BusState::ErrorActive;
+        }
+    }
+
+    /// As [`Account::taken`], of frames that another socket of this process sent to this port's interface. They are
+    /// known again by what they are. Somebody else on this machine who sends the same is not, while one is on its way; but
+    /// then the one of our own comes back as a frame too many, and is not taken for ours.
+    pub(super) fn taken_by_another(&mut self, frames: &[Frame]) {
+        self.taken(frames);
+        for frame in frames.iter().filter(|frame| frame.kind() != FrameKind::Remote) {
+            if self.sent_by_another.is_full() {
+                // One whose confirmation was lost, since no more than these are sent while any is waited for.
+                self.sent_by_another.remove(0);
+            }
+            self.sent_by_another.push(*frame);
         }
     }
 
@@ -65,7 +95,7 @@ impl Account {
             self.health.busy_ns += WireLength::of(frame).duration_ns(self.bit_rate, self.data_bit_rate);
         }
         match arrival.message {
-            Message::Frame(frame) if arrival.is_own => {
+            Message::Frame(frame) if self.is_own(&frame, arrival.sender) => {
                 if frame.kind() != FrameKind::Remote {
                     self.unconfirmed = self.unconfirmed.saturating_sub(1);
                     self.health.tx_frames += 1;
@@ -87,12 +117,23 @@ impl Account {
         }
     }
 
+    fn is_own(&mut self, frame: &Frame, sender: Sender) -> bool {
+        match sender {
+            Sender::ThisSocket => true,
+            Sender::ThisMachine => {
+                let place = self.sent_by_another.iter().position(|sent| sent == frame);
+                place.map(|place| self.sent_by_another.remove(place)).is_some()
+            }
+            Sender::Wire => false,
+        }
+    }
+
     fn reported(&mut self, report: error_frame::Report) {
         if let Some(state) = report.state {
             self.health.state = state;
         }
         if report.has_dropped_transmissions {
-            self.unconfirmed = 0;
+            self.forget_transmissions();
         }
         self.health.errors += u64::from(report.is_error);
         self.health.rx_overruns += u64::from(report.has_lost_received);
@@ -118,7 +159,13 @@ impl Account {
     /// An interface that goes down drops what it still had to send.
     fn down(&mut self) {
         self.health.state = BusState::Down;
+        self.forget_transmissions();
+    }
+
+    fn forget_transmissions(&mut self) {
         self.unconfirmed = 0;
+        self.is_behind = false;
+        self.sent_by_another.clear();
     }
 }
 
@@ -131,12 +178,12 @@ mod tests {
         Frame::of(Id::canopen(0x200, node), [1, 2, 3])
     }
 
-    fn arrival(message: Message, is_own: bool) -> Arrival {
-        Arrival { message, is_own, real_time_ns: None, lost: None }
+    fn arrival(message: Message, sender: Sender) -> Arrival {
+        Arrival { message, sender, real_time_ns: None, lost: None }
     }
 
     fn error(class: u32) -> Arrival {
-        arrival(Message::Error { class, details: [0; 8] }, false)
+        arrival(Message::Error { class, details: [0; 8] }, Sender::Wire)
     }
 
     #[test]
@@ -144,10 +191,64 @@ mod tests {
         let mut account = Account::default();
         account.taken(&[frame(1), frame(2)]);
         assert_eq!((account.unconfirmed(), account.health.tx_frames), (2, 0));
-        assert_eq!(account.arrived(&arrival(Message::Frame(frame(1)), true)), None);
+        assert_eq!(account.arrived(&arrival(Message::Frame(frame(1)), Sender::ThisSocket)), None);
         assert_eq!((account.unconfirmed(), account.health.tx_frames), (1, 1));
-        assert_eq!(account.arrived(&arrival(Message::Frame(frame(7)), false)), Some(frame(7)));
+        assert_eq!(account.arrived(&arrival(Message::Frame(frame(7)), Sender::Wire)), Some(frame(7)));
         assert_eq!((account.unconfirmed(), account.health.rx_frames), (1, 1));
+    }
+
+    #[test]
+    fn a_bus_is_behind_from_a_reading_without_the_confirmation_to_the_next_one() {
+        let mut account = Account::default();
+        account.taken(&[frame(1)]);
+        assert!(!account.is_behind());
+        account.read_empty();
+        assert!(account.is_behind());
+        account.arrived(&arrival(Message::Frame(frame(1)), Sender::ThisSocket));
+        assert!(account.is_behind());
+        account.read_empty();
+        account.taken(&[frame(2)]);
+        assert!(!account.is_behind());
+        account.read_empty();
+        account.receive_failed(libc::ENETDOWN);
+        assert!(!account.is_behind());
+    }
+
+    #[test]
+    fn a_frame_that_another_socket_sent_for_this_port_is_known_again_as_often_as_it_was_sent() {
+        let mut account = Account::default();
+        account.taken_by_another(&[frame(1), frame(2)]);
+        assert_eq!(account.unconfirmed(), 2);
+        // The wire decides about the order.
+        assert_eq!(account.arrived(&arrival(Message::Frame(frame(2)), Sender::ThisMachine)), None);
+        assert_eq!(account.arrived(&arrival(Message::Frame(frame(1)), Sender::ThisMachine)), None);
+        assert_eq!((account.unconfirmed(), account.health.tx_frames, account.health.rx_frames), (0, 2, 0));
+        let too_many = account.arrived(&arrival(Message::Frame(frame(1)), Sender::ThisMachine));
+        assert_eq!((too_many, account.health.rx_frames), (Some(frame(1)), 1));
+    }
+
+    #[test]
+    fn nobody_elses_frame_is_a_confirmation_however_like_it_is() {
+        let mut account = Account::default();
+        account.taken_by_another(&[frame(1)]);
+        assert_eq!(account.arrived(&arrival(Message::Frame(frame(1)), Sender::Wire)), Some(frame(1)));
+        assert_eq!(account.arrived(&arrival(Message::Frame(frame(2)), Sender::ThisMachine)), Some(frame(2)));
+        assert_eq!(account.unconfirmed(), 1);
+    }
+
+    #[test]
+    fn confirmations_that_are_lost_leave_room_for_those_to_come() {
+        let mut account = Account::default();
+        for node in (1..=100).cycle().take(1_000) {
+            account.taken_by_another(&[frame(node)]);
+        }
+        assert_eq!(account.arrived(&arrival(Message::Frame(frame(100)), Sender::ThisMachine)), None);
+        assert_eq!(account.arrived(&arrival(Message::Frame(frame(1)), Sender::ThisMachine)), Some(frame(1)));
+        account.receive_failed(libc::ENETDOWN);
+        assert_eq!(
+            account.arrived(&arrival(Message::Frame(frame(99)), Sender::ThisMachine)),
+            Some(frame(99))
+        );
     }
 
     #[test]
@@ -156,7 +257,7 @@ mod tests {
         let remote = Frame::remote(Id::canopen(0x700, 1), 1).unwrap();
         account.taken(&[remote, frame(1)]);
         assert_eq!(account.unconfirmed(), 1);
-        account.arrived(&arrival(Message::Frame(remote), true));
+        account.arrived(&arrival(Message::Frame(remote), Sender::ThisSocket));
         assert_eq!((account.unconfirmed(), account.health.tx_frames), (1, 1));
     }
 
@@ -233,7 +334,7 @@ mod tests {
     fn lost_messages_are_counted_once_and_hold_nothing_back() {
         let mut account = Account::default();
         account.taken(&[frame(1), frame(2), frame(3)]);
-        let mut with_losses = arrival(Message::Frame(frame(9)), false);
+        let mut with_losses = arrival(Message::Frame(frame(9)), Sender::Wire);
         with_losses.lost = Some(2);
         account.arrived(&with_losses);
         account.arrived(&with_losses);
@@ -251,8 +352,8 @@ mod tests {
         let length_ns = WireLength::of(&frame(1)).duration_ns(1_000_000, None);
         account.taken(&[frame(1)]);
         assert_eq!(account.health.busy_ns, 0);
-        account.arrived(&arrival(Message::Frame(frame(1)), true));
-        account.arrived(&arrival(Message::Frame(frame(1)), false));
+        account.arrived(&arrival(Message::Frame(frame(1)), Sender::ThisSocket));
+        account.arrived(&arrival(Message::Frame(frame(1)), Sender::Wire));
         account.arrived(&error(libc::CAN_ERR_ACK));
         assert_eq!(account.health.busy_ns, 2 * length_ns);
     }
@@ -260,7 +361,7 @@ mod tests {
     #[test]
     fn what_is_no_frame_is_an_error() {
         let mut account = Account::default();
-        assert_eq!(account.arrived(&arrival(Message::Unknown, false)), None);
+        assert_eq!(account.arrived(&arrival(Message::Unknown, Sender::Wire)), None);
         account.refused(2, libc::EINVAL);
         account.receive_failed(libc::EIO);
         assert_eq!(account.health.errors, 4);

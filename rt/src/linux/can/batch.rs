@@ -28,12 +28,44 @@ pub(super) struct Batch {
 pub(super) struct Arrival {
     /// What it holds.
     pub(super) message: Message,
-    /// Whether it is one of this socket's own frames, back from the wire (`MSG_CONFIRM`).
-    pub(super) is_own: bool,
+    /// Who sent it.
+    pub(super) sender: Sender,
     /// When the kernel saw it, on `CLOCK_REALTIME`; `None` without a time stamp.
     pub(super) real_time_ns: Option<Nanoseconds>,
     /// How many messages this socket has lost so far for want of room (`SO_RXQ_OVFL`), modulo 2³².
     pub(super) lost: Option<u32>,
+}
+
+/// Who sent a message, as far as the kernel tells.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Sender {
+    /// This socket: the message is back from the wire (`MSG_CONFIRM`).
+    ThisSocket,
+    /// Another socket of this machine (`MSG_DONTROUTE`).
+    ThisMachine,
+    /// Another device on the bus.
+    Wire,
+}
+
+impl Sender {
+    const fn of(flags: libc::c_int) -> Self {
+        if flags & libc::MSG_CONFIRM != 0 {
+            Self::ThisSocket
+        } else if flags & libc::MSG_DONTROUTE != 0 {
+            Self::ThisMachine
+        } else {
+            Self::Wire
+        }
+    }
+}
+
+/// Where a message goes.
+#[derive(Clone, Copy)]
+pub(super) enum Destination {
+    /// The interface that the socket is bound to.
+    Bound,
+    /// The interface of this index.
+    Interface(libc::c_int),
 }
 
 impl Batch {
@@ -82,7 +114,7 @@ impl Batch {
             let (real_time_ns, lost) = ancillary(&header.msg_hdr);
             take(Arrival {
                 message: wire_format::read(frame, header.msg_len as usize),
-                is_own: header.msg_hdr.msg_flags & libc::MSG_CONFIRM != 0,
+                sender: Sender::of(header.msg_hdr.msg_flags),
                 real_time_ns,
                 lost,
             });
@@ -92,23 +124,40 @@ impl Batch {
 }
 
 /// Hands frames to the kernel without waiting, the first one first, and returns how many it took. An error means
-/// that it took none, and is the system's number. A batch longer than [`SEND_BATCH`] is taken up to there.
-pub(super) fn send(descriptor: libc::c_int, frames: &[Frame]) -> Result<usize, i32> {
+/// that it took none, and is the system's number. Of more frames than [`SEND_BATCH`] it is given the first ones.
+pub(super) fn send<'a>(
+    descriptor: libc::c_int,
+    frames: impl Iterator<Item = (Destination, &'a Frame)>,
+) -> Result<usize, i32> {
     let mut buffers = [EMPTY; SEND_BATCH];
+    let mut addresses = [NO_ADDRESS; SEND_BATCH];
     let mut vectors = [NO_VECTOR; SEND_BATCH];
     let mut headers = [NO_HEADER; SEND_BATCH];
-    let places = headers.iter_mut().zip(&mut vectors).zip(&mut buffers);
-    for (((header, vector), buffer), frame) in places.zip(frames) {
+    let mut count = 0;
+    let places = headers.iter_mut().zip(&mut vectors).zip(buffers.iter_mut().zip(&mut addresses));
+    for (((header, vector), (buffer, address)), (destination, frame)) in places.zip(frames) {
         vector.iov_len = wire_format::write(frame, buffer);
         vector.iov_base = (&raw mut *buffer).cast();
         header.msg_hdr.msg_iov = vector;
         header.msg_hdr.msg_iovlen = 1;
+        if let Destination::Interface(index) = destination {
+            address.can_ifindex = index;
+            header.msg_hdr.msg_name = (&raw mut *address).cast();
+            header.msg_hdr.msg_namelen = size_of::<libc::sockaddr_can>() as libc::socklen_t;
+        }
+        count += 1;
     }
-    let count = frames.len().min(SEND_BATCH) as libc::c_uint;
-    // SAFETY: the first `count` headers point to buffers of the lengths they say, which outlive the call.
+    // SAFETY: the first `count` headers point to addresses and buffers of the lengths they say, which outlive the call.
     let sent = unsafe { libc::sendmmsg(descriptor, headers.as_mut_ptr(), count, libc::MSG_DONTWAIT as _) };
     usize::try_from(sent).map_err(|_| errno())
 }
+
+const NO_ADDRESS: libc::sockaddr_can = {
+    // SAFETY: it holds numbers, of which any are possible.
+    let mut address: libc::sockaddr_can = unsafe { core::mem::zeroed() };
+    address.can_family = libc::AF_CAN as libc::sa_family_t;
+    address
+};
 
 const NO_VECTOR: libc::iovec = libc::iovec { iov_base: core::ptr::null_mut(), iov_len: 0 };
 

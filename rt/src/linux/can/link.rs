@@ -8,31 +8,42 @@
 #[derive(Clone, Copy)]
 pub(super) struct Link {
     descriptor: libc::c_int,
-    /// Its name; `None` where the socket is no CAN socket that is bound to one interface.
-    name: Option<[libc::c_char; libc::IFNAMSIZ]>,
+    /// `None` where the socket is no CAN socket that is bound to one interface.
+    interface: Option<Interface>,
+}
+
+#[derive(Clone, Copy)]
+struct Interface {
+    index: libc::c_int,
+    name: [libc::c_char; libc::IFNAMSIZ],
 }
 
 impl Link {
     /// The interface of the socket `descriptor`, which must live as long as this is used.
     pub(super) fn of(descriptor: libc::c_int) -> Self {
-        let name = bound_interface(descriptor).filter(|index| *index > 0).and_then(|index| {
+        let interface = bound_interface(descriptor).filter(|index| *index > 0).and_then(|index| {
             let mut request = NO_REQUEST;
             request.ifr_ifru.ifru_ifindex = index;
             // SAFETY: this call reads the index from the request and writes the name into it.
             let named = unsafe { libc::ioctl(descriptor, libc::SIOCGIFNAME as _, &raw mut request) };
-            (named == 0).then_some(request.ifr_name)
+            (named == 0).then_some(Interface { index, name: request.ifr_name })
         });
-        Self { descriptor, name }
+        Self { descriptor, interface }
+    }
+
+    /// The kernel's number of the interface.
+    pub(super) fn index(&self) -> Option<libc::c_int> {
+        self.interface.map(|interface| interface.index)
     }
 
     /// Whether the interface is down, going down or gone. One of which nothing is known is not.
     pub(super) fn is_lost(&self) -> bool {
-        let Some(name) = self.name else { return false };
+        let Some(interface) = self.interface else { return false };
         // Asking for one that is gone by its name would have the kernel look for a module of that name.
         if bound_interface(self.descriptor) == Some(0) {
             return true;
         }
-        let mut request = libc::ifreq { ifr_name: name, ..NO_REQUEST };
+        let mut request = libc::ifreq { ifr_name: interface.name, ..NO_REQUEST };
         // SAFETY: this call reads the name from the request and writes the flags into it.
         let answered = unsafe { libc::ioctl(self.descriptor, libc::SIOCGIFFLAGS as _, &raw mut request) };
         // SAFETY: the kernel has written the flags if it has answered, and any bits are flags.

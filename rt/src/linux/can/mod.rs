@@ -6,6 +6,7 @@ mod batch;
 mod error_frame;
 mod link;
 mod port;
+mod together;
 mod wire_format;
 
 pub use port::SocketCanPort;

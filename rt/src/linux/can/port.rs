@@ -1,12 +1,13 @@
-//! The port: one system call to send, one to receive.
+//! The port: one system call to receive; one to send, which several ports can share.
 
 use super::super::clock::{monotonic_ns, real_time_ns, timespec_of};
 use super::super::errno;
 use super::account::Account;
-use super::batch::{self, Batch, SEND_BATCH};
+use super::batch::{self, Batch, Destination, SEND_BATCH};
 use super::link::Link;
+use super::together;
 use crate::frame::Frame;
-use crate::port::{BusHealth, BusPort, RECEIVE_BATCH, ReceiveBatch, Received};
+use crate::port::{BusHealth, BusPort, Outgoing, RECEIVE_BATCH, ReceiveBatch, Received};
 use crate::time::{NANOSECONDS_PER_SECOND, Nanoseconds};
 
 /// A raw CAN socket as a bus port.
@@ -24,10 +25,10 @@ use crate::time::{NANOSECONDS_PER_SECOND, Nanoseconds};
 /// clock by the difference of the two at the time of reading. A stamp more than a second away from the present,
 /// which only a real-time clock that was set in between can cause, is replaced by the present.
 pub struct SocketCanPort {
-    descriptor: libc::c_int,
-    link: Link,
+    pub(super) descriptor: libc::c_int,
+    pub(super) link: Link,
     batch: Batch,
-    account: Account,
+    pub(super) account: Account,
 }
 
 impl SocketCanPort {
@@ -76,7 +77,7 @@ impl BusPort for SocketCanPort {
     fn send(&mut self, _now_ns: Nanoseconds, frames: &[Frame]) -> usize {
         let mut taken = 0;
         for chunk in frames.chunks(SEND_BATCH) {
-            match batch::send(self.descriptor, chunk) {
+            match batch::send(self.descriptor, chunk.iter().map(|frame| (Destination::Bound, frame))) {
                 Ok(count) => {
                     self.account.taken(chunk.get(..count).unwrap_or(chunk));
                     taken += count;
@@ -94,6 +95,10 @@ impl BusPort for SocketCanPort {
             }
         }
         taken
+    }
+
+    fn send_together(now_ns: Nanoseconds, outgoing: &mut [Outgoing<'_, Self>]) {
+        together::send(now_ns, outgoing);
     }
 
     fn receive(&mut self, _now_ns: Nanoseconds, batch: &mut ReceiveBatch) {
@@ -115,7 +120,10 @@ impl BusPort for SocketCanPort {
             });
             match outcome {
                 Ok(count) if count == limit => {}
-                Ok(_) => return,
+                Ok(_) => {
+                    self.account.read_empty();
+                    return;
+                }
                 Err(errno) => {
                     self.account.receive_failed(errno);
                     return;
