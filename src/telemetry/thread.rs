@@ -9,6 +9,7 @@ use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use nix::sys::signal::{SigSet, Signal};
+use takt_rt::linux::set_nice;
 
 use super::black_box::Fault;
 use super::logger::{LogSummary, Logger};
@@ -16,6 +17,9 @@ use crate::controller::quiet;
 
 /// A pause between two looks at the rings; at 1 ms, five records.
 const PAUSE: Duration = Duration::from_millis(5);
+
+/// Ahead of ordinary work, which on a busy CPU would let the ring run full; far behind everything that is real-time.
+const NICE: i8 = -15;
 
 /// A logger in a thread of its own. Start it before the real-time thread is elevated, so that it inherits neither
 /// the priority nor the CPU.
@@ -39,6 +43,8 @@ impl LoggerThread {
         let (faults, told_faults) = mpsc::channel::<Fault>();
         let thread = thread::Builder::new().name("takt-logger".to_owned()).spawn(move || {
             survive_size_limits();
+            // Where there is no right to it, the ring alone bridges the time in which others have the CPU.
+            let _ = set_nice(NICE);
             while !told.load(Ordering::Acquire) {
                 logger.drain();
                 told_faults.try_iter().for_each(|fault| logger.fault(&fault));

@@ -86,6 +86,13 @@ pub(super) fn set_fifo(priority: u8) -> Outcome {
     Outcome::of(unsafe { libc::syscall(libc::SYS_sched_setattr, 0, &raw const attributes, 0) })
 }
 
+/// Gives the calling thread, which is scheduled in turn with others, `nice` (-20, which gets the most of the CPU, to 19).
+/// Threads and processes that it starts inherit it. Without the right to it (`RLIMIT_NICE`) it keeps what it has.
+pub fn set_nice(nice: i8) -> Outcome {
+    // SAFETY: takes numbers only; thread 0 is the caller.
+    Outcome::of(unsafe { libc::setpriority(libc::PRIO_PROCESS, 0, nice.into()) })
+}
+
 /// Pins the calling thread to `cpu`.
 pub(super) fn pin_to(cpu: usize) -> Outcome {
     if cpu >= libc::CPU_SETSIZE as usize {
@@ -112,5 +119,25 @@ pub(super) fn pinned_cpu() -> Option<usize> {
     match (allowed.next(), allowed.next()) {
         (Some(cpu), None) => Some(cpu),
         _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use super::*;
+
+    #[test]
+    fn one_thread_gives_way_and_the_others_do_not() {
+        // SAFETY: takes numbers only.
+        let nice = || unsafe { libc::getpriority(libc::PRIO_PROCESS, 0) };
+        let before = nice();
+        std::thread::spawn(move || {
+            assert!(matches!(set_nice(19), Outcome::Granted));
+            assert_eq!(nice(), 19);
+        })
+        .join()
+        .unwrap();
+        assert_eq!(nice(), before);
     }
 }
