@@ -1,6 +1,6 @@
 # Reads a candump log (candump -L) of SYNC, feedback and set-points of drives with one PDO each way, and says for each
 # interface whether every set-point was on the wire in its slot, before the next SYNC, and after the same drive's feedback
-# of that slot; and how long before. Set-points count while they enable operation (bit 3 of the controlword that they
+# of that slot; and how long before; and how far SYNC of the buses is apart. Set-points count while they enable operation (bit 3 of the controlword that they
 # begin with). Fails when one missed its slot, or was before the feedback. Run with -v period=1000 (microseconds).
 # Seconds and microseconds are kept apart: as one number they would not fit a double's digits.
 function digit(text, place) { return index("0123456789ABCDEF", substr(text, place, 1)) - 1 }
@@ -17,6 +17,8 @@ function digit(text, place) { return index("0123456789ABCDEF", substr(text, plac
 function_code == 1 && node == 0 {
     if (bus in sync && is_commanded[bus] && at - last_set_point[bus] < least_reserve[bus]) least_reserve[bus] = at - last_set_point[bus]
     if (!(bus in sync)) { least_reserve[bus] = period; latest_set_point[bus] = latest_feedback[bus] = set_points[bus] = 0 }
+    if (latest_sync_on != "" && latest_sync_on != bus && at - sync[latest_sync_on] < period / 2 && at - sync[latest_sync_on] > furthest_apart) furthest_apart = at - sync[latest_sync_on]
+    latest_sync_on = bus
     sync[bus] = at
     slot[bus]++
     is_commanded[bus] = 0
@@ -46,5 +48,6 @@ END {
         printf "SYNC + %d us the latest feedback, + %d us the latest set-point, %d us before the next SYNC\n", latest_feedback[bus], latest_set_point[bus], least_reserve[bus]
         bad += missing[bus] + doubled[bus] + blind[bus] + (set_points[bus] == 0)
     }
+    if (length(sync) > 1) printf "  SYNC of the buses at most %d us apart\n", furthest_apart
     if (NR == 0 || bad) { print "wire: a set-point missed its slot, or feedback did" > "/dev/stderr"; exit 1 }
 }
