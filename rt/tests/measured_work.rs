@@ -1,0 +1,32 @@
+//! What the benchmarks and the counting of instructions measure is what they say.
+
+mod fixture;
+#[path = "fixture/thinking.rs"]
+mod thinking;
+
+use thinking::Thinking;
+
+#[test]
+fn the_group_whose_cycles_are_measured_is_in_motion_whatever_its_size() {
+    for axes in [1, 6, 12, 32] {
+        let mut thinking = Thinking::moving(axes);
+        let moving = (0..10_000).filter(|_| {
+            thinking.cycle();
+            thinking.is_moving()
+        });
+        let moving = moving.count();
+        assert!(moving > 9_900, "{axes} axes: {moving} cycles of 10,000");
+    }
+}
+
+#[test]
+fn the_group_that_is_planned_anew_in_every_cycle_keeps_moving() {
+    let mut thinking = Thinking::moving(7);
+    let moving = (0..10_000).filter(|_| {
+        thinking.replan();
+        thinking.cycle();
+        thinking.is_moving()
+    });
+    let moving = moving.count();
+    assert!(moving > 9_900, "{moving} cycles of 10,000");
+}
