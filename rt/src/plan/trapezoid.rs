@@ -26,6 +26,9 @@ pub(super) struct Bounds {
 }
 
 /// The core problem: cover a distance while the rate goes from one value to another.
+///
+/// Its solutions are inlined, for what a caller has just stored number by number would be loaded in pairs: the processor cannot
+/// forward that, and waits until all is in the cache, a third of the time of a plan.
 #[derive(Clone, Copy)]
 pub(super) struct Ramp {
     pub(super) distance: f64,
@@ -102,7 +105,7 @@ impl Ramp {
     }
 
     /// The fastest way. The start must be within the bounds.
-    #[inline]
+    #[inline(always)]
     pub(super) fn fastest(&self) -> Fastest {
         let direct = self.direct();
         // Everything below is as seen in the direction of the detour: in place of downwards it is upwards there.
@@ -156,7 +159,7 @@ impl Ramp {
     }
 
     /// The way that takes this long, which must be possible.
-    #[inline]
+    #[inline(always)]
     pub(super) fn lasting(&self, duration: f64) -> Stretches {
         let Direct { duration: direct_duration, excess, high, low, slope } = self.direct();
         let spare = larger(duration - direct_duration, 0.0);

@@ -200,6 +200,7 @@ fn velocity_ramp(problem: &Problem, profile: &mut Profile) -> Result<Ramp, PlanE
     })
 }
 
+#[inline(always)]
 fn drive_stretches(stretches: &Stretches, profile: &mut Profile) {
     profile.shift_all(&stretches.durations, &stretches.slopes);
 }
