@@ -1,5 +1,6 @@
 //! The trajectory of one axis: phases of constant jerk.
 
+use super::choice::select;
 use super::error::PlanError;
 use super::problem::{SIZE_MAX, State};
 
@@ -91,13 +92,6 @@ struct Coefficients {
 }
 
 const NO_PHASE: Coefficients = Coefficients { start: State::rest(0.0), jerk: 0.0 };
-
-/// `one` where the condition holds, else `other`. With a comparison of numbers as the condition it compiles to a mask,
-/// not to a branch to guess.
-#[inline]
-pub(super) fn select(condition: bool, one: f64, other: f64) -> f64 {
-    if condition { one } else { other }
-}
 
 /// The state after this time of constant jerk.
 #[inline]

@@ -19,11 +19,12 @@ mod step1;
 mod step2;
 mod turn;
 
+use super::choice::larger;
 use super::error::PlanError;
 use super::problem::{Problem, State};
 use super::profile::Profile;
+use super::ramp::{Ramp, Slopes, Stretches};
 use super::synchronisation::Return;
-use super::trapezoid::{Bounds, Ramp, Stretches, larger};
 use motion::{Scale, Shape};
 use step1::Edges;
 use step2::Slower;
@@ -180,28 +181,26 @@ fn velocity_ramp(problem: &Problem, profile: &mut Profile) -> Result<Ramp, PlanE
         profile.limit_acceleration(limits.acceleration_min, limits.acceleration_max);
     }
     let State { velocity, .. } = profile.reached();
-    let acceleration_size = larger(limits.acceleration_max, -limits.acceleration_min);
-    let swing = acceleration_size * acceleration_size / limits.jerk_max;
-    let rounding = ROUNDING * (velocity.abs() + target.velocity.abs() + swing);
+    let slopes = Slopes::symmetric(limits.jerk_max);
+    let speeds = slopes.mean() * (velocity.abs() + target.velocity.abs());
+    let rounding =
+        ROUNDING * (speeds + slopes.swing(larger(limits.acceleration_max, -limits.acceleration_min)));
     if !rounding.is_finite() {
         return Err(PlanError::NotRepresentable { axis: 0 });
     }
     Ok(Ramp {
-        distance: target.velocity - velocity,
+        area: slopes.mean() * (target.velocity - velocity),
         rounding,
         start: acceleration,
         target: target.acceleration,
-        bounds: Bounds {
-            rate_max: limits.acceleration_max,
-            rate_min: limits.acceleration_min,
-            slope_max: limits.jerk_max,
-            slope_min: -limits.jerk_max,
-        },
+        rate_max: limits.acceleration_max,
+        rate_min: limits.acceleration_min,
+        slopes,
     })
 }
 
 #[inline(always)]
-fn drive_stretches(stretches: &Stretches, profile: &mut Profile) {
+fn drive(stretches: &Stretches, profile: &mut Profile) {
     profile.shift_all(&stretches.durations, &stretches.slopes);
 }
 
@@ -224,7 +223,7 @@ pub(super) fn fastest_velocity(
     if fastest_s < least_s {
         return profile.leave_open(fastest_s);
     }
-    drive_stretches(&fastest.stretches, profile);
+    drive(&ramp.stretches(fastest.way), profile);
     let position = profile.reached().position;
     profile.finish_at(State { position, ..problem.target }, fastest_s)
 }
@@ -237,8 +236,8 @@ pub(super) fn velocity_lasting(
 ) -> Result<(), PlanError> {
     profile.begin(problem.start);
     let ramp = velocity_ramp(problem, profile)?;
-    let stretches = ramp.lasting(duration_s - profile.duration_s());
-    drive_stretches(&stretches, profile);
+    let way = ramp.lasting(duration_s - profile.duration_s());
+    drive(&ramp.stretches(way), profile);
     let position = profile.reached().position;
     profile.finish_at(State { position, ..problem.target }, duration_s)
 }

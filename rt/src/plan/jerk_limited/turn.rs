@@ -6,8 +6,8 @@
 use super::super::error::{Limit, PlanError};
 use super::super::problem::{Problem, State};
 use super::super::profile::{Profile, integrate};
-use super::super::trapezoid::Stretches;
-use super::{drive_stretches, velocity_ramp};
+use super::super::ramp::{Ramp, Stretches};
+use super::{drive, velocity_ramp};
 
 /// Halvings of the range of decelerations, which leave out what is less than rounding.
 const HALVINGS: u32 = 48;
@@ -22,7 +22,7 @@ pub(in super::super) fn stop_turning(
     turn(problem, limit, profile)?;
     let target = State::rest(problem.target.position);
     let ramp = velocity_ramp(&Problem { target, ..*problem }, profile)?;
-    drive_stretches(&ramp.fastest().stretches, profile);
+    drive(&fastest(&ramp), profile);
     profile.finish(State::rest(profile.reached().position))?;
     profile.set_minimum_duration(profile.duration_s());
     Ok(())
@@ -36,7 +36,7 @@ fn turn(problem: &Problem, limit: Limit, profile: &mut Profile) -> Result<(), Pl
         _ => (1.0, limits.position_max, -limits.acceleration_min),
     };
     let target = State::rest(problem.target.position);
-    let mut ramp = velocity_ramp(&Problem { target, ..*problem }, profile)?;
+    let ramp = velocity_ramp(&Problem { target, ..*problem }, profile)?;
     let from = profile.reached();
     let (speed, acceleration) = (sign * from.velocity, sign * from.acceleration);
     // On the arcs of full jerk the speed is `peak − deceleration²/2J`, or that with the other sign.
@@ -44,10 +44,7 @@ fn turn(problem: &Problem, limit: Limit, profile: &mut Profile) -> Result<(), Pl
     let most = libm::sqrt((2.0 * limits.jerk_max * speed + square).max(0.0)).min(deceleration_max);
     let cannot_stop = if acceleration < 0.0 { square - 2.0 * limits.jerk_max * speed } else { 0.0 };
     let least = libm::sqrt(cannot_stop.max(0.0)).min(most);
-    let mut way = |deceleration: f64| {
-        ramp.target = -sign * deceleration;
-        ramp.fastest().stretches
-    };
+    let way = |deceleration: f64| fastest(&Ramp { target: -sign * deceleration, ..ramp });
     let is_beyond = |stretches: &Stretches| sign * (arrival(&from, stretches) - end) > 0.0;
     let (mut low, mut high) = (least, most);
     if !is_beyond(&way(most)) {
@@ -60,8 +57,13 @@ fn turn(problem: &Problem, limit: Limit, profile: &mut Profile) -> Result<(), Pl
             }
         }
     }
-    drive_stretches(&way(high), profile);
+    drive(&way(high), profile);
     Ok(())
+}
+
+/// The stretches of the fastest way.
+fn fastest(ramp: &Ramp) -> Stretches {
+    ramp.stretches(ramp.fastest().way)
 }
 
 /// Where the stretches lead, seen as phases of constant jerk.
