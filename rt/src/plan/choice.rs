@@ -1,6 +1,7 @@
 //! Choices between two numbers that compile to one or two instructions, not to a branch to guess.
 
-/// `one` where the condition holds, else `other`. With a comparison of numbers as the condition it compiles to a mask.
+/// `one` where the condition holds, else `other`. With a comparison of numbers as the condition, and no other
+/// choice by the same one, it compiles to a mask.
 #[inline]
 pub(super) fn select(condition: bool, one: f64, other: f64) -> f64 {
     if condition { one } else { other }

@@ -1,6 +1,6 @@
 //! The trajectory of one axis: phases of constant jerk.
 
-use super::choice::select;
+use super::choice::larger;
 use super::error::PlanError;
 use super::problem::{SIZE_MAX, State};
 
@@ -79,8 +79,10 @@ pub struct Profile {
     phases: [Coefficients; PHASES_MAX],
     count: usize,
     duration_s: f64,
-    end: State,
+    // Between two numbers that are stored one by one and read at the same time: read as a pair, they would have to wait for
+    // the cache.
     minimum_duration_s: f64,
+    end: State,
     blocked: [Blocked; BLOCKED_MAX],
     blocked_count: usize,
 }
@@ -288,13 +290,16 @@ impl Profile {
             end.acceleration = acceleration;
             if let (Some(phase), Some(start_s)) = (self.phases.get_mut(count), self.starts_s.get_mut(count)) {
                 *phase = Coefficients { start: end, jerk };
+                *start_s = time_s;
                 // Not the other way round: what is not a number must not look like no time.
-                *start_s = select(*duration_s <= 0.0, f64::INFINITY, time_s);
-                let elapsed_s = select(*duration_s <= 0.0, 0.0, *duration_s);
+                let elapsed_s = larger(0.0, *duration_s);
                 count += 1 - usize::from(*duration_s <= 0.0);
                 time_s += elapsed_s;
                 end = integrate(&end, jerk, elapsed_s);
             }
+        }
+        if let Some(start_s) = self.starts_s.get_mut(count) {
+            *start_s = f64::INFINITY;
         }
         (self.end, self.duration_s, self.count) = (end, time_s, count);
     }

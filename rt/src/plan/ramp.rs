@@ -106,11 +106,16 @@ impl Slopes {
         rate * rate * larger(self.rise, self.fall)
     }
 
-    /// The slope in the direction of this change of the rate, and the time that the change takes, times the mean slope.
+    /// The slope in the direction of this change of the rate.
     #[inline(always)]
-    fn change(&self, by: f64) -> (f64, f64) {
-        let downwards = by < 0.0;
-        (select(downwards, self.min, self.max), by.abs() * select(downwards, self.fall, self.rise))
+    fn towards(&self, change: f64) -> f64 {
+        select(change < 0.0, self.min, self.max)
+    }
+
+    /// The time that this change of the rate takes.
+    #[inline(always)]
+    fn time(&self, change: f64) -> f64 {
+        larger(change * self.rise, -change * self.fall)
     }
 }
 
@@ -120,10 +125,17 @@ impl Ramp {
         ROUNDING * (self.start.abs() + self.target.abs()) * larger(self.slopes.rise, self.slopes.fall)
     }
 
+    /// The bounds of the rate as seen in this direction, 1 or −1.
+    #[inline(always)]
+    fn bounds_towards(&self, sign: f64) -> (f64, f64) {
+        let (one, other) = (sign * self.rate_max, sign * self.rate_min);
+        (larger(one, other), smaller(one, other))
+    }
+
     #[inline(always)]
     fn direct(&self) -> Direct {
         let (start, target) = (self.start, self.target);
-        let (_, duration) = self.slopes.change(target - start);
+        let duration = self.slopes.time(target - start);
         let excess = self.area - 0.5 * (start + target) * duration;
         let (high, low) = (larger(start, target), smaller(start, target));
         // With both rates of one sign, being a rounding error beside the direct motion on the wrong side costs
@@ -144,29 +156,28 @@ impl Ramp {
     pub(super) fn fastest(&self) -> Fastest {
         let direct = self.direct();
         // Everything below is as seen in the direction of the detour: in place of downwards it is upwards there.
-        let downwards = select(direct.excess == 0.0, direct.high, direct.excess) < 0.0;
+        let sign = 1.0_f64.copysign(select(direct.excess == 0.0, direct.high, direct.excess));
         let excess = direct.excess.abs();
-        let high = select(downwards, -direct.low, direct.high);
-        let low = select(downwards, -direct.high, direct.low);
-        let rate_max = select(downwards, -self.rate_min, self.rate_max);
+        let (one, other) = (sign * self.start, sign * self.target);
+        let (high, low) = (larger(one, other), smaller(one, other));
+        let (rate_max, rate_min) = self.bounds_towards(sign);
         let peak = libm::sqrt(high * high + excess);
         // peak − high without cancellation
-        let detour = select(high > 0.0, excess, peak - high) / select(high > 0.0, peak + high, 1.0);
+        let detour = excess / positive(peak + high.abs()) + (high.abs() - high);
         let room = rate_max - high;
-        let cruise = select(detour > room, (excess - room * (rate_max + high)) / rate_max, 0.0);
+        let cruise = larger(excess - room * (rate_max + high), 0.0) / rate_max;
         let detour = smaller(detour, room);
         let duration = (direct.duration + 2.0 * detour + cruise) * self.slopes.pace;
-        let rate = high + detour;
+        let way = Way { rate: sign * (high + detour), cruise };
         // The other end of what is possible in a given time dips to a rate below both: for a moment that
         // way is already too long, once it goes backwards it is short enough again. What is rounding beside
         // the direct motion must not block it.
-        let blocked = if low > 0.0 && low * low > excess + self.rounding {
-            let rate_min = select(downwards, -self.rate_max, self.rate_min);
+        let blocked = if low * larger(low, 0.0) > excess + self.rounding {
             Some(self.blocked(rate_min, direct.duration, excess, low))
         } else {
             None
         };
-        Fastest { way: Way { rate: select(downwards, -rate, rate), cruise }, duration, blocked }
+        Fastest { way, duration, blocked }
     }
 
     /// The durations between which the way is too long, for an area that exceeds that of the direct motion by less
@@ -189,28 +200,31 @@ impl Ramp {
     pub(super) fn lasting(&self, duration: f64) -> Way {
         let Direct { duration: direct_duration, excess, high, low } = self.direct();
         let spare = larger(duration * self.slopes.mean - direct_duration, 0.0);
+        // Cruising all of the spare time at this rate is enough if it is between the rates at both ends. Otherwise the cruise is
+        // beyond the nearer one: the detour by x costs 2·x of the spare time, and no more than all of it.
+        let between = smaller(larger(excess / positive(spare), low), high);
         let (above, below) = (excess - high * spare, low * spare - excess);
-        let lacking = larger(above, below);
-        let beyond = lacking > 0.0;
-        // The detour by x beyond the outer rate costs 2·x of the spare time, and no more than all of it. Between the rates
-        // all of it is for the cruise.
-        let rest = libm::sqrt(larger(spare * spare - 4.0 * lacking, 0.0));
-        let quotient = select(beyond, 2.0 * lacking, excess) / select(beyond, spare + rest, spare);
-        let detour = smaller(quotient, 0.5 * spare);
-        let rate =
-            select(above > 0.0, smaller(high + detour, self.rate_max), larger(low - detour, self.rate_min));
-        let between = select(spare > 0.0, smaller(larger(quotient, low), high), self.start);
-        Way { rate: select(beyond, rate, between), cruise: select(beyond, rest, spare) }
+        let lacking = larger(larger(above, below), 0.0);
+        let cruise = libm::sqrt(larger(spare * spare - 4.0 * lacking, 0.0));
+        let detour = smaller(2.0 * lacking / positive(spare + cruise), 0.5 * spare);
+        let rate = between + detour.copysign(above);
+        Way { rate: smaller(larger(rate, self.rate_min), self.rate_max), cruise }
     }
 
     /// The stretches of this way, in the units of the problem.
     #[inline(always)]
     pub(super) fn stretches(&self, way: Way) -> Stretches {
-        let (towards, first) = self.slopes.change(way.rate - self.start);
-        let (away, last) = self.slopes.change(self.target - way.rate);
+        let (towards, away) = (way.rate - self.start, self.target - way.rate);
+        let durations = [self.slopes.time(towards), way.cruise, self.slopes.time(away)];
         Stretches {
-            durations: [first, way.cruise, last].map(|duration| duration * self.slopes.pace),
-            slopes: [towards, 0.0, away],
+            durations: durations.map(|duration| duration * self.slopes.pace),
+            slopes: [self.slopes.towards(towards), 0.0, self.slopes.towards(away)],
         }
     }
+}
+
+/// The same number, but one to divide by if it is zero.
+#[inline(always)]
+fn positive(number: f64) -> f64 {
+    larger(number, f64::MIN_POSITIVE)
 }
