@@ -242,14 +242,15 @@ impl Profile {
         self.append(duration_s, acceleration, 0.0);
     }
 
-    /// Appends phases of constant acceleration, leaving out those that are not longer than 0 s.
+    /// Appends phases of constant acceleration to the state that is reached, leaving out those that are not longer than 0 s.
     #[inline]
     pub(super) fn accelerate_all<const COUNT: usize>(
         &mut self,
+        reached: State,
         durations_s: &[f64; COUNT],
         accelerations: &[f64; COUNT],
     ) {
-        self.append_all(durations_s, accelerations, |_, acceleration| (acceleration, 0.0));
+        self.append_all(reached, durations_s, accelerations, |_, acceleration| (acceleration, 0.0));
     }
 
     /// Appends a phase of constant jerk; one that is not longer than 0 s is left out.
@@ -257,10 +258,15 @@ impl Profile {
         self.append(duration_s, self.end.acceleration, jerk);
     }
 
-    /// Appends phases of constant jerk, leaving out those that are not longer than 0 s.
+    /// Appends phases of constant jerk to the state that is reached, leaving out those that are not longer than 0 s.
     #[inline]
-    pub(super) fn shift_all<const COUNT: usize>(&mut self, durations_s: &[f64; COUNT], jerks: &[f64; COUNT]) {
-        self.append_all(durations_s, jerks, |reached, jerk| (reached, jerk));
+    pub(super) fn shift_all<const COUNT: usize>(
+        &mut self,
+        reached: State,
+        durations_s: &[f64; COUNT],
+        jerks: &[f64; COUNT],
+    ) {
+        self.append_all(reached, durations_s, jerks, |acceleration, jerk| (acceleration, jerk));
     }
 
     /// Takes away what rounding has put the acceleration beyond its limits.
@@ -270,21 +276,23 @@ impl Profile {
 
     /// Appends a phase that starts with this acceleration.
     fn append(&mut self, duration_s: f64, acceleration: f64, jerk: f64) {
-        self.append_all(&[duration_s], &[jerk], |_, jerk| (acceleration, jerk));
+        self.append_all(self.end, &[duration_s], &[jerk], |_, jerk| (acceleration, jerk));
     }
 
     /// Appends phases. `rates` gives the acceleration at the start and the jerk, from the acceleration reached and
     /// the parameter of the phase.
     ///
+    /// The state that is reached comes from the caller, who has just made it: read again, it would have to wait for the cache.
     /// Whether a phase is left out is a coin toss, so it is written in any case and only the count depends on it.
     #[inline]
     fn append_all<const COUNT: usize>(
         &mut self,
+        reached: State,
         durations_s: &[f64; COUNT],
         parameters: &[f64; COUNT],
         rates: impl Fn(f64, f64) -> (f64, f64),
     ) {
-        let (mut end, mut time_s, mut count) = (self.end, self.duration_s, self.count);
+        let (mut end, mut time_s, mut count) = (reached, self.duration_s, self.count);
         for (duration_s, parameter) in durations_s.iter().zip(parameters) {
             let (acceleration, jerk) = rates(end.acceleration, *parameter);
             end.acceleration = acceleration;

@@ -1,39 +1,44 @@
 //! Second order: accelerate, cruise, decelerate, in closed form: see [`Ramp`].
 
-use super::choice::larger;
+use super::choice::{larger, smaller};
 use super::error::PlanError;
-use super::problem::{Problem, State};
+use super::problem::{Limits, Problem, State};
 use super::profile::Profile;
 use super::ramp::{Ramp, Slopes, Stretches};
 
 /// Relative to the sizes of a problem, differences up to this are rounding.
 const ROUNDING: f64 = 1024.0 * f64::EPSILON;
 
-/// Brings the velocity back to its limit, and gives the rest of the problem.
-#[inline(always)]
-fn brake(problem: &Problem, profile: &mut Profile) -> Result<Ramp, PlanError> {
-    let Problem { start, target, limits } = problem;
-    profile.begin(State { acceleration: 0.0, ..*start });
-    let mut velocity = start.velocity;
-    if velocity > limits.velocity_max || velocity < limits.velocity_min {
-        velocity = velocity.clamp(limits.velocity_min, limits.velocity_max);
-        let acceleration =
-            if velocity < start.velocity { limits.acceleration_min } else { limits.acceleration_max };
-        profile.accelerate((velocity - start.velocity) / acceleration, acceleration);
+/// Begins the profile with the way of the velocity back to its limit, and gives the state behind it.
+#[inline]
+fn brake(start: &State, limits: &Limits, profile: &mut Profile) -> State {
+    let start = State { acceleration: 0.0, ..*start };
+    profile.begin(start);
+    let velocity = smaller(larger(start.velocity, limits.velocity_min), limits.velocity_max);
+    if velocity == start.velocity {
+        return start;
     }
-    let position = profile.reached().position;
+    let acceleration =
+        if velocity < start.velocity { limits.acceleration_min } else { limits.acceleration_max };
+    profile.accelerate((velocity - start.velocity) / acceleration, acceleration);
+    State { velocity, ..profile.reached() }
+}
+
+/// The problem from this state, which must be within the limits.
+#[inline(always)]
+fn ramp(start: &State, target: &State, limits: &Limits) -> Result<Ramp, PlanError> {
     let slopes = Slopes::asymmetric(limits.acceleration_max, limits.acceleration_min);
     // The state may have gone through many cycles of sampling and planning.
     let fastest = larger(limits.velocity_max, -limits.velocity_min);
-    let places = slopes.mean() * (position.abs() + target.position.abs());
+    let places = slopes.mean() * (start.position.abs() + target.position.abs());
     let rounding = ROUNDING * (places + slopes.swing(fastest));
     if !rounding.is_finite() {
         return Err(PlanError::NotRepresentable { axis: 0 });
     }
     Ok(Ramp {
-        area: slopes.mean() * (target.position - position),
+        area: slopes.mean() * (target.position - start.position),
         rounding,
-        start: velocity,
+        start: start.velocity,
         target: target.velocity,
         rate_max: limits.velocity_max,
         rate_min: limits.velocity_min,
@@ -42,8 +47,8 @@ fn brake(problem: &Problem, profile: &mut Profile) -> Result<Ramp, PlanError> {
 }
 
 #[inline(always)]
-fn drive(stretches: &Stretches, profile: &mut Profile) {
-    profile.accelerate_all(&stretches.durations, &stretches.slopes);
+fn drive(reached: State, stretches: &Stretches, profile: &mut Profile) {
+    profile.accelerate_all(reached, &stretches.durations, &stretches.slopes);
 }
 
 fn target(problem: &Problem) -> State {
@@ -57,7 +62,8 @@ pub(super) fn fastest_position(
     least_s: f64,
     profile: &mut Profile,
 ) -> Result<(), PlanError> {
-    let ramp = brake(problem, profile)?;
+    let start = brake(&problem.start, &problem.limits, profile);
+    let ramp = ramp(&start, &problem.target, &problem.limits)?;
     let brake_s = profile.duration_s();
     let fastest = ramp.fastest();
     let fastest_s = brake_s + fastest.duration;
@@ -68,7 +74,7 @@ pub(super) fn fastest_position(
     if fastest_s < least_s {
         return profile.leave_open(fastest_s);
     }
-    drive(&ramp.stretches(fastest.way), profile);
+    drive(start, &ramp.stretches(fastest.way), profile);
     profile.finish_at(target(problem), fastest_s)
 }
 
@@ -78,9 +84,10 @@ pub(super) fn position_lasting(
     duration_s: f64,
     profile: &mut Profile,
 ) -> Result<(), PlanError> {
-    let ramp = brake(problem, profile)?;
+    let start = brake(&problem.start, &problem.limits, profile);
+    let ramp = ramp(&start, &problem.target, &problem.limits)?;
     let way = ramp.lasting(duration_s - profile.duration_s());
-    drive(&ramp.stretches(way), profile);
+    drive(start, &ramp.stretches(way), profile);
     profile.finish_at(target(problem), duration_s)
 }
 

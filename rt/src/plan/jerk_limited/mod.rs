@@ -21,7 +21,7 @@ mod turn;
 
 use super::choice::larger;
 use super::error::PlanError;
-use super::problem::{Problem, State};
+use super::problem::{Limits, Problem, State};
 use super::profile::Profile;
 use super::ramp::{Ramp, Slopes, Stretches};
 use super::synchronisation::Return;
@@ -52,12 +52,10 @@ struct Inside {
 impl Inside {
     fn of(problem: &Problem, manner: Return, profile: &mut Profile) -> Result<Self, PlanError> {
         let Problem { start, target, limits } = problem;
-        profile.begin(*start);
-        match manner {
-            Return::Fastest => brake::brake(limits, profile),
-            Return::Settled => brake::settle(limits, profile),
-        }
-        let reached = profile.reached();
+        let reached = match manner {
+            Return::Fastest => brake::brake(start, limits, profile),
+            Return::Settled => brake::settle(start, limits, profile),
+        };
         let scale = Scale::of(limits);
         let distance = target.position - reached.position;
         let motion = scale.motion(&reached, distance, target, limits);
@@ -77,7 +75,7 @@ impl Inside {
 
     fn drive(&self, shape: &Shape, jerk_max: f64, profile: &mut Profile) {
         let durations_s = shape.durations.map(|duration| duration * self.scale.time_s);
-        profile.shift_all(&durations_s, &shape.jerks.map(|jerk| jerk * jerk_max));
+        profile.shift_all(profile.reached(), &durations_s, &shape.jerks.map(|jerk| jerk * jerk_max));
     }
 }
 
@@ -168,30 +166,20 @@ fn mix(inside: &Inside, first: &Shape, second: &Shape, share: f64, jerk_max: f64
     }
 }
 
-/// The velocity interface is the second-order problem one order lower. From where the profile is.
+/// The velocity interface is the second-order problem one order lower. The start must be within the limits of acceleration.
 #[inline(always)]
-fn velocity_ramp(problem: &Problem, profile: &mut Profile) -> Result<Ramp, PlanError> {
-    let Problem { target, limits, .. } = problem;
-    let start = profile.reached();
-    let mut acceleration = start.acceleration;
-    if acceleration > limits.acceleration_max || acceleration < limits.acceleration_min {
-        acceleration = acceleration.clamp(limits.acceleration_min, limits.acceleration_max);
-        let excess = start.acceleration - acceleration;
-        profile.shift(excess.abs() / limits.jerk_max, -libm::copysign(limits.jerk_max, excess));
-        profile.limit_acceleration(limits.acceleration_min, limits.acceleration_max);
-    }
-    let State { velocity, .. } = profile.reached();
+fn velocity_ramp(start: &State, target: &State, limits: &Limits) -> Result<Ramp, PlanError> {
     let slopes = Slopes::symmetric(limits.jerk_max);
-    let speeds = slopes.mean() * (velocity.abs() + target.velocity.abs());
+    let speeds = slopes.mean() * (start.velocity.abs() + target.velocity.abs());
     let rounding =
         ROUNDING * (speeds + slopes.swing(larger(limits.acceleration_max, -limits.acceleration_min)));
     if !rounding.is_finite() {
         return Err(PlanError::NotRepresentable { axis: 0 });
     }
     Ok(Ramp {
-        area: slopes.mean() * (target.velocity - velocity),
+        area: slopes.mean() * (target.velocity - start.velocity),
         rounding,
-        start: acceleration,
+        start: start.acceleration,
         target: target.acceleration,
         rate_max: limits.acceleration_max,
         rate_min: limits.acceleration_min,
@@ -200,8 +188,8 @@ fn velocity_ramp(problem: &Problem, profile: &mut Profile) -> Result<Ramp, PlanE
 }
 
 #[inline(always)]
-fn drive(stretches: &Stretches, profile: &mut Profile) {
-    profile.shift_all(&stretches.durations, &stretches.slopes);
+fn drive(reached: State, stretches: &Stretches, profile: &mut Profile) {
+    profile.shift_all(reached, &stretches.durations, &stretches.slopes);
 }
 
 /// The fastest profile to the target velocity and acceleration, wherever that leads. Its phases are left out where it
@@ -211,8 +199,8 @@ pub(super) fn fastest_velocity(
     least_s: f64,
     profile: &mut Profile,
 ) -> Result<(), PlanError> {
-    profile.begin(problem.start);
-    let ramp = velocity_ramp(problem, profile)?;
+    let start = brake::relax(&problem.start, &problem.limits, profile);
+    let ramp = velocity_ramp(&start, &problem.target, &problem.limits)?;
     let brake_s = profile.duration_s();
     let fastest = ramp.fastest();
     let fastest_s = brake_s + fastest.duration;
@@ -223,7 +211,7 @@ pub(super) fn fastest_velocity(
     if fastest_s < least_s {
         return profile.leave_open(fastest_s);
     }
-    drive(&ramp.stretches(fastest.way), profile);
+    drive(start, &ramp.stretches(fastest.way), profile);
     let position = profile.reached().position;
     profile.finish_at(State { position, ..problem.target }, fastest_s)
 }
@@ -234,10 +222,10 @@ pub(super) fn velocity_lasting(
     duration_s: f64,
     profile: &mut Profile,
 ) -> Result<(), PlanError> {
-    profile.begin(problem.start);
-    let ramp = velocity_ramp(problem, profile)?;
+    let start = brake::relax(&problem.start, &problem.limits, profile);
+    let ramp = velocity_ramp(&start, &problem.target, &problem.limits)?;
     let way = ramp.lasting(duration_s - profile.duration_s());
-    drive(&ramp.stretches(way), profile);
+    drive(start, &ramp.stretches(way), profile);
     let position = profile.reached().position;
     profile.finish_at(State { position, ..problem.target }, duration_s)
 }
