@@ -1,6 +1,6 @@
 //! The trajectory of one axis: phases of constant jerk.
 
-use super::choice::larger;
+use super::choice::{larger, smaller};
 use super::error::PlanError;
 use super::problem::{SIZE_MAX, State};
 
@@ -271,7 +271,7 @@ impl Profile {
 
     /// Takes away what rounding has put the acceleration beyond its limits.
     pub(super) fn limit_acceleration(&mut self, min: f64, max: f64) {
-        self.end.acceleration = self.end.acceleration.clamp(min, max);
+        self.end.acceleration = smaller(larger(self.end.acceleration, min), max);
     }
 
     /// Appends a phase that starts with this acceleration.
