@@ -23,11 +23,13 @@
 
 #[cfg(test)]
 mod bound;
+mod choice;
 mod error;
 mod group;
 mod jerk_limited;
 mod problem;
 mod profile;
+mod ramp;
 mod straight;
 mod synchronisation;
 mod tracking;

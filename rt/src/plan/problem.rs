@@ -1,7 +1,7 @@
 //! The planning problem of one axis: where it is, where it shall be, what it must keep.
 
+use super::choice::smaller;
 use super::error::{Limit, PlanError, Quantity};
-use super::trapezoid::smaller;
 
 /// The state of motion of one axis, in rad, rad/s and rad/s² (m, m/s and m/s² for a linear axis).
 ///

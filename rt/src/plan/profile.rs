@@ -1,5 +1,6 @@
 //! The trajectory of one axis: phases of constant jerk.
 
+use super::choice::{larger, smaller};
 use super::error::PlanError;
 use super::problem::{SIZE_MAX, State};
 
@@ -78,8 +79,10 @@ pub struct Profile {
     phases: [Coefficients; PHASES_MAX],
     count: usize,
     duration_s: f64,
-    end: State,
+    // Between two numbers that are stored one by one and read at the same time: read as a pair, they would have to wait for
+    // the cache.
     minimum_duration_s: f64,
+    end: State,
     blocked: [Blocked; BLOCKED_MAX],
     blocked_count: usize,
 }
@@ -91,13 +94,6 @@ struct Coefficients {
 }
 
 const NO_PHASE: Coefficients = Coefficients { start: State::rest(0.0), jerk: 0.0 };
-
-/// `one` where the condition holds, else `other`. With a comparison of numbers as the condition it compiles to a mask,
-/// not to a branch to guess.
-#[inline]
-pub(super) fn select(condition: bool, one: f64, other: f64) -> f64 {
-    if condition { one } else { other }
-}
 
 /// The state after this time of constant jerk.
 #[inline]
@@ -246,14 +242,15 @@ impl Profile {
         self.append(duration_s, acceleration, 0.0);
     }
 
-    /// Appends phases of constant acceleration, leaving out those that are not longer than 0 s.
+    /// Appends phases of constant acceleration to the state that is reached, leaving out those that are not longer than 0 s.
     #[inline]
     pub(super) fn accelerate_all<const COUNT: usize>(
         &mut self,
+        reached: State,
         durations_s: &[f64; COUNT],
         accelerations: &[f64; COUNT],
     ) {
-        self.append_all(durations_s, accelerations, |_, acceleration| (acceleration, 0.0));
+        self.append_all(reached, durations_s, accelerations, |_, acceleration| (acceleration, 0.0));
     }
 
     /// Appends a phase of constant jerk; one that is not longer than 0 s is left out.
@@ -261,46 +258,56 @@ impl Profile {
         self.append(duration_s, self.end.acceleration, jerk);
     }
 
-    /// Appends phases of constant jerk, leaving out those that are not longer than 0 s.
+    /// Appends phases of constant jerk to the state that is reached, leaving out those that are not longer than 0 s.
     #[inline]
-    pub(super) fn shift_all<const COUNT: usize>(&mut self, durations_s: &[f64; COUNT], jerks: &[f64; COUNT]) {
-        self.append_all(durations_s, jerks, |reached, jerk| (reached, jerk));
+    pub(super) fn shift_all<const COUNT: usize>(
+        &mut self,
+        reached: State,
+        durations_s: &[f64; COUNT],
+        jerks: &[f64; COUNT],
+    ) {
+        self.append_all(reached, durations_s, jerks, |acceleration, jerk| (acceleration, jerk));
     }
 
     /// Takes away what rounding has put the acceleration beyond its limits.
     pub(super) fn limit_acceleration(&mut self, min: f64, max: f64) {
-        self.end.acceleration = self.end.acceleration.clamp(min, max);
+        self.end.acceleration = smaller(larger(self.end.acceleration, min), max);
     }
 
     /// Appends a phase that starts with this acceleration.
     fn append(&mut self, duration_s: f64, acceleration: f64, jerk: f64) {
-        self.append_all(&[duration_s], &[jerk], |_, jerk| (acceleration, jerk));
+        self.append_all(self.end, &[duration_s], &[jerk], |_, jerk| (acceleration, jerk));
     }
 
     /// Appends phases. `rates` gives the acceleration at the start and the jerk, from the acceleration reached and
     /// the parameter of the phase.
     ///
+    /// The state that is reached comes from the caller, who has just made it: read again, it would have to wait for the cache.
     /// Whether a phase is left out is a coin toss, so it is written in any case and only the count depends on it.
     #[inline]
     fn append_all<const COUNT: usize>(
         &mut self,
+        reached: State,
         durations_s: &[f64; COUNT],
         parameters: &[f64; COUNT],
         rates: impl Fn(f64, f64) -> (f64, f64),
     ) {
-        let (mut end, mut time_s, mut count) = (self.end, self.duration_s, self.count);
+        let (mut end, mut time_s, mut count) = (reached, self.duration_s, self.count);
         for (duration_s, parameter) in durations_s.iter().zip(parameters) {
             let (acceleration, jerk) = rates(end.acceleration, *parameter);
             end.acceleration = acceleration;
             if let (Some(phase), Some(start_s)) = (self.phases.get_mut(count), self.starts_s.get_mut(count)) {
                 *phase = Coefficients { start: end, jerk };
+                *start_s = time_s;
                 // Not the other way round: what is not a number must not look like no time.
-                *start_s = select(*duration_s <= 0.0, f64::INFINITY, time_s);
-                let elapsed_s = select(*duration_s <= 0.0, 0.0, *duration_s);
+                let elapsed_s = larger(0.0, *duration_s);
                 count += 1 - usize::from(*duration_s <= 0.0);
                 time_s += elapsed_s;
                 end = integrate(&end, jerk, elapsed_s);
             }
+        }
+        if let Some(start_s) = self.starts_s.get_mut(count) {
+            *start_s = f64::INFINITY;
         }
         (self.end, self.duration_s, self.count) = (end, time_s, count);
     }

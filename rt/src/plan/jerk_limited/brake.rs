@@ -3,6 +3,7 @@
 //! Outside are an acceleration or a velocity beyond its limit, and an acceleration so large that the velocity will
 //! go beyond its limit even when the jerk takes it away at once. The brake has at most two phases.
 
+use super::super::choice::{larger, smaller};
 use super::super::problem::{Limits, State};
 use super::super::profile::Profile;
 use super::motion::Swing;
@@ -13,29 +14,47 @@ const ROUNDING: f64 = 1e-13;
 /// Duration and jerk of the phases.
 type Phases = [(f64, f64); 2];
 
-/// Appends the brake, as fast as possible.
-pub(super) fn brake(limits: &Limits, profile: &mut Profile) {
-    let State { velocity, acceleration, .. } = profile.reached();
-    for (duration_s, jerk) in phases(limits, velocity, acceleration) {
+/// Begins the profile with the brake, as fast as possible, and gives the state behind it.
+pub(super) fn brake(start: &State, limits: &Limits, profile: &mut Profile) -> State {
+    profile.begin(*start);
+    let Some(phases) = phases(limits, start.velocity, start.acceleration) else { return *start };
+    for (duration_s, jerk) in phases {
         profile.shift(duration_s, jerk);
     }
     profile.limit_acceleration(limits.acceleration_min, limits.acceleration_max);
+    profile.reached()
 }
 
-/// Appends the way to the velocity limit that does not go below it: at its end the acceleration is zero.
-pub(super) fn settle(limits: &Limits, profile: &mut Profile) {
-    let Limits { velocity_max, velocity_min, acceleration_min, acceleration_max, jerk_max, .. } = *limits;
-    let clamped = profile.reached().acceleration.clamp(acceleration_min, acceleration_max);
-    let excess = profile.reached().acceleration - clamped;
-    profile.shift(excess.abs() / jerk_max, -libm::copysign(jerk_max, excess));
+/// Begins the profile with the way to an acceleration within its limits, and gives the state behind it.
+#[inline]
+pub(super) fn relax(start: &State, limits: &Limits, profile: &mut Profile) -> State {
+    let Limits { acceleration_min, acceleration_max, jerk_max, .. } = *limits;
+    profile.begin(*start);
+    let within = smaller(larger(start.acceleration, acceleration_min), acceleration_max);
+    if start.acceleration == within {
+        return *start;
+    }
+    let excess = start.acceleration - within;
+    profile.shift(excess.abs() / jerk_max, -jerk_max.copysign(excess));
     profile.limit_acceleration(acceleration_min, acceleration_max);
-    let State { velocity, acceleration, .. } = profile.reached();
+    profile.reached()
+}
+
+/// Begins the profile with the way to the velocity limit that does not go below it, with acceleration zero at its end, and gives
+/// the state behind it.
+pub(super) fn settle(start: &State, limits: &Limits, profile: &mut Profile) -> State {
+    let Limits { velocity_max, velocity_min, acceleration_min, acceleration_max, jerk_max, .. } = *limits;
+    let relaxed = relax(start, limits, profile);
+    let State { velocity, acceleration, .. } = relaxed;
     let behind = velocity + 0.5 * acceleration * acceleration.abs() / jerk_max;
     if behind > velocity_max * (1.0 + ROUNDING) {
         slow_down(velocity - velocity_max, acceleration, -acceleration_min, jerk_max, -1.0, profile);
     } else if behind < velocity_min * (1.0 + ROUNDING) {
         slow_down(velocity_min - velocity, -acceleration, acceleration_max, jerk_max, 1.0, profile);
+    } else {
+        return relaxed;
     }
+    profile.reached()
 }
 
 /// Down by `step` to acceleration zero, from an acceleration that adds to it when positive.
@@ -47,7 +66,8 @@ fn slow_down(step: f64, acceleration: f64, limit: f64, jerk: f64, sign: f64, pro
     profile.limit_acceleration(0.0, 0.0);
 }
 
-fn phases(limits: &Limits, velocity: f64, acceleration: f64) -> Phases {
+/// What brings this state back, unless it is inside the limits.
+fn phases(limits: &Limits, velocity: f64, acceleration: f64) -> Option<Phases> {
     let half_square = 0.5 * acceleration * acceleration / limits.jerk_max;
     let beyond_max = velocity + if acceleration > 0.0 { half_square } else { 0.0 };
     let beyond_min = velocity - if acceleration < 0.0 { half_square } else { 0.0 };
@@ -68,15 +88,15 @@ fn phases(limits: &Limits, velocity: f64, acceleration: f64) -> Phases {
     let mirrored = |phases: Phases| phases.map(|(duration_s, jerk)| (duration_s, -jerk));
     // What the acceleration is about to do comes before what the velocity already is.
     if acceleration >= 0.0 && too_fast || acceleration <= 0.0 && too_fast && !too_slow {
-        up.slow_down(velocity, acceleration)
+        Some(up.slow_down(velocity, acceleration))
     } else if too_slow {
-        mirrored(down.slow_down(-velocity, -acceleration))
+        Some(mirrored(down.slow_down(-velocity, -acceleration)))
     } else if acceleration > limits.acceleration_max {
-        [((acceleration - limits.acceleration_max) / limits.jerk_max, -limits.jerk_max), (0.0, 0.0)]
+        Some([((acceleration - limits.acceleration_max) / limits.jerk_max, -limits.jerk_max), (0.0, 0.0)])
     } else if acceleration < limits.acceleration_min {
-        [((limits.acceleration_min - acceleration) / limits.jerk_max, limits.jerk_max), (0.0, 0.0)]
+        Some([((limits.acceleration_min - acceleration) / limits.jerk_max, limits.jerk_max), (0.0, 0.0)])
     } else {
-        [(0.0, 0.0); 2]
+        None
     }
 }
 

@@ -5,7 +5,7 @@
 //! `H = v + A·B/2` (the Hamiltonian of the optimal control problem: `A` and `B` are the accelerations reached
 //! on the way up and down). `H` grows with `v`, so the distance has at most one minimum.
 
-use super::super::trapezoid::smaller;
+use super::super::choice::smaller;
 use super::motion::{Motion, Shape, Swing};
 use super::roots::{Point, excess, rising_root};
 

@@ -19,11 +19,12 @@ mod step1;
 mod step2;
 mod turn;
 
+use super::choice::larger;
 use super::error::PlanError;
-use super::problem::{Problem, State};
+use super::problem::{Limits, Problem, State};
 use super::profile::Profile;
+use super::ramp::{Ramp, Slopes, Stretches};
 use super::synchronisation::Return;
-use super::trapezoid::{Bounds, Ramp, Stretches, larger};
 use motion::{Scale, Shape};
 use step1::Edges;
 use step2::Slower;
@@ -51,12 +52,10 @@ struct Inside {
 impl Inside {
     fn of(problem: &Problem, manner: Return, profile: &mut Profile) -> Result<Self, PlanError> {
         let Problem { start, target, limits } = problem;
-        profile.begin(*start);
-        match manner {
-            Return::Fastest => brake::brake(limits, profile),
-            Return::Settled => brake::settle(limits, profile),
-        }
-        let reached = profile.reached();
+        let reached = match manner {
+            Return::Fastest => brake::brake(start, limits, profile),
+            Return::Settled => brake::settle(start, limits, profile),
+        };
         let scale = Scale::of(limits);
         let distance = target.position - reached.position;
         let motion = scale.motion(&reached, distance, target, limits);
@@ -76,7 +75,7 @@ impl Inside {
 
     fn drive(&self, shape: &Shape, jerk_max: f64, profile: &mut Profile) {
         let durations_s = shape.durations.map(|duration| duration * self.scale.time_s);
-        profile.shift_all(&durations_s, &shape.jerks.map(|jerk| jerk * jerk_max));
+        profile.shift_all(profile.reached(), &durations_s, &shape.jerks.map(|jerk| jerk * jerk_max));
     }
 }
 
@@ -167,41 +166,30 @@ fn mix(inside: &Inside, first: &Shape, second: &Shape, share: f64, jerk_max: f64
     }
 }
 
-/// The velocity interface is the second-order problem one order lower. From where the profile is.
+/// The velocity interface is the second-order problem one order lower. The start must be within the limits of acceleration.
 #[inline(always)]
-fn velocity_ramp(problem: &Problem, profile: &mut Profile) -> Result<Ramp, PlanError> {
-    let Problem { target, limits, .. } = problem;
-    let start = profile.reached();
-    let mut acceleration = start.acceleration;
-    if acceleration > limits.acceleration_max || acceleration < limits.acceleration_min {
-        acceleration = acceleration.clamp(limits.acceleration_min, limits.acceleration_max);
-        let excess = start.acceleration - acceleration;
-        profile.shift(excess.abs() / limits.jerk_max, -libm::copysign(limits.jerk_max, excess));
-        profile.limit_acceleration(limits.acceleration_min, limits.acceleration_max);
-    }
-    let State { velocity, .. } = profile.reached();
-    let acceleration_size = larger(limits.acceleration_max, -limits.acceleration_min);
-    let swing = acceleration_size * acceleration_size / limits.jerk_max;
-    let rounding = ROUNDING * (velocity.abs() + target.velocity.abs() + swing);
+fn velocity_ramp(start: &State, target: &State, limits: &Limits) -> Result<Ramp, PlanError> {
+    let slopes = Slopes::symmetric(limits.jerk_max);
+    let speeds = slopes.mean() * (start.velocity.abs() + target.velocity.abs());
+    let rounding =
+        ROUNDING * (speeds + slopes.swing(larger(limits.acceleration_max, -limits.acceleration_min)));
     if !rounding.is_finite() {
         return Err(PlanError::NotRepresentable { axis: 0 });
     }
     Ok(Ramp {
-        distance: target.velocity - velocity,
+        area: slopes.mean() * (target.velocity - start.velocity),
         rounding,
-        start: acceleration,
+        start: start.acceleration,
         target: target.acceleration,
-        bounds: Bounds {
-            rate_max: limits.acceleration_max,
-            rate_min: limits.acceleration_min,
-            slope_max: limits.jerk_max,
-            slope_min: -limits.jerk_max,
-        },
+        rate_max: limits.acceleration_max,
+        rate_min: limits.acceleration_min,
+        slopes,
     })
 }
 
-fn drive_stretches(stretches: &Stretches, profile: &mut Profile) {
-    profile.shift_all(&stretches.durations, &stretches.slopes);
+#[inline(always)]
+fn drive(reached: State, stretches: &Stretches, profile: &mut Profile) {
+    profile.shift_all(reached, &stretches.durations, &stretches.slopes);
 }
 
 /// The fastest profile to the target velocity and acceleration, wherever that leads. Its phases are left out where it
@@ -211,8 +199,8 @@ pub(super) fn fastest_velocity(
     least_s: f64,
     profile: &mut Profile,
 ) -> Result<(), PlanError> {
-    profile.begin(problem.start);
-    let ramp = velocity_ramp(problem, profile)?;
+    let start = brake::relax(&problem.start, &problem.limits, profile);
+    let ramp = velocity_ramp(&start, &problem.target, &problem.limits)?;
     let brake_s = profile.duration_s();
     let fastest = ramp.fastest();
     let fastest_s = brake_s + fastest.duration;
@@ -223,7 +211,7 @@ pub(super) fn fastest_velocity(
     if fastest_s < least_s {
         return profile.leave_open(fastest_s);
     }
-    drive_stretches(&fastest.stretches, profile);
+    drive(start, &ramp.stretches(fastest.way), profile);
     let position = profile.reached().position;
     profile.finish_at(State { position, ..problem.target }, fastest_s)
 }
@@ -234,10 +222,10 @@ pub(super) fn velocity_lasting(
     duration_s: f64,
     profile: &mut Profile,
 ) -> Result<(), PlanError> {
-    profile.begin(problem.start);
-    let ramp = velocity_ramp(problem, profile)?;
-    let stretches = ramp.lasting(duration_s - profile.duration_s());
-    drive_stretches(&stretches, profile);
+    let start = brake::relax(&problem.start, &problem.limits, profile);
+    let ramp = velocity_ramp(&start, &problem.target, &problem.limits)?;
+    let way = ramp.lasting(duration_s - profile.duration_s());
+    drive(start, &ramp.stretches(way), profile);
     let position = profile.reached().position;
     profile.finish_at(State { position, ..problem.target }, duration_s)
 }

@@ -1,6 +1,6 @@
 //! Roots of functions that are monotone between two points: Newton's method, kept in its bracket.
 
-use super::super::profile::select;
+use super::super::choice::select;
 
 /// The most evaluations for one root. Newton's method from a bracket ends after about five; when it leaves the
 /// bracket it is halved, and 64 halvings exhaust the 53 bits of a number.

@@ -6,8 +6,9 @@
 use super::super::error::{Limit, PlanError};
 use super::super::problem::{Problem, State};
 use super::super::profile::{Profile, integrate};
-use super::super::trapezoid::Stretches;
-use super::{drive_stretches, velocity_ramp};
+use super::super::ramp::{Ramp, Stretches};
+use super::brake::relax;
+use super::{drive, velocity_ramp};
 
 /// Halvings of the range of decelerations, which leave out what is less than rounding.
 const HALVINGS: u32 = 48;
@@ -18,36 +19,31 @@ pub(in super::super) fn stop_turning(
     limit: Limit,
     profile: &mut Profile,
 ) -> Result<(), PlanError> {
-    profile.begin(problem.start);
     turn(problem, limit, profile)?;
-    let target = State::rest(problem.target.position);
-    let ramp = velocity_ramp(&Problem { target, ..*problem }, profile)?;
-    drive_stretches(&ramp.fastest().stretches, profile);
+    let standstill = profile.reached();
+    let ramp = velocity_ramp(&standstill, &State::rest(0.0), &problem.limits)?;
+    drive(standstill, &fastest(&ramp), profile);
     profile.finish(State::rest(profile.reached().position))?;
     profile.set_minimum_duration(profile.duration_s());
     Ok(())
 }
 
-/// Appends the way to the standstill before the limit.
+/// Begins the profile with the way to the standstill before the limit.
 fn turn(problem: &Problem, limit: Limit, profile: &mut Profile) -> Result<(), PlanError> {
     let limits = &problem.limits;
     let (sign, end, deceleration_max) = match limit {
         Limit::PositionMin => (-1.0, limits.position_min, limits.acceleration_max),
         _ => (1.0, limits.position_max, -limits.acceleration_min),
     };
-    let target = State::rest(problem.target.position);
-    let mut ramp = velocity_ramp(&Problem { target, ..*problem }, profile)?;
-    let from = profile.reached();
+    let from = relax(&problem.start, limits, profile);
+    let ramp = velocity_ramp(&from, &State::rest(0.0), limits)?;
     let (speed, acceleration) = (sign * from.velocity, sign * from.acceleration);
     // On the arcs of full jerk the speed is `peak − deceleration²/2J`, or that with the other sign.
     let square = acceleration * acceleration;
     let most = libm::sqrt((2.0 * limits.jerk_max * speed + square).max(0.0)).min(deceleration_max);
     let cannot_stop = if acceleration < 0.0 { square - 2.0 * limits.jerk_max * speed } else { 0.0 };
     let least = libm::sqrt(cannot_stop.max(0.0)).min(most);
-    let mut way = |deceleration: f64| {
-        ramp.target = -sign * deceleration;
-        ramp.fastest().stretches
-    };
+    let way = |deceleration: f64| fastest(&Ramp { target: -sign * deceleration, ..ramp });
     let is_beyond = |stretches: &Stretches| sign * (arrival(&from, stretches) - end) > 0.0;
     let (mut low, mut high) = (least, most);
     if !is_beyond(&way(most)) {
@@ -60,8 +56,14 @@ fn turn(problem: &Problem, limit: Limit, profile: &mut Profile) -> Result<(), Pl
             }
         }
     }
-    drive_stretches(&way(high), profile);
+    drive(from, &way(high), profile);
+    profile.limit_acceleration(limits.acceleration_min, limits.acceleration_max);
     Ok(())
+}
+
+/// The stretches of the fastest way.
+fn fastest(ramp: &Ramp) -> Stretches {
+    ramp.stretches(ramp.fastest().way)
 }
 
 /// Where the stretches lead, seen as phases of constant jerk.
