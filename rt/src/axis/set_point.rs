@@ -14,12 +14,8 @@ impl Axis {
     /// The newest set-point, with velocity and acceleration as the steps of the positions give them.
     pub fn stepped(&self, period_s: f64) -> State {
         let [newest, last, before] = self.set.map(|state| state.position);
-        let limits = &self.parameters.limits;
-        let acceleration = ((newest - last) - (last - before)) / (period_s * period_s);
-        let acceleration = acceleration.clamp(-limits.deceleration, limits.acceleration);
-        // The step is what the velocity was in the middle of the cycle.
-        let velocity = (newest - last) / period_s + acceleration * period_s / 2.0;
-        State { position: newest, velocity: velocity.clamp(-limits.velocity, limits.velocity), acceleration }
+        let course = Course { sent: [last, before, before], next: newest, period_s };
+        course.state(&self.parameters.limits)
     }
 
     /// Makes the actual position the set-point, as if it had always been: for an axis whose drive has been sent none.
