@@ -91,6 +91,10 @@ fn storms_that_have_failed_once_pass() {
         21647,
         // Another client enabled the group while the run said farewell to the drives, which took their watchdogs away.
         43967,
+        // A stop from a stream leapt from an acceleration that only the other direction allows.
+        33837,
+        // A command that had been bridged was in the third difference over a slower bus' steps when a stop began.
+        45278,
     ];
     for seed in seeds {
         let played = play(&Case::of(seed));
