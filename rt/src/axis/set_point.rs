@@ -11,11 +11,15 @@ impl Axis {
         self.set[0]
     }
 
-    /// The newest set-point, with velocity and acceleration as the steps of the positions give them.
-    pub fn stepped(&self, period_s: f64) -> State {
+    /// Gives the newest set-point the velocity and the acceleration that its steps show: for a stream, of which what it says
+    /// of them may be wrong. Where it has led is known, and that is what goes on from here.
+    pub fn take_steps(&mut self, period_s: f64) {
+        if self.is_profile() {
+            return;
+        }
         let [newest, last, before] = self.set.map(|state| state.position);
         let course = Course { sent: [last, before, before], next: newest, period_s };
-        course.state(&self.parameters.limits)
+        self.set[0] = course.state(&self.parameters.limits);
     }
 
     /// Makes the actual position the set-point, as if it had always been: for an axis whose drive has been sent none.

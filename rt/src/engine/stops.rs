@@ -146,16 +146,10 @@ impl Engine {
 
     fn plan_stop(&mut self) -> Result<(), PlanError> {
         self.axes.iter_mut().for_each(Axis::stop_profile);
-        let (is_streamed, period_s) = (self.phase == Phase::Streaming, self.period_s);
         self.motion.stop(self.axes.iter().map(|axis| {
-            let position = axis.set_point().position;
-            let start = match (axis.is_profile(), is_streamed) {
-                (true, _) => State { position, ..State::default() },
-                // What a stream says of its velocity may be wrong; where it has led is known.
-                (false, true) => axis.stepped(period_s),
-                (false, false) => axis.set_point(),
-            };
-            (start, &axis.parameters().limits)
+            let here = axis.set_point();
+            let standing = State { position: here.position, ..State::default() };
+            (if axis.is_profile() { standing } else { here }, &axis.parameters().limits)
         }))
     }
 }
