@@ -94,6 +94,10 @@ impl Engine {
             self.carry_out(wanted, now_ns, door);
         }
     }
+            if rule != Rule::Requested {
+                // Nobody has asked for a reset of this one.
+                self.fault_reset = 0;
+            }
 
     /// A joint in profile torque cannot be held where it is: its drive closes no position loop. It stops by the drive's
     /// quick stop, which ends without torque, and the brake holds it.
@@ -170,7 +174,13 @@ fn complaint(
         return Some((Rule::MissedFeedback, axis.feedback_age().into(), missed_limit.into()));
     }
     if axis.drive_state().is_faulted() {
+    let is_stopping_itself = phase == Phase::Stopping && axis.stops_by_itself();
+    let must_be_enabled = !matches!(phase, Phase::Enabling | Phase::Disabling) && !is_stopping_itself;
+    let is_disabled = must_be_enabled && !axis.is_enabled();
+    // Whatever else is wrong with it, and comes first.
+    if is_disabled || axis.drive_state().is_faulted() {
         axis.give_up();
+    }
         return Some((Rule::DriveFault, axis.error_code().into(), 0.0));
     }
     if let Some(complaint) = axis.node_complaint() {
@@ -196,9 +206,7 @@ fn complaint(
     if let Some(code) = axis.unexplained_emergency() {
         return Some((Rule::EmergencyMessage, code.into(), 0.0));
     }
-    let is_stopping_itself = phase == Phase::Stopping && axis.stops_by_itself();
-    if !axis.is_enabled() && !is_stopping_itself {
-        axis.give_up();
+    if is_disabled {
         return Some((Rule::DriveDisabled, axis.statusword().into(), 0.0));
     }
     if let Some(distance) = axis.jump() {
