@@ -64,6 +64,18 @@ fn a_bus_that_is_lost_soon_after_the_axes_are_enabled_is_noticed_by_its_drives()
 }
 
 #[test]
+fn an_axis_whose_bus_is_behind_for_a_moment_while_another_one_is_lost_stops_at_its_limits() {
+    let fault = |rest: &str| format!("[[fault]]\nwhen = \"moving\"\n{rest}\n");
+    let lost = fault("kind = \"interface-down\"\nbus = \"base\"\nat = \"424 ms\"");
+    for at_ms in 424..440 {
+        let delay = "kind = \"delay\"\naxis = \"joint4\"\nfunction = \"rpdo\"\nby = \"2767 us\"\ncount = 1";
+        let played =
+            play(&moving("arm6-erob", &(lost.clone() + &fault(&format!("{delay}\nat = \"{at_ms} ms\"")))));
+        assert!(played.is_ok(), "at {at_ms} ms: {played:?}");
+    }
+}
+
+#[test]
 fn a_stop_in_coordination_leads_no_joint_beyond_its_position_limit() {
     // The wrist is nearly there when the slower joints still have a long way to stop.
     for length in (300..1500).step_by(25) {

@@ -124,6 +124,8 @@ pub struct Engine {
     fault_reset: u32,
     heartbeat_due: u32,
     blocked_cycles: u32,
+    /// For how long own frames have waited for the wire, a bus each.
+    held_back_cycles: [u32; MAX_BUSES],
     last_slot: Option<u64>,
     missed_slots: u64,
     dropped: u64,
@@ -189,6 +191,7 @@ impl Engine {
             fault_reset: 0,
             heartbeat_due: 0,
             blocked_cycles: 0,
+            held_back_cycles: [0; MAX_BUSES],
             last_slot: None,
             missed_slots: 0,
             dropped: 0,

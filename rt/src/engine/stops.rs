@@ -23,7 +23,11 @@ impl Engine {
         let is_held_back = transmission == Transmission::Blocked || !self.held_back.is_empty();
         let is_blocked = is_held_back || self.is_not_taken;
         self.is_not_taken = false;
-        self.blocked_cycles = if is_blocked { self.blocked_cycles.saturating_add(1) } else { 0 };
+        let count = |cycles: u32, goes_on: bool| if goes_on { cycles.saturating_add(1) } else { 0 };
+        self.blocked_cycles = count(self.blocked_cycles, is_blocked);
+        for (bus, cycles) in self.held_back_cycles.iter_mut().enumerate() {
+            *cycles = count(*cycles, self.held_back.contains(bus));
+        }
         if !has_power(self.phase) {
             return;
         }
@@ -44,9 +48,11 @@ impl Engine {
         }
         if self.blocked_cycles > self.not_transmitted_cycles {
             let (cycles, limit) = (self.blocked_cycles.into(), self.not_transmitted_cycles.into());
-            // Their drives are where the last set-point left them, and get no other before they are disabled.
+            // Their drives are where the last set-point left them, and get no other before they are disabled. Those on a bus
+            // that is behind for a cycle or two, while another one is lost, stop with the rest.
             for axis in &mut self.axes {
-                if self.held_back.contains(axis.parameters().bus.into()) {
+                let bus = self.held_back_cycles.get(usize::from(axis.parameters().bus));
+                if bus.is_some_and(|cycles| *cycles > self.not_transmitted_cycles) {
                     axis.give_up();
                 }
             }
