@@ -64,6 +64,16 @@ fn a_bus_that_is_lost_soon_after_the_axes_are_enabled_is_noticed_by_its_drives()
 }
 
 #[test]
+fn a_bus_that_is_lost_while_the_axes_are_enabled_is_noticed_by_its_drives() {
+    for at_ms in 236..256 {
+        let lost =
+            format!("[[fault]]\nkind = \"bus-off\"\nbus = \"arm\"\nwhen = \"start\"\nat = \"{at_ms} ms\"\n");
+        let played = play(&moving("mixed-arm", &lost));
+        assert!(played.is_ok(), "at {at_ms} ms: {played:?}");
+    }
+}
+
+#[test]
 fn an_axis_whose_bus_is_behind_for_a_moment_while_another_one_is_lost_stops_at_its_limits() {
     let fault = |rest: &str| format!("[[fault]]\nwhen = \"moving\"\n{rest}\n");
     let lost = fault("kind = \"interface-down\"\nbus = \"base\"\nat = \"424 ms\"");

@@ -94,16 +94,16 @@ impl Engine {
         let kept = present.filter(|present| present.rule != Rule::Requested || rule == Rule::Requested);
         self.stop = Some(StopReason { category: hardest, ..kept.unwrap_or(reason) });
         if kept.is_none() {
+            if rule != Rule::Requested {
+                // Nobody has asked for a reset of this one.
+                self.fault_reset = 0;
+            }
             self.happened(now_ns, EventKind::Stop(StopReason { category: hardest, ..reason }), door);
         }
         if present.is_none_or(|present| wanted < present.category) {
             self.carry_out(wanted, now_ns, door);
         }
     }
-            if rule != Rule::Requested {
-                // Nobody has asked for a reset of this one.
-                self.fault_reset = 0;
-            }
 
     /// A joint in profile torque cannot be held where it is: its drive closes no position loop. It stops by the drive's
     /// quick stop, which ends without torque, and the brake holds it.
@@ -175,11 +175,6 @@ fn complaint(
     acknowledge_limit: u32,
     period_s: f64,
 ) -> Option<(Rule, f64, f64)> {
-    let missed_limit = axis.parameters().missed_feedback_cycles;
-    if axis.feedback_age() > missed_limit {
-        return Some((Rule::MissedFeedback, axis.feedback_age().into(), missed_limit.into()));
-    }
-    if axis.drive_state().is_faulted() {
     let is_stopping_itself = phase == Phase::Stopping && axis.stops_by_itself();
     let must_be_enabled = !matches!(phase, Phase::Enabling | Phase::Disabling) && !is_stopping_itself;
     let is_disabled = must_be_enabled && !axis.is_enabled();
@@ -187,6 +182,11 @@ fn complaint(
     if is_disabled || axis.drive_state().is_faulted() {
         axis.give_up();
     }
+    let missed_limit = axis.parameters().missed_feedback_cycles;
+    if axis.feedback_age() > missed_limit {
+        return Some((Rule::MissedFeedback, axis.feedback_age().into(), missed_limit.into()));
+    }
+    if axis.drive_state().is_faulted() {
         return Some((Rule::DriveFault, axis.error_code().into(), 0.0));
     }
     if let Some(complaint) = axis.node_complaint() {
