@@ -56,8 +56,9 @@ fn attempt(seed: u64) -> Result<(Case, Done), String> {
         .map_err(|wrong| format!("TAKT_STORM_SEED={seed}: {wrong}"))
 }
 
-/// Every so many seeds from this one on, until there have been enough cycles.
-fn shard(first: u64, budget: u64) -> (Coverage, Vec<String>) {
+/// Every so many seeds from this one on, until there have been enough cycles. Says at once what fails: the end of a long run
+/// is far.
+fn shard(first: u64, budget: u64) -> (Coverage, Vec<u64>) {
     let (mut coverage, mut failures) = (Coverage::default(), vec![]);
     for seed in (first..).step_by(SHARDS as usize) {
         if coverage.cycles >= budget || failures.len() >= FAILURES_AT_MOST {
@@ -65,14 +66,17 @@ fn shard(first: u64, budget: u64) -> (Coverage, Vec<String>) {
         }
         match attempt(seed) {
             Ok((case, done)) => coverage.take(&case, &done),
-            Err(failure) => failures.push(failure),
+            Err(failure) => {
+                println!("{failure}");
+                failures.push(seed);
+            }
         }
     }
     (coverage, failures)
 }
 
 /// All of the shards, on as many threads as there are processors.
-fn weather(first: u64, cycles: u64) -> (Coverage, Vec<String>) {
+fn weather(first: u64, cycles: u64) -> (Coverage, Vec<u64>) {
     let next = AtomicU64::new(0);
     let all = Mutex::new((Coverage::default(), vec![]));
     thread::scope(|scope| {
@@ -109,7 +113,7 @@ fn the_invariants_hold_in_every_storm_and_every_fault_has_its_turn() {
         let seconds = began.elapsed().as_secs_f64();
         println!("{}\n{:.0} cycles a second", coverage.table(), coverage.cycles as f64 / seconds);
     }
-    assert!(failures.is_empty(), "{}", failures.join("\n"));
+    assert!(failures.is_empty(), "storms have failed: {failures:?}");
     let gaps = if cycles < CYCLES { vec![] } else { coverage.gaps() };
     assert!(gaps.is_empty(), "never: {gaps:?}");
 }
