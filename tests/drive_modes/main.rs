@@ -13,5 +13,7 @@ mod profile_velocity;
 mod quirks;
 mod reported_mapping;
 mod silence;
+mod statuswords;
+mod stream;
 mod time_of_day;
 mod trajectory_time;

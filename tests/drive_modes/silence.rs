@@ -118,6 +118,28 @@ fn an_erob_whose_controller_was_away_has_stopped_and_left_operational_and_stays_
     }
 }
 
+/// Its reports answer set-points, and that of the cycle before the pause comes behind it.
+#[test]
+fn a_yz_aim_does_not_seem_faster_than_it_is_when_some_slots_are_missed() {
+    for answers_sync in [true, false] {
+        for missed in 1..=8 {
+            let mut config = parse(&one_yz_aim("pp", "to = \"500 mm\""));
+            config.axes[0].answers_sync = answers_sync;
+            let mut world = World::new(config);
+            world.run_until(|world| world.phase() == Phase::Moving);
+            world.run_for(400);
+            world.run.clock().stall(2 * missed * MILLISECOND_NS);
+            for _ in 0..20 {
+                world.run_for(1);
+                let (velocity, limit) =
+                    (world.run.snapshot().axes[0].velocity, world.config.axes[0].limits.velocity);
+                assert!(velocity <= 1.05 * limit, "{velocity} after {missed} missed slots, {answers_sync}");
+            }
+            assert_eq!(world.phase(), Phase::Moving, "{missed}, {answers_sync}: {:?}", world.stops());
+        }
+    }
+}
+
 /// A YZ-AIM that goes on by itself when the heartbeat returns would turn at its old speed, or go on to its old target. Our
 /// heartbeat is due in every 100th slot, of which every second one is no cycle of the bus: each place of the absence in
 /// that is tried.

@@ -1,6 +1,6 @@
 //! What is stated of a stop: how long it takes and how far it leads.
 
-use takt::config::{Axis, Config};
+use takt::config::{Axis, Config, DriveFamily};
 
 /// How far behind its set-point a joint may be that obeys.
 const LAG_S: f64 = 0.4;
@@ -25,6 +25,16 @@ pub fn to_rest_s(config: &Config) -> f64 {
 /// How far a joint may travel until then: rad (m).
 pub fn to_rest_distance(config: &Config, axis: &Axis) -> f64 {
     axis.limits.velocity * (to_rest_s(config) + LAG_S) / 2.0
+}
+
+/// How long a joint goes on at most whose drive has no brake, when its power is cut at full speed: until friction has
+/// stopped it.
+pub fn coasting_s(axis: &Axis) -> f64 {
+    let joint = &axis.simulated;
+    match axis.drive {
+        DriveFamily::YzAim => axis.limits.velocity * joint.inertia / joint.coulomb_friction,
+        DriveFamily::ErobCanopen => 0.0,
+    }
 }
 
 /// The most cycles in a phase that must pass by itself.

@@ -64,6 +64,28 @@ fn a_bus_that_is_lost_soon_after_the_axes_are_enabled_is_noticed_by_its_drives()
 }
 
 #[test]
+fn a_bus_that_is_lost_while_the_axes_are_enabled_is_noticed_by_its_drives() {
+    for at_ms in 236..256 {
+        let lost =
+            format!("[[fault]]\nkind = \"bus-off\"\nbus = \"arm\"\nwhen = \"start\"\nat = \"{at_ms} ms\"\n");
+        let played = play(&moving("mixed-arm", &lost));
+        assert!(played.is_ok(), "at {at_ms} ms: {played:?}");
+    }
+}
+
+#[test]
+fn an_axis_whose_bus_is_behind_for_a_moment_while_another_one_is_lost_stops_at_its_limits() {
+    let fault = |rest: &str| format!("[[fault]]\nwhen = \"moving\"\n{rest}\n");
+    let lost = fault("kind = \"interface-down\"\nbus = \"base\"\nat = \"424 ms\"");
+    for at_ms in 424..440 {
+        let delay = "kind = \"delay\"\naxis = \"joint4\"\nfunction = \"rpdo\"\nby = \"2767 us\"\ncount = 1";
+        let played =
+            play(&moving("arm6-erob", &(lost.clone() + &fault(&format!("{delay}\nat = \"{at_ms} ms\"")))));
+        assert!(played.is_ok(), "at {at_ms} ms: {played:?}");
+    }
+}
+
+#[test]
 fn a_stop_in_coordination_leads_no_joint_beyond_its_position_limit() {
     // The wrist is nearly there when the slower joints still have a long way to stop.
     for length in (300..1500).step_by(25) {
@@ -91,6 +113,10 @@ fn storms_that_have_failed_once_pass() {
         21647,
         // Another client enabled the group while the run said farewell to the drives, which took their watchdogs away.
         43967,
+        // A stop from a stream leapt from an acceleration that only the other direction allows.
+        33837,
+        // A command that had been bridged was in the third difference over a slower bus' steps when a stop began.
+        45278,
     ];
     for seed in seeds {
         let played = play(&Case::of(seed));

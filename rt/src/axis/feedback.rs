@@ -1,7 +1,7 @@
 //! What the drive of an axis reports.
 
-use super::Axis;
 use super::position_watch::{Judgement, Reach};
+use super::{Axis, FeedbackSince};
 use crate::cia402::State as DriveState;
 use crate::frame::Frame;
 use crate::pdo::{FeedbackSlot, TooShort};
@@ -60,11 +60,17 @@ impl Axis {
             return;
         }
         let span_s = self.span_s;
+        // One that answers set-points tells where it was in the cycle before: the time for which there were none is behind
+        // its report, not before it. Whoever may be either has had the longer time, and is believed to be no faster.
+        let longest_s = match self.parameters.feedback_since {
+            FeedbackSince::Sync => span_s,
+            FeedbackSince::CommandPhase => span_s.max(self.cycle_s),
+        };
         self.span_s = 0.0;
         self.cycle_s = span_s;
         self.arrived = 0;
         self.age = 0;
-        self.judge_position(span_s);
+        self.judge_position(longest_s);
         self.is_heard = true;
         self.notice_state();
         self.following_error = if self.is_profile() { 0.0 } else { self.sent[2].position - self.position };

@@ -11,15 +11,15 @@ impl Axis {
         self.set[0]
     }
 
-    /// The newest set-point, with velocity and acceleration as the steps of the positions give them.
-    pub fn stepped(&self, period_s: f64) -> State {
+    /// Gives the newest set-point the velocity and the acceleration that its steps show: for a stream, of which what it says
+    /// of them may be wrong. Where it has led is known, and that is what goes on from here.
+    pub fn take_steps(&mut self, period_s: f64) {
+        if self.is_profile() {
+            return;
+        }
         let [newest, last, before] = self.set.map(|state| state.position);
-        let limits = &self.parameters.limits;
-        let acceleration = ((newest - last) - (last - before)) / (period_s * period_s);
-        let acceleration = acceleration.clamp(-limits.deceleration, limits.acceleration);
-        // The step is what the velocity was in the middle of the cycle.
-        let velocity = (newest - last) / period_s + acceleration * period_s / 2.0;
-        State { position: newest, velocity: velocity.clamp(-limits.velocity, limits.velocity), acceleration }
+        let course = Course { sent: [last, before, before], next: newest, period_s };
+        self.set[0] = course.state(&self.parameters.limits);
     }
 
     /// Makes the actual position the set-point, as if it had always been: for an axis whose drive has been sent none.

@@ -123,7 +123,11 @@ pub struct Engine {
     stop: Option<StopReason>,
     fault_reset: u32,
     heartbeat_due: u32,
+    /// Whether the drives have been given a heartbeat since they were to be enabled.
+    has_beaten: bool,
     blocked_cycles: u32,
+    /// For how long own frames have waited for the wire, a bus each.
+    held_back_cycles: [u32; MAX_BUSES],
     last_slot: Option<u64>,
     missed_slots: u64,
     dropped: u64,
@@ -188,7 +192,9 @@ impl Engine {
             stop: None,
             fault_reset: 0,
             heartbeat_due: 0,
+            has_beaten: false,
             blocked_cycles: 0,
+            held_back_cycles: [0; MAX_BUSES],
             last_slot: None,
             missed_slots: 0,
             dropped: 0,
@@ -340,6 +346,7 @@ impl Engine {
     /// Ends the cycle: leaves its record and shows the new state.
     pub fn finish(&mut self, timing: Timing, now_ns: Nanoseconds, buses: &[BusHealth], door: &mut impl Door) {
         if let Some(heartbeat) = self.heartbeat {
+            self.has_beaten |= self.heartbeat_due == 0;
             self.heartbeat_due = match self.heartbeat_due {
                 0 => heartbeat.cycles.saturating_sub(1),
                 cycles => cycles - 1,

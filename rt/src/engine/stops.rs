@@ -23,7 +23,11 @@ impl Engine {
         let is_held_back = transmission == Transmission::Blocked || !self.held_back.is_empty();
         let is_blocked = is_held_back || self.is_not_taken;
         self.is_not_taken = false;
-        self.blocked_cycles = if is_blocked { self.blocked_cycles.saturating_add(1) } else { 0 };
+        let count = |cycles: u32, goes_on: bool| if goes_on { cycles.saturating_add(1) } else { 0 };
+        self.blocked_cycles = count(self.blocked_cycles, is_blocked);
+        for (bus, cycles) in self.held_back_cycles.iter_mut().enumerate() {
+            *cycles = count(*cycles, self.held_back.contains(bus));
+        }
         if !has_power(self.phase) {
             return;
         }
@@ -44,9 +48,11 @@ impl Engine {
         }
         if self.blocked_cycles > self.not_transmitted_cycles {
             let (cycles, limit) = (self.blocked_cycles.into(), self.not_transmitted_cycles.into());
-            // Their drives are where the last set-point left them, and get no other before they are disabled.
+            // Their drives are where the last set-point left them, and get no other before they are disabled. Those on a bus
+            // that is behind for a cycle or two, while another one is lost, stop with the rest.
             for axis in &mut self.axes {
-                if self.held_back.contains(axis.parameters().bus.into()) {
+                let bus = self.held_back_cycles.get(usize::from(axis.parameters().bus));
+                if bus.is_some_and(|cycles| *cycles > self.not_transmitted_cycles) {
                     axis.give_up();
                 }
             }
@@ -88,6 +94,10 @@ impl Engine {
         let kept = present.filter(|present| present.rule != Rule::Requested || rule == Rule::Requested);
         self.stop = Some(StopReason { category: hardest, ..kept.unwrap_or(reason) });
         if kept.is_none() {
+            if rule != Rule::Requested {
+                // Nobody has asked for a reset of this one.
+                self.fault_reset = 0;
+            }
             self.happened(now_ns, EventKind::Stop(StopReason { category: hardest, ..reason }), door);
         }
         if present.is_none_or(|present| wanted < present.category) {
@@ -146,16 +156,10 @@ impl Engine {
 
     fn plan_stop(&mut self) -> Result<(), PlanError> {
         self.axes.iter_mut().for_each(Axis::stop_profile);
-        let (is_streamed, period_s) = (self.phase == Phase::Streaming, self.period_s);
         self.motion.stop(self.axes.iter().map(|axis| {
-            let position = axis.set_point().position;
-            let start = match (axis.is_profile(), is_streamed) {
-                (true, _) => State { position, ..State::default() },
-                // What a stream says of its velocity may be wrong; where it has led is known.
-                (false, true) => axis.stepped(period_s),
-                (false, false) => axis.set_point(),
-            };
-            (start, &axis.parameters().limits)
+            let here = axis.set_point();
+            let standing = State { position: here.position, ..State::default() };
+            (if axis.is_profile() { standing } else { here }, &axis.parameters().limits)
         }))
     }
 }
@@ -171,12 +175,18 @@ fn complaint(
     acknowledge_limit: u32,
     period_s: f64,
 ) -> Option<(Rule, f64, f64)> {
+    let is_stopping_itself = phase == Phase::Stopping && axis.stops_by_itself();
+    let must_be_enabled = !matches!(phase, Phase::Enabling | Phase::Disabling) && !is_stopping_itself;
+    let is_disabled = must_be_enabled && !axis.is_enabled();
+    // Whatever else is wrong with it, and comes first.
+    if is_disabled || axis.drive_state().is_faulted() {
+        axis.give_up();
+    }
     let missed_limit = axis.parameters().missed_feedback_cycles;
     if axis.feedback_age() > missed_limit {
         return Some((Rule::MissedFeedback, axis.feedback_age().into(), missed_limit.into()));
     }
     if axis.drive_state().is_faulted() {
-        axis.give_up();
         return Some((Rule::DriveFault, axis.error_code().into(), 0.0));
     }
     if let Some(complaint) = axis.node_complaint() {
@@ -202,9 +212,7 @@ fn complaint(
     if let Some(code) = axis.unexplained_emergency() {
         return Some((Rule::EmergencyMessage, code.into(), 0.0));
     }
-    let is_stopping_itself = phase == Phase::Stopping && axis.stops_by_itself();
-    if !axis.is_enabled() && !is_stopping_itself {
-        axis.give_up();
+    if is_disabled {
         return Some((Rule::DriveDisabled, axis.statusword().into(), 0.0));
     }
     if let Some(distance) = axis.jump() {

@@ -97,14 +97,18 @@ impl Engine {
             1..=FAULT_RESET_CYCLES => Some(controlword::FAULT_RESET),
             _ => Some(controlword::DISABLE_VOLTAGE),
         };
+        // With these commands, or before them.
+        let has_beaten = self.has_beaten || self.heartbeat_due == 0;
         for axis in &mut self.axes {
             let is_held_back = self.held_back.contains(axis.parameters().bus.into());
             if has_cycle_of(&self.buses, axis, slot) && !is_held_back {
                 // A drive that falls out of operation enabled is not led back by what the others are still to do; and none
-                // is led up before its joint is at rest and its target there.
+                // is led up before its joint is at rest and its target there, nor before it watches the controller.
                 let is_led_up = match self.phase {
                     Phase::Enabling => {
-                        axis.is_ready() && (axis.is_enabled() || axis.is_on_joint(self.period_s))
+                        has_beaten
+                            && axis.is_ready()
+                            && (axis.is_enabled() || axis.is_on_joint(self.period_s))
                     }
                     _ => axis.is_enabled(),
                 };
@@ -169,8 +173,9 @@ impl Engine {
     }
 
     /// A drive watches the controller from the first heartbeat on that it hears after it has been set up: that comes before
-    /// anything moves, and not only after a whole period.
+    /// any is led up, and not only after a whole period.
     pub(super) fn hasten_heartbeat(&mut self) {
+        self.has_beaten = self.heartbeat.is_none();
         self.heartbeat_due = self.heartbeat_due.min(self.heartbeat_held_cycles());
     }
 

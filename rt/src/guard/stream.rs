@@ -45,6 +45,16 @@ impl Course {
         (self.velocity() + acceleration * self.period_s / 2.0, acceleration)
     }
 
+    /// The state at the end of the next step, as the steps show it. Whatever is planned from it goes on with these steps
+    /// without a leap of the acceleration, so none of it is cut off that the checks of a stream let pass: an acceleration
+    /// beyond the limit of its direction is for the planner to take back. They let pass a velocity to which the
+    /// acceleration would lead beyond the limit where no limit of the jerk keeps it from ending at once; there it ends.
+    pub fn state(&self, limits: &AxisLimits) -> State {
+        let (velocity, acceleration) = self.end();
+        let fastest = limits.velocity * (1.0 + TOLERANCE);
+        State { position: self.next, velocity: velocity.clamp(-fastest, fastest), acceleration }
+    }
+
     /// The velocity of the joint, with its sign, once its acceleration has been taken back.
     fn settled_velocity(&self, limits: &AxisLimits) -> f64 {
         let (velocity, acceleration) = self.end();
@@ -258,14 +268,46 @@ mod tests {
                 prop_assert!(guard::check(&limits, PERIOD_S, sent[1], sent[0], &next).is_ok());
                 sent = [next.position, sent[0], sent[1]];
             }
-            let acceleration = (sent[0] - 2.0 * sent[1] + sent[2]) / (PERIOD_S * PERIOD_S);
-            let velocity = (sent[0] - sent[1]) / PERIOD_S + acceleration * PERIOD_S / 2.0;
+            let last = Course { sent: [sent[1], sent[2], sent[2]], next: sent[0], period_s: PERIOD_S };
             let mut motion = Motion::default();
-            motion.stop([(State { position: sent[0], velocity, acceleration }, &limits)].into_iter()).unwrap();
+            motion.stop([(last.state(&limits), &limits)].into_iter()).unwrap();
             while !motion.is_finished() {
                 motion.advance(PERIOD_S);
                 let position = motion.states().next().unwrap().position;
                 prop_assert!((-1.000_001..=2.000_001).contains(&position), "{position}");
+            }
+        }
+
+        #[test]
+        fn a_stop_from_wherever_a_stream_may_go_leaps_in_none_of_its_rates(
+            jerks in prop::collection::vec((-1.0f64..=1.0, 1usize..200), 1..40),
+            (acceleration, deceleration) in prop::sample::select(&[(10.0, 20.0), (20.0, 10.0)][..]),
+        ) {
+            let limits = AxisLimits { jerk: 150.0, acceleration, deceleration, ..LIMITS };
+            let mut sent = [0.0; 3];
+            for (jerk, times) in jerks {
+                for _ in 0..times {
+                    let next = 3.0 * (sent[0] - sent[1]) + sent[2] + jerk * limits.jerk * PERIOD_S.powi(3);
+                    let course = Course { sent, next, period_s: PERIOD_S };
+                    let state = State { position: next, ..State::default() };
+                    let is_passed = guard::check(&limits, PERIOD_S, sent[1], sent[0], &state)
+                        .and_then(|()| check_jerk(limits.jerk, &course))
+                        .and_then(|()| check_braking(&limits, &course));
+                    if is_passed.is_ok() {
+                        sent = [next, sent[0], sent[1]];
+                    }
+                }
+            }
+            let last = Course { sent: [sent[1], sent[2], sent[2]], next: sent[0], period_s: PERIOD_S };
+            let mut motion = Motion::default();
+            motion.stop([(last.state(&limits), &limits)].into_iter()).unwrap();
+            while !motion.is_finished() {
+                motion.advance(PERIOD_S);
+                let next = motion.states().next().unwrap();
+                let passed = guard::check(&limits, PERIOD_S, sent[1], sent[0], &next)
+                    .and_then(|()| check_jerk(limits.jerk, &Course { sent, next: next.position, period_s: PERIOD_S }));
+                prop_assert!(passed.is_ok(), "{passed:?} from {sent:?} to {next:?}");
+                sent = [next.position, sent[0], sent[1]];
             }
         }
     }

@@ -18,20 +18,20 @@ struct Point {
     position: f64,
     /// As it went onto the wire; `None` where the wire carries no position.
     counts: Option<i32>,
-    /// Since the set-point before: seconds in which the trajectory went on.
-    step_s: f64,
+    /// Since the set-point before: cycles in which the trajectory went on.
+    cycles: u32,
 }
 
 /// Room for the rounding of floating-point sums, relative to a limit.
 const ROUNDING: f64 = 1e-6;
 /// When none has got to the drive for longer than this, it stands where the last one led.
 const GAP_S: f64 = 0.004;
-/// A command of a stream that has not come and was bridged, or was clamped in velocity and acceleration, shows in the
-/// jerk for so many cycles.
-const MARKED_CYCLES: u32 = 6;
+/// A command of a stream that has not come and was bridged shows in the third differences of so many cycles.
+const BRIDGED_CYCLES: u32 = 4;
 
 pub struct Course {
     scale: Scale,
+    period_s: f64,
     /// What was sent to the enabled drive, newest first.
     points: [Option<Point>; 3],
     /// Where the trajectory has led, newest first. What is on the wire is so many cycles old: an axis on a faster bus waits
@@ -48,8 +48,10 @@ pub struct Course {
     told_slot: u64,
     /// What the last cycle was: the phase, and where the set-point was.
     last: Option<(Phase, f64)>,
-    /// Cycles in which the jerk is not the trajectory's own.
-    marked: u32,
+    /// Commands of a stream until its jerk is its own again.
+    bridged: u32,
+    /// Cycles in which the trajectory went on since the last one whose jerk nobody keeps to the limit.
+    kept: u32,
 }
 
 impl Course {
@@ -59,6 +61,7 @@ impl Course {
         let slowest = follow.map(divider).max().unwrap_or(1).max(divider(axis));
         Self {
             scale: assemble::scale(axis).unwrap(),
+            period_s: config.cycle.period_ns as f64 * 1e-9,
             points: [None; 3],
             planned: VecDeque::new(),
             delay_cycles: 2 * (slowest - divider(axis)) as usize,
@@ -67,16 +70,15 @@ impl Course {
             cycles: 0,
             told_slot: 0,
             last: None,
-            marked: 0,
+            bridged: 0,
+            kept: u32::MAX,
         }
     }
 
     pub fn check(&mut self, seen: &Seen<'_>, index: usize) -> Result<(), String> {
         let axis = &seen.config.axes[index];
         self.cycles += u32::from(seen.record.is_commanded);
-        let is_streaming = seen.record.phase == Phase::Streaming;
-        let is_altered = axis.on_violation == OnViolation::Clamp || !seen.asked.has_streamed;
-        self.marked = if is_streaming && is_altered { MARKED_CYCLES } else { self.marked.saturating_sub(1) };
+        self.note_jerk(seen, axis);
         self.check_rates(seen, index)?;
         self.check_wire(seen, index)?;
         if axis.control.is_profile() {
@@ -107,21 +109,36 @@ impl Course {
         if told.position.or(told.velocity).or(told.torque).is_none() || !seen.record.is_commanded {
             return Ok(());
         }
-        let period_s = seen.config.cycle.period_ns as f64 * 1e-9;
-        let step_s = f64::from(std::mem::take(&mut self.cycles)) * period_s;
-        let nominal_s = period_s * f64::from(seen.config.buses[axis.bus].divider);
+        let cycles = std::mem::take(&mut self.cycles);
+        let nominal_s = self.period_s * f64::from(seen.config.buses[axis.bus].divider);
         let slot = seen.snapshot.slot;
-        let silent_s = (slot - std::mem::replace(&mut self.told_slot, slot)) as f64 * period_s;
+        let silent_s = (slot - std::mem::replace(&mut self.told_slot, slot)) as f64 * self.period_s;
         // An axis that is given up because its set-points do not get through stays where the last one led.
         let is_given_up = silent_s > nominal_s * (1.0 + ROUNDING)
             && self.points[0].is_some_and(|last| last.position == record.position_set);
         if is_given_up || silent_s > GAP_S.max(nominal_s) * (1.0 + ROUNDING) {
             self.points = [None; 3];
         }
-        let point = Point { position: record.position_set, counts: told.position, step_s };
+        let point = Point { position: record.position_set, counts: told.position, cycles };
         self.check_point(axis, &point)?;
         self.points = [Some(point), self.points[0], self.points[1]];
         Ok(())
+    }
+
+    /// Nobody keeps the jerk of a stream to the limit that is clamped, in velocity and acceleration, or after a command that
+    /// has not come. Whatever is planned keeps it, also the stop that begins in the midst of such a stream.
+    fn note_jerk(&mut self, seen: &Seen<'_>, axis: &Axis) {
+        let is_streaming = seen.record.phase == Phase::Streaming;
+        if seen.asked.has_streamed {
+            self.bridged = self.bridged.saturating_sub(1);
+        } else if is_streaming {
+            self.bridged = BRIDGED_CYCLES;
+        }
+        if is_streaming && (axis.on_violation == OnViolation::Clamp || self.bridged > 0) {
+            self.kept = 0;
+        } else if seen.record.is_commanded {
+            self.kept = self.kept.saturating_add(1);
+        }
     }
 
     /// The planned set-point, by differences of what was sent, and what is on the wire of it.
@@ -138,8 +155,10 @@ impl Course {
         }
         let limits = &axis.limits;
         let noise = 8.0 * f64::EPSILON * (1.0 + next.position.abs());
-        let velocity = (next.position - last.position) / next.step_s;
-        if velocity.abs() > limits.velocity * (1.0 + ROUNDING) + noise / next.step_s {
+        let step_s = |point: &Point| f64::from(point.cycles) * self.period_s;
+        let (next_s, last_s) = (step_s(next), step_s(&last));
+        let velocity = (next.position - last.position) / next_s;
+        if velocity.abs() > limits.velocity * (1.0 + ROUNDING) + noise / next_s {
             return Err(format!("set-point at {velocity} beyond {}", limits.velocity));
         }
         let room = ROUNDING * (limits.position_max - limits.position_min);
@@ -149,16 +168,15 @@ impl Course {
             return Err(format!("set-point from {} to {}, out of the limits", last.position, next.position));
         }
         let Some(before) = self.points[1] else { return Ok(()) };
+        let before_s = step_s(&before);
         let limit = limits.acceleration.max(limits.deceleration);
-        let last_velocity = (last.position - before.position) / last.step_s;
-        let span_s = (next.step_s + last.step_s) / 2.0;
+        let last_velocity = (last.position - before.position) / last_s;
+        let span_s = (next_s + last_s) / 2.0;
         let acceleration = (velocity - last_velocity) / span_s;
-        if acceleration.abs()
-            > limit * (1.0 + ROUNDING) + 4.0 * noise / (span_s * next.step_s.min(last.step_s))
-        {
+        if acceleration.abs() > limit * (1.0 + ROUNDING) + 4.0 * noise / (span_s * next_s.min(last_s)) {
             return Err(format!("set-point with acceleration {acceleration} beyond {limit}"));
         }
-        if next.step_s == last.step_s
+        if next.cycles == last.cycles
             && let (Some(newest), Some(newer), Some(older)) = (next.counts, last.counts, before.counts)
         {
             // Each of the three is rounded by up to half a count, the one in the middle counts twice.
@@ -169,11 +187,13 @@ impl Course {
             }
         }
         let Some(oldest) = self.points[2] else { return Ok(()) };
-        let is_even = next.step_s == last.step_s && last.step_s == before.step_s;
-        if is_even && self.marked == 0 && limits.jerk.is_finite() {
-            let oldest_velocity = (before.position - oldest.position) / before.step_s;
+        let is_even = next.cycles == last.cycles && last.cycles == before.cycles;
+        // Over steps of several cycles it is a weighted mean of those over one: so far back as to the first of them.
+        let is_kept = self.kept > 3 * next.cycles.saturating_sub(1);
+        if is_even && is_kept && limits.jerk.is_finite() {
+            let oldest_velocity = (before.position - oldest.position) / before_s;
             let jerk = (acceleration - (last_velocity - oldest_velocity) / span_s) / span_s;
-            if jerk.abs() > limits.jerk * 1.001 + 8.0 * noise / span_s.powi(3) {
+            if jerk.abs() > limits.jerk * (1.0 + ROUNDING) + 8.0 * noise / span_s.powi(3) {
                 return Err(format!("set-point with jerk {jerk} beyond {}", limits.jerk));
             }
         }

@@ -1,7 +1,8 @@
 //! Nothing is enabled, reset or moved that should not be.
 
 use takt_rt::cia402::State;
-use takt_rt::stop::Phase;
+use takt_rt::record::{Event, EventKind};
+use takt_rt::stop::{Phase, Rule};
 
 use super::{REST, Seen};
 use crate::bounds;
@@ -36,6 +37,8 @@ pub struct Power {
     since_enabling: u64,
     /// Cycles for which the group has been disabled.
     disabled: u64,
+    /// Whether somebody has asked for a reset since the last fault came up. On a bus that is busy it waits.
+    is_reset_awaited: bool,
 }
 
 impl Power {
@@ -45,6 +48,7 @@ impl Power {
             has_enabled: false,
             since_enabling: u64::MAX,
             disabled: 0,
+            is_reset_awaited: false,
         }
     }
 
@@ -53,6 +57,13 @@ impl Power {
         self.has_enabled |= phase == Phase::Enabling;
         let is_enabling = phase == Phase::Enabling;
         self.since_enabling = if is_enabling { 0 } else { self.since_enabling.saturating_add(1) };
+        let is_fault =
+            |event: &Event| matches!(event.kind, EventKind::Stop(reason) if reason.rule != Rule::Requested);
+        if seen.events.iter().any(is_fault) {
+            self.is_reset_awaited = false;
+        } else if seen.asked.has_reset {
+            self.is_reset_awaited = true;
+        }
         let is_disabled = matches!(phase, Phase::Disabled | Phase::Passive);
         self.disabled = if is_disabled { self.disabled + 1 } else { 0 };
         for index in 0..self.axes.len() {
@@ -79,7 +90,8 @@ impl Power {
             return Err(format!("controlword {word:#06x} in a disabled group"));
         }
         let is_reset = word & FAULT_RESET != 0;
-        match is_reset && self.has_enabled && !seen.asked.has_reset_lately {
+        let is_asked_for = self.is_reset_awaited || seen.asked.has_reset_lately;
+        match is_reset && self.has_enabled && !is_asked_for {
             true => Err(format!("reset by controlword {word:#06x}, and nobody has asked for that")),
             false => Ok(()),
         }
@@ -94,14 +106,15 @@ impl Power {
         if truth.state == State::OperationEnabled {
             return Err(format!("enabled, {} cycles after the group was disabled", self.disabled));
         }
-        let is_late = self.disabled > bounds::cycles(seen.config, bounds::to_rest_s(seen.config));
+        let to_rest_s = bounds::to_rest_s(seen.config) + bounds::coasting_s(&seen.config.axes[index]);
+        let is_late = self.disabled > bounds::cycles(seen.config, to_rest_s);
         match is_late && truth.velocity.abs() > REST {
             true => Err(format!("{} in a disabled group", truth.velocity)),
             false => Ok(()),
         }
     }
 
-    /// A joint without torque does not speed up, and one that is braked and stands stays.
+    /// A joint without torque at either look does not speed up, and one that is braked and stands stays.
     fn check_powerless(&self, seen: &Seen<'_>, index: usize) -> Result<(), String> {
         let now = &seen.truth[index];
         let Some(before) = self.axes[index].truth else { return Ok(()) };
@@ -109,7 +122,9 @@ impl Power {
             return Ok(());
         }
         let was_powerless = !before.state.has_torque() && !now.state.has_torque();
-        if was_powerless && now.torque == 0.0 && now.velocity.abs() > before.velocity.abs() + 1e-9 {
+        // What a drive had when its state was taken from it acts until its next step.
+        let had_torque = before.torque != 0.0 || now.torque != 0.0;
+        if was_powerless && !had_torque && now.velocity.abs() > before.velocity.abs() + 1e-9 {
             return Err(format!("without torque from {before:?} to {now:?}"));
         }
         let stood = was_powerless && before.is_braked && now.is_braked && before.velocity == 0.0;

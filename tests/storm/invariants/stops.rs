@@ -1,6 +1,6 @@
 //! A stop is over within the time and the distance that are stated of it.
 
-use takt_rt::stop::Phase;
+use takt_rt::stop::{Phase, StopCategory};
 
 use super::phases::is_unbounded;
 use super::{REST, Seen};
@@ -11,11 +11,13 @@ pub struct Stops {
     positions: Vec<f64>,
     /// Cycles since the stop under way began.
     cycles: Option<u64>,
+    /// Whether it has become one that cuts the power at once.
+    is_cut: bool,
 }
 
 impl Stops {
     pub fn new(axes: usize) -> Self {
-        Self { positions: vec![0.0; axes], cycles: None }
+        Self { positions: vec![0.0; axes], cycles: None, is_cut: false }
     }
 
     pub fn check(&mut self, seen: &Seen<'_>) -> Result<(), String> {
@@ -23,7 +25,7 @@ impl Stops {
         match (seen.snapshot.phase, self.cycles) {
             (Phase::Moving | Phase::Streaming | Phase::Enabling, _) => self.cycles = None,
             (Phase::Stopping, None) => {
-                self.cycles = Some(0);
+                (self.cycles, self.is_cut) = (Some(0), false);
                 let positions = self.positions.iter_mut().zip(seen.truth);
                 positions.for_each(|(position, truth)| *position = truth.position);
                 let (planned_s, stated_s) = (seen.snapshot.remaining_s, bounds::planned_s(config));
@@ -35,13 +37,16 @@ impl Stops {
             _ => {}
         }
         let Some(cycles) = self.cycles else { return Ok(()) };
-        let is_over = cycles > bounds::cycles(config, bounds::to_rest_s(config));
+        self.is_cut |= seen.snapshot.stop.is_some_and(|stop| stop.category == StopCategory::Zero);
         for (index, axis) in
             config.axes.iter().enumerate().filter(|(index, _)| !seen.concerns[*index].is_present)
         {
             let truth = &seen.truth[index];
             let travelled = (truth.position - self.positions[index]).abs();
-            let limit = bounds::to_rest_distance(config, axis);
+            // The controller has no more part in where a joint coasts to.
+            let coasting_s = if self.is_cut { bounds::coasting_s(axis) } else { 0.0 };
+            let is_over = cycles > bounds::cycles(config, bounds::to_rest_s(config) + coasting_s);
+            let limit = bounds::to_rest_distance(config, axis) + axis.limits.velocity * coasting_s / 2.0;
             if travelled > limit && !is_unbounded(&axis.control) {
                 return Err(format!("{}: {travelled} since the stop began, beyond {limit}", axis.name));
             }
