@@ -2,6 +2,7 @@
 
 mod arm;
 mod command;
+mod deaf_drives;
 mod drives;
 mod files;
 mod reactions;

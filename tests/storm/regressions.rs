@@ -91,6 +91,8 @@ fn storms_that_have_failed_once_pass() {
         21647,
         // Another client enabled the group while the run said farewell to the drives, which took their watchdogs away.
         43967,
+        // A drive had said by SDO that it was off, and the set-points that it was believed to follow broke off.
+        10486,
     ];
     for seed in seeds {
         let played = play(&Case::of(seed));

@@ -41,11 +41,6 @@ impl Axis {
         self.since_emergency = (code != 0).then_some(0);
     }
 
-    /// Takes the state in a boot-up message or heartbeat.
-    pub fn receive_error_control(&mut self, state: u8) {
-        self.node_watch.receive(state);
-    }
-
     /// Lets time pass in a slot in which the axis' bus has no cycle.
     pub fn wait(&mut self, elapsed_s: f64) {
         self.span_s += elapsed_s;

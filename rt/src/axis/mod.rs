@@ -6,6 +6,7 @@ mod feedback;
 mod parameters;
 mod position_watch;
 mod profile_mode;
+mod service;
 mod set_point;
 
 use arrayvec::ArrayVec;
@@ -22,6 +23,7 @@ use crate::time::Nanoseconds;
 use crate::watch::{DuplicateWatch, NodeWatch};
 
 use position_watch::PositionWatch;
+use service::ServiceCommand;
 
 pub use parameters::{AxisParameters, Cadence, CommandPdo, FeedbackSince, MAX_PDOS, Pdo};
 
@@ -68,6 +70,9 @@ pub struct Axis {
     contradictions: u8,
     /// Whether the drive left operation enabled by itself and must not be led back to it.
     is_lost: bool,
+    /// Whether the node takes no process data any more, see [`Axis::notice_deafness`].
+    is_deaf: bool,
+    service: ServiceCommand,
     /// Whether it may be led up, see [`Axis::prepare_to_enable`].
     is_ready: bool,
     /// How far the joint has been reported from where it was, where no joint can get.
@@ -119,6 +124,8 @@ impl Axis {
             stalled_cycles: 0,
             contradictions: 0,
             is_lost: false,
+            is_deaf: false,
+            service: ServiceCommand::default(),
             is_ready: false,
             jump: None,
             is_position_known: false,
@@ -165,6 +172,7 @@ impl Axis {
     /// Begins to watch the node anew.
     pub fn begin_watch(&mut self) {
         self.is_lost = false;
+        self.is_deaf = false;
         self.is_ready = false;
         self.node_watch.begin();
         self.duplicate_watch = DuplicateWatch::default();

@@ -5,6 +5,7 @@
 //! It knows neither clocks nor buses; [`crate::cycle`] drives it.
 
 mod behaviour;
+mod last_word;
 mod parameters;
 mod process_data;
 mod requests;
@@ -285,6 +286,7 @@ impl Engine {
             self.act(now_ns, door);
             self.write_commands(slot);
         }
+        self.command_by_service();
         self.phase_cycles = self.phase_cycles.saturating_add(1);
         self.record.is_commanded = has_commands;
         has_commands

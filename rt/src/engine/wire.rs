@@ -64,10 +64,14 @@ impl Engine {
             }
             Destination::Foreign => {
                 self.foreign_id.get_or_insert(received.frame.id().value());
+                self.hear_other_master(bus, &received.frame);
                 self.hand_over(bus, received, door);
             }
             Destination::Unused => {}
-            Destination::Service => self.hand_over(bus, received, door),
+            Destination::Service => {
+                self.hear_answer(bus, &received.frame);
+                self.hand_over(bus, received, door);
+            }
         }
     }
 
@@ -112,6 +116,8 @@ impl Engine {
                     Goal::Enabled if self.phase == Phase::Stopping && axis.stops_by_itself() => {
                         Goal::QuickStop
                     }
+                    // The same as by SDO, should it hear this all the same.
+                    Goal::Enabled if axis.is_deaf() => Goal::QuickStop,
                     Goal::Enabled if !is_led_up => Goal::Disabled,
                     goal => goal,
                 };
@@ -134,7 +140,7 @@ impl Engine {
     }
 
     /// The heartbeat and TIME when they are due, and service frames as far as the budget goes: what follows the set-points.
-    pub fn services(&self, bus: usize, door: &mut impl Door, batch: &mut SendBatch) {
+    pub fn services(&mut self, bus: usize, door: &mut impl Door, batch: &mut SendBatch) {
         if let Some(heartbeat) = self.heartbeat.filter(|_| self.heartbeat_due == 0) {
             let _ = batch.try_push(Frame::of(Id::canopen(0x700, heartbeat.node), [NMT_OPERATIONAL]));
         }
@@ -149,7 +155,7 @@ impl Engine {
             _ => parameters.service_frames_active,
         };
         for _ in 0..budget.min(batch.remaining_capacity()) {
-            match door.service_frame(bus) {
+            match self.last_word(bus).or_else(|| door.service_frame(bus)) {
                 Some(frame) => batch.push(frame),
                 None => break,
             }
