@@ -2,7 +2,10 @@
 
 use takt::canopen::nmt::{NmtCommand, NmtTarget};
 use takt::config::{Axis, Config};
-use takt::faults::{DriveTrouble, Effect, ForeignFrames, FrameEffect, InterfaceEffect, Part, Rehearsal};
+use takt::faults::{
+    Direction, DriveTrouble, Effect, ForeignFrames, FrameEffect, FrameFunction, InterfaceEffect, Part,
+    Rehearsal,
+};
 use takt::sim::Defect;
 
 /// What can no longer be expected of a joint.
@@ -12,6 +15,8 @@ pub struct Concern {
     pub is_present: bool,
     /// A torque from outside acts on it, or another master commands its drive between two looks.
     pub is_driven_by_others: bool,
+    /// What is sent to its drive is corrupted with a right CRC: it does what it hears.
+    pub is_misled: bool,
     /// Another master has reset its communication: its drive has forgotten whom it watches.
     pub is_unwatched: bool,
     /// No SDO gets to its drive while this lasts.
@@ -25,6 +30,7 @@ impl Concern {
         Self {
             is_present: self.is_present || other.is_present,
             is_driven_by_others: self.is_driven_by_others || other.is_driven_by_others,
+            is_misled: self.is_misled || other.is_misled,
             is_unwatched: self.is_unwatched || other.is_unwatched,
             is_cut_off: self.is_cut_off || other.is_cut_off,
             is_loaded: self.is_loaded || other.is_loaded,
@@ -82,6 +88,16 @@ fn concern(axis: &Axis, fault: &takt::faults::Fault) -> Concern {
         Effect::Foreign(ForeignFrames::SetPoints { id, .. }) => own(id.value()),
         _ => true,
     };
+    let is_misled = match fault.effect {
+        Effect::Frames(FrameEffect::Corrupt { part, .. }) => {
+            let is_of_drives =
+                matches!(fault.selection.function, Some(FrameFunction::Tpdo | FrameFunction::Emergency));
+            let is_sent = fault.selection.direction != Direction::Received && !is_of_drives;
+            // What is meant for another drive may come to this one.
+            is_sent && (!is_at_another_axis || part == Part::Identifier)
+        }
+        _ => false,
+    };
     let is_unwatched = match fault.effect {
         Effect::Foreign(ForeignFrames::Frame { frame, .. }) => matches!(
             NmtCommand::decode(&frame),
@@ -98,6 +114,7 @@ fn concern(axis: &Axis, fault: &takt::faults::Fault) -> Concern {
     };
     Concern {
         is_present,
+        is_misled,
         is_unwatched,
         is_cut_off,
         is_driven_by_others: is_own && matches!(fault.kind, "load" | "foreign-set-points"),
