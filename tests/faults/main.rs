@@ -5,6 +5,7 @@ mod command;
 mod deaf_drives;
 mod drives;
 mod files;
+mod late_drives;
 mod reactions;
 mod repeatability;
 mod wrapper;

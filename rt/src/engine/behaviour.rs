@@ -41,6 +41,7 @@ impl Engine {
 
     fn wait_for_drives(&mut self, now_ns: Nanoseconds, door: &mut impl Door) {
         self.hold();
+        self.look_for_late_drives();
         self.axes.iter_mut().for_each(|axis| axis.prepare_to_enable(self.period_s));
         if self.axes.iter().all(|axis| axis.is_ready() && axis.is_enabled()) {
             self.enter(Phase::Holding, now_ns, door);

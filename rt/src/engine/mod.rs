@@ -64,6 +64,13 @@ impl BusSet {
         self.0 |= 1 << (bus & 31);
     }
 
+    /// Takes a bus away. Returns whether it was among them.
+    pub fn take(&mut self, bus: usize) -> bool {
+        let was_there = self.contains(bus);
+        self.0 &= !(1 << (bus & 31));
+        was_there
+    }
+
     /// Whether a bus is among them.
     pub const fn contains(self, bus: usize) -> bool {
         self.0 >> (bus & 31) & 1 == 1
@@ -121,6 +128,8 @@ pub struct Engine {
     /// Whether an interface has refused frames since the last cycle.
     is_not_taken: bool,
     held_back: BusSet,
+    /// Whose next SYNC is left out.
+    left_out: BusSet,
     stop: Option<StopReason>,
     fault_reset: u32,
     heartbeat_due: u32,
@@ -186,6 +195,7 @@ impl Engine {
             foreign_id: None,
             is_not_taken: false,
             held_back: BusSet::default(),
+            left_out: BusSet::default(),
             stop: None,
             fault_reset: 0,
             heartbeat_due: 0,
@@ -384,6 +394,7 @@ impl Engine {
                 drive_state: axis.drive_state(),
                 error_code: axis.error_code(),
                 is_heard: axis.is_heard(),
+                unanswered: axis.unanswered(),
             };
         }
         for (shown, health) in snapshot.buses.iter_mut().zip(buses) {

@@ -16,6 +16,8 @@ use crate::time::Nanoseconds;
 /// report must have been heard, and their targets and controlwords be new ones.
 const HEARTBEAT_HELD_BUS_CYCLES: u32 = 4;
 const NMT_OPERATIONAL: u8 = 5;
+/// Cycles from one look for late drives to the next: their silence must have been heard.
+const LOOK_AGAIN_CYCLES: u32 = 64;
 
 impl Engine {
     /// The SYNC of a bus, if one is to be sent in this slot, now. Answers to an earlier one are late from now on.
@@ -24,12 +26,26 @@ impl Engine {
         if !self.is_sync_on || !has_cycle(parameters, slot) {
             return None;
         }
+        let is_left_out = self.left_out.take(bus);
         for axis in self.axes.iter_mut().filter(|axis| usize::from(axis.parameters().bus) == bus) {
-            if axis.parameters().feedback_since == FeedbackSince::Sync {
-                axis.expect_feedback(now_ns);
+            match axis.parameters().feedback_since {
+                FeedbackSince::Sync if is_left_out => axis.leave_out(now_ns),
+                FeedbackSince::Sync => axis.ask(now_ns),
+                FeedbackSince::CommandPhase => {}
             }
         }
-        Some(Frame::of(parameters.sync_id, []))
+        (!is_left_out).then(|| Frame::of(parameters.sync_id, []))
+    }
+
+    /// Leaves out a SYNC of the buses on which a drive has not answered every one in its own cycle: before the drives are
+    /// led up, that disturbs nothing.
+    pub(super) fn look_for_late_drives(&mut self) {
+        if !self.phase_cycles.is_multiple_of(LOOK_AGAIN_CYCLES) {
+            return;
+        }
+        for axis in self.axes.iter().filter(|axis| axis.is_doubtful()) {
+            self.left_out.insert(axis.parameters().bus.into());
+        }
     }
 
     /// Takes a frame that arrived on a bus.
