@@ -8,8 +8,8 @@ use std::sync::Arc;
 
 use takt::bus::port::Port;
 use takt::faults::{
-    Course, Cue, DriveTrouble, Effect, Fault, FaultyPort, ForeignFrames, FrameEffect, InterfaceEffect, Part,
-    Selection, Window,
+    Course, Cue, DelayPlace, DriveTrouble, Effect, Fault, FaultyPort, ForeignFrames, FrameEffect,
+    InterfaceEffect, Part, Selection, Window,
 };
 use takt::sim::erob::{ErobJoint, ErobParameters};
 use takt::sim::plant::{Encoder, JointParameters};
@@ -202,7 +202,7 @@ fn every_effect() -> Vec<Effect> {
     let foreign = |frames| Effect::Foreign(frames);
     let drive = |node, trouble| Effect::Drive { node, trouble };
     vec![
-        Effect::Frames(FrameEffect::Delay { by_ns: 3_300_000 }),
+        Effect::Frames(FrameEffect::Delay { by_ns: 3_300_000, place: DelayPlace::Machine }),
         Effect::Frames(FrameEffect::Duplicate { copies: 8 }),
         Effect::Frames(FrameEffect::Corrupt { bits: 3, part: Part::Payload }),
         Effect::Frames(FrameEffect::Corrupt { bits: 1, part: Part::Identifier }),

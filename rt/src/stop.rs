@@ -30,7 +30,8 @@ pub enum Rule {
     FollowingError = 5,
     /// A stream of set-points ended without its owner ending it.
     StaleCommand = 6,
-    /// A drive has not reported in time for too many cycles.
+    /// A drive has not reported in time for too many cycles; or, with a limit of 0, it reports so many cycles late in every
+    /// cycle.
     MissedFeedback = 7,
     /// A drive reports a fault.
     DriveFault = 8,

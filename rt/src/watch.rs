@@ -83,8 +83,40 @@ impl TimingLadder {
 pub mod node_state {
     /// It has just started.
     pub const BOOT_UP: u8 = 0;
+    /// Neither process data nor SDO is taken.
+    pub const STOPPED: u8 = 4;
     /// Process data flows.
     pub const OPERATIONAL: u8 = 5;
+    /// SDO is taken, process data is not.
+    pub const PRE_OPERATIONAL: u8 = 0x7F;
+}
+
+/// Commands of an NMT master (CiA 301, 7.2.8.2.1).
+pub mod nmt_command {
+    /// Enter operational.
+    pub const START: u8 = 0x01;
+    /// Enter stopped.
+    pub const STOP: u8 = 0x02;
+    /// Enter pre-operational.
+    pub const ENTER_PRE_OPERATIONAL: u8 = 0x80;
+    /// Restart the application.
+    pub const RESET_NODE: u8 = 0x81;
+    /// Restart the communication.
+    pub const RESET_COMMUNICATION: u8 = 0x82;
+}
+
+/// What a node takes of all that it is sent, by what it has said of itself and what it has been told by others.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Hearing {
+    /// Process data and SDO.
+    #[default]
+    ProcessData,
+    /// SDO only.
+    Service,
+    /// SDO only, and it has forgotten what its process data mean and whom it watches: no start gives them back.
+    ServiceAfterReset,
+    /// Nothing but NMT.
+    Nmt,
 }
 
 /// What the error control messages of a drive tell while it is to work.
@@ -93,6 +125,7 @@ pub struct NodeWatch {
     silent_cycles: u32,
     has_booted: bool,
     left_operational: Option<u8>,
+    hearing: Hearing,
 }
 
 /// What is wrong with a node.
@@ -116,12 +149,48 @@ impl NodeWatch {
     /// Takes the state in an error control message.
     pub fn receive(&mut self, state: u8) {
         self.silent_cycles = 0;
-        match state {
-            node_state::BOOT_UP => self.has_booted = true,
-            // Bit 7 toggles in answers to node guarding.
-            state if state & 0x7F == node_state::OPERATIONAL => self.left_operational = None,
-            state => self.left_operational = Some(state & 0x7F),
+        // Bit 7 toggles in answers to node guarding.
+        match (state, state & 0x7F) {
+            (node_state::BOOT_UP, _) => {
+                self.has_booted = true;
+                self.hearing = Hearing::ServiceAfterReset;
+            }
+            (_, node_state::OPERATIONAL) => {
+                self.left_operational = None;
+                self.is_started();
+            }
+            (_, state) => {
+                self.left_operational = Some(state);
+                if state == node_state::PRE_OPERATIONAL && self.hearing != Hearing::ServiceAfterReset {
+                    self.hearing = Hearing::Service;
+                }
+            }
         }
+    }
+
+    /// Takes a command that another master has given to the node.
+    pub fn commanded(&mut self, command: u8) {
+        match command {
+            nmt_command::START => self.is_started(),
+            nmt_command::STOP => self.hearing = Hearing::Nmt,
+            nmt_command::ENTER_PRE_OPERATIONAL if self.hearing == Hearing::ServiceAfterReset => {}
+            nmt_command::ENTER_PRE_OPERATIONAL => self.hearing = Hearing::Service,
+            nmt_command::RESET_NODE | nmt_command::RESET_COMMUNICATION => {
+                self.hearing = Hearing::ServiceAfterReset;
+            }
+            _ => {}
+        }
+    }
+
+    fn is_started(&mut self) {
+        if self.hearing != Hearing::ServiceAfterReset {
+            self.hearing = Hearing::ProcessData;
+        }
+    }
+
+    /// What the node takes of what it is sent.
+    pub const fn hearing(&self) -> Hearing {
+        self.hearing
     }
 
     /// Lets a cycle pass.
@@ -225,6 +294,37 @@ mod tests {
         assert_eq!(watch.complaint(None), Some(NodeComplaint::BootUp));
         watch.begin();
         assert_eq!(watch.complaint(None), None);
+    }
+
+    #[test]
+    fn what_a_node_hears_follows_from_what_it_says_and_what_others_tell_it() {
+        let heard = |messages: &[Result<u8, u8>]| {
+            let mut watch = NodeWatch::default();
+            for message in messages {
+                match *message {
+                    Ok(state) => watch.receive(state),
+                    Err(command) => watch.commanded(command),
+                }
+            }
+            watch.hearing()
+        };
+        let (started, pre_operational) =
+            (Ok(node_state::OPERATIONAL), Ok(0x80 | node_state::PRE_OPERATIONAL));
+        assert_eq!(heard(&[started]), Hearing::ProcessData);
+        assert_eq!(heard(&[pre_operational]), Hearing::Service);
+        assert_eq!(heard(&[pre_operational, started]), Hearing::ProcessData);
+        assert_eq!(heard(&[Err(nmt_command::STOP)]), Hearing::Nmt);
+        assert_eq!(heard(&[Err(nmt_command::STOP), Err(nmt_command::START)]), Hearing::ProcessData);
+        // One that has been reset has forgotten its process data, and a start does not give them back.
+        for reset in
+            [Ok(node_state::BOOT_UP), Err(nmt_command::RESET_NODE), Err(nmt_command::RESET_COMMUNICATION)]
+        {
+            for later in
+                [started, pre_operational, Err(nmt_command::START), Err(nmt_command::ENTER_PRE_OPERATIONAL)]
+            {
+                assert_eq!(heard(&[reset, later]), Hearing::ServiceAfterReset);
+            }
+        }
     }
 
     #[test]

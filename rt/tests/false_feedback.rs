@@ -4,9 +4,11 @@ mod fixture;
 
 use std::f64::consts::TAU;
 
-use fixture::{COUNTS_PER_TURN, LIMITS, PERIOD_NS, Rig, axis_in, parameters, scale};
-use takt_rt::cia402::State;
+use fixture::{COUNTS_PER_TURN, LIMITS, PERIOD_NS, Rig, axis, axis_in, parameters, scale};
+use takt_rt::axis::{Axis, AxisParameters, Cadence, CommandPdo};
+use takt_rt::cia402::{Goal, State};
 use takt_rt::control::ControlLaw;
+use takt_rt::dialect::Dialect;
 use takt_rt::door::Request;
 use takt_rt::frame::Id;
 use takt_rt::stop::{Phase, Rule};
@@ -155,4 +157,23 @@ fn a_drive_that_is_enabled_already_when_the_group_becomes_active_is_not_moved() 
     rig.run(50);
     assert!(targets(&rig).iter().all(|target| *target == counts(1.5)), "{:?}", targets(&rig));
     assert_eq!(rig.drive(0).position, counts(1.5));
+}
+
+#[test]
+fn a_drive_that_hears_its_controlword_now_and_then_only_is_told_again_however_disabled_it_seems() {
+    let rare = |command: CommandPdo| CommandPdo { cadence: Cadence::OnControlword, ..command };
+    let usual = axis(0, 1);
+    let mut drive = Axis::new(AxisParameters {
+        dialect: Dialect::YzAim,
+        controlword_spacing_cycles: 10,
+        commands: usual.commands.iter().cloned().map(rare).collect(),
+        ..usual
+    });
+    drive.set_reported_position(0);
+    let told = (0..100).filter(|_| {
+        assert!(!drive.is_enabled());
+        drive.command(Goal::Disabled, None);
+        drive.frames().next().is_some()
+    });
+    assert_eq!(told.count(), 10);
 }

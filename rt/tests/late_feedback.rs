@@ -5,6 +5,8 @@ mod fixture;
 
 use fixture::{PERIOD_NS, Rig, parameters};
 use takt_rt::axis::FeedbackSince;
+use takt_rt::cia402::controlword;
+use takt_rt::door::Request;
 use takt_rt::frame::{Frame, Id};
 use takt_rt::stop::{Phase, Rule};
 
@@ -107,4 +109,69 @@ fn a_drive_that_reports_by_itself_is_heard_from_one_command_phase_to_the_next() 
         rig.run(1);
     }
     assert_eq!((rig.stops().len(), rig.stops()[0].rule), (1, Rule::MissedFeedback));
+}
+
+/// Drives that answer so many whole cycles late, and a little more, from the first SYNC on.
+fn steadily_late(cycles: u64) -> Rig {
+    let mut rig = Rig::new(3);
+    rig.buses[0].late_ns = cycles * PERIOD_NS + 100_000;
+    rig.door.requests.extend([Request::Sync(true), Request::Activate]);
+    rig.run(100);
+    rig
+}
+
+fn syncs(rig: &Rig) -> Vec<u64> {
+    let sent = rig.buses[0].sent.iter().filter(|(_, frame)| frame.id().value() == 0x80);
+    sent.map(|(at_ns, _)| *at_ns).collect()
+}
+
+#[test]
+fn a_drive_that_always_answers_whole_cycles_late_is_never_led_up_and_its_lateness_is_told() {
+    for cycles in [1, 2, 3, 10] {
+        let mut rig = steadily_late(cycles);
+        assert_eq!(rig.door.snapshot.axes[0].unanswered, cycles as u16);
+        for attempt in 1..=2 {
+            rig.request(Request::Enable);
+            rig.run_until(Phase::Disabled, 200);
+            let stops = rig.stops();
+            assert_eq!((stops.len(), stops[0].rule, stops[0].axis), (attempt, Rule::MissedFeedback, Some(0)));
+            assert_eq!(
+                (stops[0].value, stops[0].limit, stops[0].phase),
+                (cycles as f64, 0.0, Phase::Enabling)
+            );
+            rig.request(Request::ResetFaults);
+        }
+        let sent = rig.buses[0].sent.iter().filter(|(_, frame)| frame.id() == Id::canopen(0x200, 1));
+        let words: Vec<u16> = sent.map(|(_, frame)| frame.first_word() as u16).collect();
+        assert!(words.len() > 100 && words.iter().all(|word| *word == controlword::SHUTDOWN));
+        // The drives answer in time from now on.
+        rig.buses[0].late_ns = 0;
+        rig.run(100);
+        rig.request(Request::Enable);
+        rig.run_until(Phase::Holding, 200);
+    }
+}
+
+#[test]
+fn no_sync_is_left_out_where_every_one_has_been_answered_in_time() {
+    let mut rig = Rig::enabled(3);
+    rig.run(200);
+    assert!(syncs(&rig).windows(2).all(|pair| pair[1] - pair[0] == PERIOD_NS));
+}
+
+#[test]
+fn an_answer_that_was_lost_before_costs_one_sync_and_nothing_else() {
+    let mut rig = Rig::new(3);
+    rig.door.requests.extend([Request::Sync(true), Request::Activate]);
+    rig.run(50);
+    rig.drive(1).is_silent = true;
+    rig.run(2);
+    rig.drive(1).is_silent = false;
+    rig.run(50);
+    assert_eq!(rig.door.snapshot.axes[1].unanswered, 2);
+    rig.request(Request::Enable);
+    rig.run_until(Phase::Holding, 50);
+    let left_out = syncs(&rig).windows(2).filter(|pair| pair[1] - pair[0] == 2 * PERIOD_NS).count();
+    assert_eq!((left_out, rig.stops().len()), (1, 0));
+    assert_eq!(rig.door.snapshot.axes[1].unanswered, 0);
 }

@@ -185,7 +185,6 @@ impl Supervisor {
                     }
                 }
                 self.facts = facts;
-                self.ask(Request::Sync(true));
                 // It has just succeeded, so the second stage can begin.
                 let _ = self.bring_up.start();
                 self.enter(Stage::Start, now_ns);
@@ -204,6 +203,8 @@ impl Supervisor {
                     .zip(&facts)
                     .map(|(axis, facts)| Request::Position { axis, counts: facts.position_counts });
                 positions.for_each(|position| self.ask(position));
+                // Every node is operational: each answers the first SYNC, unless it always answers late.
+                self.ask(Request::Sync(true));
                 self.ask(Request::Activate);
                 self.enter(Stage::Activate, now_ns);
             }

@@ -1,8 +1,8 @@
 //! Bringing drives up and leaving them, all axes of all buses side by side.
 //!
 //! [`BringUp`] has two stages. [`Stage::Configure`] leaves every drive pre-operational, without torque, mapped, in its
-//! mode, with its target at its actual position. Then SYNC begins, and [`BringUp::start`] begins [`Stage::Start`],
-//! which makes the nodes operational. [`Leave`] is the polite farewell after motion.
+//! mode, with its target at its actual position. Then [`BringUp::start`] begins [`Stage::Start`], which makes the nodes
+//! operational, and SYNC may begin. [`Leave`] is the polite farewell after motion.
 //!
 //! There is no input and output here: [`BringUp::poll`] hands out frames, [`BringUp::receive`] takes them. Both may be
 //! called as often as is convenient; a drive has at most one SDO outstanding.
@@ -105,8 +105,8 @@ impl BringUp {
         Self { group, start_steps: start_steps.collect(), stage: Stage::Configure }
     }
 
-    /// Begins [`Stage::Start`]. SYNC should be running: nodes that become operational wait for it. The outcome is
-    /// open again until the stage is done.
+    /// Begins [`Stage::Start`]. The outcome is open again until the stage is done. Nodes that have become operational wait
+    /// for SYNC.
     pub fn start(&mut self) -> Result<(), NotConfigured> {
         if self.stage != Stage::Configure || !matches!(self.outcome(), Some(Ok(_))) {
             return Err(NotConfigured);

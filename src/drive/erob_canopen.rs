@@ -82,8 +82,7 @@ pub(super) fn configure(config: &Config, axis: &Axis, timing: &BringUpTiming) ->
 
 /// From there to operational.
 pub(super) fn start(axis: &Axis, timing: &BringUpTiming) -> Vec<Step> {
-    let mut list =
-        List::new("start", "check that SYNC is running and that no other master commands this node");
+    let mut list = List::new("start", "check that no other master commands this node");
     list.nmt_reported(NmtCommand::Start, NmtState::Operational, axis, timing);
     list.read(objects::STATUSWORD, Check::Any, Fact::Statusword);
     list.read(objects::ERROR_CODE, Check::Any, Fact::ErrorCode);

@@ -28,11 +28,12 @@ pub enum Effect {
 pub enum FrameEffect {
     /// It is lost on the way; a sent one counts as confirmed.
     Drop,
-    /// It comes so much later; what comes after it does not wait. A received one tells when it arrived, as one that lies in
-    /// the machine.
+    /// It comes so much later; what comes after it does not wait.
     Delay {
         /// How much.
         by_ns: Nanoseconds,
+        /// Where a received one is held up.
+        place: DelayPlace,
     },
     /// It comes so many more times.
     Duplicate {
@@ -59,6 +60,15 @@ impl FrameEffect {
     pub const fn is_of_sending(self) -> bool {
         matches!(self, Self::EchoLoss | Self::FullQueue)
     }
+}
+
+/// Where a received frame is held up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DelayPlace {
+    /// In the machine: it tells when it arrived.
+    Machine,
+    /// On its way to it, as one that is sent late: it arrives so much later.
+    Bus,
 }
 
 /// A part of a frame.

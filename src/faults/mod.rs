@@ -26,7 +26,7 @@ mod window;
 
 pub use breakable::{Breakable, CannotBreak, DriveTrouble, Heard};
 pub use cue::{Cue, Cues};
-pub use effect::{Effect, ForeignFrames, FrameEffect, InterfaceEffect, Part};
+pub use effect::{DelayPlace, Effect, ForeignFrames, FrameEffect, InterfaceEffect, Part};
 pub use port::FaultyPort;
 pub use read::ScenarioError;
 pub use rehearsal::{Rehearsal, Tiding, Tidings, Turn};

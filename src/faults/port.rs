@@ -9,7 +9,7 @@ use takt_rt::time::Nanoseconds;
 
 use super::breakable::{Breakable, CannotBreak, DriveTrouble, Heard};
 use super::cue::Cues;
-use super::effect::{Effect, FrameEffect, InterfaceEffect, corrupted};
+use super::effect::{DelayPlace, Effect, FrameEffect, InterfaceEffect, corrupted};
 use super::foreign::Foreigner;
 use super::scenario::Fault;
 use super::selection::{Direction, Selector};
@@ -53,7 +53,7 @@ pub struct FaultyPort<P> {
 enum Fate {
     Copies(Frame, usize),
     Moved,
-    Late(Nanoseconds),
+    Late(Nanoseconds, DelayPlace),
     Lost,
     Refused,
 }
@@ -169,7 +169,7 @@ impl<P: Breakable> FaultyPort<P> {
         }
         match effect {
             FrameEffect::Drop => Fate::Lost,
-            FrameEffect::Delay { by_ns } => Fate::Late(by_ns),
+            FrameEffect::Delay { by_ns, place } => Fate::Late(by_ns, place),
             FrameEffect::Duplicate { copies } => Fate::Copies(*frame, 1 + usize::from(copies)),
             FrameEffect::Corrupt { bits, part } => {
                 Fate::Copies(corrupted(frame, bits, part, |limit| self.selector.below(limit)), 1)
@@ -199,7 +199,7 @@ impl<P: Breakable> FaultyPort<P> {
                     self.outgoing.push((number, *frame));
                     continue;
                 }
-                Fate::Late(by_ns) if self.held.len() < HELD => {
+                Fate::Late(by_ns, _) if self.held.len() < HELD => {
                     self.held.push_back((now_ns.saturating_add(by_ns), *frame));
                     continue;
                 }
@@ -207,7 +207,7 @@ impl<P: Breakable> FaultyPort<P> {
                     self.added.tx_frames += 1;
                     continue;
                 }
-                Fate::Copies(..) | Fate::Moved | Fate::Late(_) | Fate::Refused => {}
+                Fate::Copies(..) | Fate::Moved | Fate::Late(..) | Fate::Refused => {}
             }
             gone = number;
             self.added.tx_overruns += (frames.len() - number) as u64;
@@ -261,11 +261,16 @@ impl<P: Breakable> FaultyPort<P> {
                     }
                     self.arrive(received);
                 }
-                Fate::Late(by_ns) if self.late.len() < HELD => {
-                    // It has arrived when it did: nobody has come to take it yet.
-                    self.late.push_back((received.at_ns.saturating_add(by_ns), received));
+                Fate::Late(by_ns, place) if self.late.len() < HELD => {
+                    let due_ns = received.at_ns.saturating_add(by_ns);
+                    let at_ns = match place {
+                        // It has arrived when it did: nobody has come to take it yet.
+                        DelayPlace::Machine => received.at_ns,
+                        DelayPlace::Bus => due_ns,
+                    };
+                    self.late.push_back((due_ns, Received { at_ns, ..received }));
                 }
-                Fate::Late(_) => self.added.rx_overruns += 1,
+                Fate::Late(..) => self.added.rx_overruns += 1,
                 Fate::Lost | Fate::Refused => {}
             }
         }

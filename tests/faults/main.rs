@@ -2,8 +2,10 @@
 
 mod arm;
 mod command;
+mod deaf_drives;
 mod drives;
 mod files;
+mod late_drives;
 mod reactions;
 mod repeatability;
 mod wrapper;

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use proptest::prelude::*;
 use takt::faults::{
-    Breakable, Course, Cue, Cues, Direction, Effect, Fault, FaultyPort, ForeignFrames, FrameEffect,
-    InterfaceEffect, Part, Selection, Window,
+    Breakable, Course, Cue, Cues, DelayPlace, Direction, Effect, Fault, FaultyPort, ForeignFrames,
+    FrameEffect, InterfaceEffect, Part, Selection, Window,
 };
 use takt_rt::frame::{Frame, Id};
 use takt_rt::port::{BusHealth, BusPort, BusState, ReceiveBatch, Received};
@@ -97,7 +97,11 @@ fn only_the_selected_frames_are_concerned_and_the_others_keep_their_order() {
 #[test]
 fn a_delayed_frame_leaves_in_its_own_time_and_is_unconfirmed_until_then() {
     let selection = Selection { ids: 0x201..=0x201, ..Selection::default() };
-    let (mut port, _) = wrapped(Effect::Frames(FrameEffect::Delay { by_ns: 300 }), selection, None);
+    let (mut port, _) = wrapped(
+        Effect::Frames(FrameEffect::Delay { by_ns: 300, place: DelayPlace::Machine }),
+        selection,
+        None,
+    );
     assert_eq!(port.send(1000, &numbered(3)), 3);
     assert_eq!((port.unconfirmed(1299), port.unconfirmed(1500)), (1, 0));
     let times: Vec<(u64, u32)> =
@@ -107,13 +111,21 @@ fn a_delayed_frame_leaves_in_its_own_time_and_is_unconfirmed_until_then() {
 
 #[test]
 fn a_late_arrival_is_taken_later_and_tells_when_it_arrived() {
-    let mut port = frames(FrameEffect::Delay { by_ns: 300 });
+    let mut port = frames(FrameEffect::Delay { by_ns: 300, place: DelayPlace::Machine });
     hears(&mut port, &[frame(0x181, 1)], 1000);
     assert_eq!(received(&mut port, 1010), []);
     assert_eq!(received(&mut port, 1299), []);
     assert_eq!(received(&mut port, 1300), [Received { frame: frame(0x181, 1), at_ns: 1000 }]);
     hears(&mut port, &[frame(0x181, 2)], 2000);
     assert_eq!(received(&mut port, 2400), [Received { frame: frame(0x181, 2), at_ns: 2000 }]);
+}
+
+#[test]
+fn a_frame_that_is_late_on_the_bus_tells_of_its_late_arrival() {
+    let mut port = frames(FrameEffect::Delay { by_ns: 300, place: DelayPlace::Bus });
+    hears(&mut port, &[frame(0x181, 1)], 1000);
+    assert_eq!(received(&mut port, 1299), []);
+    assert_eq!(received(&mut port, 1300), [Received { frame: frame(0x181, 1), at_ns: 1300 }]);
 }
 
 #[test]
@@ -231,7 +243,7 @@ fn another_master_repeats_what_was_commanded_when_it_began() {
 fn any_effect() -> impl Strategy<Value = FrameEffect> {
     prop_oneof![
         Just(FrameEffect::Drop),
-        (0u64..5_000).prop_map(|by_ns| FrameEffect::Delay { by_ns }),
+        (0u64..5_000).prop_map(|by_ns| FrameEffect::Delay { by_ns, place: DelayPlace::Machine }),
         (1u8..=8).prop_map(|copies| FrameEffect::Duplicate { copies }),
         (1u8..=64).prop_map(|bits| FrameEffect::Corrupt { bits, part: Part::Payload }),
         (1u8..=11).prop_map(|bits| FrameEffect::Corrupt { bits, part: Part::Identifier }),

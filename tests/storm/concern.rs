@@ -1,7 +1,12 @@
 //! Whom a fault concerns, from the cycle on in which it begins.
 
+use takt::canopen::nmt::{NmtCommand, NmtTarget};
 use takt::config::{Axis, Config};
-use takt::faults::{Effect, ForeignFrames, FrameEffect, Part, Rehearsal};
+use takt::faults::{
+    Direction, DriveTrouble, Effect, ForeignFrames, FrameEffect, FrameFunction, InterfaceEffect, Part,
+    Rehearsal,
+};
+use takt::sim::Defect;
 
 /// What can no longer be expected of a joint.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -10,9 +15,12 @@ pub struct Concern {
     pub is_present: bool,
     /// A torque from outside acts on it, or another master commands its drive between two looks.
     pub is_driven_by_others: bool,
-    /// Another master has changed the state of its node. If that has reset its communication, the drive is deaf to process
-    /// data and has forgotten its watchdog: only a farewell by SDO disables it, and a run that is broken off has none.
-    pub is_deaf: bool,
+    /// What is sent to its drive is corrupted with a right CRC: it does what it hears.
+    pub is_misled: bool,
+    /// Another master has reset its communication: its drive has forgotten whom it watches.
+    pub is_unwatched: bool,
+    /// No SDO gets to its drive while this lasts.
+    pub is_cut_off: bool,
     /// Something pushes the joint for as long as it lasts, also in the end.
     pub is_loaded: bool,
 }
@@ -22,7 +30,9 @@ impl Concern {
         Self {
             is_present: self.is_present || other.is_present,
             is_driven_by_others: self.is_driven_by_others || other.is_driven_by_others,
-            is_deaf: self.is_deaf || other.is_deaf,
+            is_misled: self.is_misled || other.is_misled,
+            is_unwatched: self.is_unwatched || other.is_unwatched,
+            is_cut_off: self.is_cut_off || other.is_cut_off,
             is_loaded: self.is_loaded || other.is_loaded,
         }
     }
@@ -78,10 +88,36 @@ fn concern(axis: &Axis, fault: &takt::faults::Fault) -> Concern {
         Effect::Foreign(ForeignFrames::SetPoints { id, .. }) => own(id.value()),
         _ => true,
     };
+    let is_misled = match fault.effect {
+        Effect::Frames(FrameEffect::Corrupt { part, .. }) => {
+            let is_of_drives =
+                matches!(fault.selection.function, Some(FrameFunction::Tpdo | FrameFunction::Emergency));
+            let is_sent = fault.selection.direction != Direction::Received && !is_of_drives;
+            // What is meant for another drive may come to this one.
+            is_sent && (!is_at_another_axis || part == Part::Identifier)
+        }
+        _ => false,
+    };
+    let is_unwatched = match fault.effect {
+        Effect::Foreign(ForeignFrames::Frame { frame, .. }) => matches!(
+            NmtCommand::decode(&frame),
+            Some((NmtCommand::ResetCommunication, target)) if [NmtTarget::All, NmtTarget::Node(axis.node)].contains(&target)
+        ),
+        _ => false,
+    };
+    let is_cut_off = match fault.effect {
+        Effect::Interface(effect) => effect != InterfaceEffect::ErrorPassive,
+        Effect::Drive { node, trouble } => {
+            node == axis.node && trouble == DriveTrouble::Defect(Defect::SilentSdoServer)
+        }
+        _ => false,
+    };
     Concern {
         is_present,
+        is_misled,
+        is_unwatched,
+        is_cut_off,
         is_driven_by_others: is_own && matches!(fault.kind, "load" | "foreign-set-points"),
-        is_deaf: !is_at_another_axis && fault.kind == "foreign-nmt",
         is_loaded: is_own && fault.kind == "load",
     }
 }

@@ -1,4 +1,7 @@
 //! How soon each kind of fault is noticed in motion, and how soon the arm stands.
+//!
+//! A drive for which every frame is turned into another, with a right CRC, does what it hears for as long as that lasts:
+//! for it there is no time that could be stated. What is stated is the rest of the joints that hear what is sent to them.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -10,6 +13,7 @@ use takt_rt::stop::{Rule, StopReason};
 
 use crate::bounds;
 use crate::case::scenario;
+use crate::concern::Concerns;
 use crate::dice::Dice;
 use crate::machine::load;
 use crate::run::World;
@@ -29,16 +33,20 @@ struct Reaction {
     reason: StopReason,
     /// From the cycle in which the fault began to the one in which the stop did.
     noticed_cycles: f64,
-    /// From then on until every joint stood.
+    /// From then on until every joint stood that hears what its drive is sent.
     rest_ms: f64,
+    /// The same of those whose drives are told something else.
+    misled_rest_ms: f64,
 }
 
 fn reaction(config: &Config, scenario: &Scenario) -> Option<Reaction> {
     let mut world = World::new(config, scenario);
     let mut stop: Option<(StopReason, u64)> = None;
-    let mut last_motion_ns = 0;
+    let mut concerns = Concerns::new(config, &world.rehearsal);
+    let (mut last_motion_ns, mut last_misled_ns) = (0, 0);
     for _ in 0..bounds::cycles(config, LONGEST_S) {
         let goes_on = world.step(config);
+        concerns.observe(&world.rehearsal, |_| ());
         while world.log.next_record(|_| ()).is_some() {}
         for event in &world.events {
             match event.kind {
@@ -48,9 +56,12 @@ fn reaction(config: &Config, scenario: &Scenario) -> Option<Reaction> {
                 _ => {}
             }
         }
-        let mut joints = config.axes.iter().zip(&world.truth);
-        if stop.is_some() && joints.any(|(axis, truth)| truth.velocity.abs() > REST * axis.limits.velocity) {
-            last_motion_ns = world.snapshot.at_ns;
+        let joints = config.axes.iter().zip(&world.truth).zip(&concerns.by_axis);
+        for ((axis, truth), concern) in joints.filter(|_| stop.is_some()) {
+            if truth.velocity.abs() > REST * axis.limits.velocity {
+                let last_ns = if concern.is_misled { &mut last_misled_ns } else { &mut last_motion_ns };
+                *last_ns = world.snapshot.at_ns;
+            }
         }
         if !goes_on {
             break;
@@ -59,10 +70,12 @@ fn reaction(config: &Config, scenario: &Scenario) -> Option<Reaction> {
     let (reason, stopped_ns) = stop?;
     let began_ns = world.rehearsal.courses().next().and_then(|(_, course)| course.began_ns())?;
     let noticed_ns = stopped_ns.saturating_sub(began_ns) as f64;
+    let rest_ms = |last_ns: u64| last_ns.saturating_sub(stopped_ns) as f64 * 1e-6;
     Some(Reaction {
         reason,
         noticed_cycles: (noticed_ns / config.cycle.period_ns as f64).ceil(),
-        rest_ms: last_motion_ns.saturating_sub(stopped_ns) as f64 * 1e-6,
+        rest_ms: rest_ms(last_motion_ns),
+        misled_rest_ms: rest_ms(last_misled_ns),
     })
 }
 
@@ -112,9 +125,11 @@ fn table(config: &Config, times: u64) -> (String, Vec<f64>) {
             middle_and_largest(reactions.iter().map(|reaction| reaction.noticed_cycles).collect());
         let (rest_ms, rest_at_most_ms) =
             middle_and_largest(reactions.iter().map(|reaction| reaction.rest_ms).collect());
+        let misled_ms = reactions.iter().map(|reaction| reaction.misled_rest_ms).fold(0.0, f64::max);
+        let misled = if misled_ms > 0.0 { format!("; misled {misled_ms:.0}") } else { String::new() };
         let _ = writeln!(
             text,
-            "| {kind} | {} of {times} | {} | {noticed:.0} / {noticed_at_most:.0} | {rest_ms:.0} / {rest_at_most_ms:.0} |",
+            "| {kind} | {} of {times} | {} | {noticed:.0} / {noticed_at_most:.0} | {rest_ms:.0} / {rest_at_most_ms:.0}{misled} |",
             reactions.len(),
             rules.join(", "),
         );

@@ -1,6 +1,6 @@
 //! What is sent to the drive of an axis.
 
-use super::{Axis, Cadence, CommandPdo};
+use super::{Axis, Cadence, CommandPdo, SETTLED_CYCLES};
 use crate::cia402::{Goal, controlword};
 use crate::control::{ControlLaw, LoopInput};
 use crate::frame::Frame;
@@ -13,9 +13,12 @@ impl Axis {
     pub fn command(&mut self, goal: Goal, other_word: Option<u16>) {
         let is_enabled = self.is_enabled();
         let word = other_word.unwrap_or_else(|| self.word_towards(goal));
-        let is_repeated = self.parameters.controlword_spacing_cycles > 0
-            && self.since_controlword >= self.parameters.controlword_spacing_cycles
-            && is_enabled != (goal == Goal::Enabled);
+        // A drive that is not to be enabled is told so again and again, whatever it seems to show: what was sent may not have
+        // got to it, and what was received may have been another's.
+        let spacing = self.parameters.controlword_spacing_cycles;
+        let is_repeated = spacing > 0
+            && self.since_controlword >= spacing.max(SETTLED_CYCLES)
+            && !(is_enabled && goal == Goal::Enabled);
         self.is_controlword_due = word != self.base_word || is_repeated;
         self.since_controlword =
             if self.is_controlword_due { 0 } else { self.since_controlword.saturating_add(1) };

@@ -19,9 +19,44 @@ impl Axis {
         self.arrived = 0;
     }
 
+    /// SYNC begins: no drive has been asked anything yet.
+    pub fn begin_sync(&mut self) {
+        self.punctuality.begin();
+    }
+
+    /// SYNC asks the drive for the feedback of a cycle; see [`Axis::expect_feedback`].
+    pub fn ask(&mut self, now_ns: Nanoseconds) {
+        self.expect_feedback(now_ns);
+        self.punctuality.ask();
+    }
+
+    /// SYNC is left out in a cycle, to see whether the drive's silence falls into it.
+    pub fn leave_out(&mut self, now_ns: Nanoseconds) {
+        self.expect_feedback(now_ns);
+        self.punctuality.leave_out();
+    }
+
+    /// SYNCs that the drive has left without an answer, or has not answered yet; 0 for one that is not asked by SYNC.
+    pub fn unanswered(&self) -> u16 {
+        self.punctuality.unanswered()
+    }
+
+    /// How many cycles of its bus late the drive has been found to report, always; 0 if it has not been.
+    pub fn late_cycles(&self) -> u16 {
+        self.punctuality.late_cycles()
+    }
+
+    /// Whether only a SYNC that is left out can tell if the drive reports in time.
+    pub fn is_doubtful(&self) -> bool {
+        self.punctuality.is_doubtful()
+    }
+
     /// Takes feedback PDO number `pdo` (from 0) that arrived at `at_ns`. One that is late changes nothing, nor one that is
     /// too short.
     pub fn receive(&mut self, pdo: usize, frame: &Frame, at_ns: Nanoseconds) -> Result<(), TooShort> {
+        if pdo == 0 {
+            self.punctuality.answer();
+        }
         if at_ns < self.expected_since_ns {
             return Ok(());
         }
@@ -41,11 +76,6 @@ impl Axis {
         self.since_emergency = (code != 0).then_some(0);
     }
 
-    /// Takes the state in a boot-up message or heartbeat.
-    pub fn receive_error_control(&mut self, state: u8) {
-        self.node_watch.receive(state);
-    }
-
     /// Lets time pass in a slot in which the axis' bus has no cycle.
     pub fn wait(&mut self, elapsed_s: f64) {
         self.span_s += elapsed_s;
@@ -55,6 +85,9 @@ impl Axis {
     pub fn begin_cycle(&mut self, elapsed_s: f64) {
         self.span_s += elapsed_s;
         let expected = (1u8 << self.parameters.feedback.len().min(7)) - 1;
+        if !self.punctuality.pass(self.arrived != 0) {
+            return;
+        }
         if self.arrived & expected != expected {
             self.age = self.age.saturating_add(1);
             return;

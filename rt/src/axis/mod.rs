@@ -6,6 +6,8 @@ mod feedback;
 mod parameters;
 mod position_watch;
 mod profile_mode;
+mod punctuality;
+mod service;
 mod set_point;
 
 use arrayvec::ArrayVec;
@@ -22,6 +24,8 @@ use crate::time::Nanoseconds;
 use crate::watch::{DuplicateWatch, NodeWatch};
 
 use position_watch::PositionWatch;
+use punctuality::Punctuality;
+use service::ServiceCommand;
 
 pub use parameters::{AxisParameters, Cadence, CommandPdo, FeedbackSince, MAX_PDOS, Pdo};
 
@@ -68,6 +72,9 @@ pub struct Axis {
     contradictions: u8,
     /// Whether the drive left operation enabled by itself and must not be led back to it.
     is_lost: bool,
+    /// Whether the node takes no process data any more, see [`Axis::notice_deafness`].
+    is_deaf: bool,
+    service: ServiceCommand,
     /// Whether it may be led up, see [`Axis::prepare_to_enable`].
     is_ready: bool,
     /// How far the joint has been reported from where it was, where no joint can get.
@@ -79,6 +86,7 @@ pub struct Axis {
     since_emergency: Option<u8>,
     node_watch: NodeWatch,
     duplicate_watch: DuplicateWatch,
+    punctuality: Punctuality,
     following_error: f64,
     following_guard: FollowingErrorGuard,
     /// Bits 0 to 3 and 7 of the last controlword.
@@ -119,6 +127,8 @@ impl Axis {
             stalled_cycles: 0,
             contradictions: 0,
             is_lost: false,
+            is_deaf: false,
+            service: ServiceCommand::default(),
             is_ready: false,
             jump: None,
             is_position_known: false,
@@ -126,6 +136,7 @@ impl Axis {
             since_emergency: None,
             node_watch: NodeWatch::default(),
             duplicate_watch: DuplicateWatch::default(),
+            punctuality: Punctuality::default(),
             following_error: 0.0,
             following_guard,
             base_word: 0,
@@ -165,9 +176,11 @@ impl Axis {
     /// Begins to watch the node anew.
     pub fn begin_watch(&mut self) {
         self.is_lost = false;
+        self.is_deaf = false;
         self.is_ready = false;
         self.node_watch.begin();
         self.duplicate_watch = DuplicateWatch::default();
+        self.punctuality.forget_findings();
         self.since_emergency = None;
     }
 
@@ -190,9 +203,11 @@ impl Axis {
     }
 
     /// Looks whether the drive may be led up: it has been disabled long enough for nothing older to be under way in either
-    /// direction, and its joint is at rest on the set-point. That remains so until the node is watched anew.
+    /// direction, its reports come in their own cycle, and its joint is at rest on the set-point. That remains so until the
+    /// node is watched anew.
     pub fn prepare_to_enable(&mut self, period_s: f64) {
         self.is_ready |= self.age == 0
+            && self.punctuality.is_punctual()
             && !self.drive_state().has_torque()
             && self.base_word == controlword::SHUTDOWN
             && self.since_controlword >= SETTLED_CYCLES

@@ -26,7 +26,7 @@ pub struct Pdo {
 pub enum Cadence {
     /// In every cycle of its bus.
     EveryCycle,
-    /// When the controlword changes, and again while the drive does not follow it.
+    /// When the controlword changes, and again while the drive is not enabled or is not to be.
     OnControlword,
 }
 

@@ -23,10 +23,13 @@ impl Engine {
             Phase::Streaming => self.follow_stream(now_ns, door),
             Phase::Disabling => {
                 self.come_to_rest();
+                let is_on_way = !self.motion.is_finished();
                 // A drive that has fallen silent never shows that it has obeyed; it is not waited for without end.
-                let is_patient =
-                    !self.motion.is_finished() || self.phase_cycles <= self.enable_timeout_cycles;
-                if !(is_patient && self.axes.iter().any(|axis| axis.drive_state().has_torque())) {
+                let is_patient = is_on_way || self.phase_cycles <= self.enable_timeout_cycles;
+                // What is told to one that is believed to follow goes on to rest, though it may have said otherwise by SDO.
+                let has_torque =
+                    |axis: &Axis| axis.has_torque() || is_on_way && axis.drive_state().has_torque();
+                if !(is_patient && self.axes.iter().any(has_torque)) {
                     self.motion.cancel();
                     self.goal = Goal::Disabled;
                     self.axes.iter_mut().for_each(Axis::let_go);
@@ -38,6 +41,7 @@ impl Engine {
 
     fn wait_for_drives(&mut self, now_ns: Nanoseconds, door: &mut impl Door) {
         self.hold();
+        self.look_for_late_drives();
         self.axes.iter_mut().for_each(|axis| axis.prepare_to_enable(self.period_s));
         if self.axes.iter().all(|axis| axis.is_ready() && axis.is_enabled()) {
             self.enter(Phase::Holding, now_ns, door);

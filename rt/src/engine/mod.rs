@@ -5,6 +5,7 @@
 //! It knows neither clocks nor buses; [`crate::cycle`] drives it.
 
 mod behaviour;
+mod last_word;
 mod parameters;
 mod process_data;
 mod requests;
@@ -61,6 +62,13 @@ impl BusSet {
     /// Adds a bus.
     pub fn insert(&mut self, bus: usize) {
         self.0 |= 1 << (bus & 31);
+    }
+
+    /// Takes a bus away. Returns whether it was among them.
+    pub fn take(&mut self, bus: usize) -> bool {
+        let was_there = self.contains(bus);
+        self.0 &= !(1 << (bus & 31));
+        was_there
     }
 
     /// Whether a bus is among them.
@@ -120,6 +128,8 @@ pub struct Engine {
     /// Whether an interface has refused frames since the last cycle.
     is_not_taken: bool,
     held_back: BusSet,
+    /// Whose next SYNC is left out.
+    left_out: BusSet,
     stop: Option<StopReason>,
     fault_reset: u32,
     heartbeat_due: u32,
@@ -189,6 +199,7 @@ impl Engine {
             foreign_id: None,
             is_not_taken: false,
             held_back: BusSet::default(),
+            left_out: BusSet::default(),
             stop: None,
             fault_reset: 0,
             heartbeat_due: 0,
@@ -291,6 +302,7 @@ impl Engine {
             self.act(now_ns, door);
             self.write_commands(slot);
         }
+        self.command_by_service();
         self.phase_cycles = self.phase_cycles.saturating_add(1);
         self.record.is_commanded = has_commands;
         has_commands
@@ -389,6 +401,7 @@ impl Engine {
                 drive_state: axis.drive_state(),
                 error_code: axis.error_code(),
                 is_heard: axis.is_heard(),
+                unanswered: axis.unanswered(),
             };
         }
         for (shown, health) in snapshot.buses.iter_mut().zip(buses) {

@@ -19,6 +19,9 @@ impl Engine {
         let is_latched = self.stop.is_some_and(|stop| stop.rule != Rule::Requested);
         let is_done = match asked.request {
             Request::Sync(on) => {
+                if on && !self.is_sync_on {
+                    self.axes.iter_mut().for_each(Axis::begin_sync);
+                }
                 self.is_sync_on = on;
                 true
             }

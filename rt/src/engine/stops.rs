@@ -186,6 +186,9 @@ fn complaint(
     if axis.feedback_age() > missed_limit {
         return Some((Rule::MissedFeedback, axis.feedback_age().into(), missed_limit.into()));
     }
+    if axis.late_cycles() > 0 {
+        return Some((Rule::MissedFeedback, axis.late_cycles().into(), 0.0));
+    }
     if axis.drive_state().is_faulted() {
         return Some((Rule::DriveFault, axis.error_code().into(), 0.0));
     }

@@ -16,6 +16,8 @@ use crate::time::Nanoseconds;
 /// report must have been heard, and their targets and controlwords be new ones.
 const HEARTBEAT_HELD_BUS_CYCLES: u32 = 4;
 const NMT_OPERATIONAL: u8 = 5;
+/// Cycles from one look for late drives to the next: their silence must have been heard.
+const LOOK_AGAIN_CYCLES: u32 = 64;
 
 impl Engine {
     /// The SYNC of a bus, if one is to be sent in this slot, now. Answers to an earlier one are late from now on.
@@ -24,12 +26,26 @@ impl Engine {
         if !self.is_sync_on || !has_cycle(parameters, slot) {
             return None;
         }
+        let is_left_out = self.left_out.take(bus);
         for axis in self.axes.iter_mut().filter(|axis| usize::from(axis.parameters().bus) == bus) {
-            if axis.parameters().feedback_since == FeedbackSince::Sync {
-                axis.expect_feedback(now_ns);
+            match axis.parameters().feedback_since {
+                FeedbackSince::Sync if is_left_out => axis.leave_out(now_ns),
+                FeedbackSince::Sync => axis.ask(now_ns),
+                FeedbackSince::CommandPhase => {}
             }
         }
-        Some(Frame::of(parameters.sync_id, []))
+        (!is_left_out).then(|| Frame::of(parameters.sync_id, []))
+    }
+
+    /// Leaves out a SYNC of the buses on which a drive has not answered every one in its own cycle: before the drives are
+    /// led up, that disturbs nothing.
+    pub(super) fn look_for_late_drives(&mut self) {
+        if !self.phase_cycles.is_multiple_of(LOOK_AGAIN_CYCLES) {
+            return;
+        }
+        for axis in self.axes.iter().filter(|axis| axis.is_doubtful()) {
+            self.left_out.insert(axis.parameters().bus.into());
+        }
     }
 
     /// Takes a frame that arrived on a bus.
@@ -64,10 +80,14 @@ impl Engine {
             }
             Destination::Foreign => {
                 self.foreign_id.get_or_insert(received.frame.id().value());
+                self.hear_other_master(bus, &received.frame);
                 self.hand_over(bus, received, door);
             }
             Destination::Unused => {}
-            Destination::Service => self.hand_over(bus, received, door),
+            Destination::Service => {
+                self.hear_answer(bus, &received.frame);
+                self.hand_over(bus, received, door);
+            }
         }
     }
 
@@ -116,6 +136,8 @@ impl Engine {
                     Goal::Enabled if self.phase == Phase::Stopping && axis.stops_by_itself() => {
                         Goal::QuickStop
                     }
+                    // The same as by SDO, should it hear this all the same.
+                    Goal::Enabled if axis.is_deaf() => Goal::QuickStop,
                     Goal::Enabled if !is_led_up => Goal::Disabled,
                     goal => goal,
                 };
@@ -138,7 +160,7 @@ impl Engine {
     }
 
     /// The heartbeat and TIME when they are due, and service frames as far as the budget goes: what follows the set-points.
-    pub fn services(&self, bus: usize, door: &mut impl Door, batch: &mut SendBatch) {
+    pub fn services(&mut self, bus: usize, door: &mut impl Door, batch: &mut SendBatch) {
         if let Some(heartbeat) = self.heartbeat.filter(|_| self.heartbeat_due == 0) {
             let _ = batch.try_push(Frame::of(Id::canopen(0x700, heartbeat.node), [NMT_OPERATIONAL]));
         }
@@ -153,7 +175,7 @@ impl Engine {
             _ => parameters.service_frames_active,
         };
         for _ in 0..budget.min(batch.remaining_capacity()) {
-            match door.service_frame(bus) {
+            match self.last_word(bus).or_else(|| door.service_frame(bus)) {
                 Some(frame) => batch.push(frame),
                 None => break,
             }

@@ -43,6 +43,7 @@ pub const NO_SNAPSHOT: Snapshot = Snapshot {
         drive_state: cia402::State::NotReadyToSwitchOn,
         error_code: 0,
         is_heard: false,
+        unanswered: 0,
     }; MAX_AXES],
     bus_count: 0,
     buses: [BusHealth {
@@ -176,7 +177,9 @@ fn put_axis(axis: &AxisSnapshot, words: &mut Words<'_>) {
     words.put_f64(axis.velocity);
     let is_heard = u64::from(axis.is_heard) << 32;
     let drive_state = (axis.drive_state as u64) << 40;
-    words.put(u64::from(axis.statusword) | u64::from(axis.error_code) << 16 | is_heard | drive_state);
+    let unanswered = u64::from(axis.unanswered) << 48;
+    let words_of_drive = u64::from(axis.statusword) | u64::from(axis.error_code) << 16;
+    words.put(words_of_drive | is_heard | drive_state | unanswered);
 }
 
 fn take_axis(words: &mut Words<'_>) -> AxisSnapshot {
@@ -190,6 +193,7 @@ fn take_axis(words: &mut Words<'_>) -> AxisSnapshot {
         drive_state: drive_state_of((packed >> 40) as u8),
         error_code: (packed >> 16) as u16,
         is_heard: packed >> 32 & 1 == 1,
+        unanswered: (packed >> 48) as u16,
     }
 }
 
@@ -262,8 +266,11 @@ mod tests {
 
     fn axes() -> impl Strategy<Value = AxisSnapshot> {
         let states = prop::sample::select(&cia402::State::ALL[..]);
-        (any::<(f64, f64, f64, u16, u16, bool)>(), states).prop_map(
-            |((position_set, position, velocity, statusword, error_code, is_heard), drive_state)| {
+        (any::<(f64, f64, f64, u16, u16, bool, u16)>(), states).prop_map(
+            |(
+                (position_set, position, velocity, statusword, error_code, is_heard, unanswered),
+                drive_state,
+            )| {
                 AxisSnapshot {
                     position_set,
                     position,
@@ -272,6 +279,7 @@ mod tests {
                     drive_state,
                     error_code,
                     is_heard,
+                    unanswered,
                 }
             },
         )

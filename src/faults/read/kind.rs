@@ -8,7 +8,7 @@ use crate::config::read::entry::{Bounds, Entry};
 use crate::config::read::section::Section;
 use crate::config::{Axis, Config, Quantity, Travel};
 use crate::faults::breakable::{Breakable, DriveTrouble};
-use crate::faults::effect::{Effect, ForeignFrames, FrameEffect, InterfaceEffect, Part};
+use crate::faults::effect::{DelayPlace, Effect, ForeignFrames, FrameEffect, InterfaceEffect, Part};
 use crate::faults::selection::Selection;
 use crate::faults::window::Window;
 use crate::sim::{Defect, DriveFault, SimulatedBus};
@@ -109,7 +109,10 @@ pub fn read(section: &mut Section<'_>, word: Word, place: &Place<'_, '_>, config
         Word::Drop => frames(section, place, config, |_| Some(FrameEffect::Drop)),
         Word::Delay => frames(section, place, config, |section| {
             let entry = section.require("by", "how much later they come: by = \"300 us\"")?;
-            Some(FrameEffect::Delay { by_ns: common::duration(&entry, config)? })
+            let by_ns = common::duration(&entry, config);
+            let places = [("machine", DelayPlace::Machine), ("bus", DelayPlace::Bus)];
+            let place = section.get("where").map_or(Some(DelayPlace::Machine), |entry| entry.choice(&places));
+            Some(FrameEffect::Delay { by_ns: by_ns?, place: place? })
         }),
         Word::Duplicate => frames(section, place, config, |section| {
             let copies = section.get("copies").map_or(Some(1), |entry| entry.integer(1..9))?;

@@ -1,0 +1,91 @@
+//! Drives that another master has made deaf to process data, without a farewell that would come to their help.
+
+use std::sync::Arc;
+
+use takt::bus::port::Port;
+use takt::config::Config;
+use takt::controller::{Interrupt, VirtualRun};
+use takt::faults::Rehearsal;
+use takt_rt::stop::Phase;
+
+use crate::arm::{folder, scenario};
+
+/// The machines: every way in which a drive can be in motion when it turns deaf.
+const MACHINES: [&str; 6] = [
+    "arm6-erob",
+    "erob-modes/erob-csv",
+    "erob-modes/erob-cst",
+    "erob-modes/erob-pv",
+    "erob-modes/erob-pt",
+    "gantry-yz-aim",
+];
+const COMMANDS: [&str; 3] = ["reset-communication", "pre-operational", "stop"];
+
+fn machine(name: &str) -> Config {
+    let mut config = Config::load(&folder().join(format!("{name}.toml"))).unwrap();
+    config.axes.iter_mut().for_each(|axis| axis.simulated.power_up_ns = 5_000_000);
+    config
+}
+
+fn deafened(config: &Config, command: &str) -> Rehearsal {
+    let axis = &config.axes[0].name;
+    let text = format!(
+        "[[fault]]\nkind = \"foreign-nmt\"\naxis = \"{axis}\"\ncommand = \"{command}\"\nwhen = \"moving\"\nat = \"300 ms\""
+    );
+    Rehearsal::new(scenario(&text, config))
+}
+
+/// Plays until the fault has begun.
+fn struck(config: &Config, command: &str) -> VirtualRun<Port> {
+    let rehearsal = Arc::new(deafened(config, command));
+    let (mut run, _) = VirtualRun::rehearsed(config, Arc::clone(&rehearsal)).unwrap();
+    while !rehearsal.courses().any(|(_, course)| course.began_ns().is_some()) {
+        assert!(run.step(), "{}: over before the fault", config.name);
+    }
+    run
+}
+
+fn first_drive(config: &Config, run: &mut VirtualRun<Port>) -> takt::sim::Observation {
+    let axis = &config.axes[0];
+    run.ports()[axis.bus].simulated_mut().unwrap().observe(axis.node).unwrap()
+}
+
+#[test]
+fn a_drive_that_hears_no_process_data_any_more_is_stopped_and_switched_off_by_sdo_before_anybody_says_farewell()
+ {
+    for name in MACHINES {
+        let config = machine(name);
+        for command in COMMANDS {
+            let mut run = struck(&config, command);
+            let began_ns = run.snapshot().at_ns;
+            let mut ended_ns = None;
+            while run.snapshot().phase != Phase::Disabled {
+                assert!(run.step(), "{name}, {command}: never disabled");
+                let drive = first_drive(&config, &mut run);
+                if !drive.state.has_torque() {
+                    ended_ns = ended_ns.or(Some(run.snapshot().at_ns));
+                }
+            }
+            let of_group_ms = (run.snapshot().at_ns - began_ns) / 1_000_000;
+            let of_drive_ms = ended_ns.map(|ns| (ns - began_ns) / 1_000_000);
+            assert!(of_drive_ms.is_some_and(|ms| ms <= 700), "{name}, {command}: {of_drive_ms:?} ms");
+            assert!(of_group_ms <= 1200, "{name}, {command}: the group waits {of_group_ms} ms");
+            let speed = first_drive(&config, &mut run).velocity.abs() / config.axes[0].limits.velocity;
+            assert!(speed < 0.01, "{name}, {command}: {speed} of its velocity limit");
+        }
+    }
+}
+
+#[test]
+fn a_run_that_is_cut_off_leaves_no_deaf_drive_enabled() {
+    for name in MACHINES {
+        let config = machine(name);
+        for command in COMMANDS {
+            let mut run = struck(&config, command);
+            run.interrupt(Interrupt::Immediate);
+            while run.step() {}
+            let state = first_drive(&config, &mut run).state;
+            assert!(!state.has_torque(), "{name}, {command}: {state:?}");
+        }
+    }
+}

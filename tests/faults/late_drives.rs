@@ -1,0 +1,37 @@
+//! Drives that always answer SYNC whole cycles late: each answer looks like one to the next SYNC.
+
+use takt::controller::Outcome;
+use takt_rt::stop::{Phase, Rule, StopCategory};
+
+use crate::arm::{arm, play};
+
+#[test]
+fn a_drive_that_always_reports_whole_cycles_late_is_not_enabled_and_is_named_with_its_lateness() {
+    for cycles in [1, 2, 5, 20] {
+        // It comes a little after the SYNC that it seems to answer.
+        let by_us = 1000 * cycles + 100;
+        let late = format!(
+            "[[fault]]\nkind = \"delay\"\naxis = \"joint5\"\nfunction = \"tpdo\"\nby = \"{by_us} us\"\nwhere = \"bus\"\n\
+             when = \"start\""
+        );
+        let played = play(&arm(), &late);
+        let Some(Outcome::Stopped(stop)) = played.outcome else { panic!("{cycles}: {:?}", played.outcome) };
+        assert_eq!((stop.rule, stop.axis, stop.category), (Rule::MissedFeedback, Some(4), StopCategory::One));
+        assert_eq!((stop.value, stop.limit, stop.phase), (f64::from(cycles), 0.0, Phase::Enabling));
+        assert!(!played.phases.contains(&Phase::Holding), "{:?}", played.phases);
+        assert_eq!(played.largest_step, 0.0, "no drive was enabled");
+    }
+}
+
+#[test]
+fn feedback_that_was_lost_or_late_before_the_axes_are_enabled_is_no_late_drive() {
+    for fault in [
+        "kind = \"drop\"\naxis = \"joint5\"\nfunction = \"tpdo\"\ncount = 3",
+        "kind = \"delay\"\naxis = \"joint5\"\nfunction = \"tpdo\"\nby = \"2100 us\"\nwhere = \"bus\"\ncount = 1",
+        "kind = \"delay\"\nbus = \"wrist\"\nfunction = \"tpdo\"\nby = \"100 us\"\nwhere = \"bus\"",
+        "kind = \"drop\"\nbus = \"base\"\nfunction = \"tpdo\"\nprobability = \"2 %\"",
+    ] {
+        let played = play(&arm(), &format!("[[fault]]\n{fault}\nwhen = \"start\""));
+        assert_eq!(played.outcome, Some(Outcome::Finished), "{fault}");
+    }
+}
