@@ -177,3 +177,27 @@ fn a_bus_that_comes_back_from_bus_off_to_error_passive_does_not_soften_the_stop(
     rig.run_until(Phase::Disabled, 3_000);
     assert_eq!(told(&rig), [(Rule::BusLost, StopCategory::One)]);
 }
+
+#[test]
+fn a_group_that_is_disabled_while_it_is_led_up_is_not_called_disabled_before_the_last_word_has_taken_effect()
+{
+    for after in 1..60 {
+        // The last word may be on the wire while no SYNC has made it valid yet.
+        let mut parameters = parameters(3);
+        parameters.buses[0].divider = 3;
+        let mut rig = Rig::of(parameters);
+        rig.door.requests.extend([Request::Sync(true), Request::Activate]);
+        rig.run(10);
+        rig.request(Request::Enable);
+        rig.run(after);
+        rig.request(Request::Disable);
+        rig.run_until(Phase::Disabled, 100);
+        for _ in 0..20 {
+            for axis in 0..3 {
+                let state = rig.drive(axis).state;
+                assert!(!state.has_torque(), "disabled {after} cycles after enabling: {state:?}");
+            }
+            rig.run(1);
+        }
+    }
+}

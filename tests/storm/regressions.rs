@@ -92,7 +92,8 @@ fn storms_that_have_failed_once_pass() {
         // Another client enabled the group while the run said farewell to the drives, which took their watchdogs away.
         43967,
         // A drive had said by SDO that it was off, and the set-points that it was believed to follow broke off.
-        10486,
+        10486, // A group was called disabled while the word that enabled a drive was on the wire.
+        4572,
     ];
     for seed in seeds {
         let played = play(&Case::of(seed));
