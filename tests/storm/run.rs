@@ -168,7 +168,7 @@ pub fn play(case: &Case) -> Result<Done, String> {
         let is_raging = enabled.is_some_and(|enabled| cycles < enabled + case.length);
         clients.act(case, &mut world, is_raging);
     }
-    at_rest(case, &concerns, &mut world)?;
+    at_rest(case, &mut concerns, &mut world)?;
     let is_bring_up_failed = matches!(world.run.supervisor().outcome(), Some(Outcome::BringUpFailed(_)));
     Ok(Done { cycles, fingerprint: fingerprint.value(), struck, is_bring_up_failed })
 }
@@ -223,7 +223,7 @@ impl Clients {
 }
 
 /// Some time after the controller has gone, whatever it could not stop has been stopped by its own watchdog.
-fn at_rest(case: &Case, concerns: &Concerns, world: &mut World) -> Result<(), String> {
+fn at_rest(case: &Case, concerns: &mut Concerns, world: &mut World) -> Result<(), String> {
     let end_ns = world.snapshot.at_ns;
     let mut batch = ReceiveBatch::new();
     for now_ns in (1..=WATCHDOG_MS).map(|passed_ms| end_ns + passed_ms * 1_000_000) {
@@ -232,6 +232,8 @@ fn at_rest(case: &Case, concerns: &Concerns, world: &mut World) -> Result<(), St
             port.receive(now_ns, &mut batch);
         }
     }
+    // Some faults may have begun only now.
+    concerns.observe(&world.rehearsal, |_| ());
     for (axis, concern) in case.config.axes.iter().zip(&concerns.by_axis) {
         let truth = world.run.ports()[axis.bus].observe(axis.node);
         let is_driven = truth.state == State::OperationEnabled;
