@@ -121,3 +121,83 @@ fn a_fault_of_the_standing_group_after_a_requested_stop_is_a_stop_of_its_own() {
         [(Rule::Requested, StopCategory::Two), (Rule::UnexpectedBootUp, StopCategory::One)]
     );
 }
+
+/// A bus turns error-passive in motion, which stops the group under power, and goes bus-off so many cycles later.
+fn error_passive_then_off(bus_lost: StopCategory, after: usize) -> Rig {
+    let mut parameters = parameters(6);
+    parameters.categories.set(Rule::BusLost, bus_lost);
+    let mut rig = Rig::of(parameters).enable();
+    rig.move_to(2.0);
+    rig.run(200);
+    rig.buses[0].state = BusState::ErrorPassive;
+    rig.run(1);
+    assert_eq!(rig.phase(), Phase::Stopping);
+    rig.run(after);
+    rig.buses[0].state = BusState::BusOff;
+    rig.run(1);
+    rig
+}
+
+#[test]
+fn an_error_passive_bus_that_goes_bus_off_makes_the_stop_harder_and_stays_its_one_reason() {
+    // In the first cycle of the stop, on its way, and when the group stands under power.
+    for (after, is_standing) in [(0, false), (50, false), (600, true)] {
+        for (category, at_once) in [
+            (StopCategory::One, if is_standing { Phase::Disabling } else { Phase::Stopping }),
+            (StopCategory::Zero, Phase::Disabling),
+        ] {
+            let mut rig = error_passive_then_off(category, after);
+            assert_eq!(rig.phase(), at_once, "{category:?} after {after} cycles");
+            let shown = rig.door.snapshot.stop.unwrap();
+            assert_eq!(
+                (shown.rule, shown.phase, shown.category),
+                (Rule::BusErrorPassive, Phase::Moving, category)
+            );
+            let begun = rig.door.records.len();
+            rig.run_until(Phase::Disabled, 3_000);
+            let is_held = rig.door.records[begun..].iter().any(|record| record.phase == Phase::Holding);
+            assert!(!is_held, "{category:?} after {after} cycles: held under power");
+            assert_eq!(told(&rig), [(Rule::BusErrorPassive, StopCategory::Two)]);
+            rig.assert_limits_kept();
+        }
+    }
+}
+
+#[test]
+fn a_bus_that_comes_back_from_bus_off_to_error_passive_does_not_soften_the_stop() {
+    let mut rig = Rig::enabled(6);
+    rig.move_to(2.0);
+    rig.run(200);
+    for state in [BusState::BusOff, BusState::ErrorPassive, BusState::ErrorActive] {
+        rig.buses[0].state = state;
+        rig.run(20);
+        let shown = rig.door.snapshot.stop.unwrap();
+        assert_eq!((shown.rule, shown.category), (Rule::BusLost, StopCategory::One));
+    }
+    rig.run_until(Phase::Disabled, 3_000);
+    assert_eq!(told(&rig), [(Rule::BusLost, StopCategory::One)]);
+}
+
+#[test]
+fn a_group_that_is_disabled_while_it_is_led_up_is_not_called_disabled_before_the_last_word_has_taken_effect()
+{
+    for after in 1..60 {
+        // The last word may be on the wire while no SYNC has made it valid yet.
+        let mut parameters = parameters(3);
+        parameters.buses[0].divider = 3;
+        let mut rig = Rig::of(parameters);
+        rig.door.requests.extend([Request::Sync(true), Request::Activate]);
+        rig.run(10);
+        rig.request(Request::Enable);
+        rig.run(after);
+        rig.request(Request::Disable);
+        rig.run_until(Phase::Disabled, 100);
+        for _ in 0..20 {
+            for axis in 0..3 {
+                let state = rig.drive(axis).state;
+                assert!(!state.has_torque(), "disabled {after} cycles after enabling: {state:?}");
+            }
+            rig.run(1);
+        }
+    }
+}

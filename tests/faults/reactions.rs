@@ -190,6 +190,21 @@ fn an_error_passive_interface_stops_the_arm_under_power() {
 }
 
 #[test]
+fn an_interface_that_goes_bus_off_after_it_was_error_passive_has_the_arm_disabled() {
+    let played = play(
+        &arm(),
+        "[[fault]]\nkind = \"error-passive\"\nbus = \"wrist\"\nfor = \"20 ms\"\nwhen = \"moving\"\nat = \"300 ms\"\n\
+         [[fault]]\nkind = \"bus-off\"\nbus = \"wrist\"\nwhen = \"stopping\"\nat = \"20 ms\"",
+    );
+    assert_safe("error-passive, then bus-off", &played);
+    assert_eq!(played.stops.len(), 1);
+    let Some(Outcome::Stopped(stop)) = played.outcome else { panic!("{:?}", played.outcome) };
+    assert_eq!(stop.rule, Rule::BusErrorPassive);
+    assert!(!played.phases[2..].ends_with(&[Phase::Stopping, Phase::Holding]), "{:?}", played.phases);
+    assert_eq!(played.phases.last(), Some(&Phase::Disabled));
+}
+
+#[test]
 fn a_single_false_statusword_neither_stops_the_arm_nor_moves_it_otherwise() {
     let played = in_motion("kind = \"statusword\"\naxis = \"joint2\"\nclear = 0x0004\nfor = \"1 cycles\"");
     assert_eq!(played.outcome, Some(Outcome::Finished));

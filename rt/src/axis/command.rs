@@ -23,6 +23,12 @@ impl Axis {
         self.since_controlword =
             if self.is_controlword_due { 0 } else { self.since_controlword.saturating_add(1) };
         self.base_word = word;
+        // One that has shown torque shows as well when it has none any more.
+        self.is_led_up = !self.drive_state().has_torque()
+            && match word {
+                controlword::SWITCH_ON | controlword::ENABLE_OPERATION => true,
+                _ => self.is_led_up && self.since_controlword < SETTLED_CYCLES,
+            };
         self.sent = [self.delay.due(), self.sent[0], self.sent[1]];
 
         let parameters = &self.parameters;
@@ -52,6 +58,11 @@ impl Axis {
         self.command.set(law.target_slot(), raw);
         let mode_bits = if is_enabled { self.mode_bits() } else { 0 };
         self.command.set(CommandSlot::Controlword, (word | mode_bits).into());
+    }
+
+    /// Whether a controlword that leads the drive up may still be under way, whatever the drive shows.
+    pub fn is_led_up(&self) -> bool {
+        self.is_led_up
     }
 
     /// The controlword that brings the drive one step nearer to `goal`.

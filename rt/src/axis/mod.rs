@@ -93,6 +93,8 @@ pub struct Axis {
     base_word: u16,
     since_controlword: u32,
     is_controlword_due: bool,
+    /// See [`Axis::is_led_up`].
+    is_led_up: bool,
     torque_set: f64,
 }
 
@@ -142,6 +144,7 @@ impl Axis {
             base_word: 0,
             since_controlword: 0,
             is_controlword_due: false,
+            is_led_up: false,
             torque_set: 0.0,
         }
     }

@@ -26,10 +26,12 @@ impl Engine {
                 let is_on_way = !self.motion.is_finished();
                 // A drive that has fallen silent never shows that it has obeyed; it is not waited for without end.
                 let is_patient = is_on_way || self.phase_cycles <= self.enable_timeout_cycles;
-                // What is told to one that is believed to follow goes on to rest, though it may have said otherwise by SDO.
-                let has_torque =
-                    |axis: &Axis| axis.has_torque() || is_on_way && axis.drive_state().has_torque();
-                if !(is_patient && self.axes.iter().any(has_torque)) {
+                // What is told to one that is believed to follow goes on to rest, though it may have said otherwise by SDO; and
+                // one that shows no torque yet may be about to have it.
+                let is_waited_for = |axis: &Axis| {
+                    axis.has_torque() || axis.is_led_up() || is_on_way && axis.drive_state().has_torque()
+                };
+                if !(is_patient && self.axes.iter().any(is_waited_for)) {
                     self.motion.cancel();
                     self.goal = Goal::Disabled;
                     self.axes.iter_mut().for_each(Axis::let_go);
