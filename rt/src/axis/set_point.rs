@@ -11,8 +11,8 @@ impl Axis {
         self.set[0]
     }
 
-    /// Gives the newest set-point the velocity and the acceleration that its steps show: for a stream, of which what it says
-    /// of them may be wrong. Where it has led is known, and that is what goes on from here.
+    /// Gives the newest set-point the velocity and the acceleration that its steps show: when a stream ends, of which what it
+    /// said of them may be wrong. Where it has led is known, and whatever is planned from now on goes on from that.
     pub fn take_steps(&mut self, period_s: f64) {
         if self.is_profile() {
             return;

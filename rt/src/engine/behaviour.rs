@@ -159,7 +159,6 @@ impl Engine {
         }
         let Some(next) = self.streamed(&command.set_points, now_ns, door) else { return };
         if self.advance_guarded(&next, now_ns, door) {
-            self.axes.iter_mut().for_each(|axis| axis.take_steps(self.period_s));
             // Until the next command comes the present one is carried on at its velocity, up to its expiry.
             let period_s = self.period_s;
             if let Some(held) = &mut self.stream {

@@ -156,6 +156,9 @@ impl Engine {
 
     fn plan_stop(&mut self) -> Result<(), PlanError> {
         self.axes.iter_mut().for_each(Axis::stop_profile);
+        if self.phase == Phase::Streaming {
+            self.axes.iter_mut().for_each(|axis| axis.take_steps(self.period_s));
+        }
         self.motion.stop(self.axes.iter().map(|axis| {
             let here = axis.set_point();
             let standing = State { position: here.position, ..State::default() };
