@@ -143,28 +143,6 @@ fn a_stop_of_category_2_comes_to_rest_at_the_deceleration_limit_and_never_starts
     assert_eq!(world.stops().len(), 1);
 }
 
-/// The drive takes a target that lies nearer than it can stop, passes it and swings back. A stop does not.
-#[test]
-fn a_stop_on_the_way_to_a_target_that_is_too_near_to_stop_at_comes_to_rest_beyond_it_and_for_good() {
-    let mut world = World::holding(erob());
-    in_motion(&mut world);
-    let (here, speed) = (world.observe(0).position, world.observe(0).velocity);
-    let shortest = speed * speed / (2.0 * world.config.axes[0].limits.deceleration);
-    world.drive_to(8, 0, ProfileTarget::Position(here + 0.3 * shortest));
-    world.request(Request::Stop(StopCategory::Two));
-    world.run_until(|world| world.phase() == Phase::Holding);
-    let held = world.observe(0);
-    assert!(held.velocity.abs() < 0.02 * speed, "{held:?}");
-    let way = held.position - here;
-    assert!((shortest..1.2 * shortest).contains(&way), "{way}, at the limit {shortest}");
-    for _ in 0..2_000 {
-        world.run_for(1);
-        let velocity = world.observe(0).velocity;
-        assert!(velocity > -0.02 * speed, "it went back: {velocity}");
-    }
-    assert!((world.observe(0).position - held.position).abs() < 1e-2);
-}
-
 #[test]
 fn a_stop_of_category_1_brakes_in_the_end() {
     let mut world = World::holding(erob());
