@@ -54,17 +54,19 @@ pub enum Flow {
 }
 
 /// The loop's place on the grid.
-#[derive(Clone, Copy, Debug)]
+#[derive(Debug)]
 pub struct Cycle {
     grid: Grid,
     plan: SlotPlan,
     next_slot: u64,
+    /// What leaves on each bus. It lives here so that its 80 kB need not be written anew in every cycle.
+    batches: [SendBatch; MAX_BUSES],
 }
 
 impl Cycle {
     /// A loop that begins with slot 0 of `grid`.
     pub const fn new(grid: Grid, plan: SlotPlan) -> Self {
-        Self { grid, plan, next_slot: 0 }
+        Self { grid, plan, next_slot: 0, batches: [const { SendBatch::new_const() }; MAX_BUSES] }
     }
 
     /// One whole cycle.
@@ -94,14 +96,14 @@ impl Cycle {
         let has_commands = engine.compute(timing.slot, began_ns, &health, transmission, door);
         timing.compute_ns = clock.now_ns().saturating_sub(began_ns);
 
-        let mut batches: [SendBatch; MAX_BUSES] = [const { SendBatch::new_const() }; MAX_BUSES];
-        for (bus, batch) in batches.iter_mut().enumerate().take(ports.len()) {
+        for (bus, batch) in self.batches.iter_mut().enumerate().take(ports.len()) {
+            batch.clear();
             if has_commands {
                 engine.set_points(bus, timing.slot, batch);
             }
             engine.services(bus, door, batch);
         }
-        if !send(ports, &batches, clock.now_ns()) {
+        if !send(ports, &self.batches, clock.now_ns()) {
             engine.not_taken();
         }
         let finished_ns = clock.now_ns();
