@@ -54,19 +54,17 @@ pub enum Flow {
 }
 
 /// The loop's place on the grid.
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug)]
 pub struct Cycle {
     grid: Grid,
     plan: SlotPlan,
     next_slot: u64,
-    /// What leaves on each bus. It lives here so that its 80 kB need not be written anew in every cycle.
-    batches: [SendBatch; MAX_BUSES],
 }
 
 impl Cycle {
     /// A loop that begins with slot 0 of `grid`.
     pub const fn new(grid: Grid, plan: SlotPlan) -> Self {
-        Self { grid, plan, next_slot: 0, batches: [const { SendBatch::new_const() }; MAX_BUSES] }
+        Self { grid, plan, next_slot: 0 }
     }
 
     /// One whole cycle.
@@ -96,14 +94,15 @@ impl Cycle {
         let has_commands = engine.compute(timing.slot, began_ns, &health, transmission, door);
         timing.compute_ns = clock.now_ns().saturating_sub(began_ns);
 
-        for (bus, batch) in self.batches.iter_mut().enumerate().take(ports.len()) {
-            batch.clear();
+        // Not made as a constant, whose 80 kB would be written in every cycle.
+        let mut batches: [SendBatch; MAX_BUSES] = core::array::from_fn(|_| SendBatch::new());
+        for (bus, batch) in batches.iter_mut().enumerate().take(ports.len()) {
             if has_commands {
                 engine.set_points(bus, timing.slot, batch);
             }
             engine.services(bus, door, batch);
         }
-        if !send(ports, &self.batches, clock.now_ns()) {
+        if !send(ports, &batches, clock.now_ns()) {
             engine.not_taken();
         }
         let finished_ns = clock.now_ns();
