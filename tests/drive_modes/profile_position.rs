@@ -9,7 +9,7 @@ use takt_rt::frame::Frame;
 use takt_rt::profile::ProfileTarget;
 use takt_rt::stop::{Phase, Rule, StopCategory};
 
-use crate::world::{World, counts, counts_per_unit, id, load, one_yz_aim, parse, word};
+use crate::world::{MILLISECOND_NS, World, counts, counts_per_unit, id, load, one_yz_aim, parse, word};
 
 const RPDO1: u32 = 0x201;
 const TPDO1: u32 = 0x181;
@@ -141,6 +141,45 @@ fn a_stop_of_category_2_comes_to_rest_at_the_deceleration_limit_and_never_starts
     assert!(velocities[velocities.len() - 2_000..].iter().all(|velocity| velocity.abs() < 1e-3));
     assert_eq!(world.phase(), Phase::Holding);
     assert_eq!(world.stops().len(), 1);
+}
+
+/// The drive takes a target that lies nearer than it can stop, passes it and swings back. A stop does not.
+#[test]
+fn a_stop_on_the_way_to_a_target_that_is_too_near_to_stop_at_comes_to_rest_beyond_it_and_for_good() {
+    let mut world = World::holding(erob());
+    in_motion(&mut world);
+    let (here, speed) = (world.observe(0).position, world.observe(0).velocity);
+    let shortest = speed * speed / (2.0 * world.config.axes[0].limits.deceleration);
+    world.drive_to(8, 0, ProfileTarget::Position(here + 0.3 * shortest));
+    world.request(Request::Stop(StopCategory::Two));
+    world.run_until(|world| world.phase() == Phase::Holding);
+    let held = world.observe(0);
+    assert!(held.velocity.abs() < 0.02 * speed, "{held:?}");
+    let way = held.position - here;
+    assert!((shortest..1.2 * shortest).contains(&way), "{way}, at the limit {shortest}");
+    for _ in 0..2_000 {
+        world.run_for(1);
+        let velocity = world.observe(0).velocity;
+        assert!(velocity > -0.02 * speed, "it went back: {velocity}");
+    }
+    assert!((world.observe(0).position - held.position).abs() < 1e-2);
+}
+
+/// The cycle that follows missed slots is a long one; those of the stop are not.
+#[test]
+fn a_stop_right_after_missed_slots_is_no_longer_than_any_other() {
+    let mut config = erob();
+    config.simulation.longest_gap_ns = 100 * MILLISECOND_NS;
+    let mut world = World::holding(config);
+    in_motion(&mut world);
+    world.run.clock().stall(12 * MILLISECOND_NS);
+    world.request(Request::Stop(StopCategory::Two));
+    assert_eq!(world.phase(), Phase::Stopping);
+    let begun = world.observe(0);
+    world.run_until(|world| world.phase() == Phase::Holding);
+    let way = world.observe(0).position - begun.position;
+    let shortest = begun.velocity * begun.velocity / (2.0 * world.config.axes[0].limits.deceleration);
+    assert!((shortest..1.1 * shortest).contains(&way), "{way}, at the limit {shortest}");
 }
 
 #[test]

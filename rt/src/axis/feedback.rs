@@ -97,10 +97,10 @@ impl Axis {
         // its report, not before it. Whoever may be either has had the longer time, and is believed to be no faster.
         let longest_s = match self.parameters.feedback_since {
             FeedbackSince::Sync => span_s,
-            FeedbackSince::CommandPhase => span_s.max(self.cycle_s),
+            FeedbackSince::CommandPhase => span_s.max(self.last_span_s),
         };
         self.span_s = 0.0;
-        self.cycle_s = span_s;
+        self.last_span_s = span_s;
         self.arrived = 0;
         self.age = 0;
         self.judge_position(longest_s);

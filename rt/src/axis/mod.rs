@@ -59,10 +59,12 @@ pub struct Axis {
     /// Which feedback PDOs have come since then, a bit each.
     arrived: u8,
     age: u16,
+    /// The period of its bus.
+    cycle_s: f64,
     /// Time since the feedback before.
     span_s: f64,
-    /// The last such time between two feedbacks.
-    cycle_s: f64,
+    /// The last such time between two feedbacks: slots that are missed make it longer than a cycle.
+    last_span_s: f64,
     is_heard: bool,
     /// Cycles in which a drive in profile position has stood before its target.
     stalled_cycles: u32,
@@ -122,8 +124,9 @@ impl Axis {
             expected_since_ns: 0,
             arrived: 0,
             age: 0,
-            span_s: 0.0,
             cycle_s: 0.0,
+            span_s: 0.0,
+            last_span_s: 0.0,
             is_heard: false,
             state: DriveState::NotReadyToSwitchOn,
             stalled_cycles: 0,
@@ -152,6 +155,11 @@ impl Axis {
     /// What does not change.
     pub fn parameters(&self) -> &AxisParameters {
         &self.parameters
+    }
+
+    /// Takes over the period of the axis' bus.
+    pub fn set_cycle(&mut self, cycle_s: f64) {
+        self.cycle_s = cycle_s;
     }
 
     /// Uses the rated torque that the drive has reported (N·m, or N). Nonsense changes nothing.

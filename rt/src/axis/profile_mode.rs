@@ -72,38 +72,56 @@ impl Axis {
         self.set_profile_target(target, Nanoseconds::MAX);
     }
 
+    /// How the drive decelerates. A YZ-AIM has one ramp for both.
+    fn deceleration(&self) -> f64 {
+        let limits = &self.parameters.limits;
+        match self.parameters.dialect {
+            Dialect::Cia402 => limits.deceleration,
+            Dialect::YzAim => limits.deceleration.min(limits.acceleration),
+        }
+    }
+
+    /// The least distance in which the drive can stop.
+    fn braking_distance(&self) -> f64 {
+        self.velocity * self.velocity / (2.0 * self.deceleration())
+    }
+
     /// How far the joint goes on, in its direction, when it is told to come to rest now: until the drive has heard that,
     /// which in profile position waits for the handshake, and while it decelerates.
     fn way_to_rest(&self) -> f64 {
         let limits = &self.parameters.limits;
-        // A YZ-AIM has one ramp for both.
-        let deceleration = match self.parameters.dialect {
-            Dialect::Cia402 => limits.deceleration,
-            Dialect::YzAim => limits.deceleration.min(limits.acceleration),
-        };
         let reaction_s = f64::from(REACTION_CYCLES + self.profile.cycles_to_offer()) * self.cycle_s;
         // It may still be speeding up.
         let speed = self.velocity.abs();
         let highest = (speed + limits.acceleration * reaction_s).min(limits.velocity.max(speed));
-        let distance = highest * reaction_s + highest * highest / (2.0 * deceleration);
+        let distance = highest * reaction_s + highest * highest / (2.0 * self.deceleration());
         if self.velocity == 0.0 { 0.0 } else { distance.copysign(self.velocity) }
     }
 
-    /// Where the joint comes to rest if it is told to now; not beyond where it is going, nor beyond its limits.
+    /// Where the joint comes to rest if it is told to now: on its target, if that is on its way and it can stop there; never
+    /// beyond its limits.
     fn nearest_rest(&self) -> f64 {
         let limits = &self.parameters.limits;
         let (lowest, highest) =
             (limits.position_min.min(self.position), limits.position_max.max(self.position));
         let rest = (self.position + self.way_to_rest()).clamp(lowest, highest);
-        match self.profile_target {
-            Some(ProfileTarget::Position(target)) if self.velocity > 0.0 && target > self.position => {
-                rest.min(target)
-            }
-            Some(ProfileTarget::Position(target)) if self.velocity < 0.0 && target < self.position => {
-                rest.max(target)
-            }
-            _ => rest,
+        let Some(ProfileTarget::Position(target)) = self.profile_target else { return rest };
+        let ahead = (target - self.position) * self.velocity.signum();
+        if self.velocity == 0.0 || ahead <= 0.0 {
+            return rest;
         }
+        // A drive that is told to stop nearer than it can swings back. Its target is too near, so it does not speed up.
+        let braking = self.braking_distance();
+        let reaction = self.velocity.abs() * f64::from(REACTION_CYCLES) * self.cycle_s;
+        let nearest = if ahead < braking { reaction + braking } else { ahead };
+        rest.clamp(self.position - nearest, self.position + nearest)
+    }
+
+    /// Whether a stop of the joint is over: it stands, and in profile position where it was sent. One that swings back
+    /// stands for a moment on its way.
+    pub fn has_stopped(&self) -> bool {
+        let is_under_way = self.parameters.law == ControlLaw::ProfilePosition && self.is_enabled();
+        self.is_at_rest() && (!is_under_way || self.is_target_reached())
     }
 
     /// Whether the drive has its target and says that it has reached it; an axis that follows set-points always has.

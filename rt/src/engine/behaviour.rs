@@ -122,7 +122,7 @@ impl Engine {
     /// The planned part of a stop is over; a joint in a profile mode gets the time that its limits allow for.
     fn finish_stop(&mut self, now_ns: Nanoseconds, door: &mut impl Door) {
         let slowest_s =
-            self.axes.iter().filter(|axis| !axis.is_at_rest()).map(stopping_s).fold(0.0, f64::max);
+            self.axes.iter().filter(|axis| !axis.has_stopped()).map(stopping_s).fold(0.0, f64::max);
         if f64::from(self.phase_cycles) * self.period_s < slowest_s {
             return;
         }

@@ -7,7 +7,7 @@ use crate::dispatch::{Dispatch, IdTaken};
 use crate::frame::Id;
 use crate::record::{MAX_AXES, MAX_BUSES};
 use crate::stop::StopCategories;
-use crate::time::Nanoseconds;
+use crate::time::{NANOSECONDS_PER_SECOND, Nanoseconds};
 use crate::watch::TimingLadder;
 
 /// A bus as the engine knows it.
@@ -102,8 +102,10 @@ pub(super) fn axes_of(parameters: &EngineParameters) -> ArrayVec<Axis, MAX_AXES>
         |axis: &Axis| parameters.buses.get(usize::from(axis.parameters().bus)).map_or(1, |bus| bus.divider);
     // A drive in a profile mode gets no set-points that anybody would have to wait for.
     let slowest = axes.iter().filter(|axis| !axis.is_profile()).map(divider).max().unwrap_or(1);
+    let period_s = parameters.period_ns as f64 / NANOSECONDS_PER_SECOND as f64;
     for axis in &mut axes {
         axis.delay_set_points(slowest.saturating_sub(divider(axis)).saturating_mul(2));
+        axis.set_cycle(period_s * f64::from(divider(axis)));
     }
     axes
 }
