@@ -22,8 +22,6 @@ use crate::drive::{AxisFacts, BringUp, Leave};
 
 /// The group must get where it was told to within this time; the engine has time-outs of its own, which are shorter.
 const PATIENCE_NS: u64 = 8_000_000_000;
-/// An immediate end waits no longer than this for the drives to show that they have no torque.
-const CUT_NS: u64 = 100_000_000;
 /// Standstill before the brakes: the drives settle on their last set-point.
 const SETTLE_NS: u64 = 300_000_000;
 
@@ -159,9 +157,10 @@ impl Supervisor {
             }
             Stage::Leave => self.say_farewell(now_ns, elapsed_ns, host),
             Stage::Cut => {
-                // The last controlwords take effect at the SYNC after them, so the loop goes on until it shows.
+                // The last controlwords take effect at the SYNC after them, and may have to wait for the bus: the loop goes
+                // on until it shows, or until the engine waits no longer.
                 let is_off = matches!(snapshot.phase, Phase::Disabled | Phase::Passive);
-                if (is_off && elapsed_ns > 0) || elapsed_ns > CUT_NS {
+                if (is_off && elapsed_ns > 0) || elapsed_ns > PATIENCE_NS {
                     self.ask(Request::Leave);
                     self.enter(Stage::Done, now_ns);
                 }

@@ -27,17 +27,20 @@ fn machine(name: &str) -> Config {
     config
 }
 
-fn deafened(config: &Config, command: &str) -> Rehearsal {
+fn deafening(config: &Config, command: &str) -> String {
     let axis = &config.axes[0].name;
-    let text = format!(
-        "[[fault]]\nkind = \"foreign-nmt\"\naxis = \"{axis}\"\ncommand = \"{command}\"\nwhen = \"moving\"\nat = \"300 ms\""
-    );
-    Rehearsal::new(scenario(&text, config))
+    format!(
+        "[[fault]]\nkind = \"foreign-nmt\"\naxis = \"{axis}\"\ncommand = \"{command}\"\nwhen = \"moving\"\nat = \"300 ms\"\n"
+    )
 }
 
 /// Plays until the fault has begun.
 fn struck(config: &Config, command: &str) -> VirtualRun<Port> {
-    let rehearsal = Arc::new(deafened(config, command));
+    played_until_struck(config, &deafening(config, command))
+}
+
+fn played_until_struck(config: &Config, faults: &str) -> VirtualRun<Port> {
+    let rehearsal = Arc::new(Rehearsal::new(scenario(faults, config)));
     let (mut run, _) = VirtualRun::rehearsed(config, Arc::clone(&rehearsal)).unwrap();
     while !rehearsal.courses().any(|(_, course)| course.began_ns().is_some()) {
         assert!(run.step(), "{}: over before the fault", config.name);
@@ -86,6 +89,26 @@ fn a_run_that_is_cut_off_leaves_no_deaf_drive_enabled() {
             while run.step() {}
             let state = first_drive(&config, &mut run).state;
             assert!(!state.has_torque(), "{name}, {command}: {state:?}");
+        }
+    }
+}
+
+/// Reset, the drive watches nobody any more; while nothing gets to it, only patience helps.
+#[test]
+fn a_run_waits_for_a_queue_that_is_full_before_it_leaves_a_drive_that_watches_nobody() {
+    for name in MACHINES {
+        let config = machine(name);
+        let bus = &config.buses[config.axes[0].bus].name;
+        let full = format!(
+            "[[fault]]\nkind = \"full-queue\"\nbus = \"{bus}\"\nwhen = \"moving\"\nat = \"300 ms\"\nfor = \"400 ms\"\n"
+        );
+        for interrupt in [None, Some(Interrupt::Controlled), Some(Interrupt::Immediate)] {
+            let mut run =
+                played_until_struck(&config, &(full.clone() + &deafening(&config, "reset-communication")));
+            interrupt.into_iter().for_each(|interrupt| run.interrupt(interrupt));
+            while run.step() {}
+            let state = first_drive(&config, &mut run).state;
+            assert!(!state.has_torque(), "{name}, {interrupt:?}: {state:?}");
         }
     }
 }

@@ -107,6 +107,7 @@ fn concern(axis: &Axis, fault: &takt::faults::Fault) -> Concern {
     };
     let is_cut_off = match fault.effect {
         Effect::Interface(effect) => effect != InterfaceEffect::ErrorPassive,
+        Effect::Frames(FrameEffect::FullQueue) => true,
         Effect::Drive { node, trouble } => {
             node == axis.node && trouble == DriveTrouble::Defect(Defect::SilentSdoServer)
         }

@@ -124,6 +124,11 @@ fn storms_that_have_failed_once_pass() {
         // A load came up after the run, in the time in which the joints were watched for rest.
         23840, // A drive had torque for a part of the cycle, from frames that were corrupted.
         24065,
+        // A stop in profile position kept a target that was too near, and its turning point was taken for rest.
+        1_007_267,
+        // A stop in profile position right after missed slots was led far beyond where the joint could have stopped.
+        37621, // A run that was cut off left while the queue was full, and a drive that watched nobody enabled.
+        1_012_241,
     ];
     for seed in seeds {
         let played = play(&Case::of(seed));
