@@ -97,41 +97,54 @@ fn a_stop_in_coordination_leads_no_joint_beyond_its_position_limit() {
     }
 }
 
+/// What each of them has found.
+const FAILED_ONCE: [(u64, &str); 19] = [
+    (1875, "An event timer that was set before operational woke a YZ-AIM in every nanosecond"),
+    (3022, "A YZ-AIM whose communication has been reset watches the controller for 2 s"),
+    (823, "A clamped stream expired too near to a position limit for a stop with limited jerk"),
+    (898, "A group was enabled anew while the controlwords that disabled it were under way"),
+    (206, "A joint was enabled while it was coasting"),
+    (613, "A stream was stopped with a joint in profile torque, and its drive's quick stop taken back"),
+    (8727, "A run that was cut off ended before the SYNC at which its last controlwords act"),
+    (
+        21647,
+        "A move passed its target so fast, and so near to a position limit, that nothing could stop it before",
+    ),
+    (
+        43967,
+        "Another client enabled the group while the run said farewell to the drives, which took their watchdogs away",
+    ),
+    (33837, "A stop from a stream leapt from an acceleration that only the other direction allows"),
+    (
+        45278,
+        "A command that had been bridged was in the third difference over a slower bus' steps when a stop began",
+    ),
+    (
+        10486,
+        "A drive had said by SDO that it was off, and the set-points that it was believed to follow broke off",
+    ),
+    (4572, "A group was called disabled while the word that enabled a drive was on the wire"),
+    (14435, "A reset waited for longer than a reset may take while a flood kept the bus busy"),
+    (23840, "A load came up after the run, in the time in which the joints were watched for rest"),
+    (24065, "A drive had torque for a part of the cycle, from frames that were corrupted"),
+    (
+        1_007_267,
+        "A stop in profile position kept a target that was too near, and its turning point was taken for rest",
+    ),
+    (
+        37621,
+        "A stop in profile position right after missed slots was led far beyond where the joint could have stopped",
+    ),
+    (
+        1_012_241,
+        "A run that was cut off left while the queue was full, and a drive that watched nobody enabled",
+    ),
+];
+
 #[test]
 fn storms_that_have_failed_once_pass() {
-    let seeds = [
-        // An event timer that was set before operational woke a YZ-AIM in every nanosecond.
-        1875, // A YZ-AIM whose communication has been reset watches the controller for 2 s.
-        3022, // A clamped stream expired too near to a position limit for a stop with limited jerk.
-        823,  // A group was enabled anew while the controlwords that disabled it were under way.
-        898,  // A joint was enabled while it was coasting.
-        206,
-        // A stream was stopped with a joint in profile torque, and its drive's quick stop taken back.
-        613, // A run that was cut off ended before the SYNC at which its last controlwords act.
-        8727,
-        // A move passed its target so fast, and so near to a position limit, that nothing could stop it before.
-        21647,
-        // Another client enabled the group while the run said farewell to the drives, which took their watchdogs away.
-        43967,
-        // A stop from a stream leapt from an acceleration that only the other direction allows.
-        33837,
-        // A command that had been bridged was in the third difference over a slower bus' steps when a stop began.
-        45278,
-        // A drive had said by SDO that it was off, and the set-points that it was believed to follow broke off.
-        10486, // A group was called disabled while the word that enabled a drive was on the wire.
-        4572,  // A reset waited for longer than a reset may take while a flood kept the bus busy.
-        14435,
-        // A load came up after the run, in the time in which the joints were watched for rest.
-        23840, // A drive had torque for a part of the cycle, from frames that were corrupted.
-        24065,
-        // A stop in profile position kept a target that was too near, and its turning point was taken for rest.
-        1_007_267,
-        // A stop in profile position right after missed slots was led far beyond where the joint could have stopped.
-        37621, // A run that was cut off left while the queue was full, and a drive that watched nobody enabled.
-        1_012_241,
-    ];
-    for seed in seeds {
+    for (seed, what) in FAILED_ONCE {
         let played = play(&Case::of(seed));
-        assert!(played.is_ok(), "{seed}: {played:?}");
+        assert!(played.is_ok(), "{seed}, {what}: {played:?}");
     }
 }
