@@ -7,5 +7,6 @@ mod drives;
 mod files;
 mod late_drives;
 mod reactions;
+mod rearming;
 mod repeatability;
 mod wrapper;

@@ -76,6 +76,20 @@ impl Axis {
         self.since_emergency = (code != 0).then_some(0);
     }
 
+    /// Forgets what has been wrong with the drive. The code of a fault is known until it is there no more.
+    pub fn begin_fault_reset(&mut self) {
+        self.since_emergency = None;
+        self.is_being_reset = self.state.is_faulted();
+        if !self.is_being_reset {
+            self.emergency_code = 0;
+        }
+    }
+
+    /// Whether a fault that was there when the last reset began has been there ever since.
+    pub fn is_being_reset(&self) -> bool {
+        self.is_being_reset
+    }
+
     /// Lets time pass in a slot in which the axis' bus has no cycle.
     pub fn wait(&mut self, elapsed_s: f64) {
         self.span_s += elapsed_s;
@@ -166,9 +180,14 @@ impl Axis {
             && shown != DriveState::OperationEnabled
             && !shown.is_faulted();
         self.contradictions = if contradicts { self.contradictions.saturating_add(1) } else { 0 };
-        if self.contradictions != 1 {
-            self.state = shown;
+        if self.contradictions == 1 {
+            return;
         }
+        if self.state.is_faulted() && !shown.is_faulted() {
+            self.emergency_code = 0;
+            self.is_being_reset = false;
+        }
+        self.state = shown;
     }
 
     /// The drive's state by its statuswords.

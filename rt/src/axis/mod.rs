@@ -84,6 +84,8 @@ pub struct Axis {
     /// Whether `position` is what the drive has said.
     is_position_known: bool,
     emergency_code: u16,
+    /// See [`Axis::is_being_reset`].
+    is_being_reset: bool,
     /// Cycles since an emergency message came.
     since_emergency: Option<u8>,
     node_watch: NodeWatch,
@@ -138,6 +140,7 @@ impl Axis {
             jump: None,
             is_position_known: false,
             emergency_code: 0,
+            is_being_reset: false,
             since_emergency: None,
             node_watch: NodeWatch::default(),
             duplicate_watch: DuplicateWatch::default(),

@@ -40,7 +40,7 @@ pub type SendBatch = ArrayVec<Frame, SEND_BATCH>;
 const MARKED_BY_BRIDGE: u8 = 4;
 /// Requests looked at in one cycle; the rest waits, so that a flood costs a bounded time.
 const REQUESTS_PER_CYCLE: usize = 4;
-/// How long controlword bit 7 is held low before, and high in, a fault reset.
+/// How long controlword bit 7 is held low before, and high in, a fault reset, and how long the drives have to answer it.
 const FAULT_RESET_CYCLES: u32 = 10;
 /// Whether the set-points of a cycle can leave.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -131,6 +131,7 @@ pub struct Engine {
     /// Whose next SYNC is left out.
     left_out: BusSet,
     stop: Option<StopReason>,
+    /// Cycles of a fault reset that are still to come.
     fault_reset: u32,
     heartbeat_due: u32,
     /// Whether the drives have been given a heartbeat since they were to be enabled.

@@ -188,10 +188,8 @@ impl Engine {
     fn reset_faults(&mut self) -> bool {
         match self.phase {
             Phase::Disabled => {
-                self.fault_reset = 2 * FAULT_RESET_CYCLES;
-                for axis in &mut self.axes {
-                    axis.receive_emergency(0);
-                }
+                self.fault_reset = 3 * FAULT_RESET_CYCLES;
+                self.axes.iter_mut().for_each(Axis::begin_fault_reset);
             }
             Phase::Holding => {}
             _ => return false,

@@ -64,7 +64,8 @@ impl Engine {
             // An axis counts in cycles of its bus.
             let acknowledge_limit =
                 self.acknowledge_timeout_cycles.div_ceil(bus.map_or(1, |bus| bus.divider.max(1)));
-            let complaint = complaint(axis, self.phase, acknowledge_limit, self.period_s);
+            let is_resetting = self.fault_reset > 0 && axis.is_being_reset();
+            let complaint = complaint(axis, self.phase, is_resetting, acknowledge_limit, self.period_s);
             let Some((rule, value, limit)) = complaint else {
                 continue;
             };
@@ -171,18 +172,20 @@ const fn has_power(phase: Phase) -> bool {
     !matches!(phase, Phase::Passive | Phase::Disabled)
 }
 
-/// What is wrong with an axis, if anything: rule, value, limit.
+/// What is wrong with an axis, if anything: rule, value, limit. A fault that is being reset is none yet.
 fn complaint(
     axis: &mut Axis,
     phase: Phase,
+    is_resetting: bool,
     acknowledge_limit: u32,
     period_s: f64,
 ) -> Option<(Rule, f64, f64)> {
     let is_stopping_itself = phase == Phase::Stopping && axis.stops_by_itself();
     let must_be_enabled = !matches!(phase, Phase::Enabling | Phase::Disabling) && !is_stopping_itself;
     let is_disabled = must_be_enabled && !axis.is_enabled();
+    let is_faulted = axis.drive_state().is_faulted() && !is_resetting;
     // Whatever else is wrong with it, and comes first.
-    if is_disabled || axis.drive_state().is_faulted() {
+    if is_disabled || is_faulted {
         axis.give_up();
     }
     let missed_limit = axis.parameters().missed_feedback_cycles;
@@ -192,7 +195,7 @@ fn complaint(
     if axis.late_cycles() > 0 {
         return Some((Rule::MissedFeedback, axis.late_cycles().into(), 0.0));
     }
-    if axis.drive_state().is_faulted() {
+    if is_faulted {
         return Some((Rule::DriveFault, axis.error_code().into(), 0.0));
     }
     if let Some(complaint) = axis.node_complaint() {

@@ -111,10 +111,10 @@ impl Engine {
     pub(super) fn write_commands(&mut self, slot: u64) {
         let resetting = self.fault_reset;
         self.fault_reset = resetting.saturating_sub(1);
-        // Low first, so that what follows is an edge whatever was sent before.
-        let reset_word = match resetting {
-            0 => None,
-            1..=FAULT_RESET_CYCLES => Some(controlword::FAULT_RESET),
+        // Low first, so that what follows is an edge whatever was sent before; in the end the drives answer.
+        let reset_word = match resetting.div_ceil(FAULT_RESET_CYCLES) {
+            0 | 1 => None,
+            2 => Some(controlword::FAULT_RESET),
             _ => Some(controlword::DISABLE_VOLTAGE),
         };
         // With these commands, or before them.
