@@ -5,34 +5,34 @@
 //! cargo run --release --example embed configs/arm6-erob.toml
 //! ```
 
-use std::error::Error;
 use std::f64::consts::TAU;
 use std::path::PathBuf;
 use std::thread;
 use std::time::Duration;
 
+use miette::IntoDiagnostic;
 use takt::config::{Config, OnViolation};
 use takt::controller::Controller;
 use takt::controller::session::SessionOptions;
 use takt_rt::plan::State;
 
-fn main() -> Result<(), Box<dyn Error>> {
+fn main() -> miette::Result<()> {
     let path = std::env::args().nth(1).map_or_else(|| PathBuf::from("configs/arm6-erob.toml"), PathBuf::from);
-    let mut config = Config::load(&path).map_err(miette::Report::new)?;
+    let mut config = Config::load(&path)?;
     // This thread is not real-time: it makes its set-points unevenly, and what comes of that is held to the limits.
     config.axes.iter_mut().for_each(|axis| axis.on_violation = OnViolation::Clamp);
     let cycle_ns = config.cycle.period_ns;
-    let mut arm = Controller::start(config, SessionOptions::default())?;
+    let mut arm = Controller::start(config, SessionOptions::default()).into_diagnostic()?;
 
     let middle = |axis: &takt::config::Axis| 0.5 * (axis.limits.position_min + axis.limits.position_max);
     let targets: Vec<f64> = arm.axes().iter().map(middle).collect();
-    let motion = arm.move_to(&targets)?;
-    arm.wait(motion, Duration::from_secs(30))?;
+    let motion = arm.move_to(&targets).into_diagnostic()?;
+    arm.wait(motion, Duration::from_secs(30)).into_diagnostic()?;
     show(&arm, "moved");
 
     // A set-point for every axis in every slot, made for the time of that slot and not for the time at which this thread
     // happens to run: what the drives get is then as smooth as what is computed.
-    arm.begin_stream()?;
+    arm.begin_stream().into_diagnostic()?;
     let period_s = cycle_ns as f64 * 1e-9;
     let (first, mut last) = (arm.state().slot, 0);
     while last - first.min(last) < (3.0 / period_s) as u64 {
@@ -52,12 +52,12 @@ fn main() -> Result<(), Box<dyn Error>> {
                 acceleration: 0.0,
             })
             .collect();
-        arm.stream(&set_points, Duration::from_millis(50))?;
+        arm.stream(&set_points, Duration::from_millis(50)).into_diagnostic()?;
     }
     show(&arm, "streamed");
     println!("{} set-points were held to the limits", arm.state().clamped);
 
-    let session = arm.finish()?;
+    let session = arm.finish().into_diagnostic()?;
     println!("{:?} after {} cycles", session.outcome, session.log.statistics.cycles);
     Ok(())
 }

@@ -5,18 +5,18 @@
 //! cargo run --release --example virtual_time configs/arm6-erob.toml
 //! ```
 
-use std::error::Error;
 use std::path::PathBuf;
 
+use miette::IntoDiagnostic;
 use takt::config::Config;
 use takt::controller::VirtualRun;
 
 const CYCLES_AT_MOST: u64 = 10_000_000;
 
-fn main() -> Result<(), Box<dyn Error>> {
+fn main() -> miette::Result<()> {
     let path = std::env::args().nth(1).map_or_else(|| PathBuf::from("configs/arm6-erob.toml"), PathBuf::from);
-    let config = Config::load(&path).map_err(miette::Report::new)?;
-    let (mut run, _log) = VirtualRun::simulated(&config)?;
+    let config = Config::load(&path)?;
+    let (mut run, _log) = VirtualRun::simulated(&config).into_diagnostic()?;
     let mut largest = vec![0.0_f64; config.axes.len()];
     let outcome = run.run(CYCLES_AT_MOST, |run| {
         for (largest, axis) in largest.iter_mut().zip(run.snapshot().axes) {

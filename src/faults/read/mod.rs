@@ -18,7 +18,7 @@ use crate::config::{Config, ConfigError, ProblemKind};
 const FAULTS_AT_MOST: usize = 64;
 
 /// A scenario that cannot be played.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, miette::Diagnostic)]
 pub enum ScenarioError {
     /// The file cannot be read.
     #[error("the scenario {path} cannot be read: {reason}")]
@@ -30,6 +30,7 @@ pub enum ScenarioError {
     },
     /// It is not right, or does not suit the configuration. `miette` shows each problem with its line.
     #[error(transparent)]
+    #[diagnostic(transparent)]
     Wrong(#[from] ConfigError),
 }
 

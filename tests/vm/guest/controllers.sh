@@ -1,6 +1,6 @@
 # What breaks between the emulated controllers and their bus, and in the controllers themselves: three axes on can0 and
 # can1, which only the emulated machine has; another one's controllers may be in use. Their error counters are those of
-# tests/vm/module. TAKT names the program.
+# tests/vm/module. TAKT names the program, AFTER_A_STOP the example of that name.
 [ "$TAKT_VM" != host ] || exit 0
 . tests/vm/guest/faulted_run.sh
 half=$folder/half.toml restarting=$folder/restarting.toml
@@ -73,6 +73,21 @@ moves_again() { # AFTER_WHAT
     end borne
 }
 
+# One process through it all: it stops, resets the fault, enables the axes again and goes on moving.
+goes_on_after_bus_off() {
+    name="program that goes on after bus-off"
+    sed 's/^interface = "sim"/interface = "can0"/' "$restarting" > "$folder/goes_on.toml"
+    chrt --other 0 "$AFTER_A_STOP" "$folder/goes_on.toml" 6 > "$folder/goes_on.txt" 2>&1 & run=$!
+    in_motion can0
+    errors can0 transmit 32
+    wait $run
+    if grep -q 'enabled again' "$folder/goes_on.txt" && grep -q '^Finished after 1 stop' "$folder/goes_on.txt"; then
+        passes "$name: $(tail -n 1 "$folder/goes_on.txt")"
+    else
+        fails "$name: $(tail -n 1 "$folder/goes_on.txt")"
+    fi
+}
+
 stays_off() {
     ip link set can0 down
     ip link set can0 up type can bitrate 1000000 restart-ms 0
@@ -110,6 +125,7 @@ bus_off "bus-off, restart after $restart_ms ms"
 sleep 0.2
 expect "$name, afterwards" "ERROR-ACTIVE 0 0" "$(controller can0 | cut -d ' ' -f -3)"
 moves_again "bus-off and restart"
+goes_on_after_bus_off
 stays_off
 goes_down_and_up "controller down and up" "$half" can0 base=can0
 flood "flood of identifier 001 from the drives' controller" can1 "$half" base=can0
