@@ -126,7 +126,11 @@ impl Line {
             value >= min * (1.0 + ROUNDING) && value <= max * (1.0 + ROUNDING)
         };
         let extrema = reference.extrema();
-        let jerk = reference.phases().fold(0.0_f64, |largest, phase| largest.max(phase.jerk.abs()));
+        // Without a limit of the jerk the acceleration leaps between the phases.
+        let jerk = match self.problem.limits.is_second_order() {
+            true => f64::INFINITY,
+            false => reference.phases().fold(0.0_f64, |largest, phase| largest.max(phase.jerk.abs())),
+        };
         problems.iter().all(|problem| {
             let ratio = self.ratio(problem);
             let Limits { velocity_max, velocity_min, acceleration_max, acceleration_min, jerk_max, .. } =
@@ -135,7 +139,7 @@ impl Line {
             let accelerations = [extrema.acceleration.min, extrema.acceleration.max];
             velocities.iter().all(|velocity| within(ratio * velocity, velocity_min, velocity_max))
                 && accelerations.iter().all(|value| within(ratio * value, acceleration_min, acceleration_max))
-                && ratio.abs() * jerk <= jerk_max * (1.0 + ROUNDING)
+                && (ratio == 0.0 || ratio.abs() * jerk <= jerk_max * (1.0 + ROUNDING))
         })
     }
 

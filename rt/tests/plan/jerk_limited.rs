@@ -504,6 +504,27 @@ fn a_motion_off_the_line_is_refused_in_the_strict_mode_with_its_axis() {
 }
 
 #[test]
+fn an_axis_with_a_limited_jerk_does_not_follow_the_leaps_of_one_without() {
+    // On a straight line with the other one.
+    let leaping = Problem {
+        start: state(0.0, -0.4, 0.0),
+        target: State::rest(1.0),
+        limits: Limits::symmetric(1.0, 8.0, f64::INFINITY),
+    };
+    let other = Problem {
+        start: state(0.0, -0.1, 0.0),
+        target: State::rest(0.25),
+        limits: Limits::symmetric(1.0, 8.0, 40.0),
+    };
+    let timing = Timing { synchronisation: Synchronisation::Phase, ..Timing::default() };
+    for problems in [[leaping, other], [other, leaping]] {
+        for (problem, profile) in problems.iter().zip(plan(&problems, timing).1) {
+            assert_eq!(judge(problem, &profile, Arrival::State), Ok(()));
+        }
+    }
+}
+
+#[test]
 fn a_velocity_is_reached_in_the_shortest_time() {
     let problem = Problem {
         start: state(0.0, 0.0, 0.0),
