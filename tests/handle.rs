@@ -81,6 +81,35 @@ fn after_a_stop_nothing_moves_before_the_fault_is_reset() {
     assert!(joint.wait_for(Phase::Holding, PATIENCE));
 }
 
+/// Four requests are taken up in a cycle: behind so many a stop would begin half a minute after it was asked for.
+const FLOOD: usize = 100_000;
+
+#[test]
+fn a_stop_overtakes_what_a_client_has_flooded_the_controller_with() {
+    let mut joint = start("single-erob.toml");
+    let mut asked = 0;
+    for number in 0..FLOOD {
+        match joint.move_to(&[0.2 + 0.1 * (number % 2) as f64]) {
+            Ok(_) => asked += 1,
+            Err(error) => assert!(matches!(error, CommandError::Full { .. }), "{error}"),
+        }
+    }
+    assert!(asked < FLOOD, "there is no end to what can be asked");
+    let last = loop {
+        if let Ok(motion) = joint.move_to(&[0.4]) {
+            break motion;
+        }
+    };
+    let slot = joint.state().slot;
+    joint.stop(StopCategory::One).unwrap();
+    assert!(joint.wait_for(Phase::Disabled, PATIENCE));
+    let stop = joint.state().stop.unwrap();
+    assert_eq!((stop.rule, stop.category), (Rule::Requested, StopCategory::One));
+    assert!(stop.slot - slot < 2_000, "{} slots after it was asked for", stop.slot - slot);
+    assert!(joint.wait(last, PATIENCE).is_err());
+    assert_eq!(joint.finish().unwrap().outcome, Outcome::Finished);
+}
+
 #[test]
 fn drives_that_cannot_be_brought_up_are_named() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/single-erob.toml");

@@ -1,17 +1,17 @@
 //! A controller in real time, from the configuration to what is left of the run.
 
-use std::collections::VecDeque;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, mpsc};
 use std::time::Duration;
 
-use takt_rt::door::{Asked, Request, Snapshot};
+use takt_rt::door::{Request, Snapshot};
 use takt_rt::linux::MonotonicClock;
 use takt_rt::port::Clock;
 use takt_rt::stop::StopCategory;
 
 use super::assemble::{self, AssembleError};
 use super::channels::{ChannelSizes, Observer, RequestNumbers, Streamer, channels};
+use super::handle::WaitingRequests;
 use super::outcome::{Interrupt, Outcome, Progress};
 use super::quiet;
 use super::realtime_thread::{self, Begun, Ended, StartError, Work};
@@ -97,8 +97,8 @@ pub fn run(
 
 /// Somebody who commands the group from another thread, in place of the program.
 pub(super) struct Remote {
-    /// What is asked of the group, in order.
-    pub requests: mpsc::Receiver<Asked>,
+    /// What is asked of the group.
+    pub requests: Arc<WaitingRequests>,
     /// Where the ways to see the state and to stream are handed out, and the numbers of requests, once the real-time
     /// thread runs.
     pub introduce: mpsc::SyncSender<(Observer, Streamer, RequestNumbers)>,
@@ -159,17 +159,15 @@ pub(super) fn lead(
         let _ = remote.introduce.send((host.observer(), streamer, host.numbers()));
     }
     let mut time_of_day = TimeOfDayKeeper::of(config);
-    let numbers = host.numbers();
-    let mut asked = VecDeque::new();
+    let mut time_to_tell = None;
     let (mut panicked, mut is_watched) = (None, true);
     while !running.is_finished() {
         supervisor.poll(clock.now_ns(), &mut host);
         let now_ns = clock.now_ns();
         let time = time_of_day.poll(now_ns, || WallClock::starting_now(now_ns));
-        asked.extend(time.map(|request| Asked { id: numbers.next(), request }));
-        asked.extend(remote.iter().flat_map(|remote| remote.requests.try_iter()));
-        while asked.front().is_some_and(|asked| host.ask(*asked).is_ok()) {
-            asked.pop_front();
+        time_to_tell = time.or(time_to_tell).filter(|time| host.request(*time).is_err());
+        if let Some(remote) = &remote {
+            remote.requests.hand_over(|asked| host.ask(asked).is_ok());
         }
         if let Some(rehearsal) = &options.rehearsal {
             rehearsal.observe(&host.snapshot());

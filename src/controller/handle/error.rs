@@ -57,6 +57,12 @@ pub enum CommandError {
         /// The mode that takes it.
         needed: &'static str,
     },
+    /// More has been asked for than the real-time thread has taken up yet; a stop always finds room.
+    #[error("{waiting} requests are waiting already")]
+    Full {
+        /// How many.
+        waiting: usize,
+    },
     /// The controller has ended.
     #[error("the controller has ended")]
     Ended,
@@ -68,7 +74,8 @@ pub enum MotionError {
     /// The group has stopped.
     #[error("the group has stopped: {0:?}")]
     Stopped(StopReason),
-    /// The real-time thread refused it: another phase, or a latched fault.
+    /// The real-time thread refused it: another phase, or a latched fault. Or it was never asked: too much was waiting, or a
+    /// stop has overtaken it.
     #[error("the motion was refused while {phase:?}")]
     Refused {
         /// The phase that the group was in.

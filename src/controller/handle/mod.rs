@@ -19,6 +19,7 @@
 //! ```
 
 mod error;
+mod waiting_requests;
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -39,6 +40,9 @@ use super::channels::{Observer, RequestNumbers, Streamer};
 use super::outcome::{Interrupt, Outcome};
 use super::session::{self, Remote, Session, SessionError, SessionOptions};
 use crate::config::{Axis, Config};
+use waiting_requests::REQUESTS_AT_MOST;
+
+pub(super) use waiting_requests::WaitingRequests;
 
 pub use error::{CommandError, MotionError, StartFailure};
 
@@ -50,7 +54,7 @@ const ENABLE_PATIENCE: Duration = Duration::from_secs(60);
 /// A group of axes that is enabled and obeys. Dropping it brings the axes to rest, disables and leaves them.
 pub struct Controller {
     axes: Vec<Axis>,
-    requests: mpsc::Sender<Asked>,
+    requests: Arc<WaitingRequests>,
     numbers: RequestNumbers,
     observer: Observer,
     streamer: Streamer,
@@ -89,9 +93,9 @@ impl Controller {
     /// # Errors
     /// See [`StartFailure`]; nothing has moved then.
     pub fn start(config: Config, options: SessionOptions) -> Result<Self, StartFailure> {
-        let (requests, remote_requests) = mpsc::channel();
+        let requests = Arc::new(WaitingRequests::default());
         let (introduce, introduced) = mpsc::sync_channel(1);
-        let remote = Remote { requests: remote_requests, introduce };
+        let remote = Remote { requests: Arc::clone(&requests), introduce };
         let is_ending = Arc::new(AtomicBool::new(false));
         let axes = config.axes.clone();
         let thread = {
@@ -204,13 +208,16 @@ impl Controller {
     /// # Errors
     /// [`MotionError::Refused`] unless the group holds its position and is punctual, [`MotionError::Ended`].
     pub fn begin_stream(&mut self) -> Result<(), MotionError> {
-        let asked = self.ask(Request::Stream).map_err(|_| MotionError::Ended)?;
+        let asked = self.ask(Request::Stream).map_err(|error| match error {
+            CommandError::Full { .. } => MotionError::Refused { phase: self.state().phase },
+            _ => MotionError::Ended,
+        })?;
         loop {
             let state = self.state();
             if state.phase == Phase::Streaming {
                 return Ok(());
             }
-            if state.refusals.contain(asked) {
+            if self.is_refused(&state, asked) {
                 return Err(MotionError::Refused { phase: state.phase });
             }
             if self.has_ended() {
@@ -235,7 +242,8 @@ impl Controller {
         Ok(())
     }
 
-    /// Stops the group by this category.
+    /// Stops the group by this category. Whatever has been asked for before and is still waiting is forgotten, so that it
+    /// neither holds the stop up nor is begun after it.
     ///
     /// # Errors
     /// [`CommandError::Ended`].
@@ -243,7 +251,7 @@ impl Controller {
         self.ask(Request::Stop(category)).map(drop)
     }
 
-    /// Brings the axes to rest if need be, and disables them.
+    /// Brings the axes to rest if need be, and disables them. It overtakes what is waiting as [`Controller::stop`] does.
     ///
     /// # Errors
     /// [`CommandError::Ended`].
@@ -254,7 +262,7 @@ impl Controller {
     /// Enables the axes again, after [`Controller::disable`], or after a fault and [`Controller::reset_faults`].
     ///
     /// # Errors
-    /// [`CommandError::Ended`].
+    /// [`CommandError::Full`], [`CommandError::Ended`].
     pub fn enable(&mut self) -> Result<(), CommandError> {
         self.ask(Request::Enable).map(drop)
     }
@@ -262,7 +270,7 @@ impl Controller {
     /// Clears latched faults. Refused in motion.
     ///
     /// # Errors
-    /// [`CommandError::Ended`].
+    /// [`CommandError::Full`], [`CommandError::Ended`].
     pub fn reset_faults(&mut self) -> Result<(), CommandError> {
         self.ask(Request::ResetFaults).map(drop)
     }
@@ -282,7 +290,7 @@ impl Controller {
             if let Some(reason) = state.stop.filter(|reason| reason.slot > motion.slot) {
                 return Err(MotionError::Stopped(reason));
             }
-            if state.refusals.contain(motion.request) {
+            if self.is_refused(&state, motion.request) {
                 return Err(MotionError::Refused { phase: state.phase });
             }
             if self.has_ended() {
@@ -312,7 +320,7 @@ impl Controller {
     /// # Errors
     /// [`StartFailure::Died`] when the thread that leads the controller did not end by itself.
     pub fn finish(mut self) -> Result<Session, StartFailure> {
-        self.is_ending.store(true, Ordering::Relaxed);
+        self.begin_end();
         let Some(thread) = self.thread.take() else { return Err(StartFailure::Died) };
         match thread.join() {
             // To be asked to end is how such a run is over.
@@ -322,6 +330,13 @@ impl Controller {
             Ok(session) => Ok(session?),
             Err(_) => Err(StartFailure::Died),
         }
+    }
+
+    /// Ends the run from its present motion: what waits behind it is not begun any more.
+    fn begin_end(&self) {
+        // Where the controller has ended there is nothing to stop.
+        let _ = self.ask(Request::Stop(StopCategory::Two));
+        self.is_ending.store(true, Ordering::Relaxed);
     }
 
     fn has_ended(&self) -> bool {
@@ -353,19 +368,33 @@ impl Controller {
 
     fn begin(&self, id: RequestId, request: Request, ends_at_rest: bool) -> Result<Motion, CommandError> {
         let slot = self.state().slot;
-        self.requests.send(Asked { id, request }).map_err(|_| CommandError::Ended)?;
+        self.hand_in(Asked { id, request })?;
         Ok(Motion { request: id, slot, ends_at_rest })
     }
 
     fn ask(&self, request: Request) -> Result<RequestId, CommandError> {
         let id = self.numbers.next();
-        self.requests.send(Asked { id, request }).map(|()| id).map_err(|_| CommandError::Ended)
+        self.hand_in(Asked { id, request }).map(|()| id)
+    }
+
+    fn hand_in(&self, asked: Asked) -> Result<(), CommandError> {
+        if self.has_ended() {
+            Err(CommandError::Ended)
+        } else if self.requests.ask(asked) {
+            Ok(())
+        } else {
+            Err(CommandError::Full { waiting: REQUESTS_AT_MOST })
+        }
+    }
+
+    fn is_refused(&self, state: &Snapshot, request: RequestId) -> bool {
+        state.refusals.contain(request) || self.requests.has_forgotten(request)
     }
 }
 
 impl Drop for Controller {
     fn drop(&mut self) {
-        self.is_ending.store(true, Ordering::Relaxed);
+        self.begin_end();
         if let Some(thread) = self.thread.take() {
             // Its outcome interests nobody any more.
             let _ = thread.join();
