@@ -46,9 +46,12 @@ const TOML: &str = "[\\[\\]=\", .0-9a-z_\n#'{}-]{0,200}";
 #[test]
 fn every_kept_input_is_borne() {
     type Subject = fn(&[u8]);
-    let subjects: [(&str, Subject); 4] = [
+    let subjects: [(&str, Subject); 7] = [
         ("configuration", subjects::configuration::run),
         ("scenario", subjects::scenario::run),
+        ("device_description", subjects::device_description::run),
+        ("recording", subjects::recording::run),
+        ("problem_lines", subjects::problem_lines::run),
         ("wire", subjects::wire::run),
         ("engine", |bytes| drop(subjects::engine::run(bytes))),
     ];
@@ -99,6 +102,23 @@ proptest! {
     fn any_text_is_a_scenario_or_is_explained(text in TOML, seed in mutated("scenario")) {
         subjects::scenario::run(text.as_bytes());
         subjects::scenario::run(&seed);
+    }
+
+    #[test]
+    fn any_text_describes_a_device_or_is_explained(text in TOML, seed in mutated("device_description")) {
+        subjects::device_description::run(text.as_bytes());
+        subjects::device_description::run(&seed);
+    }
+
+    #[test]
+    fn any_file_is_a_recording_or_is_explained(seed in mutated("recording")) {
+        subjects::recording::run(&seed);
+    }
+
+    #[test]
+    fn any_text_is_a_trajectory_problem_or_is_explained(text in TOML, seed in mutated("problem_lines")) {
+        subjects::problem_lines::run(text.as_bytes());
+        subjects::problem_lines::run(&seed);
     }
 
     #[test]
