@@ -4,10 +4,14 @@
 use std::path::Path;
 
 use proptest::prelude::*;
+use takt_rt::cia402::OperationMode;
+use takt_rt::dialect::Dialect;
 use takt_rt::stop::Phase;
 
 #[path = "../fuzz/subjects/mod.rs"]
 mod subjects;
+
+use subjects::engine::Journey;
 
 fn seeds(name: &str) -> Vec<Vec<u8>> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/seeds").join(name);
@@ -42,9 +46,12 @@ const TOML: &str = "[\\[\\]=\", .0-9a-z_\n#'{}-]{0,200}";
 #[test]
 fn every_kept_input_is_borne() {
     type Subject = fn(&[u8]);
-    let subjects: [(&str, Subject); 4] = [
+    let subjects: [(&str, Subject); 7] = [
         ("configuration", subjects::configuration::run),
         ("scenario", subjects::scenario::run),
+        ("device_description", subjects::device_description::run),
+        ("recording", subjects::recording::run),
+        ("problem_lines", subjects::problem_lines::run),
         ("wire", subjects::wire::run),
         ("engine", |bytes| drop(subjects::engine::run(bytes))),
     ];
@@ -55,11 +62,31 @@ fn every_kept_input_is_borne() {
 
 /// Else it would be no wonder that nothing goes wrong.
 #[test]
-fn the_kept_inputs_lead_the_group_through_every_phase() {
-    let phases: Vec<Phase> = seeds("engine").iter().flat_map(|bytes| subjects::engine::run(bytes)).collect();
+fn the_kept_inputs_lead_the_group_through_every_phase_and_move_it_in_every_mode() {
+    let journeys: Vec<Journey> = seeds("engine").iter().map(|bytes| subjects::engine::run(bytes)).collect();
     for phase in Phase::ALL {
-        assert!(phases.contains(&phase), "{phase:?}");
+        assert!(journeys.iter().any(|journey| journey.phases.contains(&phase)), "{phase:?}");
     }
+    let moved = |mode: OperationMode, dialect| {
+        journeys.iter().any(|journey| journey.modes_in_motion.contains(&(mode, dialect)))
+    };
+    for mode in [
+        OperationMode::CyclicSynchronousPosition,
+        OperationMode::CyclicSynchronousVelocity,
+        OperationMode::CyclicSynchronousTorque,
+        OperationMode::InterpolatedPosition,
+        OperationMode::ProfilePosition,
+        OperationMode::ProfileVelocity,
+        OperationMode::ProfileTorque,
+    ] {
+        assert!(moved(mode, Dialect::Cia402), "{mode:?}");
+    }
+    for mode in
+        [OperationMode::InterpolatedPosition, OperationMode::ProfilePosition, OperationMode::ProfileVelocity]
+    {
+        assert!(moved(mode, Dialect::YzAim), "{mode:?} of a YZ-AIM");
+    }
+    assert!(journeys.iter().any(|journey| journey.refused > 0 && journey.refused < journey.taken));
 }
 
 proptest! {
@@ -75,6 +102,23 @@ proptest! {
     fn any_text_is_a_scenario_or_is_explained(text in TOML, seed in mutated("scenario")) {
         subjects::scenario::run(text.as_bytes());
         subjects::scenario::run(&seed);
+    }
+
+    #[test]
+    fn any_text_describes_a_device_or_is_explained(text in TOML, seed in mutated("device_description")) {
+        subjects::device_description::run(text.as_bytes());
+        subjects::device_description::run(&seed);
+    }
+
+    #[test]
+    fn any_file_is_a_recording_or_is_explained(seed in mutated("recording")) {
+        subjects::recording::run(&seed);
+    }
+
+    #[test]
+    fn any_text_is_a_trajectory_problem_or_is_explained(text in TOML, seed in mutated("problem_lines")) {
+        subjects::problem_lines::run(text.as_bytes());
+        subjects::problem_lines::run(&seed);
     }
 
     #[test]

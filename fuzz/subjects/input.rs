@@ -2,6 +2,9 @@
 
 use takt_rt::frame::{Frame, Id};
 
+/// The identifiers of NMT, SYNC, TIME, and layer settings from slave and master.
+const FOR_ALL: [u32; 5] = [0x000, 0x080, 0x100, 0x7E4, 0x7E5];
+
 /// Reads values from bytes; 0 behind the end.
 #[derive(Clone, Copy, Debug)]
 pub struct Input<'a>(&'a [u8]);
@@ -50,6 +53,7 @@ impl<'a> Input<'a> {
         let id = match kind & 3 {
             0 => Id::extended(self.word() & 0x1FFF_FFFF),
             1 => Id::base(u32::from(self.short()) & 0x7FF),
+            3 => Id::base(FOR_ALL[usize::from(self.byte()) % FOR_ALL.len()]),
             _ => Ok(Id::canopen(u16::from(self.byte() & 15) << 7, self.byte() % 8)),
         };
         let id = id.expect("the identifier is cut to its field");

@@ -3,9 +3,12 @@
 use std::sync::OnceLock;
 
 use takt::canopen::emcy::Emergency;
+use takt::canopen::lss::{LssRequest, LssResponse};
 use takt::canopen::nmt::{ErrorControl, HeartbeatConsumer, NmtCommand};
 use takt::canopen::object::ObjectAddress;
 use takt::canopen::sdo::{Client, Request, Response, Timing, Transfer};
+use takt::canopen::sync::Sync;
+use takt::canopen::time::{TimeOfDay, system_time};
 use takt::config::Config;
 use takt::sim::SimulatedBus;
 use takt_rt::cia402::State;
@@ -13,20 +16,24 @@ use takt_rt::frame::{Frame, Id};
 use takt_rt::pdo::{MAX_OBJECTS, MappedObject, Mapping, ProcessImage};
 use takt_rt::port::{BusPort, ReceiveBatch};
 
+use super::conversations;
 use super::input::Input;
 
 const NODE: u8 = 2;
 
-/// What is decoded can be encoded and is the same again; the SDO client always comes to an end; the drive always lives on
-/// and speaks properly; process data are taken or refused.
+/// What is decoded can be encoded and is the same again; the SDO client, the layer settings, bring-up and farewell always
+/// come to an end; the drive always lives on and speaks properly; process data are taken or refused.
 pub fn run(bytes: &[u8]) {
     let Some((kind, rest)) = bytes.split_first() else { return };
     let input = Input::new(rest);
-    match kind % 4 {
+    match kind % 8 {
         0 => decode(input),
         1 => ask(input),
-        2 => talk_to_drive(input),
-        _ => unpack(input),
+        2 => talk_to_drive(one_drive(), input),
+        3 => unpack(input),
+        4 => conversations::layer_settings(input),
+        5 => talk_to_drive(one_yz_aim(), input),
+        _ => conversations::bring_up(input),
     }
 }
 
@@ -47,6 +54,20 @@ fn decode(mut input: Input<'_>) {
         }
         if let Some((node, response)) = Response::decode(&frame) {
             assert_eq!(Response::decode(&response.frame(node)), Some((node, response)), "{frame:?}");
+        }
+        if let Some(request) = LssRequest::decode(&frame) {
+            assert_eq!(LssRequest::decode(&request.frame()), Some(request), "{frame:?}");
+        }
+        if let Some(response) = LssResponse::decode(&frame) {
+            assert_eq!(LssResponse::decode(&response.frame()), Some(response), "{frame:?}");
+        }
+        if let Some(time) = TimeOfDay::decode(&frame) {
+            assert_eq!(TimeOfDay::decode(&time.frame()), Some(time), "{frame:?}");
+            system_time(time);
+        }
+        if let Some(sync) = Sync::decode(&frame) {
+            let before = Sync { counter: input.bytes::<1>().first().copied() };
+            sync.missing_since(before, input.byte());
         }
         State::decode(frame.first_word() as u16);
         let mut consumer = HeartbeatConsumer::new(NODE, 1_000_000);
@@ -109,8 +130,20 @@ fn one_drive() -> &'static Config {
     })
 }
 
-fn talk_to_drive(mut input: Input<'_>) {
-    let mut bus = SimulatedBus::new(one_drive(), 0);
+fn one_yz_aim() -> &'static Config {
+    static CONFIG: OnceLock<Config> = OnceLock::new();
+    CONFIG.get_or_init(|| {
+        let text = include_str!("../../configs/gantry-yz-aim.toml");
+        let mut config = Config::parse("gantry-yz-aim.toml", text).expect("the example is sound");
+        config.axes.truncate(1);
+        config.axes[0].node = NODE;
+        config.axes[0].simulated.power_up_ns = 100_000;
+        config
+    })
+}
+
+fn talk_to_drive(config: &Config, mut input: Input<'_>) {
+    let mut bus = SimulatedBus::new(config, 0);
     let mut now_ns = 0;
     for _ in 0..FRAMES_AT_MOST {
         if input.is_empty() {

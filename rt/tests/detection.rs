@@ -7,6 +7,7 @@ use fixture::{PERIOD_NS, Rig, parameters};
 use takt_rt::door::Request;
 use takt_rt::frame::{Frame, Id};
 use takt_rt::guard::OnViolation;
+use takt_rt::pdo::{MappedObject, Mapping};
 use takt_rt::port::BusState;
 use takt_rt::record::EventKind;
 use takt_rt::stop::{Phase, Rule, StopCategory};
@@ -35,6 +36,18 @@ fn a_drive_that_boots_in_motion_stops_the_group() {
     assert_eq!(reason(&rig), (Rule::UnexpectedBootUp, Some(1), 0.0));
     rig.run_until(Phase::Disabled, 3_000);
     rig.assert_limits_kept();
+}
+
+#[test]
+fn a_drive_that_has_not_reported_yet_is_silent_and_in_no_other_mode() {
+    let mut parameters = parameters(1);
+    let feedback = [0x6041_0010, 0x6064_0020, 0x6061_0008].map(MappedObject::from_parameter);
+    parameters.axes[0].feedback[0].mapping = Mapping::feedback(&feedback).unwrap();
+    let mut rig = Rig::of(parameters);
+    rig.drive(0).is_silent = true;
+    rig.door.requests.extend([Request::Sync(true), Request::Activate, Request::Enable]);
+    rig.run(10);
+    assert_eq!(reason(&rig), (Rule::MissedFeedback, Some(0), 4.0));
 }
 
 #[test]

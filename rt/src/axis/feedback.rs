@@ -214,11 +214,12 @@ impl Axis {
         }
     }
 
-    /// The mode that the drive shows, if it reports one that differs from ours.
+    /// The mode that the drive shows, if it reports one that differs from ours. One that has not reported yet shows none.
     pub fn foreign_mode(&self) -> Option<i8> {
+        let is_shown = self.is_heard && self.reports(FeedbackSlot::OperationModeDisplay);
         let shown = self.feedback.feedback(FeedbackSlot::OperationModeDisplay) as i8;
         let ours = self.parameters.law.operation_mode() as i8;
-        (self.reports(FeedbackSlot::OperationModeDisplay) && shown != ours).then_some(shown)
+        (is_shown && shown != ours).then_some(shown)
     }
 
     /// Whether the drive follows set-points.

@@ -87,7 +87,7 @@ pub struct Recorded {
     pub health: Vec<(usize, TracedHealth)>,
     /// Timing and following errors of the whole recording.
     pub statistics: Statistics,
-    /// The first and the last slot.
+    /// The lowest and the highest slot; those of a damaged file need not be in order.
     pub slots: Option<(u64, u64)>,
     /// The time of day.
     pub wall_clock: Option<WallClock>,
@@ -148,13 +148,14 @@ impl Recorded {
             Item::Fault(fault) => self.faults.push(fault),
             Item::Cycle(record, log_time_ns) => {
                 let (slot, start_ns) = (record.timing.slot, record.timing.slot_start_ns);
-                if self.statistics.axes.is_empty() {
+                if self.statistics.cycles == 0 {
                     self.statistics = Statistics::new(record.axis_count.into());
                 }
                 self.statistics.add(record);
                 self.wall_clock =
                     self.wall_clock.or_else(|| Some(WallClock::fixed(log_time_ns.saturating_sub(start_ns))));
-                self.slots = Some((self.slots.map_or(slot, |(first, _)| first), slot));
+                let (first, last) = self.slots.unwrap_or((slot, slot));
+                self.slots = Some((first.min(slot), last.max(slot)));
             }
             Item::Event(event) => self.events.push(event),
             Item::Health(OnBus { bus, what }) => self.health.push((bus, what)),

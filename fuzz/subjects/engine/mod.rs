@@ -1,0 +1,338 @@
+//! The engine, given any frames, requests, streams, faults and delays.
+//!
+//! Drives of the simplest kind obey what they are commanded, unless the input has them do something else ([`drive`]). What
+//! is looked at is what leaves on the wire, and what the engine says of itself ([`watch`]).
+
+mod asking;
+mod drive;
+mod watch;
+
+use std::collections::VecDeque;
+use std::sync::OnceLock;
+
+use takt::config::{Config, Control};
+use takt::controller::assemble;
+use takt_rt::cia402::{Command, OperationMode, State};
+use takt_rt::dialect::Dialect;
+use takt_rt::door::{Asked, Door, Request, RequestId, Snapshot, StreamCommand};
+use takt_rt::engine::{BusSet, Engine, SendBatch, Transmission};
+use takt_rt::frame::Frame;
+use takt_rt::port::{BusHealth, BusState, Received};
+use takt_rt::record::{CycleRecord, Event, Timing};
+use takt_rt::stop::Phase;
+
+use super::input::Input;
+use drive::ObedientDrive;
+use watch::Watch;
+
+/// Cycles that one input can last.
+const CYCLES_AT_MOST: u64 = 4_000;
+
+/// By the first byte of an input: most of the time in CSP, where a set-point on the wire is a position.
+fn configuration(number: u8) -> &'static Config {
+    static CONFIGURATIONS: OnceLock<[Config; 8]> = OnceLock::new();
+    let configurations = CONFIGURATIONS.get_or_init(|| {
+        [
+            include_str!("../../../configs/arm6-erob.toml"),
+            include_str!("../../../configs/arm6-erob-csv.toml"),
+            include_str!("../../../configs/arm6-erob-cst.toml"),
+            include_str!("../../../configs/mixed-arm.toml"),
+            include_str!("../../../configs/gantry-yz-aim.toml"),
+            include_str!("../../../configs/erob-modes/erob-pp.toml"),
+            include_str!("../../../configs/erob-modes/erob-pt.toml"),
+            include_str!("every-mode.toml"),
+        ]
+        .map(|text| Config::parse("example", text).expect("the example is sound"))
+    });
+    &configurations[match number % 16 {
+        number @ 6..=12 => usize::from(number - 5),
+        13 | 14 => 7,
+        _ => 0,
+    }]
+}
+
+/// What a group has gone through.
+#[derive(Default)]
+pub struct Journey {
+    pub phases: Vec<Phase>,
+    /// The modes of axes that were enabled while the group moved, with the dialects of their drives.
+    pub modes_in_motion: Vec<(OperationMode, Dialect)>,
+    /// Requests that were taken up and those that were refused.
+    pub taken: u64,
+    pub refused: u64,
+}
+
+/// Whatever comes in: no panic, no set-point of an enabled axis beyond its limits or with a step beyond its limits, no axis
+/// enabled that should not be, no motion with a latched fault, an end and a reason of every stop, an event for every change.
+pub fn run(bytes: &[u8]) -> Journey {
+    let mut input = Input::new(bytes);
+    let mut machine = Machine::new(configuration(input.byte()));
+    while !input.is_empty() && machine.slot < CYCLES_AT_MOST && !machine.engine.is_leaving() {
+        machine.act(&mut input);
+    }
+    machine.journey
+}
+
+/// The other side of the door.
+#[derive(Default)]
+struct Hall {
+    requests: VecDeque<Request>,
+    asked: u64,
+    stream: Option<StreamCommand>,
+    services: VecDeque<Frame>,
+    events: Vec<Event>,
+    is_retired: bool,
+    snapshot: Snapshot,
+}
+
+impl Door for Hall {
+    fn request(&mut self) -> Option<Asked> {
+        let request = self.requests.pop_front()?;
+        self.asked += 1;
+        self.is_retired |= request == Request::Retire;
+        Some(Asked { id: RequestId(self.asked), request })
+    }
+
+    fn stream(&mut self) -> Option<StreamCommand> {
+        self.stream.take()
+    }
+
+    fn service_frame(&mut self, _bus: usize) -> Option<Frame> {
+        self.services.pop_front()
+    }
+
+    fn received(&mut self, _bus: usize, _frame: &Received) -> bool {
+        true
+    }
+
+    fn record(&mut self, record: &CycleRecord) -> bool {
+        assert!(record.axes().iter().all(|axis| axis.position_set.is_finite()), "{:?}", record.axes());
+        true
+    }
+
+    fn event(&mut self, event: &Event) -> bool {
+        self.events.push(*event);
+        true
+    }
+
+    fn publish(&mut self, snapshot: &Snapshot) {
+        self.snapshot = *snapshot;
+    }
+}
+
+struct Machine {
+    config: &'static Config,
+    engine: Engine,
+    hall: Hall,
+    drives: Vec<ObedientDrive>,
+    watch: Watch,
+    /// The target on the wire of the last cycle, of each axis that the engine holds for enabled, and the cycles in which
+    /// its set-point has gone on since then.
+    targets: Vec<Option<(i32, u32)>>,
+    slot: u64,
+    journey: Journey,
+    buses: Vec<BusHealth>,
+    held_back: BusSet,
+}
+
+impl Machine {
+    fn new(config: &'static Config) -> Self {
+        Self {
+            config,
+            engine: assemble::engine(config).expect("the example is sound"),
+            hall: Hall::default(),
+            drives: drive::drives(config),
+            watch: Watch::new(config),
+            targets: vec![None; config.axes.len()],
+            slot: 0,
+            journey: Journey { phases: vec![Phase::Passive], ..Journey::default() },
+            buses: vec![BusHealth::default(); config.buses.len()],
+            held_back: BusSet::default(),
+        }
+    }
+
+    fn now_ns(&self) -> u64 {
+        self.slot * self.config.cycle.period_ns
+    }
+
+    fn act(&mut self, input: &mut Input<'_>) {
+        match input.byte() % 16 {
+            0..3 => {
+                for _ in 0..=input.byte() {
+                    self.cycle(Transmission::Free);
+                }
+            }
+            3 => self.disturb(input),
+            4 | 5 => {
+                let sweep = asking::Sweep::new(&self.engine, self.period_s(), input);
+                for cycle in sweep.cycles() {
+                    self.hall.stream = Some(sweep.command(cycle, self.now_ns()));
+                    self.cycle(Transmission::Free);
+                }
+            }
+            6 => {
+                self.slot += u64::from(input.byte());
+                self.cycle(Transmission::Free);
+            }
+            7 => self.cycle(Transmission::TooLate),
+            8 => self.cycle(Transmission::Blocked),
+            9 => {
+                let bus = usize::from(input.byte()) % (self.buses.len() + 1);
+                let received = Received { frame: input.frame(), at_ns: self.now_ns() };
+                self.engine.receive(bus, &received, &mut self.hall);
+            }
+            10 => {
+                let request = asking::request(self.config, self.now_ns(), input);
+                self.hall.requests.push_back(request);
+            }
+            11 => self.hall.stream = Some(asking::stream(&self.engine, self.now_ns(), input)),
+            12 => {
+                let states =
+                    [BusState::ErrorActive, BusState::ErrorPassive, BusState::BusOff, BusState::Down];
+                let bus = usize::from(input.byte()) % self.buses.len();
+                self.buses[bus].state = states[usize::from(input.byte()) % states.len()];
+            }
+            13 => {
+                let drive = usize::from(input.byte()) % self.drives.len();
+                let drive = &mut self.drives[drive];
+                match input.byte() % 4 {
+                    0 => drive.is_silent = !drive.is_silent,
+                    1 => drive.state = State::Fault,
+                    2 => drive.state = State::SwitchOnDisabled,
+                    _ => drive.turn(input.word() as i32),
+                }
+            }
+            14 => self.hall.requests.extend([Request::Sync(true), Request::Activate, Request::Enable]),
+            _ => {
+                let to_rest = asking::possible_move(self.config, input);
+                self.hall.requests.push_back(Request::Move(to_rest));
+            }
+        }
+    }
+
+    /// What else can be wrong with buses and drives.
+    fn disturb(&mut self, input: &mut Input<'_>) {
+        match input.byte() % 4 {
+            0 => self.engine.not_taken(),
+            1 => {
+                let bus = usize::from(input.byte()) % self.buses.len();
+                if !self.held_back.take(bus) {
+                    self.held_back.insert(bus);
+                }
+            }
+            2 => {
+                let drive = usize::from(input.byte()) % self.drives.len();
+                self.drives[drive].is_late = !self.drives[drive].is_late;
+            }
+            _ => self.hall.services.push_back(input.frame()),
+        }
+    }
+
+    fn period_s(&self) -> f64 {
+        self.config.cycle.period_ns as f64 * 1e-9
+    }
+
+    fn cycle(&mut self, transmission: Transmission) {
+        self.slot += 1;
+        let now_ns = self.now_ns();
+        self.report();
+        let before = self.engine.phase();
+        let mut held_back = self.held_back;
+        if transmission == Transmission::Blocked {
+            (0..self.buses.len()).for_each(|bus| held_back.insert(bus));
+        }
+        self.engine.hold_back(held_back);
+        let asked = self.hall.asked;
+        let has_commands = self.engine.compute(self.slot, now_ns, &self.buses, transmission, &mut self.hall);
+        assert!(!has_commands || transmission != Transmission::TooLate);
+        let mut sent = vec![SendBatch::new(); self.buses.len()];
+        for (bus, batch) in sent.iter_mut().enumerate() {
+            if has_commands {
+                self.engine.set_points(bus, self.slot, batch);
+            }
+        }
+        let is_held = |bus| held_back.contains(bus) || transmission == Transmission::TooLate;
+        assert!(sent.iter().enumerate().all(|(bus, batch)| !is_held(bus) || batch.is_empty()));
+        self.obey(&sent, before, has_commands);
+        for (bus, batch) in sent.iter_mut().enumerate() {
+            self.engine.services(bus, &mut self.hall, batch);
+        }
+        let timing = Timing { slot: self.slot, ..Timing::default() };
+        self.engine.finish(timing, now_ns, &self.buses, &mut self.hall);
+        self.watch.look(&self.engine, &self.hall.events, &self.hall.snapshot, has_commands);
+        self.hall.events.clear();
+        if self.hall.is_retired {
+            self.watch.retire();
+        }
+        self.note(self.hall.asked - asked);
+    }
+
+    fn note(&mut self, asked: u64) {
+        let journey = &mut self.journey;
+        let phase = self.engine.phase();
+        if journey.phases.last() != Some(&phase) {
+            journey.phases.push(phase);
+        }
+        for axis in self.engine.axes() {
+            let mode = (axis.parameters().law.operation_mode(), axis.parameters().dialect);
+            let is_moved = matches!(phase, Phase::Moving | Phase::Streaming) && axis.is_enabled();
+            if is_moved && !journey.modes_in_motion.contains(&mode) {
+                journey.modes_in_motion.push(mode);
+            }
+        }
+        journey.taken += asked;
+        journey.refused = self.hall.snapshot.refused;
+    }
+
+    /// SYNC, and what the drives say to it.
+    fn report(&mut self) {
+        let (slot, now_ns) = (self.slot, self.now_ns());
+        for (bus, parameters) in self.config.buses.iter().enumerate() {
+            if !slot.is_multiple_of(parameters.divider.into()) {
+                continue;
+            }
+            let has_sync = self.engine.sync(bus, slot, now_ns).is_some();
+            let on_bus = |(axis, _): &(&takt::config::Axis, _)| axis.bus == bus;
+            for (_, drive) in self.config.axes.iter().zip(&mut self.drives).filter(on_bus) {
+                for frame in drive.tell(now_ns, has_sync) {
+                    self.engine.receive(bus, &Received { frame, at_ns: now_ns }, &mut self.hall);
+                }
+            }
+        }
+    }
+
+    /// The drives take what was sent to them, and what was sent is looked at.
+    fn obey(&mut self, sent: &[SendBatch], before: Phase, has_acted: bool) {
+        let (phase, period_s) = (self.engine.phase(), self.period_s());
+        for index in 0..self.config.axes.len() {
+            let (axis, drive) = (&self.config.axes[index], &mut self.drives[index]);
+            if let Some((_, cycles)) = self.targets[index].as_mut().filter(|_| has_acted) {
+                *cycles += 1;
+            }
+            let mut is_commanded = false;
+            for frame in &sent[axis.bus] {
+                if !drive.is_commanded_by(frame.id()) {
+                    continue;
+                }
+                is_commanded = true;
+                let word = drive.take(frame);
+                let enables = word.is_some_and(|word| Command::decode(word) == Command::EnableOperation);
+                let may_enable = !matches!(phase, Phase::Passive | Phase::Disabled | Phase::Disabling);
+                assert!(may_enable || !enables, "{before:?} to {phase:?}");
+            }
+            drive.pass(period_s);
+            let Some(target) = drive.position_target().filter(|_| is_commanded) else { continue };
+            let shown = self.engine.axes()[index].is_enabled().then_some((target, 0));
+            if let (Some((last, cycles)), Some((now, _))) = (self.targets[index], shown) {
+                let per_unit = self.engine.axes()[index].parameters().scale.resolution();
+                let most = axis.limits.velocity * period_s * per_unit * f64::from(cycles);
+                let step = f64::from(now) - f64::from(last);
+                assert!(step.abs() <= most + 2.0, "{}: {step} counts, at most {most}; {before:?}", axis.name);
+                let is_at_rest = phase == Phase::Holding && before == Phase::Holding;
+                let is_simple = axis.control == Control::Position && self.buses.len() == 1;
+                assert!(!(is_at_rest && is_simple) || step == 0.0, "{step} at rest");
+            }
+            self.targets[index] = shown;
+        }
+    }
+}

@@ -1,0 +1,151 @@
+//! What must hold after every cycle, whatever came in.
+
+use takt::config::Config;
+use takt_rt::door::Snapshot;
+use takt_rt::engine::Engine;
+use takt_rt::record::{Event, EventKind};
+use takt_rt::stop::{Phase, Rule, StopReason};
+
+/// Room for rounding, relative to a limit.
+const ROOM: f64 = 2e-6;
+/// A stop takes no longer than this many times the time from full speed to rest at the limits, and a second for drives
+/// that make their own way.
+const STOP_PATIENCE: f64 = 4.0;
+
+/// What is known of an axis from the cycles before.
+#[derive(Clone, Copy, Default)]
+struct Past {
+    /// Set-points of the last two cycles, newest first.
+    set: [f64; 2],
+    /// Cycles in a row in which it was enabled.
+    enabled: u32,
+}
+
+pub struct Watch {
+    config: &'static Config,
+    axes: Vec<Past>,
+    phase: Phase,
+    is_retired: bool,
+    refused: u64,
+    /// The reason of the last stop, as it was told.
+    told: Option<StopReason>,
+    stopping_cycles: u32,
+    stopping_at_most: u32,
+}
+
+impl Watch {
+    pub fn new(config: &'static Config) -> Self {
+        let time_to_rest_s = |axis: &takt::config::Axis| {
+            let limits = &axis.limits;
+            let deceleration = limits.acceleration.min(limits.deceleration);
+            limits.velocity / deceleration + 2.0 * deceleration / limits.jerk
+        };
+        let slowest_s = config.axes.iter().map(time_to_rest_s).fold(0.0, f64::max);
+        let patience_s = STOP_PATIENCE * slowest_s + 1.0;
+        Self {
+            config,
+            axes: vec![Past::default(); config.axes.len()],
+            phase: Phase::Passive,
+            is_retired: false,
+            refused: 0,
+            told: None,
+            stopping_cycles: 0,
+            stopping_at_most: (patience_s * 1e9 / config.cycle.period_ns as f64) as u32,
+        }
+    }
+
+    /// Somebody has asked the engine to enable nothing any more.
+    pub fn retire(&mut self) {
+        self.is_retired = true;
+    }
+
+    /// Looks at a cycle. `has_acted` tells whether set-points could leave.
+    pub fn look(&mut self, engine: &Engine, events: &[Event], snapshot: &Snapshot, has_acted: bool) {
+        events.iter().for_each(|event| self.hear(event));
+        assert_eq!(self.phase, engine.phase(), "a phase that nobody was told of");
+        assert_eq!(self.phase, snapshot.phase);
+        assert_eq!(self.refused, snapshot.refused, "a refusal that nobody was told of");
+        self.look_at_stop(snapshot, has_acted);
+        if has_acted {
+            self.look_at_set_points(engine);
+        }
+    }
+
+    fn hear(&mut self, event: &Event) {
+        match event.kind {
+            EventKind::PhaseChanged { from, to } => {
+                assert_eq!(from, self.phase, "the phase before {to:?}");
+                let is_possible = match to {
+                    Phase::Passive => false,
+                    Phase::Disabled => matches!(from, Phase::Passive | Phase::Disabling),
+                    Phase::Enabling => from == Phase::Disabled && !self.is_retired,
+                    Phase::Holding => matches!(from, Phase::Enabling | Phase::Moving | Phase::Stopping),
+                    Phase::Moving | Phase::Streaming => matches!(from, Phase::Holding | Phase::Moving),
+                    Phase::Stopping => matches!(from, Phase::Moving | Phase::Streaming),
+                    Phase::Disabling => !matches!(from, Phase::Passive | Phase::Disabled),
+                };
+                assert!(is_possible, "{from:?} to {to:?}");
+                self.phase = to;
+                self.stopping_cycles = 0;
+            }
+            EventKind::Stop(stop) => {
+                assert_eq!(stop.phase, self.phase, "{stop:?}");
+                self.told = Some(stop);
+            }
+            EventKind::Refused { .. } => self.refused += 1,
+            _ => {}
+        }
+    }
+
+    fn look_at_stop(&mut self, snapshot: &Snapshot, has_acted: bool) {
+        let is_latched = snapshot.stop.is_some_and(|stop| stop.rule != Rule::Requested);
+        if is_latched {
+            let (is_on_way, stop) =
+                (matches!(self.phase, Phase::Enabling | Phase::Moving | Phase::Streaming), snapshot.stop);
+            assert!(!is_on_way, "{:?} in spite of {stop:?}", self.phase);
+        }
+        if let Some(stop) = snapshot.stop {
+            let told = self.told.expect("nobody was told of the stop");
+            assert_eq!((told.rule, told.axis, told.slot), (stop.rule, stop.axis, stop.slot));
+            assert!(stop.category <= told.category, "{stop:?} was {told:?}");
+        }
+        if self.phase == Phase::Stopping {
+            assert!(snapshot.stop.is_some(), "a stop without a reason");
+            self.stopping_cycles += u32::from(has_acted);
+            assert!(
+                self.stopping_cycles <= self.stopping_at_most,
+                "the stop does not end: {:?}",
+                snapshot.stop
+            );
+        }
+    }
+
+    fn look_at_set_points(&mut self, engine: &Engine) {
+        let period_s = self.config.cycle.period_ns as f64 * 1e-9;
+        for ((axis, past), named) in engine.axes().iter().zip(&mut self.axes).zip(&self.config.axes) {
+            let (limits, now) = (&axis.parameters().limits, axis.set_point().position);
+            let [last, before] = past.set;
+            past.enabled = if axis.is_enabled() { past.enabled + 1 } else { 0 };
+            past.set = [now, last];
+            let (name, phase) = (&named.name, self.phase);
+            assert!(now.is_finite(), "{name}: {now}");
+            if axis.is_profile() || past.enabled < 2 {
+                continue;
+            }
+            let room = ROOM * (limits.position_max - limits.position_min);
+            let is_deeper =
+                now > last.max(limits.position_max + room) || now < last.min(limits.position_min - room);
+            assert!(!is_deeper, "{name}: set-point {last} to {now}, outside its limits, {phase:?}");
+            let speed = (now - last) / period_s;
+            assert!(speed.abs() <= limits.velocity * (1.0 + ROOM), "{name}: {speed} rad/s, {phase:?}");
+            let is_guarded =
+                matches!(phase, Phase::Holding | Phase::Moving | Phase::Streaming | Phase::Stopping);
+            if is_guarded && past.enabled >= 3 {
+                let acceleration = (speed - (last - before) / period_s) / period_s;
+                let noise = 8.0 * f64::EPSILON * (1.0 + now.abs()) / (period_s * period_s);
+                let most = limits.acceleration.max(limits.deceleration) * (1.0 + ROOM) + noise;
+                assert!(acceleration.abs() <= most, "{name}: {acceleration} rad/s², {phase:?}");
+            }
+        }
+    }
+}

@@ -1,0 +1,42 @@
+//! The reader of recordings and black boxes, given any bytes.
+
+use std::fs;
+use std::path::PathBuf;
+
+use takt::telemetry::{Emphasis, Recorded, RecordingReport};
+
+/// Reads bytes as a recording. What is taken can be reported in words and as JSON; what is refused says why.
+pub fn run(bytes: &[u8]) {
+    let file = File::with(bytes);
+    let recorded = match Recorded::open(&file.0) {
+        Ok(recorded) => recorded,
+        Err(error) => return assert!(error.to_string().len() > file.0.as_os_str().len()),
+    };
+    let report = RecordingReport::new(&recorded, None, 20).expect("what was read once can be read again");
+    assert!(!report.picture(Emphasis::None).is_empty());
+    serde_json::to_string(&report).expect("a report is plain data");
+    let cycles = recorded.cycles(&(0..=u64::MAX)).expect("what was read once can be read again");
+    assert_eq!(cycles.len() as u64, recorded.statistics.cycles);
+    for record in cycles {
+        assert!(record.axes().len() <= recorded.machine.axes.len());
+    }
+}
+
+/// A file of this thread, until it is dropped.
+struct File(PathBuf);
+
+impl File {
+    fn with(bytes: &[u8]) -> Self {
+        let (process, thread) = (std::process::id(), std::thread::current().id());
+        let path = std::env::temp_dir().join(format!("takt-fuzz-{process}-{thread:?}.mcap"));
+        fs::write(&path, bytes).expect("there is room for a small file");
+        Self(path)
+    }
+}
+
+impl Drop for File {
+    fn drop(&mut self) {
+        // One that stays behind is written over.
+        let _ = fs::remove_file(&self.0);
+    }
+}
