@@ -113,13 +113,14 @@ fn the_real_loop_allocates_nothing_from_bring_up_to_the_last_cycle() {
         spin_guard_ns: None,
         is_realtime_required: false,
     };
+    let folder = tempfile::tempdir().unwrap();
     let options = LoggerOptions {
         machine: Machine::of(&config),
         wall_clock: WallClock::starting_now(started_ns),
         started_ns,
         recording: None,
         candump: None,
-        black_box: Some(BlackBoxOptions { span_ns: 5_000_000_000, directory: "/nonexistent".into() }),
+        black_box: Some(BlackBoxOptions { span_ns: 5_000_000_000, directory: folder.path().to_owned() }),
         traces,
     };
     let logger = LoggerThread::start(Logger::new(log, options, Box::new(|_| {}))).unwrap();
