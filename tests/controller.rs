@@ -135,6 +135,22 @@ fn a_second_ctrl_c_takes_the_power_at_once_and_the_run_ends_when_it_is_off() {
     }
 }
 
+#[test]
+fn the_simulated_world_keeps_up_with_a_cycle_however_long_it_is() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/arm6-erob.toml");
+    let text = std::fs::read_to_string(path).unwrap();
+    for (period, of_bus) in [("1 ms", "2 ms"), ("4 ms", "8 ms"), ("20 ms", "20 ms")] {
+        let bus = format!("name = \"wrist\"\nperiod = \"{of_bus}\"");
+        let text = text.replace("\"1 ms\"", &format!("\"{period}\"")).replace("name = \"wrist\"", &bus);
+        let mut config = Config::parse("slow.toml", &text).unwrap();
+        config.program.moves.truncate(1);
+        let mut run = start(&config);
+        assert_eq!(run.run(CYCLES_AT_MOST, |_| {}), Some(Outcome::Finished), "{period}");
+        let paused_ns: Vec<u64> = run.ports().iter().map(|bus| bus.paused_ns()).collect();
+        assert_eq!(paused_ns, [0, 0], "{period}");
+    }
+}
+
 /// Every record of a run, as one number.
 fn fingerprint(config: &Config) -> u64 {
     let (mut run, mut log) = VirtualRun::simulated(config).unwrap();

@@ -105,5 +105,5 @@ pub const RING_RECORDS: usize = 4096;
 
 /// `[simulation] seed`
 pub const SEED: u64 = 1;
-/// `[simulation] longest_gap`
+/// `[simulation] longest_gap`; two periods of the cycle where that is more
 pub const LONGEST_GAP_NS: u64 = 2_000_000;

@@ -393,7 +393,7 @@ pub struct Simulation {
     /// Seed of everything random. Default 1.
     pub seed: u64,
     /// A pause of this process that is longer than this stops the simulated world too: the host's stalls are
-    /// not the bus's. Default 2 ms.
+    /// not the bus's. A period of the cycle at least; default 2 ms, or two periods where that is more.
     pub longest_gap_ns: u64,
 }
 

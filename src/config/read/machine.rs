@@ -161,14 +161,16 @@ pub fn telemetry(mut section: Section<'_>) -> Telemetry {
     telemetry
 }
 
-pub fn simulation(mut section: Section<'_>) -> Simulation {
+/// Within a cycle the simulated world never stands still.
+pub fn simulation(mut section: Section<'_>, period_ns: u64) -> Simulation {
     let seed =
         section.get("seed").and_then(|entry| entry.integer(0..i64::MAX)).and_then(|v| u64::try_from(v).ok());
-    let longest_gap_ns = section.get("longest_gap").and_then(|entry| entry.nanoseconds(100e-6, 1.0));
+    let longest_gap_ns =
+        section.get("longest_gap").and_then(|entry| entry.nanoseconds(period_ns as f64 / 1e9, 1.0));
     section.finish();
     Simulation {
         seed: seed.unwrap_or(defaults::SEED),
-        longest_gap_ns: longest_gap_ns.unwrap_or(defaults::LONGEST_GAP_NS),
+        longest_gap_ns: longest_gap_ns.unwrap_or(defaults::LONGEST_GAP_NS.max(2 * period_ns)),
     }
 }
 

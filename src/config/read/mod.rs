@@ -65,7 +65,7 @@ fn read<'a>(document: &'a DeTable<'a>, problems: &'a Problems<'a>) -> Option<Con
     let realtime = machine::realtime(root.section("realtime"), cycle.period_ns);
     let master = machine::master(root.section("master"));
     let telemetry = machine::telemetry(root.section("telemetry"));
-    let simulation = machine::simulation(root.section("simulation"));
+    let simulation = machine::simulation(root.section("simulation"), cycle.period_ns);
 
     root.require("bus", "at least one [[bus]]");
     let buses = bus::buses(root.sections("bus"), cycle.period_ns, problems);
