@@ -5,8 +5,8 @@ mod fixture;
 use fixture::{LIMITS, PERIOD_NS, Rig, axis_in, parameters};
 use takt_rt::control::ControlLaw;
 use takt_rt::door::{Request, StreamCommand};
-use takt_rt::guard::OnViolation;
-use takt_rt::plan::State;
+use takt_rt::guard::{AxisLimits, OnViolation};
+use takt_rt::plan::{self, Limits, Problem, Profile, State};
 use takt_rt::record::MAX_AXES;
 use takt_rt::stop::{Phase, Rule, StopCategory};
 
@@ -21,8 +21,13 @@ const TORQUE: ControlLaw = ControlLaw::Torque {
 
 /// One axis that follows a stream, standing at 0.
 fn streaming(law: ControlLaw, on_violation: OnViolation) -> Rig {
+    streaming_within(LIMITS, law, on_violation)
+}
+
+fn streaming_within(limits: AxisLimits, law: ControlLaw, on_violation: OnViolation) -> Rig {
     let mut parameters = parameters(1);
     parameters.axes[0] = axis_in(law, 0, 1);
+    parameters.axes[0].limits = limits;
     parameters.axes[0].on_violation = on_violation;
     let mut rig = Rig::of(parameters).enable();
     rig.move_to(0.0);
@@ -97,6 +102,87 @@ fn a_stream_that_says_how_fast_it_is_is_followed_as_it_says() {
         assert_eq!((set.position, set.velocity), (position, velocity));
     }
     assert!(rig.stops().is_empty());
+}
+
+/// From 0 to the highest position, at full velocity on the way, as fast as the limits allow.
+fn to_the_limit(limits: &AxisLimits) -> Profile {
+    let planned = Limits::asymmetric(
+        limits.velocity,
+        -limits.velocity,
+        limits.acceleration,
+        -limits.deceleration,
+        limits.jerk,
+    );
+    let (start, target) = (State::rest(0.0), State::rest(limits.position_max));
+    plan::position(&Problem { start, target, limits: planned }).unwrap()
+}
+
+#[test]
+fn a_stream_of_positions_planned_at_the_very_limits_is_followed_and_can_be_stopped_anywhere() {
+    for (acceleration, deceleration, jerk) in
+        [(8.0, 8.0, 100.0), (6.0, 12.0, 1000.0), (12.0, 5.0, 60.0), (8.0, 8.0, f64::INFINITY)]
+    {
+        let limits = AxisLimits { acceleration, deceleration, jerk, ..LIMITS };
+        let profile = to_the_limit(&limits);
+        let period_s = PERIOD_NS as f64 * 1e-9;
+        let cycles = (profile.duration_s() / period_s).ceil() as usize;
+        for expired_in in (1..=cycles).step_by(37).chain([cycles + 50]) {
+            let mut rig = streaming_within(limits, ControlLaw::Position, OnViolation::Reject);
+            let before = rig.door.records.len();
+            for cycle in 1..=expired_in {
+                let position = profile.sample(cycle as f64 * period_s).position;
+                // What it says of its velocity is left out, and it is never carried on.
+                let valid_until_ns = rig.clock.now_ns + PERIOD_NS;
+                let set_points = [State::rest(position); MAX_AXES];
+                rig.door.stream = Some(StreamCommand { valid_until_ns, set_points });
+                rig.run(1);
+                assert_eq!(rig.engine.axes()[0].set_point().position, position, "in cycle {cycle}");
+            }
+            rig.run(2_000);
+            let stops = rig.stops();
+            assert_eq!(stops.len(), 1, "{stops:?}");
+            assert_eq!((stops[0].rule, stops[0].category), (Rule::StaleCommand, StopCategory::Two));
+            assert_eq!(rig.phase(), Phase::Holding);
+            let records = rig.door.records.iter().skip(before);
+            let set: Vec<f64> = records.map(|record| record.axes[0].position_set).collect();
+            for steps in set.windows(2) {
+                let velocity = (steps[1] - steps[0]) / period_s;
+                assert!(velocity.abs() <= limits.velocity * (1.0 + 2e-6), "{velocity}");
+                assert!(steps[1] <= limits.position_max + 6e-6, "{}", steps[1]);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_stream_planned_a_little_beyond_a_limit_is_refused_in_time() {
+    let limits = AxisLimits { jerk: 100.0, ..LIMITS };
+    let wider = [
+        (Rule::VelocityLimit, AxisLimits { velocity: limits.velocity * 1.0001, ..limits }),
+        (Rule::PositionLimit, AxisLimits { position_max: limits.position_max + 1e-4, ..limits }),
+        (Rule::JerkLimit, AxisLimits { jerk: limits.jerk * 1.0001, ..limits }),
+        (Rule::AccelerationLimit, AxisLimits { acceleration: limits.acceleration * 1.0001, ..limits }),
+    ];
+    for (rule, wider) in wider {
+        let profile = to_the_limit(&wider);
+        let period_s = PERIOD_NS as f64 * 1e-9;
+        let mut rig = streaming_within(limits, ControlLaw::Position, OnViolation::Reject);
+        let mut cycle = 0;
+        while rig.phase() == Phase::Streaming || cycle == 0 {
+            cycle += 1;
+            stream(&mut rig, profile.sample(f64::from(cycle) * period_s));
+            rig.run(1);
+        }
+        rig.run_until(Phase::Holding, 5_000);
+        let stops = rig.stops();
+        assert_eq!(
+            (stops.len(), stops[0].rule, stops[0].category),
+            (1, rule, StopCategory::Two),
+            "{stops:?}"
+        );
+        let highest = rig.door.records.iter().map(|record| record.axes[0].position_set).fold(0.0, f64::max);
+        assert!(highest <= limits.position_max + 6e-6, "{highest}");
+    }
 }
 
 #[test]

@@ -1,11 +1,15 @@
 //! The last look at every set-point, whoever made it, before it becomes a frame.
 
+#[cfg(test)]
+mod planned;
+mod reach;
 mod stream;
 
 use crate::plan::State;
 use crate::stop::Rule;
 
-pub use stream::{Course, OnViolation, braking_distance, check_braking, check_jerk, clamp};
+pub use reach::braking_distance;
+pub use stream::{Course, OnViolation, check_braking, check_jerk, clamp};
 
 /// What an axis may never be asked to do. rad (m) and seconds.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,6 +42,19 @@ impl AxisLimits {
             && positive(self.deceleration)
             && self.jerk > 0.0
             && positive(self.torque)
+    }
+
+    /// How fast the velocity, with its sign, may rise and how fast it may fall when a joint at this velocity is stopped: all
+    /// the way, though the stop may turn it round.
+    pub(crate) fn rising_and_falling(&self, velocity: f64) -> (f64, f64) {
+        let AxisLimits { acceleration, deceleration, .. } = *self;
+        if velocity > 0.0 {
+            (acceleration, deceleration)
+        } else if velocity < 0.0 {
+            (deceleration, acceleration)
+        } else {
+            (acceleration.min(deceleration), acceleration.min(deceleration))
+        }
     }
 
     /// Whether `position` may be a target.

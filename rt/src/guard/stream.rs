@@ -1,9 +1,18 @@
 //! What a set-point of a stream must keep to beyond [`check`](super::check): its maker is not known, and nobody has
 //! planned how it goes on.
 
+use super::reach::Reach;
 use super::{AxisLimits, TOLERANCE, Violation};
 use crate::plan::State;
 use crate::stop::Rule;
+
+/// By how much a position may be off, relative to it or to 1 rad: whoever samples a trajectory adds up times and evaluates
+/// polynomials, each with a rounding. The third difference divides what comes of it by the cube of the period.
+const ROUNDINGS: f64 = 64.0;
+
+/// Relative to the limits that a stop must be able to keep: half of what [`check`](super::check) allows, so that every step of
+/// the stop passes it.
+const BRAKING_TOLERANCE: f64 = TOLERANCE / 2.0;
 
 /// What is done with a set-point of a stream that breaks a limit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -39,38 +48,53 @@ impl Course {
         (self.velocity() - self.last_velocity()) / self.period_s
     }
 
-    /// Velocity and acceleration at the end of the next step, which itself is what the velocity was in its middle.
-    fn end(&self) -> (f64, f64) {
+    /// The same course with positive and negative exchanged.
+    fn mirrored(&self) -> Self {
+        Self { sent: self.sent.map(|position| -position), next: -self.next, period_s: self.period_s }
+    }
+
+    /// The state at the end of the next step if the acceleration stays as it was at its beginning. The velocity of a step is
+    /// that of its middle.
+    fn even_end(&self) -> State {
         let acceleration = self.acceleration();
-        (self.velocity() + acceleration * self.period_s / 2.0, acceleration)
+        let velocity = self.velocity() + acceleration * self.period_s / 2.0;
+        State { position: self.next, velocity, acceleration }
     }
 
-    /// The state at the end of the next step, as the steps show it. Whatever is planned from it goes on with these steps
-    /// without a leap of the acceleration, so none of it is cut off that the checks of a stream let pass: an acceleration
-    /// beyond the limit of its direction is for the planner to take back. They let pass a velocity to which the
-    /// acceleration would lead beyond the limit where no limit of the jerk keeps it from ending at once; there it ends.
-    pub fn state(&self, limits: &AxisLimits) -> State {
-        let (velocity, acceleration) = self.end();
-        let fastest = limits.velocity * (1.0 + TOLERANCE);
-        State { position: self.next, velocity: velocity.clamp(-fastest, fastest), acceleration }
-    }
-
-    /// The velocity of the joint, with its sign, once its acceleration has been taken back.
-    fn settled_velocity(&self, limits: &AxisLimits) -> f64 {
-        let (velocity, acceleration) = self.end();
-        // Without a limit of the jerk that takes no time.
-        if limits.jerk.is_finite() {
-            velocity + acceleration * acceleration.abs() / (2.0 * limits.jerk)
+    /// The state at the end of the next step if the joint has been braked on its way towards positive positions since the
+    /// acceleration was as the steps show it, which is one cycle ago: as hard as the limits allow.
+    ///
+    /// Of all motions within the limits of deceleration and jerk that lead through these positions none is slower in the end,
+    /// and none decelerates more. And what goes on from this state within the limits has steps that keep them too, the
+    /// first ones as well.
+    fn braked_end(&self, limits: &AxisLimits) -> State {
+        let (velocity, acceleration, period_s) = (self.velocity(), self.acceleration(), self.period_s);
+        let most = limits.rising_and_falling(velocity).1.max(-acceleration);
+        let braked = acceleration - limits.jerk * period_s;
+        let (velocity, acceleration) = if braked > -most {
+            let lost = limits.jerk * period_s * period_s / 3.0;
+            (velocity + acceleration * period_s / 2.0 - lost, braked)
         } else {
-            self.velocity()
-        }
+            (velocity - most * period_s / 2.0, -most)
+        };
+        State { position: self.next, velocity, acceleration }
     }
 
-    /// The lowest and the highest position on the way to rest of a stop that begins after the next set-point.
-    fn turning_points(&self, limits: &AxisLimits) -> (f64, f64) {
-        let (velocity, acceleration) = self.end();
-        let down = braking_distance(limits, -velocity, -acceleration);
-        (self.next - down, self.next + braking_distance(limits, velocity, acceleration))
+    /// The state at the end of the next step, as the steps show it, for a stop that begins there. They leave open what the
+    /// acceleration has become since the beginning of the step: it counts as unchanged, unless only a joint that has been
+    /// braked since can be stopped within the limits. Whatever is planned from there goes on with these steps without a leap
+    /// of the acceleration; one beyond the limit of its direction is for the planner to take back.
+    pub fn state(&self, limits: &AxisLimits) -> State {
+        let even = self.even_end();
+        let too_far = Way::both(self, limits).find(|way| {
+            let state = if way.sign < 0.0 { mirrored(&even) } else { even };
+            !way.is_kept(&Reach::of(&state, limits))
+        });
+        match too_far {
+            None => even,
+            Some(way) if way.sign < 0.0 => mirrored(&way.course.braked_end(limits)),
+            Some(way) => way.course.braked_end(limits),
+        }
     }
 
     fn jerk(&self) -> f64 {
@@ -80,11 +104,59 @@ impl Course {
 
     /// What the rounding of positions comes to after so many divisions by the period.
     fn noise(&self, divisions: i32) -> f64 {
-        let mut noise = 8.0 * f64::EPSILON * (1.0 + self.next.abs());
+        let mut noise = ROUNDINGS * f64::EPSILON * (1.0 + self.next.abs());
         for _ in 0..divisions {
             noise /= self.period_s;
         }
         noise
+    }
+}
+
+fn mirrored(state: &State) -> State {
+    State { position: -state.position, velocity: -state.velocity, acceleration: -state.acceleration }
+}
+
+/// A course seen in one of the two directions, which is positive here.
+struct Way<'a> {
+    course: Course,
+    sign: f64,
+    farthest: f64,
+    limits: &'a AxisLimits,
+}
+
+impl<'a> Way<'a> {
+    fn both(course: &Course, limits: &'a AxisLimits) -> impl Iterator<Item = Self> {
+        let (max, min) = (limits.position_max, limits.position_min);
+        [(*course, 1.0, max), (course.mirrored(), -1.0, -min)]
+            .into_iter()
+            .map(move |(course, sign, farthest)| Self { course, sign, farthest, limits })
+    }
+
+    /// Whether the limits are kept to the last bit. From outside those of the position the joint may come back.
+    fn is_kept(&self, reach: &Reach) -> bool {
+        reach.velocity <= self.limits.velocity && reach.position <= self.farthest.max(self.course.next)
+    }
+
+    /// Checks that they can be kept, but for the tolerance.
+    fn check(&self) -> Result<(), Violation> {
+        let reach = Reach::of(&self.course.braked_end(self.limits), self.limits);
+        let fastest = self.limits.velocity;
+        if reach.velocity > fastest * (1.0 + BRAKING_TOLERANCE) + self.course.noise(1) {
+            return Err(Violation {
+                rule: Rule::VelocityLimit,
+                value: self.sign * reach.velocity,
+                limit: fastest,
+            });
+        }
+        let room = BRAKING_TOLERANCE * (self.limits.position_max - self.limits.position_min);
+        if reach.position > (self.farthest + room).max(self.course.next) + self.course.noise(0) {
+            return Err(Violation {
+                rule: Rule::PositionLimit,
+                value: self.sign * reach.position,
+                limit: self.sign * self.farthest,
+            });
+        }
+        Ok(())
     }
 }
 
@@ -98,37 +170,12 @@ pub fn check_jerk(limit: f64, course: &Course) -> Result<(), Violation> {
 }
 
 /// Checks that the joint can still come to rest within its limits of position, and of velocity on the way.
+///
+/// What can is let pass: every motion within the limits, sampled once a period. What cannot is refused: whatever passes can
+/// be stopped from [`Course::state`] with all of its steps within the limits, but for the tolerance that every check of the
+/// guard has for rounding, a millionth of the limit (of the range of positions).
 pub fn check_braking(limits: &AxisLimits, course: &Course) -> Result<(), Violation> {
-    let room = TOLERANCE * (limits.position_max - limits.position_min) + course.noise(0);
-    let settled = course.settled_velocity(limits);
-    if settled.abs() > limits.velocity * (1.0 + TOLERANCE) + course.noise(1) {
-        return Err(Violation { rule: Rule::VelocityLimit, value: settled, limit: limits.velocity });
-    }
-    let (lowest, highest) = course.turning_points(limits);
-    if highest > limits.position_max.max(course.next) + room {
-        return Err(Violation { rule: Rule::PositionLimit, value: highest, limit: limits.position_max });
-    }
-    if lowest < limits.position_min.min(course.next) - room {
-        return Err(Violation { rule: Rule::PositionLimit, value: lowest, limit: limits.position_min });
-    }
-    Ok(())
-}
-
-/// How far a joint goes on at most towards positive positions when it is stopped at the limits; 0 if it does not.
-/// Acceleration in that direction must first be taken back, which speeds the joint up still, or turns it round.
-pub fn braking_distance(limits: &AxisLimits, velocity: f64, acceleration: f64) -> f64 {
-    let along = acceleration.max(0.0);
-    let (taking_back_s, building_up_s) = match limits.jerk.is_finite() {
-        true => (along / limits.jerk, limits.deceleration / limits.jerk),
-        false => (0.0, 0.0),
-    };
-    let highest = velocity + along * taking_back_s / 2.0;
-    if highest <= 0.0 {
-        return 0.0;
-    }
-    // During that time the acceleration falls evenly from `along` to 0.
-    let meanwhile = velocity * taking_back_s + along * taking_back_s * taking_back_s / 3.0;
-    (meanwhile + highest * highest / (2.0 * limits.deceleration) + highest * building_up_s / 2.0).max(0.0)
+    Way::both(course, limits).try_for_each(|way| way.check())
 }
 
 /// The set-point nearest to the one asked for that keeps the limits of velocity and acceleration, and from which a stop
@@ -144,16 +191,12 @@ pub fn clamp(limits: &AxisLimits, course: &Course) -> State {
         false => (last_velocity - speeding_up, (last_velocity + slowing_down).min(speeding_up)),
     };
     let at = |velocity: f64| Course { next: last + velocity * period_s, ..*course };
-    let is_low_enough = |velocity: f64| {
-        let course = at(velocity);
-        course.turning_points(limits).1 <= limits.position_max
-            && course.settled_velocity(limits) <= limits.velocity
+    let is_within = |course: Course, farthest: f64| {
+        let reach = Reach::of(&course.braked_end(limits), limits);
+        reach.position <= farthest && reach.velocity <= limits.velocity
     };
-    let is_high_enough = |velocity: f64| {
-        let course = at(velocity);
-        course.turning_points(limits).0 >= limits.position_min
-            && course.settled_velocity(limits) >= -limits.velocity
-    };
+    let is_low_enough = |velocity: f64| is_within(at(velocity), limits.position_max);
+    let is_high_enough = |velocity: f64| is_within(at(velocity).mirrored(), -limits.position_min);
     let within = wanted.clamp(-limits.velocity, limits.velocity).max(lowest).min(highest);
     // The limit that the joint goes towards has the last word.
     let velocity = match last_velocity > 0.0 {
@@ -212,26 +255,13 @@ mod tests {
 
     #[test]
     fn a_stream_must_leave_room_to_stop_before_the_limit() {
-        // 2 rad/s at 20 rad/s² take 0.1 rad.
-        assert_eq!(check_braking(&LIMITS, &moving_at(1.89, 2.0)), Ok(()));
+        // 2 rad/s at 20 rad/s² take 0.1 rad; the joint has been braked for half a step in which it has lost 0.01 rad/s.
+        assert_eq!(check_braking(&LIMITS, &moving_at(1.9, 2.0)), Ok(()));
         let violation = check_braking(&LIMITS, &moving_at(1.91, 2.0)).unwrap_err();
         assert_eq!((violation.rule, violation.limit), (Rule::PositionLimit, 2.0));
-        assert!((violation.value - 2.01).abs() < 1e-9);
+        assert!((violation.value - (1.91 + 1.99 * 1.99 / 40.0)).abs() < 1e-9);
         assert_eq!(check_braking(&LIMITS, &moving_at(1.99, -2.0)), Ok(()));
         assert!(check_braking(&LIMITS, &moving_at(-0.95, -2.0)).is_err());
-    }
-
-    #[test]
-    fn a_limited_jerk_makes_the_way_to_rest_longer() {
-        let limits = AxisLimits { jerk: 100.0, ..LIMITS };
-        let plain = braking_distance(&LIMITS, 2.0, 0.0);
-        // The deceleration builds up over 0.2 s: half of what that takes longer at 2 rad/s.
-        assert!((braking_distance(&limits, 2.0, 0.0) - plain - 0.2).abs() < 1e-12);
-        assert!(braking_distance(&limits, 2.0, 10.0) > braking_distance(&limits, 2.0, 0.0));
-        assert_eq!(braking_distance(&limits, -2.0, 0.0), 0.0);
-        // The acceleration turns the joint round while it is taken back within 0.3 s: -0.6 + 0.9 rad, at 2.5 rad/s in the end.
-        let stop = braking_distance(&limits, 2.5, 0.0);
-        assert!((braking_distance(&limits, -2.0, 30.0) - 0.3 - stop).abs() < 1e-12);
     }
 
     #[test]
