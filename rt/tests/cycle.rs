@@ -98,8 +98,12 @@ fn the_heartbeat_leaves_once_in_its_period_behind_the_set_points() {
     let beats = times_of(&rig, Id::canopen(0x700, 127));
     assert!(beats.len() >= 10);
     let gaps: Vec<u64> = beats.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    assert!(gaps[0] < 50 * PERIOD_NS, "enabling hastens it, so that the drives watch before anything moves");
-    assert!(gaps[1..].iter().all(|gap| *gap == 50 * PERIOD_NS), "{gaps:?}");
+    let (hastened, regular) = gaps.split_at(2);
+    assert!(
+        hastened.iter().all(|gap| *gap < 50 * PERIOD_NS),
+        "enabling hastens two, so that the drives watch before anything moves though one be lost: {gaps:?}"
+    );
+    assert!(regular.iter().all(|gap| *gap == 50 * PERIOD_NS), "{gaps:?}");
     let position = |id| rig.buses[0].sent.iter().rposition(|(_, frame)| frame.id() == id).unwrap();
     let beat = position(Id::canopen(0x700, 127));
     let behind =

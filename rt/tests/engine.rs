@@ -197,7 +197,7 @@ fn after_a_category_0_stop_in_motion_nothing_of_the_old_motion_comes_back() {
     rig.request(Request::Stop(StopCategory::Zero));
     rig.run_until(Phase::Disabled, 10);
     rig.request(Request::Enable);
-    rig.run(3);
+    rig.run(8);
     rig.drive(1).is_silent = true;
     rig.run_until(Phase::Disabling, 10);
     rig.drive(1).is_silent = false;

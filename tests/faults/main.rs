@@ -6,6 +6,7 @@ mod deaf_drives;
 mod drives;
 mod files;
 mod late_drives;
+mod lost_heartbeat;
 mod reactions;
 mod rearming;
 mod repeatability;

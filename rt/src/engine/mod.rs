@@ -134,8 +134,8 @@ pub struct Engine {
     /// Cycles of a fault reset that are still to come.
     fault_reset: u32,
     heartbeat_due: u32,
-    /// Whether the drives have been given a heartbeat since they were to be enabled.
-    has_beaten: bool,
+    /// Heartbeats that are still to leave before any drive is led up.
+    heartbeats_awaited: u32,
     blocked_cycles: u32,
     /// For how long own frames have waited for the wire, a bus each.
     held_back_cycles: [u32; MAX_BUSES],
@@ -204,7 +204,7 @@ impl Engine {
             stop: None,
             fault_reset: 0,
             heartbeat_due: 0,
-            has_beaten: false,
+            heartbeats_awaited: 0,
             blocked_cycles: 0,
             held_back_cycles: [0; MAX_BUSES],
             last_slot: None,
@@ -359,11 +359,10 @@ impl Engine {
     /// Ends the cycle: leaves its record and shows the new state.
     pub fn finish(&mut self, timing: Timing, now_ns: Nanoseconds, buses: &[BusHealth], door: &mut impl Door) {
         if let Some(heartbeat) = self.heartbeat {
-            self.has_beaten |= self.heartbeat_due == 0;
-            self.heartbeat_due = match self.heartbeat_due {
-                0 => heartbeat.cycles.saturating_sub(1),
-                cycles => cycles - 1,
-            };
+            match self.heartbeat_due {
+                0 => self.has_beaten(heartbeat),
+                _ => self.heartbeat_due -= 1,
+            }
         }
         let missed_slots = self.record.timing.missed_slots;
         self.record.timing = Timing { missed_slots, ..timing };

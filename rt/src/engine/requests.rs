@@ -40,7 +40,7 @@ impl Engine {
                 self.stop = None;
                 self.begin_watch();
                 self.goal = Goal::Enabled;
-                self.hasten_heartbeat();
+                self.hasten_heartbeats();
                 self.enter(Phase::Enabling, now_ns, door);
                 true
             }

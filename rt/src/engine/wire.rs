@@ -1,6 +1,8 @@
 //! What comes from the buses and what goes to them: SYNC, feedback, controlwords and set-points, the heartbeat, services.
 
-use super::{BusSet, Engine, FAULT_RESET_CYCLES, SendBatch, Transmission, has_cycle, has_cycle_of};
+use super::{
+    BusSet, Engine, FAULT_RESET_CYCLES, Heartbeat, SendBatch, Transmission, has_cycle, has_cycle_of,
+};
 use crate::axis::FeedbackSince;
 use crate::cia402::{Goal, controlword};
 use crate::dispatch::Destination;
@@ -15,6 +17,8 @@ use crate::time::Nanoseconds;
 /// A drive that has stopped for want of it may go on with its old target once it is back: until then what the drives
 /// report must have been heard, and their targets and controlwords be new ones.
 const HEARTBEAT_HELD_BUS_CYCLES: u32 = 4;
+/// One alone might be lost on the wire, and the drive that has not heard it runs unwatched for a whole period.
+const HEARTBEATS_BEFORE_ENABLING: u32 = 2;
 const NMT_OPERATIONAL: u8 = 5;
 /// Cycles from one look for late drives to the next: their silence must have been heard.
 const LOOK_AGAIN_CYCLES: u32 = 64;
@@ -118,7 +122,7 @@ impl Engine {
             _ => Some(controlword::DISABLE_VOLTAGE),
         };
         // With these commands, or before them.
-        let has_beaten = self.has_beaten || self.heartbeat_due == 0;
+        let has_beaten = self.heartbeats_awaited <= u32::from(self.heartbeat_due == 0);
         for axis in &mut self.axes {
             let is_held_back = self.held_back.contains(axis.parameters().bus.into());
             if has_cycle_of(&self.buses, axis, slot) && !is_held_back {
@@ -196,9 +200,18 @@ impl Engine {
 
     /// A drive watches the controller from the first heartbeat on that it hears after it has been set up: that comes before
     /// any is led up, and not only after a whole period.
-    pub(super) fn hasten_heartbeat(&mut self) {
-        self.has_beaten = self.heartbeat.is_none();
+    pub(super) fn hasten_heartbeats(&mut self) {
+        self.heartbeats_awaited = if self.heartbeat.is_some() { HEARTBEATS_BEFORE_ENABLING } else { 0 };
         self.heartbeat_due = self.heartbeat_due.min(self.heartbeat_held_cycles());
+    }
+
+    /// A heartbeat has left. While more are awaited, the next one comes as soon as after an absence.
+    pub(super) fn has_beaten(&mut self, heartbeat: Heartbeat) {
+        self.heartbeats_awaited = self.heartbeats_awaited.saturating_sub(1);
+        self.heartbeat_due = heartbeat.cycles.saturating_sub(1);
+        if self.heartbeats_awaited > 0 {
+            self.heartbeat_due = self.heartbeat_due.min(self.heartbeat_held_cycles());
+        }
     }
 
     fn heartbeat_held_cycles(&self) -> u32 {

@@ -126,7 +126,7 @@ proptest! {
         limits in limits(),
         targets in targets(),
         // By how much each limit that the stream keeps to is higher than that of the guard.
-        beyond in prop::collection::vec(prop_oneof![Just(0.0), 1e-5f64..0.01, 0.01f64..2.0], 5),
+        beyond in prop::collection::vec(prop_oneof![Just(0.0), 1e-7f64..1e-5, 1e-5f64..0.01, 0.01f64..2.0], 5),
         cycles in 1usize..3000,
     ) {
         let period_s = 0.001;
@@ -170,7 +170,7 @@ proptest! {
             stream.take(next);
             // The rounding of positions shows in what is small against it.
             let worst = excesses.into_iter().fold(0.0, f64::max);
-            prop_assert!(worst < 3.0 * TOLERANCE, "{excesses:?} was let pass");
+            prop_assert!(worst < 4.0 * TOLERANCE, "{excesses:?} was let pass");
         }
         // Wherever the stream has ended, refused or not.
         motion.stop([(stream.state(), &limits)].into_iter()).unwrap();
@@ -179,8 +179,8 @@ proptest! {
             let next = motion.states().next().unwrap().position;
             let passed = stream.check_steps(next);
             prop_assert!(passed.is_ok(), "{passed:?} at {next} of {limits:?}");
-            let farthest = limits.position_max + 3.0 * TOLERANCE * range;
-            prop_assert!(next <= farthest && next >= limits.position_min - 3.0 * TOLERANCE * range, "{next}");
+            let farthest = limits.position_max + 1.1 * TOLERANCE * range;
+            prop_assert!(next <= farthest && next >= limits.position_min - 1.1 * TOLERANCE * range, "{next}");
             stream.take(next);
         }
     }

@@ -10,6 +10,10 @@ use crate::stop::Rule;
 /// polynomials, each with a rounding. The third difference divides what comes of it by the cube of the period.
 const ROUNDINGS: f64 = 64.0;
 
+/// Relative to the limits that a stop must be able to keep: half of what [`check`](super::check) allows, so that every step of
+/// the stop passes it.
+const BRAKING_TOLERANCE: f64 = TOLERANCE / 2.0;
+
 /// What is done with a set-point of a stream that breaks a limit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum OnViolation {
@@ -133,19 +137,19 @@ impl<'a> Way<'a> {
         reach.velocity <= self.limits.velocity && reach.position <= self.farthest.max(self.course.next)
     }
 
-    /// Checks that they can be kept, but for rounding.
+    /// Checks that they can be kept, but for the tolerance.
     fn check(&self) -> Result<(), Violation> {
         let reach = Reach::of(&self.course.braked_end(self.limits), self.limits);
         let fastest = self.limits.velocity;
-        if reach.velocity > fastest * (1.0 + TOLERANCE) + self.course.noise(1) {
+        if reach.velocity > fastest * (1.0 + BRAKING_TOLERANCE) + self.course.noise(1) {
             return Err(Violation {
                 rule: Rule::VelocityLimit,
                 value: self.sign * reach.velocity,
                 limit: fastest,
             });
         }
-        let room = TOLERANCE * (self.limits.position_max - self.limits.position_min) + self.course.noise(0);
-        if reach.position > self.farthest.max(self.course.next) + room {
+        let room = BRAKING_TOLERANCE * (self.limits.position_max - self.limits.position_min);
+        if reach.position > (self.farthest + room).max(self.course.next) + self.course.noise(0) {
             return Err(Violation {
                 rule: Rule::PositionLimit,
                 value: self.sign * reach.position,

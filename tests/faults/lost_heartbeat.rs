@@ -1,0 +1,99 @@
+//! A heartbeat of the controller that no drive hears: drives begin to watch with the first that they hear.
+
+use takt::config::Config;
+use takt::controller::VirtualRun;
+use takt::sim::SimulatedBus;
+use takt_rt::cia402::State;
+use takt_rt::frame::{Frame, Id};
+use takt_rt::port::{BusHealth, BusPort, ReceiveBatch};
+use takt_rt::stop::Phase;
+
+use crate::arm::folder;
+
+const MILLISECOND_NS: u64 = 1_000_000;
+
+/// A simulated bus on which one of the controller's heartbeats is lost.
+struct LossyBus {
+    bus: SimulatedBus,
+    heartbeat: Id,
+    /// Which one, counted from 0.
+    lost: Option<usize>,
+    heartbeats: usize,
+}
+
+impl BusPort for LossyBus {
+    fn send(&mut self, now_ns: u64, frames: &[Frame]) -> usize {
+        for (index, frame) in frames.iter().enumerate() {
+            if frame.id() == self.heartbeat {
+                self.heartbeats += 1;
+                if self.lost.is_some_and(|lost| self.heartbeats == lost + 1) {
+                    continue;
+                }
+            }
+            if self.bus.send(now_ns, &[*frame]) == 0 {
+                return index;
+            }
+        }
+        frames.len()
+    }
+
+    fn receive(&mut self, now_ns: u64, batch: &mut ReceiveBatch) {
+        self.bus.receive(now_ns, batch);
+    }
+
+    fn unconfirmed(&mut self, now_ns: u64) -> usize {
+        self.bus.unconfirmed(now_ns)
+    }
+
+    fn health(&mut self) -> BusHealth {
+        self.bus.health()
+    }
+}
+
+/// The first axis of a machine whose controller beats so seldom that the drives hear it by chance only.
+fn machine(name: &str) -> Config {
+    let mut config = Config::load(&folder().join(format!("{name}.toml"))).unwrap();
+    config.axes.iter_mut().for_each(|axis| axis.simulated.power_up_ns = 5 * MILLISECOND_NS);
+    config.master.heartbeat_ns = Some(20_000 * MILLISECOND_NS);
+    config.master.heartbeat_timeout_ns = 50_000 * MILLISECOND_NS;
+    config
+}
+
+/// Plays until all axes are enabled and the first move has begun. Returns how many heartbeats were sent on the first bus.
+fn enabled(config: &Config, lost: Option<usize>) -> (VirtualRun<LossyBus>, usize) {
+    let heartbeat = Id::canopen(0x700, config.master.node);
+    let buses = (0..config.buses.len()).map(|bus| SimulatedBus::new(config, bus));
+    let ports = buses.map(|bus| LossyBus { bus, heartbeat, lost, heartbeats: 0 }).collect();
+    let (mut run, _) = VirtualRun::new(config, ports).unwrap();
+    while run.snapshot().phase != Phase::Moving {
+        assert!(run.step(), "{}: it ends before it moves", config.name);
+    }
+    let heartbeats = run.ports()[0].heartbeats;
+    (run, heartbeats)
+}
+
+#[test]
+fn a_drive_whose_controller_dies_as_soon_as_it_is_enabled_stops_whichever_heartbeat_was_lost() {
+    for name in ["single-erob", "gantry-yz-aim"] {
+        let config = machine(name);
+        let sent = enabled(&config, None).1;
+        assert!(sent >= 2, "{name}: {sent} heartbeats");
+        for lost in 0..sent {
+            let (mut run, _) = enabled(&config, Some(lost));
+            let died_ns = run.snapshot().at_ns;
+            let port = &mut run.ports()[0];
+            let mut observed = |at_ns: u64| -> Vec<State> {
+                port.receive(at_ns, &mut ReceiveBatch::new());
+                config.axes.iter().map(|axis| port.bus.observe(axis.node).unwrap().state).collect()
+            };
+            assert!(observed(died_ns).iter().all(|state| *state == State::OperationEnabled));
+            let ticks = died_ns..=died_ns + config.master.heartbeat_timeout_ns;
+            let states = ticks.step_by(MILLISECOND_NS as usize).map(observed).last().unwrap();
+            // That of a YZ-AIM stays on its place, with an alarm.
+            assert!(
+                states.iter().all(|state| state.is_faulted()),
+                "{name}, {lost} of {sent} lost: {states:?}"
+            );
+        }
+    }
+}
