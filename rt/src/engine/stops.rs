@@ -64,7 +64,7 @@ impl Engine {
             // An axis counts in cycles of its bus.
             let acknowledge_limit =
                 self.acknowledge_timeout_cycles.div_ceil(bus.map_or(1, |bus| bus.divider.max(1)));
-            let complaint = complaint(axis, self.phase, acknowledge_limit, self.period_s);
+            let complaint = complaint(axis, self.phase, acknowledge_limit);
             let Some((rule, value, limit)) = complaint else {
                 continue;
             };
@@ -172,12 +172,7 @@ const fn has_power(phase: Phase) -> bool {
 }
 
 /// What is wrong with an axis, if anything: rule, value, limit.
-fn complaint(
-    axis: &mut Axis,
-    phase: Phase,
-    acknowledge_limit: u32,
-    period_s: f64,
-) -> Option<(Rule, f64, f64)> {
+fn complaint(axis: &mut Axis, phase: Phase, acknowledge_limit: u32) -> Option<(Rule, f64, f64)> {
     let is_stopping_itself = phase == Phase::Stopping && axis.stops_by_itself();
     let must_be_enabled = !matches!(phase, Phase::Enabling | Phase::Disabling) && !is_stopping_itself;
     let is_disabled = must_be_enabled && !axis.is_enabled();
@@ -221,9 +216,8 @@ fn complaint(
     if is_disabled {
         return Some((Rule::DriveDisabled, axis.statusword().into(), 0.0));
     }
-    if let Some(distance) = axis.jump() {
-        let limit = axis.parameters().limits.velocity * period_s;
-        return Some((Rule::ImplausibleFeedback, distance, limit));
+    if let Some(jump) = axis.jump() {
+        return Some((Rule::ImplausibleFeedback, jump.distance, jump.reach));
     }
     if axis.unacknowledged_cycles() > acknowledge_limit {
         let (cycles, limit) = (axis.unacknowledged_cycles().into(), acknowledge_limit.into());
