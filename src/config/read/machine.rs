@@ -165,10 +165,13 @@ pub fn simulation(mut section: Section<'_>) -> Simulation {
     let seed =
         section.get("seed").and_then(|entry| entry.integer(0..i64::MAX)).and_then(|v| u64::try_from(v).ok());
     let longest_gap_ns = section.get("longest_gap").and_then(|entry| entry.nanoseconds(100e-6, 1.0));
+    let stops_for_missed_slots =
+        boolean(&mut section, "stops_for_missed_slots", defaults::STOPS_FOR_MISSED_SLOTS);
     section.finish();
     Simulation {
         seed: seed.unwrap_or(defaults::SEED),
         longest_gap_ns: longest_gap_ns.unwrap_or(defaults::LONGEST_GAP_NS),
+        stops_for_missed_slots,
     }
 }
 
