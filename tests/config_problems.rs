@@ -148,6 +148,7 @@ cases! {
         "period = \"1 ms\"" => "period = true", at "period": WrongType { expected: "a number or a text with number and unit", found: "true or false", .. },
         "priority = 80" => "priority = 80.5", at "priority": WrongType { expected: "a whole number", found: "a number", .. },
         "lock_memory = true" => "lock_memory = \"yes\"", at "lock_memory": WrongType { expected: "true or false", found: "a text", .. },
+        "seed = 1" => "stops_for_missed_slots = 1", at "stops_for": WrongType { key, .. } if key == "simulation.stops_for_missed_slots",
         "name = \"left\"" => "name = 1", at "name = 1": WrongType { key, expected: "a text in quotes", .. } if key == "bus.name",
         "feedback = [\"velocity\"]" => "feedback = \"velocity\"", at "feedback": WrongType { expected: "a list", .. },
         "to = [\"30 deg\", 0.5]" => "to = [\"30 deg\", [0.5]]", at "to = [\"30": WrongType { found: "a list", .. },
@@ -222,6 +223,7 @@ cases! {
         "directory = \"runs\"" => "directory = \"\"", at "directory": OutOfRange { .. },
         "seed = 1" => "seed = 99999999999999999999", at "seed": OutOfRange { .. },
         "longest_gap = \"2 ms\"" => "longest_gap = \"900 us\"", at "longest_gap": OutOfRange { .. },
+        "longest_gap = \"2 ms\"" => "longest_gap = \"2 s\"", at "longest_gap": OutOfRange { .. },
         "bit_rate = \"1 Mbit/s\"" => "bit_rate = \"500 kbit/s\"", at "500 kbit/s": OutOfRange { key, .. } if key == "bus.bit_rate",
     }
 

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use takt::config::{Config, Control};
 use takt::controller::{Interrupt, Outcome, VirtualRun};
-use takt::sim::{DriveFault, SimulatedBus};
+use takt::sim::{DriveFault, Observation, SimulatedBus};
 use takt_rt::cia402::State;
 use takt_rt::door::Request;
 use takt_rt::frame::{Frame, Id};
@@ -271,28 +271,35 @@ fn a_joint_that_is_held_fast_stops_the_whole_arm() {
 }
 
 /// The controller is gone without a farewell, as after `kill -9`: the drives' own watchdogs stop the arm.
-#[test]
-fn when_the_controller_dies_the_drives_stop_by_themselves() {
-    let config = load("arm6-erob.toml");
-    let mut run = start(&config);
-    while run.snapshot().phase != Phase::Moving {
-        assert!(run.step());
-    }
-    run.run(300, |_| {});
-    let mut now_ns = run.clock().now_ns();
-    let end_ns = now_ns + config.master.heartbeat_timeout_ns + 300_000_000;
-    while now_ns < end_ns {
-        now_ns += 1_000_000;
-        for port in run.ports() {
-            port.receive(now_ns, &mut ReceiveBatch::new());
-        }
-    }
-    for port in run.ports() {
+fn drives_of(ports: &mut [SimulatedBus]) -> Vec<Observation> {
+    let mut seen = vec![];
+    for port in ports {
         let nodes: Vec<u8> = port.nodes().collect();
-        for node in nodes {
-            let seen = port.observe(node).unwrap();
-            assert!(!seen.state.has_torque(), "node {node}: {:?}", seen.state);
-            assert!(seen.velocity.abs() < 1e-3, "node {node}: {}", seen.velocity);
+        seen.extend(nodes.into_iter().map(|node| port.observe(node).unwrap()));
+    }
+    seen
+}
+
+/// An eRob by object 1029, a YZ-AIM by its alarm 20.
+#[test]
+fn when_the_controller_dies_the_drives_of_every_family_stop_by_themselves() {
+    for name in ["arm6-erob.toml", "gantry-yz-aim.toml"] {
+        let config = load(name);
+        let mut run = start(&config);
+        while run.snapshot().phase != Phase::Moving {
+            assert!(run.step());
+        }
+        run.run(300, |_| {});
+        assert!(drives_of(run.ports()).iter().any(|seen| seen.velocity.abs() > 0.01), "{name}: it stands");
+        let mut now_ns = run.clock().now_ns();
+        let end_ns = now_ns + config.master.heartbeat_timeout_ns + 300_000_000;
+        while now_ns < end_ns {
+            now_ns += 1_000_000;
+            run.ports().iter_mut().for_each(|port| port.receive(now_ns, &mut ReceiveBatch::new()));
+        }
+        for seen in drives_of(run.ports()) {
+            assert!(!seen.state.has_torque(), "{name}: {:?}", seen.state);
+            assert!(seen.velocity.abs() < 1e-3, "{name}: {}", seen.velocity);
         }
     }
 }

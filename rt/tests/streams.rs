@@ -185,6 +185,36 @@ fn a_stream_planned_a_little_beyond_a_limit_is_refused_in_time() {
     }
 }
 
+/// Within the limits of velocity and acceleration, and of the jerk too up to the cycle in which it leaps.
+#[test]
+fn a_stream_whose_acceleration_leaps_is_stopped_by_its_jerk() {
+    const JERK: f64 = 200.0;
+    let mut parameters = parameters(1);
+    parameters.axes[0].limits.jerk = JERK;
+    let mut rig = Rig::of(parameters).enable();
+    rig.move_to(0.0);
+    rig.run_until(Phase::Holding, 5_000);
+    rig.run(10);
+    rig.request(Request::Stream);
+    let period_s = PERIOD_NS as f64 * 1e-9;
+    let (mut position, mut velocity, mut acceleration) = (0.0, 0.0, 0.0);
+    let mut go_on = |rig: &mut Rig, jerk: f64| {
+        acceleration += jerk * period_s;
+        velocity += acceleration * period_s;
+        position += velocity * period_s;
+        stream(rig, State { position, velocity, acceleration });
+        rig.run(1);
+    };
+    (0..20).for_each(|_| go_on(&mut rig, 0.9 * JERK));
+    assert_eq!((rig.phase(), rig.stops()), (Phase::Streaming, vec![]));
+    go_on(&mut rig, 1.5 * JERK);
+    let stops = rig.stops();
+    assert_eq!((stops.len(), stops[0].rule, stops[0].category), (1, Rule::JerkLimit, StopCategory::Two));
+    assert!((stops[0].value - 1.5 * JERK).abs() < 1e-3 && stops[0].limit == JERK, "{stops:?}");
+    rig.run_until(Phase::Holding, 1_000);
+    rig.assert_limits_kept();
+}
+
 #[test]
 fn what_is_no_number_is_refused_whether_streams_are_clamped_or_not() {
     for on_violation in [OnViolation::Reject, OnViolation::Clamp] {

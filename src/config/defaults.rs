@@ -107,3 +107,5 @@ pub const RING_RECORDS: usize = 4096;
 pub const SEED: u64 = 1;
 /// `[simulation] longest_gap`; two periods of the cycle where that is more
 pub const LONGEST_GAP_NS: u64 = 2_000_000;
+/// `[simulation] stops_for_missed_slots`
+pub const STOPS_FOR_MISSED_SLOTS: bool = false;

@@ -395,6 +395,9 @@ pub struct Simulation {
     /// A pause of this process that is longer than this stops the simulated world too: the host's stalls are
     /// not the bus's. A period of the cycle at least; default 2 ms, or two periods where that is more.
     pub longest_gap_ns: u64,
+    /// Whether too many missed slots stop the group although every bus is simulated, as they do on a real one. Default no:
+    /// the drives stand still while the process does, and nothing is lost by a slot that they miss as well.
+    pub stops_for_missed_slots: bool,
 }
 
 /// The drive and joint that stand in for an axis on a simulated bus.

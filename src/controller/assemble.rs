@@ -94,7 +94,8 @@ pub fn engine(config: &Config) -> Result<Engine, AssembleError> {
         service_frames_active: bus.service_frames_per_cycle,
         service_frames_passive: SERVICE_FRAMES_PASSIVE.max(bus.service_frames_per_cycle),
     });
-    let is_simulated = config.buses.iter().all(|bus| bus.interface == Interface::Simulated);
+    let bears_missed_slots = !config.simulation.stops_for_missed_slots
+        && config.buses.iter().all(|bus| bus.interface == Interface::Simulated);
     let heartbeat = config
         .master
         .heartbeat_ns
@@ -111,8 +112,7 @@ pub fn engine(config: &Config) -> Result<Engine, AssembleError> {
         timing: TimingLadder {
             warning: config.missed_slots.warning,
             degraded: config.missed_slots.degraded,
-            // Simulated drives stand still while the process does: nothing is lost by a slot that they miss as well.
-            unfit: if is_simulated { u32::MAX } else { config.missed_slots.stop },
+            unfit: if bears_missed_slots { u32::MAX } else { config.missed_slots.stop },
             leak_cycles: cycles(config.missed_slots.leak_ns).max(1),
         },
         acknowledge_timeout_cycles: cycles(ACKNOWLEDGE_TIMEOUT_NS),

@@ -92,6 +92,13 @@ pub fn stop_cause(stop: &StopReason, machine: &Machine) -> String {
         Rule::FollowingError => {
             format!("{axis} was {value:.4} {unit} from its set-point (allowed: {limit:.4} {unit})")
         }
+        Rule::StaleCommand if stop.axis.is_some() => {
+            format!("what {axis} had been asked for expired and was not asked for again")
+        }
+        // One that has begun may be late by nothing.
+        Rule::StaleCommand if limit > 0.0 => {
+            format!("the stream of set-points did not begin within {}", cycles(limit))
+        }
         Rule::StaleCommand => {
             "the stream of set-points ended: its last command expired and no newer one came".to_owned()
         }
@@ -150,7 +157,7 @@ pub fn stop_cause(stop: &StopReason, machine: &Machine) -> String {
             format!("the set-point of {axis} asked for {value:.1} {unit}/s³ (allowed: {limit:.1} {unit}/s³)")
         }
         Rule::ImplausibleFeedback => format!(
-            "{axis} was reported {value:.4} {unit} from where it was a cycle before (its speed allows {limit:.4} {unit})"
+            "{axis} was reported {value:.4} {unit} from where it was, further than it can have got ({limit:.4} {unit})"
         ),
         Rule::BusErrorPassive => {
             format!("bus {} is error-passive: hardly a frame gets through", bus_name(value, machine))
@@ -252,6 +259,34 @@ mod tests {
                 0.0214,
                 0.02,
                 "shoulder was 0.0214 rad from its set-point (allowed: 0.0200 rad)",
+            ),
+            (
+                Rule::StaleCommand,
+                None,
+                3.0,
+                0.0,
+                "the stream of set-points ended: its last command expired and no newer one came",
+            ),
+            (
+                Rule::StaleCommand,
+                None,
+                501.0,
+                500.0,
+                "the stream of set-points did not begin within 500 cycles",
+            ),
+            (
+                Rule::StaleCommand,
+                Some(1),
+                1.0,
+                0.0,
+                "what slide had been asked for expired and was not asked for again",
+            ),
+            (
+                Rule::ImplausibleFeedback,
+                Some(0),
+                0.5,
+                0.0101,
+                "shoulder was reported 0.5000 rad from where it was, further than it can have got (0.0101 rad)",
             ),
             (
                 Rule::VelocityLimit,

@@ -119,7 +119,7 @@ pub fn config(axes: &[(usize, u8)]) -> Config {
             black_box_ns: None,
             ring_records: 16,
         },
-        simulation: Simulation { seed: 1, longest_gap_ns: 1_000_000 },
+        simulation: Simulation { seed: 1, longest_gap_ns: 1_000_000, stops_for_missed_slots: false },
     }
 }
 

@@ -11,6 +11,15 @@ use crate::watch::NodeComplaint;
 /// A fault shows in the statusword within this many slots of the emergency message that announces it.
 const EMERGENCY_GRACE_CYCLES: u8 = 3;
 
+/// A report of a joint where it cannot have got to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Jump {
+    /// How far that is from where it was: rad (m).
+    pub distance: f64,
+    /// How far it can have got: rad (m).
+    pub reach: f64,
+}
+
 impl Axis {
     /// Begins to wait for the feedback of a cycle. What arrived before `now_ns` and has not been used is too late for its
     /// own cycle, and is no feedback of this one.
@@ -139,7 +148,7 @@ impl Axis {
                 };
                 self.believe(position, counts);
             }
-            Judgement::Doubtful { distance } => self.jump = Some(distance),
+            Judgement::Doubtful { distance, reach } => self.jump = Some(Jump { distance, reach }),
         }
     }
 
@@ -195,9 +204,9 @@ impl Axis {
         self.state
     }
 
-    /// How far from where it was the joint has been reported in this cycle, where it cannot have got to: rad (m). It is not
-    /// believed to be there before the next report agrees.
-    pub fn jump(&self) -> Option<f64> {
+    /// Where the joint has been reported in this cycle, if it cannot have got to there. It is not believed to be there before
+    /// the next report agrees.
+    pub fn jump(&self) -> Option<Jump> {
         self.jump.filter(|_| self.age == 0)
     }
 

@@ -27,6 +27,7 @@ use position_watch::PositionWatch;
 use punctuality::Punctuality;
 use service::ServiceCommand;
 
+pub use feedback::Jump;
 pub use parameters::{AxisParameters, Cadence, CommandPdo, FeedbackSince, MAX_PDOS, Pdo};
 
 /// Cycles of its bus after which a drive has obeyed a controlword and has said so.
@@ -79,8 +80,8 @@ pub struct Axis {
     service: ServiceCommand,
     /// Whether it may be led up, see [`Axis::prepare_to_enable`].
     is_ready: bool,
-    /// How far the joint has been reported from where it was, where no joint can get.
-    jump: Option<f64>,
+    /// The last report of the joint where it cannot have got to, if none was believed since.
+    jump: Option<Jump>,
     /// Whether `position` is what the drive has said.
     is_position_known: bool,
     emergency_code: u16,

@@ -32,6 +32,8 @@ pub(super) enum Judgement {
     Doubtful {
         /// How far it is from where it was: rad (m).
         distance: f64,
+        /// How far it can have got: rad (m).
+        reach: f64,
     },
 }
 
@@ -67,7 +69,8 @@ impl PositionWatch {
             }
             None => {
                 self.doubtful = Some(reported);
-                Judgement::Doubtful { distance: (reported - believed).abs() }
+                let distance = (reported - believed).abs();
+                Judgement::Doubtful { distance, reach: reach.within(self.believed_s) }
             }
         }
     }
@@ -113,8 +116,9 @@ mod tests {
         watch.judge(0.0, 1e-3, REACH);
         assert_eq!(watch.judge(0.1, 0.1, REACH), Judgement::Believed { velocity: 1.0 });
         let doubtful = watch.judge(0.2, 1e-3, REACH);
-        let Judgement::Doubtful { distance } = doubtful else { panic!("{doubtful:?}") };
+        let Judgement::Doubtful { distance, reach } = doubtful else { panic!("{doubtful:?}") };
         assert!((distance - 0.1).abs() < 1e-12);
+        assert!((reach - (4.0 * 2.0 * 1e-3 + 64.0 * 1e-6)).abs() < 1e-12);
         // Of two that agree the second tells the velocity.
         let Judgement::Believed { velocity } = watch.judge(0.201, 1e-3, REACH) else { panic!() };
         assert!((velocity - 1.0).abs() < 1e-9);

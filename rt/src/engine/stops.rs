@@ -65,7 +65,7 @@ impl Engine {
             let acknowledge_limit =
                 self.acknowledge_timeout_cycles.div_ceil(bus.map_or(1, |bus| bus.divider.max(1)));
             let is_resetting = self.fault_reset > 0 && axis.is_being_reset();
-            let complaint = complaint(axis, self.phase, is_resetting, acknowledge_limit, self.period_s);
+            let complaint = complaint(axis, self.phase, is_resetting, acknowledge_limit);
             let Some((rule, value, limit)) = complaint else {
                 continue;
             };
@@ -178,7 +178,6 @@ fn complaint(
     phase: Phase,
     is_resetting: bool,
     acknowledge_limit: u32,
-    period_s: f64,
 ) -> Option<(Rule, f64, f64)> {
     let is_stopping_itself = phase == Phase::Stopping && axis.stops_by_itself();
     let must_be_enabled = !matches!(phase, Phase::Enabling | Phase::Disabling) && !is_stopping_itself;
@@ -224,9 +223,8 @@ fn complaint(
     if is_disabled {
         return Some((Rule::DriveDisabled, axis.statusword().into(), 0.0));
     }
-    if let Some(distance) = axis.jump() {
-        let limit = axis.parameters().limits.velocity * period_s;
-        return Some((Rule::ImplausibleFeedback, distance, limit));
+    if let Some(jump) = axis.jump() {
+        return Some((Rule::ImplausibleFeedback, jump.distance, jump.reach));
     }
     if axis.unacknowledged_cycles() > acknowledge_limit {
         let (cycles, limit) = (axis.unacknowledged_cycles().into(), acknowledge_limit.into());

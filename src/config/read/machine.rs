@@ -167,10 +167,13 @@ pub fn simulation(mut section: Section<'_>, period_ns: u64) -> Simulation {
         section.get("seed").and_then(|entry| entry.integer(0..i64::MAX)).and_then(|v| u64::try_from(v).ok());
     let longest_gap_ns =
         section.get("longest_gap").and_then(|entry| entry.nanoseconds(period_ns as f64 / 1e9, 1.0));
+    let stops_for_missed_slots =
+        boolean(&mut section, "stops_for_missed_slots", defaults::STOPS_FOR_MISSED_SLOTS);
     section.finish();
     Simulation {
         seed: seed.unwrap_or(defaults::SEED),
         longest_gap_ns: longest_gap_ns.unwrap_or(defaults::LONGEST_GAP_NS.max(2 * period_ns)),
+        stops_for_missed_slots,
     }
 }
 

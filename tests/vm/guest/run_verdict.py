@@ -5,7 +5,8 @@
 The run must have stopped in motion by one of the rules and have left a black box that says the same, or, where `borne` is
 among them, have finished. Whatever happened, every cycle must be in the recording, and no set-point may be further from
 the one before than a cycle's motion at the limit of the velocity; with `records_lost` among the rules there is no such
-recording, and the run must have said so. Prints how it ended in a few words; ends with an error that says what is wrong.
+recording, and the run must have said so; with `nothing_lost` it must have counted no missed slot, no frame that was not sent,
+received or traced, and no error of a bus. Prints how it ended in a few words; ends with an error that says what is wrong.
 
 With FAULT_AT, the time of the fault in seconds of CLOCK_REALTIME (`-` without one), a stop is followed by a second line:
 its rule, its category, and after how many milliseconds it was noticed and all axes that are still heard were at rest.
@@ -127,11 +128,12 @@ def main(takt, path, code, fault_at_s, *rules):
     else:
         require(run["stop"] is not None, "nothing stopped it")
         ended = judge_stop(takt, run, int(code), rules)
+    counted = anomalies(run)
+    require("nothing_lost" not in rules or not counted, f"it has counted {counted}")
     is_lost = "records_lost" in rules
     records = judge_records(takt, run, is_lost)
     if not is_lost:
         judge_steps(run)
-    counted = anomalies(run)
     print(f"{ended}, {records}" + (f"; {counted}" if counted else ""))
     if run["stop"] and not is_lost and fault_at_s != "-":
         noticed_ms, rest_ms = stop_times(run, fault_at_s)

@@ -19,7 +19,7 @@ soak() {
         index=$(($(stat -c %s "$recording") / 1024 / 500))
         sleep 0.5
     done
-    end borne
+    end borne nothing_lost
     if [ "$late" -le $((early + index)) ]; then
         passes "$name: $early KiB resident after 5 s, $late KiB at the end, of which at most $index KiB are the recording's index"
     else
