@@ -209,9 +209,11 @@ fn failure(config: &Config, outcome: &Outcome) -> Option<String> {
             "{}: the drive is operational but sends no feedback; is another master changing its PDOs?",
             name(*axis)
         )),
-        Outcome::MoveRefused { number } => Some(format!(
-            "move {number} of the program was refused: its target or a fraction lies outside the limits"
-        )),
+        Outcome::MoveRefused { number, refusal } => {
+            let why = refusal.map(|refusal| words::refusal(&refusal, &Machine::of(config)));
+            let why = why.unwrap_or_else(|| "why is no longer known".to_owned());
+            Some(format!("move {number} of the program could not be begun: {why}"))
+        }
         Outcome::CallbackPanicked { message } => {
             Some(format!("a defect of takt (please report it) ended the run in a controlled stop: {message}"))
         }

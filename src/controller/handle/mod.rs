@@ -33,14 +33,16 @@ use takt_rt::plan::State;
 use takt_rt::port::Clock;
 use takt_rt::profile::ProfileTarget;
 use takt_rt::record::MAX_AXES;
+use takt_rt::refusal::Answer;
 use takt_rt::stop::{Phase, StopCategory};
 
 use super::channels::{Observer, RequestNumbers, Streamer};
 use super::outcome::{Interrupt, Outcome};
 use super::session::{self, Remote, Session, SessionError, SessionOptions};
 use crate::config::{Axis, Config};
+use crate::telemetry::Machine;
 
-pub use error::{CommandError, MotionError, StartFailure};
+pub use error::{CommandError, MotionError, Refused, StartFailure};
 
 /// Between two looks at the state by whoever waits.
 const LOOK: Duration = Duration::from_millis(1);
@@ -50,6 +52,7 @@ const ENABLE_PATIENCE: Duration = Duration::from_secs(60);
 /// A group of axes that is enabled and obeys. Dropping it brings the axes to rest, disables and leaves them.
 pub struct Controller {
     axes: Vec<Axis>,
+    machine: Machine,
     requests: mpsc::Sender<Asked>,
     numbers: RequestNumbers,
     observer: Observer,
@@ -93,7 +96,7 @@ impl Controller {
         let (introduce, introduced) = mpsc::sync_channel(1);
         let remote = Remote { requests: remote_requests, introduce };
         let is_ending = Arc::new(AtomicBool::new(false));
-        let axes = config.axes.clone();
+        let (axes, machine) = (config.axes.clone(), Machine::of(&config));
         let thread = {
             let is_ending = Arc::clone(&is_ending);
             let watch =
@@ -106,7 +109,7 @@ impl Controller {
             return Err(failed(thread));
         };
         let thread = Some(thread);
-        let mut controller = Self { axes, requests, numbers, observer, streamer, is_ending, thread };
+        let mut controller = Self { axes, machine, requests, numbers, observer, streamer, is_ending, thread };
         let begun = Instant::now();
         while controller.state().phase != Phase::Holding {
             if controller.has_ended() || begun.elapsed() > ENABLE_PATIENCE {
@@ -202,22 +205,9 @@ impl Controller {
     /// the time that enabling may take, and begin where the joints are.
     ///
     /// # Errors
-    /// [`MotionError::Refused`] unless the group holds its position and is punctual, [`MotionError::Ended`].
-    pub fn begin_stream(&mut self) -> Result<(), MotionError> {
-        let asked = self.ask(Request::Stream).map_err(|_| MotionError::Ended)?;
-        loop {
-            let state = self.state();
-            if state.phase == Phase::Streaming {
-                return Ok(());
-            }
-            if state.refusals.contain(asked) {
-                return Err(MotionError::Refused { phase: state.phase });
-            }
-            if self.has_ended() {
-                return Err(MotionError::Ended);
-            }
-            thread::sleep(LOOK);
-        }
+    /// [`CommandError::Refused`] unless the group holds its position and is punctual, [`CommandError::Ended`].
+    pub fn begin_stream(&mut self) -> Result<(), CommandError> {
+        self.obtain(Request::Stream)
     }
 
     /// Replaces the streamed set-points, one for each axis; the real-time thread takes the newest ones. They expire after
@@ -235,7 +225,7 @@ impl Controller {
         Ok(())
     }
 
-    /// Stops the group by this category.
+    /// Stops the group by this category. That is never refused, and not waited for.
     ///
     /// # Errors
     /// [`CommandError::Ended`].
@@ -243,28 +233,28 @@ impl Controller {
         self.ask(Request::Stop(category)).map(drop)
     }
 
-    /// Brings the axes to rest if need be, and disables them.
+    /// Begins to bring the axes to rest if need be, and to disable them.
     ///
     /// # Errors
-    /// [`CommandError::Ended`].
+    /// [`CommandError::Refused`], [`CommandError::Ended`].
     pub fn disable(&mut self) -> Result<(), CommandError> {
-        self.ask(Request::Disable).map(drop)
+        self.obtain(Request::Disable)
     }
 
-    /// Enables the axes again, after [`Controller::disable`], or after a fault and [`Controller::reset_faults`].
+    /// Begins to enable the axes again, after [`Controller::disable`], or after a fault and [`Controller::reset_faults`].
     ///
     /// # Errors
-    /// [`CommandError::Ended`].
+    /// [`CommandError::Refused`] unless the axes are disabled and no fault is latched, [`CommandError::Ended`].
     pub fn enable(&mut self) -> Result<(), CommandError> {
-        self.ask(Request::Enable).map(drop)
+        self.obtain(Request::Enable)
     }
 
-    /// Clears latched faults. Refused in motion.
+    /// Clears latched faults.
     ///
     /// # Errors
-    /// [`CommandError::Ended`].
+    /// [`CommandError::Refused`] in motion, [`CommandError::Ended`].
     pub fn reset_faults(&mut self) -> Result<(), CommandError> {
-        self.ask(Request::ResetFaults).map(drop)
+        self.obtain(Request::ResetFaults)
     }
 
     /// Waits until a motion is over: until the axes are at rest at their targets, or a speed or torque has been reached.
@@ -282,8 +272,8 @@ impl Controller {
             if let Some(reason) = state.stop.filter(|reason| reason.slot > motion.slot) {
                 return Err(MotionError::Stopped(reason));
             }
-            if state.refusals.contain(motion.request) {
-                return Err(MotionError::Refused { phase: state.phase });
+            if let Answer::Refused(refusal) = state.answers.of(motion.request) {
+                return Err(Refused::new(refusal, &self.machine).into());
             }
             if self.has_ended() {
                 return Err(MotionError::Ended);
@@ -355,6 +345,21 @@ impl Controller {
         let slot = self.state().slot;
         self.requests.send(Asked { id, request }).map_err(|_| CommandError::Ended)?;
         Ok(Motion { request: id, slot, ends_at_rest })
+    }
+
+    /// Asks for something, and waits until it has been granted.
+    fn obtain(&self, request: Request) -> Result<(), CommandError> {
+        let asked = self.ask(request)?;
+        loop {
+            let answers = self.state().answers;
+            match answers.of(asked) {
+                Answer::Granted => return Ok(()),
+                Answer::Refused(refusal) => return Err(Refused::new(refusal, &self.machine).into()),
+                Answer::None if answers.have_forgotten(asked) => return Err(CommandError::Unanswered),
+                Answer::None if self.has_ended() => return Err(CommandError::Ended),
+                Answer::None => thread::sleep(LOOK),
+            }
+        }
     }
 
     fn ask(&self, request: Request) -> Result<RequestId, CommandError> {
