@@ -247,6 +247,41 @@ fn a_folder_that_cannot_be_written_costs_the_recording_and_one_message_and_nothi
     assert_eq!(report(&output)["telemetry"]["recording"], Value::Null);
 }
 
+/// `takt run … 2>&1 | head`
+#[test]
+fn a_run_whose_messages_nobody_reads_any_more_stops_and_reports_as_ever() {
+    let place = Place::new();
+    let (reader, nobody) = std::io::pipe().unwrap();
+    drop(reader);
+    let scenario = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/faults/blocked-joint.toml");
+    let output = Command::new(env!("CARGO_BIN_EXE_takt"))
+        .arg("run")
+        .arg(place.config())
+        .args(["--json", "--faults"])
+        .arg(scenario)
+        .stderr(nobody)
+        .output()
+        .unwrap();
+    assert_eq!(
+        (output.status.code(), &report(&output)["stop"]["rule"]),
+        (Some(1), &"following_error".into())
+    );
+}
+
+#[test]
+fn a_duration_that_cannot_be_is_named_with_its_option() {
+    let place = Place::new();
+    for duration in ["-1", "0", "nan", "inf", "soon"] {
+        let output = place.run_to_end(&["--duration", duration]);
+        assert_eq!(output.status.code(), Some(2));
+        let said = errors(&output);
+        assert!(
+            said.starts_with(&format!("error: invalid value '{duration}' for '--duration <S>': ")),
+            "{said}"
+        );
+    }
+}
+
 #[test]
 fn check_says_whether_a_configuration_fits() {
     let place = Place::new();

@@ -367,6 +367,25 @@ fn a_file_that_is_not_there_is_named() {
     assert_eq!(error.line(&error.problems()[0]), None);
 }
 
+#[test]
+fn a_file_that_is_no_text_is_shown_where_it_ceases_to_be() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("machine.toml");
+    std::fs::write(&path, [SOUND.as_bytes(), b"# \xE4ndern\n"].concat()).unwrap();
+    let error = Config::load(&path).unwrap_err();
+    assert_eq!(error.problems()[0].kind, NotText);
+    assert_eq!(error.line(&error.problems()[0]), Some(SOUND.lines().count() + 1));
+    assert!(rendered(&error).contains("ndern"), "{}", rendered(&error));
+}
+
+#[test]
+fn a_period_that_cannot_be_is_told_once_and_not_also_of_the_axes_on_its_bus() {
+    let text = include_str!("../configs/mixed-arm.toml").replace("period = \"2 ms\"", "period = \"1.5 ms\"");
+    let error = error_of(&text);
+    let said: Vec<String> = error.problems().iter().map(ToString::to_string).collect();
+    assert_eq!(said, ["`bus.period` cannot be 1.5 ms"]);
+}
+
 fn rendered(error: &ConfigError) -> String {
     let mut text = String::new();
     GraphicalReportHandler::new_themed(GraphicalTheme::unicode_nocolor())

@@ -11,6 +11,7 @@ use takt_rt::cia402::State;
 use takt_rt::door::Request;
 use takt_rt::frame::{Frame, Id};
 use takt_rt::port::{BusHealth, BusPort, Clock, ReceiveBatch};
+use takt_rt::refusal::{Answer, Objection, RequestKind};
 use takt_rt::stop::{Phase, Rule, StopCategory};
 
 /// A minute is more than any of these programs takes.
@@ -374,7 +375,7 @@ fn what_is_refused_to_another_client_does_not_end_the_program() {
 }
 
 #[test]
-fn whoever_asks_finds_out_what_was_refused_by_its_number() {
+fn whoever_asks_finds_out_by_its_number_what_was_refused_and_why() {
     let config = load("arm6-erob.toml");
     let mut run = start(&config);
     while run.snapshot().phase != Phase::Moving {
@@ -383,8 +384,11 @@ fn whoever_asks_finds_out_what_was_refused_by_its_number() {
     let refused = run.host().request(Request::Enable).unwrap();
     let taken = run.host().request(Request::Stop(StopCategory::Two)).unwrap();
     run.run(2, |_| {});
-    let refusals = run.snapshot().refusals;
-    assert_eq!((refusals.contain(refused), refusals.contain(taken)), (true, false));
+    let answers = run.snapshot().answers;
+    let Answer::Refused(Some(refusal)) = answers.of(refused) else { panic!("{answers:?}") };
+    let kind = (refusal.request, refusal.objection, refusal.phase);
+    assert_eq!(kind, (RequestKind::Enable, Objection::Phase, Phase::Moving));
+    assert_eq!(answers.of(taken), Answer::Granted);
 }
 
 #[test]

@@ -7,6 +7,7 @@ use takt::config::Config;
 use takt::controller::session::SessionOptions;
 use takt::controller::{CommandError, Controller, MotionError, MoveOptions, Outcome, StartFailure};
 use takt_rt::plan::State;
+use takt_rt::refusal::RequestKind;
 use takt_rt::stop::{Phase, Rule, StopCategory};
 
 const PATIENCE: Duration = Duration::from_secs(30);
@@ -59,7 +60,7 @@ fn a_speed_is_reached_kept_and_ended_and_one_that_is_not_renewed_stops_the_group
 }
 
 #[test]
-fn after_a_stop_nothing_moves_before_the_fault_is_reset() {
+fn after_a_stop_nothing_moves_before_the_fault_is_reset_and_whoever_asks_is_told_why() {
     let mut joint = start("single-erob.toml");
     joint.begin_stream().unwrap();
     let far = State { position: 1.0, ..State::default() };
@@ -71,9 +72,19 @@ fn after_a_stop_nothing_moves_before_the_fault_is_reset() {
     assert_eq!(joint.state().stop.map(|stop| stop.rule), Some(Rule::StartPose));
     assert!(joint.wait_for(Phase::Holding, PATIENCE));
     let refused = joint.move_to(&[0.2]).unwrap();
-    assert!(matches!(joint.wait(refused, PATIENCE), Err(MotionError::Refused { .. })));
+    let Err(MotionError::Refused(refused)) = joint.wait(refused, PATIENCE) else { panic!("it was taken") };
+    assert_eq!(
+        refused.to_string(),
+        "the move was refused while holding: the group has stopped for a fault of joint (start_pose), which must be \
+         reset first"
+    );
+    let Err(CommandError::Refused(refused)) = joint.begin_stream() else { panic!("it was taken") };
+    assert_eq!(refused.refusal.map(|refusal| refusal.request), Some(RequestKind::Stream));
+    let Err(CommandError::Refused(refused)) = joint.enable() else { panic!("it was taken") };
+    assert_eq!(refused.to_string(), "enabling was refused: not possible while holding");
     joint.reset_faults().unwrap();
     let motion = joint.move_to(&[0.2]).unwrap();
+    assert!(matches!(joint.reset_faults(), Err(CommandError::Refused(_))), "it moves");
     assert_eq!(joint.wait(motion, PATIENCE), Ok(()));
     joint.stop(StopCategory::One).unwrap();
     assert!(joint.wait_for(Phase::Disabled, PATIENCE));

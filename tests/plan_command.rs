@@ -109,6 +109,29 @@ fn a_line_that_is_no_problem_is_named_and_the_rest_is_answered() {
 }
 
 #[test]
+fn a_line_that_is_no_text_and_a_problem_without_axes_are_named_and_the_rest_is_answered() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("problems.jsonl");
+    let lines =
+        [b"\xFF\xFE".to_vec(), b"{\"p0\":[],\"vmax\":[],\"amax\":[]}".to_vec(), problem().to_string().into()];
+    std::fs::write(&file, lines.join(&b'\n')).unwrap();
+    let output = plan(&[file.to_str().unwrap()], "");
+    assert_eq!(output.status.code(), Some(2));
+    let answers = answers(&output);
+    let results: Vec<_> = answers.iter().map(|answer| answer["result"].as_str().unwrap()).collect();
+    assert_eq!(results, ["malformed", "malformed", "ok"]);
+    assert!(answers[0]["message"].as_str().unwrap().starts_with("line 1: this is no text"), "{}", answers[0]);
+    assert!(answers[1]["message"].as_str().unwrap().starts_with("line 2: `p0` is empty"), "{}", answers[1]);
+}
+
+#[test]
+fn a_folder_in_place_of_a_file_is_named() {
+    let output = plan(&["/"], "");
+    assert_eq!(output.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&output.stderr).starts_with("takt: / cannot be read"));
+}
+
+#[test]
 fn a_file_that_is_not_there_is_named() {
     let output = plan(&["nowhere.jsonl"], "");
     assert_eq!(output.status.code(), Some(2));

@@ -71,6 +71,16 @@ fn json(output: &Output) -> Value {
     serde_json::from_slice(&output.stdout).unwrap()
 }
 
+/// Kept from before refusals said what was refused and why.
+#[test]
+fn a_recording_of_an_earlier_version_is_read() {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/seeds/recording/of_an_earlier_version");
+    let output = report(&file, &[]);
+    assert_eq!(output.status.code(), Some(0), "{}", errors(&output));
+    let text = text(&output);
+    assert!(text.contains("disabled → enabling") && text.contains("recording of 6 cycles"), "{text}");
+}
+
 #[test]
 fn a_black_box_tells_the_reason_the_axis_and_its_last_cycles_the_events_and_the_timing() {
     let left = stopped_run();

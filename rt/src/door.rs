@@ -9,6 +9,7 @@ use crate::plan;
 use crate::port::{BusHealth, Received};
 use crate::profile::ProfileTarget;
 use crate::record::{CycleRecord, Event, MAX_AXES, MAX_BUSES};
+use crate::refusal::{Answers, RequestKind};
 use crate::stop::{Phase, StopCategory, StopReason};
 use crate::time::Nanoseconds;
 use crate::watch::TimingLevel;
@@ -48,40 +49,6 @@ pub struct Asked {
     pub id: RequestId,
     /// The request.
     pub request: Request,
-}
-
-/// Which of the last requests were refused: of the newest one, and of those with the [`Refusals::REMEMBERED`] numbers
-/// before it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Refusals {
-    /// The newest request that was taken up.
-    pub newest: RequestId,
-    /// Bit n stands for the request whose number is by n less than the newest.
-    pub refused: u128,
-}
-
-impl Refusals {
-    /// How far back is remembered.
-    pub const REMEMBERED: u64 = 127;
-
-    /// Takes note of a request.
-    pub fn note(&mut self, id: RequestId, is_refused: bool) {
-        let ahead = id.0.saturating_sub(self.newest.0);
-        if ahead > 0 {
-            self.refused = if ahead > Self::REMEMBERED { 0 } else { self.refused << ahead };
-            self.newest = id;
-        }
-        let behind = self.newest.0 - id.0;
-        if is_refused && behind <= Self::REMEMBERED {
-            self.refused |= 1 << behind;
-        }
-    }
-
-    /// Whether a request was refused, as far as that is remembered.
-    pub fn contain(&self, id: RequestId) -> bool {
-        let behind = self.newest.0.checked_sub(id.0).filter(|behind| *behind <= Self::REMEMBERED);
-        behind.is_some_and(|behind| self.refused >> behind & 1 == 1)
-    }
 }
 
 /// What can be asked of the group.
@@ -133,6 +100,29 @@ pub enum Request {
     Retire,
     /// Leave the loop after this cycle. The drives get no more set-points.
     Leave,
+}
+
+impl Request {
+    /// What it is, without its parameters.
+    pub const fn kind(&self) -> RequestKind {
+        match self {
+            Self::Sync(_) => RequestKind::Sync,
+            Self::TimeOfDay { .. } => RequestKind::TimeOfDay,
+            Self::RatedTorque { .. } => RequestKind::RatedTorque,
+            Self::ProcessData(_) => RequestKind::ProcessData,
+            Self::Position { .. } => RequestKind::Position,
+            Self::Activate => RequestKind::Activate,
+            Self::Enable => RequestKind::Enable,
+            Self::Move(_) => RequestKind::Move,
+            Self::SetProfileTarget(_) => RequestKind::SetProfileTarget,
+            Self::Stream => RequestKind::Stream,
+            Self::Stop(_) => RequestKind::Stop,
+            Self::Disable => RequestKind::Disable,
+            Self::ResetFaults => RequestKind::ResetFaults,
+            Self::Retire => RequestKind::Retire,
+            Self::Leave => RequestKind::Leave,
+        }
+    }
 }
 
 /// The process data of one axis, to replace what it was set up with.
@@ -219,8 +209,8 @@ pub struct Snapshot {
     pub dropped: u64,
     /// Requests that were refused, since the start.
     pub refused: u64,
-    /// Which of the last ones.
-    pub refusals: Refusals,
+    /// What became of the last requests.
+    pub answers: Answers,
     /// The number of the last finished move; 0 before the first.
     pub finished_move: u32,
     /// Planned time left of the present move or stop, in seconds.
@@ -248,7 +238,7 @@ impl Default for Snapshot {
             clamped: 0,
             dropped: 0,
             refused: 0,
-            refusals: Refusals::default(),
+            answers: Answers::default(),
             finished_move: 0,
             remaining_s: 0.0,
             stop: None,
@@ -280,30 +270,4 @@ pub struct AxisSnapshot {
     /// SYNCs that the drive has left without an answer, or has not answered yet. One that stays so may have been lost, or
     /// every answer since then comes so many cycles late: that is looked into whenever the group is enabled.
     pub unanswered: u16,
-}
-
-#[cfg(test)]
-mod tests {
-    extern crate std;
-    use super::*;
-    use std::vec::Vec;
-
-    fn refused(noted: &[(u64, bool)]) -> Vec<u64> {
-        let mut refusals = Refusals::default();
-        noted.iter().for_each(|(id, is_refused)| refusals.note(RequestId(*id), *is_refused));
-        (0..1000).filter(|id| refusals.contain(RequestId(*id))).collect()
-    }
-
-    #[test]
-    fn each_request_is_found_by_its_number_in_whatever_order_they_came() {
-        assert_eq!(refused(&[(1, false), (2, true), (3, false), (4, true)]), [2, 4]);
-        assert_eq!(refused(&[(7, true), (5, true), (6, false), (9, false), (8, true)]), [5, 7, 8]);
-    }
-
-    #[test]
-    fn what_is_too_long_ago_is_forgotten_and_never_taken_for_another() {
-        assert_eq!(refused(&[(1, true), (128, false)]), [1]);
-        assert_eq!(refused(&[(1, true), (129, false)]), [0; 0]);
-        assert_eq!(refused(&[(1, true), (600, true), (2, true)]), [600]);
-    }
 }

@@ -17,7 +17,7 @@
 //! - [`axis`], [`engine`]: one joint, and the group that moves together; [`engine::Engine::compute`] is a cycle's thinking.
 //! - [`watch`]: what is watched over time: missed slots, nodes that fall silent, two nodes with one number.
 //! - [`cycle`]: the paced loop around it: SYNC, feedback, set-points, skip and never burst.
-//! - [`record`]: what each cycle leaves behind.
+//! - [`record`], [`refusal`]: what each cycle leaves behind; why a request was refused.
 #![no_std]
 #![deny(unsafe_code)]
 
@@ -39,6 +39,7 @@ pub mod plan;
 pub mod port;
 pub mod profile;
 pub mod record;
+pub mod refusal;
 pub mod stop;
 pub mod time;
 pub mod time_of_day;

@@ -1,6 +1,7 @@
 //! What one cycle leaves behind: a record of fixed size, copied to the logger through a lock-free ring.
 
 use crate::cia402;
+use crate::refusal::Refusal;
 use crate::stop::{Phase, StopReason};
 use crate::time::Nanoseconds;
 use crate::watch::TimingLevel;
@@ -160,8 +161,5 @@ pub enum EventKind {
         level: TimingLevel,
     },
     /// A request was refused and changed nothing.
-    Refused {
-        /// The phase that forbade it.
-        phase: Phase,
-    },
+    Refused(Refusal),
 }

@@ -10,6 +10,7 @@ use takt_rt::guard::OnViolation;
 use takt_rt::pdo::{MappedObject, Mapping};
 use takt_rt::port::BusState;
 use takt_rt::record::EventKind;
+use takt_rt::refusal::Objection;
 use takt_rt::stop::{Phase, Rule, StopCategory};
 use takt_rt::watch::TimingLevel;
 
@@ -148,6 +149,9 @@ fn slots_missed_too_often_are_told_then_keep_streams_away_and_then_stop_the_grou
     rig.request(Request::Stream);
     rig.run(1);
     assert_eq!((rig.door.snapshot.refused, rig.phase()), (refused + 1, Phase::Holding));
+    let refusal = rig.refusals().pop().unwrap();
+    assert_eq!((refusal.objection, refusal.limit), (Objection::MissedSlots, 50.0));
+    assert!(refusal.value >= 50.0, "{refusal:?}");
     stall(&mut rig, 300);
     assert_eq!(reason(&rig).0, Rule::TimingUnfit);
     let levels: Vec<TimingLevel> = (rig.door.events.iter())

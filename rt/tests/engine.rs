@@ -2,15 +2,17 @@
 
 mod fixture;
 
-use fixture::{PERIOD_NS, Rig, jerk_limited, parameters, scale};
+use fixture::{PERIOD_NS, Rig, jerk_limited, move_to, parameters, scale};
 use proptest::prelude::*;
 use takt_rt::axis::AxisParameters;
 use takt_rt::cia402::State as DriveState;
-use takt_rt::door::{Move, Request};
+use takt_rt::door::{Move, ProfileMove, Request, RequestId};
 use takt_rt::engine::{Engine, SetUpError};
 use takt_rt::frame::{Frame, Id};
 use takt_rt::port::BusState;
+use takt_rt::profile::ProfileTarget;
 use takt_rt::record::{EventKind, MAX_AXES};
+use takt_rt::refusal::{Answer, Objection};
 use takt_rt::stop::{Phase, Rule, StopCategory};
 
 fn rules(rig: &Rig) -> Vec<Rule> {
@@ -116,27 +118,86 @@ fn what_cannot_be_done_is_refused_and_changes_nothing() {
         acceleration_scale: 1.0,
         minimum_duration_s: 0.0,
     };
+    let moved = |parameters| Request::Move(parameters);
+    let at_speed = |target, velocity| {
+        moved(Move { target: [target; MAX_AXES], target_velocity: [velocity; MAX_AXES], ..good })
+    };
+    let mut third = good;
+    third.target[2] = -3.2;
+    // What is asked for; what stands against it, at which axis, with which value and limit.
     let refused = [
-        Request::Move(Move { target: [3.1; MAX_AXES], ..good }),
-        Request::Move(Move { target: [f64::NAN; MAX_AXES], ..good }),
-        Request::Move(Move { velocity_scale: 0.0, ..good }),
-        Request::Move(Move { velocity_scale: 1.5, ..good }),
-        Request::Move(Move { acceleration_scale: f64::NAN, ..good }),
-        Request::Move(Move { minimum_duration_s: f64::INFINITY, ..good }),
-        Request::Move(Move { target_velocity: [f64::NAN; MAX_AXES], ..good }),
-        // A stop from there ends at ±3.05 rad.
-        Request::Move(Move { target: [2.85; MAX_AXES], target_velocity: [2.0; MAX_AXES], ..good }),
-        Request::Move(Move { target: [-2.85; MAX_AXES], target_velocity: [-2.0; MAX_AXES], ..good }),
-        Request::Enable,
-        Request::Activate,
-        Request::RatedTorque { axis: 0, torque: -1.0 },
-        Request::RatedTorque { axis: 200, torque: 1.0 },
+        (at_speed(3.1, 0.0), Objection::PositionLimit, Some(0), 3.1, 3.0),
+        (moved(third), Objection::PositionLimit, Some(2), -3.2, -3.0),
+        (at_speed(f64::INFINITY, 0.0), Objection::NotFinite, Some(0), f64::INFINITY, 0.0),
+        (at_speed(0.5, -2.5), Objection::VelocityLimit, Some(0), -2.5, -2.0),
+        (at_speed(0.5, f64::NEG_INFINITY), Objection::NotFinite, Some(0), f64::NEG_INFINITY, 0.0),
+        // A stop from there ends at ±3.05 rad, one cycle later.
+        (at_speed(2.85, 2.0), Objection::NoRoomToStop, Some(0), 3.052, 3.0),
+        (at_speed(-2.85, -2.0), Objection::NoRoomToStop, Some(0), -3.052, -3.0),
+        (moved(Move { velocity_scale: 0.0, ..good }), Objection::VelocityScale, None, 0.0, 1.0),
+        (moved(Move { velocity_scale: 1.5, ..good }), Objection::VelocityScale, None, 1.5, 1.0),
+        (moved(Move { acceleration_scale: -1.0, ..good }), Objection::AccelerationScale, None, -1.0, 1.0),
+        (
+            moved(Move { minimum_duration_s: f64::INFINITY, ..good }),
+            Objection::MinimumDuration,
+            None,
+            f64::INFINITY,
+            0.0,
+        ),
+        (moved(Move { minimum_duration_s: -1.0, ..good }), Objection::MinimumDuration, None, -1.0, 0.0),
+        (at_speed_of_half(good), Objection::NoTrajectory, Some(0), 0.0, 0.0),
+        (profile(0, ProfileTarget::Velocity(0.1)), Objection::WrongMode, Some(0), 8.0, 0.0),
+        (profile(9, ProfileTarget::Velocity(0.1)), Objection::UnknownAxis, None, 9.0, 3.0),
+        (Request::Enable, Objection::Phase, None, 0.0, 0.0),
+        (Request::Activate, Objection::Phase, None, 0.0, 0.0),
+        (Request::RatedTorque { axis: 1, torque: -1.0 }, Objection::RatedTorque, Some(1), -1.0, 0.0),
+        (Request::RatedTorque { axis: 200, torque: 1.0 }, Objection::UnknownAxis, None, 200.0, 3.0),
+        (Request::Position { axis: 3, counts: 1 }, Objection::UnknownAxis, None, 3.0, 3.0),
+        (Request::TimeOfDay { at_zero_ns: 1 }, Objection::NoTime, None, 0.0, 0.0),
     ];
-    for (count, request) in (1..).zip(refused) {
+    for (count, (request, objection, axis, value, limit)) in (1..).zip(refused) {
         rig.request(request);
-        assert_eq!(rig.door.snapshot.refused, count, "{request:?}");
-        assert_eq!(rig.phase(), Phase::Holding, "{request:?}");
+        assert_eq!((rig.door.snapshot.refused, rig.phase()), (count, Phase::Holding), "{request:?}");
+        let Some(refusal) = rig.refusals().pop() else { panic!("{request:?}: nobody was told") };
+        let expected = (request.kind(), objection, axis, Phase::Holding);
+        assert_eq!((refusal.request, refusal.objection, refusal.axis, refusal.phase), expected);
+        assert_eq!(refusal.limit, limit, "{request:?}");
+        assert!(refusal.value == value || (refusal.value - value).abs() < 1e-9, "{refusal:?}");
+        let answer = rig.door.snapshot.answers.of(RequestId(rig.door.taken));
+        assert_eq!(answer, Answer::Refused(Some(refusal)));
     }
+    rig.request(Request::Move(Move { velocity_scale: f64::NAN, ..good }));
+    assert!(rig.refusals().pop().is_some_and(|refusal| refusal.value.is_nan()));
+}
+
+/// At the target it would go at the limit, which half the limit does not lead to.
+fn at_speed_of_half(good: Move) -> Request {
+    Request::Move(Move { target_velocity: [2.0; MAX_AXES], velocity_scale: 0.5, ..good })
+}
+
+fn profile(axis: u8, target: ProfileTarget) -> Request {
+    Request::SetProfileTarget(ProfileMove { id: 9, axis, target, valid_until_ns: u64::MAX })
+}
+
+#[test]
+fn what_is_latched_or_on_its_way_out_says_so_when_it_refuses() {
+    let mut rig = Rig::enabled(3);
+    rig.stream(2.0, 0.0, PERIOD_NS * 100);
+    rig.request(Request::Stream);
+    rig.stream(2.0, 0.0, PERIOD_NS * 100);
+    rig.run(5);
+    assert_eq!((rig.phase(), rig.stops()[0].rule), (Phase::Holding, Rule::StartPose));
+    for request in [Request::Stream, Request::Move(move_to(0.1)), profile(0, ProfileTarget::Velocity(0.1))] {
+        rig.request(request);
+        let refusal = rig.refusals().pop().unwrap();
+        let (objection, rule) = (refusal.objection, Rule::ALL[refusal.value as usize]);
+        assert_eq!((objection, refusal.axis, rule), (Objection::StopLatched, Some(0), Rule::StartPose));
+    }
+    rig.request(Request::Retire);
+    rig.request(Request::Disable);
+    rig.run_until(Phase::Disabled, 400);
+    rig.request(Request::Enable);
+    assert_eq!(rig.refusals().pop().unwrap().objection, Objection::Retired);
 }
 
 #[test]

@@ -7,6 +7,7 @@ use takt_rt::axis::{Cadence, MAX_PDOS};
 use takt_rt::door::{AxisProcessData, MappedPdo, Request};
 use takt_rt::frame::Id;
 use takt_rt::pdo::{MAX_OBJECTS, MappedObject};
+use takt_rt::refusal::Objection;
 use takt_rt::stop::Phase;
 
 const CONTROLWORD: MappedObject = MappedObject::new(0x6040, 0, 16);
@@ -70,16 +71,24 @@ fn what_cannot_be_exchanged_or_comes_too_late_is_refused_and_changes_nothing() {
     taken.feedback[0] = Some(pdo(0x280, &[STATUSWORD, POSITION]));
     taken.unused[0] = Some(Id::canopen(0x080, 1));
     let mut rig = Rig::new(1);
-    for (count, impossible) in (1..).zip([
-        AxisProcessData { axis: 7, ..good },
-        AxisProcessData { feedback: [None; MAX_PDOS], ..good },
-        AxisProcessData { commands: [None; MAX_PDOS], ..good },
-        data(&[CONTROLWORD, unknown], &[STATUSWORD, POSITION]),
-        data(&[CONTROLWORD, TARGET], &[MappedObject::new(0x6041, 0, 12)]),
-        taken,
+    let (narrow, unknown_parameter) = (MappedObject::new(0x6041, 0, 12), unknown.parameter().into());
+    for (count, (impossible, objection, axis, value)) in (1..).zip([
+        (AxisProcessData { axis: 7, ..good }, Objection::UnknownAxis, None, 7.0),
+        (AxisProcessData { feedback: [None; MAX_PDOS], ..good }, Objection::NoProcessData, Some(0), 0.0),
+        (AxisProcessData { commands: [None; MAX_PDOS], ..good }, Objection::NoProcessData, Some(0), 0.0),
+        (
+            data(&[CONTROLWORD, unknown], &[STATUSWORD, POSITION]),
+            Objection::Mapping,
+            Some(0),
+            unknown_parameter,
+        ),
+        (data(&[CONTROLWORD, TARGET], &[narrow]), Objection::Mapping, Some(0), narrow.parameter().into()),
+        (taken, Objection::IdTaken, Some(0), f64::from(0x081)),
     ]) {
         rig.request(Request::ProcessData(impossible));
         assert_eq!(rig.door.snapshot.refused, count, "{impossible:?}");
+        let refusal = rig.refusals().pop().unwrap();
+        assert_eq!((refusal.objection, refusal.axis, refusal.value), (objection, axis, value));
     }
     let mut rig = rig.enable();
     let refused = rig.door.snapshot.refused;

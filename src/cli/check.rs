@@ -42,8 +42,7 @@ fn refuse(error: ConfigError, is_json: bool) -> Exit {
     if is_json {
         print_json(&Refusal::of(&error));
     } else {
-        // Nothing can be done about a closed standard error.
-        let _ = writeln!(std::io::stderr(), "{:?}", miette::Report::new(error));
+        say!("{:?}", miette::Report::new(error));
     }
     Exit::Usage
 }

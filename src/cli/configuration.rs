@@ -31,12 +31,12 @@ impl FromStr for BusOverride {
 /// Reads a configuration and applies the overrides. What is wrong is printed.
 pub fn load(path: &Path, buses: &[BusOverride]) -> Result<Config, Exit> {
     let mut config = Config::load(path).map_err(|error| {
-        eprintln!("{:?}", miette::Report::new(error));
+        say!("{:?}", miette::Report::new(error));
         Exit::Usage
     })?;
     for bus in buses {
         config.override_interface(&bus.name, &bus.interface).map_err(|error| {
-            eprintln!("takt: --bus {}={}: {error}", bus.name, bus.interface);
+            say!("takt: --bus {}={}: {error}", bus.name, bus.interface);
             Exit::Usage
         })?;
     }
@@ -48,6 +48,6 @@ pub fn seconds(text: &str) -> Result<Duration, String> {
     let number: f64 = text.parse().map_err(|_| format!("`{text}` is not a number of seconds"))?;
     match Duration::try_from_secs_f64(number) {
         Ok(duration) if !duration.is_zero() => Ok(duration),
-        _ => Err("a duration must be longer than 0 s".to_owned()),
+        _ => Err("a duration is a finite number of seconds, longer than 0".to_owned()),
     }
 }

@@ -22,7 +22,7 @@ pub struct Arguments {
     /// interface there is
     config: Option<PathBuf>,
     /// Run the loop itself for so many seconds and grade it; 0 leaves that out
-    #[arg(long, value_name = "S", default_value_t = 10, value_parser = clap::value_parser!(u64).range(0..=86_400))]
+    #[arg(long, value_name = "S", default_value_t = 10, allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(0..=86_400))]
     self_test_s: u64,
     /// Print what was found as one JSON object
     #[arg(long)]
@@ -38,21 +38,21 @@ pub fn run(arguments: &Arguments) -> Exit {
     let interrupted = match interruption::watch() {
         Ok(interrupted) => interrupted,
         Err(error) => {
-            eprintln!("takt: cannot watch for Ctrl-C: {error}");
+            say!("takt: cannot watch for Ctrl-C: {error}");
             return Exit::Stopped;
         }
     };
     let subject = Subject::new(config.as_ref());
     let Some(attempted) = attempt(&subject) else {
-        eprintln!("takt: the system has no thread for an attempt at real time");
+        say!("takt: the system has no thread for an attempt at real time");
         return Exit::Stopped;
     };
     let mut examination = examine(&Source::this_machine(), &subject, &attempted);
     if arguments.self_test_s > 0 {
         match self_test(&subject, arguments.self_test_s, &interrupted) {
             Ok(Some(result)) => examination = examination.with_self_test(result),
-            Ok(None) => eprintln!("takt: the self-test did not get to a single cycle"),
-            Err(error) => eprintln!("takt: no self-test: {error}"),
+            Ok(None) => say!("takt: the self-test did not get to a single cycle"),
+            Err(error) => say!("takt: no self-test: {error}"),
         }
     }
     print(&examination, arguments.json);
@@ -100,7 +100,7 @@ fn print(examination: &Examination, as_json: bool) {
         match serde_json::to_string(examination) {
             Ok(json) => format!("{json}\n"),
             Err(error) => {
-                eprintln!("takt: the report cannot be written as JSON: {error}");
+                say!("takt: the report cannot be written as JSON: {error}");
                 return;
             }
         }

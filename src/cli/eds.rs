@@ -90,8 +90,7 @@ fn problems(findings: &Findings) -> Vec<ProblemPicture> {
 }
 
 fn show(findings: Findings) {
-    // Nothing can be done about a closed standard error.
-    let _ = writeln!(std::io::stderr(), "{:?}", miette::Report::new(findings));
+    say!("{:?}", miette::Report::new(findings));
 }
 
 fn print(text: &str) {

@@ -64,7 +64,7 @@ pub fn run(arguments: &Arguments) -> Exit {
     let interrupted = match interruption::watch() {
         Ok(interrupted) => interrupted,
         Err(error) => {
-            eprintln!("takt: cannot watch for Ctrl-C: {error}");
+            say!("takt: cannot watch for Ctrl-C: {error}");
             return Exit::Stopped;
         }
     };
@@ -74,7 +74,7 @@ pub fn run(arguments: &Arguments) -> Exit {
         match measure(&options, pacing, &interrupted) {
             Ok(measurement) => measurements.push(measurement),
             Err(error) => {
-                eprintln!("takt: {error}");
+                say!("takt: {error}");
                 return Exit::Usage;
             }
         }
@@ -127,7 +127,7 @@ fn draw(path: &PathBuf, options: &JitterOptions, measurements: &[Measurement]) -
     let title = format!("{} cycles of {} µs{bus}", options.cycles, options.period_ns / 1_000);
     let written = fs::write(path, jitter::drawing(&title, measurements));
     if let Err(error) = &written {
-        eprintln!("takt: {} cannot be written: {error}", path.display());
+        say!("takt: {} cannot be written: {error}", path.display());
     }
     written.is_ok()
 }
@@ -138,7 +138,7 @@ fn print(report: &JitterReport, as_json: bool) {
         match serde_json::to_string(report) {
             Ok(json) => format!("{json}\n"),
             Err(error) => {
-                eprintln!("takt: the report cannot be written as JSON: {error}");
+                say!("takt: the report cannot be written as JSON: {error}");
                 return;
             }
         }

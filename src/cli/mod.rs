@@ -1,5 +1,8 @@
 //! The command line: one file a subcommand, and what they share.
 
+#[macro_use]
+mod say;
+
 mod chart;
 mod check;
 mod configuration;

@@ -30,35 +30,34 @@ pub fn run(arguments: &Arguments) -> Exit {
     match answer_all(arguments) {
         Ok(exit) => exit,
         Err(message) => {
-            // Nothing can be done about a closed standard error.
-            let _ = writeln!(std::io::stderr(), "{message}");
+            say!("{message}");
             Exit::Usage
         }
     }
 }
 
 fn answer_all(arguments: &Arguments) -> Result<Exit, String> {
+    let name = arguments.problems.as_ref().map_or("standard input".into(), |path| path.to_string_lossy());
+    let unreadable = |error: std::io::Error| format!("takt: {name} cannot be read: {error}");
     let input: Box<dyn BufRead> = match &arguments.problems {
-        Some(path) => {
-            let file = File::open(path).map_err(|error| format!("{}: {error}", path.display()))?;
-            Box::new(BufReader::new(file))
-        }
+        Some(path) => Box::new(BufReader::new(File::open(path).map_err(unreadable)?)),
         None => Box::new(std::io::stdin().lock()),
     };
     let mut output = std::io::BufWriter::new(std::io::stdout().lock());
     let mut exit = Exit::Done;
     let mut plot = arguments.plot.as_ref();
-    for (index, line) in input.lines().enumerate() {
-        let line = line.map_err(|error| format!("line {}: {error}", index + 1))?;
-        if line.trim().is_empty() {
+    for (index, line) in input.split(b'\n').enumerate() {
+        let line = line.map_err(unreadable)?;
+        if line.trim_ascii().is_empty() {
             continue;
         }
-        let answer = match Question::parse(&line) {
+        let text = str::from_utf8(&line).map_err(|error| format!("this is no text: {error}"));
+        let answer = match text.and_then(Question::parse) {
             Ok(question) => {
                 let (answer, trajectory) = question.solve();
                 if let (Some(path), Some(trajectory)) = (plot, trajectory) {
                     std::fs::write(path, plot::draw(&question.problems(), &trajectory))
-                        .map_err(|error| format!("{}: {error}", path.display()))?;
+                        .map_err(|error| format!("takt: {} cannot be written: {error}", path.display()))?;
                     plot = None;
                 }
                 answer

@@ -34,7 +34,7 @@ pub struct Arguments {
     #[arg(long = "bus", value_name = "NAME=INTERFACE")]
     buses: Vec<BusOverride>,
     /// Repeat the program until this many seconds are over
-    #[arg(long, value_name = "S", value_parser = configuration::seconds)]
+    #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = configuration::seconds)]
     duration: Option<Duration>,
     /// Record to this file instead of a new one in the configured folder
     #[arg(long, value_name = "FILE.mcap")]
@@ -68,7 +68,7 @@ pub fn run(arguments: Arguments) -> Exit {
         Err(exit) => return exit,
     };
     if let Err(refused) = schedule::verify(&config) {
-        eprintln!("takt: {refused}");
+        say!("takt: {refused}");
         return Exit::Usage;
     }
     let rehearsal = match arguments.faults.as_deref().map(|path| rehearsal(path, &config)).transpose() {
@@ -78,7 +78,7 @@ pub fn run(arguments: Arguments) -> Exit {
     let mut signals = match Signals::watch() {
         Ok(signals) => signals,
         Err(error) => {
-            eprintln!("takt: cannot watch for Ctrl-C: {error}");
+            say!("takt: cannot watch for Ctrl-C: {error}");
             return Exit::Stopped;
         }
     };
@@ -95,11 +95,11 @@ pub fn run(arguments: Arguments) -> Exit {
     let mut tidings = Tidings::default();
     let mut tell = || {
         let news = rehearsal.as_deref().map_or_else(Vec::new, |rehearsal| tidings.next(rehearsal));
-        news.iter().for_each(|tiding| bar.suspend(|| eprintln!("takt: {tiding}")));
+        news.iter().for_each(|tiding| bar.suspend(|| say!("takt: {tiding}")));
     };
     let session = session::run(&config, options, notify, |snapshot, progress| {
         drawn.show(&progress);
-        hints.look(snapshot).for_each(|hint| bar.suspend(|| eprintln!("takt: {hint}")));
+        hints.look(snapshot).for_each(|hint| bar.suspend(|| say!("takt: {hint}")));
         tell();
         signals.next()
     });
@@ -115,29 +115,30 @@ pub fn run(arguments: Arguments) -> Exit {
 fn rehearsal(path: &Path, config: &Config) -> Result<Arc<Rehearsal>, Exit> {
     let scenario = Scenario::load(path, config).map_err(|error| {
         match error {
-            ScenarioError::Wrong(error) => eprintln!("{:?}", miette::Report::new(error)),
-            unreadable @ ScenarioError::Unreadable { .. } => eprintln!("takt: {unreadable}"),
+            ScenarioError::Wrong(error) => say!("{:?}", miette::Report::new(error)),
+            unreadable @ ScenarioError::Unreadable { .. } => say!("takt: {unreadable}"),
         }
         Exit::Usage
     })?;
     let is_real =
         |fault: &Fault| config.buses.get(fault.bus).is_some_and(|bus| bus.interface != Interface::Simulated);
     if let Some(fault) = scenario.faults.iter().find(|fault| is_real(fault)) {
-        eprintln!(
+        say!(
             "takt: fault `{}` (line {}) is played on real drives: keep away from them, and keep the emergency stop in \
              your hand",
-            fault.kind, fault.line
+            fault.kind,
+            fault.line
         );
     }
     Ok(Arc::new(Rehearsal::new(scenario)))
 }
 
 fn refuse(error: &SessionError) -> Exit {
-    eprintln!("takt: {error}");
+    say!("takt: {error}");
     let SessionError::Start(StartError::Refused(report)) = error else { return Exit::Usage };
     let realtime = RealtimeReport::new(report, 0, 0);
-    realtime.refused.iter().for_each(|refused| eprintln!("  refused: {refused}"));
-    realtime.grant_with.iter().for_each(|command| eprintln!("  grant it with: {command}"));
+    realtime.refused.iter().for_each(|refused| say!("  refused: {refused}"));
+    realtime.grant_with.iter().for_each(|command| say!("  grant it with: {command}"));
     Exit::RealtimeRefused
 }
 
@@ -163,17 +164,13 @@ fn report(config: &Config, session: &Session, as_json: bool) -> Exit {
         let printed = Printed { report: &report, ended, failure };
         match serde_json::to_string(&printed) {
             Ok(json) => print(&format!("{json}\n")),
-            Err(error) => eprintln!("takt: the report cannot be written as JSON: {error}"),
+            Err(error) => say!("takt: the report cannot be written as JSON: {error}"),
         }
     } else {
         match failure {
             Some(failure) => {
-                eprintln!("takt: {failure}");
-                report
-                    .telemetry
-                    .black_boxes
-                    .iter()
-                    .for_each(|path| eprintln!("black box: {}", path.display()));
+                say!("takt: {failure}");
+                report.telemetry.black_boxes.iter().for_each(|path| say!("black box: {}", path.display()));
             }
             None => {
                 print(&report.picture(if stdout().is_terminal() { Emphasis::Ansi } else { Emphasis::None }))
@@ -209,9 +206,11 @@ fn failure(config: &Config, outcome: &Outcome) -> Option<String> {
             "{}: the drive is operational but sends no feedback; is another master changing its PDOs?",
             name(*axis)
         )),
-        Outcome::MoveRefused { number } => Some(format!(
-            "move {number} of the program was refused: its target or a fraction lies outside the limits"
-        )),
+        Outcome::MoveRefused { number, refusal } => {
+            let why = refusal.map(|refusal| words::refusal(&refusal, &Machine::of(config)));
+            let why = why.unwrap_or_else(|| "why is no longer known".to_owned());
+            Some(format!("move {number} of the program could not be begun: {why}"))
+        }
         Outcome::CallbackPanicked { message } => {
             Some(format!("a defect of takt (please report it) ended the run in a controlled stop: {message}"))
         }
@@ -320,7 +319,7 @@ fn notices(bar: &ProgressBar, machine: Machine) -> Box<dyn FnMut(&Notice) + Send
             Notice::Event(event) if is_urgent(event) => words::event(event, &machine),
             Notice::Event(_) => return,
         };
-        bar.suspend(|| eprintln!("{text}"));
+        bar.suspend(|| say!("{text}"));
     })
 }
 

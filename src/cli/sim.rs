@@ -35,21 +35,18 @@ pub fn run(arguments: &Arguments) -> Exit {
     let drives = match open(&config) {
         Ok(drives) => drives,
         Err(error) => {
-            eprintln!("takt: {error}");
+            say!("takt: {error}");
             return Exit::Usage;
         }
     };
     if drives.is_empty() {
-        eprintln!(
-            "takt: no bus has a real interface; name one, for example: --bus {}=vcan0",
-            first_bus(&config)
-        );
+        say!("takt: no bus has a real interface; name one, for example: --bus {}=vcan0", first_bus(&config));
         return Exit::Usage;
     }
     let is_stopped = Arc::new(AtomicBool::new(false));
     for signal in [SIGINT, SIGTERM] {
         if let Err(error) = signal_hook::flag::register(signal, Arc::clone(&is_stopped)) {
-            eprintln!("takt: cannot watch for Ctrl-C: {error}");
+            say!("takt: cannot watch for Ctrl-C: {error}");
             return Exit::Stopped;
         }
     }
@@ -59,7 +56,7 @@ pub fn run(arguments: &Arguments) -> Exit {
             .into_iter()
             .map(|(name, mut drives)| {
                 let nodes: Vec<String> = drives.nodes().map(|node| node.to_string()).collect();
-                eprintln!("bus `{name}`: nodes {}; Ctrl-C ends them", nodes.join(", "));
+                say!("bus `{name}`: nodes {}; Ctrl-C ends them", nodes.join(", "));
                 let is_stopped = Arc::clone(&is_stopped);
                 scope.spawn(move || drives.run(&is_stopped))
             })

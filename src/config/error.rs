@@ -35,6 +35,17 @@ impl ConfigError {
         Self(Box::new(Inner { source, text: text.to_owned(), problems: seen }))
     }
 
+    /// The text of a file.
+    pub(crate) fn text_of(source_name: &str, bytes: Vec<u8>) -> Result<String, Self> {
+        String::from_utf8(bytes).map_err(|error| {
+            let at = error.utf8_error().valid_up_to();
+            // What stands in the place of the byte is as long as that many bytes.
+            let span = at..at + char::REPLACEMENT_CHARACTER.len_utf8();
+            let problem = Problem { kind: ProblemKind::NotText, span: Some(span), first_line: None };
+            Self::new(source_name, &String::from_utf8_lossy(error.as_bytes()), vec![problem])
+        })
+    }
+
     /// The problems in the order of the file; never empty.
     pub fn problems(&self) -> &[Problem] {
         &self.0.problems

@@ -28,8 +28,8 @@ impl Config {
     /// [`crate::bus::schedule::verify`].
     pub fn load(path: &Path) -> Result<Self, ConfigError> {
         let name = path.display().to_string();
-        match std::fs::read_to_string(path) {
-            Ok(text) => Self::parse(&name, &text),
+        match std::fs::read(path) {
+            Ok(bytes) => Self::parse(&name, &ConfigError::text_of(&name, bytes)?),
             Err(error) => {
                 let kind = ProblemKind::Unreadable { reason: error.to_string() };
                 Err(ConfigError::new(&name, "", vec![Problem { kind, span: None, first_line: None }]))

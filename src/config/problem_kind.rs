@@ -17,6 +17,9 @@ pub enum ProblemKind {
         /// What the operating system said.
         reason: String,
     },
+    /// It is not text in UTF-8.
+    #[error("this is not text: a byte that UTF-8 does not have")]
+    NotText,
     /// It is not TOML.
     #[error("this is not TOML: {message}")]
     Syntax {
@@ -243,6 +246,7 @@ impl ProblemKind {
             Self::Unreadable { .. } => {
                 "give the path of a configuration; configs/reference.toml explains them".into()
             }
+            Self::NotText => "a configuration is TOML in UTF-8; is this another file?".into(),
             Self::Syntax { .. } => {
                 "the TOML rules are at https://toml.io; texts and units stand in quotes".into()
             }
@@ -259,7 +263,7 @@ impl ProblemKind {
                 "add the unit, as in \"{}\"; without quotes, {given} is taken in {}",
                 quantity.example, quantity.unit
             ),
-            Self::UnknownUnit { symbol, quantity, .. } => match quantity::nearest_unit(symbol) {
+            Self::UnknownUnit { symbol, quantity, .. } => match quantity::nearest_unit(symbol, *quantity) {
                 Some(unit) => format!("did you mean {unit:?}? {}", show_quantity(*quantity)),
                 None => show_quantity(*quantity),
             },
@@ -300,7 +304,7 @@ impl ProblemKind {
     /// What is written beside the place in the file.
     pub(super) fn label(&self) -> &'static str {
         match self {
-            Self::Syntax { .. } => "here",
+            Self::NotText | Self::Syntax { .. } => "here",
             Self::UnknownKey { .. } => "not known here",
             Self::MissingKey { .. } => "missing in here",
             Self::WrongType { .. } => "wrong type",

@@ -316,9 +316,15 @@ fn superscript(character: char) -> Option<u32> {
     "⁰¹²³⁴⁵⁶⁷⁸⁹".chars().position(|c| c == character).and_then(|value| u32::try_from(value).ok())
 }
 
-/// The unit symbol most like one that is not known.
-pub fn nearest_unit(symbol: &str) -> Option<&'static str> {
-    super::spelling::nearest(symbol, UNITS.iter().map(|unit| unit.symbol))
+/// The unit that was probably meant by a symbol where this quantity is wanted: one of its own, or, of a quantity whose unit
+/// is put together of several, any.
+pub fn nearest_unit(symbol: &str, quantity: Quantity) -> Option<&'static str> {
+    let nearest = |units: &mut dyn Iterator<Item = &Unit>| {
+        super::spelling::nearest(symbol, units.map(|unit| unit.symbol))
+    };
+    let is_put_together = quantity.unit.contains(['/', ' ', '^']);
+    let own = nearest(&mut UNITS.iter().filter(|unit| unit.dimension == quantity.dimension));
+    own.or_else(|| is_put_together.then(|| nearest(&mut UNITS.iter())).flatten())
 }
 
 #[cfg(test)]
@@ -402,7 +408,10 @@ mod tests {
         assert_eq!(Quantity::ANGLE.parse("2 furlong"), unknown("furlong"));
         assert_eq!(Quantity::ANGLE.parse("2 rad/"), unknown("/"));
         assert_eq!(Quantity::ANGLE.parse("2 rad^"), unknown("rad^"));
-        assert_eq!(nearest_unit("dge"), Some("deg"));
+        assert_eq!(nearest_unit("dge", Quantity::ANGLE), Some("deg"));
+        assert_eq!(nearest_unit("dge", Quantity::ANGULAR_VELOCITY), Some("deg"));
+        assert_eq!(nearest_unit("h", Quantity::DURATION), None);
+        assert_eq!(nearest_unit("mss", Quantity::DURATION), Some("ms"));
     }
 
     #[test]

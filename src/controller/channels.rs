@@ -181,7 +181,7 @@ pub struct HostSide {
 
 impl HostSide {
     /// Asks for something. It is taken up in the next cycle, requests in their order. Returns the number by which
-    /// [`Snapshot::refusals`] tells of it.
+    /// [`Snapshot::answers`] tells of it.
     ///
     /// # Errors
     /// [`ChannelError::Full`]; nothing has been asked then.

@@ -1,5 +1,6 @@
 //! How a run goes and how it ends.
 
+use takt_rt::refusal::Refusal;
 use takt_rt::stop::{Phase, StopReason};
 
 use crate::drive::BringUpError;
@@ -31,6 +32,8 @@ pub enum Outcome {
     MoveRefused {
         /// The move.
         number: u64,
+        /// Why, if that is still known.
+        refusal: Option<Refusal>,
     },
     /// A function that the caller gave to the run panicked, and the axes were stopped in control.
     CallbackPanicked {

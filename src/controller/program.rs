@@ -3,6 +3,7 @@
 use takt_rt::door::{Asked, Move, ProfileMove, Request, RequestId, Snapshot};
 use takt_rt::profile::ProfileTarget;
 use takt_rt::record::MAX_AXES;
+use takt_rt::refusal::{Answer, Refusal};
 use takt_rt::stop::Phase;
 
 use super::channels::RequestNumbers;
@@ -46,7 +47,12 @@ pub enum Step {
     /// This, in this order.
     Begin(Vec<Asked>),
     /// The real-time thread has refused the move with this number, counted from 1.
-    Refused(u64),
+    Refused {
+        /// The move.
+        number: u64,
+        /// Why, if that is still known.
+        refusal: Option<Refusal>,
+    },
     /// Everything has been done.
     Finished,
 }
@@ -70,6 +76,10 @@ impl ProgramRunner {
     pub fn poll(&mut self, now_ns: u64, snapshot: &Snapshot, numbers: &RequestNumbers) -> Step {
         let is_reached = snapshot.finished_move == self.last_id;
         let is_done = is_reached && snapshot.phase == Phase::Holding;
+        if let (State::Moving | State::Stopping, Some(refusal)) = (self.state, self.refusal(snapshot)) {
+            self.state = State::Finished;
+            return Step::Refused { number: self.begun, refusal };
+        }
         match self.state {
             State::Finished => Step::Finished,
             State::Next if self.repeat.is_some_and(|times| self.begun >= times * self.moves.len() as u64) => {
@@ -80,12 +90,6 @@ impl ProgramRunner {
                 self.begun += 1;
                 self.state = State::Moving;
                 Step::Begin(self.present_requests(now_ns, 1.0, numbers))
-            }
-            State::Moving | State::Stopping
-                if self.asked.iter().any(|asked| snapshot.refusals.contain(*asked)) =>
-            {
-                self.state = State::Finished;
-                Step::Refused(self.begun)
             }
             State::Moving => {
                 match self.present_duration_ns() {
@@ -115,6 +119,14 @@ impl ProgramRunner {
                 Step::Wait
             }
         }
+    }
+
+    /// Why one of the present requests was refused, if one was and that is still known.
+    fn refusal(&self, snapshot: &Snapshot) -> Option<Option<Refusal>> {
+        self.asked.iter().find_map(|asked| match snapshot.answers.of(*asked) {
+            Answer::Refused(refusal) => Some(refusal),
+            Answer::None | Answer::Granted => None,
+        })
     }
 
     fn dwell(&mut self, now_ns: u64) {
@@ -192,6 +204,7 @@ fn move_of(id: u32, present: &ProgramMove, position: &[f64]) -> Move {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use takt_rt::refusal::{Objection, RequestKind};
 
     fn program(repeat: u32) -> Program {
         let to = |target: f64| ProgramMove {
@@ -208,11 +221,20 @@ mod tests {
         Snapshot { phase: Phase::Holding, finished_move: id, ..Snapshot::default() }
     }
 
+    const REFUSAL: Refusal = Refusal {
+        request: RequestKind::Move,
+        objection: Objection::PositionLimit,
+        axis: Some(0),
+        value: 2.0,
+        limit: 1.5,
+        phase: Phase::Holding,
+    };
+
     fn refusing(ids: &[RequestId]) -> Snapshot {
         let mut snapshot = done(0);
         for id in ids {
             snapshot.refused += 1;
-            snapshot.refusals.note(*id, true);
+            snapshot.answers.note(*id, Some(REFUSAL));
         }
         snapshot
     }
@@ -301,10 +323,10 @@ mod tests {
     }
 
     #[test]
-    fn a_refused_move_ends_the_program_with_its_number() {
+    fn a_refused_move_ends_the_program_with_its_number_and_why() {
         let mut runner = Running::new(&program(1));
         let (asked, _) = runner.begin(0, &done(0)).unwrap();
-        assert_eq!(runner.poll(1, &refusing(&[asked])), Step::Refused(1));
+        assert_eq!(runner.poll(1, &refusing(&[asked])), Step::Refused { number: 1, refusal: Some(REFUSAL) });
         assert_eq!(runner.poll(2, &refusing(&[asked])), Step::Finished);
     }
 

@@ -267,7 +267,7 @@ impl Supervisor {
         match self.program.poll(now_ns, snapshot, &self.numbers) {
             Step::Wait => {}
             Step::Begin(requests) => self.outgoing.extend(requests),
-            Step::Refused(number) => self.end(now_ns, Outcome::MoveRefused { number }),
+            Step::Refused { number, refusal } => self.end(now_ns, Outcome::MoveRefused { number, refusal }),
             Step::Finished => self.end(now_ns, Outcome::Finished),
         }
     }

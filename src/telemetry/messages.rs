@@ -15,33 +15,55 @@ pub use decode::{decode_axis, decode_bus, decode_cycle, decode_event};
 pub struct MessageType {
     pub name: &'static str,
     pub definition: &'static str,
+    /// Fields at the end that recordings of earlier versions do not have.
+    pub later_fields: usize,
+}
+
+impl MessageType {
+    /// Whether messages of another definition of this type can be read.
+    pub fn can_be_read_as(&self, definition: &str) -> bool {
+        let (known, other) = (layout(self.definition), layout(definition));
+        known == other || known.len() == other.len() + self.later_fields && known.starts_with(&other)
+    }
 }
 
 /// The times of a cycle.
-pub const CYCLE: MessageType =
-    MessageType { name: "takt_msgs/msg/Cycle", definition: include_str!("messages/Cycle.msg") };
+pub const CYCLE: MessageType = MessageType {
+    name: "takt_msgs/msg/Cycle",
+    definition: include_str!("messages/Cycle.msg"),
+    later_fields: 0,
+};
 
 /// One axis in a cycle.
-pub const AXIS: MessageType =
-    MessageType { name: "takt_msgs/msg/Axis", definition: include_str!("messages/Axis.msg") };
+pub const AXIS: MessageType = MessageType {
+    name: "takt_msgs/msg/Axis",
+    definition: include_str!("messages/Axis.msg"),
+    later_fields: 0,
+};
 
 /// An event.
-pub const EVENT: MessageType =
-    MessageType { name: "takt_msgs/msg/Event", definition: include_str!("messages/Event.msg") };
+pub const EVENT: MessageType = MessageType {
+    name: "takt_msgs/msg/Event",
+    definition: include_str!("messages/Event.msg"),
+    later_fields: 2,
+};
 
 /// A frame on a bus.
-pub const FRAME: MessageType =
-    MessageType { name: "takt_msgs/msg/Frame", definition: include_str!("messages/Frame.msg") };
+pub const FRAME: MessageType = MessageType {
+    name: "takt_msgs/msg/Frame",
+    definition: include_str!("messages/Frame.msg"),
+    later_fields: 0,
+};
 
 /// The health of a bus.
 pub const BUS: MessageType =
-    MessageType { name: "takt_msgs/msg/Bus", definition: include_str!("messages/Bus.msg") };
+    MessageType { name: "takt_msgs/msg/Bus", definition: include_str!("messages/Bus.msg"), later_fields: 0 };
 
 /// The messages that are read again.
 pub const READ: [&MessageType; 4] = [&CYCLE, &AXIS, &EVENT, &BUS];
 
 /// What of a definition settles where the fields are: everything but comments and constants.
-pub fn layout(definition: &str) -> Vec<&str> {
+fn layout(definition: &str) -> Vec<&str> {
     let lines = definition.lines().map(str::trim);
     lines.filter(|line| !line.is_empty() && !line.starts_with('#') && !line.contains('=')).collect()
 }
@@ -104,6 +126,8 @@ struct EventFields {
     error_code: u16,
     error_register: u8,
     manufacturer: [u8; 5],
+    /// What was asked for and what stands against it, by their numbers; `None` in a recording of an earlier version.
+    refusal: Option<(u8, u8)>,
 }
 
 impl EventFields {
@@ -137,7 +161,15 @@ impl EventFields {
             },
             EventKind::MissedSlots { count } => Self { kind: 5, missed_slots: count, ..none },
             EventKind::Timing { level } => Self { kind: 7, timing_level: level as u8, ..none },
-            EventKind::Refused { phase } => Self { kind: 6, phase_from: phase as u8, ..none },
+            EventKind::Refused(refused) => Self {
+                kind: 6,
+                axis: refused.axis,
+                phase_from: refused.phase as u8,
+                value: refused.value,
+                limit: refused.limit,
+                refusal: Some((refused.request as u8, refused.objection as u8)),
+                ..none
+            },
         }
     }
 }
@@ -165,7 +197,9 @@ pub fn encode_event(event: &Event, text: &str, encoder: &mut CdrEncoder) {
         .u16(fields.statusword)
         .u16(fields.error_code)
         .u8(fields.error_register)
-        .octets(fields.manufacturer);
+        .octets(fields.manufacturer)
+        .u8(fields.refusal.map_or(0, |(request, _)| request))
+        .u8(fields.refusal.map_or(0, |(_, objection)| objection));
 }
 
 /// Encodes a [`FRAME`].
@@ -201,6 +235,7 @@ pub fn encode_bus(TracedHealth { at_ns, health }: &TracedHealth, encoder: &mut C
 mod tests {
     use super::*;
     use takt_rt::cia402::State;
+    use takt_rt::refusal::{Objection, Refusal, RequestKind};
     use takt_rt::stop::{Phase, Rule, StopCategory, StopReason};
     use takt_rt::watch::TimingLevel;
 
@@ -225,6 +260,19 @@ mod tests {
     }
 
     #[test]
+    fn definitions_that_lack_only_the_later_fields_can_be_read() {
+        let earlier = |missing: usize| {
+            let fields = layout(EVENT.definition);
+            fields[..fields.len() - missing].join("\n")
+        };
+        assert!(EVENT.can_be_read_as(&earlier(0)) && EVENT.can_be_read_as(&earlier(2)));
+        assert!(!EVENT.can_be_read_as(&earlier(1)) && !EVENT.can_be_read_as(&earlier(3)));
+        assert!(!EVENT.can_be_read_as(&(earlier(0) + "\nuint8 another")));
+        let other = earlier(2).replace("uint64 slot", "uint32 slot");
+        assert!(!EVENT.can_be_read_as(&other) && !CYCLE.can_be_read_as(""));
+    }
+
+    #[test]
     fn the_constants_in_the_schemas_are_those_of_the_records() {
         let phases = Phase::ALL.map(|phase| (format!("{phase:?}"), phase as u8));
         assert_eq!(constants(&CYCLE, "phase"), phases);
@@ -236,6 +284,10 @@ mod tests {
         );
         let rules = Rule::ALL.map(|rule| (format!("{rule:?}"), rule as u8));
         assert_eq!(constants(&EVENT, "rule"), rules);
+        let requests = RequestKind::ALL.map(|request| (format!("Request{request:?}"), request as u8));
+        assert_eq!(constants(&EVENT, "request"), requests);
+        let objections = Objection::ALL.map(|objection| (format!("Objection{objection:?}"), objection as u8));
+        assert_eq!(constants(&EVENT, "objection"), objections);
     }
 
     #[test]
@@ -255,7 +307,14 @@ mod tests {
             EventKind::DriveState { axis: 0, state: State::NotReadyToSwitchOn, statusword: 0 },
             EventKind::Emergency { axis: 0, code: 0, register: 0, manufacturer: [0; 5] },
             EventKind::MissedSlots { count: 1 },
-            EventKind::Refused { phase: Phase::Moving },
+            EventKind::Refused(Refusal {
+                request: RequestKind::Move,
+                objection: Objection::Phase,
+                axis: None,
+                value: 0.0,
+                limit: 0.0,
+                phase: Phase::Moving,
+            }),
             EventKind::Timing { level: TimingLevel::Normal },
         ];
         let encoded = kinds.map(|kind| {

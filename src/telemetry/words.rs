@@ -12,6 +12,10 @@ use takt_rt::watch::TimingLevel;
 
 use super::machine::{Machine, Unit};
 
+mod refusal;
+
+pub use refusal::{refusal, request};
+
 /// What the group was doing, as a verb: "moving".
 pub const fn phase(phase: Phase) -> &'static str {
     match phase {
@@ -215,9 +219,7 @@ pub fn event(event: &Event, machine: &Machine) -> String {
         EventKind::Timing { level: TimingLevel::Unfit } => "slots are missed too often to go on".to_owned(),
         EventKind::MissedSlots { count: 1 } => "1 slot passed unused: the thread was late".to_owned(),
         EventKind::MissedSlots { count } => format!("{count} slots passed unused: the thread was late"),
-        EventKind::Refused { phase: forbade } => {
-            format!("a request was refused: not possible while {}", phase(forbade))
-        }
+        EventKind::Refused(refused) => refusal(&refused, machine),
     }
 }
 
@@ -230,6 +232,7 @@ mod tests {
     use super::super::machine::SetPointMagnitudes;
     use super::*;
     use crate::telemetry::machine::{AxisDescription, BusDescription};
+    use takt_rt::refusal::{Objection, Refusal, RequestKind};
 
     fn machine() -> Machine {
         let axis = |name: &str, unit| AxisDescription {
@@ -434,8 +437,15 @@ mod tests {
             "30 slots passed unused: the thread was late"
         );
         assert_eq!(
-            words(EventKind::Refused { phase: Phase::Moving }),
-            "a request was refused: not possible while moving"
+            words(EventKind::Refused(Refusal {
+                request: RequestKind::Enable,
+                objection: Objection::Phase,
+                axis: None,
+                value: 0.0,
+                limit: 0.0,
+                phase: Phase::Moving,
+            })),
+            "enabling was refused: not possible while moving"
         );
     }
 }

@@ -7,6 +7,7 @@ use takt_rt::door::Door;
 use takt_rt::frame::{Frame, Id};
 use takt_rt::port::{BusHealth, BusPort, ReceiveBatch, Received};
 use takt_rt::record::EventKind;
+use takt_rt::refusal::{Objection, Refusal, RequestKind};
 use takt_rt::stop::Phase;
 
 use crate::reader::{Value, messages};
@@ -25,6 +26,17 @@ fn record() -> Vec<u8> {
     rt.event(&event(
         8,
         EventKind::Emergency { axis: 1, code: 0x7305, register: 0x21, manufacturer: [1, 2, 3, 4, 5] },
+    ));
+    rt.event(&event(
+        9,
+        EventKind::Refused(Refusal {
+            request: RequestKind::Move,
+            objection: Objection::PositionLimit,
+            axis: Some(1),
+            value: 1.25,
+            limit: 0.75,
+            phase: Phase::Holding,
+        }),
     ));
     let summary = logger.finish();
     assert_eq!((summary.records, summary.records_dropped, summary.not_written.len()), (20, 0, 0));
@@ -90,6 +102,7 @@ fn events_are_recorded_in_words_and_in_numbers() {
         "stop: slide was 0.2500 m from its set-point (allowed: 0.1250 m) while moving; \
          category 1: decelerated, then power removed",
         "slide: emergency message: error 0x7305, register 0x21, manufacturer 01 02 03 04 05",
+        "the move was refused while holding: slide cannot go to 1.2500 m, beyond its position limit of 0.7500 m",
     ];
     assert_eq!(texts, expected.map(|text| Value::Text(text.to_owned())));
     let (time, stop) = &events[1];
@@ -101,6 +114,12 @@ fn events_are_recorded_in_words_and_in_numbers() {
     for (field, value) in [("error_code", 0x7305), ("error_register", 0x21), ("manufacturer[4]", 5)] {
         assert_eq!(emergency[field], number(value), "{field}");
     }
+    let (_, refusal) = &events[3];
+    for (field, value) in
+        [("axis", 1.0), ("value", 1.25), ("limit", 0.75), ("request", 7.0), ("objection", 7.0)]
+    {
+        assert_eq!(refusal[field], number(value), "{field}");
+    }
     assert_eq!(events[0].1["axis"], number(-1));
 }
 
@@ -109,7 +128,7 @@ fn a_recording_has_an_index_and_tells_what_the_machine_is() {
     let recording = record();
     let summary = mcap::Summary::read(&recording).unwrap().unwrap();
     let statistics = summary.stats.unwrap();
-    assert_eq!((statistics.message_count, statistics.channel_count), (20 * 3 + 3, 4));
+    assert_eq!((statistics.message_count, statistics.channel_count), (20 * 3 + 4, 4));
     let slide = summary.channels.values().find(|channel| channel.topic == "/axis/slide").unwrap();
     let expected = [
         ("acceleration_limit", "10"),

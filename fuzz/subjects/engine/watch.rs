@@ -4,6 +4,7 @@ use takt::config::Config;
 use takt_rt::door::Snapshot;
 use takt_rt::engine::Engine;
 use takt_rt::record::{Event, EventKind};
+use takt_rt::refusal::{Objection, Refusal, RequestKind};
 use takt_rt::stop::{Phase, Rule, StopReason};
 
 /// Room for rounding, relative to a limit.
@@ -92,9 +93,18 @@ impl Watch {
                 assert_eq!(stop.phase, self.phase, "{stop:?}");
                 self.told = Some(stop);
             }
-            EventKind::Refused { .. } => self.refused += 1,
+            EventKind::Refused(refusal) => self.hear_refusal(&refusal),
             _ => {}
         }
+    }
+
+    fn hear_refusal(&mut self, refusal: &Refusal) {
+        self.refused += 1;
+        assert_eq!(refusal.phase, self.phase, "{refusal:?}");
+        assert!(refusal.axis.is_none_or(|axis| usize::from(axis) < self.axes.len()), "{refusal:?}");
+        let never = [RequestKind::Sync, RequestKind::Stop, RequestKind::Retire, RequestKind::Leave];
+        assert!(!never.contains(&refusal.request), "{refusal:?}");
+        assert!(refusal.request != RequestKind::Position || refusal.objection == Objection::UnknownAxis);
     }
 
     fn look_at_stop(&mut self, snapshot: &Snapshot, has_acted: bool) {

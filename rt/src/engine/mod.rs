@@ -6,6 +6,7 @@
 
 mod behaviour;
 mod last_word;
+mod obstacle;
 mod parameters;
 mod process_data;
 mod requests;
@@ -17,7 +18,7 @@ use arrayvec::ArrayVec;
 use crate::axis::{Axis, FeedbackSince};
 use crate::cia402::Goal;
 use crate::dispatch::Dispatch;
-use crate::door::{AxisSnapshot, Door, Refusals, Snapshot, StreamCommand};
+use crate::door::{AxisSnapshot, Door, Snapshot, StreamCommand};
 use crate::frame::Frame;
 use crate::motion::Motion;
 use crate::port::BusHealth;
@@ -113,8 +114,6 @@ pub struct Engine {
     /// The move under way: its number and whether it ends in motion.
     move_id: u32,
     finished_move: u32,
-    refused: u64,
-    refusals: Refusals,
     stream: Option<StreamCommand>,
     /// Whether a command of the present stream has been taken.
     is_stream_begun: bool,
@@ -144,6 +143,7 @@ pub struct Engine {
     dropped: u64,
     drive_states: [crate::cia402::State; MAX_AXES],
     record: CycleRecord,
+    /// Also the place where the answers to requests are kept.
     snapshot: Snapshot,
 }
 
@@ -189,8 +189,6 @@ impl Engine {
             motion: Motion::default(),
             move_id: 0,
             finished_move: 0,
-            refused: 0,
-            refusals: Refusals::default(),
             stream: None,
             is_stream_begun: false,
             bridged_cycles: 0,
@@ -386,8 +384,6 @@ impl Engine {
         snapshot.timing = self.timing_level;
         snapshot.clamped = self.clamped;
         snapshot.dropped = self.dropped;
-        snapshot.refused = self.refused;
-        snapshot.refusals = self.refusals;
         snapshot.finished_move = self.finished_move;
         let is_on_way = matches!(self.phase, Phase::Moving | Phase::Stopping);
         snapshot.remaining_s = if is_on_way { self.motion.remaining_s() } else { 0.0 };

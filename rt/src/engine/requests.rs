@@ -1,86 +1,122 @@
 //! What is asked of the group, and what of it is possible now.
 
+use super::obstacle::{Obstacle, check_profile_target, check_scales, check_target};
 use super::{Engine, FAULT_RESET_CYCLES};
 use crate::axis::Axis;
 use crate::cia402::Goal;
-use crate::control::ControlLaw;
 use crate::door::{Asked, Door, Move, ProfileMove, Request};
-use crate::guard;
 use crate::motion::Leg;
 use crate::plan::State;
 use crate::profile::ProfileTarget;
 use crate::record::EventKind;
+use crate::refusal::{Objection, Refusal};
 use crate::stop::{Phase, Rule, StopCategory};
 use crate::time::Nanoseconds;
 use crate::watch::TimingLevel;
 
+/// Done, or what stands in the way; nothing has changed then.
+type Answered = Result<(), Obstacle>;
+
 impl Engine {
     pub(super) fn take(&mut self, asked: &Asked, now_ns: Nanoseconds, door: &mut impl Door) {
-        let is_latched = self.stop.is_some_and(|stop| stop.rule != Rule::Requested);
-        let is_done = match asked.request {
-            Request::Sync(on) => {
-                if on && !self.is_sync_on {
-                    self.axes.iter_mut().for_each(Axis::begin_sync);
-                }
-                self.is_sync_on = on;
-                true
-            }
-            Request::TimeOfDay { at_zero_ns } => {
-                self.time.as_mut().map(|time| time.set(at_zero_ns)).is_some()
-            }
-            Request::RatedTorque { axis, torque } => {
-                self.axes.get_mut(usize::from(axis)).is_some_and(|axis| axis.set_rated_torque(torque))
-            }
-            Request::ProcessData(data) => self.set_process_data(&data).is_some(),
-            Request::Position { axis, counts } => {
-                self.axes.get_mut(usize::from(axis)).map(|axis| axis.set_reported_position(counts)).is_some()
-            }
-            Request::Activate => self.activate(now_ns, door),
-            Request::Enable if self.phase == Phase::Disabled && !is_latched && !self.is_retired => {
-                self.stop = None;
-                self.begin_watch();
-                self.goal = Goal::Enabled;
-                self.hasten_heartbeats();
-                self.enter(Phase::Enabling, now_ns, door);
-                true
-            }
-            Request::Move(parameters) if !is_latched => self.begin_move(&parameters, now_ns, door),
-            Request::SetProfileTarget(target) if !is_latched => {
-                self.set_profile_target(&target, now_ns, door)
-            }
-            Request::Stream if self.phase == Phase::Holding && !is_latched && self.is_punctual() => {
-                self.stop = None;
-                self.stream = None;
-                self.is_stream_begun = false;
-                self.enter(Phase::Streaming, now_ns, door);
-                true
-            }
-            Request::Stop(category) => {
-                self.begin_stop(Rule::Requested, Some(category), None, 0.0, 0.0, now_ns, door);
-                true
-            }
-            Request::Disable => self.begin_disable(now_ns, door),
-            Request::ResetFaults => self.reset_faults(),
-            Request::Retire => {
-                self.is_retired = true;
-                true
-            }
-            Request::Leave => {
-                self.is_leaving = true;
-                true
-            }
-            Request::Enable | Request::Move(_) | Request::SetProfileTarget(_) | Request::Stream => false,
-        };
-        self.refusals.note(asked.id, !is_done);
-        if !is_done {
-            self.refused += 1;
-            self.happened(now_ns, EventKind::Refused { phase: self.phase }, door);
+        let obstacle = self.answer(&asked.request, now_ns, door).err();
+        let refusal = obstacle.map(|Obstacle { objection, axis, value, limit }| Refusal {
+            request: asked.request.kind(),
+            objection,
+            axis,
+            value,
+            limit,
+            phase: self.phase,
+        });
+        self.snapshot.answers.note(asked.id, refusal);
+        if let Some(refusal) = refusal {
+            self.snapshot.refused += 1;
+            self.happened(now_ns, EventKind::Refused(refusal), door);
         }
     }
 
-    /// Whether whoever streams set-points can count on the slots.
-    fn is_punctual(&self) -> bool {
-        self.timing_level < TimingLevel::Degraded
+    fn answer(&mut self, request: &Request, now_ns: Nanoseconds, door: &mut impl Door) -> Answered {
+        match request {
+            Request::Sync(on) => {
+                if *on && !self.is_sync_on {
+                    self.axes.iter_mut().for_each(Axis::begin_sync);
+                }
+                self.is_sync_on = *on;
+            }
+            Request::TimeOfDay { at_zero_ns } => {
+                self.time.as_mut().ok_or(Objection::NoTime)?.set(*at_zero_ns);
+            }
+            Request::RatedTorque { axis, torque } => {
+                if !self.axis_mut(*axis)?.set_rated_torque(*torque) {
+                    return Err(Obstacle::from(Objection::RatedTorque)
+                        .of_axis((*axis).into())
+                        .with(*torque, 0.0));
+                }
+            }
+            Request::ProcessData(data) => self.set_process_data(data)?,
+            Request::Position { axis, counts } => self.axis_mut(*axis)?.set_reported_position(*counts),
+            Request::Activate => self.activate(now_ns, door)?,
+            Request::Enable => self.begin_enable(now_ns, door)?,
+            Request::Move(parameters) => self.begin_move(parameters, now_ns, door)?,
+            Request::SetProfileTarget(target) => self.set_profile_target(target, now_ns, door)?,
+            Request::Stream => self.begin_stream(now_ns, door)?,
+            Request::Stop(category) => {
+                self.begin_stop(Rule::Requested, Some(*category), None, 0.0, 0.0, now_ns, door);
+            }
+            Request::Disable => self.begin_disable(now_ns, door)?,
+            Request::ResetFaults => self.reset_faults()?,
+            Request::Retire => self.is_retired = true,
+            Request::Leave => self.is_leaving = true,
+        }
+        Ok(())
+    }
+
+    pub(super) fn require_phase(&self, possible: &[Phase]) -> Answered {
+        if possible.contains(&self.phase) { Ok(()) } else { Err(Objection::Phase.into()) }
+    }
+
+    /// A fault that has stopped the group must be reset before anything moves.
+    fn require_no_fault(&self) -> Answered {
+        match self.stop.filter(|stop| stop.rule != Rule::Requested) {
+            Some(stop) => {
+                let latched = Obstacle::from(Objection::StopLatched);
+                Err(Obstacle { axis: stop.axis, ..latched }.with(f64::from(stop.rule as u8), 0.0))
+            }
+            None => Ok(()),
+        }
+    }
+
+    pub(super) fn axis_mut(&mut self, number: u8) -> Result<&mut Axis, Obstacle> {
+        let unknown = Obstacle::from(Objection::UnknownAxis).with(f64::from(number), self.axes.len() as f64);
+        self.axes.get_mut(usize::from(number)).ok_or(unknown)
+    }
+
+    fn begin_enable(&mut self, now_ns: Nanoseconds, door: &mut impl Door) -> Answered {
+        if self.is_retired {
+            return Err(Objection::Retired.into());
+        }
+        self.require_phase(&[Phase::Disabled])?;
+        self.require_no_fault()?;
+        self.stop = None;
+        self.begin_watch();
+        self.goal = Goal::Enabled;
+        self.hasten_heartbeats();
+        self.enter(Phase::Enabling, now_ns, door);
+        Ok(())
+    }
+
+    fn begin_stream(&mut self, now_ns: Nanoseconds, door: &mut impl Door) -> Answered {
+        self.require_phase(&[Phase::Holding])?;
+        self.require_no_fault()?;
+        if self.timing_level >= TimingLevel::Degraded {
+            let (missed, limit) = (self.missed.filled(), self.ladder.degraded);
+            return Err(Obstacle::from(Objection::MissedSlots).with(missed.into(), limit.into()));
+        }
+        self.stop = None;
+        self.stream = None;
+        self.is_stream_begun = false;
+        self.enter(Phase::Streaming, now_ns, door);
+        Ok(())
     }
 
     /// Forgets what was seen while nothing could move.
@@ -90,32 +126,24 @@ impl Engine {
         self.missed.empty();
     }
 
-    fn activate(&mut self, now_ns: Nanoseconds, door: &mut impl Door) -> bool {
-        if self.phase != Phase::Passive {
-            return false;
-        }
+    fn activate(&mut self, now_ns: Nanoseconds, door: &mut impl Door) -> Answered {
+        self.require_phase(&[Phase::Passive])?;
         self.goal = Goal::Disabled;
         self.axes.iter_mut().for_each(Axis::start_from_actual);
         self.enter(Phase::Disabled, now_ns, door);
-        true
+        Ok(())
     }
 
-    fn begin_move(&mut self, parameters: &Move, now_ns: Nanoseconds, door: &mut impl Door) -> bool {
-        let scale = |value: f64| value > 0.0 && value <= 1.0;
-        let is_possible = matches!(self.phase, Phase::Holding | Phase::Moving)
-            && scale(parameters.velocity_scale)
-            && scale(parameters.acceleration_scale)
-            && parameters.minimum_duration_s.is_finite()
-            && self
-                .axes
-                .iter()
-                .zip(parameters.target.into_iter().zip(parameters.target_velocity))
-                .all(|(axis, (position, velocity))| is_target(axis, position, velocity, self.period_s));
-        if !is_possible {
-            return false;
+    fn begin_move(&mut self, parameters: &Move, now_ns: Nanoseconds, door: &mut impl Door) -> Answered {
+        self.require_phase(&[Phase::Holding, Phase::Moving])?;
+        self.require_no_fault()?;
+        check_scales(parameters)?;
+        let targets = || parameters.target.into_iter().zip(parameters.target_velocity);
+        for (index, (axis, (position, velocity))) in self.axes.iter().zip(targets()).enumerate() {
+            check_target(axis, position, velocity, self.period_s)
+                .map_err(|obstacle| obstacle.of_axis(index))?;
         }
-        let targets = parameters.target.into_iter().zip(parameters.target_velocity);
-        let legs = self.axes.iter().zip(targets).map(|(axis, (position, velocity))| {
+        let legs = self.axes.iter().zip(targets()).map(|(axis, (position, velocity))| {
             let start = axis.set_point();
             let target = State { position, velocity, acceleration: 0.0 };
             let limits = &axis.parameters().limits;
@@ -126,15 +154,10 @@ impl Engine {
                 Leg { start, target, limits }
             }
         });
-        let planned = self.motion.move_to(
-            legs,
-            parameters.velocity_scale,
-            parameters.acceleration_scale,
-            parameters.minimum_duration_s,
-        );
-        if planned.is_err() {
-            return false;
-        }
+        let minimum_duration_s = parameters.minimum_duration_s;
+        self.motion
+            .move_to(legs, parameters.velocity_scale, parameters.acceleration_scale, minimum_duration_s)
+            .map_err(|error| Obstacle::of_plan(error, minimum_duration_s))?;
         for (axis, position) in self.axes.iter_mut().zip(parameters.target) {
             if axis.accepts(ProfileTarget::Position(position)) {
                 axis.set_profile_target(ProfileTarget::Position(position), Nanoseconds::MAX);
@@ -143,7 +166,7 @@ impl Engine {
         self.stop = None;
         self.move_id = parameters.id;
         self.enter(Phase::Moving, now_ns, door);
-        true
+        Ok(())
     }
 
     fn set_profile_target(
@@ -151,28 +174,26 @@ impl Engine {
         wanted: &ProfileMove,
         now_ns: Nanoseconds,
         door: &mut impl Door,
-    ) -> bool {
+    ) -> Answered {
         let index = usize::from(wanted.axis);
-        let is_possible = matches!(self.phase, Phase::Holding | Phase::Moving);
-        if !(is_possible && self.axes.get(index).is_some_and(|axis| axis.accepts(wanted.target))) {
-            return false;
-        }
+        self.require_phase(&[Phase::Holding, Phase::Moving])?;
+        self.require_no_fault()?;
+        check_profile_target(self.axis_mut(wanted.axis)?, wanted.target)
+            .map_err(|obstacle| obstacle.of_axis(index))?;
         // The other axes stay where they are, not where the last trajectory ended.
-        if self.phase == Phase::Holding && self.plan_standstill().is_err() {
-            return false;
+        if self.phase == Phase::Holding {
+            self.plan_standstill().map_err(|error| Obstacle::of_plan(error, 0.0))?;
         }
-        if let Some(axis) = self.axes.get_mut(index) {
-            axis.set_profile_target(wanted.target, wanted.valid_until_ns);
-        }
+        self.axis_mut(wanted.axis)?.set_profile_target(wanted.target, wanted.valid_until_ns);
         self.stop = None;
         self.move_id = wanted.id;
         self.enter(Phase::Moving, now_ns, door);
-        true
+        Ok(())
     }
 
-    fn begin_disable(&mut self, now_ns: Nanoseconds, door: &mut impl Door) -> bool {
+    fn begin_disable(&mut self, now_ns: Nanoseconds, door: &mut impl Door) -> Answered {
         match self.phase {
-            Phase::Passive => return false,
+            Phase::Passive => return Err(Objection::Phase.into()),
             Phase::Disabled | Phase::Disabling => {}
             Phase::Enabling | Phase::Holding => {
                 self.goal = Goal::Disabled;
@@ -182,32 +203,16 @@ impl Engine {
                 self.begin_stop(Rule::Requested, Some(StopCategory::One), None, 0.0, 0.0, now_ns, door);
             }
         }
-        true
+        Ok(())
     }
 
-    fn reset_faults(&mut self) -> bool {
-        match self.phase {
-            Phase::Disabled => {
-                self.fault_reset = 3 * FAULT_RESET_CYCLES;
-                self.axes.iter_mut().for_each(Axis::begin_fault_reset);
-            }
-            Phase::Holding => {}
-            _ => return false,
+    fn reset_faults(&mut self) -> Answered {
+        self.require_phase(&[Phase::Disabled, Phase::Holding])?;
+        if self.phase == Phase::Disabled {
+            self.fault_reset = 3 * FAULT_RESET_CYCLES;
+            self.axes.iter_mut().for_each(Axis::begin_fault_reset);
         }
         self.stop = None;
-        true
-    }
-}
-
-/// Whether an axis can be sent to a position, and be stopped behind it where it passes it at speed: up to a cycle later.
-/// One that is driven by velocity or torque has none to go to, and is left as it is.
-fn is_target(axis: &Axis, position: f64, velocity: f64, period_s: f64) -> bool {
-    let limits = &axis.parameters().limits;
-    let way = |velocity: f64| velocity.max(0.0) * period_s + guard::braking_distance(limits, velocity, 0.0);
-    match axis.parameters().law {
-        ControlLaw::ProfileVelocity | ControlLaw::ProfileTorque => true,
-        ControlLaw::ProfilePosition => limits.contain(position),
-        _ if velocity == 0.0 => limits.contain(position),
-        _ => limits.contain(position + way(velocity)) && limits.contain(position - way(-velocity)),
+        Ok(())
     }
 }

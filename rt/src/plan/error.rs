@@ -94,6 +94,19 @@ pub enum PlanError {
 }
 
 impl PlanError {
+    /// The axis at fault; `None` when it is not one axis.
+    pub const fn axis(&self) -> Option<usize> {
+        match self {
+            Self::NotFinite { axis, .. }
+            | Self::InvalidLimit { axis, .. }
+            | Self::TargetBeyondLimit { axis, .. }
+            | Self::PositionBeyondLimit { axis, .. }
+            | Self::NotStraight { axis }
+            | Self::NotRepresentable { axis } => Some(*axis),
+            Self::LengthMismatch { .. } | Self::InvalidTiming => None,
+        }
+    }
+
     /// The same error, for the axis with this index.
     pub(super) fn on_axis(mut self, index: usize) -> Self {
         match &mut self {

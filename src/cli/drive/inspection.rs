@@ -49,10 +49,10 @@ pub struct Write {
 #[derive(Args, Debug)]
 pub struct Watch {
     /// Seconds between two readings
-    #[arg(long, value_name = "S", default_value = "0.1", value_parser = configuration::seconds)]
+    #[arg(long, value_name = "S", default_value = "0.1", allow_negative_numbers = true, value_parser = configuration::seconds)]
     interval: Duration,
     /// End after this many seconds
-    #[arg(long, value_name = "S", value_parser = configuration::seconds)]
+    #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = configuration::seconds)]
     duration: Option<Duration>,
 }
 

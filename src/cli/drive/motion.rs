@@ -30,7 +30,7 @@ pub enum Action {
 #[derive(Args, Debug)]
 pub struct Enable {
     /// Hold for this many seconds
-    #[arg(long, value_name = "S", value_parser = configuration::seconds)]
+    #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = configuration::seconds)]
     duration: Option<Duration>,
     /// Leave the torque on
     #[arg(long, conflicts_with = "duration")]
@@ -38,6 +38,7 @@ pub struct Enable {
 }
 
 #[derive(Args, Debug)]
+#[command(subcommand_value_name = "absolute|relative|reciprocate|continuous")]
 pub struct Move {
     #[command(subcommand)]
     course: CourseArguments,
@@ -73,7 +74,7 @@ enum CourseArguments {
         #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
         times: u32,
         /// Seconds of standstill at each end
-        #[arg(long, value_name = "S", value_parser = configuration::seconds)]
+        #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = configuration::seconds)]
         dwell: Option<Duration>,
         #[command(flatten)]
         pace: PaceArguments,
@@ -83,7 +84,7 @@ enum CourseArguments {
         /// Which way
         direction: Direction,
         /// Stop after this many seconds
-        #[arg(long, value_name = "S", value_parser = configuration::seconds)]
+        #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = configuration::seconds)]
         duration: Option<Duration>,
         #[command(flatten)]
         pace: PaceArguments,
@@ -125,7 +126,7 @@ pub struct Velocity {
     #[arg(allow_hyphen_values = true)]
     velocity: String,
     /// Stop after this many seconds
-    #[arg(long, value_name = "S", value_parser = configuration::seconds)]
+    #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = configuration::seconds)]
     duration: Option<Duration>,
     #[command(flatten)]
     ramps: RampArguments,
@@ -143,7 +144,7 @@ pub struct Torque {
     #[arg(long, value_name = "V")]
     max_velocity: Option<String>,
     /// End after this many seconds
-    #[arg(long, value_name = "S", value_parser = configuration::seconds)]
+    #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = configuration::seconds)]
     duration: Option<Duration>,
 }
 
@@ -153,7 +154,7 @@ pub struct Home {
     #[arg(long, value_name = "N", allow_hyphen_values = true)]
     method: Option<i8>,
     /// Give up and stop after this many seconds
-    #[arg(long, value_name = "S", default_value = "60", value_parser = configuration::seconds)]
+    #[arg(long, value_name = "S", default_value = "60", allow_negative_numbers = true, value_parser = configuration::seconds)]
     within: Duration,
     /// Try a method that the drive's manual does not describe
     #[arg(long)]

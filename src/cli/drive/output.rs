@@ -63,7 +63,7 @@ impl Output {
                 self.step = name;
                 self.line.set_message(name);
                 if self.options.verbose {
-                    eprintln!("{} ── {name}", seconds(at_ns));
+                    say!("{} ── {name}", seconds(at_ns));
                 }
             }
             Seen::Event(Event::Note(text)) => self.hint(&text),
@@ -77,14 +77,14 @@ impl Output {
     pub fn hint(&mut self, text: &str) {
         self.notes.push(text.to_owned());
         if !self.options.json {
-            self.line.suspend(|| eprintln!("note: {text}"));
+            self.line.suspend(|| say!("note: {text}"));
         }
     }
 
     fn frame(&self, at_ns: Nanoseconds, direction: char, frame: &Frame) {
         if self.options.verbose {
             let (frame, words) = (format!("{frame:?}"), meaning::of(&self.subject, frame));
-            eprintln!("{} {direction} {frame:<21}  {words}", seconds(at_ns));
+            say!("{} {direction} {frame:<21}  {words}", seconds(at_ns));
         }
     }
 
@@ -166,7 +166,7 @@ impl Output {
         };
         match serde_json::to_string(&printed) {
             Ok(json) => print(&format!("{json}\n")),
-            Err(error) => eprintln!("takt: the result cannot be written as JSON: {error}"),
+            Err(error) => say!("takt: the result cannot be written as JSON: {error}"),
         }
     }
 
@@ -174,13 +174,13 @@ impl Output {
         let name = &self.subject.name;
         match &failed.failure {
             Failure::Interrupted if self.action == "watch" => {}
-            Failure::Interrupted => eprintln!("takt: {name}: interrupted in `{}`", failed.step),
+            Failure::Interrupted => say!("takt: {name}: interrupted in `{}`", failed.step),
             failure => {
                 // What is refused before the first word with the drive has no step.
                 let step = if failure.is_refusal() { String::new() } else { format!(", {}", failed.step) };
-                eprintln!("takt: {name}{step}: {failure}");
+                say!("takt: {name}{step}: {failure}");
                 if let Some(advice) = failure.advice() {
-                    eprintln!("  try: {advice}");
+                    say!("  try: {advice}");
                 }
             }
         }

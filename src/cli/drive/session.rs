@@ -24,14 +24,14 @@ pub fn run(subject: Subject, request: Request, bus: Bus, options: Options, mut o
     let mut port = match open(&bus) {
         Ok(port) => port,
         Err(error) => {
-            eprintln!("takt: {error}");
+            say!("takt: {error}");
             return Exit::Usage;
         }
     };
     let interrupted = match interruption::watch() {
         Ok(interrupted) => interrupted,
         Err(error) => {
-            eprintln!("takt: cannot watch for Ctrl-C: {error}");
+            say!("takt: cannot watch for Ctrl-C: {error}");
             return Exit::Stopped;
         }
     };

@@ -63,7 +63,7 @@ fn family(text: &str) -> Result<Family, String> {
 }
 
 fn refuse(text: &str) -> Exit {
-    eprintln!("takt: {text}");
+    say!("takt: {text}");
     Exit::Usage
 }
 

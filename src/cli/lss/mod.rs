@@ -161,14 +161,14 @@ pub fn run(arguments: &Arguments) -> Exit {
     let interrupted = match interruption::watch() {
         Ok(interrupted) => interrupted,
         Err(error) => {
-            eprintln!("takt: cannot watch for Ctrl-C: {error}");
+            say!("takt: cannot watch for Ctrl-C: {error}");
             return Exit::Stopped;
         }
     };
     let is_interrupted = || interrupted.load(Ordering::Relaxed);
     match &arguments.bus {
         Interface::Simulated if arguments.simulate.is_empty() => {
-            eprintln!("takt: nobody is on a simulated bus: add --simulate IDENTITY");
+            say!("takt: nobody is on a simulated bus: add --simulate IDENTITY");
             Exit::Usage
         }
         Interface::Simulated => {
@@ -177,20 +177,20 @@ pub fn run(arguments: &Arguments) -> Exit {
             lead(arguments, &mut bus, &mut VirtualClock::default(), is_interrupted)
         }
         Interface::SocketCan(_) if !arguments.simulate.is_empty() => {
-            eprintln!("takt: --simulate is for a simulated bus: --bus sim");
+            say!("takt: --simulate is for a simulated bus: --bus sim");
             Exit::Usage
         }
         Interface::SocketCan(name) => {
             let bit_rate = arguments.bit_rate;
             let settings = InterfaceSettings { bit_rate, data_bit_rate: None, restart_ms: RESTART_MS };
             if let Err(error) = prepare_interface(name, &settings) {
-                eprintln!("takt: bus {name}: {error}");
+                say!("takt: bus {name}: {error}");
                 return Exit::Usage;
             }
             match open_socketcan(name, &SocketCanOptions { bit_rate, ..SocketCanOptions::default() }) {
                 Ok(mut port) => lead(arguments, &mut port, &mut MonotonicClock::default(), is_interrupted),
                 Err(error) => {
-                    eprintln!("takt: bus {name}: {error}");
+                    say!("takt: bus {name}: {error}");
                     Exit::Usage
                 }
             }

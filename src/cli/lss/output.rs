@@ -84,7 +84,7 @@ pub fn show(at_ns: Nanoseconds, seen: &Seen) {
         Seen::Event(_) => return,
     };
     let at_s = at_ns as f64 / 1e9;
-    eprintln!("{at_s:11.6} {direction} {:<22} {}", format!("{frame:?}"), words.unwrap_or_default());
+    say!("{at_s:11.6} {direction} {:<22} {}", format!("{frame:?}"), words.unwrap_or_default());
 }
 
 fn advice(failure: LayerSettingFailure) -> Option<&'static str> {
@@ -123,7 +123,7 @@ impl Output {
             };
             match serde_json::to_string(&printed) {
                 Ok(json) => print(&format!("{json}\n")),
-                Err(error) => eprintln!("takt: the result cannot be written as JSON: {error}"),
+                Err(error) => say!("takt: the result cannot be written as JSON: {error}"),
             }
             return exit;
         }
@@ -131,9 +131,9 @@ impl Output {
         match failure {
             None => {}
             Some(failure) => {
-                eprintln!("takt: {}: {failure}", self.action);
+                say!("takt: {}: {failure}", self.action);
                 if let Some(advice) = advice(failure) {
-                    eprintln!("  try: {advice}");
+                    say!("  try: {advice}");
                 }
             }
         }

@@ -72,6 +72,9 @@ impl Question {
 
     fn check_lengths(&self) -> Result<(), String> {
         let axes = self.p0.len();
+        if axes == 0 {
+            return Err("`p0` is empty: a problem has at least one axis".to_owned());
+        }
         let required = [("vmax", self.vmax.len()), ("amax", self.amax.len())];
         let optional = [
             ("v0", self.v0.len()),

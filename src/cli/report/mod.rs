@@ -36,7 +36,7 @@ pub fn run(arguments: &Arguments) -> Exit {
     match tell(arguments) {
         Ok(exit) => exit,
         Err(message) => {
-            eprintln!("takt: {message}");
+            say!("takt: {message}");
             Exit::Usage
         }
     }
@@ -69,7 +69,7 @@ fn tell(arguments: &Arguments) -> Result<Exit, String> {
 fn write(path: &Path, svg: &str) -> bool {
     let written = fs::write(path, svg);
     if let Err(error) = &written {
-        eprintln!("takt: {} cannot be written: {error}", path.display());
+        say!("takt: {} cannot be written: {error}", path.display());
     }
     written.is_ok()
 }

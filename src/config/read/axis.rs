@@ -206,7 +206,8 @@ fn check_bit_rate(drive: Option<DriveFamily>, bus: Option<&ReadBus>, problems: &
 /// A YZ-AIM interpolates from target to target in 2 ms (manual, 5.10.3).
 fn check_period(control: Option<Control>, bus: Option<&ReadBus>, cycle_ns: u64, problems: &Problems<'_>) {
     let (Some(Control::Interpolated), Some(bus)) = (control, bus) else { return };
-    let period_ns = cycle_ns * u64::from(bus.divider);
+    let Some(divider) = bus.divider else { return };
+    let period_ns = cycle_ns * u64::from(divider);
     if period_ns != yz_aim::INTERPOLATION_PERIOD_NS {
         let (key, value) = ("bus.period".to_owned(), Quantity::DURATION.show(period_ns as f64 / 1e9));
         let allowed = "2 ms, the period of a YZ-AIM that interpolates: period = \"2 ms\"".to_owned();

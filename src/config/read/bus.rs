@@ -22,8 +22,8 @@ const RESTART_LIMIT_MS: i64 = 60_000;
 pub struct ReadBus {
     pub name: Option<String>,
     pub bit_rate: u32,
-    /// Cycles of the controller in one of this bus.
-    pub divider: u32,
+    /// Cycles of the controller in one of this bus; `None` when its period is wrong.
+    pub divider: Option<u32>,
     /// Where the bit rate stands, if it does.
     pub bit_rate_span: Option<Range<usize>>,
     /// `None` when something about it is wrong.
@@ -84,7 +84,7 @@ fn bus<'a>(
             .quantity(Quantity::BIT_RATE, Bounds::Between(bit_rate.into(), 8e6))
             .map(|rate| rate.round() as u32)
     });
-    let divider = section.get("period").and_then(|entry| divider(&entry, cycle_ns)).unwrap_or(1);
+    let divider = section.get("period").map_or(Some(1), |entry| divider(&entry, cycle_ns));
     let restart_ms = section.get("restart_ms").and_then(|entry| entry.integer(0..RESTART_LIMIT_MS + 1));
     let service_frames = section.get("service_frames_per_cycle").and_then(|entry| entry.integer(1..33));
     let sdo_while_enabled = boolean(&mut section, "sdo_while_enabled", defaults::SDO_WHILE_ENABLED);
@@ -92,7 +92,7 @@ fn bus<'a>(
     let bus = name.zip(interface).map(|(name, interface)| Bus {
         name: name.to_owned(),
         interface,
-        divider,
+        divider: divider.unwrap_or(1),
         bit_rate,
         data_bit_rate,
         restart_ms: restart_ms.and_then(|time| u32::try_from(time).ok()).unwrap_or(defaults::RESTART_MS),

@@ -1,10 +1,11 @@
 //! How a snapshot and a streamed command are laid out in 64-bit words.
 
 use takt_rt::cia402;
-use takt_rt::door::{AxisSnapshot, Refusals, RequestId, Snapshot, StreamCommand};
+use takt_rt::door::{AxisSnapshot, RequestId, Snapshot, StreamCommand};
 use takt_rt::plan;
 use takt_rt::port::{BusHealth, BusState};
 use takt_rt::record::{MAX_AXES, MAX_BUSES};
+use takt_rt::refusal::{Answers, Objection, Refusal, RequestKind};
 use takt_rt::stop::{Phase, Rule, StopCategory, StopReason};
 use takt_rt::watch::TimingLevel;
 
@@ -12,7 +13,7 @@ use super::latest::Words;
 
 /// Words of a snapshot of so many axes and buses.
 pub const fn snapshot_words(axes: usize, buses: usize) -> usize {
-    15 + 4 * axes + 7 * buses
+    17 + 4 * Answers::EXPLAINED + 4 * axes + 7 * buses
 }
 
 /// Words of a streamed command for so many axes.
@@ -30,7 +31,7 @@ pub const NO_SNAPSHOT: Snapshot = Snapshot {
     clamped: 0,
     dropped: 0,
     refused: 0,
-    refusals: Refusals { newest: RequestId(0), refused: 0 },
+    answers: Answers { newest: RequestId(0), taken_up: 0, refused: 0, refusals: [None; Answers::EXPLAINED] },
     finished_move: 0,
     remaining_s: 0.0,
     stop: None,
@@ -72,9 +73,7 @@ pub fn put_snapshot(snapshot: &Snapshot, words: &mut Words<'_>) {
     words.put(snapshot.clamped);
     words.put(snapshot.dropped);
     words.put(snapshot.refused);
-    words.put(snapshot.refusals.newest.0);
-    words.put(snapshot.refusals.refused as u64);
-    words.put((snapshot.refusals.refused >> 64) as u64);
+    put_answers(&snapshot.answers, words);
     words.put_f64(snapshot.remaining_s);
     if let Some(stop) = snapshot.stop {
         put_stop(&stop, words);
@@ -99,7 +98,7 @@ pub fn take_snapshot(words: &mut Words<'_>) -> Snapshot {
         timing: TimingLevel::ALL.get(usize::from(flags >> 1)).copied().unwrap_or_default(),
         dropped: words.take(),
         refused: words.take(),
-        refusals: take_refusals(words),
+        answers: take_answers(words),
         finished_move: (packed >> 32) as u32,
         remaining_s: words.take_f64(),
         stop: (flags & 1 == 1).then(|| take_stop(words)),
@@ -116,9 +115,49 @@ pub fn take_snapshot(words: &mut Words<'_>) -> Snapshot {
     snapshot
 }
 
-fn take_refusals(words: &mut Words<'_>) -> Refusals {
+fn put_answers(answers: &Answers, words: &mut Words<'_>) {
+    words.put(answers.newest.0);
+    for bits in [answers.taken_up, answers.refused] {
+        words.put(bits as u64);
+        words.put((bits >> 64) as u64);
+    }
+    // The newest come first, so that the first that is missing is the end.
+    for place in &answers.refusals {
+        let Some((RequestId(id), refused)) = place else {
+            words.put(0);
+            return;
+        };
+        let axis = refused.axis.map_or(0, |axis| u64::from(axis) << 32 | 1 << 40);
+        let kinds = pack([refused.request as u8, refused.objection as u8, refused.phase as u8, 1]);
+        words.put(kinds | axis);
+        words.put(*id);
+        words.put_f64(refused.value);
+        words.put_f64(refused.limit);
+    }
+}
+
+fn take_answers(words: &mut Words<'_>) -> Answers {
     let newest = RequestId(words.take());
-    Refusals { newest, refused: u128::from(words.take()) | u128::from(words.take()) << 64 }
+    let mut bits = || u128::from(words.take()) | u128::from(words.take()) << 64;
+    let mut answers = Answers { newest, taken_up: bits(), refused: bits(), ..Answers::default() };
+    for place in &mut answers.refusals {
+        let packed = words.take();
+        let [request, objection, phase, is_there] = unpack(packed);
+        if is_there == 0 {
+            break;
+        }
+        let id = RequestId(words.take());
+        let refusal = Refusal {
+            request: RequestKind::ALL.get(usize::from(request)).copied().unwrap_or(RequestKind::Leave),
+            objection: Objection::ALL.get(usize::from(objection)).copied().unwrap_or(Objection::Phase),
+            axis: (packed >> 40 & 1 == 1).then_some((packed >> 32) as u8),
+            value: words.take_f64(),
+            limit: words.take_f64(),
+            phase: phase_of(phase),
+        };
+        *place = Some((id, refusal));
+    }
+    answers
 }
 
 pub fn put_stream(command: &StreamCommand, axes: usize, words: &mut Words<'_>) {
@@ -264,6 +303,22 @@ mod tests {
         )
     }
 
+    fn refusals() -> impl Strategy<Value = Refusal> {
+        let requests = prop::sample::select(&RequestKind::ALL[..]);
+        let objections = prop::sample::select(&Objection::ALL[..]);
+        let phases = prop::sample::select(&Phase::ALL[..]);
+        (requests, objections, any::<Option<u8>>(), any::<(f64, f64)>(), phases).prop_map(
+            |(request, objection, axis, (value, limit), phase)| Refusal {
+                request,
+                objection,
+                axis,
+                value,
+                limit,
+                phase,
+            },
+        )
+    }
+
     fn axes() -> impl Strategy<Value = AxisSnapshot> {
         let states = prop::sample::select(&cia402::State::ALL[..]);
         (any::<(f64, f64, f64, u16, u16, bool, u16)>(), states).prop_map(
@@ -307,11 +362,13 @@ mod tests {
             prop::option::of(stop_reasons()),
             prop::sample::select(&Phase::ALL[..]),
         );
-        (counted, any::<(u64, u64, u64, u64, u32, f64)>(), any::<(u64, u64, u128)>()).prop_map(
+        let refusals = prop::collection::vec((any::<u64>(), refusals()), 0..=Answers::EXPLAINED);
+        let answers = (any::<(u64, u64, u128, u128)>(), refusals);
+        (counted, any::<(u64, u64, u64, u64, u32, f64)>(), answers).prop_map(
             |(
                 (axes, buses, stop, phase),
                 (slot, at_ns, missed_slots, dropped, finished_move, remaining_s),
-                (refused, newest, refusals),
+                ((refused, newest, taken_up, refused_bits), refusals),
             )| {
                 let mut snapshot = Snapshot {
                     slot,
@@ -321,7 +378,14 @@ mod tests {
                     dropped,
                     finished_move,
                     refused,
-                    refusals: Refusals { newest: RequestId(newest), refused: refusals },
+                    answers: Answers {
+                        newest: RequestId(newest),
+                        taken_up,
+                        refused: refused_bits,
+                        refusals: std::array::from_fn(|at| {
+                            refusals.get(at).map(|(id, refusal)| (RequestId(*id), *refusal))
+                        }),
+                    },
                     remaining_s,
                     stop,
                     axis_count: axes.len() as u8,

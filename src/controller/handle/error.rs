@@ -1,8 +1,10 @@
 //! Why a controller does not start, a command is not given, a motion does not get to its end.
 
-use takt_rt::stop::{Phase, StopReason};
+use takt_rt::refusal::Refusal;
+use takt_rt::stop::StopReason;
 
 use crate::controller::session::{Session, SessionError};
+use crate::telemetry::{Machine, words};
 
 /// Why there is no controller.
 #[derive(Debug, thiserror::Error)]
@@ -16,6 +18,24 @@ pub enum StartFailure {
     /// The thread that leads the controller has died, which only a defect of takt can bring about.
     #[error("the thread that leads the controller has died")]
     Died,
+}
+
+/// The real-time thread has refused a request.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{words}")]
+pub struct Refused {
+    /// What was refused and why; `None` when so many others were refused since that it is no longer known.
+    pub refusal: Option<Refusal>,
+    words: String,
+}
+
+impl Refused {
+    pub(super) fn new(refusal: Option<Refusal>, machine: &Machine) -> Self {
+        let forgotten =
+            || "the request was refused, as were so many since that why is no longer known".to_owned();
+        let words = refusal.map_or_else(forgotten, |refusal| words::refusal(&refusal, machine));
+        Self { refusal, words }
+    }
 }
 
 /// Why a command was not given; nothing has changed then.
@@ -63,24 +83,32 @@ pub enum CommandError {
         /// How many.
         waiting: usize,
     },
+    /// The real-time thread has refused it.
+    #[error(transparent)]
+    Refused(#[from] Refused),
+    /// So many requests have followed it that what became of it is not known.
+    #[error("too many requests have followed it to know what became of it")]
+    Unanswered,
+    /// A stop has overtaken it before the real-time thread had taken it up.
+    #[error("a stop has overtaken the request")]
+    Overtaken,
     /// The controller has ended.
     #[error("the controller has ended")]
     Ended,
 }
 
 /// Why a motion did not get to its end.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MotionError {
     /// The group has stopped.
     #[error("the group has stopped: {0:?}")]
     Stopped(StopReason),
-    /// The real-time thread refused it: another phase, or a latched fault. Or it was never asked: too much was waiting, or a
-    /// stop has overtaken it.
-    #[error("the motion was refused while {phase:?}")]
-    Refused {
-        /// The phase that the group was in.
-        phase: Phase,
-    },
+    /// The real-time thread has refused it.
+    #[error(transparent)]
+    Refused(#[from] Refused),
+    /// A stop has overtaken it before the real-time thread had taken it up.
+    #[error("a stop has overtaken the motion")]
+    Overtaken,
     /// It was not over in time; it goes on.
     #[error("the motion was not over in time")]
     NotInTime,

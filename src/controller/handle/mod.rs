@@ -34,17 +34,19 @@ use takt_rt::plan::State;
 use takt_rt::port::Clock;
 use takt_rt::profile::ProfileTarget;
 use takt_rt::record::MAX_AXES;
+use takt_rt::refusal::Answer;
 use takt_rt::stop::{Phase, StopCategory};
 
 use super::channels::{Observer, RequestNumbers, Streamer};
 use super::outcome::{Interrupt, Outcome};
 use super::session::{self, Remote, Session, SessionError, SessionOptions};
 use crate::config::{Axis, Config};
+use crate::telemetry::Machine;
 use waiting_requests::REQUESTS_AT_MOST;
 
 pub(super) use waiting_requests::WaitingRequests;
 
-pub use error::{CommandError, MotionError, StartFailure};
+pub use error::{CommandError, MotionError, Refused, StartFailure};
 
 /// Between two looks at the state by whoever waits.
 const LOOK: Duration = Duration::from_millis(1);
@@ -54,6 +56,7 @@ const ENABLE_PATIENCE: Duration = Duration::from_secs(60);
 /// A group of axes that is enabled and obeys. Dropping it brings the axes to rest, disables and leaves them.
 pub struct Controller {
     axes: Vec<Axis>,
+    machine: Machine,
     requests: Arc<WaitingRequests>,
     numbers: RequestNumbers,
     observer: Observer,
@@ -97,7 +100,7 @@ impl Controller {
         let (introduce, introduced) = mpsc::sync_channel(1);
         let remote = Remote { requests: Arc::clone(&requests), introduce };
         let is_ending = Arc::new(AtomicBool::new(false));
-        let axes = config.axes.clone();
+        let (axes, machine) = (config.axes.clone(), Machine::of(&config));
         let thread = {
             let is_ending = Arc::clone(&is_ending);
             let watch =
@@ -110,7 +113,7 @@ impl Controller {
             return Err(failed(thread));
         };
         let thread = Some(thread);
-        let mut controller = Self { axes, requests, numbers, observer, streamer, is_ending, thread };
+        let mut controller = Self { axes, machine, requests, numbers, observer, streamer, is_ending, thread };
         let begun = Instant::now();
         while controller.state().phase != Phase::Holding {
             if controller.has_ended() || begun.elapsed() > ENABLE_PATIENCE {
@@ -206,25 +209,9 @@ impl Controller {
     /// the time that enabling may take, and begin where the joints are.
     ///
     /// # Errors
-    /// [`MotionError::Refused`] unless the group holds its position and is punctual, [`MotionError::Ended`].
-    pub fn begin_stream(&mut self) -> Result<(), MotionError> {
-        let asked = self.ask(Request::Stream).map_err(|error| match error {
-            CommandError::Full { .. } => MotionError::Refused { phase: self.state().phase },
-            _ => MotionError::Ended,
-        })?;
-        loop {
-            let state = self.state();
-            if state.phase == Phase::Streaming {
-                return Ok(());
-            }
-            if self.is_refused(&state, asked) {
-                return Err(MotionError::Refused { phase: state.phase });
-            }
-            if self.has_ended() {
-                return Err(MotionError::Ended);
-            }
-            thread::sleep(LOOK);
-        }
+    /// [`CommandError::Refused`] unless the group holds its position and is punctual, [`CommandError::Full`], [`CommandError::Ended`].
+    pub fn begin_stream(&mut self) -> Result<(), CommandError> {
+        self.obtain(Request::Stream)
     }
 
     /// Replaces the streamed set-points, one for each axis; the real-time thread takes the newest ones. They expire after
@@ -242,8 +229,8 @@ impl Controller {
         Ok(())
     }
 
-    /// Stops the group by this category. Whatever has been asked for before and is still waiting is forgotten, so that it
-    /// neither holds the stop up nor is begun after it.
+    /// Stops the group by this category. That is never refused, and not waited for. Whatever has been asked for before and is
+    /// still waiting is forgotten, so that it neither holds the stop up nor is begun after it.
     ///
     /// # Errors
     /// [`CommandError::Ended`].
@@ -251,28 +238,30 @@ impl Controller {
         self.ask(Request::Stop(category)).map(drop)
     }
 
-    /// Brings the axes to rest if need be, and disables them. It overtakes what is waiting as [`Controller::stop`] does.
+    /// Begins to bring the axes to rest if need be, and to disable them. It overtakes what is waiting as [`Controller::stop`]
+    /// does.
     ///
     /// # Errors
-    /// [`CommandError::Ended`].
+    /// [`CommandError::Refused`], [`CommandError::Ended`].
     pub fn disable(&mut self) -> Result<(), CommandError> {
-        self.ask(Request::Disable).map(drop)
+        self.obtain(Request::Disable)
     }
 
-    /// Enables the axes again, after [`Controller::disable`], or after a fault and [`Controller::reset_faults`].
+    /// Begins to enable the axes again, after [`Controller::disable`], or after a fault and [`Controller::reset_faults`].
     ///
     /// # Errors
-    /// [`CommandError::Full`], [`CommandError::Ended`].
+    /// [`CommandError::Refused`] unless the axes are disabled and no fault is latched, [`CommandError::Full`],
+    /// [`CommandError::Ended`].
     pub fn enable(&mut self) -> Result<(), CommandError> {
-        self.ask(Request::Enable).map(drop)
+        self.obtain(Request::Enable)
     }
 
-    /// Clears latched faults. Refused in motion.
+    /// Clears latched faults.
     ///
     /// # Errors
-    /// [`CommandError::Full`], [`CommandError::Ended`].
+    /// [`CommandError::Refused`] in motion, [`CommandError::Full`], [`CommandError::Ended`].
     pub fn reset_faults(&mut self) -> Result<(), CommandError> {
-        self.ask(Request::ResetFaults).map(drop)
+        self.obtain(Request::ResetFaults)
     }
 
     /// Waits until a motion is over: until the axes are at rest at their targets, or a speed or torque has been reached.
@@ -290,8 +279,11 @@ impl Controller {
             if let Some(reason) = state.stop.filter(|reason| reason.slot > motion.slot) {
                 return Err(MotionError::Stopped(reason));
             }
-            if self.is_refused(&state, motion.request) {
-                return Err(MotionError::Refused { phase: state.phase });
+            if let Answer::Refused(refusal) = state.answers.of(motion.request) {
+                return Err(Refused::new(refusal, &self.machine).into());
+            }
+            if self.requests.has_forgotten(motion.request) {
+                return Err(MotionError::Overtaken);
             }
             if self.has_ended() {
                 return Err(MotionError::Ended);
@@ -372,6 +364,22 @@ impl Controller {
         Ok(Motion { request: id, slot, ends_at_rest })
     }
 
+    /// Asks for something, and waits until it has been granted.
+    fn obtain(&self, request: Request) -> Result<(), CommandError> {
+        let asked = self.ask(request)?;
+        loop {
+            let answers = self.state().answers;
+            match answers.of(asked) {
+                Answer::Granted => return Ok(()),
+                Answer::Refused(refusal) => return Err(Refused::new(refusal, &self.machine).into()),
+                Answer::None if answers.have_forgotten(asked) => return Err(CommandError::Unanswered),
+                Answer::None if self.requests.has_forgotten(asked) => return Err(CommandError::Overtaken),
+                Answer::None if self.has_ended() => return Err(CommandError::Ended),
+                Answer::None => thread::sleep(LOOK),
+            }
+        }
+    }
+
     fn ask(&self, request: Request) -> Result<RequestId, CommandError> {
         let id = self.numbers.next();
         self.hand_in(Asked { id, request }).map(|()| id)
@@ -385,10 +393,6 @@ impl Controller {
         } else {
             Err(CommandError::Full { waiting: REQUESTS_AT_MOST })
         }
-    }
-
-    fn is_refused(&self, state: &Snapshot, request: RequestId) -> bool {
-        state.refusals.contain(request) || self.requests.has_forgotten(request)
     }
 }
 

@@ -4,10 +4,13 @@
 use std::collections::VecDeque;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use takt_rt::door::{Asked, Refusals, Request, RequestId};
+use takt_rt::door::{Asked, Request, RequestId};
 
 /// Sixteen cycles' worth: whoever asks for more than this at once does not look at what becomes of it.
 pub const REQUESTS_AT_MOST: usize = 64;
+
+/// So many of those that a stop has overtaken are remembered.
+const FORGOTTEN_AT_MOST: usize = 4 * REQUESTS_AT_MOST;
 
 /// The requests that wait, oldest first.
 #[derive(Debug, Default)]
@@ -18,8 +21,8 @@ pub struct WaitingRequests {
 #[derive(Debug, Default)]
 struct Waiting {
     requests: VecDeque<Asked>,
-    /// Those that a stop has overtaken.
-    forgotten: Refusals,
+    /// Those that a stop has overtaken, the newest last.
+    forgotten: VecDeque<RequestId>,
 }
 
 impl WaitingRequests {
@@ -52,7 +55,7 @@ impl WaitingRequests {
 
     /// Whether a request has been forgotten for a stop, as far as that is remembered.
     pub fn has_forgotten(&self, request: RequestId) -> bool {
-        self.lock().forgotten.contain(request)
+        self.lock().forgotten.contains(&request)
     }
 
     fn lock(&self) -> MutexGuard<'_, Waiting> {
@@ -66,9 +69,12 @@ impl Waiting {
         let forgotten = &mut self.forgotten;
         self.requests.retain(|asked| {
             let is_kept = ends_motion(&asked.request);
-            forgotten.note(asked.id, !is_kept);
+            if !is_kept {
+                forgotten.push_back(asked.id);
+            }
             is_kept
         });
+        forgotten.drain(..forgotten.len().saturating_sub(FORGOTTEN_AT_MOST));
     }
 }
 

@@ -41,8 +41,8 @@ impl Scenario {
     /// See [`ScenarioError`].
     pub fn load(path: &Path, config: &Config) -> Result<Self, ScenarioError> {
         let name = path.display().to_string();
-        match std::fs::read_to_string(path) {
-            Ok(text) => Ok(Self::parse(&name, &text, config)?),
+        match std::fs::read(path) {
+            Ok(bytes) => Ok(Self::parse(&name, &ConfigError::text_of(&name, bytes)?, config)?),
             Err(error) => Err(ScenarioError::Unreadable { path: name, reason: error.to_string() }),
         }
     }

@@ -3,6 +3,7 @@
 use takt_rt::cia402::State;
 use takt_rt::port::{BusHealth, BusState};
 use takt_rt::record::{AxisRecord, CycleRecord, EventKind, Timing};
+use takt_rt::refusal::{Objection, Refusal, RequestKind};
 use takt_rt::stop::{Phase, Rule, StopCategory, StopReason};
 use takt_rt::watch::TimingLevel;
 
@@ -74,6 +75,10 @@ pub fn decode_event(message: &[u8]) -> Option<RecordedEvent> {
         error_code: fields.u16()?,
         error_register: fields.u8()?,
         manufacturer: fields.octets()?,
+        refusal: match fields.u8() {
+            Some(request) => Some((request, fields.u8()?)),
+            None => None,
+        },
     };
     Some(RecordedEvent { slot, at_ns, text, kind: of_kind.kind(slot) })
 }
@@ -134,7 +139,14 @@ impl EventFields {
                 manufacturer: self.manufacturer,
             },
             5 => EventKind::MissedSlots { count: self.missed_slots },
-            6 => EventKind::Refused { phase: phase(self.phase_from)? },
+            6 => EventKind::Refused(Refusal {
+                request: *RequestKind::ALL.get(usize::from(self.refusal?.0))?,
+                objection: *Objection::ALL.get(usize::from(self.refusal?.1))?,
+                axis: self.axis,
+                value: self.value,
+                limit: self.limit,
+                phase: phase(self.phase_from)?,
+            }),
             7 => EventKind::Timing { level: *TimingLevel::ALL.get(usize::from(self.timing_level))? },
             _ => return None,
         })
@@ -147,6 +159,25 @@ mod tests {
     use crate::telemetry::cdr::CdrEncoder;
     use crate::telemetry::messages::encode_event;
     use takt_rt::record::Event;
+
+    const REFUSAL: Refusal = Refusal {
+        request: RequestKind::Move,
+        objection: Objection::NoRoomToStop,
+        axis: Some(2),
+        value: 3.25,
+        limit: 3.0,
+        phase: Phase::Holding,
+    };
+
+    #[test]
+    fn a_refusal_of_an_earlier_version_keeps_its_words() {
+        let event = Event { slot: 77, at_ns: 88, kind: EventKind::Refused(REFUSAL) };
+        let mut encoder = CdrEncoder::default();
+        encode_event(&event, "in words", &mut encoder);
+        let earlier = decode_event(&encoder.bytes()[..encoder.bytes().len() - 2]);
+        let expected = RecordedEvent { slot: 77, at_ns: 88, text: "in words".to_owned(), kind: None };
+        assert_eq!(earlier, Some(expected));
+    }
 
     #[test]
     fn every_kind_of_event_is_read_as_it_was_written() {
@@ -169,7 +200,7 @@ mod tests {
             EventKind::Timing { level: TimingLevel::Degraded },
             EventKind::Emergency { axis: 1, code: 0x7305, register: 0x21, manufacturer: [1, 2, 3, 4, 5] },
             EventKind::MissedSlots { count: 30 },
-            EventKind::Refused { phase: Phase::Moving },
+            EventKind::Refused(REFUSAL),
         ] {
             encode_event(&Event { slot: 77, at_ns: 88, kind }, "in words", &mut encoder);
             let expected =

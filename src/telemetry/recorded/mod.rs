@@ -258,7 +258,7 @@ impl Decoder {
     fn schema(&mut self, id: u16, name: &str, definition: &[u8]) {
         let known = messages::READ.iter().find(|message| message.name == name);
         let Some(known) = known else { return };
-        if messages::layout(&String::from_utf8_lossy(definition)) == messages::layout(known.definition) {
+        if known.can_be_read_as(&String::from_utf8_lossy(definition)) {
             self.schemas.insert(id, known);
         } else {
             self.other_layout = Some(known.name);
