@@ -95,10 +95,11 @@ pub fn engine(config: &Config) -> Result<Engine, AssembleError> {
         service_frames_passive: SERVICE_FRAMES_PASSIVE.max(bus.service_frames_per_cycle),
     });
     let is_simulated = config.buses.iter().all(|bus| bus.interface == Interface::Simulated);
-    let heartbeat = config
-        .master
-        .heartbeat_ns
-        .map(|ns| Heartbeat { node: config.master.node, cycles: cycles(ns).max(1) });
+    let heartbeat = config.master.heartbeat_ns.map(|ns| Heartbeat {
+        node: config.master.node,
+        cycles: cycles(ns).max(1),
+        timeout_cycles: cycles(config.master.heartbeat_timeout_ns),
+    });
     Engine::new(EngineParameters {
         period_ns,
         axes,

@@ -9,4 +9,5 @@ mod late_drives;
 mod lost_heartbeat;
 mod reactions;
 mod repeatability;
+mod unreachable;
 mod wrapper;
