@@ -143,7 +143,10 @@ fn axis_parameters(
         node: axis.node,
         commands: data.commands.iter().map(command).collect::<Result<_, _>>().map_err(wrong_mapping)?,
         feedback: data.feedback.iter().map(feedback).collect::<Result<_, _>>().map_err(wrong_mapping)?,
-        feedback_since: feedback_since(&data.feedback),
+        feedback_since: match axis.drive {
+            DriveFamily::YzAim if yz_aim::answers_set_points(axis) => FeedbackSince::SetPoint,
+            _ => feedback_since(&data.feedback),
+        },
         unused: data.unused.iter().map(|plan| plan.id).collect(),
         dialect: axis.drive.dialect(),
         controlword_spacing_cycles: u32::try_from(
