@@ -267,12 +267,38 @@ fn after_a_category_0_stop_in_motion_nothing_of_the_old_motion_comes_back() {
 }
 
 #[test]
-fn a_drive_that_never_answers_again_is_not_waited_for_without_end() {
+fn a_drive_that_never_answers_again_is_waited_for_until_its_own_watchdog_has_fired() {
     let mut rig = Rig::enabled(3);
     rig.drive(1).is_silent = true;
     rig.run_until(Phase::Disabling, 10);
-    rig.run_until(Phase::Disabled, 510);
+    rig.run(190);
+    assert_eq!(rig.phase(), Phase::Disabling);
+    rig.run_until(Phase::Disabled, 10);
     assert_eq!(rules(&rig), [Rule::MissedFeedback]);
+}
+
+/// Disables a group in which one drive never shows that it obeys.
+fn disable_in_vain(mut rig: Rig) {
+    rig.request(Request::Disable);
+    rig.run(495);
+    assert_eq!(rig.phase(), Phase::Disabling);
+    rig.run_until(Phase::Disabled, 20);
+}
+
+#[test]
+fn a_silent_drive_without_a_watchdog_is_waited_for_longer() {
+    let mut unwatched = parameters(3);
+    unwatched.heartbeat = None;
+    let mut rig = Rig::of(unwatched).enable();
+    rig.drive(1).is_silent = true;
+    disable_in_vain(rig);
+}
+
+#[test]
+fn a_drive_that_answers_and_does_not_obey_is_waited_for_longer_than_its_watchdog_takes() {
+    let mut rig = Rig::enabled(3);
+    rig.drive(1).is_defiant = true;
+    disable_in_vain(rig);
 }
 
 #[test]

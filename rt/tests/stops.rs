@@ -14,6 +14,8 @@ fn disabling_in_vain() -> Rig {
     let mut parameters = parameters(3);
     // What the silent drive lacks is no fault of its own here.
     parameters.axes[0].missed_feedback_cycles = u16::MAX;
+    // And nothing makes it stop by itself.
+    parameters.heartbeat = None;
     let mut rig = Rig::of(parameters).enable();
     rig.drive(0).is_silent = true;
     rig.request(Request::Disable);

@@ -11,7 +11,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
 use takt::bus::schedule;
-use takt::config::{Config, Interface};
+use takt::config::{Config, Interface, Master};
 use takt::controller::realtime_thread::StartError;
 use takt::controller::session::{self, Session, SessionError, SessionOptions};
 use takt::controller::{Interrupt, Outcome, Progress};
@@ -59,6 +59,8 @@ struct Printed<'a> {
     ended: &'static str,
     /// Why the run failed, in words, where it was not a stop of the group.
     failure: Option<String>,
+    /// The axes whose drives could not be reached in the end.
+    unreached: Vec<&'a str>,
 }
 
 /// Runs it.
@@ -154,6 +156,11 @@ fn report(config: &Config, session: &Session, as_json: bool) -> Exit {
     };
     let report = RunReport::new(&session.log, &outcome);
     let failure = failure(config, &session.outcome);
+    let named = session.unreached.iter().filter_map(|axis| config.axes.get(*axis));
+    let unreached: Vec<&str> = named.map(|axis| axis.name.as_str()).collect();
+    if !unreached.is_empty() {
+        eprintln!("takt: {}", unreachable(&unreached, &config.master));
+    }
     let (ended, exit) = match session.outcome {
         Outcome::Finished => ("finished", Exit::Done),
         Outcome::Interrupted => ("interrupted", Exit::Interrupted),
@@ -161,7 +168,7 @@ fn report(config: &Config, session: &Session, as_json: bool) -> Exit {
         _ => ("failed", Exit::Stopped),
     };
     if as_json {
-        let printed = Printed { report: &report, ended, failure };
+        let printed = Printed { report: &report, ended, failure, unreached };
         match serde_json::to_string(&printed) {
             Ok(json) => print(&format!("{json}\n")),
             Err(error) => say!("takt: the report cannot be written as JSON: {error}"),
@@ -191,6 +198,22 @@ fn stop_of(session: &Session) -> Option<StopReason> {
         Outcome::Interrupted => session.snapshot.stop,
         _ => None,
     }
+}
+
+/// What a person must know of drives that gave no answer any more.
+fn unreachable(axes: &[&str], master: &Master) -> String {
+    let by_themselves = match master.heartbeat_ns {
+        Some(_) => format!(
+            "each stops by itself {} ms after the last heartbeat that it has heard",
+            master.heartbeat_timeout_ns / 1_000_000
+        ),
+        None => "nothing stops them, since `heartbeat` is off".to_owned(),
+    };
+    format!(
+        "{}: no answer in the end, so it is not known whether they have stopped; {by_themselves}. Look before you come near, \
+         and switch their power off before you repair the bus",
+        axes.join(", ")
+    )
 }
 
 fn failure(config: &Config, outcome: &Outcome) -> Option<String> {

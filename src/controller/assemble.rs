@@ -96,10 +96,11 @@ pub fn engine(config: &Config) -> Result<Engine, AssembleError> {
     });
     let bears_missed_slots = !config.simulation.stops_for_missed_slots
         && config.buses.iter().all(|bus| bus.interface == Interface::Simulated);
-    let heartbeat = config
-        .master
-        .heartbeat_ns
-        .map(|ns| Heartbeat { node: config.master.node, cycles: cycles(ns).max(1) });
+    let heartbeat = config.master.heartbeat_ns.map(|ns| Heartbeat {
+        node: config.master.node,
+        cycles: cycles(ns).max(1),
+        timeout_cycles: cycles(config.master.heartbeat_timeout_ns),
+    });
     Engine::new(EngineParameters {
         period_ns,
         axes,
@@ -142,7 +143,10 @@ fn axis_parameters(
         node: axis.node,
         commands: data.commands.iter().map(command).collect::<Result<_, _>>().map_err(wrong_mapping)?,
         feedback: data.feedback.iter().map(feedback).collect::<Result<_, _>>().map_err(wrong_mapping)?,
-        feedback_since: feedback_since(&data.feedback),
+        feedback_since: match axis.drive {
+            DriveFamily::YzAim if yz_aim::answers_set_points(axis) => FeedbackSince::SetPoint,
+            _ => feedback_since(&data.feedback),
+        },
         unused: data.unused.iter().map(|plan| plan.id).collect(),
         dialect: axis.drive.dialect(),
         controlword_spacing_cycles: u32::try_from(

@@ -51,6 +51,8 @@ pub struct Session {
     pub snapshot: Snapshot,
     /// Where the last move led (rad or m), an axis each; `None` if the program did not finish.
     pub target: Option<Vec<f64>>,
+    /// The axes whose drives could not be reached in the end: see [`Supervisor::unreached`].
+    pub unreached: Vec<usize>,
     /// What came of the real-time set-up.
     pub begun: Begun,
     /// How the loop was; `None` if the thread died.
@@ -208,6 +210,7 @@ pub(super) fn lead(
     Ok(Session {
         snapshot: host.snapshot(),
         target: target.map(<[f64]>::to_vec),
+        unreached: supervisor.unreached().to_vec(),
         outcome,
         begun,
         ended,

@@ -56,6 +56,8 @@ pub struct Supervisor {
     numbers: RequestNumbers,
     interrupt: Option<Interrupt>,
     outcome: Option<Outcome>,
+    /// See [`Supervisor::unreached`].
+    unreached: Vec<usize>,
     deadline_ns: Option<u64>,
     duration_ns: Option<u64>,
     /// Whether somebody else commands the group once it is enabled.
@@ -77,6 +79,7 @@ impl Supervisor {
             numbers: RequestNumbers::default(),
             interrupt: None,
             outcome: None,
+            unreached: Vec::new(),
             deadline_ns: None,
             duration_ns,
             is_serving: false,
@@ -97,6 +100,12 @@ impl Supervisor {
     /// How the run ended; `None` while it goes on.
     pub fn outcome(&self) -> Option<&Outcome> {
         if self.stage == Stage::Done { self.outcome.as_ref() } else { None }
+    }
+
+    /// The axes whose drives gave no answer to the farewell, though they had been brought up: nobody has heard whether they
+    /// have stopped.
+    pub fn unreached(&self) -> &[usize] {
+        &self.unreached
     }
 
     /// What the drives have said of themselves; empty before they are configured.
@@ -325,7 +334,12 @@ impl Supervisor {
 
     fn say_farewell(&mut self, now_ns: u64, elapsed_ns: u64, host: &mut HostSide) {
         self.leave.poll(now_ns, &mut sending_through(host));
-        if self.leave.outcome().is_some() || elapsed_ns > PATIENCE_NS {
+        let left = self.leave.outcome();
+        if left.is_some() || elapsed_ns > PATIENCE_NS {
+            if let (Some(Err(error)), false) = (left, self.facts.is_empty()) {
+                let silent = error.failures.into_iter().filter(|failure| failure.cause.is_silence());
+                self.unreached = silent.map(|failure| failure.axis).collect();
+            }
             self.ask(Request::Sync(false));
             self.ask(Request::Leave);
             self.enter(Stage::Done, now_ns);

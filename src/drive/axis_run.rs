@@ -7,14 +7,14 @@ use takt_rt::frame::{Frame, Id};
 use takt_rt::time::Nanoseconds;
 
 use super::facts::AxisFacts;
-use super::failure::{Answered, Cause};
+use super::failure::Cause;
 use super::step::{Action, Source, Step, When};
 use crate::canopen::dcf::Download;
 use crate::canopen::emcy::Emergency;
 use crate::canopen::nmt::{ErrorControl, NmtState, NmtTarget};
 use crate::canopen::objects::DEVICE_TYPE;
 use crate::canopen::pdo_inquiry::PdoInquiry;
-use crate::canopen::sdo::{Client, SdoError, Timing, Transfer};
+use crate::canopen::sdo::{Client, Timing, Transfer};
 use crate::config::Axis;
 
 /// How long to wait between two readings of an object that is waited for.
@@ -224,15 +224,9 @@ impl AxisRun {
     }
 
     fn fail(&mut self, cause: Cause) {
-        let is_silent = matches!(
-            cause,
-            Cause::Transfer { error: SdoError::NoReply { .. }, .. }
-                | Cause::Inquiry(_)
-                | Cause::StateNotReached { answered: Answered::Nothing, .. }
-                | Cause::Restarted { .. }
-        );
+        let is_lost = cause.is_silence() || matches!(cause, Cause::Restarted { .. });
         self.failure.get_or_insert((self.current, cause));
-        if self.policy == Policy::BestEffort && !is_silent {
+        if self.policy == Policy::BestEffort && !is_lost {
             self.next_step();
         } else {
             self.phase = Phase::Over;

@@ -268,6 +268,16 @@ impl fmt::Display for Cause {
 }
 
 impl Cause {
+    /// Whether the drive gave no answer.
+    pub fn is_silence(&self) -> bool {
+        matches!(
+            self,
+            Self::Transfer { error: SdoError::NoReply { .. }, .. }
+                | Self::Inquiry(_)
+                | Self::StateNotReached { answered: Answered::Nothing, .. }
+        )
+    }
+
     /// What to try, where the cause itself tells more than the step.
     fn advice(&self) -> Option<&'static str> {
         match self {

@@ -193,6 +193,12 @@ fn own_heartbeat_ms(axis: &Axis) -> i64 {
     axis.heartbeat_ns.map_or(0, |period_ns| rounded_up(period_ns, 1_000_000))
 }
 
+/// Whether the drive reports when it is sent a set-point, and only then: TPDO 1, which answers a target in profile position,
+/// may come unasked as well (manual, 5.08.3).
+pub fn answers_set_points(axis: &Axis) -> bool {
+    !answers_sync(axis) && axis.control == Control::Interpolated
+}
+
 /// Whether the drive reports at SYNC. In profile velocity it must: its answer to a command shows no statusword.
 pub fn answers_sync(axis: &Axis) -> bool {
     axis.answers_sync || axis.control == Control::ProfileVelocity

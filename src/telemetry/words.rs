@@ -108,7 +108,7 @@ pub fn stop_cause(stop: &StopReason, machine: &Machine) -> String {
         }
         // At least one may always be missing: this is not about missing ones.
         Rule::MissedFeedback if limit == 0.0 => {
-            format!("the drive of {axis} answers every SYNC {} late", cycles(value))
+            format!("the drive of {axis} always answers {} late", cycles(value))
         }
         Rule::MissedFeedback => {
             format!("{axis} has not reported in time for {} (allowed: {limit:.0})", cycles(value))
@@ -305,7 +305,7 @@ mod tests {
                 3.0,
                 "slide has not reported in time for 4 cycles (allowed: 3)",
             ),
-            (Rule::MissedFeedback, Some(1), 2.0, 0.0, "the drive of slide answers every SYNC 2 cycles late"),
+            (Rule::MissedFeedback, Some(1), 2.0, 0.0, "the drive of slide always answers 2 cycles late"),
             (Rule::DriveFault, Some(0), 0x730F.into(), 0.0, "the drive of shoulder reports fault 0x730F"),
             (
                 Rule::DriveDisabled,

@@ -1,9 +1,11 @@
-//! Drives that always answer SYNC whole cycles late: each answer looks like one to the next SYNC.
+//! Drives that always answer whole cycles late, SYNC or set-points: each answer looks like one to the next.
 
 use takt::controller::Outcome;
 use takt_rt::stop::{Phase, Rule, StopCategory};
 
-use crate::arm::{arm, play};
+use takt::config::Config;
+
+use crate::arm::{arm, folder, play};
 
 #[test]
 fn a_drive_that_always_reports_whole_cycles_late_is_not_enabled_and_is_named_with_its_lateness() {
@@ -32,6 +34,47 @@ fn feedback_that_was_lost_or_late_before_the_axes_are_enabled_is_no_late_drive()
         "kind = \"drop\"\nbus = \"base\"\nfunction = \"tpdo\"\nprobability = \"2 %\"",
     ] {
         let played = play(&arm(), &format!("[[fault]]\n{fault}\nwhen = \"start\""));
+        assert_eq!(played.outcome, Some(Outcome::Finished), "{fault}");
+    }
+}
+
+/// The gantry with drives that answer set-points alone.
+fn answering_set_points() -> Config {
+    let mut config = Config::load(&folder().join("gantry-yz-aim.toml")).unwrap();
+    config.program.moves.truncate(1);
+    for axis in &mut config.axes {
+        axis.simulated.power_up_ns = 5_000_000;
+        axis.answers_sync = false;
+    }
+    config
+}
+
+#[test]
+fn a_drive_that_always_answers_set_points_whole_cycles_late_is_not_enabled_and_is_named_with_its_lateness() {
+    for cycles in [1, 2, 5, 20] {
+        let by_us = 2000 * cycles + 100;
+        let late = format!(
+            "[[fault]]\nkind = \"delay\"\naxis = \"y\"\nfunction = \"tpdo\"\nby = \"{by_us} us\"\nwhere = \"bus\"\n\
+             when = \"start\""
+        );
+        let played = play(&answering_set_points(), &late);
+        let Some(Outcome::Stopped(stop)) = played.outcome else { panic!("{cycles}: {:?}", played.outcome) };
+        assert_eq!((stop.rule, stop.axis, stop.category), (Rule::MissedFeedback, Some(1), StopCategory::One));
+        assert_eq!((stop.value, stop.limit, stop.phase), (f64::from(cycles), 0.0, Phase::Enabling));
+        assert!(!played.phases.contains(&Phase::Holding), "{:?}", played.phases);
+    }
+}
+
+#[test]
+fn an_answer_to_a_set_point_that_was_lost_or_late_before_the_axes_are_enabled_is_no_late_drive() {
+    for fault in [
+        "kind = \"drop\"\naxis = \"y\"\nfunction = \"tpdo\"\ncount = 3",
+        "kind = \"drop\"\naxis = \"y\"\nfunction = \"rpdo\"\ncount = 4",
+        "kind = \"delay\"\naxis = \"y\"\nfunction = \"tpdo\"\nby = \"4100 us\"\nwhere = \"bus\"\ncount = 1",
+        "kind = \"delay\"\nbus = \"gantry\"\nfunction = \"tpdo\"\nby = \"300 us\"\nwhere = \"bus\"",
+        "kind = \"drop\"\nbus = \"gantry\"\nfunction = \"tpdo\"\nprobability = \"2 %\"",
+    ] {
+        let played = play(&answering_set_points(), &format!("[[fault]]\n{fault}\nwhen = \"start\""));
         assert_eq!(played.outcome, Some(Outcome::Finished), "{fault}");
     }
 }

@@ -10,4 +10,5 @@ mod lost_heartbeat;
 mod reactions;
 mod rearming;
 mod repeatability;
+mod unreachable;
 mod wrapper;

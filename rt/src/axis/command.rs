@@ -1,6 +1,6 @@
 //! What is sent to the drive of an axis.
 
-use super::{Axis, Cadence, CommandPdo, SETTLED_CYCLES};
+use super::{Axis, Cadence, CommandPdo, FeedbackSince, SETTLED_CYCLES};
 use crate::cia402::{Goal, controlword};
 use crate::control::{ControlLaw, LoopInput};
 use crate::frame::Frame;
@@ -30,6 +30,7 @@ impl Axis {
                 _ => self.is_led_up && self.since_controlword < SETTLED_CYCLES,
             };
         self.sent = [self.delay.due(), self.sent[0], self.sent[1]];
+        self.ask_by_set_point();
 
         let parameters = &self.parameters;
         let law = parameters.law;
@@ -58,6 +59,14 @@ impl Axis {
         self.command.set(law.target_slot(), raw);
         let mode_bits = if is_enabled { self.mode_bits() } else { 0 };
         self.command.set(CommandSlot::Controlword, (word | mode_bits).into());
+    }
+
+    /// The set-point of this cycle asks a drive that answers it, unless it is left out.
+    fn ask_by_set_point(&mut self) {
+        self.is_left_out = core::mem::take(&mut self.is_next_left_out);
+        if self.parameters.feedback_since == FeedbackSince::SetPoint && self.is_position_known {
+            if self.is_left_out { self.punctuality.leave_out() } else { self.punctuality.ask() }
+        }
     }
 
     /// Whether a controlword that leads the drive up may still be under way, whatever the drive shows.
@@ -104,7 +113,11 @@ impl Axis {
     /// The frames of this cycle's command; none while it is not known where the drive is.
     pub fn frames(&self) -> impl Iterator<Item = Frame> {
         let is_due = |command: &CommandPdo| {
-            self.is_position_known && (command.cadence == Cadence::EveryCycle || self.is_controlword_due)
+            self.is_position_known
+                && match command.cadence {
+                    Cadence::EveryCycle => !self.is_left_out,
+                    Cadence::OnControlword => self.is_controlword_due,
+                }
         };
         self.parameters.commands.iter().filter(move |command| is_due(command)).filter_map(|command| {
             let payload = command.pdo.mapping.pack(&self.command);

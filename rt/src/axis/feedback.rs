@@ -45,7 +45,12 @@ impl Axis {
         self.punctuality.leave_out();
     }
 
-    /// SYNCs that the drive has left without an answer, or has not answered yet; 0 for one that is not asked by SYNC.
+    /// The next set-point is left out, which asks a drive that answers them: as [`Axis::leave_out`] for one that answers SYNC.
+    pub fn leave_out_set_point(&mut self) {
+        self.is_next_left_out = true;
+    }
+
+    /// What asks the drive, SYNCs or set-points, and has had no answer, or none yet; 0 for one that reports when it likes.
     pub fn unanswered(&self) -> u16 {
         self.punctuality.unanswered()
     }
@@ -55,7 +60,7 @@ impl Axis {
         self.punctuality.late_cycles()
     }
 
-    /// Whether only a SYNC that is left out can tell if the drive reports in time.
+    /// Whether only a SYNC or a set-point that is left out can tell if the drive reports in time.
     pub fn is_doubtful(&self) -> bool {
         self.punctuality.is_doubtful()
     }
@@ -120,7 +125,7 @@ impl Axis {
         // its report, not before it. Whoever may be either has had the longer time, and is believed to be no faster.
         let longest_s = match self.parameters.feedback_since {
             FeedbackSince::Sync => span_s,
-            FeedbackSince::CommandPhase => span_s.max(self.last_span_s),
+            FeedbackSince::SetPoint | FeedbackSince::CommandPhase => span_s.max(self.last_span_s),
         };
         self.span_s = 0.0;
         self.last_span_s = span_s;

@@ -92,6 +92,9 @@ pub struct Axis {
     node_watch: NodeWatch,
     duplicate_watch: DuplicateWatch,
     punctuality: Punctuality,
+    /// Whether the next set-point is left out, and whether that of this cycle is.
+    is_next_left_out: bool,
+    is_left_out: bool,
     following_error: f64,
     following_guard: FollowingErrorGuard,
     /// Bits 0 to 3 and 7 of the last controlword.
@@ -146,6 +149,8 @@ impl Axis {
             node_watch: NodeWatch::default(),
             duplicate_watch: DuplicateWatch::default(),
             punctuality: Punctuality::default(),
+            is_next_left_out: false,
+            is_left_out: false,
             following_error: 0.0,
             following_guard,
             base_word: 0,

@@ -53,7 +53,10 @@ pub enum FeedbackSince {
     /// The cycle's SYNC, which the drive answers.
     #[default]
     Sync,
-    /// The command phase of the cycle before: the drive answers set-points, or reports when it likes.
+    /// The command phase of the cycle before, in which the drive was sent the set-point that it answers: the command that
+    /// is sent in every cycle.
+    SetPoint,
+    /// The same, for a drive that reports when it likes.
     CommandPhase,
 }
 

@@ -1,21 +1,21 @@
-//! Whether a drive answers a SYNC before the next one. PDOs carry no number: an answer that is late by a whole cycle looks
-//! like one to the next SYNC. What tells is a SYNC that is left out: a punctual drive is silent in that cycle, one that is
-//! late is so as many cycles later.
+//! Whether a drive answers before it is asked again, be it by SYNC or by set-points. PDOs carry no number: an answer that is
+//! late by a whole cycle looks like one to the next question. What tells is a question that is left out: a punctual drive is
+//! silent in that cycle, one that is late is so as many cycles later.
 
 /// An answer that is later than this is not waited for.
 const LATEST_CYCLES: u16 = 50;
 
-/// Counts a drive's answers against the SYNCs that they belong to. Cycles are those of its bus.
+/// Counts a drive's answers against the questions, SYNCs or set-points, that they belong to. Cycles are those of its bus.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Punctuality {
     unanswered: u16,
-    /// Cycles since the SYNC that was left out, while its silence is waited for.
+    /// Cycles since the question that was left out, while its silence is waited for.
     since_gap: Option<u16>,
     late_cycles: u16,
 }
 
 impl Punctuality {
-    /// Begins anew, with no SYNC on the way.
+    /// Begins anew, with no question on the way.
     pub(super) fn begin(&mut self) {
         *self = Self::default();
     }
@@ -25,12 +25,12 @@ impl Punctuality {
         *self = Self { unanswered: self.unanswered, ..Self::default() };
     }
 
-    /// A SYNC leaves.
+    /// A question leaves.
     pub(super) fn ask(&mut self) {
         self.unanswered = self.unanswered.saturating_add(1);
     }
 
-    /// The SYNC of a cycle is left out.
+    /// The question of a cycle is left out.
     pub(super) fn leave_out(&mut self) {
         self.since_gap = Some(0);
     }
@@ -51,7 +51,7 @@ impl Punctuality {
         cycles > 0 || has_answer
     }
 
-    /// SYNCs that have had no answer, or none yet.
+    /// Questions that have had no answer, or none yet.
     pub(super) const fn unanswered(&self) -> u16 {
         self.unanswered
     }
@@ -61,12 +61,12 @@ impl Punctuality {
         self.late_cycles
     }
 
-    /// Whether every SYNC has been answered in its own cycle.
+    /// Whether every question has been answered in its own cycle.
     pub(super) const fn is_punctual(&self) -> bool {
         self.unanswered == 0 && self.since_gap.is_none()
     }
 
-    /// Whether nothing but a SYNC that is left out can tell.
+    /// Whether nothing but a question that is left out can tell.
     pub(super) const fn is_doubtful(&self) -> bool {
         self.unanswered > 0 && self.since_gap.is_none() && self.late_cycles == 0
     }
@@ -76,7 +76,7 @@ impl Punctuality {
 mod tests {
     use super::*;
 
-    /// A drive that answers so many cycles late is asked, and one SYNC is left out.
+    /// A drive that answers so many cycles late is asked, and one question is left out.
     fn found(late: u16) -> Punctuality {
         let mut punctuality = Punctuality::default();
         for cycle in 0..200 {

@@ -24,12 +24,22 @@ impl Engine {
             Phase::Disabling => {
                 self.come_to_rest();
                 let is_on_way = !self.motion.is_finished();
-                // A drive that has fallen silent never shows that it has obeyed; it is not waited for without end.
+                // A drive that does not show that it has obeyed is not waited for without end.
                 let is_patient = is_on_way || self.phase_cycles <= self.enable_timeout_cycles;
+                // One that says nothing has either heard what it was told, or has missed the heartbeats for so long that it has
+                // stopped by itself. To one that hears SDO alone it is told by SDO.
+                let has_stopped_by_itself = |axis: &Axis| {
+                    let bus = self.buses.get(usize::from(axis.parameters().bus));
+                    let silent_cycles = u32::from(axis.feedback_age()) * bus.map_or(1, |bus| bus.divider);
+                    let is_over = self.heartbeat.is_some_and(|beat| silent_cycles > beat.timeout_cycles);
+                    is_over && !is_on_way && !axis.is_deaf()
+                };
                 // What is told to one that is believed to follow goes on to rest, though it may have said otherwise by SDO; and
                 // one that shows no torque yet may be about to have it.
                 let is_waited_for = |axis: &Axis| {
-                    axis.has_torque() || axis.is_led_up() || is_on_way && axis.drive_state().has_torque()
+                    let may_have_torque =
+                        axis.has_torque() || axis.is_led_up() || is_on_way && axis.drive_state().has_torque();
+                    may_have_torque && !has_stopped_by_itself(axis)
                 };
                 if !(is_patient && self.axes.iter().any(is_waited_for)) {
                     self.motion.cancel();

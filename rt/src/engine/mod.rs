@@ -267,7 +267,7 @@ impl Engine {
             let has_cycle = has_cycle_of(&self.buses, axis, slot);
             if has_cycle {
                 axis.begin_cycle(elapsed_s);
-                if axis.parameters().feedback_since == FeedbackSince::CommandPhase {
+                if axis.parameters().feedback_since != FeedbackSince::Sync {
                     axis.expect_feedback(now_ns);
                 }
             } else {

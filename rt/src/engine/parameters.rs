@@ -31,6 +31,8 @@ pub struct Heartbeat {
     pub node: u8,
     /// Cycles from one to the next.
     pub cycles: u32,
+    /// Cycles without one after which the drives stop by themselves.
+    pub timeout_cycles: u32,
 }
 
 /// Everything about the group that does not change while it runs.

@@ -35,20 +35,23 @@ impl Engine {
             match axis.parameters().feedback_since {
                 FeedbackSince::Sync if is_left_out => axis.leave_out(now_ns),
                 FeedbackSince::Sync => axis.ask(now_ns),
-                FeedbackSince::CommandPhase => {}
+                FeedbackSince::SetPoint | FeedbackSince::CommandPhase => {}
             }
         }
         (!is_left_out).then(|| Frame::of(parameters.sync_id, []))
     }
 
-    /// Leaves out a SYNC of the buses on which a drive has not answered every one in its own cycle: before the drives are
-    /// led up, that disturbs nothing.
+    /// Leaves out what asks a drive that has not answered every time in its own cycle, a SYNC of its bus or a set-point: before
+    /// the drives are led up, that disturbs nothing.
     pub(super) fn look_for_late_drives(&mut self) {
         if !self.phase_cycles.is_multiple_of(LOOK_AGAIN_CYCLES) {
             return;
         }
-        for axis in self.axes.iter().filter(|axis| axis.is_doubtful()) {
-            self.left_out.insert(axis.parameters().bus.into());
+        for axis in self.axes.iter_mut().filter(|axis| axis.is_doubtful()) {
+            match axis.parameters().feedback_since {
+                FeedbackSince::SetPoint => axis.leave_out_set_point(),
+                _ => self.left_out.insert(axis.parameters().bus.into()),
+            }
         }
     }
 

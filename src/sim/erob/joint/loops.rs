@@ -1,0 +1,95 @@
+//! The control loops and the joint that they drive, step by step.
+
+use takt_rt::time::{NANOSECONDS_PER_SECOND, Nanoseconds};
+
+use super::ErobJoint;
+use crate::sim::erob::dictionary::at;
+use crate::sim::erob::errors::Error;
+use crate::sim::erob::motion::{Actual, Demand};
+
+/// The control loops and the plant run at 8 kHz.
+const STEP_NS: Nanoseconds = 125_000;
+
+impl ErobJoint {
+    /// Runs the loops on their grid up to `now_ns`.
+    pub(super) fn run_loops(&mut self, now_ns: Nanoseconds) {
+        while self.stepped_ns + STEP_NS <= now_ns {
+            self.step(STEP_NS);
+        }
+    }
+
+    /// Runs the loops up to exactly `now_ns` and starts their grid anew there: the lock to SYNC.
+    pub(super) fn lock_loops(&mut self, now_ns: Nanoseconds) {
+        self.run_loops(now_ns);
+        if now_ns > self.stepped_ns {
+            self.step(now_ns - self.stepped_ns);
+        }
+    }
+
+    fn step(&mut self, duration_ns: Nanoseconds) {
+        let duration_s = duration_ns as f64 / NANOSECONDS_PER_SECOND as f64;
+        self.stepped_ns += duration_ns;
+        self.evaluate(self.stepped_ns);
+        let is_driven = self.device.state().has_torque();
+        if is_driven {
+            self.drive(duration_s);
+        } else {
+            self.torque = 0.0;
+        }
+        if self.defects.is_joint_blocked {
+            self.joint.halt();
+        } else {
+            let is_braked = self.is_braked();
+            self.joint.step(duration_s, self.torque * self.direction(), is_braked);
+        }
+        let actual = self.actual();
+        if is_driven {
+            self.check_following_error(actual);
+        } else {
+            self.motion.follow(actual);
+        }
+        let word = self.device.controlword();
+        let bits = self.motion.status_bits(actual, word, &self.dictionary, duration_s);
+        self.dictionary.set(at::STATUSWORD, self.device.statusword(bits).into());
+    }
+
+    /// Set-point, loops, torque of one step.
+    fn drive(&mut self, duration_s: f64) {
+        let actual = self.actual();
+        let velocity = self.joint.velocity() * self.direction();
+        let demand = match self.device.stop() {
+            Some(stop) => {
+                let (demand, is_at_rest) = self.motion.step_stop(stop.deceleration, duration_s);
+                if is_at_rest {
+                    self.device.stopped();
+                }
+                demand
+            }
+            None => self.motion.step(self.device.controlword(), actual, &self.dictionary, duration_s),
+        };
+        let unit = 1.0 / self.parameters.encoder.counts_per_unit.abs();
+        let per_mille = self.parameters.rated_torque / 1000.0;
+        self.torque = match demand {
+            Demand::Position { position, velocity: forward, torque } => {
+                let error = (position - actual.position) * unit;
+                self.servo.position(error, forward * unit, velocity, torque * per_mille, duration_s)
+            }
+            Demand::Velocity { velocity: wanted, torque } => {
+                self.servo.velocity(wanted * unit, velocity, torque * per_mille, duration_s)
+            }
+            Demand::Torque(torque) => self.servo.torque(torque * per_mille, velocity),
+        };
+        if !self.device.state().has_torque() {
+            self.torque = 0.0;
+        }
+    }
+
+    fn check_following_error(&mut self, actual: Actual) {
+        let window = self.dictionary.signed_real(at::FOLLOWING_ERROR_WINDOW);
+        let error = self.motion.position() - actual.position;
+        let is_watched = window >= 0.0 && self.motion.follows_position() && self.device.stop().is_none();
+        if is_watched && error.abs() > window {
+            self.fail(Error::PositionLost);
+        }
+    }
+}
