@@ -106,7 +106,7 @@ pub fn run(arguments: Arguments) -> Exit {
     tell();
     bar.finish_and_clear();
     match session {
-        Ok(session) => report(&config, &session, arguments.json),
+        Ok(session) => report(&session, arguments.json),
         Err(error) => refuse(&error),
     }
 }
@@ -142,7 +142,7 @@ fn refuse(error: &SessionError) -> Exit {
     Exit::RealtimeRefused
 }
 
-fn report(config: &Config, session: &Session, as_json: bool) -> Exit {
+fn report(session: &Session, as_json: bool) -> Exit {
     let faults = session.ended.map_or(0, |ended| ended.page_faults.minor + ended.page_faults.major);
     let spin_guard_ns = session.ended.map_or(0, |ended| ended.spin_guard_ns);
     let outcome = RunOutcome {
@@ -153,7 +153,7 @@ fn report(config: &Config, session: &Session, as_json: bool) -> Exit {
         stop: stop_of(session),
     };
     let report = RunReport::new(&session.log, &outcome);
-    let failure = failure(config, &session.outcome);
+    let failure = failure(&session.outcome, &session.log.machine);
     let (ended, exit) = match session.outcome {
         Outcome::Finished => ("finished", Exit::Done),
         Outcome::Interrupted => ("interrupted", Exit::Interrupted),
@@ -193,34 +193,10 @@ fn stop_of(session: &Session) -> Option<StopReason> {
     }
 }
 
-fn failure(config: &Config, outcome: &Outcome) -> Option<String> {
-    let name = |axis: usize| config.axes.get(axis).map_or("?", |axis| axis.name.as_str());
-    match outcome {
-        Outcome::Finished | Outcome::Interrupted | Outcome::Stopped(_) => None,
-        Outcome::BringUpFailed(error) => Some(error.to_string()),
-        Outcome::FaultPersists { axis, code } => Some(format!(
-            "{}: the drive is in a fault ({code:#06x}) that a fault reset does not clear",
-            name(*axis)
-        )),
-        Outcome::NotHeard { axis } => Some(format!(
-            "{}: the drive is operational but sends no feedback; is another master changing its PDOs?",
-            name(*axis)
-        )),
-        Outcome::MoveRefused { number, refusal } => {
-            let why = refusal.map(|refusal| words::refusal(&refusal, &Machine::of(config)));
-            let why = why.unwrap_or_else(|| "why is no longer known".to_owned());
-            Some(format!("move {number} of the program could not be begun: {why}"))
-        }
-        Outcome::CallbackPanicked { message } => {
-            Some(format!("a defect of takt (please report it) ended the run in a controlled stop: {message}"))
-        }
-        Outcome::Stuck { phase } => {
-            Some(format!("the group did not get any further while it was {}", words::phase(*phase)))
-        }
-        Outcome::ThreadDied => Some(
-            "the real-time thread ended by itself; this is a defect of takt, please report it".to_owned(),
-        ),
-    }
+/// What a report does not say by itself.
+fn failure(outcome: &Outcome, machine: &Machine) -> Option<String> {
+    let is_reported = matches!(outcome, Outcome::Finished | Outcome::Interrupted | Outcome::Stopped(_));
+    (!is_reported).then(|| outcome.words(machine))
 }
 
 /// Ctrl-C and SIGTERM. The first asks for a controlled stop, the second for an immediate one.
