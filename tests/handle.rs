@@ -86,7 +86,15 @@ fn after_a_stop_nothing_moves_before_the_fault_is_reset_and_whoever_asks_is_told
     let motion = joint.move_to(&[0.2]).unwrap();
     assert!(matches!(joint.reset_faults(), Err(CommandError::Refused(_))), "it moves");
     assert_eq!(joint.wait(motion, PATIENCE), Ok(()));
+    let slowly = MoveOptions { velocity_scale: 0.02, ..MoveOptions::default() };
+    let motion = joint.move_with(&[-0.2], slowly).unwrap();
+    assert!(joint.wait_for(Phase::Moving, PATIENCE));
     joint.stop(StopCategory::One).unwrap();
+    let stopped = joint.wait(motion, PATIENCE).unwrap_err();
+    assert_eq!(
+        stopped.to_string(),
+        "the group has stopped: a stop was asked for while moving; category 1: decelerated, then power removed"
+    );
     assert!(joint.wait_for(Phase::Disabled, PATIENCE));
     joint.enable().unwrap();
     assert!(joint.wait_for(Phase::Holding, PATIENCE));
@@ -127,7 +135,13 @@ fn drives_that_cannot_be_brought_up_are_named() {
     let mut config = Config::load(&path).unwrap();
     config.telemetry.is_recorded = false;
     config.axes[0].identity.vendor = Some(0x1234);
-    match Controller::start(config, SessionOptions::default()).err() {
+    let failure = Controller::start(config, SessionOptions::default()).err();
+    let said = failure.as_ref().map(ToString::to_string).unwrap_or_default();
+    assert!(
+        said.starts_with("the drives could not be enabled: axis `joint` (node 1 on bus `can`)"),
+        "{said}"
+    );
+    match failure {
         Some(StartFailure::NotEnabled(session)) => {
             assert!(matches!(session.outcome, Outcome::BringUpFailed(_)), "{:?}", session.outcome);
         }

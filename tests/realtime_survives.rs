@@ -132,8 +132,8 @@ fn a_client_that_floods_the_queue_and_the_stream_does_not_keep_the_program_from_
         |host| {
             for _ in 0..100 {
                 host.stream(&command);
-                // What the group accepts at any time, and changes nothing in this mode.
-                if host.request(Request::RatedTorque { axis: 0, torque: 87.0 }).is_err() {
+                // What the group grants at any time, and what is so already.
+                if host.request(Request::Sync(true)).is_err() {
                     refused.set(refused.get() + 1);
                 }
             }

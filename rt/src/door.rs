@@ -61,7 +61,7 @@ pub enum Request {
         /// ns
         at_zero_ns: u64,
     },
-    /// Use what the drive has reported about itself.
+    /// Use what the drive has reported about itself. Refused while any drive may have torque.
     RatedTorque {
         /// The axis.
         axis: u8,

@@ -150,8 +150,7 @@ fn what_cannot_be_done_is_refused_and_changes_nothing() {
         (profile(9, ProfileTarget::Velocity(0.1)), Objection::UnknownAxis, None, 9.0, 3.0),
         (Request::Enable, Objection::Phase, None, 0.0, 0.0),
         (Request::Activate, Objection::Phase, None, 0.0, 0.0),
-        (Request::RatedTorque { axis: 1, torque: -1.0 }, Objection::RatedTorque, Some(1), -1.0, 0.0),
-        (Request::RatedTorque { axis: 200, torque: 1.0 }, Objection::UnknownAxis, None, 200.0, 3.0),
+        (Request::RatedTorque { axis: 1, torque: 50.0 }, Objection::Phase, None, 0.0, 0.0),
         (Request::Position { axis: 3, counts: 1 }, Objection::UnknownAxis, None, 3.0, 3.0),
         (Request::TimeOfDay { at_zero_ns: 1 }, Objection::NoTime, None, 0.0, 0.0),
     ];
@@ -177,6 +176,28 @@ fn at_speed_of_half(good: Move) -> Request {
 
 fn profile(axis: u8, target: ProfileTarget) -> Request {
     Request::SetProfileTarget(ProfileMove { id: 9, axis, target, valid_until_ns: u64::MAX })
+}
+
+#[test]
+fn a_rated_torque_is_a_positive_one_of_an_axis_that_is_there() {
+    let mut rig = Rig::new(3);
+    for (axis, torque, objection) in [
+        (1, 50.0, None),
+        (1, -1.0, Some(Objection::RatedTorque)),
+        (1, f64::NAN, Some(Objection::RatedTorque)),
+        (200, 1.0, Some(Objection::UnknownAxis)),
+    ] {
+        rig.request(Request::RatedTorque { axis, torque });
+        let answer = rig.door.snapshot.answers.of(RequestId(rig.door.taken));
+        let told = match answer {
+            Answer::Refused(Some(refusal)) => Some(refusal.objection),
+            answer => {
+                assert_eq!(answer, Answer::Granted);
+                None
+            }
+        };
+        assert_eq!(told, objection, "{torque}");
+    }
 }
 
 #[test]

@@ -155,12 +155,12 @@ fn report(config: &Config, session: &Session, as_json: bool) -> Exit {
         stop: stop_of(session),
     };
     let report = RunReport::new(&session.log, &outcome);
-    let failure = failure(config, &session.outcome);
     let named = session.unreached.iter().filter_map(|axis| config.axes.get(*axis));
     let unreached: Vec<&str> = named.map(|axis| axis.name.as_str()).collect();
     if !unreached.is_empty() {
-        eprintln!("takt: {}", unreachable(&unreached, &config.master));
+        say!("takt: {}", unreachable(&unreached, &config.master));
     }
+    let failure = failure(&session.outcome, &session.log.machine);
     let (ended, exit) = match session.outcome {
         Outcome::Finished => ("finished", Exit::Done),
         Outcome::Interrupted => ("interrupted", Exit::Interrupted),
@@ -216,34 +216,10 @@ fn unreachable(axes: &[&str], master: &Master) -> String {
     )
 }
 
-fn failure(config: &Config, outcome: &Outcome) -> Option<String> {
-    let name = |axis: usize| config.axes.get(axis).map_or("?", |axis| axis.name.as_str());
-    match outcome {
-        Outcome::Finished | Outcome::Interrupted | Outcome::Stopped(_) => None,
-        Outcome::BringUpFailed(error) => Some(error.to_string()),
-        Outcome::FaultPersists { axis, code } => Some(format!(
-            "{}: the drive is in a fault ({code:#06x}) that a fault reset does not clear",
-            name(*axis)
-        )),
-        Outcome::NotHeard { axis } => Some(format!(
-            "{}: the drive is operational but sends no feedback; is another master changing its PDOs?",
-            name(*axis)
-        )),
-        Outcome::MoveRefused { number, refusal } => {
-            let why = refusal.map(|refusal| words::refusal(&refusal, &Machine::of(config)));
-            let why = why.unwrap_or_else(|| "why is no longer known".to_owned());
-            Some(format!("move {number} of the program could not be begun: {why}"))
-        }
-        Outcome::CallbackPanicked { message } => {
-            Some(format!("a defect of takt (please report it) ended the run in a controlled stop: {message}"))
-        }
-        Outcome::Stuck { phase } => {
-            Some(format!("the group did not get any further while it was {}", words::phase(*phase)))
-        }
-        Outcome::ThreadDied => Some(
-            "the real-time thread ended by itself; this is a defect of takt, please report it".to_owned(),
-        ),
-    }
+/// What a report does not say by itself.
+fn failure(outcome: &Outcome, machine: &Machine) -> Option<String> {
+    let is_reported = matches!(outcome, Outcome::Finished | Outcome::Interrupted | Outcome::Stopped(_));
+    (!is_reported).then(|| outcome.words(machine))
 }
 
 /// Ctrl-C and SIGTERM. The first asks for a controlled stop, the second for an immediate one.

@@ -13,7 +13,9 @@ mod supervisor;
 mod time_of_day;
 mod virtual_time;
 
-pub use handle::{CommandError, Controller, Motion, MotionError, MoveOptions, Refused, StartFailure};
+pub use handle::{
+    CommandError, Controller, Motion, MotionError, MoveOptions, Refused, StartFailure, Stopped,
+};
 pub use outcome::{Interrupt, Outcome, Progress};
 pub use program::{ProgramRunner, Step};
 pub use supervisor::Supervisor;

@@ -4,6 +4,7 @@ use takt_rt::refusal::Refusal;
 use takt_rt::stop::{Phase, StopReason};
 
 use crate::drive::BringUpError;
+use crate::telemetry::{Machine, words};
 
 /// How a run ended.
 #[derive(Clone, Debug, PartialEq)]
@@ -47,6 +48,41 @@ pub enum Outcome {
         /// What it was doing.
         phase: Phase,
     },
+}
+
+impl Outcome {
+    /// It in words, with the names of the axes.
+    pub fn words(&self, machine: &Machine) -> String {
+        let name = |axis: usize| u8::try_from(axis).map_or("?".to_owned(), |axis| machine.axis_name(axis));
+        match self {
+            Self::Finished => "the run is over".to_owned(),
+            Self::Interrupted => "the run was interrupted".to_owned(),
+            Self::Stopped(stop) => words::stop(stop, machine),
+            Self::BringUpFailed(error) => error.to_string(),
+            Self::FaultPersists { axis, code } => {
+                let axis = name(*axis);
+                format!("{axis}: the drive is in a fault ({code:#06x}) that a fault reset does not clear")
+            }
+            Self::NotHeard { axis } => format!(
+                "{}: the drive is operational but sends no feedback; is another master changing its PDOs?",
+                name(*axis)
+            ),
+            Self::MoveRefused { number, refusal } => {
+                let why = refusal.map(|refusal| words::refusal(&refusal, machine));
+                let why = why.unwrap_or_else(|| "why is no longer known".to_owned());
+                format!("move {number} of the program could not be begun: {why}")
+            }
+            Self::CallbackPanicked { message } => {
+                format!("a defect of takt (please report it) ended the run in a controlled stop: {message}")
+            }
+            Self::Stuck { phase } => {
+                format!("the group did not get any further while it was {}", words::phase(*phase))
+            }
+            Self::ThreadDied => {
+                "the real-time thread ended by itself; this is a defect of takt, please report it".to_owned()
+            }
+        }
+    }
 }
 
 /// Who asks a run to end before its program does.

@@ -47,6 +47,8 @@ impl Engine {
                 self.time.as_mut().ok_or(Objection::NoTime)?.set(*at_zero_ns);
             }
             Request::RatedTorque { axis, torque } => {
+                // What is commanded in per mille of it would leap.
+                self.require_phase(&[Phase::Passive, Phase::Disabled])?;
                 if !self.axis_mut(*axis)?.set_rated_torque(*torque) {
                     return Err(Obstacle::from(Objection::RatedTorque)
                         .of_axis((*axis).into())

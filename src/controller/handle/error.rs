@@ -13,7 +13,7 @@ pub enum StartFailure {
     #[error(transparent)]
     Session(#[from] SessionError),
     /// The drives could not be brought up or enabled; what is left of the attempt.
-    #[error("the drives could not be enabled: {:?}", .0.outcome)]
+    #[error("the drives could not be enabled: {}", .0.outcome.words(&.0.log.machine))]
     NotEnabled(Box<Session>),
     /// The thread that leads the controller has died, which only a defect of takt can bring about.
     #[error("the thread that leads the controller has died")]
@@ -35,6 +35,21 @@ impl Refused {
             || "the request was refused, as were so many since that why is no longer known".to_owned();
         let words = refusal.map_or_else(forgotten, |refusal| words::refusal(&refusal, machine));
         Self { refusal, words }
+    }
+}
+
+/// The group has stopped.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("the group has stopped: {words}")]
+pub struct Stopped {
+    /// Why.
+    pub reason: StopReason,
+    words: String,
+}
+
+impl Stopped {
+    pub(super) fn new(reason: StopReason, machine: &Machine) -> Self {
+        Self { reason, words: words::stop(&reason, machine) }
     }
 }
 
@@ -101,8 +116,8 @@ pub enum CommandError {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MotionError {
     /// The group has stopped.
-    #[error("the group has stopped: {0:?}")]
-    Stopped(StopReason),
+    #[error(transparent)]
+    Stopped(#[from] Stopped),
     /// The real-time thread has refused it.
     #[error(transparent)]
     Refused(#[from] Refused),

@@ -46,7 +46,7 @@ use waiting_requests::REQUESTS_AT_MOST;
 
 pub(super) use waiting_requests::WaitingRequests;
 
-pub use error::{CommandError, MotionError, Refused, StartFailure};
+pub use error::{CommandError, MotionError, Refused, StartFailure, Stopped};
 
 /// Between two looks at the state by whoever waits.
 const LOOK: Duration = Duration::from_millis(1);
@@ -277,7 +277,7 @@ impl Controller {
                 return Ok(());
             }
             if let Some(reason) = state.stop.filter(|reason| reason.slot > motion.slot) {
-                return Err(MotionError::Stopped(reason));
+                return Err(Stopped::new(reason, &self.machine).into());
             }
             if let Answer::Refused(refusal) = state.answers.of(motion.request) {
                 return Err(Refused::new(refusal, &self.machine).into());
