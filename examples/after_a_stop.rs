@@ -17,7 +17,6 @@ use takt::config::{Axis, Config};
 use takt::controller::session::SessionOptions;
 use takt::controller::{Controller, MotionError};
 use takt::faults::{Rehearsal, Scenario};
-use takt::telemetry::{Machine, words};
 use takt_rt::stop::Phase;
 
 /// A bus may be away for some time, and a drive needs some to be well again.
@@ -34,7 +33,6 @@ fn main() -> miette::Result<()> {
         Some(path) => Some(Arc::new(Rehearsal::new(Scenario::load(Path::new(&path), &config)?))),
         None => None,
     };
-    let machine = Machine::of(&config);
     let mut arm =
         Controller::start(config.clone(), SessionOptions { rehearsal, ..SessionOptions::default() })
             .into_diagnostic()?;
@@ -45,9 +43,9 @@ fn main() -> miette::Result<()> {
     while begun.elapsed().as_secs_f64() < seconds {
         match to_and_fro(&mut arm, &there, &back) {
             Ok(()) => {}
-            Err(MotionError::Stopped(reason)) => {
+            Err(MotionError::Stopped(stopped)) => {
                 stops += 1;
-                say(words::stop(&reason, &machine));
+                say(stopped.to_string());
                 arm = if is_enabled_again(&mut arm) { arm } else { brought_up_again(arm, &config)? };
                 say("the axes are enabled again".to_owned());
             }
