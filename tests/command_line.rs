@@ -178,7 +178,7 @@ fn a_bus_that_cannot_carry_its_traffic_is_refused_with_the_sums() {
     let output = place.run_to_end(&[]);
     assert_eq!(output.status.code(), Some(2));
     let errors = errors(&output);
-    assert!(errors.contains("base") && errors.contains("1435"), "{errors}");
+    assert!(errors.contains("base") && errors.contains("1495"), "{errors}");
 }
 
 #[test]

@@ -168,22 +168,22 @@ fn the_command_phase_is_a_fraction_or_a_time() {
 #[test]
 fn an_automatic_command_phase_is_resolved_when_the_file_is_read() {
     let auto = with("[cycle]\ncommand_phase = \"auto\"");
-    // SYNC, 20 µs, feedback: 190 µs; set-points and heartbeat: 180 µs; no more than 100 µs for a SYNC that is late.
-    assert_eq!(auto.cycle.command_phase_ns, 290_000);
+    // SYNC, 20 µs, feedback: 200 µs; set-points and heartbeat: 180 µs; no more than 100 µs for a SYNC that is late.
+    assert_eq!(auto.cycle.command_phase_ns, 300_000);
     let arm = fs::read_to_string(config("arm6-erob.toml")).unwrap();
     let arm = parse(&arm.replace("command_phase = 0.5", "command_phase = \"auto\""));
-    // From 420 to 590 µs: 75 µs for either wake-up, 20 µs for computing.
-    assert_eq!(arm.cycle.command_phase_ns, 495_000);
+    // From 450 to 590 µs: 60 µs for either wake-up, 20 µs for computing.
+    assert_eq!(arm.cycle.command_phase_ns, 510_000);
     for bus in takt::bus::schedule::verify(&arm).unwrap() {
         assert!(!bus.is_narrow());
-        assert_eq!((bus.slot.sync_reserve_ns, bus.slot.set_points_reserve_ns), (75_000, 95_000));
+        assert_eq!((bus.slot.sync_reserve_ns, bus.slot.set_points_reserve_ns), (60_000, 80_000));
     }
 }
 
 #[test]
 fn an_automatic_command_phase_suits_the_fullest_bus_in_every_cycle() {
     let text = fs::read_to_string(config("axes32-erob.toml")).unwrap();
-    for (period, expected_ns) in [("1 ms", 495_000), ("2 ms", 620_000), ("4 ms", 820_000)] {
+    for (period, expected_ns) in [("1 ms", 510_000), ("2 ms", 650_000), ("4 ms", 850_000)] {
         let cycle = format!("[cycle]\nperiod = {period:?}\ncommand_phase = \"auto\"\n[telemetry]");
         let config = parse(&text.replace("[telemetry]", &cycle));
         assert_eq!(config.cycle.command_phase_ns, expected_ns, "{period}");

@@ -40,8 +40,8 @@ fn a_configuration_that_fits_is_shown_with_limits_units_and_buses_and_exit_code_
         "-2.9671   2.9671",
         "83443.027 per rad",
         "199.6",
-        "745 µs = 55 SYNC + 345 feedback + 345 set-points",
-        "420 to 590              fits",
+        "775 µs = 55 SYNC + 375 feedback + 345 set-points",
+        "450 to 590              fits",
         "Every bus carries its traffic in the worst case.",
     ] {
         assert!(text.contains(part), "{part:?} is missing in\n{text}");
@@ -66,7 +66,7 @@ fn buses_that_cannot_carry_their_traffic_end_in_exit_code_2_and_what_would_fit()
     let output = check(&path, &[]);
     let text = standard_output(&output);
     assert_eq!(output.status.code(), Some(2), "{text}");
-    assert!(text.contains("1435 µs = 55 SYNC + 690 feedback + 690 set-points"), "{text}");
+    assert!(text.contains("1495 µs = 55 SYNC + 750 feedback + 690 set-points"), "{text}");
     assert!(text.contains("what would fit: 2 buses: 3 of these axes fit one"), "{text}");
     let output = check(&path, &["--json"]);
     assert_eq!((output.status.code(), &json(&output)["fits"]), (Some(2), &Value::Bool(false)));
@@ -99,8 +99,8 @@ fn an_automatic_command_phase_is_shown_and_explained_where_there_is_none() {
     let auto = arm.replace("command_phase = 0.5", "command_phase = \"auto\"");
     std::fs::write(&path, &auto).unwrap();
     let text = standard_output(&check(&path, &[]));
-    assert!(text.contains("the command phase at 495 µs (as \"auto\" has it)"), "{text}");
-    assert_eq!(json(&check(&path, &["--json"]))["command_phase_ns"], 495_000);
+    assert!(text.contains("the command phase at 510 µs (as \"auto\" has it)"), "{text}");
+    assert_eq!(json(&check(&path, &["--json"]))["command_phase_ns"], 510_000);
 
     std::fs::write(&path, auto.replace("bus = \"wrist\"", "bus = \"base\"")).unwrap();
     let output = check(&path, &["--json"]);
@@ -108,7 +108,7 @@ fn an_automatic_command_phase_is_shown_and_explained_where_there_is_none() {
     let problem = &json(&output)["problems"][0];
     assert_eq!(problem["message"], "no command phase suits every bus");
     let help = problem["help"].as_str().unwrap();
-    assert!(help.contains("765 µs at the earliest") && help.contains("245 µs at the latest"), "{help}");
+    assert!(help.contains("825 µs at the earliest") && help.contains("245 µs at the latest"), "{help}");
     assert!(help.contains("2 buses: 3 of these axes fit one"), "{help}");
 }
 

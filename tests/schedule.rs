@@ -6,14 +6,16 @@ use std::path::{Path, PathBuf};
 use takt::bus::schedule::{self, BusSchedule, MessageKind, Remedy, Shortfall};
 use takt::config::{Config, Feedback};
 
-/// So many eRobs on one bus, with additions to every axis.
+/// So many eRobs on one bus, with additions to every axis. They report statusword and position and no more, unless that says
+/// what else: it is what the field notes reckon with.
 fn erobs(axes: usize, cycle: &str, bus: &str, axis: &str) -> Config {
     let mut text = format!("name = \"erobs\"\n[cycle]\n{cycle}\n[[bus]]\nname = \"bus\"\n{bus}\n");
     for node in 1..=axes {
         let limits = "limits = { position = [-1, 1], velocity = 1, acceleration = 1, torque = 1 }";
         let head =
             format!("[[axis]]\nname = \"a{node}\"\nbus = \"bus\"\nnode = {node}\ndrive = \"erob-canopen\"");
-        let _ = writeln!(text, "{head}\n{limits}\n{axis}");
+        let feedback = if axis.contains("feedback =") { "" } else { "feedback = []" };
+        let _ = writeln!(text, "{head}\n{limits}\n{feedback}\n{axis}");
     }
     Config::parse("erobs.toml", &text).unwrap_or_else(|error| panic!("{:?}", miette::Report::new(error)))
 }

@@ -178,7 +178,8 @@ pub struct Axis {
     pub transmission_type: u8,
     /// Whose mapping of the PDOs counts. Default: the controller's; of a YZ-AIM, which cannot be mapped, the drive's.
     pub mapping: PdoMapping,
-    /// What the drive reports every cycle beside statusword and position. Default: nothing.
+    /// What the drive reports every cycle beside statusword and position. Default: the mode of operation, where the PDOs are
+    /// written.
     pub feedback: Vec<Feedback>,
     /// Whether a YZ-AIM answers SYNC with its position (TPDO2), the default, or set-points alone (TPDO4), which spares
     /// the bus a frame and makes the feedback a cycle older. Other drives always answer SYNC.

@@ -98,7 +98,7 @@ fn axis<'a>(
         check_speed(&section, limits.as_ref(), &counting, travel, quantities);
     }
     let mapping = mapping(&mut section, drive);
-    let feedback = feedback(&mut section, drive);
+    let feedback = feedback(&mut section, drive, mapping);
     let answers_sync = boolean(&mut section, "answers_sync", defaults::ANSWERS_SYNC);
     let transmission_type = transmission_type(&mut section);
     let start_tolerance = section
@@ -288,10 +288,15 @@ fn mapping(section: &mut Section<'_>, drive: Option<DriveFamily>) -> PdoMapping 
     read.unwrap_or(if is_fixed { PdoMapping::AsStored } else { PdoMapping::Written })
 }
 
-fn feedback(section: &mut Section<'_>, drive: Option<DriveFamily>) -> Vec<Feedback> {
+/// A drive whose PDOs are written reports its mode of operation unless another list is given: nothing else tells that
+/// somebody has changed it.
+fn feedback(section: &mut Section<'_>, drive: Option<DriveFamily>, mapping: PdoMapping) -> Vec<Feedback> {
     let choices = Feedback::ALL.map(|feedback| (feedback.word(), feedback));
+    let Some(entry) = section.get("feedback") else {
+        return if mapping == PdoMapping::Written { vec![Feedback::OperationMode] } else { vec![] };
+    };
     let mut feedback = vec![];
-    for entry in section.get("feedback").and_then(|entry| entry.list()).into_iter().flatten() {
+    for entry in entry.list().into_iter().flatten() {
         let Some(object) = entry.choice(&choices) else { continue };
         if drive == Some(DriveFamily::YzAim) {
             let given = entry.text().unwrap_or_default().to_owned();
