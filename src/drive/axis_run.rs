@@ -146,6 +146,9 @@ impl AxisRun {
     pub fn poll(&mut self, now_ns: Nanoseconds, send: &mut impl FnMut(Frame)) {
         while !self.is_over() {
             while let Some(frame) = self.client.poll(now_ns) {
+                if let Some(Action::Reach { command }) = self.action() {
+                    send(command.frame(NmtTarget::Node(self.node)));
+                }
                 send(frame);
             }
             while let Some(frame) = self.inquiry.as_mut().and_then(|inquiry| inquiry.poll(now_ns)) {
@@ -304,6 +307,7 @@ impl AxisRun {
             Action::Read { object, .. } | Action::Await { object, .. } => {
                 Transfer::Upload { object: object.address }
             }
+            Action::Reach { .. } => Transfer::Upload { object: DEVICE_TYPE.address },
             Action::ReadText { object, .. } => Transfer::Upload { object },
             Action::WriteBytes(Download { object, data }) => Transfer::Download { object, data },
             Action::Nmt { .. } => return Ok(()),

@@ -93,6 +93,7 @@ pub(super) fn start(axis: &Axis, timing: &BringUpTiming) -> Vec<Step> {
 /// From operational to pre-operational, without torque, not minding the master's silence.
 pub(super) fn leave(axis: &Axis, timing: &BringUpTiming) -> Vec<Step> {
     let mut list = List::new("farewell", "power-cycle the drive before the next run");
+    list.reach(NmtCommand::EnterPreOperational);
     list.nmt_reported(NmtCommand::EnterPreOperational, NmtState::PreOperational, axis, timing);
     come_to_rest(&mut list, axis, timing);
     list.about("end of heartbeats", "expect a communication fault of the drive; the next bring-up clears it");

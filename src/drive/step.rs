@@ -43,6 +43,9 @@ pub(super) enum Action {
         /// When to command again: the first frame may have come before the node could hear.
         repeat_ns: Nanoseconds,
     },
+    /// Commands a state and asks for the device type, both again and again, until the node answers. It may have been away, and
+    /// a stopped one has no SDO server before it is commanded.
+    Reach { command: NmtCommand },
     /// Reads a number.
     Read {
         object: Object,

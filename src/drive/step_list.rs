@@ -70,6 +70,11 @@ impl List {
         self.push(Action::Nmt { command, awaited, within_ns, repeat_ns });
     }
 
+    /// See [`Action::Reach`].
+    pub fn reach(&mut self, command: NmtCommand) {
+        self.push(Action::Reach { command });
+    }
+
     /// Commands a state that the drive's heartbeat, if it has one, must report.
     pub fn nmt_reported(
         &mut self,

@@ -95,6 +95,7 @@ pub(super) fn start(axis: &Axis, timing: &BringUpTiming) -> Vec<Step> {
 /// From operational to pre-operational, without torque, not minding the master's silence.
 pub(super) fn leave(axis: &Axis, timing: &BringUpTiming) -> Vec<Step> {
     let mut list = List::new("farewell", "power-cycle the drive before the next run");
+    list.reach(NmtCommand::EnterPreOperational);
     list.nmt_reported(NmtCommand::EnterPreOperational, NmtState::PreOperational, axis, timing);
     come_to_rest(&mut list, timing);
     list.about("end of heartbeats", "expect alarm 20 of the drive; it clears at the next bring-up");

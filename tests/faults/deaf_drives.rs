@@ -6,6 +6,7 @@ use takt::bus::port::Port;
 use takt::config::Config;
 use takt::controller::{Interrupt, VirtualRun};
 use takt::faults::Rehearsal;
+use takt::sim::NmtState;
 use takt_rt::stop::Phase;
 
 use crate::arm::{folder, scenario};
@@ -109,6 +110,26 @@ fn a_run_waits_for_a_queue_that_is_full_before_it_leaves_a_drive_that_watches_no
             while run.step() {}
             let state = first_drive(&config, &mut run).state;
             assert!(!state.has_torque(), "{name}, {interrupt:?}: {state:?}");
+        }
+    }
+}
+
+/// It may be away when the run begins to take its leave, and what is told only once is lost.
+#[test]
+fn a_drive_that_comes_back_while_the_run_takes_its_leave_is_left_without_torque_and_pre_operational() {
+    for name in MACHINES {
+        let config = machine(name);
+        for away_ms in [600, 900, 1200, 1500] {
+            let silent = format!(
+                "[[fault]]\nkind = \"silent-node\"\naxis = \"{}\"\nwhen = \"moving\"\nat = \"300 ms\"\nfor = \"{away_ms} ms\"\n",
+                config.axes[0].name
+            );
+            let mut run = played_until_struck(&config, &silent);
+            while run.step() {}
+            assert_eq!(run.supervisor().unreached(), [0usize; 0], "{name}, {away_ms} ms");
+            let drive = first_drive(&config, &mut run);
+            assert!(!drive.state.has_torque(), "{name}, {away_ms} ms: {:?}", drive.state);
+            assert_eq!(drive.nmt, NmtState::PreOperational, "{name}, {away_ms} ms");
         }
     }
 }

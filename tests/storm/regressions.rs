@@ -98,7 +98,7 @@ fn a_stop_in_coordination_leads_no_joint_beyond_its_position_limit() {
 }
 
 /// What each of them has found.
-const FAILED_ONCE: [(u64, &str); 19] = [
+const FAILED_ONCE: [(u64, &str); 21] = [
     (1875, "An event timer that was set before operational woke a YZ-AIM in every nanosecond"),
     (3022, "A YZ-AIM whose communication has been reset watches the controller for 2 s"),
     (823, "A clamped stream expired too near to a position limit for a stop with limited jerk"),
@@ -138,6 +138,14 @@ const FAILED_ONCE: [(u64, &str); 19] = [
     (
         1_012_241,
         "A run that was cut off left while the queue was full, and a drive that watched nobody enabled",
+    ),
+    (
+        5651,
+        "A drive came back when it had been told only once to take no process data, and another master led it up",
+    ),
+    (
+        775,
+        "A stream beyond a position limit, by less than the tolerance, was stopped with more jerk than the limit",
     ),
 ];
 

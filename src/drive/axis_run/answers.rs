@@ -6,6 +6,7 @@ use takt_rt::time::Nanoseconds;
 use super::{AWAIT_PAUSE_NS, AxisRun, Phase, Progress};
 use crate::canopen::dcf::Download;
 use crate::canopen::object::Object;
+use crate::canopen::objects::DEVICE_TYPE;
 use crate::canopen::pdo_inquiry::PdoInquiry;
 use crate::canopen::sdo::{AbortCode, Completed, SdoError, Transfer};
 use crate::drive::failure::{Answered, Cause, Content};
@@ -40,6 +41,13 @@ impl AxisRun {
             (Phase::Transfer { .. }, Some(Action::Read { object, check, keep, is_optional })) => {
                 self.read(object, check, keep, is_optional, outcome)
             }
+            (Phase::Transfer { .. }, Some(Action::Reach { .. })) => match outcome {
+                Ok(_) | Err(SdoError::Aborted(_)) => {
+                    self.next_step();
+                    Ok(())
+                }
+                Err(error) => Err(Cause::Transfer { object: DEVICE_TYPE, access: Access::Read, error }),
+            },
             (Phase::Transfer { .. }, Some(Action::ReadText { object, keep })) => {
                 match outcome {
                     Ok(Completed::Uploaded(uploaded)) => self.facts.keep_text(keep, uploaded.text()),
