@@ -22,6 +22,10 @@ fn cycle(criterion: &mut Criterion) {
             let mut thinking = Thinking::moving(axes);
             bencher.iter(|| black_box(thinking.cycle()));
         });
+        group.bench_function(BenchmarkId::new("streaming", axes), |bencher| {
+            let mut thinking = Thinking::streaming(axes);
+            bencher.iter(|| black_box(thinking.cycle()));
+        });
         group.bench_function(BenchmarkId::new("replanned every cycle", axes), |bencher| {
             let mut thinking = Thinking::moving(axes);
             bencher.iter(|| {

@@ -1,7 +1,7 @@
 //! Runs a fixed number of cycles of the engine, or packs and unpacks PDOs, for counting instructions; see
 //! `benches/instructions`.
 //!
-//! The work is named by the first argument (`cycle-AXES`, `replan-AXES`, `pack`, `unpack`) and repeated as often as the
+//! The work is named by the first argument (`cycle-AXES`, `replan-AXES`, `stream-AXES`, `pack`, `unpack`) and repeated as often as the
 //! second says; the difference between two repetition counts is free of the start-up.
 
 use std::hint::black_box;
@@ -23,6 +23,7 @@ fn main() {
     let Ok(axes) = axes.parse() else { usage() };
     match name {
         "cycle" | "replan" => cycles(axes, name == "replan", repetitions),
+        "stream" => streamed_cycles(axes, repetitions),
         "pack" => pack(repetitions),
         "unpack" => unpack(repetitions),
         _ => usage(),
@@ -30,7 +31,7 @@ fn main() {
 }
 
 fn usage() -> ! {
-    eprintln!("usage: cycle_instructions cycle-AXES|replan-AXES|pack|unpack REPETITIONS");
+    eprintln!("usage: cycle_instructions cycle-AXES|replan-AXES|stream-AXES|pack|unpack REPETITIONS");
     std::process::exit(2);
 }
 
@@ -40,6 +41,13 @@ fn cycles(axes: usize, is_replanned: bool, repetitions: u32) {
         if is_replanned {
             thinking.replan();
         }
+        black_box(thinking.cycle());
+    }
+}
+
+fn streamed_cycles(axes: usize, repetitions: u32) {
+    let mut thinking = Thinking::streaming(axes);
+    for _ in 0..repetitions {
         black_box(thinking.cycle());
     }
 }

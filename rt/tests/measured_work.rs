@@ -30,3 +30,14 @@ fn the_group_that_is_planned_anew_in_every_cycle_keeps_moving() {
     let moving = moving.count();
     assert!(moving > 9_900, "{moving} cycles of 10,000");
 }
+
+#[test]
+fn the_group_that_follows_a_stream_follows_it_for_as_long_as_it_is_measured() {
+    for axes in [1, 6, 32] {
+        let mut thinking = Thinking::streaming(axes);
+        for cycle in 0..10_000 {
+            thinking.cycle();
+            assert!(thinking.is_streaming(), "{axes} axes, in cycle {cycle}");
+        }
+    }
+}
