@@ -1,0 +1,24 @@
+//! What is wrong with the servo or its joint, beyond its alarms.
+
+use crate::sim::defect::{Defect, Unsupported};
+
+/// The lasting defects of one servo.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Defects {
+    /// The joint does not move.
+    pub is_joint_blocked: bool,
+}
+
+impl Defects {
+    /// A lasting defect comes or goes.
+    ///
+    /// # Errors
+    /// [`Unsupported`] for what this servo cannot have.
+    pub fn set(&mut self, defect: Defect, is_present: bool) -> Result<(), Unsupported> {
+        match defect {
+            Defect::BlockedJoint => self.is_joint_blocked = is_present,
+            _ => return Err(Unsupported { defect }),
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,36 @@
+//! What the controller does about what goes wrong with YZ-AIM servos.
+
+use takt::config::Config;
+use takt::controller::Outcome;
+use takt_rt::stop::{Phase, Rule, StopCategory};
+
+use crate::arm::{folder, play};
+
+/// The example with two of its moves and drives that are up at once.
+fn gantry() -> Config {
+    let mut config = Config::load(&folder().join("gantry-yz-aim.toml")).unwrap();
+    config.program.moves.truncate(2);
+    config.axes.iter_mut().for_each(|axis| axis.simulated.power_up_ns = 5_000_000);
+    config
+}
+
+/// What goes wrong with an axis well into the first move, the rule that sees it, and in how many milliseconds at the latest.
+const STOPS: [(&str, Rule, f64); 1] = [
+    // The joint must fall behind first, and the window of the following error be over.
+    ("kind = \"stall\"", Rule::FollowingError, 300.0),
+];
+
+#[test]
+fn every_fault_with_a_rule_stops_the_whole_gantry_in_time_and_says_why() {
+    for (fault, rule, within_ms) in STOPS {
+        let text = format!("[[fault]]\n{fault}\naxis = \"y\"\nwhen = \"moving\"\nat = \"300 ms\"");
+        let played = play(&gantry(), &text);
+        let [stop] = played.stops.as_slice() else { panic!("{fault}: {:?}", played.outcome) };
+        assert_eq!((stop.rule, stop.axis, stop.category), (rule, Some(1), StopCategory::One), "{fault}");
+        assert!(played.detection_ms.is_some_and(|ms| (0.0..=within_ms).contains(&ms)), "{fault}: {played:?}");
+        assert!(played.largest_step <= 1.0 + 1e-6, "{fault}: {} velocity limits", played.largest_step);
+        assert!(played.speed_at_end < 1e-3, "{fault}: {} m/s at the end", played.speed_at_end);
+        assert_eq!(played.phases.last(), Some(&Phase::Disabled), "{fault}: {:?}", played.phases);
+        assert!(matches!(played.outcome, Some(Outcome::Stopped(_))), "{fault}: {:?}", played.outcome);
+    }
+}

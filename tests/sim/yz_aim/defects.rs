@@ -1,0 +1,33 @@
+//! What is wrong with the servo or its joint: how it shows, and what the drive makes of it.
+
+use takt::sim::Defect;
+
+use super::alarms::{speed_rpm, turning};
+use super::{Bench, NODE};
+
+impl Bench {
+    fn afflict(&mut self, defect: Defect) {
+        self.bus.afflict(NODE, defect, true).unwrap();
+    }
+
+    fn mend(&mut self, defect: Defect) {
+        self.bus.afflict(NODE, defect, false).unwrap();
+    }
+}
+
+#[test]
+fn a_blocked_joint_withstands_the_motor_until_that_notices_its_blocked_rotor() {
+    let mut bench = turning();
+    bench.write(0x2618, 0, 2, 602).unwrap();
+    bench.afflict(Defect::BlockedJoint);
+    let before = bench.position();
+    bench.run_ms(1_800);
+    assert_eq!((bench.position(), bench.alarm()), (before, 0));
+    assert!(bench.observe().torque > 1.0);
+    bench.run_ms(700);
+    assert_eq!((bench.position(), bench.alarm()), (before, 0x12));
+    bench.mend(Defect::BlockedJoint);
+    bench.control(0x8F);
+    bench.run_ms(500);
+    assert!((speed_rpm(&mut bench) - 500.0).abs() < 1.0);
+}
