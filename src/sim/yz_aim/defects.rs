@@ -7,6 +7,8 @@ use crate::sim::defect::{Defect, Unsupported};
 pub struct Defects {
     /// The joint does not move.
     pub is_joint_blocked: bool,
+    /// The SDO server is mute.
+    pub is_sdo_silent: bool,
 }
 
 impl Defects {
@@ -17,6 +19,7 @@ impl Defects {
     pub fn set(&mut self, defect: Defect, is_present: bool) -> Result<(), Unsupported> {
         match defect {
             Defect::BlockedJoint => self.is_joint_blocked = is_present,
+            Defect::SilentSdoServer => self.is_sdo_silent = is_present,
             _ => return Err(Unsupported { defect }),
         }
         Ok(())

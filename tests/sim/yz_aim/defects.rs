@@ -31,3 +31,18 @@ fn a_blocked_joint_withstands_the_motor_until_that_notices_its_blocked_rotor() {
     bench.run_ms(500);
     assert!((speed_rpm(&mut bench) - 500.0).abs() < 1.0);
 }
+
+#[test]
+fn a_mute_sdo_server_neither_answers_nor_does_what_it_is_told_and_everything_else_works() {
+    let mut bench = turning();
+    bench.afflict(Defect::SilentSdoServer);
+    let halt = [0x2B, 0x40, 0x60, 0, 0x0F, 0x01, 0, 0];
+    bench.say(0x600 + u32::from(NODE), halt);
+    bench.take(0x705);
+    bench.run_ms(300);
+    assert!(bench.take(0x580 + u32::from(NODE)).is_empty());
+    assert_eq!(bench.take(0x705), [[5]; 3]);
+    assert!((speed_rpm(&mut bench) - 500.0).abs() < 1.0);
+    bench.mend(Defect::SilentSdoServer);
+    assert_eq!(bench.read(0x6040, 0), Ok(0x0F));
+}
