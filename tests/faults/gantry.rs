@@ -15,9 +15,10 @@ fn gantry() -> Config {
 }
 
 /// What goes wrong with an axis well into the first move, the rule that sees it, and in how many milliseconds at the latest.
-const STOPS: [(&str, Rule, f64); 1] = [
+const STOPS: [(&str, Rule, f64); 2] = [
     // The joint must fall behind first, and the window of the following error be over.
     ("kind = \"stall\"", Rule::FollowingError, 300.0),
+    ("kind = \"encoder-jump\"\nby = \"20 mm\"", Rule::ImplausibleFeedback, 5.0),
 ];
 
 #[test]

@@ -12,7 +12,7 @@ pub struct Defects {
 }
 
 impl Defects {
-    /// A lasting defect comes or goes.
+    /// A lasting defect comes or goes; events leave nothing here.
     ///
     /// # Errors
     /// [`Unsupported`] for what this servo cannot have.
@@ -20,6 +20,7 @@ impl Defects {
         match defect {
             Defect::BlockedJoint => self.is_joint_blocked = is_present,
             Defect::SilentSdoServer => self.is_sdo_silent = is_present,
+            Defect::EncoderJump { .. } => {}
             _ => return Err(Unsupported { defect }),
         }
         Ok(())

@@ -3,7 +3,7 @@
 use takt::sim::Defect;
 
 use super::alarms::{speed_rpm, turning};
-use super::{Bench, NODE};
+use super::{Bench, NODE, bench, by_the_manual};
 
 impl Bench {
     fn afflict(&mut self, defect: Defect) {
@@ -45,4 +45,20 @@ fn a_mute_sdo_server_neither_answers_nor_does_what_it_is_told_and_everything_els
     assert!((speed_rpm(&mut bench) - 500.0).abs() < 1.0);
     bench.mend(Defect::SilentSdoServer);
     assert_eq!(bench.read(0x6040, 0), Ok(0x0F));
+}
+
+#[test]
+fn an_encoder_jump_moves_the_counts_at_once_and_the_servo_brings_them_back_to_the_target() {
+    let mut bench = bench(by_the_manual(NODE));
+    bench.control(0x2F);
+    bench.run_ms(100);
+    let (before, position) = (bench.observe(), bench.position());
+    bench.afflict(Defect::EncoderJump { distance: 0.01 });
+    let after = bench.observe();
+    let counts = (0.01 / super::TAU * super::RATIO * 32_768.0).round() as i32;
+    assert_eq!(after.position, before.position);
+    assert_eq!(after.position_counts - before.position_counts, counts);
+    bench.run_ms(500);
+    assert!((bench.position() - position).abs() <= 1, "{} {position}", bench.position());
+    assert!((bench.observe().position - before.position + 0.01).abs() < 1e-4);
 }
