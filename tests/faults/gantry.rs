@@ -15,10 +15,12 @@ fn gantry() -> Config {
 }
 
 /// What goes wrong with an axis well into the first move, the rule that sees it, and in how many milliseconds at the latest.
-const STOPS: [(&str, Rule, f64); 2] = [
+const STOPS: [(&str, Rule, f64); 3] = [
     // The joint must fall behind first, and the window of the following error be over.
     ("kind = \"stall\"", Rule::FollowingError, 300.0),
     ("kind = \"encoder-jump\"\nby = \"20 mm\"", Rule::ImplausibleFeedback, 5.0),
+    // Feedback may be missing for five cycles of 2 ms.
+    ("kind = \"wrong-mapping\"\ncontents = \"short\"", Rule::MissedFeedback, 13.0),
 ];
 
 #[test]

@@ -1,6 +1,8 @@
 //! What is wrong with the servo or its joint, beyond its alarms.
 
-use crate::sim::defect::{Defect, Unsupported};
+use takt_rt::frame::Frame;
+
+use crate::sim::defect::{Defect, Unsupported, shorter};
 
 /// The lasting defects of one servo.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -9,6 +11,7 @@ pub struct Defects {
     pub is_joint_blocked: bool,
     /// The SDO server is mute.
     pub is_sdo_silent: bool,
+    is_feedback_short: bool,
 }
 
 impl Defects {
@@ -20,9 +23,15 @@ impl Defects {
         match defect {
             Defect::BlockedJoint => self.is_joint_blocked = is_present,
             Defect::SilentSdoServer => self.is_sdo_silent = is_present,
+            Defect::ShortFeedback => self.is_feedback_short = is_present,
             Defect::EncoderJump { .. } => {}
             _ => return Err(Unsupported { defect }),
         }
         Ok(())
+    }
+
+    /// A TPDO as it leaves the drive.
+    pub fn sent(&self, frame: Frame) -> Frame {
+        if self.is_feedback_short { shorter(frame) } else { frame }
     }
 }

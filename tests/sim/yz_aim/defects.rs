@@ -62,3 +62,18 @@ fn an_encoder_jump_moves_the_counts_at_once_and_the_servo_brings_them_back_to_th
     assert!((bench.position() - position).abs() <= 1, "{} {position}", bench.position());
     assert!((bench.observe().position - before.position + 0.01).abs() < 1e-4);
 }
+
+#[test]
+fn short_feedback_lacks_the_last_byte_of_every_tpdo_until_it_is_mended() {
+    let mut bench = turning();
+    let answer = |bench: &mut Bench| {
+        bench.say(0x500 + u32::from(NODE), [0; 4]);
+        bench.run_ms(1);
+        bench.take(0x480 + u32::from(NODE)).pop().unwrap()
+    };
+    let whole = answer(&mut bench).len();
+    bench.afflict(Defect::ShortFeedback);
+    assert_eq!((whole, answer(&mut bench).len()), (6, 5));
+    bench.mend(Defect::ShortFeedback);
+    assert_eq!(answer(&mut bench).len(), 6);
+}

@@ -105,7 +105,7 @@ impl YzAimJoint {
             self.process_data.run_events(now_ns, feedback, &self.dictionary);
             while let Some(frame) = self.process_data.next(now_ns, self.node, &self.dictionary) {
                 if is_on_bus {
-                    mailbox.put(frame);
+                    mailbox.put(self.defects.sent(frame));
                 }
             }
         }
