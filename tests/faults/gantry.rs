@@ -15,12 +15,14 @@ fn gantry() -> Config {
 }
 
 /// What goes wrong with an axis well into the first move, the rule that sees it, and in how many milliseconds at the latest.
-const STOPS: [(&str, Rule, f64); 3] = [
+const STOPS: [(&str, Rule, f64); 5] = [
     // The joint must fall behind first, and the window of the following error be over.
     ("kind = \"stall\"", Rule::FollowingError, 300.0),
     ("kind = \"encoder-jump\"\nby = \"20 mm\"", Rule::ImplausibleFeedback, 5.0),
     // Feedback may be missing for five cycles of 2 ms.
     ("kind = \"wrong-mapping\"\ncontents = \"short\"", Rule::MissedFeedback, 13.0),
+    ("kind = \"statusword\"\nset = 0x0008", Rule::DriveFault, 4.0),
+    ("kind = \"statusword\"\nclear = 0x0004", Rule::DriveDisabled, 6.0),
 ];
 
 #[test]

@@ -12,6 +12,8 @@ pub struct Defects {
     /// The SDO server is mute.
     pub is_sdo_silent: bool,
     is_feedback_short: bool,
+    /// The bits that TPDOs show as 1, and those that they show as 0.
+    statusword: Option<(u16, u16)>,
 }
 
 impl Defects {
@@ -24,10 +26,17 @@ impl Defects {
             Defect::BlockedJoint => self.is_joint_blocked = is_present,
             Defect::SilentSdoServer => self.is_sdo_silent = is_present,
             Defect::ShortFeedback => self.is_feedback_short = is_present,
+            Defect::Statusword { set, clear } => self.statusword = is_present.then_some((set, clear)),
             Defect::EncoderJump { .. } => {}
             _ => return Err(Unsupported { defect }),
         }
         Ok(())
+    }
+
+    /// The statusword that TPDOs show in place of the true one.
+    pub fn shown(&self, statusword: u16) -> u16 {
+        let (set, clear) = self.statusword.unwrap_or_default();
+        statusword & !clear | set
     }
 
     /// A TPDO as it leaves the drive.

@@ -3,7 +3,7 @@
 use takt::sim::Defect;
 
 use super::alarms::{speed_rpm, turning};
-use super::{Bench, NODE, bench, by_the_manual};
+use super::{Bench, NODE, bench, by_the_manual, decoded};
 
 impl Bench {
     fn afflict(&mut self, defect: Defect) {
@@ -13,6 +13,13 @@ impl Bench {
     fn mend(&mut self, defect: Defect) {
         self.bus.afflict(NODE, defect, false).unwrap();
     }
+}
+
+/// The TPDO that answers RPDO4.
+fn tpdo4(bench: &mut Bench) -> Vec<u8> {
+    bench.say(0x500 + u32::from(NODE), [0; 4]);
+    bench.run_ms(1);
+    bench.take(0x480 + u32::from(NODE)).pop().unwrap()
 }
 
 #[test]
@@ -66,14 +73,20 @@ fn an_encoder_jump_moves_the_counts_at_once_and_the_servo_brings_them_back_to_th
 #[test]
 fn short_feedback_lacks_the_last_byte_of_every_tpdo_until_it_is_mended() {
     let mut bench = turning();
-    let answer = |bench: &mut Bench| {
-        bench.say(0x500 + u32::from(NODE), [0; 4]);
-        bench.run_ms(1);
-        bench.take(0x480 + u32::from(NODE)).pop().unwrap()
-    };
-    let whole = answer(&mut bench).len();
+    let whole = tpdo4(&mut bench).len();
     bench.afflict(Defect::ShortFeedback);
-    assert_eq!((whole, answer(&mut bench).len()), (6, 5));
+    assert_eq!((whole, tpdo4(&mut bench).len()), (6, 5));
     bench.mend(Defect::ShortFeedback);
-    assert_eq!(answer(&mut bench).len(), 6);
+    assert_eq!(tpdo4(&mut bench).len(), 6);
+}
+
+#[test]
+fn a_false_statusword_is_in_the_tpdos_only_and_what_is_both_set_and_cleared_is_set() {
+    let mut bench = turning();
+    let defect = Defect::Statusword { set: 0x0048, clear: 0x0044 };
+    bench.afflict(defect);
+    assert_eq!(decoded(&tpdo4(&mut bench)).1, 0x047B);
+    assert_eq!((bench.statusword(), bench.observe().statusword), (0x0437, 0x0437));
+    bench.mend(defect);
+    assert_eq!(decoded(&tpdo4(&mut bench)).1, 0x0437);
 }
