@@ -15,7 +15,7 @@ fn gantry() -> Config {
 }
 
 /// What goes wrong with an axis well into the first move, the rule that sees it, and in how many milliseconds at the latest.
-const STOPS: [(&str, Rule, f64); 5] = [
+const STOPS: [(&str, Rule, f64); 9] = [
     // The joint must fall behind first, and the window of the following error be over.
     ("kind = \"stall\"", Rule::FollowingError, 300.0),
     ("kind = \"encoder-jump\"\nby = \"20 mm\"", Rule::ImplausibleFeedback, 5.0),
@@ -23,6 +23,10 @@ const STOPS: [(&str, Rule, f64); 5] = [
     ("kind = \"wrong-mapping\"\ncontents = \"short\"", Rule::MissedFeedback, 13.0),
     ("kind = \"statusword\"\nset = 0x0008", Rule::DriveFault, 4.0),
     ("kind = \"statusword\"\nclear = 0x0004", Rule::DriveDisabled, 6.0),
+    ("kind = \"alarm\"\ncode = 0x12", Rule::DriveFault, 4.0),
+    ("kind = \"alarm\"\ncode = 0x14", Rule::DriveFault, 4.0),
+    ("kind = \"alarm\"\ncode = 0x15", Rule::DriveFault, 4.0),
+    ("kind = \"alarm\"\ncode = 0x10", Rule::DriveFault, 4.0),
 ];
 
 #[test]

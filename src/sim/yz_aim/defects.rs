@@ -27,7 +27,7 @@ impl Defects {
             Defect::SilentSdoServer => self.is_sdo_silent = is_present,
             Defect::ShortFeedback => self.is_feedback_short = is_present,
             Defect::Statusword { set, clear } => self.statusword = is_present.then_some((set, clear)),
-            Defect::EncoderJump { .. } => {}
+            Defect::EncoderJump { .. } | Defect::Alarm { .. } => {}
             _ => return Err(Unsupported { defect }),
         }
         Ok(())

@@ -349,11 +349,13 @@ impl Drive for YzAimJoint {
     fn afflict(&mut self, now_ns: Nanoseconds, defect: Defect, is_present: bool) -> Result<(), Unsupported> {
         self.run_loops(now_ns);
         self.defects.set(defect, is_present)?;
-        if let Defect::EncoderJump { distance } = defect
-            && is_present
-        {
-            let counts = (distance * self.parameters.encoder.counts_per_unit).round() as i64 as i32;
-            self.counts_offset = self.counts_offset.wrapping_add(counts);
+        match defect {
+            Defect::EncoderJump { distance } if is_present => {
+                let counts = (distance * self.parameters.encoder.counts_per_unit).round() as i64 as i32;
+                self.counts_offset = self.counts_offset.wrapping_add(counts);
+            }
+            Defect::Alarm { code } if is_present => self.raise(now_ns, code)?,
+            _ => {}
         }
         self.wake_ns = self.now_ns + 1;
         Ok(())

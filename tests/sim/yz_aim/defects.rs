@@ -3,7 +3,7 @@
 use takt::sim::Defect;
 
 use super::alarms::{speed_rpm, turning};
-use super::{Bench, NODE, bench, by_the_manual, decoded};
+use super::{Bench, NODE, YzAimParameters, bench, by_the_manual, decoded};
 
 impl Bench {
     fn afflict(&mut self, defect: Defect) {
@@ -89,4 +89,39 @@ fn a_false_statusword_is_in_the_tpdos_only_and_what_is_both_set_and_cleared_is_s
     assert_eq!((bench.statusword(), bench.observe().statusword), (0x0437, 0x0437));
     bench.mend(defect);
     assert_eq!(decoded(&tpdo4(&mut bench)).1, 0x0437);
+}
+
+#[test]
+fn every_alarm_of_the_manual_can_come_and_stops_the_motor_unless_it_is_the_batterys() {
+    for (code, turns) in [(0x10, true), (0x12, false), (0x14, false), (0x15, false), (0x20, false)] {
+        let mut bench = turning();
+        bench.afflict(Defect::Alarm { code });
+        assert_eq!((bench.alarm(), bench.statusword() & 8), (u32::from(code), 8));
+        bench.run_ms(2_000);
+        assert_eq!(speed_rpm(&mut bench).abs() > 1.0, turns, "{code:#x}");
+    }
+}
+
+#[test]
+fn the_alarm_of_the_lost_communication_ends_with_the_next_heartbeat_of_the_master() {
+    let mut bench = turning();
+    bench.afflict(Defect::Alarm { code: 0x20 });
+    bench.run_ms(500);
+    bench.say(0x77F, [0x05]);
+    bench.run_ms(500);
+    assert_eq!(bench.alarm(), 0);
+    assert!((speed_rpm(&mut bench) - 500.0).abs() < 1.0);
+}
+
+#[test]
+fn a_code_that_is_none_of_its_alarms_is_refused_and_changes_nothing() {
+    let without_battery = YzAimParameters { has_battery: false, ..by_the_manual(NODE) };
+    for (parameters, code) in
+        [(by_the_manual(NODE), 0), (by_the_manual(NODE), 0x7500), (without_battery, 0x10)]
+    {
+        let mut bench = bench(parameters);
+        let before = bench.statusword();
+        assert!(bench.bus.afflict(NODE, Defect::Alarm { code }, true).is_err(), "{code:#x}");
+        assert_eq!((bench.alarm(), bench.statusword()), (0, before));
+    }
 }

@@ -4,8 +4,9 @@
 use takt_rt::time::Nanoseconds;
 
 use super::YzAimJoint;
+use crate::sim::defect::{Defect, Unsupported};
 use crate::sim::drive::DriveFault;
-use crate::sim::yz_aim::alarms::StoppingAlarm;
+use crate::sim::yz_aim::alarms::{BATTERY, COMMUNICATION_LOST, StoppingAlarm};
 use crate::sim::yz_aim::objects::at;
 
 /// For how long the speed may stay behind before it is a stall.
@@ -82,6 +83,22 @@ impl YzAimJoint {
             | DriveFault::OverTemperature
             | DriveFault::Encoder => {}
         }
+    }
+
+    /// One of the drive's own alarms comes, whatever the cause.
+    ///
+    /// # Errors
+    /// [`Unsupported`] for a code that is none of them.
+    pub(super) fn raise(&mut self, now_ns: Nanoseconds, code: u16) -> Result<(), Unsupported> {
+        match code {
+            BATTERY if self.parameters.has_battery => self.alarms.has_lost_battery = true,
+            COMMUNICATION_LOST => self.network.lose_master(),
+            _ => {
+                let defect = Defect::Alarm { code };
+                self.fail(now_ns, StoppingAlarm::of(code).ok_or(Unsupported { defect })?);
+            }
+        }
+        Ok(())
     }
 }
 
