@@ -67,8 +67,10 @@ pub(super) fn shorter(frame: Frame) -> Frame {
 
 /// This simulated drive cannot be broken in this way.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[error("this simulated drive cannot have the defect {defect:?}")]
+#[error("{reason}")]
 pub struct Unsupported {
     /// What it should have had.
     pub defect: Defect,
+    /// Why it cannot, for people: names the family.
+    pub reason: &'static str,
 }

@@ -2,6 +2,7 @@
 
 use takt::config::Config;
 use takt::controller::Outcome;
+use takt::faults::Scenario;
 use takt_rt::stop::{Phase, Rule, StopCategory};
 
 use crate::arm::{folder, play};
@@ -51,4 +52,28 @@ fn a_servo_without_sdo_replies_cannot_be_brought_up_and_in_motion_nobody_misses_
     assert!(matches!(played.outcome, Some(Outcome::BringUpFailed(_))), "{:?}", played.outcome);
     let played = play(&gantry(), &format!("{stuck}when = \"moving\""));
     assert_eq!(played.outcome, Some(Outcome::Finished));
+}
+
+/// What a YZ-AIM cannot have: the keys, the line that is to blame, what is said there, and why.
+const REFUSED: [(&str, &str, usize, &str, &str); 8] = [
+    ("stuck-brake", "", 3, "`fault.axis` cannot be \"y\"", "a YZ-AIM has no brake"),
+    ("mode-display", "mode = 1", 3, "`fault.axis` cannot be \"y\"", "the PDOs of a YZ-AIM show no mode"),
+    ("torque-off", "", 3, "`fault.axis` cannot be \"y\"", "a YZ-AIM has no safe torque off"),
+    ("emergency", "code = 0x4210", 3, "`fault.axis` cannot be \"y\"", "a YZ-AIM sends no emergency messages"),
+    ("wrong-mapping", "", 3, "`fault.axis` cannot be \"y\"", "the PDOs of a YZ-AIM are fixed"),
+    ("wrong-mapping", "contents = \"other\"", 4, "`fault.contents` cannot be \"other\"", "\"short\""),
+    ("alarm", "code = 0x7500", 4, "`fault.code` cannot be 0x7500", "0x10, 0x12, 0x14, 0x15 and 0x20"),
+    ("alarm", "code = 0", 4, "`fault.code` cannot be 0x0000", "the alarms of a YZ-AIM are"),
+];
+
+#[test]
+fn what_a_servo_cannot_have_is_refused_where_the_file_says_it_with_the_reason() {
+    for (kind, keys, line, said, why) in REFUSED {
+        let text = format!("[[fault]]\nkind = \"{kind}\"\naxis = \"y\"\n{keys}");
+        let error = Scenario::parse("scenario", &text, &gantry()).unwrap_err();
+        let [problem] = error.problems() else { panic!("{text}: {:?}", error.problems()) };
+        let help = problem.kind.help();
+        assert_eq!((error.line(problem), problem.to_string().as_str()), (Some(line), said), "{text}");
+        assert!(help.contains(&format!("{kind:?}; ")) && help.contains(why), "{text}: {help}");
+    }
 }

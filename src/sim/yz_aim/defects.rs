@@ -22,13 +22,20 @@ impl Defects {
     /// # Errors
     /// [`Unsupported`] for what this servo cannot have.
     pub fn set(&mut self, defect: Defect, is_present: bool) -> Result<(), Unsupported> {
+        let refused = |reason| Err(Unsupported { defect, reason });
         match defect {
             Defect::BlockedJoint => self.is_joint_blocked = is_present,
             Defect::SilentSdoServer => self.is_sdo_silent = is_present,
             Defect::ShortFeedback => self.is_feedback_short = is_present,
             Defect::Statusword { set, clear } => self.statusword = is_present.then_some((set, clear)),
             Defect::EncoderJump { .. } | Defect::Alarm { .. } => {}
-            _ => return Err(Unsupported { defect }),
+            Defect::StuckBrake => return refused("a YZ-AIM has no brake"),
+            Defect::OtherObjectMapped => {
+                return refused("the PDOs of a YZ-AIM are fixed, and can only be too short: \"short\"");
+            }
+            Defect::OperationModeDisplay { .. } => return refused("the PDOs of a YZ-AIM show no mode"),
+            Defect::Emergency { .. } => return refused("a YZ-AIM sends no emergency messages"),
+            Defect::TorqueOff => return refused("a YZ-AIM has no safe torque off"),
         }
         Ok(())
     }

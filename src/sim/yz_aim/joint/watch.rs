@@ -94,8 +94,12 @@ impl YzAimJoint {
             BATTERY if self.parameters.has_battery => self.alarms.has_lost_battery = true,
             COMMUNICATION_LOST => self.network.lose_master(),
             _ => {
-                let defect = Defect::Alarm { code };
-                self.fail(now_ns, StoppingAlarm::of(code).ok_or(Unsupported { defect })?);
+                let reason = match code {
+                    BATTERY => "this YZ-AIM has no battery",
+                    _ => "the alarms of a YZ-AIM are 0x10, 0x12, 0x14, 0x15 and 0x20",
+                };
+                let unknown = Unsupported { defect: Defect::Alarm { code }, reason };
+                self.fail(now_ns, StoppingAlarm::of(code).ok_or(unknown)?);
             }
         }
         Ok(())
