@@ -1,6 +1,8 @@
 //! What can be wrong with a simulated drive or its joint beyond the causes of alarms
 //! ([`DriveFault`](super::DriveFault)): things that the drive itself may not even notice.
 
+use takt_rt::frame::Frame;
+
 /// Something wrong with a drive or its joint. Some are states that last until they are mended, the others
 /// ([`Defect::is_event`]) just happen.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,10 +59,18 @@ impl Defect {
     }
 }
 
+/// A frame without its last byte.
+pub(super) fn shorter(frame: Frame) -> Frame {
+    let shorter = frame.payload().split_last().and_then(|(_, rest)| Frame::data(frame.id(), rest).ok());
+    shorter.unwrap_or(frame)
+}
+
 /// This simulated drive cannot be broken in this way.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[error("this simulated drive cannot have the defect {defect:?}")]
+#[error("{reason}")]
 pub struct Unsupported {
     /// What it should have had.
     pub defect: Defect,
+    /// Why it cannot, for people: names the family.
+    pub reason: &'static str,
 }

@@ -41,10 +41,7 @@ pub trait Drive: Send {
     ///
     /// # Errors
     /// [`Unsupported`] when this drive cannot be broken in this way; nothing has changed then.
-    fn afflict(&mut self, now_ns: Nanoseconds, defect: Defect, is_present: bool) -> Result<(), Unsupported> {
-        let _ = (now_ns, is_present);
-        Err(Unsupported { defect })
-    }
+    fn afflict(&mut self, now_ns: Nanoseconds, defect: Defect, is_present: bool) -> Result<(), Unsupported>;
 }
 
 /// The truth about a simulated drive and its joint.

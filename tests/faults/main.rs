@@ -5,6 +5,7 @@ mod command;
 mod deaf_drives;
 mod drives;
 mod files;
+mod gantry;
 mod late_drives;
 mod lost_heartbeat;
 mod reactions;

@@ -1,6 +1,7 @@
 //! The simulated YZ-AIM servo, as a master sees it.
 
 mod alarms;
+mod defects;
 mod homing;
 mod interpolation;
 mod network;

@@ -1,6 +1,6 @@
 //! Random faults of every kind, as a user would write them down.
 
-use takt::config::{Axis, Config, Travel};
+use takt::config::{Axis, Config, DriveFamily, Travel};
 
 use crate::dice::Dice;
 
@@ -44,18 +44,7 @@ pub const KINDS: [&str; 35] = [
 ];
 
 /// Those that only the simulated eRob can have.
-pub const NEEDS_EROB: [&str; 10] = [
-    "stall",
-    "stuck-brake",
-    "encoder-jump",
-    "stuck-sdo",
-    "wrong-mapping",
-    "statusword",
-    "mode-display",
-    "torque-off",
-    "alarm",
-    "emergency",
-];
+pub const NEEDS_EROB: [&str; 4] = ["stuck-brake", "mode-display", "torque-off", "emergency"];
 
 /// What a fault needs to be told beside its kind.
 enum Place {
@@ -141,7 +130,13 @@ fn particulars(dice: &mut Dice, axis: &Axis, kind: &str) -> (Place, bool, String
             (Place::Axis, true, format!("set = {set}\nclear = {clear}"))
         }
         "mode-display" => (Place::Axis, true, format!("mode = {}", dice.pick(&[0, 1, 2, 3, 6, 8]))),
-        "alarm" => (Place::Axis, false, format!("code = {}", dice.pick(&[0x2310, 0x4310, 0x7500, 0xFF01]))),
+        "alarm" => {
+            let codes: &[u16] = match axis.drive {
+                DriveFamily::ErobCanopen => &[0x2310, 0x4310, 0x7500, 0xFF01],
+                DriveFamily::YzAim => &[0x10, 0x12, 0x14, 0x15, 0x20],
+            };
+            (Place::Axis, false, format!("code = {}", dice.pick(codes)))
+        }
         "emergency" => (Place::Axis, false, "code = 0x4210".to_owned()),
         _ => (Place::Axis, false, String::new()),
     }

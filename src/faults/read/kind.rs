@@ -94,6 +94,11 @@ pub const WORDS: [(&str, Word); 35] = [
 ];
 
 impl Word {
+    /// As the file says it.
+    pub fn name(self) -> &'static str {
+        WORDS.iter().find(|(_, other)| *other == self).map_or("", |(name, _)| *name)
+    }
+
     /// Whether it happens to an axis rather than to a bus.
     pub fn needs_axis(self) -> bool {
         matches!(self, Self::Drive(_) | Self::ForeignSetPoints | Self::DuplicateNode)
@@ -246,14 +251,9 @@ fn bytes(entry: &Entry<'_>) -> Option<Vec<u8>> {
     list.iter().map(|byte| u8::try_from(byte.integer(0..256)?).ok()).collect()
 }
 
-fn drive(
-    section: &mut Section<'_>,
-    trouble: Trouble,
-    place: &Place<'_, '_>,
-    config: &Config,
-) -> Option<Read> {
+fn drive(section: &mut Section<'_>, kind: Trouble, place: &Place<'_, '_>, config: &Config) -> Option<Read> {
     let axis = place.axis?;
-    let trouble = drive_trouble(section, trouble, axis);
+    let trouble = drive_trouble(section, kind, axis);
     // Without knowing whether it lasts, an end is not called unknown.
     let window = match trouble {
         Some(trouble) if trouble.is_event() => common::beginning(section, config),
@@ -266,10 +266,31 @@ fn drive(
     // Whether that drive can have it is best tried with one like it.
     let mut trial = SimulatedBus::new(config, axis.bus);
     if let (Err(error), Some(entry)) = (trial.trouble(axis.node, trouble, true), &place.entry) {
-        entry.report_range(format!("{:?}", axis.name), format!("an axis whose drive can; {error}"));
+        let name = Word::Drive(kind).name();
+        match particular(section, trouble) {
+            Some((particular, value)) => {
+                let allowed = format!("what axis {:?} can have as {name:?}; {error}", axis.name);
+                particular.report_range(value, allowed);
+            }
+            None => {
+                let allowed = format!("an axis whose drive can have {name:?}; {error}");
+                entry.report_range(format!("{:?}", axis.name), allowed);
+            }
+        }
         return None;
     }
     Some((window?, Selection::default(), Effect::Drive { node: axis.node, trouble }))
+}
+
+/// The key, with its value, that decides whether a drive can have it: another one may suit the same axis.
+fn particular<'a>(section: &mut Section<'a>, trouble: DriveTrouble) -> Option<(Entry<'a>, String)> {
+    match trouble {
+        DriveTrouble::Defect(Defect::Alarm { code }) => Some((section.get("code")?, format!("{code:#06x}"))),
+        DriveTrouble::Defect(Defect::OtherObjectMapped) => {
+            Some((section.get("contents")?, "\"other\"".to_owned()))
+        }
+        _ => None,
+    }
 }
 
 fn drive_trouble(section: &mut Section<'_>, trouble: Trouble, axis: &Axis) -> Option<DriveTrouble> {

@@ -101,6 +101,13 @@ fn fault(mut section: Section<'_>, text: &str, config: &Config) -> Option<Fault>
     let read = kind::read(&mut section, word, &place, config);
     section.finish();
     let (window, selection, effect) = read?;
-    let name = kind::WORDS.iter().find(|(_, other)| *other == word).map_or("", |(name, _)| *name);
-    Some(Fault { kind: name, place: place.show(config), line, bus: place.bus, window, selection, effect })
+    Some(Fault {
+        kind: word.name(),
+        place: place.show(config),
+        line,
+        bus: place.bus,
+        window,
+        selection,
+        effect,
+    })
 }

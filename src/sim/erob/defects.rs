@@ -3,7 +3,7 @@
 use takt_rt::frame::Frame;
 
 use super::dictionary::{Dictionary, at};
-use crate::sim::defect::Defect;
+use crate::sim::defect::{Defect, shorter};
 
 /// The lasting defects of one module.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -63,11 +63,7 @@ impl Defects {
 
     /// A feedback PDO as it leaves the drive.
     pub fn sent(&self, frame: Frame) -> Frame {
-        let bytes = frame.payload();
-        match bytes.split_last() {
-            Some((_, shorter)) if self.is_feedback_short => Frame::data(frame.id(), shorter).unwrap_or(frame),
-            _ => frame,
-        }
+        if self.is_feedback_short { shorter(frame) } else { frame }
     }
 }
 

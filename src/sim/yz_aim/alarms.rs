@@ -14,8 +14,17 @@ pub enum StoppingAlarm {
     OverVoltage = 0x15,
 }
 
-const BATTERY: u16 = 0x10;
-const COMMUNICATION_LOST: u16 = 0x20;
+impl StoppingAlarm {
+    /// The alarm with this code in 260Eh.
+    pub fn of(code: u16) -> Option<Self> {
+        [Self::BlockedRotor, Self::Stall, Self::OverVoltage].into_iter().find(|alarm| *alarm as u16 == code)
+    }
+}
+
+/// The code of the battery's power lost.
+pub const BATTERY: u16 = 0x10;
+/// The code of the communication lost.
+pub const COMMUNICATION_LOST: u16 = 0x20;
 /// How long an over-voltage lasts. It cannot be cleared before it is over.
 const OVER_VOLTAGE_NS: Nanoseconds = 100_000_000;
 

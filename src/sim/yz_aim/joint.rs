@@ -13,6 +13,7 @@ use takt_rt::time::Nanoseconds;
 
 use super::alarms::{Alarms, StoppingAlarm};
 use super::bit_rate::BitRateChange;
+use super::defects::Defects;
 use super::device::{Device, Level};
 use super::dictionary::Dictionary;
 use super::homing::Homing;
@@ -22,6 +23,7 @@ use super::objects::at;
 use super::parameters::{COUNTS_PER_SECOND_PER_RPM, COUNTS_PER_TURN, YzAimParameters};
 use super::process_data::{ProcessData, report_state_first};
 use super::sdo::SdoServer;
+use crate::sim::defect::{Defect, Unsupported};
 use crate::sim::drive::{Drive, DriveFault, NmtState, Observation};
 use crate::sim::mailbox::Mailbox;
 use crate::sim::plant::Joint;
@@ -82,6 +84,7 @@ pub struct YzAimJoint {
     /// 260Ah = 60006 has been written.
     is_zero_armed: bool,
     injected: Option<DriveFault>,
+    defects: Defects,
     save_ns: Nanoseconds,
     /// How far the loops have come.
     stepped_ns: Nanoseconds,
@@ -131,6 +134,7 @@ impl YzAimJoint {
             was_energised: false,
             is_zero_armed: false,
             injected: None,
+            defects: Defects::default(),
             save_ns: NEVER,
             stepped_ns: 0,
             now_ns: 0,
@@ -340,5 +344,20 @@ impl Drive for YzAimJoint {
 
     fn set_load_torque(&mut self, torque: f64) {
         self.joint.set_load_torque(torque);
+    }
+
+    fn afflict(&mut self, now_ns: Nanoseconds, defect: Defect, is_present: bool) -> Result<(), Unsupported> {
+        self.run_loops(now_ns);
+        self.defects.set(defect, is_present)?;
+        match defect {
+            Defect::EncoderJump { distance } if is_present => {
+                let counts = (distance * self.parameters.encoder.counts_per_unit).round() as i64 as i32;
+                self.counts_offset = self.counts_offset.wrapping_add(counts);
+            }
+            Defect::Alarm { code } if is_present => self.raise(now_ns, code)?,
+            _ => {}
+        }
+        self.wake_ns = self.now_ns + 1;
+        Ok(())
     }
 }

@@ -9,6 +9,7 @@
 //!                         ├── bit_rate       the procedure of four writes
 //!                         ├── device         controlword → statusword
 //!                         ├── alarms         260Eh
+//!                         ├── defects        what is wrong and raises no alarm by itself
 //!                         └── homing, motion → servo → plant
 //! ```
 //!
@@ -33,6 +34,7 @@
 
 mod alarms;
 mod bit_rate;
+mod defects;
 mod device;
 mod dictionary;
 mod homing;

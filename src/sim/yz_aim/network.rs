@@ -140,8 +140,13 @@ impl Network {
     /// Notices that the master's heartbeat has stayed away.
     pub fn watch_master(&mut self, now_ns: Nanoseconds) {
         if now_ns >= self.master_deadline_ns {
-            self.master_deadline_ns = NEVER;
-            self.is_master_lost = true;
+            self.lose_master();
         }
+    }
+
+    /// Takes the master for lost until it is heard again.
+    pub fn lose_master(&mut self) {
+        self.master_deadline_ns = NEVER;
+        self.is_master_lost = true;
     }
 }

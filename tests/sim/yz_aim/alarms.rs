@@ -7,7 +7,7 @@ use takt_rt::cia402::State;
 use super::{Bench, NODE, Quirks, YzAimParameters, bench, by_the_manual, parameters};
 
 /// An enabled drive that turns at 500 r/min in mode 3, with its heartbeat every 100 ms.
-fn turning() -> Bench {
+pub fn turning() -> Bench {
     let mut bench = bench(by_the_manual(NODE));
     bench.write(0x1017, 0, 2, 100).unwrap();
     bench.write(0x6060, 0, 1, 3).unwrap();
@@ -18,7 +18,7 @@ fn turning() -> Bench {
     bench
 }
 
-fn speed_rpm(bench: &mut Bench) -> f64 {
+pub fn speed_rpm(bench: &mut Bench) -> f64 {
     bench.observe().velocity * super::RATIO * 60.0 / super::TAU
 }
 

@@ -22,7 +22,7 @@ impl YzAimJoint {
             0x000 => self.take_nmt(now_ns, frame.payload()),
             id @ 0x701..=0x77F => self.network.heard(now_ns, (id & 0x7F) as u8, &self.dictionary),
             _ if frame.id() == Id::canopen(0x600, self.node) => {
-                if self.network.has_services() {
+                if self.network.has_services() && !self.defects.is_sdo_silent {
                     self.take_request(now_ns, frame.payload());
                 }
             }
@@ -105,7 +105,7 @@ impl YzAimJoint {
             self.process_data.run_events(now_ns, feedback, &self.dictionary);
             while let Some(frame) = self.process_data.next(now_ns, self.node, &self.dictionary) {
                 if is_on_bus {
-                    mailbox.put(frame);
+                    mailbox.put(self.defects.sent(frame));
                 }
             }
         }

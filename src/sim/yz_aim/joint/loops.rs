@@ -45,7 +45,11 @@ impl YzAimJoint {
             self.homing.fail();
             self.torque = 0.0;
         }
-        self.joint.step(duration_s, self.torque * self.direction(), false);
+        if self.defects.is_joint_blocked {
+            self.joint.halt();
+        } else {
+            self.joint.step(duration_s, self.torque * self.direction(), false);
+        }
         if is_energised {
             self.watch(duration_s);
         } else {

@@ -51,7 +51,7 @@ impl YzAimJoint {
         let scale = if self.parameters.quirks.has_fine_velocity_in_tpdo3 { 10.0 } else { 1.0 };
         Feedback {
             position: self.counts(),
-            statusword: self.statusword(),
+            statusword: self.defects.shown(self.statusword()),
             velocity: (scale * self.velocity_rpm()).round_ties_even() as i32,
         }
     }

@@ -4,8 +4,9 @@
 use takt_rt::time::Nanoseconds;
 
 use super::YzAimJoint;
+use crate::sim::defect::{Defect, Unsupported};
 use crate::sim::drive::DriveFault;
-use crate::sim::yz_aim::alarms::StoppingAlarm;
+use crate::sim::yz_aim::alarms::{BATTERY, COMMUNICATION_LOST, StoppingAlarm};
 use crate::sim::yz_aim::objects::at;
 
 /// For how long the speed may stay behind before it is a stall.
@@ -82,6 +83,26 @@ impl YzAimJoint {
             | DriveFault::OverTemperature
             | DriveFault::Encoder => {}
         }
+    }
+
+    /// One of the drive's own alarms comes, whatever the cause.
+    ///
+    /// # Errors
+    /// [`Unsupported`] for a code that is none of them.
+    pub(super) fn raise(&mut self, now_ns: Nanoseconds, code: u16) -> Result<(), Unsupported> {
+        match code {
+            BATTERY if self.parameters.has_battery => self.alarms.has_lost_battery = true,
+            COMMUNICATION_LOST => self.network.lose_master(),
+            _ => {
+                let reason = match code {
+                    BATTERY => "this YZ-AIM has no battery",
+                    _ => "the alarms of a YZ-AIM are 0x10, 0x12, 0x14, 0x15 and 0x20",
+                };
+                let unknown = Unsupported { defect: Defect::Alarm { code }, reason };
+                self.fail(now_ns, StoppingAlarm::of(code).ok_or(unknown)?);
+            }
+        }
+        Ok(())
     }
 }
 
