@@ -71,7 +71,7 @@ pub(super) fn configure(config: &Config, axis: &Axis, timing: &BringUpTiming) ->
         timing.reset_repeat_ns,
     );
     list.identity(axis);
-    come_to_rest(&mut list, timing);
+    come_to_rest(&mut list, axis, timing);
     list.configuration_file(axis);
     process_data(&mut list, axis);
     motion(&mut list, axis);
@@ -97,14 +97,14 @@ pub(super) fn leave(axis: &Axis, timing: &BringUpTiming) -> Vec<Step> {
     let mut list = List::new("farewell", "power-cycle the drive before the next run");
     list.reach(NmtCommand::EnterPreOperational);
     list.nmt_reported(NmtCommand::EnterPreOperational, NmtState::PreOperational, axis, timing);
-    come_to_rest(&mut list, timing);
+    come_to_rest(&mut list, axis, timing);
     list.about("end of heartbeats", "expect alarm 20 of the drive; it clears at the next bring-up");
     list.write_and_read_back(objects::CONSUMER_HEARTBEAT_TIME, 0);
     list.steps
 }
 
 /// A drive may have been left enabled, even moving.
-fn come_to_rest(list: &mut List, timing: &BringUpTiming) {
+fn come_to_rest(list: &mut List, axis: &Axis, timing: &BringUpTiming) {
     list.about(
         "standstill without torque",
         "the drive holds or moves its axis and does not obey: use the emergency stop, then power-cycle it",
@@ -123,6 +123,8 @@ fn come_to_rest(list: &mut List, timing: &BringUpTiming) {
     });
     list.when = When::Always;
     list.write(objects::CONTROLWORD, controlword::DISABLE_VOLTAGE.into());
+    // Homing needs no controlword: only another mode ends it.
+    list.write(objects::MODES_OF_OPERATION, axis.control.operation_mode() as i64);
     list.push(Action::Await {
         object: objects::STATUSWORD,
         check: NOT_STARTED,

@@ -98,7 +98,7 @@ fn a_stop_in_coordination_leads_no_joint_beyond_its_position_limit() {
 }
 
 /// What each of them has found.
-const FAILED_ONCE: [(u64, &str); 21] = [
+const FAILED_ONCE: [(u64, &str); 22] = [
     (1875, "An event timer that was set before operational woke a YZ-AIM in every nanosecond"),
     (3022, "A YZ-AIM whose communication has been reset watches the controller for 2 s"),
     (823, "A clamped stream expired too near to a position limit for a stop with limited jerk"),
@@ -147,6 +147,7 @@ const FAILED_ONCE: [(u64, &str); 21] = [
         775,
         "A stream beyond a position limit, by less than the tolerance, was stopped with more jerk than the limit",
     ),
+    (19907, "A servo was homing, by a mode that no controlword ends, and went on when the run was over"),
 ];
 
 #[test]
