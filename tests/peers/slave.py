@@ -156,7 +156,7 @@ def communication(slave):
 
 
 def mapping(slave):
-    for communication_index, mapping_index, wanted in ((0x1400, 0x1600, [0x6040, 0x607A]), (0x1800, 0x1A00, [0x6041, 0x6064])):
+    for communication_index, mapping_index, wanted in ((0x1400, 0x1600, [0x6040, 0x607A]), (0x1800, 0x1A00, [0x6041, 0x6061, 0x6064])):
         count = slave.last_written(mapping_index, 0)
         mapped = [slave.last_written(mapping_index, number) >> 16 for number in range(1, count + 1)]
         expect(f"objects mapped by {mapping_index:04X}", sorted(mapped), sorted(wanted))
