@@ -1,7 +1,7 @@
 //! Whom a fault concerns, from the cycle on in which it begins.
 
 use takt::canopen::nmt::{NmtCommand, NmtTarget};
-use takt::config::{Axis, Config};
+use takt::config::{Axis, Config, DriveFamily};
 use takt::faults::{
     Direction, DriveTrouble, Effect, ForeignFrames, FrameEffect, FrameFunction, InterfaceEffect, Part,
     Rehearsal,
@@ -13,7 +13,8 @@ use takt::sim::Defect;
 pub struct Concern {
     /// A fault concerns this joint, its drive or its bus: it may not obey.
     pub is_present: bool,
-    /// A torque from outside acts on it, or another master commands its drive between two looks.
+    /// A torque from outside acts on it, another master commands its drive between two looks, or its drive by itself does what
+    /// nobody has asked for.
     pub is_driven_by_others: bool,
     /// What is sent to its drive is corrupted with a right CRC: it does what it hears.
     pub is_misled: bool,
@@ -113,12 +114,14 @@ fn concern(axis: &Axis, fault: &takt::faults::Fault) -> Concern {
         }
         _ => false,
     };
+    // A servo holds its shaft before anybody has commanded it, and follows an encoder that slips.
+    let is_led_astray = fault.kind == "encoder-jump" && axis.drive == DriveFamily::YzAim;
     Concern {
         is_present,
         is_misled,
         is_unwatched,
         is_cut_off,
-        is_driven_by_others: is_own && matches!(fault.kind, "load" | "foreign-set-points"),
+        is_driven_by_others: is_own && (matches!(fault.kind, "load" | "foreign-set-points") || is_led_astray),
         is_loaded: is_own && fault.kind == "load",
     }
 }
