@@ -242,8 +242,9 @@ impl Course {
             position > limits.position_max + count && position > last.max(limits.position_max) + count
                 || position < limits.position_min - count && position < last.min(limits.position_min) - count
         };
-        // A drive in profile position is stopped where the joint comes to rest, which may be where it is.
-        let reference = if axis.control.is_profile() { truth.position } else { last };
+        // A drive in profile position is stopped where the joint comes to rest, which may be where it was when it last reported.
+        let reference =
+            if axis.control.is_profile() { truth.position - truth.velocity * GAP_S } else { last };
         if !concern.is_present && is_further_out(position, last) && is_further_out(position, reference) {
             return Err(format!("from {last} to {position} on the wire, out of the limits"));
         }
