@@ -114,7 +114,7 @@ impl Axis {
         let braking = self.braking_distance();
         let reaction = self.velocity.abs() * f64::from(REACTION_CYCLES) * self.cycle_s;
         let nearest = if ahead < braking { reaction + braking } else { ahead };
-        rest.clamp(self.position - nearest, self.position + nearest)
+        rest.max(self.position - nearest).min(self.position + nearest)
     }
 
     /// Whether a stop of the joint is over: it stands, and in profile position where it was sent. One that swings back
