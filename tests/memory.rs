@@ -1,0 +1,109 @@
+//! A run holds as much memory after minutes as it held after seconds, whatever is recorded of it.
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::io::{self, Write};
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicI64, AtomicU64, Ordering};
+
+use takt::bus::port::Port;
+use takt::config::Config;
+use takt::controller::VirtualRun;
+use takt::telemetry::{BlackBoxOptions, Destination, Logger, LoggerOptions, Machine, WallClock};
+
+/// What all threads together have taken from the heap and not given back.
+static HELD_BYTES: AtomicI64 = AtomicI64::new(0);
+
+/// The system's allocator, with an account of what is held.
+struct Accounting;
+
+// SAFETY: every call is handed on unchanged to the system's allocator; the account touches no memory of the heap.
+unsafe impl GlobalAlloc for Accounting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        HELD_BYTES.fetch_add(layout.size() as i64, Ordering::Relaxed);
+        // SAFETY: the caller keeps the contract of `alloc`, which is the same here.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        HELD_BYTES.fetch_sub(layout.size() as i64, Ordering::Relaxed);
+        // SAFETY: `pointer` came from `System` with this layout.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+
+    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        HELD_BYTES.fetch_add(size as i64 - layout.size() as i64, Ordering::Relaxed);
+        // SAFETY: `pointer` came from `System` with this layout, and the caller keeps the contract of `realloc`.
+        unsafe { System.realloc(pointer, layout, size) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Accounting = Accounting;
+
+/// Takes a recording and keeps nothing but its length.
+#[derive(Clone, Default)]
+struct Length(Arc<AtomicU64>);
+
+impl Write for Length {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.0.fetch_add(bytes.len() as u64, Ordering::Relaxed);
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+/// What the heap holds at the end of every minute of six axes in motion, with a recording or without, the black box being
+/// on in any case.
+fn held_every_minute(minutes: usize, recording: Option<Destination>) -> Vec<i64> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/arm6-erob.toml");
+    let mut config = Config::load(&path).unwrap();
+    config.program.repeat = u32::MAX;
+    let mut traces = vec![];
+    let ports = (0..config.buses.len()).map(|bus| {
+        let (port, trace) = Port::open(&config, bus).unwrap().traced(&config.buses[bus].name);
+        traces.push(trace);
+        port
+    });
+    let (mut run, log) = VirtualRun::new(&config, ports.collect()).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let options = LoggerOptions {
+        machine: Machine::of(&config),
+        wall_clock: WallClock::fixed(0),
+        started_ns: 0,
+        recording,
+        candump: None,
+        black_box: Some(BlackBoxOptions { span_ns: 5_000_000_000, directory: folder.path().to_owned() }),
+        traces,
+    };
+    let mut logger = Logger::new(log, options, Box::new(|_| {}));
+    let mut held = Vec::with_capacity(minutes);
+    for cycle in 1..=minutes as u64 * 60_000 {
+        assert!(run.step(), "the run is over in cycle {cycle}: {:?}", run.supervisor().outcome());
+        logger.drain();
+        if cycle.is_multiple_of(60_000) {
+            held.push(HELD_BYTES.load(Ordering::Relaxed));
+        }
+    }
+    let summary = logger.finish();
+    assert_eq!((summary.records_dropped, summary.frames_dropped), (0, 0));
+    held
+}
+
+/// In one test, because all threads share the account.
+#[test]
+fn a_run_keeps_nothing_of_the_cycles_it_has_behind_it_but_the_index_of_its_recording() {
+    let held = held_every_minute(3, None);
+    assert_eq!(held, [held[0]; 3], "bytes held, without a recording");
+
+    let recorded = Length::default();
+    let destination = Destination::Stream("length".to_owned(), Box::new(recorded.clone()));
+    let held = held_every_minute(3, Some(destination));
+    // An MCAP file ends with an index of its chunks, which is collected on the way: some 270 bytes for each of 300 kB.
+    let in_two_minutes = recorded.0.load(Ordering::Relaxed) as i64 * 2 / 3;
+    assert!(in_two_minutes > 50_000_000, "{in_two_minutes} bytes were recorded in two minutes");
+    assert!(held[2] - held[0] < in_two_minutes / 512, "{held:?} bytes held, {in_two_minutes} recorded");
+}
