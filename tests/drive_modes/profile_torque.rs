@@ -118,6 +118,76 @@ fn a_stop_of_category_2_in_motion_becomes_one_of_category_1() {
     assert!(world.observe(0).is_braked);
 }
 
+/// A joint that hardly anything slows: at 20 deg/s it coasts for radians.
+fn without_friction() -> World {
+    let (config, buses) = erob_with(load("erob-modes/erob-pt.toml"), |parameters| {
+        parameters.joint.viscous_friction = 0.01;
+        parameters.joint.coulomb_friction = 0.02;
+    });
+    World::holding_on(config, buses)
+}
+
+/// Pushes the joint up to a speed and lets it go.
+fn let_go_at(world: &mut World, speed: f64) {
+    world.drive_to(7, 0, ProfileTarget::Torque(1.0));
+    world.run_until(|world| world.observe(0).velocity > speed);
+    world.drive_to(8, 0, ProfileTarget::Torque(0.0));
+}
+
+#[test]
+fn a_move_that_ends_with_no_torque_is_over_when_the_joint_stands() {
+    let mut world = World::holding(load("erob-modes/erob-pt.toml"));
+    let_go_at(&mut world, 0.3);
+    let standing = 0.02 * world.config.axes[0].limits.velocity;
+    world.run_until(|world| world.run.snapshot().finished_move == 8);
+    // It was reported a cycle or two before.
+    assert!(world.observe(0).velocity.abs() < 1.1 * standing, "{:?}", world.observe(0));
+    world.run_for(1);
+    assert_eq!((world.phase(), world.stops()), (Phase::Holding, vec![]));
+}
+
+#[test]
+fn a_joint_that_is_let_go_and_coasts_is_stopped_before_its_position_limit() {
+    let mut world = without_friction();
+    let limit = world.config.axes[0].limits.position_max;
+    let_go_at(&mut world, 0.8);
+    let outcome = world.run_to_the_end(|_| ());
+    let Outcome::Stopped(stop) = outcome else { panic!("{outcome:?}") };
+    assert_eq!((stop.rule, stop.axis, stop.category), (Rule::PositionLimit, Some(0), StopCategory::One));
+    let seen = world.observe(0);
+    assert!(seen.is_braked && seen.velocity == 0.0, "{seen:?}");
+    assert!((0.9 * limit..limit).contains(&seen.position), "{seen:?}, the limit is {limit}");
+    assert_eq!(world.stops().len(), 1);
+}
+
+/// The brake is made to hold a joint, not to stop one.
+#[test]
+fn a_joint_that_a_load_pulls_away_while_the_group_holds_is_slowed_by_the_drive_before_it_is_braked() {
+    let asked = [Some(Request::Disable), Some(Request::Stop(StopCategory::One)), None];
+    for asked in asked {
+        let mut world = without_friction();
+        world.port(0).bus.set_load_torque(1, 0.5).unwrap();
+        world.run_until(|world| world.observe(0).velocity > 0.8);
+        assert_eq!(world.phase(), Phase::Holding);
+        if let Some(request) = asked {
+            world.request(request);
+        }
+        let mut is_slowed = false;
+        while world.phase() != Phase::Disabled {
+            world.run_for(1);
+            let seen = world.observe(0);
+            is_slowed |= seen.state == State::QuickStopActive;
+            assert!(!seen.is_braked || seen.velocity.abs() < 0.15, "{asked:?}: {seen:?}");
+        }
+        assert!(is_slowed, "{asked:?}");
+        world.run_for(20);
+        let seen = world.observe(0);
+        assert!(seen.is_braked && seen.velocity == 0.0, "{asked:?}: {seen:?}");
+        assert!(seen.position < world.config.axes[0].limits.position_max, "{asked:?}: {seen:?}");
+        assert_eq!(world.stops().len(), 1, "{asked:?}: {:?}", world.stops());
+    }
+}
+
 #[test]
 fn firmware_without_interpolated_position_is_named() {
     let config = load("erob-modes/erob-ip.toml");

@@ -124,9 +124,16 @@ impl Axis {
         self.is_at_rest() && (!is_under_way || self.is_target_reached())
     }
 
-    /// Whether the drive has its target and says that it has reached it; an axis that follows set-points always has.
+    /// Whether the drive has its target and says that it has reached it; an axis that follows set-points always has. A joint
+    /// that is let go coasts, and is where it was sent when it stands.
     pub fn is_target_reached(&self) -> bool {
-        !self.is_profile() || self.profile.is_reached(self.parameters.dialect, self.statusword())
+        let is_there = || self.profile.is_reached(self.parameters.dialect, self.statusword());
+        !self.is_profile() || !self.is_adrift() && is_there()
+    }
+
+    /// Whether the joint moves and nobody drives it: with profile torque of zero it coasts, or a load pulls it.
+    pub fn is_adrift(&self) -> bool {
+        self.parameters.law == ControlLaw::ProfileTorque && !self.is_driven() && !self.is_standing()
     }
 
     /// Whether the drive is asked to go on moving without end: a velocity or a torque that is not zero.
@@ -191,7 +198,7 @@ impl Axis {
                 limit: self.parameters.following_error_limit,
             });
         }
-        if !self.is_driven() {
+        if !self.is_driven() && !self.is_adrift() {
             return Ok(());
         }
         let distance = self.way_to_rest();

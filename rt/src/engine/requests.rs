@@ -197,12 +197,12 @@ impl Engine {
         match self.phase {
             Phase::Passive => return Err(Objection::Phase.into()),
             Phase::Disabled | Phase::Disabling => {}
-            Phase::Enabling | Phase::Holding => {
+            _ if self.is_under_way() || self.phase == Phase::Stopping => {
+                self.begin_stop(Rule::Requested, Some(StopCategory::One), None, 0.0, 0.0, now_ns, door);
+            }
+            _ => {
                 self.goal = Goal::Disabled;
                 self.enter(Phase::Disabling, now_ns, door);
-            }
-            Phase::Moving | Phase::Streaming | Phase::Stopping => {
-                self.begin_stop(Rule::Requested, Some(StopCategory::One), None, 0.0, 0.0, now_ns, door);
             }
         }
         Ok(())

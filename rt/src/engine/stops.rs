@@ -109,11 +109,19 @@ impl Engine {
     /// A joint in profile torque cannot be held where it is: its drive closes no position loop. It stops by the drive's
     /// quick stop, which ends without torque, and the brake holds it.
     fn possible(&self, category: StopCategory) -> StopCategory {
-        let is_on_way = matches!(self.phase, Phase::Moving | Phase::Streaming);
         let is_unheld = self.axes.iter().any(|axis| axis.parameters().law == ControlLaw::ProfileTorque);
         match category {
-            StopCategory::Two if is_unheld && is_on_way => StopCategory::One,
+            StopCategory::Two if is_unheld && self.is_under_way() => StopCategory::One,
             category => category,
+        }
+    }
+
+    /// Whether a stop has something to bring to rest. A joint in profile torque may begin to move by itself.
+    pub(super) fn is_under_way(&self) -> bool {
+        match self.phase {
+            Phase::Moving | Phase::Streaming => true,
+            Phase::Holding => self.axes.iter().any(Axis::is_adrift),
+            _ => false,
         }
     }
 
@@ -129,11 +137,7 @@ impl Engine {
                 self.goal = Goal::NoVoltage;
                 self.enter(Phase::Disabling, now_ns, door);
             }
-            (Phase::Enabling, _) | (Phase::Holding, StopCategory::One) => {
-                self.goal = Goal::Disabled;
-                self.enter(Phase::Disabling, now_ns, door);
-            }
-            (Phase::Moving | Phase::Streaming, _) => {
+            _ if self.is_under_way() => {
                 if self.plan_stop().is_ok() {
                     self.enter(Phase::Stopping, now_ns, door);
                 } else {
@@ -143,7 +147,11 @@ impl Engine {
                     self.enter(Phase::Disabling, now_ns, door);
                 }
             }
-            (Phase::Stopping | Phase::Disabling | Phase::Holding, _) => {}
+            (Phase::Enabling, _) | (Phase::Holding, StopCategory::One) => {
+                self.goal = Goal::Disabled;
+                self.enter(Phase::Disabling, now_ns, door);
+            }
+            _ => {}
         }
     }
 
