@@ -232,7 +232,7 @@ fn run_and_break(config: &Config, break_it: impl FnOnce(&mut SimulatedBus)) -> (
 
 fn rule_and_axis(outcome: Option<Outcome>) -> (Rule, Option<u8>) {
     match outcome {
-        Some(Outcome::Stopped(stop)) => (stop.rule, stop.axis),
+        Some(Outcome::Stopped(stop)) => (stop.rule, stop.axis()),
         other => panic!("{other:?}"),
     }
 }

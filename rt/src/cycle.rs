@@ -102,9 +102,8 @@ impl Cycle {
             }
             engine.services(bus, door, batch);
         }
-        if !send(ports, &batches, clock.now_ns()) {
-            engine.not_taken();
-        }
+        let not_taken = send(ports, &batches, clock.now_ns());
+        engine.not_taken(not_taken);
         let finished_ns = clock.now_ns();
         timing.sent_ns = finished_ns.saturating_sub(timing.slot_start_ns);
         engine.finish(timing, finished_ns, &health, door);
@@ -139,18 +138,23 @@ fn release_sync<P: BusPort>(engine: &mut Engine, ports: &mut [P], slot: u64, now
     send(ports, &syncs, now_ns);
 }
 
-/// Sends to each bus its own frames. Returns whether all of them were taken.
+/// Sends to each bus its own frames. Returns the buses that did not take all of them.
 fn send<P: BusPort, const N: usize>(
     ports: &mut [P],
     batches: &[ArrayVec<Frame, N>],
     now_ns: Nanoseconds,
-) -> bool {
+) -> BusSet {
     let mut taken = [0; MAX_BUSES];
     let entries = ports.iter_mut().zip(batches).zip(&mut taken).filter(|((_, frames), _)| !frames.is_empty());
     let mut outgoing: ArrayVec<Outgoing<'_, P>, MAX_BUSES> =
         entries.map(|((port, frames), taken)| Outgoing { port, frames, taken }).collect();
     P::send_together(now_ns, &mut outgoing);
-    outgoing.iter().all(|entry| *entry.taken >= entry.frames.len())
+    drop(outgoing);
+    let mut not_taken = BusSet::default();
+    let is_short = |(_, (frames, taken)): &(usize, (&ArrayVec<Frame, N>, &usize))| **taken < frames.len();
+    let short = batches.iter().zip(&taken).enumerate().filter(is_short);
+    short.for_each(|(bus, _)| not_taken.insert(bus));
+    not_taken
 }
 
 /// Hands everything that has arrived to the engine. Returns the buses on which own frames still wait for the wire.

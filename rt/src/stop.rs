@@ -235,6 +235,36 @@ impl Phase {
     ];
 }
 
+/// What a stop concerns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
+pub enum Origin {
+    /// The group as a whole: what was asked of it, or how it is paced.
+    #[default]
+    Group,
+    /// The axis with this number.
+    Axis(u8),
+    /// The bus with this number.
+    Bus(u8),
+}
+
+impl Origin {
+    /// The axis, if it is one.
+    pub const fn axis(self) -> Option<u8> {
+        match self {
+            Self::Axis(axis) => Some(axis),
+            Self::Group | Self::Bus(_) => None,
+        }
+    }
+
+    /// The bus, if it is one.
+    pub const fn bus(self) -> Option<u8> {
+        match self {
+            Self::Bus(bus) => Some(bus),
+            Self::Group | Self::Axis(_) => None,
+        }
+    }
+}
+
 /// The one reason of a stop: the first fault, or that it was asked for where there is none.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StopReason {
@@ -242,8 +272,8 @@ pub struct StopReason {
     pub category: StopCategory,
     /// What was broken.
     pub rule: Rule,
-    /// The axis concerned; `None` when it was not one axis.
-    pub axis: Option<u8>,
+    /// What it concerns.
+    pub origin: Origin,
     /// What was seen, in the unit of the rule (rad, rad/s, rad/s², cycles, an error code …).
     pub value: f64,
     /// What would have been allowed, in the same unit.
@@ -252,4 +282,11 @@ pub struct StopReason {
     pub slot: u64,
     /// What the group was doing then.
     pub phase: Phase,
+}
+
+impl StopReason {
+    /// The axis concerned; `None` when it was not one axis.
+    pub const fn axis(&self) -> Option<u8> {
+        self.origin.axis()
+    }
 }

@@ -91,7 +91,7 @@ fn missed_feedback_is_counted_in_cycles_of_the_own_bus() {
     assert_eq!(rig.stops(), []);
     rig.run(3);
     assert_eq!(
-        rig.stops().iter().map(|stop| (stop.rule, stop.axis)).collect::<Vec<_>>(),
+        rig.stops().iter().map(|stop| (stop.rule, stop.axis())).collect::<Vec<_>>(),
         [(Rule::MissedFeedback, Some(4))]
     );
 }

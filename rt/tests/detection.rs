@@ -11,7 +11,7 @@ use takt_rt::pdo::{MappedObject, Mapping};
 use takt_rt::port::BusState;
 use takt_rt::record::EventKind;
 use takt_rt::refusal::Objection;
-use takt_rt::stop::{Phase, Rule, StopCategory};
+use takt_rt::stop::{Origin, Phase, Rule, StopCategory};
 use takt_rt::watch::TimingLevel;
 
 fn moving() -> Rig {
@@ -23,10 +23,10 @@ fn moving() -> Rig {
 }
 
 /// The one reason for which the group has stopped, with its value.
-fn reason(rig: &Rig) -> (Rule, Option<u8>, f64) {
+fn reason(rig: &Rig) -> (Rule, Origin, f64) {
     let stops = rig.stops();
     assert_eq!(stops.len(), 1, "{stops:?}");
-    (stops[0].rule, stops[0].axis, stops[0].value)
+    (stops[0].rule, stops[0].origin, stops[0].value)
 }
 
 #[test]
@@ -34,7 +34,7 @@ fn a_drive_that_boots_in_motion_stops_the_group() {
     let mut rig = moving();
     rig.buses[0].inject(Frame::of(Id::canopen(0x700, 2), [0]));
     rig.run(2);
-    assert_eq!(reason(&rig), (Rule::UnexpectedBootUp, Some(1), 0.0));
+    assert_eq!(reason(&rig), (Rule::UnexpectedBootUp, Origin::Axis(1), 0.0));
     rig.run_until(Phase::Disabled, 3_000);
     rig.assert_limits_kept();
 }
@@ -48,7 +48,7 @@ fn a_drive_that_has_not_reported_yet_is_silent_and_in_no_other_mode() {
     rig.drive(0).is_silent = true;
     rig.door.requests.extend([Request::Sync(true), Request::Activate, Request::Enable]);
     rig.run(10);
-    assert_eq!(reason(&rig), (Rule::MissedFeedback, Some(0), 4.0));
+    assert_eq!(reason(&rig), (Rule::MissedFeedback, Origin::Axis(0), 4.0));
 }
 
 #[test]
@@ -69,7 +69,7 @@ fn a_node_that_leaves_operational_or_whose_heartbeat_ceases_stops_the_group() {
     let mut rig = moving();
     rig.buses[0].inject(Frame::of(Id::canopen(0x700, 3), [0x7F]));
     rig.run(2);
-    assert_eq!(reason(&rig), (Rule::NodeNotOperational, Some(2), 127.0));
+    assert_eq!(reason(&rig), (Rule::NodeNotOperational, Origin::Axis(2), 127.0));
 
     let mut watched = parameters(3);
     watched.axes[1].heartbeat_timeout_cycles = Some(50);
@@ -89,7 +89,7 @@ fn whoever_else_sends_sync_set_points_or_commands_stops_the_group_and_is_named_b
         let mut rig = moving();
         rig.buses[0].inject(Frame::of(id, [0x81, 0]));
         rig.run(2);
-        assert_eq!(reason(&rig), (Rule::ForeignMaster, None, id.value().into()));
+        assert_eq!(reason(&rig), (Rule::ForeignMaster, Origin::Bus(0), id.value().into()));
         rig.run_until(Phase::Disabled, 3_000);
         rig.assert_limits_kept();
     }
@@ -111,7 +111,7 @@ fn two_nodes_with_one_number_are_told_from_feedback_that_comes_late() {
     twice(&mut rig, 10);
     assert!(rig.stops().is_empty());
     twice(&mut rig, 1);
-    assert_eq!(reason(&rig), (Rule::DuplicateNode, Some(0), 1.0));
+    assert_eq!(reason(&rig), (Rule::DuplicateNode, Origin::Axis(0), 1.0));
 }
 
 #[test]
@@ -119,7 +119,7 @@ fn an_emergency_message_without_a_fault_stops_the_group_with_its_code() {
     let mut rig = moving();
     rig.buses[0].inject(Frame::of(Id::canopen(0x080, 2), [0x10, 0x43, 0x09, 0, 0, 0, 0, 0]));
     rig.run(6);
-    assert_eq!(reason(&rig), (Rule::EmergencyMessage, Some(1), f64::from(0x4310)));
+    assert_eq!(reason(&rig), (Rule::EmergencyMessage, Origin::Axis(1), f64::from(0x4310)));
 }
 
 #[test]
@@ -127,7 +127,7 @@ fn an_error_passive_interface_stops_the_group_where_it_is() {
     let mut rig = moving();
     rig.buses[0].state = BusState::ErrorPassive;
     rig.run(2);
-    assert_eq!(reason(&rig).0, Rule::BusErrorPassive);
+    assert_eq!(reason(&rig), (Rule::BusErrorPassive, Origin::Bus(0), 0.0));
     rig.run_until(Phase::Holding, 3_000);
     rig.assert_limits_kept();
 }

@@ -13,7 +13,7 @@ use takt_rt::port::BusState;
 use takt_rt::profile::ProfileTarget;
 use takt_rt::record::{EventKind, MAX_AXES};
 use takt_rt::refusal::{Answer, Objection};
-use takt_rt::stop::{Phase, Rule, StopCategory};
+use takt_rt::stop::{Origin, Phase, Rule, StopCategory};
 
 fn rules(rig: &Rig) -> Vec<Rule> {
     rig.stops().iter().map(|stop| stop.rule).collect()
@@ -333,7 +333,7 @@ fn a_fault_of_one_axis_stops_all_with_one_reason_and_needs_a_reset() {
     let stops = rig.stops();
     assert_eq!(stops.len(), 1);
     assert_eq!(
-        (stops[0].rule, stops[0].axis, stops[0].value),
+        (stops[0].rule, stops[0].axis(), stops[0].value),
         (Rule::DriveFault, Some(1), f64::from(0x3211))
     );
     assert_eq!(stops[0].phase, Phase::Moving);
@@ -385,7 +385,7 @@ fn a_joint_that_does_not_follow_stops_the_group() {
     rig.move_to(2.5);
     rig.run_until(Phase::Stopping, 500);
     let stop = rig.stops()[0];
-    assert_eq!((stop.rule, stop.axis), (Rule::FollowingError, Some(2)));
+    assert_eq!((stop.rule, stop.axis()), (Rule::FollowingError, Some(2)));
     assert!(stop.value.abs() > 0.05 && stop.limit == 0.05);
     rig.run_until(Phase::Disabled, 1_000);
 }
@@ -409,7 +409,7 @@ fn a_drive_that_cannot_be_enabled_ends_the_attempt() {
     rig.request(Request::Enable);
     rig.run_until(Phase::Disabled, 600);
     let stop = rig.stops()[0];
-    assert_eq!((stop.rule, stop.axis), (Rule::EnableTimeout, Some(1)));
+    assert_eq!((stop.rule, stop.axis()), (Rule::EnableTimeout, Some(1)));
 }
 
 #[test]
@@ -421,6 +421,7 @@ fn a_lost_bus_stops_the_group() {
         rig.buses[1].state = state;
         rig.run(1);
         assert_eq!(rules(&rig), [Rule::BusLost]);
+        assert_eq!(rig.stops()[0].origin, Origin::Bus(1));
         assert_eq!(rig.phase(), Phase::Stopping);
     }
 }
@@ -443,6 +444,7 @@ fn nothing_is_queued_behind_set_points_that_wait_for_the_wire() {
     rig.buses[0].unconfirmed = 3;
     rig.run(7);
     assert_eq!(rules(&rig), [Rule::NotTransmitted]);
+    assert_eq!(rig.stops()[0].origin, Origin::Bus(0));
 }
 
 #[test]

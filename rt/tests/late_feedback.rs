@@ -134,7 +134,10 @@ fn a_drive_that_always_answers_whole_cycles_late_is_never_led_up_and_its_latenes
             rig.request(Request::Enable);
             rig.run_until(Phase::Disabled, 200);
             let stops = rig.stops();
-            assert_eq!((stops.len(), stops[0].rule, stops[0].axis), (attempt, Rule::MissedFeedback, Some(0)));
+            assert_eq!(
+                (stops.len(), stops[0].rule, stops[0].axis()),
+                (attempt, Rule::MissedFeedback, Some(0))
+            );
             assert_eq!(
                 (stops[0].value, stops[0].limit, stops[0].phase),
                 (cycles as f64, 0.0, Phase::Enabling)

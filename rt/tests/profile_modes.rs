@@ -94,7 +94,7 @@ fn each_velocity_and_torque_has_an_expiry_of_its_own_and_a_position_has_none() {
     assert_eq!((rig.phase(), rig.stops().len()), (Phase::Moving, 0));
     rig.run(20);
     let stop = rig.stops()[0];
-    assert_eq!((stop.rule, stop.axis), (Rule::StaleCommand, Some(VELOCITY)));
+    assert_eq!((stop.rule, stop.axis()), (Rule::StaleCommand, Some(VELOCITY)));
     rig.run_until(Phase::Disabled, 5_000);
     assert_eq!(rig.stops().len(), 1);
 }
@@ -124,7 +124,7 @@ fn a_set_point_that_is_not_acknowledged_stops_the_group() {
     assert_eq!(rig.stops(), []);
     rig.run(10);
     let stop = rig.stops()[0];
-    assert_eq!((stop.rule, stop.axis, stop.value), (Rule::NotAcknowledged, Some(POSITION), 501.0));
+    assert_eq!((stop.rule, stop.axis(), stop.value), (Rule::NotAcknowledged, Some(POSITION), 501.0));
     rig.run_until(Phase::Disabled, 5_000);
     assert_eq!(rig.stops().len(), 1);
 }
@@ -141,7 +141,7 @@ fn on_a_bus_with_fewer_cycles_the_acknowledgement_is_due_in_the_same_time() {
     assert_eq!(rig.stops(), []);
     rig.run(20);
     let stop = rig.stops()[0];
-    assert_eq!((stop.rule, stop.axis, stop.value), (Rule::NotAcknowledged, Some(4), 251.0));
+    assert_eq!((stop.rule, stop.axis(), stop.value), (Rule::NotAcknowledged, Some(4), 251.0));
 }
 
 /// The others decelerate meanwhile; what has fallen out is not led back by that.

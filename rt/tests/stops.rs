@@ -63,7 +63,7 @@ fn a_fault_on_the_way_of_a_stop_that_was_asked_for_takes_its_place_and_must_be_r
         let hardest = category.min(StopCategory::One);
         assert_eq!(told(&rig), [(Rule::Requested, category), (Rule::UnexpectedBootUp, hardest)]);
         let shown = rig.door.snapshot.stop.unwrap();
-        assert_eq!((shown.rule, shown.axis, shown.category), (Rule::UnexpectedBootUp, Some(1), hardest));
+        assert_eq!((shown.rule, shown.axis(), shown.category), (Rule::UnexpectedBootUp, Some(1), hardest));
         rig.run_until(Phase::Disabled, 3_000);
         rig.assert_limits_kept();
 

@@ -12,7 +12,7 @@ use std::path::PathBuf;
 use mcap::{McapError, McapResult};
 use takt_rt::cia402::State;
 use takt_rt::record::{CycleRecord, Event, EventKind};
-use takt_rt::stop::{Phase, Rule, StopCategory, StopReason};
+use takt_rt::stop::{Origin, Phase, Rule, StopCategory, StopReason};
 use takt_rt::time::Nanoseconds;
 
 use super::destination::Destination;
@@ -82,7 +82,7 @@ impl Fault {
                 let as_stop = StopReason {
                     category: StopCategory::Zero,
                     rule: Rule::DriveFault,
-                    axis: Some(*axis),
+                    origin: Origin::Axis(*axis),
                     value: f64::from(*code),
                     limit: 0.0,
                     slot: *slot,
@@ -102,7 +102,9 @@ impl Fault {
             ("reason".to_owned(), self.words(machine)),
             ("slot".to_owned(), last_slot.to_string()),
         ]);
-        let mut add = |key: &str, value: String| metadata.insert(key.to_owned(), value);
+        let mut add = |key: &str, value: String| {
+            metadata.insert(key.to_owned(), value);
+        };
         match self {
             Self::Stop(stop) => {
                 add("slot", stop.slot.to_string());
@@ -110,8 +112,10 @@ impl Fault {
                 add("phase", words::phase(stop.phase).to_owned());
                 add("value", stop.value.to_string());
                 add("limit", stop.limit.to_string());
-                if let Some(axis) = stop.axis {
-                    add("axis", machine.axis_name(axis));
+                match stop.origin {
+                    Origin::Group => {}
+                    Origin::Axis(axis) => add("axis", machine.axis_name(axis)),
+                    Origin::Bus(bus) => add("bus", machine.bus_name(bus)),
                 }
             }
             Self::Drive { axis, code, slot, phase } => {

@@ -104,6 +104,11 @@ impl<'a> CdrDecoder<'a> {
         Some(Self { body: message.strip_prefix(&HEADER)?, at: 0 })
     }
 
+    /// Whether the message has nothing more.
+    pub fn is_over(&self) -> bool {
+        self.at >= self.body.len()
+    }
+
     fn take<const N: usize>(&mut self) -> Option<[u8; N]> {
         let from = self.at.next_multiple_of(N);
         let bytes = self.body.get(from..)?.first_chunk::<N>()?;

@@ -102,6 +102,11 @@ impl Machine {
         self.axes.get(usize::from(axis)).map_or_else(|| format!("axis {axis}"), |axis| axis.name.clone())
     }
 
+    /// The name of a bus; its number when it has none.
+    pub fn bus_name(&self, bus: u8) -> String {
+        self.buses.get(usize::from(bus)).map_or_else(|| format!("bus {bus}"), |bus| bus.name.clone())
+    }
+
     /// The unit of an axis.
     pub fn axis_unit(&self, axis: u8) -> Unit {
         self.axes.get(usize::from(axis)).map_or(Unit::Radian, |axis| axis.unit)

@@ -15,15 +15,16 @@ pub use decode::{decode_axis, decode_bus, decode_cycle, decode_event};
 pub struct MessageType {
     pub name: &'static str,
     pub definition: &'static str,
-    /// Fields at the end that recordings of earlier versions do not have.
-    pub later_fields: usize,
+    /// How many of the fields at the end the recordings of each earlier version do not have.
+    pub later_fields: &'static [usize],
 }
 
 impl MessageType {
     /// Whether messages of another definition of this type can be read.
     pub fn can_be_read_as(&self, definition: &str) -> bool {
         let (known, other) = (layout(self.definition), layout(definition));
-        known == other || known.len() == other.len() + self.later_fields && known.starts_with(&other)
+        let is_earlier = self.later_fields.iter().any(|later| known.len() == other.len() + later);
+        known == other || is_earlier && known.starts_with(&other)
     }
 }
 
@@ -31,33 +32,36 @@ impl MessageType {
 pub const CYCLE: MessageType = MessageType {
     name: "takt_msgs/msg/Cycle",
     definition: include_str!("messages/Cycle.msg"),
-    later_fields: 0,
+    later_fields: &[],
 };
 
 /// One axis in a cycle.
 pub const AXIS: MessageType = MessageType {
     name: "takt_msgs/msg/Axis",
     definition: include_str!("messages/Axis.msg"),
-    later_fields: 0,
+    later_fields: &[],
 };
 
 /// An event.
 pub const EVENT: MessageType = MessageType {
     name: "takt_msgs/msg/Event",
     definition: include_str!("messages/Event.msg"),
-    later_fields: 2,
+    later_fields: &[1, 3],
 };
 
 /// A frame on a bus.
 pub const FRAME: MessageType = MessageType {
     name: "takt_msgs/msg/Frame",
     definition: include_str!("messages/Frame.msg"),
-    later_fields: 0,
+    later_fields: &[],
 };
 
 /// The health of a bus.
-pub const BUS: MessageType =
-    MessageType { name: "takt_msgs/msg/Bus", definition: include_str!("messages/Bus.msg"), later_fields: 0 };
+pub const BUS: MessageType = MessageType {
+    name: "takt_msgs/msg/Bus",
+    definition: include_str!("messages/Bus.msg"),
+    later_fields: &[],
+};
 
 /// The messages that are read again.
 pub const READ: [&MessageType; 4] = [&CYCLE, &AXIS, &EVENT, &BUS];
@@ -128,6 +132,8 @@ struct EventFields {
     manufacturer: [u8; 5],
     /// What was asked for and what stands against it, by their numbers; `None` in a recording of an earlier version.
     refusal: Option<(u8, u8)>,
+    /// `None` in a recording of an earlier version too.
+    bus: Option<u8>,
 }
 
 impl EventFields {
@@ -139,7 +145,8 @@ impl EventFields {
             }
             EventKind::Stop(stop) => Self {
                 kind: 1,
-                axis: stop.axis,
+                axis: stop.axis(),
+                bus: stop.origin.bus(),
                 phase_from: stop.phase as u8,
                 category: stop.category as u8,
                 rule: stop.rule as u8,
@@ -199,7 +206,8 @@ pub fn encode_event(event: &Event, text: &str, encoder: &mut CdrEncoder) {
         .u8(fields.error_register)
         .octets(fields.manufacturer)
         .u8(fields.refusal.map_or(0, |(request, _)| request))
-        .u8(fields.refusal.map_or(0, |(_, objection)| objection));
+        .u8(fields.refusal.map_or(0, |(_, objection)| objection))
+        .i16(fields.bus.map_or(-1, i16::from));
 }
 
 /// Encodes a [`FRAME`].
@@ -236,7 +244,7 @@ mod tests {
     use super::*;
     use takt_rt::cia402::State;
     use takt_rt::refusal::{Objection, Refusal, RequestKind};
-    use takt_rt::stop::{Phase, Rule, StopCategory, StopReason};
+    use takt_rt::stop::{Origin, Phase, Rule, StopCategory, StopReason};
     use takt_rt::watch::TimingLevel;
 
     /// The constants of a definition that stand in front of `field`, with the names as Rust writes them.
@@ -265,10 +273,10 @@ mod tests {
             let fields = layout(EVENT.definition);
             fields[..fields.len() - missing].join("\n")
         };
-        assert!(EVENT.can_be_read_as(&earlier(0)) && EVENT.can_be_read_as(&earlier(2)));
-        assert!(!EVENT.can_be_read_as(&earlier(1)) && !EVENT.can_be_read_as(&earlier(3)));
+        assert!([0, 1, 3].iter().all(|missing| EVENT.can_be_read_as(&earlier(*missing))));
+        assert!(!EVENT.can_be_read_as(&earlier(2)) && !EVENT.can_be_read_as(&earlier(4)));
         assert!(!EVENT.can_be_read_as(&(earlier(0) + "\nuint8 another")));
-        let other = earlier(2).replace("uint64 slot", "uint32 slot");
+        let other = earlier(3).replace("uint64 slot", "uint32 slot");
         assert!(!EVENT.can_be_read_as(&other) && !CYCLE.can_be_read_as(""));
     }
 
@@ -297,7 +305,7 @@ mod tests {
             EventKind::Stop(StopReason {
                 category: StopCategory::One,
                 rule: Rule::DriveFault,
-                axis: Some(3),
+                origin: Origin::Axis(3),
                 value: 0.0,
                 limit: 0.0,
                 slot: 0,

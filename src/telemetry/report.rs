@@ -194,6 +194,8 @@ pub struct StopReport {
     pub rule: &'static str,
     /// The axis concerned.
     pub axis: Option<String>,
+    /// The bus concerned.
+    pub bus: Option<String>,
     /// What was seen, in the unit of the rule.
     pub value: f64,
     /// What would have been allowed.
@@ -356,7 +358,8 @@ impl StopReport {
             category: stop.category as u8,
             reason: words::stop_cause(stop, machine),
             rule: words::rule_key(stop.rule),
-            axis: stop.axis.map(|axis| machine.axis_name(axis)),
+            axis: stop.axis().map(|axis| machine.axis_name(axis)),
+            bus: stop.origin.bus().map(|bus| machine.bus_name(bus)),
             value: stop.value,
             limit: stop.limit,
             slot: stop.slot,

@@ -255,7 +255,7 @@ fn a_drive_that_does_not_acknowledge_or_does_not_let_go_stops_the_group() {
         world.drive_to(7, 0, ProfileTarget::Position(0.5));
         let outcome = world.run_to_the_end(|_| ());
         let Outcome::Stopped(stop) = outcome else { panic!("{outcome:?}") };
-        assert_eq!((stop.rule, stop.axis), (Rule::NotAcknowledged, Some(0)));
+        assert_eq!((stop.rule, stop.axis()), (Rule::NotAcknowledged, Some(0)));
         assert_eq!(world.stops().len(), 1);
     }
 }
@@ -295,6 +295,6 @@ fn a_joint_that_does_not_get_to_its_target_stops_the_group_instead_of_moving_for
     world.run_until(|world| !world.stops().is_empty());
     let stops = world.stops();
     let seen = [Rule::FollowingError, Rule::DriveFault, Rule::DriveDisabled];
-    assert!(seen.contains(&stops[0].rule) && stops[0].axis == Some(0), "{stops:?}");
+    assert!(seen.contains(&stops[0].rule) && stops[0].axis() == Some(0), "{stops:?}");
     world.run_until(|world| world.phase() == Phase::Disabled);
 }

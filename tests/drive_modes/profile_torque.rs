@@ -65,7 +65,7 @@ fn a_joint_that_gets_too_fast_is_let_go_and_braked() {
     let mut fastest = 0.0_f64;
     let outcome = world.run_to_the_end(|world| fastest = fastest.max(world.observe(0).velocity));
     let Outcome::Stopped(stop) = outcome else { panic!("{outcome:?}") };
-    assert_eq!((stop.rule, stop.axis, stop.category), (Rule::VelocityLimit, Some(0), StopCategory::One));
+    assert_eq!((stop.rule, stop.axis(), stop.category), (Rule::VelocityLimit, Some(0), StopCategory::One));
     assert!(fastest < 1.3 * limit, "{fastest}");
     assert_eq!(world.stops().len(), 1);
     let seen = world.observe(0);
@@ -153,7 +153,7 @@ fn a_joint_that_is_let_go_and_coasts_is_stopped_before_its_position_limit() {
     let_go_at(&mut world, 0.8);
     let outcome = world.run_to_the_end(|_| ());
     let Outcome::Stopped(stop) = outcome else { panic!("{outcome:?}") };
-    assert_eq!((stop.rule, stop.axis, stop.category), (Rule::PositionLimit, Some(0), StopCategory::One));
+    assert_eq!((stop.rule, stop.axis(), stop.category), (Rule::PositionLimit, Some(0), StopCategory::One));
     let seen = world.observe(0);
     assert!(seen.is_braked && seen.velocity == 0.0, "{seen:?}");
     assert!((0.9 * limit..limit).contains(&seen.position), "{seen:?}, the limit is {limit}");

@@ -61,7 +61,7 @@ fn a_velocity_that_nobody_renews_expires_and_the_group_stops() {
         world.request(Request::SetProfileTarget(ProfileMove { id: 7, axis: 0, target, valid_until_ns }));
         world.run_until(|world| !world.stops().is_empty());
         let stop = world.stops()[0];
-        assert_eq!((stop.rule, stop.axis, stop.category), (Rule::StaleCommand, Some(0), StopCategory::Two));
+        assert_eq!((stop.rule, stop.axis(), stop.category), (Rule::StaleCommand, Some(0), StopCategory::Two));
         let late_ns = world.run.snapshot().at_ns - valid_until_ns;
         assert!(late_ns <= 2 * MILLISECOND_NS, "{late_ns}");
         while world.phase() == Phase::Stopping {

@@ -2,7 +2,7 @@
 
 use takt::controller::Outcome;
 use takt_rt::port::BusState;
-use takt_rt::stop::{Phase, Rule, StopCategory};
+use takt_rt::stop::{Origin, Phase, Rule, StopCategory};
 
 use crate::arm::{Played, arm, play};
 
@@ -22,109 +22,115 @@ fn assert_safe(fault: &str, played: &Played) {
     assert_eq!(played.missed_slots, 0, "{fault}");
 }
 
-/// The stop that a fault leads to, and in how many milliseconds it is begun at the latest.
-struct Stops(&'static str, Rule, Option<u8>, f64);
+/// The stop that a fault leads to, whom it names, and in how many milliseconds it is begun at the latest.
+struct Stops(&'static str, Rule, Origin, f64);
 
 const STOPS: [Stops; 38] = {
+    use Origin::{Axis, Bus};
     use Rule::*;
     [
         // Feedback may be missing for five cycles; the sixth is one too many.
-        Stops("kind = \"drop\"\nbus = \"base\"\nfunction = \"tpdo\"", MissedFeedback, Some(0), 6.0),
-        Stops("kind = \"drop\"\naxis = \"joint5\"\nfunction = \"tpdo\"", MissedFeedback, Some(4), 6.0),
-        Stops("kind = \"drop\"\nbus = \"base\"\nfunction = \"sync\"", MissedFeedback, Some(0), 7.0),
+        Stops("kind = \"drop\"\nbus = \"base\"\nfunction = \"tpdo\"", MissedFeedback, Axis(0), 6.0),
+        Stops("kind = \"drop\"\naxis = \"joint5\"\nfunction = \"tpdo\"", MissedFeedback, Axis(4), 6.0),
+        Stops("kind = \"drop\"\nbus = \"base\"\nfunction = \"sync\"", MissedFeedback, Axis(0), 7.0),
         // Late is missed, however regularly it comes.
         Stops(
             "kind = \"delay\"\nbus = \"base\"\nfunction = \"tpdo\"\nby = \"1 cycles\"",
             MissedFeedback,
-            Some(0),
+            Axis(0),
             6.0,
         ),
         Stops(
             "kind = \"delay\"\nbus = \"base\"\nfunction = \"tpdo\"\nby = \"2 cycles\"",
             MissedFeedback,
-            Some(0),
+            Axis(0),
             6.0,
         ),
         Stops(
             "kind = \"delay\"\naxis = \"joint5\"\nfunction = \"tpdo\"\nby = \"5 ms\"",
             MissedFeedback,
-            Some(4),
+            Axis(4),
             6.0,
         ),
         Stops(
             "kind = \"delay\"\nbus = \"wrist\"\nfunction = \"tpdo\"\nby = \"600 us\"",
             MissedFeedback,
-            Some(3),
+            Axis(3),
             6.0,
         ),
-        Stops("kind = \"full-queue\"\nbus = \"base\"", NotTransmitted, None, 7.0),
-        Stops("kind = \"full-queue\"\nbus = \"base\"\nfunction = \"rpdo\"", NotTransmitted, None, 7.0),
-        Stops("kind = \"flood\"\nbus = \"base\"\nfor = \"20 ms\"", NotTransmitted, None, 7.0),
-        Stops("kind = \"silent-node\"\naxis = \"joint2\"", MissedFeedback, Some(1), 6.0),
-        Stops("kind = \"reboot\"\naxis = \"joint6\"", MissedFeedback, Some(5), 6.0),
+        Stops("kind = \"full-queue\"\nbus = \"base\"", NotTransmitted, Bus(0), 7.0),
+        Stops("kind = \"full-queue\"\nbus = \"base\"\nfunction = \"rpdo\"", NotTransmitted, Bus(0), 7.0),
+        Stops("kind = \"flood\"\nbus = \"base\"\nfor = \"20 ms\"", NotTransmitted, Bus(0), 7.0),
+        Stops("kind = \"silent-node\"\naxis = \"joint2\"", MissedFeedback, Axis(1), 6.0),
+        Stops("kind = \"reboot\"\naxis = \"joint6\"", MissedFeedback, Axis(5), 6.0),
         Stops(
             "kind = \"wrong-mapping\"\naxis = \"joint1\"\ncontents = \"short\"",
             MissedFeedback,
-            Some(0),
+            Axis(0),
             6.0,
         ),
-        Stops("kind = \"foreign-nmt\"\nbus = \"wrist\"\ncommand = \"stop\"", ForeignMaster, None, 2.0),
+        Stops("kind = \"foreign-nmt\"\nbus = \"wrist\"\ncommand = \"stop\"", ForeignMaster, Bus(1), 2.0),
         Stops(
             "kind = \"foreign-nmt\"\naxis = \"joint3\"\ncommand = \"pre-operational\"",
             ForeignMaster,
-            None,
+            Bus(0),
             2.0,
         ),
         Stops(
             "kind = \"foreign-nmt\"\naxis = \"joint3\"\ncommand = \"reset-node\"",
             ForeignMaster,
-            None,
+            Bus(0),
             2.0,
         ),
-        Stops("kind = \"foreign-sync\"\nbus = \"base\"\nperiod = \"1.3 ms\"", ForeignMaster, None, 4.0),
-        Stops("kind = \"foreign-set-points\"\naxis = \"joint1\"\nfor = \"0.2 s\"", ForeignMaster, None, 4.0),
+        Stops("kind = \"foreign-sync\"\nbus = \"base\"\nperiod = \"1.3 ms\"", ForeignMaster, Bus(0), 4.0),
+        Stops(
+            "kind = \"foreign-set-points\"\naxis = \"joint1\"\nfor = \"0.2 s\"",
+            ForeignMaster,
+            Bus(0),
+            4.0,
+        ),
         Stops(
             "kind = \"foreign-nmt\"\naxis = \"joint1\"\ncommand = \"reset-communication\"",
             ForeignMaster,
-            None,
+            Bus(0),
             2.0,
         ),
-        Stops("kind = \"duplicate\"\nbus = \"base\"", DuplicateNode, Some(0), 9.0),
+        Stops("kind = \"duplicate\"\nbus = \"base\"", DuplicateNode, Axis(0), 9.0),
         // Whoever takes a number that is in use boots first.
-        Stops("kind = \"duplicate-node\"\naxis = \"joint1\"", UnexpectedBootUp, Some(0), 2.0),
-        Stops("kind = \"emergency\"\naxis = \"joint1\"\ncode = 0x4210", EmergencyMessage, Some(0), 6.0),
+        Stops("kind = \"duplicate-node\"\naxis = \"joint1\"", UnexpectedBootUp, Axis(0), 2.0),
+        Stops("kind = \"emergency\"\naxis = \"joint1\"\ncode = 0x4210", EmergencyMessage, Axis(0), 6.0),
         Stops(
             "kind = \"encoder-jump\"\naxis = \"joint1\"\nby = \"3 deg\"",
             ImplausibleFeedback,
-            Some(0),
+            Axis(0),
             3.0,
         ),
-        Stops("kind = \"echo-loss\"\nbus = \"wrist\"\nfor = \"100 ms\"", NotTransmitted, None, 7.0),
-        Stops("kind = \"bus-off\"\nbus = \"wrist\"", BusLost, None, 1.0),
-        Stops("kind = \"bus-off\"\nbus = \"wrist\"\nrestart = \"100 ms\"", BusLost, None, 1.0),
-        Stops("kind = \"interface-down\"\nbus = \"base\"\nfor = \"100 ms\"", BusLost, None, 1.0),
+        Stops("kind = \"echo-loss\"\nbus = \"wrist\"\nfor = \"100 ms\"", NotTransmitted, Bus(1), 7.0),
+        Stops("kind = \"bus-off\"\nbus = \"wrist\"", BusLost, Bus(1), 1.0),
+        Stops("kind = \"bus-off\"\nbus = \"wrist\"\nrestart = \"100 ms\"", BusLost, Bus(1), 1.0),
+        Stops("kind = \"interface-down\"\nbus = \"base\"\nfor = \"100 ms\"", BusLost, Bus(0), 1.0),
         // The window of the following error is 50 ms; before that the joint must fall behind by 0.1 rad.
-        Stops("kind = \"stall\"\naxis = \"joint1\"", FollowingError, Some(0), 200.0),
-        Stops("kind = \"stuck-brake\"\naxis = \"joint1\"", FollowingError, Some(0), 200.0),
-        Stops("kind = \"drop\"\naxis = \"joint1\"\nfunction = \"rpdo\"", FollowingError, Some(0), 200.0),
-        Stops("kind = \"wrong-mapping\"\naxis = \"joint1\"", ImplausibleFeedback, Some(0), 3.0),
-        Stops("kind = \"mode-display\"\naxis = \"joint4\"\nmode = 1", ModeChanged, Some(3), 2.0),
-        Stops("kind = \"torque-off\"\naxis = \"joint4\"", DriveDisabled, Some(3), 2.0),
-        Stops("kind = \"alarm\"\naxis = \"joint4\"\ncode = 0x7500", DriveFault, Some(3), 2.0),
-        Stops("kind = \"over-voltage\"\naxis = \"joint2\"", DriveFault, Some(1), 2.0),
-        Stops("kind = \"over-temperature\"\naxis = \"joint2\"", DriveFault, Some(1), 2.0),
-        Stops("kind = \"battery\"\naxis = \"joint2\"", DriveFault, Some(1), 2.0),
-        Stops("kind = \"statusword\"\naxis = \"joint2\"\nset = 0x0008", DriveFault, Some(1), 2.0),
+        Stops("kind = \"stall\"\naxis = \"joint1\"", FollowingError, Axis(0), 200.0),
+        Stops("kind = \"stuck-brake\"\naxis = \"joint1\"", FollowingError, Axis(0), 200.0),
+        Stops("kind = \"drop\"\naxis = \"joint1\"\nfunction = \"rpdo\"", FollowingError, Axis(0), 200.0),
+        Stops("kind = \"wrong-mapping\"\naxis = \"joint1\"", ImplausibleFeedback, Axis(0), 3.0),
+        Stops("kind = \"mode-display\"\naxis = \"joint4\"\nmode = 1", ModeChanged, Axis(3), 2.0),
+        Stops("kind = \"torque-off\"\naxis = \"joint4\"", DriveDisabled, Axis(3), 2.0),
+        Stops("kind = \"alarm\"\naxis = \"joint4\"\ncode = 0x7500", DriveFault, Axis(3), 2.0),
+        Stops("kind = \"over-voltage\"\naxis = \"joint2\"", DriveFault, Axis(1), 2.0),
+        Stops("kind = \"over-temperature\"\naxis = \"joint2\"", DriveFault, Axis(1), 2.0),
+        Stops("kind = \"battery\"\naxis = \"joint2\"", DriveFault, Axis(1), 2.0),
+        Stops("kind = \"statusword\"\naxis = \"joint2\"\nset = 0x0008", DriveFault, Axis(1), 2.0),
     ]
 };
 
 #[test]
 fn every_fault_with_a_rule_stops_the_whole_arm_in_time_and_says_why() {
-    for Stops(fault, rule, axis, within_ms) in STOPS {
+    for Stops(fault, rule, origin, within_ms) in STOPS {
         let played = in_motion(fault);
         assert_safe(fault, &played);
         let [stop] = played.stops.as_slice() else { panic!("{fault}: {:?}", played.outcome) };
-        assert_eq!((stop.rule, stop.axis), (rule, axis), "{fault}");
+        assert_eq!((stop.rule, stop.origin), (rule, origin), "{fault}");
         assert_eq!((stop.category, stop.phase), (StopCategory::One, Phase::Moving), "{fault}");
         assert!(played.detection_ms.is_some_and(|ms| (0.0..=within_ms).contains(&ms)), "{fault}: {played:?}");
         assert_eq!(played.phases.last(), Some(&Phase::Disabled), "{fault}: {:?}", played.phases);
@@ -142,7 +148,7 @@ fn a_drive_whose_heartbeat_ceases_stops_the_whole_arm_though_it_still_reports() 
     let played = play(&config, &format!("[[fault]]\n{fault}\n{IN_MOTION}"));
     assert_safe(fault, &played);
     let [stop] = played.stops.as_slice() else { panic!("{:?}", played.outcome) };
-    assert_eq!((stop.rule, stop.axis, stop.category), (Rule::NodeLost, Some(3), StopCategory::One));
+    assert_eq!((stop.rule, stop.axis(), stop.category), (Rule::NodeLost, Some(3), StopCategory::One));
     assert_eq!((stop.value, stop.limit), (61.0, 60.0));
     let well = play(&config, "[[fault]]\nkind = \"drop\"\nbus = \"base\"\nat = \"1000 s\"");
     assert_eq!(well.outcome, Some(Outcome::Finished));
@@ -286,7 +292,7 @@ fn a_second_fault_while_stopping_does_not_become_the_reason() {
          [[fault]]\nkind = \"over-voltage\"\naxis = \"joint1\"\nwhen = \"stopping\"\nat = \"20 cycles\"",
     );
     assert_safe("two at once", &played);
-    assert_eq!((played.stops[0].rule, played.stops[0].axis), (Rule::DriveDisabled, Some(4)));
+    assert_eq!((played.stops[0].rule, played.stops[0].axis()), (Rule::DriveDisabled, Some(4)));
     assert_eq!(played.emergencies, [(0, 0x3210)]);
     assert!(!played.phases.contains(&Phase::Holding) || played.phases.last() == Some(&Phase::Disabled));
 }

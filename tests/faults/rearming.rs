@@ -73,6 +73,6 @@ fn a_fault_that_a_reset_does_not_clear_stops_the_group_again_with_its_code() {
     run_until(&mut run, |run| run.snapshot().phase == Phase::Enabling);
     run_until(&mut run, |run| run.snapshot().phase == Phase::Disabled);
     let again = latched(&run).unwrap();
-    assert_eq!((again.rule, again.axis), (Rule::DriveFault, Some(0)));
+    assert_eq!((again.rule, again.axis()), (Rule::DriveFault, Some(0)));
     assert_eq!((again.value, first.value), (f64::from(0x730F), f64::from(0x730F)));
 }

@@ -91,7 +91,7 @@ fn the_report_has_the_keys_of_the_contract_with_the_values_of_the_run() {
     assert_eq!((&report["telemetry"]["records"], &report["telemetry"]["dropped"]), (&json!(18), &json!(2)));
     let expected = json!({
         "category": 1, "reason": "slide was 0.2500 m from its set-point (allowed: 0.1250 m)",
-        "rule": "following_error", "axis": "slide", "value": 0.25, "limit": 0.125, "slot": 7,
+        "rule": "following_error", "axis": "slide", "bus": null, "value": 0.25, "limit": 0.125, "slot": 7,
         "phase": "moving",
     });
     assert_eq!(report["stop"], expected);

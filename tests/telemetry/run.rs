@@ -11,7 +11,7 @@ use takt::telemetry::{
 use takt_rt::cia402;
 use takt_rt::door::Door;
 use takt_rt::record::{AxisRecord, CycleRecord, Event, EventKind, MAX_AXES, Timing};
-use takt_rt::stop::{Phase, Rule, StopCategory, StopReason};
+use takt_rt::stop::{Origin, Phase, Rule, StopCategory, StopReason};
 
 /// 2023-11-14 22:13:20 UTC
 pub const UNIX_AT_ZERO_NS: u64 = 1_700_000_000_000_000_000;
@@ -21,7 +21,7 @@ pub const CYCLE_NS: u64 = 1_000_000;
 pub const STOP: StopReason = StopReason {
     category: StopCategory::One,
     rule: Rule::FollowingError,
-    axis: Some(1),
+    origin: Origin::Axis(1),
     value: 0.25,
     limit: 0.125,
     slot: 7,

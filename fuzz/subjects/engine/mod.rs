@@ -213,7 +213,11 @@ impl Machine {
     /// What else can be wrong with buses and drives.
     fn disturb(&mut self, input: &mut Input<'_>) {
         match input.byte() % 4 {
-            0 => self.engine.not_taken(),
+            0 => {
+                let mut full = BusSet::default();
+                full.insert(self.slot as usize % self.buses.len());
+                self.engine.not_taken(full);
+            }
             1 => {
                 let bus = usize::from(input.byte()) % self.buses.len();
                 if !self.held_back.take(bus) {

@@ -116,7 +116,7 @@ impl Watch {
         }
         if let Some(stop) = snapshot.stop {
             let told = self.told.expect("nobody was told of the stop");
-            assert_eq!((told.rule, told.axis, told.slot), (stop.rule, stop.axis, stop.slot));
+            assert_eq!((told.rule, told.origin, told.slot), (stop.rule, stop.origin, stop.slot));
             assert!(stop.category <= told.category, "{stop:?} was {told:?}");
         }
         if self.phase == Phase::Stopping {

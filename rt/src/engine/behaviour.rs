@@ -9,7 +9,7 @@ use crate::door::Door;
 use crate::guard::{OnViolation, Violation};
 use crate::plan::State;
 use crate::record::{EventKind, MAX_AXES};
-use crate::stop::{Phase, Rule, StopCategory};
+use crate::stop::{Origin, Phase, Rule, StopCategory};
 use crate::time::Nanoseconds;
 
 impl Engine {
@@ -58,9 +58,10 @@ impl Engine {
         if self.axes.iter().all(|axis| axis.is_ready() && axis.is_enabled()) {
             self.enter(Phase::Holding, now_ns, door);
         } else if self.phase_cycles > self.enable_timeout_cycles {
-            let axis = self.axes.iter().position(|axis| !axis.is_enabled()).map(|axis| axis as u8);
+            let late = self.axes.iter().position(|axis| !axis.is_enabled());
+            let origin = late.map_or(Origin::Group, |axis| Origin::Axis(axis as u8));
             let (value, limit) = (self.phase_cycles.into(), self.enable_timeout_cycles.into());
-            self.begin_stop(Rule::EnableTimeout, None, axis, value, limit, now_ns, door);
+            self.begin_stop(Rule::EnableTimeout, None, origin, value, limit, now_ns, door);
         }
     }
 
@@ -95,7 +96,15 @@ impl Engine {
         if let Some(index) = expired.filter(|_| self.phase == Phase::Moving) {
             let age_ns = self.axes.get(index).map_or(0, |axis| axis.expired_ns(now_ns));
             let age_cycles = age_ns.div_ceil(self.period_ns) as f64;
-            self.begin_stop(Rule::StaleCommand, None, Some(index as u8), age_cycles, 0.0, now_ns, door);
+            self.begin_stop(
+                Rule::StaleCommand,
+                None,
+                Origin::Axis(index as u8),
+                age_cycles,
+                0.0,
+                now_ns,
+                door,
+            );
         }
         self.motion.advance(self.period_s);
         let next: ArrayVec<State, MAX_AXES> = self.motion.states().take(self.axes.len()).collect();
@@ -114,7 +123,7 @@ impl Engine {
     /// The planned part of a move is over; drives in profile modes may still be on their way.
     fn finish_move(&mut self, is_planned_to_rest: bool, now_ns: Nanoseconds, door: &mut impl Door) {
         if !is_planned_to_rest {
-            self.begin_stop(Rule::Requested, Some(StopCategory::Two), None, 0.0, 0.0, now_ns, door);
+            self.begin_stop(Rule::Requested, Some(StopCategory::Two), Origin::Group, 0.0, 0.0, now_ns, door);
             return;
         }
         if !self.axes.iter().all(Axis::is_target_reached) {
@@ -151,13 +160,13 @@ impl Engine {
             self.hold();
             if self.phase_cycles > self.enable_timeout_cycles {
                 let (value, limit) = (self.phase_cycles.into(), self.enable_timeout_cycles.into());
-                self.begin_stop(Rule::StaleCommand, None, None, value, limit, now_ns, door);
+                self.begin_stop(Rule::StaleCommand, None, Origin::Group, value, limit, now_ns, door);
             }
             return;
         };
         if now_ns > command.valid_until_ns {
             let age_cycles = (now_ns - command.valid_until_ns).div_ceil(self.period_ns);
-            self.begin_stop(Rule::StaleCommand, None, None, age_cycles as f64, 0.0, now_ns, door);
+            self.begin_stop(Rule::StaleCommand, None, Origin::Group, age_cycles as f64, 0.0, now_ns, door);
             return self.follow_stop(now_ns, door);
         }
         if !self.is_stream_begun {
@@ -229,7 +238,7 @@ impl Engine {
     fn refuse(&mut self, axis: u8, violation: Violation, now_ns: Nanoseconds, door: &mut impl Door) {
         let category = (self.phase == Phase::Stopping).then_some(StopCategory::Zero);
         let (rule, value, limit) = (violation.rule, violation.value, violation.limit);
-        self.begin_stop(rule, category, Some(axis), value, limit, now_ns, door);
+        self.begin_stop(rule, category, Origin::Axis(axis), value, limit, now_ns, door);
     }
 
     /// Takes the next set-points of all axes if the guard agrees to each. If not, the group stops from where it

@@ -123,9 +123,9 @@ pub struct Engine {
     missed: LeakyBucket,
     timing_level: TimingLevel,
     /// What was sent by somebody who may not.
-    foreign_id: Option<u32>,
+    foreign_id: Option<(u8, u32)>,
     /// Whether an interface has refused frames since the last cycle.
-    is_not_taken: bool,
+    not_taken: BusSet,
     held_back: BusSet,
     /// Whose next SYNC is left out.
     left_out: BusSet,
@@ -196,7 +196,7 @@ impl Engine {
             missed: LeakyBucket::default(),
             timing_level: TimingLevel::Normal,
             foreign_id: None,
-            is_not_taken: false,
+            not_taken: BusSet::default(),
             held_back: BusSet::default(),
             left_out: BusSet::default(),
             stop: None,

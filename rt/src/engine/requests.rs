@@ -10,7 +10,7 @@ use crate::plan::State;
 use crate::profile::ProfileTarget;
 use crate::record::EventKind;
 use crate::refusal::{Objection, Refusal};
-use crate::stop::{Phase, Rule, StopCategory};
+use crate::stop::{Origin, Phase, Rule, StopCategory};
 use crate::time::Nanoseconds;
 use crate::watch::TimingLevel;
 
@@ -63,7 +63,7 @@ impl Engine {
             Request::SetProfileTarget(target) => self.set_profile_target(target, now_ns, door)?,
             Request::Stream => self.begin_stream(now_ns, door)?,
             Request::Stop(category) => {
-                self.begin_stop(Rule::Requested, Some(*category), None, 0.0, 0.0, now_ns, door);
+                self.begin_stop(Rule::Requested, Some(*category), Origin::Group, 0.0, 0.0, now_ns, door);
             }
             Request::Disable => self.begin_disable(now_ns, door)?,
             Request::ResetFaults => self.reset_faults()?,
@@ -82,7 +82,7 @@ impl Engine {
         match self.stop.filter(|stop| stop.rule != Rule::Requested) {
             Some(stop) => {
                 let latched = Obstacle::from(Objection::StopLatched);
-                Err(Obstacle { axis: stop.axis, ..latched }.with(f64::from(stop.rule as u8), 0.0))
+                Err(Obstacle { axis: stop.axis(), ..latched }.with(f64::from(stop.rule as u8), 0.0))
             }
             None => Ok(()),
         }
@@ -198,7 +198,15 @@ impl Engine {
             Phase::Passive => return Err(Objection::Phase.into()),
             Phase::Disabled | Phase::Disabling => {}
             _ if self.is_under_way() || self.phase == Phase::Stopping => {
-                self.begin_stop(Rule::Requested, Some(StopCategory::One), None, 0.0, 0.0, now_ns, door);
+                self.begin_stop(
+                    Rule::Requested,
+                    Some(StopCategory::One),
+                    Origin::Group,
+                    0.0,
+                    0.0,
+                    now_ns,
+                    door,
+                );
             }
             _ => {
                 self.goal = Goal::Disabled;

@@ -1,6 +1,6 @@
 //! What is wrong with the group, and how it stops.
 
-use super::{Engine, Transmission};
+use super::{BusSet, Engine, Transmission};
 use crate::axis::Axis;
 use crate::cia402::Goal;
 use crate::control::ControlLaw;
@@ -8,7 +8,7 @@ use crate::door::Door;
 use crate::plan::{PlanError, State};
 use crate::port::{BusHealth, BusState};
 use crate::record::EventKind;
-use crate::stop::{Phase, Rule, StopCategory, StopReason};
+use crate::stop::{Origin, Phase, Rule, StopCategory, StopReason};
 use crate::time::Nanoseconds;
 use crate::watch::{NodeComplaint, TimingLevel, node_state};
 
@@ -21,8 +21,8 @@ impl Engine {
         door: &mut impl Door,
     ) {
         let is_held_back = transmission == Transmission::Blocked || !self.held_back.is_empty();
-        let is_blocked = is_held_back || self.is_not_taken;
-        self.is_not_taken = false;
+        let not_taken = core::mem::take(&mut self.not_taken);
+        let is_blocked = is_held_back || !not_taken.is_empty();
         let count = |cycles: u32, goes_on: bool| if goes_on { cycles.saturating_add(1) } else { 0 };
         self.blocked_cycles = count(self.blocked_cycles, is_blocked);
         for (bus, cycles) in self.held_back_cycles.iter_mut().enumerate() {
@@ -37,14 +37,14 @@ impl Engine {
                 BusState::ErrorPassive => Rule::BusErrorPassive,
                 BusState::ErrorActive => continue,
             };
-            self.begin_stop(rule, None, None, bus as f64, 0.0, now_ns, door);
+            self.begin_stop(rule, None, Origin::Bus(bus as u8), 0.0, 0.0, now_ns, door);
         }
-        if let Some(id) = self.foreign_id.take() {
-            self.begin_stop(Rule::ForeignMaster, None, None, id.into(), 0.0, now_ns, door);
+        if let Some((bus, id)) = self.foreign_id.take() {
+            self.begin_stop(Rule::ForeignMaster, None, Origin::Bus(bus), id.into(), 0.0, now_ns, door);
         }
         if self.timing_level == TimingLevel::Unfit {
             let (slots, limit) = (self.missed.filled().into(), self.ladder.unfit.into());
-            self.begin_stop(Rule::TimingUnfit, None, None, slots, limit, now_ns, door);
+            self.begin_stop(Rule::TimingUnfit, None, Origin::Group, slots, limit, now_ns, door);
         }
         if self.blocked_cycles > self.not_transmitted_cycles {
             let (cycles, limit) = (self.blocked_cycles.into(), self.not_transmitted_cycles.into());
@@ -56,7 +56,8 @@ impl Engine {
                     axis.give_up();
                 }
             }
-            self.begin_stop(Rule::NotTransmitted, None, None, cycles, limit, now_ns, door);
+            let origin = self.slowest_bus(not_taken).map_or(Origin::Group, |bus| Origin::Bus(bus as u8));
+            self.begin_stop(Rule::NotTransmitted, None, origin, cycles, limit, now_ns, door);
         }
         for index in 0..self.axes.len() {
             let Some(axis) = self.axes.get_mut(index) else { continue };
@@ -69,8 +70,15 @@ impl Engine {
             let Some((rule, value, limit)) = complaint else {
                 continue;
             };
-            self.begin_stop(rule, None, Some(index as u8), value, limit, now_ns, door);
+            self.begin_stop(rule, None, Origin::Axis(index as u8), value, limit, now_ns, door);
         }
+    }
+
+    /// The bus whose frames have waited longest for the wire, or else one that had no room for all of them.
+    fn slowest_bus(&self, not_taken: BusSet) -> Option<usize> {
+        let waiting = self.held_back_cycles.iter().enumerate().rev().max_by_key(|(_, cycles)| **cycles);
+        let held_back = waiting.filter(|(_, cycles)| **cycles > 0).map(|(bus, _)| bus);
+        held_back.or_else(|| (0..self.buses.len()).find(|bus| not_taken.contains(*bus)))
     }
 
     /// Begins a stop. The first fault stays the reason, and a later one can only make the stop harder. That somebody asked
@@ -80,7 +88,7 @@ impl Engine {
         &mut self,
         rule: Rule,
         category: Option<StopCategory>,
-        axis: Option<u8>,
+        origin: Origin,
         value: f64,
         limit: f64,
         now_ns: Nanoseconds,
@@ -88,7 +96,7 @@ impl Engine {
     ) {
         let wanted = self.possible(category.unwrap_or(self.categories.of(rule)));
         let slot = self.last_slot.unwrap_or(0);
-        let reason = StopReason { category: wanted, rule, axis, value, limit, slot, phase: self.phase };
+        let reason = StopReason { category: wanted, rule, origin, value, limit, slot, phase: self.phase };
         let is_under_way = matches!(self.phase, Phase::Stopping | Phase::Disabling);
         let present = self.stop.filter(|present| is_under_way || present.rule != Rule::Requested);
         let hardest = present.map_or(wanted, |present| present.category.min(wanted));

@@ -86,7 +86,7 @@ impl Engine {
                 self.hand_over(bus, received, door);
             }
             Destination::Foreign => {
-                self.foreign_id.get_or_insert(received.frame.id().value());
+                self.foreign_id.get_or_insert((bus as u8, received.frame.id().value()));
                 self.hear_other_master(bus, &received.frame);
                 self.hand_over(bus, received, door);
             }
@@ -110,9 +110,9 @@ impl Engine {
         self.held_back = buses;
     }
 
-    /// An interface had no room for all that it was handed: set-points may be missing.
-    pub fn not_taken(&mut self) {
-        self.is_not_taken = true;
+    /// These interfaces had no room for all that they were handed: set-points may be missing.
+    pub fn not_taken(&mut self, buses: BusSet) {
+        self.not_taken = buses;
     }
 
     pub(super) fn write_commands(&mut self, slot: u64) {

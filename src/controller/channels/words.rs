@@ -6,7 +6,7 @@ use takt_rt::plan;
 use takt_rt::port::{BusHealth, BusState};
 use takt_rt::record::{MAX_AXES, MAX_BUSES};
 use takt_rt::refusal::{Answers, Objection, Refusal, RequestKind};
-use takt_rt::stop::{Phase, Rule, StopCategory, StopReason};
+use takt_rt::stop::{Origin, Phase, Rule, StopCategory, StopReason};
 use takt_rt::watch::TimingLevel;
 
 use super::latest::Words;
@@ -185,8 +185,13 @@ pub fn take_stream(axes: usize, words: &mut Words<'_>) -> StreamCommand {
 }
 
 fn put_stop(stop: &StopReason, words: &mut Words<'_>) {
-    let axis = stop.axis.map_or(0, |axis| u64::from(axis) << 32 | 1 << 40);
-    words.put(pack([stop.category as u8, stop.rule as u8, stop.phase as u8, 0]) | axis);
+    let (kind, number) = match stop.origin {
+        Origin::Group => (0, 0),
+        Origin::Axis(axis) => (1, axis),
+        Origin::Bus(bus) => (2, bus),
+    };
+    let origin = u64::from(number) << 32;
+    words.put(pack([stop.category as u8, stop.rule as u8, stop.phase as u8, kind]) | origin);
     words.put_f64(stop.value);
     words.put_f64(stop.limit);
     words.put(stop.slot);
@@ -194,7 +199,7 @@ fn put_stop(stop: &StopReason, words: &mut Words<'_>) {
 
 fn take_stop(words: &mut Words<'_>) -> StopReason {
     let packed = words.take();
-    let [category, rule, phase, _] = unpack(packed);
+    let [category, rule, phase, origin] = unpack(packed);
     StopReason {
         category: match category {
             0 => StopCategory::Zero,
@@ -202,7 +207,11 @@ fn take_stop(words: &mut Words<'_>) -> StopReason {
             _ => StopCategory::Two,
         },
         rule: Rule::ALL.get(usize::from(rule)).copied().unwrap_or(Rule::Requested),
-        axis: (packed >> 40 & 1 == 1).then_some((packed >> 32) as u8),
+        origin: match origin {
+            0 => Origin::Group,
+            1 => Origin::Axis((packed >> 32) as u8),
+            _ => Origin::Bus((packed >> 32) as u8),
+        },
         value: words.take_f64(),
         limit: words.take_f64(),
         slot: words.take(),
@@ -290,11 +299,16 @@ mod tests {
     fn stop_reasons() -> impl Strategy<Value = StopReason> {
         let categories = prop::sample::select(vec![StopCategory::Zero, StopCategory::One, StopCategory::Two]);
         let (rules, phases) = (prop::sample::select(&Rule::ALL[..]), prop::sample::select(&Phase::ALL[..]));
-        (categories, rules, any::<Option<u8>>(), any::<(f64, f64, u64)>(), phases).prop_map(
-            |(category, rule, axis, (value, limit, slot), phase)| StopReason {
+        let origins = prop_oneof![
+            Just(Origin::Group),
+            any::<u8>().prop_map(Origin::Axis),
+            any::<u8>().prop_map(Origin::Bus)
+        ];
+        (categories, rules, origins, any::<(f64, f64, u64)>(), phases).prop_map(
+            |(category, rule, origin, (value, limit, slot), phase)| StopReason {
                 category,
                 rule,
-                axis,
+                origin,
                 value,
                 limit,
                 slot,

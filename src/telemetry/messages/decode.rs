@@ -4,7 +4,7 @@ use takt_rt::cia402::State;
 use takt_rt::port::{BusHealth, BusState};
 use takt_rt::record::{AxisRecord, CycleRecord, EventKind, Timing};
 use takt_rt::refusal::{Objection, Refusal, RequestKind};
-use takt_rt::stop::{Phase, Rule, StopCategory, StopReason};
+use takt_rt::stop::{Origin, Phase, Rule, StopCategory, StopReason};
 use takt_rt::watch::TimingLevel;
 
 use super::EventFields;
@@ -79,6 +79,7 @@ pub fn decode_event(message: &[u8]) -> Option<RecordedEvent> {
             Some(request) => Some((request, fields.u8()?)),
             None => None,
         },
+        bus: if fields.is_over() { None } else { u8::try_from(fields.i16()?).ok() },
     };
     Some(RecordedEvent { slot, at_ns, text, kind: of_kind.kind(slot) })
 }
@@ -113,6 +114,14 @@ fn phase(number: u8) -> Option<Phase> {
 }
 
 impl EventFields {
+    fn origin(&self) -> Origin {
+        match (self.axis, self.bus) {
+            (Some(axis), _) => Origin::Axis(axis),
+            (None, Some(bus)) => Origin::Bus(bus),
+            (None, None) => Origin::Group,
+        }
+    }
+
     /// The event that these are the fields of, if this version knows it.
     fn kind(&self, slot: u64) -> Option<EventKind> {
         Some(match self.kind {
@@ -120,7 +129,7 @@ impl EventFields {
             1 => EventKind::Stop(StopReason {
                 category: *CATEGORIES.get(usize::from(self.category))?,
                 rule: *Rule::ALL.get(usize::from(self.rule))?,
-                axis: self.axis,
+                origin: self.origin(),
                 value: self.value,
                 limit: self.limit,
                 slot,
@@ -160,6 +169,16 @@ mod tests {
     use crate::telemetry::messages::encode_event;
     use takt_rt::record::Event;
 
+    const STOP: StopReason = StopReason {
+        category: StopCategory::Two,
+        rule: Rule::FollowingError,
+        origin: Origin::Axis(3),
+        value: 0.25,
+        limit: -1.5,
+        slot: 77,
+        phase: Phase::Streaming,
+    };
+
     const REFUSAL: Refusal = Refusal {
         request: RequestKind::Move,
         objection: Objection::NoRoomToStop,
@@ -169,32 +188,33 @@ mod tests {
         phase: Phase::Holding,
     };
 
+    /// The last bytes are two for the refusal and two, at an even place, for the bus.
     #[test]
-    fn a_refusal_of_an_earlier_version_keeps_its_words() {
-        let event = Event { slot: 77, at_ns: 88, kind: EventKind::Refused(REFUSAL) };
-        let mut encoder = CdrEncoder::default();
-        encode_event(&event, "in words", &mut encoder);
-        let earlier = decode_event(&encoder.bytes()[..encoder.bytes().len() - 2]);
-        let expected = RecordedEvent { slot: 77, at_ns: 88, text: "in words".to_owned(), kind: None };
-        assert_eq!(earlier, Some(expected));
+    fn an_event_of_an_earlier_version_is_read_as_far_as_it_goes_and_keeps_its_words() {
+        let of_a_bus = StopReason { origin: Origin::Bus(1), ..STOP };
+        let of_no_bus = StopReason { origin: Origin::Group, ..STOP };
+        for (kind, without_bus, without_both) in [
+            (EventKind::Refused(REFUSAL), Some(EventKind::Refused(REFUSAL)), None),
+            (EventKind::Stop(of_a_bus), Some(EventKind::Stop(of_no_bus)), Some(EventKind::Stop(of_no_bus))),
+        ] {
+            let mut encoder = CdrEncoder::default();
+            encode_event(&Event { slot: 77, at_ns: 88, kind }, "in words", &mut encoder);
+            for (missing, kind) in [(2, without_bus), (4, without_both)] {
+                let earlier = decode_event(&encoder.bytes()[..encoder.bytes().len() - missing]);
+                let expected = RecordedEvent { slot: 77, at_ns: 88, text: "in words".to_owned(), kind };
+                assert_eq!(earlier, Some(expected), "{missing} bytes less");
+            }
+        }
     }
 
     #[test]
     fn every_kind_of_event_is_read_as_it_was_written() {
-        let stop = StopReason {
-            category: StopCategory::Two,
-            rule: Rule::FollowingError,
-            axis: Some(3),
-            value: 0.25,
-            limit: -1.5,
-            slot: 77,
-            phase: Phase::Streaming,
-        };
         let mut encoder = CdrEncoder::default();
         for kind in [
             EventKind::PhaseChanged { from: Phase::Passive, to: Phase::Disabled },
-            EventKind::Stop(stop),
-            EventKind::Stop(StopReason { axis: None, ..stop }),
+            EventKind::Stop(STOP),
+            EventKind::Stop(StopReason { origin: Origin::Group, ..STOP }),
+            EventKind::Stop(StopReason { origin: Origin::Bus(1), ..STOP }),
             EventKind::MoveFinished { id: 9 },
             EventKind::DriveState { axis: 2, state: State::OperationEnabled, statusword: 0x1637 },
             EventKind::Timing { level: TimingLevel::Degraded },

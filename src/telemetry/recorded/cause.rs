@@ -20,6 +20,8 @@ pub struct Cause {
     pub category: Option<u8>,
     /// The axis concerned.
     pub axis: Option<String>,
+    /// The bus concerned.
+    pub bus: Option<String>,
     /// What was seen, in the unit of the rule.
     pub value: Option<f64>,
     /// What would have been allowed.
@@ -42,6 +44,7 @@ impl Recorded {
                 rule: text("rule").unwrap_or_default(),
                 category: number("category").map(|category| category as u8),
                 axis: text("axis"),
+                bus: text("bus"),
                 value: number("value"),
                 limit: number("limit"),
                 slot: fault.get("slot").and_then(|slot| slot.parse().ok()).unwrap_or(0),
@@ -63,7 +66,8 @@ impl Recorded {
             reason: words::stop(stop, &self.machine),
             rule: words::rule_key(stop.rule).to_owned(),
             category: Some(stop.category as u8),
-            axis: stop.axis.map(|axis| self.machine.axis_name(axis)),
+            axis: stop.axis().map(|axis| self.machine.axis_name(axis)),
+            bus: stop.origin.bus().map(|bus| self.machine.bus_name(bus)),
             value: Some(stop.value),
             limit: Some(stop.limit),
             slot,

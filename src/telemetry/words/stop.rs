@@ -1,0 +1,325 @@
+//! Why the group stopped, in words.
+//!
+//! What [`StopReason::value`] and [`StopReason::limit`] mean follows from the rule: rad (m) and their derivatives for
+//! the limits and the following error; cycles for a stale command, missed feedback and an enable time-out; the error
+//! code for a drive fault; the statusword for a drive that has disabled itself; object 6061 against 6060 for a
+//! changed mode; cycles for set-points not transmitted.
+
+use takt_rt::stop::{Rule, StopReason};
+
+use super::{category, mode, phase};
+use crate::telemetry::machine::{Machine, Unit};
+
+/// Why the group stopped, without how and when: "joint3 was 0.0214 rad from its set-point (allowed: 0.0200 rad)".
+pub fn stop_cause(stop: &StopReason, machine: &Machine) -> String {
+    let axis = stop.axis().map_or_else(|| "an axis".to_owned(), |axis| machine.axis_name(axis));
+    let bus =
+        stop.origin.bus().map_or_else(|| "a bus".to_owned(), |bus| format!("bus {}", machine.bus_name(bus)));
+    let unit = stop.axis().map_or(Unit::Radian, |axis| machine.axis_unit(axis)).symbol();
+    let (value, limit) = (stop.value, stop.limit);
+    match stop.rule {
+        Rule::Requested => "a stop was asked for".to_owned(),
+        Rule::NotFinite => format!("the set-point of {axis} was not a finite number ({value})"),
+        Rule::PositionLimit => format!(
+            "the set-point of {axis}, {value:.4} {unit}, lay outside its position limit of {limit:.4} {unit}"
+        ),
+        Rule::VelocityLimit => {
+            format!("the set-point of {axis} asked for {value:.3} {unit}/s (allowed: {limit:.3} {unit}/s)")
+        }
+        Rule::AccelerationLimit => {
+            format!("the set-point of {axis} asked for {value:.2} {unit}/s² (allowed: {limit:.2} {unit}/s²)")
+        }
+        Rule::FollowingError => {
+            format!("{axis} was {value:.4} {unit} from its set-point (allowed: {limit:.4} {unit})")
+        }
+        Rule::StaleCommand if stop.axis().is_some() => {
+            format!("what {axis} had been asked for expired and was not asked for again")
+        }
+        // One that has begun may be late by nothing.
+        Rule::StaleCommand if limit > 0.0 => {
+            format!("the stream of set-points did not begin within {}", cycles(limit))
+        }
+        Rule::StaleCommand => {
+            "the stream of set-points ended: its last command expired and no newer one came".to_owned()
+        }
+        // At least one may always be missing: this is not about missing ones.
+        Rule::MissedFeedback if limit == 0.0 => {
+            format!("the drive of {axis} always answers {} late", cycles(value))
+        }
+        Rule::MissedFeedback => {
+            format!("{axis} has not reported in time for {} (allowed: {limit:.0})", cycles(value))
+        }
+        Rule::DriveFault => {
+            let code = value as u32;
+            if code == 0 {
+                format!("the drive of {axis} reports a fault without an error code")
+            } else {
+                format!("the drive of {axis} reports fault 0x{code:04X}")
+            }
+        }
+        Rule::DriveDisabled => format!(
+            "the drive of {axis} left operation enabled by itself (statusword 0x{:04X})",
+            value as u16
+        ),
+        Rule::ModeChanged => {
+            format!("the drive of {axis} shows {} instead of {}", mode(value), mode(limit))
+        }
+        Rule::NotAcknowledged => {
+            format!("the drive of {axis} did not acknowledge its target within {}", cycles(limit))
+        }
+        Rule::NodeLost => {
+            format!("no heartbeat of {axis} has come for {} (allowed: {limit:.0})", cycles(value))
+        }
+        Rule::NodeNotOperational => {
+            format!(
+                "the node of {axis} is no longer operational: its heartbeat shows state 0x{:02X}",
+                value as u8
+            )
+        }
+        Rule::UnexpectedBootUp => format!("the drive of {axis} has started anew in the middle of its work"),
+        Rule::EmergencyMessage => {
+            format!("the drive of {axis} sent emergency message 0x{:04X} and shows no fault", value as u16)
+        }
+        Rule::DuplicateNode => {
+            format!("two nodes answer under the number of {axis}, {value:.0}: its feedback comes twice")
+        }
+        Rule::ForeignMaster => format!(
+            "somebody else sends on {bus} what only this controller may: a frame with identifier 0x{:03X}",
+            value as u32
+        ),
+        Rule::TimingUnfit => {
+            format!("the controller misses its slots too often: {value:.0} of late (allowed: {limit:.0})")
+        }
+        Rule::StartPose => format!(
+            "the stream of set-points began {value:.4} {unit} from where {axis} is (allowed: {limit:.4} {unit})"
+        ),
+        Rule::JerkLimit => {
+            format!("the set-point of {axis} asked for {value:.1} {unit}/s³ (allowed: {limit:.1} {unit}/s³)")
+        }
+        Rule::ImplausibleFeedback => format!(
+            "{axis} was reported {value:.4} {unit} from where it was, further than it can have got ({limit:.4} {unit})"
+        ),
+        Rule::BusErrorPassive => {
+            format!("{bus} is error-passive: hardly a frame gets through")
+        }
+        Rule::EnableTimeout => format!(
+            "the drive of {axis} did not reach operation enabled within {} ({:.1} s)",
+            cycles(limit),
+            limit * machine.cycle_ns as f64 * 1e-9
+        ),
+        Rule::NoTrajectory => match stop.axis() {
+            Some(_) => format!("no trajectory leads {axis} to what was asked"),
+            None => "no trajectory leads to what was asked".to_owned(),
+        },
+        Rule::BusLost => {
+            format!("{bus} is bus-off or its interface is down")
+        }
+        Rule::NotTransmitted => {
+            format!("set-points are not getting onto the wire of {bus} for {}", cycles(value))
+        }
+    }
+}
+
+fn cycles(count: f64) -> String {
+    if count == 1.0 { "1 cycle".to_owned() } else { format!("{count:.0} cycles") }
+}
+
+/// The whole story of a stop: cause, what was going on, and how.
+pub fn stop(stop: &StopReason, machine: &Machine) -> String {
+    format!("{} while {}; {}", stop_cause(stop, machine), phase(stop.phase), category(stop.category))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::telemetry::words::rule_key;
+    use crate::telemetry::words::tests::machine;
+    use takt_rt::stop::{Origin, Phase, StopCategory};
+
+    fn reason(rule: Rule, origin: Origin, value: f64, limit: f64) -> StopReason {
+        StopReason { category: StopCategory::One, rule, origin, value, limit, slot: 9, phase: Phase::Moving }
+    }
+
+    #[test]
+    fn every_cause_names_its_axis_and_its_unit() {
+        let cases = [
+            (
+                Rule::FollowingError,
+                Origin::Axis(0),
+                0.0214,
+                0.02,
+                "shoulder was 0.0214 rad from its set-point (allowed: 0.0200 rad)",
+            ),
+            (
+                Rule::StaleCommand,
+                Origin::Group,
+                3.0,
+                0.0,
+                "the stream of set-points ended: its last command expired and no newer one came",
+            ),
+            (
+                Rule::StaleCommand,
+                Origin::Group,
+                501.0,
+                500.0,
+                "the stream of set-points did not begin within 500 cycles",
+            ),
+            (
+                Rule::StaleCommand,
+                Origin::Axis(1),
+                1.0,
+                0.0,
+                "what slide had been asked for expired and was not asked for again",
+            ),
+            (
+                Rule::ImplausibleFeedback,
+                Origin::Axis(0),
+                0.5,
+                0.0101,
+                "shoulder was reported 0.5000 rad from where it was, further than it can have got (0.0101 rad)",
+            ),
+            (
+                Rule::VelocityLimit,
+                Origin::Axis(1),
+                2.5,
+                2.0,
+                "the set-point of slide asked for 2.500 m/s (allowed: 2.000 m/s)",
+            ),
+            (
+                Rule::MissedFeedback,
+                Origin::Axis(1),
+                4.0,
+                3.0,
+                "slide has not reported in time for 4 cycles (allowed: 3)",
+            ),
+            (
+                Rule::MissedFeedback,
+                Origin::Axis(1),
+                2.0,
+                0.0,
+                "the drive of slide always answers 2 cycles late",
+            ),
+            (
+                Rule::DriveFault,
+                Origin::Axis(0),
+                0x730F.into(),
+                0.0,
+                "the drive of shoulder reports fault 0x730F",
+            ),
+            (
+                Rule::DriveDisabled,
+                Origin::Axis(0),
+                0x1250.into(),
+                0.0,
+                "the drive of shoulder left operation enabled by itself (statusword 0x1250)",
+            ),
+            (
+                Rule::ModeChanged,
+                Origin::Axis(0),
+                1.0,
+                8.0,
+                "the drive of shoulder shows mode 1 (profile position) instead of \
+              mode 8 (cyclic synchronous position)",
+            ),
+            (
+                Rule::EnableTimeout,
+                Origin::Axis(9),
+                0.0,
+                2000.0,
+                "the drive of axis 9 did not reach operation enabled within 2000 cycles (2.0 s)",
+            ),
+            (Rule::BusLost, Origin::Bus(0), 0.0, 0.0, "bus left is bus-off or its interface is down"),
+            (
+                Rule::NotTransmitted,
+                Origin::Bus(0),
+                6.0,
+                0.0,
+                "set-points are not getting onto the wire of bus left for 6 cycles",
+            ),
+            (
+                Rule::StartPose,
+                Origin::Axis(1),
+                0.5,
+                0.002,
+                "the stream of set-points began 0.5000 m from where slide is (allowed: 0.0020 m)",
+            ),
+            (
+                Rule::JerkLimit,
+                Origin::Axis(0),
+                250.0,
+                100.0,
+                "the set-point of shoulder asked for 250.0 rad/s³ (allowed: 100.0 rad/s³)",
+            ),
+            (
+                Rule::NodeLost,
+                Origin::Axis(0),
+                301.0,
+                300.0,
+                "no heartbeat of shoulder has come for 301 cycles (allowed: 300)",
+            ),
+            (
+                Rule::NodeNotOperational,
+                Origin::Axis(0),
+                127.0,
+                5.0,
+                "the node of shoulder is no longer operational: its heartbeat shows state 0x7F",
+            ),
+            (
+                Rule::EmergencyMessage,
+                Origin::Axis(0),
+                0x4310.into(),
+                0.0,
+                "the drive of shoulder sent emergency message 0x4310 and shows no fault",
+            ),
+            (
+                Rule::ForeignMaster,
+                Origin::Bus(0),
+                0x080.into(),
+                0.0,
+                "somebody else sends on bus left what only this controller may: a frame with identifier 0x080",
+            ),
+            (
+                Rule::TimingUnfit,
+                Origin::Group,
+                250.0,
+                250.0,
+                "the controller misses its slots too often: 250 of late (allowed: 250)",
+            ),
+            (
+                Rule::BusErrorPassive,
+                Origin::Bus(0),
+                0.0,
+                0.0,
+                "bus left is error-passive: hardly a frame gets through",
+            ),
+            (
+                Rule::NotAcknowledged,
+                Origin::Axis(0),
+                501.0,
+                500.0,
+                "the drive of shoulder did not acknowledge its target within 500 cycles",
+            ),
+        ];
+        for (rule, origin, value, limit, words) in cases {
+            assert_eq!(stop_cause(&reason(rule, origin, value, limit), &machine()), words);
+        }
+    }
+
+    #[test]
+    fn a_stop_tells_cause_phase_and_category() {
+        assert_eq!(
+            stop(&reason(Rule::Requested, Origin::Group, 0.0, 0.0), &machine()),
+            "a stop was asked for while moving; category 1: decelerated, then power removed"
+        );
+    }
+
+    #[test]
+    fn no_two_rules_share_a_key_or_a_cause() {
+        let causes = Rule::ALL.map(|rule| stop_cause(&reason(rule, Origin::Axis(0), 1.0, 2.0), &machine()));
+        let keys = Rule::ALL.map(rule_key);
+        for (index, rule) in Rule::ALL.into_iter().enumerate() {
+            assert!(!causes[..index].contains(&causes[index]), "{rule:?}");
+            assert!(!keys[..index].contains(&keys[index]), "{rule:?}");
+        }
+    }
+}
