@@ -154,6 +154,41 @@ fn a_stream_of_positions_planned_at_the_very_limits_is_followed_and_can_be_stopp
     }
 }
 
+/// As clients do that wake up a little late: the set-point of one cycle never comes, and the next one is on time.
+#[test]
+fn a_stream_near_its_limits_that_misses_a_command_now_and_then_goes_on_whether_it_says_its_velocity_or_not() {
+    let limits = AxisLimits { jerk: 100.0, ..LIMITS };
+    let nearly = AxisLimits {
+        velocity: 0.95 * limits.velocity,
+        acceleration: 0.9 * limits.acceleration,
+        deceleration: 0.9 * limits.deceleration,
+        jerk: 0.9 * limits.jerk,
+        position_max: 0.99 * limits.position_max,
+        ..limits
+    };
+    let profile = to_the_limit(&nearly);
+    let period_s = PERIOD_NS as f64 * 1e-9;
+    let cycles = (profile.duration_s() / period_s).ceil() as usize;
+    for missing in 2..40 {
+        for says_all in [false, true] {
+            let mut rig = streaming_within(limits, ControlLaw::Position, OnViolation::Reject);
+            let mut farthest = 0.0_f64;
+            for cycle in 1..=cycles {
+                let state = profile.sample(cycle as f64 * period_s);
+                if cycle % 40 != missing {
+                    stream(&mut rig, if says_all { state } else { State::rest(state.position) });
+                }
+                rig.run(1);
+                farthest = farthest.max((rig.engine.axes()[0].set_point().position - state.position).abs());
+            }
+            assert_eq!((rig.stops(), rig.phase()), (vec![], Phase::Streaming), "{missing}, {says_all}");
+            // At constant velocity it would be off by half of it, or all of it where only steps are known.
+            let acceleration = limits.acceleration * period_s * period_s;
+            assert!(farthest > 0.0 && farthest < 0.1 * acceleration, "{missing}, {says_all}: {farthest:e}");
+        }
+    }
+}
+
 #[test]
 fn a_stream_planned_a_little_beyond_a_limit_is_refused_in_time() {
     let limits = AxisLimits { jerk: 100.0, ..LIMITS };

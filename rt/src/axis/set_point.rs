@@ -106,6 +106,30 @@ impl Axis {
         }
     }
 
+    /// What takes the place of the next command of a stream when it does not come in time: for one cycle the motion goes on as
+    /// it did, with its acceleration, so that the one after it fits in; from then on at its velocity. What the stream says of
+    /// itself counts if its steps agree; of one that says nothing they are all that is known.
+    pub fn carried_on(&self, command: &State, period_s: f64) -> State {
+        let limits = &self.parameters.limits;
+        let most = limits.acceleration.max(limits.deceleration);
+        let [newest, last, before] = self.set.map(|state| state.position);
+        let (step, step_before) = ((newest - last) / period_s, (last - before) / period_s);
+        let says_something = command.velocity != 0.0 || command.acceleration != 0.0;
+        let is_said = says_something && (command.velocity - step).abs() <= most * period_s;
+        let (velocity, change) = if is_said {
+            (command.velocity, command.acceleration * period_s)
+        } else {
+            (step, step - step_before)
+        };
+        let end = velocity + change.max(-most * period_s).min(most * period_s);
+        // It neither turns round nor leaves the limits by itself.
+        let is_turned = end * velocity < 0.0;
+        let end = if is_turned { 0.0 } else { end.max(-limits.velocity).min(limits.velocity) };
+        // What it says is its velocity at the end of a step, and what the steps show is that of their middle.
+        let mean = if is_said { (velocity + end) / 2.0 } else { end };
+        State { position: command.position + mean * period_s, velocity: end, acceleration: 0.0 }
+    }
+
     fn course(&self, next: &State, period_s: f64) -> Course {
         let sent = [self.set[0].position, self.set[1].position, self.set[2].position];
         Course { sent, next: next.position, period_s }

@@ -178,10 +178,11 @@ impl Engine {
         }
         let Some(next) = self.streamed(&command.set_points, now_ns, door) else { return };
         if self.advance_guarded(&next, now_ns, door) {
-            // Until the next command comes the present one is carried on at its velocity, up to its expiry.
-            let period_s = self.period_s;
+            // Until the next command comes the present one is carried on, up to its expiry.
             if let Some(held) = &mut self.stream {
-                held.set_points.iter_mut().for_each(|point| point.position += point.velocity * period_s);
+                for (axis, point) in self.axes.iter().zip(&mut held.set_points) {
+                    *point = axis.carried_on(point, self.period_s);
+                }
             }
         }
     }
