@@ -78,6 +78,7 @@ fn logger(criterion: &mut Criterion) {
         let (mut rt, _host, log) = sides(axes);
         let axis = |index| AxisDescription {
             name: format!("joint{index}"),
+            bus: None,
             unit: Unit::Radian,
             counts_per_unit: 83_443.0,
             limits: SetPointMagnitudes::default(),

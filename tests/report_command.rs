@@ -3,11 +3,13 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+use std::sync::Arc;
 
 use serde_json::Value;
 use takt::bus::trace::traced;
 use takt::config::Config;
 use takt::controller::{Outcome, VirtualRun};
+use takt::faults::{Rehearsal, Scenario};
 use takt::sim::SimulatedBus;
 use takt::telemetry::{BlackBoxOptions, Destination, Logger, LoggerOptions, Machine, Recorded, WallClock};
 use takt_rt::stop::Rule;
@@ -139,6 +141,53 @@ fn the_cycles_that_are_read_are_those_that_were_recorded() {
     let read: Vec<f64> = cycles.iter().map(|cycle| cycle.axes[3].position).collect();
     assert_eq!(read, written);
     assert!(read.iter().any(|position| position.abs() > 0.1), "the joint has moved");
+}
+
+/// A recording of the arm in virtual time, one of whose buses is lost in motion.
+fn recording_of_a_lost_bus(bus: &str, folder: &Path) -> PathBuf {
+    let config = Config::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/arm6-erob.toml")).unwrap();
+    let fault = format!(
+        "[[fault]]\nkind = \"bus-off\"\nbus = {bus:?}\nwhen = \"moving\"\nat = \"300 ms\"\nrestart = \"0.1 s\""
+    );
+    let scenario = Scenario::parse("scenario", &fault, &config).unwrap();
+    let (mut run, log) = VirtualRun::rehearsed(&config, Arc::new(Rehearsal::new(scenario))).unwrap();
+    let options = LoggerOptions {
+        machine: Machine::of(&config),
+        wall_clock: WallClock::fixed(UNIX_AT_ZERO_NS),
+        started_ns: 0,
+        recording: Some(Destination::File(folder.join(format!("{bus}.mcap")))),
+        candump: None,
+        black_box: None,
+        traces: vec![],
+    };
+    let mut logger = Logger::new(log, options, Box::new(|_| {}));
+    let outcome = run.run(60_000, |_| {
+        logger.drain();
+    });
+    assert!(matches!(outcome, Some(Outcome::Stopped(stop)) if stop.rule == Rule::BusLost), "{outcome:?}");
+    logger.finish().recording.unwrap()
+}
+
+#[test]
+fn of_a_stop_for_a_bus_an_axis_on_that_bus_is_shown_even_if_another_was_further_from_its_set_points() {
+    let folder = tempfile::tempdir().unwrap();
+    for (bus, axes) in [("base", ["joint1", "joint2", "joint3"]), ("wrist", ["joint4", "joint5", "joint6"])] {
+        let recording = recording_of_a_lost_bus(bus, folder.path());
+        let told = json(&report(&recording, &["--json"]));
+        assert_eq!((&told["cause"]["bus"], &told["cause"]["axis"]), (&bus.into(), &Value::Null));
+        let shown = told["axis"]["name"].as_str().unwrap();
+        assert!(axes.contains(&shown), "{shown} is shown of bus {bus}");
+        // Though an axis on the other bus had been further away.
+        let mut recorded = Recorded::open(&recording).unwrap();
+        let other =
+            recorded.machine.axes.iter().position(|axis| !axes.contains(&axis.name.as_str())).unwrap();
+        recorded.statistics.axes[other].following_error_max.as_mut().unwrap().error = 9.0;
+        let chosen = recorded.axis(None).unwrap();
+        assert_eq!(recorded.machine.axes[chosen].name, shown);
+        // An earlier version did not record which axis is on which bus.
+        recorded.machine.axes.iter_mut().for_each(|axis| axis.bus = None);
+        assert_eq!(recorded.axis(None), Some(other));
+    }
 }
 
 #[test]

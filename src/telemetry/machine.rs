@@ -24,6 +24,8 @@ pub struct Machine {
 pub struct AxisDescription {
     /// Its name in the configuration.
     pub name: String,
+    /// The name of the bus it is on; `None` where a recording of an earlier version does not say it.
+    pub bus: Option<String>,
     /// Whether it turns or slides.
     pub unit: Unit,
     /// Counts per rad (m) of the position that the drive reports.
@@ -92,7 +94,7 @@ impl Machine {
         Self {
             name: config.name.clone(),
             cycle_ns: config.cycle.period_ns,
-            axes: config.axes.iter().map(AxisDescription::of).collect(),
+            axes: config.axes.iter().map(|axis| AxisDescription::of(axis, config)).collect(),
             buses: config.buses.iter().map(bus).collect(),
         }
     }
@@ -114,14 +116,15 @@ impl Machine {
 }
 
 impl AxisDescription {
-    /// The description of a configured axis.
-    pub fn of(axis: &Axis) -> Self {
+    /// The description of an axis of a configuration.
+    pub fn of(axis: &Axis, config: &Config) -> Self {
         let (unit, travel_per_turn) = match axis.travel {
             Travel::Rotary => (Unit::Radian, TAU),
             Travel::Linear { lead_m } => (Unit::Metre, lead_m),
         };
         Self {
             name: axis.name.clone(),
+            bus: config.buses.get(axis.bus).map(|bus| bus.name.clone()),
             unit,
             counts_per_unit: axis.counts_per_turn * axis.gear_ratio / travel_per_turn,
             limits: SetPointMagnitudes {

@@ -68,7 +68,7 @@ impl Recording {
         let event_channel = channel(event, "/events", &BTreeMap::new())?;
         let mut axis_channels = Vec::new();
         for (index, description) in machine.axes.iter().enumerate() {
-            let metadata = BTreeMap::from([
+            let mut metadata = BTreeMap::from([
                 ("index".to_owned(), index.to_string()),
                 ("name".to_owned(), description.name.clone()),
                 ("unit".to_owned(), description.unit.symbol().to_owned()),
@@ -77,6 +77,7 @@ impl Recording {
                 ("acceleration_limit".to_owned(), description.limits.acceleration.to_string()),
                 ("jerk_limit".to_owned(), description.limits.jerk.to_string()),
             ]);
+            metadata.extend(description.bus.clone().map(|bus| ("bus".to_owned(), bus)));
             axis_channels.push(channel(axis, &format!("/axis/{}", description.name), &metadata)?);
         }
         // An empty recording shows at once whether it can be written, and can be opened while it grows.

@@ -111,6 +111,7 @@ mod tests {
     pub(super) fn machine() -> Machine {
         let axis = |name: &str, unit| AxisDescription {
             name: name.to_owned(),
+            bus: None,
             unit,
             counts_per_unit: 1.0,
             limits: SetPointMagnitudes::default(),

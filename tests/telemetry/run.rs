@@ -43,6 +43,7 @@ pub fn sides(records: usize) -> (RtSide, HostSide, LogSide) {
 pub fn machine() -> Machine {
     let axis = |name: &str, unit| AxisDescription {
         name: name.to_owned(),
+        bus: None,
         unit,
         counts_per_unit: 83_443.0,
         limits: SetPointMagnitudes { velocity: 2.0, acceleration: 10.0, jerk: 50.0 },

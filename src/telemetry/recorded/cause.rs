@@ -83,7 +83,7 @@ impl Recorded {
     }
 
     /// The number of the axis with this name; without a name, of the axis concerned, or else of the one that was
-    /// furthest from its set-points.
+    /// furthest from its set-points: of those on the bus concerned, where the recording says which these are.
     pub fn axis(&self, name: Option<&str>) -> Option<usize> {
         let position = |name: &str| self.machine.axes.iter().position(|axis| axis.name == name);
         if let Some(name) = name {
@@ -93,9 +93,17 @@ impl Recorded {
             let largest = self.statistics.axes.get(*axis).and_then(|axis| axis.following_error_max);
             largest.map_or(0.0, |largest| largest.error)
         };
-        let furthest =
-            || (0..self.machine.axes.len()).max_by(|a, b| error(a).total_cmp(&error(b)).then(b.cmp(a)));
-        self.cause().and_then(|cause| position(&cause.axis?)).or_else(furthest)
+        let cause = self.cause();
+        let bus = cause.as_ref().and_then(|cause| cause.bus.as_ref());
+        let is_on_it = |axis: &usize| {
+            bus.is_some() && self.machine.axes.get(*axis).is_some_and(|axis| axis.bus.as_ref() == bus)
+        };
+        let furthest = || {
+            let axes = || 0..self.machine.axes.len();
+            let by_error = |a: &usize, b: &usize| error(a).total_cmp(&error(b)).then(b.cmp(a));
+            axes().filter(is_on_it).max_by(by_error).or_else(|| axes().max_by(by_error))
+        };
+        cause.as_ref().and_then(|cause| position(cause.axis.as_ref()?)).or_else(furthest)
     }
 
     pub(in crate::telemetry) fn seconds(&self, at_ns: u64) -> f64 {

@@ -276,6 +276,7 @@ impl Decoder {
             (name, Some(index)) if name == messages::AXIS.name => {
                 let description = AxisDescription {
                     name: text("name").to_owned(),
+                    bus: channel.metadata.get("bus").cloned(),
                     unit: if text("unit") == Unit::Metre.symbol() { Unit::Metre } else { Unit::Radian },
                     counts_per_unit: number("counts_per_unit"),
                     limits: SetPointMagnitudes {
