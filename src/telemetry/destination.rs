@@ -8,7 +8,8 @@ use std::path::{Path, PathBuf};
 pub enum Destination {
     /// A new file in this folder, named after the machine and the time. The folder is made if it does not exist.
     Directory(PathBuf),
-    /// This file; with `-2`, `-3` … before its extension if it exists already. Its folder is made if need be.
+    /// This file; with `-2`, `-3` … before its extension if it exists already. Its folder is made if need be. A folder or
+    /// a device is no file.
     File(PathBuf),
     /// Anything that takes bytes, and what to call it in messages.
     Stream(String, Box<dyn Write + Send>),
@@ -62,6 +63,16 @@ fn create_new(path: &Path) -> io::Result<(PathBuf, File)> {
         match OpenOptions::new().write(true).create_new(true).open(&candidate) {
             Ok(file) => return Ok((candidate, file)),
             Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {
+                // Beside a folder or a device nobody would look for it.
+                match fs::metadata(&candidate) {
+                    Ok(found) if found.is_dir() => {
+                        return Err(io::Error::other("this is a folder: name a file in it"));
+                    }
+                    Ok(found) if !found.is_file() => {
+                        return Err(io::Error::other("this is no ordinary file"));
+                    }
+                    _ => {}
+                }
                 candidate = numbered(path, number);
             }
             Err(error) => return Err(error),
@@ -96,6 +107,18 @@ mod tests {
         };
         let names = [open(), open(), open()].map(|path| path.file_name().unwrap().to_owned());
         assert_eq!(names, ["arm_6_x.mcap", "arm_6_x-2.mcap", "arm_6_x-3.mcap"]);
+    }
+
+    #[test]
+    fn a_folder_or_a_device_in_place_of_the_file_is_an_error_and_nothing_is_written_beside_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let inside = folder.path().join("runs");
+        fs::create_dir(&inside).unwrap();
+        let error =
+            |path: &Path| Destination::File(path.to_owned()).open("arm", "mcap").err().unwrap().to_string();
+        assert_eq!(error(&inside), format!("{}: this is a folder: name a file in it", inside.display()));
+        assert_eq!(error(Path::new("/dev/null")), "/dev/null: this is no ordinary file");
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
     }
 
     #[test]
