@@ -189,8 +189,8 @@ fn an_unknown_bus_on_the_command_line_is_refused() {
 }
 
 #[test]
-fn ctrl_c_and_sigterm_stop_in_control_and_end_with_130() {
-    for which in [Signal::SIGINT, Signal::SIGTERM] {
+fn ctrl_c_sigterm_and_a_closed_terminal_stop_in_control_and_end_with_130() {
+    for which in [Signal::SIGINT, Signal::SIGTERM, Signal::SIGHUP] {
         let place = Place::new();
         let child = place.run(&["--json"]);
         // Power-up and bring-up take about half a second, the first move more than one.
@@ -203,6 +203,27 @@ fn ctrl_c_and_sigterm_stop_in_control_and_end_with_130() {
         assert_eq!(report["stop"]["category"], 2, "{report}");
         assert_eq!(report["telemetry"]["dropped"], 0);
     }
+}
+
+/// Whatever `nohup` starts has this signal ignored.
+#[test]
+fn a_run_that_was_told_to_outlive_its_terminal_does() {
+    let place = Place::new();
+    let child = Command::new("nohup")
+        .arg(env!("CARGO_BIN_EXE_takt"))
+        .arg("run")
+        .arg(place.config())
+        .arg("--json")
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    thread::sleep(Duration::from_millis(1_500));
+    signal(&child, Signal::SIGHUP);
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", errors(&output));
+    assert_eq!(report(&output)["ended"], "finished");
 }
 
 #[test]

@@ -6,7 +6,6 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 
 use clap::Args;
-use signal_hook::consts::{SIGINT, SIGTERM};
 
 use takt::bus::SocketCanOptions;
 use takt::bus::port::{OpenError, open_configured};
@@ -15,6 +14,7 @@ use takt::sim::LiveDrives;
 
 use super::configuration::{self, BusOverride};
 use super::exit::Exit;
+use super::interruption;
 
 /// Put the drives of a configuration, simulated, on real interfaces, for any master to talk to.
 #[derive(Args, Debug)]
@@ -43,13 +43,13 @@ pub fn run(arguments: &Arguments) -> Exit {
         say!("takt: no bus has a real interface; name one, for example: --bus {}=vcan0", first_bus(&config));
         return Exit::Usage;
     }
-    let is_stopped = Arc::new(AtomicBool::new(false));
-    for signal in [SIGINT, SIGTERM] {
-        if let Err(error) = signal_hook::flag::register(signal, Arc::clone(&is_stopped)) {
+    let is_stopped = match interruption::watch() {
+        Ok(is_stopped) => is_stopped,
+        Err(error) => {
             say!("takt: cannot watch for Ctrl-C: {error}");
             return Exit::Stopped;
         }
-    }
+    };
     let has_panicked = AtomicBool::new(false);
     thread::scope(|scope| {
         let threads: Vec<_> = drives
