@@ -5,5 +5,5 @@ mod cli;
 use clap::Parser;
 
 fn main() -> cli::Exit {
-    cli::CommandLine::parse().execute()
+    cli::CommandLine::try_parse().map_or_else(|error| cli::refuse(&error), cli::CommandLine::execute)
 }

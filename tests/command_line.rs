@@ -292,7 +292,8 @@ fn a_run_whose_messages_nobody_reads_any_more_stops_and_reports_as_ever() {
 #[test]
 fn a_duration_that_cannot_be_is_named_with_its_option() {
     let place = Place::new();
-    for duration in ["-1", "0", "nan", "inf", "soon"] {
+    // The last but one is more than the clock can count in nanoseconds.
+    for duration in ["-1", "0", "nan", "inf", "soon", "18446744073.709551615", "1e300"] {
         let output = place.run_to_end(&["--duration", duration]);
         assert_eq!(output.status.code(), Some(2));
         let said = errors(&output);
@@ -300,6 +301,78 @@ fn a_duration_that_cannot_be_is_named_with_its_option() {
             said.starts_with(&format!("error: invalid value '{duration}' for '--duration <S>': ")),
             "{said}"
         );
+    }
+}
+
+/// Nothing was done, and a program can read why.
+#[test]
+fn whatever_is_refused_is_one_object_after_json_with_what_is_wrong() {
+    let place = Place::new();
+    let (config, folder) = (place.config(), place.folder.path());
+    let nowhere = folder.join("nowhere");
+    let (config, nowhere, folder) =
+        (config.to_str().unwrap(), nowhere.to_str().unwrap(), folder.to_str().unwrap());
+    let cases: &[(&[&str], &str)] = &[
+        (&["run", nowhere], nowhere),
+        (&["run", folder], folder),
+        (&["run", config, "--faults", nowhere], nowhere),
+        (&["run", config, "--bus", "tail=can7"], "tail"),
+        (&["run", config, "--bus", "base=sim", "--bus", "base=sim"], "connected already"),
+        (&["run", config, "--bus", "base=nobody0"], "no interface nobody0"),
+        (&["run", config, "--duration", "nan"], "--duration <S>"),
+        (&["run"], "<CONFIG>"),
+        (&["check", nowhere], nowhere),
+        (&["report", nowhere], nowhere),
+        (&["report", config], "no MCAP file"),
+        (&["eds", nowhere], nowhere),
+        (&["doctor", nowhere], nowhere),
+        (&["jitter", "--bus", "nobody0"], "no interface nobody0"),
+        (&["jitter", "--cycles", "-5"], "--cycles <N>"),
+        (&["lss", "--bus", "sim", "scan"], "--simulate"),
+        (&["lss", "--bus", "nobody0", "scan"], "no interface nobody0"),
+        (&["lss", "--bus", "can0", "--simulate", "1:2:3:4", "scan"], "--bus sim"),
+        (&["drive", nowhere, "joint1", "info"], nowhere),
+        (&["drive", config, "elbow", "info"], "joint1, joint2"),
+        (&["drive", config, "info"], "joint1, joint2"),
+        (&["drive", config, "joint1", "--bus", "tail=sim", "info"], "tail"),
+        (&["drive", config, "joint1", "--family", "yz-aim", "info"], "erob-canopen"),
+        (&["drive", "--bus", "sim", "--node", "1", "--family", "yz-aim", "info"], "needs a configuration"),
+        (&["drive", "--bus", "nobody0", "--node", "1", "--family", "yz-aim", "info"], "no interface nobody0"),
+        (&["drive", config, "joint1", "dance"], "dance"),
+        (&["dance"], "dance"),
+    ];
+    for (arguments, words) in cases {
+        let output =
+            Command::new(env!("CARGO_BIN_EXE_takt")).args(*arguments).arg("--json").output().unwrap();
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {}", errors(&output));
+        let refusal = report(&output);
+        assert!(refusal["error"].as_str().unwrap().contains(words), "{arguments:?}: {refusal}");
+        assert!(refusal["problems"].is_array() && output.stderr.is_empty(), "{arguments:?}: {refusal}");
+    }
+}
+
+#[test]
+fn required_real_time_that_is_refused_is_one_object_after_json_with_the_commands_that_grant_it() {
+    let output = Place::new().run_unprivileged(&["--require-realtime", "--json"]);
+    assert_eq!(output.status.code(), Some(3), "{}", errors(&output));
+    let refusal = report(&output);
+    assert!(refusal["error"].is_string(), "{refusal}");
+    assert!(refusal["realtime"]["grant_with"].to_string().contains("sudo setcap"), "{refusal}");
+}
+
+#[test]
+fn a_result_that_a_full_disk_has_swallowed_is_no_success() {
+    let place = Place::new();
+    for subcommand in [&["check"][..], &["check", "--json"]] {
+        let full = fs::File::options().write(true).open("/dev/full").unwrap();
+        let output = Command::new(env!("CARGO_BIN_EXE_takt"))
+            .args(subcommand)
+            .arg(place.config())
+            .stdout(full)
+            .output()
+            .unwrap();
+        assert_eq!(output.status.code(), Some(1));
+        assert!(errors(&output).contains("cannot be written to standard output"), "{}", errors(&output));
     }
 }
 

@@ -2,6 +2,7 @@
 
 mod printed;
 
+use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
 use std::thread;
@@ -228,4 +229,29 @@ fn ctrl_c_ends_a_watch() {
     ends_with(130, &output);
     assert!(said(&output).lines().count() > 3, "{}", said(&output));
     assert!(output.stderr.is_empty(), "{}", errors(&output));
+}
+
+/// `takt drive … watch | head`
+#[test]
+fn a_watch_that_nobody_reads_any_more_ends() {
+    let config = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/single-erob.toml");
+    let mut child = takt(&[config.to_str().unwrap(), "joint", "watch", "--interval", "0.01", "--json"])
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut readings = BufReader::new(child.stdout.take().unwrap());
+    let mut reading = String::new();
+    readings.read_line(&mut reading).unwrap();
+    assert!(reading.contains("position"), "{reading}");
+    drop(readings);
+    assert_eq!(child.wait().unwrap().code(), Some(0));
+}
+
+#[test]
+fn how_fast_has_no_direction() {
+    for option in ["--velocity", "--acceleration", "--deceleration"] {
+        let unit = if option == "--velocity" { "deg/s" } else { "deg/s^2" };
+        is_refused(&["move", "absolute", "5 deg", option, &format!("-1 {unit}")], "is below zero");
+    }
+    is_refused(&["torque", "1 Nm", "--max-velocity", "-1 deg/s"], "is below zero");
 }

@@ -3,15 +3,16 @@
 mod text;
 
 use std::f64::consts::TAU;
-use std::io::Write as _;
 use std::path::PathBuf;
 
 use clap::Args;
 use serde::Serialize;
 use takt::bus::schedule::{self, BusSchedule};
-use takt::config::{Axis, Config, ConfigError, Control, Travel};
+use takt::config::{Axis, Config, Control, Travel};
 
 use super::exit::Exit;
+use super::print;
+use super::refusal::Refusal;
 
 /// Check a configuration: limits, units, bus load, and the worst-case response time of every message
 #[derive(Args, Clone, Debug)]
@@ -27,64 +28,14 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Exit {
     let config = match Config::load(&arguments.config) {
         Ok(config) => config,
-        Err(error) => return refuse(error, arguments.json),
+        Err(error) => return Refusal::from(error).print(arguments.json),
     };
     let check = Check::of(&config);
+    let exit = if check.fits { Exit::Done } else { Exit::Usage };
     if arguments.json {
-        print_json(&check)
+        print::indented_json(&check, exit)
     } else {
-        print(&text::whole(&check, &config))
-    }
-    if check.fits { Exit::Done } else { Exit::Usage }
-}
-
-fn refuse(error: ConfigError, is_json: bool) -> Exit {
-    if is_json {
-        print_json(&Refusal::of(&error));
-    } else {
-        say!("{:?}", miette::Report::new(error));
-    }
-    Exit::Usage
-}
-
-fn print(text: &str) {
-    // A reader that has seen enough (`| head`) is no failure of the check.
-    let _ = std::io::stdout().write_all(text.as_bytes());
-}
-
-fn print_json(value: &impl Serialize) {
-    match serde_json::to_string_pretty(value) {
-        Ok(text) => print(&format!("{text}\n")),
-        Err(error) => print(&format!("{{\"error\": {:?}}}\n", error.to_string())),
-    }
-}
-
-/// A configuration that could not be read, for `--json`.
-#[derive(Serialize)]
-struct Refusal {
-    error: String,
-    problems: Vec<RefusalProblem>,
-}
-
-#[derive(Serialize)]
-struct RefusalProblem {
-    line: Option<usize>,
-    message: String,
-    help: String,
-}
-
-impl Refusal {
-    fn of(error: &ConfigError) -> Self {
-        let problems = error
-            .problems()
-            .iter()
-            .map(|problem| RefusalProblem {
-                line: error.line(problem),
-                message: problem.to_string(),
-                help: problem.kind.help(),
-            })
-            .collect();
-        Self { error: error.to_string(), problems }
+        print::text(&text::whole(&check, &config), exit)
     }
 }
 

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use takt::config::Config;
 
-use super::exit::Exit;
+use super::refusal::Refusal;
 
 /// `--bus NAME=INTERFACE`
 #[derive(Clone, Debug)]
@@ -28,26 +28,30 @@ impl FromStr for BusOverride {
     }
 }
 
-/// Reads a configuration and applies the overrides. What is wrong is printed.
-pub fn load(path: &Path, buses: &[BusOverride]) -> Result<Config, Exit> {
-    let mut config = Config::load(path).map_err(|error| {
-        say!("{:?}", miette::Report::new(error));
-        Exit::Usage
-    })?;
-    for bus in buses {
-        config.override_interface(&bus.name, &bus.interface).map_err(|error| {
-            say!("takt: --bus {}={}: {error}", bus.name, bus.interface);
-            Exit::Usage
-        })?;
+/// Reads a configuration and applies the overrides.
+pub fn load(path: &Path, buses: &[BusOverride]) -> Result<Config, Refusal> {
+    let mut config = Config::load(path)?;
+    for (index, bus) in buses.iter().enumerate() {
+        if buses.iter().take(index).any(|earlier| earlier.name == bus.name) {
+            return Err(
+                format!("--bus {}={}: this bus has been connected already", bus.name, bus.interface).into()
+            );
+        }
+        config
+            .override_interface(&bus.name, &bus.interface)
+            .map_err(|error| format!("--bus {}={}: {error}", bus.name, bus.interface))?;
     }
     Ok(config)
 }
+
+/// Longer than thirty years is a slip, and would not fit the clock in nanoseconds.
+const LONGEST_S: f64 = 1e9;
 
 /// A positive number of seconds.
 pub fn seconds(text: &str) -> Result<Duration, String> {
     let number: f64 = text.parse().map_err(|_| format!("`{text}` is not a number of seconds"))?;
     match Duration::try_from_secs_f64(number) {
-        Ok(duration) if !duration.is_zero() => Ok(duration),
-        _ => Err("a duration is a finite number of seconds, longer than 0".to_owned()),
+        Ok(duration) if !duration.is_zero() && number <= LONGEST_S => Ok(duration),
+        _ => Err(format!("a duration is a number of seconds above 0, {LONGEST_S} at most")),
     }
 }

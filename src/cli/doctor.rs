@@ -1,19 +1,20 @@
 //! `takt doctor`: is this machine fit for the loop?
 
-use std::io::{IsTerminal, Write, stderr, stdout};
+use std::io::{IsTerminal, stderr, stdout};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
-use takt::doctor::{Examination, SelfTest, Source, Subject, Verdict, attempt, examine};
+use takt::doctor::{SelfTest, Source, Subject, Verdict, attempt, examine};
 use takt::jitter::{self, JitterOptions, Pacing};
 use takt::telemetry::Emphasis;
 
 use super::configuration;
 use super::exit::Exit;
 use super::interruption;
+use super::print;
 
 /// Say whether this machine is fit for the loop, and how to make it so. Ends with 1 when something forbids real time.
 #[derive(Args, Debug)]
@@ -33,7 +34,7 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Exit {
     let config = match arguments.config.as_deref().map(|path| configuration::load(path, &[])).transpose() {
         Ok(config) => config,
-        Err(exit) => return exit,
+        Err(refusal) => return refusal.print(arguments.json),
     };
     let interrupted = match interruption::watch() {
         Ok(interrupted) => interrupted,
@@ -55,14 +56,18 @@ pub fn run(arguments: &Arguments) -> Exit {
             Err(error) => say!("takt: no self-test: {error}"),
         }
     }
-    print(&examination, arguments.json);
-    if interrupted.load(Ordering::Relaxed) {
+    let exit = if interrupted.load(Ordering::Relaxed) {
         Exit::Interrupted
     } else if examination.verdict == Verdict::ForbidsRealTime {
         Exit::Stopped
     } else {
         Exit::Done
+    };
+    if arguments.json {
+        return print::json(&examination, exit);
     }
+    let emphasis = if stdout().is_terminal() { Emphasis::Ansi } else { Emphasis::None };
+    print::text(&examination.picture(emphasis), exit)
 }
 
 /// Runs the loop of the subject, without a bus.
@@ -92,20 +97,4 @@ fn progress_bar(cycles: u64) -> ProgressBar {
         bar.set_style(style.progress_chars("━╸─"));
     }
     bar
-}
-
-/// A reader that has seen enough (`| head`) is no failure.
-fn print(examination: &Examination, as_json: bool) {
-    let text = if as_json {
-        match serde_json::to_string(examination) {
-            Ok(json) => format!("{json}\n"),
-            Err(error) => {
-                say!("takt: the report cannot be written as JSON: {error}");
-                return;
-            }
-        }
-    } else {
-        examination.picture(if stdout().is_terminal() { Emphasis::Ansi } else { Emphasis::None })
-    };
-    let _ = stdout().write_all(text.as_bytes());
 }

@@ -3,7 +3,6 @@
 mod picture;
 mod text;
 
-use std::io::Write as _;
 use std::path::PathBuf;
 
 use clap::Args;
@@ -11,6 +10,7 @@ use serde::Serialize;
 use takt::canopen::eds::{self, Findings, Severity};
 
 use super::exit::Exit;
+use super::print;
 use picture::Picture;
 
 /// Print the object dictionary of an EDS or DCF, with its PDOs and with what is wrong in the file
@@ -33,24 +33,23 @@ pub fn run(arguments: &Arguments) -> Exit {
         Err(findings) => {
             if arguments.json {
                 let problems = problems(&findings);
-                print_json(&Refusal { error: findings.to_string(), problems });
-            } else {
-                show(findings);
+                let refusal = Refusal { error: findings.to_string(), problems };
+                return print::indented_json(&refusal, Exit::Usage);
             }
+            show(findings);
             return Exit::Usage;
         }
     };
     let node = arguments.node.or(loaded.dictionary.commissioned_node());
     let picture = Picture::of(&loaded.dictionary, node, problems(&loaded.warnings));
     if arguments.json {
-        print_json(&picture);
-    } else {
-        print(&text::whole(&picture));
-        if !loaded.warnings.is_empty() {
-            show(loaded.warnings);
-        }
+        return print::indented_json(&picture, Exit::Done);
     }
-    Exit::Done
+    let exit = print::text(&text::whole(&picture), Exit::Done);
+    if !loaded.warnings.is_empty() {
+        show(loaded.warnings);
+    }
+    exit
 }
 
 #[derive(Serialize)]
@@ -91,16 +90,4 @@ fn problems(findings: &Findings) -> Vec<ProblemPicture> {
 
 fn show(findings: Findings) {
     say!("{:?}", miette::Report::new(findings));
-}
-
-fn print(text: &str) {
-    // A reader that has seen enough (`| head`) is no failure.
-    let _ = std::io::stdout().write_all(text.as_bytes());
-}
-
-fn print_json(value: &impl Serialize) {
-    match serde_json::to_string_pretty(value) {
-        Ok(text) => print(&format!("{text}\n")),
-        Err(error) => print(&format!("{{\"error\": {:?}}}\n", error.to_string())),
-    }
 }

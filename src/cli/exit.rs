@@ -7,14 +7,24 @@ use std::process::{ExitCode, Termination};
 pub enum Exit {
     /// Everything was done.
     Done,
-    /// The run ended in a stop or a fault, or a check found something that forbids what was asked.
+    /// The run ended in a stop or a fault, a check found something that forbids what was asked, or a result is lost.
     Stopped,
     /// The configuration or the command line is wrong; nothing was done.
     Usage,
     /// Real-time set-up was required and refused.
     RealtimeRefused,
-    /// Ctrl-C or SIGTERM; the axes were stopped in control.
+    /// Ctrl-C, SIGTERM or a terminal that was closed; the axes were stopped in control.
     Interrupted,
+}
+
+impl Exit {
+    /// How it ends when something besides has failed: what went well has not.
+    pub const fn and_failed(self) -> Self {
+        match self {
+            Self::Done => Self::Stopped,
+            worse => worse,
+        }
+    }
 }
 
 impl Termination for Exit {

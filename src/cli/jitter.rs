@@ -1,7 +1,7 @@
 //! `takt jitter`: how evenly this machine paces the loop.
 
 use std::fs;
-use std::io::{IsTerminal, Write, stderr, stdout};
+use std::io::{IsTerminal, stderr, stdout};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -14,6 +14,8 @@ use takt::telemetry::Emphasis;
 
 use super::exit::Exit;
 use super::interruption;
+use super::print;
+use super::refusal::Refusal;
 
 /// Measure how evenly this machine paces the loop: sleeping only, and sleeping, then spinning.
 #[derive(Args, Debug)]
@@ -22,16 +24,16 @@ pub struct Arguments {
     #[arg(long, value_name = "INTERFACE", value_parser = interface)]
     bus: Option<Interface>,
     /// Period of the cycle, in whole microseconds
-    #[arg(long, value_name = "N", default_value_t = 1_000, value_parser = clap::value_parser!(u64).range(250..=100_000))]
+    #[arg(long, value_name = "N", default_value_t = 1_000, allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(250..=100_000))]
     period_us: u64,
     /// Cycles to measure, of each way of waiting
-    #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 10_000, allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(1..))]
     cycles: u64,
     /// SCHED_FIFO priority; 0 stays in the normal class
-    #[arg(long, value_name = "P", default_value_t = 80, value_parser = clap::value_parser!(u8).range(0..=99))]
+    #[arg(long, value_name = "P", default_value_t = 80, allow_negative_numbers = true, value_parser = clap::value_parser!(u8).range(0..=99))]
     priority: u8,
     /// The CPU to stay on [default: the last one, with SCHED_FIFO]
-    #[arg(long, value_name = "C")]
+    #[arg(long, value_name = "C", allow_negative_numbers = true)]
     cpu: Option<usize>,
     /// Draw the histograms into this file
     #[arg(long, value_name = "FILE.svg")]
@@ -73,23 +75,25 @@ pub fn run(arguments: &Arguments) -> Exit {
     for pacing in [Pacing::Sleep, Pacing::SleepThenSpin] {
         match measure(&options, pacing, &interrupted) {
             Ok(measurement) => measurements.push(measurement),
-            Err(error) => {
-                say!("takt: {error}");
-                return Exit::Usage;
-            }
+            Err(error) => return Refusal::from(error.to_string()).print(arguments.json),
         }
         if interrupted.load(Ordering::Relaxed) {
             break;
         }
     }
     let is_drawn = arguments.svg.as_ref().is_none_or(|path| draw(path, &options, &measurements));
-    if let Some(report) = JitterReport::new(&options, &measurements) {
-        print(&report, arguments.json);
-    }
-    match (interrupted.load(Ordering::Relaxed), is_drawn) {
+    let exit = match (interrupted.load(Ordering::Relaxed), is_drawn) {
         (true, _) => Exit::Interrupted,
         (false, true) => Exit::Done,
         (false, false) => Exit::Stopped,
+    };
+    match JitterReport::new(&options, &measurements) {
+        Some(report) if arguments.json => print::json(&report, exit),
+        Some(report) => {
+            let emphasis = if stdout().is_terminal() { Emphasis::Ansi } else { Emphasis::None };
+            print::text(&report.picture(emphasis), exit)
+        }
+        None => exit,
     }
 }
 
@@ -130,20 +134,4 @@ fn draw(path: &PathBuf, options: &JitterOptions, measurements: &[Measurement]) -
         say!("takt: {} cannot be written: {error}", path.display());
     }
     written.is_ok()
-}
-
-/// A reader that has seen enough (`| head`) is no failure.
-fn print(report: &JitterReport, as_json: bool) {
-    let text = if as_json {
-        match serde_json::to_string(report) {
-            Ok(json) => format!("{json}\n"),
-            Err(error) => {
-                say!("takt: the report cannot be written as JSON: {error}");
-                return;
-            }
-        }
-    } else {
-        report.picture(if stdout().is_terminal() { Emphasis::Ansi } else { Emphasis::None })
-    };
-    let _ = stdout().write_all(text.as_bytes());
 }

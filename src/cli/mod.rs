@@ -14,12 +14,15 @@ mod interruption;
 mod jitter;
 mod lss;
 mod plan;
+mod print;
+mod refusal;
 mod report;
 mod run;
 mod sim;
 mod table;
 
 pub use exit::Exit;
+pub use refusal::of_command_line as refuse;
 
 use clap::{Parser, Subcommand};
 

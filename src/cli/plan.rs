@@ -5,12 +5,15 @@ mod plot;
 mod question;
 
 use std::fs::File;
-use std::io::{BufRead, BufReader, Write};
-use std::path::PathBuf;
+use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
 
 use clap::Args;
+use takt_rt::plan::Profile;
 
 use super::exit::Exit;
+use super::print;
+use super::refusal::Refusal;
 use answer::Answer;
 use question::Question;
 
@@ -24,28 +27,24 @@ pub struct Arguments {
     plot: Option<PathBuf>,
 }
 
-/// Answers every line. The exit code is 2 when a line is no problem or a file cannot be used, else 0: that a problem
-/// has no answer is an answer.
+/// Answers every line. The exit code is 2 when a line is no problem or the file cannot be read, 1 when an answer or the
+/// picture is lost, else 0: that a problem has no answer is an answer.
 pub fn run(arguments: &Arguments) -> Exit {
     match answer_all(arguments) {
         Ok(exit) => exit,
-        Err(message) => {
-            say!("{message}");
-            Exit::Usage
-        }
+        Err(refusal) => refusal.print(false),
     }
 }
 
-fn answer_all(arguments: &Arguments) -> Result<Exit, String> {
+fn answer_all(arguments: &Arguments) -> Result<Exit, Refusal> {
     let name = arguments.problems.as_ref().map_or("standard input".into(), |path| path.to_string_lossy());
-    let unreadable = |error: std::io::Error| format!("takt: {name} cannot be read: {error}");
+    let unreadable = |error: std::io::Error| format!("{name} cannot be read: {error}");
     let input: Box<dyn BufRead> = match &arguments.problems {
         Some(path) => Box::new(BufReader::new(File::open(path).map_err(unreadable)?)),
         None => Box::new(std::io::stdin().lock()),
     };
-    let mut output = std::io::BufWriter::new(std::io::stdout().lock());
     let mut exit = Exit::Done;
-    let mut plot = arguments.plot.as_ref();
+    let mut plot = arguments.plot.as_deref();
     for (index, line) in input.split(b'\n').enumerate() {
         let line = line.map_err(unreadable)?;
         if line.trim_ascii().is_empty() {
@@ -56,9 +55,10 @@ fn answer_all(arguments: &Arguments) -> Result<Exit, String> {
             Ok(question) => {
                 let (answer, trajectory) = question.solve();
                 if let (Some(path), Some(trajectory)) = (plot, trajectory) {
-                    std::fs::write(path, plot::draw(&question.problems(), &trajectory))
-                        .map_err(|error| format!("takt: {} cannot be written: {error}", path.display()))?;
                     plot = None;
+                    if !draw(path, &question, &trajectory) {
+                        exit = exit.and_failed();
+                    }
                 }
                 answer
             }
@@ -67,14 +67,24 @@ fn answer_all(arguments: &Arguments) -> Result<Exit, String> {
                 Answer::malformed(index + 1, message)
             }
         };
-        let written = serde_json::to_writer(&mut output, &answer)
-            .map_err(std::io::Error::from)
-            .and_then(|()| output.write_all(b"\n"));
-        if written.is_err() {
-            // A reader that has seen enough (`| head`) is no failure.
-            return Ok(exit);
+        // Who asks one problem after the other waits for each answer.
+        let json = serde_json::to_string(&answer).map_err(std::io::Error::from);
+        match json.and_then(|json| print::write(&format!("{json}\n"))) {
+            Ok(true) => {}
+            Ok(false) => return Ok(exit),
+            Err(error) => return Ok(print::unwritten(&error, exit)),
         }
     }
-    let _ = output.flush();
+    if let Some(path) = plot {
+        say!("takt: {} is not drawn: there is no trajectory", path.display());
+    }
     Ok(exit)
+}
+
+fn draw(path: &Path, question: &Question, trajectory: &[Profile]) -> bool {
+    let written = std::fs::write(path, plot::draw(&question.problems(), trajectory));
+    if let Err(error) = &written {
+        say!("takt: {} cannot be written: {error}", path.display());
+    }
+    written.is_ok()
 }

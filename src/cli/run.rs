@@ -1,6 +1,6 @@
 //! `takt run`: the main job.
 
-use std::io::{IsTerminal, Write, stderr, stdout};
+use std::io::{IsTerminal, stderr, stdout};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -24,6 +24,8 @@ use takt_rt::stop::StopReason;
 use super::configuration::{self, BusOverride};
 use super::exit::Exit;
 use super::interruption;
+use super::print;
+use super::refusal::Refusal;
 
 /// Bring the drives up, run the motion program of a configuration, stop in control, and report.
 #[derive(Args, Debug)]
@@ -63,19 +65,26 @@ struct Printed<'a> {
     unreached: Vec<&'a str>,
 }
 
+/// Real-time set-up that was required and refused, as an object.
+#[derive(Serialize)]
+struct PrintedRefusal<'a> {
+    error: String,
+    problems: [(); 0],
+    realtime: &'a RealtimeReport,
+}
+
 /// Runs it.
 pub fn run(arguments: Arguments) -> Exit {
     let config = match configuration::load(&arguments.config, &arguments.buses) {
         Ok(config) => config,
-        Err(exit) => return exit,
+        Err(refusal) => return refusal.print(arguments.json),
     };
     if let Err(refused) = schedule::verify(&config) {
-        say!("takt: {refused}");
-        return Exit::Usage;
+        return Refusal::from(refused.to_string()).print(arguments.json);
     }
     let rehearsal = match arguments.faults.as_deref().map(|path| rehearsal(path, &config)).transpose() {
         Ok(rehearsal) => rehearsal,
-        Err(exit) => return exit,
+        Err(refusal) => return refusal.print(arguments.json),
     };
     let mut signals = match Signals::watch() {
         Ok(signals) => signals,
@@ -109,18 +118,15 @@ pub fn run(arguments: Arguments) -> Exit {
     bar.finish_and_clear();
     match session {
         Ok(session) => report(&config, &session, arguments.json),
-        Err(error) => refuse(&error),
+        Err(error) => refuse(&error, arguments.json),
     }
 }
 
-/// Reads a scenario. What is wrong is printed, and what a person should know before it is played on real drives.
-fn rehearsal(path: &Path, config: &Config) -> Result<Arc<Rehearsal>, Exit> {
-    let scenario = Scenario::load(path, config).map_err(|error| {
-        match error {
-            ScenarioError::Wrong(error) => say!("{:?}", miette::Report::new(error)),
-            unreadable @ ScenarioError::Unreadable { .. } => say!("takt: {unreadable}"),
-        }
-        Exit::Usage
+/// Reads a scenario. What a person should know before it is played on real drives is said.
+fn rehearsal(path: &Path, config: &Config) -> Result<Arc<Rehearsal>, Refusal> {
+    let scenario = Scenario::load(path, config).map_err(|error| match error {
+        ScenarioError::Wrong(error) => Refusal::from(error),
+        unreadable @ ScenarioError::Unreadable { .. } => unreadable.to_string().into(),
     })?;
     let is_real =
         |fault: &Fault| config.buses.get(fault.bus).is_some_and(|bus| bus.interface != Interface::Simulated);
@@ -135,10 +141,16 @@ fn rehearsal(path: &Path, config: &Config) -> Result<Arc<Rehearsal>, Exit> {
     Ok(Arc::new(Rehearsal::new(scenario)))
 }
 
-fn refuse(error: &SessionError) -> Exit {
-    say!("takt: {error}");
-    let SessionError::Start(StartError::Refused(report)) = error else { return Exit::Usage };
+fn refuse(error: &SessionError, is_json: bool) -> Exit {
+    let SessionError::Start(StartError::Refused(report)) = error else {
+        return Refusal::from(error.to_string()).print(is_json);
+    };
     let realtime = RealtimeReport::new(report, 0, 0);
+    if is_json {
+        let printed = PrintedRefusal { error: error.to_string(), problems: [], realtime: &realtime };
+        return print::indented_json(&printed, Exit::RealtimeRefused);
+    }
+    say!("takt: {error}");
     realtime.refused.iter().for_each(|refused| say!("  refused: {refused}"));
     realtime.grant_with.iter().for_each(|command| say!("  grant it with: {command}"));
     Exit::RealtimeRefused
@@ -168,28 +180,19 @@ fn report(config: &Config, session: &Session, as_json: bool) -> Exit {
         _ => ("failed", Exit::Stopped),
     };
     if as_json {
-        let printed = Printed { report: &report, ended, failure, unreached };
-        match serde_json::to_string(&printed) {
-            Ok(json) => print(&format!("{json}\n")),
-            Err(error) => say!("takt: the report cannot be written as JSON: {error}"),
+        return print::json(&Printed { report: &report, ended, failure, unreached }, exit);
+    }
+    match failure {
+        Some(failure) => {
+            say!("takt: {failure}");
+            report.telemetry.black_boxes.iter().for_each(|path| say!("black box: {}", path.display()));
+            exit
         }
-    } else {
-        match failure {
-            Some(failure) => {
-                say!("takt: {failure}");
-                report.telemetry.black_boxes.iter().for_each(|path| say!("black box: {}", path.display()));
-            }
-            None => {
-                print(&report.picture(if stdout().is_terminal() { Emphasis::Ansi } else { Emphasis::None }))
-            }
+        None => {
+            let emphasis = if stdout().is_terminal() { Emphasis::Ansi } else { Emphasis::None };
+            print::text(&report.picture(emphasis), exit)
         }
     }
-    exit
-}
-
-/// A reader that has seen enough (`| head`) is no failure of the run.
-fn print(text: &str) {
-    let _ = stdout().write_all(text.as_bytes());
 }
 
 fn stop_of(session: &Session) -> Option<StopReason> {

@@ -30,7 +30,7 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Exit {
     let config = match configuration::load(&arguments.config, &arguments.buses) {
         Ok(config) => config,
-        Err(exit) => return exit,
+        Err(refusal) => return refusal.print(false),
     };
     let drives = match open(&config) {
         Ok(drives) => drives,

@@ -34,7 +34,11 @@ fn a_wrong_scenario_is_refused_before_anything_moves() {
     let faults = place.path().join("wrong.toml");
     fs::write(&faults, "[[fault]]\nkind = \"stall\"\naxis = \"elbow\"\n").unwrap();
     let output = run(&faults);
-    let said = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(2), "{said}");
-    assert!(said.contains("elbow") && said.contains("joint1") && said.contains("wrong.toml"), "{said}");
+    assert_eq!(output.status.code(), Some(2), "{}", String::from_utf8_lossy(&output.stderr));
+    let refusal: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert!(refusal["error"].as_str().unwrap().contains("wrong.toml"), "{refusal}");
+    let problem = &refusal["problems"][0];
+    assert_eq!(problem["line"], 3, "{refusal}");
+    assert!(problem["message"].as_str().unwrap().contains("elbow"), "{refusal}");
+    assert!(problem["help"].as_str().unwrap().contains("joint1"), "{refusal}");
 }

@@ -80,7 +80,7 @@ impl Action {
 pub fn run(arguments: &Arguments) -> Exit {
     let (subject, bus) = match arguments.target.resolve() {
         Ok(resolved) => resolved,
-        Err(exit) => return exit,
+        Err(refusal) => return refusal.print(arguments.options.json),
     };
     let mut output = output::Output::new(&subject, arguments.action.name(), arguments.options);
     match arguments.action.request(&subject, arguments.options.raw) {

@@ -71,7 +71,7 @@ enum CourseArguments {
         #[arg(allow_hyphen_values = true)]
         position: String,
         /// So many times
-        #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+        #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
         times: u32,
         /// Seconds of standstill at each end
         #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = configuration::seconds)]
@@ -101,7 +101,7 @@ enum Direction {
 #[derive(Args, Debug)]
 struct PaceArguments {
     /// Profile velocity: "20 deg/s" [default: a tenth of the axis' limit]
-    #[arg(long, value_name = "V")]
+    #[arg(long, value_name = "V", allow_hyphen_values = true)]
     velocity: Option<String>,
     #[command(flatten)]
     ramps: RampArguments,
@@ -113,10 +113,10 @@ struct PaceArguments {
 #[derive(Args, Debug)]
 struct RampArguments {
     /// Profile acceleration: "90 deg/s^2" [default: a tenth of the axis' limit]
-    #[arg(long, value_name = "A")]
+    #[arg(long, value_name = "A", allow_hyphen_values = true)]
     acceleration: Option<String>,
     /// Profile deceleration [default: a tenth of the axis' limit]
-    #[arg(long, value_name = "A")]
+    #[arg(long, value_name = "A", allow_hyphen_values = true)]
     deceleration: Option<String>,
 }
 
@@ -141,7 +141,7 @@ pub struct Torque {
     #[arg(allow_hyphen_values = true)]
     torque: String,
     /// Faster than this the axis is stopped: "10 deg/s" [default: a quarter of the axis' limit]
-    #[arg(long, value_name = "V")]
+    #[arg(long, value_name = "V", allow_hyphen_values = true)]
     max_velocity: Option<String>,
     /// End after this many seconds
     #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = configuration::seconds)]
@@ -191,7 +191,11 @@ impl Action {
             },
             Self::Torque(arguments) => Request::Torque {
                 torque: read(&arguments.torque, subject.effort_quantity())?,
-                velocity_limit: optional(&arguments.max_velocity, subject.velocity_quantity(), is_raw)?,
+                velocity_limit: optional(
+                    arguments.max_velocity.as_ref(),
+                    subject.velocity_quantity(),
+                    is_raw,
+                )?,
                 duration_ns: nanoseconds(arguments.duration),
             },
             Self::Home(arguments) => Request::Home {
@@ -230,9 +234,9 @@ impl RampArguments {
     fn pace(&self, subject: &Subject, velocity: Option<&String>, is_raw: bool) -> Result<Pace, Failure> {
         let acceleration = subject.acceleration_quantity();
         Ok(Pace {
-            velocity: velocity.map(|text| read(text, subject.velocity_quantity(), is_raw)).transpose()?,
-            acceleration: optional(&self.acceleration, acceleration, is_raw)?,
-            deceleration: optional(&self.deceleration, acceleration, is_raw)?,
+            velocity: optional(velocity, subject.velocity_quantity(), is_raw)?,
+            acceleration: optional(self.acceleration.as_ref(), acceleration, is_raw)?,
+            deceleration: optional(self.deceleration.as_ref(), acceleration, is_raw)?,
         })
     }
 }
@@ -245,6 +249,17 @@ fn read(text: &str, quantity: Quantity, is_raw: bool) -> Result<Amount, Failure>
     amount::parse(text, quantity, is_raw).map_err(|error: AmountError| Failure::Unsuitable(error.to_string()))
 }
 
-fn optional(text: &Option<String>, quantity: Quantity, is_raw: bool) -> Result<Option<Amount>, Failure> {
-    text.as_ref().map(|text| read(text, quantity, is_raw)).transpose()
+/// How fast, or how soon: no direction.
+fn magnitude(text: &str, quantity: Quantity, is_raw: bool) -> Result<Amount, Failure> {
+    let amount = read(text, quantity, is_raw)?;
+    match amount {
+        Amount::Joint(value) if value < 0.0 => {}
+        Amount::Drive(value) if value < 0 => {}
+        _ => return Ok(amount),
+    }
+    Err(Failure::Unsuitable(format!("`{text}` is below zero: a limit and a profile have no direction")))
+}
+
+fn optional(text: Option<&String>, quantity: Quantity, is_raw: bool) -> Result<Option<Amount>, Failure> {
+    text.map(|text| magnitude(text, quantity, is_raw)).transpose()
 }

@@ -1,6 +1,6 @@
 //! What is shown while a procedure runs, and in the end.
 
-use std::io::{IsTerminal, Write, stderr, stdout};
+use std::io::{IsTerminal, stderr};
 
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
@@ -12,6 +12,7 @@ use takt_rt::frame::Frame;
 use takt_rt::time::Nanoseconds;
 
 use super::super::exit::Exit;
+use super::super::print;
 use super::Options;
 
 /// Where everything that is to be shown goes.
@@ -22,6 +23,8 @@ pub struct Output {
     line: ProgressBar,
     step: &'static str,
     notes: Vec<String>,
+    /// Set when readings cannot be shown any more: how it ends then.
+    unshown: Option<Exit>,
 }
 
 #[derive(Serialize)]
@@ -53,11 +56,11 @@ impl Output {
         } else {
             ProgressBar::hidden()
         };
-        Self { subject: subject.clone(), action, options, line, step: "", notes: vec![] }
+        Self { subject: subject.clone(), action, options, line, step: "", notes: vec![], unshown: None }
     }
 
-    /// Shows something that has just happened.
-    pub fn see(&mut self, at_ns: Nanoseconds, seen: Seen) {
+    /// Shows something that has just happened. Returns whether there is still somebody to show readings to.
+    pub fn see(&mut self, at_ns: Nanoseconds, seen: Seen) -> bool {
         match seen {
             Seen::Event(Event::Step(name)) => {
                 self.step = name;
@@ -71,6 +74,7 @@ impl Output {
             Seen::Sent(frame) => self.frame(at_ns, '>', &frame),
             Seen::Received(frame) => self.frame(at_ns, '<', &frame),
         }
+        self.unshown.is_none()
     }
 
     /// Says something that people should know.
@@ -88,15 +92,23 @@ impl Output {
         }
     }
 
-    fn read(&self, at_ns: Nanoseconds, reading: &Reading) {
+    fn read(&mut self, at_ns: Nanoseconds, reading: &Reading) {
         let is_watched = self.action == "watch";
         if is_watched && self.options.json {
-            print(&format!("{}\n", self.reading_json(at_ns, reading)));
+            self.print(&format!("{}\n", self.reading_json(at_ns, reading)));
         } else if is_watched && self.line.is_hidden() {
-            print(&format!("{}  {}\n", seconds(at_ns), self.reading_words(reading)));
+            self.print(&format!("{}  {}\n", seconds(at_ns), self.reading_words(reading)));
         } else {
             self.line.set_message(format!("{}: {}", self.step, self.reading_words(reading)));
         }
+    }
+
+    fn print(&mut self, reading: &str) {
+        self.unshown = self.unshown.or_else(|| match print::write(reading) {
+            Ok(true) => None,
+            Ok(false) => Some(Exit::Done),
+            Err(error) => Some(print::unwritten(&error, Exit::Done)),
+        });
     }
 
     fn reading_json(&self, at_ns: Nanoseconds, reading: &Reading) -> serde_json::Value {
@@ -131,26 +143,29 @@ impl Output {
         self.line.finish_and_clear();
         let (ended, exit) = match outcome {
             Ok(_) => ("done", Exit::Done),
-            Err(Failed { failure: Failure::Interrupted, .. }) => ("interrupted", Exit::Interrupted),
+            Err(Failed { failure: Failure::Interrupted, .. }) => {
+                ("interrupted", self.unshown.unwrap_or(Exit::Interrupted))
+            }
             Err(failed) if failed.failure.is_refusal() => ("refused", Exit::Usage),
             Err(_) => ("failed", Exit::Stopped),
         };
         if self.options.json {
-            self.finish_json(outcome, ended);
-        } else {
-            match outcome {
-                Ok(report) => print(&picture(report)),
-                Err(failed) => self.say_failed(failed),
+            return self.finish_json(outcome, ended, exit);
+        }
+        match outcome {
+            Ok(report) => print::text(&picture(report), exit),
+            Err(failed) => {
+                self.say_failed(failed);
+                exit
             }
         }
-        exit
     }
 
-    fn finish_json(&self, outcome: &Result<Report, Failed>, ended: &'static str) {
+    fn finish_json(&self, outcome: &Result<Report, Failed>, ended: &'static str, exit: Exit) -> Exit {
         let failed = outcome.as_ref().err();
         // A watch has printed its readings, one object each; only what went wrong is left to say.
         if self.action == "watch" && failed.is_none_or(|failed| failed.failure == Failure::Interrupted) {
-            return;
+            return exit;
         }
         let printed = Printed {
             axis: &self.subject.name,
@@ -164,10 +179,7 @@ impl Output {
             notes: &self.notes,
             result: outcome.as_ref().ok(),
         };
-        match serde_json::to_string(&printed) {
-            Ok(json) => print(&format!("{json}\n")),
-            Err(error) => say!("takt: the result cannot be written as JSON: {error}"),
-        }
+        print::json(&printed, exit)
     }
 
     fn say_failed(&self, failed: &Failed) {
@@ -189,11 +201,6 @@ impl Output {
 
 fn seconds(at_ns: Nanoseconds) -> String {
     format!("{:11.6}", at_ns as f64 / 1e9)
-}
-
-/// A reader that has seen enough (`| head`) is no failure.
-fn print(text: &str) {
-    let _ = stdout().write_all(text.as_bytes());
 }
 
 fn picture(report: &Report) -> String {

@@ -12,6 +12,7 @@ use takt_rt::port::{BusPort, BusState};
 
 use super::super::exit::Exit;
 use super::super::interruption;
+use super::super::refusal::Refusal;
 use super::Options;
 use super::output::Output;
 use super::target::Bus;
@@ -23,10 +24,7 @@ const RESTART_MS: u32 = 100;
 pub fn run(subject: Subject, request: Request, bus: Bus, options: Options, mut output: Output) -> Exit {
     let mut port = match open(&bus) {
         Ok(port) => port,
-        Err(error) => {
-            say!("takt: {error}");
-            return Exit::Usage;
-        }
+        Err(error) => return Refusal::from(error.to_string()).print(options.json),
     };
     let interrupted = match interruption::watch() {
         Ok(interrupted) => interrupted,
@@ -38,7 +36,11 @@ pub fn run(subject: Subject, request: Request, bus: Bus, options: Options, mut o
     let is_simulated = matches!(port, Port::Simulated(_));
     let procedure = procedure(subject, request);
     let is_interrupted = || interrupted.swap(false, Ordering::Relaxed);
-    let see = |at_ns, seen| output.see(at_ns, seen);
+    // What nobody reads any more ends as on Ctrl-C.
+    let see = |at_ns, seen| {
+        let is_shown = output.see(at_ns, seen);
+        interrupted.fetch_or(!is_shown, Ordering::Relaxed);
+    };
     let outcome = if options.fast && is_simulated {
         let mut clock = VirtualClock::default();
         bus_session::run(procedure, &mut port, &mut clock, is_interrupted, see)

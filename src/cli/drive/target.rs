@@ -8,7 +8,7 @@ use takt::commission::{Family, Subject};
 use takt::config::{Config, Interface, Quantity};
 
 use super::super::configuration;
-use super::super::exit::Exit;
+use super::super::refusal::Refusal;
 
 /// The drive.
 #[derive(Args, Debug)]
@@ -62,14 +62,9 @@ fn family(text: &str) -> Result<Family, String> {
         .ok_or_else(|| format!("the families are {}", known()))
 }
 
-fn refuse(text: &str) -> Exit {
-    say!("takt: {text}");
-    Exit::Usage
-}
-
 impl Target {
-    /// The drive and its bus. What is wrong is printed.
-    pub fn resolve(&self) -> Result<(Subject, Bus), Exit> {
+    /// The drive and its bus.
+    pub fn resolve(&self) -> Result<(Subject, Bus), Refusal> {
         let (subject, bus) = match &self.config {
             Some(config) => self.of_configuration(config)?,
             None => self.of_interface()?,
@@ -77,27 +72,28 @@ impl Target {
         Ok((subject, bus))
     }
 
-    fn of_interface(&self) -> Result<(Subject, Bus), Exit> {
+    fn of_interface(&self) -> Result<(Subject, Bus), Refusal> {
         let (Some(bus), Some(node), Some(family)) = (&self.bus, self.node, self.family) else {
-            return Err(refuse(
-                "name the drive: CONFIG AXIS, or --bus INTERFACE --node N --family FAMILY (all three)",
-            ));
+            return Err(
+                "name the drive: CONFIG AXIS, or --bus INTERFACE --node N --family FAMILY (all three)".into(),
+            );
         };
         let interface = bus.parse::<Interface>();
         match interface {
             Ok(Interface::SocketCan(name)) => {
                 let subject = Subject::unconfigured(node, family)
-                    .map_err(|error| refuse(&format!("the units cannot be converted ({error:?})")))?;
+                    .map_err(|error| format!("the units cannot be converted ({error:?})"))?;
                 Ok((subject, Bus::Interface { name, bit_rate: self.bit_rate }))
             }
-            Ok(Interface::Simulated) => Err(refuse(
-                "a simulated drive needs a configuration that says what it is: takt drive CONFIG AXIS …",
-            )),
-            Err(error) => Err(refuse(&format!("--bus {bus}: {error}: {}", error.help()))),
+            Ok(Interface::Simulated) => {
+                Err("a simulated drive needs a configuration that says what it is: takt drive CONFIG AXIS …"
+                    .into())
+            }
+            Err(error) => Err(format!("--bus {bus}: {error}: {}", error.help()).into()),
         }
     }
 
-    fn of_configuration(&self, path: &Path) -> Result<(Subject, Bus), Exit> {
+    fn of_configuration(&self, path: &Path) -> Result<(Subject, Bus), Refusal> {
         let mut config = configuration::load(path, &[])?;
         let known: Vec<&str> = config.axes.iter().map(|axis| axis.name.as_str()).collect();
         let index = match (&self.axis, known.as_slice()) {
@@ -110,25 +106,18 @@ impl Target {
                 Some(name) => format!("there is no axis {name:?}"),
                 None => "say which axis".to_owned(),
             };
-            return Err(refuse(&format!("{problem}; the axes are: {}", known.join(", "))));
+            return Err(format!("{problem}; the axes are: {}", known.join(", ")).into());
         };
         if let Some(bus) = &self.bus {
             let own = config.buses.get(axis.bus).map(|bus| bus.name.clone()).unwrap_or_default();
             let (name, interface) = bus.split_once('=').unwrap_or((&own, bus));
-            config
-                .override_interface(name, interface)
-                .map_err(|error| refuse(&format!("--bus {bus}: {error}")))?;
+            config.override_interface(name, interface).map_err(|error| format!("--bus {bus}: {error}"))?;
         }
-        let mut subject = Subject::of(&axis).map_err(|error| {
-            refuse(&format!("axis {}: its units cannot be converted ({error:?})", axis.name))
-        })?;
+        let mut subject = Subject::of(&axis)
+            .map_err(|error| format!("axis {}: its units cannot be converted ({error:?})", axis.name))?;
         if let Some(family) = self.family.filter(|family| *family != subject.family) {
-            return Err(refuse(&format!(
-                "the axis {} is configured as {}, not {}",
-                axis.name,
-                subject.family.word(),
-                family.word()
-            )));
+            let (name, configured, other) = (&axis.name, subject.family.word(), family.word());
+            return Err(format!("the axis {name} is configured as {configured}, not {other}").into());
         }
         // A drive that still has its factory's number is reached under that one.
         subject.node = self.node.unwrap_or(subject.node);

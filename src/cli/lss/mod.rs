@@ -18,6 +18,7 @@ use takt_rt::port::{BusPort, Clock};
 
 use super::exit::Exit;
 use super::interruption;
+use super::refusal::Refusal;
 use output::{Device, Output, Report};
 
 /// How soon a controller that has gone off the bus comes back.
@@ -166,10 +167,10 @@ pub fn run(arguments: &Arguments) -> Exit {
         }
     };
     let is_interrupted = || interrupted.load(Ordering::Relaxed);
+    let refuse = |words: String| Refusal::from(words).print(arguments.json);
     match &arguments.bus {
         Interface::Simulated if arguments.simulate.is_empty() => {
-            say!("takt: nobody is on a simulated bus: add --simulate IDENTITY");
-            Exit::Usage
+            refuse("nobody is on a simulated bus: add --simulate IDENTITY".to_owned())
         }
         Interface::Simulated => {
             let devices = arguments.simulate.iter();
@@ -177,22 +178,17 @@ pub fn run(arguments: &Arguments) -> Exit {
             lead(arguments, &mut bus, &mut VirtualClock::default(), is_interrupted)
         }
         Interface::SocketCan(_) if !arguments.simulate.is_empty() => {
-            say!("takt: --simulate is for a simulated bus: --bus sim");
-            Exit::Usage
+            refuse("--simulate is for a simulated bus: --bus sim".to_owned())
         }
         Interface::SocketCan(name) => {
             let bit_rate = arguments.bit_rate;
             let settings = InterfaceSettings { bit_rate, data_bit_rate: None, restart_ms: RESTART_MS };
             if let Err(error) = prepare_interface(name, &settings) {
-                say!("takt: bus {name}: {error}");
-                return Exit::Usage;
+                return refuse(format!("bus {name}: {error}"));
             }
             match open_socketcan(name, &SocketCanOptions { bit_rate, ..SocketCanOptions::default() }) {
                 Ok(mut port) => lead(arguments, &mut port, &mut MonotonicClock::default(), is_interrupted),
-                Err(error) => {
-                    say!("takt: bus {name}: {error}");
-                    Exit::Usage
-                }
+                Err(error) => refuse(format!("bus {name}: {error}")),
             }
         }
     }

@@ -1,7 +1,5 @@
 //! What is shown of layer setting services.
 
-use std::io::Write as _;
-
 use serde::Serialize;
 
 use takt::canopen::lss::{LssAddress, LssError, LssRequest, LssResponse};
@@ -10,6 +8,7 @@ use takt::commission::layer_settings::LayerSettingFailure;
 use takt_rt::time::Nanoseconds;
 
 use super::super::exit::Exit;
+use super::super::print;
 
 /// The identity of a device.
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -121,20 +120,13 @@ impl Output {
                 advice: failure.and_then(advice),
                 result: report,
             };
-            match serde_json::to_string(&printed) {
-                Ok(json) => print(&format!("{json}\n")),
-                Err(error) => say!("takt: the result cannot be written as JSON: {error}"),
-            }
-            return exit;
+            return print::json(&printed, exit);
         }
-        print(&text(report));
-        match failure {
-            None => {}
-            Some(failure) => {
-                say!("takt: {}: {failure}", self.action);
-                if let Some(advice) = advice(failure) {
-                    say!("  try: {advice}");
-                }
+        let exit = print::text(&text(report), exit);
+        if let Some(failure) = failure {
+            say!("takt: {}: {failure}", self.action);
+            if let Some(advice) = advice(failure) {
+                say!("  try: {advice}");
             }
         }
         exit
@@ -169,9 +161,4 @@ fn text(report: &Report) -> String {
         );
     }
     lines.into_iter().map(|line| format!("  {line}\n")).collect()
-}
-
-/// A reader that has seen enough (`| head`) is no failure.
-fn print(text: &str) {
-    let _ = std::io::stdout().write_all(text.as_bytes());
 }

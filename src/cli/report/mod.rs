@@ -3,13 +3,15 @@
 mod drawing;
 
 use std::fs;
-use std::io::{IsTerminal, Write, stdout};
+use std::io::{IsTerminal, stdout};
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use takt::telemetry::{Emphasis, Recorded, RecordedError, RecordingReport};
 
 use super::exit::Exit;
+use super::print;
+use super::refusal::Refusal;
 
 /// Tell from a recording or a black box why the group stopped, what led to it, and how the timing was
 #[derive(Args, Debug)]
@@ -20,7 +22,7 @@ pub struct Arguments {
     #[arg(long, value_name = "NAME")]
     axis: Option<String>,
     /// Show so many cycles up to the stop
-    #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u64).range(1..=10_000))]
+    #[arg(long, value_name = "N", default_value_t = 20, allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(1..=10_000))]
     cycles: u64,
     /// Draw position, velocity, following error and timing around the stop into this file
     #[arg(long, value_name = "FILE.svg")]
@@ -35,35 +37,30 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Exit {
     match tell(arguments) {
         Ok(exit) => exit,
-        Err(message) => {
-            say!("takt: {message}");
-            Exit::Usage
-        }
+        Err(refusal) => refusal.print(arguments.json),
     }
 }
 
-fn tell(arguments: &Arguments) -> Result<Exit, String> {
+fn tell(arguments: &Arguments) -> Result<Exit, Refusal> {
     let words = |error: RecordedError| error.to_string();
     let recorded = Recorded::open(&arguments.recording).map_err(words)?;
     let axis = recorded.axis(arguments.axis.as_deref());
     if let (Some(name), None) = (&arguments.axis, axis) {
         let names: Vec<&str> = recorded.machine.axes.iter().map(|axis| axis.name.as_str()).collect();
-        return Err(format!("there is no axis {name:?} in it; there are {}", names.join(", ")));
+        return Err(format!("there is no axis {name:?} in it; there are {}", names.join(", ")).into());
     }
     let report = RecordingReport::new(&recorded, axis, arguments.cycles).map_err(words)?;
     let is_drawn = match &arguments.svg {
         Some(path) => write(path, &drawing::draw(&recorded, axis).map_err(words)?),
         None => true,
     };
-    let text = if arguments.json {
-        let json = serde_json::to_string(&report);
-        format!("{}\n", json.map_err(|error| format!("the report cannot be written as JSON: {error}"))?)
+    let exit = if is_drawn { Exit::Done } else { Exit::Stopped };
+    Ok(if arguments.json {
+        print::json(&report, exit)
     } else {
-        report.picture(if stdout().is_terminal() { Emphasis::Ansi } else { Emphasis::None })
-    };
-    // A reader that has seen enough (`| head`) is no failure.
-    let _ = stdout().write_all(text.as_bytes());
-    Ok(if is_drawn { Exit::Done } else { Exit::Stopped })
+        let emphasis = if stdout().is_terminal() { Emphasis::Ansi } else { Emphasis::None };
+        print::text(&report.picture(emphasis), exit)
+    })
 }
 
 fn write(path: &Path, svg: &str) -> bool {

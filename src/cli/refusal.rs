@@ -1,0 +1,96 @@
+//! Why nothing was done, in words or, after `--json`, as one object.
+
+use std::ffi::OsStr;
+
+use serde::Serialize;
+use takt::config::ConfigError;
+
+use super::exit::Exit;
+use super::print;
+
+/// Why nothing was done.
+pub enum Refusal {
+    /// In words.
+    Words(String),
+    /// A file that is not right, with its problems.
+    File(ConfigError),
+}
+
+/// A refusal as an object.
+#[derive(Serialize)]
+struct Printed {
+    error: String,
+    problems: Vec<Problem>,
+}
+
+#[derive(Serialize)]
+struct Problem {
+    line: Option<usize>,
+    message: String,
+    help: String,
+}
+
+impl Refusal {
+    /// Prints it, as an object on standard output or in words on standard error.
+    pub fn print(self, is_json: bool) -> Exit {
+        match self {
+            refusal if is_json => print::indented_json(&refusal.printed(), Exit::Usage),
+            Self::Words(words) => {
+                say!("takt: {words}");
+                Exit::Usage
+            }
+            Self::File(error) => {
+                say!("{:?}", miette::Report::new(error));
+                Exit::Usage
+            }
+        }
+    }
+
+    fn printed(self) -> Printed {
+        match self {
+            Self::Words(error) => Printed { error, problems: vec![] },
+            Self::File(error) => Printed {
+                error: error.to_string(),
+                problems: error
+                    .problems()
+                    .iter()
+                    .map(|problem| Problem {
+                        line: error.line(problem),
+                        message: problem.to_string(),
+                        help: problem.kind.help(),
+                    })
+                    .collect(),
+            },
+        }
+    }
+}
+
+impl From<ConfigError> for Refusal {
+    fn from(error: ConfigError) -> Self {
+        Self::File(error)
+    }
+}
+
+impl From<String> for Refusal {
+    fn from(words: String) -> Self {
+        Self::Words(words)
+    }
+}
+
+impl From<&str> for Refusal {
+    fn from(words: &str) -> Self {
+        Self::Words(words.to_owned())
+    }
+}
+
+/// Prints what is wrong with the command line, or the help that it has asked for.
+pub fn of_command_line(error: &clap::Error) -> Exit {
+    let is_json = std::env::args_os().any(|argument| argument == OsStr::new("--json"));
+    if error.use_stderr() && is_json {
+        let words = error.render().to_string();
+        return Refusal::from(words.trim_start_matches("error: ").trim_end()).print(true);
+    }
+    // Nobody may be there any more to read it.
+    let _ = error.print();
+    if error.use_stderr() { Exit::Usage } else { Exit::Done }
+}
