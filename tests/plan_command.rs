@@ -1,6 +1,7 @@
 //! `takt plan` as a user meets it: problems in, one a line, answers out.
 
-use std::io::Write;
+use std::fs::File;
+use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
@@ -106,6 +107,139 @@ fn a_line_that_is_no_problem_is_named_and_the_rest_is_answered() {
     assert_eq!(results, ["ok", "malformed", "malformed", "ok"]);
     assert!(answers[1]["message"].as_str().unwrap().starts_with("line 2: "), "{}", answers[1]);
     assert!(answers[2]["message"].as_str().unwrap().starts_with("line 3: `vmax`"), "{}", answers[2]);
+}
+
+#[test]
+fn a_misspelt_key_is_an_error_that_names_it_its_place_and_those_there_are() {
+    let mut misspelt = problem();
+    misspelt["jmx"] = json!([1.0, 1.0]);
+    let output = plan(&[], &format!("{}\n{misspelt}\n", problem()));
+    assert_eq!(output.status.code(), Some(2));
+    let answers = answers(&output);
+    assert_eq!((&answers[0]["result"], &answers[1]["result"]), (&json!("ok"), &json!("malformed")));
+    let message = answers[1]["message"].as_str().unwrap();
+    assert!(message.starts_with("line 2: unknown field `jmx`, expected one of "), "{message}");
+    assert!(
+        message.contains("`jmax`") && message.contains(" (column ") && !message.contains("line 1"),
+        "{message}"
+    );
+}
+
+/// `otg_oracle.py` writes the problem with its family, the number of axes, and Ruckig's answer, or why there is none.
+#[test]
+fn a_problem_with_a_known_answer_beside_it_is_a_problem_like_any_other() {
+    let alone = json!({
+        "id": 7, "interface": "position", "sync": "time", "dt": null, "min_duration": null,
+        "p0": [0.0], "v0": [0.0], "a0": [0.0], "pf": [1.0], "vf": [0.0], "af": [0.0],
+        "vmax": [2.0], "vmin": [-2.0], "amax": [8.0], "amin": [-8.0], "jmax": [null],
+    });
+    let mut answered = alone.clone();
+    for (key, value) in [
+        ("family", json!("second")),
+        ("dofs", json!(1)),
+        ("result", json!("ok")),
+        ("duration", json!(0.75)),
+        ("t_min", json!([0.75])),
+        ("t", json!([0.0, 0.75])),
+        ("p", json!([[0.0], [1.0]])),
+        ("v", json!([[0.0], [0.0]])),
+        ("a", json!([[8.0], [-8.0]])),
+    ] {
+        answered[key] = value;
+    }
+    let mut crashed = alone.clone();
+    crashed["result"] = json!("crash");
+    let output = plan(&[], &format!("{alone}\n{answered}\n{crashed}\n"));
+    assert_eq!(output.status.code(), Some(0));
+    let answers = answers(&output);
+    assert_eq!((&answers[0]["result"], &answers[0]["duration"]), (&json!("ok"), &json!(0.75)));
+    assert!(answers.iter().all(|answer| *answer == answers[0]), "{answers:?}");
+    answered["dofs"] = json!(6);
+    let output = plan(&[], &answered.to_string());
+    assert_eq!(output.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&output.stdout).contains("`dofs` is 6, `p0` has 1 "));
+}
+
+#[test]
+fn what_is_wrong_with_a_problem_is_said_with_its_key() {
+    let with = |key: &str, value: Value| {
+        let mut problem = problem();
+        problem[key] = value;
+        problem.to_string()
+    };
+    let cases = [
+        (with("vmax", json!([2.0, 0.0])), "axis 1: `vmax` must be above 0"),
+        (with("amin", json!([-1.0, 1.0])), "axis 1: `amin` must be below 0"),
+        (with("jmax", json!([-1.0, null])), "axis 0: `jmax` must be above 0, or null for no limit"),
+        (with("pmin", json!([null, 3.0])), "axis 1: `pmin` must be below `pmax`"),
+        (with("vf", json!([3.0, 0.0])), "axis 0: the target cannot be reached within `vmax`"),
+        (with("dt", json!(0.0)), "`dt` is not above 0"),
+        (with("p0", json!([1e30, 0.0])), "axis 0: the numbers are too large or too small"),
+        (with("sync", json!("tme")), "line 8: unknown variant `tme`, expected one of `time`, `phase`"),
+        ("[0]".to_owned(), "line 9: a problem is no list"),
+        ("7".to_owned(), "line 10: invalid type: integer `7`, expected a problem: {\"p0\""),
+    ];
+    let input: String = cases.iter().map(|(line, _)| format!("{line}\n")).collect();
+    let answers = answers(&plan(&[], &input));
+    assert_eq!(answers.len(), cases.len());
+    for (answer, (_, words)) in answers.iter().zip(&cases) {
+        assert!(answer["message"].as_str().unwrap().contains(words), "{answer} does not say {words:?}");
+    }
+}
+
+#[test]
+fn who_asks_one_problem_after_the_other_gets_each_answer_before_the_next() {
+    let mut child = Command::new(env!("CARGO_BIN_EXE_takt"))
+        .arg("plan")
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let (mut questions, mut answers) =
+        (child.stdin.take().unwrap(), BufReader::new(child.stdout.take().unwrap()));
+    for _ in 0..3 {
+        writeln!(questions, "{}", problem()).unwrap();
+        let mut answer = String::new();
+        answers.read_line(&mut answer).unwrap();
+        assert!(answer.contains("\"ok\""), "{answer}");
+    }
+    drop(questions);
+    assert_eq!(child.wait().unwrap().code(), Some(0));
+}
+
+#[test]
+fn answers_that_a_full_disk_has_swallowed_are_no_success() {
+    let full = File::options().write(true).open("/dev/full").unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let problems = folder.path().join("problems.jsonl");
+    std::fs::write(&problems, format!("{}\n", problem())).unwrap();
+    let output =
+        Command::new(env!("CARGO_BIN_EXE_takt")).arg("plan").arg(problems).stdout(full).output().unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(said.contains("cannot be written to standard output: No space left"), "{said}");
+}
+
+#[test]
+fn a_picture_that_is_not_drawn_is_said_and_costs_no_answer() {
+    let folder = tempfile::tempdir().unwrap();
+    let inside = folder.path().to_str().unwrap();
+    let output = plan(&["--plot", inside], &format!("{}\n{}\n", problem(), problem()));
+    assert_eq!((output.status.code(), answers(&output).len()), (Some(1), 2));
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(
+        said.starts_with(&format!("takt: {inside} cannot be written: ")) && said.lines().count() == 1,
+        "{said}"
+    );
+    let mut beyond = problem();
+    beyond["pf"] = json!([1.0, -1.5]);
+    let picture = folder.path().join("none.svg");
+    let output = plan(&["--plot", picture.to_str().unwrap()], &beyond.to_string());
+    assert_eq!(output.status.code(), Some(0));
+    assert!(
+        String::from_utf8_lossy(&output.stderr).contains("none.svg is not drawn: there is no trajectory")
+    );
+    assert!(!picture.exists());
 }
 
 #[test]

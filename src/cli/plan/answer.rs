@@ -1,7 +1,7 @@
 //! An answer as it is written in a line.
 
 use serde::Serialize;
-use takt_rt::plan::{Extrema, PlanError, Profile};
+use takt_rt::plan::{Extrema, Limit, PlanError, Profile, Quantity};
 
 /// The number of sample times, from the start to the end.
 const SAMPLES: u32 = 16;
@@ -71,16 +71,18 @@ impl Answer {
 fn words(error: PlanError) -> (&'static str, String) {
     match error {
         PlanError::NotFinite { axis, quantity } => {
-            ("not_finite", format!("axis {axis}: the {quantity:?} is not a finite number"))
+            ("not_finite", format!("axis {axis}: `{}` is not a finite number", state_key(quantity)))
         }
         PlanError::InvalidLimit { axis, limit } => {
-            ("invalid_limit", format!("axis {axis}: {limit:?} is no limit of this kind"))
+            ("invalid_limit", format!("axis {axis}: {}", requirement(limit)))
         }
         PlanError::TargetBeyondLimit { axis, limit } => {
-            ("target_beyond_limit", format!("axis {axis}: the target cannot be reached within {limit:?}"))
+            let key = limit_key(limit);
+            ("target_beyond_limit", format!("axis {axis}: the target cannot be reached within `{key}`"))
         }
         PlanError::PositionBeyondLimit { axis, limit } => {
-            ("position_beyond_limit", format!("axis {axis}: no trajectory to the target keeps {limit:?}"))
+            let key = limit_key(limit);
+            ("position_beyond_limit", format!("axis {axis}: no trajectory to the target keeps `{key}`"))
         }
         PlanError::NotStraight { axis } => {
             ("not_straight", format!("axis {axis} is not in proportion to the others"))
@@ -92,7 +94,45 @@ fn words(error: PlanError) -> (&'static str, String) {
             ("length_mismatch", format!("{received} axes in place of {expected}"))
         }
         PlanError::InvalidTiming => {
-            ("invalid_timing", "`min_duration` or `dt` is negative or not a finite number".into())
+            let message = "`min_duration` is negative, or `dt` is not above 0, or one of them is too large or too small";
+            ("invalid_timing", message.into())
         }
+    }
+}
+
+/// The key of a problem in which a limit stands.
+const fn limit_key(limit: Limit) -> &'static str {
+    match limit {
+        Limit::PositionMax => "pmax",
+        Limit::PositionMin => "pmin",
+        Limit::VelocityMax => "vmax",
+        Limit::VelocityMin => "vmin",
+        Limit::AccelerationMax => "amax",
+        Limit::AccelerationMin => "amin",
+        Limit::JerkMax => "jmax",
+    }
+}
+
+/// What a limit must be.
+const fn requirement(limit: Limit) -> &'static str {
+    match limit {
+        Limit::PositionMax | Limit::PositionMin => "`pmin` must be below `pmax`",
+        Limit::VelocityMax => "`vmax` must be above 0",
+        Limit::VelocityMin => "`vmin` must be below 0",
+        Limit::AccelerationMax => "`amax` must be above 0",
+        Limit::AccelerationMin => "`amin` must be below 0",
+        Limit::JerkMax => "`jmax` must be above 0, or null for no limit",
+    }
+}
+
+/// The key of a problem in which a part of the start or the target stands.
+const fn state_key(quantity: Quantity) -> &'static str {
+    match quantity {
+        Quantity::StartPosition => "p0",
+        Quantity::StartVelocity => "v0",
+        Quantity::StartAcceleration => "a0",
+        Quantity::TargetPosition => "pf",
+        Quantity::TargetVelocity => "vf",
+        Quantity::TargetAcceleration => "af",
     }
 }

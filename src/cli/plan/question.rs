@@ -1,6 +1,7 @@
 //! A problem as it is written in a line.
 
 use serde::Deserialize;
+use serde::de::IgnoredAny;
 use takt_rt::plan::{
     Limits, Problem, Profile, State, Synchronisation, Timing, synchronised, synchronised_velocity,
 };
@@ -8,7 +9,14 @@ use takt_rt::plan::{
 use super::answer::Answer;
 
 /// The problem, one number an axis in every list. What is left out is zero, or unlimited for a position or a jerk.
+///
+/// Files of problems with known answers have `family` and the answer in the same line: these keys are allowed, and are not
+/// looked at.
 #[derive(Deserialize, Debug)]
+#[serde(
+    deny_unknown_fields,
+    expecting = "a problem: {\"p0\": [0], \"pf\": [1], \"vmax\": [2], \"amax\": [8]}"
+)]
 pub struct Question {
     #[serde(default)]
     id: serde_json::Value,
@@ -42,6 +50,24 @@ pub struct Question {
     pmin: Vec<Option<f64>>,
     #[serde(default)]
     pmax: Vec<Option<f64>>,
+    /// The number of axes, where somebody wants it to be checked.
+    dofs: Option<usize>,
+    #[serde(default, rename = "family")]
+    _family: IgnoredAny,
+    #[serde(default, rename = "result")]
+    _result: IgnoredAny,
+    #[serde(default, rename = "duration")]
+    _duration: IgnoredAny,
+    #[serde(default, rename = "t_min")]
+    _minimum_durations: IgnoredAny,
+    #[serde(default, rename = "t")]
+    _times: IgnoredAny,
+    #[serde(default, rename = "p")]
+    _positions: IgnoredAny,
+    #[serde(default, rename = "v")]
+    _velocities: IgnoredAny,
+    #[serde(default, rename = "a")]
+    _accelerations: IgnoredAny,
 }
 
 #[derive(Deserialize, Clone, Copy, Debug, Default)]
@@ -65,7 +91,16 @@ enum Sync {
 impl Question {
     /// Reads a line and checks that the lists belong together.
     pub fn parse(line: &str) -> Result<Self, String> {
-        let question: Self = serde_json::from_str(line).map_err(|error| error.to_string())?;
+        if line.trim_start().starts_with('[') {
+            return Err("a problem is no list, but an object: {\"p0\": [0], …}".to_owned());
+        }
+        let question: Self = serde_json::from_str(line).map_err(|error| {
+            // Of the place that the reader names, only the column means something: every line is read on its own.
+            let (words, column) = (error.to_string(), error.column());
+            let words =
+                words.strip_suffix(&format!(" at line {} column {column}", error.line())).unwrap_or(&words);
+            format!("{words} (column {column})")
+        })?;
         question.check_lengths()?;
         Ok(question)
     }
@@ -88,6 +123,9 @@ impl Question {
             ("pmin", self.pmin.len()),
             ("pmax", self.pmax.len()),
         ];
+        if let Some(dofs) = self.dofs.filter(|dofs| *dofs != axes) {
+            return Err(format!("`dofs` is {dofs}, `p0` has {axes} numbers"));
+        }
         let wrong = required
             .iter()
             .find(|(_, length)| *length != axes)
