@@ -28,5 +28,6 @@ pub mod doctor;
 pub mod drive;
 pub mod faults;
 pub mod jitter;
+mod printable;
 pub mod sim;
 pub mod telemetry;

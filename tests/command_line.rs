@@ -376,6 +376,30 @@ fn a_result_that_a_full_disk_has_swallowed_is_no_success() {
     }
 }
 
+/// Whoever made the file must not have the terminal.
+#[test]
+fn what_a_terminal_would_obey_is_not_shown_of_a_file() {
+    let place = Place::new();
+    let config = place.config();
+    let check = || {
+        let output = Command::new(env!("CARGO_BIN_EXE_takt")).arg("check").arg(&config).output().unwrap();
+        assert_eq!(output.status.code(), Some(2));
+        output
+    };
+    for (text, words) in [
+        ("\"a\\u001b[2Jkey\" = 1\n", "`a?[2Jkey` means nothing here"),
+        ("name = \"raw \u{1b}[31m red\"\n", "raw ?[31m red"),
+        ("# \u{9b}31m \u{202e}\nnam = \"arm\"\n", "# ¿31m \u{fffd}"),
+    ] {
+        fs::write(&config, text).unwrap();
+        let said = errors(&check());
+        assert!(said.contains(words), "{said}");
+        assert!(!said.contains(['\u{1b}', '\u{9b}', '\u{202e}']), "{said:?}");
+    }
+    fs::write(&config, [b"name = \"arm\"\n# \xff".as_slice(), b"\x1b[2J\x07\n"].concat()).unwrap();
+    assert!(!errors(&check()).contains(['\u{1b}', '\u{7}']));
+}
+
 #[test]
 fn check_says_whether_a_configuration_fits() {
     let place = Place::new();

@@ -190,6 +190,38 @@ fn of_a_stop_for_a_bus_an_axis_on_that_bus_is_shown_even_if_another_was_further_
     }
 }
 
+/// Whoever made the file must not have the terminal.
+#[test]
+fn what_a_terminal_would_obey_is_not_shown_of_a_recording() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/single-erob.toml");
+    let mut config = Config::load(&path).unwrap();
+    config.program.moves.truncate(1);
+    let (mut run, log) = VirtualRun::simulated(&config).unwrap();
+    let mut machine = Machine::of(&config);
+    machine.name = "arm\u{1b}[2J".to_owned();
+    machine.axes[0].name = "joint\u{1b}[31m".to_owned();
+    machine.buses[0].name = "can\u{9b}31m".to_owned();
+    let options = LoggerOptions {
+        machine,
+        wall_clock: WallClock::fixed(UNIX_AT_ZERO_NS),
+        started_ns: 0,
+        recording: Some(Destination::File(folder.path().join("run.mcap"))),
+        candump: None,
+        black_box: None,
+        traces: vec![],
+    };
+    let mut logger = Logger::new(log, options, Box::new(|_| {}));
+    run.run(60_000, |_| {
+        logger.drain();
+    });
+    let output = report(&logger.finish().recording.unwrap(), &[]);
+    assert_eq!(output.status.code(), Some(0), "{}", errors(&output));
+    let text = text(&output);
+    assert!(text.contains("arm?[2J") && text.contains("joint?[31m"), "{text}");
+    assert!(!text.contains(['\u{1b}', '\u{9b}']), "{text:?}");
+}
+
 #[test]
 fn another_axis_can_be_asked_for_and_one_that_is_not_there_is_told_with_those_that_are() {
     let left = stopped_run();

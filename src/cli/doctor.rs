@@ -1,6 +1,6 @@
 //! `takt doctor`: is this machine fit for the loop?
 
-use std::io::{IsTerminal, stderr, stdout};
+use std::io::{IsTerminal, stderr};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -9,7 +9,6 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use takt::doctor::{SelfTest, Source, Subject, Verdict, attempt, examine};
 use takt::jitter::{self, JitterOptions, Pacing};
-use takt::telemetry::Emphasis;
 
 use super::configuration;
 use super::exit::Exit;
@@ -66,8 +65,7 @@ pub fn run(arguments: &Arguments) -> Exit {
     if arguments.json {
         return print::json(&examination, exit);
     }
-    let emphasis = if stdout().is_terminal() { Emphasis::Ansi } else { Emphasis::None };
-    print::text(&examination.picture(emphasis), exit)
+    print::text(&examination.picture(print::emphasis()), exit)
 }
 
 /// Runs the loop of the subject, without a bus.

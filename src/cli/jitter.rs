@@ -1,7 +1,7 @@
 //! `takt jitter`: how evenly this machine paces the loop.
 
 use std::fs;
-use std::io::{IsTerminal, stderr, stdout};
+use std::io::{IsTerminal, stderr};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -10,7 +10,6 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use takt::config::Interface;
 use takt::jitter::{self, JitterOptions, JitterReport, Measurement, Pacing};
-use takt::telemetry::Emphasis;
 
 use super::exit::Exit;
 use super::interruption;
@@ -89,10 +88,7 @@ pub fn run(arguments: &Arguments) -> Exit {
     };
     match JitterReport::new(&options, &measurements) {
         Some(report) if arguments.json => print::json(&report, exit),
-        Some(report) => {
-            let emphasis = if stdout().is_terminal() { Emphasis::Ansi } else { Emphasis::None };
-            print::text(&report.picture(emphasis), exit)
-        }
+        Some(report) => print::text(&report.picture(print::emphasis()), exit),
         None => exit,
     }
 }

@@ -1,10 +1,18 @@
 //! The result of a subcommand, on standard output.
 
-use std::io::{self, ErrorKind, Write, stdout};
+use std::env;
+use std::io::{self, ErrorKind, IsTerminal, Write, stdout};
 
 use serde::Serialize;
+use takt::telemetry::Emphasis;
 
 use super::exit::Exit;
+
+/// How the result is emphasised: with colours on a terminal, unless `NO_COLOR` is set (<https://no-color.org>).
+pub fn emphasis() -> Emphasis {
+    let is_plain = env::var_os("NO_COLOR").is_some_and(|set| !set.is_empty());
+    if stdout().is_terminal() && !is_plain { Emphasis::Ansi } else { Emphasis::None }
+}
 
 /// Prints a text. How the subcommand ends: as it would, unless the text cannot be written.
 pub fn text(text: &str, exit: Exit) -> Exit {

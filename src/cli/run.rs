@@ -1,6 +1,6 @@
 //! `takt run`: the main job.
 
-use std::io::{IsTerminal, stderr, stdout};
+use std::io::{IsTerminal, stderr};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -16,7 +16,7 @@ use takt::controller::realtime_thread::StartError;
 use takt::controller::session::{self, Session, SessionError, SessionOptions};
 use takt::controller::{Interrupt, Outcome, Progress};
 use takt::faults::{Fault, Rehearsal, Scenario, ScenarioError, Tidings};
-use takt::telemetry::{Destination, Emphasis, Machine, Notice, RealtimeReport, RunOutcome, RunReport, words};
+use takt::telemetry::{Destination, Machine, Notice, RealtimeReport, RunOutcome, RunReport, words};
 use takt_rt::door::Snapshot;
 use takt_rt::record::{Event, EventKind};
 use takt_rt::stop::StopReason;
@@ -188,10 +188,7 @@ fn report(config: &Config, session: &Session, as_json: bool) -> Exit {
             report.telemetry.black_boxes.iter().for_each(|path| say!("black box: {}", path.display()));
             exit
         }
-        None => {
-            let emphasis = if stdout().is_terminal() { Emphasis::Ansi } else { Emphasis::None };
-            print::text(&report.picture(emphasis), exit)
-        }
+        None => print::text(&report.picture(print::emphasis()), exit),
     }
 }
 

@@ -9,6 +9,7 @@ use thiserror::Error;
 use crate::canopen::dcf::DcfError;
 
 use super::problem_kind::ProblemKind;
+use crate::printable::printable;
 
 /// A configuration that cannot be used, with all of its problems in the order of the file. `miette` shows each of
 /// them with its line.
@@ -31,7 +32,7 @@ impl ConfigError {
                 seen.push(problem);
             }
         }
-        let source = NamedSource::new(source_name, text.to_owned());
+        let source = NamedSource::new(source_name, printable(text));
         Self(Box::new(Inner { source, text: text.to_owned(), problems: seen }))
     }
 

@@ -1,7 +1,10 @@
 //! From the bytes of a file to text: the encodings and line ends that are met.
 
+use crate::printable::printable;
+
 /// Decodes a file. The standard asks for ASCII; UTF-8 (with or without its mark), UTF-16 (with its mark) and Latin-1
-/// are met. Every line of the result ends with a line feed alone, or with it after a carriage return.
+/// are met. What no terminal should be shown is replaced. Every line of the result ends with a line feed alone, or with
+/// it after a carriage return.
 pub(super) fn decode(bytes: &[u8]) -> String {
     let text = match bytes {
         [0xEF, 0xBB, 0xBF, rest @ ..] => utf8_or_latin1(rest),
@@ -11,7 +14,7 @@ pub(super) fn decode(bytes: &[u8]) -> String {
     };
     // Old editors end files with a zero or Ctrl-Z.
     let text = text.trim_end_matches(['\0', '\x1A']);
-    if text.contains('\n') { text.to_owned() } else { text.replace('\r', "\n") }
+    printable(&if text.contains('\n') { text.to_owned() } else { text.replace('\r', "\n") })
 }
 
 fn utf8_or_latin1(bytes: &[u8]) -> String {

@@ -4,6 +4,7 @@ use takt_rt::time::Nanoseconds;
 
 use super::abort::AbortCode;
 use crate::canopen::object::{DataType, ObjectAddress};
+use crate::printable::printable;
 
 /// The most bytes that an upload takes; what a server sends beyond is refused.
 pub const MAX_UPLOAD_BYTES: usize = 1 << 16;
@@ -68,7 +69,7 @@ impl Uploaded {
 
     /// The text that the bytes hold (VISIBLE_STRING), without trailing zeros and blanks.
     pub fn text(&self) -> String {
-        String::from_utf8_lossy(&self.bytes).trim_end_matches(['\0', ' ']).to_owned()
+        printable(String::from_utf8_lossy(&self.bytes).trim_end_matches(['\0', ' ']))
     }
 }
 

@@ -3,11 +3,10 @@
 mod drawing;
 
 use std::fs;
-use std::io::{IsTerminal, stdout};
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use takt::telemetry::{Emphasis, Recorded, RecordedError, RecordingReport};
+use takt::telemetry::{Recorded, RecordedError, RecordingReport};
 
 use super::exit::Exit;
 use super::print;
@@ -58,8 +57,7 @@ fn tell(arguments: &Arguments) -> Result<Exit, Refusal> {
     Ok(if arguments.json {
         print::json(&report, exit)
     } else {
-        let emphasis = if stdout().is_terminal() { Emphasis::Ansi } else { Emphasis::None };
-        print::text(&report.picture(emphasis), exit)
+        print::text(&report.picture(print::emphasis()), exit)
     })
 }
 

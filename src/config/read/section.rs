@@ -8,6 +8,7 @@ use toml::de::{DeTable, DeValue};
 use super::entry::{Entry, Problems};
 use crate::config::problem_kind::ProblemKind;
 use crate::config::spelling;
+use crate::printable::printable;
 
 /// A table that is being read. It remembers which keys were asked for: what is left over at the end is unknown, and
 /// what was asked for in vain is missing.
@@ -134,7 +135,7 @@ impl<'a> Section<'a> {
                 let nearest = spelling::nearest(key.get_ref(), absent);
                 meant.extend(nearest);
                 let kind = ProblemKind::UnknownKey {
-                    key: self.path_of(key.get_ref()),
+                    key: printable(&self.path_of(key.get_ref())),
                     nearest,
                     known: known.clone(),
                 };

@@ -21,6 +21,7 @@ use super::recording;
 use super::statistics::Statistics;
 use super::wall_clock::WallClock;
 use crate::bus::trace::TracedHealth;
+use crate::printable::printable;
 
 pub use cause::Cause;
 pub use walk::WalkError;
@@ -38,7 +39,9 @@ pub enum RecordedError {
         error: WalkError,
     },
     /// It is an MCAP file of something else.
-    #[error("{path}: no recording of takt (it was written by {library:?})")]
+    #[error(
+        "{path}: no recording of takt (it was written by {library:?}); name one that `takt run` has left"
+    )]
     Foreign {
         /// The file.
         path: PathBuf,
@@ -137,15 +140,17 @@ impl Recorded {
 
     fn take(&mut self, item: Item<'_>) {
         match item {
-            Item::Machine(mut described) => {
-                let mut text = |key: &str| described.remove(key).unwrap_or_default();
+            Item::Machine(described) => {
+                let text = |key: &str| described.get(key).map_or_else(String::new, |text| printable(text));
                 self.version = text("version");
                 self.machine.name = text("machine");
                 self.machine.cycle_ns = text("cycle_ns").parse().unwrap_or(0);
                 let bus = |name: &str| BusDescription { name: name.to_owned(), interface: String::new() };
                 self.machine.buses = text("buses").lines().map(bus).collect();
             }
-            Item::Fault(fault) => self.faults.push(fault),
+            Item::Fault(fault) => {
+                self.faults.push(fault.into_iter().map(|(key, text)| (key, printable(&text))).collect());
+            }
             Item::Cycle(record, log_time_ns) => {
                 let (slot, start_ns) = (record.timing.slot, record.timing.slot_start_ns);
                 if self.statistics.cycles == 0 {
@@ -157,7 +162,7 @@ impl Recorded {
                 let (first, last) = self.slots.unwrap_or((slot, slot));
                 self.slots = Some((first.min(slot), last.max(slot)));
             }
-            Item::Event(event) => self.events.push(event),
+            Item::Event(event) => self.events.push(RecordedEvent { text: printable(&event.text), ..event }),
             Item::Health(OnBus { bus, what }) => self.health.push((bus, what)),
         }
     }
@@ -275,8 +280,8 @@ impl Decoder {
             (name, _) if name == messages::EVENT.name => Carries::Events,
             (name, Some(index)) if name == messages::AXIS.name => {
                 let description = AxisDescription {
-                    name: text("name").to_owned(),
-                    bus: channel.metadata.get("bus").cloned(),
+                    name: printable(text("name")),
+                    bus: channel.metadata.get("bus").map(|bus| printable(bus)),
                     unit: if text("unit") == Unit::Metre.symbol() { Unit::Metre } else { Unit::Radian },
                     counts_per_unit: number("counts_per_unit"),
                     limits: SetPointMagnitudes {

@@ -6,6 +6,8 @@ use std::io::{self, Read};
 use mcap::MAGIC;
 use mcap::records::op;
 
+use crate::printable::printable;
+
 /// No record of takt is longer. A length beyond it is no length.
 const LONGEST_RECORD: u64 = 1 << 28;
 
@@ -25,10 +27,10 @@ pub enum WalkError {
     #[error(transparent)]
     Io(#[from] io::Error),
     /// There is nothing in it.
-    #[error("the file is empty")]
+    #[error("the file is empty: nothing was recorded")]
     Empty,
     /// It is something else.
-    #[error("this is no MCAP file")]
+    #[error("this is no MCAP file; name a recording or a black box that `takt run` has left")]
     NotMcap,
     /// takt compresses nothing.
     #[error("its chunks are compressed ({0}); takt writes and reads uncompressed ones only")]
@@ -87,7 +89,7 @@ fn read_up_to(file: &mut impl Read, length: u64, into: &mut Vec<u8>) -> io::Resu
 fn walk_chunk(body: &[u8], is_whole: bool, visit: &mut impl FnMut(u8, &[u8])) -> Result<bool, WalkError> {
     let Some(chunk) = Chunk::parse(body) else { return Ok(!is_whole) };
     if !chunk.compression.is_empty() {
-        return Err(WalkError::Compressed(String::from_utf8_lossy(chunk.compression).into_owned()));
+        return Err(WalkError::Compressed(printable(&String::from_utf8_lossy(chunk.compression))));
     }
     if is_whole && chunk.crc != 0 && crc32fast::hash(chunk.records) != chunk.crc {
         return Ok(false);

@@ -1,0 +1,46 @@
+//! Text from a file that may be anybody's, as a terminal may be shown it.
+
+/// The same text without what would move a terminal's cursor, colour what follows, or turn its direction. Every
+/// character that is replaced is as long as what stands in its place, so that places in the text stay what they are.
+pub fn printable(text: &str) -> String {
+    let mut letters = text.chars().peekable();
+    let mut shown = String::with_capacity(text.len());
+    while let Some(letter) = letters.next() {
+        let is_line_end = letter == '\r' && letters.peek() == Some(&'\n');
+        shown.push(if is_line_end { letter } else { replacement(letter) });
+    }
+    shown
+}
+
+const fn replacement(letter: char) -> char {
+    match letter {
+        '\n' | '\t' => letter,
+        '\0'..='\u{1F}' | '\u{7F}' => '?',
+        '\u{80}'..='\u{9F}' => '¿',
+        '\u{200E}' | '\u{200F}' | '\u{2028}'..='\u{202E}' | '\u{2066}'..='\u{2069}' => {
+            char::REPLACEMENT_CHARACTER
+        }
+        _ => letter,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::printable;
+    use proptest::prelude::*;
+
+    #[test]
+    fn what_a_terminal_would_obey_is_replaced_and_everything_else_stays() {
+        assert_eq!(printable("\u{1B}[2J\u{9B}1m\u{202E}\rä\0"), "?[2J¿1m\u{FFFD}?ä?");
+        let plain = "k = \"µs\"\t# \u{2026}\r\nnext 日本\n";
+        assert_eq!(printable(plain), plain);
+    }
+
+    proptest! {
+        #[test]
+        fn every_character_keeps_its_place(text in any::<String>()) {
+            let places = |text: &str| text.char_indices().map(|(at, _)| at).collect::<Vec<_>>();
+            prop_assert_eq!(places(&printable(&text)), places(&text));
+        }
+    }
+}
