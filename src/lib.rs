@@ -31,3 +31,4 @@ pub mod jitter;
 mod printable;
 pub mod sim;
 pub mod telemetry;
+mod text_file;

@@ -266,6 +266,14 @@ fn a_folder_in_place_of_a_file_is_named() {
 }
 
 #[test]
+fn a_line_without_an_end_is_not_waited_for() {
+    let output = plan(&["/dev/zero"], "");
+    assert_eq!(output.status.code(), Some(2));
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(said.starts_with("takt: /dev/zero cannot be read: a line does not end"), "{said}");
+}
+
+#[test]
 fn a_file_that_is_not_there_is_named() {
     let output = plan(&["nowhere.jsonl"], "");
     assert_eq!(output.status.code(), Some(2));

@@ -5,7 +5,7 @@ mod plot;
 mod question;
 
 use std::fs::File;
-use std::io::{BufRead, BufReader};
+use std::io::{self, BufRead, BufReader, Read as _};
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -38,19 +38,19 @@ pub fn run(arguments: &Arguments) -> Exit {
 
 fn answer_all(arguments: &Arguments) -> Result<Exit, Refusal> {
     let name = arguments.problems.as_ref().map_or("standard input".into(), |path| path.to_string_lossy());
-    let unreadable = |error: std::io::Error| format!("{name} cannot be read: {error}");
+    let unreadable = |error: io::Error| format!("{name} cannot be read: {error}");
     let input: Box<dyn BufRead> = match &arguments.problems {
         Some(path) => Box::new(BufReader::new(File::open(path).map_err(unreadable)?)),
-        None => Box::new(std::io::stdin().lock()),
+        None => Box::new(io::stdin().lock()),
     };
     let mut exit = Exit::Done;
     let mut plot = arguments.plot.as_deref();
-    for (index, line) in input.split(b'\n').enumerate() {
+    for (index, line) in lines(input).enumerate() {
         let line = line.map_err(unreadable)?;
         if line.trim_ascii().is_empty() {
             continue;
         }
-        let text = str::from_utf8(&line).map_err(|error| format!("this is no text: {error}"));
+        let text = str::from_utf8(line.trim_ascii_end()).map_err(|error| format!("this is no text: {error}"));
         let answer = match text.and_then(Question::parse) {
             Ok(question) => {
                 let (answer, trajectory) = question.solve();
@@ -68,7 +68,7 @@ fn answer_all(arguments: &Arguments) -> Result<Exit, Refusal> {
             }
         };
         // Who asks one problem after the other waits for each answer.
-        let json = serde_json::to_string(&answer).map_err(std::io::Error::from);
+        let json = serde_json::to_string(&answer).map_err(io::Error::from);
         match json.and_then(|json| print::write(&format!("{json}\n"))) {
             Ok(true) => {}
             Ok(false) => return Ok(exit),
@@ -79,6 +79,21 @@ fn answer_all(arguments: &Arguments) -> Result<Exit, Refusal> {
         say!("takt: {} is not drawn: there is no trajectory", path.display());
     }
     Ok(exit)
+}
+
+/// No problem takes a longer line.
+const LONGEST_LINE: u64 = 64 << 20;
+
+fn lines(mut input: impl BufRead) -> impl Iterator<Item = io::Result<Vec<u8>>> {
+    std::iter::from_fn(move || {
+        let mut line = Vec::new();
+        match input.by_ref().take(LONGEST_LINE).read_until(b'\n', &mut line) {
+            Ok(0) => None,
+            Ok(read) if read as u64 == LONGEST_LINE => Some(Err(io::Error::other("a line does not end"))),
+            Ok(_) => Some(Ok(line)),
+            Err(error) => Some(Err(error)),
+        }
+    })
 }
 
 fn draw(path: &Path, question: &Question, trajectory: &[Profile]) -> bool {

@@ -28,7 +28,7 @@ impl Config {
     /// [`crate::bus::schedule::verify`].
     pub fn load(path: &Path) -> Result<Self, ConfigError> {
         let name = path.display().to_string();
-        match std::fs::read(path) {
+        match crate::text_file::read(path) {
             Ok(bytes) => Self::parse(&name, &ConfigError::text_of(&name, bytes)?),
             Err(error) => {
                 let kind = ProblemKind::Unreadable { reason: error.to_string() };

@@ -135,7 +135,7 @@ impl DeviceConfiguration {
     /// Reads a DCF, or a concise DCF, for a node.
     pub fn load(path: &Path, node: u8) -> Result<Self, DcfError> {
         let name = path.display().to_string();
-        let bytes = std::fs::read(path)
+        let bytes = crate::text_file::read(path)
             .map_err(|error| DcfError::Unreadable { path: name.clone(), reason: error.to_string() })?;
         // As a text, the first bytes of a DCF would count more entries than any file has room for.
         if let Ok(downloads) = decode_concise(&bytes) {

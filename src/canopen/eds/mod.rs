@@ -60,7 +60,7 @@ pub struct Loaded {
 /// Reads an EDS or DCF from a file.
 pub fn load(path: &Path) -> Result<Loaded, Findings> {
     let name = path.display().to_string();
-    match std::fs::read(path) {
+    match crate::text_file::read(path) {
         Ok(bytes) => parse(&name, &bytes),
         Err(error) => Err(Findings::unreadable(&name, error.to_string())),
     }

@@ -41,7 +41,7 @@ impl Scenario {
     /// See [`ScenarioError`].
     pub fn load(path: &Path, config: &Config) -> Result<Self, ScenarioError> {
         let name = path.display().to_string();
-        match std::fs::read(path) {
+        match crate::text_file::read(path) {
             Ok(bytes) => Ok(Self::parse(&name, &ConfigError::text_of(&name, bytes)?, config)?),
             Err(error) => Err(ScenarioError::Unreadable { path: name, reason: error.to_string() }),
         }

@@ -4,8 +4,8 @@ mod cause;
 mod walk;
 
 use std::collections::{BTreeMap, HashMap};
-use std::fs::File;
-use std::io::BufReader;
+use std::fs::{self, File};
+use std::io::{self, BufReader};
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
@@ -116,6 +116,12 @@ impl Recorded {
             wall_clock: None,
             warnings: Vec::new(),
         };
+        if fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir()) {
+            let error = io::Error::other(
+                "this is no ordinary file, and a recording is read more than once: save it first",
+            );
+            return Err(RecordedError::Unreadable { path: path.to_owned(), error: error.into() });
+        }
         let decoder = recorded.read(|recorded, item| recorded.take(item))?;
         recorded.machine.axes = decoder.axes.into_values().collect();
         Ok(recorded)
