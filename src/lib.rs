@@ -15,6 +15,7 @@
 //! - [`sim`]: buses and drives that behave like the manuals and the field notes say, quirks included.
 //! - [`faults`]: what can go wrong on a bus or in a drive, on purpose, from a scenario file.
 //! - [`telemetry`]: the logger that empties the rings: statistics, recordings, the report.
+//! - [`doctor`] and [`jitter`]: whether a machine is fit for it, and how evenly it paces the loop.
 //!
 //! To embed takt, see `examples/` and [`controller::Controller`].
 #![deny(unsafe_code)]
