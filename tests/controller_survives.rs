@@ -51,11 +51,21 @@ impl Place {
         command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
     }
 
-    /// Starts a run and waits until the arm moves: bring-up takes half a second, the first move more than one.
+    /// Starts a run and waits until its recording, which is a third of a second behind, shows that the arm moves.
     fn start_and_wait_for_motion(&self) -> Child {
-        let child = self.start(takt());
-        thread::sleep(Duration::from_millis(1_200));
+        let mut child = self.start(takt());
+        while !self.is_in_motion() {
+            assert_eq!(child.try_wait().unwrap(), None, "the run has ended before the arm moved");
+            thread::sleep(Duration::from_millis(20));
+        }
         child
+    }
+
+    fn is_in_motion(&self) -> bool {
+        let Ok(mut files) = fs::read_dir(self.runs()) else { return false };
+        let recorded = files.next().and_then(|file| Recorded::open(&file.unwrap().path()).ok());
+        let cycles = recorded.and_then(|recorded| recorded.cycles(&(0..=u64::MAX)).ok()).unwrap_or_default();
+        cycles.last().is_some_and(|last| last.phase == Phase::Moving)
     }
 
     fn files(&self) -> Vec<PathBuf> {
