@@ -150,8 +150,18 @@ pub fn play(case: &Case) -> Result<Done, String> {
         let World { log, snapshot, truth, events, .. } = &mut world;
         let mut look = |record: &_| {
             fingerprint.take_record(record);
-            let (told, concerns, asked) = (&wire.told, &concerns.by_axis, clients.asked);
-            invariants.check(&Seen { config, snapshot, record, told, truth, events, concerns, asked })
+            invariants.check(&Seen {
+                config,
+                snapshot,
+                record,
+                told: &wire.told,
+                truth,
+                events,
+                concerns: &concerns.by_axis,
+                troubled_buses: &concerns.by_bus,
+                overloaded_buses: &concerns.is_overloaded,
+                asked: clients.asked,
+            })
         };
         while let Some(checked) = log.next_record(&mut look) {
             checked.map_err(|what| wrong(snapshot, what))?;
