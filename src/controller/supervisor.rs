@@ -252,9 +252,12 @@ impl Supervisor {
     }
 
     fn enable(&mut self, now_ns: u64, elapsed_ns: u64, snapshot: &Snapshot) {
-        if let Some(stop) = own_stop(snapshot) {
+        // Whoever commands the group may have been quicker to see that it holds.
+        let is_enabled =
+            matches!(snapshot.phase, Phase::Holding | Phase::Moving | Phase::Streaming | Phase::Stopping);
+        if let Some(stop) = own_stop(snapshot).filter(|_| !(self.is_serving && is_enabled)) {
             self.end(now_ns, Outcome::Stopped(stop));
-        } else if snapshot.phase == Phase::Holding {
+        } else if is_enabled {
             self.deadline_ns = self.duration_ns.map(|duration_ns| now_ns + duration_ns);
             self.enter(Stage::Run, now_ns);
         } else if elapsed_ns > PATIENCE_NS {
