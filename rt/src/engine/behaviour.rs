@@ -116,7 +116,9 @@ impl Engine {
                 let is_planned_to_rest = next.iter().all(|state| state.velocity == 0.0);
                 self.finish_move(is_planned_to_rest, now_ns, door);
             }
-            _ => self.finish_stop(now_ns, door),
+            Phase::Stopping => self.finish_stop(now_ns, door),
+            // It has just become one that takes the power at once.
+            _ => {}
         }
     }
 

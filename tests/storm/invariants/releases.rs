@@ -10,15 +10,15 @@ const SLOW: f64 = 0.02;
 
 pub struct Releases {
     axes: Vec<Option<Observation>>,
-    /// The slot of the last look.
-    slot: u64,
+    /// When they were looked at last.
+    seen_ns: u64,
     /// Whether the power has been cut at once since the group was last enabled.
     is_cut: bool,
 }
 
 impl Releases {
     pub fn new(axes: usize) -> Self {
-        Self { axes: vec![None; axes], slot: 0, is_cut: false }
+        Self { axes: vec![None; axes], seen_ns: 0, is_cut: false }
     }
 
     pub fn check(&mut self, seen: &Seen<'_>) -> Result<(), String> {
@@ -26,8 +26,8 @@ impl Releases {
             Some(stop) => self.is_cut |= stop.category == StopCategory::Zero,
             None => self.is_cut = false,
         }
-        let slots = seen.snapshot.slot - std::mem::replace(&mut self.slot, seen.snapshot.slot);
-        let elapsed_s = slots as f64 * seen.config.cycle.period_ns as f64 * 1e-9;
+        let now_ns = seen.snapshot.at_ns;
+        let elapsed_s = (now_ns - std::mem::replace(&mut self.seen_ns, now_ns)) as f64 * 1e-9;
         let axes = seen.config.axes.iter().zip(seen.truth).zip(seen.concerns);
         for (last, ((axis, now), concern)) in self.axes.iter_mut().zip(axes) {
             let Some(before) = last.replace(*now) else { continue };
