@@ -2,8 +2,9 @@
 
 mod fixture;
 
-use fixture::{LIMITS, PERIOD_NS, Rig, axis_in, move_to, parameters};
-use takt_rt::cia402::State as DriveState;
+use fixture::{LIMITS, PERIOD_NS, Rig, axis, axis_in, move_to, parameters, scale};
+use takt_rt::axis::{Axis, AxisParameters, FeedbackSince};
+use takt_rt::cia402::{Goal, State as DriveState};
 use takt_rt::control::ControlLaw;
 use takt_rt::door::{ProfileMove, Request};
 use takt_rt::frame::{Frame, Id};
@@ -277,4 +278,32 @@ fn a_joint_that_was_just_told_to_turn_is_not_let_go_as_if_it_stood() {
         let share = speed_when_let_go(&mut rig);
         assert!(share <= 0.02, "let go at {share} of its highest speed when stopped {cycles} cycles later");
     }
+}
+
+#[test]
+fn a_joint_that_coasts_is_not_taken_for_standing_when_slots_are_missed() {
+    let period_s = PERIOD_NS as f64 * 1e-9;
+    // It answers set-points: the first report after slots that were missed is older than they are.
+    let parameters = AxisParameters { feedback_since: FeedbackSince::SetPoint, ..axis(0, 1) };
+    let is_led_up = |speed: f64, missed_slots: u32| {
+        let mut axis = Axis::new(parameters.clone());
+        axis.set_cycle(period_s);
+        let (mut position, mut unreported_slots) = (0.0, 1);
+        for cycle in 0..40 {
+            let [s0, s1] = (DriveState::ReadyToSwitchOn.statusword_bits() | 0x0290).to_le_bytes();
+            position += speed * period_s * f64::from(unreported_slots);
+            let [p0, p1, p2, p3] = scale().position_to_counts(position).to_le_bytes();
+            let report = Frame::of(Id::canopen(0x180, 1), [s0, s1, p0, p1, p2, p3]);
+            axis.receive(0, &report, 1).unwrap();
+            let slots = if cycle == 20 { 1 + missed_slots } else { 1 };
+            unreported_slots = slots;
+            axis.begin_cycle(period_s * f64::from(slots));
+            axis.prepare_to_enable(period_s);
+            axis.follow_actual(period_s);
+            axis.command(Goal::Disabled, None);
+        }
+        axis.is_ready()
+    };
+    assert!(is_led_up(0.0, 0) && is_led_up(0.0, 12));
+    assert!(!is_led_up(0.3, 0) && !is_led_up(0.3, 12));
 }

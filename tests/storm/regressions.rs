@@ -151,6 +151,25 @@ const FAILED_ONCE: [(u64, &str); 22] = [
     (19907, "A servo was homing, by a mode that no controlword ends, and went on when the run was over"),
 ];
 
+/// The same of those that are played with their hardships.
+const FAILED_IN_HARDSHIP: [(u64, &str); 4] = [
+    (7_002_676, "A joint in profile velocity was told to turn round, and let go as it stood on its way"),
+    (7_002_556, "A joint was let go that was still behind its set-point"),
+    (9_005_759, "A stop so near to a position limit that it swings back takes longer than was stated"),
+    (
+        9_009_552,
+        "A joint that coasted seemed to stand in the report after slots that were missed, and was enabled",
+    ),
+];
+
+#[test]
+fn storms_that_have_failed_in_hardship_pass() {
+    for (seed, what) in FAILED_IN_HARDSHIP {
+        let played = play(&Case::of(seed));
+        assert!(played.is_ok(), "{seed}, {what}: {played:?}");
+    }
+}
+
 #[test]
 fn storms_that_have_failed_once_pass() {
     for (seed, what) in FAILED_ONCE {

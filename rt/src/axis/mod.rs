@@ -235,7 +235,7 @@ impl Axis {
             && !self.drive_state().has_torque()
             && self.base_word == controlword::SHUTDOWN
             && self.since_controlword >= SETTLED_CYCLES
-            && self.is_standing()
+            && self.is_settled()
             && self.is_on_joint(period_s);
     }
 

@@ -5,6 +5,8 @@ use crate::control::ControlLaw;
 
 /// A joint slower than this fraction of its velocity limit stands.
 const AT_REST: f64 = 0.02;
+/// Reports that are further apart than this many cycles of the bus have slots between them that were missed.
+const USUAL_SPAN: f64 = 1.5;
 
 impl Axis {
     /// Begins to come to rest.
@@ -21,7 +23,23 @@ impl Axis {
             return true;
         }
         let is_on_its_way = self.parameters.law == ControlLaw::ProfilePosition && self.is_enabled();
-        self.standing_reports >= SETTLED_CYCLES && (!is_on_its_way || self.is_target_reached())
+        self.is_settled() && (!is_on_its_way || self.is_target_reached())
+    }
+
+    /// Takes whether a report shows the joint standing. Over slots that were missed nobody knows how far it has moved in which
+    /// time: such a report may show a coasting joint that stands.
+    pub(super) fn count_standing(&mut self, span_s: f64) {
+        let is_known = span_s < USUAL_SPAN * self.cycle_s;
+        self.standing_reports = match self.is_standing() {
+            true if is_known => self.standing_reports.saturating_add(1),
+            true => self.standing_reports,
+            false => 0,
+        };
+    }
+
+    /// Whether the joint has been reported to stand for some cycles, since the last stop began.
+    pub(super) fn is_settled(&self) -> bool {
+        self.standing_reports >= SETTLED_CYCLES
     }
 
     /// Whether the joint follows set-points that stand, and is still behind them.
