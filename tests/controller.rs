@@ -375,6 +375,41 @@ fn what_is_refused_to_another_client_does_not_end_the_program() {
     assert!(run.snapshot().refused > 1000);
 }
 
+fn move_to(target: [f64; MAX_AXES], minimum_duration_s: f64) -> Move {
+    Move {
+        id: 1,
+        target,
+        target_velocity: [0.0; MAX_AXES],
+        velocity_scale: 1.0,
+        acceleration_scale: 1.0,
+        minimum_duration_s,
+    }
+}
+
+#[test]
+fn a_client_that_goes_on_moving_the_group_does_not_keep_the_run_from_ending() {
+    let config = load("arm6-erob.toml");
+    let ports = (0..config.buses.len()).map(|bus| SimulatedBus::new(&config, bus)).collect();
+    let mut run = VirtualRun::serving(&config, ports).unwrap().0;
+    while run.snapshot().phase != Phase::Holding {
+        assert!(run.step());
+    }
+    let here = run.snapshot().axes.map(|axis| axis.position_set);
+    run.interrupt(Interrupt::Controlled);
+    let mut cycles = 0;
+    let outcome = run.run(CYCLES_AT_MOST, |run| {
+        cycles += 1;
+        let mut target = here;
+        target[0] += if cycles % 200 < 100 { 0.3 } else { -0.3 };
+        // The door may be full.
+        let _ = run.host().request(Request::Move(move_to(target, 0.0)));
+    });
+    assert_eq!(outcome, Some(Outcome::Interrupted));
+    assert!(
+        drives_of(run.ports()).iter().all(|drive| drive.state != State::OperationEnabled && drive.is_braked)
+    );
+}
+
 #[test]
 fn a_group_that_is_moved_before_the_life_cycle_has_seen_it_hold_goes_on() {
     let config = load("arm6-erob.toml");
@@ -389,14 +424,7 @@ fn a_group_that_is_moved_before_the_life_cycle_has_seen_it_hold_goes_on() {
     }
     let mut target = run.snapshot().axes.map(|axis| axis.position_set);
     target[0] += 0.1;
-    let slow_move = Move {
-        id: 1,
-        target,
-        target_velocity: [0.0; MAX_AXES],
-        velocity_scale: 1.0,
-        acceleration_scale: 1.0,
-        minimum_duration_s: 20.0,
-    };
+    let slow_move = move_to(target, 20.0);
     run.host().request(Request::Move(slow_move)).unwrap();
     run.run(2, |_| {});
     assert_eq!(run.snapshot().phase, Phase::Moving);

@@ -149,9 +149,10 @@ impl Supervisor {
                 let is_moving = matches!(snapshot.phase, Phase::Moving | Phase::Streaming | Phase::Stopping);
                 if let Some(stop) = own_stop(snapshot) {
                     self.end(now_ns, Outcome::Stopped(stop));
-                } else if is_moving {
+                } else if is_moving && elapsed_ns <= PATIENCE_NS {
                     self.stage = Stage::Settle { until_ns: now_ns + SETTLE_NS };
-                } else if now_ns >= until_ns {
+                } else if is_moving || now_ns >= until_ns {
+                    // Whoever still moves the group by then does not want it to end: it is stopped first.
                     self.begin_disable(now_ns);
                 }
             }

@@ -152,7 +152,7 @@ const FAILED_ONCE: [(u64, &str); 22] = [
 ];
 
 /// The same of those that are played with their hardships.
-const FAILED_IN_HARDSHIP: [(u64, &str); 4] = [
+const FAILED_IN_HARDSHIP: [(u64, &str); 5] = [
     (7_002_676, "A joint in profile velocity was told to turn round, and let go as it stood on its way"),
     (7_002_556, "A joint was let go that was still behind its set-point"),
     (9_005_759, "A stop so near to a position limit that it swings back takes longer than was stated"),
@@ -160,6 +160,7 @@ const FAILED_IN_HARDSHIP: [(u64, &str); 4] = [
         9_009_552,
         "A joint that coasted seemed to stand in the report after slots that were missed, and was enabled",
     ),
+    (20_005_131, "A client that went on moving the group kept the run from ending"),
 ];
 
 #[test]

@@ -6,11 +6,11 @@ use takt_rt::stop::{Origin, Rule, StopReason};
 use super::Seen;
 
 pub fn check(seen: &Seen<'_>) -> Result<(), String> {
-    let reasons = seen.events.iter().filter_map(|event| match event.kind {
+    let mut reasons = seen.events.iter().filter_map(|event| match event.kind {
         EventKind::Stop(reason) => Some(reason),
         _ => None,
     });
-    reasons.map(|reason| check_reason(seen, &reason)).collect()
+    reasons.try_for_each(|reason| check_reason(seen, &reason))
 }
 
 fn check_reason(seen: &Seen<'_>, reason: &StopReason) -> Result<(), String> {
