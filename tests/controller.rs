@@ -8,9 +8,10 @@ use takt::config::{Config, Control};
 use takt::controller::{Interrupt, Outcome, VirtualRun};
 use takt::sim::{DriveFault, Observation, SimulatedBus};
 use takt_rt::cia402::State;
-use takt_rt::door::Request;
+use takt_rt::door::{Move, Request};
 use takt_rt::frame::{Frame, Id};
 use takt_rt::port::{BusHealth, BusPort, Clock, ReceiveBatch};
+use takt_rt::record::MAX_AXES;
 use takt_rt::refusal::{Answer, Objection, RequestKind};
 use takt_rt::stop::{Phase, Rule, StopCategory};
 
@@ -372,6 +373,67 @@ fn what_is_refused_to_another_client_does_not_end_the_program() {
     });
     assert_eq!(outcome, Some(Outcome::Finished));
     assert!(run.snapshot().refused > 1000);
+}
+
+fn move_to(target: [f64; MAX_AXES], minimum_duration_s: f64) -> Move {
+    Move {
+        id: 1,
+        target,
+        target_velocity: [0.0; MAX_AXES],
+        velocity_scale: 1.0,
+        acceleration_scale: 1.0,
+        minimum_duration_s,
+    }
+}
+
+#[test]
+fn a_client_that_goes_on_moving_the_group_does_not_keep_the_run_from_ending() {
+    let config = load("arm6-erob.toml");
+    let ports = (0..config.buses.len()).map(|bus| SimulatedBus::new(&config, bus)).collect();
+    let mut run = VirtualRun::serving(&config, ports).unwrap().0;
+    while run.snapshot().phase != Phase::Holding {
+        assert!(run.step());
+    }
+    let here = run.snapshot().axes.map(|axis| axis.position_set);
+    run.interrupt(Interrupt::Controlled);
+    let mut cycles = 0;
+    let outcome = run.run(CYCLES_AT_MOST, |run| {
+        cycles += 1;
+        let mut target = here;
+        target[0] += if cycles % 200 < 100 { 0.3 } else { -0.3 };
+        // The door may be full.
+        let _ = run.host().request(Request::Move(move_to(target, 0.0)));
+    });
+    assert_eq!(outcome, Some(Outcome::Interrupted));
+    assert!(
+        drives_of(run.ports()).iter().all(|drive| drive.state != State::OperationEnabled && drive.is_braked)
+    );
+}
+
+#[test]
+fn a_group_that_is_moved_before_the_life_cycle_has_seen_it_hold_goes_on() {
+    let config = load("arm6-erob.toml");
+    let ports = (0..config.buses.len()).map(|bus| SimulatedBus::new(&config, bus)).collect();
+    let mut run = VirtualRun::serving(&config, ports).unwrap().0;
+    while run.snapshot().phase != Phase::Enabling {
+        assert!(run.step());
+    }
+    run.neglect_life_cycle(50);
+    while run.snapshot().phase != Phase::Holding {
+        assert!(run.step());
+    }
+    let mut target = run.snapshot().axes.map(|axis| axis.position_set);
+    target[0] += 0.1;
+    let slow_move = move_to(target, 20.0);
+    run.host().request(Request::Move(slow_move)).unwrap();
+    run.run(2, |_| {});
+    assert_eq!(run.snapshot().phase, Phase::Moving);
+    // Longer than anybody waits for drives that are to be enabled.
+    run.run(25_000, |_| {});
+    assert_eq!(run.snapshot().phase, Phase::Holding);
+    assert_eq!((run.snapshot().finished_move, run.snapshot().stop), (1, None));
+    run.interrupt(Interrupt::Controlled);
+    assert_eq!(run.run(CYCLES_AT_MOST, |_| {}), Some(Outcome::Interrupted));
 }
 
 #[test]

@@ -129,6 +129,11 @@ impl Motion {
         self.time_s >= self.duration_s
     }
 
+    /// Time since the end, in seconds; 0 before it.
+    pub fn overrun_s(&self) -> f64 {
+        (self.time_s - self.duration_s).max(0.0)
+    }
+
     /// Time left, in seconds.
     pub fn remaining_s(&self) -> f64 {
         (self.duration_s - self.time_s).max(0.0)

@@ -2,10 +2,14 @@
 
 mod fixture;
 
-use fixture::{Rig, move_to, parameters};
-use takt_rt::door::Request;
+use fixture::{LIMITS, PERIOD_NS, Rig, axis, axis_in, move_to, parameters, scale};
+use takt_rt::axis::{Axis, AxisParameters, FeedbackSince};
+use takt_rt::cia402::{Goal, State as DriveState};
+use takt_rt::control::ControlLaw;
+use takt_rt::door::{ProfileMove, Request};
 use takt_rt::frame::{Frame, Id};
 use takt_rt::port::BusState;
+use takt_rt::profile::ProfileTarget;
 use takt_rt::stop::{Phase, Rule, StopCategory};
 
 /// The group is to be disabled, but the drive of the first axis has fallen silent in operation enabled: it never shows that
@@ -202,4 +206,104 @@ fn a_group_that_is_disabled_while_it_is_led_up_is_not_called_disabled_before_the
             rig.run(1);
         }
     }
+}
+
+/// The fastest of the first three joints, as a share of its velocity limit, in the cycle before its drive left operation
+/// enabled.
+fn speed_when_let_go(rig: &mut Rig) -> f64 {
+    let joints = |rig: &mut Rig| [0, 1, 2].map(|axis| (rig.drive(axis).state, rig.drive(axis).position));
+    let mut fastest: f64 = 0.0;
+    let mut before = joints(rig);
+    while rig.phase() != Phase::Disabled {
+        rig.run(1);
+        let now = joints(rig);
+        for ((was, from), (is, to)) in before.into_iter().zip(now) {
+            if was == DriveState::OperationEnabled && is != was {
+                let speed = rig.engine.axes()[0].parameters().scale.position_from_counts(to - from).abs()
+                    / (PERIOD_NS as f64 * 1e-9);
+                fastest = fastest.max(speed / LIMITS.velocity);
+            }
+        }
+        before = now;
+    }
+    fastest
+}
+
+#[test]
+fn a_joint_that_is_behind_its_set_point_is_at_rest_before_its_power_is_taken() {
+    for category in [StopCategory::One, StopCategory::Two] {
+        let mut rig = Rig::enabled(3);
+        rig.drive(1).lag_s = 0.02;
+        rig.move_to(2.0);
+        rig.run(200);
+        // Held for a moment, it is still behind when it is to be disabled.
+        rig.request(Request::Stop(category));
+        if category == StopCategory::Two {
+            rig.run_until(Phase::Holding, 300);
+            rig.request(Request::Disable);
+        }
+        let share = speed_when_let_go(&mut rig);
+        assert!(share <= 0.02, "let go at {share} of its highest speed after category {category:?}");
+        assert!(rig.stops().iter().all(|stop| stop.rule == Rule::Requested));
+        rig.assert_limits_kept();
+    }
+}
+
+#[test]
+fn nobody_waits_for_a_joint_that_does_not_follow() {
+    let mut rig = Rig::enabled(3);
+    rig.drive(1).lag_s = 1.0;
+    rig.move_to(2.0);
+    rig.run_until(Phase::Stopping, 300);
+    assert_eq!(rig.stops()[0].rule, Rule::FollowingError);
+    let planned_cycles = (rig.door.snapshot.remaining_s * 1e9 / PERIOD_NS as f64).ceil() as usize;
+    rig.run_until(Phase::Disabling, planned_cycles + 2);
+}
+
+#[test]
+fn a_joint_that_was_just_told_to_turn_is_not_let_go_as_if_it_stood() {
+    for cycles in 1..10 {
+        let mut parameters = parameters(3);
+        parameters.axes[1] = axis_in(ControlLaw::ProfileVelocity, 0, 2);
+        let mut rig = Rig::of(parameters).enable();
+        let target = ProfileTarget::Velocity(1.0);
+        rig.request(Request::SetProfileTarget(ProfileMove {
+            id: 1,
+            axis: 1,
+            target,
+            valid_until_ns: u64::MAX,
+        }));
+        rig.run(cycles - 1);
+        rig.request(Request::Stop(StopCategory::One));
+        let share = speed_when_let_go(&mut rig);
+        assert!(share <= 0.02, "let go at {share} of its highest speed when stopped {cycles} cycles later");
+    }
+}
+
+#[test]
+fn a_joint_that_coasts_is_not_taken_for_standing_when_slots_are_missed() {
+    let period_s = PERIOD_NS as f64 * 1e-9;
+    // It answers set-points: the first report after slots that were missed is older than they are.
+    let parameters = AxisParameters { feedback_since: FeedbackSince::SetPoint, ..axis(0, 1) };
+    let is_led_up = |speed: f64, missed_slots: u32| {
+        let mut axis = Axis::new(parameters.clone());
+        axis.set_cycle(period_s);
+        let (mut position, mut unreported_slots) = (0.0, 1);
+        for cycle in 0..40 {
+            let [s0, s1] = (DriveState::ReadyToSwitchOn.statusword_bits() | 0x0290).to_le_bytes();
+            position += speed * period_s * f64::from(unreported_slots);
+            let [p0, p1, p2, p3] = scale().position_to_counts(position).to_le_bytes();
+            let report = Frame::of(Id::canopen(0x180, 1), [s0, s1, p0, p1, p2, p3]);
+            axis.receive(0, &report, 1).unwrap();
+            let slots = if cycle == 20 { 1 + missed_slots } else { 1 };
+            unreported_slots = slots;
+            axis.begin_cycle(period_s * f64::from(slots));
+            axis.prepare_to_enable(period_s);
+            axis.follow_actual(period_s);
+            axis.command(Goal::Disabled, None);
+        }
+        axis.is_ready()
+    };
+    assert!(is_led_up(0.0, 0) && is_led_up(0.0, 12));
+    assert!(!is_led_up(0.3, 0) && !is_led_up(0.3, 12));
 }

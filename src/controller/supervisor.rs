@@ -149,9 +149,10 @@ impl Supervisor {
                 let is_moving = matches!(snapshot.phase, Phase::Moving | Phase::Streaming | Phase::Stopping);
                 if let Some(stop) = own_stop(snapshot) {
                     self.end(now_ns, Outcome::Stopped(stop));
-                } else if is_moving {
+                } else if is_moving && elapsed_ns <= PATIENCE_NS {
                     self.stage = Stage::Settle { until_ns: now_ns + SETTLE_NS };
-                } else if now_ns >= until_ns {
+                } else if is_moving || now_ns >= until_ns {
+                    // Whoever still moves the group by then does not want it to end: it is stopped first.
                     self.begin_disable(now_ns);
                 }
             }
@@ -252,9 +253,12 @@ impl Supervisor {
     }
 
     fn enable(&mut self, now_ns: u64, elapsed_ns: u64, snapshot: &Snapshot) {
-        if let Some(stop) = own_stop(snapshot) {
+        // Whoever commands the group may have been quicker to see that it holds.
+        let is_enabled =
+            matches!(snapshot.phase, Phase::Holding | Phase::Moving | Phase::Streaming | Phase::Stopping);
+        if let Some(stop) = own_stop(snapshot).filter(|_| !(self.is_serving && is_enabled)) {
             self.end(now_ns, Outcome::Stopped(stop));
-        } else if snapshot.phase == Phase::Holding {
+        } else if is_enabled {
             self.deadline_ns = self.duration_ns.map(|duration_ns| now_ns + duration_ns);
             self.enter(Stage::Run, now_ns);
         } else if elapsed_ns > PATIENCE_NS {

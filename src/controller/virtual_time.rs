@@ -61,6 +61,9 @@ pub struct VirtualRun<P> {
     supervisor: Supervisor,
     time_of_day: TimeOfDayKeeper,
     rehearsal: Option<Arc<Rehearsal>>,
+    /// Cycles from one look of the life cycle to the next, and since the last one.
+    neglect: u64,
+    neglected: u64,
     is_over: bool,
 }
 
@@ -126,6 +129,8 @@ impl<P: BusPort> VirtualRun<P> {
             supervisor,
             time_of_day: TimeOfDayKeeper::of(config),
             rehearsal: None,
+            neglect: 1,
+            neglected: 0,
             is_over: false,
         };
         Ok((run, log))
@@ -137,7 +142,11 @@ impl<P: BusPort> VirtualRun<P> {
             return false;
         }
         let flow = self.cycle.run(&mut self.engine, &mut self.clock, &mut self.ports, &mut self.rt);
-        self.supervisor.poll(self.clock.now_ns, &mut self.host);
+        self.neglected += 1;
+        if self.neglected >= self.neglect {
+            self.neglected = 0;
+            self.supervisor.poll(self.clock.now_ns, &mut self.host);
+        }
         if let Some(time) = self.time_of_day.poll(self.clock.now_ns, || WallClock::fixed(VIRTUAL_EPOCH_NS)) {
             // One that finds the queue full is told again in a minute.
             let _ = self.host.request(time);
@@ -159,6 +168,12 @@ impl<P: BusPort> VirtualRun<P> {
             }
         }
         self.supervisor.outcome().cloned()
+    }
+
+    /// From now on the life cycle is looked after only once in so many cycles, as on a machine that has no time for it: what
+    /// leads it is no real-time thread.
+    pub fn neglect_life_cycle(&mut self, cycles: u64) {
+        self.neglect = cycles;
     }
 
     /// Asks the run to end.

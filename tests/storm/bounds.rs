@@ -7,8 +7,9 @@ const LAG_S: f64 = 0.4;
 
 fn stopping_s(axis: &Axis) -> f64 {
     let limits = &axis.limits;
-    // At full speed and in full acceleration: the acceleration is taken back, turned round, and taken back again.
-    let turning_s = (limits.acceleration + 2.0 * limits.deceleration) / limits.jerk;
+    // At full speed and in full acceleration: the acceleration is taken back, turned round, and taken back again; and where a
+    // position limit is too near for that, the joint still decelerates when it stands, and swings back.
+    let turning_s = (limits.acceleration + 4.0 * limits.deceleration) / limits.jerk;
     limits.velocity / limits.deceleration + if turning_s.is_finite() { turning_s } else { 0.0 }
 }
 

@@ -23,7 +23,21 @@ pub struct Case {
     pub interrupt: Interrupt,
     /// The cycle in which it is interrupted all the same, enabled or not.
     pub broken_off: Option<u64>,
+    pub hardship: Hardship,
     pub dice: Dice,
+}
+
+/// What makes a storm harder than its faults do.
+#[derive(Clone, Debug, Default)]
+pub struct Hardship {
+    /// Cycles of the run, from power-up on, after which the next wake-up is so many nanoseconds too late.
+    pub stalls: Vec<(u64, u64)>,
+    /// Cycles from one look of the life cycle to the next; 0 as 1.
+    pub neglect: u64,
+    /// Whether clients go on asking for things to the last cycle, though the run is on its way out.
+    pub are_clients_stubborn: bool,
+    /// Whether streams are led near their limits, say what they like of their velocity, and miss commands in a row.
+    pub are_streams_wild: bool,
 }
 
 pub fn scenario(text: &str, config: &Config) -> Scenario {
@@ -38,11 +52,27 @@ pub fn scenario(text: &str, config: &Config) -> Scenario {
 
 impl Case {
     pub fn of(seed: u64) -> Self {
+        let mut hard = Dice::new(seed).split(u64::MAX);
+        let crowd = hard.chance(0.003).then(machine::crowd);
+        let mut case = Self::with(seed, crowd);
+        if hard.chance(0.5) {
+            case.harden(&mut hard);
+        }
+        case
+    }
+
+    /// One in which everything is as well as its faults let it be.
+    pub fn plain(seed: u64) -> Self {
+        Self::with(seed, None)
+    }
+
+    fn with(seed: u64, crowd: Option<Config>) -> Self {
         let mut dice = Dice::new(seed);
         // Every kind has its turn; some storms are calm, and in most there is more than one fault.
         let first = KINDS[(seed % KINDS.len() as u64) as usize];
         let faults = dice.pick(&[0, 1, 1, 1, 2, 2, 3, 4, 6]);
         let mut config = machine::any(&mut dice, faults > 0 && NEEDS_EROB.contains(&first));
+        config = crowd.unwrap_or(config);
         if dice.chance(0.2) {
             config.axes.iter_mut().for_each(|axis| axis.on_violation = OnViolation::Clamp);
         }
@@ -61,7 +91,38 @@ impl Case {
         let scenario = scenario(&text, &config);
         let interrupt = if dice.chance(0.15) { Interrupt::Immediate } else { Interrupt::Controlled };
         let broken_off = dice.chance(0.03).then(|| dice.below(1500) as u64);
-        Self { config, text, scenario, is_serving, clients, length, interrupt, broken_off, dice }
+        let hardship = Hardship::default();
+        Self { config, text, scenario, is_serving, clients, length, interrupt, broken_off, hardship, dice }
+    }
+
+    fn harden(&mut self, dice: &mut Dice) {
+        let period_ns = self.config.cycle.period_ns as f64;
+        let hardship = &mut self.hardship;
+        for _ in 0..dice.pick(&[0, 0, 0, 1, 1, 2, 4]) {
+            let cycle = dice.below(self.length as usize + 1500) as u64;
+            let cycles = if dice.chance(0.1) { dice.between(12.0, 120.0) } else { dice.between(0.05, 12.0) };
+            hardship.stalls.push((cycle, (cycles * period_ns) as u64));
+        }
+        hardship.neglect = dice.pick(&[1, 1, 1, 2, 5, 30]);
+        hardship.are_clients_stubborn = dice.chance(0.3);
+        hardship.are_streams_wild = dice.chance(0.5);
+        let mut more = String::new();
+        if dice.chance(0.3) {
+            // In the very cycle of a change, or of another fault, or in the one after it.
+            let cue = dice.pick(&["enabled", "moving", "moving", "stopping", "stopping"]);
+            let when = format!("when = \"{cue}\"\nat = \"{} ms\"", dice.pick(&[0, 0, 1, 2]));
+            for _ in 0..dice.pick(&[1, 1, 2]) {
+                more.push_str(&possible_fault(dice, &self.config, None, &when));
+            }
+        }
+        if self.config.axes.iter().any(|axis| axis.control == Control::ProfileTorque) && dice.chance(0.4) {
+            let when = when(dice, 1500);
+            more.push_str(&possible_fault(dice, &self.config, Some("load"), &when));
+        }
+        if !more.is_empty() {
+            self.text.push_str(&more);
+            self.scenario = scenario(&self.text, &self.config);
+        }
     }
 }
 

@@ -40,6 +40,29 @@ struct Stream {
     elapsed_s: f64,
     swing: f64,
     badness: Badness,
+    wildness: Option<Wildness>,
+}
+
+/// What makes a stream harder to follow.
+#[derive(Clone, Copy)]
+struct Wildness {
+    /// The share of the limits of velocity and acceleration to which it goes.
+    share: f64,
+    words: Words,
+    /// How likely it is that commands stay away from a cycle on, and for how many cycles.
+    absence: f64,
+    absent_cycles: usize,
+    /// So many are still to stay away.
+    absent: usize,
+}
+
+/// What a stream says of its velocity and acceleration.
+#[derive(Clone, Copy, PartialEq)]
+enum Words {
+    True,
+    Velocity,
+    Nothing,
+    False,
 }
 
 #[derive(Clone, Copy, PartialEq)]
@@ -58,13 +81,14 @@ pub struct Client {
     dice: Dice,
     restlessness: f64,
     stream: Option<Stream>,
+    are_streams_wild: bool,
     last_id: u32,
 }
 
 impl Client {
-    pub fn new(mut dice: Dice) -> Self {
+    pub fn new(mut dice: Dice, are_streams_wild: bool) -> Self {
         let restlessness = dice.pick(&[0.002, 0.01, 0.05, 0.2]);
-        Self { dice, restlessness, stream: None, last_id: 1000 }
+        Self { dice, restlessness, stream: None, are_streams_wild, last_id: 1000 }
     }
 
     /// What it wants after a cycle.
@@ -183,7 +207,18 @@ impl Client {
             Badness::Stale,
         ]);
         let (cycles_left, swing) = (1 + self.dice.below(1000), self.dice.between(-0.5, 0.5));
-        self.stream = Some(Stream { cycles_left, begun, elapsed_s: 0.0, swing, badness });
+        let wildness = self.are_streams_wild.then(|| self.wildness());
+        self.stream = Some(Stream { cycles_left, begun, elapsed_s: 0.0, swing, badness, wildness });
+    }
+
+    fn wildness(&mut self) -> Wildness {
+        Wildness {
+            share: self.dice.pick(&[0.3, 0.7, 0.9, 0.98]),
+            words: self.dice.pick(&[Words::True, Words::Velocity, Words::Nothing, Words::False]),
+            absence: self.dice.pick(&[0.0, 0.01, 0.1, 0.3]),
+            absent_cycles: self.dice.pick(&[1, 1, 2, 5, 20]),
+            absent: 0,
+        }
     }
 
     /// A swing to and fro from where the axes were, well within their limits as long as it is a good one.
@@ -196,14 +231,31 @@ impl Client {
         let rate = if stream.badness == Badness::Fast { 12.0 } else { 3.0 };
         let mut set_points = [State::default(); MAX_AXES];
         for (index, axis) in config.axes.iter().enumerate() {
+            let limits = &axis.limits;
+            let (amplitude, rate) = match stream.wildness {
+                // At both limits in turn.
+                Some(Wildness { share, .. }) => {
+                    let highest = limits.acceleration.min(limits.deceleration);
+                    let way = share * limits.velocity * limits.velocity / highest;
+                    (way.copysign(stream.swing), highest / limits.velocity)
+                }
+                None => (stream.swing * limits.velocity.min(limits.acceleration) / 6.0, rate),
+            };
             // Eases in with no velocity, no acceleration and little jerk.
-            let amplitude = stream.swing * axis.limits.velocity.min(axis.limits.acceleration) / 6.0;
             let ease = (stream.elapsed_s / 0.5).min(1.0);
             let ease = ease * ease * ease * (10.0 + ease * (6.0 * ease - 15.0));
             let phase = rate * stream.elapsed_s;
             let position = stream.begun[index] + amplitude * ease * (1.0 - phase.cos());
             let velocity = amplitude * ease * rate * phase.sin();
-            set_points[index] = State { position, velocity, acceleration: 0.0 };
+            let acceleration = amplitude * ease * rate * rate * phase.cos();
+            set_points[index] = match stream.wildness.map(|wild| wild.words) {
+                Some(Words::True) => State { position, velocity, acceleration },
+                Some(Words::Nothing) => State { position, ..State::default() },
+                Some(Words::False) => {
+                    State { position, velocity: -3.0 * velocity, acceleration: 1e3 * velocity }
+                }
+                Some(Words::Velocity) | None => State { position, velocity, acceleration: 0.0 },
+            };
         }
         if is_last {
             match stream.badness {
@@ -212,7 +264,14 @@ impl Client {
                 Badness::None | Badness::Fast | Badness::Patchy | Badness::Stale => {}
             }
         }
-        let is_left_out = stream.badness == Badness::Patchy && self.dice.chance(0.2);
+        let mut is_left_out = stream.badness == Badness::Patchy && self.dice.chance(0.2);
+        if let Some(wild) = &mut stream.wildness {
+            if wild.absent == 0 && self.dice.chance(wild.absence) {
+                wild.absent = 1 + self.dice.below(wild.absent_cycles);
+            }
+            is_left_out |= wild.absent > 0;
+            wild.absent = wild.absent.saturating_sub(1);
+        }
         let is_stale = stream.badness == Badness::Stale && is_last;
         let at_ns = if is_stale { 0 } else { snapshot.at_ns };
         let valid_until_ns = at_ns + self.dice.between(0.5, 30.0) as u64 * config.cycle.period_ns;

@@ -1,5 +1,6 @@
 //! Whom a fault concerns, from the cycle on in which it begins.
 
+use takt::bus::schedule::analyse;
 use takt::canopen::nmt::{NmtCommand, NmtTarget};
 use takt::config::{Axis, Config, DriveFamily};
 use takt::faults::{
@@ -44,7 +45,13 @@ pub struct Concerns {
     /// For each fault, an entry an axis.
     by_fault: Vec<Vec<Concern>>,
     has_begun: Vec<bool>,
+    /// The bus of each fault.
+    buses: Vec<usize>,
     pub by_axis: Vec<Concern>,
+    /// Whether any fault has begun on a bus, an entry a bus.
+    pub by_bus: Vec<bool>,
+    /// Whether a bus cannot carry in time what is asked of it, an entry a bus: `takt run` refuses such a machine.
+    pub is_overloaded: Vec<bool>,
 }
 
 impl Concerns {
@@ -55,8 +62,11 @@ impl Concerns {
         let by_fault: Vec<Vec<Concern>> = rehearsal.courses().map(|(fault, _)| of_fault(fault)).collect();
         Self {
             has_begun: vec![false; by_fault.len()],
+            buses: rehearsal.courses().map(|(fault, _)| fault.bus).collect(),
             by_fault,
             by_axis: vec![Concern::default(); config.axes.len()],
+            by_bus: vec![false; config.buses.len()],
+            is_overloaded: analyse(config).iter().map(|bus| !bus.fits()).collect(),
         }
     }
 
@@ -65,6 +75,7 @@ impl Concerns {
         for (number, (_, course)) in rehearsal.courses().enumerate() {
             if !self.has_begun[number] && course.began_ns().is_some() {
                 self.has_begun[number] = true;
+                self.by_bus[self.buses[number]] = true;
                 for (present, new) in self.by_axis.iter_mut().zip(&self.by_fault[number]) {
                     *present = present.or(*new);
                 }

@@ -28,6 +28,8 @@ const SHIPPED: [&str; 15] = [
     "erob-modes/erob-pt",
     "erob-modes/erob-pv",
 ];
+/// As many axes as one controller moves.
+const CROWD: &str = "axes32-erob";
 const RANDOM_SHARE: f64 = 0.5;
 const EROB_MODES: [&str; 8] = ["csp", "csp", "csv", "cst", "ip", "pp", "pv", "pt"];
 const YZ_AIM_MODES: [&str; 3] = ["ip", "pp", "pv"];
@@ -37,7 +39,7 @@ const RECORDS: usize = 16;
 /// A shipped machine, read once.
 pub fn load(name: &str) -> Config {
     static READ: OnceLock<HashMap<&str, Config>> = OnceLock::new();
-    let read = || SHIPPED.into_iter().map(|name| (name, read(name))).collect();
+    let read = || SHIPPED.into_iter().chain([CROWD]).map(|name| (name, read(name))).collect();
     READ.get_or_init(read)[name].clone()
 }
 
@@ -54,6 +56,11 @@ fn ready(mut config: Config) -> Config {
     config.axes.iter_mut().for_each(|axis| axis.simulated.power_up_ns = 5_000_000);
     config.telemetry.ring_records = RECORDS;
     config
+}
+
+/// The largest machine that one controller moves.
+pub fn crowd() -> Config {
+    load(CROWD)
 }
 
 /// Any machine; one with an eRob if that is needed.

@@ -125,6 +125,7 @@ pub fn play(case: &Case) -> Result<Done, String> {
     let at_most = case.length + (END_AT_MOST_S * 1e9 / config.cycle.period_ns as f64) as u64;
     let (mut enabled, mut cycles) = (None, 0);
     let mut goes_on = true;
+    world.run.neglect_life_cycle(case.hardship.neglect.max(1));
     while goes_on {
         let phase = world.snapshot.phase;
         goes_on = world.step(config);
@@ -150,8 +151,18 @@ pub fn play(case: &Case) -> Result<Done, String> {
         let World { log, snapshot, truth, events, .. } = &mut world;
         let mut look = |record: &_| {
             fingerprint.take_record(record);
-            let (told, concerns, asked) = (&wire.told, &concerns.by_axis, clients.asked);
-            invariants.check(&Seen { config, snapshot, record, told, truth, events, concerns, asked })
+            invariants.check(&Seen {
+                config,
+                snapshot,
+                record,
+                told: &wire.told,
+                truth,
+                events,
+                concerns: &concerns.by_axis,
+                troubled_buses: &concerns.by_bus,
+                overloaded_buses: &concerns.is_overloaded,
+                asked: clients.asked,
+            })
         };
         while let Some(checked) = log.next_record(&mut look) {
             checked.map_err(|what| wrong(snapshot, what))?;
@@ -166,7 +177,11 @@ pub fn play(case: &Case) -> Result<Done, String> {
             world.run.interrupt(case.interrupt);
         }
         let is_raging = enabled.is_some_and(|enabled| cycles < enabled + case.length);
-        clients.act(case, &mut world, is_raging);
+        let is_open = is_raging || enabled.is_some() && case.hardship.are_clients_stubborn;
+        clients.act(case, &mut world, is_open);
+        for (_, late_ns) in case.hardship.stalls.iter().filter(|(cycle, _)| *cycle == cycles) {
+            world.run.clock().stall(*late_ns);
+        }
     }
     at_rest(case, &mut concerns, &mut world)?;
     let is_bring_up_failed = matches!(world.run.supervisor().outcome(), Some(Outcome::BringUpFailed(_)));
@@ -194,7 +209,9 @@ struct Clients {
 
 impl Clients {
     fn new(case: &Case) -> Self {
-        let all = (0..case.clients as u64).map(|number| Client::new(case.dice.split(number))).collect();
+        let all = (0..case.clients as u64)
+            .map(|number| Client::new(case.dice.split(number), case.hardship.are_streams_wild))
+            .collect();
         Self { all, asked: Asked::default(), since_reset: u64::MAX }
     }
 

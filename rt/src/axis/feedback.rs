@@ -132,6 +132,7 @@ impl Axis {
         self.arrived = 0;
         self.age = 0;
         self.judge_position(longest_s);
+        self.count_standing(longest_s);
         self.is_heard = true;
         self.notice_state();
         self.following_error = if self.is_profile() { 0.0 } else { self.sent[2].position - self.position };

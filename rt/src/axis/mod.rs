@@ -7,6 +7,7 @@ mod parameters;
 mod position_watch;
 mod profile_mode;
 mod punctuality;
+mod rest;
 mod service;
 mod set_point;
 
@@ -69,6 +70,8 @@ pub struct Axis {
     is_heard: bool,
     /// Cycles in which a drive in profile position has stood before its target.
     stalled_cycles: u32,
+    /// Reports in a row that the joint stands, since the last stop began.
+    standing_reports: u32,
     /// What the statuswords have shown, see [`Axis::drive_state`].
     state: DriveState,
     /// Statuswords in a row that do not show operation enabled, after one that did.
@@ -136,6 +139,7 @@ impl Axis {
             is_heard: false,
             state: DriveState::NotReadyToSwitchOn,
             stalled_cycles: 0,
+            standing_reports: 0,
             contradictions: 0,
             is_lost: false,
             is_deaf: false,
@@ -231,7 +235,7 @@ impl Axis {
             && !self.drive_state().has_torque()
             && self.base_word == controlword::SHUTDOWN
             && self.since_controlword >= SETTLED_CYCLES
-            && self.is_standing()
+            && self.is_settled()
             && self.is_on_joint(period_s);
     }
 

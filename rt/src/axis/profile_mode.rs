@@ -9,8 +9,6 @@ use crate::profile::ProfileTarget;
 use crate::stop::Rule;
 use crate::time::Nanoseconds;
 
-/// A joint slower than this fraction of its velocity limit stands.
-const AT_REST: f64 = 0.02;
 /// Cycles of the bus from the position that is reported to a drive that acts on what was made of it: one for which a
 /// drive's answer to a command has waited, one on the way, and one that the drive may take.
 const REACTION_CYCLES: u32 = 3;
@@ -60,9 +58,9 @@ impl Axis {
         self.profile_until_ns = valid_until_ns;
     }
 
-    /// Makes rest the target: the nearest position at which the joint can stand, no velocity, no torque. See
+    /// Makes rest the target of a drive in a profile mode: the nearest position at which the joint can stand, no velocity, no torque. See
     /// [`Axis::stops_by_itself`] for the latter.
-    pub fn stop_profile(&mut self) {
+    pub(super) fn stop_profile(&mut self) {
         let target = match self.parameters.law {
             ControlLaw::ProfilePosition => ProfileTarget::Position(self.nearest_rest()),
             ControlLaw::ProfileVelocity => ProfileTarget::Velocity(0.0),
@@ -117,13 +115,6 @@ impl Axis {
         rest.max(self.position - nearest).min(self.position + nearest)
     }
 
-    /// Whether a stop of the joint is over: it stands, and in profile position where it was sent. One that swings back
-    /// stands for a moment on its way.
-    pub fn has_stopped(&self) -> bool {
-        let is_under_way = self.parameters.law == ControlLaw::ProfilePosition && self.is_enabled();
-        self.is_at_rest() && (!is_under_way || self.is_target_reached())
-    }
-
     /// Whether the drive has its target and says that it has reached it; an axis that follows set-points always has. A joint
     /// that is let go coasts, and is where it was sent when it stands.
     pub fn is_target_reached(&self) -> bool {
@@ -150,16 +141,6 @@ impl Axis {
         if self.is_driven() { now_ns.saturating_sub(self.profile_until_ns) } else { 0 }
     }
 
-    /// Whether the joint of an axis in a profile mode stands; one that follows set-points is where they are.
-    pub fn is_at_rest(&self) -> bool {
-        !self.is_profile() || self.is_standing()
-    }
-
-    /// Whether the joint is reported to stand.
-    pub(super) fn is_standing(&self) -> bool {
-        self.velocity.abs() <= AT_REST * self.parameters.limits.velocity
-    }
-
     /// Cycles that the drive has left a set-point unacknowledged.
     pub fn unacknowledged_cycles(&self) -> u32 {
         self.profile.waiting_cycles()
@@ -172,7 +153,7 @@ impl Axis {
             && self.is_enabled()
             && self.profile.waiting_cycles() == 0
             && !self.is_target_reached();
-        let is_stalled = is_under_way && self.is_at_rest();
+        let is_stalled = is_under_way && self.is_standing();
         self.stalled_cycles = if is_stalled { self.stalled_cycles.saturating_add(1) } else { 0 };
     }
 

@@ -116,7 +116,9 @@ impl Engine {
                 let is_planned_to_rest = next.iter().all(|state| state.velocity == 0.0);
                 self.finish_move(is_planned_to_rest, now_ns, door);
             }
-            _ => self.finish_stop(now_ns, door),
+            Phase::Stopping => self.finish_stop(now_ns, door),
+            // It has just become one that takes the power at once.
+            _ => {}
         }
     }
 
@@ -138,14 +140,23 @@ impl Engine {
         }
     }
 
-    /// The planned part of a stop is over; a joint in a profile mode gets the time that its limits allow for.
+    /// The planned part of a stop is over. A joint in a profile mode gets the time that its limits allow for, and one that
+    /// follows set-points some to catch up before its power is taken.
     fn finish_stop(&mut self, now_ns: Nanoseconds, door: &mut impl Door) {
-        let slowest_s =
-            self.axes.iter().filter(|axis| !axis.has_stopped()).map(stopping_s).fold(0.0, f64::max);
-        if f64::from(self.phase_cycles) * self.period_s < slowest_s {
+        let category = self.stop.map(|stop| stop.category);
+        let stopping_for_s = f64::from(self.phase_cycles) * self.period_s;
+        let standing_for_s = self.motion.overrun_s();
+        let is_waited_for = |axis: &Axis| {
+            let is_in_time = match axis.is_profile() {
+                true => stopping_for_s < stopping_s(axis),
+                false => category != Some(StopCategory::Two) && standing_for_s < CATCHING_UP_S,
+            };
+            is_in_time && !axis.has_stopped()
+        };
+        if self.axes.iter().any(is_waited_for) {
             return;
         }
-        match self.stop.map(|stop| stop.category) {
+        match category {
             Some(StopCategory::Two) => self.enter(Phase::Holding, now_ns, door),
             _ => {
                 self.goal = Goal::Disabled;
@@ -269,6 +280,9 @@ impl Engine {
         }
     }
 }
+
+/// How long a joint may take to its set-point that follows and is behind it, at most.
+const CATCHING_UP_S: f64 = 0.5;
 
 /// From full speed to rest at the limits, with some patience for the drive's own profile.
 fn stopping_s(axis: &Axis) -> f64 {

@@ -197,7 +197,7 @@ impl Engine {
         match self.phase {
             Phase::Passive => return Err(Objection::Phase.into()),
             Phase::Disabled | Phase::Disabling => {}
-            _ if self.is_under_way() || self.phase == Phase::Stopping => {
+            _ if self.must_come_to_rest() || self.phase == Phase::Stopping => {
                 self.begin_stop(
                     Rule::Requested,
                     Some(StopCategory::One),

@@ -124,6 +124,12 @@ impl Engine {
         }
     }
 
+    /// Whether joints have yet to come to rest before their power is taken: all of them when the group moves, and in one that
+    /// holds those that are still behind their set-points.
+    pub(super) fn must_come_to_rest(&self) -> bool {
+        self.is_under_way() || self.phase == Phase::Holding && self.axes.iter().any(Axis::is_catching_up)
+    }
+
     /// Whether a stop has something to bring to rest. A joint in profile torque may begin to move by itself.
     pub(super) fn is_under_way(&self) -> bool {
         match self.phase {
@@ -145,7 +151,7 @@ impl Engine {
                 self.goal = Goal::NoVoltage;
                 self.enter(Phase::Disabling, now_ns, door);
             }
-            _ if self.is_under_way() => {
+            _ if self.is_under_way() || category == StopCategory::One && self.must_come_to_rest() => {
                 if self.plan_stop().is_ok() {
                     self.enter(Phase::Stopping, now_ns, door);
                 } else {
@@ -172,7 +178,7 @@ impl Engine {
     }
 
     fn plan_stop(&mut self) -> Result<(), PlanError> {
-        self.axes.iter_mut().for_each(Axis::stop_profile);
+        self.axes.iter_mut().for_each(Axis::begin_stop);
         if self.phase == Phase::Streaming {
             self.axes.iter_mut().for_each(|axis| axis.take_steps(self.period_s));
         }

@@ -1,8 +1,10 @@
 //! What holds after every cycle, whatever has been asked for and whatever has broken.
 
 mod course;
+mod origins;
 mod phases;
 mod power;
+mod releases;
 mod stops;
 
 use takt::config::Config;
@@ -17,6 +19,7 @@ use crate::wire::Told;
 use course::Course;
 use phases::Phases;
 use power::Power;
+use releases::Releases;
 use stops::Stops;
 
 /// Slower than this is rest: rad/s (m/s).
@@ -37,6 +40,10 @@ pub struct Seen<'a> {
     pub events: &'a [Event],
     /// What cannot be expected of the joints any more, an axis each.
     pub concerns: &'a [Concern],
+    /// Whether any fault has begun on a bus, an entry a bus.
+    pub troubled_buses: &'a [bool],
+    /// Whether a bus cannot carry in time what is asked of it, an entry a bus.
+    pub overloaded_buses: &'a [bool],
     /// What had been asked for before it.
     pub asked: Asked,
 }
@@ -46,6 +53,7 @@ pub struct Invariants {
     power: Power,
     phases: Phases,
     stops: Stops,
+    releases: Releases,
 }
 
 impl Invariants {
@@ -56,6 +64,7 @@ impl Invariants {
             power: Power::new(config.axes.len()),
             phases: Phases::default(),
             stops: Stops::new(config.axes.len()),
+            releases: Releases::new(config.axes.len()),
         }
     }
 
@@ -64,7 +73,9 @@ impl Invariants {
         for (axis, course) in self.courses.iter_mut().enumerate() {
             course.check(seen, axis).map_err(|wrong| format!("{}: {wrong}", seen.config.axes[axis].name))?;
         }
+        origins::check(seen)?;
         self.stops.check(seen)?;
+        self.releases.check(seen)?;
         self.power.check(seen)?;
         self.phases.check(seen)
     }

@@ -54,7 +54,8 @@ impl Power {
 
     pub fn check(&mut self, seen: &Seen<'_>) -> Result<(), String> {
         let phase = seen.record.phase;
-        self.has_enabled |= phase == Phase::Enabling;
+        // The life cycle's own reset comes before that, and may not be over when a client is quicker to ask for the rest.
+        self.has_enabled |= !matches!(phase, Phase::Passive | Phase::Disabled | Phase::Enabling);
         let is_enabling = phase == Phase::Enabling;
         self.since_enabling = if is_enabling { 0 } else { self.since_enabling.saturating_add(1) };
         let is_fault =

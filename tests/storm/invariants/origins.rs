@@ -1,0 +1,61 @@
+//! What a stop is said to concern is what it concerns: the axis that has the fault, the bus on which it is.
+
+use takt_rt::record::EventKind;
+use takt_rt::stop::{Origin, Rule, StopReason};
+
+use super::Seen;
+
+pub fn check(seen: &Seen<'_>) -> Result<(), String> {
+    let mut reasons = seen.events.iter().filter_map(|event| match event.kind {
+        EventKind::Stop(reason) => Some(reason),
+        _ => None,
+    });
+    reasons.try_for_each(|reason| check_reason(seen, &reason))
+}
+
+fn check_reason(seen: &Seen<'_>, reason: &StopReason) -> Result<(), String> {
+    let is_troubled =
+        |axis: u8| seen.concerns.get(usize::from(axis)).is_some_and(|concern| concern.is_present);
+    let is_overloaded = |axis: u8| {
+        seen.config.axes.get(usize::from(axis)).is_some_and(|axis| seen.overloaded_buses[axis.bus])
+    };
+    let is_right = match (reason.rule, reason.origin) {
+        // What is asked of the group, and how it is paced.
+        (Rule::Requested | Rule::TimingUnfit, Origin::Group) => true,
+        // A stream is one of the group, a velocity or a torque one of an axis.
+        (Rule::StaleCommand, Origin::Group | Origin::Axis(_)) => true,
+        // Set-points break a limit in good weather too.
+        (
+            Rule::NotFinite
+            | Rule::PositionLimit
+            | Rule::VelocityLimit
+            | Rule::AccelerationLimit
+            | Rule::JerkLimit
+            | Rule::StartPose,
+            Origin::Axis(_),
+        ) => true,
+        (Rule::MissedFeedback, Origin::Axis(axis)) if is_overloaded(axis) => true,
+        (
+            Rule::FollowingError
+            | Rule::MissedFeedback
+            | Rule::DriveFault
+            | Rule::DriveDisabled
+            | Rule::ModeChanged
+            | Rule::EnableTimeout
+            | Rule::NotAcknowledged
+            | Rule::NodeLost
+            | Rule::NodeNotOperational
+            | Rule::UnexpectedBootUp
+            | Rule::EmergencyMessage
+            | Rule::DuplicateNode
+            | Rule::ImplausibleFeedback,
+            Origin::Axis(axis),
+        ) => is_troubled(axis),
+        (
+            Rule::BusLost | Rule::BusErrorPassive | Rule::ForeignMaster | Rule::NotTransmitted,
+            Origin::Bus(bus),
+        ) => seen.troubled_buses.get(usize::from(bus)) == Some(&true),
+        _ => false,
+    };
+    if is_right { Ok(()) } else { Err(format!("nothing is wrong with what this names: {reason:?}")) }
+}

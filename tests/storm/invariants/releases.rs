@@ -1,0 +1,48 @@
+//! No drive lets its joint go, or brakes it, before it stands: in a stop that takes the time for that.
+
+use takt::sim::Observation;
+use takt_rt::stop::StopCategory;
+
+use super::Seen;
+
+/// A joint slower than this fraction of its velocity limit may be let go.
+const SLOW: f64 = 0.02;
+
+pub struct Releases {
+    axes: Vec<Option<Observation>>,
+    /// When they were looked at last.
+    seen_ns: u64,
+    /// Whether the power has been cut at once since the group was last enabled.
+    is_cut: bool,
+}
+
+impl Releases {
+    pub fn new(axes: usize) -> Self {
+        Self { axes: vec![None; axes], seen_ns: 0, is_cut: false }
+    }
+
+    pub fn check(&mut self, seen: &Seen<'_>) -> Result<(), String> {
+        match seen.snapshot.stop {
+            Some(stop) => self.is_cut |= stop.category == StopCategory::Zero,
+            None => self.is_cut = false,
+        }
+        let now_ns = seen.snapshot.at_ns;
+        let elapsed_s = (now_ns - std::mem::replace(&mut self.seen_ns, now_ns)) as f64 * 1e-9;
+        let axes = seen.config.axes.iter().zip(seen.truth).zip(seen.concerns);
+        for (last, ((axis, now), concern)) in self.axes.iter_mut().zip(axes) {
+            let Some(before) = last.replace(*now) else { continue };
+            let is_let_go = before.state.has_torque() && !now.state.has_torque();
+            let is_braked = !before.is_braked && now.is_braked;
+            let speed = before.velocity.abs();
+            // It has gone on slowing down since the last look.
+            let slow = SLOW * axis.limits.velocity + axis.limits.deceleration * elapsed_s;
+            if (is_let_go || is_braked) && !self.is_cut && !concern.is_present && speed > slow {
+                return Err(format!(
+                    "{}: let go at {speed} of {}: {now:?}, {:?}",
+                    axis.name, axis.limits.velocity, seen.snapshot.stop
+                ));
+            }
+        }
+        Ok(())
+    }
+}
