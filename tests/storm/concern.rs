@@ -5,7 +5,7 @@ use takt::canopen::nmt::{NmtCommand, NmtTarget};
 use takt::config::{Axis, Config, DriveFamily};
 use takt::faults::{
     Direction, DriveTrouble, Effect, ForeignFrames, FrameEffect, FrameFunction, InterfaceEffect, Part,
-    Rehearsal,
+    Rehearsal, Selection,
 };
 use takt::sim::Defect;
 
@@ -120,6 +120,14 @@ fn concern(axis: &Axis, fault: &takt::faults::Fault) -> Concern {
     let is_cut_off = match fault.effect {
         Effect::Interface(effect) => effect != InterfaceEffect::ErrorPassive,
         Effect::Frames(FrameEffect::FullQueue) => true,
+        // Every request to the drive, or everything that is sent to it.
+        Effect::Frames(FrameEffect::Drop) => {
+            let Selection { direction, function, node, probability, .. } = &fault.selection;
+            *direction != Direction::Received
+                && matches!(function, None | Some(FrameFunction::Sdo))
+                && node.is_none_or(|node| node == axis.node)
+                && *probability == 1.0
+        }
         Effect::Drive { node, trouble } => {
             node == axis.node && trouble == DriveTrouble::Defect(Defect::SilentSdoServer)
         }
