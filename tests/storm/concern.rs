@@ -23,6 +23,8 @@ pub struct Concern {
     pub is_unwatched: bool,
     /// No SDO gets to its drive while this lasts.
     pub is_cut_off: bool,
+    /// Somebody else sends on its bus, and what its drive reports may have to wait for that.
+    pub is_crowded: bool,
     /// Something pushes the joint for as long as it lasts, also in the end.
     pub is_loaded: bool,
 }
@@ -35,6 +37,7 @@ impl Concern {
             is_misled: self.is_misled || other.is_misled,
             is_unwatched: self.is_unwatched || other.is_unwatched,
             is_cut_off: self.is_cut_off || other.is_cut_off,
+            is_crowded: self.is_crowded || other.is_crowded,
             is_loaded: self.is_loaded || other.is_loaded,
         }
     }
@@ -140,6 +143,7 @@ fn concern(axis: &Axis, fault: &takt::faults::Fault) -> Concern {
         is_misled,
         is_unwatched,
         is_cut_off,
+        is_crowded: matches!(fault.effect, Effect::Foreign(_)),
         is_driven_by_others: is_own && (matches!(fault.kind, "load" | "foreign-set-points") || is_led_astray),
         is_loaded: is_own && fault.kind == "load",
     }

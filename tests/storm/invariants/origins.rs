@@ -16,8 +16,10 @@ pub fn check(seen: &Seen<'_>) -> Result<(), String> {
 fn check_reason(seen: &Seen<'_>, reason: &StopReason) -> Result<(), String> {
     let is_troubled =
         |axis: u8| seen.concerns.get(usize::from(axis)).is_some_and(|concern| concern.is_present);
-    let is_overloaded = |axis: u8| {
-        seen.config.axes.get(usize::from(axis)).is_some_and(|axis| seen.overloaded_buses[axis.bus])
+    let is_crowded = |axis: u8| {
+        let is_overloaded =
+            seen.config.axes.get(usize::from(axis)).is_some_and(|axis| seen.overloaded_buses[axis.bus]);
+        is_overloaded || seen.concerns.get(usize::from(axis)).is_some_and(|concern| concern.is_crowded)
     };
     let is_right = match (reason.rule, reason.origin) {
         // What is asked of the group, and how it is paced.
@@ -34,7 +36,7 @@ fn check_reason(seen: &Seen<'_>, reason: &StopReason) -> Result<(), String> {
             | Rule::StartPose,
             Origin::Axis(_),
         ) => true,
-        (Rule::MissedFeedback, Origin::Axis(axis)) if is_overloaded(axis) => true,
+        (Rule::MissedFeedback, Origin::Axis(axis)) if is_crowded(axis) => true,
         (
             Rule::FollowingError
             | Rule::MissedFeedback
