@@ -56,6 +56,19 @@ fn stopped_run() -> Left {
     Left { folder, recording: summary.recording.unwrap(), black_box: summary.black_boxes.files[0].clone() }
 }
 
+/// A recording and nothing beside it.
+fn recording_to(file: &Path, machine: Machine) -> LoggerOptions {
+    LoggerOptions {
+        machine,
+        wall_clock: WallClock::fixed(UNIX_AT_ZERO_NS),
+        started_ns: 0,
+        recording: Some(Destination::File(file.to_owned())),
+        candump: None,
+        black_box: None,
+        traces: vec![],
+    }
+}
+
 fn report(file: &Path, options: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_takt")).arg("report").arg(file).args(options).output().unwrap()
 }
@@ -202,16 +215,8 @@ fn what_a_terminal_would_obey_is_not_shown_of_a_recording() {
     machine.name = "arm\u{1b}[2J".to_owned();
     machine.axes[0].name = "joint\u{1b}[31m".to_owned();
     machine.buses[0].name = "can\u{9b}31m".to_owned();
-    let options = LoggerOptions {
-        machine,
-        wall_clock: WallClock::fixed(UNIX_AT_ZERO_NS),
-        started_ns: 0,
-        recording: Some(Destination::File(folder.path().join("run.mcap"))),
-        candump: None,
-        black_box: None,
-        traces: vec![],
-    };
-    let mut logger = Logger::new(log, options, Box::new(|_| {}));
+    let mut logger =
+        Logger::new(log, recording_to(&folder.path().join("run.mcap"), machine), Box::new(|_| {}));
     run.run(60_000, |_| {
         logger.drain();
     });
@@ -269,15 +274,7 @@ fn a_run_without_a_stop_is_shown_up_to_its_end() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/single-erob.toml");
     let config = Config::load(&path).unwrap();
     let (mut run, log) = VirtualRun::simulated(&config).unwrap();
-    let options = LoggerOptions {
-        machine: Machine::of(&config),
-        wall_clock: WallClock::fixed(UNIX_AT_ZERO_NS),
-        started_ns: 0,
-        recording: Some(Destination::File(folder.path().join("run.mcap"))),
-        candump: None,
-        black_box: None,
-        traces: vec![],
-    };
+    let options = recording_to(&folder.path().join("run.mcap"), Machine::of(&config));
     let mut logger = Logger::new(log, options, Box::new(|_| {}));
     let outcome = run.run(60_000, |_| {
         logger.drain();

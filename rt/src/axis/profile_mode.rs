@@ -58,8 +58,8 @@ impl Axis {
         self.profile_until_ns = valid_until_ns;
     }
 
-    /// Makes rest the target of a drive in a profile mode: the nearest position at which the joint can stand, no velocity, no torque. See
-    /// [`Axis::stops_by_itself`] for the latter.
+    /// Makes rest the target of a drive in a profile mode: the nearest position at which the joint can stand, no velocity, no
+    /// torque. See [`Axis::stops_by_itself`] for the latter.
     pub(super) fn stop_profile(&mut self) {
         let target = match self.parameters.law {
             ControlLaw::ProfilePosition => ProfileTarget::Position(self.nearest_rest()),

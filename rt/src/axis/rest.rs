@@ -9,7 +9,7 @@ const AT_REST: f64 = 0.02;
 const USUAL_SPAN: f64 = 1.5;
 
 impl Axis {
-    /// Begins to come to rest.
+    /// Begins to come to rest: from now on it counts for how long the joint has stood.
     pub fn begin_stop(&mut self) {
         self.stop_profile();
         self.standing_reports = 0;

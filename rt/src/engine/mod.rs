@@ -122,9 +122,9 @@ pub struct Engine {
     clamped: u64,
     missed: LeakyBucket,
     timing_level: TimingLevel,
-    /// What was sent by somebody who may not.
+    /// The bus and the identifier of what was sent by somebody who may not.
     foreign_id: Option<(u8, u32)>,
-    /// Whether an interface has refused frames since the last cycle.
+    /// Whose interfaces have refused frames since the last cycle.
     not_taken: BusSet,
     held_back: BusSet,
     /// Whose next SYNC is left out.
