@@ -3,10 +3,10 @@
 use super::Axis;
 use crate::control::ControlLaw;
 use crate::dialect::Dialect;
+use crate::fault::Rule;
 use crate::guard::Violation;
 use crate::plan::State;
 use crate::profile::ProfileTarget;
-use crate::stop::Rule;
 use crate::time::Nanoseconds;
 
 /// Cycles of the bus from the position that is reported to a drive that acts on what was made of it: one for which a

@@ -1,9 +1,9 @@
 //! Where an axis is to be.
 
 use super::Axis;
+use crate::fault::Rule;
 use crate::guard::{self, Course, Violation};
 use crate::plan::State;
-use crate::stop::Rule;
 
 impl Axis {
     /// The newest set-point.

@@ -5,8 +5,8 @@ mod planned;
 mod reach;
 mod stream;
 
+use crate::fault::{Fault, Rule};
 use crate::plan::State;
-use crate::stop::Rule;
 
 pub use reach::braking_distance;
 pub use stream::{Course, OnViolation, check_braking, check_jerk, clamp};
@@ -72,6 +72,12 @@ pub struct Violation {
     pub value: f64,
     /// What is allowed.
     pub limit: f64,
+}
+
+impl From<Violation> for Fault {
+    fn from(Violation { rule, value, limit }: Violation) -> Self {
+        Self::from_numbers(rule, value, limit).unwrap_or(Self::NoTrajectory)
+    }
 }
 
 /// Room for the rounding of floating-point differences, relative to the limit.

@@ -93,7 +93,7 @@ proptest! {
         let mut streams: Vec<Stream> =
             all.iter().map(|limits| Stream::at_rest(0.0, *limits, period_s)).collect();
         let mut states = vec![State::default(); all.len()];
-        let mut motion = Motion::default();
+        let mut motion = Motion::<4>::default();
         // To rest where the last one is passed at speed.
         for (share, speed, cycles) in targets.into_iter().chain([(0.5, 0.0, usize::MAX)]) {
             let legs = all.iter().zip(&states).map(|(limits, start)| Leg {
@@ -141,7 +141,7 @@ proptest! {
         };
         let steepest = limits.acceleration.max(limits.deceleration);
         let mut stream = Stream::at_rest(0.0, limits, period_s);
-        let mut motion = Motion::default();
+        let mut motion = Motion::<4>::default();
         let mut state = State::default();
         let targets = targets.into_iter().map(|(share, _, cycles)| (share, cycles));
         let positions = targets.flat_map(|(share, cycles)| {

@@ -3,8 +3,8 @@
 
 use super::reach::Reach;
 use super::{AxisLimits, TOLERANCE, Violation};
+use crate::fault::Rule;
 use crate::plan::State;
-use crate::stop::Rule;
 
 /// By how much a position may be off, relative to it or to 1 rad: whoever samples a trajectory adds up times and evaluates
 /// polynomials, each with a rounding. The third difference divides what comes of it by the cube of the period.
@@ -299,7 +299,7 @@ mod tests {
                 sent = [next.position, sent[0], sent[1]];
             }
             let last = Course { sent: [sent[1], sent[2], sent[2]], next: sent[0], period_s: PERIOD_S };
-            let mut motion = Motion::default();
+            let mut motion = Motion::<1>::default();
             motion.stop([(last.state(&limits), &limits)].into_iter()).unwrap();
             while !motion.is_finished() {
                 motion.advance(PERIOD_S);
@@ -329,7 +329,7 @@ mod tests {
                 }
             }
             let last = Course { sent: [sent[1], sent[2], sent[2]], next: sent[0], period_s: PERIOD_S };
-            let mut motion = Motion::default();
+            let mut motion = Motion::<1>::default();
             motion.stop([(last.state(&limits), &limits)].into_iter()).unwrap();
             while !motion.is_finished() {
                 motion.advance(PERIOD_S);
