@@ -29,11 +29,11 @@ mod dialect;
 mod dispatch;
 mod engine;
 mod frame;
+mod group_trajectory;
 mod guard;
 mod host;
 #[cfg(feature = "linux")]
 pub mod linux;
-mod motion;
 mod pdo;
 pub mod plan;
 mod port;

@@ -105,18 +105,20 @@ pub mod nmt_command {
     pub const RESET_COMMUNICATION: u8 = 0x82;
 }
 
-/// What a node takes of all that it is sent, by what it has said of itself and what it has been told by others.
+/// The NMT state that a node is believed to be in, by its heartbeats and by the NMT commands of other masters. It tells which
+/// services reach the node.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Hearing {
-    /// Process data and SDO.
+pub enum NmtState {
+    /// The node takes process data and SDO.
     #[default]
-    ProcessData,
-    /// SDO only.
-    Service,
-    /// SDO only, and it has forgotten what its process data mean and whom it watches: no start gives them back.
-    ServiceAfterReset,
-    /// Nothing but NMT.
-    Nmt,
+    Operational,
+    /// The node takes SDO, but no process data.
+    PreOperational,
+    /// As [`NmtState::PreOperational`]. The node has also lost its PDO mappings and its heartbeat consumer, so that an NMT start
+    /// alone does not bring process data back.
+    PreOperationalAfterReset,
+    /// The node takes NMT commands only.
+    Stopped,
 }
 
 /// What the error control messages of a drive tell while it is to work.
@@ -125,12 +127,12 @@ pub struct NodeWatch {
     silent_cycles: u32,
     has_booted: bool,
     left_operational: Option<u8>,
-    hearing: Hearing,
+    nmt_state: NmtState,
 }
 
 /// What is wrong with a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum NodeComplaint {
+pub enum NodeFault {
     /// It has started anew.
     BootUp,
     /// It is in another state than operational.
@@ -153,7 +155,7 @@ impl NodeWatch {
         match (state, state & 0x7F) {
             (node_state::BOOT_UP, _) => {
                 self.has_booted = true;
-                self.hearing = Hearing::ServiceAfterReset;
+                self.nmt_state = NmtState::PreOperationalAfterReset;
             }
             (_, node_state::OPERATIONAL) => {
                 self.left_operational = None;
@@ -161,8 +163,10 @@ impl NodeWatch {
             }
             (_, state) => {
                 self.left_operational = Some(state);
-                if state == node_state::PRE_OPERATIONAL && self.hearing != Hearing::ServiceAfterReset {
-                    self.hearing = Hearing::Service;
+                if state == node_state::PRE_OPERATIONAL
+                    && self.nmt_state != NmtState::PreOperationalAfterReset
+                {
+                    self.nmt_state = NmtState::PreOperational;
                 }
             }
         }
@@ -172,25 +176,25 @@ impl NodeWatch {
     pub fn commanded(&mut self, command: u8) {
         match command {
             nmt_command::START => self.is_started(),
-            nmt_command::STOP => self.hearing = Hearing::Nmt,
-            nmt_command::ENTER_PRE_OPERATIONAL if self.hearing == Hearing::ServiceAfterReset => {}
-            nmt_command::ENTER_PRE_OPERATIONAL => self.hearing = Hearing::Service,
+            nmt_command::STOP => self.nmt_state = NmtState::Stopped,
+            nmt_command::ENTER_PRE_OPERATIONAL if self.nmt_state == NmtState::PreOperationalAfterReset => {}
+            nmt_command::ENTER_PRE_OPERATIONAL => self.nmt_state = NmtState::PreOperational,
             nmt_command::RESET_NODE | nmt_command::RESET_COMMUNICATION => {
-                self.hearing = Hearing::ServiceAfterReset;
+                self.nmt_state = NmtState::PreOperationalAfterReset;
             }
             _ => {}
         }
     }
 
     fn is_started(&mut self) {
-        if self.hearing != Hearing::ServiceAfterReset {
-            self.hearing = Hearing::ProcessData;
+        if self.nmt_state != NmtState::PreOperationalAfterReset {
+            self.nmt_state = NmtState::Operational;
         }
     }
 
     /// What the node takes of what it is sent.
-    pub const fn hearing(&self) -> Hearing {
-        self.hearing
+    pub const fn nmt_state(&self) -> NmtState {
+        self.nmt_state
     }
 
     /// Lets a cycle pass.
@@ -199,15 +203,15 @@ impl NodeWatch {
     }
 
     /// What is wrong, with the longest silence that is allowed; `None` where no heartbeat is expected.
-    pub fn complaint(&self, timeout_cycles: Option<u32>) -> Option<NodeComplaint> {
+    pub fn complaint(&self, timeout_cycles: Option<u32>) -> Option<NodeFault> {
         if self.has_booted {
-            return Some(NodeComplaint::BootUp);
+            return Some(NodeFault::BootUp);
         }
         if let Some(state) = self.left_operational {
-            return Some(NodeComplaint::NotOperational { state });
+            return Some(NodeFault::NotOperational { state });
         }
         let cycles = self.silent_cycles;
-        timeout_cycles.filter(|timeout| cycles > *timeout).map(|_| NodeComplaint::Silent { cycles })
+        timeout_cycles.filter(|timeout| cycles > *timeout).map(|_| NodeFault::Silent { cycles })
     }
 
     /// Forgets what was: the node is about to be watched.
@@ -285,13 +289,13 @@ mod tests {
         assert_eq!(watch.complaint(Some(3)), None);
         (0..4).for_each(|_| watch.pass());
         assert_eq!(watch.complaint(None), None);
-        assert_eq!(watch.complaint(Some(3)), Some(NodeComplaint::Silent { cycles: 4 }));
+        assert_eq!(watch.complaint(Some(3)), Some(NodeFault::Silent { cycles: 4 }));
         watch.receive(0x7F);
-        assert_eq!(watch.complaint(Some(3)), Some(NodeComplaint::NotOperational { state: 0x7F }));
+        assert_eq!(watch.complaint(Some(3)), Some(NodeFault::NotOperational { state: 0x7F }));
         watch.receive(0x80 | node_state::OPERATIONAL);
         assert_eq!(watch.complaint(Some(3)), None);
         watch.receive(node_state::BOOT_UP);
-        assert_eq!(watch.complaint(None), Some(NodeComplaint::BootUp));
+        assert_eq!(watch.complaint(None), Some(NodeFault::BootUp));
         watch.begin();
         assert_eq!(watch.complaint(None), None);
     }
@@ -306,15 +310,15 @@ mod tests {
                     Err(command) => watch.commanded(command),
                 }
             }
-            watch.hearing()
+            watch.nmt_state()
         };
         let (started, pre_operational) =
             (Ok(node_state::OPERATIONAL), Ok(0x80 | node_state::PRE_OPERATIONAL));
-        assert_eq!(heard(&[started]), Hearing::ProcessData);
-        assert_eq!(heard(&[pre_operational]), Hearing::Service);
-        assert_eq!(heard(&[pre_operational, started]), Hearing::ProcessData);
-        assert_eq!(heard(&[Err(nmt_command::STOP)]), Hearing::Nmt);
-        assert_eq!(heard(&[Err(nmt_command::STOP), Err(nmt_command::START)]), Hearing::ProcessData);
+        assert_eq!(heard(&[started]), NmtState::Operational);
+        assert_eq!(heard(&[pre_operational]), NmtState::PreOperational);
+        assert_eq!(heard(&[pre_operational, started]), NmtState::Operational);
+        assert_eq!(heard(&[Err(nmt_command::STOP)]), NmtState::Stopped);
+        assert_eq!(heard(&[Err(nmt_command::STOP), Err(nmt_command::START)]), NmtState::Operational);
         // One that has been reset has forgotten its process data, and a start does not give them back.
         for reset in
             [Ok(node_state::BOOT_UP), Err(nmt_command::RESET_NODE), Err(nmt_command::RESET_COMMUNICATION)]
@@ -322,7 +326,7 @@ mod tests {
             for later in
                 [started, pre_operational, Err(nmt_command::START), Err(nmt_command::ENTER_PRE_OPERATIONAL)]
             {
-                assert_eq!(heard(&[reset, later]), Hearing::ServiceAfterReset);
+                assert_eq!(heard(&[reset, later]), NmtState::PreOperationalAfterReset);
             }
         }
     }

@@ -24,10 +24,10 @@ impl Axis {
             if self.is_controlword_due { 0 } else { self.since_controlword.saturating_add(1) };
         self.base_word = word;
         // One that has shown torque shows as well when it has none any more.
-        self.is_led_up = !self.drive_state().has_torque()
+        self.may_be_switching_on = !self.drive_state().has_torque()
             && match word {
                 controlword::SWITCH_ON | controlword::ENABLE_OPERATION => true,
-                _ => self.is_led_up && self.since_controlword < SETTLED_CYCLES,
+                _ => self.may_be_switching_on && self.since_controlword < SETTLED_CYCLES,
             };
         self.sent = [self.delay.due(), self.sent[0], self.sent[1]];
         self.ask_by_set_point();
@@ -65,13 +65,13 @@ impl Axis {
     fn ask_by_set_point(&mut self) {
         self.is_left_out = core::mem::take(&mut self.is_next_left_out);
         if self.parameters.feedback_since == FeedbackSince::SetPoint && self.is_position_known {
-            if self.is_left_out { self.punctuality.leave_out() } else { self.punctuality.ask() }
+            if self.is_left_out { self.late_reply.skip_request() } else { self.late_reply.ask() }
         }
     }
 
     /// Whether a controlword that leads the drive up may still be under way, whatever the drive shows.
-    pub fn is_led_up(&self) -> bool {
-        self.is_led_up
+    pub fn may_be_switching_on(&self) -> bool {
+        self.may_be_switching_on
     }
 
     /// The controlword that brings the drive one step nearer to `goal`.
@@ -114,7 +114,7 @@ impl Axis {
     pub fn frames(&self) -> impl Iterator<Item = Frame> {
         let is_due = |command: &CommandPdo| {
             self.is_position_known
-                && match command.cadence {
+                && match command.transmission {
                     TransmissionType::EveryCycle => !self.is_left_out,
                     TransmissionType::OnControlword => self.is_controlword_due,
                 }

@@ -1,12 +1,12 @@
 //! What the drive of an axis reports.
 
-use super::position_watch::{Judgement, Reach};
+use super::plausibility::{Plausibility, TravelBound};
 use super::{Axis, FeedbackSince};
 use crate::cia402::DriveState;
 use crate::frame::Frame;
 use crate::pdo::{FeedbackSlot, TooShort};
 use crate::time::Nanoseconds;
-use crate::watch::NodeComplaint;
+use crate::watch::NodeFault;
 
 /// A fault shows in the statusword within this many slots of the emergency message that announces it.
 const EMERGENCY_GRACE_CYCLES: u8 = 3;
@@ -30,46 +30,46 @@ impl Axis {
 
     /// SYNC begins: no drive has been asked anything yet.
     pub fn begin_sync(&mut self) {
-        self.punctuality.begin();
+        self.late_reply.begin();
     }
 
     /// SYNC asks the drive for the feedback of a cycle; see [`Axis::expect_feedback`].
-    pub fn ask(&mut self, now_ns: Nanoseconds) {
+    pub fn request_feedback(&mut self, now_ns: Nanoseconds) {
         self.expect_feedback(now_ns);
-        self.punctuality.ask();
+        self.late_reply.ask();
     }
 
     /// SYNC is left out in a cycle, to see whether the drive's silence falls into it.
-    pub fn leave_out(&mut self, now_ns: Nanoseconds) {
+    pub fn skip_request(&mut self, now_ns: Nanoseconds) {
         self.expect_feedback(now_ns);
-        self.punctuality.leave_out();
+        self.late_reply.skip_request();
     }
 
-    /// The next set-point is left out, which asks a drive that answers them: as [`Axis::leave_out`] for one that answers SYNC.
-    pub fn leave_out_set_point(&mut self) {
+    /// The next set-point is left out, which asks a drive that answers them: as [`Axis::skip_request`] for one that answers SYNC.
+    pub fn skip_next_set_point(&mut self) {
         self.is_next_left_out = true;
     }
 
     /// What asks the drive, SYNCs or set-points, and has had no answer, or none yet; 0 for one that reports when it likes.
     pub fn unanswered(&self) -> u16 {
-        self.punctuality.unanswered()
+        self.late_reply.unanswered()
     }
 
     /// How many cycles of its bus late the drive has been found to report, always; 0 if it has not been.
     pub fn late_cycles(&self) -> u16 {
-        self.punctuality.late_cycles()
+        self.late_reply.late_cycles()
     }
 
     /// Whether only a SYNC or a set-point that is left out can tell if the drive reports in time.
-    pub fn is_doubtful(&self) -> bool {
-        self.punctuality.is_doubtful()
+    pub fn is_reply_unverified(&self) -> bool {
+        self.late_reply.is_reply_unverified()
     }
 
     /// Takes feedback PDO number `pdo` (from 0) that arrived at `at_ns`. One that is late changes nothing, nor one that is
     /// too short.
     pub fn receive(&mut self, pdo: usize, frame: &Frame, at_ns: Nanoseconds) -> Result<(), TooShort> {
         if pdo == 0 {
-            self.punctuality.answer();
+            self.late_reply.answer();
         }
         if at_ns < self.expected_since_ns {
             return Ok(());
@@ -113,7 +113,7 @@ impl Axis {
     pub fn begin_cycle(&mut self, elapsed_s: f64) {
         self.span_s += elapsed_s;
         let expected = (1u8 << self.parameters.feedback.len().min(7)) - 1;
-        if !self.punctuality.pass(self.arrived != 0) {
+        if !self.late_reply.pass(self.arrived != 0) {
             return;
         }
         if self.arrived & expected != expected {
@@ -143,22 +143,23 @@ impl Axis {
         let scale = &self.parameters.scale;
         let counts = self.feedback.feedback(FeedbackSlot::Position);
         let position = scale.position_from_counts(counts);
-        let reach = Reach { velocity: self.parameters.limits.velocity, count: 1.0 / scale.resolution() };
-        match self.position_watch.judge(position, span_s, reach) {
-            Judgement::Believed { velocity } => {
+        let reach =
+            TravelBound { velocity: self.parameters.limits.velocity, count: 1.0 / scale.resolution() };
+        match self.plausibility.judge(position, span_s, reach) {
+            Plausibility::Plausible { velocity } => {
                 self.jump = None;
                 self.velocity = if self.reports(FeedbackSlot::Velocity) {
                     scale.velocity_from_drive(self.feedback.feedback(FeedbackSlot::Velocity))
                 } else {
                     velocity
                 };
-                self.believe(position, counts);
+                self.accept(position, counts);
             }
-            Judgement::Doubtful { distance, reach } => self.jump = Some(Jump { distance, reach }),
+            Plausibility::Implausible { distance, reach } => self.jump = Some(Jump { distance, reach }),
         }
     }
 
-    fn believe(&mut self, position: f64, counts: i32) {
+    fn accept(&mut self, position: f64, counts: i32) {
         (self.position, self.position_counts) = (position, counts);
         if !self.is_position_known {
             self.is_position_known = true;
@@ -169,7 +170,7 @@ impl Axis {
     /// Takes the position that the drive has reported otherwise than by process data, if there has been none.
     pub fn set_reported_position(&mut self, counts: i32) {
         if !self.is_heard {
-            self.believe(self.parameters.scale.position_from_counts(counts), counts);
+            self.accept(self.parameters.scale.position_from_counts(counts), counts);
         }
     }
 
@@ -253,7 +254,7 @@ impl Axis {
     }
 
     /// What the node's error control messages say against it.
-    pub fn node_complaint(&self) -> Option<NodeComplaint> {
+    pub fn node_fault(&self) -> Option<NodeFault> {
         self.node_watch.complaint(self.parameters.heartbeat_timeout_cycles)
     }
 

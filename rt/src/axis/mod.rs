@@ -3,10 +3,10 @@
 mod command;
 mod delay;
 mod feedback;
+mod late_reply;
 mod parameters;
-mod position_watch;
+mod plausibility;
 mod profile_mode;
-mod punctuality;
 mod rest;
 mod service;
 mod set_point;
@@ -24,8 +24,8 @@ use crate::record::AxisRecord;
 use crate::time::Nanoseconds;
 use crate::watch::{DuplicateWatch, NodeWatch};
 
-use position_watch::PositionWatch;
-use punctuality::Punctuality;
+use late_reply::LateReplyDetector;
+use plausibility::PlausibilityCheck;
 use service::ServiceCommand;
 
 pub use feedback::Jump;
@@ -51,7 +51,7 @@ pub struct Axis {
     profile_target: Option<ProfileTarget>,
     /// When a velocity or a torque expires.
     profile_until_ns: Nanoseconds,
-    position_watch: PositionWatch,
+    plausibility: PlausibilityCheck,
     /// Where the joint is believed to be, in counts too, and how fast.
     position: f64,
     position_counts: i32,
@@ -78,11 +78,11 @@ pub struct Axis {
     contradictions: u8,
     /// Whether the drive left operation enabled by itself and must not be led back to it.
     is_lost: bool,
-    /// Whether the node takes no process data any more, see [`Axis::notice_deafness`].
-    is_deaf: bool,
+    /// Whether the node takes no process data any more, see [`Axis::note_pdo_reachability`].
+    is_pdo_unreachable: bool,
     service: ServiceCommand,
     /// Whether it may be led up, see [`Axis::prepare_to_enable`].
-    is_ready: bool,
+    is_power_granted: bool,
     /// The last report of the joint where it cannot have got to, if none was believed since.
     jump: Option<Jump>,
     /// Whether `position` is what the drive has said.
@@ -94,7 +94,7 @@ pub struct Axis {
     since_emergency: Option<u8>,
     node_watch: NodeWatch,
     duplicate_watch: DuplicateWatch,
-    punctuality: Punctuality,
+    late_reply: LateReplyDetector,
     /// Whether the next set-point is left out, and whether that of this cycle is.
     is_next_left_out: bool,
     is_left_out: bool,
@@ -104,8 +104,8 @@ pub struct Axis {
     base_word: u16,
     since_controlword: u32,
     is_controlword_due: bool,
-    /// See [`Axis::is_led_up`].
-    is_led_up: bool,
+    /// See [`Axis::may_be_switching_on`].
+    may_be_switching_on: bool,
     torque_set: f64,
 }
 
@@ -126,7 +126,7 @@ impl Axis {
             profile: ProfileCommand::default(),
             profile_target: None,
             profile_until_ns: 0,
-            position_watch: PositionWatch::default(),
+            plausibility: PlausibilityCheck::default(),
             position: 0.0,
             position_counts: 0,
             velocity: 0.0,
@@ -142,9 +142,9 @@ impl Axis {
             standing_reports: 0,
             contradictions: 0,
             is_lost: false,
-            is_deaf: false,
+            is_pdo_unreachable: false,
             service: ServiceCommand::default(),
-            is_ready: false,
+            is_power_granted: false,
             jump: None,
             is_position_known: false,
             emergency_code: 0,
@@ -152,7 +152,7 @@ impl Axis {
             since_emergency: None,
             node_watch: NodeWatch::default(),
             duplicate_watch: DuplicateWatch::default(),
-            punctuality: Punctuality::default(),
+            late_reply: LateReplyDetector::default(),
             is_next_left_out: false,
             is_left_out: false,
             following_error: 0.0,
@@ -160,7 +160,7 @@ impl Axis {
             base_word: 0,
             since_controlword: 0,
             is_controlword_due: false,
-            is_led_up: false,
+            may_be_switching_on: false,
             torque_set: 0.0,
         }
     }
@@ -200,11 +200,11 @@ impl Axis {
     /// Begins to watch the node anew.
     pub fn begin_watch(&mut self) {
         self.is_lost = false;
-        self.is_deaf = false;
-        self.is_ready = false;
+        self.is_pdo_unreachable = false;
+        self.is_power_granted = false;
         self.node_watch.begin();
         self.duplicate_watch = DuplicateWatch::default();
-        self.punctuality.forget_findings();
+        self.late_reply.forget_findings();
         self.since_emergency = None;
     }
 
@@ -217,12 +217,12 @@ impl Axis {
     }
 
     /// The drive has left operation enabled by itself: it is not led back to it before it is watched anew.
-    pub fn give_up(&mut self) {
+    pub fn latch_off(&mut self) {
         self.is_lost = true;
     }
 
     /// The drive has no torque, or is not waited for any longer: its set-point follows the joint again.
-    pub fn let_go(&mut self) {
+    pub fn release_latch(&mut self) {
         self.is_lost = false;
     }
 
@@ -230,8 +230,8 @@ impl Axis {
     /// direction, its reports come in their own cycle, and its joint is at rest on the set-point. That remains so until the
     /// node is watched anew.
     pub fn prepare_to_enable(&mut self, period_s: f64) {
-        self.is_ready |= self.age == 0
-            && self.punctuality.is_punctual()
+        self.is_power_granted |= self.age == 0
+            && self.late_reply.is_punctual()
             && !self.drive_state().has_torque()
             && self.base_word == controlword::SHUTDOWN
             && self.since_controlword >= SETTLED_CYCLES
@@ -240,8 +240,8 @@ impl Axis {
     }
 
     /// Whether the drive may be led up.
-    pub fn is_ready(&self) -> bool {
-        self.is_ready
+    pub fn is_power_granted(&self) -> bool {
+        self.is_power_granted
     }
 
     /// What this cycle leaves behind.

@@ -119,16 +119,18 @@ impl Axis {
     /// that is let go coasts, and is where it was sent when it stands.
     pub fn is_target_reached(&self) -> bool {
         let is_there = || self.profile.is_reached(self.parameters.dialect, self.statusword());
-        !self.is_profile() || !self.is_adrift() && is_there()
+        !self.is_profile() || !self.is_coasting() && is_there()
     }
 
     /// Whether the joint moves and nobody drives it: with profile torque of zero it coasts, or a load pulls it.
-    pub fn is_adrift(&self) -> bool {
-        self.parameters.law == ControlLaw::ProfileTorque && !self.is_driven() && !self.is_standing()
+    pub fn is_coasting(&self) -> bool {
+        self.parameters.law == ControlLaw::ProfileTorque
+            && !self.is_moving_on_command()
+            && !self.is_standing()
     }
 
     /// Whether the drive is asked to go on moving without end: a velocity or a torque that is not zero.
-    pub fn is_driven(&self) -> bool {
+    pub fn is_moving_on_command(&self) -> bool {
         match self.profile_target {
             Some(ProfileTarget::Velocity(value) | ProfileTarget::Torque(value)) => value != 0.0,
             _ => false,
@@ -138,7 +140,7 @@ impl Axis {
     /// For how long the velocity or torque that the drive is asked for has been expired; 0 if it is valid or there is
     /// none.
     pub fn expired_ns(&self, now_ns: Nanoseconds) -> Nanoseconds {
-        if self.is_driven() { now_ns.saturating_sub(self.profile_until_ns) } else { 0 }
+        if self.is_moving_on_command() { now_ns.saturating_sub(self.profile_until_ns) } else { 0 }
     }
 
     /// Cycles that the drive has left a set-point unacknowledged.
@@ -179,7 +181,7 @@ impl Axis {
                 limit: self.parameters.following_error_limit,
             });
         }
-        if !self.is_driven() && !self.is_adrift() {
+        if !self.is_moving_on_command() && !self.is_coasting() {
             return Ok(());
         }
         let distance = self.way_to_rest();

@@ -4,7 +4,7 @@ use super::Axis;
 use crate::cia402::controlword;
 use crate::dialect::Dialect;
 use crate::frame::{Frame, Id};
-use crate::watch::{Hearing, nmt_command, node_state};
+use crate::watch::{NmtState, nmt_command, node_state};
 
 /// Cycles of its bus without feedback after which a node is believed that does not take process data. Its number, or its
 /// heartbeat, may as well be somebody else's.
@@ -31,23 +31,24 @@ pub(super) struct ServiceCommand {
 
 impl Axis {
     /// Takes an NMT command that another master has given to the node.
-    pub fn commanded_by_other(&mut self, command: u8) {
+    pub fn receive_foreign_nmt(&mut self, command: u8) {
         self.node_watch.commanded(command);
     }
 
     /// Looks whether the node takes process data. One that has said, or has been told, that it does not is believed when its
     /// feedback stays away as well; that remains so until it is watched anew.
-    pub fn notice_deafness(&mut self) {
-        self.is_deaf |= self.node_watch.hearing() != Hearing::ProcessData && self.age >= DEAF_CYCLES;
+    pub fn note_pdo_reachability(&mut self) {
+        self.is_pdo_unreachable |=
+            self.node_watch.nmt_state() != NmtState::Operational && self.age >= DEAF_CYCLES;
     }
 
     /// Whether the node takes no process data any more.
-    pub fn is_deaf(&self) -> bool {
-        self.is_deaf
+    pub fn is_pdo_unreachable(&self) -> bool {
+        self.is_pdo_unreachable
     }
 
     /// What a drive that is deaf and moves is to be told: to come to rest by its own means.
-    pub fn stop_word(&self) -> u16 {
+    pub fn sdo_stop_word(&self) -> u16 {
         match self.parameters.dialect {
             _ if !self.drive_state().has_torque() => controlword::DISABLE_VOLTAGE,
             Dialect::Cia402 => controlword::QUICK_STOP,
@@ -71,7 +72,7 @@ impl Axis {
         let service = &mut self.service;
         let word = service.word.filter(|_| !service.is_confirmed && service.wait == 0)?;
         // A stopped node has no SDO server.
-        if self.node_watch.hearing() == Hearing::Nmt && !service.is_woken {
+        if self.node_watch.nmt_state() == NmtState::Stopped && !service.is_woken {
             service.is_woken = true;
             return Some(Frame::of(Id::canopen(0, 0), [nmt_command::ENTER_PRE_OPERATIONAL, node]));
         }

@@ -1,7 +1,7 @@
 //! Where an axis is to be.
 
 use super::Axis;
-use crate::guard::{self, Course, Violation};
+use crate::guard::{self, SetPointSteps, Violation};
 use crate::plan::State;
 use crate::stop::Rule;
 
@@ -13,13 +13,13 @@ impl Axis {
 
     /// Gives the newest set-point the velocity and the acceleration that its steps show: when a stream ends, of which what it
     /// said of them may be wrong. Where it has led is known, and whatever is planned from now on goes on from that.
-    pub fn take_steps(&mut self, period_s: f64) {
+    pub fn derive_from_steps(&mut self, period_s: f64) {
         if self.is_profile() {
             return;
         }
         let [newest, last, before] = self.set.map(|state| state.position);
-        let course = Course { sent: [last, before, before], next: newest, period_s };
-        self.set[0] = course.state(&self.parameters.limits);
+        let steps = SetPointSteps { sent: [last, before, before], next: newest, period_s };
+        self.set[0] = steps.state(&self.parameters.limits);
     }
 
     /// Makes the actual position the set-point, as if it had always been: for an axis whose drive has been sent none.
@@ -79,13 +79,13 @@ impl Axis {
     pub fn check_stream(&self, next: &State, period_s: f64, is_bridged: bool) -> Result<(), Violation> {
         let limits = &self.parameters.limits;
         let jerk = if is_bridged { f64::INFINITY } else { limits.jerk };
-        guard::check_jerk(jerk, &self.course(next, period_s))?;
-        guard::check_braking(limits, &self.course(next, period_s))
+        guard::check_jerk(jerk, &self.steps(next, period_s))?;
+        guard::check_braking(limits, &self.steps(next, period_s))
     }
 
     /// The set-point within the limits that is nearest to one of a stream.
     pub fn clamped(&self, next: &State, period_s: f64) -> State {
-        guard::clamp(&self.parameters.limits, &self.course(next, period_s))
+        guard::clamp(&self.parameters.limits, &self.steps(next, period_s))
     }
 
     /// A set-point of a stream, of which the position counts: what it says of its velocity and acceleration is fed forward
@@ -109,7 +109,7 @@ impl Axis {
     /// What takes the place of the next command of a stream when it does not come in time: for one cycle the motion goes on as
     /// it did, with its acceleration, so that the one after it fits in; from then on at its velocity. What the stream says of
     /// itself counts if its steps agree; of one that says nothing they are all that is known.
-    pub fn carried_on(&self, command: &State, period_s: f64) -> State {
+    pub fn extrapolated(&self, command: &State, period_s: f64) -> State {
         let limits = &self.parameters.limits;
         let most = limits.acceleration.max(limits.deceleration);
         let [newest, last, before] = self.set.map(|state| state.position);
@@ -130,9 +130,9 @@ impl Axis {
         State { position: command.position + mean * period_s, velocity: end, acceleration: 0.0 }
     }
 
-    fn course(&self, next: &State, period_s: f64) -> Course {
+    fn steps(&self, next: &State, period_s: f64) -> SetPointSteps {
         let sent = [self.set[0].position, self.set[1].position, self.set[2].position];
-        Course { sent, next: next.position, period_s }
+        SetPointSteps { sent, next: next.position, period_s }
     }
 
     /// Checks that a stream begins where the joint is. What is no number is left to [`Axis::check`].

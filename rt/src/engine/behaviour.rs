@@ -32,19 +32,20 @@ impl Engine {
                     let bus = self.buses.get(usize::from(axis.parameters().bus));
                     let silent_cycles = u32::from(axis.feedback_age()) * bus.map_or(1, |bus| bus.divider);
                     let is_over = self.heartbeat.is_some_and(|beat| silent_cycles > beat.timeout_cycles);
-                    is_over && !is_on_way && !axis.is_deaf()
+                    is_over && !is_on_way && !axis.is_pdo_unreachable()
                 };
                 // What is told to one that is believed to follow goes on to rest, though it may have said otherwise by SDO; and
                 // one that shows no torque yet may be about to have it.
                 let is_waited_for = |axis: &Axis| {
-                    let may_have_torque =
-                        axis.has_torque() || axis.is_led_up() || is_on_way && axis.drive_state().has_torque();
+                    let may_have_torque = axis.has_torque()
+                        || axis.may_be_switching_on()
+                        || is_on_way && axis.drive_state().has_torque();
                     may_have_torque && !has_stopped_by_itself(axis)
                 };
                 if !(is_patient && self.axes.iter().any(is_waited_for)) {
                     self.motion.cancel();
                     self.goal = Goal::Disabled;
-                    self.axes.iter_mut().for_each(Axis::let_go);
+                    self.axes.iter_mut().for_each(Axis::release_latch);
                     self.enter(Phase::Disabled, now_ns, host);
                 }
             }
@@ -55,7 +56,7 @@ impl Engine {
         self.hold();
         self.look_for_late_drives();
         self.axes.iter_mut().for_each(|axis| axis.prepare_to_enable(self.period_s));
-        if self.axes.iter().all(|axis| axis.is_ready() && axis.is_enabled()) {
+        if self.axes.iter().all(|axis| axis.is_power_granted() && axis.is_enabled()) {
             self.enter(Phase::Holding, now_ns, host);
         } else if self.phase_cycles > self.enable_timeout_cycles {
             let late = self.axes.iter().position(|axis| !axis.is_enabled());
@@ -135,7 +136,7 @@ impl Engine {
             self.finished_move = self.move_id;
             self.happened(now_ns, EventKind::MoveFinished { id: self.move_id }, host);
         }
-        if !self.axes.iter().any(Axis::is_driven) {
+        if !self.axes.iter().any(Axis::is_moving_on_command) {
             self.enter(Phase::Holding, now_ns, host);
         }
     }
@@ -192,7 +193,7 @@ impl Engine {
             // Until the next command comes the present one is carried on, up to its expiry.
             if let Some(held) = &mut self.stream {
                 for (axis, point) in self.axes.iter().zip(&mut held.set_points) {
-                    *point = axis.carried_on(point, self.period_s);
+                    *point = axis.extrapolated(point, self.period_s);
                 }
             }
         }

@@ -22,17 +22,17 @@ impl Engine {
         let is_overdue = Nanoseconds::from(self.phase_cycles).saturating_mul(self.period_ns) > OBEYING_NS;
         for axis in &mut self.axes {
             if has_power {
-                axis.notice_deafness();
+                axis.note_pdo_reachability();
             }
             let is_silent = axis.feedback_age() > axis.parameters().missed_feedback_cycles;
             let word = match self.phase {
                 _ if !has_power => None,
-                Phase::Disabling if axis.is_deaf() => Some(controlword::DISABLE_VOLTAGE),
+                Phase::Disabling if axis.is_pdo_unreachable() => Some(controlword::DISABLE_VOLTAGE),
                 // Nobody knows whether it hears.
                 Phase::Disabling if is_silent && is_overdue && axis.drive_state().has_torque() => {
                     Some(controlword::DISABLE_VOLTAGE)
                 }
-                _ if axis.is_deaf() => Some(axis.stop_word()),
+                _ if axis.is_pdo_unreachable() => Some(axis.sdo_stop_word()),
                 _ => None,
             };
             axis.command_by_service(word);
@@ -51,7 +51,7 @@ impl Engine {
     pub(super) fn hear_other_master(&mut self, bus: usize, frame: &Frame) {
         let (0, &[command, node]) = (frame.id().value(), frame.payload()) else { return };
         for axis in self.axes_of(bus).filter(|axis| node == 0 || node == axis.parameters().node) {
-            axis.commanded_by_other(command);
+            axis.receive_foreign_nmt(command);
         }
     }
 

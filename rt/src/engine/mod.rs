@@ -19,8 +19,8 @@ use crate::axis::{Axis, FeedbackSince};
 use crate::cia402::Goal;
 use crate::dispatch::Dispatch;
 use crate::frame::Frame;
+use crate::group_trajectory::GroupTrajectory;
 use crate::host::{AxisSnapshot, HostInterface, Snapshot, StreamCommand};
-use crate::motion::Motion;
 use crate::port::BusHealth;
 use crate::record::{CycleRecord, CycleTiming, Event, EventKind, MAX_AXES, MAX_BUSES};
 use crate::stop::{Phase, StopCategories, StopReason};
@@ -110,7 +110,7 @@ pub struct Engine {
     is_retired: bool,
     is_leaving: bool,
     goal: Goal,
-    motion: Motion,
+    motion: GroupTrajectory,
     /// The move under way: its number and whether it ends in motion.
     move_id: u32,
     finished_move: u32,
@@ -186,7 +186,7 @@ impl Engine {
             is_retired: false,
             is_leaving: false,
             goal: Goal::Disabled,
-            motion: Motion::default(),
+            motion: GroupTrajectory::default(),
             move_id: 0,
             finished_move: 0,
             stream: None,

@@ -4,8 +4,8 @@ use super::obstacle::{Obstacle, check_profile_target, check_scales, check_target
 use super::{Engine, FAULT_RESET_CYCLES};
 use crate::axis::Axis;
 use crate::cia402::Goal;
+use crate::group_trajectory::Leg;
 use crate::host::{HostInterface, Move, ProfileMove, Request, RequestEnvelope};
-use crate::motion::Leg;
 use crate::plan::State;
 use crate::profile::ProfileTarget;
 use crate::record::EventKind;

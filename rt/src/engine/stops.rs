@@ -10,7 +10,7 @@ use crate::port::{BusHealth, BusState};
 use crate::record::EventKind;
 use crate::stop::{Origin, Phase, Rule, StopCategory, StopReason};
 use crate::time::Nanoseconds;
-use crate::watch::{NodeComplaint, TimingLevel, node_state};
+use crate::watch::{NodeFault, TimingLevel, node_state};
 
 impl Engine {
     pub(super) fn supervise(
@@ -53,7 +53,7 @@ impl Engine {
             for axis in &mut self.axes {
                 let bus = self.held_back_cycles.get(usize::from(axis.parameters().bus));
                 if bus.is_some_and(|cycles| *cycles > self.not_transmitted_cycles) {
-                    axis.give_up();
+                    axis.latch_off();
                 }
             }
             let origin = self.slowest_bus(not_taken).map_or(Origin::Group, |bus| Origin::Bus(bus as u8));
@@ -134,7 +134,7 @@ impl Engine {
     pub(super) fn is_under_way(&self) -> bool {
         match self.phase {
             Phase::Moving | Phase::Streaming => true,
-            Phase::Holding => self.axes.iter().any(Axis::is_adrift),
+            Phase::Holding => self.axes.iter().any(Axis::is_coasting),
             _ => false,
         }
     }
@@ -180,7 +180,7 @@ impl Engine {
     fn plan_stop(&mut self) -> Result<(), PlanError> {
         self.axes.iter_mut().for_each(Axis::begin_stop);
         if self.phase == Phase::Streaming {
-            self.axes.iter_mut().for_each(|axis| axis.take_steps(self.period_s));
+            self.axes.iter_mut().for_each(|axis| axis.derive_from_steps(self.period_s));
         }
         self.motion.stop(self.axes.iter().map(|axis| {
             let here = axis.set_point();
@@ -207,7 +207,7 @@ fn complaint(
     let is_faulted = axis.drive_state().is_faulted() && !is_resetting;
     // Whatever else is wrong with it, and comes first.
     if is_disabled || is_faulted {
-        axis.give_up();
+        axis.latch_off();
     }
     let missed_limit = axis.parameters().missed_feedback_cycles;
     if axis.feedback_age() > missed_limit {
@@ -219,14 +219,14 @@ fn complaint(
     if is_faulted {
         return Some((Rule::DriveFault, axis.error_code().into(), 0.0));
     }
-    if let Some(complaint) = axis.node_complaint() {
+    if let Some(complaint) = axis.node_fault() {
         let timeout = axis.parameters().heartbeat_timeout_cycles.unwrap_or(0);
         return Some(match complaint {
-            NodeComplaint::BootUp => (Rule::UnexpectedBootUp, 0.0, 0.0),
-            NodeComplaint::NotOperational { state } => {
+            NodeFault::BootUp => (Rule::UnexpectedBootUp, 0.0, 0.0),
+            NodeFault::NotOperational { state } => {
                 (Rule::NodeNotOperational, state.into(), node_state::OPERATIONAL.into())
             }
-            NodeComplaint::Silent { cycles } => (Rule::NodeLost, cycles.into(), timeout.into()),
+            NodeFault::Silent { cycles } => (Rule::NodeLost, cycles.into(), timeout.into()),
         });
     }
     if axis.is_duplicate() {

@@ -33,8 +33,8 @@ impl Engine {
         let is_left_out = self.left_out.take(bus);
         for axis in self.axes.iter_mut().filter(|axis| usize::from(axis.parameters().bus) == bus) {
             match axis.parameters().feedback_since {
-                FeedbackSince::Sync if is_left_out => axis.leave_out(now_ns),
-                FeedbackSince::Sync => axis.ask(now_ns),
+                FeedbackSince::Sync if is_left_out => axis.skip_request(now_ns),
+                FeedbackSince::Sync => axis.request_feedback(now_ns),
                 FeedbackSince::SetPoint | FeedbackSince::CommandPhase => {}
             }
         }
@@ -47,9 +47,9 @@ impl Engine {
         if !self.phase_cycles.is_multiple_of(LOOK_AGAIN_CYCLES) {
             return;
         }
-        for axis in self.axes.iter_mut().filter(|axis| axis.is_doubtful()) {
+        for axis in self.axes.iter_mut().filter(|axis| axis.is_reply_unverified()) {
             match axis.parameters().feedback_since {
-                FeedbackSince::SetPoint => axis.leave_out_set_point(),
+                FeedbackSince::SetPoint => axis.skip_next_set_point(),
                 _ => self.left_out.insert(axis.parameters().bus.into()),
             }
         }
@@ -131,10 +131,10 @@ impl Engine {
             if has_cycle_of(&self.buses, axis, slot) && !is_held_back {
                 // A drive that falls out of operation enabled is not led back by what the others are still to do; and none
                 // is led up before its joint is at rest and its target there, nor before it watches the controller.
-                let is_led_up = match self.phase {
+                let may_be_enabled = match self.phase {
                     Phase::Enabling => {
                         has_beaten
-                            && axis.is_ready()
+                            && axis.is_power_granted()
                             && (axis.is_enabled() || axis.is_on_joint(self.period_s))
                     }
                     _ => axis.is_enabled(),
@@ -144,8 +144,8 @@ impl Engine {
                         Goal::QuickStop
                     }
                     // The same as by SDO, should it hear this all the same.
-                    Goal::Enabled if axis.is_deaf() => Goal::QuickStop,
-                    Goal::Enabled if !is_led_up => Goal::Disabled,
+                    Goal::Enabled if axis.is_pdo_unreachable() => Goal::QuickStop,
+                    Goal::Enabled if !may_be_enabled => Goal::Disabled,
                     goal => goal,
                 };
                 axis.command(goal, reset_word.filter(|_| axis.drive_state().is_faulted()));

@@ -2,14 +2,14 @@
 
 #[cfg(test)]
 mod planned;
-mod reach;
+mod stopping_bound;
 mod stream;
 
 use crate::plan::State;
 use crate::stop::Rule;
 
-pub use reach::braking_distance;
-pub use stream::{Course, OnViolation, check_braking, check_jerk, clamp};
+pub use stopping_bound::braking_distance;
+pub use stream::{OnViolation, SetPointSteps, check_braking, check_jerk, clamp};
 
 /// What an axis may never be asked to do. rad (m) and seconds.
 #[derive(Clone, Copy, Debug, PartialEq)]

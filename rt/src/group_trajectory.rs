@@ -11,7 +11,7 @@ use crate::record::MAX_AXES;
 /// There is room for two: the next one is planned beside the present one and takes its place only when all of it is
 /// there, without being copied.
 #[derive(Clone, Debug)]
-pub struct Motion {
+pub struct GroupTrajectory {
     first: [Profile; MAX_AXES],
     second: [Profile; MAX_AXES],
     is_second_present: bool,
@@ -38,14 +38,14 @@ impl<'a> Leg<'a> {
     }
 }
 
-impl Default for Motion {
+impl Default for GroupTrajectory {
     fn default() -> Self {
         let hold = [Profile::hold(0.0); MAX_AXES];
         Self { first: hold, second: hold, is_second_present: false, duration_s: 0.0, time_s: 0.0 }
     }
 }
 
-impl Motion {
+impl GroupTrajectory {
     /// Plans a coordinated move within fractions of the limits: on a straight line from rest to rest, and otherwise where
     /// that takes no longer. On error the present motion goes on.
     pub fn move_to<'a>(
@@ -198,7 +198,7 @@ mod tests {
     fn a_move_that_is_to_be_gentle_takes_a_high_acceleration_back_before_the_velocity_limit() {
         let start = State { position: 0.0, velocity: 1.9, acceleration: 4.0 };
         let target = State { position: 2.5, ..State::default() };
-        let mut motion = Motion::default();
+        let mut motion = GroupTrajectory::default();
         motion.move_to([Leg { start, target, limits: &LIMITS }].into_iter(), 1.0, 0.1, 0.0).unwrap();
         while !motion.is_finished() {
             motion.advance(0.001);
@@ -213,7 +213,7 @@ mod tests {
         let slow = AxisLimits { deceleration: 1.0, ..LIMITS };
         for jerk in [100.0, f64::INFINITY] {
             let (quick, slow) = (AxisLimits { jerk, ..LIMITS }, AxisLimits { jerk, ..slow });
-            let mut motion = Motion::default();
+            let mut motion = GroupTrajectory::default();
             // 0.5 rad/s at 8 rad/s² take less than 0.06 rad; in the 2 s of the other axis they would take 0.5 rad.
             motion.stop([(at(2.9, 0.5), &quick), (at(0.0, 2.0), &slow)].into_iter()).unwrap();
             let mut farthest: f64 = 2.9;
@@ -231,7 +231,7 @@ mod tests {
             let limits = AxisLimits { jerk, ..LIMITS };
             let start = State::default();
             let target = State { position: 0.333, velocity: 1.1, acceleration: 0.0 };
-            let mut motion = Motion::default();
+            let mut motion = GroupTrajectory::default();
             motion.move_to([Leg { start, target, limits: &limits }].into_iter(), 0.7, 0.7, 0.0).unwrap();
             let (mut last, mut before) = (start, start);
             while !motion.is_finished() {

@@ -7,14 +7,14 @@ const LATEST_CYCLES: u16 = 50;
 
 /// Counts a drive's answers against the questions, SYNCs or set-points, that they belong to. Cycles are those of its bus.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Punctuality {
+pub(super) struct LateReplyDetector {
     unanswered: u16,
     /// Cycles since the question that was left out, while its silence is waited for.
     since_gap: Option<u16>,
     late_cycles: u16,
 }
 
-impl Punctuality {
+impl LateReplyDetector {
     /// Begins anew, with no question on the way.
     pub(super) fn begin(&mut self) {
         *self = Self::default();
@@ -31,7 +31,7 @@ impl Punctuality {
     }
 
     /// The question of a cycle is left out.
-    pub(super) fn leave_out(&mut self) {
+    pub(super) fn skip_request(&mut self) {
         self.since_gap = Some(0);
     }
 
@@ -67,7 +67,7 @@ impl Punctuality {
     }
 
     /// Whether nothing but a question that is left out can tell.
-    pub(super) const fn is_doubtful(&self) -> bool {
+    pub(super) const fn is_reply_unverified(&self) -> bool {
         self.unanswered > 0 && self.since_gap.is_none() && self.late_cycles == 0
     }
 }
@@ -77,24 +77,24 @@ mod tests {
     use super::*;
 
     /// A drive that answers so many cycles late is asked, and one question is left out.
-    fn found(late: u16) -> Punctuality {
-        let mut punctuality = Punctuality::default();
+    fn found(late: u16) -> LateReplyDetector {
+        let mut late_reply = LateReplyDetector::default();
         for cycle in 0..200 {
             let is_left_out = cycle == 100;
             if is_left_out {
-                assert_eq!(punctuality.is_doubtful(), late > 0);
-                assert_eq!(punctuality.unanswered(), late);
-                punctuality.leave_out();
+                assert_eq!(late_reply.is_reply_unverified(), late > 0);
+                assert_eq!(late_reply.unanswered(), late);
+                late_reply.skip_request();
             } else {
-                punctuality.ask();
+                late_reply.ask();
             }
             let has_answer = cycle >= late && cycle - late != 100;
             if has_answer {
-                punctuality.answer();
+                late_reply.answer();
             }
-            assert_eq!(punctuality.pass(has_answer), !(is_left_out && late == 0));
+            assert_eq!(late_reply.pass(has_answer), !(is_left_out && late == 0));
         }
-        punctuality
+        late_reply
     }
 
     #[test]
@@ -107,11 +107,11 @@ mod tests {
 
     #[test]
     fn an_answer_that_was_lost_is_cleared_up_by_silence() {
-        let mut punctuality = Punctuality::default();
-        punctuality.ask();
-        assert!(punctuality.pass(false) && punctuality.is_doubtful());
-        punctuality.leave_out();
-        assert!(!punctuality.pass(false));
-        assert!(punctuality.is_punctual() && punctuality.late_cycles() == 0);
+        let mut late_reply = LateReplyDetector::default();
+        late_reply.ask();
+        assert!(late_reply.pass(false) && late_reply.is_reply_unverified());
+        late_reply.skip_request();
+        assert!(!late_reply.pass(false));
+        assert!(late_reply.is_punctual() && late_reply.late_cycles() == 0);
     }
 }
