@@ -121,13 +121,33 @@ pub enum NmtState {
     Stopped,
 }
 
-/// What the error control messages of a drive tell while it is to work.
+/// Cycles of its bus without feedback after which a node whose NMT state is not operational counts as unreachable. Its node
+/// ID in an NMT command, or its heartbeat, may have been another node's.
+const UNREACHABLE_CYCLES: u16 = 2;
+
+/// The worst that a node's own error control messages have shown since it is watched.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct NodeWatch {
+enum ErrorControl {
+    /// The node is operational, or has said nothing.
+    #[default]
+    Operational,
+    /// The node is in another state than operational.
+    NotOperational {
+        /// Which.
+        state: u8,
+    },
+    /// The node has started anew. That remains so.
+    BootedUp,
+}
+
+/// What is known of a node by its error control messages and by the NMT commands of other masters.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct NodeMonitor {
     silent_cycles: u32,
-    has_booted: bool,
-    left_operational: Option<u8>,
+    error_control: ErrorControl,
     nmt_state: NmtState,
+    /// Whether the node has taken no process data at some time since it is watched.
+    is_pdo_unreachable: bool,
 }
 
 /// What is wrong with a node.
@@ -147,38 +167,38 @@ pub enum NodeFault {
     },
 }
 
-impl NodeWatch {
+impl NodeMonitor {
     /// Takes the state in an error control message.
     pub fn receive(&mut self, state: u8) {
         self.silent_cycles = 0;
         // Bit 7 toggles in answers to node guarding.
-        match (state, state & 0x7F) {
+        let shown = match (state, state & 0x7F) {
             (node_state::BOOT_UP, _) => {
-                self.has_booted = true;
                 self.nmt_state = NmtState::PreOperationalAfterReset;
+                ErrorControl::BootedUp
             }
             (_, node_state::OPERATIONAL) => {
-                self.left_operational = None;
-                self.is_started();
+                self.note_start();
+                ErrorControl::Operational
             }
             (_, state) => {
-                self.left_operational = Some(state);
-                if state == node_state::PRE_OPERATIONAL
-                    && self.nmt_state != NmtState::PreOperationalAfterReset
-                {
-                    self.nmt_state = NmtState::PreOperational;
+                if state == node_state::PRE_OPERATIONAL {
+                    self.note_pre_operational();
                 }
+                ErrorControl::NotOperational { state }
             }
+        };
+        if self.error_control != ErrorControl::BootedUp {
+            self.error_control = shown;
         }
     }
 
-    /// Takes a command that another master has given to the node.
-    pub fn commanded(&mut self, command: u8) {
+    /// Takes an NMT command that another master has given to the node.
+    pub fn receive_foreign_nmt(&mut self, command: u8) {
         match command {
-            nmt_command::START => self.is_started(),
+            nmt_command::START => self.note_start(),
             nmt_command::STOP => self.nmt_state = NmtState::Stopped,
-            nmt_command::ENTER_PRE_OPERATIONAL if self.nmt_state == NmtState::PreOperationalAfterReset => {}
-            nmt_command::ENTER_PRE_OPERATIONAL => self.nmt_state = NmtState::PreOperational,
+            nmt_command::ENTER_PRE_OPERATIONAL => self.note_pre_operational(),
             nmt_command::RESET_NODE | nmt_command::RESET_COMMUNICATION => {
                 self.nmt_state = NmtState::PreOperationalAfterReset;
             }
@@ -186,15 +206,32 @@ impl NodeWatch {
         }
     }
 
-    fn is_started(&mut self) {
+    fn note_start(&mut self) {
         if self.nmt_state != NmtState::PreOperationalAfterReset {
             self.nmt_state = NmtState::Operational;
         }
     }
 
-    /// What the node takes of what it is sent.
+    fn note_pre_operational(&mut self) {
+        if self.nmt_state != NmtState::PreOperationalAfterReset {
+            self.nmt_state = NmtState::PreOperational;
+        }
+    }
+
+    /// The NMT state that the node is believed to be in.
     pub const fn nmt_state(&self) -> NmtState {
         self.nmt_state
+    }
+
+    /// Updates whether process data reach the node, whose feedback is so many cycles of its bus old.
+    pub fn note_pdo_reachability(&mut self, feedback_age_cycles: u16) {
+        self.is_pdo_unreachable |=
+            self.nmt_state != NmtState::Operational && feedback_age_cycles >= UNREACHABLE_CYCLES;
+    }
+
+    /// Whether the node takes no process data any more. That remains so until the node is watched anew.
+    pub const fn is_pdo_unreachable(&self) -> bool {
+        self.is_pdo_unreachable
     }
 
     /// Lets a cycle pass.
@@ -203,15 +240,15 @@ impl NodeWatch {
     }
 
     /// What is wrong, with the longest silence that is allowed; `None` where no heartbeat is expected.
-    pub fn complaint(&self, timeout_cycles: Option<u32>) -> Option<NodeFault> {
-        if self.has_booted {
-            return Some(NodeFault::BootUp);
+    pub fn fault(&self, timeout_cycles: Option<u32>) -> Option<NodeFault> {
+        match self.error_control {
+            ErrorControl::BootedUp => Some(NodeFault::BootUp),
+            ErrorControl::NotOperational { state } => Some(NodeFault::NotOperational { state }),
+            ErrorControl::Operational => {
+                let cycles = self.silent_cycles;
+                timeout_cycles.filter(|timeout| cycles > *timeout).map(|_| NodeFault::Silent { cycles })
+            }
         }
-        if let Some(state) = self.left_operational {
-            return Some(NodeFault::NotOperational { state });
-        }
-        let cycles = self.silent_cycles;
-        timeout_cycles.filter(|timeout| cycles > *timeout).map(|_| NodeFault::Silent { cycles })
     }
 
     /// Forgets what was: the node is about to be watched.
@@ -220,19 +257,19 @@ impl NodeWatch {
     }
 }
 
-/// Two nodes with one number answer the same SYNC twice. Feedback that comes late makes two in one cycle as well, so
-/// only a run of them counts.
+/// Two nodes with one node ID answer the same SYNC twice. Late feedback makes two in one cycle as well, so only a run of them
+/// counts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct DuplicateWatch {
+pub struct DuplicateNodeDetector {
     filled: u16,
 }
 
 const DUPLICATE_LIMIT: u16 = 12;
 const DUPLICATE_STEP: u16 = 3;
 
-impl DuplicateWatch {
-    /// Feedback came that was there already in this cycle.
-    pub fn again(&mut self) {
+impl DuplicateNodeDetector {
+    /// A feedback PDO has arrived for the second time in a cycle.
+    pub fn note_repetition(&mut self) {
         self.filled = self.filled.saturating_add(DUPLICATE_STEP);
     }
 
@@ -242,7 +279,7 @@ impl DuplicateWatch {
     }
 
     /// Whether it has gone on for too long to be lateness.
-    pub const fn is_duplicate(&self) -> bool {
+    pub const fn is_found(&self) -> bool {
         self.filled >= DUPLICATE_LIMIT
     }
 }
@@ -284,30 +321,30 @@ mod tests {
 
     #[test]
     fn a_node_that_boots_leaves_operational_or_falls_silent_is_noticed() {
-        let mut watch = NodeWatch::default();
+        let mut watch = NodeMonitor::default();
         watch.receive(node_state::OPERATIONAL);
-        assert_eq!(watch.complaint(Some(3)), None);
+        assert_eq!(watch.fault(Some(3)), None);
         (0..4).for_each(|_| watch.pass());
-        assert_eq!(watch.complaint(None), None);
-        assert_eq!(watch.complaint(Some(3)), Some(NodeFault::Silent { cycles: 4 }));
+        assert_eq!(watch.fault(None), None);
+        assert_eq!(watch.fault(Some(3)), Some(NodeFault::Silent { cycles: 4 }));
         watch.receive(0x7F);
-        assert_eq!(watch.complaint(Some(3)), Some(NodeFault::NotOperational { state: 0x7F }));
+        assert_eq!(watch.fault(Some(3)), Some(NodeFault::NotOperational { state: 0x7F }));
         watch.receive(0x80 | node_state::OPERATIONAL);
-        assert_eq!(watch.complaint(Some(3)), None);
+        assert_eq!(watch.fault(Some(3)), None);
         watch.receive(node_state::BOOT_UP);
-        assert_eq!(watch.complaint(None), Some(NodeFault::BootUp));
+        assert_eq!(watch.fault(None), Some(NodeFault::BootUp));
         watch.begin();
-        assert_eq!(watch.complaint(None), None);
+        assert_eq!(watch.fault(None), None);
     }
 
     #[test]
     fn what_a_node_hears_follows_from_what_it_says_and_what_others_tell_it() {
         let heard = |messages: &[Result<u8, u8>]| {
-            let mut watch = NodeWatch::default();
+            let mut watch = NodeMonitor::default();
             for message in messages {
                 match *message {
                     Ok(state) => watch.receive(state),
-                    Err(command) => watch.commanded(command),
+                    Err(command) => watch.receive_foreign_nmt(command),
                 }
             }
             watch.nmt_state()
@@ -333,16 +370,16 @@ mod tests {
 
     #[test]
     fn feedback_that_comes_twice_in_every_cycle_is_a_second_node_and_twice_at_times_is_not() {
-        let mut watch = DuplicateWatch::default();
+        let mut watch = DuplicateNodeDetector::default();
         for _ in 0..100 {
-            watch.again();
+            watch.note_repetition();
             (0..DUPLICATE_STEP).for_each(|_| watch.pass());
-            assert!(!watch.is_duplicate());
+            assert!(!watch.is_found());
         }
         let needed = (1..100).find(|_| {
-            watch.again();
+            watch.note_repetition();
             watch.pass();
-            watch.is_duplicate()
+            watch.is_found()
         });
         assert!(needed.is_some_and(|cycles| cycles < 10));
     }
