@@ -32,11 +32,11 @@ mod dispatch;
 mod engine;
 mod fault;
 mod frame;
+mod group_trajectory;
 mod guard;
 mod host;
 #[cfg(feature = "linux")]
 pub mod linux;
-mod motion;
 mod motion_reports;
 mod pdo;
 mod phase;

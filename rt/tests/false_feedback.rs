@@ -161,7 +161,7 @@ fn a_drive_that_is_enabled_already_when_the_group_becomes_active_is_not_moved() 
 
 #[test]
 fn a_drive_that_hears_its_controlword_now_and_then_only_is_told_again_however_disabled_it_seems() {
-    let rare = |command: CommandPdo| CommandPdo { cadence: TransmissionType::OnControlword, ..command };
+    let rare = |command: CommandPdo| CommandPdo { transmission: TransmissionType::OnControlword, ..command };
     let usual = axis(0, 1);
     let mut drive = Axis::new(AxisParameters {
         dialect: Dialect::YzAim,

@@ -276,7 +276,7 @@ fn a_joint_that_coasts_is_not_taken_for_standing_when_slots_are_missed() {
     let period_s = PERIOD_NS as f64 * 1e-9;
     // It answers set-points: the first report after slots that were missed is older than they are.
     let parameters = AxisParameters { feedback_since: FeedbackSince::SetPoint, ..axis(0, 1) };
-    let is_led_up = |speed: f64, missed_slots: u32| {
+    let may_be_enabled = |speed: f64, missed_slots: u32| {
         let mut axis = Axis::new(parameters.clone());
         axis.set_cycle(period_s);
         let (mut position, mut unreported_slots) = (0.0, 1);
@@ -293,8 +293,8 @@ fn a_joint_that_coasts_is_not_taken_for_standing_when_slots_are_missed() {
             axis.follow_actual(period_s);
             axis.command(Goal::Disabled, None);
         }
-        axis.is_ready()
+        axis.is_power_granted()
     };
-    assert!(is_led_up(0.0, 0) && is_led_up(0.0, 12));
-    assert!(!is_led_up(0.3, 0) && !is_led_up(0.3, 12));
+    assert!(may_be_enabled(0.0, 0) && may_be_enabled(0.0, 12));
+    assert!(!may_be_enabled(0.3, 0) && !may_be_enabled(0.3, 12));
 }

@@ -53,8 +53,8 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         let is_skipped = self.skip_sync.take(bus);
         for axis in self.axes_of(bus) {
             match axis.parameters().feedback_since {
-                FeedbackSince::Sync if is_skipped => axis.leave_out(now_ns),
-                FeedbackSince::Sync => axis.ask(now_ns),
+                FeedbackSince::Sync if is_skipped => axis.skip_request(now_ns),
+                FeedbackSince::Sync => axis.request_feedback(now_ns),
                 FeedbackSince::SetPoint | FeedbackSince::CommandPhase => {}
             }
         }
@@ -117,13 +117,13 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         }
         let is_stopping = self.state == GroupState::Stopping;
         // A drive that PDOs do not reach is told the same by SDO.
-        if axis.is_deaf() || is_stopping && axis.stops_by_itself() {
+        if axis.is_pdo_unreachable() || is_stopping && axis.stops_by_itself() {
             return Goal::QuickStop;
         }
         let may_be_enabled = match self.state {
             GroupState::Enabling => {
                 self.heartbeat.as_ref().is_none_or(|heartbeat| heartbeat.allows_enabling(bus))
-                    && axis.is_ready()
+                    && axis.is_power_granted()
                     && (axis.is_enabled() || axis.is_on_joint(self.period_s))
             }
             _ => axis.is_enabled(),

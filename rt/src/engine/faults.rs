@@ -11,7 +11,7 @@ use crate::port::{BusHealth, BusState};
 use crate::record::EventKind;
 use crate::stop::{Origin, StopCause, StopReason};
 use crate::stop_category::StopCategory;
-use crate::watch::{NodeComplaint, TimingLevel};
+use crate::watch::{NodeFault, TimingLevel};
 
 impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
     /// Begins a stop for everything that is wrong while drives may have torque.
@@ -68,7 +68,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         // a bus that is behind for a cycle or two, while another one is lost, stop with the rest.
         for axis in &mut self.axes {
             if self.backlog.cycles_of(axis.parameters().bus.into()) > limit {
-                axis.give_up();
+                axis.latch_off();
             }
         }
         let origin = self.backlog.slowest_bus().map_or(Origin::Group, |bus| Origin::Bus(bus as u8));
@@ -94,7 +94,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         };
         // Whatever else is wrong with the drive: it is not enabled again.
         if check.is_disabled(axis) || check.is_faulted(axis) {
-            axis.give_up();
+            axis.latch_off();
         }
         check.fault_of(axis)
     }
@@ -158,7 +158,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
     pub(super) fn is_under_way(&self) -> bool {
         match self.state {
             GroupState::Moving { .. } | GroupState::Streaming(_) => true,
-            GroupState::Holding => self.axes.iter().any(Axis::is_adrift),
+            GroupState::Holding => self.axes.iter().any(Axis::is_coasting),
             _ => false,
         }
     }
@@ -202,7 +202,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
     fn plan_stop(&mut self) -> Result<(), PlanError> {
         self.axes.iter_mut().for_each(Axis::begin_stop);
         if matches!(self.state, GroupState::Streaming(_)) {
-            self.axes.iter_mut().for_each(|axis| axis.take_steps(self.period_s));
+            self.axes.iter_mut().for_each(|axis| axis.derive_from_steps(self.period_s));
         }
         self.motion.stop(self.axes.iter().map(|axis| {
             let here = axis.set_point();
@@ -253,12 +253,12 @@ impl AxisCheck {
         if self.is_faulted(axis) {
             return Some(Fault::DriveFault { error_code: axis.error_code() });
         }
-        if let Some(complaint) = axis.node_complaint() {
+        if let Some(fault) = axis.node_fault() {
             let limit = axis.parameters().heartbeat_timeout_cycles.unwrap_or(0);
-            return Some(match complaint {
-                NodeComplaint::BootUp => Fault::UnexpectedBootUp,
-                NodeComplaint::NotOperational { state } => Fault::NodeNotOperational { state },
-                NodeComplaint::Silent { cycles } => Fault::NodeLost { cycles, limit },
+            return Some(match fault {
+                NodeFault::BootUp => Fault::UnexpectedBootUp,
+                NodeFault::NotOperational { state } => Fault::NodeNotOperational { state },
+                NodeFault::Silent { cycles } => Fault::NodeLost { cycles, limit },
             });
         }
         if axis.is_duplicate() {

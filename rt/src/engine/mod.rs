@@ -36,8 +36,8 @@ use crate::axis::Axis;
 use crate::bus_set::BusSet;
 use crate::dispatch::Dispatch;
 use crate::frame::{Frame, Id};
+use crate::group_trajectory::GroupTrajectory;
 use crate::host::{AxisSnapshot, HostInterface, Snapshot};
-use crate::motion::Motion;
 use crate::phase::Phase;
 use crate::port::BusHealth;
 use crate::record::{CycleRecord, CycleTiming, Event, EventKind, MAX_AXES, MAX_BUSES};
@@ -207,7 +207,7 @@ pub struct Engine<const AXES: usize = MAX_AXES, const BUSES: usize = MAX_BUSES> 
     /// Cycles since the state was entered.
     state_cycles: u32,
     /// What is planned, while the group moves or stops.
-    motion: Motion<AXES>,
+    motion: GroupTrajectory<AXES>,
     /// Why the group stops or has stopped. It stays until a request ends it: a fault must be reset.
     stop: Option<StopReason>,
     /// Cycles of a fault reset that are still to come.
@@ -296,7 +296,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
             axes,
             state: GroupState::Passive,
             state_cycles: 0,
-            motion: Motion::default(),
+            motion: GroupTrajectory::default(),
             stop: None,
             fault_reset_cycles: 0,
             commands: Commands::None,

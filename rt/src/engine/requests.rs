@@ -6,8 +6,8 @@ use super::targets::{Rejection, check_profile_target, check_scales, check_target
 use super::{Ending, Engine};
 use crate::axis::Axis;
 use crate::control::ControlLaw;
+use crate::group_trajectory::Leg;
 use crate::host::HostInterface;
-use crate::motion::Leg;
 use crate::phase::Phase;
 use crate::plan::State;
 use crate::profile::ProfileTarget;

@@ -24,20 +24,20 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         let is_always_late = self.slots.late_cycles > self.not_transmitted_cycles;
         for axis in &mut self.axes {
             if has_power {
-                axis.notice_deafness();
+                axis.note_pdo_reachability();
             }
             let behind_cycles = self.backlog.cycles_of(axis.parameters().bus.into());
             let is_cut_off = is_always_late || behind_cycles > self.not_transmitted_cycles;
             // Whether such a drive receives its PDOs is not known.
             let is_silent = axis.feedback_age() > axis.parameters().missed_feedback_cycles;
-            let is_to_be_switched_off =
-                axis.is_deaf() || axis.drive_state().has_torque() && (is_cut_off || is_silent && is_overdue);
+            let is_to_be_switched_off = axis.is_pdo_unreachable()
+                || axis.drive_state().has_torque() && (is_cut_off || is_silent && is_overdue);
             let word = if !has_power {
                 None
             } else if is_disabling && is_to_be_switched_off {
                 Some(controlword::DISABLE_VOLTAGE)
-            } else if axis.is_deaf() {
-                Some(axis.stop_word())
+            } else if axis.is_pdo_unreachable() {
+                Some(axis.sdo_stop_word())
             } else {
                 None
             };

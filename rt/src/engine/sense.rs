@@ -59,7 +59,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
     fn receive_foreign_nmt(&mut self, bus: usize, frame: &Frame) {
         let (0, &[command, node]) = (frame.id().value(), frame.payload()) else { return };
         for axis in self.axes_of(bus).filter(|axis| node == 0 || node == axis.parameters().node) {
-            axis.commanded_by_other(command);
+            axis.receive_foreign_nmt(command);
         }
     }
 

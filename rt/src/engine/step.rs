@@ -96,7 +96,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         self.hold();
         self.probe_late_drives();
         self.axes.iter_mut().for_each(|axis| axis.prepare_to_enable(self.period_s));
-        if self.axes.iter().all(|axis| axis.is_ready() && axis.is_enabled()) {
+        if self.axes.iter().all(|axis| axis.is_power_granted() && axis.is_enabled()) {
             self.enter(GroupState::Holding);
         }
     }
@@ -107,9 +107,9 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         if !self.state_cycles.is_multiple_of(PROBE_AGAIN_CYCLES) {
             return;
         }
-        for axis in self.axes.iter_mut().filter(|axis| axis.is_doubtful()) {
+        for axis in self.axes.iter_mut().filter(|axis| axis.is_reply_unverified()) {
             match axis.parameters().feedback_since {
-                FeedbackSince::SetPoint => axis.leave_out_set_point(),
+                FeedbackSince::SetPoint => axis.skip_next_set_point(),
                 _ => self.skip_sync.insert(axis.parameters().bus.into()),
             }
         }
@@ -145,7 +145,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         }
         if is_passing {
             self.begin_stop(StopCause::Requested, Origin::Group, StopCategory::Two);
-        } else if !self.axes.iter().any(Axis::is_driven) {
+        } else if !self.axes.iter().any(Axis::is_moving_on_command) {
             self.enter(GroupState::Holding);
         }
     }
@@ -241,20 +241,21 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
             let divider = self.buses.get(usize::from(axis.parameters().bus)).map_or(1, |bus| bus.divider);
             let silent_cycles = u32::from(axis.feedback_age()).saturating_mul(divider);
             let is_over = self.heartbeat.as_ref().is_some_and(|beat| silent_cycles > beat.timeout_cycles());
-            is_over && !is_on_way && !axis.is_deaf()
+            is_over && !is_on_way && !axis.is_pdo_unreachable()
         };
         // The set-points of a drive that seems to follow go on to rest, though it may have said otherwise by SDO; and
         // one that shows no torque yet may be about to have it.
         let is_waited_for = |axis: &Axis| {
-            let may_have_torque =
-                axis.has_torque() || axis.is_led_up() || is_on_way && axis.drive_state().has_torque();
+            let may_have_torque = axis.has_torque()
+                || axis.may_be_switching_on()
+                || is_on_way && axis.drive_state().has_torque();
             may_have_torque && !has_stopped_by_itself(axis)
         };
         if is_patient && self.axes.iter().any(is_waited_for) {
             return;
         }
         self.motion.cancel();
-        self.axes.iter_mut().for_each(Axis::let_go);
+        self.axes.iter_mut().for_each(Axis::release_latch);
         self.enter(GroupState::Disabled);
     }
 
@@ -283,7 +284,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         // Until the next command comes the present one is carried on, up to its expiry.
         let mut carried = command;
         for (axis, point) in self.axes.iter().zip(&mut carried.set_points) {
-            *point = axis.carried_on(point, self.period_s);
+            *point = axis.extrapolated(point, self.period_s);
         }
         self.state = GroupState::Streaming(Stream::Follows(carried));
         Ok(())

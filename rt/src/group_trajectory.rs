@@ -10,7 +10,7 @@ use crate::plan::{self, Limits, PlanError, PlanOptions, Problem, Profile, Return
 /// There is room for two: the next one is planned beside the present one and takes its place only when all of it is
 /// there, without being copied.
 #[derive(Clone, Debug)]
-pub struct Motion<const AXES: usize> {
+pub struct GroupTrajectory<const AXES: usize> {
     first: [Profile; AXES],
     second: [Profile; AXES],
     is_second_present: bool,
@@ -37,14 +37,14 @@ impl<'a> Leg<'a> {
     }
 }
 
-impl<const AXES: usize> Default for Motion<AXES> {
+impl<const AXES: usize> Default for GroupTrajectory<AXES> {
     fn default() -> Self {
         let hold = [Profile::hold(0.0); AXES];
         Self { first: hold, second: hold, is_second_present: false, duration_s: 0.0, time_s: 0.0 }
     }
 }
 
-impl<const AXES: usize> Motion<AXES> {
+impl<const AXES: usize> GroupTrajectory<AXES> {
     /// Plans a coordinated move within fractions of the limits: on a straight line from rest to rest, and otherwise where
     /// that takes no longer. On error the present motion goes on.
     pub fn move_to<'a>(
@@ -197,7 +197,7 @@ mod tests {
     fn a_move_that_is_to_be_gentle_takes_a_high_acceleration_back_before_the_velocity_limit() {
         let start = State { position: 0.0, velocity: 1.9, acceleration: 4.0 };
         let target = State { position: 2.5, ..State::default() };
-        let mut motion = Motion::<1>::default();
+        let mut motion = GroupTrajectory::<2>::default();
         motion.move_to([Leg { start, target, limits: &LIMITS }].into_iter(), 1.0, 0.1, 0.0).unwrap();
         while !motion.is_finished() {
             motion.advance(0.001);
@@ -212,7 +212,7 @@ mod tests {
         let slow = AxisLimits { deceleration: 1.0, ..LIMITS };
         for jerk in [100.0, f64::INFINITY] {
             let (quick, slow) = (AxisLimits { jerk, ..LIMITS }, AxisLimits { jerk, ..slow });
-            let mut motion = Motion::<2>::default();
+            let mut motion = GroupTrajectory::<2>::default();
             // 0.5 rad/s at 8 rad/s² take less than 0.06 rad; in the 2 s of the other axis they would take 0.5 rad.
             motion.stop([(at(2.9, 0.5), &quick), (at(0.0, 2.0), &slow)].into_iter()).unwrap();
             let mut farthest: f64 = 2.9;
@@ -230,7 +230,7 @@ mod tests {
             let limits = AxisLimits { jerk, ..LIMITS };
             let start = State::default();
             let target = State { position: 0.333, velocity: 1.1, acceleration: 0.0 };
-            let mut motion = Motion::<1>::default();
+            let mut motion = GroupTrajectory::<2>::default();
             motion.move_to([Leg { start, target, limits: &limits }].into_iter(), 0.7, 0.7, 0.0).unwrap();
             let (mut last, mut before) = (start, start);
             while !motion.is_finished() {
