@@ -74,7 +74,8 @@ pub trait BusPort {
     }
 
     /// Appends what has arrived up to `now_ns`, oldest first, as far as `batch` has room. Own frames are not
-    /// among it. Fewer than the room left means that nothing more is waiting.
+    /// among it. Fewer than the room left means that nothing more is waiting, or that the port has done as much as it
+    /// does in one call; the rest stays for the next one.
     fn receive(&mut self, now_ns: Nanoseconds, batch: &mut ReceiveBatch);
 
     /// Own frames that were taken by [`BusPort::send`] and have not yet been seen on the wire. While there are

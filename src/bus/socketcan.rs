@@ -108,7 +108,7 @@ pub fn open_socketcan(interface: &str, options: &SocketCanOptions) -> Result<Soc
         .set_socket_option_int(libc::SOL_SOCKET, libc::SO_RXQ_OVFL, 1)
         .map_err(failed("asking for the overflow counter"))?;
     SocketCanPort::new(socket.as_raw_fd(), options.bit_rate, options.data_bit_rate)
-        .map_err(io::Error::from_raw_os_error)
+        .map_err(|error| io::Error::from_raw_os_error(error.errno))
         .map_err(failed("duplicating the socket"))
 }
 

@@ -20,7 +20,7 @@ mod spin_guard;
 mod step;
 mod thread;
 
-pub use can::SocketCanPort;
+pub use can::{DescriptorError, SocketCanPort};
 pub use clock::MonotonicClock;
 pub use kernel::{is_preempt_rt, is_preempt_rt_version};
 pub use memory::{PREFAULT_LIMIT_BYTES, PageFaults};

@@ -2,7 +2,8 @@
 
 use super::super::clock::nanoseconds_of;
 use super::super::errno;
-use super::wire_format::{self, EMPTY, Message};
+use super::arrival::{Arrival, MessageSource, Sender};
+use super::wire_format::{self, EMPTY};
 use crate::frame::Frame;
 use crate::port::RECEIVE_BATCH;
 use crate::time::Nanoseconds;
@@ -17,46 +18,11 @@ const CONTROL_BYTES: usize = 64;
 #[repr(C, align(8))]
 struct Control([u8; CONTROL_BYTES]);
 
-/// The buffers of one socket. The descriptor is somebody else's.
-pub(super) struct Batch {
+/// The messages of one socket, with the buffers to receive them. The descriptor belongs to the port.
+pub(super) struct SocketSource {
+    descriptor: libc::c_int,
     frames: [libc::canfd_frame; RECEIVE_BATCH],
     control: [Control; RECEIVE_BATCH],
-}
-
-/// One message as the kernel handed it over.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Arrival {
-    /// What it holds.
-    pub(super) message: Message,
-    /// Who sent it.
-    pub(super) sender: Sender,
-    /// When the kernel saw it, on `CLOCK_REALTIME`; `None` without a time stamp.
-    pub(super) real_time_ns: Option<Nanoseconds>,
-    /// How many messages this socket has lost so far for want of room (`SO_RXQ_OVFL`), modulo 2³².
-    pub(super) lost: Option<u32>,
-}
-
-/// Who sent a message, as far as the kernel tells.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Sender {
-    /// This socket: the message is back from the wire (`MSG_CONFIRM`).
-    ThisSocket,
-    /// Another socket of this machine (`MSG_DONTROUTE`).
-    ThisMachine,
-    /// Another device on the bus.
-    Wire,
-}
-
-impl Sender {
-    const fn of(flags: libc::c_int) -> Self {
-        if flags & libc::MSG_CONFIRM != 0 {
-            Self::ThisSocket
-        } else if flags & libc::MSG_DONTROUTE != 0 {
-            Self::ThisMachine
-        } else {
-            Self::Wire
-        }
-    }
 }
 
 /// Where a message goes.
@@ -68,19 +34,19 @@ pub(super) enum Destination {
     Interface(libc::c_int),
 }
 
-impl Batch {
-    pub(super) const fn new() -> Self {
-        Self { frames: [EMPTY; RECEIVE_BATCH], control: [Control([0; CONTROL_BYTES]); RECEIVE_BATCH] }
+impl SocketSource {
+    /// The messages of the socket `descriptor`, which must live as long as this is used.
+    pub(super) const fn new(descriptor: libc::c_int) -> Self {
+        Self {
+            descriptor,
+            frames: [EMPTY; RECEIVE_BATCH],
+            control: [Control([0; CONTROL_BYTES]); RECEIVE_BATCH],
+        }
     }
+}
 
-    /// Takes up to `limit` messages without waiting, hands each to `take`, and returns how many there were. The
-    /// error is the system's number; an empty queue is not an error.
-    pub(super) fn receive(
-        &mut self,
-        descriptor: libc::c_int,
-        limit: usize,
-        mut take: impl FnMut(Arrival),
-    ) -> Result<usize, i32> {
+impl MessageSource for SocketSource {
+    fn receive(&mut self, limit: usize, mut take: impl FnMut(Arrival)) -> Result<usize, i32> {
         let mut vectors = [NO_VECTOR; RECEIVE_BATCH];
         let mut headers = [NO_HEADER; RECEIVE_BATCH];
         let buffers = self.frames.iter_mut().zip(&mut self.control);
@@ -97,7 +63,7 @@ impl Batch {
         // touched otherwise until the call has returned. There is no time-out to point to.
         let count = unsafe {
             libc::recvmmsg(
-                descriptor,
+                self.descriptor,
                 headers.as_mut_ptr(),
                 limit as libc::c_uint,
                 libc::MSG_DONTWAIT as _,
