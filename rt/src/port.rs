@@ -115,6 +115,7 @@ pub struct BusHealth {
     pub rx_overruns: u64,
     /// Error frames and bus errors.
     pub errors: u64,
-    /// How long the wire was occupied, in nanoseconds, as far as this port saw it; for the bus load.
+    /// How long the wire was occupied, in nanoseconds, by the frames that this port saw; for the bus load. A SocketCAN port
+    /// leaves out the stuff bits: the wire is then occupied for up to 22 % longer. A simulated bus counts every bit.
     pub busy_ns: u64,
 }

@@ -7,9 +7,9 @@
 
 use takt_rt::frame::Frame;
 use takt_rt::time::Nanoseconds;
-use takt_rt::wire::{INTERMISSION_BITS, WireLength, bits_ns};
 
 use super::mailbox::{Mailbox, Order, priority};
+use super::wire_length::{INTERMISSION_BITS, WireLength, bits_ns};
 
 /// The bit rates of a bus in bit/s.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
