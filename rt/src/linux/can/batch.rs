@@ -11,7 +11,7 @@ use crate::time::Nanoseconds;
 /// The most frames handed to the kernel in one call.
 pub(super) const SEND_BATCH: usize = 64;
 
-/// Room for a time stamp and the overflow counter, with their headers.
+/// Room for a time stamp and the overflow counter, with their headers, in bytes.
 const CONTROL_BYTES: usize = 64;
 
 #[derive(Clone, Copy)]
@@ -59,8 +59,8 @@ impl MessageSource for SocketSource {
             header.msg_hdr.msg_controllen = CONTROL_BYTES as _;
         }
         let limit = limit.min(RECEIVE_BATCH);
-        // SAFETY: the first `limit` headers point to buffers of the lengths they say, which live and are not
-        // touched otherwise until the call has returned. There is no time-out to point to.
+        // SAFETY: the first `limit` headers point to buffers of the stated lengths. The buffers live until the call has
+        // returned, and nothing else touches them meanwhile. There is no time-out.
         let count = unsafe {
             libc::recvmmsg(
                 self.descriptor,
@@ -89,8 +89,11 @@ impl MessageSource for SocketSource {
     }
 }
 
-/// Hands frames to the kernel without waiting, the first one first, and returns how many it took. An error means
-/// that it took none, and is the system's number. Of more frames than [`SEND_BATCH`] it is given the first ones.
+/// Hands frames to the kernel without waiting, the first one first, and returns how many it took. Of more frames than
+/// [`SEND_BATCH`], it gets the first ones.
+///
+/// # Errors
+/// The error number of the system. The kernel took no frame then.
 pub(super) fn send<'a>(
     descriptor: libc::c_int,
     frames: impl Iterator<Item = (Destination, &'a Frame)>,
@@ -113,13 +116,13 @@ pub(super) fn send<'a>(
         }
         count += 1;
     }
-    // SAFETY: the first `count` headers point to addresses and buffers of the lengths they say, which outlive the call.
+    // SAFETY: the first `count` headers point to addresses and buffers of the stated lengths, which outlive the call.
     let sent = unsafe { libc::sendmmsg(descriptor, headers.as_mut_ptr(), count, libc::MSG_DONTWAIT as _) };
     usize::try_from(sent).map_err(|_| errno())
 }
 
 const NO_ADDRESS: libc::sockaddr_can = {
-    // SAFETY: it holds numbers, of which any are possible.
+    // SAFETY: it holds numbers only, for which zero is valid.
     let mut address: libc::sockaddr_can = unsafe { core::mem::zeroed() };
     address.can_family = libc::AF_CAN as libc::sa_family_t;
     address
@@ -128,23 +131,23 @@ const NO_ADDRESS: libc::sockaddr_can = {
 const NO_VECTOR: libc::iovec = libc::iovec { iov_base: core::ptr::null_mut(), iov_len: 0 };
 
 const NO_HEADER: libc::mmsghdr = {
-    // SAFETY: it holds numbers and pointers that may be null.
+    // SAFETY: it holds numbers and pointers, for which zero and null are valid.
     unsafe { core::mem::zeroed() }
 };
 
 /// The time stamp and the overflow counter that came with a message.
 fn ancillary(header: &libc::msghdr) -> (Option<Nanoseconds>, Option<u32>) {
     let (mut stamp, mut lost) = (None, None);
-    // SAFETY: the kernel has filled the control buffer and set its length; the macros stay within it.
+    // SAFETY: the kernel has filled the control buffer and set its length. The macros stay within it.
     let mut next = unsafe { libc::CMSG_FIRSTHDR(header) };
-    // SAFETY: a header that the macros return lies within the control buffer, which is aligned for it.
+    // SAFETY: a header that the macros return is within the control buffer, which is aligned for it.
     while let Some(entry) = unsafe { next.as_ref() } {
         if entry.cmsg_level == libc::SOL_SOCKET && entry.cmsg_type == libc::SCM_TIMESTAMPNS {
-            // SAFETY: this type carries a `timespec`, for which the buffer has room; it need not be aligned.
+            // SAFETY: a message of this type holds a `timespec`, and the buffer has room for it. It need not be aligned.
             let time = unsafe { libc::CMSG_DATA(entry).cast::<libc::timespec>().read_unaligned() };
             stamp = Some(nanoseconds_of(&time));
         } else if entry.cmsg_level == libc::SOL_SOCKET && entry.cmsg_type == libc::SO_RXQ_OVFL {
-            // SAFETY: this type carries 32 bits, for which the buffer has room; they need not be aligned.
+            // SAFETY: a message of this type holds 32 bits, and the buffer has room for them. They need not be aligned.
             lost = Some(unsafe { libc::CMSG_DATA(entry).cast::<u32>().read_unaligned() });
         }
         // SAFETY: as for the first one.

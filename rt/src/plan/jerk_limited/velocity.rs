@@ -47,7 +47,6 @@ pub(super) fn append(reached: State, phases: &ThreePhases, profile: &mut Profile
 ///
 /// # Errors
 /// [`PlanError::NotRepresentable`] with axis 0.
-#[inline]
 pub(in super::super) fn fastest_velocity(
     problem: &Problem,
     least_s: f64,
@@ -74,7 +73,6 @@ pub(in super::super) fn fastest_velocity(
 ///
 /// # Errors
 /// [`PlanError::NotRepresentable`] with axis 0.
-#[inline]
 pub(in super::super) fn velocity_lasting(
     problem: &Problem,
     duration_s: f64,
