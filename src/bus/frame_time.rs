@@ -1,7 +1,7 @@
 //! The longest time that a frame can take on the wire: every field of its format, the most stuff bits that these fields can need,
 //! and the intermission, which no other frame can use.
 
-use takt_rt::frame::FrameKind;
+use takt_rt::FrameKind;
 
 /// The properties of a frame that decide its longest time on the wire.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -21,8 +21,8 @@
 //!
 //! ```
 //! use takt::sim::{BitRates, SimulatedBus};
-//! use takt_rt::frame::{Frame, Id};
-//! use takt_rt::port::{BusPort, ReceiveBatch};
+//! use takt_rt::{Frame, Id};
+//! use takt_rt::{BusPort, ReceiveBatch};
 //!
 //! # fn parameters() -> takt::sim::erob::ErobParameters {
 //! #     use takt::sim::erob::ErobParameters;

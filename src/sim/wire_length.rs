@@ -1,8 +1,7 @@
 //! How long a frame is on the wire, bit by bit (ISO 11898-1). The stuff bits are counted from the content of the frame, its
 //! CRC included. So two frames with equally many bytes can take different times, as on a real bus.
 
-use takt_rt::frame::{Frame, FrameKind};
-use takt_rt::time::{NANOSECONDS_PER_SECOND, Nanoseconds};
+use takt_rt::{Frame, FrameKind, NANOSECONDS_PER_SECOND, Nanoseconds};
 
 /// Bits between a frame and the next one. Every length here includes them, as in the worst-case formula of Davis, Burns,
 /// Bril and Lukkien (Real-Time Systems 35, 2007).
@@ -210,8 +209,7 @@ impl Crc15 {
 mod tests {
     use super::*;
     use proptest::prelude::*;
-    use takt_rt::frame::Id;
-    use takt_rt::wire::UnstuffedLength;
+    use takt_rt::{Id, UnstuffedLength};
 
     /// The bits of a classic frame up to and with the CRC, one by one, as the standard writes them.
     fn bits_of(frame: &Frame) -> Vec<bool> {

@@ -6,11 +6,11 @@
 //! same motion again.
 //!
 //! ```
-//! use takt_rt::plan::{Limits, Problem, Profile, State, Timing, synchronised};
+//! use takt_rt::plan::{Limits, Problem, Profile, State, PlanOptions, synchronised};
 //! let limits = Limits::symmetric(2.0, 8.0, f64::INFINITY);
 //! let problems = [1.0, -0.25].map(|target| Problem { start: State::rest(0.0), target: State::rest(target), limits });
 //! let mut profiles = [Profile::hold(0.0); 2];
-//! let duration_s = synchronised(&problems, &mut profiles, Timing::default()).unwrap();
+//! let duration_s = synchronised(&problems, &mut profiles, PlanOptions::default()).unwrap();
 //! assert_eq!(duration_s, 0.75);
 //! assert_eq!(profiles[1].sample(duration_s), State::rest(-0.25));
 //! ```
@@ -31,19 +31,19 @@ mod choice;
 mod error;
 mod group;
 mod jerk_limited;
+mod options;
 mod problem;
 mod profile;
 mod second_order;
 mod straight;
 mod synchronisation;
-mod timing;
 mod tracking;
 mod trapezoid;
 mod travel;
 
 pub use error::{Limit, PlanError, Quantity};
 pub use group::{GroupState, PlanFailure, Trajectory};
+pub use options::{PlanOptions, Return, Synchronisation};
 pub use problem::{Limits, Problem, State};
 pub use profile::{Blocked, Extrema, PHASES_MAX, Phase, Profile, Range};
 pub use synchronisation::{position, stop, synchronised, synchronised_velocity, velocity};
-pub use timing::{Return, Synchronisation, Timing};

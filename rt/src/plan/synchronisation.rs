@@ -6,10 +6,10 @@
 //! 4. Where a profile leaves a position limit, `travel` replaces it.
 
 use super::error::PlanError;
+use super::options::{PlanOptions, Return, Synchronisation};
 use super::problem::{Limits, Problem, State};
 use super::profile::{BLOCKED_MAX, Profile};
 use super::straight::Line;
-use super::timing::{Return, Synchronisation, Timing};
 use super::{jerk_limited, trapezoid, travel};
 
 /// What the target of an axis is: a position with the velocity and acceleration there, or a velocity alone.
@@ -32,7 +32,7 @@ enum Interface {
 pub fn synchronised(
     problems: &[Problem],
     profiles: &mut [Profile],
-    timing: Timing,
+    timing: PlanOptions,
 ) -> Result<f64, PlanError> {
     let duration_s = plan(Interface::Position(timing.return_to_limits), problems, profiles, timing)?;
     let refuse = |error: PlanError, profiles: &mut [Profile]| {
@@ -62,7 +62,7 @@ fn first_left(problems: &[Problem], profiles: &[Profile]) -> Option<PlanError> {
 fn keep_travel(
     problems: &[Problem],
     profiles: &mut [Profile],
-    timing: Timing,
+    timing: PlanOptions,
     duration_s: f64,
 ) -> Result<f64, PlanError> {
     let return_to_limits = timing.return_to_limits;
@@ -87,7 +87,7 @@ fn keep_travel(
             return first_left(problems, profiles).map_or(Ok(longest_s), Err);
         }
         let timing =
-            Timing { minimum_duration_s: longest_s, synchronisation: Synchronisation::Time, ..timing };
+            PlanOptions { minimum_duration_s: longest_s, synchronisation: Synchronisation::Time, ..timing };
         duration_s = plan(Interface::Position(return_to_limits), problems, profiles, timing)?;
         if first_left(problems, profiles).is_none() {
             return Ok(duration_s);
@@ -106,7 +106,7 @@ fn keep_travel(
 pub fn synchronised_velocity(
     problems: &[Problem],
     profiles: &mut [Profile],
-    timing: Timing,
+    timing: PlanOptions,
 ) -> Result<f64, PlanError> {
     plan(Interface::Velocity, problems, profiles, timing)
 }
@@ -141,7 +141,7 @@ pub fn stop(starts: &[State], limits: &[Limits], profiles: &mut [Profile]) -> Re
 /// As [`synchronised`], with axis 0.
 pub fn position(problem: &Problem) -> Result<Profile, PlanError> {
     let mut profile = [Profile::hold(0.0)];
-    synchronised(&[*problem], &mut profile, Timing::default())?;
+    synchronised(&[*problem], &mut profile, PlanOptions::default())?;
     let [profile] = profile;
     Ok(profile)
 }
@@ -189,7 +189,7 @@ fn plan(
     interface: Interface,
     problems: &[Problem],
     profiles: &mut [Profile],
-    timing: Timing,
+    timing: PlanOptions,
 ) -> Result<f64, PlanError> {
     expect_length(problems.len(), profiles.len())?;
     timing.validate()?;
@@ -239,7 +239,7 @@ fn straight(
     interface: Interface,
     problems: &[Problem],
     profiles: &mut [Profile],
-    timing: &Timing,
+    timing: &PlanOptions,
 ) -> Result<f64, PlanError> {
     let line = Line::of(problems)?;
     let projected = line.projected(problems);

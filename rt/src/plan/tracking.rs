@@ -4,10 +4,10 @@
 //! acceleration of the target. That is an ordinary planning problem, without blocked intervals.
 
 use super::error::PlanError;
+use super::options::{PlanOptions, Return, Synchronisation};
 use super::problem::{Limits, Problem, State};
 use super::profile::Profile;
 use super::synchronisation::synchronised;
-use super::timing::{Return, Synchronisation, Timing};
 use super::travel;
 
 /// The share of the acceleration limits that a target may use. The axis needs the rest to catch up with the target.
@@ -17,7 +17,7 @@ const ACCELERATION_SHARE: f64 = 0.95;
 const ROUNDING: f64 = 1e-12;
 
 /// The timing of a tracked motion: a velocity beyond its limit comes back to the limit without falling below it.
-const SETTLED: Timing = Timing {
+const SETTLED: PlanOptions = PlanOptions {
     synchronisation: Synchronisation::Time,
     minimum_duration_s: 0.0,
     cycle_s: None,

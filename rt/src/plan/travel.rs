@@ -5,9 +5,9 @@
 //! - A coordinated stop that leaves a limit is replaced by the fastest stop, or by one that reverses at the limit.
 
 use super::error::{Limit, PlanError};
+use super::options::Return;
 use super::problem::{Limits, Problem, State};
 use super::profile::Profile;
-use super::timing::Return;
 use super::{jerk_limited, trapezoid};
 
 /// Leaving a position limit by this much, relative to the positions, is rounding.

@@ -2,9 +2,9 @@
 
 use super::super::choice::larger;
 use super::super::error::PlanError;
+use super::super::options::Return;
 use super::super::problem::Problem;
 use super::super::profile::Profile;
-use super::super::timing::Return;
 use super::motion::{Scale, SevenPhases};
 use super::step1::{Candidate, Edges};
 use super::step2::Slower;

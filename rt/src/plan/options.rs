@@ -1,4 +1,4 @@
-//! When a motion ends, and what its axes have in common.
+//! The options of a plan: when the motion ends, and what its axes have in common.
 
 use super::error::PlanError;
 use super::problem::SIZE_MAX;
@@ -33,7 +33,7 @@ pub enum Return {
 
 /// When a motion ends, and how it gets there.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Timing {
+pub struct PlanOptions {
     /// What the axes have in common.
     pub synchronisation: Synchronisation,
     /// The motion takes at least this long, in s: 0 (as fast as possible) to below 1e30.
@@ -44,7 +44,7 @@ pub struct Timing {
     pub return_to_limits: Return,
 }
 
-impl Timing {
+impl PlanOptions {
     pub(super) fn validate(&self) -> Result<(), PlanError> {
         let least_valid = self.minimum_duration_s >= 0.0 && self.minimum_duration_s < SIZE_MAX;
         let cycle_valid = self.cycle_s.is_none_or(|cycle_s| cycle_s > 1.0 / SIZE_MAX && cycle_s < SIZE_MAX);
