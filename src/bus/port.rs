@@ -1,4 +1,4 @@
-//! The port of a configured bus, whatever it is connected to.
+//! The port of a configured bus, of any kind.
 
 use arrayvec::ArrayVec;
 use takt_rt::Frame;
@@ -12,39 +12,39 @@ use crate::config::{Config, Interface};
 use crate::faults::{Breakable, CannotBreak, DriveTrouble, FaultyPort, Heard};
 use crate::sim::SimulatedBus;
 
-/// Frames on their way to the logger: almost a second of a full bus of 1 Mbit/s.
+/// Room for frames on their way to the logger: almost one second of a full bus at 1 Mbit/s.
 const TRACE_FRAMES: usize = 1 << 13;
 
 /// A bus port of any kind.
 pub enum Port {
-    /// Simulated drives inside this process.
+    /// A bus with simulated drives inside this process.
     Simulated(Box<SimulatedBus>),
     /// A CAN interface of this machine.
     SocketCan(Box<SocketCanPort>),
-    /// Any port whose frames the logger sees too.
+    /// Any port whose frames go to the logger too.
     Traced(Box<TracedPort<Port>>),
-    /// Any port with a fault on purpose.
+    /// Any port with faults that are injected on purpose.
     Faulty(Box<FaultyPort<Port>>),
 }
 
 /// A bus that cannot be opened.
 #[derive(Debug, thiserror::Error)]
 pub enum OpenError {
-    /// The interface is not as it must be.
+    /// The interface is missing, or its settings are wrong and cannot be changed.
     #[error("bus `{bus}`: {error}")]
     Interface {
-        /// The bus.
+        /// The name of the bus.
         bus: String,
-        /// Why.
+        /// The reason.
         #[source]
         error: InterfaceError,
     },
-    /// There is no socket on the interface.
+    /// The socket on the interface cannot be opened.
     #[error("bus `{bus}`: {error}")]
     Socket {
-        /// The bus.
+        /// The name of the bus.
         bus: String,
-        /// Why.
+        /// The reason.
         #[source]
         error: SocketCanError,
     },
@@ -63,7 +63,7 @@ impl Port {
         }
     }
 
-    /// The simulated bus behind it, if it is one.
+    /// The simulated bus behind this port, if there is one.
     pub fn simulated_mut(&mut self) -> Option<&mut SimulatedBus> {
         match self {
             Self::Simulated(bus) => Some(bus),
@@ -73,15 +73,15 @@ impl Port {
         }
     }
 
-    /// The same port, and a trace of its frames.
+    /// This port with a trace, which receives a copy of every frame, and the trace.
     pub fn traced(self, name: &str) -> (Self, Trace) {
         let (port, trace) = traced(self, name, TRACE_FRAMES);
         (Self::Traced(Box::new(port)), trace)
     }
 }
 
-/// Brings the interface of bus number `bus` up, as far as that is needed and permitted, and opens it. `None` when the
-/// bus is a simulated one.
+/// Brings the interface of bus number `bus` up, as far as needed and permitted, and opens it. Returns `None` for a simulated
+/// bus.
 ///
 /// # Errors
 /// See [`OpenError`].

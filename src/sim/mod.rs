@@ -58,6 +58,7 @@ pub mod plant;
 mod port;
 pub(crate) mod random;
 mod servo;
+mod wire_length;
 pub mod yz_aim;
 
 pub use defect::{Defect, Unsupported};
@@ -66,4 +67,4 @@ pub use live::LiveDrives;
 pub use mailbox::{Mailbox, Order};
 pub use medium::{BitRates, Medium, Transmission};
 pub use port::{AfflictError, SimulatedBus, UnknownNode};
-pub use takt_rt::{INTERMISSION_BITS, WireLength, bits_ns};
+pub use wire_length::{INTERMISSION_BITS, WireLength, bits_ns};
