@@ -63,7 +63,7 @@ fn a_device_is_selected_by_its_identity_configured_stored_and_boots() {
     let mut bus = unconfigured(&[10, 11]);
     assert_eq!(bus.run(LssTask::SwitchSelective(address(11))), Ok(LssOutcome::Done));
     assert_eq!(bus.run(LssTask::InquireAddress), Ok(LssOutcome::Device(address(11))));
-    assert_eq!(bus.run(LssTask::Inquire(Inquiry::Node)), Ok(LssOutcome::Told(255)));
+    assert_eq!(bus.run(LssTask::Inquire(Inquiry::Node)), Ok(LssOutcome::Value(255)));
     assert_eq!(bus.run(LssTask::ConfigureNode(5)), Ok(LssOutcome::Done));
     assert_eq!(bus.run(LssTask::ConfigureBitTiming(BitTiming::Kilobits500)), Ok(LssOutcome::Done));
     assert_eq!(bus.run(LssTask::Store), Ok(LssOutcome::Done));
@@ -106,7 +106,7 @@ fn devices_are_found_by_a_span_of_identities_and_by_having_no_node_number() {
     assert_eq!(bus.run(LssTask::IdentifyUnconfigured), Ok(LssOutcome::Exists(true)));
     bus.devices.remove(0);
     assert_eq!(bus.run(LssTask::IdentifyUnconfigured), Ok(LssOutcome::Exists(false)));
-    assert_eq!(bus.run(LssTask::FastScan([None; 4])), Ok(LssOutcome::Nobody));
+    assert_eq!(bus.run(LssTask::FastScan([None; 4])), Ok(LssOutcome::NotFound));
 }
 
 #[test]
@@ -117,7 +117,7 @@ fn fast_scan_finds_one_device_after_the_other_and_gives_each_a_node_number() {
         match bus.run(LssTask::FastScan([None; 4])).unwrap() {
             LssOutcome::Device(address) => found.push(address.serial),
             outcome => {
-                assert_eq!(outcome, LssOutcome::Nobody);
+                assert_eq!(outcome, LssOutcome::NotFound);
                 break;
             }
         }
@@ -138,7 +138,7 @@ fn what_is_known_beforehand_is_asked_for_at_once() {
     assert_eq!(questions, 1 + 3 + 32 + 1);
     assert_eq!(bus.devices[0].mode(), LssMode::Configuration);
     let other = [Some(0x332), None, None, None];
-    assert_eq!(unconfigured(&[42]).run(LssTask::FastScan(other)), Ok(LssOutcome::Nobody));
+    assert_eq!(unconfigured(&[42]).run(LssTask::FastScan(other)), Ok(LssOutcome::NotFound));
 }
 
 #[test]

@@ -3,13 +3,13 @@
 use proptest::prelude::*;
 use takt::canopen::object::ObjectAddress;
 use takt::canopen::sdo::{
-    AbortCode, BlockSegment, BlockSize, Client, Completed, Expedited, Request, Response, SdoError, Timing,
-    Transfer, Uploaded,
+    AbortCode, BlockSegment, BlockSize, Completed, Expedited, SdoClient, SdoError, SdoRequest, SdoResponse,
+    SdoTiming, Transfer, Uploaded,
 };
 use takt_rt::frame::{Frame, Id};
 
 const NODE: u8 = 2;
-const TIMING: Timing = Timing { reply_timeout_ns: 500, retries: 2 };
+const TIMING: SdoTiming = SdoTiming { reply_timeout_ns: 500, retries: 2 };
 const DOMAIN: ObjectAddress = ObjectAddress::new(0x1F50, 1);
 
 fn bytes(hex: &str) -> [u8; 8] {
@@ -17,14 +17,14 @@ fn bytes(hex: &str) -> [u8; 8] {
     bytes.try_into().unwrap()
 }
 
-fn client(transfer: Transfer) -> Client {
-    let mut client = Client::new(NODE, TIMING);
+fn client(transfer: Transfer) -> SdoClient {
+    let mut client = SdoClient::new(NODE, TIMING);
     client.start(transfer).unwrap();
     client
 }
 
 /// Plays a conversation: `>` is sent by the client, `<` by the server.
-fn play(client: &mut Client, conversation: &[&str]) {
+fn play(client: &mut SdoClient, conversation: &[&str]) {
     for line in conversation {
         match line.split_at(2) {
             ("> ", hex) => {
@@ -246,40 +246,40 @@ impl Server {
 
     fn receive(&mut self, frame: &Frame) -> Vec<[u8; 8]> {
         let raw: [u8; 8] = frame.payload().try_into().unwrap();
-        let payload = |response: Response| response.frame(NODE).payload().try_into().unwrap();
+        let payload = |response: SdoResponse| response.frame(NODE).payload().try_into().unwrap();
         if self.is_receiving && raw[0] & 0x7F <= SERVER_BLOCK.segments() && raw[0] != 0x80 {
             return self.take(BlockSegment::decode(raw).unwrap()).map(payload).into_iter().collect();
         }
-        match Request::decode(frame).unwrap().1 {
-            Request::BlockUpload { object, .. } => {
+        match SdoRequest::decode(frame).unwrap().1 {
+            SdoRequest::BlockUpload { object, .. } => {
                 self.sent = 0;
                 let size = Some(self.data.len() as u32);
-                vec![payload(Response::BlockUpload { object, size, has_crc: true })]
+                vec![payload(SdoResponse::BlockUpload { object, size, has_crc: true })]
             }
-            Request::BlockUploadStart => self.block(32),
-            Request::BlockAcknowledge { last, block_size } => {
+            SdoRequest::BlockUploadStart => self.block(32),
+            SdoRequest::BlockAcknowledge { last, block_size } => {
                 self.sent += 7 * usize::from(last);
                 if self.sent < self.data.len() {
                     return self.block(block_size.segments());
                 }
                 let unused = (self.sent - self.data.len()) as u8;
-                vec![payload(Response::BlockUploadEnd { unused, crc: crc(&self.data) })]
+                vec![payload(SdoResponse::BlockUploadEnd { unused, crc: crc(&self.data) })]
             }
-            Request::BlockUploadEnd => {
+            SdoRequest::BlockUploadEnd => {
                 self.has_ended = true;
                 vec![]
             }
-            Request::BlockDownload { object, .. } => {
+            SdoRequest::BlockDownload { object, .. } => {
                 (self.received, self.last, self.is_receiving) = (vec![], 0, true);
-                vec![payload(Response::BlockDownload { object, block_size: SERVER_BLOCK, has_crc: true })]
+                vec![payload(SdoResponse::BlockDownload { object, block_size: SERVER_BLOCK, has_crc: true })]
             }
-            Request::BlockDownloadEnd { unused, crc: told } => {
+            SdoRequest::BlockDownloadEnd { unused, crc: told } => {
                 self.received.truncate(self.received.len() - usize::from(unused));
                 assert_eq!(told, crc(&self.received));
                 (self.has_ended, self.is_receiving) = (true, false);
-                vec![payload(Response::BlockDownloadEnd)]
+                vec![payload(SdoResponse::BlockDownloadEnd)]
             }
-            Request::Abort { .. } => {
+            SdoRequest::Abort { .. } => {
                 self.is_receiving = false;
                 vec![]
             }
@@ -297,7 +297,7 @@ impl Server {
         all.collect::<Vec<_>>().into_iter().filter(|_| !self.loses()).collect()
     }
 
-    fn take(&mut self, segment: BlockSegment) -> Option<Response> {
+    fn take(&mut self, segment: BlockSegment) -> Option<SdoResponse> {
         let is_lost = self.loses();
         if !is_lost && segment.number() == self.last + 1 {
             self.received.extend(segment.data());
@@ -308,7 +308,7 @@ impl Server {
             return None;
         }
         let last = std::mem::take(&mut self.last);
-        Some(Response::BlockAcknowledge { last, block_size: SERVER_BLOCK })
+        Some(SdoResponse::BlockAcknowledge { last, block_size: SERVER_BLOCK })
     }
 }
 
@@ -319,7 +319,7 @@ fn crc(data: &[u8]) -> u16 {
 }
 
 /// Runs until there is an outcome; time passes when nobody has anything to say.
-fn run(client: &mut Client, server: &mut Server) -> Result<Completed, SdoError> {
+fn run(client: &mut SdoClient, server: &mut Server) -> Result<Completed, SdoError> {
     let mut now_ns = 0;
     for _ in 0..100_000 {
         let mut replies = vec![];
@@ -404,6 +404,6 @@ fn an_expedited_answer_does_not_end_a_block_transfer() {
     let mut client = client(Transfer::BlockUpload { object: DOMAIN });
     client.poll(0).unwrap();
     let data = Expedited::of(&[1]).unwrap();
-    client.receive(&Response::UploadExpedited { object: DOMAIN, data }.frame(NODE));
+    client.receive(&SdoResponse::UploadExpedited { object: DOMAIN, data }.frame(NODE));
     assert_eq!(client.take_outcome(), None);
 }

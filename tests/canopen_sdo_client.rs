@@ -3,25 +3,25 @@
 use proptest::prelude::*;
 use takt::canopen::object::{DataType, ObjectAddress};
 use takt::canopen::sdo::{
-    AbortCode, Busy, Client, Completed, MAX_UPLOAD_BYTES, SdoError, Timing, Transfer, Uploaded,
+    AbortCode, Completed, MAX_UPLOAD_BYTES, SdoBusy, SdoClient, SdoError, SdoTiming, Transfer, Uploaded,
 };
 use takt_rt::frame::{Frame, Id};
 
 const NODE: u8 = 2;
-const TIMING: Timing = Timing { reply_timeout_ns: 500, retries: 2 };
+const TIMING: SdoTiming = SdoTiming { reply_timeout_ns: 500, retries: 2 };
 const MODE: ObjectAddress = ObjectAddress::new(0x6060, 0);
 const DISPLAY: ObjectAddress = ObjectAddress::new(0x6061, 0);
 const NAME: ObjectAddress = ObjectAddress::new(0x1008, 0);
 
 /// A client and what the test says to it.
 struct Conversation {
-    client: Client,
+    client: SdoClient,
     now_ns: u64,
 }
 
 impl Conversation {
     fn new(transfer: Transfer) -> Self {
-        let mut client = Client::new(NODE, TIMING);
+        let mut client = SdoClient::new(NODE, TIMING);
         client.start(transfer).unwrap();
         Self { client, now_ns: 0 }
     }
@@ -114,7 +114,7 @@ fn an_object_is_read_in_one_frame_each_way() {
 
 #[test]
 fn a_reply_that_does_not_tell_its_size_is_read_by_the_type_of_the_object() {
-    let mut client = Client::new(NODE, TIMING);
+    let mut client = SdoClient::new(NODE, TIMING);
     client.start(Transfer::Upload { object: DISPLAY }).unwrap();
     client.poll(0).unwrap();
     client.receive(&reply(&bytes("42 61 60 00 FE 00 00 00")));
@@ -397,13 +397,13 @@ fn an_upload_without_end_is_refused() {
 
 #[test]
 fn one_transfer_runs_at_a_time() {
-    let mut client = Client::new(NODE, TIMING);
+    let mut client = SdoClient::new(NODE, TIMING);
     let transfer = Transfer::Upload { object: DISPLAY };
     client.start(transfer.clone()).unwrap();
-    assert_eq!(client.start(transfer.clone()), Err(Busy));
+    assert_eq!(client.start(transfer.clone()), Err(SdoBusy));
     client.poll(0).unwrap();
     client.receive(&reply(&[0x4F, 0x61, 0x60, 0, 8, 0, 0, 0]));
-    assert_eq!(client.start(transfer.clone()), Err(Busy), "its outcome has not been taken");
+    assert_eq!(client.start(transfer.clone()), Err(SdoBusy), "its outcome has not been taken");
     client.take_outcome().unwrap().unwrap();
     client.start(transfer).unwrap();
 }
@@ -442,7 +442,7 @@ proptest! {
     fn arbitrary_replies_never_panic_and_never_complete_an_upload_wrongly(
         replies in prop::collection::vec((any_reply(), 0..600u64), 0..60),
     ) {
-        let mut client = Client::new(NODE, TIMING);
+        let mut client = SdoClient::new(NODE, TIMING);
         client.start(Transfer::Upload { object: NAME }).unwrap();
         let (mut now_ns, mut last_request, mut collected) = (0, vec![], vec![]);
         for (bytes, pause_ns) in replies {
@@ -484,7 +484,7 @@ proptest! {
         replies in prop::collection::vec((any_reply(), 0..600u64), 0..60),
         length in 0..20usize,
     ) {
-        let mut client = Client::new(NODE, TIMING);
+        let mut client = SdoClient::new(NODE, TIMING);
         client.start(Transfer::Download { object: NAME, data: vec![7; length] }).unwrap();
         let (mut now_ns, mut last_request) = (0, vec![]);
         for (bytes, pause_ns) in replies {
@@ -514,7 +514,7 @@ proptest! {
 
     #[test]
     fn every_conversation_ends_within_its_time_outs_when_nothing_answers(step_ns in 1..700u64) {
-        let mut client = Client::new(NODE, TIMING);
+        let mut client = SdoClient::new(NODE, TIMING);
         client.start(Transfer::Download { object: NAME, data: vec![1; 9] }).unwrap();
         let (mut now_ns, mut requests) = (0, 0);
         let error = loop {

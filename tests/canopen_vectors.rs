@@ -3,7 +3,7 @@
 
 use takt::canopen::nmt::{ErrorControl, NmtCommand, NmtState, NmtTarget};
 use takt::canopen::object::ObjectAddress;
-use takt::canopen::sdo::{Client, Completed, Expedited, Request, Response, Timing, Transfer};
+use takt::canopen::sdo::{Completed, Expedited, SdoClient, SdoRequest, SdoResponse, SdoTiming, Transfer};
 use takt_rt::frame::{Frame, Id};
 use takt_rt::pdo::{CommandSlot, MappedObject, Mapping, ProcessImage};
 
@@ -81,10 +81,11 @@ impl Vector {
             "NMT stop remote node" => NmtCommand::Stop.frame(node),
             "NMT reset communication" => NmtCommand::ResetCommunication.frame(node),
             words if words.starts_with("SDO download") => {
-                Request::DownloadExpedited { object: self.object(), data: self.expedited() }.frame(self.node)
+                SdoRequest::DownloadExpedited { object: self.object(), data: self.expedited() }
+                    .frame(self.node)
             }
             words if words.starts_with("SDO upload request") => {
-                Request::Upload { object: self.object() }.frame(self.node)
+                SdoRequest::Upload { object: self.object() }.frame(self.node)
             }
             words if words.starts_with("RPDO1 controlword 0x") => self.process_data(),
             words => panic!("{}: {words}", self.id),
@@ -123,10 +124,16 @@ fn our_decoders_understand_every_frame_of_the_drive() {
             continue;
         }
         let response = match row.meaning.starts_with("SDO download response") {
-            true => Response::DownloadAccepted { object: row.object() },
-            false => Response::UploadExpedited { object: row.object(), data: row.expedited() },
+            true => SdoResponse::DownloadAccepted { object: row.object() },
+            false => SdoResponse::UploadExpedited { object: row.object(), data: row.expedited() },
         };
-        assert_eq!(Response::decode(&row.frame()), Some((row.node, response)), "{}: {}", row.id, row.meaning);
+        assert_eq!(
+            SdoResponse::decode(&row.frame()),
+            Some((row.node, response)),
+            "{}: {}",
+            row.id,
+            row.meaning
+        );
     }
 }
 
@@ -136,8 +143,8 @@ fn a_simulated_drive_reads_what_the_manuals_host_sends_and_answers_the_same_byte
         let frame = row.frame();
         let again = match row.can_id & 0x780 {
             0x000 => NmtCommand::decode(&frame).map(|(command, target)| command.frame(target)),
-            0x580 => Response::decode(&frame).map(|(node, response)| response.frame(node)),
-            _ => Request::decode(&frame).map(|(node, request)| request.frame(node)),
+            0x580 => SdoResponse::decode(&frame).map(|(node, response)| response.frame(node)),
+            _ => SdoRequest::decode(&frame).map(|(node, request)| request.frame(node)),
         };
         assert_eq!(again, Some(frame), "{}: {}", row.id, row.meaning);
     }
@@ -151,7 +158,7 @@ fn the_client_walks_through_every_exchange_that_the_manual_prints_in_full() {
         if request.can_id & 0x780 != 0x600 || response.can_id & 0x780 != 0x580 {
             continue;
         }
-        let mut client = Client::new(request.node, Timing::default());
+        let mut client = SdoClient::new(request.node, SdoTiming::default());
         let object = request.object();
         let transfer = match request.meaning.starts_with("SDO download") {
             true => Transfer::Download { object, data: request.expedited().bytes().into() },

@@ -7,7 +7,7 @@ use takt::canopen::lss::{
 };
 use takt::canopen::sdo;
 use takt::config::Config;
-use takt::drive::{BringUp, BringUpTiming, Leave};
+use takt::drive::{BringUp, BringUpTiming, Shutdown};
 use takt::sim::SimulatedBus;
 use takt_rt::frame::{Frame, Id};
 use takt_rt::port::{BusPort, ReceiveBatch};
@@ -77,7 +77,7 @@ const TIMING: BringUpTiming = BringUpTiming {
     boot_up_timeout_ns: 100_000_000,
     reset_repeat_ns: 30_000_000,
     confirm_timeout_ns: 50_000_000,
-    sdo: sdo::Timing { reply_timeout_ns: 5_000_000, retries: 1 },
+    sdo: sdo::SdoTiming { reply_timeout_ns: 5_000_000, retries: 1 },
 };
 const STEP_NS: u64 = 500_000;
 /// Every step of the longest list has a time-out, and one restart.
@@ -112,7 +112,7 @@ pub fn bring_up(mut input: Input<'_>) {
 }
 
 fn leave(config: &Config, mut line: Line<'_>) {
-    let mut leave = Leave::new(config);
+    let mut leave = Shutdown::new(config);
     for _ in 0..STEPS_AT_MOST {
         line.step(|now_ns, mut send| leave.poll(now_ns, &mut send))
             .iter()

@@ -6,7 +6,7 @@ use takt::canopen::emcy::Emergency;
 use takt::canopen::lss::{LssRequest, LssResponse};
 use takt::canopen::nmt::{ErrorControl, HeartbeatConsumer, NmtCommand};
 use takt::canopen::object::ObjectAddress;
-use takt::canopen::sdo::{Client, Request, Response, Timing, Transfer};
+use takt::canopen::sdo::{SdoClient, SdoRequest, SdoResponse, SdoTiming, Transfer};
 use takt::canopen::sync::Sync;
 use takt::canopen::time::{TimeOfDay, system_time};
 use takt::config::Config;
@@ -49,11 +49,11 @@ fn decode(mut input: Input<'_>) {
         if let Some(control) = ErrorControl::decode(&frame) {
             assert_eq!(ErrorControl::decode(&control.frame()), Some(control));
         }
-        if let Some((node, request)) = Request::decode(&frame) {
-            assert_eq!(Request::decode(&request.frame(node)), Some((node, request)), "{frame:?}");
+        if let Some((node, request)) = SdoRequest::decode(&frame) {
+            assert_eq!(SdoRequest::decode(&request.frame(node)), Some((node, request)), "{frame:?}");
         }
-        if let Some((node, response)) = Response::decode(&frame) {
-            assert_eq!(Response::decode(&response.frame(node)), Some((node, response)), "{frame:?}");
+        if let Some((node, response)) = SdoResponse::decode(&frame) {
+            assert_eq!(SdoResponse::decode(&response.frame(node)), Some((node, response)), "{frame:?}");
         }
         if let Some(request) = LssRequest::decode(&frame) {
             assert_eq!(LssRequest::decode(&request.frame()), Some(request), "{frame:?}");
@@ -95,7 +95,7 @@ fn ask(mut input: Input<'_>) {
             }
         }
     };
-    let mut client = Client::new(NODE, Timing { reply_timeout_ns: 1_000_000, retries: 2 });
+    let mut client = SdoClient::new(NODE, SdoTiming { reply_timeout_ns: 1_000_000, retries: 2 });
     assert!(client.start(transfer).is_ok());
     let mut now_ns = 0;
     for _ in 0..POLLS_AT_MOST {
@@ -156,7 +156,7 @@ fn talk_to_drive(config: &Config, mut input: Input<'_>) {
         for received in &batch {
             let id = received.frame.id();
             if id.value() & 0x780 == 0x580 && !id.is_extended() {
-                assert!(Response::decode(&received.frame).is_some(), "{:?}", received.frame);
+                assert!(SdoResponse::decode(&received.frame).is_some(), "{:?}", received.frame);
             }
         }
     }

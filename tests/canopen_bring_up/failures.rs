@@ -3,7 +3,7 @@
 use takt::canopen::emcy::{Emergency, ErrorCode, ErrorRegister};
 use takt::canopen::sdo::AbortCode;
 use takt::config::Control;
-use takt::drive::{Answered, BringUp, Cause, Leave};
+use takt::drive::{BringUp, FailureCause, ProbeResult, Shutdown};
 use takt_rt::cia402::State;
 
 use super::scripted_drive::{ScriptedDrive, at};
@@ -45,7 +45,7 @@ fn a_drive_that_does_not_obey_nmt() {
     let mut world = World::of(&config);
     world.drive().flaws.is_deaf_to_nmt = true;
     let failure = world.run(&mut BringUp::new(&config)).unwrap_err().failures.remove(0);
-    assert!(matches!(failure.cause, Cause::StateNotReached { answered: Answered::Sdo, .. }));
+    assert!(matches!(failure.cause, FailureCause::StateNotReached { probe_result: ProbeResult::Sdo, .. }));
     assert!(failure.advice().contains("second master"));
 }
 
@@ -225,7 +225,7 @@ fn a_drive_that_restarts_while_it_is_started() {
     let now_ns = world.now_ns;
     world.drive().power_up_at(now_ns);
     let failure = world.run(&mut bring_up).unwrap_err().failures.remove(0);
-    assert_eq!(failure.cause, Cause::Restarted { times: 1 });
+    assert_eq!(failure.cause, FailureCause::Restarted { times: 1 });
 }
 
 #[test]
@@ -265,7 +265,7 @@ fn leaving_goes_on_after_a_refusal_and_tells_of_it_in_the_end() {
     let config = config(&[(0, 2)]);
     let mut world = started(&config);
     world.drive().flaws.refused.insert(at(0x6040, 0), AbortCode::General);
-    let error = world.run(&mut Leave::new(&config)).unwrap_err();
+    let error = world.run(&mut Shutdown::new(&config)).unwrap_err();
     assert_eq!((error.failures.len(), error.failures[0].step), (1, "standstill without torque"));
     assert_eq!(world.drive().number(0x1016, 1), 0, "the watch was ended all the same");
 }
@@ -276,6 +276,6 @@ fn leaving_a_drive_that_has_gone_ends_soon() {
     let mut world = started(&config);
     let begin = world.now_ns;
     world.drive().powered_up_at_ns = u64::MAX;
-    world.run(&mut Leave::new(&config)).unwrap_err();
+    world.run(&mut Shutdown::new(&config)).unwrap_err();
     assert!(world.now_ns - begin < 5_000_000_000, "{} ms", (world.now_ns - begin) / 1_000_000);
 }

@@ -11,7 +11,7 @@ use scripted_drive::at;
 use takt::canopen::emcy::ErrorCode;
 use takt::canopen::nmt::NmtState;
 use takt::config::{Config, Control};
-use takt::drive::{BringUp, BringUpTiming, Leave, NotConfigured, Progress, Stage};
+use takt::drive::{BringUp, BringUpProgress, BringUpTiming, NotConfigured, Shutdown, Stage};
 use takt_rt::cia402::State;
 use takt_rt::frame::{Frame, Id};
 use world::{World, config};
@@ -180,7 +180,7 @@ fn without_heartbeats_nothing_waits_for_one() {
     let mut world = started(&config);
     assert_eq!(world.drive().nmt, NmtState::Operational);
     assert_eq!((world.drive().number(0x1016, 1), world.drive().number(0x1017, 0)), (0, 0));
-    world.run(&mut Leave::new(&config)).unwrap();
+    world.run(&mut Shutdown::new(&config)).unwrap();
     assert_eq!(world.drive().nmt, NmtState::PreOperational);
 }
 
@@ -264,7 +264,7 @@ fn a_polite_leave_disables_and_ends_the_watch_for_the_masters_heartbeat() {
     let config = config(&[(0, 2)]);
     let mut world = started(&config);
     world.drive().state = State::ReadyToSwitchOn;
-    let facts = world.run(&mut Leave::new(&config)).unwrap();
+    let facts = world.run(&mut Shutdown::new(&config)).unwrap();
     let drive = world.drive();
     assert_eq!((drive.nmt, drive.state), (NmtState::PreOperational, State::SwitchOnDisabled));
     assert_eq!((drive.number(0x1016, 1), drive.number(0x1017, 0)), (0, 0));
@@ -276,7 +276,7 @@ fn leaving_an_axis_that_still_has_torque_brings_it_to_rest() {
     let config = config(&[(0, 2)]);
     let mut world = started(&config);
     world.drive().state = State::OperationEnabled;
-    world.run(&mut Leave::new(&config)).unwrap();
+    world.run(&mut Shutdown::new(&config)).unwrap();
     assert_eq!(world.drive().state, State::SwitchOnDisabled);
 }
 
@@ -288,7 +288,7 @@ fn progress_goes_from_nothing_to_all_and_names_the_slowest_axis() {
     world.drives[1].1.power_up_at(begin + 2_000_000_000);
     let mut bring_up = BringUp::new(&config);
     let reset = "restart of its communication";
-    assert_eq!(bring_up.progress(), Progress { fraction: 0.0, step: reset, axis: 0 });
+    assert_eq!(bring_up.progress(), BringUpProgress { fraction: 0.0, step: reset, axis: 0 });
     let mut last = 0.0;
     while bring_up.outcome().is_none() {
         world.step(&mut bring_up);
@@ -296,7 +296,7 @@ fn progress_goes_from_nothing_to_all_and_names_the_slowest_axis() {
         assert!((last..=1.0).contains(&progress.fraction));
         last = progress.fraction;
         if world.now_ns == begin + 1_000_000_000 {
-            assert_eq!(progress, Progress { fraction: 0.5, step: reset, axis: 1 });
+            assert_eq!(progress, BringUpProgress { fraction: 0.5, step: reset, axis: 1 });
         }
     }
     assert!(world.now_ns > begin + 1_000_000_000);

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use takt::canopen::nmt::{ErrorControl, NmtCommand, NmtState, NmtTarget};
 use takt::canopen::object::ObjectAddress;
-use takt::canopen::sdo::{AbortCode, Expedited, Request, Response, Segment};
+use takt::canopen::sdo::{AbortCode, Expedited, SdoRequest, SdoResponse, Segment};
 use takt_rt::cia402::{Command, State, controlword};
 use takt_rt::frame::{Frame, Id};
 
@@ -197,7 +197,7 @@ impl ScriptedDrive {
         {
             self.obey(command);
         }
-        match Request::decode(frame) {
+        match SdoRequest::decode(frame) {
             Some((node, request)) if node == self.node && self.nmt != NmtState::Stopped => {
                 self.serve(request)
             }
@@ -218,22 +218,22 @@ impl ScriptedDrive {
         self.heartbeat_at_ns = 0;
     }
 
-    fn reply(&mut self, response: Response) {
+    fn reply(&mut self, response: SdoResponse) {
         if self.flaws.lost_replies > 0 {
             self.flaws.lost_replies -= 1;
             return;
         }
-        if self.replies.iter().any(|frame| Response::decode(frame).is_some()) {
+        if self.replies.iter().any(|frame| SdoResponse::decode(frame).is_some()) {
             self.violations.push("an SDO request came before the last one was answered".into());
         }
         self.replies.push(response.frame(self.node));
     }
 
-    fn serve(&mut self, request: Request) {
+    fn serve(&mut self, request: SdoRequest) {
         match request {
-            Request::Upload { object } => self.upload(object),
-            Request::UploadSegment { toggle } => self.upload_segment(toggle),
-            Request::DownloadExpedited { object, data } => self.download(object, data.bytes().to_vec()),
+            SdoRequest::Upload { object } => self.upload(object),
+            SdoRequest::UploadSegment { toggle } => self.upload_segment(toggle),
+            SdoRequest::DownloadExpedited { object, data } => self.download(object, data.bytes().to_vec()),
             other => self.violations.push(format!("not expected in a bring-up: {other:?}")),
         }
     }
@@ -243,18 +243,18 @@ impl ScriptedDrive {
             return;
         }
         if let Some(code) = self.flaws.refused.get(&object).copied() {
-            return self.reply(Response::Abort { object, code });
+            return self.reply(SdoResponse::Abort { object, code });
         }
         self.dictionary.insert(at(0x6041, 0), self.statusword().to_le_bytes().to_vec());
         let Some(bytes) = self.dictionary.get(&object).cloned() else {
-            return self.reply(Response::Abort { object, code: AbortCode::ObjectDoesNotExist });
+            return self.reply(SdoResponse::Abort { object, code: AbortCode::ObjectDoesNotExist });
         };
         match Expedited::of(&bytes) {
-            Some(data) => self.reply(Response::UploadExpedited { object, data }),
+            Some(data) => self.reply(SdoResponse::UploadExpedited { object, data }),
             None => {
                 let size = Some(bytes.len() as u32);
                 self.upload = Some((bytes, false));
-                self.reply(Response::UploadSegmented { object, size });
+                self.reply(SdoResponse::UploadSegmented { object, size });
             }
         }
     }
@@ -272,7 +272,7 @@ impl ScriptedDrive {
         if !is_last {
             self.upload = Some((rest, !expected));
         }
-        self.reply(Response::UploadSegment { toggle, data, is_last });
+        self.reply(SdoResponse::UploadSegment { toggle, data, is_last });
     }
 
     fn download(&mut self, object: ObjectAddress, bytes: Vec<u8>) {
@@ -288,14 +288,14 @@ impl ScriptedDrive {
         }
         let refused = self.flaws.refused.get(&object).copied();
         if let Some(code) = refused.or_else(|| self.objection(object, &bytes)) {
-            return self.reply(Response::Abort { object, code });
+            return self.reply(SdoResponse::Abort { object, code });
         }
         self.writes.push((object, bytes.clone()));
         self.check_mapping_rules(object, &bytes);
         if !self.flaws.forgetful.contains(&object) {
             self.take(object, bytes);
         }
-        self.reply(Response::DownloadAccepted { object });
+        self.reply(SdoResponse::DownloadAccepted { object });
     }
 
     fn objection(&self, object: ObjectAddress, bytes: &[u8]) -> Option<AbortCode> {

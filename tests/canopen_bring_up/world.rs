@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use takt::config::*;
-use takt::drive::{AxisFacts, BringUp, BringUpError, Leave};
+use takt::drive::{AxisFacts, BringUp, BringUpError, Shutdown};
 use takt_rt::frame::Frame;
 
 use super::scripted_drive::ScriptedDrive;
@@ -17,7 +17,7 @@ pub struct World {
     queues: Vec<Vec<Frame>>,
 }
 
-/// What a [`BringUp`] and a [`Leave`] have in common.
+/// What a [`BringUp`] and a [`Shutdown`] have in common.
 pub trait Procedure {
     fn poll(&mut self, now_ns: u64, send: &mut impl FnMut(usize, Frame));
     fn receive(&mut self, bus: usize, frame: &Frame);
@@ -40,7 +40,7 @@ macro_rules! procedure {
     };
 }
 procedure!(BringUp);
-procedure!(Leave);
+procedure!(Shutdown);
 
 impl World {
     /// An eRob as delivered for each axis.

@@ -2,10 +2,11 @@
 
 use std::cell::Cell;
 
-use takt::commission::bus_session::{self, Seen};
-use takt::commission::dictionary::{self, Choice};
+use takt::commission::bus_session::{self, SessionEvent};
+use takt::commission::dictionary::{self, SelectedObject};
 use takt::commission::{
-    Amount, Course, Event, Failed, Pace, ReadObject, Report, Request, Subject, procedure,
+    CommandValue, MotionProfile, MoveKind, ProcedureError, ProcedureEvent, ReadObject, Report, TargetDrive,
+    Task, procedure,
 };
 use takt::controller::VirtualClock;
 use takt::sim::{Observation, SimulatedBus};
@@ -17,7 +18,7 @@ pub const SECOND: u64 = 1_000 * MS;
 pub const NODE: u8 = 1;
 
 pub struct Bench {
-    pub subject: Subject,
+    pub target: TargetDrive,
     pub bus: SimulatedBus,
     pub clock: VirtualClock,
     pub sent: Vec<Frame>,
@@ -28,30 +29,30 @@ pub struct Bench {
 }
 
 impl Bench {
-    pub fn of(subject: Subject, bus: SimulatedBus) -> Self {
+    pub fn of(target: TargetDrive, bus: SimulatedBus) -> Self {
         let clock = VirtualClock::default();
-        Self { subject, bus, clock, sent: vec![], steps: vec![], notes: vec![], fastest: 0.0 }
+        Self { target, bus, clock, sent: vec![], steps: vec![], notes: vec![], fastest: 0.0 }
     }
 
-    pub fn run(&mut self, request: Request) -> Result<Report, Failed> {
+    pub fn run(&mut self, request: Task) -> Result<Report, ProcedureError> {
         self.run_interrupted(request, |_| 0)
     }
 
     /// `interruptions` tells how many requests to end there have been up to a step.
     pub fn run_interrupted(
         &mut self,
-        request: Request,
+        request: Task,
         interruptions: impl Fn(&str) -> usize,
-    ) -> Result<Report, Failed> {
-        self.run_as(self.subject.clone(), request, interruptions)
+    ) -> Result<Report, ProcedureError> {
+        self.run_as(self.target.clone(), request, interruptions)
     }
 
     pub fn run_as(
         &mut self,
-        subject: Subject,
-        request: Request,
+        target: TargetDrive,
+        request: Task,
         interruptions: impl Fn(&str) -> usize,
-    ) -> Result<Report, Failed> {
+    ) -> Result<Report, ProcedureError> {
         let Self { bus, clock, sent, steps, notes, fastest, .. } = self;
         sent.clear();
         steps.clear();
@@ -63,26 +64,28 @@ impl Bench {
             asked += usize::from(is_more);
             is_more
         };
-        bus_session::run(procedure(subject, request), bus, clock, is_interrupted, |_, seen| match seen {
-            Seen::Event(Event::Step(name)) => {
+        bus_session::run(procedure(target, request), bus, clock, is_interrupted, |_, seen| match seen {
+            SessionEvent::Procedure(ProcedureEvent::Step(name)) => {
                 step.set(name);
                 steps.push(name);
             }
-            Seen::Event(Event::Note(text)) => notes.push(text),
-            Seen::Event(Event::Reading(reading)) => *fastest = fastest.max(reading.velocity.abs()),
-            Seen::Sent(frame) => sent.push(frame),
-            Seen::Received(_) => {}
+            SessionEvent::Procedure(ProcedureEvent::Note(text)) => notes.push(text),
+            SessionEvent::Procedure(ProcedureEvent::Reading(reading)) => {
+                *fastest = fastest.max(reading.velocity.abs())
+            }
+            SessionEvent::Sent(frame) => sent.push(frame),
+            SessionEvent::Received(_) => {}
         })
     }
 
     /// Runs a procedure for a time at most; `touch` may do something to the bus meanwhile.
     pub fn run_for(
         &mut self,
-        request: Request,
+        request: Task,
         until_ns: u64,
         mut touch: impl FnMut(&mut SimulatedBus, u64),
-    ) -> Option<Result<Report, Failed>> {
-        let mut procedure = procedure(self.subject.clone(), request);
+    ) -> Option<Result<Report, ProcedureError>> {
+        let mut procedure = procedure(self.target.clone(), request);
         for now_ns in (0..until_ns).step_by((MS / 2) as usize) {
             touch(&mut self.bus, now_ns);
             let mut batch = ReceiveBatch::new();
@@ -109,20 +112,20 @@ impl Bench {
     }
 }
 
-pub fn degrees(degrees: f64) -> Amount {
-    Amount::Joint(degrees.to_radians())
+pub fn degrees(degrees: f64) -> CommandValue {
+    CommandValue::Joint(degrees.to_radians())
 }
 
-pub fn move_to(course: Course) -> Request {
-    Request::Move { course, pace: brisk(), keeps_enabled: false }
+pub fn move_to(kind: MoveKind) -> Task {
+    Task::Move { kind, profile: brisk(), keeps_enabled: false }
 }
 
-pub fn absolute(position: f64) -> Course {
-    Course::Absolute { to: degrees(position), is_immediate: false }
+pub fn absolute(position: f64) -> MoveKind {
+    MoveKind::Absolute { to: degrees(position), is_immediate: false }
 }
 
-pub fn brisk() -> Pace {
-    Pace {
+pub fn brisk() -> MotionProfile {
+    MotionProfile {
         velocity: Some(degrees(60.0)),
         acceleration: Some(degrees(200.0)),
         deceleration: Some(degrees(200.0)),
@@ -139,8 +142,10 @@ pub fn number(report: &Report, key: &str) -> f64 {
 }
 
 pub fn read(bench: &mut Bench, name: &str) -> i64 {
-    let Ok(Choice::Known(entry)) = dictionary::find(bench.subject.family, name) else { panic!("{name}") };
+    let Ok(SelectedObject::Known(entry)) = dictionary::find(bench.target.family, name) else {
+        panic!("{name}")
+    };
     let object = ReadObject { address: entry.object.address, entry: Some(entry), data_type: None };
-    let report = bench.run(Request::Read { objects: vec![object] }).unwrap();
+    let report = bench.run(Task::Read { objects: vec![object] }).unwrap();
     serde_json::to_value(&report).unwrap()["objects"][0]["raw"].as_i64().unwrap()
 }

@@ -1,7 +1,7 @@
-//! One oddity a row: what it says, the warnings or errors with their lines, and what is made of it.
+//! One anomaly a row: what it says, the warnings or errors with their lines, and what is made of it.
 
 use takt::canopen::eds::{
-    self, AccessType, DataType, DictionaryEntry, Findings, ObjectDictionary, ObjectType, Severity, Value,
+    self, AccessType, DataTypeCode, DictionaryEntry, Findings, ObjectDictionary, ObjectType, Severity, Value,
 };
 use takt::canopen::object::ObjectAddress;
 
@@ -43,7 +43,7 @@ fn check(what: &str, file: &[u8], expected: &[Found], is_right: impl Fn(&ObjectD
         .iter()
         .map(|problem| {
             let text = format!("{problem}; {}", problem.kind.help());
-            (problem.kind.severity(), findings.place(problem).line, text)
+            (problem.kind.severity(), findings.position(problem).line, text)
         })
         .collect();
     assert_eq!(found.len(), expected.len(), "{what}: {}", show(&findings));
@@ -226,7 +226,7 @@ fn odd_objects() {
         "data type by name",
         of(&named("ParameterName=x\ntype=unsigned16\naccess=ro")).as_bytes(),
         &[warning(3, "write its code, 0x0006")],
-        |dictionary| entry(dictionary, 0).data_type == Some(DataType::UNSIGNED16),
+        |dictionary| entry(dictionary, 0).data_type == Some(DataTypeCode::UNSIGNED16),
     );
     check(
         "no such data type",
@@ -372,7 +372,7 @@ fn compact_sub_objects() {
         names == ["NrOfObjects", "Gain1", "Gain2", "Gain3"]
             && number(dictionary, 0) == Some(3)
             && number(dictionary, 3) == Some(3)
-            && entry(dictionary, 2).data_type == Some(DataType::UNSIGNED16)
+            && entry(dictionary, 2).data_type == Some(DataTypeCode::UNSIGNED16)
     });
     let lists = "[2000Name]\nNrOfEntries=1\n2=Integral\n[2000VALUE]\nNrOfEntries=2\n1=0x10\n2=$NODEID\n[2000Denotation]\n3=spare\n";
     check("names and values apart", file(lists).as_bytes(), &[], |dictionary| {
@@ -502,7 +502,7 @@ fn every_problem_is_told_at_once_with_line_and_column() {
     let places: Vec<(usize, usize)> = findings
         .problems()
         .iter()
-        .map(|problem| findings.place(problem))
+        .map(|problem| findings.position(problem))
         .map(|place| (place.line, place.column))
         .collect();
     assert_eq!(places, [(6, 16), (7, 10), (8, 11), (9, 12)]);

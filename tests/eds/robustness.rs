@@ -5,7 +5,7 @@ use takt::canopen::eds::{self, Findings};
 
 fn show(findings: &Findings) {
     for problem in findings.problems() {
-        let place = findings.place(problem);
+        let place = findings.position(problem);
         assert!(place.line >= 1 && place.column >= 1);
         let _ = (problem.to_string(), problem.kind.help(), findings.source_line(problem));
     }

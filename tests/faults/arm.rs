@@ -7,7 +7,7 @@ use std::sync::Arc;
 use takt::bus::port::Port;
 use takt::config::{Axis, Config, Feedback};
 use takt::controller::{Outcome, VirtualRun};
-use takt::faults::{Rehearsal, Scenario, Tidings};
+use takt::faults::{FaultEvents, FaultInjector, Scenario};
 use takt::sim::Observation;
 use takt_rt::cia402::State;
 use takt_rt::door::AxisSnapshot;
@@ -72,9 +72,9 @@ pub fn play(config: &Config, text: &str) -> Played {
 }
 
 pub fn play_scenario(config: &Config, scenario: Scenario) -> Played {
-    let rehearsal = Arc::new(Rehearsal::new(scenario));
-    let (mut run, mut log) = VirtualRun::rehearsed(config, Arc::clone(&rehearsal)).unwrap();
-    let mut tidings = Tidings::default();
+    let fault_injector = Arc::new(FaultInjector::new(scenario));
+    let (mut run, mut log) = VirtualRun::with_faults(config, Arc::clone(&fault_injector)).unwrap();
+    let mut fault_events = FaultEvents::default();
     let mut hasher = DefaultHasher::new();
     let (mut phases, mut stops, mut emergencies, mut news) = (vec![], vec![], vec![], vec![]);
     let mut last: Vec<Option<f64>> = vec![None; config.axes.len()];
@@ -93,7 +93,7 @@ pub fn play_scenario(config: &Config, scenario: Scenario) -> Played {
                 _ => {}
             }
         }
-        news.extend(tidings.next(&rehearsal).iter().map(ToString::to_string));
+        news.extend(fault_events.next(&fault_injector).iter().map(ToString::to_string));
         let snapshot = run.snapshot();
         if phases.last() != Some(&snapshot.phase) {
             phases.push(snapshot.phase);
@@ -114,7 +114,7 @@ pub fn play_scenario(config: &Config, scenario: Scenario) -> Played {
         }
     });
     let snapshot = run.snapshot();
-    let began_ns = rehearsal.courses().filter_map(|(_, course)| course.began_ns()).max();
+    let began_ns = fault_injector.progress().filter_map(|(_, progress)| progress.began_ns()).max();
     let stopped_ns = stops
         .first()
         .map(|stop: &StopReason| (stop.slot + 1) * config.cycle.period_ns + config.cycle.command_phase_ns);
@@ -125,7 +125,7 @@ pub fn play_scenario(config: &Config, scenario: Scenario) -> Played {
         emergencies,
         missed_slots: snapshot.missed_slots,
         news,
-        frames: rehearsal.courses().map(|(_, course)| course.frames()).collect(),
+        frames: fault_injector.progress().map(|(_, progress)| progress.frames()).collect(),
         fingerprint: hasher.finish(),
         largest_step,
         accelerations,

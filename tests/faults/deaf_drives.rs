@@ -5,8 +5,8 @@ use std::sync::Arc;
 use takt::bus::port::Port;
 use takt::config::Config;
 use takt::controller::{Interrupt, VirtualRun};
-use takt::faults::Rehearsal;
-use takt::sim::NmtState;
+use takt::faults::FaultInjector;
+use takt::sim::NodeState;
 use takt_rt::stop::Phase;
 
 use crate::arm::{folder, scenario};
@@ -41,9 +41,9 @@ fn struck(config: &Config, command: &str) -> VirtualRun<Port> {
 }
 
 fn played_until_struck(config: &Config, faults: &str) -> VirtualRun<Port> {
-    let rehearsal = Arc::new(Rehearsal::new(scenario(faults, config)));
-    let (mut run, _) = VirtualRun::rehearsed(config, Arc::clone(&rehearsal)).unwrap();
-    while !rehearsal.courses().any(|(_, course)| course.began_ns().is_some()) {
+    let fault_injector = Arc::new(FaultInjector::new(scenario(faults, config)));
+    let (mut run, _) = VirtualRun::with_faults(config, Arc::clone(&fault_injector)).unwrap();
+    while !fault_injector.progress().any(|(_, progress)| progress.began_ns().is_some()) {
         assert!(run.step(), "{}: over before the fault", config.name);
     }
     run
@@ -129,7 +129,7 @@ fn a_drive_that_comes_back_while_the_run_takes_its_leave_is_left_without_torque_
             assert_eq!(run.supervisor().unreached(), [0usize; 0], "{name}, {away_ms} ms");
             let drive = first_drive(&config, &mut run);
             assert!(!drive.state.has_torque(), "{name}, {away_ms} ms: {:?}", drive.state);
-            assert_eq!(drive.nmt, NmtState::PreOperational, "{name}, {away_ms} ms");
+            assert_eq!(drive.nmt, NodeState::PreOperational, "{name}, {away_ms} ms");
         }
     }
 }

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use takt::config::Config;
-use takt::sim::{AfflictError, Defect, SimulatedBus};
+use takt::sim::{Defect, InjectDefectError, SimulatedBus};
 use takt_rt::frame::{Frame, Id};
 use takt_rt::port::{BusPort, ReceiveBatch};
 
@@ -29,10 +29,10 @@ const READ_DEVICE_TYPE: [u8; 8] = [0x40, 0x00, 0x10, 0, 0, 0, 0, 0];
 #[test]
 fn a_mute_sdo_server_gives_no_reply_until_it_is_mended() {
     let mut bus = bus();
-    bus.afflict(1, Defect::SilentSdoServer, true).unwrap();
+    bus.inject_defect(1, Defect::SilentSdoServer, true).unwrap();
     bus.send(4_000_000, &[Frame::of(Id::canopen(0x600, 1), READ_DEVICE_TYPE)]);
     assert_eq!(heard(&mut bus, 8_000_000), []);
-    bus.afflict(1, Defect::SilentSdoServer, false).unwrap();
+    bus.inject_defect(1, Defect::SilentSdoServer, false).unwrap();
     bus.send(9_000_000, &[Frame::of(Id::canopen(0x600, 1), READ_DEVICE_TYPE)]);
     assert_eq!(heard(&mut bus, 12_000_000).len(), 1);
 }
@@ -43,7 +43,7 @@ fn an_emergency_message_is_sent_without_a_fault_and_an_alarm_with_one() {
         [(Defect::Emergency { code: 0x4210 }, 0x4210, false), (Defect::Alarm { code: 0x7500 }, 0x7500, true)]
     {
         let mut bus = bus();
-        bus.afflict(2, defect, true).unwrap();
+        bus.inject_defect(2, defect, true).unwrap();
         let frames = heard(&mut bus, 6_000_000);
         assert_eq!((frames.len(), frames[0].id()), (1, Id::canopen(0x080, 2)));
         assert_eq!(frames[0].first_word() as u16, code);
@@ -56,7 +56,7 @@ fn an_emergency_message_is_sent_without_a_fault_and_an_alarm_with_one() {
 fn an_encoder_jump_moves_the_counts_and_not_the_joint() {
     let mut bus = bus();
     let before = bus.observe(3).unwrap();
-    bus.afflict(3, Defect::EncoderJump { distance: 0.1 }, true).unwrap();
+    bus.inject_defect(3, Defect::EncoderJump { distance: 0.1 }, true).unwrap();
     let after = bus.observe(3).unwrap();
     assert_eq!(after.position, before.position);
     // This axis is reversed.
@@ -68,11 +68,11 @@ fn an_encoder_jump_moves_the_counts_and_not_the_joint() {
 fn a_blocked_joint_withstands_any_torque() {
     let mut bus = bus();
     let before = bus.observe(1).unwrap().position;
-    bus.afflict(1, Defect::BlockedJoint, true).unwrap();
+    bus.inject_defect(1, Defect::BlockedJoint, true).unwrap();
     bus.set_load_torque(1, 1e6).unwrap();
     heard(&mut bus, 100_000_000);
     assert_eq!(bus.observe(1).unwrap().position, before);
-    bus.afflict(1, Defect::BlockedJoint, false).unwrap();
+    bus.inject_defect(1, Defect::BlockedJoint, false).unwrap();
     heard(&mut bus, 110_000_000);
     assert_ne!(bus.observe(1).unwrap().position, before);
 }
@@ -81,13 +81,13 @@ fn a_blocked_joint_withstands_any_torque() {
 fn a_foreigner_is_heard_by_the_master_and_by_the_drives() {
     let mut bus = bus();
     let start = Frame::of(Id::canopen(0, 0), [1, 0]);
-    assert!(bus.say(4_000_000, &start));
+    assert!(bus.send_foreign(4_000_000, &start));
     assert_eq!(heard(&mut bus, 5_000_000)[0], start);
-    assert_eq!(bus.observe(1).unwrap().nmt, takt::sim::NmtState::Operational);
+    assert_eq!(bus.observe(1).unwrap().nmt, takt::sim::NodeState::Operational);
 }
 
 #[test]
 fn a_node_that_is_not_there_is_named() {
-    let error = bus().afflict(99, Defect::StuckBrake, true);
-    assert!(matches!(error, Err(AfflictError::UnknownNode(unknown)) if unknown.node == 99), "{error:?}");
+    let error = bus().inject_defect(99, Defect::StuckBrake, true);
+    assert!(matches!(error, Err(InjectDefectError::UnknownNode(unknown)) if unknown.node == 99), "{error:?}");
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use takt::bus::port::Port;
 use takt::config::Config;
 use takt::controller::VirtualRun;
-use takt::faults::Rehearsal;
+use takt::faults::FaultInjector;
 use takt::sim::SimulatedBus;
 use takt_rt::door::Request;
 use takt_rt::stop::{Phase, Rule, StopReason};
@@ -19,12 +19,12 @@ fn faulted(config: &Config, kind: &str) -> VirtualRun<Port> {
     let axis = &config.axes[0].name;
     let fault =
         format!("[[fault]]\nkind = \"{kind}\"\naxis = \"{axis}\"\nwhen = \"enabled\"\nat = \"100 ms\"\n");
-    let rehearsal = Arc::new(Rehearsal::new(scenario(&fault, config)));
+    let fault_injector = Arc::new(FaultInjector::new(scenario(&fault, config)));
     let simulated = |bus| Port::Simulated(Box::new(SimulatedBus::new(config, bus)));
-    let ports = (0..config.buses.len()).map(|bus| rehearsal.wrap(bus, simulated(bus))).collect();
+    let ports = (0..config.buses.len()).map(|bus| fault_injector.wrap(bus, simulated(bus))).collect();
     let (mut run, _) = VirtualRun::serving(config, ports).unwrap();
     run_until(&mut run, |run| {
-        rehearsal.observe(&run.snapshot());
+        fault_injector.observe(&run.snapshot());
         latched(run).is_some() && run.snapshot().phase == Phase::Disabled
     });
     run

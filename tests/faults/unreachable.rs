@@ -5,7 +5,7 @@ use std::sync::Arc;
 use takt::bus::port::Port;
 use takt::config::Config;
 use takt::controller::{Outcome, VirtualRun};
-use takt::faults::Rehearsal;
+use takt::faults::FaultInjector;
 use takt_rt::stop::{Phase, Rule};
 
 use crate::arm::{arm, scenario};
@@ -23,17 +23,17 @@ struct Ended {
 /// Plays a fault that begins in motion to the end of the run.
 fn ended(config: &Config, fault: &str) -> Ended {
     let text = format!("[[fault]]\n{fault}\nwhen = \"moving\"\nat = \"300 ms\"");
-    let rehearsal = Arc::new(Rehearsal::new(scenario(&text, config)));
-    let (mut run, _) = VirtualRun::rehearsed(config, Arc::clone(&rehearsal)).unwrap();
+    let fault_injector = Arc::new(FaultInjector::new(scenario(&text, config)));
+    let (mut run, _) = VirtualRun::with_faults(config, Arc::clone(&fault_injector)).unwrap();
     let mut disabled_ns = None;
     while run.step() {
-        if rehearsal.courses().any(|(_, course)| course.began_ns().is_some())
+        if fault_injector.progress().any(|(_, progress)| progress.began_ns().is_some())
             && run.snapshot().phase == Phase::Disabled
         {
             disabled_ns = disabled_ns.or(Some(run.snapshot().at_ns));
         }
     }
-    let began_ns = rehearsal.courses().find_map(|(_, course)| course.began_ns()).unwrap();
+    let began_ns = fault_injector.progress().find_map(|(_, progress)| progress.began_ns()).unwrap();
     Ended { began_ns, disabled_ns: disabled_ns.unwrap(), over_ns: run.snapshot().at_ns, run }
 }
 

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use proptest::prelude::*;
 use takt::faults::{
-    Breakable, Course, Cue, Cues, DelayPlace, Direction, Effect, Fault, FaultyPort, ForeignFrames,
-    FrameEffect, InterfaceEffect, Part, Selection, Window,
+    DelayPlace, Direction, Effect, FaultProgress, FaultyPort, ForeignFrames, FrameEffect, Injectable,
+    InterfaceEffect, Part, ScenarioFault, Selection, Trigger, TriggerTimes, Window,
 };
 use takt_rt::frame::{Frame, Id};
 use takt_rt::port::{BusHealth, BusPort, BusState, ReceiveBatch, Received};
@@ -39,7 +39,7 @@ impl BusPort for Line {
     }
 }
 
-impl Breakable for Line {}
+impl Injectable for Line {}
 
 fn frame(id: u32, byte: u8) -> Frame {
     Frame::of(Id::base(id).unwrap(), [byte; 8])
@@ -49,11 +49,19 @@ fn numbered(count: u8) -> Vec<Frame> {
     (0..count).map(|number| frame(0x200 + u32::from(number), number)).collect()
 }
 
-fn wrapped(effect: Effect, selection: Selection, lasts_ns: Option<u64>) -> (FaultyPort<Line>, Arc<Course>) {
-    let window = Window { cue: Cue::Start, after_ns: 0, lasts_ns };
-    let fault = Fault { kind: "", place: String::new(), line: 1, bus: 0, window, selection, effect };
-    let course = Arc::new(Course::default());
-    (FaultyPort::new(Line::default(), &fault, Arc::new(Cues::default()), Arc::clone(&course)), course)
+fn wrapped(
+    effect: Effect,
+    selection: Selection,
+    lasts_ns: Option<u64>,
+) -> (FaultyPort<Line>, Arc<FaultProgress>) {
+    let window = Window { trigger: Trigger::Start, after_ns: 0, lasts_ns };
+    let fault =
+        ScenarioFault { kind: "", location: String::new(), line: 1, bus: 0, window, selection, effect };
+    let progress = Arc::new(FaultProgress::default());
+    (
+        FaultyPort::new(Line::default(), &fault, Arc::new(TriggerTimes::default()), Arc::clone(&progress)),
+        progress,
+    )
 }
 
 fn frames(effect: FrameEffect) -> FaultyPort<Line> {
@@ -86,10 +94,10 @@ fn a_dropped_frame_is_gone_and_counts_as_sent() {
 #[test]
 fn only_the_selected_frames_are_concerned_and_the_others_keep_their_order() {
     let selection = Selection { ids: 0x201..=0x202, direction: Direction::Sent, ..Selection::default() };
-    let (mut port, course) = wrapped(Effect::Frames(FrameEffect::Drop), selection, None);
+    let (mut port, progress) = wrapped(Effect::Frames(FrameEffect::Drop), selection, None);
     assert_eq!(port.send(0, &numbered(5)), 5);
     let left: Vec<u32> = sent(&mut port).iter().map(|frame| frame.id().value()).collect();
-    assert_eq!((left, course.frames()), (vec![0x200, 0x203, 0x204], 2));
+    assert_eq!((left, progress.frames()), (vec![0x200, 0x203, 0x204], 2));
     hears(&mut port, &numbered(5), 0);
     assert_eq!(received(&mut port, 1).len(), 5);
 }
@@ -200,13 +208,13 @@ fn corruption_turns_bits_of_the_part_that_was_named() {
 fn a_foreigner_speaks_in_its_rhythm_and_is_heard_here_too() {
     let says = frame(0x123, 9);
     let effect = Effect::Foreign(ForeignFrames::Frame { frame: says, period_ns: Some(100) });
-    let (mut port, course) = wrapped(effect, Selection::default(), Some(350));
+    let (mut port, progress) = wrapped(effect, Selection::default(), Some(350));
     received(&mut port, 0);
     let heard: Vec<u64> = received(&mut port, 320).iter().map(|received| received.at_ns).collect();
     assert_eq!(heard, [100, 200, 300]);
     assert_eq!(received(&mut port, 1000), []);
     let said: Vec<u64> = port.inner_mut().sent.iter().map(|(at_ns, _)| *at_ns).collect();
-    assert_eq!((said, course.frames()), (vec![0, 100, 200, 300], 4));
+    assert_eq!((said, progress.frames()), (vec![0, 100, 200, 300], 4));
 }
 
 #[test]
@@ -221,10 +229,10 @@ fn after_a_long_pause_a_foreigner_does_not_make_up_for_what_it_has_not_said() {
 #[test]
 fn another_master_repeats_what_was_commanded_when_it_began() {
     let effect = Effect::Foreign(ForeignFrames::SetPoints { id: Id::canopen(0x200, 1), period_ns: 100 });
-    let window = Window { cue: Cue::Start, after_ns: 1000, lasts_ns: None };
-    let fault = Fault {
+    let window = Window { trigger: Trigger::Start, after_ns: 1000, lasts_ns: None };
+    let fault = ScenarioFault {
         kind: "",
-        place: String::new(),
+        location: String::new(),
         line: 1,
         bus: 0,
         window,
@@ -280,9 +288,9 @@ proptest! {
         calls in proptest::collection::vec((0u64..2_000, 0u8..60, 0u8..60), 1..40),
     ) {
         let selection = || Selection { probability, ..Selection::default() };
-        let fault = |effect| Fault {
-            kind: "", place: String::new(), line: 1, bus: 0,
-            window: Window { cue: Cue::Start, after_ns: 500, lasts_ns: Some(20_000) },
+        let fault = |effect| ScenarioFault {
+            kind: "", location: String::new(), line: 1, bus: 0,
+            window: Window { trigger: Trigger::Start, after_ns: 500, lasts_ns: Some(20_000) },
             selection: selection(), effect: Effect::Frames(effect),
         };
         let inner = FaultyPort::new(Line::default(), &fault(effects.0), Arc::default(), Arc::default());

@@ -2,7 +2,7 @@
 
 use takt::sim::erob::{ErobJoint, ErobParameters};
 use takt::sim::plant::{Encoder, JointParameters};
-use takt::sim::{BitRates, Drive, Observation, SimulatedBus};
+use takt::sim::{Drive, Observation, SimulatedBus, WireBitRates};
 use takt_rt::frame::{Frame, Id};
 use takt_rt::port::{BusPort, ReceiveBatch, Received};
 
@@ -54,7 +54,7 @@ impl Bench {
 
     /// A bus with any drives that boot within 10 ms.
     pub fn of(drives: Vec<Box<dyn Drive>>) -> Self {
-        let rates = BitRates { nominal: 1_000_000, data: None };
+        let rates = WireBitRates { nominal: 1_000_000, data: None };
         let bus = SimulatedBus::with_drives(rates, u64::MAX, drives);
         let mut bench = Self { bus, now_ns: 0, heard: vec![] };
         bench.run_ns(0);
@@ -92,7 +92,7 @@ impl Bench {
     }
 
     /// Sends a data frame.
-    pub fn say<const N: usize>(&mut self, id: u32, bytes: [u8; N]) {
+    pub fn send_data<const N: usize>(&mut self, id: u32, bytes: [u8; N]) {
         self.send(Frame::of(Id::base(id).unwrap(), bytes));
     }
 
@@ -106,7 +106,7 @@ impl Bench {
 
     /// One SDO request and its answer, which must come within 2 ms.
     pub fn sdo(&mut self, request: [u8; 8]) -> [u8; 8] {
-        self.say(0x600 + u32::from(NODE), request);
+        self.send_data(0x600 + u32::from(NODE), request);
         self.run_ms(2);
         let answers = self.take(0x580 + u32::from(NODE));
         assert_eq!(answers.len(), 1, "answers to {request:02X?}");
@@ -141,7 +141,7 @@ impl Bench {
     }
 
     pub fn nmt(&mut self, command: u8) {
-        self.say(0x000, [command, NODE]);
+        self.send_data(0x000, [command, NODE]);
         self.run_ms(2);
     }
 
@@ -169,11 +169,11 @@ impl Bench {
 
     /// One cycle of 1 ms: SYNC, then at 60 % the set-point. Returns what TPDO1 said: statusword and position.
     pub fn cycle(&mut self, controlword: u16, target: i32) -> (u16, i32) {
-        self.say(0x080, []);
+        self.send_data(0x080, []);
         self.run_ns(600_000);
         let [low, high] = controlword.to_le_bytes();
         let [a, b, c, d] = target.to_le_bytes();
-        self.say(0x200 + u32::from(NODE), [low, high, a, b, c, d]);
+        self.send_data(0x200 + u32::from(NODE), [low, high, a, b, c, d]);
         self.run_ns(400_000);
         let tpdo = self.take(0x180 + u32::from(NODE)).pop().expect("TPDO1 after SYNC");
         (u16::from_le_bytes([tpdo[0], tpdo[1]]), i32::from_le_bytes([tpdo[2], tpdo[3], tpdo[4], tpdo[5]]))

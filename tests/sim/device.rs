@@ -26,7 +26,7 @@ fn statuswords_are_those_of_real_units_with_and_without_the_warning_bit() {
         bench.cycle(0x0F, 60_000);
         bench.cycle(0x0F, 60_000);
         seen.push(bench.cycle(0x0F, 60_000).0);
-        bench.bus.inject(NODE, DriveFault::OverCurrent).unwrap();
+        bench.bus.inject_fault(NODE, DriveFault::OverCurrent).unwrap();
         bench.cycle(0x0F, 60_000);
         seen.push(bench.cycle(0x0F, 60_000).0);
         warnings.extend(seen.iter().map(|word| word & WARNING));
@@ -88,7 +88,7 @@ fn the_brake_is_engaged_exactly_when_there_is_no_torque() {
 fn a_fault_is_left_by_a_rising_edge_that_is_held_for_several_cycles() {
     let mut bench = Bench::new();
     bench.enable(8, TARGET_POSITION, 0);
-    bench.bus.inject(NODE, DriveFault::Encoder).unwrap();
+    bench.bus.inject_fault(NODE, DriveFault::Encoder).unwrap();
     for _ in 0..3 {
         bench.cycle(0x0F, 0);
     }
@@ -116,7 +116,7 @@ fn a_battery_fault_is_left_only_after_its_own_reset_which_loses_the_turns() {
     let mut bench = Bench::with(vec![far]);
     let before = bench.observe().position_counts;
     assert!(before > 3 * 524_288);
-    bench.bus.inject(NODE, DriveFault::MultiTurnBattery).unwrap();
+    bench.bus.inject_fault(NODE, DriveFault::MultiTurnBattery).unwrap();
     bench.run_ms(2);
     for _ in 0..2 {
         bench.write(0x6040, 0, 2, 0x00).unwrap();
@@ -142,7 +142,7 @@ fn a_lost_master_makes_an_enabled_drive_decelerate_before_it_cuts_power() {
     bench.write(0x1029, 1, 1, 1).unwrap();
     bench.enable(9, TARGET_VELOCITY, 0);
     for _ in 0..300 {
-        bench.say(0x701, [5]);
+        bench.send_data(0x701, [5]);
         bench.cycle(0x0F, 160_000);
     }
     let (mut reacting, mut last) = (0, bench.observe().velocity);

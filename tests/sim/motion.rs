@@ -114,9 +114,9 @@ fn syncs_that_come_late_do_not_shake_the_joint() {
         // 0 to 300 µs late, in no order.
         let late_ns = (cycle * 7_919) % 300 * 1_000;
         bench.run_ns(late_ns as u64);
-        bench.say(0x080, []);
+        bench.send_data(0x080, []);
         let [a, b, c, d] = (150 * cycle).to_le_bytes();
-        bench.say(0x205, [0x0F, 0, a, b, c, d]);
+        bench.send_data(0x205, [0x0F, 0, a, b, c, d]);
         bench.run_ns(MILLISECOND_NS - late_ns as u64);
         if cycle > 300 {
             let velocity = bench.observe().velocity * COUNTS_PER_RADIAN;

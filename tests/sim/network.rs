@@ -1,7 +1,7 @@
 //! NMT, boot-up, heartbeat in both directions, guarding, emergency messages.
 
 use takt::sim::erob::ErobParameters;
-use takt::sim::{DriveFault, NmtState};
+use takt::sim::{DriveFault, NodeState};
 use takt_rt::cia402::State;
 use takt_rt::frame::{Frame, Id};
 
@@ -13,21 +13,21 @@ const MASTER_HEARTBEAT: u32 = 0x701;
 fn a_drive_is_mute_until_its_boot_up_message() {
     let slow = ErobParameters { power_up_ns: 8_000 * MILLISECOND_NS, ..parameters(NODE) };
     let mut bench = Bench::with(vec![slow]);
-    bench.say(0x605, [0x40, 0x00, 0x10, 0, 0, 0, 0, 0]);
-    bench.say(0x000, [0x01, 0x00]);
+    bench.send_data(0x605, [0x40, 0x00, 0x10, 0, 0, 0, 0, 0]);
+    bench.send_data(0x000, [0x01, 0x00]);
     bench.run_ms(7_989);
     assert!(bench.heard.is_empty());
     bench.run_ms(2);
     let [boot_up] = &bench.heard[..] else { panic!("{} frames", bench.heard.len()) };
     assert_eq!(boot_up.frame, Frame::of(Id::canopen(0x700, NODE), [0]));
-    assert_eq!(bench.observe().nmt, NmtState::PreOperational);
+    assert_eq!(bench.observe().nmt, NodeState::PreOperational);
 }
 
 #[test]
 fn a_stopped_node_answers_no_sdo_until_it_is_reset() {
     let mut bench = Bench::new();
     bench.nmt(0x02);
-    bench.say(0x605, [0x40, 0x00, 0x10, 0, 0, 0, 0, 0]);
+    bench.send_data(0x605, [0x40, 0x00, 0x10, 0, 0, 0, 0, 0]);
     bench.run_ms(5);
     assert!(bench.heard.is_empty());
     let reset_ns = bench.now_ns;
@@ -41,26 +41,26 @@ fn a_stopped_node_answers_no_sdo_until_it_is_reset() {
 #[test]
 fn commands_reach_the_node_that_they_name_and_node_0_is_every_one() {
     let mut bench = Bench::with(vec![parameters(NODE), parameters(6)]);
-    bench.say(0x000, [0x01, 6]);
+    bench.send_data(0x000, [0x01, 6]);
     bench.run_ms(1);
     let state = |bench: &mut Bench, node| bench.bus.observe(node).unwrap().nmt;
     assert_eq!(
         (state(&mut bench, NODE), state(&mut bench, 6)),
-        (NmtState::PreOperational, NmtState::Operational)
+        (NodeState::PreOperational, NodeState::Operational)
     );
-    bench.say(0x000, [0x80, 0]);
+    bench.send_data(0x000, [0x80, 0]);
     bench.run_ms(1);
-    bench.say(0x000, [0x01, 0]);
+    bench.send_data(0x000, [0x01, 0]);
     bench.run_ms(1);
     assert_eq!(
         (state(&mut bench, NODE), state(&mut bench, 6)),
-        (NmtState::Operational, NmtState::Operational)
+        (NodeState::Operational, NodeState::Operational)
     );
     // A command of the wrong length or number changes nothing.
-    bench.say(0x000, [0x02, NODE, 0]);
-    bench.say(0x000, [0x03, NODE]);
+    bench.send_data(0x000, [0x02, NODE, 0]);
+    bench.send_data(0x000, [0x03, NODE]);
     bench.run_ms(1);
-    assert_eq!(state(&mut bench, NODE), NmtState::Operational);
+    assert_eq!(state(&mut bench, NODE), NodeState::Operational);
 }
 
 #[test]
@@ -106,9 +106,9 @@ fn loses_master(error_behaviour: i64) -> Bench {
     bench.write(0x1029, 1, 1, error_behaviour).unwrap();
     bench.nmt(0x01);
     bench.run_ms(200);
-    assert_eq!(bench.observe().nmt, NmtState::Operational, "watched before the first heartbeat");
+    assert_eq!(bench.observe().nmt, NodeState::Operational, "watched before the first heartbeat");
     for _ in 0..5 {
-        bench.say(MASTER_HEARTBEAT, [5]);
+        bench.send_data(MASTER_HEARTBEAT, [5]);
         bench.run_ms(40);
     }
     assert_eq!(bench.observe().state, State::SwitchOnDisabled);
@@ -122,19 +122,19 @@ fn loses_master(error_behaviour: i64) -> Bench {
 fn a_lost_master_is_a_fault_an_emergency_message_and_the_state_that_1029_says() {
     let mut bench = loses_master(0);
     assert_eq!(bench.take(0x085), [[0x30, 0x81, 0x11, 0, 0, 0, 0, 0]]);
-    assert_eq!((bench.observe().nmt, bench.observe().state), (NmtState::PreOperational, State::Fault));
+    assert_eq!((bench.observe().nmt, bench.observe().state), (NodeState::PreOperational, State::Fault));
     assert_eq!(bench.read(0x1003, 1), Ok(0x8130));
-    assert_eq!(loses_master(1).observe().nmt, NmtState::Operational);
-    assert_eq!(loses_master(2).observe().nmt, NmtState::Stopped);
+    assert_eq!(loses_master(1).observe().nmt, NodeState::Operational);
+    assert_eq!(loses_master(2).observe().nmt, NodeState::Stopped);
 }
 
 #[test]
 fn without_a_programmed_consumer_the_masters_death_goes_unnoticed() {
     let mut bench = Bench::new();
     bench.nmt(0x01);
-    bench.say(MASTER_HEARTBEAT, [5]);
+    bench.send_data(MASTER_HEARTBEAT, [5]);
     bench.run_ms(5_000);
-    assert_eq!((bench.observe().nmt, bench.observe().error_code), (NmtState::Operational, 0));
+    assert_eq!((bench.observe().nmt, bench.observe().error_code), (NodeState::Operational, 0));
 }
 
 #[test]
@@ -162,7 +162,7 @@ fn a_guarded_node_notices_when_the_guard_stays_away() {
     bench.run_ms(59);
     assert_eq!(bench.observe().error_code, 0);
     bench.run_ms(3);
-    assert_eq!((bench.observe().error_code, bench.observe().nmt), (0x8130, NmtState::PreOperational));
+    assert_eq!((bench.observe().error_code, bench.observe().nmt), (0x8130, NodeState::PreOperational));
 }
 
 #[test]
@@ -170,9 +170,9 @@ fn errors_fill_the_history_newest_first_and_0_empties_it() {
     let mut bench = Bench::new();
     assert_eq!(bench.read(0x1003, 0), Ok(0));
     assert_eq!(bench.read(0x1003, 1), Err(0x0800_0024));
-    bench.bus.inject(NODE, DriveFault::OverCurrent).unwrap();
+    bench.bus.inject_fault(NODE, DriveFault::OverCurrent).unwrap();
     bench.run_ms(1);
-    bench.bus.inject(NODE, DriveFault::Encoder).unwrap();
+    bench.bus.inject_fault(NODE, DriveFault::Encoder).unwrap();
     bench.run_ms(1);
     assert_eq!(bench.take(0x085), [[0x10, 0x23, 0x03, 0, 0, 0, 0, 0], [0x05, 0x73, 0x23, 0, 0, 0, 0, 0]]);
     assert_eq!((bench.read(0x1003, 0), bench.read(0x1001, 0)), (Ok(2), Ok(0x23)));
@@ -189,10 +189,10 @@ fn frames_that_are_not_the_drives_own_leave_it_silent() {
     bench.run_ms(5);
     bench.heard.clear();
     // The vendor's other protocol, another node's services, an extended identifier, a CAN FD frame.
-    bench.say(0x645, [0x00, 0x02]);
-    bench.say(0x606, [0x40, 0x00, 0x10, 0, 0, 0, 0, 0]);
-    bench.say(0x206, [0x06, 0x00]);
-    bench.say(0x305, [0x06, 0x00, 0, 0, 0, 0]);
+    bench.send_data(0x645, [0x00, 0x02]);
+    bench.send_data(0x606, [0x40, 0x00, 0x10, 0, 0, 0, 0, 0]);
+    bench.send_data(0x206, [0x06, 0x00]);
+    bench.send_data(0x305, [0x06, 0x00, 0, 0, 0, 0]);
     bench.send(Frame::of(Id::extended(0x605).unwrap(), [0x40, 0x00, 0x10, 0, 0, 0, 0, 0]));
     bench.send(Frame::fd(Id::canopen(0x600, NODE), &[0x40, 0x00, 0x10, 0, 0, 0, 0, 0], false).unwrap());
     bench.run_ms(20);

@@ -2,13 +2,13 @@
 
 use takt::config::{Config, Travel};
 use takt::sim::erob::ErobJoint;
-use takt::sim::{BitRates, SimulatedBus, UnknownNode, WireLength};
+use takt::sim::{SimulatedBus, UnknownNode, WireBitRates, WireLength};
 use takt_rt::frame::{Frame, Id};
 use takt_rt::port::{BusPort, BusState, RECEIVE_BATCH, ReceiveBatch};
 
 use super::bench::{Bench, MILLISECOND_NS, NODE, parameters};
 
-const RATES: BitRates = BitRates { nominal: 1_000_000, data: None };
+const RATES: WireBitRates = WireBitRates { nominal: 1_000_000, data: None };
 
 fn bus(longest_gap_ns: u64) -> SimulatedBus {
     SimulatedBus::with_drives(RATES, longest_gap_ns, vec![Box::new(ErobJoint::new(parameters(NODE)))])
@@ -121,7 +121,7 @@ fn a_silenced_drive_neither_hears_nor_speaks_but_lives_on() {
     bench.bus.silence(NODE, true).unwrap();
     let before = bench.observe().position;
     for _ in 0..100 {
-        bench.say(0x080, []);
+        bench.send_data(0x080, []);
         bench.run_ms(1);
     }
     assert!(bench.heard.is_empty());
@@ -144,13 +144,13 @@ fn drives_that_are_not_there_are_named() {
 fn tpdos_of_several_drives_come_in_the_order_of_their_identifiers_without_a_gap() {
     let mut bench = Bench::with([7, 5, 6].map(parameters).to_vec());
     for node in [5u8, 6, 7] {
-        bench.say(0x600 + u32::from(node), [0x2F, 0x00, 0x18, 2, 1, 0, 0, 0]);
+        bench.send_data(0x600 + u32::from(node), [0x2F, 0x00, 0x18, 2, 1, 0, 0, 0]);
     }
     bench.run_ms(3);
-    bench.say(0x000, [1, 0]);
+    bench.send_data(0x000, [1, 0]);
     bench.run_ms(3);
     bench.heard.clear();
-    bench.say(0x080, []);
+    bench.send_data(0x080, []);
     bench.run_ms(1);
     let ids: Vec<_> = bench.heard.iter().map(|received| received.frame.id().value()).collect();
     assert_eq!(ids, [0x185, 0x186, 0x187]);
@@ -167,10 +167,10 @@ fn the_same_calls_give_the_same_bytes_at_the_same_times() {
         bench.enable(8, 0x607A_0020, 0);
         let mut heard = vec![];
         for cycle in 0..500i32 {
-            bench.say(0x080, []);
+            bench.send_data(0x080, []);
             bench.run_ns(600_000);
             let [a, b, c, d] = (40 * cycle).to_le_bytes();
-            bench.say(0x205, [0x0F, 0, a, b, c, d]);
+            bench.send_data(0x205, [0x0F, 0, a, b, c, d]);
             bench.run_ns(400_000);
             heard.append(&mut bench.heard);
         }
@@ -206,7 +206,7 @@ fn a_configured_bus_has_a_drive_for_each_of_its_axes_with_the_axis_own_scale() {
     assert_eq!(counts, [1000 - 41_722, 52_428_800]);
     // Half the bit rate, twice the time: the boot-up messages follow each other.
     let boot_ups = received(&mut bus, 4 * MILLISECOND_NS);
-    let slow = BitRates { nominal: 500_000, data: None };
+    let slow = WireBitRates { nominal: 500_000, data: None };
     let duration_ns = slow.duration_ns(&Frame::of(Id::canopen(0x700, 3), [0]));
     assert_eq!(boot_ups[1].0 - boot_ups[0].0, duration_ns);
 }

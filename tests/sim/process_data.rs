@@ -10,11 +10,11 @@ const TARGET_POSITION: u32 = 0x607A_0020;
 fn nothing_is_sent_at_sync_before_the_node_is_started() {
     let mut bench = Bench::new();
     bench.write(0x1800, 2, 1, 1).unwrap();
-    bench.say(0x080, []);
+    bench.send_data(0x080, []);
     bench.run_ms(2);
     assert!(bench.heard.is_empty());
     bench.nmt(0x01);
-    bench.say(0x080, []);
+    bench.send_data(0x080, []);
     bench.run_ms(2);
     assert_eq!(bench.take(0x185).len(), 1);
 }
@@ -28,7 +28,7 @@ fn a_tpdo_of_type_n_comes_at_every_nth_sync_and_shortly_after_it() {
         let mut syncs_ns = vec![];
         for _ in 0..480 {
             syncs_ns.push(bench.now_ns);
-            bench.say(0x080, []);
+            bench.send_data(0x080, []);
             bench.run_ms(1);
         }
         let expected: Vec<_> = syncs_ns
@@ -51,12 +51,12 @@ fn type_0_is_sent_at_sync_only_after_a_change() {
     bench.write(0x1800, 2, 1, 0).unwrap();
     bench.nmt(0x01);
     for expected in [1, 0, 0] {
-        bench.say(0x080, []);
+        bench.send_data(0x080, []);
         bench.run_ms(2);
         assert_eq!(bench.take(0x185).len(), expected);
     }
     bench.write(0x6040, 0, 2, 6).unwrap();
-    bench.say(0x080, []);
+    bench.send_data(0x080, []);
     bench.run_ms(2);
     assert_eq!(bench.take(0x185).len(), 1);
 }
@@ -99,10 +99,10 @@ fn a_synchronous_rpdo_waits_for_sync_and_an_event_driven_one_acts_at_once() {
         let mut bench = Bench::new();
         bench.write(0x1400, 2, 1, transmission_type).unwrap();
         bench.nmt(0x01);
-        bench.say(0x205, [0x06, 0x00]);
+        bench.send_data(0x205, [0x06, 0x00]);
         bench.run_ms(2);
         assert_eq!(bench.read(0x6040, 0), Ok(if is_immediate { 6 } else { 0 }), "type {transmission_type}");
-        bench.say(0x080, []);
+        bench.send_data(0x080, []);
         bench.run_ms(2);
         assert_eq!(bench.read(0x6040, 0), Ok(6));
     }
@@ -113,16 +113,16 @@ fn a_short_rpdo_changes_nothing_and_raises_one_emergency_message_until_a_good_on
     let mut bench = Bench::new();
     bench.start_process_data(TARGET_POSITION);
     for _ in 0..3 {
-        bench.say(0x205, [0x06, 0x00, 1, 2, 3]);
+        bench.send_data(0x205, [0x06, 0x00, 1, 2, 3]);
         bench.run_ms(1);
     }
     assert_eq!(bench.take(0x085), [[0x10, 0x82, 0x11, 0, 0, 0, 0, 0]]);
-    bench.say(0x080, []);
+    bench.send_data(0x080, []);
     bench.run_ms(1);
     assert_eq!((bench.read(0x6040, 0), bench.read(0x607A, 0)), (Ok(0), Ok(0)));
     // Longer than the mapping is good: what is beyond is not used.
-    bench.say(0x205, [0x06, 0x00, 1, 0, 0, 0, 9, 9]);
-    bench.say(0x080, []);
+    bench.send_data(0x205, [0x06, 0x00, 1, 0, 0, 0, 9, 9]);
+    bench.send_data(0x080, []);
     bench.run_ms(1);
     assert_eq!(bench.take(0x085), [[0; 8]]);
     assert_eq!((bench.read(0x6040, 0), bench.read(0x607A, 0)), (Ok(6), Ok(1)));
@@ -132,10 +132,10 @@ fn a_short_rpdo_changes_nothing_and_raises_one_emergency_message_until_a_good_on
 fn what_was_latched_is_forgotten_when_the_node_leaves_operational() {
     let mut bench = Bench::new();
     bench.start_process_data(TARGET_POSITION);
-    bench.say(0x205, [0x06, 0x00, 1, 0, 0, 0]);
+    bench.send_data(0x205, [0x06, 0x00, 1, 0, 0, 0]);
     bench.nmt(0x80);
     bench.nmt(0x01);
-    bench.say(0x080, []);
+    bench.send_data(0x080, []);
     bench.run_ms(1);
     assert_eq!(bench.read(0x6040, 0), Ok(0));
 }
@@ -156,10 +156,10 @@ fn sync_may_have_another_identifier() {
     bench.write(0x1005, 0, 4, 0x0A0).unwrap();
     bench.write(0x1800, 2, 1, 1).unwrap();
     bench.nmt(0x01);
-    bench.say(0x080, []);
+    bench.send_data(0x080, []);
     bench.run_ms(1);
     assert!(bench.take(0x185).is_empty());
-    bench.say(0x0A0, []);
+    bench.send_data(0x0A0, []);
     bench.run_ms(1);
     assert_eq!(bench.take(0x185).len(), 1);
 }

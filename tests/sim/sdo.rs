@@ -100,7 +100,7 @@ fn block_transfer_is_refused_and_an_abort_is_not_answered() {
     let mut bench = Bench::new();
     assert_eq!(bench.sdo([0xA4, 0x18, 0x10, 1, 0, 0, 0, 0]), [0x80, 0x18, 0x10, 1, 0x01, 0x00, 0x04, 0x05]);
     assert_eq!(bench.sdo([0xC2, 0x81, 0x60, 0, 4, 0, 0, 0])[4..], 0x0504_0001u32.to_le_bytes());
-    bench.say(0x605, [0x80, 0x81, 0x60, 0, 0, 0, 0, 0]);
+    bench.send_data(0x605, [0x80, 0x81, 0x60, 0, 0, 0, 0, 0]);
     bench.run_ms(3);
     assert!(bench.heard.is_empty());
 }
@@ -109,10 +109,10 @@ fn block_transfer_is_refused_and_an_abort_is_not_answered() {
 fn an_answer_takes_a_third_of_a_millisecond_to_one_and_a_request_before_it_is_lost() {
     let mut bench = Bench::new();
     for _ in 0..50 {
-        bench.say(0x605, [0x40, 0x00, 0x10, 0, 0, 0, 0, 0]);
+        bench.send_data(0x605, [0x40, 0x00, 0x10, 0, 0, 0, 0, 0]);
         let asked_ns = bench.now_ns;
         bench.run_ns(200_000);
-        bench.say(0x605, [0x40, 0x41, 0x60, 0, 0, 0, 0, 0]);
+        bench.send_data(0x605, [0x40, 0x41, 0x60, 0, 0, 0, 0, 0]);
         bench.run_ms(2);
         let [answer] = &bench.heard[..] else { panic!("{} answers", bench.heard.len()) };
         assert_eq!(answer.frame.payload()[..3], [0x43, 0x00, 0x10]);
@@ -125,7 +125,7 @@ fn an_answer_takes_a_third_of_a_millisecond_to_one_and_a_request_before_it_is_lo
 #[test]
 fn a_request_that_is_not_eight_bytes_long_is_ignored() {
     let mut bench = Bench::new();
-    bench.say(0x605, [0x40, 0x00, 0x10, 0]);
+    bench.send_data(0x605, [0x40, 0x00, 0x10, 0]);
     bench.run_ms(3);
     assert!(bench.heard.is_empty());
 }

@@ -91,7 +91,7 @@ impl Bench {
 
     /// RPDO4 and its answer.
     fn hold_target(&mut self, target: i32) -> (i32, u16) {
-        self.say(0x500 + u32::from(NODE), target.to_le_bytes());
+        self.send_data(0x500 + u32::from(NODE), target.to_le_bytes());
         self.run_ns(500_000);
         let answer = self.take(0x480 + u32::from(NODE)).pop().expect("TPDO4 after RPDO4");
         decoded(&answer)
@@ -100,7 +100,7 @@ impl Bench {
     /// A cycle of 2 ms: RPDO4, then SYNC. Returns what TPDO2 says after SYNC.
     fn interpolate(&mut self, target: i32) -> (i32, u16) {
         self.hold_target(target);
-        self.say(0x080, []);
+        self.send_data(0x080, []);
         self.run_ns(1_500_000);
         let answer = self.take(0x280 + u32::from(NODE)).pop().expect("TPDO2 after SYNC");
         decoded(&answer)

@@ -38,7 +38,7 @@ fn stopping_alarms_show_everywhere_and_free_the_motor_until_they_are_cleared() {
     ];
     for (fault, code) in faults {
         let mut bench = turning();
-        bench.bus.inject(NODE, fault).unwrap();
+        bench.bus.inject_fault(NODE, fault).unwrap();
         bench.run_ms(2_000);
         assert_eq!((bench.alarm(), bench.statusword() & 0x0F), (code, 0x0B));
         assert_eq!((bench.observe().state, bench.observe().error_code), (State::Fault, code as u16));
@@ -58,7 +58,7 @@ fn stopping_alarms_show_everywhere_and_free_the_motor_until_they_are_cleared() {
 #[test]
 fn the_output_enable_clears_an_alarm_too_and_the_motor_runs_again() {
     let mut bench = turning();
-    bench.bus.inject(NODE, DriveFault::Stall).unwrap();
+    bench.bus.inject_fault(NODE, DriveFault::Stall).unwrap();
     bench.run_ms(1_000);
     bench.write(0x2601, 0, 2, 1).unwrap();
     bench.run_ms(500);
@@ -74,7 +74,7 @@ fn the_output_enable_clears_an_alarm_too_and_the_motor_runs_again() {
 fn an_over_voltage_shows_in_6079_and_is_not_cleared_while_it_lasts() {
     let mut bench = turning();
     assert_eq!(bench.read(0x6079, 0), Ok(24 * 327));
-    bench.bus.inject(NODE, DriveFault::OverVoltage).unwrap();
+    bench.bus.inject_fault(NODE, DriveFault::OverVoltage).unwrap();
     bench.run_ms(10);
     assert!(bench.read(0x6079, 0).unwrap() > 52 * 327);
     bench.control(0x80);
@@ -89,7 +89,7 @@ fn an_over_voltage_shows_in_6079_and_is_not_cleared_while_it_lasts() {
 fn the_battery_alarm_lets_the_motor_run_and_only_the_multi_turn_zero_clears_it() {
     let mut bench = turning();
     assert_eq!(bench.read(0x261E, 0), Ok(10));
-    bench.bus.inject(NODE, DriveFault::MultiTurnBattery).unwrap();
+    bench.bus.inject_fault(NODE, DriveFault::MultiTurnBattery).unwrap();
     bench.run_ms(500);
     assert!((speed_rpm(&mut bench) - 500.0).abs() < 1.0);
     assert_eq!((bench.alarm(), bench.statusword(), bench.read(0x261E, 0)), (0x10, 0x043F, Ok(0)));
@@ -114,7 +114,7 @@ fn the_battery_alarm_lets_the_motor_run_and_only_the_multi_turn_zero_clears_it()
 fn whether_the_battery_alarm_shows_in_bit_3_is_the_units_own() {
     let quirks = Quirks { shows_battery_alarm: false, ..Quirks::default() };
     let mut bench = bench(YzAimParameters { quirks, ..parameters(NODE) });
-    bench.bus.inject(NODE, DriveFault::MultiTurnBattery).unwrap();
+    bench.bus.inject_fault(NODE, DriveFault::MultiTurnBattery).unwrap();
     bench.run_ms(10);
     assert_eq!((bench.alarm(), bench.statusword()), (0x10, 0x0404));
 }

@@ -1,13 +1,13 @@
 //! NMT, heartbeat in both directions, PDO timing.
 
 use takt::sim::yz_aim::YzAimJoint;
-use takt::sim::{Drive, Mailbox, NmtState, Order};
+use takt::sim::{Drive, Mailbox, NodeState, QueueOrder};
 use takt_rt::frame::{Frame, Id};
 
 use super::{Bench, MILLISECOND_NS, NODE, Quirks, YzAimParameters, bench, by_the_manual, parameters};
 
 fn host_heartbeat(bench: &mut Bench) {
-    bench.say(0x77F, [5]);
+    bench.send_data(0x77F, [5]);
 }
 
 #[test]
@@ -15,9 +15,9 @@ fn a_stopped_drive_is_silent_and_still_hears_nmt() {
     let mut bench = bench(parameters(NODE));
     bench.nmt(0x02);
     bench.heard.clear();
-    bench.say(0x605, [0x40, 0, 0x10, 0, 0, 0, 0, 0]);
-    bench.say(0x205, [0x2F, 0, 1, 0, 0, 0, 0]);
-    bench.say(0x080, []);
+    bench.send_data(0x605, [0x40, 0, 0x10, 0, 0, 0, 0, 0]);
+    bench.send_data(0x205, [0x2F, 0, 1, 0, 0, 0, 0]);
+    bench.send_data(0x080, []);
     bench.run_ms(3_000);
     assert!(bench.heard.is_empty());
     bench.nmt(0x01);
@@ -50,7 +50,7 @@ fn the_state_after_power_up_and_its_announcement_are_the_units_own() {
     let quirks = Quirks { announces_power_up: false, ..Quirks::default() };
     let unit = YzAimParameters { starts_operational: true, quirks, ..parameters(NODE) };
     let mut unit = bench(unit);
-    assert_eq!(unit.observe().nmt, NmtState::Operational);
+    assert_eq!(unit.observe().nmt, NodeState::Operational);
     unit.run_ms(1_000);
     assert_eq!(unit.take(0x705), [[5]]);
     unit.bus.power_cycle(NODE).unwrap();
@@ -99,7 +99,7 @@ fn a_lost_master_stops_the_motor_and_its_return_lets_it_go_on_to_the_old_target(
 fn only_node_127_counts_and_a_time_of_0_watches_nobody() {
     let mut bench = bench(by_the_manual(NODE));
     bench.write(0x1016, 1, 4, 0x007F_0064).unwrap();
-    bench.say(0x701, [5]);
+    bench.send_data(0x701, [5]);
     bench.run_ms(500);
     assert_eq!(bench.alarm(), 0);
     bench.write(0x1016, 1, 4, 0x007F_0000).unwrap();
@@ -115,7 +115,7 @@ fn tpdo1_and_tpdo3_come_every_100_ms_and_tpdo2_with_every_sync() {
     bench.run_ms(1_000);
     assert_eq!((bench.take(0x185).len(), bench.take(0x385).len()), (10, 10));
     for _ in 0..10 {
-        bench.say(0x080, []);
+        bench.send_data(0x080, []);
         bench.run_ms(2);
     }
     assert_eq!(bench.take(0x285).len(), 10);
@@ -125,7 +125,7 @@ fn tpdo1_and_tpdo3_come_every_100_ms_and_tpdo2_with_every_sync() {
     bench.write(0x1801, 2, 1, 255).unwrap();
     bench.heard.clear();
     for _ in 0..100 {
-        bench.say(0x080, []);
+        bench.send_data(0x080, []);
         bench.run_ms(2);
     }
     assert_eq!([0x185, 0x285, 0x385].map(|id| bench.take(id).len()), [0, 0, 10]);
@@ -134,7 +134,7 @@ fn tpdo1_and_tpdo3_come_every_100_ms_and_tpdo2_with_every_sync() {
 #[test]
 fn an_event_timer_that_is_set_before_operational_waits_for_it_and_wakes_nobody() {
     let mut joint = YzAimJoint::new(parameters(NODE));
-    let mut mailbox = Mailbox::new(Order::FirstInFirstOut, 8);
+    let mut mailbox = Mailbox::new(QueueOrder::FirstInFirstOut, 8);
     joint.advance(10 * MILLISECOND_NS, &mut mailbox);
     let write = Frame::of(Id::canopen(0x600, NODE), [0x2B, 0x00, 0x18, 5, 20, 0, 0, 0]);
     joint.receive(11 * MILLISECOND_NS, &write, &mut mailbox);
@@ -159,7 +159,7 @@ fn answers_to_rpdos_keep_the_inhibit_time() {
     bench.write(0x1803, 3, 2, 100).unwrap();
     bench.heard.clear();
     for _ in 0..5 {
-        bench.say(0x505, [0, 0, 0, 0]);
+        bench.send_data(0x505, [0, 0, 0, 0]);
         bench.run_ms(1);
     }
     bench.run_ms(20);
@@ -174,8 +174,8 @@ fn answers_to_rpdos_keep_the_inhibit_time() {
 #[test]
 fn pdos_and_sync_do_nothing_before_operational() {
     let mut bench = bench(by_the_manual(NODE));
-    bench.say(0x205, [0x2F, 0, 1, 0x50, 0xC3, 0, 0]);
-    bench.say(0x080, []);
+    bench.send_data(0x205, [0x2F, 0, 1, 0x50, 0xC3, 0, 0]);
+    bench.send_data(0x080, []);
     bench.run_ms(300);
     assert_eq!((bench.position(), bench.statusword()), (0, 0x0404));
     assert!(bench.heard.is_empty());
@@ -186,7 +186,7 @@ fn an_overlapping_sdo_is_lost_and_answers_take_about_300_microseconds() {
     let mut bench = bench(parameters(NODE));
     let began_ns = bench.now_ns;
     for index in [0x00, 0x17, 0x05] {
-        bench.say(0x605, [0x40, index, 0x10, 0, 0, 0, 0, 0]);
+        bench.send_data(0x605, [0x40, index, 0x10, 0, 0, 0, 0, 0]);
     }
     bench.run_ms(5);
     let [answer] = &bench.heard[..] else { panic!("{} answers", bench.heard.len()) };
@@ -198,7 +198,7 @@ fn an_overlapping_sdo_is_lost_and_answers_take_about_300_microseconds() {
 #[test]
 fn an_unknown_object_gets_no_answer_at_all() {
     let mut bench = bench(parameters(NODE));
-    bench.say(0x605, [0x23, 0x84, 0x60, 0, 0x10, 0x27, 0, 0]);
+    bench.send_data(0x605, [0x23, 0x84, 0x60, 0, 0x10, 0x27, 0, 0]);
     bench.run_ms(100);
     assert!(bench.heard.is_empty());
     assert_eq!(bench.read(0x1018, 1), Ok(0x331));

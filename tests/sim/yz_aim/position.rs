@@ -163,14 +163,14 @@ fn an_rpdo2_moves_only_what_is_enabled_with_bit_5() {
     let mut bench = bench(by_the_manual(NODE));
     bench.nmt(0x01);
     let rpdo2 = [0x50, 0xC3, 0, 0, 0xE8, 0x03, 0, 0];
-    bench.say(0x305, rpdo2);
+    bench.send_data(0x305, rpdo2);
     bench.run_ms(100);
     assert_eq!(super::decoded(&bench.take(0x285)[0]), (0, 0x0404));
-    bench.say(0x205, [0x2F, 0, 1, 0x50, 0xC3, 0, 0]);
+    bench.send_data(0x205, [0x2F, 0, 1, 0x50, 0xC3, 0, 0]);
     bench.run_ms(1);
     assert_eq!(super::decoded(bench.take(0x185).last().unwrap()).1, 0x0037);
     bench.run_ms(1000);
-    bench.say(0x305, rpdo2);
+    bench.send_data(0x305, rpdo2);
     bench.run_ms(1);
     assert_eq!(super::decoded(&bench.take(0x285)[0]), (50_000, 0x0437));
 }
@@ -182,7 +182,7 @@ fn tpdo3_says_the_velocity_in_r_min_or_in_tenths_as_the_unit_is() {
         let mut bench = bench(YzAimParameters { quirks, ..parameters(NODE) });
         bench.nmt(0x01);
         for _ in 0..300 {
-            bench.say(0x405, [0x0F, 0, 3, 0xA8, 0xFD, 0xFF, 0xFF]);
+            bench.send_data(0x405, [0x0F, 0, 3, 0xA8, 0xFD, 0xFF, 0xFF]);
             bench.run_ms(1);
         }
         let answer = bench.take(0x385).pop().unwrap();

@@ -1,7 +1,7 @@
 //! What is stored, what needs a power cycle, and what the drive does by itself after one.
 
 use takt::sim::yz_aim::{Model, YzAimJoint};
-use takt::sim::{Drive, Mailbox, Order};
+use takt::sim::{Drive, Mailbox, QueueOrder};
 use takt_rt::frame::{Frame, Id};
 
 use super::{Bench, MILLISECOND_NS, NODE, YzAimParameters, bench, by_the_manual, parameters};
@@ -33,13 +33,13 @@ fn a_node_address_counts_when_it_was_stored_and_the_supply_returns() {
     bench.run_ms(10);
     assert_eq!(bench.bus.nodes().collect::<Vec<_>>(), [9]);
     assert_eq!(bench.take(0x709), [[0]]);
-    bench.say(0x609, [0x40, 0x00, 0x14, 1, 0, 0, 0, 0]);
-    bench.say(0x605, [0x40, 0x00, 0x14, 1, 0, 0, 0, 0]);
+    bench.send_data(0x609, [0x40, 0x00, 0x14, 1, 0, 0, 0, 0]);
+    bench.send_data(0x605, [0x40, 0x00, 0x14, 1, 0, 0, 0, 0]);
     bench.run_ms(5);
     assert_eq!(bench.take(0x589), [[0x43, 0x00, 0x14, 1, 0x09, 0x02, 0, 0]]);
     assert!(bench.heard.is_empty());
     for address in [0, 128] {
-        bench.say(0x609, [0x2B, 0x15, 0x26, 0, address, 0, 0, 0]);
+        bench.send_data(0x609, [0x2B, 0x15, 0x26, 0, address, 0, 0, 0]);
         bench.run_ms(5);
         assert_eq!(bench.take(0x589)[0][0], 0x80);
     }
@@ -48,7 +48,7 @@ fn a_node_address_counts_when_it_was_stored_and_the_supply_returns() {
 #[test]
 fn at_a_new_bit_rate_the_drive_is_deaf_and_mute_on_the_old_bus() {
     let mut drive = YzAimJoint::new(parameters(NODE));
-    let mut mailbox = Mailbox::new(Order::Priority, 16);
+    let mut mailbox = Mailbox::new(QueueOrder::Priority, 16);
     let mut now_ns = 10 * MILLISECOND_NS;
     let mut ask = |drive: &mut YzAimJoint, request: [u8; 8]| {
         drive.receive(now_ns, &Frame::of(Id::canopen(0x600, NODE), request), &mut mailbox);
@@ -56,7 +56,7 @@ fn at_a_new_bit_rate_the_drive_is_deaf_and_mute_on_the_old_bus() {
         drive.advance(now_ns, &mut mailbox);
         std::iter::from_fn(|| mailbox.pop()).count()
     };
-    drive.advance(10 * MILLISECOND_NS, &mut Mailbox::new(Order::Priority, 16));
+    drive.advance(10 * MILLISECOND_NS, &mut Mailbox::new(QueueOrder::Priority, 16));
     for request in [
         [0x2B, 0x00, 0x26, 0, 1, 0, 0, 0],
         [0x23, 0x83, 0x60, 0, 0x22, 3, 0, 0],
@@ -66,7 +66,7 @@ fn at_a_new_bit_rate_the_drive_is_deaf_and_mute_on_the_old_bus() {
         assert_eq!(ask(&mut drive, request), 1);
     }
     assert_eq!(drive.bit_rate(), 1_000_000, "until the supply returns");
-    drive.power_cycle(20 * MILLISECOND_NS, &mut Mailbox::new(Order::Priority, 16));
+    drive.power_cycle(20 * MILLISECOND_NS, &mut Mailbox::new(QueueOrder::Priority, 16));
     assert_eq!(drive.bit_rate(), 500_000);
     for _ in 0..2_000 {
         assert_eq!(ask(&mut drive, [0x40, 0, 0x10, 0, 0, 0, 0, 0]), 0);
@@ -182,9 +182,9 @@ fn writes_that_the_dictionary_does_not_allow_are_aborted() {
 #[test]
 fn unpadded_requests_are_taken() {
     let mut bench = bench(parameters(NODE));
-    bench.say(0x605, [0x2F, 0x60, 0x60, 0, 3]);
+    bench.send_data(0x605, [0x2F, 0x60, 0x60, 0, 3]);
     bench.run_ms(2);
-    bench.say(0x605, [0x40, 0x60, 0x60, 0]);
+    bench.send_data(0x605, [0x40, 0x60, 0x60, 0]);
     bench.run_ms(2);
     assert_eq!(bench.take(0x585), [[0x60, 0x60, 0x60, 0, 0, 0, 0, 0], [0x4F, 0x60, 0x60, 0, 3, 0, 0, 0]]);
 }

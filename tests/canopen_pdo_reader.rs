@@ -6,11 +6,11 @@ use takt::canopen::eds;
 use takt::canopen::object::ObjectAddress;
 use takt::canopen::objects::PdoDirection;
 use takt::canopen::pdo_configuration::PdoConfiguration;
-use takt::canopen::pdo_inquiry::{PdoInquiry, PdoInquiryError};
-use takt::canopen::sdo::{Expedited, Request, SdoError, Timing};
+use takt::canopen::pdo_reader::{PdoReadError, PdoReader};
+use takt::canopen::sdo::{Expedited, SdoError, SdoRequest, SdoTiming};
 use takt::sim::erob::{ErobJoint, ErobParameters};
 use takt::sim::plant::{Encoder, JointParameters};
-use takt::sim::{BitRates, SimulatedBus};
+use takt::sim::{SimulatedBus, WireBitRates};
 use takt_rt::frame::{Frame, Id};
 use takt_rt::port::{BusPort, ReceiveBatch};
 
@@ -45,7 +45,7 @@ impl Bench {
             is_upload_segmented: false,
             seed: 1,
         });
-        let rates = BitRates { nominal: 1_000_000, data: None };
+        let rates = WireBitRates { nominal: 1_000_000, data: None };
         let mut bus = SimulatedBus::with_drives(rates, u64::MAX, vec![Box::new(drive)]);
         bus.send(0, &[]);
         let mut bench = Self { bus, now_ns: 0 };
@@ -65,16 +65,16 @@ impl Bench {
         heard
     }
 
-    fn ask(&mut self, mut inquiry: PdoInquiry) -> Result<Vec<PdoConfiguration>, PdoInquiryError> {
+    fn ask(&mut self, mut reader: PdoReader) -> Result<Vec<PdoConfiguration>, PdoReadError> {
         for _ in 0..10_000 {
-            while let Some(frame) = inquiry.poll(self.now_ns) {
+            while let Some(frame) = reader.poll(self.now_ns) {
                 self.bus.send(self.now_ns, &[frame]);
             }
-            if let Some(outcome) = inquiry.outcome() {
+            if let Some(outcome) = reader.outcome() {
                 return outcome;
             }
             for frame in self.pass(1) {
-                inquiry.receive(&frame);
+                reader.receive(&frame);
             }
         }
         panic!("no end after 10 s");
@@ -85,7 +85,7 @@ impl Bench {
 fn what_the_drive_reports_is_what_its_data_sheet_says() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/eds/erob-canopen.eds");
     let described = eds::load(&path).unwrap().dictionary.pdos(Some(NODE));
-    let reported = Bench::new().ask(PdoInquiry::of_first_four(NODE, Timing::default())).unwrap();
+    let reported = Bench::new().ask(PdoReader::of_first_four(NODE, SdoTiming::default())).unwrap();
     assert_eq!(reported.len(), 8);
     for (reported, described) in reported.iter().zip(&described) {
         // The data sheet leaves these open.
@@ -102,13 +102,13 @@ fn process_data_is_decoded_by_what_the_drive_reports() {
     for (subindex, value) in [(1, &0x285_u32.to_le_bytes()[..]), (2, &[1])] {
         let object = ObjectAddress::new(0x1801, subindex);
         let data = Expedited::of(value).unwrap();
-        bench.bus.send(bench.now_ns, &[Request::DownloadExpedited { object, data }.frame(NODE)]);
+        bench.bus.send(bench.now_ns, &[SdoRequest::DownloadExpedited { object, data }.frame(NODE)]);
         bench.pass(5);
     }
     bench.bus.send(bench.now_ns, &[Frame::of(Id::canopen(0, 0), [1, NODE])]);
     bench.pass(5);
-    let inquiry = PdoInquiry::new(NODE, Timing::default(), [(PdoDirection::Transmit, 2)]);
-    let tpdo2 = bench.ask(inquiry).unwrap().remove(0);
+    let reader = PdoReader::new(NODE, SdoTiming::default(), [(PdoDirection::Transmit, 2)]);
+    let tpdo2 = bench.ask(reader).unwrap().remove(0);
     assert_eq!((tpdo2.is_valid, tpdo2.length()), (true, 6));
     bench.bus.send(bench.now_ns, &[Frame::of(Id::canopen(0x80, 0), [])]);
     let heard = bench.pass(3);
@@ -123,9 +123,9 @@ fn process_data_is_decoded_by_what_the_drive_reports() {
 fn pdos_that_the_drive_does_not_have_are_left_out_and_silence_is_a_failure() {
     let mut bench = Bench::new();
     let pdos = [(PdoDirection::Receive, 5), (PdoDirection::Receive, 2)];
-    let reported = bench.ask(PdoInquiry::new(NODE, Timing::default(), pdos)).unwrap();
+    let reported = bench.ask(PdoReader::new(NODE, SdoTiming::default(), pdos)).unwrap();
     assert_eq!(reported.iter().map(|pdo| pdo.number).collect::<Vec<_>>(), [2]);
-    let failure = bench.ask(PdoInquiry::of_first_four(9, Timing::default())).unwrap_err();
+    let failure = bench.ask(PdoReader::of_first_four(9, SdoTiming::default())).unwrap_err();
     assert_eq!(failure.object.to_string(), "1400:00");
     assert!(matches!(failure.error, SdoError::NoReply { .. }));
 }
