@@ -32,7 +32,7 @@ impl ConsumerHeartbeatTime {
 /// The node already has a consumer; CiA 301, 7.5.2.19 refuses such an entry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the heartbeat of node {node} is already monitored")]
-pub struct AlreadyWatched {
+pub struct AlreadyMonitored {
     /// The node ID.
     pub node: u8,
 }
@@ -46,19 +46,19 @@ pub struct HeartbeatTable {
 
 impl HeartbeatTable {
     /// Monitors these nodes, each from its first message on.
-    pub fn new(entries: impl IntoIterator<Item = ConsumerHeartbeatTime>) -> Result<Self, AlreadyWatched> {
+    pub fn new(entries: impl IntoIterator<Item = ConsumerHeartbeatTime>) -> Result<Self, AlreadyMonitored> {
         let mut table = Self::default();
         for entry in entries {
-            table.watch(entry)?;
+            table.monitor(entry)?;
         }
         Ok(table)
     }
 
     /// Adds a node.
-    pub fn watch(&mut self, entry: ConsumerHeartbeatTime) -> Result<(), AlreadyWatched> {
+    pub fn monitor(&mut self, entry: ConsumerHeartbeatTime) -> Result<(), AlreadyMonitored> {
         let ConsumerHeartbeatTime { node, time_ms } = entry;
-        if self.is_watched(node) {
-            return Err(AlreadyWatched { node });
+        if self.is_monitored(node) {
+            return Err(AlreadyMonitored { node });
         }
         let timeout_ns = Nanoseconds::from(time_ms) * MILLISECOND_NS;
         self.consumers.push((node, HeartbeatConsumer::new(node, timeout_ns)));
@@ -66,18 +66,18 @@ impl HeartbeatTable {
     }
 
     /// Removes a node.
-    pub fn forget(&mut self, node: u8) {
-        self.consumers.retain(|(watched, _)| *watched != node);
+    pub fn remove(&mut self, node: u8) {
+        self.consumers.retain(|(monitored, _)| *monitored != node);
     }
 
     /// Whether a node is monitored.
-    pub fn is_watched(&self, node: u8) -> bool {
-        self.consumers.iter().any(|(watched, _)| *watched == node)
+    pub fn is_monitored(&self, node: u8) -> bool {
+        self.consumers.iter().any(|(monitored, _)| *monitored == node)
     }
 
     /// The last reported state of a node; `None` if it is not monitored, not known yet, or lost.
     pub fn state(&self, node: u8) -> Option<NmtState> {
-        self.consumers.iter().find(|(watched, _)| *watched == node)?.1.state()
+        self.consumers.iter().find(|(monitored, _)| *monitored == node)?.1.state()
     }
 
     /// Every monitored node with its state.
@@ -142,10 +142,10 @@ mod tests {
     #[test]
     fn a_node_is_added_once_and_can_be_removed() {
         let mut table = HeartbeatTable::new([entry(2, 100)]).unwrap();
-        assert_eq!(table.watch(entry(2, 500)), Err(AlreadyWatched { node: 2 }));
-        table.forget(2);
-        assert!(!table.is_watched(2));
-        assert_eq!(table.watch(entry(2, 500)), Ok(()));
+        assert_eq!(table.monitor(entry(2, 500)), Err(AlreadyMonitored { node: 2 }));
+        table.remove(2);
+        assert!(!table.is_monitored(2));
+        assert_eq!(table.monitor(entry(2, 500)), Ok(()));
     }
 
     #[test]

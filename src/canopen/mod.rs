@@ -1,9 +1,9 @@
-//! The CANopen services (CiA 301) of a master, without input and output: the caller passes time and frames in, and sends
-//! the frames that come out.
+//! The CANopen services (CiA 301) of a master, without input and output: the caller passes time and frames in, and
+//! sends the frames that come out.
 //!
 //! - [`nmt`]: network management: commands, states, boot-up and heartbeat.
-//! - [`sdo`]: service data objects: the messages, and a client that transfers one object at a time, expedited, segmented
-//!   or in blocks.
+//! - [`sdo`]: service data objects: the messages, and a client that transfers one object at a time, expedited,
+//!   segmented or in blocks.
 //! - [`emcy`]: emergency messages and the names of their codes.
 //! - [`sync`]: the SYNC message; [`time`]: the TIME message.
 //! - [`heartbeat`]: heartbeat consumers.

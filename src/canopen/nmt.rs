@@ -123,7 +123,7 @@ pub struct HeartbeatConsumer {
     node: u8,
     timeout_ns: Nanoseconds,
     state: Option<NmtState>,
-    heard_at_ns: Nanoseconds,
+    received_at_ns: Nanoseconds,
     is_lost: bool,
 }
 
@@ -151,7 +151,7 @@ pub enum HeartbeatEvent {
 impl HeartbeatConsumer {
     /// Monitors `node` with this timeout.
     pub const fn new(node: u8, timeout_ns: Nanoseconds) -> Self {
-        Self { node, timeout_ns, state: None, heard_at_ns: 0, is_lost: false }
+        Self { node, timeout_ns, state: None, received_at_ns: 0, is_lost: false }
     }
 
     /// The last reported state; `None` before the first message and after a loss.
@@ -164,7 +164,7 @@ impl HeartbeatConsumer {
         let message = ErrorControl::decode(frame).filter(|message| message.node == self.node)?;
         let from = self.state();
         self.state = Some(message.state);
-        self.heard_at_ns = now_ns;
+        self.received_at_ns = now_ns;
         self.is_lost = false;
         match message.state {
             NmtState::BootUp => Some(HeartbeatEvent::BootUp),
@@ -176,7 +176,7 @@ impl HeartbeatConsumer {
     /// Returns once that the heartbeat has timed out.
     pub fn poll(&mut self, now_ns: Nanoseconds) -> Option<HeartbeatEvent> {
         let last = self.state()?;
-        let silence_ns = now_ns.saturating_sub(self.heard_at_ns);
+        let silence_ns = now_ns.saturating_sub(self.received_at_ns);
         // A node that has only booted may not produce a heartbeat yet.
         if last == NmtState::BootUp || silence_ns <= self.timeout_ns {
             return None;
@@ -233,9 +233,9 @@ mod tests {
     #[test]
     fn a_consumer_reports_changes_and_each_timeout_once() {
         let mut consumer = HeartbeatConsumer::new(2, 100);
-        assert_eq!(consumer.poll(1_000), None, "nothing is watched before the first message");
+        assert_eq!(consumer.poll(1_000), None, "not monitored before the first message");
         assert_eq!(consumer.receive(1_000, &heartbeat(NmtState::BootUp)), Some(HeartbeatEvent::BootUp));
-        assert_eq!(consumer.poll(5_000), None, "a boot-up alone promises no heartbeat");
+        assert_eq!(consumer.poll(5_000), None, "a boot-up message alone does not start monitoring");
         let changed = HeartbeatEvent::Changed { from: Some(NmtState::BootUp), to: NmtState::PreOperational };
         assert_eq!(consumer.receive(5_000, &heartbeat(NmtState::PreOperational)), Some(changed));
         assert_eq!(consumer.receive(5_050, &heartbeat(NmtState::PreOperational)), None);

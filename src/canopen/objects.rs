@@ -93,7 +93,8 @@ pub const SOFTWARE_VERSION: ObjectAddress = ObjectAddress::new(0x100A, 0);
 
 /// Bit of a PDO's COB-ID that makes the PDO invalid (CiA 301, 7.5.2.35).
 pub const PDO_INVALID: u32 = 1 << 31;
-/// The valid bit and the 11-bit identifier of a PDO's COB-ID. Bit 30 (no RTR) is excluded, because some devices force it.
+/// The valid bit and the 11-bit identifier of a PDO's COB-ID. Bit 30 (no RTR) is excluded, because some devices force
+/// it.
 pub const PDO_IDENTITY: u32 = PDO_INVALID | 0x7FF;
 
 /// The direction of a PDO, seen from the device.

@@ -8,7 +8,8 @@ use super::objects::{PDO_INVALID, PdoDirection, PdoParameters};
 
 /// Bit of a COB-ID for a 29-bit identifier.
 const EXTENDED: u32 = 1 << 29;
-/// Numbers of mapped objects from this one on mean multiplexed PDOs, which have no mapping of their own (CiA 301, 7.5.2.36).
+/// Numbers of mapped objects from this one on mean multiplexed PDOs, which have no mapping of their own (CiA 301,
+/// 7.5.2.36).
 const MULTIPLEXED: u32 = 0xFE;
 
 /// The configuration of one PDO.
@@ -71,8 +72,8 @@ impl PdoConfiguration {
         self.bits().div_ceil(8)
     }
 
-    /// The values of the mapped objects in a frame of this PDO, as unsigned bits; the lowest 64 bits of longer objects. `None`
-    /// for other frames and for frames shorter than the mapping.
+    /// The values of the mapped objects in a frame of this PDO, as unsigned bits; the lowest 64 bits of longer objects.
+    /// `None` for other frames and for frames shorter than the mapping.
     pub fn values(&self, frame: &Frame) -> Option<Vec<(MappedObject, u64)>> {
         let payload = frame.payload();
         if !self.is_valid || Some(frame.id()) != self.id || payload.len() < self.length() {

@@ -1,7 +1,8 @@
 //! Reads the PDO configuration of a device by SDO, so that process data is decoded as the device reports it.
 //!
-//! Sub-index 0 of each parameter is read first, because it says which sub-indices exist. A device that does not answer for
-//! missing objects then gets no such request. No input and output, as with [`sdo::SdoClient`](super::sdo::SdoClient).
+//! Sub-index 0 of each parameter is read first, because it says which sub-indices exist. A device that does not answer
+//! for missing objects then gets no such request. No input and output, as with
+//! [`sdo::SdoClient`](super::sdo::SdoClient).
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -88,8 +89,8 @@ impl PdoReader {
         self.client.receive(frame);
     }
 
-    /// The PDOs of the device, or the object that could not be read; `None` while reading. An abort means that the object does
-    /// not exist; no reply is a failure.
+    /// The PDOs of the device, or the object that could not be read; `None` while reading. An abort means that the
+    /// object does not exist; no reply is a failure.
     pub fn outcome(&self) -> Option<Result<Vec<PdoConfiguration>, PdoReadError>> {
         if let Some(failure) = self.failure {
             return Some(Err(failure));

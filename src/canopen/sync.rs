@@ -24,8 +24,8 @@ impl Sync {
         }
     }
 
-    /// Number of missing messages between `before` and this one, by their counters and the overflow value (object 1019, 2 to
-    /// 240); 0 when one of them has no counter.
+    /// Number of missing messages between `before` and this one, by their counters and the overflow value (object 1019,
+    /// 2 to 240); 0 when one of them has no counter.
     pub fn missing_since(self, before: Self, overflow: u8) -> u8 {
         let (Some(now), Some(before)) = (self.counter, before.counter) else { return 0 };
         let due = if before >= overflow { 1 } else { before + 1 };
@@ -51,7 +51,8 @@ impl SyncProducer {
         Self { counter: None }
     }
 
-    /// SYNC with a counter from 1 to `overflow` (object 1019), then from 1 again. `None` outside 2 to 240 (CiA 301, 7.5.2.22).
+    /// SYNC with a counter from 1 to `overflow` (object 1019), then from 1 again. `None` outside 2 to 240 (CiA 301,
+    /// 7.5.2.22).
     pub const fn with_counter(overflow: u8) -> Option<Self> {
         match overflow {
             2..=240 => Some(Self { counter: Some(Counter { last: 0, overflow }) }),

@@ -1,5 +1,5 @@
-//! Converts the time of day of the TIME message (CiA 301, 7.2.6) from and to the system clock. The message and its producer
-//! are in [`takt_rt::time_of_day`].
+//! Converts the time of day of the TIME message (CiA 301, 7.2.6) from and to the system clock. The message and its
+//! producer are in [`takt_rt::time_of_day`].
 
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 

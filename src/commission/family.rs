@@ -1,4 +1,4 @@
-//! What commissioning knows about each drive family.
+//! The properties of each drive family for commissioning.
 
 use takt_rt::frame::Frame;
 
@@ -23,7 +23,7 @@ impl Family {
         }
     }
 
-    /// SdoTiming and quirks of the SDO server. A YZ-AIM drops requests that overlap or follow too soon.
+    /// Timing and quirks of the SDO server. A YZ-AIM drops requests that overlap or follow too soon.
     pub const fn sdo_quirks(self) -> SdoQuirks {
         let timing = SdoTiming { reply_timeout_ns: 100_000_000, retries: 2 };
         match self {

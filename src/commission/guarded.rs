@@ -7,8 +7,8 @@ use super::report::Report;
 use super::sdo_session::SdoSession;
 use super::target::TargetDrive;
 
-/// Runs `work`, then `rest`. `rest` is left out when `work` succeeded and the axis stays enabled. A further interruption
-/// cuts `rest` short and runs `cut`, which takes the torque off at once.
+/// Runs `work`, then `rest`. `rest` is left out when `work` succeeded and the axis stays enabled. A further
+/// interruption cuts `rest` short and runs `cut`, which takes the torque off at once.
 pub async fn guarded(
     c: &SdoSession,
     keeps_enabled: bool,
@@ -34,12 +34,12 @@ pub async fn guarded(
         rested => rested,
     };
     match (done, rested) {
-        (Err(failure), Err(trouble)) => {
-            c.note(format!("the axis may still be moving: {trouble}; use the emergency stop"));
+        (Err(failure), Err(stop_failure)) => {
+            c.note(format!("the axis may still be moving: {stop_failure}; use the emergency stop"));
             Err(failure)
         }
         (Err(failure), Ok(())) => Err(failure),
-        (Ok(_), Err(trouble)) => Err(trouble),
+        (Ok(_), Err(stop_failure)) => Err(stop_failure),
         (Ok(report), Ok(())) => Ok(report),
     }
 }

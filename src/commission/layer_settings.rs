@@ -87,7 +87,8 @@ impl<'a, P: BusPort, C: Clock> LayerSettings<'a, P, C> {
         }
     }
 
-    /// Switches the selected device to LSS configuration state and all others to waiting. Returns its identity, if known.
+    /// Switches the selected device to LSS configuration state and all others to waiting. Returns its identity, if
+    /// known.
     ///
     /// # Errors
     /// The device does not answer, or a task failed.
@@ -109,8 +110,8 @@ impl<'a, P: BusPort, C: Clock> LayerSettings<'a, P, C> {
         }
     }
 
-    /// Finds one device without a node ID that is not yet in configuration state, and switches it there. `None`: there is
-    /// no such device.
+    /// Finds one device without a node ID that is not yet in configuration state, and switches it there. `None`: there
+    /// is no such device.
     ///
     /// # Errors
     /// Answers were lost, or the scan was interrupted.
@@ -121,8 +122,8 @@ impl<'a, P: BusPort, C: Clock> LayerSettings<'a, P, C> {
         }
     }
 
-    /// Switches all devices to LSS waiting state. With `is_boot_up_awaited`, waits for the boot-up message of a device that
-    /// has just got a node ID, and returns that node ID.
+    /// Switches all devices to LSS waiting state. With `is_boot_up_awaited`, waits for the boot-up message of a device
+    /// that has just got a node ID, and returns that node ID.
     ///
     /// # Errors
     /// It was interrupted.

@@ -65,8 +65,8 @@ impl TargetDrive {
         self.limits.map(|limits| self.acceleration_raw(CommandValue::Joint(limits.deceleration)))
     }
 
-    /// Checks that the axis can still stop before a position limit. The deceleration is in drive units; `None` is that of
-    /// the limits.
+    /// Checks that the axis can still stop before a position limit. The deceleration is in drive units; `None` is that
+    /// of the limits.
     ///
     /// # Errors
     /// [`Failure::AtLimit`]
@@ -89,7 +89,8 @@ impl TargetDrive {
         Err(Failure::AtLimit { quantity: self.position_quantity(), value: reading.position, low, high })
     }
 
-    /// Checks that a resting axis may move in the direction of `velocity` (drive units). At a limit it may only move away.
+    /// Checks that a resting axis may move in the direction of `velocity` (drive units). At a limit it may only move
+    /// away.
     ///
     /// # Errors
     /// [`Failure::AtLimit`]

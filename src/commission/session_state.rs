@@ -11,7 +11,7 @@ use crate::canopen::function_code;
 use crate::canopen::nmt::{ErrorControl, NmtState};
 use crate::canopen::sdo::{SdoClient, SdoTiming};
 
-/// SdoTiming and deviations of a drive's SDO server.
+/// Timing and deviations of a drive's SDO server.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SdoQuirks {
     /// Reply timeout and retries.

@@ -1,14 +1,14 @@
 //! Brings drives up and shuts them down, all axes of all buses in parallel.
 //!
 //! [`BringUp`] has two stages. [`Stage::Configure`] leaves every drive in NMT pre-operational, without torque, with its
-//! PDO mapping and mode set, and its target at the actual position. Then [`BringUp::start`] begins [`Stage::Start`], which
-//! makes the nodes operational; after that SYNC may begin. [`Shutdown`] follows the last motion.
+//! PDO mapping and mode set, and its target at the actual position. Then [`BringUp::start`] begins [`Stage::Start`],
+//! which makes the nodes operational; after that SYNC may begin. [`Shutdown`] follows the last motion.
 //!
 //! There is no input and output here: [`BringUp::poll`] returns frames, [`BringUp::receive`] takes them. Both may be
 //! called at any rate. Each drive has at most one SDO transfer under way.
 //!
-//! If the configuration gives the master a heartbeat, the drives monitor it from the end of [`Stage::Configure`] on. The
-//! caller sends it from before the bring-up until [`Shutdown`] is done, also after a failed bring-up.
+//! If the configuration gives the master a heartbeat, the drives monitor it from the end of [`Stage::Configure`] on.
+//! The caller sends it from before the bring-up until [`Shutdown`] is done, also after a failed bring-up.
 
 use takt_rt::frame::Frame;
 use takt_rt::time::Nanoseconds;
@@ -144,8 +144,8 @@ impl BringUp {
     }
 }
 
-/// Shuts every axis of a configuration down: NMT pre-operational, without torque, heartbeat watchdog off. The cycle should
-/// have disabled the axes before; an axis that still has torque is stopped and disabled.
+/// Shuts every axis of a configuration down: NMT pre-operational, without torque, heartbeat watchdog off. The cycle
+/// should have disabled the axes before; an axis that still has torque is stopped and disabled.
 ///
 /// The master's heartbeat must continue until this is done.
 #[derive(Debug)]

@@ -1,5 +1,5 @@
-//! ZeroErr eRob with CANopen firmware (eRunner manual 1.7, chapter 5, and field experience): the steps of bring-up, start
-//! and shutdown, and the vendor's error codes.
+//! ZeroErr eRob with CANopen firmware (eRunner manual 1.7, chapter 5, and field experience): the steps of bring-up,
+//! start and shutdown, and the vendor's error codes.
 
 use takt_rt::cia402::controlword;
 use takt_rt::frame::{Frame, Id};
@@ -56,7 +56,7 @@ pub(super) fn configure(config: &Config, axis: &Axis, timing: &BringUpTiming) ->
     let mut list = StepList::new(
         "restart of its communication",
         "check that the drive is powered (it needs 8 s), the wiring and the termination of the bus, its bit rate \
-         (1 Mbit/s), and its node number",
+         (1 Mbit/s), and its node ID",
     );
     list.nmt(
         NmtCommand::ResetCommunication,
@@ -252,8 +252,8 @@ fn ratings(list: &mut StepList, axis: &Axis) {
     list.read_optional(objects::QUICK_STOP_OPTION_CODE, Fact::QuickStopOptionCode);
 }
 
-/// Sets the drive's limits beyond those of the controller, which acts first. Sets the drive's profile to the axis' limits,
-/// because the defaults are very slow (6081 = 10000 count/s); the cyclic modes use it too.
+/// Sets the drive's limits beyond those of the controller, which acts first. Sets the drive's profile to the axis'
+/// limits, because the defaults are very slow (6081 = 10000 count/s); the cyclic modes use it too.
 fn limits(list: &mut StepList, axis: &Axis) {
     list.begin("limits", "choose limits for this axis that its drive accepts");
     let limits = &axis.limits;
@@ -291,7 +291,7 @@ fn target_at_actual_position(list: &mut StepList) {
     }
 }
 
-/// Sets the heartbeats. Without them a drive does not react when its master dies.
+/// Sets the heartbeats. Without them a drive does not react when the master fails.
 fn heartbeats(list: &mut StepList, config: &Config, axis: &Axis) {
     list.begin("heartbeat", "choose heartbeat times that this drive accepts");
     let own_ms = axis.heartbeat_ns.map_or(0, |period_ns| rounded_up(period_ns, 1_000_000));

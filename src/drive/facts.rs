@@ -39,8 +39,8 @@ pub struct AxisFacts {
     pub process_data: Option<ProcessData>,
     /// Optional objects that the drive does not have.
     pub absent: Vec<ObjectAddress>,
-    /// Number of boot-ups after the first one; each led to a new configuration. A reset during the drive's power-up also
-    /// counts, because the drive executes it later.
+    /// Number of boot-ups after the first one; each led to a new configuration. A reset during the drive's power-up
+    /// also counts, because the drive executes it later.
     pub restarts: u8,
 }
 

@@ -81,7 +81,7 @@ pub enum FailureCause {
         reported: Option<NmtState>,
         /// How long the procedure waited.
         waited_ns: Nanoseconds,
-        /// What probe_result a probe.
+        /// The answer to a probe with other services.
         probe_result: ProbeResult,
     },
     /// A transfer failed.
@@ -191,7 +191,7 @@ impl fmt::Display for Content {
     }
 }
 
-/// What probe_result a probe of a node that did not report the awaited state.
+/// The answer of a node that did not report the awaited state to a probe.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ProbeResult {
     /// Nothing answered.
@@ -213,9 +213,7 @@ impl fmt::Display for FailureCause {
                     None => f.write_str("it reported nothing")?,
                 }
                 match probe_result {
-                    ProbeResult::Nothing => {
-                        f.write_str(" and probe_result neither SDO nor any other protocol")
-                    }
+                    ProbeResult::Nothing => f.write_str(" and answered neither SDO nor any other protocol"),
                     ProbeResult::Sdo => f.write_str(", but its SDO server answers"),
                     ProbeResult::OtherProtocol(name) => write!(f, ", but it answers the {name}"),
                 }
@@ -277,7 +275,7 @@ impl FailureCause {
         )
     }
 
-    /// The remedy, if the cause tells more than the step.
+    /// The remedy, if the cause is more specific than the step.
     fn advice(&self) -> Option<&'static str> {
         match self {
             Self::StateNotReached { probe_result: ProbeResult::OtherProtocol(_), .. } => {

@@ -55,8 +55,9 @@ pub struct ProcessData {
 }
 
 impl ProcessData {
-    /// The process data of an axis. If the drive's own mapping is used, it is known only after the drive has reported it
-    /// ([`ProcessData::as_reported`]). Until then this has the same number of PDOs as a written mapping, each of full length.
+    /// The process data of an axis. If the drive's own mapping is used, it is known only after the drive has reported
+    /// it ([`ProcessData::as_reported`]). Until then this has the same number of PDOs as a written mapping, each of
+    /// full length.
     pub fn of(axis: &Axis) -> Self {
         match axis.drive {
             DriveFamily::ErobCanopen if axis.mapping == PdoMapping::AsStored => {
@@ -90,8 +91,8 @@ impl ProcessData {
         [STATUSWORD, POSITION].into_iter().chain(axis.feedback.iter().copied().map(mapped)).collect()
     }
 
-    /// Maps a drive with free mapping: the command in one PDO, the feedback in as many as it needs, statusword and position
-    /// first.
+    /// Maps a drive with free mapping: the command in one PDO, the feedback in as many as it needs, statusword and
+    /// position first.
     fn mapped_freely(axis: &Axis) -> Self {
         let mut feedback = vec![vec![]];
         for object in Self::needed_feedback(axis) {

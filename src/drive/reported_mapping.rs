@@ -155,8 +155,8 @@ fn named(object: MappedObject) -> String {
 }
 
 impl ProcessData {
-    /// The process data of an axis by the drive's report. With free mapping, any PDOs with the needed objects will do. Each
-    /// PDO of a YZ-AIM has a fixed purpose; a PDO that it does not report is as in the manual.
+    /// The process data of an axis by the drive's report. With free mapping, any PDOs with the needed objects will do.
+    /// Each PDO of a YZ-AIM has a fixed purpose; a PDO that it does not report is as in the manual.
     ///
     /// # Errors
     /// The first reason for which the axis cannot work with it, or the bus load is not covered by the check.
@@ -246,8 +246,8 @@ fn check_length(
     Err(MappingProblem::Length { direction, number, object: mapped, expected_bits: needed.bits })
 }
 
-/// Checks that every object of an RPDO has a value: dummy entries, needed objects, and targets or offsets of other modes,
-/// which are sent as zero.
+/// Checks that every object of an RPDO has a value: dummy entries, needed objects, and targets or offsets of other
+/// modes, which are sent as zero.
 fn check_values(pdo: &PdoConfiguration, needed: &[MappedObject]) -> Result<(), MappingProblem> {
     let has_value = |object: &MappedObject| {
         object.is_dummy()

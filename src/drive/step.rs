@@ -42,8 +42,8 @@ pub(super) enum Action {
         /// Condition to repeat the command, because a booting node may have missed it.
         repeat_ns: Nanoseconds,
     },
-    /// Repeats an NMT command and an SDO upload of object 1000 until the node answers. The node may have been absent, and a
-    /// node in NMT stopped has no SDO server before the command.
+    /// Repeats an NMT command and an SDO upload of object 1000 until the node answers. The node may have been absent,
+    /// and a node in NMT stopped has no SDO server before the command.
     WakeUp { command: NmtCommand },
     /// Reads a number.
     Read {

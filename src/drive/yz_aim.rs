@@ -62,7 +62,7 @@ pub fn alarm_advice(code: ErrorCode) -> Option<&'static str> {
 pub(super) fn configure(config: &Config, axis: &Axis, timing: &BringUpTiming) -> Vec<ProcedureStep> {
     let mut list = StepList::new(
         "restart of its communication",
-        "check that the drive is powered, the wiring and the termination of the bus, its bit rate, and its node number",
+        "check that the drive is powered, the wiring and the termination of the bus, its bit rate, and its node ID",
     );
     list.nmt(
         NmtCommand::ResetCommunication,
@@ -196,8 +196,8 @@ fn own_heartbeat_ms(axis: &Axis) -> i64 {
     axis.heartbeat_ns.map_or(0, |period_ns| rounded_up(period_ns, 1_000_000))
 }
 
-/// Whether the drive sends its feedback in reply to a set-point, and only then. TPDO 1, the reply in profile position, may
-/// also be sent by its event timer (manual, 5.08.3).
+/// Whether the drive sends its feedback in reply to a set-point, and only then. TPDO 1, the reply in profile position,
+/// may also be sent by its event timer (manual, 5.08.3).
 pub fn answers_set_points(axis: &Axis) -> bool {
     !answers_sync(axis) && axis.control == Control::Interpolated
 }

@@ -2,15 +2,16 @@
 //! (`takt run CONFIG --faults FILE`), and serve tests in virtual time.
 //!
 //! ```text
-//!  scenario file ── read ──▶ Scenario ──▶ FaultInjector ── wrap ──▶ FaultyPort(FaultyPort(… the real or simulated port))
+//! scenario file ── read ──▶ Scenario ──▶ FaultInjector ── wrap ──▶ FaultyPort(FaultyPort(… the real or simulated
+//! port))
 //!                                            ▲  │                       one fault each: window, selection, effect
 //!                                   triggers │  │ fault events
 //!                                            │  ▼
 //!                        the state of the group; which faults have begun and ended
 //! ```
 //!
-//! Every fault is one wrapper around a port, so faults compose. A wrapper allocates no memory after its construction and
-//! reads no clock. The same seed gives the same faults in every run. Frames can be changed on any port, drives only
+//! Every fault is one wrapper around a port, so faults compose. A wrapper allocates no memory after its construction
+//! and reads no clock. The same seed gives the same faults in every run. Frames can be changed on any port, drives only
 //! where they are simulated.
 
 mod effect;

@@ -1,5 +1,5 @@
-//! Defects of a simulated drive or its joint. Unlike a [`DriveFault`](super::DriveFault), the drive itself may not detect
-//! them.
+//! Defects of a simulated drive or its joint. Unlike a [`DriveFault`](super::DriveFault), the drive itself may not
+//! detect them.
 
 use takt_rt::frame::Frame;
 
@@ -13,7 +13,8 @@ pub enum Defect {
     StuckBrake,
     /// The SDO server does not reply; everything else works.
     SilentSdoServer,
-    /// The feedback PDOs carry another object than the mapping says: the motor encoder (2240) instead of the position (6064).
+    /// The feedback PDOs carry another object than the mapping says: the motor encoder (2240) instead of the position
+    /// (6064).
     OtherObjectMapped,
     /// The feedback PDOs are one byte shorter than their mapping.
     ShortFeedback,

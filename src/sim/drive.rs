@@ -29,8 +29,8 @@ pub trait Drive: Send {
     /// Injects a fault. The drive detects it at its next advance.
     fn inject_fault(&mut self, fault: DriveFault);
 
-    /// Cuts the supply and restores it at once: the drive boots with its saved parameters. The joint keeps its position, and
-    /// the brake stops it.
+    /// Cuts the supply and restores it at once: the drive boots with its saved parameters. The joint keeps its
+    /// position, and the brake stops it.
     fn power_cycle(&mut self, now_ns: Nanoseconds, mailbox: &mut Mailbox);
 
     /// Sets the external load torque on the joint: N·m (N). It lasts until it is set again.
@@ -98,7 +98,8 @@ impl NodeState {
     }
 }
 
-/// The cause of a drive fault. The error codes are those of CiA 402-2 (IEC 61800-7-201), unless the drive's own is known.
+/// The cause of a drive fault. The error codes are those of CiA 402-2 (IEC 61800-7-201), unless the drive's own is
+/// known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DriveFault {
     /// Short circuit or over-current at the motor: 0x2310. Power is cut at once.

@@ -15,8 +15,8 @@ use crate::config::Config;
 /// Longest wait, so that a request to stop is noticed.
 const LONGEST_WAIT_NS: Nanoseconds = 20_000_000;
 
-/// Drives that share one interface. Their frames are sent in the order of bus arbitration. Frames that the interface has
-/// no room for wait.
+/// Drives that share one interface. Their frames are sent in the order of bus arbitration. Frames that the interface
+/// has no room for wait.
 pub struct LiveDrives {
     port: SocketCanPort,
     stations: Vec<(Box<dyn Drive>, Mailbox)>,
@@ -135,8 +135,8 @@ mod tests {
 
     use super::*;
 
-    /// The drives of the first bus of a configuration on one end of a socket pair, and the other end. Only the interface
-    /// differs from a real one.
+    /// The drives of the first bus of a configuration on one end of a socket pair, and the other end. Only the
+    /// interface differs from a real one.
     fn connected() -> (LiveDrives, SocketCanPort) {
         let mut config = Config::load(Path::new("configs/arm6-erob.toml")).unwrap();
         config.axes.iter_mut().for_each(|axis| axis.simulated.power_up_ns = 1_000_000);

@@ -41,8 +41,8 @@ impl Mailbox {
         true
     }
 
-    /// Adds a frame, or replaces a waiting one with the same identifier, like a message buffer that is written again: the
-    /// newest data is sent.
+    /// Adds a frame, or replaces a waiting one with the same identifier, like a message buffer that is written again:
+    /// the newest data is sent.
     pub fn put(&mut self, frame: Frame) -> bool {
         if let Some(waiting) = self.frames.iter_mut().find(|waiting| waiting.id() == frame.id()) {
             *waiting = frame;
@@ -77,7 +77,8 @@ impl Mailbox {
     }
 }
 
-/// The arbitration key: the smaller one wins. Identifier first, then data before remote (the RTR bit of data is dominant).
+/// The arbitration key: the smaller one wins. Identifier first, then data before remote (the RTR bit of data is
+/// dominant).
 pub(super) fn priority(frame: &Frame) -> (u64, bool) {
     (frame.id().arbitration_key(), frame.kind() == FrameKind::Remote)
 }

@@ -58,7 +58,8 @@ impl Medium {
         Self { rates, mailboxes, is_connected, on_wire: None, free_ns: 0, busy_ns: 0 }
     }
 
-    /// The usual bus: station 0 is the master with a FIFO queue, followed by this number of drives with priority queues.
+    /// The usual bus: station 0 is the master with a FIFO queue, followed by this number of drives with priority
+    /// queues.
     pub fn with_master(
         rates: WireBitRates,
         master_frames: usize,
@@ -100,7 +101,8 @@ impl Medium {
         self.busy_ns
     }
 
-    /// The time of the next event: the frame on the wire arrives, or a waiting one can start. `None` when no frame waits.
+    /// The time of the next event: the frame on the wire arrives, or a waiting one can start. `None` when no frame
+    /// waits.
     pub fn next_ns(&self, now_ns: Nanoseconds) -> Option<Nanoseconds> {
         match &self.on_wire {
             Some(transmission) => Some(transmission.arrives_ns),

@@ -15,8 +15,9 @@
 //!                         plant ── inertia, friction, brake, end stops, encoder; homing switches
 //! ```
 //!
-//! Everything is passive, without threads and clocks. The caller passes the time in, so the same code runs in virtual time
-//! (hours in seconds, the same result in every run) and in wall-clock time. It allocates no memory after construction.
+//! Everything is passive, without threads and clocks. The caller passes the time in, so the same code runs in virtual
+//! time (hours in seconds, the same result in every run) and in wall-clock time. It allocates no memory after
+//! construction.
 //!
 //! ```
 //! use takt::sim::{WireBitRates, SimulatedBus};

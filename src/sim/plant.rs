@@ -1,5 +1,5 @@
-//! The mechanics of one joint: inertia, friction, brake, end stops and encoder, in SI units. A linear axis has metres and
-//! newtons instead of radians and newton metres.
+//! The mechanics of one joint: inertia, friction, brake, end stops and encoder, in SI units. A linear axis has metres
+//! and newtons instead of radians and newton metres.
 
 /// The parameters of a joint, at the output side.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -67,9 +67,9 @@ impl Joint {
 
     /// Advances by `duration_s` under a constant motor torque.
     ///
-    /// Coulomb friction is exact: a step in which the velocity would change its sign is split at standstill, and the joint stays
-    /// there while the friction can hold it. So it neither creeps nor chatters. Viscous friction is integrated implicitly,
-    /// which is stable for any coefficient.
+    /// Coulomb friction is exact: a step in which the velocity would change its sign is split at standstill, and the
+    /// joint stays there while the friction can hold it. So it neither creeps nor chatters. Viscous friction is
+    /// integrated implicitly, which is stable for any coefficient.
     pub fn step(&mut self, duration_s: f64, motor_torque: f64, is_braked: bool) {
         let brake = if is_braked { self.parameters.brake_torque } else { 0.0 };
         let friction = self.parameters.coulomb_friction + brake;

@@ -27,8 +27,8 @@ const MASTER: usize = 0;
 
 /// A bus with simulated drives.
 ///
-/// The master's frames wait in a FIFO queue like the kernel's: a frame behind a set-point is sent after it, whatever its
-/// priority. Every drive offers its highest-priority frame first.
+/// The master's frames wait in a FIFO queue like the kernel's: a frame behind a set-point is sent after it, whatever
+/// its priority. Every drive offers its highest-priority frame first.
 pub struct SimulatedBus {
     medium: Medium,
     drives: Vec<Box<dyn Drive>>,
@@ -63,7 +63,7 @@ pub(super) fn drives_of(config: &Config, bus: usize) -> Vec<Box<dyn Drive>> {
 
 /// The bus has no drive with this node ID.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("no simulated drive with node number {node} on this bus")]
+#[error("no simulated drive with node ID {node} on this bus")]
 pub struct UnknownNode {
     /// The requested node ID.
     pub node: u8,
@@ -89,8 +89,8 @@ impl SimulatedBus {
         Self::with_drives(rates, config.simulation.longest_gap_ns, drives_of(config, bus))
     }
 
-    /// A bus with these drives, whose supply is switched on at the first call. When two calls are more than `longest_gap_ns`
-    /// apart, the simulation pauses for the rest of the gap.
+    /// A bus with these drives, whose supply is switched on at the first call. When two calls are more than
+    /// `longest_gap_ns` apart, the simulation pauses for the rest of the gap.
     pub fn with_drives(
         rates: WireBitRates,
         longest_gap_ns: Nanoseconds,
@@ -141,8 +141,8 @@ impl SimulatedBus {
         Ok(self.drives[station - 1].inject_defect(self.now_ns, defect, is_present)?)
     }
 
-    /// Lets a foreign station send a frame: it takes part in the arbitration, and every station receives it. Returns whether
-    /// that station had room for it.
+    /// Lets a foreign station send a frame: it takes part in the arbitration, and every station receives it. Returns
+    /// whether that station had room for it.
     pub fn send_foreign(&mut self, now_ns: Nanoseconds, frame: &Frame) -> bool {
         self.advance_to(now_ns);
         self.medium.mailbox_mut(self.drives.len() + 1).push(*frame)

@@ -1,5 +1,5 @@
-//! The control loops of a drive: position (P), velocity (PI) and torque, at the rate of the plant. The gains are scaled by
-//! the inertia, as in a commissioned unit.
+//! The control loops of a drive: position (P), velocity (PI) and torque, at the rate of the plant. The gains are scaled
+//! by the inertia, as in a commissioned unit.
 
 /// Gains as rates, independent of the inertia.
 const POSITION_RATE: f64 = 120.0; // 1/s

@@ -1,4 +1,4 @@
-//! A bench with one simulated drive in virtual time, and everything that is seen of a procedure on it.
+//! A test bench: one simulated drive in virtual time, and a record of a procedure on it.
 
 use std::cell::Cell;
 
@@ -24,7 +24,7 @@ pub struct Bench {
     pub sent: Vec<Frame>,
     pub steps: Vec<&'static str>,
     pub notes: Vec<String>,
-    /// The highest speed of the joint that a reading has shown: rad/s.
+    /// The highest joint speed in a reading: rad/s.
     pub fastest: f64,
 }
 
@@ -38,7 +38,7 @@ impl Bench {
         self.run_interrupted(request, |_| 0)
     }
 
-    /// `interruptions` tells how many requests to end there have been up to a step.
+    /// `interruptions` returns the number of interruptions until a step.
     pub fn run_interrupted(
         &mut self,
         request: Task,
@@ -78,7 +78,7 @@ impl Bench {
         })
     }
 
-    /// Runs a procedure for a time at most; `touch` may do something to the bus meanwhile.
+    /// Runs a procedure for a limited time; `touch` may change the bus meanwhile.
     pub fn run_for(
         &mut self,
         request: Task,
@@ -105,7 +105,7 @@ impl Bench {
         self.bus.observe(NODE).unwrap()
     }
 
-    /// Position of this frame among the frames that were sent.
+    /// The index of this frame among the sent frames.
     pub fn sent_at(&self, frame: Frame) -> usize {
         let found = self.sent.iter().position(|sent| *sent == frame);
         found.unwrap_or_else(|| panic!("{frame:?} was not sent: {:?}", self.sent))

@@ -1,4 +1,4 @@
-//! Against the simulated eRob.
+//! Commissioning of the simulated eRob.
 
 use std::path::Path;
 
@@ -24,7 +24,7 @@ fn changed(change: impl FnOnce(&mut Config)) -> Bench {
 }
 
 #[test]
-fn info_tells_who_the_drive_is_and_how_it_fares() {
+fn info_reports_identity_ratings_and_state() {
     let mut bench = bench();
     let report = bench.run(Task::Info).unwrap();
     assert_eq!(report.get("vendor_id"), Some(&0x5A65_726F_u32.into()));
@@ -32,14 +32,14 @@ fn info_tells_who_the_drive_is_and_how_it_fares() {
     assert_eq!(number(&report, "rated_torque"), 31.0);
     assert_eq!(number(&report, "rated_current_a"), 6.3);
     assert_eq!(number(&report, "error_code"), 0.0);
-    // The joint has no device name (1008): nothing is said of it.
+    // The drive has no device name (1008), so the report has none.
     assert_eq!(report.get("device_name"), None);
-    // Nothing but questions was sent.
+    // Only SDO uploads were sent.
     assert!(bench.sent.iter().all(|frame| frame.payload()[0] == 0x40), "{:?}", bench.sent);
 }
 
 #[test]
-fn an_absolute_move_makes_the_handshake_and_ends_at_the_target_without_torque() {
+fn an_absolute_move_uses_the_handshake_and_ends_at_the_target_without_torque() {
     let mut bench = bench();
     let report = bench.run(move_to(absolute(30.0))).unwrap();
     let seen = bench.observe();
@@ -63,7 +63,7 @@ fn an_immediate_target_is_marked_by_bit_5() {
 }
 
 #[test]
-fn without_a_pace_a_move_takes_a_tenth_of_the_limits() {
+fn a_move_without_a_profile_takes_a_tenth_of_the_limits() {
     let mut bench = bench();
     let request =
         Task::Move { kind: absolute(10.0), profile: MotionProfile::default(), keeps_enabled: false };
@@ -72,7 +72,7 @@ fn without_a_pace_a_move_takes_a_tenth_of_the_limits() {
 }
 
 #[test]
-fn relative_and_reciprocating_moves_count_from_where_the_axis_is() {
+fn relative_and_reciprocating_moves_start_at_the_actual_position() {
     let mut bench = bench();
     bench.run(move_to(absolute(20.0))).unwrap();
     bench.run(move_to(MoveKind::Relative(degrees(-5.0)))).unwrap();
@@ -86,7 +86,7 @@ fn relative_and_reciprocating_moves_count_from_where_the_axis_is() {
 }
 
 #[test]
-fn a_reversed_geared_and_shifted_axis_moves_in_the_joints_own_units() {
+fn a_reversed_geared_and_shifted_axis_moves_in_joint_units() {
     let mut bench = changed(|config| {
         let axis = &mut config.axes[0];
         (axis.reversed, axis.gear_ratio, axis.zero_counts) = (true, 2.0, 1000);
@@ -101,7 +101,7 @@ fn a_reversed_geared_and_shifted_axis_moves_in_the_joints_own_units() {
 }
 
 #[test]
-fn what_is_outside_the_limits_is_refused_and_nothing_moves() {
+fn targets_outside_the_limits_are_refused_and_nothing_moves() {
     let mut bench = bench();
     bench.run(move_to(absolute(100.0))).unwrap();
     let before = bench.observe().position;
@@ -129,7 +129,7 @@ fn what_is_outside_the_limits_is_refused_and_nothing_moves() {
 }
 
 #[test]
-fn a_velocity_lasts_its_time_and_ends_in_a_ramp_to_rest() {
+fn a_velocity_run_lasts_its_time_and_ends_with_a_ramp_to_standstill() {
     let mut bench = bench();
     let request = Task::Velocity {
         velocity: degrees(-40.0),
@@ -141,7 +141,7 @@ fn a_velocity_lasts_its_time_and_ends_in_a_ramp_to_rest() {
     assert!((number(&report, "highest_velocity").to_degrees() + 40.0).abs() < 0.5, "{report:?}");
     assert!((number(&report, "travelled").to_degrees() + 40.0).abs() < 3.0, "{report:?}");
     assert_eq!(bench.observe().state, State::SwitchOnDisabled);
-    // The ramp came before the quick stop: the drive was at rest when its torque went.
+    // The ramp came before the quick stop: the drive was at standstill when its torque went off.
     assert!(bench.steps.contains(&"ramp to standstill"), "{:?}", bench.steps);
 }
 
@@ -159,7 +159,7 @@ fn an_axis_that_runs_towards_a_limit_stops_before_it() {
 }
 
 #[test]
-fn a_torque_is_per_mille_of_the_rated_one_and_ends_at_rest() {
+fn a_torque_is_sent_in_per_mille_of_the_rated_torque_and_ends_at_standstill() {
     let mut bench = bench();
     let request = Task::Torque {
         torque: CommandValue::Joint(0.93),
@@ -175,7 +175,7 @@ fn a_torque_is_per_mille_of_the_rated_one_and_ends_at_rest() {
 }
 
 #[test]
-fn a_torque_that_makes_the_axis_too_fast_is_ended() {
+fn a_torque_run_ends_when_the_axis_is_too_fast() {
     let mut bench = bench();
     let limit = degrees(10.0);
     let request =
@@ -187,7 +187,7 @@ fn a_torque_that_makes_the_axis_too_fast_is_ended() {
 }
 
 #[test]
-fn ctrl_c_stops_a_motion_in_control_and_disables() {
+fn ctrl_c_stops_a_motion_and_disables() {
     let mut bench = bench();
     let kind = MoveKind::Continuous { is_forward: true, duration_ns: None };
     for keeps_enabled in [false, true] {
@@ -203,7 +203,7 @@ fn ctrl_c_stops_a_motion_in_control_and_disables() {
 }
 
 #[test]
-fn a_second_ctrl_c_takes_the_torque_away_at_once() {
+fn a_second_ctrl_c_takes_the_torque_off_at_once() {
     let mut bench = changed(|config| config.axes[0].limits.deceleration = 0.2);
     let profile = MotionProfile { deceleration: None, ..brisk() };
     let request =
@@ -220,7 +220,7 @@ fn a_second_ctrl_c_takes_the_torque_away_at_once() {
 }
 
 #[test]
-fn torque_stays_on_only_when_that_is_asked_for() {
+fn torque_stays_on_only_on_request() {
     let mut bench = bench();
     bench.run(Task::Enable { hold_ns: Some(SECOND / 5), keeps_enabled: false }).unwrap();
     assert!(!bench.observe().state.has_torque());
@@ -231,7 +231,7 @@ fn torque_stays_on_only_when_that_is_asked_for() {
     let seen = bench.observe();
     assert_eq!(seen.state, State::OperationEnabled);
     assert!((seen.position.to_degrees() - 5.0).abs() < 0.01);
-    // NoDevice feeds a watch over the master now, and the drive does not miss it.
+    // The drive no longer consumes a heartbeat, so it stays enabled.
     let every = Task::Watch { every_ns: 100 * MS, duration_ns: Some(2 * SECOND) };
     bench.run(every).unwrap();
     assert_eq!(bench.observe().state, State::OperationEnabled);
@@ -241,11 +241,11 @@ fn torque_stays_on_only_when_that_is_asked_for() {
 }
 
 #[test]
-fn a_drive_whose_master_dies_in_a_motion_stops_by_itself() {
+fn a_drive_stops_by_itself_when_its_master_dies_in_a_motion() {
     let mut bench = bench();
     let velocity = degrees(20.0);
     let request = Task::Velocity { velocity, profile: brisk(), duration_ns: None, keeps_enabled: false };
-    // The program runs for two seconds and is then gone.
+    // The program runs for two seconds and then stops.
     assert!(bench.run_for(request, 2 * SECOND, |_, _| {}).is_none());
     assert!(bench.observe().velocity.to_degrees() > 19.0);
     bench.bus.send(22 * SECOND, &[]);
@@ -268,7 +268,7 @@ fn a_drive_in_a_fault_is_not_moved_and_the_fault_is_named() {
 }
 
 #[test]
-fn a_fault_in_the_middle_of_a_motion_ends_it_and_is_named() {
+fn a_fault_during_a_motion_ends_it_and_is_named() {
     let mut bench = bench();
     let breaks = |bus: &mut SimulatedBus, now_ns: u64| {
         if now_ns == SECOND {
@@ -284,7 +284,7 @@ fn a_fault_in_the_middle_of_a_motion_ends_it_and_is_named() {
 }
 
 #[test]
-fn the_battery_fault_is_cleared_with_consent_only() {
+fn the_battery_fault_is_cleared_only_with_consent() {
     let mut bench = bench();
     bench.run(move_to(MoveKind::Relative(degrees(-40.0)))).unwrap();
     bench.bus.inject_fault(NODE, DriveFault::MultiTurnBattery).unwrap();
@@ -298,7 +298,7 @@ fn the_battery_fault_is_cleared_with_consent_only() {
 }
 
 #[test]
-fn zero_clears_the_turns_with_consent_and_never_under_torque() {
+fn zero_clears_the_turn_count_with_consent_and_never_with_torque() {
     let mut bench = bench();
     assert!(bench.run(Task::Zero { is_confirmed: false }).unwrap_err().failure.is_refusal());
     bench.run(move_to(absolute(-90.0))).unwrap();
@@ -313,7 +313,7 @@ fn zero_clears_the_turns_with_consent_and_never_under_torque() {
 }
 
 #[test]
-fn what_was_saved_is_there_after_a_power_cycle_and_nothing_else() {
+fn saved_parameters_survive_a_power_cycle_and_others_do_not() {
     let mut bench = bench();
     let write = |name: &str, value| {
         let Ok(SelectedObject::Known(entry)) = dictionary::find(Family::ErobCanopen, name) else {
@@ -330,7 +330,7 @@ fn what_was_saved_is_there_after_a_power_cycle_and_nothing_else() {
 }
 
 #[test]
-fn a_node_that_is_not_there_is_named_and_a_stopped_one_is_woken() {
+fn a_missing_node_is_named_and_a_stopped_node_is_woken() {
     let mut bench = bench();
     let absent = TargetDrive { node: 9, ..bench.target.clone() };
     let failed = bench.run_as(absent, Task::Info, |_| 0).unwrap_err();
@@ -344,7 +344,7 @@ fn a_node_that_is_not_there_is_named_and_a_stopped_one_is_woken() {
 }
 
 #[test]
-fn a_drive_of_another_family_is_looked_at_but_not_moved() {
+fn a_drive_of_another_family_is_read_but_not_moved() {
     let mut bench = bench();
     let other = TargetDrive { family: Family::YzAim, ..bench.target.clone() };
     let request = Task::Move { kind: absolute(1.0), profile: brisk(), keeps_enabled: false };
@@ -354,7 +354,7 @@ fn a_drive_of_another_family_is_looked_at_but_not_moved() {
 }
 
 #[test]
-fn homing_is_refused_by_the_name_of_what_the_drive_has() {
+fn homing_is_refused_with_the_modes_that_the_drive_has() {
     let mut bench = bench();
     let home = |method| Task::Home { method, within_ns: SECOND, is_forced: false };
     let words = bench.run(home(None)).unwrap_err().failure.to_string();
@@ -364,7 +364,7 @@ fn homing_is_refused_by_the_name_of_what_the_drive_has() {
 }
 
 #[test]
-fn what_only_the_other_family_can_do_is_refused_with_a_way() {
+fn tasks_of_the_other_family_are_refused_with_an_alternative() {
     let mut bench = bench();
     for (request, way) in [
         (Task::SetId { node: 5 }, "object 0043"),

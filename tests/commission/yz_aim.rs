@@ -1,4 +1,4 @@
-//! Against the simulated YZ-AIM, and against the frames that its manual prints.
+//! Commissioning of the simulated YZ-AIM, compared with the frames in its manual.
 
 use std::f64::consts::TAU;
 
@@ -14,13 +14,13 @@ use takt_rt::units::{Scale, ScaleParameters};
 
 use super::bench::*;
 
-/// Turns of the motor for one of the joint.
+/// Turns of the motor for one turn of the joint.
 const RATIO: f64 = 10.0;
 
-/// The rows of the manual's frames.
+/// The frames of the manual.
 const VECTORS: &str = include_str!("../vectors/yz-aim-vectors.csv");
 
-/// The frame on the wire of a row.
+/// The frame of a row.
 fn vector(id: &str) -> Frame {
     let row = VECTORS.lines().find(|row| row.starts_with(&format!("{id},"))).unwrap();
     let wire = row.split("WIRE=").nth(1).unwrap().trim_end_matches('"');
@@ -111,7 +111,7 @@ fn assert_sent(bench: &Bench, rows: &[&str]) {
 }
 
 #[test]
-fn info_tells_alarm_supply_battery_gear_and_special_function() {
+fn info_reports_alarm_supply_battery_gear_and_special_function() {
     let mut bench = bench();
     let report = bench.run(Task::Info).unwrap();
     assert_eq!(number(&report, "vendor_id"), f64::from(0x331));
@@ -125,7 +125,7 @@ fn info_tells_alarm_supply_battery_gear_and_special_function() {
 }
 
 #[test]
-fn an_absolute_move_is_that_of_the_manual_and_survives_an_ignored_first_target() {
+fn an_absolute_move_is_as_in_the_manual_and_survives_an_ignored_first_target() {
     for quirks in [Quirks::none(), Quirks::default()] {
         let mut bench = with(vec![YzAimParameters { quirks, ..parameters() }]);
         let report = bench.run(move_to(raw(50_000))).unwrap();
@@ -140,7 +140,7 @@ fn an_absolute_move_is_that_of_the_manual_and_survives_an_ignored_first_target()
 }
 
 #[test]
-fn a_relative_move_is_that_of_the_manual_and_is_made_once() {
+fn a_relative_move_is_as_in_the_manual_and_is_sent_once() {
     for quirks in [Quirks::none(), Quirks::default()] {
         let mut bench = with(vec![YzAimParameters { quirks, ..parameters() }]);
         for expected in [50_000, 100_000] {
@@ -154,7 +154,7 @@ fn a_relative_move_is_that_of_the_manual_and_is_made_once() {
 }
 
 #[test]
-fn a_target_outside_the_limits_is_refused_and_the_drive_is_left_as_it_is() {
+fn a_target_outside_the_limits_is_refused_and_the_drive_is_not_changed() {
     let mut bench = bench();
     for kind in [
         MoveKind::Absolute { to: CommandValue::Joint(20.1), is_immediate: false },
@@ -168,7 +168,7 @@ fn a_target_outside_the_limits_is_refused_and_the_drive_is_left_as_it_is() {
 }
 
 #[test]
-fn a_velocity_is_that_of_the_manual_and_ends_in_a_ramp() {
+fn a_velocity_run_is_as_in_the_manual_and_ends_with_a_ramp() {
     let mut bench = bench();
     let request = Task::Velocity {
         velocity: CommandValue::Drive(1000),
@@ -185,7 +185,7 @@ fn a_velocity_is_that_of_the_manual_and_ends_in_a_ramp() {
 }
 
 #[test]
-fn reciprocating_and_continuous_moves_end_at_rest() {
+fn reciprocating_and_continuous_moves_end_at_standstill() {
     let mut bench = bench();
     let kind = MoveKind::Reciprocate { to: CommandValue::Joint(1.0), times: 2, dwell_ns: 20 * MS };
     let report = bench.run(move_to(kind)).unwrap();
@@ -217,13 +217,13 @@ fn ctrl_c_stops_and_disables_in_every_mode() {
 }
 
 #[test]
-fn torque_stays_on_only_when_that_is_asked_for() {
+fn torque_stays_on_only_on_request() {
     let mut bench = bench();
     bench.run(Task::Enable { hold_ns: Some(SECOND / 5), keeps_enabled: false }).unwrap();
     assert!(!is_enabled(&mut bench));
     bench.run(Task::Enable { hold_ns: None, keeps_enabled: true }).unwrap();
     assert!(is_enabled(&mut bench));
-    // The watch over the master is armed again by a heartbeat only, which nobody sends.
+    // Only a heartbeat would arm the heartbeat watchdog again, and no node sends one.
     bench.run(Task::Watch { every_ns: 100 * MS, duration_ns: Some(5 * SECOND) }).unwrap();
     assert!(is_enabled(&mut bench));
     assert_eq!(read(&mut bench, "consumer heartbeat time"), 0x007F_07D0);
@@ -233,7 +233,7 @@ fn torque_stays_on_only_when_that_is_asked_for() {
 }
 
 #[test]
-fn an_axis_that_is_enabled_already_is_not_let_go_for_the_next_motion() {
+fn an_enabled_axis_stays_enabled_for_the_next_motion() {
     let mut bench = bench();
     bench.run(Task::Enable { hold_ns: None, keeps_enabled: true }).unwrap();
     let velocity = Task::Velocity {
@@ -252,7 +252,7 @@ fn an_axis_that_is_enabled_already_is_not_let_go_for_the_next_motion() {
 }
 
 #[test]
-fn a_drive_whose_master_dies_in_a_motion_stops_by_itself() {
+fn a_drive_stops_by_itself_when_its_master_dies_in_a_motion() {
     let mut bench = bench();
     let request = Task::Velocity {
         velocity: CommandValue::Drive(300),
@@ -267,7 +267,7 @@ fn a_drive_whose_master_dies_in_a_motion_stops_by_itself() {
 }
 
 #[test]
-fn homing_finds_the_switch_by_the_mode_alone() {
+fn homing_finds_the_switch_by_setting_the_mode() {
     let mut bench = with(vec![YzAimParameters {
         switches: HomingSwitches { dir: Some(Switch::below(-0.6)), pu: None },
         end_stops: Some(EndStops { lowest: -1.0, highest: 1.0 }),
@@ -307,7 +307,7 @@ fn the_multi_turn_zero_is_set_with_consent_and_verified() {
 }
 
 #[test]
-fn what_is_stored_is_there_after_a_power_cycle() {
+fn stored_parameters_survive_a_power_cycle() {
     let mut bench = bench();
     let gains = |position_proportional| Task::Gains {
         position_proportional,
@@ -323,7 +323,7 @@ fn what_is_stored_is_there_after_a_power_cycle() {
 }
 
 #[test]
-fn another_node_number_needs_the_drive_alone_on_its_bus() {
+fn another_node_id_needs_the_drive_alone_on_its_bus() {
     let mut bench = with(vec![parameters(), YzAimParameters { node: 5, ..parameters() }]);
     let failed = bench.run(Task::SetId { node: 2 }).unwrap_err();
     assert!(matches!(&failed.failure, Failure::Unsuitable(words) if words.contains("(5)")), "{failed:?}");
@@ -346,7 +346,7 @@ fn the_bit_rate_is_changed_by_four_writes_in_order() {
 }
 
 #[test]
-fn alarms_are_named_and_each_is_cleared_in_its_way() {
+fn alarms_are_named_and_each_is_cleared_in_its_own_way() {
     let mut bench = bench();
     bench.run(Task::Info).unwrap();
     bench.bus.inject_fault(NODE, DriveFault::BlockedRotor).unwrap();
@@ -363,10 +363,10 @@ fn alarms_are_named_and_each_is_cleared_in_its_way() {
 }
 
 #[test]
-fn a_lost_master_is_cleared_by_a_heartbeat_and_nothing_moves() {
+fn a_lost_master_is_cleared_by_a_heartbeat_without_motion() {
     let mut bench = bench();
     bench.run(Task::Enable { hold_ns: None, keeps_enabled: true }).unwrap();
-    // Another master sent one heartbeat, and has died.
+    // Another master sent one heartbeat and then stopped.
     let now_ns = bench.clock.now_ns();
     bench.bus.send(now_ns, &[vector("D011")]);
     bench.run(Task::Watch { every_ns: 100 * MS, duration_ns: Some(3 * SECOND) }).unwrap();
@@ -382,7 +382,7 @@ fn a_lost_master_is_cleared_by_a_heartbeat_and_nothing_moves() {
 }
 
 #[test]
-fn what_moves_the_motor_at_power_up_needs_consent() {
+fn motion_at_power_up_needs_consent() {
     let mut bench = bench();
     let auto_home = |is_on, is_confirmed| Task::AutoHome { is_on, is_confirmed };
     assert!(bench.run(auto_home(true, false)).unwrap_err().failure.is_refusal());
@@ -404,7 +404,7 @@ fn interpolation_is_set_up_and_stored_without_a_ramp() {
 }
 
 #[test]
-fn the_gear_is_read_and_changed_and_keys_are_no_numerators() {
+fn the_gear_is_read_and_changed_and_command_keys_are_refused() {
     let mut bench = bench();
     let report = bench.run(Task::Gear { ratio: Some((256, 25)) }).unwrap();
     assert_eq!(number(&report, "pulses_per_turn"), 3200.0);
@@ -414,7 +414,7 @@ fn the_gear_is_read_and_changed_and_keys_are_no_numerators() {
 }
 
 #[test]
-fn an_object_that_the_drive_lacks_ends_in_silence_and_is_named() {
+fn a_missing_object_is_named_after_a_timeout() {
     let mut bench = bench();
     let object = takt::commission::ReadObject {
         address: takt::canopen::object::ObjectAddress::new(0x6502, 0),

@@ -1,4 +1,4 @@
-//! After a fault: what is asked to bring the group back.
+//! Recovery after a fault: reset and enable.
 
 use std::sync::Arc;
 
@@ -14,7 +14,7 @@ use crate::arm::{arm, folder, scenario};
 
 const CYCLES_AT_MOST: usize = 20_000;
 
-/// An enabled group without a program, on which this fault of its first axis is played.
+/// An enabled group without a program, with this fault of its first axis.
 fn faulted(config: &Config, kind: &str) -> VirtualRun<Port> {
     let axis = &config.axes[0].name;
     let fault =
@@ -51,10 +51,10 @@ fn machines() -> [Config; 2] {
 }
 
 #[test]
-fn a_group_that_is_reset_and_enabled_in_one_breath_holds_again() {
+fn a_group_that_is_reset_and_enabled_at_once_holds_again() {
     for config in machines() {
         let mut run = faulted(&config, "over-voltage");
-        // A YZ-AIM cannot be reset before the voltage is right again.
+        // A YZ-AIM cannot be reset before the over-voltage is over.
         (0..200).for_each(|_| assert!(run.step()));
         run.host().request(Request::ResetFaults).unwrap();
         run.host().request(Request::Enable).unwrap();

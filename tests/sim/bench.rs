@@ -1,4 +1,4 @@
-//! A bus with one simulated eRob joint and a master's hands on it, in virtual time.
+//! A bus with simulated eRob joints and a master that the test controls, in virtual time.
 
 use takt::sim::erob::{ErobJoint, ErobParameters};
 use takt::sim::plant::{Encoder, JointParameters};
@@ -10,7 +10,7 @@ pub const NODE: u8 = 5;
 pub const MILLISECOND_NS: u64 = 1_000_000;
 pub const COUNTS_PER_RADIAN: f64 = 524_288.0 / std::f64::consts::TAU;
 
-/// A joint of the size 80H-80.
+/// A joint of size 80H-80.
 pub fn parameters(node: u8) -> ErobParameters {
     ErobParameters {
         node,
@@ -38,12 +38,12 @@ pub fn parameters(node: u8) -> ErobParameters {
 pub struct Bench {
     pub bus: SimulatedBus,
     pub now_ns: u64,
-    /// Everything the drives have said and nobody has looked at.
+    /// All frames of the drives that the test has not taken yet.
     pub heard: Vec<Received>,
 }
 
 impl Bench {
-    /// A bus with these modules, which have booted; their boot-up messages have been heard.
+    /// A bus with these modules after their boot-up messages, which are discarded.
     pub fn with(modules: Vec<ErobParameters>) -> Self {
         let mut drives: Vec<Box<dyn Drive>> = vec![];
         for module in modules {
@@ -68,7 +68,7 @@ impl Bench {
         Self::with(vec![parameters(NODE)])
     }
 
-    /// Lets time pass and listens.
+    /// Lets time pass and collects the received frames.
     pub fn run_ns(&mut self, duration_ns: u64) {
         self.now_ns += duration_ns;
         let mut batch = ReceiveBatch::new();
@@ -96,7 +96,7 @@ impl Bench {
         self.send(Frame::of(Id::base(id).unwrap(), bytes));
     }
 
-    /// What was heard under an identifier since the last time, in order.
+    /// Returns the frames received under an identifier since the last call, in order.
     pub fn take(&mut self, id: u32) -> Vec<Vec<u8>> {
         let (mine, others): (Vec<_>, Vec<_>) =
             self.heard.drain(..).partition(|received| received.frame.id().value() == id);
@@ -104,7 +104,7 @@ impl Bench {
         mine.into_iter().map(|received| received.frame.payload().to_vec()).collect()
     }
 
-    /// One SDO request and its answer, which must come within 2 ms.
+    /// Sends one SDO request and returns its reply, which must arrive within 2 ms.
     pub fn sdo(&mut self, request: [u8; 8]) -> [u8; 8] {
         self.send_data(0x600 + u32::from(NODE), request);
         self.run_ms(2);
@@ -113,7 +113,7 @@ impl Bench {
         answers[0].clone().try_into().unwrap()
     }
 
-    /// Writes an object of so many bytes; the abort code when it is refused.
+    /// Writes an object of this many bytes. The error is the abort code.
     pub fn write(&mut self, index: u16, subindex: u8, bytes: u8, value: i64) -> Result<(), u32> {
         let [low, high] = index.to_le_bytes();
         let [a, b, c, d, ..] = value.to_le_bytes();
@@ -125,7 +125,7 @@ impl Bench {
         }
     }
 
-    /// Reads an object; the abort code when it is refused.
+    /// Reads an object. The error is the abort code.
     pub fn read(&mut self, index: u16, subindex: u8) -> Result<u32, u32> {
         let [low, high] = index.to_le_bytes();
         let answer = self.sdo([0x40, low, high, subindex, 0, 0, 0, 0]);
@@ -145,8 +145,8 @@ impl Bench {
         self.run_ms(2);
     }
 
-    /// Maps RPDO1 to the controlword and `target`, TPDO1 to statusword and position, both at every SYNC, and
-    /// starts the node.
+    /// Maps RPDO1 to the controlword and `target` and TPDO1 to statusword and position, both sent at every SYNC.
+    /// Then starts the node.
     pub fn start_process_data(&mut self, target: u32) {
         for (communication, mapping, id, objects) in [
             (0x1400, 0x1600, 0x200, [0x6040_0010, target]),
@@ -167,7 +167,7 @@ impl Bench {
         self.heard.clear();
     }
 
-    /// One cycle of 1 ms: SYNC, then at 60 % the set-point. Returns what TPDO1 said: statusword and position.
+    /// One cycle of 1 ms: SYNC, then the set-point at 60 %. Returns statusword and position from TPDO1.
     pub fn cycle(&mut self, controlword: u16, target: i32) -> (u16, i32) {
         self.send_data(0x080, []);
         self.run_ns(600_000);
@@ -179,7 +179,8 @@ impl Bench {
         (u16::from_le_bytes([tpdo[0], tpdo[1]]), i32::from_le_bytes([tpdo[2], tpdo[3], tpdo[4], tpdo[5]]))
     }
 
-    /// Sets a mode and enables, with `target` in every set-point; in a position mode the actual position.
+    /// Sets a mode and enables the drive with `target` in every set-point. In a position mode it is the actual
+    /// position.
     pub fn enable(&mut self, mode: i8, target_object: u32, target: i32) {
         self.write(0x6060, 0, 1, mode.into()).unwrap();
         assert_eq!(self.read(0x6061, 0), Ok(mode as u32));

@@ -1,4 +1,4 @@
-//! NMT, boot-up, heartbeat in both directions, guarding, emergency messages.
+//! NMT, boot-up, heartbeat producer and consumer, node guarding, emergency messages.
 
 use takt::sim::erob::ErobParameters;
 use takt::sim::{DriveFault, NodeState};
@@ -10,7 +10,7 @@ use super::bench::{Bench, MILLISECOND_NS, NODE, parameters};
 const MASTER_HEARTBEAT: u32 = 0x701;
 
 #[test]
-fn a_drive_is_mute_until_its_boot_up_message() {
+fn a_drive_sends_nothing_before_its_boot_up_message() {
     let slow = ErobParameters { power_up_ns: 8_000 * MILLISECOND_NS, ..parameters(NODE) };
     let mut bench = Bench::with(vec![slow]);
     bench.send_data(0x605, [0x40, 0x00, 0x10, 0, 0, 0, 0, 0]);
@@ -24,7 +24,7 @@ fn a_drive_is_mute_until_its_boot_up_message() {
 }
 
 #[test]
-fn a_stopped_node_answers_no_sdo_until_it_is_reset() {
+fn a_stopped_node_answers_no_sdo_request_until_it_is_reset() {
     let mut bench = Bench::new();
     bench.nmt(0x02);
     bench.send_data(0x605, [0x40, 0x00, 0x10, 0, 0, 0, 0, 0]);
@@ -39,7 +39,7 @@ fn a_stopped_node_answers_no_sdo_until_it_is_reset() {
 }
 
 #[test]
-fn commands_reach_the_node_that_they_name_and_node_0_is_every_one() {
+fn nmt_commands_address_one_node_or_all_with_node_id_0() {
     let mut bench = Bench::with(vec![parameters(NODE), parameters(6)]);
     bench.send_data(0x000, [0x01, 6]);
     bench.run_ms(1);
@@ -56,7 +56,7 @@ fn commands_reach_the_node_that_they_name_and_node_0_is_every_one() {
         (state(&mut bench, NODE), state(&mut bench, 6)),
         (NodeState::Operational, NodeState::Operational)
     );
-    // A command of the wrong length or number changes nothing.
+    // A command with a wrong length or node ID changes nothing.
     bench.send_data(0x000, [0x02, NODE, 0]);
     bench.send_data(0x000, [0x03, NODE]);
     bench.run_ms(1);
@@ -64,7 +64,7 @@ fn commands_reach_the_node_that_they_name_and_node_0_is_every_one() {
 }
 
 #[test]
-fn reset_communication_restores_communication_only_and_reset_node_everything() {
+fn reset_communication_restores_the_communication_objects_and_reset_node_all() {
     let mut bench = Bench::new();
     bench.write(0x1006, 0, 4, 1000).unwrap();
     bench.write(0x6081, 0, 4, 5566).unwrap();
@@ -99,7 +99,7 @@ fn the_heartbeat_shows_the_state_at_its_period() {
     assert_eq!(bench.take(0x705).last().unwrap(), &[4]);
 }
 
-/// A started drive that has heard one heartbeat of the master and expects more, and then the time-out passes.
+/// A started drive that consumes the master's heartbeat, receives it once, and then reaches the time-out.
 fn loses_master(error_behaviour: i64) -> Bench {
     let mut bench = Bench::new();
     bench.write(0x1016, 1, 4, 0x0001_0032).unwrap();
@@ -119,7 +119,7 @@ fn loses_master(error_behaviour: i64) -> Bench {
 }
 
 #[test]
-fn a_lost_master_is_a_fault_an_emergency_message_and_the_state_that_1029_says() {
+fn a_lost_master_causes_a_fault_an_emergency_message_and_the_state_of_1029() {
     let mut bench = loses_master(0);
     assert_eq!(bench.take(0x085), [[0x30, 0x81, 0x11, 0, 0, 0, 0, 0]]);
     assert_eq!((bench.observe().nmt, bench.observe().state), (NodeState::PreOperational, State::Fault));
@@ -129,7 +129,7 @@ fn a_lost_master_is_a_fault_an_emergency_message_and_the_state_that_1029_says() 
 }
 
 #[test]
-fn without_a_programmed_consumer_the_masters_death_goes_unnoticed() {
+fn without_a_heartbeat_consumer_a_lost_master_is_not_detected() {
     let mut bench = Bench::new();
     bench.nmt(0x01);
     bench.send_data(MASTER_HEARTBEAT, [5]);
@@ -138,7 +138,7 @@ fn without_a_programmed_consumer_the_masters_death_goes_unnoticed() {
 }
 
 #[test]
-fn guarding_is_answered_with_a_toggling_bit_unless_there_is_a_heartbeat() {
+fn node_guarding_is_answered_with_a_toggle_bit_unless_the_heartbeat_is_on() {
     let mut bench = Bench::new();
     let request = Frame::remote(Id::canopen(0x700, NODE), 1).unwrap();
     for expected in [127, 255, 127] {
@@ -153,7 +153,7 @@ fn guarding_is_answered_with_a_toggling_bit_unless_there_is_a_heartbeat() {
 }
 
 #[test]
-fn a_guarded_node_notices_when_the_guard_stays_away() {
+fn a_guarded_node_detects_missing_guarding() {
     let mut bench = Bench::new();
     bench.write(0x100C, 0, 2, 20).unwrap();
     bench.write(0x100D, 0, 1, 3).unwrap();
@@ -166,7 +166,7 @@ fn a_guarded_node_notices_when_the_guard_stays_away() {
 }
 
 #[test]
-fn errors_fill_the_history_newest_first_and_0_empties_it() {
+fn errors_fill_the_history_newest_first_and_writing_0_clears_it() {
     let mut bench = Bench::new();
     assert_eq!(bench.read(0x1003, 0), Ok(0));
     assert_eq!(bench.read(0x1003, 1), Err(0x0800_0024));
@@ -183,12 +183,12 @@ fn errors_fill_the_history_newest_first_and_0_empties_it() {
 }
 
 #[test]
-fn frames_that_are_not_the_drives_own_leave_it_silent() {
+fn the_drive_ignores_frames_of_other_protocols_and_nodes() {
     let mut bench = Bench::new();
     bench.nmt(0x01);
     bench.run_ms(5);
     bench.heard.clear();
-    // The vendor's other protocol, another node's services, an extended identifier, a CAN FD frame.
+    // The vendor's other protocol, services of another node, an extended identifier, a CAN FD frame.
     bench.send_data(0x645, [0x00, 0x02]);
     bench.send_data(0x606, [0x40, 0x00, 0x10, 0, 0, 0, 0, 0]);
     bench.send_data(0x206, [0x06, 0x00]);

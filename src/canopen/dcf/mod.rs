@@ -1,8 +1,8 @@
 //! Device configuration: the values that a DCF (CiA 306) or a concise DCF (CiA 302-3, object 1F22) writes to a device.
 //!
-//! A DCF has values but no order. [`DeviceConfiguration::of`] gives the writes in an order that devices accept: by index,
-//! and each PDO is made invalid, mapped, and made valid again (CiA 301, 7.5.2.36). A concise DCF is an ordered list and
-//! keeps its order.
+//! A DCF has values but no order. [`DeviceConfiguration::of`] gives the writes in an order that devices accept: by
+//! index, and each PDO is made invalid, mapped, and made valid again (CiA 301, 7.5.2.36). A concise DCF is an ordered
+//! list and keeps its order.
 //!
 //! Commands and set-points are not written: see [`Omission`].
 

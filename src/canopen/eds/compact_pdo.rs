@@ -1,6 +1,6 @@
 //! `CompactPDO`: PDOs that the file counts but does not describe. Bit n of the key stands for sub-index n+1 of the
-//! communication parameter. The values are those of the pre-defined connection set (CiA 301, 7.3.3): the first four PDOs
-//! of each direction are valid, the others are not, and nothing is mapped.
+//! communication parameter. The values are those of the pre-defined connection set (CiA 301, 7.3.3): the first four
+//! PDOs of each direction are valid, the others are not, and nothing is mapped.
 
 use super::data_type::DataTypeCode;
 use super::dictionary::{AccessType, DictionaryObject, LocatedValue, ObjectDictionary, ObjectType};

@@ -91,7 +91,8 @@ impl DataTypeCode {
         }
     }
 
-    /// The type of a standard object (CiA 301; CiA 402 for the objects that takt uses), for files without this information.
+    /// The type of a standard object (CiA 301; CiA 402 for the objects that takt uses), for files without this
+    /// information.
     pub(super) fn of_standard_object(index: u16, subindex: u8) -> Option<Self> {
         Some(Self(match (index, subindex) {
             (0x1000 | 0x1002 | 0x1005..=0x1007 | 0x1012..=0x1014, 0) => 0x07,

@@ -164,8 +164,8 @@ impl Reader<'_, '_, '_> {
             let ObjectAddress { index, subindex } = self.context.address;
             let data_type = DataTypeCode::of_standard_object(index, subindex).or(self.context.usual_type);
             let repair = match data_type {
-                Some(data_type) => format!("it was taken as {data_type}"),
-                None => "its type is not known: it can be neither written nor mapped".to_owned(),
+                Some(data_type) => format!("it was read as {data_type}"),
+                None => "its type is unknown, so it can be neither written nor mapped".to_owned(),
             };
             self.missing("DataType", repair);
             return data_type;
@@ -187,14 +187,14 @@ impl Reader<'_, '_, '_> {
 
     fn access(&mut self) -> AccessType {
         let Some(pair) = self.section.get("AccessType") else {
-            self.missing("AccessType", "it was taken as ro".to_owned());
+            self.missing("AccessType", "it was read as ro".to_owned());
             return AccessType::ReadOnly;
         };
         AccessType::from_word(pair.value).unwrap_or_else(|| {
             let kind = EdsProblemKind::UnknownWord {
                 key: pair.key.to_owned(),
                 given: pair.value.to_owned(),
-                repair: "it was taken as ro; what may stand here: ro, wo, rw, rwr, rww, const",
+                repair: "it was read as ro; allowed: ro, wo, rw, rwr, rww, const",
             };
             self.reporter.report(kind, pair.span.clone());
             AccessType::ReadOnly

@@ -83,7 +83,7 @@ fn index(pair: &Pair<'_>, dictionary: &ObjectDictionary, reporter: &mut Reporter
         let kind = EdsProblemKind::UnknownWord {
             key: pair.key.to_owned(),
             given,
-            repair: "it was passed over; an index may stand here, as in 0x1018",
+            repair: "it was ignored; allowed: an index, as in 0x1018",
         };
         reporter.report(kind, pair.span.clone());
     }

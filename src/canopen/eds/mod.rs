@@ -1,18 +1,19 @@
-//! Electronic data sheets and device configuration files (CiA 306): reads a device's object dictionary from files as they
-//! are found in practice.
+//! Electronic data sheets and device configuration files (CiA 306): reads a device's object dictionary from files as
+//! they are found in practice.
 //!
 //! [`load`] and [`parse`] return an [`ObjectDictionary`] with [`Findings`]. Each repair is a warning with its position.
 //! What cannot be repaired is an error; all errors are reported together:
 //!
 //! - **Repaired**: case and spelling of keys, sections and `$NODEID`; counts and lists that disagree with the sections;
-//!   missing data types, access types and names; object types that the sub-objects contradict; impossible limits; repeated
-//!   keys and sections (the first one is used, as by the profile functions of Windows); lines that are not valid.
+//!   missing data types, access types and names; object types that the sub-objects contradict; impossible limits;
+//!   repeated keys and sections (the first one is used, as by the profile functions of Windows); lines that are not
+//!   valid.
 //! - **Refused**: values that do not fit their type, because a wrong value could reach a drive; a configured value that
 //!   appears twice with different values; files without any object.
 //!
-//! A number with a leading zero is octal, by the standard, with a warning if the decimal number would differ. With digits
-//! that are not octal it is decimal, with a warning too. A hexadecimal number of a signed type may be its bit pattern
-//! (`0xFFFFFFFF` is -1 in INTEGER32).
+//! A number with a leading zero is octal, by the standard, with a warning if the decimal number would differ. With
+//! digits that are not octal it is decimal, with a warning too. A hexadecimal number of a signed type may be its bit
+//! pattern (`0xFFFFFFFF` is -1 in INTEGER32).
 //!
 //! ```text
 //! parse ── text ── ini: sections, keys and values with their positions

@@ -135,7 +135,7 @@ impl Reader<'_, '_, '_> {
                 let kind = EdsProblemKind::MissingKey {
                     key: "ObjectType",
                     object: format!("{:04X}", self.index),
-                    repair: format!("it was taken as {found}"),
+                    repair: format!("it was read as {found}"),
                 };
                 self.reporter.report(kind, section.header.clone());
             }
@@ -147,7 +147,7 @@ impl Reader<'_, '_, '_> {
             let kind = EdsProblemKind::UnknownWord {
                 key: pair.key.to_owned(),
                 given: pair.value.to_owned(),
-                repair: "it was taken from the sections; what may stand here: 0x2, 0x5 to 0x9",
+                repair: "it was derived from the sections; allowed: 0x2, 0x5 to 0x9",
             };
             self.reporter.report(kind, pair.span.clone());
             return found;

@@ -286,7 +286,7 @@ fn anomaly_words(anomaly: Anomaly, given: &str) -> String {
         Anomaly::NotOctal => format!("{given} has a leading zero and digits that octal does not have"),
         Anomaly::Suffix => format!("{given} is not the notation of a hexadecimal number"),
         Anomaly::NoDollar => format!("{given} is not the notation of the node ID"),
-        Anomaly::Comment => format!("there is a comment behind the number: {given}"),
+        Anomaly::Comment => format!("there is a comment after the number: {given}"),
         Anomaly::Word => format!("{given} is a word instead of a number"),
     }
 }

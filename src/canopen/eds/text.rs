@@ -2,9 +2,9 @@
 
 use crate::printable::printable;
 
-/// Decodes a file. The standard requires ASCII. UTF-8 (with or without byte order mark), UTF-16 (with byte order mark) and
-/// Latin-1 also occur. Characters that are unsafe on a terminal are replaced. Every line of the result ends with a line
-/// feed, with or without a carriage return before it.
+/// Decodes a file. The standard requires ASCII. UTF-8 (with or without byte order mark), UTF-16 (with byte order mark)
+/// and Latin-1 also occur. Characters that are unsafe on a terminal are replaced. Every line of the result ends with a
+/// line feed, with or without a carriage return before it.
 pub(super) fn decode(bytes: &[u8]) -> String {
     let text = match bytes {
         [0xEF, 0xBB, 0xBF, rest @ ..] => utf8_or_latin1(rest),

@@ -57,8 +57,8 @@ impl Value {
         }
     }
 
-    /// The little-endian bytes of an SDO transfer. `None`: the value needs a node ID and none is given, it does not fit the
-    /// type, or the type has no such values.
+    /// The little-endian bytes of an SDO transfer. `None`: the value needs a node ID and none is given, it does not fit
+    /// the type, or the type has no such values.
     pub fn encode(&self, data_type: DataTypeCode, node: Option<u8>) -> Option<Vec<u8>> {
         match (self, data_type.kind()) {
             (Self::Number(number), ValueKind::Unsigned(bits) | ValueKind::Signed(bits)) => {

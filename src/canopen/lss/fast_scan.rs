@@ -1,6 +1,6 @@
-//! LSS fastscan (CiA 305, section 6.5.3): finds the identity of one device without a node ID, bit by bit. A device replies
-//! when the requested bits match its own; silence means that no device matches. With several devices the lowest identity
-//! is found, because a 0 bit of any device is followed.
+//! LSS fastscan (CiA 305, section 6.5.3): finds the identity of one device without a node ID, bit by bit. A device
+//! replies when the requested bits match its own; silence means that no device matches. With several devices the lowest
+//! identity is found, because a 0 bit of any device is followed.
 
 use super::LssAddress;
 use super::wire::LssRequest;

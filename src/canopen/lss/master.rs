@@ -18,8 +18,8 @@ pub enum LssTask {
     ConfigureNode(u8),
     /// Configures the bit rate of the device in configuration state; it takes effect when it is activated.
     ConfigureBitTiming(BitTiming),
-    /// Activates the configured bit rate: the devices change it after the delay, and send again after another delay. The
-    /// master must change its own bit rate in between. No reply.
+    /// Activates the configured bit rate: the devices change it after the delay, and send again after another delay.
+    /// The master must change its own bit rate in between. No reply.
     ActivateBitTiming {
         /// The delay in ms.
         delay_ms: u16,

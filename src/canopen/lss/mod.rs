@@ -3,9 +3,9 @@
 //! [`LssRequest`] and [`LssResponse`] are the messages; both sides can be written with them. [`LssMaster`] runs one
 //! [`LssTask`] at a time, without input and output. [`LssTask::FastScan`] finds a device with an unknown identity.
 //!
-//! A device without a node ID sends neither boot-up nor heartbeat. [`LssTask::IdentifyUnconfigured`] asks for such devices.
-//! A device boots when it has got a node ID and is switched to waiting state. A device that had another node ID keeps it
-//! until it is reset.
+//! A device without a node ID sends neither boot-up nor heartbeat. [`LssTask::IdentifyUnconfigured`] asks for such
+//! devices. A device boots when it has got a node ID and is switched to waiting state. A device that had another node
+//! ID keeps it until it is reset.
 
 mod fast_scan;
 mod master;

@@ -108,7 +108,8 @@ impl Inquiry {
 pub enum LssRequest {
     /// Switch every device to this state. No response.
     SwitchGlobal(LssMode),
-    /// One of the four identity values (0 to 3) of the device to switch to configuration state. It responds to the last one.
+    /// One of the four identity values (0 to 3) of the device to switch to configuration state. It responds to the last
+    /// one.
     SwitchSelective {
         /// The part, an index into [`LssAddress::values`](super::LssAddress::values).
         part: u8,
@@ -119,7 +120,8 @@ pub enum LssRequest {
     ConfigureNode(u8),
     /// Configure the bit rate; it takes effect when it is activated.
     ConfigureBitTiming(BitTiming),
-    /// Activate the bit rate: devices stop sending, change it after the delay, and send again after another delay. No response.
+    /// Activate the bit rate: devices stop sending, change it after the delay, and send again after another delay. No
+    /// response.
     ActivateBitTiming {
         /// The delay in ms.
         delay_ms: u16,
@@ -128,8 +130,8 @@ pub enum LssRequest {
     Store,
     /// Read this value.
     Inquire(Inquiry),
-    /// One of the six values of an identity range: vendor, product, lowest and highest revision, lowest and highest serial
-    /// number. Devices in the range respond to the last one.
+    /// One of the six values of an identity range: vendor, product, lowest and highest revision, lowest and highest
+    /// serial number. Devices in the range respond to the last one.
     IdentifyRemote {
         /// The part, 0 to 5.
         part: u8,

@@ -1,8 +1,8 @@
 //! The SDO client for one node: one transfer at a time, with a timeout for every wait.
 //!
-//! A request without a response is repeated. A response that arrives after the repetition leaves a second, stale response
-//! under way, which a later transfer of the same object could mistake for its own. So after a repeated transfer, the
-//! client sends nothing until no response can be outstanding.
+//! A request without a response is repeated. A response that arrives after the repetition leaves a second, stale
+//! response under way, which a later transfer of the same object could mistake for its own. So after a repeated
+//! transfer, the client sends nothing until no response can be outstanding.
 
 use takt_rt::frame::Frame;
 use takt_rt::time::Nanoseconds;
@@ -23,8 +23,8 @@ pub struct SdoTiming {
 }
 
 impl Default for SdoTiming {
-    /// 0.5 s and two retries: drives answer within about 1 ms, but requests share the bus with process data and may have to
-    /// wait.
+    /// 0.5 s and two retries: drives answer within about 1 ms, but requests share the bus with process data and may
+    /// have to wait.
     fn default() -> Self {
         Self { reply_timeout_ns: 500_000_000, retries: 2 }
     }

@@ -45,7 +45,7 @@ pub(super) enum ExchangeStep {
 /// The final request of a finished transfer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum FinalRequest {
-    /// None: the server knows that it is finished.
+    /// None, because the server has finished the transfer.
     None,
     /// The client aborts the transfer.
     Abort(AbortCode),

@@ -1,7 +1,7 @@
 //! Service data objects (CiA 301, 7.2.4): read and write objects of one node, expedited, segmented and in blocks.
 //!
-//! [`SdoRequest`] and [`SdoResponse`] are the messages; only valid ones can be built, and both sides can be written with
-//! them. [`SdoClient`] is the SDO client.
+//! [`SdoRequest`] and [`SdoResponse`] are the messages; only valid ones can be built, and both sides can be written
+//! with them. [`SdoClient`] is the SDO client.
 //!
 //! ```text
 //! client ── sending, repeating, timeouts

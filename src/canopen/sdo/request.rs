@@ -125,8 +125,8 @@ impl SdoRequest {
         Frame::of(Id::canopen(function_code::SDO_REQUEST, node), bytes)
     }
 
-    /// Decodes node ID and request; `None` for other frames. The segments of a block look like other requests: decode them
-    /// with [`BlockSegment`](super::BlockSegment) during a block.
+    /// Decodes node ID and request; `None` for other frames. The segments of a block look like other requests: decode
+    /// them with [`BlockSegment`](super::BlockSegment) during a block.
     pub fn decode(frame: &Frame) -> Option<(u8, Self)> {
         let node = node_of(frame, function_code::SDO_REQUEST)?;
         Some((node, Self::from_bytes(wire::eight_bytes(frame)?)?))

@@ -124,8 +124,8 @@ impl SdoResponse {
         Frame::of(Id::canopen(function_code::SDO_RESPONSE, node), bytes)
     }
 
-    /// Decodes node ID and response; `None` for other frames. The segments of a block look like other responses: decode them
-    /// with [`BlockSegment`](super::BlockSegment) during a block.
+    /// Decodes node ID and response; `None` for other frames. The segments of a block look like other responses: decode
+    /// them with [`BlockSegment`](super::BlockSegment) during a block.
     pub fn decode(frame: &Frame) -> Option<(u8, Self)> {
         let node = node_of(frame, function_code::SDO_RESPONSE)?;
         Some((node, Self::from_bytes(wire::eight_bytes(frame)?)?))

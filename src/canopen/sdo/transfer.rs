@@ -22,8 +22,8 @@ pub enum Transfer {
         /// The object.
         object: ObjectAddress,
     },
-    /// Write a long object in blocks; falls back to [`Transfer::Download`] when the server has no block transfer, and for up
-    /// to four bytes.
+    /// Write a long object in blocks; falls back to [`Transfer::Download`] when the server has no block transfer, and
+    /// for up to four bytes.
     BlockDownload {
         /// The object.
         object: ObjectAddress,

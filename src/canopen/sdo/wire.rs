@@ -149,8 +149,8 @@ impl Segment {
 pub struct BlockSize(u8);
 
 impl BlockSize {
-    /// The block size that the client requests. 32 frames last 4 ms at 1 Mbit/s, which leaves the bus to others. With such
-    /// sequence numbers, the first byte of a late segment never looks like an initiation.
+    /// The block size that the client requests. 32 frames last 4 ms at 1 Mbit/s, which leaves the bus to others. With
+    /// such sequence numbers, the first byte of a late segment never looks like an initiation.
     pub(super) const FOR_UPLOADS: Self = Self(32);
 
     /// `None` outside 1 to 127.
@@ -178,8 +178,8 @@ pub struct BlockSegment {
 impl BlockSegment {
     const LAST: u8 = 0x80;
 
-    /// Segment `number` of its block, with the first seven bytes of `data`, filled with zeros. `is_last`: it is the last
-    /// segment of the transfer. `None` when the number is not 1 to 127.
+    /// Segment `number` of its block, with the first seven bytes of `data`, filled with zeros. `is_last`: it is the
+    /// last segment of the transfer. `None` when the number is not 1 to 127.
     pub fn new(number: u8, data: &[u8], is_last: bool) -> Option<Self> {
         let number = BlockSize::new(number)?.segments();
         let mut bytes = [0; 7];

@@ -78,7 +78,7 @@ pub async fn prepare(
 /// stops its motion.
 async fn arm_watchdog(c: &SdoSession, s: &TargetDrive) -> Result<(), Failure> {
     if s.node == MASTER {
-        c.note("node 127 cannot use the heartbeat watchdog: if this program dies, the drive keeps moving");
+        c.note("node 127 cannot use the heartbeat watchdog: if this program ends unexpectedly, the drive keeps moving");
         return Ok(());
     }
     c.step("heartbeat");

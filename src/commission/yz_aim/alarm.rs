@@ -71,7 +71,7 @@ impl Alarm {
         }
     }
 
-    /// How to clear it. The manual says nothing of over-voltage and unknown codes; a reset is tried.
+    /// How to clear it. The manual does not cover over-voltage and unknown codes; a reset is tried.
     pub const fn clearing(self) -> Clearing {
         match self {
             Self::Battery => Clearing::Zero,

@@ -82,7 +82,7 @@ pub async fn prepare(
     c.command(NmtCommand::Start);
     c.pause(NMT_PAUSE_NS).await?;
     if s.node == MASTER {
-        c.note("node 127 cannot use the heartbeat watchdog: if this program dies, the drive keeps moving");
+        c.note("node 127 cannot use the heartbeat watchdog: if this program ends unexpectedly, the drive keeps moving");
     } else {
         c.step("heartbeat");
         c.set_heartbeat(MASTER, Some(HEARTBEAT_NS));
@@ -138,8 +138,8 @@ pub async fn come_to_rest(c: &SdoSession) -> Result<(), Failure> {
     rested
 }
 
-/// Stops any motion: velocity mode ramps down, other modes halt. A drive that was never enabled can still run homing and
-/// may ignore a halt; changing to position mode ends its homing.
+/// Stops any motion: velocity mode ramps down, other modes halt. A drive that was never enabled can still run homing
+/// and may ignore a halt; changing to position mode ends its homing.
 async fn stop(c: &SdoSession) -> Result<(), Failure> {
     c.step("stop in control");
     c.write(&TARGET_VELOCITY, 0).await?;

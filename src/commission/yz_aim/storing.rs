@@ -1,4 +1,5 @@
-//! Stores parameters, and changes stored settings: multi-turn zero, node address, bit rate (manual V.2, V.3.B, 5.04, 5.13).
+//! Stores parameters, and changes stored settings: multi-turn zero, node address, bit rate (manual V.2, V.3.B, 5.04,
+//! 5.13).
 
 use takt_rt::time::Nanoseconds;
 

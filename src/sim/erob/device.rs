@@ -79,8 +79,8 @@ impl ErobDevice {
         }
     }
 
-    /// Evaluates the controlword. The drive does this in every step of its loop and after every write of 6040. `is_cleared`:
-    /// the cause of a fault is gone.
+    /// Evaluates the controlword. The drive does this in every step of its loop and after every write of 6040.
+    /// `is_cleared`: the cause of a fault is gone.
     pub fn evaluate(&mut self, now_ns: Nanoseconds, dictionary: &ErobDictionary, is_cleared: bool) -> Change {
         let word = dictionary.get(at::CONTROLWORD) as u16;
         let rising = word & !self.controlword;
@@ -151,7 +151,7 @@ impl ErobDevice {
     }
 
     /// Enters the fault state. Without torque, or when power must be cut, this happens at once. Otherwise the drive
-    /// decelerates first, as object 605E says.
+    /// decelerates first, by object 605E.
     pub fn fault(&mut self, cuts_power: bool, dictionary: &ErobDictionary) {
         if self.state.is_faulted() && !(cuts_power && self.state == State::FaultReactionActive) {
             return;
@@ -166,8 +166,8 @@ impl ErobDevice {
         self.state = if self.stop.is_some() { State::FaultReactionActive } else { State::Fault };
     }
 
-    /// The statusword as real units set it: bit 9 always, bit 4 unless there is a fault, bit 7 on some units, bit 12 except in
-    /// enabled profile position mode. `mode_bits` are bits 10 to 13, which the mode sets in an enabled drive.
+    /// The statusword as real units set it: bit 9 always, bit 4 unless there is a fault, bit 7 on some units, bit 12
+    /// except in enabled profile position mode. `mode_bits` are bits 10 to 13, which the mode sets in an enabled drive.
     pub fn statusword(&self, mode_bits: u16) -> u16 {
         let bits = match self.state {
             State::OperationEnabled => mode_bits,

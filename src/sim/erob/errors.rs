@@ -1,4 +1,5 @@
-//! Errors of the drive: emergency messages, the error register and the error history (CiA 301, 7.2.7, 7.5.2.2, 7.5.2.4).
+//! Errors of the drive: emergency messages, the error register and the error history (CiA 301, 7.2.7, 7.5.2.2,
+//! 7.5.2.4).
 
 use super::dictionary::{ErobDictionary, at};
 use crate::sim::drive::DriveFault;
@@ -53,8 +54,8 @@ impl ErobError {
         }
     }
 
-    /// Whether power is cut at once, because a controlled deceleration is not possible: faults of current (2xxx), voltage
-    /// (3xxx), hardware (5xxx) and sensors (73xx).
+    /// Whether power is cut at once, because a controlled deceleration is not possible: faults of current (2xxx),
+    /// voltage (3xxx), hardware (5xxx) and sensors (73xx).
     pub const fn cuts_power(self) -> bool {
         match self {
             Self::Fault(DriveFault::OverTemperature)

@@ -198,7 +198,8 @@ impl ErobJoint {
         dictionary.set(at::STATUSWORD, statusword.into());
     }
 
-    /// Writes the measured values to the dictionary with the effect of the defects, and lets the PDOs take their objects.
+    /// Writes the measured values to the dictionary with the effect of the defects, and lets the PDOs take their
+    /// objects.
     fn report<T>(&mut self, take: impl FnOnce(&mut ErobProcessData, &ErobDictionary) -> T) -> T {
         self.measure();
         let truth = self.defects.falsify(&mut self.dictionary);

@@ -15,14 +15,15 @@
 //! - A CSP target latched at SYNC k is reached at SYNC k + 1. The drive interpolates over the period (1006, otherwise
 //!   60C2), locks its loop to SYNC, and feeds the difference of the last two targets forward for at most two periods.
 //!   Without SYNC it holds the last target.
-//! - A write that the current state forbids (mapping of a valid PDO, 6060 while enabled) is aborted with 0x0800_0022. 6060
-//!   accepts a mode that 6502 does not name, but 6061 does not follow.
+//! - A write that the current state forbids (mapping of a valid PDO, 6060 while enabled) is aborted with 0x0800_0022.
+//!   6060 accepts a mode that 6502 does not name, but 6061 does not follow.
 //! - After 2242 = 1 a battery fault still needs a rising edge of controlword bit 7.
-//! - Electrical and encoder faults cut the power at once. Other faults decelerate by 605E first; the default ramp 6085 =
-//!   200 counts/s² takes minutes, so 6085 should be written.
+//! - Electrical and encoder faults cut the power at once. Other faults decelerate by 605E first; the default ramp 6085
+//!   = 200 counts/s² takes minutes, so 6085 should be written.
 //! - The following error window 6065 is off (all ones) until it is written.
 //! - The brake works without delay. The controlword's transition 5 (disable operation) is immediate.
-//! - 6093, 6080, 607C, 2380 to 2382, 3B60 and the homing and interpolation objects can be read and written, without effect.
+//! - 6093, 6080, 607C, 2380 to 2382, 3B60 and the homing and interpolation objects can be read and written, without
+//!   effect.
 
 mod defects;
 mod device;

@@ -55,8 +55,8 @@ const FORWARD_FILTER_S: f64 = 1e-3;
 /// Number of periods for which the velocity is fed forward, so that a SYNC up to one period late does not disturb the
 /// joint.
 const FORWARD_PERIODS: f64 = 2.0;
-/// In interpolated position mode, a target up to this multiple of the longest step (profile velocity times period) belongs to
-/// a stream. A more distant one is a move.
+/// In interpolated position mode, a target up to this multiple of the longest step (profile velocity times period)
+/// belongs to a stream. A more distant one is a move.
 const STREAMED_STEPS: f64 = 1.5;
 /// Tolerance in counts within which a profile has reached its target.
 const ARRIVED: f64 = 0.01;
@@ -106,8 +106,8 @@ impl ErobMotion {
         }
     }
 
-    /// Starts at the actual position, when torque comes on. The CSP target is the value of object 607A, so an old one makes
-    /// the axis jump.
+    /// Starts at the actual position, when torque comes on. The CSP target is the value of object 607A, so an old one
+    /// makes the axis jump.
     pub fn engage(&mut self, mode: Option<OperationMode>, actual: ErobActual, dictionary: &ErobDictionary) {
         *self = Self {
             mode,
@@ -127,9 +127,9 @@ impl ErobMotion {
         self.torque = 0.0;
     }
 
-    /// Latches the target of CSP, or of interpolated position mode while controlword bit 4 is set: at SYNC, or after a write in
-    /// between. It is reached at the end of the interpolation period, at the next SYNC. The same target again changes
-    /// nothing while the interpolation runs.
+    /// Latches the target of CSP, or of interpolated position mode while controlword bit 4 is set: at SYNC, or after a
+    /// write in between. It is reached at the end of the interpolation period, at the next SYNC. The same target again
+    /// changes nothing while the interpolation runs.
     pub fn latch(&mut self, dictionary: &ErobDictionary) {
         let is_interpolating = self.mode == Some(OperationMode::InterpolatedPosition)
             && dictionary.get(at::CONTROLWORD) as u16 & controlword::BIT_4 != 0;
@@ -185,8 +185,8 @@ impl ErobMotion {
         }
     }
 
-    /// Advances by `duration_s` and returns the set-point. A position is that of the beginning of the step, when the actual
-    /// position was measured.
+    /// Advances by `duration_s` and returns the set-point. A position is that of the beginning of the step, when the
+    /// actual position was measured.
     pub fn step(
         &mut self,
         word: u16,

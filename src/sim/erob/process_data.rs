@@ -210,8 +210,8 @@ impl ErobProcessData {
         }
     }
 
-    /// Checks the event-driven TPDOs (types 254 and 255). Events: the first time, the event timer, and a change of a mapped
-    /// object other than measured values.
+    /// Checks the event-driven TPDOs (types 254 and 255). Events: the first time, the event timer, and a change of a
+    /// mapped object other than measured values.
     pub fn sample_events(&mut self, now_ns: Nanoseconds, dictionary: &ErobDictionary) {
         for outbound in &mut self.outbound {
             let pdo = &outbound.pdo;

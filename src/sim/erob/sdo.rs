@@ -1,7 +1,7 @@
 //! The SDO server: one transfer at a time, expedited or segmented (CiA 301, 7.2.4). It refuses block transfers.
 //!
-//! The server holds the state of a transfer and encodes its frames. [`ErobObjectAccess`], passed with each request, reads
-//! and writes the objects.
+//! The server holds the state of a transfer and encodes its frames. [`ErobObjectAccess`], passed with each request,
+//! reads and writes the objects.
 
 use takt_rt::time::Nanoseconds;
 
@@ -11,7 +11,7 @@ use crate::sim::random::Random;
 /// Range of the response time, as measured on real units.
 const LATENCY_NS: std::ops::Range<Nanoseconds> = 300_000..1_000_000;
 
-/// ErobObjectAccess to the objects behind the server.
+/// Access to the objects behind the server.
 pub trait ErobObjectAccess {
     /// The value of an entry as little-endian bytes, and their number.
     fn read(&mut self, index: u16, subindex: u8) -> Result<([u8; 4], usize), ErobAbortCode>;

@@ -98,8 +98,8 @@ impl YzAimDevice {
 
     /// Takes a controlword.
     ///
-    /// With the quirks, two kinds of controlword have no effect: one that skips 0006h after power-up, and one that raises the
-    /// level too soon after the last.
+    /// With the quirks, two kinds of controlword have no effect: one that skips 0006h after power-up, and one that
+    /// raises the level too soon after the last.
     pub fn take(&mut self, now_ns: Nanoseconds, word: u16, quirks: &Quirks) {
         let wanted = Level::wanted(word);
         let is_raising = wanted > self.level.max(Level::Off);

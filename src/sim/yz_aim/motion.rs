@@ -121,8 +121,8 @@ impl YzAimMotion {
         self.is_limited
     }
 
-    /// Advances by `duration_s` and returns the set-point. A position is that of the beginning of the step, when the actual
-    /// position was measured. `acceleration` is infinite without a ramp.
+    /// Advances by `duration_s` and returns the set-point. A position is that of the beginning of the step, when the
+    /// actual position was measured. `acceleration` is infinite without a ramp.
     pub fn step(
         &mut self,
         command: MotionCommand,

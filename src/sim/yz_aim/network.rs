@@ -125,7 +125,8 @@ impl YzAimNetwork {
         None
     }
 
-    /// Receives the heartbeat of another node. The first one starts monitoring; after a loss, the next one ends the alarm.
+    /// Receives the heartbeat of another node. The first one starts monitoring; after a loss, the next one ends the
+    /// alarm.
     pub fn receive_heartbeat(&mut self, now_ns: Nanoseconds, node: u8, dictionary: &YzAimDictionary) {
         let consumer = dictionary.get(at::CONSUMER_HEARTBEAT) as u32;
         let timeout_ms = Nanoseconds::from(consumer as u16);

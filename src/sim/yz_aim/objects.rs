@@ -1,5 +1,5 @@
-//! The object dictionary by the manual's chapter VI, with the entries that CiA 301 implies. Other objects do not exist here.
-//! The manual gives few defaults outside the communication parameters; the others are from a new unit.
+//! The object dictionary by the manual's chapter VI, with the entries that CiA 301 implies. Other objects do not exist
+//! here. The manual gives few defaults outside the communication parameters; the others are from a new unit.
 
 /// One entry of the dictionary.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -103,8 +103,8 @@ pub struct Quirks {
     pub has_settable_pdos: bool,
     /// Whether TPDO3 has 0.1 r/min per bit like 606Ch by SDO, instead of 1 r/min as in the manual's example.
     pub has_fine_velocity_in_tpdo3: bool,
-    /// TPDO1, 2 and 4 have the statusword before the position, and TPDO3 has velocity and statusword instead of position and
-    /// velocity. The mapping objects say so.
+    /// TPDO1, 2 and 4 have the statusword before the position, and TPDO3 has velocity and statusword instead of
+    /// position and velocity. The mapping objects contain this order.
     pub reports_state_first: bool,
     /// Whether power-up sends a boot-up message, not only NMT 81h and 82h.
     pub announces_power_up: bool,
@@ -205,7 +205,8 @@ pub struct YzAimParameters {
 }
 
 impl YzAimParameters {
-    /// A new unit of a model on a bus at 1 Mbit/s, with a gear and a joint. The peak torque is three times the rated torque.
+    /// A new unit of a model on a bus at 1 Mbit/s, with a gear and a joint. The peak torque is three times the rated
+    /// torque.
     pub fn new(node: u8, model: Model, gearing: Gearing, joint: JointParameters) -> Self {
         let ratings = model.ratings();
         let direction = if gearing.is_reversed { -1.0 } else { 1.0 };
@@ -238,8 +239,8 @@ impl YzAimParameters {
         }
     }
 
-    /// The unit that simulates a configured axis. Interpolation is stored if the axis uses it. Limit switches are just beyond
-    /// the axis' limits, the lower one at DIR and the upper one at PU, with end stops behind them.
+    /// The unit that simulates a configured axis. Interpolation is stored if the axis uses it. Limit switches are just
+    /// beyond the axis' limits, the lower one at DIR and the upper one at PU, with end stops behind them.
     pub fn of(axis: &Axis, bit_rate: u32, simulation: &Simulation) -> Self {
         let travel_per_turn = match axis.travel {
             Travel::Rotary => TAU,

@@ -53,7 +53,8 @@ pub struct Addressed {
 }
 
 impl Addressed {
-    /// Decodes a frame. Frames of four bytes and more are accepted without padding, because published masters send them so.
+    /// Decodes a frame. Frames of four bytes and more are accepted without padding, because published masters send them
+    /// so.
     pub fn decode(payload: &[u8]) -> Option<Self> {
         let &[command, low, high, subindex, ref rest @ ..] = payload else { return None };
         let mut data = [0; 4];

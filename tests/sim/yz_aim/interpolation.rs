@@ -5,7 +5,7 @@ use takt::sim::yz_aim::YzAimJoint;
 
 use super::{Bench, MILLISECOND_NS, NODE, YzAimParameters, bench, by_the_manual, parameters};
 
-/// A unit that was set up for interpolation, enabled in mode 7 while the cycle runs.
+/// A unit set up for interpolation and enabled in mode 7 while the cycle runs.
 fn interpolating() -> Bench {
     let mut bench = bench(YzAimParameters { special_function: 7, ..parameters(NODE) });
     bench.write(0x6060, 0, 1, 7).unwrap();
@@ -18,7 +18,7 @@ fn interpolating() -> Bench {
 }
 
 #[test]
-fn targets_are_followed_from_sync_to_sync() {
+fn targets_are_interpolated_from_sync_to_sync() {
     let mut bench = interpolating();
     let mut target = 0;
     // 1000 r/min are 1092 counts per 2 ms.
@@ -36,7 +36,7 @@ fn targets_are_followed_from_sync_to_sync() {
 }
 
 #[test]
-fn a_held_target_moves_nothing_before_sync() {
+fn a_target_has_no_effect_before_sync() {
     let mut bench = interpolating();
     bench.hold_target(500);
     bench.run_ms(50);
@@ -47,7 +47,7 @@ fn a_held_target_moves_nothing_before_sync() {
 }
 
 #[test]
-fn a_step_beyond_the_highest_speed_is_followed_as_fast_as_the_motor_can() {
+fn a_step_beyond_the_highest_speed_is_followed_at_the_highest_speed() {
     let mut bench = interpolating();
     bench.interpolate(50_000);
     bench.run_ms(18);
@@ -105,7 +105,7 @@ fn the_first_target_after_enabling_is_ignored() {
 }
 
 #[test]
-fn of_two_targets_before_sync_the_newer_counts_and_without_one_the_last_is_held() {
+fn the_newest_target_before_sync_applies_and_the_last_one_is_held() {
     let mut bench = interpolating();
     bench.hold_target(100);
     bench.hold_target(300);
@@ -120,7 +120,7 @@ fn of_two_targets_before_sync_the_newer_counts_and_without_one_the_last_is_held(
 }
 
 #[test]
-fn a_halt_holds_the_shaft_while_targets_come_and_ends_in_a_chase() {
+fn after_a_halt_the_motor_runs_to_the_latest_target_at_full_speed() {
     let mut bench = interpolating();
     bench.control(0x10F);
     for k in 0..100 {
@@ -136,7 +136,7 @@ fn a_halt_holds_the_shaft_while_targets_come_and_ends_in_a_chase() {
 }
 
 #[test]
-fn after_a_lost_heartbeat_the_motor_goes_on_by_itself_to_wherever_the_targets_have_gone() {
+fn after_a_lost_heartbeat_the_motor_runs_on_to_the_latest_target() {
     let mut bench = interpolating();
     bench.write(0x1016, 1, 4, 0x007F_0032).unwrap();
     bench.send_data(0x77F, [5]);
@@ -166,7 +166,7 @@ fn three_axes(setting: fn(u8) -> YzAimParameters) -> Bench {
 }
 
 #[test]
-fn all_axes_take_their_target_at_the_same_sync() {
+fn all_axes_apply_their_target_at_the_same_sync() {
     let mut bench = three_axes(|node| YzAimParameters { special_function: 7, ..by_the_manual(node) });
     for node in [NODE, 6, 7].map(u32::from) {
         bench.send_data(0x600 + node, [0x2F, 0x60, 0x60, 0, 7, 0, 0, 0]);
@@ -191,11 +191,11 @@ fn all_axes_take_their_target_at_the_same_sync() {
 }
 
 #[test]
-fn the_loops_begin_anew_with_sync_wherever_it_falls() {
-    // Between two SYNCs it would show how many steps of the loops there have been.
+fn the_control_loops_restart_with_every_sync() {
+    // Between two SYNCs, the result would depend on the number of control steps so far.
     let positions = |phase_ns: u64| {
         let mut bench = interpolating();
-        // Nothing else on the bus may delay SYNC.
+        // No other frame on the bus may delay SYNC.
         for (index, subindex) in [(0x1017, 0), (0x1800, 5), (0x1802, 5)] {
             bench.write(index, subindex, 2, 0).unwrap();
         }
@@ -235,7 +235,7 @@ fn without_interpolation_sync_starts_profiles_together() {
 }
 
 #[test]
-fn the_same_life_gives_the_same_frames_however_often_somebody_looks() {
+fn the_frames_do_not_depend_on_how_often_the_drive_is_polled() {
     let live = |glances: u64| {
         let mut bench = interpolating();
         bench.heard.clear();

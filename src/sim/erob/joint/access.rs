@@ -10,7 +10,7 @@ use crate::sim::erob::{process_data, sdo};
 
 /// The signature for object 1010:1.
 const SAVE_SIGNATURE: u32 = u32::from_le_bytes(*b"save");
-/// Time from "save" until it takes effect: the manual says to wait 3 s before the supply is cut.
+/// Time from "save" until it takes effect: the manual requires a wait of 3 s before the supply is cut.
 const SAVE_NS: Nanoseconds = 3_000_000_000;
 
 /// Writes an entry from an RPDO. An enabled drive keeps its mode; a value out of range is ignored.
