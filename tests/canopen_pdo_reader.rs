@@ -11,8 +11,7 @@ use takt::canopen::sdo::{Expedited, SdoError, SdoRequest, SdoTiming};
 use takt::sim::erob::{ErobJoint, ErobParameters};
 use takt::sim::plant::{Encoder, JointParameters};
 use takt::sim::{SimulatedBus, WireBitRates};
-use takt_rt::frame::{Frame, Id};
-use takt_rt::port::{BusPort, ReceiveBatch};
+use takt_rt::{BusPort, Frame, Id, ReceiveBatch};
 
 const NODE: u8 = 5;
 const MILLISECOND_NS: u64 = 1_000_000;

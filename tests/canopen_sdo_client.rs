@@ -5,7 +5,7 @@ use takt::canopen::object::{DataType, ObjectAddress};
 use takt::canopen::sdo::{
     AbortCode, Completed, MAX_UPLOAD_BYTES, SdoBusy, SdoClient, SdoError, SdoTiming, Transfer, Uploaded,
 };
-use takt_rt::frame::{Frame, Id};
+use takt_rt::{Frame, Id};
 
 const NODE: u8 = 2;
 const TIMING: SdoTiming = SdoTiming { reply_timeout_ns: 500, retries: 2 };

@@ -15,8 +15,7 @@ use takt::sim::erob::{ErobJoint, ErobParameters};
 use takt::sim::plant::{Encoder, JointParameters};
 use takt::sim::yz_aim::{Gearing, Model, YzAimJoint, YzAimParameters};
 use takt::sim::{Defect, Drive, DriveFault, SimulatedBus, WireBitRates};
-use takt_rt::frame::{Frame, Id};
-use takt_rt::port::{BusPort, ReceiveBatch};
+use takt_rt::{BusPort, Frame, Id, ReceiveBatch};
 
 thread_local! {
     static ALLOCATIONS: Cell<u64> = const { Cell::new(0) };

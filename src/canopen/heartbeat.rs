@@ -1,7 +1,6 @@
 //! Heartbeat consumers for several nodes (CiA 301, 7.2.8.3.2 and object 1016).
 
-use takt_rt::frame::Frame;
-use takt_rt::time::Nanoseconds;
+use takt_rt::{Frame, Nanoseconds};
 
 use super::nmt::{HeartbeatConsumer, HeartbeatEvent, NmtState};
 

@@ -1,7 +1,6 @@
 //! The configuration of a PDO, from a device by SDO or from a file.
 
-use takt_rt::frame::{Frame, Id};
-use takt_rt::pdo::MappedObject;
+use takt_rt::{Frame, Id, MappedObject};
 
 use super::object::ObjectAddress;
 use super::objects::{PDO_INVALID, PdoDirection, PdoParameters};

@@ -1,6 +1,6 @@
 //! First contact with a drive: checks that it answers SDO requests, and that its vendor ID is the expected one.
 
-use takt_rt::frame::{Frame, Id};
+use takt_rt::{Frame, Id};
 
 use super::failure::Failure;
 use super::family::Family;

@@ -1,6 +1,6 @@
 //! Events of a running procedure.
 
-use takt_rt::time::Nanoseconds;
+use takt_rt::Nanoseconds;
 
 /// An event for the operator.
 #[derive(Clone, Debug, PartialEq)]

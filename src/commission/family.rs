@@ -1,6 +1,6 @@
 //! The properties of each drive family for commissioning.
 
-use takt_rt::frame::Frame;
+use takt_rt::Frame;
 
 use super::dictionary::ObjectEntry;
 use super::session_state::SdoQuirks;

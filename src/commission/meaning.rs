@@ -1,6 +1,6 @@
 //! Describes frames in words, for the trace of a procedure.
 
-use takt_rt::frame::Frame;
+use takt_rt::Frame;
 
 use super::dictionary::ObjectEntry;
 use super::family::Family;

@@ -1,6 +1,6 @@
 //! Motion profile of a commissioning move, and the stopping distance before a limit.
 
-use takt_rt::time::Nanoseconds;
+use takt_rt::Nanoseconds;
 
 use super::event::AxisReading;
 use super::failure::Failure;

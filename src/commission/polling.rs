@@ -1,6 +1,6 @@
 //! Polls the readings of an axis, and reports its final position and its moves.
 
-use takt_rt::time::Nanoseconds;
+use takt_rt::Nanoseconds;
 
 use super::contact;
 use super::event::AxisReading;

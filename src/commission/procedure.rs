@@ -5,8 +5,7 @@ use std::future::Future;
 use std::pin::Pin;
 use std::task::{Context, Poll, Waker};
 
-use takt_rt::frame::Frame;
-use takt_rt::time::Nanoseconds;
+use takt_rt::{Frame, Nanoseconds};
 
 use super::event::ProcedureEvent;
 use super::failure::Failure;

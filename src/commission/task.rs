@@ -1,6 +1,6 @@
 //! The tasks that commissioning can carry out with a drive.
 
-use takt_rt::time::Nanoseconds;
+use takt_rt::Nanoseconds;
 
 use super::dictionary::ObjectEntry;
 use super::motion_profile::MotionProfile;

@@ -10,8 +10,7 @@
 //! If the configuration gives the master a heartbeat, the drives monitor it from the end of [`Stage::Configure`] on.
 //! The caller sends it from before the bring-up until [`Shutdown`] is done, also after a failed bring-up.
 
-use takt_rt::frame::Frame;
-use takt_rt::time::Nanoseconds;
+use takt_rt::{Frame, Nanoseconds};
 
 use super::axis_run::{AxisRun, Policy};
 use super::erob_canopen;

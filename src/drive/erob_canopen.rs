@@ -1,10 +1,7 @@
 //! ZeroErr eRob with CANopen firmware (eRunner manual 1.7, chapter 5, and field experience): the steps of bring-up,
 //! start and shutdown, and the vendor's error codes.
 
-use takt_rt::cia402::controlword;
-use takt_rt::frame::{Frame, Id};
-use takt_rt::pdo::CommandSlot;
-use takt_rt::time::Nanoseconds;
+use takt_rt::{CommandSlot, Frame, Id, Nanoseconds, controlword};
 
 use super::axis_run::OtherProtocol;
 use super::bring_up::BringUpTiming;

@@ -1,7 +1,6 @@
 //! A procedure on one drive as a list of steps: plain data that describes a family's procedure. `axis_run` runs it.
 
-use takt_rt::cia402::{OperationMode, State};
-use takt_rt::time::Nanoseconds;
+use takt_rt::{DriveState, Nanoseconds, OperationMode};
 
 use crate::canopen::dcf::Download;
 use crate::canopen::nmt::{NmtCommand, NmtState};
@@ -152,7 +151,7 @@ impl Check {
             Self::Masked { value: wanted, mask } => (value ^ wanted) & i64::from(mask) == 0,
             Self::Profile(profile) => value & 0xFFFF == i64::from(profile),
             Self::Supports(mode) => value & i64::from(mode.supported_bit()) != 0,
-            Self::NoTorque => !State::decode(value as u16).has_torque(),
+            Self::NoTorque => !DriveState::decode(value as u16).has_torque(),
             Self::AtMost(limit) => value.abs() <= limit,
             Self::Positive => value > 0,
         }
@@ -177,7 +176,7 @@ impl Check {
     /// The meaning of a value that does not pass, beyond its number.
     pub fn meaning(self, value: i64) -> Option<String> {
         match self {
-            Self::NoTorque => Some(format!("{:?}", State::decode(value as u16))),
+            Self::NoTorque => Some(format!("{:?}", DriveState::decode(value as u16))),
             Self::Supports(_) => {
                 let supported =
                     OperationMode::ALL.into_iter().filter(|mode| Self::Supports(*mode).passes(value));

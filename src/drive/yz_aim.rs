@@ -4,8 +4,7 @@
 //! The PDO mapping is fixed. The drive has no mode display (6061) and no emergency messages, and it does not answer SDO
 //! requests for unknown objects.
 
-use takt_rt::cia402::controlword;
-use takt_rt::time::Nanoseconds;
+use takt_rt::{Nanoseconds, controlword};
 
 use super::bring_up::BringUpTiming;
 use super::step::{Action, Check, Condition, Fact, ProcedureStep, ReadBack, ValueSource};

@@ -1,7 +1,6 @@
 //! The effects of faults.
 
-use takt_rt::frame::{Frame, FrameKind, Id};
-use takt_rt::time::Nanoseconds;
+use takt_rt::{Frame, FrameKind, Id, Nanoseconds};
 
 use super::injectable::DriveEffect;
 

@@ -1,8 +1,6 @@
 //! ScenarioFault injection into a port and the simulated drives behind it.
 
-use takt_rt::frame::Frame;
-use takt_rt::port::BusPort;
-use takt_rt::time::Nanoseconds;
+use takt_rt::{BusPort, Frame, Nanoseconds};
 
 use crate::bus::trace::TracedPort;
 use crate::sim::{Defect, DriveFault, InjectDefectError, SimulatedBus, UnknownNode};

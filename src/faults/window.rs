@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-use takt_rt::time::Nanoseconds;
+use takt_rt::Nanoseconds;
 
 use super::trigger::{Trigger, TriggerTimes};
 
@@ -153,8 +153,7 @@ impl WindowTimer {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use takt_rt::door::Snapshot;
-    use takt_rt::stop::Phase;
+    use takt_rt::{Phase, Snapshot};
 
     fn timer(window: Window) -> (WindowTimer, Arc<TriggerTimes>) {
         let trigger_times = Arc::new(TriggerTimes::default());

@@ -1,7 +1,7 @@
 //! Defects of a simulated drive or its joint. Unlike a [`DriveFault`](super::DriveFault), the drive itself may not
 //! detect them.
 
-use takt_rt::frame::Frame;
+use takt_rt::Frame;
 
 /// A defect of a drive or its joint. Most are states that last until they are removed; the others are momentary events
 /// ([`Defect::is_event`]).

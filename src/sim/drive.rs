@@ -2,9 +2,7 @@
 //! from its mailbox. It has no thread and reads no clock, so the same drive runs in virtual time, in wall-clock time,
 //! and on a real interface.
 
-use takt_rt::cia402::State;
-use takt_rt::frame::Frame;
-use takt_rt::time::Nanoseconds;
+use takt_rt::{DriveState, Frame, Nanoseconds};
 
 use super::defect::{Defect, Unsupported};
 use super::mailbox::Mailbox;
@@ -60,7 +58,7 @@ pub struct Observation {
     /// The reported position in counts.
     pub position_counts: i32,
     /// Its CiA 402 state.
-    pub state: State,
+    pub state: DriveState,
     /// Its statusword (object 6041).
     pub statusword: u16,
     /// Its error code (object 603F).

@@ -5,9 +5,7 @@
 //! acknowledged. Two stations that send the same identifier at once would destroy each other's frames on a real bus;
 //! here the station with the lower number goes first.
 
-use takt_rt::frame::Frame;
-use takt_rt::time::Nanoseconds;
-use takt_rt::wire::{INTERMISSION_BITS, WireLength, bits_ns};
+use takt_rt::{Frame, INTERMISSION_BITS, Nanoseconds, WireLength, bits_ns};
 
 use super::mailbox::{Mailbox, QueueOrder, priority};
 
@@ -149,7 +147,7 @@ impl Medium {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use takt_rt::frame::Id;
+    use takt_rt::Id;
 
     const RATES: WireBitRates = WireBitRates { nominal: 1_000_000, data: None };
 

@@ -21,8 +21,7 @@
 //!
 //! ```
 //! use takt::sim::{WireBitRates, SimulatedBus};
-//! use takt_rt::frame::{Frame, Id};
-//! use takt_rt::port::{BusPort, ReceiveBatch};
+//! use takt_rt::{BusPort, Frame, Id, ReceiveBatch};
 //!
 //! # fn parameters() -> takt::sim::erob::ErobParameters {
 //! #     use takt::sim::erob::ErobParameters;
@@ -66,4 +65,4 @@ pub use live::LiveDrives;
 pub use mailbox::{Mailbox, QueueOrder};
 pub use medium::{FrameOnWire, Medium, WireBitRates};
 pub use port::{InjectDefectError, SimulatedBus, UnknownNode};
-pub use takt_rt::wire::{INTERMISSION_BITS, WireLength, bits_ns};
+pub use takt_rt::{INTERMISSION_BITS, WireLength, bits_ns};

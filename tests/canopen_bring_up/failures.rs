@@ -4,7 +4,7 @@ use takt::canopen::emcy::{Emergency, ErrorCode, ErrorRegister};
 use takt::canopen::sdo::AbortCode;
 use takt::config::Control;
 use takt::drive::{BringUp, FailureCause, ProbeResult, Shutdown};
-use takt_rt::cia402::State;
+use takt_rt::State;
 
 use super::scripted_drive::{ScriptedDrive, at};
 use super::started;
@@ -158,7 +158,7 @@ fn a_write_is_refused_because_of_the_drives_state() {
 #[test]
 fn the_drive_keeps_its_torque() {
     let message = message(|drive| {
-        drive.state = State::OperationEnabled;
+        drive.state = DriveState::OperationEnabled;
         drive.flaws.ignores_controlwords = true;
     });
     assert!(

@@ -6,9 +6,7 @@ use takt::commission::dictionary::{self, SelectedObject};
 use takt::commission::{CommandValue, Failure, Family, MotionProfile, MoveKind, TargetDrive, Task};
 use takt::config::Config;
 use takt::sim::{DriveFault, SimulatedBus};
-use takt_rt::cia402::State;
-use takt_rt::frame::{Frame, Id};
-use takt_rt::port::{BusPort, Clock};
+use takt_rt::{BusPort, Clock, DriveState, Frame, Id};
 
 use super::bench::*;
 
@@ -44,7 +42,7 @@ fn an_absolute_move_uses_the_handshake_and_ends_at_the_target_without_torque() {
     let report = bench.run(move_to(absolute(30.0))).unwrap();
     let seen = bench.observe();
     assert!((seen.position - 30_f64.to_radians()).abs() < 1e-4, "{seen:?}");
-    assert_eq!((seen.state, seen.is_braked), (State::SwitchOnDisabled, true));
+    assert_eq!((seen.state, seen.is_braked), (DriveState::SwitchOnDisabled, true));
     assert!(number(&report, "error_counts").abs() <= 100.0, "{report:?}");
     let target_at = bench.sent_at(Frame::of(Id::canopen(0x600, NODE), {
         let [a, b, c, d] = 43_691_i32.to_le_bytes();
@@ -155,7 +153,7 @@ fn an_axis_that_runs_towards_a_limit_stops_before_it() {
     let seen = bench.observe();
     let degrees_at = seen.position.to_degrees();
     assert!(degrees_at > -170.0 && degrees_at < -150.0, "{seen:?}");
-    assert_eq!(seen.state, State::SwitchOnDisabled);
+    assert_eq!(seen.state, DriveState::SwitchOnDisabled);
 }
 
 #[test]
@@ -171,7 +169,7 @@ fn a_torque_is_sent_in_per_mille_of_the_rated_torque_and_ends_at_standstill() {
     bench.sent_at(write_u16(0x6071, 30));
     assert!(number(&report, "travelled") > 0.0);
     let seen = bench.observe();
-    assert_eq!((seen.state, seen.velocity), (State::SwitchOnDisabled, 0.0));
+    assert_eq!((seen.state, seen.velocity), (DriveState::SwitchOnDisabled, 0.0));
 }
 
 #[test]
@@ -183,7 +181,7 @@ fn a_torque_run_ends_when_the_axis_is_too_fast() {
     let failed = bench.run(request).unwrap_err();
     assert!(matches!(failed.failure, Failure::AtLimit { .. }) && failed.step == "torque", "{failed:?}");
     assert!(bench.fastest.to_degrees() < 20.0, "{}", bench.fastest.to_degrees());
-    assert_eq!(bench.observe().state, State::SwitchOnDisabled);
+    assert_eq!(bench.observe().state, DriveState::SwitchOnDisabled);
 }
 
 #[test]
@@ -195,7 +193,7 @@ fn ctrl_c_stops_a_motion_and_disables() {
         let failed = bench.run_interrupted(request, |step| usize::from(step == "run")).unwrap_err();
         assert_eq!(failed.failure, Failure::Interrupted);
         let seen = bench.observe();
-        assert_eq!((seen.state, seen.velocity), (State::SwitchOnDisabled, 0.0));
+        assert_eq!((seen.state, seen.velocity), (DriveState::SwitchOnDisabled, 0.0));
     }
     let quick_stop_at = bench.sent_at(write_u16(0x6040, 0x02));
     let off_at = bench.sent.iter().rposition(|frame| *frame == write_u16(0x6040, 0)).unwrap();
@@ -216,7 +214,7 @@ fn a_second_ctrl_c_takes_the_torque_off_at_once() {
     let failed = bench.run_interrupted(request, asked).unwrap_err();
     assert_eq!(failed.failure, Failure::Interrupted);
     assert!(bench.steps.contains(&"torque off at once"), "{:?}", bench.steps);
-    assert_eq!(bench.observe().state, State::SwitchOnDisabled);
+    assert_eq!(bench.observe().state, DriveState::SwitchOnDisabled);
 }
 
 #[test]
@@ -229,7 +227,7 @@ fn torque_stays_on_only_on_request() {
     let request = Task::Move { kind: absolute(5.0), profile: brisk(), keeps_enabled: true };
     bench.run(request).unwrap();
     let seen = bench.observe();
-    assert_eq!(seen.state, State::OperationEnabled);
+    assert_eq!(seen.state, DriveState::OperationEnabled);
     assert!((seen.position.to_degrees() - 5.0).abs() < 0.01);
     // The drive no longer consumes a heartbeat, so it stays enabled.
     let every = Task::Watch { every_ns: 100 * MS, duration_ns: Some(2 * SECOND) };
@@ -237,7 +235,7 @@ fn torque_stays_on_only_on_request() {
     assert_eq!(bench.observe().state, State::OperationEnabled);
     let report = bench.run(Task::Disable).unwrap();
     assert_eq!(report.get("was_enabled"), Some(&true.into()));
-    assert_eq!(bench.observe().state, State::SwitchOnDisabled);
+    assert_eq!(bench.observe().state, DriveState::SwitchOnDisabled);
 }
 
 #[test]
@@ -280,7 +278,7 @@ fn a_fault_during_a_motion_ends_it_and_is_named() {
         matches!(&failed.failure, Failure::Faulted { what, .. } if what.starts_with("0x4310")),
         "{failed:?}"
     );
-    assert_eq!((failed.step, bench.observe().state), ("move", State::Fault));
+    assert_eq!((failed.step, bench.observe().state), ("move", DriveState::Fault));
 }
 
 #[test]
@@ -293,7 +291,7 @@ fn the_battery_fault_is_cleared_only_with_consent() {
     assert_eq!(bench.observe().state, State::Fault);
     bench.run(Task::ClearFault { is_confirmed: true }).unwrap();
     let seen = bench.observe();
-    assert_eq!((seen.state, seen.error_code), (State::SwitchOnDisabled, 0));
+    assert_eq!((seen.state, seen.error_code), (DriveState::SwitchOnDisabled, 0));
     assert!((0..524_288).contains(&seen.position_counts), "{seen:?}");
 }
 

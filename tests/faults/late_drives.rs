@@ -1,7 +1,7 @@
 //! Drives whose replies are always whole cycles late, so that each reply looks like one to the next SYNC or set-point.
 
 use takt::controller::Outcome;
-use takt_rt::stop::{Phase, Rule, StopCategory};
+use takt_rt::{Phase, Rule, StopCategory};
 
 use takt::config::Config;
 

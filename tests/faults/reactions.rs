@@ -1,8 +1,7 @@
 //! The controller's reaction to each fault that has a rule, and the invariants for all faults.
 
 use takt::controller::Outcome;
-use takt_rt::port::BusState;
-use takt_rt::stop::{Origin, Phase, Rule, StopCategory};
+use takt_rt::{BusState, Origin, Phase, Rule, StopCategory};
 
 use crate::arm::{Played, arm, play};
 

@@ -7,8 +7,7 @@ use takt::faults::{
     DelayPlace, Direction, Effect, FaultProgress, FaultyPort, ForeignFrames, FrameEffect, Injectable,
     InterfaceEffect, Part, ScenarioFault, Selection, Trigger, TriggerTimes, Window,
 };
-use takt_rt::frame::{Frame, Id};
-use takt_rt::port::{BusHealth, BusPort, BusState, ReceiveBatch, Received};
+use takt_rt::{BusHealth, BusPort, BusState, Frame, Id, ReceiveBatch, Received};
 
 /// A port that keeps the sent frames, and receives the frames that the test gives it.
 #[derive(Default)]

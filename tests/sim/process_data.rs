@@ -1,6 +1,6 @@
 //! The time at which PDOs act, and PDOs of a wrong length (CiA 301, 7.2.2).
 
-use takt_rt::frame::{Frame, Id};
+use takt_rt::{Frame, Id};
 
 use super::bench::{Bench, NODE};
 

@@ -1,6 +1,6 @@
 //! Checks that PDO mappings refer to existing, mappable objects with the right length.
 
-use takt_rt::pdo::MappedObject;
+use takt_rt::MappedObject;
 
 use super::data_type::{DataTypeCode, ValueKind};
 use super::dictionary::{DictionaryEntry, ObjectDictionary};

@@ -1,7 +1,6 @@
 //! The LSS master: one task at a time, with a timeout for every wait.
 
-use takt_rt::frame::Frame;
-use takt_rt::time::Nanoseconds;
+use takt_rt::{Frame, Nanoseconds};
 
 use super::LssAddress;
 use super::fast_scan::{FastScan, KnownIdentity, Scanned};

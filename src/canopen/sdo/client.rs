@@ -4,8 +4,7 @@
 //! response under way, which a later transfer of the same object could mistake for its own. So after a repeated
 //! transfer, the client sends nothing until no response can be outstanding.
 
-use takt_rt::frame::Frame;
-use takt_rt::time::Nanoseconds;
+use takt_rt::{Frame, Nanoseconds};
 
 use super::abort::AbortCode;
 use super::exchange::{Exchange, ExchangeStep};

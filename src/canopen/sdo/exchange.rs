@@ -1,6 +1,6 @@
 //! The state machine of one transfer, without timing.
 
-use takt_rt::frame::{Frame, Id};
+use takt_rt::{Frame, Id};
 
 use super::abort::AbortCode;
 use super::block_download::{BlockDownload, Next};

@@ -1,6 +1,6 @@
 //! Requests of an SDO client.
 
-use takt_rt::frame::{Frame, Id};
+use takt_rt::{Frame, Id};
 
 use super::abort::AbortCode;
 use super::wire::{

@@ -1,6 +1,6 @@
 //! Responses of an SDO server.
 
-use takt_rt::frame::{Frame, Id};
+use takt_rt::{Frame, Id};
 
 use super::abort::AbortCode;
 use super::wire::{

@@ -1,6 +1,6 @@
 //! Transfers, their results and errors.
 
-use takt_rt::time::Nanoseconds;
+use takt_rt::Nanoseconds;
 
 use super::abort::AbortCode;
 use crate::canopen::object::{DataType, ObjectAddress};

@@ -1,7 +1,6 @@
 //! Homing of an eRob. The known firmware has no homing mode; firmware that declares one can use methods 35 and 37.
 
-use takt_rt::cia402::{OperationMode, controlword, statusword};
-use takt_rt::time::Nanoseconds;
+use takt_rt::{Nanoseconds, OperationMode, controlword, statusword};
 
 use super::motion::with_torque;
 use super::objects::{HOME_OFFSET, HOMING_METHOD};

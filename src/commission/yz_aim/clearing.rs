@@ -1,7 +1,7 @@
 //! Clears an alarm in the way that the manual gives for it (IIb.3, 5.11.2). The targets are reset first: after a loss
 //! of communication the drive resumes its motion as soon as the heartbeat returns.
 
-use takt_rt::time::Nanoseconds;
+use takt_rt::Nanoseconds;
 
 use super::alarm::{Alarm, Clearing};
 use super::enabling::statusword;

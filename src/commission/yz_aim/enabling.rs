@@ -1,6 +1,6 @@
 //! Enabling and disabling a YZ-AIM, with the checks before motion.
 
-use takt_rt::time::Nanoseconds;
+use takt_rt::Nanoseconds;
 
 use super::alarm::Alarm;
 use super::objects::{ACCELERATION, VELOCITY};

@@ -1,6 +1,6 @@
 //! Homing (manual 5.09). Setting the mode starts it; statusword bit 12 reports its end, bit 13 an error.
 
-use takt_rt::time::Nanoseconds;
+use takt_rt::Nanoseconds;
 
 use super::enabling::{self, mode};
 use super::motion::with_torque;

@@ -1,7 +1,7 @@
 //! Motion of a YZ-AIM by SDO (manual 5.06.1, 5.06.2, 5.07.1): every motion is prepared, monitored and ended at
 //! standstill.
 
-use takt_rt::time::Nanoseconds;
+use takt_rt::Nanoseconds;
 
 use super::enabling::{self, mode};
 use super::objects::ACCELERATION;

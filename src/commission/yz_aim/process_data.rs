@@ -1,6 +1,6 @@
 //! Describes the PDOs of a YZ-AIM. Their mapping is fixed (manual 5.08).
 
-use takt_rt::frame::Frame;
+use takt_rt::Frame;
 
 use super::words;
 use crate::commission::target::TargetDrive;

@@ -1,6 +1,6 @@
 //! Reads position, velocity, current and alarms of a YZ-AIM.
 
-use takt_rt::time::Nanoseconds;
+use takt_rt::Nanoseconds;
 
 use super::alarm::Alarm;
 use super::objects::{ALARM, CURRENT, VELOCITY};

@@ -1,7 +1,6 @@
 //! Evaluates the drive's SDO responses: checks and stores values, verifies writes, and classifies missing answers.
 
-use takt_rt::dialect::Dialect;
-use takt_rt::time::Nanoseconds;
+use takt_rt::{Dialect, Nanoseconds};
 
 use super::{AWAIT_PAUSE_NS, AxisRun, StepPhase, StepResult};
 use crate::canopen::dcf::Download;

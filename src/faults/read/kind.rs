@@ -1,6 +1,6 @@
 //! The kinds of fault and their keys.
 
-use takt_rt::frame::{Frame, Id};
+use takt_rt::{Frame, Id};
 
 use super::common::{self, Location};
 use crate::canopen::nmt::{NmtCommand, NmtTarget};

@@ -1,6 +1,6 @@
 //! The defects of an eRob, and their effect on its feedback.
 
-use takt_rt::frame::Frame;
+use takt_rt::Frame;
 
 use super::dictionary::{ErobDictionary, at};
 use crate::sim::defect::{Defect, shorter};

@@ -1,7 +1,6 @@
 //! The CiA 402 state machine: controlword, state, statusword, the ramps of some transitions, and the fault reaction.
 
-use takt_rt::cia402::{Command, State, controlword, statusword};
-use takt_rt::time::Nanoseconds;
+use takt_rt::{Command, DriveState, Nanoseconds, controlword, statusword};
 
 use super::dictionary::{ErobDictionary, at};
 
@@ -16,7 +15,7 @@ pub struct Stop {
     /// In counts/s².
     pub deceleration: f64,
     /// The state after it.
-    pub then: State,
+    pub then: DriveState,
 }
 
 /// What a state change means for the motion.
@@ -33,7 +32,7 @@ pub enum Change {
 /// The state machine.
 #[derive(Clone, Copy, Debug)]
 pub struct ErobDevice {
-    state: State,
+    state: DriveState,
     controlword: u16,
     reset_since_ns: Option<Nanoseconds>,
     stop: Option<Stop>,
@@ -44,7 +43,7 @@ impl ErobDevice {
     /// A drive that is booting. The warning bit differs from unit to unit.
     pub fn starting(has_warning: bool) -> Self {
         Self {
-            state: State::NotReadyToSwitchOn,
+            state: DriveState::NotReadyToSwitchOn,
             controlword: 0,
             reset_since_ns: None,
             stop: None,
@@ -58,7 +57,7 @@ impl ErobDevice {
     }
 
     /// The state.
-    pub fn state(&self) -> State {
+    pub fn state(&self) -> DriveState {
         self.state
     }
 
@@ -74,8 +73,8 @@ impl ErobDevice {
 
     /// Ends the initialisation (transition 1).
     pub fn started(&mut self) {
-        if self.state == State::NotReadyToSwitchOn {
-            self.state = State::SwitchOnDisabled;
+        if self.state == DriveState::NotReadyToSwitchOn {
+            self.state = DriveState::SwitchOnDisabled;
         }
     }
 
@@ -85,11 +84,11 @@ impl ErobDevice {
         let word = dictionary.get(at::CONTROLWORD) as u16;
         let rising = word & !self.controlword;
         self.controlword = word;
-        if self.state == State::Fault {
+        if self.state == DriveState::Fault {
             return self.evaluate_reset(now_ns, word, rising, is_cleared);
         }
         self.reset_since_ns = None;
-        if self.state == State::FaultReactionActive {
+        if self.state == DriveState::FaultReactionActive {
             return Change::None;
         }
         self.evaluate_command(Command::decode(word), dictionary)
@@ -117,8 +116,8 @@ impl ErobDevice {
         }
         let next = self.state.after(command, false);
         let had_torque = self.state.has_torque();
-        if self.state == State::OperationEnabled
-            && next == State::ReadyToSwitchOn
+        if self.state == DriveState::OperationEnabled
+            && next == DriveState::ReadyToSwitchOn
             && dictionary.signed(at::SHUTDOWN_OPTION) == 1
         {
             let deceleration = dictionary.real(at::PROFILE_DECELERATION);
@@ -126,13 +125,13 @@ impl ErobDevice {
             return Change::None;
         }
         self.stop = None;
-        if next == State::QuickStopActive && self.state != next {
+        if next == DriveState::QuickStopActive && self.state != next {
             // The drive has no object 605A; it acts like its default 2: disable after the quick stop ramp.
             let deceleration = dictionary.real(at::QUICK_STOP_DECELERATION);
-            self.stop = Some(Stop { deceleration, then: State::SwitchOnDisabled });
+            self.stop = Some(Stop { deceleration, then: DriveState::SwitchOnDisabled });
         }
         self.state = next;
-        if next == State::OperationEnabled && !had_torque { Change::Enabled } else { Change::None }
+        if next == DriveState::OperationEnabled && !had_torque { Change::Enabled } else { Change::None }
     }
 
     /// Ends the deceleration at standstill.
@@ -145,7 +144,7 @@ impl ErobDevice {
     /// Removes the torque without a fault, like safe torque off.
     pub fn lose_torque(&mut self) {
         if self.state.has_torque() && !self.state.is_faulted() {
-            self.state = State::SwitchOnDisabled;
+            self.state = DriveState::SwitchOnDisabled;
             self.stop = None;
         }
     }
@@ -153,7 +152,7 @@ impl ErobDevice {
     /// Enters the fault state. Without torque, or when power must be cut, this happens at once. Otherwise the drive
     /// decelerates first, by object 605E.
     pub fn fault(&mut self, cuts_power: bool, dictionary: &ErobDictionary) {
-        if self.state.is_faulted() && !(cuts_power && self.state == State::FaultReactionActive) {
+        if self.state.is_faulted() && !(cuts_power && self.state == DriveState::FaultReactionActive) {
             return;
         }
         let deceleration = match dictionary.signed(at::FAULT_REACTION_OPTION) {
@@ -162,15 +161,15 @@ impl ErobDevice {
             2 => Some(dictionary.real(at::QUICK_STOP_DECELERATION)),
             _ => None,
         };
-        self.stop = deceleration.map(|deceleration| Stop { deceleration, then: State::Fault });
-        self.state = if self.stop.is_some() { State::FaultReactionActive } else { State::Fault };
+        self.stop = deceleration.map(|deceleration| Stop { deceleration, then: DriveState::Fault });
+        self.state = if self.stop.is_some() { DriveState::FaultReactionActive } else { DriveState::Fault };
     }
 
     /// The statusword as real units set it: bit 9 always, bit 4 unless there is a fault, bit 7 on some units, bit 12
     /// except in enabled profile position mode. `mode_bits` are bits 10 to 13, which the mode sets in an enabled drive.
     pub fn statusword(&self, mode_bits: u16) -> u16 {
         let bits = match self.state {
-            State::OperationEnabled => mode_bits,
+            DriveState::OperationEnabled => mode_bits,
             _ => statusword::BIT_12,
         };
         let voltage = if self.state.is_faulted() { 0 } else { VOLTAGE_ENABLED };

@@ -41,7 +41,7 @@ pub use joint::ErobJoint;
 pub use objects::{ErobAccess, ErobDataType, ErobObject, OBJECTS};
 
 use crate::config::{Axis, Control, Simulation, Travel};
-use takt_rt::time::Nanoseconds;
+use takt_rt::Nanoseconds;
 
 use super::plant::{Encoder, JointParameters};
 

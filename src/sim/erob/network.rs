@@ -1,6 +1,6 @@
 //! NMT state, boot-up, heartbeat producer and consumer, node guarding (CiA 301, 7.2.8, 7.3.2).
 
-use takt_rt::time::Nanoseconds;
+use takt_rt::Nanoseconds;
 
 use super::dictionary::{ErobDictionary, at};
 use crate::sim::drive::NodeState;

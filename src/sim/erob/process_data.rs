@@ -1,8 +1,6 @@
 //! The four RPDOs and four TPDOs: parameters, compiled mappings, and transmission types (CiA 301, 7.2.2).
 
-use takt_rt::frame::{Frame, Id};
-use takt_rt::pdo::MappedObject;
-use takt_rt::time::Nanoseconds;
+use takt_rt::{Frame, Id, MappedObject, Nanoseconds};
 
 use super::dictionary::{ErobAbortCode, ErobDictionary, at};
 use super::objects::{ErobAccess, OBJECTS, find, place};

@@ -3,7 +3,7 @@
 //! The server holds the state of a transfer and encodes its frames. [`ErobObjectAccess`], passed with each request,
 //! reads and writes the objects.
 
-use takt_rt::time::Nanoseconds;
+use takt_rt::Nanoseconds;
 
 use super::dictionary::ErobAbortCode;
 use crate::sim::random::Random;

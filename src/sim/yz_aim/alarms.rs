@@ -1,6 +1,6 @@
 //! Alarms of a YZ-AIM: causes, effect on the motor, and how they are cleared (manual, chapter IIb.3).
 
-use takt_rt::time::Nanoseconds;
+use takt_rt::Nanoseconds;
 
 /// An alarm that stops the motor until it is cleared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,6 +1,6 @@
 //! The defects of a YZ-AIM that raise no alarm by themselves.
 
-use takt_rt::frame::Frame;
+use takt_rt::Frame;
 
 use crate::sim::defect::{Defect, Unsupported, shorter};
 

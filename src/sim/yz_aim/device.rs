@@ -1,8 +1,7 @@
 //! Controlword and statusword (manual 5.04). This drive has no CiA 402 state machine, only a level that the controlword
 //! sets.
 
-use takt_rt::cia402::{State, controlword};
-use takt_rt::time::Nanoseconds;
+use takt_rt::{DriveState, Nanoseconds, controlword};
 
 use super::parameters::Quirks;
 
@@ -33,12 +32,12 @@ impl Level {
     }
 
     /// The corresponding CiA 402 state, for an observer.
-    pub fn state(self) -> State {
+    pub fn state(self) -> DriveState {
         match self {
-            Self::Cold | Self::Off => State::SwitchOnDisabled,
-            Self::Ready => State::ReadyToSwitchOn,
-            Self::SwitchedOn => State::SwitchedOn,
-            Self::Enabled => State::OperationEnabled,
+            Self::Cold | Self::Off => DriveState::SwitchOnDisabled,
+            Self::Ready => DriveState::ReadyToSwitchOn,
+            Self::SwitchedOn => DriveState::SwitchedOn,
+            Self::Enabled => DriveState::OperationEnabled,
         }
     }
 }

@@ -1,6 +1,6 @@
 //! NMT state, boot-up, heartbeat producer and consumer (manual 5.11, 5.12).
 
-use takt_rt::time::Nanoseconds;
+use takt_rt::Nanoseconds;
 
 use super::dictionary::YzAimDictionary;
 use super::objects::at;

@@ -1,7 +1,6 @@
 //! Profile position mode. Each target (607A) uses the handshake of controlword bit 4 and statusword bit 12.
 
-use takt_rt::cia402::{OperationMode, controlword, statusword};
-use takt_rt::time::Nanoseconds;
+use takt_rt::{Nanoseconds, OperationMode, controlword, statusword};
 
 use super::{POLL_NS, begin, with_torque};
 use crate::canopen::objects::*;

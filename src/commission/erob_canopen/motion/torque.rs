@@ -1,7 +1,6 @@
 //! Profile torque mode. The velocity is monitored here, because the drive does not limit it in this mode.
 
-use takt_rt::cia402::OperationMode;
-use takt_rt::time::Nanoseconds;
+use takt_rt::{Nanoseconds, OperationMode};
 
 use super::{begin, poll_until, with_torque};
 use crate::canopen::objects::*;

@@ -1,7 +1,6 @@
 //! Access of the master to the object dictionary by SDO and RPDO, with the effects of each write.
 
-use takt_rt::cia402::State;
-use takt_rt::time::Nanoseconds;
+use takt_rt::{DriveState, Nanoseconds};
 
 use super::ErobJoint;
 use crate::sim::erob::dictionary::{ErobAbortCode, ErobDictionary, at};
@@ -15,7 +14,7 @@ const SAVE_NS: Nanoseconds = 3_000_000_000;
 
 /// Writes an entry from an RPDO. An enabled drive keeps its mode; a value out of range is ignored.
 pub(super) fn write_field(dictionary: &mut ErobDictionary, at: usize, value: u32) {
-    let is_enabled = State::decode(dictionary.get(at::STATUSWORD) as u16).has_torque();
+    let is_enabled = DriveState::decode(dictionary.get(at::STATUSWORD) as u16).has_torque();
     if at == at::OPERATION_MODE && is_enabled {
         return;
     }

@@ -1,6 +1,6 @@
 //! Steps the control loops and the joint.
 
-use takt_rt::time::{NANOSECONDS_PER_SECOND, Nanoseconds};
+use takt_rt::{NANOSECONDS_PER_SECOND, Nanoseconds};
 
 use super::ErobJoint;
 use crate::sim::erob::dictionary::at;

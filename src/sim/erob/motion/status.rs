@@ -1,6 +1,6 @@
 //! The motion bits of the statusword: target reached, internal limit, set-point acknowledged.
 
-use takt_rt::cia402::{OperationMode, controlword, statusword};
+use takt_rt::{OperationMode, controlword, statusword};
 
 use super::{ARRIVED, ErobActual, ErobMotion};
 use crate::sim::erob::dictionary::{ErobDictionary, at};

@@ -1,7 +1,6 @@
 //! Access of the master to the object dictionary by SDO and RPDO.
 
-use takt_rt::cia402::controlword;
-use takt_rt::time::Nanoseconds;
+use takt_rt::{Nanoseconds, controlword};
 
 use super::YzAimJoint;
 use crate::sim::yz_aim::dictionary::decode;

@@ -1,6 +1,6 @@
 //! Detects a blocked rotor, too long a time at the current limit, and a stall. Applies injected faults.
 
-use takt_rt::time::Nanoseconds;
+use takt_rt::Nanoseconds;
 
 use super::YzAimJoint;
 use crate::sim::defect::{Defect, Unsupported};

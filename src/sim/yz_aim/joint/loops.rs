@@ -1,6 +1,6 @@
 //! Steps the control loops and the joint.
 
-use takt_rt::time::{NANOSECONDS_PER_SECOND, Nanoseconds};
+use takt_rt::{NANOSECONDS_PER_SECOND, Nanoseconds};
 
 use super::load_monitor::LoadMonitor;
 use super::{COUNTS_PER_SECOND_PER_RPM, NEVER, YzAimJoint, mode};
