@@ -12,7 +12,7 @@ use takt::canopen::emcy::ErrorCode;
 use takt::canopen::nmt::NmtState;
 use takt::config::{Config, Control};
 use takt::drive::{BringUp, BringUpProgress, BringUpTiming, NotConfigured, Shutdown, Stage};
-use takt_rt::{Frame, Id, State};
+use takt_rt::{DriveState, Frame, Id};
 use world::{World, config};
 
 /// A world whose drives are configured and started.

@@ -138,7 +138,7 @@ fn a_velocity_run_lasts_its_time_and_ends_with_a_ramp_to_standstill() {
     let report = bench.run(request).unwrap();
     assert!((number(&report, "highest_velocity").to_degrees() + 40.0).abs() < 0.5, "{report:?}");
     assert!((number(&report, "travelled").to_degrees() + 40.0).abs() < 3.0, "{report:?}");
-    assert_eq!(bench.observe().state, State::SwitchOnDisabled);
+    assert_eq!(bench.observe().state, DriveState::SwitchOnDisabled);
     // The ramp came before the quick stop: the drive was at standstill when its torque went off.
     assert!(bench.steps.contains(&"ramp to standstill"), "{:?}", bench.steps);
 }
@@ -223,7 +223,7 @@ fn torque_stays_on_only_on_request() {
     bench.run(Task::Enable { hold_ns: Some(SECOND / 5), keeps_enabled: false }).unwrap();
     assert!(!bench.observe().state.has_torque());
     bench.run(Task::Enable { hold_ns: None, keeps_enabled: true }).unwrap();
-    assert_eq!(bench.observe().state, State::OperationEnabled);
+    assert_eq!(bench.observe().state, DriveState::OperationEnabled);
     let request = Task::Move { kind: absolute(5.0), profile: brisk(), keeps_enabled: true };
     bench.run(request).unwrap();
     let seen = bench.observe();
@@ -232,7 +232,7 @@ fn torque_stays_on_only_on_request() {
     // The drive no longer consumes a heartbeat, so it stays enabled.
     let every = Task::Watch { every_ns: 100 * MS, duration_ns: Some(2 * SECOND) };
     bench.run(every).unwrap();
-    assert_eq!(bench.observe().state, State::OperationEnabled);
+    assert_eq!(bench.observe().state, DriveState::OperationEnabled);
     let report = bench.run(Task::Disable).unwrap();
     assert_eq!(report.get("was_enabled"), Some(&true.into()));
     assert_eq!(bench.observe().state, DriveState::SwitchOnDisabled);
@@ -288,7 +288,7 @@ fn the_battery_fault_is_cleared_only_with_consent() {
     bench.bus.inject_fault(NODE, DriveFault::MultiTurnBattery).unwrap();
     let failed = bench.run(Task::ClearFault { is_confirmed: false }).unwrap_err();
     assert!(matches!(failed.failure, Failure::NeedsConsent { option: "--yes", .. }), "{failed:?}");
-    assert_eq!(bench.observe().state, State::Fault);
+    assert_eq!(bench.observe().state, DriveState::Fault);
     bench.run(Task::ClearFault { is_confirmed: true }).unwrap();
     let seen = bench.observe();
     assert_eq!((seen.state, seen.error_code), (DriveState::SwitchOnDisabled, 0));

@@ -93,7 +93,7 @@ fn a_fault_reset_needs_a_rising_edge_held_for_several_cycles() {
         bench.cycle(0x0F, 0);
     }
     assert_eq!(bench.take(0x085), [[0x05, 0x73, 0x21, 0, 0, 0, 0, 0]]);
-    assert_eq!((bench.observe().state, bench.observe().error_code), (State::Fault, 0x7305));
+    assert_eq!((bench.observe().state, bench.observe().error_code), (DriveState::Fault, 0x7305));
     // One edge is too short, the next one is long enough.
     for (controlword, cycles, state) in [
         (0x80, 2, DriveState::Fault),
@@ -238,7 +238,7 @@ fn a_power_cycle_disables_the_drive_engages_the_brake_and_restarts() {
     bench.run_ms(60);
     assert_eq!(bench.take(0x705), [[0]]);
     let observed = bench.observe();
-    assert_eq!((observed.state, observed.velocity), (State::SwitchOnDisabled, 0.0));
+    assert_eq!((observed.state, observed.velocity), (DriveState::SwitchOnDisabled, 0.0));
     // The brake needed a few hundredths of a radian, and the joint stayed at rest there.
     assert!((0.0..0.05).contains(&(observed.position - position)));
 }

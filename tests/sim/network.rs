@@ -2,7 +2,7 @@
 
 use takt::sim::erob::ErobParameters;
 use takt::sim::{DriveFault, NodeState};
-use takt_rt::{Frame, Id, State};
+use takt_rt::{DriveState, Frame, Id};
 
 use super::bench::{Bench, MILLISECOND_NS, NODE, parameters};
 
