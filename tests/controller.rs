@@ -238,7 +238,8 @@ fn rule_and_axis(outcome: Option<Outcome>) -> (Rule, Option<u8>) {
 #[test]
 fn a_fault_of_one_drive_stops_the_whole_arm_in_a_coordinated_way() {
     let config = load("arm6-erob.toml");
-    let (outcome, phases) = run_and_break(&config, |bus| bus.inject(2, DriveFault::OverCurrent).unwrap());
+    let (outcome, phases) =
+        run_and_break(&config, |bus| bus.inject_fault(2, DriveFault::OverCurrent).unwrap());
     assert_eq!(rule_and_axis(outcome), (Rule::DriveFault, Some(1)));
     // Seen in the very cycle in which the drive reports it.
     assert_eq!(phases, [Phase::Stopping, Phase::Disabling, Phase::Disabled]);
@@ -461,7 +462,7 @@ fn a_fault_while_the_drives_are_disabled_at_the_end_is_how_the_run_ended() {
         if run.snapshot().phase == Phase::Disabling && !is_disturbed {
             is_disturbed = true;
             let now_ns = run.clock().now_ns();
-            assert!(run.ports()[0].say(now_ns, &Frame::of(Id::canopen(0x080, 0), [])));
+            assert!(run.ports()[0].send_foreign(now_ns, &Frame::of(Id::canopen(0x080, 0), [])));
         }
     });
     let Some(Outcome::Stopped(stop)) = outcome else { panic!("{outcome:?}") };

@@ -9,7 +9,7 @@ use serde_json::Value;
 use takt::bus::trace::traced;
 use takt::config::Config;
 use takt::controller::{Outcome, VirtualRun};
-use takt::faults::{Rehearsal, Scenario};
+use takt::faults::{FaultInjector, Scenario};
 use takt::sim::SimulatedBus;
 use takt::telemetry::{BlackBoxOptions, Destination, Logger, LoggerOptions, Machine, Recorded, WallClock};
 use takt_rt::Rule;
@@ -163,7 +163,7 @@ fn recording_of_a_lost_bus(bus: &str, folder: &Path) -> PathBuf {
         "[[fault]]\nkind = \"bus-off\"\nbus = {bus:?}\nwhen = \"moving\"\nat = \"300 ms\"\nrestart = \"0.1 s\""
     );
     let scenario = Scenario::parse("scenario", &fault, &config).unwrap();
-    let (mut run, log) = VirtualRun::rehearsed(&config, Arc::new(Rehearsal::new(scenario))).unwrap();
+    let (mut run, log) = VirtualRun::with_faults(&config, Arc::new(FaultInjector::new(scenario))).unwrap();
     let options = LoggerOptions {
         machine: Machine::of(&config),
         wall_clock: WallClock::fixed(UNIX_AT_ZERO_NS),

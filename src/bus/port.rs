@@ -9,7 +9,7 @@ use super::interface::{InterfaceError, InterfaceSettings, prepare_interface};
 use super::socketcan::{SocketCanError, SocketCanOptions, open_socketcan};
 use super::trace::{Trace, TracedPort, traced};
 use crate::config::{Config, Interface};
-use crate::faults::{Breakable, CannotBreak, DriveTrouble, FaultyPort, Heard};
+use crate::faults::{Delivery, DriveEffect, FaultyPort, InjectError, Injectable};
 use crate::sim::SimulatedBus;
 
 /// Room for frames on their way to the logger: almost one second of a full bus at 1 Mbit/s.
@@ -161,25 +161,25 @@ impl BusPort for Port {
     }
 }
 
-impl Breakable for Port {
-    fn say(&mut self, now_ns: Nanoseconds, frame: &Frame) -> Heard {
+impl Injectable for Port {
+    fn send_foreign(&mut self, now_ns: Nanoseconds, frame: &Frame) -> Delivery {
         match self {
-            Self::Simulated(port) => Breakable::say(port.as_mut(), now_ns, frame),
+            Self::Simulated(port) => Injectable::send_foreign(port.as_mut(), now_ns, frame),
             Self::SocketCan(port) => {
                 port.send(now_ns, &[*frame]);
-                Heard::ByOthers
+                Delivery::ToOthers
             }
-            Self::Traced(port) => port.say(now_ns, frame),
-            Self::Faulty(port) => port.say(now_ns, frame),
+            Self::Traced(port) => port.send_foreign(now_ns, frame),
+            Self::Faulty(port) => port.send_foreign(now_ns, frame),
         }
     }
 
-    fn trouble(&mut self, node: u8, trouble: DriveTrouble, is_present: bool) -> Result<(), CannotBreak> {
+    fn inject(&mut self, node: u8, effect: DriveEffect, is_present: bool) -> Result<(), InjectError> {
         match self {
-            Self::Simulated(port) => port.trouble(node, trouble, is_present),
-            Self::SocketCan(_) => Err(CannotBreak::NotSimulated),
-            Self::Traced(port) => port.trouble(node, trouble, is_present),
-            Self::Faulty(port) => port.trouble(node, trouble, is_present),
+            Self::Simulated(port) => port.inject(node, effect, is_present),
+            Self::SocketCan(_) => Err(InjectError::NotSimulated),
+            Self::Traced(port) => port.inject(node, effect, is_present),
+            Self::Faulty(port) => port.inject(node, effect, is_present),
         }
     }
 }

@@ -72,7 +72,7 @@ struct ProblemPicture {
 
 fn problems(findings: &Findings) -> Vec<ProblemPicture> {
     let picture = |problem| {
-        let place = findings.place(problem);
+        let place = findings.position(problem);
         ProblemPicture {
             severity: match problem.kind.severity() {
                 Severity::Warning => "warning",

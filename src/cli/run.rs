@@ -15,7 +15,7 @@ use takt::config::{Config, Interface, Master};
 use takt::controller::realtime_thread::StartError;
 use takt::controller::session::{self, Session, SessionError, SessionOptions};
 use takt::controller::{Interrupt, Outcome, Progress};
-use takt::faults::{Fault, Rehearsal, Scenario, ScenarioError, Tidings};
+use takt::faults::{FaultEvents, FaultInjector, Scenario, ScenarioError, ScenarioFault};
 use takt::telemetry::{Destination, Machine, Notice, RealtimeReport, RunOutcome, RunReport, words};
 use takt_rt::{Event, EventKind, Snapshot, StopReason};
 
@@ -80,10 +80,11 @@ pub fn run(arguments: Arguments) -> Exit {
     if let Err(refused) = schedule::verify(&config) {
         return Refusal::from(refused.to_string()).print(arguments.json);
     }
-    let rehearsal = match arguments.faults.as_deref().map(|path| rehearsal(path, &config)).transpose() {
-        Ok(rehearsal) => rehearsal,
-        Err(refusal) => return refusal.print(arguments.json),
-    };
+    let fault_injector =
+        match arguments.faults.as_deref().map(|path| fault_injector(path, &config)).transpose() {
+            Ok(fault_injector) => fault_injector,
+            Err(refusal) => return refusal.print(arguments.json),
+        };
     let mut signals = match Signals::watch() {
         Ok(signals) => signals,
         Err(error) => {
@@ -96,15 +97,17 @@ pub fn run(arguments: Arguments) -> Exit {
         duration_ns: arguments.duration.map(|duration| duration.as_nanos() as u64),
         recording: arguments.record.map(Destination::File),
         is_realtime_required: arguments.require_realtime,
-        rehearsal: rehearsal.clone(),
+        fault_injector: fault_injector.clone(),
     };
     let notify = notices(&bar, Machine::of(&config));
     let mut drawn = Drawn::new(bar.clone());
     let mut hints = Hints::new(&config);
-    let mut tidings = Tidings::default();
+    let mut fault_events = FaultEvents::default();
     let mut tell = || {
-        let news = rehearsal.as_deref().map_or_else(Vec::new, |rehearsal| tidings.next(rehearsal));
-        news.iter().for_each(|tiding| bar.suspend(|| say!("takt: {tiding}")));
+        let news = fault_injector
+            .as_deref()
+            .map_or_else(Vec::new, |fault_injector| fault_events.next(fault_injector));
+        news.iter().for_each(|fault_event| bar.suspend(|| say!("takt: {fault_event}")));
     };
     let session = session::run(&config, options, notify, |snapshot, progress| {
         drawn.show(&progress);
@@ -121,13 +124,14 @@ pub fn run(arguments: Arguments) -> Exit {
 }
 
 /// Reads a scenario. What a person should know before it is played on real drives is said.
-fn rehearsal(path: &Path, config: &Config) -> Result<Arc<Rehearsal>, Refusal> {
+fn fault_injector(path: &Path, config: &Config) -> Result<Arc<FaultInjector>, Refusal> {
     let scenario = Scenario::load(path, config).map_err(|error| match error {
         ScenarioError::Wrong(error) => Refusal::from(error),
         unreadable @ ScenarioError::Unreadable { .. } => unreadable.to_string().into(),
     })?;
-    let is_real =
-        |fault: &Fault| config.buses.get(fault.bus).is_some_and(|bus| bus.interface != Interface::Simulated);
+    let is_real = |fault: &ScenarioFault| {
+        config.buses.get(fault.bus).is_some_and(|bus| bus.interface != Interface::Simulated)
+    };
     if let Some(fault) = scenario.faults.iter().find(|fault| is_real(fault)) {
         say!(
             "takt: fault `{}` (line {}) is played on real drives: keep away from them, and keep the emergency stop in \
@@ -136,7 +140,7 @@ fn rehearsal(path: &Path, config: &Config) -> Result<Arc<Rehearsal>, Refusal> {
             fault.line
         );
     }
-    Ok(Arc::new(Rehearsal::new(scenario)))
+    Ok(Arc::new(FaultInjector::new(scenario)))
 }
 
 fn refuse(error: &SessionError, is_json: bool) -> Exit {

@@ -18,7 +18,7 @@ use super::time_of_day::TimeOfDayKeeper;
 use crate::bus::port::{OpenError, Port};
 use crate::bus::trace::Trace;
 use crate::config::Config;
-use crate::faults::Rehearsal;
+use crate::faults::FaultInjector;
 use crate::telemetry::{
     BlackBoxOptions, Destination, Fault, LogSummary, Logger, LoggerOptions, LoggerThread, Machine, Notice,
     WallClock, panic_message,
@@ -37,7 +37,7 @@ pub struct SessionOptions {
     /// Whether a refused step of the real-time set-up ends the run before anything moves.
     pub is_realtime_required: bool,
     /// Faults that are played on the buses.
-    pub rehearsal: Option<Arc<Rehearsal>>,
+    pub fault_injector: Option<Arc<FaultInjector>>,
 }
 
 /// What is left of a run.
@@ -114,7 +114,7 @@ pub(super) fn lead(
 ) -> Result<Session, SessionError> {
     let mut clock = MonotonicClock::default();
     let engine = Box::new(assemble::engine(config)?);
-    let (ports, traces) = open_ports(config, options.rehearsal.as_deref())?;
+    let (ports, traces) = open_ports(config, options.fault_injector.as_deref())?;
     let (rt, mut host, log) = channels(&ChannelSizes::of(config));
     let mut supervisor = match remote {
         Some(_) => Supervisor::serving(config),
@@ -169,8 +169,8 @@ pub(super) fn lead(
         if let Some(remote) = &remote {
             remote.requests.hand_over(|asked| host.ask(asked).is_ok());
         }
-        if let Some(rehearsal) = &options.rehearsal {
-            rehearsal.observe(&host.snapshot());
+        if let Some(fault_injector) = &options.fault_injector {
+            fault_injector.observe(&host.snapshot());
         }
         let mut panics_now = None;
         if is_watched {
@@ -217,14 +217,17 @@ pub(super) fn lead(
     })
 }
 
-fn open_ports(config: &Config, rehearsal: Option<&Rehearsal>) -> Result<(Vec<Port>, Vec<Trace>), OpenError> {
+fn open_ports(
+    config: &Config,
+    fault_injector: Option<&FaultInjector>,
+) -> Result<(Vec<Port>, Vec<Trace>), OpenError> {
     let mut ports = Vec::with_capacity(config.buses.len());
     let mut traces = Vec::new();
     let is_traced = config.telemetry.is_candump_written || config.telemetry.black_box_ns.is_some();
     for (index, bus) in config.buses.iter().enumerate() {
         let port = Port::open(config, index)?;
-        let port = match rehearsal {
-            Some(rehearsal) => rehearsal.wrap(index, port),
+        let port = match fault_injector {
+            Some(fault_injector) => fault_injector.wrap(index, port),
             None => port,
         };
         ports.push(if is_traced {

@@ -18,7 +18,7 @@ use super::channels::{HostSide, RequestNumbers};
 use super::outcome::{Interrupt, Outcome, Progress};
 use super::program::{ProgramRunner, Step};
 use crate::config::Config;
-use crate::drive::{AxisFacts, BringUp, Leave};
+use crate::drive::{AxisFacts, BringUp, Shutdown};
 
 /// The group must get where it was told to within this time; the engine has time-outs of its own, which are shorter.
 const PATIENCE_NS: u64 = 8_000_000_000;
@@ -49,7 +49,7 @@ pub struct Supervisor {
     stage: Stage,
     stage_since_ns: Option<u64>,
     bring_up: BringUp,
-    leave: Leave,
+    shutdown: Shutdown,
     program: ProgramRunner,
     facts: Vec<AxisFacts>,
     outgoing: VecDeque<RequestEnvelope>,
@@ -72,7 +72,7 @@ impl Supervisor {
             stage: Stage::Configure,
             stage_since_ns: None,
             bring_up: BringUp::new(config),
-            leave: Leave::new(config),
+            shutdown: Shutdown::new(config),
             program: ProgramRunner::new(&config.program, duration_ns.is_some()),
             facts: Vec::new(),
             outgoing: VecDeque::new(),
@@ -122,7 +122,7 @@ impl Supervisor {
     pub fn poll(&mut self, now_ns: u64, host: &mut HostSide) {
         while let Some((bus, received)) = host.take_service() {
             self.bring_up.receive(bus, &received.frame);
-            self.leave.receive(bus, &received.frame);
+            self.shutdown.receive(bus, &received.frame);
         }
         let snapshot = host.snapshot();
         self.numbers = host.numbers();
@@ -337,8 +337,8 @@ impl Supervisor {
     }
 
     fn say_farewell(&mut self, now_ns: u64, elapsed_ns: u64, host: &mut HostSide) {
-        self.leave.poll(now_ns, &mut sending_through(host));
-        let left = self.leave.outcome();
+        self.shutdown.poll(now_ns, &mut sending_through(host));
+        let left = self.shutdown.outcome();
         if left.is_some() || elapsed_ns > PATIENCE_NS {
             if let (Some(Err(error)), false) = (left, self.facts.is_empty()) {
                 let silent = error.failures.into_iter().filter(|failure| failure.cause.is_silence());

@@ -13,7 +13,7 @@ use super::supervisor::Supervisor;
 use super::time_of_day::TimeOfDayKeeper;
 use crate::bus::port::Port;
 use crate::config::Config;
-use crate::faults::Rehearsal;
+use crate::faults::FaultInjector;
 use crate::sim::SimulatedBus;
 use crate::telemetry::WallClock;
 
@@ -56,7 +56,7 @@ pub struct VirtualRun<P> {
     host: HostSide,
     supervisor: Supervisor,
     time_of_day: TimeOfDayKeeper,
-    rehearsal: Option<Arc<Rehearsal>>,
+    fault_injector: Option<Arc<FaultInjector>>,
     /// Cycles from one look of the life cycle to the next, and since the last one.
     neglect: u64,
     neglected: u64,
@@ -79,11 +79,14 @@ impl VirtualRun<Port> {
     ///
     /// # Errors
     /// See [`assemble::engine`].
-    pub fn rehearsed(config: &Config, rehearsal: Arc<Rehearsal>) -> Result<(Self, LogSide), AssembleError> {
+    pub fn with_faults(
+        config: &Config,
+        fault_injector: Arc<FaultInjector>,
+    ) -> Result<(Self, LogSide), AssembleError> {
         let simulated = |bus| Port::Simulated(Box::new(SimulatedBus::new(config, bus)));
-        let ports = (0..config.buses.len()).map(|bus| rehearsal.wrap(bus, simulated(bus))).collect();
+        let ports = (0..config.buses.len()).map(|bus| fault_injector.wrap(bus, simulated(bus))).collect();
         let (run, log) = Self::new(config, ports)?;
-        Ok((Self { rehearsal: Some(rehearsal), ..run }, log))
+        Ok((Self { fault_injector: Some(fault_injector), ..run }, log))
     }
 }
 
@@ -124,7 +127,7 @@ impl<P: BusPort> VirtualRun<P> {
             host,
             supervisor,
             time_of_day: TimeOfDayKeeper::of(config),
-            rehearsal: None,
+            fault_injector: None,
             neglect: 1,
             neglected: 0,
             is_over: false,
@@ -147,8 +150,8 @@ impl<P: BusPort> VirtualRun<P> {
             // One that finds the queue full is told again in a minute.
             let _ = self.host.request(time);
         }
-        if let Some(rehearsal) = &self.rehearsal {
-            rehearsal.observe(&self.host.snapshot());
+        if let Some(fault_injector) = &self.fault_injector {
+            fault_injector.observe(&self.host.snapshot());
         }
         self.is_over = flow == Flow::Shutdown;
         !self.is_over

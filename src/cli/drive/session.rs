@@ -4,7 +4,7 @@ use std::sync::atomic::Ordering;
 
 use takt::bus::port::{OpenError, Port, open_configured};
 use takt::bus::{InterfaceSettings, SocketCanOptions, open_socketcan, prepare_interface};
-use takt::commission::{Failure, Request, Subject, bus_session, procedure};
+use takt::commission::{Failure, TargetDrive, Task, bus_session, procedure};
 use takt::controller::VirtualClock;
 use takt::sim::SimulatedBus;
 use takt_rt::linux::MonotonicClock;
@@ -21,7 +21,7 @@ use super::target::Bus;
 const RESTART_MS: u32 = 100;
 
 /// Does what is asked for.
-pub fn run(subject: Subject, request: Request, bus: Bus, options: Options, mut output: Output) -> Exit {
+pub fn run(target: TargetDrive, task: Task, bus: Bus, options: Options, mut output: Output) -> Exit {
     let mut port = match open(&bus) {
         Ok(port) => port,
         Err(error) => return Refusal::from(error.to_string()).print(options.json),
@@ -34,7 +34,7 @@ pub fn run(subject: Subject, request: Request, bus: Bus, options: Options, mut o
         }
     };
     let is_simulated = matches!(port, Port::Simulated(_));
-    let procedure = procedure(subject, request);
+    let procedure = procedure(target, task);
     let is_interrupted = || interrupted.swap(false, Ordering::Relaxed);
     // What nobody reads any more ends as on Ctrl-C.
     let see = |at_ns, seen| {

@@ -1,8 +1,8 @@
-//! Asks a device over SDO how its PDOs are configured, so that process data can be decoded by what the device says
-//! rather than by what a manual says.
+//! Reads the PDO configuration of a device by SDO, so that process data is decoded as the device reports it.
 //!
-//! Sub-index 0 of each parameter is read first: it tells which others there are, so that a device that never answers for
-//! an object it does not have is not asked for one. No input and output, as with [`sdo::Client`](super::sdo::Client).
+//! Sub-index 0 of each parameter is read first, because it says which sub-indices exist. A device that does not answer
+//! for missing objects then gets no such request. No input and output, as with
+//! [`sdo::SdoClient`](super::sdo::SdoClient).
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -11,38 +11,37 @@ use takt_rt::{Frame, Nanoseconds};
 use super::object::ObjectAddress;
 use super::objects::{PdoDirection, PdoParameters};
 use super::pdo_configuration::PdoConfiguration;
-use super::sdo::{Client, Completed, SdoError, Timing, Transfer, Uploaded};
+use super::sdo::{Completed, SdoClient, SdoError, SdoTiming, Transfer, Uploaded};
 
-/// Sub-indices of a communication parameter that are asked for: not 4, which is reserved.
+/// The sub-indices of a communication parameter that are read; 4 is reserved.
 const COMMUNICATION: [u8; 4] = [1, 2, 3, 5];
-/// The most objects that a mapping has; beyond are the marks of multiplexed PDOs.
+/// The largest number of mapped objects; higher numbers mean multiplexed PDOs.
 const MOST_MAPPED: u8 = 64;
 
-/// What could not be read.
+/// The object that could not be read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("reading {object}: {error}")]
-pub struct PdoInquiryError {
+pub struct PdoReadError {
     /// The object.
     pub object: ObjectAddress,
-    /// Why.
+    /// The reason.
     pub error: SdoError,
 }
 
 /// Reads the configuration of some PDOs of one device.
 #[derive(Debug)]
-pub struct PdoInquiry {
-    client: Client,
+pub struct PdoReader {
+    client: SdoClient,
     pdos: Vec<(PdoDirection, u16)>,
-    /// What is still to be read, the next one first.
+    /// The objects to read, the next one first.
     questions: VecDeque<ObjectAddress>,
     answers: BTreeMap<ObjectAddress, u32>,
-    failure: Option<PdoInquiryError>,
+    failure: Option<PdoReadError>,
 }
 
-impl PdoInquiry {
-    /// Reads these PDOs (numbers counted from 1) of `node`. Those that the device does not have are left out of the
-    /// outcome.
-    pub fn new(node: u8, timing: Timing, pdos: impl IntoIterator<Item = (PdoDirection, u16)>) -> Self {
+impl PdoReader {
+    /// Reads these PDOs (numbers counted from 1) of `node`. The outcome leaves out PDOs that the device does not have.
+    pub fn new(node: u8, timing: SdoTiming, pdos: impl IntoIterator<Item = (PdoDirection, u16)>) -> Self {
         let pdos: Vec<(PdoDirection, u16)> = pdos.into_iter().collect();
         let parameters = pdos.iter().map(|(direction, number)| PdoParameters::at(*direction, *number));
         let questions = parameters.flat_map(|parameters| {
@@ -50,11 +49,17 @@ impl PdoInquiry {
             [ObjectAddress::new(communication, 0), parameters.mapped_count().address]
         });
         let questions = questions.collect();
-        Self { client: Client::new(node, timing), pdos, questions, answers: BTreeMap::new(), failure: None }
+        Self {
+            client: SdoClient::new(node, timing),
+            pdos,
+            questions,
+            answers: BTreeMap::new(),
+            failure: None,
+        }
     }
 
-    /// The first four PDOs of each direction, which every device may have.
-    pub fn of_first_four(node: u8, timing: Timing) -> Self {
+    /// Reads the first four PDOs of each direction.
+    pub fn of_first_four(node: u8, timing: SdoTiming) -> Self {
         let directions = [PdoDirection::Receive, PdoDirection::Transmit];
         let pdos =
             directions.into_iter().flat_map(|direction| (1..=4).map(move |number| (direction, number)));
@@ -78,14 +83,14 @@ impl PdoInquiry {
         }
     }
 
-    /// Takes a frame that was received; frames that are not from this node's SDO server are passed over.
+    /// Receives a frame; frames from other nodes are ignored.
     pub fn receive(&mut self, frame: &Frame) {
         self.client.receive(frame);
     }
 
-    /// The PDOs that the device has, or what could not be read; `None` while it is being asked. A refusal means that the
-    /// device has no such object; silence is a failure.
-    pub fn outcome(&self) -> Option<Result<Vec<PdoConfiguration>, PdoInquiryError>> {
+    /// The PDOs of the device, or the object that could not be read; `None` while reading. An abort means that the
+    /// object does not exist; no reply is a failure.
+    pub fn outcome(&self) -> Option<Result<Vec<PdoConfiguration>, PdoReadError>> {
         if let Some(failure) = self.failure {
             return Some(Err(failure));
         }
@@ -112,7 +117,7 @@ impl PdoInquiry {
                 }
             }
             Ok(Completed::Downloaded) | Err(SdoError::Aborted(_)) => {}
-            Err(error) => self.failure = Some(PdoInquiryError { object, error }),
+            Err(error) => self.failure = Some(PdoReadError { object, error }),
         }
     }
 
@@ -129,7 +134,7 @@ impl PdoInquiry {
     }
 }
 
-/// Up to four bytes as a number, low byte first.
+/// Up to four bytes as a little-endian number.
 fn number(uploaded: &Uploaded) -> u32 {
     uploaded.bytes.iter().take(4).rev().fold(0, |number, byte| number << 8 | u32::from(*byte))
 }

@@ -1,5 +1,4 @@
-//! The drive that is commissioned: where it is, of which family, how its units relate to those of its joint, and what
-//! it may never exceed.
+//! The target drive of commissioning: node ID, family, units and limits of its axis.
 
 use std::f64::consts::TAU;
 
@@ -10,44 +9,44 @@ use super::family::Family;
 use crate::config::{Axis, Limits, Quantity, Travel};
 use crate::controller::assemble;
 
-/// A value as it was asked for.
+/// A value as the user wrote it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Amount {
-    /// Of the joint, in SI units.
+pub enum CommandValue {
+    /// A joint value in SI units.
     Joint(f64),
-    /// Of the drive, in its own unit.
+    /// A drive value in drive units.
     Drive(i64),
 }
 
-/// One drive, and the joint that it moves.
+/// The target drive and its axis.
 #[derive(Clone, Debug)]
-pub struct Subject {
-    /// What people call it.
+pub struct TargetDrive {
+    /// The name for people.
     pub name: String,
-    /// Its node number.
+    /// The node ID.
     pub node: u8,
-    /// Its family.
+    /// The family.
     pub family: Family,
     /// Rotary or linear.
     pub travel: Travel,
-    /// Counts of one turn of the position that the drive reports.
+    /// Counts per turn of the reported position.
     pub counts_per_turn: f64,
-    /// From the joint's units to the drive's.
+    /// Conversion between joint and drive units.
     pub scale: Scale,
-    /// What the axis may not exceed, where that is known.
+    /// The limits of the axis, if known.
     pub limits: Option<Limits>,
-    /// For how long to wait for its first answer.
+    /// How long to wait for the first answer.
     pub patience_ns: Nanoseconds,
 }
 
-/// How long a drive without anything known of its supply may take to answer.
+/// How long a drive may take to answer when its boot time is not known.
 const PATIENCE_NS: Nanoseconds = 1_000_000_000;
 
-impl Subject {
+impl TargetDrive {
     /// The drive of a configured axis.
     ///
     /// # Errors
-    /// Units that cannot be converted; a configuration that passed its checks has none.
+    /// The units cannot be converted. A checked configuration always has valid units.
     pub fn of(axis: &Axis) -> Result<Self, ScaleError> {
         Ok(Self {
             name: axis.name.clone(),
@@ -61,10 +60,10 @@ impl Subject {
         })
     }
 
-    /// A drive of which nothing but its family is known: its joint is what its encoder turns with, without limits.
+    /// A drive without a configuration: only its family is known, the axis is its encoder, and there are no limits.
     ///
     /// # Errors
-    /// None: the family's own units can be converted.
+    /// None in practice: the family's own units are valid.
     pub fn unconfigured(node: u8, family: Family) -> Result<Self, ScaleError> {
         let counts_per_turn = family.counts_per_turn();
         Ok(Self {
@@ -87,7 +86,7 @@ impl Subject {
         })
     }
 
-    /// What a position of this axis is: an angle or a length.
+    /// The quantity of a position: an angle or a length.
     pub const fn position_quantity(&self) -> Quantity {
         match self.travel {
             Travel::Rotary => Quantity::ANGLE,
@@ -95,7 +94,7 @@ impl Subject {
         }
     }
 
-    /// What a velocity of this axis is.
+    /// The quantity of a velocity.
     pub const fn velocity_quantity(&self) -> Quantity {
         match self.travel {
             Travel::Rotary => Quantity::ANGULAR_VELOCITY,
@@ -103,7 +102,7 @@ impl Subject {
         }
     }
 
-    /// What an acceleration of this axis is.
+    /// The quantity of an acceleration.
     pub const fn acceleration_quantity(&self) -> Quantity {
         match self.travel {
             Travel::Rotary => Quantity::ANGULAR_ACCELERATION,
@@ -111,7 +110,7 @@ impl Subject {
         }
     }
 
-    /// What the effort of this axis is: a torque or a force.
+    /// The quantity of an effort: a torque or a force.
     pub const fn effort_quantity(&self) -> Quantity {
         match self.travel {
             Travel::Rotary => Quantity::TORQUE,
@@ -119,51 +118,50 @@ impl Subject {
         }
     }
 
-    /// rad (m) of a position in counts.
+    /// Position in rad (m) from counts.
     pub fn position(&self, counts: i64) -> f64 {
         self.scale.position_from_counts(clamped(counts))
     }
 
-    /// rad/s (m/s) of a velocity in drive units.
+    /// Velocity in rad/s (m/s) from drive units.
     pub fn velocity(&self, raw: f64) -> f64 {
         raw * self.scale.velocity_from_drive(1)
     }
 
-    /// rad/s² (m/s²) of an acceleration in drive units.
+    /// Acceleration in rad/s² (m/s²) from drive units.
     pub fn acceleration(&self, raw: f64) -> f64 {
         self.velocity(raw).abs()
     }
 
-    /// Counts of a position.
-    pub fn position_counts(&self, position: Amount) -> i64 {
+    /// Position in counts.
+    pub fn position_counts(&self, position: CommandValue) -> i64 {
         match position {
-            Amount::Joint(position) => self.scale.position_to_counts(position).into(),
-            Amount::Drive(counts) => counts,
+            CommandValue::Joint(position) => self.scale.position_to_counts(position).into(),
+            CommandValue::Drive(counts) => counts,
         }
     }
 
-    /// Counts of a distance, with its sign in the drive's direction.
-    pub fn distance_counts(&self, distance: Amount) -> i64 {
+    /// Distance in counts, signed in the drive's direction.
+    pub fn distance_counts(&self, distance: CommandValue) -> i64 {
         match distance {
-            Amount::Joint(distance) => {
+            CommandValue::Joint(distance) => {
                 let counts = |position| i64::from(self.scale.position_to_counts(position));
                 counts(distance) - counts(0.0)
             }
-            Amount::Drive(counts) => counts,
+            CommandValue::Drive(counts) => counts,
         }
     }
 
-    /// Drive units of a velocity, with its sign in the drive's direction. A velocity that is not zero never becomes
-    /// zero by rounding.
-    pub fn velocity_raw(&self, velocity: Amount) -> i64 {
+    /// Velocity in drive units, signed in the drive's direction. A velocity other than zero is never rounded to zero.
+    pub fn velocity_raw(&self, velocity: CommandValue) -> i64 {
         match velocity {
-            Amount::Joint(velocity) => away_from_zero(velocity / self.scale.velocity_from_drive(1)),
-            Amount::Drive(raw) => raw,
+            CommandValue::Joint(velocity) => away_from_zero(velocity / self.scale.velocity_from_drive(1)),
+            CommandValue::Drive(raw) => raw,
         }
     }
 
-    /// Drive units of an acceleration: at least 1.
-    pub fn acceleration_raw(&self, acceleration: Amount) -> i64 {
+    /// Acceleration in drive units, at least 1.
+    pub fn acceleration_raw(&self, acceleration: CommandValue) -> i64 {
         self.velocity_raw(acceleration).abs().max(1)
     }
 
@@ -236,21 +234,21 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_erob_counts_its_output_and_a_yz_aim_its_motor() {
-        let erob = Subject::unconfigured(1, Family::ErobCanopen).unwrap();
-        assert_eq!(erob.position_counts(Amount::Joint(TAU)), 524_288);
-        assert_eq!(erob.velocity_raw(Amount::Joint(TAU)), 524_288);
-        let yz_aim = Subject::unconfigured(1, Family::YzAim).unwrap();
-        assert_eq!(yz_aim.position_counts(Amount::Joint(TAU)), 32_768);
-        assert_eq!(yz_aim.velocity_raw(Amount::Joint(TAU)), 60);
-        assert_eq!(yz_aim.acceleration_raw(Amount::Joint(TAU)), 60);
+    fn an_erob_counts_output_turns_and_a_yz_aim_motor_turns() {
+        let erob = TargetDrive::unconfigured(1, Family::ErobCanopen).unwrap();
+        assert_eq!(erob.position_counts(CommandValue::Joint(TAU)), 524_288);
+        assert_eq!(erob.velocity_raw(CommandValue::Joint(TAU)), 524_288);
+        let yz_aim = TargetDrive::unconfigured(1, Family::YzAim).unwrap();
+        assert_eq!(yz_aim.position_counts(CommandValue::Joint(TAU)), 32_768);
+        assert_eq!(yz_aim.velocity_raw(CommandValue::Joint(TAU)), 60);
+        assert_eq!(yz_aim.acceleration_raw(CommandValue::Joint(TAU)), 60);
         assert!((yz_aim.velocity(60.0) - TAU).abs() < 1e-12);
     }
 
     #[test]
     fn a_slow_velocity_is_not_rounded_to_standstill() {
-        let yz_aim = Subject::unconfigured(1, Family::YzAim).unwrap();
-        assert_eq!(yz_aim.velocity_raw(Amount::Joint(-0.001)), -1);
-        assert_eq!(yz_aim.velocity_raw(Amount::Joint(0.0)), 0);
+        let yz_aim = TargetDrive::unconfigured(1, Family::YzAim).unwrap();
+        assert_eq!(yz_aim.velocity_raw(CommandValue::Joint(-0.001)), -1);
+        assert_eq!(yz_aim.velocity_raw(CommandValue::Joint(0.0)), 0);
     }
 }

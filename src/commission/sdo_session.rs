@@ -1,7 +1,7 @@
-//! What a procedure and the one who runs it share: the present, the SDO client, what is to be sent, what was heard.
+//! An SDO session with one drive: the interface through which a procedure reads, writes, waits and reports.
 //!
-//! A procedure is written as sequential code that awaits: transfers, pauses, conditions. Nothing of it blocks and
-//! nothing runs by itself: [`Procedure`](super::Procedure) is polled with the present and fed with frames.
+//! A procedure is sequential async code. It never blocks: [`Procedure`](super::Procedure) polls it with the current
+//! time and passes the received frames to it.
 
 use std::cell::{Ref, RefCell, RefMut};
 use std::future::poll_fn;
@@ -10,167 +10,168 @@ use std::task::Poll;
 
 use takt_rt::{Frame, Nanoseconds};
 
-use super::event::{Event, Reading};
+use super::event::{AxisReading, ProcedureEvent};
 use super::failure::Failure;
-use super::line::{Line, Manners, OwnHeartbeat};
+use super::session_state::{OwnHeartbeat, SdoQuirks, SessionState};
 use crate::canopen::emcy::Emergency;
 use crate::canopen::nmt::{NmtCommand, NmtState, NmtTarget};
 use crate::canopen::object::{Object, ObjectAddress};
-use crate::canopen::sdo::{Client, Completed, SdoError, Timing, Transfer, Uploaded};
+use crate::canopen::sdo::{Completed, SdoClient, SdoError, SdoTiming, Transfer, Uploaded};
 use crate::drive::Access;
 
-/// A conversation with one drive.
+/// An SDO session with one drive. Clones share the same state.
 #[derive(Clone, Debug)]
-pub struct Conversation(Rc<RefCell<Line>>);
+pub struct SdoSession(Rc<RefCell<SessionState>>);
 
-impl Conversation {
-    pub(super) fn new(node: u8, manners: Manners) -> Self {
-        Self(Rc::new(RefCell::new(Line::new(node, manners))))
+impl SdoSession {
+    pub(super) fn new(node: u8, sdo_quirks: SdoQuirks) -> Self {
+        Self(Rc::new(RefCell::new(SessionState::new(node, sdo_quirks))))
     }
 
-    // No borrow outlives the statement that it is made in, and none is held across an await: these cannot panic.
-    pub(super) fn line(&self) -> Ref<'_, Line> {
+    // No borrow outlives its statement and none is held across an await, so these cannot panic.
+    pub(super) fn state(&self) -> Ref<'_, SessionState> {
         self.0.borrow()
     }
 
-    pub(super) fn line_mut(&self) -> RefMut<'_, Line> {
+    pub(super) fn state_mut(&self) -> RefMut<'_, SessionState> {
         self.0.borrow_mut()
     }
 
-    /// Says what is being done now.
+    /// Begins a step and reports it.
     pub fn step(&self, name: &'static str) {
-        let mut line = self.line_mut();
-        line.step = name;
-        line.events.push_back(Event::Step(name));
+        let mut state = self.state_mut();
+        state.step = name;
+        state.events.push_back(ProcedureEvent::Step(name));
     }
 
-    /// What follows belongs to an earlier step again.
-    pub fn go_on_with(&self, name: &'static str) {
-        self.line_mut().step = name;
+    /// Continues an earlier step without reporting it again.
+    pub fn resume_step(&self, name: &'static str) {
+        self.state_mut().step = name;
     }
 
-    /// The present step is the one that failed, whatever is done afterwards.
+    /// Keeps the current step as the failing one, although clean-up steps follow.
     pub fn keep_failing_step(&self) {
-        let mut line = self.line_mut();
-        line.failing_step = line.failing_step.or(Some(line.step));
+        let mut state = self.state_mut();
+        state.failing_step = state.failing_step.or(Some(state.step));
     }
 
-    /// Says something that people should know.
+    /// Reports a note for the operator.
     pub fn note(&self, text: impl Into<String>) {
-        self.line_mut().events.push_back(Event::Note(text.into()));
+        self.state_mut().events.push_back(ProcedureEvent::Note(text.into()));
     }
 
-    /// Shows where the axis is.
-    pub fn show(&self, reading: Reading) {
-        self.line_mut().events.push_back(Event::Reading(reading));
+    /// Reports a reading of the axis.
+    pub fn show(&self, reading: AxisReading) {
+        self.state_mut().events.push_back(ProcedureEvent::Reading(reading));
     }
 
-    /// The node's number.
+    /// The node ID.
     pub fn node(&self) -> u8 {
-        self.line().node
+        self.state().node
     }
 
-    /// The present.
+    /// The current time.
     pub fn now_ns(&self) -> Nanoseconds {
-        self.line().now_ns
+        self.state().now_ns
     }
 
-    /// The state that the node has reported last, if it has reported any.
+    /// The NMT state in the node's last heartbeat, if one was received.
     pub fn nmt_state(&self) -> Option<NmtState> {
-        self.line().nmt
+        self.state().nmt
     }
 
-    /// The drive's last emergency message, unless it told that the error has gone.
+    /// The drive's last emergency message, unless an "error reset" message (code 00xx) followed.
     pub fn emergency(&self) -> Option<Emergency> {
-        self.line().emergency
+        self.state().emergency
     }
 
-    /// Requests to end are not obeyed any more, until there is one more than now.
+    /// Ignores the interruptions so far (at least one); only a further one counts.
     pub fn ignore_interruptions(&self) {
-        let mut line = self.line_mut();
-        line.ignored_interruptions = line.interruptions.max(line.ignored_interruptions).max(1);
+        let mut state = self.state_mut();
+        state.ignored_interruptions = state.interruptions.max(state.ignored_interruptions).max(1);
     }
 
     /// Sends a frame.
     pub fn send(&self, frame: Frame) {
-        self.line_mut().outgoing.push_back(frame);
+        self.state_mut().outgoing.push_back(frame);
     }
 
-    /// Commands the node's state.
+    /// Sends an NMT command to the node.
     pub fn command(&self, command: NmtCommand) {
         let node = self.node();
         self.send(command.frame(NmtTarget::Node(node)));
     }
 
-    /// Sends a heartbeat from now on, or none any more.
-    pub fn beat(&self, node: u8, period_ns: Option<Nanoseconds>) {
-        let mut line = self.line_mut();
-        let due_ns = line.now_ns;
-        line.heartbeat = period_ns.map(|period_ns| OwnHeartbeat { node, period_ns, due_ns });
+    /// Starts the heartbeat of this program under the node ID `node`, or stops it (`None`).
+    pub fn set_heartbeat(&self, node: u8, period_ns: Option<Nanoseconds>) {
+        let mut state = self.state_mut();
+        let due_ns = state.now_ns;
+        state.heartbeat = period_ns.map(|period_ns| OwnHeartbeat { node, period_ns, due_ns });
     }
 
-    async fn until<T>(&self, mut look: impl FnMut(&mut Line) -> Option<T>) -> T {
-        poll_fn(|_| match look(&mut self.line_mut()) {
+    async fn until<T>(&self, mut check: impl FnMut(&mut SessionState) -> Option<T>) -> T {
+        poll_fn(|_| match check(&mut self.state_mut()) {
             Some(value) => Poll::Ready(value),
             None => Poll::Pending,
         })
         .await
     }
 
-    /// Waits.
+    /// Waits for a time.
     ///
     /// # Errors
     /// [`Failure::Interrupted`]
     pub async fn pause(&self, duration_ns: Nanoseconds) -> Result<(), Failure> {
         let end_ns = self.now_ns().saturating_add(duration_ns);
-        let is_interrupted = self
-            .until(|line| (line.is_interrupted() || line.now_ns >= end_ns).then_some(line.is_interrupted()));
+        let is_interrupted = self.until(|state| {
+            (state.is_interrupted() || state.now_ns >= end_ns).then_some(state.is_interrupted())
+        });
         if is_interrupted.await { Err(Failure::Interrupted) } else { Ok(()) }
     }
 
-    /// Collects every frame of the bus for a while.
+    /// Collects all frames on the bus for a time.
     ///
     /// # Errors
     /// [`Failure::Interrupted`]
-    pub async fn listen(&self, duration_ns: Nanoseconds) -> Result<Vec<Frame>, Failure> {
-        self.begin_listening();
+    pub async fn collect_frames(&self, duration_ns: Nanoseconds) -> Result<Vec<Frame>, Failure> {
+        self.begin_collecting();
         let paused = self.pause(duration_ns).await;
-        let heard = self.end_listening();
-        paused.map(|()| heard)
+        let collected = self.end_collecting();
+        paused.map(|()| collected)
     }
 
-    /// Collects every frame of the bus from now on.
-    pub fn begin_listening(&self) {
-        self.line_mut().heard = Some(vec![]);
+    /// Starts to collect all frames on the bus.
+    pub fn begin_collecting(&self) {
+        self.state_mut().collected = Some(vec![]);
     }
 
-    /// What was collected.
-    pub fn end_listening(&self) -> Vec<Frame> {
-        self.line_mut().heard.take().unwrap_or_default()
+    /// Stops collecting and returns the frames.
+    pub fn end_collecting(&self) -> Vec<Frame> {
+        self.state_mut().collected.take().unwrap_or_default()
     }
 
-    /// Moves one object.
+    /// Performs one SDO transfer.
     ///
     /// # Errors
-    /// [`Failure::Interrupted`] before it has begun. What comes of the transfer itself is inside.
+    /// [`Failure::Interrupted`] when it was interrupted before it began. The inner result is that of the transfer.
     pub async fn transfer(&self, transfer: Transfer) -> Result<Result<Completed, SdoError>, Failure> {
-        self.until(|line| (line.now_ns >= line.free_ns).then_some(())).await;
-        if self.line().is_interrupted() {
+        self.until(|state| (state.now_ns >= state.free_ns).then_some(())).await;
+        if self.state().is_interrupted() {
             return Err(Failure::Interrupted);
         }
-        // The client is free: every transfer is awaited to its end here.
-        let started = self.line_mut().client.start(transfer);
+        // The client is free, because every transfer is awaited to its end here.
+        let started = self.state_mut().client.start(transfer);
         debug_assert!(started.is_ok());
-        let outcome = self.until(|line| line.client.take_outcome()).await;
-        let mut line = self.line_mut();
-        line.free_ns = line.now_ns.saturating_add(line.manners.gap_ns);
+        let outcome = self.until(|state| state.client.take_outcome()).await;
+        let mut state = self.state_mut();
+        state.free_ns = state.now_ns.saturating_add(state.sdo_quirks.gap_ns);
         Ok(outcome)
     }
 
     /// Reads the bytes of an object.
     ///
     /// # Errors
-    /// See [`Conversation::transfer`].
+    /// See [`SdoSession::transfer`].
     pub async fn upload(&self, address: ObjectAddress) -> Result<Result<Uploaded, SdoError>, Failure> {
         let completed = self.transfer(Transfer::Upload { object: address }).await?;
         Ok(completed.map(|completed| match completed {
@@ -179,20 +180,20 @@ impl Conversation {
         }))
     }
 
-    /// Reads a number. Its length is what the drive says, its sign that of the object's type.
+    /// Reads a number. The drive decides the length, the object's type the sign.
     ///
     /// # Errors
-    /// The transfer failed, or brought no number.
+    /// The transfer failed, or the data is not a number.
     pub async fn read(&self, object: &Object) -> Result<i64, Failure> {
         let failed = |error| Failure::Transfer { object: *object, access: Access::Read, error };
         let uploaded = self.upload(object.address).await?.map_err(failed)?;
         number(object, &uploaded)
     }
 
-    /// Reads a number that the drive may lack: `None` when it says so.
+    /// Reads a number from an object that may not exist; `None` when the drive says so.
     ///
     /// # Errors
-    /// As [`Conversation::read`].
+    /// As [`SdoSession::read`].
     pub async fn read_optional(&self, object: &Object) -> Result<Option<i64>, Failure> {
         match self.read(object).await {
             Ok(value) => Ok(Some(value)),
@@ -201,7 +202,7 @@ impl Conversation {
         }
     }
 
-    /// Reads a text that the drive may lack.
+    /// Reads a text from an object that may not exist.
     ///
     /// # Errors
     /// The drive did not answer.
@@ -226,22 +227,23 @@ impl Conversation {
         }
     }
 
-    /// Writes a number once: when no answer comes, nobody knows whether it was taken. For what must not be done twice.
+    /// Writes a number without a retry, for commands that must not be executed twice. When no answer comes, it is
+    /// unknown whether the drive took the value.
     ///
     /// # Errors
-    /// As [`Conversation::write`].
+    /// As [`SdoSession::write`].
     pub async fn write_once(&self, object: &Object, value: i64) -> Result<(), Failure> {
-        let (node, timing) = (self.node(), self.line().manners.timing);
-        self.line_mut().client = Client::new(node, Timing { retries: 0, ..timing });
+        let (node, timing) = (self.node(), self.state().sdo_quirks.timing);
+        self.state_mut().client = SdoClient::new(node, SdoTiming { retries: 0, ..timing });
         let written = self.write(object, value).await;
-        self.line_mut().client = Client::new(node, timing);
+        self.state_mut().client = SdoClient::new(node, timing);
         written
     }
 
-    /// Writes a number to an object that the drive may lack; tells whether it was taken.
+    /// Writes a number to an object that may not exist; returns whether the drive accepted it.
     ///
     /// # Errors
-    /// As [`Conversation::write`].
+    /// As [`SdoSession::write`].
     pub async fn write_optional(&self, object: &Object, value: i64) -> Result<bool, Failure> {
         match self.write(object, value).await {
             Ok(()) => Ok(true),
@@ -250,10 +252,10 @@ impl Conversation {
         }
     }
 
-    /// Writes a number and reads it again.
+    /// Writes a number and reads it back.
     ///
     /// # Errors
-    /// As [`Conversation::write`], and [`Failure::NotKept`].
+    /// As [`SdoSession::write`], and [`Failure::NotKept`].
     pub async fn write_and_check(&self, object: &Object, value: i64) -> Result<(), Failure> {
         self.write(object, value).await?;
         let received = self.read(object).await?;
@@ -263,10 +265,10 @@ impl Conversation {
         Err(Failure::NotKept { object: *object, written: value, received })
     }
 
-    /// Reads an object again and again until it is as wanted.
+    /// Polls an object until its value is as wanted.
     ///
     /// # Errors
-    /// [`Failure::NotInTime`], and those of [`Conversation::read`].
+    /// [`Failure::NotInTime`], and those of [`SdoSession::read`].
     pub async fn wait_for(
         &self,
         object: &Object,
@@ -289,10 +291,10 @@ impl Conversation {
     }
 }
 
-/// Between two readings of an object that is waited for.
+/// Interval between two reads of a polled object.
 const POLL_NS: Nanoseconds = 5_000_000;
 
-/// The number in the bytes of an object: as its type says, or as many bytes as the drive has sent.
+/// Decodes the number in an object's bytes by the object's type, or by the length that the drive sent.
 pub(super) fn number(object: &Object, uploaded: &Uploaded) -> Result<i64, Failure> {
     let of_other_length = || uploaded.number(object.data_type.of_length(uploaded.bytes.len())?);
     let received = uploaded.bytes.len();

@@ -1,27 +1,27 @@
-//! The state behind a conversation: the present, the SDO client, what is to be sent, what was heard.
+//! The state of an SDO session: time, SDO client, outgoing frames, received messages.
 
 use std::collections::VecDeque;
 
 use takt_rt::{Frame, Id, Nanoseconds};
 
-use super::event::Event;
+use super::event::ProcedureEvent;
 use crate::canopen::emcy::Emergency;
 use crate::canopen::function_code;
 use crate::canopen::nmt::{ErrorControl, NmtState};
-use crate::canopen::sdo::{Client, Timing};
+use crate::canopen::sdo::{SdoClient, SdoTiming};
 
-/// How a drive's SDO server wants to be spoken to.
+/// Timing and deviations of a drive's SDO server.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Manners {
-    /// Waiting and repeating.
-    pub timing: Timing,
-    /// The pause after an answer before the next request.
+pub struct SdoQuirks {
+    /// Reply timeout and retries.
+    pub timing: SdoTiming,
+    /// Minimum pause between a reply and the next request.
     pub gap_ns: Nanoseconds,
-    /// Whether its replies may be shorter than eight bytes, without the zeros at their end.
+    /// Whether replies may be shorter than eight bytes, with trailing zeros left out.
     pub has_short_replies: bool,
 }
 
-/// The heartbeat that is sent while a procedure runs.
+/// The heartbeat that this program sends while a procedure runs.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct OwnHeartbeat {
     pub node: u8,
@@ -30,40 +30,40 @@ pub(super) struct OwnHeartbeat {
 }
 
 #[derive(Debug)]
-pub(super) struct Line {
+pub(super) struct SessionState {
     pub now_ns: Nanoseconds,
     pub node: u8,
-    pub manners: Manners,
-    pub client: Client,
+    pub sdo_quirks: SdoQuirks,
+    pub client: SdoClient,
     pub outgoing: VecDeque<Frame>,
-    pub events: VecDeque<Event>,
-    /// Frames that were received, while somebody listens to them.
-    pub heard: Option<Vec<Frame>>,
-    /// The last state that the node has reported.
+    pub events: VecDeque<ProcedureEvent>,
+    /// The frames received since collecting began; `None` while nothing is collected.
+    pub collected: Option<Vec<Frame>>,
+    /// The NMT state in the node's last heartbeat.
     pub nmt: Option<NmtState>,
     pub emergency: Option<Emergency>,
     pub heartbeat: Option<OwnHeartbeat>,
     pub step: &'static str,
-    /// The step that failed, when others follow it.
+    /// The step that failed, when clean-up steps follow it.
     pub failing_step: Option<&'static str>,
-    /// How often it was asked to end.
+    /// Number of interruptions so far.
     pub interruptions: u8,
-    /// So many requests to end are obeyed later: the axis is being brought to rest.
+    /// Number of interruptions that are ignored, because the axis is already being stopped.
     pub ignored_interruptions: u8,
-    /// No request leaves before this time.
+    /// No SDO request is sent before this time.
     pub free_ns: Nanoseconds,
 }
 
-impl Line {
-    pub fn new(node: u8, manners: Manners) -> Self {
+impl SessionState {
+    pub fn new(node: u8, sdo_quirks: SdoQuirks) -> Self {
         Self {
             now_ns: 0,
             node,
-            manners,
-            client: Client::new(node, manners.timing),
+            sdo_quirks,
+            client: SdoClient::new(node, sdo_quirks.timing),
             outgoing: VecDeque::new(),
             events: VecDeque::new(),
-            heard: None,
+            collected: None,
             nmt: None,
             emergency: None,
             heartbeat: None,
@@ -80,7 +80,7 @@ impl Line {
     }
 
     pub fn receive(&mut self, frame: &Frame) {
-        match self.lengthened(frame) {
+        match self.padded(frame) {
             Some(whole) => self.client.receive(&whole),
             None => self.client.receive(frame),
         }
@@ -91,19 +91,19 @@ impl Line {
             let is_gone = emergency.code.0 & 0xFF00 == 0;
             self.emergency = (!is_gone).then_some(emergency);
         }
-        if let Some(heard) = &mut self.heard {
-            heard.push(*frame);
+        if let Some(collected) = &mut self.collected {
+            collected.push(*frame);
         }
     }
 
-    fn lengthened(&self, frame: &Frame) -> Option<Frame> {
+    fn padded(&self, frame: &Frame) -> Option<Frame> {
         let is_reply = frame.id() == Id::canopen(function_code::SDO_RESPONSE, self.node);
         let is_short = (1..8).contains(&frame.payload().len());
-        (self.manners.has_short_replies && is_reply && is_short)
+        (self.sdo_quirks.has_short_replies && is_reply && is_short)
             .then(|| Frame::of(frame.id(), frame.first_word().to_le_bytes()))
     }
 
-    /// The own heartbeat, when it is due.
+    /// The own heartbeat frame, when it is due.
     pub fn heartbeat(&mut self) -> Option<Frame> {
         let now_ns = self.now_ns;
         let heartbeat = self.heartbeat.as_mut().filter(|heartbeat| heartbeat.due_ns <= now_ns)?;

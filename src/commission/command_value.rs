@@ -1,27 +1,27 @@
-//! Values as people write them: with a unit for the joint, plain for the drive.
+//! Parses command values: a joint value has a unit, a drive value is a plain number.
 
 use crate::config::{Quantity, QuantityError};
 
 use super::dictionary::integer;
-use super::subject::Amount;
+use super::target::CommandValue;
 
-/// Why a text is not the value that was asked for.
+/// Why a text is not a valid value.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum AmountError {
-    /// It is no number.
+pub enum CommandValueError {
+    /// It is not a number.
     #[error("`{text}` is no {quantity}: write for example \"{example}\"")]
     NoNumber {
-        /// What was written.
+        /// The text as written.
         text: String,
-        /// What was asked for.
+        /// The expected quantity.
         quantity: &'static str,
-        /// How it could be written.
+        /// An example of valid text.
         example: &'static str,
     },
-    /// It is no whole number of drive units.
+    /// It is not a whole number of drive units.
     #[error("`{text}` is no whole number, as values of the drive are (`--raw`)")]
     NoInteger {
-        /// What was written.
+        /// The text as written.
         text: String,
     },
     /// It has no unit.
@@ -29,9 +29,9 @@ pub enum AmountError {
         "`{text}` has no unit: write for example \"{example}\", or `--raw` for a number in the drive's unit"
     )]
     NoUnit {
-        /// What was written.
+        /// The text as written.
         text: String,
-        /// How it could be written.
+        /// An example of valid text.
         example: &'static str,
     },
     /// It has an unknown unit.
@@ -39,7 +39,7 @@ pub enum AmountError {
     UnknownUnit {
         /// The symbol.
         symbol: String,
-        /// How it could be written.
+        /// An example of valid text.
         example: &'static str,
     },
     /// It has the unit of another quantity.
@@ -47,39 +47,41 @@ pub enum AmountError {
     OtherQuantity {
         /// The unit.
         unit: String,
-        /// a or an
+        /// The article of the quantity: a or an.
         article: &'static str,
-        /// What was asked for.
+        /// The expected quantity.
         quantity: &'static str,
-        /// How it could be written.
+        /// An example of valid text.
         example: &'static str,
     },
 }
 
-/// Reads a value.
+/// Parses a value.
 ///
 /// # Errors
-/// See [`AmountError`].
-pub fn parse(text: &str, quantity: Quantity, is_raw: bool) -> Result<Amount, AmountError> {
+/// See [`CommandValueError`].
+pub fn parse(text: &str, quantity: Quantity, is_raw: bool) -> Result<CommandValue, CommandValueError> {
     if is_raw {
-        let number = integer(text).ok_or_else(|| AmountError::NoInteger { text: text.to_owned() })?;
-        return Ok(Amount::Drive(number));
+        let number = integer(text).ok_or_else(|| CommandValueError::NoInteger { text: text.to_owned() })?;
+        return Ok(CommandValue::Drive(number));
     }
     let Quantity { name, example, .. } = quantity;
     let text_owned = || text.to_owned();
     let value = quantity.parse(text).map_err(|error| match error {
-        QuantityError::NoNumber => AmountError::NoNumber { text: text_owned(), quantity: name, example },
-        QuantityError::NoUnit => AmountError::NoUnit { text: text_owned(), example },
-        QuantityError::UnknownUnit { symbol } => AmountError::UnknownUnit { symbol, example },
+        QuantityError::NoNumber => {
+            CommandValueError::NoNumber { text: text_owned(), quantity: name, example }
+        }
+        QuantityError::NoUnit => CommandValueError::NoUnit { text: text_owned(), example },
+        QuantityError::UnknownUnit { symbol } => CommandValueError::UnknownUnit { symbol, example },
         QuantityError::OtherQuantity { unit } => {
             let article = if name.starts_with('a') { "an" } else { "a" };
-            AmountError::OtherQuantity { unit, article, quantity: name, example }
+            CommandValueError::OtherQuantity { unit, article, quantity: name, example }
         }
     })?;
     if value.is_finite() {
-        return Ok(Amount::Joint(value));
+        return Ok(CommandValue::Joint(value));
     }
-    Err(AmountError::NoNumber { text: text_owned(), quantity: name, example })
+    Err(CommandValueError::NoNumber { text: text_owned(), quantity: name, example })
 }
 
 #[cfg(test)]
@@ -87,14 +89,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_value_is_of_the_joint_with_its_unit_and_of_the_drive_when_raw() {
+    fn a_value_with_a_unit_is_a_joint_value_and_a_raw_value_is_a_drive_value() {
         let angle = Quantity::ANGLE;
-        assert_eq!(parse("1 rad", angle, false), Ok(Amount::Joint(1.0)));
-        assert_eq!(parse("-1000", angle, true), Ok(Amount::Drive(-1000)));
+        assert_eq!(parse("1 rad", angle, false), Ok(CommandValue::Joint(1.0)));
+        assert_eq!(parse("-1000", angle, true), Ok(CommandValue::Drive(-1000)));
     }
 
     #[test]
-    fn what_is_no_value_is_refused_with_an_example() {
+    fn invalid_values_are_refused_with_an_example() {
         let words = |text: &str, is_raw: bool| parse(text, Quantity::ANGLE, is_raw).unwrap_err().to_string();
         assert!(words("5", false).contains("has no unit: write for example \"170 deg\", or `--raw`"));
         assert!(words("5 deg/s", false).contains("`deg/s` is not the unit of an angle"));

@@ -1,4 +1,4 @@
-//! Procedures that speak with devices, which may answer anything: bring-up and farewell, and the layer settings.
+//! Procedures with devices that may send any reply: bring-up and shutdown of drives, and LSS.
 
 use std::sync::OnceLock;
 
@@ -7,13 +7,13 @@ use takt::canopen::lss::{
 };
 use takt::canopen::sdo;
 use takt::config::Config;
-use takt::drive::{BringUp, BringUpTiming, Leave};
+use takt::drive::{BringUp, BringUpTiming, Shutdown};
 use takt::sim::SimulatedBus;
 use takt_rt::{BusPort, Frame, Id, ReceiveBatch};
 
 use super::input::Input;
 
-/// The master of the layer settings comes to an end with any task and any answers.
+/// The LSS master ends with any task and any replies.
 pub fn layer_settings(mut input: Input<'_>) {
     let mut address = || LssAddress::from_values([(); 4].map(|()| input.word()));
     let (first, second) = (address(), address());
@@ -34,7 +34,7 @@ pub fn layer_settings(mut input: Input<'_>) {
     let mut master = LssMaster::new(timing);
     assert!(master.start(task).is_ok() && master.start(task).is_err());
     let mut now_ns = 0;
-    for _ in 0..QUESTIONS_AT_MOST {
+    for _ in 0..MAX_REQUESTS {
         while let Some(frame) = master.poll(now_ns) {
             assert!(LssRequest::decode(&frame).is_some(), "{frame:?}");
         }
@@ -52,11 +52,11 @@ pub fn layer_settings(mut input: Input<'_>) {
             }
         }
     }
-    panic!("{task:?} does not come to an end");
+    panic!("{task:?} does not end");
 }
 
-/// A fast scan asks some 130 questions.
-const QUESTIONS_AT_MOST: usize = 1_000;
+/// A fast scan sends about 130 requests.
+const MAX_REQUESTS: usize = 1_000;
 
 fn configurations() -> &'static [Config; 3] {
     static CONFIGURATIONS: OnceLock<[Config; 3]> = OnceLock::new();
@@ -64,7 +64,7 @@ fn configurations() -> &'static [Config; 3] {
         let erob = include_str!("../../configs/single-erob.toml");
         let stored = erob.replace("[[axis]]", "[[axis]]\nmapping = \"as-stored\"");
         [erob, &stored, include_str!("../../configs/gantry-yz-aim.toml")].map(|text| {
-            let mut config = Config::parse("example", text).expect("the example is sound");
+            let mut config = Config::parse("example", text).expect("the example is valid");
             config.axes.truncate(1);
             config.axes[0].simulated.power_up_ns = 1_000_000;
             config
@@ -76,21 +76,21 @@ const TIMING: BringUpTiming = BringUpTiming {
     boot_up_timeout_ns: 100_000_000,
     reset_repeat_ns: 30_000_000,
     confirm_timeout_ns: 50_000_000,
-    sdo: sdo::Timing { reply_timeout_ns: 5_000_000, retries: 1 },
+    sdo: sdo::SdoTiming { reply_timeout_ns: 5_000_000, retries: 1 },
 };
 const STEP_NS: u64 = 500_000;
-/// Every step of the longest list has a time-out, and one restart.
-const STEPS_AT_MOST: usize = 100_000;
+/// Every step of the longest list may time out, and one restart is possible.
+const MAX_STEPS: usize = 100_000;
 
-/// A drive is brought up and left, some of whose frames are lost, doubled or have other bytes. Either comes to an end, and
-/// who fails says why.
+/// A drive is brought up and shut down while frames are lost, duplicated or changed. Both procedures end, and a failure
+/// has a reason.
 pub fn bring_up(mut input: Input<'_>) {
     let config = &configurations()[usize::from(input.byte()) % 3];
-    let mut line = Line { bus: SimulatedBus::new(config, 0), now_ns: 0, input, untouched: 0 };
+    let mut bus = UnreliableBus { bus: SimulatedBus::new(config, 0), now_ns: 0, input, unchanged: 0 };
     let mut bring_up = BringUp::with_timing(config, TIMING);
     let mut is_started = false;
-    for _ in 0..STEPS_AT_MOST {
-        line.step(|now_ns, mut send| bring_up.poll(now_ns, &mut send))
+    for _ in 0..MAX_STEPS {
+        bus.step(|now_ns, mut send| bring_up.poll(now_ns, &mut send))
             .iter()
             .for_each(|frame| bring_up.receive(0, frame));
         match bring_up.outcome() {
@@ -100,42 +100,42 @@ pub fn bring_up(mut input: Input<'_>) {
                 bring_up.start().expect("the first stage has succeeded");
                 is_started = true;
             }
-            Some(Ok(_)) => return leave(config, line),
+            Some(Ok(_)) => return shut_down(config, bus),
             Some(Err(error)) => {
                 assert!(!error.failures.is_empty() && !error.to_string().is_empty());
-                return leave(config, line);
+                return shut_down(config, bus);
             }
         }
     }
-    panic!("the bring-up does not come to an end: {:?}", bring_up.progress());
+    panic!("the bring-up does not end: {:?}", bring_up.progress());
 }
 
-fn leave(config: &Config, mut line: Line<'_>) {
-    let mut leave = Leave::new(config);
-    for _ in 0..STEPS_AT_MOST {
-        line.step(|now_ns, mut send| leave.poll(now_ns, &mut send))
+fn shut_down(config: &Config, mut bus: UnreliableBus<'_>) {
+    let mut shutdown = Shutdown::new(config);
+    for _ in 0..MAX_STEPS {
+        bus.step(|now_ns, mut send| shutdown.poll(now_ns, &mut send))
             .iter()
-            .for_each(|frame| leave.receive(0, frame));
-        match leave.outcome() {
+            .for_each(|frame| shutdown.receive(0, frame));
+        match shutdown.outcome() {
             None => {}
             Some(Ok(_)) => return,
             Some(Err(error)) => return assert!(!error.to_string().is_empty()),
         }
     }
-    panic!("the farewell does not come to an end");
+    panic!("the shutdown does not end");
 }
 
-/// A bus that is not to be trusted.
-struct Line<'a> {
+/// A bus that loses, duplicates and changes frames.
+struct UnreliableBus<'a> {
     bus: SimulatedBus,
     now_ns: u64,
     input: Input<'a>,
-    /// Frames that come as they are.
-    untouched: u32,
+    /// The number of frames that pass unchanged.
+    unchanged: u32,
 }
 
-impl Line<'_> {
-    /// Sends, and gives what comes.
+impl UnreliableBus<'_> {
+    /// Sends the due frames and returns the received ones.
     fn step(&mut self, poll: impl FnOnce(u64, &mut dyn FnMut(usize, Frame))) -> Vec<Frame> {
         self.now_ns += STEP_NS;
         let (bus, now_ns) = (&mut self.bus, self.now_ns);
@@ -144,24 +144,24 @@ impl Line<'_> {
         });
         let mut batch = ReceiveBatch::new();
         self.bus.receive(now_ns, &mut batch);
-        batch.iter().flat_map(|received| self.touch(received.frame)).collect()
+        batch.iter().flat_map(|received| self.change(received.frame)).collect()
     }
 
-    fn touch(&mut self, frame: Frame) -> Vec<Frame> {
-        if self.input.is_empty() || self.untouched > 0 {
-            self.untouched = self.untouched.saturating_sub(1);
+    fn change(&mut self, frame: Frame) -> Vec<Frame> {
+        if self.input.is_empty() || self.unchanged > 0 {
+            self.unchanged = self.unchanged.saturating_sub(1);
             return vec![frame];
         }
         let other = |at: usize, byte: u8| {
             let mut bytes = frame.payload().to_vec();
-            if let Some(place) = bytes.get_mut(at) {
-                *place = byte;
+            if let Some(target) = bytes.get_mut(at) {
+                *target = byte;
             }
             Frame::data(frame.id(), &bytes).expect("as long as before")
         };
         match self.input.byte() {
             count @ 0..200 => {
-                self.untouched = count.into();
+                self.unchanged = count.into();
                 vec![frame]
             }
             200..210 => vec![],

@@ -1,49 +1,49 @@
-//! Looking at an axis: once in the end, again and again while it moves, or for somebody who watches.
+//! Polls the readings of an axis, and reports its final position and its moves.
 
 use takt_rt::Nanoseconds;
 
 use super::contact;
-use super::conversation::Conversation;
-use super::event::Reading;
+use super::event::AxisReading;
 use super::failure::Failure;
 use super::report::Report;
-use super::request::Course;
-use super::subject::Subject;
+use super::sdo_session::SdoSession;
+use super::target::TargetDrive;
+use super::task::MoveKind;
 use crate::canopen::objects::POSITION_ACTUAL_VALUE;
 
-/// Shows what `read` reads until it is time.
+/// Shows a reading at each interval until the time is over.
 pub async fn watch(
-    c: &Conversation,
+    c: &SdoSession,
     every_ns: Nanoseconds,
     duration_ns: Option<Nanoseconds>,
-    mut read: impl AsyncFnMut() -> Result<Reading, Failure>,
+    mut read: impl AsyncFnMut() -> Result<AxisReading, Failure>,
 ) -> Result<Report, Failure> {
     c.step("watch");
-    let mut looks = 0_u64;
+    let mut count = 0_u64;
     let show = async || {
         let reading = read().await?;
         c.show(reading);
-        looks += 1;
+        count += 1;
         Ok(reading)
     };
-    tend(c, every_ns, duration_ns, show, |_| Ok(())).await?;
+    poll_until(c, every_ns, duration_ns, show, |_| Ok(())).await?;
     let mut report = Report::new();
-    report.add("readings", "readings", looks, looks.to_string());
+    report.add("readings", "readings", count, count.to_string());
     Ok(report)
 }
 
-/// Looks at what `read` reads for a time, every so often; `look` may end it before.
-pub async fn tend(
-    c: &Conversation,
+/// Polls `read` at an interval until the time is over; `check` can end it earlier with a failure.
+pub async fn poll_until(
+    c: &SdoSession,
     every_ns: Nanoseconds,
     duration_ns: Option<Nanoseconds>,
-    mut read: impl AsyncFnMut() -> Result<Reading, Failure>,
-    mut look: impl FnMut(&Reading) -> Result<(), Failure>,
+    mut read: impl AsyncFnMut() -> Result<AxisReading, Failure>,
+    mut check: impl FnMut(&AxisReading) -> Result<(), Failure>,
 ) -> Result<(), Failure> {
     let began_ns = c.now_ns();
     loop {
         let begun_ns = c.now_ns();
-        look(&read().await?)?;
+        check(&read().await?)?;
         let since = |then_ns: Nanoseconds| c.now_ns().saturating_sub(then_ns);
         let left_ns = duration_ns.map(|duration_ns| duration_ns.saturating_sub(since(began_ns)));
         if left_ns == Some(0) {
@@ -54,23 +54,23 @@ pub async fn tend(
     }
 }
 
-/// Checks where a course leads before anything is changed: a drive that is not moved is left as it is.
-pub async fn check_course(c: &Conversation, s: &Subject, course: Course) -> Result<(), Failure> {
-    if let Course::Absolute { to, .. } | Course::Reciprocate { to, .. } = course {
+/// Checks the target position before anything is changed in the drive.
+pub async fn check_target(c: &SdoSession, s: &TargetDrive, kind: MoveKind) -> Result<(), Failure> {
+    if let MoveKind::Absolute { to, .. } | MoveKind::Reciprocate { to, .. } = kind {
         s.check_position(s.position_counts(to))?;
     }
-    contact::reach_family(c, s).await?;
-    c.step("way");
+    contact::connect_family(c, s).await?;
+    c.step("plan the move");
     let here = c.read(&POSITION_ACTUAL_VALUE).await?;
-    match course {
-        Course::Relative(by) => s.check_position(here.saturating_add(s.distance_counts(by))),
-        Course::Reciprocate { .. } => s.check_position(here),
-        Course::Absolute { .. } | Course::Continuous { .. } => Ok(()),
+    match kind {
+        MoveKind::Relative(by) => s.check_position(here.saturating_add(s.distance_counts(by))),
+        MoveKind::Reciprocate { .. } => s.check_position(here),
+        MoveKind::Absolute { .. } | MoveKind::Continuous { .. } => Ok(()),
     }
 }
 
-/// Where the axis is in the end.
-pub fn summary(s: &Subject, reading: &Reading) -> Report {
+/// Final position and state of the axis.
+pub fn summary(s: &TargetDrive, reading: &AxisReading) -> Report {
     let mut report = Report::new();
     report.add("position", "position", reading.position, s.position_quantity().show(reading.position));
     let counts = reading.position_counts;
@@ -79,8 +79,8 @@ pub fn summary(s: &Subject, reading: &Reading) -> Report {
     report
 }
 
-/// What came of a run at a velocity in drive units, from one count to another.
-pub fn run_report(s: &Subject, commanded: i64, fastest: f64, began: i64, ended: i64) -> Report {
+/// The result of a run at a velocity: drive units, and the positions before and after in counts.
+pub fn run_report(s: &TargetDrive, commanded: i64, fastest: f64, began: i64, ended: i64) -> Report {
     let (commanded, way) = (s.velocity(commanded as f64), s.position(ended) - s.position(began));
     let (velocity, position) = (s.velocity_quantity(), s.position_quantity());
     let mut report = Report::new();
@@ -90,8 +90,8 @@ pub fn run_report(s: &Subject, commanded: i64, fastest: f64, began: i64, ended: 
     report
 }
 
-/// What came of moves to targets, in counts.
-pub fn move_report(s: &Subject, from: i64, target: i64, moves: u32, error: i64) -> Report {
+/// The result of moves to targets, in counts.
+pub fn move_report(s: &TargetDrive, from: i64, target: i64, moves: u32, error: i64) -> Report {
     let (from, target, position) = (s.position(from), s.position(target), s.position_quantity());
     let mut report = Report::new();
     report.add("from", "from", from, position.show(from));
