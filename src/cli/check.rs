@@ -2,7 +2,6 @@
 
 mod text;
 
-use std::f64::consts::TAU;
 use std::path::PathBuf;
 
 use clap::Args;
@@ -96,11 +95,7 @@ impl Check {
 
 impl AxisCheck {
     fn of(axis: &Axis, config: &Config) -> Self {
-        let travel_per_turn = match axis.travel {
-            Travel::Rotary => TAU,
-            Travel::Linear { lead_m } => lead_m,
-        };
-        let counts_per_unit = axis.counts_per_turn * axis.gear_ratio / travel_per_turn;
+        let counts_per_unit = axis.counts_per_turn * axis.gear_ratio / axis.travel.per_turn();
         let direction = if axis.reversed { -1.0 } else { 1.0 };
         let counts =
             |position: f64| (direction * position * counts_per_unit + f64::from(axis.zero_counts)).round();

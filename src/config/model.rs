@@ -2,6 +2,7 @@
 //! value being possible. The defaults that are named here hold where the file says nothing; they are constants of
 //! `defaults.rs`, and `configs/reference.toml` shows them as a file.
 
+use std::f64::consts::TAU;
 use std::path::PathBuf;
 
 use serde::Serialize;
@@ -96,7 +97,7 @@ pub struct Realtime {
 /// This controller as a CANopen node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Master {
-    /// Its own node number, under which its heartbeat is sent. Default 127.
+    /// Its own node ID, under which its heartbeat is sent. Default 127.
     pub node: u8,
     /// Period of its heartbeat in whole milliseconds; `None` sends none. Default 100 ms.
     pub heartbeat_ns: Option<u64>,
@@ -148,7 +149,7 @@ pub struct Axis {
     pub name: String,
     /// Its bus, an index into [`Config::buses`].
     pub bus: usize,
-    /// Its CANopen node number, 1 to 127.
+    /// Its CANopen node ID, 1 to 127.
     pub node: u8,
     /// The family of the drive.
     pub drive: DriveFamily,
@@ -170,6 +171,9 @@ pub struct Axis {
     pub following_error: FollowingError,
     /// How far from the joint a stream of set-points may begin: rad (m). Default 0.02 rad or 0.002 m.
     pub start_tolerance: f64,
+    /// How far from its target a program may leave the joint and still be finished: rad (m). Default 0.01 rad or 1 mm; in CST
+    /// 1.5 · coulomb_friction / stiffness where that is more, since static friction holds a joint off its target there.
+    pub target_tolerance: f64,
     /// What is done with set-points of a stream that break a limit. Default: the group stops.
     pub on_violation: OnViolation,
     /// Cycles without feedback before the group stops. Default 5.
@@ -205,6 +209,16 @@ pub enum DriveFamily {
     ErobCanopen,
     /// YZ-AIM integrated servo, CANopen edition.
     YzAim,
+}
+
+impl Travel {
+    /// How far the joint gets in one turn: rad (m).
+    pub const fn per_turn(self) -> f64 {
+        match self {
+            Self::Rotary => TAU,
+            Self::Linear { lead_m } => lead_m,
+        }
+    }
 }
 
 impl DriveFamily {

@@ -36,6 +36,16 @@ pub enum ProblemKind {
         /// The keys that mean something in this place.
         known: Vec<&'static str>,
     },
+    /// A key that means nothing beside another one.
+    #[error("`{key}` means nothing beside `{beside}`")]
+    Ignored {
+        /// The key.
+        key: String,
+        /// The other one.
+        beside: &'static str,
+        /// When it means something.
+        belongs: &'static str,
+    },
     /// A key that is needed and not there.
     #[error("`{key}` is missing")]
     MissingKey {
@@ -140,7 +150,7 @@ pub enum ProblemKind {
         /// The name.
         name: String,
     },
-    /// Two nodes of the same number on a bus.
+    /// Two nodes with the same node ID on a bus.
     #[error("node {node} is already taken on the bus {bus:?}")]
     DuplicateNode {
         /// The bus.
@@ -254,6 +264,7 @@ impl ProblemKind {
             Self::UnknownKey { nearest: None, known, .. } => {
                 format!("what may stand here: {}", known.join(", "))
             }
+            Self::Ignored { belongs, .. } => (*belongs).into(),
             Self::MissingKey { says, .. } => (*says).into(),
             Self::WrongType { expected, .. } => format!("write {expected}"),
             Self::NotAQuantity { quantity, .. } | Self::WrongUnit { quantity, .. } => {
@@ -306,6 +317,7 @@ impl ProblemKind {
         match self {
             Self::NotText | Self::Syntax { .. } => "here",
             Self::UnknownKey { .. } => "not known here",
+            Self::Ignored { .. } => "means nothing here",
             Self::MissingKey { .. } => "missing in here",
             Self::WrongType { .. } => "wrong type",
             Self::UnknownUnit { .. } | Self::WrongUnit { .. } => "wrong unit",

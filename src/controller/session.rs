@@ -115,6 +115,7 @@ pub(super) fn lead(
     remote: Option<Remote>,
 ) -> Result<Session, SessionError> {
     let mut clock = MonotonicClock::default();
+    config.validate_on_this_machine().map_err(AssembleError::from)?;
     let engine = Box::new(assemble::engine(config)?);
     let (ports, traces) = open_ports(config, options.rehearsal.as_deref())?;
     let (rt, mut host, log) = channels(&ChannelSizes::of(config));

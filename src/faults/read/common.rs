@@ -4,7 +4,8 @@ use std::ops::RangeInclusive;
 
 use takt_rt::time::Nanoseconds;
 
-use crate::config::read::entry::{Bounds, Entry};
+use crate::config::bounds::Bounds;
+use crate::config::read::entry::Entry;
 use crate::config::read::section::Section;
 use crate::config::{Axis, Config, Interface, Quantity};
 use crate::faults::cue::Cue;
@@ -123,7 +124,7 @@ pub fn duration(entry: &Entry<'_>, config: &Config) -> Option<Nanoseconds> {
     {
         return Some(Nanoseconds::from(cycles) * config.cycle.period_ns);
     }
-    entry.nanoseconds(0.0, LONGEST_S)
+    entry.nanoseconds(0.0..=LONGEST_S)
 }
 
 /// A rhythm; absent, it is `default_ns`.

@@ -10,7 +10,7 @@ use toml::de::DeTable;
 
 use super::scenario::{Fault, Scenario};
 use crate::config::read::document;
-use crate::config::read::entry::Problems;
+use crate::config::spot::Problems;
 use crate::config::read::section::Section;
 use crate::config::{Config, ConfigError, ProblemKind};
 
@@ -58,7 +58,7 @@ impl Scenario {
 
 fn read<'a>(
     table: &'a DeTable<'a>,
-    problems: &'a Problems<'a>,
+    problems: &'a Problems,
     text: &str,
     config: &Config,
 ) -> Option<Scenario> {
@@ -69,7 +69,7 @@ fn read<'a>(
     if given > FAULTS_AT_MOST
         && let Some(beyond) = sections.get(FAULTS_AT_MOST)
     {
-        beyond.report_here(ProblemKind::OutOfRange {
+        beyond.header_spot().report(ProblemKind::OutOfRange {
             key: "fault".to_owned(),
             value: format!("a list of {given}"),
             allowed: format!("1 to {FAULTS_AT_MOST} faults"),
@@ -85,7 +85,7 @@ fn fault(mut section: Section<'_>, text: &str, config: &Config) -> Option<Fault>
     let line = 1 + text.get(..section.header().start).map_or(0, |before| before.matches('\n').count());
     let Some(entry) = section.get("kind") else {
         let says = "what goes wrong: kind = \"drop\"";
-        section.report_here(ProblemKind::MissingKey { key: "fault.kind".to_owned(), says });
+        section.header_spot().report(ProblemKind::MissingKey { key: "fault.kind".to_owned(), says });
         return None;
     };
     // Without a kind nobody can say which other keys mean anything.
