@@ -223,7 +223,7 @@ cases! {
         "directory = \"runs\"" => "directory = \"\"", at "directory": OutOfRange { .. },
         "seed = 1" => "seed = 99999999999999999999", at "seed": OutOfRange { .. },
         "longest_gap = \"2 ms\"" => "longest_gap = \"900 us\"", at "longest_gap": OutOfRange { .. },
-        "longest_gap = \"2 ms\"" => "longest_gap = \"2 s\"", at "longest_gap": OutOfRange { .. },
+        "longest_gap = \"2 ms\"" => "longest_gap = \"61 s\"", at "longest_gap": OutOfRange { .. },
         "bit_rate = \"1 Mbit/s\"" => "bit_rate = \"500 kbit/s\"", at "500 kbit/s": OutOfRange { key, .. } if key == "bus.bit_rate",
     }
 

@@ -3,17 +3,21 @@
 use std::fmt;
 use std::ops::Range;
 
-use miette::{Diagnostic, LabeledSpan, NamedSource, SourceCode};
+use miette::{Diagnostic, LabeledSpan, SourceCode};
 use thiserror::Error;
 
 use crate::canopen::dcf::DcfError;
 
 use super::problem_kind::ProblemKind;
+use super::source_view::SourceView;
 use crate::printable::printable;
 
 /// The most problems that are shown of one configuration; the rest are counted. Whoever gets more of them has given another
 /// file, or will see the rest after the first are mended.
 const SHOWN_AT_MOST: usize = 20;
+
+/// The most bytes of a file that are underlined.
+const LONGEST_SPAN: usize = 200;
 
 /// A configuration that cannot be used, with its first twenty problems in the order of the file. `miette` shows each of them
 /// with its line.
@@ -24,7 +28,7 @@ pub struct ConfigError(Box<Inner>);
 struct Inner {
     name: String,
     /// The text of the file; `None` where the configuration was made in code or could not be read.
-    source: Option<NamedSource<String>>,
+    source: Option<SourceView>,
     lines: LineStarts,
     problems: Vec<Problem>,
     omitted: usize,
@@ -34,8 +38,16 @@ impl ConfigError {
     /// A file, or another text, that is wrong.
     pub(super) fn of_text(name: &str, text: &str, problems: Vec<Problem>) -> Self {
         let name = printable(name);
-        let source = Some(NamedSource::new(&name, printable(text)));
-        Self::new(name, source, LineStarts::of(text), problems)
+        let source = Some(SourceView::new(&name, printable(text)));
+        let shorten = |problem: &mut Problem| {
+            if let Location::Text { span, .. } = &mut problem.location {
+                let end = span.end.min(span.start.saturating_add(LONGEST_SPAN));
+                span.end = text.floor_char_boundary(end).max(span.start);
+            }
+        };
+        let mut error = Self::new(name, source, LineStarts::of(text), problems);
+        error.0.problems.iter_mut().for_each(shorten);
+        error
     }
 
     /// A file that cannot be read.
@@ -51,12 +63,7 @@ impl ConfigError {
         Self::new(name, None, LineStarts::of(""), problems)
     }
 
-    fn new(
-        name: String,
-        source: Option<NamedSource<String>>,
-        lines: LineStarts,
-        mut problems: Vec<Problem>,
-    ) -> Self {
+    fn new(name: String, source: Option<SourceView>, lines: LineStarts, mut problems: Vec<Problem>) -> Self {
         problems.sort_by_key(|problem| problem.span().map(|span| (span.start, span.end)));
         // The defaults of axes are read once for each axis, with the same problems.
         let mut shown: Vec<Problem> = Vec::with_capacity(SHOWN_AT_MOST);
@@ -115,6 +122,11 @@ impl LineStarts {
         Self(std::iter::once(0).chain(ends.map(|(at, _)| at + 1)).collect())
     }
 
+    /// Where a line begins, counted from 0.
+    pub fn start_of(&self, line: usize) -> usize {
+        self.0.get(line).copied().unwrap_or(0)
+    }
+
     /// The line in which a byte is, counted from 1.
     pub fn line_of(&self, at: usize) -> usize {
         self.0.partition_point(|start| *start <= at)
@@ -130,7 +142,8 @@ impl fmt::Display for ConfigError {
             (count, 0) => write!(f, ": {count} problems")?,
             (count, _) => write!(f, ": {count} problems, of which the first {SHOWN_AT_MOST} follow")?,
         }
-        let fields = self.problems().iter().filter(|problem| matches!(problem.location, Location::Field { .. }));
+        let fields =
+            self.problems().iter().filter(|problem| matches!(problem.location, Location::Field { .. }));
         for problem in fields {
             write!(f, "; {problem} ({})", problem.kind.help())?;
         }
@@ -196,7 +209,7 @@ impl fmt::Display for Location {
 }
 
 impl Problem {
-    /// The bytes of the file that are wrong; `None` where there is no file, or it could not be read.
+    /// The bytes of the file that are wrong, the first 200 of them; `None` where there is no file, or it could not be read.
     pub fn span(&self) -> Option<Range<usize>> {
         match &self.location {
             Location::Text { span, .. } => Some(span.clone()),

@@ -15,6 +15,7 @@ mod quantity;
 mod ranges;
 pub(crate) mod read;
 mod rules;
+mod source_view;
 mod spelling;
 pub(crate) mod spot;
 
@@ -35,9 +36,7 @@ impl Config {
         let name = path.display().to_string();
         match crate::text_file::read(path) {
             Ok(bytes) => Self::parse(&name, &ConfigError::text_of(&name, bytes)?),
-            Err(error) => {
-                Err(ConfigError::unreadable(&name, error.to_string()))
-            }
+            Err(error) => Err(ConfigError::unreadable(&name, error.to_string())),
         }
     }
 

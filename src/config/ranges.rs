@@ -61,8 +61,11 @@ pub const COUNTS_PER_TURN: Bounds = Bounds::Plausible {
 pub const GEAR_RATIO: Bounds =
     Bounds::Plausible { low: 1e-3, high: 1e5, reason: "no gear of a joint has another ratio" };
 /// `axis.lead`
-pub const LEAD: Bounds =
-    Bounds::Plausible { low: 1e-5, high: 10.0, reason: "no screw or belt moves a joint by less or more in a turn" };
+pub const LEAD: Bounds = Bounds::Plausible {
+    low: 1e-5,
+    high: 10.0,
+    reason: "no screw or belt moves a joint by less or more in a turn",
+};
 /// `axis.velocity_loop.position_gain`
 pub const POSITION_GAIN: Bounds = Bounds::Plausible {
     low: 0.01,
@@ -95,7 +98,7 @@ pub const BLACK_BOX_S: RangeInclusive<f64> = 0.1..=60.0;
 /// `telemetry.ring_records`
 pub const RING_RECORDS: Range<i64> = 64..1_048_577;
 /// `simulation.longest_gap`, at most, in seconds.
-pub const LONGEST_GAP_AT_MOST_S: f64 = 1.0;
+pub const LONGEST_GAP_AT_MOST_S: f64 = 60.0;
 
 /// The ranges of what an axis has in rad or in m.
 pub struct AxisRanges {

@@ -95,7 +95,8 @@ fn axis(mut section: Section<'_>, machine: &Machine<'_>, earlier: &[ReadAxis]) -
         }
         Some(name)
     });
-    let bus = section.require("bus", "the name of its bus").and_then(|entry| bus_index(&entry, machine.buses));
+    let bus =
+        section.require("bus", "the name of its bus").and_then(|entry| bus_index(&entry, machine.buses));
     let node = section.require_own("node", "its node ID, 1 to 127").and_then(|entry| {
         let node = node(&entry)?;
         check_node(&entry, node, bus, machine, earlier);
@@ -136,11 +137,8 @@ fn axis(mut section: Section<'_>, machine: &Machine<'_>, earlier: &[ReadAxis]) -
     let mapping = mapping(&mut section, drive);
     let feedback = feedback(&mut section, drive, mapping);
     let answers_sync = boolean(&mut section, "answers_sync", defaults::ANSWERS_SYNC);
-    let mut tolerance = |key| {
-        section
-            .get(key)
-            .and_then(|entry: Entry<'_>| entry.quantity(q.position, q.ranges.deviation))
-    };
+    let mut tolerance =
+        |key| section.get(key).and_then(|entry: Entry<'_>| entry.quantity(q.position, q.ranges.deviation));
     let start_tolerance = tolerance("start_tolerance");
     let target_tolerance = tolerance("target_tolerance");
     let on_violation = section

@@ -60,9 +60,9 @@ fn bus<'a>(mut section: Section<'a>, cycle_ns: u64, earlier: &[ReadBus<'a>]) -> 
         Some(entry) => interface(&entry, earlier),
     };
     let bit_rate_entry = section.get("bit_rate");
-    let bit_rate = bit_rate_entry.as_ref().and_then(|entry| {
-        rules::bus::bit_rate(&entry.spot, entry.unbounded(Quantity::BIT_RATE)?)
-    });
+    let bit_rate = bit_rate_entry
+        .as_ref()
+        .and_then(|entry| rules::bus::bit_rate(&entry.spot, entry.unbounded(Quantity::BIT_RATE)?));
     let bit_rate = bit_rate.unwrap_or(defaults::BIT_RATE);
     let data_bit_rate = section.get("data_bit_rate").and_then(|entry| {
         rules::bus::data_bit_rate(&entry.spot, entry.unbounded(Quantity::BIT_RATE)?, bit_rate)

@@ -19,7 +19,8 @@ pub fn control(
     joint: &SimulatedJoint,
     surroundings: Option<&Surroundings>,
 ) -> Option<Control> {
-    let period_s = surroundings.map_or(defaults::PERIOD_NS, |surroundings| surroundings.period_ns) as f64 / 1e9;
+    let period_s =
+        surroundings.map_or(defaults::PERIOD_NS, |surroundings| surroundings.period_ns) as f64 / 1e9;
     let mut velocity_section = section.section("velocity_loop");
     let mut torque_section = section.section("torque_loop");
     let velocity_loop = velocity_loop(&mut velocity_section, period_s);
@@ -90,7 +91,8 @@ fn torque_loop(
     let damping = value("damping", q.damping, q.ranges.damping, default_damping);
     let viscous_friction =
         value("viscous_friction", q.damping, q.ranges.viscous_friction, Some(joint.viscous_friction));
-    let coulomb_friction = value("coulomb_friction", q.effort, q.ranges.friction, Some(joint.coulomb_friction));
+    let coulomb_friction =
+        value("coulomb_friction", q.effort, q.ranges.friction, Some(joint.coulomb_friction));
     let are_given = [stiffness != default_stiffness, damping != default_damping];
     let origin = match bandwidth {
         Some(bandwidth) if are_given == [false; 2] => Origin::Bandwidth(bandwidth),

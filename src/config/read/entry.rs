@@ -12,6 +12,7 @@ use crate::config::quantity::{Quantity, QuantityError, Short};
 use crate::config::rules;
 use crate::config::spelling;
 use crate::config::spot::{Problems, Spot};
+use crate::printable::excerpt;
 
 /// One value with its place.
 #[derive(Clone)]
@@ -92,7 +93,10 @@ impl<'a> Entry<'a> {
         let DeValue::Integer(integer) = self.value else { return self.wrong_type("a whole number") };
         let value = whole(integer);
         if value.is_none() {
-            self.report_range(integer.to_string(), format!("{} to {}", allowed.start, allowed.end - 1));
+            self.report_range(
+                excerpt(&integer.to_string()),
+                format!("{} to {}", allowed.start, allowed.end - 1),
+            );
         }
         self.spot.integer(value?, &allowed)
     }
@@ -130,7 +134,7 @@ impl<'a> Entry<'a> {
             let words: Vec<_> = choices.iter().map(|(word, _)| *word).collect();
             let nearest = spelling::nearest(given, words.iter().copied());
             let key = self.spot.key.clone();
-            self.report(ProblemKind::UnknownChoice { key, given: given.to_owned(), nearest, choices: words });
+            self.report(ProblemKind::UnknownChoice { key, given: excerpt(given), nearest, choices: words });
         }
         found
     }
@@ -168,13 +172,17 @@ impl<'a> Entry<'a> {
     }
 
     fn with_unit(&self, text: &str, quantity: Quantity) -> Option<f64> {
-        let (key, given) = (self.spot.key.clone(), text.to_owned());
+        let (key, given) = (self.spot.key.clone(), excerpt(text));
         let kind = match quantity.parse(text) {
             Ok(value) => return Some(value),
             Err(QuantityError::NoNumber) => ProblemKind::NotAQuantity { key, given, quantity },
             Err(QuantityError::NoUnit) => ProblemKind::MissingUnit { key, given, quantity },
-            Err(QuantityError::UnknownUnit { symbol }) => ProblemKind::UnknownUnit { key, symbol, quantity },
-            Err(QuantityError::OtherQuantity { unit }) => ProblemKind::WrongUnit { key, unit, quantity },
+            Err(QuantityError::UnknownUnit { symbol }) => {
+                ProblemKind::UnknownUnit { key, symbol: excerpt(&symbol), quantity }
+            }
+            Err(QuantityError::OtherQuantity { unit }) => {
+                ProblemKind::WrongUnit { key, unit: excerpt(&unit), quantity }
+            }
         };
         self.report(kind);
         None

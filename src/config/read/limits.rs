@@ -17,9 +17,9 @@ pub fn limits(mut section: Section<'_>, q: Quantities, counting: Option<&Countin
             let range = position_range(&entry, q)?;
             rules::limits::position_range(&entry.spot, range, q, counting).then_some(range)
         });
-    let velocity = section.require("velocity", "highest speed: velocity = \"137 deg/s\"").and_then(|entry| {
-        rules::limits::velocity(&entry.spot, entry.unbounded(q.velocity)?, q, counting)
-    });
+    let velocity = section
+        .require("velocity", "highest speed: velocity = \"137 deg/s\"")
+        .and_then(|entry| rules::limits::velocity(&entry.spot, entry.unbounded(q.velocity)?, q, counting));
     let acceleration = section
         .require("acceleration", "highest acceleration: acceleration = \"8 rad/s^2\"")
         .and_then(|entry| entry.quantity(q.acceleration, q.ranges.acceleration));

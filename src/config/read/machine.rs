@@ -66,7 +66,11 @@ pub fn realtime(mut section: Section<'_>, period_ns: u64) -> Realtime {
         }
     });
     let spin_guard_ns = section.get("spin_guard").and_then(|entry| {
-        if entry.is_word("measure") { None } else { entry.nanoseconds(rules::realtime::spin_guard(period_ns)) }
+        if entry.is_word("measure") {
+            None
+        } else {
+            entry.nanoseconds(rules::realtime::spin_guard(period_ns))
+        }
     });
     let realtime = Realtime {
         priority: priority.unwrap_or(Some(defaults::PRIORITY)),
@@ -176,8 +180,9 @@ pub fn telemetry(mut section: Section<'_>) -> Telemetry {
 pub fn simulation(mut section: Section<'_>, period_ns: u64) -> Simulation {
     let seed =
         section.get("seed").and_then(|entry| entry.integer(0..i64::MAX)).and_then(|v| u64::try_from(v).ok());
-    let longest_gap_ns =
-        section.get("longest_gap").and_then(|entry| entry.nanoseconds(rules::simulation::longest_gap(period_ns)));
+    let longest_gap_ns = section
+        .get("longest_gap")
+        .and_then(|entry| entry.nanoseconds(rules::simulation::longest_gap(period_ns)));
     let stops_for_missed_slots =
         boolean(&mut section, "stops_for_missed_slots", defaults::STOPS_FOR_MISSED_SLOTS);
     section.finish();

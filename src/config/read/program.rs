@@ -79,8 +79,13 @@ fn program_target(section: &mut Section<'_>, axes: &[ReadAxis]) -> Option<Progra
         (None, None) => {
             let says = "a target for every axis, to = [\"30 deg\", …], or one for all of them";
             let entry = section.require("to", says)?;
-            ignored(&lasting, "to", "`for` belongs to `speed` or `torque`; `dwell` is standstill after a move");
-            target(&entry, axes, |axis| axis.quantities.position, rules::position).map(ProgramTarget::Position)
+            ignored(
+                &lasting,
+                "to",
+                "`for` belongs to `speed` or `torque`; `dwell` is standstill after a move",
+            );
+            target(&entry, axes, |axis| axis.quantities.position, rules::position)
+                .map(ProgramTarget::Position)
         }
     }
 }

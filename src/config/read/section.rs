@@ -9,7 +9,7 @@ use super::entry::Entry;
 use crate::config::problem_kind::ProblemKind;
 use crate::config::spelling;
 use crate::config::spot::{Problems, Spot};
-use crate::printable::printable;
+use crate::printable::excerpt;
 
 /// The most unknown keys of a table for which the key that was meant is looked for. No more problems are shown anyway.
 const SUGGESTED_AT_MOST: usize = 20;
@@ -148,7 +148,7 @@ impl<'a> Section<'a> {
                 });
                 meant.extend(nearest.flatten());
                 let kind = ProblemKind::UnknownKey {
-                    key: printable(&self.path_of(key.get_ref())),
+                    key: self.path_of(&excerpt(key.get_ref())),
                     nearest: nearest.flatten(),
                     known: known.clone(),
                 };

@@ -14,6 +14,7 @@ use crate::config::ranges;
 use crate::config::spelling;
 use crate::config::spot::Spot;
 use crate::drive::yz_aim;
+use crate::printable::excerpt;
 
 pub fn validate(config: &Config, whole: &Fields<'_>) {
     let axes = &config.axes;
@@ -66,7 +67,7 @@ fn validate_place(axis: &Axis, earlier: &[Axis], config: &Config, fields: &Field
 pub fn unknown_bus(given: &str, known: &[&str]) -> ProblemKind {
     let nearest = spelling::nearest(given, known.iter().copied()).map(str::to_owned);
     let known = known.iter().map(|name| (*name).to_owned()).collect();
-    ProblemKind::UnknownBus { name: given.to_owned(), nearest, known }
+    ProblemKind::UnknownBus { name: excerpt(given), nearest, known }
 }
 
 pub fn duplicate_node(bus: &str, node: u8) -> ProblemKind {
@@ -76,9 +77,7 @@ pub fn duplicate_node(bus: &str, node: u8) -> ProblemKind {
 /// An eRob knows one bit rate (eRunner manual, section 1 of the specification), a YZ-AIM four (manual, 5.13).
 pub fn bit_rate(spot: &Spot<'_>, drive: DriveFamily, rate: u32) {
     let (rates, allowed): (&[u32], _) = match drive {
-        DriveFamily::ErobCanopen => {
-            (&[1_000_000], "1 Mbit/s, the one bit rate of the eRobs on this bus")
-        }
+        DriveFamily::ErobCanopen => (&[1_000_000], "1 Mbit/s, the one bit rate of the eRobs on this bus"),
         DriveFamily::YzAim => (
             &[125_000, 250_000, 500_000, 1_000_000],
             "125, 250 or 500 kbit/s or 1 Mbit/s, the bit rates of the YZ-AIMs on this bus",
@@ -96,8 +95,8 @@ fn validate_motion(axis: &Axis, config: &Config, fields: &Fields<'_>) {
     let q = Quantities::of(axis.travel);
     let counting = Counting::of(axis);
     let is_countable = validate_counting(axis, fields);
-    let are_sound = is_countable
-        && limits::validate(&axis.limits, q, Some(&counting), &fields.within("limits"));
+    let are_sound =
+        is_countable && limits::validate(&axis.limits, q, Some(&counting), &fields.within("limits"));
     let limits = are_sound.then_some(&axis.limits);
     limits::validate_following_error(&axis.following_error, q, &fields.within("following_error"));
     for (key, value) in
@@ -115,8 +114,7 @@ fn validate_motion(axis: &Axis, config: &Config, fields: &Fields<'_>) {
             motor_speed(&fields.at("limits.velocity"), limits, &counting, q);
         }
     }
-    let is_simulated =
-        config.buses.get(axis.bus).is_some_and(|bus| bus.interface == Interface::Simulated);
+    let is_simulated = config.buses.get(axis.bus).is_some_and(|bus| bus.interface == Interface::Simulated);
     let surroundings =
         Surroundings::new(period_ns, axis.transmission_type, axis.simulated.inertia, is_simulated);
     loops::validate(axis.control, q, axis.simulated.inertia, &surroundings, fields);

@@ -64,7 +64,9 @@ fn interface(spot: &Spot<'_>, interface: &Interface) {
     let Interface::SocketCan(given) = interface else { return };
     match given.parse::<Interface>() {
         Ok(parsed) if parsed == *interface => {}
-        Ok(_) => spot.report_range(format!("{given:?}"), "Interface::Simulated, which is not SocketCAN".to_owned()),
+        Ok(_) => {
+            spot.report_range(format!("{given:?}"), "Interface::Simulated, which is not SocketCAN".to_owned())
+        }
         Err(reason) => spot.report(ProblemKind::Interface { reason }),
     }
 }

@@ -12,11 +12,9 @@ pub fn validate(cycle: &Cycle, missed_slots: &MissedSlots, fields: &Fields<'_>) 
     }
     let fields = fields.within("missed_slots");
     let mut earlier = 0;
-    for (key, slots) in [
-        ("warning", missed_slots.warning),
-        ("degraded", missed_slots.degraded),
-        ("stop", missed_slots.stop),
-    ] {
+    for (key, slots) in
+        [("warning", missed_slots.warning), ("degraded", missed_slots.degraded), ("stop", missed_slots.stop)]
+    {
         self::missed_slots(&fields.at(key), slots, earlier);
         earlier = earlier.max(slots);
     }

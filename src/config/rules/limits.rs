@@ -11,7 +11,8 @@ use crate::config::spot::Spot;
 
 /// Returns whether the limits are sound, so that what depends on them can be judged.
 pub fn validate(limits: &Limits, q: Quantities, counting: Option<&Counting>, fields: &Fields<'_>) -> bool {
-    let is_range = position_range(&fields.at("position"), [limits.position_min, limits.position_max], q, counting);
+    let is_range =
+        position_range(&fields.at("position"), [limits.position_min, limits.position_max], q, counting);
     let checks = [
         velocity(&fields.at("velocity"), limits.velocity, q, counting),
         fields.at("acceleration").quantity(limits.acceleration, q.acceleration, q.ranges.acceleration),
@@ -25,7 +26,12 @@ pub fn validate(limits: &Limits, q: Quantities, counting: Option<&Counting>, fie
 
 /// The lowest position is below the highest, by a count at least, and a drive can count both. The latter is judged where
 /// it is known how the drive counts.
-pub fn position_range(spot: &Spot<'_>, [low, high]: [f64; 2], q: Quantities, counting: Option<&Counting>) -> bool {
+pub fn position_range(
+    spot: &Spot<'_>,
+    [low, high]: [f64; 2],
+    q: Quantities,
+    counting: Option<&Counting>,
+) -> bool {
     let is_finite = [low, high].map(|position| spot.quantity(position, q.position, Bounds::Finite).is_some());
     if is_finite != [true; 2] {
         return false;
@@ -37,8 +43,7 @@ pub fn position_range(spot: &Spot<'_>, [low, high]: [f64; 2], q: Quantities, cou
     let Some(counting) = counting else { return true };
     let resolution = 1.0 / counting.counts_per_unit();
     if high - low < resolution {
-        let allowed =
-            format!("a range of {} at least, one count of the drive", q.position.show(resolution));
+        let allowed = format!("a range of {} at least, one count of the drive", q.position.show(resolution));
         spot.report_range(format!("a range of {}", q.position.show(high - low)), allowed);
         return false;
     }

@@ -70,10 +70,13 @@ fn damping_ratio<const N: usize>(coefficients: [f64; N]) -> f64 {
     if coefficients.iter().any(|coefficient| !coefficient.is_finite()) {
         return -1.0;
     }
-    roots(&coefficients).into_iter().map(|z| {
-        let s = z.ln();
-        if z.norm() < FADED || s.norm() < STANDSTILL { 1.0 } else { -s.re / s.norm() }
-    }).fold(1.0, f64::min)
+    roots(&coefficients)
+        .into_iter()
+        .map(|z| {
+            let s = z.ln();
+            if z.norm() < FADED || s.norm() < STANDSTILL { 1.0 } else { -s.re / s.norm() }
+        })
+        .fold(1.0, f64::min)
 }
 
 /// The roots by the method of Durand and Kerner: all of them at once, each corrected by its distance from the others.

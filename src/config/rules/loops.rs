@@ -19,7 +19,12 @@ pub struct Surroundings {
 
 impl Surroundings {
     /// A drive that reports in every so many cycles closes its loop as seldom.
-    pub fn new(bus_period_ns: u64, transmission_type: u8, simulated_inertia: f64, is_simulated: bool) -> Self {
+    pub fn new(
+        bus_period_ns: u64,
+        transmission_type: u8,
+        simulated_inertia: f64,
+        is_simulated: bool,
+    ) -> Self {
         let cycles = if transmission_type <= 240 { transmission_type.max(1) } else { 1 };
         Self {
             period_ns: bus_period_ns.saturating_mul(cycles.into()),
@@ -137,8 +142,11 @@ impl TorqueLoop {
         if present >= LEAST_DAMPING_RATIO {
             return true;
         }
-        let place =
-            format!("an inertia of {} and a period of {}", q.inertia.show(inertia), surroundings.show_period());
+        let place = format!(
+            "an inertia of {} and a period of {}",
+            q.inertia.show(inertia),
+            surroundings.show_period()
+        );
         let verdict = verdict(present);
         if let Origin::Bandwidth(bandwidth) = origin {
             let own = if self.inertia > 0.0 { self.inertia } else { self.simulated_inertia };
@@ -166,7 +174,9 @@ impl TorqueLoop {
                 });
                 let allowed = match most.filter(|most| *most < self.damping) {
                     Some(most) => format!("at most {} with {place}: {verdict}", q.damping.show(most)),
-                    None => format!("more, for a stiffness of {}: {verdict}", q.stiffness.show(self.stiffness)),
+                    None => {
+                        format!("more, for a stiffness of {}: {verdict}", q.stiffness.show(self.stiffness))
+                    }
                 };
                 at("damping").report_range(q.damping.show(self.damping), allowed);
             }

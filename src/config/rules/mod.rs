@@ -17,6 +17,7 @@ use super::error::ConfigError;
 use super::model::Config;
 use super::problem_kind::ProblemKind;
 use super::spot::{Problems, Spot};
+use crate::printable::excerpt;
 
 impl Config {
     /// Checks every value, as the reader of files does, for whoever has changed a configuration in code. Everything that
@@ -36,7 +37,11 @@ impl Config {
         bus::validate(self, &whole);
         axis::validate(self, &whole);
         program::validate(&self.program, &self.axes, &whole);
-        if problems.is_empty() { Ok(()) } else { Err(ConfigError::of_fields(&self.name, problems.into_vec())) }
+        if problems.is_empty() {
+            Ok(())
+        } else {
+            Err(ConfigError::of_fields(&self.name, problems.into_vec()))
+        }
     }
 }
 
@@ -51,7 +56,11 @@ impl Config {
         let problems = Problems::in_fields();
         let fields = Fields { prefix: "realtime.".to_owned(), of: String::new(), problems: &problems };
         realtime::cpu_is_present(&self.realtime, &fields);
-        if problems.is_empty() { Ok(()) } else { Err(ConfigError::of_fields(&self.name, problems.into_vec())) }
+        if problems.is_empty() {
+            Ok(())
+        } else {
+            Err(ConfigError::of_fields(&self.name, problems.into_vec()))
+        }
     }
 }
 
@@ -60,7 +69,7 @@ pub fn name(spot: &Spot<'_>, name: &str) -> bool {
     let is_sound = (1..=32).contains(&name.chars().count())
         && name.chars().all(|c| c.is_alphanumeric() || matches!(c, '-' | '_' | '.'));
     if !is_sound {
-        spot.report(ProblemKind::BadName { key: spot.key.clone(), given: name.to_owned() });
+        spot.report(ProblemKind::BadName { key: spot.key.clone(), given: excerpt(name) });
     }
     is_sound
 }

@@ -48,7 +48,9 @@ fn validate_target(present: &ProgramMove, axes: &[Axis], fields: &Fields<'_>) {
             duration(&fields.at("for"), *duration_s);
         }
         ProgramTarget::Torque { torque, duration_s } => {
-            if let Some(spot) = of_axes("torque", torque, &|spot, value, axis| self::torque(spot, value, axis)) {
+            if let Some(spot) =
+                of_axes("torque", torque, &|spot, value, axis| self::torque(spot, value, axis))
+            {
                 some_axis_is_driven(&spot, torque);
             }
             duration(&fields.at("for"), *duration_s);

@@ -22,7 +22,8 @@ pub fn validate(realtime: &Realtime, period_ns: u64, fields: &Fields<'_>) {
 
 /// A CPU that the kernel knows, whether it is switched on or not.
 pub fn cpu_is_present(realtime: &Realtime, fields: &Fields<'_>) {
-    let count = sysconf(SysconfVar::_NPROCESSORS_CONF).ok().flatten().and_then(|count| usize::try_from(count).ok());
+    let count =
+        sysconf(SysconfVar::_NPROCESSORS_CONF).ok().flatten().and_then(|count| usize::try_from(count).ok());
     if let (Some(cpu), Some(count)) = (realtime.cpu, count)
         && cpu >= count
     {
