@@ -1,6 +1,7 @@
 //! `takt check`: everything that can be known before motion.
 
 mod text;
+mod unattended;
 
 use std::path::PathBuf;
 
@@ -12,6 +13,7 @@ use takt::config::{Axis, Config, Control, Travel};
 use super::exit::Exit;
 use super::print;
 use super::refusal::Refusal;
+use unattended::Unattended;
 
 /// Check a configuration: limits, units, bus load, and the worst-case response time of every message
 #[derive(Args, Clone, Debug)]
@@ -69,6 +71,10 @@ struct AxisCheck {
     torque: f64,
     following_error: f64,
     following_error_time_ns: u64,
+    /// How far off its target a program may leave it.
+    target_tolerance: f64,
+    /// What it does when the controller is gone.
+    without_controller: Unattended,
     counts_per_unit: f64,
     /// What one count is.
     resolution: f64,
@@ -124,6 +130,8 @@ impl AxisCheck {
             torque: axis.limits.torque,
             following_error: axis.following_error.limit,
             following_error_time_ns: axis.following_error.time_ns,
+            target_tolerance: axis.target_tolerance,
+            without_controller: Unattended::of(axis, config),
             counts_per_unit,
             resolution: 1.0 / counts_per_unit,
             counts_per_cycle: axis.limits.velocity

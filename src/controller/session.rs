@@ -206,8 +206,8 @@ pub(super) fn lead(
         (Outcome::Interrupted | Outcome::Finished, Some(message)) => Outcome::CallbackPanicked { message },
         (outcome, _) => outcome,
     };
-    let target =
-        supervisor.target().filter(|_| outcome == Outcome::Finished && options.duration_ns.is_none());
+    let is_done = matches!(outcome, Outcome::Finished | Outcome::OffTarget { .. });
+    let target = supervisor.target().filter(|_| is_done && options.duration_ns.is_none());
     Ok(Session {
         snapshot: host.snapshot(),
         target: target.map(<[f64]>::to_vec),
