@@ -251,7 +251,7 @@ fn no_escape_character_from_outside_reaches_the_terminal() {
 fn what_an_axis_does_without_the_controller_is_told_for_its_mode() {
     for (mode, words) in [
         ("csp", "holds its last set-point, 0.1024 rad (5.9 deg) away at most"),
-        ("csv", "goes on for 100 ms, then brakes: stands after 399 ms and 0.5964 rad (34.2 deg) at most"),
+        ("csv", "goes on for 100 ms, then brakes: at rest after 399 ms and 0.5964 rad (34.2 deg) at most"),
         ("cst", "goes on for 100 ms, then brakes"),
         ("pp", "ends its move by itself"),
         ("pv", "goes on for 100 ms, then brakes"),

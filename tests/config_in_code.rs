@@ -139,11 +139,7 @@ const CASES: &[Case] = &[
     ("missed feedback", |c| axis(c).missed_feedback_cycles = 0, &[AXIS, "`axis.missed_feedback_cycles`"]),
     ("transmission type", |c| axis(c).transmission_type = 0, &[AXIS, "`axis.transmission_type` cannot be 0"]),
     ("transmission type", |c| axis(c).transmission_type = 250, &[AXIS, "254 or 255 (event)"]),
-    (
-        "feedback",
-        |c| axis(c).feedback = vec![Feedback::Torque; 2],
-        &[AXIS, "stands twice in `axis.feedback`"],
-    ),
+    ("feedback", |c| axis(c).feedback = vec![Feedback::Torque; 2], &[AXIS, "is in `axis.feedback` twice"]),
     ("feedback delay", |c| axis(c).feedback_delay_ns = u64::MAX, &[AXIS, "`axis.feedback_delay`"]),
     ("own heartbeat", |c| axis(c).heartbeat_ns = Some(0), &[AXIS, "`axis.heartbeat` cannot be 0 s"]),
     ("interpolation", |c| axis(c).drive = takt::config::DriveFamily::YzAim, &[AXIS, "`axis.mode` cannot be"]),

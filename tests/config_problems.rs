@@ -440,7 +440,7 @@ Error:
   help: write an angular velocity, as in "137 deg/s", or a bare number in rad/s
 
 Error: 
-  × node 1 is already taken on the bus "left"
+  × the node ID 1 is already taken on the bus "left"
     ╭─[machine.toml:66:8]
  65 │ bus = "left"
  66 │ node = 1
@@ -448,8 +448,8 @@ Error:
     ·        ╰── again; first in line 33
  67 │ limits = { position = [-1, 1], velocity = 1.0, acceleration = 5, torque = 20 }
     ╰────
-  help: give each node of a bus a number of its own, 1 to 127; the controller itself is [master]
-        node on every bus
+  help: give each node of a bus a node ID of its own, 1 to 127; on every bus, [master] node is the
+        ID of the controller
 "#;
     assert_eq!(rendered(&error_of(&text)), expected);
 }

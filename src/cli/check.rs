@@ -25,7 +25,7 @@ pub struct Arguments {
     json: bool,
 }
 
-/// Checks a configuration and tells the result. The exit code is 0 when it can be run, else 2.
+/// Checks a configuration and prints the result. The exit code is 0 when it can be run, else 2.
 pub fn run(arguments: &Arguments) -> Exit {
     let config = match Config::load(&arguments.config) {
         Ok(config) => config,
@@ -40,14 +40,14 @@ pub fn run(arguments: &Arguments) -> Exit {
     }
 }
 
-/// What was found out.
+/// The result.
 #[derive(Serialize)]
 struct Check {
     name: String,
     fits: bool,
     cycle_ns: u64,
     command_phase_ns: u64,
-    /// What `command_phase = "auto"` stands for; `None` where no command phase suits every bus.
+    /// The value of `command_phase = "auto"`; `None` where no command phase suits every bus.
     automatic_command_phase_ns: Option<u64>,
     axes: Vec<AxisCheck>,
     buses: Vec<BusSchedule>,

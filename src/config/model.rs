@@ -1,5 +1,5 @@
-//! The checked configuration as plain data. Whoever holds a [`Config`] that was read from a file may rely on every
-//! value being possible. The defaults that are named here hold where the file says nothing; they are constants of
+//! The configuration as plain data. Every value of a [`Config`] that was read from a file is possible. One that was changed in
+//! code is checked by [`Config::validate`]. The defaults that are named here hold where the file says nothing; they are constants of
 //! `defaults.rs`, and `configs/reference.toml` shows them as a file.
 
 use std::f64::consts::TAU;
@@ -52,8 +52,7 @@ pub struct Cycle {
     /// Period of SYNC and set-points; 250 µs to 100 ms in whole microseconds. Default 1 ms.
     pub period_ns: u64,
     /// When the command phase begins, after the start of the slot; 5 % to 95 % of the period. Default 55 %. A file
-    /// may leave it to [`automatic_command_phase`](crate::bus::schedule::automatic_command_phase); what that finds
-    /// stands here.
+    /// may leave it to [`automatic_command_phase`](crate::bus::schedule::automatic_command_phase); this is what that finds.
     pub command_phase_ns: u64,
 }
 
@@ -68,7 +67,7 @@ impl Config {
 /// When missed slots are too many: a bucket that every missed slot fills by one and that loses one in a while.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MissedSlots {
-    /// Slots in the bucket from which on it is told. Default 10.
+    /// Slots in the bucket from which on the operator is warned. Default 10.
     pub warning: u32,
     /// Slots from which on no stream is begun. Default 50.
     pub degraded: u32,

@@ -114,7 +114,7 @@ pub enum ProblemKind {
         /// What it may be.
         allowed: String,
     },
-    /// A word that is not one of those that may stand here.
+    /// A word that is not one of those that are allowed here.
     #[error("`{key}` cannot be {given:?}")]
     UnknownChoice {
         /// The key.
@@ -123,7 +123,7 @@ pub enum ProblemKind {
         given: String,
         /// What was probably meant.
         nearest: Option<&'static str>,
-        /// The words that may stand here.
+        /// The words that are allowed here.
         choices: Vec<&'static str>,
     },
     /// A name that is empty or has characters that names cannot have.
@@ -135,11 +135,11 @@ pub enum ProblemKind {
         given: String,
     },
     /// The same thing twice in a list.
-    #[error("{given:?} stands twice in `{key}`")]
+    #[error("{given:?} is in `{key}` twice")]
     Repeated {
         /// The key of the list.
         key: String,
-        /// What stands twice.
+        /// What is there twice.
         given: String,
     },
     /// Two buses or two axes of the same name.
@@ -151,7 +151,7 @@ pub enum ProblemKind {
         name: String,
     },
     /// Two nodes with the same node ID on a bus.
-    #[error("node {node} is already taken on the bus {bus:?}")]
+    #[error("the node ID {node} is already taken on the bus {bus:?}")]
     DuplicateNode {
         /// The bus.
         bus: String,
@@ -258,11 +258,12 @@ impl ProblemKind {
             }
             Self::NotText => "a configuration is TOML in UTF-8; is this another file?".into(),
             Self::Syntax { .. } => {
-                "the TOML rules are at https://toml.io; texts and units stand in quotes".into()
+                "the rules of TOML are at https://toml.io; texts, and numbers with units, are in quotes"
+                    .into()
             }
             Self::UnknownKey { nearest: Some(nearest), .. } => format!("did you mean `{nearest}`?"),
             Self::UnknownKey { nearest: None, known, .. } => {
-                format!("what may stand here: {}", known.join(", "))
+                format!("allowed here: {}", known.join(", "))
             }
             Self::Ignored { belongs, .. } => (*belongs).into(),
             Self::MissingKey { says, .. } => (*says).into(),
@@ -284,11 +285,11 @@ impl ProblemKind {
             }
             Self::UnknownChoice { nearest: None, choices, .. } => show_choices(choices),
             Self::BadName { .. } => "a name has 1 to 32 letters, digits or -_.".into(),
-            Self::Repeated { .. } => "leave one of them out".into(),
+            Self::Repeated { .. } => "remove one of them".into(),
             Self::DuplicateName { what, .. } => format!("give each {what} a name of its own"),
             Self::DuplicateNode { .. } => {
-                "give each node of a bus a number of its own, 1 to 127; the controller \
-                                           itself is [master] node on every bus"
+                "give each node of a bus a node ID of its own, 1 to 127; on every bus, \
+                                           [master] node is the ID of the controller"
                     .into()
             }
             Self::DuplicateInterface { .. } => "give each bus an interface of its own".into(),
@@ -354,7 +355,7 @@ fn show_quantity(quantity: Quantity) -> String {
 
 fn show_choices(choices: &[&str]) -> String {
     let quoted: Vec<_> = choices.iter().map(|choice| format!("{choice:?}")).collect();
-    format!("what may stand here: {}", quoted.join(", "))
+    format!("allowed here: {}", quoted.join(", "))
 }
 
 fn article(noun: &str) -> &'static str {

@@ -27,7 +27,7 @@ pub const NODE_ID: Range<i64> = 1..128;
 pub const HEARTBEAT_S: RangeInclusive<f64> = 10e-3..=65.535;
 /// `master.heartbeat_timeout`, in seconds; object 1016 has 16 bits.
 pub const HEARTBEAT_TIMEOUT_S: RangeInclusive<f64> = 1e-3..=65.535;
-/// `master.time`, in seconds. More often than every 10 ms tells nobody more.
+/// `master.time`, in seconds. TIME more often than every 10 ms has no use.
 pub const TIME_S: RangeInclusive<f64> = 10e-3..=3600.0;
 
 /// `bus.bit_rate`: the bit rates of CiA 301, 5.3, which every adapter and every drive here divides its clock to.
@@ -36,7 +36,7 @@ pub const BIT_RATES: [u32; 8] = [10_000, 20_000, 50_000, 125_000, 250_000, 500_0
 pub const DATA_BIT_RATE_AT_MOST: f64 = 8e6;
 /// The longest period of a bus, in seconds.
 pub const BUS_PERIOD_AT_MOST_S: f64 = 0.1;
-/// `bus.restart_ms`; nobody waits longer for a bus.
+/// `bus.restart_ms`, a minute at most.
 pub const RESTART_MS: Range<i64> = 0..60_001;
 /// `bus.service_frames_per_cycle`
 pub const SERVICE_FRAMES: Range<i64> = 1..33;

@@ -4,8 +4,8 @@ use miette::{MietteError, MietteSpanContents, NamedSource, SourceCode, SourceSpa
 
 use super::error::LineStarts;
 
-/// The most bytes of a file that are shown around a problem. A report of a longer excerpt takes long to draw, and nobody
-/// can read it.
+/// The most bytes of a file that are shown around a problem. A longer excerpt takes long to render, and is not
+/// readable.
 const SHOWN_AT_MOST: usize = 2000;
 /// What is shown on both sides of a problem in a line that is too long.
 const SIDE: usize = 60;

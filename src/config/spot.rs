@@ -13,7 +13,7 @@ use super::error::{LineStarts, Location, Problem};
 use super::problem_kind::ProblemKind;
 use super::quantity::Quantity;
 
-/// The problems found so far. Reading goes on after a problem, so that a person gets all of them at once.
+/// The problems found so far. Reading goes on after a problem, so that all of them are shown at once.
 pub struct Problems {
     /// Where relative paths begin.
     directory: PathBuf,

@@ -1,4 +1,4 @@
-//! What `takt check` found out, for people. Axes and buses that are alike are shown once.
+//! The result of `takt check` as text. Axes and buses that are alike are shown once.
 
 use std::fmt::Write as _;
 
@@ -10,7 +10,7 @@ use takt::printable::printable_path;
 use super::{AxisCheck, Check};
 use crate::cli::table::Table;
 
-/// All of it.
+/// The whole text.
 pub fn whole(check: &Check, config: &Config) -> String {
     let mut text = format!(
         "{}: {} axes on {} buses, a cycle of {} with the command phase at {} µs{}\n",

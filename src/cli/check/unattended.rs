@@ -18,9 +18,9 @@ pub enum Unattended {
     GoesOn {
         /// The time until the drive misses the heartbeat.
         timeout_ns: u64,
-        /// The time until the joint stands.
+        /// The time until the joint is at rest.
         time_ns: u64,
-        /// The way until the joint stands, from full speed: rad (m).
+        /// The travel until the joint is at rest, from full speed: rad (m).
         travel: f64,
     },
     /// It goes on, and no heartbeat stops it.
@@ -52,7 +52,7 @@ impl Unattended {
 
     /// It in words.
     pub fn words(&self, is_linear: bool) -> String {
-        let way = |travel: f64| {
+        let distance = |travel: f64| {
             if is_linear {
                 format!("{travel:.4} m")
             } else {
@@ -64,15 +64,15 @@ impl Unattended {
             Self::HoldsLastSetPoint { travel } => {
                 format!(
                     "holds its last set-point, {} away at most (following error and one cycle)",
-                    way(*travel)
+                    distance(*travel)
                 )
             }
             Self::EndsItsMove => "ends its move by itself, at its target".to_owned(),
             Self::GoesOn { timeout_ns, time_ns, travel } => format!(
-                "goes on for {} ms, then brakes: stands after {} ms and {} at most",
+                "goes on for {} ms, then brakes: at rest after {} ms and {} at most",
                 milliseconds(*timeout_ns),
                 milliseconds(*time_ns),
-                way(*travel)
+                distance(*travel)
             ),
             Self::GoesOnForEver => "goes on FOR EVER: [master] heartbeat is off".to_owned(),
         }

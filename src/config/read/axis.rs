@@ -280,8 +280,8 @@ fn mapping(section: &mut Section<'_>, drive: Option<DriveFamily>) -> PdoMapping 
     read.unwrap_or(if is_fixed { PdoMapping::AsStored } else { PdoMapping::Written })
 }
 
-/// A drive whose PDOs are written reports its mode of operation unless another list is given: nothing else tells that
-/// somebody has changed it.
+/// A drive whose PDOs are written reports its mode of operation (object 6061) unless another list is given. Nothing else shows that
+/// another master has changed the mode.
 fn feedback(section: &mut Section<'_>, drive: Option<DriveFamily>, mapping: PdoMapping) -> Vec<Feedback> {
     let choices = Feedback::ALL.map(|feedback| (feedback.word(), feedback));
     let Some(entry) = section.get("feedback") else {

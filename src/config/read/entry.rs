@@ -1,4 +1,4 @@
-//! One value of the file: where it stands, what it should be, and the problem if it is something else.
+//! One value of the file: its place, what it should be, and the problem if it is something else.
 
 use std::ops::{Range, RangeInclusive};
 use std::path::PathBuf;

@@ -1,8 +1,7 @@
 //! From the text of a file to a checked [`Config`].
 //!
-//! `toml` gives the tree with the place of every key and value. It is read here key by key rather than by derived
-//! `serde` code, because that would end at the first problem; a person who sets up a machine wants to hear of all of
-//! them at once.
+//! `toml` gives the tree with the place of every key and value. It is read here key by key, not by derived `serde` code, which
+//! ends at the first problem. Whoever sets up a machine needs all problems at once.
 
 mod axis;
 mod bus;

@@ -1,4 +1,4 @@
-//! A table of the file, with the table of defaults that stands behind it.
+//! A table of the file, with the table of its defaults.
 
 use std::ops::Range;
 
@@ -14,8 +14,8 @@ use crate::printable::excerpt;
 /// The most unknown keys of a table for which the key that was meant is looked for. No more problems are shown anyway.
 const SUGGESTED_AT_MOST: usize = 20;
 
-/// A table that is being read. It remembers which keys were asked for: what is left over at the end is unknown, and
-/// what was asked for in vain is missing.
+/// A table that is being read. It remembers which keys were looked up: the others are unknown, and required ones that were not
+/// found are missing.
 pub struct Section<'a> {
     path: String,
     header: Range<usize>,
@@ -25,7 +25,7 @@ pub struct Section<'a> {
     known: Vec<&'static str>,
     known_in_defaults: Vec<&'static str>,
     missing: Vec<(&'static str, &'static str)>,
-    /// Whether something else stands where the table should: what it lacks is not the problem then.
+    /// Whether the file has something other than a table here. Its missing keys are not reported then.
     is_no_table: bool,
     problems: &'a Problems,
 }
@@ -141,7 +141,7 @@ impl<'a> Section<'a> {
             let mut unknown: Vec<_> = keys.filter(is_unknown).collect();
             unknown.sort_by_key(|key| key.span().start);
             for (index, key) in unknown.into_iter().enumerate() {
-                // What was meant by each of a thousand unknown keys takes long to find, and nobody sees it.
+                // Looking for the key that was meant takes long, and only the first problems are shown.
                 let nearest = (index < SUGGESTED_AT_MOST).then(|| {
                     let absent = known.iter().copied().filter(|known| find(table, known).is_none());
                     spelling::nearest(key.get_ref(), absent)

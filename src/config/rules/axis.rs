@@ -90,7 +90,7 @@ pub fn bit_rate(spot: &Spot<'_>, drive: DriveFamily, rate: u32) {
     }
 }
 
-/// Units, limits, mode and loops, and the joint that stands in.
+/// Units, limits, mode, loops, and the simulated joint.
 fn validate_motion(axis: &Axis, config: &Config, fields: &Fields<'_>) {
     let q = Quantities::of(axis.travel);
     let counting = Counting::of(axis);

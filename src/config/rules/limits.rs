@@ -65,7 +65,7 @@ fn fits_counts(spot: &Spot<'_>, counts: &[f64]) -> bool {
     beyond.is_none()
 }
 
-/// A stop must end in a time that a person waits beside the machine.
+/// A stop from full speed must end within seconds: Ctrl-C and every controlled stop wait for it.
 pub fn stopping_time<'a>(limits: &Limits, q: Quantities, at: impl Fn(&'static str) -> Spot<'a>) -> bool {
     let Limits { velocity, deceleration, jerk, .. } = *limits;
     let without_jerk_s = velocity / deceleration;

@@ -2,7 +2,7 @@
 //!
 //! A loop over the bus acts once in a period. Feedback that is taken at one SYNC becomes a set-point that the drive latches
 //! at the next SYNC and keeps for a period. The criterion is the damping ratio of the closed loop's poles in discrete time:
-//! a pole z of a loop with the period T stands for the pole s = ln z / T, whose damping ratio is −Re s / |s|. A pole outside
+//! a pole z of a loop with the period T corresponds to the pole s = ln z / T, whose damping ratio is −Re s / |s|. A pole outside
 //! the unit circle has a negative damping ratio: the loop is unstable.
 
 use num_complex::Complex64;

@@ -1,4 +1,4 @@
-//! What every value of a configuration must be. Each rule stands once. The reader of files applies it to a key, and
+//! What every value of a configuration must be. Each rule exists once. The reader of files applies it to a key, and
 //! [`Config::validate`] to a field.
 
 pub mod axis;
@@ -20,8 +20,8 @@ use super::spot::{Problems, Spot};
 use crate::printable::excerpt;
 
 impl Config {
-    /// Checks every value, as the reader of files does, for whoever has changed a configuration in code. Everything that
-    /// starts something with a configuration calls this first.
+    /// Checks every value by the rules of the reader of files. A configuration that was changed in code needs this; everything
+    /// that starts with a configuration calls it first.
     ///
     /// # Errors
     /// Every problem, with the field that it concerns.

@@ -13,7 +13,7 @@ use super::limits::contains;
 
 pub fn validate(program: &Program, axes: &[Axis], whole: &Fields<'_>) {
     let fields = whole.within("program");
-    // A program of its own default is one that nobody has asked for.
+    // `Program::default()` is no program; it repeats nothing.
     if !program.moves.is_empty() || program.repeat != 0 {
         fields.at("repeat").integer(program.repeat, &ranges::REPEAT);
     }

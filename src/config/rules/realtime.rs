@@ -32,7 +32,8 @@ pub fn cpu_is_present(realtime: &Realtime, fields: &Fields<'_>) {
     }
 }
 
-/// The range of the spin guard, in seconds. A loop that spins for most of its period leaves the CPU to nobody else.
+/// The range of the spin guard, in seconds. A loop that spins for most of its period leaves no time to other
+/// threads of its CPU.
 pub fn spin_guard(period_ns: u64) -> RangeInclusive<f64> {
     0.0..=period_ns as f64 / 1e9 * ranges::SPIN_GUARD_AT_MOST
 }

@@ -15,13 +15,13 @@ pub fn validate(simulation: &Simulation, period_ns: u64, fields: &Fields<'_>) {
     fields.at("longest_gap").duration(simulation.longest_gap_ns, longest_gap(period_ns));
 }
 
-/// The range of the longest gap, in seconds. Within a cycle the simulated world never stands still.
+/// The range of the longest gap, in seconds. The simulated world never pauses within a cycle.
 pub fn longest_gap(period_ns: u64) -> RangeInclusive<f64> {
     let period_s = period_ns as f64 / 1e9;
     period_s..=ranges::LONGEST_GAP_AT_MOST_S.max(period_s)
 }
 
-/// The joint that stands in for an axis. Without sound limits nothing is said of where it begins.
+/// The simulated joint of an axis. Its initial position is judged only where the limits are sound.
 pub fn validate_joint(
     joint: &SimulatedJoint,
     q: Quantities,
