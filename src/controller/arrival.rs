@@ -1,6 +1,6 @@
 //! Whether a program has brought the joints to where it ends.
 
-use takt_rt::door::Snapshot;
+use takt_rt::Snapshot;
 
 use super::outcome::Outcome;
 use crate::config::{Config, Control};

@@ -1,6 +1,6 @@
 //! The axes.
 
-use takt_rt::record::MAX_AXES;
+use takt_rt::MAX_AXES;
 
 use super::loops::Surroundings;
 use super::{Fields, limits, loops, master, name, simulation};

@@ -1,6 +1,6 @@
 //! The buses.
 
-use takt_rt::record::MAX_BUSES;
+use takt_rt::MAX_BUSES;
 
 use super::{Fields, name};
 use crate::config::bounds::Bounds;
