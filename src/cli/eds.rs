@@ -11,6 +11,7 @@ use takt::canopen::eds::{self, Findings, Severity};
 
 use super::exit::Exit;
 use super::print;
+use super::say;
 use picture::Picture;
 
 /// Print the object dictionary of an EDS or DCF, with its PDOs and with what is wrong in the file
@@ -89,5 +90,5 @@ fn problems(findings: &Findings) -> Vec<ProblemPicture> {
 }
 
 fn show(findings: Findings) {
-    say!("{:?}", miette::Report::new(findings));
+    say::report(&miette::Report::new(findings));
 }

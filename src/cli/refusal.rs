@@ -1,5 +1,6 @@
 //! Why nothing was done, in words or, after `--json`, as one object.
 
+use std::env;
 use std::ffi::OsStr;
 
 use serde::Serialize;
@@ -7,6 +8,7 @@ use takt::config::ConfigError;
 
 use super::exit::Exit;
 use super::print;
+use super::say;
 
 /// Why nothing was done.
 pub enum Refusal {
@@ -21,6 +23,8 @@ pub enum Refusal {
 struct Printed {
     error: String,
     problems: Vec<Problem>,
+    /// How many problems there are besides these.
+    omitted: usize,
 }
 
 #[derive(Serialize)]
@@ -40,7 +44,7 @@ impl Refusal {
                 Exit::Usage
             }
             Self::File(error) => {
-                say!("{:?}", miette::Report::new(error));
+                say::report(&miette::Report::new(error));
                 Exit::Usage
             }
         }
@@ -48,9 +52,10 @@ impl Refusal {
 
     fn printed(self) -> Printed {
         match self {
-            Self::Words(error) => Printed { error, problems: vec![] },
+            Self::Words(error) => Printed { error, problems: vec![], omitted: 0 },
             Self::File(error) => Printed {
                 error: error.to_string(),
+                omitted: error.omitted(),
                 problems: error
                     .problems()
                     .iter()
@@ -85,12 +90,17 @@ impl From<&str> for Refusal {
 
 /// Prints what is wrong with the command line, or the help that it has asked for.
 pub fn of_command_line(error: &clap::Error) -> Exit {
-    let is_json = std::env::args_os().any(|argument| argument == OsStr::new("--json"));
+    let is_json = env::args_os().any(|argument| argument == OsStr::new("--json"));
     if error.use_stderr() && is_json {
         let words = error.render().to_string();
         return Refusal::from(words.trim_start_matches("error: ").trim_end()).print(true);
     }
-    // Nobody may be there any more to read it.
-    let _ = error.print();
+    // `clap` repeats the arguments as they are, between colours of its own.
+    if env::args_os().any(|argument| argument.to_string_lossy().chars().any(char::is_control)) {
+        say!("{}", error.render());
+    } else {
+        // Nobody may be there any more to read it.
+        let _ = error.print();
+    }
     if error.use_stderr() { Exit::Usage } else { Exit::Done }
 }

@@ -15,6 +15,7 @@ use takt::sim::LiveDrives;
 use super::configuration::{self, BusOverride};
 use super::exit::Exit;
 use super::interruption;
+use super::refusal::Refusal;
 
 /// Put the drives of a configuration, simulated, on real interfaces, for any master to talk to.
 #[derive(Args, Debug)]
@@ -32,6 +33,9 @@ pub fn run(arguments: &Arguments) -> Exit {
         Ok(config) => config,
         Err(refusal) => return refusal.print(false),
     };
+    if let Err(error) = config.validate() {
+        return Refusal::from(error).print(false);
+    }
     let drives = match open(&config) {
         Ok(drives) => drives,
         Err(error) => {

@@ -1,6 +1,7 @@
 //! A running controller: the engine of a configuration, the real-time thread that paces it, and the life cycle
 //! around it.
 
+mod arrival;
 pub mod assemble;
 pub mod channels;
 mod handle;

@@ -35,6 +35,15 @@ pub enum Outcome {
         /// Why, if that is still known.
         refusal: Option<RequestError>,
     },
+    /// The program is done, but a joint is farther off its target than its `target_tolerance`.
+    OffTarget {
+        /// The axis.
+        axis: usize,
+        /// How far beyond its target it is: rad (m).
+        distance: f64,
+        /// How far it may be: rad (m).
+        tolerance: f64,
+    },
     /// A function that the caller gave to the run panicked, and the axes were stopped in control.
     CallbackPanicked {
         /// What the panic said.
@@ -70,6 +79,15 @@ impl Outcome {
                 let why = refusal.map(|refusal| words::rejection(&refusal, machine));
                 let why = why.unwrap_or_else(|| "why is no longer known".to_owned());
                 format!("move {number} of the program could not be begun: {why}")
+            }
+            Self::OffTarget { axis, distance, tolerance } => {
+                format!(
+                    "{}: the program is done, but the joint is {:.6} rad (m) off its target, and target_tolerance is {:.6}; \
+                     in CSV and CST, look at the gains of the loop, and at the friction that is fed forward",
+                    name(*axis),
+                    distance.abs(),
+                    tolerance
+                )
             }
             Self::CallbackPanicked { message } => {
                 format!("a defect of takt (please report it) ended the run in a controlled stop: {message}")

@@ -113,6 +113,7 @@ pub(super) fn lead(
     remote: Option<Remote>,
 ) -> Result<Session, SessionError> {
     let mut clock = MonotonicClock::default();
+    config.validate_on_this_machine().map_err(AssembleError::from)?;
     let engine = Box::new(assemble::engine(config)?);
     let (ports, traces) = open_ports(config, options.fault_injector.as_deref())?;
     let (rt, mut host, log) = channels(&ChannelSizes::of(config));
@@ -203,8 +204,8 @@ pub(super) fn lead(
         (Outcome::Interrupted | Outcome::Finished, Some(message)) => Outcome::CallbackPanicked { message },
         (outcome, _) => outcome,
     };
-    let target =
-        supervisor.target().filter(|_| outcome == Outcome::Finished && options.duration_ns.is_none());
+    let is_done = matches!(outcome, Outcome::Finished | Outcome::OffTarget { .. });
+    let target = supervisor.target().filter(|_| is_done && options.duration_ns.is_none());
     Ok(Session {
         snapshot: host.snapshot(),
         target: target.map(<[f64]>::to_vec),

@@ -14,6 +14,7 @@ use takt_rt::{
     AxisSnapshot, Frame, Phase, Request, RequestEnvelope, Rule, Snapshot, StopCategory, StopReason,
 };
 
+use super::arrival::{ARRIVAL_NS, Arrival};
 use super::channels::{HostSide, RequestNumbers};
 use super::outcome::{Interrupt, Outcome, Progress};
 use super::program::{ProgramRunner, Step};
@@ -51,6 +52,7 @@ pub struct Supervisor {
     bring_up: BringUp,
     shutdown: Shutdown,
     program: ProgramRunner,
+    arrival: Arrival,
     facts: Vec<AxisFacts>,
     outgoing: VecDeque<RequestEnvelope>,
     numbers: RequestNumbers,
@@ -74,6 +76,7 @@ impl Supervisor {
             bring_up: BringUp::new(config),
             shutdown: Shutdown::new(config),
             program: ProgramRunner::new(&config.program, duration_ns.is_some()),
+            arrival: Arrival::of(config),
             facts: Vec::new(),
             outgoing: VecDeque::new(),
             numbers: RequestNumbers::default(),
@@ -147,11 +150,15 @@ impl Supervisor {
             Stage::Run => self.run(now_ns, snapshot),
             Stage::Settle { until_ns } => {
                 let is_moving = matches!(snapshot.phase, Phase::Moving | Phase::Streaming | Phase::Stopping);
+                let missed = self.missed_target(snapshot);
+                let is_waited_for = (is_moving && elapsed_ns <= PATIENCE_NS)
+                    || (missed.is_some() && elapsed_ns <= ARRIVAL_NS);
                 if let Some(stop) = own_stop(snapshot) {
                     self.end(now_ns, Outcome::Stopped(stop));
-                } else if is_moving && elapsed_ns <= PATIENCE_NS {
+                } else if is_waited_for {
                     self.stage = Stage::Settle { until_ns: now_ns + SETTLE_NS };
-                } else if is_moving || now_ns >= until_ns {
+                } else if is_moving || missed.is_some() || now_ns >= until_ns {
+                    self.outcome = missed.or(self.outcome.take());
                     // Whoever still moves the group by then does not want it to end: it is stopped first.
                     self.begin_disable(now_ns);
                 }
@@ -301,6 +308,14 @@ impl Supervisor {
             }
             (Some(Interrupt::Controlled), _) => self.end(now_ns, Outcome::Interrupted),
         }
+    }
+
+    /// The joint that the finished program has left off its target, if there is one. A program that was cut off by its
+    /// duration has no target that counts.
+    fn missed_target(&self, snapshot: &Snapshot) -> Option<Outcome> {
+        let has_finished = self.outcome == Some(Outcome::Finished) && self.duration_ns.is_none();
+        let target = self.program.target().filter(|_| has_finished)?;
+        self.arrival.missed(target, snapshot)
     }
 
     /// Begins the way out from wherever the run is.

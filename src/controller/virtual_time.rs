@@ -69,6 +69,8 @@ impl VirtualRun<SimulatedBus> {
     /// # Errors
     /// See [`assemble::engine`].
     pub fn simulated(config: &Config) -> Result<(Self, LogSide), AssembleError> {
+        // The simulated drives take the values as they are.
+        config.validate()?;
         let ports = (0..config.buses.len()).map(|bus| SimulatedBus::new(config, bus)).collect();
         Self::new(config, ports)
     }
@@ -83,6 +85,7 @@ impl VirtualRun<Port> {
         config: &Config,
         fault_injector: Arc<FaultInjector>,
     ) -> Result<(Self, LogSide), AssembleError> {
+        config.validate()?;
         let simulated = |bus| Port::Simulated(Box::new(SimulatedBus::new(config, bus)));
         let ports = (0..config.buses.len()).map(|bus| fault_injector.wrap(bus, simulated(bus))).collect();
         let (run, log) = Self::new(config, ports)?;

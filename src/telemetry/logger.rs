@@ -19,6 +19,7 @@ use super::wall_clock::WallClock;
 use super::words;
 use crate::bus::trace::Trace;
 use crate::controller::channels::LogSide;
+use crate::printable::printable_path;
 
 /// What a logger is to do.
 pub struct LoggerOptions {
@@ -296,13 +297,13 @@ impl Logger {
     fn still_there(&mut self, path: Option<PathBuf>) -> Option<PathBuf> {
         let path = path?;
         if !path.exists() {
-            self.give_up(format!("{} was removed during the run", path.display()));
+            self.give_up(format!("{} was removed during the run", printable_path(&path)));
             return None;
         }
         if let Err(error) = File::open(&path).and_then(|file| file.sync_data()) {
             self.give_up(format!(
                 "{} may not be whole: cannot bring it to the disk: {error}",
-                path.display()
+                printable_path(&path)
             ));
         }
         Some(path)

@@ -1,5 +1,6 @@
 //! The report of a run for people, and the parts of it that other reports show too: at most 100 columns, histograms of block characters, colours only on request.
 
+use crate::printable::printable_path;
 use std::fmt::Write;
 
 use super::report::{
@@ -148,14 +149,14 @@ impl RunReport {
         if let Some(path) = &telemetry.recording {
             let size =
                 telemetry.recording_bytes.map_or_else(String::new, |size| format!(" ({})", bytes(size)));
-            lines.push(format!("{}{size}", path.display()));
+            lines.push(format!("{}{size}", printable_path(path)));
         }
-        lines.extend(telemetry.candump.iter().map(|path| path.display().to_string()));
+        lines.extend(telemetry.candump.iter().map(|path| printable_path(path)));
         lines.extend(telemetry.not_written.iter().cloned());
         wrap(text, &emphasis.heading("telemetry"), 9, &lines);
         if !telemetry.black_boxes.is_empty() {
             let mut lines: Vec<String> =
-                telemetry.black_boxes.iter().map(|path| path.display().to_string()).collect();
+                telemetry.black_boxes.iter().map(|path| printable_path(path)).collect();
             if telemetry.black_boxes_replaced > 0 {
                 lines.push(format!("{} between the last two are not kept", telemetry.black_boxes_replaced));
             }
