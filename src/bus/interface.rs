@@ -2,12 +2,14 @@
 
 use std::fs;
 use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use socketcan::nl::{CanBitTiming, CanCtrlModes, CanState, InterfaceDetails, Mtu};
 use socketcan::{CanCtrlMode, CanInterface, InterfaceCanParams};
 use takt_rt::port::BusState;
 use thiserror::Error;
+
+use crate::config::Bus;
 
 /// The hardware type of CAN interfaces (`ARPHRD_CAN`), as `/sys/class/net/NAME/type` gives it.
 const CAN_HARDWARE_TYPE: &str = "280";
@@ -21,6 +23,13 @@ pub struct InterfaceSettings {
     pub data_bit_rate: Option<u32>,
     /// After how many milliseconds a controller that has gone off the bus comes back by itself; 0 never.
     pub restart_ms: u32,
+}
+
+impl InterfaceSettings {
+    /// Those of a bus of a configuration.
+    pub const fn of(bus: &Bus) -> Self {
+        Self { bit_rate: bus.bit_rate, data_bit_rate: bus.data_bit_rate, restart_ms: bus.restart_ms }
+    }
 }
 
 /// What an interface is and how it is.
@@ -124,6 +133,14 @@ pub enum InterfaceError {
     },
 }
 
+/// The index that the kernel has given to an interface. No other interface has it, not even later ones.
+pub(super) fn interface_index(name: &str) -> Result<u32, InterfaceError> {
+    let folder = can_folder(name)?;
+    let read = fs::read_to_string(folder.join("ifindex"));
+    let index = read.and_then(|text| text.trim().parse().map_err(io::Error::other));
+    index.map_err(|error| system(name, "reading its index", &error.into()))
+}
+
 /// Reads what an interface is and how it is. Needs no right.
 pub fn interface_status(name: &str) -> Result<InterfaceStatus, InterfaceError> {
     let details = open(name)?.details().map_err(|error| system(name, "reading its state", &error))?;
@@ -161,6 +178,12 @@ pub fn prepare_interface(
 }
 
 fn open(name: &str) -> Result<CanInterface, InterfaceError> {
+    can_folder(name)?;
+    CanInterface::open(name).map_err(|error| system(name, "opening it", &error))
+}
+
+/// Where the kernel tells of a CAN interface.
+fn can_folder(name: &str) -> Result<PathBuf, InterfaceError> {
     let folder = Path::new("/sys/class/net").join(name);
     // A name with a slash is none of an interface's, and is not one of a file's either.
     if name.is_empty() || name.contains('/') || !folder.exists() {
@@ -170,7 +193,7 @@ fn open(name: &str) -> Result<CanInterface, InterfaceError> {
     if kind.trim() != CAN_HARDWARE_TYPE {
         return Err(InterfaceError::NotCan { name: name.into() });
     }
-    CanInterface::open(name).map_err(|error| system(name, "opening it", &error))
+    Ok(folder)
 }
 
 fn status_of(name: &str, details: &InterfaceDetails) -> InterfaceStatus {

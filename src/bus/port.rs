@@ -94,12 +94,7 @@ pub fn open_configured(
 ) -> Result<Option<SocketCanPort>, OpenError> {
     let Some(bus) = config.buses.get(bus) else { return Ok(None) };
     let Interface::SocketCan(interface) = &bus.interface else { return Ok(None) };
-    let settings = InterfaceSettings {
-        bit_rate: bus.bit_rate,
-        data_bit_rate: bus.data_bit_rate,
-        restart_ms: bus.restart_ms,
-    };
-    prepare_interface(interface, &settings)
+    prepare_interface(interface, &InterfaceSettings::of(bus))
         .map_err(|error| OpenError::Interface { bus: bus.name.clone(), error })?;
     let port = open_socketcan(interface, options)
         .map_err(|error| OpenError::Socket { bus: bus.name.clone(), error })?;

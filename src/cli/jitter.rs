@@ -76,12 +76,12 @@ pub fn run(arguments: &Arguments) -> Exit {
             Ok(measurement) => measurements.push(measurement),
             Err(error) => return Refusal::from(error.to_string()).print(arguments.json),
         }
-        if interrupted.load(Ordering::Relaxed) {
+        if is_broken_off(&measurements) {
             break;
         }
     }
     let is_drawn = arguments.svg.as_ref().is_none_or(|path| draw(path, &options, &measurements));
-    let exit = match (interrupted.load(Ordering::Relaxed), is_drawn) {
+    let exit = match (is_broken_off(&measurements), is_drawn) {
         (true, _) => Exit::Interrupted,
         (false, true) => Exit::Done,
         (false, false) => Exit::Stopped,
@@ -91,6 +91,11 @@ pub fn run(arguments: &Arguments) -> Exit {
         Some(report) => print::text(&report.picture(print::emphasis()), exit),
         None => exit,
     }
+}
+
+/// Whether Ctrl-C, or another process that takes the interface over, has ended the measurement.
+fn is_broken_off(measurements: &[Measurement]) -> bool {
+    measurements.iter().any(|measurement| !measurement.is_whole)
 }
 
 fn measure(

@@ -13,6 +13,7 @@ mod exit;
 mod interruption;
 mod jitter;
 mod lss;
+mod ownership;
 mod plan;
 mod print;
 mod refusal;

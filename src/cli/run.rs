@@ -24,6 +24,7 @@ use takt_rt::stop::StopReason;
 use super::configuration::{self, BusOverride};
 use super::exit::Exit;
 use super::interruption;
+use super::ownership;
 use super::print;
 use super::refusal::Refusal;
 
@@ -44,6 +45,9 @@ pub struct Arguments {
     /// Play the faults of this scenario (TOML), to see what they lead to; configs/faults has examples
     #[arg(long, value_name = "FILE.toml")]
     faults: Option<PathBuf>,
+    /// Have another takt of this host that commands one of the buses stop in control first, and take them over
+    #[arg(long)]
+    take_over: bool,
     /// End with exit code 3 before anything moves if the system refuses a step of the real-time set-up
     #[arg(long)]
     require_realtime: bool,
@@ -57,9 +61,9 @@ pub struct Arguments {
 struct Printed<'a> {
     #[serde(flatten)]
     report: &'a RunReport,
-    /// `finished`, `interrupted`, `stopped` or `failed`.
+    /// `finished`, `interrupted`, `taken_over`, `stopped` or `failed`.
     ended: &'static str,
-    /// Why the run failed, in words, where it was not a stop of the group.
+    /// Why the run ended, in words, where it was neither its end, nor Ctrl-C, nor a stop of the group.
     failure: Option<String>,
     /// The axes whose drives could not be reached in the end.
     unreached: Vec<&'a str>,
@@ -99,6 +103,7 @@ pub fn run(arguments: Arguments) -> Exit {
         recording: arguments.record.map(Destination::File),
         is_realtime_required: arguments.require_realtime,
         rehearsal: rehearsal.clone(),
+        if_owned: ownership::if_owned(arguments.take_over),
     };
     let notify = notices(&bar, Machine::of(&config));
     let mut drawn = Drawn::new(bar.clone());
@@ -142,8 +147,10 @@ fn rehearsal(path: &Path, config: &Config) -> Result<Arc<Rehearsal>, Refusal> {
 }
 
 fn refuse(error: &SessionError, is_json: bool) -> Exit {
-    let SessionError::Start(StartError::Refused(report)) = error else {
-        return Refusal::from(error.to_string()).print(is_json);
+    let report = match error {
+        SessionError::Start(StartError::Refused(report)) => report,
+        SessionError::Claim(error) => return ownership::refusal(error).print(is_json),
+        error => return Refusal::from(error.to_string()).print(is_json),
     };
     let realtime = RealtimeReport::new(report, 0, 0);
     if is_json {
@@ -176,6 +183,7 @@ fn report(config: &Config, session: &Session, as_json: bool) -> Exit {
     let (ended, exit) = match session.outcome {
         Outcome::Finished => ("finished", Exit::Done),
         Outcome::Interrupted => ("interrupted", Exit::Interrupted),
+        Outcome::TakenOver { .. } => ("taken_over", Exit::Interrupted),
         Outcome::Stopped(_) => ("stopped", Exit::Stopped),
         _ => ("failed", Exit::Stopped),
     };
@@ -195,7 +203,7 @@ fn report(config: &Config, session: &Session, as_json: bool) -> Exit {
 fn stop_of(session: &Session) -> Option<StopReason> {
     match session.outcome {
         Outcome::Stopped(stop) => Some(stop),
-        Outcome::Interrupted => session.snapshot.stop,
+        Outcome::Interrupted | Outcome::TakenOver { .. } => session.snapshot.stop,
         _ => None,
     }
 }

@@ -4,7 +4,7 @@
 //! [`ConfigError`] with every problem of the file, each with its line and a way out. Quantities are bare numbers in SI
 //! units or texts with a unit (`"137 deg/s"`). `configs/reference.toml` is the description of the format.
 
-mod defaults;
+pub(crate) mod defaults;
 mod error;
 mod interface;
 mod model;

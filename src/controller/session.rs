@@ -17,6 +17,7 @@ use super::quiet;
 use super::realtime_thread::{self, Begun, Ended, StartError, Work};
 use super::supervisor::Supervisor;
 use super::time_of_day::TimeOfDayKeeper;
+use crate::bus::ownership::{ClaimError, IfOwned, Ownership};
 use crate::bus::port::{OpenError, Port};
 use crate::bus::trace::Trace;
 use crate::config::Config;
@@ -40,6 +41,8 @@ pub struct SessionOptions {
     pub is_realtime_required: bool,
     /// Faults that are played on the buses.
     pub rehearsal: Option<Arc<Rehearsal>>,
+    /// What happens when another process of this host is the master of a bus already.
+    pub if_owned: IfOwned,
 }
 
 /// What is left of a run.
@@ -69,6 +72,9 @@ pub enum SessionError {
     /// The configuration asks for what cannot be done.
     #[error(transparent)]
     Assemble(#[from] AssembleError),
+    /// A bus may not be commanded by this process.
+    #[error(transparent)]
+    Claim(#[from] ClaimError),
     /// A bus cannot be opened.
     #[error(transparent)]
     Open(#[from] OpenError),
@@ -116,6 +122,7 @@ pub(super) fn lead(
 ) -> Result<Session, SessionError> {
     let mut clock = MonotonicClock::default();
     let engine = Box::new(assemble::engine(config)?);
+    let mut ownership = Ownership::of(config, options.if_owned)?;
     let (ports, traces) = open_ports(config, options.rehearsal.as_deref())?;
     let (rt, mut host, log) = channels(&ChannelSizes::of(config));
     let mut supervisor = match remote {
@@ -163,6 +170,7 @@ pub(super) fn lead(
     let mut time_of_day = TimeOfDayKeeper::of(config);
     let mut time_to_tell = None;
     let (mut panicked, mut is_watched) = (None, true);
+    let mut taken_over_by = None;
     while !running.is_finished() {
         supervisor.poll(clock.now_ns(), &mut host);
         let now_ns = clock.now_ns();
@@ -173,6 +181,10 @@ pub(super) fn lead(
         }
         if let Some(rehearsal) = &options.rehearsal {
             rehearsal.observe(&host.snapshot());
+        }
+        if let Some(process) = ownership.poll_release_request() {
+            taken_over_by = Some(process);
+            supervisor.interrupt(Interrupt::Controlled);
         }
         let mut panics_now = None;
         if is_watched {
@@ -198,13 +210,19 @@ pub(super) fn lead(
         quiet::sleep(PAUSE, config.cycle.period_ns);
     }
     let ended = running.join();
+    // The ports are closed with the thread. What is left to be done here does not concern the buses.
+    drop(ownership);
     if ended.is_none() {
         logger.fault(Fault::ThreadDied);
     }
-    let outcome = match (supervisor.outcome().cloned().unwrap_or(Outcome::ThreadDied), panicked) {
-        (Outcome::Interrupted | Outcome::Finished, Some(message)) => Outcome::CallbackPanicked { message },
-        (outcome, _) => outcome,
-    };
+    let outcome =
+        match (supervisor.outcome().cloned().unwrap_or(Outcome::ThreadDied), panicked, taken_over_by) {
+            (Outcome::Interrupted | Outcome::Finished, Some(message), _) => {
+                Outcome::CallbackPanicked { message }
+            }
+            (Outcome::Interrupted, None, Some(process)) => Outcome::TakenOver { process },
+            (outcome, ..) => outcome,
+        };
     let target =
         supervisor.target().filter(|_| outcome == Outcome::Finished && options.duration_ns.is_none());
     Ok(Session {

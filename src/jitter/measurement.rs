@@ -7,6 +7,7 @@ use takt_rt::door::Request;
 use takt_rt::port::BusHealth;
 
 use crate::bus::interface_status;
+use crate::bus::ownership::{ClaimError, IfOwned, Ownership};
 use crate::bus::port::{OpenError, Port};
 use crate::config::{Config, ConfigError, Interface, Realtime};
 use crate::controller::assemble::{self, AssembleError};
@@ -105,6 +106,9 @@ pub enum JitterError {
     /// The cycle cannot be set up.
     #[error(transparent)]
     Assemble(#[from] AssembleError),
+    /// The interface may not be commanded by this process.
+    #[error(transparent)]
+    Claim(#[from] ClaimError),
     /// The interface cannot be opened.
     #[error(transparent)]
     Open(#[from] OpenError),
@@ -127,6 +131,7 @@ pub fn measure(
     mut watch: impl FnMut(u64) -> bool,
 ) -> Result<Measurement, JitterError> {
     let config = config(options)?;
+    let mut ownership = Ownership::of(&config, IfOwned::Refuse)?;
     let ports = match options.interface {
         Some(_) => vec![Port::open(&config, 0)?],
         None => vec![],
@@ -152,7 +157,7 @@ pub fn measure(
     while !running.is_finished() {
         collect(&mut log, &mut statistics, options.cycles);
         let done = statistics.cycles + log.records_dropped();
-        if done >= options.cycles || !watch(done) {
+        if done >= options.cycles || !watch(done) || ownership.poll_release_request().is_some() {
             let _ = host.request(Request::Leave);
         }
         quiet::sleep(PAUSE, options.period_ns);

@@ -12,6 +12,7 @@ use clap::{Args, Subcommand};
 use takt::commission::{Failure, Request, Subject};
 
 use super::exit::Exit;
+use super::ownership::if_owned;
 
 /// Commission one drive: look at it, move it, set it up
 ///
@@ -26,6 +27,9 @@ pub struct Arguments {
     target: target::Target,
     #[command(flatten)]
     options: Options,
+    /// Have another takt of this host that commands the bus stop in control first, and take the bus over
+    #[arg(long, global = true)]
+    take_over: bool,
     #[command(subcommand)]
     action: Action,
 }
@@ -84,7 +88,10 @@ pub fn run(arguments: &Arguments) -> Exit {
     };
     let mut output = output::Output::new(&subject, arguments.action.name(), arguments.options);
     match arguments.action.request(&subject, arguments.options.raw) {
-        Ok(request) => session::run(subject, request, bus, arguments.options, output),
+        Ok(request) => {
+            let if_owned = if_owned(arguments.take_over);
+            session::run(subject, request, bus, if_owned, arguments.options, output)
+        }
         Err(failure) => output.refuse(&failure),
     }
 }

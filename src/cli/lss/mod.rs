@@ -7,7 +7,8 @@ use std::sync::atomic::Ordering;
 
 use clap::{Args, Subcommand};
 
-use takt::bus::{InterfaceSettings, SocketCanOptions, open_socketcan, prepare_interface};
+use takt::bus::ownership::{BusClaim, IfOwned, MasterTraffic, Ownership};
+use takt::bus::{InterfaceSettings, SocketCanOptions, open_socketcan};
 use takt::canopen::lss::{BitTiming, Inquiry, LssAddress, LssOutcome, LssTask};
 use takt::commission::layer_settings::{Choice, LayerSettingFailure, LayerSettings};
 use takt::config::{Interface, Quantity};
@@ -183,9 +184,21 @@ pub fn run(arguments: &Arguments) -> Exit {
         Interface::SocketCan(name) => {
             let bit_rate = arguments.bit_rate;
             let settings = InterfaceSettings { bit_rate, data_bit_rate: None, restart_ms: RESTART_MS };
-            if let Err(error) = prepare_interface(name, &settings) {
-                return refuse(format!("bus {name}: {error}"));
-            }
+            let claim = BusClaim {
+                bus: name.clone(),
+                interface: name.clone(),
+                settings,
+                traffic: MasterTraffic::without_configuration(None),
+            };
+            let mut ownership = match Ownership::claim(vec![claim], IfOwned::Refuse) {
+                Ok(ownership) => ownership,
+                Err(error) => return refuse(error.to_string()),
+            };
+            let mut is_taken_over = false;
+            let is_interrupted = || {
+                is_taken_over |= ownership.poll_release_request().is_some();
+                is_taken_over || is_interrupted()
+            };
             match open_socketcan(name, &SocketCanOptions { bit_rate, ..SocketCanOptions::default() }) {
                 Ok(mut port) => lead(arguments, &mut port, &mut MonotonicClock::default(), is_interrupted),
                 Err(error) => refuse(format!("bus {name}: {error}")),
