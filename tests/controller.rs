@@ -7,13 +7,10 @@ use std::path::Path;
 use takt::config::{Config, Control};
 use takt::controller::{Interrupt, Outcome, VirtualRun};
 use takt::sim::{DriveFault, Observation, SimulatedBus};
-use takt_rt::cia402::State;
-use takt_rt::door::{Move, Request};
-use takt_rt::frame::{Frame, Id};
-use takt_rt::port::{BusHealth, BusPort, Clock, ReceiveBatch};
-use takt_rt::record::MAX_AXES;
-use takt_rt::refusal::{Answer, Objection, RequestKind};
-use takt_rt::stop::{Phase, Rule, StopCategory};
+use takt_rt::{
+    Answer, BusHealth, BusPort, Clock, DriveState, Frame, Id, MAX_AXES, Move, Phase, ReceiveBatch,
+    RejectReason, Request, RequestKind, Rule, StopCategory,
+};
 
 /// A minute is more than any of these programs takes.
 const CYCLES_AT_MOST: u64 = 60_000;
@@ -87,7 +84,7 @@ fn after_a_run_every_drive_is_disabled_and_at_rest() {
     let mut run = start(&config);
     run.run(CYCLES_AT_MOST, |_| {});
     for (axis, shown) in config.axes.iter().zip(run.snapshot().axes) {
-        assert!(!State::decode(shown.statusword).has_torque(), "{}", axis.name);
+        assert!(!DriveState::decode(shown.statusword).has_torque(), "{}", axis.name);
     }
 }
 
@@ -406,7 +403,9 @@ fn a_client_that_goes_on_moving_the_group_does_not_keep_the_run_from_ending() {
     });
     assert_eq!(outcome, Some(Outcome::Interrupted));
     assert!(
-        drives_of(run.ports()).iter().all(|drive| drive.state != State::OperationEnabled && drive.is_braked)
+        drives_of(run.ports())
+            .iter()
+            .all(|drive| drive.state != DriveState::OperationEnabled && drive.is_braked)
     );
 }
 
@@ -449,7 +448,7 @@ fn whoever_asks_finds_out_by_its_number_what_was_refused_and_why() {
     let answers = run.snapshot().answers;
     let Answer::Refused(Some(refusal)) = answers.of(refused) else { panic!("{answers:?}") };
     let kind = (refusal.request, refusal.objection, refusal.phase);
-    assert_eq!(kind, (RequestKind::Enable, Objection::Phase, Phase::Moving));
+    assert_eq!(kind, (RequestKind::Enable, RejectReason::Phase, Phase::Moving));
     assert_eq!(answers.of(taken), Answer::Granted);
 }
 

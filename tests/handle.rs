@@ -7,8 +7,7 @@ use takt::config::Config;
 use takt::controller::session::SessionOptions;
 use takt::controller::{CommandError, Controller, MotionError, MoveOptions, Outcome, StartFailure};
 use takt_rt::plan::State;
-use takt_rt::refusal::RequestKind;
-use takt_rt::stop::{Phase, Rule, StopCategory};
+use takt_rt::{Phase, RequestKind, Rule, StopCategory};
 
 const PATIENCE: Duration = Duration::from_secs(30);
 

@@ -12,7 +12,7 @@ use takt::controller::{Outcome, VirtualRun};
 use takt::faults::{Rehearsal, Scenario};
 use takt::sim::SimulatedBus;
 use takt::telemetry::{BlackBoxOptions, Destination, Logger, LoggerOptions, Machine, Recorded, WallClock};
-use takt_rt::stop::Rule;
+use takt_rt::Rule;
 use tempfile::TempDir;
 
 /// 2023-11-14 22:13:20 UTC

@@ -11,11 +11,11 @@
 
 use arrayvec::ArrayVec;
 
-use crate::door::Door;
 use crate::engine::{BusSet, Engine, SendBatch, Transmission};
 use crate::frame::Frame;
+use crate::host::HostInterface;
 use crate::port::{BusHealth, BusPort, Clock, Outgoing, ReceiveBatch};
-use crate::record::{MAX_BUSES, Timing};
+use crate::record::{CycleTiming, MAX_BUSES};
 use crate::time::{Grid, Nanoseconds};
 
 /// When things happen inside a slot, in nanoseconds after its start.
@@ -50,7 +50,7 @@ pub enum Flow {
     /// There is a next cycle.
     Continue,
     /// The loop was asked to end.
-    Leave,
+    Shutdown,
 }
 
 /// The loop's place on the grid.
@@ -68,19 +68,19 @@ impl Cycle {
     }
 
     /// One whole cycle.
-    pub fn run<C: Clock, P: BusPort, D: Door>(
+    pub fn run<C: Clock, P: BusPort, D: HostInterface>(
         &mut self,
         engine: &mut Engine,
         clock: &mut C,
         ports: &mut [P],
-        door: &mut D,
+        host: &mut D,
     ) -> Flow {
         let mut timing = self.reach_slot(clock);
         timing.sync_ns = clock.now_ns().saturating_sub(timing.slot_start_ns);
         release_sync(engine, ports, timing.slot, clock.now_ns());
 
         let wake = clock.wait_until(timing.slot_start_ns + self.plan.command_phase_ns);
-        let held_back = take_feedback(engine, ports, wake.now_ns, door);
+        let held_back = take_feedback(engine, ports, wake.now_ns, host);
         engine.hold_back(held_back);
         let health = health_of(ports);
         let began_ns = clock.now_ns();
@@ -91,7 +91,7 @@ impl Cycle {
         } else {
             Transmission::Free
         };
-        let has_commands = engine.compute(timing.slot, began_ns, &health, transmission, door);
+        let has_commands = engine.compute(timing.slot, began_ns, &health, transmission, host);
         timing.compute_ns = clock.now_ns().saturating_sub(began_ns);
 
         // Not made as a constant, whose 80 kB would be written in every cycle.
@@ -100,18 +100,18 @@ impl Cycle {
             if has_commands {
                 engine.set_points(bus, timing.slot, batch);
             }
-            engine.services(bus, door, batch);
+            engine.services(bus, host, batch);
         }
         let not_taken = send(ports, &batches, clock.now_ns());
         engine.not_taken(not_taken);
         let finished_ns = clock.now_ns();
         timing.sent_ns = finished_ns.saturating_sub(timing.slot_start_ns);
-        engine.finish(timing, finished_ns, &health, door);
-        if engine.is_leaving() { Flow::Leave } else { Flow::Continue }
+        engine.finish(timing, finished_ns, &health, host);
+        if engine.is_leaving() { Flow::Shutdown } else { Flow::Continue }
     }
 
     /// Waits for the next slot that can be used. The wake-ups that came too late for theirs are among the latency.
-    fn reach_slot(&mut self, clock: &mut impl Clock) -> Timing {
+    fn reach_slot(&mut self, clock: &mut impl Clock) -> CycleTiming {
         let mut wake_ns = 0;
         loop {
             let now_ns = clock.now_ns();
@@ -124,7 +124,7 @@ impl Cycle {
             wake_ns = wake.timer_latency_ns.max(wake_ns);
             if wake.now_ns <= slot_start_ns + self.plan.latest_sync_ns {
                 self.next_slot = slot + 1;
-                return Timing { slot, slot_start_ns, wake_ns, ..Timing::default() };
+                return CycleTiming { slot, slot_start_ns, wake_ns, ..CycleTiming::default() };
             }
             self.next_slot = slot + 1;
         }
@@ -162,7 +162,7 @@ fn take_feedback<P: BusPort>(
     engine: &mut Engine,
     ports: &mut [P],
     now_ns: Nanoseconds,
-    door: &mut impl Door,
+    host: &mut impl HostInterface,
 ) -> BusSet {
     let mut held_back = BusSet::default();
     let mut batch = ReceiveBatch::new();
@@ -172,7 +172,7 @@ fn take_feedback<P: BusPort>(
             batch.clear();
             port.receive(now_ns, &mut batch);
             for received in &batch {
-                engine.receive(bus, received, door);
+                engine.receive(bus, received, host);
             }
             if !batch.is_full() {
                 break;

@@ -21,28 +21,57 @@
 #![no_std]
 #![deny(unsafe_code)]
 
-pub mod axis;
-pub mod cia402;
-pub mod control;
-pub mod cycle;
-pub mod dialect;
-pub mod dispatch;
-pub mod door;
-pub mod engine;
-pub mod frame;
-pub mod guard;
+mod axis;
+mod cia402;
+mod control;
+mod cycle;
+mod dialect;
+mod dispatch;
+mod engine;
+mod frame;
+mod guard;
+mod host;
 #[cfg(feature = "linux")]
 pub mod linux;
 mod motion;
-pub mod pdo;
+mod pdo;
 pub mod plan;
-pub mod port;
-pub mod profile;
-pub mod record;
-pub mod refusal;
-pub mod stop;
-pub mod time;
-pub mod time_of_day;
-pub mod units;
-pub mod watch;
-pub mod wire;
+mod port;
+mod profile;
+mod record;
+mod refusal;
+mod stop;
+mod time;
+mod time_of_day;
+mod units;
+mod watch;
+mod wire;
+
+pub use axis::{Axis, AxisParameters, CommandPdo, FeedbackSince, Jump, MAX_PDOS, Pdo, TransmissionType};
+pub use cia402::{Command, DriveState, Goal, OperationMode, controlword, statusword};
+pub use control::{ControlLaw, LoopInput};
+pub use cycle::{Cycle, Flow, SlotPlan};
+pub use dialect::Dialect;
+pub use engine::{
+    BusParameters, BusSet, Engine, EngineParameters, Heartbeat, SEND_BATCH, SendBatch, SetUpError,
+    Transmission,
+};
+pub use frame::{Frame, FrameError, FrameKind, Id};
+pub use guard::{AxisLimits, OnViolation, Violation, braking_distance};
+pub use host::{
+    AxisProcessData, AxisSnapshot, HostInterface, MappedPdo, Move, ProfileMove, Request, RequestEnvelope,
+    RequestId, Snapshot, StreamCommand,
+};
+pub use pdo::{
+    CommandSlot, FeedbackSlot, MAX_OBJECTS, MappedObject, Mapping, MappingError, ProcessImage, TooShort,
+};
+pub use port::{BusHealth, BusPort, BusState, Clock, Outgoing, RECEIVE_BATCH, ReceiveBatch, Received, Wake};
+pub use profile::ProfileTarget;
+pub use record::{AxisRecord, CycleRecord, CycleTiming, Event, EventKind, MAX_AXES, MAX_BUSES};
+pub use refusal::{Answer, Answers, Refusal, RejectReason, RequestKind};
+pub use stop::{Origin, Phase, Rule, StopCategories, StopCategory, StopReason};
+pub use time::{Grid, NANOSECONDS_PER_SECOND, Nanoseconds};
+pub use time_of_day::{TIME_ID, TimeOfDay};
+pub use units::{Scale, ScaleError, ScaleParameters};
+pub use watch::{TimingLadder, TimingLevel, nmt_command, node_state};
+pub use wire::{INTERMISSION_BITS, WireLength, bits_ns};

@@ -3,7 +3,7 @@
 use arrayvec::ArrayVec;
 
 use crate::guard::AxisLimits;
-use crate::plan::{self, Limits, PlanError, Problem, Profile, Return, State, Synchronisation, Timing};
+use crate::plan::{self, Limits, PlanError, PlanOptions, Problem, Profile, Return, State, Synchronisation};
 use crate::record::MAX_AXES;
 
 /// The trajectory that the group is on.
@@ -70,7 +70,8 @@ impl Motion {
             if is_from_rest_to_rest { Synchronisation::Straight } else { Synchronisation::Phase };
         // Where a limit has just been lowered, slow down to it and no further.
         let return_to_limits = Return::Settled;
-        let timing = Timing { synchronisation, minimum_duration_s, return_to_limits, ..Timing::default() };
+        let timing =
+            PlanOptions { synchronisation, minimum_duration_s, return_to_limits, ..PlanOptions::default() };
         let duration_s = plan::synchronised(&problems, self.free(problems.len()), timing)?;
         self.begin(duration_s);
         Ok(())

@@ -13,7 +13,7 @@ pub const MAX_BUSES: usize = 16;
 
 /// The times of one cycle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Timing {
+pub struct CycleTiming {
     /// The number of the slot on the grid.
     pub slot: u64,
     /// Its start on the grid.
@@ -53,7 +53,7 @@ pub struct AxisRecord {
     /// Distance between the set-point that was in force at this cycle's SYNC and the position reported for it.
     pub following_error: f32,
     /// What the statusword says of the drive.
-    pub drive_state: cia402::State,
+    pub drive_state: cia402::DriveState,
     /// Object 6040 as sent.
     pub controlword: u16,
     /// Object 6041 as received.
@@ -72,7 +72,7 @@ pub struct AxisRecord {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CycleRecord {
     /// When.
-    pub timing: Timing,
+    pub timing: CycleTiming,
     /// What the group was doing.
     pub phase: Phase,
     /// Whether set-points were sent in this cycle; if not, the drives hold the last ones.
@@ -86,7 +86,7 @@ pub struct CycleRecord {
 impl Default for CycleRecord {
     fn default() -> Self {
         Self {
-            timing: Timing::default(),
+            timing: CycleTiming::default(),
             phase: Phase::default(),
             is_commanded: false,
             axis_count: 0,
@@ -135,7 +135,7 @@ pub enum EventKind {
         /// The axis.
         axis: u8,
         /// The new one.
-        state: cia402::State,
+        state: cia402::DriveState,
         /// The statusword that showed it.
         statusword: u16,
     },

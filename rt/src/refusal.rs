@@ -1,9 +1,9 @@
 //! Why a request was refused, and what became of the last ones.
 
-use crate::door::RequestId;
+use crate::host::RequestId;
 use crate::stop::Phase;
 
-/// What was asked for, without its parameters: [`Request::kind`](crate::door::Request::kind).
+/// What was asked for, without its parameters: [`Request::kind`](crate::host::Request::kind).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[repr(u8)]
 pub enum RequestKind {
@@ -34,9 +34,9 @@ pub enum RequestKind {
     /// To clear faults.
     ResetFaults = 12,
     /// To enable nothing any more.
-    Retire = 13,
+    InhibitEnable = 13,
     /// To end.
-    Leave = 14,
+    Shutdown = 14,
 }
 
 impl RequestKind {
@@ -55,8 +55,8 @@ impl RequestKind {
         Self::Stop,
         Self::Disable,
         Self::ResetFaults,
-        Self::Retire,
-        Self::Leave,
+        Self::InhibitEnable,
+        Self::Shutdown,
     ];
 }
 
@@ -64,13 +64,13 @@ impl RequestKind {
 /// rad (m), rad/s (m/s), N·m (N), or as it says here; 0 where there is none.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[repr(u8)]
-pub enum Objection {
+pub enum RejectReason {
     /// It is not possible in the phase that the group is in.
     Phase = 0,
     /// A fault has stopped the group and has not been reset. The value is the number of the [`Rule`](crate::stop::Rule).
     StopLatched = 1,
     /// The run is on its way out: nothing is enabled any more.
-    Retired = 2,
+    EnableInhibited = 2,
     /// Slots are missed too often for a stream. The value is how many have been of late.
     MissedSlots = 3,
     /// There is no such axis. The value is the number that was asked for, the limit how many there are.
@@ -107,12 +107,12 @@ pub enum Objection {
     NoTime = 19,
 }
 
-impl Objection {
+impl RejectReason {
     /// Every one, in the order of their numbers.
     pub const ALL: [Self; 20] = [
         Self::Phase,
         Self::StopLatched,
-        Self::Retired,
+        Self::EnableInhibited,
         Self::MissedSlots,
         Self::UnknownAxis,
         Self::WrongMode,
@@ -139,10 +139,10 @@ pub struct Refusal {
     /// What was asked for.
     pub request: RequestKind,
     /// What stands against it.
-    pub objection: Objection,
+    pub objection: RejectReason,
     /// The axis at fault; `None` when it is not one axis.
     pub axis: Option<u8>,
-    /// What was asked for, see [`Objection`].
+    /// What was asked for, see [`RejectReason`].
     pub value: f64,
     /// What is allowed.
     pub limit: f64,
@@ -232,7 +232,7 @@ mod tests {
     fn refusal(value: u64) -> Refusal {
         Refusal {
             request: RequestKind::Move,
-            objection: Objection::PositionLimit,
+            objection: RejectReason::PositionLimit,
             axis: Some(2),
             value: value as f64,
             limit: 3.0,

@@ -4,13 +4,10 @@ mod fixture;
 
 use fixture::{FRICTION, INERTIA, LIMITS, PERIOD_NS, Rig, axis_in, move_to, parameters, scale};
 use proptest::prelude::*;
-use takt_rt::cia402::State as DriveState;
-use takt_rt::control::ControlLaw;
-use takt_rt::door::{Move, ProfileMove, Request};
-use takt_rt::engine::EngineParameters;
-use takt_rt::profile::ProfileTarget;
-use takt_rt::record::EventKind;
-use takt_rt::stop::{Phase, Rule, StopCategory};
+use takt_rt::{
+    ControlLaw, DriveState, EngineParameters, EventKind, Move, Phase, ProfileMove, ProfileTarget, Request,
+    Rule, StopCategory,
+};
 
 const LAWS: [ControlLaw; 7] = [
     ControlLaw::Position,
@@ -43,7 +40,7 @@ fn all_modes() -> EngineParameters {
 
 fn enabled() -> Rig {
     let mut rig = Rig::of(all_modes());
-    rig.door.requests.extend([Request::Sync(true), Request::Activate]);
+    rig.host.requests.extend([Request::Sync(true), Request::Activate]);
     rig.run(10);
     rig.request(Request::Enable);
     rig.run_until(Phase::Holding, 100);
@@ -78,7 +75,7 @@ fn while_one_axis_is_given_a_target_the_others_stay_where_they_are() {
         rig.run(10);
         rig.request(Request::Enable);
         rig.run_until(Phase::Holding, 400);
-        rig.door.events.clear();
+        rig.host.events.clear();
     }
 }
 
@@ -110,7 +107,7 @@ fn a_move_takes_cyclic_axes_and_profile_position_along_and_is_finished_when_all_
         assert_eq!(rig.drive(axis).position, scale().position_to_counts(1.0), "axis {axis}");
     }
     assert_eq!(rig.drive(usize::from(VELOCITY)).position, held);
-    assert_eq!(rig.door.snapshot.finished_move, 7);
+    assert_eq!(rig.host.snapshot.finished_move, 7);
     rig.assert_limits_kept();
     assert_eq!(rig.stops(), []);
 }
@@ -199,7 +196,7 @@ fn assert_targets_within_limits(rig: &Rig) {
         (VELOCITY, scale.velocity_to_drive(LIMITS.velocity)),
         (TORQUE, scale.torque_to_per_mille(LIMITS.torque)),
     ];
-    for record in &rig.door.records {
+    for record in &rig.host.records {
         for (axis, highest) in highest {
             let raw = record.axes[usize::from(axis)].command_raw;
             assert!(raw.abs() <= highest, "{raw} for axis {axis} in slot {}", record.timing.slot);
@@ -213,7 +210,7 @@ fn assert_targets_within_limits(rig: &Rig) {
 fn assert_one_reason_for_each_stop(rig: &Rig) {
     let mut phase = Phase::Passive;
     let mut told = None;
-    for event in &rig.door.events {
+    for event in &rig.host.events {
         match event.kind {
             EventKind::PhaseChanged { to, .. } => {
                 phase = to;

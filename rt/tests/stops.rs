@@ -3,14 +3,10 @@
 mod fixture;
 
 use fixture::{LIMITS, PERIOD_NS, Rig, axis, axis_in, move_to, parameters, scale};
-use takt_rt::axis::{Axis, AxisParameters, FeedbackSince};
-use takt_rt::cia402::{Goal, State as DriveState};
-use takt_rt::control::ControlLaw;
-use takt_rt::door::{ProfileMove, Request};
-use takt_rt::frame::{Frame, Id};
-use takt_rt::port::BusState;
-use takt_rt::profile::ProfileTarget;
-use takt_rt::stop::{Phase, Rule, StopCategory};
+use takt_rt::{
+    Axis, AxisParameters, BusState, ControlLaw, DriveState, FeedbackSince, Frame, Goal, Id, Phase,
+    ProfileMove, ProfileTarget, Request, Rule, StopCategory,
+};
 
 /// The group is to be disabled, but the drive of the first axis has fallen silent in operation enabled: it never shows that
 /// it obeys.
@@ -34,7 +30,7 @@ fn disabling_that_becomes_harder_on_its_way_lasts_no_longer() {
         let mut cycles = 0;
         while rig.phase() == Phase::Disabling {
             if harder_after == Some(cycles) {
-                rig.door.requests.push_back(Request::Stop(StopCategory::Zero));
+                rig.host.requests.push_back(Request::Stop(StopCategory::Zero));
             }
             rig.run(1);
             cycles += 1;
@@ -66,7 +62,7 @@ fn a_fault_on_the_way_of_a_stop_that_was_asked_for_takes_its_place_and_must_be_r
         // The fault itself asks for category 1; what was asked for stays where it is harder.
         let hardest = category.min(StopCategory::One);
         assert_eq!(told(&rig), [(Rule::Requested, category), (Rule::UnexpectedBootUp, hardest)]);
-        let shown = rig.door.snapshot.stop.unwrap();
+        let shown = rig.host.snapshot.stop.unwrap();
         assert_eq!((shown.rule, shown.axis(), shown.category), (Rule::UnexpectedBootUp, Some(1), hardest));
         rig.run_until(Phase::Disabled, 3_000);
         rig.assert_limits_kept();
@@ -108,7 +104,7 @@ fn what_is_asked_for_on_the_way_of_a_fault_does_not_take_its_place() {
     rig.request(Request::Stop(StopCategory::Two));
     rig.run(2);
     assert_eq!(told(&rig), [(Rule::UnexpectedBootUp, StopCategory::One)]);
-    let shown = rig.door.snapshot.stop.unwrap();
+    let shown = rig.host.snapshot.stop.unwrap();
     assert_eq!((shown.rule, shown.category), (Rule::UnexpectedBootUp, StopCategory::Zero));
     rig.run_until(Phase::Disabled, 3_000);
 }
@@ -154,14 +150,14 @@ fn an_error_passive_bus_that_goes_bus_off_makes_the_stop_harder_and_stays_its_on
         ] {
             let mut rig = error_passive_then_off(category, after);
             assert_eq!(rig.phase(), at_once, "{category:?} after {after} cycles");
-            let shown = rig.door.snapshot.stop.unwrap();
+            let shown = rig.host.snapshot.stop.unwrap();
             assert_eq!(
                 (shown.rule, shown.phase, shown.category),
                 (Rule::BusErrorPassive, Phase::Moving, category)
             );
-            let begun = rig.door.records.len();
+            let begun = rig.host.records.len();
             rig.run_until(Phase::Disabled, 3_000);
-            let is_held = rig.door.records[begun..].iter().any(|record| record.phase == Phase::Holding);
+            let is_held = rig.host.records[begun..].iter().any(|record| record.phase == Phase::Holding);
             assert!(!is_held, "{category:?} after {after} cycles: held under power");
             assert_eq!(told(&rig), [(Rule::BusErrorPassive, StopCategory::Two)]);
             rig.assert_limits_kept();
@@ -177,7 +173,7 @@ fn a_bus_that_comes_back_from_bus_off_to_error_passive_does_not_soften_the_stop(
     for state in [BusState::BusOff, BusState::ErrorPassive, BusState::ErrorActive] {
         rig.buses[0].state = state;
         rig.run(20);
-        let shown = rig.door.snapshot.stop.unwrap();
+        let shown = rig.host.snapshot.stop.unwrap();
         assert_eq!((shown.rule, shown.category), (Rule::BusLost, StopCategory::One));
     }
     rig.run_until(Phase::Disabled, 3_000);
@@ -192,7 +188,7 @@ fn a_group_that_is_disabled_while_it_is_led_up_is_not_called_disabled_before_the
         let mut parameters = parameters(3);
         parameters.buses[0].divider = 3;
         let mut rig = Rig::of(parameters);
-        rig.door.requests.extend([Request::Sync(true), Request::Activate]);
+        rig.host.requests.extend([Request::Sync(true), Request::Activate]);
         rig.run(10);
         rig.request(Request::Enable);
         rig.run(after);
@@ -256,7 +252,7 @@ fn nobody_waits_for_a_joint_that_does_not_follow() {
     rig.move_to(2.0);
     rig.run_until(Phase::Stopping, 300);
     assert_eq!(rig.stops()[0].rule, Rule::FollowingError);
-    let planned_cycles = (rig.door.snapshot.remaining_s * 1e9 / PERIOD_NS as f64).ceil() as usize;
+    let planned_cycles = (rig.host.snapshot.remaining_s * 1e9 / PERIOD_NS as f64).ceil() as usize;
     rig.run_until(Phase::Disabling, planned_cycles + 2);
 }
 

@@ -17,9 +17,7 @@ use takt::controller::session::{self, Session, SessionError, SessionOptions};
 use takt::controller::{Interrupt, Outcome, Progress};
 use takt::faults::{Fault, Rehearsal, Scenario, ScenarioError, Tidings};
 use takt::telemetry::{Destination, Machine, Notice, RealtimeReport, RunOutcome, RunReport, words};
-use takt_rt::door::Snapshot;
-use takt_rt::record::{Event, EventKind};
-use takt_rt::stop::StopReason;
+use takt_rt::{Event, EventKind, Snapshot, StopReason};
 
 use super::configuration::{self, BusOverride};
 use super::exit::Exit;

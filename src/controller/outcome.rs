@@ -1,7 +1,6 @@
 //! How a run goes and how it ends.
 
-use takt_rt::refusal::Refusal;
-use takt_rt::stop::{Phase, StopReason};
+use takt_rt::{Phase, Refusal, StopReason};
 
 use crate::bus::ownership::Process;
 use crate::drive::BringUpError;

@@ -1,10 +1,9 @@
 //! The motion program: which move is next, and when.
 
-use takt_rt::door::{Asked, Move, ProfileMove, Request, RequestId, Snapshot};
-use takt_rt::profile::ProfileTarget;
-use takt_rt::record::MAX_AXES;
-use takt_rt::refusal::{Answer, Refusal};
-use takt_rt::stop::Phase;
+use takt_rt::{
+    Answer, MAX_AXES, Move, Phase, ProfileMove, ProfileTarget, Refusal, Request, RequestEnvelope, RequestId,
+    Snapshot,
+};
 
 use super::channels::RequestNumbers;
 use crate::config::{Program, ProgramMove, ProgramTarget};
@@ -45,7 +44,7 @@ pub enum Step {
     /// Nothing but time.
     Wait,
     /// This, in this order.
-    Begin(Vec<Asked>),
+    Begin(Vec<RequestEnvelope>),
     /// The real-time thread has refused the move with this number, counted from 1.
     Refused {
         /// The move.
@@ -151,7 +150,12 @@ impl ProgramRunner {
 
     /// The requests of the present move, its speeds and torques times `factor`. All of them are one move with a number of
     /// its own.
-    fn present_requests(&mut self, now_ns: u64, factor: f64, numbers: &RequestNumbers) -> Vec<Asked> {
+    fn present_requests(
+        &mut self,
+        now_ns: u64,
+        factor: f64,
+        numbers: &RequestNumbers,
+    ) -> Vec<RequestEnvelope> {
         // Never 0, which stands for "none yet".
         self.last_id = self.last_id.checked_add(1).unwrap_or(1);
         let id = self.last_id;
@@ -171,7 +175,7 @@ impl ProgramRunner {
             ProgramTarget::Torque { torque, .. } => drive(torque, ProfileTarget::Torque),
         };
         self.asked = requests.iter().map(|_| numbers.next()).collect();
-        self.asked.iter().zip(requests).map(|(id, request)| Asked { id: *id, request }).collect()
+        self.asked.iter().zip(requests).map(|(id, request)| RequestEnvelope { id: *id, request }).collect()
     }
 
     /// Where the present move leads (rad or m), an axis each; `None` before the first, and where it leads nowhere.
@@ -204,7 +208,7 @@ fn move_of(id: u32, present: &ProgramMove, position: &[f64]) -> Move {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use takt_rt::refusal::{Objection, RequestKind};
+    use takt_rt::{RejectReason, RequestKind};
 
     fn program(repeat: u32) -> Program {
         let to = |target: f64| ProgramMove {
@@ -223,7 +227,7 @@ mod tests {
 
     const REFUSAL: Refusal = Refusal {
         request: RequestKind::Move,
-        objection: Objection::PositionLimit,
+        objection: RejectReason::PositionLimit,
         axis: Some(0),
         value: 2.0,
         limit: 1.5,
@@ -254,7 +258,7 @@ mod tests {
         fn begin(&mut self, now_ns: u64, snapshot: &Snapshot) -> Option<(RequestId, Move)> {
             match self.poll(now_ns, snapshot) {
                 Step::Begin(requests) => match requests[..] {
-                    [Asked { id, request: Request::Move(begun) }] => Some((id, begun)),
+                    [RequestEnvelope { id, request: Request::Move(begun) }] => Some((id, begun)),
                     _ => panic!("{requests:?}"),
                 },
                 _ => None,
@@ -270,8 +274,8 @@ mod tests {
         let asked = |step| match step {
             Step::Begin(requests) => match requests[..] {
                 [
-                    Asked { request: Request::SetProfileTarget(first), .. },
-                    Asked { request: Request::SetProfileTarget(second), .. },
+                    RequestEnvelope { request: Request::SetProfileTarget(first), .. },
+                    RequestEnvelope { request: Request::SetProfileTarget(second), .. },
                 ] => {
                     assert_eq!((first.id, first.axis, second.axis), (second.id, 0, 1));
                     (second.id, first.target, second.target)

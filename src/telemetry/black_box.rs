@@ -10,10 +10,9 @@ use std::fs;
 use std::path::PathBuf;
 
 use mcap::{McapError, McapResult};
-use takt_rt::cia402::State;
-use takt_rt::record::{CycleRecord, Event, EventKind};
-use takt_rt::stop::{Origin, Phase, Rule, StopCategory, StopReason};
-use takt_rt::time::Nanoseconds;
+use takt_rt::{
+    CycleRecord, DriveState, Event, EventKind, Nanoseconds, Origin, Phase, Rule, StopCategory, StopReason,
+};
 
 use super::destination::Destination;
 use super::machine::Machine;
@@ -143,7 +142,7 @@ pub struct BlackBox {
     directory: PathBuf,
     wall_clock: WallClock,
     started_ns: Nanoseconds,
-    drives: Vec<Option<State>>,
+    drives: Vec<Option<DriveState>>,
     open: Option<OpenFile>,
     files: Vec<PathBuf>,
     replaced: u64,

@@ -3,8 +3,7 @@
 
 mod decode;
 
-use takt_rt::frame::FrameKind;
-use takt_rt::record::{AxisRecord, CycleRecord, Event, EventKind};
+use takt_rt::{AxisRecord, CycleRecord, Event, EventKind, FrameKind};
 
 use super::cdr::CdrEncoder;
 use crate::bus::trace::{TracedFrame, TracedHealth};
@@ -242,10 +241,10 @@ pub fn encode_bus(TracedHealth { at_ns, health }: &TracedHealth, encoder: &mut C
 #[cfg(test)]
 mod tests {
     use super::*;
-    use takt_rt::cia402::State;
-    use takt_rt::refusal::{Objection, Refusal, RequestKind};
-    use takt_rt::stop::{Origin, Phase, Rule, StopCategory, StopReason};
-    use takt_rt::watch::TimingLevel;
+    use takt_rt::{
+        DriveState, Origin, Phase, Refusal, RejectReason, RequestKind, Rule, StopCategory, StopReason,
+        TimingLevel,
+    };
 
     /// The constants of a definition that stand in front of `field`, with the names as Rust writes them.
     fn constants(message: &MessageType, field: &str) -> Vec<(String, u8)> {
@@ -284,7 +283,7 @@ mod tests {
     fn the_constants_in_the_schemas_are_those_of_the_records() {
         let phases = Phase::ALL.map(|phase| (format!("{phase:?}"), phase as u8));
         assert_eq!(constants(&CYCLE, "phase"), phases);
-        let states = State::ALL.map(|state| (format!("{state:?}"), state as u8));
+        let states = DriveState::ALL.map(|state| (format!("{state:?}"), state as u8));
         assert_eq!(constants(&AXIS, "state"), states);
         assert_eq!(
             constants(&BUS, "state"),
@@ -294,7 +293,8 @@ mod tests {
         assert_eq!(constants(&EVENT, "rule"), rules);
         let requests = RequestKind::ALL.map(|request| (format!("Request{request:?}"), request as u8));
         assert_eq!(constants(&EVENT, "request"), requests);
-        let objections = Objection::ALL.map(|objection| (format!("Objection{objection:?}"), objection as u8));
+        let objections =
+            RejectReason::ALL.map(|objection| (format!("RejectReason{objection:?}"), objection as u8));
         assert_eq!(constants(&EVENT, "objection"), objections);
     }
 
@@ -312,12 +312,12 @@ mod tests {
                 phase: Phase::Moving,
             }),
             EventKind::MoveFinished { id: 1 },
-            EventKind::DriveState { axis: 0, state: State::NotReadyToSwitchOn, statusword: 0 },
+            EventKind::DriveState { axis: 0, state: DriveState::NotReadyToSwitchOn, statusword: 0 },
             EventKind::Emergency { axis: 0, code: 0, register: 0, manufacturer: [0; 5] },
             EventKind::MissedSlots { count: 1 },
             EventKind::Refused(Refusal {
                 request: RequestKind::Move,
-                objection: Objection::Phase,
+                objection: RejectReason::Phase,
                 axis: None,
                 value: 0.0,
                 limit: 0.0,

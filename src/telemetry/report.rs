@@ -4,10 +4,7 @@ use std::fs;
 use std::path::PathBuf;
 
 use serde::Serialize;
-use takt_rt::door::Snapshot;
-use takt_rt::port::{BusHealth, BusState};
-use takt_rt::stop::StopReason;
-use takt_rt::time::{NANOSECONDS_PER_SECOND, Nanoseconds};
+use takt_rt::{BusHealth, BusState, NANOSECONDS_PER_SECOND, Nanoseconds, Snapshot, StopReason};
 
 use super::logger::LogSummary;
 use super::machine::{AxisDescription, BusDescription, Machine, SetPointMagnitudes};

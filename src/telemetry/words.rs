@@ -1,9 +1,6 @@
 //! Stops, phases and events in words, with the names of the axes and the units of the values.
 
-use takt_rt::cia402::{OperationMode, State};
-use takt_rt::record::{Event, EventKind};
-use takt_rt::stop::{Phase, Rule, StopCategory};
-use takt_rt::watch::TimingLevel;
+use takt_rt::{DriveState, Event, EventKind, OperationMode, Phase, Rule, StopCategory, TimingLevel};
 
 use super::machine::Machine;
 
@@ -42,17 +39,17 @@ pub const fn category(category: StopCategory) -> &'static str {
 }
 
 /// A state of a drive (CiA 402).
-pub const fn state(state: State) -> &'static str {
+pub const fn state(state: DriveState) -> &'static str {
     match state {
-        State::NotReadyToSwitchOn => "not ready to switch on",
-        State::SwitchOnDisabled => "switch on disabled",
-        State::ReadyToSwitchOn => "ready to switch on",
-        State::SwitchedOn => "switched on",
-        State::OperationEnabled => "operation enabled",
-        State::QuickStopActive => "quick stop active",
-        State::FaultReactionActive => "fault reaction active",
-        State::Fault => "fault",
-        State::Undefined => "no state of CiA 402",
+        DriveState::NotReadyToSwitchOn => "not ready to switch on",
+        DriveState::SwitchOnDisabled => "switch on disabled",
+        DriveState::ReadyToSwitchOn => "ready to switch on",
+        DriveState::SwitchedOn => "switched on",
+        DriveState::OperationEnabled => "operation enabled",
+        DriveState::QuickStopActive => "quick stop active",
+        DriveState::FaultReactionActive => "fault reaction active",
+        DriveState::Fault => "fault",
+        DriveState::Undefined => "no state of CiA 402",
     }
 }
 
@@ -106,7 +103,7 @@ pub fn event(event: &Event, machine: &Machine) -> String {
 mod tests {
     use super::*;
     use crate::telemetry::machine::{AxisDescription, BusDescription, SetPointMagnitudes, Unit};
-    use takt_rt::refusal::{Objection, Refusal, RequestKind};
+    use takt_rt::{Refusal, RejectReason, RequestKind};
 
     pub(super) fn machine() -> Machine {
         let axis = |name: &str, unit| AxisDescription {
@@ -132,7 +129,7 @@ mod tests {
             "enabling → holding"
         );
         assert_eq!(
-            words(EventKind::DriveState { axis: 0, state: State::OperationEnabled, statusword: 0x1637 }),
+            words(EventKind::DriveState { axis: 0, state: DriveState::OperationEnabled, statusword: 0x1637 }),
             "shoulder: operation enabled (statusword 0x1637)"
         );
         assert_eq!(
@@ -151,7 +148,7 @@ mod tests {
         assert_eq!(
             words(EventKind::Refused(Refusal {
                 request: RequestKind::Enable,
-                objection: Objection::Phase,
+                objection: RejectReason::Phase,
                 axis: None,
                 value: 0.0,
                 limit: 0.0,

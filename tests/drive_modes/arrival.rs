@@ -2,8 +2,7 @@
 
 use takt::config::ProgramTarget;
 use takt::controller::Outcome;
-use takt_rt::cia402::State;
-use takt_rt::stop::Phase;
+use takt_rt::{DriveState, Phase};
 
 use crate::world::{World, counts_per_unit, load};
 
@@ -133,6 +132,6 @@ fn an_erob_in_profile_torque_pushes_as_asked_and_its_brake_holds_in_the_end() {
     assert!(pushed.iter().all(|seen| seen.abs() < 1.6), "{pushed:?}");
     assert!(turned.0 < -0.1 && turned.1 > 0.1, "{turned:?}");
     let seen = world.observe(0);
-    assert!(seen.is_braked && seen.velocity == 0.0 && seen.state != State::OperationEnabled);
+    assert!(seen.is_braked && seen.velocity == 0.0 && seen.state != DriveState::OperationEnabled);
     assert_eq!(world.stops(), []);
 }

@@ -3,11 +3,9 @@
 use takt::config::Config;
 use takt::controller::Outcome;
 use takt::sim::Defect;
-use takt_rt::cia402::{controlword, statusword};
-use takt_rt::door::{ProfileMove, Request};
-use takt_rt::frame::Frame;
-use takt_rt::profile::ProfileTarget;
-use takt_rt::stop::{Phase, Rule, StopCategory};
+use takt_rt::{
+    Frame, Phase, ProfileMove, ProfileTarget, Request, Rule, StopCategory, controlword, statusword,
+};
 
 use crate::world::{MILLISECOND_NS, World, counts, counts_per_unit, id, load, one_yz_aim, parse, word};
 

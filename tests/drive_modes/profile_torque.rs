@@ -4,10 +4,7 @@ use takt::config::Config;
 use takt::controller::Outcome;
 use takt::sim::erob::{ErobJoint, ErobParameters};
 use takt::sim::{BitRates, Drive, SimulatedBus};
-use takt_rt::cia402::State;
-use takt_rt::door::{ProfileMove, Request};
-use takt_rt::profile::ProfileTarget;
-use takt_rt::stop::{Phase, Rule, StopCategory};
+use takt_rt::{DriveState, Phase, ProfileMove, ProfileTarget, Request, Rule, StopCategory};
 
 use crate::world::{World, load, word};
 
@@ -95,7 +92,7 @@ fn a_stop_in_motion_decelerates_the_joint_by_the_drives_quick_stop_and_then_brak
             states.push(seen.state);
         }
     }
-    assert!(states.contains(&State::QuickStopActive), "{states:?}");
+    assert!(states.contains(&DriveState::QuickStopActive), "{states:?}");
     let needed_ms = 1000.0 * speed / limits.deceleration;
     assert!(f64::from(cycles) < 1.1 * needed_ms + 20.0, "{cycles} ms, {needed_ms} ms at the limit");
     world.run_for(5);
@@ -176,7 +173,7 @@ fn a_joint_that_a_load_pulls_away_while_the_group_holds_is_slowed_by_the_drive_b
         while world.phase() != Phase::Disabled {
             world.run_for(1);
             let seen = world.observe(0);
-            is_slowed |= seen.state == State::QuickStopActive;
+            is_slowed |= seen.state == DriveState::QuickStopActive;
             assert!(!seen.is_braked || seen.velocity.abs() < 0.15, "{asked:?}: {seen:?}");
         }
         assert!(is_slowed, "{asked:?}");

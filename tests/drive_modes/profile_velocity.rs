@@ -1,8 +1,6 @@
 //! Profile velocity: it stops by velocity 0, expires, and does not run into a position limit.
 
-use takt_rt::door::{ProfileMove, Request};
-use takt_rt::profile::ProfileTarget;
-use takt_rt::stop::{Phase, Rule, StopCategory};
+use takt_rt::{Phase, ProfileMove, ProfileTarget, Request, Rule, StopCategory};
 
 use crate::world::{MILLISECOND_NS, World, counts, load, one_yz_aim, parse, word};
 

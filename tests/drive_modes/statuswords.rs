@@ -1,9 +1,7 @@
 //! What a drive is told whose statuswords show what nobody has asked for.
 
 use takt::config::{Config, Feedback};
-use takt_rt::door::Request;
-use takt_rt::frame::Frame;
-use takt_rt::stop::{Phase, Rule};
+use takt_rt::{Frame, Phase, Request, Rule};
 
 use crate::world::{World, id, load, word};
 

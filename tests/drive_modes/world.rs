@@ -7,12 +7,10 @@ use takt::config::{Axis, Config, ProgramMove, ProgramTarget, Travel};
 use takt::controller::channels::LogSide;
 use takt::controller::{Outcome, VirtualRun};
 use takt::sim::{Observation, SimulatedBus};
-use takt_rt::door::{ProfileMove, Request};
-use takt_rt::frame::{Frame, Id};
-use takt_rt::port::{BusHealth, BusPort, ReceiveBatch, Received};
-use takt_rt::profile::ProfileTarget;
-use takt_rt::record::{Event, EventKind};
-use takt_rt::stop::{Phase, StopReason};
+use takt_rt::{
+    BusHealth, BusPort, Event, EventKind, Frame, Id, Phase, ProfileMove, ProfileTarget, ReceiveBatch,
+    Received, Request, StopReason,
+};
 
 pub const MILLISECOND_NS: u64 = 1_000_000;
 /// A minute is more than any of these programs takes.

@@ -3,7 +3,7 @@
 use takt::config::Config;
 use takt::controller::Outcome;
 use takt::faults::Scenario;
-use takt_rt::stop::{Phase, Rule, StopCategory};
+use takt_rt::{Phase, Rule, StopCategory};
 
 use crate::arm::{folder, play};
 

@@ -1,7 +1,7 @@
 //! Drives that always answer whole cycles late, SYNC or set-points: each answer looks like one to the next.
 
 use takt::controller::Outcome;
-use takt_rt::stop::{Phase, Rule, StopCategory};
+use takt_rt::{Phase, Rule, StopCategory};
 
 use takt::config::Config;
 

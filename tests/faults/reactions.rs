@@ -1,8 +1,7 @@
 //! What the controller does about each fault, for which there is a rule; and what holds whatever happens.
 
 use takt::controller::Outcome;
-use takt_rt::port::BusState;
-use takt_rt::stop::{Origin, Phase, Rule, StopCategory};
+use takt_rt::{BusState, Origin, Phase, Rule, StopCategory};
 
 use crate::arm::{Played, arm, play};
 

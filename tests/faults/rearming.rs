@@ -7,8 +7,7 @@ use takt::config::Config;
 use takt::controller::VirtualRun;
 use takt::faults::Rehearsal;
 use takt::sim::SimulatedBus;
-use takt_rt::door::Request;
-use takt_rt::stop::{Phase, Rule, StopReason};
+use takt_rt::{Phase, Request, Rule, StopReason};
 
 use crate::arm::{arm, folder, scenario};
 

@@ -6,7 +6,7 @@ use takt::bus::port::Port;
 use takt::config::Config;
 use takt::controller::{Outcome, VirtualRun};
 use takt::faults::Rehearsal;
-use takt_rt::stop::{Phase, Rule};
+use takt_rt::{Phase, Rule};
 
 use crate::arm::{arm, scenario};
 

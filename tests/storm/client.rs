@@ -1,17 +1,16 @@
 //! Somebody who asks the group for anything at any time.
 
 use takt::config::{Config, Control};
-use takt_rt::door::{Move, ProfileMove, Request, Snapshot, StreamCommand};
 use takt_rt::plan::State;
-use takt_rt::profile::ProfileTarget;
-use takt_rt::record::MAX_AXES;
-use takt_rt::stop::{Phase, StopCategory};
+use takt_rt::{
+    MAX_AXES, Move, Phase, ProfileMove, ProfileTarget, Request, Snapshot, StopCategory, StreamCommand,
+};
 
 use crate::dice::Dice;
 
 /// What has been asked of the group up to a cycle, as far as invariants depend on it.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Asked {
+pub struct RequestEnvelope {
     /// A command of a stream has been handed over since the cycle before.
     pub has_streamed: bool,
     /// Somebody has asked for a reset of faults since the cycle before.
@@ -20,7 +19,7 @@ pub struct Asked {
     pub has_reset_lately: bool,
 }
 
-/// The most requests in one cycle: more than the door holds.
+/// The most requests in one cycle: more than the host interface holds.
 const REQUESTS_AT_MOST: usize = 24;
 
 /// What the client wants in a cycle.
@@ -284,6 +283,6 @@ impl Client {
 
 /// Whether the group can be asked for something beside a program: nothing has stopped it by itself.
 pub fn is_open(snapshot: &Snapshot) -> bool {
-    let has_own_stop = snapshot.stop.is_some_and(|stop| stop.rule != takt_rt::stop::Rule::Requested);
+    let has_own_stop = snapshot.stop.is_some_and(|stop| stop.rule != takt_rt::Rule::Requested);
     snapshot.phase != Phase::Passive && !has_own_stop
 }

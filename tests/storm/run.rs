@@ -8,15 +8,10 @@ use takt::controller::channels::LogSide;
 use takt::controller::{Outcome, VirtualRun};
 use takt::faults::{Rehearsal, Scenario};
 use takt::sim::{Observation, SimulatedBus};
-use takt_rt::cia402::State;
-use takt_rt::door::{Request, Snapshot};
-use takt_rt::frame::Frame;
-use takt_rt::port::{BusPort, ReceiveBatch};
-use takt_rt::record::{Event, EventKind};
-use takt_rt::stop::{Phase, Rule};
+use takt_rt::{BusPort, DriveState, Event, EventKind, Frame, Phase, ReceiveBatch, Request, Rule, Snapshot};
 
 use crate::case::Case;
-use crate::client::{Asked, Client, is_open};
+use crate::client::{Client, RequestEnvelope, is_open};
 use crate::concern::Concerns;
 use crate::fingerprint::Fingerprint;
 use crate::invariants::{Invariants, REST, Seen};
@@ -27,7 +22,7 @@ use crate::wire::Wire;
 const END_AT_MOST_S: f64 = 45.0;
 /// A YZ-AIM whose communication has been reset watches the controller for its factory setting of 2 s; then it stops.
 const WATCHDOG_MS: u64 = 3000;
-/// A request waits in the door and then takes so many cycles of the slowest bus to show.
+/// A request waits in the host interface and then takes so many cycles of the slowest bus to show.
 const RESET_CYCLES: u64 = 60;
 
 /// A controller in virtual time of which everything is seen.
@@ -203,7 +198,7 @@ fn note_stop(events: &[Event], struck: &mut [Struck]) {
 /// Those who ask for things, all at one door.
 struct Clients {
     all: Vec<Client>,
-    asked: Asked,
+    asked: RequestEnvelope,
     since_reset: u64,
 }
 
@@ -212,7 +207,7 @@ impl Clients {
         let all = (0..case.clients as u64)
             .map(|number| Client::new(case.dice.split(number), case.hardship.are_streams_wild))
             .collect();
-        Self { all, asked: Asked::default(), since_reset: u64::MAX }
+        Self { all, asked: RequestEnvelope::default(), since_reset: u64::MAX }
     }
 
     fn act(&mut self, case: &Case, world: &mut World, is_raging: bool) {
@@ -254,7 +249,7 @@ fn at_rest(case: &Case, concerns: &mut Concerns, world: &mut World) -> Result<()
     concerns.observe(&world.rehearsal, |_| ());
     for (axis, concern) in case.config.axes.iter().zip(&concerns.by_axis) {
         let truth = world.run.ports()[axis.bus].observe(axis.node);
-        let is_driven = truth.state == State::OperationEnabled;
+        let is_driven = truth.state == DriveState::OperationEnabled;
         // Nothing stops a drive that watches nobody any more and that nothing gets to.
         let is_beyond_reach = concern.is_unwatched && concern.is_cut_off;
         if (truth.velocity.abs() > REST || is_driven) && !concern.is_loaded && !is_beyond_reach {

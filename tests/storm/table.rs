@@ -8,8 +8,7 @@ use std::fmt::Write;
 
 use takt::config::Config;
 use takt::faults::Scenario;
-use takt_rt::record::EventKind;
-use takt_rt::stop::{Rule, StopReason};
+use takt_rt::{EventKind, Rule, StopReason};
 
 use crate::bounds;
 use crate::case::scenario;

@@ -2,8 +2,7 @@
 
 use takt::bus::port::Port;
 use takt::sim::Observation;
-use takt_rt::frame::Frame;
-use takt_rt::port::{BusHealth, BusPort, ReceiveBatch};
+use takt_rt::{BusHealth, BusPort, Frame, ReceiveBatch};
 
 /// The outermost port of a bus: what happens to a frame behind it is no longer the controller's doing.
 pub struct Tap {

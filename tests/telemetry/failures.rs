@@ -2,10 +2,7 @@ use std::fs::{self, OpenOptions};
 
 use takt::bus::trace::{TracedPort, traced};
 use takt::telemetry::{Destination, Logger, Notice};
-use takt_rt::door::Door;
-use takt_rt::frame::{Frame, Id};
-use takt_rt::port::{BusHealth, BusPort, ReceiveBatch};
-use takt_rt::record::EventKind;
+use takt_rt::{BusHealth, BusPort, EventKind, Frame, HostInterface, Id, ReceiveBatch};
 
 use crate::run::{Disk, Notices, cycle, event, options, run, sides};
 

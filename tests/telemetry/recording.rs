@@ -3,12 +3,10 @@ use std::path::Path;
 
 use takt::bus::trace::traced;
 use takt::telemetry::{Destination, Logger};
-use takt_rt::door::Door;
-use takt_rt::frame::{Frame, Id};
-use takt_rt::port::{BusHealth, BusPort, ReceiveBatch, Received};
-use takt_rt::record::EventKind;
-use takt_rt::refusal::{Objection, Refusal, RequestKind};
-use takt_rt::stop::Phase;
+use takt_rt::{
+    BusHealth, BusPort, EventKind, Frame, HostInterface, Id, Phase, ReceiveBatch, Received, Refusal,
+    RejectReason, RequestKind,
+};
 
 use crate::reader::{Value, messages};
 use crate::run::{
@@ -31,7 +29,7 @@ fn record() -> Vec<u8> {
         9,
         EventKind::Refused(Refusal {
             request: RequestKind::Move,
-            objection: Objection::PositionLimit,
+            objection: RejectReason::PositionLimit,
             axis: Some(1),
             value: 1.25,
             limit: 0.75,

@@ -1,8 +1,7 @@
 use std::fs;
 
 use takt::telemetry::{Destination, Logger, LoggerThread, Notice};
-use takt_rt::door::Door;
-use takt_rt::record::EventKind;
+use takt_rt::{EventKind, HostInterface};
 
 use crate::reader::messages;
 use crate::run::{Notices, cycle, event, options, sides};

@@ -2,14 +2,11 @@
 
 use takt::config::Config;
 use takt::drive::ProcessData;
-use takt_rt::door::{Move, ProfileMove, Request, StreamCommand};
-use takt_rt::engine::Engine;
-use takt_rt::frame::Id;
-use takt_rt::pdo::MappedObject;
 use takt_rt::plan;
-use takt_rt::profile::ProfileTarget;
-use takt_rt::record::MAX_AXES;
-use takt_rt::stop::StopCategory;
+use takt_rt::{
+    Engine, Id, MAX_AXES, MappedObject, Move, ProfileMove, ProfileTarget, Request, StopCategory,
+    StreamCommand,
+};
 
 use super::super::input::Input;
 
@@ -29,12 +26,12 @@ pub fn request(config: &Config, now_ns: u64, input: &mut Input<'_>) -> Request {
         7 => Request::Stop(categories[usize::from(input.byte()) % 3]),
         8 => Request::Disable,
         9 | 10 => Request::ResetFaults,
-        11 => Request::Leave,
+        11 => Request::Shutdown,
         12 => process_data(config, input),
         13 => Request::Position { axis: input.byte(), counts: input.word() as i32 },
         14 => Request::TimeOfDay { at_zero_ns: u64::from_le_bytes(input.bytes()) },
         15 | 16 => Request::SetProfileTarget(profile_move(config, now_ns, input)),
-        _ => Request::Retire,
+        _ => Request::InhibitEnable,
     }
 }
 

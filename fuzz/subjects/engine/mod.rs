@@ -12,14 +12,11 @@ use std::sync::OnceLock;
 
 use takt::config::{Config, Control};
 use takt::controller::assemble;
-use takt_rt::cia402::{Command, OperationMode, State};
-use takt_rt::dialect::Dialect;
-use takt_rt::door::{Asked, Door, Request, RequestId, Snapshot, StreamCommand};
-use takt_rt::engine::{BusSet, Engine, SendBatch, Transmission};
-use takt_rt::frame::Frame;
-use takt_rt::port::{BusHealth, BusState, Received};
-use takt_rt::record::{CycleRecord, Event, Timing};
-use takt_rt::stop::Phase;
+use takt_rt::{
+    BusHealth, BusSet, BusState, Command, CycleRecord, CycleTiming, Dialect, DriveState, Engine, Event,
+    Frame, HostInterface, OperationMode, Phase, Received, Request, RequestEnvelope, RequestId, SendBatch,
+    Snapshot, StreamCommand, Transmission,
+};
 
 use super::input::Input;
 use drive::ObedientDrive;
@@ -73,7 +70,7 @@ pub fn run(bytes: &[u8]) -> Journey {
     machine.journey
 }
 
-/// The other side of the door.
+/// The other side of the host interface.
 #[derive(Default)]
 struct Hall {
     requests: VecDeque<Request>,
@@ -85,12 +82,12 @@ struct Hall {
     snapshot: Snapshot,
 }
 
-impl Door for Hall {
-    fn request(&mut self) -> Option<Asked> {
+impl HostInterface for Hall {
+    fn request(&mut self) -> Option<RequestEnvelope> {
         let request = self.requests.pop_front()?;
         self.asked += 1;
-        self.is_retired |= request == Request::Retire;
-        Some(Asked { id: RequestId(self.asked), request })
+        self.is_retired |= request == Request::InhibitEnable;
+        Some(RequestEnvelope { id: RequestId(self.asked), request })
     }
 
     fn stream(&mut self) -> Option<StreamCommand> {
@@ -197,8 +194,8 @@ impl Machine {
                 let drive = &mut self.drives[drive];
                 match input.byte() % 4 {
                     0 => drive.is_silent = !drive.is_silent,
-                    1 => drive.state = State::Fault,
-                    2 => drive.state = State::SwitchOnDisabled,
+                    1 => drive.state = DriveState::Fault,
+                    2 => drive.state = DriveState::SwitchOnDisabled,
                     _ => drive.turn(input.word() as i32),
                 }
             }
@@ -261,7 +258,7 @@ impl Machine {
         for (bus, batch) in sent.iter_mut().enumerate() {
             self.engine.services(bus, &mut self.hall, batch);
         }
-        let timing = Timing { slot: self.slot, ..Timing::default() };
+        let timing = CycleTiming { slot: self.slot, ..CycleTiming::default() };
         self.engine.finish(timing, now_ns, &self.buses, &mut self.hall);
         self.watch.look(&self.engine, &self.hall.events, &self.hall.snapshot, has_commands);
         self.hall.events.clear();

@@ -1,11 +1,9 @@
 //! What must hold after every cycle, whatever came in.
 
 use takt::config::Config;
-use takt_rt::door::Snapshot;
-use takt_rt::engine::Engine;
-use takt_rt::record::{Event, EventKind};
-use takt_rt::refusal::{Objection, Refusal, RequestKind};
-use takt_rt::stop::{Phase, Rule, StopReason};
+use takt_rt::{
+    Engine, Event, EventKind, Phase, Refusal, RejectReason, RequestKind, Rule, Snapshot, StopReason,
+};
 
 /// Room for rounding, relative to a limit.
 const ROOM: f64 = 2e-6;
@@ -102,9 +100,9 @@ impl Watch {
         self.refused += 1;
         assert_eq!(refusal.phase, self.phase, "{refusal:?}");
         assert!(refusal.axis.is_none_or(|axis| usize::from(axis) < self.axes.len()), "{refusal:?}");
-        let never = [RequestKind::Sync, RequestKind::Stop, RequestKind::Retire, RequestKind::Leave];
+        let never = [RequestKind::Sync, RequestKind::Stop, RequestKind::InhibitEnable, RequestKind::Shutdown];
         assert!(!never.contains(&refusal.request), "{refusal:?}");
-        assert!(refusal.request != RequestKind::Position || refusal.objection == Objection::UnknownAxis);
+        assert!(refusal.request != RequestKind::Position || refusal.objection == RejectReason::UnknownAxis);
     }
 
     fn look_at_stop(&mut self, snapshot: &Snapshot, has_acted: bool) {

@@ -1,6 +1,6 @@
 //! What is sent to the drive of an axis.
 
-use super::{Axis, Cadence, CommandPdo, FeedbackSince, SETTLED_CYCLES};
+use super::{Axis, CommandPdo, FeedbackSince, SETTLED_CYCLES, TransmissionType};
 use crate::cia402::{Goal, controlword};
 use crate::control::{ControlLaw, LoopInput};
 use crate::frame::Frame;
@@ -115,8 +115,8 @@ impl Axis {
         let is_due = |command: &CommandPdo| {
             self.is_position_known
                 && match command.cadence {
-                    Cadence::EveryCycle => !self.is_left_out,
-                    Cadence::OnControlword => self.is_controlword_due,
+                    TransmissionType::EveryCycle => !self.is_left_out,
+                    TransmissionType::OnControlword => self.is_controlword_due,
                 }
         };
         self.parameters.commands.iter().filter(move |command| is_due(command)).filter_map(|command| {

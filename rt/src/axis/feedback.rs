@@ -2,7 +2,7 @@
 
 use super::position_watch::{Judgement, Reach};
 use super::{Axis, FeedbackSince};
-use crate::cia402::State as DriveState;
+use crate::cia402::DriveState;
 use crate::frame::Frame;
 use crate::pdo::{FeedbackSlot, TooShort};
 use crate::time::Nanoseconds;

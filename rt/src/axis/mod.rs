@@ -15,7 +15,7 @@ use arrayvec::ArrayVec;
 
 use self::delay::SetPointDelay;
 
-use crate::cia402::{State as DriveState, controlword};
+use crate::cia402::{DriveState, controlword};
 use crate::guard::FollowingErrorGuard;
 use crate::pdo::{CommandSlot, FeedbackSlot, ProcessImage};
 use crate::plan::State;
@@ -29,7 +29,7 @@ use punctuality::Punctuality;
 use service::ServiceCommand;
 
 pub use feedback::Jump;
-pub use parameters::{AxisParameters, Cadence, CommandPdo, FeedbackSince, MAX_PDOS, Pdo};
+pub use parameters::{AxisParameters, CommandPdo, FeedbackSince, MAX_PDOS, Pdo, TransmissionType};
 
 /// Cycles of its bus after which a drive has obeyed a controlword and has said so.
 const SETTLED_CYCLES: u32 = 4;

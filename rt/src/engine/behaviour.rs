@@ -5,22 +5,22 @@ use arrayvec::ArrayVec;
 use super::Engine;
 use crate::axis::Axis;
 use crate::cia402::Goal;
-use crate::door::Door;
 use crate::guard::{OnViolation, Violation};
+use crate::host::HostInterface;
 use crate::plan::State;
 use crate::record::{EventKind, MAX_AXES};
 use crate::stop::{Origin, Phase, Rule, StopCategory};
 use crate::time::Nanoseconds;
 
 impl Engine {
-    pub(super) fn act(&mut self, now_ns: Nanoseconds, door: &mut impl Door) {
+    pub(super) fn act(&mut self, now_ns: Nanoseconds, host: &mut impl HostInterface) {
         match self.phase {
             Phase::Passive => {}
             Phase::Disabled => self.hold(),
-            Phase::Enabling => self.wait_for_drives(now_ns, door),
+            Phase::Enabling => self.wait_for_drives(now_ns, host),
             Phase::Holding => self.hold(),
-            Phase::Moving | Phase::Stopping => self.follow_motion(now_ns, door),
-            Phase::Streaming => self.follow_stream(now_ns, door),
+            Phase::Moving | Phase::Stopping => self.follow_motion(now_ns, host),
+            Phase::Streaming => self.follow_stream(now_ns, host),
             Phase::Disabling => {
                 self.come_to_rest();
                 let is_on_way = !self.motion.is_finished();
@@ -45,23 +45,23 @@ impl Engine {
                     self.motion.cancel();
                     self.goal = Goal::Disabled;
                     self.axes.iter_mut().for_each(Axis::let_go);
-                    self.enter(Phase::Disabled, now_ns, door);
+                    self.enter(Phase::Disabled, now_ns, host);
                 }
             }
         }
     }
 
-    fn wait_for_drives(&mut self, now_ns: Nanoseconds, door: &mut impl Door) {
+    fn wait_for_drives(&mut self, now_ns: Nanoseconds, host: &mut impl HostInterface) {
         self.hold();
         self.look_for_late_drives();
         self.axes.iter_mut().for_each(|axis| axis.prepare_to_enable(self.period_s));
         if self.axes.iter().all(|axis| axis.is_ready() && axis.is_enabled()) {
-            self.enter(Phase::Holding, now_ns, door);
+            self.enter(Phase::Holding, now_ns, host);
         } else if self.phase_cycles > self.enable_timeout_cycles {
             let late = self.axes.iter().position(|axis| !axis.is_enabled());
             let origin = late.map_or(Origin::Group, |axis| Origin::Axis(axis as u8));
             let (value, limit) = (self.phase_cycles.into(), self.enable_timeout_cycles.into());
-            self.begin_stop(Rule::EnableTimeout, None, origin, value, limit, now_ns, door);
+            self.begin_stop(Rule::EnableTimeout, None, origin, value, limit, now_ns, host);
         }
     }
 
@@ -91,7 +91,7 @@ impl Engine {
         }
     }
 
-    fn follow_motion(&mut self, now_ns: Nanoseconds, door: &mut impl Door) {
+    fn follow_motion(&mut self, now_ns: Nanoseconds, host: &mut impl HostInterface) {
         let expired = self.axes.iter().position(|axis| axis.expired_ns(now_ns) > 0);
         if let Some(index) = expired.filter(|_| self.phase == Phase::Moving) {
             let age_ns = self.axes.get(index).map_or(0, |axis| axis.expired_ns(now_ns));
@@ -103,29 +103,29 @@ impl Engine {
                 age_cycles,
                 0.0,
                 now_ns,
-                door,
+                host,
             );
         }
         self.motion.advance(self.period_s);
         let next: ArrayVec<State, MAX_AXES> = self.motion.states().take(self.axes.len()).collect();
-        if !self.advance_guarded(&next, now_ns, door) || !self.motion.is_finished() {
+        if !self.advance_guarded(&next, now_ns, host) || !self.motion.is_finished() {
             return;
         }
         match self.phase {
             Phase::Moving => {
                 let is_planned_to_rest = next.iter().all(|state| state.velocity == 0.0);
-                self.finish_move(is_planned_to_rest, now_ns, door);
+                self.finish_move(is_planned_to_rest, now_ns, host);
             }
-            Phase::Stopping => self.finish_stop(now_ns, door),
+            Phase::Stopping => self.finish_stop(now_ns, host),
             // It has just become one that takes the power at once.
             _ => {}
         }
     }
 
     /// The planned part of a move is over; drives in profile modes may still be on their way.
-    fn finish_move(&mut self, is_planned_to_rest: bool, now_ns: Nanoseconds, door: &mut impl Door) {
+    fn finish_move(&mut self, is_planned_to_rest: bool, now_ns: Nanoseconds, host: &mut impl HostInterface) {
         if !is_planned_to_rest {
-            self.begin_stop(Rule::Requested, Some(StopCategory::Two), Origin::Group, 0.0, 0.0, now_ns, door);
+            self.begin_stop(Rule::Requested, Some(StopCategory::Two), Origin::Group, 0.0, 0.0, now_ns, host);
             return;
         }
         if !self.axes.iter().all(Axis::is_target_reached) {
@@ -133,16 +133,16 @@ impl Engine {
         }
         if self.finished_move != self.move_id {
             self.finished_move = self.move_id;
-            self.happened(now_ns, EventKind::MoveFinished { id: self.move_id }, door);
+            self.happened(now_ns, EventKind::MoveFinished { id: self.move_id }, host);
         }
         if !self.axes.iter().any(Axis::is_driven) {
-            self.enter(Phase::Holding, now_ns, door);
+            self.enter(Phase::Holding, now_ns, host);
         }
     }
 
     /// The planned part of a stop is over. A joint in a profile mode gets the time that its limits allow for, and one that
     /// follows set-points some to catch up before its power is taken.
-    fn finish_stop(&mut self, now_ns: Nanoseconds, door: &mut impl Door) {
+    fn finish_stop(&mut self, now_ns: Nanoseconds, host: &mut impl HostInterface) {
         let category = self.stop.map(|stop| stop.category);
         let stopping_for_s = f64::from(self.phase_cycles) * self.period_s;
         let standing_for_s = self.motion.overrun_s();
@@ -157,38 +157,38 @@ impl Engine {
             return;
         }
         match category {
-            Some(StopCategory::Two) => self.enter(Phase::Holding, now_ns, door),
+            Some(StopCategory::Two) => self.enter(Phase::Holding, now_ns, host),
             _ => {
                 self.goal = Goal::Disabled;
-                self.enter(Phase::Disabling, now_ns, door);
+                self.enter(Phase::Disabling, now_ns, host);
             }
         }
     }
 
-    fn follow_stream(&mut self, now_ns: Nanoseconds, door: &mut impl Door) {
+    fn follow_stream(&mut self, now_ns: Nanoseconds, host: &mut impl HostInterface) {
         let Some(command) = self.stream else {
             // Nothing has come yet: the owner has one enable time-out to begin.
             self.hold();
             if self.phase_cycles > self.enable_timeout_cycles {
                 let (value, limit) = (self.phase_cycles.into(), self.enable_timeout_cycles.into());
-                self.begin_stop(Rule::StaleCommand, None, Origin::Group, value, limit, now_ns, door);
+                self.begin_stop(Rule::StaleCommand, None, Origin::Group, value, limit, now_ns, host);
             }
             return;
         };
         if now_ns > command.valid_until_ns {
             let age_cycles = (now_ns - command.valid_until_ns).div_ceil(self.period_ns);
-            self.begin_stop(Rule::StaleCommand, None, Origin::Group, age_cycles as f64, 0.0, now_ns, door);
-            return self.follow_stop(now_ns, door);
+            self.begin_stop(Rule::StaleCommand, None, Origin::Group, age_cycles as f64, 0.0, now_ns, host);
+            return self.follow_stop(now_ns, host);
         }
         if !self.is_stream_begun {
             self.is_stream_begun = true;
             if let Some((axis, violation)) = self.violation(&command.set_points, Axis::check_start) {
-                self.refuse(axis, violation, now_ns, door);
-                return self.follow_stop(now_ns, door);
+                self.refuse(axis, violation, now_ns, host);
+                return self.follow_stop(now_ns, host);
             }
         }
-        let Some(next) = self.streamed(&command.set_points, now_ns, door) else { return };
-        if self.advance_guarded(&next, now_ns, door) {
+        let Some(next) = self.streamed(&command.set_points, now_ns, host) else { return };
+        if self.advance_guarded(&next, now_ns, host) {
             // Until the next command comes the present one is carried on, up to its expiry.
             if let Some(held) = &mut self.stream {
                 for (axis, point) in self.axes.iter().zip(&mut held.set_points) {
@@ -203,7 +203,7 @@ impl Engine {
         &mut self,
         wanted: &[State],
         now_ns: Nanoseconds,
-        door: &mut impl Door,
+        host: &mut impl HostInterface,
     ) -> Option<ArrayVec<State, MAX_AXES>> {
         let (period_s, is_bridged) = (self.period_s, self.bridged_cycles > 0);
         let check = |axis: &Axis, next: &State| {
@@ -227,8 +227,8 @@ impl Engine {
             OnViolation::Clamp => Ok(()),
         };
         if let Some((axis, violation)) = self.violation(&next, rejecting) {
-            self.refuse(axis, violation, now_ns, door);
-            self.follow_stop(now_ns, door);
+            self.refuse(axis, violation, now_ns, host);
+            self.follow_stop(now_ns, host);
             return None;
         }
         Some(next)
@@ -247,23 +247,28 @@ impl Engine {
         })
     }
 
-    fn refuse(&mut self, axis: u8, violation: Violation, now_ns: Nanoseconds, door: &mut impl Door) {
+    fn refuse(&mut self, axis: u8, violation: Violation, now_ns: Nanoseconds, host: &mut impl HostInterface) {
         let category = (self.phase == Phase::Stopping).then_some(StopCategory::Zero);
         let (rule, value, limit) = (violation.rule, violation.value, violation.limit);
-        self.begin_stop(rule, category, Origin::Axis(axis), value, limit, now_ns, door);
+        self.begin_stop(rule, category, Origin::Axis(axis), value, limit, now_ns, host);
     }
 
     /// Takes the next set-points of all axes if the guard agrees to each. If not, the group stops from where it
     /// was, in this same cycle. Returns whether they were taken.
-    fn advance_guarded(&mut self, next: &[State], now_ns: Nanoseconds, door: &mut impl Door) -> bool {
+    fn advance_guarded(
+        &mut self,
+        next: &[State],
+        now_ns: Nanoseconds,
+        host: &mut impl HostInterface,
+    ) -> bool {
         let period_s = self.period_s;
         if let Some((axis, violation)) = self.violation(next, |axis, state| axis.check(state, period_s)) {
             let was_stopping = self.phase == Phase::Stopping;
-            self.refuse(axis, violation, now_ns, door);
+            self.refuse(axis, violation, now_ns, host);
             if was_stopping {
                 self.come_to_rest();
             } else {
-                self.follow_stop(now_ns, door);
+                self.follow_stop(now_ns, host);
             }
             return false;
         }
@@ -272,9 +277,9 @@ impl Engine {
     }
 
     /// The first cycle of a stop that was begun instead of taking a set-point.
-    fn follow_stop(&mut self, now_ns: Nanoseconds, door: &mut impl Door) {
+    fn follow_stop(&mut self, now_ns: Nanoseconds, host: &mut impl HostInterface) {
         if self.phase == Phase::Stopping {
-            self.follow_motion(now_ns, door);
+            self.follow_motion(now_ns, host);
         } else {
             self.come_to_rest();
         }

@@ -18,11 +18,11 @@ use arrayvec::ArrayVec;
 use crate::axis::{Axis, FeedbackSince};
 use crate::cia402::Goal;
 use crate::dispatch::Dispatch;
-use crate::door::{AxisSnapshot, Door, Snapshot, StreamCommand};
 use crate::frame::Frame;
+use crate::host::{AxisSnapshot, HostInterface, Snapshot, StreamCommand};
 use crate::motion::Motion;
 use crate::port::BusHealth;
-use crate::record::{CycleRecord, Event, EventKind, MAX_AXES, MAX_BUSES, Timing};
+use crate::record::{CycleRecord, CycleTiming, Event, EventKind, MAX_AXES, MAX_BUSES};
 use crate::stop::{Phase, StopCategories, StopReason};
 use crate::time::{NANOSECONDS_PER_SECOND, Nanoseconds};
 use crate::time_of_day::TimeProducer;
@@ -141,7 +141,7 @@ pub struct Engine {
     last_slot: Option<u64>,
     missed_slots: u64,
     dropped: u64,
-    drive_states: [crate::cia402::State; MAX_AXES],
+    drive_states: [crate::cia402::DriveState; MAX_AXES],
     record: CycleRecord,
     /// Also the place where the answers to requests are kept.
     snapshot: Snapshot,
@@ -239,9 +239,9 @@ impl Engine {
         self.is_leaving
     }
 
-    fn happened(&mut self, at_ns: Nanoseconds, kind: EventKind, door: &mut impl Door) {
+    fn happened(&mut self, at_ns: Nanoseconds, kind: EventKind, host: &mut impl HostInterface) {
         let slot = self.last_slot.unwrap_or(0);
-        if !door.event(&Event { slot, at_ns, kind }) {
+        if !host.event(&Event { slot, at_ns, kind }) {
             self.dropped += 1;
         }
     }
@@ -255,10 +255,10 @@ impl Engine {
         now_ns: Nanoseconds,
         buses: &[BusHealth],
         transmission: Transmission,
-        door: &mut impl Door,
+        host: &mut impl HostInterface,
     ) -> bool {
         let elapsed = self.last_slot.map_or(1, |last| slot.saturating_sub(last));
-        self.count_slot(slot, elapsed, transmission, now_ns, door);
+        self.count_slot(slot, elapsed, transmission, now_ns, host);
         if let Some(time) = &mut self.time {
             time.pass(elapsed, now_ns);
         }
@@ -275,20 +275,20 @@ impl Engine {
             }
             axis.watch();
         }
-        self.notice_drive_states(now_ns, door);
+        self.notice_drive_states(now_ns, host);
         for _ in 0..REQUESTS_PER_CYCLE {
-            match door.request() {
-                Some(asked) => self.take(&asked, now_ns, door),
+            match host.request() {
+                Some(asked) => self.take(&asked, now_ns, host),
                 None => break,
             }
         }
-        if let Some(command) = door.stream() {
+        if let Some(command) = host.stream() {
             self.stream = Some(command);
             self.bridged_cycles = self.bridged_cycles.saturating_sub(1);
         } else if self.phase == Phase::Streaming {
             self.bridged_cycles = MARKED_BY_BRIDGE;
         }
-        self.supervise(buses, transmission, now_ns, door);
+        self.supervise(buses, transmission, now_ns, host);
         // A group that stops and whose set-points do not get out does not wait for them any longer, whatever it stops for.
         let is_given_up = self.stop.is_some() && self.blocked_cycles > self.not_transmitted_cycles;
         let can_leave = match transmission {
@@ -298,7 +298,7 @@ impl Engine {
         };
         let has_commands = can_leave && self.phase != Phase::Passive;
         if has_commands {
-            self.act(now_ns, door);
+            self.act(now_ns, host);
             self.write_commands(slot);
         }
         self.command_by_service();
@@ -313,7 +313,7 @@ impl Engine {
         elapsed: u64,
         transmission: Transmission,
         now_ns: Nanoseconds,
-        door: &mut impl Door,
+        host: &mut impl HostInterface,
     ) {
         let missed = elapsed.saturating_sub(1) + u64::from(transmission == Transmission::TooLate);
         self.last_slot = Some(slot);
@@ -321,16 +321,16 @@ impl Engine {
         self.record.timing.missed_slots = missed;
         if missed > 0 {
             self.missed_slots += missed;
-            self.happened(now_ns, EventKind::MissedSlots { count: missed }, door);
+            self.happened(now_ns, EventKind::MissedSlots { count: missed }, host);
         }
         let level = self.ladder.level(self.missed.take(missed, self.ladder.leak_cycles));
         if level != self.timing_level {
             self.timing_level = level;
-            self.happened(now_ns, EventKind::Timing { level }, door);
+            self.happened(now_ns, EventKind::Timing { level }, host);
         }
     }
 
-    fn notice_drive_states(&mut self, now_ns: Nanoseconds, door: &mut impl Door) {
+    fn notice_drive_states(&mut self, now_ns: Nanoseconds, host: &mut impl HostInterface) {
         for index in 0..self.axes.len() {
             let (Some(axis), Some(known)) = (self.axes.get(index), self.drive_states.get_mut(index)) else {
                 continue;
@@ -338,24 +338,30 @@ impl Engine {
             let (state, statusword) = (axis.drive_state(), axis.statusword());
             if *known != state {
                 *known = state;
-                self.happened(now_ns, EventKind::DriveState { axis: index as u8, state, statusword }, door);
+                self.happened(now_ns, EventKind::DriveState { axis: index as u8, state, statusword }, host);
             }
         }
     }
 
     /// Begins a phase. One that is under way goes on, and what it may last counts from its first beginning.
-    fn enter(&mut self, phase: Phase, now_ns: Nanoseconds, door: &mut impl Door) {
+    fn enter(&mut self, phase: Phase, now_ns: Nanoseconds, host: &mut impl HostInterface) {
         if phase == self.phase {
             return;
         }
         let kind = EventKind::PhaseChanged { from: self.phase, to: phase };
-        self.happened(now_ns, kind, door);
+        self.happened(now_ns, kind, host);
         self.phase = phase;
         self.phase_cycles = 0;
     }
 
     /// Ends the cycle: leaves its record and shows the new state.
-    pub fn finish(&mut self, timing: Timing, now_ns: Nanoseconds, buses: &[BusHealth], door: &mut impl Door) {
+    pub fn finish(
+        &mut self,
+        timing: CycleTiming,
+        now_ns: Nanoseconds,
+        buses: &[BusHealth],
+        host: &mut impl HostInterface,
+    ) {
         if let Some(heartbeat) = self.heartbeat {
             match self.heartbeat_due {
                 0 => self.has_beaten(heartbeat),
@@ -363,16 +369,16 @@ impl Engine {
             }
         }
         let missed_slots = self.record.timing.missed_slots;
-        self.record.timing = Timing { missed_slots, ..timing };
+        self.record.timing = CycleTiming { missed_slots, ..timing };
         self.record.phase = self.phase;
         for (axis, record) in self.axes.iter().zip(&mut self.record.axes) {
             axis.record(self.period_s, record);
         }
-        if !door.record(&self.record) {
+        if !host.record(&self.record) {
             self.dropped += 1;
         }
         self.show(timing.slot, now_ns, buses);
-        door.publish(&self.snapshot);
+        host.publish(&self.snapshot);
     }
 
     fn show(&mut self, slot: u64, now_ns: Nanoseconds, buses: &[BusHealth]) {

@@ -2,23 +2,23 @@
 
 use crate::axis::Axis;
 use crate::control::ControlLaw;
-use crate::door::Move;
 use crate::guard;
+use crate::host::Move;
 use crate::plan::PlanError;
 use crate::profile::ProfileTarget;
-use crate::refusal::Objection;
+use crate::refusal::RejectReason;
 
 /// An objection with its particulars.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Obstacle {
-    pub objection: Objection,
+    pub objection: RejectReason,
     pub axis: Option<u8>,
     pub value: f64,
     pub limit: f64,
 }
 
-impl From<Objection> for Obstacle {
-    fn from(objection: Objection) -> Self {
+impl From<RejectReason> for Obstacle {
+    fn from(objection: RejectReason) -> Self {
         Self { objection, axis: None, value: 0.0, limit: 0.0 }
     }
 }
@@ -38,10 +38,10 @@ impl Obstacle {
     pub fn of_plan(error: PlanError, minimum_duration_s: f64) -> Self {
         match (error, error.axis()) {
             (PlanError::InvalidTiming, _) => {
-                Self::from(Objection::MinimumDuration).with(minimum_duration_s, 0.0)
+                Self::from(RejectReason::MinimumDuration).with(minimum_duration_s, 0.0)
             }
-            (_, Some(index)) => Self::from(Objection::NoTrajectory).of_axis(index),
-            (_, None) => Objection::NoTrajectory.into(),
+            (_, Some(index)) => Self::from(RejectReason::NoTrajectory).of_axis(index),
+            (_, None) => RejectReason::NoTrajectory.into(),
         }
     }
 }
@@ -50,15 +50,15 @@ impl Obstacle {
 pub(super) fn check_scales(wanted: &Move) -> Result<(), Obstacle> {
     let is_scale = |value: f64| value > 0.0 && value <= 1.0;
     for (objection, value) in [
-        (Objection::VelocityScale, wanted.velocity_scale),
-        (Objection::AccelerationScale, wanted.acceleration_scale),
+        (RejectReason::VelocityScale, wanted.velocity_scale),
+        (RejectReason::AccelerationScale, wanted.acceleration_scale),
     ] {
         if !is_scale(value) {
             return Err(Obstacle::from(objection).with(value, 1.0));
         }
     }
     if !wanted.minimum_duration_s.is_finite() {
-        return Err(Obstacle::from(Objection::MinimumDuration).with(wanted.minimum_duration_s, 0.0));
+        return Err(Obstacle::from(RejectReason::MinimumDuration).with(wanted.minimum_duration_s, 0.0));
     }
     Ok(())
 }
@@ -72,13 +72,13 @@ pub(super) fn check_target(axis: &Axis, position: f64, velocity: f64, period_s: 
         ControlLaw::ProfilePosition => 0.0,
         _ => velocity,
     };
-    check_position(axis, position, Objection::PositionLimit)?;
-    check_magnitude(velocity, limits.velocity, Objection::VelocityLimit)?;
+    check_position(axis, position, RejectReason::PositionLimit)?;
+    check_magnitude(velocity, limits.velocity, RejectReason::VelocityLimit)?;
     if velocity == 0.0 {
         return Ok(());
     }
     let way = velocity.abs() * period_s + guard::braking_distance(limits, velocity.abs(), 0.0);
-    check_position(axis, position + way.copysign(velocity), Objection::NoRoomToStop)
+    check_position(axis, position + way.copysign(velocity), RejectReason::NoRoomToStop)
 }
 
 /// Whether a target is of the kind that the axis' mode takes, and within its limits.
@@ -86,24 +86,24 @@ pub(super) fn check_profile_target(axis: &Axis, target: ProfileTarget) -> Result
     let parameters = axis.parameters();
     match (parameters.law, target) {
         (ControlLaw::ProfilePosition, ProfileTarget::Position(position)) => {
-            check_position(axis, position, Objection::PositionLimit)
+            check_position(axis, position, RejectReason::PositionLimit)
         }
         (ControlLaw::ProfileVelocity, ProfileTarget::Velocity(velocity)) => {
-            check_magnitude(velocity, parameters.limits.velocity, Objection::VelocityLimit)
+            check_magnitude(velocity, parameters.limits.velocity, RejectReason::VelocityLimit)
         }
         (ControlLaw::ProfileTorque, ProfileTarget::Torque(torque)) => {
-            check_magnitude(torque, parameters.limits.torque, Objection::TorqueLimit)
+            check_magnitude(torque, parameters.limits.torque, RejectReason::TorqueLimit)
         }
         (law, _) => {
-            Err(Obstacle::from(Objection::WrongMode).with(f64::from(law.operation_mode() as i8), 0.0))
+            Err(Obstacle::from(RejectReason::WrongMode).with(f64::from(law.operation_mode() as i8), 0.0))
         }
     }
 }
 
-fn check_position(axis: &Axis, position: f64, objection: Objection) -> Result<(), Obstacle> {
+fn check_position(axis: &Axis, position: f64, objection: RejectReason) -> Result<(), Obstacle> {
     let limits = &axis.parameters().limits;
     if !position.is_finite() {
-        return Err(Obstacle::from(Objection::NotFinite).with(position, 0.0));
+        return Err(Obstacle::from(RejectReason::NotFinite).with(position, 0.0));
     }
     if limits.contain(position) {
         return Ok(());
@@ -112,9 +112,9 @@ fn check_position(axis: &Axis, position: f64, objection: Objection) -> Result<()
     Err(Obstacle::from(objection).with(position, broken))
 }
 
-fn check_magnitude(value: f64, limit: f64, objection: Objection) -> Result<(), Obstacle> {
+fn check_magnitude(value: f64, limit: f64, objection: RejectReason) -> Result<(), Obstacle> {
     if !value.is_finite() {
-        Err(Obstacle::from(Objection::NotFinite).with(value, 0.0))
+        Err(Obstacle::from(RejectReason::NotFinite).with(value, 0.0))
     } else if value.abs() > limit {
         Err(Obstacle::from(objection).with(value, limit.copysign(value)))
     } else {

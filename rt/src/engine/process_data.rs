@@ -6,9 +6,9 @@ use super::Engine;
 use super::obstacle::Obstacle;
 use crate::axis::{CommandPdo, MAX_PDOS, Pdo};
 use crate::dispatch::IdTaken;
-use crate::door::{AxisProcessData, MappedPdo};
+use crate::host::{AxisProcessData, MappedPdo};
 use crate::pdo::{MAX_OBJECTS, MappedObject, Mapping, MappingError};
-use crate::refusal::Objection;
+use crate::refusal::RejectReason;
 use crate::stop::Phase;
 
 impl Engine {
@@ -29,10 +29,10 @@ impl Engine {
         let feedback: ArrayVec<Pdo, MAX_PDOS> = feedback.collect::<Result<_, _>>().map_err(unmapped)?;
         // An engine has a table for every bus of an axis, and a place for every axis in it.
         let (Some(table), Some(axis)) = (self.dispatch.get_mut(bus), self.axes.get_mut(index)) else {
-            return Err(Objection::UnknownAxis.into());
+            return Err(RejectReason::UnknownAxis.into());
         };
         if commands.is_empty() || feedback.is_empty() {
-            return Err(Objection::NoProcessData.into());
+            return Err(RejectReason::NoProcessData.into());
         }
         let mut changed = table.clone();
         changed.forget_process_data(data.axis);
@@ -58,11 +58,11 @@ fn unmapped(error: MappingError) -> Obstacle {
         | MappingError::Width { object }
         | MappingError::NothingToSend { object } => object.parameter(),
     };
-    Obstacle::from(Objection::Mapping).with(parameter.into(), 0.0)
+    Obstacle::from(RejectReason::Mapping).with(parameter.into(), 0.0)
 }
 
 fn taken(IdTaken { id }: IdTaken) -> Obstacle {
-    Obstacle::from(Objection::IdTaken).with(id.value().into(), 0.0)
+    Obstacle::from(RejectReason::IdTaken).with(id.value().into(), 0.0)
 }
 
 fn objects(pdo: &MappedPdo) -> ArrayVec<MappedObject, MAX_OBJECTS> {

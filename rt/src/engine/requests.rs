@@ -4,12 +4,12 @@ use super::obstacle::{Obstacle, check_profile_target, check_scales, check_target
 use super::{Engine, FAULT_RESET_CYCLES};
 use crate::axis::Axis;
 use crate::cia402::Goal;
-use crate::door::{Asked, Door, Move, ProfileMove, Request};
+use crate::host::{HostInterface, Move, ProfileMove, Request, RequestEnvelope};
 use crate::motion::Leg;
 use crate::plan::State;
 use crate::profile::ProfileTarget;
 use crate::record::EventKind;
-use crate::refusal::{Objection, Refusal};
+use crate::refusal::{Refusal, RejectReason};
 use crate::stop::{Origin, Phase, Rule, StopCategory};
 use crate::time::Nanoseconds;
 use crate::watch::TimingLevel;
@@ -18,8 +18,13 @@ use crate::watch::TimingLevel;
 type Answered = Result<(), Obstacle>;
 
 impl Engine {
-    pub(super) fn take(&mut self, asked: &Asked, now_ns: Nanoseconds, door: &mut impl Door) {
-        let obstacle = self.answer(&asked.request, now_ns, door).err();
+    pub(super) fn take(
+        &mut self,
+        asked: &RequestEnvelope,
+        now_ns: Nanoseconds,
+        host: &mut impl HostInterface,
+    ) {
+        let obstacle = self.answer(&asked.request, now_ns, host).err();
         let refusal = obstacle.map(|Obstacle { objection, axis, value, limit }| Refusal {
             request: asked.request.kind(),
             objection,
@@ -31,11 +36,11 @@ impl Engine {
         self.snapshot.answers.note(asked.id, refusal);
         if let Some(refusal) = refusal {
             self.snapshot.refused += 1;
-            self.happened(now_ns, EventKind::Refused(refusal), door);
+            self.happened(now_ns, EventKind::Refused(refusal), host);
         }
     }
 
-    fn answer(&mut self, request: &Request, now_ns: Nanoseconds, door: &mut impl Door) -> Answered {
+    fn answer(&mut self, request: &Request, now_ns: Nanoseconds, host: &mut impl HostInterface) -> Answered {
         match request {
             Request::Sync(on) => {
                 if *on && !self.is_sync_on {
@@ -44,44 +49,44 @@ impl Engine {
                 self.is_sync_on = *on;
             }
             Request::TimeOfDay { at_zero_ns } => {
-                self.time.as_mut().ok_or(Objection::NoTime)?.set(*at_zero_ns);
+                self.time.as_mut().ok_or(RejectReason::NoTime)?.set(*at_zero_ns);
             }
             Request::RatedTorque { axis, torque } => {
                 // What is commanded in per mille of it would leap.
                 self.require_phase(&[Phase::Passive, Phase::Disabled])?;
                 if !self.axis_mut(*axis)?.set_rated_torque(*torque) {
-                    return Err(Obstacle::from(Objection::RatedTorque)
+                    return Err(Obstacle::from(RejectReason::RatedTorque)
                         .of_axis((*axis).into())
                         .with(*torque, 0.0));
                 }
             }
             Request::ProcessData(data) => self.set_process_data(data)?,
             Request::Position { axis, counts } => self.axis_mut(*axis)?.set_reported_position(*counts),
-            Request::Activate => self.activate(now_ns, door)?,
-            Request::Enable => self.begin_enable(now_ns, door)?,
-            Request::Move(parameters) => self.begin_move(parameters, now_ns, door)?,
-            Request::SetProfileTarget(target) => self.set_profile_target(target, now_ns, door)?,
-            Request::Stream => self.begin_stream(now_ns, door)?,
+            Request::Activate => self.activate(now_ns, host)?,
+            Request::Enable => self.begin_enable(now_ns, host)?,
+            Request::Move(parameters) => self.begin_move(parameters, now_ns, host)?,
+            Request::SetProfileTarget(target) => self.set_profile_target(target, now_ns, host)?,
+            Request::Stream => self.begin_stream(now_ns, host)?,
             Request::Stop(category) => {
-                self.begin_stop(Rule::Requested, Some(*category), Origin::Group, 0.0, 0.0, now_ns, door);
+                self.begin_stop(Rule::Requested, Some(*category), Origin::Group, 0.0, 0.0, now_ns, host);
             }
-            Request::Disable => self.begin_disable(now_ns, door)?,
+            Request::Disable => self.begin_disable(now_ns, host)?,
             Request::ResetFaults => self.reset_faults()?,
-            Request::Retire => self.is_retired = true,
-            Request::Leave => self.is_leaving = true,
+            Request::InhibitEnable => self.is_retired = true,
+            Request::Shutdown => self.is_leaving = true,
         }
         Ok(())
     }
 
     pub(super) fn require_phase(&self, possible: &[Phase]) -> Answered {
-        if possible.contains(&self.phase) { Ok(()) } else { Err(Objection::Phase.into()) }
+        if possible.contains(&self.phase) { Ok(()) } else { Err(RejectReason::Phase.into()) }
     }
 
     /// A fault that has stopped the group must be reset before anything moves.
     fn require_no_fault(&self) -> Answered {
         match self.stop.filter(|stop| stop.rule != Rule::Requested) {
             Some(stop) => {
-                let latched = Obstacle::from(Objection::StopLatched);
+                let latched = Obstacle::from(RejectReason::StopLatched);
                 Err(Obstacle { axis: stop.axis(), ..latched }.with(f64::from(stop.rule as u8), 0.0))
             }
             None => Ok(()),
@@ -89,13 +94,14 @@ impl Engine {
     }
 
     pub(super) fn axis_mut(&mut self, number: u8) -> Result<&mut Axis, Obstacle> {
-        let unknown = Obstacle::from(Objection::UnknownAxis).with(f64::from(number), self.axes.len() as f64);
+        let unknown =
+            Obstacle::from(RejectReason::UnknownAxis).with(f64::from(number), self.axes.len() as f64);
         self.axes.get_mut(usize::from(number)).ok_or(unknown)
     }
 
-    fn begin_enable(&mut self, now_ns: Nanoseconds, door: &mut impl Door) -> Answered {
+    fn begin_enable(&mut self, now_ns: Nanoseconds, host: &mut impl HostInterface) -> Answered {
         if self.is_retired {
-            return Err(Objection::Retired.into());
+            return Err(RejectReason::EnableInhibited.into());
         }
         self.require_phase(&[Phase::Disabled])?;
         self.require_no_fault()?;
@@ -103,21 +109,21 @@ impl Engine {
         self.begin_watch();
         self.goal = Goal::Enabled;
         self.hasten_heartbeats();
-        self.enter(Phase::Enabling, now_ns, door);
+        self.enter(Phase::Enabling, now_ns, host);
         Ok(())
     }
 
-    fn begin_stream(&mut self, now_ns: Nanoseconds, door: &mut impl Door) -> Answered {
+    fn begin_stream(&mut self, now_ns: Nanoseconds, host: &mut impl HostInterface) -> Answered {
         self.require_phase(&[Phase::Holding])?;
         self.require_no_fault()?;
         if self.timing_level >= TimingLevel::Degraded {
             let (missed, limit) = (self.missed.filled(), self.ladder.degraded);
-            return Err(Obstacle::from(Objection::MissedSlots).with(missed.into(), limit.into()));
+            return Err(Obstacle::from(RejectReason::MissedSlots).with(missed.into(), limit.into()));
         }
         self.stop = None;
         self.stream = None;
         self.is_stream_begun = false;
-        self.enter(Phase::Streaming, now_ns, door);
+        self.enter(Phase::Streaming, now_ns, host);
         Ok(())
     }
 
@@ -128,15 +134,20 @@ impl Engine {
         self.missed.empty();
     }
 
-    fn activate(&mut self, now_ns: Nanoseconds, door: &mut impl Door) -> Answered {
+    fn activate(&mut self, now_ns: Nanoseconds, host: &mut impl HostInterface) -> Answered {
         self.require_phase(&[Phase::Passive])?;
         self.goal = Goal::Disabled;
         self.axes.iter_mut().for_each(Axis::start_from_actual);
-        self.enter(Phase::Disabled, now_ns, door);
+        self.enter(Phase::Disabled, now_ns, host);
         Ok(())
     }
 
-    fn begin_move(&mut self, parameters: &Move, now_ns: Nanoseconds, door: &mut impl Door) -> Answered {
+    fn begin_move(
+        &mut self,
+        parameters: &Move,
+        now_ns: Nanoseconds,
+        host: &mut impl HostInterface,
+    ) -> Answered {
         self.require_phase(&[Phase::Holding, Phase::Moving])?;
         self.require_no_fault()?;
         check_scales(parameters)?;
@@ -167,7 +178,7 @@ impl Engine {
         }
         self.stop = None;
         self.move_id = parameters.id;
-        self.enter(Phase::Moving, now_ns, door);
+        self.enter(Phase::Moving, now_ns, host);
         Ok(())
     }
 
@@ -175,7 +186,7 @@ impl Engine {
         &mut self,
         wanted: &ProfileMove,
         now_ns: Nanoseconds,
-        door: &mut impl Door,
+        host: &mut impl HostInterface,
     ) -> Answered {
         let index = usize::from(wanted.axis);
         self.require_phase(&[Phase::Holding, Phase::Moving])?;
@@ -189,13 +200,13 @@ impl Engine {
         self.axis_mut(wanted.axis)?.set_profile_target(wanted.target, wanted.valid_until_ns);
         self.stop = None;
         self.move_id = wanted.id;
-        self.enter(Phase::Moving, now_ns, door);
+        self.enter(Phase::Moving, now_ns, host);
         Ok(())
     }
 
-    fn begin_disable(&mut self, now_ns: Nanoseconds, door: &mut impl Door) -> Answered {
+    fn begin_disable(&mut self, now_ns: Nanoseconds, host: &mut impl HostInterface) -> Answered {
         match self.phase {
-            Phase::Passive => return Err(Objection::Phase.into()),
+            Phase::Passive => return Err(RejectReason::Phase.into()),
             Phase::Disabled | Phase::Disabling => {}
             _ if self.must_come_to_rest() || self.phase == Phase::Stopping => {
                 self.begin_stop(
@@ -205,12 +216,12 @@ impl Engine {
                     0.0,
                     0.0,
                     now_ns,
-                    door,
+                    host,
                 );
             }
             _ => {
                 self.goal = Goal::Disabled;
-                self.enter(Phase::Disabling, now_ns, door);
+                self.enter(Phase::Disabling, now_ns, host);
             }
         }
         Ok(())

@@ -4,7 +4,7 @@ use super::{BusSet, Engine, Transmission};
 use crate::axis::Axis;
 use crate::cia402::Goal;
 use crate::control::ControlLaw;
-use crate::door::Door;
+use crate::host::HostInterface;
 use crate::plan::{PlanError, State};
 use crate::port::{BusHealth, BusState};
 use crate::record::EventKind;
@@ -18,7 +18,7 @@ impl Engine {
         buses: &[BusHealth],
         transmission: Transmission,
         now_ns: Nanoseconds,
-        door: &mut impl Door,
+        host: &mut impl HostInterface,
     ) {
         let is_held_back = transmission == Transmission::Blocked || !self.held_back.is_empty();
         let not_taken = core::mem::take(&mut self.not_taken);
@@ -37,14 +37,14 @@ impl Engine {
                 BusState::ErrorPassive => Rule::BusErrorPassive,
                 BusState::ErrorActive => continue,
             };
-            self.begin_stop(rule, None, Origin::Bus(bus as u8), 0.0, 0.0, now_ns, door);
+            self.begin_stop(rule, None, Origin::Bus(bus as u8), 0.0, 0.0, now_ns, host);
         }
         if let Some((bus, id)) = self.foreign_id.take() {
-            self.begin_stop(Rule::ForeignMaster, None, Origin::Bus(bus), id.into(), 0.0, now_ns, door);
+            self.begin_stop(Rule::ForeignMaster, None, Origin::Bus(bus), id.into(), 0.0, now_ns, host);
         }
         if self.timing_level == TimingLevel::Unfit {
             let (slots, limit) = (self.missed.filled().into(), self.ladder.unfit.into());
-            self.begin_stop(Rule::TimingUnfit, None, Origin::Group, slots, limit, now_ns, door);
+            self.begin_stop(Rule::TimingUnfit, None, Origin::Group, slots, limit, now_ns, host);
         }
         if self.blocked_cycles > self.not_transmitted_cycles {
             let (cycles, limit) = (self.blocked_cycles.into(), self.not_transmitted_cycles.into());
@@ -57,7 +57,7 @@ impl Engine {
                 }
             }
             let origin = self.slowest_bus(not_taken).map_or(Origin::Group, |bus| Origin::Bus(bus as u8));
-            self.begin_stop(Rule::NotTransmitted, None, origin, cycles, limit, now_ns, door);
+            self.begin_stop(Rule::NotTransmitted, None, origin, cycles, limit, now_ns, host);
         }
         for index in 0..self.axes.len() {
             let Some(axis) = self.axes.get_mut(index) else { continue };
@@ -70,7 +70,7 @@ impl Engine {
             let Some((rule, value, limit)) = complaint else {
                 continue;
             };
-            self.begin_stop(rule, None, Origin::Axis(index as u8), value, limit, now_ns, door);
+            self.begin_stop(rule, None, Origin::Axis(index as u8), value, limit, now_ns, host);
         }
     }
 
@@ -92,7 +92,7 @@ impl Engine {
         value: f64,
         limit: f64,
         now_ns: Nanoseconds,
-        door: &mut impl Door,
+        host: &mut impl HostInterface,
     ) {
         let wanted = self.possible(category.unwrap_or(self.categories.of(rule)));
         let slot = self.last_slot.unwrap_or(0);
@@ -107,10 +107,10 @@ impl Engine {
                 // Nobody has asked for a reset of this one.
                 self.fault_reset = 0;
             }
-            self.happened(now_ns, EventKind::Stop(StopReason { category: hardest, ..reason }), door);
+            self.happened(now_ns, EventKind::Stop(StopReason { category: hardest, ..reason }), host);
         }
         if present.is_none_or(|present| wanted < present.category) {
-            self.carry_out(wanted, now_ns, door);
+            self.carry_out(wanted, now_ns, host);
         }
     }
 
@@ -139,7 +139,7 @@ impl Engine {
         }
     }
 
-    fn carry_out(&mut self, category: StopCategory, now_ns: Nanoseconds, door: &mut impl Door) {
+    fn carry_out(&mut self, category: StopCategory, now_ns: Nanoseconds, host: &mut impl HostInterface) {
         match (self.phase, category) {
             (Phase::Passive | Phase::Disabled, _) => {}
             (_, StopCategory::Zero) => {
@@ -149,21 +149,21 @@ impl Engine {
                     self.motion.cancel();
                 }
                 self.goal = Goal::NoVoltage;
-                self.enter(Phase::Disabling, now_ns, door);
+                self.enter(Phase::Disabling, now_ns, host);
             }
             _ if self.is_under_way() || category == StopCategory::One && self.must_come_to_rest() => {
                 if self.plan_stop().is_ok() {
-                    self.enter(Phase::Stopping, now_ns, door);
+                    self.enter(Phase::Stopping, now_ns, host);
                 } else {
                     // No trajectory to rest can be computed: the drives' own brakes are what is left.
                     self.motion.cancel();
                     self.goal = Goal::NoVoltage;
-                    self.enter(Phase::Disabling, now_ns, door);
+                    self.enter(Phase::Disabling, now_ns, host);
                 }
             }
             (Phase::Enabling, _) | (Phase::Holding, StopCategory::One) => {
                 self.goal = Goal::Disabled;
-                self.enter(Phase::Disabling, now_ns, door);
+                self.enter(Phase::Disabling, now_ns, host);
             }
             _ => {}
         }

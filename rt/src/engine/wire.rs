@@ -6,8 +6,8 @@ use super::{
 use crate::axis::FeedbackSince;
 use crate::cia402::{Goal, controlword};
 use crate::dispatch::Destination;
-use crate::door::Door;
 use crate::frame::{Frame, Id};
+use crate::host::HostInterface;
 use crate::port::Received;
 use crate::record::EventKind;
 use crate::stop::Phase;
@@ -56,7 +56,7 @@ impl Engine {
     }
 
     /// Takes a frame that arrived on a bus.
-    pub fn receive(&mut self, bus: usize, received: &Received, door: &mut impl Door) {
+    pub fn receive(&mut self, bus: usize, received: &Received, host: &mut impl HostInterface) {
         let Some(table) = self.dispatch.get(bus) else { return };
         match table.destination(&received.frame) {
             Destination::Feedback { axis, pdo } => {
@@ -74,32 +74,32 @@ impl Engine {
                 self.happened(
                     received.at_ns,
                     EventKind::Emergency { axis, code, register, manufacturer },
-                    door,
+                    host,
                 );
-                self.hand_over(bus, received, door);
+                self.hand_over(bus, received, host);
             }
             Destination::ErrorControl { axis } => {
                 let state = received.frame.payload().first().copied();
                 if let (Some(axis), Some(state)) = (self.axes.get_mut(usize::from(axis)), state) {
                     axis.receive_error_control(state);
                 }
-                self.hand_over(bus, received, door);
+                self.hand_over(bus, received, host);
             }
             Destination::Foreign => {
                 self.foreign_id.get_or_insert((bus as u8, received.frame.id().value()));
                 self.hear_other_master(bus, &received.frame);
-                self.hand_over(bus, received, door);
+                self.hand_over(bus, received, host);
             }
             Destination::Unused => {}
             Destination::Service => {
                 self.hear_answer(bus, &received.frame);
-                self.hand_over(bus, received, door);
+                self.hand_over(bus, received, host);
             }
         }
     }
 
-    fn hand_over(&mut self, bus: usize, received: &Received, door: &mut impl Door) {
-        if !door.received(bus, received) {
+    fn hand_over(&mut self, bus: usize, received: &Received, host: &mut impl HostInterface) {
+        if !host.received(bus, received) {
             self.dropped += 1;
         }
     }
@@ -167,7 +167,7 @@ impl Engine {
     }
 
     /// The heartbeat and TIME when they are due, and service frames as far as the budget goes: what follows the set-points.
-    pub fn services(&mut self, bus: usize, door: &mut impl Door, batch: &mut SendBatch) {
+    pub fn services(&mut self, bus: usize, host: &mut impl HostInterface, batch: &mut SendBatch) {
         if let Some(heartbeat) = self.heartbeat.filter(|_| self.heartbeat_due == 0) {
             let _ = batch.try_push(Frame::of(Id::canopen(0x700, heartbeat.node), [NMT_OPERATIONAL]));
         }
@@ -182,7 +182,7 @@ impl Engine {
             _ => parameters.service_frames_active,
         };
         for _ in 0..budget.min(batch.remaining_capacity()) {
-            match self.last_word(bus).or_else(|| door.service_frame(bus)) {
+            match self.last_word(bus).or_else(|| host.service_frame(bus)) {
                 Some(frame) => batch.push(frame),
                 None => break,
             }

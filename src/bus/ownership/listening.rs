@@ -3,8 +3,7 @@
 
 use std::fmt;
 
-use takt_rt::frame::{Frame, FrameKind, Id};
-use takt_rt::time::Nanoseconds;
+use takt_rt::{Frame, FrameKind, Id, Nanoseconds};
 
 use crate::canopen::nmt::{NmtCommand, NmtTarget};
 use crate::config::{Config, defaults};

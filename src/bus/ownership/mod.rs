@@ -8,8 +8,7 @@ mod lock;
 use std::io;
 
 use takt_rt::linux::MonotonicClock;
-use takt_rt::port::{BusPort, Clock, ReceiveBatch};
-use takt_rt::time::Nanoseconds;
+use takt_rt::{BusPort, Clock, Nanoseconds, ReceiveBatch};
 
 use super::interface::{InterfaceError, InterfaceSettings, interface_index, prepare_interface};
 use super::socketcan::{SocketCanError, SocketCanOptions, open_socketcan};
@@ -278,8 +277,8 @@ mod tests {
     use std::os::unix::net::UnixDatagram;
     use std::path::Path;
 
-    use takt_rt::frame::{Frame, Id};
     use takt_rt::linux::SocketCanPort;
+    use takt_rt::{Frame, Id};
 
     use super::*;
     use crate::controller::VirtualClock;

@@ -1,13 +1,11 @@
 //! How a snapshot and a streamed command are laid out in 64-bit words.
 
-use takt_rt::cia402;
-use takt_rt::door::{AxisSnapshot, RequestId, Snapshot, StreamCommand};
 use takt_rt::plan;
-use takt_rt::port::{BusHealth, BusState};
-use takt_rt::record::{MAX_AXES, MAX_BUSES};
-use takt_rt::refusal::{Answers, Objection, Refusal, RequestKind};
-use takt_rt::stop::{Origin, Phase, Rule, StopCategory, StopReason};
-use takt_rt::watch::TimingLevel;
+use takt_rt::{
+    Answers, AxisSnapshot, BusHealth, BusState, DriveState, MAX_AXES, MAX_BUSES, Origin, Phase, Refusal,
+    RejectReason, RequestId, RequestKind, Rule, Snapshot, StopCategory, StopReason, StreamCommand,
+    TimingLevel,
+};
 
 use super::latest::Words;
 
@@ -41,7 +39,7 @@ pub const NO_SNAPSHOT: Snapshot = Snapshot {
         position: 0.0,
         velocity: 0.0,
         statusword: 0,
-        drive_state: cia402::State::NotReadyToSwitchOn,
+        drive_state: DriveState::NotReadyToSwitchOn,
         error_code: 0,
         is_heard: false,
         unanswered: 0,
@@ -148,8 +146,8 @@ fn take_answers(words: &mut Words<'_>) -> Answers {
         }
         let id = RequestId(words.take());
         let refusal = Refusal {
-            request: RequestKind::ALL.get(usize::from(request)).copied().unwrap_or(RequestKind::Leave),
-            objection: Objection::ALL.get(usize::from(objection)).copied().unwrap_or(Objection::Phase),
+            request: RequestKind::ALL.get(usize::from(request)).copied().unwrap_or(RequestKind::Shutdown),
+            objection: RejectReason::ALL.get(usize::from(objection)).copied().unwrap_or(RejectReason::Phase),
             axis: (packed >> 40 & 1 == 1).then_some((packed >> 32) as u8),
             value: words.take_f64(),
             limit: words.take_f64(),
@@ -278,8 +276,8 @@ fn phase_of(number: u8) -> Phase {
     Phase::ALL.get(usize::from(number)).copied().unwrap_or_default()
 }
 
-fn drive_state_of(number: u8) -> cia402::State {
-    cia402::State::ALL.get(usize::from(number)).copied().unwrap_or_default()
+fn drive_state_of(number: u8) -> DriveState {
+    DriveState::ALL.get(usize::from(number)).copied().unwrap_or_default()
 }
 
 fn pack([a, b, c, d]: [u8; 4]) -> u64 {
@@ -319,7 +317,7 @@ mod tests {
 
     fn refusals() -> impl Strategy<Value = Refusal> {
         let requests = prop::sample::select(&RequestKind::ALL[..]);
-        let objections = prop::sample::select(&Objection::ALL[..]);
+        let objections = prop::sample::select(&RejectReason::ALL[..]);
         let phases = prop::sample::select(&Phase::ALL[..]);
         (requests, objections, any::<Option<u8>>(), any::<(f64, f64)>(), phases).prop_map(
             |(request, objection, axis, (value, limit), phase)| Refusal {
@@ -334,7 +332,7 @@ mod tests {
     }
 
     fn axes() -> impl Strategy<Value = AxisSnapshot> {
-        let states = prop::sample::select(&cia402::State::ALL[..]);
+        let states = prop::sample::select(&DriveState::ALL[..]);
         (any::<(f64, f64, f64, u16, u16, bool, u16)>(), states).prop_map(
             |(
                 (position_set, position, velocity, statusword, error_code, is_heard, unanswered),

@@ -1,7 +1,6 @@
 //! Why a controller does not start, a command is not given, a motion does not get to its end.
 
-use takt_rt::refusal::Refusal;
-use takt_rt::stop::StopReason;
+use takt_rt::{Refusal, StopReason};
 
 use crate::controller::session::{Session, SessionError};
 use crate::telemetry::{Machine, words};

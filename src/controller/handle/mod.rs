@@ -27,15 +27,12 @@ use std::sync::mpsc;
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-use takt_rt::control::ControlLaw;
-use takt_rt::door::{Asked, Move, ProfileMove, Request, RequestId, Snapshot, StreamCommand};
 use takt_rt::linux::MonotonicClock;
 use takt_rt::plan::State;
-use takt_rt::port::Clock;
-use takt_rt::profile::ProfileTarget;
-use takt_rt::record::MAX_AXES;
-use takt_rt::refusal::Answer;
-use takt_rt::stop::{Phase, StopCategory};
+use takt_rt::{
+    Answer, Clock, ControlLaw, MAX_AXES, Move, Phase, ProfileMove, ProfileTarget, Request, RequestEnvelope,
+    RequestId, Snapshot, StopCategory, StreamCommand,
+};
 
 use super::channels::{Observer, RequestNumbers, Streamer};
 use super::outcome::{Interrupt, Outcome};
@@ -360,7 +357,7 @@ impl Controller {
 
     fn begin(&self, id: RequestId, request: Request, ends_at_rest: bool) -> Result<Motion, CommandError> {
         let slot = self.state().slot;
-        self.hand_in(Asked { id, request })?;
+        self.hand_in(RequestEnvelope { id, request })?;
         Ok(Motion { request: id, slot, ends_at_rest })
     }
 
@@ -382,10 +379,10 @@ impl Controller {
 
     fn ask(&self, request: Request) -> Result<RequestId, CommandError> {
         let id = self.numbers.next();
-        self.hand_in(Asked { id, request }).map(|()| id)
+        self.hand_in(RequestEnvelope { id, request }).map(|()| id)
     }
 
-    fn hand_in(&self, asked: Asked) -> Result<(), CommandError> {
+    fn hand_in(&self, asked: RequestEnvelope) -> Result<(), CommandError> {
         if self.has_ended() {
             Err(CommandError::Ended)
         } else if self.requests.ask(asked) {

@@ -1,11 +1,9 @@
 //! From the messages of a recording back to records.
 
-use takt_rt::cia402::State;
-use takt_rt::port::{BusHealth, BusState};
-use takt_rt::record::{AxisRecord, CycleRecord, EventKind, Timing};
-use takt_rt::refusal::{Objection, Refusal, RequestKind};
-use takt_rt::stop::{Origin, Phase, Rule, StopCategory, StopReason};
-use takt_rt::watch::TimingLevel;
+use takt_rt::{
+    AxisRecord, BusHealth, BusState, CycleRecord, CycleTiming, DriveState, EventKind, Origin, Phase, Refusal,
+    RejectReason, RequestKind, Rule, StopCategory, StopReason, TimingLevel,
+};
 
 use super::EventFields;
 use crate::bus::trace::TracedHealth;
@@ -15,7 +13,7 @@ use crate::telemetry::recorded::RecordedEvent;
 /// Decodes a [`CYCLE`](super::CYCLE), without its axes.
 pub fn decode_cycle(message: &[u8]) -> Option<CycleRecord> {
     let mut fields = CdrDecoder::begin(message)?;
-    let timing = Timing {
+    let timing = CycleTiming {
         slot: fields.u64()?,
         slot_start_ns: fields.u64()?,
         wake_ns: fields.u64()?,
@@ -105,8 +103,8 @@ pub(super) const BUS_STATES: [BusState; 4] =
     [BusState::ErrorActive, BusState::ErrorPassive, BusState::BusOff, BusState::Down];
 const CATEGORIES: [StopCategory; 3] = [StopCategory::Zero, StopCategory::One, StopCategory::Two];
 
-fn drive_state(number: u8) -> Option<State> {
-    State::ALL.get(usize::from(number)).copied()
+fn drive_state(number: u8) -> Option<DriveState> {
+    DriveState::ALL.get(usize::from(number)).copied()
 }
 
 fn phase(number: u8) -> Option<Phase> {
@@ -150,7 +148,7 @@ impl EventFields {
             5 => EventKind::MissedSlots { count: self.missed_slots },
             6 => EventKind::Refused(Refusal {
                 request: *RequestKind::ALL.get(usize::from(self.refusal?.0))?,
-                objection: *Objection::ALL.get(usize::from(self.refusal?.1))?,
+                objection: *RejectReason::ALL.get(usize::from(self.refusal?.1))?,
                 axis: self.axis,
                 value: self.value,
                 limit: self.limit,
@@ -167,7 +165,7 @@ mod tests {
     use super::*;
     use crate::telemetry::cdr::CdrEncoder;
     use crate::telemetry::messages::encode_event;
-    use takt_rt::record::Event;
+    use takt_rt::Event;
 
     const STOP: StopReason = StopReason {
         category: StopCategory::Two,
@@ -181,7 +179,7 @@ mod tests {
 
     const REFUSAL: Refusal = Refusal {
         request: RequestKind::Move,
-        objection: Objection::NoRoomToStop,
+        objection: RejectReason::NoRoomToStop,
         axis: Some(2),
         value: 3.25,
         limit: 3.0,
@@ -216,7 +214,7 @@ mod tests {
             EventKind::Stop(StopReason { origin: Origin::Group, ..STOP }),
             EventKind::Stop(StopReason { origin: Origin::Bus(1), ..STOP }),
             EventKind::MoveFinished { id: 9 },
-            EventKind::DriveState { axis: 2, state: State::OperationEnabled, statusword: 0x1637 },
+            EventKind::DriveState { axis: 2, state: DriveState::OperationEnabled, statusword: 0x1637 },
             EventKind::Timing { level: TimingLevel::Degraded },
             EventKind::Emergency { axis: 1, code: 0x7305, register: 0x21, manufacturer: [1, 2, 3, 4, 5] },
             EventKind::MissedSlots { count: 30 },

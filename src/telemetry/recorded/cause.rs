@@ -3,8 +3,7 @@
 use std::ops::RangeInclusive;
 
 use serde::Serialize;
-use takt_rt::record::EventKind;
-use takt_rt::stop::{Rule, StopReason};
+use takt_rt::{EventKind, Rule, StopReason};
 
 use super::Recorded;
 use crate::telemetry::words;

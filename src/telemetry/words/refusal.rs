@@ -1,8 +1,6 @@
 //! Refused requests in words.
 
-use takt_rt::pdo::MappedObject;
-use takt_rt::refusal::{Objection, Refusal, RequestKind};
-use takt_rt::stop::Rule;
+use takt_rt::{MappedObject, Refusal, RejectReason, RequestKind, Rule};
 
 use super::{mode, phase, rule_key};
 use crate::telemetry::machine::{Machine, Unit};
@@ -23,8 +21,8 @@ pub const fn request(kind: RequestKind) -> &'static str {
         RequestKind::Stop => "the stop",
         RequestKind::Disable => "disabling",
         RequestKind::ResetFaults => "the fault reset",
-        RequestKind::Retire => "retiring",
-        RequestKind::Leave => "leaving",
+        RequestKind::InhibitEnable => "retiring",
+        RequestKind::Shutdown => "leaving",
     }
 }
 
@@ -33,7 +31,7 @@ pub const fn request(kind: RequestKind) -> &'static str {
 pub fn refusal(refused: &Refusal, machine: &Machine) -> String {
     let (what, during) = (request(refused.request), phase(refused.phase));
     match refused.objection {
-        Objection::Phase => format!("{what} was refused: not possible while {during}"),
+        RejectReason::Phase => format!("{what} was refused: not possible while {during}"),
         _ => format!("{what} was refused while {during}: {}", objection(refused, machine)),
     }
 }
@@ -47,54 +45,54 @@ fn objection(refused: &Refusal, machine: &Machine) -> String {
         Unit::Metre => ("m", "N"),
     };
     match refused.objection {
-        Objection::Phase => format!("not possible while {}", phase(refused.phase)),
-        Objection::StopLatched => {
+        RejectReason::Phase => format!("not possible while {}", phase(refused.phase)),
+        RejectReason::StopLatched => {
             let rule = Rule::ALL.get(value as usize).copied();
             let of = refused.axis.map_or_else(String::new, |_| format!(" of {axis}"));
             let key = rule.map_or("unknown", rule_key);
             format!("the group has stopped for a fault{of} ({key}), which must be reset first")
         }
-        Objection::Retired => "the run is on its way out".to_owned(),
-        Objection::MissedSlots => {
+        RejectReason::EnableInhibited => "the run is on its way out".to_owned(),
+        RejectReason::MissedSlots => {
             format!("{value:.0} slots were missed of late, and from {limit:.0} on no stream is begun")
         }
-        Objection::UnknownAxis => {
+        RejectReason::UnknownAxis => {
             format!("there is no axis {value:.0}: there are {limit:.0}, counted from 0")
         }
-        Objection::WrongMode => format!("{axis} is in {}, which takes no such target", mode(value)),
-        Objection::NotFinite => format!("what was asked of {axis} is no finite number ({value})"),
-        Objection::PositionLimit => {
+        RejectReason::WrongMode => format!("{axis} is in {}, which takes no such target", mode(value)),
+        RejectReason::NotFinite => format!("what was asked of {axis} is no finite number ({value})"),
+        RejectReason::PositionLimit => {
             format!(
                 "{axis} cannot go to {value:.4} {length}, beyond its position limit of {limit:.4} {length}"
             )
         }
-        Objection::VelocityLimit => {
+        RejectReason::VelocityLimit => {
             format!("{value:.3} {length}/s is beyond the velocity limit of {axis}, {limit:.3} {length}/s")
         }
-        Objection::TorqueLimit => {
+        RejectReason::TorqueLimit => {
             format!("{value:.2} {force} is beyond the torque limit of {axis}, {limit:.2} {force}")
         }
-        Objection::NoRoomToStop => format!(
+        RejectReason::NoRoomToStop => format!(
             "at such a speed {axis} comes to rest only at {value:.4} {length}, beyond its position limit of \
              {limit:.4} {length}"
         ),
-        Objection::VelocityScale => {
+        RejectReason::VelocityScale => {
             format!("{value} is no fraction of the velocity limits, above 0 up to 1")
         }
-        Objection::AccelerationScale => {
+        RejectReason::AccelerationScale => {
             format!("{value} is no fraction of the acceleration limits, above 0 up to 1")
         }
-        Objection::MinimumDuration => format!("{value} s is no duration that it can have at least"),
-        Objection::NoTrajectory => format!("no trajectory within the limits of {axis} leads there"),
-        Objection::RatedTorque => format!("{value} {force} is no rated torque for {axis}"),
-        Objection::NoProcessData => format!("{axis} would have none in one direction"),
-        Objection::Mapping if value == 0.0 => format!("a PDO of {axis} has too many objects"),
-        Objection::Mapping => {
+        RejectReason::MinimumDuration => format!("{value} s is no duration that it can have at least"),
+        RejectReason::NoTrajectory => format!("no trajectory within the limits of {axis} leads there"),
+        RejectReason::RatedTorque => format!("{value} {force} is no rated torque for {axis}"),
+        RejectReason::NoProcessData => format!("{axis} would have none in one direction"),
+        RejectReason::Mapping if value == 0.0 => format!("a PDO of {axis} has too many objects"),
+        RejectReason::Mapping => {
             let MappedObject { index, subindex, bits } = MappedObject::from_parameter(value as u32);
             format!("{index:04X}:{subindex:02X} of {bits} bits cannot be in a PDO of {axis}")
         }
-        Objection::IdTaken => format!("identifier {:03X} for {axis} is in use", value as u32),
-        Objection::NoTime => "the drives are not told the time (`time` of [master])".to_owned(),
+        RejectReason::IdTaken => format!("identifier {:03X} for {axis} is in use", value as u32),
+        RejectReason::NoTime => "the drives are not told the time (`time` of [master])".to_owned(),
     }
 }
 
@@ -102,7 +100,7 @@ fn objection(refused: &Refusal, machine: &Machine) -> String {
 mod tests {
     use super::*;
     use crate::telemetry::machine::{AxisDescription, SetPointMagnitudes};
-    use takt_rt::stop::Phase;
+    use takt_rt::Phase;
 
     fn machine() -> Machine {
         let axis = |name: &str, unit| AxisDescription {
@@ -116,7 +114,7 @@ mod tests {
         Machine { name: "arm".to_owned(), cycle_ns: 1_000_000, axes, buses: vec![] }
     }
 
-    fn said(objection: Objection, axis: Option<u8>, value: f64, limit: f64) -> String {
+    fn said(objection: RejectReason, axis: Option<u8>, value: f64, limit: f64) -> String {
         let phase = Phase::Holding;
         refusal(&Refusal { request: RequestKind::Move, objection, axis, value, limit, phase }, &machine())
     }
@@ -126,43 +124,43 @@ mod tests {
         let begin = "the move was refused while holding: ";
         for (objection, axis, value, limit, why) in [
             (
-                Objection::PositionLimit,
+                RejectReason::PositionLimit,
                 Some(1),
                 1.25,
                 0.8,
                 "slide cannot go to 1.2500 m, beyond its position limit of 0.8000 m",
             ),
             (
-                Objection::StopLatched,
+                RejectReason::StopLatched,
                 Some(0),
                 f64::from(Rule::FollowingError as u8),
                 0.0,
                 "the group has stopped for a fault of shoulder (following_error), which must be reset first",
             ),
             (
-                Objection::NoRoomToStop,
+                RejectReason::NoRoomToStop,
                 Some(0),
                 -3.05,
                 -3.0,
                 "at such a speed shoulder comes to rest only at -3.0500 rad, beyond its position limit of -3.0000 rad",
             ),
             (
-                Objection::VelocityScale,
+                RejectReason::VelocityScale,
                 None,
                 1.5,
                 1.0,
                 "1.5 is no fraction of the velocity limits, above 0 up to 1",
             ),
-            (Objection::UnknownAxis, None, 7.0, 2.0, "there is no axis 7: there are 2, counted from 0"),
+            (RejectReason::UnknownAxis, None, 7.0, 2.0, "there is no axis 7: there are 2, counted from 0"),
             (
-                Objection::WrongMode,
+                RejectReason::WrongMode,
                 Some(0),
                 8.0,
                 0.0,
                 "shoulder is in mode 8 (cyclic synchronous position), which takes no such target",
             ),
             (
-                Objection::Mapping,
+                RejectReason::Mapping,
                 Some(1),
                 f64::from(0x2000_0110_u32),
                 0.0,
@@ -175,7 +173,7 @@ mod tests {
 
     #[test]
     fn no_two_objections_and_no_two_requests_are_said_in_the_same_words() {
-        let objections = Objection::ALL.map(|objection| said(objection, Some(0), 1.0, 2.0));
+        let objections = RejectReason::ALL.map(|objection| said(objection, Some(0), 1.0, 2.0));
         for (index, words) in objections.iter().enumerate() {
             assert!(!objections[..index].contains(words), "{words}");
         }

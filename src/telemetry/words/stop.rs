@@ -5,7 +5,7 @@
 //! code for a drive fault; the statusword for a drive that has disabled itself; object 6061 against 6060 for a
 //! changed mode; cycles for set-points not transmitted.
 
-use takt_rt::stop::{Rule, StopReason};
+use takt_rt::{Rule, StopReason};
 
 use super::{category, mode, phase};
 use crate::telemetry::machine::{Machine, Unit};
@@ -134,7 +134,7 @@ mod tests {
     use super::*;
     use crate::telemetry::words::rule_key;
     use crate::telemetry::words::tests::machine;
-    use takt_rt::stop::{Origin, Phase, StopCategory};
+    use takt_rt::{Origin, Phase, StopCategory};
 
     fn reason(rule: Rule, origin: Origin, value: f64, limit: f64) -> StopReason {
         StopReason { category: StopCategory::One, rule, origin, value, limit, slot: 9, phase: Phase::Moving }

@@ -5,19 +5,7 @@
 
 use core::f64::consts::TAU;
 
-use takt_rt::axis::{AxisParameters, CommandPdo, FeedbackSince, Pdo};
-use takt_rt::control::ControlLaw;
-use takt_rt::dialect::Dialect;
-use takt_rt::door::{Asked, Door, Request, RequestId, Snapshot, StreamCommand};
-use takt_rt::engine::{BusParameters, Engine, EngineParameters, SendBatch, Transmission};
-use takt_rt::frame::{Frame, Id};
-use takt_rt::guard::{AxisLimits, OnViolation};
-use takt_rt::pdo::{MappedObject, Mapping};
-use takt_rt::port::{BusHealth, Received};
-use takt_rt::record::{CycleRecord, Event, Timing};
-use takt_rt::stop::{Phase, StopCategories};
-use takt_rt::units::{Scale, ScaleParameters};
-use takt_rt::watch::TimingLadder;
+use takt_rt::{RequestEnvelope, AxisLimits, AxisParameters, BusHealth, BusParameters, CommandPdo, ControlLaw, CycleRecord, Dialect, HostInterface, Engine, EngineParameters, Event, FeedbackSince, Frame, Id, MappedObject, Mapping, OnViolation, Pdo, Phase, Received, Request, RequestId, Scale, ScaleParameters, SendBatch, Snapshot, StopCategories, StreamCommand, CycleTiming, TimingLadder, Transmission};
 
 // The C library gives the program its entry; nothing else of it is used.
 #[link(name = "c")]
@@ -38,10 +26,10 @@ struct Silent {
     requests: [Option<Request>; 3],
 }
 
-impl Door for Silent {
-    fn request(&mut self) -> Option<Asked> {
+impl HostInterface for Silent {
+    fn request(&mut self) -> Option<RequestEnvelope> {
         let numbered = self.requests.iter_mut().zip(1..);
-        numbered.filter_map(|(place, id)| Some(Asked { id: RequestId(id), request: place.take()? })).next()
+        numbered.filter_map(|(place, id)| Some(RequestEnvelope { id: RequestId(id), request: place.take()? })).next()
     }
     fn stream(&mut self) -> Option<StreamCommand> {
         None
@@ -126,18 +114,18 @@ fn cycles() -> Option<Phase> {
     };
     let mut engine = Engine::new(parameters).ok()?;
     let requests = [Some(Request::Sync(true)), Some(Request::Activate), Some(Request::Enable)];
-    let mut door = Silent { requests };
+    let mut host = Silent { requests };
     let health = [BusHealth::default()];
     for slot in 0..40 {
         let at_ns = slot * 1_000_000;
         // Ready to switch on, and operation enabled a while later.
         let statusword_low = if slot < 20 { 0x31 } else { 0x37 };
         let frame = Frame::of(Id::canopen(0x180, 1), [statusword_low, 0x12, 1, 0, 0, 0]);
-        engine.receive(0, &Received { frame, at_ns }, &mut door);
-        engine.compute(slot, at_ns, &health, Transmission::Free, &mut door);
+        engine.receive(0, &Received { frame, at_ns }, &mut host);
+        engine.compute(slot, at_ns, &health, Transmission::Free, &mut host);
         let mut batch = SendBatch::new();
         engine.set_points(0, slot, &mut batch);
-        engine.finish(Timing { slot, ..Timing::default() }, at_ns, &health, &mut door);
+        engine.finish(CycleTiming { slot, ..CycleTiming::default() }, at_ns, &health, &mut host);
     }
     Some(engine.phase())
 }

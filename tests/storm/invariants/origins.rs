@@ -1,7 +1,6 @@
 //! What a stop is said to concern is what it concerns: the axis that has the fault, the bus on which it is.
 
-use takt_rt::record::EventKind;
-use takt_rt::stop::{Origin, Rule, StopReason};
+use takt_rt::{EventKind, Origin, Rule, StopReason};
 
 use super::Seen;
 

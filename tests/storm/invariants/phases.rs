@@ -1,8 +1,7 @@
 //! The group's state machine: it never stays where it must pass, and every stop has one reason.
 
 use takt::config::{Config, Control};
-use takt_rt::record::EventKind;
-use takt_rt::stop::{Phase, Rule};
+use takt_rt::{EventKind, Phase, Rule};
 
 use super::Seen;
 use crate::bounds;

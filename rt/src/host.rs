@@ -1,7 +1,7 @@
 //! The door between the real-time thread and everything else: a handful of bounded, lock-free channels, seen from
 //! inside as this one trait. No call waits; a full channel drops, and says so.
 
-use crate::axis::{Cadence, MAX_PDOS};
+use crate::axis::{MAX_PDOS, TransmissionType};
 use crate::cia402;
 use crate::frame::{Frame, Id};
 use crate::pdo::{MAX_OBJECTS, MappedObject};
@@ -15,9 +15,9 @@ use crate::time::Nanoseconds;
 use crate::watch::TimingLevel;
 
 /// What the real-time thread asks of and tells the outside.
-pub trait Door {
+pub trait HostInterface {
     /// The oldest request that waits.
-    fn request(&mut self) -> Option<Asked>;
+    fn request(&mut self) -> Option<RequestEnvelope>;
 
     /// The newest streamed command, if one has come since the last call.
     fn stream(&mut self) -> Option<StreamCommand>;
@@ -44,7 +44,7 @@ pub struct RequestId(pub u64);
 
 /// A request with the number by which whoever asked finds out what came of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Asked {
+pub struct RequestEnvelope {
     /// The number.
     pub id: RequestId,
     /// The request.
@@ -87,7 +87,7 @@ pub enum Request {
     /// Give a drive in a profile mode a target. The group is moving until all its targets are reached, and as long as a
     /// velocity or a torque is wanted.
     SetProfileTarget(ProfileMove),
-    /// Follow [`Door::stream`].
+    /// Follow [`HostInterface::stream`].
     Stream,
     /// Stop by this category.
     Stop(StopCategory),
@@ -97,9 +97,9 @@ pub enum Request {
     ResetFaults,
     /// Enable nothing any more, whoever asks for it: the run is on its way out, and the drives' watchdogs are to be switched
     /// off.
-    Retire,
+    InhibitEnable,
     /// Leave the loop after this cycle. The drives get no more set-points.
-    Leave,
+    Shutdown,
 }
 
 impl Request {
@@ -119,8 +119,8 @@ impl Request {
             Self::Stop(_) => RequestKind::Stop,
             Self::Disable => RequestKind::Disable,
             Self::ResetFaults => RequestKind::ResetFaults,
-            Self::Retire => RequestKind::Retire,
-            Self::Leave => RequestKind::Leave,
+            Self::InhibitEnable => RequestKind::InhibitEnable,
+            Self::Shutdown => RequestKind::Shutdown,
         }
     }
 }
@@ -144,7 +144,7 @@ pub struct MappedPdo {
     /// The identifier.
     pub id: Id,
     /// When it is sent, if by us.
-    pub cadence: Cadence,
+    pub cadence: TransmissionType,
     /// What it carries, in order.
     pub objects: [Option<MappedObject>; MAX_OBJECTS],
 }
@@ -262,7 +262,7 @@ pub struct AxisSnapshot {
     /// Object 6041.
     pub statusword: u16,
     /// What it says of the drive.
-    pub drive_state: cia402::State,
+    pub drive_state: cia402::DriveState,
     /// Object 603F or the code of the last emergency message.
     pub error_code: u16,
     /// Whether the drive has reported since the controller became active.
