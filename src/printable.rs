@@ -1,4 +1,6 @@
-//! Text from a file that may be anybody's, as a terminal may be shown it.
+//! Text that somebody else has chosen (the contents and names of files, arguments), made safe to show on a terminal.
+
+use std::path::Path;
 
 /// The same text without what would move a terminal's cursor, colour what follows, or turn its direction. Every
 /// character that is replaced is as long as what stands in its place, so that places in the text stay what they are.
@@ -10,6 +12,11 @@ pub fn printable(text: &str) -> String {
         shown.push(if is_line_end { letter } else { replacement(letter) });
     }
     shown
+}
+
+/// A path, made safe in the same way.
+pub fn printable_path(path: &Path) -> String {
+    printable(&path.display().to_string())
 }
 
 const fn replacement(letter: char) -> char {

@@ -141,6 +141,12 @@ pub(super) fn interface_index(name: &str) -> Result<u32, InterfaceError> {
     index.map_err(|error| system(name, "reading its index", &error.into()))
 }
 
+/// How many frames the queue of an interface holds (`txqueuelen`); `None` where that cannot be read.
+pub fn transmit_queue_length(name: &str) -> Option<u32> {
+    let read = fs::read_to_string(can_folder(name).ok()?.join("tx_queue_len"));
+    read.ok()?.trim().parse().ok()
+}
+
 /// Reads what an interface is and how it is. Needs no right.
 pub fn interface_status(name: &str) -> Result<InterfaceStatus, InterfaceError> {
     let details = open(name)?.details().map_err(|error| system(name, "reading its state", &error))?;
@@ -160,9 +166,10 @@ pub fn prepare_interface(
     }
     let interface = open(name)?;
     let is_controller = status.has_controller;
-    let refused = |action, error: &socketcan::Error| match permission_error(error) {
-        true => InterfaceError::NotPermitted { name: name.into(), command: command(&status, settings) },
-        false => system(name, action, error),
+    let may_configure = may_configure(&fs::read_to_string("/proc/self/status").unwrap_or_default());
+    let refused = |action, error: &socketcan::Error| {
+        let command = command(&status, settings);
+        refusal(name, action, command, error, may_configure)
     };
     if is_controller {
         interface
@@ -276,6 +283,32 @@ fn command(status: &InterfaceStatus, settings: &InterfaceSettings) -> String {
     }
 }
 
+/// Why an interface was not brought up. A refusal of the kernel arrives as a missing acknowledgement, without its reason:
+/// whether it was for want of a right follows from the rights of this process.
+fn refusal(
+    name: &str,
+    action: &'static str,
+    command: String,
+    error: &socketcan::Error,
+    may_configure: bool,
+) -> InterfaceError {
+    if permission_error(error) || !may_configure {
+        return InterfaceError::NotPermitted { name: name.into(), command };
+    }
+    let reason = format!("{error}; the kernel says why after: {command}");
+    InterfaceError::System { name: name.into(), action, reason }
+}
+
+/// CAP_NET_ADMIN, as a bit of the sets of capabilities.
+const NET_ADMIN: u32 = 12;
+
+/// Whether a process may configure interfaces, as the kernel's status of it says.
+fn may_configure(status: &str) -> bool {
+    let effective = status.lines().find_map(|line| line.strip_prefix("CapEff:"));
+    let mask = effective.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
+    mask.is_some_and(|mask| mask >> NET_ADMIN & 1 == 1)
+}
+
 fn permission_error(error: &socketcan::Error) -> bool {
     let kind = match error {
         socketcan::Error::Io(error) => Some(error.kind()),
@@ -342,6 +375,27 @@ mod tests {
         let text = compare(&off, &CLASSIC).unwrap_err().to_string();
         assert!(text.ends_with("sudo ip link set can0 type can restart"), "{text}");
         assert!(compare(&InterfaceStatus { restart_ms: Some(100), ..off }, &CLASSIC).is_ok());
+    }
+
+    #[test]
+    fn an_interface_that_is_down_is_answered_with_the_command_that_brings_it_up() {
+        let down = InterfaceStatus { is_up: false, ..up(Some(1_000_000)) };
+        let no_reason = socketcan::Error::Nl(socketcan::nl::NlError::NoAck);
+        let text = |may_configure| {
+            refusal("can0", "bringing it up", command(&down, &CLASSIC), &no_reason, may_configure).to_string()
+        };
+        let command = "sudo ip link set can0 up type can bitrate 1000000 restart-ms 100";
+        let ordinary = format!("can0 is down and this process may not bring it up; to do so: {command}");
+        assert_eq!(text(false), ordinary);
+        assert!(text(true).ends_with(&format!("the kernel says why after: {command}")), "{}", text(true));
+    }
+
+    #[test]
+    fn the_right_to_configure_interfaces_is_seen_in_the_status_of_the_process() {
+        assert!(may_configure("CapPrm:\t0000000000000000\nCapEff:\t0000000000001000\n"));
+        assert!(may_configure("CapEff:\t000001ffffffffff\n"));
+        assert!(!may_configure("CapPrm:\t0000000000001000\nCapEff:\t0000000000000000\n"));
+        assert!(!may_configure(""));
     }
 
     #[test]

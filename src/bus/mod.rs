@@ -10,5 +10,6 @@ pub mod trace;
 
 pub use interface::{
     InterfaceError, InterfaceSettings, InterfaceStatus, Timing, interface_status, prepare_interface,
+    transmit_queue_length,
 };
 pub use socketcan::{SocketCanError, SocketCanOptions, open_socketcan};

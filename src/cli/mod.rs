@@ -10,6 +10,7 @@ mod doctor;
 mod drive;
 mod eds;
 mod exit;
+mod full_queue;
 mod interruption;
 mod jitter;
 mod lss;

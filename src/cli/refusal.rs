@@ -4,9 +4,11 @@ use std::ffi::OsStr;
 
 use serde::Serialize;
 use takt::config::ConfigError;
+use takt::printable::printable;
 
 use super::exit::Exit;
 use super::print;
+use super::say;
 
 /// Why nothing was done.
 pub enum Refusal {
@@ -40,7 +42,7 @@ impl Refusal {
                 Exit::Usage
             }
             Self::File(error) => {
-                say!("{:?}", miette::Report::new(error));
+                say::styled(&format!("{:?}", miette::Report::new(error)));
                 Exit::Usage
             }
         }
@@ -90,7 +92,13 @@ pub fn of_command_line(error: &clap::Error) -> Exit {
         let words = error.render().to_string();
         return Refusal::from(words.trim_start_matches("error: ").trim_end()).print(true);
     }
-    // Nobody may be there any more to read it.
-    let _ = error.print();
+    // clap shows the arguments as they are.
+    let words = error.render().to_string();
+    if error.use_stderr() && printable(&words) != words {
+        say!("{}", words.trim_end());
+    } else {
+        // Nobody may be there any more to read it.
+        let _ = error.print();
+    }
     if error.use_stderr() { Exit::Usage } else { Exit::Done }
 }

@@ -16,11 +16,12 @@ use takt::controller::realtime_thread::StartError;
 use takt::controller::session::{self, Session, SessionError, SessionOptions};
 use takt::controller::{Interrupt, Outcome, Progress};
 use takt::faults::{Fault, Rehearsal, Scenario, ScenarioError, Tidings};
-use takt::telemetry::{Destination, Machine, Notice, RealtimeReport, RunOutcome, RunReport, words};
-use takt_rt::{Event, EventKind, Snapshot, StopReason};
+use takt::telemetry::{Destination, Machine, Notice, RealtimeReport, RunEnd, RunOutcome, RunReport, words};
+use takt_rt::{Event, EventKind, StopReason};
 
 use super::configuration::{self, BusOverride};
 use super::exit::Exit;
+use super::full_queue::{self, FullQueues};
 use super::interruption;
 use super::ownership;
 use super::print;
@@ -54,13 +55,11 @@ pub struct Arguments {
     json: bool,
 }
 
-/// The report, and how the run ended.
+/// The report, with what is known beside it.
 #[derive(Serialize)]
 struct Printed<'a> {
     #[serde(flatten)]
     report: &'a RunReport,
-    /// `finished`, `interrupted`, `taken_over`, `stopped` or `failed`.
-    ended: &'static str,
     /// Why the run ended, in words, where it was neither its end, nor Ctrl-C, nor a stop of the group.
     failure: Option<String>,
     /// The axes whose drives could not be reached in the end.
@@ -105,7 +104,7 @@ pub fn run(arguments: Arguments) -> Exit {
     };
     let notify = notices(&bar, Machine::of(&config));
     let mut drawn = Drawn::new(bar.clone());
-    let mut hints = Hints::new(&config);
+    let mut full_queues = FullQueues::new(&config);
     let mut tidings = Tidings::default();
     let mut tell = || {
         let news = rehearsal.as_deref().map_or_else(Vec::new, |rehearsal| tidings.next(rehearsal));
@@ -113,7 +112,7 @@ pub fn run(arguments: Arguments) -> Exit {
     };
     let session = session::run(&config, options, notify, |snapshot, progress| {
         drawn.show(&progress);
-        hints.look(snapshot).for_each(|hint| bar.suspend(|| say!("takt: {hint}")));
+        full_queues.poll(snapshot).for_each(|hint| bar.suspend(|| say!("takt: {hint}")));
         tell();
         signals.next()
     });
@@ -164,7 +163,15 @@ fn refuse(error: &SessionError, is_json: bool) -> Exit {
 fn report(config: &Config, session: &Session, as_json: bool) -> Exit {
     let faults = session.ended.map_or(0, |ended| ended.page_faults.minor + ended.page_faults.major);
     let spin_guard_ns = session.ended.map_or(0, |ended| ended.spin_guard_ns);
+    let (ended, exit) = match session.outcome {
+        Outcome::Finished => (RunEnd::Finished, Exit::Done),
+        Outcome::Interrupted => (RunEnd::Interrupted, Exit::Interrupted),
+        Outcome::TakenOver { .. } => (RunEnd::TakenOver, Exit::Interrupted),
+        Outcome::Stopped(_) => (RunEnd::Stopped, Exit::Stopped),
+        _ => (RunEnd::Failed, Exit::Stopped),
+    };
     let outcome = RunOutcome {
+        ended,
         realtime: RealtimeReport::new(&session.begun.report, spin_guard_ns, faults),
         last: session.snapshot,
         buses_open_ns: session.open_ns,
@@ -177,18 +184,16 @@ fn report(config: &Config, session: &Session, as_json: bool) -> Exit {
     if !unreached.is_empty() {
         say!("takt: {}", unreachable(&unreached, &config.master));
     }
-    let failure = failure(&session.outcome, &session.log.machine);
-    let (ended, exit) = match session.outcome {
-        Outcome::Finished => ("finished", Exit::Done),
-        Outcome::Interrupted => ("interrupted", Exit::Interrupted),
-        Outcome::TakenOver { .. } => ("taken_over", Exit::Interrupted),
-        Outcome::Stopped(_) => ("stopped", Exit::Stopped),
-        _ => ("failed", Exit::Stopped),
-    };
+    let failure = failure(config, session);
+    let exit = if report.telemetry.not_written.is_empty() { exit } else { exit.and_failed() };
     if as_json {
-        return print::json(&Printed { report: &report, ended, failure, unreached }, exit);
+        return print::json(&Printed { report: &report, failure, unreached }, exit);
     }
     match failure {
+        Some(failure) if ended == RunEnd::TakenOver => {
+            say!("takt: {failure}");
+            print::text(&report.picture(print::emphasis()), exit)
+        }
         Some(failure) => {
             say!("takt: {failure}");
             report.telemetry.black_boxes.iter().for_each(|path| say!("black box: {}", path.display()));
@@ -223,9 +228,19 @@ fn unreachable(axes: &[&str], master: &Master) -> String {
 }
 
 /// What a report does not say by itself.
-fn failure(outcome: &Outcome, machine: &Machine) -> Option<String> {
-    let is_reported = matches!(outcome, Outcome::Finished | Outcome::Interrupted | Outcome::Stopped(_));
-    (!is_reported).then(|| outcome.words(machine))
+fn failure(config: &Config, session: &Session) -> Option<String> {
+    let words = session.outcome.words(&session.log.machine);
+    match session.outcome {
+        Outcome::Finished | Outcome::Interrupted | Outcome::Stopped(_) => None,
+        Outcome::BringUpFailed(_) | Outcome::NotHeard { .. } | Outcome::Stuck { .. } => {
+            // Whatever the drives were not told, they could not answer.
+            Some(
+                full_queue::cause(config, &session.snapshot)
+                    .map_or(words.clone(), |cause| format!("{words}; {cause}")),
+            )
+        }
+        _ => Some(words),
+    }
 }
 
 /// Ctrl-C and SIGTERM. The first asks for a controlled stop, the second for an immediate one.
@@ -284,32 +299,6 @@ impl Drawn {
     }
 }
 
-/// Says once for each bus what is the likely cause of frames that find no room.
-struct Hints {
-    /// The buses that nothing has been said of.
-    silent: Vec<(usize, String)>,
-}
-
-impl Hints {
-    fn new(config: &Config) -> Self {
-        Self { silent: config.buses.iter().map(|bus| bus.name.clone()).enumerate().collect() }
-    }
-
-    fn look(&mut self, snapshot: &Snapshot) -> impl Iterator<Item = String> {
-        let has_overrun =
-            |bus: &(usize, String)| snapshot.buses.get(bus.0).is_some_and(|health| health.tx_overruns > 0);
-        let (said, silent) = std::mem::take(&mut self.silent).into_iter().partition(has_overrun);
-        self.silent = silent;
-        let said: Vec<(usize, String)> = said;
-        said.into_iter().map(|(_, name)| {
-            format!(
-                "bus {name} takes no more frames: nobody acknowledges them. Is the drives' power on, is the bus \
-                 terminated, is the bit rate right?"
-            )
-        })
-    }
-}
-
 /// What is no part of an ordinary run.
 fn is_urgent(event: &Event) -> bool {
     matches!(event.kind, EventKind::Stop(_) | EventKind::Emergency { .. } | EventKind::Refused { .. })
@@ -326,24 +315,4 @@ fn notices(bar: &ProgressBar, machine: Machine) -> Box<dyn FnMut(&Notice) + Send
         };
         bar.suspend(|| say!("{text}"));
     })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn frames_that_find_no_room_are_explained_once_for_each_bus() {
-        let arm = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/arm6-erob.toml");
-        let Ok(config) = Config::load(&arm) else { panic!("the example is sound") };
-        let mut hints = Hints::new(&config);
-        let mut snapshot = Snapshot::default();
-        assert_eq!(hints.look(&snapshot).count(), 0);
-        snapshot.buses[1].tx_overruns = 1;
-        let said: Vec<String> = hints.look(&snapshot).collect();
-        assert!(said.len() == 1 && said[0].starts_with("bus wrist "), "{said:?}");
-        assert_eq!(hints.look(&snapshot).count(), 0);
-        snapshot.buses[0].tx_overruns = 1;
-        assert_eq!(hints.look(&snapshot).count(), 1);
-    }
 }

@@ -38,6 +38,8 @@ mod value;
 
 use std::path::Path;
 
+use crate::printable::printable_path;
+
 pub use data_type::{DataType, ValueKind};
 pub use dictionary::{
     AccessType, DeviceCommissioning, DeviceInfo, DictionaryEntry, DictionaryObject, FileInfo,
@@ -59,7 +61,7 @@ pub struct Loaded {
 
 /// Reads an EDS or DCF from a file.
 pub fn load(path: &Path) -> Result<Loaded, Findings> {
-    let name = path.display().to_string();
+    let name = printable_path(path);
     match crate::text_file::read(path) {
         Ok(bytes) => parse(&name, &bytes),
         Err(error) => Err(Findings::unreadable(&name, error.to_string())),

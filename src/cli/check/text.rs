@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use takt::bus::schedule::text::{message_name, microseconds, narrow, remedy, reserve, shortfall, sums};
 use takt::bus::schedule::{BusSchedule, MessageSchedule};
 use takt::config::{Bus, Config};
+use takt::printable::printable_path;
 
 use super::{AxisCheck, Check};
 use crate::cli::table::Table;
@@ -51,7 +52,7 @@ fn configuration_files(config: &Config) -> String {
         if text.is_empty() {
             text.push_str("\nConfiguration files\n");
         }
-        let (path, count) = (file.path.display(), file.downloads.len());
+        let (path, count) = (printable_path(&file.path), file.downloads.len());
         let _ = writeln!(text, "  {}: {count} writes from {path}", axis.name);
         for (object, omission) in &file.omitted {
             let _ = writeln!(text, "    not written: {object} ({omission})");

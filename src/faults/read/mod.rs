@@ -13,6 +13,7 @@ use crate::config::read::document;
 use crate::config::read::entry::Problems;
 use crate::config::read::section::Section;
 use crate::config::{Config, ConfigError, ProblemKind};
+use crate::printable::printable_path;
 
 /// More faults than this in one file are a slip.
 const FAULTS_AT_MOST: usize = 64;
@@ -40,7 +41,7 @@ impl Scenario {
     /// # Errors
     /// See [`ScenarioError`].
     pub fn load(path: &Path, config: &Config) -> Result<Self, ScenarioError> {
-        let name = path.display().to_string();
+        let name = printable_path(path);
         match crate::text_file::read(path) {
             Ok(bytes) => Ok(Self::parse(&name, &ConfigError::text_of(&name, bytes)?, config)?),
             Err(error) => Err(ScenarioError::Unreadable { path: name, reason: error.to_string() }),

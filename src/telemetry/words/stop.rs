@@ -24,7 +24,10 @@ pub fn stop_cause(stop: &StopReason, machine: &Machine) -> String {
             "the set-point of {axis}, {value:.4} {unit}, lay outside its position limit of {limit:.4} {unit}"
         ),
         Rule::VelocityLimit => {
-            format!("the set-point of {axis} asked for {value:.3} {unit}/s (allowed: {limit:.3} {unit}/s)")
+            // Asked for by a set-point, or measured where the drive plans its own motion (PP, PV, PT).
+            format!(
+                "the velocity of {axis}, {value:.3} {unit}/s, was beyond its limit of {limit:.3} {unit}/s"
+            )
         }
         Rule::AccelerationLimit => {
             format!("the set-point of {axis} asked for {value:.2} {unit}/s² (allowed: {limit:.2} {unit}/s²)")
@@ -183,7 +186,7 @@ mod tests {
                 Origin::Axis(1),
                 2.5,
                 2.0,
-                "the set-point of slide asked for 2.500 m/s (allowed: 2.000 m/s)",
+                "the velocity of slide, 2.500 m/s, was beyond its limit of 2.000 m/s",
             ),
             (
                 Rule::MissedFeedback,
