@@ -14,14 +14,14 @@ use crate::config::Bus;
 /// The hardware type of CAN interfaces (`ARPHRD_CAN`), as `/sys/class/net/NAME/type` gives it.
 const CAN_HARDWARE_TYPE: &str = "280";
 
-/// How fast a bus is to be, and how its controller recovers.
+/// The bit rates of a bus, and how its controller recovers from bus-off.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct InterfaceSettings {
     /// Bit/s of classic frames and of the arbitration phase.
     pub bit_rate: u32,
     /// Bit/s of the data phase of CAN FD frames; `None` for a classic bus.
     pub data_bit_rate: Option<u32>,
-    /// After how many milliseconds a controller that has gone off the bus comes back by itself; 0 never.
+    /// The time in milliseconds after which the kernel restarts a controller that is bus-off; 0 means never.
     pub restart_ms: u32,
 }
 
@@ -32,10 +32,10 @@ impl InterfaceSettings {
     }
 }
 
-/// What an interface is and how it is.
+/// The properties and the present state of an interface.
 #[derive(Clone, Debug, PartialEq)]
 pub struct InterfaceStatus {
-    /// Its name.
+    /// The name of the interface.
     pub name: String,
     /// Whether it is up.
     pub is_up: bool,
@@ -43,47 +43,47 @@ pub struct InterfaceStatus {
     pub has_fd: bool,
     /// The bit timing of its controller; `None` for a virtual interface, which has none, and for a controller
     /// that was never configured.
-    pub timing: Option<Timing>,
-    /// That of the data phase.
-    pub data_timing: Option<Timing>,
-    /// After how many milliseconds the controller comes back from bus-off by itself; 0 never. `None` for a
-    /// virtual interface.
+    pub timing: Option<ControllerTiming>,
+    /// The bit timing of the data phase of CAN FD frames.
+    pub data_timing: Option<ControllerTiming>,
+    /// The time in milliseconds after which the kernel restarts the controller after bus-off; 0 means never. `None`
+    /// for a virtual interface.
     pub restart_ms: Option<u32>,
     /// The controller's state.
     pub state: BusState,
-    /// The controller's transmit and receive error counters, where the driver tells them.
+    /// The controller's transmit and receive error counters, where the driver reports them.
     pub error_counters: Option<(u16, u16)>,
-    /// Whether there is a controller behind it, in contrast to vcan, vxcan and slcan.
+    /// Whether the interface has a CAN controller; vcan, vxcan and slcan have none.
     pub has_controller: bool,
 }
 
 /// The bit timing in force.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Timing {
+pub struct ControllerTiming {
     /// Bit/s.
     pub bit_rate: u32,
-    /// Where in the bit its level is sampled, 0 to 1.
+    /// The sample point as a part of the bit time, 0 to 1.
     pub sample_point: f64,
 }
 
-/// Why an interface cannot be used. The text ends with the command that mends it.
+/// Why an interface cannot be used. The message ends with the command that repairs it.
 #[derive(Debug, Error)]
 pub enum InterfaceError {
-    /// There is none of that name.
+    /// No interface has this name.
     #[error(
-        "there is no interface {name}; `ip -brief link` lists those there are (for a virtual one: sudo ip link add dev {name} type vcan)"
+        "there is no interface {name}; `ip -brief link` lists all interfaces (for a virtual one: sudo ip link add dev {name} type vcan)"
     )]
     Missing {
         /// The name asked for.
         name: String,
     },
-    /// It is another kind of network.
+    /// The interface belongs to another kind of network.
     #[error("{name} is not a CAN interface")]
     NotCan {
         /// The name asked for.
         name: String,
     },
-    /// It runs, at another bit rate. A running bus is not stopped behind the back of others that use it.
+    /// The interface is up at another bit rate. takt does not stop a bus that other programs may be using.
     #[error(
         "{name} runs at {found} bit/s and {wanted} are configured; to change it: sudo ip link set {name} down && {command}"
     )]
@@ -97,7 +97,7 @@ pub enum InterfaceError {
         /// The command that sets it up, once it is down.
         command: String,
     },
-    /// It does not carry CAN FD frames and is to do so.
+    /// CAN FD frames are configured, and the interface does not carry them.
     #[error("{name} does not carry CAN FD frames; to change it: sudo ip link set {name} down && {command}")]
     NoFd {
         /// The interface.
@@ -105,7 +105,7 @@ pub enum InterfaceError {
         /// The command that sets it up, once it is down.
         command: String,
     },
-    /// It is off the bus, and nothing brings it back by itself.
+    /// The controller is bus-off, and no automatic restart is configured.
     #[error(
         "{name} is bus-off and never restarts by itself; after the cause is found: sudo ip link set {name} type can restart"
     )]
@@ -121,7 +121,7 @@ pub enum InterfaceError {
         /// The command that brings it up.
         command: String,
     },
-    /// The system refused for another reason.
+    /// The kernel refused for another reason.
     #[error("{name}: {action}: {reason}")]
     System {
         /// The interface.
@@ -133,7 +133,7 @@ pub enum InterfaceError {
     },
 }
 
-/// The index that the kernel has given to an interface. No other interface has it, not even later ones.
+/// The index that the kernel has given to an interface. No other interface gets it, not even a later one.
 pub(super) fn interface_index(name: &str) -> Result<u32, InterfaceError> {
     let folder = can_folder(name)?;
     let read = fs::read_to_string(folder.join("ifindex"));
@@ -147,14 +147,14 @@ pub fn transmit_queue_length(name: &str) -> Option<u32> {
     read.ok()?.trim().parse().ok()
 }
 
-/// Reads what an interface is and how it is. Needs no right.
+/// Reads the properties and the state of an interface. Every user may do so.
 pub fn interface_status(name: &str) -> Result<InterfaceStatus, InterfaceError> {
     let details = open(name)?.details().map_err(|error| system(name, "reading its state", &error))?;
     Ok(status_of(name, &details))
 }
 
-/// Brings an interface up as the settings say, as far as that is needed and this process may, and returns how
-/// it is then. One that is up already is only compared: it belongs to whoever brought it up.
+/// Brings an interface up with these settings and returns its state. An interface that is up already is only compared
+/// with the settings: another program may be using it.
 pub fn prepare_interface(
     name: &str,
     settings: &InterfaceSettings,
@@ -189,10 +189,10 @@ fn open(name: &str) -> Result<CanInterface, InterfaceError> {
     CanInterface::open(name).map_err(|error| system(name, "opening it", &error))
 }
 
-/// Where the kernel tells of a CAN interface.
+/// The folder in which the kernel describes a CAN interface.
 fn can_folder(name: &str) -> Result<PathBuf, InterfaceError> {
     let folder = Path::new("/sys/class/net").join(name);
-    // A name with a slash is none of an interface's, and is not one of a file's either.
+    // No interface has a slash in its name; with one, the path would lead to another folder.
     if name.is_empty() || name.contains('/') || !folder.exists() {
         return Err(InterfaceError::Missing { name: name.into() });
     }
@@ -227,9 +227,11 @@ fn status_of(name: &str, details: &InterfaceDetails) -> InterfaceStatus {
 }
 
 /// A controller that was never configured has a bit rate of zero. The kernel gives the sample point in thousandths.
-fn timing_of(timing: CanBitTiming) -> Option<Timing> {
-    (timing.bitrate != 0)
-        .then(|| Timing { bit_rate: timing.bitrate, sample_point: f64::from(timing.sample_point) / 1_000.0 })
+fn timing_of(timing: CanBitTiming) -> Option<ControllerTiming> {
+    (timing.bitrate != 0).then(|| ControllerTiming {
+        bit_rate: timing.bitrate,
+        sample_point: f64::from(timing.sample_point) / 1_000.0,
+    })
 }
 
 /// The kernel chooses the sample point as CiA recommends (75 % above 800 kbit/s, 80 % above 500 kbit/s, else 87.5 %),
@@ -245,7 +247,7 @@ fn parameters(settings: &InterfaceSettings) -> InterfaceCanParams {
     }
 }
 
-/// Whether an interface that is up is as it is to be, or will be so by itself. A virtual one has no bit rate and takes any.
+/// Compares an interface that is up with the settings. A virtual interface has no bit rate and accepts any.
 fn compare(status: &InterfaceStatus, settings: &InterfaceSettings) -> Result<(), InterfaceError> {
     if status.state == BusState::BusOff && status.restart_ms == Some(0) {
         return Err(InterfaceError::IsOff { name: status.name.clone() });
@@ -269,7 +271,7 @@ fn compare(status: &InterfaceStatus, settings: &InterfaceSettings) -> Result<(),
     Ok(())
 }
 
-/// The command that brings the interface up as it is to be.
+/// The command that brings the interface up with these settings.
 fn command(status: &InterfaceStatus, settings: &InterfaceSettings) -> String {
     let name = &status.name;
     match (status.has_controller, settings.data_bit_rate) {
@@ -283,8 +285,8 @@ fn command(status: &InterfaceStatus, settings: &InterfaceSettings) -> String {
     }
 }
 
-/// Why an interface was not brought up. A refusal of the kernel arrives as a missing acknowledgement, without its reason:
-/// whether it was for want of a right follows from the rights of this process.
+/// Why an interface was not brought up. The netlink library reports a refusal of the kernel as a missing acknowledgement,
+/// without the reason. So the reason is taken from the capabilities of this process.
 fn refusal(
     name: &str,
     action: &'static str,
@@ -295,7 +297,7 @@ fn refusal(
     if permission_error(error) || !may_configure {
         return InterfaceError::NotPermitted { name: name.into(), command };
     }
-    let reason = format!("{error}; the kernel says why after: {command}");
+    let reason = format!("{error}; to see the kernel's reason: {command}");
     InterfaceError::System { name: name.into(), action, reason }
 }
 
@@ -327,7 +329,7 @@ mod tests {
     use super::*;
 
     fn up(timing: Option<u32>) -> InterfaceStatus {
-        let timing = timing.map(|bit_rate| Timing { bit_rate, sample_point: 0.875 });
+        let timing = timing.map(|bit_rate| ControllerTiming { bit_rate, sample_point: 0.875 });
         InterfaceStatus {
             name: "can0".into(),
             is_up: true,
@@ -387,7 +389,7 @@ mod tests {
         let command = "sudo ip link set can0 up type can bitrate 1000000 restart-ms 100";
         let ordinary = format!("can0 is down and this process may not bring it up; to do so: {command}");
         assert_eq!(text(false), ordinary);
-        assert!(text(true).ends_with(&format!("the kernel says why after: {command}")), "{}", text(true));
+        assert!(text(true).ends_with(&format!("to see the kernel's reason: {command}")), "{}", text(true));
     }
 
     #[test]

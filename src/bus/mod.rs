@@ -9,7 +9,7 @@ mod socketcan;
 pub mod trace;
 
 pub use interface::{
-    InterfaceError, InterfaceSettings, InterfaceStatus, Timing, interface_status, prepare_interface,
-    transmit_queue_length,
+    ControllerTiming, InterfaceError, InterfaceSettings, InterfaceStatus, interface_status,
+    prepare_interface, transmit_queue_length,
 };
 pub use socketcan::{SocketCanError, SocketCanOptions, open_socketcan};

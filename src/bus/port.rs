@@ -12,7 +12,7 @@ use crate::config::{Config, Interface};
 use crate::faults::{Breakable, CannotBreak, DriveTrouble, FaultyPort, Heard};
 use crate::sim::SimulatedBus;
 
-/// Frames on their way to the logger: almost a second of a full bus of 1 Mbit/s.
+/// Frames that the trace to the logger holds: almost one second of a fully loaded bus at 1 Mbit/s.
 const TRACE_FRAMES: usize = 1 << 13;
 
 /// A bus port of any kind.
@@ -21,16 +21,16 @@ pub enum Port {
     Simulated(Box<SimulatedBus>),
     /// A CAN interface of this machine.
     SocketCan(Box<SocketCanPort>),
-    /// Any port whose frames the logger sees too.
+    /// Any port whose frames are copied to the logger.
     Traced(Box<TracedPort<Port>>),
-    /// Any port with a fault on purpose.
+    /// Any port with injected faults.
     Faulty(Box<FaultyPort<Port>>),
 }
 
 /// A bus that cannot be opened.
 #[derive(Debug, thiserror::Error)]
 pub enum OpenError {
-    /// The interface is not as it must be.
+    /// The interface is missing, down or set up differently.
     #[error("bus `{bus}`: {error}")]
     Interface {
         /// The bus.
@@ -39,7 +39,7 @@ pub enum OpenError {
         #[source]
         error: InterfaceError,
     },
-    /// There is no socket on the interface.
+    /// No socket could be opened on the interface.
     #[error("bus `{bus}`: {error}")]
     Socket {
         /// The bus.
@@ -63,7 +63,7 @@ impl Port {
         }
     }
 
-    /// The simulated bus behind it, if it is one.
+    /// The simulated bus behind this port, if it is a simulated one.
     pub fn simulated_mut(&mut self) -> Option<&mut SimulatedBus> {
         match self {
             Self::Simulated(bus) => Some(bus),

@@ -17,14 +17,14 @@ mod lss;
 mod ownership;
 mod plan;
 mod print;
-mod refusal;
 mod report;
 mod run;
 mod sim;
 mod table;
+mod usage_error;
 
 pub use exit::Exit;
-pub use refusal::of_command_line as refuse;
+pub use usage_error::of_command_line as refuse;
 
 use clap::{Parser, Subcommand};
 

@@ -2,7 +2,7 @@
 
 use takt::bus::ownership::{ClaimError, IfOwned};
 
-use super::refusal::Refusal;
+use super::usage_error::UsageError;
 
 /// What `--take-over` asks for.
 pub const fn if_owned(take_over: bool) -> IfOwned {
@@ -10,7 +10,7 @@ pub const fn if_owned(take_over: bool) -> IfOwned {
 }
 
 /// Why a subcommand that has `--take-over` was refused.
-pub fn refusal(error: &ClaimError) -> Refusal {
+pub fn usage_error(error: &ClaimError) -> UsageError {
     if error.can_be_taken_over() {
         return format!("{error}, or add --take-over, which has it stop in control first").into();
     }

@@ -25,7 +25,7 @@ use super::full_queue::{self, FullQueues};
 use super::interruption;
 use super::ownership;
 use super::print;
-use super::refusal::Refusal;
+use super::usage_error::UsageError;
 
 /// Bring the drives up, run the motion program of a configuration, stop in control, and report.
 #[derive(Args, Debug)]
@@ -81,7 +81,7 @@ pub fn run(arguments: Arguments) -> Exit {
         Err(refusal) => return refusal.print(arguments.json),
     };
     if let Err(refused) = schedule::verify(&config) {
-        return Refusal::from(refused.to_string()).print(arguments.json);
+        return UsageError::from(refused.to_string()).print(arguments.json);
     }
     let rehearsal = match arguments.faults.as_deref().map(|path| rehearsal(path, &config)).transpose() {
         Ok(rehearsal) => rehearsal,
@@ -103,7 +103,7 @@ pub fn run(arguments: Arguments) -> Exit {
         if_owned: ownership::if_owned(arguments.take_over),
     };
     let notify = notices(&bar, Machine::of(&config));
-    let mut drawn = Drawn::new(bar.clone());
+    let mut throttled_bar = ThrottledBar::new(bar.clone());
     let mut full_queues = FullQueues::new(&config);
     let mut tidings = Tidings::default();
     let mut tell = || {
@@ -111,7 +111,7 @@ pub fn run(arguments: Arguments) -> Exit {
         news.iter().for_each(|tiding| bar.suspend(|| say!("takt: {tiding}")));
     };
     let session = session::run(&config, options, notify, |snapshot, progress| {
-        drawn.show(&progress);
+        throttled_bar.show(&progress);
         full_queues.poll(snapshot).for_each(|hint| bar.suspend(|| say!("takt: {hint}")));
         tell();
         signals.next()
@@ -124,10 +124,10 @@ pub fn run(arguments: Arguments) -> Exit {
     }
 }
 
-/// Reads a scenario. What a person should know before it is played on real drives is said.
-fn rehearsal(path: &Path, config: &Config) -> Result<Arc<Rehearsal>, Refusal> {
+/// Reads a scenario. Warns before faults are injected on real drives.
+fn rehearsal(path: &Path, config: &Config) -> Result<Arc<Rehearsal>, UsageError> {
     let scenario = Scenario::load(path, config).map_err(|error| match error {
-        ScenarioError::Wrong(error) => Refusal::from(error),
+        ScenarioError::Wrong(error) => UsageError::from(error),
         unreadable @ ScenarioError::Unreadable { .. } => unreadable.to_string().into(),
     })?;
     let is_real =
@@ -146,8 +146,8 @@ fn rehearsal(path: &Path, config: &Config) -> Result<Arc<Rehearsal>, Refusal> {
 fn refuse(error: &SessionError, is_json: bool) -> Exit {
     let report = match error {
         SessionError::Start(StartError::Refused(report)) => report,
-        SessionError::Claim(error) => return ownership::refusal(error).print(is_json),
-        error => return Refusal::from(error.to_string()).print(is_json),
+        SessionError::Claim(error) => return ownership::usage_error(error).print(is_json),
+        error => return UsageError::from(error.to_string()).print(is_json),
     };
     let realtime = RealtimeReport::new(report, 0, 0);
     if is_json {
@@ -211,7 +211,7 @@ fn stop_of(session: &Session) -> Option<StopReason> {
     }
 }
 
-/// What a person must know of drives that gave no answer any more.
+/// The warning about drives that no longer answered.
 fn unreachable(axes: &[&str], master: &Master) -> String {
     let by_themselves = match master.heartbeat_ns {
         Some(_) => format!(
@@ -221,19 +221,19 @@ fn unreachable(axes: &[&str], master: &Master) -> String {
         None => "nothing stops them, since `heartbeat` is off".to_owned(),
     };
     format!(
-        "{}: no answer in the end, so it is not known whether they have stopped; {by_themselves}. Look before you come near, \
+        "{}: no answer in the end, so it is not known whether they have stopped; {by_themselves}. Make sure of that before you come near, \
          and switch their power off before you repair the bus",
         axes.join(", ")
     )
 }
 
-/// What a report does not say by itself.
+/// Why the run ended, where the report does not say it.
 fn failure(config: &Config, session: &Session) -> Option<String> {
     let words = session.outcome.words(&session.log.machine);
     match session.outcome {
         Outcome::Finished | Outcome::Interrupted | Outcome::Stopped(_) => None,
         Outcome::BringUpFailed(_) | Outcome::NotHeard { .. } | Outcome::Stuck { .. } => {
-            // Whatever the drives were not told, they could not answer.
+            // A drive cannot answer a frame that it was not sent.
             Some(
                 full_queue::cause(config, &session.snapshot)
                     .map_or(words.clone(), |cause| format!("{words}; {cause}")),
@@ -274,13 +274,13 @@ fn progress_bar(config: &Config) -> ProgressBar {
     bar
 }
 
-/// A progress bar that is redrawn some times a second at most, and only when it has changed.
-struct Drawn {
+/// A progress bar that is updated at most ten times a second.
+struct ThrottledBar {
     bar: ProgressBar,
     last: Option<(Instant, Progress)>,
 }
 
-impl Drawn {
+impl ThrottledBar {
     const INTERVAL: Duration = Duration::from_millis(100);
 
     fn new(bar: ProgressBar) -> Self {
@@ -299,12 +299,12 @@ impl Drawn {
     }
 }
 
-/// What is no part of an ordinary run.
+/// Whether an event is not part of an ordinary run.
 fn is_urgent(event: &Event) -> bool {
     matches!(event.kind, EventKind::Stop(_) | EventKind::Emergency { .. } | EventKind::Refused { .. })
 }
 
-/// Says at once what people should not have to wait for.
+/// Prints messages that must not wait for the end of the run.
 fn notices(bar: &ProgressBar, machine: Machine) -> Box<dyn FnMut(&Notice) + Send> {
     let bar = bar.clone();
     Box::new(move |notice| {

@@ -16,7 +16,7 @@ use takt::sim::LiveDrives;
 use super::configuration::{self, BusOverride};
 use super::exit::Exit;
 use super::interruption;
-use super::refusal::Refusal;
+use super::usage_error::UsageError;
 
 /// Put the drives of a configuration, simulated, on real interfaces, for any master to talk to.
 #[derive(Args, Debug)]
@@ -37,11 +37,11 @@ pub fn run(arguments: &Arguments) -> Exit {
     // Held until the drives are gone.
     let locked = match lock(&config) {
         Ok(locked) => locked,
-        Err(error) => return Refusal::from(error.to_string()).print(false),
+        Err(error) => return UsageError::from(error.to_string()).print(false),
     };
     let drives = match open(&config) {
         Ok(drives) => drives,
-        Err(error) => return Refusal::from(error.to_string()).print(false),
+        Err(error) => return UsageError::from(error.to_string()).print(false),
     };
     if drives.is_empty() {
         say!("takt: no bus has a real interface; name one, for example: --bus {}=vcan0", first_bus(&config));
@@ -84,7 +84,7 @@ fn lock(config: &Config) -> Result<Vec<InterfaceLock>, ClaimError> {
     real.map(|(bus, interface)| lock_for_simulator(bus, interface)).collect()
 }
 
-/// The drives of every bus that has a real interface. They hear everything, as a node on a bus does.
+/// The drives of every bus that has a real interface. Their port has no filters: a node on a bus receives every frame.
 fn open(config: &Config) -> Result<Vec<(String, LiveDrives)>, OpenError> {
     let mut all = vec![];
     for (index, bus) in config.buses.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! The loop with nothing to do but to be on time.
+//! Runs the loop without any motion and measures its timing.
 
 use std::time::Duration;
 
@@ -14,10 +14,10 @@ use crate::controller::quiet;
 use crate::controller::realtime_thread::{self, Begun, StartError, Work};
 use crate::telemetry::Statistics;
 
-/// A pause between two looks at the loop; the ring of cycle records holds many times as much.
+/// The pause between two polls of the loop; the ring of cycle records holds many times as much.
 const PAUSE: Duration = Duration::from_millis(5);
 
-/// One axis, since a loop without any cannot be. It is never activated.
+/// One axis, because a loop needs at least one. It is never activated.
 const PASSIVE: &str = r#"
 name = "jitter"
 master = { heartbeat = "off" }
@@ -33,7 +33,7 @@ drive = "erob-canopen"
 limits = { position = [-1, 1], velocity = 1, acceleration = 1, torque = 1 }
 "#;
 
-/// What is measured.
+/// What to measure.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JitterOptions {
     /// The period of the cycle.
@@ -74,7 +74,7 @@ pub enum Pacing {
     SleepThenSpin,
 }
 
-/// What was measured.
+/// The result of a measurement.
 #[derive(Clone, Debug)]
 pub struct Measurement {
     /// How the loop waited.
@@ -95,10 +95,10 @@ pub struct Measurement {
     pub is_whole: bool,
 }
 
-/// Why nothing was measured.
+/// Why there is no measurement.
 #[derive(Debug, thiserror::Error)]
 pub enum JitterError {
-    /// The period is none that a cycle can have.
+    /// The period is outside the range of a cycle.
     #[error("{0}")]
     Config(#[from] ConfigError),
     /// The cycle cannot be set up.
@@ -110,7 +110,7 @@ pub enum JitterError {
     /// The interface cannot be opened.
     #[error(transparent)]
     Open(#[from] OpenError),
-    /// There is no thread.
+    /// The real-time thread could not be started.
     #[error(transparent)]
     Start(#[from] StartError),
     /// The loop ended by itself, which only a defect of takt can bring about.
@@ -147,7 +147,7 @@ pub fn measure(
         },
         is_realtime_required: false,
     };
-    // The ring of requests is empty: there is room for this one, and later for that to leave.
+    // The ring of requests is empty: there is room for this request, and later for the one to shut down.
     let _ = host.request(Request::Sync(has_bus));
     let running = realtime_thread::start(realtime_thread::thread_config(&options.realtime), work)?;
     let begun = running.begun();
@@ -175,7 +175,7 @@ pub fn measure(
     })
 }
 
-/// Takes the records that wait, as far as they are asked for; the loop runs a little longer.
+/// Takes the records that are waiting, up to the number asked for. The loop runs a little longer than that.
 fn collect(log: &mut LogSide, statistics: &mut Statistics, cycles: u64) {
     let is_wanted = |statistics: &Statistics| statistics.cycles < cycles;
     while is_wanted(statistics) && log.next_record(|record| statistics.add(record)).is_some() {}

@@ -10,10 +10,10 @@ use takt::commission::{Failure, ReadObject, Request, Subject};
 
 use super::super::configuration;
 
-/// Looking at a drive.
+/// Reading from a drive.
 #[derive(Subcommand, Debug)]
 pub enum Action {
-    /// Who the drive is and how it fares
+    /// Show the identity, the state and the errors of the drive
     Info,
     /// Read objects, by index:subindex or by name
     Read(Read),
@@ -71,7 +71,7 @@ impl Action {
         }
     }
 
-    /// What is asked of the drive.
+    /// The request to the drive.
     pub fn request(&self, subject: &Subject, is_raw: bool) -> Result<Request, Failure> {
         match self {
             Self::Info => Ok(Request::Info),

@@ -14,7 +14,7 @@ use takt::commission::{Failure, Request, Subject};
 use super::exit::Exit;
 use super::ownership::if_owned;
 
-/// Commission one drive: look at it, move it, set it up
+/// Commission one drive: inspect it, move it, set it up
 ///
 /// The drive is an axis of a configuration (`takt drive CONFIG AXIS …`; the axis may be left out where there is only
 /// one), or a node on an interface (`takt drive --bus can0 --node 1 --family erob-canopen …`), of which no limits are
@@ -34,10 +34,10 @@ pub struct Arguments {
     action: Action,
 }
 
-/// What every action knows.
+/// Options of every action.
 #[derive(Args, Clone, Copy, Debug)]
 struct Options {
-    /// Values are whole numbers of the drive's own units
+    /// Values are whole numbers in the drive's own units
     #[arg(long, global = true)]
     raw: bool,
     /// Show every step and every frame with its meaning
@@ -46,7 +46,7 @@ struct Options {
     /// Print the result as one JSON object (watch: one for each reading)
     #[arg(long, global = true)]
     json: bool,
-    /// Let the time of a simulated bus run as fast as it can
+    /// Run the time of a simulated bus as fast as possible
     #[arg(long, global = true)]
     fast: bool,
 }
@@ -80,7 +80,7 @@ impl Action {
     }
 }
 
-/// Does it.
+/// Runs it.
 pub fn run(arguments: &Arguments) -> Exit {
     let (subject, bus) = match arguments.target.resolve() {
         Ok(resolved) => resolved,

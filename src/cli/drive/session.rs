@@ -1,4 +1,4 @@
-//! Opens the bus, carries the procedure out, and shows what happens.
+//! Opens the bus, runs the procedure, and shows what happens.
 
 use std::cell::Cell;
 use std::sync::atomic::Ordering;
@@ -15,15 +15,15 @@ use takt_rt::{BusPort, BusState};
 use super::super::exit::Exit;
 use super::super::interruption;
 use super::super::ownership;
-use super::super::refusal::Refusal;
+use super::super::usage_error::UsageError;
 use super::Options;
 use super::output::Output;
 use super::target::Bus;
 
-/// How soon a controller that has gone off the bus comes back.
+/// The time in milliseconds after which the kernel restarts a controller that is bus-off.
 const RESTART_MS: u32 = 100;
 
-/// Does what is asked for.
+/// Runs a request on a drive.
 pub fn run(
     subject: Subject,
     request: Request,
@@ -36,11 +36,11 @@ pub fn run(
     let claim = claim(&bus, subject.node);
     let mut ownership = match Ownership::claim(claim.into_iter().collect(), if_owned) {
         Ok(ownership) => ownership,
-        Err(error) => return ownership::refusal(&error).print(options.json),
+        Err(error) => return ownership::usage_error(&error).print(options.json),
     };
     let mut port = match open(&bus) {
         Ok(port) => port,
-        Err(error) => return Refusal::from(error.to_string()).print(options.json),
+        Err(error) => return UsageError::from(error.to_string()).print(options.json),
     };
     let interrupted = match interruption::watch() {
         Ok(interrupted) => interrupted,
@@ -57,7 +57,7 @@ pub fn run(
         taken_over_by.set(asking.or(taken_over_by.get()));
         interrupted.swap(false, Ordering::Relaxed) || asking.is_some()
     };
-    // What nobody reads any more ends as on Ctrl-C.
+    // When the readings can no longer be printed, the procedure ends as after Ctrl-C.
     let see = |at_ns, seen| {
         let is_shown = output.see(at_ns, seen);
         interrupted.fetch_or(!is_shown, Ordering::Relaxed);
@@ -72,17 +72,17 @@ pub fn run(
         output.hint(&format!("{process} takes the bus over"));
     }
     let is_silent = matches!(&outcome, Err(failed) if matches!(failed.failure, Failure::Silent { .. }));
-    if is_silent && is_deaf(&mut port) {
+    if is_silent && is_unacknowledged(&mut port) {
         output.hint(
-            "nobody acknowledges a frame on this bus: is it plugged in and terminated, is the drives' power on, is the \
+            "no node on this bus acknowledges a frame: is it plugged in and terminated, is the drives' power on, is the \
              bit rate right?",
         );
     }
     output.finish(&outcome)
 }
 
-/// Whether nothing that was sent has been acknowledged by anybody.
-fn is_deaf(port: &mut Port) -> bool {
+/// Whether no frame that was sent has been acknowledged.
+fn is_unacknowledged(port: &mut Port) -> bool {
     let health = port.health();
     health.tx_frames == 0 || health.state != BusState::ErrorActive
 }
@@ -103,7 +103,7 @@ const fn settings(bit_rate: u32) -> InterfaceSettings {
     InterfaceSettings { bit_rate, data_bit_rate: None, restart_ms: RESTART_MS }
 }
 
-/// Everything on the bus is heard: a scan wants to know who is there.
+/// Opens the port without filters: a scan has to see all nodes.
 fn open(bus: &Bus) -> Result<Port, OpenError> {
     match bus {
         Bus::Configured { config, bus } => {
