@@ -89,7 +89,7 @@ fn people_get_tables_and_histograms_and_an_svg() {
     assert!(!text.contains('\x1b'), "colours are for terminals");
     let svg = fs::read_to_string(path).unwrap();
     assert!(svg.starts_with("<svg ") && svg.ends_with("</svg>\n"));
-    // Two histograms with a curve for each way of waiting.
+    // Two histograms with a curve for each kind of pacing.
     assert_eq!(svg.matches("<path ").count(), 4);
 }
 

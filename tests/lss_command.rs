@@ -65,7 +65,7 @@ fn a_device_that_had_a_node_number_keeps_it_until_it_is_reset_which_is_said() {
     let identity = KNOWN.split('@').next().unwrap();
     let output = simulated(&["--device", identity, "set-id", "12"]);
     ends_with(0, &output);
-    assert!(said(&output).contains("goes by its old node ID until it is reset"), "{}", said(&output));
+    assert!(said(&output).contains("keeps its old node ID until it is reset"), "{}", said(&output));
     assert!(!said(&output).contains("booted"), "{}", said(&output));
 }
 

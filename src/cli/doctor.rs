@@ -33,7 +33,7 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Exit {
     let config = match arguments.config.as_deref().map(|path| configuration::load(path, &[])).transpose() {
         Ok(config) => config,
-        Err(refusal) => return refusal.print(arguments.json),
+        Err(error) => return error.print(arguments.json),
     };
     let interrupted = match interruption::watch() {
         Ok(interrupted) => interrupted,

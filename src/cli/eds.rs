@@ -11,6 +11,7 @@ use takt::canopen::eds::{self, Findings, Severity};
 
 use super::exit::Exit;
 use super::print;
+use super::say;
 use view::View;
 
 /// Print the object dictionary of an EDS or DCF, with its PDOs and with what is wrong in the file
@@ -33,8 +34,8 @@ pub fn run(arguments: &Arguments) -> Exit {
         Err(findings) => {
             if arguments.json {
                 let problems = problems(&findings);
-                let refusal = UsageError { error: findings.to_string(), problems };
-                return print::indented_json(&refusal, Exit::Usage);
+                let printed = PrintedFindings { error: findings.to_string(), problems };
+                return print::indented_json(&printed, Exit::Usage);
             }
             show(findings);
             return Exit::Usage;
@@ -52,15 +53,16 @@ pub fn run(arguments: &Arguments) -> Exit {
     exit
 }
 
+/// A file that cannot be used, as an object.
 #[derive(Serialize)]
-struct UsageError {
+struct PrintedFindings {
     error: String,
-    problems: Vec<ProblemPicture>,
+    problems: Vec<PrintedProblem>,
 }
 
 /// A problem of the file.
 #[derive(Serialize)]
-struct ProblemPicture {
+struct PrintedProblem {
     severity: &'static str,
     line: usize,
     column: usize,
@@ -70,10 +72,10 @@ struct ProblemPicture {
     help: String,
 }
 
-fn problems(findings: &Findings) -> Vec<ProblemPicture> {
-    let view = |problem| {
+fn problems(findings: &Findings) -> Vec<PrintedProblem> {
+    let printed = |problem| {
         let place = findings.place(problem);
-        ProblemPicture {
+        PrintedProblem {
             severity: match problem.kind.severity() {
                 Severity::Warning => "warning",
                 Severity::Error => "error",
@@ -85,9 +87,9 @@ fn problems(findings: &Findings) -> Vec<ProblemPicture> {
             help: problem.kind.help(),
         }
     };
-    findings.problems().iter().map(view).collect()
+    findings.problems().iter().map(printed).collect()
 }
 
 fn show(findings: Findings) {
-    say!("{:?}", miette::Report::new(findings));
+    say::styled(&format!("{:?}", miette::Report::new(findings)));
 }

@@ -7,9 +7,9 @@ use takt_rt::{BusHealth, BusState, Snapshot};
 /// As many frames as takt hands to an interface at once, at most. A queue that is shorter can be full on a healthy bus.
 const FRAMES_AT_ONCE: u32 = 64;
 
-/// Says once for each bus why frames found no room.
+/// Explains once for each bus why frames found no room.
 pub struct FullQueues {
-    /// The buses of which nothing was said, with their index.
+    /// The buses that have not been explained yet, with their index.
     unmentioned: Vec<(usize, Bus)>,
 }
 
@@ -19,7 +19,7 @@ impl FullQueues {
         Self { unmentioned: config.buses.iter().cloned().enumerate().collect() }
     }
 
-    /// What is to be said now.
+    /// The explanations that are due now.
     pub fn poll(&mut self, snapshot: &Snapshot) -> impl Iterator<Item = String> + use<> {
         let mut said = vec![];
         self.unmentioned.retain(|(index, bus)| {
@@ -31,7 +31,7 @@ impl FullQueues {
     }
 }
 
-/// What a failure may come from when frames found no room; `None` when all of them did.
+/// The likely cause of a failure when frames found no room; `None` when none was lost.
 pub fn cause(config: &Config, snapshot: &Snapshot) -> Option<String> {
     let overrun = |(_, health): &(&Bus, &BusHealth)| health.tx_overruns > 0;
     let (bus, health) = config.buses.iter().zip(&snapshot.buses).find(overrun)?;
@@ -54,7 +54,7 @@ fn explanation(bus: &Bus, health: &BusHealth, queue_length: Option<u32>) -> Stri
     let is_acknowledged = health.tx_frames > 0 && health.state == BusState::ErrorActive;
     match queue_length {
         _ if !is_acknowledged => format!(
-            "bus {name} takes no more frames: nobody acknowledges them. Is the drives' power on, is the bus terminated, \
+            "bus {name} takes no more frames: no node acknowledges them. Is the drives' power on, is the bus terminated, \
              is the bit rate right?"
         ),
         Some(length) if length < FRAMES_AT_ONCE => format!(
@@ -107,7 +107,7 @@ mod tests {
         let unheard = BusHealth { tx_frames: 0, ..healthy };
         for health in [passive, unheard] {
             assert!(
-                said(&health, Some(1)).contains("nobody acknowledges them"),
+                said(&health, Some(1)).contains("no node acknowledges them"),
                 "{}",
                 said(&health, Some(1))
             );

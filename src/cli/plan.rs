@@ -32,7 +32,7 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Exit {
     match answer_all(arguments) {
         Ok(exit) => exit,
-        Err(refusal) => refusal.print(false),
+        Err(error) => error.print(false),
     }
 }
 

@@ -78,14 +78,14 @@ struct PrintedRefusal<'a> {
 pub fn run(arguments: Arguments) -> Exit {
     let config = match configuration::load(&arguments.config, &arguments.buses) {
         Ok(config) => config,
-        Err(refusal) => return refusal.print(arguments.json),
+        Err(error) => return error.print(arguments.json),
     };
     if let Err(refused) = schedule::verify(&config) {
         return UsageError::from(refused.to_string()).print(arguments.json);
     }
     let rehearsal = match arguments.faults.as_deref().map(|path| rehearsal(path, &config)).transpose() {
         Ok(rehearsal) => rehearsal,
-        Err(refusal) => return refusal.print(arguments.json),
+        Err(error) => return error.print(arguments.json),
     };
     let mut signals = match Signals::watch() {
         Ok(signals) => signals,

@@ -32,7 +32,7 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Exit {
     let config = match configuration::load(&arguments.config, &arguments.buses) {
         Ok(config) => config,
-        Err(refusal) => return refusal.print(false),
+        Err(error) => return error.print(false),
     };
     // Held until the drives are gone.
     let locked = match lock(&config) {

@@ -87,6 +87,9 @@ pub enum SessionError {
 /// Runs the program of a configuration. `notify` hears what the logger has to say, from its thread. `watch` is called
 /// about once in a millisecond with the newest state and what the run is doing, and may ask it to end.
 ///
+/// Before anything is sent, the real buses are locked and listened to, see [`crate::bus::ownership`]. Another process may ask
+/// for the buses later: the group then stops in category 2, and the run ends as [`Outcome::TakenOver`].
+///
 /// When `notify` or `watch` panics, the panic is caught, that one is not called again, and the group stops in category 1;
 /// the run then ends as [`Outcome::CallbackPanicked`].
 ///
@@ -115,12 +118,24 @@ pub(super) fn lead(
     config: &Config,
     options: SessionOptions,
     notify: Box<dyn FnMut(&Notice) + Send>,
+    watch: impl FnMut(&Snapshot, Progress) -> Option<Interrupt>,
+    remote: Option<Remote>,
+) -> Result<Session, SessionError> {
+    let ownership = Ownership::of(config, options.if_owned)?;
+    lead_as_owner(config, options, notify, watch, remote, ownership)
+}
+
+/// As [`lead`], on buses that are claimed already.
+fn lead_as_owner(
+    config: &Config,
+    options: SessionOptions,
+    notify: Box<dyn FnMut(&Notice) + Send>,
     mut watch: impl FnMut(&Snapshot, Progress) -> Option<Interrupt>,
     remote: Option<Remote>,
+    mut ownership: Ownership,
 ) -> Result<Session, SessionError> {
     let mut clock = MonotonicClock::default();
     let engine = Box::new(assemble::engine(config)?);
-    let mut ownership = Ownership::of(config, options.if_owned)?;
     let (ports, traces) = open_ports(config, options.rehearsal.as_deref())?;
     let (rt, mut host, log) = channels(&ChannelSizes::of(config));
     let mut supervisor = match remote {
@@ -254,4 +269,57 @@ fn open_ports(config: &Config, rehearsal: Option<&Rehearsal>) -> Result<(Vec<Por
         });
     }
     Ok((ports, traces))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+    use std::sync::atomic::{AtomicBool, Ordering};
+    use std::thread;
+
+    use takt_rt::{Phase, StopCategory};
+
+    use super::*;
+    use crate::bus::ownership::{InterfaceLock, LockError, Role};
+
+    /// Simulated buses need no lock: this one stands for that of a real interface.
+    #[test]
+    fn a_run_that_is_taken_over_stops_in_control_before_it_releases_its_buses() {
+        let interface = format!("test-session-{}", std::process::id());
+        let mut config = Config::load(Path::new("configs/single-erob.toml")).unwrap();
+        config.telemetry.is_recorded = false;
+        let ownership = Ownership::of_locks(vec![InterfaceLock::take(Role::Master, &interface).unwrap()]);
+        let has_moved = AtomicBool::new(false);
+        let session = thread::scope(|scope| {
+            let taking = scope.spawn(|| {
+                while !has_moved.load(Ordering::Relaxed) {
+                    thread::sleep(PAUSE);
+                }
+                assert!(matches!(InterfaceLock::take(Role::Master, &interface), Err(LockError::Held(_))));
+                InterfaceLock::take_over(Role::Master, &interface).unwrap()
+            });
+            // Without an end, so that only the other one ends it.
+            let options = SessionOptions { duration_ns: Some(600_000_000_000), ..SessionOptions::default() };
+            let watch = |snapshot: &Snapshot, _| {
+                has_moved.fetch_or(snapshot.phase == Phase::Moving, Ordering::Relaxed);
+                None
+            };
+            let session = lead_as_owner(&config, options, Box::new(|_| {}), watch, None, ownership).unwrap();
+            let _taken = taking.join().unwrap();
+            session
+        });
+        let pid = i32::try_from(std::process::id()).unwrap();
+        assert!(
+            matches!(session.outcome, Outcome::TakenOver { process } if process.pid == pid),
+            "{:?}",
+            session.outcome
+        );
+        let stop = session.snapshot.stop.expect("it was stopped");
+        assert_eq!((stop.category, stop.phase), (StopCategory::Two, Phase::Moving));
+        assert!(
+            matches!(session.snapshot.phase, Phase::Disabled | Phase::Passive),
+            "{:?}",
+            session.snapshot.phase
+        );
+    }
 }

@@ -1,5 +1,5 @@
-//! Whether another master is active on a bus, judged by what is heard before the first own frame. No I/O: frames and
-//! times go in, a verdict comes out.
+//! Detects another master from the frames that are received before the first own frame is sent. No I/O: frames and times
+//! go in, a verdict comes out.
 
 use std::fmt;
 
@@ -18,15 +18,15 @@ const LSS_REQUEST: u32 = 0x7E5;
 /// RPDO 1 to 4 of the pre-defined connection set (CiA 301, 7.3.3).
 const RPDO: [u16; 4] = [0x200, 0x300, 0x400, 0x500];
 
-/// It is listened for at least this long: the default heartbeat of a takt that runs elsewhere comes three times in it,
-/// and SYNC at its longest period of 100 ms as often.
+/// The shortest listening time. The default heartbeat of takt (100 ms) comes three times in it, and so does SYNC at the
+/// longest period of a cycle (100 ms).
 const SHORTEST_NS: Nanoseconds = 300_000_000;
-/// It is listened for at most this long: a configured heartbeat of a minute is not waited for.
+/// The longest listening time. A heartbeat that is configured to a minute is not awaited.
 const LONGEST_NS: Nanoseconds = 2_000_000_000;
-/// SYNC periods of the own configuration that are waited for.
+/// The listening time covers this many SYNC periods of the own configuration, and one and a half heartbeat periods.
 const SYNC_PERIODS: u64 = 3;
 
-/// What a bus is like, as far as a master can be recognised by it.
+/// The traffic by which another master is recognised on a bus.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MasterTraffic {
     /// The node ID of this master.
@@ -35,7 +35,7 @@ pub struct MasterTraffic {
     drives: Vec<u8>,
     /// Identifiers of set-points, with the node ID of the drive that obeys them.
     set_points: Vec<(Id, u8)>,
-    /// How long it takes to be sure.
+    /// How long to listen.
     duration_ns: Nanoseconds,
 }
 
@@ -46,7 +46,7 @@ impl MasterTraffic {
         let mut set_points: Vec<(Id, u8)> = axes().flat_map(|axis| rpdos(axis.node)).collect();
         for axis in axes() {
             let data = ProcessData::of(axis);
-            // Where a drive's mapping is its own, a RPDO of the pre-defined set may be its feedback.
+            // A drive may send its feedback with an identifier that the pre-defined connection set gives to an RPDO.
             let sent: Vec<Id> = data.feedback.iter().chain(&data.unused).map(|pdo| pdo.id).collect();
             set_points.retain(|(id, _)| !sent.contains(id));
             set_points.extend(data.commands.iter().map(|pdo| (pdo.id, axis.node)));
@@ -71,7 +71,7 @@ impl MasterTraffic {
         }
     }
 
-    /// What a frame tells of another master; `None` for all that a drive may send, too.
+    /// The activity of another master that a frame shows; `None` for frames that a drive or a reader may send.
     pub fn judge(&self, frame: &Frame) -> Option<HeardMaster> {
         let id = frame.id();
         if frame.kind() != FrameKind::Data || id.is_extended() {
@@ -173,7 +173,7 @@ const fn command_name(command: NmtCommand) -> &'static str {
     }
 }
 
-/// Listening to one bus for as long as another master could be silent.
+/// Listening on one bus, for longer than the pauses between the frames of another master.
 #[derive(Clone, Debug)]
 pub struct Listening {
     traffic: MasterTraffic,
@@ -181,10 +181,10 @@ pub struct Listening {
     heard: Option<HeardMaster>,
 }
 
-/// What has come of listening so far.
+/// The result of listening so far.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
-    /// Nothing yet; it is to be listened for longer.
+    /// No other master was heard yet.
     Undecided,
     /// No other master is active.
     Free,
@@ -193,7 +193,7 @@ pub enum Verdict {
 }
 
 impl Listening {
-    /// Begins now.
+    /// Begins to listen at this time.
     pub fn new(traffic: MasterTraffic, now_ns: Nanoseconds) -> Self {
         let end_ns = now_ns.saturating_add(traffic.duration_ns);
         Self { traffic, end_ns, heard: None }
@@ -204,7 +204,7 @@ impl Listening {
         self.heard = self.heard.or_else(|| self.traffic.judge(frame));
     }
 
-    /// What is known now.
+    /// The verdict at this time.
     pub fn verdict(&self, now_ns: Nanoseconds) -> Verdict {
         match self.heard {
             Some(heard) => Verdict::Occupied(heard),

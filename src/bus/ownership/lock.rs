@@ -1,9 +1,9 @@
 //! One master, and one simulator, for each CAN interface of a host.
 //!
-//! The lock is an abstract Unix socket that is named after the interface and listened on. The kernel lets go of it
-//! with the process, whatever ends that (`kill -9`, too); it needs no folder, no rights and no cleaning up; it holds
-//! between all users; and like the interface itself it belongs to one network namespace. Whoever connects is told by
-//! the kernel which process holds the lock, and may ask that process to come to a controlled stop and release it.
+//! The lock is a listening Unix socket with an abstract name, made from the role and the interface. The kernel removes
+//! it when the process ends, also after `kill -9`. It needs no folder, no rights and no cleaning up, and it works across
+//! users. Like the interface itself, the name belongs to one network namespace. A second process that connects learns
+//! from the kernel which process holds the lock. It may ask that process to stop in control and to release the lock.
 
 use std::fmt;
 use std::io::{self, ErrorKind, Read, Write};
@@ -15,21 +15,21 @@ use std::time::{Duration, Instant};
 use nix::sys::socket::{getsockopt, sockopt::PeerCredentials};
 use nix::unistd::geteuid;
 
-/// What is asked of the holder, and what the holder answers.
+/// The request to the holder, and its answers.
 const REQUEST: &[u8] = b"release\n";
 const AGREED: u8 = b'y';
 const DENIED: u8 = b'n';
 
-/// Between two attempts to take a lock that is just being taken or released.
+/// The pause before the next attempt, when another process is just taking or releasing the lock.
 const RETRY: Duration = Duration::from_millis(5);
-/// A holder that lives has answered a request by then; it looks for one about once in a millisecond.
+/// How long to wait for the answer. A healthy holder polls for requests about once in a millisecond.
 const ANSWER_PATIENCE: Duration = Duration::from_secs(2);
-/// A holder that stops in control has released the lock by then.
+/// How long to wait for the release. A controlled stop takes a few seconds at most.
 const RELEASE_PATIENCE: Duration = Duration::from_secs(30);
 /// Connections whose request has not arrived yet, at most. The oldest one is closed for a new one.
 const UNREAD_CONNECTIONS: usize = 16;
 
-/// What a process does on an interface. One of each may be on it.
+/// The role of a process on an interface. There may be one process of each role.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
     /// Commands the drives.
@@ -50,7 +50,7 @@ impl Role {
 /// A process at the other end of a lock.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Process {
-    /// Its process ID; 0 for one in a container, whose processes cannot be seen from here.
+    /// Its process ID; 0 for a process in a container, which cannot be seen from here.
     pub pid: i32,
     /// The user it belongs to.
     pub user: u32,
@@ -83,13 +83,13 @@ impl From<io::Error> for LockError {
 /// Why a lock was not released.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ReleaseError {
-    /// It belongs to another user, and only root and the same user may ask.
+    /// The holder belongs to another user; only that user and root may ask.
     #[error("it belongs to another user; only that user and root may have it stopped")]
     Denied,
-    /// It does not answer.
+    /// The holder does not answer.
     #[error("it does not answer")]
     Unanswered,
-    /// It has agreed, and has not come to an end.
+    /// The holder has agreed, and has not released the lock in time.
     #[error("it has agreed to stop and has not come to an end in {} s", RELEASE_PATIENCE.as_secs())]
     Unfinished,
 }
@@ -97,11 +97,11 @@ pub enum ReleaseError {
 /// The right to be master or simulator on an interface. Dropping it releases it.
 #[derive(Debug)]
 pub struct InterfaceLock {
-    // Dropped first: the name is free before those who wait for it are told.
+    // Dropped first: the name must be free before the waiting processes see the end of their connection.
     listener: UnixListener,
-    /// Those whose request has not arrived yet.
+    /// Connections whose request has not arrived yet.
     unread: Vec<UnixStream>,
-    /// Those who wait for the release, which is the end of the connection.
+    /// Connections of processes that wait for the release. They see it as the end of the connection.
     waiting: Vec<UnixStream>,
 }
 
@@ -128,7 +128,7 @@ impl InterfaceLock {
             }
             match UnixStream::connect_addr(&address) {
                 Ok(stream) => return Err(LockError::Held(peer(&stream)?)),
-                // The holder has bound it and does not listen yet, or has just released it.
+                // The holder has bound the socket and does not listen yet, or it has just released it.
                 Err(error)
                     if error.kind() == ErrorKind::ConnectionRefused && began.elapsed() < ANSWER_PATIENCE => {}
                 Err(error) => return Err(error.into()),
@@ -137,8 +137,8 @@ impl InterfaceLock {
         }
     }
 
-    /// As [`InterfaceLock::take`]; whoever has it is asked to come to a controlled stop and release it, and is waited
-    /// for.
+    /// Takes the lock. If another process holds it, that process is asked to stop in control and to release it, and this
+    /// call waits for that.
     ///
     /// # Errors
     /// [`TakeOverError`].
@@ -155,8 +155,8 @@ impl InterfaceLock {
         }
     }
 
-    /// Whether somebody who may do so asks for the lock. Once it is told, the holder is to stop in control and to drop
-    /// the lock. Does not block.
+    /// Answers requests for release. Returns the process that may take over; the holder is then to stop in control and to
+    /// drop the lock. Does not block.
     pub fn poll_release_request(&mut self) -> Option<Process> {
         while let Ok((stream, _)) = self.listener.accept() {
             if self.unread.len() == UNREAD_CONNECTIONS {
@@ -170,7 +170,7 @@ impl InterfaceLock {
         for stream in std::mem::take(&mut self.unread) {
             match read_request(&stream) {
                 Request::NotYet => self.unread.push(stream),
-                // Only wanted to know who holds the lock.
+                // The other process only wanted to know the holder.
                 Request::Other => {}
                 Request::Release(process) => {
                     let is_entitled = process.user == 0 || process.user == geteuid().as_raw();
@@ -227,13 +227,13 @@ fn peer(stream: &UnixStream) -> io::Result<Process> {
 fn ask_for_release(role: Role, interface: &str) -> io::Result<Result<(), ReleaseError>> {
     let mut stream = match UnixStream::connect_addr(&address(role, interface)?) {
         Ok(stream) => stream,
-        // It has just been released.
+        // The lock has just been released.
         Err(error) if error.kind() == ErrorKind::ConnectionRefused => return Ok(Ok(())),
         Err(error) => return Err(error),
     };
     stream.set_read_timeout(Some(ANSWER_PATIENCE))?;
     let mut answer = [0];
-    // A holder that has just come to its end is no error: what it has not read is then reset.
+    // If the holder has just ended, the connection is reset: that is a release, and no error.
     let answered = stream.write_all(REQUEST).and_then(|()| stream.read(&mut answer));
     match (answered, answer) {
         (Ok(1), [DENIED]) => return Ok(Err(ReleaseError::Denied)),

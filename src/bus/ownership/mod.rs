@@ -1,6 +1,8 @@
-//! One master for each bus. Before its first frame a process takes the lock of every real interface that it is to
-//! command, and listens whether another master is active there: two masters that command one arm move it in ways that
-//! neither of them has planned. Simulated buses belong to the process anyway.
+//! One master for each bus. Two masters that command one arm would move it in ways that neither of them has planned.
+//!
+//! So a process locks every real interface before it sends its first frame on it: see [`InterfaceLock`]. Then it listens
+//! there for a while, because another master may run on another host or be another program: see [`Listening`]. Simulated
+//! buses are inside the process and need neither.
 
 mod listening;
 mod lock;
@@ -17,7 +19,7 @@ use crate::config::{Config, Interface};
 pub use listening::{HeardMaster, Listening, MasterActivity, MasterTraffic, Verdict};
 pub use lock::{InterfaceLock, LockError, Process, ReleaseError, Role, TakeOverError};
 
-/// Between two looks at the buses that are listened to. A full bus of 1 Mbit/s has some forty frames in it.
+/// The pause between two polls of the buses. At most about forty frames pass a bus of 1 Mbit/s in it.
 const POLL_NS: Nanoseconds = 2_000_000;
 
 /// What happens when another process of this host is the master of an interface already.
@@ -26,8 +28,8 @@ pub enum IfOwned {
     /// The start is refused.
     #[default]
     Refuse,
-    /// That process is asked to come to a controlled stop, and is waited for. A master that takt cannot ask, on another
-    /// host or another program, is still a reason to refuse.
+    /// That process is asked to stop in control, and its end is awaited. Another master that cannot be asked, on another
+    /// host or of another program, is still refused.
     TakeOver,
 }
 
@@ -40,7 +42,7 @@ pub struct BusClaim {
     pub interface: String,
     /// How it is brought up if it is down.
     pub settings: InterfaceSettings,
-    /// How a master is recognised on it.
+    /// How another master is recognised on it.
     pub traffic: MasterTraffic,
 }
 
@@ -61,7 +63,7 @@ impl BusClaim {
 /// Why this process may not command a bus. Nothing has been sent then.
 #[derive(Debug, thiserror::Error)]
 pub enum ClaimError {
-    /// The interface is not as it must be.
+    /// The interface is missing, down or set up differently.
     #[error("bus `{bus}`: {error}")]
     Interface {
         /// The bus.
@@ -70,7 +72,7 @@ pub enum ClaimError {
         #[source]
         error: InterfaceError,
     },
-    /// There is no socket on the interface.
+    /// No socket could be opened on the interface.
     #[error("bus `{bus}`: {error}")]
     Socket {
         /// The bus.
@@ -79,7 +81,7 @@ pub enum ClaimError {
         #[source]
         error: SocketCanError,
     },
-    /// The system has no lock for us.
+    /// The lock could not be created.
     #[error("bus `{bus}`: locking {interface}: {error}")]
     Lock {
         /// The bus.
@@ -102,7 +104,7 @@ pub enum ClaimError {
         /// The process.
         holder: Process,
     },
-    /// A process of this host is the master of the interface and was not brought to release it.
+    /// A process of this host is the master of the interface and has not released it.
     #[error(
         "bus `{bus}`: {holder} is the master of {interface} and does not release it: {error}. Nothing was sent"
     )]
@@ -118,8 +120,8 @@ pub enum ClaimError {
     },
     /// Another master is active on the bus.
     #[error(
-        "bus `{bus}`: another master is active on {interface}: {heard} was heard. Nothing was sent. No takt on this host \
-         is that master, so that it cannot be asked to stop: stop it where it runs"
+        "bus `{bus}`: another master is active on {interface}: {heard} was heard. Nothing was sent. That master is no takt \
+         of this host and cannot be asked to stop: stop it first"
     )]
     OtherMaster {
         /// The bus.
@@ -163,13 +165,13 @@ impl Ownership {
         for claim in claims {
             indexed.push((index_of(&claim.bus, &claim.interface)?, claim));
         }
-        // Everybody takes them in the same order, so that no two processes wait for each other.
+        // All processes take the locks in the same order, so that no two of them wait for each other.
         indexed.sort_by_key(|(index, _)| *index);
         let mut locks = vec![];
         for (index, claim) in &indexed {
             locks.push(take(Role::Master, *index, &claim.bus, &claim.interface, if_owned)?);
         }
-        // A master that has stopped for us may have left an interface down.
+        // Only now: until the lock is taken, the interface belongs to another process.
         for (_, claim) in &indexed {
             prepare_interface(&claim.interface, &claim.settings)
                 .map_err(|error| ClaimError::Interface { bus: claim.bus.clone(), error })?;
@@ -190,7 +192,13 @@ impl Ownership {
         }
     }
 
-    /// Whether another process asks this one to stop in control and to release its interfaces. Does not block.
+    /// With these locks, whatever they are of.
+    #[cfg(test)]
+    pub(crate) const fn of_locks(locks: Vec<InterfaceLock>) -> Self {
+        Self { locks }
+    }
+
+    /// The process that asks this one to stop in control and to release its interfaces, if there is one. Does not block.
     pub fn poll_release_request(&mut self) -> Option<Process> {
         let mut asking = None;
         for lock in &mut self.locks {
@@ -200,7 +208,7 @@ impl Ownership {
     }
 }
 
-/// Locks an interface for a simulator of drives. A simulator waits for a master, so that it does not listen.
+/// Locks an interface for a simulator of drives. A simulator waits for a master, so it does not listen for one.
 ///
 /// # Errors
 /// See [`ClaimError`].
@@ -212,7 +220,7 @@ fn index_of(bus: &str, interface: &str) -> Result<u32, ClaimError> {
     interface_index(interface).map_err(|error| ClaimError::Interface { bus: bus.to_owned(), error })
 }
 
-/// The lock goes by the index, which the kernel gives to one interface only and which outlives its renaming.
+/// The lock is named after the index of the interface, which stays the same when the interface is renamed.
 fn take(
     role: Role,
     index: u32,
@@ -257,7 +265,7 @@ fn listen<P: BusPort>(buses: &mut [(P, Listening)], clock: &mut impl Clock) -> O
 }
 
 fn receive_all(port: &mut impl BusPort, now_ns: Nanoseconds, listening: &mut Listening) {
-    // A bus that never falls silent would keep a loop without a bound here.
+    // Bounded, because a bus may receive frames as fast as they are read.
     for _ in 0..BATCHES {
         let mut batch = ReceiveBatch::new();
         port.receive(now_ns, &mut batch);
@@ -268,7 +276,7 @@ fn receive_all(port: &mut impl BusPort, now_ns: Nanoseconds, listening: &mut Lis
     }
 }
 
-/// Batches that are read from a bus in one look: more than its socket keeps.
+/// Batches that are read from a bus in one poll: more frames than its socket keeps.
 const BATCHES: usize = 32;
 
 #[cfg(test)]

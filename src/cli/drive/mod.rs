@@ -84,7 +84,7 @@ impl Action {
 pub fn run(arguments: &Arguments) -> Exit {
     let (subject, bus) = match arguments.target.resolve() {
         Ok(resolved) => resolved,
-        Err(refusal) => return refusal.print(arguments.options.json),
+        Err(error) => return error.print(arguments.options.json),
     };
     let mut output = output::Output::new(&subject, arguments.action.name(), arguments.options);
     match arguments.action.request(&subject, arguments.options.raw) {

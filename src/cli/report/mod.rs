@@ -36,7 +36,7 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Exit {
     match tell(arguments) {
         Ok(exit) => exit,
-        Err(refusal) => refusal.print(arguments.json),
+        Err(error) => error.print(arguments.json),
     }
 }
 

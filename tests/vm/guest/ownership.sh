@@ -28,7 +28,7 @@ refused() {
     fi
 }
 
-# of_report KEY...: a value of the JSON report of the run with the name $1.
+# A value of the JSON report of a run.
 of_report() { # NAME KEY...
     python3 -c 'import json, sys
 value = json.load(open(sys.argv[1]))
@@ -60,7 +60,7 @@ beside_a_running_one() {
 # stranger NAME PATTERN IDENTIFIER DATA: something that sends this frame every ten milliseconds, and that no lock knows.
 stranger() {
     local sender
-    cangen vcan0 -I "$3" -L "$((${#4} / 2))" -D "$4" -g 10 & sender=$!
+    cangen vcan0 -I "$3" -L "$((${#4} / 2))" ${4:+-D "$4"} -g 10 & sender=$!
     sleep 0.1
     refused "$1" "another master is active on vcan0: $2" run "$arm" $buses --duration 1
     refused "$1, takt run --take-over" "another master is active on vcan0: $2" run "$arm" $buses --duration 1 --take-over
@@ -81,6 +81,7 @@ taken_over() {
     else
         fails "$first: exit code $status, ended $ended, category $category; $(of_report "$first" failure)"
     fi
+    rm -f "$recordings/$first.mcap"
     end borne
 }
 begin_take_over() { # NAME
@@ -89,13 +90,14 @@ begin_take_over() { # NAME
         > "$folder/$name.json" 2> "$folder/$name.txt" & run=$!
 }
 
-# The lock has gone with the process, and nothing is left to be heard of it.
+# The lock has gone with the process. The drives have come to rest by their own watchdogs.
 after_kill() {
     begin "run that is killed" 20 "$arm" $both
     in_motion vcan0
     kill -KILL $run; wait $run 2>/dev/null
     rm -f "$recording"
-    begin "run right after a kill -9 of another" 2 "$arm" $both
+    sleep 1
+    begin "run after a kill -9 of another" 2 "$arm" $both
     end borne
 }
 
