@@ -6,7 +6,7 @@ use takt::canopen::object::ObjectAddress;
 use takt::canopen::objects::PdoDirection;
 use takt::canopen::pdo_configuration::PdoConfiguration;
 
-use super::ProblemPicture;
+use super::PrintedProblem;
 
 /// Everything that is printed.
 #[derive(Serialize)]
@@ -20,7 +20,7 @@ pub struct View {
     pub objects: Vec<ObjectView>,
     pub pdos: Vec<PdoView>,
     pub comments: Vec<String>,
-    pub warnings: Vec<ProblemPicture>,
+    pub warnings: Vec<PrintedProblem>,
 }
 
 #[derive(Serialize)]
@@ -113,7 +113,7 @@ pub struct MappedPicture {
 }
 
 impl View {
-    pub fn of(dictionary: &ObjectDictionary, node: Option<u8>, warnings: Vec<ProblemPicture>) -> Self {
+    pub fn of(dictionary: &ObjectDictionary, node: Option<u8>, warnings: Vec<PrintedProblem>) -> Self {
         let (file, device) = (&dictionary.file, &dictionary.device);
         let number = |index, subindex| {
             u32::try_from(dictionary.number(ObjectAddress::new(index, subindex), node)?).ok()
