@@ -49,7 +49,7 @@ fn stopped_run() -> Left {
         logger.drain();
     });
     assert!(
-        matches!(outcome, Some(Outcome::Stopped(stop)) if stop.rule == Rule::FollowingError),
+        matches!(outcome, Some(Outcome::Stopped(stop)) if stop.rule() == Rule::FollowingError),
         "{outcome:?}"
     );
     let summary = logger.finish();
@@ -177,7 +177,7 @@ fn recording_of_a_lost_bus(bus: &str, folder: &Path) -> PathBuf {
     let outcome = run.run(60_000, |_| {
         logger.drain();
     });
-    assert!(matches!(outcome, Some(Outcome::Stopped(stop)) if stop.rule == Rule::BusLost), "{outcome:?}");
+    assert!(matches!(outcome, Some(Outcome::Stopped(stop)) if stop.rule() == Rule::BusLost), "{outcome:?}");
     logger.finish().recording.unwrap()
 }
 

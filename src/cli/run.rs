@@ -301,7 +301,7 @@ impl ThrottledBar {
 
 /// Whether an event is not part of an ordinary run.
 fn is_urgent(event: &Event) -> bool {
-    matches!(event.kind, EventKind::Stop(_) | EventKind::Emergency { .. } | EventKind::Refused { .. })
+    matches!(event.kind, EventKind::Stop(_) | EventKind::Emergency { .. } | EventKind::Rejected { .. })
 }
 
 /// Prints messages that must not wait for the end of the run.

@@ -393,7 +393,7 @@ impl Supervisor {
 
 /// A stop that nobody asked for.
 fn own_stop(snapshot: &Snapshot) -> Option<StopReason> {
-    snapshot.stop.filter(|stop| stop.rule != Rule::Requested)
+    snapshot.stop.filter(|stop| stop.rule() != Rule::Requested)
 }
 
 /// Hands the frames of a procedure to the service channel. A frame that finds no room is lost like one on a bad bus:

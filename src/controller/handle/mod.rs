@@ -30,8 +30,8 @@ use std::time::{Duration, Instant};
 use takt_rt::linux::MonotonicClock;
 use takt_rt::plan::State;
 use takt_rt::{
-    Answer, Clock, ControlLaw, MAX_AXES, Move, Phase, ProfileMove, ProfileTarget, Request, RequestEnvelope,
-    RequestId, Snapshot, StopCategory, StreamCommand,
+    Answer, Clock, ControlLaw, MAX_AXES, MotionState, Move, Phase, ProfileMove, ProfileTarget, Request,
+    RequestEnvelope, RequestId, Snapshot, StopCategory, StreamCommand,
 };
 
 use super::channels::{Observer, RequestNumbers, Streamer};
@@ -165,7 +165,6 @@ impl Controller {
         all.iter_mut().zip(target).for_each(|(to, from)| *to = *from);
         let id = self.numbers.next();
         let request = Request::Move(Move {
-            id: move_number(id),
             target: all,
             target_velocity: [0.0; MAX_AXES],
             velocity_scale: options.velocity_scale,
@@ -269,14 +268,15 @@ impl Controller {
         let begun = Instant::now();
         loop {
             let state = self.state();
-            let is_finished = state.finished_move == move_number(motion.request);
-            if is_finished && (!motion.ends_at_rest || state.phase == Phase::Holding) {
-                return Ok(());
+            match state.motions.of(motion.request) {
+                Some(MotionState::Finished) if !motion.ends_at_rest || state.phase == Phase::Holding => {
+                    return Ok(());
+                }
+                Some(MotionState::Stopped(reason)) => return Err(Stopped::new(reason, &self.machine).into()),
+                Some(MotionState::Replaced { .. }) => return Err(MotionError::Overtaken),
+                _ => {}
             }
-            if let Some(reason) = state.stop.filter(|reason| reason.slot > motion.slot) {
-                return Err(Stopped::new(reason, &self.machine).into());
-            }
-            if let Answer::Refused(refusal) = state.answers.of(motion.request) {
+            if let Answer::Rejected(refusal) = state.answers.of(motion.request) {
                 return Err(Refused::new(refusal, &self.machine).into());
             }
             if self.requests.has_forgotten(motion.request) {
@@ -351,7 +351,7 @@ impl Controller {
         let id = self.numbers.next();
         // An axis that exists has a number that fits.
         let axis = axis as u8;
-        let wanted = ProfileMove { id: move_number(id), axis, target, valid_until_ns: expiry_ns(valid_for) };
+        let wanted = ProfileMove { axis, target, valid_until_ns: expiry_ns(valid_for) };
         self.begin(id, Request::SetProfileTarget(wanted), ends_at_rest)
     }
 
@@ -368,7 +368,7 @@ impl Controller {
             let answers = self.state().answers;
             match answers.of(asked) {
                 Answer::Granted => return Ok(()),
-                Answer::Refused(refusal) => return Err(Refused::new(refusal, &self.machine).into()),
+                Answer::Rejected(refusal) => return Err(Refused::new(refusal, &self.machine).into()),
                 Answer::None if answers.have_forgotten(asked) => return Err(CommandError::Unanswered),
                 Answer::None if self.requests.has_forgotten(asked) => return Err(CommandError::Overtaken),
                 Answer::None if self.has_ended() => return Err(CommandError::Ended),
@@ -422,9 +422,4 @@ fn within(axis: &Axis, value: f64, lowest: f64, highest: f64) -> Result<(), Comm
 fn expiry_ns(valid_for: Duration) -> u64 {
     let valid_ns = u64::try_from(valid_for.as_nanos()).unwrap_or(u64::MAX);
     MonotonicClock::default().now_ns().saturating_add(valid_ns)
-}
-
-/// The number of the move that a request asks for: never 0, which stands for "none yet".
-const fn move_number(request: RequestId) -> u32 {
-    (request.0 % u32::MAX as u64) as u32 + 1
 }
