@@ -2,6 +2,7 @@
 
 use takt_rt::{Phase, RequestError, StopReason};
 
+use crate::bus::ownership::Process;
 use crate::drive::BringUpError;
 use crate::telemetry::{Machine, words};
 
@@ -12,6 +13,11 @@ pub enum Outcome {
     Finished,
     /// Somebody interrupted it; the axes were stopped in control unless it was asked otherwise.
     Interrupted,
+    /// Another process took the buses over; the axes were stopped in control for it.
+    TakenOver {
+        /// The process.
+        process: Process,
+    },
     /// The group stopped by itself.
     Stopped(StopReason),
     /// The drives could not be brought up.
@@ -65,6 +71,9 @@ impl Outcome {
         match self {
             Self::Finished => "the run is over".to_owned(),
             Self::Interrupted => "the run was interrupted".to_owned(),
+            Self::TakenOver { process } => {
+                format!("{process} has taken the buses over; the axes were stopped in control for it")
+            }
             Self::Stopped(stop) => words::stop(stop, machine),
             Self::BringUpFailed(error) => error.to_string(),
             Self::FaultPersists { axis, code } => {

@@ -15,6 +15,7 @@ use super::quiet;
 use super::realtime_thread::{self, Begun, Ended, StartError, Work};
 use super::supervisor::Supervisor;
 use super::time_of_day::TimeOfDayKeeper;
+use crate::bus::ownership::{ClaimError, IfOwned, Ownership};
 use crate::bus::port::{OpenError, Port};
 use crate::bus::trace::Trace;
 use crate::config::Config;
@@ -38,6 +39,8 @@ pub struct SessionOptions {
     pub is_realtime_required: bool,
     /// Faults that are played on the buses.
     pub fault_injector: Option<Arc<FaultInjector>>,
+    /// What happens when another process of this host is the master of a bus already.
+    pub if_owned: IfOwned,
 }
 
 /// What is left of a run.
@@ -67,6 +70,9 @@ pub enum SessionError {
     /// The configuration asks for what cannot be done.
     #[error(transparent)]
     Assemble(#[from] AssembleError),
+    /// A bus may not be commanded by this process.
+    #[error(transparent)]
+    Claim(#[from] ClaimError),
     /// A bus cannot be opened.
     #[error(transparent)]
     Open(#[from] OpenError),
@@ -80,6 +86,9 @@ pub enum SessionError {
 
 /// Runs the program of a configuration. `notify` hears what the logger has to say, from its thread. `watch` is called
 /// about once in a millisecond with the newest state and what the run is doing, and may ask it to end.
+///
+/// Before anything is sent, the real buses are locked and listened to, see [`crate::bus::ownership`]. Another process may ask
+/// for the buses later: the group then stops in category 2, and the run ends as [`Outcome::TakenOver`].
 ///
 /// When `notify` or `watch` panics, the panic is caught, that one is not called again, and the group stops in category 1;
 /// the run then ends as [`Outcome::CallbackPanicked`].
@@ -109,8 +118,21 @@ pub(super) fn lead(
     config: &Config,
     options: SessionOptions,
     notify: Box<dyn FnMut(&Notice) + Send>,
+    watch: impl FnMut(&Snapshot, Progress) -> Option<Interrupt>,
+    remote: Option<Remote>,
+) -> Result<Session, SessionError> {
+    let ownership = Ownership::of(config, options.if_owned)?;
+    lead_as_owner(config, options, notify, watch, remote, ownership)
+}
+
+/// As [`lead`], on buses that are claimed already.
+fn lead_as_owner(
+    config: &Config,
+    options: SessionOptions,
+    notify: Box<dyn FnMut(&Notice) + Send>,
     mut watch: impl FnMut(&Snapshot, Progress) -> Option<Interrupt>,
     remote: Option<Remote>,
+    mut ownership: Ownership,
 ) -> Result<Session, SessionError> {
     let mut clock = MonotonicClock::default();
     config.validate_on_this_machine().map_err(AssembleError::from)?;
@@ -162,6 +184,7 @@ pub(super) fn lead(
     let mut time_of_day = TimeOfDayKeeper::of(config);
     let mut time_to_tell = None;
     let (mut panicked, mut is_watched) = (None, true);
+    let mut taken_over_by = None;
     while !running.is_finished() {
         supervisor.poll(clock.now_ns(), &mut host);
         let now_ns = clock.now_ns();
@@ -172,6 +195,10 @@ pub(super) fn lead(
         }
         if let Some(fault_injector) = &options.fault_injector {
             fault_injector.observe(&host.snapshot());
+        }
+        if let Some(process) = ownership.poll_release_request() {
+            taken_over_by = Some(process);
+            supervisor.interrupt(Interrupt::Controlled);
         }
         let mut panics_now = None;
         if is_watched {
@@ -197,13 +224,19 @@ pub(super) fn lead(
         quiet::sleep(PAUSE, config.cycle.period_ns);
     }
     let ended = running.join();
+    // The ports are closed with the thread. What is left to be done here does not concern the buses.
+    drop(ownership);
     if ended.is_none() {
         logger.fault(Fault::ThreadDied);
     }
-    let outcome = match (supervisor.outcome().cloned().unwrap_or(Outcome::ThreadDied), panicked) {
-        (Outcome::Interrupted | Outcome::Finished, Some(message)) => Outcome::CallbackPanicked { message },
-        (outcome, _) => outcome,
-    };
+    let outcome =
+        match (supervisor.outcome().cloned().unwrap_or(Outcome::ThreadDied), panicked, taken_over_by) {
+            (Outcome::Interrupted | Outcome::Finished, Some(message), _) => {
+                Outcome::CallbackPanicked { message }
+            }
+            (Outcome::Interrupted, None, Some(process)) => Outcome::TakenOver { process },
+            (outcome, ..) => outcome,
+        };
     let is_done = matches!(outcome, Outcome::Finished | Outcome::OffTarget { .. });
     let target = supervisor.target().filter(|_| is_done && options.duration_ns.is_none());
     Ok(Session {
@@ -240,4 +273,57 @@ fn open_ports(
         });
     }
     Ok((ports, traces))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+    use std::sync::atomic::{AtomicBool, Ordering};
+    use std::thread;
+
+    use takt_rt::{Phase, StopCategory};
+
+    use super::*;
+    use crate::bus::ownership::{InterfaceLock, LockError, Role};
+
+    /// Simulated buses need no lock: this one stands for that of a real interface.
+    #[test]
+    fn a_run_that_is_taken_over_stops_in_control_before_it_releases_its_buses() {
+        let interface = format!("test-session-{}", std::process::id());
+        let mut config = Config::load(Path::new("configs/single-erob.toml")).unwrap();
+        config.telemetry.is_recorded = false;
+        let ownership = Ownership::of_locks(vec![InterfaceLock::take(Role::Master, &interface).unwrap()]);
+        let has_moved = AtomicBool::new(false);
+        let session = thread::scope(|scope| {
+            let taking = scope.spawn(|| {
+                while !has_moved.load(Ordering::Relaxed) {
+                    thread::sleep(PAUSE);
+                }
+                assert!(matches!(InterfaceLock::take(Role::Master, &interface), Err(LockError::Held(_))));
+                InterfaceLock::take_over(Role::Master, &interface).unwrap()
+            });
+            // Without an end, so that only the other one ends it.
+            let options = SessionOptions { duration_ns: Some(600_000_000_000), ..SessionOptions::default() };
+            let watch = |snapshot: &Snapshot, _| {
+                has_moved.fetch_or(snapshot.phase == Phase::Moving, Ordering::Relaxed);
+                None
+            };
+            let session = lead_as_owner(&config, options, Box::new(|_| {}), watch, None, ownership).unwrap();
+            let _taken = taking.join().unwrap();
+            session
+        });
+        let pid = i32::try_from(std::process::id()).unwrap();
+        assert!(
+            matches!(session.outcome, Outcome::TakenOver { process } if process.pid == pid),
+            "{:?}",
+            session.outcome
+        );
+        let stop = session.snapshot.stop.expect("it was stopped");
+        assert_eq!((stop.category, stop.phase), (StopCategory::Two, Phase::Moving));
+        assert!(
+            matches!(session.snapshot.phase, Phase::Disabled | Phase::Passive),
+            "{:?}",
+            session.snapshot.phase
+        );
+    }
 }

@@ -39,8 +39,8 @@ pub use picture::Emphasis;
 pub use recorded::{Cause, Recorded, RecordedError, RecordedEvent, WalkError};
 pub use recording_report::{AxisCycle, AxisCycles, AxisSummary, BusChange, RecordingReport, ReportedEvent};
 pub use report::{
-    AxisReport, BusReport, LatencyReport, RealtimeReport, RunOutcome, RunReport, SetPointParts, StopReport,
-    TelemetryReport,
+    AxisReport, BusReport, LatencyReport, RealtimeReport, RunEnd, RunOutcome, RunReport, SetPointParts,
+    StopReport, TelemetryReport,
 };
 pub use statistics::{AxisStatistics, FollowingErrorMaximum, Latency, Statistics};
 pub use thread::LoggerThread;

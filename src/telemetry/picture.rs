@@ -1,12 +1,12 @@
 //! The report of a run for people, and the parts of it that other reports show too: at most 100 columns, histograms of block characters, colours only on request.
 
-use crate::printable::printable_path;
 use std::fmt::Write;
 
 use super::report::{
-    AxisReport, BusReport, DECADES, LatencyReport, RANGES_PER_DECADE, RealtimeReport, RunReport,
+    AxisReport, BusReport, DECADES, LatencyReport, RANGES_PER_DECADE, RealtimeReport, RunEnd, RunReport,
     SetPointParts,
 };
+use crate::printable::{printable, printable_path};
 
 /// Rows of a histogram.
 const ROWS: usize = 4;
@@ -66,7 +66,12 @@ impl RunReport {
         let run = format!("{cycles} cycles of {cycle_ms} ms, {seconds:.2} s");
         match &self.stop {
             None => {
-                let verdict = emphasis.good("✓ program finished");
+                let verdict = match self.ended {
+                    RunEnd::Finished => emphasis.good("✓ program finished"),
+                    RunEnd::Interrupted => emphasis.bad("✗ interrupted before the axes were enabled"),
+                    RunEnd::TakenOver => emphasis.bad("✗ taken over before the axes were enabled"),
+                    RunEnd::Stopped | RunEnd::Failed => emphasis.bad("✗ failed"),
+                };
                 line(text, &format!("{}  {verdict}, {run}", emphasis.heading(&self.machine)));
             }
             Some(stop) => {
@@ -152,7 +157,7 @@ impl RunReport {
             lines.push(format!("{}{size}", printable_path(path)));
         }
         lines.extend(telemetry.candump.iter().map(|path| printable_path(path)));
-        lines.extend(telemetry.not_written.iter().cloned());
+        lines.extend(telemetry.not_written.iter().map(|text| printable(text)));
         wrap(text, &emphasis.heading("telemetry"), 9, &lines);
         if !telemetry.black_boxes.is_empty() {
             let mut lines: Vec<String> =

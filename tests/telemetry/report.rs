@@ -1,5 +1,7 @@
 use serde_json::{Value, json};
-use takt::telemetry::{Destination, Emphasis, LogSummary, Logger, RealtimeReport, RunOutcome, RunReport};
+use takt::telemetry::{
+    Destination, Emphasis, LogSummary, Logger, RealtimeReport, RunEnd, RunOutcome, RunReport,
+};
 use takt_rt::{BusHealth, BusState, HostInterface, Snapshot, StopReason};
 
 use crate::run::{Disk, Notices, STOP, cycle, options, run, sides};
@@ -8,6 +10,7 @@ const COLUMNS: usize = 100;
 
 fn outcome(last: Snapshot, stop: Option<StopReason>) -> RunOutcome {
     RunOutcome {
+        ended: if stop.is_some() { RunEnd::Stopped } else { RunEnd::Finished },
         realtime: RealtimeReport {
             policy: "SCHED_OTHER".to_owned(),
             page_faults: 2,

@@ -1,6 +1,7 @@
 //! Reads a recording or a black box: what it is of, what happened in it, how the timing was, and any of its cycles.
 
 mod cause;
+mod lengths;
 mod walk;
 
 use std::collections::{BTreeMap, HashMap};
@@ -240,6 +241,10 @@ impl Decoder {
     fn record(&mut self, opcode: u8, body: &[u8], give: &mut impl FnMut(Item<'_>)) {
         use mcap::records::op;
         if !matches!(opcode, op::HEADER | op::SCHEMA | op::CHANNEL | op::MESSAGE | op::METADATA) {
+            return;
+        }
+        if !lengths::fit(opcode, body) {
+            self.malformed += 1;
             return;
         }
         match mcap::parse_record(opcode, body) {

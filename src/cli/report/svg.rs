@@ -1,16 +1,16 @@
-//! What led to the stop, and what came of it, as a picture.
+//! The cycles before and after a stop as SVG.
 
 use takt::telemetry::{Recorded, RecordedError};
 use takt_rt::{AxisRecord, CycleRecord, CycleTiming, NANOSECONDS_PER_SECOND};
 
 use crate::cli::chart::{COLOURS, Chart, Curve, Panel};
 
-/// What is drawn before the stop, and after it.
+/// The time that is shown before the stop, and after it.
 const BEFORE_NS: u64 = NANOSECONDS_PER_SECOND;
 const AFTER_NS: u64 = NANOSECONDS_PER_SECOND / 2;
 
 /// Position, velocity, following error of an axis, and the timing.
-pub fn draw(recorded: &Recorded, axis: Option<usize>) -> Result<String, RecordedError> {
+pub fn render(recorded: &Recorded, axis: Option<usize>) -> Result<String, RecordedError> {
     let cycle_ns = recorded.machine.cycle_ns.max(1);
     let slots = recorded.slots_around_cause(BEFORE_NS / cycle_ns, AFTER_NS / cycle_ns);
     let cycles = recorded.cycles(&slots)?;
