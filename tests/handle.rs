@@ -128,6 +128,23 @@ fn a_stop_overtakes_what_a_client_has_flooded_the_controller_with() {
     assert_eq!(joint.finish().unwrap().outcome, Outcome::Finished);
 }
 
+/// Tries of a stop that is followed by a motion.
+const STOPS_BEFORE_MOTIONS: u64 = 200;
+
+#[test]
+fn a_stop_that_was_asked_for_before_a_motion_is_never_its_answer() {
+    let mut joint = start("single-erob.toml");
+    let home = joint.state().axes[0].position_set;
+    for number in 0..STOPS_BEFORE_MOTIONS {
+        joint.stop(StopCategory::Two).unwrap();
+        // From nothing to 5 ms, in steps that do not keep to the cycle.
+        std::thread::sleep(Duration::from_micros(number * 1_700 % 5_000));
+        let target = home + if number % 2 == 0 { 1e-3 } else { 0.0 };
+        let motion = joint.move_to(&[target]).unwrap();
+        assert_eq!(joint.wait(motion, PATIENCE), Ok(()), "try {number}");
+    }
+}
+
 #[test]
 fn drives_that_cannot_be_brought_up_are_named() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/single-erob.toml");

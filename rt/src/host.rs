@@ -4,6 +4,7 @@
 use crate::axis::{MAX_PDOS, TransmissionType};
 use crate::cia402;
 use crate::frame::{Frame, Id};
+use crate::motion_reports::MotionReports;
 use crate::pdo::{MAX_OBJECTS, MappedObject};
 use crate::plan;
 use crate::port::{BusHealth, Received};
@@ -211,6 +212,8 @@ pub struct Snapshot {
     pub refused: u64,
     /// What became of the last requests.
     pub answers: Answers,
+    /// What became of the last motions.
+    pub motions: MotionReports,
     /// The number of the last finished move; 0 before the first.
     pub finished_move: u32,
     /// Planned time left of the present move or stop, in seconds.
@@ -239,6 +242,7 @@ impl Default for Snapshot {
             dropped: 0,
             refused: 0,
             answers: Answers::default(),
+            motions: MotionReports::default(),
             finished_move: 0,
             remaining_s: 0.0,
             stop: None,

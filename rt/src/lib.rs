@@ -34,6 +34,7 @@ mod host;
 #[cfg(feature = "linux")]
 pub mod linux;
 mod motion;
+mod motion_reports;
 mod pdo;
 pub mod plan;
 mod port;
@@ -62,6 +63,7 @@ pub use host::{
     AxisProcessData, AxisSnapshot, HostInterface, MappedPdo, Move, ProfileMove, Request, RequestEnvelope,
     RequestId, Snapshot, StreamCommand,
 };
+pub use motion_reports::{MotionReport, MotionReports, MotionState};
 pub use pdo::{
     CommandSlot, FeedbackSlot, MAX_OBJECTS, MappedObject, Mapping, MappingError, ProcessImage, TooShort,
 };

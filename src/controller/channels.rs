@@ -11,6 +11,7 @@
 //! preempted in the middle of something.
 
 mod latest;
+mod motion_words;
 mod primitives;
 mod records;
 mod request_numbers;

@@ -7,6 +7,7 @@ use crate::axis::Axis;
 use crate::cia402::Goal;
 use crate::guard::{OnViolation, Violation};
 use crate::host::HostInterface;
+use crate::motion_reports::MotionState;
 use crate::plan::State;
 use crate::record::{EventKind, MAX_AXES};
 use crate::stop::{Origin, Phase, Rule, StopCategory};
@@ -125,13 +126,15 @@ impl Engine {
     /// The planned part of a move is over; drives in profile modes may still be on their way.
     fn finish_move(&mut self, is_planned_to_rest: bool, now_ns: Nanoseconds, host: &mut impl HostInterface) {
         if !is_planned_to_rest {
+            // It has passed its target at speed, as it was asked to.
+            self.snapshot.motions.end_all(MotionState::Finished);
             self.begin_stop(Rule::Requested, Some(StopCategory::Two), Origin::Group, 0.0, 0.0, now_ns, host);
             return;
         }
         if !self.axes.iter().all(Axis::is_target_reached) {
             return;
         }
-        if self.finished_move != self.move_id {
+        if self.snapshot.motions.end_all(MotionState::Finished) {
             self.finished_move = self.move_id;
             self.happened(now_ns, EventKind::MoveFinished { id: self.move_id }, host);
         }

@@ -4,6 +4,7 @@ use super::obstacle::{Obstacle, check_profile_target, check_scales, check_target
 use super::{Engine, FAULT_RESET_CYCLES};
 use crate::axis::Axis;
 use crate::cia402::Goal;
+use crate::control::ControlLaw;
 use crate::host::{HostInterface, Move, ProfileMove, Request, RequestEnvelope};
 use crate::motion::Leg;
 use crate::plan::State;
@@ -24,7 +25,7 @@ impl Engine {
         now_ns: Nanoseconds,
         host: &mut impl HostInterface,
     ) {
-        let obstacle = self.answer(&asked.request, now_ns, host).err();
+        let obstacle = self.answer(asked, now_ns, host).err();
         let refusal = obstacle.map(|Obstacle { objection, axis, value, limit }| Refusal {
             request: asked.request.kind(),
             objection,
@@ -40,8 +41,13 @@ impl Engine {
         }
     }
 
-    fn answer(&mut self, request: &Request, now_ns: Nanoseconds, host: &mut impl HostInterface) -> Answered {
-        match request {
+    fn answer(
+        &mut self,
+        asked: &RequestEnvelope,
+        now_ns: Nanoseconds,
+        host: &mut impl HostInterface,
+    ) -> Answered {
+        match &asked.request {
             Request::Sync(on) => {
                 if *on && !self.is_sync_on {
                     self.axes.iter_mut().for_each(Axis::begin_sync);
@@ -64,8 +70,19 @@ impl Engine {
             Request::Position { axis, counts } => self.axis_mut(*axis)?.set_reported_position(*counts),
             Request::Activate => self.activate(now_ns, host)?,
             Request::Enable => self.begin_enable(now_ns, host)?,
-            Request::Move(parameters) => self.begin_move(parameters, now_ns, host)?,
-            Request::SetProfileTarget(target) => self.set_profile_target(target, now_ns, host)?,
+            Request::Move(parameters) => {
+                self.begin_move(parameters, now_ns, host)?;
+                // It takes over what was planned, and the drives that find their own way to a position.
+                let law = |axis: u8| self.axes.get(usize::from(axis)).map(|axis| axis.parameters().law);
+                let is_positioned = |axis: u8| law(axis) == Some(ControlLaw::ProfilePosition);
+                self.snapshot.motions.begin(asked.id, None, |axis| axis.is_none_or(is_positioned));
+            }
+            Request::SetProfileTarget(wanted) => {
+                self.set_profile_target(wanted, now_ns, host)?;
+                let is_position = matches!(wanted.target, ProfileTarget::Position(_));
+                let takes_over = |axis: Option<u8>| axis.map_or(is_position, |axis| axis == wanted.axis);
+                self.snapshot.motions.begin(asked.id, Some(wanted.axis), takes_over);
+            }
             Request::Stream => self.begin_stream(now_ns, host)?,
             Request::Stop(category) => {
                 self.begin_stop(Rule::Requested, Some(*category), Origin::Group, 0.0, 0.0, now_ns, host);

@@ -5,6 +5,7 @@ use crate::axis::Axis;
 use crate::cia402::Goal;
 use crate::control::ControlLaw;
 use crate::host::HostInterface;
+use crate::motion_reports::MotionState;
 use crate::plan::{PlanError, State};
 use crate::port::{BusHealth, BusState};
 use crate::record::EventKind;
@@ -101,7 +102,9 @@ impl Engine {
         let present = self.stop.filter(|present| is_under_way || present.rule != Rule::Requested);
         let hardest = present.map_or(wanted, |present| present.category.min(wanted));
         let kept = present.filter(|present| present.rule != Rule::Requested || rule == Rule::Requested);
-        self.stop = Some(StopReason { category: hardest, ..kept.unwrap_or(reason) });
+        let stop = StopReason { category: hardest, ..kept.unwrap_or(reason) };
+        self.stop = Some(stop);
+        self.snapshot.motions.end_all(MotionState::Stopped(stop));
         if kept.is_none() {
             if rule != Rule::Requested {
                 // Nobody has asked for a reset of this one.

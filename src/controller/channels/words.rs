@@ -2,16 +2,17 @@
 
 use takt_rt::plan;
 use takt_rt::{
-    Answers, AxisSnapshot, BusHealth, BusState, DriveState, MAX_AXES, MAX_BUSES, Origin, Phase, Refusal,
-    RejectReason, RequestId, RequestKind, Rule, Snapshot, StopCategory, StopReason, StreamCommand,
-    TimingLevel,
+    Answers, AxisSnapshot, BusHealth, BusState, DriveState, MAX_AXES, MAX_BUSES, MotionReports, Origin,
+    Phase, Refusal, RejectReason, RequestId, RequestKind, Rule, Snapshot, StopCategory, StopReason,
+    StreamCommand, TimingLevel,
 };
 
 use super::latest::Words;
+use super::motion_words::{MOTION_WORDS, put_motions, take_motions};
 
 /// Words of a snapshot of so many axes and buses.
 pub const fn snapshot_words(axes: usize, buses: usize) -> usize {
-    17 + 4 * Answers::EXPLAINED + 4 * axes + 7 * buses
+    17 + MOTION_WORDS + 4 * Answers::EXPLAINED + 4 * axes + 7 * buses
 }
 
 /// Words of a streamed command for so many axes.
@@ -30,6 +31,7 @@ pub const NO_SNAPSHOT: Snapshot = Snapshot {
     dropped: 0,
     refused: 0,
     answers: Answers { newest: RequestId(0), taken_up: 0, refused: 0, refusals: [None; Answers::EXPLAINED] },
+    motions: MotionReports { reports: [None; MotionReports::CAPACITY] },
     finished_move: 0,
     remaining_s: 0.0,
     stop: None,
@@ -72,6 +74,7 @@ pub fn put_snapshot(snapshot: &Snapshot, words: &mut Words<'_>) {
     words.put(snapshot.dropped);
     words.put(snapshot.refused);
     put_answers(&snapshot.answers, words);
+    put_motions(&snapshot.motions, words);
     words.put_f64(snapshot.remaining_s);
     if let Some(stop) = snapshot.stop {
         put_stop(&stop, words);
@@ -97,6 +100,7 @@ pub fn take_snapshot(words: &mut Words<'_>) -> Snapshot {
         dropped: words.take(),
         refused: words.take(),
         answers: take_answers(words),
+        motions: take_motions(words),
         finished_move: (packed >> 32) as u32,
         remaining_s: words.take_f64(),
         stop: (flags & 1 == 1).then(|| take_stop(words)),
@@ -182,7 +186,7 @@ pub fn take_stream(axes: usize, words: &mut Words<'_>) -> StreamCommand {
     command
 }
 
-fn put_stop(stop: &StopReason, words: &mut Words<'_>) {
+pub fn put_stop(stop: &StopReason, words: &mut Words<'_>) {
     let (kind, number) = match stop.origin {
         Origin::Group => (0, 0),
         Origin::Axis(axis) => (1, axis),
@@ -195,7 +199,7 @@ fn put_stop(stop: &StopReason, words: &mut Words<'_>) {
     words.put(stop.slot);
 }
 
-fn take_stop(words: &mut Words<'_>) -> StopReason {
+pub fn take_stop(words: &mut Words<'_>) -> StopReason {
     let packed = words.take();
     let [category, rule, phase, origin] = unpack(packed);
     StopReason {
@@ -293,6 +297,7 @@ mod tests {
     use super::*;
     use crate::controller::channels::latest::{Attempt, latest};
     use proptest::prelude::*;
+    use takt_rt::{MotionReport, MotionState};
 
     fn stop_reasons() -> impl Strategy<Value = StopReason> {
         let categories = prop::sample::select(vec![StopCategory::Zero, StopCategory::One, StopCategory::Two]);
@@ -329,6 +334,19 @@ mod tests {
                 phase,
             },
         )
+    }
+
+    fn motions() -> impl Strategy<Value = MotionReports> {
+        let states = prop_oneof![
+            Just(MotionState::InProgress),
+            Just(MotionState::Finished),
+            stop_reasons().prop_map(MotionState::Stopped),
+            any::<u64>().prop_map(|by| MotionState::Replaced { by: RequestId(by) }),
+        ];
+        let reports = (any::<u64>(), any::<Option<u8>>(), states)
+            .prop_map(|(request, axis, state)| MotionReport { request: RequestId(request), axis, state });
+        prop::collection::vec(reports, 0..=MotionReports::CAPACITY)
+            .prop_map(|reports| MotionReports { reports: std::array::from_fn(|at| reports.get(at).copied()) })
     }
 
     fn axes() -> impl Strategy<Value = AxisSnapshot> {
@@ -375,12 +393,12 @@ mod tests {
             prop::sample::select(&Phase::ALL[..]),
         );
         let refusals = prop::collection::vec((any::<u64>(), refusals()), 0..=Answers::EXPLAINED);
-        let answers = (any::<(u64, u64, u128, u128)>(), refusals);
+        let answers = (any::<(u64, u64, u128, u128)>(), refusals, motions());
         (counted, any::<(u64, u64, u64, u64, u32, f64)>(), answers).prop_map(
             |(
                 (axes, buses, stop, phase),
                 (slot, at_ns, missed_slots, dropped, finished_move, remaining_s),
-                ((refused, newest, taken_up, refused_bits), refusals),
+                ((refused, newest, taken_up, refused_bits), refusals, motions),
             )| {
                 let mut snapshot = Snapshot {
                     slot,
@@ -398,6 +416,7 @@ mod tests {
                             refusals.get(at).map(|(id, refusal)| (RequestId(*id), *refusal))
                         }),
                     },
+                    motions,
                     remaining_s,
                     stop,
                     axis_count: axes.len() as u8,
