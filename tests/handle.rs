@@ -146,6 +146,32 @@ fn a_stop_that_was_asked_for_before_a_motion_is_never_its_answer() {
 }
 
 #[test]
+fn each_wait_is_answered_by_its_own_motion() {
+    let mut joint = start("single-erob.toml");
+    let slowly = MoveOptions { velocity_scale: 0.02, ..MoveOptions::default() };
+    let replaced = joint.move_with(&[0.5], slowly).unwrap();
+    assert!(joint.wait_for(Phase::Moving, PATIENCE));
+    let arrived = joint.move_to(&[0.1]).unwrap();
+    assert_eq!(joint.wait(replaced, PATIENCE), Err(MotionError::Replaced));
+    assert_eq!(joint.wait(arrived, PATIENCE), Ok(()));
+    let stopped = joint.move_with(&[0.5], slowly).unwrap();
+    assert!(joint.wait_for(Phase::Moving, PATIENCE));
+    joint.stop(StopCategory::Two).unwrap();
+    let why = joint.wait(stopped, PATIENCE);
+    assert!(
+        matches!(&why, Err(MotionError::Stopped(stopped)) if stopped.reason.rule == Rule::Requested),
+        "{why:?}"
+    );
+    assert!(joint.wait_for(Phase::Holding, PATIENCE));
+    let last = joint.move_to(&[0.1]).unwrap();
+    assert_eq!(joint.wait(last, PATIENCE), Ok(()));
+    // The answers to the motions before are still the same.
+    assert_eq!(joint.wait(replaced, PATIENCE), Err(MotionError::Replaced));
+    assert_eq!(joint.wait(arrived, PATIENCE), Ok(()));
+    assert_eq!(joint.wait(stopped, PATIENCE), why);
+}
+
+#[test]
 fn drives_that_cannot_be_brought_up_are_named() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/single-erob.toml");
     let mut config = Config::load(&path).unwrap();

@@ -14,9 +14,9 @@ mod time_of_day;
 mod virtual_time;
 
 pub use handle::{
-    CommandError, Controller, Motion, MotionError, MoveOptions, Refused, StartFailure, Stopped,
+    CommandError, Controller, MotionError, MotionId, MoveOptions, Refused, StartFailure, Stopped,
 };
 pub use outcome::{Interrupt, Outcome, Progress};
-pub use program::{ProgramRunner, Step};
+pub use program::{ProgramRunner, ProgramStep};
 pub use supervisor::Supervisor;
 pub use virtual_time::{VirtualClock, VirtualRun};

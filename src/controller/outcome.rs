@@ -35,6 +35,11 @@ pub enum Outcome {
         /// Why, if that is still known.
         refusal: Option<Refusal>,
     },
+    /// A motion that another client asked for has taken the place of a move of the program; counted from 1.
+    MoveReplaced {
+        /// The move.
+        number: u64,
+    },
     /// A function that the caller gave to the run panicked, and the axes were stopped in control.
     CallbackPanicked {
         /// What the panic said.
@@ -70,6 +75,9 @@ impl Outcome {
                 let why = refusal.map(|refusal| words::refusal(&refusal, machine));
                 let why = why.unwrap_or_else(|| "why is no longer known".to_owned());
                 format!("move {number} of the program could not be begun: {why}")
+            }
+            Self::MoveReplaced { number } => {
+                format!("another client has moved the group during move {number} of the program")
             }
             Self::CallbackPanicked { message } => {
                 format!("a defect of takt (please report it) ended the run in a controlled stop: {message}")

@@ -16,7 +16,7 @@ use takt_rt::{
 
 use super::channels::{HostSide, RequestNumbers};
 use super::outcome::{Interrupt, Outcome, Progress};
-use super::program::{ProgramRunner, Step};
+use super::program::{ProgramRunner, ProgramStep};
 use crate::config::Config;
 use crate::drive::{AxisFacts, BringUp, Leave};
 
@@ -278,10 +278,13 @@ impl Supervisor {
             return self.end(now_ns, Outcome::Finished);
         }
         match self.program.poll(now_ns, snapshot, &self.numbers) {
-            Step::Wait => {}
-            Step::Begin(requests) => self.outgoing.extend(requests),
-            Step::Refused { number, refusal } => self.end(now_ns, Outcome::MoveRefused { number, refusal }),
-            Step::Finished => self.end(now_ns, Outcome::Finished),
+            ProgramStep::Wait => {}
+            ProgramStep::Begin(requests) => self.outgoing.extend(requests),
+            ProgramStep::Refused { number, refusal } => {
+                self.end(now_ns, Outcome::MoveRefused { number, refusal });
+            }
+            ProgramStep::Replaced { number } => self.end(now_ns, Outcome::MoveReplaced { number }),
+            ProgramStep::Finished => self.end(now_ns, Outcome::Finished),
         }
     }
 

@@ -123,6 +123,12 @@ pub enum MotionError {
     /// A stop has overtaken it before the real-time thread had taken it up.
     #[error("a stop has overtaken the motion")]
     Overtaken,
+    /// A later motion has taken its place before it was over.
+    #[error("a later motion has replaced the motion")]
+    Replaced,
+    /// So many motions have followed it that what became of it is not known.
+    #[error("too many motions have followed it to know what became of it")]
+    Forgotten,
     /// It was not over in time; it goes on.
     #[error("the motion was not over in time")]
     NotInTime,

@@ -30,8 +30,8 @@ use std::time::{Duration, Instant};
 use takt_rt::linux::MonotonicClock;
 use takt_rt::plan::State;
 use takt_rt::{
-    Answer, Clock, ControlLaw, MAX_AXES, Move, Phase, ProfileMove, ProfileTarget, Request, RequestEnvelope,
-    RequestId, Snapshot, StopCategory, StreamCommand,
+    Answer, Clock, ControlLaw, MAX_AXES, MotionState, Move, Phase, ProfileMove, ProfileTarget, Request,
+    RequestEnvelope, RequestId, Snapshot, StopCategory, StreamCommand,
 };
 
 use super::channels::{Observer, RequestNumbers, Streamer};
@@ -62,13 +62,9 @@ pub struct Controller {
     thread: Option<JoinHandle<Result<Session, SessionError>>>,
 }
 
-/// A motion that was asked for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Motion {
-    request: RequestId,
-    slot: u64,
-    ends_at_rest: bool,
-}
+/// Names a motion that was asked for, for [`Controller::wait`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct MotionId(RequestId);
 
 /// How a move is made.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -142,7 +138,7 @@ impl Controller {
     ///
     /// # Errors
     /// See [`CommandError`]; nothing has changed then.
-    pub fn move_to(&mut self, target: &[f64]) -> Result<Motion, CommandError> {
+    pub fn move_to(&mut self, target: &[f64]) -> Result<MotionId, CommandError> {
         self.move_with(target, MoveOptions::default())
     }
 
@@ -150,7 +146,7 @@ impl Controller {
     ///
     /// # Errors
     /// See [`CommandError`]; nothing has changed then.
-    pub fn move_with(&mut self, target: &[f64], options: MoveOptions) -> Result<Motion, CommandError> {
+    pub fn move_with(&mut self, target: &[f64], options: MoveOptions) -> Result<MotionId, CommandError> {
         if target.len() != self.axes.len() {
             return Err(CommandError::Count { given: target.len(), axes: self.axes.len() });
         }
@@ -172,7 +168,7 @@ impl Controller {
             acceleration_scale: options.acceleration_scale,
             minimum_duration_s: options.minimum_duration_s,
         });
-        self.begin(id, request, true)
+        self.begin(id, request)
     }
 
     /// Lets a drive in profile velocity go at a speed (rad/s or m/s). When that has not been renewed within `valid_for`,
@@ -185,10 +181,10 @@ impl Controller {
         axis: usize,
         velocity: f64,
         valid_for: Duration,
-    ) -> Result<Motion, CommandError> {
+    ) -> Result<MotionId, CommandError> {
         let own = self.axis(axis, ControlLaw::ProfileVelocity, "profile velocity, mode = \"pv\"")?;
         within(own, velocity, -own.limits.velocity, own.limits.velocity)?;
-        self.drive(axis, ProfileTarget::Velocity(velocity), velocity == 0.0, valid_for)
+        self.drive(axis, ProfileTarget::Velocity(velocity), valid_for)
     }
 
     /// Lets a drive in profile torque push with a torque (N·m or N). When that has not been renewed within `valid_for`,
@@ -196,10 +192,15 @@ impl Controller {
     ///
     /// # Errors
     /// See [`CommandError`]; nothing has changed then.
-    pub fn torque(&mut self, axis: usize, torque: f64, valid_for: Duration) -> Result<Motion, CommandError> {
+    pub fn torque(
+        &mut self,
+        axis: usize,
+        torque: f64,
+        valid_for: Duration,
+    ) -> Result<MotionId, CommandError> {
         let own = self.axis(axis, ControlLaw::ProfileTorque, "profile torque, mode = \"pt\"")?;
         within(own, torque, -own.limits.torque, own.limits.torque)?;
-        self.drive(axis, ProfileTarget::Torque(torque), torque == 0.0, valid_for)
+        self.drive(axis, ProfileTarget::Torque(torque), valid_for)
     }
 
     /// Begins to follow [`Controller::stream`]: what is streamed from now on counts. The first set-points must come within
@@ -261,28 +262,20 @@ impl Controller {
         self.obtain(Request::ResetFaults)
     }
 
-    /// Waits until a motion is over: until the axes are at rest at their targets, or a speed or torque has been reached.
+    /// Waits until a motion is over: until the axes are at rest at their targets, or a speed or torque has been reached. The
+    /// answer is that of this motion, whatever the group did before it and has done since.
     ///
     /// # Errors
     /// See [`MotionError`].
-    pub fn wait(&self, motion: Motion, at_most: Duration) -> Result<(), MotionError> {
+    pub fn wait(&self, motion: MotionId, at_most: Duration) -> Result<(), MotionError> {
         let begun = Instant::now();
         loop {
-            let state = self.state();
-            let is_finished = state.finished_move == move_number(motion.request);
-            if is_finished && (!motion.ends_at_rest || state.phase == Phase::Holding) {
-                return Ok(());
+            // In this order: what the controller did last before it ended is in the state that is read after it.
+            let has_ended = self.has_ended();
+            if let Some(result) = self.result_of(motion) {
+                return result;
             }
-            if let Some(reason) = state.stop.filter(|reason| reason.slot > motion.slot) {
-                return Err(Stopped::new(reason, &self.machine).into());
-            }
-            if let Answer::Refused(refusal) = state.answers.of(motion.request) {
-                return Err(Refused::new(refusal, &self.machine).into());
-            }
-            if self.requests.has_forgotten(motion.request) {
-                return Err(MotionError::Overtaken);
-            }
-            if self.has_ended() {
+            if has_ended {
                 return Err(MotionError::Ended);
             }
             if begun.elapsed() > at_most {
@@ -290,6 +283,23 @@ impl Controller {
             }
             thread::sleep(LOOK);
         }
+    }
+
+    /// How a motion ended, if it has.
+    fn result_of(&self, MotionId(request): MotionId) -> Option<Result<(), MotionError>> {
+        let state = self.state();
+        let result = match (state.motions.of(request), state.answers.of(request)) {
+            (Some(MotionState::InProgress), _) => return None,
+            (Some(MotionState::Finished), _) => Ok(()),
+            (Some(MotionState::Stopped(reason)), _) => Err(Stopped::new(reason, &self.machine).into()),
+            (Some(MotionState::Replaced { .. }), _) => Err(MotionError::Replaced),
+            (None, Answer::Refused(refusal)) => Err(Refused::new(refusal, &self.machine).into()),
+            (None, Answer::Granted) => Err(MotionError::Forgotten),
+            (None, Answer::None) if state.answers.have_forgotten(request) => Err(MotionError::Forgotten),
+            (None, Answer::None) if self.requests.has_forgotten(request) => Err(MotionError::Overtaken),
+            (None, Answer::None) => return None,
+        };
+        Some(result)
     }
 
     /// Waits for a phase. Returns whether it came in time.
@@ -345,20 +355,18 @@ impl Controller {
         &mut self,
         axis: usize,
         target: ProfileTarget,
-        ends_at_rest: bool,
         valid_for: Duration,
-    ) -> Result<Motion, CommandError> {
+    ) -> Result<MotionId, CommandError> {
         let id = self.numbers.next();
         // An axis that exists has a number that fits.
         let axis = axis as u8;
         let wanted = ProfileMove { id: move_number(id), axis, target, valid_until_ns: expiry_ns(valid_for) };
-        self.begin(id, Request::SetProfileTarget(wanted), ends_at_rest)
+        self.begin(id, Request::SetProfileTarget(wanted))
     }
 
-    fn begin(&self, id: RequestId, request: Request, ends_at_rest: bool) -> Result<Motion, CommandError> {
-        let slot = self.state().slot;
+    fn begin(&self, id: RequestId, request: Request) -> Result<MotionId, CommandError> {
         self.hand_in(RequestEnvelope { id, request })?;
-        Ok(Motion { request: id, slot, ends_at_rest })
+        Ok(MotionId(id))
     }
 
     /// Asks for something, and waits until it has been granted.
@@ -424,7 +432,7 @@ fn expiry_ns(valid_for: Duration) -> u64 {
     MonotonicClock::default().now_ns().saturating_add(valid_ns)
 }
 
-/// The number of the move that a request asks for: never 0, which stands for "none yet".
+/// The number that events and recordings show for the motion that a request asks for.
 const fn move_number(request: RequestId) -> u32 {
-    (request.0 % u32::MAX as u64) as u32 + 1
+    request.0 as u32
 }
