@@ -11,8 +11,8 @@ use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use serde_json::Value;
 use takt::config::Config;
-use takt::telemetry::Recorded;
-use takt_rt::{CycleRecord, Phase};
+use takt::telemetry::{Recorded, RecordedCycle};
+use takt_rt::Phase;
 use tempfile::TempDir;
 
 /// A folder with the six-axis arm and two of its moves, recording into `runs` beside it.
@@ -242,7 +242,7 @@ fn assert_moved_smoothly(place: &Place) {
         if !is_enabled(before) || !is_enabled(after) {
             continue;
         }
-        for ((axis, from), to) in config.axes.iter().zip(before.axes()).zip(after.axes()) {
+        for ((axis, from), to) in config.axes.iter().zip(&before.axes).zip(&after.axes) {
             let step = (to.position_set - from.position_set).abs();
             assert!(step <= axis.limits.velocity * period_s * 1.000_01, "{}: {step} rad", axis.name);
             let change = f64::from((to.velocity_set - from.velocity_set).abs());
@@ -287,6 +287,6 @@ fn a_process_that_is_frozen_in_motion_for_too_long_stops_the_arm_without_a_jump_
 }
 
 /// Whether the drives follow set-points.
-fn is_enabled(record: &CycleRecord) -> bool {
+fn is_enabled(record: &RecordedCycle) -> bool {
     matches!(record.phase, Phase::Holding | Phase::Moving | Phase::Stopping)
 }

@@ -5,14 +5,18 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::Arc;
 
+use mcap::records::op;
 use serde_json::Value;
 use takt::bus::trace::traced;
 use takt::config::Config;
+use takt::controller::channels::{ChannelSizes, channels};
 use takt::controller::{Outcome, VirtualRun};
 use takt::faults::{Rehearsal, Scenario};
 use takt::sim::SimulatedBus;
-use takt::telemetry::{BlackBoxOptions, Destination, Logger, LoggerOptions, Machine, Recorded, WallClock};
-use takt_rt::Rule;
+use takt::telemetry::{
+    BlackBoxOptions, BusDescription, Destination, Logger, LoggerOptions, Machine, Recorded, WallClock,
+};
+use takt_rt::{CycleRecord, HostInterface, Rule};
 use tempfile::TempDir;
 
 /// 2023-11-14 22:13:20 UTC
@@ -340,6 +344,65 @@ fn damaged_bytes_never_bring_it_down_and_a_damaged_part_is_left_out_with_a_warni
         }
     }
     assert!(warned >= 25, "{warned} of 30 damaged chunks were told");
+}
+
+/// As [`report`], in a process that may have so much address space.
+fn report_within(file: &Path, bytes: u64) -> Output {
+    let limited = format!("ulimit -v {}; exec \"$0\" report \"$1\"", bytes / 1024);
+    Command::new("sh").arg("-c").arg(limited).arg(env!("CARGO_BIN_EXE_takt")).arg(file).output().unwrap()
+}
+
+/// Far less than the 4 GiB that a length of 32 bits can ask for, and enough for the files below.
+const ADDRESS_SPACE_BYTES: u64 = 400 << 20;
+
+/// A record as MCAP writes it.
+fn record(opcode: u8, body: &[u8]) -> Vec<u8> {
+    [&[opcode][..], &(body.len() as u64).to_le_bytes(), body].concat()
+}
+
+#[test]
+fn a_length_that_a_file_lies_about_costs_no_memory() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("lying.mcap");
+    // A text of 4 GiB, and nothing of it there.
+    let text = u32::MAX.to_le_bytes();
+    let (schema, channel) = ([&[1, 0][..], &text].concat(), [&[1, 0, 1, 0][..], &text].concat());
+    let bodies: [(u8, &[u8]); 4] =
+        [(op::HEADER, &text), (op::SCHEMA, &schema), (op::CHANNEL, &channel), (op::METADATA, &text)];
+    for (opcode, body) in bodies {
+        fs::write(&file, [mcap::MAGIC, &record(opcode, body)].concat()).unwrap();
+        let output = report_within(&file, ADDRESS_SPACE_BYTES);
+        assert_eq!(output.status.code(), Some(2), "{}", errors(&output));
+        assert!(errors(&output).contains("no recording of takt"), "{}", errors(&output));
+    }
+}
+
+#[test]
+fn many_short_cycles_and_a_long_name_take_no_more_memory_than_the_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let sizes = ChannelSizes {
+        axes: 0,
+        buses: 1,
+        records: 1024,
+        events: 1,
+        requests: 1,
+        service_out: 1,
+        service_in: 1,
+    };
+    let (mut rt, _host, log) = channels(&sizes);
+    let bus = BusDescription { name: "b".repeat(1 << 20), interface: String::new() };
+    let machine = Machine { name: "m".to_owned(), cycle_ns: 1_000_000, axes: vec![], buses: vec![bus] };
+    let file = folder.path().join("many.mcap");
+    let mut logger = Logger::new(log, recording_to(&file, machine), Box::new(|_| {}));
+    // All of them in the slot that a report shows.
+    for _ in 0..300_000 / 1000 {
+        (0..1000).for_each(|_| assert!(rt.record(&CycleRecord::default())));
+        logger.drain();
+    }
+    logger.finish();
+    let output = report_within(&file, ADDRESS_SPACE_BYTES);
+    assert_eq!(output.status.code(), Some(0), "{}", errors(&output));
+    assert!(text(&output).contains("300000 cycles"), "{}", text(&output));
 }
 
 #[test]

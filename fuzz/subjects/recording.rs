@@ -17,8 +17,8 @@ pub fn run(bytes: &[u8]) {
     serde_json::to_string(&report).expect("a report is plain data");
     let cycles = recorded.cycles(&(0..=u64::MAX)).expect("what was read once can be read again");
     assert_eq!(cycles.len() as u64, recorded.statistics.cycles);
-    for record in cycles {
-        assert!(record.axes().len() <= recorded.machine.axes.len());
+    for cycle in cycles {
+        assert!(cycle.axes.len() <= recorded.machine.axes.len());
     }
 }
 

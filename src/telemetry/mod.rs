@@ -36,7 +36,7 @@ pub use listener::{Notify, panic_message};
 pub use logger::{BlackBoxes, LogSummary, Logger, LoggerOptions, Notice};
 pub use machine::{AxisDescription, BusDescription, Machine, SetPointMagnitudes, Unit};
 pub use picture::Emphasis;
-pub use recorded::{Cause, Recorded, RecordedError, RecordedEvent, WalkError};
+pub use recorded::{Cause, Recorded, RecordedCycle, RecordedError, RecordedEvent, WalkError};
 pub use recording_report::{AxisCycle, AxisCycles, AxisSummary, BusChange, RecordingReport, ReportedEvent};
 pub use report::{
     AxisReport, BusReport, LatencyReport, RealtimeReport, RunOutcome, RunReport, SetPointParts, StopReport,

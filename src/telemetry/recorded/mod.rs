@@ -1,6 +1,7 @@
 //! Reads a recording or a black box: what it is of, what happened in it, how the timing was, and any of its cycles.
 
 mod cause;
+mod records;
 mod walk;
 
 use std::collections::{BTreeMap, HashMap};
@@ -9,8 +10,7 @@ use std::io::{self, BufReader};
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
-use mcap::records::Record;
-use takt_rt::{CycleRecord, EventKind, Nanoseconds};
+use takt_rt::{AxisRecord, CycleRecord, CycleTiming, EventKind, MAX_BUSES, Nanoseconds, Phase};
 
 use super::black_box;
 use super::machine::{AxisDescription, BusDescription, Machine, SetPointMagnitudes, Unit};
@@ -21,6 +21,7 @@ use super::statistics::Statistics;
 use super::wall_clock::WallClock;
 use crate::bus::trace::TracedHealth;
 use crate::printable::printable;
+use records::Record;
 
 pub use cause::Cause;
 pub use walk::WalkError;
@@ -70,6 +71,27 @@ pub struct RecordedEvent {
     pub text: String,
     /// What it was; `None` when it is of a kind that this version does not know.
     pub kind: Option<EventKind>,
+}
+
+/// A cycle with the axes that the recording has.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RecordedCycle {
+    /// When.
+    pub timing: CycleTiming,
+    /// What the group was doing.
+    pub phase: Phase,
+    /// Whether set-points were sent in this cycle.
+    pub is_commanded: bool,
+    /// The axes in the order of the configuration.
+    pub axes: Vec<AxisRecord>,
+}
+
+impl RecordedCycle {
+    fn of(record: &CycleRecord) -> Self {
+        let CycleRecord { timing, phase, is_commanded, .. } = *record;
+        // No room for axes that are not there: a recording has millions of cycles.
+        Self { timing, phase, is_commanded, axes: record.axes().to_vec() }
+    }
 }
 
 /// A recording, but for its cycles.
@@ -130,14 +152,14 @@ impl Recorded {
     ///
     /// # Errors
     /// See [`RecordedError`].
-    pub fn cycles(&self, slots: &RangeInclusive<u64>) -> Result<Vec<CycleRecord>, RecordedError> {
+    pub fn cycles(&self, slots: &RangeInclusive<u64>) -> Result<Vec<RecordedCycle>, RecordedError> {
         let mut cycles = Vec::new();
         let mut copy = Self { warnings: Vec::new(), ..self.clone() };
         copy.read(|_, item| {
             if let Item::Cycle(record, _) = item
                 && slots.contains(&record.timing.slot)
             {
-                cycles.push(*record);
+                cycles.push(RecordedCycle::of(record));
             }
         })?;
         Ok(cycles)
@@ -146,12 +168,13 @@ impl Recorded {
     fn take(&mut self, item: Item<'_>) {
         match item {
             Item::Machine(described) => {
-                let text = |key: &str| described.get(key).map_or_else(String::new, |text| printable(text));
+                let text = |key: &str| described.get(key).map_or_else(String::new, |text| name(text));
                 self.version = text("version");
                 self.machine.name = text("machine");
                 self.machine.cycle_ns = text("cycle_ns").parse().unwrap_or(0);
-                let bus = |name: &str| BusDescription { name: name.to_owned(), interface: String::new() };
-                self.machine.buses = text("buses").lines().map(bus).collect();
+                let bus = |line: &str| BusDescription { name: name(line), interface: String::new() };
+                let buses = described.get("buses").map_or("", String::as_str);
+                self.machine.buses = buses.lines().take(MAX_BUSES).map(bus).collect();
             }
             Item::Fault(fault) => {
                 self.faults.push(fault.into_iter().map(|(key, text)| (key, printable(&text))).collect());
@@ -203,6 +226,14 @@ impl Recorded {
     }
 }
 
+/// Names are repeated in every row of a report, so that a longer one would cost much more than its place in the file.
+const LONGEST_NAME: usize = 200;
+
+/// A name that can be shown.
+fn name(text: &str) -> String {
+    printable(&text.chars().take(LONGEST_NAME).collect::<String>())
+}
+
 /// What a recording consists of.
 enum Item<'a> {
     Machine(BTreeMap<String, String>),
@@ -238,30 +269,27 @@ struct Decoder {
 
 impl Decoder {
     fn record(&mut self, opcode: u8, body: &[u8], give: &mut impl FnMut(Item<'_>)) {
-        use mcap::records::op;
-        if !matches!(opcode, op::HEADER | op::SCHEMA | op::CHANNEL | op::MESSAGE | op::METADATA) {
-            return;
-        }
-        match mcap::parse_record(opcode, body) {
-            Ok(Record::Header(header)) => self.library = header.library,
-            Ok(Record::Schema { header, data }) => self.schema(header.id, &header.name, &data),
-            Ok(Record::Channel(channel)) => self.channel(&channel),
-            Ok(Record::Metadata(metadata)) if metadata.name == recording::METADATA => {
+        match records::parse(opcode, body) {
+            None => {}
+            Some(Ok(Record::Header { library })) => self.library = library,
+            Some(Ok(Record::Schema { id, name, definition })) => self.schema(id, &name, definition),
+            Some(Ok(Record::Channel { id, schema, metadata })) => self.channel(id, schema, &metadata),
+            Some(Ok(Record::Metadata { name, entries })) if name == recording::METADATA => {
                 self.is_of_takt = true;
-                give(Item::Machine(metadata.metadata));
+                give(Item::Machine(entries));
             }
-            Ok(Record::Metadata(metadata)) if metadata.name == black_box::METADATA => {
-                give(Item::Fault(metadata.metadata));
+            Some(Ok(Record::Metadata { name, entries })) if name == black_box::METADATA => {
+                give(Item::Fault(entries));
             }
-            Ok(Record::Message { header, data }) => {
-                if let Some(carries) = self.channels.get(&header.channel_id)
-                    && self.message(*carries, header.log_time, &data, give).is_none()
+            Some(Ok(Record::Metadata { .. })) => {}
+            Some(Ok(Record::Message { channel, log_time_ns, data })) => {
+                if let Some(carries) = self.channels.get(&channel)
+                    && self.message(*carries, log_time_ns, data, give).is_none()
                 {
                     self.malformed += 1;
                 }
             }
-            Ok(_) => {}
-            Err(_) => self.malformed += 1,
+            Some(Err(records::Malformed)) => self.malformed += 1,
         }
     }
 
@@ -275,18 +303,18 @@ impl Decoder {
         }
     }
 
-    fn channel(&mut self, channel: &mcap::records::Channel) {
-        let Some(schema) = self.schemas.get(&channel.schema_id) else { return };
-        let text = |key: &str| channel.metadata.get(key).map_or("", String::as_str);
+    fn channel(&mut self, id: u16, schema: u16, metadata: &BTreeMap<String, String>) {
+        let Some(schema) = self.schemas.get(&schema) else { return };
+        let text = |key: &str| metadata.get(key).map_or("", String::as_str);
         let number = |key: &str| text(key).parse().unwrap_or(f64::INFINITY);
         let index = text("index").parse::<usize>().ok();
         let carries = match (schema.name, index) {
-            (name, _) if name == messages::CYCLE.name => Carries::Cycles,
-            (name, _) if name == messages::EVENT.name => Carries::Events,
-            (name, Some(index)) if name == messages::AXIS.name => {
+            (message, _) if message == messages::CYCLE.name => Carries::Cycles,
+            (message, _) if message == messages::EVENT.name => Carries::Events,
+            (message, Some(index)) if message == messages::AXIS.name => {
                 let description = AxisDescription {
-                    name: printable(text("name")),
-                    bus: channel.metadata.get("bus").map(|bus| printable(bus)),
+                    name: name(text("name")),
+                    bus: metadata.get("bus").map(|bus| name(bus)),
                     unit: if text("unit") == Unit::Metre.symbol() { Unit::Metre } else { Unit::Radian },
                     counts_per_unit: number("counts_per_unit"),
                     limits: SetPointMagnitudes {
@@ -298,10 +326,10 @@ impl Decoder {
                 self.axes.insert(index, description);
                 Carries::Axis(index)
             }
-            (name, Some(index)) if name == messages::BUS.name => Carries::Health(index),
+            (message, Some(index)) if message == messages::BUS.name => Carries::Health(index),
             _ => return,
         };
-        self.channels.insert(channel.id, carries);
+        self.channels.insert(id, carries);
     }
 
     fn message(

@@ -5,10 +5,10 @@ mod picture;
 use std::path::PathBuf;
 
 use serde::Serialize;
-use takt_rt::{AxisRecord, CycleRecord, EventKind};
+use takt_rt::{AxisRecord, EventKind};
 
 use super::machine::SetPointMagnitudes;
-use super::recorded::{Cause, Recorded, RecordedError};
+use super::recorded::{Cause, Recorded, RecordedCycle, RecordedError};
 use super::report::{BusReport, LatencyReport, SetPointParts};
 use super::words;
 
@@ -151,7 +151,7 @@ impl RecordingReport {
         let window = recorded.cycles(&recorded.slots_around_cause(cycles.saturating_sub(1), 0))?;
         let shown = axis.or_else(|| recorded.axis(None)).and_then(|axis| {
             let description = machine.axes.get(axis)?;
-            let row = |record: &CycleRecord| Some(AxisCycle::new(record, record.axes().get(axis)?));
+            let row = |cycle: &RecordedCycle| Some(AxisCycle::new(cycle, cycle.axes.get(axis)?));
             Some(AxisCycles {
                 name: description.name.clone(),
                 unit: description.unit.symbol(),
@@ -221,10 +221,10 @@ impl RecordingReport {
 }
 
 impl AxisCycle {
-    fn new(record: &CycleRecord, axis: &AxisRecord) -> Self {
+    fn new(cycle: &RecordedCycle, axis: &AxisRecord) -> Self {
         Self {
-            slot: record.timing.slot,
-            phase: words::phase(record.phase),
+            slot: cycle.timing.slot,
+            phase: words::phase(cycle.phase),
             position_set: axis.position_set,
             position: axis.position,
             velocity_set: axis.velocity_set,
