@@ -13,7 +13,7 @@ pub fn run(bytes: &[u8]) {
         Err(error) => return assert!(error.to_string().len() > file.0.as_os_str().len()),
     };
     let report = RecordingReport::new(&recorded, None, 20).expect("what was read once can be read again");
-    assert!(!report.picture(Emphasis::None).is_empty());
+    assert!(!report.render(Emphasis::None).is_empty());
     serde_json::to_string(&report).expect("a report is plain data");
     let cycles = recorded.cycles(&(0..=u64::MAX)).expect("what was read once can be read again");
     assert_eq!(cycles.len() as u64, recorded.statistics.cycles);

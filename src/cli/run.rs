@@ -16,7 +16,7 @@ use takt::controller::realtime_thread::StartError;
 use takt::controller::session::{self, Session, SessionError, SessionOptions};
 use takt::controller::{Interrupt, Outcome, Progress};
 use takt::faults::{Fault, Rehearsal, Scenario, ScenarioError, Tidings};
-use takt::telemetry::{Destination, Machine, Notice, RealtimeReport, RunOutcome, RunReport, words};
+use takt::telemetry::{Machine, Notice, RealtimeReport, RecordingDestination, RunOutcome, RunReport, words};
 use takt_rt::{Event, EventKind, Snapshot, StopReason};
 
 use super::configuration::{self, BusOverride};
@@ -94,7 +94,7 @@ pub fn run(arguments: Arguments) -> Exit {
     let bar = progress_bar(&config);
     let options = SessionOptions {
         duration_ns: arguments.duration.map(|duration| duration.as_nanos() as u64),
-        recording: arguments.record.map(Destination::File),
+        recording: arguments.record.map(RecordingDestination::File),
         is_realtime_required: arguments.require_realtime,
         rehearsal: rehearsal.clone(),
     };
@@ -186,7 +186,7 @@ fn report(config: &Config, session: &Session, as_json: bool) -> Exit {
             report.telemetry.black_boxes.iter().for_each(|path| say!("black box: {}", path.display()));
             exit
         }
-        None => print::text(&report.picture(print::emphasis()), exit),
+        None => print::text(&report.render(print::emphasis()), exit),
     }
 }
 

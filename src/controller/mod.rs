@@ -1,14 +1,13 @@
-//! A running controller: the engine of a configuration, the real-time thread that paces it, and the life cycle
-//! around it.
+//! A running controller: the engine of a configuration, the real-time thread that runs it, and the life cycle of a run.
 
 pub mod assemble;
 pub mod channels;
 mod handle;
 mod outcome;
 mod program;
-pub mod quiet;
 pub mod realtime_thread;
 pub mod session;
+pub mod sleep_alignment;
 mod supervisor;
 mod time_of_day;
 mod virtual_time;

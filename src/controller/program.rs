@@ -1,4 +1,4 @@
-//! The motion program: which move is next, and when.
+//! The motion program: decides which move is next, and when.
 
 use takt_rt::{
     Answer, MAX_AXES, MotionState, Move, ProfileMove, ProfileTarget, Refusal, Request, RequestEnvelope,

@@ -1,4 +1,4 @@
-//! What people call the parts of the machine that records and events know by number.
+//! Names and units of the parts of the machine. Records and events have only their numbers.
 
 use std::f64::consts::TAU;
 
@@ -24,17 +24,17 @@ pub struct Machine {
 pub struct AxisDescription {
     /// Its name in the configuration.
     pub name: String,
-    /// The name of the bus it is on; `None` where a recording of an earlier version does not say it.
+    /// The name of its bus; `None` in a recording of an earlier version without this name.
     pub bus: Option<String>,
-    /// Whether it turns or slides.
+    /// The unit of its position.
     pub unit: Unit,
     /// Counts per rad (m) of the position that the drive reports.
     pub counts_per_unit: f64,
-    /// What its set-points may reach.
+    /// The limits of its set-points.
     pub limits: SetPointMagnitudes,
 }
 
-/// How large the derivatives of a set-point are, or may be, in rad (m) and seconds.
+/// Magnitudes, or limits, of the derivatives of a set-point, in rad (m) and seconds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct SetPointMagnitudes {
     /// rad/s (m/s)
@@ -50,7 +50,7 @@ pub struct SetPointMagnitudes {
 pub struct BusDescription {
     /// Its name in the configuration.
     pub name: String,
-    /// What it is connected to: `sim`, or the name of a network interface.
+    /// `sim`, or the name of its network interface.
     pub interface: String,
 }
 
@@ -99,12 +99,12 @@ impl Machine {
         }
     }
 
-    /// The name of an axis; its number when it has none.
+    /// The name of an axis; its number if it is unknown.
     pub fn axis_name(&self, axis: u8) -> String {
         self.axes.get(usize::from(axis)).map_or_else(|| format!("axis {axis}"), |axis| axis.name.clone())
     }
 
-    /// The name of a bus; its number when it has none.
+    /// The name of a bus; its number if it is unknown.
     pub fn bus_name(&self, bus: u8) -> String {
         self.buses.get(usize::from(bus)).map_or_else(|| format!("bus {bus}"), |bus| bus.name.clone())
     }

@@ -1,4 +1,4 @@
-//! Reads a recording or a black box: what it is of, what happened in it, how the timing was, and any of its cycles.
+//! Reads a recording or a black box: the machine, the events, the timing, and the cycles.
 
 mod cause;
 mod records;
@@ -13,9 +13,9 @@ use std::path::{Path, PathBuf};
 use takt_rt::{AxisRecord, CycleRecord, CycleTiming, EventKind, MAX_BUSES, Nanoseconds, Phase};
 
 use super::black_box;
+use super::history::OnBus;
 use super::machine::{AxisDescription, BusDescription, Machine, SetPointMagnitudes, Unit};
 use super::messages::{self, MessageType};
-use super::past::OnBus;
 use super::recording;
 use super::statistics::Statistics;
 use super::wall_clock::WallClock;
@@ -29,7 +29,7 @@ pub use walk::WalkError;
 /// Why a file cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordedError {
-    /// It is none that can be read.
+    /// It cannot be read.
     #[error("{path}: {error}")]
     Unreadable {
         /// The file.
@@ -38,14 +38,14 @@ pub enum RecordedError {
         #[source]
         error: WalkError,
     },
-    /// It is an MCAP file of something else.
+    /// It is an MCAP file of another program.
     #[error(
-        "{path}: no recording of takt (it was written by {library:?}); name one that `takt run` has left"
+        "{path}: this is not a recording of takt (it was written by {library:?}); name a file of `takt run`"
     )]
     Foreign {
         /// The file.
         path: PathBuf,
-        /// What the file says of its writer.
+        /// The program that wrote it, according to the file.
         library: String,
     },
     /// Its messages have other fields.
@@ -60,16 +60,16 @@ pub enum RecordedError {
     },
 }
 
-/// An event with what the recording says of it in words.
+/// An event with its text.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RecordedEvent {
     /// The slot in which it was seen.
     pub slot: u64,
     /// When, on the monotonic clock of the run.
     pub at_ns: Nanoseconds,
-    /// In words.
+    /// Its text.
     pub text: String,
-    /// What it was; `None` when it is of a kind that this version does not know.
+    /// Its kind; `None` if this version does not know it.
     pub kind: Option<EventKind>,
 }
 
@@ -78,7 +78,7 @@ pub struct RecordedEvent {
 pub struct RecordedCycle {
     /// When.
     pub timing: CycleTiming,
-    /// What the group was doing.
+    /// The phase of the group.
     pub phase: Phase,
     /// Whether set-points were sent in this cycle.
     pub is_commanded: bool,
@@ -94,7 +94,7 @@ impl RecordedCycle {
     }
 }
 
-/// A recording, but for its cycles.
+/// A recording without its cycles.
 #[derive(Clone, Debug)]
 pub struct Recorded {
     /// The file.
@@ -103,19 +103,19 @@ pub struct Recorded {
     pub version: String,
     /// Names, units and limits.
     pub machine: Machine,
-    /// The faults for which a black box was written, each with its keys; none in an ordinary recording.
-    pub faults: Vec<BTreeMap<String, String>>,
-    /// What happened, in the order of the file.
+    /// The incidents for which a black box was written, each with its keys; none in an ordinary recording.
+    pub incidents: Vec<BTreeMap<String, String>>,
+    /// The events in the order of the file.
     pub events: Vec<RecordedEvent>,
-    /// How the buses were, whenever that changed, with the number of the bus.
+    /// Every change of the health of a bus, with the number of the bus.
     pub health: Vec<(usize, TracedHealth)>,
     /// Timing and following errors of the whole recording.
     pub statistics: Statistics,
-    /// The lowest and the highest slot; those of a damaged file need not be in order.
+    /// The lowest and the highest slot. In a damaged file, slots may be out of order.
     pub slots: Option<(u64, u64)>,
     /// The time of day.
     pub wall_clock: Option<WallClock>,
-    /// What is not as it should be with the file.
+    /// Defects of the file.
     pub warnings: Vec<String>,
 }
 
@@ -129,7 +129,7 @@ impl Recorded {
             path: path.to_owned(),
             version: String::new(),
             machine: Machine { name: String::new(), cycle_ns: 0, axes: Vec::new(), buses: Vec::new() },
-            faults: Vec::new(),
+            incidents: Vec::new(),
             events: Vec::new(),
             health: Vec::new(),
             statistics: Statistics::default(),
@@ -139,7 +139,7 @@ impl Recorded {
         };
         if fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir()) {
             let error = io::Error::other(
-                "this is no ordinary file, and a recording is read more than once: save it first",
+                "this is not a regular file, and a recording is read more than once; save it to a file first",
             );
             return Err(RecordedError::Unreadable { path: path.to_owned(), error: error.into() });
         }
@@ -176,8 +176,9 @@ impl Recorded {
                 let buses = described.get("buses").map_or("", String::as_str);
                 self.machine.buses = buses.lines().take(MAX_BUSES).map(bus).collect();
             }
-            Item::Fault(fault) => {
-                self.faults.push(fault.into_iter().map(|(key, text)| (key, printable(&text))).collect());
+            Item::Incident(incident) => {
+                self.incidents
+                    .push(incident.into_iter().map(|(key, text)| (key, printable(&text))).collect());
             }
             Item::Cycle(record, log_time_ns) => {
                 let (slot, start_ns) = (record.timing.slot, record.timing.slot_start_ns);
@@ -195,7 +196,7 @@ impl Recorded {
         }
     }
 
-    /// Shows everything in the file to `take`.
+    /// Passes everything in the file to `take`.
     fn read(&mut self, mut take: impl FnMut(&mut Self, Item<'_>)) -> Result<Decoder, RecordedError> {
         let path = self.path.clone();
         let unreadable = |error| RecordedError::Unreadable { path: path.clone(), error };
@@ -214,13 +215,13 @@ impl Recorded {
             return Err(RecordedError::Foreign { path, library });
         }
         if !condition.is_whole {
-            self.warnings.push("the file is cut off; this is what there is of it".to_owned());
+            self.warnings.push("the file is cut off; it is read to its last whole record".to_owned());
         }
         if condition.damaged_chunks > 0 {
-            self.warnings.push(format!("{} damaged parts were left out", condition.damaged_chunks));
+            self.warnings.push(format!("{} damaged chunks were skipped", condition.damaged_chunks));
         }
         if decoder.malformed > 0 {
-            self.warnings.push(format!("{} malformed messages were left out", decoder.malformed));
+            self.warnings.push(format!("{} malformed messages were skipped", decoder.malformed));
         }
         Ok(decoder)
     }
@@ -234,17 +235,17 @@ fn name(text: &str) -> String {
     printable(&text.chars().take(LONGEST_NAME).collect::<String>())
 }
 
-/// What a recording consists of.
+/// An item of a recording.
 enum Item<'a> {
     Machine(BTreeMap<String, String>),
-    Fault(BTreeMap<String, String>),
+    Incident(BTreeMap<String, String>),
     /// With its time of day.
     Cycle(&'a CycleRecord, u64),
     Event(RecordedEvent),
     Health(OnBus<TracedHealth>),
 }
 
-/// What a channel carries.
+/// The kind of messages of a channel.
 #[derive(Clone, Copy)]
 enum Carries {
     Cycles,
@@ -253,7 +254,7 @@ enum Carries {
     Health(usize),
 }
 
-/// From records to items.
+/// Makes items from records.
 #[derive(Default)]
 struct Decoder {
     library: String,
@@ -262,7 +263,7 @@ struct Decoder {
     schemas: HashMap<u16, &'static MessageType>,
     channels: HashMap<u16, Carries>,
     axes: BTreeMap<usize, AxisDescription>,
-    /// The cycle whose axes follow, its time of day, and how many of them have been seen.
+    /// The cycle whose axes follow, its time of day, and the number of axes seen so far.
     cycle: Option<(Box<CycleRecord>, u64, usize)>,
     malformed: u64,
 }
@@ -279,7 +280,7 @@ impl Decoder {
                 give(Item::Machine(entries));
             }
             Some(Ok(Record::Metadata { name, entries })) if name == black_box::METADATA => {
-                give(Item::Fault(entries));
+                give(Item::Incident(entries));
             }
             Some(Ok(Record::Metadata { .. })) => {}
             Some(Ok(Record::Message { channel, log_time_ns, data })) => {
@@ -365,7 +366,7 @@ impl Decoder {
         Some(())
     }
 
-    /// Gives the last cycle, unless some of its axes are missing.
+    /// Passes on the last cycle, unless some of its axes are missing.
     fn finish(&mut self, give: &mut impl FnMut(Item<'_>)) {
         if let Some((record, log_time_ns, seen)) = self.cycle.take()
             && seen == self.axes.len()

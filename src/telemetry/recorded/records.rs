@@ -1,5 +1,5 @@
 //! The MCAP records that a recording consists of. Every length is checked against the bytes that are there, before
-//! anything of that length is allocated: a file may say anything.
+//! anything of that length is allocated: a file may contain any number.
 
 use std::collections::BTreeMap;
 
@@ -28,7 +28,7 @@ pub enum Record<'a> {
         id: u16,
         /// The type of its messages.
         schema: u16,
-        /// What its writer says of it.
+        /// The description of the channel by its writer.
         metadata: BTreeMap<String, String>,
     },
     /// A message.
@@ -40,9 +40,9 @@ pub enum Record<'a> {
         /// Its fields.
         data: &'a [u8],
     },
-    /// What the writer says of the file.
+    /// A description of the file by its writer.
     Metadata {
-        /// What it is about.
+        /// Its name.
         name: String,
         /// Its keys and texts.
         entries: BTreeMap<String, String>,
@@ -168,15 +168,15 @@ mod tests {
     fn a_length_beyond_the_end_of_the_record_makes_it_malformed() {
         let body = metadata_record("takt", &[("machine", "arm")]);
         for at in [0, 8, 12, 23] {
-            let mut lying = body.clone();
-            lying[at..at + 4].copy_from_slice(&u32::MAX.to_le_bytes());
-            assert_eq!(parse(op::METADATA, &lying), Some(Err(Malformed)), "the length at byte {at}");
+            let mut false_length = body.clone();
+            false_length[at..at + 4].copy_from_slice(&u32::MAX.to_le_bytes());
+            assert_eq!(parse(op::METADATA, &false_length), Some(Err(Malformed)), "the length at byte {at}");
         }
     }
 
     proptest! {
         #[test]
-        fn no_bytes_bring_it_down(opcode in 0u8..0x12, body in prop::collection::vec(any::<u8>(), 0..100)) {
+        fn no_input_makes_it_panic(opcode in 0u8..0x12, body in prop::collection::vec(any::<u8>(), 0..100)) {
             let _ = parse(opcode, &body);
         }
     }
