@@ -1,4 +1,4 @@
-//! Everything that is decoded from the wire, given any frames.
+//! Fuzzes every decoder of frames with arbitrary frames.
 
 use std::sync::OnceLock;
 
@@ -20,8 +20,8 @@ use super::input::Input;
 
 const NODE: u8 = 2;
 
-/// What is decoded can be encoded and is the same again; the SDO client, the layer settings, bring-up and farewell always
-/// come to an end; the drive always lives on and speaks properly; process data are taken or refused.
+/// A decoded frame can be encoded, and gives the same frame. The SDO client, the layer settings, the bring-up and the
+/// shut-down always end. The simulated drive goes on and sends valid frames. Process data are accepted or rejected.
 pub fn run(bytes: &[u8]) {
     let Some((kind, rest)) = bytes.split_first() else { return };
     let input = Input::new(rest);
@@ -77,7 +77,7 @@ fn decode(mut input: Input<'_>) {
     }
 }
 
-/// The longest that a client may go on with a server that says whatever it likes.
+/// The longest time that a client may spend with a server that sends arbitrary frames.
 const POLLS_AT_MOST: usize = 10_000;
 
 fn ask(mut input: Input<'_>) {
@@ -99,7 +99,7 @@ fn ask(mut input: Input<'_>) {
     let mut now_ns = 0;
     for _ in 0..POLLS_AT_MOST {
         while let Some(frame) = client.poll(now_ns) {
-            // A segment of a block has no command, so only this much can be said of every frame.
+            // A segment of a block has no command specifier, so nothing more holds for every frame.
             assert_eq!((frame.id(), frame.payload().len()), (Id::canopen(0x600, NODE), 8), "{frame:?}");
         }
         if client.take_outcome().is_some() {
@@ -120,7 +120,7 @@ fn one_drive() -> &'static Config {
     static CONFIG: OnceLock<Config> = OnceLock::new();
     CONFIG.get_or_init(|| {
         let text = include_str!("../../configs/single-erob.toml");
-        let mut config = Config::parse("single-erob.toml", text).expect("the example is sound");
+        let mut config = Config::parse("single-erob.toml", text).expect("the example is valid");
         config.axes.iter_mut().for_each(|axis| {
             axis.node = NODE;
             axis.simulated.power_up_ns = 100_000;
@@ -133,7 +133,7 @@ fn one_yz_aim() -> &'static Config {
     static CONFIG: OnceLock<Config> = OnceLock::new();
     CONFIG.get_or_init(|| {
         let text = include_str!("../../configs/gantry-yz-aim.toml");
-        let mut config = Config::parse("gantry-yz-aim.toml", text).expect("the example is sound");
+        let mut config = Config::parse("gantry-yz-aim.toml", text).expect("the example is valid");
         config.axes.truncate(1);
         config.axes[0].node = NODE;
         config.axes[0].simulated.power_up_ns = 100_000;
