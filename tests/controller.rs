@@ -8,8 +8,8 @@ use takt::config::{Config, Control};
 use takt::controller::{Interrupt, Outcome, VirtualRun};
 use takt::sim::{DriveFault, Observation, SimulatedBus};
 use takt_rt::{
-    Answer, BusHealth, BusPort, Clock, DriveState, Frame, Id, MAX_AXES, Move, Phase, ReceiveBatch,
-    RejectReason, Request, RequestKind, Rule, StopCategory,
+    Answer, BusHealth, BusPort, Clock, DriveState, Frame, Id, MAX_AXES, MotionState, Move, Phase,
+    ReceiveBatch, RejectReason, Request, RequestKind, Rule, StopCategory,
 };
 
 /// A minute of 1 ms cycles. Every program here takes less.
@@ -234,7 +234,7 @@ fn run_and_inject(config: &Config, inject: impl FnOnce(&mut SimulatedBus)) -> (O
 
 fn rule_and_axis(outcome: Option<Outcome>) -> (Rule, Option<u8>) {
     match outcome {
-        Some(Outcome::Stopped(stop)) => (stop.rule, stop.axis()),
+        Some(Outcome::Stopped(stop)) => (stop.rule(), stop.axis()),
         other => panic!("{other:?}"),
     }
 }
@@ -377,12 +377,11 @@ fn a_refused_request_of_another_client_does_not_end_the_program() {
         }
     });
     assert_eq!(outcome, Some(Outcome::Finished));
-    assert!(run.snapshot().refused > 1000);
+    assert!(run.snapshot().rejected > 1000);
 }
 
 fn move_to(target: [f64; MAX_AXES], minimum_duration_s: f64) -> Move {
     Move {
-        id: 1,
         target,
         target_velocity: [0.0; MAX_AXES],
         velocity_scale: 1.0,
@@ -432,13 +431,14 @@ fn a_group_that_a_client_moves_before_the_life_cycle_sees_it_hold_goes_on() {
     let mut target = run.snapshot().axes.map(|axis| axis.position_set);
     target[0] += 0.1;
     let slow_move = move_to(target, 20.0);
-    run.host().request(Request::Move(slow_move)).unwrap();
+    let motion = run.host().request(Request::Move(slow_move)).unwrap();
     run.run(2, |_| {});
     assert_eq!(run.snapshot().phase, Phase::Moving);
     // This is longer than the enable time-out.
     run.run(25_000, |_| {});
     assert_eq!(run.snapshot().phase, Phase::Holding);
-    assert_eq!((run.snapshot().finished_move, run.snapshot().stop), (1, None));
+    let snapshot = run.snapshot();
+    assert_eq!((snapshot.motions.of(motion), snapshot.stop), (Some(MotionState::Finished), None));
     run.interrupt(Interrupt::Controlled);
     assert_eq!(run.run(CYCLES_AT_MOST, |_| {}), Some(Outcome::Interrupted));
 }
@@ -454,8 +454,8 @@ fn the_answer_to_a_request_is_found_by_its_id_with_the_reason_of_a_refusal() {
     let taken = run.host().request(Request::Stop(StopCategory::Two)).unwrap();
     run.run(2, |_| {});
     let answers = run.snapshot().answers;
-    let Answer::Refused(Some(refusal)) = answers.of(refused) else { panic!("{answers:?}") };
-    let kind = (refusal.request, refusal.objection, refusal.phase);
+    let Answer::Rejected(Some(refusal)) = answers.of(refused) else { panic!("{answers:?}") };
+    let kind = (refusal.request, refusal.reason, refusal.phase);
     assert_eq!(kind, (RequestKind::Enable, RejectReason::Phase, Phase::Moving));
     assert_eq!(answers.of(taken), Answer::Granted);
 }
@@ -473,5 +473,5 @@ fn a_fault_during_disabling_is_the_outcome_of_the_run() {
         }
     });
     let Some(Outcome::Stopped(stop)) = outcome else { panic!("{outcome:?}") };
-    assert_eq!((stop.rule, stop.phase), (Rule::ForeignMaster, Phase::Disabling));
+    assert_eq!((stop.rule(), stop.phase), (Rule::ForeignMaster, Phase::Disabling));
 }

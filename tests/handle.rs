@@ -55,7 +55,7 @@ fn a_velocity_is_reached_and_ended_and_an_expired_one_stops_the_group() {
     joint.velocity(0, 0.2, Duration::from_millis(300)).unwrap();
     assert!(joint.wait_for(Phase::Stopping, PATIENCE) || joint.state().stop.is_some());
     assert!(joint.wait_for(Phase::Holding, PATIENCE));
-    assert_eq!(joint.state().stop.map(|stop| stop.rule), Some(Rule::StaleCommand));
+    assert_eq!(joint.state().stop.map(|stop| stop.rule()), Some(Rule::StaleCommand));
 }
 
 #[test]
@@ -68,7 +68,7 @@ fn after_a_fault_each_request_is_refused_with_the_reason_until_the_fault_is_rese
     while joint.state().stop.is_none() && begun.elapsed() < PATIENCE {
         std::thread::sleep(Duration::from_millis(1));
     }
-    assert_eq!(joint.state().stop.map(|stop| stop.rule), Some(Rule::StartPose));
+    assert_eq!(joint.state().stop.map(|stop| stop.rule()), Some(Rule::StartPose));
     assert!(joint.wait_for(Phase::Holding, PATIENCE));
     let refused = joint.move_to(&[0.2]).unwrap();
     let Err(MotionError::Refused(refused)) = joint.wait(refused, PATIENCE) else { panic!("it was granted") };
@@ -122,7 +122,7 @@ fn a_stop_does_not_wait_behind_a_flood_of_requests() {
     joint.stop(StopCategory::One).unwrap();
     assert!(joint.wait_for(Phase::Disabled, PATIENCE));
     let stop = joint.state().stop.unwrap();
-    assert_eq!((stop.rule, stop.category), (Rule::Requested, StopCategory::One));
+    assert_eq!((stop.rule(), stop.category), (Rule::Requested, StopCategory::One));
     assert!(stop.slot - slot < 2_000, "{} slots after its request", stop.slot - slot);
     assert!(joint.wait(last, PATIENCE).is_err());
     assert_eq!(joint.finish().unwrap().outcome, Outcome::Finished);
@@ -159,7 +159,7 @@ fn each_wait_returns_the_result_of_its_own_motion() {
     joint.stop(StopCategory::Two).unwrap();
     let why = joint.wait(stopped, PATIENCE);
     assert!(
-        matches!(&why, Err(MotionError::Stopped(stopped)) if stopped.reason.rule == Rule::Requested),
+        matches!(&why, Err(MotionError::Stopped(stopped)) if stopped.reason.rule() == Rule::Requested),
         "{why:?}"
     );
     assert!(joint.wait_for(Phase::Holding, PATIENCE));

@@ -54,7 +54,7 @@ fn stopped_run() -> RunFiles {
         logger.drain();
     });
     assert!(
-        matches!(outcome, Some(Outcome::Stopped(stop)) if stop.rule == Rule::FollowingError),
+        matches!(outcome, Some(Outcome::Stopped(stop)) if stop.rule() == Rule::FollowingError),
         "{outcome:?}"
     );
     let summary = logger.finish();
@@ -186,7 +186,7 @@ fn recording_of_a_lost_bus(bus: &str, folder: &Path) -> PathBuf {
     let outcome = run.run(60_000, |_| {
         logger.drain();
     });
-    assert!(matches!(outcome, Some(Outcome::Stopped(stop)) if stop.rule == Rule::BusLost), "{outcome:?}");
+    assert!(matches!(outcome, Some(Outcome::Stopped(stop)) if stop.rule() == Rule::BusLost), "{outcome:?}");
     logger.finish().recording.unwrap()
 }
 

@@ -12,7 +12,8 @@ pub fn run(bytes: &[u8]) {
         Ok(recorded) => recorded,
         Err(error) => return assert!(error.to_string().len() > file.0.as_os_str().len()),
     };
-    let report = RecordingReport::new(&recorded, None, 20).expect("a recording that was read once can be read again");
+    let report =
+        RecordingReport::new(&recorded, None, 20).expect("a recording that was read once can be read again");
     assert!(!report.render(Emphasis::None).is_empty());
     serde_json::to_string(&report).expect("a report is plain data");
     let cycles = recorded.cycles(&(0..=u64::MAX)).expect("a recording that was read once can be read again");

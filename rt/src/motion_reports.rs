@@ -1,7 +1,7 @@
 //! What became of the motions that were begun last: each motion by the request that began it.
 
-use crate::host::RequestId;
 use crate::record::MAX_AXES;
+use crate::request::RequestId;
 use crate::stop::StopReason;
 
 /// What has become of a motion.
@@ -81,14 +81,12 @@ impl MotionReports {
         }
     }
 
-    /// Ends every motion that is in progress. Returns whether there was one.
-    pub fn end_all(&mut self, state: MotionState) -> bool {
-        let mut has_ended = false;
+    /// Ends every motion that is in progress, and names the request that began each.
+    pub fn end_all(&mut self, state: MotionState, mut ended: impl FnMut(RequestId)) {
         for report in self.reports.iter_mut().flatten().filter(|report| report.is_in_progress()) {
             report.state = state;
-            has_ended = true;
+            ended(report.request);
         }
-        has_ended
     }
 
     /// Keeps what is in progress, and the newest that have ended.
@@ -125,8 +123,13 @@ mod tests {
         reports.begin(RequestId(4), None, GROUP);
         reports.begin(RequestId(7), None, GROUP);
         assert_eq!(of(&reports, 4), Some(MotionState::Replaced { by: RequestId(7) }));
-        assert!(reports.end_all(MotionState::Finished));
-        assert!(!reports.end_all(MotionState::Finished), "nothing is in progress");
+        let end = |reports: &mut MotionReports| {
+            let mut ended = Vec::new();
+            reports.end_all(MotionState::Finished, |request| ended.push(request));
+            ended
+        };
+        assert_eq!(end(&mut reports), [RequestId(7)]);
+        assert_eq!(end(&mut reports), [], "nothing is in progress");
         assert_eq!(of(&reports, 4), Some(MotionState::Replaced { by: RequestId(7) }));
         assert_eq!((of(&reports, 7), of(&reports, 5)), (Some(MotionState::Finished), None));
     }

@@ -1,8 +1,9 @@
 //! What one cycle leaves behind: a record of fixed size, copied to the logger through a lock-free ring.
 
 use crate::cia402;
-use crate::refusal::Refusal;
-use crate::stop::{Phase, StopReason};
+use crate::phase::Phase;
+use crate::request::{RequestError, RequestId};
+use crate::stop::StopReason;
 use crate::time::Nanoseconds;
 use crate::watch::TimingLevel;
 
@@ -70,7 +71,7 @@ pub struct AxisRecord {
 
 /// One cycle.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct CycleRecord {
+pub struct CycleRecord<const AXES: usize = MAX_AXES> {
     /// When.
     pub timing: CycleTiming,
     /// What the group was doing.
@@ -80,22 +81,22 @@ pub struct CycleRecord {
     /// How many of `axes` count.
     pub axis_count: u8,
     /// The axes in the order of the configuration.
-    pub axes: [AxisRecord; MAX_AXES],
+    pub axes: [AxisRecord; AXES],
 }
 
-impl Default for CycleRecord {
+impl<const AXES: usize> Default for CycleRecord<AXES> {
     fn default() -> Self {
         Self {
             timing: CycleTiming::default(),
             phase: Phase::default(),
             is_commanded: false,
             axis_count: 0,
-            axes: [AxisRecord::default(); MAX_AXES],
+            axes: [AxisRecord::default(); AXES],
         }
     }
 }
 
-impl CycleRecord {
+impl<const AXES: usize> CycleRecord<AXES> {
     /// The axes that count.
     pub fn axes(&self) -> &[AxisRecord] {
         self.axes.get(..self.axis_count.into()).unwrap_or(&self.axes)
@@ -125,10 +126,10 @@ pub enum EventKind {
     },
     /// A stop began; one for each stop, and a second one when a fault comes up on the way of a stop that was asked for.
     Stop(StopReason),
-    /// A move was finished.
-    MoveFinished {
-        /// The number that the move was given.
-        id: u32,
+    /// A motion has reached its target.
+    MotionFinished {
+        /// The request that began it.
+        request: RequestId,
     },
     /// A drive's state changed.
     DriveState {
@@ -160,6 +161,6 @@ pub enum EventKind {
         /// The level from now on.
         level: TimingLevel,
     },
-    /// A request was refused and changed nothing.
-    Refused(Refusal),
+    /// A request was rejected and changed nothing.
+    Rejected(RequestError),
 }

@@ -88,7 +88,7 @@ fn missed_feedback_is_counted_in_cycles_of_the_own_bus() {
     assert_eq!(rig.stops(), []);
     rig.run(3);
     assert_eq!(
-        rig.stops().iter().map(|stop| (stop.rule, stop.axis())).collect::<Vec<_>>(),
+        rig.stops().iter().map(|stop| (stop.rule(), stop.axis())).collect::<Vec<_>>(),
         [(Rule::MissedFeedback, Some(4))]
     );
 }
@@ -112,7 +112,7 @@ fn a_drive_of_which_the_position_is_not_known_is_sent_nothing_until_bring_up_tel
         .collect();
     assert!(targets.len() >= 3 && targets.iter().all(|target| *target == 2_345), "{targets:?}");
     rig.request(Request::Position { axis: 2, counts: 0 });
-    assert_eq!(rig.host.snapshot.refused, 1, "there is no such axis");
+    assert_eq!(rig.host.snapshot.rejected, 1, "there is no such axis");
 }
 
 #[test]

@@ -85,7 +85,7 @@ fn after_a_stall_in_motion_the_set_points_go_on_by_one_period() {
     rig.run_until(Phase::Holding, 5_000);
     rig.assert_limits_kept();
     assert_eq!(rig.stops(), []);
-    assert_eq!(rig.host.snapshot.finished_move, 7);
+    assert_eq!(rig.finished_motions(), 1);
 }
 
 #[test]

@@ -80,11 +80,11 @@ fn a_position_that_no_joint_can_have_got_to_stops_the_group_and_is_not_believed_
     rig.run(2);
     assert_eq!(rig.engine.axes()[0].position(), truth);
     let stops = rig.stops();
-    assert_eq!((stops.len(), stops[0].rule, stops[0].axis()), (1, Rule::ImplausibleFeedback, Some(0)));
-    assert!((stops[0].value - 0.5).abs() < 1e-4, "{stops:?}");
+    assert_eq!((stops.len(), stops[0].rule(), stops[0].axis()), (1, Rule::ImplausibleFeedback, Some(0)));
+    assert!((stops[0].cause.numbers().0 - 0.5).abs() < 1e-4, "{stops:?}");
     // Four times what its speed allows, and 64 counts.
     let reach = 4.0 * LIMITS.velocity * PERIOD_NS as f64 * 1e-9 + 64.0 * TAU / COUNTS_PER_TURN;
-    assert!((stops[0].limit - reach).abs() < 1e-9, "{stops:?}, {reach}");
+    assert!((stops[0].cause.numbers().1 - reach).abs() < 1e-9, "{stops:?}, {reach}");
 
     rig.run_until(Phase::Disabled, 600);
     rig.drive(0).lies.extend([(DriveState::SwitchOnDisabled, there); 50]);
@@ -161,7 +161,7 @@ fn a_drive_that_is_enabled_already_when_the_group_becomes_active_is_not_moved() 
 
 #[test]
 fn a_drive_that_hears_its_controlword_now_and_then_only_is_told_again_however_disabled_it_seems() {
-    let rare = |command: CommandPdo| CommandPdo { cadence: TransmissionType::OnControlword, ..command };
+    let rare = |command: CommandPdo| CommandPdo { transmission: TransmissionType::OnControlword, ..command };
     let usual = axis(0, 1);
     let mut drive = Axis::new(AxisParameters {
         dialect: Dialect::YzAim,

@@ -4,7 +4,7 @@
 mod fixture;
 
 use fixture::{PERIOD_NS, Rig, parameters};
-use takt_rt::{FeedbackSince, Frame, Id, Phase, Request, Rule, controlword};
+use takt_rt::{Fault, FeedbackSince, Frame, Id, Phase, Request, Rule, StopCause, controlword};
 
 fn moving() -> Rig {
     let mut rig = Rig::enabled(3);
@@ -24,8 +24,8 @@ fn feedback_that_is_late_by_whole_cycles_counts_as_missed_and_stops_the_group_af
         assert_eq!(rig.host.records.last().unwrap().axes[0].feedback_age, 3);
         rig.run(1);
         let stops = rig.stops();
-        assert_eq!((stops.len(), stops[0].rule), (1, Rule::MissedFeedback), "{late_cycles} cycles late");
-        assert_eq!((stops[0].value, stops[0].limit), (4.0, 3.0));
+        assert_eq!((stops.len(), stops[0].rule()), (1, Rule::MissedFeedback), "{late_cycles} cycles late");
+        assert_eq!(stops[0].cause, StopCause::Fault(Fault::MissedFeedback { cycles: 4, limit: 3 }));
         rig.run_until(Phase::Disabled, 3_000);
         rig.assert_limits_kept();
     }
@@ -36,7 +36,7 @@ fn feedback_that_misses_its_command_phase_by_a_little_counts_as_missed_too() {
     let mut rig = moving();
     rig.buses[0].lies_ns = 600_000;
     rig.run(5);
-    assert_eq!(rig.stops()[0].rule, Rule::MissedFeedback);
+    assert_eq!(rig.stops()[0].rule(), Rule::MissedFeedback);
 }
 
 #[test]
@@ -104,7 +104,7 @@ fn a_drive_that_reports_by_itself_is_heard_from_one_command_phase_to_the_next() 
         report(&mut rig);
         rig.run(1);
     }
-    assert_eq!((rig.stops().len(), rig.stops()[0].rule), (1, Rule::MissedFeedback));
+    assert_eq!((rig.stops().len(), rig.stops()[0].rule()), (1, Rule::MissedFeedback));
 }
 
 /// Drives that answer so many whole cycles late, and a little more, from the first SYNC on.
@@ -131,12 +131,12 @@ fn a_drive_that_always_answers_whole_cycles_late_is_never_led_up_and_its_latenes
             rig.run_until(Phase::Disabled, 200);
             let stops = rig.stops();
             assert_eq!(
-                (stops.len(), stops[0].rule, stops[0].axis()),
+                (stops.len(), stops[0].rule(), stops[0].axis()),
                 (attempt, Rule::MissedFeedback, Some(0))
             );
             assert_eq!(
-                (stops[0].value, stops[0].limit, stops[0].phase),
-                (cycles as f64, 0.0, Phase::Enabling)
+                (stops[0].cause, stops[0].phase),
+                (StopCause::Fault(Fault::LateFeedback { cycles: cycles as u16 }), Phase::Enabling)
             );
             rig.request(Request::ResetFaults);
         }

@@ -4,8 +4,7 @@ mod fixture;
 
 use fixture::{PERIOD_NS, Rig, axis_in, move_to, parameters};
 use takt_rt::{
-    ControlLaw, EventKind, MotionState, Move, Phase, ProfileMove, ProfileTarget, Request, RequestId, Rule,
-    StopCategory,
+    ControlLaw, MotionState, Move, Phase, ProfileMove, ProfileTarget, Request, RequestId, Rule, StopCategory,
 };
 
 fn state(rig: &Rig, request: u64) -> Option<MotionState> {
@@ -18,20 +17,16 @@ fn ask(rig: &mut Rig, request: Request) -> u64 {
     rig.host.taken
 }
 
-fn finished(rig: &Rig) -> usize {
-    rig.host.events.iter().filter(|event| matches!(event.kind, EventKind::MoveFinished { .. })).count()
-}
-
 #[test]
-fn a_move_reports_that_it_is_finished_whatever_number_its_caller_gave_it() {
+fn each_of_several_moves_reports_that_it_is_finished() {
     let mut rig = Rig::enabled(2);
-    for (count, (id, target)) in [(0, 0.3), (0, 0.1), (5, 0.2), (5, 0.3)].into_iter().enumerate() {
-        let request = ask(&mut rig, Request::Move(Move { id, ..move_to(target) }));
+    for (count, target) in [0.3, 0.1, 0.2, 0.3].into_iter().enumerate() {
+        let request = ask(&mut rig, Request::Move(move_to(target)));
         assert_eq!(state(&rig, request), Some(MotionState::InProgress));
         rig.run_until(Phase::Holding, 5_000);
         rig.run(1);
         assert_eq!(state(&rig, request), Some(MotionState::Finished));
-        assert_eq!(finished(&rig), count + 1);
+        assert_eq!(rig.finished_motions(), count + 1);
     }
 }
 
@@ -63,7 +58,7 @@ fn a_motion_that_was_stopped_says_why_for_as_long_as_it_is_remembered() {
     rig.run_until(Phase::Holding, 5_000);
     rig.run(1);
     let Some(MotionState::Stopped(stop)) = state(&rig, motion) else { panic!("{:?}", state(&rig, motion)) };
-    assert_eq!((stop.rule, stop.category, stop.phase), (Rule::Requested, StopCategory::Two, Phase::Moving));
+    assert_eq!((stop.rule(), stop.category, stop.phase), (Rule::Requested, StopCategory::Two, Phase::Moving));
     assert_eq!(state(&rig, next), Some(MotionState::Finished));
 }
 
@@ -94,7 +89,7 @@ fn profile_drives() -> Rig {
 
 fn target(rig: &Rig, axis: u8, target: ProfileTarget) -> Request {
     let valid_until_ns = rig.clock.now_ns + 60_000 * PERIOD_NS;
-    Request::SetProfileTarget(ProfileMove { id: 0, axis, target, valid_until_ns })
+    Request::SetProfileTarget(ProfileMove { axis, target, valid_until_ns })
 }
 
 #[test]

@@ -39,7 +39,7 @@ fn commands_go_out_as_the_drive_maps_them() {
     let reported = data(&[TARGET, CONTROLWORD], &[STATUSWORD, POSITION]);
     rig.host.requests.extend([Request::ProcessData(reported), Request::Sync(true), Request::Activate]);
     rig.run(20);
-    assert_eq!(rig.host.snapshot.refused, 0);
+    assert_eq!(rig.host.snapshot.rejected, 0);
     let sent = |id: u32| rig.buses[0].sent.iter().filter(move |(_, frame)| frame.id().value() == id);
     assert_eq!(sent(0x201).count(), 0, "nobody listens to RPDO 1 any more");
     let (_, last) = sent(0x301).next_back().unwrap();
@@ -57,7 +57,7 @@ fn a_drive_whose_mapping_is_told_as_it_was_expected_moves_as_ever() {
     let mut rig = rig.enable();
     rig.move_to(0.1);
     rig.run_until(Phase::Holding, 5_000);
-    assert_eq!((rig.stops(), rig.host.snapshot.refused), (vec![], 0));
+    assert_eq!((rig.stops(), rig.host.snapshot.rejected), (vec![], 0));
 }
 
 #[test]
@@ -69,29 +69,28 @@ fn what_cannot_be_exchanged_or_comes_too_late_is_refused_and_changes_nothing() {
     taken.feedback[0] = Some(pdo(0x280, &[STATUSWORD, POSITION]));
     taken.unused[0] = Some(Id::canopen(0x080, 1));
     let mut rig = Rig::new(1);
-    let (narrow, unknown_parameter) = (MappedObject::new(0x6041, 0, 12), unknown.parameter().into());
-    for (count, (impossible, objection, axis, value)) in (1..).zip([
-        (AxisProcessData { axis: 7, ..good }, RejectReason::UnknownAxis, None, 7.0),
-        (AxisProcessData { feedback: [None; MAX_PDOS], ..good }, RejectReason::NoProcessData, Some(0), 0.0),
-        (AxisProcessData { commands: [None; MAX_PDOS], ..good }, RejectReason::NoProcessData, Some(0), 0.0),
+    let narrow = MappedObject::new(0x6041, 0, 12);
+    for (count, (impossible, reason, axis)) in (1..).zip([
+        (AxisProcessData { axis: 7, ..good }, RejectReason::UnknownAxis { axis: 7, axes: 1 }, None),
+        (AxisProcessData { feedback: [None; MAX_PDOS], ..good }, RejectReason::NoProcessData, Some(0)),
+        (AxisProcessData { commands: [None; MAX_PDOS], ..good }, RejectReason::NoProcessData, Some(0)),
         (
             data(&[CONTROLWORD, unknown], &[STATUSWORD, POSITION]),
-            RejectReason::Mapping,
+            RejectReason::Mapping { object: unknown },
             Some(0),
-            unknown_parameter,
         ),
-        (data(&[CONTROLWORD, TARGET], &[narrow]), RejectReason::Mapping, Some(0), narrow.parameter().into()),
-        (taken, RejectReason::IdTaken, Some(0), f64::from(0x081)),
+        (data(&[CONTROLWORD, TARGET], &[narrow]), RejectReason::Mapping { object: narrow }, Some(0)),
+        (taken, RejectReason::IdTaken { id: Id::canopen(0x080, 1) }, Some(0)),
     ]) {
         rig.request(Request::ProcessData(impossible));
-        assert_eq!(rig.host.snapshot.refused, count, "{impossible:?}");
-        let refusal = rig.refusals().pop().unwrap();
-        assert_eq!((refusal.objection, refusal.axis, refusal.value), (objection, axis, value));
+        assert_eq!(rig.host.snapshot.rejected, count, "{impossible:?}");
+        let rejection = rig.rejections().pop().unwrap();
+        assert_eq!((rejection.reason, rejection.axis), (reason, axis));
     }
     let mut rig = rig.enable();
-    let refused = rig.host.snapshot.refused;
+    let refused = rig.host.snapshot.rejected;
     rig.request(Request::ProcessData(good));
-    assert_eq!((rig.host.snapshot.refused, rig.phase()), (refused + 1, Phase::Holding));
+    assert_eq!((rig.host.snapshot.rejected, rig.phase()), (refused + 1, Phase::Holding));
     rig.move_to(0.1);
     rig.run_until(Phase::Holding, 5_000);
     assert_eq!(rig.stops(), []);

@@ -47,7 +47,7 @@ fn disabling_that_becomes_harder_on_its_way_lasts_no_longer() {
 
 /// The rules and categories of all stops that were told of.
 fn told(rig: &Rig) -> Vec<(Rule, StopCategory)> {
-    rig.stops().iter().map(|stop| (stop.rule, stop.category)).collect()
+    rig.stops().iter().map(|stop| (stop.rule(), stop.category)).collect()
 }
 
 #[test]
@@ -63,7 +63,7 @@ fn a_fault_on_the_way_of_a_stop_that_was_asked_for_takes_its_place_and_must_be_r
         let hardest = category.min(StopCategory::One);
         assert_eq!(told(&rig), [(Rule::Requested, category), (Rule::UnexpectedBootUp, hardest)]);
         let shown = rig.host.snapshot.stop.unwrap();
-        assert_eq!((shown.rule, shown.axis(), shown.category), (Rule::UnexpectedBootUp, Some(1), hardest));
+        assert_eq!((shown.rule(), shown.axis(), shown.category), (Rule::UnexpectedBootUp, Some(1), hardest));
         rig.run_until(Phase::Disabled, 3_000);
         rig.assert_limits_kept();
 
@@ -105,7 +105,7 @@ fn what_is_asked_for_on_the_way_of_a_fault_does_not_take_its_place() {
     rig.run(2);
     assert_eq!(told(&rig), [(Rule::UnexpectedBootUp, StopCategory::One)]);
     let shown = rig.host.snapshot.stop.unwrap();
-    assert_eq!((shown.rule, shown.category), (Rule::UnexpectedBootUp, StopCategory::Zero));
+    assert_eq!((shown.rule(), shown.category), (Rule::UnexpectedBootUp, StopCategory::Zero));
     rig.run_until(Phase::Disabled, 3_000);
 }
 
@@ -152,7 +152,7 @@ fn an_error_passive_bus_that_goes_bus_off_makes_the_stop_harder_and_stays_its_on
             assert_eq!(rig.phase(), at_once, "{category:?} after {after} cycles");
             let shown = rig.host.snapshot.stop.unwrap();
             assert_eq!(
-                (shown.rule, shown.phase, shown.category),
+                (shown.rule(), shown.phase, shown.category),
                 (Rule::BusErrorPassive, Phase::Moving, category)
             );
             let begun = rig.host.records.len();
@@ -174,7 +174,7 @@ fn a_bus_that_comes_back_from_bus_off_to_error_passive_does_not_soften_the_stop(
         rig.buses[0].state = state;
         rig.run(20);
         let shown = rig.host.snapshot.stop.unwrap();
-        assert_eq!((shown.rule, shown.category), (Rule::BusLost, StopCategory::One));
+        assert_eq!((shown.rule(), shown.category), (Rule::BusLost, StopCategory::One));
     }
     rig.run_until(Phase::Disabled, 3_000);
     assert_eq!(told(&rig), [(Rule::BusLost, StopCategory::One)]);
@@ -240,7 +240,7 @@ fn a_joint_that_is_behind_its_set_point_is_at_rest_before_its_power_is_taken() {
         }
         let share = speed_when_let_go(&mut rig);
         assert!(share <= 0.02, "let go at {share} of its highest speed after category {category:?}");
-        assert!(rig.stops().iter().all(|stop| stop.rule == Rule::Requested));
+        assert!(rig.stops().iter().all(|stop| stop.rule() == Rule::Requested));
         rig.assert_limits_kept();
     }
 }
@@ -251,7 +251,7 @@ fn nobody_waits_for_a_joint_that_does_not_follow() {
     rig.drive(1).lag_s = 1.0;
     rig.move_to(2.0);
     rig.run_until(Phase::Stopping, 300);
-    assert_eq!(rig.stops()[0].rule, Rule::FollowingError);
+    assert_eq!(rig.stops()[0].rule(), Rule::FollowingError);
     let planned_cycles = (rig.host.snapshot.remaining_s * 1e9 / PERIOD_NS as f64).ceil() as usize;
     rig.run_until(Phase::Disabling, planned_cycles + 2);
 }
@@ -263,12 +263,7 @@ fn a_joint_that_was_just_told_to_turn_is_not_let_go_as_if_it_stood() {
         parameters.axes[1] = axis_in(ControlLaw::ProfileVelocity, 0, 2);
         let mut rig = Rig::of(parameters).enable();
         let target = ProfileTarget::Velocity(1.0);
-        rig.request(Request::SetProfileTarget(ProfileMove {
-            id: 1,
-            axis: 1,
-            target,
-            valid_until_ns: u64::MAX,
-        }));
+        rig.request(Request::SetProfileTarget(ProfileMove { axis: 1, target, valid_until_ns: u64::MAX }));
         rig.run(cycles - 1);
         rig.request(Request::Stop(StopCategory::One));
         let share = speed_when_let_go(&mut rig);
@@ -281,7 +276,7 @@ fn a_joint_that_coasts_is_not_taken_for_standing_when_slots_are_missed() {
     let period_s = PERIOD_NS as f64 * 1e-9;
     // It answers set-points: the first report after slots that were missed is older than they are.
     let parameters = AxisParameters { feedback_since: FeedbackSince::SetPoint, ..axis(0, 1) };
-    let is_led_up = |speed: f64, missed_slots: u32| {
+    let may_be_enabled = |speed: f64, missed_slots: u32| {
         let mut axis = Axis::new(parameters.clone());
         axis.set_cycle(period_s);
         let (mut position, mut unreported_slots) = (0.0, 1);
@@ -298,8 +293,8 @@ fn a_joint_that_coasts_is_not_taken_for_standing_when_slots_are_missed() {
             axis.follow_actual(period_s);
             axis.command(Goal::Disabled, None);
         }
-        axis.is_ready()
+        axis.is_power_granted()
     };
-    assert!(is_led_up(0.0, 0) && is_led_up(0.0, 12));
-    assert!(!is_led_up(0.3, 0) && !is_led_up(0.3, 12));
+    assert!(may_be_enabled(0.0, 0) && may_be_enabled(0.0, 12));
+    assert!(!may_be_enabled(0.3, 0) && !may_be_enabled(0.3, 12));
 }

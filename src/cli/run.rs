@@ -304,7 +304,7 @@ impl Hints {
 
 /// What is no part of an ordinary run.
 fn is_urgent(event: &Event) -> bool {
-    matches!(event.kind, EventKind::Stop(_) | EventKind::Emergency { .. } | EventKind::Refused { .. })
+    matches!(event.kind, EventKind::Stop(_) | EventKind::Emergency { .. } | EventKind::Rejected { .. })
 }
 
 /// Says at once what people should not have to wait for.

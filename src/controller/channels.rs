@@ -380,7 +380,8 @@ mod tests {
         let (mut rt, _host, mut log) = channels(&SIZES);
         let record = CycleRecord { axis_count: 2, ..CycleRecord::default() };
         assert_eq!((0..6).filter(|_| rt.record(&record)).count(), 4);
-        let event = |slot| Event { slot, at_ns: 0, kind: EventKind::MoveFinished { id: 1 } };
+        let event =
+            |slot| Event { slot, at_ns: 0, kind: EventKind::MotionFinished { request: RequestId(1) } };
         assert_eq!((0..3).filter(|slot| rt.event(&event(*slot))).count(), 2);
         assert_eq!(log.next_record(|seen| *seen), Some(record));
         assert_eq!(log.take_event(), Some(event(0)));

@@ -1,6 +1,6 @@
 //! The progress of a run, and its outcome.
 
-use takt_rt::{Phase, Refusal, StopReason};
+use takt_rt::{Phase, RequestError, StopReason};
 
 use crate::drive::BringUpError;
 use crate::telemetry::{Machine, words};
@@ -33,7 +33,7 @@ pub enum Outcome {
         /// The move.
         number: u64,
         /// The reason, if it is still known.
-        refusal: Option<Refusal>,
+        refusal: Option<RequestError>,
     },
     /// A motion of another client has replaced a move of the program; counted from 1.
     MoveReplaced {
@@ -72,7 +72,7 @@ impl Outcome {
                 name(*axis)
             ),
             Self::MoveRefused { number, refusal } => {
-                let why = refusal.map(|refusal| words::refusal(&refusal, machine));
+                let why = refusal.map(|refusal| words::rejection(&refusal, machine));
                 let why = why.unwrap_or_else(|| "the reason is no longer known".to_owned());
                 format!("move {number} of the program was refused: {why}")
             }

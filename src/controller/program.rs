@@ -1,7 +1,7 @@
 //! The motion program: decides which move is next, and when.
 
 use takt_rt::{
-    Answer, MAX_AXES, MotionState, Move, ProfileMove, ProfileTarget, Refusal, Request, RequestEnvelope,
+    Answer, MAX_AXES, MotionState, Move, ProfileMove, ProfileTarget, Request, RequestEnvelope, RequestError,
     RequestId, Snapshot,
 };
 
@@ -55,7 +55,7 @@ pub enum ProgramStep {
         /// The move.
         number: u64,
         /// Why, if that is still known.
-        refusal: Option<Refusal>,
+        refusal: Option<RequestError>,
     },
     /// Everything has been done.
     Finished,
@@ -72,7 +72,7 @@ const REACHING_NS: u64 = 10_000_000_000;
 enum MotionResult {
     Open,
     Finished,
-    Refused(Option<Refusal>),
+    Refused(Option<RequestError>),
     Replaced,
 }
 
@@ -129,7 +129,7 @@ impl ProgramRunner {
     /// What has become of the present motion.
     fn motion_result(&self, snapshot: &Snapshot) -> MotionResult {
         let refusal = self.requests.iter().find_map(|request| match snapshot.answers.of(*request) {
-            Answer::Refused(refusal) => Some(refusal),
+            Answer::Rejected(refusal) => Some(refusal),
             Answer::None | Answer::Granted => None,
         });
         if let Some(refusal) = refusal {
@@ -184,20 +184,18 @@ impl ProgramRunner {
         factor: f64,
         numbers: &RequestNumbers,
     ) -> Vec<RequestEnvelope> {
-        // Events and recordings show it.
-        let id = self.begun as u32;
         let valid_until_ns = now_ns + self.present_duration_ns().unwrap_or(0) + REACHING_NS + EXPIRY_NS;
         let Some(present) = self.present() else { return vec![] };
         let drive = |values: &[f64], target: fn(f64) -> ProfileTarget| -> Vec<Request> {
             let axes = (0..).zip(values).filter(|(_, value)| **value != 0.0);
             axes.map(|(axis, value)| {
                 let target = target(value * factor);
-                Request::SetProfileTarget(ProfileMove { id, axis, target, valid_until_ns })
+                Request::SetProfileTarget(ProfileMove { axis, target, valid_until_ns })
             })
             .collect()
         };
         let requests = match &present.target {
-            ProgramTarget::Position(position) => vec![Request::Move(move_of(id, present, position))],
+            ProgramTarget::Position(position) => vec![Request::Move(move_of(present, position))],
             ProgramTarget::Velocity { velocity, .. } => drive(velocity, ProfileTarget::Velocity),
             ProgramTarget::Torque { torque, .. } => drive(torque, ProfileTarget::Torque),
         };
@@ -220,11 +218,10 @@ impl ProgramRunner {
     }
 }
 
-fn move_of(id: u32, present: &ProgramMove, position: &[f64]) -> Move {
+fn move_of(present: &ProgramMove, position: &[f64]) -> Move {
     let mut target = [0.0; MAX_AXES];
     target.iter_mut().zip(position).for_each(|(to, from)| *to = *from);
     Move {
-        id,
         target,
         target_velocity: [0.0; MAX_AXES],
         velocity_scale: present.velocity_scale,
@@ -256,24 +253,22 @@ mod tests {
             snapshot.answers.note(*request, None);
             snapshot.motions.begin(*request, None, |_| false);
         }
-        snapshot.motions.end_all(MotionState::Finished);
+        snapshot.motions.end_all(MotionState::Finished, |_| {});
         snapshot
     }
 
-    const REFUSAL: Refusal = Refusal {
+    const REJECTED: RequestError = RequestError {
         request: RequestKind::Move,
-        objection: RejectReason::PositionLimit,
+        reason: RejectReason::PositionLimit { position: 2.0, limit: 1.5 },
         axis: Some(0),
-        value: 2.0,
-        limit: 1.5,
         phase: Phase::Holding,
     };
 
     fn refusing(ids: &[RequestId]) -> Snapshot {
         let mut snapshot = finished(&[]);
         for id in ids {
-            snapshot.refused += 1;
-            snapshot.answers.note(*id, Some(REFUSAL));
+            snapshot.rejected += 1;
+            snapshot.answers.note(*id, Some(REJECTED));
         }
         snapshot
     }
@@ -312,7 +307,7 @@ mod tests {
                     RequestEnvelope { id, request: Request::SetProfileTarget(first) },
                     RequestEnvelope { id: next_id, request: Request::SetProfileTarget(second) },
                 ] => {
-                    assert_eq!((first.id, first.axis, second.axis), (second.id, 0, 1));
+                    assert_eq!((first.axis, second.axis), (0, 1));
                     ([id, next_id], first.target, second.target)
                 }
                 _ => panic!("{requests:?}"),
@@ -369,7 +364,7 @@ mod tests {
     fn a_refused_move_ends_the_program_with_its_number_and_why() {
         let mut runner = Running::new(&program(1));
         let (request, _) = runner.begin(0, &finished(&[])).unwrap();
-        let refused = ProgramStep::Refused { number: 1, refusal: Some(REFUSAL) };
+        let refused = ProgramStep::Refused { number: 1, refusal: Some(REJECTED) };
         assert_eq!(runner.poll(1, &refusing(&[request])), refused);
         assert_eq!(runner.poll(2, &refusing(&[request])), ProgramStep::Finished);
     }

@@ -395,7 +395,7 @@ impl Supervisor {
 
 /// A stop for a fault.
 fn fault_stop(snapshot: &Snapshot) -> Option<StopReason> {
-    snapshot.stop.filter(|stop| stop.rule != Rule::Requested)
+    snapshot.stop.filter(|stop| stop.rule() != Rule::Requested)
 }
 
 /// Passes the frames of a procedure to the service channel. If the channel is full, the frame is lost as on a disturbed bus,

@@ -11,7 +11,8 @@ use std::path::PathBuf;
 
 use mcap::{McapError, McapResult};
 use takt_rt::{
-    CycleRecord, DriveState, Event, EventKind, Nanoseconds, Origin, Phase, Rule, StopCategory, StopReason,
+    CycleRecord, DriveState, Event, EventKind, Nanoseconds, Origin, Phase, Rule, StopCategory, StopCause,
+    StopReason,
 };
 
 use super::destination::RecordingDestination;
@@ -66,7 +67,7 @@ impl Incident {
     /// Its key, for the name of the file.
     pub fn key(&self) -> &'static str {
         match self {
-            Self::Stop(stop) => words::rule_key(stop.rule),
+            Self::Stop(stop) => words::rule_key(stop.rule()),
             Self::Drive { .. } => words::rule_key(Rule::DriveFault),
             Self::ThreadDied => "thread_died",
             Self::CallbackPanicked(_) => "callback_panicked",
@@ -80,10 +81,8 @@ impl Incident {
             Self::Drive { axis, code, slot, phase } => {
                 let as_stop = StopReason {
                     category: StopCategory::Zero,
-                    rule: Rule::DriveFault,
+                    cause: StopCause::Fault(takt_rt::Fault::DriveFault { error_code: *code }),
                     origin: Origin::Axis(*axis),
-                    value: f64::from(*code),
-                    limit: 0.0,
                     slot: *slot,
                     phase: *phase,
                 };
@@ -109,8 +108,9 @@ impl Incident {
                 add("slot", stop.slot.to_string());
                 add("category", (stop.category as u8).to_string());
                 add("phase", words::phase(stop.phase).to_owned());
-                add("value", stop.value.to_string());
-                add("limit", stop.limit.to_string());
+                let (value, limit) = stop.cause.numbers();
+                add("value", value.to_string());
+                add("limit", limit.to_string());
                 match stop.origin {
                     Origin::Group => {}
                     Origin::Axis(axis) => add("axis", machine.axis_name(axis)),
@@ -187,7 +187,7 @@ impl BlackBox {
         self.history.event(event);
         self.write(|recording| recording.event(event, text));
         match event.kind {
-            EventKind::Stop(stop) if stop.rule != Rule::Requested => Some(Incident::Stop(stop)),
+            EventKind::Stop(stop) if stop.rule() != Rule::Requested => Some(Incident::Stop(stop)),
             EventKind::DriveState { axis, state, .. } => {
                 let known = self.drives.get_mut(usize::from(axis))?.replace(state);
                 let phase = self.history.last_phase();

@@ -355,11 +355,11 @@ impl StopReport {
         Self {
             category: stop.category as u8,
             reason: words::stop_cause(stop, machine),
-            rule: words::rule_key(stop.rule),
+            rule: words::rule_key(stop.rule()),
             axis: stop.axis().map(|axis| machine.axis_name(axis)),
             bus: stop.origin.bus().map(|bus| machine.bus_name(bus)),
-            value: stop.value,
-            limit: stop.limit,
+            value: stop.cause.numbers().0,
+            limit: stop.cause.numbers().1,
             slot: stop.slot,
             phase: words::phase(stop.phase),
         }

@@ -4,10 +4,10 @@ use takt_rt::{DriveState, Event, EventKind, OperationMode, Phase, Rule, StopCate
 
 use super::machine::Machine;
 
-mod refusal;
+mod rejection;
 mod stop;
 
-pub use refusal::{refusal, request};
+pub use rejection::{rejection, request};
 pub use stop::{stop, stop_cause};
 
 /// What the group was doing, as a verb: "moving".
@@ -75,7 +75,7 @@ pub fn event(event: &Event, machine: &Machine) -> String {
     match event.kind {
         EventKind::PhaseChanged { from, to } => format!("{} → {}", phase(from), phase(to)),
         EventKind::Stop(reason) => format!("stop: {}", stop(&reason, machine)),
-        EventKind::MoveFinished { id } => format!("move {id} finished"),
+        EventKind::MotionFinished { request } => format!("motion {} finished", request.0),
         EventKind::DriveState { axis, state: to, statusword } => {
             format!("{}: {} (statusword 0x{statusword:04X})", machine.axis_name(axis), state(to))
         }
@@ -95,7 +95,7 @@ pub fn event(event: &Event, machine: &Machine) -> String {
         EventKind::Timing { level: TimingLevel::Unfit } => "slots are missed too often to go on".to_owned(),
         EventKind::MissedSlots { count: 1 } => "1 slot passed unused: the thread was late".to_owned(),
         EventKind::MissedSlots { count } => format!("{count} slots passed unused: the thread was late"),
-        EventKind::Refused(refused) => refusal(&refused, machine),
+        EventKind::Rejected(rejected) => rejection(&rejected, machine),
     }
 }
 
@@ -103,7 +103,7 @@ pub fn event(event: &Event, machine: &Machine) -> String {
 mod tests {
     use super::*;
     use crate::telemetry::machine::{AxisDescription, BusDescription, SetPointMagnitudes, Unit};
-    use takt_rt::{Refusal, RejectReason, RequestKind};
+    use takt_rt::{RejectReason, RequestError, RequestKind};
 
     pub(super) fn machine() -> Machine {
         let axis = |name: &str, unit| AxisDescription {
@@ -146,15 +146,13 @@ mod tests {
             "30 slots passed unused: the thread was late"
         );
         assert_eq!(
-            words(EventKind::Refused(Refusal {
+            words(EventKind::Rejected(RequestError {
                 request: RequestKind::Enable,
-                objection: RejectReason::Phase,
+                reason: RejectReason::Phase,
                 axis: None,
-                value: 0.0,
-                limit: 0.0,
                 phase: Phase::Moving,
             })),
-            "enabling was refused: not possible while moving"
+            "enabling was rejected: not possible while moving"
         );
     }
 }

@@ -13,7 +13,7 @@ fn errors_at_rest(name: &str) -> Vec<Vec<f64>> {
     let mut errors = vec![vec![]; moves.len()];
     let outcome = world.run_to_the_end(|world| {
         let snapshot = world.run.snapshot();
-        let finished = (snapshot.finished_move as usize).checked_sub(1);
+        let finished = world.finished_motions().checked_sub(1);
         let Some(finished) = finished.filter(|_| snapshot.phase == Phase::Holding) else { return };
         let ProgramTarget::Position(target) = &moves[finished].target else {
             panic!("{name} has no targets")

@@ -75,7 +75,7 @@ fn a_yz_aim_whose_controller_was_away_stays_where_it_stopped_and_is_not_enabled_
         let since_ns = world.run.snapshot().at_ns;
         let way = largest_way_to_the_end(&mut world, &before);
         assert!(way <= TOLERANCE_COUNTS, "{way} counts, {answers_sync}, {after_cycles}");
-        let rules: Vec<Rule> = world.stops().iter().map(|stop| stop.rule).collect();
+        let rules: Vec<Rule> = world.stops().iter().map(|stop| stop.rule()).collect();
         assert_eq!(rules, [Rule::DriveFault], "{answers_sync}, {after_cycles}");
         assert_nobody_enables_after(&mut world, since_ns);
     }
@@ -111,7 +111,7 @@ fn an_erob_whose_controller_was_away_has_stopped_and_left_operational_and_stays_
         assert!(seen.velocity.abs() < 1e-3, "{name}: {seen:?}");
         let way = largest_way_to_the_end(&mut world, &before);
         assert!(way <= TOLERANCE_COUNTS, "{name}: {way} counts");
-        let rules: Vec<Rule> = world.stops().iter().map(|stop| stop.rule).collect();
+        let rules: Vec<Rule> = world.stops().iter().map(|stop| stop.rule()).collect();
         assert_eq!(rules, [Rule::MissedFeedback], "{name}");
     }
 }

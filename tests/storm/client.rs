@@ -81,13 +81,12 @@ pub struct Client {
     restlessness: f64,
     stream: Option<Stream>,
     are_streams_wild: bool,
-    last_id: u32,
 }
 
 impl Client {
     pub fn new(mut dice: Dice, are_streams_wild: bool) -> Self {
         let restlessness = dice.pick(&[0.002, 0.01, 0.05, 0.2]);
-        Self { dice, restlessness, stream: None, are_streams_wild, last_id: 1000 }
+        Self { dice, restlessness, stream: None, are_streams_wild }
     }
 
     /// What it wants after a cycle.
@@ -129,11 +128,6 @@ impl Client {
         }
     }
 
-    fn id(&mut self) -> u32 {
-        self.last_id += 1;
-        self.last_id
-    }
-
     fn scale(&mut self) -> f64 {
         if self.dice.chance(0.03) {
             self.dice.pick(&[0.0, -1.0, 2.0, f64::NAN])
@@ -157,9 +151,7 @@ impl Client {
         }
         let minimum_duration_s = if self.dice.chance(0.1) { self.dice.between(0.0, 2.0) } else { 0.0 };
         let (velocity_scale, acceleration_scale) = (self.scale(), self.scale());
-        let id = self.id();
         Request::Move(Move {
-            id,
             target,
             target_velocity,
             velocity_scale,
@@ -184,7 +176,7 @@ impl Client {
             _ => ProfileTarget::Torque(share * limits.torque * 0.2),
         };
         let valid_until_ns = snapshot.at_ns + self.dice.below(2_000_000_000) as u64;
-        Request::SetProfileTarget(ProfileMove { id: self.id(), axis: axis as u8, target, valid_until_ns })
+        Request::SetProfileTarget(ProfileMove { axis: axis as u8, target, valid_until_ns })
     }
 
     fn begin_stream(&mut self, config: &Config, snapshot: &Snapshot) {
@@ -283,6 +275,6 @@ impl Client {
 
 /// Whether the group can be asked for something beside a program: nothing has stopped it by itself.
 pub fn is_open(snapshot: &Snapshot) -> bool {
-    let has_own_stop = snapshot.stop.is_some_and(|stop| stop.rule != takt_rt::Rule::Requested);
+    let has_own_stop = snapshot.stop.is_some_and(|stop| stop.rule() != takt_rt::Rule::Requested);
     snapshot.phase != Phase::Passive && !has_own_stop
 }

@@ -186,10 +186,10 @@ pub fn play(case: &Case) -> Result<Done, String> {
 fn note_stop(events: &[Event], struck: &mut [Struck]) {
     for event in events {
         if let EventKind::Stop(reason) = event.kind
-            && reason.rule != Rule::Requested
+            && reason.rule() != Rule::Requested
         {
             struck.iter_mut().filter(|struck| !struck.is_overtaken).for_each(|struck| {
-                struck.stop.get_or_insert(reason.rule);
+                struck.stop.get_or_insert(reason.rule());
             });
         }
     }

@@ -6,7 +6,7 @@ use takt::controller::channels::RtSide;
 use takt::telemetry::{BlackBoxOptions, Incident, LogSummary, Logger, LoggerOptions, Notice};
 use takt_rt::{
     BusHealth, BusPort, BusState, CycleRecord, DriveState, EventKind, Frame, HostInterface, Id, Phase,
-    ReceiveBatch, Received, Rule, StopReason,
+    ReceiveBatch, Received, Rule, StopCause, StopReason,
 };
 
 use crate::reader::{Value, messages};
@@ -88,7 +88,8 @@ impl Run {
     }
 
     fn stop(&mut self, rule: Rule) {
-        let stop = StopReason { rule, slot: self.slot, ..STOP };
+        let cause = StopCause::from_numbers(rule, 0.25, 8.0).unwrap();
+        let stop = StopReason { cause, slot: self.slot, ..STOP };
         self.rt.event(&event(self.slot, EventKind::Stop(stop)));
     }
 

@@ -2,7 +2,7 @@ use std::fs::{self, OpenOptions};
 
 use takt::bus::trace::{TracedPort, traced};
 use takt::telemetry::{Logger, Notice, RecordingDestination};
-use takt_rt::{BusHealth, BusPort, EventKind, Frame, HostInterface, Id, ReceiveBatch};
+use takt_rt::{BusHealth, BusPort, EventKind, Frame, HostInterface, Id, ReceiveBatch, RequestId};
 
 use crate::run::{Disk, Notices, cycle, event, options, run, sides};
 
@@ -68,7 +68,9 @@ fn a_full_ring_drops_records_and_counts_them() {
     let disk = Disk::new(usize::MAX);
     let mut logger = Logger::new(log, options(Some(disk.destination())), Notices::default().sink());
     assert_eq!((0..20).filter(|slot| rt.record(&cycle(*slot))).count(), 8);
-    let accepted = (0..20).filter(|id| rt.event(&event(0, EventKind::MoveFinished { id: *id }))).count();
+    let accepted = (0..20)
+        .filter(|id| rt.event(&event(0, EventKind::MotionFinished { request: RequestId(*id) })))
+        .count();
     assert_eq!(accepted, 16);
     assert_eq!(logger.drain(), 24);
     run(&mut rt, &mut logger, 20..30);

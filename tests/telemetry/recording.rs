@@ -4,8 +4,8 @@ use std::path::Path;
 use takt::bus::trace::traced;
 use takt::telemetry::{Logger, RecordingDestination};
 use takt_rt::{
-    BusHealth, BusPort, EventKind, Frame, HostInterface, Id, Phase, ReceiveBatch, Received, Refusal,
-    RejectReason, RequestKind,
+    BusHealth, BusPort, EventKind, Frame, HostInterface, Id, Phase, ReceiveBatch, Received, RejectReason,
+    RequestError, RequestKind,
 };
 
 use crate::reader::{Value, messages};
@@ -27,12 +27,10 @@ fn record() -> Vec<u8> {
     ));
     rt.event(&event(
         9,
-        EventKind::Refused(Refusal {
+        EventKind::Rejected(RequestError {
             request: RequestKind::Move,
-            objection: RejectReason::PositionLimit,
+            reason: RejectReason::PositionLimit { position: 1.25, limit: 0.75 },
             axis: Some(1),
-            value: 1.25,
-            limit: 0.75,
             phase: Phase::Holding,
         }),
     ));

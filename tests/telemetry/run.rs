@@ -9,8 +9,8 @@ use takt::telemetry::{
     SetPointMagnitudes, Unit, WallClock,
 };
 use takt_rt::{
-    AxisRecord, CycleRecord, CycleTiming, DriveState, Event, EventKind, HostInterface, MAX_AXES, Origin,
-    Phase, Rule, StopCategory, StopReason,
+    AxisRecord, CycleRecord, CycleTiming, DriveState, Event, EventKind, Fault, HostInterface, MAX_AXES,
+    Origin, Phase, StopCategory, StopCause, StopReason,
 };
 
 /// 2023-11-14 22:13:20 UTC
@@ -20,10 +20,8 @@ pub const EPOCH_NS: u64 = 5_000_000;
 pub const CYCLE_NS: u64 = 1_000_000;
 pub const STOP: StopReason = StopReason {
     category: StopCategory::One,
-    rule: Rule::FollowingError,
+    cause: StopCause::Fault(Fault::FollowingError { error: 0.25, limit: 0.125 }),
     origin: Origin::Axis(1),
-    value: 0.25,
-    limit: 0.125,
     slot: 7,
     phase: Phase::Moving,
 };

@@ -36,13 +36,13 @@ pub struct CommandPdo {
     /// What.
     pub pdo: Pdo,
     /// When.
-    pub cadence: TransmissionType,
+    pub transmission: TransmissionType,
 }
 
 impl CommandPdo {
     /// One that is sent in every cycle of its bus.
     pub const fn every_cycle(pdo: Pdo) -> Self {
-        Self { pdo, cadence: TransmissionType::EveryCycle }
+        Self { pdo, transmission: TransmissionType::EveryCycle }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use takt_rt::{Refusal, StopReason};
+use takt_rt::{RequestError, StopReason};
 
 use crate::controller::session::{Session, SessionError};
 use crate::telemetry::{Machine, words};
@@ -26,17 +26,17 @@ pub enum StartFailure {
 #[error("{words}")]
 pub struct Refused {
     /// The request and the reason; `None` if many later refusals have replaced it.
-    pub refusal: Option<Refusal>,
+    pub refusal: Option<RequestError>,
     words: String,
 }
 
 impl Refused {
-    pub(super) fn new(refusal: Option<Refusal>, machine: &Machine) -> Self {
+    pub(super) fn new(refusal: Option<RequestError>, machine: &Machine) -> Self {
         let forgotten = || {
             "the request was refused; the reason is no longer known, because many later requests were refused"
                 .to_owned()
         };
-        let words = refusal.map_or_else(forgotten, |refusal| words::refusal(&refusal, machine));
+        let words = refusal.map_or_else(forgotten, |refusal| words::rejection(&refusal, machine));
         Self { refusal, words }
     }
 }

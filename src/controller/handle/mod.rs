@@ -162,7 +162,6 @@ impl Controller {
         all.iter_mut().zip(target).for_each(|(to, from)| *to = *from);
         let id = self.numbers.next();
         let request = Request::Move(Move {
-            id: move_number(id),
             target: all,
             target_velocity: [0.0; MAX_AXES],
             velocity_scale: options.velocity_scale,
@@ -292,7 +291,7 @@ impl Controller {
             (Some(MotionState::Finished), _) => Ok(()),
             (Some(MotionState::Stopped(reason)), _) => Err(Stopped::new(reason, &self.machine).into()),
             (Some(MotionState::Replaced { .. }), _) => Err(MotionError::Replaced),
-            (None, Answer::Refused(refusal)) => Err(Refused::new(refusal, &self.machine).into()),
+            (None, Answer::Rejected(refusal)) => Err(Refused::new(refusal, &self.machine).into()),
             (None, Answer::Granted) => Err(MotionError::Forgotten),
             (None, Answer::None) if state.answers.have_forgotten(request) => Err(MotionError::Forgotten),
             (None, Answer::None) if self.requests.is_discarded(request) => Err(MotionError::Overtaken),
@@ -359,7 +358,7 @@ impl Controller {
         let id = self.numbers.next();
         // The number of an existing axis fits.
         let axis = axis as u8;
-        let wanted = ProfileMove { id: move_number(id), axis, target, valid_until_ns: expiry_ns(valid_for) };
+        let wanted = ProfileMove { axis, target, valid_until_ns: expiry_ns(valid_for) };
         self.begin(id, Request::SetProfileTarget(wanted))
     }
 
@@ -375,7 +374,7 @@ impl Controller {
             let answers = self.state().answers;
             match answers.of(id) {
                 Answer::Granted => return Ok(()),
-                Answer::Refused(refusal) => return Err(Refused::new(refusal, &self.machine).into()),
+                Answer::Rejected(refusal) => return Err(Refused::new(refusal, &self.machine).into()),
                 Answer::None if answers.have_forgotten(id) => return Err(CommandError::Unanswered),
                 Answer::None if self.requests.is_discarded(id) => return Err(CommandError::Overtaken),
                 Answer::None if self.has_ended() => return Err(CommandError::Ended),
@@ -429,9 +428,4 @@ fn within(axis: &Axis, value: f64, lowest: f64, highest: f64) -> Result<(), Comm
 fn expiry_ns(valid_for: Duration) -> u64 {
     let valid_ns = u64::try_from(valid_for.as_nanos()).unwrap_or(u64::MAX);
     MonotonicClock::default().now_ns().saturating_add(valid_ns)
-}
-
-/// The number that events and recordings show for the motion that a request asks for.
-const fn move_number(request: RequestId) -> u32 {
-    request.0 as u32
 }

@@ -5,7 +5,12 @@
 
 use core::f64::consts::TAU;
 
-use takt_rt::{RequestEnvelope, AxisLimits, AxisParameters, BusHealth, BusParameters, CommandPdo, ControlLaw, CycleRecord, Dialect, HostInterface, Engine, EngineParameters, Event, FeedbackSince, Frame, Id, MappedObject, Mapping, OnViolation, Pdo, Phase, Received, Request, RequestId, Scale, ScaleParameters, SendBatch, Snapshot, StopCategories, StreamCommand, CycleTiming, TimingLadder, Transmission};
+use takt_rt::{
+    AxisLimits, AxisParameters, BusHealth, BusParameters, BusSet, CommandPdo, ControlLaw, CycleInput,
+    CycleTiming, Deadline, Dialect, Engine, EngineParameters, FeedbackSince, Frame, HostInterface, Id,
+    MappedObject, Mapping, OnViolation, Pdo, Phase, Received, Request, RequestEnvelope, RequestId, Scale,
+    ScaleParameters, SendBatch, StopCategories, TimingLadder,
+};
 
 // The C library gives the program its entry; nothing else of it is used.
 #[link(name = "c")]
@@ -23,30 +28,16 @@ extern "C" fn rust_eh_personality() {}
 
 #[derive(Default)]
 struct Silent {
-    requests: [Option<Request>; 3],
+    requests: [Option<Request<1>>; 3],
 }
 
-impl HostInterface for Silent {
-    fn request(&mut self) -> Option<RequestEnvelope> {
+impl HostInterface<1, 1> for Silent {
+    fn request(&mut self) -> Option<RequestEnvelope<1>> {
         let numbered = self.requests.iter_mut().zip(1..);
-        numbered.filter_map(|(place, id)| Some(RequestEnvelope { id: RequestId(id), request: place.take()? })).next()
+        numbered
+            .filter_map(|(place, id)| Some(RequestEnvelope { id: RequestId(id), request: place.take()? }))
+            .next()
     }
-    fn stream(&mut self) -> Option<StreamCommand> {
-        None
-    }
-    fn service_frame(&mut self, _: usize) -> Option<Frame> {
-        None
-    }
-    fn received(&mut self, _: usize, _: &Received) -> bool {
-        true
-    }
-    fn record(&mut self, _: &CycleRecord) -> bool {
-        true
-    }
-    fn event(&mut self, _: &Event) -> bool {
-        true
-    }
-    fn publish(&mut self, _: &Snapshot) {}
 }
 
 fn axis() -> Option<AxisParameters> {
@@ -112,7 +103,7 @@ fn cycles() -> Option<Phase> {
         categories: StopCategories::default(),
         timing: TimingLadder { warning: 10, degraded: 50, unfit: 250, leak_cycles: 20 },
     };
-    let mut engine = Engine::new(parameters).ok()?;
+    let mut engine: Engine<1, 1> = Engine::new(parameters).ok()?;
     let requests = [Some(Request::Sync(true)), Some(Request::Activate), Some(Request::Enable)];
     let mut host = Silent { requests };
     let health = [BusHealth::default()];
@@ -121,10 +112,14 @@ fn cycles() -> Option<Phase> {
         // Ready to switch on, and operation enabled a while later.
         let statusword_low = if slot < 20 { 0x31 } else { 0x37 };
         let frame = Frame::of(Id::canopen(0x180, 1), [statusword_low, 0x12, 1, 0, 0, 0]);
-        engine.receive(0, &Received { frame, at_ns }, &mut host);
-        engine.compute(slot, at_ns, &health, Transmission::Free, &mut host);
+        engine.sync(0, slot, at_ns);
+        engine.receive(0, &Received { frame, at_ns });
+        engine.compute(
+            &CycleInput { slot, now_ns: at_ns, buses: &health, behind: BusSet::default() },
+            &mut host,
+        );
         let mut batch = SendBatch::new();
-        engine.set_points(0, slot, &mut batch);
+        engine.encode(0, Deadline::Met, &mut host, &mut batch);
         engine.finish(CycleTiming { slot, ..CycleTiming::default() }, at_ns, &health, &mut host);
     }
     Some(engine.phase())

@@ -31,11 +31,11 @@ impl Phases {
     }
 
     fn check_reasons(&mut self, seen: &Seen<'_>) -> Result<(), String> {
-        let shown = seen.snapshot.stop.filter(|stop| stop.rule != Rule::Requested);
+        let shown = seen.snapshot.stop.filter(|stop| stop.rule() != Rule::Requested);
         let was_latched = self.is_latched;
         for event in seen.events {
             match event.kind {
-                EventKind::Stop(reason) if reason.rule != Rule::Requested => {
+                EventKind::Stop(reason) if reason.rule() != Rule::Requested => {
                     if self.is_latched && !seen.asked.has_reset_lately {
                         return Err(format!("a second reason: {reason:?}, shown {:?}", seen.snapshot.stop));
                     }

@@ -57,7 +57,7 @@ impl Power {
         let is_enabling = phase == Phase::Enabling;
         self.since_enabling = if is_enabling { 0 } else { self.since_enabling.saturating_add(1) };
         let is_fault =
-            |event: &Event| matches!(event.kind, EventKind::Stop(reason) if reason.rule != Rule::Requested);
+            |event: &Event| matches!(event.kind, EventKind::Stop(reason) if reason.rule() != Rule::Requested);
         if seen.events.iter().any(is_fault) {
             self.is_reset_awaited = false;
         } else if seen.asked.has_reset {
