@@ -3,6 +3,7 @@
 use std::f64::consts::TAU;
 
 use serde::Serialize;
+use takt_rt::ControlLaw;
 
 use crate::config::{Axis, Config, Interface, Travel};
 
@@ -28,6 +29,8 @@ pub struct AxisDescription {
     pub bus: Option<String>,
     /// The unit of its position.
     pub unit: Unit,
+    /// Whether its drive plans its own profile to a target (a profile mode), instead of following set-points.
+    pub plans_own_profile: bool,
     /// Counts per rad (m) of the position that the drive reports.
     pub counts_per_unit: f64,
     /// The limits of its set-points.
@@ -109,6 +112,11 @@ impl Machine {
         self.buses.get(usize::from(bus)).map_or_else(|| format!("bus {bus}"), |bus| bus.name.clone())
     }
 
+    /// Whether the drive of an axis plans its own profile, instead of following set-points.
+    pub fn plans_own_profile(&self, axis: u8) -> bool {
+        self.axes.get(usize::from(axis)).is_some_and(|axis| axis.plans_own_profile)
+    }
+
     /// The unit of an axis.
     pub fn axis_unit(&self, axis: u8) -> Unit {
         self.axes.get(usize::from(axis)).map_or(Unit::Radian, |axis| axis.unit)
@@ -126,6 +134,10 @@ impl AxisDescription {
             name: axis.name.clone(),
             bus: config.buses.get(axis.bus).map(|bus| bus.name.clone()),
             unit,
+            plans_own_profile: matches!(
+                axis.control,
+                ControlLaw::ProfilePosition | ControlLaw::ProfileVelocity | ControlLaw::ProfileTorque
+            ),
             counts_per_unit: axis.counts_per_turn * axis.gear_ratio / travel_per_turn,
             limits: SetPointMagnitudes {
                 velocity: axis.limits.velocity,

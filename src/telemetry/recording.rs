@@ -71,6 +71,7 @@ impl Recording {
                 ("index".to_owned(), index.to_string()),
                 ("name".to_owned(), description.name.clone()),
                 ("unit".to_owned(), description.unit.symbol().to_owned()),
+                ("plans_own_profile".to_owned(), description.plans_own_profile.to_string()),
                 ("counts_per_unit".to_owned(), description.counts_per_unit.to_string()),
                 ("velocity_limit".to_owned(), description.limits.velocity.to_string()),
                 ("acceleration_limit".to_owned(), description.limits.acceleration.to_string()),

@@ -43,6 +43,7 @@ pub fn machine() -> Machine {
         name: name.to_owned(),
         bus: None,
         unit,
+        plans_own_profile: false,
         counts_per_unit: 83_443.0,
         limits: SetPointMagnitudes { velocity: 2.0, acceleration: 10.0, jerk: 50.0 },
     };

@@ -317,6 +317,8 @@ impl Decoder {
                     name: name(text("name")),
                     bus: metadata.get("bus").map(|bus| name(bus)),
                     unit: if text("unit") == Unit::Metre.symbol() { Unit::Metre } else { Unit::Radian },
+                    // Recordings of earlier versions do not have it.
+                    plans_own_profile: text("plans_own_profile") == "true",
                     counts_per_unit: number("counts_per_unit"),
                     limits: SetPointMagnitudes {
                         velocity: number("velocity_limit"),
