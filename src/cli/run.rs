@@ -16,7 +16,9 @@ use takt::controller::realtime_thread::StartError;
 use takt::controller::session::{self, Session, SessionError, SessionOptions};
 use takt::controller::{Interrupt, Outcome, Progress};
 use takt::faults::{FaultEvents, FaultInjector, Scenario, ScenarioError, ScenarioFault};
-use takt::telemetry::{Destination, Machine, Notice, RealtimeReport, RunEnd, RunOutcome, RunReport, words};
+use takt::telemetry::{
+    Machine, Notice, RealtimeReport, RecordingDestination, RunEnd, RunOutcome, RunReport, words,
+};
 use takt_rt::{Event, EventKind, StopReason};
 
 use super::configuration::{self, BusOverride};
@@ -98,7 +100,7 @@ pub fn run(arguments: Arguments) -> Exit {
     let bar = progress_bar(&config);
     let options = SessionOptions {
         duration_ns: arguments.duration.map(|duration| duration.as_nanos() as u64),
-        recording: arguments.record.map(Destination::File),
+        recording: arguments.record.map(RecordingDestination::File),
         is_realtime_required: arguments.require_realtime,
         fault_injector: fault_injector.clone(),
         if_owned: ownership::if_owned(arguments.take_over),
@@ -196,14 +198,14 @@ fn report(config: &Config, session: &Session, as_json: bool) -> Exit {
     match failure {
         Some(failure) if ended == RunEnd::TakenOver => {
             say!("takt: {failure}");
-            print::text(&report.picture(print::emphasis()), exit)
+            print::text(&report.render(print::emphasis()), exit)
         }
         Some(failure) => {
             say!("takt: {failure}");
             report.telemetry.black_boxes.iter().for_each(|path| say!("black box: {}", path.display()));
             exit
         }
-        None => print::text(&report.picture(print::emphasis()), exit),
+        None => print::text(&report.render(print::emphasis()), exit),
     }
 }
 
