@@ -14,7 +14,7 @@ use crate::dice::Dice;
 pub struct Asked {
     /// A command of a stream has been handed over since the cycle before.
     pub has_streamed: bool,
-    /// Somebody has asked for a reset of faults since the cycle before.
+    /// A reset of faults that somebody has asked for was granted in this cycle.
     pub has_reset: bool,
     /// The same, not long ago.
     pub has_reset_lately: bool,

@@ -152,7 +152,11 @@ const FAILED_ONCE: [(u64, &str); 22] = [
 ];
 
 /// The same of those that are played with their hardships.
-const FAILED_IN_HARDSHIP: [(u64, &str); 5] = [
+const FAILED_IN_HARDSHIP: [(u64, &str); 6] = [
+    (
+        31_415_936_809,
+        "A reset was asked for, and granted after the next fault: the storm took it for one that nobody had asked for",
+    ),
     (7_002_676, "A joint in profile velocity was told to turn round, and let go as it stood on its way"),
     (7_002_556, "A joint was let go that was still behind its set-point"),
     (9_005_759, "A stop so near to a position limit that it swings back takes longer than was stated"),

@@ -9,10 +9,11 @@ use takt::controller::{Outcome, VirtualRun};
 use takt::faults::{Rehearsal, Scenario};
 use takt::sim::{Observation, SimulatedBus};
 use takt_rt::cia402::State;
-use takt_rt::door::{Request, Snapshot};
+use takt_rt::door::{Request, RequestId, Snapshot};
 use takt_rt::frame::Frame;
 use takt_rt::port::{BusPort, ReceiveBatch};
 use takt_rt::record::{Event, EventKind};
+use takt_rt::refusal::Answer;
 use takt_rt::stop::{Phase, Rule};
 
 use crate::case::Case;
@@ -27,7 +28,7 @@ use crate::wire::Wire;
 const END_AT_MOST_S: f64 = 45.0;
 /// A YZ-AIM whose communication has been reset watches the controller for its factory setting of 2 s; then it stops.
 const WATCHDOG_MS: u64 = 3000;
-/// A request waits in the door and then takes so many cycles of the slowest bus to show.
+/// A reset of faults that has been granted takes so many cycles of the slowest bus to show.
 const RESET_CYCLES: u64 = 60;
 
 /// A controller in virtual time of which everything is seen.
@@ -147,6 +148,7 @@ pub fn play(case: &Case) -> Result<Done, String> {
             });
         });
         note_stop(&world.events, &mut struck);
+        clients.note_answers(&world.snapshot);
         fingerprint.take_cycle(&world);
         let World { log, snapshot, truth, events, .. } = &mut world;
         let mut look = |record: &_| {
@@ -200,10 +202,12 @@ fn note_stop(events: &[Event], struck: &mut [Struck]) {
     }
 }
 
-/// Those who ask for things, all at one door.
+/// Those who ask for things, all through one queue.
 struct Clients {
     all: Vec<Client>,
     asked: Asked,
+    /// Resets of faults that wait in the queue. Each counts when it is granted: a fault may come up before that, and is reset too.
+    awaited_resets: Vec<RequestId>,
     since_reset: u64,
 }
 
@@ -212,22 +216,28 @@ impl Clients {
         let all = (0..case.clients as u64)
             .map(|number| Client::new(case.dice.split(number), case.hardship.are_streams_wild))
             .collect();
-        Self { all, asked: Asked::default(), since_reset: u64::MAX }
+        Self { all, asked: Asked::default(), awaited_resets: vec![], since_reset: u64::MAX }
+    }
+
+    /// Looks which resets have been granted in the last cycle.
+    fn note_answers(&mut self, snapshot: &Snapshot) {
+        let answers = &snapshot.answers;
+        self.asked.has_reset = self.awaited_resets.iter().any(|id| answers.of(*id) == Answer::Granted);
+        self.awaited_resets.retain(|id| answers.of(*id) == Answer::None && !answers.have_forgotten(*id));
+        self.since_reset = if self.asked.has_reset { 0 } else { self.since_reset.saturating_add(1) };
+        self.asked.has_reset_lately = self.since_reset < RESET_CYCLES;
     }
 
     fn act(&mut self, case: &Case, world: &mut World, is_raging: bool) {
-        (self.asked.has_streamed, self.asked.has_reset) = (false, false);
-        self.since_reset = self.since_reset.saturating_add(1);
+        self.asked.has_streamed = false;
         let snapshot = &world.snapshot;
         let is_waited_for = snapshot.phase == Phase::Passive || !case.is_serving && !is_open(snapshot);
         if is_raging && !is_waited_for {
             for client in &mut self.all {
                 let wishes = client.wishes(&case.config, snapshot);
                 for request in &wishes.requests {
-                    if world.run.host().request(*request).is_ok() && *request == Request::ResetFaults {
-                        self.since_reset = 0;
-                        self.asked.has_reset = true;
-                    }
+                    let id = world.run.host().request(*request).ok();
+                    self.awaited_resets.extend(id.filter(|_| *request == Request::ResetFaults));
                 }
                 if let Some(command) = wishes.stream {
                     world.run.host().stream(&command);
@@ -236,7 +246,6 @@ impl Clients {
                 world.run.clock().stall(wishes.late_ns);
             }
         }
-        self.asked.has_reset_lately = self.since_reset < RESET_CYCLES;
     }
 }
 

@@ -37,7 +37,7 @@ pub struct Power {
     since_enabling: u64,
     /// Cycles for which the group has been disabled.
     disabled: u64,
-    /// Whether somebody has asked for a reset since the last fault came up. On a bus that is busy it waits.
+    /// Whether a reset has been granted since the last fault came up. On a bus that is busy its controlwords wait.
     is_reset_awaited: bool,
 }
 
