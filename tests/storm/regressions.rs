@@ -152,7 +152,8 @@ const FAILED_ONCE: [(u64, &str); 22] = [
 ];
 
 /// The same of those that are played with their hardships.
-const FAILED_IN_HARDSHIP: [(u64, &str); 6] = [
+const FAILED_IN_HARDSHIP: [(u64, &str); 7] = [
+    (88_124_920, "A joint in cyclic torque swung about its set-point, and its power was taken while it did"),
     (
         31_415_936_809,
         "A reset was asked for, and granted after the next fault: the storm took it for one that nobody had asked for",

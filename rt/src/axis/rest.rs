@@ -1,7 +1,9 @@
 //! Whether the joint of an axis has come to rest, by what its drive reports.
 
 use super::{Axis, SETTLED_CYCLES};
+use crate::cia402::State as DriveState;
 use crate::control::ControlLaw;
+use crate::dialect::Dialect;
 
 /// A joint slower than this fraction of its velocity limit stands.
 const AT_REST: f64 = 0.02;
@@ -45,6 +47,18 @@ impl Axis {
     /// Whether the joint follows set-points that stand, and is still behind them.
     pub fn is_catching_up(&self) -> bool {
         !self.is_profile() && self.is_obeying() && !self.is_standing()
+    }
+
+    /// Whether the drive must bring its joint to rest by its own quick stop (object 6085) before its power is taken. The set-points
+    /// stand, and the joint still moves: a loop that is closed over the bus makes it swing, and another set-point would not help.
+    pub fn must_quick_stop(&self) -> bool {
+        let is_moving = match self.drive_state() {
+            DriveState::OperationEnabled => self.is_obeying(),
+            DriveState::QuickStopActive => self.age <= self.parameters.missed_feedback_cycles,
+            _ => false,
+        };
+        let has_quick_stop = self.parameters.dialect == Dialect::Cia402;
+        has_quick_stop && !self.is_profile() && is_moving && !self.is_settled()
     }
 
     /// Whether the joint is heard, enabled and where it is to be, as far as a following error is allowed.
