@@ -12,8 +12,6 @@ use crate::dice::Dice;
 /// What has been asked of the group up to a cycle, as far as invariants depend on it.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Asked {
-    /// A command of a stream has been handed over since the cycle before.
-    pub has_streamed: bool,
     /// A reset of faults that somebody has asked for was granted in this cycle.
     pub has_reset: bool,
     /// The same, not long ago.

@@ -152,7 +152,11 @@ const FAILED_ONCE: [(u64, &str); 22] = [
 ];
 
 /// The same of those that are played with their hardships.
-const FAILED_IN_HARDSHIP: [(u64, &str); 7] = [
+const FAILED_IN_HARDSHIP: [(u64, &str); 8] = [
+    (
+        99_906_829,
+        "A stream that leapt at its start was let pass, since the cycle before its first command had none",
+    ),
     (88_124_920, "A joint in cyclic torque swung about its set-point, and its power was taken while it did"),
     (
         31_415_936_809,

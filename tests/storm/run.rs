@@ -229,7 +229,6 @@ impl Clients {
     }
 
     fn act(&mut self, case: &Case, world: &mut World, is_raging: bool) {
-        self.asked.has_streamed = false;
         let snapshot = &world.snapshot;
         let is_waited_for = snapshot.phase == Phase::Passive || !case.is_serving && !is_open(snapshot);
         if is_raging && !is_waited_for {
@@ -241,7 +240,6 @@ impl Clients {
                 }
                 if let Some(command) = wishes.stream {
                     world.run.host().stream(&command);
-                    self.asked.has_streamed = true;
                 }
                 world.run.clock().stall(wishes.late_ns);
             }

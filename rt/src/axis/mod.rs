@@ -16,7 +16,7 @@ use arrayvec::ArrayVec;
 use self::delay::SetPointDelay;
 
 use crate::cia402::{State as DriveState, controlword};
-use crate::guard::FollowingErrorGuard;
+use crate::guard::{FollowingErrorGuard, StreamCommands};
 use crate::pdo::{CommandSlot, FeedbackSlot, ProcessImage};
 use crate::plan::State;
 use crate::profile::{ProfileCommand, ProfileTarget};
@@ -27,6 +27,7 @@ use crate::watch::{DuplicateWatch, NodeWatch};
 use position_watch::PositionWatch;
 use punctuality::Punctuality;
 use service::ServiceCommand;
+use set_point::Following;
 
 pub use feedback::Jump;
 pub use parameters::{AxisParameters, Cadence, CommandPdo, FeedbackSince, MAX_PDOS, Pdo};
@@ -46,6 +47,9 @@ pub struct Axis {
     delay: SetPointDelay,
     /// The same of the cycles in which they were sent.
     sent: [State; 3],
+    /// The commands of the present stream, and what its set-points follow.
+    stream: StreamCommands,
+    following: Following,
     profile: ProfileCommand,
     /// What `profile` stands for; `None` before the first target since the drive was enabled.
     profile_target: Option<ProfileTarget>,
@@ -123,6 +127,8 @@ impl Axis {
             set: [State::default(); 3],
             delay: SetPointDelay::default(),
             sent: [State::default(); 3],
+            stream: StreamCommands::default(),
+            following: Following::Commands,
             profile: ProfileCommand::default(),
             profile_target: None,
             profile_until_ns: 0,

@@ -1,9 +1,26 @@
 //! Where an axis is to be.
 
 use super::Axis;
-use crate::guard::{self, Course, Violation};
-use crate::plan::State;
+use crate::guard::{self, Course, StreamCommands, Violation};
+use crate::motion::stop_limits;
+use crate::plan::{Problem, State};
 use crate::stop::Rule;
+
+/// Steps before a set-point in its third difference.
+const STEPS_OF_JERK: u8 = 3;
+/// See [`Axis::met_within`].
+const MET_SHARE: f64 = 1e-3;
+
+/// What the set-points of a stream follow.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Following {
+    /// The commands: each is a set-point.
+    Commands,
+    /// Nothing yet: the first command has not come.
+    Awaited,
+    /// The motion that the commands show, since one has not come; so many of the last set-points have met their commands again.
+    Motion { met: u8 },
+}
 
 impl Axis {
     /// The newest set-point.
@@ -17,9 +34,13 @@ impl Axis {
         if self.is_profile() {
             return;
         }
+        self.set[0] = self.state_by_steps(period_s);
+    }
+
+    fn state_by_steps(&self, period_s: f64) -> State {
         let [newest, last, before] = self.set.map(|state| state.position);
         let course = Course { sent: [last, before, before], next: newest, period_s };
-        self.set[0] = course.state(&self.parameters.limits);
+        course.state(&self.parameters.limits)
     }
 
     /// Makes the actual position the set-point, as if it had always been: for an axis whose drive has been sent none.
@@ -74,17 +95,16 @@ impl Axis {
         guard::check(&self.parameters.limits, period_s, self.set[1].position, self.set[0].position, next)
     }
 
-    /// Checks the next set-point of a stream, beyond [`Axis::check`]. After a command that did not come and was bridged the
-    /// jerk is not the stream's own, and is not judged.
-    pub fn check_stream(&self, next: &State, period_s: f64, is_bridged: bool) -> Result<(), Violation> {
+    /// Checks the next set-point of a stream, beyond [`Axis::check`].
+    pub fn check_stream(&self, next: &State, period_s: f64) -> Result<(), Violation> {
         let limits = &self.parameters.limits;
-        let jerk = if is_bridged { f64::INFINITY } else { limits.jerk };
-        guard::check_jerk(jerk, &self.course(next, period_s))?;
+        guard::check_jerk(limits.jerk, &self.course(next, period_s))?;
         guard::check_braking(limits, &self.course(next, period_s))
     }
 
     /// The set-point within the limits that is nearest to one of a stream.
-    pub fn clamped(&self, next: &State, period_s: f64) -> State {
+    pub fn clamped(&mut self, next: &State, period_s: f64) -> State {
+        self.following = Following::Commands;
         guard::clamp(&self.parameters.limits, &self.course(next, period_s))
     }
 
@@ -106,28 +126,98 @@ impl Axis {
         }
     }
 
-    /// What takes the place of the next command of a stream when it does not come in time: for one cycle the motion goes on as
-    /// it did, with its acceleration, so that the one after it fits in; from then on at its velocity. What the stream says of
-    /// itself counts if its steps agree; of one that says nothing they are all that is known.
-    pub fn carried_on(&self, command: &State, period_s: f64) -> State {
-        let limits = &self.parameters.limits;
-        let most = limits.acceleration.max(limits.deceleration);
-        let [newest, last, before] = self.set.map(|state| state.position);
-        let (step, step_before) = ((newest - last) / period_s, (last - before) / period_s);
-        let says_something = command.velocity != 0.0 || command.acceleration != 0.0;
-        let is_said = says_something && (command.velocity - step).abs() <= most * period_s;
-        let (velocity, change) = if is_said {
-            (command.velocity, command.acceleration * period_s)
-        } else {
-            (step, step - step_before)
+    /// A stream is asked for: the set-points so far count as the commands before its first one.
+    pub fn begin_stream(&mut self) {
+        self.stream = StreamCommands::begin(self.set.map(|state| state.position));
+        self.following = Following::Commands;
+    }
+
+    /// Lets a cycle pass in which the first command of a stream has not come yet. Its owner may have begun to move.
+    pub fn await_stream(&mut self) {
+        self.stream.pass();
+        self.following = Following::Awaited;
+    }
+
+    /// The next set-point of a stream, of which a command has come in this cycle or has not. A command that fits the set-points
+    /// before it is taken as it is. Where one does not come, the motion of the commands so far is followed in its place, within
+    /// all limits; and so is that of the commands after it until one is met, if they keep the limits by themselves.
+    ///
+    /// # Errors
+    /// The limit that the stream breaks.
+    pub fn streamed(&mut self, command: Option<&State>, period_s: f64) -> Result<State, Violation> {
+        self.stream.pass();
+        let Some(command) = command else {
+            return self.follow_motion(period_s);
         };
-        let end = velocity + change.max(-most * period_s).min(most * period_s);
-        // It neither turns round nor leaves the limits by itself.
-        let is_turned = end * velocity < 0.0;
-        let end = if is_turned { 0.0 } else { end.max(-limits.velocity).min(limits.velocity) };
-        // What it says is its velocity at the end of a step, and what the steps show is that of their middle.
-        let mean = if is_said { (velocity + end) / 2.0 } else { end };
-        State { position: command.position + mean * period_s, velocity: end, acceleration: 0.0 }
+        if command.position.is_finite() {
+            self.stream.take(command.position);
+        }
+        let checked = self.check(command, period_s).and_then(|()| self.check_stream(command, period_s));
+        match (checked, self.following) {
+            (Ok(()), Following::Commands | Following::Awaited) => {
+                self.following = Following::Commands;
+                return Ok(self.agreeing(command, period_s));
+            }
+            (Err(violation), following)
+                if following == Following::Commands || violation.rule == Rule::NotFinite =>
+            {
+                return Err(violation);
+            }
+            _ => self.stream.check(&self.parameters.limits, period_s)?,
+        }
+        let met = match self.following {
+            Following::Motion { met } => met,
+            Following::Commands | Following::Awaited => 0,
+        };
+        let next = self.follow_motion(period_s)?;
+        let distance = (command.position - next.position).abs();
+        match checked {
+            Ok(()) if distance <= self.met_within(period_s) => {
+                self.following = if met < STEPS_OF_JERK {
+                    Following::Motion { met: met + 1 }
+                } else {
+                    Following::Commands
+                };
+                Ok(State { position: command.position, ..next })
+            }
+            Err(violation) if distance > self.parameters.start_tolerance => Err(violation),
+            _ => Ok(next),
+        }
+    }
+
+    /// The next set-point on the way to the motion that the commands of a stream show.
+    fn follow_motion(&mut self, period_s: f64) -> Result<State, Violation> {
+        let limits = &self.parameters.limits;
+        let start = match self.following {
+            Following::Motion { .. } => self.set[0],
+            Following::Commands | Following::Awaited => self.state_by_steps(period_s),
+        };
+        let motion = self.stream.motion(period_s, limits);
+        let is_within = |next: &State| {
+            self.check(next, period_s).and_then(|()| self.check_stream(next, period_s)).is_ok()
+        };
+        let met = motion.meet(&start, limits, period_s).filter(is_within);
+        let next = match met {
+            Some(next) => next,
+            // It is bound for a limit, and following it as closely as possible would be, too. The planner is told where it is now.
+            None => {
+                let target = State { acceleration: 0.0, ..motion.after(-period_s).state };
+                let problem = Problem { start, target, limits: stop_limits(&start, limits) };
+                let untracked =
+                    |_| Violation { rule: Rule::NoTrajectory, value: target.position, limit: 0.0 };
+                problem.track(period_s).map_err(untracked)?
+            }
+        };
+        self.following = Following::Motion { met: 0 };
+        Ok(next)
+    }
+
+    /// How near its command a set-point has to be for the stream to be met: a small share of what the limits of acceleration and
+    /// jerk make of a position in a cycle.
+    fn met_within(&self, period_s: f64) -> f64 {
+        let limits = &self.parameters.limits;
+        let steepest = limits.acceleration.max(limits.deceleration);
+        MET_SHARE * (limits.jerk * period_s).min(steepest) * period_s * period_s
     }
 
     fn course(&self, next: &State, period_s: f64) -> Course {

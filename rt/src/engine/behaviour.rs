@@ -169,6 +169,7 @@ impl Engine {
         let Some(command) = self.stream else {
             // Nothing has come yet: the owner has one enable time-out to begin.
             self.hold();
+            self.axes.iter_mut().for_each(Axis::await_stream);
             if self.phase_cycles > self.enable_timeout_cycles {
                 let (value, limit) = (self.phase_cycles.into(), self.enable_timeout_cycles.into());
                 self.begin_stop(Rule::StaleCommand, None, Origin::Group, value, limit, now_ns, door);
@@ -187,51 +188,42 @@ impl Engine {
                 return self.follow_stop(now_ns, door);
             }
         }
-        let Some(next) = self.streamed(&command.set_points, now_ns, door) else { return };
-        if self.advance_guarded(&next, now_ns, door) {
-            // Until the next command comes the present one is carried on, up to its expiry.
-            if let Some(held) = &mut self.stream {
-                for (axis, point) in self.axes.iter().zip(&mut held.set_points) {
-                    *point = axis.carried_on(point, self.period_s);
-                }
+        let is_renewed = core::mem::take(&mut self.is_stream_renewed);
+        match self.streamed(&command.set_points, is_renewed) {
+            Ok(next) => {
+                self.advance_guarded(&next, now_ns, door);
+            }
+            Err((axis, violation)) => {
+                self.refuse(axis, violation, now_ns, door);
+                self.follow_stop(now_ns, door);
             }
         }
     }
 
-    /// The set-points of a stream as the guard lets them pass. If it does not, the group stops in this same cycle.
+    /// The next set-points of a stream, or the first axis that it would lead beyond a limit.
     fn streamed(
         &mut self,
-        wanted: &[State],
-        now_ns: Nanoseconds,
-        door: &mut impl Door,
-    ) -> Option<ArrayVec<State, MAX_AXES>> {
-        let (period_s, is_bridged) = (self.period_s, self.bridged_cycles > 0);
-        let check = |axis: &Axis, next: &State| {
-            axis.check(next, period_s).and_then(|()| axis.check_stream(next, period_s, is_bridged))
-        };
+        commands: &[State],
+        is_renewed: bool,
+    ) -> Result<ArrayVec<State, MAX_AXES>, (u8, Violation)> {
+        let period_s = self.period_s;
         let mut next: ArrayVec<State, MAX_AXES> = ArrayVec::new();
-        for (axis, wanted) in self.axes.iter().zip(wanted) {
-            let is_clamped = axis.parameters().on_violation == OnViolation::Clamp
-                && axis.is_enabled()
-                && !axis.is_profile()
-                && check(axis, wanted).is_err();
-            self.clamped += u64::from(is_clamped);
-            next.push(if is_clamped {
-                axis.clamped(wanted, period_s)
-            } else {
-                axis.agreeing(wanted, period_s)
+        for (index, (axis, command)) in self.axes.iter_mut().zip(commands).enumerate() {
+            if !axis.is_enabled() || axis.is_profile() {
+                next.push(*command);
+                continue;
+            }
+            let streamed = axis.streamed(is_renewed.then_some(command), period_s);
+            next.push(match (streamed, axis.parameters().on_violation) {
+                (Ok(set_point), _) => set_point,
+                (Err(_), OnViolation::Clamp) => {
+                    self.clamped += 1;
+                    axis.clamped(command, period_s)
+                }
+                (Err(violation), OnViolation::Reject) => return Err((index as u8, violation)),
             });
         }
-        let rejecting = |axis: &Axis, next: &State| match axis.parameters().on_violation {
-            OnViolation::Reject => check(axis, next),
-            OnViolation::Clamp => Ok(()),
-        };
-        if let Some((axis, violation)) = self.violation(&next, rejecting) {
-            self.refuse(axis, violation, now_ns, door);
-            self.follow_stop(now_ns, door);
-            return None;
-        }
-        Some(next)
+        Ok(next)
     }
 
     /// The first axis that follows set-points and whose next one does not pass a check.

@@ -37,8 +37,6 @@ pub const SEND_BATCH: usize = 64;
 /// Frames for one bus.
 pub type SendBatch = ArrayVec<Frame, SEND_BATCH>;
 
-/// Steps that a third difference reaches back: for so long a bridged command shows in the jerk.
-const MARKED_BY_BRIDGE: u8 = 4;
 /// Requests looked at in one cycle; the rest waits, so that a flood costs a bounded time.
 const REQUESTS_PER_CYCLE: usize = 4;
 /// How long controlword bit 7 is held low before, and high in, a fault reset, and how long the drives have to answer it.
@@ -117,8 +115,8 @@ pub struct Engine {
     stream: Option<StreamCommand>,
     /// Whether a command of the present stream has been taken.
     is_stream_begun: bool,
-    /// Cycles in which the set-points still bear the mark of a command that did not come and was bridged.
-    bridged_cycles: u8,
+    /// Whether a command has come that no set-point has been made of.
+    is_stream_renewed: bool,
     clamped: u64,
     missed: LeakyBucket,
     timing_level: TimingLevel,
@@ -191,7 +189,7 @@ impl Engine {
             finished_move: 0,
             stream: None,
             is_stream_begun: false,
-            bridged_cycles: 0,
+            is_stream_renewed: false,
             clamped: 0,
             missed: LeakyBucket::default(),
             timing_level: TimingLevel::Normal,
@@ -284,9 +282,7 @@ impl Engine {
         }
         if let Some(command) = door.stream() {
             self.stream = Some(command);
-            self.bridged_cycles = self.bridged_cycles.saturating_sub(1);
-        } else if self.phase == Phase::Streaming {
-            self.bridged_cycles = MARKED_BY_BRIDGE;
+            self.is_stream_renewed = true;
         }
         self.supervise(buses, transmission, now_ns, door);
         // A group that stops and whose set-points do not get out does not wait for them any longer, whatever it stops for.

@@ -117,6 +117,7 @@ impl Engine {
         self.stop = None;
         self.stream = None;
         self.is_stream_begun = false;
+        self.axes.iter_mut().for_each(Axis::begin_stream);
         self.enter(Phase::Streaming, now_ns, door);
         Ok(())
     }

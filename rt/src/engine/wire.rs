@@ -146,7 +146,9 @@ impl Engine {
                     // The same as by SDO, should it hear this all the same.
                     Goal::Enabled if axis.is_deaf() => Goal::QuickStop,
                     Goal::Enabled if !is_led_up => Goal::Disabled,
-                    Goal::Disabled if self.phase == Phase::Disabling && axis.must_quick_stop() => Goal::QuickStop,
+                    Goal::Disabled if self.phase == Phase::Disabling && axis.must_quick_stop() => {
+                        Goal::QuickStop
+                    }
                     goal => goal,
                 };
                 axis.command(goal, reset_word.filter(|_| axis.drive_state().is_faulted()));

@@ -1,5 +1,6 @@
 //! The last look at every set-point, whoever made it, before it becomes a frame.
 
+mod commands;
 #[cfg(test)]
 mod planned;
 mod reach;
@@ -8,6 +9,7 @@ mod stream;
 use crate::plan::State;
 use crate::stop::Rule;
 
+pub use commands::{StreamCommands, StreamMotion};
 pub use reach::braking_distance;
 pub use stream::{Course, OnViolation, check_braking, check_jerk, clamp};
 

@@ -26,8 +26,6 @@ struct Point {
 const ROUNDING: f64 = 1e-6;
 /// When none has got to the drive for longer than this, it stands where the last one led.
 const GAP_S: f64 = 0.004;
-/// A command of a stream that has not come and was bridged shows in the third differences of so many cycles.
-const BRIDGED_CYCLES: u32 = 4;
 
 pub struct Course {
     scale: Scale,
@@ -48,8 +46,6 @@ pub struct Course {
     told_slot: u64,
     /// What the last cycle was: the phase, and where the set-point was.
     last: Option<(Phase, f64)>,
-    /// Commands of a stream until its jerk is its own again.
-    bridged: u32,
     /// Cycles in which the trajectory went on since the last one whose jerk nobody keeps to the limit.
     kept: u32,
 }
@@ -70,7 +66,6 @@ impl Course {
             cycles: 0,
             told_slot: 0,
             last: None,
-            bridged: 0,
             kept: u32::MAX,
         }
     }
@@ -125,16 +120,11 @@ impl Course {
         Ok(())
     }
 
-    /// Nobody keeps the jerk of a stream to the limit that is clamped, in velocity and acceleration, or after a command that
-    /// has not come. Whatever is planned keeps it, also the stop that begins in the midst of such a stream.
+    /// A stream that is clamped is held to the limits of velocity and acceleration, and not to that of the jerk. Whatever else is
+    /// sent keeps it, also the stop that begins in the midst of such a stream.
     fn note_jerk(&mut self, seen: &Seen<'_>, axis: &Axis) {
         let is_streaming = seen.record.phase == Phase::Streaming;
-        if seen.asked.has_streamed {
-            self.bridged = self.bridged.saturating_sub(1);
-        } else if is_streaming {
-            self.bridged = BRIDGED_CYCLES;
-        }
-        if is_streaming && (axis.on_violation == OnViolation::Clamp || self.bridged > 0) {
+        if is_streaming && axis.on_violation == OnViolation::Clamp {
             self.kept = 0;
         } else if seen.record.is_commanded {
             self.kept = self.kept.saturating_add(1);
