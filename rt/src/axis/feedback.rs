@@ -5,11 +5,15 @@ use super::{Axis, FeedbackSince};
 use crate::cia402::State as DriveState;
 use crate::frame::Frame;
 use crate::pdo::{FeedbackSlot, TooShort};
-use crate::time::Nanoseconds;
+use crate::time::{NANOSECONDS_PER_SECOND, Nanoseconds};
 use crate::watch::NodeComplaint;
 
 /// A fault shows in the statusword within this many slots of the emergency message that announces it.
 const EMERGENCY_GRACE_CYCLES: u8 = 3;
+
+fn seconds(ns: Nanoseconds) -> f64 {
+    ns as f64 / NANOSECONDS_PER_SECOND as f64
+}
 
 /// A report of a joint where it cannot have got to.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -120,15 +124,7 @@ impl Axis {
             self.age = self.age.saturating_add(1);
             return;
         }
-        let span_s = self.span_s;
-        // One that answers set-points tells where it was in the cycle before: the time for which there were none is behind
-        // its report, not before it. Whoever may be either has had the longer time, and is believed to be no faster.
-        let longest_s = match self.parameters.feedback_since {
-            FeedbackSince::Sync => span_s,
-            FeedbackSince::SetPoint | FeedbackSince::CommandPhase => span_s.max(self.last_span_s),
-        };
-        self.span_s = 0.0;
-        self.last_span_s = span_s;
+        let longest_s = self.take_span_s();
         self.arrived = 0;
         self.age = 0;
         self.judge_position(longest_s);
@@ -136,6 +132,26 @@ impl Axis {
         self.is_heard = true;
         self.notice_state();
         self.following_error = if self.is_profile() { 0.0 } else { self.sent[2].position - self.position };
+    }
+
+    /// The time from the report before this one to this one, in seconds.
+    fn take_span_s(&mut self) -> f64 {
+        let slots_s = core::mem::take(&mut self.span_s);
+        let longest_s = slots_s.max(core::mem::replace(&mut self.last_span_s, slots_s));
+        let asked_ns = self.expected_since_ns;
+        let asked_before_ns = core::mem::replace(&mut self.asked_ns, asked_ns);
+        match self.parameters.feedback_since {
+            // It tells where it was when it was asked. SYNC, or a set-point, that leaves late is not a fast joint.
+            FeedbackSince::Sync | FeedbackSince::SetPoint
+                if asked_before_ns > 0 && asked_ns > asked_before_ns =>
+            {
+                seconds(asked_ns - asked_before_ns)
+            }
+            FeedbackSince::Sync => slots_s,
+            // One that answers set-points tells where it was in the cycle before: the time for which there were none is behind
+            // its report, not before it. Whoever may be either has had the longer time, and is believed to be no faster.
+            FeedbackSince::SetPoint | FeedbackSince::CommandPhase => longest_s,
+        }
     }
 
     /// Takes the position of this cycle's report, and the velocity, unless the joint cannot be there.

@@ -62,6 +62,8 @@ pub struct Axis {
     velocity: f64,
     /// What arrived before this is no feedback of the present cycle.
     expected_since_ns: Nanoseconds,
+    /// The same of the cycle of the last report; 0 before the first one.
+    asked_ns: Nanoseconds,
     /// Which feedback PDOs have come since then, a bit each.
     arrived: u8,
     age: u16,
@@ -137,6 +139,7 @@ impl Axis {
             position_counts: 0,
             velocity: 0.0,
             expected_since_ns: 0,
+            asked_ns: 0,
             arrived: 0,
             age: 0,
             cycle_s: 0.0,
