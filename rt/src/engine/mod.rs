@@ -133,7 +133,8 @@ pub struct Engine {
     heartbeat_due: u32,
     /// Heartbeats that are still to leave before any drive is led up.
     heartbeats_awaited: u32,
-    blocked_cycles: u32,
+    /// For how long own frames have waited for the wire or found no room, a bus each.
+    blocked_cycles: [u32; MAX_BUSES],
     /// For how long own frames have waited for the wire, a bus each.
     held_back_cycles: [u32; MAX_BUSES],
     last_slot: Option<u64>,
@@ -201,7 +202,7 @@ impl Engine {
             fault_reset: 0,
             heartbeat_due: 0,
             heartbeats_awaited: 0,
-            blocked_cycles: 0,
+            blocked_cycles: [0; MAX_BUSES],
             held_back_cycles: [0; MAX_BUSES],
             last_slot: None,
             missed_slots: 0,
@@ -286,7 +287,7 @@ impl Engine {
         }
         self.supervise(buses, transmission, now_ns, door);
         // A group that stops and whose set-points do not get out does not wait for them any longer, whatever it stops for.
-        let is_given_up = self.stop.is_some() && self.blocked_cycles > self.not_transmitted_cycles;
+        let is_given_up = self.stop.is_some() && self.longest_blocked().1 > self.not_transmitted_cycles;
         let can_leave = match transmission {
             Transmission::Free => true,
             Transmission::TooLate => false,

@@ -1,6 +1,6 @@
 //! What is wrong with the group, and how it stops.
 
-use super::{BusSet, Engine, Transmission};
+use super::{Engine, Transmission};
 use crate::axis::Axis;
 use crate::cia402::Goal;
 use crate::control::ControlLaw;
@@ -20,13 +20,14 @@ impl Engine {
         now_ns: Nanoseconds,
         door: &mut impl Door,
     ) {
-        let is_held_back = transmission == Transmission::Blocked || !self.held_back.is_empty();
         let not_taken = core::mem::take(&mut self.not_taken);
-        let is_blocked = is_held_back || !not_taken.is_empty();
         let count = |cycles: u32, goes_on: bool| if goes_on { cycles.saturating_add(1) } else { 0 };
-        self.blocked_cycles = count(self.blocked_cycles, is_blocked);
-        for (bus, cycles) in self.held_back_cycles.iter_mut().enumerate() {
-            *cycles = count(*cycles, self.held_back.contains(bus));
+        let counters = self.held_back_cycles.iter_mut().zip(&mut self.blocked_cycles);
+        for (bus, (held_back, blocked)) in counters.enumerate().take(self.buses.len()) {
+            let is_held_back = self.held_back.contains(bus);
+            *held_back = count(*held_back, is_held_back);
+            let is_behind = is_held_back || transmission == Transmission::Blocked;
+            *blocked = count(*blocked, is_behind || not_taken.contains(bus));
         }
         if !has_power(self.phase) {
             return;
@@ -46,8 +47,9 @@ impl Engine {
             let (slots, limit) = (self.missed.filled().into(), self.ladder.unfit.into());
             self.begin_stop(Rule::TimingUnfit, None, Origin::Group, slots, limit, now_ns, door);
         }
-        if self.blocked_cycles > self.not_transmitted_cycles {
-            let (cycles, limit) = (self.blocked_cycles.into(), self.not_transmitted_cycles.into());
+        let (bus, cycles) = self.longest_blocked();
+        if cycles > self.not_transmitted_cycles {
+            let (cycles, limit) = (cycles.into(), self.not_transmitted_cycles.into());
             // Their drives are where the last set-point left them, and get no other before they are disabled. Those on a bus
             // that is behind for a cycle or two, while another one is lost, stop with the rest.
             for axis in &mut self.axes {
@@ -56,8 +58,7 @@ impl Engine {
                     axis.give_up();
                 }
             }
-            let origin = self.slowest_bus(not_taken).map_or(Origin::Group, |bus| Origin::Bus(bus as u8));
-            self.begin_stop(Rule::NotTransmitted, None, origin, cycles, limit, now_ns, door);
+            self.begin_stop(Rule::NotTransmitted, None, Origin::Bus(bus as u8), cycles, limit, now_ns, door);
         }
         for index in 0..self.axes.len() {
             let Some(axis) = self.axes.get_mut(index) else { continue };
@@ -74,11 +75,10 @@ impl Engine {
         }
     }
 
-    /// The bus whose frames have waited longest for the wire, or else one that had no room for all of them.
-    fn slowest_bus(&self, not_taken: BusSet) -> Option<usize> {
-        let waiting = self.held_back_cycles.iter().enumerate().rev().max_by_key(|(_, cycles)| **cycles);
-        let held_back = waiting.filter(|(_, cycles)| **cycles > 0).map(|(bus, _)| bus);
-        held_back.or_else(|| (0..self.buses.len()).find(|bus| not_taken.contains(*bus)))
+    /// The bus that has not carried all of its frames for longest, and for how many cycles.
+    pub(super) fn longest_blocked(&self) -> (usize, u32) {
+        let blocked = self.blocked_cycles.iter().copied().enumerate().rev();
+        blocked.max_by_key(|(_, cycles)| *cycles).unwrap_or_default()
     }
 
     /// Begins a stop. The first fault stays the reason, and a later one can only make the stop harder. That somebody asked
