@@ -27,6 +27,8 @@ pub struct Concern {
     pub is_crowded: bool,
     /// Something pushes the joint for as long as it lasts, also in the end.
     pub is_loaded: bool,
+    /// Since when nothing that is sent to its drive gets there any more: ns.
+    pub unreachable_since_ns: Option<u64>,
 }
 
 impl Concern {
@@ -39,6 +41,7 @@ impl Concern {
             is_cut_off: self.is_cut_off || other.is_cut_off,
             is_crowded: self.is_crowded || other.is_crowded,
             is_loaded: self.is_loaded || other.is_loaded,
+            unreachable_since_ns: self.unreachable_since_ns.or(other.unreachable_since_ns),
         }
     }
 }
@@ -55,6 +58,7 @@ pub struct Concerns {
     pub by_bus: Vec<bool>,
     /// Whether a bus cannot carry in time what is asked of it, an entry a bus: `takt run` refuses such a machine.
     pub is_overloaded: Vec<bool>,
+    bus_of_axis: Vec<usize>,
 }
 
 impl Concerns {
@@ -70,6 +74,25 @@ impl Concerns {
             by_axis: vec![Concern::default(); config.axes.len()],
             by_bus: vec![false; config.buses.len()],
             is_overloaded: analyse(config).iter().map(|bus| !bus.fits()).collect(),
+            bus_of_axis: config.axes.iter().map(|axis| axis.bus).collect(),
+        }
+    }
+
+    /// The loop is late: frames may meet those of the next cycle on any bus.
+    pub fn crowd(&mut self) {
+        self.by_bus.fill(true);
+        self.by_axis.iter_mut().for_each(|concern| concern.is_crowded = true);
+    }
+
+    /// The queue of a bus does not drain: for a time, or from now on for ever.
+    pub fn clog(&mut self, bus: usize, now_ns: u64, is_for_ever: bool) {
+        self.by_bus[bus] = true;
+        for (concern, _) in self.by_axis.iter_mut().zip(&self.bus_of_axis).filter(|(_, of)| **of == bus) {
+            (concern.is_present, concern.is_crowded) = (true, true);
+            concern.is_cut_off |= is_for_ever;
+            if is_for_ever {
+                concern.unreachable_since_ns.get_or_insert(now_ns);
+            }
         }
     }
 
@@ -146,5 +169,6 @@ fn concern(axis: &Axis, fault: &takt::faults::Fault) -> Concern {
         is_crowded: matches!(fault.effect, Effect::Foreign(_)),
         is_driven_by_others: is_own && (matches!(fault.kind, "load" | "foreign-set-points") || is_led_astray),
         is_loaded: is_own && fault.kind == "load",
+        unreachable_since_ns: None,
     }
 }

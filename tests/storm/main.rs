@@ -14,6 +14,7 @@ mod dice;
 mod fingerprint;
 mod invariants;
 mod machine;
+mod overload;
 mod regressions;
 mod run;
 mod table;
@@ -48,7 +49,11 @@ fn attempt(seed: u64) -> Result<(Case, Done), String> {
         let case = Case::of(seed);
         match play(&case) {
             Ok(done) => Ok((case, done)),
-            Err(wrong) => Err(format!("{} {wrong}\n{}", case.config.name, case.text)),
+            Err(wrong) => {
+                let overload =
+                    if case.overload.is_present() { format!("{:?}\n", case.overload) } else { String::new() };
+                Err(format!("{} {wrong}\n{overload}{}", case.config.name, case.text))
+            }
         }
     }));
     played

@@ -126,6 +126,7 @@ pub fn play(case: &Case) -> Result<Done, String> {
     let at_most = case.length + (END_AT_MOST_S * 1e9 / config.cycle.period_ns as f64) as u64;
     let (mut enabled, mut cycles) = (None, 0);
     let mut goes_on = true;
+    let mut overload_dice = case.dice.split(u64::MAX - 2);
     world.run.neglect_life_cycle(case.hardship.neglect.max(1));
     while goes_on {
         let phase = world.snapshot.phase;
@@ -164,6 +165,7 @@ pub fn play(case: &Case) -> Result<Done, String> {
                 troubled_buses: &concerns.by_bus,
                 overloaded_buses: &concerns.is_overloaded,
                 asked: clients.asked,
+                has_faults: !case.scenario.faults.is_empty(),
             })
         };
         while let Some(checked) = log.next_record(&mut look) {
@@ -181,6 +183,7 @@ pub fn play(case: &Case) -> Result<Done, String> {
         let is_raging = enabled.is_some_and(|enabled| cycles < enabled + case.length);
         let is_open = is_raging || enabled.is_some() && case.hardship.are_clients_stubborn;
         clients.act(case, &mut world, is_open);
+        case.overload.act(cycles, &mut overload_dice, &mut world.run, &mut concerns);
         for (_, late_ns) in case.hardship.stalls.iter().filter(|(cycle, _)| *cycle == cycles) {
             world.run.clock().stall(*late_ns);
         }

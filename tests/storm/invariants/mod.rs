@@ -1,6 +1,7 @@
 //! What holds after every cycle, whatever has been asked for and whatever has broken.
 
 mod course;
+mod motion;
 mod origins;
 mod phases;
 mod power;
@@ -46,6 +47,8 @@ pub struct Seen<'a> {
     pub overloaded_buses: &'a [bool],
     /// What had been asked for before it.
     pub asked: Asked,
+    /// Whether anything else is wrong than that the machine has too little time.
+    pub has_faults: bool,
 }
 
 pub struct Invariants {
@@ -74,6 +77,7 @@ impl Invariants {
             course.check(seen, axis).map_err(|wrong| format!("{}: {wrong}", seen.config.axes[axis].name))?;
         }
         origins::check(seen)?;
+        motion::check(seen)?;
         self.stops.check(seen)?;
         self.releases.check(seen)?;
         self.power.check(seen)?;
