@@ -11,8 +11,7 @@ use takt::controller::channels::{ChannelSizes, HostSide, LogSide, RtSide, channe
 use takt::telemetry::{
     AxisDescription, Destination, Logger, LoggerOptions, Machine, SetPointMagnitudes, Unit, WallClock,
 };
-use takt_rt::door::{Door, Snapshot};
-use takt_rt::record::CycleRecord;
+use takt_rt::{CycleRecord, HostInterface, Snapshot};
 
 /// The ring holds eight seconds of records at 1 ms.
 const RECORDS: usize = 8192;

@@ -6,8 +6,7 @@ use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use takt::sim::erob::{ErobJoint, ErobParameters};
 use takt::sim::plant::{Encoder, JointParameters};
 use takt::sim::{BitRates, Drive, SimulatedBus, WireLength};
-use takt_rt::frame::{Frame, Id};
-use takt_rt::port::{BusPort, ReceiveBatch};
+use takt_rt::{BusPort, Frame, Id, ReceiveBatch};
 
 fn drive(node: u8) -> Box<dyn Drive> {
     Box::new(ErobJoint::new(ErobParameters {

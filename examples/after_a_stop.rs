@@ -17,7 +17,7 @@ use takt::config::{Axis, Config};
 use takt::controller::session::SessionOptions;
 use takt::controller::{Controller, MotionError};
 use takt::faults::{Rehearsal, Scenario};
-use takt_rt::stop::Phase;
+use takt_rt::Phase;
 
 /// A bus may be away for some time, and a drive needs some to be well again.
 const BETWEEN_ATTEMPTS: Duration = Duration::from_millis(500);

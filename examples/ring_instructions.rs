@@ -9,10 +9,7 @@ use std::hint::black_box;
 
 use takt::bus::trace::traced;
 use takt::controller::channels::{ChannelSizes, channels};
-use takt_rt::door::{Door, Snapshot};
-use takt_rt::frame::{Frame, Id};
-use takt_rt::port::{BusHealth, BusPort, ReceiveBatch, Received};
-use takt_rt::record::CycleRecord;
+use takt_rt::{BusHealth, BusPort, CycleRecord, Frame, HostInterface, Id, ReceiveBatch, Received, Snapshot};
 
 /// A bus on which so many drives answer SYNC.
 struct Answering {

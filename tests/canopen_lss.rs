@@ -6,7 +6,7 @@ use takt::canopen::lss::{
     LssTiming,
 };
 use takt::sim::lss::LssDevice;
-use takt_rt::frame::Frame;
+use takt_rt::Frame;
 
 const MILLISECOND_NS: u64 = 1_000_000;
 

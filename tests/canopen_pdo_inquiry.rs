@@ -11,8 +11,7 @@ use takt::canopen::sdo::{Expedited, Request, SdoError, Timing};
 use takt::sim::erob::{ErobJoint, ErobParameters};
 use takt::sim::plant::{Encoder, JointParameters};
 use takt::sim::{BitRates, SimulatedBus};
-use takt_rt::frame::{Frame, Id};
-use takt_rt::port::{BusPort, ReceiveBatch};
+use takt_rt::{BusPort, Frame, Id, ReceiveBatch};
 
 const NODE: u8 = 5;
 const MILLISECOND_NS: u64 = 1_000_000;

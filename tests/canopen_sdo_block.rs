@@ -6,7 +6,7 @@ use takt::canopen::sdo::{
     AbortCode, BlockSegment, BlockSize, Client, Completed, Expedited, Request, Response, SdoError, Timing,
     Transfer, Uploaded,
 };
-use takt_rt::frame::{Frame, Id};
+use takt_rt::{Frame, Id};
 
 const NODE: u8 = 2;
 const TIMING: Timing = Timing { reply_timeout_ns: 500, retries: 2 };

@@ -5,7 +5,7 @@ use takt::canopen::object::{DataType, ObjectAddress};
 use takt::canopen::sdo::{
     AbortCode, Busy, Client, Completed, MAX_UPLOAD_BYTES, SdoError, Timing, Transfer, Uploaded,
 };
-use takt_rt::frame::{Frame, Id};
+use takt_rt::{Frame, Id};
 
 const NODE: u8 = 2;
 const TIMING: Timing = Timing { reply_timeout_ns: 500, retries: 2 };

@@ -4,8 +4,7 @@
 use takt::canopen::nmt::{ErrorControl, NmtCommand, NmtState, NmtTarget};
 use takt::canopen::object::ObjectAddress;
 use takt::canopen::sdo::{Client, Completed, Expedited, Request, Response, Timing, Transfer};
-use takt_rt::frame::{Frame, Id};
-use takt_rt::pdo::{CommandSlot, MappedObject, Mapping, ProcessImage};
+use takt_rt::{CommandSlot, Frame, Id, MappedObject, Mapping, ProcessImage};
 
 const VECTORS: &str = include_str!("vectors/erob-can.csv");
 

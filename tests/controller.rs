@@ -7,13 +7,10 @@ use std::path::Path;
 use takt::config::{Config, Control};
 use takt::controller::{Interrupt, Outcome, VirtualRun};
 use takt::sim::{DriveFault, Observation, SimulatedBus};
-use takt_rt::cia402::State;
-use takt_rt::door::{Move, Request};
-use takt_rt::frame::{Frame, Id};
-use takt_rt::port::{BusHealth, BusPort, Clock, ReceiveBatch};
-use takt_rt::record::MAX_AXES;
-use takt_rt::refusal::{Answer, Objection, RequestKind};
-use takt_rt::stop::{Phase, Rule, StopCategory};
+use takt_rt::{
+    Answer, BusHealth, BusPort, Clock, DriveState, Frame, Id, MAX_AXES, MotionState, Move, Phase,
+    ReceiveBatch, RejectReason, Request, RequestKind, Rule, StopCategory,
+};
 
 /// A minute is more than any of these programs takes.
 const CYCLES_AT_MOST: u64 = 60_000;
@@ -87,7 +84,7 @@ fn after_a_run_every_drive_is_disabled_and_at_rest() {
     let mut run = start(&config);
     run.run(CYCLES_AT_MOST, |_| {});
     for (axis, shown) in config.axes.iter().zip(run.snapshot().axes) {
-        assert!(!State::decode(shown.statusword).has_torque(), "{}", axis.name);
+        assert!(!DriveState::decode(shown.statusword).has_torque(), "{}", axis.name);
     }
 }
 
@@ -233,7 +230,7 @@ fn run_and_break(config: &Config, break_it: impl FnOnce(&mut SimulatedBus)) -> (
 
 fn rule_and_axis(outcome: Option<Outcome>) -> (Rule, Option<u8>) {
     match outcome {
-        Some(Outcome::Stopped(stop)) => (stop.rule, stop.axis()),
+        Some(Outcome::Stopped(stop)) => (stop.rule(), stop.axis()),
         other => panic!("{other:?}"),
     }
 }
@@ -372,12 +369,11 @@ fn what_is_refused_to_another_client_does_not_end_the_program() {
         }
     });
     assert_eq!(outcome, Some(Outcome::Finished));
-    assert!(run.snapshot().refused > 1000);
+    assert!(run.snapshot().rejected > 1000);
 }
 
 fn move_to(target: [f64; MAX_AXES], minimum_duration_s: f64) -> Move {
     Move {
-        id: 1,
         target,
         target_velocity: [0.0; MAX_AXES],
         velocity_scale: 1.0,
@@ -406,7 +402,9 @@ fn a_client_that_goes_on_moving_the_group_does_not_keep_the_run_from_ending() {
     });
     assert_eq!(outcome, Some(Outcome::Interrupted));
     assert!(
-        drives_of(run.ports()).iter().all(|drive| drive.state != State::OperationEnabled && drive.is_braked)
+        drives_of(run.ports())
+            .iter()
+            .all(|drive| drive.state != DriveState::OperationEnabled && drive.is_braked)
     );
 }
 
@@ -425,13 +423,14 @@ fn a_group_that_is_moved_before_the_life_cycle_has_seen_it_hold_goes_on() {
     let mut target = run.snapshot().axes.map(|axis| axis.position_set);
     target[0] += 0.1;
     let slow_move = move_to(target, 20.0);
-    run.host().request(Request::Move(slow_move)).unwrap();
+    let motion = run.host().request(Request::Move(slow_move)).unwrap();
     run.run(2, |_| {});
     assert_eq!(run.snapshot().phase, Phase::Moving);
     // Longer than anybody waits for drives that are to be enabled.
     run.run(25_000, |_| {});
     assert_eq!(run.snapshot().phase, Phase::Holding);
-    assert_eq!((run.snapshot().finished_move, run.snapshot().stop), (1, None));
+    let snapshot = run.snapshot();
+    assert_eq!((snapshot.motions.of(motion), snapshot.stop), (Some(MotionState::Finished), None));
     run.interrupt(Interrupt::Controlled);
     assert_eq!(run.run(CYCLES_AT_MOST, |_| {}), Some(Outcome::Interrupted));
 }
@@ -447,9 +446,9 @@ fn whoever_asks_finds_out_by_its_number_what_was_refused_and_why() {
     let taken = run.host().request(Request::Stop(StopCategory::Two)).unwrap();
     run.run(2, |_| {});
     let answers = run.snapshot().answers;
-    let Answer::Refused(Some(refusal)) = answers.of(refused) else { panic!("{answers:?}") };
-    let kind = (refusal.request, refusal.objection, refusal.phase);
-    assert_eq!(kind, (RequestKind::Enable, Objection::Phase, Phase::Moving));
+    let Answer::Rejected(Some(refusal)) = answers.of(refused) else { panic!("{answers:?}") };
+    let kind = (refusal.request, refusal.reason, refusal.phase);
+    assert_eq!(kind, (RequestKind::Enable, RejectReason::Phase, Phase::Moving));
     assert_eq!(answers.of(taken), Answer::Granted);
 }
 
@@ -466,5 +465,5 @@ fn a_fault_while_the_drives_are_disabled_at_the_end_is_how_the_run_ended() {
         }
     });
     let Some(Outcome::Stopped(stop)) = outcome else { panic!("{outcome:?}") };
-    assert_eq!((stop.rule, stop.phase), (Rule::ForeignMaster, Phase::Disabling));
+    assert_eq!((stop.rule(), stop.phase), (Rule::ForeignMaster, Phase::Disabling));
 }

@@ -12,8 +12,7 @@ use nix::unistd::Pid;
 use serde_json::Value;
 use takt::config::Config;
 use takt::telemetry::Recorded;
-use takt_rt::record::CycleRecord;
-use takt_rt::stop::Phase;
+use takt_rt::{CycleRecord, Phase};
 use tempfile::TempDir;
 
 /// A folder with the six-axis arm and two of its moves, recording into `runs` beside it.

@@ -4,9 +4,7 @@
 use std::path::Path;
 
 use proptest::prelude::*;
-use takt_rt::cia402::OperationMode;
-use takt_rt::dialect::Dialect;
-use takt_rt::stop::Phase;
+use takt_rt::{Dialect, OperationMode, Phase};
 
 #[path = "../fuzz/subjects/mod.rs"]
 mod subjects;

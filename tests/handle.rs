@@ -7,8 +7,7 @@ use takt::config::Config;
 use takt::controller::session::SessionOptions;
 use takt::controller::{CommandError, Controller, MotionError, MoveOptions, Outcome, StartFailure};
 use takt_rt::plan::State;
-use takt_rt::refusal::RequestKind;
-use takt_rt::stop::{Phase, Rule, StopCategory};
+use takt_rt::{Phase, RequestKind, Rule, StopCategory};
 
 const PATIENCE: Duration = Duration::from_secs(30);
 
@@ -56,7 +55,7 @@ fn a_speed_is_reached_kept_and_ended_and_one_that_is_not_renewed_stops_the_group
     joint.velocity(0, 0.2, Duration::from_millis(300)).unwrap();
     assert!(joint.wait_for(Phase::Stopping, PATIENCE) || joint.state().stop.is_some());
     assert!(joint.wait_for(Phase::Holding, PATIENCE));
-    assert_eq!(joint.state().stop.map(|stop| stop.rule), Some(Rule::StaleCommand));
+    assert_eq!(joint.state().stop.map(|stop| stop.rule()), Some(Rule::StaleCommand));
 }
 
 #[test]
@@ -69,7 +68,7 @@ fn after_a_stop_nothing_moves_before_the_fault_is_reset_and_whoever_asks_is_told
     while joint.state().stop.is_none() && begun.elapsed() < PATIENCE {
         std::thread::sleep(Duration::from_millis(1));
     }
-    assert_eq!(joint.state().stop.map(|stop| stop.rule), Some(Rule::StartPose));
+    assert_eq!(joint.state().stop.map(|stop| stop.rule()), Some(Rule::StartPose));
     assert!(joint.wait_for(Phase::Holding, PATIENCE));
     let refused = joint.move_to(&[0.2]).unwrap();
     let Err(MotionError::Refused(refused)) = joint.wait(refused, PATIENCE) else { panic!("it was taken") };
@@ -123,7 +122,7 @@ fn a_stop_overtakes_what_a_client_has_flooded_the_controller_with() {
     joint.stop(StopCategory::One).unwrap();
     assert!(joint.wait_for(Phase::Disabled, PATIENCE));
     let stop = joint.state().stop.unwrap();
-    assert_eq!((stop.rule, stop.category), (Rule::Requested, StopCategory::One));
+    assert_eq!((stop.rule(), stop.category), (Rule::Requested, StopCategory::One));
     assert!(stop.slot - slot < 2_000, "{} slots after it was asked for", stop.slot - slot);
     assert!(joint.wait(last, PATIENCE).is_err());
     assert_eq!(joint.finish().unwrap().outcome, Outcome::Finished);

@@ -13,9 +13,9 @@ use takt::controller::channels::{ChannelSizes, channels};
 use takt::controller::realtime_thread::{self, Work};
 use takt::controller::{Outcome, Supervisor, assemble};
 use takt::telemetry::{BlackBoxOptions, Logger, LoggerOptions, LoggerThread, Machine, WallClock};
-use takt_rt::frame::Frame;
+use takt_rt::Frame;
 use takt_rt::linux::MonotonicClock;
-use takt_rt::port::{BusHealth, BusPort, Clock, ReceiveBatch};
+use takt_rt::{BusHealth, BusPort, Clock, ReceiveBatch};
 
 thread_local! {
     static IS_WATCHED: Cell<bool> = const { Cell::new(false) };
@@ -109,7 +109,7 @@ fn the_real_loop_allocates_nothing_from_bring_up_to_the_last_cycle() {
         engine: Box::new(assemble::engine(&config).unwrap()),
         plan: assemble::slot_plan(&config),
         ports: ports.collect(),
-        door: rt,
+        host: rt,
         spin_guard_ns: None,
         is_realtime_required: false,
     };

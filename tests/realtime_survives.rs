@@ -18,13 +18,12 @@ use takt::controller::{Outcome, Supervisor, assemble};
 use takt::telemetry::{
     BlackBoxOptions, Fault, Logger, LoggerOptions, LoggerThread, Machine, Notice, Recorded, WallClock,
 };
-use takt_rt::door::{Request, Snapshot, StreamCommand};
-use takt_rt::frame::Frame;
 use takt_rt::linux::MonotonicClock;
 use takt_rt::plan;
-use takt_rt::port::{BusHealth, BusPort, Clock, ReceiveBatch};
-use takt_rt::record::{EventKind, MAX_AXES};
-use takt_rt::stop::{Phase, StopCategory};
+use takt_rt::{
+    BusHealth, BusPort, Clock, EventKind, Frame, MAX_AXES, Phase, ReceiveBatch, Request, Snapshot,
+    StopCategory, StreamCommand,
+};
 
 fn arm(directory: &Path) -> Config {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/arm6-erob.toml");
@@ -62,7 +61,7 @@ fn run<P: BusPort + Send + 'static>(
         engine: Box::new(assemble::engine(config).unwrap()),
         plan: assemble::slot_plan(config),
         ports,
-        door: rt,
+        host: rt,
         spin_guard_ns: None,
         is_realtime_required: false,
     };

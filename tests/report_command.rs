@@ -12,7 +12,7 @@ use takt::controller::{Outcome, VirtualRun};
 use takt::faults::{Rehearsal, Scenario};
 use takt::sim::SimulatedBus;
 use takt::telemetry::{BlackBoxOptions, Destination, Logger, LoggerOptions, Machine, Recorded, WallClock};
-use takt_rt::stop::Rule;
+use takt_rt::Rule;
 use tempfile::TempDir;
 
 /// 2023-11-14 22:13:20 UTC
@@ -49,7 +49,7 @@ fn stopped_run() -> Left {
         logger.drain();
     });
     assert!(
-        matches!(outcome, Some(Outcome::Stopped(stop)) if stop.rule == Rule::FollowingError),
+        matches!(outcome, Some(Outcome::Stopped(stop)) if stop.rule() == Rule::FollowingError),
         "{outcome:?}"
     );
     let summary = logger.finish();
@@ -177,7 +177,7 @@ fn recording_of_a_lost_bus(bus: &str, folder: &Path) -> PathBuf {
     let outcome = run.run(60_000, |_| {
         logger.drain();
     });
-    assert!(matches!(outcome, Some(Outcome::Stopped(stop)) if stop.rule == Rule::BusLost), "{outcome:?}");
+    assert!(matches!(outcome, Some(Outcome::Stopped(stop)) if stop.rule() == Rule::BusLost), "{outcome:?}");
     logger.finish().recording.unwrap()
 }
 

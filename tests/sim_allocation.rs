@@ -15,8 +15,7 @@ use takt::sim::erob::{ErobJoint, ErobParameters};
 use takt::sim::plant::{Encoder, JointParameters};
 use takt::sim::yz_aim::{Gearing, Model, YzAimJoint, YzAimParameters};
 use takt::sim::{BitRates, Defect, Drive, DriveFault, SimulatedBus};
-use takt_rt::frame::{Frame, Id};
-use takt_rt::port::{BusPort, ReceiveBatch};
+use takt_rt::{BusPort, Frame, Id, ReceiveBatch};
 
 thread_local! {
     static ALLOCATIONS: Cell<u64> = const { Cell::new(0) };

@@ -10,9 +10,8 @@ use takt::bus::{
     InterfaceError, InterfaceSettings, SocketCanOptions, interface_status, open_socketcan, prepare_interface,
 };
 use takt::config::Config;
-use takt_rt::frame::{Frame, Id};
 use takt_rt::linux::{MonotonicClock, SocketCanPort};
-use takt_rt::port::{BusPort, BusState, Clock, Outgoing, ReceiveBatch, Received};
+use takt_rt::{BusPort, BusState, Clock, Frame, Id, Outgoing, ReceiveBatch, Received};
 
 /// A virtual interface of its own for each test, so that they can run side by side.
 struct VirtualCan(&'static str);

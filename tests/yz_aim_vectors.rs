@@ -7,8 +7,7 @@ use std::f64::consts::TAU;
 use takt::sim::plant::JointParameters;
 use takt::sim::yz_aim::{Gearing, Model, OBJECTS, Quirks, YzAimJoint, YzAimParameters};
 use takt::sim::{BitRates, Drive, DriveFault, SimulatedBus};
-use takt_rt::frame::{Frame, Id};
-use takt_rt::port::{BusPort, ReceiveBatch};
+use takt_rt::{BusPort, Frame, Id, ReceiveBatch};
 
 const VECTORS: &str = include_str!("vectors/yz-aim-vectors.csv");
 const DICTIONARY: &str = include_str!("vectors/yz-aim-objects.csv");

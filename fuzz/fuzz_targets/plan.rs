@@ -8,7 +8,7 @@
 
 use libfuzzer_sys::fuzz_target;
 use takt_rt::plan::{
-    Limits, Problem, Profile, Return, State, Synchronisation, Timing, stop, synchronised,
+    Limits, Problem, Profile, Return, State, Synchronisation, PlanOptions, stop, synchronised,
     synchronised_velocity,
 };
 
@@ -46,9 +46,9 @@ impl Numbers<'_> {
     }
 }
 
-fn timing(mode: u8, numbers: &mut Numbers) -> Timing {
+fn timing(mode: u8, numbers: &mut Numbers) -> PlanOptions {
     let (minimum_s, cycle_s) = (numbers.next(), numbers.next());
-    Timing {
+    PlanOptions {
         synchronisation: match mode & 3 {
             0 => Synchronisation::Time,
             1 => Synchronisation::Phase,

@@ -9,8 +9,7 @@ use takt::canopen::sdo;
 use takt::config::Config;
 use takt::drive::{BringUp, BringUpTiming, Leave};
 use takt::sim::SimulatedBus;
-use takt_rt::frame::{Frame, Id};
-use takt_rt::port::{BusPort, ReceiveBatch};
+use takt_rt::{BusPort, Frame, Id, ReceiveBatch};
 
 use super::input::Input;
 

@@ -1,6 +1,6 @@
 //! Values from the bytes that a fuzzer makes.
 
-use takt_rt::frame::{Frame, Id};
+use takt_rt::{Frame, Id};
 
 /// The identifiers of NMT, SYNC, TIME, and layer settings from slave and master.
 const FOR_ALL: [u32; 5] = [0x000, 0x080, 0x100, 0x7E4, 0x7E5];

@@ -6,10 +6,7 @@ use takt::bus::port::Port;
 use takt::config::Config;
 use takt::faults::{Rehearsal, Scenario};
 use takt::sim::SimulatedBus;
-use takt_rt::door::Snapshot;
-use takt_rt::frame::{Frame, Id};
-use takt_rt::port::{BusPort, ReceiveBatch};
-use takt_rt::stop::Phase;
+use takt_rt::{BusPort, Frame, Id, Phase, ReceiveBatch, Snapshot};
 
 use super::configuration::assert_explained;
 

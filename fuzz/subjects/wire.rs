@@ -11,10 +11,9 @@ use takt::canopen::sync::Sync;
 use takt::canopen::time::{TimeOfDay, system_time};
 use takt::config::Config;
 use takt::sim::SimulatedBus;
-use takt_rt::cia402::State;
-use takt_rt::frame::{Frame, Id};
-use takt_rt::pdo::{MAX_OBJECTS, MappedObject, Mapping, ProcessImage};
-use takt_rt::port::{BusPort, ReceiveBatch};
+use takt_rt::{
+    BusPort, DriveState, Frame, Id, MAX_OBJECTS, MappedObject, Mapping, ProcessImage, ReceiveBatch,
+};
 
 use super::conversations;
 use super::input::Input;
@@ -69,7 +68,7 @@ fn decode(mut input: Input<'_>) {
             let before = Sync { counter: input.bytes::<1>().first().copied() };
             sync.missing_since(before, input.byte());
         }
-        State::decode(frame.first_word() as u16);
+        DriveState::decode(frame.first_word() as u16);
         let mut consumer = HeartbeatConsumer::new(NODE, 1_000_000);
         for now_ns in [0, u64::from(input.word()), u64::MAX] {
             let _ = consumer.receive(now_ns, &frame);

@@ -4,8 +4,7 @@
 
 use criterion::{BatchSize, BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use std::hint::black_box;
-use takt_rt::frame::Frame;
-use takt_rt::pdo::{CommandSlot, FeedbackSlot, MappedObject, Mapping, ProcessImage};
+use takt_rt::{CommandSlot, FeedbackSlot, Frame, MappedObject, Mapping, ProcessImage};
 
 #[path = "../tests/fixture/mod.rs"]
 mod fixture;
@@ -55,7 +54,7 @@ fn pdo(criterion: &mut Criterion) {
         });
     });
     group.bench_function("frame", |bencher| {
-        let id = takt_rt::frame::Id::canopen(0x200, 1);
+        let id = takt_rt::Id::canopen(0x200, 1);
         bencher.iter_batched(|| [1u8; 6], |payload| Frame::of(id, black_box(payload)), BatchSize::SmallInput);
     });
     group.finish();

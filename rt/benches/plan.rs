@@ -5,7 +5,7 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use rsruckig::prelude::{Ruckig, ThrowErrorHandler, Trajectory};
 use std::hint::black_box;
 use std::time::Duration;
-use takt_rt::plan::{Problem, Profile, State, Timing, synchronised, synchronised_velocity};
+use takt_rt::plan::{PlanOptions, Problem, Profile, State, synchronised, synchronised_velocity};
 
 mod plan_problems;
 use plan_problems::rsruckig::input;
@@ -13,7 +13,7 @@ use plan_problems::{Order, planned_anew, problems};
 
 const SETS: u64 = 1024;
 
-type Planner = fn(&[Problem], &mut [Profile], Timing) -> Result<f64, takt_rt::plan::PlanError>;
+type Planner = fn(&[Problem], &mut [Profile], PlanOptions) -> Result<f64, takt_rt::plan::PlanError>;
 
 /// Plans the sets in turn, by our planner and by `rsruckig`.
 fn compare<const AXES: usize>(
@@ -28,7 +28,7 @@ fn compare<const AXES: usize>(
     criterion.bench_function(&format!("plan/{name}/{AXES}"), |bencher| {
         bencher.iter(|| {
             let problems = next.next().map(Vec::as_slice).unwrap_or_default();
-            planner(black_box(problems), &mut profiles, Timing::default())
+            planner(black_box(problems), &mut profiles, PlanOptions::default())
         });
     });
     let inputs: Vec<_> = sets.iter().map(|set| input::<AXES>(set, name == "velocity")).collect();
@@ -87,7 +87,7 @@ fn sample(criterion: &mut Criterion) {
     for axes in [1, 7] {
         let mut profiles = vec![Profile::hold(0.0); axes];
         let set = problems(1, axes, Order::Third);
-        let duration_s = synchronised(&set, &mut profiles, Timing::default()).unwrap_or_default();
+        let duration_s = synchronised(&set, &mut profiles, PlanOptions::default()).unwrap_or_default();
         let mut states = vec![State::default(); axes];
         let mut cycle = 0_u32;
         criterion.bench_function(&format!("sample/{axes}"), |bencher| {

@@ -6,7 +6,7 @@
 
 use std::hint::black_box;
 
-use takt_rt::pdo::{CommandSlot, MappedObject, Mapping, ProcessImage};
+use takt_rt::{CommandSlot, MappedObject, Mapping, ProcessImage};
 
 #[path = "../tests/fixture/mod.rs"]
 mod fixture;

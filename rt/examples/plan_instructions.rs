@@ -11,7 +11,7 @@
 use std::hint::black_box;
 
 use ::rsruckig::prelude::{Ruckig, ThrowErrorHandler, Trajectory};
-use takt_rt::plan::{Problem, Profile, Timing, synchronised, synchronised_velocity};
+use takt_rt::plan::{PlanOptions, Problem, Profile, synchronised, synchronised_velocity};
 
 #[path = "../benches/plan_problems/mod.rs"]
 mod plan_problems;
@@ -60,7 +60,7 @@ fn plan(sets: &[Vec<Problem>], is_velocity: bool, axes: usize, repetitions: usiz
     let planner = if is_velocity { synchronised_velocity } else { synchronised };
     let mut profiles = vec![Profile::hold(0.0); axes];
     for set in sets.iter().cycle().take(repetitions) {
-        let _ = black_box(planner(black_box(set), &mut profiles, Timing::default()));
+        let _ = black_box(planner(black_box(set), &mut profiles, PlanOptions::default()));
     }
 }
 
@@ -76,7 +76,7 @@ fn plan_with_rsruckig<const AXES: usize>(sets: &[Vec<Problem>], is_velocity: boo
 fn sample(axes: usize, repetitions: usize) {
     let mut profiles = vec![Profile::hold(0.0); axes];
     let set = problems(1, axes, Order::Third);
-    let duration_s = synchronised(&set, &mut profiles, Timing::default()).unwrap_or_default();
+    let duration_s = synchronised(&set, &mut profiles, PlanOptions::default()).unwrap_or_default();
     for repetition in 0..repetitions {
         let time_s = duration_s * (repetition % 1024) as f64 / 1024.0;
         for profile in &profiles {

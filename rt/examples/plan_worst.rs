@@ -11,7 +11,7 @@ use std::hint::black_box;
 use std::time::{Duration, Instant};
 
 use ::rsruckig::prelude::{Ruckig, ThrowErrorHandler, Trajectory};
-use takt_rt::plan::{Problem, Profile, Timing, synchronised};
+use takt_rt::plan::{PlanOptions, Problem, Profile, synchronised};
 
 #[path = "../benches/plan_problems/mod.rs"]
 mod plan_problems;
@@ -36,7 +36,7 @@ fn main() {
     for (name, sets) in kinds {
         let mut profiles = vec![Profile::hold(0.0); axes];
         let own = shortest(&sets, passes, |set| {
-            let _ = black_box(synchronised(black_box(set), &mut profiles, Timing::default()));
+            let _ = black_box(synchronised(black_box(set), &mut profiles, PlanOptions::default()));
         });
         println!("{name}, {axes} axes: {}", spread(own));
         if axes == 7 {

@@ -4,7 +4,7 @@
 /// A state of the drive, as the statusword shows it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
 #[repr(u8)]
-pub enum State {
+pub enum DriveState {
     /// The drive initialises itself. Also what is assumed before the first statusword.
     #[default]
     NotReadyToSwitchOn = 0,
@@ -26,7 +26,7 @@ pub enum State {
     Undefined = 8,
 }
 
-impl State {
+impl DriveState {
     /// Every state, in the order of their numbers.
     pub const ALL: [Self; 9] = [
         Self::NotReadyToSwitchOn,
@@ -262,20 +262,20 @@ mod tests {
     #[test]
     fn statuswords_seen_on_hardware_decode_to_their_states() {
         let seen = [
-            (0x1250, State::SwitchOnDisabled),
-            (0x12D0, State::SwitchOnDisabled),
-            (0x1231, State::ReadyToSwitchOn),
-            (0x12B1, State::ReadyToSwitchOn),
-            (0x1233, State::SwitchedOn),
-            (0x12B3, State::SwitchedOn),
-            (0x12B7, State::OperationEnabled),
-            (0x1637, State::OperationEnabled),
-            (0x16B7, State::OperationEnabled),
-            (0x1208, State::Fault),
-            (0x1288, State::Fault),
+            (0x1250, DriveState::SwitchOnDisabled),
+            (0x12D0, DriveState::SwitchOnDisabled),
+            (0x1231, DriveState::ReadyToSwitchOn),
+            (0x12B1, DriveState::ReadyToSwitchOn),
+            (0x1233, DriveState::SwitchedOn),
+            (0x12B3, DriveState::SwitchedOn),
+            (0x12B7, DriveState::OperationEnabled),
+            (0x1637, DriveState::OperationEnabled),
+            (0x16B7, DriveState::OperationEnabled),
+            (0x1208, DriveState::Fault),
+            (0x1288, DriveState::Fault),
         ];
         for (word, state) in seen {
-            assert_eq!(State::decode(word), state, "{word:#06x}");
+            assert_eq!(DriveState::decode(word), state, "{word:#06x}");
         }
     }
 
@@ -283,24 +283,24 @@ mod tests {
     fn every_statusword_decodes_as_the_masks_of_the_standard_say() {
         for word in 0..=u16::MAX {
             let expected = match (word & 0x4F, word & 0x6F) {
-                (0x00, _) => State::NotReadyToSwitchOn,
-                (0x40, _) => State::SwitchOnDisabled,
-                (_, 0x21) => State::ReadyToSwitchOn,
-                (_, 0x23) => State::SwitchedOn,
-                (_, 0x27) => State::OperationEnabled,
-                (_, 0x07) => State::QuickStopActive,
-                (0x0F, _) => State::FaultReactionActive,
-                (0x08, _) => State::Fault,
-                _ => State::Undefined,
+                (0x00, _) => DriveState::NotReadyToSwitchOn,
+                (0x40, _) => DriveState::SwitchOnDisabled,
+                (_, 0x21) => DriveState::ReadyToSwitchOn,
+                (_, 0x23) => DriveState::SwitchedOn,
+                (_, 0x27) => DriveState::OperationEnabled,
+                (_, 0x07) => DriveState::QuickStopActive,
+                (0x0F, _) => DriveState::FaultReactionActive,
+                (0x08, _) => DriveState::Fault,
+                _ => DriveState::Undefined,
             };
-            assert_eq!(State::decode(word), expected, "{word:#06x}");
+            assert_eq!(DriveState::decode(word), expected, "{word:#06x}");
         }
     }
 
     #[test]
     fn the_bits_of_a_state_decode_to_it() {
-        for state in State::ALL.into_iter().filter(|state| *state != State::Undefined) {
-            assert_eq!(State::decode(state.statusword_bits()), state);
+        for state in DriveState::ALL.into_iter().filter(|state| *state != DriveState::Undefined) {
+            assert_eq!(DriveState::decode(state.statusword_bits()), state);
         }
     }
 
@@ -322,12 +322,12 @@ mod tests {
     #[test]
     fn from_every_state_but_a_fault_the_way_leads_to_every_goal() {
         let goals = [
-            (Goal::Enabled, State::OperationEnabled),
-            (Goal::Disabled, State::ReadyToSwitchOn),
-            (Goal::NoVoltage, State::SwitchOnDisabled),
+            (Goal::Enabled, DriveState::OperationEnabled),
+            (Goal::Disabled, DriveState::ReadyToSwitchOn),
+            (Goal::NoVoltage, DriveState::SwitchOnDisabled),
         ];
-        for start in State::ALL {
-            if start.is_faulted() || matches!(start, State::NotReadyToSwitchOn | State::Undefined) {
+        for start in DriveState::ALL {
+            if start.is_faulted() || matches!(start, DriveState::NotReadyToSwitchOn | DriveState::Undefined) {
                 continue;
             }
             for (goal, reached) in goals {
@@ -344,9 +344,9 @@ mod tests {
     #[test]
     fn a_fault_is_left_by_a_rising_edge_only() {
         let word = controlword::FAULT_RESET;
-        assert_eq!(State::Fault.after(Command::decode(word), false), State::Fault);
-        assert_eq!(State::Fault.after(Command::decode(word), true), State::SwitchOnDisabled);
-        assert_eq!(State::Fault.controlword_towards(Goal::Enabled) & controlword::FAULT_RESET, 0);
+        assert_eq!(DriveState::Fault.after(Command::decode(word), false), DriveState::Fault);
+        assert_eq!(DriveState::Fault.after(Command::decode(word), true), DriveState::SwitchOnDisabled);
+        assert_eq!(DriveState::Fault.controlword_towards(Goal::Enabled) & controlword::FAULT_RESET, 0);
     }
 
     #[test]

@@ -113,6 +113,18 @@ impl ControlLaw {
         }
     }
 
+    /// The gains of the loops that are closed here, in the order of their fields.
+    pub fn gains(&self) -> impl Iterator<Item = f64> + use<> {
+        let gains = match *self {
+            Self::Velocity { position_gain } => [position_gain, 0.0, 0.0, 0.0, 0.0],
+            Self::Torque { stiffness, damping, inertia, viscous_friction, coulomb_friction } => {
+                [stiffness, damping, inertia, viscous_friction, coulomb_friction]
+            }
+            _ => [0.0; 5],
+        };
+        gains.into_iter()
+    }
+
     /// The target of an axis that gets no torque: the actual position, no velocity, no torque. A drive that is enabled
     /// on it stays where it is.
     pub const fn idle(&self, position_counts: i32) -> i32 {

@@ -7,21 +7,24 @@
 //! ```
 //!
 //! A late wake-up never bursts and never loses phase: slots that have passed are skipped and counted, and the
-//! trajectory goes on by one nominal period.
+//! trajectory goes on by one nominal period. Whether the deadline was met is decided after computing, by the clock, when
+//! the frames are about to leave. A thread that is always late goes on without SYNC and set-points: the engine then stops the
+//! drives by SDO.
 
 use arrayvec::ArrayVec;
 
-use crate::door::Door;
-use crate::engine::{BusSet, Engine, SendBatch, Transmission};
+use crate::bus_set::BusSet;
+use crate::engine::{CycleInput, Deadline, Engine, Receiver, SendBatch};
 use crate::frame::Frame;
+use crate::host::HostInterface;
 use crate::port::{BusHealth, BusPort, Clock, Outgoing, ReceiveBatch};
-use crate::record::{MAX_BUSES, Timing};
+use crate::record::CycleTiming;
 use crate::time::{Grid, Nanoseconds};
 
 /// When things happen inside a slot, in nanoseconds after its start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SlotPlan {
-    /// SYNC that cannot leave by then is not sent: the slot is skipped, since drives would latch late and the
+    /// SYNC that cannot leave by then is not sent: the slot is skipped, because drives would latch late and the
     /// feedback would miss the command phase.
     pub latest_sync_ns: Nanoseconds,
     /// The beginning of the command phase.
@@ -50,7 +53,7 @@ pub enum Flow {
     /// There is a next cycle.
     Continue,
     /// The loop was asked to end.
-    Leave,
+    Shutdown,
 }
 
 /// The loop's place on the grid.
@@ -61,6 +64,9 @@ pub struct Cycle {
     next_slot: u64,
 }
 
+/// Slots that are tried in one cycle. When the wake-up was too late for each of them, the cycle goes on without SYNC.
+const SLOT_ATTEMPTS: usize = 3;
+
 impl Cycle {
     /// A loop that begins with slot 0 of `grid`.
     pub const fn new(grid: Grid, plan: SlotPlan) -> Self {
@@ -68,125 +74,177 @@ impl Cycle {
     }
 
     /// One whole cycle.
-    pub fn run<C: Clock, P: BusPort, D: Door>(
+    pub fn run<const AXES: usize, const BUSES: usize, C, P, H>(
         &mut self,
-        engine: &mut Engine,
+        engine: &mut Engine<AXES, BUSES>,
         clock: &mut C,
         ports: &mut [P],
-        door: &mut D,
-    ) -> Flow {
-        let mut timing = self.reach_slot(clock);
+        host: &mut H,
+    ) -> Flow
+    where
+        C: Clock,
+        P: BusPort,
+        H: HostInterface<AXES, BUSES>,
+    {
+        let (mut timing, sync_deadline) = self.reach_slot(clock);
         timing.sync_ns = clock.now_ns().saturating_sub(timing.slot_start_ns);
-        release_sync(engine, ports, timing.slot, clock.now_ns());
+        if sync_deadline == Deadline::Met {
+            look_again(engine, ports, clock.now_ns(), host);
+            release_sync(engine, ports, timing.slot, clock.now_ns());
+        }
 
         let wake = clock.wait_until(timing.slot_start_ns + self.plan.command_phase_ns);
-        let held_back = take_feedback(engine, ports, wake.now_ns, door);
-        engine.hold_back(held_back);
-        let health = health_of(ports);
+        let behind = take_feedback(engine, ports, wake.now_ns, host);
+        let health = health_of::<P, BUSES>(ports);
         let began_ns = clock.now_ns();
-        let transmission = if held_back.is_every_of(ports.len()) {
-            Transmission::Blocked
-        } else if began_ns > timing.slot_start_ns + self.plan.latest_set_points_ns {
-            Transmission::TooLate
-        } else {
-            Transmission::Free
-        };
-        let has_commands = engine.compute(timing.slot, began_ns, &health, transmission, door);
-        timing.compute_ns = clock.now_ns().saturating_sub(began_ns);
-
-        // Not made as a constant, whose 80 kB would be written in every cycle.
-        let mut batches: [SendBatch; MAX_BUSES] = core::array::from_fn(|_| SendBatch::new());
-        for (bus, batch) in batches.iter_mut().enumerate().take(ports.len()) {
-            if has_commands {
-                engine.set_points(bus, timing.slot, batch);
+        engine.compute(&CycleInput { slot: timing.slot, now_ns: began_ns, buses: &health, behind }, host);
+        let ready_ns = clock.now_ns();
+        timing.compute_ns = ready_ns.saturating_sub(began_ns);
+        let deadline = match sync_deadline {
+            Deadline::Met if ready_ns <= timing.slot_start_ns + self.plan.latest_set_points_ns => {
+                Deadline::Met
             }
-            engine.services(bus, door, batch);
+            _ => Deadline::Missed,
+        };
+
+        // Not made as a constant, all of whose bytes would be written in every cycle.
+        let mut batches: [SendBatch; BUSES] = core::array::from_fn(|_| SendBatch::new());
+        for (bus, batch) in batches.iter_mut().enumerate().take(ports.len()) {
+            engine.encode(bus, deadline, host, batch);
         }
         let not_taken = send(ports, &batches, clock.now_ns());
         engine.not_taken(not_taken);
         let finished_ns = clock.now_ns();
         timing.sent_ns = finished_ns.saturating_sub(timing.slot_start_ns);
-        engine.finish(timing, finished_ns, &health, door);
-        if engine.is_leaving() { Flow::Leave } else { Flow::Continue }
+        engine.finish(timing, finished_ns, &health, host);
+        if engine.is_shutting_down() { Flow::Shutdown } else { Flow::Continue }
     }
 
-    /// Waits for the next slot that can be used. The wake-ups that came too late for theirs are among the latency.
-    fn reach_slot(&mut self, clock: &mut impl Clock) -> Timing {
+    /// Waits for the next slot that can be used; after some that cannot, for the last of them, with a missed deadline. The
+    /// wake-ups that came too late for their slots are among the latency.
+    fn reach_slot(&mut self, clock: &mut impl Clock) -> (CycleTiming, Deadline) {
         let mut wake_ns = 0;
-        loop {
+        for attempt in 1..=SLOT_ATTEMPTS {
             let now_ns = clock.now_ns();
             let mut slot = self.next_slot;
-            if now_ns > self.grid.slot_start_ns(slot) + self.plan.latest_sync_ns {
+            if now_ns > self.latest_sync_ns(slot) {
                 slot = slot.max(self.grid.next_slot(now_ns));
             }
             let slot_start_ns = self.grid.slot_start_ns(slot);
             let wake = clock.wait_to_send(slot_start_ns);
             wake_ns = wake.timer_latency_ns.max(wake_ns);
-            if wake.now_ns <= slot_start_ns + self.plan.latest_sync_ns {
-                self.next_slot = slot + 1;
-                return Timing { slot, slot_start_ns, wake_ns, ..Timing::default() };
+            self.next_slot = slot.saturating_add(1);
+            let timing = CycleTiming { slot, slot_start_ns, wake_ns, ..CycleTiming::default() };
+            if wake.now_ns <= self.latest_sync_ns(slot) {
+                return (timing, Deadline::Met);
             }
-            self.next_slot = slot + 1;
+            if attempt == SLOT_ATTEMPTS {
+                return (timing, Deadline::Missed);
+            }
         }
+        (CycleTiming::default(), Deadline::Missed)
+    }
+
+    const fn latest_sync_ns(&self, slot: u64) -> Nanoseconds {
+        self.grid.slot_start_ns(slot).saturating_add(self.plan.latest_sync_ns)
     }
 }
 
 /// SYNC on every bus that has it in this slot.
-fn release_sync<P: BusPort>(engine: &mut Engine, ports: &mut [P], slot: u64, now_ns: Nanoseconds) {
-    let syncs = (0..ports.len()).map(|bus| engine.sync(bus, slot, now_ns).into_iter().collect());
-    let syncs: ArrayVec<ArrayVec<Frame, 1>, MAX_BUSES> = syncs.take(MAX_BUSES).collect();
+fn release_sync<const AXES: usize, const BUSES: usize, P: BusPort>(
+    engine: &mut Engine<AXES, BUSES>,
+    ports: &mut [P],
+    slot: u64,
+    now_ns: Nanoseconds,
+) {
+    let mut syncs: [ArrayVec<Frame, 1>; BUSES] = core::array::from_fn(|_| ArrayVec::new());
+    for (bus, sync) in syncs.iter_mut().enumerate().take(ports.len()) {
+        sync.extend(engine.sync(bus, slot, now_ns));
+    }
     send(ports, &syncs, now_ns);
 }
 
 /// Sends to each bus its own frames. Returns the buses that did not take all of them.
-fn send<P: BusPort, const N: usize>(
+fn send<P: BusPort, const N: usize, const BUSES: usize>(
     ports: &mut [P],
-    batches: &[ArrayVec<Frame, N>],
+    batches: &[ArrayVec<Frame, N>; BUSES],
     now_ns: Nanoseconds,
 ) -> BusSet {
-    let mut taken = [0; MAX_BUSES];
+    let mut taken = [0; BUSES];
     let entries = ports.iter_mut().zip(batches).zip(&mut taken).filter(|((_, frames), _)| !frames.is_empty());
-    let mut outgoing: ArrayVec<Outgoing<'_, P>, MAX_BUSES> =
+    let mut outgoing: ArrayVec<Outgoing<'_, P>, BUSES> =
         entries.map(|((port, frames), taken)| Outgoing { port, frames, taken }).collect();
     P::send_together(now_ns, &mut outgoing);
     drop(outgoing);
     let mut not_taken = BusSet::default();
-    let is_short = |(_, (frames, taken)): &(usize, (&ArrayVec<Frame, N>, &usize))| **taken < frames.len();
-    let short = batches.iter().zip(&taken).enumerate().filter(is_short);
-    short.for_each(|(bus, _)| not_taken.insert(bus));
+    for (bus, (frames, taken)) in batches.iter().zip(&taken).enumerate() {
+        if *taken < frames.len() {
+            not_taken.insert(bus);
+        }
+    }
     not_taken
 }
 
-/// Hands everything that has arrived to the engine. Returns the buses on which own frames still wait for the wire.
-fn take_feedback<P: BusPort>(
-    engine: &mut Engine,
+/// Looks again at the buses that were behind in the last cycle: a bus that has caught up since gets its SYNC.
+fn look_again<const AXES: usize, const BUSES: usize, P: BusPort>(
+    engine: &mut Engine<AXES, BUSES>,
     ports: &mut [P],
     now_ns: Nanoseconds,
-    door: &mut impl Door,
-) -> BusSet {
-    let mut held_back = BusSet::default();
-    let mut batch = ReceiveBatch::new();
-    for (bus, port) in ports.iter_mut().enumerate() {
-        // Bounded: whoever floods the bus with more than a bus can carry in one slot is heard next time.
-        for _ in 0..RECEIVES_PER_CYCLE {
-            batch.clear();
-            port.receive(now_ns, &mut batch);
-            for received in &batch {
-                engine.receive(bus, received, door);
-            }
-            if !batch.is_full() {
-                break;
-            }
-        }
-        if port.unconfirmed(now_ns) > 0 {
-            held_back.insert(bus);
+    host: &mut impl HostInterface<AXES, BUSES>,
+) {
+    let was_behind = engine.behind();
+    let mut caught_up = BusSet::default();
+    for (bus, port) in ports.iter_mut().enumerate().filter(|(bus, _)| was_behind.contains(*bus)) {
+        receive(engine, bus, port, now_ns, host);
+        if port.unconfirmed(now_ns) == 0 {
+            caught_up.insert(bus);
         }
     }
-    held_back
+    engine.note_caught_up(caught_up);
 }
 
+/// Hands everything that has arrived to the engine. Returns the buses on which own frames still wait for the wire.
+fn take_feedback<const AXES: usize, const BUSES: usize, P: BusPort>(
+    engine: &mut Engine<AXES, BUSES>,
+    ports: &mut [P],
+    now_ns: Nanoseconds,
+    host: &mut impl HostInterface<AXES, BUSES>,
+) -> BusSet {
+    let mut behind = BusSet::default();
+    for (bus, port) in ports.iter_mut().enumerate() {
+        receive(engine, bus, port, now_ns, host);
+        if port.unconfirmed(now_ns) > 0 {
+            behind.insert(bus);
+        }
+    }
+    behind
+}
+
+/// Batches that are received from a bus at a time. A flood of more than a bus can carry in one slot waits for the next time.
 const RECEIVES_PER_CYCLE: usize = 4;
 
-fn health_of<P: BusPort>(ports: &mut [P]) -> ArrayVec<BusHealth, MAX_BUSES> {
-    ports.iter_mut().take(MAX_BUSES).map(BusPort::health).collect()
+fn receive<const AXES: usize, const BUSES: usize, P: BusPort>(
+    engine: &mut Engine<AXES, BUSES>,
+    bus: usize,
+    port: &mut P,
+    now_ns: Nanoseconds,
+    host: &mut impl HostInterface<AXES, BUSES>,
+) {
+    let mut batch = ReceiveBatch::new();
+    for _ in 0..RECEIVES_PER_CYCLE {
+        batch.clear();
+        port.receive(now_ns, &mut batch);
+        for received in &batch {
+            if engine.receive(bus, received) == Receiver::Host && !host.received(bus, received) {
+                engine.count_dropped();
+            }
+        }
+        if !batch.is_full() {
+            break;
+        }
+    }
+}
+
+fn health_of<P: BusPort, const BUSES: usize>(ports: &mut [P]) -> ArrayVec<BusHealth, BUSES> {
+    ports.iter_mut().take(BUSES).map(BusPort::health).collect()
 }

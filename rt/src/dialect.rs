@@ -1,6 +1,6 @@
 //! How a family of drives speaks through controlword and statusword where that is not CiA 402's way.
 
-use crate::cia402::{Goal, State, controlword, statusword};
+use crate::cia402::{DriveState, Goal, controlword, statusword};
 
 /// The meaning of the bits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -21,20 +21,20 @@ const ALARM: u16 = 0x08;
 impl Dialect {
     /// The state that a statusword shows. A YZ-AIM shows no more than enabled, alarm, or neither, which is given as
     /// switch on disabled.
-    pub const fn state(self, word: u16) -> State {
+    pub const fn state(self, word: u16) -> DriveState {
         match self {
-            Self::Cia402 => State::decode(word),
-            Self::YzAim if word & ALARM != 0 => State::Fault,
-            Self::YzAim if word & YZ_AIM_ENABLED == YZ_AIM_ENABLED => State::OperationEnabled,
-            Self::YzAim => State::SwitchOnDisabled,
+            Self::Cia402 => DriveState::decode(word),
+            Self::YzAim if word & ALARM != 0 => DriveState::Fault,
+            Self::YzAim if word & YZ_AIM_ENABLED == YZ_AIM_ENABLED => DriveState::OperationEnabled,
+            Self::YzAim => DriveState::SwitchOnDisabled,
         }
     }
 
     /// The controlword after `last` that leads a drive in `state` towards `goal`. A YZ-AIM does not show how far it
     /// has come, so the way up is walked by what was sent: 06, 07, 0F, and from the beginning if that was in vain.
-    pub const fn controlword(self, state: State, goal: Goal, last: u16) -> u16 {
+    pub const fn controlword(self, state: DriveState, goal: Goal, last: u16) -> u16 {
         match (self, goal, state) {
-            (Self::YzAim, Goal::Enabled, State::OperationEnabled) => controlword::ENABLE_OPERATION,
+            (Self::YzAim, Goal::Enabled, DriveState::OperationEnabled) => controlword::ENABLE_OPERATION,
             (Self::YzAim, Goal::Enabled, _) => match last {
                 controlword::SHUTDOWN => controlword::SWITCH_ON,
                 controlword::SWITCH_ON => controlword::ENABLE_OPERATION,
@@ -62,13 +62,13 @@ mod tests {
     #[test]
     fn statuswords_of_the_yz_aim_manual_decode_bit_by_bit() {
         let seen = [
-            (0x0037, State::OperationEnabled),
-            (0x0437, State::OperationEnabled),
-            (0x0404, State::SwitchOnDisabled),
-            (0x0014, State::SwitchOnDisabled),
-            (0x1414, State::SwitchOnDisabled),
-            (0x043F, State::Fault),
-            (0x0008, State::Fault),
+            (0x0037, DriveState::OperationEnabled),
+            (0x0437, DriveState::OperationEnabled),
+            (0x0404, DriveState::SwitchOnDisabled),
+            (0x0014, DriveState::SwitchOnDisabled),
+            (0x1414, DriveState::SwitchOnDisabled),
+            (0x043F, DriveState::Fault),
+            (0x0008, DriveState::Fault),
         ];
         for (word, state) in seen {
             assert_eq!(Dialect::YzAim.state(word), state, "{word:#06x}");
@@ -77,16 +77,16 @@ mod tests {
 
     #[test]
     fn a_yz_aim_is_led_up_by_06_07_0f_and_again_if_it_does_not_follow() {
-        let next = |last| Dialect::YzAim.controlword(State::SwitchOnDisabled, Goal::Enabled, last);
+        let next = |last| Dialect::YzAim.controlword(DriveState::SwitchOnDisabled, Goal::Enabled, last);
         assert_eq!([0, 0x06, 0x07, 0x0F].map(next), [0x06, 0x07, 0x0F, 0x06]);
-        assert_eq!(Dialect::YzAim.controlword(State::OperationEnabled, Goal::Enabled, 0x0F), 0x0F);
-        assert_eq!(Dialect::YzAim.controlword(State::OperationEnabled, Goal::Disabled, 0x0F), 0x06);
-        assert_eq!(Dialect::YzAim.controlword(State::OperationEnabled, Goal::NoVoltage, 0x0F), 0x00);
+        assert_eq!(Dialect::YzAim.controlword(DriveState::OperationEnabled, Goal::Enabled, 0x0F), 0x0F);
+        assert_eq!(Dialect::YzAim.controlword(DriveState::OperationEnabled, Goal::Disabled, 0x0F), 0x06);
+        assert_eq!(Dialect::YzAim.controlword(DriveState::OperationEnabled, Goal::NoVoltage, 0x0F), 0x00);
     }
 
     #[test]
     fn the_standard_is_followed_where_a_drive_follows_it() {
-        for state in State::ALL {
+        for state in DriveState::ALL {
             let word = Dialect::Cia402.controlword(state, Goal::Enabled, 0);
             assert_eq!(word, state.controlword_towards(Goal::Enabled));
         }

@@ -21,28 +21,69 @@
 #![no_std]
 #![deny(unsafe_code)]
 
-pub mod axis;
-pub mod cia402;
-pub mod control;
-pub mod cycle;
-pub mod dialect;
-pub mod dispatch;
-pub mod door;
-pub mod engine;
-pub mod frame;
-pub mod guard;
+mod answers;
+mod axis;
+mod bus_set;
+mod cia402;
+mod control;
+mod cycle;
+mod dialect;
+mod dispatch;
+mod engine;
+mod fault;
+mod frame;
+mod group_trajectory;
+mod guard;
+mod host;
 #[cfg(feature = "linux")]
 pub mod linux;
-mod motion;
-pub mod pdo;
+mod motion_reports;
+mod pdo;
+mod phase;
 pub mod plan;
-pub mod port;
-pub mod profile;
-pub mod record;
-pub mod refusal;
-pub mod stop;
-pub mod time;
-pub mod time_of_day;
-pub mod units;
-pub mod watch;
-pub mod wire;
+mod port;
+mod profile;
+mod record;
+mod request;
+mod stop;
+mod stop_category;
+mod time;
+mod time_of_day;
+mod units;
+mod watch;
+mod wire;
+
+pub use answers::{Answer, Answers};
+pub use axis::{Axis, AxisParameters, CommandPdo, FeedbackSince, Jump, MAX_PDOS, Pdo, TransmissionType};
+pub use bus_set::BusSet;
+pub use cia402::{Command, DriveState, Goal, OperationMode, controlword, statusword};
+pub use control::{ControlLaw, LoopInput};
+pub use cycle::{Cycle, Flow, SlotPlan};
+pub use dialect::Dialect;
+pub use engine::{
+    BusParameters, CycleCount, CycleInput, Deadline, Engine, EngineParameters, Heartbeat, Receiver,
+    SEND_BATCH, SendBatch, SetUpError,
+};
+pub use fault::{Fault, Rule};
+pub use frame::{Frame, FrameError, FrameKind, Id};
+pub use guard::{AxisLimits, OnViolation, Violation, braking_distance};
+pub use host::{AxisSnapshot, HostInterface, Snapshot, StreamCommand};
+pub use motion_reports::{MotionReport, MotionReports, MotionState};
+pub use pdo::{
+    CommandSlot, FeedbackSlot, MAX_OBJECTS, MappedObject, Mapping, MappingError, ProcessImage, TooShort,
+};
+pub use phase::Phase;
+pub use port::{BusHealth, BusPort, BusState, Clock, Outgoing, RECEIVE_BATCH, ReceiveBatch, Received, Wake};
+pub use profile::ProfileTarget;
+pub use record::{AxisRecord, CycleRecord, CycleTiming, Event, EventKind, MAX_AXES, MAX_BUSES};
+pub use request::{
+    AxisProcessData, MappedPdo, Move, ProfileMove, RejectReason, Request, RequestEnvelope, RequestError,
+    RequestId, RequestKind,
+};
+pub use stop::{Origin, StopCategories, StopCause, StopReason};
+pub use stop_category::StopCategory;
+pub use time::{Grid, NANOSECONDS_PER_SECOND, Nanoseconds};
+pub use time_of_day::{TIME_ID, TimeOfDay};
+pub use units::{Scale, ScaleError, ScaleParameters};
+pub use watch::{TimingLadder, TimingLevel, nmt_command, node_state};
+pub use wire::{INTERMISSION_BITS, WireLength, bits_ns};

@@ -1,8 +1,9 @@
 //! What one cycle leaves behind: a record of fixed size, copied to the logger through a lock-free ring.
 
 use crate::cia402;
-use crate::refusal::Refusal;
-use crate::stop::{Phase, StopReason};
+use crate::phase::Phase;
+use crate::request::{RequestError, RequestId};
+use crate::stop::StopReason;
 use crate::time::Nanoseconds;
 use crate::watch::TimingLevel;
 
@@ -13,7 +14,7 @@ pub const MAX_BUSES: usize = 16;
 
 /// The times of one cycle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Timing {
+pub struct CycleTiming {
     /// The number of the slot on the grid.
     pub slot: u64,
     /// Its start on the grid.
@@ -53,7 +54,7 @@ pub struct AxisRecord {
     /// Distance between the set-point that was in force at this cycle's SYNC and the position reported for it.
     pub following_error: f32,
     /// What the statusword says of the drive.
-    pub drive_state: cia402::State,
+    pub drive_state: cia402::DriveState,
     /// Object 6040 as sent.
     pub controlword: u16,
     /// Object 6041 as received.
@@ -70,9 +71,9 @@ pub struct AxisRecord {
 
 /// One cycle.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct CycleRecord {
+pub struct CycleRecord<const AXES: usize = MAX_AXES> {
     /// When.
-    pub timing: Timing,
+    pub timing: CycleTiming,
     /// What the group was doing.
     pub phase: Phase,
     /// Whether set-points were sent in this cycle; if not, the drives hold the last ones.
@@ -80,22 +81,22 @@ pub struct CycleRecord {
     /// How many of `axes` count.
     pub axis_count: u8,
     /// The axes in the order of the configuration.
-    pub axes: [AxisRecord; MAX_AXES],
+    pub axes: [AxisRecord; AXES],
 }
 
-impl Default for CycleRecord {
+impl<const AXES: usize> Default for CycleRecord<AXES> {
     fn default() -> Self {
         Self {
-            timing: Timing::default(),
+            timing: CycleTiming::default(),
             phase: Phase::default(),
             is_commanded: false,
             axis_count: 0,
-            axes: [AxisRecord::default(); MAX_AXES],
+            axes: [AxisRecord::default(); AXES],
         }
     }
 }
 
-impl CycleRecord {
+impl<const AXES: usize> CycleRecord<AXES> {
     /// The axes that count.
     pub fn axes(&self) -> &[AxisRecord] {
         self.axes.get(..self.axis_count.into()).unwrap_or(&self.axes)
@@ -125,17 +126,17 @@ pub enum EventKind {
     },
     /// A stop began; one for each stop, and a second one when a fault comes up on the way of a stop that was asked for.
     Stop(StopReason),
-    /// A move was finished.
-    MoveFinished {
-        /// The number that the move was given.
-        id: u32,
+    /// A motion has reached its target.
+    MotionFinished {
+        /// The request that began it.
+        request: RequestId,
     },
     /// A drive's state changed.
     DriveState {
         /// The axis.
         axis: u8,
         /// The new one.
-        state: cia402::State,
+        state: cia402::DriveState,
         /// The statusword that showed it.
         statusword: u16,
     },
@@ -160,6 +161,6 @@ pub enum EventKind {
         /// The level from now on.
         level: TimingLevel,
     },
-    /// A request was refused and changed nothing.
-    Refused(Refusal),
+    /// A request was rejected and changed nothing.
+    Rejected(RequestError),
 }

@@ -105,32 +105,54 @@ pub mod nmt_command {
     pub const RESET_COMMUNICATION: u8 = 0x82;
 }
 
-/// What a node takes of all that it is sent, by what it has said of itself and what it has been told by others.
+/// The NMT state that a node is believed to be in, by its heartbeats and by the NMT commands of other masters. It tells which
+/// services reach the node.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Hearing {
-    /// Process data and SDO.
+pub enum NmtState {
+    /// The node takes process data and SDO.
     #[default]
-    ProcessData,
-    /// SDO only.
-    Service,
-    /// SDO only, and it has forgotten what its process data mean and whom it watches: no start gives them back.
-    ServiceAfterReset,
-    /// Nothing but NMT.
-    Nmt,
+    Operational,
+    /// The node takes SDO, but no process data.
+    PreOperational,
+    /// As [`NmtState::PreOperational`]. The node has also lost its PDO mappings and its heartbeat consumer, so that an NMT start
+    /// alone does not bring process data back.
+    PreOperationalAfterReset,
+    /// The node takes NMT commands only.
+    Stopped,
 }
 
-/// What the error control messages of a drive tell while it is to work.
+/// Cycles of its bus without feedback after which a node whose NMT state is not operational counts as unreachable. Its node
+/// ID in an NMT command, or its heartbeat, may have been another node's.
+const UNREACHABLE_CYCLES: u16 = 2;
+
+/// The worst that a node's own error control messages have shown since it is watched.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct NodeWatch {
+enum ErrorControl {
+    /// The node is operational, or has said nothing.
+    #[default]
+    Operational,
+    /// The node is in another state than operational.
+    NotOperational {
+        /// Which.
+        state: u8,
+    },
+    /// The node has started anew. That remains so.
+    BootedUp,
+}
+
+/// What is known of a node by its error control messages and by the NMT commands of other masters.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct NodeMonitor {
     silent_cycles: u32,
-    has_booted: bool,
-    left_operational: Option<u8>,
-    hearing: Hearing,
+    error_control: ErrorControl,
+    nmt_state: NmtState,
+    /// Whether the node has taken no process data at some time since it is watched.
+    is_pdo_unreachable: bool,
 }
 
 /// What is wrong with a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum NodeComplaint {
+pub enum NodeFault {
     /// It has started anew.
     BootUp,
     /// It is in another state than operational.
@@ -145,52 +167,71 @@ pub enum NodeComplaint {
     },
 }
 
-impl NodeWatch {
+impl NodeMonitor {
     /// Takes the state in an error control message.
     pub fn receive(&mut self, state: u8) {
         self.silent_cycles = 0;
         // Bit 7 toggles in answers to node guarding.
-        match (state, state & 0x7F) {
+        let shown = match (state, state & 0x7F) {
             (node_state::BOOT_UP, _) => {
-                self.has_booted = true;
-                self.hearing = Hearing::ServiceAfterReset;
+                self.nmt_state = NmtState::PreOperationalAfterReset;
+                ErrorControl::BootedUp
             }
             (_, node_state::OPERATIONAL) => {
-                self.left_operational = None;
-                self.is_started();
+                self.note_start();
+                ErrorControl::Operational
             }
             (_, state) => {
-                self.left_operational = Some(state);
-                if state == node_state::PRE_OPERATIONAL && self.hearing != Hearing::ServiceAfterReset {
-                    self.hearing = Hearing::Service;
+                if state == node_state::PRE_OPERATIONAL {
+                    self.note_pre_operational();
                 }
+                ErrorControl::NotOperational { state }
             }
+        };
+        if self.error_control != ErrorControl::BootedUp {
+            self.error_control = shown;
         }
     }
 
-    /// Takes a command that another master has given to the node.
-    pub fn commanded(&mut self, command: u8) {
+    /// Takes an NMT command that another master has given to the node.
+    pub fn receive_foreign_nmt(&mut self, command: u8) {
         match command {
-            nmt_command::START => self.is_started(),
-            nmt_command::STOP => self.hearing = Hearing::Nmt,
-            nmt_command::ENTER_PRE_OPERATIONAL if self.hearing == Hearing::ServiceAfterReset => {}
-            nmt_command::ENTER_PRE_OPERATIONAL => self.hearing = Hearing::Service,
+            nmt_command::START => self.note_start(),
+            nmt_command::STOP => self.nmt_state = NmtState::Stopped,
+            nmt_command::ENTER_PRE_OPERATIONAL => self.note_pre_operational(),
             nmt_command::RESET_NODE | nmt_command::RESET_COMMUNICATION => {
-                self.hearing = Hearing::ServiceAfterReset;
+                self.nmt_state = NmtState::PreOperationalAfterReset;
             }
             _ => {}
         }
     }
 
-    fn is_started(&mut self) {
-        if self.hearing != Hearing::ServiceAfterReset {
-            self.hearing = Hearing::ProcessData;
+    fn note_start(&mut self) {
+        if self.nmt_state != NmtState::PreOperationalAfterReset {
+            self.nmt_state = NmtState::Operational;
         }
     }
 
-    /// What the node takes of what it is sent.
-    pub const fn hearing(&self) -> Hearing {
-        self.hearing
+    fn note_pre_operational(&mut self) {
+        if self.nmt_state != NmtState::PreOperationalAfterReset {
+            self.nmt_state = NmtState::PreOperational;
+        }
+    }
+
+    /// The NMT state that the node is believed to be in.
+    pub const fn nmt_state(&self) -> NmtState {
+        self.nmt_state
+    }
+
+    /// Updates whether process data reach the node, whose feedback is so many cycles of its bus old.
+    pub fn note_pdo_reachability(&mut self, feedback_age_cycles: u16) {
+        self.is_pdo_unreachable |=
+            self.nmt_state != NmtState::Operational && feedback_age_cycles >= UNREACHABLE_CYCLES;
+    }
+
+    /// Whether the node takes no process data any more. That remains so until the node is watched anew.
+    pub const fn is_pdo_unreachable(&self) -> bool {
+        self.is_pdo_unreachable
     }
 
     /// Lets a cycle pass.
@@ -199,15 +240,15 @@ impl NodeWatch {
     }
 
     /// What is wrong, with the longest silence that is allowed; `None` where no heartbeat is expected.
-    pub fn complaint(&self, timeout_cycles: Option<u32>) -> Option<NodeComplaint> {
-        if self.has_booted {
-            return Some(NodeComplaint::BootUp);
+    pub fn fault(&self, timeout_cycles: Option<u32>) -> Option<NodeFault> {
+        match self.error_control {
+            ErrorControl::BootedUp => Some(NodeFault::BootUp),
+            ErrorControl::NotOperational { state } => Some(NodeFault::NotOperational { state }),
+            ErrorControl::Operational => {
+                let cycles = self.silent_cycles;
+                timeout_cycles.filter(|timeout| cycles > *timeout).map(|_| NodeFault::Silent { cycles })
+            }
         }
-        if let Some(state) = self.left_operational {
-            return Some(NodeComplaint::NotOperational { state });
-        }
-        let cycles = self.silent_cycles;
-        timeout_cycles.filter(|timeout| cycles > *timeout).map(|_| NodeComplaint::Silent { cycles })
     }
 
     /// Forgets what was: the node is about to be watched.
@@ -216,19 +257,19 @@ impl NodeWatch {
     }
 }
 
-/// Two nodes with one number answer the same SYNC twice. Feedback that comes late makes two in one cycle as well, so
-/// only a run of them counts.
+/// Two nodes with one node ID answer the same SYNC twice. Late feedback makes two in one cycle as well, so only a run of them
+/// counts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct DuplicateWatch {
+pub struct DuplicateNodeDetector {
     filled: u16,
 }
 
 const DUPLICATE_LIMIT: u16 = 12;
 const DUPLICATE_STEP: u16 = 3;
 
-impl DuplicateWatch {
-    /// Feedback came that was there already in this cycle.
-    pub fn again(&mut self) {
+impl DuplicateNodeDetector {
+    /// A feedback PDO has arrived for the second time in a cycle.
+    pub fn note_repetition(&mut self) {
         self.filled = self.filled.saturating_add(DUPLICATE_STEP);
     }
 
@@ -238,7 +279,7 @@ impl DuplicateWatch {
     }
 
     /// Whether it has gone on for too long to be lateness.
-    pub const fn is_duplicate(&self) -> bool {
+    pub const fn is_found(&self) -> bool {
         self.filled >= DUPLICATE_LIMIT
     }
 }
@@ -280,41 +321,41 @@ mod tests {
 
     #[test]
     fn a_node_that_boots_leaves_operational_or_falls_silent_is_noticed() {
-        let mut watch = NodeWatch::default();
+        let mut watch = NodeMonitor::default();
         watch.receive(node_state::OPERATIONAL);
-        assert_eq!(watch.complaint(Some(3)), None);
+        assert_eq!(watch.fault(Some(3)), None);
         (0..4).for_each(|_| watch.pass());
-        assert_eq!(watch.complaint(None), None);
-        assert_eq!(watch.complaint(Some(3)), Some(NodeComplaint::Silent { cycles: 4 }));
+        assert_eq!(watch.fault(None), None);
+        assert_eq!(watch.fault(Some(3)), Some(NodeFault::Silent { cycles: 4 }));
         watch.receive(0x7F);
-        assert_eq!(watch.complaint(Some(3)), Some(NodeComplaint::NotOperational { state: 0x7F }));
+        assert_eq!(watch.fault(Some(3)), Some(NodeFault::NotOperational { state: 0x7F }));
         watch.receive(0x80 | node_state::OPERATIONAL);
-        assert_eq!(watch.complaint(Some(3)), None);
+        assert_eq!(watch.fault(Some(3)), None);
         watch.receive(node_state::BOOT_UP);
-        assert_eq!(watch.complaint(None), Some(NodeComplaint::BootUp));
+        assert_eq!(watch.fault(None), Some(NodeFault::BootUp));
         watch.begin();
-        assert_eq!(watch.complaint(None), None);
+        assert_eq!(watch.fault(None), None);
     }
 
     #[test]
     fn what_a_node_hears_follows_from_what_it_says_and_what_others_tell_it() {
         let heard = |messages: &[Result<u8, u8>]| {
-            let mut watch = NodeWatch::default();
+            let mut watch = NodeMonitor::default();
             for message in messages {
                 match *message {
                     Ok(state) => watch.receive(state),
-                    Err(command) => watch.commanded(command),
+                    Err(command) => watch.receive_foreign_nmt(command),
                 }
             }
-            watch.hearing()
+            watch.nmt_state()
         };
         let (started, pre_operational) =
             (Ok(node_state::OPERATIONAL), Ok(0x80 | node_state::PRE_OPERATIONAL));
-        assert_eq!(heard(&[started]), Hearing::ProcessData);
-        assert_eq!(heard(&[pre_operational]), Hearing::Service);
-        assert_eq!(heard(&[pre_operational, started]), Hearing::ProcessData);
-        assert_eq!(heard(&[Err(nmt_command::STOP)]), Hearing::Nmt);
-        assert_eq!(heard(&[Err(nmt_command::STOP), Err(nmt_command::START)]), Hearing::ProcessData);
+        assert_eq!(heard(&[started]), NmtState::Operational);
+        assert_eq!(heard(&[pre_operational]), NmtState::PreOperational);
+        assert_eq!(heard(&[pre_operational, started]), NmtState::Operational);
+        assert_eq!(heard(&[Err(nmt_command::STOP)]), NmtState::Stopped);
+        assert_eq!(heard(&[Err(nmt_command::STOP), Err(nmt_command::START)]), NmtState::Operational);
         // One that has been reset has forgotten its process data, and a start does not give them back.
         for reset in
             [Ok(node_state::BOOT_UP), Err(nmt_command::RESET_NODE), Err(nmt_command::RESET_COMMUNICATION)]
@@ -322,23 +363,23 @@ mod tests {
             for later in
                 [started, pre_operational, Err(nmt_command::START), Err(nmt_command::ENTER_PRE_OPERATIONAL)]
             {
-                assert_eq!(heard(&[reset, later]), Hearing::ServiceAfterReset);
+                assert_eq!(heard(&[reset, later]), NmtState::PreOperationalAfterReset);
             }
         }
     }
 
     #[test]
     fn feedback_that_comes_twice_in_every_cycle_is_a_second_node_and_twice_at_times_is_not() {
-        let mut watch = DuplicateWatch::default();
+        let mut watch = DuplicateNodeDetector::default();
         for _ in 0..100 {
-            watch.again();
+            watch.note_repetition();
             (0..DUPLICATE_STEP).for_each(|_| watch.pass());
-            assert!(!watch.is_duplicate());
+            assert!(!watch.is_found());
         }
         let needed = (1..100).find(|_| {
-            watch.again();
+            watch.note_repetition();
             watch.pass();
-            watch.is_duplicate()
+            watch.is_found()
         });
         assert!(needed.is_some_and(|cycles| cycles < 10));
     }

@@ -3,10 +3,7 @@
 mod fixture;
 
 use fixture::{LIMITS, PERIOD_NS, Rig, parameters};
-use takt_rt::door::Request;
-use takt_rt::engine::EngineParameters;
-use takt_rt::frame::Id;
-use takt_rt::stop::{Origin, Phase, Rule};
+use takt_rt::{EngineParameters, Id, Origin, Phase, Request, Rule};
 
 /// Three axes on a bus with a cycle in every slot, three on one with a cycle in every second.
 fn two_rates() -> EngineParameters {
@@ -41,7 +38,7 @@ fn one_move_leads_the_axes_of_both_buses_to_their_targets_at_one_time() {
     let mut fastest = [0.0_f64; 6];
     while rig.phase() == Phase::Moving {
         rig.run(1);
-        let shown = rig.door.snapshot.axes;
+        let shown = rig.host.snapshot.axes;
         fastest.iter_mut().zip(shown).for_each(|(fastest, axis)| *fastest = fastest.max(axis.velocity));
     }
     rig.run(4);
@@ -63,7 +60,7 @@ fn from_rest_to_rest_the_axes_stay_on_a_straight_line_whatever_their_limits() {
         axis.limits.jerk = 50.0;
     }
     let mut rig = Rig::of(own).enable();
-    let start: Vec<f64> = rig.door.snapshot.axes[..3].iter().map(|axis| axis.position_set).collect();
+    let start: Vec<f64> = rig.host.snapshot.axes[..3].iter().map(|axis| axis.position_set).collect();
     let mut request = fixture::move_to(0.5);
     let ends = [1.0, -0.4, 0.25];
     request.target[..3].copy_from_slice(&ends);
@@ -71,7 +68,7 @@ fn from_rest_to_rest_the_axes_stay_on_a_straight_line_whatever_their_limits() {
     let mut on_the_way = 0;
     while rig.phase() == Phase::Moving {
         rig.run(1);
-        let set: Vec<f64> = rig.door.snapshot.axes[..3].iter().map(|axis| axis.position_set).collect();
+        let set: Vec<f64> = rig.host.snapshot.axes[..3].iter().map(|axis| axis.position_set).collect();
         let share = (set[0] - start[0]) / (ends[0] - start[0]);
         on_the_way += usize::from(share > 0.01 && share < 0.99);
         for axis in 0..3 {
@@ -91,7 +88,7 @@ fn missed_feedback_is_counted_in_cycles_of_the_own_bus() {
     assert_eq!(rig.stops(), []);
     rig.run(3);
     assert_eq!(
-        rig.stops().iter().map(|stop| (stop.rule, stop.axis())).collect::<Vec<_>>(),
+        rig.stops().iter().map(|stop| (stop.rule(), stop.axis())).collect::<Vec<_>>(),
         [(Rule::MissedFeedback, Some(4))]
     );
 }
@@ -100,7 +97,7 @@ fn missed_feedback_is_counted_in_cycles_of_the_own_bus() {
 fn a_drive_of_which_the_position_is_not_known_is_sent_nothing_until_bring_up_tells_it() {
     let mut rig = Rig::new(2);
     rig.drive(1).is_silent = true;
-    rig.door.requests.extend([Request::Sync(true), Request::Activate]);
+    rig.host.requests.extend([Request::Sync(true), Request::Activate]);
     rig.run(20);
     assert!(!times_of(&rig, 0, Id::canopen(0x200, 1)).is_empty());
     assert!(times_of(&rig, 0, Id::canopen(0x200, 2)).is_empty());
@@ -115,7 +112,7 @@ fn a_drive_of_which_the_position_is_not_known_is_sent_nothing_until_bring_up_tel
         .collect();
     assert!(targets.len() >= 3 && targets.iter().all(|target| *target == 2_345), "{targets:?}");
     rig.request(Request::Position { axis: 2, counts: 0 });
-    assert_eq!(rig.door.snapshot.refused, 1, "there is no such axis");
+    assert_eq!(rig.host.snapshot.rejected, 1, "there is no such axis");
 }
 
 #[test]
@@ -164,5 +161,5 @@ fn two_buses_that_are_behind_one_after_the_other_are_no_bus_that_does_not_transm
     rig.buses[1].unconfirmed = 1;
     rig.run(5);
     let stops = rig.stops();
-    assert_eq!((stops.len(), stops[0].rule, stops[0].origin), (1, Rule::NotTransmitted, Origin::Bus(0)));
+    assert_eq!((stops.len(), stops[0].rule(), stops[0].origin), (1, Rule::NotTransmitted, Origin::Bus(0)));
 }

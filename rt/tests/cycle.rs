@@ -4,10 +4,7 @@ mod fixture;
 
 use fixture::{PERIOD_NS, Rig};
 use proptest::prelude::*;
-use takt_rt::door::Request;
-use takt_rt::frame::{Frame, Id};
-use takt_rt::record::EventKind;
-use takt_rt::stop::Phase;
+use takt_rt::{EventKind, Frame, Id, Phase, Request};
 
 const EPOCH_NS: u64 = 5 * PERIOD_NS;
 const COMMAND_PHASE_NS: u64 = 550_000;
@@ -35,22 +32,22 @@ fn sync_leaves_at_the_start_of_every_slot_and_set_points_in_the_command_phase() 
 #[test]
 fn a_late_thread_skips_slots_counts_them_and_stays_on_the_grid() {
     let mut rig = Rig::enabled(3);
-    let before = rig.door.snapshot.slot;
+    let before = rig.host.snapshot.slot;
     rig.clock.lateness_ns.push_back(30_400_000);
     rig.run(1);
     // Woken 30.4 periods late: slots 1 to 31 after `before` are lost, the next that can be met is the 32nd.
-    assert_eq!(rig.door.snapshot.slot, before + 32);
-    assert_eq!(rig.door.snapshot.missed_slots, 31);
-    let timing = rig.door.records.last().unwrap().timing;
+    assert_eq!(rig.host.snapshot.slot, before + 32);
+    assert_eq!(rig.host.snapshot.missed_slots, 31);
+    let timing = rig.host.records.last().unwrap().timing;
     assert_eq!((timing.missed_slots, timing.wake_ns), (31, 30_400_000));
     rig.run(10);
-    assert_eq!(rig.door.snapshot.missed_slots, 31);
+    assert_eq!(rig.host.snapshot.missed_slots, 31);
     let syncs = syncs(&rig);
     assert!(syncs.iter().all(|at| (at - EPOCH_NS).is_multiple_of(PERIOD_NS)));
     let gaps: Vec<u64> =
         syncs.windows(2).map(|pair| pair[1] - pair[0]).filter(|gap| *gap != PERIOD_NS).collect();
     assert_eq!(gaps, [32 * PERIOD_NS], "one gap, and never two in the place of one");
-    assert!(rig.door.events.iter().any(|event| event.kind == EventKind::MissedSlots { count: 31 }));
+    assert!(rig.host.events.iter().any(|event| event.kind == EventKind::MissedSlots { count: 31 }));
 }
 
 #[test]
@@ -58,7 +55,7 @@ fn a_sync_that_is_only_a_little_late_is_sent_and_its_error_recorded() {
     let mut rig = Rig::enabled(3);
     rig.clock.lateness_ns.push_back(60_000);
     rig.run(1);
-    let timing = rig.door.records.last().unwrap().timing;
+    let timing = rig.host.records.last().unwrap().timing;
     assert_eq!((timing.sync_ns, timing.wake_ns, timing.missed_slots), (60_000, 60_000, 0));
 }
 
@@ -73,7 +70,7 @@ fn set_points_that_would_run_into_the_next_sync_are_not_sent_and_nothing_jumps()
     rig.run(1);
     let sent: Vec<Frame> = rig.buses[0].sent[sent_before..].iter().map(|(_, frame)| *frame).collect();
     assert!(sent.iter().all(|frame| frame.id().value() & 0x780 != 0x200), "{sent:?}");
-    assert_eq!(rig.door.records.last().unwrap().timing.missed_slots, 1);
+    assert_eq!(rig.host.records.last().unwrap().timing.missed_slots, 1);
     rig.run_until(Phase::Holding, 5_000);
     rig.assert_limits_kept();
     assert_eq!(rig.stops(), []);
@@ -88,7 +85,7 @@ fn after_a_stall_in_motion_the_set_points_go_on_by_one_period() {
     rig.run_until(Phase::Holding, 5_000);
     rig.assert_limits_kept();
     assert_eq!(rig.stops(), []);
-    assert_eq!(rig.door.snapshot.finished_move, 7);
+    assert_eq!(rig.finished_motions(), 1);
 }
 
 #[test]
@@ -115,12 +112,12 @@ fn the_heartbeat_leaves_once_in_its_period_behind_the_set_points() {
 fn service_frames_are_sent_up_to_the_budget_behind_the_set_points() {
     let mut rig = Rig::new(3);
     let request = Frame::of(Id::canopen(0x600, 1), [0x40, 0, 0x10, 0, 0, 0, 0, 0]);
-    rig.door.services.extend([request; 20]);
+    rig.host.services.extend([request; 20]);
     rig.run(1);
-    assert_eq!(rig.door.services.len(), 12, "eight while the axes are passive");
-    rig.door.requests.push_back(Request::Activate);
+    assert_eq!(rig.host.services.len(), 12, "eight while the axes are passive");
+    rig.host.requests.push_back(Request::Activate);
     rig.run(1);
-    assert_eq!(rig.door.services.len(), 10, "two while set-points are sent");
+    assert_eq!(rig.host.services.len(), 10, "two while set-points are sent");
 }
 
 #[test]
@@ -129,16 +126,16 @@ fn frames_that_are_no_process_data_go_through_the_door() {
     let answer = Frame::of(Id::canopen(0x580, 1), [0x60, 0x17, 0x10, 0, 0, 0, 0, 0]);
     rig.buses[0].inject(answer);
     rig.run(1);
-    assert_eq!(rig.door.received, [answer]);
+    assert_eq!(rig.host.received, [answer]);
 }
 
 #[test]
 fn a_full_ring_is_counted_and_waits_for_nobody() {
     let mut rig = Rig::enabled(3);
-    rig.door.is_full = true;
-    let before = rig.door.snapshot.dropped;
+    rig.host.is_full = true;
+    let before = rig.host.snapshot.dropped;
     rig.run(10);
-    assert_eq!(rig.door.snapshot.dropped, before + 10);
+    assert_eq!(rig.host.snapshot.dropped, before + 10);
 }
 
 proptest! {
@@ -149,14 +146,14 @@ proptest! {
         stalls in prop::collection::vec(prop_oneof![4 => Just(0u64), 1 => 0u64..5_000_000], 1..200),
     ) {
         let mut rig = Rig::enabled(1);
-        let first = rig.door.snapshot.slot;
-        let records_before = rig.door.records.len();
-        let missed_before = rig.door.snapshot.missed_slots;
+        let first = rig.host.snapshot.slot;
+        let records_before = rig.host.records.len();
+        let missed_before = rig.host.snapshot.missed_slots;
         rig.clock.lateness_ns.extend(stalls);
         rig.run(100);
-        let late_commands = rig.door.records[records_before..].iter().map(|record| record.timing.missed_slots).sum::<u64>();
-        prop_assert_eq!(rig.door.snapshot.missed_slots - missed_before, late_commands);
-        let slots: Vec<u64> = rig.door.records[records_before..].iter().map(|record| record.timing.slot).collect();
+        let late_commands = rig.host.records[records_before..].iter().map(|record| record.timing.missed_slots).sum::<u64>();
+        prop_assert_eq!(rig.host.snapshot.missed_slots - missed_before, late_commands);
+        let slots: Vec<u64> = rig.host.records[records_before..].iter().map(|record| record.timing.slot).collect();
         prop_assert!(slots.windows(2).all(|pair| pair[0] < pair[1]));
         let skipped = slots[slots.len() - 1] - first - slots.len() as u64;
         prop_assert!(late_commands >= skipped);

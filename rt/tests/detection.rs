@@ -4,15 +4,10 @@
 mod fixture;
 
 use fixture::{PERIOD_NS, Rig, parameters};
-use takt_rt::door::Request;
-use takt_rt::frame::{Frame, Id};
-use takt_rt::guard::OnViolation;
-use takt_rt::pdo::{MappedObject, Mapping};
-use takt_rt::port::BusState;
-use takt_rt::record::EventKind;
-use takt_rt::refusal::Objection;
-use takt_rt::stop::{Origin, Phase, Rule, StopCategory};
-use takt_rt::watch::TimingLevel;
+use takt_rt::{
+    BusState, EventKind, Frame, Id, MappedObject, Mapping, OnViolation, Origin, Phase, RejectReason, Request,
+    Rule, StopCategory, TimingLevel,
+};
 
 fn moving() -> Rig {
     let mut rig = Rig::enabled(3);
@@ -26,7 +21,7 @@ fn moving() -> Rig {
 fn reason(rig: &Rig) -> (Rule, Origin, f64) {
     let stops = rig.stops();
     assert_eq!(stops.len(), 1, "{stops:?}");
-    (stops[0].rule, stops[0].origin, stops[0].value)
+    (stops[0].rule(), stops[0].origin, stops[0].cause.numbers().0)
 }
 
 #[test]
@@ -46,7 +41,7 @@ fn a_drive_that_has_not_reported_yet_is_silent_and_in_no_other_mode() {
     parameters.axes[0].feedback[0].mapping = Mapping::feedback(&feedback).unwrap();
     let mut rig = Rig::of(parameters);
     rig.drive(0).is_silent = true;
-    rig.door.requests.extend([Request::Sync(true), Request::Activate, Request::Enable]);
+    rig.host.requests.extend([Request::Sync(true), Request::Activate, Request::Enable]);
     rig.run(10);
     assert_eq!(reason(&rig), (Rule::MissedFeedback, Origin::Axis(0), 4.0));
 }
@@ -142,19 +137,21 @@ fn slots_missed_too_often_are_told_then_keep_streams_away_and_then_stop_the_grou
         }
     };
     stall(&mut rig, 12);
-    assert_eq!(rig.door.snapshot.timing, TimingLevel::Warning);
+    assert_eq!(rig.host.snapshot.timing, TimingLevel::Warning);
     stall(&mut rig, 45);
-    assert_eq!(rig.door.snapshot.timing, TimingLevel::Degraded);
-    let refused = rig.door.snapshot.refused;
+    assert_eq!(rig.host.snapshot.timing, TimingLevel::Degraded);
+    let refused = rig.host.snapshot.rejected;
     rig.request(Request::Stream);
     rig.run(1);
-    assert_eq!((rig.door.snapshot.refused, rig.phase()), (refused + 1, Phase::Holding));
-    let refusal = rig.refusals().pop().unwrap();
-    assert_eq!((refusal.objection, refusal.limit), (Objection::MissedSlots, 50.0));
-    assert!(refusal.value >= 50.0, "{refusal:?}");
+    assert_eq!((rig.host.snapshot.rejected, rig.phase()), (refused + 1, Phase::Holding));
+    let rejection = rig.rejections().pop().unwrap();
+    assert!(
+        matches!(rejection.reason, RejectReason::MissedSlots { missed: 50.., limit: 50 }),
+        "{rejection:?}"
+    );
     stall(&mut rig, 300);
     assert_eq!(reason(&rig).0, Rule::TimingUnfit);
-    let levels: Vec<TimingLevel> = (rig.door.events.iter())
+    let levels: Vec<TimingLevel> = (rig.host.events.iter())
         .filter_map(|event| match event.kind {
             EventKind::Timing { level } => Some(level),
             _ => None,
@@ -196,8 +193,8 @@ fn a_stream_that_asks_for_too_much_is_followed_as_far_as_the_limits_go_where_it_
         rig.run(1);
     }
     assert!(rig.stops().is_empty());
-    assert!(rig.door.snapshot.clamped > 3_000);
-    let reached = rig.door.snapshot.axes[0].position_set;
+    assert!(rig.host.snapshot.clamped > 3_000);
+    let reached = rig.host.snapshot.axes[0].position_set;
     assert!((2.9..=3.0).contains(&reached), "{reached}");
     rig.assert_limits_kept();
 }
@@ -218,7 +215,7 @@ fn a_stream_that_could_not_stop_before_its_limit_any_more_is_stopped_in_time() {
     }
     assert_eq!(reason(&rig).0, Rule::PositionLimit);
     assert_eq!(rig.phase(), Phase::Holding);
-    let rest = rig.door.snapshot.axes[0].position_set;
+    let rest = rig.host.snapshot.axes[0].position_set;
     assert!(rest <= 3.0 + 1e-6 && rest > 2.9, "{rest}");
     rig.assert_limits_kept();
 }

@@ -4,19 +4,14 @@ mod fixture;
 
 use fixture::{PERIOD_NS, Rig, jerk_limited, move_to, parameters, scale};
 use proptest::prelude::*;
-use takt_rt::axis::AxisParameters;
-use takt_rt::cia402::State as DriveState;
-use takt_rt::door::{Move, ProfileMove, Request, RequestId};
-use takt_rt::engine::{Engine, SetUpError};
-use takt_rt::frame::{Frame, Id};
-use takt_rt::port::BusState;
-use takt_rt::profile::ProfileTarget;
-use takt_rt::record::{EventKind, MAX_AXES};
-use takt_rt::refusal::{Answer, Objection};
-use takt_rt::stop::{Origin, Phase, Rule, StopCategory};
+use takt_rt::{
+    Answer, AxisParameters, BusState, DriveState, Engine, EventKind, Frame, Id, MAX_AXES, Move,
+    OperationMode, Origin, Phase, ProfileMove, ProfileTarget, RejectReason, Request, RequestId, Rule,
+    SetUpError, StopCategory,
+};
 
 fn rules(rig: &Rig) -> Vec<Rule> {
-    rig.stops().iter().map(|stop| stop.rule).collect()
+    rig.stops().iter().map(|stop| stop.rule()).collect()
 }
 
 #[test]
@@ -30,7 +25,7 @@ fn a_passive_group_sends_no_set_points() {
 fn enabling_does_not_move_an_axis_by_a_single_count() {
     let mut rig = Rig::new(6);
     let before: Vec<i32> = (0..6).map(|axis| rig.drive(axis).position).collect();
-    rig.door.requests.extend([Request::Sync(true), Request::Activate]);
+    rig.host.requests.extend([Request::Sync(true), Request::Activate]);
     rig.run(5);
     rig.request(Request::Enable);
     rig.run_until(Phase::Holding, 50);
@@ -46,7 +41,7 @@ fn a_move_arrives_on_the_count_and_says_so() {
     assert_eq!(rig.phase(), Phase::Moving);
     rig.run_until(Phase::Holding, 5_000);
     rig.run(3);
-    assert_eq!(rig.door.snapshot.finished_move, 7);
+    assert_eq!(rig.finished_motions(), 1);
     for axis in 0..6 {
         assert_eq!(rig.drive(axis).position, scale().position_to_counts(1.25));
     }
@@ -73,7 +68,6 @@ fn a_limit_that_is_lowered_in_motion_is_approached_without_undershoot_or_reversa
     let mut rig = Rig::of(jerk_limited(1, 20.0)).enable();
     let at_scale = |velocity_scale| {
         Request::Move(Move {
-            id: 3,
             target: [2.9; MAX_AXES],
             target_velocity: [0.0; MAX_AXES],
             velocity_scale,
@@ -85,11 +79,11 @@ fn a_limit_that_is_lowered_in_motion_is_approached_without_undershoot_or_reversa
     rig.run_until(Phase::Holding, 10_000);
     rig.request(at_scale(1.0));
     rig.run(1_000);
-    let begun = rig.door.records.len();
+    let begun = rig.host.records.len();
     rig.request(at_scale(0.25));
     rig.run(1_500);
     let velocities: Vec<f64> =
-        rig.door.records[begun..].iter().map(|cycle| cycle.axes[0].velocity_set.into()).collect();
+        rig.host.records[begun..].iter().map(|cycle| cycle.axes[0].velocity_set.into()).collect();
     assert!(velocities[0] > 1.9);
     assert!(
         velocities.iter().all(|velocity| *velocity > 0.5 - 1e-6),
@@ -111,7 +105,6 @@ fn moving(request: Request) -> Move {
 fn what_cannot_be_done_is_refused_and_changes_nothing() {
     let mut rig = Rig::enabled(3);
     let good = Move {
-        id: 9,
         target: [0.5; MAX_AXES],
         target_velocity: [0.0; MAX_AXES],
         velocity_scale: 1.0,
@@ -126,47 +119,58 @@ fn what_cannot_be_done_is_refused_and_changes_nothing() {
     third.target[2] = -3.2;
     // What is asked for; what stands against it, at which axis, with which value and limit.
     let refused = [
-        (at_speed(3.1, 0.0), Objection::PositionLimit, Some(0), 3.1, 3.0),
-        (moved(third), Objection::PositionLimit, Some(2), -3.2, -3.0),
-        (at_speed(f64::INFINITY, 0.0), Objection::NotFinite, Some(0), f64::INFINITY, 0.0),
-        (at_speed(0.5, -2.5), Objection::VelocityLimit, Some(0), -2.5, -2.0),
-        (at_speed(0.5, f64::NEG_INFINITY), Objection::NotFinite, Some(0), f64::NEG_INFINITY, 0.0),
+        (at_speed(3.1, 0.0), RejectReason::PositionLimit { position: 3.1, limit: 3.0 }, Some(0)),
+        (moved(third), RejectReason::PositionLimit { position: -3.2, limit: -3.0 }, Some(2)),
+        (at_speed(f64::INFINITY, 0.0), RejectReason::NotFinite { value: f64::INFINITY }, Some(0)),
+        (at_speed(0.5, -2.5), RejectReason::VelocityLimit { velocity: -2.5, limit: -2.0 }, Some(0)),
+        (at_speed(0.5, f64::NEG_INFINITY), RejectReason::NotFinite { value: f64::NEG_INFINITY }, Some(0)),
         // A stop from there ends at ±3.05 rad, one cycle later.
-        (at_speed(2.85, 2.0), Objection::NoRoomToStop, Some(0), 3.052, 3.0),
-        (at_speed(-2.85, -2.0), Objection::NoRoomToStop, Some(0), -3.052, -3.0),
-        (moved(Move { velocity_scale: 0.0, ..good }), Objection::VelocityScale, None, 0.0, 1.0),
-        (moved(Move { velocity_scale: 1.5, ..good }), Objection::VelocityScale, None, 1.5, 1.0),
-        (moved(Move { acceleration_scale: -1.0, ..good }), Objection::AccelerationScale, None, -1.0, 1.0),
+        (at_speed(2.85, 2.0), RejectReason::NoRoomToStop { rest: 3.052, limit: 3.0 }, Some(0)),
+        (at_speed(-2.85, -2.0), RejectReason::NoRoomToStop { rest: -3.052, limit: -3.0 }, Some(0)),
+        (moved(Move { velocity_scale: 0.0, ..good }), RejectReason::VelocityScale { scale: 0.0 }, None),
+        (moved(Move { velocity_scale: 1.5, ..good }), RejectReason::VelocityScale { scale: 1.5 }, None),
+        (
+            moved(Move { acceleration_scale: -1.0, ..good }),
+            RejectReason::AccelerationScale { scale: -1.0 },
+            None,
+        ),
         (
             moved(Move { minimum_duration_s: f64::INFINITY, ..good }),
-            Objection::MinimumDuration,
+            RejectReason::MinimumDuration { duration_s: f64::INFINITY },
             None,
-            f64::INFINITY,
-            0.0,
         ),
-        (moved(Move { minimum_duration_s: -1.0, ..good }), Objection::MinimumDuration, None, -1.0, 0.0),
-        (at_speed_of_half(good), Objection::NoTrajectory, Some(0), 0.0, 0.0),
-        (profile(0, ProfileTarget::Velocity(0.1)), Objection::WrongMode, Some(0), 8.0, 0.0),
-        (profile(9, ProfileTarget::Velocity(0.1)), Objection::UnknownAxis, None, 9.0, 3.0),
-        (Request::Enable, Objection::Phase, None, 0.0, 0.0),
-        (Request::Activate, Objection::Phase, None, 0.0, 0.0),
-        (Request::RatedTorque { axis: 1, torque: 50.0 }, Objection::Phase, None, 0.0, 0.0),
-        (Request::Position { axis: 3, counts: 1 }, Objection::UnknownAxis, None, 3.0, 3.0),
-        (Request::TimeOfDay { at_zero_ns: 1 }, Objection::NoTime, None, 0.0, 0.0),
+        (
+            moved(Move { minimum_duration_s: -1.0, ..good }),
+            RejectReason::MinimumDuration { duration_s: -1.0 },
+            None,
+        ),
+        (at_speed_of_half(good), RejectReason::NoTrajectory, Some(0)),
+        (
+            profile(0, ProfileTarget::Velocity(0.1)),
+            RejectReason::WrongMode { mode: OperationMode::CyclicSynchronousPosition },
+            Some(0),
+        ),
+        (profile(9, ProfileTarget::Velocity(0.1)), RejectReason::UnknownAxis { axis: 9, axes: 3 }, None),
+        (Request::Enable, RejectReason::Phase, None),
+        (Request::Activate, RejectReason::Phase, None),
+        (Request::RatedTorque { axis: 1, torque: 50.0 }, RejectReason::Phase, None),
+        (Request::Position { axis: 3, counts: 1 }, RejectReason::UnknownAxis { axis: 3, axes: 3 }, None),
+        (Request::TimeOfDay { at_zero_ns: 1 }, RejectReason::NoTime, None),
     ];
-    for (count, (request, objection, axis, value, limit)) in (1..).zip(refused) {
+    for (count, (request, reason, axis)) in (1..).zip(refused) {
         rig.request(request);
-        assert_eq!((rig.door.snapshot.refused, rig.phase()), (count, Phase::Holding), "{request:?}");
-        let Some(refusal) = rig.refusals().pop() else { panic!("{request:?}: nobody was told") };
-        let expected = (request.kind(), objection, axis, Phase::Holding);
-        assert_eq!((refusal.request, refusal.objection, refusal.axis, refusal.phase), expected);
-        assert_eq!(refusal.limit, limit, "{request:?}");
-        assert!(refusal.value == value || (refusal.value - value).abs() < 1e-9, "{refusal:?}");
-        let answer = rig.door.snapshot.answers.of(RequestId(rig.door.taken));
-        assert_eq!(answer, Answer::Refused(Some(refusal)));
+        assert_eq!((rig.host.snapshot.rejected, rig.phase()), (count, Phase::Holding), "{request:?}");
+        let Some(rejection) = rig.rejections().pop() else { panic!("{request:?}: nobody was told") };
+        let expected = (request.kind(), reason.number(), axis, Phase::Holding);
+        assert_eq!((rejection.request, rejection.reason.number(), rejection.axis, rejection.phase), expected);
+        let ((value, limit), (seen, allowed)) = (reason.numbers(), rejection.reason.numbers());
+        assert_eq!(allowed, limit, "{request:?}");
+        assert!(seen == value || (seen - value).abs() < 1e-9, "{rejection:?}");
+        let answer = rig.host.snapshot.answers.of(RequestId(rig.host.taken));
+        assert_eq!(answer, Answer::Rejected(Some(rejection)));
     }
     rig.request(Request::Move(Move { velocity_scale: f64::NAN, ..good }));
-    assert!(rig.refusals().pop().is_some_and(|refusal| refusal.value.is_nan()));
+    assert!(rig.rejections().pop().is_some_and(|rejection| rejection.reason.numbers().0.is_nan()));
 }
 
 /// At the target it would go at the limit, which half the limit does not lead to.
@@ -175,28 +179,28 @@ fn at_speed_of_half(good: Move) -> Request {
 }
 
 fn profile(axis: u8, target: ProfileTarget) -> Request {
-    Request::SetProfileTarget(ProfileMove { id: 9, axis, target, valid_until_ns: u64::MAX })
+    Request::SetProfileTarget(ProfileMove { axis, target, valid_until_ns: u64::MAX })
 }
 
 #[test]
 fn a_rated_torque_is_a_positive_one_of_an_axis_that_is_there() {
     let mut rig = Rig::new(3);
-    for (axis, torque, objection) in [
+    for (axis, torque, reason) in [
         (1, 50.0, None),
-        (1, -1.0, Some(Objection::RatedTorque)),
-        (1, f64::NAN, Some(Objection::RatedTorque)),
-        (200, 1.0, Some(Objection::UnknownAxis)),
+        (1, -1.0, Some(RejectReason::RatedTorque { torque: -1.0 })),
+        (1, f64::INFINITY, Some(RejectReason::RatedTorque { torque: f64::INFINITY })),
+        (200, 1.0, Some(RejectReason::UnknownAxis { axis: 200, axes: 3 })),
     ] {
         rig.request(Request::RatedTorque { axis, torque });
-        let answer = rig.door.snapshot.answers.of(RequestId(rig.door.taken));
+        let answer = rig.host.snapshot.answers.of(RequestId(rig.host.taken));
         let told = match answer {
-            Answer::Refused(Some(refusal)) => Some(refusal.objection),
+            Answer::Rejected(Some(rejection)) => Some(rejection.reason),
             answer => {
                 assert_eq!(answer, Answer::Granted);
                 None
             }
         };
-        assert_eq!(told, objection, "{torque}");
+        assert_eq!(told, reason, "{torque}");
     }
 }
 
@@ -207,31 +211,31 @@ fn what_is_latched_or_on_its_way_out_says_so_when_it_refuses() {
     rig.request(Request::Stream);
     rig.stream(2.0, 0.0, PERIOD_NS * 100);
     rig.run(5);
-    assert_eq!((rig.phase(), rig.stops()[0].rule), (Phase::Holding, Rule::StartPose));
+    assert_eq!((rig.phase(), rig.stops()[0].rule()), (Phase::Holding, Rule::StartPose));
     for request in [Request::Stream, Request::Move(move_to(0.1)), profile(0, ProfileTarget::Velocity(0.1))] {
         rig.request(request);
-        let refusal = rig.refusals().pop().unwrap();
-        let (objection, rule) = (refusal.objection, Rule::ALL[refusal.value as usize]);
-        assert_eq!((objection, refusal.axis, rule), (Objection::StopLatched, Some(0), Rule::StartPose));
+        let rejection = rig.rejections().pop().unwrap();
+        let expected = RejectReason::StopLatched { rule: Rule::StartPose };
+        assert_eq!((rejection.reason, rejection.axis), (expected, Some(0)));
     }
-    rig.request(Request::Retire);
+    rig.request(Request::InhibitEnable);
     rig.request(Request::Disable);
     rig.run_until(Phase::Disabled, 400);
     rig.request(Request::Enable);
-    assert_eq!(rig.refusals().pop().unwrap().objection, Objection::Retired);
+    assert_eq!(rig.rejections().pop().unwrap().reason, RejectReason::EnableInhibited);
 }
 
 #[test]
 fn nobody_enables_a_group_that_is_on_its_way_out() {
     let mut rig = Rig::enabled(3);
-    rig.request(Request::Retire);
+    rig.request(Request::InhibitEnable);
     assert_eq!(rig.phase(), Phase::Holding, "what is enabled remains so until it is disabled");
     rig.request(Request::Disable);
     rig.run_until(Phase::Disabled, 400);
     rig.run(60);
     rig.request(Request::Enable);
     rig.run(60);
-    assert_eq!((rig.phase(), rig.door.snapshot.refused), (Phase::Disabled, 1));
+    assert_eq!((rig.phase(), rig.host.snapshot.rejected), (Phase::Disabled, 1));
 }
 
 #[test]
@@ -333,7 +337,7 @@ fn a_fault_of_one_axis_stops_all_with_one_reason_and_needs_a_reset() {
     let stops = rig.stops();
     assert_eq!(stops.len(), 1);
     assert_eq!(
-        (stops[0].rule, stops[0].axis(), stops[0].value),
+        (stops[0].rule(), stops[0].axis(), stops[0].cause.numbers().0),
         (Rule::DriveFault, Some(1), f64::from(0x3211))
     );
     assert_eq!(stops[0].phase, Phase::Moving);
@@ -342,12 +346,12 @@ fn a_fault_of_one_axis_stops_all_with_one_reason_and_needs_a_reset() {
     );
 
     rig.request(Request::Enable);
-    assert_eq!((rig.phase(), rig.door.snapshot.refused), (Phase::Disabled, 1), "the fault is latched");
+    assert_eq!((rig.phase(), rig.host.snapshot.rejected), (Phase::Disabled, 1), "the fault is latched");
     rig.request(Request::ResetFaults);
     rig.run(30);
     rig.request(Request::Enable);
     rig.run_until(Phase::Holding, 50);
-    assert_eq!(rig.door.snapshot.stop, None);
+    assert_eq!(rig.host.snapshot.stop, None);
 }
 
 #[test]
@@ -357,9 +361,9 @@ fn an_emergency_message_is_an_event_and_goes_through_the_door() {
     rig.buses[0].inject(emergency);
     rig.run(1);
     let kind = EventKind::Emergency { axis: 2, code: 0x730F, register: 0x81, manufacturer: [1, 2, 3, 4, 5] };
-    assert!(rig.door.events.iter().any(|event| event.kind == kind));
-    assert_eq!(rig.door.received, [emergency]);
-    assert_eq!(rig.door.snapshot.axes[2].error_code, 0x730F);
+    assert!(rig.host.events.iter().any(|event| event.kind == kind));
+    assert_eq!(rig.host.received, [emergency]);
+    assert_eq!(rig.host.snapshot.axes[2].error_code, 0x730F);
 }
 
 #[test]
@@ -385,8 +389,9 @@ fn a_joint_that_does_not_follow_stops_the_group() {
     rig.move_to(2.5);
     rig.run_until(Phase::Stopping, 500);
     let stop = rig.stops()[0];
-    assert_eq!((stop.rule, stop.axis()), (Rule::FollowingError, Some(2)));
-    assert!(stop.value.abs() > 0.05 && stop.limit == 0.05);
+    assert_eq!((stop.rule(), stop.axis()), (Rule::FollowingError, Some(2)));
+    let (error, limit) = stop.cause.numbers();
+    assert!(error.abs() > 0.05 && limit == 0.05);
     rig.run_until(Phase::Disabled, 1_000);
 }
 
@@ -403,13 +408,13 @@ fn a_drive_that_leaves_operation_enabled_stops_the_group() {
 #[test]
 fn a_drive_that_cannot_be_enabled_ends_the_attempt() {
     let mut rig = Rig::new(3);
-    rig.door.requests.extend([Request::Sync(true), Request::Activate]);
+    rig.host.requests.extend([Request::Sync(true), Request::Activate]);
     rig.run(5);
     rig.drive(1).state = DriveState::NotReadyToSwitchOn;
     rig.request(Request::Enable);
     rig.run_until(Phase::Disabled, 600);
     let stop = rig.stops()[0];
-    assert_eq!((stop.rule, stop.axis()), (Rule::EnableTimeout, Some(1)));
+    assert_eq!((stop.rule(), stop.axis()), (Rule::EnableTimeout, Some(1)));
 }
 
 #[test]
@@ -433,10 +438,10 @@ fn nothing_is_queued_behind_set_points_that_wait_for_the_wire() {
     rig.run(100);
     rig.buses[0].unconfirmed = 3;
     let before = rig.buses[0].sent.len();
-    let set_before = rig.door.snapshot.axes[0].position_set;
+    let set_before = rig.host.snapshot.axes[0].position_set;
     rig.run(4);
     assert!(rig.buses[0].sent[before..].iter().all(|(_, frame)| frame.id().value() & 0x780 != 0x200));
-    assert_eq!(rig.door.snapshot.axes[0].position_set, set_before, "the trajectory waits, too");
+    assert_eq!(rig.host.snapshot.axes[0].position_set, set_before, "the trajectory waits, too");
     rig.buses[0].unconfirmed = 0;
     rig.run(10);
     assert_eq!(rules(&rig), []);
@@ -461,7 +466,7 @@ fn a_stream_is_followed_while_it_lasts_and_its_end_is_a_stop_at_the_limits() {
         rig.stream(position, velocity, 5 * PERIOD_NS);
         rig.run(1);
         assert_eq!(rig.phase(), Phase::Streaming);
-        assert_eq!(rig.door.snapshot.axes[0].position_set, position);
+        assert_eq!(rig.host.snapshot.axes[0].position_set, position);
     }
     rig.run(4);
     assert_eq!(rig.phase(), Phase::Streaming, "a few lost commands are bridged at the last velocity");
@@ -506,7 +511,9 @@ fn impossible_parameters_are_refused_with_the_axis() {
     assert_eq!(with(|axis| axis.commands.clear()), Some(SetUpError::NoPdo { axis: 1 }));
     assert_eq!(with(|axis| axis.limits.velocity = f64::NAN), Some(SetUpError::ImpossibleLimits { axis: 1 }));
     let taken = with(|axis| axis.node = 1);
-    assert_eq!(taken, Some(SetUpError::IdTaken { axis: 1, id: Id::canopen(0x080, 1) }));
+    assert_eq!(taken, Some(SetUpError::NodeId { axis: Some(1), node: 1 }));
+    let same_id = with(|axis| axis.feedback[0].id = Id::canopen(0x180, 1));
+    assert_eq!(same_id, Some(SetUpError::IdTaken { axis: 1, id: Id::canopen(0x180, 1) }));
     let mut none = parameters(1);
     none.axes.clear();
     assert_eq!(Engine::new(none).err(), Some(SetUpError::NoAxis));
@@ -525,7 +532,6 @@ fn any_request() -> impl Strategy<Value = Request> {
         Just(Request::Stop(StopCategory::One)),
         Just(Request::Stop(StopCategory::Two)),
         (number, -2.0f64..2.0, 0.0f64..1.1).prop_map(|(target, velocity, scale)| Request::Move(Move {
-            id: 1,
             target: [target; MAX_AXES],
             target_velocity: [if velocity.abs() < 1.0 { 0.0 } else { velocity }; MAX_AXES],
             velocity_scale: scale,
@@ -553,7 +559,7 @@ proptest! {
                 3 => rig.buses[0].inject(Frame::of(Id::canopen(0x180, 1), [0xFF; 3])),
                 4 => rig.clock.lateness_ns.extend([0, 7_300_000]),
                 5 => {
-                    let at = rig.door.snapshot.axes[0].position_set + step;
+                    let at = rig.host.snapshot.axes[0].position_set + step;
                     rig.stream(at, step * 10.0, 3 * PERIOD_NS);
                 }
                 _ => {}
@@ -570,6 +576,6 @@ proptest! {
             rig.buses[0].inject(Frame::data(Id::base(id).unwrap(), &word.to_le_bytes()[..length]).unwrap());
             rig.run(1);
         }
-        prop_assert!(rig.door.snapshot.axes.iter().all(|axis| axis.position.is_finite()));
+        prop_assert!(rig.host.snapshot.axes.iter().all(|axis| axis.position.is_finite()));
     }
 }

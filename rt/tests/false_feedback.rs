@@ -5,13 +5,10 @@ mod fixture;
 use std::f64::consts::TAU;
 
 use fixture::{COUNTS_PER_TURN, LIMITS, PERIOD_NS, Rig, axis, axis_in, parameters, scale};
-use takt_rt::axis::{Axis, AxisParameters, Cadence, CommandPdo};
-use takt_rt::cia402::{Goal, State};
-use takt_rt::control::ControlLaw;
-use takt_rt::dialect::Dialect;
-use takt_rt::door::Request;
-use takt_rt::frame::Id;
-use takt_rt::stop::{Phase, Rule};
+use takt_rt::{
+    Axis, AxisParameters, CommandPdo, ControlLaw, Dialect, DriveState, Goal, Id, Phase, Request, Rule,
+    TransmissionType,
+};
 
 fn counts(radians: f64) -> i32 {
     (radians * COUNTS_PER_TURN / TAU) as i32
@@ -42,7 +39,7 @@ fn lied_about(by: f64, cycles: usize) -> Rig {
     rig.drive(0).position -= counts(0.04);
     rig.run(4);
     rig.request(Request::Disable);
-    let lie = (State::SwitchOnDisabled, rig.drive(0).position + counts(by));
+    let lie = (DriveState::SwitchOnDisabled, rig.drive(0).position + counts(by));
     rig.drive(0).lies.extend(vec![lie; cycles]);
     rig
 }
@@ -66,7 +63,7 @@ fn two_false_reports_leave_the_target_where_it_was() {
     rig.drive(1).is_defiant = true;
     rig.request(Request::Disable);
     let before = *targets(&rig).last().unwrap();
-    rig.drive(0).lies.extend([(State::SwitchOnDisabled, before + counts(0.007)); 5]);
+    rig.drive(0).lies.extend([(DriveState::SwitchOnDisabled, before + counts(0.007)); 5]);
     rig.run(100);
     assert_eq!(rig.phase(), Phase::Disabling);
     assert!(targets(&rig)[10..].iter().all(|target| *target == before));
@@ -79,18 +76,18 @@ fn a_position_that_no_joint_can_have_got_to_stops_the_group_and_is_not_believed_
     rig.run_until(Phase::Holding, 3_000);
     let truth = rig.engine.axes()[0].position();
     let there = rig.drive(0).position + counts(0.5);
-    rig.drive(0).lies.push_back((State::OperationEnabled, there));
+    rig.drive(0).lies.push_back((DriveState::OperationEnabled, there));
     rig.run(2);
     assert_eq!(rig.engine.axes()[0].position(), truth);
     let stops = rig.stops();
-    assert_eq!((stops.len(), stops[0].rule, stops[0].axis()), (1, Rule::ImplausibleFeedback, Some(0)));
-    assert!((stops[0].value - 0.5).abs() < 1e-4, "{stops:?}");
+    assert_eq!((stops.len(), stops[0].rule(), stops[0].axis()), (1, Rule::ImplausibleFeedback, Some(0)));
+    assert!((stops[0].cause.numbers().0 - 0.5).abs() < 1e-4, "{stops:?}");
     // Four times what its speed allows, and 64 counts.
     let reach = 4.0 * LIMITS.velocity * PERIOD_NS as f64 * 1e-9 + 64.0 * TAU / COUNTS_PER_TURN;
-    assert!((stops[0].limit - reach).abs() < 1e-9, "{stops:?}, {reach}");
+    assert!((stops[0].cause.numbers().1 - reach).abs() < 1e-9, "{stops:?}, {reach}");
 
     rig.run_until(Phase::Disabled, 600);
-    rig.drive(0).lies.extend([(State::SwitchOnDisabled, there); 50]);
+    rig.drive(0).lies.extend([(DriveState::SwitchOnDisabled, there); 50]);
     rig.run(1);
     assert_eq!(rig.engine.axes()[0].position(), truth);
     rig.run(1);
@@ -110,12 +107,12 @@ fn one_false_position_does_not_reach_the_loops_that_are_closed_here() {
     parameters.axes[0] = axis_in(law, 0, 1);
     let mut rig = Rig::of(parameters).enable();
     rig.run(200);
-    let quiet = rig.door.records.last().unwrap().axes[0].torque_set;
+    let quiet = rig.host.records.last().unwrap().axes[0].torque_set;
     let there = rig.drive(0).position + counts(0.5);
-    rig.drive(0).lies.push_back((State::OperationEnabled, there));
+    rig.drive(0).lies.push_back((DriveState::OperationEnabled, there));
     rig.run(2);
     assert_eq!(rig.stops().len(), 1);
-    let kick = (rig.door.records.last().unwrap().axes[0].torque_set - quiet).abs();
+    let kick = (rig.host.records.last().unwrap().axes[0].torque_set - quiet).abs();
     assert!(kick < 1.0, "{kick} N·m");
 }
 
@@ -132,7 +129,7 @@ fn a_drive_is_enabled_only_when_its_target_is_where_the_joint_is() {
     }
     rig.request(Request::Enable);
     let mut cycles = 0;
-    while rig.drive(0).state != State::OperationEnabled {
+    while rig.drive(0).state != DriveState::OperationEnabled {
         rig.run(1);
         cycles += 1;
         assert!(cycles < 500);
@@ -149,7 +146,7 @@ fn a_drive_is_enabled_only_when_its_target_is_where_the_joint_is() {
 #[test]
 fn a_drive_that_is_enabled_already_when_the_group_becomes_active_is_not_moved() {
     let mut rig = Rig::new(3);
-    rig.drive(0).state = State::OperationEnabled;
+    rig.drive(0).state = DriveState::OperationEnabled;
     rig.drive(0).position = counts(1.5);
     rig.drive(0).is_stuck = true;
     rig.request(Request::Sync(true));
@@ -164,7 +161,7 @@ fn a_drive_that_is_enabled_already_when_the_group_becomes_active_is_not_moved() 
 
 #[test]
 fn a_drive_that_hears_its_controlword_now_and_then_only_is_told_again_however_disabled_it_seems() {
-    let rare = |command: CommandPdo| CommandPdo { cadence: Cadence::OnControlword, ..command };
+    let rare = |command: CommandPdo| CommandPdo { transmission: TransmissionType::OnControlword, ..command };
     let usual = axis(0, 1);
     let mut drive = Axis::new(AxisParameters {
         dialect: Dialect::YzAim,

@@ -4,11 +4,10 @@
 mod fixture;
 
 use fixture::{LIMITS, PERIOD_NS, Rig, axis, parameters, scale};
-use takt_rt::axis::{Axis, AxisParameters, FeedbackSince};
-use takt_rt::cia402::{State as DriveState, controlword};
-use takt_rt::door::Request;
-use takt_rt::frame::{Frame, Id};
-use takt_rt::stop::{Phase, Rule};
+use takt_rt::{
+    Axis, AxisParameters, DriveState, Fault, FeedbackSince, Frame, Id, Phase, Request, Rule, StopCause,
+    controlword,
+};
 
 fn moving() -> Rig {
     let mut rig = Rig::enabled(3);
@@ -25,11 +24,11 @@ fn feedback_that_is_late_by_whole_cycles_counts_as_missed_and_stops_the_group_af
         rig.buses[0].lies_ns = late_cycles * PERIOD_NS;
         rig.run(3);
         assert!(rig.stops().is_empty(), "{late_cycles} cycles late: three may be missing");
-        assert_eq!(rig.door.records.last().unwrap().axes[0].feedback_age, 3);
+        assert_eq!(rig.host.records.last().unwrap().axes[0].feedback_age, 3);
         rig.run(1);
         let stops = rig.stops();
-        assert_eq!((stops.len(), stops[0].rule), (1, Rule::MissedFeedback), "{late_cycles} cycles late");
-        assert_eq!((stops[0].value, stops[0].limit), (4.0, 3.0));
+        assert_eq!((stops.len(), stops[0].rule()), (1, Rule::MissedFeedback), "{late_cycles} cycles late");
+        assert_eq!(stops[0].cause, StopCause::Fault(Fault::MissedFeedback { cycles: 4, limit: 3 }));
         rig.run_until(Phase::Disabled, 3_000);
         rig.assert_limits_kept();
     }
@@ -40,7 +39,7 @@ fn feedback_that_misses_its_command_phase_by_a_little_counts_as_missed_too() {
     let mut rig = moving();
     rig.buses[0].lies_ns = 600_000;
     rig.run(5);
-    assert_eq!(rig.stops()[0].rule, Rule::MissedFeedback);
+    assert_eq!(rig.stops()[0].rule(), Rule::MissedFeedback);
 }
 
 #[test]
@@ -49,7 +48,7 @@ fn feedback_that_comes_later_but_in_time_is_taken() {
     rig.buses[0].lies_ns = 500_000;
     rig.run(100);
     assert!(rig.stops().is_empty());
-    assert_eq!(rig.door.records.last().unwrap().axes[0].feedback_age, 0);
+    assert_eq!(rig.host.records.last().unwrap().axes[0].feedback_age, 0);
 }
 
 #[test]
@@ -61,7 +60,7 @@ fn feedback_that_is_late_for_a_few_cycles_is_borne_and_what_has_piled_up_is_neit
         // All of it at once, the late and the fresh.
         rig.buses[0].lies_ns = 0;
         rig.run(1);
-        let record = rig.door.records.last().unwrap().axes[0];
+        let record = rig.host.records.last().unwrap().axes[0];
         assert_eq!(record.feedback_age, 0);
         assert_eq!(record.position_raw, rig.drive(0).position);
         rig.run(10);
@@ -108,14 +107,14 @@ fn a_drive_that_reports_by_itself_is_heard_from_one_command_phase_to_the_next() 
         report(&mut rig);
         rig.run(1);
     }
-    assert_eq!((rig.stops().len(), rig.stops()[0].rule), (1, Rule::MissedFeedback));
+    assert_eq!((rig.stops().len(), rig.stops()[0].rule()), (1, Rule::MissedFeedback));
 }
 
 /// Drives that answer so many whole cycles late, and a little more, from the first SYNC on.
 fn steadily_late(cycles: u64) -> Rig {
     let mut rig = Rig::new(3);
     rig.buses[0].late_ns = cycles * PERIOD_NS + 100_000;
-    rig.door.requests.extend([Request::Sync(true), Request::Activate]);
+    rig.host.requests.extend([Request::Sync(true), Request::Activate]);
     rig.run(100);
     rig
 }
@@ -129,18 +128,18 @@ fn syncs(rig: &Rig) -> Vec<u64> {
 fn a_drive_that_always_answers_whole_cycles_late_is_never_led_up_and_its_lateness_is_told() {
     for cycles in [1, 2, 3, 10] {
         let mut rig = steadily_late(cycles);
-        assert_eq!(rig.door.snapshot.axes[0].unanswered, cycles as u16);
+        assert_eq!(rig.host.snapshot.axes[0].unanswered, cycles as u16);
         for attempt in 1..=2 {
             rig.request(Request::Enable);
             rig.run_until(Phase::Disabled, 200);
             let stops = rig.stops();
             assert_eq!(
-                (stops.len(), stops[0].rule, stops[0].axis()),
+                (stops.len(), stops[0].rule(), stops[0].axis()),
                 (attempt, Rule::MissedFeedback, Some(0))
             );
             assert_eq!(
-                (stops[0].value, stops[0].limit, stops[0].phase),
-                (cycles as f64, 0.0, Phase::Enabling)
+                (stops[0].cause, stops[0].phase),
+                (StopCause::Fault(Fault::LateFeedback { cycles: cycles as u16 }), Phase::Enabling)
             );
             rig.request(Request::ResetFaults);
         }
@@ -165,18 +164,18 @@ fn no_sync_is_left_out_where_every_one_has_been_answered_in_time() {
 #[test]
 fn an_answer_that_was_lost_before_costs_one_sync_and_nothing_else() {
     let mut rig = Rig::new(3);
-    rig.door.requests.extend([Request::Sync(true), Request::Activate]);
+    rig.host.requests.extend([Request::Sync(true), Request::Activate]);
     rig.run(50);
     rig.drive(1).is_silent = true;
     rig.run(2);
     rig.drive(1).is_silent = false;
     rig.run(50);
-    assert_eq!(rig.door.snapshot.axes[1].unanswered, 2);
+    assert_eq!(rig.host.snapshot.axes[1].unanswered, 2);
     rig.request(Request::Enable);
     rig.run_until(Phase::Holding, 50);
     let left_out = syncs(&rig).windows(2).filter(|pair| pair[1] - pair[0] == 2 * PERIOD_NS).count();
     assert_eq!((left_out, rig.stops().len()), (1, 0));
-    assert_eq!(rig.door.snapshot.axes[1].unanswered, 0);
+    assert_eq!(rig.host.snapshot.axes[1].unanswered, 0);
 }
 
 /// The velocities that an axis makes of a joint's reports, while its drive is asked for them so much too late.

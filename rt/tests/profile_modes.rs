@@ -4,13 +4,10 @@ mod fixture;
 
 use fixture::{FRICTION, INERTIA, LIMITS, PERIOD_NS, Rig, axis_in, move_to, parameters, scale};
 use proptest::prelude::*;
-use takt_rt::cia402::State as DriveState;
-use takt_rt::control::ControlLaw;
-use takt_rt::door::{Move, ProfileMove, Request};
-use takt_rt::engine::EngineParameters;
-use takt_rt::profile::ProfileTarget;
-use takt_rt::record::EventKind;
-use takt_rt::stop::{Phase, Rule, StopCategory};
+use takt_rt::{
+    ControlLaw, DriveState, EngineParameters, EventKind, Move, Phase, ProfileMove, ProfileTarget, Request,
+    Rule, StopCategory,
+};
 
 const LAWS: [ControlLaw; 7] = [
     ControlLaw::Position,
@@ -43,7 +40,7 @@ fn all_modes() -> EngineParameters {
 
 fn enabled() -> Rig {
     let mut rig = Rig::of(all_modes());
-    rig.door.requests.extend([Request::Sync(true), Request::Activate]);
+    rig.host.requests.extend([Request::Sync(true), Request::Activate]);
     rig.run(10);
     rig.request(Request::Enable);
     rig.run_until(Phase::Holding, 100);
@@ -53,7 +50,7 @@ fn enabled() -> Rig {
 
 fn drive_to(rig: &mut Rig, axis: u8, target: ProfileTarget, valid_for_ns: u64) {
     let valid_until_ns = rig.clock.now_ns + valid_for_ns;
-    rig.request(Request::SetProfileTarget(ProfileMove { id: 9, axis, target, valid_until_ns }));
+    rig.request(Request::SetProfileTarget(ProfileMove { axis, target, valid_until_ns }));
 }
 
 const LONG_NS: u64 = 3_600_000_000_000;
@@ -78,7 +75,7 @@ fn while_one_axis_is_given_a_target_the_others_stay_where_they_are() {
         rig.run(10);
         rig.request(Request::Enable);
         rig.run_until(Phase::Holding, 400);
-        rig.door.events.clear();
+        rig.host.events.clear();
     }
 }
 
@@ -94,7 +91,7 @@ fn each_velocity_and_torque_has_an_expiry_of_its_own_and_a_position_has_none() {
     assert_eq!((rig.phase(), rig.stops().len()), (Phase::Moving, 0));
     rig.run(20);
     let stop = rig.stops()[0];
-    assert_eq!((stop.rule, stop.axis()), (Rule::StaleCommand, Some(VELOCITY)));
+    assert_eq!((stop.rule(), stop.axis()), (Rule::StaleCommand, Some(VELOCITY)));
     rig.run_until(Phase::Disabled, 5_000);
     assert_eq!(rig.stops().len(), 1);
 }
@@ -110,7 +107,7 @@ fn a_move_takes_cyclic_axes_and_profile_position_along_and_is_finished_when_all_
         assert_eq!(rig.drive(axis).position, scale().position_to_counts(1.0), "axis {axis}");
     }
     assert_eq!(rig.drive(usize::from(VELOCITY)).position, held);
-    assert_eq!(rig.door.snapshot.finished_move, 7);
+    assert_eq!(rig.finished_motions(), 1);
     rig.assert_limits_kept();
     assert_eq!(rig.stops(), []);
 }
@@ -124,7 +121,10 @@ fn a_set_point_that_is_not_acknowledged_stops_the_group() {
     assert_eq!(rig.stops(), []);
     rig.run(10);
     let stop = rig.stops()[0];
-    assert_eq!((stop.rule, stop.axis(), stop.value), (Rule::NotAcknowledged, Some(POSITION), 501.0));
+    assert_eq!(
+        (stop.rule(), stop.axis(), stop.cause.numbers().0),
+        (Rule::NotAcknowledged, Some(POSITION), 501.0)
+    );
     rig.run_until(Phase::Disabled, 5_000);
     assert_eq!(rig.stops().len(), 1);
 }
@@ -141,7 +141,7 @@ fn on_a_bus_with_fewer_cycles_the_acknowledgement_is_due_in_the_same_time() {
     assert_eq!(rig.stops(), []);
     rig.run(20);
     let stop = rig.stops()[0];
-    assert_eq!((stop.rule, stop.axis(), stop.value), (Rule::NotAcknowledged, Some(4), 251.0));
+    assert_eq!((stop.rule(), stop.axis(), stop.cause.numbers().0), (Rule::NotAcknowledged, Some(4), 251.0));
 }
 
 /// The others decelerate meanwhile; what has fallen out is not led back by that.
@@ -157,7 +157,7 @@ fn a_drive_that_falls_out_of_operation_enabled_is_not_enabled_again_by_the_stop(
         assert_ne!(rig.drive(6).state, DriveState::OperationEnabled);
         assert_ne!(rig.drive(6).state, DriveState::SwitchedOn);
     }
-    assert_eq!(rig.stops().iter().map(|stop| stop.rule).collect::<Vec<_>>(), [Rule::DriveDisabled]);
+    assert_eq!(rig.stops().iter().map(|stop| stop.rule()).collect::<Vec<_>>(), [Rule::DriveDisabled]);
 }
 
 fn any_target() -> impl Strategy<Value = ProfileTarget> {
@@ -173,7 +173,6 @@ fn any_request() -> impl Strategy<Value = Request> {
     let drive = (any_target(), 0..8u8, prop_oneof![Just(0), Just(50), Just(100_000)]);
     prop_oneof![
         6 => drive.prop_map(|(target, axis, valid_until_ns)| Request::SetProfileTarget(ProfileMove {
-            id: 2,
             axis,
             target,
             valid_until_ns: valid_until_ns * PERIOD_NS,
@@ -199,7 +198,7 @@ fn assert_targets_within_limits(rig: &Rig) {
         (VELOCITY, scale.velocity_to_drive(LIMITS.velocity)),
         (TORQUE, scale.torque_to_per_mille(LIMITS.torque)),
     ];
-    for record in &rig.door.records {
+    for record in &rig.host.records {
         for (axis, highest) in highest {
             let raw = record.axes[usize::from(axis)].command_raw;
             assert!(raw.abs() <= highest, "{raw} for axis {axis} in slot {}", record.timing.slot);
@@ -213,7 +212,7 @@ fn assert_targets_within_limits(rig: &Rig) {
 fn assert_one_reason_for_each_stop(rig: &Rig) {
     let mut phase = Phase::Passive;
     let mut told = None;
-    for event in &rig.door.events {
+    for event in &rig.host.events {
         match event.kind {
             EventKind::PhaseChanged { to, .. } => {
                 phase = to;
@@ -221,10 +220,10 @@ fn assert_one_reason_for_each_stop(rig: &Rig) {
             }
             EventKind::Stop(reason) => {
                 let is_stopping = matches!(phase, Phase::Stopping | Phase::Disabling);
-                let is_worse = told == Some(Rule::Requested) && reason.rule != Rule::Requested;
+                let is_worse = told == Some(Rule::Requested) && reason.rule() != Rule::Requested;
                 assert!(told.is_none() || !is_stopping || is_worse, "{reason:?} during a stop");
                 assert_eq!(reason.phase, phase);
-                told = Some(reason.rule);
+                told = Some(reason.rule());
             }
             _ => {}
         }

@@ -3,12 +3,10 @@
 mod fixture;
 
 use fixture::Rig;
-use takt_rt::axis::{Cadence, MAX_PDOS};
-use takt_rt::door::{AxisProcessData, MappedPdo, Request};
-use takt_rt::frame::Id;
-use takt_rt::pdo::{MAX_OBJECTS, MappedObject};
-use takt_rt::refusal::Objection;
-use takt_rt::stop::Phase;
+use takt_rt::{
+    AxisProcessData, Id, MAX_OBJECTS, MAX_PDOS, MappedObject, MappedPdo, Phase, RejectReason, Request,
+    TransmissionType,
+};
 
 const CONTROLWORD: MappedObject = MappedObject::new(0x6040, 0, 16);
 const TARGET: MappedObject = MappedObject::new(0x607A, 0, 32);
@@ -20,7 +18,7 @@ fn pdo(function: u16, objects: &[MappedObject]) -> MappedPdo {
     for (place, object) in mapped.iter_mut().zip(objects) {
         *place = Some(*object);
     }
-    MappedPdo { id: Id::canopen(function, 1), cadence: Cadence::EveryCycle, objects: mapped }
+    MappedPdo { id: Id::canopen(function, 1), cadence: TransmissionType::EveryCycle, objects: mapped }
 }
 
 fn data(command: &[MappedObject], feedback: &[MappedObject]) -> AxisProcessData {
@@ -39,9 +37,9 @@ fn data(command: &[MappedObject], feedback: &[MappedObject]) -> AxisProcessData 
 fn commands_go_out_as_the_drive_maps_them() {
     let mut rig = Rig::new(1);
     let reported = data(&[TARGET, CONTROLWORD], &[STATUSWORD, POSITION]);
-    rig.door.requests.extend([Request::ProcessData(reported), Request::Sync(true), Request::Activate]);
+    rig.host.requests.extend([Request::ProcessData(reported), Request::Sync(true), Request::Activate]);
     rig.run(20);
-    assert_eq!(rig.door.snapshot.refused, 0);
+    assert_eq!(rig.host.snapshot.rejected, 0);
     let sent = |id: u32| rig.buses[0].sent.iter().filter(move |(_, frame)| frame.id().value() == id);
     assert_eq!(sent(0x201).count(), 0, "nobody listens to RPDO 1 any more");
     let (_, last) = sent(0x301).next_back().unwrap();
@@ -59,7 +57,7 @@ fn a_drive_whose_mapping_is_told_as_it_was_expected_moves_as_ever() {
     let mut rig = rig.enable();
     rig.move_to(0.1);
     rig.run_until(Phase::Holding, 5_000);
-    assert_eq!((rig.stops(), rig.door.snapshot.refused), (vec![], 0));
+    assert_eq!((rig.stops(), rig.host.snapshot.rejected), (vec![], 0));
 }
 
 #[test]
@@ -71,29 +69,28 @@ fn what_cannot_be_exchanged_or_comes_too_late_is_refused_and_changes_nothing() {
     taken.feedback[0] = Some(pdo(0x280, &[STATUSWORD, POSITION]));
     taken.unused[0] = Some(Id::canopen(0x080, 1));
     let mut rig = Rig::new(1);
-    let (narrow, unknown_parameter) = (MappedObject::new(0x6041, 0, 12), unknown.parameter().into());
-    for (count, (impossible, objection, axis, value)) in (1..).zip([
-        (AxisProcessData { axis: 7, ..good }, Objection::UnknownAxis, None, 7.0),
-        (AxisProcessData { feedback: [None; MAX_PDOS], ..good }, Objection::NoProcessData, Some(0), 0.0),
-        (AxisProcessData { commands: [None; MAX_PDOS], ..good }, Objection::NoProcessData, Some(0), 0.0),
+    let narrow = MappedObject::new(0x6041, 0, 12);
+    for (count, (impossible, reason, axis)) in (1..).zip([
+        (AxisProcessData { axis: 7, ..good }, RejectReason::UnknownAxis { axis: 7, axes: 1 }, None),
+        (AxisProcessData { feedback: [None; MAX_PDOS], ..good }, RejectReason::NoProcessData, Some(0)),
+        (AxisProcessData { commands: [None; MAX_PDOS], ..good }, RejectReason::NoProcessData, Some(0)),
         (
             data(&[CONTROLWORD, unknown], &[STATUSWORD, POSITION]),
-            Objection::Mapping,
+            RejectReason::Mapping { object: unknown },
             Some(0),
-            unknown_parameter,
         ),
-        (data(&[CONTROLWORD, TARGET], &[narrow]), Objection::Mapping, Some(0), narrow.parameter().into()),
-        (taken, Objection::IdTaken, Some(0), f64::from(0x081)),
+        (data(&[CONTROLWORD, TARGET], &[narrow]), RejectReason::Mapping { object: narrow }, Some(0)),
+        (taken, RejectReason::IdTaken { id: Id::canopen(0x080, 1) }, Some(0)),
     ]) {
         rig.request(Request::ProcessData(impossible));
-        assert_eq!(rig.door.snapshot.refused, count, "{impossible:?}");
-        let refusal = rig.refusals().pop().unwrap();
-        assert_eq!((refusal.objection, refusal.axis, refusal.value), (objection, axis, value));
+        assert_eq!(rig.host.snapshot.rejected, count, "{impossible:?}");
+        let rejection = rig.rejections().pop().unwrap();
+        assert_eq!((rejection.reason, rejection.axis), (reason, axis));
     }
     let mut rig = rig.enable();
-    let refused = rig.door.snapshot.refused;
+    let refused = rig.host.snapshot.rejected;
     rig.request(Request::ProcessData(good));
-    assert_eq!((rig.door.snapshot.refused, rig.phase()), (refused + 1, Phase::Holding));
+    assert_eq!((rig.host.snapshot.rejected, rig.phase()), (refused + 1, Phase::Holding));
     rig.move_to(0.1);
     rig.run_until(Phase::Holding, 5_000);
     assert_eq!(rig.stops(), []);

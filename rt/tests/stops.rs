@@ -3,14 +3,10 @@
 mod fixture;
 
 use fixture::{LIMITS, PERIOD_NS, Rig, axis, axis_in, move_to, parameters, scale};
-use takt_rt::axis::{Axis, AxisParameters, FeedbackSince};
-use takt_rt::cia402::{Goal, State as DriveState};
-use takt_rt::control::ControlLaw;
-use takt_rt::door::{ProfileMove, Request};
-use takt_rt::frame::{Frame, Id};
-use takt_rt::port::BusState;
-use takt_rt::profile::ProfileTarget;
-use takt_rt::stop::{Phase, Rule, StopCategory};
+use takt_rt::{
+    Axis, AxisParameters, BusState, ControlLaw, DriveState, FeedbackSince, Frame, Goal, Id, Phase,
+    ProfileMove, ProfileTarget, Request, Rule, StopCategory,
+};
 
 /// The group is to be disabled, but the drive of the first axis has fallen silent in operation enabled: it never shows that
 /// it obeys.
@@ -34,7 +30,7 @@ fn disabling_that_becomes_harder_on_its_way_lasts_no_longer() {
         let mut cycles = 0;
         while rig.phase() == Phase::Disabling {
             if harder_after == Some(cycles) {
-                rig.door.requests.push_back(Request::Stop(StopCategory::Zero));
+                rig.host.requests.push_back(Request::Stop(StopCategory::Zero));
             }
             rig.run(1);
             cycles += 1;
@@ -51,7 +47,7 @@ fn disabling_that_becomes_harder_on_its_way_lasts_no_longer() {
 
 /// The rules and categories of all stops that were told of.
 fn told(rig: &Rig) -> Vec<(Rule, StopCategory)> {
-    rig.stops().iter().map(|stop| (stop.rule, stop.category)).collect()
+    rig.stops().iter().map(|stop| (stop.rule(), stop.category)).collect()
 }
 
 #[test]
@@ -66,8 +62,8 @@ fn a_fault_on_the_way_of_a_stop_that_was_asked_for_takes_its_place_and_must_be_r
         // The fault itself asks for category 1; what was asked for stays where it is harder.
         let hardest = category.min(StopCategory::One);
         assert_eq!(told(&rig), [(Rule::Requested, category), (Rule::UnexpectedBootUp, hardest)]);
-        let shown = rig.door.snapshot.stop.unwrap();
-        assert_eq!((shown.rule, shown.axis(), shown.category), (Rule::UnexpectedBootUp, Some(1), hardest));
+        let shown = rig.host.snapshot.stop.unwrap();
+        assert_eq!((shown.rule(), shown.axis(), shown.category), (Rule::UnexpectedBootUp, Some(1), hardest));
         rig.run_until(Phase::Disabled, 3_000);
         rig.assert_limits_kept();
 
@@ -108,8 +104,8 @@ fn what_is_asked_for_on_the_way_of_a_fault_does_not_take_its_place() {
     rig.request(Request::Stop(StopCategory::Two));
     rig.run(2);
     assert_eq!(told(&rig), [(Rule::UnexpectedBootUp, StopCategory::One)]);
-    let shown = rig.door.snapshot.stop.unwrap();
-    assert_eq!((shown.rule, shown.category), (Rule::UnexpectedBootUp, StopCategory::Zero));
+    let shown = rig.host.snapshot.stop.unwrap();
+    assert_eq!((shown.rule(), shown.category), (Rule::UnexpectedBootUp, StopCategory::Zero));
     rig.run_until(Phase::Disabled, 3_000);
 }
 
@@ -154,14 +150,14 @@ fn an_error_passive_bus_that_goes_bus_off_makes_the_stop_harder_and_stays_its_on
         ] {
             let mut rig = error_passive_then_off(category, after);
             assert_eq!(rig.phase(), at_once, "{category:?} after {after} cycles");
-            let shown = rig.door.snapshot.stop.unwrap();
+            let shown = rig.host.snapshot.stop.unwrap();
             assert_eq!(
-                (shown.rule, shown.phase, shown.category),
+                (shown.rule(), shown.phase, shown.category),
                 (Rule::BusErrorPassive, Phase::Moving, category)
             );
-            let begun = rig.door.records.len();
+            let begun = rig.host.records.len();
             rig.run_until(Phase::Disabled, 3_000);
-            let is_held = rig.door.records[begun..].iter().any(|record| record.phase == Phase::Holding);
+            let is_held = rig.host.records[begun..].iter().any(|record| record.phase == Phase::Holding);
             assert!(!is_held, "{category:?} after {after} cycles: held under power");
             assert_eq!(told(&rig), [(Rule::BusErrorPassive, StopCategory::Two)]);
             rig.assert_limits_kept();
@@ -177,8 +173,8 @@ fn a_bus_that_comes_back_from_bus_off_to_error_passive_does_not_soften_the_stop(
     for state in [BusState::BusOff, BusState::ErrorPassive, BusState::ErrorActive] {
         rig.buses[0].state = state;
         rig.run(20);
-        let shown = rig.door.snapshot.stop.unwrap();
-        assert_eq!((shown.rule, shown.category), (Rule::BusLost, StopCategory::One));
+        let shown = rig.host.snapshot.stop.unwrap();
+        assert_eq!((shown.rule(), shown.category), (Rule::BusLost, StopCategory::One));
     }
     rig.run_until(Phase::Disabled, 3_000);
     assert_eq!(told(&rig), [(Rule::BusLost, StopCategory::One)]);
@@ -192,7 +188,7 @@ fn a_group_that_is_disabled_while_it_is_led_up_is_not_called_disabled_before_the
         let mut parameters = parameters(3);
         parameters.buses[0].divider = 3;
         let mut rig = Rig::of(parameters);
-        rig.door.requests.extend([Request::Sync(true), Request::Activate]);
+        rig.host.requests.extend([Request::Sync(true), Request::Activate]);
         rig.run(10);
         rig.request(Request::Enable);
         rig.run(after);
@@ -243,7 +239,7 @@ fn a_joint_that_is_behind_its_set_point_is_at_rest_before_its_power_is_taken() {
         }
         let share = speed_when_let_go(&mut rig);
         assert!(share <= 0.02, "let go at {share} of its highest speed after category {category:?}");
-        assert!(rig.stops().iter().all(|stop| stop.rule == Rule::Requested));
+        assert!(rig.stops().iter().all(|stop| stop.rule() == Rule::Requested));
         rig.assert_limits_kept();
     }
 }
@@ -272,13 +268,13 @@ fn a_joint_that_swings_about_its_set_point_is_stopped_by_its_drive_before_its_po
         let fastest = speeds.fold(0.0, f64::max);
         assert!(fastest > 0.1 * LIMITS.velocity, "it swings: {fastest}");
         rig.request(Request::Stop(StopCategory::One));
-        let begun = rig.door.records.len();
+        let begun = rig.host.records.len();
         let share = speed_when_let_go(&mut rig);
         assert!(share <= 0.02, "let go at {share} of its highest speed");
         // Half a second to catch up, and a ramp from full speed.
-        let waited_cycles = rig.door.records.len() - begun;
+        let waited_cycles = rig.host.records.len() - begun;
         assert!(waited_cycles < 800, "{waited_cycles}");
-        assert!(rig.stops().iter().all(|stop| stop.rule == Rule::Requested), "{:?}", rig.stops());
+        assert!(rig.stops().iter().all(|stop| stop.rule() == Rule::Requested), "{:?}", rig.stops());
     }
 }
 
@@ -288,8 +284,8 @@ fn nobody_waits_for_a_joint_that_does_not_follow() {
     rig.drive(1).lag_s = 1.0;
     rig.move_to(2.0);
     rig.run_until(Phase::Stopping, 300);
-    assert_eq!(rig.stops()[0].rule, Rule::FollowingError);
-    let planned_cycles = (rig.door.snapshot.remaining_s * 1e9 / PERIOD_NS as f64).ceil() as usize;
+    assert_eq!(rig.stops()[0].rule(), Rule::FollowingError);
+    let planned_cycles = (rig.host.snapshot.remaining_s * 1e9 / PERIOD_NS as f64).ceil() as usize;
     rig.run_until(Phase::Disabling, planned_cycles + 2);
 }
 
@@ -300,12 +296,7 @@ fn a_joint_that_was_just_told_to_turn_is_not_let_go_as_if_it_stood() {
         parameters.axes[1] = axis_in(ControlLaw::ProfileVelocity, 0, 2);
         let mut rig = Rig::of(parameters).enable();
         let target = ProfileTarget::Velocity(1.0);
-        rig.request(Request::SetProfileTarget(ProfileMove {
-            id: 1,
-            axis: 1,
-            target,
-            valid_until_ns: u64::MAX,
-        }));
+        rig.request(Request::SetProfileTarget(ProfileMove { axis: 1, target, valid_until_ns: u64::MAX }));
         rig.run(cycles - 1);
         rig.request(Request::Stop(StopCategory::One));
         let share = speed_when_let_go(&mut rig);
@@ -318,7 +309,7 @@ fn a_joint_that_coasts_is_not_taken_for_standing_when_slots_are_missed() {
     let period_s = PERIOD_NS as f64 * 1e-9;
     // It answers set-points: the first report after slots that were missed is older than they are.
     let parameters = AxisParameters { feedback_since: FeedbackSince::SetPoint, ..axis(0, 1) };
-    let is_led_up = |speed: f64, missed_slots: u32| {
+    let may_be_enabled = |speed: f64, missed_slots: u32| {
         let mut axis = Axis::new(parameters.clone());
         axis.set_cycle(period_s);
         let (mut position, mut unreported_slots) = (0.0, 1);
@@ -335,8 +326,8 @@ fn a_joint_that_coasts_is_not_taken_for_standing_when_slots_are_missed() {
             axis.follow_actual(period_s);
             axis.command(Goal::Disabled, None);
         }
-        axis.is_ready()
+        axis.is_power_granted()
     };
-    assert!(is_led_up(0.0, 0) && is_led_up(0.0, 12));
-    assert!(!is_led_up(0.3, 0) && !is_led_up(0.3, 12));
+    assert!(may_be_enabled(0.0, 0) && may_be_enabled(0.0, 12));
+    assert!(!may_be_enabled(0.3, 0) && !may_be_enabled(0.3, 12));
 }

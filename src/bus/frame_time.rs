@@ -1,7 +1,7 @@
 //! How long a frame can be on the wire at most: every field of the format, the most stuff bits that its bits can
 //! need, and the intermission that no other frame can use.
 
-use takt_rt::frame::FrameKind;
+use takt_rt::FrameKind;
 
 /// What decides the length of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

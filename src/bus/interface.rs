@@ -6,7 +6,7 @@ use std::path::Path;
 
 use socketcan::nl::{CanBitTiming, CanCtrlModes, CanState, InterfaceDetails, Mtu};
 use socketcan::{CanCtrlMode, CanInterface, InterfaceCanParams};
-use takt_rt::port::BusState;
+use takt_rt::BusState;
 use thiserror::Error;
 
 /// The hardware type of CAN interfaces (`ARPHRD_CAN`), as `/sys/class/net/NAME/type` gives it.

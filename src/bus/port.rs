@@ -1,11 +1,9 @@
 //! The port of a configured bus, whatever it is connected to.
 
 use arrayvec::ArrayVec;
-use takt_rt::frame::Frame;
+use takt_rt::Frame;
 use takt_rt::linux::SocketCanPort;
-use takt_rt::port::{BusHealth, BusPort, Outgoing, ReceiveBatch};
-use takt_rt::record::MAX_BUSES;
-use takt_rt::time::Nanoseconds;
+use takt_rt::{BusHealth, BusPort, MAX_BUSES, Nanoseconds, Outgoing, ReceiveBatch};
 
 use super::interface::{InterfaceError, InterfaceSettings, prepare_interface};
 use super::socketcan::{SocketCanError, SocketCanOptions, open_socketcan};

@@ -4,7 +4,7 @@ use std::io;
 use std::os::fd::AsRawFd;
 
 use socketcan::{CanFdSocket, CanFilter, Socket, SocketOptions};
-use takt_rt::frame::Id;
+use takt_rt::Id;
 use takt_rt::linux::SocketCanPort;
 use thiserror::Error;
 

@@ -5,10 +5,7 @@
 //! several pieces.
 
 use arrayvec::ArrayVec;
-use takt_rt::frame::{Frame, FrameKind, Id};
-use takt_rt::port::{BusHealth, BusPort, Outgoing, ReceiveBatch};
-use takt_rt::record::MAX_BUSES;
-use takt_rt::time::Nanoseconds;
+use takt_rt::{BusHealth, BusPort, Frame, FrameKind, Id, MAX_BUSES, Nanoseconds, Outgoing, ReceiveBatch};
 
 use crate::controller::channels::{Consumer, Producer, ring};
 
@@ -223,8 +220,7 @@ impl<P: BusPort> BusPort for TracedPort<P> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use takt_rt::frame::Id;
-    use takt_rt::port::{BusState, Received};
+    use takt_rt::{BusState, Id, Received};
 
     /// Takes two frames at a time, and has received one frame at each instant.
     struct Narrow;

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use takt_rt::frame::{Frame, Id};
+use takt_rt::{Frame, Id};
 
 use super::{function_code, node_of};
 

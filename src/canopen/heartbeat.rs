@@ -1,7 +1,6 @@
 //! The nodes whose heartbeat is watched (CiA 301, 7.2.8.3.2 and object 1016): a table of consumers, one a node.
 
-use takt_rt::frame::Frame;
-use takt_rt::time::Nanoseconds;
+use takt_rt::{Frame, Nanoseconds};
 
 use super::nmt::{HeartbeatConsumer, HeartbeatEvent, NmtState};
 

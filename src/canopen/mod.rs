@@ -44,7 +44,7 @@ pub mod function_code {
 }
 
 /// The node of a frame that carries `function`'s 11-bit identifier; `None` for every other frame.
-fn node_of(frame: &takt_rt::frame::Frame, function: u16) -> Option<u8> {
+fn node_of(frame: &takt_rt::Frame, function: u16) -> Option<u8> {
     let id = frame.id();
     let node = id.value().checked_sub(function.into())?;
     (!id.is_extended() && (1..=0x7F).contains(&node)).then_some(node as u8)

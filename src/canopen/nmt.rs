@@ -3,8 +3,7 @@
 
 use std::fmt;
 
-use takt_rt::frame::{Frame, Id};
-use takt_rt::time::Nanoseconds;
+use takt_rt::{Frame, Id, Nanoseconds};
 
 use super::{function_code, node_of};
 

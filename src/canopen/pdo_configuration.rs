@@ -1,7 +1,6 @@
 //! How a PDO is configured, whoever tells: a device over SDO, or a file that describes it.
 
-use takt_rt::frame::{Frame, Id};
-use takt_rt::pdo::MappedObject;
+use takt_rt::{Frame, Id, MappedObject};
 
 use super::object::ObjectAddress;
 use super::objects::{PDO_INVALID, PdoDirection, PdoParameters};

@@ -1,6 +1,6 @@
 //! The SYNC message (CiA 301, 7.2.5): without data, or with a counter from 1 up to an agreed overflow value.
 
-use takt_rt::frame::{Frame, FrameKind, Id};
+use takt_rt::{Frame, FrameKind, Id};
 
 use super::function_code;
 

@@ -3,8 +3,8 @@
 
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-use takt_rt::time::{NANOSECONDS_PER_SECOND, Nanoseconds};
-pub use takt_rt::time_of_day::TimeOfDay;
+pub use takt_rt::TimeOfDay;
+use takt_rt::{NANOSECONDS_PER_SECOND, Nanoseconds};
 
 /// From 1970-01-01 to 1984-01-01.
 const EPOCH: Duration = Duration::from_secs(5_113 * 86_400);

@@ -17,9 +17,7 @@ use takt::controller::session::{self, Session, SessionError, SessionOptions};
 use takt::controller::{Interrupt, Outcome, Progress};
 use takt::faults::{Fault, Rehearsal, Scenario, ScenarioError, Tidings};
 use takt::telemetry::{Destination, Machine, Notice, RealtimeReport, RunOutcome, RunReport, words};
-use takt_rt::door::Snapshot;
-use takt_rt::record::{Event, EventKind};
-use takt_rt::stop::StopReason;
+use takt_rt::{Event, EventKind, Snapshot, StopReason};
 
 use super::configuration::{self, BusOverride};
 use super::exit::Exit;
@@ -306,7 +304,7 @@ impl Hints {
 
 /// What is no part of an ordinary run.
 fn is_urgent(event: &Event) -> bool {
-    matches!(event.kind, EventKind::Stop(_) | EventKind::Emergency { .. } | EventKind::Refused { .. })
+    matches!(event.kind, EventKind::Stop(_) | EventKind::Emergency { .. } | EventKind::Rejected { .. })
 }
 
 /// Says at once what people should not have to wait for.

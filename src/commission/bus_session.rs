@@ -2,9 +2,7 @@
 
 use std::collections::VecDeque;
 
-use takt_rt::frame::Frame;
-use takt_rt::port::{BusPort, Clock, ReceiveBatch};
-use takt_rt::time::Nanoseconds;
+use takt_rt::{BusPort, Clock, Frame, Nanoseconds, ReceiveBatch};
 
 use super::event::Event;
 use super::procedure::{Failed, Procedure};

@@ -1,6 +1,6 @@
 //! The first words with a drive: does it answer, and is it the one that was meant.
 
-use takt_rt::frame::{Frame, Id};
+use takt_rt::{Frame, Id};
 
 use super::conversation::Conversation;
 use super::failure::Failure;

@@ -1,6 +1,6 @@
 //! What a procedure has to say while it runs.
 
-use takt_rt::time::Nanoseconds;
+use takt_rt::Nanoseconds;
 
 /// Something to tell people.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,6 +1,6 @@
 //! Why a procedure could not be done.
 
-use takt_rt::time::Nanoseconds;
+use takt_rt::Nanoseconds;
 
 use crate::canopen::nmt::NmtState;
 use crate::canopen::object::{Object, ObjectAddress};

@@ -1,6 +1,6 @@
 //! What commissioning knows of the families of drives.
 
-use takt_rt::frame::Frame;
+use takt_rt::Frame;
 
 use super::dictionary::Entry;
 use super::line::Manners;

@@ -2,8 +2,7 @@
 
 use std::collections::VecDeque;
 
-use takt_rt::frame::{Frame, Id};
-use takt_rt::time::Nanoseconds;
+use takt_rt::{Frame, Id, Nanoseconds};
 
 use super::event::Event;
 use crate::canopen::emcy::Emergency;

@@ -1,6 +1,6 @@
 //! Looking at an axis: once in the end, again and again while it moves, or for somebody who watches.
 
-use takt_rt::time::Nanoseconds;
+use takt_rt::Nanoseconds;
 
 use super::contact;
 use super::conversation::Conversation;

@@ -1,6 +1,6 @@
 //! What a frame means, in words: for whoever watches a procedure at work.
 
-use takt_rt::frame::Frame;
+use takt_rt::Frame;
 
 use super::dictionary::Entry;
 use super::family::Family;

@@ -1,6 +1,6 @@
 //! How fast a commissioning move is, and how much room is left before a limit.
 
-use takt_rt::time::Nanoseconds;
+use takt_rt::Nanoseconds;
 
 use super::event::Reading;
 use super::failure::Failure;

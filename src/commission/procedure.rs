@@ -5,8 +5,7 @@ use std::future::Future;
 use std::pin::Pin;
 use std::task::{Context, Poll, Waker};
 
-use takt_rt::frame::Frame;
-use takt_rt::time::Nanoseconds;
+use takt_rt::{Frame, Nanoseconds};
 
 use super::conversation::Conversation;
 use super::event::Event;
@@ -84,7 +83,7 @@ impl Procedure {
         self.conversation.line_mut().receive(frame);
     }
 
-    /// Asks it to end: an axis that moves is stopped in control and disabled. Asked again, it is disabled at once.
+    /// Asks it to end: an axis that moves is stopped in control and disabled. RequestEnvelope again, it is disabled at once.
     pub fn interrupt(&mut self) {
         let mut line = self.conversation.line_mut();
         line.interruptions = line.interruptions.saturating_add(1);

@@ -1,6 +1,6 @@
 //! What can be asked of a drive.
 
-use takt_rt::time::Nanoseconds;
+use takt_rt::Nanoseconds;
 
 use super::dictionary::Entry;
 use super::pace::Pace;

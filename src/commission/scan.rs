@@ -2,8 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use takt_rt::frame::Frame;
-use takt_rt::time::Nanoseconds;
+use takt_rt::{Frame, Nanoseconds};
 
 use super::conversation::Conversation;
 use super::failure::Failure;

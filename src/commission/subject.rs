@@ -3,8 +3,7 @@
 
 use std::f64::consts::TAU;
 
-use takt_rt::time::Nanoseconds;
-use takt_rt::units::{Scale, ScaleError, ScaleParameters};
+use takt_rt::{Nanoseconds, Scale, ScaleError, ScaleParameters};
 
 use super::failure::Failure;
 use super::family::Family;

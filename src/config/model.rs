@@ -5,15 +5,14 @@
 use std::path::PathBuf;
 
 use serde::Serialize;
+/// Limits of an axis in rad (m) and seconds. Defaults: the deceleration is the acceleration, the jerk is infinite.
+pub use takt_rt::AxisLimits as Limits;
 /// How an axis is commanded. Defaults of the gains: a position gain of 20 1/s; in CST a stiffness of inertia · bandwidth² and
 /// a damping of 2 · inertia · bandwidth with a bandwidth of 40 rad/s, and the inertia and friction of the simulated joint.
-pub use takt_rt::control::ControlLaw as Control;
-use takt_rt::dialect::Dialect;
-/// Limits of an axis in rad (m) and seconds. Defaults: the deceleration is the acceleration, the jerk is infinite.
-pub use takt_rt::guard::AxisLimits as Limits;
+pub use takt_rt::ControlLaw as Control;
+use takt_rt::Dialect;
 
-pub use takt_rt::guard::OnViolation;
-pub use takt_rt::stop::StopCategories;
+pub use takt_rt::{OnViolation, StopCategories};
 
 use super::defaults;
 use crate::canopen::dcf::DeviceConfiguration;
@@ -27,7 +26,7 @@ pub struct Config {
     pub cycle: Cycle,
     /// When missed slots are too many.
     pub missed_slots: MissedSlots,
-    /// How each rule stops the group. Default: see [`takt_rt::stop::Rule::default_category`].
+    /// How each rule stops the group. Default: see [`takt_rt::Rule::default_category`].
     pub stops: StopCategories,
     /// What is asked of the operating system.
     pub realtime: Realtime,

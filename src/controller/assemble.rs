@@ -2,14 +2,11 @@
 
 use std::f64::consts::TAU;
 
-use takt_rt::axis::{AxisParameters, CommandPdo, FeedbackSince, Pdo};
-use takt_rt::cycle::SlotPlan;
-use takt_rt::engine::{BusParameters, Engine, EngineParameters, Heartbeat, SetUpError};
-use takt_rt::frame::Id;
-use takt_rt::pdo::{Mapping, MappingError};
-use takt_rt::record::{MAX_AXES, MAX_BUSES};
-use takt_rt::units::{Scale, ScaleError, ScaleParameters};
-use takt_rt::watch::TimingLadder;
+use takt_rt::{
+    AxisParameters, BusParameters, CommandPdo, Engine, EngineParameters, FeedbackSince, Heartbeat, Id,
+    MAX_AXES, MAX_BUSES, Mapping, MappingError, Pdo, Scale, ScaleError, ScaleParameters, SetUpError,
+    SlotPlan, TimingLadder,
+};
 
 use crate::config::{Axis, Config, DriveFamily, Interface, Travel};
 use crate::drive::{PdoPlan, ProcessData, yz_aim};
@@ -131,7 +128,7 @@ fn axis_parameters(
     let wrong_mapping = |error| AssembleError::Mapping { axis: index, error };
     let command = |plan: &PdoPlan| -> Result<CommandPdo, MappingError> {
         let pdo = Pdo { id: plan.id, mapping: Mapping::commands(&plan.objects)? };
-        Ok(CommandPdo { pdo, cadence: plan.cadence })
+        Ok(CommandPdo { pdo, transmission: plan.cadence })
     };
     let feedback = |plan: &PdoPlan| Ok(Pdo { id: plan.id, mapping: Mapping::feedback(&plan.objects)? });
     let spacing_ns = match axis.drive {

@@ -2,7 +2,7 @@
 //! channel with all its memory and hands out its three sides.
 //!
 //! ```text
-//! HostSide ── requests, newest streamed command, service frames ──▶ RtSide (takt_rt::door::Door)
+//! HostSide ── requests, newest streamed command, service frames ──▶ RtSide (takt_rt::HostInterface)
 //! HostSide ◀── service frames, newest snapshot (any number of observers) ── RtSide
 //! LogSide  ◀── cycle records, events ── RtSide
 //! ```
@@ -11,16 +11,17 @@
 //! preempted in the middle of something.
 
 mod latest;
+mod motion_words;
 mod primitives;
 mod records;
 mod request_numbers;
 mod ring;
 mod words;
 
-use takt_rt::door::{Asked, Door, Request, RequestId, Snapshot, StreamCommand};
-use takt_rt::frame::Frame;
-use takt_rt::port::Received;
-use takt_rt::record::{CycleRecord, Event};
+use takt_rt::{
+    CycleRecord, Event, Frame, HostInterface, Received, Request, RequestEnvelope, RequestId, Snapshot,
+    StreamCommand,
+};
 
 use crate::config::Config;
 use latest::{Attempt, Reader, Writer};
@@ -32,9 +33,9 @@ pub use ring::{Consumer, Producer, ring};
 /// How much each channel can hold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ChannelSizes {
-    /// Axes of the controller, up to [`takt_rt::record::MAX_AXES`].
+    /// Axes of the controller, up to [`takt_rt::MAX_AXES`].
     pub axes: usize,
-    /// Buses of the controller, up to [`takt_rt::record::MAX_BUSES`].
+    /// Buses of the controller, up to [`takt_rt::MAX_BUSES`].
     pub buses: usize,
     /// Cycle records on the way to the logger.
     pub records: usize,
@@ -114,7 +115,7 @@ pub fn channels(sizes: &ChannelSizes) -> (RtSide, HostSide, LogSide) {
 /// The real-time thread's side.
 pub struct RtSide {
     axes: usize,
-    requests: Consumer<Asked>,
+    requests: Consumer<RequestEnvelope>,
     stream: Reader,
     stream_seen: u64,
     service: Vec<Consumer<Frame>>,
@@ -128,8 +129,8 @@ pub struct RtSide {
 /// the fraction of a microsecond that a read takes.
 const STREAM_ATTEMPTS: usize = 3;
 
-impl Door for RtSide {
-    fn request(&mut self) -> Option<Asked> {
+impl HostInterface for RtSide {
+    fn request(&mut self) -> Option<RequestEnvelope> {
         self.requests.pop()
     }
 
@@ -171,7 +172,7 @@ impl Door for RtSide {
 
 /// The side of whoever commands the controller.
 pub struct HostSide {
-    requests: Producer<Asked>,
+    requests: Producer<RequestEnvelope>,
     numbers: RequestNumbers,
     streamer: Option<Streamer>,
     service: Vec<Producer<Frame>>,
@@ -187,14 +188,14 @@ impl HostSide {
     /// [`ChannelError::Full`]; nothing has been asked then.
     pub fn request(&mut self, request: Request) -> Result<RequestId, ChannelError> {
         let id = self.numbers.next();
-        self.ask(Asked { id, request }).map(|()| id)
+        self.ask(RequestEnvelope { id, request }).map(|()| id)
     }
 
     /// As [`HostSide::request`], under a number of [`HostSide::numbers`].
     ///
     /// # Errors
     /// [`ChannelError::Full`]; nothing has been asked then.
-    pub fn ask(&mut self, asked: Asked) -> Result<(), ChannelError> {
+    pub fn ask(&mut self, asked: RequestEnvelope) -> Result<(), ChannelError> {
         if self.requests.push(asked) { Ok(()) } else { Err(ChannelError::Full) }
     }
 
@@ -316,10 +317,9 @@ impl LogSide {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use takt_rt::frame::Id;
+    use takt_rt::Id;
     use takt_rt::plan;
-    use takt_rt::record::{EventKind, MAX_AXES};
-    use takt_rt::stop::{Phase, StopCategory};
+    use takt_rt::{EventKind, MAX_AXES, Phase, StopCategory};
 
     const SIZES: ChannelSizes =
         ChannelSizes { axes: 2, buses: 2, records: 4, events: 2, requests: 2, service_out: 2, service_in: 2 };
@@ -334,10 +334,10 @@ mod tests {
         let first = host.request(Request::Enable).unwrap();
         let second = host.request(Request::Stop(StopCategory::Two)).unwrap();
         assert!(first < second);
-        assert_eq!(host.request(Request::Leave), Err(ChannelError::Full));
-        assert_eq!(rt.request(), Some(Asked { id: first, request: Request::Enable }));
+        assert_eq!(host.request(Request::Shutdown), Err(ChannelError::Full));
+        assert_eq!(rt.request(), Some(RequestEnvelope { id: first, request: Request::Enable }));
         let request = Request::Stop(StopCategory::Two);
-        assert_eq!(rt.request(), Some(Asked { id: second, request }));
+        assert_eq!(rt.request(), Some(RequestEnvelope { id: second, request }));
         assert_eq!(rt.request(), None);
     }
 
@@ -381,7 +381,8 @@ mod tests {
         let (mut rt, _host, mut log) = channels(&SIZES);
         let record = CycleRecord { axis_count: 2, ..CycleRecord::default() };
         assert_eq!((0..6).filter(|_| rt.record(&record)).count(), 4);
-        let event = |slot| Event { slot, at_ns: 0, kind: EventKind::MoveFinished { id: 1 } };
+        let event =
+            |slot| Event { slot, at_ns: 0, kind: EventKind::MotionFinished { request: RequestId(1) } };
         assert_eq!((0..3).filter(|slot| rt.event(&event(*slot))).count(), 2);
         assert_eq!(log.next_record(|seen| *seen), Some(record));
         assert_eq!(log.take_event(), Some(event(0)));

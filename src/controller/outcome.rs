@@ -1,7 +1,6 @@
 //! How a run goes and how it ends.
 
-use takt_rt::refusal::Refusal;
-use takt_rt::stop::{Phase, StopReason};
+use takt_rt::{Phase, RequestError, StopReason};
 
 use crate::drive::BringUpError;
 use crate::telemetry::{Machine, words};
@@ -34,7 +33,7 @@ pub enum Outcome {
         /// The move.
         number: u64,
         /// Why, if that is still known.
-        refusal: Option<Refusal>,
+        refusal: Option<RequestError>,
     },
     /// A function that the caller gave to the run panicked, and the axes were stopped in control.
     CallbackPanicked {
@@ -68,7 +67,7 @@ impl Outcome {
                 name(*axis)
             ),
             Self::MoveRefused { number, refusal } => {
-                let why = refusal.map(|refusal| words::refusal(&refusal, machine));
+                let why = refusal.map(|refusal| words::rejection(&refusal, machine));
                 let why = why.unwrap_or_else(|| "why is no longer known".to_owned());
                 format!("move {number} of the program could not be begun: {why}")
             }

@@ -1,10 +1,9 @@
 //! The motion program: which move is next, and when.
 
-use takt_rt::door::{Asked, Move, ProfileMove, Request, RequestId, Snapshot};
-use takt_rt::profile::ProfileTarget;
-use takt_rt::record::MAX_AXES;
-use takt_rt::refusal::{Answer, Refusal};
-use takt_rt::stop::Phase;
+use takt_rt::{
+    Answer, MAX_AXES, MotionState, Move, Phase, ProfileMove, ProfileTarget, Request, RequestEnvelope,
+    RequestError, RequestId, Snapshot,
+};
 
 use super::channels::RequestNumbers;
 use crate::config::{Program, ProgramMove, ProgramTarget};
@@ -17,8 +16,6 @@ pub struct ProgramRunner {
     repeat: Option<u64>,
     /// Moves begun so far.
     begun: u64,
-    /// The number of the last move that was asked for.
-    last_id: u32,
     /// The numbers of the requests that ask for it.
     asked: Vec<RequestId>,
     state: State,
@@ -45,13 +42,13 @@ pub enum Step {
     /// Nothing but time.
     Wait,
     /// This, in this order.
-    Begin(Vec<Asked>),
+    Begin(Vec<RequestEnvelope>),
     /// The real-time thread has refused the move with this number, counted from 1.
     Refused {
         /// The move.
         number: u64,
         /// Why, if that is still known.
-        refusal: Option<Refusal>,
+        refusal: Option<RequestError>,
     },
     /// Everything has been done.
     Finished,
@@ -68,13 +65,13 @@ impl ProgramRunner {
     pub fn new(program: &Program, endless: bool) -> Self {
         let repeat = (!endless).then(|| u64::from(program.repeat.max(1)));
         let state = if program.moves.is_empty() { State::Finished } else { State::Next };
-        Self { moves: program.moves.clone(), repeat, begun: 0, last_id: 0, asked: vec![], state }
+        Self { moves: program.moves.clone(), repeat, begun: 0, asked: vec![], state }
     }
 
     /// Takes the state of the group and says what is to happen. The requests of a step bear `numbers`, so that nobody
     /// else's refusal is taken for theirs.
     pub fn poll(&mut self, now_ns: u64, snapshot: &Snapshot, numbers: &RequestNumbers) -> Step {
-        let is_reached = snapshot.finished_move == self.last_id;
+        let is_reached = self.is_reached(snapshot);
         let is_done = is_reached && snapshot.phase == Phase::Holding;
         if let (State::Moving | State::Stopping, Some(refusal)) = (self.state, self.refusal(snapshot)) {
             self.state = State::Finished;
@@ -121,10 +118,16 @@ impl ProgramRunner {
         }
     }
 
+    /// Whether every motion of the present requests has reached its target.
+    fn is_reached(&self, snapshot: &Snapshot) -> bool {
+        let is_finished = |asked: &RequestId| snapshot.motions.of(*asked) == Some(MotionState::Finished);
+        !self.asked.is_empty() && self.asked.iter().all(is_finished)
+    }
+
     /// Why one of the present requests was refused, if one was and that is still known.
-    fn refusal(&self, snapshot: &Snapshot) -> Option<Option<Refusal>> {
+    fn refusal(&self, snapshot: &Snapshot) -> Option<Option<RequestError>> {
         self.asked.iter().find_map(|asked| match snapshot.answers.of(*asked) {
-            Answer::Refused(refusal) => Some(refusal),
+            Answer::Rejected(refusal) => Some(refusal),
             Answer::None | Answer::Granted => None,
         })
     }
@@ -151,27 +154,29 @@ impl ProgramRunner {
 
     /// The requests of the present move, its speeds and torques times `factor`. All of them are one move with a number of
     /// its own.
-    fn present_requests(&mut self, now_ns: u64, factor: f64, numbers: &RequestNumbers) -> Vec<Asked> {
-        // Never 0, which stands for "none yet".
-        self.last_id = self.last_id.checked_add(1).unwrap_or(1);
-        let id = self.last_id;
+    fn present_requests(
+        &mut self,
+        now_ns: u64,
+        factor: f64,
+        numbers: &RequestNumbers,
+    ) -> Vec<RequestEnvelope> {
         let valid_until_ns = now_ns + self.present_duration_ns().unwrap_or(0) + REACHING_NS + EXPIRY_NS;
         let Some(present) = self.present() else { return vec![] };
         let drive = |values: &[f64], target: fn(f64) -> ProfileTarget| -> Vec<Request> {
             let axes = (0..).zip(values).filter(|(_, value)| **value != 0.0);
             axes.map(|(axis, value)| {
                 let target = target(value * factor);
-                Request::SetProfileTarget(ProfileMove { id, axis, target, valid_until_ns })
+                Request::SetProfileTarget(ProfileMove { axis, target, valid_until_ns })
             })
             .collect()
         };
         let requests = match &present.target {
-            ProgramTarget::Position(position) => vec![Request::Move(move_of(id, present, position))],
+            ProgramTarget::Position(position) => vec![Request::Move(move_of(present, position))],
             ProgramTarget::Velocity { velocity, .. } => drive(velocity, ProfileTarget::Velocity),
             ProgramTarget::Torque { torque, .. } => drive(torque, ProfileTarget::Torque),
         };
         self.asked = requests.iter().map(|_| numbers.next()).collect();
-        self.asked.iter().zip(requests).map(|(id, request)| Asked { id: *id, request }).collect()
+        self.asked.iter().zip(requests).map(|(id, request)| RequestEnvelope { id: *id, request }).collect()
     }
 
     /// Where the present move leads (rad or m), an axis each; `None` before the first, and where it leads nowhere.
@@ -188,11 +193,10 @@ impl ProgramRunner {
     }
 }
 
-fn move_of(id: u32, present: &ProgramMove, position: &[f64]) -> Move {
+fn move_of(present: &ProgramMove, position: &[f64]) -> Move {
     let mut target = [0.0; MAX_AXES];
     target.iter_mut().zip(position).for_each(|(to, from)| *to = *from);
     Move {
-        id,
         target,
         target_velocity: [0.0; MAX_AXES],
         velocity_scale: present.velocity_scale,
@@ -204,7 +208,7 @@ fn move_of(id: u32, present: &ProgramMove, position: &[f64]) -> Move {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use takt_rt::refusal::{Objection, RequestKind};
+    use takt_rt::{RejectReason, RequestKind};
 
     fn program(repeat: u32) -> Program {
         let to = |target: f64| ProgramMove {
@@ -217,24 +221,28 @@ mod tests {
         Program { repeat, moves: vec![to(1.0), to(2.0)] }
     }
 
-    fn done(id: u32) -> Snapshot {
-        Snapshot { phase: Phase::Holding, finished_move: id, ..Snapshot::default() }
+    /// The group holds after the motions of these requests have reached their targets.
+    fn done(motions: &[RequestId]) -> Snapshot {
+        let mut snapshot = Snapshot { phase: Phase::Holding, ..Snapshot::default() };
+        for (axis, request) in (0..).zip(motions) {
+            snapshot.motions.begin(*request, Some(axis), |_| false);
+        }
+        snapshot.motions.end_all(MotionState::Finished, |_| {});
+        snapshot
     }
 
-    const REFUSAL: Refusal = Refusal {
+    const REJECTED: RequestError = RequestError {
         request: RequestKind::Move,
-        objection: Objection::PositionLimit,
+        reason: RejectReason::PositionLimit { position: 2.0, limit: 1.5 },
         axis: Some(0),
-        value: 2.0,
-        limit: 1.5,
         phase: Phase::Holding,
     };
 
-    fn refusing(ids: &[RequestId]) -> Snapshot {
-        let mut snapshot = done(0);
+    fn rejecting(ids: &[RequestId]) -> Snapshot {
+        let mut snapshot = done(&[]);
         for id in ids {
-            snapshot.refused += 1;
-            snapshot.answers.note(*id, Some(REFUSAL));
+            snapshot.rejected += 1;
+            snapshot.answers.note(*id, Some(REJECTED));
         }
         snapshot
     }
@@ -254,7 +262,7 @@ mod tests {
         fn begin(&mut self, now_ns: u64, snapshot: &Snapshot) -> Option<(RequestId, Move)> {
             match self.poll(now_ns, snapshot) {
                 Step::Begin(requests) => match requests[..] {
-                    [Asked { id, request: Request::Move(begun) }] => Some((id, begun)),
+                    [RequestEnvelope { id, request: Request::Move(begun) }] => Some((id, begun)),
                     _ => panic!("{requests:?}"),
                 },
                 _ => None,
@@ -270,39 +278,39 @@ mod tests {
         let asked = |step| match step {
             Step::Begin(requests) => match requests[..] {
                 [
-                    Asked { request: Request::SetProfileTarget(first), .. },
-                    Asked { request: Request::SetProfileTarget(second), .. },
+                    RequestEnvelope { id: one, request: Request::SetProfileTarget(first) },
+                    RequestEnvelope { id: other, request: Request::SetProfileTarget(second) },
                 ] => {
-                    assert_eq!((first.id, first.axis, second.axis), (second.id, 0, 1));
-                    (second.id, first.target, second.target)
+                    assert_eq!((first.axis, second.axis), (0, 1));
+                    ([one, other], first.target, second.target)
                 }
                 _ => panic!("{requests:?}"),
             },
             step => panic!("{step:?}"),
         };
         let speeds = |first, second| (ProfileTarget::Velocity(first), ProfileTarget::Velocity(second));
-        let (spin, first, second) = asked(runner.poll(0, &done(0)));
+        let (spin, first, second) = asked(runner.poll(0, &done(&[])));
         assert_eq!((first, second), speeds(0.3, 0.5));
-        let driving = Snapshot { phase: Phase::Moving, ..done(spin) };
+        let driving = Snapshot { phase: Phase::Moving, ..done(&spin) };
         assert_eq!(runner.poll(500_000_000, &driving), Step::Wait);
         assert_eq!(runner.poll(2_499_000_000, &driving), Step::Wait);
         let (rest, first, second) = asked(runner.poll(2_500_000_000, &driving));
         assert_eq!((first, second), speeds(0.0, 0.0));
         assert_eq!(runner.poll(2_600_000_000, &driving), Step::Wait);
-        assert_eq!(runner.poll(3_000_000_000, &done(rest)), Step::Wait);
-        assert_eq!((runner.poll(3_100_000_000, &done(rest)), runner.0.target()), (Step::Wait, None));
-        assert_eq!(runner.poll(3_100_000_000, &done(rest)), Step::Finished);
+        assert_eq!(runner.poll(3_000_000_000, &done(&rest)), Step::Wait);
+        assert_eq!((runner.poll(3_100_000_000, &done(&rest)), runner.0.target()), (Step::Wait, None));
+        assert_eq!(runner.poll(3_100_000_000, &done(&rest)), Step::Finished);
     }
 
     #[test]
     fn moves_follow_one_another_after_their_dwell_as_often_as_asked() {
         let mut runner = Running::new(&program(2));
         let mut targets = vec![];
-        let mut snapshot = done(0);
+        let mut snapshot = done(&[]);
         for now_ms in 0..2_000 {
-            if let Some((_, begun)) = runner.begin(now_ms * 1_000_000, &snapshot) {
+            if let Some((motion, begun)) = runner.begin(now_ms * 1_000_000, &snapshot) {
                 targets.push((now_ms, begun.target[0]));
-                snapshot = done(begun.id);
+                snapshot = done(&[motion]);
             }
         }
         let only: Vec<f64> = targets.iter().map(|(_, target)| *target).collect();
@@ -314,9 +322,9 @@ mod tests {
     #[test]
     fn the_next_move_waits_for_the_present_one() {
         let mut runner = Running::new(&program(1));
-        let (_, first) = runner.begin(0, &done(0)).unwrap();
+        let (_, first) = runner.begin(0, &done(&[])).unwrap();
         assert_eq!((first.velocity_scale, first.acceleration_scale), (0.5, 0.25));
-        let moving = Snapshot { phase: Phase::Moving, ..done(0) };
+        let moving = Snapshot { phase: Phase::Moving, ..done(&[]) };
         for now_s in 0..100 {
             assert_eq!(runner.poll(now_s * 1_000_000_000, &moving), Step::Wait);
         }
@@ -325,19 +333,22 @@ mod tests {
     #[test]
     fn a_refused_move_ends_the_program_with_its_number_and_why() {
         let mut runner = Running::new(&program(1));
-        let (asked, _) = runner.begin(0, &done(0)).unwrap();
-        assert_eq!(runner.poll(1, &refusing(&[asked])), Step::Refused { number: 1, refusal: Some(REFUSAL) });
-        assert_eq!(runner.poll(2, &refusing(&[asked])), Step::Finished);
+        let (asked, _) = runner.begin(0, &done(&[])).unwrap();
+        assert_eq!(
+            runner.poll(1, &rejecting(&[asked])),
+            Step::Refused { number: 1, refusal: Some(REJECTED) }
+        );
+        assert_eq!(runner.poll(2, &rejecting(&[asked])), Step::Finished);
     }
 
     #[test]
     fn what_is_refused_to_somebody_else_is_not_the_program_s() {
         let mut runner = Running::new(&program(1));
         let before = runner.1.next();
-        let (asked, begun) = runner.begin(0, &done(0)).unwrap();
+        let (asked, _) = runner.begin(0, &done(&[])).unwrap();
         let others = [before, runner.1.next(), runner.1.next()];
-        assert_eq!(runner.poll(1, &refusing(&others)), Step::Wait);
-        let finished = Snapshot { finished_move: begun.id, ..refusing(&others) };
+        assert_eq!(runner.poll(1, &rejecting(&others)), Step::Wait);
+        let finished = Snapshot { motions: done(&[asked]).motions, ..rejecting(&others) };
         assert_eq!(runner.poll(2, &finished), Step::Wait);
         assert!(runner.begin(200_000_000, &finished).is_none());
         assert!(runner.begin(200_000_001, &finished).is_some_and(|(next, _)| next > asked));
@@ -345,6 +356,6 @@ mod tests {
 
     #[test]
     fn a_program_without_moves_is_finished_at_once() {
-        assert_eq!(Running::new(&Program::default()).poll(0, &done(0)), Step::Finished);
+        assert_eq!(Running::new(&Program::default()).poll(0, &done(&[])), Step::Finished);
     }
 }

@@ -10,8 +10,7 @@ use std::thread;
 use std::time::Duration;
 
 use takt_rt::linux::MonotonicClock;
-use takt_rt::port::Clock;
-use takt_rt::time::Nanoseconds;
+use takt_rt::{Clock, Nanoseconds};
 
 /// The start of the first slot at or after `earliest_ns`.
 pub(super) fn first_slot_after(earliest_ns: Nanoseconds, period_ns: Nanoseconds) -> Nanoseconds {

@@ -3,12 +3,8 @@
 use std::sync::mpsc;
 use std::thread::{Builder, JoinHandle};
 
-use takt_rt::cycle::{Cycle, Flow, SlotPlan};
-use takt_rt::door::Door;
-use takt_rt::engine::Engine;
 use takt_rt::linux::{PacedClock, PageFaults, RealtimeThread, ThreadConfig, ThreadReport};
-use takt_rt::port::{BusPort, Clock};
-use takt_rt::time::Grid;
+use takt_rt::{BusPort, Clock, Cycle, Engine, Flow, Grid, HostInterface, SlotPlan};
 
 use super::quiet;
 use crate::config::Realtime;
@@ -60,7 +56,7 @@ pub struct Work<P, D> {
     /// The buses.
     pub ports: Vec<P>,
     /// The door to the rest.
-    pub door: D,
+    pub host: D,
     /// A fixed spin guard; `None` measures, a tenth of the period at most.
     pub spin_guard_ns: Option<u64>,
     /// Whether a refused step ends the thread before its first cycle.
@@ -94,7 +90,7 @@ pub enum StartError {
 pub fn start<P, D>(config: ThreadConfig, work: Work<P, D>) -> Result<Running, StartError>
 where
     P: BusPort + Send + 'static,
-    D: Door + Send + 'static,
+    D: HostInterface + Send + 'static,
 {
     let (say, hear) = mpsc::sync_channel(1);
     let body = move || loop_body(&config, work, &say);
@@ -120,7 +116,7 @@ impl Running {
     }
 }
 
-fn loop_body<P: BusPort, D: Door>(
+fn loop_body<P: BusPort, D: HostInterface>(
     config: &ThreadConfig,
     mut work: Work<P, D>,
     say: &mpsc::SyncSender<Result<Begun, Box<ThreadReport>>>,
@@ -141,7 +137,7 @@ fn loop_body<P: BusPort, D: Door>(
     let epoch_ns = quiet::first_slot_after(clock.now_ns() + LEAD_IN_NS, period_ns);
     let mut cycle = Cycle::new(Grid::new(epoch_ns, period_ns)?, work.plan);
     let before = realtime.page_faults();
-    while cycle.run(&mut work.engine, &mut clock, &mut work.ports, &mut work.door) == Flow::Continue {}
+    while cycle.run(&mut work.engine, &mut clock, &mut work.ports, &mut work.host) == Flow::Continue {}
     let page_faults = realtime.page_faults().since(before);
     Some(Ended { page_faults, spin_guard_ns: clock.guard_ns() })
 }

@@ -4,10 +4,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, mpsc};
 use std::time::Duration;
 
-use takt_rt::door::{Request, Snapshot};
 use takt_rt::linux::MonotonicClock;
-use takt_rt::port::Clock;
-use takt_rt::stop::StopCategory;
+use takt_rt::{Clock, Request, Snapshot, StopCategory};
 
 use super::assemble::{self, AssembleError};
 use super::channels::{ChannelSizes, Observer, RequestNumbers, Streamer, channels};
@@ -144,7 +142,7 @@ pub(super) fn lead(
         engine,
         plan: assemble::slot_plan(config),
         ports,
-        door: rt,
+        host: rt,
         spin_guard_ns: config.realtime.spin_guard_ns,
         is_realtime_required: options.is_realtime_required,
     };

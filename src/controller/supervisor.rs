@@ -5,14 +5,14 @@
 //!     └────────── any failure, stop or interrupt ─────────┴──────────↗
 //! ```
 //!
-//! [`Supervisor::poll`] is called now and then with the host's side of the door. It never blocks, so it runs beside the
+//! [`Supervisor::poll`] is called now and then with the host's side of the host interface. It never blocks, so it runs beside the
 //! real-time thread as well as between the cycles of a run in virtual time.
 
 use std::collections::VecDeque;
 
-use takt_rt::door::{Asked, AxisSnapshot, Request, Snapshot};
-use takt_rt::frame::Frame;
-use takt_rt::stop::{Phase, Rule, StopCategory, StopReason};
+use takt_rt::{
+    AxisSnapshot, Frame, Phase, Request, RequestEnvelope, Rule, Snapshot, StopCategory, StopReason,
+};
 
 use super::channels::{HostSide, RequestNumbers};
 use super::outcome::{Interrupt, Outcome, Progress};
@@ -52,7 +52,7 @@ pub struct Supervisor {
     leave: Leave,
     program: ProgramRunner,
     facts: Vec<AxisFacts>,
-    outgoing: VecDeque<Asked>,
+    outgoing: VecDeque<RequestEnvelope>,
     numbers: RequestNumbers,
     interrupt: Option<Interrupt>,
     outcome: Option<Outcome>,
@@ -171,7 +171,7 @@ impl Supervisor {
                 // on until it shows, or until the engine waits no longer.
                 let is_off = matches!(snapshot.phase, Phase::Disabled | Phase::Passive);
                 if (is_off && elapsed_ns > 0) || elapsed_ns > PATIENCE_NS {
-                    self.ask(Request::Leave);
+                    self.ask(Request::Shutdown);
                     self.enter(Stage::Done, now_ns);
                 }
             }
@@ -289,7 +289,7 @@ impl Supervisor {
         match (self.interrupt, self.stage) {
             (None, _) | (_, Stage::Done | Stage::Cut) => {}
             (Some(Interrupt::Immediate), _) => {
-                self.ask(Request::Retire);
+                self.ask(Request::InhibitEnable);
                 self.ask(Request::Stop(StopCategory::Zero));
                 self.outcome.get_or_insert(Outcome::Interrupted);
                 self.enter(Stage::Cut, now_ns);
@@ -319,7 +319,7 @@ impl Supervisor {
 
     fn begin_disable(&mut self, now_ns: u64) {
         // In this order, so that nobody enables what has just been disabled.
-        self.ask(Request::Retire);
+        self.ask(Request::InhibitEnable);
         self.ask(Request::Disable);
         self.enter(Stage::Disable, now_ns);
     }
@@ -345,13 +345,13 @@ impl Supervisor {
                 self.unreached = silent.map(|failure| failure.axis).collect();
             }
             self.ask(Request::Sync(false));
-            self.ask(Request::Leave);
+            self.ask(Request::Shutdown);
             self.enter(Stage::Done, now_ns);
         }
     }
 
     fn ask(&mut self, request: Request) {
-        self.outgoing.push_back(Asked { id: self.numbers.next(), request });
+        self.outgoing.push_back(RequestEnvelope { id: self.numbers.next(), request });
     }
 
     fn enter(&mut self, stage: Stage, now_ns: u64) {
@@ -393,7 +393,7 @@ impl Supervisor {
 
 /// A stop that nobody asked for.
 fn own_stop(snapshot: &Snapshot) -> Option<StopReason> {
-    snapshot.stop.filter(|stop| stop.rule != Rule::Requested)
+    snapshot.stop.filter(|stop| stop.rule() != Rule::Requested)
 }
 
 /// Hands the frames of a procedure to the service channel. A frame that finds no room is lost like one on a bad bus:

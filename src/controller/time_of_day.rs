@@ -1,6 +1,6 @@
 //! Telling the cycle the time of day, which its clock does not know.
 
-use takt_rt::door::Request;
+use takt_rt::Request;
 
 use crate::canopen::time::since_epoch_ns;
 use crate::config::Config;

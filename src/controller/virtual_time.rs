@@ -4,11 +4,7 @@
 
 use std::sync::Arc;
 
-use takt_rt::cycle::{Cycle, Flow};
-use takt_rt::door::Snapshot;
-use takt_rt::engine::Engine;
-use takt_rt::port::{BusPort, Clock, Wake};
-use takt_rt::time::Grid;
+use takt_rt::{BusPort, Clock, Cycle, Engine, Flow, Grid, Snapshot, Wake};
 
 use super::assemble::{self, AssembleError};
 use super::channels::{ChannelSizes, HostSide, LogSide, RtSide, channels};
@@ -194,7 +190,7 @@ impl<P: BusPort> VirtualRun<P> {
         if let Some(rehearsal) = &self.rehearsal {
             rehearsal.observe(&self.host.snapshot());
         }
-        self.is_over = flow == Flow::Leave;
+        self.is_over = flow == Flow::Shutdown;
         !self.is_over
     }
 
@@ -231,7 +227,7 @@ impl<P: BusPort> VirtualRun<P> {
         &self.supervisor
     }
 
-    /// The host's side of the door, to command the group directly.
+    /// The host's side of the host interface, to command the group directly.
     pub fn host(&mut self) -> &mut HostSide {
         &mut self.host
     }

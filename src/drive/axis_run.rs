@@ -3,8 +3,7 @@
 
 mod answers;
 
-use takt_rt::frame::{Frame, Id};
-use takt_rt::time::Nanoseconds;
+use takt_rt::{Frame, Id, Nanoseconds};
 
 use super::facts::AxisFacts;
 use super::failure::Cause;

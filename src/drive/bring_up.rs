@@ -10,8 +10,7 @@
 //! Where the configuration gives the master a heartbeat, the drives watch it from the end of [`Stage::Configure`] on:
 //! it must be sent from before the bring-up until [`Leave`] is done, or until a failed bring-up has been left.
 
-use takt_rt::frame::Frame;
-use takt_rt::time::Nanoseconds;
+use takt_rt::{Frame, Nanoseconds};
 
 use super::axis_run::{AxisRun, Policy};
 use super::erob_canopen;

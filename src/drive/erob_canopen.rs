@@ -1,10 +1,7 @@
 //! ZeroErr eRob joints with CANopen firmware (eRunner manual 1.7, chapter 5; what real units add to it): the steps that
 //! bring one up, start it and leave it, and what its own error codes mean.
 
-use takt_rt::cia402::controlword;
-use takt_rt::frame::{Frame, Id};
-use takt_rt::pdo::CommandSlot;
-use takt_rt::time::Nanoseconds;
+use takt_rt::{CommandSlot, Frame, Id, Nanoseconds, controlword};
 
 use super::axis_run::OtherProtocol;
 use super::bring_up::BringUpTiming;

@@ -1,7 +1,6 @@
 //! What a bring-up learns of a drive.
 
-use takt_rt::cia402::State;
-use takt_rt::dialect::Dialect;
+use takt_rt::{Dialect, DriveState};
 
 use super::process_data::ProcessData;
 use super::step::{Fact, TextFact};
@@ -70,7 +69,7 @@ pub struct DeviceTexts {
 
 impl AxisFacts {
     /// The state in the last statusword.
-    pub const fn state(&self) -> State {
+    pub const fn state(&self) -> DriveState {
         self.dialect.state(self.statusword)
     }
 

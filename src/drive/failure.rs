@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use takt_rt::time::Nanoseconds;
+use takt_rt::Nanoseconds;
 
 use super::reported_mapping::MappingProblem;
 use super::step::{Access, Check};

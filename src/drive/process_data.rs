@@ -1,9 +1,8 @@
 //! Which objects travel in which PDO. Bring-up programs it, the cycle compiles it, and the bus arithmetic counts it.
 
-use takt_rt::axis::{Cadence, MAX_PDOS};
-use takt_rt::door::{AxisProcessData, MappedPdo, Request};
-use takt_rt::frame::Id;
-use takt_rt::pdo::{CommandSlot, MappedObject};
+use takt_rt::{
+    AxisProcessData, CommandSlot, Id, MAX_PDOS, MappedObject, MappedPdo, Request, TransmissionType,
+};
 
 use super::yz_aim;
 use crate::canopen::objects::PdoDirection;
@@ -33,7 +32,7 @@ pub struct PdoPlan {
     /// What it carries, in order.
     pub objects: Vec<MappedObject>,
     /// When it is sent, if by us.
-    pub cadence: Cadence,
+    pub cadence: TransmissionType,
 }
 
 impl PdoPlan {
@@ -108,11 +107,11 @@ impl ProcessData {
         let transmission_type = axis.transmission_type;
         let receive = |number, objects| PdoPlan {
             transmission_type,
-            ..pdo(PdoDirection::Receive, number, axis.node, objects, Cadence::EveryCycle)
+            ..pdo(PdoDirection::Receive, number, axis.node, objects, TransmissionType::EveryCycle)
         };
         let transmit = |(number, objects)| PdoPlan {
             transmission_type,
-            ..pdo(PdoDirection::Transmit, number, axis.node, objects, Cadence::EveryCycle)
+            ..pdo(PdoDirection::Transmit, number, axis.node, objects, TransmissionType::EveryCycle)
         };
         Self {
             commands: vec![receive(1, Self::needed_commands(axis))],
@@ -132,19 +131,19 @@ impl ProcessData {
             let answers_sync = number == 2 && yz_aim::answers_sync(axis);
             PdoPlan {
                 transmission_type: if answers_sync { 1 } else { 255 },
-                ..pdo(PdoDirection::Transmit, number, axis.node, objects, Cadence::EveryCycle)
+                ..pdo(PdoDirection::Transmit, number, axis.node, objects, TransmissionType::EveryCycle)
             }
         };
         let position = vec![CONTROLWORD, OPERATION_MODE, TARGET_POSITION];
         let (commands, answer) = match axis.control {
             Control::ProfileVelocity => {
                 let velocity = vec![CONTROLWORD, OPERATION_MODE, TARGET_VELOCITY];
-                (vec![receive(3, velocity, Cadence::EveryCycle)], 3)
+                (vec![receive(3, velocity, TransmissionType::EveryCycle)], 3)
             }
-            Control::ProfilePosition => (vec![receive(1, position, Cadence::EveryCycle)], 1),
+            Control::ProfilePosition => (vec![receive(1, position, TransmissionType::EveryCycle)], 1),
             _ => {
-                let interpolated = receive(4, vec![TARGET_POSITION], Cadence::EveryCycle);
-                (vec![receive(1, position, Cadence::OnControlword), interpolated], 4)
+                let interpolated = receive(4, vec![TARGET_POSITION], TransmissionType::EveryCycle);
+                (vec![receive(1, position, TransmissionType::OnControlword), interpolated], 4)
             }
         };
         let feedback = if yz_aim::answers_sync(axis) { 2 } else { answer };
@@ -172,7 +171,7 @@ impl ProcessData {
 
     /// The PDO among the unused ones with which the drive answers each command at once.
     pub fn answer(&self) -> Option<&PdoPlan> {
-        let command = self.commands.iter().find(|command| command.cadence == Cadence::EveryCycle)?;
+        let command = self.commands.iter().find(|command| command.cadence == TransmissionType::EveryCycle)?;
         self.unused.iter().find(|pdo| pdo.number == command.number)
     }
 }
@@ -182,7 +181,7 @@ fn pdo(
     number: u8,
     node: u8,
     objects: Vec<MappedObject>,
-    cadence: Cadence,
+    cadence: TransmissionType,
 ) -> PdoPlan {
     let id = pdo_id(direction, number, node);
     PdoPlan { number, id, transmission_type: 0, objects, cadence }

@@ -1,9 +1,7 @@
 //! The process data of a drive as the drive itself reports it: which of its PDOs carry what the axis needs, or why they
 //! do not.
 
-use takt_rt::axis::Cadence;
-use takt_rt::frame::Id;
-use takt_rt::pdo::{CommandSlot, MappedObject};
+use takt_rt::{CommandSlot, Id, MappedObject, TransmissionType};
 
 use super::process_data::{PdoPlan, ProcessData, pdo_id};
 use crate::canopen::object::ObjectAddress;
@@ -197,7 +195,7 @@ fn by_content(
         if reported != Some(expected) {
             return Err(MappingProblem::TransmissionType { direction, number, reported, expected });
         }
-        plan_of(pdo, axis, Cadence::EveryCycle)
+        plan_of(pdo, axis, TransmissionType::EveryCycle)
     };
     for pdo in &commands {
         check_values(pdo, &ProcessData::needed_commands(axis))?;
@@ -267,7 +265,11 @@ fn check_values(pdo: &PdoConfiguration, needed: &[MappedObject]) -> Result<(), M
     }
 }
 
-fn plan_of(pdo: &PdoConfiguration, axis: &Axis, cadence: Cadence) -> Result<PdoPlan, MappingProblem> {
+fn plan_of(
+    pdo: &PdoConfiguration,
+    axis: &Axis,
+    cadence: TransmissionType,
+) -> Result<PdoPlan, MappingProblem> {
     let PdoConfiguration { direction, number, id: reported, transmission_type, .. } = *pdo;
     let expected = pdo_id(direction, number as u8, axis.node);
     if reported != Some(expected) {

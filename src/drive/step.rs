@@ -1,8 +1,7 @@
 //! A procedure on one drive as a list of steps: plain data that a family of drives writes down and
 //! [`AxisRun`](super::axis_run::AxisRun) carries out.
 
-use takt_rt::cia402::{OperationMode, State};
-use takt_rt::time::Nanoseconds;
+use takt_rt::{DriveState, Nanoseconds, OperationMode};
 
 use crate::canopen::dcf::Download;
 use crate::canopen::nmt::{NmtCommand, NmtState};
@@ -153,7 +152,7 @@ impl Check {
             Self::Masked { value: wanted, mask } => (value ^ wanted) & i64::from(mask) == 0,
             Self::Profile(profile) => value & 0xFFFF == i64::from(profile),
             Self::Supports(mode) => value & i64::from(mode.supported_bit()) != 0,
-            Self::NoTorque => !State::decode(value as u16).has_torque(),
+            Self::NoTorque => !DriveState::decode(value as u16).has_torque(),
             Self::AtMost(limit) => value.abs() <= limit,
             Self::Positive => value > 0,
         }
@@ -178,7 +177,7 @@ impl Check {
     /// What a value means, beside the number itself.
     pub fn meaning(self, value: i64) -> Option<String> {
         match self {
-            Self::NoTorque => Some(format!("{:?}", State::decode(value as u16))),
+            Self::NoTorque => Some(format!("{:?}", DriveState::decode(value as u16))),
             Self::Supports(_) => {
                 let supported =
                     OperationMode::ALL.into_iter().filter(|mode| Self::Supports(*mode).passes(value));

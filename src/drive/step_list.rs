@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use takt_rt::time::Nanoseconds;
+use takt_rt::Nanoseconds;
 
 use super::bring_up::BringUpTiming;
 use super::step::{Action, Check, Fact, ReadBack, Source, Step, When};

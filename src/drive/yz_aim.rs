@@ -4,8 +4,7 @@
 //! Its PDOs are fixed, it shows no mode of operation, it has no emergency object, and objects that it does not know get
 //! no answer at all.
 
-use takt_rt::cia402::controlword;
-use takt_rt::time::Nanoseconds;
+use takt_rt::{Nanoseconds, controlword};
 
 use super::bring_up::BringUpTiming;
 use super::step::{Action, Check, Fact, ReadBack, Source, Step, When};

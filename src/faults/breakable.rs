@@ -1,8 +1,6 @@
 //! What a port offers to those who break things behind it.
 
-use takt_rt::frame::Frame;
-use takt_rt::port::BusPort;
-use takt_rt::time::Nanoseconds;
+use takt_rt::{BusPort, Frame, Nanoseconds};
 
 use crate::bus::trace::TracedPort;
 use crate::sim::{AfflictError, Defect, DriveFault, SimulatedBus, UnknownNode};

@@ -2,9 +2,7 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use takt_rt::door::Snapshot;
-use takt_rt::stop::Phase;
-use takt_rt::time::Nanoseconds;
+use takt_rt::{Nanoseconds, Phase, Snapshot};
 
 /// What a fault waits for before its time counts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]

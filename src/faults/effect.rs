@@ -1,7 +1,6 @@
 //! What a fault does.
 
-use takt_rt::frame::{Frame, FrameKind, Id};
-use takt_rt::time::Nanoseconds;
+use takt_rt::{Frame, FrameKind, Id, Nanoseconds};
 
 use super::breakable::DriveTrouble;
 

@@ -1,7 +1,6 @@
 //! Somebody else on the bus.
 
-use takt_rt::frame::Frame;
-use takt_rt::time::Nanoseconds;
+use takt_rt::{Frame, Nanoseconds};
 
 use super::effect::ForeignFrames;
 use crate::canopen::nmt::{ErrorControl, NmtState};

@@ -3,9 +3,7 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use takt_rt::frame::Frame;
-use takt_rt::port::{BusHealth, BusPort, BusState, ReceiveBatch, Received};
-use takt_rt::time::Nanoseconds;
+use takt_rt::{BusHealth, BusPort, BusState, Frame, Nanoseconds, ReceiveBatch, Received};
 
 use super::breakable::{Breakable, CannotBreak, DriveTrouble, Heard};
 use super::cue::Cues;

@@ -3,8 +3,7 @@
 use std::fmt;
 use std::sync::Arc;
 
-use takt_rt::door::Snapshot;
-use takt_rt::time::{NANOSECONDS_PER_SECOND, Nanoseconds};
+use takt_rt::{NANOSECONDS_PER_SECOND, Nanoseconds, Snapshot};
 
 use super::cue::{Cue, Cues};
 use super::port::FaultyPort;

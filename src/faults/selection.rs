@@ -2,7 +2,7 @@
 
 use std::ops::RangeInclusive;
 
-use takt_rt::frame::Frame;
+use takt_rt::Frame;
 
 use crate::sim::random::Random;
 
@@ -141,7 +141,7 @@ impl Selector {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use takt_rt::frame::Id;
+    use takt_rt::Id;
 
     fn frame(id: u32) -> Frame {
         Frame::of(Id::base(id).unwrap(), [])

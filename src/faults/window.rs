@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-use takt_rt::time::Nanoseconds;
+use takt_rt::Nanoseconds;
 
 use super::cue::{Cue, Cues};
 
@@ -151,8 +151,7 @@ impl Timer {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use takt_rt::door::Snapshot;
-    use takt_rt::stop::Phase;
+    use takt_rt::{Phase, Snapshot};
 
     fn timer(window: Window) -> (Timer, Arc<Cues>) {
         let cues = Arc::new(Cues::default());

@@ -2,9 +2,7 @@
 
 use std::time::Duration;
 
-use takt_rt::cycle::SlotPlan;
-use takt_rt::door::Request;
-use takt_rt::port::BusHealth;
+use takt_rt::{BusHealth, Request, SlotPlan};
 
 use crate::bus::interface_status;
 use crate::bus::port::{OpenError, Port};
@@ -132,12 +130,12 @@ pub fn measure(
         None => vec![],
     };
     let has_bus = !ports.is_empty();
-    let (door, mut host, mut log) = channels(&ChannelSizes::of(&config));
+    let (rt, mut host, mut log) = channels(&ChannelSizes::of(&config));
     let work = Work {
         engine: Box::new(assemble::engine(&config)?),
         plan: SlotPlan::usual(config.cycle.period_ns, config.cycle.command_phase_ns),
         ports,
-        door,
+        host: rt,
         spin_guard_ns: match pacing {
             Pacing::Sleep => Some(0),
             Pacing::SleepThenSpin => options.realtime.spin_guard_ns,
@@ -153,7 +151,7 @@ pub fn measure(
         collect(&mut log, &mut statistics, options.cycles);
         let done = statistics.cycles + log.records_dropped();
         if done >= options.cycles || !watch(done) {
-            let _ = host.request(Request::Leave);
+            let _ = host.request(Request::Shutdown);
         }
         quiet::sleep(PAUSE, options.period_ns);
     }

@@ -1,7 +1,7 @@
 //! What was measured, as data: what `takt jitter --json` prints.
 
 use serde::Serialize;
-use takt_rt::port::BusHealth;
+use takt_rt::BusHealth;
 
 use super::measurement::{JitterOptions, Measurement, Pacing};
 use crate::telemetry::{LatencyReport, RealtimeReport};

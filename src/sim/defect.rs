@@ -1,7 +1,7 @@
 //! What can be wrong with a simulated drive or its joint beyond the causes of alarms
 //! ([`DriveFault`](super::DriveFault)): things that the drive itself may not even notice.
 
-use takt_rt::frame::Frame;
+use takt_rt::Frame;
 
 /// Something wrong with a drive or its joint. Some are states that last until they are mended, the others
 /// ([`Defect::is_event`]) just happen.

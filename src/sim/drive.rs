@@ -2,9 +2,7 @@
 //! mailbox. It has no thread and asks no clock, so that the same drive runs on a simulated bus in virtual time, on one
 //! in wall-clock time, and behind a real interface.
 
-use takt_rt::cia402::State;
-use takt_rt::frame::Frame;
-use takt_rt::time::Nanoseconds;
+use takt_rt::{DriveState, Frame, Nanoseconds};
 
 use super::defect::{Defect, Unsupported};
 use super::mailbox::Mailbox;
@@ -56,7 +54,7 @@ pub struct Observation {
     /// What the drive reports as position: counts.
     pub position_counts: i32,
     /// The state of its CiA 402 machine.
-    pub state: State,
+    pub state: DriveState,
     /// Its statusword (object 6041).
     pub statusword: u16,
     /// Its error code (object 603F).

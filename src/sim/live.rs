@@ -2,10 +2,9 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use takt_rt::frame::Frame;
+use takt_rt::Frame;
 use takt_rt::linux::{MonotonicClock, SocketCanPort};
-use takt_rt::port::{BusHealth, BusPort, Clock, ReceiveBatch};
-use takt_rt::time::Nanoseconds;
+use takt_rt::{BusHealth, BusPort, Clock, Nanoseconds, ReceiveBatch};
 
 use super::drive::Drive;
 use super::mailbox::{Mailbox, Order};
@@ -131,7 +130,7 @@ mod tests {
     use std::os::unix::net::UnixDatagram;
     use std::path::Path;
 
-    use takt_rt::frame::Id;
+    use takt_rt::Id;
 
     use super::*;
 

@@ -2,9 +2,7 @@
 
 use std::collections::VecDeque;
 
-use takt_rt::frame::Frame;
-use takt_rt::port::{BusHealth, BusPort, ReceiveBatch, Received};
-use takt_rt::time::Nanoseconds;
+use takt_rt::{BusHealth, BusPort, Frame, Nanoseconds, ReceiveBatch, Received};
 
 use crate::canopen::lss::{BitTiming, Inquiry, LssAddress, LssMode, LssRequest, LssResponse, LssResult};
 use crate::canopen::nmt::{ErrorControl, NmtState};

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use takt_rt::frame::{Frame, FrameKind};
+use takt_rt::{Frame, FrameKind};
 
 /// In which order a node's frames go to the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -85,7 +85,7 @@ pub(super) fn priority(frame: &Frame) -> (u64, bool) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use takt_rt::frame::Id;
+    use takt_rt::Id;
 
     fn frame(id: u32, byte: u8) -> Frame {
         Frame::of(Id::base(id).unwrap(), [byte])

@@ -5,9 +5,7 @@
 //! acknowledged (there is always another receiver). Two stations that send the same identifier at once would
 //! destroy each other's frames on a real bus; here the one with the lower number goes first.
 
-use takt_rt::frame::Frame;
-use takt_rt::time::Nanoseconds;
-use takt_rt::wire::{INTERMISSION_BITS, WireLength, bits_ns};
+use takt_rt::{Frame, INTERMISSION_BITS, Nanoseconds, WireLength, bits_ns};
 
 use super::mailbox::{Mailbox, Order, priority};
 
@@ -145,7 +143,7 @@ impl Medium {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use takt_rt::frame::Id;
+    use takt_rt::Id;
 
     const RATES: BitRates = BitRates { nominal: 1_000_000, data: None };
 

@@ -21,8 +21,8 @@
 //!
 //! ```
 //! use takt::sim::{BitRates, SimulatedBus};
-//! use takt_rt::frame::{Frame, Id};
-//! use takt_rt::port::{BusPort, ReceiveBatch};
+//! use takt_rt::{Frame, Id};
+//! use takt_rt::{BusPort, ReceiveBatch};
 //!
 //! # fn parameters() -> takt::sim::erob::ErobParameters {
 //! #     use takt::sim::erob::ErobParameters;
@@ -66,4 +66,4 @@ pub use live::LiveDrives;
 pub use mailbox::{Mailbox, Order};
 pub use medium::{BitRates, Medium, Transmission};
 pub use port::{AfflictError, SimulatedBus, UnknownNode};
-pub use takt_rt::wire::{INTERMISSION_BITS, WireLength, bits_ns};
+pub use takt_rt::{INTERMISSION_BITS, WireLength, bits_ns};

@@ -7,9 +7,7 @@
 
 use std::collections::VecDeque;
 
-use takt_rt::frame::Frame;
-use takt_rt::port::{BusHealth, BusPort, BusState, ReceiveBatch, Received};
-use takt_rt::time::Nanoseconds;
+use takt_rt::{BusHealth, BusPort, BusState, Frame, Nanoseconds, ReceiveBatch, Received};
 
 use super::defect::{Defect, Unsupported};
 use super::drive::{Drive, DriveFault, Observation};

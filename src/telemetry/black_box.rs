@@ -10,10 +10,10 @@ use std::fs;
 use std::path::PathBuf;
 
 use mcap::{McapError, McapResult};
-use takt_rt::cia402::State;
-use takt_rt::record::{CycleRecord, Event, EventKind};
-use takt_rt::stop::{Origin, Phase, Rule, StopCategory, StopReason};
-use takt_rt::time::Nanoseconds;
+use takt_rt::{
+    CycleRecord, DriveState, Event, EventKind, Nanoseconds, Origin, Phase, Rule, StopCategory, StopCause,
+    StopReason,
+};
 
 use super::destination::Destination;
 use super::machine::Machine;
@@ -67,7 +67,7 @@ impl Fault {
     /// The rule by its key, for the name of the file.
     pub fn key(&self) -> &'static str {
         match self {
-            Self::Stop(stop) => words::rule_key(stop.rule),
+            Self::Stop(stop) => words::rule_key(stop.rule()),
             Self::Drive { .. } => words::rule_key(Rule::DriveFault),
             Self::ThreadDied => "thread_died",
             Self::CallbackPanicked(_) => "callback_panicked",
@@ -81,10 +81,8 @@ impl Fault {
             Self::Drive { axis, code, slot, phase } => {
                 let as_stop = StopReason {
                     category: StopCategory::Zero,
-                    rule: Rule::DriveFault,
+                    cause: StopCause::Fault(takt_rt::Fault::DriveFault { error_code: *code }),
                     origin: Origin::Axis(*axis),
-                    value: f64::from(*code),
-                    limit: 0.0,
                     slot: *slot,
                     phase: *phase,
                 };
@@ -110,8 +108,9 @@ impl Fault {
                 add("slot", stop.slot.to_string());
                 add("category", (stop.category as u8).to_string());
                 add("phase", words::phase(stop.phase).to_owned());
-                add("value", stop.value.to_string());
-                add("limit", stop.limit.to_string());
+                let (value, limit) = stop.cause.numbers();
+                add("value", value.to_string());
+                add("limit", limit.to_string());
                 match stop.origin {
                     Origin::Group => {}
                     Origin::Axis(axis) => add("axis", machine.axis_name(axis)),
@@ -143,7 +142,7 @@ pub struct BlackBox {
     directory: PathBuf,
     wall_clock: WallClock,
     started_ns: Nanoseconds,
-    drives: Vec<Option<State>>,
+    drives: Vec<Option<DriveState>>,
     open: Option<OpenFile>,
     files: Vec<PathBuf>,
     replaced: u64,
@@ -188,7 +187,7 @@ impl BlackBox {
         self.past.event(event);
         self.write(|recording| recording.event(event, text));
         match event.kind {
-            EventKind::Stop(stop) if stop.rule != Rule::Requested => Some(Fault::Stop(stop)),
+            EventKind::Stop(stop) if stop.rule() != Rule::Requested => Some(Fault::Stop(stop)),
             EventKind::DriveState { axis, state, .. } => {
                 let known = self.drives.get_mut(usize::from(axis))?.replace(state);
                 let phase = self.past.last_phase();

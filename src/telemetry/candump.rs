@@ -3,7 +3,7 @@
 
 use std::io::{self, BufWriter, Write};
 
-use takt_rt::time::{NANOSECONDS_PER_SECOND, Nanoseconds};
+use takt_rt::{NANOSECONDS_PER_SECOND, Nanoseconds};
 
 use super::destination::Opened;
 use super::past::OnBus;

@@ -5,8 +5,7 @@ use std::path::PathBuf;
 use std::sync::{Arc, OnceLock};
 
 use mcap::McapError;
-use takt_rt::record::Event;
-use takt_rt::time::Nanoseconds;
+use takt_rt::{Event, Nanoseconds};
 
 use super::black_box::{BlackBox, BlackBoxOptions, Fault, reason};
 use super::candump::CandumpLog;

@@ -3,8 +3,7 @@
 
 mod decode;
 
-use takt_rt::frame::FrameKind;
-use takt_rt::record::{AxisRecord, CycleRecord, Event, EventKind};
+use takt_rt::{AxisRecord, CycleRecord, Event, EventKind, FrameKind};
 
 use super::cdr::CdrEncoder;
 use crate::bus::trace::{TracedFrame, TracedHealth};
@@ -68,7 +67,9 @@ pub const READ: [&MessageType; 4] = [&CYCLE, &AXIS, &EVENT, &BUS];
 
 /// What of a definition settles where the fields are: everything but comments and constants.
 fn layout(definition: &str) -> Vec<&str> {
-    let lines = definition.lines().map(str::trim);
+    // Recordings of earlier versions have another name for the field `reason`.
+    let renamed = |line| if line == "uint8 objection" { "uint8 reason" } else { line };
+    let lines = definition.lines().map(str::trim).map(renamed);
     lines.filter(|line| !line.is_empty() && !line.starts_with('#') && !line.contains('=')).collect()
 }
 
@@ -149,12 +150,12 @@ impl EventFields {
                 bus: stop.origin.bus(),
                 phase_from: stop.phase as u8,
                 category: stop.category as u8,
-                rule: stop.rule as u8,
-                value: stop.value,
-                limit: stop.limit,
+                rule: stop.rule() as u8,
+                value: stop.cause.numbers().0,
+                limit: stop.cause.numbers().1,
                 ..none
             },
-            EventKind::MoveFinished { id } => Self { kind: 2, move_id: id, ..none },
+            EventKind::MotionFinished { request } => Self { kind: 2, move_id: request.0 as u32, ..none },
             EventKind::DriveState { axis, state, statusword } => {
                 Self { kind: 3, axis: Some(axis), drive_state: state as u8, statusword, ..none }
             }
@@ -168,13 +169,13 @@ impl EventFields {
             },
             EventKind::MissedSlots { count } => Self { kind: 5, missed_slots: count, ..none },
             EventKind::Timing { level } => Self { kind: 7, timing_level: level as u8, ..none },
-            EventKind::Refused(refused) => Self {
+            EventKind::Rejected(refused) => Self {
                 kind: 6,
                 axis: refused.axis,
                 phase_from: refused.phase as u8,
-                value: refused.value,
-                limit: refused.limit,
-                refusal: Some((refused.request as u8, refused.objection as u8)),
+                value: refused.reason.numbers().0,
+                limit: refused.reason.numbers().1,
+                refusal: Some((refused.request as u8, refused.reason.number())),
                 ..none
             },
         }
@@ -242,10 +243,10 @@ pub fn encode_bus(TracedHealth { at_ns, health }: &TracedHealth, encoder: &mut C
 #[cfg(test)]
 mod tests {
     use super::*;
-    use takt_rt::cia402::State;
-    use takt_rt::refusal::{Objection, Refusal, RequestKind};
-    use takt_rt::stop::{Origin, Phase, Rule, StopCategory, StopReason};
-    use takt_rt::watch::TimingLevel;
+    use takt_rt::{
+        DriveState, Fault, Origin, Phase, RejectReason, RequestError, RequestId, RequestKind, Rule,
+        StopCategory, StopCause, StopReason, TimingLevel,
+    };
 
     /// The constants of a definition that stand in front of `field`, with the names as Rust writes them.
     fn constants(message: &MessageType, field: &str) -> Vec<(String, u8)> {
@@ -276,6 +277,7 @@ mod tests {
         assert!([0, 1, 3].iter().all(|missing| EVENT.can_be_read_as(&earlier(*missing))));
         assert!(!EVENT.can_be_read_as(&earlier(2)) && !EVENT.can_be_read_as(&earlier(4)));
         assert!(!EVENT.can_be_read_as(&(earlier(0) + "\nuint8 another")));
+        assert!(EVENT.can_be_read_as(&EVENT.definition.replace("uint8 reason", "uint8 objection")));
         let other = earlier(3).replace("uint64 slot", "uint32 slot");
         assert!(!EVENT.can_be_read_as(&other) && !CYCLE.can_be_read_as(""));
     }
@@ -284,7 +286,7 @@ mod tests {
     fn the_constants_in_the_schemas_are_those_of_the_records() {
         let phases = Phase::ALL.map(|phase| (format!("{phase:?}"), phase as u8));
         assert_eq!(constants(&CYCLE, "phase"), phases);
-        let states = State::ALL.map(|state| (format!("{state:?}"), state as u8));
+        let states = DriveState::ALL.map(|state| (format!("{state:?}"), state as u8));
         assert_eq!(constants(&AXIS, "state"), states);
         assert_eq!(
             constants(&BUS, "state"),
@@ -294,8 +296,11 @@ mod tests {
         assert_eq!(constants(&EVENT, "rule"), rules);
         let requests = RequestKind::ALL.map(|request| (format!("Request{request:?}"), request as u8));
         assert_eq!(constants(&EVENT, "request"), requests);
-        let objections = Objection::ALL.map(|objection| (format!("Objection{objection:?}"), objection as u8));
-        assert_eq!(constants(&EVENT, "objection"), objections);
+        let reasons = RejectReason::ALL.map(|reason| {
+            let debug = format!("{reason:?}");
+            (format!("Reason{}", debug.split(' ').next().unwrap()), reason.number())
+        });
+        assert_eq!(constants(&EVENT, "reason"), reasons);
     }
 
     #[test]
@@ -304,23 +309,19 @@ mod tests {
             EventKind::PhaseChanged { from: Phase::Passive, to: Phase::Disabled },
             EventKind::Stop(StopReason {
                 category: StopCategory::One,
-                rule: Rule::DriveFault,
+                cause: StopCause::Fault(Fault::DriveFault { error_code: 0 }),
                 origin: Origin::Axis(3),
-                value: 0.0,
-                limit: 0.0,
                 slot: 0,
                 phase: Phase::Moving,
             }),
-            EventKind::MoveFinished { id: 1 },
-            EventKind::DriveState { axis: 0, state: State::NotReadyToSwitchOn, statusword: 0 },
+            EventKind::MotionFinished { request: RequestId(1) },
+            EventKind::DriveState { axis: 0, state: DriveState::NotReadyToSwitchOn, statusword: 0 },
             EventKind::Emergency { axis: 0, code: 0, register: 0, manufacturer: [0; 5] },
             EventKind::MissedSlots { count: 1 },
-            EventKind::Refused(Refusal {
+            EventKind::Rejected(RequestError {
                 request: RequestKind::Move,
-                objection: Objection::Phase,
+                reason: RejectReason::Phase,
                 axis: None,
-                value: 0.0,
-                limit: 0.0,
                 phase: Phase::Moving,
             }),
             EventKind::Timing { level: TimingLevel::Normal },

@@ -2,10 +2,9 @@
 
 use std::collections::VecDeque;
 
-use takt_rt::frame::{Frame, FrameKind, Id};
-use takt_rt::record::{AxisRecord, CycleRecord, Event, MAX_AXES, Timing};
-use takt_rt::stop::Phase;
-use takt_rt::time::Nanoseconds;
+use takt_rt::{
+    AxisRecord, CycleRecord, CycleTiming, Event, Frame, FrameKind, Id, MAX_AXES, Nanoseconds, Phase,
+};
 
 use crate::bus::trace::{TracedFrame, TracedHealth};
 
@@ -20,7 +19,7 @@ const HEALTH_CHANGES: usize = 4096;
 /// A cycle without its axes.
 #[derive(Clone, Copy)]
 struct Times {
-    timing: Timing,
+    timing: CycleTiming,
     phase: Phase,
     is_commanded: bool,
 }
@@ -267,13 +266,13 @@ fn frame(id: u32, kind: u8, length: u8, payload: &[u8]) -> Option<Frame> {
 mod tests {
     use super::*;
     use std::convert::Infallible;
-    use takt_rt::record::EventKind;
+    use takt_rt::EventKind;
 
     const CYCLE_NS: Nanoseconds = 1_000_000;
 
     fn record(slot: u64) -> CycleRecord {
         let mut record = CycleRecord { axis_count: 2, phase: Phase::Moving, ..CycleRecord::default() };
-        record.timing = Timing { slot, slot_start_ns: slot * CYCLE_NS, ..Timing::default() };
+        record.timing = CycleTiming { slot, slot_start_ns: slot * CYCLE_NS, ..CycleTiming::default() };
         record.axes[0].position = slot as f64;
         record.axes[1].error_code = slot as u16;
         record
@@ -339,7 +338,7 @@ mod tests {
         };
         let before = sizes(&past);
         let frame = Frame::of(Id::canopen(0x180, 1), [0; 8]);
-        let health = TracedHealth { at_ns: 1, health: takt_rt::port::BusHealth::default() };
+        let health = TracedHealth { at_ns: 1, health: takt_rt::BusHealth::default() };
         for slot in 0..50 {
             past.cycle(&record(slot));
             for at in 0..200 {

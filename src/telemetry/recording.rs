@@ -8,8 +8,7 @@ use std::io::{BufWriter, Write};
 use mcap::records::{MessageHeader, Metadata};
 use mcap::write::NoSeek;
 use mcap::{McapError, McapResult, WriteOptions};
-use takt_rt::record::{CycleRecord, Event};
-use takt_rt::stop::Phase;
+use takt_rt::{CycleRecord, Event, Phase};
 
 use super::cdr::CdrEncoder;
 use super::destination::Opened;

@@ -4,10 +4,7 @@ use std::fs;
 use std::path::PathBuf;
 
 use serde::Serialize;
-use takt_rt::door::Snapshot;
-use takt_rt::port::{BusHealth, BusState};
-use takt_rt::stop::StopReason;
-use takt_rt::time::{NANOSECONDS_PER_SECOND, Nanoseconds};
+use takt_rt::{BusHealth, BusState, NANOSECONDS_PER_SECOND, Nanoseconds, Snapshot, StopReason};
 
 use super::logger::LogSummary;
 use super::machine::{AxisDescription, BusDescription, Machine, SetPointMagnitudes};
@@ -357,11 +354,11 @@ impl StopReport {
         Self {
             category: stop.category as u8,
             reason: words::stop_cause(stop, machine),
-            rule: words::rule_key(stop.rule),
+            rule: words::rule_key(stop.rule()),
             axis: stop.axis().map(|axis| machine.axis_name(axis)),
             bus: stop.origin.bus().map(|bus| machine.bus_name(bus)),
-            value: stop.value,
-            limit: stop.limit,
+            value: stop.cause.numbers().0,
+            limit: stop.cause.numbers().1,
             slot: stop.slot,
             phase: words::phase(stop.phase),
         }

@@ -1,9 +1,7 @@
 //! What is reckoned from the cycle records while they pass.
 
 use hdrhistogram::Histogram;
-use takt_rt::record::{AxisRecord, CycleRecord};
-use takt_rt::stop::Phase;
-use takt_rt::time::Nanoseconds;
+use takt_rt::{AxisRecord, CycleRecord, Nanoseconds, Phase};
 
 use super::machine::SetPointMagnitudes;
 
@@ -157,13 +155,13 @@ pub struct Statistics {
     pub first_ns: Nanoseconds,
     /// Start of the last cycle seen.
     pub last_ns: Nanoseconds,
-    /// [`Timing::wake_ns`](takt_rt::record::Timing::wake_ns)
+    /// [`CycleTiming::wake_ns`](takt_rt::CycleTiming::wake_ns)
     pub wake: Latency,
-    /// [`Timing::sync_ns`](takt_rt::record::Timing::sync_ns)
+    /// [`CycleTiming::sync_ns`](takt_rt::CycleTiming::sync_ns)
     pub sync: Latency,
-    /// [`Timing::compute_ns`](takt_rt::record::Timing::compute_ns)
+    /// [`CycleTiming::compute_ns`](takt_rt::CycleTiming::compute_ns)
     pub compute: Latency,
-    /// [`Timing::sent_ns`](takt_rt::record::Timing::sent_ns)
+    /// [`CycleTiming::sent_ns`](takt_rt::CycleTiming::sent_ns)
     pub sent: Latency,
     /// The axes in the order of the configuration.
     pub axes: Vec<AxisStatistics>,
@@ -197,11 +195,11 @@ impl Statistics {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use takt_rt::record::{MAX_AXES, Timing};
+    use takt_rt::{CycleTiming, MAX_AXES};
 
     fn record(slot: u64, phase: Phase, axis: AxisRecord) -> CycleRecord {
         CycleRecord {
-            timing: Timing { slot, slot_start_ns: slot * 1_000_000, ..Timing::default() },
+            timing: CycleTiming { slot, slot_start_ns: slot * 1_000_000, ..CycleTiming::default() },
             phase,
             is_commanded: true,
             axis_count: 1,

@@ -2,7 +2,7 @@
 
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use takt_rt::time::{NANOSECONDS_PER_SECOND, Nanoseconds};
+use takt_rt::{NANOSECONDS_PER_SECOND, Nanoseconds};
 
 const DAYS_PER_400_YEARS: u64 = 146_097;
 

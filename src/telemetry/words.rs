@@ -1,16 +1,13 @@
 //! Stops, phases and events in words, with the names of the axes and the units of the values.
 
-use takt_rt::cia402::{OperationMode, State};
-use takt_rt::record::{Event, EventKind};
-use takt_rt::stop::{Phase, Rule, StopCategory};
-use takt_rt::watch::TimingLevel;
+use takt_rt::{DriveState, Event, EventKind, OperationMode, Phase, Rule, StopCategory, TimingLevel};
 
 use super::machine::Machine;
 
-mod refusal;
+mod rejection;
 mod stop;
 
-pub use refusal::{refusal, request};
+pub use rejection::{rejection, request};
 pub use stop::{stop, stop_cause};
 
 /// What the group was doing, as a verb: "moving".
@@ -42,17 +39,17 @@ pub const fn category(category: StopCategory) -> &'static str {
 }
 
 /// A state of a drive (CiA 402).
-pub const fn state(state: State) -> &'static str {
+pub const fn state(state: DriveState) -> &'static str {
     match state {
-        State::NotReadyToSwitchOn => "not ready to switch on",
-        State::SwitchOnDisabled => "switch on disabled",
-        State::ReadyToSwitchOn => "ready to switch on",
-        State::SwitchedOn => "switched on",
-        State::OperationEnabled => "operation enabled",
-        State::QuickStopActive => "quick stop active",
-        State::FaultReactionActive => "fault reaction active",
-        State::Fault => "fault",
-        State::Undefined => "no state of CiA 402",
+        DriveState::NotReadyToSwitchOn => "not ready to switch on",
+        DriveState::SwitchOnDisabled => "switch on disabled",
+        DriveState::ReadyToSwitchOn => "ready to switch on",
+        DriveState::SwitchedOn => "switched on",
+        DriveState::OperationEnabled => "operation enabled",
+        DriveState::QuickStopActive => "quick stop active",
+        DriveState::FaultReactionActive => "fault reaction active",
+        DriveState::Fault => "fault",
+        DriveState::Undefined => "no state of CiA 402",
     }
 }
 
@@ -78,7 +75,7 @@ pub fn event(event: &Event, machine: &Machine) -> String {
     match event.kind {
         EventKind::PhaseChanged { from, to } => format!("{} → {}", phase(from), phase(to)),
         EventKind::Stop(reason) => format!("stop: {}", stop(&reason, machine)),
-        EventKind::MoveFinished { id } => format!("move {id} finished"),
+        EventKind::MotionFinished { request } => format!("motion {} finished", request.0),
         EventKind::DriveState { axis, state: to, statusword } => {
             format!("{}: {} (statusword 0x{statusword:04X})", machine.axis_name(axis), state(to))
         }
@@ -98,7 +95,7 @@ pub fn event(event: &Event, machine: &Machine) -> String {
         EventKind::Timing { level: TimingLevel::Unfit } => "slots are missed too often to go on".to_owned(),
         EventKind::MissedSlots { count: 1 } => "1 slot passed unused: the thread was late".to_owned(),
         EventKind::MissedSlots { count } => format!("{count} slots passed unused: the thread was late"),
-        EventKind::Refused(refused) => refusal(&refused, machine),
+        EventKind::Rejected(rejected) => rejection(&rejected, machine),
     }
 }
 
@@ -106,7 +103,7 @@ pub fn event(event: &Event, machine: &Machine) -> String {
 mod tests {
     use super::*;
     use crate::telemetry::machine::{AxisDescription, BusDescription, SetPointMagnitudes, Unit};
-    use takt_rt::refusal::{Objection, Refusal, RequestKind};
+    use takt_rt::{RejectReason, RequestError, RequestKind};
 
     pub(super) fn machine() -> Machine {
         let axis = |name: &str, unit| AxisDescription {
@@ -132,7 +129,7 @@ mod tests {
             "enabling → holding"
         );
         assert_eq!(
-            words(EventKind::DriveState { axis: 0, state: State::OperationEnabled, statusword: 0x1637 }),
+            words(EventKind::DriveState { axis: 0, state: DriveState::OperationEnabled, statusword: 0x1637 }),
             "shoulder: operation enabled (statusword 0x1637)"
         );
         assert_eq!(
@@ -149,15 +146,13 @@ mod tests {
             "30 slots passed unused: the thread was late"
         );
         assert_eq!(
-            words(EventKind::Refused(Refusal {
+            words(EventKind::Rejected(RequestError {
                 request: RequestKind::Enable,
-                objection: Objection::Phase,
+                reason: RejectReason::Phase,
                 axis: None,
-                value: 0.0,
-                limit: 0.0,
                 phase: Phase::Moving,
             })),
-            "enabling was refused: not possible while moving"
+            "enabling was rejected: not possible while moving"
         );
     }
 }

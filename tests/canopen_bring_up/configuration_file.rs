@@ -9,7 +9,7 @@ use takt::config::Config;
 use takt::drive::{BringUp, BringUpError};
 
 use takt::sim::SimulatedBus;
-use takt_rt::port::{BusPort, ReceiveBatch};
+use takt_rt::{BusPort, ReceiveBatch};
 
 use super::scripted_drive::{ScriptedDrive, at};
 use super::world::{World, config};

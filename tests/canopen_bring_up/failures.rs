@@ -4,7 +4,7 @@ use takt::canopen::emcy::{Emergency, ErrorCode, ErrorRegister};
 use takt::canopen::sdo::AbortCode;
 use takt::config::Control;
 use takt::drive::{Answered, BringUp, Cause, Leave};
-use takt_rt::cia402::State;
+use takt_rt::DriveState;
 
 use super::scripted_drive::{ScriptedDrive, at};
 use super::started;
@@ -159,7 +159,7 @@ fn a_refusal_because_of_the_drives_state() {
 #[test]
 fn a_drive_that_keeps_its_torque() {
     let message = message(|drive| {
-        drive.state = State::OperationEnabled;
+        drive.state = DriveState::OperationEnabled;
         drive.flaws.is_stubborn = true;
     });
     assert!(

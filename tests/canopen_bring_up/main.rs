@@ -12,8 +12,7 @@ use takt::canopen::emcy::ErrorCode;
 use takt::canopen::nmt::NmtState;
 use takt::config::{Config, Control};
 use takt::drive::{BringUp, BringUpTiming, Leave, NotConfigured, Progress, Stage};
-use takt_rt::cia402::State;
-use takt_rt::frame::{Frame, Id};
+use takt_rt::{DriveState, Frame, Id};
 use world::{World, config};
 
 /// A world whose drives have been configured and started.
@@ -32,7 +31,7 @@ fn a_configured_drive_is_pre_operational_mapped_and_targets_its_actual_position(
     let mut world = World::of(&config);
     world.run(&mut BringUp::new(&config)).unwrap();
     let drive = world.drive();
-    assert_eq!((drive.nmt, drive.state), (NmtState::PreOperational, State::SwitchOnDisabled));
+    assert_eq!((drive.nmt, drive.state), (NmtState::PreOperational, DriveState::SwitchOnDisabled));
     let expected = [
         (0x1005, 0, 0x80),
         (0x1006, 0, 1000),
@@ -210,18 +209,18 @@ fn a_drive_that_is_still_powering_up_is_waited_for() {
 fn a_drive_left_enabled_is_stopped_by_its_ramp_and_switched_off_before_anything_is_changed() {
     let config = config(&[(0, 2)]);
     let mut world = World::of(&config);
-    world.drive().state = State::OperationEnabled;
+    world.drive().state = DriveState::OperationEnabled;
     world.drive().set(0x606C, 0, &200_000_i32.to_le_bytes());
     let mut bring_up = BringUp::new(&config);
     for _ in 0..500 {
         world.step(&mut bring_up);
     }
-    assert_eq!(world.drive().state, State::QuickStopActive, "it is still moving");
+    assert_eq!(world.drive().state, DriveState::QuickStopActive, "it is still moving");
     assert_eq!(world.drive().number(0x6085, 0), 417_215, "on the ramp of the configuration");
     world.drive().set(0x606C, 0, &(-1_500_i32).to_le_bytes());
     world.run(&mut bring_up).unwrap();
     let drive = world.drive();
-    assert_eq!(drive.state, State::SwitchOnDisabled);
+    assert_eq!(drive.state, DriveState::SwitchOnDisabled);
     let controlwords: Vec<&[u8]> = drive
         .writes
         .iter()
@@ -235,7 +234,7 @@ fn a_drive_left_enabled_is_stopped_by_its_ramp_and_switched_off_before_anything_
 fn a_fault_is_reported_and_does_not_end_the_bring_up() {
     let config = config(&[(0, 2)]);
     let mut world = World::of(&config);
-    world.drive().state = State::Fault;
+    world.drive().state = DriveState::Fault;
     world.drive().set(0x603F, 0, &0x730F_u16.to_le_bytes());
     let facts = world.run(&mut BringUp::new(&config)).unwrap();
     assert_eq!(facts[0].fault(), Some(ErrorCode(0x730F)));
@@ -263,21 +262,21 @@ fn a_drive_that_restarts_in_the_middle_is_configured_anew() {
 fn a_polite_leave_disables_and_ends_the_watch_for_the_masters_heartbeat() {
     let config = config(&[(0, 2)]);
     let mut world = started(&config);
-    world.drive().state = State::ReadyToSwitchOn;
+    world.drive().state = DriveState::ReadyToSwitchOn;
     let facts = world.run(&mut Leave::new(&config)).unwrap();
     let drive = world.drive();
-    assert_eq!((drive.nmt, drive.state), (NmtState::PreOperational, State::SwitchOnDisabled));
+    assert_eq!((drive.nmt, drive.state), (NmtState::PreOperational, DriveState::SwitchOnDisabled));
     assert_eq!((drive.number(0x1016, 1), drive.number(0x1017, 0)), (0, 0));
-    assert_eq!(facts[0].state(), State::SwitchOnDisabled);
+    assert_eq!(facts[0].state(), DriveState::SwitchOnDisabled);
 }
 
 #[test]
 fn leaving_an_axis_that_still_has_torque_brings_it_to_rest() {
     let config = config(&[(0, 2)]);
     let mut world = started(&config);
-    world.drive().state = State::OperationEnabled;
+    world.drive().state = DriveState::OperationEnabled;
     world.run(&mut Leave::new(&config)).unwrap();
-    assert_eq!(world.drive().state, State::SwitchOnDisabled);
+    assert_eq!(world.drive().state, DriveState::SwitchOnDisabled);
 }
 
 #[test]

@@ -5,8 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use takt::canopen::nmt::{ErrorControl, NmtCommand, NmtState, NmtTarget};
 use takt::canopen::object::ObjectAddress;
 use takt::canopen::sdo::{AbortCode, Expedited, Request, Response, Segment};
-use takt_rt::cia402::{Command, State, controlword};
-use takt_rt::frame::{Frame, Id};
+use takt_rt::{Command, DriveState, Frame, Id, controlword};
 
 const INVALID: u32 = 1 << 31;
 
@@ -35,7 +34,7 @@ pub struct ScriptedDrive {
     pub node: u8,
     pub nmt: NmtState,
     pub dictionary: BTreeMap<ObjectAddress, Vec<u8>>,
-    pub state: State,
+    pub state: DriveState,
     pub flaws: Flaws,
     /// Before this time it hears and says nothing.
     pub powered_up_at_ns: u64,
@@ -60,7 +59,7 @@ impl ScriptedDrive {
             node,
             nmt: NmtState::PreOperational,
             dictionary: BTreeMap::new(),
-            state: State::SwitchOnDisabled,
+            state: DriveState::SwitchOnDisabled,
             flaws: Flaws::default(),
             powered_up_at_ns: 0,
             writes: vec![],

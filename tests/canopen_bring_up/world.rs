@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use takt::config::*;
 use takt::drive::{AxisFacts, BringUp, BringUpError, Leave};
-use takt_rt::frame::Frame;
+use takt_rt::Frame;
 
 use super::scripted_drive::ScriptedDrive;
 

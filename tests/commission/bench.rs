@@ -9,8 +9,7 @@ use takt::commission::{
 };
 use takt::controller::VirtualClock;
 use takt::sim::{Observation, SimulatedBus};
-use takt_rt::frame::{Frame, Id};
-use takt_rt::port::{BusPort, ReceiveBatch};
+use takt_rt::{BusPort, Frame, Id, ReceiveBatch};
 
 pub const MS: u64 = 1_000_000;
 pub const SECOND: u64 = 1_000 * MS;

@@ -6,9 +6,7 @@ use takt::commission::dictionary::{self, Choice};
 use takt::commission::{Amount, Course, Failure, Family, Pace, Request, Subject};
 use takt::config::Config;
 use takt::sim::{DriveFault, SimulatedBus};
-use takt_rt::cia402::State;
-use takt_rt::frame::{Frame, Id};
-use takt_rt::port::{BusPort, Clock};
+use takt_rt::{BusPort, Clock, DriveState, Frame, Id};
 
 use super::bench::*;
 
@@ -44,7 +42,7 @@ fn an_absolute_move_makes_the_handshake_and_ends_at_the_target_without_torque() 
     let report = bench.run(move_to(absolute(30.0))).unwrap();
     let seen = bench.observe();
     assert!((seen.position - 30_f64.to_radians()).abs() < 1e-4, "{seen:?}");
-    assert_eq!((seen.state, seen.is_braked), (State::SwitchOnDisabled, true));
+    assert_eq!((seen.state, seen.is_braked), (DriveState::SwitchOnDisabled, true));
     assert!(number(&report, "error_counts").abs() <= 100.0, "{report:?}");
     let target_at = bench.sent_at(Frame::of(Id::canopen(0x600, NODE), {
         let [a, b, c, d] = 43_691_i32.to_le_bytes();
@@ -139,7 +137,7 @@ fn a_velocity_lasts_its_time_and_ends_in_a_ramp_to_rest() {
     let report = bench.run(request).unwrap();
     assert!((number(&report, "highest_velocity").to_degrees() + 40.0).abs() < 0.5, "{report:?}");
     assert!((number(&report, "travelled").to_degrees() + 40.0).abs() < 3.0, "{report:?}");
-    assert_eq!(bench.observe().state, State::SwitchOnDisabled);
+    assert_eq!(bench.observe().state, DriveState::SwitchOnDisabled);
     // The ramp came before the quick stop: the drive was at rest when its torque went.
     assert!(bench.steps.contains(&"ramp to standstill"), "{:?}", bench.steps);
 }
@@ -154,7 +152,7 @@ fn an_axis_that_runs_towards_a_limit_stops_before_it() {
     let seen = bench.observe();
     let degrees_at = seen.position.to_degrees();
     assert!(degrees_at > -170.0 && degrees_at < -150.0, "{seen:?}");
-    assert_eq!(seen.state, State::SwitchOnDisabled);
+    assert_eq!(seen.state, DriveState::SwitchOnDisabled);
 }
 
 #[test]
@@ -167,7 +165,7 @@ fn a_torque_is_per_mille_of_the_rated_one_and_ends_at_rest() {
     bench.sent_at(write_u16(0x6071, 30));
     assert!(number(&report, "travelled") > 0.0);
     let seen = bench.observe();
-    assert_eq!((seen.state, seen.velocity), (State::SwitchOnDisabled, 0.0));
+    assert_eq!((seen.state, seen.velocity), (DriveState::SwitchOnDisabled, 0.0));
 }
 
 #[test]
@@ -179,7 +177,7 @@ fn a_torque_that_makes_the_axis_too_fast_is_ended() {
     let failed = bench.run(request).unwrap_err();
     assert!(matches!(failed.failure, Failure::AtLimit { .. }) && failed.step == "torque", "{failed:?}");
     assert!(bench.fastest.to_degrees() < 20.0, "{}", bench.fastest.to_degrees());
-    assert_eq!(bench.observe().state, State::SwitchOnDisabled);
+    assert_eq!(bench.observe().state, DriveState::SwitchOnDisabled);
 }
 
 #[test]
@@ -191,7 +189,7 @@ fn ctrl_c_stops_a_motion_in_control_and_disables() {
         let failed = bench.run_interrupted(request, |step| usize::from(step == "run")).unwrap_err();
         assert_eq!(failed.failure, Failure::Interrupted);
         let seen = bench.observe();
-        assert_eq!((seen.state, seen.velocity), (State::SwitchOnDisabled, 0.0));
+        assert_eq!((seen.state, seen.velocity), (DriveState::SwitchOnDisabled, 0.0));
     }
     let quick_stop_at = bench.sent_at(write_u16(0x6040, 0x02));
     let off_at = bench.sent.iter().rposition(|frame| *frame == write_u16(0x6040, 0)).unwrap();
@@ -212,7 +210,7 @@ fn a_second_ctrl_c_takes_the_torque_away_at_once() {
     let failed = bench.run_interrupted(request, asked).unwrap_err();
     assert_eq!(failed.failure, Failure::Interrupted);
     assert!(bench.steps.contains(&"torque off at once"), "{:?}", bench.steps);
-    assert_eq!(bench.observe().state, State::SwitchOnDisabled);
+    assert_eq!(bench.observe().state, DriveState::SwitchOnDisabled);
 }
 
 #[test]
@@ -221,19 +219,19 @@ fn torque_stays_on_only_when_that_is_asked_for() {
     bench.run(Request::Enable { hold_ns: Some(SECOND / 5), keeps_enabled: false }).unwrap();
     assert!(!bench.observe().state.has_torque());
     bench.run(Request::Enable { hold_ns: None, keeps_enabled: true }).unwrap();
-    assert_eq!(bench.observe().state, State::OperationEnabled);
+    assert_eq!(bench.observe().state, DriveState::OperationEnabled);
     let request = Request::Move { course: absolute(5.0), pace: brisk(), keeps_enabled: true };
     bench.run(request).unwrap();
     let seen = bench.observe();
-    assert_eq!(seen.state, State::OperationEnabled);
+    assert_eq!(seen.state, DriveState::OperationEnabled);
     assert!((seen.position.to_degrees() - 5.0).abs() < 0.01);
     // Nobody feeds a watch over the master now, and the drive does not miss it.
     let every = Request::Watch { every_ns: 100 * MS, duration_ns: Some(2 * SECOND) };
     bench.run(every).unwrap();
-    assert_eq!(bench.observe().state, State::OperationEnabled);
+    assert_eq!(bench.observe().state, DriveState::OperationEnabled);
     let report = bench.run(Request::Disable).unwrap();
     assert_eq!(report.get("was_enabled"), Some(&true.into()));
-    assert_eq!(bench.observe().state, State::SwitchOnDisabled);
+    assert_eq!(bench.observe().state, DriveState::SwitchOnDisabled);
 }
 
 #[test]
@@ -276,7 +274,7 @@ fn a_fault_in_the_middle_of_a_motion_ends_it_and_is_named() {
         matches!(&failed.failure, Failure::Faulted { what, .. } if what.starts_with("0x4310")),
         "{failed:?}"
     );
-    assert_eq!((failed.step, bench.observe().state), ("move", State::Fault));
+    assert_eq!((failed.step, bench.observe().state), ("move", DriveState::Fault));
 }
 
 #[test]
@@ -286,10 +284,10 @@ fn the_battery_fault_is_cleared_with_consent_only() {
     bench.bus.inject(NODE, DriveFault::MultiTurnBattery).unwrap();
     let failed = bench.run(Request::ClearFault { is_agreed: false }).unwrap_err();
     assert!(matches!(failed.failure, Failure::NeedsConsent { option: "--yes", .. }), "{failed:?}");
-    assert_eq!(bench.observe().state, State::Fault);
+    assert_eq!(bench.observe().state, DriveState::Fault);
     bench.run(Request::ClearFault { is_agreed: true }).unwrap();
     let seen = bench.observe();
-    assert_eq!((seen.state, seen.error_code), (State::SwitchOnDisabled, 0));
+    assert_eq!((seen.state, seen.error_code), (DriveState::SwitchOnDisabled, 0));
     assert!((0..524_288).contains(&seen.position_counts), "{seen:?}");
 }
 

@@ -8,9 +8,7 @@ use takt::sim::homing_switches::{HomingSwitches, Switch};
 use takt::sim::plant::{EndStops, JointParameters};
 use takt::sim::yz_aim::{Gearing, Model, Quirks, YzAimJoint, YzAimParameters};
 use takt::sim::{BitRates, Drive, DriveFault, SimulatedBus};
-use takt_rt::frame::{Frame, Id};
-use takt_rt::port::{BusPort, Clock};
-use takt_rt::units::{Scale, ScaleParameters};
+use takt_rt::{BusPort, Clock, Frame, Id, Scale, ScaleParameters};
 
 use super::bench::*;
 

@@ -2,8 +2,7 @@
 
 use takt::config::ProgramTarget;
 use takt::controller::Outcome;
-use takt_rt::cia402::State;
-use takt_rt::stop::Phase;
+use takt_rt::{DriveState, Phase};
 
 use crate::world::{World, counts_per_unit, load};
 
@@ -14,7 +13,7 @@ fn errors_at_rest(name: &str) -> Vec<Vec<f64>> {
     let mut errors = vec![vec![]; moves.len()];
     let outcome = world.run_to_the_end(|world| {
         let snapshot = world.run.snapshot();
-        let finished = (snapshot.finished_move as usize).checked_sub(1);
+        let finished = world.finished_motions().checked_sub(1);
         let Some(finished) = finished.filter(|_| snapshot.phase == Phase::Holding) else { return };
         let ProgramTarget::Position(target) = &moves[finished].target else {
             panic!("{name} has no targets")
@@ -133,6 +132,6 @@ fn an_erob_in_profile_torque_pushes_as_asked_and_its_brake_holds_in_the_end() {
     assert!(pushed.iter().all(|seen| seen.abs() < 1.6), "{pushed:?}");
     assert!(turned.0 < -0.1 && turned.1 > 0.1, "{turned:?}");
     let seen = world.observe(0);
-    assert!(seen.is_braked && seen.velocity == 0.0 && seen.state != State::OperationEnabled);
+    assert!(seen.is_braked && seen.velocity == 0.0 && seen.state != DriveState::OperationEnabled);
     assert_eq!(world.stops(), []);
 }

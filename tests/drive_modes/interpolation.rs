@@ -2,7 +2,7 @@
 
 use takt::config::{Config, ProgramTarget};
 use takt::controller::Outcome;
-use takt_rt::stop::Phase;
+use takt_rt::Phase;
 
 use crate::world::{
     MILLISECOND_NS, Sent, Watched, World, counts, counts_per_unit, id, load, parse, text_of, word,

@@ -3,11 +3,9 @@
 use takt::config::Config;
 use takt::controller::Outcome;
 use takt::sim::Defect;
-use takt_rt::cia402::{controlword, statusword};
-use takt_rt::door::{ProfileMove, Request};
-use takt_rt::frame::Frame;
-use takt_rt::profile::ProfileTarget;
-use takt_rt::stop::{Phase, Rule, StopCategory};
+use takt_rt::{
+    Frame, Phase, ProfileMove, ProfileTarget, Request, Rule, StopCategory, controlword, statusword,
+};
 
 use crate::world::{MILLISECOND_NS, World, counts, counts_per_unit, id, load, one_yz_aim, parse, word};
 
@@ -31,7 +29,7 @@ fn commands_since(world: &mut World, since_ns: u64) -> Vec<(u64, u16, i32)> {
 
 /// Runs until the joint is at its speed limit on a long way, and gives the present.
 fn in_motion(world: &mut World) -> u64 {
-    world.drive_to(7, 0, ProfileTarget::Position(2.5));
+    world.drive_to(0, ProfileTarget::Position(2.5));
     world.run_until(|world| world.observe(0).velocity > 0.9 * world.config.axes[0].limits.velocity);
     world.run_for(100);
     world.run.snapshot().at_ns
@@ -41,8 +39,8 @@ fn in_motion(world: &mut World) -> u64 {
 fn a_target_is_offered_with_bit_4_acknowledged_with_bit_12_and_both_fall() {
     let mut world = World::holding(erob());
     let since_ns = world.run.snapshot().at_ns;
-    world.drive_to(7, 0, ProfileTarget::Position(0.5));
-    world.run_until(|world| world.run.snapshot().finished_move == 7);
+    world.drive_to(0, ProfileTarget::Position(0.5));
+    world.run_until(|world| world.is_reached());
     let target = target_counts(&world, 0.5);
     let commands = commands_since(&mut world, since_ns);
     let offers: Vec<_> = commands.iter().filter(|(_, word, _)| word & controlword::BIT_4 != 0).collect();
@@ -71,9 +69,9 @@ fn a_new_target_in_motion_is_taken_at_once_and_the_old_one_is_left() {
     let mut world = World::holding(erob());
     in_motion(&mut world);
     let at = world.observe(0).position;
-    world.drive_to(8, 0, ProfileTarget::Position(-0.3));
+    world.drive_to(0, ProfileTarget::Position(-0.3));
     let mut furthest = at;
-    while world.run.snapshot().finished_move != 8 {
+    while !world.is_reached() {
         world.run_for(1);
         furthest = furthest.max(world.observe(0).position);
         assert!(world.observe(0).velocity.abs() <= 1.01 * world.config.axes[0].limits.velocity);
@@ -90,10 +88,10 @@ fn a_new_target_in_motion_is_taken_at_once_and_the_old_one_is_left() {
 fn a_second_target_so_many_cycles_after_the_first_is_where_the_joint_ends() {
     for gap in 0..12 {
         let mut world = World::holding(erob());
-        world.drive_to(7, 0, ProfileTarget::Position(0.1));
+        world.drive_to(0, ProfileTarget::Position(0.1));
         world.run_for(gap);
-        world.drive_to(8, 0, ProfileTarget::Position(-0.05));
-        world.run_until(|world| world.run.snapshot().finished_move == 8);
+        world.drive_to(0, ProfileTarget::Position(-0.05));
+        world.run_until(|world| world.is_reached());
         world.run_for(300);
         let error = (world.observe(0).position + 0.05) * counts_per_unit(&world.config.axes[0]);
         assert!(error.abs() <= 2.0, "{gap}: {error}");
@@ -105,11 +103,11 @@ fn a_second_target_so_many_cycles_after_the_first_is_where_the_joint_ends() {
 fn targets_that_come_in_every_cycle_are_followed_and_none_is_called_unacknowledged() {
     let mut world = World::holding(erob());
     for step in 0..1500_u32 {
-        world.drive_to(10 + step, 0, ProfileTarget::Position(f64::from(step) * 2e-4));
+        world.drive_to(0, ProfileTarget::Position(f64::from(step) * 2e-4));
     }
     let behind = 1499.0 * 2e-4 - world.observe(0).position;
     assert!(behind < 0.1, "{behind} rad behind");
-    world.run_until(|world| world.run.snapshot().finished_move == 1509);
+    world.run_until(|world| world.is_reached());
     assert_eq!(world.stops(), []);
 }
 
@@ -150,7 +148,7 @@ fn a_stop_on_the_way_to_a_target_that_is_too_near_to_stop_at_comes_to_rest_beyon
     in_motion(&mut world);
     let (here, speed) = (world.observe(0).position, world.observe(0).velocity);
     let shortest = speed * speed / (2.0 * world.config.axes[0].limits.deceleration);
-    world.drive_to(8, 0, ProfileTarget::Position(here + 0.3 * shortest));
+    world.drive_to(0, ProfileTarget::Position(here + 0.3 * shortest));
     world.request(Request::Stop(StopCategory::Two));
     world.run_until(|world| world.phase() == Phase::Holding);
     let held = world.observe(0);
@@ -201,7 +199,7 @@ fn disabling_keeps_the_last_target_and_never_commands_position_0() {
     let mut config = erob();
     config.axes[0].simulated.initial_position = 1.0;
     let mut world = World::holding(config);
-    world.drive_to(7, 0, ProfileTarget::Position(0.5));
+    world.drive_to(0, ProfileTarget::Position(0.5));
     world.run_until(|world| world.phase() == Phase::Holding);
     let since_ns = world.run.snapshot().at_ns;
     world.request(Request::Disable);
@@ -218,7 +216,7 @@ fn disabling_keeps_the_last_target_and_never_commands_position_0() {
 fn what_cannot_be_a_target_is_refused_and_changes_nothing_on_the_wire() {
     let mut world = World::holding(erob());
     let limits = world.config.axes[0].limits;
-    let wanted = |axis, target| ProfileMove { id: 9, axis, target, valid_until_ns: u64::MAX };
+    let wanted = |axis, target| ProfileMove { axis, target, valid_until_ns: u64::MAX };
     let refused = [
         wanted(0, ProfileTarget::Position(limits.position_max + 0.01)),
         wanted(0, ProfileTarget::Position(f64::NAN)),
@@ -230,7 +228,7 @@ fn what_cannot_be_a_target_is_refused_and_changes_nothing_on_the_wire() {
     for (count, wanted) in (1..).zip(refused) {
         world.request(Request::SetProfileTarget(wanted));
         world.run_for(5);
-        assert_eq!((world.run.snapshot().refused, world.phase()), (count, Phase::Holding), "{wanted:?}");
+        assert_eq!((world.run.snapshot().rejected, world.phase()), (count, Phase::Holding), "{wanted:?}");
     }
     let commands = commands_since(&mut world, since_ns);
     assert!(
@@ -252,10 +250,10 @@ fn a_drive_that_does_not_acknowledge_or_does_not_let_go_stops_the_group() {
             }
             _ => frame,
         }));
-        world.drive_to(7, 0, ProfileTarget::Position(0.5));
+        world.drive_to(0, ProfileTarget::Position(0.5));
         let outcome = world.run_to_the_end(|_| ());
         let Outcome::Stopped(stop) = outcome else { panic!("{outcome:?}") };
-        assert_eq!((stop.rule, stop.axis()), (Rule::NotAcknowledged, Some(0)));
+        assert_eq!((stop.rule(), stop.axis()), (Rule::NotAcknowledged, Some(0)));
         assert_eq!(world.stops().len(), 1);
     }
 }
@@ -266,13 +264,13 @@ fn a_yz_aim_moves_to_targets_by_its_own_profile_and_stops_without_going_back() {
         let mut config = parse(&one_yz_aim("pp", "to = 0"));
         config.axes[0].answers_sync = answers_sync;
         let mut world = World::holding(config);
-        world.drive_to(7, 0, ProfileTarget::Position(0.1));
-        world.run_until(|world| world.run.snapshot().finished_move == 7);
+        world.drive_to(0, ProfileTarget::Position(0.1));
+        world.run_until(|world| world.is_reached());
         world.run_for(300);
         let scale = counts_per_unit(&world.config.axes[0]);
         let error = (world.observe(0).position - 0.1) * scale;
         assert!(error.abs() <= 2.0, "{error}");
-        world.drive_to(8, 0, ProfileTarget::Position(0.7));
+        world.drive_to(0, ProfileTarget::Position(0.7));
         world.run_until(|world| world.observe(0).velocity > 0.13);
         world.request(Request::Stop(StopCategory::Two));
         let mut slowest = f64::MAX;
@@ -295,6 +293,6 @@ fn a_joint_that_does_not_get_to_its_target_stops_the_group_instead_of_moving_for
     world.run_until(|world| !world.stops().is_empty());
     let stops = world.stops();
     let seen = [Rule::FollowingError, Rule::DriveFault, Rule::DriveDisabled];
-    assert!(seen.contains(&stops[0].rule) && stops[0].axis() == Some(0), "{stops:?}");
+    assert!(seen.contains(&stops[0].rule()) && stops[0].axis() == Some(0), "{stops:?}");
     world.run_until(|world| world.phase() == Phase::Disabled);
 }

@@ -1,8 +1,6 @@
 //! Profile velocity: it stops by velocity 0, expires, and does not run into a position limit.
 
-use takt_rt::door::{ProfileMove, Request};
-use takt_rt::profile::ProfileTarget;
-use takt_rt::stop::{Phase, Rule, StopCategory};
+use takt_rt::{Phase, ProfileMove, ProfileTarget, Request, Rule, StopCategory};
 
 use crate::world::{MILLISECOND_NS, World, counts, load, one_yz_aim, parse, word};
 
@@ -15,7 +13,7 @@ fn yz_aim() -> World {
 }
 
 fn turn(world: &mut World, velocity: f64) {
-    world.drive_to(7, 0, ProfileTarget::Velocity(velocity));
+    world.drive_to(0, ProfileTarget::Velocity(velocity));
     world.run_until(|world| (world.observe(0).velocity - velocity).abs() < 0.01 * velocity.abs());
 }
 
@@ -58,10 +56,13 @@ fn a_velocity_that_nobody_renews_expires_and_the_group_stops() {
         let velocity = 0.5 * world.config.axes[0].limits.velocity;
         let valid_until_ns = world.run.snapshot().at_ns + 500 * MILLISECOND_NS;
         let target = ProfileTarget::Velocity(velocity);
-        world.request(Request::SetProfileTarget(ProfileMove { id: 7, axis: 0, target, valid_until_ns }));
+        world.request(Request::SetProfileTarget(ProfileMove { axis: 0, target, valid_until_ns }));
         world.run_until(|world| !world.stops().is_empty());
         let stop = world.stops()[0];
-        assert_eq!((stop.rule, stop.axis(), stop.category), (Rule::StaleCommand, Some(0), StopCategory::Two));
+        assert_eq!(
+            (stop.rule(), stop.axis(), stop.category),
+            (Rule::StaleCommand, Some(0), StopCategory::Two)
+        );
         let late_ns = world.run.snapshot().at_ns - valid_until_ns;
         assert!(late_ns <= 2 * MILLISECOND_NS, "{late_ns}");
         while world.phase() == Phase::Stopping {
@@ -78,7 +79,7 @@ fn a_velocity_that_is_renewed_in_time_goes_on() {
     let target = ProfileTarget::Velocity(0.5);
     for _ in 0..20 {
         let valid_until_ns = world.run.snapshot().at_ns + 110 * MILLISECOND_NS;
-        world.request(Request::SetProfileTarget(ProfileMove { id: 7, axis: 0, target, valid_until_ns }));
+        world.request(Request::SetProfileTarget(ProfileMove { axis: 0, target, valid_until_ns }));
         world.run_for(99);
     }
     assert_eq!((world.phase(), world.stops().len()), (Phase::Moving, 0));
@@ -90,7 +91,7 @@ fn on_the_way_to_a_position_limit_the_joint_is_stopped_before_it() {
         for mut world in [erob(), yz_aim()] {
             let limits = world.config.axes[0].limits;
             let velocity = direction * 0.99 * limits.velocity;
-            world.drive_to(7, 0, ProfileTarget::Velocity(velocity));
+            world.drive_to(0, ProfileTarget::Velocity(velocity));
             let is_at_limit = limits.position_min == 0.0 && direction < 0.0;
             if !is_at_limit {
                 world.run_until(|world| (world.observe(0).velocity - velocity).abs() < 0.01 * velocity.abs());
@@ -101,7 +102,7 @@ fn on_the_way_to_a_position_limit_the_joint_is_stopped_before_it() {
                 furthest = if direction > 0.0 { furthest.max(position) } else { furthest.min(position) };
             });
             let stops = world.stops();
-            assert_eq!(stops.iter().map(|stop| stop.rule).collect::<Vec<_>>(), [Rule::PositionLimit]);
+            assert_eq!(stops.iter().map(|stop| stop.rule()).collect::<Vec<_>>(), [Rule::PositionLimit]);
             let limit = if direction > 0.0 { limits.position_max } else { limits.position_min };
             // At the limit itself it takes the drive's first movement to see where it goes.
             let allowed = if is_at_limit { 1e-3 * limits.position_max } else { 0.0 };

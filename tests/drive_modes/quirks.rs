@@ -4,7 +4,7 @@ use takt::config::Config;
 use takt::controller::Outcome;
 use takt::sim::yz_aim::{Quirks, YzAimJoint, YzAimParameters};
 use takt::sim::{BitRates, Drive, SimulatedBus};
-use takt_rt::stop::Phase;
+use takt_rt::Phase;
 
 use crate::world::{World, counts_per_unit, id, load};
 

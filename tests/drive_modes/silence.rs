@@ -2,9 +2,7 @@
 
 use takt::config::{Config, DriveFamily};
 use takt::controller::Outcome;
-use takt_rt::cia402::State;
-use takt_rt::port::BusPort;
-use takt_rt::stop::{Phase, Rule};
+use takt_rt::{BusPort, DriveState, Phase, Rule};
 
 use crate::world::{MILLISECOND_NS, World, counts_per_unit, id, load, one_yz_aim, parse, word};
 
@@ -77,7 +75,7 @@ fn a_yz_aim_whose_controller_was_away_stays_where_it_stopped_and_is_not_enabled_
         let since_ns = world.run.snapshot().at_ns;
         let way = largest_way_to_the_end(&mut world, &before);
         assert!(way <= TOLERANCE_COUNTS, "{way} counts, {answers_sync}, {after_cycles}");
-        let rules: Vec<Rule> = world.stops().iter().map(|stop| stop.rule).collect();
+        let rules: Vec<Rule> = world.stops().iter().map(|stop| stop.rule()).collect();
         assert_eq!(rules, [Rule::DriveFault], "{answers_sync}, {after_cycles}");
         assert_nobody_enables_after(&mut world, since_ns);
     }
@@ -93,7 +91,7 @@ fn on_two_buses_the_yz_aims_and_the_erobs_stay_where_they_stopped() {
         for axis in 0..5 {
             let seen = world.observe(axis);
             assert!(seen.velocity.abs() < 1e-3, "{seen:?}");
-            assert!(seen.state == State::Fault || seen.error_code == COMMUNICATION_LOST, "{seen:?}");
+            assert!(seen.state == DriveState::Fault || seen.error_code == COMMUNICATION_LOST, "{seen:?}");
         }
         let since_ns = world.run.snapshot().at_ns;
         let way = largest_way_to_the_end(&mut world, &before);
@@ -109,11 +107,11 @@ fn an_erob_whose_controller_was_away_has_stopped_and_left_operational_and_stays_
         let mut world = away(load(&format!("erob-modes/{name}.toml")), 300);
         let before = positions_before_return(&mut world);
         let seen = world.observe(0);
-        assert_eq!((seen.nmt, seen.state), (takt::sim::NmtState::Stopped, State::Fault), "{name}");
+        assert_eq!((seen.nmt, seen.state), (takt::sim::NmtState::Stopped, DriveState::Fault), "{name}");
         assert!(seen.velocity.abs() < 1e-3, "{name}: {seen:?}");
         let way = largest_way_to_the_end(&mut world, &before);
         assert!(way <= TOLERANCE_COUNTS, "{name}: {way} counts");
-        let rules: Vec<Rule> = world.stops().iter().map(|stop| stop.rule).collect();
+        let rules: Vec<Rule> = world.stops().iter().map(|stop| stop.rule()).collect();
         assert_eq!(rules, [Rule::MissedFeedback], "{name}");
     }
 }

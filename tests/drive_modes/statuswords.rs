@@ -1,9 +1,7 @@
 //! What a drive is told whose statuswords show what nobody has asked for.
 
 use takt::config::{Config, Feedback};
-use takt_rt::door::Request;
-use takt_rt::frame::Frame;
-use takt_rt::stop::{Phase, Rule};
+use takt_rt::{Frame, Phase, Request, Rule};
 
 use crate::world::{World, id, load, word};
 
@@ -55,7 +53,7 @@ fn a_fault_that_comes_up_while_the_drives_are_enabled_is_not_reset_by_what_was_a
     for _ in 0..60 {
         world.step();
     }
-    assert_eq!(world.stops().last().map(|stop| stop.rule), Some(Rule::DriveFault));
+    assert_eq!(world.stops().last().map(|stop| stop.rule()), Some(Rule::DriveFault));
     let words = words_since(&mut world, since_ns);
     assert!(words.len() > 20 && words.iter().all(|word| word & FAULT_RESET == 0), "{words:x?}");
 }
@@ -68,7 +66,7 @@ fn a_drive_that_was_seen_disabled_is_not_led_back_whatever_else_was_wrong_with_i
     const DISABLED: (u16, u8) = (READY_TO_SWITCH_ON, OTHER_MODE);
     seem(&mut world, &[DISABLED, DISABLED, DISABLED, (OPERATION_ENABLED, OUR_MODE)]);
     world.run_for(4);
-    assert_eq!((world.phase(), world.stops()[0].rule), (Phase::Stopping, Rule::ModeChanged));
+    assert_eq!((world.phase(), world.stops()[0].rule()), (Phase::Stopping, Rule::ModeChanged));
     let since_ns = world.run.snapshot().at_ns;
     world.run_for(20);
     let words = words_since(&mut world, since_ns);

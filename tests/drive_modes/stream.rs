@@ -1,10 +1,7 @@
 //! A stream of set-points that ends in a stop.
 
-use takt_rt::cia402::State as DriveState;
-use takt_rt::door::{Request, StreamCommand};
 use takt_rt::plan::State;
-use takt_rt::record::MAX_AXES;
-use takt_rt::stop::{Phase, StopCategory};
+use takt_rt::{DriveState, MAX_AXES, Phase, Request, StopCategory, StreamCommand};
 
 use crate::world::{MILLISECOND_NS, World, load};
 

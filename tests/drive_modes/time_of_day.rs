@@ -3,7 +3,7 @@
 use takt::bus::schedule::{self, MessageKind};
 use takt::canopen::time::TimeOfDay;
 use takt::controller::Outcome;
-use takt_rt::time_of_day::TIME_ID;
+use takt_rt::TIME_ID;
 
 use crate::world::{MILLISECOND_NS, World, parse, text_of};
 
@@ -33,7 +33,7 @@ fn both_families_are_told_the_time_behind_their_set_points_and_move_as_ever() {
         let behind = told.iter().filter(|(at_ns, _)| {
             let of_cycle =
                 || sent.iter().filter(|(sent_ns, ..)| sent_ns == at_ns).map(|(_, frame, _)| frame.id());
-            let is_set_point = |id: takt_rt::frame::Id| (0x200..0x580).contains(&id.value());
+            let is_set_point = |id: takt_rt::Id| (0x200..0x580).contains(&id.value());
             let place = of_cycle().position(|id| id == TIME_ID).unwrap();
             of_cycle().skip(place).any(is_set_point)
         });

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use takt_rt::stop::Phase;
+use takt_rt::Phase;
 
 use crate::world::{MILLISECOND_NS, World, counts, counts_per_unit, id, parse, text_of};
 

@@ -7,12 +7,10 @@ use takt::config::{Axis, Config, ProgramMove, ProgramTarget, Travel};
 use takt::controller::channels::LogSide;
 use takt::controller::{Outcome, VirtualRun};
 use takt::sim::{Observation, SimulatedBus};
-use takt_rt::door::{ProfileMove, Request};
-use takt_rt::frame::{Frame, Id};
-use takt_rt::port::{BusHealth, BusPort, ReceiveBatch, Received};
-use takt_rt::profile::ProfileTarget;
-use takt_rt::record::{Event, EventKind};
-use takt_rt::stop::{Phase, StopReason};
+use takt_rt::{
+    BusHealth, BusPort, Event, EventKind, Frame, Id, MotionState, Phase, ProfileMove, ProfileTarget,
+    ReceiveBatch, Received, Request, RequestId, StopReason,
+};
 
 pub const MILLISECOND_NS: u64 = 1_000_000;
 /// A minute is more than any of these programs takes.
@@ -77,6 +75,7 @@ pub struct World {
     pub run: VirtualRun<Watched>,
     log: LogSide,
     pub events: Vec<Event>,
+    last_motion: RequestId,
 }
 
 pub fn text_of(name: &str) -> String {
@@ -133,7 +132,7 @@ impl World {
     pub fn on(config: Config, buses: Vec<SimulatedBus>) -> Self {
         let ports = buses.into_iter().map(Watched::new).collect();
         let (run, log) = VirtualRun::new(&config, ports).unwrap();
-        Self { config, run, log, events: vec![] }
+        Self { config, run, log, events: vec![], last_motion: RequestId::default() }
     }
 
     /// A controller that holds where its axes are for an hour, to be commanded by the test.
@@ -154,7 +153,7 @@ impl World {
             dwell_s: 3600.0,
         }];
         let mut world = Self::on(config, buses);
-        world.run_until(|world| world.run.snapshot().finished_move == 1);
+        world.run_until(|world| world.finished_motions() > 0);
         world.run_until(|world| world.phase() == Phase::Holding);
         world.run_for(50);
         world
@@ -205,15 +204,28 @@ impl World {
         self.run.snapshot().phase
     }
 
-    pub fn request(&mut self, request: Request) {
-        self.run.host().request(request).unwrap();
+    pub fn request(&mut self, request: Request) -> RequestId {
+        let id = self.run.host().request(request).unwrap();
         self.run_for(1);
+        id
+    }
+
+    /// How many motions have reached their target.
+    pub fn finished_motions(&self) -> usize {
+        let is_finished = |event: &&Event| matches!(event.kind, EventKind::MotionFinished { .. });
+        self.events.iter().filter(is_finished).count()
+    }
+
+    /// Whether the last target that [`World::drive_to`] has given is reached.
+    pub fn is_reached(&self) -> bool {
+        self.run.snapshot().motions.of(self.last_motion) == Some(MotionState::Finished)
     }
 
     /// Gives an axis in a profile mode a target that stays valid for an hour.
-    pub fn drive_to(&mut self, id: u32, axis: u8, target: ProfileTarget) {
+    pub fn drive_to(&mut self, axis: u8, target: ProfileTarget) {
         let valid_until_ns = self.run.snapshot().at_ns + 3_600_000 * MILLISECOND_NS;
-        self.request(Request::SetProfileTarget(ProfileMove { id, axis, target, valid_until_ns }));
+        self.last_motion =
+            self.request(Request::SetProfileTarget(ProfileMove { axis, target, valid_until_ns }));
     }
 
     pub fn port(&mut self, bus: usize) -> &mut Watched {

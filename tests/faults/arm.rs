@@ -9,10 +9,7 @@ use takt::config::{Axis, Config, Feedback};
 use takt::controller::{Outcome, VirtualRun};
 use takt::faults::{Rehearsal, Scenario, Tidings};
 use takt::sim::Observation;
-use takt_rt::cia402::State;
-use takt_rt::door::AxisSnapshot;
-use takt_rt::record::EventKind;
-use takt_rt::stop::{Phase, StopReason};
+use takt_rt::{AxisSnapshot, DriveState, EventKind, Phase, StopReason};
 
 /// Twenty seconds are more than its shortened program takes.
 const CYCLES_AT_MOST: u64 = 20_000;
@@ -62,7 +59,7 @@ pub struct Played {
     /// From the beginning of the last fault to the command phase in which the first stop was begun.
     pub detection_ms: Option<f64>,
     /// The last state of each bus.
-    pub health: Vec<takt_rt::port::BusHealth>,
+    pub health: Vec<takt_rt::BusHealth>,
     /// The speed of the fastest joint at the end of the run, in truth.
     pub speed_at_end: f64,
 }
@@ -141,7 +138,7 @@ pub fn play_scenario(config: &Config, scenario: Scenario) -> Played {
 fn enabled_set_points(config: &Config, run: &mut VirtualRun<Port>) -> Vec<Option<f64>> {
     let snapshot = run.snapshot();
     let of = |(axis, shown): (&Axis, &AxisSnapshot)| {
-        let is_enabled = truth(run, axis).state == State::OperationEnabled;
+        let is_enabled = truth(run, axis).state == DriveState::OperationEnabled;
         is_enabled.then_some(shown.position_set)
     };
     config.axes.iter().zip(&snapshot.axes).map(of).collect()

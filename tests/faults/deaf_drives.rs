@@ -7,7 +7,7 @@ use takt::config::Config;
 use takt::controller::{Interrupt, VirtualRun};
 use takt::faults::Rehearsal;
 use takt::sim::NmtState;
-use takt_rt::stop::Phase;
+use takt_rt::Phase;
 
 use crate::arm::{folder, scenario};
 

@@ -4,8 +4,7 @@ use std::path::Path;
 
 use takt::config::Config;
 use takt::sim::{AfflictError, Defect, SimulatedBus};
-use takt_rt::frame::{Frame, Id};
-use takt_rt::port::{BusPort, ReceiveBatch};
+use takt_rt::{BusPort, Frame, Id, ReceiveBatch};
 
 fn bus() -> SimulatedBus {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/arm6-erob.toml");

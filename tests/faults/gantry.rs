@@ -3,7 +3,7 @@
 use takt::config::Config;
 use takt::controller::Outcome;
 use takt::faults::Scenario;
-use takt_rt::stop::{Phase, Rule, StopCategory};
+use takt_rt::{Phase, Rule, StopCategory};
 
 use crate::arm::{folder, play};
 
@@ -36,7 +36,7 @@ fn every_fault_with_a_rule_stops_the_whole_gantry_in_time_and_says_why() {
         let text = format!("[[fault]]\n{fault}\naxis = \"y\"\nwhen = \"moving\"\nat = \"300 ms\"");
         let played = play(&gantry(), &text);
         let [stop] = played.stops.as_slice() else { panic!("{fault}: {:?}", played.outcome) };
-        assert_eq!((stop.rule, stop.axis(), stop.category), (rule, Some(1), StopCategory::One), "{fault}");
+        assert_eq!((stop.rule(), stop.axis(), stop.category), (rule, Some(1), StopCategory::One), "{fault}");
         assert!(played.detection_ms.is_some_and(|ms| (0.0..=within_ms).contains(&ms)), "{fault}: {played:?}");
         assert!(played.largest_step <= 1.0 + 1e-6, "{fault}: {} velocity limits", played.largest_step);
         assert!(played.speed_at_end < 1e-3, "{fault}: {} m/s at the end", played.speed_at_end);

@@ -1,7 +1,7 @@
 //! Drives that always answer whole cycles late, SYNC or set-points: each answer looks like one to the next.
 
 use takt::controller::Outcome;
-use takt_rt::stop::{Phase, Rule, StopCategory};
+use takt_rt::{Phase, Rule, StopCategory};
 
 use takt::config::Config;
 
@@ -19,10 +19,10 @@ fn a_drive_that_always_reports_whole_cycles_late_is_not_enabled_and_is_named_wit
         let played = play(&arm(), &late);
         let Some(Outcome::Stopped(stop)) = played.outcome else { panic!("{cycles}: {:?}", played.outcome) };
         assert_eq!(
-            (stop.rule, stop.axis(), stop.category),
+            (stop.rule(), stop.axis(), stop.category),
             (Rule::MissedFeedback, Some(4), StopCategory::One)
         );
-        assert_eq!((stop.value, stop.limit, stop.phase), (f64::from(cycles), 0.0, Phase::Enabling));
+        assert_eq!((stop.cause.numbers(), stop.phase), ((f64::from(cycles), 0.0), Phase::Enabling));
         assert!(!played.phases.contains(&Phase::Holding), "{:?}", played.phases);
         assert_eq!(played.largest_step, 0.0, "no drive was enabled");
     }
@@ -63,10 +63,10 @@ fn a_drive_that_always_answers_set_points_whole_cycles_late_is_not_enabled_and_i
         let played = play(&answering_set_points(), &late);
         let Some(Outcome::Stopped(stop)) = played.outcome else { panic!("{cycles}: {:?}", played.outcome) };
         assert_eq!(
-            (stop.rule, stop.axis(), stop.category),
+            (stop.rule(), stop.axis(), stop.category),
             (Rule::MissedFeedback, Some(1), StopCategory::One)
         );
-        assert_eq!((stop.value, stop.limit, stop.phase), (f64::from(cycles), 0.0, Phase::Enabling));
+        assert_eq!((stop.cause.numbers(), stop.phase), ((f64::from(cycles), 0.0), Phase::Enabling));
         assert!(!played.phases.contains(&Phase::Holding), "{:?}", played.phases);
     }
 }

@@ -3,10 +3,7 @@
 use takt::config::Config;
 use takt::controller::VirtualRun;
 use takt::sim::SimulatedBus;
-use takt_rt::cia402::State;
-use takt_rt::frame::{Frame, Id};
-use takt_rt::port::{BusHealth, BusPort, ReceiveBatch};
-use takt_rt::stop::Phase;
+use takt_rt::{BusHealth, BusPort, DriveState, Frame, Id, Phase, ReceiveBatch};
 
 use crate::arm::folder;
 
@@ -82,11 +79,11 @@ fn a_drive_whose_controller_dies_as_soon_as_it_is_enabled_stops_whichever_heartb
             let (mut run, _) = enabled(&config, Some(lost));
             let died_ns = run.snapshot().at_ns;
             let port = &mut run.ports()[0];
-            let mut observed = |at_ns: u64| -> Vec<State> {
+            let mut observed = |at_ns: u64| -> Vec<DriveState> {
                 port.receive(at_ns, &mut ReceiveBatch::new());
                 config.axes.iter().map(|axis| port.bus.observe(axis.node).unwrap().state).collect()
             };
-            assert!(observed(died_ns).iter().all(|state| *state == State::OperationEnabled));
+            assert!(observed(died_ns).iter().all(|state| *state == DriveState::OperationEnabled));
             let ticks = died_ns..=died_ns + config.master.heartbeat_timeout_ns;
             let states = ticks.step_by(MILLISECOND_NS as usize).map(observed).last().unwrap();
             // That of a YZ-AIM stays on its place, with an alarm.

@@ -1,8 +1,7 @@
 //! What the controller does about each fault, for which there is a rule; and what holds whatever happens.
 
 use takt::controller::Outcome;
-use takt_rt::port::BusState;
-use takt_rt::stop::{Origin, Phase, Rule, StopCategory};
+use takt_rt::{BusState, Origin, Phase, Rule, StopCategory};
 
 use crate::arm::{Played, arm, play};
 
@@ -130,7 +129,7 @@ fn every_fault_with_a_rule_stops_the_whole_arm_in_time_and_says_why() {
         let played = in_motion(fault);
         assert_safe(fault, &played);
         let [stop] = played.stops.as_slice() else { panic!("{fault}: {:?}", played.outcome) };
-        assert_eq!((stop.rule, stop.origin), (rule, origin), "{fault}");
+        assert_eq!((stop.rule(), stop.origin), (rule, origin), "{fault}");
         assert_eq!((stop.category, stop.phase), (StopCategory::One, Phase::Moving), "{fault}");
         assert!(played.detection_ms.is_some_and(|ms| (0.0..=within_ms).contains(&ms)), "{fault}: {played:?}");
         assert_eq!(played.phases.last(), Some(&Phase::Disabled), "{fault}: {:?}", played.phases);
@@ -148,8 +147,8 @@ fn a_drive_whose_heartbeat_ceases_stops_the_whole_arm_though_it_still_reports() 
     let played = play(&config, &format!("[[fault]]\n{fault}\n{IN_MOTION}"));
     assert_safe(fault, &played);
     let [stop] = played.stops.as_slice() else { panic!("{:?}", played.outcome) };
-    assert_eq!((stop.rule, stop.axis(), stop.category), (Rule::NodeLost, Some(3), StopCategory::One));
-    assert_eq!((stop.value, stop.limit), (61.0, 60.0));
+    assert_eq!((stop.rule(), stop.axis(), stop.category), (Rule::NodeLost, Some(3), StopCategory::One));
+    assert_eq!(stop.cause.numbers(), (61.0, 60.0));
     let well = play(&config, "[[fault]]\nkind = \"drop\"\nbus = \"base\"\nat = \"1000 s\"");
     assert_eq!(well.outcome, Some(Outcome::Finished));
 }
@@ -184,7 +183,7 @@ fn the_axes_that_still_obey_decelerate_within_their_limits() {
 #[test]
 fn the_code_of_an_alarm_is_the_value_of_the_stop() {
     let played = in_motion("kind = \"alarm\"\naxis = \"joint4\"\ncode = 0x7500");
-    assert_eq!(played.stops[0].value, f64::from(0x7500));
+    assert_eq!(played.stops[0].cause.numbers().0, f64::from(0x7500));
     assert_eq!(played.emergencies, [(3, 0x7500)]);
 }
 
@@ -217,7 +216,7 @@ fn what_the_machine_must_bear_does_not_stop_it() {
 fn an_error_passive_interface_stops_the_arm_under_power() {
     let played = in_motion("kind = \"error-passive\"\nbus = \"wrist\"\nfor = \"0.5 s\"");
     let [stop] = played.stops.as_slice() else { panic!("{:?}", played.outcome) };
-    assert_eq!((stop.rule, stop.category), (Rule::BusErrorPassive, StopCategory::Two));
+    assert_eq!((stop.rule(), stop.category), (Rule::BusErrorPassive, StopCategory::Two));
 }
 
 #[test]
@@ -230,7 +229,7 @@ fn an_interface_that_goes_bus_off_after_it_was_error_passive_has_the_arm_disable
     assert_safe("error-passive, then bus-off", &played);
     assert_eq!(played.stops.len(), 1);
     let Some(Outcome::Stopped(stop)) = played.outcome else { panic!("{:?}", played.outcome) };
-    assert_eq!(stop.rule, Rule::BusErrorPassive);
+    assert_eq!(stop.rule(), Rule::BusErrorPassive);
     assert!(!played.phases[2..].ends_with(&[Phase::Stopping, Phase::Holding]), "{:?}", played.phases);
     assert_eq!(played.phases.last(), Some(&Phase::Disabled));
 }
@@ -292,7 +291,7 @@ fn a_second_fault_while_stopping_does_not_become_the_reason() {
          [[fault]]\nkind = \"over-voltage\"\naxis = \"joint1\"\nwhen = \"stopping\"\nat = \"20 cycles\"",
     );
     assert_safe("two at once", &played);
-    assert_eq!((played.stops[0].rule, played.stops[0].axis()), (Rule::DriveDisabled, Some(4)));
+    assert_eq!((played.stops[0].rule(), played.stops[0].axis()), (Rule::DriveDisabled, Some(4)));
     assert_eq!(played.emergencies, [(0, 0x3210)]);
     assert!(!played.phases.contains(&Phase::Holding) || played.phases.last() == Some(&Phase::Disabled));
 }

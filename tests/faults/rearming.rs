@@ -7,8 +7,7 @@ use takt::config::Config;
 use takt::controller::VirtualRun;
 use takt::faults::Rehearsal;
 use takt::sim::SimulatedBus;
-use takt_rt::door::Request;
-use takt_rt::stop::{Phase, Rule, StopReason};
+use takt_rt::{Fault, Phase, Request, Rule, StopCause, StopReason};
 
 use crate::arm::{arm, folder, scenario};
 
@@ -41,7 +40,7 @@ fn run_until(run: &mut VirtualRun<Port>, is_there: impl Fn(&VirtualRun<Port>) ->
 }
 
 fn latched(run: &VirtualRun<Port>) -> Option<StopReason> {
-    run.snapshot().stop.filter(|stop| stop.rule != Rule::Requested)
+    run.snapshot().stop.filter(|stop| stop.rule() != Rule::Requested)
 }
 
 fn machines() -> [Config; 2] {
@@ -73,6 +72,7 @@ fn a_fault_that_a_reset_does_not_clear_stops_the_group_again_with_its_code() {
     run_until(&mut run, |run| run.snapshot().phase == Phase::Enabling);
     run_until(&mut run, |run| run.snapshot().phase == Phase::Disabled);
     let again = latched(&run).unwrap();
-    assert_eq!((again.rule, again.axis()), (Rule::DriveFault, Some(0)));
-    assert_eq!((again.value, first.value), (f64::from(0x730F), f64::from(0x730F)));
+    assert_eq!((again.rule(), again.axis()), (Rule::DriveFault, Some(0)));
+    let fault = StopCause::Fault(Fault::DriveFault { error_code: 0x730F });
+    assert_eq!((again.cause, first.cause), (fault, fault));
 }

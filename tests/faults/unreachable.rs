@@ -6,7 +6,7 @@ use takt::bus::port::Port;
 use takt::config::Config;
 use takt::controller::{Outcome, VirtualRun};
 use takt::faults::Rehearsal;
-use takt_rt::stop::{Phase, Rule};
+use takt_rt::{Phase, Rule};
 
 use crate::arm::{arm, scenario};
 
@@ -55,7 +55,7 @@ fn a_run_whose_drives_cannot_be_reached_ends_when_their_own_watchdogs_have_fired
     let Some(Outcome::Stopped(stop)) = ended.run.supervisor().outcome().cloned() else {
         panic!("not stopped")
     };
-    assert_eq!(stop.rule, Rule::BusLost);
+    assert_eq!(stop.rule(), Rule::BusLost);
     let wrist = torques(&config, &mut ended.run, "wrist");
     assert_eq!(ended.run.supervisor().unreached(), wrist.iter().map(|(axis, _)| *axis).collect::<Vec<_>>());
     for bus in ["base", "wrist"] {

@@ -7,8 +7,7 @@ use takt::faults::{
     Breakable, Course, Cue, Cues, DelayPlace, Direction, Effect, Fault, FaultyPort, ForeignFrames,
     FrameEffect, InterfaceEffect, Part, Selection, Window,
 };
-use takt_rt::frame::{Frame, Id};
-use takt_rt::port::{BusHealth, BusPort, BusState, ReceiveBatch, Received};
+use takt_rt::{BusHealth, BusPort, BusState, Frame, Id, ReceiveBatch, Received};
 
 /// Keeps what it is sent, and has received what it is told to have.
 #[derive(Default)]

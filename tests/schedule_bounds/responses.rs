@@ -4,7 +4,7 @@ use proptest::prelude::*;
 use takt::bus::frame_time::BitRates;
 use takt::bus::schedule::{Message, response_time};
 use takt::sim;
-use takt_rt::frame::{Frame, FrameKind, Id};
+use takt_rt::{Frame, FrameKind, Id};
 
 use crate::frames::{bound_ns, longest};
 use crate::traffic::{Traffic, longest_response_ns};

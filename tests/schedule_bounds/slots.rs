@@ -5,7 +5,7 @@ use proptest::prelude::*;
 use takt::bus::schedule::{self, BusSchedule, MessageKind, MessageSchedule};
 use takt::config::Config;
 use takt::sim::BitRates;
-use takt_rt::frame::{Frame, FrameKind, Id};
+use takt_rt::{Frame, FrameKind, Id};
 
 use crate::frames::longest;
 use crate::traffic::{Arrival, Traffic};

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, HashMap, VecDeque};
 
 use takt::sim::{BitRates, Mailbox, Medium, Order};
-use takt_rt::frame::{Frame, Id};
+use takt_rt::{Frame, Id};
 
 /// A frame that has been received, times in ns.
 #[derive(Clone, Copy, Debug)]

@@ -3,8 +3,7 @@
 use takt::sim::erob::{ErobJoint, ErobParameters};
 use takt::sim::plant::{Encoder, JointParameters};
 use takt::sim::{BitRates, Drive, Observation, SimulatedBus};
-use takt_rt::frame::{Frame, Id};
-use takt_rt::port::{BusPort, ReceiveBatch, Received};
+use takt_rt::{BusPort, Frame, Id, ReceiveBatch, Received};
 
 pub const NODE: u8 = 5;
 pub const MILLISECOND_NS: u64 = 1_000_000;
@@ -189,7 +188,7 @@ impl Bench {
                 self.cycle(controlword, target);
             }
         }
-        assert_eq!(self.observe().state, takt_rt::cia402::State::OperationEnabled);
+        assert_eq!(self.observe().state, takt_rt::DriveState::OperationEnabled);
     }
 
     pub fn observe(&mut self) -> Observation {

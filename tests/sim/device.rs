@@ -2,7 +2,7 @@
 
 use takt::sim::DriveFault;
 use takt::sim::erob::ErobParameters;
-use takt_rt::cia402::State;
+use takt_rt::DriveState;
 
 use super::bench::{Bench, NODE, parameters};
 
@@ -41,22 +41,22 @@ fn each_controlword_takes_the_transition_of_the_standard() {
     let mut bench = Bench::new();
     bench.write(0x6060, 0, 1, 8).unwrap();
     let steps = [
-        (0x0F, State::SwitchOnDisabled),
-        (0x07, State::SwitchOnDisabled),
-        (0x06, State::ReadyToSwitchOn),
-        (0x00, State::SwitchOnDisabled),
-        (0x06, State::ReadyToSwitchOn),
-        (0x07, State::SwitchedOn),
-        (0x06, State::ReadyToSwitchOn),
-        (0x07, State::SwitchedOn),
-        (0x00, State::SwitchOnDisabled),
-        (0x06, State::ReadyToSwitchOn),
-        (0x0F, State::OperationEnabled),
-        (0x07, State::SwitchedOn),
-        (0x0F, State::OperationEnabled),
-        (0x06, State::ReadyToSwitchOn),
-        (0x0F, State::OperationEnabled),
-        (0x00, State::SwitchOnDisabled),
+        (0x0F, DriveState::SwitchOnDisabled),
+        (0x07, DriveState::SwitchOnDisabled),
+        (0x06, DriveState::ReadyToSwitchOn),
+        (0x00, DriveState::SwitchOnDisabled),
+        (0x06, DriveState::ReadyToSwitchOn),
+        (0x07, DriveState::SwitchedOn),
+        (0x06, DriveState::ReadyToSwitchOn),
+        (0x07, DriveState::SwitchedOn),
+        (0x00, DriveState::SwitchOnDisabled),
+        (0x06, DriveState::ReadyToSwitchOn),
+        (0x0F, DriveState::OperationEnabled),
+        (0x07, DriveState::SwitchedOn),
+        (0x0F, DriveState::OperationEnabled),
+        (0x06, DriveState::ReadyToSwitchOn),
+        (0x0F, DriveState::OperationEnabled),
+        (0x00, DriveState::SwitchOnDisabled),
     ];
     for (controlword, state) in steps {
         bench.write(0x6040, 0, 2, controlword).unwrap();
@@ -93,13 +93,13 @@ fn a_fault_is_left_by_a_rising_edge_that_is_held_for_several_cycles() {
         bench.cycle(0x0F, 0);
     }
     assert_eq!(bench.take(0x085), [[0x05, 0x73, 0x21, 0, 0, 0, 0, 0]]);
-    assert_eq!((bench.observe().state, bench.observe().error_code), (State::Fault, 0x7305));
+    assert_eq!((bench.observe().state, bench.observe().error_code), (DriveState::Fault, 0x7305));
     // An edge that is too short, then one that is long enough.
     for (controlword, cycles, state) in [
-        (0x80, 2, State::Fault),
-        (0x06, 3, State::Fault),
-        (0x80, 6, State::SwitchOnDisabled),
-        (0x06, 3, State::ReadyToSwitchOn),
+        (0x80, 2, DriveState::Fault),
+        (0x06, 3, DriveState::Fault),
+        (0x80, 6, DriveState::SwitchOnDisabled),
+        (0x06, 3, DriveState::ReadyToSwitchOn),
     ] {
         for _ in 0..cycles {
             bench.cycle(controlword, 0);
@@ -122,7 +122,7 @@ fn a_battery_fault_is_left_only_after_its_own_reset_which_loses_the_turns() {
         bench.write(0x6040, 0, 2, 0x00).unwrap();
         bench.write(0x6040, 0, 2, 0x80).unwrap();
         bench.run_ms(10);
-        assert_eq!((bench.observe().state, bench.observe().error_code), (State::Fault, 0x730F));
+        assert_eq!((bench.observe().state, bench.observe().error_code), (DriveState::Fault, 0x730F));
         bench.bus.power_cycle(NODE).unwrap();
         bench.run_ms(10);
         bench.heard.clear();
@@ -130,7 +130,7 @@ fn a_battery_fault_is_left_only_after_its_own_reset_which_loses_the_turns() {
     bench.write(0x2242, 0, 2, 1).unwrap();
     bench.write(0x6040, 0, 2, 0x80).unwrap();
     bench.run_ms(10);
-    assert_eq!(bench.observe().state, State::SwitchOnDisabled);
+    assert_eq!(bench.observe().state, DriveState::SwitchOnDisabled);
     assert_eq!(bench.observe().position_counts, before % 524_288);
 }
 
@@ -146,10 +146,10 @@ fn a_lost_master_makes_an_enabled_drive_decelerate_before_it_cuts_power() {
         bench.cycle(0x0F, 160_000);
     }
     let (mut reacting, mut last) = (0, bench.observe().velocity);
-    while bench.observe().state != State::Fault {
+    while bench.observe().state != DriveState::Fault {
         bench.cycle(0x0F, 160_000);
         let observed = bench.observe();
-        if observed.state == State::FaultReactionActive {
+        if observed.state == DriveState::FaultReactionActive {
             reacting += 1;
             assert!(observed.velocity <= last + 1e-3);
             last = observed.velocity;
@@ -171,11 +171,11 @@ fn a_quick_stop_runs_its_ramp_and_ends_without_power() {
     }
     bench.cycle(0x02, 160_000);
     bench.cycle(0x02, 160_000);
-    assert_eq!(bench.observe().state, State::QuickStopActive);
+    assert_eq!(bench.observe().state, DriveState::QuickStopActive);
     for _ in 0..120 {
         bench.cycle(0x02, 160_000);
     }
-    assert_eq!((bench.observe().state, bench.observe().velocity), (State::SwitchOnDisabled, 0.0));
+    assert_eq!((bench.observe().state, bench.observe().velocity), (DriveState::SwitchOnDisabled, 0.0));
 }
 
 #[test]
@@ -191,11 +191,11 @@ fn shutdown_is_immediate_or_after_a_ramp_as_605b_says() {
         for _ in 0..10 {
             bench.cycle(0x06, 160_000);
         }
-        assert_eq!(bench.observe().state == State::OperationEnabled, still_enabled);
+        assert_eq!(bench.observe().state == DriveState::OperationEnabled, still_enabled);
         for _ in 0..120 {
             bench.cycle(0x06, 160_000);
         }
-        assert_eq!((bench.observe().state, bench.observe().velocity), (State::ReadyToSwitchOn, 0.0));
+        assert_eq!((bench.observe().state, bench.observe().velocity), (DriveState::ReadyToSwitchOn, 0.0));
     }
 }
 
@@ -209,7 +209,7 @@ fn leaving_the_following_error_window_is_a_fault() {
     for _ in 0..300 {
         bench.cycle(0x0F, 0);
     }
-    assert_eq!((bench.observe().state, bench.observe().error_code), (State::Fault, 0x8611));
+    assert_eq!((bench.observe().state, bench.observe().error_code), (DriveState::Fault, 0x8611));
     assert_eq!(bench.take(0x085)[0], [0x11, 0x86, 0x21, 0, 0, 0, 0, 0]);
 }
 
@@ -238,7 +238,7 @@ fn a_power_cycle_disables_brakes_and_starts_anew() {
     bench.run_ms(60);
     assert_eq!(bench.take(0x705), [[0]]);
     let observed = bench.observe();
-    assert_eq!((observed.state, observed.velocity), (State::SwitchOnDisabled, 0.0));
+    assert_eq!((observed.state, observed.velocity), (DriveState::SwitchOnDisabled, 0.0));
     // The brake took a few hundredths of a radian, and the joint stayed where it then was.
     assert!((0.0..0.05).contains(&(observed.position - position)));
 }

@@ -4,7 +4,7 @@
 use proptest::prelude::*;
 use takt::bus::frame_time::{FrameShape, worst_case_bits};
 use takt::sim::WireLength;
-use takt_rt::frame::{Frame, Id};
+use takt_rt::{Frame, Id};
 
 fn identifiers() -> impl Strategy<Value = Id> {
     prop_oneof![

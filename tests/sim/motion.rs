@@ -2,7 +2,7 @@
 
 use takt::sim::erob::ErobParameters;
 use takt::sim::plant::Encoder;
-use takt_rt::cia402::State;
+use takt_rt::DriveState;
 
 use super::bench::{Bench, COUNTS_PER_RADIAN, MILLISECOND_NS, NODE, parameters};
 
@@ -103,7 +103,7 @@ fn when_sync_stays_away_the_last_target_is_reached_and_held() {
     bench.run_ms(2_000);
     // The one of cycle 998 was latched at the last SYNC, the one of cycle 999 still waits.
     assert!((bench.observe().position_counts - 99_800).abs() <= 1);
-    assert_eq!(bench.observe().state, State::OperationEnabled);
+    assert_eq!(bench.observe().state, DriveState::OperationEnabled);
 }
 
 #[test]

@@ -2,8 +2,7 @@
 
 use takt::sim::erob::ErobParameters;
 use takt::sim::{DriveFault, NmtState};
-use takt_rt::cia402::State;
-use takt_rt::frame::{Frame, Id};
+use takt_rt::{DriveState, Frame, Id};
 
 use super::bench::{Bench, MILLISECOND_NS, NODE, parameters};
 
@@ -111,7 +110,7 @@ fn loses_master(error_behaviour: i64) -> Bench {
         bench.say(MASTER_HEARTBEAT, [5]);
         bench.run_ms(40);
     }
-    assert_eq!(bench.observe().state, State::SwitchOnDisabled);
+    assert_eq!(bench.observe().state, DriveState::SwitchOnDisabled);
     bench.heard.clear();
     bench.run_ms(11);
     assert_eq!(bench.observe().error_code, 0x8130);
@@ -122,7 +121,7 @@ fn loses_master(error_behaviour: i64) -> Bench {
 fn a_lost_master_is_a_fault_an_emergency_message_and_the_state_that_1029_says() {
     let mut bench = loses_master(0);
     assert_eq!(bench.take(0x085), [[0x30, 0x81, 0x11, 0, 0, 0, 0, 0]]);
-    assert_eq!((bench.observe().nmt, bench.observe().state), (NmtState::PreOperational, State::Fault));
+    assert_eq!((bench.observe().nmt, bench.observe().state), (NmtState::PreOperational, DriveState::Fault));
     assert_eq!(bench.read(0x1003, 1), Ok(0x8130));
     assert_eq!(loses_master(1).observe().nmt, NmtState::Operational);
     assert_eq!(loses_master(2).observe().nmt, NmtState::Stopped);

@@ -3,8 +3,7 @@
 use takt::config::{Config, Travel};
 use takt::sim::erob::ErobJoint;
 use takt::sim::{BitRates, SimulatedBus, UnknownNode, WireLength};
-use takt_rt::frame::{Frame, Id};
-use takt_rt::port::{BusPort, BusState, RECEIVE_BATCH, ReceiveBatch};
+use takt_rt::{BusPort, BusState, Frame, Id, RECEIVE_BATCH, ReceiveBatch};
 
 use super::bench::{Bench, MILLISECOND_NS, NODE, parameters};
 

@@ -1,6 +1,6 @@
 //! When PDOs act, and what they do with frames that do not fit (CiA 301, 7.2.2).
 
-use takt_rt::frame::{Frame, Id};
+use takt_rt::{Frame, Id};
 
 use super::bench::{Bench, NODE};
 

@@ -1,6 +1,6 @@
 //! The modes in which the drive makes its own trajectory: PP, PV, PT.
 
-use takt_rt::cia402::statusword::{BIT_12, TARGET_REACHED};
+use takt_rt::statusword::{BIT_12, TARGET_REACHED};
 
 use super::bench::{Bench, COUNTS_PER_RADIAN, NODE};
 

@@ -55,8 +55,7 @@ fn the_drive_answers_every_printed_canopen_conversation_as_printed() {
     let mut rows = rows.into_iter().peekable();
     while let Some(row) = rows.next() {
         assert!(row.is_request, "{}: an answer without a request", row.id);
-        let frame =
-            takt_rt::frame::Frame::data(takt_rt::frame::Id::base(row.can_id).unwrap(), &row.data).unwrap();
+        let frame = takt_rt::Frame::data(takt_rt::Id::base(row.can_id).unwrap(), &row.data).unwrap();
         bench.send(frame);
         bench.run_ms(2);
         let heard: Vec<_> = std::mem::take(&mut bench.heard);

@@ -1,24 +1,23 @@
 //! Somebody who asks the group for anything at any time.
 
 use takt::config::{Config, Control};
-use takt_rt::door::{Move, ProfileMove, Request, Snapshot, StreamCommand};
 use takt_rt::plan::State;
-use takt_rt::profile::ProfileTarget;
-use takt_rt::record::MAX_AXES;
-use takt_rt::stop::{Phase, StopCategory};
+use takt_rt::{
+    MAX_AXES, Move, Phase, ProfileMove, ProfileTarget, Request, Snapshot, StopCategory, StreamCommand,
+};
 
 use crate::dice::Dice;
 
 /// What has been asked of the group up to a cycle, as far as invariants depend on it.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Asked {
+pub struct RecentRequests {
     /// A reset of faults that somebody has asked for was granted in this cycle.
     pub has_reset: bool,
     /// The same, not long ago.
     pub has_reset_lately: bool,
 }
 
-/// The most requests in one cycle: more than the door holds.
+/// The most requests in one cycle: more than the host interface holds.
 const REQUESTS_AT_MOST: usize = 24;
 
 /// What the client wants in a cycle.
@@ -80,13 +79,12 @@ pub struct Client {
     restlessness: f64,
     stream: Option<Stream>,
     are_streams_wild: bool,
-    last_id: u32,
 }
 
 impl Client {
     pub fn new(mut dice: Dice, are_streams_wild: bool) -> Self {
         let restlessness = dice.pick(&[0.002, 0.01, 0.05, 0.2]);
-        Self { dice, restlessness, stream: None, are_streams_wild, last_id: 1000 }
+        Self { dice, restlessness, stream: None, are_streams_wild }
     }
 
     /// What it wants after a cycle.
@@ -128,11 +126,6 @@ impl Client {
         }
     }
 
-    fn id(&mut self) -> u32 {
-        self.last_id += 1;
-        self.last_id
-    }
-
     fn scale(&mut self) -> f64 {
         if self.dice.chance(0.03) {
             self.dice.pick(&[0.0, -1.0, 2.0, f64::NAN])
@@ -156,9 +149,7 @@ impl Client {
         }
         let minimum_duration_s = if self.dice.chance(0.1) { self.dice.between(0.0, 2.0) } else { 0.0 };
         let (velocity_scale, acceleration_scale) = (self.scale(), self.scale());
-        let id = self.id();
         Request::Move(Move {
-            id,
             target,
             target_velocity,
             velocity_scale,
@@ -183,7 +174,7 @@ impl Client {
             _ => ProfileTarget::Torque(share * limits.torque * 0.2),
         };
         let valid_until_ns = snapshot.at_ns + self.dice.below(2_000_000_000) as u64;
-        Request::SetProfileTarget(ProfileMove { id: self.id(), axis: axis as u8, target, valid_until_ns })
+        Request::SetProfileTarget(ProfileMove { axis: axis as u8, target, valid_until_ns })
     }
 
     fn begin_stream(&mut self, config: &Config, snapshot: &Snapshot) {
@@ -282,6 +273,6 @@ impl Client {
 
 /// Whether the group can be asked for something beside a program: nothing has stopped it by itself.
 pub fn is_open(snapshot: &Snapshot) -> bool {
-    let has_own_stop = snapshot.stop.is_some_and(|stop| stop.rule != takt_rt::stop::Rule::Requested);
+    let has_own_stop = snapshot.stop.is_some_and(|stop| stop.rule() != takt_rt::Rule::Requested);
     snapshot.phase != Phase::Passive && !has_own_stop
 }

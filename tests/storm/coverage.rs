@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
 use takt::config::DriveFamily;
-use takt_rt::stop::Phase;
+use takt_rt::Phase;
 
 use crate::case::Case;
 use crate::run::Done;

@@ -2,7 +2,7 @@
 
 use std::fmt::{self, Write};
 
-use takt_rt::record::CycleRecord;
+use takt_rt::CycleRecord;
 
 use crate::run::World;
 

@@ -6,7 +6,7 @@ use std::path::Path;
 use std::sync::OnceLock;
 
 use takt::config::{Axis, Config, DriveFamily, Feedback};
-use takt_rt::stop::Rule;
+use takt_rt::Rule;
 
 use crate::dice::Dice;
 

@@ -8,16 +8,13 @@ use takt::controller::channels::LogSide;
 use takt::controller::{Outcome, VirtualRun};
 use takt::faults::{Rehearsal, Scenario};
 use takt::sim::{Observation, SimulatedBus};
-use takt_rt::cia402::State;
-use takt_rt::door::{Request, RequestId, Snapshot};
-use takt_rt::frame::Frame;
-use takt_rt::port::{BusPort, ReceiveBatch};
-use takt_rt::record::{Event, EventKind};
-use takt_rt::refusal::Answer;
-use takt_rt::stop::{Phase, Rule};
+use takt_rt::{
+    Answer, BusPort, DriveState, Event, EventKind, Frame, Phase, ReceiveBatch, Request, RequestId, Rule,
+    Snapshot,
+};
 
 use crate::case::Case;
-use crate::client::{Asked, Client, is_open};
+use crate::client::{Client, RecentRequests, is_open};
 use crate::concern::Concerns;
 use crate::fingerprint::Fingerprint;
 use crate::invariants::{Invariants, REST, Seen};
@@ -196,10 +193,10 @@ pub fn play(case: &Case) -> Result<Done, String> {
 fn note_stop(events: &[Event], struck: &mut [Struck]) {
     for event in events {
         if let EventKind::Stop(reason) = event.kind
-            && reason.rule != Rule::Requested
+            && reason.rule() != Rule::Requested
         {
             struck.iter_mut().filter(|struck| !struck.is_overtaken).for_each(|struck| {
-                struck.stop.get_or_insert(reason.rule);
+                struck.stop.get_or_insert(reason.rule());
             });
         }
     }
@@ -208,7 +205,7 @@ fn note_stop(events: &[Event], struck: &mut [Struck]) {
 /// Those who ask for things, all through one queue.
 struct Clients {
     all: Vec<Client>,
-    asked: Asked,
+    asked: RecentRequests,
     /// Resets of faults that wait in the queue. Each counts when it is granted: a fault may come up before that, and is reset too.
     awaited_resets: Vec<RequestId>,
     since_reset: u64,
@@ -219,7 +216,7 @@ impl Clients {
         let all = (0..case.clients as u64)
             .map(|number| Client::new(case.dice.split(number), case.hardship.are_streams_wild))
             .collect();
-        Self { all, asked: Asked::default(), awaited_resets: vec![], since_reset: u64::MAX }
+        Self { all, asked: RecentRequests::default(), awaited_resets: vec![], since_reset: u64::MAX }
     }
 
     /// Looks which resets have been granted in the last cycle.
@@ -264,7 +261,7 @@ fn at_rest(case: &Case, concerns: &mut Concerns, world: &mut World) -> Result<()
     concerns.observe(&world.rehearsal, |_| ());
     for (axis, concern) in case.config.axes.iter().zip(&concerns.by_axis) {
         let truth = world.run.ports()[axis.bus].observe(axis.node);
-        let is_driven = truth.state == State::OperationEnabled;
+        let is_driven = truth.state == DriveState::OperationEnabled;
         // Nothing stops a drive that watches nobody any more and that nothing gets to.
         let is_beyond_reach = concern.is_unwatched && concern.is_cut_off;
         if (truth.velocity.abs() > REST || is_driven) && !concern.is_loaded && !is_beyond_reach {

@@ -8,8 +8,7 @@ use std::fmt::Write;
 
 use takt::config::Config;
 use takt::faults::Scenario;
-use takt_rt::record::EventKind;
-use takt_rt::stop::{Rule, StopReason};
+use takt_rt::{EventKind, Rule, StopReason};
 
 use crate::bounds;
 use crate::case::scenario;
@@ -50,7 +49,7 @@ fn reaction(config: &Config, scenario: &Scenario) -> Option<Reaction> {
         while world.log.next_record(|_| ()).is_some() {}
         for event in &world.events {
             match event.kind {
-                EventKind::Stop(reason) if reason.rule != Rule::Requested => {
+                EventKind::Stop(reason) if reason.rule() != Rule::Requested => {
                     stop = stop.or(Some((reason, event.at_ns)));
                 }
                 _ => {}
@@ -116,7 +115,7 @@ fn table(config: &Config, times: u64) -> (String, Vec<f64>) {
         }
         let mut rules: BTreeMap<String, u64> = BTreeMap::new();
         for Reaction { reason, .. } in &reactions {
-            *rules.entry(format!("{} ({}", reason.rule.key(), reason.category as u8)).or_default() += 1;
+            *rules.entry(format!("{} ({}", reason.rule().key(), reason.category as u8)).or_default() += 1;
         }
         let mut rules: Vec<(String, u64)> = rules.into_iter().collect();
         rules.sort_by_key(|(_, count)| std::cmp::Reverse(*count));

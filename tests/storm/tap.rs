@@ -4,8 +4,7 @@ use std::collections::VecDeque;
 
 use takt::bus::port::Port;
 use takt::sim::Observation;
-use takt_rt::frame::Frame;
-use takt_rt::port::{BusHealth, BusPort, ReceiveBatch};
+use takt_rt::{BusHealth, BusPort, Frame, ReceiveBatch};
 
 /// Frames that an interface holds.
 const QUEUE: usize = 64;

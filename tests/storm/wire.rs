@@ -2,8 +2,7 @@
 
 use takt::config::Config;
 use takt::drive::ProcessData;
-use takt_rt::frame::Frame;
-use takt_rt::pdo::MappedObject;
+use takt_rt::{Frame, MappedObject};
 
 const CONTROLWORD: u16 = 0x6040;
 const TARGET_POSITION: u16 = 0x607A;

@@ -4,12 +4,10 @@ use std::path::{Path, PathBuf};
 use takt::bus::trace::{TracedPort, traced};
 use takt::controller::channels::RtSide;
 use takt::telemetry::{BlackBoxOptions, Fault, LogSummary, Logger, LoggerOptions, Notice};
-use takt_rt::cia402::State;
-use takt_rt::door::Door;
-use takt_rt::frame::{Frame, Id};
-use takt_rt::port::{BusHealth, BusPort, BusState, ReceiveBatch, Received};
-use takt_rt::record::{CycleRecord, EventKind};
-use takt_rt::stop::{Phase, Rule, StopReason};
+use takt_rt::{
+    BusHealth, BusPort, BusState, CycleRecord, DriveState, EventKind, Frame, HostInterface, Id, Phase,
+    ReceiveBatch, Received, Rule, StopCause, StopReason,
+};
 
 use crate::reader::{Value, messages};
 use crate::run::{CYCLE_NS, EPOCH_NS, Notices, STOP, UNIX_AT_ZERO_NS, cycle, event, options, sides};
@@ -90,7 +88,8 @@ impl Run {
     }
 
     fn stop(&mut self, rule: Rule) {
-        let stop = StopReason { rule, slot: self.slot, ..STOP };
+        let cause = StopCause::from_numbers(rule, 0.25, 8.0).unwrap();
+        let stop = StopReason { cause, slot: self.slot, ..STOP };
         self.rt.event(&event(self.slot, EventKind::Stop(stop)));
     }
 
@@ -247,7 +246,7 @@ fn a_drive_that_faults_without_power_is_a_fault_and_one_that_was_faulted_before_
     let folder = tempfile::tempdir().unwrap();
     let mut run = Run::new(folder.path());
     let faulted = |slot| {
-        event(slot, EventKind::DriveState { axis: 0, state: State::decode(0x0008), statusword: 0x0008 })
+        event(slot, EventKind::DriveState { axis: 0, state: DriveState::decode(0x0008), statusword: 0x0008 })
     };
     let disabled = |run: &mut Run, count: u64| {
         for _ in 0..count {
@@ -262,7 +261,7 @@ fn a_drive_that_faults_without_power_is_a_fault_and_one_that_was_faulted_before_
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
     run.rt.event(&event(
         10,
-        EventKind::DriveState { axis: 0, state: State::decode(0x0250), statusword: 0x0250 },
+        EventKind::DriveState { axis: 0, state: DriveState::decode(0x0250), statusword: 0x0250 },
     ));
     disabled(&mut run, 10);
     run.rt.event(&faulted(20));
@@ -281,12 +280,12 @@ fn a_drive_whose_fault_stops_the_group_is_one_fault_even_if_the_power_is_gone_wh
     let mut run = Run::new(folder.path());
     run.rt.event(&event(
         0,
-        EventKind::DriveState { axis: 1, state: State::decode(0x0237), statusword: 0x0237 },
+        EventKind::DriveState { axis: 1, state: DriveState::decode(0x0237), statusword: 0x0237 },
     ));
     run.cycles(10);
     run.rt.event(&event(
         10,
-        EventKind::DriveState { axis: 1, state: State::decode(0x0008), statusword: 0x0008 },
+        EventKind::DriveState { axis: 1, state: DriveState::decode(0x0008), statusword: 0x0008 },
     ));
     run.stop(Rule::DriveFault);
     run.rt.record(&CycleRecord { phase: Phase::Disabled, ..cycle(10) });

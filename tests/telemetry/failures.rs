@@ -2,10 +2,7 @@ use std::fs::{self, OpenOptions};
 
 use takt::bus::trace::{TracedPort, traced};
 use takt::telemetry::{Destination, Logger, Notice};
-use takt_rt::door::Door;
-use takt_rt::frame::{Frame, Id};
-use takt_rt::port::{BusHealth, BusPort, ReceiveBatch};
-use takt_rt::record::EventKind;
+use takt_rt::{BusHealth, BusPort, EventKind, Frame, HostInterface, Id, ReceiveBatch, RequestId};
 
 use crate::run::{Disk, Notices, cycle, event, options, run, sides};
 
@@ -72,7 +69,9 @@ fn a_full_ring_drops_counts_and_reports() {
     let disk = Disk::new(usize::MAX);
     let mut logger = Logger::new(log, options(Some(disk.destination())), Notices::default().sink());
     assert_eq!((0..20).filter(|slot| rt.record(&cycle(*slot))).count(), 8);
-    let taken = (0..20).filter(|id| rt.event(&event(0, EventKind::MoveFinished { id: *id }))).count();
+    let taken = (0..20)
+        .filter(|id| rt.event(&event(0, EventKind::MotionFinished { request: RequestId(*id) })))
+        .count();
     assert_eq!(taken, 16);
     assert_eq!(logger.drain(), 24);
     run(&mut rt, &mut logger, 20..30);

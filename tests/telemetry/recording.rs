@@ -3,12 +3,10 @@ use std::path::Path;
 
 use takt::bus::trace::traced;
 use takt::telemetry::{Destination, Logger};
-use takt_rt::door::Door;
-use takt_rt::frame::{Frame, Id};
-use takt_rt::port::{BusHealth, BusPort, ReceiveBatch, Received};
-use takt_rt::record::EventKind;
-use takt_rt::refusal::{Objection, Refusal, RequestKind};
-use takt_rt::stop::Phase;
+use takt_rt::{
+    BusHealth, BusPort, EventKind, Frame, HostInterface, Id, Phase, ReceiveBatch, Received, RejectReason,
+    RequestError, RequestKind,
+};
 
 use crate::reader::{Value, messages};
 use crate::run::{
@@ -29,12 +27,10 @@ fn record() -> Vec<u8> {
     ));
     rt.event(&event(
         9,
-        EventKind::Refused(Refusal {
+        EventKind::Rejected(RequestError {
             request: RequestKind::Move,
-            objection: Objection::PositionLimit,
+            reason: RejectReason::PositionLimit { position: 1.25, limit: 0.75 },
             axis: Some(1),
-            value: 1.25,
-            limit: 0.75,
             phase: Phase::Holding,
         }),
     ));

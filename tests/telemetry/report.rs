@@ -1,8 +1,6 @@
 use serde_json::{Value, json};
 use takt::telemetry::{Destination, Emphasis, LogSummary, Logger, RealtimeReport, RunOutcome, RunReport};
-use takt_rt::door::{Door, Snapshot};
-use takt_rt::port::{BusHealth, BusState};
-use takt_rt::stop::StopReason;
+use takt_rt::{BusHealth, BusState, HostInterface, Snapshot, StopReason};
 
 use crate::run::{Disk, Notices, STOP, cycle, options, run, sides};
 

@@ -8,10 +8,10 @@ use takt::telemetry::{
     AxisDescription, BusDescription, Destination, Logger, LoggerOptions, Machine, Notice, SetPointMagnitudes,
     Unit, WallClock,
 };
-use takt_rt::cia402;
-use takt_rt::door::Door;
-use takt_rt::record::{AxisRecord, CycleRecord, Event, EventKind, MAX_AXES, Timing};
-use takt_rt::stop::{Origin, Phase, Rule, StopCategory, StopReason};
+use takt_rt::{
+    AxisRecord, CycleRecord, CycleTiming, DriveState, Event, EventKind, Fault, HostInterface, MAX_AXES,
+    Origin, Phase, StopCategory, StopCause, StopReason,
+};
 
 /// 2023-11-14 22:13:20 UTC
 pub const UNIX_AT_ZERO_NS: u64 = 1_700_000_000_000_000_000;
@@ -20,10 +20,8 @@ pub const EPOCH_NS: u64 = 5_000_000;
 pub const CYCLE_NS: u64 = 1_000_000;
 pub const STOP: StopReason = StopReason {
     category: StopCategory::One,
-    rule: Rule::FollowingError,
+    cause: StopCause::Fault(Fault::FollowingError { error: 0.25, limit: 0.125 }),
     origin: Origin::Axis(1),
-    value: 0.25,
-    limit: 0.125,
     slot: 7,
     phase: Phase::Moving,
 };
@@ -84,7 +82,7 @@ pub fn cycle(slot: u64) -> CycleRecord {
             torque: -8.5,
             following_error: 0.0625 * slot as f32,
             controlword: 0x0F,
-            drive_state: cia402::State::OperationEnabled,
+            drive_state: DriveState::OperationEnabled,
             statusword: 0x1637,
             error_code: 0x7305,
             feedback_age: axis as u16,
@@ -93,7 +91,7 @@ pub fn cycle(slot: u64) -> CycleRecord {
         };
     }
     CycleRecord {
-        timing: Timing {
+        timing: CycleTiming {
             slot,
             slot_start_ns: EPOCH_NS + slot * CYCLE_NS,
             wake_ns: 1000 + slot,

@@ -1,8 +1,7 @@
 use std::fs;
 
 use takt::telemetry::{Destination, Logger, LoggerThread, Notice};
-use takt_rt::door::Door;
-use takt_rt::record::EventKind;
+use takt_rt::{EventKind, HostInterface, RequestId};
 
 use crate::reader::messages;
 use crate::run::{Notices, cycle, event, options, sides};
@@ -14,7 +13,7 @@ fn the_thread_writes_all_that_was_handed_over_before_it_was_told_to_finish() {
     let notices = Notices::default();
     let options = options(Some(Destination::File(folder.path().join("run.mcap"))));
     let thread = LoggerThread::start(Logger::new(log, options, notices.sink())).unwrap();
-    let last = event(999, EventKind::MoveFinished { id: 4 });
+    let last = event(999, EventKind::MotionFinished { request: RequestId(4) });
     let mut dropped = 0;
     for slot in 0..1000 {
         while !rt.record(&cycle(slot)) {

@@ -2,14 +2,11 @@
 
 use takt::config::Config;
 use takt::drive::ProcessData;
-use takt_rt::door::{Move, ProfileMove, Request, StreamCommand};
-use takt_rt::engine::Engine;
-use takt_rt::frame::Id;
-use takt_rt::pdo::MappedObject;
 use takt_rt::plan;
-use takt_rt::profile::ProfileTarget;
-use takt_rt::record::MAX_AXES;
-use takt_rt::stop::StopCategory;
+use takt_rt::{
+    Engine, Id, MAX_AXES, MappedObject, Move, ProfileMove, ProfileTarget, Request, StopCategory,
+    StreamCommand,
+};
 
 use super::super::input::Input;
 
@@ -29,12 +26,12 @@ pub fn request(config: &Config, now_ns: u64, input: &mut Input<'_>) -> Request {
         7 => Request::Stop(categories[usize::from(input.byte()) % 3]),
         8 => Request::Disable,
         9 | 10 => Request::ResetFaults,
-        11 => Request::Leave,
+        11 => Request::Shutdown,
         12 => process_data(config, input),
         13 => Request::Position { axis: input.byte(), counts: input.word() as i32 },
         14 => Request::TimeOfDay { at_zero_ns: u64::from_le_bytes(input.bytes()) },
         15 | 16 => Request::SetProfileTarget(profile_move(config, now_ns, input)),
-        _ => Request::Retire,
+        _ => Request::InhibitEnable,
     }
 }
 
@@ -60,7 +57,7 @@ fn process_data(config: &Config, input: &mut Input<'_>) -> Request {
 
 /// A target that fits the axis, or any.
 fn profile_move(config: &Config, now_ns: u64, input: &mut Input<'_>) -> ProfileMove {
-    let (id, axis, kind) = (input.word(), input.byte() % 40, input.byte());
+    let (_, axis, kind) = (input.word(), input.byte() % 40, input.byte());
     let limits = config.axes.get(usize::from(axis)).map_or(&config.axes[0].limits, |axis| &axis.limits);
     let share = f64::from(input.byte() as i8) / 128.0;
     let value =
@@ -71,12 +68,14 @@ fn profile_move(config: &Config, now_ns: u64, input: &mut Input<'_>) -> ProfileM
         2 => ProfileTarget::Torque(value(limits.torque, input)),
         _ => ProfileTarget::Velocity(0.0),
     };
-    ProfileMove { id, axis, target, valid_until_ns: now_ns + 10_000_000 * u64::from(input.byte()) }
+    ProfileMove { axis, target, valid_until_ns: now_ns + 10_000_000 * u64::from(input.byte()) }
 }
 
 /// A move that begins and ends at rest, to somewhere within the limits.
 pub fn possible_move(config: &Config, input: &mut Input<'_>) -> Move {
-    let mut asked = nowhere(input.word());
+    // Kept inputs have a word here that is not used any more.
+    input.word();
+    let mut asked = nowhere();
     for (axis, target) in config.axes.iter().zip(&mut asked.target) {
         let share = f64::from(input.byte()) / 255.0;
         let range = axis.limits.position_max - axis.limits.position_min;
@@ -87,7 +86,9 @@ pub fn possible_move(config: &Config, input: &mut Input<'_>) -> Move {
 
 /// A move to anywhere, with any speed there.
 fn any_move(config: &Config, input: &mut Input<'_>) -> Move {
-    let mut asked = nowhere(input.word());
+    // Kept inputs have a word here that is not used any more.
+    input.word();
+    let mut asked = nowhere();
     for (_, target) in config.axes.iter().zip(&mut asked.target) {
         input.byte();
         *target = input.number();
@@ -99,9 +100,8 @@ fn any_move(config: &Config, input: &mut Input<'_>) -> Move {
     asked
 }
 
-fn nowhere(id: u32) -> Move {
+fn nowhere() -> Move {
     Move {
-        id,
         target: [0.0; MAX_AXES],
         target_velocity: [0.0; MAX_AXES],
         velocity_scale: 1.0,

@@ -3,11 +3,7 @@
 use takt::config::{Axis, Config, Control};
 use takt::controller::assemble;
 use takt::drive::{PdoPlan, ProcessData};
-use takt_rt::cia402::{Command, State, controlword, statusword};
-use takt_rt::dialect::Dialect;
-use takt_rt::frame::{Frame, Id};
-use takt_rt::pdo::MappedObject;
-use takt_rt::units::Scale;
+use takt_rt::{Command, Dialect, DriveState, Frame, Id, MappedObject, Scale, controlword, statusword};
 
 /// Below this speed friction fades out, so that a joint at rest stays there: rad/s (m/s).
 const COULOMB_FADE: f64 = 1e-3;
@@ -21,7 +17,7 @@ pub struct ObedientDrive {
     scale: Scale,
     /// What it is sent and what it sends.
     pub data: ProcessData,
-    pub state: State,
+    pub state: DriveState,
     pub is_silent: bool,
     /// Whether it tells in each cycle what it had to tell in the one before.
     pub is_late: bool,
@@ -46,7 +42,7 @@ impl ObedientDrive {
             axis,
             scale: assemble::scale(axis).expect("the example is sound"),
             data: ProcessData::of(axis),
-            state: State::SwitchOnDisabled,
+            state: DriveState::SwitchOnDisabled,
             is_silent: false,
             is_late: false,
             position: axis.limits.position_min.max(0.0).min(axis.limits.position_max),
@@ -105,10 +101,10 @@ impl ObedientDrive {
     }
 
     fn statusword(&self) -> u16 {
-        let is_enabled = self.state == State::OperationEnabled;
+        let is_enabled = self.state == DriveState::OperationEnabled;
         match self.axis.drive.dialect() {
             Dialect::YzAim => match self.state {
-                State::Fault | State::FaultReactionActive => 0x0008,
+                DriveState::Fault | DriveState::FaultReactionActive => 0x0008,
                 _ if is_enabled => 0x0037 | self.target_reached(),
                 _ => 0x0404,
             },
@@ -170,11 +166,11 @@ impl ObedientDrive {
     /// Lets time pass.
     pub fn pass(&mut self, period_s: f64) {
         match self.state {
-            State::OperationEnabled => self.go(period_s),
+            DriveState::OperationEnabled => self.go(period_s),
             // Its ramp is steep, and it has no torque at the end of it.
-            State::QuickStopActive => {
+            DriveState::QuickStopActive => {
                 self.velocity = 0.0;
-                self.state = State::SwitchOnDisabled;
+                self.state = DriveState::SwitchOnDisabled;
             }
             _ => self.velocity = 0.0,
         }

@@ -12,14 +12,11 @@ use std::sync::OnceLock;
 
 use takt::config::{Config, Control};
 use takt::controller::assemble;
-use takt_rt::cia402::{Command, OperationMode, State};
-use takt_rt::dialect::Dialect;
-use takt_rt::door::{Asked, Door, Request, RequestId, Snapshot, StreamCommand};
-use takt_rt::engine::{BusSet, Engine, SendBatch, Transmission};
-use takt_rt::frame::Frame;
-use takt_rt::port::{BusHealth, BusState, Received};
-use takt_rt::record::{CycleRecord, Event, Timing};
-use takt_rt::stop::Phase;
+use takt_rt::{
+    BusHealth, BusSet, BusState, Command, CycleInput, CycleRecord, CycleTiming, Deadline, Dialect,
+    DriveState, Engine, Event, Frame, HostInterface, OperationMode, Phase, Received, Request,
+    RequestEnvelope, RequestId, SendBatch, Snapshot, StreamCommand,
+};
 
 use super::input::Input;
 use drive::ObedientDrive;
@@ -51,6 +48,17 @@ fn configuration(number: u8) -> &'static Config {
     }]
 }
 
+/// What keeps the frames of a cycle from leaving.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Disturbed {
+    /// Nothing.
+    No,
+    /// They are ready too late.
+    Late,
+    /// Every bus is behind.
+    Blocked,
+}
+
 /// What a group has gone through.
 #[derive(Default)]
 pub struct Journey {
@@ -67,13 +75,13 @@ pub struct Journey {
 pub fn run(bytes: &[u8]) -> Journey {
     let mut input = Input::new(bytes);
     let mut machine = Machine::new(configuration(input.byte()));
-    while !input.is_empty() && machine.slot < CYCLES_AT_MOST && !machine.engine.is_leaving() {
+    while !input.is_empty() && machine.slot < CYCLES_AT_MOST && !machine.engine.is_shutting_down() {
         machine.act(&mut input);
     }
     machine.journey
 }
 
-/// The other side of the door.
+/// The other side of the host interface.
 #[derive(Default)]
 struct Hall {
     requests: VecDeque<Request>,
@@ -85,12 +93,12 @@ struct Hall {
     snapshot: Snapshot,
 }
 
-impl Door for Hall {
-    fn request(&mut self) -> Option<Asked> {
+impl HostInterface for Hall {
+    fn request(&mut self) -> Option<RequestEnvelope> {
         let request = self.requests.pop_front()?;
         self.asked += 1;
-        self.is_retired |= request == Request::Retire;
-        Some(Asked { id: RequestId(self.asked), request })
+        self.is_retired |= request == Request::InhibitEnable;
+        Some(RequestEnvelope { id: RequestId(self.asked), request })
     }
 
     fn stream(&mut self) -> Option<StreamCommand> {
@@ -159,7 +167,7 @@ impl Machine {
         match input.byte() % 16 {
             0..3 => {
                 for _ in 0..=input.byte() {
-                    self.cycle(Transmission::Free);
+                    self.cycle(Disturbed::No);
                 }
             }
             3 => self.disturb(input),
@@ -167,19 +175,19 @@ impl Machine {
                 let sweep = asking::Sweep::new(&self.engine, self.period_s(), input);
                 for cycle in sweep.cycles() {
                     self.hall.stream = Some(sweep.command(cycle, self.now_ns()));
-                    self.cycle(Transmission::Free);
+                    self.cycle(Disturbed::No);
                 }
             }
             6 => {
                 self.slot += u64::from(input.byte());
-                self.cycle(Transmission::Free);
+                self.cycle(Disturbed::No);
             }
-            7 => self.cycle(Transmission::TooLate),
-            8 => self.cycle(Transmission::Blocked),
+            7 => self.cycle(Disturbed::Late),
+            8 => self.cycle(Disturbed::Blocked),
             9 => {
                 let bus = usize::from(input.byte()) % (self.buses.len() + 1);
                 let received = Received { frame: input.frame(), at_ns: self.now_ns() };
-                self.engine.receive(bus, &received, &mut self.hall);
+                self.engine.receive(bus, &received);
             }
             10 => {
                 let request = asking::request(self.config, self.now_ns(), input);
@@ -197,8 +205,8 @@ impl Machine {
                 let drive = &mut self.drives[drive];
                 match input.byte() % 4 {
                     0 => drive.is_silent = !drive.is_silent,
-                    1 => drive.state = State::Fault,
-                    2 => drive.state = State::SwitchOnDisabled,
+                    1 => drive.state = DriveState::Fault,
+                    2 => drive.state = DriveState::SwitchOnDisabled,
                     _ => drive.turn(input.word() as i32),
                 }
             }
@@ -236,32 +244,30 @@ impl Machine {
         self.config.cycle.period_ns as f64 * 1e-9
     }
 
-    fn cycle(&mut self, transmission: Transmission) {
+    fn cycle(&mut self, disturbed: Disturbed) {
         self.slot += 1;
         let now_ns = self.now_ns();
         self.report();
         let before = self.engine.phase();
         let mut held_back = self.held_back;
-        if transmission == Transmission::Blocked {
+        if disturbed == Disturbed::Blocked {
             (0..self.buses.len()).for_each(|bus| held_back.insert(bus));
         }
-        self.engine.hold_back(held_back);
         let asked = self.hall.asked;
-        let has_commands = self.engine.compute(self.slot, now_ns, &self.buses, transmission, &mut self.hall);
-        assert!(!has_commands || transmission != Transmission::TooLate);
+        let input = CycleInput { slot: self.slot, now_ns, buses: &self.buses, behind: held_back };
+        self.engine.compute(&input, &mut self.hall);
+        let deadline = if disturbed == Disturbed::Late { Deadline::Missed } else { Deadline::Met };
         let mut sent = vec![SendBatch::new(); self.buses.len()];
         for (bus, batch) in sent.iter_mut().enumerate() {
-            if has_commands {
-                self.engine.set_points(bus, self.slot, batch);
-            }
+            self.engine.encode(bus, deadline, &mut self.hall, batch);
         }
-        let is_held = |bus| held_back.contains(bus) || transmission == Transmission::TooLate;
-        assert!(sent.iter().enumerate().all(|(bus, batch)| !is_held(bus) || batch.is_empty()));
+        // After its deadline, or behind a backlog, nothing leaves but what stops the drives: NMT and SDO requests.
+        let is_held = |bus| held_back.contains(bus) || disturbed == Disturbed::Late;
+        let may_stop = |frame: &Frame| matches!(frame.id().value() & 0x780, 0x000 | 0x600);
+        assert!(sent.iter().enumerate().all(|(bus, batch)| !is_held(bus) || batch.iter().all(may_stop)));
+        let has_commands = deadline == Deadline::Met && self.engine.phase() != Phase::Passive;
         self.obey(&sent, before, has_commands);
-        for (bus, batch) in sent.iter_mut().enumerate() {
-            self.engine.services(bus, &mut self.hall, batch);
-        }
-        let timing = Timing { slot: self.slot, ..Timing::default() };
+        let timing = CycleTiming { slot: self.slot, ..CycleTiming::default() };
         self.engine.finish(timing, now_ns, &self.buses, &mut self.hall);
         self.watch.look(&self.engine, &self.hall.events, &self.hall.snapshot, has_commands);
         self.hall.events.clear();
@@ -285,7 +291,7 @@ impl Machine {
             }
         }
         journey.taken += asked;
-        journey.refused = self.hall.snapshot.refused;
+        journey.refused = self.hall.snapshot.rejected;
     }
 
     /// SYNC, and what the drives say to it.
@@ -299,7 +305,7 @@ impl Machine {
             let on_bus = |(axis, _): &(&takt::config::Axis, _)| axis.bus == bus;
             for (_, drive) in self.config.axes.iter().zip(&mut self.drives).filter(on_bus) {
                 for frame in drive.tell(now_ns, has_sync) {
-                    self.engine.receive(bus, &Received { frame, at_ns: now_ns }, &mut self.hall);
+                    self.engine.receive(bus, &Received { frame, at_ns: now_ns });
                 }
             }
         }

@@ -1,11 +1,9 @@
 //! What must hold after every cycle, whatever came in.
 
 use takt::config::Config;
-use takt_rt::door::Snapshot;
-use takt_rt::engine::Engine;
-use takt_rt::record::{Event, EventKind};
-use takt_rt::refusal::{Objection, Refusal, RequestKind};
-use takt_rt::stop::{Phase, Rule, StopReason};
+use takt_rt::{
+    Engine, Event, EventKind, Phase, RejectReason, RequestError, RequestKind, Rule, Snapshot, StopReason,
+};
 
 /// Room for rounding, relative to a limit.
 const ROOM: f64 = 2e-6;
@@ -65,7 +63,7 @@ impl Watch {
         events.iter().for_each(|event| self.hear(event));
         assert_eq!(self.phase, engine.phase(), "a phase that nobody was told of");
         assert_eq!(self.phase, snapshot.phase);
-        assert_eq!(self.refused, snapshot.refused, "a refusal that nobody was told of");
+        assert_eq!(self.refused, snapshot.rejected, "a refusal that nobody was told of");
         self.look_at_stop(snapshot, has_acted);
         if has_acted {
             self.look_at_set_points(engine);
@@ -93,22 +91,25 @@ impl Watch {
                 assert_eq!(stop.phase, self.phase, "{stop:?}");
                 self.told = Some(stop);
             }
-            EventKind::Refused(refusal) => self.hear_refusal(&refusal),
+            EventKind::Rejected(rejected) => self.hear_rejection(&rejected),
             _ => {}
         }
     }
 
-    fn hear_refusal(&mut self, refusal: &Refusal) {
+    fn hear_rejection(&mut self, rejected: &RequestError) {
         self.refused += 1;
-        assert_eq!(refusal.phase, self.phase, "{refusal:?}");
-        assert!(refusal.axis.is_none_or(|axis| usize::from(axis) < self.axes.len()), "{refusal:?}");
-        let never = [RequestKind::Sync, RequestKind::Stop, RequestKind::Retire, RequestKind::Leave];
-        assert!(!never.contains(&refusal.request), "{refusal:?}");
-        assert!(refusal.request != RequestKind::Position || refusal.objection == Objection::UnknownAxis);
+        assert_eq!(rejected.phase, self.phase, "{rejected:?}");
+        assert!(rejected.axis.is_none_or(|axis| usize::from(axis) < self.axes.len()), "{rejected:?}");
+        let never = [RequestKind::Sync, RequestKind::Stop, RequestKind::InhibitEnable, RequestKind::Shutdown];
+        assert!(!never.contains(&rejected.request), "{rejected:?}");
+        assert!(
+            rejected.request != RequestKind::Position
+                || matches!(rejected.reason, RejectReason::UnknownAxis { .. })
+        );
     }
 
     fn look_at_stop(&mut self, snapshot: &Snapshot, has_acted: bool) {
-        let is_latched = snapshot.stop.is_some_and(|stop| stop.rule != Rule::Requested);
+        let is_latched = snapshot.stop.is_some_and(|stop| stop.rule() != Rule::Requested);
         if is_latched {
             let (is_on_way, stop) =
                 (matches!(self.phase, Phase::Enabling | Phase::Moving | Phase::Streaming), snapshot.stop);
@@ -116,7 +117,7 @@ impl Watch {
         }
         if let Some(stop) = snapshot.stop {
             let told = self.told.expect("nobody was told of the stop");
-            assert_eq!((told.rule, told.origin, told.slot), (stop.rule, stop.origin, stop.slot));
+            assert_eq!((told.rule(), told.origin, told.slot), (stop.rule(), stop.origin, stop.slot));
             assert!(stop.category <= told.category, "{stop:?} was {told:?}");
         }
         if self.phase == Phase::Stopping {

@@ -2,7 +2,7 @@
 
 pub mod rsruckig;
 
-use takt_rt::plan::{Limits, Problem, Profile, State, Timing, synchronised};
+use takt_rt::plan::{Limits, PlanOptions, Problem, Profile, State, synchronised};
 
 /// Which derivative is limited.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -49,7 +49,7 @@ pub fn problems(seed: u64, axes: usize, order: Order) -> Vec<Problem> {
 pub fn planned_anew(seed: u64, axes: usize, part: f64) -> Vec<Problem> {
     let mut set = problems(seed, axes, Order::Third);
     let mut profiles = vec![Profile::hold(0.0); axes];
-    let duration_s = synchronised(&set, &mut profiles, Timing::default()).unwrap_or_default();
+    let duration_s = synchronised(&set, &mut profiles, PlanOptions::default()).unwrap_or_default();
     for (problem, profile) in set.iter_mut().zip(&profiles) {
         problem.start = profile.sample(part * duration_s);
     }

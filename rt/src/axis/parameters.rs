@@ -23,7 +23,7 @@ pub struct Pdo {
 
 /// When a command is sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Cadence {
+pub enum TransmissionType {
     /// In every cycle of its bus.
     EveryCycle,
     /// When the controlword changes, and again while the drive is not enabled or is not to be.
@@ -36,13 +36,13 @@ pub struct CommandPdo {
     /// What.
     pub pdo: Pdo,
     /// When.
-    pub cadence: Cadence,
+    pub transmission: TransmissionType,
 }
 
 impl CommandPdo {
     /// One that is sent in every cycle of its bus.
     pub const fn every_cycle(pdo: Pdo) -> Self {
-        Self { pdo, cadence: Cadence::EveryCycle }
+        Self { pdo, transmission: TransmissionType::EveryCycle }
     }
 }
 

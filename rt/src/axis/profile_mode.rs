@@ -3,10 +3,10 @@
 use super::Axis;
 use crate::control::ControlLaw;
 use crate::dialect::Dialect;
+use crate::fault::Rule;
 use crate::guard::Violation;
 use crate::plan::State;
-use crate::profile::ProfileTarget;
-use crate::stop::Rule;
+use crate::profile::{ProfileCommand, ProfileTarget};
 use crate::time::Nanoseconds;
 
 /// Cycles of the bus from the position that is reported to a drive that acts on what was made of it: one for which a
@@ -18,14 +18,93 @@ const STALL_PATIENCE: u32 = 20;
 /// How far the velocity of a profile may overshoot its limit: the drive's own loop makes it.
 const VELOCITY_OVERSHOOT: f64 = 1.2;
 
+/// A target, and when it expires.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct TimedTarget {
+    target: ProfileTarget,
+    valid_until_ns: Nanoseconds,
+}
+
+/// The target of a drive in a profile mode, and what becomes of it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct ProfileMode {
+    command: ProfileCommand,
+    /// What `command` stands for; `None` before the first target since the drive was enabled.
+    target: Option<TimedTarget>,
+    /// Slots in which a drive in profile position has stood before its target.
+    stalled_cycles: u32,
+}
+
+impl ProfileMode {
+    fn set(&mut self, raw: i32, needs_handshake: bool, target: TimedTarget) {
+        self.command.set(raw, needs_handshake);
+        self.target = Some(target);
+    }
+
+    /// The drive has no torque: nothing is to move.
+    pub(super) fn rest(&mut self, target_raw: i32) {
+        self.command.rest(target_raw);
+        self.target = None;
+    }
+
+    /// Goes on by one cycle of the bus in a mode without a handshake.
+    pub(super) fn pass(&mut self) {
+        self.command.pass();
+    }
+
+    /// Goes on by one cycle of the bus. The bits of the controlword for profile position.
+    pub(super) fn position_bits(&mut self, statusword: u16) -> u16 {
+        self.command.position_bits(statusword)
+    }
+
+    /// The target in drive units.
+    pub(super) const fn target_raw(&self) -> i32 {
+        self.command.target_raw()
+    }
+
+    fn target(&self) -> Option<ProfileTarget> {
+        self.target.map(|timed| timed.target)
+    }
+
+    /// The torque that the drive is asked for: N·m (N).
+    pub(super) fn torque(&self) -> f64 {
+        match self.target() {
+            Some(ProfileTarget::Torque(torque)) => torque,
+            _ => 0.0,
+        }
+    }
+
+    fn is_moving_on_command(&self) -> bool {
+        match self.target() {
+            Some(ProfileTarget::Velocity(value) | ProfileTarget::Torque(value)) => value != 0.0,
+            _ => false,
+        }
+    }
+
+    fn expired_ns(&self, now_ns: Nanoseconds) -> Nanoseconds {
+        let until = self.target.filter(|_| self.is_moving_on_command()).map(|timed| timed.valid_until_ns);
+        until.map_or(0, |until_ns| now_ns.saturating_sub(until_ns))
+    }
+
+    fn count_stall(&mut self, is_stalled: bool) {
+        self.stalled_cycles = if is_stalled { self.stalled_cycles.saturating_add(1) } else { 0 };
+    }
+
+    /// Whether the drive has stood before its target for too long, where a following error may last for so many slots.
+    const fn is_stalled(&self, following_error_cycles: u32) -> bool {
+        let allowed = if following_error_cycles == 0 { 1 } else { following_error_cycles };
+        self.stalled_cycles > STALL_PATIENCE.saturating_mul(allowed)
+    }
+}
+
 impl Axis {
     /// Whether the drive makes its own way to a target.
     pub fn is_profile(&self) -> bool {
         self.parameters.law.is_profile()
     }
 
-    /// Whether the drive must bring the joint to rest by its own quick stop (object 6085). The manual stops profile torque
-    /// with torque 0, which only lets go: the joint coasts, and nothing but friction slows it.
+    /// Whether the drive must bring the joint to rest by its own quick stop (object 6085). In profile torque a torque of 0 lets
+    /// the joint coast: nothing but friction slows it.
     pub fn stops_by_itself(&self) -> bool {
         self.parameters.law == ControlLaw::ProfileTorque
     }
@@ -53,9 +132,7 @@ impl Axis {
             ProfileTarget::Velocity(velocity) => (scale.velocity_to_drive(velocity), false),
             ProfileTarget::Torque(torque) => (scale.torque_to_per_mille(torque), false),
         };
-        self.profile.set(raw, needs_handshake);
-        self.profile_target = Some(target);
-        self.profile_until_ns = valid_until_ns;
+        self.profile.set(raw, needs_handshake, TimedTarget { target, valid_until_ns });
     }
 
     /// Makes rest the target of a drive in a profile mode: the nearest position at which the joint can stand, no velocity, no
@@ -81,121 +158,152 @@ impl Axis {
 
     /// The least distance in which the drive can stop.
     fn braking_distance(&self) -> f64 {
-        self.velocity * self.velocity / (2.0 * self.deceleration())
+        self.velocity() * self.velocity() / (2.0 * self.deceleration())
     }
 
     /// How far the joint goes on, in its direction, when it is told to come to rest now: until the drive has heard that,
     /// which in profile position waits for the handshake, and while it decelerates.
     fn way_to_rest(&self) -> f64 {
         let limits = &self.parameters.limits;
-        let reaction_s = f64::from(REACTION_CYCLES + self.profile.cycles_to_offer()) * self.cycle_s;
+        let reaction_s =
+            f64::from(REACTION_CYCLES + self.profile.command.cycles_to_offer()) * self.reception.cycle_s();
         // It may still be speeding up.
-        let speed = self.velocity.abs();
+        let speed = self.velocity().abs();
         let highest = (speed + limits.acceleration * reaction_s).min(limits.velocity.max(speed));
         let distance = highest * reaction_s + highest * highest / (2.0 * self.deceleration());
-        if self.velocity == 0.0 { 0.0 } else { distance.copysign(self.velocity) }
+        if self.velocity() == 0.0 { 0.0 } else { distance.copysign(self.velocity()) }
     }
 
     /// Where the joint comes to rest if it is told to now: on its target, if that is on its way and it can stop there; never
     /// beyond its limits.
     fn nearest_rest(&self) -> f64 {
         let limits = &self.parameters.limits;
-        let (lowest, highest) =
-            (limits.position_min.min(self.position), limits.position_max.max(self.position));
-        let rest = (self.position + self.way_to_rest()).clamp(lowest, highest);
-        let Some(ProfileTarget::Position(target)) = self.profile_target else { return rest };
-        let ahead = (target - self.position) * self.velocity.signum();
-        if self.velocity == 0.0 || ahead <= 0.0 {
+        let (position, velocity) = (self.position(), self.velocity());
+        let (lowest, highest) = (limits.position_min.min(position), limits.position_max.max(position));
+        let rest = (position + self.way_to_rest()).clamp(lowest, highest);
+        let Some(ProfileTarget::Position(target)) = self.profile.target() else { return rest };
+        let ahead = (target - position) * velocity.signum();
+        if velocity == 0.0 || ahead <= 0.0 {
             return rest;
         }
         // A drive that is told to stop nearer than it can swings back. Its target is too near, so it does not speed up.
         let braking = self.braking_distance();
-        let reaction = self.velocity.abs() * f64::from(REACTION_CYCLES) * self.cycle_s;
+        let reaction = velocity.abs() * f64::from(REACTION_CYCLES) * self.reception.cycle_s();
         let nearest = if ahead < braking { reaction + braking } else { ahead };
-        rest.max(self.position - nearest).min(self.position + nearest)
+        rest.max(position - nearest).min(position + nearest)
     }
 
     /// Whether the drive has its target and says that it has reached it; an axis that follows set-points always has. A joint
-    /// that is let go coasts, and is where it was sent when it stands.
+    /// that coasts has reached its target when it stands.
     pub fn is_target_reached(&self) -> bool {
-        let is_there = || self.profile.is_reached(self.parameters.dialect, self.statusword());
-        !self.is_profile() || !self.is_adrift() && is_there()
+        let is_there = || self.profile.command.is_reached(self.parameters.dialect, self.statusword());
+        !self.is_profile() || !self.is_coasting() && is_there()
     }
 
-    /// Whether the joint moves and nobody drives it: with profile torque of zero it coasts, or a load pulls it.
-    pub fn is_adrift(&self) -> bool {
-        self.parameters.law == ControlLaw::ProfileTorque && !self.is_driven() && !self.is_standing()
+    /// Whether the joint moves and its drive does not drive it: with a profile torque of zero it coasts, or a load pulls it.
+    pub fn is_coasting(&self) -> bool {
+        self.parameters.law == ControlLaw::ProfileTorque
+            && !self.is_moving_on_command()
+            && !self.is_standing()
     }
 
-    /// Whether the drive is asked to go on moving without end: a velocity or a torque that is not zero.
-    pub fn is_driven(&self) -> bool {
-        match self.profile_target {
-            Some(ProfileTarget::Velocity(value) | ProfileTarget::Torque(value)) => value != 0.0,
-            _ => false,
-        }
+    /// Whether the drive is commanded to go on moving without end: by a velocity or a torque that is not zero.
+    pub fn is_moving_on_command(&self) -> bool {
+        self.profile.is_moving_on_command()
     }
 
     /// For how long the velocity or torque that the drive is asked for has been expired; 0 if it is valid or there is
     /// none.
     pub fn expired_ns(&self, now_ns: Nanoseconds) -> Nanoseconds {
-        if self.is_driven() { now_ns.saturating_sub(self.profile_until_ns) } else { 0 }
+        self.profile.expired_ns(now_ns)
     }
 
     /// Cycles that the drive has left a set-point unacknowledged.
     pub fn unacknowledged_cycles(&self) -> u32 {
-        self.profile.waiting_cycles()
+        self.profile.command.waiting_cycles()
     }
 
     /// Counts for how long a drive in profile position has stood still before its target.
     pub(super) fn watch_stall(&mut self) {
         let is_under_way = self.parameters.law == ControlLaw::ProfilePosition
-            && self.profile_target.is_some()
+            && self.profile.target().is_some()
             && self.is_enabled()
-            && self.profile.waiting_cycles() == 0
+            && self.unacknowledged_cycles() == 0
             && !self.is_target_reached();
-        let is_stalled = is_under_way && self.is_standing();
-        self.stalled_cycles = if is_stalled { self.stalled_cycles.saturating_add(1) } else { 0 };
+        self.profile.count_stall(is_under_way && self.is_standing());
     }
 
     /// Watches what the drive makes of its target, since no set-point passes the guard: the joint must be able to come
     /// to rest before a position limit, and keep to its velocity limit.
     pub fn check_profile(&self) -> Result<(), Violation> {
         let limits = &self.parameters.limits;
-        if !self.is_profile() || self.age > 0 {
+        if !self.is_profile() || self.feedback_age() > 0 {
             return Ok(());
         }
-        if self.velocity.abs() > VELOCITY_OVERSHOOT * limits.velocity {
+        if self.velocity().abs() > VELOCITY_OVERSHOOT * limits.velocity {
             return Err(Violation {
                 rule: Rule::VelocityLimit,
-                value: self.velocity,
+                value: self.velocity(),
                 limit: limits.velocity,
             });
         }
-        if self.stalled_cycles > STALL_PATIENCE * self.parameters.following_error_cycles.max(1) {
-            let value = self.shown_set_point().position - self.position;
+        if self.profile.is_stalled(self.parameters.following_error_cycles) {
+            let value = self.shown_set_point().position - self.position();
             return Err(Violation {
                 rule: Rule::FollowingError,
                 value,
                 limit: self.parameters.following_error_limit,
             });
         }
-        if !self.is_driven() && !self.is_adrift() {
+        if !self.is_moving_on_command() && !self.is_coasting() {
             return Ok(());
         }
         let distance = self.way_to_rest();
-        let rest = self.position + distance;
+        let rest = self.position() + distance;
         let limit = if distance > 0.0 { limits.position_max } else { limits.position_min };
         let is_beyond = (distance > 0.0 && rest > limit) || (distance < 0.0 && rest < limit);
         if is_beyond { Err(Violation { rule: Rule::PositionLimit, value: rest, limit }) } else { Ok(()) }
     }
 
-    /// What the set-points of an axis in a profile mode are, for whoever looks.
+    /// What is shown as the set-point of an axis in a profile mode.
     pub(super) fn shown_set_point(&self) -> State {
-        let rest = State { position: self.position, ..State::default() };
-        match self.profile_target {
+        let rest = State::rest(self.position());
+        match self.profile.target() {
             Some(ProfileTarget::Position(position)) => State { position, ..rest },
             Some(ProfileTarget::Velocity(velocity)) => State { velocity, ..rest },
             Some(ProfileTarget::Torque(_)) | None => rest,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_drive_may_stand_before_its_target_for_a_multiple_of_the_time_that_a_following_error_may_last() {
+        let stalled = |stalled_cycles| ProfileMode { stalled_cycles, ..ProfileMode::default() };
+        assert!(!stalled(STALL_PATIENCE).is_stalled(0) && stalled(STALL_PATIENCE + 1).is_stalled(0));
+        assert!(!stalled(60).is_stalled(3) && stalled(61).is_stalled(3));
+        // The product is more than 32 bits hold: it is never reached, and does not wrap to a small number.
+        for allowed in [u32::MAX / STALL_PATIENCE + 1, u32::MAX] {
+            assert!(!stalled(u32::MAX).is_stalled(allowed));
+        }
+    }
+
+    #[test]
+    fn only_a_velocity_or_a_torque_that_is_not_zero_expires() {
+        let mut profile = ProfileMode::default();
+        for (target, expired_ns) in [
+            (ProfileTarget::Velocity(0.5), 30),
+            (ProfileTarget::Velocity(0.0), 0),
+            (ProfileTarget::Torque(-2.0), 30),
+            (ProfileTarget::Position(1.0), 0),
+        ] {
+            profile.set(0, false, TimedTarget { target, valid_until_ns: 70 });
+            assert_eq!(profile.expired_ns(100), expired_ns, "{target:?}");
+        }
+        profile.rest(0);
+        assert_eq!((profile.target(), profile.expired_ns(100)), (None, 0));
     }
 }

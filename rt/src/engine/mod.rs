@@ -1,215 +1,319 @@
-//! The cycle as pure computation: frames and time in, frames out.
+//! The cycle of one group as pure computation: frames and time in, frames out.
 //!
-//! [`Engine`] holds the axes and the phase that the group is in. Each slot it gives SYNC, takes what the drives
-//! report, decides in [`Engine::compute`] (requests, supervision, motion, guard, commands), and gives the set-points.
-//! It knows neither clocks nor buses; [`crate::cycle`] drives it.
+//! [`Engine`] holds the axes of a group and what the group is doing. It knows neither clocks nor buses: [`crate::cycle`]
+//! drives it. Each cycle reads
+//!
+//! ```text
+//! sync → receive … → compute { sense → handle_requests → check_faults → step } → encode → finish
+//! ```
+//!
+//! - `sense` counts slots and takes what the drives have reported;
+//! - `requests` handles what was asked for; `targets` checks the targets; `process_data` exchanges mappings;
+//! - `faults` looks for the first thing that is wrong, and begins stops;
+//! - `step` makes the next set-points of the phase that the group is in (`state` has the table of phases);
+//! - `encode` makes frames of them, and decides what may leave; `sdo_fallback` stops drives that PDOs do not reach.
+//!
+//! Events wait in an outbox until [`Engine::finish`] hands them to the host.
 
-mod behaviour;
-mod last_word;
-mod obstacle;
+mod backlog;
+mod encode;
+mod faults;
+mod heartbeat;
+mod outbox;
 mod parameters;
 mod process_data;
 mod requests;
-mod stops;
-mod wire;
+mod sdo_fallback;
+mod sense;
+mod slots;
+mod state;
+mod step;
+mod targets;
 
 use arrayvec::ArrayVec;
 
-use crate::axis::{Axis, FeedbackSince};
-use crate::cia402::Goal;
+use crate::axis::Axis;
+use crate::bus_set::BusSet;
 use crate::dispatch::Dispatch;
-use crate::door::{AxisSnapshot, Door, Snapshot, StreamCommand};
-use crate::frame::Frame;
-use crate::motion::Motion;
+use crate::frame::{Frame, Id};
+use crate::group_trajectory::GroupTrajectory;
+use crate::host::{AxisSnapshot, HostInterface, Snapshot};
+use crate::phase::Phase;
 use crate::port::BusHealth;
-use crate::record::{CycleRecord, Event, EventKind, MAX_AXES, MAX_BUSES, Timing};
-use crate::stop::{Phase, StopCategories, StopReason};
+use crate::record::{CycleRecord, CycleTiming, Event, EventKind, MAX_AXES, MAX_BUSES};
+use crate::stop::{StopCategories, StopReason};
 use crate::time::{NANOSECONDS_PER_SECOND, Nanoseconds};
 use crate::time_of_day::TimeProducer;
-use crate::watch::{LeakyBucket, TimingLadder, TimingLevel};
+use backlog::Backlog;
+use heartbeat::HeartbeatProducer;
+use outbox::Outbox;
 use parameters::{axes_of, dispatch_of};
+use slots::SlotWatch;
+use state::GroupState;
 
-pub use parameters::{BusParameters, EngineParameters, Heartbeat, SetUpError};
+pub use parameters::{BusParameters, CycleCount, EngineParameters, Heartbeat, SetUpError};
+pub use sense::Receiver;
 
-/// The most frames the engine hands to one bus in one cycle.
+/// The most frames that the engine hands to one bus in one cycle.
 pub const SEND_BATCH: usize = 64;
 
 /// Frames for one bus.
 pub type SendBatch = ArrayVec<Frame, SEND_BATCH>;
 
-/// Requests looked at in one cycle; the rest waits, so that a flood costs a bounded time.
-const REQUESTS_PER_CYCLE: usize = 4;
-/// How long controlword bit 7 is held low before, and high in, a fault reset, and how long the drives have to answer it.
-const FAULT_RESET_CYCLES: u32 = 10;
-/// Whether the set-points of a cycle can leave.
+/// What a cycle begins with.
+#[derive(Clone, Copy, Debug)]
+pub struct CycleInput<'a> {
+    /// The slot.
+    pub slot: u64,
+    /// The time.
+    pub now_ns: Nanoseconds,
+    /// The state of each bus.
+    pub buses: &'a [BusHealth],
+    /// The buses on which own frames of an earlier cycle still wait for the wire.
+    pub behind: BusSet,
+}
+
+/// Whether the set-points of a cycle were ready in time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Transmission {
-    /// They can.
-    Free,
-    /// It is too late in the slot: they would run into the next SYNC. Counts as a missed slot.
-    TooLate,
-    /// Set-points of an earlier cycle are still waiting for the wire on every bus; more behind them would be stale
-    /// when they get there.
-    Blocked,
+pub enum Deadline {
+    /// They were.
+    Met,
+    /// They would run into the next SYNC. Nothing leaves but what stops the drives, and the slot counts as missed.
+    Missed,
 }
 
-/// Some of the buses.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct BusSet(u32);
-
-impl BusSet {
-    /// Adds a bus.
-    pub fn insert(&mut self, bus: usize) {
-        self.0 |= 1 << (bus & 31);
-    }
-
-    /// Takes a bus away. Returns whether it was among them.
-    pub fn take(&mut self, bus: usize) -> bool {
-        let was_there = self.contains(bus);
-        self.0 &= !(1 << (bus & 31));
-        was_there
-    }
-
-    /// Whether a bus is among them.
-    pub const fn contains(self, bus: usize) -> bool {
-        self.0 >> (bus & 31) & 1 == 1
-    }
-
-    /// Whether there is none.
-    pub const fn is_empty(self) -> bool {
-        self.0 == 0
-    }
-
-    /// Whether all of so many buses, at least one, are among them.
-    pub const fn is_every_of(self, buses: usize) -> bool {
-        buses > 0 && self.0.count_ones() as usize >= buses
-    }
-}
-
-/// The group of axes that move together.
+/// A group of axes that move together.
+///
+/// `AXES` and `BUSES` are the most axes and buses that there is room for; an engine needs about 3 kB an axis and 10 kB a bus.
+///
+/// # The order of calls
+/// In each slot, once each: [`Engine::sync`] for every bus, and its frame is sent; [`Engine::receive`] for every frame that has
+/// arrived; [`Engine::compute`]; [`Engine::encode`] for every bus, and its batch is sent; [`Engine::finish`].
+/// [`crate::Cycle`] does that with a clock and ports.
+///
+/// ```
+/// use takt_rt::*;
+///
+/// /// Asks for one thing after the other.
+/// struct Host { requests: Vec<Request<1>>, phase: Phase }
+///
+/// impl HostInterface<1, 1> for Host {
+///     fn request(&mut self) -> Option<RequestEnvelope<1>> {
+///         self.requests.pop().map(|request| RequestEnvelope { id: RequestId(0), request })
+///     }
+///     fn publish(&mut self, snapshot: &Snapshot<1, 1>) {
+///         self.phase = snapshot.phase;
+///     }
+/// }
+///
+/// let object = MappedObject::new;
+/// let pdo = |function, mapping| Pdo { id: Id::canopen(function, 1), mapping };
+/// let commands = Mapping::commands(&[object(0x6040, 0, 16), object(0x607A, 0, 32)]).unwrap();
+/// let feedback = Mapping::feedback(&[object(0x6041, 0, 16), object(0x6064, 0, 32)]).unwrap();
+/// let axis = AxisParameters {
+///     bus: 0,
+///     node: 1,
+///     commands: [CommandPdo::every_cycle(pdo(0x200, commands))].into_iter().collect(),
+///     feedback: [pdo(0x180, feedback)].into_iter().collect(),
+///     feedback_since: FeedbackSince::Sync,
+///     unused: Default::default(),
+///     dialect: Dialect::Cia402,
+///     controlword_spacing_cycles: 0,
+///     law: ControlLaw::Position,
+///     scale: Scale::new(ScaleParameters {
+///         counts_per_turn: 524_288.0,
+///         velocity_units_per_turn: 524_288.0,
+///         gear_ratio: 1.0,
+///         travel_per_turn: std::f64::consts::TAU,
+///         reversed: false,
+///         zero_counts: 0.0,
+///         rated_torque: 31.0,
+///     })
+///     .unwrap(),
+///     limits: AxisLimits {
+///         position_min: -3.0,
+///         position_max: 3.0,
+///         velocity: 2.0,
+///         acceleration: 10.0,
+///         deceleration: 10.0,
+///         jerk: 200.0,
+///         torque: 40.0,
+///     },
+///     start_tolerance: 0.02,
+///     on_violation: OnViolation::Reject,
+///     heartbeat_timeout_cycles: None,
+///     following_error_limit: 0.1,
+///     following_error_cycles: 50,
+///     missed_feedback_cycles: 5,
+/// };
+/// let bus = BusParameters {
+///     sync_id: Id::canopen(0x080, 0),
+///     divider: 1,
+///     service_frames_active: 1,
+///     service_frames_passive: 6,
+/// };
+/// let mut engine: Engine<1, 1> = Engine::new(EngineParameters {
+///     period_ns: 1_000_000,
+///     axes: [axis].into_iter().collect(),
+///     buses: [bus].into_iter().collect(),
+///     heartbeat: None,
+///     time_cycles: None,
+///     enable_timeout_cycles: 100,
+///     not_transmitted_cycles: 5,
+///     acknowledge_timeout_cycles: 500,
+///     categories: StopCategories::default(),
+///     timing: TimingLadder { warning: 10, degraded: 50, unfit: 250, leak_cycles: 20 },
+/// })
+/// .unwrap();
+///
+/// let requests = vec![Request::Enable, Request::Activate, Request::Sync(true)];
+/// let mut host = Host { requests, phase: Phase::Passive };
+/// let mut statusword = 0x0231_u16; // ready to switch on
+/// for slot in 0..50 {
+///     let now_ns = slot * 1_000_000;
+///     let sync = engine.sync(0, slot, now_ns);
+///     // A real drive answers SYNC by its position. This one is always at count 1.
+///     if sync.is_some() {
+///         let [low, high] = statusword.to_le_bytes();
+///         let frame = Frame::of(Id::canopen(0x180, 1), [low, high, 1, 0, 0, 0]);
+///         engine.receive(0, &Received { frame, at_ns: now_ns });
+///     }
+///     let buses = [BusHealth::default()];
+///     engine.compute(&CycleInput { slot, now_ns, buses: &buses, behind: BusSet::default() }, &mut host);
+///     let mut batch = SendBatch::new();
+///     engine.encode(0, Deadline::Met, &mut host, &mut batch);
+///     // It obeys the controlword, the first two bytes of its command.
+///     if let Some([0x0F, ..]) = batch.first().map(Frame::payload) {
+///         statusword = 0x0237; // operation enabled
+///     }
+///     let timing = CycleTiming { slot, ..CycleTiming::default() };
+///     engine.finish(timing, now_ns, &buses, &mut host);
+/// }
+/// assert_eq!(host.phase, Phase::Holding);
+/// ```
 #[derive(Debug)]
-pub struct Engine {
+pub struct Engine<const AXES: usize = MAX_AXES, const BUSES: usize = MAX_BUSES> {
     period_ns: Nanoseconds,
     period_s: f64,
-    axes: ArrayVec<Axis, MAX_AXES>,
-    buses: ArrayVec<BusParameters, MAX_BUSES>,
-    dispatch: [Dispatch; MAX_BUSES],
-    heartbeat: Option<Heartbeat>,
-    time: Option<TimeProducer>,
     enable_timeout_cycles: u32,
     not_transmitted_cycles: u32,
     acknowledge_timeout_cycles: u32,
     categories: StopCategories,
-    ladder: TimingLadder,
+    buses: ArrayVec<BusParameters, BUSES>,
+    dispatch: [Dispatch; BUSES],
 
-    phase: Phase,
-    phase_cycles: u32,
-    is_sync_on: bool,
-    is_retired: bool,
-    is_leaving: bool,
-    goal: Goal,
-    motion: Motion,
-    /// The move under way: its number and whether it ends in motion.
-    move_id: u32,
-    finished_move: u32,
-    stream: Option<StreamCommand>,
-    /// Whether a command of the present stream has been taken.
-    is_stream_begun: bool,
-    /// Whether a command has come that no set-point has been made of.
-    is_stream_renewed: bool,
-    clamped: u64,
-    missed: LeakyBucket,
-    timing_level: TimingLevel,
-    /// The bus and the identifier of what was sent by somebody who may not.
-    foreign_id: Option<(u8, u32)>,
-    /// Whose interfaces have refused frames since the last cycle.
-    not_taken: BusSet,
-    held_back: BusSet,
-    /// Whose next SYNC is left out.
-    left_out: BusSet,
+    axes: ArrayVec<Axis, AXES>,
+    state: GroupState<AXES>,
+    /// Cycles since the state was entered.
+    state_cycles: u32,
+    /// What is planned, while the group moves or stops.
+    motion: GroupTrajectory<AXES>,
+    /// Why the group stops or has stopped. It stays until a request ends it: a fault must be reset.
     stop: Option<StopReason>,
     /// Cycles of a fault reset that are still to come.
-    fault_reset: u32,
-    heartbeat_due: u32,
-    /// Heartbeats that are still to leave before any drive is led up.
-    heartbeats_awaited: u32,
-    /// For how long own frames have waited for the wire or found no room, a bus each.
-    blocked_cycles: [u32; MAX_BUSES],
-    /// For how long own frames have waited for the wire, a bus each.
-    held_back_cycles: [u32; MAX_BUSES],
-    last_slot: Option<u64>,
-    missed_slots: u64,
+    fault_reset_cycles: u32,
+    commands: Commands,
+    /// Whether the commands of this cycle were ready in time, as far as is known.
+    deadline: Deadline,
+    requested: Requested,
+
+    /// The time of the present cycle.
+    now_ns: Nanoseconds,
+    slots: SlotWatch,
+    backlog: Backlog<BUSES>,
+    /// The buses whose next SYNC is skipped, see [`Engine::probe_late_drives`].
+    skip_sync: BusSet,
+    /// The buses whose drives have been asked for feedback by SYNC in this slot.
+    asked_by_sync: BusSet,
+    /// The bus and the identifier of a frame that only this controller may send.
+    foreign_frame: Option<(u8, Id)>,
+    heartbeat: Option<HeartbeatProducer<BUSES>>,
+    time: Option<TimeProducer>,
+
+    events: Outbox,
+    /// Events, records and frames that found no room.
     dropped: u64,
-    drive_states: [crate::cia402::State; MAX_AXES],
-    record: CycleRecord,
-    /// Also the place where the answers to requests are kept.
-    snapshot: Snapshot,
+    record: CycleRecord<AXES>,
+    /// What observers see; the answers to requests are kept in it.
+    snapshot: Snapshot<AXES, BUSES>,
 }
 
-impl Engine {
-    /// Checks the parameters. The engine begins in [`Phase::Passive`].
-    pub fn new(parameters: EngineParameters) -> Result<Self, SetUpError> {
-        if parameters.period_ns == 0 {
-            return Err(SetUpError::NoPeriod);
-        }
-        if parameters.axes.is_empty() {
-            return Err(SetUpError::NoAxis);
-        }
-        if let Some(bus) = parameters.buses.iter().position(|bus| bus.divider == 0) {
-            return Err(SetUpError::NoDivider { bus });
-        }
+/// What becomes of the commands of a cycle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Commands {
+    /// There are none: the group is passive, or every bus is behind.
+    None,
+    /// They are to leave with this cycle.
+    Made,
+    /// They were made in an earlier cycle, and were ready too late. They leave with the next one, in place of new ones.
+    Held,
+}
+
+/// What was asked for that no later request takes back.
+#[derive(Clone, Copy, Debug, Default)]
+struct Requested {
+    /// Whether SYNC is sent.
+    sync: bool,
+    /// How the run is to end.
+    ending: Ending,
+}
+
+/// How far a run is on its way to the end.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+enum Ending {
+    /// It goes on.
+    #[default]
+    NotBegun,
+    /// Nothing is enabled any more.
+    EnableInhibited,
+    /// The loop ends after this cycle.
+    Shutdown,
+}
+
+impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
+    /// An engine in [`Phase::Passive`].
+    ///
+    /// # Errors
+    /// A parameter that is not possible. Everything that the engine relies on is checked here.
+    pub fn new(parameters: EngineParameters<AXES, BUSES>) -> Result<Self, SetUpError> {
+        parameters.validate()?;
         let dispatch = dispatch_of(&parameters)?;
         let axes = axes_of(&parameters);
-        let record = CycleRecord { axis_count: parameters.axes.len() as u8, ..CycleRecord::default() };
-        let snapshot = Snapshot {
-            axis_count: parameters.axes.len() as u8,
-            bus_count: parameters.buses.len() as u8,
-            ..Snapshot::default()
-        };
+        let axis_count = parameters.axes.len() as u8;
+        let slowest_divider = parameters.buses.iter().map(|bus| bus.divider).max().unwrap_or(1);
+        let heartbeat =
+            parameters.heartbeat.map(|heartbeat| HeartbeatProducer::new(heartbeat, slowest_divider));
+        let bus_count = parameters.buses.len() as u8;
         Ok(Self {
             period_ns: parameters.period_ns,
             period_s: parameters.period_ns as f64 / NANOSECONDS_PER_SECOND as f64,
-            axes,
-            buses: parameters.buses,
-            dispatch,
-            heartbeat: parameters.heartbeat,
-            time: parameters.time_cycles.map(TimeProducer::new),
             enable_timeout_cycles: parameters.enable_timeout_cycles,
             not_transmitted_cycles: parameters.not_transmitted_cycles,
             acknowledge_timeout_cycles: parameters.acknowledge_timeout_cycles,
             categories: parameters.categories,
-            ladder: parameters.timing,
-            phase: Phase::Passive,
-            phase_cycles: 0,
-            is_sync_on: false,
-            is_retired: false,
-            is_leaving: false,
-            goal: Goal::Disabled,
-            motion: Motion::default(),
-            move_id: 0,
-            finished_move: 0,
-            stream: None,
-            is_stream_begun: false,
-            is_stream_renewed: false,
-            clamped: 0,
-            missed: LeakyBucket::default(),
-            timing_level: TimingLevel::Normal,
-            foreign_id: None,
-            not_taken: BusSet::default(),
-            held_back: BusSet::default(),
-            left_out: BusSet::default(),
+            buses: parameters.buses,
+            dispatch,
+            axes,
+            state: GroupState::Passive,
+            state_cycles: 0,
+            motion: GroupTrajectory::default(),
             stop: None,
-            fault_reset: 0,
-            heartbeat_due: 0,
-            heartbeats_awaited: 0,
-            blocked_cycles: [0; MAX_BUSES],
-            held_back_cycles: [0; MAX_BUSES],
-            last_slot: None,
-            missed_slots: 0,
+            fault_reset_cycles: 0,
+            commands: Commands::None,
+            deadline: Deadline::Met,
+            requested: Requested::default(),
+            now_ns: 0,
+            slots: SlotWatch::new(parameters.timing),
+            backlog: Backlog::default(),
+            skip_sync: BusSet::default(),
+            asked_by_sync: BusSet::default(),
+            foreign_frame: None,
+            heartbeat,
+            time: parameters.time_cycles.map(TimeProducer::new),
+            events: Outbox::default(),
             dropped: 0,
-            drive_states: Default::default(),
-            record,
-            snapshot,
+            record: CycleRecord { axis_count, ..CycleRecord::default() },
+            snapshot: Snapshot { axis_count, bus_count, ..Snapshot::default() },
         })
     }
 
@@ -225,7 +329,7 @@ impl Engine {
 
     /// What the group is doing.
     pub fn phase(&self) -> Phase {
-        self.phase
+        self.state.phase()
     }
 
     /// The axes.
@@ -234,156 +338,82 @@ impl Engine {
     }
 
     /// Whether the loop is to end after this cycle.
-    pub fn is_leaving(&self) -> bool {
-        self.is_leaving
+    pub fn is_shutting_down(&self) -> bool {
+        self.requested.ending == Ending::Shutdown
     }
 
-    fn happened(&mut self, at_ns: Nanoseconds, kind: EventKind, door: &mut impl Door) {
-        let slot = self.last_slot.unwrap_or(0);
-        if !door.event(&Event { slot, at_ns, kind }) {
-            self.dropped += 1;
+    /// What one cycle decides. [`Engine::encode`] makes frames of it.
+    pub fn compute(&mut self, input: &CycleInput<'_>, host: &mut impl HostInterface<AXES, BUSES>) {
+        self.sense(input);
+        self.handle_requests(host);
+        self.check_faults(input.buses);
+        self.step();
+        self.update_sdo_fallback();
+        self.state_cycles = self.state_cycles.saturating_add(1);
+    }
+
+    fn emit(&mut self, kind: EventKind) {
+        self.events.push(Event { slot: self.present_slot(), at_ns: self.now_ns, kind });
+    }
+
+    fn present_slot(&self) -> u64 {
+        self.slots.present.unwrap_or(0)
+    }
+
+    /// Enters a state. One that goes on as it was, is not entered: what it may last counts from its first beginning.
+    fn enter(&mut self, state: GroupState<AXES>) {
+        let (from, to) = (self.state.phase(), state.phase());
+        self.state = state;
+        if from != to {
+            self.emit(EventKind::PhaseChanged { from, to });
+            self.state_cycles = 0;
         }
     }
 
-    /// The thinking of one cycle. Nothing moves on unless set-points can leave.
-    ///
-    /// Returns whether there are set-points to send.
-    pub fn compute(
+    /// Ends the cycle: hands the events, the record and the new state to the host.
+    pub fn finish(
         &mut self,
-        slot: u64,
+        timing: CycleTiming,
         now_ns: Nanoseconds,
         buses: &[BusHealth],
-        transmission: Transmission,
-        door: &mut impl Door,
-    ) -> bool {
-        let elapsed = self.last_slot.map_or(1, |last| slot.saturating_sub(last));
-        self.count_slot(slot, elapsed, transmission, now_ns, door);
-        if let Some(time) = &mut self.time {
-            time.pass(elapsed, now_ns);
-        }
-        let elapsed_s = self.period_s * elapsed as f64;
-        for axis in &mut self.axes {
-            let has_cycle = has_cycle_of(&self.buses, axis, slot);
-            if has_cycle {
-                axis.begin_cycle(elapsed_s);
-                if axis.parameters().feedback_since != FeedbackSince::Sync {
-                    axis.expect_feedback(now_ns);
-                }
-            } else {
-                axis.wait(elapsed_s)
-            }
-            axis.watch();
-        }
-        self.notice_drive_states(now_ns, door);
-        for _ in 0..REQUESTS_PER_CYCLE {
-            match door.request() {
-                Some(asked) => self.take(&asked, now_ns, door),
-                None => break,
-            }
-        }
-        if let Some(command) = door.stream() {
-            self.stream = Some(command);
-            self.is_stream_renewed = true;
-        }
-        self.supervise(buses, transmission, now_ns, door);
-        // A group that stops and whose set-points do not get out does not wait for them any longer, whatever it stops for.
-        let is_given_up = self.stop.is_some() && self.longest_blocked().1 > self.not_transmitted_cycles;
-        let can_leave = match transmission {
-            Transmission::Free => true,
-            Transmission::TooLate => false,
-            Transmission::Blocked => is_given_up,
-        };
-        let has_commands = can_leave && self.phase != Phase::Passive;
-        if has_commands {
-            self.act(now_ns, door);
-            self.write_commands(slot);
-        }
-        self.command_by_service();
-        self.phase_cycles = self.phase_cycles.saturating_add(1);
-        self.record.is_commanded = has_commands;
-        has_commands
-    }
-
-    fn count_slot(
-        &mut self,
-        slot: u64,
-        elapsed: u64,
-        transmission: Transmission,
-        now_ns: Nanoseconds,
-        door: &mut impl Door,
+        host: &mut impl HostInterface<AXES, BUSES>,
     ) {
-        let missed = elapsed.saturating_sub(1) + u64::from(transmission == Transmission::TooLate);
-        self.last_slot = Some(slot);
-        self.hold_heartbeat_back(elapsed, transmission);
-        self.record.timing.missed_slots = missed;
-        if missed > 0 {
-            self.missed_slots += missed;
-            self.happened(now_ns, EventKind::MissedSlots { count: missed }, door);
+        let is_late = self.deadline == Deadline::Missed;
+        let is_commanded = self.commands == Commands::Made && !is_late;
+        self.slots.end(is_late);
+        if is_late {
+            self.emit(EventKind::MissedSlots { count: 1 });
         }
-        let level = self.ladder.level(self.missed.take(missed, self.ladder.leak_cycles));
-        if level != self.timing_level {
-            self.timing_level = level;
-            self.happened(now_ns, EventKind::Timing { level }, door);
+        if is_commanded {
+            self.fault_reset_cycles = self.fault_reset_cycles.saturating_sub(1);
         }
-    }
-
-    fn notice_drive_states(&mut self, now_ns: Nanoseconds, door: &mut impl Door) {
-        for index in 0..self.axes.len() {
-            let (Some(axis), Some(known)) = (self.axes.get(index), self.drive_states.get_mut(index)) else {
-                continue;
-            };
-            let (state, statusword) = (axis.drive_state(), axis.statusword());
-            if *known != state {
-                *known = state;
-                self.happened(now_ns, EventKind::DriveState { axis: index as u8, state, statusword }, door);
-            }
-        }
-    }
-
-    /// Begins a phase. One that is under way goes on, and what it may last counts from its first beginning.
-    fn enter(&mut self, phase: Phase, now_ns: Nanoseconds, door: &mut impl Door) {
-        if phase == self.phase {
-            return;
-        }
-        let kind = EventKind::PhaseChanged { from: self.phase, to: phase };
-        self.happened(now_ns, kind, door);
-        self.phase = phase;
-        self.phase_cycles = 0;
-    }
-
-    /// Ends the cycle: leaves its record and shows the new state.
-    pub fn finish(&mut self, timing: Timing, now_ns: Nanoseconds, buses: &[BusHealth], door: &mut impl Door) {
-        if let Some(heartbeat) = self.heartbeat {
-            match self.heartbeat_due {
-                0 => self.has_beaten(heartbeat),
-                _ => self.heartbeat_due -= 1,
-            }
-        }
-        let missed_slots = self.record.timing.missed_slots;
-        self.record.timing = Timing { missed_slots, ..timing };
-        self.record.phase = self.phase;
+        self.dropped += self.events.drain(|event| host.event(event));
+        self.record.timing = CycleTiming { missed_slots: self.slots.missed_now, ..timing };
+        self.record.phase = self.state.phase();
+        self.record.is_commanded = is_commanded;
         for (axis, record) in self.axes.iter().zip(&mut self.record.axes) {
             axis.record(self.period_s, record);
         }
-        if !door.record(&self.record) {
-            self.dropped += 1;
-        }
+        self.dropped += u64::from(!host.record(&self.record));
         self.show(timing.slot, now_ns, buses);
-        door.publish(&self.snapshot);
+        host.publish(&self.snapshot);
+        if is_late && self.commands == Commands::Made {
+            self.commands = Commands::Held;
+        }
     }
 
     fn show(&mut self, slot: u64, now_ns: Nanoseconds, buses: &[BusHealth]) {
         let snapshot = &mut self.snapshot;
         snapshot.slot = slot;
         snapshot.at_ns = now_ns;
-        snapshot.phase = self.phase;
-        snapshot.missed_slots = self.missed_slots;
-        snapshot.timing = self.timing_level;
-        snapshot.clamped = self.clamped;
+        snapshot.phase = self.state.phase();
+        snapshot.missed_slots = self.slots.missed;
+        snapshot.timing = self.slots.level();
         snapshot.dropped = self.dropped;
-        snapshot.finished_move = self.finished_move;
-        let is_on_way = matches!(self.phase, Phase::Moving | Phase::Stopping);
-        snapshot.remaining_s = if is_on_way { self.motion.remaining_s() } else { 0.0 };
+        snapshot.remaining_s = match self.state {
+            GroupState::Moving { .. } | GroupState::Stopping => self.motion.remaining_s(),
+            _ => 0.0,
+        };
         snapshot.stop = self.stop;
         for (axis, shown) in self.axes.iter().zip(&mut snapshot.axes) {
             *shown = AxisSnapshot {
@@ -403,10 +433,12 @@ impl Engine {
     }
 }
 
+/// Whether a bus has SYNC, feedback and set-points in this slot.
 const fn has_cycle(bus: &BusParameters, slot: u64) -> bool {
     slot.is_multiple_of(bus.divider as u64)
 }
 
+/// As [`has_cycle`], for the bus of an axis.
 fn has_cycle_of(buses: &[BusParameters], axis: &Axis, slot: u64) -> bool {
     buses.get(usize::from(axis.parameters().bus)).is_some_and(|bus| has_cycle(bus, slot))
 }

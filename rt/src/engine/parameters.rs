@@ -1,7 +1,8 @@
-//! Everything about the group that does not change while it runs, and why it may be refused.
+//! Everything about the group that does not change while it runs, and how it is checked.
 
 use arrayvec::ArrayVec;
 
+use super::SEND_BATCH;
 use crate::axis::{Axis, AxisParameters};
 use crate::dispatch::{Dispatch, IdTaken};
 use crate::frame::Id;
@@ -15,7 +16,7 @@ use crate::watch::TimingLadder;
 pub struct BusParameters {
     /// Identifier of SYNC.
     pub sync_id: Id,
-    /// Slots in one cycle of this bus, at least 1: it has SYNC, feedback and set-points in every slot whose number this
+    /// Slots in one cycle of this bus, 1 to 32: it has SYNC, feedback and set-points in every slot whose number this
     /// divides.
     pub divider: u32,
     /// The most service frames in a cycle while set-points are sent.
@@ -27,7 +28,7 @@ pub struct BusParameters {
 /// The heartbeat of this controller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Heartbeat {
-    /// Its node number.
+    /// Its node ID, 1 to 127.
     pub node: u8,
     /// Cycles from one to the next.
     pub cycles: u32,
@@ -37,13 +38,13 @@ pub struct Heartbeat {
 
 /// Everything about the group that does not change while it runs.
 #[derive(Clone, Debug)]
-pub struct EngineParameters {
+pub struct EngineParameters<const AXES: usize = MAX_AXES, const BUSES: usize = MAX_BUSES> {
     /// The period of the cycle.
     pub period_ns: Nanoseconds,
     /// The axes.
-    pub axes: ArrayVec<AxisParameters, MAX_AXES>,
+    pub axes: ArrayVec<AxisParameters, AXES>,
     /// The buses.
-    pub buses: ArrayVec<BusParameters, MAX_BUSES>,
+    pub buses: ArrayVec<BusParameters, BUSES>,
     /// The heartbeat, if one is sent.
     pub heartbeat: Option<Heartbeat>,
     /// Cycles from one TIME message to the next, where the drives are told the time of day.
@@ -60,22 +61,34 @@ pub struct EngineParameters {
     pub not_transmitted_cycles: u32,
 }
 
-/// Why an engine cannot be.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// Why an engine cannot be set up.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SetUpError {
-    /// The period is zero.
-    NoPeriod,
+    /// The period is zero or longer than [`EngineParameters::LONGEST_PERIOD_NS`].
+    Period {
+        /// The period.
+        period_ns: Nanoseconds,
+    },
     /// There is no axis.
     NoAxis,
-    /// The cycle of a bus has no slot.
-    NoDivider {
+    /// A bus has a cycle of no slot, or of more than [`EngineParameters::LARGEST_DIVIDER`].
+    Divider {
         /// The bus.
         bus: usize,
+        /// The slots of its cycle.
+        divider: u32,
     },
     /// An axis names a bus that is not there.
     UnknownBus {
         /// The axis.
         axis: usize,
+    },
+    /// A node ID is not 1 to 127, or is that of another node on the same bus.
+    NodeId {
+        /// The axis; `None` for the controller.
+        axis: Option<usize>,
+        /// The node ID.
+        node: u8,
     },
     /// An axis has no PDO in one of the directions.
     NoPdo {
@@ -87,6 +100,18 @@ pub enum SetUpError {
         /// The axis.
         axis: usize,
     },
+    /// A tolerance of an axis, or a gain of its control law, is not a number that can be used: negative, infinite or none.
+    ImpossibleNumber {
+        /// The axis.
+        axis: usize,
+        /// The number.
+        value: f64,
+    },
+    /// A number of cycles is zero where at least one must pass.
+    NoCycles {
+        /// Which number.
+        of: CycleCount,
+    },
     /// Two axes of a bus expect the same identifier.
     IdTaken {
         /// The axis that came second.
@@ -94,15 +119,165 @@ pub enum SetUpError {
         /// The identifier.
         id: Id,
     },
+    /// The frames of one cycle of a bus do not fit into one batch.
+    TooManyFrames {
+        /// The bus.
+        bus: usize,
+        /// How many frames it needs.
+        frames: usize,
+        /// How many fit.
+        limit: usize,
+    },
+}
+
+/// A number of cycles in [`EngineParameters`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CycleCount {
+    /// From one heartbeat to the next.
+    Heartbeat,
+    /// Until the drives stop for want of a heartbeat.
+    HeartbeatTimeout,
+    /// From one TIME message to the next.
+    Time,
+    /// Until every drive must be enabled.
+    EnableTimeout,
+    /// For which frames may fail to get onto the wire.
+    NotTransmitted,
+    /// Until a drive must acknowledge its target.
+    AcknowledgeTimeout,
+    /// For which feedback may be missed.
+    MissedFeedback,
+}
+
+impl core::fmt::Display for SetUpError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match *self {
+            Self::Period { period_ns } => {
+                write!(f, "a period of {period_ns} ns is not possible (1 ns to 1 s)")
+            }
+            Self::NoAxis => write!(f, "there is no axis"),
+            Self::Divider { bus, divider } => {
+                write!(f, "bus {bus}: a cycle of {divider} slots is not possible (1 to 32)")
+            }
+            Self::UnknownBus { axis } => write!(f, "axis {axis} names a bus that does not exist"),
+            Self::NodeId { axis: Some(axis), node } => {
+                write!(f, "axis {axis}: node ID {node} is not possible (1 to 127, one node each)")
+            }
+            Self::NodeId { axis: None, node } => {
+                write!(f, "the controller: node ID {node} is not possible (1 to 127, one node each)")
+            }
+            Self::NoPdo { axis } => write!(f, "axis {axis} has no PDO in one of the directions"),
+            Self::ImpossibleLimits { axis } => write!(f, "axis {axis}: its limits cannot be kept"),
+            Self::ImpossibleNumber { axis, value } => {
+                write!(f, "axis {axis}: {value} is not possible as a tolerance or a gain")
+            }
+            Self::NoCycles { of } => write!(f, "at least one cycle must pass ({of:?})"),
+            Self::IdTaken { axis, id } => write!(f, "axis {axis}: identifier {id:?} is in use already"),
+            Self::TooManyFrames { bus, frames, limit } => {
+                write!(f, "bus {bus} needs {frames} frames in a cycle; {limit} fit")
+            }
+        }
+    }
+}
+
+impl core::error::Error for SetUpError {}
+
+/// Frames of a cycle beside set-points: the heartbeat, TIME, and one service frame.
+pub(super) const OTHER_FRAMES: usize = 3;
+
+impl<const AXES: usize, const BUSES: usize> EngineParameters<AXES, BUSES> {
+    /// The longest period of the cycle.
+    pub const LONGEST_PERIOD_NS: Nanoseconds = NANOSECONDS_PER_SECOND;
+    /// The most slots in a cycle of a bus: set-points of other buses wait for twice as long, in a ring of 64.
+    pub const LARGEST_DIVIDER: u32 = 32;
+
+    /// Checks everything that the engine relies on.
+    pub(super) fn validate(&self) -> Result<(), SetUpError> {
+        if !(1..=Self::LONGEST_PERIOD_NS).contains(&self.period_ns) {
+            return Err(SetUpError::Period { period_ns: self.period_ns });
+        }
+        if self.axes.is_empty() {
+            return Err(SetUpError::NoAxis);
+        }
+        self.validate_cycles()?;
+        for (axis, own) in self.axes.iter().enumerate() {
+            self.validate_axis(axis, own)?;
+        }
+        if let Some(node) = self.heartbeat.map(|heartbeat| heartbeat.node) {
+            let is_taken = self.axes.iter().any(|axis| axis.node == node);
+            if is_taken || !is_node_id(node) {
+                return Err(SetUpError::NodeId { axis: None, node });
+            }
+        }
+        for (bus, own) in self.buses.iter().enumerate() {
+            if !(1..=Self::LARGEST_DIVIDER).contains(&own.divider) {
+                return Err(SetUpError::Divider { bus, divider: own.divider });
+            }
+            let of_bus = self.axes.iter().filter(|axis| usize::from(axis.bus) == bus);
+            let frames = OTHER_FRAMES + of_bus.map(|axis| axis.commands.len()).sum::<usize>();
+            if frames > SEND_BATCH {
+                return Err(SetUpError::TooManyFrames { bus, frames, limit: SEND_BATCH });
+            }
+        }
+        Ok(())
+    }
+
+    fn validate_cycles(&self) -> Result<(), SetUpError> {
+        let heartbeat = |cycles: fn(Heartbeat) -> u32| self.heartbeat.map_or(1, cycles);
+        let counts = [
+            (CycleCount::Heartbeat, heartbeat(|heartbeat| heartbeat.cycles)),
+            (CycleCount::HeartbeatTimeout, heartbeat(|heartbeat| heartbeat.timeout_cycles)),
+            (CycleCount::Time, self.time_cycles.unwrap_or(1)),
+            (CycleCount::EnableTimeout, self.enable_timeout_cycles),
+            (CycleCount::NotTransmitted, self.not_transmitted_cycles),
+            (CycleCount::AcknowledgeTimeout, self.acknowledge_timeout_cycles),
+            (
+                CycleCount::MissedFeedback,
+                self.axes.iter().map(|axis| axis.missed_feedback_cycles.into()).min().unwrap_or(1),
+            ),
+        ];
+        match counts.into_iter().find(|(_, cycles)| *cycles == 0) {
+            Some((of, _)) => Err(SetUpError::NoCycles { of }),
+            None => Ok(()),
+        }
+    }
+
+    fn validate_axis(&self, axis: usize, own: &AxisParameters) -> Result<(), SetUpError> {
+        if usize::from(own.bus) >= self.buses.len() {
+            return Err(SetUpError::UnknownBus { axis });
+        }
+        let is_taken =
+            self.axes.iter().take(axis).any(|other| (other.bus, other.node) == (own.bus, own.node));
+        if is_taken || !is_node_id(own.node) {
+            return Err(SetUpError::NodeId { axis: Some(axis), node: own.node });
+        }
+        if own.commands.is_empty() || own.feedback.is_empty() {
+            return Err(SetUpError::NoPdo { axis });
+        }
+        if !own.limits.are_possible() {
+            return Err(SetUpError::ImpossibleLimits { axis });
+        }
+        let numbers = [own.following_error_limit, own.start_tolerance].into_iter().chain(own.law.gains());
+        match numbers.into_iter().find(|value| !(value.is_finite() && *value >= 0.0)) {
+            Some(value) => Err(SetUpError::ImpossibleNumber { axis, value }),
+            None => Ok(()),
+        }
+    }
+}
+
+const fn is_node_id(node: u8) -> bool {
+    1 <= node && node <= 127
 }
 
 /// The axes. The set-points of those on faster buses wait for those on the slowest: a joint is where the trajectory was two
 /// cycles of its bus ago.
-pub(super) fn axes_of(parameters: &EngineParameters) -> ArrayVec<Axis, MAX_AXES> {
-    let mut axes: ArrayVec<Axis, MAX_AXES> = parameters.axes.iter().cloned().map(Axis::new).collect();
+pub(super) fn axes_of<const AXES: usize, const BUSES: usize>(
+    parameters: &EngineParameters<AXES, BUSES>,
+) -> ArrayVec<Axis, AXES> {
+    let mut axes: ArrayVec<Axis, AXES> = parameters.axes.iter().cloned().map(Axis::new).collect();
     let divider =
         |axis: &Axis| parameters.buses.get(usize::from(axis.parameters().bus)).map_or(1, |bus| bus.divider);
-    // A drive in a profile mode gets no set-points that anybody would have to wait for.
+    // A drive in a profile mode gets no set-points, so that no other axis waits for it.
     let slowest = axes.iter().filter(|axis| !axis.is_profile()).map(divider).max().unwrap_or(1);
     let period_s = parameters.period_ns as f64 / NANOSECONDS_PER_SECOND as f64;
     for axis in &mut axes {
@@ -112,12 +287,13 @@ pub(super) fn axes_of(parameters: &EngineParameters) -> ArrayVec<Axis, MAX_AXES>
     axes
 }
 
-/// Who is meant by each identifier, on each bus.
-pub(super) fn dispatch_of(parameters: &EngineParameters) -> Result<[Dispatch; MAX_BUSES], SetUpError> {
-    let mut dispatch: [Dispatch; MAX_BUSES] = core::array::from_fn(|_| Dispatch::default());
+/// The owner of each identifier, on each bus.
+pub(super) fn dispatch_of<const AXES: usize, const BUSES: usize>(
+    parameters: &EngineParameters<AXES, BUSES>,
+) -> Result<[Dispatch; BUSES], SetUpError> {
+    let mut dispatch: [Dispatch; BUSES] = core::array::from_fn(|_| Dispatch::default());
     for (axis, own) in parameters.axes.iter().enumerate() {
-        let is_bus_known = usize::from(own.bus) < parameters.buses.len();
-        let table = dispatch.get_mut(usize::from(own.bus)).filter(|_| is_bus_known);
+        let table = dispatch.get_mut(usize::from(own.bus));
         enter(table.ok_or(SetUpError::UnknownBus { axis })?, axis, own)?;
     }
     for (bus, table) in parameters.buses.iter().zip(&mut dispatch) {
@@ -131,12 +307,6 @@ pub(super) fn dispatch_of(parameters: &EngineParameters) -> Result<[Dispatch; MA
 }
 
 fn enter(table: &mut Dispatch, axis: usize, own: &AxisParameters) -> Result<(), SetUpError> {
-    if own.commands.is_empty() || own.feedback.is_empty() {
-        return Err(SetUpError::NoPdo { axis });
-    }
-    if !own.limits.are_possible() {
-        return Err(SetUpError::ImpossibleLimits { axis });
-    }
     let taken = |taken: IdTaken| SetUpError::IdTaken { axis, id: taken.id };
     table.emergency(Id::canopen(0x080, own.node), axis as u8).map_err(taken)?;
     for (number, pdo) in own.feedback.iter().enumerate() {

@@ -2,37 +2,41 @@
 
 use arrayvec::ArrayVec;
 
-use super::Engine;
-use super::obstacle::Obstacle;
+use super::parameters::OTHER_FRAMES;
+use super::targets::Rejection;
+use super::{Engine, SEND_BATCH};
 use crate::axis::{CommandPdo, MAX_PDOS, Pdo};
 use crate::dispatch::IdTaken;
-use crate::door::{AxisProcessData, MappedPdo};
 use crate::pdo::{MAX_OBJECTS, MappedObject, Mapping, MappingError};
-use crate::refusal::Objection;
-use crate::stop::Phase;
+use crate::phase::Phase;
+use crate::request::{AxisProcessData, MappedPdo, RejectReason};
 
-impl Engine {
+impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
     /// Changes what is exchanged with an axis' drive. Not where something moves already, the axis is not there, it has no PDO
     /// in one direction, an object has no use or value, or an identifier has another one. Then nothing is changed.
-    pub(super) fn set_process_data(&mut self, data: &AxisProcessData) -> Result<(), Obstacle> {
+    pub(super) fn set_process_data(&mut self, data: &AxisProcessData) -> Result<(), Rejection> {
         self.require_phase(&[Phase::Passive])?;
         let index = usize::from(data.axis);
         let bus = usize::from(self.axis_mut(data.axis)?.parameters().bus);
-        self.exchange(data, index, bus).map_err(|obstacle| obstacle.of_axis(index))
+        self.exchange(data, index, bus).map_err(|reason| reason.of_axis(index))
     }
 
-    fn exchange(&mut self, data: &AxisProcessData, index: usize, bus: usize) -> Result<(), Obstacle> {
+    fn exchange(&mut self, data: &AxisProcessData, index: usize, bus: usize) -> Result<(), RejectReason> {
         let commands = data.commands.iter().flatten().map(command);
         let commands: ArrayVec<CommandPdo, MAX_PDOS> =
             commands.collect::<Result<_, _>>().map_err(unmapped)?;
         let feedback = data.feedback.iter().flatten().map(feedback);
         let feedback: ArrayVec<Pdo, MAX_PDOS> = feedback.collect::<Result<_, _>>().map_err(unmapped)?;
+        let frames = self.frames_beside(index, bus) + commands.len();
+        if frames > SEND_BATCH {
+            return Err(RejectReason::TooManyFrames { frames: frames as u16, limit: SEND_BATCH as u16 });
+        }
         // An engine has a table for every bus of an axis, and a place for every axis in it.
         let (Some(table), Some(axis)) = (self.dispatch.get_mut(bus), self.axes.get_mut(index)) else {
-            return Err(Objection::UnknownAxis.into());
+            return Err(RejectReason::NoProcessData);
         };
         if commands.is_empty() || feedback.is_empty() {
-            return Err(Objection::NoProcessData.into());
+            return Err(RejectReason::NoProcessData);
         }
         let mut changed = table.clone();
         changed.forget_process_data(data.axis);
@@ -49,20 +53,29 @@ impl Engine {
         axis.set_process_data(commands, feedback);
         Ok(())
     }
+
+    /// The most frames of a bus in one cycle, without the set-points of one axis.
+    fn frames_beside(&self, index: usize, bus: usize) -> usize {
+        let others = self
+            .axes
+            .iter()
+            .enumerate()
+            .filter(|(other, axis)| *other != index && usize::from(axis.parameters().bus) == bus);
+        OTHER_FRAMES + others.map(|(_, axis)| axis.parameters().commands.len()).sum::<usize>()
+    }
 }
 
-fn unmapped(error: MappingError) -> Obstacle {
-    let parameter = match error {
-        MappingError::TooManyObjects { .. } => 0,
+fn unmapped(error: MappingError) -> RejectReason {
+    match error {
+        MappingError::TooManyObjects { .. } => RejectReason::TooManyObjects,
         MappingError::TooLong { object, .. }
         | MappingError::Width { object }
-        | MappingError::NothingToSend { object } => object.parameter(),
-    };
-    Obstacle::from(Objection::Mapping).with(parameter.into(), 0.0)
+        | MappingError::NothingToSend { object } => RejectReason::Mapping { object },
+    }
 }
 
-fn taken(IdTaken { id }: IdTaken) -> Obstacle {
-    Obstacle::from(Objection::IdTaken).with(id.value().into(), 0.0)
+fn taken(IdTaken { id }: IdTaken) -> RejectReason {
+    RejectReason::IdTaken { id }
 }
 
 fn objects(pdo: &MappedPdo) -> ArrayVec<MappedObject, MAX_OBJECTS> {
@@ -71,7 +84,7 @@ fn objects(pdo: &MappedPdo) -> ArrayVec<MappedObject, MAX_OBJECTS> {
 
 fn command(pdo: &MappedPdo) -> Result<CommandPdo, MappingError> {
     let mapping = Mapping::commands(&objects(pdo))?;
-    Ok(CommandPdo { pdo: Pdo { id: pdo.id, mapping }, cadence: pdo.cadence })
+    Ok(CommandPdo { pdo: Pdo { id: pdo.id, mapping }, transmission: pdo.cadence })
 }
 
 fn feedback(pdo: &MappedPdo) -> Result<Pdo, MappingError> {

@@ -1,150 +1,173 @@
 //! What is asked of the group, and what of it is possible now.
 
-use super::obstacle::{Obstacle, check_profile_target, check_scales, check_target};
-use super::{Engine, FAULT_RESET_CYCLES};
+use super::encode::FAULT_RESET_CYCLES;
+use super::state::{GroupState, PowerRemoval, Stream};
+use super::targets::{Rejection, check_profile_target, check_scales, check_target, plan_rejection};
+use super::{Ending, Engine};
 use crate::axis::Axis;
-use crate::cia402::Goal;
-use crate::door::{Asked, Door, Move, ProfileMove, Request};
-use crate::motion::Leg;
+use crate::control::ControlLaw;
+use crate::group_trajectory::Leg;
+use crate::host::HostInterface;
+use crate::phase::Phase;
 use crate::plan::State;
 use crate::profile::ProfileTarget;
 use crate::record::EventKind;
-use crate::refusal::{Objection, Refusal};
-use crate::stop::{Origin, Phase, Rule, StopCategory};
+use crate::request::{Move, ProfileMove, RejectReason, Request, RequestEnvelope, RequestError, RequestId};
+use crate::stop::{Origin, StopCause};
+use crate::stop_category::StopCategory;
 use crate::time::Nanoseconds;
 use crate::watch::TimingLevel;
 
-/// Done, or what stands in the way; nothing has changed then.
-type Answered = Result<(), Obstacle>;
+/// Requests that are handled in one cycle; the rest waits, so that a flood of them costs a bounded time.
+const REQUESTS_PER_CYCLE: usize = 4;
 
-impl Engine {
-    pub(super) fn take(&mut self, asked: &Asked, now_ns: Nanoseconds, door: &mut impl Door) {
-        let obstacle = self.answer(&asked.request, now_ns, door).err();
-        let refusal = obstacle.map(|Obstacle { objection, axis, value, limit }| Refusal {
-            request: asked.request.kind(),
-            objection,
-            axis,
-            value,
-            limit,
-            phase: self.phase,
-        });
-        self.snapshot.answers.note(asked.id, refusal);
-        if let Some(refusal) = refusal {
-            self.snapshot.refused += 1;
-            self.happened(now_ns, EventKind::Refused(refusal), door);
+/// Done, or why not; nothing has changed then.
+type Handled = Result<(), Rejection>;
+
+impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
+    pub(super) fn handle_requests(&mut self, host: &mut impl HostInterface<AXES, BUSES>) {
+        for _ in 0..REQUESTS_PER_CYCLE {
+            let Some(envelope) = host.request() else { break };
+            self.handle_request(&envelope);
+        }
+        if let GroupState::Streaming(stream) = &mut self.state
+            && let Some(command) = host.stream()
+        {
+            stream.receive(command, self.now_ns);
         }
     }
 
-    fn answer(&mut self, request: &Request, now_ns: Nanoseconds, door: &mut impl Door) -> Answered {
+    fn handle_request(&mut self, envelope: &RequestEnvelope<AXES>) {
+        let RequestEnvelope { id, request } = envelope;
+        let rejected = self.try_request(*id, request).err().map(|Rejection { reason, axis }| RequestError {
+            request: request.kind(),
+            reason,
+            axis,
+            phase: self.state.phase(),
+        });
+        self.snapshot.answers.note(*id, rejected);
+        if let Some(rejected) = rejected {
+            self.snapshot.rejected += 1;
+            self.emit(EventKind::Rejected(rejected));
+        }
+    }
+
+    fn try_request(&mut self, id: RequestId, request: &Request<AXES>) -> Handled {
         match request {
-            Request::Sync(on) => {
-                if *on && !self.is_sync_on {
+            Request::Sync(is_on) => {
+                if *is_on && !self.requested.sync {
                     self.axes.iter_mut().for_each(Axis::begin_sync);
                 }
-                self.is_sync_on = *on;
+                self.requested.sync = *is_on;
             }
             Request::TimeOfDay { at_zero_ns } => {
-                self.time.as_mut().ok_or(Objection::NoTime)?.set(*at_zero_ns);
+                self.time.as_mut().ok_or(RejectReason::NoTime)?.set(*at_zero_ns);
             }
-            Request::RatedTorque { axis, torque } => {
-                // What is commanded in per mille of it would leap.
-                self.require_phase(&[Phase::Passive, Phase::Disabled])?;
-                if !self.axis_mut(*axis)?.set_rated_torque(*torque) {
-                    return Err(Obstacle::from(Objection::RatedTorque)
-                        .of_axis((*axis).into())
-                        .with(*torque, 0.0));
-                }
-            }
+            Request::RatedTorque { axis, torque } => self.set_rated_torque(*axis, *torque)?,
             Request::ProcessData(data) => self.set_process_data(data)?,
             Request::Position { axis, counts } => self.axis_mut(*axis)?.set_reported_position(*counts),
-            Request::Activate => self.activate(now_ns, door)?,
-            Request::Enable => self.begin_enable(now_ns, door)?,
-            Request::Move(parameters) => self.begin_move(parameters, now_ns, door)?,
-            Request::SetProfileTarget(target) => self.set_profile_target(target, now_ns, door)?,
-            Request::Stream => self.begin_stream(now_ns, door)?,
-            Request::Stop(category) => {
-                self.begin_stop(Rule::Requested, Some(*category), Origin::Group, 0.0, 0.0, now_ns, door);
-            }
-            Request::Disable => self.begin_disable(now_ns, door)?,
+            Request::Activate => self.activate()?,
+            Request::Enable => self.begin_enabling()?,
+            Request::Move(parameters) => self.begin_move(id, parameters)?,
+            Request::SetProfileTarget(target) => self.set_profile_target(id, target)?,
+            Request::Stream => self.begin_stream()?,
+            Request::Stop(category) => self.begin_stop(StopCause::Requested, Origin::Group, *category),
+            Request::Disable => self.begin_disabling()?,
             Request::ResetFaults => self.reset_faults()?,
-            Request::Retire => self.is_retired = true,
-            Request::Leave => self.is_leaving = true,
+            Request::InhibitEnable => {
+                self.requested.ending = self.requested.ending.max(Ending::EnableInhibited)
+            }
+            Request::Shutdown => self.requested.ending = Ending::Shutdown,
         }
         Ok(())
     }
 
-    pub(super) fn require_phase(&self, possible: &[Phase]) -> Answered {
-        if possible.contains(&self.phase) { Ok(()) } else { Err(Objection::Phase.into()) }
+    pub(super) fn require_phase(&self, possible: &[Phase]) -> Handled {
+        if possible.contains(&self.state.phase()) { Ok(()) } else { Err(RejectReason::Phase.into()) }
     }
 
     /// A fault that has stopped the group must be reset before anything moves.
-    fn require_no_fault(&self) -> Answered {
-        match self.stop.filter(|stop| stop.rule != Rule::Requested) {
+    fn require_no_fault(&self) -> Handled {
+        match self.stop.filter(|stop| !stop.is_requested()) {
             Some(stop) => {
-                let latched = Obstacle::from(Objection::StopLatched);
-                Err(Obstacle { axis: stop.axis(), ..latched }.with(f64::from(stop.rule as u8), 0.0))
+                Err(Rejection { reason: RejectReason::StopLatched { rule: stop.rule() }, axis: stop.axis() })
             }
             None => Ok(()),
         }
     }
 
-    pub(super) fn axis_mut(&mut self, number: u8) -> Result<&mut Axis, Obstacle> {
-        let unknown = Obstacle::from(Objection::UnknownAxis).with(f64::from(number), self.axes.len() as f64);
-        self.axes.get_mut(usize::from(number)).ok_or(unknown)
+    pub(super) fn axis_mut(&mut self, number: u8) -> Result<&mut Axis, Rejection> {
+        let unknown = RejectReason::UnknownAxis { axis: number, axes: self.axes.len() as u8 };
+        self.axes.get_mut(usize::from(number)).ok_or(unknown.into())
     }
 
-    fn begin_enable(&mut self, now_ns: Nanoseconds, door: &mut impl Door) -> Answered {
-        if self.is_retired {
-            return Err(Objection::Retired.into());
+    /// What is commanded in per mille of the rated torque must not leap: it changes without power only.
+    fn set_rated_torque(&mut self, axis: u8, torque: f64) -> Handled {
+        self.require_phase(&[Phase::Passive, Phase::Disabled])?;
+        if self.axis_mut(axis)?.set_rated_torque(torque) {
+            Ok(())
+        } else {
+            Err(RejectReason::RatedTorque { torque }.of_axis(axis.into()))
+        }
+    }
+
+    fn activate(&mut self) -> Handled {
+        self.require_phase(&[Phase::Passive])?;
+        self.axes.iter_mut().for_each(Axis::start_from_actual);
+        self.enter(GroupState::Disabled);
+        Ok(())
+    }
+
+    fn begin_enabling(&mut self) -> Handled {
+        if self.requested.ending >= Ending::EnableInhibited {
+            return Err(RejectReason::EnableInhibited.into());
         }
         self.require_phase(&[Phase::Disabled])?;
         self.require_no_fault()?;
         self.stop = None;
-        self.begin_watch();
-        self.goal = Goal::Enabled;
-        self.hasten_heartbeats();
-        self.enter(Phase::Enabling, now_ns, door);
+        self.forget_observations();
+        if let Some(heartbeat) = &mut self.heartbeat {
+            heartbeat.hasten();
+        }
+        self.enter(GroupState::Enabling);
         Ok(())
     }
 
-    fn begin_stream(&mut self, now_ns: Nanoseconds, door: &mut impl Door) -> Answered {
+    /// Forgets what was observed while nothing could move.
+    fn forget_observations(&mut self) {
+        self.axes.iter_mut().for_each(Axis::begin_watch);
+        self.foreign_frame = None;
+        self.slots.forgive();
+        if let Some(level) = self.slots.changed_level() {
+            self.emit(EventKind::Timing { level });
+        }
+    }
+
+    fn begin_stream(&mut self) -> Handled {
         self.require_phase(&[Phase::Holding])?;
         self.require_no_fault()?;
-        if self.timing_level >= TimingLevel::Degraded {
-            let (missed, limit) = (self.missed.filled(), self.ladder.degraded);
-            return Err(Obstacle::from(Objection::MissedSlots).with(missed.into(), limit.into()));
+        if self.slots.level() >= TimingLevel::Degraded {
+            let (missed, _) = self.slots.unforgiven();
+            return Err(RejectReason::MissedSlots { missed, limit: self.slots.degraded() }.into());
         }
         self.stop = None;
-        self.stream = None;
-        self.is_stream_begun = false;
         self.axes.iter_mut().for_each(Axis::begin_stream);
-        self.enter(Phase::Streaming, now_ns, door);
+        self.enter(GroupState::Streaming(Stream::Awaited));
         Ok(())
     }
 
-    /// Forgets what was seen while nothing could move.
-    fn begin_watch(&mut self) {
-        self.axes.iter_mut().for_each(Axis::begin_watch);
-        self.foreign_id = None;
-        self.missed.empty();
+    fn enter_motion(&mut self) {
+        self.stop = None;
+        self.enter(GroupState::Moving { is_reported: false });
     }
 
-    fn activate(&mut self, now_ns: Nanoseconds, door: &mut impl Door) -> Answered {
-        self.require_phase(&[Phase::Passive])?;
-        self.goal = Goal::Disabled;
-        self.axes.iter_mut().for_each(Axis::start_from_actual);
-        self.enter(Phase::Disabled, now_ns, door);
-        Ok(())
-    }
-
-    fn begin_move(&mut self, parameters: &Move, now_ns: Nanoseconds, door: &mut impl Door) -> Answered {
+    fn begin_move(&mut self, id: RequestId, parameters: &Move<AXES>) -> Handled {
         self.require_phase(&[Phase::Holding, Phase::Moving])?;
         self.require_no_fault()?;
         check_scales(parameters)?;
         let targets = || parameters.target.into_iter().zip(parameters.target_velocity);
         for (index, (axis, (position, velocity))) in self.axes.iter().zip(targets()).enumerate() {
-            check_target(axis, position, velocity, self.period_s)
-                .map_err(|obstacle| obstacle.of_axis(index))?;
+            check_target(axis, position, velocity, self.period_s).map_err(|reason| reason.of_axis(index))?;
         }
         let legs = self.axes.iter().zip(targets()).map(|(axis, (position, velocity))| {
             let start = axis.set_point();
@@ -160,67 +183,54 @@ impl Engine {
         let minimum_duration_s = parameters.minimum_duration_s;
         self.motion
             .move_to(legs, parameters.velocity_scale, parameters.acceleration_scale, minimum_duration_s)
-            .map_err(|error| Obstacle::of_plan(error, minimum_duration_s))?;
+            .map_err(|error| plan_rejection(error, minimum_duration_s))?;
         for (axis, position) in self.axes.iter_mut().zip(parameters.target) {
             if axis.accepts(ProfileTarget::Position(position)) {
                 axis.set_profile_target(ProfileTarget::Position(position), Nanoseconds::MAX);
             }
         }
-        self.stop = None;
-        self.move_id = parameters.id;
-        self.enter(Phase::Moving, now_ns, door);
+        // It takes over what was planned, and the drives that find their own way to a position.
+        let law = |axis: u8| self.axes.get(usize::from(axis)).map(|axis| axis.parameters().law);
+        let is_positioned = |axis: u8| law(axis) == Some(ControlLaw::ProfilePosition);
+        self.snapshot.motions.begin(id, None, |axis| axis.is_none_or(is_positioned));
+        self.enter_motion();
         Ok(())
     }
 
-    fn set_profile_target(
-        &mut self,
-        wanted: &ProfileMove,
-        now_ns: Nanoseconds,
-        door: &mut impl Door,
-    ) -> Answered {
+    fn set_profile_target(&mut self, id: RequestId, wanted: &ProfileMove) -> Handled {
         let index = usize::from(wanted.axis);
         self.require_phase(&[Phase::Holding, Phase::Moving])?;
         self.require_no_fault()?;
         check_profile_target(self.axis_mut(wanted.axis)?, wanted.target)
-            .map_err(|obstacle| obstacle.of_axis(index))?;
+            .map_err(|reason| reason.of_axis(index))?;
         // The other axes stay where they are, not where the last trajectory ended.
-        if self.phase == Phase::Holding {
-            self.plan_standstill().map_err(|error| Obstacle::of_plan(error, 0.0))?;
+        if self.state == GroupState::Holding {
+            self.plan_standstill().map_err(|error| plan_rejection(error, 0.0))?;
         }
         self.axis_mut(wanted.axis)?.set_profile_target(wanted.target, wanted.valid_until_ns);
-        self.stop = None;
-        self.move_id = wanted.id;
-        self.enter(Phase::Moving, now_ns, door);
+        let is_position = matches!(wanted.target, ProfileTarget::Position(_));
+        let takes_over = |axis: Option<u8>| axis.map_or(is_position, |axis| axis == wanted.axis);
+        self.snapshot.motions.begin(id, Some(wanted.axis), takes_over);
+        self.enter_motion();
         Ok(())
     }
 
-    fn begin_disable(&mut self, now_ns: Nanoseconds, door: &mut impl Door) -> Answered {
-        match self.phase {
-            Phase::Passive => return Err(Objection::Phase.into()),
-            Phase::Disabled | Phase::Disabling => {}
-            _ if self.must_come_to_rest() || self.phase == Phase::Stopping => {
-                self.begin_stop(
-                    Rule::Requested,
-                    Some(StopCategory::One),
-                    Origin::Group,
-                    0.0,
-                    0.0,
-                    now_ns,
-                    door,
-                );
+    fn begin_disabling(&mut self) -> Handled {
+        match self.state {
+            GroupState::Passive => return Err(RejectReason::Phase.into()),
+            GroupState::Disabled | GroupState::Disabling(_) => {}
+            _ if self.must_come_to_rest() || self.state == GroupState::Stopping => {
+                self.begin_stop(StopCause::Requested, Origin::Group, StopCategory::One);
             }
-            _ => {
-                self.goal = Goal::Disabled;
-                self.enter(Phase::Disabling, now_ns, door);
-            }
+            _ => self.enter(GroupState::Disabling(PowerRemoval::Shutdown)),
         }
         Ok(())
     }
 
-    fn reset_faults(&mut self) -> Answered {
+    fn reset_faults(&mut self) -> Handled {
         self.require_phase(&[Phase::Disabled, Phase::Holding])?;
-        if self.phase == Phase::Disabled {
-            self.fault_reset = 3 * FAULT_RESET_CYCLES;
+        if self.state == GroupState::Disabled {
+            self.fault_reset_cycles = 3 * FAULT_RESET_CYCLES;
             self.axes.iter_mut().for_each(Axis::begin_fault_reset);
         }
         self.stop = None;

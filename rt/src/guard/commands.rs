@@ -2,8 +2,8 @@
 
 use super::stream::ROUNDINGS;
 use super::{AxisLimits, TOLERANCE, Violation};
+use crate::fault::Rule;
 use crate::plan::{self, Limits, Problem, State};
-use crate::stop::Rule;
 
 /// How many are kept: a third difference needs four.
 const KEPT: usize = 4;

@@ -1,17 +1,19 @@
 //! The last look at every set-point, whoever made it, before it becomes a frame.
 
 mod commands;
+mod following_error;
 #[cfg(test)]
 mod planned;
-mod reach;
+mod stopping_bound;
 mod stream;
 
+use crate::fault::{Fault, Rule};
 use crate::plan::State;
-use crate::stop::Rule;
 
-pub use commands::{StreamCommands, StreamMotion};
-pub use reach::braking_distance;
-pub use stream::{Course, OnViolation, check_braking, check_jerk, clamp};
+pub use commands::StreamCommands;
+pub use following_error::FollowingErrorGuard;
+pub use stopping_bound::braking_distance;
+pub use stream::{OnViolation, SetPointSteps, check_braking, check_jerk, clamp};
 
 /// What an axis may never be asked to do. rad (m) and seconds.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -76,6 +78,12 @@ pub struct Violation {
     pub limit: f64,
 }
 
+impl From<Violation> for Fault {
+    fn from(Violation { rule, value, limit }: Violation) -> Self {
+        Self::from_numbers(rule, value, limit).unwrap_or(Self::NoTrajectory)
+    }
+}
+
 /// Room for the rounding of floating-point differences, relative to the limit.
 const TOLERANCE: f64 = 1e-6;
 
@@ -116,35 +124,6 @@ pub fn check(
         return Err(Violation { rule: Rule::AccelerationLimit, value: acceleration, limit });
     }
     Ok(())
-}
-
-/// Watches how long a joint has been too far from its set-point.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FollowingErrorGuard {
-    limit: f64,
-    allowed_cycles: u32,
-    cycles: u32,
-}
-
-impl FollowingErrorGuard {
-    /// Allows an error beyond `limit` (rad or m) for `allowed_cycles` cycles in a row.
-    pub const fn new(limit: f64, allowed_cycles: u32) -> Self {
-        Self { limit, allowed_cycles, cycles: 0 }
-    }
-
-    /// Takes the error of this cycle.
-    pub fn check(&mut self, error: f64) -> Result<(), Violation> {
-        self.cycles = if error.abs() > self.limit { self.cycles.saturating_add(1) } else { 0 };
-        if self.cycles > self.allowed_cycles {
-            return Err(Violation { rule: Rule::FollowingError, value: error, limit: self.limit });
-        }
-        Ok(())
-    }
-
-    /// Forgets what was.
-    pub fn reset(&mut self) {
-        self.cycles = 0;
-    }
 }
 
 #[cfg(test)]
@@ -199,19 +178,6 @@ mod tests {
     fn acceleration_is_the_difference_of_two_steps() {
         assert_eq!(rule(0.0, 0.0, at(20.0 * PERIOD_S * PERIOD_S)), None);
         assert_eq!(rule(0.0, 0.0, at(20.1 * PERIOD_S * PERIOD_S)), Some(Rule::AccelerationLimit));
-    }
-
-    #[test]
-    fn a_following_error_may_be_short_but_not_long() {
-        let mut guard = FollowingErrorGuard::new(0.1, 3);
-        for _ in 0..3 {
-            assert_eq!(guard.check(-0.2), Ok(()));
-        }
-        assert_eq!(guard.check(0.05), Ok(()));
-        for _ in 0..3 {
-            assert_eq!(guard.check(0.2), Ok(()));
-        }
-        assert_eq!(guard.check(0.2), Err(Violation { rule: Rule::FollowingError, value: 0.2, limit: 0.1 }));
     }
 
     proptest! {

@@ -8,8 +8,10 @@ use std::vec::Vec;
 
 use proptest::prelude::*;
 
-use super::{AxisLimits, Course, TOLERANCE, Violation, braking_distance, check, check_braking, check_jerk};
-use crate::motion::{Leg, Motion};
+use super::{
+    AxisLimits, SetPointSteps, TOLERANCE, Violation, braking_distance, check, check_braking, check_jerk,
+};
+use crate::group_trajectory::{GroupTrajectory, Leg};
 use crate::plan::State;
 
 /// A stream of positions of one axis, which is all that the guard looks at.
@@ -26,28 +28,28 @@ impl Stream {
 
     fn check(&self, next: f64) -> Result<(), Violation> {
         self.check_steps(next)?;
-        check_braking(&self.limits, &self.course(next))
+        check_braking(&self.limits, &self.steps(next))
     }
 
     fn check_steps(&self, next: f64) -> Result<(), Violation> {
         let state = State { position: next, ..State::default() };
         check(&self.limits, self.period_s, self.sent[1], self.sent[0], &state)?;
-        check_jerk(self.limits.jerk, &self.course(next))
+        check_jerk(self.limits.jerk, &self.steps(next))
     }
 
-    fn course(&self, next: f64) -> Course {
-        Course { sent: self.sent, next, period_s: self.period_s }
+    fn steps(&self, next: f64) -> SetPointSteps {
+        SetPointSteps { sent: self.sent, next, period_s: self.period_s }
     }
 
     fn take(&mut self, next: f64) {
         self.sent = [next, self.sent[0], self.sent[1]];
     }
 
-    /// The state that a stop begins from, see `Axis::take_steps`.
+    /// The state that a stop begins from, see `Axis::derive_from_steps`.
     fn state(&self) -> State {
         let [newest, last, before] = self.sent;
-        let course = Course { sent: [last, before, before], next: newest, period_s: self.period_s };
-        course.state(&self.limits)
+        let steps = SetPointSteps { sent: [last, before, before], next: newest, period_s: self.period_s };
+        steps.state(&self.limits)
     }
 }
 
@@ -93,7 +95,7 @@ proptest! {
         let mut streams: Vec<Stream> =
             all.iter().map(|limits| Stream::at_rest(0.0, *limits, period_s)).collect();
         let mut states = vec![State::default(); all.len()];
-        let mut motion = Motion::default();
+        let mut motion = GroupTrajectory::<4>::default();
         // To rest where the last one is passed at speed.
         for (share, speed, cycles) in targets.into_iter().chain([(0.5, 0.0, usize::MAX)]) {
             let legs = all.iter().zip(&states).map(|(limits, start)| Leg {
@@ -141,7 +143,7 @@ proptest! {
         };
         let steepest = limits.acceleration.max(limits.deceleration);
         let mut stream = Stream::at_rest(0.0, limits, period_s);
-        let mut motion = Motion::default();
+        let mut motion = GroupTrajectory::<4>::default();
         let mut state = State::default();
         let targets = targets.into_iter().map(|(share, _, cycles)| (share, cycles));
         let positions = targets.flat_map(|(share, cycles)| {

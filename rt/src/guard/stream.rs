@@ -1,10 +1,10 @@
 //! What a set-point of a stream must keep to beyond [`check`](super::check): its maker is not known, and nobody has
 //! planned how it goes on.
 
-use super::reach::Reach;
+use super::stopping_bound::StoppingBound;
 use super::{AxisLimits, TOLERANCE, Violation};
+use crate::fault::Rule;
 use crate::plan::State;
-use crate::stop::Rule;
 
 /// By how much a position may be off, relative to it or to 1 rad: whoever samples a trajectory adds up times and evaluates
 /// polynomials, each with a rounding. The third difference divides what comes of it by the cube of the period.
@@ -26,7 +26,7 @@ pub enum OnViolation {
 
 /// Set-points of the last three cycles, newest first, and the one that is to follow.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Course {
+pub struct SetPointSteps {
     /// Positions that were sent, newest first (rad or m).
     pub sent: [f64; 3],
     /// The position that is to follow.
@@ -35,7 +35,7 @@ pub struct Course {
     pub period_s: f64,
 }
 
-impl Course {
+impl SetPointSteps {
     fn velocity(&self) -> f64 {
         (self.next - self.sent[0]) / self.period_s
     }
@@ -48,7 +48,7 @@ impl Course {
         (self.velocity() - self.last_velocity()) / self.period_s
     }
 
-    /// The same course with positive and negative exchanged.
+    /// The same steps with positive and negative exchanged.
     fn mirrored(&self) -> Self {
         Self { sent: self.sent.map(|position| -position), next: -self.next, period_s: self.period_s }
     }
@@ -86,14 +86,14 @@ impl Course {
     /// of the acceleration; one beyond the limit of its direction is for the planner to take back.
     pub fn state(&self, limits: &AxisLimits) -> State {
         let even = self.even_end();
-        let too_far = Way::both(self, limits).find(|way| {
+        let too_far = Direction::both(self, limits).find(|way| {
             let state = if way.sign < 0.0 { mirrored(&even) } else { even };
-            !way.is_kept(&Reach::of(&state, limits))
+            !way.is_kept(&StoppingBound::of(&state, limits))
         });
         match too_far {
             None => even,
-            Some(way) if way.sign < 0.0 => mirrored(&way.course.braked_end(limits)),
-            Some(way) => way.course.braked_end(limits),
+            Some(way) if way.sign < 0.0 => mirrored(&way.steps.braked_end(limits)),
+            Some(way) => way.steps.braked_end(limits),
         }
     }
 
@@ -116,43 +116,43 @@ fn mirrored(state: &State) -> State {
     State { position: -state.position, velocity: -state.velocity, acceleration: -state.acceleration }
 }
 
-/// A course seen in one of the two directions, which is positive here.
-struct Way<'a> {
-    course: Course,
+/// A steps seen in one of the two directions, which is positive here.
+struct Direction<'a> {
+    steps: SetPointSteps,
     sign: f64,
     farthest: f64,
     limits: &'a AxisLimits,
 }
 
-impl<'a> Way<'a> {
-    fn both(course: &Course, limits: &'a AxisLimits) -> impl Iterator<Item = Self> {
+impl<'a> Direction<'a> {
+    fn both(steps: &SetPointSteps, limits: &'a AxisLimits) -> impl Iterator<Item = Self> {
         let (max, min) = (limits.position_max, limits.position_min);
-        [(*course, 1.0, max), (course.mirrored(), -1.0, -min)]
+        [(*steps, 1.0, max), (steps.mirrored(), -1.0, -min)]
             .into_iter()
-            .map(move |(course, sign, farthest)| Self { course, sign, farthest, limits })
+            .map(move |(steps, sign, farthest)| Self { steps, sign, farthest, limits })
     }
 
     /// Whether the limits are kept to the last bit. From outside those of the position the joint may come back.
-    fn is_kept(&self, reach: &Reach) -> bool {
-        reach.velocity <= self.limits.velocity && reach.position <= self.farthest.max(self.course.next)
+    fn is_kept(&self, bound: &StoppingBound) -> bool {
+        bound.velocity <= self.limits.velocity && bound.position <= self.farthest.max(self.steps.next)
     }
 
     /// Checks that they can be kept, but for the tolerance.
     fn check(&self) -> Result<(), Violation> {
-        let reach = Reach::of(&self.course.braked_end(self.limits), self.limits);
+        let bound = StoppingBound::of(&self.steps.braked_end(self.limits), self.limits);
         let fastest = self.limits.velocity;
-        if reach.velocity > fastest * (1.0 + BRAKING_TOLERANCE) + self.course.noise(1) {
+        if bound.velocity > fastest * (1.0 + BRAKING_TOLERANCE) + self.steps.noise(1) {
             return Err(Violation {
                 rule: Rule::VelocityLimit,
-                value: self.sign * reach.velocity,
+                value: self.sign * bound.velocity,
                 limit: fastest,
             });
         }
         let room = BRAKING_TOLERANCE * (self.limits.position_max - self.limits.position_min);
-        if reach.position > (self.farthest + room).max(self.course.next) + self.course.noise(0) {
+        if bound.position > (self.farthest + room).max(self.steps.next) + self.steps.noise(0) {
             return Err(Violation {
                 rule: Rule::PositionLimit,
-                value: self.sign * reach.position,
+                value: self.sign * bound.position,
                 limit: self.sign * self.farthest,
             });
         }
@@ -161,9 +161,9 @@ impl<'a> Way<'a> {
 }
 
 /// Checks that a jerk limit is kept.
-pub fn check_jerk(limit: f64, course: &Course) -> Result<(), Violation> {
-    let jerk = course.jerk();
-    if jerk.abs() > limit * (1.0 + TOLERANCE) + course.noise(3) {
+pub fn check_jerk(limit: f64, steps: &SetPointSteps) -> Result<(), Violation> {
+    let jerk = steps.jerk();
+    if jerk.abs() > limit * (1.0 + TOLERANCE) + steps.noise(3) {
         return Err(Violation { rule: Rule::JerkLimit, value: jerk, limit });
     }
     Ok(())
@@ -172,28 +172,28 @@ pub fn check_jerk(limit: f64, course: &Course) -> Result<(), Violation> {
 /// Checks that the joint can still come to rest within its limits of position, and of velocity on the way.
 ///
 /// What can is let pass: every motion within the limits, sampled once a period. What cannot is refused: whatever passes can
-/// be stopped from [`Course::state`] with all of its steps within the limits, but for the tolerance that every check of the
+/// be stopped from [`SetPointSteps::state`] with all of its steps within the limits, but for the tolerance that every check of the
 /// guard has for rounding, a millionth of the limit (of the range of positions).
-pub fn check_braking(limits: &AxisLimits, course: &Course) -> Result<(), Violation> {
-    Way::both(course, limits).try_for_each(|way| way.check())
+pub fn check_braking(limits: &AxisLimits, steps: &SetPointSteps) -> Result<(), Violation> {
+    Direction::both(steps, limits).try_for_each(|direction| direction.check())
 }
 
 /// The set-point nearest to the one asked for that keeps the limits of velocity and acceleration, and from which a stop
 /// at all limits, that of the jerk too, stays within those of the position. A target that is no number counts as the
 /// wish to stop.
-pub fn clamp(limits: &AxisLimits, course: &Course) -> State {
-    let (period_s, last, last_velocity) = (course.period_s, course.sent[0], course.last_velocity());
-    let wanted = if course.next.is_finite() { course.velocity() } else { 0.0 };
+pub fn clamp(limits: &AxisLimits, steps: &SetPointSteps) -> State {
+    let (period_s, last, last_velocity) = (steps.period_s, steps.sent[0], steps.last_velocity());
+    let wanted = if steps.next.is_finite() { steps.velocity() } else { 0.0 };
     let speeding_up = limits.acceleration * period_s;
     let slowing_down = limits.deceleration * period_s;
     let (lowest, highest) = match last_velocity > 0.0 {
         true => ((last_velocity - slowing_down).max(-speeding_up), last_velocity + speeding_up),
         false => (last_velocity - speeding_up, (last_velocity + slowing_down).min(speeding_up)),
     };
-    let at = |velocity: f64| Course { next: last + velocity * period_s, ..*course };
-    let is_within = |course: Course, farthest: f64| {
-        let reach = Reach::of(&course.braked_end(limits), limits);
-        reach.position <= farthest && reach.velocity <= limits.velocity
+    let at = |velocity: f64| SetPointSteps { next: last + velocity * period_s, ..*steps };
+    let is_within = |steps: SetPointSteps, farthest: f64| {
+        let bound = StoppingBound::of(&steps.braked_end(limits), limits);
+        bound.position <= farthest && bound.velocity <= limits.velocity
     };
     let is_low_enough = |velocity: f64| is_within(at(velocity), limits.position_max);
     let is_high_enough = |velocity: f64| is_within(at(velocity).mirrored(), -limits.position_min);
@@ -229,8 +229,8 @@ fn nearest(wanted: f64, end: f64, is_possible: impl Fn(f64) -> bool) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::group_trajectory::GroupTrajectory;
     use crate::guard;
-    use crate::motion::Motion;
     use proptest::prelude::*;
 
     const LIMITS: AxisLimits = AxisLimits {
@@ -244,9 +244,9 @@ mod tests {
     };
     const PERIOD_S: f64 = 0.001;
 
-    fn moving_at(position: f64, velocity: f64) -> Course {
+    fn moving_at(position: f64, velocity: f64) -> SetPointSteps {
         let step = velocity * PERIOD_S;
-        Course {
+        SetPointSteps {
             sent: [position - step, position - 2.0 * step, position - 3.0 * step],
             next: position,
             period_s: PERIOD_S,
@@ -266,7 +266,7 @@ mod tests {
 
     #[test]
     fn jerk_is_the_third_difference() {
-        let third = |jerk: f64| Course { next: jerk * PERIOD_S.powi(3), ..moving_at(0.0, 0.0) };
+        let third = |jerk: f64| SetPointSteps { next: jerk * PERIOD_S.powi(3), ..moving_at(0.0, 0.0) };
         assert_eq!(check_jerk(100.0, &third(99.0)), Ok(()));
         assert_eq!(check_jerk(100.0, &third(101.0)).unwrap_err().rule, Rule::JerkLimit);
     }
@@ -278,7 +278,7 @@ mod tests {
         ) {
             let mut sent = [0.0; 3];
             for target in targets.into_iter().flat_map(|target| [target; 5]) {
-                let next = clamp(&LIMITS, &Course { sent, next: target, period_s: PERIOD_S });
+                let next = clamp(&LIMITS, &SetPointSteps { sent, next: target, period_s: PERIOD_S });
                 let passed = guard::check(&LIMITS, PERIOD_S, sent[1], sent[0], &next);
                 prop_assert!(passed.is_ok(), "{passed:?}");
                 prop_assert!(LIMITS.contain(next.position), "{next:?}");
@@ -293,13 +293,13 @@ mod tests {
             let limits = AxisLimits { jerk: 150.0, ..LIMITS };
             let mut sent = [0.0; 3];
             for target in targets.into_iter().flat_map(|(target, times)| core::iter::repeat_n(target, times)) {
-                let course = Course { sent, next: target, period_s: PERIOD_S };
-                let next = clamp(&limits, &course);
+                let steps = SetPointSteps { sent, next: target, period_s: PERIOD_S };
+                let next = clamp(&limits, &steps);
                 prop_assert!(guard::check(&limits, PERIOD_S, sent[1], sent[0], &next).is_ok());
                 sent = [next.position, sent[0], sent[1]];
             }
-            let last = Course { sent: [sent[1], sent[2], sent[2]], next: sent[0], period_s: PERIOD_S };
-            let mut motion = Motion::default();
+            let last = SetPointSteps { sent: [sent[1], sent[2], sent[2]], next: sent[0], period_s: PERIOD_S };
+            let mut motion = GroupTrajectory::<4>::default();
             motion.stop([(last.state(&limits), &limits)].into_iter()).unwrap();
             while !motion.is_finished() {
                 motion.advance(PERIOD_S);
@@ -318,24 +318,24 @@ mod tests {
             for (jerk, times) in jerks {
                 for _ in 0..times {
                     let next = 3.0 * (sent[0] - sent[1]) + sent[2] + jerk * limits.jerk * PERIOD_S.powi(3);
-                    let course = Course { sent, next, period_s: PERIOD_S };
+                    let steps = SetPointSteps { sent, next, period_s: PERIOD_S };
                     let state = State { position: next, ..State::default() };
                     let is_passed = guard::check(&limits, PERIOD_S, sent[1], sent[0], &state)
-                        .and_then(|()| check_jerk(limits.jerk, &course))
-                        .and_then(|()| check_braking(&limits, &course));
+                        .and_then(|()| check_jerk(limits.jerk, &steps))
+                        .and_then(|()| check_braking(&limits, &steps));
                     if is_passed.is_ok() {
                         sent = [next, sent[0], sent[1]];
                     }
                 }
             }
-            let last = Course { sent: [sent[1], sent[2], sent[2]], next: sent[0], period_s: PERIOD_S };
-            let mut motion = Motion::default();
+            let last = SetPointSteps { sent: [sent[1], sent[2], sent[2]], next: sent[0], period_s: PERIOD_S };
+            let mut motion = GroupTrajectory::<4>::default();
             motion.stop([(last.state(&limits), &limits)].into_iter()).unwrap();
             while !motion.is_finished() {
                 motion.advance(PERIOD_S);
                 let next = motion.states().next().unwrap();
                 let passed = guard::check(&limits, PERIOD_S, sent[1], sent[0], &next)
-                    .and_then(|()| check_jerk(limits.jerk, &Course { sent, next: next.position, period_s: PERIOD_S }));
+                    .and_then(|()| check_jerk(limits.jerk, &SetPointSteps { sent, next: next.position, period_s: PERIOD_S }));
                 prop_assert!(passed.is_ok(), "{passed:?} from {sent:?} to {next:?}");
                 sent = [next.position, sent[0], sent[1]];
             }

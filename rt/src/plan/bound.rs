@@ -11,7 +11,7 @@ use proptest::test_runner::RngSeed;
 use super::jerk_limited::SEARCHES_MAX;
 use super::jerk_limited::roots::{EVALUATIONS_MAX, work};
 use super::{
-    Limits, Problem, Profile, Return, State, Synchronisation, Timing, position, stop, synchronised,
+    Limits, PlanOptions, Problem, Profile, Return, State, Synchronisation, position, stop, synchronised,
     synchronised_velocity,
 };
 
@@ -55,7 +55,7 @@ fn problem() -> impl Strategy<Value = Problem> {
     })
 }
 
-fn timing() -> impl Strategy<Value = Timing> {
+fn timing() -> impl Strategy<Value = PlanOptions> {
     let modes = vec![
         Synchronisation::Time,
         Synchronisation::Phase,
@@ -63,7 +63,7 @@ fn timing() -> impl Strategy<Value = Timing> {
         Synchronisation::Independent,
     ];
     (prop::sample::select(modes), 0.0..10.0_f64, any::<[bool; 3]>()).prop_map(
-        |(synchronisation, minimum_duration_s, [minimum, cycle, settled])| Timing {
+        |(synchronisation, minimum_duration_s, [minimum, cycle, settled])| PlanOptions {
             synchronisation,
             minimum_duration_s: if minimum { minimum_duration_s } else { 0.0 },
             cycle_s: cycle.then_some(0.001),

@@ -5,7 +5,7 @@ use nalgebra::SVector;
 use super::error::PlanError;
 use super::problem::{Limits, Problem, State};
 use super::profile::{Extrema, Profile};
-use super::synchronisation::{Timing, stop, synchronised};
+use super::synchronisation::{PlanOptions, stop, synchronised};
 
 /// The state of motion of `AXES` axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,11 +38,11 @@ impl<const AXES: usize> GroupState<AXES> {
 ///
 /// ```
 /// use nalgebra::vector;
-/// use takt_rt::plan::{GroupState, Limits, Timing, Trajectory};
+/// use takt_rt::plan::{GroupState, Limits, PlanOptions, Trajectory};
 /// let start = GroupState::rest(vector![0.0, 0.5]);
 /// let target = GroupState::rest(vector![1.0, -0.5]);
 /// let limits = [Limits::symmetric(2.0, 8.0, 100.0); 2];
-/// let trajectory = Trajectory::plan(&start, &target, &limits, Timing::default()).unwrap();
+/// let trajectory = Trajectory::plan(&start, &target, &limits, PlanOptions::default()).unwrap();
 /// assert_eq!(trajectory.sample(trajectory.duration_s()), target);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -69,7 +69,7 @@ impl<const AXES: usize> Trajectory<AXES> {
         start: &GroupState<AXES>,
         target: &GroupState<AXES>,
         limits: &[Limits; AXES],
-        timing: Timing,
+        timing: PlanOptions,
     ) -> Result<Self, Refusal<AXES>> {
         let rest = Problem {
             start: State::rest(0.0),

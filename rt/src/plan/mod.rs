@@ -6,11 +6,11 @@
 //! `profile.sample(t)`, gives the same motion again.
 //!
 //! ```
-//! use takt_rt::plan::{Limits, Problem, Profile, State, Timing, synchronised};
+//! use takt_rt::plan::{Limits, Problem, Profile, State, PlanOptions, synchronised};
 //! let limits = Limits::symmetric(2.0, 8.0, f64::INFINITY);
 //! let problems = [1.0, -0.25].map(|target| Problem { start: State::rest(0.0), target: State::rest(target), limits });
 //! let mut profiles = [Profile::hold(0.0); 2];
-//! let duration_s = synchronised(&problems, &mut profiles, Timing::default()).unwrap();
+//! let duration_s = synchronised(&problems, &mut profiles, PlanOptions::default()).unwrap();
 //! assert_eq!(duration_s, 0.75);
 //! assert_eq!(profiles[1].sample(duration_s), State::rest(-0.25));
 //! ```
@@ -41,5 +41,5 @@ pub use group::{GroupState, Refusal, Trajectory};
 pub use problem::{Limits, Problem, State};
 pub use profile::{Blocked, Extrema, PHASES_MAX, Phase, Profile, Range};
 pub use synchronisation::{
-    Return, Synchronisation, Timing, position, stop, synchronised, synchronised_velocity, velocity,
+    PlanOptions, Return, Synchronisation, position, stop, synchronised, synchronised_velocity, velocity,
 };

@@ -35,7 +35,7 @@ pub enum Return {
 
 /// When a motion shall end, and how it gets there.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Timing {
+pub struct PlanOptions {
     /// What the axes have in common.
     pub synchronisation: Synchronisation,
     /// The motion takes at least this long, in s. 0 for as fast as possible.
@@ -46,7 +46,7 @@ pub struct Timing {
     pub return_to_limits: Return,
 }
 
-impl Timing {
+impl PlanOptions {
     fn validate(&self) -> Result<(), PlanError> {
         let least_valid = self.minimum_duration_s >= 0.0 && self.minimum_duration_s < SIZE_MAX;
         let cycle_valid = self.cycle_s.is_none_or(|cycle_s| cycle_s > 1.0 / SIZE_MAX && cycle_s < SIZE_MAX);
@@ -76,7 +76,7 @@ enum Interface {
 pub fn synchronised(
     problems: &[Problem],
     profiles: &mut [Profile],
-    timing: Timing,
+    timing: PlanOptions,
 ) -> Result<f64, PlanError> {
     let duration_s = plan(Interface::Position(timing.return_to_limits), problems, profiles, timing)?;
     let refuse = |error: PlanError, profiles: &mut [Profile]| {
@@ -106,7 +106,7 @@ fn first_left(problems: &[Problem], profiles: &[Profile]) -> Option<PlanError> {
 fn keep_travel(
     problems: &[Problem],
     profiles: &mut [Profile],
-    timing: Timing,
+    timing: PlanOptions,
     duration_s: f64,
 ) -> Result<f64, PlanError> {
     let manner = timing.return_to_limits;
@@ -131,7 +131,7 @@ fn keep_travel(
             return first_left(problems, profiles).map_or(Ok(longest_s), Err);
         }
         let timing =
-            Timing { minimum_duration_s: longest_s, synchronisation: Synchronisation::Time, ..timing };
+            PlanOptions { minimum_duration_s: longest_s, synchronisation: Synchronisation::Time, ..timing };
         duration_s = plan(Interface::Position(manner), problems, profiles, timing)?;
         if first_left(problems, profiles).is_none() {
             return Ok(duration_s);
@@ -150,7 +150,7 @@ fn keep_travel(
 pub fn synchronised_velocity(
     problems: &[Problem],
     profiles: &mut [Profile],
-    timing: Timing,
+    timing: PlanOptions,
 ) -> Result<f64, PlanError> {
     plan(Interface::Velocity, problems, profiles, timing)
 }
@@ -183,7 +183,7 @@ pub fn stop(starts: &[State], limits: &[Limits], profiles: &mut [Profile]) -> Re
 /// As [`synchronised`], with axis 0.
 pub fn position(problem: &Problem) -> Result<Profile, PlanError> {
     let mut profile = [Profile::hold(0.0)];
-    synchronised(&[*problem], &mut profile, Timing::default())?;
+    synchronised(&[*problem], &mut profile, PlanOptions::default())?;
     let [profile] = profile;
     Ok(profile)
 }
@@ -231,7 +231,7 @@ fn plan(
     interface: Interface,
     problems: &[Problem],
     profiles: &mut [Profile],
-    timing: Timing,
+    timing: PlanOptions,
 ) -> Result<f64, PlanError> {
     expect_length(problems.len(), profiles.len())?;
     timing.validate()?;
@@ -281,7 +281,7 @@ fn straight(
     interface: Interface,
     problems: &[Problem],
     profiles: &mut [Profile],
-    timing: &Timing,
+    timing: &PlanOptions,
 ) -> Result<f64, PlanError> {
     let line = Line::of(problems)?;
     let projected = line.projected(problems);

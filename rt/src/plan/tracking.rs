@@ -6,7 +6,7 @@
 use super::error::PlanError;
 use super::problem::{Limits, Problem, State};
 use super::profile::Profile;
-use super::synchronisation::{Return, Synchronisation, Timing, synchronised};
+use super::synchronisation::{PlanOptions, Return, Synchronisation, synchronised};
 use super::travel;
 
 /// The share of the acceleration limits that a target may use; the rest is for catching up with it.
@@ -16,7 +16,7 @@ const ACCELERATION_SHARE: f64 = 0.95;
 const ROUNDING: f64 = 1e-12;
 
 /// A velocity limit is come back to without going below it.
-const SETTLED: Timing = Timing {
+const SETTLED: PlanOptions = PlanOptions {
     synchronisation: Synchronisation::Time,
     minimum_duration_s: 0.0,
     cycle_s: None,

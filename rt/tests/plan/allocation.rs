@@ -5,8 +5,8 @@ use super::random::Random;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 use takt_rt::plan::{
-    Limit, Limits, PlanError, Problem, Profile, Quantity, Return, State, Synchronisation, Timing, position,
-    stop, synchronised, synchronised_velocity, velocity,
+    Limit, Limits, PlanError, PlanOptions, Problem, Profile, Quantity, Return, State, Synchronisation,
+    position, stop, synchronised, synchronised_velocity, velocity,
 };
 
 thread_local! {
@@ -73,7 +73,7 @@ fn no_plan_stop_sample_or_step_of_tracking_allocates() {
             };
             Problem { limits, ..problem }
         });
-        let timing = Timing {
+        let timing = PlanOptions {
             synchronisation: MODES[number / 3 % MODES.len()],
             minimum_duration_s: random.one_of([0.0, 5.0]),
             cycle_s: (random.uniform(0.0, 1.0) < 0.3).then_some(0.001),
@@ -133,7 +133,7 @@ fn every_error_is_a_plain_enum_and_made_without_allocating() {
     for (bad, expected) in cases {
         let straight = matches!(expected, PlanError::NotStraight { .. });
         let synchronisation = if straight { Synchronisation::Straight } else { Synchronisation::Time };
-        let timing = Timing { synchronisation, ..Timing::default() };
+        let timing = PlanOptions { synchronisation, ..PlanOptions::default() };
         let (mut answer, mut profiles) = (Ok(0.0), [Profile::hold(0.0); 2]);
         let count = allocations(|| answer = synchronised(&[good, bad], &mut profiles, timing));
         assert_eq!((answer, count), (Err(expected), 0));
@@ -142,8 +142,8 @@ fn every_error_is_a_plain_enum_and_made_without_allocating() {
     let mut profiles = [Profile::hold(0.0); 2];
     let mut answers = [Ok(0.0); 2];
     let count = allocations(|| {
-        answers[0] = synchronised(&[good], &mut profiles, Timing::default());
-        let timing = Timing { cycle_s: Some(0.0), ..Timing::default() };
+        answers[0] = synchronised(&[good], &mut profiles, PlanOptions::default());
+        let timing = PlanOptions { cycle_s: Some(0.0), ..PlanOptions::default() };
         answers[1] = synchronised(&[good, good], &mut profiles, timing);
     });
     let length = PlanError::LengthMismatch { expected: 1, received: 2 };

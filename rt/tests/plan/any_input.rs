@@ -3,7 +3,7 @@
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use takt_rt::plan::{
-    Limits, PlanError, Problem, Profile, Return, State, Synchronisation, Timing, stop, synchronised,
+    Limits, PlanError, PlanOptions, Problem, Profile, Return, State, Synchronisation, stop, synchronised,
     synchronised_velocity,
 };
 
@@ -39,7 +39,7 @@ fn problem() -> impl Strategy<Value = Problem> {
     })
 }
 
-fn timing() -> impl Strategy<Value = Timing> {
+fn timing() -> impl Strategy<Value = PlanOptions> {
     let modes = vec![
         Synchronisation::Time,
         Synchronisation::Phase,
@@ -47,7 +47,7 @@ fn timing() -> impl Strategy<Value = Timing> {
         Synchronisation::Independent,
     ];
     (prop::sample::select(modes), number(), prop::option::of(number()), any::<[bool; 2]>()).prop_map(
-        |(synchronisation, minimum_duration_s, cycle_s, [settled, minimum])| Timing {
+        |(synchronisation, minimum_duration_s, cycle_s, [settled, minimum])| PlanOptions {
             synchronisation,
             minimum_duration_s: if minimum { minimum_duration_s } else { 0.0 },
             cycle_s,
@@ -102,8 +102,8 @@ fn limits_that_are_next_to_nothing_are_refused() {
     let problem = Problem { start, target: State { acceleration: 1.6e-303, ..start }, limits };
     let refused = Err(PlanError::NotRepresentable { axis: 0 });
     let mut profiles = [Profile::hold(0.0)];
-    assert_eq!(synchronised(&[problem], &mut profiles, Timing::default()), refused);
-    assert_eq!(synchronised_velocity(&[problem], &mut profiles, Timing::default()), refused);
+    assert_eq!(synchronised(&[problem], &mut profiles, PlanOptions::default()), refused);
+    assert_eq!(synchronised_velocity(&[problem], &mut profiles, PlanOptions::default()), refused);
     assert_eq!(stop(&[start], &[limits], &mut profiles), refused);
 }
 
@@ -112,7 +112,7 @@ fn limits_that_are_next_to_nothing_are_refused() {
 fn states_and_limits_whose_products_overflow_are_refused() {
     let limits = Limits::symmetric(3.5e59, 3.5e59, 3.4e59);
     let problem = Problem { start: State::rest(-3.4e59), target: State::rest(3.5e59), limits };
-    let answer = synchronised(&[problem], &mut [Profile::hold(0.0)], Timing::default());
+    let answer = synchronised(&[problem], &mut [Profile::hold(0.0)], PlanOptions::default());
     assert_eq!(answer, Err(PlanError::NotRepresentable { axis: 0 }));
 }
 
@@ -121,7 +121,7 @@ fn states_and_limits_whose_products_overflow_are_refused() {
 fn limits_that_are_beyond_all_measure_are_refused() {
     let limits = Limits::symmetric(8.2e136, 8.2e136, 6.8e136);
     let problem = Problem { start: State::rest(0.0), target: State::rest(0.0), limits };
-    let answer = synchronised(&[problem], &mut [Profile::hold(0.0)], Timing::default());
+    let answer = synchronised(&[problem], &mut [Profile::hold(0.0)], PlanOptions::default());
     assert_eq!(answer, Err(PlanError::NotRepresentable { axis: 0 }));
 }
 
@@ -132,8 +132,12 @@ fn a_cycle_that_is_next_to_nothing_is_refused() {
     let problem = Problem { start: State::rest(0.0), target: State::rest(1.0), limits };
     for (cycle_s, minimum_duration_s) in [(4.8e-299, 1.6e11), (1e-31, 0.0), (1e31, 0.0), (0.001, 1e31)] {
         let synchronisation = Synchronisation::Independent;
-        let timing =
-            Timing { cycle_s: Some(cycle_s), minimum_duration_s, synchronisation, ..Timing::default() };
+        let timing = PlanOptions {
+            cycle_s: Some(cycle_s),
+            minimum_duration_s,
+            synchronisation,
+            ..PlanOptions::default()
+        };
         let answer = synchronised(&[problem], &mut [Profile::hold(0.0)], timing);
         assert_eq!(answer, Err(PlanError::InvalidTiming));
     }
@@ -145,7 +149,7 @@ fn a_motion_that_lasts_next_to_no_time_is_where_it_should_be() {
     let start = State { position: 1.5e11, velocity: 3.399_986_479_566_3e-311, acceleration: 1.5e11 };
     let target = State { velocity: 3.399_986_479_656e-311, ..start };
     let problem = Problem { start, target, limits: Limits::symmetric(1.6e11, 1.6e11, 1.6e11) };
-    let timing = Timing { minimum_duration_s: 2e-307, ..Timing::default() };
+    let timing = PlanOptions { minimum_duration_s: 2e-307, ..PlanOptions::default() };
     let mut profiles = [Profile::hold(0.0)];
     synchronised_velocity(&[problem], &mut profiles, timing).unwrap();
     for part in [0.0, 0.5, 1.0] {
@@ -165,7 +169,7 @@ fn a_motion_that_takes_no_time_beyond_a_position_limit_is_waited_for_or_refused(
     let target = State { position: 2.2e-106, velocity: 0.0, acceleration: 1.331_267_540_180_239_4e-302 };
     let problem = Problem { start: State::rest(0.0), target, limits };
     let mut profiles = [Profile::hold(0.0)];
-    let answer = synchronised(&[problem], &mut profiles, Timing::default());
+    let answer = synchronised(&[problem], &mut profiles, PlanOptions::default());
     assert!(answer.is_ok() || matches!(answer, Err(PlanError::PositionBeyondLimit { .. })), "{answer:?}");
     assert!(profiles[0].duration_s() >= 0.0 && are_numbers(&profiles));
 }

@@ -1,8 +1,8 @@
 //! Commands in the counts of an encoder (`otg.md` section 4, 8).
 
 use core::f64::consts::TAU;
-use takt_rt::plan::{Limits, Problem, Profile, State, Timing, position, synchronised};
-use takt_rt::units::{Scale, ScaleParameters};
+use takt_rt::plan::{Limits, PlanOptions, Problem, Profile, State, position, synchronised};
+use takt_rt::{Scale, ScaleParameters};
 
 const CYCLE_S: f64 = 0.001;
 
@@ -64,7 +64,7 @@ fn counts_do_not_drift() {
         let problem = |start| [Problem { start, target: State::rest(*target), limits }];
         let mut cycles = 0_u32;
         while command != State::rest(*target) {
-            synchronised(&problem(command), &mut profiles, Timing::default()).unwrap();
+            synchronised(&problem(command), &mut profiles, PlanOptions::default()).unwrap();
             command = profiles[0].sample(CYCLE_S);
             cycles += 1;
             assert!(cycles < 2000, "{command:?}");

@@ -5,7 +5,7 @@ use super::checker::{Arrival, judge};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use takt_rt::plan::{
-    Limits, PlanError, Problem, Profile, Return, State, Synchronisation, Timing, position, stop,
+    Limits, PlanError, PlanOptions, Problem, Profile, Return, State, Synchronisation, position, stop,
     synchronised, velocity,
 };
 
@@ -44,7 +44,7 @@ pub fn problem() -> impl Strategy<Value = Problem> {
     })
 }
 
-fn plan(problems: &[Problem], timing: Timing) -> (f64, Vec<Profile>) {
+fn plan(problems: &[Problem], timing: PlanOptions) -> (f64, Vec<Profile>) {
     let mut profiles = vec![Profile::hold(0.0); problems.len()];
     let duration_s = synchronised(problems, &mut profiles, timing).unwrap();
     (duration_s, profiles)
@@ -111,7 +111,7 @@ proptest! {
 
     #[test]
     fn axes_arrive_together_as_soon_as_all_can(problems in prop::collection::vec(problem(), 1..8)) {
-        let (duration_s, profiles) = plan(&problems, Timing::default());
+        let (duration_s, profiles) = plan(&problems, PlanOptions::default());
         let slowest_s = profiles.iter().map(Profile::minimum_duration_s).fold(0.0, f64::max);
         prop_assert!(duration_s >= slowest_s);
         let mut ends = profiles.iter().flat_map(|profile| profile.blocked().iter().map(|blocked| blocked.before_s));
@@ -126,7 +126,7 @@ proptest! {
     fn any_duration_that_is_not_blocked_is_possible(problem in problem(), factor in 1.0..2.0_f64) {
         let fastest = position(&problem).unwrap();
         let wanted_s = fastest.duration_s() * factor;
-        let (duration_s, profiles) = plan(&[problem], Timing { minimum_duration_s: wanted_s, ..Timing::default() });
+        let (duration_s, profiles) = plan(&[problem], PlanOptions { minimum_duration_s: wanted_s, ..PlanOptions::default() });
         prop_assert_eq!(judge(&problem, &profiles[0], Arrival::State), Ok(()));
         match fastest.blocked().iter().find(|blocked| blocked.after_s < wanted_s && wanted_s < blocked.before_s) {
             Some(blocked) => prop_assert_eq!(duration_s, blocked.before_s),
@@ -199,7 +199,7 @@ proptest! {
     #[test]
     fn the_duration_is_a_multiple_of_the_cycle(problems in prop::collection::vec(problem(), 1..4), independent: bool) {
         let synchronisation = if independent { Synchronisation::Independent } else { Synchronisation::Time };
-        let (duration_s, profiles) = plan(&problems, Timing { cycle_s: Some(0.004), synchronisation, ..Timing::default() });
+        let (duration_s, profiles) = plan(&problems, PlanOptions { cycle_s: Some(0.004), synchronisation, ..PlanOptions::default() });
         for (problem, profile) in problems.iter().zip(&profiles) {
             let cycles = profile.duration_s() / 0.004;
             prop_assert!(profile.duration_s() <= duration_s && (cycles - cycles.round()).abs() < 1e-6);
@@ -232,7 +232,7 @@ proptest! {
             })
             .collect();
         let mut profiles = vec![Profile::hold(0.0); problems.len()];
-        match synchronised(&problems, &mut profiles, Timing::default()) {
+        match synchronised(&problems, &mut profiles, PlanOptions::default()) {
             Ok(duration_s) => {
                 for (problem, profile) in problems.iter().zip(&profiles) {
                     prop_assert_eq!(profile.duration_s(), duration_s);
@@ -268,7 +268,7 @@ proptest! {
         let keeps_velocity =
             speeds.max <= problem.limits.velocity_max && speeds.min >= problem.limits.velocity_min;
         let can_stop = range.max <= high && range.min >= low && keeps_velocity;
-        let answer = synchronised(&[problem], &mut profiles, Timing::default());
+        let answer = synchronised(&[problem], &mut profiles, PlanOptions::default());
         prop_assert!(answer.is_ok() || !can_stop, "{answer:?}");
     }
 
@@ -330,7 +330,7 @@ proptest! {
     ) {
         let start = state(0.0, vmax + excess, if excess < 0.1 { a0.max(0.0) } else { 0.0 });
         let problem = Problem { start, target: State::rest(1000.0), limits: Limits::symmetric(vmax, amax, jmax) };
-        let timing = Timing { return_to_limits: Return::Settled, ..Timing::default() };
+        let timing = PlanOptions { return_to_limits: Return::Settled, ..PlanOptions::default() };
         let (duration_s, profiles) = plan(&[problem], timing);
         prop_assert_eq!(judge(&problem, &profiles[0], Arrival::State), Ok(()));
         let mut at_limit = false;
@@ -418,7 +418,8 @@ fn a_lower_velocity_limit_while_cruising_does_not_reverse_the_joint() {
         target: State::rest(5.0),
         limits: Limits::symmetric(0.5, 10.0, 20.0),
     };
-    let settled = plan(&[problem], Timing { return_to_limits: Return::Settled, ..Timing::default() }).1[0];
+    let settled =
+        plan(&[problem], PlanOptions { return_to_limits: Return::Settled, ..PlanOptions::default() }).1[0];
     assert_eq!(judge(&problem, &settled, Arrival::State), Ok(()));
     assert!(settled.extrema().velocity.min >= 0.0);
     // As fast as possible, it is back at 0.5 rad/s sooner but goes on to −0.5 rad/s.
@@ -443,7 +444,7 @@ fn discrete_durations_hit_a_moving_target_in_every_mode() {
         ([moving, beside], Synchronisation::Phase),
         ([moving, beside], Synchronisation::Straight),
     ] {
-        let timing = Timing { cycle_s: Some(0.001), synchronisation, ..Timing::default() };
+        let timing = PlanOptions { cycle_s: Some(0.001), synchronisation, ..PlanOptions::default() };
         for (problem, profile) in problems.iter().zip(plan(&problems, timing).1) {
             assert_eq!(judge(problem, &profile, Arrival::State), Ok(()));
             let cycles = profile.duration_s() / 0.001;
@@ -471,7 +472,7 @@ fn a_straight_line_is_kept_by_random_motions_from_rest_to_rest_and_planned_anew_
                 limits: all_limits[axis],
             })
             .collect();
-        let timing = Timing { synchronisation: Synchronisation::Straight, ..Timing::default() };
+        let timing = PlanOptions { synchronisation: Synchronisation::Straight, ..PlanOptions::default() };
         let (total_s, mut profiles) = plan(&problems, timing);
         for cycle in 0..20 {
             for ((axis, problem), profile) in problems.iter_mut().enumerate().zip(&profiles) {
@@ -498,7 +499,7 @@ fn a_motion_off_the_line_is_refused_in_the_strict_mode_with_its_axis() {
     let limits = Limits::symmetric(1.0, 3.0, 30.0);
     let good = Problem { start: State::rest(0.0), target: State::rest(1.0), limits };
     let bad = Problem { start: state(0.0, 0.3, 0.0), target: State::rest(0.5), limits };
-    let timing = Timing { synchronisation: Synchronisation::Straight, ..Timing::default() };
+    let timing = PlanOptions { synchronisation: Synchronisation::Straight, ..PlanOptions::default() };
     let answer = synchronised(&[good, bad], &mut [Profile::hold(0.0); 2], timing);
     assert_eq!(answer, Err(PlanError::NotStraight { axis: 1 }));
 }
@@ -516,7 +517,7 @@ fn an_axis_with_a_limited_jerk_does_not_follow_the_leaps_of_one_without() {
         target: State::rest(0.25),
         limits: Limits::symmetric(1.0, 8.0, 40.0),
     };
-    let timing = Timing { synchronisation: Synchronisation::Phase, ..Timing::default() };
+    let timing = PlanOptions { synchronisation: Synchronisation::Phase, ..PlanOptions::default() };
     for problems in [[leaping, other], [other, leaping]] {
         for (problem, profile) in problems.iter().zip(plan(&problems, timing).1) {
             assert_eq!(judge(problem, &profile, Arrival::State), Ok(()));

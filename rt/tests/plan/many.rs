@@ -5,25 +5,25 @@
 use super::checker::{Arrival, judge};
 use super::families::{AXES, FAMILIES, Family};
 use super::random::Random;
-use takt_rt::plan::{Problem, Profile, Synchronisation, Timing, synchronised, synchronised_velocity};
+use takt_rt::plan::{PlanOptions, Problem, Profile, Synchronisation, synchronised, synchronised_velocity};
 
 /// How many problems are solved when nobody asks for more.
 const PROBLEMS: u64 = 100_000;
 
-fn timing(random: &mut Random) -> Timing {
+fn timing(random: &mut Random) -> PlanOptions {
     let modes =
         [Synchronisation::Time, Synchronisation::Time, Synchronisation::Phase, Synchronisation::Independent];
     let choice = random.uniform(0.0, 1.0);
-    Timing {
+    PlanOptions {
         synchronisation: modes[(random.next() % 4) as usize],
         cycle_s: (choice < 0.1).then_some(0.001),
         minimum_duration_s: if (0.1..0.2).contains(&choice) { random.uniform(1.0, 10.0) } else { 0.0 },
-        ..Timing::default()
+        ..PlanOptions::default()
     }
 }
 
 /// Plans and judges; says what is wrong.
-fn solve(family: Family, problems: &[Problem], timing: Timing) -> Result<(), String> {
+fn solve(family: Family, problems: &[Problem], timing: PlanOptions) -> Result<(), String> {
     let mut profiles = vec![Profile::hold(0.0); problems.len()];
     let arrival = family.arrival();
     let planner = if arrival == Arrival::State { synchronised } else { synchronised_velocity };

@@ -3,8 +3,8 @@
 use super::checker::{Arrival, judge};
 use serde_json::Value;
 use takt_rt::plan::{
-    Limits, Problem, Profile, State, Synchronisation, Timing, position, synchronised, synchronised_velocity,
-    velocity,
+    Limits, PlanOptions, Problem, Profile, State, Synchronisation, position, synchronised,
+    synchronised_velocity, velocity,
 };
 
 fn number(value: &Value) -> f64 {
@@ -45,7 +45,7 @@ fn agrees(own_s: f64, oracle_s: f64) -> bool {
 /// Says where the planner and the oracle disagree, or what is wrong with the trajectory.
 fn compare(line: &Value) -> Result<(), String> {
     let problems = problems(line);
-    let timing = Timing {
+    let timing = PlanOptions {
         synchronisation: match line["sync"].as_str() {
             Some("none") => Synchronisation::Independent,
             Some("phase") => Synchronisation::Phase,
@@ -53,7 +53,7 @@ fn compare(line: &Value) -> Result<(), String> {
         },
         minimum_duration_s: line["min_duration"].as_f64().unwrap_or(0.0),
         cycle_s: line["dt"].as_f64(),
-        ..Timing::default()
+        ..PlanOptions::default()
     };
     let mut profiles = vec![Profile::hold(0.0); problems.len()];
     let (answer, arrival) = match line["interface"].as_str() {

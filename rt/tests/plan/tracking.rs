@@ -3,7 +3,7 @@
 use nalgebra::vector;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
-use takt_rt::plan::{GroupState, Limit, Limits, PlanError, Problem, State, Timing, Trajectory};
+use takt_rt::plan::{GroupState, Limit, Limits, PlanError, PlanOptions, Problem, State, Trajectory};
 
 /// The limits of a joint of an arm.
 const ARM: Limits = Limits::symmetric(2.5, 15.0, 1000.0);
@@ -95,8 +95,9 @@ proptest! {
 fn a_group_that_would_leave_its_position_limits_is_refused_with_a_stop() {
     let limits = [ARM, ARM.with_position(-1.0, 1.0)];
     let start = GroupState { velocity: vector![0.5, 2.0], ..GroupState::rest(vector![0.0, 0.9]) };
-    let refusal = Trajectory::plan(&start, &GroupState::rest(vector![1.0, 0.0]), &limits, Timing::default())
-        .unwrap_err();
+    let refusal =
+        Trajectory::plan(&start, &GroupState::rest(vector![1.0, 0.0]), &limits, PlanOptions::default())
+            .unwrap_err();
     assert_eq!(refusal.error, PlanError::PositionBeyondLimit { axis: 1, limit: Limit::PositionMax });
     let stop = refusal.stop.unwrap();
     let end = stop.sample(stop.duration_s());

@@ -4,8 +4,8 @@ use super::checker::{Arrival, judge};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use takt_rt::plan::{
-    Limit, Limits, PlanError, Problem, Profile, State, Synchronisation, Timing, position, stop, synchronised,
-    synchronised_velocity,
+    Limit, Limits, PlanError, PlanOptions, Problem, Profile, State, Synchronisation, position, stop,
+    synchronised, synchronised_velocity,
 };
 
 fn limits() -> impl Strategy<Value = Limits> {
@@ -37,7 +37,7 @@ fn problem_from_rest() -> impl Strategy<Value = Problem> {
     })
 }
 
-fn plan(problems: &[Problem], timing: Timing) -> Result<(f64, Vec<Profile>), PlanError> {
+fn plan(problems: &[Problem], timing: PlanOptions) -> Result<(f64, Vec<Profile>), PlanError> {
     let mut profiles = vec![Profile::hold(0.0); problems.len()];
     let duration_s = synchronised(problems, &mut profiles, timing)?;
     Ok((duration_s, profiles))
@@ -78,7 +78,7 @@ proptest! {
 
     #[test]
     fn axes_arrive_together_as_soon_as_the_slowest_can(problems in prop::collection::vec(problem(), 1..8)) {
-        let (duration_s, profiles) = plan(&problems, Timing::default()).unwrap();
+        let (duration_s, profiles) = plan(&problems, PlanOptions::default()).unwrap();
         let slowest_s = profiles.iter().map(Profile::minimum_duration_s).fold(0.0, f64::max);
         let blocked = profiles.iter().flat_map(Profile::blocked).any(|blocked| blocked.after_s < slowest_s && slowest_s < blocked.before_s);
         prop_assert_eq!(duration_s != slowest_s, blocked);
@@ -94,7 +94,7 @@ proptest! {
     fn any_duration_that_is_not_blocked_is_possible_and_a_blocked_one_is_prolonged(problem in problem(), factor in 1.0..3.0_f64) {
         let fastest = position(&problem).unwrap();
         let wanted_s = fastest.duration_s() * factor;
-        let (duration_s, profiles) = plan(&[problem], Timing { minimum_duration_s: wanted_s, ..Timing::default() }).unwrap();
+        let (duration_s, profiles) = plan(&[problem], PlanOptions { minimum_duration_s: wanted_s, ..PlanOptions::default() }).unwrap();
         prop_assert_eq!(judge(&problem, &profiles[0], Arrival::State), Ok(()));
         match fastest.blocked().iter().find(|blocked| blocked.after_s < wanted_s && wanted_s < blocked.before_s) {
             Some(blocked) => prop_assert_eq!(duration_s, blocked.before_s),
@@ -105,7 +105,7 @@ proptest! {
     #[test]
     fn the_duration_is_a_multiple_of_the_cycle(problems in prop::collection::vec(problem(), 1..4), independent: bool) {
         let synchronisation = if independent { Synchronisation::Independent } else { Synchronisation::Time };
-        let timing = Timing { cycle_s: Some(0.004), synchronisation, ..Timing::default() };
+        let timing = PlanOptions { cycle_s: Some(0.004), synchronisation, ..PlanOptions::default() };
         let (duration_s, profiles) = plan(&problems, timing).unwrap();
         prop_assert!(profiles.iter().all(|profile| profile.duration_s() <= duration_s));
         for (problem, profile) in problems.iter().zip(&profiles) {
@@ -136,7 +136,7 @@ proptest! {
 
     #[test]
     fn planning_anew_in_every_cycle_arrives_at_the_same_time(problems in prop::collection::vec(problem(), 1..5), cycles in 5..400_u32) {
-        let (total_s, mut profiles) = plan(&problems, Timing::default()).unwrap();
+        let (total_s, mut profiles) = plan(&problems, PlanOptions::default()).unwrap();
         let mut problems = problems;
         let mut time_s = 0.0;
         let cycle_s = total_s / f64::from(cycles);
@@ -144,7 +144,7 @@ proptest! {
             for (problem, profile) in problems.iter_mut().zip(&profiles) {
                 problem.start = profile.sample(cycle_s);
             }
-            let remaining_s = synchronised(&problems, &mut profiles, Timing::default()).unwrap();
+            let remaining_s = synchronised(&problems, &mut profiles, PlanOptions::default()).unwrap();
             time_s += cycle_s;
             // Where a rounding error asks for a detour, its time is the square root of the error.
             prop_assert!(close(time_s + remaining_s, total_s, 1e-6), "{} {total_s}", time_s + remaining_s);
@@ -190,7 +190,7 @@ proptest! {
     #[test]
     fn target_velocities_are_reached_together(problems in prop::collection::vec(problem(), 1..8)) {
         let mut profiles = vec![Profile::hold(0.0); problems.len()];
-        let duration_s = synchronised_velocity(&problems, &mut profiles, Timing::default()).unwrap();
+        let duration_s = synchronised_velocity(&problems, &mut profiles, PlanOptions::default()).unwrap();
         for (problem, profile) in problems.iter().zip(&profiles) {
             prop_assert_eq!(profile.duration_s(), duration_s);
             prop_assert_eq!(judge(problem, profile, Arrival::Velocity), Ok(()));
@@ -202,7 +202,7 @@ proptest! {
         let high = problem.start.position.max(problem.target.position) + room;
         let problem = Problem { limits: problem.limits.with_position(f64::NEG_INFINITY, high), ..problem };
         let mut profiles = [Profile::hold(0.0)];
-        match synchronised(&[problem], &mut profiles, Timing::default()) {
+        match synchronised(&[problem], &mut profiles, PlanOptions::default()) {
             Ok(_) => prop_assert!(profiles[0].extrema().position.max <= high + 1e-9),
             Err(error) => {
                 prop_assert_eq!(error, PlanError::PositionBeyondLimit { axis: 0, limit: Limit::PositionMax });
@@ -245,14 +245,14 @@ fn an_axis_that_cannot_wait_makes_the_others_wait() {
     let alone = [position(&passing).unwrap(), position(&other).unwrap()];
     let blocked = alone[0].blocked()[0];
     assert!(blocked.after_s < alone[1].duration_s() && alone[1].duration_s() < blocked.before_s);
-    let (duration_s, _) = plan(&[passing, other], Timing::default()).unwrap();
+    let (duration_s, _) = plan(&[passing, other], PlanOptions::default()).unwrap();
     assert_eq!(duration_s, blocked.before_s);
 }
 
 #[test]
 fn what_is_wrong_with_a_problem_is_said_with_its_axis() {
     let good = Problem { start: State::rest(0.0), target: State::rest(1.0), limits: SECOND_ORDER };
-    let refused = |bad: Problem| plan(&[good, bad], Timing::default()).unwrap_err();
+    let refused = |bad: Problem| plan(&[good, bad], PlanOptions::default()).unwrap_err();
     let zero = Limits { velocity_max: 0.0, ..SECOND_ORDER };
     assert_eq!(
         refused(Problem { limits: zero, ..good }),
@@ -264,10 +264,10 @@ fn what_is_wrong_with_a_problem_is_said_with_its_axis() {
     assert!(matches!(refused(nowhere), PlanError::NotFinite { axis: 1, .. }));
     let huge = Problem { target: State::rest(1e308), start: State::rest(-1e308), ..good };
     assert_eq!(refused(huge), PlanError::NotRepresentable { axis: 1 });
-    let length = synchronised(&[good], &mut [], Timing::default());
+    let length = synchronised(&[good], &mut [], PlanOptions::default());
     assert_eq!(length, Err(PlanError::LengthMismatch { expected: 1, received: 0 }));
-    let timing = Timing { minimum_duration_s: -1.0, ..Timing::default() };
+    let timing = PlanOptions { minimum_duration_s: -1.0, ..PlanOptions::default() };
     assert_eq!(plan(&[good], timing).unwrap_err(), PlanError::InvalidTiming);
-    let timing = Timing { cycle_s: Some(0.0), ..Timing::default() };
+    let timing = PlanOptions { cycle_s: Some(0.0), ..PlanOptions::default() };
     assert_eq!(plan(&[good], timing).unwrap_err(), PlanError::InvalidTiming);
 }

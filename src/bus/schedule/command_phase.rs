@@ -4,10 +4,10 @@
 //! leaves of the slot. It is divided so that both wake-ups of the controller may be equally late: the one for SYNC,
 //! which the feedback follows, and the one for the set-points, after which [`COMPUTE_RESERVE_NS`] are kept for
 //! computing. That maximises the latency that the slot stands. What the feedback is given ends at a tenth of the
-//! period, since a SYNC that is later than that is not sent at all ([`takt_rt::cycle::SlotPlan`]); all beyond goes to
+//! period, since a SYNC that is later than that is not sent at all ([`takt_rt::SlotPlan`]); all beyond goes to
 //! the set-points.
 
-use takt_rt::cycle::SlotPlan;
+use takt_rt::SlotPlan;
 use thiserror::Error;
 
 use super::{BusSchedule, COMPUTE_RESERVE_NS, analyse_bus, remedy, text};

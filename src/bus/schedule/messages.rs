@@ -1,9 +1,7 @@
 //! Every message that a configuration puts on a bus.
 
 use serde::Serialize;
-use takt_rt::axis::Cadence;
-use takt_rt::frame::Id;
-use takt_rt::time_of_day::TIME_ID;
+use takt_rt::{Id, TIME_ID, TransmissionType};
 
 use crate::bus::frame_time::FrameShape;
 use crate::config::{Axis, Config, DriveFamily, Master};
@@ -154,7 +152,7 @@ fn axis_messages(index: usize, axis: &Axis, period_ns: u64) -> Vec<BusMessage> {
     }));
     // A controlword that is sent when it changes goes to one axis in a cycle while they are enabled, and the group
     // stands still then: its delay does no harm, and it is not part of the sums.
-    let every_cycle = data.commands.iter().filter(|pdo| pdo.cadence == Cadence::EveryCycle);
+    let every_cycle = data.commands.iter().filter(|pdo| pdo.cadence == TransmissionType::EveryCycle);
     messages.extend(every_cycle.map(|pdo| of_axis(MessageKind::SetPoint, pdo, period_ns)));
     messages.extend(axis.heartbeat_ns.map(|heartbeat_ns| {
         let id = Id::canopen(0x700, axis.node);

@@ -1,6 +1,6 @@
 //! Whether PDO mappings name objects that are there, can be mapped, and have the length that the mapping says.
 
-use takt_rt::pdo::MappedObject;
+use takt_rt::MappedObject;
 
 use super::data_type::{DataType, ValueKind};
 use super::dictionary::{DictionaryEntry, ObjectDictionary};

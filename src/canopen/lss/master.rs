@@ -1,7 +1,6 @@
 //! The master's side of LSS: one task at a time, every wait bounded.
 
-use takt_rt::frame::Frame;
-use takt_rt::time::Nanoseconds;
+use takt_rt::{Frame, Nanoseconds};
 
 use super::LssAddress;
 use super::fast_scan::{FastScan, Known, Scanned};

@@ -1,6 +1,6 @@
 //! The messages of LSS (CiA 305, section 6).
 
-use takt_rt::frame::{Frame, Id};
+use takt_rt::{Frame, Id};
 
 /// What the master sends under.
 const MASTER: u16 = 0x7E5;

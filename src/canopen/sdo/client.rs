@@ -4,8 +4,7 @@
 //! stale reply under way, which a later transfer of the same object could take for its own: after a repeated transfer
 //! the client therefore stays quiet until no reply can be outstanding any more.
 
-use takt_rt::frame::Frame;
-use takt_rt::time::Nanoseconds;
+use takt_rt::{Frame, Nanoseconds};
 
 use super::abort::AbortCode;
 use super::exchange::{Exchange, Step};

@@ -1,6 +1,6 @@
 //! One transfer from its initiation to its end, without regard to time.
 
-use takt_rt::frame::{Frame, Id};
+use takt_rt::{Frame, Id};
 
 use super::abort::AbortCode;
 use super::block_download::{BlockDownload, Next};

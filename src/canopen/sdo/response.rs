@@ -1,6 +1,6 @@
 //! What a server sends.
 
-use takt_rt::frame::{Frame, Id};
+use takt_rt::{Frame, Id};
 
 use super::abort::AbortCode;
 use super::wire::{

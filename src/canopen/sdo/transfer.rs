@@ -1,6 +1,6 @@
 //! What can be transferred, what comes of it, and why it may fail.
 
-use takt_rt::time::Nanoseconds;
+use takt_rt::Nanoseconds;
 
 use super::abort::AbortCode;
 use crate::canopen::object::{DataType, ObjectAddress};

@@ -1,6 +1,6 @@
 //! The parts that requests and responses share: addresses, and data of at most four or seven bytes.
 
-use takt_rt::frame::{Frame, FrameKind};
+use takt_rt::{Frame, FrameKind};
 
 use crate::canopen::object::ObjectAddress;
 

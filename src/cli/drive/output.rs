@@ -8,8 +8,7 @@ use serde_json::json;
 
 use takt::commission::bus_session::Seen;
 use takt::commission::{Event, Failed, Failure, Reading, Report, Subject, meaning};
-use takt_rt::frame::Frame;
-use takt_rt::time::Nanoseconds;
+use takt_rt::{Frame, Nanoseconds};
 
 use super::super::exit::Exit;
 use super::super::print;

@@ -8,7 +8,7 @@ use takt::commission::{Failure, Request, Subject, bus_session, procedure};
 use takt::controller::VirtualClock;
 use takt::sim::SimulatedBus;
 use takt_rt::linux::MonotonicClock;
-use takt_rt::port::{BusPort, BusState};
+use takt_rt::{BusPort, BusState};
 
 use super::super::exit::Exit;
 use super::super::interruption;

@@ -14,7 +14,7 @@ use takt::config::{Interface, Quantity};
 use takt::controller::VirtualClock;
 use takt::sim::lss::{LssBus, LssDevice};
 use takt_rt::linux::MonotonicClock;
-use takt_rt::port::{BusPort, Clock};
+use takt_rt::{BusPort, Clock};
 
 use super::exit::Exit;
 use super::interruption;

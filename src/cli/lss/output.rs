@@ -5,7 +5,7 @@ use serde::Serialize;
 use takt::canopen::lss::{LssAddress, LssError, LssRequest, LssResponse};
 use takt::commission::bus_session::Seen;
 use takt::commission::layer_settings::LayerSettingFailure;
-use takt_rt::time::Nanoseconds;
+use takt_rt::Nanoseconds;
 
 use super::super::exit::Exit;
 use super::super::print;

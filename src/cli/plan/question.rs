@@ -3,7 +3,7 @@
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 use takt_rt::plan::{
-    Limits, Problem, Profile, State, Synchronisation, Timing, synchronised, synchronised_velocity,
+    Limits, PlanOptions, Problem, Profile, State, Synchronisation, synchronised, synchronised_velocity,
 };
 
 use super::answer::Answer;
@@ -174,7 +174,7 @@ impl Question {
     pub fn solve(&self) -> (Answer, Option<Vec<Profile>>) {
         let problems = self.problems();
         let mut profiles = vec![Profile::hold(0.0); problems.len()];
-        let timing = Timing {
+        let timing = PlanOptions {
             synchronisation: match self.sync {
                 Sync::Time => Synchronisation::Time,
                 Sync::Phase => Synchronisation::Phase,
@@ -183,7 +183,7 @@ impl Question {
             },
             minimum_duration_s: self.min_duration.unwrap_or(0.0),
             cycle_s: self.dt,
-            ..Timing::default()
+            ..PlanOptions::default()
         };
         let planned = match self.interface {
             Interface::Position => synchronised(&problems, &mut profiles, timing),

@@ -1,8 +1,7 @@
 //! What led to the stop, and what came of it, as a picture.
 
 use takt::telemetry::{Recorded, RecordedError};
-use takt_rt::record::{AxisRecord, CycleRecord, Timing};
-use takt_rt::time::NANOSECONDS_PER_SECOND;
+use takt_rt::{AxisRecord, CycleRecord, CycleTiming, NANOSECONDS_PER_SECOND};
 
 use crate::cli::chart::{COLOURS, Chart, Curve, Panel};
 
@@ -24,7 +23,8 @@ pub fn draw(recorded: &Recorded, axis: Option<usize>) -> Result<String, Recorded
         cycles.iter().filter_map(|record| Some((time_s(record.timing.slot), value(record)?))).collect()
     };
     let of_axis = |value: fn(&AxisRecord) -> f64| points(&|record| record.axes().get(axis?).map(value));
-    let of_timing = |value: fn(&Timing) -> u64| points(&|record| Some(value(&record.timing) as f64 * 1e-3));
+    let of_timing =
+        |value: fn(&CycleTiming) -> u64| points(&|record| Some(value(&record.timing) as f64 * 1e-3));
     let panel = |name: String, curves: Vec<(&str, Vec<(f64, f64)>)>| {
         let coloured = || COLOURS.into_iter().zip(&curves);
         Panel {

@@ -1,7 +1,6 @@
 //! Torque on and torque off, and everything that must be right before an eRob moves.
 
-use takt_rt::cia402::{OperationMode, State, controlword};
-use takt_rt::time::Nanoseconds;
+use takt_rt::{DriveState, Nanoseconds, OperationMode, controlword};
 
 use super::reading;
 use super::state::modes_words;
@@ -26,8 +25,8 @@ const HEARTBEAT_TIMEOUT_MS: i64 = 500;
 const NMT_PAUSE_NS: Nanoseconds = 20_000_000;
 
 /// The state of the drive.
-pub async fn state(c: &Conversation) -> Result<State, Failure> {
-    Ok(State::decode(c.read(&STATUSWORD).await? as u16))
+pub async fn state(c: &Conversation) -> Result<DriveState, Failure> {
+    Ok(DriveState::decode(c.read(&STATUSWORD).await? as u16))
 }
 
 /// The right drive, without a fault.
@@ -95,13 +94,13 @@ pub async fn enable(c: &Conversation, s: &Subject) -> Result<i64, Failure> {
     c.write(&TARGET_TORQUE, 0).await?;
     c.step("enable");
     for (word, wanted, what) in [
-        (controlword::SHUTDOWN, State::ReadyToSwitchOn, "ready to switch on"),
-        (controlword::SWITCH_ON, State::SwitchedOn, "switched on"),
-        (controlword::ENABLE_OPERATION, State::OperationEnabled, "operation enabled"),
+        (controlword::SHUTDOWN, DriveState::ReadyToSwitchOn, "ready to switch on"),
+        (controlword::SWITCH_ON, DriveState::SwitchedOn, "switched on"),
+        (controlword::ENABLE_OPERATION, DriveState::OperationEnabled, "operation enabled"),
     ] {
         c.write(&CONTROLWORD, word.into()).await?;
         c.wait_for(&STATUSWORD, what, STATE_NS, |value| {
-            let state = State::decode(value as u16);
+            let state = DriveState::decode(value as u16);
             state == wanted || state.is_faulted()
         })
         .await?;
@@ -139,7 +138,7 @@ pub async fn come_to_rest(c: &Conversation, s: &Subject) -> Result<(), Failure> 
 pub async fn torque_off(c: &Conversation) -> Result<(), Failure> {
     c.step("disable");
     c.write(&CONTROLWORD, controlword::DISABLE_VOLTAGE.into()).await?;
-    let has_none = |word: i64| !State::decode(word as u16).has_torque();
+    let has_none = |word: i64| !DriveState::decode(word as u16).has_torque();
     c.wait_for(&STATUSWORD, "a state without torque", STATE_NS, has_none).await.map(|_| ())
 }
 

@@ -1,7 +1,6 @@
 //! Clearing a fault: the rising edge of controlword bit 7, and for the multi-turn battery what goes before it.
 
-use takt_rt::cia402::{State, controlword};
-use takt_rt::time::Nanoseconds;
+use takt_rt::{DriveState, Nanoseconds, controlword};
 
 use super::enabling::state;
 use super::reading::{advice, error_code, in_words, summary};
@@ -46,7 +45,7 @@ pub async fn clear(c: &Conversation, s: &Subject, is_agreed: bool) -> Result<Rep
     c.write(&CONTROLWORD, controlword::DISABLE_VOLTAGE.into()).await?;
     c.write(&CONTROLWORD, controlword::FAULT_RESET.into()).await?;
     c.pause(EDGE_NS).await?;
-    let is_gone = |word: i64| !State::decode(word as u16).is_faulted();
+    let is_gone = |word: i64| !DriveState::decode(word as u16).is_faulted();
     let cleared = c.wait_for(&STATUSWORD, "the end of the fault", CLEARING_NS, is_gone).await;
     c.write(&CONTROLWORD, controlword::DISABLE_VOLTAGE.into()).await?;
     match cleared {

@@ -1,7 +1,6 @@
 //! Homing of an eRob: firmware that declares it may take the present position as zero. The known firmware does not.
 
-use takt_rt::cia402::{OperationMode, controlword, statusword};
-use takt_rt::time::Nanoseconds;
+use takt_rt::{Nanoseconds, OperationMode, controlword, statusword};
 
 use super::motion::with_torque;
 use super::objects::{HOME_OFFSET, HOMING_METHOD};

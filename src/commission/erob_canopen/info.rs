@@ -1,6 +1,6 @@
 //! Who an eRob is and how it fares.
 
-use takt_rt::cia402::State;
+use takt_rt::DriveState;
 
 use super::objects::*;
 use super::reading::{self, in_words};
@@ -14,7 +14,7 @@ use crate::commission::report::Report;
 use crate::commission::subject::Subject;
 use crate::drive::mode_words;
 use serde_json::json;
-use takt_rt::cia402::OperationMode;
+use takt_rt::OperationMode;
 
 /// `info`
 pub async fn info(c: &Conversation, s: &Subject) -> Result<Report, Failure> {
@@ -77,7 +77,7 @@ async fn condition(
     c.step("condition");
     let reading = reading::read(c, s, rated).await?;
     let word = reading.statusword;
-    report.add("state", "state", state_words(State::decode(word)), statusword_words(word));
+    report.add("state", "state", state_words(DriveState::decode(word)), statusword_words(word));
     report.add("statusword", "statusword", word, format!("0x{word:04X}"));
     let mode = c.read(&MODES_OF_OPERATION_DISPLAY).await?;
     let known = i8::try_from(mode).ok().and_then(OperationMode::from_number);

@@ -7,8 +7,7 @@ use crate::commission::subject::Subject;
 use crate::drive::mode_words;
 
 use super::state;
-use takt_rt::cia402::OperationMode;
-use takt_rt::frame::{Frame, Id};
+use takt_rt::{Frame, Id, OperationMode};
 
 /// 1001
 pub const ERROR_REGISTER: Object = Object::new(0x1001, 0, DataType::U8, "error register");

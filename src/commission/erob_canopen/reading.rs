@@ -1,7 +1,6 @@
 //! Where an eRob is and how it fares.
 
-use takt_rt::cia402::State;
-use takt_rt::time::Nanoseconds;
+use takt_rt::{DriveState, Nanoseconds};
 
 use super::objects::TORQUE_ACTUAL_VALUE;
 use super::state::{error_words, state_words};
@@ -42,7 +41,7 @@ pub async fn read(c: &Conversation, s: &Subject, rated: Option<f64>) -> Result<R
         torque: torque(s, rated, per_mille),
         current_a: None,
         statusword: word,
-        state: state_words(State::decode(word)),
+        state: state_words(DriveState::decode(word)),
     })
 }
 
@@ -50,9 +49,9 @@ pub async fn read(c: &Conversation, s: &Subject, rated: Option<f64>) -> Result<R
 pub async fn read_enabled(c: &Conversation, s: &Subject, rated: Option<f64>) -> Result<Reading, Failure> {
     let reading = read(c, s, rated).await?;
     c.show(reading);
-    match State::decode(reading.statusword) {
-        State::OperationEnabled => Ok(reading),
-        State::Fault | State::FaultReactionActive => Err(fault(c).await?),
+    match DriveState::decode(reading.statusword) {
+        DriveState::OperationEnabled => Ok(reading),
+        DriveState::Fault | DriveState::FaultReactionActive => Err(fault(c).await?),
         _ => Err(Failure::Disabled { statusword: reading.statusword }),
     }
 }

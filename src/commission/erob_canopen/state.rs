@@ -1,6 +1,6 @@
 //! Statusword, controlword, modes and errors of an eRob in words.
 
-use takt_rt::cia402::{Command, OperationMode, State, controlword, statusword};
+use takt_rt::{Command, DriveState, OperationMode, controlword, statusword};
 
 use crate::canopen::emcy::ErrorCode;
 use crate::drive::{erob_canopen, mode_words};
@@ -9,21 +9,21 @@ use crate::drive::{erob_canopen, mode_words};
 pub const SAVE_SIGNATURE: i64 = 0x6576_6173;
 
 /// The state of the drive in words.
-pub const fn state_words(state: State) -> &'static str {
+pub const fn state_words(state: DriveState) -> &'static str {
     match state {
-        State::NotReadyToSwitchOn => "not ready to switch on",
-        State::SwitchOnDisabled => "switch on disabled",
-        State::ReadyToSwitchOn => "ready to switch on",
-        State::SwitchedOn => "switched on",
-        State::OperationEnabled => "operation enabled",
-        State::QuickStopActive => "quick stop active",
-        State::FaultReactionActive => "fault reaction active",
-        State::Fault => "fault",
-        State::Undefined => "undefined",
+        DriveState::NotReadyToSwitchOn => "not ready to switch on",
+        DriveState::SwitchOnDisabled => "switch on disabled",
+        DriveState::ReadyToSwitchOn => "ready to switch on",
+        DriveState::SwitchedOn => "switched on",
+        DriveState::OperationEnabled => "operation enabled",
+        DriveState::QuickStopActive => "quick stop active",
+        DriveState::FaultReactionActive => "fault reaction active",
+        DriveState::Fault => "fault",
+        DriveState::Undefined => "undefined",
     }
 }
 
-/// State and bits of a statusword. Bit 7 and bit 12 are often set without a reason on this drive.
+/// DriveState and bits of a statusword. Bit 7 and bit 12 are often set without a reason on this drive.
 pub fn statusword_words(word: u16) -> String {
     let bits = [
         (statusword::WARNING, "warning"),
@@ -32,7 +32,7 @@ pub fn statusword_words(word: u16) -> String {
         (statusword::BIT_13, "following error"),
     ];
     let set = bits.iter().filter(|(bit, _)| word & bit != 0).map(|(_, name)| *name);
-    let words: Vec<&str> = std::iter::once(state_words(State::decode(word))).chain(set).collect();
+    let words: Vec<&str> = std::iter::once(state_words(DriveState::decode(word))).chain(set).collect();
     words.join(", ")
 }
 

@@ -1,6 +1,6 @@
 //! Zero and store.
 
-use takt_rt::time::Nanoseconds;
+use takt_rt::Nanoseconds;
 
 use super::enabling::state;
 use super::objects::{MULTI_TURN_RESET, STORE};

@@ -1,7 +1,7 @@
 //! Clearing an alarm, each in its own way (manual IIb.3, 5.11.2). The targets are withdrawn first: a drive that has
 //! lost its master resumes its motion by itself when the heartbeat returns.
 
-use takt_rt::time::Nanoseconds;
+use takt_rt::Nanoseconds;
 
 use super::alarm::{Alarm, Clearing};
 use super::enabling::statusword;

@@ -1,6 +1,6 @@
 //! Torque on and torque off, and everything that must be right before a YZ-AIM moves.
 
-use takt_rt::time::Nanoseconds;
+use takt_rt::Nanoseconds;
 
 use super::alarm::Alarm;
 use super::objects::{ACCELERATION, VELOCITY};

@@ -1,6 +1,6 @@
 //! Homing (manual 5.09): the mode alone starts it; bit 12 tells its end, bit 13 an error.
 
-use takt_rt::time::Nanoseconds;
+use takt_rt::Nanoseconds;
 
 use super::enabling::{self, mode};
 use super::motion::with_torque;

@@ -1,6 +1,6 @@
 //! Every motion of a YZ-AIM by SDO (manual 5.06.1, 5.06.2, 5.07.1): prepared, watched, and ended at rest.
 
-use takt_rt::time::Nanoseconds;
+use takt_rt::Nanoseconds;
 
 use super::enabling::{self, mode};
 use super::objects::ACCELERATION;

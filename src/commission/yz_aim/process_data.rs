@@ -1,6 +1,6 @@
 //! The PDOs of a YZ-AIM in words: their mapping is fixed (manual 5.08).
 
-use takt_rt::frame::Frame;
+use takt_rt::Frame;
 
 use super::words;
 use crate::commission::subject::Subject;

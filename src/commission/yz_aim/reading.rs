@@ -1,6 +1,6 @@
 //! Where a YZ-AIM is and how it fares.
 
-use takt_rt::time::Nanoseconds;
+use takt_rt::Nanoseconds;
 
 use super::alarm::Alarm;
 use super::objects::{ALARM, CURRENT, VELOCITY};

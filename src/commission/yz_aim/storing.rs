@@ -1,6 +1,6 @@
 //! Storing parameters, and what is stored: the multi-turn zero, node address, bit rate (manual V.2, V.3.B, 5.04, 5.13).
 
-use takt_rt::time::Nanoseconds;
+use takt_rt::Nanoseconds;
 
 use super::alarm::Alarm;
 use super::enabling::refuse_enabled;

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use takt_rt::record::MAX_AXES;
+use takt_rt::MAX_AXES;
 
 use super::bus::ReadBus;
 use super::control::control;

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use takt_rt::record::MAX_BUSES;
+use takt_rt::MAX_BUSES;
 
 use super::entry::{Bounds, Entry, Problems};
 use super::machine::boolean;

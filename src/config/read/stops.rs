@@ -1,6 +1,6 @@
 //! `[stops]` and `[cycle.missed_slots]`: what stops the group, and how.
 
-use takt_rt::stop::{Rule, StopCategory};
+use takt_rt::{Rule, StopCategory};
 
 use super::section::Section;
 use crate::config::defaults;

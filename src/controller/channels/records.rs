@@ -3,7 +3,7 @@
 //! and the logger sends the slot back. The slot that came back last is used first, so that as long as the logger
 //! keeps up, a handful of slots go round and stay in the cache, however many there are.
 
-use takt_rt::record::CycleRecord;
+use takt_rt::CycleRecord;
 
 use super::ring::{Consumer, Producer, ring};
 
@@ -78,13 +78,12 @@ impl RecordConsumer {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use takt_rt::record::{AxisRecord, MAX_AXES, Timing};
-    use takt_rt::stop::Phase;
+    use takt_rt::{AxisRecord, CycleTiming, MAX_AXES, Phase};
 
     fn record(slot: u64, axis_count: u8) -> CycleRecord {
         let axis = AxisRecord { position: slot as f64, ..AxisRecord::default() };
         CycleRecord {
-            timing: Timing { slot, ..Timing::default() },
+            timing: CycleTiming { slot, ..CycleTiming::default() },
             phase: Phase::Moving,
             is_commanded: true,
             axis_count,

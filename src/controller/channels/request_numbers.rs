@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use takt_rt::door::RequestId;
+use takt_rt::RequestId;
 
 /// Gives out numbers of requests. Clone it for every thread that asks.
 #[derive(Clone, Debug, Default)]

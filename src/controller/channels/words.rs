@@ -1,19 +1,18 @@
 //! How a snapshot and a streamed command are laid out in 64-bit words.
 
-use takt_rt::cia402;
-use takt_rt::door::{AxisSnapshot, RequestId, Snapshot, StreamCommand};
 use takt_rt::plan;
-use takt_rt::port::{BusHealth, BusState};
-use takt_rt::record::{MAX_AXES, MAX_BUSES};
-use takt_rt::refusal::{Answers, Objection, Refusal, RequestKind};
-use takt_rt::stop::{Origin, Phase, Rule, StopCategory, StopReason};
-use takt_rt::watch::TimingLevel;
+use takt_rt::{
+    Answers, AxisSnapshot, BusHealth, BusState, DriveState, MAX_AXES, MAX_BUSES, MotionReports, Origin,
+    Phase, RejectReason, RequestError, RequestId, RequestKind, Rule, Snapshot, StopCategory, StopCause,
+    StopReason, StreamCommand, TimingLevel,
+};
 
 use super::latest::Words;
+use super::motion_words::{MOTION_WORDS, put_motions, take_motions};
 
 /// Words of a snapshot of so many axes and buses.
 pub const fn snapshot_words(axes: usize, buses: usize) -> usize {
-    17 + 4 * Answers::EXPLAINED + 4 * axes + 7 * buses
+    17 + MOTION_WORDS + 4 * Answers::EXPLAINED + 4 * axes + 7 * buses
 }
 
 /// Words of a streamed command for so many axes.
@@ -30,9 +29,14 @@ pub const NO_SNAPSHOT: Snapshot = Snapshot {
     timing: TimingLevel::Normal,
     clamped: 0,
     dropped: 0,
-    refused: 0,
-    answers: Answers { newest: RequestId(0), taken_up: 0, refused: 0, refusals: [None; Answers::EXPLAINED] },
-    finished_move: 0,
+    rejected: 0,
+    answers: Answers {
+        newest: RequestId(0),
+        taken_up: 0,
+        rejected: 0,
+        rejections: [None; Answers::EXPLAINED],
+    },
+    motions: MotionReports { reports: [None; MotionReports::CAPACITY] },
     remaining_s: 0.0,
     stop: None,
     axis_count: 0,
@@ -41,7 +45,7 @@ pub const NO_SNAPSHOT: Snapshot = Snapshot {
         position: 0.0,
         velocity: 0.0,
         statusword: 0,
-        drive_state: cia402::State::NotReadyToSwitchOn,
+        drive_state: DriveState::NotReadyToSwitchOn,
         error_code: 0,
         is_heard: false,
         unanswered: 0,
@@ -61,19 +65,18 @@ pub const NO_SNAPSHOT: Snapshot = Snapshot {
 pub fn put_snapshot(snapshot: &Snapshot, words: &mut Words<'_>) {
     words.put(snapshot.slot);
     words.put(snapshot.at_ns);
-    words.put(
-        pack([
-            snapshot.phase as u8,
-            snapshot.axis_count,
-            snapshot.bus_count,
-            u8::from(snapshot.stop.is_some()) | (snapshot.timing as u8) << 1,
-        ]) | u64::from(snapshot.finished_move) << 32,
-    );
+    words.put(pack([
+        snapshot.phase as u8,
+        snapshot.axis_count,
+        snapshot.bus_count,
+        u8::from(snapshot.stop.is_some()) | (snapshot.timing as u8) << 1,
+    ]));
     words.put(snapshot.missed_slots);
     words.put(snapshot.clamped);
     words.put(snapshot.dropped);
-    words.put(snapshot.refused);
+    words.put(snapshot.rejected);
     put_answers(&snapshot.answers, words);
+    put_motions(&snapshot.motions, words);
     words.put_f64(snapshot.remaining_s);
     if let Some(stop) = snapshot.stop {
         put_stop(&stop, words);
@@ -97,9 +100,9 @@ pub fn take_snapshot(words: &mut Words<'_>) -> Snapshot {
         clamped: words.take(),
         timing: TimingLevel::ALL.get(usize::from(flags >> 1)).copied().unwrap_or_default(),
         dropped: words.take(),
-        refused: words.take(),
+        rejected: words.take(),
         answers: take_answers(words),
-        finished_move: (packed >> 32) as u32,
+        motions: take_motions(words),
         remaining_s: words.take_f64(),
         stop: (flags & 1 == 1).then(|| take_stop(words)),
         axis_count,
@@ -117,45 +120,45 @@ pub fn take_snapshot(words: &mut Words<'_>) -> Snapshot {
 
 fn put_answers(answers: &Answers, words: &mut Words<'_>) {
     words.put(answers.newest.0);
-    for bits in [answers.taken_up, answers.refused] {
+    for bits in [answers.taken_up, answers.rejected] {
         words.put(bits as u64);
         words.put((bits >> 64) as u64);
     }
     // The newest come first, so that the first that is missing is the end.
-    for place in &answers.refusals {
+    for place in &answers.rejections {
         let Some((RequestId(id), refused)) = place else {
             words.put(0);
             return;
         };
         let axis = refused.axis.map_or(0, |axis| u64::from(axis) << 32 | 1 << 40);
-        let kinds = pack([refused.request as u8, refused.objection as u8, refused.phase as u8, 1]);
+        let kinds = pack([refused.request as u8, refused.reason.number(), refused.phase as u8, 1]);
+        let (asked, allowed) = refused.reason.numbers();
         words.put(kinds | axis);
         words.put(*id);
-        words.put_f64(refused.value);
-        words.put_f64(refused.limit);
+        words.put_f64(asked);
+        words.put_f64(allowed);
     }
 }
 
 fn take_answers(words: &mut Words<'_>) -> Answers {
     let newest = RequestId(words.take());
     let mut bits = || u128::from(words.take()) | u128::from(words.take()) << 64;
-    let mut answers = Answers { newest, taken_up: bits(), refused: bits(), ..Answers::default() };
-    for place in &mut answers.refusals {
+    let mut answers = Answers { newest, taken_up: bits(), rejected: bits(), ..Answers::default() };
+    for place in &mut answers.rejections {
         let packed = words.take();
-        let [request, objection, phase, is_there] = unpack(packed);
+        let [request, reason, phase, is_there] = unpack(packed);
         if is_there == 0 {
             break;
         }
         let id = RequestId(words.take());
-        let refusal = Refusal {
-            request: RequestKind::ALL.get(usize::from(request)).copied().unwrap_or(RequestKind::Leave),
-            objection: Objection::ALL.get(usize::from(objection)).copied().unwrap_or(Objection::Phase),
+        let (asked, allowed) = (words.take_f64(), words.take_f64());
+        let rejected = RequestError {
+            request: RequestKind::ALL.get(usize::from(request)).copied().unwrap_or(RequestKind::Shutdown),
+            reason: RejectReason::from_numbers(reason, asked, allowed).unwrap_or(RejectReason::Phase),
             axis: (packed >> 40 & 1 == 1).then_some((packed >> 32) as u8),
-            value: words.take_f64(),
-            limit: words.take_f64(),
             phase: phase_of(phase),
         };
-        *place = Some((id, refusal));
+        *place = Some((id, rejected));
     }
     answers
 }
@@ -184,36 +187,37 @@ pub fn take_stream(axes: usize, words: &mut Words<'_>) -> StreamCommand {
     command
 }
 
-fn put_stop(stop: &StopReason, words: &mut Words<'_>) {
+pub fn put_stop(stop: &StopReason, words: &mut Words<'_>) {
     let (kind, number) = match stop.origin {
         Origin::Group => (0, 0),
         Origin::Axis(axis) => (1, axis),
         Origin::Bus(bus) => (2, bus),
     };
     let origin = u64::from(number) << 32;
-    words.put(pack([stop.category as u8, stop.rule as u8, stop.phase as u8, kind]) | origin);
-    words.put_f64(stop.value);
-    words.put_f64(stop.limit);
+    words.put(pack([stop.category as u8, stop.rule() as u8, stop.phase as u8, kind]) | origin);
+    let (seen, allowed) = stop.cause.numbers();
+    words.put_f64(seen);
+    words.put_f64(allowed);
     words.put(stop.slot);
 }
 
-fn take_stop(words: &mut Words<'_>) -> StopReason {
+pub fn take_stop(words: &mut Words<'_>) -> StopReason {
     let packed = words.take();
     let [category, rule, phase, origin] = unpack(packed);
+    let (seen, allowed) = (words.take_f64(), words.take_f64());
+    let rule = Rule::ALL.get(usize::from(rule)).copied().unwrap_or(Rule::Requested);
     StopReason {
         category: match category {
             0 => StopCategory::Zero,
             1 => StopCategory::One,
             _ => StopCategory::Two,
         },
-        rule: Rule::ALL.get(usize::from(rule)).copied().unwrap_or(Rule::Requested),
+        cause: StopCause::from_numbers(rule, seen, allowed).unwrap_or(StopCause::Requested),
         origin: match origin {
             0 => Origin::Group,
             1 => Origin::Axis((packed >> 32) as u8),
             _ => Origin::Bus((packed >> 32) as u8),
         },
-        value: words.take_f64(),
-        limit: words.take_f64(),
         slot: words.take(),
         phase: phase_of(phase),
     }
@@ -278,8 +282,8 @@ fn phase_of(number: u8) -> Phase {
     Phase::ALL.get(usize::from(number)).copied().unwrap_or_default()
 }
 
-fn drive_state_of(number: u8) -> cia402::State {
-    cia402::State::ALL.get(usize::from(number)).copied().unwrap_or_default()
+fn drive_state_of(number: u8) -> DriveState {
+    DriveState::ALL.get(usize::from(number)).copied().unwrap_or_default()
 }
 
 fn pack([a, b, c, d]: [u8; 4]) -> u64 {
@@ -295,6 +299,7 @@ mod tests {
     use super::*;
     use crate::controller::channels::latest::{Attempt, latest};
     use proptest::prelude::*;
+    use takt_rt::{MotionReport, MotionState};
 
     fn stop_reasons() -> impl Strategy<Value = StopReason> {
         let categories = prop::sample::select(vec![StopCategory::Zero, StopCategory::One, StopCategory::Two]);
@@ -304,37 +309,42 @@ mod tests {
             any::<u8>().prop_map(Origin::Axis),
             any::<u8>().prop_map(Origin::Bus)
         ];
-        (categories, rules, origins, any::<(f64, f64, u64)>(), phases).prop_map(
-            |(category, rule, origin, (value, limit, slot), phase)| StopReason {
+        // Numbers that every fault can have: the operation modes are 8 to 10.
+        let numbers = (0u8..100, 8u8..=10, any::<u64>());
+        (categories, rules, origins, numbers, phases).prop_map(
+            |(category, rule, origin, (seen, allowed, slot), phase)| StopReason {
                 category,
-                rule,
+                cause: StopCause::from_numbers(rule, seen.into(), allowed.into()).unwrap(),
                 origin,
-                value,
-                limit,
                 slot,
                 phase,
             },
         )
     }
 
-    fn refusals() -> impl Strategy<Value = Refusal> {
+    fn rejections() -> impl Strategy<Value = RequestError> {
         let requests = prop::sample::select(&RequestKind::ALL[..]);
-        let objections = prop::sample::select(&Objection::ALL[..]);
+        let reasons = prop::sample::select(&RejectReason::ALL[..]);
         let phases = prop::sample::select(&Phase::ALL[..]);
-        (requests, objections, any::<Option<u8>>(), any::<(f64, f64)>(), phases).prop_map(
-            |(request, objection, axis, (value, limit), phase)| Refusal {
-                request,
-                objection,
-                axis,
-                value,
-                limit,
-                phase,
-            },
-        )
+        (requests, reasons, any::<Option<u8>>(), phases)
+            .prop_map(|(request, reason, axis, phase)| RequestError { request, reason, axis, phase })
+    }
+
+    fn motions() -> impl Strategy<Value = MotionReports> {
+        let states = prop_oneof![
+            Just(MotionState::InProgress),
+            Just(MotionState::Finished),
+            stop_reasons().prop_map(MotionState::Stopped),
+            any::<u64>().prop_map(|by| MotionState::Replaced { by: RequestId(by) }),
+        ];
+        let reports = (any::<u64>(), any::<Option<u8>>(), states)
+            .prop_map(|(request, axis, state)| MotionReport { request: RequestId(request), axis, state });
+        prop::collection::vec(reports, 0..=MotionReports::CAPACITY)
+            .prop_map(|reports| MotionReports { reports: std::array::from_fn(|at| reports.get(at).copied()) })
     }
 
     fn axes() -> impl Strategy<Value = AxisSnapshot> {
-        let states = prop::sample::select(&cia402::State::ALL[..]);
+        let states = prop::sample::select(&DriveState::ALL[..]);
         (any::<(f64, f64, f64, u16, u16, bool, u16)>(), states).prop_map(
             |(
                 (position_set, position, velocity, statusword, error_code, is_heard, unanswered),
@@ -376,13 +386,13 @@ mod tests {
             prop::option::of(stop_reasons()),
             prop::sample::select(&Phase::ALL[..]),
         );
-        let refusals = prop::collection::vec((any::<u64>(), refusals()), 0..=Answers::EXPLAINED);
-        let answers = (any::<(u64, u64, u128, u128)>(), refusals);
-        (counted, any::<(u64, u64, u64, u64, u32, f64)>(), answers).prop_map(
+        let refusals = prop::collection::vec((any::<u64>(), rejections()), 0..=Answers::EXPLAINED);
+        let answers = (any::<(u64, u64, u128, u128)>(), refusals, motions());
+        (counted, any::<(u64, u64, u64, u64, f64)>(), answers).prop_map(
             |(
                 (axes, buses, stop, phase),
-                (slot, at_ns, missed_slots, dropped, finished_move, remaining_s),
-                ((refused, newest, taken_up, refused_bits), refusals),
+                (slot, at_ns, missed_slots, dropped, remaining_s),
+                ((refused, newest, taken_up, refused_bits), refusals, motions),
             )| {
                 let mut snapshot = Snapshot {
                     slot,
@@ -390,16 +400,16 @@ mod tests {
                     phase,
                     missed_slots,
                     dropped,
-                    finished_move,
-                    refused,
+                    rejected: refused,
                     answers: Answers {
                         newest: RequestId(newest),
                         taken_up,
-                        refused: refused_bits,
-                        refusals: std::array::from_fn(|at| {
+                        rejected: refused_bits,
+                        rejections: std::array::from_fn(|at| {
                             refusals.get(at).map(|(id, refusal)| (RequestId(*id), *refusal))
                         }),
                     },
+                    motions,
                     remaining_s,
                     stop,
                     axis_count: axes.len() as u8,

@@ -1,7 +1,6 @@
 //! Why a controller does not start, a command is not given, a motion does not get to its end.
 
-use takt_rt::refusal::Refusal;
-use takt_rt::stop::StopReason;
+use takt_rt::{RequestError, StopReason};
 
 use crate::controller::session::{Session, SessionError};
 use crate::telemetry::{Machine, words};
@@ -25,15 +24,15 @@ pub enum StartFailure {
 #[error("{words}")]
 pub struct Refused {
     /// What was refused and why; `None` when so many others were refused since that it is no longer known.
-    pub refusal: Option<Refusal>,
+    pub refusal: Option<RequestError>,
     words: String,
 }
 
 impl Refused {
-    pub(super) fn new(refusal: Option<Refusal>, machine: &Machine) -> Self {
+    pub(super) fn new(refusal: Option<RequestError>, machine: &Machine) -> Self {
         let forgotten =
             || "the request was refused, as were so many since that why is no longer known".to_owned();
-        let words = refusal.map_or_else(forgotten, |refusal| words::refusal(&refusal, machine));
+        let words = refusal.map_or_else(forgotten, |refusal| words::rejection(&refusal, machine));
         Self { refusal, words }
     }
 }

@@ -27,15 +27,12 @@ use std::sync::mpsc;
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-use takt_rt::control::ControlLaw;
-use takt_rt::door::{Asked, Move, ProfileMove, Request, RequestId, Snapshot, StreamCommand};
 use takt_rt::linux::MonotonicClock;
 use takt_rt::plan::State;
-use takt_rt::port::Clock;
-use takt_rt::profile::ProfileTarget;
-use takt_rt::record::MAX_AXES;
-use takt_rt::refusal::Answer;
-use takt_rt::stop::{Phase, StopCategory};
+use takt_rt::{
+    Answer, Clock, ControlLaw, MAX_AXES, MotionState, Move, Phase, ProfileMove, ProfileTarget, Request,
+    RequestEnvelope, RequestId, Snapshot, StopCategory, StreamCommand,
+};
 
 use super::channels::{Observer, RequestNumbers, Streamer};
 use super::outcome::{Interrupt, Outcome};
@@ -168,7 +165,6 @@ impl Controller {
         all.iter_mut().zip(target).for_each(|(to, from)| *to = *from);
         let id = self.numbers.next();
         let request = Request::Move(Move {
-            id: move_number(id),
             target: all,
             target_velocity: [0.0; MAX_AXES],
             velocity_scale: options.velocity_scale,
@@ -272,14 +268,15 @@ impl Controller {
         let begun = Instant::now();
         loop {
             let state = self.state();
-            let is_finished = state.finished_move == move_number(motion.request);
-            if is_finished && (!motion.ends_at_rest || state.phase == Phase::Holding) {
-                return Ok(());
+            match state.motions.of(motion.request) {
+                Some(MotionState::Finished) if !motion.ends_at_rest || state.phase == Phase::Holding => {
+                    return Ok(());
+                }
+                Some(MotionState::Stopped(reason)) => return Err(Stopped::new(reason, &self.machine).into()),
+                Some(MotionState::Replaced { .. }) => return Err(MotionError::Overtaken),
+                _ => {}
             }
-            if let Some(reason) = state.stop.filter(|reason| reason.slot > motion.slot) {
-                return Err(Stopped::new(reason, &self.machine).into());
-            }
-            if let Answer::Refused(refusal) = state.answers.of(motion.request) {
+            if let Answer::Rejected(refusal) = state.answers.of(motion.request) {
                 return Err(Refused::new(refusal, &self.machine).into());
             }
             if self.requests.has_forgotten(motion.request) {
@@ -354,13 +351,13 @@ impl Controller {
         let id = self.numbers.next();
         // An axis that exists has a number that fits.
         let axis = axis as u8;
-        let wanted = ProfileMove { id: move_number(id), axis, target, valid_until_ns: expiry_ns(valid_for) };
+        let wanted = ProfileMove { axis, target, valid_until_ns: expiry_ns(valid_for) };
         self.begin(id, Request::SetProfileTarget(wanted), ends_at_rest)
     }
 
     fn begin(&self, id: RequestId, request: Request, ends_at_rest: bool) -> Result<Motion, CommandError> {
         let slot = self.state().slot;
-        self.hand_in(Asked { id, request })?;
+        self.hand_in(RequestEnvelope { id, request })?;
         Ok(Motion { request: id, slot, ends_at_rest })
     }
 
@@ -371,7 +368,7 @@ impl Controller {
             let answers = self.state().answers;
             match answers.of(asked) {
                 Answer::Granted => return Ok(()),
-                Answer::Refused(refusal) => return Err(Refused::new(refusal, &self.machine).into()),
+                Answer::Rejected(refusal) => return Err(Refused::new(refusal, &self.machine).into()),
                 Answer::None if answers.have_forgotten(asked) => return Err(CommandError::Unanswered),
                 Answer::None if self.requests.has_forgotten(asked) => return Err(CommandError::Overtaken),
                 Answer::None if self.has_ended() => return Err(CommandError::Ended),
@@ -382,10 +379,10 @@ impl Controller {
 
     fn ask(&self, request: Request) -> Result<RequestId, CommandError> {
         let id = self.numbers.next();
-        self.hand_in(Asked { id, request }).map(|()| id)
+        self.hand_in(RequestEnvelope { id, request }).map(|()| id)
     }
 
-    fn hand_in(&self, asked: Asked) -> Result<(), CommandError> {
+    fn hand_in(&self, asked: RequestEnvelope) -> Result<(), CommandError> {
         if self.has_ended() {
             Err(CommandError::Ended)
         } else if self.requests.ask(asked) {
@@ -425,9 +422,4 @@ fn within(axis: &Axis, value: f64, lowest: f64, highest: f64) -> Result<(), Comm
 fn expiry_ns(valid_for: Duration) -> u64 {
     let valid_ns = u64::try_from(valid_for.as_nanos()).unwrap_or(u64::MAX);
     MonotonicClock::default().now_ns().saturating_add(valid_ns)
-}
-
-/// The number of the move that a request asks for: never 0, which stands for "none yet".
-const fn move_number(request: RequestId) -> u32 {
-    (request.0 % u32::MAX as u64) as u32 + 1
 }

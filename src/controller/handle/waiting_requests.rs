@@ -4,7 +4,7 @@
 use std::collections::VecDeque;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use takt_rt::door::{Asked, Request, RequestId};
+use takt_rt::{Request, RequestEnvelope, RequestId};
 
 /// Sixteen cycles' worth: whoever asks for more than this at once does not look at what becomes of it.
 pub const REQUESTS_AT_MOST: usize = 64;
@@ -20,7 +20,7 @@ pub struct WaitingRequests {
 
 #[derive(Debug, Default)]
 struct Waiting {
-    requests: VecDeque<Asked>,
+    requests: VecDeque<RequestEnvelope>,
     /// Those that a stop has overtaken, the newest last.
     forgotten: VecDeque<RequestId>,
 }
@@ -29,7 +29,7 @@ impl WaitingRequests {
     /// Takes a request. A stop, and a request to disable, is always taken, and what waits is forgotten for it: nothing that
     /// was asked for before is begun after it. Returns whether there was room.
     #[must_use]
-    pub fn ask(&self, asked: Asked) -> bool {
+    pub fn ask(&self, asked: RequestEnvelope) -> bool {
         let mut waiting = self.lock();
         if ends_motion(&asked.request) {
             waiting.forget_all_but_stops();
@@ -46,7 +46,7 @@ impl WaitingRequests {
     }
 
     /// Hands the requests over in their order, for as long as they are taken.
-    pub fn hand_over(&self, mut take: impl FnMut(Asked) -> bool) {
+    pub fn hand_over(&self, mut take: impl FnMut(RequestEnvelope) -> bool) {
         let mut waiting = self.lock();
         while waiting.requests.front().is_some_and(|asked| take(*asked)) {
             waiting.requests.pop_front();
@@ -85,10 +85,10 @@ const fn ends_motion(request: &Request) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use takt_rt::stop::StopCategory;
+    use takt_rt::StopCategory;
 
-    fn asked(id: u64, request: Request) -> Asked {
-        Asked { id: RequestId(id), request }
+    fn asked(id: u64, request: Request) -> RequestEnvelope {
+        RequestEnvelope { id: RequestId(id), request }
     }
 
     /// What is handed over, the first so many.

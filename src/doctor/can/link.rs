@@ -1,7 +1,7 @@
 //! What `ip -details -statistics -json link show` says of CAN interfaces; without `ip`, what the kernel says itself.
 
 use serde_json::Value;
-use takt_rt::port::BusState;
+use takt_rt::BusState;
 
 use crate::bus::{self, InterfaceStatus};
 

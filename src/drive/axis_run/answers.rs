@@ -1,7 +1,6 @@
 //! What becomes of a step once the drive has answered: values judged and kept, writes read back, silence understood.
 
-use takt_rt::dialect::Dialect;
-use takt_rt::time::Nanoseconds;
+use takt_rt::{Dialect, Nanoseconds};
 
 use super::{AWAIT_PAUSE_NS, AxisRun, Phase, Progress};
 use crate::canopen::dcf::Download;

@@ -2,7 +2,7 @@
 
 use std::ops::RangeInclusive;
 
-use takt_rt::time::Nanoseconds;
+use takt_rt::Nanoseconds;
 
 use crate::config::read::entry::{Bounds, Entry};
 use crate::config::read::section::Section;

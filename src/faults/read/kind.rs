@@ -1,6 +1,6 @@
 //! The kinds of fault and the keys of each.
 
-use takt_rt::frame::{Frame, Id};
+use takt_rt::{Frame, Id};
 
 use super::common::{self, Place};
 use crate::canopen::nmt::{NmtCommand, NmtTarget};

@@ -1,6 +1,6 @@
 //! What is wrong with the module or its joint, and how that shows in its feedback.
 
-use takt_rt::frame::Frame;
+use takt_rt::Frame;
 
 use super::dictionary::{Dictionary, at};
 use crate::sim::defect::{Defect, shorter};

@@ -1,8 +1,7 @@
 //! The CiA 402 state machine of the drive: controlword in, statusword out, with the ramps that some transitions
 //! take and the reaction to faults.
 
-use takt_rt::cia402::{Command, State, controlword, statusword};
-use takt_rt::time::Nanoseconds;
+use takt_rt::{Command, DriveState, Nanoseconds, controlword, statusword};
 
 use super::dictionary::{Dictionary, at};
 
@@ -17,7 +16,7 @@ pub struct Stop {
     /// In counts/s².
     pub deceleration: f64,
     /// The state at its end.
-    pub then: State,
+    pub then: DriveState,
 }
 
 /// What a change of state means to the motion.
@@ -34,7 +33,7 @@ pub enum Change {
 /// The state machine.
 #[derive(Clone, Copy, Debug)]
 pub struct Device {
-    state: State,
+    state: DriveState,
     controlword: u16,
     reset_since_ns: Option<Nanoseconds>,
     stop: Option<Stop>,
@@ -45,7 +44,7 @@ impl Device {
     /// A drive that is starting. The warning bit is as the unit happens to have it.
     pub fn starting(has_warning: bool) -> Self {
         Self {
-            state: State::NotReadyToSwitchOn,
+            state: DriveState::NotReadyToSwitchOn,
             controlword: 0,
             reset_since_ns: None,
             stop: None,
@@ -59,7 +58,7 @@ impl Device {
     }
 
     /// The state.
-    pub fn state(&self) -> State {
+    pub fn state(&self) -> DriveState {
         self.state
     }
 
@@ -75,8 +74,8 @@ impl Device {
 
     /// Initialisation is over (transition 1).
     pub fn started(&mut self) {
-        if self.state == State::NotReadyToSwitchOn {
-            self.state = State::SwitchOnDisabled;
+        if self.state == DriveState::NotReadyToSwitchOn {
+            self.state = DriveState::SwitchOnDisabled;
         }
     }
 
@@ -86,11 +85,11 @@ impl Device {
         let word = dictionary.get(at::CONTROLWORD) as u16;
         let rising = word & !self.controlword;
         self.controlword = word;
-        if self.state == State::Fault {
+        if self.state == DriveState::Fault {
             return self.evaluate_reset(now_ns, word, rising, is_cleared);
         }
         self.reset_since_ns = None;
-        if self.state == State::FaultReactionActive {
+        if self.state == DriveState::FaultReactionActive {
             return Change::None;
         }
         self.evaluate_command(Command::decode(word), dictionary)
@@ -118,8 +117,8 @@ impl Device {
         }
         let next = self.state.after(command, false);
         let had_torque = self.state.has_torque();
-        if self.state == State::OperationEnabled
-            && next == State::ReadyToSwitchOn
+        if self.state == DriveState::OperationEnabled
+            && next == DriveState::ReadyToSwitchOn
             && dictionary.signed(at::SHUTDOWN_OPTION) == 1
         {
             let deceleration = dictionary.real(at::PROFILE_DECELERATION);
@@ -127,13 +126,13 @@ impl Device {
             return Change::None;
         }
         self.stop = None;
-        if next == State::QuickStopActive && self.state != next {
+        if next == DriveState::QuickStopActive && self.state != next {
             // Without object 605A the quick stop ends as its default 2 says: power off after the ramp.
             let deceleration = dictionary.real(at::QUICK_STOP_DECELERATION);
-            self.stop = Some(Stop { deceleration, then: State::SwitchOnDisabled });
+            self.stop = Some(Stop { deceleration, then: DriveState::SwitchOnDisabled });
         }
         self.state = next;
-        if next == State::OperationEnabled && !had_torque { Change::Enabled } else { Change::None }
+        if next == DriveState::OperationEnabled && !had_torque { Change::Enabled } else { Change::None }
     }
 
     /// The deceleration has come to rest.
@@ -146,7 +145,7 @@ impl Device {
     /// The torque is gone without a fault, as after safe torque off.
     pub fn lose_torque(&mut self) {
         if self.state.has_torque() && !self.state.is_faulted() {
-            self.state = State::SwitchOnDisabled;
+            self.state = DriveState::SwitchOnDisabled;
             self.stop = None;
         }
     }
@@ -154,7 +153,7 @@ impl Device {
     /// A fault has been noticed. Without torque, or when power must be cut, the reaction is over at once; otherwise
     /// the drive decelerates as object 605E says first.
     pub fn fault(&mut self, cuts_power: bool, dictionary: &Dictionary) {
-        if self.state.is_faulted() && !(cuts_power && self.state == State::FaultReactionActive) {
+        if self.state.is_faulted() && !(cuts_power && self.state == DriveState::FaultReactionActive) {
             return;
         }
         let deceleration = match dictionary.signed(at::FAULT_REACTION_OPTION) {
@@ -163,8 +162,8 @@ impl Device {
             2 => Some(dictionary.real(at::QUICK_STOP_DECELERATION)),
             _ => None,
         };
-        self.stop = deceleration.map(|deceleration| Stop { deceleration, then: State::Fault });
-        self.state = if self.stop.is_some() { State::FaultReactionActive } else { State::Fault };
+        self.stop = deceleration.map(|deceleration| Stop { deceleration, then: DriveState::Fault });
+        self.state = if self.stop.is_some() { DriveState::FaultReactionActive } else { DriveState::Fault };
     }
 
     /// The statusword as real units set it: bit 9 always, bit 4 as long as there is no
@@ -172,7 +171,7 @@ impl Device {
     /// 13 as the mode of an enabled drive sets them.
     pub fn statusword(&self, mode_bits: u16) -> u16 {
         let bits = match self.state {
-            State::OperationEnabled => mode_bits,
+            DriveState::OperationEnabled => mode_bits,
             _ => statusword::BIT_12,
         };
         let voltage = if self.state.is_faulted() { 0 } else { VOLTAGE_ENABLED };

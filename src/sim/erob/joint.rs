@@ -4,9 +4,7 @@ mod access;
 mod frames;
 mod loops;
 
-use takt_rt::cia402::{OperationMode, State};
-use takt_rt::frame::Frame;
-use takt_rt::time::Nanoseconds;
+use takt_rt::{DriveState, Frame, Nanoseconds, OperationMode};
 
 use super::ErobParameters;
 use super::defects::Defects;
@@ -142,7 +140,7 @@ impl ErobJoint {
         if !had_stop && self.device.stop().is_some() {
             self.motion.begin_stop(self.actual());
         }
-        if self.device.state() == State::OperationEnabled {
+        if self.device.state() == DriveState::OperationEnabled {
             self.motion.evaluate(self.device.controlword(), previous, &self.dictionary);
         }
     }

@@ -42,7 +42,7 @@ pub use joint::ErobJoint;
 pub use objects::{Access, DataType, OBJECTS, Object};
 
 use crate::config::{Axis, Control, Simulation, Travel};
-use takt_rt::time::Nanoseconds;
+use takt_rt::Nanoseconds;
 
 use super::plant::{Encoder, JointParameters};
 

@@ -2,7 +2,7 @@
 
 mod status;
 
-use takt_rt::cia402::{OperationMode, controlword};
+use takt_rt::{OperationMode, controlword};
 
 use super::dictionary::{Dictionary, at};
 

@@ -1,7 +1,7 @@
 //! The node's life on the network: NMT state, boot-up, heartbeat in both directions, node guarding (CiA 301, 7.2.8,
 //! 7.3.2).
 
-use takt_rt::time::Nanoseconds;
+use takt_rt::Nanoseconds;
 
 use super::dictionary::{Dictionary, at};
 use crate::sim::drive::NmtState;

@@ -1,8 +1,6 @@
 //! The four RPDOs and four TPDOs: their parameters, their compiled mappings, and when they act (CiA 301, 7.2.2).
 
-use takt_rt::frame::{Frame, Id};
-use takt_rt::pdo::MappedObject;
-use takt_rt::time::Nanoseconds;
+use takt_rt::{Frame, Id, MappedObject, Nanoseconds};
 
 use super::dictionary::{AbortCode, Dictionary, at};
 use super::objects::{Access, OBJECTS, find, place};

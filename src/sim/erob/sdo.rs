@@ -3,7 +3,7 @@
 //! The server holds the state of a transfer and speaks its frames; what an object's value is and whether it may be
 //! written is asked of the [`Access`] that is handed in with each request.
 
-use takt_rt::time::Nanoseconds;
+use takt_rt::Nanoseconds;
 
 use super::dictionary::AbortCode;
 use crate::sim::random::Random;

@@ -1,6 +1,6 @@
 //! Alarms: what is wrong, what the motor does about it, and what clears it (manual, chapter IIb.3).
 
-use takt_rt::time::Nanoseconds;
+use takt_rt::Nanoseconds;
 
 /// An alarm that stops the motor until it is cleared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,6 +1,6 @@
 //! What is wrong with the servo or its joint, beyond its alarms.
 
-use takt_rt::frame::Frame;
+use takt_rt::Frame;
 
 use crate::sim::defect::{Defect, Unsupported, shorter};
 

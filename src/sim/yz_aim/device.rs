@@ -1,8 +1,7 @@
 //! Controlword in, statusword out (manual 5.04). This drive has no CiA 402 machine: there is only how far its controlword has
 //! led it.
 
-use takt_rt::cia402::{State, controlword};
-use takt_rt::time::Nanoseconds;
+use takt_rt::{DriveState, Nanoseconds, controlword};
 
 use super::parameters::Quirks;
 
@@ -33,12 +32,12 @@ impl Level {
     }
 
     /// As a state of CiA 402, for an observer.
-    pub fn state(self) -> State {
+    pub fn state(self) -> DriveState {
         match self {
-            Self::Cold | Self::Off => State::SwitchOnDisabled,
-            Self::Ready => State::ReadyToSwitchOn,
-            Self::SwitchedOn => State::SwitchedOn,
-            Self::Enabled => State::OperationEnabled,
+            Self::Cold | Self::Off => DriveState::SwitchOnDisabled,
+            Self::Ready => DriveState::ReadyToSwitchOn,
+            Self::SwitchedOn => DriveState::SwitchedOn,
+            Self::Enabled => DriveState::OperationEnabled,
         }
     }
 }

@@ -7,9 +7,7 @@ mod loops;
 mod measurement;
 mod watch;
 
-use takt_rt::cia402::State;
-use takt_rt::frame::Frame;
-use takt_rt::time::Nanoseconds;
+use takt_rt::{DriveState, Frame, Nanoseconds};
 
 use super::alarms::{Alarms, StoppingAlarm};
 use super::bit_rate::BitRateChange;
@@ -321,7 +319,7 @@ impl Drive for YzAimJoint {
             velocity: self.joint.velocity(),
             torque: self.torque * self.direction(),
             position_counts: self.counts(),
-            state: if is_stopped { State::Fault } else { self.device.level().state() },
+            state: if is_stopped { DriveState::Fault } else { self.device.level().state() },
             statusword: self.statusword(),
             error_code: self.alarm_code(),
             operation_mode: self.mode() as i8,

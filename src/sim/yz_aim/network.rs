@@ -1,6 +1,6 @@
 //! The node's life on the network: NMT state, boot-up, heartbeat in both directions (manual 5.11, 5.12).
 
-use takt_rt::time::Nanoseconds;
+use takt_rt::Nanoseconds;
 
 use super::dictionary::Dictionary;
 use super::objects::at;

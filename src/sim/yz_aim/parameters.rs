@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use takt_rt::time::Nanoseconds;
+use takt_rt::Nanoseconds;
 
 use crate::config::{Axis, Control, Simulation, Travel};
 use crate::sim::homing_switches::{HomingSwitches, Switch};

@@ -1,7 +1,6 @@
 //! The four RPDOs and four TPDOs, whose mapping is fixed, and when they act (manual 5.08).
 
-use takt_rt::frame::{Frame, Id};
-use takt_rt::time::Nanoseconds;
+use takt_rt::{Frame, Id, Nanoseconds};
 
 use super::dictionary::Dictionary;
 use super::objects::at;

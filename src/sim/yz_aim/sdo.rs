@@ -1,6 +1,6 @@
 //! The SDO server: expedited transfers, one at a time (manual 5.05).
 
-use takt_rt::time::Nanoseconds;
+use takt_rt::Nanoseconds;
 
 use crate::sim::random::Random;
 

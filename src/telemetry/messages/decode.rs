@@ -1,11 +1,10 @@
 //! From the messages of a recording back to records.
 
-use takt_rt::cia402::State;
-use takt_rt::port::{BusHealth, BusState};
-use takt_rt::record::{AxisRecord, CycleRecord, EventKind, Timing};
-use takt_rt::refusal::{Objection, Refusal, RequestKind};
-use takt_rt::stop::{Origin, Phase, Rule, StopCategory, StopReason};
-use takt_rt::watch::TimingLevel;
+use takt_rt::{
+    AxisRecord, BusHealth, BusState, CycleRecord, CycleTiming, DriveState, EventKind, Origin, Phase,
+    RejectReason, RequestError, RequestId, RequestKind, Rule, StopCategory, StopCause, StopReason,
+    TimingLevel,
+};
 
 use super::EventFields;
 use crate::bus::trace::TracedHealth;
@@ -15,7 +14,7 @@ use crate::telemetry::recorded::RecordedEvent;
 /// Decodes a [`CYCLE`](super::CYCLE), without its axes.
 pub fn decode_cycle(message: &[u8]) -> Option<CycleRecord> {
     let mut fields = CdrDecoder::begin(message)?;
-    let timing = Timing {
+    let timing = CycleTiming {
         slot: fields.u64()?,
         slot_start_ns: fields.u64()?,
         wake_ns: fields.u64()?,
@@ -105,8 +104,8 @@ pub(super) const BUS_STATES: [BusState; 4] =
     [BusState::ErrorActive, BusState::ErrorPassive, BusState::BusOff, BusState::Down];
 const CATEGORIES: [StopCategory; 3] = [StopCategory::Zero, StopCategory::One, StopCategory::Two];
 
-fn drive_state(number: u8) -> Option<State> {
-    State::ALL.get(usize::from(number)).copied()
+fn drive_state(number: u8) -> Option<DriveState> {
+    DriveState::ALL.get(usize::from(number)).copied()
 }
 
 fn phase(number: u8) -> Option<Phase> {
@@ -128,14 +127,16 @@ impl EventFields {
             0 => EventKind::PhaseChanged { from: phase(self.phase_from)?, to: phase(self.phase_to)? },
             1 => EventKind::Stop(StopReason {
                 category: *CATEGORIES.get(usize::from(self.category))?,
-                rule: *Rule::ALL.get(usize::from(self.rule))?,
+                cause: StopCause::from_numbers(
+                    *Rule::ALL.get(usize::from(self.rule))?,
+                    self.value,
+                    self.limit,
+                )?,
                 origin: self.origin(),
-                value: self.value,
-                limit: self.limit,
                 slot,
                 phase: phase(self.phase_from)?,
             }),
-            2 => EventKind::MoveFinished { id: self.move_id },
+            2 => EventKind::MotionFinished { request: RequestId(self.move_id.into()) },
             3 => EventKind::DriveState {
                 axis: self.axis?,
                 state: drive_state(self.drive_state)?,
@@ -148,12 +149,10 @@ impl EventFields {
                 manufacturer: self.manufacturer,
             },
             5 => EventKind::MissedSlots { count: self.missed_slots },
-            6 => EventKind::Refused(Refusal {
+            6 => EventKind::Rejected(RequestError {
                 request: *RequestKind::ALL.get(usize::from(self.refusal?.0))?,
-                objection: *Objection::ALL.get(usize::from(self.refusal?.1))?,
+                reason: RejectReason::from_numbers(self.refusal?.1, self.value, self.limit)?,
                 axis: self.axis,
-                value: self.value,
-                limit: self.limit,
                 phase: phase(self.phase_from)?,
             }),
             7 => EventKind::Timing { level: *TimingLevel::ALL.get(usize::from(self.timing_level))? },
@@ -167,24 +166,20 @@ mod tests {
     use super::*;
     use crate::telemetry::cdr::CdrEncoder;
     use crate::telemetry::messages::encode_event;
-    use takt_rt::record::Event;
+    use takt_rt::{Event, Fault};
 
     const STOP: StopReason = StopReason {
         category: StopCategory::Two,
-        rule: Rule::FollowingError,
+        cause: StopCause::Fault(Fault::FollowingError { error: 0.25, limit: -1.5 }),
         origin: Origin::Axis(3),
-        value: 0.25,
-        limit: -1.5,
         slot: 77,
         phase: Phase::Streaming,
     };
 
-    const REFUSAL: Refusal = Refusal {
+    const REFUSAL: RequestError = RequestError {
         request: RequestKind::Move,
-        objection: Objection::NoRoomToStop,
+        reason: RejectReason::NoRoomToStop { rest: 3.25, limit: 3.0 },
         axis: Some(2),
-        value: 3.25,
-        limit: 3.0,
         phase: Phase::Holding,
     };
 
@@ -194,7 +189,7 @@ mod tests {
         let of_a_bus = StopReason { origin: Origin::Bus(1), ..STOP };
         let of_no_bus = StopReason { origin: Origin::Group, ..STOP };
         for (kind, without_bus, without_both) in [
-            (EventKind::Refused(REFUSAL), Some(EventKind::Refused(REFUSAL)), None),
+            (EventKind::Rejected(REFUSAL), Some(EventKind::Rejected(REFUSAL)), None),
             (EventKind::Stop(of_a_bus), Some(EventKind::Stop(of_no_bus)), Some(EventKind::Stop(of_no_bus))),
         ] {
             let mut encoder = CdrEncoder::default();
@@ -215,12 +210,12 @@ mod tests {
             EventKind::Stop(STOP),
             EventKind::Stop(StopReason { origin: Origin::Group, ..STOP }),
             EventKind::Stop(StopReason { origin: Origin::Bus(1), ..STOP }),
-            EventKind::MoveFinished { id: 9 },
-            EventKind::DriveState { axis: 2, state: State::OperationEnabled, statusword: 0x1637 },
+            EventKind::MotionFinished { request: RequestId(9) },
+            EventKind::DriveState { axis: 2, state: DriveState::OperationEnabled, statusword: 0x1637 },
             EventKind::Timing { level: TimingLevel::Degraded },
             EventKind::Emergency { axis: 1, code: 0x7305, register: 0x21, manufacturer: [1, 2, 3, 4, 5] },
             EventKind::MissedSlots { count: 30 },
-            EventKind::Refused(REFUSAL),
+            EventKind::Rejected(REFUSAL),
         ] {
             encode_event(&Event { slot: 77, at_ns: 88, kind }, "in words", &mut encoder);
             let expected =

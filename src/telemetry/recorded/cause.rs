@@ -3,8 +3,7 @@
 use std::ops::RangeInclusive;
 
 use serde::Serialize;
-use takt_rt::record::EventKind;
-use takt_rt::stop::{Rule, StopReason};
+use takt_rt::{EventKind, Rule, StopReason};
 
 use super::Recorded;
 use crate::telemetry::words;
@@ -57,19 +56,19 @@ impl Recorded {
                 _ => None,
             })
         };
-        let unrequested = stops().find(|(_, stop)| stop.rule != Rule::Requested);
+        let unrequested = stops().find(|(_, stop)| stop.rule() != Rule::Requested);
         unrequested.or_else(|| stops().next()).map(|(slot, stop)| self.cause_of(slot, &stop))
     }
 
     fn cause_of(&self, slot: u64, stop: &StopReason) -> Cause {
         Cause {
             reason: words::stop(stop, &self.machine),
-            rule: words::rule_key(stop.rule).to_owned(),
+            rule: words::rule_key(stop.rule()).to_owned(),
             category: Some(stop.category as u8),
             axis: stop.axis().map(|axis| self.machine.axis_name(axis)),
             bus: stop.origin.bus().map(|bus| self.machine.bus_name(bus)),
-            value: Some(stop.value),
-            limit: Some(stop.limit),
+            value: Some(stop.cause.numbers().0),
+            limit: Some(stop.cause.numbers().1),
             slot,
             phase: Some(words::phase(stop.phase).to_owned()),
         }

@@ -10,8 +10,7 @@ use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 use mcap::records::Record;
-use takt_rt::record::{CycleRecord, EventKind};
-use takt_rt::time::Nanoseconds;
+use takt_rt::{CycleRecord, EventKind, Nanoseconds};
 
 use super::black_box;
 use super::machine::{AxisDescription, BusDescription, Machine, SetPointMagnitudes, Unit};

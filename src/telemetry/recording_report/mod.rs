@@ -5,7 +5,7 @@ mod picture;
 use std::path::PathBuf;
 
 use serde::Serialize;
-use takt_rt::record::{AxisRecord, CycleRecord, EventKind};
+use takt_rt::{AxisRecord, CycleRecord, EventKind};
 
 use super::machine::SetPointMagnitudes;
 use super::recorded::{Cause, Recorded, RecordedError};

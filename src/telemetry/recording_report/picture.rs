@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use takt_rt::stop::Rule;
+use takt_rt::Rule;
 
 use super::{AxisCycle, RecordingReport};
 use crate::telemetry::picture::{self, Emphasis, latency_table, line, missed_slots, wrap};

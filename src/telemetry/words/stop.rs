@@ -1,11 +1,6 @@
 //! Why the group stopped, in words.
-//!
-//! What [`StopReason::value`] and [`StopReason::limit`] mean follows from the rule: rad (m) and their derivatives for
-//! the limits and the following error; cycles for a stale command, missed feedback and an enable time-out; the error
-//! code for a drive fault; the statusword for a drive that has disabled itself; object 6061 against 6060 for a
-//! changed mode; cycles for set-points not transmitted.
 
-use takt_rt::stop::{Rule, StopReason};
+use takt_rt::{Fault, StopCause, StopReason};
 
 use super::{category, mode, phase};
 use crate::telemetry::machine::{Machine, Unit};
@@ -16,112 +11,105 @@ pub fn stop_cause(stop: &StopReason, machine: &Machine) -> String {
     let bus =
         stop.origin.bus().map_or_else(|| "a bus".to_owned(), |bus| format!("bus {}", machine.bus_name(bus)));
     let unit = stop.axis().map_or(Unit::Radian, |axis| machine.axis_unit(axis)).symbol();
-    let (value, limit) = (stop.value, stop.limit);
-    match stop.rule {
-        Rule::Requested => "a stop was asked for".to_owned(),
-        Rule::NotFinite => format!("the set-point of {axis} was not a finite number ({value})"),
-        Rule::PositionLimit => format!(
-            "the set-point of {axis}, {value:.4} {unit}, lay outside its position limit of {limit:.4} {unit}"
+    let StopCause::Fault(fault) = stop.cause else { return "a stop was asked for".to_owned() };
+    match fault {
+        Fault::NotFinite { position } => {
+            format!("the set-point of {axis} was not a finite number ({position})")
+        }
+        Fault::PositionLimit { position, limit } => format!(
+            "the set-point of {axis}, {position:.4} {unit}, lay outside its position limit of {limit:.4} {unit}"
         ),
-        Rule::VelocityLimit => {
-            format!("the set-point of {axis} asked for {value:.3} {unit}/s (allowed: {limit:.3} {unit}/s)")
+        Fault::VelocityLimit { velocity, limit } => {
+            format!("the set-point of {axis} asked for {velocity:.3} {unit}/s (allowed: {limit:.3} {unit}/s)")
         }
-        Rule::AccelerationLimit => {
-            format!("the set-point of {axis} asked for {value:.2} {unit}/s² (allowed: {limit:.2} {unit}/s²)")
+        Fault::AccelerationLimit { acceleration, limit } => format!(
+            "the set-point of {axis} asked for {acceleration:.2} {unit}/s² (allowed: {limit:.2} {unit}/s²)"
+        ),
+        Fault::JerkLimit { jerk, limit } => {
+            format!("the set-point of {axis} asked for {jerk:.1} {unit}/s³ (allowed: {limit:.1} {unit}/s³)")
         }
-        Rule::FollowingError => {
-            format!("{axis} was {value:.4} {unit} from its set-point (allowed: {limit:.4} {unit})")
+        Fault::FollowingError { error, limit } => {
+            format!("{axis} was {error:.4} {unit} from its set-point (allowed: {limit:.4} {unit})")
         }
-        Rule::StaleCommand if stop.axis().is_some() => {
-            format!("what {axis} had been asked for expired and was not asked for again")
+        Fault::StartPose { distance, limit } => format!(
+            "the stream of set-points began {distance:.4} {unit} from where {axis} is (allowed: {limit:.4} {unit})"
+        ),
+        Fault::ImplausibleFeedback { distance, reachable } => format!(
+            "{axis} was reported {distance:.4} {unit} from where it was, farther than it can have moved ({reachable:.4} {unit})"
+        ),
+        Fault::StaleCommand { .. } if stop.axis().is_some() => {
+            format!("the velocity or torque of {axis} expired and was not renewed")
         }
-        // One that has begun may be late by nothing.
-        Rule::StaleCommand if limit > 0.0 => {
-            format!("the stream of set-points did not begin within {}", cycles(limit))
-        }
-        Rule::StaleCommand => {
+        Fault::StaleCommand { .. } => {
             "the stream of set-points ended: its last command expired and no newer one came".to_owned()
         }
-        // At least one may always be missing: this is not about missing ones.
-        Rule::MissedFeedback if limit == 0.0 => {
-            format!("the drive of {axis} always answers {} late", cycles(value))
+        Fault::StreamNotBegun { limit, .. } => {
+            format!("the stream of set-points did not begin within {}", cycles(limit))
         }
-        Rule::MissedFeedback => {
-            format!("{axis} has not reported in time for {} (allowed: {limit:.0})", cycles(value))
+        Fault::MissedFeedback { cycles: missed, limit } => {
+            format!("{axis} has not reported in time for {} (allowed: {limit})", cycles(missed))
         }
-        Rule::DriveFault => {
-            let code = value as u32;
-            if code == 0 {
-                format!("the drive of {axis} reports a fault without an error code")
-            } else {
-                format!("the drive of {axis} reports fault 0x{code:04X}")
-            }
+        Fault::LateFeedback { cycles: late } => {
+            format!("the drive of {axis} always answers {} late", cycles(late))
         }
-        Rule::DriveDisabled => format!(
-            "the drive of {axis} left operation enabled by itself (statusword 0x{:04X})",
-            value as u16
+        Fault::DriveFault { error_code: 0 } => {
+            format!("the drive of {axis} reports a fault without an error code")
+        }
+        Fault::DriveFault { error_code } => format!("the drive of {axis} reports fault 0x{error_code:04X}"),
+        Fault::DriveDisabled { statusword } => {
+            format!("the drive of {axis} left operation enabled by itself (statusword 0x{statusword:04X})")
+        }
+        Fault::ModeChanged { shown, expected } => format!(
+            "the drive of {axis} shows {} instead of {}",
+            mode(shown.into()),
+            mode((expected as i8).into())
         ),
-        Rule::ModeChanged => {
-            format!("the drive of {axis} shows {} instead of {}", mode(value), mode(limit))
-        }
-        Rule::NotAcknowledged => {
+        Fault::NotAcknowledged { limit, .. } => {
             format!("the drive of {axis} did not acknowledge its target within {}", cycles(limit))
         }
-        Rule::NodeLost => {
-            format!("no heartbeat of {axis} has come for {} (allowed: {limit:.0})", cycles(value))
+        Fault::NodeLost { cycles: silent, limit } => {
+            format!("no heartbeat of {axis} has come for {} (allowed: {limit})", cycles(silent))
         }
-        Rule::NodeNotOperational => {
+        Fault::NodeNotOperational { state } => {
+            format!("the node of {axis} is no longer operational: its heartbeat shows state 0x{state:02X}")
+        }
+        Fault::UnexpectedBootUp => format!("the drive of {axis} started anew during its work"),
+        Fault::EmergencyMessage { code } => {
+            format!("the drive of {axis} sent emergency message 0x{code:04X} and shows no fault")
+        }
+        Fault::DuplicateNode { node } => {
+            format!("two nodes answer with the node ID of {axis}, {node}: its feedback comes twice")
+        }
+        Fault::ForeignMaster { id } => {
             format!(
-                "the node of {axis} is no longer operational: its heartbeat shows state 0x{:02X}",
-                value as u8
+                "another master sends on {bus}: a frame with identifier 0x{id:?} is not from this controller"
             )
         }
-        Rule::UnexpectedBootUp => format!("the drive of {axis} has started anew in the middle of its work"),
-        Rule::EmergencyMessage => {
-            format!("the drive of {axis} sent emergency message 0x{:04X} and shows no fault", value as u16)
+        Fault::TimingUnfit { missed, limit } => {
+            format!("the controller misses its slots too often: {missed} of late (allowed: {limit})")
         }
-        Rule::DuplicateNode => {
-            format!("two nodes answer under the number of {axis}, {value:.0}: its feedback comes twice")
-        }
-        Rule::ForeignMaster => format!(
-            "somebody else sends on {bus} what only this controller may: a frame with identifier 0x{:03X}",
-            value as u32
-        ),
-        Rule::TimingUnfit => {
-            format!("the controller misses its slots too often: {value:.0} of late (allowed: {limit:.0})")
-        }
-        Rule::StartPose => format!(
-            "the stream of set-points began {value:.4} {unit} from where {axis} is (allowed: {limit:.4} {unit})"
-        ),
-        Rule::JerkLimit => {
-            format!("the set-point of {axis} asked for {value:.1} {unit}/s³ (allowed: {limit:.1} {unit}/s³)")
-        }
-        Rule::ImplausibleFeedback => format!(
-            "{axis} was reported {value:.4} {unit} from where it was, further than it can have got ({limit:.4} {unit})"
-        ),
-        Rule::BusErrorPassive => {
-            format!("{bus} is error-passive: hardly a frame gets through")
-        }
-        Rule::EnableTimeout => format!(
+        Fault::BusErrorPassive => format!("{bus} is error-passive: hardly a frame gets through"),
+        Fault::BusLost => format!("{bus} is bus-off or its interface is down"),
+        Fault::EnableTimeout { limit, .. } => format!(
             "the drive of {axis} did not reach operation enabled within {} ({:.1} s)",
             cycles(limit),
-            limit * machine.cycle_ns as f64 * 1e-9
+            f64::from(limit) * machine.cycle_ns as f64 * 1e-9
         ),
-        Rule::NoTrajectory => match stop.axis() {
-            Some(_) => format!("no trajectory leads {axis} to what was asked"),
-            None => "no trajectory leads to what was asked".to_owned(),
-        },
-        Rule::BusLost => {
-            format!("{bus} is bus-off or its interface is down")
+        Fault::NoTrajectory if stop.axis().is_some() => {
+            format!("no trajectory leads {axis} to what was asked")
         }
-        Rule::NotTransmitted => {
-            format!("set-points are not getting onto the wire of {bus} for {}", cycles(value))
+        Fault::NoTrajectory => "no trajectory leads to what was asked".to_owned(),
+        Fault::NotTransmitted { cycles: blocked, .. } => {
+            format!("set-points are not getting onto the wire of {bus} for {}", cycles(blocked))
         }
     }
 }
 
-fn cycles(count: f64) -> String {
-    if count == 1.0 { "1 cycle".to_owned() } else { format!("{count:.0} cycles") }
+fn cycles(count: impl Into<u32>) -> String {
+    match count.into() {
+        1 => "1 cycle".to_owned(),
+        count => format!("{count} cycles"),
+    }
 }
 
 /// The whole story of a stop: cause, what was going on, and how.
@@ -134,10 +122,11 @@ mod tests {
     use super::*;
     use crate::telemetry::words::rule_key;
     use crate::telemetry::words::tests::machine;
-    use takt_rt::stop::{Origin, Phase, StopCategory};
+    use takt_rt::{Origin, Phase, Rule, StopCategory};
 
     fn reason(rule: Rule, origin: Origin, value: f64, limit: f64) -> StopReason {
-        StopReason { category: StopCategory::One, rule, origin, value, limit, slot: 9, phase: Phase::Moving }
+        let cause = StopCause::from_numbers(rule, value, limit).unwrap();
+        StopReason { category: StopCategory::One, cause, origin, slot: 9, phase: Phase::Moving }
     }
 
     #[test]
@@ -169,14 +158,14 @@ mod tests {
                 Origin::Axis(1),
                 1.0,
                 0.0,
-                "what slide had been asked for expired and was not asked for again",
+                "the velocity or torque of slide expired and was not renewed",
             ),
             (
                 Rule::ImplausibleFeedback,
                 Origin::Axis(0),
                 0.5,
                 0.0101,
-                "shoulder was reported 0.5000 rad from where it was, further than it can have got (0.0101 rad)",
+                "shoulder was reported 0.5000 rad from where it was, farther than it can have moved (0.0101 rad)",
             ),
             (
                 Rule::VelocityLimit,
@@ -276,7 +265,7 @@ mod tests {
                 Origin::Bus(0),
                 0x080.into(),
                 0.0,
-                "somebody else sends on bus left what only this controller may: a frame with identifier 0x080",
+                "another master sends on bus left: a frame with identifier 0x080 is not from this controller",
             ),
             (
                 Rule::TimingUnfit,
@@ -315,7 +304,7 @@ mod tests {
 
     #[test]
     fn no_two_rules_share_a_key_or_a_cause() {
-        let causes = Rule::ALL.map(|rule| stop_cause(&reason(rule, Origin::Axis(0), 1.0, 2.0), &machine()));
+        let causes = Rule::ALL.map(|rule| stop_cause(&reason(rule, Origin::Axis(0), 1.0, 8.0), &machine()));
         let keys = Rule::ALL.map(rule_key);
         for (index, rule) in Rule::ALL.into_iter().enumerate() {
             assert!(!causes[..index].contains(&causes[index]), "{rule:?}");

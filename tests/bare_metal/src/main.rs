@@ -5,19 +5,12 @@
 
 use core::f64::consts::TAU;
 
-use takt_rt::axis::{AxisParameters, CommandPdo, FeedbackSince, Pdo};
-use takt_rt::control::ControlLaw;
-use takt_rt::dialect::Dialect;
-use takt_rt::door::{Asked, Door, Request, RequestId, Snapshot, StreamCommand};
-use takt_rt::engine::{BusParameters, Engine, EngineParameters, SendBatch, Transmission};
-use takt_rt::frame::{Frame, Id};
-use takt_rt::guard::{AxisLimits, OnViolation};
-use takt_rt::pdo::{MappedObject, Mapping};
-use takt_rt::port::{BusHealth, Received};
-use takt_rt::record::{CycleRecord, Event, Timing};
-use takt_rt::stop::{Phase, StopCategories};
-use takt_rt::units::{Scale, ScaleParameters};
-use takt_rt::watch::TimingLadder;
+use takt_rt::{
+    AxisLimits, AxisParameters, BusHealth, BusParameters, BusSet, CommandPdo, ControlLaw, CycleInput,
+    CycleTiming, Deadline, Dialect, Engine, EngineParameters, FeedbackSince, Frame, HostInterface, Id,
+    MappedObject, Mapping, OnViolation, Pdo, Phase, Received, Request, RequestEnvelope, RequestId, Scale,
+    ScaleParameters, SendBatch, StopCategories, TimingLadder,
+};
 
 // The C library gives the program its entry; nothing else of it is used.
 #[link(name = "c")]
@@ -35,30 +28,16 @@ extern "C" fn rust_eh_personality() {}
 
 #[derive(Default)]
 struct Silent {
-    requests: [Option<Request>; 3],
+    requests: [Option<Request<1>>; 3],
 }
 
-impl Door for Silent {
-    fn request(&mut self) -> Option<Asked> {
+impl HostInterface<1, 1> for Silent {
+    fn request(&mut self) -> Option<RequestEnvelope<1>> {
         let numbered = self.requests.iter_mut().zip(1..);
-        numbered.filter_map(|(place, id)| Some(Asked { id: RequestId(id), request: place.take()? })).next()
+        numbered
+            .filter_map(|(place, id)| Some(RequestEnvelope { id: RequestId(id), request: place.take()? }))
+            .next()
     }
-    fn stream(&mut self) -> Option<StreamCommand> {
-        None
-    }
-    fn service_frame(&mut self, _: usize) -> Option<Frame> {
-        None
-    }
-    fn received(&mut self, _: usize, _: &Received) -> bool {
-        true
-    }
-    fn record(&mut self, _: &CycleRecord) -> bool {
-        true
-    }
-    fn event(&mut self, _: &Event) -> bool {
-        true
-    }
-    fn publish(&mut self, _: &Snapshot) {}
 }
 
 fn axis() -> Option<AxisParameters> {
@@ -124,20 +103,24 @@ fn cycles() -> Option<Phase> {
         categories: StopCategories::default(),
         timing: TimingLadder { warning: 10, degraded: 50, unfit: 250, leak_cycles: 20 },
     };
-    let mut engine = Engine::new(parameters).ok()?;
+    let mut engine: Engine<1, 1> = Engine::new(parameters).ok()?;
     let requests = [Some(Request::Sync(true)), Some(Request::Activate), Some(Request::Enable)];
-    let mut door = Silent { requests };
+    let mut host = Silent { requests };
     let health = [BusHealth::default()];
     for slot in 0..40 {
         let at_ns = slot * 1_000_000;
         // Ready to switch on, and operation enabled a while later.
         let statusword_low = if slot < 20 { 0x31 } else { 0x37 };
         let frame = Frame::of(Id::canopen(0x180, 1), [statusword_low, 0x12, 1, 0, 0, 0]);
-        engine.receive(0, &Received { frame, at_ns }, &mut door);
-        engine.compute(slot, at_ns, &health, Transmission::Free, &mut door);
+        engine.sync(0, slot, at_ns);
+        engine.receive(0, &Received { frame, at_ns });
+        engine.compute(
+            &CycleInput { slot, now_ns: at_ns, buses: &health, behind: BusSet::default() },
+            &mut host,
+        );
         let mut batch = SendBatch::new();
-        engine.set_points(0, slot, &mut batch);
-        engine.finish(Timing { slot, ..Timing::default() }, at_ns, &health, &mut door);
+        engine.encode(0, Deadline::Met, &mut host, &mut batch);
+        engine.finish(CycleTiming { slot, ..CycleTiming::default() }, at_ns, &health, &mut host);
     }
     Some(engine.phase())
 }

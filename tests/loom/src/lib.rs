@@ -1,4 +1,4 @@
-//! The lock-free channels of the door, the very source files of takt, built on loom's atomics: loom runs a test again
+//! The lock-free channels of the host interface, the very source files of takt, built on loom's atomics: loom runs a test again
 //! and again, through every order in which the threads can be scheduled and every value that a load may see.
 //!
 //! What is proven here holds for the bounds that each test names. Loom knows the relaxed, acquire and release accesses

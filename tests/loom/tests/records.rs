@@ -2,7 +2,7 @@
 
 use loom::thread;
 use takt_loom::records::{RecordConsumer, record_ring};
-use takt_rt::record::{AxisRecord, CycleRecord};
+use takt_rt::{AxisRecord, CycleRecord};
 
 const PUSHES: u64 = 4;
 

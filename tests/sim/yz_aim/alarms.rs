@@ -2,7 +2,7 @@
 
 use takt::sim::DriveFault;
 use takt::sim::plant::EndStops;
-use takt_rt::cia402::State;
+use takt_rt::DriveState;
 
 use super::{Bench, NODE, Quirks, YzAimParameters, bench, by_the_manual, parameters};
 
@@ -41,7 +41,7 @@ fn stopping_alarms_show_everywhere_and_free_the_motor_until_they_are_cleared() {
         bench.bus.inject(NODE, fault).unwrap();
         bench.run_ms(2_000);
         assert_eq!((bench.alarm(), bench.statusword() & 0x0F), (code, 0x0B));
-        assert_eq!((bench.observe().state, bench.observe().error_code), (State::Fault, code as u16));
+        assert_eq!((bench.observe().state, bench.observe().error_code), (DriveState::Fault, code as u16));
         assert_eq!(last_heartbeat(&mut bench), [0x04]);
         assert_eq!((speed_rpm(&mut bench), bench.observe().torque), (0.0, 0.0));
         assert_eq!(bench.read(0x2601, 0), Ok(0));

@@ -2,7 +2,7 @@
 
 use takt::sim::yz_aim::{Model, YzAimJoint};
 use takt::sim::{Drive, Mailbox, Order};
-use takt_rt::frame::{Frame, Id};
+use takt_rt::{Frame, Id};
 
 use super::{Bench, MILLISECOND_NS, NODE, YzAimParameters, bench, by_the_manual, parameters};
 

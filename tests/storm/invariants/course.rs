@@ -4,10 +4,7 @@ use std::collections::VecDeque;
 
 use takt::config::{Axis, Config, OnViolation};
 use takt::controller::assemble;
-use takt_rt::cia402::State;
-use takt_rt::record::{Event, EventKind};
-use takt_rt::stop::Phase;
-use takt_rt::units::Scale;
+use takt_rt::{DriveState, Event, EventKind, Phase, Scale};
 
 use super::Seen;
 
@@ -81,7 +78,7 @@ impl Course {
         }
         let record = &seen.record.axes()[index];
         // What the controller believes of the drive: for one that it takes for disabled it plans nothing.
-        if record.drive_state != State::OperationEnabled {
+        if record.drive_state != DriveState::OperationEnabled {
             self.points = [None; 3];
             self.planned.clear();
             self.last = None;
@@ -207,7 +204,7 @@ impl Course {
     /// Positions on the wire while the drive really is enabled, whatever the controller believes.
     fn check_wire(&mut self, seen: &Seen<'_>, index: usize) -> Result<(), String> {
         let (axis, concern, truth) = (&seen.config.axes[index], &seen.concerns[index], &seen.truth[index]);
-        if truth.state != State::OperationEnabled {
+        if truth.state != DriveState::OperationEnabled {
             self.on_wire = None;
             self.coasting = truth.velocity.abs();
             return Ok(());

@@ -10,10 +10,9 @@ mod stops;
 
 use takt::config::Config;
 use takt::sim::Observation;
-use takt_rt::door::Snapshot;
-use takt_rt::record::{CycleRecord, Event};
+use takt_rt::{CycleRecord, Event, Snapshot};
 
-use crate::client::Asked;
+use crate::client::RecentRequests;
 use crate::concern::Concern;
 use crate::wire::Told;
 
@@ -46,7 +45,7 @@ pub struct Seen<'a> {
     /// Whether a bus cannot carry in time what is asked of it, an entry a bus.
     pub overloaded_buses: &'a [bool],
     /// What had been asked for before it.
-    pub asked: Asked,
+    pub asked: RecentRequests,
     /// Whether anything else is wrong than that the machine has too little time.
     pub has_faults: bool,
 }

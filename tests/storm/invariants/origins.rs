@@ -1,7 +1,6 @@
 //! What a stop is said to concern is what it concerns: the axis that has the fault, the bus on which it is.
 
-use takt_rt::record::EventKind;
-use takt_rt::stop::{Origin, Rule, StopReason};
+use takt_rt::{EventKind, Origin, Rule, StopReason};
 
 use super::Seen;
 
@@ -21,7 +20,7 @@ fn check_reason(seen: &Seen<'_>, reason: &StopReason) -> Result<(), String> {
             seen.config.axes.get(usize::from(axis)).is_some_and(|axis| seen.overloaded_buses[axis.bus]);
         is_overloaded || seen.concerns.get(usize::from(axis)).is_some_and(|concern| concern.is_crowded)
     };
-    let is_right = match (reason.rule, reason.origin) {
+    let is_right = match (reason.rule(), reason.origin) {
         // What is asked of the group, and how it is paced.
         (Rule::Requested | Rule::TimingUnfit, Origin::Group) => true,
         // A stream is one of the group, a velocity or a torque one of an axis.

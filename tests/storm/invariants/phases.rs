@@ -1,8 +1,7 @@
 //! The group's state machine: it never stays where it must pass, and every stop has one reason.
 
 use takt::config::{Config, Control};
-use takt_rt::record::EventKind;
-use takt_rt::stop::{Phase, Rule};
+use takt_rt::{EventKind, Phase, Rule};
 
 use super::Seen;
 use crate::bounds;
@@ -32,11 +31,11 @@ impl Phases {
     }
 
     fn check_reasons(&mut self, seen: &Seen<'_>) -> Result<(), String> {
-        let shown = seen.snapshot.stop.filter(|stop| stop.rule != Rule::Requested);
+        let shown = seen.snapshot.stop.filter(|stop| stop.rule() != Rule::Requested);
         let was_latched = self.is_latched;
         for event in seen.events {
             match event.kind {
-                EventKind::Stop(reason) if reason.rule != Rule::Requested => {
+                EventKind::Stop(reason) if reason.rule() != Rule::Requested => {
                     if self.is_latched && !seen.asked.has_reset_lately {
                         return Err(format!("a second reason: {reason:?}, shown {:?}", seen.snapshot.stop));
                     }

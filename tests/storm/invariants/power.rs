@@ -1,8 +1,6 @@
 //! Nothing is enabled, reset or moved that should not be.
 
-use takt_rt::cia402::State;
-use takt_rt::record::{Event, EventKind};
-use takt_rt::stop::{Phase, Rule};
+use takt_rt::{DriveState, Event, EventKind, Phase, Rule};
 
 use super::{REST, Seen};
 use crate::bounds;
@@ -59,7 +57,7 @@ impl Power {
         let is_enabling = phase == Phase::Enabling;
         self.since_enabling = if is_enabling { 0 } else { self.since_enabling.saturating_add(1) };
         let is_fault =
-            |event: &Event| matches!(event.kind, EventKind::Stop(reason) if reason.rule != Rule::Requested);
+            |event: &Event| matches!(event.kind, EventKind::Stop(reason) if reason.rule() != Rule::Requested);
         if seen.events.iter().any(is_fault) {
             self.is_reset_awaited = false;
         } else if seen.asked.has_reset {
@@ -104,7 +102,7 @@ impl Power {
         if concern.is_present || self.disabled <= OBEYING_CYCLES {
             return Ok(());
         }
-        if truth.state == State::OperationEnabled {
+        if truth.state == DriveState::OperationEnabled {
             return Err(format!("enabled, {} cycles after the group was disabled", self.disabled));
         }
         let to_rest_s = bounds::to_rest_s(seen.config) + bounds::coasting_s(&seen.config.axes[index]);

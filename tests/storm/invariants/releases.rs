@@ -1,7 +1,7 @@
 //! No drive lets its joint go, or brakes it, before it stands: in a stop that takes the time for that.
 
 use takt::sim::Observation;
-use takt_rt::stop::StopCategory;
+use takt_rt::StopCategory;
 
 use super::Seen;
 

@@ -1,6 +1,6 @@
 //! A stop is over within the time and the distance that are stated of it.
 
-use takt_rt::stop::{Phase, StopCategory};
+use takt_rt::{Phase, StopCategory};
 
 use super::phases::is_unbounded;
 use super::{REST, Seen};

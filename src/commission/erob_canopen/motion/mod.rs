@@ -3,8 +3,7 @@
 pub mod position;
 pub mod torque;
 
-use takt_rt::cia402::OperationMode;
-use takt_rt::time::Nanoseconds;
+use takt_rt::{Nanoseconds, OperationMode};
 
 use super::{enabling, reading};
 use crate::canopen::objects::*;

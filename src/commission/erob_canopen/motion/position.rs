@@ -1,7 +1,6 @@
 //! Profile position: every target with its handshake (607A, bit 4, status bit 12, bit 4 off, status bit 12 off).
 
-use takt_rt::cia402::{OperationMode, controlword, statusword};
-use takt_rt::time::Nanoseconds;
+use takt_rt::{Nanoseconds, OperationMode, controlword, statusword};
 
 use super::{LOOK_NS, begin, with_torque};
 use crate::canopen::objects::*;

@@ -1,7 +1,6 @@
 //! Profile torque, with an eye on the velocity: nothing else limits it in this mode.
 
-use takt_rt::cia402::OperationMode;
-use takt_rt::time::Nanoseconds;
+use takt_rt::{Nanoseconds, OperationMode};
 
 use super::{begin, tend, with_torque};
 use crate::canopen::objects::*;

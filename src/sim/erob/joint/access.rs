@@ -1,7 +1,6 @@
 //! The dictionary as the master reaches it, by SDO and by RPDO, with everything that a write sets in motion.
 
-use takt_rt::cia402::State;
-use takt_rt::time::Nanoseconds;
+use takt_rt::{DriveState, Nanoseconds};
 
 use super::ErobJoint;
 use crate::sim::erob::dictionary::{AbortCode, Dictionary, at};
@@ -15,7 +14,7 @@ const SAVE_NS: Nanoseconds = 3_000_000_000;
 
 /// How an RPDO writes an entry: an enabled drive keeps its mode, and values out of range are left.
 pub(super) fn write_field(dictionary: &mut Dictionary, at: usize, value: u32) {
-    let is_enabled = State::decode(dictionary.get(at::STATUSWORD) as u16).has_torque();
+    let is_enabled = DriveState::decode(dictionary.get(at::STATUSWORD) as u16).has_torque();
     if at == at::OPERATION_MODE && is_enabled {
         return;
     }

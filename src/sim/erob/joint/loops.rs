@@ -1,6 +1,6 @@
 //! The control loops and the joint that they drive, step by step.
 
-use takt_rt::time::{NANOSECONDS_PER_SECOND, Nanoseconds};
+use takt_rt::{NANOSECONDS_PER_SECOND, Nanoseconds};
 
 use super::ErobJoint;
 use crate::sim::erob::dictionary::at;

@@ -1,6 +1,6 @@
 //! What the statusword tells of the motion: whether the target is reached, a limit acts, a set-point is taken.
 
-use takt_rt::cia402::{OperationMode, controlword, statusword};
+use takt_rt::{OperationMode, controlword, statusword};
 
 use super::{ARRIVED, Actual, Motion};
 use crate::sim::erob::dictionary::{Dictionary, at};

@@ -1,7 +1,6 @@
 //! The dictionary as the master reaches it, by SDO and by RPDO.
 
-use takt_rt::cia402::controlword;
-use takt_rt::time::Nanoseconds;
+use takt_rt::{Nanoseconds, controlword};
 
 use super::YzAimJoint;
 use crate::sim::yz_aim::dictionary::decode;

@@ -1,7 +1,6 @@
 //! What the values that a master writes make the drive do.
 
-use takt_rt::cia402::controlword;
-use takt_rt::time::Nanoseconds;
+use takt_rt::{Nanoseconds, controlword};
 
 use super::{COUNTS_PER_SECOND_PER_RPM, COUNTS_PER_TURN, YzAimJoint, mode};
 use crate::sim::drive::NmtState;

@@ -1,7 +1,6 @@
 //! Frames in, frames out.
 
-use takt_rt::frame::{Frame, FrameKind, Id};
-use takt_rt::time::Nanoseconds;
+use takt_rt::{Frame, FrameKind, Id, Nanoseconds};
 
 use super::YzAimJoint;
 use crate::sim::drive::NmtState;

@@ -1,6 +1,6 @@
 //! The control loops on their grid: from the order of the moment to torque, and the joint under it.
 
-use takt_rt::time::{NANOSECONDS_PER_SECOND, Nanoseconds};
+use takt_rt::{NANOSECONDS_PER_SECOND, Nanoseconds};
 
 use super::watch::Watch;
 use super::{COUNTS_PER_SECOND_PER_RPM, NEVER, YzAimJoint, mode};

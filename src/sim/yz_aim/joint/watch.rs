@@ -1,7 +1,7 @@
 //! What the drive notices by itself: a blocked rotor, too long at the current limit, a loss of speed; and what breaks from
 //! outside.
 
-use takt_rt::time::Nanoseconds;
+use takt_rt::Nanoseconds;
 
 use super::YzAimJoint;
 use crate::sim::defect::{Defect, Unsupported};

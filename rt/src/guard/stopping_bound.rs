@@ -5,14 +5,14 @@ use crate::plan::State;
 
 /// What a joint reaches at least towards positive positions, if it is stopped at the limits from now on.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Reach {
+pub(super) struct StoppingBound {
     /// The velocity, with its sign, once an acceleration in this direction has been taken back.
     pub velocity: f64,
     /// The position.
     pub position: f64,
 }
 
-impl Reach {
+impl StoppingBound {
     pub(super) fn of(state: &State, limits: &AxisLimits) -> Self {
         let State { position, velocity, acceleration } = *state;
         let along = acceleration.max(0.0);

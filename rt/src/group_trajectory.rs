@@ -3,17 +3,16 @@
 use arrayvec::ArrayVec;
 
 use crate::guard::AxisLimits;
-use crate::plan::{self, Limits, PlanError, Problem, Profile, Return, State, Synchronisation, Timing};
-use crate::record::MAX_AXES;
+use crate::plan::{self, Limits, PlanError, PlanOptions, Problem, Profile, Return, State, Synchronisation};
 
 /// The trajectory that the group is on.
 ///
 /// There is room for two: the next one is planned beside the present one and takes its place only when all of it is
 /// there, without being copied.
 #[derive(Clone, Debug)]
-pub struct Motion {
-    first: [Profile; MAX_AXES],
-    second: [Profile; MAX_AXES],
+pub struct GroupTrajectory<const AXES: usize> {
+    first: [Profile; AXES],
+    second: [Profile; AXES],
     is_second_present: bool,
     duration_s: f64,
     time_s: f64,
@@ -38,14 +37,14 @@ impl<'a> Leg<'a> {
     }
 }
 
-impl Default for Motion {
+impl<const AXES: usize> Default for GroupTrajectory<AXES> {
     fn default() -> Self {
-        let hold = [Profile::hold(0.0); MAX_AXES];
+        let hold = [Profile::hold(0.0); AXES];
         Self { first: hold, second: hold, is_second_present: false, duration_s: 0.0, time_s: 0.0 }
     }
 }
 
-impl Motion {
+impl<const AXES: usize> GroupTrajectory<AXES> {
     /// Plans a coordinated move within fractions of the limits: on a straight line from rest to rest, and otherwise where
     /// that takes no longer. On error the present motion goes on.
     pub fn move_to<'a>(
@@ -55,8 +54,8 @@ impl Motion {
         acceleration_scale: f64,
         minimum_duration_s: f64,
     ) -> Result<(), PlanError> {
-        let problems: ArrayVec<Problem, MAX_AXES> = legs
-            .take(MAX_AXES)
+        let problems: ArrayVec<Problem, AXES> = legs
+            .take(AXES)
             .map(|leg| Problem {
                 start: leg.start,
                 target: leg.target,
@@ -70,7 +69,8 @@ impl Motion {
             if is_from_rest_to_rest { Synchronisation::Straight } else { Synchronisation::Phase };
         // Where a limit has just been lowered, slow down to it and no further.
         let return_to_limits = Return::Settled;
-        let timing = Timing { synchronisation, minimum_duration_s, return_to_limits, ..Timing::default() };
+        let timing =
+            PlanOptions { synchronisation, minimum_duration_s, return_to_limits, ..PlanOptions::default() };
         let duration_s = plan::synchronised(&problems, self.free(problems.len()), timing)?;
         self.begin(duration_s);
         Ok(())
@@ -78,9 +78,9 @@ impl Motion {
 
     /// Plans the fastest coordinated stop. On error the present motion goes on.
     pub fn stop<'a>(&mut self, axes: impl Iterator<Item = (State, &'a AxisLimits)>) -> Result<(), PlanError> {
-        let mut starts: ArrayVec<State, MAX_AXES> = ArrayVec::new();
-        let mut limits: ArrayVec<Limits, MAX_AXES> = ArrayVec::new();
-        for (start, axis) in axes.take(MAX_AXES) {
+        let mut starts: ArrayVec<State, AXES> = ArrayVec::new();
+        let mut limits: ArrayVec<Limits, AXES> = ArrayVec::new();
+        for (start, axis) in axes.take(AXES) {
             starts.push(start);
             limits.push(stop_limits(&start, axis));
         }
@@ -197,7 +197,7 @@ mod tests {
     fn a_move_that_is_to_be_gentle_takes_a_high_acceleration_back_before_the_velocity_limit() {
         let start = State { position: 0.0, velocity: 1.9, acceleration: 4.0 };
         let target = State { position: 2.5, ..State::default() };
-        let mut motion = Motion::default();
+        let mut motion = GroupTrajectory::<2>::default();
         motion.move_to([Leg { start, target, limits: &LIMITS }].into_iter(), 1.0, 0.1, 0.0).unwrap();
         while !motion.is_finished() {
             motion.advance(0.001);
@@ -212,7 +212,7 @@ mod tests {
         let slow = AxisLimits { deceleration: 1.0, ..LIMITS };
         for jerk in [100.0, f64::INFINITY] {
             let (quick, slow) = (AxisLimits { jerk, ..LIMITS }, AxisLimits { jerk, ..slow });
-            let mut motion = Motion::default();
+            let mut motion = GroupTrajectory::<2>::default();
             // 0.5 rad/s at 8 rad/s² take less than 0.06 rad; in the 2 s of the other axis they would take 0.5 rad.
             motion.stop([(at(2.9, 0.5), &quick), (at(0.0, 2.0), &slow)].into_iter()).unwrap();
             let mut farthest: f64 = 2.9;
@@ -230,7 +230,7 @@ mod tests {
             let limits = AxisLimits { jerk, ..LIMITS };
             let start = State::default();
             let target = State { position: 0.333, velocity: 1.1, acceleration: 0.0 };
-            let mut motion = Motion::default();
+            let mut motion = GroupTrajectory::<2>::default();
             motion.move_to([Leg { start, target, limits: &limits }].into_iter(), 0.7, 0.7, 0.0).unwrap();
             let (mut last, mut before) = (start, start);
             while !motion.is_finished() {

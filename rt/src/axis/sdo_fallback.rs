@@ -1,0 +1,185 @@
+//! The drive's controlword by SDO: what is left for a drive that takes no process data any more.
+
+use super::Axis;
+use crate::cia402::controlword;
+use crate::dialect::Dialect;
+use crate::frame::{Frame, Id};
+use crate::watch::{NmtState, nmt_command, node_state};
+
+/// Function codes of an SDO request and of its answer (CiA 301, 7.3.3).
+const SDO_REQUEST: u16 = 0x600;
+const SDO_ANSWER: u16 = 0x580;
+/// Download of two bytes to 6040:00 in one frame, and its confirmation (CiA 301, 7.2.4.3.3).
+const DOWNLOAD_CONTROLWORD: [u8; 4] = [0x2B, 0x40, 0x60, 0x00];
+const CONTROLWORD_DOWNLOADED: [u8; 4] = [0x60, 0x40, 0x60, 0x00];
+
+/// The controlword that a drive is to have by SDO.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum SdoFallback {
+    /// Process data serve.
+    #[default]
+    Unused,
+    /// The controlword is being written.
+    Writing {
+        /// Which.
+        word: u16,
+        /// Slots until it is written, or written again.
+        wait_slots: u32,
+        /// Whether the node has just been sent to pre-operational, where it has an SDO server.
+        is_woken: bool,
+    },
+    /// The drive has confirmed the controlword.
+    Confirmed {
+        /// Which.
+        word: u16,
+    },
+}
+
+impl SdoFallback {
+    fn word(self) -> Option<u16> {
+        match self {
+            Self::Unused => None,
+            Self::Writing { word, .. } | Self::Confirmed { word } => Some(word),
+        }
+    }
+
+    /// Lets a slot pass in which the drive is to have this controlword, or needs none.
+    fn pass(&mut self, wanted: Option<u16>) {
+        if self.word() != wanted {
+            *self =
+                wanted.map_or(Self::Unused, |word| Self::Writing { word, wait_slots: 0, is_woken: false });
+        } else if let Self::Writing { wait_slots, .. } = self {
+            *wait_slots = wait_slots.saturating_sub(1);
+        }
+    }
+
+    /// The frame that is due, if one is. It is due again after so many slots, unless it is confirmed before.
+    fn frame(&mut self, node: u8, nmt_state: NmtState, repeat_slots: u32) -> Option<Frame> {
+        let Self::Writing { word, wait_slots: wait_slots @ 0, is_woken } = self else { return None };
+        // A stopped node has no SDO server.
+        if nmt_state == NmtState::Stopped && !*is_woken {
+            *is_woken = true;
+            return Some(Frame::of(Id::canopen(0, 0), [nmt_command::ENTER_PRE_OPERATIONAL, node]));
+        }
+        *is_woken = false;
+        *wait_slots = repeat_slots;
+        let [command, index_low, index_high, subindex] = DOWNLOAD_CONTROLWORD;
+        let [low, high] = word.to_le_bytes();
+        let request = [command, index_low, index_high, subindex, low, high, 0, 0];
+        Some(Frame::of(Id::canopen(SDO_REQUEST, node), request))
+    }
+
+    /// Takes a frame that may be the confirmation.
+    fn receive(&mut self, node: u8, frame: &Frame) {
+        if let Self::Writing { word, .. } = *self
+            && frame.id() == Id::canopen(SDO_ANSWER, node)
+            && frame.payload().starts_with(&CONTROLWORD_DOWNLOADED)
+        {
+            *self = Self::Confirmed { word };
+        }
+    }
+
+    /// Whether the drive has confirmed that its power is to be off.
+    fn is_switched_off(self) -> bool {
+        self == Self::Confirmed { word: controlword::DISABLE_VOLTAGE }
+    }
+}
+
+impl Axis {
+    /// Takes an NMT command that another master has given to the node.
+    pub fn receive_foreign_nmt(&mut self, command: u8) {
+        self.node_monitor.receive_foreign_nmt(command);
+    }
+
+    /// Updates whether process data reach the node, see [`Axis::is_pdo_unreachable`]. Called in each slot in which drives may
+    /// have power.
+    pub fn note_pdo_reachability(&mut self) {
+        self.node_monitor.note_pdo_reachability(self.reception.age_cycles());
+    }
+
+    /// Whether the node takes no process data any more: its NMT state is another one than operational, and its feedback stays
+    /// away. That remains so until the node is watched anew.
+    pub fn is_pdo_unreachable(&self) -> bool {
+        self.node_monitor.is_pdo_unreachable()
+    }
+
+    /// The controlword that stops a drive which process data do not reach.
+    pub fn sdo_stop_word(&self) -> u16 {
+        match self.parameters.dialect {
+            _ if !self.drive_state().has_torque() => controlword::DISABLE_VOLTAGE,
+            Dialect::Cia402 => controlword::QUICK_STOP,
+            // It has no quick stop; its halt keeps the shaft locked.
+            Dialect::YzAim => controlword::ENABLE_OPERATION | controlword::HALT,
+        }
+    }
+
+    /// Lets a slot pass in which the drive is to have this controlword by SDO, or needs none.
+    pub fn command_by_service(&mut self, word: Option<u16>) {
+        self.sdo_fallback.pass(word);
+    }
+
+    /// The frame that is due to write that controlword, if one is. It is due again after so many slots, unless the drive
+    /// confirms it before.
+    pub fn service_frame(&mut self, repeat_slots: u32) -> Option<Frame> {
+        self.sdo_fallback.frame(self.parameters.node, self.node_monitor.nmt_state(), repeat_slots)
+    }
+
+    /// Takes a frame that may confirm a controlword that was written by SDO.
+    pub fn receive_service(&mut self, frame: &Frame) {
+        self.sdo_fallback.receive(self.parameters.node, frame);
+    }
+
+    /// Whether the drive has torque, as far as it can be known: an SDO confirmation is newer than the last statusword.
+    pub fn has_torque(&self) -> bool {
+        self.drive_state().has_torque() && !self.sdo_fallback.is_switched_off()
+    }
+
+    /// Takes the state in a boot-up message or heartbeat.
+    pub fn receive_error_control(&mut self, state: u8) {
+        self.node_monitor.receive(state);
+        // A stopped YZ-AIM says nothing, and one with an alarm says "stopped" (manual, 5.11.1).
+        if state == node_state::STOPPED && self.parameters.dialect == Dialect::Cia402 {
+            self.node_monitor.receive_foreign_nmt(nmt_command::STOP);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const NODE: u8 = 5;
+
+    fn confirmation() -> Frame {
+        Frame::of(Id::canopen(SDO_ANSWER, NODE), [0x60, 0x40, 0x60, 0, 0, 0, 0, 0])
+    }
+
+    #[test]
+    fn a_controlword_is_written_again_until_it_is_confirmed() {
+        let mut fallback = SdoFallback::default();
+        let written = |fallback: &mut SdoFallback| {
+            fallback.pass(Some(controlword::QUICK_STOP));
+            fallback.frame(NODE, NmtState::PreOperational, 3).is_some()
+        };
+        let slots = [0; 7].map(|_| written(&mut fallback));
+        assert_eq!(slots, [true, false, false, true, false, false, true]);
+        fallback.receive(NODE, &confirmation());
+        assert_eq!([0; 7].map(|_| written(&mut fallback)), [false; 7]);
+        assert!(!fallback.is_switched_off());
+        // Another controlword is written at once, and needs its own confirmation.
+        fallback.pass(Some(controlword::DISABLE_VOLTAGE));
+        assert!(fallback.frame(NODE, NmtState::PreOperational, 3).is_some());
+        fallback.receive(NODE, &confirmation());
+        assert!(fallback.is_switched_off());
+        fallback.pass(None);
+        assert_eq!(fallback, SdoFallback::Unused);
+    }
+
+    #[test]
+    fn a_stopped_node_is_sent_to_pre_operational_before_each_write() {
+        let mut fallback = SdoFallback::default();
+        fallback.pass(Some(0));
+        let ids = [0; 3].map(|_| fallback.frame(NODE, NmtState::Stopped, 2).map(|frame| frame.id().value()));
+        assert_eq!(ids, [Some(0), Some(0x605), None]);
+    }
+}

@@ -1,0 +1,214 @@
+//! Where an axis is to be: its set-points, and what the guard says of them.
+
+use super::Axis;
+use super::delay::SetPointDelay;
+use super::power::Power;
+use crate::fault::Rule;
+use crate::guard::{self, SetPointSteps, Violation};
+use crate::plan::State;
+
+/// The set-points of an axis, on their way from the source to the drive.
+#[derive(Clone, Debug, Default)]
+pub(super) struct SetPoints {
+    /// Of this cycle, the last, and the one before.
+    newest: [State; 3],
+    /// Those that wait until the axes on slower buses are as far.
+    delay: SetPointDelay,
+    /// Those that were sent in this cycle, in the last, and in the one before.
+    sent: [State; 3],
+}
+
+impl SetPoints {
+    /// From now on set-points wait for so many cycles before they are sent.
+    pub(super) fn set_delay(&mut self, cycles: u32) {
+        self.delay.set(cycles);
+    }
+
+    /// The newest set-point.
+    pub(super) const fn newest(&self) -> State {
+        self.newest[0]
+    }
+
+    /// The positions of this cycle, the last, and the one before.
+    pub(super) fn positions(&self) -> [f64; 3] {
+        self.newest.map(|state| state.position)
+    }
+
+    /// How much the acceleration has changed in this cycle.
+    pub(super) fn acceleration_change(&self) -> f64 {
+        self.newest[0].acceleration - self.newest[1].acceleration
+    }
+
+    /// Takes the next set-point.
+    pub(super) fn push(&mut self, next: State) {
+        self.newest = [next, self.newest[0], self.newest[1]];
+        self.delay.push(next);
+    }
+
+    /// Gives the newest set-point another velocity and acceleration.
+    pub(super) fn refine_newest(&mut self, state: State) {
+        self.newest[0] = state;
+    }
+
+    /// Rests at a position, as if it had always been there.
+    pub(super) fn rest_at(&mut self, position: f64) {
+        self.newest = [State::rest(position); 3];
+        self.delay.fill(self.newest[0]);
+        self.sent = self.newest;
+    }
+
+    /// Rests where the newest set-point is. What waits to be sent is still sent: a drive that obeys although it says otherwise
+    /// gets no step.
+    pub(super) fn rest_here(&mut self) {
+        self.newest = [State::rest(self.newest[0].position); 3];
+        self.delay.push(self.newest[0]);
+    }
+
+    /// Begins a command: the set-point that is due is sent.
+    pub(super) fn send(&mut self) {
+        self.sent = [self.delay.due(), self.sent[0], self.sent[1]];
+    }
+
+    /// The set-point that is sent in this cycle; it takes effect at the next SYNC.
+    pub(super) const fn sent_now(&self) -> State {
+        self.sent[0]
+    }
+
+    /// The set-point that the joint should have reached when the present feedback was taken.
+    pub(super) const fn due(&self) -> State {
+        self.sent[2]
+    }
+}
+
+impl Axis {
+    /// The newest set-point.
+    pub fn set_point(&self) -> State {
+        self.set_points.newest()
+    }
+
+    /// Gives the newest set-point the velocity and the acceleration that its steps show. Used when a stream ends: what it said
+    /// of its velocity may be wrong, where it has led is known. Whatever is planned from now on goes on from that.
+    pub fn derive_from_steps(&mut self, period_s: f64) {
+        if self.is_profile() {
+            return;
+        }
+        self.set_points.refine_newest(self.state_by_steps(period_s));
+    }
+
+    /// The state of the newest set-point, as the steps to it show it.
+    pub(super) fn state_by_steps(&self, period_s: f64) -> State {
+        let [newest, last, before] = self.set_points.positions();
+        let steps = SetPointSteps { sent: [last, before, before], next: newest, period_s };
+        steps.state(&self.parameters.limits)
+    }
+
+    /// Makes the actual position the set-point, as if it had always been: for an axis whose drive has been sent none.
+    pub fn start_from_actual(&mut self) {
+        self.rest_at(self.joint.position());
+    }
+
+    /// Lets the set-point follow the joint, as the target of a drive that may be enabled on it. It moves no faster than the
+    /// joint may. So it makes no step, whether the reported position does or the drive obeys although it says otherwise.
+    ///
+    /// The set-point of an axis that is latched off stays where it was.
+    pub fn follow_actual(&mut self, period_s: f64) {
+        let here = self.set_point().position;
+        // In a profile mode the drive gets no set-points.
+        let fastest = if self.is_profile() { f64::INFINITY } else { self.parameters.limits.velocity };
+        let most = fastest * period_s;
+        let way = (self.joint.position() - here).clamp(-most, most);
+        // The sum of the difference need not be the actual position to the last bit.
+        let is_there = way.abs() < most;
+        let next = if is_there { self.joint.position() } else { here + way };
+        self.rest_at(if self.power == Power::LatchedOff { here } else { next });
+    }
+
+    /// Leaves the set-point where it is.
+    pub fn stay(&mut self) {
+        if self.is_enabled() {
+            self.advance(State::rest(self.set_point().position));
+        } else {
+            self.set_points.rest_here();
+            self.following.restart();
+        }
+    }
+
+    /// Whether the set-point is where the joint is, but for one step within the limits.
+    pub fn is_on_joint(&self, period_s: f64) -> bool {
+        (self.joint.position() - self.set_point().position).abs()
+            <= self.parameters.limits.velocity * period_s
+    }
+
+    fn rest_at(&mut self, position: f64) {
+        self.set_points.rest_at(position);
+        self.following.clear();
+    }
+
+    /// Checks the next set-point against the guard.
+    pub fn check(&self, next: &State, period_s: f64) -> Result<(), Violation> {
+        let [last, before_last, _] = self.set_points.positions();
+        guard::check(&self.parameters.limits, period_s, before_last, last, next)
+    }
+
+    /// Checks the next set-point of a stream, beyond [`Axis::check`].
+    pub fn check_stream(&self, next: &State, period_s: f64) -> Result<(), Violation> {
+        let limits = &self.parameters.limits;
+        guard::check_jerk(limits.jerk, &self.steps(next, period_s))?;
+        guard::check_braking(limits, &self.steps(next, period_s))
+    }
+
+    /// The set-point within the limits that is nearest to one of a stream.
+    pub fn clamped(&mut self, next: &State, period_s: f64) -> State {
+        self.follow_commands();
+        guard::clamp(&self.parameters.limits, &self.steps(next, period_s))
+    }
+
+    /// A set-point of a stream, of which the position counts: what it says of its velocity and acceleration is fed forward
+    /// as far as its step and the limits agree, so that nobody turns a joint by words alone. What is no number is left to
+    /// [`Axis::check`].
+    pub fn agreeing(&self, next: &State, period_s: f64) -> State {
+        let limits = &self.parameters.limits;
+        let most = limits.acceleration.max(limits.deceleration);
+        let (step, room) = ((next.position - self.set_point().position) / period_s, most * period_s);
+        let within = |value: f64, lowest: f64, highest: f64| value.max(lowest).min(highest);
+        if !(next.velocity.is_finite() && next.acceleration.is_finite() && step.is_finite()) {
+            return *next;
+        }
+        State {
+            position: next.position,
+            velocity: within(next.velocity, step - room, step + room),
+            acceleration: within(next.acceleration, -most, most),
+        }
+    }
+
+    fn steps(&self, next: &State, period_s: f64) -> SetPointSteps {
+        SetPointSteps { sent: self.set_points.positions(), next: next.position, period_s }
+    }
+
+    /// Checks that a stream begins where the joint is. What is no number is left to [`Axis::check`].
+    pub fn check_start(&self, first: &State) -> Result<(), Violation> {
+        let (distance, limit) =
+            ((first.position - self.joint.position()).abs(), self.parameters.start_tolerance);
+        if distance > limit {
+            Err(Violation { rule: Rule::StartPose, value: distance, limit })
+        } else {
+            Ok(())
+        }
+    }
+
+    /// Checks for how long the following error has been too large, if there is feedback of this cycle. [`Axis::watch`] counts.
+    pub fn check_following(&self) -> Result<(), Violation> {
+        if self.feedback_age() > 0 { Ok(()) } else { self.following.check() }
+    }
+
+    /// Has set-points wait for so many cycles before they are sent, for the axes on slower buses.
+    pub fn delay_set_points(&mut self, cycles: u32) {
+        self.set_points.set_delay(cycles);
+    }
+
+    /// Takes the next set-point. In a profile mode there is none: the target stays.
+    pub fn advance(&mut self, next: State) {
+        let next = if self.is_profile() { self.shown_set_point() } else { next };
+        self.set_points.push(next);
+    }
+}

@@ -1,0 +1,39 @@
+//! A set of buses.
+
+/// Some of the buses, by their numbers (0 to 31).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct BusSet(u32);
+
+impl BusSet {
+    /// Adds a bus.
+    pub fn insert(&mut self, bus: usize) {
+        self.0 |= 1 << (bus & 31);
+    }
+
+    /// Takes a bus away. Returns whether it was in the set.
+    pub fn take(&mut self, bus: usize) -> bool {
+        let was_there = self.contains(bus);
+        self.0 &= !(1 << (bus & 31));
+        was_there
+    }
+
+    /// Whether a bus is in the set.
+    pub const fn contains(self, bus: usize) -> bool {
+        self.0 >> (bus & 31) & 1 == 1
+    }
+
+    /// This set less the buses of another.
+    pub const fn without(self, other: Self) -> Self {
+        Self(self.0 & !other.0)
+    }
+
+    /// Whether no bus is in the set.
+    pub const fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+
+    /// Whether all of so many buses, at least one, are in the set.
+    pub const fn is_every_of(self, buses: usize) -> bool {
+        buses > 0 && self.0.count_ones() as usize >= buses
+    }
+}

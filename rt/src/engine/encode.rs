@@ -1,0 +1,183 @@
+//! What leaves in a cycle: SYNC, controlwords and set-points, the heartbeat, TIME, service frames.
+//!
+//! One rule decides, in one place ([`Engine::may_leave`]): after its deadline, or behind a backlog, nothing leaves except what
+//! stops the drives.
+
+use super::state::{GroupState, PowerRemoval};
+use super::{Commands, Deadline, Engine, SendBatch, has_cycle, has_cycle_of};
+use crate::axis::{Axis, FeedbackSince};
+use crate::bus_set::BusSet;
+use crate::cia402::{Goal, controlword};
+use crate::frame::Frame;
+use crate::host::HostInterface;
+use crate::time::Nanoseconds;
+
+/// How long controlword bit 7 is held low before, and high in, a fault reset, and how long the drives have to answer it.
+pub(super) const FAULT_RESET_CYCLES: u32 = 10;
+
+/// What a frame is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Purpose {
+    /// It keeps the drives working.
+    Operate,
+    /// It stops a drive.
+    Stop,
+}
+
+impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
+    /// After its deadline, or behind a backlog, nothing leaves except what stops the drives.
+    fn may_leave(&self, bus: usize, deadline: Deadline, purpose: Purpose) -> bool {
+        purpose == Purpose::Stop || deadline == Deadline::Met && !self.backlog.behind().contains(bus)
+    }
+
+    /// The buses that were behind in the last cycle: before [`Engine::sync`], whoever drives the engine may look again, and name
+    /// those that have caught up since by [`Engine::note_caught_up`].
+    pub fn behind(&self) -> BusSet {
+        self.backlog.behind()
+    }
+
+    /// Takes the buses that have caught up since the last cycle.
+    pub fn note_caught_up(&mut self, buses: BusSet) {
+        self.backlog.clear(buses);
+    }
+
+    /// The SYNC of a bus, if one is to be sent in this slot, now. Answers to an earlier one are late from now on.
+    pub fn sync(&mut self, bus: usize, slot: u64, now_ns: Nanoseconds) -> Option<Frame> {
+        let parameters = self.buses.get(bus)?;
+        let sync_id = parameters.sync_id;
+        let is_due = self.requested.sync && has_cycle(parameters, slot);
+        if !is_due || !self.may_leave(bus, Deadline::Met, Purpose::Operate) {
+            return None;
+        }
+        self.asked_by_sync.insert(bus);
+        let is_skipped = self.skip_sync.take(bus);
+        for axis in self.axes_of(bus) {
+            match axis.parameters().feedback_since {
+                FeedbackSince::Sync if is_skipped => axis.skip_request(now_ns),
+                FeedbackSince::Sync => axis.request_feedback(now_ns),
+                FeedbackSince::SetPoint | FeedbackSince::CommandPhase => {}
+            }
+        }
+        (!is_skipped).then(|| Frame::of(sync_id, []))
+    }
+
+    /// These interfaces had no room for all that they were handed: set-points may be missing.
+    pub fn not_taken(&mut self, buses: BusSet) {
+        self.backlog.note_not_taken(buses);
+    }
+
+    /// The frames of a bus in this cycle, in the order in which they are to leave. Ask for it after [`Engine::compute`], with
+    /// whether the deadline was met by the clock at that moment.
+    pub fn encode(
+        &mut self,
+        bus: usize,
+        deadline: Deadline,
+        host: &mut impl HostInterface<AXES, BUSES>,
+        batch: &mut SendBatch,
+    ) {
+        self.deadline = deadline;
+        if self.may_leave(bus, deadline, Purpose::Operate) {
+            self.encode_set_points(bus, batch);
+            self.encode_heartbeat_and_time(bus, batch);
+        }
+        self.encode_services(bus, deadline, host, batch);
+    }
+
+    fn push(&mut self, frame: Frame, batch: &mut SendBatch) {
+        self.dropped += u64::from(batch.try_push(frame).is_err());
+    }
+
+    /// Controlwords and set-points, where the bus has a cycle in this slot.
+    fn encode_set_points(&mut self, bus: usize, batch: &mut SendBatch) {
+        if self.commands != Commands::Made {
+            return;
+        }
+        let slot = self.present_slot();
+        for index in 0..self.axes.len() {
+            let Some(axis) = self.axes.get(index) else { continue };
+            if usize::from(axis.parameters().bus) != bus || !has_cycle_of(&self.buses, axis, slot) {
+                continue;
+            }
+            let (goal, reset_word) = (self.goal_of(axis, bus), self.fault_reset_word(axis));
+            let Some(axis) = self.axes.get_mut(index) else { continue };
+            axis.command(goal, reset_word);
+            let lost = axis.frames().filter(|frame| batch.try_push(*frame).is_err()).count();
+            self.dropped += lost as u64;
+        }
+    }
+
+    /// Where a drive is led in this cycle.
+    ///
+    /// A drive that falls out of operation enabled is not enabled again by what the others are still to do. None is enabled
+    /// before its joint is at rest with its target there, nor before it watches the controller by the heartbeat.
+    fn goal_of(&self, axis: &Axis, bus: usize) -> Goal {
+        let goal = self.state.goal();
+        let is_shutting_down = self.state == GroupState::Disabling(PowerRemoval::Shutdown);
+        if is_shutting_down && axis.must_quick_stop() {
+            return Goal::QuickStop;
+        }
+        if goal != Goal::Enabled {
+            return goal;
+        }
+        let is_stopping = self.state == GroupState::Stopping;
+        // A drive that PDOs do not reach is told the same by SDO.
+        if axis.is_pdo_unreachable() || is_stopping && axis.stops_by_itself() {
+            return Goal::QuickStop;
+        }
+        let may_be_enabled = match self.state {
+            GroupState::Enabling => {
+                self.heartbeat.as_ref().is_none_or(|heartbeat| heartbeat.allows_enabling(bus))
+                    && axis.is_power_granted()
+                    && (axis.is_enabled() || axis.is_on_joint(self.period_s))
+            }
+            _ => axis.is_enabled(),
+        };
+        if may_be_enabled { Goal::Enabled } else { Goal::Disabled }
+    }
+
+    /// The controlword of a fault reset, for a drive that is at fault. Bit 7 is low first, so that what follows is an edge
+    /// whatever was sent before; in the end the drives have time to answer.
+    fn fault_reset_word(&self, axis: &Axis) -> Option<u16> {
+        let word = match self.fault_reset_cycles.div_ceil(FAULT_RESET_CYCLES) {
+            0 | 1 => return None,
+            2 => controlword::FAULT_RESET,
+            _ => controlword::DISABLE_VOLTAGE,
+        };
+        axis.drive_state().is_faulted().then_some(word)
+    }
+
+    fn encode_heartbeat_and_time(&mut self, bus: usize, batch: &mut SendBatch) {
+        let heartbeat = self.heartbeat.as_mut().and_then(|heartbeat| heartbeat.take(bus));
+        let time = self.time.and_then(|time| time.message());
+        for frame in heartbeat.into_iter().chain(time) {
+            self.push(frame, batch);
+        }
+    }
+
+    /// Service frames as far as the budget goes. Those that stop a drive come first, and leave in any case.
+    fn encode_services(
+        &mut self,
+        bus: usize,
+        deadline: Deadline,
+        host: &mut impl HostInterface<AXES, BUSES>,
+        batch: &mut SendBatch,
+    ) {
+        let Some(parameters) = self.buses.get(bus) else { return };
+        let budget = match self.state {
+            GroupState::Passive => parameters.service_frames_passive,
+            _ => parameters.service_frames_active,
+        };
+        let may_serve = self.may_leave(bus, deadline, Purpose::Operate);
+        for number in 0..budget.max(1).min(batch.remaining_capacity()) {
+            let stopping = self.sdo_fallback_frame(bus);
+            let frame = match stopping {
+                None if may_serve && number < budget => host.service_frame(bus),
+                stopping => stopping,
+            };
+            match frame {
+                Some(frame) => self.push(frame, batch),
+                None => break,
+            }
+        }
+    }
+}

@@ -1,0 +1,290 @@
+//! What is wrong with the group, and how it stops.
+
+use super::Engine;
+use super::state::{GroupState, PowerRemoval};
+use crate::axis::Axis;
+use crate::control::ControlLaw;
+use crate::fault::Fault;
+use crate::motion_reports::MotionState;
+use crate::plan::{PlanError, State};
+use crate::port::{BusHealth, BusState};
+use crate::record::EventKind;
+use crate::stop::{Origin, StopCause, StopReason};
+use crate::stop_category::StopCategory;
+use crate::watch::{NodeFault, TimingLevel};
+
+impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
+    /// Begins a stop for everything that is wrong while drives may have torque.
+    pub(super) fn check_faults(&mut self, buses: &[BusHealth]) {
+        if !self.state.has_power() {
+            return;
+        }
+        self.check_buses(buses);
+        if self.slots.level() == TimingLevel::Unfit {
+            let (missed, limit) = self.slots.unforgiven();
+            self.fail(Origin::Group, Fault::TimingUnfit { missed, limit });
+        }
+        self.check_transmission();
+        for index in 0..self.axes.len() {
+            if let Some(fault) = self.check_axis(index) {
+                self.fail(Origin::Axis(index as u8), fault);
+            }
+        }
+        self.check_enable_timeout();
+        self.take_power_if_cut_off();
+    }
+
+    fn check_enable_timeout(&mut self) {
+        let (cycles, limit) = (self.state_cycles, self.enable_timeout_cycles);
+        if self.state != GroupState::Enabling || cycles <= limit {
+            return;
+        }
+        let late = self.axes.iter().position(|axis| !axis.is_enabled());
+        let origin = late.map_or(Origin::Group, |axis| Origin::Axis(axis as u8));
+        self.fail(origin, Fault::EnableTimeout { cycles, limit });
+    }
+
+    fn check_buses(&mut self, buses: &[BusHealth]) {
+        for (bus, health) in buses.iter().enumerate().take(self.buses.len()) {
+            let fault = match health.state {
+                BusState::BusOff | BusState::Down => Fault::BusLost,
+                BusState::ErrorPassive => Fault::BusErrorPassive,
+                BusState::ErrorActive => continue,
+            };
+            self.fail(Origin::Bus(bus as u8), fault);
+        }
+        if let Some((bus, id)) = self.foreign_frame.take() {
+            self.fail(Origin::Bus(bus), Fault::ForeignMaster { id });
+        }
+    }
+
+    /// Whether own frames get onto the wire.
+    fn check_transmission(&mut self) {
+        let limit = self.not_transmitted_cycles;
+        let (bus, cycles) = self.backlog.longest_blocked();
+        if cycles <= limit {
+            return;
+        }
+        // The drives of such a bus are where the last set-point left them, and get no other before they are disabled. Those on
+        // a bus that is behind for a cycle or two, while another one is lost, stop with the rest.
+        for axis in &mut self.axes {
+            if self.backlog.behind_cycles(axis.parameters().bus.into()) > limit {
+                axis.latch_off();
+            }
+        }
+        self.fail(Origin::Bus(bus as u8), Fault::NotTransmitted { cycles, limit });
+    }
+
+    fn check_axis(&mut self, index: usize) -> Option<Fault> {
+        let state = &self.state;
+        let axis = self.axes.get_mut(index)?;
+        let is_resetting = self.fault_reset_cycles > 0 && axis.is_being_reset();
+        let check = AxisCheck {
+            // It stops by its own quick stop, which ends without torque.
+            may_be_disabled: matches!(state, GroupState::Enabling | GroupState::Disabling(_))
+                || *state == GroupState::Stopping && axis.stops_by_itself(),
+            is_fault_expected: is_resetting,
+            is_mode_free: matches!(state, GroupState::Disabling(_)),
+            is_in_operation: !matches!(state, GroupState::Enabling | GroupState::Disabling(_)),
+            acknowledge_limit: {
+                // An axis counts in cycles of its bus.
+                let divider = self.buses.get(usize::from(axis.parameters().bus)).map_or(1, |bus| bus.divider);
+                self.acknowledge_timeout_cycles.div_ceil(divider)
+            },
+        };
+        // Whatever else is wrong with the drive: it is not enabled again.
+        if check.is_disabled(axis) || check.is_faulted(axis) {
+            axis.latch_off();
+        }
+        check.fault_of(axis)
+    }
+
+    /// A stop whose commands have not left for too long, because the thread is always late, does not wait for a punctual
+    /// set-point: it takes the power, by SDO.
+    fn take_power_if_cut_off(&mut self) {
+        let is_cut_off = self.slots.late_cycles > self.not_transmitted_cycles;
+        if let Some(stop) = self.stop.filter(|_| is_cut_off && self.state == GroupState::Stopping) {
+            self.begin_stop(stop.cause, stop.origin, StopCategory::Zero);
+        }
+    }
+
+    /// Begins the stop that the configuration has for a fault.
+    pub(super) fn fail(&mut self, origin: Origin, fault: Fault) {
+        self.begin_stop(StopCause::Fault(fault), origin, self.categories.of(fault.rule()));
+    }
+
+    /// Begins a stop. The first fault stays the reason, and a later one can only make the stop harder. That somebody asked
+    /// for the stop is no fault: the first one that comes up before that stop is over takes its place, and must be reset.
+    pub(super) fn begin_stop(&mut self, cause: StopCause, origin: Origin, category: StopCategory) {
+        let wanted = self.possible(category);
+        let (slot, phase) = (self.present_slot(), self.state.phase());
+        let is_under_way = matches!(self.state, GroupState::Stopping | GroupState::Disabling(_));
+        let present = self.stop.filter(|present| is_under_way || !present.is_requested());
+        let hardest = present.map_or(wanted, |present| present.category.min(wanted));
+        let kept = present.filter(|present| !present.is_requested() || cause == StopCause::Requested);
+        let reason = kept.unwrap_or(StopReason { category: wanted, cause, origin, slot, phase });
+        let reason = StopReason { category: hardest, ..reason };
+        self.stop = Some(reason);
+        if kept.is_none() {
+            if cause != StopCause::Requested {
+                // A reset that is under way is not for this fault.
+                self.fault_reset_cycles = 0;
+            }
+            self.emit(EventKind::Stop(reason));
+            self.snapshot.motions.end_all(MotionState::Stopped(reason), |_| {});
+        }
+        if present.is_none_or(|present| wanted < present.category) {
+            self.carry_out(wanted);
+        }
+    }
+
+    /// A joint in profile torque cannot be held where it is: its drive closes no position loop. It stops by the drive's
+    /// quick stop, which ends without torque, and the brake holds it.
+    fn possible(&self, category: StopCategory) -> StopCategory {
+        let is_unheld = self.axes.iter().any(|axis| axis.parameters().law == ControlLaw::ProfileTorque);
+        match category {
+            StopCategory::Two if is_unheld && self.is_under_way() => StopCategory::One,
+            category => category,
+        }
+    }
+
+    /// Whether joints have yet to come to rest before their power is taken: all of them when the group moves, and in one that
+    /// holds those that are still behind their set-points.
+    pub(super) fn must_come_to_rest(&self) -> bool {
+        self.is_under_way() || self.state == GroupState::Holding && self.axes.iter().any(Axis::is_catching_up)
+    }
+
+    /// Whether a stop has something to bring to rest. A joint in profile torque may begin to move by itself.
+    pub(super) fn is_under_way(&self) -> bool {
+        match self.state {
+            GroupState::Moving { .. } | GroupState::Streaming(_) => true,
+            GroupState::Holding => self.axes.iter().any(Axis::is_coasting),
+            _ => false,
+        }
+    }
+
+    fn carry_out(&mut self, category: StopCategory) {
+        match (&self.state, category) {
+            (GroupState::Passive | GroupState::Disabled, _) => {}
+            // While the power goes, the set-points go on to rest at the limits: a drive that is slow to obey
+            // gets no step. Without a trajectory to rest they stay where they are.
+            (_, StopCategory::Zero) => self.remove_power_now(),
+            _ if self.is_under_way() || category == StopCategory::One && self.must_come_to_rest() => {
+                if self.plan_stop().is_ok() {
+                    self.enter(GroupState::Stopping);
+                } else {
+                    // No trajectory to rest can be computed: the drives' own brakes are what is left.
+                    self.remove_power_now();
+                }
+            }
+            (GroupState::Enabling, _) | (GroupState::Holding, StopCategory::One) => {
+                self.enter(GroupState::Disabling(PowerRemoval::Shutdown));
+            }
+            _ => {}
+        }
+    }
+
+    fn remove_power_now(&mut self) {
+        if self.plan_stop().is_err() {
+            self.motion.cancel();
+        }
+        self.enter(GroupState::Disabling(PowerRemoval::DisableVoltage));
+    }
+
+    /// Every axis stays on its set-point.
+    pub(super) fn plan_standstill(&mut self) -> Result<(), PlanError> {
+        self.motion.stop(self.axes.iter().map(|axis| {
+            let standing = State { position: axis.set_point().position, ..State::default() };
+            (standing, &axis.parameters().limits)
+        }))
+    }
+
+    fn plan_stop(&mut self) -> Result<(), PlanError> {
+        self.axes.iter_mut().for_each(Axis::begin_stop);
+        if matches!(self.state, GroupState::Streaming(_)) {
+            self.axes.iter_mut().for_each(|axis| axis.derive_from_steps(self.period_s));
+        }
+        self.motion.stop(self.axes.iter().map(|axis| {
+            let here = axis.set_point();
+            let standing = State { position: here.position, ..State::default() };
+            (if axis.is_profile() { standing } else { here }, &axis.parameters().limits)
+        }))
+    }
+}
+
+/// What is expected of an axis in the present state of the group.
+struct AxisCheck {
+    /// Whether its drive may be out of operation enabled.
+    may_be_disabled: bool,
+    /// Whether the fault that it shows is being reset.
+    is_fault_expected: bool,
+    /// Whether its mode of operation may be any.
+    is_mode_free: bool,
+    /// Whether it is held or moved.
+    is_in_operation: bool,
+    /// Cycles of its bus within which a target must be acknowledged.
+    acknowledge_limit: u32,
+}
+
+impl AxisCheck {
+    fn is_disabled(&self, axis: &Axis) -> bool {
+        !self.may_be_disabled && !axis.is_enabled()
+    }
+
+    fn is_faulted(&self, axis: &Axis) -> bool {
+        axis.drive_state().is_faulted() && !self.is_fault_expected
+    }
+
+    /// The first thing that is wrong with an axis.
+    fn fault_of(&self, axis: &mut Axis) -> Option<Fault> {
+        self.communication_fault(axis)
+            .or_else(|| if self.is_in_operation { self.operation_fault(axis) } else { None })
+    }
+
+    /// What must be right whenever a drive may have torque.
+    fn communication_fault(&self, axis: &Axis) -> Option<Fault> {
+        let limit = axis.parameters().missed_feedback_cycles;
+        if axis.feedback_age() > limit {
+            return Some(Fault::MissedFeedback { cycles: axis.feedback_age(), limit });
+        }
+        if axis.late_cycles() > 0 {
+            return Some(Fault::LateFeedback { cycles: axis.late_cycles() });
+        }
+        if self.is_faulted(axis) {
+            return Some(Fault::DriveFault { error_code: axis.error_code() });
+        }
+        if let Some(fault) = axis.node_fault() {
+            let limit = axis.parameters().heartbeat_timeout_cycles.unwrap_or(0);
+            return Some(match fault {
+                NodeFault::BootUp => Fault::UnexpectedBootUp,
+                NodeFault::NotOperational { state } => Fault::NodeNotOperational { state },
+                NodeFault::Silent { cycles } => Fault::NodeLost { cycles, limit },
+            });
+        }
+        if axis.is_duplicate() {
+            return Some(Fault::DuplicateNode { node: axis.parameters().node });
+        }
+        let foreign_mode = axis.foreign_mode().filter(|_| !self.is_mode_free);
+        foreign_mode
+            .map(|shown| Fault::ModeChanged { shown, expected: axis.parameters().law.operation_mode() })
+    }
+
+    /// What must be right while an axis is held or moved.
+    fn operation_fault(&self, axis: &mut Axis) -> Option<Fault> {
+        if let Some(code) = axis.unexplained_emergency() {
+            return Some(Fault::EmergencyMessage { code });
+        }
+        if self.is_disabled(axis) {
+            return Some(Fault::DriveDisabled { statusword: axis.statusword() });
+        }
+        if let Some(jump) = axis.jump() {
+            return Some(Fault::ImplausibleFeedback { distance: jump.distance, reachable: jump.reach });
+        }
+        let (cycles, limit) = (axis.unacknowledged_cycles(), self.acknowledge_limit);
+        if cycles > limit {
+            return Some(Fault::NotAcknowledged { cycles, limit });
+        }
+        let checked = axis.check_following().and_then(|()| axis.check_profile());
+        checked.err().map(Fault::from)
+    }
+}

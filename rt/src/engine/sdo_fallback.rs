@@ -1,0 +1,60 @@
+//! Stopping drives that PDOs do not reach: their controlword (object 6040) by SDO, from the real-time thread, before the
+//! service frames of the host. PDOs do not reach a node that another master has stopped or reset, and none while the thread is
+//! always late or the bus always behind: the way to switch a drive off does not need a punctual set-point.
+
+use super::Engine;
+use super::state::GroupState;
+use crate::cia402::controlword;
+use crate::frame::Frame;
+use crate::time::{NANOSECONDS_PER_SECOND, Nanoseconds};
+
+/// How long an SDO server may take: a drive answers within a millisecond, one that has just been reset is there within
+/// another.
+const ANSWER_NS: Nanoseconds = NANOSECONDS_PER_SECOND / 100;
+/// How long drives that receive PDOs take to obey the controlwords of disabling, and to show it: a YZ-AIM is told
+/// again after 20 ms.
+const OBEYING_NS: Nanoseconds = NANOSECONDS_PER_SECOND / 20;
+
+impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
+    /// Decides which drives are to be stopped by SDO.
+    pub(super) fn update_sdo_fallback(&mut self) {
+        let has_power = self.state.has_power();
+        let is_disabling = matches!(self.state, GroupState::Disabling(_));
+        let is_overdue = Nanoseconds::from(self.state_cycles).saturating_mul(self.period_ns) > OBEYING_NS;
+        let is_always_late = self.slots.late_cycles > self.not_transmitted_cycles;
+        for axis in &mut self.axes {
+            if has_power {
+                axis.note_pdo_reachability();
+            }
+            let behind_cycles = self.backlog.behind_cycles(axis.parameters().bus.into());
+            let is_cut_off = is_always_late || behind_cycles > self.not_transmitted_cycles;
+            // Whether such a drive receives its PDOs is not known.
+            let is_silent = axis.feedback_age() > axis.parameters().missed_feedback_cycles;
+            let is_to_be_switched_off = axis.is_pdo_unreachable()
+                || axis.drive_state().has_torque() && (is_cut_off || is_silent && is_overdue);
+            let word = if !has_power {
+                None
+            } else if is_disabling && is_to_be_switched_off {
+                Some(controlword::DISABLE_VOLTAGE)
+            } else if axis.is_pdo_unreachable() {
+                Some(axis.sdo_stop_word())
+            } else {
+                None
+            };
+            axis.command_by_service(word);
+        }
+    }
+
+    /// The frame that is due for a drive on a bus.
+    pub(super) fn sdo_fallback_frame(&mut self, bus: usize) -> Option<Frame> {
+        // Every other drive has its turn before one is told again: two frames each, one in a slot.
+        let turns = 2 * self.axes.len() as u32;
+        let repeat_slots = u32::try_from(ANSWER_NS.div_ceil(self.period_ns)).unwrap_or(u32::MAX).max(turns);
+        self.axes_of(bus).find_map(|axis| axis.service_frame(repeat_slots))
+    }
+
+    /// Takes a frame that may be a drive's answer.
+    pub(super) fn receive_sdo_response(&mut self, bus: usize, frame: &Frame) {
+        self.axes_of(bus).for_each(|axis| axis.receive_service(frame));
+    }
+}

@@ -1,0 +1,125 @@
+//! What the cycle begins with: the slot, the frames that have arrived, and what the drives report by them.
+
+use super::{CycleInput, Deadline, Engine, has_cycle_of};
+use crate::axis::{Axis, FeedbackSince};
+use crate::dispatch::Destination;
+use crate::frame::Frame;
+use crate::port::Received;
+use crate::record::{Event, EventKind};
+
+/// Who a received frame is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Receiver {
+    /// The engine has taken all of it.
+    Engine,
+    /// The host is to have it too: it is no process data.
+    Host,
+}
+
+impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
+    /// Takes a frame that arrived on a bus.
+    pub fn receive(&mut self, bus: usize, received: &Received) -> Receiver {
+        let Some(table) = self.dispatch.get(bus) else { return Receiver::Engine };
+        match table.destination(&received.frame) {
+            Destination::Feedback { axis, pdo } => {
+                if let Some(axis) = self.axes.get_mut(usize::from(axis)) {
+                    // A frame that is too short counts as not received: the age of the feedback shows it.
+                    let _ = axis.receive(pdo.into(), &received.frame, received.at_ns);
+                }
+                return Receiver::Engine;
+            }
+            Destination::Unused => return Receiver::Engine,
+            Destination::Emergency { axis } => self.receive_emergency(axis, received),
+            Destination::ErrorControl { axis } => {
+                let state = received.frame.payload().first().copied();
+                if let (Some(axis), Some(state)) = (self.axes.get_mut(usize::from(axis)), state) {
+                    axis.receive_error_control(state);
+                }
+            }
+            Destination::Foreign => {
+                self.foreign_frame.get_or_insert((bus as u8, received.frame.id()));
+                self.receive_foreign_nmt(bus, &received.frame);
+            }
+            Destination::Service => self.receive_sdo_response(bus, &received.frame),
+        }
+        Receiver::Host
+    }
+
+    fn receive_emergency(&mut self, axis: u8, received: &Received) {
+        let [low, high, register, manufacturer @ ..] = received.frame.first_word().to_le_bytes();
+        let code = u16::from_le_bytes([low, high]);
+        if let Some(axis) = self.axes.get_mut(usize::from(axis)) {
+            axis.receive_emergency(code);
+        }
+        let kind = EventKind::Emergency { axis, code, register, manufacturer };
+        self.events.push(Event { slot: self.present_slot(), at_ns: received.at_ns, kind });
+    }
+
+    /// Takes what another master has told the nodes of a bus.
+    fn receive_foreign_nmt(&mut self, bus: usize, frame: &Frame) {
+        let (0, &[command, node]) = (frame.id().value(), frame.payload()) else { return };
+        for axis in self.axes_of(bus).filter(|axis| node == 0 || node == axis.parameters().node) {
+            axis.receive_foreign_nmt(command);
+        }
+    }
+
+    /// A received frame for the host found no room there.
+    pub fn count_dropped(&mut self) {
+        self.dropped += 1;
+    }
+
+    pub(super) fn axes_of(&mut self, bus: usize) -> impl Iterator<Item = &mut Axis> {
+        self.axes.iter_mut().filter(move |axis| usize::from(axis.parameters().bus) == bus)
+    }
+
+    /// Begins the cycle of a slot with what has been received.
+    pub(super) fn sense(&mut self, input: &CycleInput<'_>) {
+        self.now_ns = input.now_ns;
+        self.deadline = Deadline::Met;
+        let elapsed = self.slots.begin(input.slot);
+        if self.slots.missed_now > 0 {
+            self.emit(EventKind::MissedSlots { count: self.slots.missed_now });
+        }
+        if let Some(level) = self.slots.changed_level() {
+            self.emit(EventKind::Timing { level });
+        }
+        if let Some(heartbeat) = &mut self.heartbeat {
+            heartbeat.pass(elapsed);
+        }
+        if let Some(time) = &mut self.time {
+            time.pass(elapsed, input.now_ns);
+        }
+        self.backlog.pass(input.behind);
+        let elapsed_s = self.period_s * elapsed as f64;
+        let asked_by_sync = core::mem::take(&mut self.asked_by_sync);
+        for axis in &mut self.axes {
+            // A drive that was not asked, because the thread was late or the bus behind, has not missed its answer.
+            let is_unasked = self.requested.sync
+                && axis.parameters().feedback_since == FeedbackSince::Sync
+                && !asked_by_sync.contains(axis.parameters().bus.into());
+            if has_cycle_of(&self.buses, axis, input.slot) && !is_unasked {
+                axis.begin_cycle(elapsed_s);
+                if axis.parameters().feedback_since != FeedbackSince::Sync {
+                    axis.expect_feedback(input.now_ns);
+                }
+            } else {
+                axis.wait(elapsed_s)
+            }
+            axis.watch();
+        }
+        self.report_drive_states();
+    }
+
+    /// Emits an event for each drive whose state has changed since the last record.
+    fn report_drive_states(&mut self) {
+        for index in 0..self.axes.len() {
+            let (Some(axis), Some(recorded)) = (self.axes.get(index), self.record.axes.get(index)) else {
+                continue;
+            };
+            let (state, statusword) = (axis.drive_state(), axis.statusword());
+            if recorded.drive_state != state {
+                self.emit(EventKind::DriveState { axis: index as u8, state, statusword });
+            }
+        }
+    }
+}

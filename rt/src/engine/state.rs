@@ -1,0 +1,95 @@
+//! What the group is doing, with what only that needs.
+//!
+//! ```text
+//! phase      leaves when …                                                           for
+//! ─────────  ──────────────────────────────────────────────────────────────────────  ─────────────────────
+//! Passive    Request::Activate                                                       Disabled
+//! Disabled   Request::Enable                                                         Enabling
+//! Enabling   every drive shows operation enabled                                     Holding
+//!            a stop, Request::Disable                                                Disabling
+//! Holding    Request::Move, Request::SetProfileTarget                                Moving
+//!            Request::Stream                                                         Streaming
+//!            Request::Disable, a stop of category 1 or 0                             Stopping, Disabling
+//! Moving     the targets are reached                                                 Holding
+//!            Request::Disable, a stop                                                Stopping, Disabling (0)
+//! Streaming  Request::Disable, a stop                                                Stopping, Disabling (0)
+//! Stopping   the joints are at rest                                                  Holding (2), Disabling (1)
+//!            it gets harder (category 0)                                             Disabling
+//! Disabling  no drive shows torque any more, or the patience is over                 Disabled
+//! ```
+//!
+//! A number in brackets is a stop category of IEC 60204-1.
+
+use crate::cia402::Goal;
+use crate::host::StreamCommand;
+use crate::phase::Phase;
+
+/// What the group is doing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum GroupState<const AXES: usize> {
+    Passive,
+    Disabled,
+    Enabling,
+    Holding,
+    Moving {
+        /// Whether the end of the motion has been reported; a velocity or a torque goes on after that.
+        is_reported: bool,
+    },
+    Streaming(Stream<AXES>),
+    Stopping,
+    Disabling(PowerRemoval),
+}
+
+/// What a stream has brought so far.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Stream<const AXES: usize> {
+    /// No command yet: the set-points stay.
+    Awaited,
+    /// The first command has come, and has yet to be checked against where the joints are.
+    Begins(StreamCommand<AXES>),
+    /// A command has come, and has yet to be made set-points of.
+    Follows(StreamCommand<AXES>),
+    /// No newer command has come than this one: the motion of the stream goes on, up to its expiry.
+    Continues(StreamCommand<AXES>),
+}
+
+/// How the power is taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum PowerRemoval {
+    /// By the way of CiA 402: ready to switch on.
+    Shutdown,
+    /// At once: disable voltage.
+    DisableVoltage,
+}
+
+impl<const AXES: usize> GroupState<AXES> {
+    /// The phase that observers see.
+    pub(super) const fn phase(&self) -> Phase {
+        match self {
+            Self::Passive => Phase::Passive,
+            Self::Disabled => Phase::Disabled,
+            Self::Enabling => Phase::Enabling,
+            Self::Holding => Phase::Holding,
+            Self::Moving { .. } => Phase::Moving,
+            Self::Streaming(_) => Phase::Streaming,
+            Self::Stopping => Phase::Stopping,
+            Self::Disabling(_) => Phase::Disabling,
+        }
+    }
+
+    /// Where the drives are led.
+    pub(super) const fn goal(&self) -> Goal {
+        match self {
+            Self::Passive | Self::Disabled | Self::Disabling(PowerRemoval::Shutdown) => Goal::Disabled,
+            Self::Disabling(PowerRemoval::DisableVoltage) => Goal::NoVoltage,
+            Self::Enabling | Self::Holding | Self::Moving { .. } | Self::Streaming(_) | Self::Stopping => {
+                Goal::Enabled
+            }
+        }
+    }
+
+    /// Whether a drive may have torque.
+    pub(super) const fn has_power(&self) -> bool {
+        !matches!(self, Self::Passive | Self::Disabled)
+    }
+}

@@ -1,0 +1,321 @@
+//! One step of the group: what each phase makes of the next set-points.
+//!
+//! A phase proposes the next set-points, the guard checks them, the axes take them. Where that fails, the group stops from
+//! where it was, in this same cycle.
+
+use arrayvec::ArrayVec;
+
+use super::state::{GroupState, PowerRemoval, Stream};
+use super::{Commands, Engine};
+use crate::axis::{Axis, FeedbackSince};
+use crate::fault::Fault;
+use crate::guard::{OnViolation, Violation};
+use crate::host::StreamCommand;
+use crate::motion_reports::MotionState;
+use crate::plan::State;
+use crate::record::{Event, EventKind};
+use crate::stop::{Origin, StopCause};
+use crate::stop_category::StopCategory;
+use crate::time::Nanoseconds;
+
+/// Cycles from one probe for late drives to the next: their silence must have been received.
+const PROBE_AGAIN_CYCLES: u32 = 64;
+/// For so long a stop waits at most for a joint that follows set-points and is behind them.
+const CATCHING_UP_S: f64 = 0.5;
+/// A phase, the stop that it fails into, and that stop at once where its first step fails too. Taking the power never fails.
+const ATTEMPTS: usize = 3;
+
+/// The first thing that keeps a step from being made.
+type Failure = (Origin, Fault);
+
+impl<const AXES: usize> Stream<AXES> {
+    /// Takes the newest command. One that has expired before the stream begins is none.
+    pub(super) fn receive(&mut self, command: StreamCommand<AXES>, now_ns: Nanoseconds) {
+        *self = match self {
+            Self::Awaited if command.valid_until_ns < now_ns => Self::Awaited,
+            Self::Awaited | Self::Begins(_) => Self::Begins(command),
+            Self::Follows(_) | Self::Continues(_) => Self::Follows(command),
+        };
+    }
+}
+
+impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
+    /// Makes the next set-points, unless those of the last cycle have still to leave, or every bus is behind.
+    pub(super) fn step(&mut self) {
+        let is_every_bus_behind = self.backlog.behind().is_every_of(self.buses.len());
+        // A group that stops does not wait for the wire any longer, whatever it stops for.
+        let is_over_waiting =
+            self.stop.is_some() && self.backlog.longest_blocked().1 > self.not_transmitted_cycles;
+        let must_wait = is_every_bus_behind && !is_over_waiting;
+        let is_held = self.commands == Commands::Held;
+        self.commands = match self.state {
+            GroupState::Passive => Commands::None,
+            _ if must_wait && is_held => Commands::Held,
+            _ if must_wait => Commands::None,
+            _ => Commands::Made,
+        };
+        if must_wait || is_held {
+            // Drives may have obeyed what was said by SDO.
+            return self.end_disabling();
+        }
+        for _ in 0..ATTEMPTS {
+            match self.step_phase() {
+                Ok(()) => return,
+                Err((origin, fault)) if self.state == GroupState::Stopping => {
+                    self.begin_stop(StopCause::Fault(fault), origin, StopCategory::Zero);
+                }
+                Err((origin, fault)) => self.fail(origin, fault),
+            }
+        }
+    }
+
+    fn step_phase(&mut self) -> Result<(), Failure> {
+        match self.state {
+            GroupState::Passive => {}
+            GroupState::Disabled | GroupState::Holding => self.hold(),
+            GroupState::Enabling => self.step_enabling(),
+            GroupState::Moving { is_reported } => self.step_move(is_reported)?,
+            GroupState::Streaming(stream) => self.step_stream(stream)?,
+            GroupState::Stopping => self.step_stop()?,
+            GroupState::Disabling(_) => {
+                self.come_to_rest();
+                self.end_disabling();
+            }
+        }
+        Ok(())
+    }
+
+    /// Enabled axes stay on their set-point; the set-point of the others follows them.
+    fn hold(&mut self) {
+        for axis in &mut self.axes {
+            if axis.is_enabled() { axis.stay() } else { axis.follow_actual(self.period_s) }
+        }
+    }
+
+    fn step_enabling(&mut self) {
+        self.hold();
+        self.probe_late_drives();
+        self.axes.iter_mut().for_each(|axis| axis.prepare_to_enable(self.period_s));
+        if self.axes.iter().all(|axis| axis.is_power_granted() && axis.is_enabled()) {
+            self.enter(GroupState::Holding);
+        }
+    }
+
+    /// Skips what requests feedback from a drive that has not answered every time in its own cycle, a SYNC of its bus or a
+    /// set-point: before the drives are enabled, that disturbs nothing.
+    fn probe_late_drives(&mut self) {
+        if !self.state_cycles.is_multiple_of(PROBE_AGAIN_CYCLES) {
+            return;
+        }
+        for axis in self.axes.iter_mut().filter(|axis| axis.is_reply_unverified()) {
+            match axis.parameters().feedback_since {
+                FeedbackSince::SetPoint => axis.skip_next_set_point(),
+                _ => self.skip_sync.insert(axis.parameters().bus.into()),
+            }
+        }
+    }
+
+    fn step_move(&mut self, is_reported: bool) -> Result<(), Failure> {
+        for (index, axis) in self.axes.iter().enumerate() {
+            let expired_ns = axis.expired_ns(self.now_ns);
+            if expired_ns > 0 {
+                let age_cycles = expired_ns.div_ceil(self.period_ns);
+                return Err((Origin::Axis(index as u8), Fault::StaleCommand { age_cycles }));
+            }
+        }
+        self.follow_motion()?;
+        if self.motion.is_finished() {
+            self.end_move(is_reported);
+        }
+        Ok(())
+    }
+
+    /// The planned part of a move is over; drives in profile modes may still be on their way.
+    fn end_move(&mut self, is_reported: bool) {
+        let is_passing = self.motion.states().take(self.axes.len()).any(|state| state.velocity != 0.0);
+        if !is_passing && !self.axes.iter().all(Axis::is_target_reached) {
+            return;
+        }
+        if !is_reported {
+            self.state = GroupState::Moving { is_reported: true };
+            let (slot, at_ns, events) = (self.present_slot(), self.now_ns, &mut self.events);
+            self.snapshot.motions.end_all(MotionState::Finished, |request| {
+                events.push(Event { slot, at_ns, kind: EventKind::MotionFinished { request } });
+            });
+        }
+        if is_passing {
+            self.begin_stop(StopCause::Requested, Origin::Group, StopCategory::Two);
+        } else if !self.axes.iter().any(Axis::is_moving_on_command) {
+            self.enter(GroupState::Holding);
+        }
+    }
+
+    fn step_stop(&mut self) -> Result<(), Failure> {
+        self.follow_motion()?;
+        if self.motion.is_finished() {
+            self.end_stop();
+        }
+        Ok(())
+    }
+
+    /// The planned part of a stop is over. A joint in a profile mode gets the time that its limits allow for, and one that
+    /// follows set-points some to catch up before its power is taken.
+    fn end_stop(&mut self) {
+        let category = self.stop.map(|stop| stop.category);
+        let stopping_for_s = f64::from(self.state_cycles) * self.period_s;
+        let standing_for_s = self.motion.overrun_s();
+        let is_waited_for = |axis: &Axis| {
+            let is_in_time = match axis.is_profile() {
+                true => stopping_for_s < stopping_s(axis),
+                false => category != Some(StopCategory::Two) && standing_for_s < CATCHING_UP_S,
+            };
+            is_in_time && !axis.has_stopped()
+        };
+        if self.axes.iter().any(is_waited_for) {
+            return;
+        }
+        self.enter(match category {
+            Some(StopCategory::Two) => GroupState::Holding,
+            _ => GroupState::Disabling(PowerRemoval::Shutdown),
+        });
+    }
+
+    /// Goes on by one period on the planned motion.
+    fn follow_motion(&mut self) -> Result<(), Failure> {
+        self.motion.advance(self.period_s);
+        let next = self.planned();
+        self.check(&next)?;
+        self.take_set_points(&next);
+        Ok(())
+    }
+
+    fn planned(&self) -> ArrayVec<State, AXES> {
+        self.motion.states().take(self.axes.len()).collect()
+    }
+
+    fn check(&self, next: &[State]) -> Result<(), Failure> {
+        self.first_violation(next, |axis, state| axis.check(state, self.period_s))
+    }
+
+    /// The first axis that follows set-points and whose next one does not pass a check.
+    fn first_violation(
+        &self,
+        next: &[State],
+        check: impl Fn(&Axis, &State) -> Result<(), Violation>,
+    ) -> Result<(), Failure> {
+        for (index, (axis, state)) in self.axes.iter().zip(next).enumerate() {
+            if axis.is_enabled() && !axis.is_profile() {
+                check(axis, state).map_err(|violation| (Origin::Axis(index as u8), violation.into()))?;
+            }
+        }
+        Ok(())
+    }
+
+    fn take_set_points(&mut self, next: &[State]) {
+        for (axis, state) in self.axes.iter_mut().zip(next) {
+            if axis.is_enabled() { axis.advance(*state) } else { axis.stay() }
+        }
+    }
+
+    /// What is still on its way to rest goes on as far as the guard agrees, and everything else stays where it is. No set-point
+    /// follows a joint: a drive whose statusword is false still obeys.
+    fn come_to_rest(&mut self) {
+        if !self.motion.is_finished() && self.follow_motion().is_ok() {
+            return;
+        }
+        self.motion.cancel();
+        self.axes.iter_mut().for_each(Axis::stay);
+    }
+
+    /// Ends the disabling when no drive is waited for any more. A drive that does not show that it has obeyed is not waited
+    /// for without end.
+    fn end_disabling(&mut self) {
+        if !matches!(self.state, GroupState::Disabling(_)) {
+            return;
+        }
+        let is_on_way = !self.motion.is_finished();
+        let is_patient = is_on_way || self.state_cycles <= self.enable_timeout_cycles;
+        // A drive that says nothing has either received what it was told, or has missed the heartbeats for so long that it has
+        // stopped by itself. One that PDOs do not reach is told by SDO.
+        let has_stopped_by_itself = |axis: &Axis| {
+            let divider = self.buses.get(usize::from(axis.parameters().bus)).map_or(1, |bus| bus.divider);
+            let silent_cycles = u32::from(axis.feedback_age()).saturating_mul(divider);
+            let is_over = self.heartbeat.as_ref().is_some_and(|beat| silent_cycles > beat.timeout_cycles());
+            is_over && !is_on_way && !axis.is_pdo_unreachable()
+        };
+        // The set-points of a drive that seems to follow go on to rest, though it may have said otherwise by SDO; and
+        // one that shows no torque yet may be about to have it.
+        let is_waited_for = |axis: &Axis| {
+            let may_have_torque = axis.has_torque()
+                || axis.may_be_switching_on()
+                || is_on_way && axis.drive_state().has_torque();
+            may_have_torque && !has_stopped_by_itself(axis)
+        };
+        if is_patient && self.axes.iter().any(is_waited_for) {
+            return;
+        }
+        self.motion.cancel();
+        self.axes.iter_mut().for_each(Axis::release_latch);
+        self.enter(GroupState::Disabled);
+    }
+
+    fn step_stream(&mut self, stream: Stream<AXES>) -> Result<(), Failure> {
+        let (command, is_new) = match stream {
+            Stream::Awaited => return self.await_stream(),
+            Stream::Begins(command) | Stream::Follows(command) => (command, true),
+            Stream::Continues(command) => (command, false),
+        };
+        if self.now_ns > command.valid_until_ns {
+            let age_cycles = (self.now_ns - command.valid_until_ns).div_ceil(self.period_ns);
+            return Err((Origin::Group, Fault::StaleCommand { age_cycles }));
+        }
+        if matches!(stream, Stream::Begins(_)) {
+            self.first_violation(&command.set_points, Axis::check_start)?;
+        }
+        let next = self.streamed(&command.set_points, is_new)?;
+        self.check(&next)?;
+        self.take_set_points(&next);
+        self.state = GroupState::Streaming(Stream::Continues(command));
+        Ok(())
+    }
+
+    fn await_stream(&mut self) -> Result<(), Failure> {
+        let (cycles, limit) = (self.state_cycles, self.enable_timeout_cycles);
+        if cycles > limit {
+            return Err((Origin::Group, Fault::StreamNotBegun { cycles, limit }));
+        }
+        self.hold();
+        self.axes.iter_mut().for_each(Axis::await_stream);
+        Ok(())
+    }
+
+    /// The next set-points of a stream, each within all limits.
+    fn streamed(&mut self, commands: &[State], are_new: bool) -> Result<ArrayVec<State, AXES>, Failure> {
+        let period_s = self.period_s;
+        let mut next: ArrayVec<State, AXES> = ArrayVec::new();
+        for (index, (axis, command)) in self.axes.iter_mut().zip(commands).enumerate() {
+            if !axis.is_enabled() || axis.is_profile() {
+                next.push(*command);
+                continue;
+            }
+            let streamed = axis.streamed(are_new.then_some(command), period_s);
+            next.push(match (streamed, axis.parameters().on_violation) {
+                (Ok(set_point), _) => set_point,
+                (Err(_), OnViolation::Clamp) => {
+                    self.snapshot.clamped += 1;
+                    axis.clamped(command, period_s)
+                }
+                (Err(violation), OnViolation::Reject) => {
+                    return Err((Origin::Axis(index as u8), violation.into()));
+                }
+            });
+        }
+        Ok(next)
+    }
+}
+
+/// From full speed to rest at the limits, with some patience for the drive's own profile.
+fn stopping_s(axis: &Axis) -> f64 {
+    let limits = &axis.parameters().limits;
+    1.5 * limits.velocity / limits.deceleration + 0.5
+}

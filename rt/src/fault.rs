@@ -1,0 +1,433 @@
+//! What can go wrong: one enum, whose variants carry what was seen and what was allowed.
+
+use crate::cia402::OperationMode;
+use crate::frame::Id;
+use crate::stop_category::StopCategory;
+
+/// What made the group stop without anybody asking for it. Lengths are in rad (m for a linear axis) and their derivatives.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Fault {
+    /// A set-point was not a finite number.
+    NotFinite {
+        /// The position of the set-point.
+        position: f64,
+    },
+    /// A set-point lay outside the position limits; in a profile mode, the place where the joint would come to rest.
+    PositionLimit {
+        /// The position.
+        position: f64,
+        /// The limit that it breaks.
+        limit: f64,
+    },
+    /// A set-point asked for more than the velocity limit; in a profile mode, the joint was faster.
+    VelocityLimit {
+        /// The velocity.
+        velocity: f64,
+        /// The highest speed.
+        limit: f64,
+    },
+    /// A set-point asked for more than the acceleration limit.
+    AccelerationLimit {
+        /// The acceleration.
+        acceleration: f64,
+        /// The highest acceleration.
+        limit: f64,
+    },
+    /// A set-point of a stream asked for more than the jerk limit.
+    JerkLimit {
+        /// The jerk.
+        jerk: f64,
+        /// The highest jerk.
+        limit: f64,
+    },
+    /// A stream began too far from where the joint is.
+    StartPose {
+        /// The distance.
+        distance: f64,
+        /// The largest distance allowed.
+        limit: f64,
+    },
+    /// The joint was farther from its set-point than allowed for longer than allowed.
+    FollowingError {
+        /// The following error.
+        error: f64,
+        /// The largest one allowed.
+        limit: f64,
+    },
+    /// A joint was reported where it cannot be.
+    ImplausibleFeedback {
+        /// The distance from the last plausible position.
+        distance: f64,
+        /// The largest distance that the joint can have moved since.
+        reachable: f64,
+    },
+    /// A stream was begun, and no command came.
+    StreamNotBegun {
+        /// Cycles since the stream was begun.
+        cycles: u32,
+        /// Cycles within which the first command must come.
+        limit: u32,
+    },
+    /// A streamed command, a velocity or a torque expired and was not renewed.
+    StaleCommand {
+        /// Cycles since it expired.
+        age_cycles: u64,
+    },
+    /// A drive has not reported in time for too many cycles.
+    MissedFeedback {
+        /// Cycles of its bus without feedback in time.
+        cycles: u16,
+        /// Cycles that are allowed.
+        limit: u16,
+    },
+    /// A drive reports whole cycles late, in every cycle.
+    LateFeedback {
+        /// Cycles of its bus.
+        cycles: u16,
+    },
+    /// A drive reports a fault.
+    DriveFault {
+        /// Object 603F, or the code of the last emergency message; 0 if the drive gave none.
+        error_code: u16,
+    },
+    /// A drive has left operation enabled by itself.
+    DriveDisabled {
+        /// Object 6041.
+        statusword: u16,
+    },
+    /// A drive shows another mode of operation than the one that it was set to.
+    ModeChanged {
+        /// Object 6061.
+        shown: i8,
+        /// Object 6060.
+        expected: OperationMode,
+    },
+    /// A drive in profile position does not acknowledge its target.
+    NotAcknowledged {
+        /// Cycles of its bus.
+        cycles: u32,
+        /// Cycles within which it must.
+        limit: u32,
+    },
+    /// A drive did not reach operation enabled in time.
+    EnableTimeout {
+        /// Cycles since enabling began.
+        cycles: u32,
+        /// Cycles that are allowed.
+        limit: u32,
+    },
+    /// No trajectory exists for what was asked.
+    NoTrajectory,
+    /// An interface is bus-off or down.
+    BusLost,
+    /// The error counters of an interface are near bus-off.
+    BusErrorPassive,
+    /// Frames of this controller do not get onto the wire.
+    NotTransmitted {
+        /// Cycles in a row.
+        cycles: u32,
+        /// Cycles that are allowed.
+        limit: u32,
+    },
+    /// The heartbeat of a node has not come for too long.
+    NodeLost {
+        /// Cycles since the last one.
+        cycles: u32,
+        /// Cycles that are allowed.
+        limit: u32,
+    },
+    /// A node is in another NMT state than operational.
+    NodeNotOperational {
+        /// The state that its heartbeat shows (CiA 301, 7.2.8.3.2.2).
+        state: u8,
+    },
+    /// A node has started anew while it was to work.
+    UnexpectedBootUp,
+    /// A drive has sent an emergency message, and its statusword shows no fault that would explain it.
+    EmergencyMessage {
+        /// The error code.
+        code: u16,
+    },
+    /// Two nodes answer with one node ID.
+    DuplicateNode {
+        /// The node ID.
+        node: u8,
+    },
+    /// Another master sends SYNC, set-points or NMT commands on the bus.
+    ForeignMaster {
+        /// The identifier of its frame.
+        id: Id,
+    },
+    /// Too many slots were missed.
+    TimingUnfit {
+        /// Missed slots that are not yet forgiven.
+        missed: u32,
+        /// As many are too many.
+        limit: u32,
+    },
+}
+
+/// What is broken by a fault, without the numbers: the key of a configuration and the number of a recording.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[repr(u8)]
+pub enum Rule {
+    /// The stop was asked for.
+    Requested = 0,
+    /// [`Fault::NotFinite`].
+    NotFinite = 1,
+    /// [`Fault::PositionLimit`].
+    PositionLimit = 2,
+    /// [`Fault::VelocityLimit`].
+    VelocityLimit = 3,
+    /// [`Fault::AccelerationLimit`].
+    AccelerationLimit = 4,
+    /// [`Fault::FollowingError`].
+    FollowingError = 5,
+    /// [`Fault::StaleCommand`] and [`Fault::StreamNotBegun`].
+    StaleCommand = 6,
+    /// [`Fault::MissedFeedback`] and [`Fault::LateFeedback`].
+    MissedFeedback = 7,
+    /// [`Fault::DriveFault`].
+    DriveFault = 8,
+    /// [`Fault::DriveDisabled`].
+    DriveDisabled = 9,
+    /// [`Fault::ModeChanged`].
+    ModeChanged = 10,
+    /// [`Fault::EnableTimeout`].
+    EnableTimeout = 11,
+    /// [`Fault::NoTrajectory`].
+    NoTrajectory = 12,
+    /// [`Fault::BusLost`].
+    BusLost = 13,
+    /// [`Fault::NotTransmitted`].
+    NotTransmitted = 14,
+    /// [`Fault::NotAcknowledged`].
+    NotAcknowledged = 15,
+    /// [`Fault::NodeLost`].
+    NodeLost = 16,
+    /// [`Fault::NodeNotOperational`].
+    NodeNotOperational = 17,
+    /// [`Fault::UnexpectedBootUp`].
+    UnexpectedBootUp = 18,
+    /// [`Fault::EmergencyMessage`].
+    EmergencyMessage = 19,
+    /// [`Fault::DuplicateNode`].
+    DuplicateNode = 20,
+    /// [`Fault::ForeignMaster`].
+    ForeignMaster = 21,
+    /// [`Fault::TimingUnfit`].
+    TimingUnfit = 22,
+    /// [`Fault::StartPose`].
+    StartPose = 23,
+    /// [`Fault::JerkLimit`].
+    JerkLimit = 24,
+    /// [`Fault::BusErrorPassive`].
+    BusErrorPassive = 25,
+    /// [`Fault::ImplausibleFeedback`].
+    ImplausibleFeedback = 26,
+}
+
+impl Fault {
+    /// The rule that is broken.
+    pub const fn rule(&self) -> Rule {
+        match self {
+            Self::NotFinite { .. } => Rule::NotFinite,
+            Self::PositionLimit { .. } => Rule::PositionLimit,
+            Self::VelocityLimit { .. } => Rule::VelocityLimit,
+            Self::AccelerationLimit { .. } => Rule::AccelerationLimit,
+            Self::JerkLimit { .. } => Rule::JerkLimit,
+            Self::StartPose { .. } => Rule::StartPose,
+            Self::FollowingError { .. } => Rule::FollowingError,
+            Self::ImplausibleFeedback { .. } => Rule::ImplausibleFeedback,
+            Self::StreamNotBegun { .. } | Self::StaleCommand { .. } => Rule::StaleCommand,
+            Self::MissedFeedback { .. } | Self::LateFeedback { .. } => Rule::MissedFeedback,
+            Self::DriveFault { .. } => Rule::DriveFault,
+            Self::DriveDisabled { .. } => Rule::DriveDisabled,
+            Self::ModeChanged { .. } => Rule::ModeChanged,
+            Self::NotAcknowledged { .. } => Rule::NotAcknowledged,
+            Self::EnableTimeout { .. } => Rule::EnableTimeout,
+            Self::NoTrajectory => Rule::NoTrajectory,
+            Self::BusLost => Rule::BusLost,
+            Self::BusErrorPassive => Rule::BusErrorPassive,
+            Self::NotTransmitted { .. } => Rule::NotTransmitted,
+            Self::NodeLost { .. } => Rule::NodeLost,
+            Self::NodeNotOperational { .. } => Rule::NodeNotOperational,
+            Self::UnexpectedBootUp => Rule::UnexpectedBootUp,
+            Self::EmergencyMessage { .. } => Rule::EmergencyMessage,
+            Self::DuplicateNode { .. } => Rule::DuplicateNode,
+            Self::ForeignMaster { .. } => Rule::ForeignMaster,
+            Self::TimingUnfit { .. } => Rule::TimingUnfit,
+        }
+    }
+
+    /// What was seen and what was allowed, as two numbers for recordings; 0 where there is none.
+    /// [`Fault::from_numbers`] is the way back.
+    pub fn numbers(&self) -> (f64, f64) {
+        match *self {
+            Self::NotFinite { position } => (position, 0.0),
+            Self::PositionLimit { position, limit } => (position, limit),
+            Self::VelocityLimit { velocity, limit } => (velocity, limit),
+            Self::AccelerationLimit { acceleration, limit } => (acceleration, limit),
+            Self::JerkLimit { jerk, limit } => (jerk, limit),
+            Self::StartPose { distance, limit } => (distance, limit),
+            Self::FollowingError { error, limit } => (error, limit),
+            Self::ImplausibleFeedback { distance, reachable } => (distance, reachable),
+            Self::StaleCommand { age_cycles } => (age_cycles as f64, 0.0),
+            Self::MissedFeedback { cycles, limit } => (cycles.into(), limit.into()),
+            Self::LateFeedback { cycles } => (cycles.into(), 0.0),
+            Self::DriveFault { error_code: code } | Self::EmergencyMessage { code } => (code.into(), 0.0),
+            Self::DriveDisabled { statusword } => (statusword.into(), 0.0),
+            Self::ModeChanged { shown, expected } => (shown.into(), (expected as i8).into()),
+            Self::StreamNotBegun { cycles, limit }
+            | Self::NotAcknowledged { cycles, limit }
+            | Self::EnableTimeout { cycles, limit }
+            | Self::NotTransmitted { cycles, limit }
+            | Self::NodeLost { cycles, limit }
+            | Self::TimingUnfit { missed: cycles, limit } => (cycles.into(), limit.into()),
+            Self::NodeNotOperational { state } => (state.into(), 0.0),
+            Self::DuplicateNode { node } => (node.into(), 0.0),
+            Self::ForeignMaster { id } => (id.value().into(), 0.0),
+            Self::NoTrajectory | Self::BusLost | Self::BusErrorPassive | Self::UnexpectedBootUp => (0.0, 0.0),
+        }
+    }
+
+    /// The fault that these numbers stand for; `None` for [`Rule::Requested`], and for numbers that no fault has.
+    pub fn from_numbers(rule: Rule, seen: f64, allowed: f64) -> Option<Self> {
+        Some(match rule {
+            Rule::Requested => return None,
+            Rule::NotFinite => Self::NotFinite { position: seen },
+            Rule::PositionLimit => Self::PositionLimit { position: seen, limit: allowed },
+            Rule::VelocityLimit => Self::VelocityLimit { velocity: seen, limit: allowed },
+            Rule::AccelerationLimit => Self::AccelerationLimit { acceleration: seen, limit: allowed },
+            Rule::JerkLimit => Self::JerkLimit { jerk: seen, limit: allowed },
+            Rule::StartPose => Self::StartPose { distance: seen, limit: allowed },
+            Rule::FollowingError => Self::FollowingError { error: seen, limit: allowed },
+            Rule::ImplausibleFeedback => Self::ImplausibleFeedback { distance: seen, reachable: allowed },
+            Rule::StaleCommand if allowed > 0.0 => {
+                Self::StreamNotBegun { cycles: seen as u32, limit: allowed as u32 }
+            }
+            Rule::StaleCommand => Self::StaleCommand { age_cycles: seen as u64 },
+            Rule::MissedFeedback if allowed == 0.0 => Self::LateFeedback { cycles: seen as u16 },
+            Rule::MissedFeedback => Self::MissedFeedback { cycles: seen as u16, limit: allowed as u16 },
+            Rule::DriveFault => Self::DriveFault { error_code: seen as u16 },
+            Rule::DriveDisabled => Self::DriveDisabled { statusword: seen as u16 },
+            Rule::ModeChanged => {
+                Self::ModeChanged { shown: seen as i8, expected: OperationMode::from_number(allowed as i8)? }
+            }
+            Rule::NotAcknowledged => Self::NotAcknowledged { cycles: seen as u32, limit: allowed as u32 },
+            Rule::EnableTimeout => Self::EnableTimeout { cycles: seen as u32, limit: allowed as u32 },
+            Rule::NoTrajectory => Self::NoTrajectory,
+            Rule::BusLost => Self::BusLost,
+            Rule::BusErrorPassive => Self::BusErrorPassive,
+            Rule::NotTransmitted => Self::NotTransmitted { cycles: seen as u32, limit: allowed as u32 },
+            Rule::NodeLost => Self::NodeLost { cycles: seen as u32, limit: allowed as u32 },
+            Rule::NodeNotOperational => Self::NodeNotOperational { state: seen as u8 },
+            Rule::UnexpectedBootUp => Self::UnexpectedBootUp,
+            Rule::EmergencyMessage => Self::EmergencyMessage { code: seen as u16 },
+            Rule::DuplicateNode => Self::DuplicateNode { node: seen as u8 },
+            Rule::ForeignMaster => Self::ForeignMaster { id: Id::base(seen as u32).ok()? },
+            Rule::TimingUnfit => Self::TimingUnfit { missed: seen as u32, limit: allowed as u32 },
+        })
+    }
+}
+
+impl Rule {
+    /// Every rule, in the order of their numbers.
+    pub const ALL: [Self; 27] = [
+        Self::Requested,
+        Self::NotFinite,
+        Self::PositionLimit,
+        Self::VelocityLimit,
+        Self::AccelerationLimit,
+        Self::FollowingError,
+        Self::StaleCommand,
+        Self::MissedFeedback,
+        Self::DriveFault,
+        Self::DriveDisabled,
+        Self::ModeChanged,
+        Self::EnableTimeout,
+        Self::NoTrajectory,
+        Self::BusLost,
+        Self::NotTransmitted,
+        Self::NotAcknowledged,
+        Self::NodeLost,
+        Self::NodeNotOperational,
+        Self::UnexpectedBootUp,
+        Self::EmergencyMessage,
+        Self::DuplicateNode,
+        Self::ForeignMaster,
+        Self::TimingUnfit,
+        Self::StartPose,
+        Self::JerkLimit,
+        Self::BusErrorPassive,
+        Self::ImplausibleFeedback,
+    ];
+
+    /// Its word in configurations and reports.
+    pub const fn key(self) -> &'static str {
+        match self {
+            Self::Requested => "requested",
+            Self::NotFinite => "not_finite",
+            Self::PositionLimit => "position_limit",
+            Self::VelocityLimit => "velocity_limit",
+            Self::AccelerationLimit => "acceleration_limit",
+            Self::FollowingError => "following_error",
+            Self::StaleCommand => "stale_command",
+            Self::MissedFeedback => "missed_feedback",
+            Self::DriveFault => "drive_fault",
+            Self::DriveDisabled => "drive_disabled",
+            Self::ModeChanged => "mode_changed",
+            Self::EnableTimeout => "enable_timeout",
+            Self::NoTrajectory => "no_trajectory",
+            Self::BusLost => "bus_lost",
+            Self::NotTransmitted => "not_transmitted",
+            Self::NotAcknowledged => "not_acknowledged",
+            Self::NodeLost => "node_lost",
+            Self::NodeNotOperational => "node_not_operational",
+            Self::UnexpectedBootUp => "unexpected_boot_up",
+            Self::EmergencyMessage => "emergency_message",
+            Self::DuplicateNode => "duplicate_node",
+            Self::ForeignMaster => "foreign_master",
+            Self::TimingUnfit => "timing_unfit",
+            Self::StartPose => "start_pose",
+            Self::JerkLimit => "jerk_limit",
+            Self::BusErrorPassive => "bus_error_passive",
+            Self::ImplausibleFeedback => "implausible_feedback",
+        }
+    }
+
+    /// The stop that this rule asks for unless a configuration says otherwise. A drive that no longer obeys, or
+    /// whose obedience cannot be seen, gets its power removed with the others' in a controlled stop; a bad
+    /// command is a reason to stand still, not to drop the load onto the brakes.
+    pub const fn default_category(self) -> StopCategory {
+        match self {
+            Self::Requested
+            | Self::NotFinite
+            | Self::PositionLimit
+            | Self::VelocityLimit
+            | Self::AccelerationLimit
+            | Self::StaleCommand
+            | Self::NoTrajectory
+            | Self::StartPose
+            | Self::JerkLimit
+            | Self::BusErrorPassive => StopCategory::Two,
+            Self::FollowingError
+            | Self::MissedFeedback
+            | Self::DriveFault
+            | Self::DriveDisabled
+            | Self::ModeChanged
+            | Self::EnableTimeout
+            | Self::BusLost
+            | Self::NotTransmitted
+            | Self::NotAcknowledged
+            | Self::NodeLost
+            | Self::NodeNotOperational
+            | Self::UnexpectedBootUp
+            | Self::EmergencyMessage
+            | Self::DuplicateNode
+            | Self::ForeignMaster
+            | Self::TimingUnfit
+            | Self::ImplausibleFeedback => StopCategory::One,
+        }
+    }
+}

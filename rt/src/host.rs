@@ -1,0 +1,145 @@
+//! The host interface: what the real-time thread shares with the rest of the program, as one trait. Behind it stand a few
+//! bounded, lock-free channels. No call waits; a full channel drops, and says so.
+
+use crate::answers::Answers;
+use crate::cia402;
+use crate::frame::Frame;
+use crate::motion_reports::MotionReports;
+use crate::phase::Phase;
+use crate::plan;
+use crate::port::{BusHealth, Received};
+use crate::record::{CycleRecord, Event, MAX_AXES, MAX_BUSES};
+use crate::request::RequestEnvelope;
+use crate::stop::StopReason;
+use crate::time::Nanoseconds;
+use crate::watch::TimingLevel;
+
+/// What the real-time thread takes from the host and gives to it. Each method has a default that takes or gives nothing, so
+/// that an embedder writes only what it uses.
+pub trait HostInterface<const AXES: usize = MAX_AXES, const BUSES: usize = MAX_BUSES> {
+    /// The oldest request that waits.
+    fn request(&mut self) -> Option<RequestEnvelope<AXES>> {
+        None
+    }
+
+    /// The newest streamed command, if one has come since the last call. Asked for in each cycle in which the group streams,
+    /// and in no other.
+    fn stream(&mut self) -> Option<StreamCommand<AXES>> {
+        None
+    }
+
+    /// The oldest service frame (NMT, SDO …) that waits to be sent on this bus. Not asked for while the bus cannot take it.
+    fn service_frame(&mut self, _bus: usize) -> Option<Frame> {
+        None
+    }
+
+    /// Hands over a frame that is not process data. Returns whether there was room.
+    fn received(&mut self, _bus: usize, _frame: &Received) -> bool {
+        true
+    }
+
+    /// Hands over the record of a cycle. Returns whether there was room.
+    fn record(&mut self, _record: &CycleRecord<AXES>) -> bool {
+        true
+    }
+
+    /// Hands over an event. Returns whether there was room.
+    fn event(&mut self, _event: &Event) -> bool {
+        true
+    }
+
+    /// Shows the present state to every observer.
+    fn publish(&mut self, _snapshot: &Snapshot<AXES, BUSES>) {}
+}
+
+/// One streamed set-point for every axis, with the time at which it loses its meaning.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StreamCommand<const AXES: usize = MAX_AXES> {
+    /// When this command expires; after that the group decelerates and holds.
+    pub valid_until_ns: Nanoseconds,
+    /// Position, velocity and acceleration, an axis each. The position counts; the others are fed forward as far as they
+    /// agree with its steps and the limits.
+    pub set_points: [plan::State; AXES],
+}
+
+/// The state of the controller after a cycle, for any number of observers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Snapshot<const AXES: usize = MAX_AXES, const BUSES: usize = MAX_BUSES> {
+    /// The slot that it describes.
+    pub slot: u64,
+    /// The time at which it was made.
+    pub at_ns: Nanoseconds,
+    /// What the group is doing.
+    pub phase: Phase,
+    /// Slots that passed unused since the start.
+    pub missed_slots: u64,
+    /// How late the controller has been of late.
+    pub timing: TimingLevel,
+    /// Set-points of streams that were replaced by the nearest ones within the limits, since the start.
+    pub clamped: u64,
+    /// Events and records that found no room, since the start.
+    pub dropped: u64,
+    /// Requests that were rejected, since the start.
+    pub rejected: u64,
+    /// What became of the last requests.
+    pub answers: Answers,
+    /// What became of the last motions.
+    pub motions: MotionReports,
+    /// Planned time left of the present move or stop, in seconds.
+    pub remaining_s: f64,
+    /// Why the group stopped or is stopping; `None` again after it has been re-enabled.
+    pub stop: Option<StopReason>,
+    /// How many of `axes` count.
+    pub axis_count: u8,
+    /// The axes in the order of the configuration.
+    pub axes: [AxisSnapshot; AXES],
+    /// How many of `buses` count.
+    pub bus_count: u8,
+    /// The buses in the order of the configuration.
+    pub buses: [BusHealth; BUSES],
+}
+
+impl<const AXES: usize, const BUSES: usize> Default for Snapshot<AXES, BUSES> {
+    fn default() -> Self {
+        Self {
+            slot: 0,
+            at_ns: 0,
+            phase: Phase::default(),
+            missed_slots: 0,
+            timing: TimingLevel::Normal,
+            clamped: 0,
+            dropped: 0,
+            rejected: 0,
+            answers: Answers::default(),
+            motions: MotionReports::default(),
+            remaining_s: 0.0,
+            stop: None,
+            axis_count: 0,
+            axes: [AxisSnapshot::default(); AXES],
+            bus_count: 0,
+            buses: [BusHealth::default(); BUSES],
+        }
+    }
+}
+
+/// One axis after a cycle.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct AxisSnapshot {
+    /// Set-point (rad or m).
+    pub position_set: f64,
+    /// Actual position (rad or m).
+    pub position: f64,
+    /// Actual velocity (rad/s or m/s).
+    pub velocity: f64,
+    /// Object 6041.
+    pub statusword: u16,
+    /// What it says of the drive.
+    pub drive_state: cia402::DriveState,
+    /// Object 603F or the code of the last emergency message.
+    pub error_code: u16,
+    /// Whether the drive has reported since the controller became active.
+    pub is_heard: bool,
+    /// SYNCs, or set-points where it answers these, that the drive has left without an answer, or has not answered yet. One that stays so may have been lost, or
+    /// every answer since then comes so many cycles late: that is looked into whenever the group is enabled.
+    pub unanswered: u16,
+}

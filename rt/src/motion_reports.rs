@@ -1,0 +1,162 @@
+//! What became of the motions that were begun last: each motion by the request that began it.
+
+use crate::record::MAX_AXES;
+use crate::request::RequestId;
+use crate::stop::StopReason;
+
+/// What has become of a motion.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum MotionState {
+    /// It is under way.
+    InProgress,
+    /// Every target has been reached. A velocity or a torque that has been reached goes on.
+    Finished,
+    /// The group has stopped before that.
+    Stopped(StopReason),
+    /// A later motion has taken its place before that.
+    Replaced {
+        /// The request for the later motion.
+        by: RequestId,
+    },
+}
+
+/// One motion.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MotionReport {
+    /// The request that began it.
+    pub request: RequestId,
+    /// The axis, if it is the motion of one drive in a profile mode; `None` if it is one of the whole group.
+    pub axis: Option<u8>,
+    /// What has become of it.
+    pub state: MotionState,
+}
+
+impl MotionReport {
+    fn is_in_progress(&self) -> bool {
+        self.state == MotionState::InProgress
+    }
+}
+
+/// The motions in progress, and the last [`MotionReports::ENDED`] of those that have ended.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MotionReports {
+    /// The newest first, without gaps.
+    pub reports: [Option<MotionReport>; Self::CAPACITY],
+}
+
+impl Default for MotionReports {
+    fn default() -> Self {
+        Self { reports: [None; Self::CAPACITY] }
+    }
+}
+
+impl MotionReports {
+    /// How many motions are remembered that have ended.
+    pub const ENDED: usize = 8;
+    /// There is room for a motion of each axis and one of the group, all in progress, beside those that have ended.
+    pub const CAPACITY: usize = MAX_AXES + 1 + Self::ENDED;
+
+    /// What has become of the motion that a request began. `None` if the request began no motion, or one that has ended and
+    /// was followed by many others.
+    pub fn of(&self, request: RequestId) -> Option<MotionState> {
+        self.iter().find(|report| report.request == request).map(|report| report.state)
+    }
+
+    /// The motions, the newest first.
+    pub fn iter(&self) -> impl Iterator<Item = &MotionReport> {
+        self.reports.iter().map_while(Option::as_ref)
+    }
+
+    /// Begins a motion. Those in progress whose axis (`None`: the group) it takes over are replaced.
+    pub fn begin(&mut self, request: RequestId, axis: Option<u8>, takes_over: impl Fn(Option<u8>) -> bool) {
+        for report in self.reports.iter_mut().flatten() {
+            if report.is_in_progress() && takes_over(report.axis) {
+                report.state = MotionState::Replaced { by: request };
+            }
+        }
+        self.forget_old();
+        self.reports.rotate_right(1);
+        if let Some(newest) = self.reports.first_mut() {
+            *newest = Some(MotionReport { request, axis, state: MotionState::InProgress });
+        }
+    }
+
+    /// Ends every motion that is in progress, and names the request that began each.
+    pub fn end_all(&mut self, state: MotionState, mut ended: impl FnMut(RequestId)) {
+        for report in self.reports.iter_mut().flatten().filter(|report| report.is_in_progress()) {
+            report.state = state;
+            ended(report.request);
+        }
+    }
+
+    /// Keeps what is in progress, and the newest that have ended.
+    fn forget_old(&mut self) {
+        let (mut ended, mut kept) = (0, 0);
+        for index in 0..Self::CAPACITY {
+            let Some(report) = self.reports.get_mut(index).and_then(Option::take) else { break };
+            ended += usize::from(!report.is_in_progress());
+            if report.is_in_progress() || ended <= Self::ENDED {
+                if let Some(place) = self.reports.get_mut(kept) {
+                    *place = Some(report);
+                }
+                kept += 1;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use super::*;
+    use std::vec::Vec;
+
+    const GROUP: fn(Option<u8>) -> bool = |axis| axis.is_none();
+
+    fn of(reports: &MotionReports, request: u64) -> Option<MotionState> {
+        reports.of(RequestId(request))
+    }
+
+    #[test]
+    fn a_motion_that_is_followed_by_another_one_was_replaced_by_it_and_stays_so() {
+        let mut reports = MotionReports::default();
+        reports.begin(RequestId(4), None, GROUP);
+        reports.begin(RequestId(7), None, GROUP);
+        assert_eq!(of(&reports, 4), Some(MotionState::Replaced { by: RequestId(7) }));
+        let end = |reports: &mut MotionReports| {
+            let mut ended = Vec::new();
+            reports.end_all(MotionState::Finished, |request| ended.push(request));
+            ended
+        };
+        assert_eq!(end(&mut reports), [RequestId(7)]);
+        assert_eq!(end(&mut reports), [], "nothing is in progress");
+        assert_eq!(of(&reports, 4), Some(MotionState::Replaced { by: RequestId(7) }));
+        assert_eq!((of(&reports, 7), of(&reports, 5)), (Some(MotionState::Finished), None));
+    }
+
+    #[test]
+    fn a_motion_of_one_axis_replaces_only_that_of_the_same_axis() {
+        let mut reports = MotionReports::default();
+        reports.begin(RequestId(1), Some(0), |axis| axis == Some(0));
+        reports.begin(RequestId(2), Some(1), |axis| axis == Some(1));
+        reports.begin(RequestId(3), Some(0), |axis| axis == Some(0));
+        assert_eq!(of(&reports, 1), Some(MotionState::Replaced { by: RequestId(3) }));
+        assert_eq!(of(&reports, 2), Some(MotionState::InProgress));
+    }
+
+    #[test]
+    fn the_last_that_have_ended_are_remembered_and_all_that_are_in_progress() {
+        let mut reports = MotionReports::default();
+        let axes = MAX_AXES as u8;
+        for axis in 0..axes {
+            reports.begin(RequestId(u64::from(axis)), Some(axis), |other| other == Some(axis));
+        }
+        for request in 1_000..1_100 {
+            reports.begin(RequestId(request), None, GROUP);
+        }
+        assert!((0..axes).all(|axis| of(&reports, axis.into()) == Some(MotionState::InProgress)));
+        let remembered: Vec<u64> =
+            reports.iter().filter(|report| report.axis.is_none()).map(|report| report.request.0).collect();
+        assert_eq!(remembered, (1_091..1_100).rev().collect::<Vec<_>>());
+    }
+}

@@ -1,0 +1,445 @@
+//! What can be asked of the group, and why it may be rejected.
+
+use crate::axis::{MAX_PDOS, TransmissionType};
+use crate::cia402::OperationMode;
+use crate::fault::Rule;
+use crate::frame::Id;
+use crate::pdo::{MAX_OBJECTS, MappedObject};
+use crate::phase::Phase;
+use crate::profile::ProfileTarget;
+use crate::record::MAX_AXES;
+use crate::stop_category::StopCategory;
+use crate::time::Nanoseconds;
+
+/// The number of a request, never given twice, whoever asks.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct RequestId(pub u64);
+
+/// A request with the number by which whoever asked finds out what came of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RequestEnvelope<const AXES: usize = MAX_AXES> {
+    /// The number.
+    pub id: RequestId,
+    /// The request.
+    pub request: Request<AXES>,
+}
+
+/// What can be asked of the group.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[expect(clippy::large_enum_variant, reason = "there is no heap to put the large ones on")]
+pub enum Request<const AXES: usize = MAX_AXES> {
+    /// Begin to send SYNC (`true`) or cease (`false`).
+    Sync(bool),
+    /// The time of day at zero of the cycle's clock, for TIME: nanoseconds after the beginning of 1984-01-01 UTC.
+    TimeOfDay {
+        /// ns
+        at_zero_ns: u64,
+    },
+    /// Use what the drive has reported about itself. Refused while any drive may have torque.
+    RatedTorque {
+        /// The axis.
+        axis: u8,
+        /// Object 6076 in N·m (N for a linear axis).
+        torque: f64,
+    },
+    /// Exchange this process data with an axis' drive, as the drive has reported it, before anything moves.
+    ProcessData(AxisProcessData),
+    /// Where the drive has said that it is, for as long as it has not reported it by process data: nothing is sent to a
+    /// drive of which this is not known.
+    Position {
+        /// The axis.
+        axis: u8,
+        /// Object 6064 in counts.
+        counts: i32,
+    },
+    /// Leave [`Phase::Passive`]: begin to send set-points, with the drives disabled.
+    Activate,
+    /// Bring every drive to operation enabled; set-points follow the actual positions until it is.
+    Enable,
+    /// Move to a target, now: a move under way is re-planned from where it is.
+    Move(Move<AXES>),
+    /// Give a drive in a profile mode a target. The group is moving until all its targets are reached, and as long as a
+    /// velocity or a torque is wanted.
+    SetProfileTarget(ProfileMove),
+    /// Follow [`HostInterface::stream`](crate::HostInterface::stream). A command that was written before counts, unless it has
+    /// expired by the cycle that takes this request up.
+    Stream,
+    /// Stop by this category.
+    Stop(StopCategory),
+    /// Bring every drive to ready to switch on, decelerating first if need be.
+    Disable,
+    /// Clear latched faults: raise controlword bit 7 for some cycles. Refused while any drive is enabled.
+    ResetFaults,
+    /// Refuse to enable from now on, whoever asks: the run is ending, and the drives' watchdogs are about to be switched off.
+    InhibitEnable,
+    /// Leave the loop after this cycle. The drives get no more set-points.
+    Shutdown,
+}
+
+impl<const AXES: usize> Request<AXES> {
+    /// What it is, without its parameters.
+    pub const fn kind(&self) -> RequestKind {
+        match self {
+            Self::Sync(_) => RequestKind::Sync,
+            Self::TimeOfDay { .. } => RequestKind::TimeOfDay,
+            Self::RatedTorque { .. } => RequestKind::RatedTorque,
+            Self::ProcessData(_) => RequestKind::ProcessData,
+            Self::Position { .. } => RequestKind::Position,
+            Self::Activate => RequestKind::Activate,
+            Self::Enable => RequestKind::Enable,
+            Self::Move(_) => RequestKind::Move,
+            Self::SetProfileTarget(_) => RequestKind::SetProfileTarget,
+            Self::Stream => RequestKind::Stream,
+            Self::Stop(_) => RequestKind::Stop,
+            Self::Disable => RequestKind::Disable,
+            Self::ResetFaults => RequestKind::ResetFaults,
+            Self::InhibitEnable => RequestKind::InhibitEnable,
+            Self::Shutdown => RequestKind::Shutdown,
+        }
+    }
+}
+
+/// The process data of one axis, to replace what it was set up with.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AxisProcessData {
+    /// The axis.
+    pub axis: u8,
+    /// What is sent, in order.
+    pub commands: [Option<MappedPdo>; MAX_PDOS],
+    /// What is expected each cycle of the bus.
+    pub feedback: [Option<MappedPdo>; MAX_PDOS],
+    /// What the drive sends beside that.
+    pub unused: [Option<Id>; MAX_PDOS],
+}
+
+/// A PDO by its mapping parameters.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MappedPdo {
+    /// The identifier.
+    pub id: Id,
+    /// When it is sent, if by us.
+    pub cadence: TransmissionType,
+    /// What it carries, in order.
+    pub objects: [Option<MappedObject>; MAX_OBJECTS],
+}
+
+/// A coordinated move of every axis, to rest unless a velocity is given.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Move<const AXES: usize = MAX_AXES> {
+    /// Where to (rad or m), an axis each.
+    pub target: [f64; AXES],
+    /// Velocity at the target (rad/s or m/s). A move that ends in motion goes over into a stop at the limits, for which there
+    /// must be room within the position limits.
+    pub target_velocity: [f64; AXES],
+    /// Fraction of each axis' velocity limit, above 0 up to 1.
+    pub velocity_scale: f64,
+    /// Fraction of each axis' acceleration (and jerk) limit, above 0 up to 1.
+    pub acceleration_scale: f64,
+    /// The move takes at least this long.
+    pub minimum_duration_s: f64,
+}
+
+/// A target for one drive in a profile mode.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ProfileMove {
+    /// The axis.
+    pub axis: u8,
+    /// Where to, how fast, or how strongly.
+    pub target: ProfileTarget,
+    /// When a velocity or a torque that is not zero expires; after that the group stops. A position does not expire.
+    pub valid_until_ns: Nanoseconds,
+}
+
+/// What was asked for, without its parameters: [`Request::kind`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[repr(u8)]
+pub enum RequestKind {
+    /// SYNC on or off.
+    Sync = 0,
+    /// The time of day.
+    TimeOfDay = 1,
+    /// The rated torque of a drive.
+    RatedTorque = 2,
+    /// The process data of a drive.
+    ProcessData = 3,
+    /// Where a drive is.
+    Position = 4,
+    /// The beginning of set-points.
+    Activate = 5,
+    /// Enabling.
+    Enable = 6,
+    /// A move.
+    Move = 7,
+    /// A target for a drive in a profile mode.
+    SetProfileTarget = 8,
+    /// The beginning of a stream.
+    Stream = 9,
+    /// A stop.
+    Stop = 10,
+    /// Disabling.
+    Disable = 11,
+    /// A fault reset.
+    ResetFaults = 12,
+    /// Enabling is to be refused from now on.
+    InhibitEnable = 13,
+    /// The end of the loop.
+    Shutdown = 14,
+}
+
+impl RequestKind {
+    /// Every kind, in the order of their numbers.
+    pub const ALL: [Self; 15] = [
+        Self::Sync,
+        Self::TimeOfDay,
+        Self::RatedTorque,
+        Self::ProcessData,
+        Self::Position,
+        Self::Activate,
+        Self::Enable,
+        Self::Move,
+        Self::SetProfileTarget,
+        Self::Stream,
+        Self::Stop,
+        Self::Disable,
+        Self::ResetFaults,
+        Self::InhibitEnable,
+        Self::Shutdown,
+    ];
+}
+
+/// Why a request is rejected. Lengths in rad (m), velocities in rad/s (m/s), torques in N·m (N).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum RejectReason {
+    /// It is not possible in the phase that the group is in.
+    Phase,
+    /// A fault has stopped the group and has not been reset.
+    StopLatched {
+        /// The rule that was broken.
+        rule: Rule,
+    },
+    /// The run is ending: enabling is refused since [`Request::InhibitEnable`].
+    EnableInhibited,
+    /// Slots are missed too often for a stream.
+    MissedSlots {
+        /// Missed slots that are not yet forgiven.
+        missed: u32,
+        /// From so many on no stream begins.
+        limit: u32,
+    },
+    /// There is no such axis.
+    UnknownAxis {
+        /// The number that was asked for.
+        axis: u8,
+        /// How many axes there are.
+        axes: u8,
+    },
+    /// The axis is in a mode that takes no such target.
+    WrongMode {
+        /// The mode that it is in.
+        mode: OperationMode,
+    },
+    /// A number is infinite or not a number.
+    NotFinite {
+        /// The number.
+        value: f64,
+    },
+    /// A target lies outside the position limits.
+    PositionLimit {
+        /// The target.
+        position: f64,
+        /// The limit.
+        limit: f64,
+    },
+    /// A velocity is beyond the limit.
+    VelocityLimit {
+        /// The velocity.
+        velocity: f64,
+        /// The limit.
+        limit: f64,
+    },
+    /// A torque is beyond the limit.
+    TorqueLimit {
+        /// The torque.
+        torque: f64,
+        /// The limit.
+        limit: f64,
+    },
+    /// A target is passed at a speed from which the axis comes to rest only outside the position limits.
+    NoRoomToStop {
+        /// Where it would come to rest.
+        rest: f64,
+        /// The limit.
+        limit: f64,
+    },
+    /// The fraction of the velocity limits is not above 0 and up to 1.
+    VelocityScale {
+        /// The fraction.
+        scale: f64,
+    },
+    /// The fraction of the acceleration limits is not above 0 and up to 1.
+    AccelerationScale {
+        /// The fraction.
+        scale: f64,
+    },
+    /// The shortest duration is negative, or so long that no trajectory can be planned for it.
+    MinimumDuration {
+        /// The duration in seconds.
+        duration_s: f64,
+    },
+    /// No trajectory within the limits leads there.
+    NoTrajectory,
+    /// A rated torque is not a positive number.
+    RatedTorque {
+        /// The torque.
+        torque: f64,
+    },
+    /// No process data would be left in one direction.
+    NoProcessData,
+    /// A PDO maps too many objects.
+    TooManyObjects,
+    /// An object cannot be mapped.
+    Mapping {
+        /// The object.
+        object: MappedObject,
+    },
+    /// An identifier is in use.
+    IdTaken {
+        /// The identifier.
+        id: Id,
+    },
+    /// The frames of a cycle would not fit into one batch.
+    TooManyFrames {
+        /// How many frames the bus would need.
+        frames: u16,
+        /// How many fit.
+        limit: u16,
+    },
+    /// The drives are not told the time of day.
+    NoTime,
+}
+
+impl RejectReason {
+    /// One of each, in the order of their numbers, with numbers of no meaning.
+    pub const ALL: [Self; 22] = [
+        Self::Phase,
+        Self::StopLatched { rule: Rule::FollowingError },
+        Self::EnableInhibited,
+        Self::MissedSlots { missed: 1, limit: 2 },
+        Self::UnknownAxis { axis: 1, axes: 2 },
+        Self::WrongMode { mode: OperationMode::ProfilePosition },
+        Self::NotFinite { value: 1.0 },
+        Self::PositionLimit { position: 1.0, limit: 2.0 },
+        Self::VelocityLimit { velocity: 1.0, limit: 2.0 },
+        Self::TorqueLimit { torque: 1.0, limit: 2.0 },
+        Self::NoRoomToStop { rest: 1.0, limit: 2.0 },
+        Self::VelocityScale { scale: 1.0 },
+        Self::AccelerationScale { scale: 1.0 },
+        Self::MinimumDuration { duration_s: 1.0 },
+        Self::NoTrajectory,
+        Self::RatedTorque { torque: 1.0 },
+        Self::NoProcessData,
+        Self::Mapping { object: MappedObject::new(0x2000, 1, 16) },
+        Self::IdTaken { id: Id::canopen(0x180, 1) },
+        Self::NoTime,
+        Self::TooManyObjects,
+        Self::TooManyFrames { frames: 1, limit: 2 },
+    ];
+
+    /// The number that stands for it in recordings.
+    pub const fn number(&self) -> u8 {
+        match self {
+            Self::Phase => 0,
+            Self::StopLatched { .. } => 1,
+            Self::EnableInhibited => 2,
+            Self::MissedSlots { .. } => 3,
+            Self::UnknownAxis { .. } => 4,
+            Self::WrongMode { .. } => 5,
+            Self::NotFinite { .. } => 6,
+            Self::PositionLimit { .. } => 7,
+            Self::VelocityLimit { .. } => 8,
+            Self::TorqueLimit { .. } => 9,
+            Self::NoRoomToStop { .. } => 10,
+            Self::VelocityScale { .. } => 11,
+            Self::AccelerationScale { .. } => 12,
+            Self::MinimumDuration { .. } => 13,
+            Self::NoTrajectory => 14,
+            Self::RatedTorque { .. } => 15,
+            Self::NoProcessData => 16,
+            Self::Mapping { .. } => 17,
+            Self::IdTaken { .. } => 18,
+            Self::NoTime => 19,
+            Self::TooManyObjects => 20,
+            Self::TooManyFrames { .. } => 21,
+        }
+    }
+
+    /// What was asked for and what is allowed, as two numbers for recordings; 0 where there is none.
+    /// [`RejectReason::from_numbers`] is the way back.
+    pub fn numbers(&self) -> (f64, f64) {
+        match *self {
+            Self::StopLatched { rule } => (f64::from(rule as u8), 0.0),
+            Self::MissedSlots { missed, limit } => (missed.into(), limit.into()),
+            Self::UnknownAxis { axis, axes } => (axis.into(), axes.into()),
+            Self::WrongMode { mode } => ((mode as i8).into(), 0.0),
+            Self::PositionLimit { position: value, limit }
+            | Self::VelocityLimit { velocity: value, limit }
+            | Self::TorqueLimit { torque: value, limit }
+            | Self::NoRoomToStop { rest: value, limit } => (value, limit),
+            Self::VelocityScale { scale: value } | Self::AccelerationScale { scale: value } => (value, 1.0),
+            Self::NotFinite { value }
+            | Self::MinimumDuration { duration_s: value }
+            | Self::RatedTorque { torque: value } => (value, 0.0),
+            Self::Mapping { object } => (object.parameter().into(), 0.0),
+            Self::IdTaken { id } => (id.value().into(), 0.0),
+            Self::TooManyFrames { frames, limit } => (frames.into(), limit.into()),
+            Self::Phase
+            | Self::EnableInhibited
+            | Self::NoTrajectory
+            | Self::NoProcessData
+            | Self::TooManyObjects
+            | Self::NoTime => (0.0, 0.0),
+        }
+    }
+
+    /// The reason that these numbers stand for; `None` for numbers that no reason has.
+    pub fn from_numbers(number: u8, asked: f64, allowed: f64) -> Option<Self> {
+        Some(match number {
+            0 => Self::Phase,
+            1 => Self::StopLatched { rule: *Rule::ALL.get(asked as usize)? },
+            2 => Self::EnableInhibited,
+            3 => Self::MissedSlots { missed: asked as u32, limit: allowed as u32 },
+            4 => Self::UnknownAxis { axis: asked as u8, axes: allowed as u8 },
+            5 => Self::WrongMode { mode: OperationMode::from_number(asked as i8)? },
+            6 => Self::NotFinite { value: asked },
+            7 => Self::PositionLimit { position: asked, limit: allowed },
+            8 => Self::VelocityLimit { velocity: asked, limit: allowed },
+            9 => Self::TorqueLimit { torque: asked, limit: allowed },
+            10 => Self::NoRoomToStop { rest: asked, limit: allowed },
+            11 => Self::VelocityScale { scale: asked },
+            12 => Self::AccelerationScale { scale: asked },
+            13 => Self::MinimumDuration { duration_s: asked },
+            14 => Self::NoTrajectory,
+            15 => Self::RatedTorque { torque: asked },
+            16 => Self::NoProcessData,
+            17 => Self::Mapping { object: MappedObject::from_parameter(asked as u32) },
+            18 => Self::IdTaken { id: Id::base(asked as u32).ok()? },
+            19 => Self::NoTime,
+            20 => Self::TooManyObjects,
+            21 => Self::TooManyFrames { frames: asked as u16, limit: allowed as u16 },
+            _ => return None,
+        })
+    }
+}
+
+/// A request that was rejected. Nothing has changed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RequestError {
+    /// What was asked for.
+    pub request: RequestKind,
+    /// Why it was rejected.
+    pub reason: RejectReason,
+    /// The axis concerned; `None` when it is not one axis.
+    pub axis: Option<u8>,
+    /// What the group was doing.
+    pub phase: Phase,
+}
