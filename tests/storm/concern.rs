@@ -84,6 +84,15 @@ impl Concerns {
         self.by_axis.iter_mut().for_each(|concern| concern.is_crowded = true);
     }
 
+    /// From now on the loop is too late in every slot.
+    pub fn miss_every_slot(&mut self, now_ns: u64) {
+        self.crowd();
+        for concern in &mut self.by_axis {
+            concern.is_present = true;
+            concern.unreachable_since_ns.get_or_insert(now_ns);
+        }
+    }
+
     /// The queue of a bus does not drain: for a time, or from now on for ever.
     pub fn clog(&mut self, bus: usize, now_ns: u64, is_for_ever: bool) {
         self.by_bus[bus] = true;

@@ -19,6 +19,8 @@ pub struct Overload {
     /// By how much SYNC may be held up after the wake-up for its slot.
     sync: Delay,
     clogs: Vec<Clog>,
+    /// From this cycle on every wake-up is so many nanoseconds too late.
+    lateness: Option<(u64, u64)>,
 }
 
 /// A delay that comes in some cycles: how likely, and how long at most in ns.
@@ -47,10 +49,11 @@ enum Kind {
     SlowComputing,
     LateSync,
     Clog,
+    LateForEver,
 }
 
 /// What a storm may have.
-const KINDS: [Kind; 3] = [Kind::SlowComputing, Kind::LateSync, Kind::Clog];
+const KINDS: [Kind; 4] = [Kind::SlowComputing, Kind::LateSync, Kind::Clog, Kind::LateForEver];
 
 impl Overload {
     /// One or two kinds, in a storm of so many cycles.
@@ -79,12 +82,18 @@ impl Overload {
                 let cycles = dice.pick(&[2, 5, 20, 100, 500, FOR_EVER]);
                 self.clogs.push(Clog { bus, from_cycle, cycles });
             }
+            Kind::LateForEver => {
+                self.lateness = Some((from_cycle, (dice.between(0.15, 3.0) * period_ns) as u64));
+            }
         }
     }
 
     /// Whether there is any.
     pub fn is_present(&self) -> bool {
-        self.computing.chance > 0.0 || self.sync.chance > 0.0 || !self.clogs.is_empty()
+        self.computing.chance > 0.0
+            || self.sync.chance > 0.0
+            || !self.clogs.is_empty()
+            || self.lateness.is_some()
     }
 
     /// What lies ahead of the next cycle.
@@ -99,6 +108,10 @@ impl Overload {
             concerns.crowd();
         }
         let now_ns = run.snapshot().at_ns;
+        if let Some((_, ns)) = self.lateness.filter(|(from_cycle, _)| *from_cycle == cycle) {
+            run.clock().be_late(ns);
+            concerns.miss_every_slot(now_ns);
+        }
         for clog in &self.clogs {
             let port = &mut run.ports()[clog.bus];
             if cycle == clog.from_cycle {

@@ -2,14 +2,18 @@
 //! reach any more has no torque in the time that is stated.
 
 use takt::config::Control;
+use takt::controller::assemble::slot_plan;
+use takt_rt::controlword;
 
 use super::Seen;
 use crate::bounds;
+use crate::wire::Told;
 
 /// How far a drive's own loop may overshoot the velocity limit.
 const OVERSHOOT: f64 = 1.3;
 
 pub fn check(seen: &Seen<'_>) -> Result<(), String> {
+    check_deadline(seen)?;
     if seen.has_faults {
         return Ok(());
     }
@@ -28,4 +32,23 @@ pub fn check(seen: &Seen<'_>) -> Result<(), String> {
         }
     }
     Ok(())
+}
+
+/// After the deadline of the set-points nothing leaves except what stops the drives: no controlword that has one operate.
+fn check_deadline(seen: &Seen<'_>) -> Result<(), String> {
+    let (sent_ns, latest_ns) = (seen.record.timing.sent_ns, slot_plan(seen.config).latest_set_points_ns);
+    if sent_ns <= latest_ns {
+        return Ok(());
+    }
+    let operates = |told: &Told| {
+        let is_halted = |word: u16| word & controlword::HALT != 0;
+        told.controlword.is_some_and(|word| word & 0xF == controlword::ENABLE_OPERATION && !is_halted(word))
+    };
+    match seen.told.iter().position(operates) {
+        Some(axis) => {
+            let name = &seen.config.axes[axis].name;
+            Err(format!("{name}: set-points {sent_ns} ns after the slot began, later than {latest_ns} ns"))
+        }
+        None => Ok(()),
+    }
 }
