@@ -12,12 +12,12 @@ fn bus() -> SimulatedBus {
     config.axes.iter_mut().for_each(|axis| axis.simulated.power_up_ns = 1_000_000);
     config.simulation.longest_gap_ns = u64::MAX;
     let mut bus = SimulatedBus::new(&config, 0);
-    heard(&mut bus, 0);
-    heard(&mut bus, 3_000_000);
+    received(&mut bus, 0);
+    received(&mut bus, 3_000_000);
     bus
 }
 
-fn heard(bus: &mut SimulatedBus, now_ns: u64) -> Vec<Frame> {
+fn received(bus: &mut SimulatedBus, now_ns: u64) -> Vec<Frame> {
     let mut batch = ReceiveBatch::new();
     bus.receive(now_ns, &mut batch);
     batch.iter().map(|received| received.frame).collect()
@@ -30,10 +30,10 @@ fn a_mute_sdo_server_gives_no_reply_until_it_is_mended() {
     let mut bus = bus();
     bus.afflict(1, Defect::SilentSdoServer, true).unwrap();
     bus.send(4_000_000, &[Frame::of(Id::canopen(0x600, 1), READ_DEVICE_TYPE)]);
-    assert_eq!(heard(&mut bus, 8_000_000), []);
+    assert_eq!(received(&mut bus, 8_000_000), []);
     bus.afflict(1, Defect::SilentSdoServer, false).unwrap();
     bus.send(9_000_000, &[Frame::of(Id::canopen(0x600, 1), READ_DEVICE_TYPE)]);
-    assert_eq!(heard(&mut bus, 12_000_000).len(), 1);
+    assert_eq!(received(&mut bus, 12_000_000).len(), 1);
 }
 
 #[test]
@@ -43,7 +43,7 @@ fn an_emergency_message_is_sent_without_a_fault_and_an_alarm_with_one() {
     {
         let mut bus = bus();
         bus.afflict(2, defect, true).unwrap();
-        let frames = heard(&mut bus, 6_000_000);
+        let frames = received(&mut bus, 6_000_000);
         assert_eq!((frames.len(), frames[0].id()), (1, Id::canopen(0x080, 2)));
         assert_eq!(frames[0].first_word() as u16, code);
         let seen = bus.observe(2).unwrap();
@@ -69,19 +69,19 @@ fn a_blocked_joint_withstands_any_torque() {
     let before = bus.observe(1).unwrap().position;
     bus.afflict(1, Defect::BlockedJoint, true).unwrap();
     bus.set_load_torque(1, 1e6).unwrap();
-    heard(&mut bus, 100_000_000);
+    received(&mut bus, 100_000_000);
     assert_eq!(bus.observe(1).unwrap().position, before);
     bus.afflict(1, Defect::BlockedJoint, false).unwrap();
-    heard(&mut bus, 110_000_000);
+    received(&mut bus, 110_000_000);
     assert_ne!(bus.observe(1).unwrap().position, before);
 }
 
 #[test]
-fn a_foreigner_is_heard_by_the_master_and_by_the_drives() {
+fn a_frame_of_another_node_reaches_the_master_and_the_drives() {
     let mut bus = bus();
     let start = Frame::of(Id::canopen(0, 0), [1, 0]);
     assert!(bus.say(4_000_000, &start));
-    assert_eq!(heard(&mut bus, 5_000_000)[0], start);
+    assert_eq!(received(&mut bus, 5_000_000)[0], start);
     assert_eq!(bus.observe(1).unwrap().nmt, takt::sim::NmtState::Operational);
 }
 

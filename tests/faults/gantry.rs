@@ -46,7 +46,7 @@ fn every_fault_with_a_rule_stops_the_whole_gantry_in_time_and_says_why() {
 }
 
 #[test]
-fn a_servo_without_sdo_replies_cannot_be_brought_up_and_in_motion_nobody_misses_them() {
+fn a_servo_without_sdo_replies_cannot_be_brought_up_and_in_motion_needs_none() {
     let stuck = "[[fault]]\nkind = \"stuck-sdo\"\naxis = \"y\"\nfor = \"0.5 s\"\n";
     let played = play(&gantry(), &format!("{}when = \"start\"", stuck.replace("0.5 s", "5 s")));
     assert!(matches!(played.outcome, Some(Outcome::BringUpFailed(_))), "{:?}", played.outcome);

@@ -2,12 +2,12 @@
 
 mod arm;
 mod command;
-mod deaf_drives;
 mod drives;
 mod files;
 mod gantry;
 mod late_drives;
 mod lost_heartbeat;
+mod pdo_unreachable;
 mod reactions;
 mod rearming;
 mod repeatability;

@@ -188,7 +188,7 @@ fn the_code_of_an_alarm_is_the_value_of_the_stop() {
 }
 
 /// Faults that are within what the machine must bear.
-const BORNE: [&str; 12] = [
+const TOLERATED: [&str; 12] = [
     "kind = \"delay\"\nbus = \"base\"\nfunction = \"tpdo\"\nby = \"100 us\"",
     "kind = \"delay\"\nbus = \"base\"\nfunction = \"tpdo\"\nby = \"1 cycles\"\nfor = \"5 cycles\"",
     "kind = \"delay\"\nbus = \"wrist\"\nfunction = \"tpdo\"\nby = \"3 cycles\"\nprobability = \"2 %\"",
@@ -205,7 +205,7 @@ const BORNE: [&str; 12] = [
 
 #[test]
 fn what_the_machine_must_bear_does_not_stop_it() {
-    for fault in BORNE {
+    for fault in TOLERATED {
         let played = in_motion(fault);
         assert_safe(fault, &played);
         assert_eq!(played.outcome, Some(Outcome::Finished), "{fault}");

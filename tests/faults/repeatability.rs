@@ -61,7 +61,7 @@ fn a_fault_that_never_begins_changes_nothing() {
 }
 
 #[test]
-fn what_begins_and_ends_is_told_once_with_its_place_and_its_time() {
+fn what_begins_and_ends_is_reported_once_with_its_place_and_its_time() {
     let played = play(
         &arm(),
         "\n[[fault]]\nkind = \"drop\"\naxis = \"joint2\"\ncount = 2\n\
@@ -75,8 +75,8 @@ fn what_begins_and_ends_is_told_once_with_its_place_and_its_time() {
         "0.1100 s after enabling: fault `load` on axis joint1 (line 6) is over",
         "0.2000 s after enabling: fault `emergency` on axis joint1 (line 12) has begun",
     ];
-    let told: Vec<&str> = played.news.iter().map(|news| news.split_once(' ').unwrap().1).collect();
-    assert_eq!(told, expected.map(|news| news.split_once(' ').unwrap().1));
+    let reported: Vec<&str> = played.news.iter().map(|news| news.split_once(' ').unwrap().1).collect();
+    assert_eq!(reported, expected.map(|news| news.split_once(' ').unwrap().1));
     let at_s: Vec<f64> =
         played.news.iter().map(|news| news.split(' ').next().unwrap().parse().unwrap()).collect();
     let due_s = [0.0, 0.0, 0.1, 0.11, 0.2];

@@ -65,7 +65,7 @@ fn a_run_whose_drives_cannot_be_reached_ends_when_their_own_watchdogs_have_fired
     let timeout_ns = config.master.heartbeat_timeout_ns;
     let waited_ns = ended.disabled_ns - ended.began_ns;
     assert!((timeout_ns..timeout_ns + SECOND_NS / 4).contains(&waited_ns), "{waited_ns} ns");
-    // The farewell is said three times.
+    // The commands that shut a drive down are sent three times.
     assert!(ended.over_ns - ended.disabled_ns < 2 * SECOND_NS);
 }
 

@@ -9,7 +9,7 @@ use takt::faults::{
 };
 use takt_rt::{BusHealth, BusPort, BusState, Frame, Id, ReceiveBatch, Received};
 
-/// Keeps what it is sent, and has received what it is told to have.
+/// Keeps what it is sent, and hands out what a test has put into it.
 #[derive(Default)]
 struct Line {
     sent: Vec<(u64, Frame)>,
@@ -196,13 +196,13 @@ fn corruption_turns_bits_of_the_part_that_was_named() {
 }
 
 #[test]
-fn a_foreigner_speaks_in_its_rhythm_and_is_heard_here_too() {
+fn another_node_sends_in_its_own_period_and_the_controller_receives_it() {
     let says = frame(0x123, 9);
     let effect = Effect::Foreign(ForeignFrames::Frame { frame: says, period_ns: Some(100) });
     let (mut port, course) = wrapped(effect, Selection::default(), Some(350));
     received(&mut port, 0);
-    let heard: Vec<u64> = received(&mut port, 320).iter().map(|received| received.at_ns).collect();
-    assert_eq!(heard, [100, 200, 300]);
+    let received_ns: Vec<u64> = received(&mut port, 320).iter().map(|received| received.at_ns).collect();
+    assert_eq!(received_ns, [100, 200, 300]);
     assert_eq!(received(&mut port, 1000), []);
     let said: Vec<u64> = port.inner_mut().sent.iter().map(|(at_ns, _)| *at_ns).collect();
     assert_eq!((said, course.frames()), (vec![0, 100, 200, 300], 4));
@@ -260,8 +260,8 @@ proptest! {
         let (mut port, _) = wrapped(Effect::Frames(FrameEffect::Reorder), selection, None);
         prop_assert_eq!(port.send(0, &numbered(count)), usize::from(count));
         hears(&mut port, &numbered(count), 0);
-        let heard: Vec<Frame> = received(&mut port, 1).iter().map(|received| received.frame).collect();
-        for mut passed in [sent(&mut port), heard] {
+        let arrived: Vec<Frame> = received(&mut port, 1).iter().map(|received| received.frame).collect();
+        for mut passed in [sent(&mut port), arrived] {
             // Unselected frames keep their places.
             for (at, frame) in passed.iter().enumerate().skip(0x11) {
                 prop_assert_eq!(frame.id().value(), 0x200 + at as u32);

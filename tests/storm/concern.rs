@@ -14,8 +14,7 @@ use takt::sim::Defect;
 pub struct Concern {
     /// A fault concerns this joint, its drive or its bus: it may not obey.
     pub is_present: bool,
-    /// A torque from outside acts on it, another master commands its drive between two looks, or its drive by itself does what
-    /// nobody has asked for.
+    /// A torque from outside acts on it, another master commands its drive, or its drive does by itself what it was not asked to.
     pub is_driven_by_others: bool,
     /// What is sent to its drive is corrupted with a right CRC: it does what it hears.
     pub is_misled: bool,

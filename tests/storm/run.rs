@@ -21,7 +21,7 @@ use crate::invariants::{Invariants, REST, Seen};
 use crate::tap::Tap;
 use crate::wire::Wire;
 
-/// Bring-up, farewell and every patience of the life cycle together.
+/// Bring-up, shutdown and all time-outs of the life cycle together.
 const END_AT_MOST_S: f64 = 45.0;
 /// A YZ-AIM whose communication has been reset watches the controller for its factory setting of 2 s; then it stops.
 const WATCHDOG_MS: u64 = 3000;
@@ -79,9 +79,9 @@ impl World {
     }
 }
 
-/// How a fault went.
+/// What became of a fault.
 #[derive(Clone, Copy, Debug)]
-pub struct Struck {
+pub struct FaultOutcome {
     /// Its number in the scenario.
     pub fault: usize,
     /// What the group was doing when it began.
@@ -101,7 +101,7 @@ pub struct Done {
     /// Of all records, events and frames.
     pub fingerprint: u64,
     /// Every fault that has begun.
-    pub struck: Vec<Struck>,
+    pub outcomes: Vec<FaultOutcome>,
     /// Whether the drives could not be brought up.
     pub is_bring_up_failed: bool,
 }
@@ -119,7 +119,7 @@ pub fn play(case: &Case) -> Result<Done, String> {
     let mut wire = Wire::new(config);
     let mut clients = Clients::new(case);
     let mut fingerprint = Fingerprint::default();
-    let mut struck: Vec<Struck> = vec![];
+    let mut outcomes: Vec<FaultOutcome> = vec![];
     let at_most = case.length + (END_AT_MOST_S * 1e9 / config.cycle.period_ns as f64) as u64;
     let (mut enabled, mut cycles) = (None, 0);
     let mut goes_on = true;
@@ -133,11 +133,11 @@ pub fn play(case: &Case) -> Result<Done, String> {
             |snapshot: &Snapshot, what: String| format!("cycle {cycles}, {:?}: {what}", snapshot.phase);
         wire.read(&world.sent);
         concerns.observe(&rehearsal, |fault| {
-            struck
+            outcomes
                 .iter_mut()
-                .filter(|struck| struck.stop.is_none())
-                .for_each(|struck| struck.is_overtaken = true);
-            struck.push(Struck {
+                .filter(|outcomes| outcomes.stop.is_none())
+                .for_each(|outcomes| outcomes.is_overtaken = true);
+            outcomes.push(FaultOutcome {
                 fault,
                 phase,
                 is_brought_up: enabled.is_some(),
@@ -145,7 +145,7 @@ pub fn play(case: &Case) -> Result<Done, String> {
                 is_overtaken: false,
             });
         });
-        note_stop(&world.events, &mut struck);
+        note_stop(&world.events, &mut outcomes);
         clients.note_answers(&world.snapshot);
         fingerprint.take_cycle(&world);
         let World { log, snapshot, truth, events, .. } = &mut world;
@@ -155,7 +155,7 @@ pub fn play(case: &Case) -> Result<Done, String> {
                 config,
                 snapshot,
                 record,
-                told: &wire.told,
+                sent: &wire.values,
                 truth,
                 events,
                 concerns: &concerns.by_axis,
@@ -187,16 +187,16 @@ pub fn play(case: &Case) -> Result<Done, String> {
     }
     at_rest(case, &mut concerns, &mut world)?;
     let is_bring_up_failed = matches!(world.run.supervisor().outcome(), Some(Outcome::BringUpFailed(_)));
-    Ok(Done { cycles, fingerprint: fingerprint.value(), struck, is_bring_up_failed })
+    Ok(Done { cycles, fingerprint: fingerprint.value(), outcomes, is_bring_up_failed })
 }
 
-fn note_stop(events: &[Event], struck: &mut [Struck]) {
+fn note_stop(events: &[Event], outcomes: &mut [FaultOutcome]) {
     for event in events {
         if let EventKind::Stop(reason) = event.kind
             && reason.rule() != Rule::Requested
         {
-            struck.iter_mut().filter(|struck| !struck.is_overtaken).for_each(|struck| {
-                struck.stop.get_or_insert(reason.rule());
+            outcomes.iter_mut().filter(|outcomes| !outcomes.is_overtaken).for_each(|outcomes| {
+                outcomes.stop.get_or_insert(reason.rule());
             });
         }
     }
@@ -262,7 +262,7 @@ fn at_rest(case: &Case, concerns: &mut Concerns, world: &mut World) -> Result<()
     for (axis, concern) in case.config.axes.iter().zip(&concerns.by_axis) {
         let truth = world.run.ports()[axis.bus].observe(axis.node);
         let is_driven = truth.state == DriveState::OperationEnabled;
-        // Nothing stops a drive that watches nobody any more and that nothing gets to.
+        // Nothing stops a drive that has no watchdog any more and that no frame reaches.
         let is_beyond_reach = concern.is_unwatched && concern.is_cut_off;
         if (truth.velocity.abs() > REST || is_driven) && !concern.is_loaded && !is_beyond_reach {
             return Err(format!("{} is not at rest in the end: {truth:?}", axis.name));

@@ -7,7 +7,7 @@ use takt_rt::controlword;
 
 use super::Seen;
 use crate::bounds;
-use crate::wire::Told;
+use crate::wire::SentValues;
 
 /// How far a drive's own loop may overshoot the velocity limit.
 const OVERSHOOT: f64 = 1.3;
@@ -40,11 +40,11 @@ fn check_deadline(seen: &Seen<'_>) -> Result<(), String> {
     if sent_ns <= latest_ns {
         return Ok(());
     }
-    let operates = |told: &Told| {
+    let operates = |sent: &SentValues| {
         let is_halted = |word: u16| word & controlword::HALT != 0;
-        told.controlword.is_some_and(|word| word & 0xF == controlword::ENABLE_OPERATION && !is_halted(word))
+        sent.controlword.is_some_and(|word| word & 0xF == controlword::ENABLE_OPERATION && !is_halted(word))
     };
-    match seen.told.iter().position(operates) {
+    match seen.sent.iter().position(operates) {
         Some(axis) => {
             let name = &seen.config.axes[axis].name;
             Err(format!("{name}: set-points {sent_ns} ns after the slot began, later than {latest_ns} ns"))

@@ -1,4 +1,4 @@
-//! Drives that another master has made deaf to process data, without a farewell that would come to their help.
+//! Drives that another master has taken out of operational: PDOs do not reach them any more.
 
 use std::sync::Arc;
 
@@ -11,7 +11,7 @@ use takt_rt::Phase;
 
 use crate::arm::{folder, scenario};
 
-/// The machines: every way in which a drive can be in motion when it turns deaf.
+/// The machines: every mode in which a drive can move when PDOs do not reach it any more.
 const MACHINES: [&str; 6] = [
     "arm6-erob",
     "erob-modes/erob-csv",
@@ -28,7 +28,7 @@ fn machine(name: &str) -> Config {
     config
 }
 
-fn deafening(config: &Config, command: &str) -> String {
+fn nmt_fault(config: &Config, command: &str) -> String {
     let axis = &config.axes[0].name;
     format!(
         "[[fault]]\nkind = \"foreign-nmt\"\naxis = \"{axis}\"\ncommand = \"{command}\"\nwhen = \"moving\"\nat = \"300 ms\"\n"
@@ -36,11 +36,11 @@ fn deafening(config: &Config, command: &str) -> String {
 }
 
 /// Plays until the fault has begun.
-fn struck(config: &Config, command: &str) -> VirtualRun<Port> {
-    played_until_struck(config, &deafening(config, command))
+fn after_nmt(config: &Config, command: &str) -> VirtualRun<Port> {
+    played_until_the_fault(config, &nmt_fault(config, command))
 }
 
-fn played_until_struck(config: &Config, faults: &str) -> VirtualRun<Port> {
+fn played_until_the_fault(config: &Config, faults: &str) -> VirtualRun<Port> {
     let rehearsal = Arc::new(Rehearsal::new(scenario(faults, config)));
     let (mut run, _) = VirtualRun::rehearsed(config, Arc::clone(&rehearsal)).unwrap();
     while !rehearsal.courses().any(|(_, course)| course.began_ns().is_some()) {
@@ -55,12 +55,11 @@ fn first_drive(config: &Config, run: &mut VirtualRun<Port>) -> takt::sim::Observ
 }
 
 #[test]
-fn a_drive_that_hears_no_process_data_any_more_is_stopped_and_switched_off_by_sdo_before_anybody_says_farewell()
- {
+fn a_drive_that_pdos_do_not_reach_any_more_is_stopped_and_switched_off_by_sdo_before_the_run_shuts_down() {
     for name in MACHINES {
         let config = machine(name);
         for command in COMMANDS {
-            let mut run = struck(&config, command);
+            let mut run = after_nmt(&config, command);
             let began_ns = run.snapshot().at_ns;
             let mut ended_ns = None;
             while run.snapshot().phase != Phase::Disabled {
@@ -81,11 +80,11 @@ fn a_drive_that_hears_no_process_data_any_more_is_stopped_and_switched_off_by_sd
 }
 
 #[test]
-fn a_run_that_is_cut_off_leaves_no_deaf_drive_enabled() {
+fn a_run_that_is_cut_off_leaves_no_drive_enabled_that_pdos_do_not_reach() {
     for name in MACHINES {
         let config = machine(name);
         for command in COMMANDS {
-            let mut run = struck(&config, command);
+            let mut run = after_nmt(&config, command);
             run.interrupt(Interrupt::Immediate);
             while run.step() {}
             let state = first_drive(&config, &mut run).state;
@@ -94,9 +93,9 @@ fn a_run_that_is_cut_off_leaves_no_deaf_drive_enabled() {
     }
 }
 
-/// Reset, the drive watches nobody any more; while nothing gets to it, only patience helps.
+/// A drive that was reset has no watchdog any more. While no frame reaches it, the run can only wait.
 #[test]
-fn a_run_waits_for_a_queue_that_is_full_before_it_leaves_a_drive_that_watches_nobody() {
+fn a_run_waits_for_a_queue_that_is_full_before_it_leaves_a_drive_without_a_watchdog() {
     for name in MACHINES {
         let config = machine(name);
         let bus = &config.buses[config.axes[0].bus].name;
@@ -105,7 +104,7 @@ fn a_run_waits_for_a_queue_that_is_full_before_it_leaves_a_drive_that_watches_no
         );
         for interrupt in [None, Some(Interrupt::Controlled), Some(Interrupt::Immediate)] {
             let mut run =
-                played_until_struck(&config, &(full.clone() + &deafening(&config, "reset-communication")));
+                played_until_the_fault(&config, &(full.clone() + &nmt_fault(&config, "reset-communication")));
             interrupt.into_iter().for_each(|interrupt| run.interrupt(interrupt));
             while run.step() {}
             let state = first_drive(&config, &mut run).state;
@@ -114,7 +113,7 @@ fn a_run_waits_for_a_queue_that_is_full_before_it_leaves_a_drive_that_watches_no
     }
 }
 
-/// It may be away when the run begins to take its leave, and what is told only once is lost.
+/// The drive may be away when the run begins to shut down. A command that is sent only once is lost then.
 #[test]
 fn a_drive_that_comes_back_while_the_run_takes_its_leave_is_left_without_torque_and_pre_operational() {
     for name in MACHINES {
@@ -124,7 +123,7 @@ fn a_drive_that_comes_back_while_the_run_takes_its_leave_is_left_without_torque_
                 "[[fault]]\nkind = \"silent-node\"\naxis = \"{}\"\nwhen = \"moving\"\nat = \"300 ms\"\nfor = \"{away_ms} ms\"\n",
                 config.axes[0].name
             );
-            let mut run = played_until_struck(&config, &silent);
+            let mut run = played_until_the_fault(&config, &silent);
             while run.step() {}
             assert_eq!(run.supervisor().unreached(), [0usize; 0], "{name}, {away_ms} ms");
             let drive = first_drive(&config, &mut run);
