@@ -58,6 +58,14 @@ pub struct IdTaken {
     pub id: Id,
 }
 
+impl core::error::Error for IdTaken {}
+
+impl core::fmt::Display for IdTaken {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, "identifier {:03X} is in use already, or cannot be dispatched", self.id.value())
+    }
+}
+
 impl Dispatch {
     /// Enters a feedback PDO (0 to 3) of an axis (0 to 31).
     pub fn feedback(&mut self, id: Id, axis: u8, pdo: u8) -> Result<(), IdTaken> {

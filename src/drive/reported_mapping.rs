@@ -255,8 +255,7 @@ fn check_values(pdo: &PdoConfiguration, needed: &[MappedObject]) -> Result<(), M
                 CommandSlot::OperationMode
                     | CommandSlot::TargetVelocity
                     | CommandSlot::TargetTorque
-                    | CommandSlot::VelocityOffset
-                    | CommandSlot::TorqueOffset
+                    | CommandSlot::Offset
             )
     };
     match pdo.objects.iter().find(|object| !has_value(object)) {
