@@ -14,8 +14,8 @@ pub const MISSED_SLOTS_WARNING: u32 = 10;
 pub const MISSED_SLOTS_DEGRADED: u32 = 50;
 /// `[cycle.missed_slots] stop`
 pub const MISSED_SLOTS_STOP: u32 = 250;
-/// `[cycle.missed_slots] leak`
-pub const MISSED_SLOTS_LEAK_NS: u64 = 10_000_000;
+/// `[cycle.missed_slots] leak_slots`
+pub const MISSED_SLOTS_LEAK_SLOTS: u32 = 10;
 
 /// `[realtime] priority`
 pub const PRIORITY: u8 = 80;

@@ -72,8 +72,8 @@ pub struct MissedSlots {
     pub degraded: u32,
     /// Slots from which on the group stops, unless all of its buses are simulated. Default 250.
     pub stop: u32,
-    /// The time in which the bucket loses one. Default 10 ms.
-    pub leak_ns: u64,
+    /// Used slots after which the bucket loses one. Default 10.
+    pub leak_slots: u32,
 }
 
 /// What is asked of the operating system for the real-time thread.

@@ -89,7 +89,7 @@ pub fn engine(config: &Config) -> Result<Engine, AssembleError> {
             warning: config.missed_slots.warning,
             degraded: config.missed_slots.degraded,
             unfit: if tolerates_missed_slots { u32::MAX } else { config.missed_slots.stop },
-            leak_slots: cycles(config.missed_slots.leak_ns).max(1),
+            leak_slots: config.missed_slots.leak_slots,
         },
         acknowledge_timeout_cycles: cycles(ACKNOWLEDGE_TIMEOUT_NS),
     })

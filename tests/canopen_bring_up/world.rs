@@ -94,7 +94,7 @@ pub fn config(axes: &[(usize, u8)]) -> Config {
     Config {
         name: "test".into(),
         cycle: Cycle { period_ns: 1_000_000, command_phase_ns: 550_000 },
-        missed_slots: MissedSlots { warning: 10, degraded: 100, stop: 500, leak_ns: 10_000_000 },
+        missed_slots: MissedSlots { warning: 10, degraded: 100, stop: 500, leak_slots: 10 },
         stops: Default::default(),
         realtime: Realtime {
             priority: None,

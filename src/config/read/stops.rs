@@ -39,7 +39,9 @@ pub fn missed_slots(mut section: Section<'_>) -> MissedSlots {
     let warning = slots("warning", defaults::MISSED_SLOTS_WARNING);
     let degraded = slots("degraded", defaults::MISSED_SLOTS_DEGRADED);
     let stop = slots("stop", defaults::MISSED_SLOTS_STOP);
-    let leak_ns = section.get("leak").and_then(|entry| entry.nanoseconds(ranges::MISSED_SLOTS_LEAK_S));
+    let leak_slots = section.get("leak_slots").and_then(|entry| entry.integer(ranges::MISSED_SLOTS));
+    let leak_slots = leak_slots.and_then(|slots| u32::try_from(slots).ok());
     section.finish();
-    MissedSlots { warning, degraded, stop, leak_ns: leak_ns.unwrap_or(defaults::MISSED_SLOTS_LEAK_NS) }
+    let leak_slots = leak_slots.unwrap_or(defaults::MISSED_SLOTS_LEAK_SLOTS);
+    MissedSlots { warning, degraded, stop, leak_slots }
 }

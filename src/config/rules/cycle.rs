@@ -18,7 +18,7 @@ pub fn validate(cycle: &Cycle, missed_slots: &MissedSlots, fields: &Fields<'_>) 
         self::missed_slots(&fields.at(key), slots, earlier);
         earlier = earlier.max(slots);
     }
-    fields.at("leak").duration(missed_slots.leak_ns, ranges::MISSED_SLOTS_LEAK_S);
+    fields.at("leak_slots").integer(missed_slots.leak_slots, &ranges::MISSED_SLOTS);
 }
 
 /// Object 1006 of the drives is in whole microseconds.
