@@ -1,7 +1,7 @@
 //! SI on our side, drive units on the wire.
 //!
-//! A position becomes counts by one multiplication and one rounding of the absolute value, never by adding up
-//! rounded steps, so the error is at most half a count for ever.
+//! A position becomes counts by one multiplication and one rounding of the absolute value. Rounded steps are never added up,
+//! so the error stays within half a count.
 
 /// What a drive counts in, against what the joint does.
 #[derive(Clone, Copy, Debug, PartialEq)]

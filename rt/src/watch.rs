@@ -1,15 +1,15 @@
-//! What is watched over time: slots that pass unused, nodes that fall silent or start anew, identifiers that come twice.
+//! What is watched over time: slots that were missed, nodes that fall silent or start anew, duplicate node IDs.
 
-/// How late the controller has been of late.
+/// How often the controller has missed slots lately.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[repr(u8)]
 pub enum TimingLevel {
     /// Hardly ever.
     #[default]
     Normal = 0,
-    /// Often enough to be told.
+    /// Often enough for an event.
     Warning = 1,
-    /// So often that no stream is begun, since its owner counts on every slot.
+    /// So often that no stream may begin: its owner relies on every slot.
     Degraded = 2,
     /// Too often to go on.
     Unfit = 3,
@@ -25,7 +25,7 @@ impl TimingLevel {
 /// whatever the period.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TimingLadder {
-    /// Slots in the bucket from which on it is told.
+    /// Missed slots in the bucket from which on there is an event.
     pub warning: u32,
     /// Slots from which on no stream is begun.
     pub degraded: u32,

@@ -512,13 +512,14 @@ fn impossible_parameters_are_refused_with_the_axis() {
         with(|axis| axis.commands.clear()),
         Some(SetUpError::Axis { axis: 1, error: AxisParametersError::NoPdo })
     );
-    for change in [
-        (|axis| axis.limits.velocity = f64::NAN) as fn(&mut AxisParameters),
+    let changes: [fn(&mut AxisParameters); 5] = [
+        |axis| axis.limits.velocity = f64::NAN,
         |axis| axis.following_error_limit = f64::NAN,
         |axis| axis.law = ControlLaw::Velocity { position_gain: f64::INFINITY },
         |axis| axis.node = 0,
         |axis| axis.node = 129,
-    ] {
+    ];
+    for change in changes {
         assert!(matches!(with(change), Some(SetUpError::Axis { axis: 1, .. })), "{:?}", with(change));
     }
     let taken = with(|axis| axis.node = 1);

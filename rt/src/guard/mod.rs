@@ -1,4 +1,4 @@
-//! The last look at every set-point, whoever made it, before it becomes a frame.
+//! The guard: the last check of every set-point, whatever its source, before it becomes a frame.
 
 mod commands;
 mod following_error;
