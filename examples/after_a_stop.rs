@@ -16,7 +16,7 @@ use miette::IntoDiagnostic;
 use takt::config::{Axis, Config};
 use takt::controller::session::SessionOptions;
 use takt::controller::{Controller, MotionError};
-use takt::faults::{Rehearsal, Scenario};
+use takt::faults::{FaultInjector, Scenario};
 use takt_rt::Phase;
 
 /// A bus may be down for some time, and a drive needs time to recover.
@@ -29,12 +29,12 @@ fn main() -> miette::Result<()> {
     let path = arguments.next().unwrap_or_else(|| "configs/arm6-erob.toml".to_owned());
     let seconds: f64 = arguments.next().map_or(Ok(10.0), |text| text.parse()).into_diagnostic()?;
     let config = Config::load(Path::new(&path))?;
-    let rehearsal = match arguments.next() {
-        Some(path) => Some(Arc::new(Rehearsal::new(Scenario::load(Path::new(&path), &config)?))),
+    let fault_injector = match arguments.next() {
+        Some(path) => Some(Arc::new(FaultInjector::new(Scenario::load(Path::new(&path), &config)?))),
         None => None,
     };
     let mut arm =
-        Controller::start(config.clone(), SessionOptions { rehearsal, ..SessionOptions::default() })
+        Controller::start(config.clone(), SessionOptions { fault_injector, ..SessionOptions::default() })
             .into_diagnostic()?;
     let (to, fro) = (pose(arm.axes(), 0.6), pose(arm.axes(), 0.4));
 

@@ -242,7 +242,8 @@ fn rule_and_axis(outcome: Option<Outcome>) -> (Rule, Option<u8>) {
 #[test]
 fn a_fault_of_one_drive_stops_the_whole_arm_in_a_coordinated_way() {
     let config = load("arm6-erob.toml");
-    let (outcome, phases) = run_and_inject(&config, |bus| bus.inject(2, DriveFault::OverCurrent).unwrap());
+    let (outcome, phases) =
+        run_and_inject(&config, |bus| bus.inject_fault(2, DriveFault::OverCurrent).unwrap());
     assert_eq!(rule_and_axis(outcome), (Rule::DriveFault, Some(1)));
     // The stop begins in the cycle in which the drive reports the fault.
     assert_eq!(phases, [Phase::Stopping, Phase::Disabling, Phase::Disabled]);
@@ -469,7 +470,7 @@ fn a_fault_during_disabling_is_the_outcome_of_the_run() {
         if run.snapshot().phase == Phase::Disabling && !is_disturbed {
             is_disturbed = true;
             let now_ns = run.clock().now_ns();
-            assert!(run.ports()[0].say(now_ns, &Frame::of(Id::canopen(0x080, 0), [])));
+            assert!(run.ports()[0].send_foreign(now_ns, &Frame::of(Id::canopen(0x080, 0), [])));
         }
     });
     let Some(Outcome::Stopped(stop)) = outcome else { panic!("{outcome:?}") };

@@ -11,7 +11,7 @@ use takt::bus::trace::traced;
 use takt::config::Config;
 use takt::controller::channels::{ChannelSizes, channels};
 use takt::controller::{Outcome, VirtualRun};
-use takt::faults::{Rehearsal, Scenario};
+use takt::faults::{FaultInjector, Scenario};
 use takt::sim::SimulatedBus;
 use takt::telemetry::{
     BlackBoxOptions, BusDescription, Logger, LoggerOptions, Machine, Recorded, RecordingDestination,
@@ -172,7 +172,7 @@ fn recording_of_a_lost_bus(bus: &str, folder: &Path) -> PathBuf {
         "[[fault]]\nkind = \"bus-off\"\nbus = {bus:?}\nwhen = \"moving\"\nat = \"300 ms\"\nrestart = \"0.1 s\""
     );
     let scenario = Scenario::parse("scenario", &fault, &config).unwrap();
-    let (mut run, log) = VirtualRun::rehearsed(&config, Arc::new(Rehearsal::new(scenario))).unwrap();
+    let (mut run, log) = VirtualRun::with_faults(&config, Arc::new(FaultInjector::new(scenario))).unwrap();
     let options = LoggerOptions {
         machine: Machine::of(&config),
         wall_clock: WallClock::fixed(UNIX_AT_ZERO_NS),
@@ -441,5 +441,31 @@ fn a_file_that_is_not_a_recording_is_refused_with_its_name_and_the_reason() {
         let output = report(&absent, &[]);
         assert_eq!(output.status.code(), Some(2));
         assert!(errors(&output).contains(absent.to_str().unwrap()), "{}", errors(&output));
+    }
+}
+
+/// The lengths in a file are whatever somebody has written there.
+#[test]
+fn a_crafted_file_of_a_few_bytes_gets_no_more_memory_than_a_recording() {
+    const HEADER: u8 = 1;
+    const SCHEMA: u8 = 3;
+    const CHANNEL: u8 = 4;
+    const METADATA: u8 = 12;
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("crafted.mcap");
+    for (opcode, before) in [(HEADER, &[][..]), (SCHEMA, &[1, 0]), (CHANNEL, &[1, 0, 1, 0]), (METADATA, &[])]
+    {
+        let body = [before, &u32::MAX.to_le_bytes(), b"abc"].concat();
+        let record = [&[opcode][..], &(body.len() as u64).to_le_bytes(), &body].concat();
+        fs::write(&file, [b"\x89MCAP0\r\n", record.as_slice()].concat()).unwrap();
+        let output = Command::new("prlimit")
+            .arg("--as=1000000000")
+            .arg(env!("CARGO_BIN_EXE_takt"))
+            .arg("report")
+            .arg(&file)
+            .output()
+            .unwrap();
+        assert_eq!(output.status.code(), Some(2), "{opcode}: {}", errors(&output));
+        assert!(errors(&output).contains("no recording of takt"), "{}", errors(&output));
     }
 }

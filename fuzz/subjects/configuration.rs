@@ -20,7 +20,7 @@ pub fn run(bytes: &[u8]) {
 pub fn assert_explained(text: &str, error: &ConfigError) {
     assert!(!error.problems().is_empty(), "refused without a reason");
     for problem in error.problems() {
-        let span = problem.span.clone().expect("the text could be read");
+        let span = problem.span().expect("the text could be read");
         assert!(text.get(span.clone()).is_some(), "{span:?} is no part of the text");
         assert!(error.line(problem).is_some_and(|line| line <= text.lines().count().max(1) + 1));
         assert!(!problem.to_string().is_empty() && !problem.kind.help().is_empty());

@@ -43,7 +43,7 @@ pub fn run(bytes: &[u8]) {
 fn assert_explained(findings: &Findings) {
     assert!(!findings.to_string().is_empty());
     for problem in findings.problems() {
-        let place = findings.place(problem);
+        let place = findings.position(problem);
         assert!(place.line > 0 && place.column > 0, "{place:?}");
         findings.source_line(problem);
         assert!(!problem.to_string().is_empty() && !problem.kind.help().is_empty());

@@ -2,11 +2,11 @@
 //! A test (`tests/fuzz_corpus.rs`) also calls them, with the files of `fuzz/seeds` and with random bytes.
 
 pub mod configuration;
-mod conversations;
 pub mod device_description;
 pub mod engine;
 mod input;
 pub mod problem_lines;
+mod procedures;
 pub mod recording;
 pub mod scenario;
 pub mod wire;

@@ -1,14 +1,11 @@
 //! Makes the engine and the slot plan from a configuration.
 
-use std::f64::consts::TAU;
-
 use takt_rt::{
     AxisParameters, BusParameters, CommandPdo, Engine, EngineParameters, FeedbackSince, Heartbeat, Id,
-    MAX_AXES, MAX_BUSES, Mapping, MappingError, Pdo, Scale, ScaleError, ScaleParameters, SetUpError,
-    SlotPlan, TimingLadder,
+    Mapping, MappingError, Pdo, Scale, ScaleError, ScaleParameters, SetUpError, SlotPlan, TimingLadder,
 };
 
-use crate::config::{Axis, Config, DriveFamily, Interface, Travel};
+use crate::config::{Axis, Config, ConfigError, DriveFamily, Interface};
 use crate::drive::{PdoPlan, ProcessData, yz_aim};
 
 /// How long the drives may take from the first controlword to operation enabled.
@@ -21,24 +18,11 @@ const NOT_TRANSMITTED_NS: u64 = 4_000_000;
 const SERVICE_FRAMES_PASSIVE: usize = 6;
 
 /// Why the real-time thread cannot execute a configuration.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[derive(Debug, thiserror::Error)]
 pub enum AssembleError {
-    /// More axes than one controller moves.
-    #[error("{given} axes: one controller moves at most {limit}")]
-    TooManyAxes {
-        /// The number in the configuration.
-        given: usize,
-        /// The largest number.
-        limit: usize,
-    },
-    /// More buses than one controller owns.
-    #[error("{given} buses: one controller owns at most {limit}")]
-    TooManyBuses {
-        /// The number in the configuration.
-        given: usize,
-        /// The largest number.
-        limit: usize,
-    },
+    /// An impossible value: see [`Config::validate`].
+    #[error(transparent)]
+    Configuration(#[from] ConfigError),
     /// An impossible mapping.
     #[error("axis {axis}: its process data cannot be mapped ({error:?})")]
     Mapping {
@@ -68,15 +52,9 @@ pub fn slot_plan(config: &Config) -> SlotPlan {
 /// The engine of a configuration.
 ///
 /// # Errors
-/// See [`AssembleError`]. A configuration that has passed its checks gives no error.
+/// See [`AssembleError`].
 pub fn engine(config: &Config) -> Result<Engine, AssembleError> {
-    let (axes, buses) = (config.axes.len(), config.buses.len());
-    if axes > MAX_AXES {
-        return Err(AssembleError::TooManyAxes { given: axes, limit: MAX_AXES });
-    }
-    if buses > MAX_BUSES {
-        return Err(AssembleError::TooManyBuses { given: buses, limit: MAX_BUSES });
-    }
+    config.validate()?;
     let period_ns = config.cycle.period_ns;
     let cycles = |ns: u64| u32::try_from(ns.div_ceil(period_ns.max(1))).unwrap_or(u32::MAX);
     let axes = config
@@ -181,15 +159,11 @@ fn feedback_since(feedback: &[PdoPlan]) -> FeedbackSince {
 /// # Errors
 /// An impossible parameter.
 pub fn scale(axis: &Axis) -> Result<Scale, ScaleError> {
-    let travel_per_turn = match axis.travel {
-        Travel::Rotary => TAU,
-        Travel::Linear { lead_m } => lead_m,
-    };
     Scale::new(ScaleParameters {
         counts_per_turn: axis.counts_per_turn,
         velocity_units_per_turn: axis.drive.velocity_units_per_turn(axis.counts_per_turn),
         gear_ratio: axis.gear_ratio,
-        travel_per_turn,
+        travel_per_turn: axis.travel.per_turn(),
         reversed: axis.reversed,
         zero_counts: axis.zero_counts.into(),
         rated_torque: axis.simulated.rated_torque,

@@ -1,5 +1,6 @@
 //! A running controller: the engine of a configuration, the real-time thread that runs it, and the life cycle of a run.
 
+mod arrival;
 pub mod assemble;
 pub mod channels;
 mod handle;

@@ -2,6 +2,7 @@
 
 use takt_rt::{Phase, RequestError, StopReason};
 
+use crate::bus::ownership::Process;
 use crate::drive::BringUpError;
 use crate::telemetry::{Machine, words};
 
@@ -12,6 +13,11 @@ pub enum Outcome {
     Finished,
     /// It was interrupted. The axes were stopped in control, unless an immediate stop was asked for.
     Interrupted,
+    /// Another process took the buses over. The axes were stopped in control for it.
+    TakenOver {
+        /// The process.
+        process: Process,
+    },
     /// The group stopped for a fault.
     Stopped(StopReason),
     /// The drives could not be brought up.
@@ -40,6 +46,15 @@ pub enum Outcome {
         /// The move.
         number: u64,
     },
+    /// The program has finished, but a joint is farther from its target than its `target_tolerance`.
+    OffTarget {
+        /// The axis.
+        axis: usize,
+        /// Its distance from the target: rad (m).
+        distance: f64,
+        /// The largest allowed distance: rad (m).
+        tolerance: f64,
+    },
     /// A function that the caller gave to the run panicked, and the axes were stopped in control.
     CallbackPanicked {
         /// The message of the panic.
@@ -61,6 +76,9 @@ impl Outcome {
         match self {
             Self::Finished => "the run has finished".to_owned(),
             Self::Interrupted => "the run was interrupted".to_owned(),
+            Self::TakenOver { process } => {
+                format!("{process} has taken the buses over; the axes were stopped in control for it")
+            }
             Self::Stopped(stop) => words::stop(stop, machine),
             Self::BringUpFailed(error) => error.to_string(),
             Self::FaultPersists { axis, code } => {
@@ -78,6 +96,15 @@ impl Outcome {
             }
             Self::MoveReplaced { number } => {
                 format!("another client has moved the group during move {number} of the program")
+            }
+            Self::OffTarget { axis, distance, tolerance } => {
+                format!(
+                    "{}: the program is done, but the joint is {:.6} rad (m) off its target, and target_tolerance is {:.6}; \
+                     in CSV and CST, look at the gains of the loop, and at the friction that is fed forward",
+                    name(*axis),
+                    distance.abs(),
+                    tolerance
+                )
             }
             Self::CallbackPanicked { message } => {
                 format!("a callback panicked, and the run ended in a controlled stop: {message}")

@@ -15,10 +15,11 @@ use super::realtime_thread::{self, Begun, Ended, LoopParts, StartError};
 use super::sleep_alignment;
 use super::supervisor::Supervisor;
 use super::time_of_day::TimeOfDayKeeper;
+use crate::bus::ownership::{ClaimError, IfOwned, Ownership};
 use crate::bus::port::{OpenError, Port};
 use crate::bus::trace::Trace;
 use crate::config::Config;
-use crate::faults::Rehearsal;
+use crate::faults::FaultInjector;
 use crate::telemetry::{
     BlackBoxOptions, Incident, LogSummary, Logger, LoggerOptions, LoggerThread, Machine, Notice,
     RecordingDestination, WallClock, panic_message,
@@ -37,7 +38,9 @@ pub struct SessionOptions {
     /// Whether a refused step of the real-time set-up ends the run before anything moves.
     pub is_realtime_required: bool,
     /// Faults that are injected into the buses.
-    pub rehearsal: Option<Arc<Rehearsal>>,
+    pub fault_injector: Option<Arc<FaultInjector>>,
+    /// What happens if another process of this computer already commands a bus.
+    pub if_owned: IfOwned,
 }
 
 /// The result of a run.
@@ -67,6 +70,9 @@ pub enum SessionError {
     /// The configuration cannot be executed.
     #[error(transparent)]
     Assemble(#[from] AssembleError),
+    /// A bus may not be commanded by this process.
+    #[error(transparent)]
+    Claim(#[from] ClaimError),
     /// A bus cannot be opened.
     #[error(transparent)]
     Open(#[from] OpenError),
@@ -80,6 +86,9 @@ pub enum SessionError {
 
 /// Runs the program of a configuration. The logger calls `notify` from its thread. `watch` is called about once in a
 /// millisecond with the newest state and the progress of the run, and may ask the run to end.
+///
+/// Before anything is sent, the real buses are locked and listened to, see [`crate::bus::ownership`]. If another process asks
+/// for the buses later, the group stops in category 2, and the run ends as [`Outcome::TakenOver`].
 ///
 /// If `notify` or `watch` panics, the panic is caught, the function is not called again, and the group stops in category 1.
 /// The run then ends as [`Outcome::CallbackPanicked`].
@@ -118,12 +127,26 @@ pub(super) fn run_with(
     config: &Config,
     options: SessionOptions,
     notify: Box<dyn FnMut(&Notice) + Send>,
-    mut watch: impl FnMut(&Snapshot, Progress) -> Option<Interrupt>,
+    watch: impl FnMut(&Snapshot, Progress) -> Option<Interrupt>,
     remote: Option<Remote>,
 ) -> Result<Session, SessionError> {
+    let ownership = Ownership::of(config, options.if_owned)?;
+    run_as_owner(config, options, notify, watch, remote, ownership)
+}
+
+/// The same as [`run_with`], on buses that this process already owns.
+fn run_as_owner(
+    config: &Config,
+    options: SessionOptions,
+    notify: Box<dyn FnMut(&Notice) + Send>,
+    mut watch: impl FnMut(&Snapshot, Progress) -> Option<Interrupt>,
+    remote: Option<Remote>,
+    mut ownership: Ownership,
+) -> Result<Session, SessionError> {
     let mut clock = MonotonicClock::default();
+    config.validate_on_this_machine().map_err(AssembleError::from)?;
     let engine = Box::new(assemble::engine(config)?);
-    let (ports, traces) = open_ports(config, options.rehearsal.as_deref())?;
+    let (ports, traces) = open_ports(config, options.fault_injector.as_deref())?;
     let (rt, mut host, log) = channels(&ChannelSizes::of(config));
     let mut supervisor = match remote {
         Some(_) => Supervisor::serving(config),
@@ -176,6 +199,7 @@ pub(super) fn run_with(
     let mut time_of_day = TimeOfDayKeeper::of(config);
     let mut time_request = None;
     let (mut panicked, mut is_watched) = (None, true);
+    let mut taken_over_by = None;
     while !running.is_finished() {
         supervisor.poll(clock.now_ns(), &mut host);
         let now_ns = clock.now_ns();
@@ -184,8 +208,12 @@ pub(super) fn run_with(
         if let Some(remote) = &remote {
             remote.requests.hand_over(|envelope| host.submit(envelope).is_ok());
         }
-        if let Some(rehearsal) = &options.rehearsal {
-            rehearsal.observe(&host.snapshot());
+        if let Some(fault_injector) = &options.fault_injector {
+            fault_injector.observe(&host.snapshot());
+        }
+        if let Some(process) = ownership.poll_release_request() {
+            taken_over_by = Some(process);
+            supervisor.interrupt(Interrupt::Controlled);
         }
         let mut panics_now = None;
         if is_watched {
@@ -211,15 +239,21 @@ pub(super) fn run_with(
         sleep_alignment::sleep(PAUSE, config.cycle.period_ns);
     }
     let ended = running.join();
+    // The ports are closed with the thread. What is left to be done here does not concern the buses.
+    drop(ownership);
     if ended.is_none() {
         logger.incident(Incident::ThreadDied);
     }
-    let outcome = match (supervisor.outcome().cloned().unwrap_or(Outcome::ThreadDied), panicked) {
-        (Outcome::Interrupted | Outcome::Finished, Some(message)) => Outcome::CallbackPanicked { message },
-        (outcome, _) => outcome,
-    };
-    let target =
-        supervisor.target().filter(|_| outcome == Outcome::Finished && options.duration_ns.is_none());
+    let outcome =
+        match (supervisor.outcome().cloned().unwrap_or(Outcome::ThreadDied), panicked, taken_over_by) {
+            (Outcome::Interrupted | Outcome::Finished, Some(message), _) => {
+                Outcome::CallbackPanicked { message }
+            }
+            (Outcome::Interrupted, None, Some(process)) => Outcome::TakenOver { process },
+            (outcome, ..) => outcome,
+        };
+    let is_done = matches!(outcome, Outcome::Finished | Outcome::OffTarget { .. });
+    let target = supervisor.target().filter(|_| is_done && options.duration_ns.is_none());
     Ok(Session {
         snapshot: host.snapshot(),
         target: target.map(<[f64]>::to_vec),
@@ -232,14 +266,17 @@ pub(super) fn run_with(
     })
 }
 
-fn open_ports(config: &Config, rehearsal: Option<&Rehearsal>) -> Result<(Vec<Port>, Vec<Trace>), OpenError> {
+fn open_ports(
+    config: &Config,
+    fault_injector: Option<&FaultInjector>,
+) -> Result<(Vec<Port>, Vec<Trace>), OpenError> {
     let mut ports = Vec::with_capacity(config.buses.len());
     let mut traces = Vec::new();
     let is_traced = config.telemetry.is_candump_written || config.telemetry.black_box_ns.is_some();
     for (index, bus) in config.buses.iter().enumerate() {
         let port = Port::open(config, index)?;
-        let port = match rehearsal {
-            Some(rehearsal) => rehearsal.wrap(index, port),
+        let port = match fault_injector {
+            Some(fault_injector) => fault_injector.wrap(index, port),
             None => port,
         };
         ports.push(if is_traced {
@@ -251,4 +288,57 @@ fn open_ports(config: &Config, rehearsal: Option<&Rehearsal>) -> Result<(Vec<Por
         });
     }
     Ok((ports, traces))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+    use std::sync::atomic::{AtomicBool, Ordering};
+    use std::thread;
+
+    use takt_rt::{Phase, StopCategory};
+
+    use super::*;
+    use crate::bus::ownership::{InterfaceLock, LockError, Role};
+
+    /// Simulated buses need no lock: this one stands for that of a real interface.
+    #[test]
+    fn a_run_that_is_taken_over_stops_in_control_before_it_releases_its_buses() {
+        let interface = format!("test-session-{}", std::process::id());
+        let mut config = Config::load(Path::new("configs/single-erob.toml")).unwrap();
+        config.telemetry.is_recorded = false;
+        let ownership = Ownership::of_locks(vec![InterfaceLock::take(Role::Master, &interface).unwrap()]);
+        let has_moved = AtomicBool::new(false);
+        let session = thread::scope(|scope| {
+            let taking = scope.spawn(|| {
+                while !has_moved.load(Ordering::Relaxed) {
+                    thread::sleep(PAUSE);
+                }
+                assert!(matches!(InterfaceLock::take(Role::Master, &interface), Err(LockError::Held(_))));
+                InterfaceLock::take_over(Role::Master, &interface).unwrap()
+            });
+            // Without an end, so that only the other one ends it.
+            let options = SessionOptions { duration_ns: Some(600_000_000_000), ..SessionOptions::default() };
+            let watch = |snapshot: &Snapshot, _| {
+                has_moved.fetch_or(snapshot.phase == Phase::Moving, Ordering::Relaxed);
+                None
+            };
+            let session = run_as_owner(&config, options, Box::new(|_| {}), watch, None, ownership).unwrap();
+            let _taken = taking.join().unwrap();
+            session
+        });
+        let pid = i32::try_from(std::process::id()).unwrap();
+        assert!(
+            matches!(session.outcome, Outcome::TakenOver { process } if process.pid == pid),
+            "{:?}",
+            session.outcome
+        );
+        let stop = session.snapshot.stop.expect("it was stopped");
+        assert_eq!((stop.category, stop.phase), (StopCategory::Two, Phase::Moving));
+        assert!(
+            matches!(session.snapshot.phase, Phase::Disabled | Phase::Passive),
+            "{:?}",
+            session.snapshot.phase
+        );
+    }
 }

@@ -14,11 +14,12 @@ use takt_rt::{
     AxisSnapshot, Frame, Phase, Request, RequestEnvelope, Rule, Snapshot, StopCategory, StopReason,
 };
 
+use super::arrival::{ARRIVAL_NS, Arrival};
 use super::channels::{HostSide, RequestNumbers};
 use super::outcome::{Interrupt, Outcome, Progress};
 use super::program::{ProgramRunner, ProgramStep};
 use crate::config::Config;
-use crate::drive::{AxisFacts, BringUp, Leave};
+use crate::drive::{AxisFacts, BringUp, Shutdown};
 
 /// A stage must be completed within this time. The engine has its own, shorter time-outs.
 const STAGE_TIMEOUT_NS: u64 = 8_000_000_000;
@@ -49,8 +50,9 @@ pub struct Supervisor {
     stage: Stage,
     stage_since_ns: Option<u64>,
     bring_up: BringUp,
-    leave: Leave,
+    shutdown: Shutdown,
     program: ProgramRunner,
+    arrival: Arrival,
     facts: Vec<AxisFacts>,
     outgoing: VecDeque<RequestEnvelope>,
     numbers: RequestNumbers,
@@ -72,8 +74,9 @@ impl Supervisor {
             stage: Stage::Configure,
             stage_since_ns: None,
             bring_up: BringUp::new(config),
-            leave: Leave::new(config),
+            shutdown: Shutdown::new(config),
             program: ProgramRunner::new(&config.program, duration_ns.is_some()),
+            arrival: Arrival::of(config),
             facts: Vec::new(),
             outgoing: VecDeque::new(),
             numbers: RequestNumbers::default(),
@@ -121,7 +124,7 @@ impl Supervisor {
     pub fn poll(&mut self, now_ns: u64, host: &mut HostSide) {
         while let Some((bus, received)) = host.take_service() {
             self.bring_up.receive(bus, &received.frame);
-            self.leave.receive(bus, &received.frame);
+            self.shutdown.receive(bus, &received.frame);
         }
         let snapshot = host.snapshot();
         self.numbers = host.numbers();
@@ -146,11 +149,15 @@ impl Supervisor {
             Stage::Run => self.run(now_ns, snapshot),
             Stage::Settle { until_ns } => {
                 let is_moving = matches!(snapshot.phase, Phase::Moving | Phase::Streaming | Phase::Stopping);
+                let missed = self.missed_target(snapshot);
+                let is_waited_for = (is_moving && elapsed_ns <= STAGE_TIMEOUT_NS)
+                    || (missed.is_some() && elapsed_ns <= ARRIVAL_NS);
                 if let Some(stop) = fault_stop(snapshot) {
                     self.end(now_ns, Outcome::Stopped(stop));
-                } else if is_moving && elapsed_ns <= STAGE_TIMEOUT_NS {
+                } else if is_waited_for {
                     self.stage = Stage::Settle { until_ns: now_ns + SETTLE_NS };
-                } else if is_moving || now_ns >= until_ns {
+                } else if is_moving || missed.is_some() || now_ns >= until_ns {
+                    self.outcome = missed.or(self.outcome.take());
                     // A client may still be moving the group: disabling stops it first.
                     self.begin_disable(now_ns);
                 }
@@ -305,6 +312,14 @@ impl Supervisor {
         }
     }
 
+    /// The joint that is off its target although the program has finished, if there is one. A program that was ended by its
+    /// duration has no target.
+    fn missed_target(&self, snapshot: &Snapshot) -> Option<Outcome> {
+        let has_finished = self.outcome == Some(Outcome::Finished) && self.duration_ns.is_none();
+        let target = self.program.target().filter(|_| has_finished)?;
+        self.arrival.missed(target, snapshot)
+    }
+
     /// Begins the end of the run, from any stage.
     fn end(&mut self, now_ns: u64, outcome: Outcome) {
         let was_running = matches!(self.stage, Stage::Run);
@@ -339,8 +354,8 @@ impl Supervisor {
     }
 
     fn shut_down(&mut self, now_ns: u64, elapsed_ns: u64, host: &mut HostSide) {
-        self.leave.poll(now_ns, &mut service_sender(host));
-        let outcome = self.leave.outcome();
+        self.shutdown.poll(now_ns, &mut service_sender(host));
+        let outcome = self.shutdown.outcome();
         if outcome.is_some() || elapsed_ns > STAGE_TIMEOUT_NS {
             if let (Some(Err(error)), false) = (outcome, self.facts.is_empty()) {
                 let silent = error.failures.into_iter().filter(|failure| failure.cause.is_silence());

@@ -12,7 +12,7 @@ use super::supervisor::Supervisor;
 use super::time_of_day::TimeOfDayKeeper;
 use crate::bus::port::Port;
 use crate::config::Config;
-use crate::faults::Rehearsal;
+use crate::faults::FaultInjector;
 use crate::sim::SimulatedBus;
 use crate::telemetry::WallClock;
 
@@ -55,7 +55,7 @@ pub struct VirtualRun<P> {
     host: HostSide,
     supervisor: Supervisor,
     time_of_day: TimeOfDayKeeper,
-    rehearsal: Option<Arc<Rehearsal>>,
+    fault_injector: Option<Arc<FaultInjector>>,
     /// Cycles from one poll of the life cycle to the next, and since the last poll.
     poll_interval: u64,
     cycles_since_poll: u64,
@@ -68,6 +68,8 @@ impl VirtualRun<SimulatedBus> {
     /// # Errors
     /// See [`assemble::engine`].
     pub fn simulated(config: &Config) -> Result<(Self, LogSide), AssembleError> {
+        // The simulated drives take the values as they are.
+        config.validate()?;
         let ports = (0..config.buses.len()).map(|bus| SimulatedBus::new(config, bus)).collect();
         Self::new(config, ports)
     }
@@ -78,11 +80,15 @@ impl VirtualRun<Port> {
     ///
     /// # Errors
     /// See [`assemble::engine`].
-    pub fn rehearsed(config: &Config, rehearsal: Arc<Rehearsal>) -> Result<(Self, LogSide), AssembleError> {
+    pub fn with_faults(
+        config: &Config,
+        fault_injector: Arc<FaultInjector>,
+    ) -> Result<(Self, LogSide), AssembleError> {
+        config.validate()?;
         let simulated = |bus| Port::Simulated(Box::new(SimulatedBus::new(config, bus)));
-        let ports = (0..config.buses.len()).map(|bus| rehearsal.wrap(bus, simulated(bus))).collect();
+        let ports = (0..config.buses.len()).map(|bus| fault_injector.wrap(bus, simulated(bus))).collect();
         let (run, log) = Self::new(config, ports)?;
-        Ok((Self { rehearsal: Some(rehearsal), ..run }, log))
+        Ok((Self { fault_injector: Some(fault_injector), ..run }, log))
     }
 }
 
@@ -123,7 +129,7 @@ impl<P: BusPort> VirtualRun<P> {
             host,
             supervisor,
             time_of_day: TimeOfDayKeeper::of(config),
-            rehearsal: None,
+            fault_injector: None,
             poll_interval: 1,
             cycles_since_poll: 0,
             is_over: false,
@@ -146,8 +152,8 @@ impl<P: BusPort> VirtualRun<P> {
             // If the queue is full, the next one follows in a minute.
             let _ = self.host.request(time);
         }
-        if let Some(rehearsal) = &self.rehearsal {
-            rehearsal.observe(&self.host.snapshot());
+        if let Some(fault_injector) = &self.fault_injector {
+            fault_injector.observe(&self.host.snapshot());
         }
         self.is_over = flow == Flow::Shutdown;
         !self.is_over

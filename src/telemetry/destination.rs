@@ -1,5 +1,6 @@
 //! Where a recording or a log is written. An existing file is never overwritten.
 
+use crate::printable::printable_path;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -42,8 +43,8 @@ impl RecordingDestination {
             Self::Stream(label, writer) => return Ok(Opened { label, path: None, writer }),
         };
         let (path, file) =
-            create_new(&path).map_err(|reason| OpenError { path: path.display().to_string(), reason })?;
-        Ok(Opened { label: path.display().to_string(), path: Some(path), writer: Box::new(file) })
+            create_new(&path).map_err(|reason| OpenError { path: printable_path(&path), reason })?;
+        Ok(Opened { label: printable_path(&path), path: Some(path), writer: Box::new(file) })
     }
 }
 

@@ -20,6 +20,7 @@ use super::wall_clock::WallClock;
 use super::words;
 use crate::bus::trace::Trace;
 use crate::controller::channels::LogSide;
+use crate::printable::printable_path;
 
 /// Settings of a logger.
 pub struct LoggerOptions {
@@ -301,13 +302,13 @@ impl Logger {
     fn verified(&mut self, path: Option<PathBuf>) -> Option<PathBuf> {
         let path = path?;
         if !path.exists() {
-            self.report_failure(format!("{} was removed during the run", path.display()));
+            self.report_failure(format!("{} was removed during the run", printable_path(&path)));
             return None;
         }
         if let Err(error) = File::open(&path).and_then(|file| file.sync_data()) {
             self.report_failure(format!(
                 "{} may be incomplete: cannot write it to the disk: {error}",
-                path.display()
+                printable_path(&path)
             ));
         }
         Some(path)

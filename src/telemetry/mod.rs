@@ -38,8 +38,8 @@ pub use recorded::{Cause, Recorded, RecordedCycle, RecordedError, RecordedEvent,
 pub use recording_report::{AxisCycle, AxisCycles, AxisSummary, BusChange, RecordingReport, ReportedEvent};
 pub use render::Emphasis;
 pub use report::{
-    AxisReport, BusReport, LatencyReport, RealtimeReport, RunOutcome, RunReport, SetPointParts, StopReport,
-    TelemetryReport,
+    AxisReport, BusReport, LatencyReport, RealtimeReport, RunEnd, RunOutcome, RunReport, SetPointParts,
+    StopReport, TelemetryReport,
 };
 pub use statistics::{AxisStatistics, FollowingErrorMaximum, Latency, Statistics};
 pub use thread::LoggerThread;

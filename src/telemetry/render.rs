@@ -4,9 +4,10 @@
 use std::fmt::Write;
 
 use super::report::{
-    AxisReport, BusReport, DECADES, LatencyReport, RANGES_PER_DECADE, RealtimeReport, RunReport,
+    AxisReport, BusReport, DECADES, LatencyReport, RANGES_PER_DECADE, RealtimeReport, RunEnd, RunReport,
     SetPointParts,
 };
+use crate::printable::{printable, printable_path};
 
 /// Rows of a histogram.
 const ROWS: usize = 4;
@@ -66,7 +67,12 @@ impl RunReport {
         let run = format!("{cycles} cycles of {cycle_ms} ms, {seconds:.2} s");
         match &self.stop {
             None => {
-                let verdict = emphasis.good("✓ program finished");
+                let verdict = match self.ended {
+                    RunEnd::Finished => emphasis.good("✓ program finished"),
+                    RunEnd::Interrupted => emphasis.bad("✗ interrupted before the axes were enabled"),
+                    RunEnd::TakenOver => emphasis.bad("✗ taken over before the axes were enabled"),
+                    RunEnd::Stopped | RunEnd::Failed => emphasis.bad("✗ failed"),
+                };
                 line(text, &format!("{}  {verdict}, {run}", emphasis.heading(&self.machine)));
             }
             Some(stop) => {
@@ -149,14 +155,14 @@ impl RunReport {
         if let Some(path) = &telemetry.recording {
             let size =
                 telemetry.recording_bytes.map_or_else(String::new, |size| format!(" ({})", bytes(size)));
-            lines.push(format!("{}{size}", path.display()));
+            lines.push(format!("{}{size}", printable_path(path)));
         }
-        lines.extend(telemetry.candump.iter().map(|path| path.display().to_string()));
-        lines.extend(telemetry.not_written.iter().cloned());
+        lines.extend(telemetry.candump.iter().map(|path| printable_path(path)));
+        lines.extend(telemetry.not_written.iter().map(|text| printable(text)));
         wrap(text, &emphasis.heading("telemetry"), 9, &lines);
         if !telemetry.black_boxes.is_empty() {
             let mut lines: Vec<String> =
-                telemetry.black_boxes.iter().map(|path| path.display().to_string()).collect();
+                telemetry.black_boxes.iter().map(|path| printable_path(path)).collect();
             if telemetry.black_boxes_replaced > 0 {
                 lines.push(format!(
                     "{} older files were replaced by the last one",

@@ -11,11 +11,29 @@ use super::machine::{AxisDescription, BusDescription, Machine, SetPointMagnitude
 use super::statistics::{AxisStatistics, Latency};
 use super::words;
 
+/// How a run ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum RunEnd {
+    /// The program was done, or its time was over.
+    Finished,
+    /// Ctrl-C or a signal ended it.
+    Interrupted,
+    /// Another process took the buses over.
+    TakenOver,
+    /// The group stopped by itself.
+    Stopped,
+    /// It could not go on for another reason.
+    Failed,
+}
+
 /// A whole run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RunReport {
     /// The name of the machine.
     pub machine: String,
+    /// How the run ended.
+    pub ended: RunEnd,
     /// Time from the start of the first cycle to the end of the last one.
     pub duration_s: f64,
     /// Period of the cycle.
@@ -40,7 +58,7 @@ pub struct RunReport {
     pub buses: Vec<BusReport>,
     /// What was recorded.
     pub telemetry: TelemetryReport,
-    /// Why the run ended before its program; `None` if the program finished.
+    /// Why the group stopped before the end of its program; `None` if it did not, or was never enabled.
     pub stop: Option<StopReport>,
 }
 
@@ -207,6 +225,8 @@ pub struct StopReport {
 /// The data of a report that the logger does not have.
 #[derive(Clone, Debug)]
 pub struct RunOutcome {
+    /// How the run ended.
+    pub ended: RunEnd,
     /// What the operating system granted.
     pub realtime: RealtimeReport,
     /// The state after the last cycle, with the counters of the buses.
@@ -238,6 +258,7 @@ impl RunReport {
         let bus = |(description, health)| BusReport::new(description, health, outcome.buses_open_ns);
         Self {
             machine: machine.name.clone(),
+            ended: outcome.ended,
             duration_s: if statistics.cycles == 0 { 0.0 } else { seconds(covered_ns) },
             cycle_ns: machine.cycle_ns,
             cycles: statistics.cycles + log.records_dropped,

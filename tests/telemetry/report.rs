@@ -1,6 +1,6 @@
 use serde_json::{Value, json};
 use takt::telemetry::{
-    Emphasis, LogSummary, Logger, RealtimeReport, RecordingDestination, RunOutcome, RunReport,
+    Emphasis, LogSummary, Logger, RealtimeReport, RecordingDestination, RunEnd, RunOutcome, RunReport,
 };
 use takt_rt::{BusHealth, BusState, HostInterface, Snapshot, StopReason};
 
@@ -10,6 +10,7 @@ const COLUMNS: usize = 100;
 
 fn outcome(last: Snapshot, stop: Option<StopReason>) -> RunOutcome {
     RunOutcome {
+        ended: if stop.is_some() { RunEnd::Stopped } else { RunEnd::Finished },
         realtime: RealtimeReport {
             policy: "SCHED_OTHER".to_owned(),
             page_faults: 2,

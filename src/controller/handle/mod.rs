@@ -152,11 +152,7 @@ impl Controller {
             return Err(CommandError::Count { given: target.len(), axes: self.axes.len() });
         }
         for (axis, value) in self.axes.iter().zip(target) {
-            let is_positioned =
-                !matches!(axis.control, ControlLaw::ProfileVelocity | ControlLaw::ProfileTorque);
-            if is_positioned {
-                within(axis, *value, axis.limits.position_min, axis.limits.position_max)?;
-            }
+            within(axis, *value, axis.limits.position_min, axis.limits.position_max)?;
         }
         let mut all = [0.0; MAX_AXES];
         all.iter_mut().zip(target).for_each(|(to, from)| *to = *from);

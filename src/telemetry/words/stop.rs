@@ -30,8 +30,11 @@ pub fn stop_cause(stop: &StopReason, machine: &Machine) -> String {
         Fault::PositionLimit { position, limit } => format!(
             "the set-point of {axis}, {position:.4} {unit}, was outside its position limit of {limit:.4} {unit}"
         ),
+        // Asked for by a set-point, or measured where the drive plans its own motion (PP, PV, PT).
         Fault::VelocityLimit { velocity, limit } => {
-            format!("the set-point of {axis} asked for {velocity:.3} {unit}/s (allowed: {limit:.3} {unit}/s)")
+            format!(
+                "the velocity of {axis}, {velocity:.3} {unit}/s, was beyond its limit of {limit:.3} {unit}/s"
+            )
         }
         Fault::AccelerationLimit { acceleration, limit } => format!(
             "the set-point of {axis} asked for {acceleration:.2} {unit}/s² (allowed: {limit:.2} {unit}/s²)"
@@ -183,7 +186,7 @@ mod tests {
                 Origin::Axis(1),
                 2.5,
                 2.0,
-                "the set-point of slide asked for 2.500 m/s (allowed: 2.000 m/s)",
+                "the velocity of slide, 2.500 m/s, was beyond its limit of 2.000 m/s",
             ),
             (
                 Rule::MissedFeedback,
