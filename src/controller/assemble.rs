@@ -20,7 +20,7 @@ const SERVICE_FRAMES_PASSIVE: usize = 6;
 /// Why the real-time thread cannot execute a configuration.
 #[derive(Debug, thiserror::Error)]
 pub enum AssembleError {
-    /// An impossible value: see [`Config::validate`].
+    /// A value that cannot be: see [`Config::validate`].
     #[error(transparent)]
     Configuration(#[from] ConfigError),
     /// An impossible mapping.
@@ -52,7 +52,7 @@ pub fn slot_plan(config: &Config) -> SlotPlan {
 /// The engine of a configuration.
 ///
 /// # Errors
-/// See [`AssembleError`].
+/// See [`AssembleError`]. A configuration that has passed its checks gives no error.
 pub fn engine(config: &Config) -> Result<Engine, AssembleError> {
     config.validate()?;
     let period_ns = config.cycle.period_ns;

@@ -13,7 +13,7 @@ pub enum Outcome {
     Finished,
     /// It was interrupted. The axes were stopped in control, unless an immediate stop was asked for.
     Interrupted,
-    /// Another process took the buses over. The axes were stopped in control for it.
+    /// Another process took the buses over; the axes were stopped in control for it.
     TakenOver {
         /// The process.
         process: Process,
@@ -41,19 +41,19 @@ pub enum Outcome {
         /// The reason, if it is still known.
         refusal: Option<RequestError>,
     },
+    /// The program is done, but a joint is farther off its target than its `target_tolerance`.
+    OffTarget {
+        /// The axis.
+        axis: usize,
+        /// How far beyond its target it is: rad (m).
+        distance: f64,
+        /// How far it may be: rad (m).
+        tolerance: f64,
+    },
     /// A motion of another client has replaced a move of the program; counted from 1.
     MoveReplaced {
         /// The move.
         number: u64,
-    },
-    /// The program has finished, but a joint is farther from its target than its `target_tolerance`.
-    OffTarget {
-        /// The axis.
-        axis: usize,
-        /// Its distance from the target: rad (m).
-        distance: f64,
-        /// The largest allowed distance: rad (m).
-        tolerance: f64,
     },
     /// A function that the caller gave to the run panicked, and the axes were stopped in control.
     CallbackPanicked {

@@ -39,7 +39,7 @@ pub struct SessionOptions {
     pub is_realtime_required: bool,
     /// Faults that are injected into the buses.
     pub fault_injector: Option<Arc<FaultInjector>>,
-    /// What happens if another process of this computer already commands a bus.
+    /// What happens when another process of this host is the master of a bus already.
     pub if_owned: IfOwned,
 }
 
@@ -87,9 +87,6 @@ pub enum SessionError {
 /// Runs the program of a configuration. The logger calls `notify` from its thread. `watch` is called about once in a
 /// millisecond with the newest state and the progress of the run, and may ask the run to end.
 ///
-/// Before anything is sent, the real buses are locked and listened to, see [`crate::bus::ownership`]. If another process asks
-/// for the buses later, the group stops in category 2, and the run ends as [`Outcome::TakenOver`].
-///
 /// If `notify` or `watch` panics, the panic is caught, the function is not called again, and the group stops in category 1.
 /// The run then ends as [`Outcome::CallbackPanicked`].
 ///
@@ -131,11 +128,11 @@ pub(super) fn run_with(
     remote: Option<Remote>,
 ) -> Result<Session, SessionError> {
     let ownership = Ownership::of(config, options.if_owned)?;
-    run_as_owner(config, options, notify, watch, remote, ownership)
+    lead_as_owner(config, options, notify, watch, remote, ownership)
 }
 
-/// The same as [`run_with`], on buses that this process already owns.
-fn run_as_owner(
+/// As [`lead`], on buses that are claimed already.
+fn lead_as_owner(
     config: &Config,
     options: SessionOptions,
     notify: Box<dyn FnMut(&Notice) + Send>,
@@ -323,7 +320,7 @@ mod tests {
                 has_moved.fetch_or(snapshot.phase == Phase::Moving, Ordering::Relaxed);
                 None
             };
-            let session = run_as_owner(&config, options, Box::new(|_| {}), watch, None, ownership).unwrap();
+            let session = lead_as_owner(&config, options, Box::new(|_| {}), watch, None, ownership).unwrap();
             let _taken = taking.join().unwrap();
             session
         });

@@ -312,8 +312,8 @@ impl Supervisor {
         }
     }
 
-    /// The joint that is off its target although the program has finished, if there is one. A program that was ended by its
-    /// duration has no target.
+    /// The joint that the finished program has left off its target, if there is one. A program that was cut off by its
+    /// duration has no target that counts.
     fn missed_target(&self, snapshot: &Snapshot) -> Option<Outcome> {
         let has_finished = self.outcome == Some(Outcome::Finished) && self.duration_ns.is_none();
         let target = self.program.target().filter(|_| has_finished)?;

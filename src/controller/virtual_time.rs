@@ -24,6 +24,14 @@ const VIRTUAL_EPOCH_NS: u64 = 946_684_800_000_000_000;
 pub struct VirtualClock {
     now_ns: u64,
     stall_ns: u64,
+    /// By how much every wait is late.
+    lateness_ns: u64,
+    /// What passes unseen: between the next wake-up of a slot and its SYNC, and while the next cycle is computed.
+    before_sync_ns: u64,
+    computing_ns: u64,
+    /// What passes before the next look at the clock, and right after it.
+    before_look_ns: u64,
+    after_look_ns: u64,
 }
 
 impl VirtualClock {
@@ -31,15 +39,47 @@ impl VirtualClock {
     pub fn stall(&mut self, ns: u64) {
         self.stall_ns += ns;
     }
+
+    /// From now on every wait ends this much later than asked for.
+    pub fn be_late(&mut self, ns: u64) {
+        self.lateness_ns = ns;
+    }
+
+    /// The thread is held up between its next wake-up for a slot and the SYNC of that slot.
+    pub fn hold_up_sync(&mut self, ns: u64) {
+        self.before_sync_ns = ns;
+    }
+
+    /// The next cycle takes this long to compute.
+    pub fn compute_for(&mut self, ns: u64) {
+        self.computing_ns = ns;
+    }
 }
 
 impl Clock for VirtualClock {
     fn now_ns(&mut self) -> u64 {
-        self.now_ns
+        let seen_ns = self.now_ns + std::mem::take(&mut self.before_look_ns);
+        self.now_ns = seen_ns + std::mem::take(&mut self.after_look_ns);
+        seen_ns
     }
 
+    /// In a cycle this is the wait for the command phase, after which the clock is looked at, and computing begins.
     fn wait_until(&mut self, deadline_ns: u64) -> Wake {
-        let timer_latency_ns = std::mem::take(&mut self.stall_ns);
+        let wake = self.wake(deadline_ns);
+        self.after_look_ns = std::mem::take(&mut self.computing_ns);
+        wake
+    }
+
+    fn wait_to_send(&mut self, deadline_ns: u64) -> Wake {
+        let wake = self.wake(deadline_ns);
+        self.before_look_ns = std::mem::take(&mut self.before_sync_ns);
+        wake
+    }
+}
+
+impl VirtualClock {
+    fn wake(&mut self, deadline_ns: u64) -> Wake {
+        let timer_latency_ns = self.lateness_ns + std::mem::take(&mut self.stall_ns);
         self.now_ns = self.now_ns.max(deadline_ns) + timer_latency_ns;
         Wake { now_ns: self.now_ns, timer_latency_ns }
     }

@@ -58,7 +58,7 @@ pub struct RunReport {
     pub buses: Vec<BusReport>,
     /// What was recorded.
     pub telemetry: TelemetryReport,
-    /// Why the group stopped before the end of its program; `None` if it did not, or was never enabled.
+    /// Why the run ended before its program; `None` if the program finished.
     pub stop: Option<StopReport>,
 }
 

@@ -214,8 +214,8 @@ fn a_foreign_station_sends_periodically_and_is_received_here_too() {
     let effect = Effect::Foreign(ForeignFrames::Frame { frame: says, period_ns: Some(100) });
     let (mut port, progress) = wrapped(effect, Selection::default(), Some(350));
     received(&mut port, 0);
-    let heard: Vec<u64> = received(&mut port, 320).iter().map(|received| received.at_ns).collect();
-    assert_eq!(heard, [100, 200, 300]);
+    let received_ns: Vec<u64> = received(&mut port, 320).iter().map(|received| received.at_ns).collect();
+    assert_eq!(received_ns, [100, 200, 300]);
     assert_eq!(received(&mut port, 1000), []);
     let said: Vec<u64> = port.inner_mut().sent.iter().map(|(at_ns, _)| *at_ns).collect();
     assert_eq!((said, progress.frames()), (vec![0, 100, 200, 300], 4));

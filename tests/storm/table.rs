@@ -34,7 +34,7 @@ struct Reaction {
     noticed_cycles: f64,
     /// From then on until every joint stood that hears what its drive is sent.
     rest_ms: f64,
-    /// The same of those whose drives are told something else.
+    /// The same of the joints whose drives receive something else.
     misled_rest_ms: f64,
 }
 
@@ -78,7 +78,7 @@ fn reaction(config: &Config, scenario: &Scenario) -> Option<Reaction> {
     })
 }
 
-/// The reactions to so many faults of a kind, at different places and times in motion; fewer where it was borne.
+/// The reactions to so many faults of a kind, at different places and times in motion; fewer where it was tolerated.
 fn reactions(number: u64, config: &Config, kind: &str, times: u64) -> Option<Vec<Reaction>> {
     let mut reactions = vec![];
     for time in 0..times {
@@ -110,7 +110,7 @@ fn table(config: &Config, times: u64) -> (String, Vec<f64>) {
     for (number, kind) in (0..).zip(KINDS) {
         let Some(reactions) = reactions(number, config, kind, times) else { continue };
         if reactions.is_empty() {
-            let _ = writeln!(text, "| {kind} | 0 of {times} | borne | – | – |");
+            let _ = writeln!(text, "| {kind} | 0 of {times} | tolerated | – | – |");
             continue;
         }
         let mut rules: BTreeMap<String, u64> = BTreeMap::new();

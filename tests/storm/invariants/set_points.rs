@@ -1,4 +1,4 @@
-//! The course of an axis' set-points: on the wire in drive units, and before they are rounded to them.
+//! The set-points of an axis keep its limits: as they were planned, and on the wire in drive units.
 
 use std::collections::VecDeque;
 
@@ -23,10 +23,8 @@ struct Point {
 const ROUNDING: f64 = 1e-6;
 /// When none has got to the drive for longer than this, it stands where the last one led.
 const GAP_S: f64 = 0.004;
-/// A command of a stream that has not come and was bridged shows in the third differences of so many cycles.
-const BRIDGED_CYCLES: u32 = 4;
 
-pub struct Course {
+pub struct SetPoints {
     scale: Scale,
     period_s: f64,
     /// What was sent to the enabled drive, newest first.
@@ -42,16 +40,14 @@ pub struct Course {
     /// Cycles in which the trajectory went on since the last set-point.
     cycles: u32,
     /// The slot of the last set-point.
-    told_slot: u64,
+    sent_slot: u64,
     /// What the last cycle was: the phase, and where the set-point was.
     last: Option<(Phase, f64)>,
-    /// Commands of a stream until its jerk is its own again.
-    bridged: u32,
-    /// Cycles in which the trajectory went on since the last one whose jerk nobody keeps to the limit.
+    /// Cycles in which the trajectory went on since the last one whose jerk is not limited.
     kept: u32,
 }
 
-impl Course {
+impl SetPoints {
     pub fn new(config: &Config, axis: &Axis) -> Self {
         let divider = |axis: &Axis| config.buses[axis.bus].divider;
         let follow = config.axes.iter().filter(|axis| !axis.control.is_profile());
@@ -65,9 +61,8 @@ impl Course {
             on_wire: None,
             coasting: 0.0,
             cycles: 0,
-            told_slot: 0,
+            sent_slot: 0,
             last: None,
-            bridged: 0,
             kept: u32::MAX,
         }
     }
@@ -82,7 +77,7 @@ impl Course {
             return Ok(());
         }
         let record = &seen.record.axes()[index];
-        // What the controller believes of the drive: for one that it takes for disabled it plans nothing.
+        // The state as the controller knows it: for a drive that it takes for disabled it plans nothing.
         if record.drive_state != DriveState::OperationEnabled {
             self.points = [None; 3];
             self.planned.clear();
@@ -102,36 +97,31 @@ impl Course {
             return Err(format!("holding, and from {position} to {}", record.position_set));
         }
         self.last = Some((phase, record.position_set));
-        let told = &seen.told[index];
-        if told.position.or(told.velocity).or(told.torque).is_none() || !seen.record.is_commanded {
+        let sent = &seen.sent[index];
+        if sent.position.or(sent.velocity).or(sent.torque).is_none() || !seen.record.is_commanded {
             return Ok(());
         }
         let cycles = std::mem::take(&mut self.cycles);
         let nominal_s = self.period_s * f64::from(seen.config.buses[axis.bus].divider);
         let slot = seen.snapshot.slot;
-        let silent_s = (slot - std::mem::replace(&mut self.told_slot, slot)) as f64 * self.period_s;
+        let silent_s = (slot - std::mem::replace(&mut self.sent_slot, slot)) as f64 * self.period_s;
         // An axis that is given up because its set-points do not get through stays where the last one led.
         let is_given_up = silent_s > nominal_s * (1.0 + ROUNDING)
             && self.points[0].is_some_and(|last| last.position == record.position_set);
         if is_given_up || silent_s > GAP_S.max(nominal_s) * (1.0 + ROUNDING) {
             self.points = [None; 3];
         }
-        let point = Point { position: record.position_set, counts: told.position, cycles };
+        let point = Point { position: record.position_set, counts: sent.position, cycles };
         self.check_point(axis, &point)?;
         self.points = [Some(point), self.points[0], self.points[1]];
         Ok(())
     }
 
-    /// Nobody keeps the jerk of a stream to the limit that is clamped, in velocity and acceleration, or after a command that
-    /// has not come. Whatever is planned keeps it, also the stop that begins in the midst of such a stream.
+    /// A stream that is clamped is held to the limits of velocity and acceleration, and not to that of the jerk. Whatever else is
+    /// sent keeps it, also the stop that begins in the midst of such a stream.
     fn note_jerk(&mut self, seen: &Seen<'_>, axis: &Axis) {
         let is_streaming = seen.record.phase == Phase::Streaming;
-        if seen.asked.has_streamed {
-            self.bridged = self.bridged.saturating_sub(1);
-        } else if is_streaming {
-            self.bridged = BRIDGED_CYCLES;
-        }
-        if is_streaming && (axis.on_violation == OnViolation::Clamp || self.bridged > 0) {
+        if is_streaming && axis.on_violation == OnViolation::Clamp {
             self.kept = 0;
         } else if seen.record.is_commanded {
             self.kept = self.kept.saturating_add(1);
@@ -197,21 +187,21 @@ impl Course {
         Ok(())
     }
 
-    /// Velocities and torques on the wire, in whatever state the drive is.
+    /// Velocities and torques on the wire keep their limits, in every state of the drive.
     fn check_rates(&self, seen: &Seen<'_>, index: usize) -> Result<(), String> {
-        let (limits, told) = (&seen.config.axes[index].limits, &seen.told[index]);
+        let (limits, sent) = (&seen.config.axes[index].limits, &seen.sent[index]);
         let velocity = self.scale.velocity_to_drive(limits.velocity).abs() + 1;
-        if let Some(told) = told.velocity.filter(|told| told.abs() > velocity) {
-            return Err(format!("velocity {told} on the wire beyond {velocity}"));
+        if let Some(sent) = sent.velocity.filter(|sent| sent.abs() > velocity) {
+            return Err(format!("velocity {sent} on the wire beyond {velocity}"));
         }
         let torque = self.scale.torque_to_per_mille(limits.torque).abs() + 1;
-        match told.torque.filter(|told| told.abs() > torque) {
-            Some(told) => Err(format!("torque {told} on the wire beyond {torque}")),
+        match sent.torque.filter(|sent| sent.abs() > torque) {
+            Some(sent) => Err(format!("torque {sent} on the wire beyond {torque}")),
             None => Ok(()),
         }
     }
 
-    /// Positions on the wire while the drive really is enabled, whatever the controller believes.
+    /// Positions on the wire keep the limits while the drive is enabled in truth, whatever the controller takes it for.
     fn check_wire(&mut self, seen: &Seen<'_>, index: usize) -> Result<(), String> {
         let (axis, concern, truth) = (&seen.config.axes[index], &seen.concerns[index], &seen.truth[index]);
         if truth.state != DriveState::OperationEnabled {
@@ -219,7 +209,7 @@ impl Course {
             self.coasting = truth.velocity.abs();
             return Ok(());
         }
-        let Some(counts) = seen.told[index].position else { return Ok(()) };
+        let Some(counts) = seen.sent[index].position else { return Ok(()) };
         let before = self.on_wire.replace((seen.snapshot.slot, counts));
         let position = self.scale.position_from_counts(counts);
         let count = 1.0 / self.scale.resolution();
@@ -230,7 +220,7 @@ impl Course {
             let reach = self.coasting.max(truth.velocity.abs()) * GAP_S + 4.0 * count;
             let is_judged = !concern.is_present && !seen.config.axes[index].control.is_profile();
             return match is_judged && (position - there).abs() > reach {
-                true => Err(format!("enabled at {there}, and told to be at {position}")),
+                true => Err(format!("enabled at {there}, and sent to {position}")),
                 false => Ok(()),
             };
         };
