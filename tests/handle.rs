@@ -74,13 +74,13 @@ fn after_a_fault_each_request_is_refused_with_the_reason_until_the_fault_is_rese
     let Err(MotionError::Refused(refused)) = joint.wait(refused, PATIENCE) else { panic!("it was granted") };
     assert_eq!(
         refused.to_string(),
-        "the move was refused while holding: the group has stopped for a fault of joint (start_pose), which must be \
+        "the move was rejected while holding: the group has stopped for a fault of joint (start_pose), which must be \
          reset first"
     );
     let Err(CommandError::Refused(refused)) = joint.begin_stream() else { panic!("it was granted") };
     assert_eq!(refused.refusal.map(|refusal| refusal.request), Some(RequestKind::Stream));
     let Err(CommandError::Refused(refused)) = joint.enable() else { panic!("it was granted") };
-    assert_eq!(refused.to_string(), "enabling was refused: not possible while holding");
+    assert_eq!(refused.to_string(), "enabling was rejected: not possible while holding");
     joint.reset_faults().unwrap();
     let motion = joint.move_to(&[0.2]).unwrap();
     assert!(matches!(joint.reset_faults(), Err(CommandError::Refused(_))), "it moves");

@@ -45,7 +45,7 @@ pub enum ProgramStep {
     Wait,
     /// These requests, in this order.
     Begin(Vec<RequestEnvelope>),
-    /// A motion of somebody else has taken the place of the move with this number, counted from 1.
+    /// A motion of another client has replaced the move with this number, counted from 1.
     Replaced {
         /// The move.
         number: u64,

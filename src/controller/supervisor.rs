@@ -62,7 +62,7 @@ pub struct Supervisor {
     unreached: Vec<usize>,
     deadline_ns: Option<u64>,
     duration_ns: Option<u64>,
-    /// Whether somebody else commands the group once it is enabled.
+    /// Whether a client commands the group, in place of the program.
     is_serving: bool,
 }
 

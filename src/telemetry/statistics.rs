@@ -57,11 +57,6 @@ impl Latency {
         value.clamp(self.min_ns(), self.max_ns)
     }
 
-    /// The mean, to three digits.
-    pub fn mean_ns(&self) -> f64 {
-        self.histogram.as_ref().map_or(0.0, Histogram::mean)
-    }
-
     /// The counts in the ranges between neighbouring `bounds_ns`. The bounds ascend, and a bound belongs to the range above
     /// it. Times outside all ranges count in the first and the last range.
     pub fn counts(&self, bounds_ns: &[u64]) -> Vec<u64> {
