@@ -1,4 +1,4 @@
-//! Faults on purpose: the wrapper, the files, and what the controller does about each kind, in virtual time.
+//! Fault injection: the wrapper, the files, and the controller's reaction to each kind, in virtual time.
 
 mod arm;
 mod command;

@@ -1,17 +1,17 @@
-//! Drives that another master has taken out of operational: PDOs do not reach them any more.
+//! Drives that another master has made PDO-unreachable, before the run shuts the drives down.
 
 use std::sync::Arc;
 
 use takt::bus::port::Port;
 use takt::config::Config;
 use takt::controller::{Interrupt, VirtualRun};
-use takt::faults::Rehearsal;
-use takt::sim::NmtState;
+use takt::faults::FaultInjector;
+use takt::sim::NodeState;
 use takt_rt::Phase;
 
 use crate::arm::{folder, scenario};
 
-/// The machines: every mode in which a drive can move when PDOs do not reach it any more.
+/// The machines: every way in which a drive can move when it becomes PDO-unreachable.
 const MACHINES: [&str; 6] = [
     "arm6-erob",
     "erob-modes/erob-csv",
@@ -35,15 +35,15 @@ fn nmt_fault(config: &Config, command: &str) -> String {
     )
 }
 
-/// Plays until the fault has begun.
-fn after_nmt(config: &Config, command: &str) -> VirtualRun<Port> {
-    played_until_the_fault(config, &nmt_fault(config, command))
+/// Runs until the fault has begun.
+fn run_until_fault(config: &Config, command: &str) -> VirtualRun<Port> {
+    play_until_fault(config, &nmt_fault(config, command))
 }
 
-fn played_until_the_fault(config: &Config, faults: &str) -> VirtualRun<Port> {
-    let rehearsal = Arc::new(Rehearsal::new(scenario(faults, config)));
-    let (mut run, _) = VirtualRun::rehearsed(config, Arc::clone(&rehearsal)).unwrap();
-    while !rehearsal.courses().any(|(_, course)| course.began_ns().is_some()) {
+fn play_until_fault(config: &Config, faults: &str) -> VirtualRun<Port> {
+    let fault_injector = Arc::new(FaultInjector::new(scenario(faults, config)));
+    let (mut run, _) = VirtualRun::with_faults(config, Arc::clone(&fault_injector)).unwrap();
+    while !fault_injector.progress().any(|(_, progress)| progress.began_ns().is_some()) {
         assert!(run.step(), "{}: over before the fault", config.name);
     }
     run
@@ -55,11 +55,11 @@ fn first_drive(config: &Config, run: &mut VirtualRun<Port>) -> takt::sim::Observ
 }
 
 #[test]
-fn a_drive_that_pdos_do_not_reach_any_more_is_stopped_and_switched_off_by_sdo_before_the_run_shuts_down() {
+fn a_pdo_unreachable_drive_is_stopped_and_disabled_by_sdo_before_the_shutdown() {
     for name in MACHINES {
         let config = machine(name);
         for command in COMMANDS {
-            let mut run = after_nmt(&config, command);
+            let mut run = run_until_fault(&config, command);
             let began_ns = run.snapshot().at_ns;
             let mut ended_ns = None;
             while run.snapshot().phase != Phase::Disabled {
@@ -80,11 +80,11 @@ fn a_drive_that_pdos_do_not_reach_any_more_is_stopped_and_switched_off_by_sdo_be
 }
 
 #[test]
-fn a_run_that_is_cut_off_leaves_no_drive_enabled_that_pdos_do_not_reach() {
+fn an_interrupted_run_leaves_no_pdo_unreachable_drive_enabled() {
     for name in MACHINES {
         let config = machine(name);
         for command in COMMANDS {
-            let mut run = after_nmt(&config, command);
+            let mut run = run_until_fault(&config, command);
             run.interrupt(Interrupt::Immediate);
             while run.step() {}
             let state = first_drive(&config, &mut run).state;
@@ -93,9 +93,9 @@ fn a_run_that_is_cut_off_leaves_no_drive_enabled_that_pdos_do_not_reach() {
     }
 }
 
-/// A drive that was reset has no watchdog any more. While no frame reaches it, the run can only wait.
+/// After its reset the drive consumes no heartbeat. While no frame gets to it, the run can only wait.
 #[test]
-fn a_run_waits_for_a_queue_that_is_full_before_it_leaves_a_drive_without_a_watchdog() {
+fn a_run_waits_for_a_full_queue_before_it_leaves_a_drive_without_a_heartbeat_watchdog() {
     for name in MACHINES {
         let config = machine(name);
         let bus = &config.buses[config.axes[0].bus].name;
@@ -104,7 +104,7 @@ fn a_run_waits_for_a_queue_that_is_full_before_it_leaves_a_drive_without_a_watch
         );
         for interrupt in [None, Some(Interrupt::Controlled), Some(Interrupt::Immediate)] {
             let mut run =
-                played_until_the_fault(&config, &(full.clone() + &nmt_fault(&config, "reset-communication")));
+                play_until_fault(&config, &(full.clone() + &nmt_fault(&config, "reset-communication")));
             interrupt.into_iter().for_each(|interrupt| run.interrupt(interrupt));
             while run.step() {}
             let state = first_drive(&config, &mut run).state;
@@ -113,9 +113,9 @@ fn a_run_waits_for_a_queue_that_is_full_before_it_leaves_a_drive_without_a_watch
     }
 }
 
-/// The drive may be away when the run begins to shut down. A command that is sent only once is lost then.
+/// The drive may be absent when the shutdown begins, and a command that is sent only once may be lost.
 #[test]
-fn a_drive_that_comes_back_while_the_run_takes_its_leave_is_left_without_torque_and_pre_operational() {
+fn a_drive_that_comes_back_during_the_shutdown_ends_without_torque_and_pre_operational() {
     for name in MACHINES {
         let config = machine(name);
         for away_ms in [600, 900, 1200, 1500] {
@@ -123,12 +123,12 @@ fn a_drive_that_comes_back_while_the_run_takes_its_leave_is_left_without_torque_
                 "[[fault]]\nkind = \"silent-node\"\naxis = \"{}\"\nwhen = \"moving\"\nat = \"300 ms\"\nfor = \"{away_ms} ms\"\n",
                 config.axes[0].name
             );
-            let mut run = played_until_the_fault(&config, &silent);
+            let mut run = play_until_fault(&config, &silent);
             while run.step() {}
             assert_eq!(run.supervisor().unreached(), [0usize; 0], "{name}, {away_ms} ms");
             let drive = first_drive(&config, &mut run);
             assert!(!drive.state.has_torque(), "{name}, {away_ms} ms: {:?}", drive.state);
-            assert_eq!(drive.nmt, NmtState::PreOperational, "{name}, {away_ms} ms");
+            assert_eq!(drive.nmt, NodeState::PreOperational, "{name}, {away_ms} ms");
         }
     }
 }

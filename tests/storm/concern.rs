@@ -4,8 +4,8 @@ use takt::bus::schedule::analyse;
 use takt::canopen::nmt::{NmtCommand, NmtTarget};
 use takt::config::{Axis, Config, DriveFamily};
 use takt::faults::{
-    Direction, DriveTrouble, Effect, ForeignFrames, FrameEffect, FrameFunction, InterfaceEffect, Part,
-    Rehearsal, Selection,
+    Direction, DriveEffect, Effect, FaultInjector, ForeignFrames, FrameEffect, FrameFunction,
+    InterfaceEffect, Part, Selection,
 };
 use takt::sim::Defect;
 
@@ -64,14 +64,15 @@ pub struct Concerns {
 }
 
 impl Concerns {
-    pub fn new(config: &Config, rehearsal: &Rehearsal) -> Self {
-        let of_fault = |fault: &takt::faults::Fault| -> Vec<Concern> {
+    pub fn new(config: &Config, fault_injector: &FaultInjector) -> Self {
+        let of_fault = |fault: &takt::faults::ScenarioFault| -> Vec<Concern> {
             config.axes.iter().map(|axis| concern(axis, fault)).collect()
         };
-        let by_fault: Vec<Vec<Concern>> = rehearsal.courses().map(|(fault, _)| of_fault(fault)).collect();
+        let by_fault: Vec<Vec<Concern>> =
+            fault_injector.progress().map(|(fault, _)| of_fault(fault)).collect();
         Self {
             has_begun: vec![false; by_fault.len()],
-            buses: rehearsal.courses().map(|(fault, _)| fault.bus).collect(),
+            buses: fault_injector.progress().map(|(fault, _)| fault.bus).collect(),
             by_fault,
             by_axis: vec![Concern::default(); config.axes.len()],
             by_bus: vec![false; config.buses.len()],
@@ -110,9 +111,9 @@ impl Concerns {
     }
 
     /// Looks which faults have begun since the last look, and calls `begun` with the number of each.
-    pub fn observe(&mut self, rehearsal: &Rehearsal, mut begun: impl FnMut(usize)) {
-        for (number, (_, course)) in rehearsal.courses().enumerate() {
-            if !self.has_begun[number] && course.began_ns().is_some() {
+    pub fn observe(&mut self, fault_injector: &FaultInjector, mut begun: impl FnMut(usize)) {
+        for (number, (_, progress)) in fault_injector.progress().enumerate() {
+            if !self.has_begun[number] && progress.began_ns().is_some() {
                 self.has_begun[number] = true;
                 self.by_bus[self.buses[number]] = true;
                 for (present, new) in self.by_axis.iter_mut().zip(&self.by_fault[number]) {
@@ -124,12 +125,12 @@ impl Concerns {
     }
 }
 
-fn concern(axis: &Axis, fault: &takt::faults::Fault) -> Concern {
+fn concern(axis: &Axis, fault: &takt::faults::ScenarioFault) -> Concern {
     if fault.bus != axis.bus {
         return Concern::default();
     }
-    let is_own = fault.place == format!("axis {}", axis.name);
-    let is_at_another_axis = fault.place.starts_with("axis ") && !is_own;
+    let is_own = fault.location == format!("axis {}", axis.name);
+    let is_at_another_axis = fault.location.starts_with("axis ") && !is_own;
     let own = |id: u32| (id & 0x7F) == u32::from(axis.node);
     let is_present = match fault.effect {
         Effect::Drive { node, .. } => node == axis.node,
@@ -167,8 +168,8 @@ fn concern(axis: &Axis, fault: &takt::faults::Fault) -> Concern {
                 && node.is_none_or(|node| node == axis.node)
                 && *probability == 1.0
         }
-        Effect::Drive { node, trouble } => {
-            node == axis.node && trouble == DriveTrouble::Defect(Defect::SilentSdoServer)
+        Effect::Drive { node, effect } => {
+            node == axis.node && effect == DriveEffect::Defect(Defect::SilentSdoServer)
         }
         _ => false,
     };

@@ -6,7 +6,7 @@ use takt::bus::port::Port;
 use takt::config::Config;
 use takt::controller::channels::LogSide;
 use takt::controller::{Outcome, VirtualRun};
-use takt::faults::{Rehearsal, Scenario};
+use takt::faults::{FaultInjector, Scenario};
 use takt::sim::{Observation, SimulatedBus};
 use takt_rt::{
     Answer, BusPort, DriveState, Event, EventKind, Frame, Phase, ReceiveBatch, Request, RequestId, Rule,
@@ -32,7 +32,7 @@ const RESET_CYCLES: u64 = 60;
 pub struct World {
     pub run: VirtualRun<Tap>,
     pub log: LogSide,
-    pub rehearsal: Arc<Rehearsal>,
+    pub fault_injector: Arc<FaultInjector>,
     pub snapshot: Snapshot,
     /// Of the present cycle.
     pub sent: Vec<Vec<Frame>>,
@@ -47,23 +47,23 @@ impl World {
     }
 
     fn with(config: &Config, scenario: &Scenario, is_serving: bool) -> Self {
-        let rehearsal = Arc::new(Rehearsal::new(scenario.clone()));
+        let fault_injector = Arc::new(FaultInjector::new(scenario.clone()));
         let simulated = |bus| Port::Simulated(Box::new(SimulatedBus::new(config, bus)));
         let ports =
-            (0..config.buses.len()).map(|bus| Tap::new(rehearsal.wrap(bus, simulated(bus)))).collect();
+            (0..config.buses.len()).map(|bus| Tap::new(fault_injector.wrap(bus, simulated(bus)))).collect();
         let made =
             if is_serving { VirtualRun::serving(config, ports) } else { VirtualRun::new(config, ports) };
         let (run, log) = made.unwrap();
         let snapshot = run.snapshot();
         let sent = vec![vec![]; config.buses.len()];
-        Self { run, log, rehearsal, snapshot, sent, truth: vec![], events: vec![] }
+        Self { run, log, fault_injector, snapshot, sent, truth: vec![], events: vec![] }
     }
 
     /// One cycle. Returns whether the run goes on.
     pub fn step(&mut self, config: &Config) -> bool {
         let goes_on = self.run.step();
         self.snapshot = self.run.snapshot();
-        self.rehearsal.observe(&self.snapshot);
+        self.fault_injector.observe(&self.snapshot);
         let ports = self.run.ports();
         for (sent, port) in self.sent.iter_mut().zip(ports.iter_mut()) {
             sent.clear();
@@ -113,9 +113,9 @@ pub struct Done {
 pub fn play(case: &Case) -> Result<Done, String> {
     let config = &case.config;
     let mut world = World::with(config, &case.scenario, case.is_serving);
-    let rehearsal = Arc::clone(&world.rehearsal);
+    let fault_injector = Arc::clone(&world.fault_injector);
     let mut invariants = Invariants::new(config);
-    let mut concerns = Concerns::new(config, &rehearsal);
+    let mut concerns = Concerns::new(config, &fault_injector);
     let mut wire = Wire::new(config);
     let mut clients = Clients::new(case);
     let mut fingerprint = Fingerprint::default();
@@ -124,7 +124,7 @@ pub fn play(case: &Case) -> Result<Done, String> {
     let (mut enabled, mut cycles) = (None, 0);
     let mut goes_on = true;
     let mut overload_dice = case.dice.split(u64::MAX - 2);
-    world.run.neglect_life_cycle(case.hardship.neglect.max(1));
+    world.run.poll_life_cycle_every(case.hardship.neglect.max(1));
     while goes_on {
         let phase = world.snapshot.phase;
         goes_on = world.step(config);
@@ -132,7 +132,7 @@ pub fn play(case: &Case) -> Result<Done, String> {
         let wrong =
             |snapshot: &Snapshot, what: String| format!("cycle {cycles}, {:?}: {what}", snapshot.phase);
         wire.read(&world.sent);
-        concerns.observe(&rehearsal, |fault| {
+        concerns.observe(&fault_injector, |fault| {
             outcomes
                 .iter_mut()
                 .filter(|outcomes| outcomes.stop.is_none())
@@ -258,7 +258,7 @@ fn at_rest(case: &Case, concerns: &mut Concerns, world: &mut World) -> Result<()
         }
     }
     // A fault may have begun in that time.
-    concerns.observe(&world.rehearsal, |_| ());
+    concerns.observe(&world.fault_injector, |_| ());
     for (axis, concern) in case.config.axes.iter().zip(&concerns.by_axis) {
         let truth = world.run.ports()[axis.bus].observe(axis.node);
         let is_driven = truth.state == DriveState::OperationEnabled;

@@ -41,11 +41,11 @@ struct Reaction {
 fn reaction(config: &Config, scenario: &Scenario) -> Option<Reaction> {
     let mut world = World::new(config, scenario);
     let mut stop: Option<(StopReason, u64)> = None;
-    let mut concerns = Concerns::new(config, &world.rehearsal);
+    let mut concerns = Concerns::new(config, &world.fault_injector);
     let (mut last_motion_ns, mut last_misled_ns) = (0, 0);
     for _ in 0..bounds::cycles(config, LONGEST_S) {
         let goes_on = world.step(config);
-        concerns.observe(&world.rehearsal, |_| ());
+        concerns.observe(&world.fault_injector, |_| ());
         while world.log.next_record(|_| ()).is_some() {}
         for event in &world.events {
             match event.kind {
@@ -67,7 +67,7 @@ fn reaction(config: &Config, scenario: &Scenario) -> Option<Reaction> {
         }
     }
     let (reason, stopped_ns) = stop?;
-    let began_ns = world.rehearsal.courses().next().and_then(|(_, course)| course.began_ns())?;
+    let began_ns = world.fault_injector.progress().next().and_then(|(_, progress)| progress.began_ns())?;
     let noticed_ns = stopped_ns.saturating_sub(began_ns) as f64;
     let rest_ms = |last_ns: u64| last_ns.saturating_sub(stopped_ns) as f64 * 1e-6;
     Some(Reaction {

@@ -56,7 +56,9 @@ use set_points::SetPoints;
 use stream::StreamFollower;
 
 pub use feedback::Jump;
-pub use parameters::{AxisParameters, CommandPdo, FeedbackSince, MAX_PDOS, Pdo, TransmissionType};
+pub use parameters::{
+    AxisParameters, AxisParametersError, CommandPdo, FeedbackSince, MAX_PDOS, Pdo, TransmissionType,
+};
 
 /// Cycles of its bus after which a drive has obeyed a controlword and has said so.
 const SETTLED_CYCLES: u32 = 4;
