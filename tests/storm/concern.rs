@@ -26,6 +26,8 @@ pub struct Concern {
     pub is_crowded: bool,
     /// Something pushes the joint for as long as it lasts, also in the end.
     pub is_loaded: bool,
+    /// The loop is late, and the heartbeat may stay away for so long that its drive reports a fault.
+    pub is_watchdog_due: bool,
     /// Since when nothing that is sent to its drive gets there any more: ns.
     pub unreachable_since_ns: Option<u64>,
 }
@@ -40,6 +42,7 @@ impl Concern {
             is_cut_off: self.is_cut_off || other.is_cut_off,
             is_crowded: self.is_crowded || other.is_crowded,
             is_loaded: self.is_loaded || other.is_loaded,
+            is_watchdog_due: self.is_watchdog_due || other.is_watchdog_due,
             unreachable_since_ns: self.unreachable_since_ns.or(other.unreachable_since_ns),
         }
     }
@@ -81,7 +84,9 @@ impl Concerns {
     /// The loop is late: frames may meet those of the next cycle on any bus.
     pub fn crowd(&mut self) {
         self.by_bus.fill(true);
-        self.by_axis.iter_mut().for_each(|concern| concern.is_crowded = true);
+        for concern in &mut self.by_axis {
+            (concern.is_crowded, concern.is_watchdog_due) = (true, true);
+        }
     }
 
     /// From now on the loop is too late in every slot.
@@ -97,7 +102,7 @@ impl Concerns {
     pub fn clog(&mut self, bus: usize, now_ns: u64, is_for_ever: bool) {
         self.by_bus[bus] = true;
         for (concern, _) in self.by_axis.iter_mut().zip(&self.bus_of_axis).filter(|(_, of)| **of == bus) {
-            (concern.is_present, concern.is_crowded) = (true, true);
+            (concern.is_present, concern.is_crowded, concern.is_watchdog_due) = (true, true, true);
             concern.is_cut_off |= is_for_ever;
             if is_for_ever {
                 concern.unreachable_since_ns.get_or_insert(now_ns);
@@ -178,6 +183,7 @@ fn concern(axis: &Axis, fault: &takt::faults::ScenarioFault) -> Concern {
         is_crowded: matches!(fault.effect, Effect::Foreign(_)),
         is_driven_by_others: is_own && (matches!(fault.kind, "load" | "foreign-set-points") || is_led_astray),
         is_loaded: is_own && fault.kind == "load",
+        is_watchdog_due: false,
         unreachable_since_ns: None,
     }
 }

@@ -181,6 +181,20 @@ const FAILED_IN_HARDSHIP: [(u64, &str); 9] = [
     (20_005_131, "A client that went on moving the group kept the run from ending"),
 ];
 
+/// The same of those on a machine that has too little time.
+const FAILED_IN_OVERLOAD: [(u64, &str); 1] = [(
+    424_242_620,
+    "A drive reported a fault for want of the heartbeat of a machine that was late in every cycle",
+)];
+
+#[test]
+fn storms_that_have_failed_in_overload_pass() {
+    for (seed, what) in FAILED_IN_OVERLOAD {
+        let played = play(&Case::of(seed));
+        assert!(played.is_ok(), "{seed}, {what}: {played:?}");
+    }
+}
+
 #[test]
 fn storms_that_have_failed_in_hardship_pass() {
     for (seed, what) in FAILED_IN_HARDSHIP {
