@@ -30,8 +30,8 @@ pub struct SocketCanOptions {
     /// How many frames of this socket may wait in the queues of the interfaces; the kernel does not take more. Choose not much more
     /// than a cycle sends: set-points that wait longer are stale.
     pub transmit_frames: usize,
-    /// How many received frames the kernel keeps while nobody reads. A process without `CAP_NET_ADMIN` gets at most
-    /// `net.core.rmem_max` bytes.
+    /// How many received frames the kernel keeps until they are read. A process without CAP_NET_ADMIN may get fewer
+    /// (`net.core.rmem_max`).
     pub receive_frames: usize,
 }
 
@@ -49,8 +49,8 @@ impl SocketCanOptions {
             identifiers: nodes.flat_map(of_node).chain(broadcast).chain([own]).collect(),
             bit_rate: settings.map_or(1_000_000, |bus| bus.bit_rate),
             data_bit_rate: settings.and_then(|bus| bus.data_bit_rate),
-            // For all buses: one socket can carry the frames of the others in the same call, and on a stuck bus they wait in its
-            // buffer.
+            // The frames of all buses: the kernel may charge one socket with frames that others send in the same call, and
+            // on a bus that is stuck they stay there.
             transmit_frames: config.axes.len() * COMMANDS_PER_AXIS + config.buses.len() * SERVICE_FRAMES,
             receive_frames: RECEIVE_FRAMES,
         }
@@ -66,7 +66,7 @@ const HEARTBEAT: u16 = 0x700;
 const COMMANDS_PER_AXIS: usize = 4;
 /// The most SYNC and service frames of a bus in a cycle.
 const SERVICE_FRAMES: usize = 8;
-/// A reader that is stalled for 30 ms on a full bus loses no frame.
+/// Enough for a reader that stalls for 30 ms on a fully loaded bus.
 const RECEIVE_FRAMES: usize = 1_024;
 
 impl Default for SocketCanOptions {
@@ -163,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn a_master_hears_every_identifier_of_its_nodes_and_its_own() {
+    fn a_master_receives_every_identifier_of_its_nodes_and_its_own() {
         let config = Config::load(Path::new("configs/arm6-erob.toml")).unwrap();
         let options = SocketCanOptions::of_master(&config, 0);
         let node = config.axes.iter().find(|axis| axis.bus == 0).map(|axis| axis.node).unwrap();

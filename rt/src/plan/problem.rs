@@ -21,6 +21,16 @@ impl State {
     pub const fn rest(position: f64) -> Self {
         Self { position, velocity: 0.0, acceleration: 0.0 }
     }
+
+    /// After this time with the same acceleration; before it, if the time is negative.
+    pub fn after(&self, time_s: f64) -> Self {
+        let Self { position, velocity, acceleration } = *self;
+        Self {
+            position: position + time_s * (velocity + 0.5 * acceleration * time_s),
+            velocity: velocity + acceleration * time_s,
+            acceleration,
+        }
+    }
 }
 
 /// The limits of the motion of one axis.

@@ -56,7 +56,7 @@ impl Problem {
         }
         // The target moves towards a limit, and so would an axis that follows it as closely as possible.
         let mut profile = Profile::hold(0.0);
-        let waypoint = State { acceleration: 0.0, ..moved(&target, cycle_s) };
+        let waypoint = State { acceleration: 0.0, ..target.after(cycle_s) };
         let absolute = Self { target: self.within_limits(&waypoint), ..*self };
         let planned = synchronised(&[absolute], core::slice::from_mut(&mut profile), SETTLED);
         let next = profile.sample(cycle_s);
@@ -70,7 +70,7 @@ impl Problem {
     /// The first cycle of the fastest motion to the target, planned in the frame of the target.
     fn relative_step(&self, now: &State, cycle_s: f64) -> Result<State, PlanError> {
         let Self { start, limits, .. } = self;
-        let then = moved(now, cycle_s);
+        let then = now.after(cycle_s);
         let seen = Self {
             start: State {
                 position: start.position - now.position,
@@ -159,15 +159,5 @@ impl Problem {
         let within = (slowest..=fastest).contains(&(velocity + acceleration * cycle_s));
         let follows = within && velocity == target.velocity && !limits.is_second_order();
         State { position, velocity, acceleration: if follows { acceleration } else { 0.0 } }
-    }
-}
-
-/// The state of a target with constant acceleration after this time.
-fn moved(target: &State, time_s: f64) -> State {
-    let State { position, velocity, acceleration } = *target;
-    State {
-        position: position + time_s * (velocity + 0.5 * acceleration * time_s),
-        velocity: velocity + acceleration * time_s,
-        acceleration,
     }
 }
