@@ -1,8 +1,8 @@
 //! From the checked configuration to what the real-time thread works with.
 
 use takt_rt::{
-    AxisParameters, BusParameters, CommandPdo, Engine, EngineParameters, FeedbackSince, Heartbeat, Id, Mapping,
-    MappingError, Pdo, Scale, ScaleError, ScaleParameters, SetUpError, SlotPlan, TimingLadder,
+    AxisParameters, BusParameters, CommandPdo, Engine, EngineParameters, FeedbackSince, Heartbeat, Id,
+    Mapping, MappingError, Pdo, Scale, ScaleError, ScaleParameters, SetUpError, SlotPlan, TimingLadder,
 };
 
 use crate::config::{Axis, Config, ConfigError, DriveFamily, Interface};
