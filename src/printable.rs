@@ -1,4 +1,4 @@
-//! Text from outside (files, names of files, arguments, drives) as a terminal may be shown it.
+//! Text that somebody else has chosen (the contents and names of files, arguments), made safe to show on a terminal.
 
 use std::path::Path;
 
@@ -14,7 +14,7 @@ pub fn printable(text: &str) -> String {
     shown
 }
 
-/// The path of a file, for a message.
+/// A path, made safe in the same way.
 pub fn printable_path(path: &Path) -> String {
     printable(&path.display().to_string())
 }

@@ -1,19 +1,18 @@
-//! The reader of configurations, given any text.
+//! Fuzzes the reader of configurations with arbitrary text.
 
 use takt::bus::schedule;
 use takt::config::{Config, ConfigError};
 use takt::controller::assemble;
 
-/// Reads a text as a configuration. One that is taken can be checked and assembled; one that is refused says what is
-/// wrong, and where.
+/// Reads a text as a configuration. A valid one can be checked and assembled. An error says what is wrong, and where.
 pub fn run(bytes: &[u8]) {
     let Ok(text) = std::str::from_utf8(bytes) else { return };
     match Config::parse("fuzz", text) {
         Err(error) => assert_explained(text, &error),
         Ok(config) => {
-            // Whether the buses can carry it is another question, which must have an answer.
+            // The buses may not be able to carry it, but the check must give a result.
             let _ = schedule::verify(&config);
-            assemble::engine(&config).expect("what passed the checks can be assembled");
+            assemble::engine(&config).expect("a configuration that passed its checks can be assembled");
         }
     }
 }

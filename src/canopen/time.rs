@@ -1,5 +1,5 @@
-//! The time of day that the TIME message (CiA 301, 7.2.6) tells, from and to the system's clock. The message itself and
-//! its producer are the cycle's: [`takt_rt::time_of_day`].
+//! Converts the time of day of the TIME message (CiA 301, 7.2.6) from and to the system clock. The message and its
+//! producer are in [`takt_rt::time_of_day`].
 
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
@@ -9,18 +9,18 @@ use takt_rt::{NANOSECONDS_PER_SECOND, Nanoseconds};
 /// From 1970-01-01 to 1984-01-01.
 const EPOCH: Duration = Duration::from_secs(5_113 * 86_400);
 
-/// A system time as CANopen counts it; `None` before 1984 and after 2163.
+/// The time of day of a system time; `None` before 1984 and after 2163.
 pub fn from_system_time(time: SystemTime) -> Option<TimeOfDay> {
     let since_epoch = time.duration_since(UNIX_EPOCH + EPOCH).ok()?;
     TimeOfDay::after_epoch(u64::try_from(since_epoch.as_millis()).ok()?)
 }
 
-/// A time of day as a system time.
+/// The system time of a time of day.
 pub fn system_time(time: TimeOfDay) -> SystemTime {
     UNIX_EPOCH + EPOCH + Duration::from_millis(time.since_epoch_ms())
 }
 
-/// Nanoseconds since 1984-01-01, of nanoseconds since 1970-01-01; 0 before that day.
+/// Nanoseconds since 1984-01-01 from nanoseconds since 1970-01-01; 0 before that day.
 pub const fn since_epoch_ns(unix_ns: Nanoseconds) -> Nanoseconds {
     unix_ns.saturating_sub(EPOCH.as_secs() * NANOSECONDS_PER_SECOND)
 }

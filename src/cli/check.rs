@@ -12,7 +12,7 @@ use takt::config::{Axis, Config, Control, Travel};
 
 use super::exit::Exit;
 use super::print;
-use super::refusal::Refusal;
+use super::usage_error::UsageError;
 use unattended::Unattended;
 
 /// Check a configuration: limits, units, bus load, and the worst-case response time of every message
@@ -29,7 +29,7 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Exit {
     let config = match Config::load(&arguments.config) {
         Ok(config) => config,
-        Err(error) => return Refusal::from(error).print(arguments.json),
+        Err(error) => return UsageError::from(error).print(arguments.json),
     };
     let check = Check::of(&config);
     let exit = if check.fits { Exit::Done } else { Exit::Usage };

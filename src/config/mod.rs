@@ -5,7 +5,7 @@
 //! units or texts with a unit (`"137 deg/s"`). `configs/reference.toml` is the description of the format.
 
 pub(crate) mod bounds;
-mod defaults;
+pub(crate) mod defaults;
 mod error;
 mod interface;
 mod model;
@@ -29,11 +29,13 @@ pub use quantity::{Dimension, Quantity, QuantityError};
 
 use thiserror::Error;
 
+use crate::printable::printable_path;
+
 impl Config {
     /// Reads a file and checks it. Whether the buses can carry what it asks for is a question for
     /// [`crate::bus::schedule::verify`].
     pub fn load(path: &Path) -> Result<Self, ConfigError> {
-        let name = path.display().to_string();
+        let name = printable_path(path);
         match crate::text_file::read(path) {
             Ok(bytes) => Self::parse(&name, &ConfigError::text_of(&name, bytes)?),
             Err(error) => Err(ConfigError::unreadable(&name, error.to_string())),

@@ -1,5 +1,6 @@
 //! The last look at every set-point, whoever made it, before it becomes a frame.
 
+mod commands;
 mod following_error;
 #[cfg(test)]
 mod planned;
@@ -9,6 +10,7 @@ mod stream;
 use crate::fault::{Fault, Rule};
 use crate::plan::State;
 
+pub use commands::StreamCommands;
 pub use following_error::FollowingErrorGuard;
 pub use stopping_bound::braking_distance;
 pub use stream::{OnViolation, SetPointSteps, check_braking, check_jerk, clamp};

@@ -8,7 +8,7 @@ use crate::plan::State;
 
 /// By how much a position may be off, relative to it or to 1 rad: whoever samples a trajectory adds up times and evaluates
 /// polynomials, each with a rounding. The third difference divides what comes of it by the cube of the period.
-const ROUNDINGS: f64 = 64.0;
+pub(super) const ROUNDINGS: f64 = 64.0;
 
 /// Relative to the limits that a stop must be able to keep: half of what [`check`](super::check) allows, so that every step of
 /// the stop passes it.

@@ -1,26 +1,26 @@
-//! Which drive: an axis of a configuration, or a node on an interface.
+//! The drive that is addressed: an axis of a configuration, or a node on an interface.
 
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use takt::commission::{Family, Subject};
+use takt::commission::{Family, TargetDrive};
 use takt::config::{Config, Interface, Quantity};
 
 use super::super::configuration;
-use super::super::refusal::Refusal;
+use super::super::usage_error::UsageError;
 
 /// The drive.
 #[derive(Args, Debug)]
 pub struct Target {
     /// The configuration (TOML)
     config: Option<PathBuf>,
-    /// The axis, by its name; may be left out where there is only one
+    /// The name of the axis; may be left out if there is only one
     axis: Option<String>,
     /// The interface: can0, vcan0 …; with a configuration also NAME=INTERFACE or sim
     #[arg(long, value_name = "INTERFACE", global = true)]
     bus: Option<String>,
-    /// The node number
+    /// The node ID
     #[arg(long, value_name = "N", global = true, value_parser = clap::value_parser!(u8).range(1..=127))]
     node: Option<u8>,
     /// The family: erob-canopen, yz-aim
@@ -36,7 +36,7 @@ fn bit_rate(text: &str) -> Result<u32, String> {
     rate.map(|rate| rate as u32).ok_or_else(|| "write it as \"500 kbit/s\", at most 1 Mbit/s".to_owned())
 }
 
-/// Where the drive's bus is.
+/// The bus of the drive.
 pub enum Bus {
     /// A bus of a configuration.
     Configured {
@@ -64,15 +64,15 @@ fn family(text: &str) -> Result<Family, String> {
 
 impl Target {
     /// The drive and its bus.
-    pub fn resolve(&self) -> Result<(Subject, Bus), Refusal> {
-        let (subject, bus) = match &self.config {
+    pub fn resolve(&self) -> Result<(TargetDrive, Bus), UsageError> {
+        let (target, bus) = match &self.config {
             Some(config) => self.of_configuration(config)?,
             None => self.of_interface()?,
         };
-        Ok((subject, bus))
+        Ok((target, bus))
     }
 
-    fn of_interface(&self) -> Result<(Subject, Bus), Refusal> {
+    fn of_interface(&self) -> Result<(TargetDrive, Bus), UsageError> {
         let (Some(bus), Some(node), Some(family)) = (&self.bus, self.node, self.family) else {
             return Err(
                 "name the drive: CONFIG AXIS, or --bus INTERFACE --node N --family FAMILY (all three)".into(),
@@ -81,9 +81,9 @@ impl Target {
         let interface = bus.parse::<Interface>();
         match interface {
             Ok(Interface::SocketCan(name)) => {
-                let subject = Subject::unconfigured(node, family)
+                let target = TargetDrive::unconfigured(node, family)
                     .map_err(|error| format!("the units cannot be converted ({error:?})"))?;
-                Ok((subject, Bus::Interface { name, bit_rate: self.bit_rate }))
+                Ok((target, Bus::Interface { name, bit_rate: self.bit_rate }))
             }
             Ok(Interface::Simulated) => {
                 Err("a simulated drive needs a configuration that says what it is: takt drive CONFIG AXIS …"
@@ -93,7 +93,7 @@ impl Target {
         }
     }
 
-    fn of_configuration(&self, path: &Path) -> Result<(Subject, Bus), Refusal> {
+    fn of_configuration(&self, path: &Path) -> Result<(TargetDrive, Bus), UsageError> {
         let mut config = configuration::load(path, &[])?;
         let known: Vec<&str> = config.axes.iter().map(|axis| axis.name.as_str()).collect();
         let index = match (&self.axis, known.as_slice()) {
@@ -113,14 +113,14 @@ impl Target {
             let (name, interface) = bus.split_once('=').unwrap_or((&own, bus));
             config.override_interface(name, interface).map_err(|error| format!("--bus {bus}: {error}"))?;
         }
-        let mut subject = Subject::of(&axis)
+        let mut target = TargetDrive::of(&axis)
             .map_err(|error| format!("axis {}: its units cannot be converted ({error:?})", axis.name))?;
-        if let Some(family) = self.family.filter(|family| *family != subject.family) {
-            let (name, configured, other) = (&axis.name, subject.family.word(), family.word());
+        if let Some(family) = self.family.filter(|family| *family != target.family) {
+            let (name, configured, other) = (&axis.name, target.family.word(), family.word());
             return Err(format!("the axis {name} is configured as {configured}, not {other}").into());
         }
-        // A drive that still has its factory's number is reached under that one.
-        subject.node = self.node.unwrap_or(subject.node);
-        Ok((subject, Bus::Configured { config: Box::new(config), bus: axis.bus }))
+        // A drive that still has the factory's node ID is addressed by that ID.
+        target.node = self.node.unwrap_or(target.node);
+        Ok((target, Bus::Configured { config: Box::new(config), bus: axis.bus }))
     }
 }
