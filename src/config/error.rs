@@ -10,7 +10,7 @@ use crate::canopen::dcf::DcfError;
 
 use super::problem_kind::ProblemKind;
 use super::source_view::SourceView;
-use crate::printable::printable;
+use crate::printable::{letter_start, printable};
 
 /// The most problems that are shown of one configuration; the rest are counted. Whoever gets more of them has given another
 /// file, or will see the rest after the first are mended.
@@ -42,7 +42,7 @@ impl ConfigError {
         let shorten = |problem: &mut Problem| {
             if let Location::Text { span, .. } = &mut problem.location {
                 let end = span.end.min(span.start.saturating_add(LONGEST_SPAN));
-                span.end = text.floor_char_boundary(end).max(span.start);
+                span.end = letter_start(text, end).max(span.start);
             }
         };
         let mut error = Self::new(name, source, LineStarts::of(text), problems);

@@ -94,7 +94,7 @@ pub const SCALE: Bounds = Bounds::Plausible {
 /// `telemetry.black_box`, in seconds.
 pub const BLACK_BOX_S: RangeInclusive<f64> = 0.1..=60.0;
 /// `telemetry.ring_records`
-pub const RING_RECORDS: Range<i64> = 64..1_048_577;
+pub const RING_RECORDS: Range<i64> = 16..1_048_577;
 /// `simulation.longest_gap`, at most, in seconds.
 pub const LONGEST_GAP_AT_MOST_S: f64 = 60.0;
 

@@ -3,6 +3,7 @@
 use miette::{MietteError, MietteSpanContents, NamedSource, SourceCode, SourceSpan, SpanContents};
 
 use super::error::LineStarts;
+use crate::printable::letter_start;
 
 /// The most bytes of a file that are shown around a problem. A longer excerpt takes long to render, and is not
 /// readable.
@@ -30,9 +31,9 @@ impl SourceView {
         let line = self.lines.line_of(at) - 1;
         let line_start = self.lines.start_of(line);
         let line_end = text.get(at..).and_then(|rest| rest.find('\n')).map_or(text.len(), |end| at + end);
-        let start = text.floor_char_boundary(at.saturating_sub(SIDE).max(line_start));
+        let start = letter_start(text, at.saturating_sub(SIDE).max(line_start));
         let span_end = at + span.len().min(SHOWN_AT_MOST);
-        let end = text.ceil_char_boundary((span_end + SIDE).min(line_end).max(at));
+        let end = letter_start(text, (span_end + SIDE).min(line_end).max(at));
         let part = text.get(start..end).unwrap_or_default();
         let column = text.get(line_start..start).map_or(0, |before| before.chars().count());
         let name = self.source.name().to_owned();

@@ -18,3 +18,4 @@ mod statuswords;
 mod stream;
 mod time_of_day;
 mod trajectory_time;
+mod unattended;

@@ -88,7 +88,7 @@ const WRONG: [(&str, usize, &str, &str); 31] = [
         "[[fault]]\nkind = \"stall\"\naxis = \"joint1\"\nprobability = 0.5",
         4,
         "means nothing here",
-        "what may stand",
+        "allowed here",
     ),
     (
         "[[fault]]\nkind = \"reboot\"\naxis = \"joint1\"\nfor = \"1 s\"",

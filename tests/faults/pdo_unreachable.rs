@@ -117,7 +117,10 @@ fn a_run_waits_for_a_full_queue_before_it_leaves_a_drive_without_a_heartbeat_wat
 #[test]
 fn a_drive_that_comes_back_during_the_shutdown_ends_without_torque_and_pre_operational() {
     for name in MACHINES {
-        let config = machine(name);
+        let mut config = machine(name);
+        // A run waits longer for drives whose watchdogs take longer.
+        config.master.heartbeat_ns = Some(100_000_000);
+        config.master.heartbeat_timeout_ns = 500_000_000;
         for away_ms in [600, 900, 1200, 1500] {
             let silent = format!(
                 "[[fault]]\nkind = \"silent-node\"\naxis = \"{}\"\nwhen = \"moving\"\nat = \"300 ms\"\nfor = \"{away_ms} ms\"\n",

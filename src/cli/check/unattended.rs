@@ -28,7 +28,8 @@ pub enum Unattended {
 }
 
 impl Unattended {
-    /// The worst case: at full speed, with the last heartbeat just sent.
+    /// The worst case: at full speed (with a torque: in full acceleration), with the last heartbeat just sent, and a drive that
+    /// brakes with the deceleration limit.
     pub fn of(axis: &Axis, config: &Config) -> Self {
         let (limits, master) = (&axis.limits, &config.master);
         match axis.control {
@@ -38,13 +39,20 @@ impl Unattended {
             }
             Control::ProfilePosition => Self::EndsItsMove,
             _ if master.heartbeat_ns.is_none() => Self::GoesOnForEver,
-            _ => {
+            control => {
                 let timeout_s = master.heartbeat_timeout_ns as f64 / 1e9;
-                let braking_s = limits.velocity / limits.deceleration;
+                // A torque goes on to accelerate the joint; a speed is kept.
+                let acceleration = match control {
+                    Control::Torque { .. } | Control::ProfileTorque => limits.acceleration,
+                    _ => 0.0,
+                };
+                let speed = limits.velocity + acceleration * timeout_s;
+                let braking_s = speed / limits.deceleration;
+                let until_braking = 0.5 * (limits.velocity + speed) * timeout_s;
                 Self::GoesOn {
                     timeout_ns: master.heartbeat_timeout_ns,
                     time_ns: ((timeout_s + braking_s) * 1e9).round() as u64,
-                    travel: limits.velocity * (timeout_s + 0.5 * braking_s),
+                    travel: until_braking + 0.5 * speed * braking_s,
                 }
             }
         }
