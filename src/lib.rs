@@ -29,7 +29,7 @@ pub mod doctor;
 pub mod drive;
 pub mod faults;
 pub mod jitter;
-mod printable;
+pub mod printable;
 pub mod sim;
 pub mod telemetry;
 mod text_file;

@@ -1,4 +1,6 @@
-//! Text from a file that may be anybody's, as a terminal may be shown it.
+//! Text that somebody else has chosen (the contents and names of files, arguments), made safe to show on a terminal.
+
+use std::path::Path;
 
 /// The same text without what would move a terminal's cursor, colour what follows, or turn its direction. Every
 /// character that is replaced is as long as what stands in its place, so that places in the text stay what they are.
@@ -8,6 +10,22 @@ pub fn printable(text: &str) -> String {
     while let Some(letter) = letters.next() {
         let is_line_end = letter == '\r' && letters.peek() == Some(&'\n');
         shown.push(if is_line_end { letter } else { replacement(letter) });
+    }
+    shown
+}
+
+/// A path, made safe in the same way.
+pub fn printable_path(path: &Path) -> String {
+    printable(&path.display().to_string())
+}
+
+/// The beginning of a text that may be of any length, for a message.
+pub fn excerpt(text: &str) -> String {
+    const LETTERS: usize = 80;
+    let mut shown = printable(text.get(..text.floor_char_boundary(4 * LETTERS)).unwrap_or_default());
+    if let Some((end, _)) = shown.char_indices().nth(LETTERS) {
+        shown.truncate(end);
+        shown.push('…');
     }
     shown
 }
@@ -26,7 +44,7 @@ const fn replacement(letter: char) -> char {
 
 #[cfg(test)]
 mod tests {
-    use super::printable;
+    use super::{excerpt, printable};
     use proptest::prelude::*;
 
     #[test]
@@ -34,6 +52,13 @@ mod tests {
         assert_eq!(printable("\u{1B}[2J\u{9B}1m\u{202E}\rä\0"), "?[2J¿1m\u{FFFD}?ä?");
         let plain = "k = \"µs\"\t# \u{2026}\r\nnext 日本\n";
         assert_eq!(printable(plain), plain);
+    }
+
+    #[test]
+    fn a_long_text_is_cut_and_a_short_one_is_whole() {
+        assert_eq!(excerpt("left\u{1B}"), "left?");
+        assert_eq!(excerpt(&"ä".repeat(80)), "ä".repeat(80));
+        assert_eq!(excerpt(&"日".repeat(1_000_000)), format!("{}…", "日".repeat(80)));
     }
 
     proptest! {

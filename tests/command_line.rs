@@ -258,14 +258,30 @@ fn a_process_that_is_frozen_in_motion_goes_on_and_counts_what_it_missed() {
 }
 
 #[test]
-fn a_folder_that_cannot_be_written_costs_the_recording_and_one_message_and_nothing_else() {
+fn a_folder_that_cannot_be_written_costs_the_recording_and_ends_with_1_and_one_message() {
     let place = Place::new();
     fs::write(place.folder.path().join("runs"), "in the way").unwrap();
     let output = place.run_to_end(&["--json"]);
-    assert_eq!(output.status.code(), Some(0), "{}", errors(&output));
+    assert_eq!(output.status.code(), Some(1), "{}", errors(&output));
     assert_eq!(errors(&output).lines().count(), 1, "{}", errors(&output));
     assert!(errors(&output).contains("runs/"), "{}", errors(&output));
-    assert_eq!(report(&output)["telemetry"]["recording"], Value::Null);
+    let report = report(&output);
+    assert_eq!(report["telemetry"]["recording"], Value::Null);
+    assert_eq!((&report["ended"], &report["stop"]), (&"finished".into(), &Value::Null));
+}
+
+#[test]
+fn a_run_that_is_interrupted_before_it_is_enabled_does_not_say_that_it_has_finished() {
+    let place = Place::new();
+    let child = place.run(&[]);
+    // The simulated drives take longer than that to power up.
+    thread::sleep(Duration::from_millis(200));
+    signal(&child, Signal::SIGINT);
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(130), "{}", errors(&output));
+    let text = String::from_utf8(output.stdout).unwrap();
+    assert!(text.contains("interrupted before the axes were enabled"), "{text}");
+    assert!(!text.contains("program finished"), "{text}");
 }
 
 /// `takt run … 2>&1 | head`
@@ -323,7 +339,7 @@ fn whatever_is_refused_is_one_object_after_json_with_what_is_wrong() {
         (&["run"], "<CONFIG>"),
         (&["check", nowhere], nowhere),
         (&["report", nowhere], nowhere),
-        (&["report", config], "no MCAP file"),
+        (&["report", config], "not an MCAP file"),
         (&["eds", nowhere], nowhere),
         (&["doctor", nowhere], nowhere),
         (&["jitter", "--bus", "nobody0"], "no interface nobody0"),
@@ -398,6 +414,43 @@ fn what_a_terminal_would_obey_is_not_shown_of_a_file() {
     }
     fs::write(&config, [b"name = \"arm\"\n# \xff".as_slice(), b"\x1b[2J\x07\n"].concat()).unwrap();
     assert!(!errors(&check()).contains(['\u{1b}', '\u{7}']));
+}
+
+/// Names that a shell has completed, and paths in a configuration, may be anybody's, too.
+#[test]
+fn what_a_terminal_would_obey_is_not_shown_of_an_argument_or_a_path() {
+    let place = Place::new();
+    let text = fs::read_to_string(place.config()).unwrap();
+    let moves: Vec<&str> = text.split("[[program.move]]").collect();
+    let folder = place.folder.path().join("a\u{1b}[31mb");
+    let recorded = place.folder.path().join("recorded.toml");
+    let telemetry = format!("[telemetry]\ndirectory = \"{}/a\\u001b[31mb\"\n", place.folder.path().display());
+    fs::write(&recorded, [moves[0], "\n", &telemetry].concat()).unwrap();
+    let with_dcf = place.folder.path().join("dcf.toml");
+    let dcf = "name = \"joint1\"\ndcf = \"a\\u001b[31mb.dcf\"\n";
+    fs::write(&with_dcf, moves[0].replacen("name = \"joint1\"\n", dcf, 1)).unwrap();
+    let escaped = folder.to_str().unwrap();
+    let (recorded, with_dcf) = (recorded.to_str().unwrap(), with_dcf.to_str().unwrap());
+    for (arguments, status) in [
+        (&["run", recorded][..], 0),
+        (&["check", with_dcf], 2),
+        (&["run", escaped], 2),
+        (&["check", escaped], 2),
+        (&["eds", escaped], 2),
+        (&["report", escaped], 2),
+        (&["plan", escaped], 2),
+        (&["drive", recorded, escaped, "info"], 2),
+        (&["run", recorded, "--bus", escaped], 2),
+        (&["run", recorded, "--faults", escaped], 2),
+        (&["run", recorded, escaped], 2),
+        (&[escaped], 2),
+    ] {
+        let output = Command::new(env!("CARGO_BIN_EXE_takt")).args(arguments).output().unwrap();
+        let said = String::from_utf8([output.stdout.as_slice(), &output.stderr].concat()).unwrap();
+        assert_eq!(output.status.code(), Some(status), "{arguments:?}: {said:?}");
+        assert!(!said.contains('\u{1b}'), "{arguments:?}: {said:?}");
+        assert!(said.contains("[31mb"), "{arguments:?}: {said:?}");
+    }
 }
 
 #[test]

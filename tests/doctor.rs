@@ -329,16 +329,16 @@ fn a_machine_that_shows_nothing_is_judged_by_the_attempt_alone() {
 }
 
 #[test]
-fn the_picture_shows_every_check_in_a_hundred_columns_and_colours_only_when_asked() {
+fn the_text_shows_every_check_in_a_hundred_columns_and_colours_only_when_asked() {
     let mut machine = prepared();
     machine.answers.insert(IP.to_owned(), can0("ERROR-PASSIVE", 0, "fq_codel", 7));
     machine.file("proc/cmdline", b"quiet");
     machine.file("sys/devices/system/cpu/isolated", b"");
     machine.file("sys/devices/system/cpu/nohz_full", b"(null)");
     let examination = machine.examine(&subject(), &attempt(Outcome::Refused { errno: 12 }));
-    let plain = examination.picture(Emphasis::None);
+    let plain = examination.render(Emphasis::None);
     assert!(!plain.contains('\x1b'));
-    assert!(examination.picture(Emphasis::Ansi).contains('\x1b'));
+    assert!(examination.render(Emphasis::Ansi).contains('\x1b'));
     for check in &examination.checks {
         assert!(plain.contains(check.title), "{}", check.title);
     }
@@ -372,7 +372,7 @@ proptest! {
         }
         let examination = machine.examine(&subject(), &attempt(Outcome::Granted));
         prop_assert!(examination.checks.len() > 15);
-        prop_assert!(!examination.picture(Emphasis::None).is_empty());
+        prop_assert!(!examination.render(Emphasis::None).is_empty());
     }
 }
 

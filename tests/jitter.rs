@@ -74,7 +74,7 @@ fn with_a_bus_a_sync_leaves_in_every_cycle() {
 }
 
 #[test]
-fn people_get_tables_and_histograms_and_a_drawing() {
+fn people_get_tables_and_histograms_and_an_svg() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("jitter.svg");
     let output =
@@ -89,7 +89,7 @@ fn people_get_tables_and_histograms_and_a_drawing() {
     assert!(!text.contains('\x1b'), "colours are for terminals");
     let svg = fs::read_to_string(path).unwrap();
     assert!(svg.starts_with("<svg ") && svg.ends_with("</svg>\n"));
-    // Two histograms with a curve for each way of waiting.
+    // Two histograms with a curve for each kind of pacing.
     assert_eq!(svg.matches("<path ").count(), 4);
 }
 
@@ -122,7 +122,7 @@ fn what_cannot_be_measured_is_refused_with_2() {
 }
 
 #[test]
-fn a_drawing_that_cannot_be_written_ends_with_1_and_the_figures_are_printed_all_the_same() {
+fn an_svg_that_cannot_be_written_ends_with_1_and_the_figures_are_printed_all_the_same() {
     let output = run(&["--cycles", "20", "--json", "--svg", "/nowhere/at/all.svg"]);
     assert_eq!(output.status.code(), Some(1));
     assert!(errors(&output).contains("/nowhere/at/all.svg"), "{}", errors(&output));

@@ -17,7 +17,7 @@ fn lss(arguments: &[&str]) -> Output {
     command.arg("lss").args(arguments).stdin(Stdio::null()).output().unwrap()
 }
 
-/// Runs it on a bus with two devices without a node ID and one with a node ID.
+/// On a bus with two devices without a node ID and one that has one.
 fn simulated(arguments: &[&str]) -> Output {
     let bus = ["--bus", "sim", "--simulate", FIRST, "--simulate", SECOND, "--simulate", KNOWN];
     lss(&[&bus, arguments].concat())
@@ -43,7 +43,7 @@ fn a_scan_finds_every_device_without_a_node_id_and_no_other() {
         .collect();
     assert_eq!(serials, [0x1234, 0xFFFF_FFFE]);
     let output = simulated(&["scan"]);
-    assert!(said(&output).contains("without a node number  0x00000331:0x00000001:0x00000100:0x00001234"));
+    assert!(said(&output).contains("without a node ID  0x00000331:0x00000001:0x00000100:0x00001234"));
     assert!(said(&output).contains("2 devices"), "{}", said(&output));
 }
 
@@ -65,7 +65,7 @@ fn a_device_that_had_a_node_id_keeps_it_until_it_is_reset_and_this_is_said() {
     let identity = KNOWN.split('@').next().unwrap();
     let output = simulated(&["--device", identity, "set-id", "12"]);
     ends_with(0, &output);
-    assert!(said(&output).contains("goes by its old number until it is reset"), "{}", said(&output));
+    assert!(said(&output).contains("keeps its old node ID until it is reset"), "{}", said(&output));
     assert!(!said(&output).contains("booted"), "{}", said(&output));
 }
 
@@ -118,7 +118,7 @@ fn who_is_not_there_is_told_with_what_to_try() {
     assert!(errors(&output).contains("no device without a node ID answers"), "{}", errors(&output));
     let output = lss(&["--bus", "sim", "--simulate", KNOWN, "scan"]);
     ends_with(0, &output);
-    assert!(said(&output).contains("no device without a node number"), "{}", said(&output));
+    assert!(said(&output).contains("no device without a node ID"), "{}", said(&output));
 }
 
 #[test]

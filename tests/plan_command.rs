@@ -237,7 +237,8 @@ fn a_picture_that_is_not_drawn_is_said_and_costs_no_answer() {
     let output = plan(&["--plot", picture.to_str().unwrap()], &beyond.to_string());
     assert_eq!(output.status.code(), Some(0));
     assert!(
-        String::from_utf8_lossy(&output.stderr).contains("none.svg is not drawn: there is no trajectory")
+        String::from_utf8_lossy(&output.stderr)
+            .contains("none.svg is not written: there is no trajectory to plot")
     );
     assert!(!picture.exists());
 }

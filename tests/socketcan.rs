@@ -82,6 +82,7 @@ fn wait_for(port: &mut SocketCanPort, what: &str, mut done: impl FnMut(&mut Sock
 }
 
 #[test]
+#[ignore = "needs root and a kernel with vcan: tests/vm/all"]
 fn frames_of_all_kinds_cross_and_own_ones_only_confirm() {
     let bus = VirtualCan::new("takt-kinds");
     let (mut left, mut right) = (bus.port(&[]), bus.port(&[]));
@@ -102,6 +103,7 @@ fn frames_of_all_kinds_cross_and_own_ones_only_confirm() {
 }
 
 #[test]
+#[ignore = "needs root and a kernel with vcan: tests/vm/all"]
 fn the_kernel_filters_what_is_not_ours() {
     let bus = VirtualCan::new("takt-filter");
     let (mut ours, mut other) = (bus.port(&[id(0x181), id(0x201)]), bus.port(&[]));
@@ -115,6 +117,7 @@ fn the_kernel_filters_what_is_not_ours() {
 }
 
 #[test]
+#[ignore = "needs root and a kernel with vcan: tests/vm/all"]
 fn a_batch_larger_than_one_call_crosses_whole() {
     let bus = VirtualCan::new("takt-batch");
     let (mut left, mut right) = (bus.port(&[]), bus.port(&[]));
@@ -136,6 +139,7 @@ fn send_together<const N: usize>(ports: [&mut SocketCanPort; N], frames: [&[Fram
 }
 
 #[test]
+#[ignore = "needs root and a kernel with vcan: tests/vm/all"]
 fn frames_that_are_sent_together_reach_each_its_own_bus_and_come_back_as_confirmations() {
     let buses = ["takt-base", "takt-wrist", "takt-hand"].map(VirtualCan::new);
     let [mut base, mut wrist, mut hand] = [0, 1, 2].map(|bus: usize| buses[bus].port(&[]));
@@ -162,6 +166,7 @@ fn frames_that_are_sent_together_reach_each_its_own_bus_and_come_back_as_confirm
 }
 
 #[test]
+#[ignore = "needs root and a kernel with vcan: tests/vm/all"]
 fn of_buses_that_are_sent_to_together_one_that_is_down_holds_no_other_up() {
     let buses = ["takt-left", "takt-middle", "takt-right"].map(VirtualCan::new);
     for down in 0..3 {
@@ -190,6 +195,7 @@ fn of_buses_that_are_sent_to_together_one_that_is_down_holds_no_other_up() {
 }
 
 #[test]
+#[ignore = "needs root and a kernel with vcan: tests/vm/all"]
 fn an_interface_that_goes_down_is_a_state_and_comes_back() {
     let bus = VirtualCan::new("takt-down");
     let (mut port, mut other) = (bus.port(&[]), bus.port(&[]));
@@ -209,6 +215,7 @@ fn an_interface_that_goes_down_is_a_state_and_comes_back() {
 }
 
 #[test]
+#[ignore = "needs root and a kernel with vcan: tests/vm/all"]
 fn an_interface_that_is_removed_is_down_for_good() {
     let bus = VirtualCan::new("takt-gone");
     let mut port = bus.port(&[]);
@@ -221,6 +228,7 @@ fn an_interface_that_is_removed_is_down_for_good() {
 }
 
 #[test]
+#[ignore = "needs root and a kernel with vcan: tests/vm/all"]
 fn received_frames_that_are_lost_are_counted() {
     let bus = VirtualCan::new("takt-flood");
     let options = SocketCanOptions { receive_frames: 16, ..SocketCanOptions::default() };
@@ -240,6 +248,7 @@ fn received_frames_that_are_lost_are_counted() {
 }
 
 #[test]
+#[ignore = "needs root and a kernel with vcan: tests/vm/all"]
 fn lost_confirmations_hold_nothing_back() {
     let bus = VirtualCan::new("takt-lost");
     let options = SocketCanOptions { receive_frames: 16, ..SocketCanOptions::default() };
@@ -255,6 +264,7 @@ fn lost_confirmations_hold_nothing_back() {
 }
 
 #[test]
+#[ignore = "needs root and a kernel with vcan: tests/vm/all"]
 fn arrivals_carry_the_kernels_time_on_the_monotonic_clock() {
     let bus = VirtualCan::new("takt-time");
     let (mut left, mut right) = (bus.port(&[]), bus.port(&[]));
@@ -282,6 +292,7 @@ const SETTINGS: InterfaceSettings =
     InterfaceSettings { bit_rate: 1_000_000, data_bit_rate: None, restart_ms: 100 };
 
 #[test]
+#[ignore = "needs root and a kernel with vcan: tests/vm/all"]
 fn a_virtual_interface_is_brought_up_for_classic_and_for_fd_frames() {
     let bus = VirtualCan::new("takt-prepare");
     run(&["ip", "link", "set", bus.0, "down"]);
@@ -328,6 +339,7 @@ impl Drop for Controllers {
 }
 
 #[test]
+#[ignore = "needs root and a kernel with vcan: tests/vm/all"]
 fn controllers_are_configured_and_another_bit_rate_is_refused_while_they_run() {
     let Some(_controllers) = Controllers::up() else { return };
     for name in ["can0", "can1"] {
@@ -344,6 +356,7 @@ fn controllers_are_configured_and_another_bit_rate_is_refused_while_they_run() {
 }
 
 #[test]
+#[ignore = "needs root and a kernel with vcan: tests/vm/all"]
 fn the_configuration_says_when_a_controller_comes_back_from_bus_off() {
     let Some(_controllers) = Controllers::up() else { return };
     run(&["ip", "link", "set", "can0", "down"]);
@@ -359,6 +372,7 @@ fn the_configuration_says_when_a_controller_comes_back_from_bus_off() {
 }
 
 #[test]
+#[ignore = "needs root and a kernel with vcan: tests/vm/all"]
 fn controllers_exchange_frames_and_confirm_them() {
     let Some(controllers) = Controllers::up() else { return };
     let (mut left, mut right) = (controllers.port("can0"), controllers.port("can1"));
@@ -378,6 +392,7 @@ fn controllers_exchange_frames_and_confirm_them() {
 }
 
 #[test]
+#[ignore = "needs root and a kernel with vcan: tests/vm/all"]
 fn frames_that_wait_for_the_bus_are_unconfirmed_and_what_finds_no_room_is_counted() {
     let Some(controllers) = Controllers::up() else { return };
     // A bucket of a few frames that fills at 125 byte/s stands in for a bus on which nobody acknowledges.
@@ -402,6 +417,7 @@ fn frames_that_wait_for_the_bus_are_unconfirmed_and_what_finds_no_room_is_counte
 }
 
 #[test]
+#[ignore = "needs root and a kernel with vcan: tests/vm/all"]
 fn an_interface_that_goes_down_forgets_what_was_queued() {
     let Some(controllers) = Controllers::up() else { return };
     run(&[

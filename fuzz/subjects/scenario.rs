@@ -1,4 +1,4 @@
-//! The reader of scenarios, given any text, and the ports that play what it takes.
+//! Fuzzes the reader of scenarios with arbitrary text, and the ports that inject its faults.
 
 use std::sync::OnceLock;
 
@@ -14,11 +14,11 @@ fn arm() -> &'static Config {
     static ARM: OnceLock<Config> = OnceLock::new();
     ARM.get_or_init(|| {
         let text = include_str!("../../configs/arm6-erob.toml");
-        Config::parse("arm6-erob.toml", text).expect("the example is sound")
+        Config::parse("arm6-erob.toml", text).expect("the example is valid")
     })
 }
 
-/// Reads a text as a scenario, and plays for some cycles what is taken.
+/// Reads a text as a scenario, and runs a valid one for some cycles.
 pub fn run(bytes: &[u8]) {
     let Ok(text) = std::str::from_utf8(bytes) else { return };
     match Scenario::parse("fuzz", text, arm()) {

@@ -1,4 +1,4 @@
-//! All decoders of frames with arbitrary frames.
+//! Fuzzes every decoder of frames with arbitrary frames.
 
 use std::sync::OnceLock;
 
@@ -20,8 +20,8 @@ use super::procedures;
 
 const NODE: u8 = 2;
 
-/// Decoded frames equal their encoding. The SDO client, LSS, bring-up and shutdown always end. The drive sends only valid
-/// frames. Process data are accepted or refused.
+/// A decoded frame can be encoded, and gives the same frame. The SDO client, the layer settings, the bring-up and the
+/// shut-down always end. The simulated drive goes on and sends valid frames. Process data are accepted or rejected.
 pub fn run(bytes: &[u8]) {
     let Some((kind, rest)) = bytes.split_first() else { return };
     let input = Input::new(rest);
@@ -98,7 +98,7 @@ fn ask(mut input: Input<'_>) {
     let mut now_ns = 0;
     for _ in 0..MAX_POLLS {
         while let Some(frame) = client.poll(now_ns) {
-            // A segment of a block has no command, so only identifier and length can be checked for every frame.
+            // A segment of a block has no command specifier, so nothing more holds for every frame.
             assert_eq!((frame.id(), frame.payload().len()), (Id::canopen(0x600, NODE), 8), "{frame:?}");
         }
         if client.take_outcome().is_some() {

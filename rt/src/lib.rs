@@ -86,4 +86,4 @@ pub use time::{Grid, NANOSECONDS_PER_SECOND, Nanoseconds};
 pub use time_of_day::{TIME_ID, TimeOfDay};
 pub use units::{Scale, ScaleError, ScaleParameters};
 pub use watch::{TimingLadder, TimingLevel, nmt_command, node_state};
-pub use wire::{INTERMISSION_BITS, WireLength, bits_ns};
+pub use wire::UnstuffedLength;

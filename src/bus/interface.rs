@@ -2,31 +2,40 @@
 
 use std::fs;
 use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use socketcan::nl::{CanBitTiming, CanCtrlModes, CanState, InterfaceDetails, Mtu};
 use socketcan::{CanCtrlMode, CanInterface, InterfaceCanParams};
 use takt_rt::BusState;
 use thiserror::Error;
 
+use crate::config::Bus;
+
 /// The hardware type of CAN interfaces (`ARPHRD_CAN`), as `/sys/class/net/NAME/type` gives it.
 const CAN_HARDWARE_TYPE: &str = "280";
 
-/// How fast a bus is to be, and how its controller recovers.
+/// The bit rates of a bus, and how its controller recovers from bus-off.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct InterfaceSettings {
     /// Bit/s of classic frames and of the arbitration phase.
     pub bit_rate: u32,
     /// Bit/s of the data phase of CAN FD frames; `None` for a classic bus.
     pub data_bit_rate: Option<u32>,
-    /// After how many milliseconds a controller that has gone off the bus comes back by itself; 0 never.
+    /// The time in milliseconds after which the kernel restarts a controller that is bus-off; 0 means never.
     pub restart_ms: u32,
 }
 
-/// What an interface is and how it is.
+impl InterfaceSettings {
+    /// Those of a bus of a configuration.
+    pub const fn of(bus: &Bus) -> Self {
+        Self { bit_rate: bus.bit_rate, data_bit_rate: bus.data_bit_rate, restart_ms: bus.restart_ms }
+    }
+}
+
+/// The properties and the present state of an interface.
 #[derive(Clone, Debug, PartialEq)]
 pub struct InterfaceStatus {
-    /// Its name.
+    /// The name of the interface.
     pub name: String,
     /// Whether it is up.
     pub is_up: bool,
@@ -34,47 +43,47 @@ pub struct InterfaceStatus {
     pub has_fd: bool,
     /// The bit timing of its controller; `None` for a virtual interface, which has none, and for a controller
     /// that was never configured.
-    pub timing: Option<Timing>,
-    /// That of the data phase.
-    pub data_timing: Option<Timing>,
-    /// After how many milliseconds the controller comes back from bus-off by itself; 0 never. `None` for a
-    /// virtual interface.
+    pub timing: Option<ControllerTiming>,
+    /// The bit timing of the data phase of CAN FD frames.
+    pub data_timing: Option<ControllerTiming>,
+    /// The time in milliseconds after which the kernel restarts the controller after bus-off; 0 means never. `None`
+    /// for a virtual interface.
     pub restart_ms: Option<u32>,
     /// The controller's state.
     pub state: BusState,
-    /// The controller's transmit and receive error counters, where the driver tells them.
+    /// The controller's transmit and receive error counters, where the driver reports them.
     pub error_counters: Option<(u16, u16)>,
-    /// Whether there is a controller behind it, in contrast to vcan, vxcan and slcan.
+    /// Whether the interface has a CAN controller; vcan, vxcan and slcan have none.
     pub has_controller: bool,
 }
 
 /// The bit timing in force.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Timing {
+pub struct ControllerTiming {
     /// Bit/s.
     pub bit_rate: u32,
-    /// Where in the bit its level is sampled, 0 to 1.
+    /// The sample point as a part of the bit time, 0 to 1.
     pub sample_point: f64,
 }
 
-/// Why an interface cannot be used. The text ends with the command that mends it.
+/// Why an interface cannot be used. The message ends with the command that repairs it.
 #[derive(Debug, Error)]
 pub enum InterfaceError {
-    /// There is none of that name.
+    /// No interface has this name.
     #[error(
-        "there is no interface {name}; `ip -brief link` lists those there are (for a virtual one: sudo ip link add dev {name} type vcan)"
+        "there is no interface {name}; `ip -brief link` lists all interfaces (for a virtual one: sudo ip link add dev {name} type vcan)"
     )]
     Missing {
         /// The name asked for.
         name: String,
     },
-    /// It is another kind of network.
+    /// The interface belongs to another kind of network.
     #[error("{name} is not a CAN interface")]
     NotCan {
         /// The name asked for.
         name: String,
     },
-    /// It runs, at another bit rate. A running bus is not stopped behind the back of others that use it.
+    /// The interface is up at another bit rate. takt does not stop a bus that other programs may be using.
     #[error(
         "{name} runs at {found} bit/s and {wanted} are configured; to change it: sudo ip link set {name} down && {command}"
     )]
@@ -88,7 +97,7 @@ pub enum InterfaceError {
         /// The command that sets it up, once it is down.
         command: String,
     },
-    /// It does not carry CAN FD frames and is to do so.
+    /// CAN FD frames are configured, and the interface does not carry them.
     #[error("{name} does not carry CAN FD frames; to change it: sudo ip link set {name} down && {command}")]
     NoFd {
         /// The interface.
@@ -96,7 +105,7 @@ pub enum InterfaceError {
         /// The command that sets it up, once it is down.
         command: String,
     },
-    /// It is off the bus, and nothing brings it back by itself.
+    /// The controller is bus-off, and no automatic restart is configured.
     #[error(
         "{name} is bus-off and never restarts by itself; after the cause is found: sudo ip link set {name} type can restart"
     )]
@@ -112,7 +121,7 @@ pub enum InterfaceError {
         /// The command that brings it up.
         command: String,
     },
-    /// The system refused for another reason.
+    /// The kernel refused for another reason.
     #[error("{name}: {action}: {reason}")]
     System {
         /// The interface.
@@ -124,14 +133,28 @@ pub enum InterfaceError {
     },
 }
 
-/// Reads what an interface is and how it is. Needs no right.
+/// The index that the kernel has given to an interface. No other interface gets it, not even a later one.
+pub(super) fn interface_index(name: &str) -> Result<u32, InterfaceError> {
+    let folder = can_folder(name)?;
+    let read = fs::read_to_string(folder.join("ifindex"));
+    let index = read.and_then(|text| text.trim().parse().map_err(io::Error::other));
+    index.map_err(|error| system(name, "reading its index", &error.into()))
+}
+
+/// How many frames the queue of an interface holds (`txqueuelen`); `None` where that cannot be read.
+pub fn transmit_queue_length(name: &str) -> Option<u32> {
+    let read = fs::read_to_string(can_folder(name).ok()?.join("tx_queue_len"));
+    read.ok()?.trim().parse().ok()
+}
+
+/// Reads the properties and the state of an interface. Every user may do so.
 pub fn interface_status(name: &str) -> Result<InterfaceStatus, InterfaceError> {
     let details = open(name)?.details().map_err(|error| system(name, "reading its state", &error))?;
     Ok(status_of(name, &details))
 }
 
-/// Brings an interface up as the settings say, as far as that is needed and this process may, and returns how
-/// it is then. One that is up already is only compared: it belongs to whoever brought it up.
+/// Brings an interface up with these settings and returns its state. An interface that is up already is only compared
+/// with the settings: another program may be using it.
 pub fn prepare_interface(
     name: &str,
     settings: &InterfaceSettings,
@@ -143,9 +166,10 @@ pub fn prepare_interface(
     }
     let interface = open(name)?;
     let is_controller = status.has_controller;
-    let refused = |action, error: &socketcan::Error| match permission_error(error) {
-        true => InterfaceError::NotPermitted { name: name.into(), command: command(&status, settings) },
-        false => system(name, action, error),
+    let may_configure = may_configure(&fs::read_to_string("/proc/self/status").unwrap_or_default());
+    let refused = |action, error: &socketcan::Error| {
+        let command = command(&status, settings);
+        refusal(name, action, command, error, may_configure)
     };
     if is_controller {
         interface
@@ -161,8 +185,14 @@ pub fn prepare_interface(
 }
 
 fn open(name: &str) -> Result<CanInterface, InterfaceError> {
+    can_folder(name)?;
+    CanInterface::open(name).map_err(|error| system(name, "opening it", &error))
+}
+
+/// The folder in which the kernel describes a CAN interface.
+fn can_folder(name: &str) -> Result<PathBuf, InterfaceError> {
     let folder = Path::new("/sys/class/net").join(name);
-    // A name with a slash is none of an interface's, and is not one of a file's either.
+    // No interface has a slash in its name; with one, the path would lead to another folder.
     if name.is_empty() || name.contains('/') || !folder.exists() {
         return Err(InterfaceError::Missing { name: name.into() });
     }
@@ -170,7 +200,7 @@ fn open(name: &str) -> Result<CanInterface, InterfaceError> {
     if kind.trim() != CAN_HARDWARE_TYPE {
         return Err(InterfaceError::NotCan { name: name.into() });
     }
-    CanInterface::open(name).map_err(|error| system(name, "opening it", &error))
+    Ok(folder)
 }
 
 fn status_of(name: &str, details: &InterfaceDetails) -> InterfaceStatus {
@@ -197,9 +227,11 @@ fn status_of(name: &str, details: &InterfaceDetails) -> InterfaceStatus {
 }
 
 /// A controller that was never configured has a bit rate of zero. The kernel gives the sample point in thousandths.
-fn timing_of(timing: CanBitTiming) -> Option<Timing> {
-    (timing.bitrate != 0)
-        .then(|| Timing { bit_rate: timing.bitrate, sample_point: f64::from(timing.sample_point) / 1_000.0 })
+fn timing_of(timing: CanBitTiming) -> Option<ControllerTiming> {
+    (timing.bitrate != 0).then(|| ControllerTiming {
+        bit_rate: timing.bitrate,
+        sample_point: f64::from(timing.sample_point) / 1_000.0,
+    })
 }
 
 /// The kernel chooses the sample point as CiA recommends (75 % above 800 kbit/s, 80 % above 500 kbit/s, else 87.5 %),
@@ -215,7 +247,7 @@ fn parameters(settings: &InterfaceSettings) -> InterfaceCanParams {
     }
 }
 
-/// Whether an interface that is up is as it is to be, or will be so by itself. A virtual one has no bit rate and takes any.
+/// Compares an interface that is up with the settings. A virtual interface has no bit rate and accepts any.
 fn compare(status: &InterfaceStatus, settings: &InterfaceSettings) -> Result<(), InterfaceError> {
     if status.state == BusState::BusOff && status.restart_ms == Some(0) {
         return Err(InterfaceError::IsOff { name: status.name.clone() });
@@ -239,7 +271,7 @@ fn compare(status: &InterfaceStatus, settings: &InterfaceSettings) -> Result<(),
     Ok(())
 }
 
-/// The command that brings the interface up as it is to be.
+/// The command that brings the interface up with these settings.
 fn command(status: &InterfaceStatus, settings: &InterfaceSettings) -> String {
     let name = &status.name;
     match (status.has_controller, settings.data_bit_rate) {
@@ -251,6 +283,32 @@ fn command(status: &InterfaceStatus, settings: &InterfaceSettings) -> String {
             format!("sudo ip link set {name} up type can bitrate {bit_rate}{data} restart-ms {restart_ms}")
         }
     }
+}
+
+/// Why an interface was not brought up. The netlink library reports a refusal of the kernel as a missing acknowledgement,
+/// without the reason. So the reason is taken from the capabilities of this process.
+fn refusal(
+    name: &str,
+    action: &'static str,
+    command: String,
+    error: &socketcan::Error,
+    may_configure: bool,
+) -> InterfaceError {
+    if permission_error(error) || !may_configure {
+        return InterfaceError::NotPermitted { name: name.into(), command };
+    }
+    let reason = format!("{error}; to see the kernel's reason: {command}");
+    InterfaceError::System { name: name.into(), action, reason }
+}
+
+/// CAP_NET_ADMIN, as a bit of the sets of capabilities.
+const NET_ADMIN: u32 = 12;
+
+/// Whether a process may configure interfaces, as the kernel's status of it says.
+fn may_configure(status: &str) -> bool {
+    let effective = status.lines().find_map(|line| line.strip_prefix("CapEff:"));
+    let mask = effective.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
+    mask.is_some_and(|mask| mask >> NET_ADMIN & 1 == 1)
 }
 
 fn permission_error(error: &socketcan::Error) -> bool {
@@ -271,7 +329,7 @@ mod tests {
     use super::*;
 
     fn up(timing: Option<u32>) -> InterfaceStatus {
-        let timing = timing.map(|bit_rate| Timing { bit_rate, sample_point: 0.875 });
+        let timing = timing.map(|bit_rate| ControllerTiming { bit_rate, sample_point: 0.875 });
         InterfaceStatus {
             name: "can0".into(),
             is_up: true,
@@ -319,6 +377,27 @@ mod tests {
         let text = compare(&off, &CLASSIC).unwrap_err().to_string();
         assert!(text.ends_with("sudo ip link set can0 type can restart"), "{text}");
         assert!(compare(&InterfaceStatus { restart_ms: Some(100), ..off }, &CLASSIC).is_ok());
+    }
+
+    #[test]
+    fn an_interface_that_is_down_is_answered_with_the_command_that_brings_it_up() {
+        let down = InterfaceStatus { is_up: false, ..up(Some(1_000_000)) };
+        let no_reason = socketcan::Error::Nl(socketcan::nl::NlError::NoAck);
+        let text = |may_configure| {
+            refusal("can0", "bringing it up", command(&down, &CLASSIC), &no_reason, may_configure).to_string()
+        };
+        let command = "sudo ip link set can0 up type can bitrate 1000000 restart-ms 100";
+        let ordinary = format!("can0 is down and this process may not bring it up; to do so: {command}");
+        assert_eq!(text(false), ordinary);
+        assert!(text(true).ends_with(&format!("to see the kernel's reason: {command}")), "{}", text(true));
+    }
+
+    #[test]
+    fn the_right_to_configure_interfaces_is_seen_in_the_status_of_the_process() {
+        assert!(may_configure("CapPrm:\t0000000000000000\nCapEff:\t0000000000001000\n"));
+        assert!(may_configure("CapEff:\t000001ffffffffff\n"));
+        assert!(!may_configure("CapPrm:\t0000000000001000\nCapEff:\t0000000000000000\n"));
+        assert!(!may_configure(""));
     }
 
     #[test]

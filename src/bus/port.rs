@@ -1,4 +1,4 @@
-//! The port of a configured bus, whatever it is connected to.
+//! The port of a configured bus, of any kind.
 
 use arrayvec::ArrayVec;
 use takt_rt::Frame;
@@ -12,39 +12,39 @@ use crate::config::{Config, Interface};
 use crate::faults::{Delivery, DriveEffect, FaultyPort, InjectError, Injectable};
 use crate::sim::SimulatedBus;
 
-/// Frames on their way to the logger: almost a second of a full bus of 1 Mbit/s.
+/// Frames that the trace to the logger holds: almost one second of a fully loaded bus at 1 Mbit/s.
 const TRACE_FRAMES: usize = 1 << 13;
 
 /// A bus port of any kind.
 pub enum Port {
-    /// Simulated drives inside this process.
+    /// A bus with simulated drives inside this process.
     Simulated(Box<SimulatedBus>),
     /// A CAN interface of this machine.
     SocketCan(Box<SocketCanPort>),
-    /// Any port whose frames the logger sees too.
+    /// Any port whose frames are copied to the logger.
     Traced(Box<TracedPort<Port>>),
-    /// Any port with a fault on purpose.
+    /// Any port with injected faults.
     Faulty(Box<FaultyPort<Port>>),
 }
 
 /// A bus that cannot be opened.
 #[derive(Debug, thiserror::Error)]
 pub enum OpenError {
-    /// The interface is not as it must be.
+    /// The interface is missing, down or set up differently.
     #[error("bus `{bus}`: {error}")]
     Interface {
-        /// The bus.
+        /// The name of the bus.
         bus: String,
-        /// Why.
+        /// The reason.
         #[source]
         error: InterfaceError,
     },
-    /// There is no socket on the interface.
+    /// No socket could be opened on the interface.
     #[error("bus `{bus}`: {error}")]
     Socket {
-        /// The bus.
+        /// The name of the bus.
         bus: String,
-        /// Why.
+        /// The reason.
         #[source]
         error: SocketCanError,
     },
@@ -63,7 +63,7 @@ impl Port {
         }
     }
 
-    /// The simulated bus behind it, if it is one.
+    /// The simulated bus behind this port, if it is a simulated one.
     pub fn simulated_mut(&mut self) -> Option<&mut SimulatedBus> {
         match self {
             Self::Simulated(bus) => Some(bus),
@@ -73,15 +73,15 @@ impl Port {
         }
     }
 
-    /// The same port, and a trace of its frames.
+    /// This port with a trace, which receives a copy of every frame, and the trace.
     pub fn traced(self, name: &str) -> (Self, Trace) {
         let (port, trace) = traced(self, name, TRACE_FRAMES);
         (Self::Traced(Box::new(port)), trace)
     }
 }
 
-/// Brings the interface of bus number `bus` up, as far as that is needed and permitted, and opens it. `None` when the
-/// bus is a simulated one.
+/// Brings the interface of bus number `bus` up, as far as needed and permitted, and opens it. Returns `None` for a simulated
+/// bus.
 ///
 /// # Errors
 /// See [`OpenError`].
@@ -92,12 +92,7 @@ pub fn open_configured(
 ) -> Result<Option<SocketCanPort>, OpenError> {
     let Some(bus) = config.buses.get(bus) else { return Ok(None) };
     let Interface::SocketCan(interface) = &bus.interface else { return Ok(None) };
-    let settings = InterfaceSettings {
-        bit_rate: bus.bit_rate,
-        data_bit_rate: bus.data_bit_rate,
-        restart_ms: bus.restart_ms,
-    };
-    prepare_interface(interface, &settings)
+    prepare_interface(interface, &InterfaceSettings::of(bus))
         .map_err(|error| OpenError::Interface { bus: bus.name.clone(), error })?;
     let port = open_socketcan(interface, options)
         .map_err(|error| OpenError::Socket { bus: bus.name.clone(), error })?;

@@ -1,6 +1,6 @@
-//! A bus port that lets another thread see every frame that passes, and how the bus is.
+//! A bus port that copies every frame, and every change of the bus state, to another thread.
 //!
-//! Every bus is traced in every run, since the black box wants its frames, so what this costs the real-time thread counts.
+//! Every bus is traced in every run, because the black box records its frames. So the cost in the real-time thread matters.
 //! A frame of up to eight bytes travels as 24 bytes instead of the 88 that the longest frame takes; a longer one as
 //! several pieces.
 
@@ -20,16 +20,16 @@ pub struct TracedFrame {
     pub frame: Frame,
 }
 
-/// How a bus was, from this instant on.
+/// The state of a bus from one instant on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TracedHealth {
-    /// When it was seen: at the last frames before it.
+    /// The time of the last frames before the change was seen.
     pub at_ns: Nanoseconds,
-    /// What was seen.
+    /// The state and counters that were seen.
     pub health: BusHealth,
 }
 
-/// Eight bytes of a frame, with what makes a frame of them.
+/// Up to eight bytes of a frame, with the header that is needed to put the frame together again.
 #[derive(Clone, Copy)]
 struct Piece {
     at_ns: Nanoseconds,
@@ -44,7 +44,7 @@ struct Piece {
 
 const PIECE_BYTES: usize = size_of::<u64>();
 
-/// Changes of a bus' health on their way. They are cumulative: what finds no room is told with the next.
+/// Changes of the bus state that the trace holds. Each has the cumulative counters, so that a dropped one loses nothing.
 const HEALTH_CHANGES: usize = 64;
 
 /// Wraps a port: everything it sends and receives is also copied to a [`Trace`]. A full trace drops and counts.

@@ -1,4 +1,4 @@
-//! Curves over time as a picture: panels under each other, limits dashed, what counts marked.
+//! Curves over time as SVG: one panel below the other, limits as dashed lines, one instant marked.
 
 use std::fmt::Write as _;
 
@@ -10,7 +10,7 @@ const GAP: f64 = 34.0;
 const MARGIN: f64 = 8.0;
 const LETTER: f64 = 7.0;
 const LINE: f64 = 14.0;
-/// What of a title there is room for.
+/// The longest title, in characters.
 const TITLE_LETTERS: usize = 118;
 
 /// The colours of curves, for as many as can be told apart.
@@ -20,9 +20,9 @@ pub const COLOURS: [&str; 8] =
 /// Panels over one time axis.
 #[derive(Debug, Default)]
 pub struct Chart {
-    /// Above everything; may be empty.
+    /// The title above the panels; may be empty.
     pub title: String,
-    /// What the time axis covers, in seconds.
+    /// The start and the end of the time axis, in seconds.
     pub span_s: (f64, f64),
     /// An instant that is marked in every panel.
     pub mark_s: Option<f64>,
@@ -33,7 +33,7 @@ pub struct Chart {
 /// Curves over one scale.
 #[derive(Debug, Default)]
 pub struct Panel {
-    /// What is drawn, with its unit.
+    /// The quantity with its unit.
     pub name: String,
     /// Names beside the heading, each with its colour.
     pub legend: Vec<(String, &'static str)>,
@@ -53,7 +53,7 @@ pub struct Curve {
 }
 
 impl Chart {
-    /// The picture as SVG.
+    /// The chart as SVG.
     pub fn draw(&self) -> String {
         let top = if self.title.is_empty() { 0.0 } else { GAP };
         let height = top + self.panels.len() as f64 * (PANEL + GAP) + GAP;

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use takt::config::Config;
 
-use super::refusal::Refusal;
+use super::usage_error::UsageError;
 
 /// `--bus NAME=INTERFACE`
 #[derive(Clone, Debug)]
@@ -29,7 +29,7 @@ impl FromStr for BusOverride {
 }
 
 /// Reads a configuration and applies the overrides.
-pub fn load(path: &Path, buses: &[BusOverride]) -> Result<Config, Refusal> {
+pub fn load(path: &Path, buses: &[BusOverride]) -> Result<Config, UsageError> {
     let mut config = Config::load(path)?;
     for (index, bus) in buses.iter().enumerate() {
         if buses.iter().take(index).any(|earlier| earlier.name == bus.name) {

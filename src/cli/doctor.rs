@@ -18,10 +18,10 @@ use super::print;
 /// Say whether this machine is fit for the loop, and how to make it so. Ends with 1 when something forbids real time.
 #[derive(Args, Debug)]
 pub struct Arguments {
-    /// A configuration: its priority, CPU, period and CAN interfaces count. Without it, the usual ones and every CAN
-    /// interface there is
+    /// A configuration: its priority, CPU, period and CAN interfaces are checked. Without it, the defaults and every CAN
+    /// interface of this machine
     config: Option<PathBuf>,
-    /// Run the loop itself for so many seconds and grade it; 0 leaves that out
+    /// Run the loop for this many seconds and grade its timing; 0 skips the self-test
     #[arg(long, value_name = "S", default_value_t = 10, allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(0..=86_400))]
     self_test_s: u64,
     /// Print what was found as one JSON object
@@ -33,7 +33,7 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Exit {
     let config = match arguments.config.as_deref().map(|path| configuration::load(path, &[])).transpose() {
         Ok(config) => config,
-        Err(refusal) => return refusal.print(arguments.json),
+        Err(error) => return error.print(arguments.json),
     };
     let interrupted = match interruption::watch() {
         Ok(interrupted) => interrupted,
@@ -44,14 +44,14 @@ pub fn run(arguments: &Arguments) -> Exit {
     };
     let subject = Subject::new(config.as_ref());
     let Some(attempted) = attempt(&subject) else {
-        say!("takt: the system has no thread for an attempt at real time");
+        say!("takt: no thread could be started to try out the real-time set-up");
         return Exit::Stopped;
     };
     let mut examination = examine(&Source::this_machine(), &subject, &attempted);
     if arguments.self_test_s > 0 {
         match self_test(&subject, arguments.self_test_s, &interrupted) {
             Ok(Some(result)) => examination = examination.with_self_test(result),
-            Ok(None) => say!("takt: the self-test did not get to a single cycle"),
+            Ok(None) => say!("takt: the self-test did not complete a single cycle"),
             Err(error) => say!("takt: no self-test: {error}"),
         }
     }
@@ -65,7 +65,7 @@ pub fn run(arguments: &Arguments) -> Exit {
     if arguments.json {
         return print::json(&examination, exit);
     }
-    print::text(&examination.picture(print::emphasis()), exit)
+    print::text(&examination.render(print::emphasis()), exit)
 }
 
 /// Runs the loop of the subject, without a bus.

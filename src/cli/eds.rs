@@ -1,7 +1,7 @@
-//! `takt eds`: what an EDS or DCF says of its device.
+//! `takt eds`: shows the contents of an EDS or DCF.
 
-mod picture;
 mod text;
+mod view;
 
 use std::path::PathBuf;
 
@@ -11,14 +11,15 @@ use takt::canopen::eds::{self, Findings, Severity};
 
 use super::exit::Exit;
 use super::print;
-use picture::Picture;
+use super::say;
+use view::View;
 
 /// Print the object dictionary of an EDS or DCF, with its PDOs and with what is wrong in the file
 #[derive(Args, Clone, Debug)]
 pub struct Arguments {
     /// The EDS or DCF
     file: PathBuf,
-    /// The node number to put in the place of $NODEID; a DCF has its own
+    /// The node ID that replaces $NODEID; a DCF has its own
     #[arg(long, value_parser = clap::value_parser!(u8).range(1..=127))]
     node: Option<u8>,
     /// Print one JSON object instead of tables
@@ -33,34 +34,35 @@ pub fn run(arguments: &Arguments) -> Exit {
         Err(findings) => {
             if arguments.json {
                 let problems = problems(&findings);
-                let refusal = Refusal { error: findings.to_string(), problems };
-                return print::indented_json(&refusal, Exit::Usage);
+                let printed = PrintedFindings { error: findings.to_string(), problems };
+                return print::indented_json(&printed, Exit::Usage);
             }
             show(findings);
             return Exit::Usage;
         }
     };
     let node = arguments.node.or(loaded.dictionary.commissioned_node());
-    let picture = Picture::of(&loaded.dictionary, node, problems(&loaded.warnings));
+    let view = View::of(&loaded.dictionary, node, problems(&loaded.warnings));
     if arguments.json {
-        return print::indented_json(&picture, Exit::Done);
+        return print::indented_json(&view, Exit::Done);
     }
-    let exit = print::text(&text::whole(&picture), Exit::Done);
+    let exit = print::text(&text::whole(&view), Exit::Done);
     if !loaded.warnings.is_empty() {
         show(loaded.warnings);
     }
     exit
 }
 
+/// A file that cannot be used, as an object.
 #[derive(Serialize)]
-struct Refusal {
+struct PrintedFindings {
     error: String,
-    problems: Vec<ProblemPicture>,
+    problems: Vec<PrintedProblem>,
 }
 
 /// A problem of the file.
 #[derive(Serialize)]
-struct ProblemPicture {
+struct PrintedProblem {
     severity: &'static str,
     line: usize,
     column: usize,
@@ -70,10 +72,10 @@ struct ProblemPicture {
     help: String,
 }
 
-fn problems(findings: &Findings) -> Vec<ProblemPicture> {
-    let picture = |problem| {
+fn problems(findings: &Findings) -> Vec<PrintedProblem> {
+    let printed = |problem| {
         let place = findings.position(problem);
-        ProblemPicture {
+        PrintedProblem {
             severity: match problem.kind.severity() {
                 Severity::Warning => "warning",
                 Severity::Error => "error",
@@ -85,9 +87,9 @@ fn problems(findings: &Findings) -> Vec<ProblemPicture> {
             help: problem.kind.help(),
         }
     };
-    findings.problems().iter().map(picture).collect()
+    findings.problems().iter().map(printed).collect()
 }
 
 fn show(findings: Findings) {
-    say!("{:?}", miette::Report::new(findings));
+    say::styled(&format!("{:?}", miette::Report::new(findings)));
 }

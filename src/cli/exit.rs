@@ -7,18 +7,18 @@ use std::process::{ExitCode, Termination};
 pub enum Exit {
     /// Everything was done.
     Done,
-    /// The run ended in a stop or a fault, a check found something that forbids what was asked, or a result is lost.
+    /// The run ended in a stop or a fault, a check found an obstacle, or a result could not be written.
     Stopped,
     /// The configuration or the command line is wrong; nothing was done.
     Usage,
     /// Real-time set-up was required and refused.
     RealtimeRefused,
-    /// Ctrl-C, SIGTERM or a terminal that was closed; the axes were stopped in control.
+    /// Ctrl-C, SIGTERM, a closed terminal, or a take-over by another process; the axes were stopped in control.
     Interrupted,
 }
 
 impl Exit {
-    /// How it ends when something besides has failed: what went well has not.
+    /// The exit code when a result was lost in addition: success becomes failure.
     pub const fn and_failed(self) -> Self {
         match self {
             Self::Done => Self::Stopped,

@@ -7,8 +7,8 @@ use std::sync::atomic::AtomicBool;
 
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
-/// A flag that is raised by Ctrl-C, by SIGTERM, and when the terminal is closed or a remote login breaks off, unless the
-/// command was told to outlive that (`nohup`).
+/// A flag that is set by Ctrl-C, by SIGTERM, and when the terminal is closed or a remote login ends. Under `nohup` the end
+/// of the terminal is ignored.
 pub fn watch() -> io::Result<Arc<AtomicBool>> {
     let arrived = Arc::new(AtomicBool::new(false));
     let outlives = is_ignored(&fs::read_to_string("/proc/self/status").unwrap_or_default(), SIGHUP);
@@ -18,7 +18,7 @@ pub fn watch() -> io::Result<Arc<AtomicBool>> {
     Ok(arrived)
 }
 
-/// Whether whoever started the process has had a signal ignored, as the kernel's status of the process says it.
+/// Whether a signal was set to be ignored when the process was started, from the kernel's status of the process.
 fn is_ignored(status: &str, signal: i32) -> bool {
     let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
     let mask = ignored.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());

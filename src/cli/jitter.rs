@@ -14,7 +14,7 @@ use takt::jitter::{self, JitterOptions, JitterReport, Measurement, Pacing};
 use super::exit::Exit;
 use super::interruption;
 use super::print;
-use super::refusal::Refusal;
+use super::usage_error::UsageError;
 
 /// Measure how evenly this machine paces the loop: sleeping only, and sleeping, then spinning.
 #[derive(Args, Debug)]
@@ -25,13 +25,13 @@ pub struct Arguments {
     /// Period of the cycle, in whole microseconds
     #[arg(long, value_name = "N", default_value_t = 1_000, allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(250..=100_000))]
     period_us: u64,
-    /// Cycles to measure, of each way of waiting
+    /// Cycles to measure for each kind of pacing
     #[arg(long, value_name = "N", default_value_t = 10_000, allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(1..))]
     cycles: u64,
     /// SCHED_FIFO priority; 0 stays in the normal class
     #[arg(long, value_name = "P", default_value_t = 80, allow_negative_numbers = true, value_parser = clap::value_parser!(u8).range(0..=99))]
     priority: u8,
-    /// The CPU to stay on [default: the last one, with SCHED_FIFO]
+    /// The CPU to run on [default: the last one, with SCHED_FIFO]
     #[arg(long, value_name = "C", allow_negative_numbers = true)]
     cpu: Option<usize>,
     /// Draw the histograms into this file
@@ -74,23 +74,28 @@ pub fn run(arguments: &Arguments) -> Exit {
     for pacing in [Pacing::Sleep, Pacing::SleepThenSpin] {
         match measure(&options, pacing, &interrupted) {
             Ok(measurement) => measurements.push(measurement),
-            Err(error) => return Refusal::from(error.to_string()).print(arguments.json),
+            Err(error) => return UsageError::from(error.to_string()).print(arguments.json),
         }
-        if interrupted.load(Ordering::Relaxed) {
+        if is_broken_off(&measurements) {
             break;
         }
     }
     let is_drawn = arguments.svg.as_ref().is_none_or(|path| draw(path, &options, &measurements));
-    let exit = match (interrupted.load(Ordering::Relaxed), is_drawn) {
+    let exit = match (is_broken_off(&measurements), is_drawn) {
         (true, _) => Exit::Interrupted,
         (false, true) => Exit::Done,
         (false, false) => Exit::Stopped,
     };
     match JitterReport::new(&options, &measurements) {
         Some(report) if arguments.json => print::json(&report, exit),
-        Some(report) => print::text(&report.picture(print::emphasis()), exit),
+        Some(report) => print::text(&report.render(print::emphasis()), exit),
         None => exit,
     }
+}
+
+/// Whether Ctrl-C, or another process that takes the interface over, has ended the measurement.
+fn is_broken_off(measurements: &[Measurement]) -> bool {
+    measurements.iter().any(|measurement| !measurement.is_whole)
 }
 
 fn measure(
@@ -125,7 +130,7 @@ fn progress_bar(cycles: u64, pacing: Pacing) -> ProgressBar {
 fn draw(path: &PathBuf, options: &JitterOptions, measurements: &[Measurement]) -> bool {
     let bus = options.interface.as_ref().map_or_else(String::new, |bus| format!(", SYNC on {bus}"));
     let title = format!("{} cycles of {} µs{bus}", options.cycles, options.period_ns / 1_000);
-    let written = fs::write(path, jitter::drawing(&title, measurements));
+    let written = fs::write(path, jitter::svg(&title, measurements));
     if let Err(error) = &written {
         say!("takt: {} cannot be written: {error}", path.display());
     }

@@ -10,19 +10,21 @@ mod doctor;
 mod drive;
 mod eds;
 mod exit;
+mod full_queue;
 mod interruption;
 mod jitter;
 mod lss;
+mod ownership;
 mod plan;
 mod print;
-mod refusal;
 mod report;
 mod run;
 mod sim;
 mod table;
+mod usage_error;
 
 pub use exit::Exit;
-pub use refusal::of_command_line as refuse;
+pub use usage_error::of_command_line as refuse;
 
 use clap::{Parser, Subcommand};
 

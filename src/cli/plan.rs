@@ -13,7 +13,7 @@ use takt_rt::plan::Profile;
 
 use super::exit::Exit;
 use super::print;
-use super::refusal::Refusal;
+use super::usage_error::UsageError;
 use answer::Answer;
 use question::Question;
 
@@ -28,15 +28,15 @@ pub struct Arguments {
 }
 
 /// Answers every line. The exit code is 2 when a line is no problem or the file cannot be read, 1 when an answer or the
-/// picture is lost, else 0: that a problem has no answer is an answer.
+/// plot cannot be written, else 0: a problem without a solution is a valid answer.
 pub fn run(arguments: &Arguments) -> Exit {
     match answer_all(arguments) {
         Ok(exit) => exit,
-        Err(refusal) => refusal.print(false),
+        Err(error) => error.print(false),
     }
 }
 
-fn answer_all(arguments: &Arguments) -> Result<Exit, Refusal> {
+fn answer_all(arguments: &Arguments) -> Result<Exit, UsageError> {
     let name = arguments.problems.as_ref().map_or("standard input".into(), |path| path.to_string_lossy());
     let unreadable = |error: io::Error| format!("{name} cannot be read: {error}");
     let input: Box<dyn BufRead> = match &arguments.problems {
@@ -67,7 +67,7 @@ fn answer_all(arguments: &Arguments) -> Result<Exit, Refusal> {
                 Answer::malformed(index + 1, message)
             }
         };
-        // Who asks one problem after the other waits for each answer.
+        // A program that asks one problem after the other waits for each answer.
         let json = serde_json::to_string(&answer).map_err(io::Error::from);
         match json.and_then(|json| print::write(&format!("{json}\n"))) {
             Ok(true) => {}
@@ -76,12 +76,12 @@ fn answer_all(arguments: &Arguments) -> Result<Exit, Refusal> {
         }
     }
     if let Some(path) = plot {
-        say!("takt: {} is not drawn: there is no trajectory", path.display());
+        say!("takt: {} is not written: there is no trajectory to plot", path.display());
     }
     Ok(exit)
 }
 
-/// No problem takes a longer line.
+/// The longest line that is read.
 const LONGEST_LINE: u64 = 64 << 20;
 
 fn lines(mut input: impl BufRead) -> impl Iterator<Item = io::Result<Vec<u8>>> {

@@ -8,13 +8,13 @@ use takt::telemetry::Emphasis;
 
 use super::exit::Exit;
 
-/// How the result is emphasised: with colours on a terminal, unless `NO_COLOR` is set (<https://no-color.org>).
+/// Whether the result has colours: with colours on a terminal, unless `NO_COLOR` is set (<https://no-color.org>).
 pub fn emphasis() -> Emphasis {
     let is_plain = env::var_os("NO_COLOR").is_some_and(|set| !set.is_empty());
     if stdout().is_terminal() && !is_plain { Emphasis::Ansi } else { Emphasis::None }
 }
 
-/// Prints a text. How the subcommand ends: as it would, unless the text cannot be written.
+/// Prints a text. Returns `exit`, or failure when the text cannot be written.
 pub fn text(text: &str, exit: Exit) -> Exit {
     match write(text) {
         Ok(_) => exit,
@@ -22,12 +22,12 @@ pub fn text(text: &str, exit: Exit) -> Exit {
     }
 }
 
-/// Prints one object in a line, for machines.
+/// Prints one JSON object in one line.
 pub fn json(value: &impl Serialize, exit: Exit) -> Exit {
     object(serde_json::to_string(value), exit)
 }
 
-/// Prints one object over many lines, for machines and people.
+/// Prints one JSON object, indented.
 pub fn indented_json(value: &impl Serialize, exit: Exit) -> Exit {
     object(serde_json::to_string_pretty(value), exit)
 }
@@ -39,10 +39,10 @@ fn object(json: serde_json::Result<String>, exit: Exit) -> Exit {
     }
 }
 
-/// Writes a text at once, and tells whether there is still a reader: one that has seen enough (`| head`) is no failure.
+/// Writes a text and flushes it. Returns whether there is still a reader: one that has ended (`| head`) is no failure.
 ///
 /// # Errors
-/// What is lost otherwise, as on a full disk.
+/// The text could not be written for another reason, for example to a full disk.
 pub fn write(text: &str) -> io::Result<bool> {
     let mut stdout = stdout().lock();
     match stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
@@ -52,7 +52,7 @@ pub fn write(text: &str) -> io::Result<bool> {
     }
 }
 
-/// Says that the result is lost. Nobody may take that for success.
+/// Reports that the result could not be written. The command must not end with success then.
 pub fn unwritten(error: &io::Error, exit: Exit) -> Exit {
     say!("takt: the result cannot be written to standard output: {error}");
     exit.and_failed()

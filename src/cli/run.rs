@@ -16,14 +16,18 @@ use takt::controller::realtime_thread::StartError;
 use takt::controller::session::{self, Session, SessionError, SessionOptions};
 use takt::controller::{Interrupt, Outcome, Progress};
 use takt::faults::{FaultEvents, FaultInjector, Scenario, ScenarioError, ScenarioFault};
-use takt::telemetry::{Destination, Machine, Notice, RealtimeReport, RunOutcome, RunReport, words};
-use takt_rt::{Event, EventKind, Snapshot, StopReason};
+use takt::telemetry::{
+    Machine, Notice, RealtimeReport, RecordingDestination, RunEnd, RunOutcome, RunReport, words,
+};
+use takt_rt::{Event, EventKind, StopReason};
 
 use super::configuration::{self, BusOverride};
 use super::exit::Exit;
+use super::full_queue::{self, FullQueues};
 use super::interruption;
+use super::ownership;
 use super::print;
-use super::refusal::Refusal;
+use super::usage_error::UsageError;
 
 /// Bring the drives up, run the motion program of a configuration, stop in control, and report.
 #[derive(Args, Debug)]
@@ -42,6 +46,9 @@ pub struct Arguments {
     /// Play the faults of this scenario (TOML), to see what they lead to; configs/faults has examples
     #[arg(long, value_name = "FILE.toml")]
     faults: Option<PathBuf>,
+    /// Have another takt of this host that commands one of the buses stop in control first, and take them over
+    #[arg(long)]
+    take_over: bool,
     /// End with exit code 3 before anything moves if the system refuses a step of the real-time set-up
     #[arg(long)]
     require_realtime: bool,
@@ -50,14 +57,12 @@ pub struct Arguments {
     json: bool,
 }
 
-/// The report, and how the run ended.
+/// The report, with what is known beside it.
 #[derive(Serialize)]
 struct Printed<'a> {
     #[serde(flatten)]
     report: &'a RunReport,
-    /// `finished`, `interrupted`, `stopped` or `failed`.
-    ended: &'static str,
-    /// Why the run failed, in words, where it was not a stop of the group.
+    /// Why the run ended, in words, where it was neither its end, nor Ctrl-C, nor a stop of the group.
     failure: Option<String>,
     /// The axes whose drives could not be reached in the end.
     unreached: Vec<&'a str>,
@@ -75,15 +80,15 @@ struct PrintedRefusal<'a> {
 pub fn run(arguments: Arguments) -> Exit {
     let config = match configuration::load(&arguments.config, &arguments.buses) {
         Ok(config) => config,
-        Err(refusal) => return refusal.print(arguments.json),
+        Err(error) => return error.print(arguments.json),
     };
     if let Err(refused) = schedule::verify(&config) {
-        return Refusal::from(refused.to_string()).print(arguments.json);
+        return UsageError::from(refused.to_string()).print(arguments.json);
     }
     let fault_injector =
         match arguments.faults.as_deref().map(|path| fault_injector(path, &config)).transpose() {
             Ok(fault_injector) => fault_injector,
-            Err(refusal) => return refusal.print(arguments.json),
+            Err(error) => return error.print(arguments.json),
         };
     let mut signals = match Signals::watch() {
         Ok(signals) => signals,
@@ -95,13 +100,14 @@ pub fn run(arguments: Arguments) -> Exit {
     let bar = progress_bar(&config);
     let options = SessionOptions {
         duration_ns: arguments.duration.map(|duration| duration.as_nanos() as u64),
-        recording: arguments.record.map(Destination::File),
+        recording: arguments.record.map(RecordingDestination::File),
         is_realtime_required: arguments.require_realtime,
         fault_injector: fault_injector.clone(),
+        if_owned: ownership::if_owned(arguments.take_over),
     };
     let notify = notices(&bar, Machine::of(&config));
-    let mut drawn = Drawn::new(bar.clone());
-    let mut hints = Hints::new(&config);
+    let mut throttled_bar = ThrottledBar::new(bar.clone());
+    let mut full_queues = FullQueues::new(&config);
     let mut fault_events = FaultEvents::default();
     let mut tell = || {
         let news = fault_injector
@@ -110,8 +116,8 @@ pub fn run(arguments: Arguments) -> Exit {
         news.iter().for_each(|fault_event| bar.suspend(|| say!("takt: {fault_event}")));
     };
     let session = session::run(&config, options, notify, |snapshot, progress| {
-        drawn.show(&progress);
-        hints.look(snapshot).for_each(|hint| bar.suspend(|| say!("takt: {hint}")));
+        throttled_bar.show(&progress);
+        full_queues.poll(snapshot).for_each(|hint| bar.suspend(|| say!("takt: {hint}")));
         tell();
         signals.next()
     });
@@ -123,10 +129,10 @@ pub fn run(arguments: Arguments) -> Exit {
     }
 }
 
-/// Reads a scenario. What a person should know before it is played on real drives is said.
-fn fault_injector(path: &Path, config: &Config) -> Result<Arc<FaultInjector>, Refusal> {
+/// Reads a scenario. Warns before faults are injected on real drives.
+fn fault_injector(path: &Path, config: &Config) -> Result<Arc<FaultInjector>, UsageError> {
     let scenario = Scenario::load(path, config).map_err(|error| match error {
-        ScenarioError::Wrong(error) => Refusal::from(error),
+        ScenarioError::Wrong(error) => UsageError::from(error),
         unreadable @ ScenarioError::Unreadable { .. } => unreadable.to_string().into(),
     })?;
     let is_real = |fault: &ScenarioFault| {
@@ -144,8 +150,10 @@ fn fault_injector(path: &Path, config: &Config) -> Result<Arc<FaultInjector>, Re
 }
 
 fn refuse(error: &SessionError, is_json: bool) -> Exit {
-    let SessionError::Start(StartError::Refused(report)) = error else {
-        return Refusal::from(error.to_string()).print(is_json);
+    let report = match error {
+        SessionError::Start(StartError::Refused(report)) => report,
+        SessionError::Claim(error) => return ownership::usage_error(error).print(is_json),
+        error => return UsageError::from(error.to_string()).print(is_json),
     };
     let realtime = RealtimeReport::new(report, 0, 0);
     if is_json {
@@ -161,7 +169,15 @@ fn refuse(error: &SessionError, is_json: bool) -> Exit {
 fn report(config: &Config, session: &Session, as_json: bool) -> Exit {
     let faults = session.ended.map_or(0, |ended| ended.page_faults.minor + ended.page_faults.major);
     let spin_guard_ns = session.ended.map_or(0, |ended| ended.spin_guard_ns);
+    let (ended, exit) = match session.outcome {
+        Outcome::Finished => (RunEnd::Finished, Exit::Done),
+        Outcome::Interrupted => (RunEnd::Interrupted, Exit::Interrupted),
+        Outcome::TakenOver { .. } => (RunEnd::TakenOver, Exit::Interrupted),
+        Outcome::Stopped(_) => (RunEnd::Stopped, Exit::Stopped),
+        _ => (RunEnd::Failed, Exit::Stopped),
+    };
     let outcome = RunOutcome {
+        ended,
         realtime: RealtimeReport::new(&session.begun.report, spin_guard_ns, faults),
         last: session.snapshot,
         buses_open_ns: session.open_ns,
@@ -174,35 +190,34 @@ fn report(config: &Config, session: &Session, as_json: bool) -> Exit {
     if !unreached.is_empty() {
         say!("takt: {}", unreachable(&unreached, &config.master));
     }
-    let failure = failure(&session.outcome, &session.log.machine);
-    let (ended, exit) = match session.outcome {
-        Outcome::Finished => ("finished", Exit::Done),
-        Outcome::Interrupted => ("interrupted", Exit::Interrupted),
-        Outcome::Stopped(_) => ("stopped", Exit::Stopped),
-        _ => ("failed", Exit::Stopped),
-    };
+    let failure = failure(config, session);
+    let exit = if report.telemetry.not_written.is_empty() { exit } else { exit.and_failed() };
     if as_json {
-        return print::json(&Printed { report: &report, ended, failure, unreached }, exit);
+        return print::json(&Printed { report: &report, failure, unreached }, exit);
     }
     match failure {
+        Some(failure) if ended == RunEnd::TakenOver => {
+            say!("takt: {failure}");
+            print::text(&report.render(print::emphasis()), exit)
+        }
         Some(failure) => {
             say!("takt: {failure}");
             report.telemetry.black_boxes.iter().for_each(|path| say!("black box: {}", path.display()));
             exit
         }
-        None => print::text(&report.picture(print::emphasis()), exit),
+        None => print::text(&report.render(print::emphasis()), exit),
     }
 }
 
 fn stop_of(session: &Session) -> Option<StopReason> {
     match session.outcome {
         Outcome::Stopped(stop) => Some(stop),
-        Outcome::Interrupted => session.snapshot.stop,
+        Outcome::Interrupted | Outcome::TakenOver { .. } => session.snapshot.stop,
         _ => None,
     }
 }
 
-/// What a person must know of drives that gave no answer any more.
+/// The warning about drives that no longer answered.
 fn unreachable(axes: &[&str], master: &Master) -> String {
     let by_themselves = match master.heartbeat_ns {
         Some(_) => format!(
@@ -212,16 +227,26 @@ fn unreachable(axes: &[&str], master: &Master) -> String {
         None => "nothing stops them, since `heartbeat` is off".to_owned(),
     };
     format!(
-        "{}: no answer in the end, so it is not known whether they have stopped; {by_themselves}. Look before you come near, \
+        "{}: no answer in the end, so it is not known whether they have stopped; {by_themselves}. Make sure of that before you come near, \
          and switch their power off before you repair the bus",
         axes.join(", ")
     )
 }
 
-/// What a report does not say by itself.
-fn failure(outcome: &Outcome, machine: &Machine) -> Option<String> {
-    let is_reported = matches!(outcome, Outcome::Finished | Outcome::Interrupted | Outcome::Stopped(_));
-    (!is_reported).then(|| outcome.words(machine))
+/// Why the run ended, where the report does not say it.
+fn failure(config: &Config, session: &Session) -> Option<String> {
+    let words = session.outcome.words(&session.log.machine);
+    match session.outcome {
+        Outcome::Finished | Outcome::Interrupted | Outcome::Stopped(_) => None,
+        Outcome::BringUpFailed(_) | Outcome::NotHeard { .. } | Outcome::Stuck { .. } => {
+            // A drive cannot answer a frame that it was not sent.
+            Some(
+                full_queue::cause(config, &session.snapshot)
+                    .map_or(words.clone(), |cause| format!("{words}; {cause}")),
+            )
+        }
+        _ => Some(words),
+    }
 }
 
 /// Ctrl-C and SIGTERM. The first asks for a controlled stop, the second for an immediate one.
@@ -255,13 +280,13 @@ fn progress_bar(config: &Config) -> ProgressBar {
     bar
 }
 
-/// A progress bar that is redrawn some times a second at most, and only when it has changed.
-struct Drawn {
+/// A progress bar that is updated at most ten times a second.
+struct ThrottledBar {
     bar: ProgressBar,
     last: Option<(Instant, Progress)>,
 }
 
-impl Drawn {
+impl ThrottledBar {
     const INTERVAL: Duration = Duration::from_millis(100);
 
     fn new(bar: ProgressBar) -> Self {
@@ -280,38 +305,12 @@ impl Drawn {
     }
 }
 
-/// Says once for each bus what is the likely cause of frames that find no room.
-struct Hints {
-    /// The buses that nothing has been said of.
-    silent: Vec<(usize, String)>,
-}
-
-impl Hints {
-    fn new(config: &Config) -> Self {
-        Self { silent: config.buses.iter().map(|bus| bus.name.clone()).enumerate().collect() }
-    }
-
-    fn look(&mut self, snapshot: &Snapshot) -> impl Iterator<Item = String> {
-        let has_overrun =
-            |bus: &(usize, String)| snapshot.buses.get(bus.0).is_some_and(|health| health.tx_overruns > 0);
-        let (said, silent) = std::mem::take(&mut self.silent).into_iter().partition(has_overrun);
-        self.silent = silent;
-        let said: Vec<(usize, String)> = said;
-        said.into_iter().map(|(_, name)| {
-            format!(
-                "bus {name} takes no more frames: nobody acknowledges them. Is the drives' power on, is the bus \
-                 terminated, is the bit rate right?"
-            )
-        })
-    }
-}
-
-/// What is no part of an ordinary run.
+/// Whether an event is not part of an ordinary run.
 fn is_urgent(event: &Event) -> bool {
     matches!(event.kind, EventKind::Stop(_) | EventKind::Emergency { .. } | EventKind::Rejected { .. })
 }
 
-/// Says at once what people should not have to wait for.
+/// Prints messages that must not wait for the end of the run.
 fn notices(bar: &ProgressBar, machine: Machine) -> Box<dyn FnMut(&Notice) + Send> {
     let bar = bar.clone();
     Box::new(move |notice| {
@@ -322,24 +321,4 @@ fn notices(bar: &ProgressBar, machine: Machine) -> Box<dyn FnMut(&Notice) + Send
         };
         bar.suspend(|| say!("{text}"));
     })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn frames_that_find_no_room_are_explained_once_for_each_bus() {
-        let arm = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/arm6-erob.toml");
-        let Ok(config) = Config::load(&arm) else { panic!("the example is sound") };
-        let mut hints = Hints::new(&config);
-        let mut snapshot = Snapshot::default();
-        assert_eq!(hints.look(&snapshot).count(), 0);
-        snapshot.buses[1].tx_overruns = 1;
-        let said: Vec<String> = hints.look(&snapshot).collect();
-        assert!(said.len() == 1 && said[0].starts_with("bus wrist "), "{said:?}");
-        assert_eq!(hints.look(&snapshot).count(), 0);
-        snapshot.buses[0].tx_overruns = 1;
-        assert_eq!(hints.look(&snapshot).count(), 1);
-    }
 }

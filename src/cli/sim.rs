@@ -8,13 +8,15 @@ use std::thread;
 use clap::Args;
 
 use takt::bus::SocketCanOptions;
+use takt::bus::ownership::{ClaimError, InterfaceLock, lock_for_simulator};
 use takt::bus::port::{OpenError, open_configured};
-use takt::config::Config;
+use takt::config::{Config, Interface};
 use takt::sim::LiveDrives;
 
 use super::configuration::{self, BusOverride};
 use super::exit::Exit;
 use super::interruption;
+use super::usage_error::UsageError;
 
 /// Put the drives of a configuration, simulated, on real interfaces, for any master to talk to.
 #[derive(Args, Debug)]
@@ -30,14 +32,19 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Exit {
     let config = match configuration::load(&arguments.config, &arguments.buses) {
         Ok(config) => config,
-        Err(refusal) => return refusal.print(false),
+        Err(error) => return error.print(false),
     };
+    // Held until the drives are gone.
+    let locked = match lock(&config) {
+        Ok(locked) => locked,
+        Err(error) => return UsageError::from(error.to_string()).print(false),
+    };
+    if let Err(error) = config.validate() {
+        return UsageError::from(error).print(false);
+    }
     let drives = match open(&config) {
         Ok(drives) => drives,
-        Err(error) => {
-            say!("takt: {error}");
-            return Exit::Usage;
-        }
+        Err(error) => return UsageError::from(error.to_string()).print(false),
     };
     if drives.is_empty() {
         say!("takt: no bus has a real interface; name one, for example: --bus {}=vcan0", first_bus(&config));
@@ -67,10 +74,20 @@ pub fn run(arguments: &Arguments) -> Exit {
             }
         }
     });
+    drop(locked);
     if has_panicked.into_inner() { Exit::Stopped } else { Exit::Done }
 }
 
-/// The drives of every bus that has a real interface. They hear everything, as a node on a bus does.
+/// One simulator for each interface: two would play drives with duplicate node IDs.
+fn lock(config: &Config) -> Result<Vec<InterfaceLock>, ClaimError> {
+    let real = config.buses.iter().filter_map(|bus| match &bus.interface {
+        Interface::SocketCan(interface) => Some((&bus.name, interface)),
+        Interface::Simulated => None,
+    });
+    real.map(|(bus, interface)| lock_for_simulator(bus, interface)).collect()
+}
+
+/// The drives of every bus that has a real interface. Their port has no filters: a node on a bus receives every frame.
 fn open(config: &Config) -> Result<Vec<(String, LiveDrives)>, OpenError> {
     let mut all = vec![];
     for (index, bus) in config.buses.iter().enumerate() {

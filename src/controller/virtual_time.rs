@@ -1,6 +1,5 @@
-//! A whole controller in virtual time: the same engine, cycle, channels, life cycle and logger as in the real-time
-//! thread, but in one thread and on a clock that jumps, so that hours of motion take seconds and the same
-//! configuration gives the same run bit for bit.
+//! A controller in virtual time: the same engine, cycle, channels, life cycle and logger as in real time, but in one thread
+//! and on a clock that jumps. Hours of motion take seconds, and the same configuration gives the same run bit for bit.
 
 use std::sync::Arc;
 
@@ -20,7 +19,7 @@ use crate::telemetry::WallClock;
 /// Zero of virtual time: 2000-01-01 00:00:00 UTC, in ns since 1970-01-01.
 const VIRTUAL_EPOCH_NS: u64 = 946_684_800_000_000_000;
 
-/// A clock that is always on time, unless it is told to be late.
+/// A clock that is always on time, unless [`VirtualClock::stall`] makes it late.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct VirtualClock {
     now_ns: u64,
@@ -28,7 +27,7 @@ pub struct VirtualClock {
 }
 
 impl VirtualClock {
-    /// The next wait ends this much later than asked for.
+    /// Makes the next wait end later by `ns`.
     pub fn stall(&mut self, ns: u64) {
         self.stall_ns += ns;
     }
@@ -57,9 +56,9 @@ pub struct VirtualRun<P> {
     supervisor: Supervisor,
     time_of_day: TimeOfDayKeeper,
     fault_injector: Option<Arc<FaultInjector>>,
-    /// Cycles from one look of the life cycle to the next, and since the last one.
-    neglect: u64,
-    neglected: u64,
+    /// Cycles from one poll of the life cycle to the next, and since the last poll.
+    poll_interval: u64,
+    cycles_since_poll: u64,
     is_over: bool,
 }
 
@@ -69,13 +68,15 @@ impl VirtualRun<SimulatedBus> {
     /// # Errors
     /// See [`assemble::engine`].
     pub fn simulated(config: &Config) -> Result<(Self, LogSide), AssembleError> {
+        // The simulated drives take the values as they are.
+        config.validate()?;
         let ports = (0..config.buses.len()).map(|bus| SimulatedBus::new(config, bus)).collect();
         Self::new(config, ports)
     }
 }
 
 impl VirtualRun<Port> {
-    /// A controller of this configuration on simulated buses on which a scenario is played, and the side for its logger.
+    /// A controller of this configuration on simulated buses with injected faults, and the side for its logger.
     ///
     /// # Errors
     /// See [`assemble::engine`].
@@ -83,6 +84,7 @@ impl VirtualRun<Port> {
         config: &Config,
         fault_injector: Arc<FaultInjector>,
     ) -> Result<(Self, LogSide), AssembleError> {
+        config.validate()?;
         let simulated = |bus| Port::Simulated(Box::new(SimulatedBus::new(config, bus)));
         let ports = (0..config.buses.len()).map(|bus| fault_injector.wrap(bus, simulated(bus))).collect();
         let (run, log) = Self::new(config, ports)?;
@@ -96,19 +98,19 @@ impl<P: BusPort> VirtualRun<P> {
     /// # Errors
     /// See [`assemble::engine`].
     pub fn new(config: &Config, ports: Vec<P>) -> Result<(Self, LogSide), AssembleError> {
-        Self::led_by(Supervisor::new(config, None), config, ports)
+        Self::with_supervisor(Supervisor::new(config, None), config, ports)
     }
 
-    /// As [`VirtualRun::new`], for a group that is brought up and enabled and then left to whoever commands it through
+    /// The same as [`VirtualRun::new`], without a program: after bring-up the group executes the requests of
     /// [`VirtualRun::host`], until it is interrupted.
     ///
     /// # Errors
     /// See [`assemble::engine`].
     pub fn serving(config: &Config, ports: Vec<P>) -> Result<(Self, LogSide), AssembleError> {
-        Self::led_by(Supervisor::serving(config), config, ports)
+        Self::with_supervisor(Supervisor::serving(config), config, ports)
     }
 
-    fn led_by(
+    fn with_supervisor(
         supervisor: Supervisor,
         config: &Config,
         ports: Vec<P>,
@@ -128,26 +130,26 @@ impl<P: BusPort> VirtualRun<P> {
             supervisor,
             time_of_day: TimeOfDayKeeper::of(config),
             fault_injector: None,
-            neglect: 1,
-            neglected: 0,
+            poll_interval: 1,
+            cycles_since_poll: 0,
             is_over: false,
         };
         Ok((run, log))
     }
 
-    /// One cycle and what the life cycle has to do after it. Returns `false` once the loop has ended.
+    /// Runs one cycle, and polls the life cycle after it. Returns `false` once the loop has ended.
     pub fn step(&mut self) -> bool {
         if self.is_over {
             return false;
         }
         let flow = self.cycle.run(&mut self.engine, &mut self.clock, &mut self.ports, &mut self.rt);
-        self.neglected += 1;
-        if self.neglected >= self.neglect {
-            self.neglected = 0;
+        self.cycles_since_poll += 1;
+        if self.cycles_since_poll >= self.poll_interval {
+            self.cycles_since_poll = 0;
             self.supervisor.poll(self.clock.now_ns, &mut self.host);
         }
         if let Some(time) = self.time_of_day.poll(self.clock.now_ns, || WallClock::fixed(VIRTUAL_EPOCH_NS)) {
-            // One that finds the queue full is told again in a minute.
+            // If the queue is full, the next one follows in a minute.
             let _ = self.host.request(time);
         }
         if let Some(fault_injector) = &self.fault_injector {
@@ -160,19 +162,18 @@ impl<P: BusPort> VirtualRun<P> {
     /// Runs to the end of the life cycle, or for `at_most` cycles. Calls `each` after every cycle.
     pub fn run(&mut self, at_most: u64, mut each: impl FnMut(&mut Self)) -> Option<Outcome> {
         for _ in 0..at_most {
-            let goes_on = self.step();
+            let is_running = self.step();
             each(self);
-            if !goes_on {
+            if !is_running {
                 break;
             }
         }
         self.supervisor.outcome().cloned()
     }
 
-    /// From now on the life cycle is looked after only once in so many cycles, as on a machine that has no time for it: what
-    /// leads it is no real-time thread.
-    pub fn neglect_life_cycle(&mut self, cycles: u64) {
-        self.neglect = cycles;
+    /// From now on the life cycle is polled only once in so many cycles, as on a busy computer: its thread is not real-time.
+    pub fn poll_life_cycle_every(&mut self, cycles: u64) {
+        self.poll_interval = cycles;
     }
 
     /// Asks the run to end.
@@ -200,7 +201,7 @@ impl<P: BusPort> VirtualRun<P> {
         &mut self.clock
     }
 
-    /// The ports, to look at the simulated drives or to break something.
+    /// The ports, to observe the simulated drives or to inject faults.
     pub fn ports(&mut self) -> &mut [P] {
         &mut self.ports
     }

@@ -1,4 +1,4 @@
-//! What only an attempt can tell: whether the system lets this process be real-time.
+//! Whether the system grants this process real-time scheduling and locked memory. Only an attempt shows that.
 
 use std::thread;
 
@@ -8,13 +8,13 @@ use takt_rt::linux::{RealtimeThread, ThreadConfig, ThreadReport};
 use super::subject::Subject;
 use crate::controller::realtime_thread::thread_config;
 
-/// Sets a thread of its own up as the loop's would be, and undoes it. What was granted is thereby proven, whatever
-/// limits and capabilities seem to say. `None` when the system has no thread for it.
+/// Sets up a separate thread as the loop's thread would be, and undoes it. The result counts more than limits and
+/// capabilities. `None` when no thread could be started.
 pub fn attempt(subject: &Subject) -> Option<ThreadReport> {
     let config = ThreadConfig { cpu: Some(subject.cpu), ..thread_config(&subject.realtime) };
     let probe = move || *RealtimeThread::enter(&config).report();
     let report = thread::Builder::new().name("takt-probe".into()).spawn(probe).ok()?.join().ok();
-    // Scheduling and CPU ended with the thread; locking concerns the process. It fails for no reason that matters.
+    // Scheduling and CPU affinity ended with the thread; memory locking belongs to the process and is undone here.
     let _ = munlockall();
     report
 }

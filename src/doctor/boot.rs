@@ -1,4 +1,4 @@
-//! The kernel's command line, and what of the loop's CPU it should name.
+//! The kernel's command line, and the parameters in it that reserve the loop's CPU.
 
 use super::distribution::Distribution;
 
@@ -14,11 +14,11 @@ pub fn parameter<'a>(command_line: &'a str, name: &str) -> Option<&'a str> {
         Some((key, value)) => (key == name).then_some(value.trim_matches('"')),
         None => (word == name).then_some(""),
     });
-    // Not `last`: quotation marks are counted from the front.
+    // Not `last`: quotation marks must be counted from the front.
     values.fold(None, |_, value| Some(value))
 }
 
-/// The command that sets a CPU aside for the loop in all respects at once: one command mends every check of it.
+/// The command that reserves a CPU for the loop. One command satisfies every check of the CPU's isolation.
 pub fn set_aside(distribution: Distribution, cpu: usize, others: &str) -> String {
     let parameters =
         format!("isolcpus=managed_irq,domain,{cpu} nohz_full={cpu} rcu_nocbs={cpu} irqaffinity={others}");

@@ -30,7 +30,7 @@ fn range(part: &str, last: usize) -> Vec<usize> {
         .collect()
 }
 
-/// No kernel has more.
+/// More CPUs than any kernel supports.
 const MOST_CPUS: usize = 8_192;
 
 /// A list in the shortest form: `0-3,8`.

@@ -1,19 +1,19 @@
-//! Which distribution this is, for the commands that differ.
+//! The Linux distribution, for commands that differ between distributions.
 
 use super::source::Source;
 
-/// A distribution, as far as commands differ.
+/// A distribution, as far as its commands differ.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Distribution {
-    /// Debian and what follows it.
+    /// Debian and its derivatives.
     Debian,
-    /// Ubuntu and what follows it.
+    /// Ubuntu and its derivatives.
     Ubuntu,
-    /// A Raspberry Pi with its own boot files, whatever runs on it.
+    /// A Raspberry Pi with its own boot files, under any distribution.
     RaspberryPi,
-    /// Fedora, Red Hat and what follows them.
+    /// Fedora, Red Hat and their derivatives.
     Fedora,
-    /// Arch.
+    /// Arch Linux.
     Arch,
     /// Another one.
     Other,
@@ -29,7 +29,7 @@ impl Distribution {
         source.text("/etc/os-release").map_or(Self::Other, |text| Self::of_release(&text))
     }
 
-    /// From `os-release`(5): the distribution's own name counts first, then those that it is like.
+    /// From `os-release`(5): `ID` counts first, then the entries of `ID_LIKE`.
     fn of_release(text: &str) -> Self {
         let value = |key: &str| {
             let line = text.lines().find_map(|line| line.strip_prefix(key));

@@ -10,7 +10,7 @@ use super::subject::Subject;
 use super::threads::threads;
 use super::{can, isolation, kernel, memory, processor, rights};
 
-/// What was found.
+/// The result of all checks.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Examination {
     /// The worst of all findings, the self-test's included.
@@ -23,11 +23,11 @@ pub struct Examination {
     pub cycle_ns: u64,
     /// Every check in its order.
     pub checks: Vec<Finding>,
-    /// How the loop itself ran; `None` when that was left out.
+    /// The result of the self-test; `None` when it was not run.
     pub self_test: Option<SelfTest>,
 }
 
-/// Examines a machine. `attempt` is what came of [`super::attempt`] on it.
+/// Examines a machine. `attempt` is the result of [`super::attempt`] on it.
 pub fn examine(source: &Source, subject: &Subject, attempt: &ThreadReport) -> Examination {
     let threads = threads(source);
     let cpu = subject.cpu;
@@ -45,7 +45,7 @@ pub fn examine(source: &Source, subject: &Subject, attempt: &ThreadReport) -> Ex
 }
 
 impl Examination {
-    /// Adds the self-test, which has its say in the verdict.
+    /// Adds the self-test, which can make the verdict worse.
     pub fn with_self_test(mut self, self_test: SelfTest) -> Self {
         self.verdict = self.verdict.max(match self_test.grade {
             Grade::Excellent | Grade::Good => Verdict::Good,

@@ -1,32 +1,32 @@
-//! What a check has found.
+//! The result of a check.
 
 use serde::Serialize;
 
-/// How good it is.
+/// How good the result is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
-    /// It is not there, or cannot be read: nothing to judge.
+    /// The value does not exist or cannot be read, so that it cannot be judged.
     NotKnown,
     /// As it should be.
     Good,
-    /// It works, and would be more even otherwise.
+    /// The loop works, with more jitter than necessary.
     CouldBeBetter,
-    /// With this the time of a cycle has no bound.
+    /// With this value the duration of a cycle has no bound.
     ForbidsRealTime,
 }
 
-/// What a check is about.
+/// The subject of a check.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Group {
     /// The kernel.
     Kernel,
-    /// What this process may do.
+    /// The rights of this process.
     Rights,
     /// The processor.
     Processor,
-    /// Whether the CPU of the loop belongs to the loop.
+    /// Whether the loop has its CPU to itself.
     Isolation,
     /// Memory.
     Memory,
@@ -34,45 +34,45 @@ pub enum Group {
     Can,
 }
 
-/// A check: what is the same whatever it finds.
+/// A check: the parts that do not depend on its result.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Check {
     /// Its key in the JSON object.
     pub key: &'static str,
-    /// What it is about.
+    /// Its subject.
     pub group: Group,
-    /// What people call it.
+    /// Its title.
     pub title: &'static str,
-    /// Where it looks.
+    /// The files or programs that it reads.
     pub source: &'static str,
     /// Why it matters.
     pub why: &'static str,
 }
 
-/// What a check has found.
+/// The result of a check.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Finding {
     /// The key of the check.
     pub check: &'static str,
-    /// What it is about.
+    /// Its subject.
     pub group: Group,
-    /// The CAN interface that it is about.
+    /// The CAN interface, if it is a check of one.
     pub interface: Option<String>,
-    /// What people call it.
+    /// Its title.
     pub title: &'static str,
-    /// How good it is.
+    /// How good the result is.
     pub verdict: Verdict,
-    /// What was read, in words.
+    /// The value that was read, in words.
     pub read: String,
     /// Where it was read.
     pub source: &'static str,
-    /// Whether this process (or the boot command line) is allowed to have it; `None` where that is no question.
+    /// Whether this process is allowed to have it, or the boot command line asks for it; `None` where this does not apply.
     pub permitted: Option<bool>,
-    /// Whether it is in force; `None` where that is no question or cannot be seen.
+    /// Whether it is in force; `None` where this does not apply or cannot be seen.
     pub applied: Option<bool>,
     /// Why it matters.
     pub why: &'static str,
-    /// The commands that mend it, to be given in a shell.
+    /// The shell commands that repair it.
     pub mend: Vec<String>,
 }
 
@@ -126,7 +126,7 @@ impl Finding {
         self
     }
 
-    /// Adds a command that mends it.
+    /// Adds a command that repairs it.
     pub(super) fn mend(mut self, command: impl Into<String>) -> Self {
         self.mend.push(command.into());
         self

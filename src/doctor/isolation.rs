@@ -1,4 +1,4 @@
-//! Whether the loop's CPU belongs to the loop: what was asked for at boot, and what is in force.
+//! Whether the loop has its CPU to itself: the boot parameters, and what is in force.
 
 use super::boot::{parameter, set_aside};
 use super::cpu_list;
@@ -50,7 +50,7 @@ const IRQBALANCE: Check = Check {
 const WHY_NOT_IN_FORCE: &str =
     "sudo dmesg | grep -iE 'isolcpus|nohz|nocb|housekeeping'   # the kernel says why it did not take it";
 
-/// What is read of a machine.
+/// The values that are read from a machine.
 struct Facts<'a> {
     cpu: usize,
     last: usize,
@@ -132,7 +132,7 @@ impl Facts<'_> {
         finding.permitted(is_asked).applied(is_applied)
     }
 
-    /// Offloading is not shown but by the threads that take the callbacks over.
+    /// RCU offloading can be seen only from the threads that run the callbacks.
     fn rcu(&self) -> Finding {
         let cpu = self.cpu;
         let is_asked = self.is_asked("rcu_nocbs") || self.is_asked("nohz_full");

@@ -1,4 +1,4 @@
-//! Memory that moves under a program.
+//! Memory management that can delay a program.
 
 use super::finding::{Check, Finding, Group};
 use super::source::Source;
@@ -8,7 +8,7 @@ const HUGE_PAGES: Check = Check {
     group: Group::Memory,
     title: "huge pages",
     source: "/sys/kernel/mm/transparent_hugepage/enabled",
-    why: "khugepaged gathers small pages into large ones behind the program's back, locked ones too; whoever touches one meanwhile waits",
+    why: "khugepaged merges small pages into large ones, also locked ones; a program that touches such a page meanwhile has to wait",
 };
 
 const PAGE_LISTS: Check = Check {
@@ -16,7 +16,7 @@ const PAGE_LISTS: Check = Check {
     group: Group::Memory,
     title: "free pages of a CPU",
     source: "/proc/zoneinfo",
-    why: "a process that ends gives the free pages that its CPU keeps back all at once, under a lock; a thousand of them take a quarter of a millisecond, for which whoever sends a frame may have to wait",
+    why: "a process that ends gives the free pages that its CPU keeps back all at once, under a lock; a thousand of them take a quarter of a millisecond, and a thread that sends a frame may have to wait for it",
 };
 
 /// The kernel's own lower limit is four of the batches in which a CPU takes pages (`zone_highsize`, mm/page_alloc.c); a

@@ -1,12 +1,12 @@
 //! Is this machine fit for the loop? `takt doctor`.
 //!
-//! [`Source`] reads files and asks programs, and nothing else does; everything that judges takes texts, so that any
-//! machine can be judged from a copy of its files. What only an attempt can tell (scheduling, locking of memory) is
-//! attempted in a thread of its own by [`attempt`], and [`self_test`](SelfTest) runs the loop.
+//! Only [`Source`] reads files and runs programs. The checks take texts, so that any machine can be judged from a copy of
+//! its files. Scheduling and memory locking are tried out in a separate thread by [`attempt`]. [`self_test`](SelfTest)
+//! runs the loop.
 //!
 //! ```text
 //! Source ──▶ kernel, isolation, processor, memory, rights, threads, can ──▶ Finding ─┐
-//! attempt ─▶ rights                                                                  ├─▶ Examination ─▶ JSON, picture
+//! attempt ─▶ rights                                                                  ├─▶ Examination ─▶ JSON, text
 //! jitter ──▶ SelfTest ───────────────────────────────────────────────────────────────┘
 //! ```
 
@@ -20,8 +20,8 @@ mod finding;
 mod isolation;
 mod kernel;
 mod memory;
-mod picture;
 mod processor;
+mod render;
 mod rights;
 mod self_test;
 mod source;

@@ -31,6 +31,9 @@ pub(super) fn rounded_up(ns: Nanoseconds, unit_ns: Nanoseconds) -> i64 {
     i64::try_from(ns.div_ceil(unit_ns)).unwrap_or(i64::MAX)
 }
 
+/// A state is not waited for when the drive reports it less often than this: Ctrl-C would take as long.
+const LONGEST_AWAITED_HEARTBEAT_NS: Nanoseconds = 1_000_000_000;
+
 /// The value of object 1016:1: the master's node ID and heartbeat timeout; 0 without a master heartbeat.
 pub(super) fn watched_heartbeat(config: &Config) -> i64 {
     config.master.heartbeat_ns.map_or(0, |_| {
@@ -80,7 +83,7 @@ impl StepList {
         self.push(Action::WakeUp { command });
     }
 
-    /// Commands an NMT state, and waits for it if the drive has a heartbeat to report it.
+    /// Commands a state that the drive's heartbeat must report, if it has one that comes soon.
     pub fn nmt_reported(
         &mut self,
         command: NmtCommand,
@@ -88,8 +91,8 @@ impl StepList {
         axis: &Axis,
         timing: &BringUpTiming,
     ) {
-        let period_ns = axis.heartbeat_ns.unwrap_or(0);
-        let awaited = axis.heartbeat_ns.map(|_| state);
+        let soon_ns = axis.heartbeat_ns.filter(|period_ns| *period_ns <= LONGEST_AWAITED_HEARTBEAT_NS);
+        let (period_ns, awaited) = (soon_ns.unwrap_or(0), soon_ns.map(|_| state));
         let within_ns = timing.confirm_timeout_ns.saturating_add(period_ns.saturating_mul(3));
         self.nmt(command, awaited, within_ns, within_ns / 3);
     }
@@ -153,5 +156,37 @@ impl StepList {
 
     pub fn write_cob_id(&mut self, parameters: PdoParameters, value: u32) {
         self.write_with(parameters.cob_id(), value.into(), ReadBack::Masked(PDO_IDENTITY), false);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+
+    fn commanded(heartbeat_ns: Option<u64>) -> Action {
+        let mut config = Config::load(Path::new("configs/single-erob.toml")).unwrap();
+        config.axes[0].heartbeat_ns = heartbeat_ns;
+        let mut list = StepList::new("start", "");
+        let timing = BringUpTiming::default();
+        list.nmt_reported(NmtCommand::Start, NmtState::Operational, &config.axes[0], &timing);
+        list.steps.remove(0).action
+    }
+
+    #[test]
+    fn a_state_is_waited_for_unless_its_drive_reports_it_once_in_a_minute() {
+        let awaited = |action| match action {
+            Action::Nmt { awaited, within_ns, .. } => (awaited, within_ns),
+            other => panic!("{other:?}"),
+        };
+        let (state, within_ns) = awaited(commanded(Some(100_000_000)));
+        assert_eq!(state, Some(NmtState::Operational));
+        assert!(within_ns > 300_000_000, "{within_ns}");
+        for heartbeat_ns in [None, Some(60_000_000_000)] {
+            let (state, within_ns) = awaited(commanded(heartbeat_ns));
+            assert_eq!(state, None);
+            assert_eq!(within_ns, BringUpTiming::default().confirm_timeout_ns);
+        }
     }
 }

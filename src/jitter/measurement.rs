@@ -1,22 +1,23 @@
-//! The loop with nothing to do but to be on time.
+//! Runs the loop without any motion and measures its timing.
 
 use std::time::Duration;
 
 use takt_rt::{BusHealth, Request, SlotPlan};
 
 use crate::bus::interface_status;
+use crate::bus::ownership::{ClaimError, IfOwned, Ownership};
 use crate::bus::port::{OpenError, Port};
 use crate::config::{Config, ConfigError, Interface, Realtime};
 use crate::controller::assemble::{self, AssembleError};
 use crate::controller::channels::{ChannelSizes, LogSide, channels};
-use crate::controller::quiet;
-use crate::controller::realtime_thread::{self, Begun, StartError, Work};
+use crate::controller::realtime_thread::{self, Begun, LoopParts, StartError};
+use crate::controller::sleep_alignment;
 use crate::telemetry::Statistics;
 
-/// A pause between two looks at the loop; the ring of cycle records holds many times as much.
+/// The pause between two polls of the loop; the ring of cycle records holds many times as much.
 const PAUSE: Duration = Duration::from_millis(5);
 
-/// One axis, since a loop without any cannot be. It is never activated.
+/// One axis, because a loop needs at least one. It is never activated.
 const PASSIVE: &str = r#"
 name = "jitter"
 master = { heartbeat = "off" }
@@ -32,7 +33,7 @@ drive = "erob-canopen"
 limits = { position = [-1, 1], velocity = 1, acceleration = 1, torque = 1 }
 "#;
 
-/// What is measured.
+/// What to measure.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JitterOptions {
     /// The period of the cycle.
@@ -73,7 +74,7 @@ pub enum Pacing {
     SleepThenSpin,
 }
 
-/// What was measured.
+/// The result of a measurement.
 #[derive(Clone, Debug)]
 pub struct Measurement {
     /// How the loop waited.
@@ -94,19 +95,22 @@ pub struct Measurement {
     pub is_whole: bool,
 }
 
-/// Why nothing was measured.
+/// Why there is no measurement.
 #[derive(Debug, thiserror::Error)]
 pub enum JitterError {
-    /// The period is none that a cycle can have.
+    /// The period is outside the range of a cycle.
     #[error("{0}")]
     Config(#[from] ConfigError),
     /// The cycle cannot be set up.
     #[error(transparent)]
     Assemble(#[from] AssembleError),
+    /// The interface may not be commanded by this process.
+    #[error(transparent)]
+    Claim(#[from] ClaimError),
     /// The interface cannot be opened.
     #[error(transparent)]
     Open(#[from] OpenError),
-    /// There is no thread.
+    /// The real-time thread could not be started.
     #[error(transparent)]
     Start(#[from] StartError),
     /// The loop ended by itself, which only a defect of takt can bring about.
@@ -125,13 +129,14 @@ pub fn measure(
     mut watch: impl FnMut(u64) -> bool,
 ) -> Result<Measurement, JitterError> {
     let config = config(options)?;
+    let mut ownership = Ownership::of(&config, IfOwned::Refuse)?;
     let ports = match options.interface {
         Some(_) => vec![Port::open(&config, 0)?],
         None => vec![],
     };
     let has_bus = !ports.is_empty();
     let (rt, mut host, mut log) = channels(&ChannelSizes::of(&config));
-    let work = Work {
+    let work = LoopParts {
         engine: Box::new(assemble::engine(&config)?),
         plan: SlotPlan::usual(config.cycle.period_ns, config.cycle.command_phase_ns),
         ports,
@@ -142,7 +147,7 @@ pub fn measure(
         },
         is_realtime_required: false,
     };
-    // The ring of requests is empty: there is room for this one, and later for that to leave.
+    // The ring of requests is empty: there is room for this request, and later for the one to shut down.
     let _ = host.request(Request::Sync(has_bus));
     let running = realtime_thread::start(realtime_thread::thread_config(&options.realtime), work)?;
     let begun = running.begun();
@@ -150,10 +155,10 @@ pub fn measure(
     while !running.is_finished() {
         collect(&mut log, &mut statistics, options.cycles);
         let done = statistics.cycles + log.records_dropped();
-        if done >= options.cycles || !watch(done) {
+        if done >= options.cycles || !watch(done) || ownership.poll_release_request().is_some() {
             let _ = host.request(Request::Shutdown);
         }
-        quiet::sleep(PAUSE, options.period_ns);
+        sleep_alignment::sleep(PAUSE, options.period_ns);
     }
     let ended = running.join().ok_or(JitterError::Died)?;
     collect(&mut log, &mut statistics, options.cycles);
@@ -170,7 +175,7 @@ pub fn measure(
     })
 }
 
-/// Takes the records that wait, as far as they are asked for; the loop runs a little longer.
+/// Takes the records that are waiting, up to the number asked for. The loop runs a little longer than that.
 fn collect(log: &mut LogSide, statistics: &mut Statistics, cycles: u64) {
     let is_wanted = |statistics: &Statistics| statistics.cycles < cycles;
     while is_wanted(statistics) && log.next_record(|record| statistics.add(record)).is_some() {}

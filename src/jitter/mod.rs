@@ -4,11 +4,11 @@
 //! set-up, around an engine whose only axis stays passive: nothing is commanded. With a bus, SYNC leaves in every
 //! slot, and the bus is read as in a run.
 
-mod drawing;
 mod measurement;
-mod picture;
+mod render;
 mod report;
+mod svg;
 
-pub use drawing::drawing;
 pub use measurement::{JitterError, JitterOptions, Measurement, Pacing, measure};
 pub use report::{JitterReport, PassReport};
+pub use svg::svg;

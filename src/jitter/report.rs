@@ -1,4 +1,4 @@
-//! What was measured, as data: what `takt jitter --json` prints.
+//! The measurements as data: the output of `takt jitter --json`.
 
 use serde::Serialize;
 use takt_rt::BusHealth;
@@ -11,7 +11,7 @@ use crate::telemetry::{LatencyReport, RealtimeReport};
 pub struct JitterReport {
     /// Period of the cycle.
     pub cycle_ns: u64,
-    /// Cycles asked for, of each way of waiting.
+    /// Cycles asked for, for each kind of pacing.
     pub cycles: u64,
     /// Whether all of them are there.
     pub is_whole: bool,
@@ -19,11 +19,11 @@ pub struct JitterReport {
     pub bus: Option<String>,
     /// What the operating system granted.
     pub realtime: RealtimeReport,
-    /// Each way of waiting, in the order in which they were measured.
+    /// One entry for each kind of pacing, in the order of measurement.
     pub passes: Vec<PassReport>,
 }
 
-/// One way of waiting for the slot.
+/// The measurement of one kind of pacing.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PassReport {
     /// `sleep` or `sleep_then_spin`.

@@ -5,9 +5,10 @@
 //! acknowledged. Two stations that send the same identifier at once would destroy each other's frames on a real bus;
 //! here the station with the lower number goes first.
 
-use takt_rt::{Frame, INTERMISSION_BITS, Nanoseconds, WireLength, bits_ns};
+use takt_rt::{Frame, Nanoseconds};
 
 use super::mailbox::{Mailbox, QueueOrder, priority};
+use super::wire_length::{INTERMISSION_BITS, WireLength, bits_ns};
 
 /// The bit rates of a bus in bit/s.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

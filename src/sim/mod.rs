@@ -57,6 +57,7 @@ pub mod plant;
 mod port;
 pub(crate) mod random;
 mod servo;
+mod wire_length;
 pub mod yz_aim;
 
 pub use defect::{Defect, Unsupported};
@@ -65,4 +66,4 @@ pub use live::LiveDrives;
 pub use mailbox::{Mailbox, QueueOrder};
 pub use medium::{FrameOnWire, Medium, WireBitRates};
 pub use port::{InjectDefectError, SimulatedBus, UnknownNode};
-pub use takt_rt::{INTERMISSION_BITS, WireLength, bits_ns};
+pub use wire_length::{INTERMISSION_BITS, WireLength, bits_ns};

@@ -163,6 +163,7 @@ fn axis(number: usize, bus: usize, node: u8) -> Axis {
         feedback: vec![Feedback::Torque],
         mapping: PdoMapping::Written,
         answers_sync: true,
+        target_tolerance: 0.01,
         start_tolerance: 0.02,
         on_violation: Default::default(),
         feedback_delay_ns: 20_000,

@@ -5,6 +5,7 @@ mod world;
 
 mod arrival;
 mod bus_budget;
+mod closed_loops;
 mod configuration_file;
 mod interpolation;
 mod profile_position;

@@ -120,7 +120,7 @@ pub fn play(case: &Case) -> Result<Done, String> {
     let at_most = case.length + (END_AT_MOST_S * 1e9 / config.cycle.period_ns as f64) as u64;
     let (mut enabled, mut cycles) = (None, 0);
     let mut goes_on = true;
-    world.run.neglect_life_cycle(case.hardship.neglect.max(1));
+    world.run.poll_life_cycle_every(case.hardship.neglect.max(1));
     while goes_on {
         let phase = world.snapshot.phase;
         goes_on = world.step(config);

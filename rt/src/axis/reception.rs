@@ -1,7 +1,7 @@
 //! Which feedback has arrived in this cycle of the bus, and how old the last complete feedback is.
 
 use super::FeedbackSince;
-use crate::time::Nanoseconds;
+use crate::time::{NANOSECONDS_PER_SECOND, Nanoseconds};
 
 /// Reports that are further apart than this many cycles of the bus have slots between them that were missed.
 const USUAL_SPAN: f64 = 1.5;
@@ -11,6 +11,8 @@ const USUAL_SPAN: f64 = 1.5;
 pub(super) struct Reception {
     /// What arrived before this is no feedback of the present cycle.
     expected_since_ns: Nanoseconds,
+    /// The same of the cycle of the last complete feedback; 0 before the first one.
+    last_expected_since_ns: Nanoseconds,
     /// Which feedback PDOs have arrived since then, a bit each.
     arrived: u8,
     /// Cycles of the bus since the last complete feedback.
@@ -84,18 +86,31 @@ impl Reception {
             self.age_cycles = self.age_cycles.saturating_add(1);
             return None;
         }
-        let span_s = core::mem::take(&mut self.span_s);
-        // A drive that answers set-points tells where it was in the cycle before. After a gap in the set-points, the gap lies
-        // behind its report and not before it. Such a drive has had the longer time of both, so that it counts as no faster
-        // than it is.
-        let longest_s = match since {
-            FeedbackSince::Sync => span_s,
-            FeedbackSince::SetPoint | FeedbackSince::CommandPhase => span_s.max(self.last_span_s),
-        };
-        self.last_span_s = span_s;
+        let longest_s = self.take_span_s(since);
         self.arrived = 0;
         self.age_cycles = 0;
         Some(ReportSpan { longest_s, is_known: longest_s < USUAL_SPAN * self.cycle_s })
+    }
+
+    /// Seconds in which the joint may have moved since the last complete feedback.
+    fn take_span_s(&mut self, since: FeedbackSince) -> f64 {
+        let slots_s = core::mem::take(&mut self.span_s);
+        let longest_s = slots_s.max(core::mem::replace(&mut self.last_span_s, slots_s));
+        let asked_ns = self.expected_since_ns;
+        let asked_before_ns = core::mem::replace(&mut self.last_expected_since_ns, asked_ns);
+        match since {
+            // A drive reports where it was when it was asked. SYNC that leaves late is not a fast joint.
+            FeedbackSince::Sync | FeedbackSince::SetPoint
+                if asked_before_ns > 0 && asked_ns > asked_before_ns =>
+            {
+                (asked_ns - asked_before_ns) as f64 / NANOSECONDS_PER_SECOND as f64
+            }
+            FeedbackSince::Sync => slots_s,
+            // A drive that answers set-points tells where it was in the cycle before. After a gap in the set-points, the gap lies
+            // behind its report and not before it. Such a drive has had the longer time of both, so that it counts as no faster
+            // than it is.
+            FeedbackSince::SetPoint | FeedbackSince::CommandPhase => longest_s,
+        }
     }
 
     /// Cycles of the bus since the last complete feedback.

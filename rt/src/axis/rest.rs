@@ -1,7 +1,9 @@
 //! Whether the joint of an axis has come to rest, by what its drive reports.
 
 use super::Axis;
+use crate::cia402::DriveState;
 use crate::control::ControlLaw;
+use crate::dialect::Dialect;
 
 impl Axis {
     /// Begins to come to rest: from now on it counts for how long the joint has stood.
@@ -24,6 +26,19 @@ impl Axis {
     /// Whether the joint follows set-points that stand, and is still behind them.
     pub fn is_catching_up(&self) -> bool {
         !self.is_profile() && self.is_obeying() && !self.is_standing()
+    }
+
+    /// Whether the drive must bring its joint to rest by its own quick stop (object 6085) before its power is taken. The
+    /// set-points stand, and the joint still moves: a loop that is closed over the bus makes it swing, and another set-point
+    /// would not help.
+    pub fn must_quick_stop(&self) -> bool {
+        let is_moving = match self.drive_state() {
+            DriveState::OperationEnabled => self.is_obeying(),
+            DriveState::QuickStopActive => self.feedback_age() <= self.parameters.missed_feedback_cycles,
+            _ => false,
+        };
+        let has_quick_stop = self.parameters.dialect == Dialect::Cia402;
+        has_quick_stop && !self.is_profile() && is_moving && !self.joint.is_settled()
     }
 
     /// Whether the drive reports and is enabled, and the joint is near its set-point, as far as a following error is allowed.

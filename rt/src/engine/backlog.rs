@@ -7,33 +7,31 @@ use crate::bus_set::BusSet;
 pub(super) struct Backlog<const BUSES: usize> {
     /// The buses on which own frames of an earlier cycle wait for the wire.
     behind: BusSet,
-    /// For so many cycles in a row, a bus each.
-    cycles: [u32; BUSES],
-    /// Cycles in a row in which any bus was behind or had no room.
-    blocked_cycles: u32,
     /// The interfaces that had no room for a frame since the last cycle.
     not_taken: BusSet,
+    /// Cycles in a row in which a bus was behind, a bus each.
+    behind_cycles: [u32; BUSES],
+    /// Cycles in a row in which a bus was behind or had no room, a bus each.
+    blocked_cycles: [u32; BUSES],
 }
 
 impl<const BUSES: usize> Default for Backlog<BUSES> {
     fn default() -> Self {
-        Self {
-            behind: BusSet::default(),
-            cycles: [0; BUSES],
-            blocked_cycles: 0,
-            not_taken: BusSet::default(),
-        }
+        let (behind, not_taken) = (BusSet::default(), BusSet::default());
+        Self { behind, not_taken, behind_cycles: [0; BUSES], blocked_cycles: [0; BUSES] }
     }
 }
 
 impl<const BUSES: usize> Backlog<BUSES> {
     /// Takes the buses that are behind in this cycle.
     pub(super) fn pass(&mut self, behind: BusSet) {
-        let count = |cycles: u32, goes_on: bool| if goes_on { cycles.saturating_add(1) } else { 0 };
         self.behind = behind;
-        self.blocked_cycles = count(self.blocked_cycles, !(behind.is_empty() && self.not_taken.is_empty()));
-        for (bus, cycles) in self.cycles.iter_mut().enumerate() {
-            *cycles = count(*cycles, behind.contains(bus));
+        let not_taken = core::mem::take(&mut self.not_taken);
+        for (bus, cycles) in self.behind_cycles.iter_mut().enumerate() {
+            *cycles = counted(*cycles, behind.contains(bus));
+        }
+        for (bus, cycles) in self.blocked_cycles.iter_mut().enumerate() {
+            *cycles = counted(*cycles, behind.contains(bus) || not_taken.contains(bus));
         }
     }
 
@@ -52,20 +50,54 @@ impl<const BUSES: usize> Backlog<BUSES> {
         self.behind
     }
 
-    /// Cycles in a row for which a bus has been behind.
-    pub(super) fn cycles_of(&self, bus: usize) -> u32 {
-        self.cycles.get(bus).copied().unwrap_or(0)
+    /// Cycles in a row in which a bus was behind.
+    pub(super) fn behind_cycles(&self, bus: usize) -> u32 {
+        self.behind_cycles.get(bus).copied().unwrap_or(0)
     }
 
-    /// Cycles in a row in which any bus was behind or had no room.
-    pub(super) const fn blocked_cycles(&self) -> u32 {
-        self.blocked_cycles
+    /// The bus that has been behind, or without room, for the longest time, and the cycles in a row.
+    pub(super) fn longest_blocked(&self) -> (usize, u32) {
+        let blocked = self.blocked_cycles.iter().copied().enumerate().rev();
+        blocked.max_by_key(|(_, cycles)| *cycles).unwrap_or_default()
+    }
+}
+
+/// One cycle more, or none.
+const fn counted(cycles: u32, goes_on: bool) -> u32 {
+    if goes_on { cycles.saturating_add(1) } else { 0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn set(bus: usize) -> BusSet {
+        let mut set = BusSet::default();
+        set.insert(bus);
+        set
     }
 
-    /// The bus whose frames have waited longest, or else one that had no room for all of them.
-    pub(super) fn slowest_bus(&self) -> Option<usize> {
-        let waiting = self.cycles.iter().enumerate().rev().max_by_key(|(_, cycles)| **cycles);
-        let behind = waiting.filter(|(_, cycles)| **cycles > 0).map(|(bus, _)| bus);
-        behind.or_else(|| (0..BUSES).find(|bus| self.not_taken.contains(*bus)))
+    #[test]
+    fn buses_that_are_behind_one_after_the_other_are_not_taken_for_one() {
+        let mut backlog: Backlog<3> = Backlog::default();
+        for cycle in 0..30 {
+            backlog.pass(set(cycle % 3));
+            assert!(backlog.longest_blocked().1 <= 1);
+        }
+        (0..4).for_each(|_| backlog.pass(set(1)));
+        assert_eq!((backlog.longest_blocked(), backlog.behind_cycles(1)), ((1, 4), 4));
+    }
+
+    #[test]
+    fn an_interface_without_room_counts_until_it_takes_every_frame() {
+        let mut backlog: Backlog<2> = Backlog::default();
+        for cycles in 1..5 {
+            backlog.note_not_taken(set(0));
+            backlog.pass(BusSet::default());
+            assert_eq!((backlog.longest_blocked(), backlog.behind_cycles(0)), ((0, cycles), 0));
+        }
+        backlog.note_not_taken(BusSet::default());
+        backlog.pass(BusSet::default());
+        assert_eq!(backlog.longest_blocked().1, 0);
     }
 }

@@ -3,7 +3,7 @@
 //! One rule decides, in one place ([`Engine::may_leave`]): after its deadline, or behind a backlog, nothing leaves except what
 //! stops the drives.
 
-use super::state::GroupState;
+use super::state::{GroupState, PowerRemoval};
 use super::{Commands, Deadline, Engine, SendBatch, has_cycle, has_cycle_of};
 use crate::axis::{Axis, FeedbackSince};
 use crate::bus_set::BusSet;
@@ -112,6 +112,10 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
     /// before its joint is at rest with its target there, nor before it watches the controller by the heartbeat.
     fn goal_of(&self, axis: &Axis, bus: usize) -> Goal {
         let goal = self.state.goal();
+        let is_shutting_down = self.state == GroupState::Disabling(PowerRemoval::Shutdown);
+        if is_shutting_down && axis.must_quick_stop() {
+            return Goal::QuickStop;
+        }
         if goal != Goal::Enabled {
             return goal;
         }

@@ -60,19 +60,19 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
 
     /// Whether own frames get onto the wire.
     fn check_transmission(&mut self) {
-        let (cycles, limit) = (self.backlog.blocked_cycles(), self.not_transmitted_cycles);
+        let limit = self.not_transmitted_cycles;
+        let (bus, cycles) = self.backlog.longest_blocked();
         if cycles <= limit {
             return;
         }
         // The drives of such a bus are where the last set-point left them, and get no other before they are disabled. Those on
         // a bus that is behind for a cycle or two, while another one is lost, stop with the rest.
         for axis in &mut self.axes {
-            if self.backlog.cycles_of(axis.parameters().bus.into()) > limit {
+            if self.backlog.behind_cycles(axis.parameters().bus.into()) > limit {
                 axis.latch_off();
             }
         }
-        let origin = self.backlog.slowest_bus().map_or(Origin::Group, |bus| Origin::Bus(bus as u8));
-        self.fail(origin, Fault::NotTransmitted { cycles, limit });
+        self.fail(Origin::Bus(bus as u8), Fault::NotTransmitted { cycles, limit });
     }
 
     fn check_axis(&mut self, index: usize) -> Option<Fault> {

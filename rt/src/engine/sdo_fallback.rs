@@ -26,7 +26,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
             if has_power {
                 axis.note_pdo_reachability();
             }
-            let behind_cycles = self.backlog.cycles_of(axis.parameters().bus.into());
+            let behind_cycles = self.backlog.behind_cycles(axis.parameters().bus.into());
             let is_cut_off = is_always_late || behind_cycles > self.not_transmitted_cycles;
             // Whether such a drive receives its PDOs is not known.
             let is_silent = axis.feedback_age() > axis.parameters().missed_feedback_cycles;

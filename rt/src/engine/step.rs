@@ -45,7 +45,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         let is_every_bus_behind = self.backlog.behind().is_every_of(self.buses.len());
         // A group that stops does not wait for the wire any longer, whatever it stops for.
         let is_over_waiting =
-            self.stop.is_some() && self.backlog.blocked_cycles() > self.not_transmitted_cycles;
+            self.stop.is_some() && self.backlog.longest_blocked().1 > self.not_transmitted_cycles;
         let must_wait = is_every_bus_behind && !is_over_waiting;
         let is_held = self.commands == Commands::Held;
         self.commands = match self.state {

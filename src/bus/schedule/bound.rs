@@ -11,7 +11,7 @@ use super::messages::{BusMessage, MessageKind};
 use super::response_time::{Message, response_time};
 use crate::bus::frame_time::{BitRates, worst_case_bits};
 
-/// The messages that are looked at together, by priority, highest first.
+/// The messages that are analysed together, highest priority first.
 #[derive(Clone, Copy)]
 pub(super) struct Traffic<'a> {
     pub messages: &'a [&'a BusMessage],

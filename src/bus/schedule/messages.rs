@@ -69,14 +69,13 @@ pub(super) struct BusMessage {
     pub period_ns: u64,
     /// How much later than its period it may be queued.
     pub jitter_ns: u64,
-    /// When it must have arrived, after it was queued; `None` where being late does no harm, and where the slot
-    /// decides.
+    /// The deadline after it was queued; `None` where being late does no harm, or where the slot sets the deadline.
     pub deadline_ns: Option<u64>,
-    /// Whether it comes when the drive likes instead of with SYNC.
+    /// Whether the drive sends it on its own events instead of at SYNC.
     pub is_asynchronous: bool,
 }
 
-/// An emergency stops the group; a second one within this time finds nothing left to disturb.
+/// Shortest time between two emergency messages: the first one stops the group, so that a later one disturbs nothing.
 const EMERGENCY_INTERVAL_NS: u64 = 1_000_000_000;
 
 const SDO_BYTES: usize = 8;

@@ -37,7 +37,7 @@ pub use remedy::Remedy;
 pub use response_time::{Message, response_time};
 pub use slot::Slot;
 
-/// What was found out about one bus. Times are in ns.
+/// The result of the analysis of one bus. Times are in ns.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct BusSchedule {
     /// Its name.
@@ -110,7 +110,7 @@ impl EmergencyEffect {
     }
 }
 
-/// What was found out about one message. Times are in ns.
+/// The result of the analysis of one message. Times are in ns.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct MessageSchedule {
     /// What it is.
@@ -306,8 +306,8 @@ fn shortfalls(messages: &[MessageSchedule], slot: &Slot, cycle: Cycle) -> Vec<Sh
     feedback.into_iter().chain(set_points).chain(others).collect()
 }
 
-/// The messages that the response time of one is found among: an emergency is looked at as the only one, and the
-/// others without any. Gives the place of the message there too.
+/// The messages that count for the response time of one message, and the place of that message among them. An emergency
+/// message is analysed as the only one of its kind; all others are analysed without emergency messages.
 fn beside<'a>(all: &[&'a BusMessage], at: usize) -> (Vec<&'a BusMessage>, usize) {
     let counts = |index: usize, message: &BusMessage| index == at || message.kind != MessageKind::Emergency;
     let counted = || all.iter().enumerate().filter(|(index, message)| counts(*index, message));

@@ -1,6 +1,6 @@
-//! What would make a bus fit: each way is tried by analysing the configuration so changed.
+//! Changes that would make a bus fit. Each is tried by analysing the changed configuration.
 //!
-//! Feedback in every second SYNC (`transmission_type = 2`) is not among the ways. A drive counts the SYNCs from when
+//! Feedback in every second SYNC (`transmission_type = 2`) is not among these changes. A drive counts the SYNCs from when
 //! its PDO became valid. Only the counter in SYNC (object 1019) with a start value in each drive (1800:6) would keep
 //! half of the drives to the odd slots and half to the even ones, and an eRob has neither. So all of them may answer
 //! the same SYNC, and the worst slot stays as it is; only the load becomes less.
@@ -10,7 +10,7 @@ use serde::Serialize;
 use super::{BusSchedule, analyse_bus, command_phase};
 use crate::config::{Axis, Config, DriveFamily, Feedback};
 
-/// A change that makes a bus fit, alone.
+/// One change that makes a bus fit without any other.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case", tag = "change")]
 pub enum Remedy {
@@ -28,7 +28,7 @@ pub enum Remedy {
     },
     /// No SDO transfers while the axes are enabled.
     SdoWhileDisabled,
-    /// No heartbeats of the drives: their feedback shows that they live.
+    /// No heartbeats of the drives; their feedback shows that they are alive.
     DriveHeartbeatsOff,
     /// No time of day.
     TimeOff,

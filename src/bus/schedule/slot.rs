@@ -3,7 +3,7 @@
 //! The response-time analysis lets everything be queued at the worst moment. In a slot the moments are known: SYNC at
 //! its start, feedback when the drives have heard SYNC, set-points at the command phase, one after the other from a
 //! queue. What remains unknown is when the background comes: heartbeats, and SDO frames where they are allowed. A
-//! frame on the wire cannot be interrupted, so each of the three can find one of the background in its way.
+//! frame on the wire cannot be interrupted, so each of the three can have to wait for one background frame.
 //!
 //! The controller's own background frames follow its set-points in the same queue. Where the command phase leaves
 //! room for all of them before the next SYNC, that SYNC and the feedback meet background frames of the drives alone;
@@ -103,7 +103,7 @@ fn time(message: &BusMessage, rates: BitRates) -> u64 {
 
 /// What decides when things arrive, depending on whether the controller's queue is empty at SYNC.
 #[derive(Clone, Copy)]
-struct Course {
+struct Timeline {
     before_sync_ns: u64,
     before_feedback_ns: u64,
     /// The command phase at which the feedback is just in time.
@@ -112,7 +112,7 @@ struct Course {
     rest_ns: u64,
 }
 
-impl Course {
+impl Timeline {
     fn phases_ns(self, period_ns: u64) -> Option<(u64, u64)> {
         let latest_ns = period_ns.checked_sub(self.rest_ns)?;
         (self.earliest_ns <= latest_ns).then_some((self.earliest_ns, latest_ns))
@@ -142,7 +142,7 @@ pub(super) fn worst_slot(
     let asynchronous_ns: u64 = asynchronous.iter().sum();
     let wait_before_set_points_ns = background.longest_ns + asynchronous_ns;
 
-    let course = |before_sync_ns: u64, before_feedback_ns: u64, rest_ns: u64| Course {
+    let timeline = |before_sync_ns: u64, before_feedback_ns: u64, rest_ns: u64| Timeline {
         before_sync_ns,
         before_feedback_ns,
         earliest_ns: before_sync_ns + sync_ns + feedback_delay_ns + before_feedback_ns + feedback_ns,
@@ -151,8 +151,8 @@ pub(super) fn worst_slot(
     let set_points_rest_ns = wait_before_set_points_ns + set_points_ns;
     let queue_rest_ns = set_points_ns + asynchronous_ns + background.all_ns;
     let empty_rest_ns = if background.has_ours { queue_rest_ns } else { set_points_rest_ns };
-    let empty_queue = course(background.longest_ns, background.second_ns, empty_rest_ns);
-    let full_queue = course(background.all_ns, 0, set_points_rest_ns);
+    let empty_queue = timeline(background.longest_ns, background.second_ns, empty_rest_ns);
+    let full_queue = timeline(background.all_ns, 0, set_points_rest_ns);
 
     let (period_ns, phase_ns) = (cycle.period_ns, cycle.command_phase_ns);
     // Set-points that are queued before all feedback has arrived leave after it.

@@ -1,4 +1,4 @@
-//! The analysis in words and sums, for people.
+//! The analysis as text: sentences and sums.
 
 use std::fmt::Write;
 
@@ -11,7 +11,7 @@ pub fn microseconds(ns: u64) -> String {
     if ns.is_multiple_of(1000) { format!("{microseconds:.0}") } else { format!("{microseconds:.1}") }
 }
 
-/// What a message is called.
+/// The name of a message.
 pub fn message_name(kind: MessageKind) -> &'static str {
     match kind {
         MessageKind::Sync => "SYNC",
@@ -77,7 +77,7 @@ pub fn sums(bus: &BusSchedule) -> Vec<String> {
     vec![process_data, feedback, set_points]
 }
 
-/// What is left of the slot: for the controller, and for an emergency. Says nothing of a bus that does not fit.
+/// The reserve of the slot, and the effect of an emergency message. Empty for a bus that does not fit.
 pub fn reserve(bus: &BusSchedule) -> Vec<String> {
     if !bus.fits() {
         return vec![];
@@ -149,7 +149,8 @@ pub fn remedy(remedy: &Remedy) -> String {
         }
         Remedy::SdoWhileDisabled => "no SDO transfers while enabled: sdo_while_enabled = false".to_owned(),
         Remedy::DriveHeartbeatsOff => {
-            "no heartbeats of the drives, whose feedback shows that they live: heartbeat = \"off\"".to_owned()
+            "no heartbeats of the drives, whose feedback shows that they are alive: heartbeat = \"off\""
+                .to_owned()
         }
         Remedy::ServiceFrames { frames } => {
             format!("fewer service frames: service_frames_per_cycle = {frames}")
@@ -197,7 +198,7 @@ pub(super) fn refusal(buses: &[BusSchedule]) -> String {
 }
 
 fn write_remedies(text: &mut String, remedies: &[Remedy]) {
-    let lines: Vec<_> = remedies.iter().map(|way| format!("    - {}", remedy(way))).collect();
+    let lines: Vec<_> = remedies.iter().map(|change| format!("    - {}", remedy(change))).collect();
     if lines.is_empty() {
         let _ = writeln!(text, "  no single change that was tried makes it fit");
     } else {

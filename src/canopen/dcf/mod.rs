@@ -17,6 +17,7 @@ pub use concise::{ConciseError, decode as decode_concise, encode as encode_conci
 use super::eds::{self, Findings, ObjectDictionary, Severity};
 use super::object::ObjectAddress;
 use super::sdo::Uploaded;
+use crate::printable::printable_path;
 
 /// One value to write.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -134,7 +135,7 @@ fn findings_words(findings: &Findings) -> String {
 impl DeviceConfiguration {
     /// Loads a DCF or a concise DCF for a node.
     pub fn load(path: &Path, node: u8) -> Result<Self, DcfError> {
-        let name = path.display().to_string();
+        let name = printable_path(path);
         let bytes = crate::text_file::read(path)
             .map_err(|error| DcfError::Unreadable { path: name.clone(), reason: error.to_string() })?;
         // A DCF is not mistaken for a concise DCF: its first bytes, read as a count, exceed any file.

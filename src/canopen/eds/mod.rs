@@ -36,6 +36,7 @@ mod section_name;
 mod text;
 mod value;
 
+use crate::printable::printable_path;
 use std::path::Path;
 
 pub use data_type::{DataTypeCode, ValueKind};
@@ -59,7 +60,7 @@ pub struct Loaded {
 
 /// Reads an EDS or DCF from a file.
 pub fn load(path: &Path) -> Result<Loaded, Findings> {
-    let name = path.display().to_string();
+    let name = printable_path(path);
     match crate::text_file::read(path) {
         Ok(bytes) => parse(&name, &bytes),
         Err(error) => Err(Findings::unreadable(&name, error.to_string())),

@@ -10,10 +10,10 @@ use takt::commission::{Failure, ReadObject, TargetDrive, Task};
 
 use super::super::configuration;
 
-/// Looking at a drive.
+/// Reading from a drive.
 #[derive(Subcommand, Debug)]
 pub enum Action {
-    /// Who the drive is and how it fares
+    /// Show the identity, the state and the errors of the drive
     Info,
     /// Read objects, by index:subindex or by name
     Read(Read),
@@ -71,7 +71,7 @@ impl Action {
         }
     }
 
-    /// What is asked of the drive.
+    /// The task to the drive.
     pub fn task(&self, target: &TargetDrive, is_raw: bool) -> Result<Task, Failure> {
         match self {
             Self::Info => Ok(Task::Info),

@@ -12,8 +12,9 @@ use clap::{Args, Subcommand};
 use takt::commission::{Failure, TargetDrive, Task};
 
 use super::exit::Exit;
+use super::ownership::if_owned;
 
-/// Commission one drive: look at it, move it, set it up
+/// Commission one drive: inspect it, move it, set it up
 ///
 /// The drive is an axis of a configuration (`takt drive CONFIG AXIS …`; the axis may be left out where there is only
 /// one), or a node on an interface (`takt drive --bus can0 --node 1 --family erob-canopen …`), of which no limits are
@@ -26,14 +27,17 @@ pub struct Arguments {
     target: target::Target,
     #[command(flatten)]
     options: Options,
+    /// Have another takt of this host that commands the bus stop in control first, and take the bus over
+    #[arg(long, global = true)]
+    take_over: bool,
     #[command(subcommand)]
     action: Action,
 }
 
-/// What every action knows.
+/// Options of every action.
 #[derive(Args, Clone, Copy, Debug)]
 struct Options {
-    /// Values are whole numbers of the drive's own units
+    /// Values are whole numbers in the drive's own units
     #[arg(long, global = true)]
     raw: bool,
     /// Show every step and every frame with its meaning
@@ -42,7 +46,7 @@ struct Options {
     /// Print the result as one JSON object (watch: one for each reading)
     #[arg(long, global = true)]
     json: bool,
-    /// Let the time of a simulated bus run as fast as it can
+    /// Run the time of a simulated bus as fast as possible
     #[arg(long, global = true)]
     fast: bool,
 }
@@ -76,15 +80,18 @@ impl Action {
     }
 }
 
-/// Does it.
+/// Runs it.
 pub fn run(arguments: &Arguments) -> Exit {
     let (target, bus) = match arguments.target.resolve() {
         Ok(resolved) => resolved,
-        Err(refusal) => return refusal.print(arguments.options.json),
+        Err(error) => return error.print(arguments.options.json),
     };
     let mut output = output::Output::new(&target, arguments.action.name(), arguments.options);
     match arguments.action.task(&target, arguments.options.raw) {
-        Ok(task) => session::run(target, task, bus, arguments.options, output),
+        Ok(task) => {
+            let if_owned = if_owned(arguments.take_over);
+            session::run(target, task, bus, if_owned, arguments.options, output)
+        }
         Err(failure) => output.refuse(&failure),
     }
 }

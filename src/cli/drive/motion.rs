@@ -21,7 +21,7 @@ pub enum Action {
     Move(Move),
     /// Run at a velocity until Ctrl-C
     Velocity(Velocity),
-    /// Apply a torque until Ctrl-C, with an eye on the velocity
+    /// Apply a torque until Ctrl-C; the axis stops when it gets too fast
     Torque(Torque),
     /// Find the home position
     Home(Home),
@@ -41,21 +41,21 @@ pub struct Enable {
 #[command(subcommand_value_name = "absolute|relative|reciprocate|continuous")]
 pub struct Move {
     #[command(subcommand)]
-    kind: CourseArguments,
+    kind: MoveKindArguments,
 }
 
 #[derive(Subcommand, Debug)]
-enum CourseArguments {
+enum MoveKindArguments {
     /// To a position
     Absolute {
         /// "90 deg", "0.2 m"; --raw: counts
         #[arg(allow_hyphen_values = true)]
         position: String,
-        /// Let the drive take the target over at once (controlword bit 5; a YZ-AIM always does)
+        /// Have the drive adopt the target at once (controlword bit 5; a YZ-AIM always does)
         #[arg(long)]
         immediate: bool,
         #[command(flatten)]
-        profile: PaceArguments,
+        profile: MotionProfileArguments,
     },
     /// By a distance
     Relative {
@@ -63,31 +63,31 @@ enum CourseArguments {
         #[arg(allow_hyphen_values = true)]
         distance: String,
         #[command(flatten)]
-        profile: PaceArguments,
+        profile: MotionProfileArguments,
     },
     /// To a position and back
     Reciprocate {
         /// "90 deg", "0.2 m"; --raw: counts
         #[arg(allow_hyphen_values = true)]
         position: String,
-        /// So many times
+        /// The number of repetitions
         #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
         times: u32,
         /// Seconds of standstill at each end
         #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = configuration::seconds)]
         dwell: Option<Duration>,
         #[command(flatten)]
-        profile: PaceArguments,
+        profile: MotionProfileArguments,
     },
-    /// On and on in one direction, until Ctrl-C or a limit
+    /// Without end in one direction, until Ctrl-C or a limit
     Continuous {
-        /// Which way
+        /// The direction
         direction: Direction,
         /// Stop after this many seconds
         #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = configuration::seconds)]
         duration: Option<Duration>,
         #[command(flatten)]
-        profile: PaceArguments,
+        profile: MotionProfileArguments,
     },
 }
 
@@ -97,9 +97,9 @@ enum Direction {
     Backward,
 }
 
-/// How fast. What is not given is a tenth of the axis' limit, or what the drive has where no limits are known.
+/// The motion profile. A value that is not given is a tenth of the axis' limit, or the drive's own where no limits are known.
 #[derive(Args, Debug)]
-struct PaceArguments {
+struct MotionProfileArguments {
     /// Profile velocity: "20 deg/s" [default: a tenth of the axis' limit]
     #[arg(long, value_name = "V", allow_hyphen_values = true)]
     velocity: Option<String>,
@@ -140,7 +140,7 @@ pub struct Torque {
     /// "2.5 Nm"; --raw: per mille of the rated torque
     #[arg(allow_hyphen_values = true)]
     torque: String,
-    /// Faster than this the axis is stopped: "10 deg/s" [default: a quarter of the axis' limit]
+    /// The axis is stopped above this velocity: "10 deg/s" [default: a quarter of the axis' limit]
     #[arg(long, value_name = "V", allow_hyphen_values = true)]
     max_velocity: Option<String>,
     /// End after this many seconds
@@ -174,7 +174,7 @@ impl Action {
         }
     }
 
-    /// What is asked of the drive.
+    /// The task to the drive.
     pub fn task(&self, target: &TargetDrive, is_raw: bool) -> Result<Task, Failure> {
         let read = |text: &str, quantity| read(text, quantity, is_raw);
         Ok(match self {
@@ -207,7 +207,7 @@ impl Action {
     }
 }
 
-impl CourseArguments {
+impl MoveKindArguments {
     fn task(&self, target: &TargetDrive, is_raw: bool) -> Result<Task, Failure> {
         let position = target.position_quantity();
         let (kind, profile) = match self {

@@ -1,4 +1,4 @@
-//! What is shown while a procedure runs, and in the end.
+//! The output of a procedure: progress, frames, and the result.
 
 use std::io::{IsTerminal, stderr};
 
@@ -14,7 +14,7 @@ use super::super::exit::Exit;
 use super::super::print;
 use super::Options;
 
-/// Where everything that is to be shown goes.
+/// Shows a procedure and its result.
 pub struct Output {
     target: TargetDrive,
     action: &'static str,
@@ -22,7 +22,7 @@ pub struct Output {
     line: ProgressBar,
     step: &'static str,
     notes: Vec<String>,
-    /// Set when readings cannot be shown any more: how it ends then.
+    /// The exit code if readings can no longer be printed.
     unshown: Option<Exit>,
 }
 
@@ -58,7 +58,7 @@ impl Output {
         Self { target: target.clone(), action, options, line, step: "", notes: vec![], unshown: None }
     }
 
-    /// Shows something that has just happened. Returns whether there is still somebody to show readings to.
+    /// Shows what has just happened. Returns whether readings can still be printed.
     pub fn see(&mut self, at_ns: Nanoseconds, seen: SessionEvent) -> bool {
         match seen {
             SessionEvent::Procedure(ProcedureEvent::Step(name)) => {
@@ -76,7 +76,7 @@ impl Output {
         self.unshown.is_none()
     }
 
-    /// Says something that people should know.
+    /// Prints a note.
     pub fn hint(&mut self, text: &str) {
         self.notes.push(text.to_owned());
         if !self.options.json {
@@ -132,12 +132,12 @@ impl Output {
         format!("{words}  0x{:04X} {}", reading.statusword, reading.state)
     }
 
-    /// Nothing was begun.
+    /// Reports that the procedure was not begun.
     pub fn refuse(&mut self, failure: &Failure) -> Exit {
         self.finish(&Err(ProcedureError { step: "command line", failure: failure.clone() }))
     }
 
-    /// Shows how it has ended.
+    /// Shows the result.
     pub fn finish(&mut self, outcome: &Result<Report, ProcedureError>) -> Exit {
         self.line.finish_and_clear();
         let (ended, exit) = match outcome {
@@ -152,7 +152,7 @@ impl Output {
             return self.finish_json(outcome, ended, exit);
         }
         match outcome {
-            Ok(report) => print::text(&picture(report), exit),
+            Ok(report) => print::text(&render(report), exit),
             Err(failed) => {
                 self.say_failed(failed);
                 exit
@@ -187,7 +187,7 @@ impl Output {
             Failure::Interrupted if self.action == "watch" => {}
             Failure::Interrupted => say!("takt: {name}: interrupted in `{}`", failed.step),
             failure => {
-                // What is refused before the first word with the drive has no step.
+                // A request that is refused before the first frame has no step.
                 let step = if failure.is_refusal() { String::new() } else { format!(", {}", failed.step) };
                 say!("takt: {name}{step}: {failure}");
                 if let Some(advice) = failure.advice() {
@@ -202,7 +202,7 @@ fn seconds(at_ns: Nanoseconds) -> String {
     format!("{:11.6}", at_ns as f64 / 1e9)
 }
 
-fn picture(report: &Report) -> String {
+fn render(report: &Report) -> String {
     let findings = report.items();
     let width = findings.iter().map(|finding| finding.label.chars().count()).max().unwrap_or(0);
     let lines = findings.iter().map(|finding| format!("  {:<width$}  {}\n", finding.label, finding.text));

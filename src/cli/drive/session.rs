@@ -1,7 +1,9 @@
-//! Opens the bus, carries the procedure out, and shows what happens.
+//! Opens the bus, runs the procedure, and shows what happens.
 
+use std::cell::Cell;
 use std::sync::atomic::Ordering;
 
+use takt::bus::ownership::{BusClaim, IfOwned, MasterTraffic, Ownership};
 use takt::bus::port::{OpenError, Port, open_configured};
 use takt::bus::{InterfaceSettings, SocketCanOptions, open_socketcan, prepare_interface};
 use takt::commission::{Failure, TargetDrive, Task, bus_session, procedure};
@@ -12,19 +14,33 @@ use takt_rt::{BusPort, BusState};
 
 use super::super::exit::Exit;
 use super::super::interruption;
-use super::super::refusal::Refusal;
+use super::super::ownership;
+use super::super::usage_error::UsageError;
 use super::Options;
 use super::output::Output;
 use super::target::Bus;
 
-/// How soon a controller that has gone off the bus comes back.
+/// The time in milliseconds after which the kernel restarts a controller that is bus-off.
 const RESTART_MS: u32 = 100;
 
-/// Does what is asked for.
-pub fn run(target: TargetDrive, task: Task, bus: Bus, options: Options, mut output: Output) -> Exit {
+/// Runs a task on a drive.
+pub fn run(
+    target: TargetDrive,
+    task: Task,
+    bus: Bus,
+    if_owned: IfOwned,
+    options: Options,
+    mut output: Output,
+) -> Exit {
+    // Reading needs it, too: a drive has room for the SDO requests of one master, and a silent one is sent an NMT command.
+    let claim = claim(&bus, target.node);
+    let mut ownership = match Ownership::claim(claim.into_iter().collect(), if_owned) {
+        Ok(ownership) => ownership,
+        Err(error) => return ownership::usage_error(&error).print(options.json),
+    };
     let mut port = match open(&bus) {
         Ok(port) => port,
-        Err(error) => return Refusal::from(error.to_string()).print(options.json),
+        Err(error) => return UsageError::from(error.to_string()).print(options.json),
     };
     let interrupted = match interruption::watch() {
         Ok(interrupted) => interrupted,
@@ -35,8 +51,13 @@ pub fn run(target: TargetDrive, task: Task, bus: Bus, options: Options, mut outp
     };
     let is_simulated = matches!(port, Port::Simulated(_));
     let procedure = procedure(target, task);
-    let is_interrupted = || interrupted.swap(false, Ordering::Relaxed);
-    // What nobody reads any more ends as on Ctrl-C.
+    let taken_over_by = Cell::new(None);
+    let is_interrupted = || {
+        let asking = ownership.poll_release_request();
+        taken_over_by.set(asking.or(taken_over_by.get()));
+        interrupted.swap(false, Ordering::Relaxed) || asking.is_some()
+    };
+    // When the readings can no longer be printed, the procedure ends as after Ctrl-C.
     let see = |at_ns, seen| {
         let is_shown = output.see(at_ns, seen);
         interrupted.fetch_or(!is_shown, Ordering::Relaxed);
@@ -47,23 +68,42 @@ pub fn run(target: TargetDrive, task: Task, bus: Bus, options: Options, mut outp
     } else {
         bus_session::run(procedure, &mut port, &mut MonotonicClock::default(), is_interrupted, see)
     };
+    if let Some(process) = taken_over_by.get() {
+        output.hint(&format!("{process} takes the bus over"));
+    }
     let is_silent = matches!(&outcome, Err(failed) if matches!(failed.failure, Failure::Silent { .. }));
-    if is_silent && is_deaf(&mut port) {
+    if is_silent && is_unacknowledged(&mut port) {
         output.hint(
-            "nobody acknowledges a frame on this bus: is it plugged in and terminated, is the drives' power on, is the \
+            "no node on this bus acknowledges a frame: is it plugged in and terminated, is the drives' power on, is the \
              bit rate right?",
         );
     }
     output.finish(&outcome)
 }
 
-/// Whether nothing that was sent has been acknowledged by anybody.
-fn is_deaf(port: &mut Port) -> bool {
+/// Whether no frame that was sent has been acknowledged.
+fn is_unacknowledged(port: &mut Port) -> bool {
     let health = port.health();
     health.tx_frames == 0 || health.state != BusState::ErrorActive
 }
 
-/// Everything on the bus is heard: a scan wants to know who is there.
+fn claim(bus: &Bus, node: u8) -> Option<BusClaim> {
+    match bus {
+        Bus::Configured { config, bus } => BusClaim::of(config, *bus),
+        Bus::Interface { name, bit_rate } => Some(BusClaim {
+            bus: name.clone(),
+            interface: name.clone(),
+            settings: settings(*bit_rate),
+            traffic: MasterTraffic::without_configuration(Some(node)),
+        }),
+    }
+}
+
+const fn settings(bit_rate: u32) -> InterfaceSettings {
+    InterfaceSettings { bit_rate, data_bit_rate: None, restart_ms: RESTART_MS }
+}
+
+/// Opens the port without filters: a scan has to see all nodes.
 fn open(bus: &Bus) -> Result<Port, OpenError> {
     match bus {
         Bus::Configured { config, bus } => {
@@ -78,9 +118,7 @@ fn open(bus: &Bus) -> Result<Port, OpenError> {
             })
         }
         Bus::Interface { name, bit_rate } => {
-            let settings =
-                InterfaceSettings { bit_rate: *bit_rate, data_bit_rate: None, restart_ms: RESTART_MS };
-            prepare_interface(name, &settings)
+            prepare_interface(name, &settings(*bit_rate))
                 .map_err(|error| OpenError::Interface { bus: name.clone(), error })?;
             let port = open_socketcan(name, &of_bit_rate(Some(*bit_rate)))
                 .map_err(|error| OpenError::Socket { bus: name.clone(), error })?;

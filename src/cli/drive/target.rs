@@ -1,4 +1,4 @@
-//! Which drive: an axis of a configuration, or a node on an interface.
+//! The drive that is addressed: an axis of a configuration, or a node on an interface.
 
 use std::path::{Path, PathBuf};
 
@@ -8,19 +8,19 @@ use takt::commission::{Family, TargetDrive};
 use takt::config::{Config, Interface, Quantity};
 
 use super::super::configuration;
-use super::super::refusal::Refusal;
+use super::super::usage_error::UsageError;
 
 /// The drive.
 #[derive(Args, Debug)]
 pub struct Target {
     /// The configuration (TOML)
     config: Option<PathBuf>,
-    /// The axis, by its name; may be left out where there is only one
+    /// The name of the axis; may be left out if there is only one
     axis: Option<String>,
     /// The interface: can0, vcan0 …; with a configuration also NAME=INTERFACE or sim
     #[arg(long, value_name = "INTERFACE", global = true)]
     bus: Option<String>,
-    /// The node number
+    /// The node ID
     #[arg(long, value_name = "N", global = true, value_parser = clap::value_parser!(u8).range(1..=127))]
     node: Option<u8>,
     /// The family: erob-canopen, yz-aim
@@ -36,7 +36,7 @@ fn bit_rate(text: &str) -> Result<u32, String> {
     rate.map(|rate| rate as u32).ok_or_else(|| "write it as \"500 kbit/s\", at most 1 Mbit/s".to_owned())
 }
 
-/// Where the drive's bus is.
+/// The bus of the drive.
 pub enum Bus {
     /// A bus of a configuration.
     Configured {
@@ -64,7 +64,7 @@ fn family(text: &str) -> Result<Family, String> {
 
 impl Target {
     /// The drive and its bus.
-    pub fn resolve(&self) -> Result<(TargetDrive, Bus), Refusal> {
+    pub fn resolve(&self) -> Result<(TargetDrive, Bus), UsageError> {
         let (target, bus) = match &self.config {
             Some(config) => self.of_configuration(config)?,
             None => self.of_interface()?,
@@ -72,7 +72,7 @@ impl Target {
         Ok((target, bus))
     }
 
-    fn of_interface(&self) -> Result<(TargetDrive, Bus), Refusal> {
+    fn of_interface(&self) -> Result<(TargetDrive, Bus), UsageError> {
         let (Some(bus), Some(node), Some(family)) = (&self.bus, self.node, self.family) else {
             return Err(
                 "name the drive: CONFIG AXIS, or --bus INTERFACE --node N --family FAMILY (all three)".into(),
@@ -93,7 +93,7 @@ impl Target {
         }
     }
 
-    fn of_configuration(&self, path: &Path) -> Result<(TargetDrive, Bus), Refusal> {
+    fn of_configuration(&self, path: &Path) -> Result<(TargetDrive, Bus), UsageError> {
         let mut config = configuration::load(path, &[])?;
         let known: Vec<&str> = config.axes.iter().map(|axis| axis.name.as_str()).collect();
         let index = match (&self.axis, known.as_slice()) {
@@ -119,7 +119,7 @@ impl Target {
             let (name, configured, other) = (&axis.name, target.family.word(), family.word());
             return Err(format!("the axis {name} is configured as {configured}, not {other}").into());
         }
-        // A drive that still has its factory's number is reached under that one.
+        // A drive that still has the factory's node ID is addressed by that ID.
         target.node = self.node.unwrap_or(target.node);
         Ok((target, Bus::Configured { config: Box::new(config), bus: axis.bus }))
     }

@@ -12,9 +12,9 @@ pub enum Action {
     Zero(Agreement),
     /// Store the parameters in the drive
     Save,
-    /// Give the drive another node number
+    /// Give the drive another node ID
     SetId {
-        /// The new node number
+        /// The new node ID
         #[arg(value_parser = clap::value_parser!(u8).range(1..=127))]
         id: u8,
     },
@@ -47,7 +47,7 @@ pub enum Action {
 
 #[derive(Args, Clone, Copy, Debug)]
 pub struct Agreement {
-    /// Agree to what cannot be undone
+    /// Confirm a change that cannot be undone
     #[arg(long)]
     yes: bool,
 }
@@ -111,7 +111,7 @@ impl Action {
         }
     }
 
-    /// What is asked of the drive.
+    /// The task to the drive.
     pub fn task(&self, is_raw: bool) -> Result<Task, Failure> {
         Ok(match self {
             Self::Zero(agreement) => Task::Zero { is_confirmed: agreement.yes },

@@ -1,30 +1,30 @@
-//! A dictionary for people.
+//! A dictionary as text.
 
 use std::fmt::Write as _;
 
-use super::picture::{EntryPicture, ObjectPicture, PdoPicture, Picture, ValuePicture};
+use super::view::{EntryView, ObjectView, PdoView, ValueView, View};
 use crate::cli::table::Table;
 
-/// All of it.
-pub fn whole(picture: &Picture) -> String {
-    let mut text = heading(picture);
-    let _ = write!(text, "\nObjects\n{}", objects(&picture.objects));
-    if !picture.pdos.is_empty() {
-        let _ = write!(text, "\nPDOs{}\n{}", for_node(picture.node), pdos(&picture.pdos));
+/// The whole text.
+pub fn whole(view: &View) -> String {
+    let mut text = heading(view);
+    let _ = write!(text, "\nObjects\n{}", objects(&view.objects));
+    if !view.pdos.is_empty() {
+        let _ = write!(text, "\nPDOs{}\n{}", for_node(view.node), pdos(&view.pdos));
     }
-    if !picture.comments.is_empty() {
+    if !view.comments.is_empty() {
         text.push_str("\nComments\n");
-        for line in &picture.comments {
+        for line in &view.comments {
             let _ = writeln!(text, "  {line}");
         }
     }
-    let entries: usize = picture.objects.iter().map(|object| object.entries.len()).sum();
-    let warnings = match picture.warnings.len() {
+    let entries: usize = view.objects.iter().map(|object| object.entries.len()).sum();
+    let warnings = match view.warnings.len() {
         0 => String::new(),
         1 => ", 1 warning".to_owned(),
         count => format!(", {count} warnings"),
     };
-    let _ = writeln!(text, "\n{} objects, {entries} entries{warnings}", picture.objects.len());
+    let _ = writeln!(text, "\n{} objects, {entries} entries{warnings}", view.objects.len());
     text
 }
 
@@ -32,8 +32,8 @@ fn for_node(node: Option<u8>) -> String {
     node.map_or(" ($NODEID is not known: --node N says it)".to_owned(), |node| format!(" of node {node}"))
 }
 
-fn heading(picture: &Picture) -> String {
-    let (device, identity, file) = (&picture.device, &picture.identity, &picture.file);
+fn heading(view: &View) -> String {
+    let (device, identity, file) = (&view.device, &view.identity, &view.file);
     let word = |text: &Option<String>| text.clone().unwrap_or_else(|| "?".to_owned());
     let pattern = |number: Option<u32>| number.map_or("?".to_owned(), |number| format!("0x{number:08X}"));
     let mut text = format!("{}: {}\n", word(&device.vendor_name), word(&device.product_name));
@@ -58,16 +58,16 @@ fn heading(picture: &Picture) -> String {
     };
     let _ = writeln!(text, "  PDO mapping {mapping}, {}LSS", if device.has_lss { "" } else { "no " });
     if file.is_configuration {
-        let name = picture.node_name.as_ref().map(|name| format!(" ({name})")).unwrap_or_default();
-        let node = picture.node.map_or("any node".to_owned(), |node| format!("node {node}"));
+        let name = view.node_name.as_ref().map(|name| format!(" ({name})")).unwrap_or_default();
+        let node = view.node.map_or("any node".to_owned(), |node| format!("node {node}"));
         let _ = writeln!(text, "  a configuration for {node}{name}");
     }
     text
 }
 
-fn objects(objects: &[ObjectPicture]) -> String {
+fn objects(objects: &[ObjectView]) -> String {
     let mut table = Table::new(["object", "name", "type", "access", "PDO", ">value", ">low", ">high"]);
-    let show = |value: &Option<ValuePicture>, entry: &EntryPicture| {
+    let show = |value: &Option<ValueView>, entry: &EntryView| {
         value.as_ref().map(|value| value.show(entry.is_pattern)).unwrap_or_default()
     };
     for object in objects {
@@ -113,7 +113,7 @@ fn objects(objects: &[ObjectPicture]) -> String {
     format!("{table}{note}")
 }
 
-fn pdos(pdos: &[PdoPicture]) -> String {
+fn pdos(pdos: &[PdoView]) -> String {
     let mut table = Table::new(["PDO", "id", ">type", ">bytes", "carries"]);
     for pdo in pdos {
         let id = match pdo.id {

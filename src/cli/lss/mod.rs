@@ -1,4 +1,4 @@
-//! `takt lss`: node numbers and bit rates for devices that are set up by their identity.
+//! `takt lss`: node IDs and bit rates for devices that are set up by their identity.
 
 mod output;
 
@@ -7,7 +7,8 @@ use std::sync::atomic::Ordering;
 
 use clap::{Args, Subcommand};
 
-use takt::bus::{InterfaceSettings, SocketCanOptions, open_socketcan, prepare_interface};
+use takt::bus::ownership::{BusClaim, IfOwned, MasterTraffic, Ownership};
+use takt::bus::{InterfaceSettings, SocketCanOptions, open_socketcan};
 use takt::canopen::lss::{BitTiming, Inquiry, LssAddress, LssOutcome, LssTask};
 use takt::commission::layer_settings::{DeviceSelection, LayerSettingFailure, LayerSettings};
 use takt::config::{Interface, Quantity};
@@ -18,20 +19,20 @@ use takt_rt::{BusPort, Clock};
 
 use super::exit::Exit;
 use super::interruption;
-use super::refusal::Refusal;
+use super::usage_error::UsageError;
 use output::{Device, Output, Report};
 
-/// How soon a controller that has gone off the bus comes back.
+/// The time in milliseconds after which the kernel restarts a controller that is bus-off.
 const RESTART_MS: u32 = 100;
-/// More devices than node numbers cannot be there.
+/// A bus cannot have more devices than there are node IDs.
 const MOST_DEVICES: usize = 127;
-/// A node number that says that there is none.
+/// The node ID of a device that is not configured (CiA 305).
 const NO_NODE: u8 = 255;
 
-/// Give devices their node number and bit rate by their identity (LSS, CiA 305)
+/// Give devices their node ID and bit rate by their identity (LSS, CiA 305)
 ///
 /// The device is the one with the identity after --device, or the only one on the bus (--only), or else one without a
-/// node number, which a scan finds. What is set is forgotten at power-down unless --store is given. Neither eRob nor
+/// node ID, which a scan finds. What is set is forgotten at power-down unless --store is given. Neither eRob nor
 /// YZ-AIM has LSS: theirs are `takt drive … set-id` and `set-bitrate`.
 #[derive(Args, Debug)]
 #[command(subcommand_value_name = "ACTION", subcommand_help_heading = "Actions")]
@@ -48,7 +49,7 @@ pub struct Arguments {
     /// The only device on the bus, whatever it is
     #[arg(long, global = true, conflicts_with = "device")]
     only: bool,
-    /// A device on a simulated bus: IDENTITY, or IDENTITY@NODE where it has a node number already
+    /// A device on a simulated bus: IDENTITY, or IDENTITY@NODE where it has a node ID already
     #[arg(long, value_name = "DEVICE", global = true)]
     simulate: Vec<SimulatedDevice>,
     /// Show every frame
@@ -63,13 +64,13 @@ pub struct Arguments {
 
 #[derive(Subcommand, Clone, Copy, Debug)]
 enum Action {
-    /// List the devices that have no node number
+    /// List the devices that have no node ID
     Scan,
-    /// Tell the identity and the node number of the device
+    /// Show the identity and the node ID of the device
     Inquire,
-    /// Give the device a node number
+    /// Give the device a node ID
     SetId {
-        /// The node number; or none, to take it away
+        /// The node ID; or none, to take it away
         #[arg(value_parser = node)]
         id: u8,
         /// Keep it over power-down
@@ -82,14 +83,14 @@ enum Action {
         /// "500 kbit/s"; one of 10, 20, 50, 125, 250, 500, 800 kbit/s and 1 Mbit/s
         #[arg(value_parser = timing)]
         rate: BitTiming,
-        /// Change to it now: everybody is silent for this many milliseconds before it and as many after it
+        /// Change to it now: all devices are silent for this many milliseconds before and after the change
         #[arg(long, value_name = "MS")]
         activate: Option<u16>,
         /// Keep it over power-down
         #[arg(long)]
         store: bool,
     },
-    /// Have the device keep its node number and bit rate over power-down
+    /// Have the device keep its node ID and bit rate over power-down
     Store,
     /// End configuration on every device, as after a change of the bit rate
     Wait,
@@ -120,7 +121,7 @@ fn timing(text: &str) -> Result<BitTiming, String> {
 }
 
 fn node(text: &str) -> Result<u8, String> {
-    let wrong = || "a node number is 1 to 127, or none".to_owned();
+    let wrong = || "a node ID is 1 to 127, or none".to_owned();
     if text == "none" {
         return Ok(NO_NODE);
     }
@@ -157,7 +158,7 @@ impl FromStr for SimulatedDevice {
     }
 }
 
-/// Does it.
+/// Runs it.
 pub fn run(arguments: &Arguments) -> Exit {
     let interrupted = match interruption::watch() {
         Ok(interrupted) => interrupted,
@@ -167,10 +168,10 @@ pub fn run(arguments: &Arguments) -> Exit {
         }
     };
     let is_interrupted = || interrupted.load(Ordering::Relaxed);
-    let refuse = |words: String| Refusal::from(words).print(arguments.json);
+    let refuse = |words: String| UsageError::from(words).print(arguments.json);
     match &arguments.bus {
         Interface::Simulated if arguments.simulate.is_empty() => {
-            refuse("nobody is on a simulated bus: add --simulate IDENTITY".to_owned())
+            refuse("a simulated bus has no devices of its own: add --simulate IDENTITY".to_owned())
         }
         Interface::Simulated => {
             let devices = arguments.simulate.iter();
@@ -183,9 +184,21 @@ pub fn run(arguments: &Arguments) -> Exit {
         Interface::SocketCan(name) => {
             let bit_rate = arguments.bit_rate;
             let settings = InterfaceSettings { bit_rate, data_bit_rate: None, restart_ms: RESTART_MS };
-            if let Err(error) = prepare_interface(name, &settings) {
-                return refuse(format!("bus {name}: {error}"));
-            }
+            let claim = BusClaim {
+                bus: name.clone(),
+                interface: name.clone(),
+                settings,
+                traffic: MasterTraffic::without_configuration(None),
+            };
+            let mut ownership = match Ownership::claim(vec![claim], IfOwned::Refuse) {
+                Ok(ownership) => ownership,
+                Err(error) => return refuse(error.to_string()),
+            };
+            let mut is_taken_over = false;
+            let is_interrupted = || {
+                is_taken_over |= ownership.poll_release_request().is_some();
+                is_taken_over || is_interrupted()
+            };
             match open_socketcan(name, &SocketCanOptions { bit_rate, ..SocketCanOptions::default() }) {
                 Ok(mut port) => lead(arguments, &mut port, &mut MonotonicClock::default(), is_interrupted),
                 Err(error) => refuse(format!("bus {name}: {error}")),
@@ -221,10 +234,10 @@ fn carry_out<P: BusPort, C: Clock>(
     let mut is_boot_up_awaited = false;
     let outcome = act(arguments, settings, report, &mut is_boot_up_awaited);
     if report.is_activated {
-        // A word at the old bit rate would only disturb the new one.
+        // A frame at the old bit rate would only disturb the devices at the new one.
         return outcome;
     }
-    // Whatever has happened, nobody is left in configuration.
+    // In every case, no device is left in the LSS state configuration.
     let released = settings.release(is_boot_up_awaited && outcome.is_ok());
     outcome?;
     report.booted_node = released?;
@@ -271,7 +284,7 @@ fn act<P: BusPort, C: Clock>(
             let before = node_of(settings)?;
             settings.perform(LssTask::ConfigureNode(id))?;
             report.node = (id != NO_NODE).then_some(id);
-            // One that had a node number before keeps it until it is reset.
+            // A device that had a node ID before keeps it until it is reset.
             *is_boot_up_awaited = before.is_none() && report.node.is_some();
             report.is_reset_needed = before.is_some();
             is_stored = store;

@@ -1,4 +1,4 @@
-//! What is shown of layer setting services.
+//! The output of `takt lss`.
 
 use serde::Serialize;
 
@@ -32,7 +32,7 @@ impl Device {
     }
 }
 
-/// What has come of it.
+/// The result.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Report {
     /// The devices that a scan has found.
@@ -41,7 +41,7 @@ pub struct Report {
     /// The device that was meant, where it is known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub device: Option<Device>,
-    /// The node number that it has or was given.
+    /// The node ID that it has or was given.
     pub node: Option<u8>,
     /// The bit rate that it was given, in bit/s.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -50,14 +50,14 @@ pub struct Report {
     pub is_stored: bool,
     /// Whether it was told to change to the bit rate.
     pub is_activated: bool,
-    /// Whether it goes by its old node number until it is reset.
+    /// Whether it keeps its old node ID until it is reset.
     pub is_reset_needed: bool,
-    /// The node number with which a device has booted.
+    /// The node ID with which a device has booted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub booted_node: Option<u8>,
 }
 
-/// Where it is shown.
+/// Shows the result.
 pub struct Output {
     pub action: &'static str,
     pub is_json: bool,
@@ -73,7 +73,7 @@ struct Printed<'a> {
     result: &'a Report,
 }
 
-/// Shows a frame with what it says to LSS.
+/// Shows a frame with its meaning in LSS.
 pub fn show(at_ns: Nanoseconds, seen: &SessionEvent) {
     let (direction, frame, words) = match seen {
         SessionEvent::Sent(frame) => {
@@ -91,8 +91,8 @@ pub fn show(at_ns: Nanoseconds, seen: &SessionEvent) {
 fn advice(failure: LayerSettingFailure) -> Option<&'static str> {
     match failure {
         LayerSettingFailure::NoDevice => Some(
-            "look at its supply, the wiring and the bit rate; a device that has a node number is named by --device or \
-             --only; a device without LSS cannot be found so",
+            "check its supply, the wiring and the bit rate; a device that has a node ID is named by --device or \
+             --only; a device without LSS cannot be found in this way",
         ),
         LayerSettingFailure::Task(LssError::NoReply { .. }) => {
             Some("check the identity, the wiring and the bit rate; the device may not have this service")
@@ -106,7 +106,7 @@ fn advice(failure: LayerSettingFailure) -> Option<&'static str> {
 }
 
 impl Output {
-    /// Shows how it has ended.
+    /// Shows the result.
     pub fn finish(&self, report: &Report, outcome: Result<(), LayerSettingFailure>) -> Exit {
         let failure = outcome.err();
         let (ended, exit) = match failure {
@@ -138,22 +138,22 @@ impl Output {
 fn text(report: &Report) -> String {
     let mut lines = vec![];
     if let Some(devices) = &report.devices {
-        lines.extend(devices.iter().map(|device| format!("without a node number  {}", device.words())));
+        lines.extend(devices.iter().map(|device| format!("without a node ID  {}", device.words())));
         lines.push(match devices.len() {
-            0 => "no device without a node number".to_owned(),
+            0 => "no device without a node ID".to_owned(),
             1 => "1 device".to_owned(),
             count => format!("{count} devices"),
         });
     }
     lines.extend(report.device.map(|device| format!("device       {}", device.words())));
-    lines.extend(report.node.map(|node| format!("node number  {node}")));
+    lines.extend(report.node.map(|node| format!("node ID      {node}")));
     lines.extend(report.bit_rate.map(|rate| format!("bit rate     {} kbit/s", rate / 1000)));
     lines.extend(report.booted_node.map(|node| format!("booted       as node {node}")));
     if report.is_stored {
         lines.push("stored       yes".to_owned());
     }
     if report.is_reset_needed {
-        lines.push("note: the device goes by its old number until it is reset".to_owned());
+        lines.push("note: the device keeps its old node ID until it is reset".to_owned());
     }
     if report.is_activated {
         lines.push(

@@ -1,4 +1,4 @@
-//! An answer as it is written in a line.
+//! An answer, as it is written to a line of JSON.
 
 use serde::Serialize;
 use takt_rt::plan::{Extrema, Limit, PlanError, Profile, Quantity};
@@ -32,7 +32,7 @@ struct Trajectory {
 }
 
 impl Answer {
-    /// There is a trajectory.
+    /// A trajectory was found.
     pub fn planned(id: serde_json::Value, duration_s: f64, profiles: &[Profile]) -> Self {
         let times: Vec<f64> =
             (0..SAMPLES).map(|k| duration_s * f64::from(k) / f64::from(SAMPLES - 1)).collect();
@@ -54,7 +54,7 @@ impl Answer {
         Self { id, result: "ok".into(), message: None, trajectory: Some(trajectory) }
     }
 
-    /// There is none.
+    /// The problem has no solution.
     pub fn refused(id: serde_json::Value, error: PlanError) -> Self {
         let (name, message) = words(error);
         Self { id, result: name.into(), message: Some(message), trajectory: None }
@@ -113,7 +113,7 @@ const fn limit_key(limit: Limit) -> &'static str {
     }
 }
 
-/// What a limit must be.
+/// The condition that a limit has to meet.
 const fn requirement(limit: Limit) -> &'static str {
     match limit {
         Limit::PositionMax | Limit::PositionMin => "`pmin` must be below `pmax`",

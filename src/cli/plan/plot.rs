@@ -1,4 +1,4 @@
-//! A trajectory as a picture: four panels, one colour an axis, limits dashed.
+//! A trajectory as SVG: four panels, one colour for each axis, limits as dashed lines.
 
 use takt_rt::plan::{Limits, Problem, Profile};
 
@@ -37,7 +37,7 @@ fn jerk(profile: &Profile, time_s: f64) -> f64 {
     profile.phases().find(|phase| inside(phase.start_s, phase.duration_s)).map_or(0.0, |phase| phase.jerk)
 }
 
-/// The picture as SVG.
+/// The trajectory as SVG.
 pub fn draw(problems: &[Problem], profiles: &[Profile]) -> String {
     let duration_s = profiles.iter().map(Profile::duration_s).fold(0.0, f64::max);
     let mut panels: Vec<Panel> =

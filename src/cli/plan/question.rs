@@ -1,4 +1,4 @@
-//! A problem as it is written in a line.
+//! A problem, as it is read from a line of JSON.
 
 use serde::Deserialize;
 use serde::de::IgnoredAny;
@@ -10,8 +10,8 @@ use super::answer::Answer;
 
 /// The problem, one number an axis in every list. What is left out is zero, or unlimited for a position or a jerk.
 ///
-/// Files of problems with known answers have `family` and the answer in the same line: these keys are allowed, and are not
-/// looked at.
+/// Files of problems with known answers have `family` and the answer in the same line: these keys are allowed and
+/// ignored.
 #[derive(Deserialize, Debug)]
 #[serde(
     deny_unknown_fields,
@@ -50,7 +50,7 @@ pub struct Question {
     pmin: Vec<Option<f64>>,
     #[serde(default)]
     pmax: Vec<Option<f64>>,
-    /// The number of axes, where somebody wants it to be checked.
+    /// The expected number of axes, if it is to be checked.
     dofs: Option<usize>,
     #[serde(default, rename = "family")]
     _family: IgnoredAny,

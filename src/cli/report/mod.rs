@@ -1,6 +1,6 @@
-//! `takt report`: what a recording or a black box tells.
+//! `takt report`: evaluates a recording or a black box.
 
-mod drawing;
+mod svg;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -10,9 +10,9 @@ use takt::telemetry::{Recorded, RecordedError, RecordingReport};
 
 use super::exit::Exit;
 use super::print;
-use super::refusal::Refusal;
+use super::usage_error::UsageError;
 
-/// Tell from a recording or a black box why the group stopped, what led to it, and how the timing was
+/// Show from a recording or a black box why the group stopped, what led to it, and the timing
 #[derive(Args, Debug)]
 pub struct Arguments {
     /// The recording, or a file of the black box; one that was cut off is read as far as it goes
@@ -31,16 +31,16 @@ pub struct Arguments {
     json: bool,
 }
 
-/// Runs it. The exit code is 2 when there is nothing to be read, 1 when the picture cannot be written, else 0: that
+/// Runs it. The exit code is 2 when there is nothing to be read, 1 when the SVG cannot be written, else 0: that
 /// the group stopped is no failure of the report.
 pub fn run(arguments: &Arguments) -> Exit {
     match tell(arguments) {
         Ok(exit) => exit,
-        Err(refusal) => refusal.print(arguments.json),
+        Err(error) => error.print(arguments.json),
     }
 }
 
-fn tell(arguments: &Arguments) -> Result<Exit, Refusal> {
+fn tell(arguments: &Arguments) -> Result<Exit, UsageError> {
     let words = |error: RecordedError| error.to_string();
     let recorded = Recorded::open(&arguments.recording).map_err(words)?;
     let axis = recorded.axis(arguments.axis.as_deref());
@@ -50,14 +50,14 @@ fn tell(arguments: &Arguments) -> Result<Exit, Refusal> {
     }
     let report = RecordingReport::new(&recorded, axis, arguments.cycles).map_err(words)?;
     let is_drawn = match &arguments.svg {
-        Some(path) => write(path, &drawing::draw(&recorded, axis).map_err(words)?),
+        Some(path) => write(path, &svg::render(&recorded, axis).map_err(words)?),
         None => true,
     };
     let exit = if is_drawn { Exit::Done } else { Exit::Stopped };
     Ok(if arguments.json {
         print::json(&report, exit)
     } else {
-        print::text(&report.picture(print::emphasis()), exit)
+        print::text(&report.render(print::emphasis()), exit)
     })
 }
 

@@ -1,6 +1,6 @@
 //! State, bit rate, recovery, queue and errors of a CAN interface.
 
-use super::link::{Link, Timing};
+use super::link::{Link, LinkTiming};
 use crate::doctor::finding::{Check, Finding, Group};
 use crate::doctor::subject::WantedBus;
 
@@ -138,8 +138,8 @@ pub fn bit_rate(link: &Link, wanted: Option<&WantedBus>) -> Finding {
     BIT_RATE.good(read).applied(true)
 }
 
-fn words(timing: Timing, data: Option<Timing>) -> String {
-    let phase = |timing: Timing| {
+fn words(timing: LinkTiming, data: Option<LinkTiming>) -> String {
+    let phase = |timing: LinkTiming| {
         format!("{} kbit/s sampled at {:.1} %", timing.bit_rate / 1_000, timing.sample_point * 100.0)
     };
     match data {
@@ -268,10 +268,10 @@ mod tests {
         );
         // A classic bus on an interface that could do more is no trouble.
         assert_eq!(bit_rate(&can0(), Some(&wanted(1_000_000, None))).verdict, Verdict::Good);
-        let early = Link { timing: Some(Timing { bit_rate: 1_000_000, sample_point: 0.5 }), ..can0() };
+        let early = Link { timing: Some(LinkTiming { bit_rate: 1_000_000, sample_point: 0.5 }), ..can0() };
         assert_eq!(bit_rate(&early, None).verdict, Verdict::CouldBeBetter);
         assert_eq!(bit_rate(&Link { timing: None, ..can0() }, None).verdict, Verdict::NotKnown);
-        let slow = Link { timing: Some(Timing { bit_rate: 250_000, sample_point: 0.875 }), ..can0() };
+        let slow = Link { timing: Some(LinkTiming { bit_rate: 250_000, sample_point: 0.875 }), ..can0() };
         assert_eq!(bit_rate(&slow, None).verdict, Verdict::Good);
     }
 

@@ -9,7 +9,7 @@ const INTERRUPT: Check = Check {
     group: Group::Can,
     title: "interrupt",
     source: "/proc/interrupts, threads irq/*",
-    why: "the driver's interrupt thread waits behind those of disks and networks when it has no more priority than they have, and SYNC behind a frame of somebody else that it has yet to finish",
+    why: "the driver's interrupt thread waits behind those of disks and networks when it has no more priority than they have, and SYNC waits behind a frame of another sender that this thread has yet to finish",
 };
 
 /// The priority that the kernel gives every interrupt thread.

@@ -18,8 +18,8 @@ pub struct Link {
     /// The controller's state: `ERROR-ACTIVE`, `BUS-OFF` …
     pub state: Option<String>,
     pub restart_ms: Option<u64>,
-    pub timing: Option<Timing>,
-    pub data_timing: Option<Timing>,
+    pub timing: Option<LinkTiming>,
+    pub data_timing: Option<LinkTiming>,
     /// The driver's name for its controller.
     pub controller: Option<String>,
     /// The controller's error counters: transmit, receive.
@@ -30,7 +30,7 @@ pub struct Link {
 
 /// A bit timing.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Timing {
+pub struct LinkTiming {
     /// Bit/s.
     pub bit_rate: u64,
     /// Where in the bit its level is sampled, 0 to 1.
@@ -40,7 +40,7 @@ pub struct Timing {
 impl Link {
     /// What the kernel tells over netlink without the help of `ip`: less.
     pub fn of_status(status: &InterfaceStatus, queue_length: Option<u64>) -> Self {
-        let timing = |timing: bus::Timing| Timing {
+        let timing = |timing: bus::ControllerTiming| LinkTiming {
             bit_rate: timing.bit_rate.into(),
             sample_point: timing.sample_point,
         };
@@ -94,11 +94,11 @@ fn link(entry: &Value) -> Option<Link> {
 }
 
 /// `ip` writes the sample point as a text with three decimals; some versions write a number.
-fn timing(value: &Value) -> Option<Timing> {
+fn timing(value: &Value) -> Option<LinkTiming> {
     let bit_rate = value["bitrate"].as_u64().filter(|rate| *rate > 0)?;
     let sample_point = &value["sample_point"];
     let sample_point = sample_point.as_f64().or_else(|| sample_point.as_str()?.parse().ok())?;
-    Some(Timing { bit_rate, sample_point })
+    Some(LinkTiming { bit_rate, sample_point })
 }
 
 fn events(entry: &Value) -> Vec<(String, u64)> {
@@ -134,7 +134,7 @@ pub mod tests {
         let links = links(MCP251XFD);
         let [can0] = links.as_slice() else { panic!("{links:?}") };
         assert_eq!((can0.name.as_str(), can0.is_up, can0.restart_ms), ("can0", true, Some(100)));
-        assert_eq!(can0.timing, Some(Timing { bit_rate: 1_000_000, sample_point: 0.75 }));
+        assert_eq!(can0.timing, Some(LinkTiming { bit_rate: 1_000_000, sample_point: 0.75 }));
         assert_eq!(can0.data_timing.map(|timing| timing.bit_rate), Some(5_000_000));
         assert_eq!((can0.controller.as_deref(), can0.error_counters), (Some("mcp251xfd"), Some((0, 3))));
         let event = |name: &str, count| (name.to_owned(), count);
@@ -165,7 +165,7 @@ pub mod tests {
             name: "can0".to_owned(),
             is_up: true,
             has_fd: false,
-            timing: Some(bus::Timing { bit_rate: 1_000_000, sample_point: 0.75 }),
+            timing: Some(bus::ControllerTiming { bit_rate: 1_000_000, sample_point: 0.75 }),
             data_timing: None,
             restart_ms: Some(100),
             state: BusState::ErrorPassive,
@@ -173,7 +173,7 @@ pub mod tests {
             has_controller: true,
         };
         let link = Link::of_status(&status, Some(10));
-        assert_eq!(link.timing, Some(Timing { bit_rate: 1_000_000, sample_point: 0.75 }));
+        assert_eq!(link.timing, Some(LinkTiming { bit_rate: 1_000_000, sample_point: 0.75 }));
         assert_eq!((link.state.as_deref(), link.restart_ms), (Some("ERROR-PASSIVE"), Some(100)));
         assert_eq!((link.error_counters, link.queue_length), (Some((128, 0)), Some(10)));
     }

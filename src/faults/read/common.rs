@@ -4,7 +4,8 @@ use std::ops::RangeInclusive;
 
 use takt_rt::Nanoseconds;
 
-use crate::config::read::entry::{Bounds, Entry};
+use crate::config::bounds::Bounds;
+use crate::config::read::entry::Entry;
 use crate::config::read::section::Section;
 use crate::config::{Axis, Config, Interface, Quantity};
 use crate::faults::selection::{Direction, FrameFunction, Selection};
@@ -124,7 +125,7 @@ pub fn duration(entry: &Entry<'_>, config: &Config) -> Option<Nanoseconds> {
     {
         return Some(Nanoseconds::from(cycles) * config.cycle.period_ns);
     }
-    entry.nanoseconds(0.0, LONGEST_S)
+    entry.nanoseconds(0.0..=LONGEST_S)
 }
 
 /// Reads `period`; the default is `default_ns`.

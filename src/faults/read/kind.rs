@@ -4,7 +4,8 @@ use takt_rt::{Frame, Id};
 
 use super::common::{self, Location};
 use crate::canopen::nmt::{NmtCommand, NmtTarget};
-use crate::config::read::entry::{Bounds, Entry};
+use crate::config::bounds::Bounds;
+use crate::config::read::entry::Entry;
 use crate::config::read::section::Section;
 use crate::config::{Axis, Config, Quantity, Travel};
 use crate::faults::effect::{DelayPlace, Effect, ForeignFrames, FrameEffect, InterfaceEffect, Part};

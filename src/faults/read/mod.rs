@@ -10,9 +10,10 @@ use toml::de::DeTable;
 
 use super::scenario::{Scenario, ScenarioFault};
 use crate::config::read::document;
-use crate::config::read::entry::Problems;
 use crate::config::read::section::Section;
+use crate::config::spot::Problems;
 use crate::config::{Config, ConfigError, ProblemKind};
+use crate::printable::printable_path;
 
 /// The largest number of faults in one file.
 const FAULTS_AT_MOST: usize = 64;
@@ -40,7 +41,7 @@ impl Scenario {
     /// # Errors
     /// See [`ScenarioError`].
     pub fn load(path: &Path, config: &Config) -> Result<Self, ScenarioError> {
-        let name = path.display().to_string();
+        let name = printable_path(path);
         match crate::text_file::read(path) {
             Ok(bytes) => Ok(Self::parse(&name, &ConfigError::text_of(&name, bytes)?, config)?),
             Err(error) => Err(ScenarioError::Unreadable { path: name, reason: error.to_string() }),
@@ -56,12 +57,7 @@ impl Scenario {
     }
 }
 
-fn read<'a>(
-    table: &'a DeTable<'a>,
-    problems: &'a Problems<'a>,
-    text: &str,
-    config: &Config,
-) -> Option<Scenario> {
+fn read<'a>(table: &'a DeTable<'a>, problems: &'a Problems, text: &str, config: &Config) -> Option<Scenario> {
     let mut root = Section::new("", 0..0, table, problems);
     root.require("fault", "at least one [[fault]]");
     let sections = root.sections("fault");
@@ -69,7 +65,7 @@ fn read<'a>(
     if given > FAULTS_AT_MOST
         && let Some(beyond) = sections.get(FAULTS_AT_MOST)
     {
-        beyond.report_here(ProblemKind::OutOfRange {
+        beyond.header_spot().report(ProblemKind::OutOfRange {
             key: "fault".to_owned(),
             value: format!("a list of {given}"),
             allowed: format!("1 to {FAULTS_AT_MOST} faults"),
@@ -85,7 +81,7 @@ fn fault(mut section: Section<'_>, text: &str, config: &Config) -> Option<Scenar
     let line = 1 + text.get(..section.header().start).map_or(0, |before| before.matches('\n').count());
     let Some(entry) = section.get("kind") else {
         let says = "what goes wrong: kind = \"drop\"";
-        section.report_here(ProblemKind::MissingKey { key: "fault.kind".to_owned(), says });
+        section.header_spot().report(ProblemKind::MissingKey { key: "fault.kind".to_owned(), says });
         return None;
     };
     // Without a valid kind it is unknown which other keys are valid.

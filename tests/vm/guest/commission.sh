@@ -94,9 +94,9 @@ expect "another family than configured" 2 'is configured as' "${x[@]}" --family 
 expect "an interface that was down, with nobody on it" 1 'node 1 does not answer' drive --bus vcan2 --node 1 --family yz-aim info
 ip link set vcan2 down
 setpriv --reuid 65534 --clear-groups --inh-caps -all "$TAKT" drive --bus vcan2 --node 1 --family yz-aim info > "$printed" 2>&1
-judge "an interface that is down, without the right to bring it up" $? 2 'vcan2.*(down|up)'
-expect "LSS: nobody without a node number" 0 'no device without a node number' lss --bus vcan0 scan
-expect "LSS: nobody to give a number to" 1 'no device without a node ID answers' lss --bus vcan1 set-id 5
+judge "an interface that is down, without the right to bring it up" $? 2 'to do so: sudo ip link set vcan2 up'
+expect "LSS: no device without a node ID" 0 'no device without a node ID' lss --bus vcan0 scan
+expect "LSS: no device to give a node ID to" 1 'no device without a node (number|ID) answers' lss --bus vcan1 set-id 5
 
 kill $erob_sim $yz_sim
 wait $erob_sim $yz_sim

@@ -123,8 +123,10 @@ def main(takt, path, code, fault_at_s, *rules):
     run = json.loads(printed)
     require(run["failure"] is None, f"it failed: {run['failure']}")
     if run["stop"] is None and "borne" in rules:
-        require(code == "0", f"nothing stopped it, and yet the exit code is {code}")
-        ended = "borne, exit code 0"
+        # What could not be written is no success, and no stop either.
+        expected = "1" if "records_lost" in rules else "0"
+        require(code == expected, f"nothing stopped it, and yet the exit code is {code}, not {expected}")
+        ended = f"borne, exit code {code}"
     else:
         require(run["stop"] is not None, "nothing stopped it")
         ended = judge_stop(takt, run, int(code), rules)

@@ -1,10 +1,10 @@
-//! What was found, for people.
+//! The result of all checks as text.
 
 use super::examination::Examination;
 use super::finding::{Finding, Group, Verdict};
 use super::self_test::{Grade, SelfTest};
 use crate::telemetry::Emphasis;
-use crate::telemetry::picture::{duration, line};
+use crate::telemetry::render::{duration, line};
 
 /// Where the text of a check begins: mark, title.
 const INDENT: usize = 24;
@@ -12,7 +12,7 @@ const COLUMNS: usize = 100;
 
 impl Examination {
     /// The findings as text of at most 100 columns (but for commands, which are not broken).
-    pub fn picture(&self, emphasis: Emphasis) -> String {
+    pub fn render(&self, emphasis: Emphasis) -> String {
         let mut text = String::new();
         let class =
             self.priority.map_or("the normal class".to_owned(), |priority| format!("SCHED_FIFO {priority}"));

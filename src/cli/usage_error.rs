@@ -1,26 +1,31 @@
-//! Why nothing was done, in words or, after `--json`, as one object.
+//! Why a command was refused before it did anything, as text or, with `--json`, as one object.
 
+use std::env;
 use std::ffi::OsStr;
 
 use serde::Serialize;
 use takt::config::ConfigError;
+use takt::printable::printable;
 
 use super::exit::Exit;
 use super::print;
+use super::say;
 
-/// Why nothing was done.
-pub enum Refusal {
-    /// In words.
+/// Why a command was refused.
+pub enum UsageError {
+    /// As text.
     Words(String),
-    /// A file that is not right, with its problems.
+    /// A file with problems.
     File(ConfigError),
 }
 
-/// A refusal as an object.
+/// The error as a JSON object.
 #[derive(Serialize)]
 struct Printed {
     error: String,
     problems: Vec<Problem>,
+    /// How many problems there are besides these.
+    omitted: usize,
 }
 
 #[derive(Serialize)]
@@ -30,17 +35,17 @@ struct Problem {
     help: String,
 }
 
-impl Refusal {
+impl UsageError {
     /// Prints it, as an object on standard output or in words on standard error.
     pub fn print(self, is_json: bool) -> Exit {
         match self {
-            refusal if is_json => print::indented_json(&refusal.printed(), Exit::Usage),
+            error if is_json => print::indented_json(&error.printed(), Exit::Usage),
             Self::Words(words) => {
                 say!("takt: {words}");
                 Exit::Usage
             }
             Self::File(error) => {
-                say!("{:?}", miette::Report::new(error));
+                say::styled(&format!("{:?}", miette::Report::new(error)));
                 Exit::Usage
             }
         }
@@ -48,9 +53,10 @@ impl Refusal {
 
     fn printed(self) -> Printed {
         match self {
-            Self::Words(error) => Printed { error, problems: vec![] },
+            Self::Words(error) => Printed { error, problems: vec![], omitted: 0 },
             Self::File(error) => Printed {
                 error: error.to_string(),
+                omitted: error.omitted(),
                 problems: error
                     .problems()
                     .iter()
@@ -65,19 +71,19 @@ impl Refusal {
     }
 }
 
-impl From<ConfigError> for Refusal {
+impl From<ConfigError> for UsageError {
     fn from(error: ConfigError) -> Self {
         Self::File(error)
     }
 }
 
-impl From<String> for Refusal {
+impl From<String> for UsageError {
     fn from(words: String) -> Self {
         Self::Words(words)
     }
 }
 
-impl From<&str> for Refusal {
+impl From<&str> for UsageError {
     fn from(words: &str) -> Self {
         Self::Words(words.to_owned())
     }
@@ -85,12 +91,18 @@ impl From<&str> for Refusal {
 
 /// Prints what is wrong with the command line, or the help that it has asked for.
 pub fn of_command_line(error: &clap::Error) -> Exit {
-    let is_json = std::env::args_os().any(|argument| argument == OsStr::new("--json"));
+    let is_json = env::args_os().any(|argument| argument == OsStr::new("--json"));
     if error.use_stderr() && is_json {
         let words = error.render().to_string();
-        return Refusal::from(words.trim_start_matches("error: ").trim_end()).print(true);
+        return UsageError::from(words.trim_start_matches("error: ").trim_end()).print(true);
     }
-    // Nobody may be there any more to read it.
-    let _ = error.print();
+    // clap prints the arguments unchanged.
+    let words = error.render().to_string();
+    if error.use_stderr() && printable(&words) != words {
+        say!("{}", words.trim_end());
+    } else {
+        // The reader may have ended.
+        let _ = error.print();
+    }
     if error.use_stderr() { Exit::Usage } else { Exit::Done }
 }

@@ -1,10 +1,11 @@
-//! Keeping the other threads of this process out of the way of a slot's beginning.
+//! Aligns the sleeps of ordinary threads so that they do not end at the beginning of a slot.
 //!
-//! On a PREEMPT_RT kernel the timers of ordinary threads expire in a kernel thread that holds a lock which sending a
-//! frame needs too. A sleep of the logger that ends just before a slot delays its SYNC by some ten microseconds. So slots
-//! begin a quarter of a period after the multiples of the period on the monotonic clock, where the kernel's own tick
-//! falls, and ordinary threads sleep until such multiples: three quarters of the way through a slot, when its set-points
-//! are out. Nobody has to tell anybody anything.
+//! On a PREEMPT_RT kernel the timers of ordinary threads expire in a kernel thread. It holds a lock that sending a frame
+//! needs too. A sleep of the logger that ends just before a slot delays its SYNC by some ten microseconds.
+//!
+//! Therefore slots begin a quarter of a period after the multiples of the period on the monotonic clock. The kernel's own
+//! tick falls on these multiples. Ordinary threads sleep until such a multiple: three quarters through a slot, when its
+//! set-points have been sent. The threads need no communication for this.
 
 use std::thread;
 use std::time::Duration;
@@ -18,12 +19,12 @@ pub(super) fn first_slot_after(earliest_ns: Nanoseconds, period_ns: Nanoseconds)
     earliest_ns.saturating_sub(phase_ns).div_ceil(period_ns) * period_ns + phase_ns
 }
 
-/// How long an ordinary thread sleeps so that it wakes after at least `pause_ns`, and away from the beginning of a slot.
+/// The time from `now_ns` to the first multiple of the period that is at least `pause_ns` later.
 const fn pause_from(now_ns: Nanoseconds, pause_ns: Nanoseconds, period_ns: Nanoseconds) -> Nanoseconds {
     (now_ns + pause_ns).div_ceil(period_ns) * period_ns - now_ns
 }
 
-/// The pause that an ordinary thread makes now: at least `pause`, and no more than a period longer.
+/// The aligned pause of an ordinary thread from now on: at least `pause`, and at most one period longer.
 pub fn pause(pause: Duration, period_ns: Nanoseconds) -> Duration {
     let now_ns = MonotonicClock::default().now_ns();
     Duration::from_nanos(pause_from(now_ns, pause.as_nanos() as u64, period_ns.max(1)))

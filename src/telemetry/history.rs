@@ -1,4 +1,4 @@
-//! The last seconds of a run, in memory whose size is settled at the start: what comes in pushes out what is oldest.
+//! The last seconds of a run, in memory that is allocated at the start. A new entry replaces the oldest ones.
 
 use std::collections::VecDeque;
 
@@ -8,12 +8,12 @@ use takt_rt::{
 
 use crate::bus::trace::{TracedFrame, TracedHealth};
 
-/// Memory for the frames of a second of one bus: at 1 Mbit/s a frame of eight bytes takes 111 bits on the wire and 23
+/// Memory for the frames of one bus in one second. At 1 Mbit/s, a frame of eight bytes takes 111 bits on the wire and 23
 /// bytes here.
 const FRAME_BYTES_PER_SECOND: usize = 256 * 1024;
-/// Events are few; a machine that has more of them in the time has one more fault.
+/// The most events that are kept. A run without faults has far fewer in this time.
 const EVENTS: usize = 1024;
-/// Changes of the buses' health, in a bad case one a cycle.
+/// The most changes of bus health that are kept. In a bad case there is one in each cycle.
 const HEALTH_CHANGES: usize = 4096;
 
 /// A cycle without its axes.
@@ -24,16 +24,16 @@ struct Times {
     is_commanded: bool,
 }
 
-/// What happened, and where: one bus among several.
+/// Something on one of the buses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct OnBus<T> {
     /// The number of the bus in the order of the configuration.
     pub bus: usize,
-    /// What happened there.
+    /// The frame, or the health of the bus.
     pub what: T,
 }
 
-/// One entry of the past.
+/// One entry of the history.
 #[derive(Clone, Copy, Debug)]
 pub enum Entry<'a> {
     Cycle(&'a CycleRecord),
@@ -42,7 +42,7 @@ pub enum Entry<'a> {
     Health(&'a OnBus<TracedHealth>),
 }
 
-/// Where an entry is kept: its number, or for a frame its place in the store.
+/// The place of an entry: its index, or for a frame its position in the store.
 #[derive(Clone, Copy)]
 enum Place {
     Cycle(usize),
@@ -51,19 +51,19 @@ enum Place {
     Health(usize),
 }
 
-/// The last seconds.
-pub struct Past {
+/// The last seconds of a run.
+pub struct History {
     span_ns: Nanoseconds,
     axis_count: usize,
     cycles: VecDeque<Times>,
-    /// Those of every cycle, one after the other.
+    /// The axes of every cycle, one after the other.
     axes: VecDeque<AxisRecord>,
     events: VecDeque<Event>,
     frames: FrameStore,
     health: VecDeque<OnBus<TracedHealth>>,
 }
 
-impl Past {
+impl History {
     /// Room for a time span of a machine with so many axes and buses.
     pub fn new(span_ns: Nanoseconds, cycle_ns: Nanoseconds, axes: usize, buses: usize) -> Self {
         let cycles = span_ns.div_ceil(cycle_ns.max(1)) as usize;
@@ -79,7 +79,7 @@ impl Past {
         }
     }
 
-    /// Adds a cycle, and forgets what is older than the time span before it.
+    /// Adds a cycle, and removes the entries that are older than the time span.
     pub fn cycle(&mut self, record: &CycleRecord) {
         let oldest_ns = record.timing.slot_start_ns.saturating_sub(self.span_ns);
         while let Some(first) = self.cycles.front()
@@ -107,12 +107,12 @@ impl Past {
         self.frames.push(frame);
     }
 
-    /// Adds a change of a bus' health.
+    /// Adds a change of the health of a bus.
     pub fn health(&mut self, health: &OnBus<TracedHealth>) {
         push(&mut self.health, *health);
     }
 
-    /// Shows all of it, in the order of time, until `visit` fails.
+    /// Passes every entry to `visit` in the order of time, until `visit` fails.
     pub fn visit<E>(&self, mut visit: impl FnMut(Entry<'_>) -> Result<(), E>) -> Result<(), E> {
         let cycles = self.cycles.iter().map(|times| times.timing.slot_start_ns).zip((0..).map(Place::Cycle));
         let events = self.events.iter().map(|event| event.at_ns).zip((0..).map(Place::Event));
@@ -153,7 +153,7 @@ impl Past {
         self.axes.get(last + axis).map_or(0, |axis| axis.error_code)
     }
 
-    /// What the group was doing at last.
+    /// The phase of the last cycle.
     pub fn last_phase(&self) -> Phase {
         self.cycles.back().map_or(Phase::Passive, |times| times.phase)
     }
@@ -177,7 +177,7 @@ fn forget<T>(queue: &mut VecDeque<T>, is_old: impl Fn(&T) -> bool) {
     }
 }
 
-/// Frames of any length behind each other in a ring of bytes: time, identifier, bus, kind, length, payload.
+/// Frames of any length, one behind the other in a ring of bytes: time, identifier, bus, kind, length, payload.
 struct FrameStore {
     bytes: VecDeque<u8>,
     capacity: usize,
@@ -206,8 +206,8 @@ impl FrameStore {
         self.bytes.extend(frame.payload());
     }
 
-    /// The time of the frame at `at`, and where the next one begins.
-    fn look(&self, at: usize) -> Option<(Nanoseconds, usize)> {
+    /// The time of the frame at `at`, and the position of the next frame.
+    fn header(&self, at: usize) -> Option<(Nanoseconds, usize)> {
         let byte = |offset: usize| self.bytes.get(at + offset).copied();
         let mut time = [0; 8];
         for (offset, to) in time.iter_mut().enumerate() {
@@ -219,27 +219,27 @@ impl FrameStore {
     }
 
     fn pop(&mut self) {
-        let end = self.look(0).map_or(self.bytes.len(), |(_, end)| end.min(self.bytes.len()));
+        let end = self.header(0).map_or(self.bytes.len(), |(_, end)| end.min(self.bytes.len()));
         self.bytes.drain(..end);
     }
 
     fn forget(&mut self, oldest_ns: Nanoseconds) {
-        while self.look(0).is_some_and(|(at_ns, _)| at_ns < oldest_ns) {
+        while self.header(0).is_some_and(|(at_ns, _)| at_ns < oldest_ns) {
             self.pop();
         }
     }
 
-    /// The times of all frames, and where they are.
+    /// The times and positions of all frames.
     fn places(&self) -> impl Iterator<Item = (Nanoseconds, usize)> + '_ {
         let mut at = 0;
         std::iter::from_fn(move || {
-            let (at_ns, end) = self.look(at)?;
+            let (at_ns, end) = self.header(at)?;
             Some((at_ns, std::mem::replace(&mut at, end)))
         })
     }
 
     fn get(&self, at: usize) -> Option<OnBus<TracedFrame>> {
-        let (at_ns, end) = self.look(at)?;
+        let (at_ns, end) = self.header(at)?;
         let mut bytes = [0; HEADER_BYTES + Frame::MAX_BYTES];
         bytes.iter_mut().zip(self.bytes.range(at..end)).for_each(|(to, from)| *to = *from);
         let (_, rest) = bytes.get(..end - at)?.split_first_chunk::<8>()?;
@@ -283,20 +283,20 @@ mod tests {
     }
 
     #[test]
-    fn the_last_seconds_come_out_in_the_order_of_time_and_what_is_older_is_forgotten() {
-        let mut past = Past::new(10 * CYCLE_NS, CYCLE_NS, 2, 1);
+    fn entries_come_out_in_the_order_of_time_and_older_ones_are_removed() {
+        let mut history = History::new(10 * CYCLE_NS, CYCLE_NS, 2, 1);
         let frame = Frame::of(Id::canopen(0x180, 1), [1, 2]);
         for slot in 0..35 {
-            past.frame(&traced(slot * CYCLE_NS + 2, 0, false, frame));
-            past.event(&Event {
+            history.frame(&traced(slot * CYCLE_NS + 2, 0, false, frame));
+            history.event(&Event {
                 slot,
                 at_ns: slot * CYCLE_NS + 1,
                 kind: EventKind::MissedSlots { count: slot },
             });
-            past.cycle(&record(slot));
+            history.cycle(&record(slot));
         }
         let (mut kinds, mut last) = (vec![], None);
-        let Ok(()) = past.visit(|entry| {
+        let Ok(()) = history.visit(|entry| {
             kinds.push(match entry {
                 Entry::Cycle(record) => {
                     last = Some(*record);
@@ -308,54 +308,54 @@ mod tests {
             });
             Ok::<_, Infallible>(())
         });
-        // The oldest event and frame lie within the ten milliseconds, the cycle before them began earlier.
+        // The oldest event and the oldest frame lie within the ten milliseconds. Their cycle began earlier.
         let expected: Vec<_> = (24..35).flat_map(|slot| [(0, slot), (1, slot), (2, slot)]).skip(1).collect();
         assert_eq!(kinds, expected);
-        assert_eq!((past.last_slot(), past.last_error_code(1)), (Some((34, 34 * CYCLE_NS)), 34));
+        assert_eq!((history.last_slot(), history.last_error_code(1)), (Some((34, 34 * CYCLE_NS)), 34));
         assert_eq!(last, Some(record(34)));
     }
 
     #[test]
-    fn a_machine_that_misses_slots_keeps_its_time_span_and_not_more_cycles() {
-        let mut past = Past::new(10 * CYCLE_NS, CYCLE_NS, 2, 1);
+    fn missed_slots_do_not_make_the_time_span_longer() {
+        let mut history = History::new(10 * CYCLE_NS, CYCLE_NS, 2, 1);
         for slot in (0..20).chain(100..104) {
-            past.cycle(&record(slot));
+            history.cycle(&record(slot));
         }
-        assert_eq!(past.cycles.len(), 4);
+        assert_eq!(history.cycles.len(), 4);
     }
 
     #[test]
-    fn no_memory_is_asked_for_however_much_comes_in() {
-        let mut past = Past::new(10 * CYCLE_NS, CYCLE_NS, 2, 2);
-        let sizes = |past: &Past| {
+    fn no_memory_is_allocated_after_the_start() {
+        let mut history = History::new(10 * CYCLE_NS, CYCLE_NS, 2, 2);
+        let sizes = |history: &History| {
             [
-                past.cycles.capacity(),
-                past.axes.capacity(),
-                past.events.capacity(),
-                past.frames.bytes.capacity(),
-                past.health.capacity(),
+                history.cycles.capacity(),
+                history.axes.capacity(),
+                history.events.capacity(),
+                history.frames.bytes.capacity(),
+                history.health.capacity(),
             ]
         };
-        let before = sizes(&past);
+        let before = sizes(&history);
         let frame = Frame::of(Id::canopen(0x180, 1), [0; 8]);
         let health = TracedHealth { at_ns: 1, health: takt_rt::BusHealth::default() };
         for slot in 0..50 {
-            past.cycle(&record(slot));
+            history.cycle(&record(slot));
             for at in 0..200 {
-                past.frame(&traced(slot * CYCLE_NS + at, 1, true, frame));
-                past.event(&Event {
+                history.frame(&traced(slot * CYCLE_NS + at, 1, true, frame));
+                history.event(&Event {
                     slot,
                     at_ns: slot * CYCLE_NS,
                     kind: EventKind::MissedSlots { count: 1 },
                 });
-                past.health(&OnBus { bus: 0, what: health });
+                history.health(&OnBus { bus: 0, what: health });
             }
         }
-        assert_eq!(sizes(&past), before);
+        assert_eq!(sizes(&history), before);
     }
 
     #[test]
-    fn frames_of_every_kind_are_kept_as_they_are_and_the_oldest_make_room() {
+    fn frames_of_every_kind_are_kept_unchanged_and_replace_the_oldest() {
         let mut store = FrameStore::new(190);
         let bytes: Vec<u8> = (0..64).collect();
         let id = Id::extended(0x1ABC_DEF0).unwrap();

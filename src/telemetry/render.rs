@@ -1,26 +1,28 @@
-//! The report of a run for people, and the parts of it that other reports show too: at most 100 columns, histograms of block characters, colours only on request.
+//! Renders the report of a run as text for people, in at most 100 columns. Histograms consist of block characters. Colours
+//! are optional. Other reports use parts of it.
 
 use std::fmt::Write;
 
 use super::report::{
-    AxisReport, BusReport, DECADES, LatencyReport, RANGES_PER_DECADE, RealtimeReport, RunReport,
+    AxisReport, BusReport, DECADES, LatencyReport, RANGES_PER_DECADE, RealtimeReport, RunEnd, RunReport,
     SetPointParts,
 };
+use crate::printable::{printable, printable_path};
 
 /// Rows of a histogram.
 const ROWS: usize = 4;
 const EIGHTHS: [char; 9] = [' ', '▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
 const DECADE_LABELS: [&str; DECADES + 1] = ["100ns", "1µs", "10µs", "100µs", "1ms", "10ms", "100ms"];
-/// Columns of a histogram: counts at the left, the bars, half a label at the right.
+/// Columns of a histogram: the counts at the left, the bars, and half a label at the right.
 const HISTOGRAM_COLUMNS: usize = 6 + 1 + RANGES_PER_DECADE * DECADES + 5;
 const COLUMNS: usize = 100;
-/// Where the text of a paragraph begins.
+/// The column at which the text of a paragraph begins.
 const INDENT: usize = 13;
 
 /// How text may be emphasised.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Emphasis {
-    /// Plain text, for anything that is not a terminal.
+    /// Plain text, for outputs other than a terminal.
     None,
     /// ANSI escape sequences.
     Ansi,
@@ -48,8 +50,8 @@ impl Emphasis {
 }
 
 impl RunReport {
-    /// The report as text of at most 100 columns (but for paths and commands, which are not broken).
-    pub fn picture(&self, emphasis: Emphasis) -> String {
+    /// The report as text of at most 100 columns. Paths and commands are not broken and may be longer.
+    pub fn render(&self, emphasis: Emphasis) -> String {
         let mut text = String::new();
         self.headline(&mut text, emphasis);
         self.latencies(&mut text, emphasis);
@@ -65,7 +67,12 @@ impl RunReport {
         let run = format!("{cycles} cycles of {cycle_ms} ms, {seconds:.2} s");
         match &self.stop {
             None => {
-                let verdict = emphasis.good("✓ program finished");
+                let verdict = match self.ended {
+                    RunEnd::Finished => emphasis.good("✓ program finished"),
+                    RunEnd::Interrupted => emphasis.bad("✗ interrupted before the axes were enabled"),
+                    RunEnd::TakenOver => emphasis.bad("✗ taken over before the axes were enabled"),
+                    RunEnd::Stopped | RunEnd::Failed => emphasis.bad("✗ failed"),
+                };
                 line(text, &format!("{}  {verdict}, {run}", emphasis.heading(&self.machine)));
             }
             Some(stop) => {
@@ -148,18 +155,21 @@ impl RunReport {
         if let Some(path) = &telemetry.recording {
             let size =
                 telemetry.recording_bytes.map_or_else(String::new, |size| format!(" ({})", bytes(size)));
-            lines.push(format!("{}{size}", path.display()));
+            lines.push(format!("{}{size}", printable_path(path)));
         }
-        lines.extend(telemetry.candump.iter().map(|path| path.display().to_string()));
-        lines.extend(telemetry.not_written.iter().cloned());
+        lines.extend(telemetry.candump.iter().map(|path| printable_path(path)));
+        lines.extend(telemetry.not_written.iter().map(|text| printable(text)));
         wrap(text, &emphasis.heading("telemetry"), 9, &lines);
         if !telemetry.black_boxes.is_empty() {
             let mut lines: Vec<String> =
-                telemetry.black_boxes.iter().map(|path| path.display().to_string()).collect();
+                telemetry.black_boxes.iter().map(|path| printable_path(path)).collect();
             if telemetry.black_boxes_replaced > 0 {
-                lines.push(format!("{} between the last two are not kept", telemetry.black_boxes_replaced));
+                lines.push(format!(
+                    "{} older files were replaced by the last one",
+                    telemetry.black_boxes_replaced
+                ));
             }
-            lines.push("`takt report FILE` tells what is in it".to_owned());
+            lines.push("show it with `takt report FILE`".to_owned());
             wrap(text, &emphasis.heading("black box"), 9, &lines);
         }
         realtime(text, emphasis, &self.realtime);
@@ -176,7 +186,7 @@ pub(crate) fn histograms(text: &mut String, emphasis: Emphasis, wake: &LatencyRe
     }
 }
 
-/// A table of latencies, a row each.
+/// A table with one row for each latency.
 pub(crate) fn latency_table(text: &mut String, emphasis: Emphasis, rows: &[(&str, &LatencyReport)]) {
     let titles = ["latency", "min", "median", "99 %", "99.9 %", "max"].map(str::to_owned);
     line(text, &emphasis.heading(&latency_row(titles)));
@@ -187,14 +197,14 @@ pub(crate) fn latency_table(text: &mut String, emphasis: Emphasis, rows: &[(&str
     }
 }
 
-/// How many slots passed unused beside so many cycles that ran.
+/// The number of missed slots, out of all slots.
 pub(crate) fn missed_slots(text: &mut String, emphasis: Emphasis, missed: u64, cycles: u64) {
     let words = format!("{missed} of {}", cycles + missed);
     let words = format!("{:<20}{words:>12}", "missed slots");
     line(text, &if missed == 0 { words } else { emphasis.bad(&words) });
 }
 
-/// What the operating system granted, and the commands that grant the rest.
+/// The real-time set-up that the operating system granted, and the commands that grant the rest.
 pub(crate) fn realtime(text: &mut String, emphasis: Emphasis, realtime: &RealtimeReport) {
     wrap(text, &emphasis.heading("real-time"), 9, &realtime_lines(realtime));
     for command in &realtime.grant_with {
@@ -220,8 +230,8 @@ fn realtime_lines(realtime: &RealtimeReport) -> Vec<String> {
     lines
 }
 
-/// The rows of a histogram: a title, the bars, and the axis with its labels. Both axes are logarithmic, so that one
-/// late cycle among millions still shows.
+/// The rows of a histogram: a title, the bars, and the axis with its labels. Both axes are logarithmic, so that a single
+/// late cycle among millions is visible.
 fn histogram(title: &str, latency: &LatencyReport) -> Vec<String> {
     let most = latency.histogram.iter().copied().max().unwrap_or(0);
     let height = |count: u64| match (count, most) {
@@ -265,7 +275,7 @@ fn axis_row(axis: &AxisReport) -> String {
             (Some(error), Some(at_s), Some(velocity)) => {
                 let decimals = if at_s < 1000.0 { 2 } else { 0 };
                 let mut circumstances = format!("{at_s:.decimals$} s, {velocity:+.2} {}/s", axis.unit);
-                // A following error in proportion to the velocity is a delay: say which.
+                // A following error that is proportional to the velocity is a delay.
                 let behind_ms = 1e3 * error / velocity.abs();
                 if velocity.abs() > 1e-3 && behind_ms < 1000.0 {
                     let _ = write!(circumstances, " = {behind_ms:.1} ms late");
@@ -274,7 +284,7 @@ fn axis_row(axis: &AxisReport) -> String {
             }
             _ => ("never enabled".to_owned(), String::new()),
         };
-    // Rounded before it is printed, and 0 added, so that nothing prints as -0.
+    // Rounding first and then adding 0 avoids "-0".
     let rounded = (axis.final_position * 1e5).round() / 1e5 + 0.0;
     let position = format!("{rounded:.5} {}", axis.unit);
     let off = format!("{:+.1}", axis.final_error_counts);
@@ -282,7 +292,7 @@ fn axis_row(axis: &AxisReport) -> String {
     format!("{name:<16}{largest:>16}   {circumstances:<36}{position:>16}{off:>12}")
 }
 
-/// A part of a limit.
+/// A fraction of a limit, as text.
 pub(super) fn part(part: Option<f64>) -> String {
     part.map_or_else(|| "no limit".to_owned(), |part| format!("{:.2} %", 100.0 * part))
 }
@@ -302,7 +312,7 @@ fn bus_row(bus: &BusReport) -> String {
     )
 }
 
-/// A name that leaves a space in a column of so many characters.
+/// A name that is shortened so that a space remains in its column.
 pub(super) fn shortened(name: &str, columns: usize) -> String {
     if name.chars().count() < columns {
         return name.to_owned();
@@ -347,7 +357,7 @@ pub(crate) fn line(text: &mut String, line: &str) {
     text.push('\n');
 }
 
-/// Writes lines behind a label (of so many visible characters), each broken between words where it gets too long.
+/// Writes lines behind a label, which has `label_columns` visible characters. A long line is broken between words.
 pub(crate) fn wrap(text: &mut String, label: &str, label_columns: usize, lines: &[String]) {
     let mut current = format!("{label}{:width$}", "", width = INDENT - label_columns);
     let mut columns = INDENT;

@@ -1,4 +1,4 @@
-//! A dictionary as it is printed: every value resolved for one node.
+//! What is printed of a dictionary: every value resolved for one node.
 
 use serde::Serialize;
 use takt::canopen::eds::{DictionaryEntry, DictionaryObject, Number, ObjectDictionary, ObjectList, Value};
@@ -6,21 +6,21 @@ use takt::canopen::object::ObjectAddress;
 use takt::canopen::objects::PdoDirection;
 use takt::canopen::pdo_configuration::PdoConfiguration;
 
-use super::ProblemPicture;
+use super::PrintedProblem;
 
-/// All that is printed.
+/// Everything that is printed.
 #[derive(Serialize)]
-pub struct Picture {
+pub struct View {
     pub file: FilePicture,
     pub device: DevicePicture,
     pub identity: IdentityPicture,
-    /// The node that `$NODEID` stands for; `None` where nobody says.
+    /// The node that `$NODEID` stands for; `None` where it is not known.
     pub node: Option<u8>,
     pub node_name: Option<String>,
-    pub objects: Vec<ObjectPicture>,
-    pub pdos: Vec<PdoPicture>,
+    pub objects: Vec<ObjectView>,
+    pub pdos: Vec<PdoView>,
     pub comments: Vec<String>,
-    pub warnings: Vec<ProblemPicture>,
+    pub warnings: Vec<PrintedProblem>,
 }
 
 #[derive(Serialize)]
@@ -55,26 +55,26 @@ pub struct IdentityPicture {
 }
 
 #[derive(Serialize)]
-pub struct ObjectPicture {
+pub struct ObjectView {
     pub index: u16,
     pub name: String,
     pub object_type: &'static str,
     pub list: &'static str,
     pub line: Option<usize>,
-    pub entries: Vec<EntryPicture>,
+    pub entries: Vec<EntryView>,
 }
 
 #[derive(Serialize)]
-pub struct EntryPicture {
+pub struct EntryView {
     pub subindex: u8,
     pub name: String,
     pub data_type: Option<String>,
     pub access: &'static str,
     pub is_mappable: bool,
-    pub default: Option<ValuePicture>,
-    pub configured: Option<ValuePicture>,
-    pub low: Option<ValuePicture>,
-    pub high: Option<ValuePicture>,
+    pub default: Option<ValueView>,
+    pub configured: Option<ValueView>,
+    pub low: Option<ValueView>,
+    pub high: Option<ValueView>,
     pub denotation: Option<String>,
     /// Whether numbers of this entry are read in hexadecimal.
     #[serde(skip)]
@@ -84,7 +84,7 @@ pub struct EntryPicture {
 /// A value: as a number or text where it can be one.
 #[derive(Clone, Serialize)]
 #[serde(untagged)]
-pub enum ValuePicture {
+pub enum ValueView {
     Number(i64),
     Unsigned(u64),
     Real(f64),
@@ -92,7 +92,7 @@ pub enum ValuePicture {
 }
 
 #[derive(Serialize)]
-pub struct PdoPicture {
+pub struct PdoView {
     pub direction: &'static str,
     pub number: u16,
     pub id: Option<u32>,
@@ -112,8 +112,8 @@ pub struct MappedPicture {
     pub name: Option<String>,
 }
 
-impl Picture {
-    pub fn of(dictionary: &ObjectDictionary, node: Option<u8>, warnings: Vec<ProblemPicture>) -> Self {
+impl View {
+    pub fn of(dictionary: &ObjectDictionary, node: Option<u8>, warnings: Vec<PrintedProblem>) -> Self {
         let (file, device) = (&dictionary.file, &dictionary.device);
         let number = |index, subindex| {
             u32::try_from(dictionary.number(ObjectAddress::new(index, subindex), node)?).ok()
@@ -144,15 +144,15 @@ impl Picture {
             },
             node,
             node_name: dictionary.commissioning.as_ref().and_then(|made_for| made_for.node_name.clone()),
-            objects: dictionary.objects.iter().map(|object| ObjectPicture::of(object, node)).collect(),
-            pdos: dictionary.pdos(node).iter().map(|pdo| PdoPicture::of(pdo, dictionary)).collect(),
+            objects: dictionary.objects.iter().map(|object| ObjectView::of(object, node)).collect(),
+            pdos: dictionary.pdos(node).iter().map(|pdo| PdoView::of(pdo, dictionary)).collect(),
             comments: dictionary.comments.clone(),
             warnings,
         }
     }
 }
 
-impl ObjectPicture {
+impl ObjectView {
     fn of(object: &DictionaryObject, node: Option<u8>) -> Self {
         Self {
             index: object.index,
@@ -164,14 +164,14 @@ impl ObjectPicture {
                 ObjectList::Manufacturer => "manufacturer",
             },
             line: object.line,
-            entries: object.entries.iter().map(|entry| EntryPicture::of(entry, node)).collect(),
+            entries: object.entries.iter().map(|entry| EntryView::of(entry, node)).collect(),
         }
     }
 }
 
-impl EntryPicture {
+impl EntryView {
     fn of(entry: &DictionaryEntry, node: Option<u8>) -> Self {
-        let picture = |value: &Value| ValuePicture::of(value, node);
+        let view = |value: &Value| ValueView::of(value, node);
         let index = entry.address.index;
         let is_long = entry.data_type.and_then(|data_type| data_type.bits()) == Some(32);
         let is_identifier = matches!(
@@ -184,17 +184,17 @@ impl EntryPicture {
             data_type: entry.data_type.map(|data_type| data_type.to_string()),
             access: entry.access.word(),
             is_mappable: entry.is_mappable,
-            default: entry.default.as_ref().map(|stated| picture(&stated.value)),
-            configured: entry.configured.as_ref().map(|stated| picture(&stated.value)),
-            low: entry.low.as_ref().map(picture),
-            high: entry.high.as_ref().map(picture),
+            default: entry.default.as_ref().map(|stated| view(&stated.value)),
+            configured: entry.configured.as_ref().map(|stated| view(&stated.value)),
+            low: entry.low.as_ref().map(view),
+            high: entry.high.as_ref().map(view),
             denotation: entry.denotation.clone(),
             is_pattern: is_identifier && is_long,
         }
     }
 }
 
-impl ValuePicture {
+impl ValueView {
     fn of(value: &Value, node: Option<u8>) -> Self {
         match value {
             Value::Number(number) => Self::of_number(*number, node),
@@ -233,7 +233,7 @@ impl ValuePicture {
     }
 }
 
-impl PdoPicture {
+impl PdoView {
     fn of(pdo: &PdoConfiguration, dictionary: &ObjectDictionary) -> Self {
         let objects = pdo.objects.iter().map(|mapped| {
             let entry = dictionary.entry(ObjectAddress::new(mapped.index, mapped.subindex));

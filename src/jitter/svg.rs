@@ -1,10 +1,10 @@
-//! What was measured, as a drawing: two histograms, both axes logarithmic, the ways of waiting on top of each other.
+//! The measurements as SVG: two histograms with logarithmic axes, one curve for each kind of pacing.
 
 use std::fmt::Write;
 
 use super::measurement::{Measurement, Pacing};
 use crate::telemetry::Latency;
-use crate::telemetry::picture::duration;
+use crate::telemetry::render::duration;
 
 const WIDTH: f64 = 1_000.0;
 const HEIGHT: f64 = 470.0;
@@ -21,8 +21,8 @@ const RANGES: usize = DECADES * RANGES_PER_DECADE;
 const DECADE_LABELS: [&str; DECADES + 1] =
     ["10 ns", "100 ns", "1 µs", "10 µs", "100 µs", "1 ms", "10 ms", "100 ms"];
 
-/// Draws the measurements as an SVG picture under `title`.
-pub fn drawing(title: &str, measurements: &[Measurement]) -> String {
+/// Renders the measurements as SVG under `title`.
+pub fn svg(title: &str, measurements: &[Measurement]) -> String {
     let mut svg = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" \
          font-family=\"Helvetica, Arial, sans-serif\" font-size=\"12\">\n\
@@ -69,7 +69,7 @@ fn counts(latency: &Latency) -> Vec<u64> {
     latency.counts(&(0..=RANGES).map(bound).collect::<Vec<_>>())
 }
 
-/// One histogram with its axes and the curves of every way of waiting.
+/// One histogram with its axes, and one curve for each kind of pacing.
 fn panel(svg: &mut String, left: f64, title: &str, latencies: &[(Pacing, &Latency)]) {
     let bottom = PANEL_TOP + PANEL_HEIGHT;
     let curves: Vec<_> = latencies.iter().map(|(pacing, latency)| (*pacing, counts(latency))).collect();
@@ -107,7 +107,7 @@ fn panel(svg: &mut String, left: f64, title: &str, latencies: &[(Pacing, &Latenc
     text(svg, (left - 7.0, PANEL_TOP - 14.0), "end", "fill=\"#444\"", "cycles");
 }
 
-/// The name of a way of waiting with its figures, under the histograms.
+/// The legend below the histograms: a kind of pacing with its figures.
 fn legend(svg: &mut String, left: f64, pass: &Measurement) {
     let top = PANEL_TOP + PANEL_HEIGHT + 36.0;
     let colour = colour(pass.pacing);
@@ -146,7 +146,7 @@ mod tests {
 
     #[test]
     fn a_title_with_signs_of_the_markup_stays_a_title() {
-        let svg = drawing("<can0> & \"co\"", &[]);
+        let svg = svg("<can0> & \"co\"", &[]);
         assert!(svg.contains(">&lt;can0&gt; &amp; \"co\"</text>"), "{svg}");
         assert!(svg.ends_with("</svg>\n"));
     }

@@ -1,17 +1,17 @@
-//! The report of a recording for people.
+//! Renders the report of a recording as text for people.
 
 use std::fmt::Write;
 
 use takt_rt::Rule;
 
 use super::{AxisCycle, RecordingReport};
-use crate::telemetry::picture::{self, Emphasis, latency_table, line, missed_slots, wrap};
+use crate::telemetry::render::{self, Emphasis, latency_table, line, missed_slots, wrap};
 use crate::telemetry::report::SetPointParts;
 use crate::telemetry::words;
 
 impl RecordingReport {
-    /// The report as text of at most 100 columns (but for paths, which are not broken).
-    pub fn picture(&self, emphasis: Emphasis) -> String {
+    /// The report as text of at most 100 columns. Paths are not broken and may be longer.
+    pub fn render(&self, emphasis: Emphasis) -> String {
         let mut text = String::new();
         let kind = if self.is_black_box { "black box" } else { "recording" };
         let cycle_ms = self.cycle_ns as f64 * 1e-6;
@@ -33,10 +33,10 @@ impl RecordingReport {
                     &[format!("{} (slot {})", cause.reason, cause.slot)],
                 );
             }
-            None => wrap(&mut text, "stop", 4, &["there is none in it".to_owned()]),
+            None => wrap(&mut text, "stop", 4, &["none".to_owned()]),
         }
         self.axis_cycles(&mut text, emphasis);
-        self.what_happened(&mut text, emphasis);
+        self.event_table(&mut text, emphasis);
         line(&mut text, "");
         let rows = [
             ("wake-up", &self.wake_ns),
@@ -76,16 +76,16 @@ impl RecordingReport {
         }
     }
 
-    fn what_happened(&self, text: &mut String, emphasis: Emphasis) {
+    fn event_table(&self, text: &mut String, emphasis: Emphasis) {
         if !self.events.is_empty() {
             line(text, "");
-            line(text, &emphasis.heading(&format!("{:>8} {:>10}  what happened", "slot", "s")));
+            line(text, &emphasis.heading(&format!("{:>8} {:>10}  event", "slot", "s")));
         }
         for event in &self.events {
             let is_of_cause = self.cause.as_ref().is_some_and(|cause| cause.slot == event.slot);
             let row = format!("{:>8} {:>10.3}  {}", event.slot, event.at_s, event.text);
-            let is_told_above = is_of_cause && event.text.starts_with("stop: ");
-            line(text, &if is_told_above { emphasis.bad(&cut(&row)) } else { cut(&row) });
+            let is_shown_above = is_of_cause && event.text.starts_with("stop: ");
+            line(text, &if is_shown_above { emphasis.bad(&cut(&row)) } else { cut(&row) });
         }
         if !self.emergencies.is_empty() {
             let lines: Vec<String> =
@@ -108,8 +108,8 @@ impl RecordingReport {
             let error = error
                 .map_or_else(|| "never enabled".to_owned(), |error| format!("{:.3} {milli}", error * 1e3));
             let SetPointParts { velocity, acceleration, jerk } = axis.set_point_part;
-            let [velocity, acceleration, jerk] = [velocity, acceleration, jerk].map(picture::part);
-            let name = picture::shortened(&axis.name, 16);
+            let [velocity, acceleration, jerk] = [velocity, acceleration, jerk].map(render::part);
+            let name = render::shortened(&axis.name, 16);
             line(text, &format!("{name:<16}{error:>18}{velocity:>14}{acceleration:>14}{jerk:>12}"));
         }
     }
@@ -125,7 +125,7 @@ impl RecordingReport {
         );
         line(text, &emphasis.heading(&titles));
         for bus in &self.buses {
-            let name = picture::shortened(&bus.name, 16);
+            let name = render::shortened(&bus.name, 16);
             let row = format!(
                 "{name:<16}{:>10.3}  {:<16}{:>10}{:>18}{:>20}",
                 bus.at_s, bus.state, bus.errors, bus.tx_overruns, bus.rx_overruns

@@ -1,21 +1,25 @@
-//! What was measured, for people.
+//! The measurements as text.
 
 use super::report::{JitterReport, PassReport};
 use crate::telemetry::Emphasis;
-use crate::telemetry::picture::{duration, histograms, latency_table, line, missed_slots, realtime};
+use crate::telemetry::render::{duration, histograms, latency_table, line, missed_slots, realtime};
 
 impl JitterReport {
     /// The report as text of at most 100 columns (but for commands, which are not broken).
-    pub fn picture(&self, emphasis: Emphasis) -> String {
+    pub fn render(&self, emphasis: Emphasis) -> String {
         let mut text = String::new();
         let cycle = duration(self.cycle_ns);
         let bus = self.bus.as_ref().map_or("no bus".to_owned(), |bus| format!("SYNC on {bus}"));
         line(
             &mut text,
-            &format!("{}  {} cycles of {cycle} each way, {bus}", emphasis.heading("jitter"), self.cycles),
+            &format!(
+                "{}  {} cycles of {cycle} for each kind of pacing, {bus}",
+                emphasis.heading("jitter"),
+                self.cycles
+            ),
         );
         if !self.is_whole {
-            line(&mut text, &emphasis.bad("interrupted: this is what there was by then"));
+            line(&mut text, &emphasis.bad("interrupted: these are the cycles measured until then"));
         }
         for pass in &self.passes {
             show_pass(&mut text, emphasis, pass);
