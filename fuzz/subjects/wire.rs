@@ -8,7 +8,7 @@ use takt::canopen::nmt::{ErrorControl, HeartbeatConsumer, NmtCommand};
 use takt::canopen::object::ObjectAddress;
 use takt::canopen::sdo::{SdoClient, SdoRequest, SdoResponse, SdoTiming, Transfer};
 use takt::canopen::sync::Sync;
-use takt::canopen::time::{TimeOfDay, system_time};
+use takt::canopen::time::TimeOfDay;
 use takt::config::Config;
 use takt::sim::SimulatedBus;
 use takt_rt::{
@@ -62,7 +62,6 @@ fn decode(mut input: Input<'_>) {
         }
         if let Some(time) = TimeOfDay::decode(&frame) {
             assert_eq!(TimeOfDay::decode(&time.frame()), Some(time), "{frame:?}");
-            system_time(time);
         }
         if let Some(sync) = Sync::decode(&frame) {
             let before = Sync { counter: input.bytes::<1>().first().copied() };

@@ -27,14 +27,6 @@ pub fn error_words(code: ErrorCode) -> &'static str {
     if code == MULTI_TURN_BATTERY { "battery voltage of the multi-turn encoder low" } else { code.words() }
 }
 
-/// The remedy for an error code that a fault reset does not clear.
-pub fn error_advice(code: ErrorCode) -> Option<&'static str> {
-    (code == MULTI_TURN_BATTERY).then_some(
-        "replace the battery, then write 1 to object 2242: this clears the fault, which a fault reset does not, and also \
-         the turn count, so the joint's zero must be set again",
-    )
-}
-
 /// The vendor's own protocol of firmware without CANopen. The request 0x0002 reads the position and changes nothing.
 /// Above node ID 63 its identifiers are those of other nodes' SDO.
 pub(super) fn other_protocol(node: u8) -> Option<OtherProtocol> {
@@ -331,10 +323,8 @@ mod tests {
     }
 
     #[test]
-    fn the_battery_fault_has_a_name_and_a_remedy() {
+    fn the_battery_fault_has_a_name() {
         assert_eq!(error_words(MULTI_TURN_BATTERY), "battery voltage of the multi-turn encoder low");
         assert_eq!(error_words(ErrorCode(0x8611)), "following error");
-        assert!(error_advice(MULTI_TURN_BATTERY).is_some_and(|advice| advice.contains("2242")));
-        assert_eq!(error_advice(ErrorCode(0x8611)), None);
     }
 }

@@ -9,7 +9,6 @@ use takt_rt::{Nanoseconds, controlword};
 use super::bring_up::BringUpTiming;
 use super::step::{Action, Check, Condition, Fact, ProcedureStep, ReadBack, ValueSource};
 use super::step_list::{StepList, rounded_up, turns, watched_heartbeat};
-use crate::canopen::emcy::ErrorCode;
 use crate::canopen::nmt::{NmtCommand, NmtState};
 use crate::canopen::object::{DataType, Object};
 use crate::canopen::objects::{self, PdoDirection, PdoParameters};
@@ -31,31 +30,6 @@ const NOT_STARTED: Check = Check::Masked { value: 0, mask: 0x03 };
 const ALARM_CODE: Object = Object::new(0x260E, 0, DataType::U16, "alarm code");
 const SPECIAL_FUNCTION: Object = Object::new(0x2619, 0, DataType::U16, "special function");
 const ACCELERATION: Object = Object::new(0x6083, 0, DataType::U32, "acceleration");
-
-/// The name of an alarm in object 260E (IIb.3).
-pub fn alarm_words(code: ErrorCode) -> Option<&'static str> {
-    Some(match code.0 {
-        0x10 => "battery power lost, multi-turn position lost",
-        0x12 => "blocked rotor",
-        0x14 => "loss of speed (stall)",
-        0x15 => "over-voltage, above 52 V",
-        0x20 => "communication lost (heartbeat of the master)",
-        _ => return None,
-    })
-}
-
-/// The remedy for an alarm.
-pub fn alarm_advice(code: ErrorCode) -> Option<&'static str> {
-    Some(match code.0 {
-        0x10 => "set the multi-turn zero again: takt drive CONFIG AXIS zero",
-        0x12 | 0x14 => "free the joint, then reset the fault: takt drive CONFIG AXIS clear-fault",
-        0x15 => {
-            "fit a brake resistor if regeneration causes it; power-cycle the drive if a fault reset does not clear it"
-        }
-        0x20 => "it clears when the master's heartbeat returns",
-        _ => return None,
-    })
-}
 
 /// From any state to pre-operational, configured, without torque.
 pub(super) fn configure(config: &Config, axis: &Axis, timing: &BringUpTiming) -> Vec<ProcedureStep> {
@@ -209,17 +183,4 @@ pub fn answers_sync(axis: &Axis) -> bool {
 /// Whether this drive has the mode.
 pub fn has_mode(control: &Control) -> bool {
     matches!(control, Control::Interpolated | Control::ProfilePosition | Control::ProfileVelocity)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_alarm_of_the_manual_has_a_name_and_a_remedy() {
-        for code in [0x10, 0x12, 0x14, 0x15, 0x20].map(ErrorCode) {
-            assert!(alarm_words(code).is_some() && alarm_advice(code).is_some(), "{code:?}");
-        }
-        assert_eq!(alarm_words(ErrorCode(0x11)), None);
-    }
 }

@@ -42,7 +42,7 @@ pub enum InjectError {
     UnknownNode(#[from] UnknownNode),
     /// The drive cannot have this defect.
     #[error(transparent)]
-    Afflict(#[from] InjectDefectError),
+    InjectDefect(#[from] InjectDefectError),
 }
 
 /// Who receives a foreign frame.

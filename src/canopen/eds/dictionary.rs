@@ -189,11 +189,6 @@ impl AccessType {
         Self::WORDS.iter().find(|(_, known)| *known == self).map_or("ro", |(word, _)| word)
     }
 
-    /// Whether it can be read.
-    pub const fn is_readable(self) -> bool {
-        !matches!(self, Self::WriteOnly)
-    }
-
     /// Whether it can be written.
     pub const fn is_writable(self) -> bool {
         !matches!(self, Self::ReadOnly | Self::Constant)

@@ -79,11 +79,6 @@ impl Expedited {
         Some(Self { bytes, length: Some(data.len() as u8) })
     }
 
-    /// Four bytes without an indicated size.
-    pub const fn without_size(bytes: [u8; 4]) -> Self {
-        Self { bytes, length: None }
-    }
-
     /// The bytes; all four when the size is not indicated.
     pub fn bytes(&self) -> &[u8] {
         self.bytes.get(..self.length.unwrap_or(4).into()).unwrap_or(&self.bytes)
