@@ -13,6 +13,9 @@ use crate::stop::{Origin, StopCause, StopReason};
 use crate::stop_category::StopCategory;
 use crate::watch::{NodeFault, TimingLevel};
 
+/// Cycles in a row whose set-points may be too late.
+const LATE_CYCLES_AT_MOST: u32 = 50;
+
 impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
     /// Begins a stop for everything that is wrong while drives may have torque.
     pub(super) fn check_faults(&mut self, buses: &[BusHealth]) {
@@ -20,10 +23,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
             return;
         }
         self.check_buses(buses);
-        if self.slots.level() == TimingLevel::Unfit {
-            let (missed, limit) = self.slots.unforgiven();
-            self.fail(Origin::Group, Fault::TimingUnfit { missed, limit });
-        }
+        self.check_timing();
         self.check_transmission();
         for index in 0..self.axes.len() {
             if let Some(fault) = self.check_axis(index) {
@@ -32,6 +32,17 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         }
         self.check_enable_timeout();
         self.take_power_if_cut_off();
+    }
+
+    /// Whether slots are missed too often. A thread that is late in every cycle cannot go on, however many slots may be missed.
+    fn check_timing(&mut self) {
+        if self.slots.level() == TimingLevel::Unfit {
+            let (missed, limit) = self.slots.unforgiven();
+            self.fail(Origin::Group, Fault::TimingUnfit { missed, limit });
+        } else if self.slots.late_cycles > LATE_CYCLES_AT_MOST {
+            let missed = self.slots.late_cycles;
+            self.fail(Origin::Group, Fault::TimingUnfit { missed, limit: LATE_CYCLES_AT_MOST });
+        }
     }
 
     fn check_enable_timeout(&mut self) {

@@ -89,7 +89,7 @@ impl StreamCommands {
         ];
         for (rule, value, limit, noise) in checks {
             // Not a number is beyond every limit.
-            if !(value.abs() <= limit * (1.0 + TOLERANCE) + noise) {
+            if value.is_nan() || value.abs() > limit * (1.0 + TOLERANCE) + noise {
                 return Err(Violation { rule, value, limit });
             }
         }
