@@ -127,6 +127,7 @@ pub(super) fn run_with(
     watch: impl FnMut(&Snapshot, Progress) -> Option<Interrupt>,
     remote: Option<Remote>,
 ) -> Result<Session, SessionError> {
+    config.validate_on_this_machine().map_err(AssembleError::from)?;
     let ownership = Ownership::of(config, options.if_owned)?;
     lead_as_owner(config, options, notify, watch, remote, ownership)
 }
@@ -141,7 +142,6 @@ fn lead_as_owner(
     mut ownership: Ownership,
 ) -> Result<Session, SessionError> {
     let mut clock = MonotonicClock::default();
-    config.validate_on_this_machine().map_err(AssembleError::from)?;
     let engine = Box::new(assemble::engine(config)?);
     let (ports, traces) = open_ports(config, options.fault_injector.as_deref())?;
     let (rt, mut host, log) = channels(&ChannelSizes::of(config));
