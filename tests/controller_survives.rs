@@ -115,7 +115,7 @@ fn a_recording_that_is_deleted_during_the_run_is_reported_and_the_motion_goes_on
     let child = place.start_and_wait_for_motion();
     fs::remove_file(&place.files()[0]).unwrap();
     let output = child.wait_with_output().unwrap();
-    let report = report(&output, 0);
+    let report = report(&output, 1);
     assert_arrived(&report);
     assert_eq!(
         (&report["telemetry"]["recording"], &report["telemetry"]["dropped"]),
@@ -147,7 +147,7 @@ fn a_folder_that_is_deleted_during_the_run_is_made_again_for_the_black_box() {
 fn a_file_size_limit_ends_the_recording_and_the_motion_goes_on() {
     let place = Place::new(&[]);
     let output = place.start(takt_with_file_size(600_000)).wait_with_output().unwrap();
-    let report = report(&output, 0);
+    let report = report(&output, 1);
     assert_arrived(&report);
     let failures = not_written(&report);
     assert!(failures.len() == 1 && failures[0].starts_with("the recording ends here: "), "{failures:?}");

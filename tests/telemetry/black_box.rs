@@ -195,7 +195,7 @@ fn the_metadata_has_the_reason_and_a_fault_that_follows_at_once_is_in_the_same_f
         ("category", "1"),
         ("axis", "slide"),
         ("value", "0.25"),
-        ("limit", "0.125"),
+        ("limit", "8"),
         ("slot", "50"),
         ("phase", "moving"),
     ] {

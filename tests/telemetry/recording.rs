@@ -98,7 +98,7 @@ fn events_are_recorded_as_text_and_as_numbers() {
         "stop: slide was 0.2500 m from its set-point (allowed: 0.1250 m) while moving; \
          category 1: decelerated, then power removed",
         "slide: emergency message: error 0x7305, register 0x21, manufacturer 01 02 03 04 05",
-        "the move was refused while holding: slide cannot go to 1.2500 m, beyond its position limit of 0.7500 m",
+        "the move was rejected while holding: slide cannot go to 1.2500 m, beyond its position limit of 0.7500 m",
     ];
     assert_eq!(texts, expected.map(|text| Value::Text(text.to_owned())));
     let (time, stop) = &events[1];
@@ -110,11 +110,11 @@ fn events_are_recorded_as_text_and_as_numbers() {
     for (field, value) in [("error_code", 0x7305), ("error_register", 0x21), ("manufacturer[4]", 5)] {
         assert_eq!(emergency[field], number(value), "{field}");
     }
-    let (_, refusal) = &events[3];
+    let (_, rejection) = &events[3];
     for (field, value) in
-        [("axis", 1.0), ("value", 1.25), ("limit", 0.75), ("request", 7.0), ("objection", 7.0)]
+        [("axis", 1.0), ("value", 1.25), ("limit", 0.75), ("request", 7.0), ("reason", 7.0)]
     {
-        assert_eq!(refusal[field], number(value), "{field}");
+        assert_eq!(rejection[field], number(value), "{field}");
     }
     assert_eq!(events[0].1["axis"], number(-1));
 }
@@ -132,6 +132,7 @@ fn a_recording_has_an_index_and_the_description_of_the_machine() {
         ("index", "1"),
         ("jerk_limit", "50"),
         ("name", "slide"),
+        ("plans_own_profile", "false"),
         ("unit", "m"),
         ("velocity_limit", "2"),
     ];
