@@ -9,7 +9,8 @@ use std::time::{Duration, Instant};
 use criterion::{Criterion, criterion_group, criterion_main};
 use takt::controller::channels::{ChannelSizes, HostSide, LogSide, RtSide, channels};
 use takt::telemetry::{
-    AxisDescription, Destination, Logger, LoggerOptions, Machine, SetPointMagnitudes, Unit, WallClock,
+    AxisDescription, Logger, LoggerOptions, Machine, RecordingDestination, SetPointMagnitudes, Unit,
+    WallClock,
 };
 use takt_rt::{CycleRecord, HostInterface, Snapshot};
 
@@ -79,6 +80,7 @@ fn logger(criterion: &mut Criterion) {
             name: format!("joint{index}"),
             bus: None,
             unit: Unit::Radian,
+            plans_own_profile: false,
             counts_per_unit: 83_443.0,
             limits: SetPointMagnitudes::default(),
         };
@@ -91,7 +93,8 @@ fn logger(criterion: &mut Criterion) {
             },
             wall_clock: WallClock::fixed(0),
             started_ns: 0,
-            recording: is_recorded.then(|| Destination::Stream("nowhere".to_owned(), Box::new(io::sink()))),
+            recording: is_recorded
+                .then(|| RecordingDestination::Stream("nowhere".to_owned(), Box::new(io::sink()))),
             candump: None,
             black_box: None,
             traces: Vec::new(),

@@ -5,7 +5,7 @@
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use takt::sim::erob::{ErobJoint, ErobParameters};
 use takt::sim::plant::{Encoder, JointParameters};
-use takt::sim::{BitRates, Drive, SimulatedBus, WireLength};
+use takt::sim::{Drive, SimulatedBus, WireBitRates, WireLength};
 use takt_rt::{BusPort, Frame, Id, ReceiveBatch};
 
 fn drive(node: u8) -> Box<dyn Drive> {
@@ -41,7 +41,7 @@ struct Running {
 
 impl Running {
     fn new(drives: u8) -> Self {
-        let rates = BitRates { nominal: 1_000_000, data: None };
+        let rates = WireBitRates { nominal: 1_000_000, data: None };
         let bus = SimulatedBus::with_drives(rates, u64::MAX, (1..=drives).map(drive).collect());
         let mut running = Self { bus, drives, cycle: 0 };
         for node in 1..=drives {

@@ -1,5 +1,5 @@
-//! Embeds the controller in a program of one's own: moves the arm, looks at it on the way, and streams set-points of its
-//! own making, a slow circle of the first two joints.
+//! Embeds the controller in a program. It moves the arm, prints the positions, and streams its own set-points: a slow circle
+//! of the first two joints.
 //!
 //! ```text
 //! cargo run --release --example embed configs/arm6-erob.toml
@@ -19,7 +19,7 @@ use takt_rt::plan::State;
 fn main() -> miette::Result<()> {
     let path = std::env::args().nth(1).map_or_else(|| PathBuf::from("configs/arm6-erob.toml"), PathBuf::from);
     let mut config = Config::load(&path)?;
-    // This thread is not real-time: it makes its set-points unevenly, and what comes of that is held to the limits.
+    // This thread is not real-time, so its set-points come unevenly. Those beyond the limits are clamped.
     config.axes.iter_mut().for_each(|axis| axis.on_violation = OnViolation::Clamp);
     let cycle_ns = config.cycle.period_ns;
     let mut arm = Controller::start(config, SessionOptions::default()).into_diagnostic()?;
@@ -28,10 +28,10 @@ fn main() -> miette::Result<()> {
     let targets: Vec<f64> = arm.axes().iter().map(middle).collect();
     let motion = arm.move_to(&targets).into_diagnostic()?;
     arm.wait(motion, Duration::from_secs(30)).into_diagnostic()?;
-    show(&arm, "moved");
+    print(&arm, "moved");
 
-    // A set-point for every axis in every slot, made for the time of that slot and not for the time at which this thread
-    // happens to run: what the drives get is then as smooth as what is computed.
+    // In every slot, one set-point for every axis, computed for the time of that slot. The present time of this thread would
+    // make the set-points uneven.
     arm.begin_stream().into_diagnostic()?;
     let period_s = cycle_ns as f64 * 1e-9;
     let (first, mut last) = (arm.state().slot, 0);
@@ -43,7 +43,7 @@ fn main() -> miette::Result<()> {
         }
         last = slot;
         let at = |slot: f64| circle(&targets, (slot - first as f64) * period_s);
-        // With the velocity, so that a set-point that comes too late is bridged smoothly.
+        // With the velocity, the controller can bridge a late set-point smoothly.
         let (now, next) = (at(slot as f64), at(slot as f64 + 0.01));
         let set_points: Vec<State> = (now.iter().zip(next))
             .map(|(&position, next)| State {
@@ -54,16 +54,16 @@ fn main() -> miette::Result<()> {
             .collect();
         arm.stream(&set_points, Duration::from_millis(50)).into_diagnostic()?;
     }
-    show(&arm, "streamed");
-    println!("{} set-points were held to the limits", arm.state().clamped);
+    print(&arm, "streamed");
+    println!("{} set-points were clamped to the limits", arm.state().clamped);
 
     let session = arm.finish().into_diagnostic()?;
     println!("{:?} after {} cycles", session.outcome, session.log.statistics.cycles);
     Ok(())
 }
 
-/// The first two joints swing around their targets, from rest and to rest: the amplitude grows and fades with the fourth
-/// power of a sine.
+/// The first two joints circle around their targets, from rest to rest. The amplitude rises and falls with the fourth power
+/// of a sine.
 fn circle(targets: &[f64], time_s: f64) -> Vec<f64> {
     let amplitude = 0.1 * (TAU / 6.0 * time_s).sin().max(0.0).powi(4);
     let mut positions = targets.to_vec();
@@ -73,9 +73,9 @@ fn circle(targets: &[f64], time_s: f64) -> Vec<f64> {
     positions
 }
 
-fn show(arm: &Controller, what: &str) {
+fn print(arm: &Controller, label: &str) {
     let state = arm.state();
-    println!("{what}: {:?}{}", state.phase, state.stop.map_or(String::new(), |stop| format!(", {stop:?}")));
+    println!("{label}: {:?}{}", state.phase, state.stop.map_or(String::new(), |stop| format!(", {stop:?}")));
     for (axis, now) in arm.axes().iter().zip(state.axes) {
         println!("  {:<10} {:+.4}", axis.name, now.position);
     }

@@ -1,9 +1,9 @@
 //! Hands cycle records to the logger's ring, publishes snapshots, and passes the frames of a cycle through a traced
 //! port and a plain one, for counting instructions; see `benches/instructions`.
 //!
-//! The work is named by the first argument (`push-AXES`, `publish-AXES`, `traced-AXES`, `untraced-AXES`) and repeated as
-//! often as the second says; the difference between two repetition counts is free of the start-up. What was pushed is
-//! also taken again, but for frames, since that is the logger's work: the trace holds those of all repetitions.
+//! The first argument names the work (`push-AXES`, `publish-AXES`, `traced-AXES`, `untraced-AXES`), the second one the
+//! number of repetitions. The difference between two repetition counts does not include the start-up. Records are also
+//! taken out again. Frames are not, since that is the work of the logger: the trace holds those of all repetitions.
 
 use std::hint::black_box;
 
@@ -11,12 +11,12 @@ use takt::bus::trace::traced;
 use takt::controller::channels::{ChannelSizes, channels};
 use takt_rt::{BusHealth, BusPort, CycleRecord, Frame, HostInterface, Id, ReceiveBatch, Received, Snapshot};
 
-/// A bus on which so many drives answer SYNC.
-struct Answering {
+/// A bus with drives that answer SYNC.
+struct DriveBus {
     drives: u8,
 }
 
-impl BusPort for Answering {
+impl BusPort for DriveBus {
     fn send(&mut self, _now_ns: u64, frames: &[Frame]) -> usize {
         frames.len()
     }
@@ -71,8 +71,8 @@ fn main() {
     });
     let record = CycleRecord { axis_count: axes, ..CycleRecord::default() };
     let snapshot = Snapshot { axis_count: axes, bus_count: buses as u8, ..Snapshot::default() };
-    let mut plain = Answering { drives: axes };
-    let (mut port, _trace) = traced(Answering { drives: axes }, "bus", 1 << 18);
+    let mut plain = DriveBus { drives: axes };
+    let (mut port, _trace) = traced(DriveBus { drives: axes }, "bus", 1 << 18);
     for now_ns in 0..repetitions.into() {
         match work {
             "push" => {

@@ -1,5 +1,5 @@
-//! Runs a configuration against its simulated drives in virtual time: ten seconds of motion in a tenth of a second, the
-//! same every time. For testing a motion program before it meets hardware.
+//! Runs a configuration with simulated drives in virtual time: ten seconds of motion take a tenth of a second, and every run
+//! is the same. Use it to test a motion program without hardware.
 //!
 //! ```text
 //! cargo run --release --example virtual_time configs/arm6-erob.toml

@@ -19,6 +19,23 @@ pub fn printable_path(path: &Path) -> String {
     printable(&path.display().to_string())
 }
 
+/// The beginning of a text that may be of any length, for a message.
+pub fn excerpt(text: &str) -> String {
+    const LETTERS: usize = 80;
+    let mut shown = printable(text.get(..letter_start(text, 4 * LETTERS)).unwrap_or_default());
+    if let Some((end, _)) = shown.char_indices().nth(LETTERS) {
+        shown.truncate(end);
+        shown.push('…');
+    }
+    shown
+}
+
+/// The last beginning of a letter at or before a byte; the end of a text that is shorter.
+pub fn letter_start(text: &str, at: usize) -> usize {
+    let is_start = |at: &usize| text.is_char_boundary(*at);
+    (0..=at.min(text.len())).rev().find(is_start).unwrap_or(0)
+}
+
 const fn replacement(letter: char) -> char {
     match letter {
         '\n' | '\t' => letter,
@@ -33,7 +50,7 @@ const fn replacement(letter: char) -> char {
 
 #[cfg(test)]
 mod tests {
-    use super::printable;
+    use super::{excerpt, printable};
     use proptest::prelude::*;
 
     #[test]
@@ -41,6 +58,13 @@ mod tests {
         assert_eq!(printable("\u{1B}[2J\u{9B}1m\u{202E}\rä\0"), "?[2J¿1m\u{FFFD}?ä?");
         let plain = "k = \"µs\"\t# \u{2026}\r\nnext 日本\n";
         assert_eq!(printable(plain), plain);
+    }
+
+    #[test]
+    fn a_long_text_is_cut_and_a_short_one_is_whole() {
+        assert_eq!(excerpt("left\u{1B}"), "left?");
+        assert_eq!(excerpt(&"ä".repeat(80)), "ä".repeat(80));
+        assert_eq!(excerpt(&"日".repeat(1_000_000)), format!("{}…", "日".repeat(80)));
     }
 
     proptest! {

@@ -1,4 +1,4 @@
-//! The LSS master against simulated devices, several at once.
+//! The LSS master against several simulated devices at once.
 
 use proptest::prelude::*;
 use takt::canopen::lss::{
@@ -14,8 +14,8 @@ struct Bus {
     now_ns: u64,
     master: LssMaster,
     devices: Vec<LssDevice>,
-    /// What the devices said beside answers: boot-up messages.
-    heard: Vec<Frame>,
+    /// The frames of the devices besides LSS replies: boot-up messages.
+    boot_ups: Vec<Frame>,
 }
 
 impl Bus {
@@ -24,7 +24,7 @@ impl Bus {
             now_ns: 7_000_000_000,
             master: LssMaster::new(LssTiming::default()),
             devices: devices.into_iter().collect(),
-            heard: vec![],
+            boot_ups: vec![],
         }
     }
 
@@ -35,7 +35,7 @@ impl Bus {
                 for device in &mut self.devices {
                     let Some(answer) = device.receive(&frame) else { continue };
                     if answer.id().value() != 0x7E4 {
-                        self.heard.push(answer);
+                        self.boot_ups.push(answer);
                     } else {
                         self.master.receive(&answer);
                     }
@@ -59,18 +59,18 @@ fn unconfigured(serials: &[u32]) -> Bus {
 }
 
 #[test]
-fn a_device_is_selected_by_its_identity_configured_stored_and_boots() {
+fn a_device_is_selected_by_identity_configured_stored_and_boots() {
     let mut bus = unconfigured(&[10, 11]);
     assert_eq!(bus.run(LssTask::SwitchSelective(address(11))), Ok(LssOutcome::Done));
     assert_eq!(bus.run(LssTask::InquireAddress), Ok(LssOutcome::Device(address(11))));
-    assert_eq!(bus.run(LssTask::Inquire(Inquiry::Node)), Ok(LssOutcome::Told(255)));
+    assert_eq!(bus.run(LssTask::Inquire(Inquiry::Node)), Ok(LssOutcome::Value(255)));
     assert_eq!(bus.run(LssTask::ConfigureNode(5)), Ok(LssOutcome::Done));
     assert_eq!(bus.run(LssTask::ConfigureBitTiming(BitTiming::Kilobits500)), Ok(LssOutcome::Done));
     assert_eq!(bus.run(LssTask::Store), Ok(LssOutcome::Done));
     assert_eq!(bus.run(LssTask::ActivateBitTiming { delay_ms: 100 }), Ok(LssOutcome::Done));
-    assert!(bus.heard.is_empty(), "it is silent until it is switched");
+    assert!(bus.boot_ups.is_empty(), "it is silent until it is switched");
     assert_eq!(bus.run(LssTask::SwitchGlobal(LssMode::Waiting)), Ok(LssOutcome::Done));
-    assert_eq!(format!("{:?}", bus.heard), "[705#00]");
+    assert_eq!(format!("{:?}", bus.boot_ups), "[705#00]");
     assert_eq!((bus.devices[0].node(), bus.devices[1].node()), (None, Some(5)));
     assert_eq!(bus.devices[1].bit_timing(), BitTiming::Kilobits500);
     let boot_up = bus.devices[1].power_cycle();
@@ -78,7 +78,7 @@ fn a_device_is_selected_by_its_identity_configured_stored_and_boots() {
 }
 
 #[test]
-fn what_is_refused_or_not_answered_is_an_error() {
+fn a_refused_or_unanswered_request_is_an_error() {
     let mut bus = unconfigured(&[10]);
     let silence = Err(LssError::NoReply { reply_timeout_ns: 500 * MILLISECOND_NS });
     assert_eq!(bus.run(LssTask::SwitchSelective(address(9))), silence);
@@ -94,7 +94,7 @@ fn what_is_refused_or_not_answered_is_an_error() {
 }
 
 #[test]
-fn devices_are_found_by_a_span_of_identities_and_by_having_no_node_number() {
+fn devices_are_found_by_an_identity_range_and_by_having_no_node_id() {
     let mut bus = unconfigured(&[10]);
     bus.devices.push(LssDevice::new(address(20), Some(3)));
     let mut exists = |low, high| {
@@ -106,18 +106,18 @@ fn devices_are_found_by_a_span_of_identities_and_by_having_no_node_number() {
     assert_eq!(bus.run(LssTask::IdentifyUnconfigured), Ok(LssOutcome::Exists(true)));
     bus.devices.remove(0);
     assert_eq!(bus.run(LssTask::IdentifyUnconfigured), Ok(LssOutcome::Exists(false)));
-    assert_eq!(bus.run(LssTask::FastScan([None; 4])), Ok(LssOutcome::Nobody));
+    assert_eq!(bus.run(LssTask::FastScan([None; 4])), Ok(LssOutcome::NotFound));
 }
 
 #[test]
-fn fast_scan_finds_one_device_after_the_other_and_gives_each_a_node_number() {
+fn fast_scan_finds_each_device_in_turn_and_assigns_a_node_id() {
     let mut bus = unconfigured(&[0xDEAD_BEEF, 3, 0xFFFF_FFFF, 0x8000_0000, 0]);
     let mut found = vec![];
     for node in 1.. {
         match bus.run(LssTask::FastScan([None; 4])).unwrap() {
             LssOutcome::Device(address) => found.push(address.serial),
             outcome => {
-                assert_eq!(outcome, LssOutcome::Nobody);
+                assert_eq!(outcome, LssOutcome::NotFound);
                 break;
             }
         }
@@ -125,11 +125,11 @@ fn fast_scan_finds_one_device_after_the_other_and_gives_each_a_node_number() {
         assert_eq!(bus.run(LssTask::SwitchGlobal(LssMode::Waiting)), Ok(LssOutcome::Done));
     }
     assert_eq!(found, [0, 3, 0x8000_0000, 0xDEAD_BEEF, 0xFFFF_FFFF], "the lowest identity first");
-    assert_eq!(bus.heard.len(), 5);
+    assert_eq!(bus.boot_ups.len(), 5);
 }
 
 #[test]
-fn what_is_known_beforehand_is_asked_for_at_once() {
+fn known_parts_of_the_identity_are_confirmed_in_one_request() {
     let known = [Some(0x331), Some(1), Some(0x100), None];
     let mut bus = unconfigured(&[42]);
     let began_ns = bus.now_ns;
@@ -138,13 +138,13 @@ fn what_is_known_beforehand_is_asked_for_at_once() {
     assert_eq!(questions, 1 + 3 + 32 + 1);
     assert_eq!(bus.devices[0].mode(), LssMode::Configuration);
     let other = [Some(0x332), None, None, None];
-    assert_eq!(unconfigured(&[42]).run(LssTask::FastScan(other)), Ok(LssOutcome::Nobody));
+    assert_eq!(unconfigured(&[42]).run(LssTask::FastScan(other)), Ok(LssOutcome::NotFound));
 }
 
 #[test]
-fn an_identity_put_together_from_lost_answers_is_nobodys() {
+fn an_identity_assembled_from_lost_replies_is_rejected() {
     let mut bus = unconfigured(&[42]);
-    // The answer to the first question comes, and then one is lost.
+    // The reply to the first request arrives, and a later one is lost.
     bus.master.start(LssTask::FastScan([None; 4])).unwrap();
     let mut asked = 0;
     let outcome = loop {

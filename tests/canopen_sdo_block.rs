@@ -1,15 +1,15 @@
-//! SDO block transfer: conversations that are exact to the byte, and a server that loses frames.
+//! SDO block transfer: exchanges exact to the byte, and a server that loses frames.
 
 use proptest::prelude::*;
 use takt::canopen::object::ObjectAddress;
 use takt::canopen::sdo::{
-    AbortCode, BlockSegment, BlockSize, Client, Completed, Expedited, Request, Response, SdoError, Timing,
-    Transfer, Uploaded,
+    AbortCode, BlockSegment, BlockSize, Completed, Expedited, SdoClient, SdoError, SdoRequest, SdoResponse,
+    SdoTiming, Transfer, Uploaded,
 };
 use takt_rt::{Frame, Id};
 
 const NODE: u8 = 2;
-const TIMING: Timing = Timing { reply_timeout_ns: 500, retries: 2 };
+const TIMING: SdoTiming = SdoTiming { reply_timeout_ns: 500, retries: 2 };
 const DOMAIN: ObjectAddress = ObjectAddress::new(0x1F50, 1);
 
 fn bytes(hex: &str) -> [u8; 8] {
@@ -17,14 +17,14 @@ fn bytes(hex: &str) -> [u8; 8] {
     bytes.try_into().unwrap()
 }
 
-fn client(transfer: Transfer) -> Client {
-    let mut client = Client::new(NODE, TIMING);
+fn client(transfer: Transfer) -> SdoClient {
+    let mut client = SdoClient::new(NODE, TIMING);
     client.start(transfer).unwrap();
     client
 }
 
-/// Plays a conversation: `>` is sent by the client, `<` by the server.
-fn play(client: &mut Client, conversation: &[&str]) {
+/// Plays an exchange: `>` is sent by the client, `<` by the server.
+fn play(client: &mut SdoClient, conversation: &[&str]) {
     for line in conversation {
         match line.split_at(2) {
             ("> ", hex) => {
@@ -68,7 +68,7 @@ fn an_object_is_read_in_blocks() {
 }
 
 #[test]
-fn an_object_is_written_in_blocks_of_the_servers_size() {
+fn an_object_is_written_in_blocks_of_the_size_that_the_server_sets() {
     let mut client = client(Transfer::BlockDownload { object: DOMAIN, data: b"123456789".into() });
     play(
         &mut client,
@@ -87,7 +87,7 @@ fn an_object_is_written_in_blocks_of_the_servers_size() {
 }
 
 #[test]
-fn what_was_not_acknowledged_is_sent_again() {
+fn unacknowledged_segments_are_sent_again() {
     let data: Vec<u8> = (1..=21).collect();
     let mut client = client(Transfer::BlockDownload { object: DOMAIN, data });
     play(
@@ -110,7 +110,7 @@ fn what_was_not_acknowledged_is_sent_again() {
 }
 
 #[test]
-fn a_server_without_block_transfer_is_asked_for_segments() {
+fn a_server_without_block_transfer_gets_a_segmented_transfer() {
     let mut reading = client(Transfer::BlockUpload { object: DOMAIN });
     play(
         &mut reading,
@@ -138,7 +138,7 @@ fn a_server_without_block_transfer_is_asked_for_segments() {
 }
 
 #[test]
-fn four_bytes_are_not_worth_a_block() {
+fn four_bytes_are_transferred_expedited() {
     let mut client = client(Transfer::BlockDownload { object: DOMAIN, data: vec![1, 2, 3, 4] });
     play(&mut client, &["> 23 50 1F 01 01 02 03 04", "< 60 50 1F 01 00 00 00 00"]);
     assert_eq!(client.take_outcome(), Some(Ok(Completed::Downloaded)));
@@ -152,7 +152,7 @@ fn other_aborts_end_a_block_transfer() {
 }
 
 #[test]
-fn an_abort_between_segments_is_not_taken_for_one() {
+fn an_abort_between_segments_is_not_read_as_a_segment() {
     let mut client = client(Transfer::BlockUpload { object: DOMAIN });
     play(
         &mut client,
@@ -187,7 +187,7 @@ fn a_wrong_checksum_aborts_the_transfer() {
 }
 
 #[test]
-fn blocks_that_never_arrive_end_the_transfer() {
+fn the_transfer_ends_when_no_block_arrives() {
     let mut writing = client(Transfer::BlockDownload { object: DOMAIN, data: vec![9; 7] });
     let (segment, nothing) = ("> 81 09 09 09 09 09 09 09", "< A2 00 7F 00 00 00 00 00");
     play(
@@ -220,7 +220,7 @@ struct Server {
     received: Vec<u8>,
     last: u8,
     has_ended: bool,
-    /// The client has begun a block download and not ended it.
+    /// Whether the client has begun a block download that has not ended.
     is_receiving: bool,
 }
 
@@ -239,47 +239,47 @@ impl Server {
         }
     }
 
-    /// Whether the next segment is lost; nothing is when the losses are used up.
+    /// Whether the next segment is lost. After the end of the list, no segment is lost.
     fn loses(&mut self) -> bool {
         self.losses.pop().unwrap_or(false)
     }
 
     fn receive(&mut self, frame: &Frame) -> Vec<[u8; 8]> {
         let raw: [u8; 8] = frame.payload().try_into().unwrap();
-        let payload = |response: Response| response.frame(NODE).payload().try_into().unwrap();
+        let payload = |response: SdoResponse| response.frame(NODE).payload().try_into().unwrap();
         if self.is_receiving && raw[0] & 0x7F <= SERVER_BLOCK.segments() && raw[0] != 0x80 {
             return self.take(BlockSegment::decode(raw).unwrap()).map(payload).into_iter().collect();
         }
-        match Request::decode(frame).unwrap().1 {
-            Request::BlockUpload { object, .. } => {
+        match SdoRequest::decode(frame).unwrap().1 {
+            SdoRequest::BlockUpload { object, .. } => {
                 self.sent = 0;
                 let size = Some(self.data.len() as u32);
-                vec![payload(Response::BlockUpload { object, size, has_crc: true })]
+                vec![payload(SdoResponse::BlockUpload { object, size, has_crc: true })]
             }
-            Request::BlockUploadStart => self.block(32),
-            Request::BlockAcknowledge { last, block_size } => {
+            SdoRequest::BlockUploadStart => self.block(32),
+            SdoRequest::BlockAcknowledge { last, block_size } => {
                 self.sent += 7 * usize::from(last);
                 if self.sent < self.data.len() {
                     return self.block(block_size.segments());
                 }
                 let unused = (self.sent - self.data.len()) as u8;
-                vec![payload(Response::BlockUploadEnd { unused, crc: crc(&self.data) })]
+                vec![payload(SdoResponse::BlockUploadEnd { unused, crc: crc(&self.data) })]
             }
-            Request::BlockUploadEnd => {
+            SdoRequest::BlockUploadEnd => {
                 self.has_ended = true;
                 vec![]
             }
-            Request::BlockDownload { object, .. } => {
+            SdoRequest::BlockDownload { object, .. } => {
                 (self.received, self.last, self.is_receiving) = (vec![], 0, true);
-                vec![payload(Response::BlockDownload { object, block_size: SERVER_BLOCK, has_crc: true })]
+                vec![payload(SdoResponse::BlockDownload { object, block_size: SERVER_BLOCK, has_crc: true })]
             }
-            Request::BlockDownloadEnd { unused, crc: told } => {
+            SdoRequest::BlockDownloadEnd { unused, crc: told } => {
                 self.received.truncate(self.received.len() - usize::from(unused));
                 assert_eq!(told, crc(&self.received));
                 (self.has_ended, self.is_receiving) = (true, false);
-                vec![payload(Response::BlockDownloadEnd)]
+                vec![payload(SdoResponse::BlockDownloadEnd)]
             }
-            Request::Abort { .. } => {
+            SdoRequest::Abort { .. } => {
                 self.is_receiving = false;
                 vec![]
             }
@@ -297,18 +297,18 @@ impl Server {
         all.collect::<Vec<_>>().into_iter().filter(|_| !self.loses()).collect()
     }
 
-    fn take(&mut self, segment: BlockSegment) -> Option<Response> {
+    fn take(&mut self, segment: BlockSegment) -> Option<SdoResponse> {
         let is_lost = self.loses();
         if !is_lost && segment.number() == self.last + 1 {
             self.received.extend(segment.data());
             self.last = segment.number();
         }
-        // A server acknowledges when the block is full or the last segment has come; a lost one it waits for in vain.
+        // A server acknowledges a full block or the last segment. It waits without end for a lost last segment.
         if is_lost || (segment.number() < SERVER_BLOCK.segments() && !segment.is_last()) {
             return None;
         }
         let last = std::mem::take(&mut self.last);
-        Some(Response::BlockAcknowledge { last, block_size: SERVER_BLOCK })
+        Some(SdoResponse::BlockAcknowledge { last, block_size: SERVER_BLOCK })
     }
 }
 
@@ -318,8 +318,8 @@ fn crc(data: &[u8]) -> u16 {
     data.iter().fold(0, |crc: u16, byte| crc << 8 ^ table(crc & 0xFF00 ^ u16::from(*byte) << 8))
 }
 
-/// Runs until there is an outcome; time passes when nobody has anything to say.
-fn run(client: &mut Client, server: &mut Server) -> Result<Completed, SdoError> {
+/// Runs until the transfer has ended. Time passes while neither side has a frame to send.
+fn run(client: &mut SdoClient, server: &mut Server) -> Result<Completed, SdoError> {
     let mut now_ns = 0;
     for _ in 0..100_000 {
         let mut replies = vec![];
@@ -340,7 +340,7 @@ fn run(client: &mut Client, server: &mut Server) -> Result<Completed, SdoError> 
 
 proptest! {
     #[test]
-    fn whatever_segments_are_lost_an_upload_brings_the_servers_data_or_fails(
+    fn an_upload_with_lost_segments_returns_the_servers_data_or_fails(
         data in prop::collection::vec(any::<u8>(), 1..600),
         losses in prop::collection::vec(prop::bool::weighted(0.1), 0..200),
     ) {
@@ -356,7 +356,7 @@ proptest! {
     }
 
     #[test]
-    fn whatever_segments_are_lost_a_download_leaves_the_clients_data_or_fails(
+    fn a_download_with_lost_segments_writes_the_clients_data_or_fails(
         data in prop::collection::vec(any::<u8>(), 5..600),
         losses in prop::collection::vec(prop::bool::weighted(0.05), 0..200),
     ) {
@@ -373,9 +373,9 @@ proptest! {
         }
     }
 
-    /// Zeros have the checksum 0, so that some of these uploads succeed.
+    /// Zeros have the checksum 0, so some of these uploads succeed.
     #[test]
-    fn arbitrary_frames_never_panic_and_never_end_an_upload_without_the_checksum_of_its_data(
+    fn arbitrary_frames_never_panic_and_never_complete_an_upload_with_a_wrong_checksum(
         frames in prop::collection::vec(
             (
                 prop_oneof![0xC0..0xE0u8, 1..5u8, 0x81..0x85u8, any::<u8>()],
@@ -404,6 +404,6 @@ fn an_expedited_answer_does_not_end_a_block_transfer() {
     let mut client = client(Transfer::BlockUpload { object: DOMAIN });
     client.poll(0).unwrap();
     let data = Expedited::of(&[1]).unwrap();
-    client.receive(&Response::UploadExpedited { object: DOMAIN, data }.frame(NODE));
+    client.receive(&SdoResponse::UploadExpedited { object: DOMAIN, data }.frame(NODE));
     assert_eq!(client.take_outcome(), None);
 }

@@ -1,27 +1,27 @@
-//! The SDO client in conversations that are exact to the byte.
+//! The SDO client in exchanges that are exact to the byte.
 
 use proptest::prelude::*;
 use takt::canopen::object::{DataType, ObjectAddress};
 use takt::canopen::sdo::{
-    AbortCode, Busy, Client, Completed, MAX_UPLOAD_BYTES, SdoError, Timing, Transfer, Uploaded,
+    AbortCode, Completed, MAX_UPLOAD_BYTES, SdoBusy, SdoClient, SdoError, SdoTiming, Transfer, Uploaded,
 };
 use takt_rt::{Frame, Id};
 
 const NODE: u8 = 2;
-const TIMING: Timing = Timing { reply_timeout_ns: 500, retries: 2 };
+const TIMING: SdoTiming = SdoTiming { reply_timeout_ns: 500, retries: 2 };
 const MODE: ObjectAddress = ObjectAddress::new(0x6060, 0);
 const DISPLAY: ObjectAddress = ObjectAddress::new(0x6061, 0);
 const NAME: ObjectAddress = ObjectAddress::new(0x1008, 0);
 
-/// A client and what the test says to it.
-struct Conversation {
-    client: Client,
+/// A client and the replies that the test gives it.
+struct Exchange {
+    client: SdoClient,
     now_ns: u64,
 }
 
-impl Conversation {
+impl Exchange {
     fn new(transfer: Transfer) -> Self {
-        let mut client = Client::new(NODE, TIMING);
+        let mut client = SdoClient::new(NODE, TIMING);
         client.start(transfer).unwrap();
         Self { client, now_ns: 0 }
     }
@@ -44,12 +44,12 @@ impl Conversation {
         self
     }
 
-    fn is_silent(&mut self) -> &mut Self {
+    fn sends_nothing(&mut self) -> &mut Self {
         assert_eq!(self.client.poll(self.now_ns), None);
         self
     }
 
-    fn hears(&mut self, hex: &str) -> &mut Self {
+    fn receives(&mut self, hex: &str) -> &mut Self {
         self.client.receive(&reply(&bytes(hex)));
         self
     }
@@ -84,37 +84,37 @@ fn uploaded(bytes: &[u8]) -> Result<Completed, SdoError> {
 
 #[test]
 fn an_object_is_written_in_one_frame_each_way() {
-    Conversation::download(MODE, &[8])
+    Exchange::download(MODE, &[8])
         .sends("2F 60 60 00 08 00 00 00")
-        .is_silent()
+        .sends_nothing()
         .is_open()
-        .hears("60 60 60 00 00 00 00 00")
+        .receives("60 60 60 00 00 00 00 00")
         .ends(Ok(Completed::Downloaded))
-        .is_silent();
+        .sends_nothing();
 }
 
 #[test]
-fn two_three_and_four_bytes_are_told_apart_by_the_command_byte() {
+fn the_command_byte_gives_the_size_of_two_three_and_four_bytes() {
     for (data, frame) in [
         (&[1, 2][..], "2B 60 60 00 01 02 00 00"),
         (&[1, 2, 3][..], "27 60 60 00 01 02 03 00"),
         (&[1, 2, 3, 4][..], "23 60 60 00 01 02 03 04"),
     ] {
-        Conversation::download(MODE, data).sends(frame);
+        Exchange::download(MODE, data).sends(frame);
     }
 }
 
 #[test]
 fn an_object_is_read_in_one_frame_each_way() {
-    Conversation::upload(DISPLAY)
+    Exchange::upload(DISPLAY)
         .sends("40 61 60 00 00 00 00 00")
-        .hears("4F 61 60 00 08 00 00 00")
+        .receives("4F 61 60 00 08 00 00 00")
         .ends(uploaded(&[8]));
 }
 
 #[test]
-fn a_reply_that_does_not_tell_its_size_is_read_by_the_type_of_the_object() {
-    let mut client = Client::new(NODE, TIMING);
+fn a_reply_without_a_size_is_read_by_the_data_type_of_the_object() {
+    let mut client = SdoClient::new(NODE, TIMING);
     client.start(Transfer::Upload { object: DISPLAY }).unwrap();
     client.poll(0).unwrap();
     client.receive(&reply(&bytes("42 61 60 00 FE 00 00 00")));
@@ -123,7 +123,7 @@ fn a_reply_that_does_not_tell_its_size_is_read_by_the_type_of_the_object() {
 }
 
 #[test]
-fn a_reply_of_another_length_than_the_type_is_no_number() {
+fn a_reply_of_another_length_than_the_data_type_is_not_a_number() {
     let two = Uploaded { bytes: vec![1, 0], is_size_known: true };
     assert_eq!((two.number(DataType::I8), two.number(DataType::I32)), (None, None));
     assert_eq!(two.number(DataType::U16), Some(1));
@@ -131,18 +131,18 @@ fn a_reply_of_another_length_than_the_type_is_no_number() {
 
 #[test]
 fn a_text_is_read_in_segments_with_alternating_toggle() {
-    let mut conversation = Conversation::upload(NAME);
+    let mut conversation = Exchange::upload(NAME);
     conversation
         .sends("40 08 10 00 00 00 00 00")
-        .hears("41 08 10 00 10 00 00 00")
+        .receives("41 08 10 00 10 00 00 00")
         .sends("60 00 00 00 00 00 00 00")
-        .hears("00 65 52 6F 62 20 6A 6F")
+        .receives("00 65 52 6F 62 20 6A 6F")
         .sends("70 00 00 00 00 00 00 00")
-        .hears("10 69 6E 74 20 38 30 48")
+        .receives("10 69 6E 74 20 38 30 48")
         .sends("60 00 00 00 00 00 00 00")
-        .hears("0B 49 00 00 00 00 00 00")
-        .is_silent();
-    // The last segment holds two bytes (n = 5): "I" and a zero that belongs to the sixteen announced.
+        .receives("0B 49 00 00 00 00 00 00")
+        .sends_nothing();
+    // The last segment holds two bytes (n = 5): "I" and a zero, which completes the announced sixteen bytes.
     let Some(Ok(Completed::Uploaded(uploaded))) = conversation.client.take_outcome() else {
         panic!("not read")
     };
@@ -151,98 +151,98 @@ fn a_text_is_read_in_segments_with_alternating_toggle() {
 
 #[test]
 fn segments_without_an_announced_size_are_read_to_the_last_one() {
-    Conversation::upload(NAME)
+    Exchange::upload(NAME)
         .sends("40 08 10 00 00 00 00 00")
-        .hears("40 08 10 00 00 00 00 00")
+        .receives("40 08 10 00 00 00 00 00")
         .sends("60 00 00 00 00 00 00 00")
-        .hears("0D 41 00 00 00 00 00 00")
+        .receives("0D 41 00 00 00 00 00 00")
         .ends(uploaded(b"A"));
 }
 
 #[test]
 fn an_empty_text_is_read() {
-    Conversation::upload(NAME)
+    Exchange::upload(NAME)
         .sends("40 08 10 00 00 00 00 00")
-        .hears("41 08 10 00 00 00 00 00")
+        .receives("41 08 10 00 00 00 00 00")
         .sends("60 00 00 00 00 00 00 00")
-        .hears("0F 00 00 00 00 00 00 00")
+        .receives("0F 00 00 00 00 00 00 00")
         .ends(uploaded(b""));
 }
 
 #[test]
 fn more_than_four_bytes_are_written_in_segments() {
-    Conversation::download(NAME, b"gantry axis 1!")
+    Exchange::download(NAME, b"gantry axis 1!")
         .sends("21 08 10 00 0E 00 00 00")
-        .hears("60 08 10 00 00 00 00 00")
+        .receives("60 08 10 00 00 00 00 00")
         .sends("00 67 61 6E 74 72 79 20")
-        .hears("20 00 00 00 00 00 00 00")
+        .receives("20 00 00 00 00 00 00 00")
         .sends("11 61 78 69 73 20 31 21")
-        .hears("30 00 00 00 00 00 00 00")
+        .receives("30 00 00 00 00 00 00 00")
         .ends(Ok(Completed::Downloaded));
 }
 
 #[test]
 fn five_bytes_leave_two_of_the_segment_unused() {
-    Conversation::download(NAME, b"joint")
+    Exchange::download(NAME, b"joint")
         .sends("21 08 10 00 05 00 00 00")
-        .hears("60 08 10 00 00 00 00 00")
+        .receives("60 08 10 00 00 00 00 00")
         .sends("05 6A 6F 69 6E 74 00 00")
-        .hears("20 00 00 00 00 00 00 00")
+        .receives("20 00 00 00 00 00 00 00")
         .ends(Ok(Completed::Downloaded));
 }
 
 #[test]
 fn an_empty_value_is_written_in_one_empty_segment() {
-    Conversation::download(NAME, b"")
+    Exchange::download(NAME, b"")
         .sends("21 08 10 00 00 00 00 00")
-        .hears("60 08 10 00 00 00 00 00")
+        .receives("60 08 10 00 00 00 00 00")
         .sends("0F 00 00 00 00 00 00 00")
-        .hears("20 00 00 00 00 00 00 00")
+        .receives("20 00 00 00 00 00 00 00")
         .ends(Ok(Completed::Downloaded));
 }
 
 #[test]
 fn an_abort_ends_a_transfer_with_its_code() {
-    Conversation::upload(DISPLAY)
+    Exchange::upload(DISPLAY)
         .sends("40 61 60 00 00 00 00 00")
-        .hears("80 61 60 00 00 00 02 06")
+        .receives("80 61 60 00 00 00 02 06")
         .ends(Err(SdoError::Aborted(AbortCode::ObjectDoesNotExist)));
-    Conversation::download(NAME, b"joint")
+    Exchange::download(NAME, b"joint")
         .sends("21 08 10 00 05 00 00 00")
-        .hears("60 08 10 00 00 00 00 00")
+        .receives("60 08 10 00 00 00 00 00")
         .sends("05 6A 6F 69 6E 74 00 00")
-        .hears("80 08 10 00 22 00 00 08")
+        .receives("80 08 10 00 22 00 00 08")
         .ends(Err(SdoError::Aborted(AbortCode::PresentDeviceState)))
-        .is_silent();
+        .sends_nothing();
 }
 
 #[test]
-fn an_abort_of_another_object_ends_nothing() {
-    Conversation::upload(DISPLAY)
+fn an_abort_for_another_object_is_ignored() {
+    Exchange::upload(DISPLAY)
         .sends("40 61 60 00 00 00 00 00")
-        .hears("80 60 60 00 00 00 02 06")
+        .receives("80 60 60 00 00 00 02 06")
         .is_open()
-        .hears("4F 61 60 00 08 00 00 00")
+        .receives("4F 61 60 00 08 00 00 00")
         .ends(uploaded(&[8]));
 }
 
 #[test]
-fn replies_about_other_objects_and_of_other_kinds_are_passed_over() {
-    Conversation::upload(DISPLAY)
+fn replies_for_other_objects_and_of_other_kinds_are_ignored() {
+    Exchange::upload(DISPLAY)
         .sends("40 61 60 00 00 00 00 00")
-        .hears("4F 60 60 00 08 00 00 00") // other index
-        .hears("4F 61 60 01 08 00 00 00") // other sub-index
-        .hears("60 61 60 00 00 00 00 00") // answer to a download
-        .hears("00 01 02 03 04 05 06 07") // segment of nothing
-        .hears("C0 61 60 00 08 00 00 00") // block transfer
+        .receives("4F 60 60 00 08 00 00 00") // other index
+        .receives("4F 61 60 01 08 00 00 00") // other sub-index
+        .receives("60 61 60 00 00 00 00 00") // answer to a download
+        .receives("00 01 02 03 04 05 06 07") // segment of nothing
+        .receives("C0 61 60 00 08 00 00 00") // block transfer
         .is_open()
-        .hears("4F 61 60 00 03 00 00 00")
+        .receives("4F 61 60 00 03 00 00 00")
         .ends(uploaded(&[3]));
 }
 
 #[test]
-fn replies_of_other_nodes_and_on_other_identifiers_are_not_heard() {
-    let mut conversation = Conversation::upload(DISPLAY);
+fn replies_of_other_nodes_and_with_other_identifiers_are_ignored() {
+    let mut conversation = Exchange::upload(DISPLAY);
     conversation.sends("40 61 60 00 00 00 00 00");
     let payload = [0x4F, 0x61, 0x60, 0, 8, 0, 0, 0];
     for id in [Id::canopen(0x580, 3), Id::canopen(0x600, 2), Id::extended(0x582).unwrap()] {
@@ -253,170 +253,170 @@ fn replies_of_other_nodes_and_on_other_identifiers_are_not_heard() {
 
 #[test]
 fn truncated_and_remote_replies_count_as_no_reply() {
-    let mut conversation = Conversation::upload(DISPLAY);
+    let mut conversation = Exchange::upload(DISPLAY);
     conversation
         .sends("40 61 60 00 00 00 00 00")
-        .hears("4F 61 60 00 08")
-        .hears("")
-        .hears("4F 61 60 00 08 00 00");
+        .receives("4F 61 60 00 08")
+        .receives("")
+        .receives("4F 61 60 00 08 00 00");
     conversation.client.receive(&Frame::remote(Id::canopen(0x580, NODE), 8).unwrap());
     for _ in 0..2 {
         conversation.passes(500).sends("40 61 60 00 00 00 00 00");
     }
     let error = SdoError::NoReply { attempts: 3, reply_timeout_ns: 500, unusable: 4 };
-    conversation.passes(500).is_silent().ends(Err(error));
+    conversation.passes(500).sends_nothing().ends(Err(error));
 }
 
 #[test]
-fn a_request_is_repeated_after_the_time_out_and_given_up_after_the_last_repetition() {
-    Conversation::download(MODE, &[8])
+fn a_request_is_repeated_after_the_time_out_and_fails_after_the_last_repetition() {
+    Exchange::download(MODE, &[8])
         .sends("2F 60 60 00 08 00 00 00")
         .passes(499)
-        .is_silent()
+        .sends_nothing()
         .passes(1)
         .sends("2F 60 60 00 08 00 00 00")
         .passes(500)
         .sends("2F 60 60 00 08 00 00 00")
         .passes(499)
-        .is_silent()
+        .sends_nothing()
         .is_open()
         .passes(1)
-        .is_silent()
+        .sends_nothing()
         .ends(Err(SdoError::NoReply { attempts: 3, reply_timeout_ns: 500, unusable: 0 }));
 }
 
 #[test]
-fn the_server_is_told_when_a_segmented_transfer_times_out_and_the_transfer_begins_again() {
-    Conversation::upload(NAME)
+fn a_segmented_transfer_that_times_out_is_aborted_and_restarted() {
+    Exchange::upload(NAME)
         .sends("40 08 10 00 00 00 00 00")
-        .hears("41 08 10 00 09 00 00 00")
+        .receives("41 08 10 00 09 00 00 00")
         .sends("60 00 00 00 00 00 00 00")
-        .hears("00 31 32 33 34 35 36 37")
+        .receives("00 31 32 33 34 35 36 37")
         .sends("70 00 00 00 00 00 00 00")
         .passes(500)
         .sends("80 08 10 00 00 00 04 05")
         .sends("40 08 10 00 00 00 00 00")
-        .hears("41 08 10 00 09 00 00 00")
+        .receives("41 08 10 00 09 00 00 00")
         .sends("60 00 00 00 00 00 00 00")
-        .hears("00 31 32 33 34 35 36 37")
+        .receives("00 31 32 33 34 35 36 37")
         .sends("70 00 00 00 00 00 00 00")
-        .hears("1B 38 39 00 00 00 00 00")
+        .receives("1B 38 39 00 00 00 00 00")
         .ends(uploaded(b"123456789"));
 }
 
 #[test]
-fn after_a_repetition_the_client_waits_until_no_stale_reply_can_be_under_way() {
-    let mut conversation = Conversation::download(MODE, &[8]);
+fn after_a_repetition_the_client_waits_until_stale_replies_have_arrived() {
+    let mut conversation = Exchange::download(MODE, &[8]);
     conversation
         .sends("2F 60 60 00 08 00 00 00")
         .passes(500)
         .sends("2F 60 60 00 08 00 00 00")
         .passes(10)
-        .hears("60 60 60 00 00 00 00 00") // late answer to the first request
+        .receives("60 60 60 00 00 00 00 00") // late answer to the first request
         .ends(Ok(Completed::Downloaded));
     conversation.client.start(Transfer::Download { object: MODE, data: vec![9] }).unwrap();
     conversation
-        .is_silent()
+        .sends_nothing()
         .passes(10)
-        .hears("60 60 60 00 00 00 00 00") // answer to the repetition, not to mode 9
+        .receives("60 60 60 00 00 00 00 00") // answer to the repetition, not to mode 9
         .is_open()
         .passes(480)
         .sends("2F 60 60 00 09 00 00 00")
         .is_open()
-        .hears("60 60 60 00 00 00 00 00")
+        .receives("60 60 60 00 00 00 00 00")
         .ends(Ok(Completed::Downloaded));
 }
 
 #[test]
 fn a_toggle_bit_that_does_not_alternate_aborts_the_transfer() {
-    Conversation::upload(NAME)
+    Exchange::upload(NAME)
         .sends("40 08 10 00 00 00 00 00")
-        .hears("41 08 10 00 10 00 00 00")
+        .receives("41 08 10 00 10 00 00 00")
         .sends("60 00 00 00 00 00 00 00")
-        .hears("10 65 52 6F 62 20 6A 6F")
+        .receives("10 65 52 6F 62 20 6A 6F")
         .sends("80 08 10 00 00 00 03 05")
         .ends(Err(SdoError::ToggleNotAlternated));
-    Conversation::download(NAME, b"joint")
+    Exchange::download(NAME, b"joint")
         .sends("21 08 10 00 05 00 00 00")
-        .hears("60 08 10 00 00 00 00 00")
+        .receives("60 08 10 00 00 00 00 00")
         .sends("05 6A 6F 69 6E 74 00 00")
-        .hears("30 00 00 00 00 00 00 00")
+        .receives("30 00 00 00 00 00 00 00")
         .sends("80 08 10 00 00 00 03 05")
         .ends(Err(SdoError::ToggleNotAlternated));
 }
 
 #[test]
-fn an_unrelated_reply_between_segments_loses_none_of_them() {
-    Conversation::upload(NAME)
+fn an_unrelated_reply_between_segments_does_not_disturb_the_transfer() {
+    Exchange::upload(NAME)
         .sends("40 08 10 00 00 00 00 00")
-        .hears("41 08 10 00 08 00 00 00")
+        .receives("41 08 10 00 08 00 00 00")
         .sends("60 00 00 00 00 00 00 00")
-        .hears("00 31 32 33 34 35 36 37")
+        .receives("00 31 32 33 34 35 36 37")
         .sends("70 00 00 00 00 00 00 00")
-        .hears("4F 61 60 00 08 00 00 00")
-        .is_silent()
-        .hears("1D 38 00 00 00 00 00 00")
+        .receives("4F 61 60 00 08 00 00 00")
+        .sends_nothing()
+        .receives("1D 38 00 00 00 00 00 00")
         .ends(uploaded(b"12345678"));
 }
 
 #[test]
 fn more_or_less_data_than_announced_aborts_the_transfer() {
     for (segment, received) in [("00 31 32 33 34 35 36 37", 7), ("0B 31 32 00 00 00 00 00", 2)] {
-        Conversation::upload(NAME)
+        Exchange::upload(NAME)
             .sends("40 08 10 00 00 00 00 00")
-            .hears("41 08 10 00 05 00 00 00")
+            .receives("41 08 10 00 05 00 00 00")
             .sends("60 00 00 00 00 00 00 00")
-            .hears(segment)
+            .receives(segment)
             .sends("80 08 10 00 10 00 07 06")
             .ends(Err(SdoError::SizeMismatch { announced: 5, received }));
     }
 }
 
 #[test]
-fn an_upload_without_end_is_refused() {
-    Conversation::upload(NAME)
+fn an_endless_upload_is_aborted() {
+    Exchange::upload(NAME)
         .sends("40 08 10 00 00 00 00 00")
-        .hears("41 08 10 00 FF FF FF FF")
+        .receives("41 08 10 00 FF FF FF FF")
         .sends("80 08 10 00 05 00 04 05")
         .ends(Err(SdoError::TooLong { limit: MAX_UPLOAD_BYTES as u32 }));
-    Conversation::upload(NAME)
+    Exchange::upload(NAME)
         .sends("40 08 10 00 00 00 00 00")
-        .hears("40 08 10 00 00 00 00 00")
+        .receives("40 08 10 00 00 00 00 00")
         .sends("60 00 00 00 00 00 00 00")
-        .hears("0E 00 00 00 00 00 00 00")
+        .receives("0E 00 00 00 00 00 00 00")
         .sends("80 08 10 00 00 00 00 08")
         .ends(Err(SdoError::EmptySegment));
-    let mut endless = Conversation::upload(NAME);
-    endless.sends("40 08 10 00 00 00 00 00").hears("40 08 10 00 00 00 00 00");
+    let mut endless = Exchange::upload(NAME);
+    endless.sends("40 08 10 00 00 00 00 00").receives("40 08 10 00 00 00 00 00");
     for segment in 0..=MAX_UPLOAD_BYTES / 7 {
         endless.sends(if segment % 2 == 0 { "60 00 00 00 00 00 00 00" } else { "70 00 00 00 00 00 00 00" });
-        endless.hears(if segment % 2 == 0 { "00 1 1 1 1 1 1 1" } else { "10 1 1 1 1 1 1 1" });
+        endless.receives(if segment % 2 == 0 { "00 1 1 1 1 1 1 1" } else { "10 1 1 1 1 1 1 1" });
     }
     endless.sends("80 08 10 00 05 00 04 05").ends(Err(SdoError::TooLong { limit: MAX_UPLOAD_BYTES as u32 }));
 }
 
 #[test]
 fn one_transfer_runs_at_a_time() {
-    let mut client = Client::new(NODE, TIMING);
+    let mut client = SdoClient::new(NODE, TIMING);
     let transfer = Transfer::Upload { object: DISPLAY };
     client.start(transfer.clone()).unwrap();
-    assert_eq!(client.start(transfer.clone()), Err(Busy));
+    assert_eq!(client.start(transfer.clone()), Err(SdoBusy));
     client.poll(0).unwrap();
     client.receive(&reply(&[0x4F, 0x61, 0x60, 0, 8, 0, 0, 0]));
-    assert_eq!(client.start(transfer.clone()), Err(Busy), "its outcome has not been taken");
+    assert_eq!(client.start(transfer.clone()), Err(SdoBusy), "its outcome has not been taken");
     client.take_outcome().unwrap().unwrap();
     client.start(transfer).unwrap();
 }
 
 #[test]
-fn errors_are_told_in_words() {
+fn errors_have_plain_messages() {
     let no_reply = SdoError::NoReply { attempts: 3, reply_timeout_ns: 500_000_000, unusable: 0 };
-    assert_eq!(no_reply.to_string(), "no reply within 500 ms, asked 3 times");
+    assert_eq!(no_reply.to_string(), "no reply within 500 ms in 3 attempts");
     let aborted = SdoError::Aborted(AbortCode::ObjectDoesNotExist);
     assert_eq!(aborted.to_string(), "abort 0x06020000 (object does not exist in the object dictionary)");
 }
 
-/// Bytes that look like replies often enough to get somewhere.
+/// Bytes that often look like replies, so that a transfer progresses.
 fn any_reply() -> impl Strategy<Value = Vec<u8>> {
     let first = prop_oneof![
         Just(0x4F),
@@ -437,12 +437,12 @@ fn any_reply() -> impl Strategy<Value = Vec<u8>> {
 }
 
 proptest! {
-    /// The oracle does not decode: a transfer may end well only with a frame that the standard allows there.
+    /// The test does not decode: a transfer may succeed only with a frame that the standard allows there.
     #[test]
     fn arbitrary_replies_never_panic_and_never_complete_an_upload_wrongly(
         replies in prop::collection::vec((any_reply(), 0..600u64), 0..60),
     ) {
-        let mut client = Client::new(NODE, TIMING);
+        let mut client = SdoClient::new(NODE, TIMING);
         client.start(Transfer::Upload { object: NAME }).unwrap();
         let (mut now_ns, mut last_request, mut collected) = (0, vec![], vec![]);
         for (bytes, pause_ns) in replies {
@@ -484,7 +484,7 @@ proptest! {
         replies in prop::collection::vec((any_reply(), 0..600u64), 0..60),
         length in 0..20usize,
     ) {
-        let mut client = Client::new(NODE, TIMING);
+        let mut client = SdoClient::new(NODE, TIMING);
         client.start(Transfer::Download { object: NAME, data: vec![7; length] }).unwrap();
         let (mut now_ns, mut last_request) = (0, vec![]);
         for (bytes, pause_ns) in replies {
@@ -513,8 +513,8 @@ proptest! {
     }
 
     #[test]
-    fn every_conversation_ends_within_its_time_outs_when_nothing_answers(step_ns in 1..700u64) {
-        let mut client = Client::new(NODE, TIMING);
+    fn every_transfer_ends_within_its_time_outs_without_a_server(step_ns in 1..700u64) {
+        let mut client = SdoClient::new(NODE, TIMING);
         client.start(Transfer::Download { object: NAME, data: vec![1; 9] }).unwrap();
         let (mut now_ns, mut requests) = (0, 0);
         let error = loop {

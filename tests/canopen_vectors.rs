@@ -1,9 +1,9 @@
-//! The frames that the manual prints: every row that is no misprint is produced by our encoders (host to drive) or
-//! understood by our decoders (drive to host).
+//! The frames that the manual prints. The encoders produce every host frame without a misprint, and the decoders read
+//! every drive frame without a misprint.
 
 use takt::canopen::nmt::{ErrorControl, NmtCommand, NmtState, NmtTarget};
 use takt::canopen::object::ObjectAddress;
-use takt::canopen::sdo::{Client, Completed, Expedited, Request, Response, Timing, Transfer};
+use takt::canopen::sdo::{Completed, Expedited, SdoClient, SdoRequest, SdoResponse, SdoTiming, Transfer};
 use takt_rt::{CommandSlot, Frame, Id, MappedObject, Mapping, ProcessImage};
 
 const VECTORS: &str = include_str!("vectors/erob-can.csv");
@@ -18,7 +18,7 @@ struct Vector {
     value: Option<i64>,
 }
 
-/// The rows about CANopen that are no misprints.
+/// The CANopen rows without misprints.
 fn vectors() -> Vec<Vector> {
     let rows = VECTORS.lines().skip(1).map(fields);
     let usable = rows.filter(|row| !row[8].starts_with("MISPRINT") && !row[3].starts_with("64"));
@@ -38,7 +38,7 @@ fn vector(row: &[String]) -> Vector {
     }
 }
 
-/// Splits a line at the commas outside quotation marks.
+/// Splits a line at commas outside quotation marks.
 fn fields(line: &str) -> Vec<String> {
     let mut fields = vec![String::new()];
     let mut is_quoted = false;
@@ -57,7 +57,7 @@ impl Vector {
         Frame::data(Id::base(self.can_id.into()).unwrap(), &self.data).unwrap()
     }
 
-    /// The object that the row's words name: `SDO download 6060:00 …`.
+    /// The object in the description of the row: `SDO download 6060:00 …`.
     fn object(&self) -> ObjectAddress {
         let (index, rest) = self.meaning.split_once(':').unwrap();
         let index = u16::from_str_radix(index.rsplit(' ').next().unwrap(), 16).unwrap();
@@ -73,17 +73,18 @@ impl Vector {
         Expedited::of(&self.value().to_le_bytes()[..length]).unwrap()
     }
 
-    /// The host's frame, made from the row's words.
+    /// The host's frame, encoded from the description of the row.
     fn encoded(&self) -> Frame {
         let node = NmtTarget::Node(self.node);
         match self.meaning.as_str() {
             "NMT stop remote node" => NmtCommand::Stop.frame(node),
             "NMT reset communication" => NmtCommand::ResetCommunication.frame(node),
             words if words.starts_with("SDO download") => {
-                Request::DownloadExpedited { object: self.object(), data: self.expedited() }.frame(self.node)
+                SdoRequest::DownloadExpedited { object: self.object(), data: self.expedited() }
+                    .frame(self.node)
             }
             words if words.starts_with("SDO upload request") => {
-                Request::Upload { object: self.object() }.frame(self.node)
+                SdoRequest::Upload { object: self.object() }.frame(self.node)
             }
             words if words.starts_with("RPDO1 controlword 0x") => self.process_data(),
             words => panic!("{}: {words}", self.id),
@@ -103,7 +104,7 @@ impl Vector {
 }
 
 #[test]
-fn our_encoders_produce_every_frame_of_the_host() {
+fn the_encoders_produce_every_frame_of_the_host() {
     let rows: Vec<Vector> = vectors().into_iter().filter(|row| row.is_from_host).collect();
     assert_eq!(rows.len(), 59);
     for row in rows {
@@ -112,7 +113,7 @@ fn our_encoders_produce_every_frame_of_the_host() {
 }
 
 #[test]
-fn our_decoders_understand_every_frame_of_the_drive() {
+fn the_decoders_read_every_frame_of_the_drive() {
     let rows: Vec<Vector> = vectors().into_iter().filter(|row| !row.is_from_host).collect();
     assert_eq!(rows.len(), 41);
     for row in rows {
@@ -122,35 +123,41 @@ fn our_decoders_understand_every_frame_of_the_drive() {
             continue;
         }
         let response = match row.meaning.starts_with("SDO download response") {
-            true => Response::DownloadAccepted { object: row.object() },
-            false => Response::UploadExpedited { object: row.object(), data: row.expedited() },
+            true => SdoResponse::DownloadAccepted { object: row.object() },
+            false => SdoResponse::UploadExpedited { object: row.object(), data: row.expedited() },
         };
-        assert_eq!(Response::decode(&row.frame()), Some((row.node, response)), "{}: {}", row.id, row.meaning);
+        assert_eq!(
+            SdoResponse::decode(&row.frame()),
+            Some((row.node, response)),
+            "{}: {}",
+            row.id,
+            row.meaning
+        );
     }
 }
 
 #[test]
-fn a_simulated_drive_reads_what_the_manuals_host_sends_and_answers_the_same_bytes() {
+fn a_simulated_drive_answers_the_manuals_requests_with_the_printed_bytes() {
     for row in vectors().into_iter().filter(|row| matches!(row.can_id & 0x780, 0x000 | 0x580 | 0x600)) {
         let frame = row.frame();
         let again = match row.can_id & 0x780 {
             0x000 => NmtCommand::decode(&frame).map(|(command, target)| command.frame(target)),
-            0x580 => Response::decode(&frame).map(|(node, response)| response.frame(node)),
-            _ => Request::decode(&frame).map(|(node, request)| request.frame(node)),
+            0x580 => SdoResponse::decode(&frame).map(|(node, response)| response.frame(node)),
+            _ => SdoRequest::decode(&frame).map(|(node, request)| request.frame(node)),
         };
         assert_eq!(again, Some(frame), "{}: {}", row.id, row.meaning);
     }
 }
 
 #[test]
-fn the_client_walks_through_every_exchange_that_the_manual_prints_in_full() {
+fn the_client_performs_every_exchange_that_the_manual_prints_in_full() {
     let rows = vectors();
     let mut exchanges = 0;
     for (request, response) in rows.iter().zip(rows.iter().skip(1)) {
         if request.can_id & 0x780 != 0x600 || response.can_id & 0x780 != 0x580 {
             continue;
         }
-        let mut client = Client::new(request.node, Timing::default());
+        let mut client = SdoClient::new(request.node, SdoTiming::default());
         let object = request.object();
         let transfer = match request.meaning.starts_with("SDO download") {
             true => Transfer::Download { object, data: request.expedited().bytes().into() },

@@ -339,7 +339,7 @@ fn whatever_is_refused_is_one_object_after_json_with_what_is_wrong() {
         (&["run"], "<CONFIG>"),
         (&["check", nowhere], nowhere),
         (&["report", nowhere], nowhere),
-        (&["report", config], "no MCAP file"),
+        (&["report", config], "not an MCAP file"),
         (&["eds", nowhere], nowhere),
         (&["doctor", nowhere], nowhere),
         (&["jitter", "--bus", "nobody0"], "no interface nobody0"),

@@ -275,3 +275,24 @@ fn a_bus_can_be_connected_elsewhere_than_the_file_says() {
     config.override_interface("base", "sim").unwrap();
     assert_eq!(config.buses[0].interface, Interface::Simulated);
 }
+
+/// A drive that goes on moving by itself is to notice soon that the controller is gone.
+#[test]
+fn the_default_heartbeat_is_faster_where_a_drive_would_go_on_moving() {
+    let times = |mode: &str, more: &str| {
+        let text = format!("[defaults.axis]\nmode = \"{mode}\"\n{more}");
+        let master = with(&text).master;
+        (master.heartbeat_ns.map(|ns| ns / 1_000_000), master.heartbeat_timeout_ns / 1_000_000)
+    };
+    for mode in ["csp", "ip", "pp"] {
+        assert_eq!(times(mode, ""), (Some(100), 500), "{mode}");
+    }
+    for mode in ["csv", "cst", "pv", "pt"] {
+        assert_eq!(times(mode, ""), (Some(20), 100), "{mode}");
+        assert_eq!(times(mode, "[cycle]\nperiod = \"50 ms\""), (Some(50), 250), "{mode}");
+        assert_eq!(times(mode, "[master]\nheartbeat = \"40 ms\""), (Some(40), 200), "{mode}");
+        assert_eq!(times(mode, "[master]\nheartbeat_timeout = \"60 ms\""), (Some(20), 60), "{mode}");
+        assert_eq!(times(mode, "[master]\nheartbeat = \"off\""), (None, 500), "{mode}");
+    }
+    assert_eq!(times("csp", "[master]\nheartbeat = \"60 s\""), (Some(60_000), 65_535));
+}

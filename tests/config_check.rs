@@ -115,7 +115,7 @@ fn an_automatic_command_phase_is_shown_and_explained_where_there_is_none() {
 #[test]
 fn thirty_two_axes_that_are_alike_are_shown_once() {
     let text = standard_output(&check(&configs().join("axes32-erob.toml"), &[]));
-    assert!(text.lines().count() < 60, "{text}");
+    assert!(text.lines().count() < 65, "{text}");
     for part in ["axis1 … axis32 (32)", "bus1 … bus10 (10)", "Bus bus1, and 9 alike", "Bus bus11 (times"]
     {
         assert!(text.contains(part), "{part:?} is missing in\n{text}");
@@ -125,4 +125,152 @@ fn thirty_two_axes_that_are_alike_are_shown_once() {
     assert_eq!(json["axes"].as_array().map(Vec::len), Some(32));
     assert_eq!(json["buses"].as_array().map(Vec::len), Some(11));
     assert_eq!(json["buses"][0]["messages"][0]["in_slot_ns"], 55_000);
+}
+
+fn standard_error(output: &Output) -> String {
+    String::from_utf8(output.stderr.clone()).unwrap()
+}
+
+#[test]
+fn what_is_no_regular_file_is_refused_at_once_with_its_name_and_why() {
+    let folder = tempfile::tempdir().unwrap();
+    let fifo = folder.path().join("fifo.toml");
+    nix::unistd::mkfifo(&fifo, nix::sys::stat::Mode::S_IRWXU).unwrap();
+    for (path, kind) in [
+        (fifo.as_path(), "a FIFO"),
+        (folder.path(), "a directory"),
+        (Path::new("/dev/null"), "a device"),
+        (Path::new("/proc/kmsg"), "a file of the kernel"),
+    ] {
+        let output = check(path, &[]);
+        let text = standard_error(&output).replace("\n  │ ", " ");
+        assert_eq!(output.status.code(), Some(2), "{path:?}: {text}");
+        assert!(text.contains(path.to_str().unwrap()), "{path:?}: {text}");
+        // Only root may open /proc/kmsg.
+        assert!(text.contains(kind) || text.contains("Permission denied"), "{path:?}: {text}");
+    }
+    let text = std::fs::read_to_string(configs().join("single-erob.toml")).unwrap();
+    let path = folder.path().join("with-dcf.toml");
+    let named = text.replacen("[[axis]]", "[[axis]]\ndcf = \"fifo.toml\"", 1);
+    std::fs::write(&path, named).unwrap();
+    let output = check(&path, &[]);
+    let text = standard_error(&output).replace("\n  │ ", " ");
+    assert_eq!(output.status.code(), Some(2), "{text}");
+    assert!(text.contains("fifo.toml cannot be read: it is a FIFO"), "{text}");
+}
+
+#[test]
+fn of_many_problems_the_first_twenty_are_shown_and_the_rest_counted() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("many.toml");
+    let keys: String = (0..100_000).map(|key| format!("key{key} = 1\n")).collect();
+    std::fs::write(&path, keys).unwrap();
+    let output = check(&path, &[]);
+    let text = standard_error(&output).replace("\n  │ ", " ");
+    assert_eq!(output.status.code(), Some(2), "{text}");
+    assert!(text.contains("100003 problems, of which the first 20 follow"), "{text}");
+    assert!(text.contains("`key16`") && !text.contains("`key17`"), "{text}");
+    let value = json(&check(&path, &["--json"]));
+    assert_eq!((value["problems"].as_array().unwrap().len(), &value["omitted"]), (20, &Value::from(99_983)));
+}
+
+#[test]
+fn more_buses_or_axes_than_a_controller_has_are_counted_and_not_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("many.toml");
+    let bus = |number| format!("[[bus]]\nname = \"b{number}\"\n");
+    let axis = |number| format!("[[axis]]\nname = \"a{number}\"\nbus = 1\n");
+    let buses: String = (0..100_000).map(bus).collect();
+    let axes: String = (0..100_000).map(axis).collect();
+    std::fs::write(&path, format!("name = \"many\"\n{buses}{axes}")).unwrap();
+    let text = standard_error(&check(&path, &[]));
+    assert!(text.contains("100000 buses are more than the 16"), "{text}");
+}
+
+#[test]
+fn of_a_line_of_a_million_letters_the_part_around_the_problem_is_shown() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("long.toml");
+    let arm = std::fs::read_to_string(configs().join("arm6-erob.toml")).unwrap();
+    for text in [
+        // Old Macintosh line ends make one line of the file.
+        arm.replace('\n', "\r"),
+        format!("{arm}\nk{} = 1\n", "k".repeat(1_000_000)),
+        arm.replace("node = 1\n", &format!("node = 1\nfeedback = [{}]\n", "\"colour\", ".repeat(100_000))),
+    ] {
+        std::fs::write(&path, text).unwrap();
+        let output = check(&path, &[]);
+        let text = standard_error(&output);
+        assert_eq!(output.status.code(), Some(2), "{text}");
+        assert!(text.len() < 40_000, "{} bytes", text.len());
+        assert!(text.lines().all(|line| line.chars().count() < 500), "{text}");
+    }
+}
+
+#[test]
+fn no_escape_character_from_outside_reaches_the_terminal() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = std::fs::read_to_string(configs().join("single-erob.toml")).unwrap();
+    let escape = "\u{1B}]0;title\u{7}";
+    let takt = |arguments: &[&str]| {
+        Command::new(env!("CARGO_BIN_EXE_takt")).args(arguments).current_dir(&folder).output().unwrap()
+    };
+    let dcf = "[DeviceComissioning]\nNodeID=1\n[OptionalObjects]\nSupportedObjects=1\n1=0x6083\n\
+               [6083]\nParameterName=a\nDataType=7\nAccessType=rw\nParameterValue=5\n";
+    std::fs::write(folder.path().join(format!("{escape}.dcf")), dcf).unwrap();
+    let toml_escape = "\\u001B]0;title\\u0007";
+    let with_dcf = text.replacen("[[axis]]", &format!("[[axis]]\ndcf = \"{toml_escape}.dcf\""), 1);
+    std::fs::write(folder.path().join("dcf.toml"), &with_dcf).unwrap();
+    let missing = with_dcf.replace(".dcf", ".none");
+    std::fs::write(folder.path().join("missing.toml"), missing).unwrap();
+    let directory = format!("{text}\n[telemetry]\ndirectory = \"{toml_escape}\"\n");
+    std::fs::write(folder.path().join("directory.toml"), directory).unwrap();
+    std::fs::write(folder.path().join(escape), "name = 1").unwrap();
+    for arguments in [
+        &["check", "dcf.toml"][..],
+        &["check", "missing.toml"],
+        &["check", escape],
+        &["check", &format!("no{escape}.toml")],
+        &["check", "dcf.toml", &format!("--{escape}")],
+        &["eds", &format!("{escape}.dcf")],
+        &["plan", escape],
+        &["run", "directory.toml"],
+        &["run", "dcf.toml", "--bus", &format!("{escape}=can0")],
+        &["report", escape],
+        &[escape],
+    ] {
+        let output = takt(arguments);
+        for stream in [&output.stdout, &output.stderr] {
+            let text = String::from_utf8_lossy(stream);
+            assert!(!text.contains('\u{7}') && !text.contains("\u{1B}]"), "{arguments:?}: {text:?}");
+        }
+    }
+}
+
+#[test]
+fn what_an_axis_does_without_the_controller_is_told_for_its_mode() {
+    for (mode, words) in [
+        ("csp", "holds its last set-point, 0.1024 rad (5.9 deg) away at most"),
+        ("csv", "goes on for 100 ms, then brakes: at rest after 399 ms and 0.5964 rad (34.2 deg) at most"),
+        ("cst", "goes on for 100 ms, then brakes"),
+        ("pp", "ends its move by itself"),
+        ("pv", "goes on for 100 ms, then brakes"),
+        ("pt", "goes on for 100 ms, then brakes"),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("one.toml");
+        let text = |heartbeat: &str| {
+            format!(
+                "name = \"one\"\n{heartbeat}[[bus]]\nname = \"b\"\n[[axis]]\nname = \"a\"\nbus = \"b\"\nnode = 1\n\
+                 drive = \"erob-canopen\"\nmode = \"{mode}\"\n[axis.limits]\nposition = [-1, 1]\n\
+                 velocity = \"137 deg/s\"\nacceleration = 8\ntorque = 40\n"
+            )
+        };
+        std::fs::write(&path, text("")).unwrap();
+        let told = standard_output(&check(&path, &[]));
+        assert!(told.contains(words), "{mode}: {told}");
+        std::fs::write(&path, text("[master]\nheartbeat = \"off\"\n")).unwrap();
+        let told = standard_output(&check(&path, &[]));
+        assert_eq!(told.contains("FOR EVER"), !matches!(mode, "csp" | "pp"), "{mode}: {told}");
+    }
 }

@@ -58,9 +58,9 @@ fn a_file_is_read_from_the_folder_of_the_configuration_for_the_node_of_its_axis(
 }
 
 #[test]
-fn an_error_in_the_file_is_shown_at_its_own_line_too() {
+fn an_error_in_the_file_is_also_shown_at_its_own_line() {
     let shown = message(Some(variable("ParameterValue=fast").as_bytes()));
-    for part in ["small.toml:10", "shoulder.dcf:5:16", "ParameterValue=fast", "is no number"] {
+    for part in ["small.toml:10", "shoulder.dcf:5:16", "ParameterValue=fast", "is not a number"] {
         assert!(shown.contains(part), "no {part} in {shown}");
     }
 }
@@ -83,5 +83,8 @@ fn takt_check_tells_what_of_the_file_is_not_written() {
     let output = Command::new(env!("CARGO_BIN_EXE_takt")).arg("check").arg(&path).output().unwrap();
     let text = String::from_utf8(output.stdout).unwrap();
     assert!(text.contains("shoulder: 1 writes from"), "{text}");
-    assert!(text.contains("not written: 60FF:00 (set-points are the controller's alone)"), "{text}");
+    assert!(
+        text.contains("not written: 60FF:00 (a set-point, which only the controller may write)"),
+        "{text}"
+    );
 }

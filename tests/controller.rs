@@ -1,4 +1,4 @@
-//! The whole controller against the simulated arm, in virtual time.
+//! The controller with the simulated arm in virtual time.
 
 use std::f64::consts::TAU;
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -12,7 +12,7 @@ use takt_rt::{
     ReceiveBatch, RejectReason, Request, RequestKind, Rule, StopCategory,
 };
 
-/// A minute is more than any of these programs takes.
+/// A minute of 1 ms cycles. Every program here takes less.
 const CYCLES_AT_MOST: u64 = 60_000;
 
 fn load(name: &str) -> Config {
@@ -24,7 +24,7 @@ fn start(config: &Config) -> VirtualRun<SimulatedBus> {
     VirtualRun::simulated(config).unwrap().0
 }
 
-/// How far each axis is from the last target when the group holds for the last time, in counts.
+/// The distance of each axis from its last target, in counts, when the group holds for the last time.
 fn run_and_measure(config: &Config) -> Vec<f64> {
     let mut run = start(config);
     let mut errors = vec![];
@@ -59,7 +59,7 @@ fn the_same_program_runs_in_cyclic_synchronous_velocity() {
     assert!(errors.iter().all(|error| error.abs() <= 2.0), "{errors:?}");
 }
 
-/// A PD loop without an integral ends where its stiffness holds the joint's Coulomb friction.
+/// A PD loop without an integral part comes to rest where its stiffness balances the Coulomb friction.
 #[test]
 fn the_same_program_runs_in_cyclic_synchronous_torque() {
     let config = load("arm6-erob-cst.toml");
@@ -89,7 +89,7 @@ fn after_a_run_every_drive_is_disabled_and_at_rest() {
 }
 
 #[test]
-fn ctrl_c_in_the_middle_stops_in_control_and_disables() {
+fn ctrl_c_during_a_move_stops_in_control_and_disables() {
     let config = load("arm6-erob.toml");
     let mut run = start(&config);
     while run.snapshot().phase != Phase::Moving {
@@ -108,10 +108,10 @@ fn ctrl_c_in_the_middle_stops_in_control_and_disables() {
     assert_eq!(phases, [Phase::Moving, Phase::Stopping, Phase::Holding, Phase::Disabling, Phase::Disabled]);
 }
 
-/// The controlwords that take the power act at the SYNC after them: a run that ended before would leave a drive to turn on
-/// with the torque that it had last.
+/// The controlwords that remove the power take effect at the next SYNC. If the run ended before, a drive would keep its last
+/// torque.
 #[test]
-fn a_second_ctrl_c_takes_the_power_at_once_and_the_run_ends_when_it_is_off() {
+fn a_second_ctrl_c_removes_the_power_and_the_run_ends_when_it_is_off() {
     for name in ["arm6-erob.toml", "arm6-erob-csv.toml", "arm6-erob-cst.toml", "gantry-yz-aim.toml"] {
         let config = load(name);
         for first in [Some(Interrupt::Controlled), None] {
@@ -135,7 +135,7 @@ fn a_second_ctrl_c_takes_the_power_at_once_and_the_run_ends_when_it_is_off() {
 }
 
 #[test]
-fn the_simulated_world_keeps_up_with_a_cycle_however_long_it_is() {
+fn the_simulation_runs_at_every_cycle_time() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/arm6-erob.toml");
     let text = std::fs::read_to_string(path).unwrap();
     for (period, of_bus) in [("1 ms", "2 ms"), ("4 ms", "8 ms"), ("20 ms", "20 ms")] {
@@ -150,7 +150,7 @@ fn the_simulated_world_keeps_up_with_a_cycle_however_long_it_is() {
     }
 }
 
-/// Every record of a run, as one number.
+/// A hash of all records of a run.
 fn fingerprint(config: &Config) -> u64 {
     let (mut run, mut log) = VirtualRun::simulated(config).unwrap();
     let mut hasher = DefaultHasher::new();
@@ -169,11 +169,15 @@ fn the_same_configuration_gives_the_same_run_bit_for_bit() {
     config.program.moves.truncate(1);
     assert_eq!(fingerprint(&config), fingerprint(&config));
     config.axes[0].simulated.coulomb_friction *= 1.001;
-    assert_ne!(fingerprint(&config), fingerprint(&load("arm6-erob.toml")), "the fingerprint sees something");
+    assert_ne!(
+        fingerprint(&config),
+        fingerprint(&load("arm6-erob.toml")),
+        "another friction gives another fingerprint"
+    );
 }
 
 #[test]
-fn an_hour_of_motion_ends_as_exactly_as_a_minute_and_takes_seconds() {
+fn after_an_hour_of_motion_the_axis_still_reaches_its_targets_exactly() {
     let mut config = load("single-erob.toml");
     config.program.repeat = 700;
     let mut run = start(&config);
@@ -182,7 +186,7 @@ fn an_hour_of_motion_ends_as_exactly_as_a_minute_and_takes_seconds() {
     let outcome = run.run(4_500_000, |run| {
         let snapshot = run.snapshot();
         holding = if snapshot.phase == Phase::Holding { holding + 1 } else { 0 };
-        // A tenth of a second after each move the joint has settled.
+        // The joint has settled a tenth of a second after each move.
         if let (100, Some(target)) = (holding, run.supervisor().target()) {
             let counts = (snapshot.axes[0].position - target[0]) * config.axes[0].counts_per_turn / TAU;
             largest_counts = largest_counts.max(counts.abs());
@@ -195,7 +199,7 @@ fn an_hour_of_motion_ends_as_exactly_as_a_minute_and_takes_seconds() {
 }
 
 #[test]
-fn stalls_of_the_host_are_counted_and_the_program_still_arrives() {
+fn stalls_of_the_computer_are_counted_and_the_program_still_finishes() {
     let config = load("arm6-erob.toml");
     let mut run = start(&config);
     let mut cycle = 0;
@@ -210,14 +214,14 @@ fn stalls_of_the_host_are_counted_and_the_program_still_arrives() {
     assert!(missed >= 10 * 29, "{missed}");
 }
 
-/// Runs until well into a move, breaks something, and goes on to the end.
-fn run_and_break(config: &Config, break_it: impl FnOnce(&mut SimulatedBus)) -> (Option<Outcome>, Vec<Phase>) {
+/// Runs into a move, injects a fault, and runs on to the end.
+fn run_and_inject(config: &Config, inject: impl FnOnce(&mut SimulatedBus)) -> (Option<Outcome>, Vec<Phase>) {
     let mut run = start(config);
     while run.snapshot().phase != Phase::Moving {
         assert!(run.step());
     }
     run.run(300, |_| {});
-    break_it(&mut run.ports()[0]);
+    inject(&mut run.ports()[0]);
     let mut phases = vec![];
     let outcome = run.run(CYCLES_AT_MOST, |run| {
         let phase = run.snapshot().phase;
@@ -238,38 +242,39 @@ fn rule_and_axis(outcome: Option<Outcome>) -> (Rule, Option<u8>) {
 #[test]
 fn a_fault_of_one_drive_stops_the_whole_arm_in_a_coordinated_way() {
     let config = load("arm6-erob.toml");
-    let (outcome, phases) = run_and_break(&config, |bus| bus.inject(2, DriveFault::OverCurrent).unwrap());
+    let (outcome, phases) =
+        run_and_inject(&config, |bus| bus.inject_fault(2, DriveFault::OverCurrent).unwrap());
     assert_eq!(rule_and_axis(outcome), (Rule::DriveFault, Some(1)));
-    // Seen in the very cycle in which the drive reports it.
+    // The stop begins in the cycle in which the drive reports the fault.
     assert_eq!(phases, [Phase::Stopping, Phase::Disabling, Phase::Disabled]);
 }
 
 #[test]
 fn a_drive_that_falls_silent_stops_the_whole_arm() {
     let config = load("arm6-erob.toml");
-    let (outcome, _) = run_and_break(&config, |bus| bus.silence(3, true).unwrap());
+    let (outcome, _) = run_and_inject(&config, |bus| bus.silence(3, true).unwrap());
     assert_eq!(rule_and_axis(outcome), (Rule::MissedFeedback, Some(2)));
 }
 
 #[test]
 fn a_drive_that_restarts_in_motion_stops_the_whole_arm() {
     let config = load("arm6-erob.toml");
-    let (outcome, _) = run_and_break(&config, |bus| bus.power_cycle(1).unwrap());
+    let (outcome, _) = run_and_inject(&config, |bus| bus.power_cycle(1).unwrap());
     assert_eq!(rule_and_axis(outcome), (Rule::MissedFeedback, Some(0)));
 }
 
 #[test]
-fn a_joint_that_is_held_fast_stops_the_whole_arm() {
+fn a_blocked_joint_stops_the_whole_arm() {
     let config = load("arm6-erob.toml");
-    let (outcome, _) = run_and_break(&config, |bus| bus.set_load_torque(1, 1e4).unwrap());
+    let (outcome, _) = run_and_inject(&config, |bus| bus.set_load_torque(1, 1e4).unwrap());
     let (rule, axis) = rule_and_axis(outcome);
-    // So much torque moves it faster than any joint can be believed to move.
+    // So much torque moves it faster than is plausible.
     let seen = [Rule::FollowingError, Rule::DriveFault, Rule::ImplausibleFeedback];
     assert!(seen.contains(&rule), "{rule:?}");
     assert_eq!(axis, Some(0));
 }
 
-/// The controller is gone without a farewell, as after `kill -9`: the drives' own watchdogs stop the arm.
+/// The state of every simulated drive.
 fn drives_of(ports: &mut [SimulatedBus]) -> Vec<Observation> {
     let mut seen = vec![];
     for port in ports {
@@ -279,9 +284,10 @@ fn drives_of(ports: &mut [SimulatedBus]) -> Vec<Observation> {
     seen
 }
 
-/// An eRob by object 1029, a YZ-AIM by its alarm 20.
+/// The controller ends without a shut-down, as after `kill -9`. The heartbeat watchdogs of the drives stop the arm: an eRob by
+/// object 1029, a YZ-AIM by its alarm 20.
 #[test]
-fn when_the_controller_dies_the_drives_of_every_family_stop_by_themselves() {
+fn after_the_controller_was_killed_the_drives_of_every_family_stop_by_themselves() {
     for name in ["arm6-erob.toml", "gantry-yz-aim.toml"] {
         let config = load(name);
         let mut run = start(&config);
@@ -289,7 +295,10 @@ fn when_the_controller_dies_the_drives_of_every_family_stop_by_themselves() {
             assert!(run.step());
         }
         run.run(300, |_| {});
-        assert!(drives_of(run.ports()).iter().any(|seen| seen.velocity.abs() > 0.01), "{name}: it stands");
+        assert!(
+            drives_of(run.ports()).iter().any(|seen| seen.velocity.abs() > 0.01),
+            "{name}: no drive moves"
+        );
         let mut now_ns = run.clock().now_ns();
         let end_ns = now_ns + config.master.heartbeat_timeout_ns + 300_000_000;
         while now_ns < end_ns {
@@ -303,13 +312,13 @@ fn when_the_controller_dies_the_drives_of_every_family_stop_by_themselves() {
     }
 }
 
-/// A bus with a past: its time has begun before that of the controller.
-struct Later {
+/// A bus whose time has begun before that of the controller.
+struct EarlierBus {
     bus: SimulatedBus,
     by_ns: u64,
 }
 
-impl BusPort for Later {
+impl BusPort for EarlierBus {
     fn send(&mut self, now_ns: u64, frames: &[Frame]) -> usize {
         self.bus.send(now_ns + self.by_ns, frames)
     }
@@ -328,9 +337,9 @@ impl BusPort for Later {
     }
 }
 
-/// Under power, stopped by their own watchdogs or not yet: whoever comes next finds them so.
+/// The drives may still be enabled, or their watchdogs may have stopped them.
 #[test]
-fn drives_that_a_dead_controller_has_left_are_brought_up_again() {
+fn drives_of_a_killed_controller_are_brought_up_again() {
     for (name, silence_ms) in [
         ("arm6-erob.toml", 100),
         ("arm6-erob.toml", 3_000),
@@ -338,28 +347,28 @@ fn drives_that_a_dead_controller_has_left_are_brought_up_again() {
         ("gantry-yz-aim.toml", 3_000),
     ] {
         let config = load(name);
-        let mut dead = start(&config);
-        while dead.snapshot().phase != Phase::Moving {
-            assert!(dead.step());
+        let mut killed = start(&config);
+        while killed.snapshot().phase != Phase::Moving {
+            assert!(killed.step());
         }
-        dead.run(300, |_| {});
-        let mut now_ns = dead.clock().now_ns();
+        killed.run(300, |_| {});
+        let mut now_ns = killed.clock().now_ns();
         let mut ports = vec![];
-        for (bus, port) in dead.ports().iter_mut().enumerate() {
+        for (bus, port) in killed.ports().iter_mut().enumerate() {
             ports.push(std::mem::replace(port, SimulatedBus::new(&config, bus)));
         }
         for _ in 0..silence_ms {
             now_ns += 1_000_000;
             ports.iter_mut().for_each(|port| port.receive(now_ns, &mut ReceiveBatch::new()));
         }
-        let ports = ports.into_iter().map(|bus| Later { bus, by_ns: now_ns }).collect();
+        let ports = ports.into_iter().map(|bus| EarlierBus { bus, by_ns: now_ns }).collect();
         let mut next = VirtualRun::new(&config, ports).unwrap().0;
         assert_eq!(next.run(CYCLES_AT_MOST, |_| {}), Some(Outcome::Finished), "{name}, {silence_ms} ms");
     }
 }
 
 #[test]
-fn what_is_refused_to_another_client_does_not_end_the_program() {
+fn a_refused_request_of_another_client_does_not_end_the_program() {
     let config = load("arm6-erob.toml");
     let mut run = start(&config);
     let outcome = run.run(CYCLES_AT_MOST, |run| {
@@ -383,7 +392,7 @@ fn move_to(target: [f64; MAX_AXES], minimum_duration_s: f64) -> Move {
 }
 
 #[test]
-fn a_client_that_goes_on_moving_the_group_does_not_keep_the_run_from_ending() {
+fn a_client_that_keeps_moving_the_group_does_not_prevent_the_end_of_the_run() {
     let config = load("arm6-erob.toml");
     let ports = (0..config.buses.len()).map(|bus| SimulatedBus::new(&config, bus)).collect();
     let mut run = VirtualRun::serving(&config, ports).unwrap().0;
@@ -397,7 +406,7 @@ fn a_client_that_goes_on_moving_the_group_does_not_keep_the_run_from_ending() {
         cycles += 1;
         let mut target = here;
         target[0] += if cycles % 200 < 100 { 0.3 } else { -0.3 };
-        // The door may be full.
+        // The queue may be full.
         let _ = run.host().request(Request::Move(move_to(target, 0.0)));
     });
     assert_eq!(outcome, Some(Outcome::Interrupted));
@@ -409,14 +418,14 @@ fn a_client_that_goes_on_moving_the_group_does_not_keep_the_run_from_ending() {
 }
 
 #[test]
-fn a_group_that_is_moved_before_the_life_cycle_has_seen_it_hold_goes_on() {
+fn a_group_that_a_client_moves_before_the_life_cycle_sees_it_hold_goes_on() {
     let config = load("arm6-erob.toml");
     let ports = (0..config.buses.len()).map(|bus| SimulatedBus::new(&config, bus)).collect();
     let mut run = VirtualRun::serving(&config, ports).unwrap().0;
     while run.snapshot().phase != Phase::Enabling {
         assert!(run.step());
     }
-    run.neglect_life_cycle(50);
+    run.poll_life_cycle_every(50);
     while run.snapshot().phase != Phase::Holding {
         assert!(run.step());
     }
@@ -426,7 +435,7 @@ fn a_group_that_is_moved_before_the_life_cycle_has_seen_it_hold_goes_on() {
     let motion = run.host().request(Request::Move(slow_move)).unwrap();
     run.run(2, |_| {});
     assert_eq!(run.snapshot().phase, Phase::Moving);
-    // Longer than anybody waits for drives that are to be enabled.
+    // This is longer than the enable time-out.
     run.run(25_000, |_| {});
     assert_eq!(run.snapshot().phase, Phase::Holding);
     let snapshot = run.snapshot();
@@ -436,7 +445,7 @@ fn a_group_that_is_moved_before_the_life_cycle_has_seen_it_hold_goes_on() {
 }
 
 #[test]
-fn whoever_asks_finds_out_by_its_number_what_was_refused_and_why() {
+fn the_answer_to_a_request_is_found_by_its_id_with_the_reason_of_a_refusal() {
     let config = load("arm6-erob.toml");
     let mut run = start(&config);
     while run.snapshot().phase != Phase::Moving {
@@ -453,7 +462,7 @@ fn whoever_asks_finds_out_by_its_number_what_was_refused_and_why() {
 }
 
 #[test]
-fn a_fault_while_the_drives_are_disabled_at_the_end_is_how_the_run_ended() {
+fn a_fault_during_disabling_is_the_outcome_of_the_run() {
     let config = load("arm6-erob.toml");
     let mut run = start(&config);
     let mut is_disturbed = false;
@@ -461,7 +470,7 @@ fn a_fault_while_the_drives_are_disabled_at_the_end_is_how_the_run_ended() {
         if run.snapshot().phase == Phase::Disabling && !is_disturbed {
             is_disturbed = true;
             let now_ns = run.clock().now_ns();
-            assert!(run.ports()[0].say(now_ns, &Frame::of(Id::canopen(0x080, 0), [])));
+            assert!(run.ports()[0].send_foreign(now_ns, &Frame::of(Id::canopen(0x080, 0), [])));
         }
     });
     let Some(Outcome::Stopped(stop)) = outcome else { panic!("{outcome:?}") };

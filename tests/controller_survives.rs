@@ -1,5 +1,5 @@
-//! `takt run` when the world around it fails: disk, files, signals. The motion goes on or ends in control, and what
-//! was lost is told.
+//! `takt run` when disks, files or other parts of the system fail. The motion goes on or stops in control, and the loss is
+//! reported.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -11,17 +11,17 @@ use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use serde_json::Value;
 use takt::config::Config;
-use takt::telemetry::Recorded;
-use takt_rt::{CycleRecord, Phase};
+use takt::telemetry::{Recorded, RecordedCycle};
+use takt_rt::Phase;
 use tempfile::TempDir;
 
-/// A folder with the six-axis arm and two of its moves, recording into `runs` beside it.
+/// A folder with a configuration of the six-axis arm with two moves. Recordings go into `runs` beside it.
 struct Place {
     folder: TempDir,
 }
 
 impl Place {
-    /// With what stands in the configuration changed, each from and to.
+    /// With changes of the configuration: pairs of the old text and the new text.
     fn new(changes: &[(&str, &str)]) -> Self {
         let place = Self { folder: tempfile::tempdir().unwrap() };
         let example = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/arm6-erob.toml");
@@ -50,7 +50,7 @@ impl Place {
         command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
     }
 
-    /// Starts a run and waits until its recording, which is a third of a second behind, shows that the arm moves.
+    /// Starts a run and waits until its recording shows that the arm moves. The recording is a third of a second late.
     fn start_and_wait_for_motion(&self) -> Child {
         let mut child = self.start(takt());
         while !self.is_in_motion() {
@@ -79,14 +79,14 @@ fn takt() -> Command {
     Command::new(env!("CARGO_BIN_EXE_takt"))
 }
 
-/// A program whose files may grow to so many bytes.
+/// The program with a limit on the size of its files.
 fn takt_with_file_size(bytes: u64) -> Command {
     let mut command = Command::new("prlimit");
     command.arg(format!("--fsize={bytes}:{bytes}")).arg(env!("CARGO_BIN_EXE_takt"));
     command
 }
 
-/// The arm lags behind further than this in its first move.
+/// The following error in the first move is larger than this limit.
 const FAULT: (&str, &str) = (r#"limit = "0.1 rad", time = "50 ms""#, r#"limit = "0.001 rad", time = "5 ms""#);
 
 fn report(output: &Output, code: i32) -> Value {
@@ -110,7 +110,7 @@ fn assert_arrived(report: &Value) {
 }
 
 #[test]
-fn a_recording_that_is_deleted_in_mid_run_is_told_and_costs_nothing_else() {
+fn a_recording_that_is_deleted_during_the_run_is_reported_and_the_motion_goes_on() {
     let place = Place::new(&[]);
     let child = place.start_and_wait_for_motion();
     fs::remove_file(&place.files()[0]).unwrap();
@@ -121,15 +121,15 @@ fn a_recording_that_is_deleted_in_mid_run_is_told_and_costs_nothing_else() {
         (&report["telemetry"]["recording"], &report["telemetry"]["dropped"]),
         (&Value::Null, &0.into())
     );
-    let told = not_written(&report);
-    assert!(told.len() == 1 && told[0].ends_with("was removed during the run"), "{told:?}");
+    let failures = not_written(&report);
+    assert!(failures.len() == 1 && failures[0].ends_with("was removed during the run"), "{failures:?}");
     assert!(errors(&output).contains("was removed during the run"), "{}", errors(&output));
 }
 
 #[test]
-fn a_folder_that_is_deleted_in_mid_run_is_made_again_for_the_black_box() {
+fn a_folder_that_is_deleted_during_the_run_is_made_again_for_the_black_box() {
     let place = Place::new(&[FAULT]);
-    // The bring-up alone takes longer.
+    // The bring-up takes longer than this.
     let child = place.start(takt());
     while !place.runs().exists() {
         thread::sleep(Duration::from_millis(1));
@@ -144,20 +144,20 @@ fn a_folder_that_is_deleted_in_mid_run_is_made_again_for_the_black_box() {
 }
 
 #[test]
-fn a_file_that_may_not_grow_is_a_full_disk_and_no_reason_to_die_in_motion() {
+fn a_file_size_limit_ends_the_recording_and_the_motion_goes_on() {
     let place = Place::new(&[]);
     let output = place.start(takt_with_file_size(600_000)).wait_with_output().unwrap();
     let report = report(&output, 0);
     assert_arrived(&report);
-    let told = not_written(&report);
-    assert!(told.len() == 1 && told[0].starts_with("the recording ends here: "), "{told:?}");
+    let failures = not_written(&report);
+    assert!(failures.len() == 1 && failures[0].starts_with("the recording ends here: "), "{failures:?}");
     assert_eq!(errors(&output).lines().count(), 1, "{}", errors(&output));
     let recorded = Recorded::open(&place.files()[0]).unwrap();
     assert!(recorded.statistics.cycles > 100 && !recorded.warnings.is_empty(), "{:?}", recorded.warnings);
 }
 
 #[test]
-fn a_full_disk_costs_the_end_of_the_black_box_and_the_stop_is_as_it_should_be() {
+fn a_full_disk_ends_the_black_box_and_the_stop_is_regular() {
     let place = Place::new(&[FAULT]);
     let output = place.start(takt_with_file_size(300_000)).wait_with_output().unwrap();
     let report = report(&output, 1);
@@ -165,27 +165,29 @@ fn a_full_disk_costs_the_end_of_the_black_box_and_the_stop_is_as_it_should_be() 
         (&report["stop"]["rule"], &report["stop"]["category"]),
         (&"following_error".into(), &1.into())
     );
-    let told = not_written(&report);
-    assert_eq!(told.iter().filter(|told| told.contains("black box")).count(), 1, "{told:?}");
-    assert_eq!(told.len(), 2, "{told:?}");
+    let failures = not_written(&report);
+    assert_eq!(failures.iter().filter(|failure| failure.contains("black box")).count(), 1, "{failures:?}");
+    assert_eq!(failures.len(), 2, "{failures:?}");
 }
 
 #[test]
-fn in_an_unwritable_folder_a_fault_stops_the_arm_as_ever_and_each_loss_is_told_once() {
+fn with_an_unwritable_folder_a_fault_stops_the_arm_and_each_loss_is_reported_once() {
     let place = Place::new(&[FAULT]);
     fs::write(place.runs(), "in the way").unwrap();
     let output = place.start(takt()).wait_with_output().unwrap();
     let report = report(&output, 1);
     assert_eq!(report["stop"]["rule"], "following_error");
-    let told = not_written(&report);
+    let failures = not_written(&report);
     assert!(
-        told.len() == 2 && told[0].starts_with("no recording: ") && told[1].starts_with("no black box: "),
-        "{told:?}"
+        failures.len() == 2
+            && failures[0].starts_with("no recording: ")
+            && failures[1].starts_with("no black box: "),
+        "{failures:?}"
     );
 }
 
 #[test]
-fn a_fault_leaves_a_black_box_whose_path_is_told_to_people_and_programs_even_without_a_recording() {
+fn a_fault_leaves_a_black_box_without_a_recording_and_its_path_is_in_text_and_json() {
     let place = Place::new(&[FAULT]);
     let text = fs::read_to_string(place.config()).unwrap();
     fs::write(place.config(), format!("{text}record = false\n")).unwrap();
@@ -211,7 +213,7 @@ fn with_the_black_box_off_a_fault_leaves_nothing() {
 }
 
 #[test]
-fn what_a_killed_controller_has_recorded_can_be_read() {
+fn the_recording_of_a_killed_controller_can_be_read() {
     let place = Place::new(&[]);
     let mut child = place.start_and_wait_for_motion();
     child.kill().unwrap();
@@ -223,14 +225,14 @@ fn what_a_killed_controller_has_recorded_can_be_read() {
     assert_eq!(report.status.code(), Some(0), "{}", errors(&report));
 }
 
-fn freeze(pid: Pid, time: Duration) {
+fn pause(pid: Pid, time: Duration) {
     kill(pid, Signal::SIGSTOP).unwrap();
     thread::sleep(time);
     kill(pid, Signal::SIGCONT).unwrap();
 }
 
-/// From cycle to cycle no set-point leaves its limits: position by velocity, velocity by acceleration. It is one
-/// period of the trajectory from one cycle to the next, however many slots have passed between them.
+/// From cycle to cycle, the position changes within the velocity limit and the velocity within the acceleration limit. Between
+/// two cycles the trajectory advances by one period, however many slots have passed.
 fn assert_moved_smoothly(place: &Place) {
     let config = Config::load(&place.config()).unwrap();
     let recorded = Recorded::open(&place.files()[0]).unwrap();
@@ -242,7 +244,7 @@ fn assert_moved_smoothly(place: &Place) {
         if !is_enabled(before) || !is_enabled(after) {
             continue;
         }
-        for ((axis, from), to) in config.axes.iter().zip(before.axes()).zip(after.axes()) {
+        for ((axis, from), to) in config.axes.iter().zip(&before.axes).zip(&after.axes) {
             let step = (to.position_set - from.position_set).abs();
             assert!(step <= axis.limits.velocity * period_s * 1.000_01, "{}: {step} rad", axis.name);
             let change = f64::from((to.velocity_set - from.velocity_set).abs());
@@ -255,12 +257,12 @@ fn assert_moved_smoothly(place: &Place) {
 }
 
 #[test]
-fn a_process_that_is_frozen_in_motion_goes_on_smoothly() {
+fn a_process_that_is_paused_in_motion_goes_on_smoothly() {
     let place = Place::new(&[]);
     let child = place.start_and_wait_for_motion();
     let pid = Pid::from_raw(i32::try_from(child.id()).unwrap());
     for _ in 0..3 {
-        freeze(pid, Duration::from_millis(60));
+        pause(pid, Duration::from_millis(60));
         thread::sleep(Duration::from_millis(60));
     }
     let report = report(&child.wait_with_output().unwrap(), 0);
@@ -270,13 +272,13 @@ fn a_process_that_is_frozen_in_motion_goes_on_smoothly() {
     assert_moved_smoothly(&place);
 }
 
-/// As on real buses; simulated ones would not mind.
+/// The setting makes simulated buses stop for missed slots, as real ones do.
 #[test]
-fn a_process_that_is_frozen_in_motion_for_too_long_stops_the_arm_without_a_jump_and_counts_what_it_missed() {
+fn a_process_that_is_paused_for_too_long_stops_the_arm_without_a_jump_and_counts_the_missed_slots() {
     let minding = ("[defaults.axis]", "[simulation]\nstops_for_missed_slots = true\n\n[defaults.axis]");
     let place = Place::new(&[minding]);
     let child = place.start_and_wait_for_motion();
-    freeze(Pid::from_raw(i32::try_from(child.id()).unwrap()), Duration::from_millis(400));
+    pause(Pid::from_raw(i32::try_from(child.id()).unwrap()), Duration::from_millis(400));
     let report = report(&child.wait_with_output().unwrap(), 1);
     let stop = &report["stop"];
     assert_eq!((&stop["rule"], &stop["category"]), (&"timing_unfit".into(), &1.into()));
@@ -287,6 +289,6 @@ fn a_process_that_is_frozen_in_motion_for_too_long_stops_the_arm_without_a_jump_
 }
 
 /// Whether the drives follow set-points.
-fn is_enabled(record: &CycleRecord) -> bool {
+fn is_enabled(record: &RecordedCycle) -> bool {
     matches!(record.phase, Phase::Holding | Phase::Moving | Phase::Stopping)
 }

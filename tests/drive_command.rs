@@ -46,7 +46,7 @@ fn is_refused(arguments: &[&str], words: &str) {
 fn info_is_a_table_for_people_and_one_object_for_programs() {
     let output = drive(&["info"]);
     ends_with(0, &output);
-    assert!(said(&output).contains("vendor id        0x5A65726F"), "{}", said(&output));
+    assert!(said(&output).contains("vendor ID        0x5A65726F"), "{}", said(&output));
     let output = drive(&["info", "--json"]);
     ends_with(0, &output);
     let object = json(&output);

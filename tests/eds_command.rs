@@ -69,7 +69,7 @@ fn a_file_that_cannot_be_used_ends_with_2() {
     let output = takt(&[path]);
     let shown = String::from_utf8(output.stderr).unwrap();
     assert_eq!((output.status.code(), output.stdout.as_slice()), (Some(2), &b""[..]));
-    assert!(shown.contains("is no number: \"fast\"") && shown.contains(":5:14"), "{shown}");
+    assert!(shown.contains("is not a number: \"fast\"") && shown.contains(":5:14"), "{shown}");
     let output = takt(&[path, "--json"]);
     let json: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(output.status.code(), Some(2));

@@ -1,4 +1,4 @@
-//! The controller as a program embeds it: commanded by calls, on simulated buses, in real time.
+//! The controller as a program embeds it, on simulated buses in real time.
 
 use std::path::Path;
 use std::time::Duration;
@@ -20,7 +20,7 @@ fn start(name: &str) -> Controller {
 }
 
 #[test]
-fn an_arm_is_moved_by_calls_and_left_politely() {
+fn an_arm_is_moved_by_calls_and_shut_down() {
     let mut arm = start("arm6-erob.toml");
     let home: Vec<f64> = arm.state().axes[..6].iter().map(|axis| axis.position_set).collect();
     let target: Vec<f64> = home.iter().map(|position| position + 0.05).collect();
@@ -34,7 +34,7 @@ fn an_arm_is_moved_by_calls_and_left_politely() {
 }
 
 #[test]
-fn what_cannot_be_is_refused_before_it_is_asked() {
+fn an_impossible_command_is_an_error_before_it_is_sent() {
     let mut arm = start("erob-modes/erob-pv.toml");
     assert_eq!(arm.move_to(&[0.0, 0.0]), Err(CommandError::Count { given: 2, axes: 1 }));
     assert!(matches!(arm.torque(0, 1.0, PATIENCE), Err(CommandError::WrongMode { .. })));
@@ -45,7 +45,7 @@ fn what_cannot_be_is_refused_before_it_is_asked() {
 }
 
 #[test]
-fn a_speed_is_reached_kept_and_ended_and_one_that_is_not_renewed_stops_the_group() {
+fn a_velocity_is_reached_and_ended_and_an_expired_one_stops_the_group() {
     let mut joint = start("erob-modes/erob-pv.toml");
     let going = joint.velocity(0, 0.5, PATIENCE).unwrap();
     assert_eq!(joint.wait(going, PATIENCE), Ok(()));
@@ -59,7 +59,7 @@ fn a_speed_is_reached_kept_and_ended_and_one_that_is_not_renewed_stops_the_group
 }
 
 #[test]
-fn after_a_stop_nothing_moves_before_the_fault_is_reset_and_whoever_asks_is_told_why() {
+fn after_a_fault_each_request_is_refused_with_the_reason_until_the_fault_is_reset() {
     let mut joint = start("single-erob.toml");
     joint.begin_stream().unwrap();
     let far = State { position: 1.0, ..State::default() };
@@ -71,16 +71,16 @@ fn after_a_stop_nothing_moves_before_the_fault_is_reset_and_whoever_asks_is_told
     assert_eq!(joint.state().stop.map(|stop| stop.rule()), Some(Rule::StartPose));
     assert!(joint.wait_for(Phase::Holding, PATIENCE));
     let refused = joint.move_to(&[0.2]).unwrap();
-    let Err(MotionError::Refused(refused)) = joint.wait(refused, PATIENCE) else { panic!("it was taken") };
+    let Err(MotionError::Refused(refused)) = joint.wait(refused, PATIENCE) else { panic!("it was granted") };
     assert_eq!(
         refused.to_string(),
-        "the move was refused while holding: the group has stopped for a fault of joint (start_pose), which must be \
+        "the move was rejected while holding: the group has stopped for a fault of joint (start_pose), which must be \
          reset first"
     );
-    let Err(CommandError::Refused(refused)) = joint.begin_stream() else { panic!("it was taken") };
+    let Err(CommandError::Refused(refused)) = joint.begin_stream() else { panic!("it was granted") };
     assert_eq!(refused.refusal.map(|refusal| refusal.request), Some(RequestKind::Stream));
-    let Err(CommandError::Refused(refused)) = joint.enable() else { panic!("it was taken") };
-    assert_eq!(refused.to_string(), "enabling was refused: not possible while holding");
+    let Err(CommandError::Refused(refused)) = joint.enable() else { panic!("it was granted") };
+    assert_eq!(refused.to_string(), "enabling was rejected: not possible while holding");
     joint.reset_faults().unwrap();
     let motion = joint.move_to(&[0.2]).unwrap();
     assert!(matches!(joint.reset_faults(), Err(CommandError::Refused(_))), "it moves");
@@ -92,27 +92,27 @@ fn after_a_stop_nothing_moves_before_the_fault_is_reset_and_whoever_asks_is_told
     let stopped = joint.wait(motion, PATIENCE).unwrap_err();
     assert_eq!(
         stopped.to_string(),
-        "the group has stopped: a stop was asked for while moving; category 1: decelerated, then power removed"
+        "the group has stopped: a stop was requested while moving; category 1: decelerated, then power removed"
     );
     assert!(joint.wait_for(Phase::Disabled, PATIENCE));
     joint.enable().unwrap();
     assert!(joint.wait_for(Phase::Holding, PATIENCE));
 }
 
-/// Four requests are taken up in a cycle: behind so many a stop would begin half a minute after it was asked for.
+/// Four requests are handled in a cycle. A stop behind so many would begin half a minute after its request.
 const FLOOD: usize = 100_000;
 
 #[test]
-fn a_stop_overtakes_what_a_client_has_flooded_the_controller_with() {
+fn a_stop_does_not_wait_behind_a_flood_of_requests() {
     let mut joint = start("single-erob.toml");
-    let mut asked = 0;
+    let mut accepted = 0;
     for number in 0..FLOOD {
         match joint.move_to(&[0.2 + 0.1 * (number % 2) as f64]) {
-            Ok(_) => asked += 1,
+            Ok(_) => accepted += 1,
             Err(error) => assert!(matches!(error, CommandError::Full { .. }), "{error}"),
         }
     }
-    assert!(asked < FLOOD, "there is no end to what can be asked");
+    assert!(accepted < FLOOD, "the number of waiting requests is bounded");
     let last = loop {
         if let Ok(motion) = joint.move_to(&[0.4]) {
             break motion;
@@ -123,9 +123,52 @@ fn a_stop_overtakes_what_a_client_has_flooded_the_controller_with() {
     assert!(joint.wait_for(Phase::Disabled, PATIENCE));
     let stop = joint.state().stop.unwrap();
     assert_eq!((stop.rule(), stop.category), (Rule::Requested, StopCategory::One));
-    assert!(stop.slot - slot < 2_000, "{} slots after it was asked for", stop.slot - slot);
+    assert!(stop.slot - slot < 2_000, "{} slots after its request", stop.slot - slot);
     assert!(joint.wait(last, PATIENCE).is_err());
     assert_eq!(joint.finish().unwrap().outcome, Outcome::Finished);
+}
+
+/// The number of stops, each followed by a motion.
+const STOPS_BEFORE_MOTIONS: u64 = 200;
+
+#[test]
+fn a_stop_that_was_requested_before_a_motion_is_never_the_result_of_the_motion() {
+    let mut joint = start("single-erob.toml");
+    let home = joint.state().axes[0].position_set;
+    for number in 0..STOPS_BEFORE_MOTIONS {
+        joint.stop(StopCategory::Two).unwrap();
+        // From 0 to 5 ms, in steps that are not multiples of the cycle.
+        std::thread::sleep(Duration::from_micros(number * 1_700 % 5_000));
+        let target = home + if number % 2 == 0 { 1e-3 } else { 0.0 };
+        let motion = joint.move_to(&[target]).unwrap();
+        assert_eq!(joint.wait(motion, PATIENCE), Ok(()), "try {number}");
+    }
+}
+
+#[test]
+fn each_wait_returns_the_result_of_its_own_motion() {
+    let mut joint = start("single-erob.toml");
+    let slowly = MoveOptions { velocity_scale: 0.02, ..MoveOptions::default() };
+    let replaced = joint.move_with(&[0.5], slowly).unwrap();
+    assert!(joint.wait_for(Phase::Moving, PATIENCE));
+    let arrived = joint.move_to(&[0.1]).unwrap();
+    assert_eq!(joint.wait(replaced, PATIENCE), Err(MotionError::Replaced));
+    assert_eq!(joint.wait(arrived, PATIENCE), Ok(()));
+    let stopped = joint.move_with(&[0.5], slowly).unwrap();
+    assert!(joint.wait_for(Phase::Moving, PATIENCE));
+    joint.stop(StopCategory::Two).unwrap();
+    let why = joint.wait(stopped, PATIENCE);
+    assert!(
+        matches!(&why, Err(MotionError::Stopped(stopped)) if stopped.reason.rule() == Rule::Requested),
+        "{why:?}"
+    );
+    assert!(joint.wait_for(Phase::Holding, PATIENCE));
+    let last = joint.move_to(&[0.1]).unwrap();
+    assert_eq!(joint.wait(last, PATIENCE), Ok(()));
+    // The results of the earlier motions are still the same.
+    assert_eq!(joint.wait(replaced, PATIENCE), Err(MotionError::Replaced));
+    assert_eq!(joint.wait(arrived, PATIENCE), Ok(()));
+    assert_eq!(joint.wait(stopped, PATIENCE), why);
 }
 
 #[test]

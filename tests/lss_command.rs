@@ -1,4 +1,4 @@
-//! `takt lss` as a user meets it, on simulated devices.
+//! `takt lss` on simulated devices.
 
 mod printed;
 
@@ -33,7 +33,7 @@ fn result(arguments: &[&str]) -> Value {
 }
 
 #[test]
-fn a_scan_finds_every_device_that_has_no_node_number_and_no_other() {
+fn a_scan_finds_every_device_without_a_node_id_and_no_other() {
     let result = result(&["scan"]);
     let serials: Vec<u64> = result["devices"]
         .as_array()
@@ -48,7 +48,7 @@ fn a_scan_finds_every_device_that_has_no_node_number_and_no_other() {
 }
 
 #[test]
-fn a_device_that_is_given_a_node_number_boots_with_it() {
+fn a_device_that_gets_a_node_id_boots_with_it() {
     let found = result(&["set-id", "5"]);
     assert_eq!(
         (&found["node"], &found["booted_node"], &found["is_stored"]),
@@ -61,7 +61,7 @@ fn a_device_that_is_given_a_node_number_boots_with_it() {
 }
 
 #[test]
-fn a_device_that_had_a_node_number_keeps_it_until_it_is_reset_which_is_said() {
+fn a_device_that_had_a_node_id_keeps_it_until_it_is_reset_and_this_is_said() {
     let identity = KNOWN.split('@').next().unwrap();
     let output = simulated(&["--device", identity, "set-id", "12"]);
     ends_with(0, &output);
@@ -70,7 +70,7 @@ fn a_device_that_had_a_node_number_keeps_it_until_it_is_reset_which_is_said() {
 }
 
 #[test]
-fn a_device_tells_who_it_is_and_which_number_it_has() {
+fn a_device_reports_its_identity_and_node_id() {
     let identity = KNOWN.split('@').next().unwrap();
     let known = result(&["--device", identity, "inquire"]);
     assert_eq!((&known["device"]["vendor"], &known["node"]), (&0x5A65_726F_u32.into(), &9.into()));
@@ -82,7 +82,7 @@ fn a_device_tells_who_it_is_and_which_number_it_has() {
 }
 
 #[test]
-fn a_bit_rate_is_set_stored_and_activated_with_word_of_what_is_to_be_done_next() {
+fn a_bit_rate_is_set_stored_and_activated_with_a_note_on_the_next_step() {
     let output = simulated(&[
         "--device",
         FIRST,
@@ -97,7 +97,7 @@ fn a_bit_rate_is_set_stored_and_activated_with_word_of_what_is_to_be_done_next()
     for words in ["bit rate     500 kbit/s", "stored       yes", "change the interface as well", "wait"] {
         assert!(said(&output).contains(words), "{words}: {}", said(&output));
     }
-    // Configured, stored, activated; and nothing after that at the old bit rate.
+    // Configured, stored, activated; no frame follows at the old bit rate.
     let sent: Vec<String> =
         errors(&output).lines().filter(|line| line.contains(" > ")).map(str::to_owned).collect();
     for (line, frame) in sent.iter().rev().zip(["7E5#15C800", "7E5#17", "7E5#130002"]) {

@@ -1,4 +1,4 @@
-//! A run holds as much memory after minutes as it held after seconds, whatever is recorded of it.
+//! The memory of a run does not grow with its duration, with a recording or without.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::io::{self, Write};
@@ -9,15 +9,15 @@ use std::sync::atomic::{AtomicI64, AtomicU64, Ordering};
 use takt::bus::port::Port;
 use takt::config::Config;
 use takt::controller::VirtualRun;
-use takt::telemetry::{BlackBoxOptions, Destination, Logger, LoggerOptions, Machine, WallClock};
+use takt::telemetry::{BlackBoxOptions, Logger, LoggerOptions, Machine, RecordingDestination, WallClock};
 
-/// What all threads together have taken from the heap and not given back.
+/// Bytes that all threads together hold on the heap.
 static HELD_BYTES: AtomicI64 = AtomicI64::new(0);
 
-/// The system's allocator, with an account of what is held.
+/// The system's allocator with a count of the bytes that are held.
 struct Accounting;
 
-// SAFETY: every call is handed on unchanged to the system's allocator; the account touches no memory of the heap.
+// SAFETY: every call is passed on unchanged to the system's allocator; counting touches no memory of the heap.
 unsafe impl GlobalAlloc for Accounting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         HELD_BYTES.fetch_add(layout.size() as i64, Ordering::Relaxed);
@@ -41,7 +41,7 @@ unsafe impl GlobalAlloc for Accounting {
 #[global_allocator]
 static ALLOCATOR: Accounting = Accounting;
 
-/// Takes a recording and keeps nothing but its length.
+/// A writer that keeps only the length of a recording.
 #[derive(Clone, Default)]
 struct Length(Arc<AtomicU64>);
 
@@ -56,9 +56,9 @@ impl Write for Length {
     }
 }
 
-/// What the heap holds at the end of every minute of six axes in motion, with a recording or without, the black box being
-/// on in any case.
-fn held_every_minute(minutes: usize, recording: Option<Destination>) -> Vec<i64> {
+/// The bytes on the heap at the end of every minute of six axes in motion, with a recording or without. The black box is
+/// always on.
+fn held_every_minute(minutes: usize, recording: Option<RecordingDestination>) -> Vec<i64> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/arm6-erob.toml");
     let mut config = Config::load(&path).unwrap();
     config.program.repeat = u32::MAX;
@@ -82,7 +82,7 @@ fn held_every_minute(minutes: usize, recording: Option<Destination>) -> Vec<i64>
     let mut logger = Logger::new(log, options, Box::new(|_| {}));
     let mut held = Vec::with_capacity(minutes);
     for cycle in 1..=minutes as u64 * 60_000 {
-        assert!(run.step(), "the run is over in cycle {cycle}: {:?}", run.supervisor().outcome());
+        assert!(run.step(), "the run has ended in cycle {cycle}: {:?}", run.supervisor().outcome());
         logger.drain();
         if cycle.is_multiple_of(60_000) {
             held.push(HELD_BYTES.load(Ordering::Relaxed));
@@ -93,16 +93,16 @@ fn held_every_minute(minutes: usize, recording: Option<Destination>) -> Vec<i64>
     held
 }
 
-/// In one test, because all threads share the account.
+/// This is one test, because all threads share the count.
 #[test]
-fn a_run_keeps_nothing_of_the_cycles_it_has_behind_it_but_the_index_of_its_recording() {
+fn the_memory_of_a_run_grows_only_by_the_index_of_its_recording() {
     let held = held_every_minute(3, None);
     assert_eq!(held, [held[0]; 3], "bytes held, without a recording");
 
     let recorded = Length::default();
-    let destination = Destination::Stream("length".to_owned(), Box::new(recorded.clone()));
+    let destination = RecordingDestination::Stream("length".to_owned(), Box::new(recorded.clone()));
     let held = held_every_minute(3, Some(destination));
-    // An MCAP file ends with an index of its chunks, which is collected on the way: some 270 bytes for each of 300 kB.
+    // An MCAP file ends with an index of its chunks. It takes some 270 bytes of memory for each chunk of 300 kB.
     let in_two_minutes = recorded.0.load(Ordering::Relaxed) as i64 * 2 / 3;
     assert!(in_two_minutes > 50_000_000, "{in_two_minutes} bytes were recorded in two minutes");
     assert!(held[2] - held[0] < in_two_minutes / 512, "{held:?} bytes held, {in_two_minutes} recorded");

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Reads a recording of takt with the reader that the MCAP project itself publishes, and says what is in it.
+"""Reads a recording of takt with the reader of the MCAP project, and prints its contents.
 
     pip install mcap mcap-ros2-support
     tests/read_recording.py runs/arm6-erob-20250131T120000Z.mcap
 
-Ends with an error when the file, its index, a schema or a message cannot be read, when slots go backwards, or when
-an axis has not as many messages as there are cycles.
+It fails if the file, its index, a schema or a message cannot be read, if slots go backwards, or if the number of an
+axis' messages is not the number of cycles.
 """
 
 import sys
@@ -29,7 +29,7 @@ def main(path):
                 continue  # the buses of a black box
             assert decoded.slot >= last_slot.get(channel.topic, 0), f"{channel.topic}: slots go backwards"
             last_slot[channel.topic] = decoded.slot
-    assert sum(counts.values()) == summary.statistics.message_count, "the statistics miscount"
+    assert sum(counts.values()) == summary.statistics.message_count, "the statistics have another number of messages"
     for axis in metadata["axes"].splitlines():
         topic = f"/axis/{axis}"
         assert counts[topic] == counts["/cycle"], f"{topic}: {counts[topic]} of {counts['/cycle']} cycles"

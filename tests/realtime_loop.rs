@@ -1,4 +1,4 @@
-//! The real loop, in its real-time thread, on real ports: it allocates nothing and takes no page fault.
+//! The loop in its real-time thread on its ports allocates nothing and causes no page fault.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -10,7 +10,7 @@ use std::time::Duration;
 use takt::bus::port::Port;
 use takt::config::Config;
 use takt::controller::channels::{ChannelSizes, channels};
-use takt::controller::realtime_thread::{self, Work};
+use takt::controller::realtime_thread::{self, LoopParts};
 use takt::controller::{Outcome, Supervisor, assemble};
 use takt::telemetry::{BlackBoxOptions, Logger, LoggerOptions, LoggerThread, Machine, WallClock};
 use takt_rt::Frame;
@@ -22,10 +22,10 @@ thread_local! {
 }
 
 static ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
-/// [`ALLOCATIONS`] at the last call of a port: what came after it is the end of the thread, not the loop.
+/// [`ALLOCATIONS`] at the last call of a port. Later allocations belong to the end of the thread, not to the loop.
 static SEEN_BY_LOOP: AtomicU64 = AtomicU64::new(0);
 
-/// Counts what the watched thread asks of the allocator, whether it takes, changes or gives back.
+/// Counts the calls of the watched thread to the allocator: allocating, reallocating and freeing.
 struct Counting;
 
 impl Counting {
@@ -36,23 +36,23 @@ impl Counting {
     }
 }
 
-// SAFETY: every call is passed on to the system's allocator as it came; counting touches no memory of theirs.
+// SAFETY: every call is passed on unchanged to the system's allocator, and counting touches no memory of the heap.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         Self::count();
-        // SAFETY: the caller's promises are passed on.
+        // SAFETY: the caller keeps the same contract.
         unsafe { System.alloc(layout) }
     }
 
     unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
         Self::count();
-        // SAFETY: the caller's promises are passed on.
+        // SAFETY: the caller keeps the same contract.
         unsafe { System.dealloc(pointer, layout) }
     }
 
     unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
         Self::count();
-        // SAFETY: the caller's promises are passed on.
+        // SAFETY: the caller keeps the same contract.
         unsafe { System.realloc(pointer, layout, size) }
     }
 }
@@ -60,7 +60,7 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
-/// Has its thread watched from the first call on, which the loop makes before its first SYNC.
+/// Starts to watch its thread at the first call, which the loop makes before its first SYNC.
 struct Watched(Port);
 
 impl Watched {
@@ -91,7 +91,7 @@ impl BusPort for Watched {
 }
 
 #[test]
-fn the_real_loop_allocates_nothing_from_bring_up_to_the_last_cycle() {
+fn the_loop_allocates_nothing_from_bring_up_to_the_last_cycle() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/arm6-erob.toml");
     let mut config = Config::load(&path).unwrap();
     config.program.moves.truncate(2);
@@ -105,7 +105,7 @@ fn the_real_loop_allocates_nothing_from_bring_up_to_the_last_cycle() {
         traces.push(trace);
         Watched(port)
     });
-    let work = Work {
+    let work = LoopParts {
         engine: Box::new(assemble::engine(&config).unwrap()),
         plan: assemble::slot_plan(&config),
         ports: ports.collect(),

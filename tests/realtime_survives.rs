@@ -1,4 +1,4 @@
-//! The real loop, in its real-time thread, on simulated buses, when everything around it fails.
+//! The loop in its real-time thread on simulated buses, while other parts of the program fail.
 
 use std::cell::Cell;
 use std::fs;
@@ -12,11 +12,11 @@ use takt::bus::port::Port;
 use takt::bus::trace::Trace;
 use takt::config::Config;
 use takt::controller::channels::{ChannelSizes, HostSide, LogSide, channels};
-use takt::controller::realtime_thread::{self, Ended, Work};
+use takt::controller::realtime_thread::{self, Ended, LoopParts};
 use takt::controller::session::{self, Session, SessionOptions};
 use takt::controller::{Outcome, Supervisor, assemble};
 use takt::telemetry::{
-    BlackBoxOptions, Fault, Logger, LoggerOptions, LoggerThread, Machine, Notice, Recorded, WallClock,
+    BlackBoxOptions, Incident, Logger, LoggerOptions, LoggerThread, Machine, Notice, Recorded, WallClock,
 };
 use takt_rt::linux::MonotonicClock;
 use takt_rt::plan;
@@ -34,7 +34,7 @@ fn arm(directory: &Path) -> Config {
     config
 }
 
-/// What is left of a run in the real-time thread.
+/// The result of a run in the real-time thread.
 struct Left {
     outcome: Option<Outcome>,
     ended: Option<Ended>,
@@ -43,7 +43,7 @@ struct Left {
     traces: Vec<Trace>,
 }
 
-/// Runs the program; `each` is called about once in a millisecond, and `wrap` may put something in front of the ports.
+/// Runs the program. `each` is called about once in a millisecond, and `wrap` may wrap the ports.
 fn run<P: BusPort + Send + 'static>(
     config: &Config,
     wrap: impl Fn(Port) -> P,
@@ -57,7 +57,7 @@ fn run<P: BusPort + Send + 'static>(
             (wrap(port), trace)
         })
         .unzip();
-    let work = Work {
+    let work = LoopParts {
         engine: Box::new(assemble::engine(config).unwrap()),
         plan: assemble::slot_plan(config),
         ports,
@@ -76,7 +76,7 @@ fn run<P: BusPort + Send + 'static>(
     Left { outcome: supervisor.outcome().cloned(), ended, snapshot: host.snapshot(), log, traces }
 }
 
-/// Counts the cycles: each asks for the health of each bus once.
+/// Counts the cycles. Each cycle reads the health of each bus once.
 struct Counted {
     port: Port,
     cycles: Arc<AtomicU64>,
@@ -102,7 +102,7 @@ impl BusPort for Counted {
 }
 
 #[test]
-fn a_logger_that_is_stuck_costs_records_and_frames_that_are_counted_and_nothing_else() {
+fn a_stuck_logger_loses_only_records_and_frames_and_they_are_counted() {
     let folder = tempfile::tempdir().unwrap();
     let mut config = arm(folder.path());
     config.telemetry.ring_records = 64;
@@ -120,7 +120,7 @@ fn a_logger_that_is_stuck_costs_records_and_frames_that_are_counted_and_nothing_
 }
 
 #[test]
-fn a_client_that_floods_the_queue_and_the_stream_does_not_keep_the_program_from_finishing() {
+fn a_client_that_floods_the_queue_and_the_stream_does_not_prevent_the_end_of_the_program() {
     let folder = tempfile::tempdir().unwrap();
     let config = arm(folder.path());
     let command = StreamCommand { valid_until_ns: u64::MAX, set_points: [plan::State::default(); MAX_AXES] };
@@ -131,7 +131,7 @@ fn a_client_that_floods_the_queue_and_the_stream_does_not_keep_the_program_from_
         |host| {
             for _ in 0..100 {
                 host.stream(&command);
-                // What the group grants at any time, and what is so already.
+                // Requests that are granted at any time and change nothing.
                 if host.request(Request::Sync(true)).is_err() {
                     refused.set(refused.get() + 1);
                 }
@@ -142,7 +142,7 @@ fn a_client_that_floods_the_queue_and_the_stream_does_not_keep_the_program_from_
     assert!(refused.get() > 10_000, "the queue was full {} times", refused.get());
 }
 
-/// A port that is a defect of the real-time thread after so many frames.
+/// A port that panics in the real-time thread after so many calls.
 struct Fatal {
     port: Port,
     sends: u32,
@@ -169,7 +169,7 @@ impl BusPort for Fatal {
 }
 
 #[test]
-fn when_the_real_time_thread_dies_its_last_cycles_and_frames_are_in_the_black_box() {
+fn after_a_panic_of_the_real_time_thread_its_last_cycles_and_frames_are_in_the_black_box() {
     let folder = tempfile::tempdir().unwrap();
     let mut config = arm(folder.path());
     config.telemetry.ring_records = 8_192;
@@ -185,7 +185,7 @@ fn when_the_real_time_thread_dies_its_last_cycles_and_frames_are_in_the_black_bo
         traces: left.traces,
     };
     let logger = LoggerThread::start(Logger::new(left.log, options, Box::new(|_| {}))).unwrap();
-    logger.fault(Fault::ThreadDied);
+    logger.incident(Incident::ThreadDied);
     let files = logger.finish().black_boxes.files;
     let recorded = Recorded::open(&files[0]).unwrap();
     assert_eq!(recorded.cause().unwrap().rule, "thread_died");
@@ -195,12 +195,12 @@ fn when_the_real_time_thread_dies_its_last_cycles_and_frames_are_in_the_black_bo
     assert!(messages.filter(|message| message.channel.topic == "/frames/base").count() > 1_000);
 }
 
-/// Whatever panicked, the group was stopped in category 1 and its drives are without power.
-fn assert_stopped_in_control(session: &Session, said: &str) {
-    assert_eq!(session.outcome, Outcome::CallbackPanicked { message: said.to_owned() });
+/// After the panic, the group was stopped in category 1, and its drives are without power.
+fn assert_stopped_in_control(session: &Session, message: &str) {
+    assert_eq!(session.outcome, Outcome::CallbackPanicked { message: message.to_owned() });
     assert_eq!(session.snapshot.stop.map(|stop| stop.category), Some(StopCategory::One));
     assert_eq!(session.snapshot.phase, Phase::Disabled);
-    assert!(session.ended.is_some(), "the real-time thread has ended as it should");
+    assert!(session.ended.is_some(), "the real-time thread has ended regularly");
     let recorded = Recorded::open(&session.log.black_boxes.files[0]).unwrap();
     assert_eq!(recorded.cause().unwrap().rule, "callback_panicked");
     let decelerated = recorded.events.iter().any(|event| {
@@ -238,5 +238,5 @@ fn a_panic_of_the_callers_notify_is_caught_and_stops_the_group_in_category_1() {
         None
     });
     assert_stopped_in_control(&session.unwrap(), "a mistake in notify");
-    assert_eq!(last_watched, Phase::Disabled, "watch was sound and has seen the end");
+    assert_eq!(last_watched, Phase::Disabled, "watch was called until the end");
 }

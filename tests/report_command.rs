@@ -5,27 +5,32 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::Arc;
 
+use mcap::records::op;
 use serde_json::Value;
 use takt::bus::trace::traced;
 use takt::config::Config;
+use takt::controller::channels::{ChannelSizes, channels};
 use takt::controller::{Outcome, VirtualRun};
-use takt::faults::{Rehearsal, Scenario};
+use takt::faults::{FaultInjector, Scenario};
 use takt::sim::SimulatedBus;
-use takt::telemetry::{BlackBoxOptions, Destination, Logger, LoggerOptions, Machine, Recorded, WallClock};
-use takt_rt::Rule;
+use takt::telemetry::{
+    BlackBoxOptions, BusDescription, Logger, LoggerOptions, Machine, Recorded, RecordingDestination,
+    WallClock,
+};
+use takt_rt::{CycleRecord, HostInterface, Rule};
 use tempfile::TempDir;
 
 /// 2023-11-14 22:13:20 UTC
 const UNIX_AT_ZERO_NS: u64 = 1_700_000_000_000_000_000;
 
-/// What a run in virtual time has left, whose arm lags behind further than is allowed.
-struct Left {
+/// The files of a run in virtual time that stopped for a following error.
+struct RunFiles {
     folder: TempDir,
     recording: PathBuf,
     black_box: PathBuf,
 }
 
-fn stopped_run() -> Left {
+fn stopped_run() -> RunFiles {
     let folder = tempfile::tempdir().unwrap();
     let mut config =
         Config::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/arm6-erob.toml")).unwrap();
@@ -39,7 +44,7 @@ fn stopped_run() -> Left {
         machine: Machine::of(&config),
         wall_clock: WallClock::fixed(UNIX_AT_ZERO_NS),
         started_ns: 0,
-        recording: Some(Destination::File(folder.path().join("run.mcap"))),
+        recording: Some(RecordingDestination::File(folder.path().join("run.mcap"))),
         candump: None,
         black_box: Some(BlackBoxOptions { span_ns: 5_000_000_000, directory: folder.path().to_owned() }),
         traces,
@@ -53,16 +58,20 @@ fn stopped_run() -> Left {
         "{outcome:?}"
     );
     let summary = logger.finish();
-    Left { folder, recording: summary.recording.unwrap(), black_box: summary.black_boxes.files[0].clone() }
+    RunFiles {
+        folder,
+        recording: summary.recording.unwrap(),
+        black_box: summary.black_boxes.files[0].clone(),
+    }
 }
 
-/// A recording and nothing beside it.
+/// Options that write a recording and nothing else.
 fn recording_to(file: &Path, machine: Machine) -> LoggerOptions {
     LoggerOptions {
         machine,
         wall_clock: WallClock::fixed(UNIX_AT_ZERO_NS),
         started_ns: 0,
-        recording: Some(Destination::File(file.to_owned())),
+        recording: Some(RecordingDestination::File(file.to_owned())),
         candump: None,
         black_box: None,
         traces: vec![],
@@ -86,7 +95,7 @@ fn json(output: &Output) -> Value {
     serde_json::from_slice(&output.stdout).unwrap()
 }
 
-/// Kept from before refusals said what was refused and why.
+/// The file was written before a refusal was recorded with its request and its reason.
 #[test]
 fn a_recording_of_an_earlier_version_is_read() {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/seeds/recording/of_an_earlier_version");
@@ -97,7 +106,7 @@ fn a_recording_of_an_earlier_version_is_read() {
 }
 
 #[test]
-fn a_black_box_tells_the_reason_the_axis_and_its_last_cycles_the_events_and_the_timing() {
+fn the_report_of_a_black_box_has_the_reason_the_axis_its_last_cycles_the_events_and_the_timing() {
     let left = stopped_run();
     let output = report(&left.black_box, &["--cycles", "7"]);
     assert_eq!(output.status.code(), Some(0), "{}", errors(&output));
@@ -119,7 +128,7 @@ fn a_black_box_tells_the_reason_the_axis_and_its_last_cycles_the_events_and_the_
 }
 
 #[test]
-fn the_recording_and_the_black_box_of_a_run_tell_the_same_of_the_stop() {
+fn the_recording_and_the_black_box_of_a_run_agree_on_the_stop() {
     let left = stopped_run();
     let [recording, black_box] =
         [&left.recording, &left.black_box].map(|file| json(&report(file, &["--json"])));
@@ -163,12 +172,12 @@ fn recording_of_a_lost_bus(bus: &str, folder: &Path) -> PathBuf {
         "[[fault]]\nkind = \"bus-off\"\nbus = {bus:?}\nwhen = \"moving\"\nat = \"300 ms\"\nrestart = \"0.1 s\""
     );
     let scenario = Scenario::parse("scenario", &fault, &config).unwrap();
-    let (mut run, log) = VirtualRun::rehearsed(&config, Arc::new(Rehearsal::new(scenario))).unwrap();
+    let (mut run, log) = VirtualRun::with_faults(&config, Arc::new(FaultInjector::new(scenario))).unwrap();
     let options = LoggerOptions {
         machine: Machine::of(&config),
         wall_clock: WallClock::fixed(UNIX_AT_ZERO_NS),
         started_ns: 0,
-        recording: Some(Destination::File(folder.join(format!("{bus}.mcap")))),
+        recording: Some(RecordingDestination::File(folder.join(format!("{bus}.mcap")))),
         candump: None,
         black_box: None,
         traces: vec![],
@@ -182,7 +191,7 @@ fn recording_of_a_lost_bus(bus: &str, folder: &Path) -> PathBuf {
 }
 
 #[test]
-fn of_a_stop_for_a_bus_an_axis_on_that_bus_is_shown_even_if_another_was_further_from_its_set_points() {
+fn after_a_stop_for_a_bus_an_axis_on_that_bus_is_shown() {
     let folder = tempfile::tempdir().unwrap();
     for (bus, axes) in [("base", ["joint1", "joint2", "joint3"]), ("wrist", ["joint4", "joint5", "joint6"])] {
         let recording = recording_of_a_lost_bus(bus, folder.path());
@@ -190,7 +199,7 @@ fn of_a_stop_for_a_bus_an_axis_on_that_bus_is_shown_even_if_another_was_further_
         assert_eq!((&told["cause"]["bus"], &told["cause"]["axis"]), (&bus.into(), &Value::Null));
         let shown = told["axis"]["name"].as_str().unwrap();
         assert!(axes.contains(&shown), "{shown} is shown of bus {bus}");
-        // Though an axis on the other bus had been further away.
+        // That holds even if an axis on the other bus had a larger following error.
         let mut recorded = Recorded::open(&recording).unwrap();
         let other =
             recorded.machine.axes.iter().position(|axis| !axes.contains(&axis.name.as_str())).unwrap();
@@ -203,9 +212,9 @@ fn of_a_stop_for_a_bus_an_axis_on_that_bus_is_shown_even_if_another_was_further_
     }
 }
 
-/// Whoever made the file must not have the terminal.
+/// The author of the file must not be able to control the terminal.
 #[test]
-fn what_a_terminal_would_obey_is_not_shown_of_a_recording() {
+fn control_characters_of_a_recording_are_not_printed() {
     let folder = tempfile::tempdir().unwrap();
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/single-erob.toml");
     let mut config = Config::load(&path).unwrap();
@@ -228,7 +237,7 @@ fn what_a_terminal_would_obey_is_not_shown_of_a_recording() {
 }
 
 #[test]
-fn another_axis_can_be_asked_for_and_one_that_is_not_there_is_told_with_those_that_are() {
+fn another_axis_can_be_shown_and_an_unknown_one_is_an_error_that_lists_the_axes() {
     let left = stopped_run();
     let shown = json(&report(&left.black_box, &["--json", "--axis", "joint6", "--cycles", "3"]));
     assert_eq!((&shown["axis"]["name"], &shown["cause"]["axis"]), (&"joint6".into(), &"joint3".into()));
@@ -243,7 +252,7 @@ fn another_axis_can_be_asked_for_and_one_that_is_not_there_is_told_with_those_th
 }
 
 #[test]
-fn the_picture_has_position_velocity_following_error_and_timing_and_marks_the_stop() {
+fn the_svg_shows_position_velocity_following_error_and_timing_and_marks_the_stop() {
     let left = stopped_run();
     let svg = left.folder.path().join("stop.svg");
     let output = report(&left.black_box, &["--svg", svg.to_str().unwrap()]);
@@ -258,14 +267,14 @@ fn the_picture_has_position_velocity_following_error_and_timing_and_marks_the_st
     ] {
         assert!(svg.contains(part), "{part}");
     }
-    // Set and actual twice, the following error, three times.
+    // Set and actual of position and velocity, the following error, and three times.
     assert_eq!(svg.matches("<polyline").count(), 8);
     assert!(svg.contains("-1 s") && !svg.contains("NaN"));
-    // Not even root writes below a file.
+    // A path below a file cannot be written, not even by root.
     let below_a_file = left.black_box.join("stop.svg");
     let unwritable = report(&left.black_box, &["--svg", below_a_file.to_str().unwrap()]);
     assert_eq!(unwritable.status.code(), Some(1));
-    assert!(text(&unwritable).contains("joint3 was"), "the text is there all the same");
+    assert!(text(&unwritable).contains("joint3 was"), "the text is printed all the same");
 }
 
 #[test]
@@ -292,7 +301,7 @@ fn a_run_without_a_stop_is_shown_up_to_its_end() {
 }
 
 #[test]
-fn a_recording_that_was_cut_off_anywhere_is_read_as_far_as_it_goes() {
+fn a_recording_that_was_cut_off_is_read_up_to_the_cut() {
     let left = stopped_run();
     let bytes = fs::read(&left.recording).unwrap();
     let whole = Recorded::open(&left.recording).unwrap();
@@ -304,10 +313,10 @@ fn a_recording_that_was_cut_off_anywhere_is_read_as_far_as_it_goes() {
         fs::write(&cut, &bytes[..length]).unwrap();
         let read = Recorded::open(&cut).unwrap_or_else(|error| panic!("{length} bytes: {error}"));
         let cycles = read.statistics.cycles;
-        // A cycle of six axes takes 900 bytes: no more than a few are lost at the end.
+        // A cycle of six axes takes 900 bytes, so only a few are lost at the end.
         assert!(cycles >= last && (cycles + 10) * 1000 > length as u64, "{cycles} cycles in {length} bytes");
         last = cycles;
-        // Behind the data is only the index, which nothing here needs.
+        // Only the index follows the data, and the reader does not use it.
         assert!(
             cycles == whole.statistics.cycles || read.warnings[0].contains("cut off"),
             "{:?}",
@@ -321,7 +330,7 @@ fn a_recording_that_was_cut_off_anywhere_is_read_as_far_as_it_goes() {
 }
 
 #[test]
-fn damaged_bytes_never_bring_it_down_and_a_damaged_part_is_left_out_with_a_warning() {
+fn damaged_bytes_never_cause_a_panic_and_a_damaged_chunk_is_skipped_with_a_warning() {
     let left = stopped_run();
     let bytes = fs::read(&left.recording).unwrap();
     let whole = Recorded::open(&left.recording).unwrap().statistics.cycles;
@@ -329,7 +338,7 @@ fn damaged_bytes_never_bring_it_down_and_a_damaged_part_is_left_out_with_a_warni
     let mut warned = 0;
     for round in 0..60 {
         let mut broken = bytes.clone();
-        // Spread over the file, and close together at its beginning.
+        // Over the whole file, and close together at its beginning.
         let at = if round < 30 { broken.len() / 30 * round + 17 } else { round * 13 };
         broken[at] ^= 0x5A;
         fs::write(&damaged, &broken).unwrap();
@@ -339,11 +348,70 @@ fn damaged_bytes_never_bring_it_down_and_a_damaged_part_is_left_out_with_a_warni
             read.cycles(&(0..=u64::MAX)).unwrap();
         }
     }
-    assert!(warned >= 25, "{warned} of 30 damaged chunks were told");
+    assert!(warned >= 25, "{warned} of 30 damaged chunks were reported");
+}
+
+/// As [`report`], in a process that may have so much address space.
+fn report_within(file: &Path, bytes: u64) -> Output {
+    let limited = format!("ulimit -v {}; exec \"$0\" report \"$1\"", bytes / 1024);
+    Command::new("sh").arg("-c").arg(limited).arg(env!("CARGO_BIN_EXE_takt")).arg(file).output().unwrap()
+}
+
+/// Far less than the 4 GiB that a length of 32 bits can ask for, and enough for the files below.
+const ADDRESS_SPACE_BYTES: u64 = 400 << 20;
+
+/// A record as MCAP writes it.
+fn record(opcode: u8, body: &[u8]) -> Vec<u8> {
+    [&[opcode][..], &(body.len() as u64).to_le_bytes(), body].concat()
 }
 
 #[test]
-fn what_is_no_recording_is_refused_with_its_name_and_the_reason() {
+fn a_length_that_a_file_lies_about_costs_no_memory() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("lying.mcap");
+    // A text of 4 GiB, and nothing of it there.
+    let text = u32::MAX.to_le_bytes();
+    let (schema, channel) = ([&[1, 0][..], &text].concat(), [&[1, 0, 1, 0][..], &text].concat());
+    let bodies: [(u8, &[u8]); 4] =
+        [(op::HEADER, &text), (op::SCHEMA, &schema), (op::CHANNEL, &channel), (op::METADATA, &text)];
+    for (opcode, body) in bodies {
+        fs::write(&file, [mcap::MAGIC, &record(opcode, body)].concat()).unwrap();
+        let output = report_within(&file, ADDRESS_SPACE_BYTES);
+        assert_eq!(output.status.code(), Some(2), "{}", errors(&output));
+        assert!(errors(&output).contains("not a recording of takt"), "{}", errors(&output));
+    }
+}
+
+#[test]
+fn many_short_cycles_and_a_long_name_take_no_more_memory_than_the_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let sizes = ChannelSizes {
+        axes: 0,
+        buses: 1,
+        records: 1024,
+        events: 1,
+        requests: 1,
+        service_out: 1,
+        service_in: 1,
+    };
+    let (mut rt, _host, log) = channels(&sizes);
+    let bus = BusDescription { name: "b".repeat(1 << 20), interface: String::new() };
+    let machine = Machine { name: "m".to_owned(), cycle_ns: 1_000_000, axes: vec![], buses: vec![bus] };
+    let file = folder.path().join("many.mcap");
+    let mut logger = Logger::new(log, recording_to(&file, machine), Box::new(|_| {}));
+    // All of them in the slot that a report shows.
+    for _ in 0..300_000 / 1000 {
+        (0..1000).for_each(|_| assert!(rt.record(&CycleRecord::default())));
+        logger.drain();
+    }
+    logger.finish();
+    let output = report_within(&file, ADDRESS_SPACE_BYTES);
+    assert_eq!(output.status.code(), Some(0), "{}", errors(&output));
+    assert!(text(&output).contains("300000 cycles"), "{}", text(&output));
+}
+
+#[test]
+fn a_file_that_is_not_a_recording_is_refused_with_its_name_and_the_reason() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("file");
     let mut foreign = vec![];
@@ -357,9 +425,9 @@ fn what_is_no_recording_is_refused_with_its_name_and_the_reason() {
     drop(writer);
     for (content, reason) in [
         (&b""[..], "empty"),
-        (b"(1700000000.001000) can0 080#\n", "no MCAP file"),
-        (&foreign[..], "no recording of takt"),
-        (&foreign[..4], "no MCAP file"),
+        (b"(1700000000.001000) can0 080#\n", "not an MCAP file"),
+        (&foreign[..], "not a recording of takt"),
+        (&foreign[..4], "not an MCAP file"),
     ] {
         fs::write(&file, content).unwrap();
         let output = report(&file, &[]);
@@ -368,36 +436,10 @@ fn what_is_no_recording_is_refused_with_its_name_and_the_reason() {
         assert!(said.contains(reason) && said.contains(file.to_str().unwrap()), "{said}");
         assert!(output.stdout.is_empty());
     }
-    // What can be read only once cannot be reported.
+    // A device or a folder is not a recording either.
     for absent in [folder.path().join("absent"), folder.path().to_owned(), "/dev/null".into()] {
         let output = report(&absent, &[]);
         assert_eq!(output.status.code(), Some(2));
         assert!(errors(&output).contains(absent.to_str().unwrap()), "{}", errors(&output));
-    }
-}
-
-/// The lengths in a file are whatever somebody has written there.
-#[test]
-fn a_crafted_file_of_a_few_bytes_gets_no_more_memory_than_a_recording() {
-    const HEADER: u8 = 1;
-    const SCHEMA: u8 = 3;
-    const CHANNEL: u8 = 4;
-    const METADATA: u8 = 12;
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("crafted.mcap");
-    for (opcode, before) in [(HEADER, &[][..]), (SCHEMA, &[1, 0]), (CHANNEL, &[1, 0, 1, 0]), (METADATA, &[])]
-    {
-        let body = [before, &u32::MAX.to_le_bytes(), b"abc"].concat();
-        let record = [&[opcode][..], &(body.len() as u64).to_le_bytes(), &body].concat();
-        fs::write(&file, [b"\x89MCAP0\r\n", record.as_slice()].concat()).unwrap();
-        let output = Command::new("prlimit")
-            .arg("--as=1000000000")
-            .arg(env!("CARGO_BIN_EXE_takt"))
-            .arg("report")
-            .arg(&file)
-            .output()
-            .unwrap();
-        assert_eq!(output.status.code(), Some(2), "{opcode}: {}", errors(&output));
-        assert!(errors(&output).contains("no recording of takt"), "{}", errors(&output));
     }
 }

@@ -8,13 +8,13 @@ use std::sync::Arc;
 
 use takt::bus::port::Port;
 use takt::faults::{
-    Course, Cue, DelayPlace, DriveTrouble, Effect, Fault, FaultyPort, ForeignFrames, FrameEffect,
-    InterfaceEffect, Part, Selection, Window,
+    DelayPlace, DriveEffect, Effect, FaultProgress, FaultyPort, ForeignFrames, FrameEffect, InterfaceEffect,
+    Part, ScenarioFault, Selection, Trigger, Window,
 };
 use takt::sim::erob::{ErobJoint, ErobParameters};
 use takt::sim::plant::{Encoder, JointParameters};
 use takt::sim::yz_aim::{Gearing, Model, YzAimJoint, YzAimParameters};
-use takt::sim::{BitRates, Defect, Drive, DriveFault, SimulatedBus};
+use takt::sim::{Defect, Drive, DriveFault, SimulatedBus, WireBitRates};
 use takt_rt::{BusPort, Frame, Id, ReceiveBatch};
 
 thread_local! {
@@ -128,12 +128,13 @@ fn live<P: BusPort>(bus: &mut P, received: &mut usize, mut breaks: impl FnMut(&m
 fn a_second_on_the_simulated_bus_takes_no_heap_memory() {
     let before = allocations();
     let drives = [1, 2, 3].map(drive).into();
-    let mut bus = SimulatedBus::with_drives(BitRates { nominal: 1_000_000, data: None }, 5_000_000, drives);
+    let mut bus =
+        SimulatedBus::with_drives(WireBitRates { nominal: 1_000_000, data: None }, 5_000_000, drives);
     let built = allocations();
     assert!(built > before, "the allocator counts");
     let mut received = 0;
     live(&mut bus, &mut received, |bus, cycle| match cycle {
-        500 => bus.inject(1, DriveFault::Encoder).unwrap(),
+        500 => bus.inject_fault(1, DriveFault::Encoder).unwrap(),
         600 => bus.power_cycle(2).unwrap(),
         700 => bus.silence(3, true).unwrap(),
         _ => {}
@@ -159,7 +160,8 @@ fn servo(node: u8) -> Box<dyn Drive> {
 #[test]
 fn a_second_of_interpolation_with_alarms_and_power_cycles_takes_no_heap_memory() {
     let drives = [1, 2, 3].map(servo).into();
-    let mut bus = SimulatedBus::with_drives(BitRates { nominal: 1_000_000, data: None }, 5_000_000, drives);
+    let mut bus =
+        SimulatedBus::with_drives(WireBitRates { nominal: 1_000_000, data: None }, 5_000_000, drives);
     let built = allocations();
     let mut batch = ReceiveBatch::new();
     let mut received = 0;
@@ -175,7 +177,7 @@ fn a_second_of_interpolation_with_alarms_and_power_cycles_takes_no_heap_memory()
         };
         match cycle {
             15 => assert_eq!(bus.send(now_ns, &[Frame::of(Id::canopen(0x000, 0), [1, 0])]), 1),
-            200 => bus.inject(1, DriveFault::Stall).unwrap(),
+            200 => bus.inject_fault(1, DriveFault::Stall).unwrap(),
             400 => bus.power_cycle(2).unwrap(),
             _ => {}
         }
@@ -199,7 +201,7 @@ fn a_second_of_interpolation_with_alarms_and_power_cycles_takes_no_heap_memory()
 /// Every effect, one after the other for 70 ms each.
 fn every_effect() -> Vec<Effect> {
     let foreign = |frames| Effect::Foreign(frames);
-    let drive = |node, trouble| Effect::Drive { node, trouble };
+    let drive = |node, effect| Effect::Drive { node, effect };
     vec![
         Effect::Frames(FrameEffect::Delay { by_ns: 3_300_000, place: DelayPlace::Machine }),
         Effect::Frames(FrameEffect::Duplicate { copies: 8 }),
@@ -216,35 +218,39 @@ fn every_effect() -> Vec<Effect> {
             frame: Frame::of(Id::canopen(0, 1), [0; 8]),
             period_ns: Some(50_000),
         }),
-        drive(1, DriveTrouble::Defect(Defect::OtherObjectMapped)),
-        drive(2, DriveTrouble::Defect(Defect::Alarm { code: 0x2310 })),
-        drive(3, DriveTrouble::Reboot),
+        drive(1, DriveEffect::Defect(Defect::OtherObjectMapped)),
+        drive(2, DriveEffect::Defect(Defect::Alarm { code: 0x2310 })),
+        drive(3, DriveEffect::Reboot),
     ]
 }
 
 #[test]
 fn a_second_with_faults_of_every_kind_takes_no_heap_memory() {
     let drives = [1, 2, 3].map(drive).into();
-    let bus = SimulatedBus::with_drives(BitRates { nominal: 1_000_000, data: None }, 5_000_000, drives);
+    let bus = SimulatedBus::with_drives(WireBitRates { nominal: 1_000_000, data: None }, 5_000_000, drives);
     let mut port = Port::Simulated(Box::new(bus));
-    let mut courses = vec![];
+    let mut all_progress = vec![];
     for (effect, number) in every_effect().into_iter().zip(0..) {
-        let window =
-            Window { cue: Cue::Start, after_ns: 1_000_000 * (10 + 65 * number), lasts_ns: Some(70_000_000) };
+        let window = Window {
+            trigger: Trigger::Start,
+            after_ns: 1_000_000 * (10 + 65 * number),
+            lasts_ns: Some(70_000_000),
+        };
         let selection = Selection { probability: 0.5, ..Selection::default() };
-        let fault = Fault { kind: "", place: String::new(), line: 1, bus: 0, window, selection, effect };
-        let course = Arc::new(Course::default());
-        courses.push(Arc::clone(&course));
-        port = Port::Faulty(Box::new(FaultyPort::new(port, &fault, Arc::default(), course)));
+        let fault =
+            ScenarioFault { kind: "", location: String::new(), line: 1, bus: 0, window, selection, effect };
+        let progress = Arc::new(FaultProgress::default());
+        all_progress.push(Arc::clone(&progress));
+        port = Port::Faulty(Box::new(FaultyPort::new(port, &fault, Arc::default(), progress)));
     }
     let built = allocations();
     let mut received = 0;
     live(&mut port, &mut received, |_, _| {});
     assert_eq!(allocations(), built);
     assert!(received > 1_000, "{received}");
-    for (course, effect) in courses.iter().zip(every_effect()) {
-        assert!(course.began_ns().is_some() && !course.is_impossible(), "{effect:?}");
+    for (progress, effect) in all_progress.iter().zip(every_effect()) {
+        assert!(progress.began_ns().is_some() && !progress.is_impossible(), "{effect:?}");
         let is_of_frames = matches!(effect, Effect::Frames(_) | Effect::Foreign(_));
-        assert!(!is_of_frames || course.frames() > 0, "{effect:?}");
+        assert!(!is_of_frames || progress.frames() > 0, "{effect:?}");
     }
 }

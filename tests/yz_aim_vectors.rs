@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 
 use takt::sim::plant::JointParameters;
 use takt::sim::yz_aim::{Gearing, Model, OBJECTS, Quirks, YzAimJoint, YzAimParameters};
-use takt::sim::{BitRates, Drive, DriveFault, SimulatedBus};
+use takt::sim::{Drive, DriveFault, SimulatedBus, WireBitRates};
 use takt_rt::{BusPort, Frame, Id, ReceiveBatch};
 
 const VECTORS: &str = include_str!("vectors/yz-aim-vectors.csv");
@@ -72,7 +72,7 @@ impl Conversation {
         for servo in servos {
             drives.push(Box::new(YzAimJoint::new(*servo)));
         }
-        let rates = BitRates { nominal: 1_000_000, data: None };
+        let rates = WireBitRates { nominal: 1_000_000, data: None };
         let bus = SimulatedBus::with_drives(rates, u64::MAX, drives);
         let mut conversation = Self { bus, now_ns: 0, heard: vec![], passed: vec![] };
         conversation.run_ms(0);
@@ -286,7 +286,7 @@ fn set_up_conversations() -> Vec<String> {
     assert!((0..10).contains(&conversation.bus.observe(1).unwrap().position_counts));
     conversation.go_through(&between("D019", "D026"));
     for reset in ["D027", "D028"] {
-        conversation.bus.inject(1, DriveFault::Stall).unwrap();
+        conversation.bus.inject_fault(1, DriveFault::Stall).unwrap();
         conversation.run_ms(10);
         assert_eq!(conversation.bus.observe(1).unwrap().error_code, 0x14);
         conversation.go_through(&[one(reset)]);

@@ -1,12 +1,12 @@
-//! The reader of EDS, DCF and concise DCF, given any bytes.
+//! Fuzzes the reader of EDS, DCF and concise DCF with arbitrary bytes.
 
 use std::path::Path;
 
 use takt::canopen::dcf::{DeviceConfiguration, decode_concise, encode_concise};
 use takt::canopen::eds::{self, Findings, Severity};
 
-/// Reads bytes as a device's description. What is refused says what is wrong and where; what is taken has values that can
-/// be written, and only warnings.
+/// Reads bytes as a device description. An error says what is wrong and where. A description without errors has values that
+/// can be written, and only warnings.
 pub fn run(bytes: &[u8]) {
     if let Ok(downloads) = decode_concise(bytes) {
         assert_eq!(encode_concise(&downloads), bytes);
@@ -26,7 +26,7 @@ pub fn run(bytes: &[u8]) {
             }
             let configuration = DeviceConfiguration::of(Path::new("fuzz"), dictionary, 5);
             for download in &configuration.downloads {
-                // A PDO that is mapped is switched off before and on again, whether the file says so or not.
+                // A PDO is disabled before its mapping is written and enabled afterwards, whether the file does so or not.
                 let is_of_pdo = (0x1400..0x1C00).contains(&download.object.index);
                 let is_writable =
                     dictionary.entry(download.object).is_some_and(|entry| entry.access.is_writable());
@@ -43,7 +43,7 @@ pub fn run(bytes: &[u8]) {
 fn assert_explained(findings: &Findings) {
     assert!(!findings.to_string().is_empty());
     for problem in findings.problems() {
-        let place = findings.place(problem);
+        let place = findings.position(problem);
         assert!(place.line > 0 && place.column > 0, "{place:?}");
         findings.source_line(problem);
         assert!(!problem.to_string().is_empty() && !problem.kind.help().is_empty());

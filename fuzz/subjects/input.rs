@@ -1,11 +1,11 @@
-//! Values from the bytes that a fuzzer makes.
+//! Values made from the bytes of a fuzzer.
 
 use takt_rt::{Frame, Id};
 
 /// The identifiers of NMT, SYNC, TIME, and layer settings from slave and master.
 const FOR_ALL: [u32; 5] = [0x000, 0x080, 0x100, 0x7E4, 0x7E5];
 
-/// Reads values from bytes; 0 behind the end.
+/// Reads values from bytes. Behind the end, every byte is 0.
 #[derive(Clone, Copy, Debug)]
 pub struct Input<'a>(&'a [u8]);
 
@@ -39,7 +39,7 @@ impl<'a> Input<'a> {
         u32::from_le_bytes(self.bytes())
     }
 
-    /// Any number at all, or most of the time one of everyday size.
+    /// An arbitrary number; mostly one of a usual size.
     pub fn number(&mut self) -> f64 {
         match self.byte() {
             0..8 => f64::from_le_bytes(self.bytes()),
@@ -63,6 +63,6 @@ impl<'a> Input<'a> {
             1 => Frame::fd(id, &self.bytes::<64>(), kind & 0x10 != 0),
             _ => Frame::data(id, &self.bytes::<8>()[..length]),
         };
-        frame.expect("the length is one that fits")
+        frame.expect("the length fits the kind")
     }
 }

@@ -1,4 +1,4 @@
-//! The reader of trajectory problems in JSON lines, as `takt plan` has it, given any text.
+//! Fuzzes the reader of trajectory problems of `takt plan`, in JSON lines, with arbitrary text.
 
 #[path = "../../src/cli/plan/answer.rs"]
 mod answer;
@@ -8,7 +8,7 @@ mod question;
 use answer::Answer;
 use question::Question;
 
-/// Answers every line of a text, each with one line of JSON that has a result.
+/// Answers every line of a text with one line of JSON that has a result.
 pub fn run(bytes: &[u8]) {
     let Ok(text) = std::str::from_utf8(bytes) else { return };
     for (index, line) in text.lines().enumerate() {
@@ -29,7 +29,7 @@ pub fn run(bytes: &[u8]) {
         let read: serde_json::Value = serde_json::from_str(&json).expect("what was written is JSON");
         assert!(read["result"].is_string(), "{json}");
         if read["result"] == "ok" {
-            // JSON has no word for a number that is none: it would be null.
+            // JSON has no infinite numbers: such a number would be null.
             for key in ["duration", "t_min", "t", "p", "v", "a", "pmin", "pmax"] {
                 let field = read[key].to_string();
                 assert!(!field.contains("null"), "{line}: {key} is {field}");

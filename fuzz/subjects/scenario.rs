@@ -1,10 +1,10 @@
-//! The reader of scenarios, given any text, and the ports that play what it takes.
+//! Fuzzes the reader of scenarios with arbitrary text, and the ports that inject its faults.
 
 use std::sync::OnceLock;
 
 use takt::bus::port::Port;
 use takt::config::Config;
-use takt::faults::{Rehearsal, Scenario};
+use takt::faults::{FaultInjector, Scenario};
 use takt::sim::SimulatedBus;
 use takt_rt::{BusPort, Frame, Id, Phase, ReceiveBatch, Snapshot};
 
@@ -14,11 +14,11 @@ fn arm() -> &'static Config {
     static ARM: OnceLock<Config> = OnceLock::new();
     ARM.get_or_init(|| {
         let text = include_str!("../../configs/arm6-erob.toml");
-        Config::parse("arm6-erob.toml", text).expect("the example is sound")
+        Config::parse("arm6-erob.toml", text).expect("the example is valid")
     })
 }
 
-/// Reads a text as a scenario, and plays for some cycles what is taken.
+/// Reads a text as a scenario, and runs a valid one for some cycles.
 pub fn run(bytes: &[u8]) {
     let Ok(text) = std::str::from_utf8(bytes) else { return };
     match Scenario::parse("fuzz", text, arm()) {
@@ -28,9 +28,9 @@ pub fn run(bytes: &[u8]) {
 }
 
 fn play(scenario: Scenario) {
-    let rehearsal = Rehearsal::new(scenario);
+    let fault_injector = FaultInjector::new(scenario);
     let mut ports: Vec<Port> = (0..arm().buses.len())
-        .map(|bus| rehearsal.wrap(bus, Port::Simulated(Box::new(SimulatedBus::new(arm(), bus)))))
+        .map(|bus| fault_injector.wrap(bus, Port::Simulated(Box::new(SimulatedBus::new(arm(), bus)))))
         .collect();
     let set_points: Vec<Frame> =
         (1..=6).map(|node| Frame::of(Id::canopen(0x200, node), [0x0F, 0, node, 0, 0, 0])).collect();
@@ -50,6 +50,6 @@ fn play(scenario: Scenario) {
             assert!(port.send(at_ns + 500_000, &set_points) <= set_points.len());
             port.health();
         }
-        rehearsal.observe(&Snapshot { phase, at_ns: at_ns + 510_000, ..Snapshot::default() });
+        fault_injector.observe(&Snapshot { phase, at_ns: at_ns + 510_000, ..Snapshot::default() });
     }
 }

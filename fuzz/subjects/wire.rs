@@ -1,4 +1,4 @@
-//! Everything that is decoded from the wire, given any frames.
+//! Fuzzes every decoder of frames with arbitrary frames.
 
 use std::sync::OnceLock;
 
@@ -6,22 +6,22 @@ use takt::canopen::emcy::Emergency;
 use takt::canopen::lss::{LssRequest, LssResponse};
 use takt::canopen::nmt::{ErrorControl, HeartbeatConsumer, NmtCommand};
 use takt::canopen::object::ObjectAddress;
-use takt::canopen::sdo::{Client, Request, Response, Timing, Transfer};
+use takt::canopen::sdo::{SdoClient, SdoRequest, SdoResponse, SdoTiming, Transfer};
 use takt::canopen::sync::Sync;
-use takt::canopen::time::{TimeOfDay, system_time};
+use takt::canopen::time::TimeOfDay;
 use takt::config::Config;
 use takt::sim::SimulatedBus;
 use takt_rt::{
     BusPort, DriveState, Frame, Id, MAX_OBJECTS, MappedObject, Mapping, ProcessImage, ReceiveBatch,
 };
 
-use super::conversations;
 use super::input::Input;
+use super::procedures;
 
 const NODE: u8 = 2;
 
-/// What is decoded can be encoded and is the same again; the SDO client, the layer settings, bring-up and farewell always
-/// come to an end; the drive always lives on and speaks properly; process data are taken or refused.
+/// A decoded frame can be encoded, and gives the same frame. The SDO client, the layer settings, the bring-up and the
+/// shut-down always end. The simulated drive goes on and sends valid frames. Process data are accepted or rejected.
 pub fn run(bytes: &[u8]) {
     let Some((kind, rest)) = bytes.split_first() else { return };
     let input = Input::new(rest);
@@ -30,9 +30,9 @@ pub fn run(bytes: &[u8]) {
         1 => ask(input),
         2 => talk_to_drive(one_drive(), input),
         3 => unpack(input),
-        4 => conversations::layer_settings(input),
+        4 => procedures::layer_settings(input),
         5 => talk_to_drive(one_yz_aim(), input),
-        _ => conversations::bring_up(input),
+        _ => procedures::bring_up(input),
     }
 }
 
@@ -48,11 +48,11 @@ fn decode(mut input: Input<'_>) {
         if let Some(control) = ErrorControl::decode(&frame) {
             assert_eq!(ErrorControl::decode(&control.frame()), Some(control));
         }
-        if let Some((node, request)) = Request::decode(&frame) {
-            assert_eq!(Request::decode(&request.frame(node)), Some((node, request)), "{frame:?}");
+        if let Some((node, request)) = SdoRequest::decode(&frame) {
+            assert_eq!(SdoRequest::decode(&request.frame(node)), Some((node, request)), "{frame:?}");
         }
-        if let Some((node, response)) = Response::decode(&frame) {
-            assert_eq!(Response::decode(&response.frame(node)), Some((node, response)), "{frame:?}");
+        if let Some((node, response)) = SdoResponse::decode(&frame) {
+            assert_eq!(SdoResponse::decode(&response.frame(node)), Some((node, response)), "{frame:?}");
         }
         if let Some(request) = LssRequest::decode(&frame) {
             assert_eq!(LssRequest::decode(&request.frame()), Some(request), "{frame:?}");
@@ -62,7 +62,6 @@ fn decode(mut input: Input<'_>) {
         }
         if let Some(time) = TimeOfDay::decode(&frame) {
             assert_eq!(TimeOfDay::decode(&time.frame()), Some(time), "{frame:?}");
-            system_time(time);
         }
         if let Some(sync) = Sync::decode(&frame) {
             let before = Sync { counter: input.bytes::<1>().first().copied() };
@@ -77,8 +76,8 @@ fn decode(mut input: Input<'_>) {
     }
 }
 
-/// The longest that a client may go on with a server that says whatever it likes.
-const POLLS_AT_MOST: usize = 10_000;
+/// The highest number of polls of a client whose server sends arbitrary replies.
+const MAX_POLLS: usize = 10_000;
 
 fn ask(mut input: Input<'_>) {
     let object = ObjectAddress { index: input.short(), subindex: input.byte() };
@@ -94,12 +93,12 @@ fn ask(mut input: Input<'_>) {
             }
         }
     };
-    let mut client = Client::new(NODE, Timing { reply_timeout_ns: 1_000_000, retries: 2 });
+    let mut client = SdoClient::new(NODE, SdoTiming { reply_timeout_ns: 1_000_000, retries: 2 });
     assert!(client.start(transfer).is_ok());
     let mut now_ns = 0;
-    for _ in 0..POLLS_AT_MOST {
+    for _ in 0..MAX_POLLS {
         while let Some(frame) = client.poll(now_ns) {
-            // A segment of a block has no command, so only this much can be said of every frame.
+            // A segment of a block has no command specifier, so nothing more holds for every frame.
             assert_eq!((frame.id(), frame.payload().len()), (Id::canopen(0x600, NODE), 8), "{frame:?}");
         }
         if client.take_outcome().is_some() {
@@ -113,14 +112,14 @@ fn ask(mut input: Input<'_>) {
         let answer = Frame::of(Id::canopen(0x580, NODE), input.bytes::<8>());
         client.receive(&answer);
     }
-    panic!("the client does not come to an end");
+    panic!("the client does not end");
 }
 
 fn one_drive() -> &'static Config {
     static CONFIG: OnceLock<Config> = OnceLock::new();
     CONFIG.get_or_init(|| {
         let text = include_str!("../../configs/single-erob.toml");
-        let mut config = Config::parse("single-erob.toml", text).expect("the example is sound");
+        let mut config = Config::parse("single-erob.toml", text).expect("the example is valid");
         config.axes.iter_mut().for_each(|axis| {
             axis.node = NODE;
             axis.simulated.power_up_ns = 100_000;
@@ -133,7 +132,7 @@ fn one_yz_aim() -> &'static Config {
     static CONFIG: OnceLock<Config> = OnceLock::new();
     CONFIG.get_or_init(|| {
         let text = include_str!("../../configs/gantry-yz-aim.toml");
-        let mut config = Config::parse("gantry-yz-aim.toml", text).expect("the example is sound");
+        let mut config = Config::parse("gantry-yz-aim.toml", text).expect("the example is valid");
         config.axes.truncate(1);
         config.axes[0].node = NODE;
         config.axes[0].simulated.power_up_ns = 100_000;
@@ -144,7 +143,7 @@ fn one_yz_aim() -> &'static Config {
 fn talk_to_drive(config: &Config, mut input: Input<'_>) {
     let mut bus = SimulatedBus::new(config, 0);
     let mut now_ns = 0;
-    for _ in 0..FRAMES_AT_MOST {
+    for _ in 0..MAX_FRAMES {
         if input.is_empty() {
             break;
         }
@@ -155,7 +154,7 @@ fn talk_to_drive(config: &Config, mut input: Input<'_>) {
         for received in &batch {
             let id = received.frame.id();
             if id.value() & 0x780 == 0x580 && !id.is_extended() {
-                assert!(Response::decode(&received.frame).is_some(), "{:?}", received.frame);
+                assert!(SdoResponse::decode(&received.frame).is_some(), "{:?}", received.frame);
             }
         }
     }
@@ -163,7 +162,7 @@ fn talk_to_drive(config: &Config, mut input: Input<'_>) {
     assert!(seen.position.is_finite() && seen.velocity.is_finite() && seen.torque.is_finite(), "{seen:?}");
 }
 
-const FRAMES_AT_MOST: usize = 200;
+const MAX_FRAMES: usize = 200;
 
 fn unpack(mut input: Input<'_>) {
     let count = usize::from(input.byte()) % (MAX_OBJECTS + 2);

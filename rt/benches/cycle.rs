@@ -1,6 +1,6 @@
-//! What a cycle costs without any I/O: feedback in, requests, supervision, trajectory, guard, set-points out, record.
+//! The time of a cycle without any input or output: feedback, requests, supervision, trajectory, guard, set-points, record.
 //!
-//! The bar: at most 250 ns an axis and 500 ns besides.
+//! The goal: at most 500 ns for each cycle and 250 ns more for each axis.
 
 use criterion::{BatchSize, BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use std::hint::black_box;

@@ -1,5 +1,5 @@
-//! The time that planning and sampling take, over 1024 random problems in motion, in the distribution of Ruckig's own
-//! benchmark; beside the same problems solved by `rsruckig`.
+//! The time of planning and sampling, over 1,024 random problems in motion, with the distribution of Ruckig's own benchmark.
+//! `rsruckig` solves the same problems for comparison.
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use rsruckig::prelude::{Ruckig, ThrowErrorHandler, Trajectory};
@@ -15,7 +15,7 @@ const SETS: u64 = 1024;
 
 type Planner = fn(&[Problem], &mut [Profile], PlanOptions) -> Result<f64, takt_rt::plan::PlanError>;
 
-/// Plans the sets in turn, by our planner and by `rsruckig`.
+/// Plans the sets one after another, with takt and with `rsruckig`.
 fn compare<const AXES: usize>(
     criterion: &mut Criterion,
     name: &str,

@@ -1,8 +1,8 @@
 //! Runs a fixed number of cycles of the engine, or packs and unpacks PDOs, for counting instructions; see
 //! `benches/instructions`.
 //!
-//! The work is named by the first argument (`cycle-AXES`, `replan-AXES`, `stream-AXES`, `pack`, `unpack`) and repeated as often as the
-//! second says; the difference between two repetition counts is free of the start-up.
+//! The first argument names the work: `cycle-AXES`, `replan-AXES`, `stream-AXES`, `pack` or `unpack`. The second one says how often
+//! it is repeated. The difference between two repetition counts does not contain the start-up.
 
 use std::hint::black_box;
 

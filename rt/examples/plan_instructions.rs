@@ -4,9 +4,9 @@
 //! valgrind --tool=callgrind target/release/examples/plan_instructions trapezoid-7 1024
 //! ```
 //!
-//! The work is named by the first argument, `position-AXES`, `velocity-AXES`, `trapezoid-AXES`, `replan-AXES`, `late-AXES`
-//! or `sample-AXES`, all but the last also with `rsruckig-` before it, and repeated as often as the second argument
-//! says; the difference between two repetition counts is free of the start-up.
+//! The first argument names the work: `position-AXES`, `velocity-AXES`, `trapezoid-AXES`, `replan-AXES`, `late-AXES` or
+//! `sample-AXES`. All but the last also exist with `rsruckig-` in front. The second argument says how often the work is
+//! repeated. The difference between two repetition counts does not contain the start-up.
 
 use std::hint::black_box;
 

@@ -1,11 +1,11 @@
-//! The longest time that planning takes: every set of problems is planned in many passes, and its shortest time counts,
-//! so that what the machine does besides does not. Beside it, the same sets planned by `rsruckig` for 7 axes.
+//! The longest time of planning. Every set of problems is planned in many passes and its shortest time counts, so other work of
+//! the machine does not. `rsruckig` plans the same sets of 7 axes for comparison.
 //!
 //! ```text
 //! cargo run --release -p takt-rt --example plan_worst -- 7 200
 //! ```
 //!
-//! The arguments are the number of axes and of passes.
+//! The arguments are the number of axes and the number of passes.
 
 use std::hint::black_box;
 use std::time::{Duration, Instant};

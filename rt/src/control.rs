@@ -41,6 +41,48 @@ pub enum ControlLaw {
     ProfileTorque,
 }
 
+/// A gain of a [`ControlLaw`] that is not finite, or is negative.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GainError {
+    /// Which.
+    pub gain: Gain,
+    /// What it is.
+    pub value: f64,
+}
+
+/// A gain of a [`ControlLaw`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Gain {
+    /// The position gain of cyclic synchronous velocity.
+    Position,
+    /// The stiffness of cyclic synchronous torque.
+    Stiffness,
+    /// Its damping.
+    Damping,
+    /// Its feed-forward inertia.
+    Inertia,
+    /// Its feed-forward viscous friction.
+    ViscousFriction,
+    /// Its feed-forward Coulomb friction.
+    CoulombFriction,
+}
+
+impl core::error::Error for GainError {}
+
+impl core::fmt::Display for GainError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let name = match self.gain {
+            Gain::Position => "position gain",
+            Gain::Stiffness => "stiffness",
+            Gain::Damping => "damping",
+            Gain::Inertia => "inertia",
+            Gain::ViscousFriction => "viscous friction",
+            Gain::CoulombFriction => "Coulomb friction",
+        };
+        write!(f, "the {name} must be a finite number, and not negative: {}", self.value)
+    }
+}
+
 /// Below this speed (rad/s or m/s) the Coulomb feed-forward fades out in proportion, so that it does not switch
 /// sign with every rounding of a standstill.
 const COULOMB_FADE: f64 = 1e-3;
@@ -59,6 +101,26 @@ pub struct LoopInput {
 }
 
 impl ControlLaw {
+    /// Checks that every gain is a finite number, and not negative.
+    pub fn validate(&self) -> Result<(), GainError> {
+        let gains: &[(Gain, f64)] = match *self {
+            Self::Velocity { position_gain } => &[(Gain::Position, position_gain)],
+            Self::Torque { stiffness, damping, inertia, viscous_friction, coulomb_friction } => &[
+                (Gain::Stiffness, stiffness),
+                (Gain::Damping, damping),
+                (Gain::Inertia, inertia),
+                (Gain::ViscousFriction, viscous_friction),
+                (Gain::CoulombFriction, coulomb_friction),
+            ],
+            _ => &[],
+        };
+        let is_wrong = |(_, value): &&(Gain, f64)| !(value.is_finite() && *value >= 0.0);
+        match gains.iter().find(is_wrong) {
+            Some(&(gain, value)) => Err(GainError { gain, value }),
+            None => Ok(()),
+        }
+    }
+
     /// The mode of operation that this needs in the drive.
     pub const fn operation_mode(&self) -> OperationMode {
         match self {
@@ -111,18 +173,6 @@ impl ControlLaw {
                 (scale.torque_to_per_mille(torque), torque)
             }
         }
-    }
-
-    /// The gains of the loops that are closed here, in the order of their fields.
-    pub fn gains(&self) -> impl Iterator<Item = f64> + use<> {
-        let gains = match *self {
-            Self::Velocity { position_gain } => [position_gain, 0.0, 0.0, 0.0, 0.0],
-            Self::Torque { stiffness, damping, inertia, viscous_friction, coulomb_friction } => {
-                [stiffness, damping, inertia, viscous_friction, coulomb_friction]
-            }
-            _ => [0.0; 5],
-        };
-        gains.into_iter()
     }
 
     /// The target of an axis that gets no torque: the actual position, no velocity, no torque. A drive that is enabled
@@ -198,6 +248,24 @@ mod tests {
         let (raw, torque) = law.target(&input(0.01, 0.5), &scale(), &LIMITS);
         assert!((torque - (10.0 + 5.0 + 0.6 + 0.5 + 2.0)).abs() < 1e-12);
         assert_eq!(raw, scale().torque_to_per_mille(torque));
+    }
+
+    #[test]
+    fn a_gain_that_is_not_finite_or_is_negative_is_named() {
+        for value in [f64::NAN, f64::INFINITY, -1.0] {
+            let error = ControlLaw::Velocity { position_gain: value }.validate().unwrap_err();
+            assert_eq!(error.gain, Gain::Position);
+            let law = ControlLaw::Torque {
+                stiffness: 1.0,
+                damping: 1.0,
+                inertia: value,
+                viscous_friction: 0.0,
+                coulomb_friction: 0.0,
+            };
+            assert_eq!(law.validate().unwrap_err().gain, Gain::Inertia);
+        }
+        assert_eq!(ControlLaw::Velocity { position_gain: 0.0 }.validate(), Ok(()));
+        assert_eq!(ControlLaw::Position.validate(), Ok(()));
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! How a family of drives speaks through controlword and statusword where that is not CiA 402's way.
+//! How a family of drives uses controlword and statusword where it differs from CiA 402.
 
 use crate::cia402::{DriveState, Goal, controlword, statusword};
 
@@ -30,8 +30,8 @@ impl Dialect {
         }
     }
 
-    /// The controlword after `last` that leads a drive in `state` towards `goal`. A YZ-AIM does not show how far it
-    /// has come, so the way up is walked by what was sent: 06, 07, 0F, and from the beginning if that was in vain.
+    /// The controlword after `last` that leads a drive in `state` towards `goal`. A YZ-AIM does not show how far it has come,
+    /// so the next controlword follows from the last one: 06, 07, 0F, and 06 again if the drive is still not enabled.
     pub const fn controlword(self, state: DriveState, goal: Goal, last: u16) -> u16 {
         match (self, goal, state) {
             (Self::YzAim, Goal::Enabled, DriveState::OperationEnabled) => controlword::ENABLE_OPERATION,

@@ -58,6 +58,14 @@ pub struct IdTaken {
     pub id: Id,
 }
 
+impl core::error::Error for IdTaken {}
+
+impl core::fmt::Display for IdTaken {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, "identifier {:03X} is in use already, or cannot be dispatched", self.id.value())
+    }
+}
+
 impl Dispatch {
     /// Enters a feedback PDO (0 to 3) of an axis (0 to 31).
     pub fn feedback(&mut self, id: Id, axis: u8, pdo: u8) -> Result<(), IdTaken> {
@@ -112,10 +120,11 @@ impl Dispatch {
         }
     }
 
-    /// Where a frame goes.
+    /// Where a frame goes. Process data, emergencies and error control are classic data frames with an 11-bit identifier
+    /// (CiA 301, 7.3.3): a frame of another kind, such as a CAN FD frame with the identifier of a PDO, is none of these.
     pub fn destination(&self, frame: &Frame) -> Destination {
         let id = frame.id();
-        if id.is_extended() || frame.kind() == FrameKind::Remote {
+        if id.is_extended() || frame.kind() != FrameKind::Data {
             return Destination::Service;
         }
         match self.entries.get(id.value() as usize) {
@@ -196,5 +205,21 @@ mod tests {
         assert_eq!(table.destination(&Frame::remote(id, 8).unwrap()), Destination::Service);
         let extended = Frame::of(Id::extended(0x181).unwrap(), [0; 8]);
         assert_eq!(table.destination(&extended), Destination::Service);
+    }
+
+    #[test]
+    fn a_flexible_data_rate_frame_is_neither_feedback_nor_a_foreign_master_on_any_identifier() {
+        let mut table = Dispatch::default();
+        table.feedback(Id::canopen(0x180, 1), 0, 0).unwrap();
+        table.emergency(Id::canopen(0x080, 1), 0).unwrap();
+        table.error_control(Id::canopen(0x700, 1), 0).unwrap();
+        table.foreign(Id::canopen(0x200, 1));
+        for (function, has_bit_rate_switch) in [0x180, 0x080, 0x700, 0x200]
+            .into_iter()
+            .flat_map(|function| [(function, false), (function, true)])
+        {
+            let frame = Frame::fd(Id::canopen(function, 1), &[1, 2, 3, 4], has_bit_rate_switch).unwrap();
+            assert_eq!(table.destination(&frame), Destination::Service, "{frame:?}");
+        }
     }
 }

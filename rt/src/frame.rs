@@ -1,5 +1,7 @@
-//! CAN frames as values that can only be valid: 11- and 29-bit identifiers, data and remote frames of
-//! classic CAN (ISO 11898-1), and CAN FD frames of up to 64 bytes.
+//! CAN frames that are always valid: 11- and 29-bit identifiers, data and remote frames of classic CAN (ISO 11898-1), and CAN FD
+//! frames of up to 64 bytes.
+
+use core::fmt;
 
 /// An 11-bit (base) or 29-bit (extended) identifier.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
@@ -11,11 +13,17 @@ const EXTENDED_MASK: u32 = 0x1FFF_FFFF;
 
 impl Id {
     /// An 11-bit identifier, 0 to 0x7FF.
+    ///
+    /// # Errors
+    /// [`FrameError::IdOutOfRange`] for a larger number.
     pub const fn base(id: u32) -> Result<Self, FrameError> {
         if id <= BASE_MASK { Ok(Self(id)) } else { Err(FrameError::IdOutOfRange { id, limit: BASE_MASK }) }
     }
 
     /// A 29-bit identifier, 0 to 0x1FFF_FFFF.
+    ///
+    /// # Errors
+    /// [`FrameError::IdOutOfRange`] for a larger number.
     pub const fn extended(id: u32) -> Result<Self, FrameError> {
         if id <= EXTENDED_MASK {
             Ok(Self(id | EXTENDED))
@@ -24,13 +32,13 @@ impl Id {
         }
     }
 
-    /// The identifier `function + node` of CANopen's pre-defined connection set (CiA 301, 7.3.3). Both are
-    /// masked to their fields, so the result is always a valid 11-bit identifier.
+    /// The identifier `function + node` of the pre-defined connection set of CANopen (CiA 301, 7.3.3). Both numbers are cut to
+    /// their bits (`function` to 0x780, the node ID to 0x7F), so the result is always a valid 11-bit identifier.
     pub const fn canopen(function: u16, node: u8) -> Self {
         Self((function as u32 & 0x780) | (node as u32 & 0x7F))
     }
 
-    /// The bare identifier, without the mark that tells 11 from 29 bits.
+    /// The number of the identifier. An 11-bit and a 29-bit identifier can have the same number.
     pub const fn value(self) -> u32 {
         self.0 & EXTENDED_MASK
     }
@@ -40,8 +48,8 @@ impl Id {
         self.0 & EXTENDED != 0
     }
 
-    /// The order in which identifiers win arbitration: the smaller key wins. An 11-bit identifier wins
-    /// against the 29-bit ones that begin with the same 11 bits (its SRR/RTR and IDE bits are dominant).
+    /// The priority in the arbitration: the smaller key wins. An 11-bit identifier wins against the 29-bit identifiers that begin
+    /// with the same 11 bits, because its RTR and IDE bits are dominant.
     pub const fn arbitration_key(self) -> u64 {
         if self.is_extended() {
             let id = self.value() as u64;
@@ -52,8 +60,8 @@ impl Id {
     }
 }
 
-impl core::fmt::Debug for Id {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+impl fmt::Debug for Id {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if self.is_extended() { write!(f, "{:08X}", self.value()) } else { write!(f, "{:03X}", self.value()) }
     }
 }
@@ -61,19 +69,35 @@ impl core::fmt::Debug for Id {
 /// What is wrong with an identifier or a payload.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FrameError {
-    /// The identifier does not fit its field.
+    /// The identifier is larger than its field.
     IdOutOfRange {
-        /// What was given.
+        /// The identifier that was given.
         id: u32,
-        /// The largest that fits.
+        /// The largest identifier of this kind.
         limit: u32,
     },
-    /// No frame of this kind can carry this many bytes.
+    /// No frame of this kind has this length.
     Length {
-        /// How many bytes were given.
+        /// The length that was given, in bytes.
         length: usize,
     },
 }
+
+impl fmt::Display for FrameError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::IdOutOfRange { id, limit } => {
+                write!(f, "identifier 0x{id:X} is out of range: expected 0 to 0x{limit:X}")
+            }
+            Self::Length { length } => write!(
+                f,
+                "no frame has {length} bytes: expected 0 to 8, or 12, 16, 20, 24, 32, 48 or 64 for CAN FD"
+            ),
+        }
+    }
+}
+
+impl core::error::Error for FrameError {}
 
 /// The four kinds of frame on a bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -84,7 +108,7 @@ pub enum FrameKind {
     Remote,
     /// A CAN FD frame at one bit rate.
     Fd,
-    /// A CAN FD frame whose data phase runs at the second, faster bit rate (BRS).
+    /// A CAN FD frame with bit-rate switching (BRS): its data phase has the second, faster bit rate.
     FdBitRateSwitch,
 }
 
@@ -98,10 +122,13 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// The longest payload of any frame.
+    /// The longest payload of any frame, in bytes.
     pub const MAX_BYTES: usize = 64;
 
     /// A classic data frame of 0 to 8 bytes.
+    ///
+    /// # Errors
+    /// [`FrameError::Length`] for more bytes.
     pub fn data(id: Id, bytes: &[u8]) -> Result<Self, FrameError> {
         if bytes.len() > 8 {
             return Err(FrameError::Length { length: bytes.len() });
@@ -109,13 +136,16 @@ impl Frame {
         Ok(Self::filled(id, FrameKind::Data, bytes))
     }
 
-    /// A classic data frame of 0 to 8 bytes whose length is known when the program is written.
+    /// A classic data frame of 0 to 8 bytes. The compiler checks the length.
     pub fn of<const N: usize>(id: Id, bytes: [u8; N]) -> Self {
         const { assert!(N <= 8) };
         Self::filled(id, FrameKind::Data, &bytes)
     }
 
     /// A remote frame that asks for `length` (0 to 8) bytes.
+    ///
+    /// # Errors
+    /// [`FrameError::Length`] for a larger length.
     pub fn remote(id: Id, length: u8) -> Result<Self, FrameError> {
         if length > 8 {
             return Err(FrameError::Length { length: length.into() });
@@ -123,7 +153,10 @@ impl Frame {
         Ok(Self { id, kind: FrameKind::Remote, length, data: [0; Self::MAX_BYTES] })
     }
 
-    /// A CAN FD frame. The length must be one the DLC can say: 0 to 8, 12, 16, 20, 24, 32, 48 or 64.
+    /// A CAN FD frame of 0 to 8, 12, 16, 20, 24, 32, 48 or 64 bytes: the lengths that a DLC can express.
+    ///
+    /// # Errors
+    /// [`FrameError::Length`] for another length.
     pub fn fd(id: Id, bytes: &[u8], bit_rate_switch: bool) -> Result<Self, FrameError> {
         if !matches!(bytes.len(), 0..=8 | 12 | 16 | 20 | 24 | 32 | 48 | 64) {
             return Err(FrameError::Length { length: bytes.len() });
@@ -145,7 +178,7 @@ impl Frame {
         self.id
     }
 
-    /// Which of the four kinds this is.
+    /// The kind of the frame.
     pub const fn kind(&self) -> FrameKind {
         self.kind
     }
@@ -155,7 +188,7 @@ impl Frame {
         matches!(self.kind, FrameKind::Fd | FrameKind::FdBitRateSwitch)
     }
 
-    /// The length field in bytes: of the payload, or for a remote frame of the payload asked for.
+    /// The length in bytes: of the payload, or for a remote frame of the payload that it asks for.
     pub const fn length(&self) -> usize {
         self.length as usize
     }
@@ -166,8 +199,8 @@ impl Frame {
         self.data.get(..carried).unwrap_or(&[])
     }
 
-    /// The first eight payload bytes as a number, low byte first; absent bytes are zero. PDOs and SDOs are
-    /// decoded from this word without a bounds check.
+    /// The first eight payload bytes as a number, low byte first. Missing bytes are zero. PDOs and SDOs are decoded from this number
+    /// without a check of the length.
     pub fn first_word(&self) -> u64 {
         let [a, b, c, d, e, f, g, h, ..] = self.data;
         u64::from_le_bytes([a, b, c, d, e, f, g, h])
@@ -185,9 +218,9 @@ impl PartialEq for Frame {
 
 impl Eq for Frame {}
 
-impl core::fmt::Debug for Frame {
-    /// `181#37 12 00`, `601#R8`, `123##00 01` as candump and cansend write them.
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+impl fmt::Debug for Frame {
+    /// Writes `181#3712`, `601#R8` or `123##101`, as candump and cansend do.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{:?}#", self.id)?;
         match self.kind {
             FrameKind::Remote => return write!(f, "R{}", self.length),
@@ -204,6 +237,7 @@ mod tests {
     extern crate std;
     use super::*;
     use std::format;
+    use std::string::ToString;
 
     #[test]
     fn identifiers_outside_their_field_are_refused() {
@@ -217,9 +251,9 @@ mod tests {
     fn a_base_identifier_wins_against_the_extended_ones_that_begin_with_it() {
         let base = Id::base(0x123).unwrap();
         let extended = Id::extended(0x123 << 18).unwrap();
-        let stronger = Id::extended(0x122 << 18 | 0x3_FFFF).unwrap();
+        let higher_priority = Id::extended(0x122 << 18 | 0x3_FFFF).unwrap();
         assert!(base.arbitration_key() < extended.arbitration_key());
-        assert!(stronger.arbitration_key() < base.arbitration_key());
+        assert!(higher_priority.arbitration_key() < base.arbitration_key());
     }
 
     #[test]
@@ -248,6 +282,16 @@ mod tests {
             format!("{:?}", Frame::fd(Id::extended(0x123).unwrap(), &[1], true).unwrap()),
             "00000123##101"
         );
+    }
+
+    #[test]
+    fn errors_say_what_was_given_and_what_was_expected() {
+        assert_eq!(
+            Id::base(0x800).unwrap_err().to_string(),
+            "identifier 0x800 is out of range: expected 0 to 0x7FF"
+        );
+        let text = Frame::data(Id::canopen(0x180, 5), &[0; 9]).unwrap_err().to_string();
+        assert!(text.starts_with("no frame has 9 bytes"), "{text}");
     }
 
     #[test]

@@ -173,7 +173,7 @@ fn move_jerk(leg: &Leg<'_>, acceleration_scale: f64) -> f64 {
 }
 
 /// A stop in coordination must not lead an axis that could stop sooner by itself beyond its position limits.
-fn stop_limits(start: &State, axis: &AxisLimits) -> Limits {
+pub(crate) fn stop_limits(start: &State, axis: &AxisLimits) -> Limits {
     let (rising, falling) = axis.rising_and_falling(start.velocity);
     Limits::asymmetric(axis.velocity, -axis.velocity, rising, -falling, axis.jerk)
         .with_position(axis.position_min.min(start.position), axis.position_max.max(start.position))

@@ -54,10 +54,13 @@ mod watch;
 mod wire;
 
 pub use answers::{Answer, Answers};
-pub use axis::{Axis, AxisParameters, CommandPdo, FeedbackSince, Jump, MAX_PDOS, Pdo, TransmissionType};
+pub use axis::{
+    Axis, AxisParameters, AxisParametersError, CommandPdo, FeedbackSince, Jump, MAX_PDOS, Pdo,
+    TransmissionType,
+};
 pub use bus_set::BusSet;
 pub use cia402::{Command, DriveState, Goal, OperationMode, controlword, statusword};
-pub use control::{ControlLaw, LoopInput};
+pub use control::{ControlLaw, Gain, GainError, LoopInput};
 pub use cycle::{Cycle, Flow, SlotPlan};
 pub use dialect::Dialect;
 pub use engine::{
@@ -66,7 +69,7 @@ pub use engine::{
 };
 pub use fault::{Fault, Rule};
 pub use frame::{Frame, FrameError, FrameKind, Id};
-pub use guard::{AxisLimits, OnViolation, Violation, braking_distance};
+pub use guard::{AxisLimits, LimitError, OnViolation, Violation, braking_distance};
 pub use host::{AxisSnapshot, HostInterface, Snapshot, StreamCommand};
 pub use motion_reports::{MotionReport, MotionReports, MotionState};
 pub use pdo::{
@@ -86,4 +89,4 @@ pub use time::{Grid, NANOSECONDS_PER_SECOND, Nanoseconds};
 pub use time_of_day::{TIME_ID, TimeOfDay};
 pub use units::{Scale, ScaleError, ScaleParameters};
 pub use watch::{TimingLadder, TimingLevel, nmt_command, node_state};
-pub use wire::{INTERMISSION_BITS, WireLength, bits_ns};
+pub use wire::UnstuffedLength;

@@ -39,6 +39,13 @@ impl MappedObject {
     }
 }
 
+impl core::fmt::Display for MappedObject {
+    /// The index and the sub-index, as `6041:00`.
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, "{:04X}:{:02X}", self.index, self.subindex)
+    }
+}
+
 /// The commanded numbers of an axis, in drive units, by what they mean.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
@@ -53,13 +60,9 @@ pub enum CommandSlot {
     TargetVelocity,
     /// 6071
     TargetTorque,
-    /// 60B1
-    VelocityOffset,
-    /// 60B2
-    TorqueOffset,
-    /// 6081
-    ProfileVelocity,
-    /// An object that takt has no use for; zero is sent.
+    /// 60B1 and 60B2, the offsets of velocity and torque: there are none, and zero is sent.
+    Offset,
+    /// An object without a value. A gap in a mapping is filled with zero, anything else is refused.
     Zero,
 }
 
@@ -77,14 +80,8 @@ pub enum FeedbackSlot {
     Velocity,
     /// 6077
     Torque,
-    /// 6078
-    Current,
-    /// 60F4
-    FollowingError,
     /// 603F
     ErrorCode,
-    /// 60FD
-    DigitalInputs,
     /// An object that takt has no use for.
     Ignored,
 }
@@ -98,9 +95,7 @@ impl CommandSlot {
             (0x607A, 0) => Self::TargetPosition,
             (0x60FF, 0) => Self::TargetVelocity,
             (0x6071, 0) => Self::TargetTorque,
-            (0x60B1, 0) => Self::VelocityOffset,
-            (0x60B2, 0) => Self::TorqueOffset,
-            (0x6081, 0) => Self::ProfileVelocity,
+            (0x60B1 | 0x60B2, 0) => Self::Offset,
             _ => Self::Zero,
         }
     }
@@ -115,20 +110,17 @@ impl FeedbackSlot {
             (0x6064, 0) => Self::Position,
             (0x606C, 0) => Self::Velocity,
             (0x6077, 0) => Self::Torque,
-            (0x6078, 0) => Self::Current,
-            (0x60F4, 0) => Self::FollowingError,
             (0x603F, 0) => Self::ErrorCode,
-            (0x60FD, 0) => Self::DigitalInputs,
             _ => Self::Ignored,
         }
     }
 
     const fn is_signed(self) -> bool {
-        !matches!(self, Self::Statusword | Self::ErrorCode | Self::DigitalInputs | Self::Ignored)
+        !matches!(self, Self::Statusword | Self::ErrorCode | Self::Ignored)
     }
 }
 
-const IMAGE_SLOTS: usize = 16;
+const IMAGE_SLOTS: usize = 8;
 
 /// The numbers of one direction of an axis, in drive units. Unsigned 32-bit objects keep their bit pattern.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -193,6 +185,25 @@ pub enum MappingError {
         /// The object.
         object: MappedObject,
     },
+}
+
+impl core::error::Error for MappingError {}
+
+impl core::fmt::Display for MappingError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::TooManyObjects { given } => {
+                write!(f, "{given} objects are mapped, but a PDO takes no more than {MAX_OBJECTS}")
+            }
+            Self::TooLong { object, bits } => {
+                write!(f, "the PDO is {bits} bits long with object {object}, but takes no more than 64")
+            }
+            Self::Width { object } => {
+                write!(f, "object {object} is mapped with {} bits, not 8, 16 or 32", object.bits)
+            }
+            Self::NothingToSend { object } => write!(f, "there is no value to send for object {object}"),
+        }
+    }
 }
 
 impl Mapping {
@@ -280,6 +291,15 @@ pub struct TooShort {
     pub received: usize,
 }
 
+impl core::error::Error for TooShort {}
+
+impl core::fmt::Display for TooShort {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let Self { expected, received } = self;
+        write!(f, "the PDO has {received} bytes, but its mapping has {expected}")
+    }
+}
+
 #[cfg(test)]
 mod tests {
     extern crate std;
@@ -333,6 +353,11 @@ mod tests {
         let unknown = MappedObject::new(0x2005, 1, 16);
         assert_eq!(Mapping::commands(&[unknown]), Err(MappingError::NothingToSend { object: unknown }));
         assert!(Mapping::feedback(&[unknown]).is_ok());
+        // Its value would be zero in every cycle: a drive that does not move.
+        let profile_velocity = MappedObject::new(0x6081, 0, 32);
+        let refused = Mapping::commands(&[CONTROLWORD, profile_velocity]);
+        assert_eq!(refused, Err(MappingError::NothingToSend { object: profile_velocity }));
+        assert!(Mapping::commands(&[MappedObject::new(0x60B1, 0, 32)]).is_ok());
         let gap = MappedObject::new(0x0005, 0, 8);
         assert_eq!(Mapping::commands(&[gap, TARGET]).unwrap().length(), 5);
     }

@@ -74,7 +74,8 @@ pub trait BusPort {
     }
 
     /// Appends what has arrived up to `now_ns`, oldest first, as far as `batch` has room. Own frames are not
-    /// among it. Fewer than the room left means that nothing more is waiting.
+    /// among it. Fewer than the room left means that nothing more is waiting, or that the port has done as much as it
+    /// does in one call; the rest stays for the next one.
     fn receive(&mut self, now_ns: Nanoseconds, batch: &mut ReceiveBatch);
 
     /// Own frames that were taken by [`BusPort::send`] and have not yet been seen on the wire. While there are
@@ -114,6 +115,7 @@ pub struct BusHealth {
     pub rx_overruns: u64,
     /// Error frames and bus errors.
     pub errors: u64,
-    /// How long the wire was occupied, in nanoseconds, as far as this port saw it; for the bus load.
+    /// How long the wire was occupied, in nanoseconds, by the frames that this port saw; for the bus load. A SocketCAN port
+    /// leaves out the stuff bits: the wire is then occupied for up to 22 % longer. A simulated bus counts every bit.
     pub busy_ns: u64,
 }

@@ -94,7 +94,7 @@ impl ProfileCommand {
         self.cycles = self.cycles.saturating_add(1);
     }
 
-    /// Cycles for which the drive has owed an answer to the handshake; 0 when none is under way.
+    /// Cycles for which the drive has not answered the handshake; 0 when none is under way.
     pub const fn waiting_cycles(&self) -> u32 {
         self.waiting_cycles
     }

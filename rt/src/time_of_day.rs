@@ -61,7 +61,7 @@ impl TimeOfDay {
     }
 }
 
-/// Tells the time every so many cycles, once it has been told itself: the cycle's clock is not that of the day.
+/// Sends TIME every so many cycles, once it knows the time of day: the clock of the cycle does not.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct TimeProducer {
     cycles: u32,

@@ -1,7 +1,7 @@
 //! SI on our side, drive units on the wire.
 //!
-//! A position becomes counts by one multiplication and one rounding of the absolute value, never by adding up
-//! rounded steps, so the error is at most half a count for ever.
+//! A position becomes counts by one multiplication and one rounding of the absolute value. Rounded steps are never added up,
+//! so the error stays within half a count.
 
 /// What a drive counts in, against what the joint does.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,7 +36,8 @@ pub struct Scale {
     torque_per_per_mille: f64,
 }
 
-/// A parameter of a scale that is not a positive, finite number (or, for the zero, not finite).
+/// A parameter of a scale that is not a positive, finite number (or, for the zero, not finite), or parameters that do not
+/// go together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ScaleError {
     /// [`ScaleParameters::counts_per_turn`]
@@ -51,6 +52,27 @@ pub enum ScaleError {
     ZeroCounts,
     /// [`ScaleParameters::rated_torque`]
     RatedTorque,
+    /// Counts, gear ratio and travel together give a resolution that no number can hold.
+    Resolution,
+}
+
+impl core::error::Error for ScaleError {}
+
+impl core::fmt::Display for ScaleError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let name = match self {
+            Self::CountsPerTurn => "the counts of one turn",
+            Self::VelocityUnitsPerTurn => "the velocity units of one turn",
+            Self::GearRatio => "the gear ratio",
+            Self::TravelPerTurn => "the travel of one turn",
+            Self::ZeroCounts => return f.write_str("the zero position in counts must be a finite number"),
+            Self::RatedTorque => "the rated torque",
+            Self::Resolution => {
+                return f.write_str("counts, gear ratio and travel give a resolution beyond all numbers");
+            }
+        };
+        write!(f, "{name} must be a positive, finite number")
+    }
 }
 
 impl Scale {
@@ -76,6 +98,16 @@ impl Scale {
             per_mille_per_torque: 0.0,
             torque_per_per_mille: 0.0,
         };
+        let is_held = |value: f64| value.is_normal();
+        let factors = [
+            scale.counts_per_unit,
+            scale.units_per_count,
+            scale.drive_velocity_per_velocity,
+            scale.velocity_per_drive_velocity,
+        ];
+        if !factors.into_iter().all(is_held) {
+            return Err(ScaleError::Resolution);
+        }
         scale.with_rated_torque(parameters.rated_torque)
     }
 
@@ -181,6 +213,8 @@ mod tests {
                 Err(ScaleError::RatedTorque)
             );
         }
+        let fine = ScaleParameters { counts_per_turn: 1e300, gear_ratio: 1e300, ..EROB };
+        assert_eq!(Scale::new(fine), Err(ScaleError::Resolution));
         assert_eq!(
             Scale::new(ScaleParameters { zero_counts: f64::NAN, ..EROB }),
             Err(ScaleError::ZeroCounts)

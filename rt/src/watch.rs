@@ -1,15 +1,15 @@
-//! What is watched over time: slots that pass unused, nodes that fall silent or start anew, identifiers that come twice.
+//! What is watched over time: slots that were missed, nodes that fall silent or start anew, duplicate node IDs.
 
-/// How late the controller has been of late.
+/// How often the controller has missed slots lately.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[repr(u8)]
 pub enum TimingLevel {
     /// Hardly ever.
     #[default]
     Normal = 0,
-    /// Often enough to be told.
+    /// Often enough for an event.
     Warning = 1,
-    /// So often that no stream is begun, since its owner counts on every slot.
+    /// So often that no stream may begin: its owner relies on every slot.
     Degraded = 2,
     /// Too often to go on.
     Unfit = 3,
@@ -20,34 +20,38 @@ impl TimingLevel {
     pub const ALL: [Self; 4] = [Self::Normal, Self::Warning, Self::Degraded, Self::Unfit];
 }
 
-/// When missed slots are too many: a bucket that every missed slot fills by one and that loses one in
-/// `leak_cycles` cycles.
+/// When missed slots are too many: a bucket that every missed slot fills by one, and that loses one after each
+/// `leak_slots` slots that were used. The leak counts slots and not time: whoever misses every second slot fills the bucket,
+/// whatever the period.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TimingLadder {
-    /// Slots in the bucket from which on it is told.
+    /// Missed slots in the bucket from which on there is an event.
     pub warning: u32,
     /// Slots from which on no stream is begun.
     pub degraded: u32,
     /// Slots from which on the group stops.
     pub unfit: u32,
-    /// Cycles in which the bucket loses one; 0 never.
-    pub leak_cycles: u32,
+    /// Slots that were used after which one missed slot is forgiven; 0 for never.
+    pub leak_slots: u32,
 }
 
 /// The bucket of a [`TimingLadder`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LeakyBucket {
     filled: u32,
-    cycles: u32,
+    /// Slots since the last leak.
+    slots: u32,
 }
 
 impl LeakyBucket {
-    /// Takes the slots that were missed in one cycle, 0 as a rule, and gives what is in the bucket then.
-    pub fn take(&mut self, missed: u64, leak_cycles: u32) -> u32 {
-        self.cycles += 1;
-        if leak_cycles > 0 && self.cycles >= leak_cycles {
-            self.cycles = 0;
-            self.filled = self.filled.saturating_sub(1);
+    /// Takes one more slot, and the slots that were missed before it or with it: 0 as a rule. Gives what is in the bucket then.
+    pub fn take(&mut self, missed: u64, leak_slots: u32) -> u32 {
+        if leak_slots > 0 {
+            self.slots = self.slots.saturating_add(1);
+            if self.slots >= leak_slots {
+                self.slots = 0;
+                self.filled = self.filled.saturating_sub(1);
+            }
         }
         self.filled = self.filled.saturating_add(u32::try_from(missed).unwrap_or(u32::MAX));
         self.filled
@@ -290,13 +294,13 @@ mod tests {
     use super::*;
     use std::vec::Vec;
 
-    const LADDER: TimingLadder = TimingLadder { warning: 3, degraded: 10, unfit: 30, leak_cycles: 10 };
+    const LADDER: TimingLadder = TimingLadder { warning: 3, degraded: 10, unfit: 30, leak_slots: 10 };
 
     #[test]
     fn a_missed_slot_now_and_then_leaks_away() {
         let mut bucket = LeakyBucket::default();
         for cycle in 0..10_000 {
-            let filled = bucket.take(u64::from(cycle % 10 == 0), LADDER.leak_cycles);
+            let filled = bucket.take(u64::from(cycle % 10 == 0), LADDER.leak_slots);
             assert_eq!(LADDER.level(filled), TimingLevel::Normal);
         }
     }
@@ -305,13 +309,29 @@ mod tests {
     fn missed_slots_that_come_faster_than_they_leak_climb_the_ladder_step_by_step() {
         let mut bucket = LeakyBucket::default();
         let levels: Vec<TimingLevel> =
-            (0..100).map(|_| LADDER.level(bucket.take(1, LADDER.leak_cycles))).collect();
+            (0..100).map(|_| LADDER.level(bucket.take(1, LADDER.leak_slots))).collect();
         assert!(levels.is_sorted());
         for level in TimingLevel::ALL {
             assert!(levels.contains(&level), "{level:?}");
         }
         bucket.empty();
-        assert_eq!(LADDER.level(bucket.take(0, LADDER.leak_cycles)), TimingLevel::Normal);
+        assert_eq!(LADDER.level(bucket.take(0, LADDER.leak_slots)), TimingLevel::Normal);
+    }
+
+    #[test]
+    fn whoever_misses_every_second_slot_becomes_unfit() {
+        let mut bucket = LeakyBucket::default();
+        let is_unfit =
+            (0..100).any(|_| LADDER.level(bucket.take(1, LADDER.leak_slots)) == TimingLevel::Unfit);
+        assert!(is_unfit);
+    }
+
+    #[test]
+    fn a_bucket_that_never_leaks_takes_more_slots_than_a_counter_of_32_bits_holds() {
+        let mut bucket = LeakyBucket { filled: 3, slots: u32::MAX };
+        assert_eq!((bucket.take(0, 0), bucket.take(1, 0)), (3, 4));
+        let mut bucket = LeakyBucket { filled: 3, slots: u32::MAX };
+        assert_eq!(bucket.take(0, u32::MAX), 2);
     }
 
     #[test]

@@ -3,7 +3,7 @@
 mod fixture;
 
 use fixture::{LIMITS, PERIOD_NS, Rig, parameters};
-use takt_rt::{EngineParameters, Id, Phase, Request, Rule};
+use takt_rt::{EngineParameters, Id, Origin, Phase, Request, Rule};
 
 /// Three axes on a bus with a cycle in every slot, three on one with a cycle in every second.
 fn two_rates() -> EngineParameters {
@@ -143,4 +143,23 @@ fn after_an_absence_set_points_leave_on_every_bus_before_the_heartbeat_does() {
             }
         }
     }
+}
+
+#[test]
+fn two_buses_that_are_behind_one_after_the_other_are_no_bus_that_does_not_transmit() {
+    // Six cycles in a row are too many; each of them is behind for four.
+    let mut rig = Rig::of(parameters(6)).enable();
+    for (bus, cycles) in [(0, 4), (1, 4), (0, 4), (1, 4)] {
+        rig.buses[bus].unconfirmed = 1;
+        rig.run(cycles);
+        rig.buses[bus].unconfirmed = 0;
+    }
+    rig.run(1);
+    assert_eq!(rig.stops(), []);
+    rig.buses[0].unconfirmed = 1;
+    rig.run(2);
+    rig.buses[1].unconfirmed = 1;
+    rig.run(5);
+    let stops = rig.stops();
+    assert_eq!((stops.len(), stops[0].rule(), stops[0].origin), (1, Rule::NotTransmitted, Origin::Bus(0)));
 }

@@ -5,9 +5,9 @@ mod fixture;
 use fixture::{PERIOD_NS, Rig, jerk_limited, move_to, parameters, scale};
 use proptest::prelude::*;
 use takt_rt::{
-    Answer, AxisParameters, BusState, DriveState, Engine, EventKind, Frame, Id, MAX_AXES, Move,
-    OperationMode, Origin, Phase, ProfileMove, ProfileTarget, RejectReason, Request, RequestId, Rule,
-    SetUpError, StopCategory,
+    Answer, AxisParameters, AxisParametersError, BusState, ControlLaw, DriveState, Engine, EventKind, Frame,
+    Id, MAX_AXES, Move, OperationMode, Origin, Phase, ProfileMove, ProfileTarget, RejectReason, Request,
+    RequestId, Rule, SetUpError, StopCategory,
 };
 
 fn rules(rig: &Rig) -> Vec<Rule> {
@@ -508,10 +508,22 @@ fn impossible_parameters_are_refused_with_the_axis() {
         Engine::new(parameters).err()
     };
     assert_eq!(with(|axis| axis.bus = 9), Some(SetUpError::UnknownBus { axis: 1 }));
-    assert_eq!(with(|axis| axis.commands.clear()), Some(SetUpError::NoPdo { axis: 1 }));
-    assert_eq!(with(|axis| axis.limits.velocity = f64::NAN), Some(SetUpError::ImpossibleLimits { axis: 1 }));
+    assert_eq!(
+        with(|axis| axis.commands.clear()),
+        Some(SetUpError::Axis { axis: 1, error: AxisParametersError::NoPdo })
+    );
+    let changes: [fn(&mut AxisParameters); 5] = [
+        |axis| axis.limits.velocity = f64::NAN,
+        |axis| axis.following_error_limit = f64::NAN,
+        |axis| axis.law = ControlLaw::Velocity { position_gain: f64::INFINITY },
+        |axis| axis.node = 0,
+        |axis| axis.node = 129,
+    ];
+    for change in changes {
+        assert!(matches!(with(change), Some(SetUpError::Axis { axis: 1, .. })), "{:?}", with(change));
+    }
     let taken = with(|axis| axis.node = 1);
-    assert_eq!(taken, Some(SetUpError::NodeId { axis: Some(1), node: 1 }));
+    assert_eq!(taken, Some(SetUpError::DuplicateNodeId { axis: 1, node: 1 }));
     let same_id = with(|axis| axis.feedback[0].id = Id::canopen(0x180, 1));
     assert_eq!(same_id, Some(SetUpError::IdTaken { axis: 1, id: Id::canopen(0x180, 1) }));
     let mut none = parameters(1);

@@ -3,8 +3,11 @@
 
 mod fixture;
 
-use fixture::{PERIOD_NS, Rig, parameters};
-use takt_rt::{Fault, FeedbackSince, Frame, Id, Phase, Request, Rule, StopCause, controlword};
+use fixture::{LIMITS, PERIOD_NS, Rig, axis, parameters, scale};
+use takt_rt::{
+    Axis, AxisParameters, DriveState, Fault, FeedbackSince, Frame, Id, Phase, Request, Rule, StopCause,
+    controlword,
+};
 
 fn moving() -> Rig {
     let mut rig = Rig::enabled(3);
@@ -173,4 +176,39 @@ fn an_answer_that_was_lost_before_costs_one_sync_and_nothing_else() {
     let left_out = syncs(&rig).windows(2).filter(|pair| pair[1] - pair[0] == 2 * PERIOD_NS).count();
     assert_eq!((left_out, rig.stops().len()), (1, 0));
     assert_eq!(rig.host.snapshot.axes[1].unanswered, 0);
+}
+
+/// The velocities that an axis makes of a joint's reports, while its drive is asked for them so much too late.
+fn velocities(feedback_since: FeedbackSince, late_ns: &[u64], missed_every: u64) -> Vec<f64> {
+    let period_s = PERIOD_NS as f64 * 1e-9;
+    let mut axis = Axis::new(AxisParameters { feedback_since, ..axis(0, 1) });
+    axis.set_cycle(period_s);
+    let (mut velocities, mut last_slot) = (vec![], 0);
+    for (slot, late_ns) in (1..400).zip(late_ns.iter().cycle()).filter(|(slot, _)| slot % missed_every != 0) {
+        let asked_ns = slot * PERIOD_NS + late_ns;
+        axis.expect_feedback(asked_ns);
+        let position = scale().position_to_counts(LIMITS.velocity * asked_ns as f64 * 1e-9);
+        let [s0, s1] = (DriveState::OperationEnabled.statusword_bits() | 0x0290).to_le_bytes();
+        let [p0, p1, p2, p3] = position.to_le_bytes();
+        let report = Frame::of(Id::canopen(0x180, 1), [s0, s1, p0, p1, p2, p3]);
+        axis.receive(0, &report, asked_ns + 100_000).unwrap();
+        axis.begin_cycle(period_s * (slot - last_slot) as f64);
+        last_slot = slot;
+        velocities.push(axis.velocity());
+    }
+    velocities.split_off(2)
+}
+
+#[test]
+fn a_joint_is_no_faster_because_its_drive_is_asked_late() {
+    for feedback_since in [FeedbackSince::Sync, FeedbackSince::SetPoint] {
+        for missed_every in [1_000, 7] {
+            let late_ns = [0, 250_000, 100_000, 0, 400_000];
+            for velocity in velocities(feedback_since, &late_ns, missed_every) {
+                let error = velocity / LIMITS.velocity - 1.0;
+                // The positions are rounded to counts.
+                assert!(error.abs() < 0.02, "{feedback_since:?}: {error}");
+            }
+        }
+    }
 }

@@ -1,5 +1,5 @@
-//! A thread is made real-time, or says what was refused: with the rights of whoever runs this test, and without
-//! any in a child process that has given them up.
+//! A thread becomes a real-time thread, or reports what was refused. It is tried with the rights of the user who runs this test,
+//! and without any rights in a child process that has given them up.
 #![cfg(all(target_os = "linux", feature = "linux"))]
 
 use std::thread;
@@ -20,7 +20,7 @@ const EVERYTHING: ThreadConfig = ThreadConfig {
 const NOTHING: ThreadConfig =
     ThreadConfig { priority: None, cpu: None, lock_memory: false, hold_dma_latency: false, stack_bytes: 0 };
 
-/// Runs in a thread of its own, whose set-up ends with it.
+/// Runs in a thread of its own, because the set-up lasts as long as the thread.
 fn in_thread<T: Send + 'static>(body: impl FnOnce() -> T + Send + 'static) -> T {
     thread::spawn(body).join().expect("the thread ends normally")
 }
@@ -117,7 +117,7 @@ fn page_faults_are_counted_from_the_end_of_the_set_up() {
     let (quiet, busy) = in_thread(|| {
         let elevated = RealtimeThread::enter(&ThreadConfig { stack_bytes: 64 * 1024, ..NOTHING });
         let quiet = elevated.page_faults();
-        // Freshly mapped memory, one fault a page at the least when it is written.
+        // New memory takes at least one page fault for each page that is written.
         let fresh = vec![1u8; 4 << 20];
         std::hint::black_box(&fresh);
         (quiet, elevated.page_faults())
@@ -130,7 +130,7 @@ fn page_faults_are_counted_from_the_end_of_the_set_up() {
 fn give_up_rights() -> bool {
     const NOBODY: libc::uid_t = 65_534;
     let none = libc::rlimit { rlim_cur: 0, rlim_max: 0 };
-    // SAFETY: plain system calls on numbers and one valid structure.
+    // SAFETY: system calls with numbers and one valid structure.
     unsafe {
         let limits = libc::setrlimit(libc::RLIMIT_RTPRIO, &none) == 0
             && libc::setrlimit(libc::RLIMIT_MEMLOCK, &none) == 0;
@@ -138,7 +138,7 @@ fn give_up_rights() -> bool {
     }
 }
 
-/// What a thread without rights gets, as a number that can be an exit code: 0 is what is expected.
+/// What a thread without rights gets, as an exit code: 0 is the expected result.
 fn verdict_without_rights() -> i32 {
     if !give_up_rights() {
         return 1;
@@ -162,16 +162,16 @@ fn verdict_without_rights() -> i32 {
 
 #[test]
 fn without_rights_fifo_locking_and_idle_states_are_refused_and_the_rest_is_done() {
-    // SAFETY: the child makes system calls alone, allocates nothing and leaves through `_exit`.
+    // SAFETY: the child makes only system calls, allocates nothing, and ends with `_exit`.
     let child = unsafe { libc::fork() };
     assert!(child >= 0, "fork");
     if child == 0 {
         let verdict = verdict_without_rights();
-        // SAFETY: ends this process without running anything of the parent's.
+        // SAFETY: ends this process without running any code of the parent.
         unsafe { libc::_exit(verdict) };
     }
     let mut status = 0;
-    // SAFETY: `status` is valid for writing; the child is ours.
+    // SAFETY: `status` is valid for writing, and the child belongs to this process.
     assert_eq!(unsafe { libc::waitpid(child, &mut status, 0) }, child);
     assert!(libc::WIFEXITED(status), "the child ended on its own");
     assert_eq!(libc::WEXITSTATUS(status), 0, "the check that failed, see `verdict_without_rights`");

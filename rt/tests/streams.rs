@@ -2,7 +2,7 @@
 
 mod fixture;
 
-use fixture::{LIMITS, PERIOD_NS, Rig, axis_in, parameters};
+use fixture::{LIMITS, PERIOD_NS, Rig, axis_in, jerk_limited, parameters};
 use takt_rt::plan::{self, Limits, Problem, Profile, State};
 use takt_rt::{
     AxisLimits, ControlLaw, MAX_AXES, OnViolation, Phase, Request, Rule, StopCategory, StreamCommand,
@@ -156,37 +156,152 @@ fn a_stream_of_positions_planned_at_the_very_limits_is_followed_and_can_be_stopp
     }
 }
 
-/// As clients do that wake up a little late: the set-point of one cycle never comes, and the next one is on time.
+const JERK: f64 = 100.0;
+
+/// An axis with this limit of the jerk that holds, for a stream that has not been asked for yet; and the number of records so far.
+fn holding(jerk: f64) -> (Rig, usize) {
+    let mut rig = Rig::of(jerk_limited(1, jerk)).enable();
+    rig.move_to(0.0);
+    rig.run_until(Phase::Holding, 5_000);
+    rig.run(10);
+    let before = rig.host.records.len();
+    (rig, before)
+}
+
+/// The highest jerk that the drive has been asked for since so many records, as it sees it: by the third differences of its
+/// set-points.
+fn highest_jerk(rig: &Rig, before: usize) -> f64 {
+    let set: Vec<f64> =
+        rig.host.records[before - 3..].iter().map(|record| record.axes[0].position_set).collect();
+    let period_s = PERIOD_NS as f64 * 1e-9;
+    let jerk = |set: &[f64]| (set[3] - 3.0 * set[2] + 3.0 * set[1] - set[0]).abs() / period_s.powi(3);
+    set.windows(4).map(jerk).fold(0.0, f64::max)
+}
+
+/// The jerk limit, with room for the rounding of positions.
+const JERK_AT_MOST: f64 = JERK * (1.0 + 1e-5) + 1e-5;
+
 #[test]
-fn a_stream_near_its_limits_that_misses_a_command_now_and_then_goes_on_whether_it_says_its_velocity_or_not() {
-    let limits = AxisLimits { jerk: 100.0, ..LIMITS };
+fn a_stream_that_leaps_at_its_start_is_refused_however_long_its_first_command_is_waited_for() {
+    let period_s = PERIOD_NS as f64 * 1e-9;
+    for waited_for in [0, 1, 2, 5, 40] {
+        let (mut rig, before) = holding(JERK);
+        rig.host.requests.push_back(Request::Stream);
+        rig.run(waited_for);
+        for cycle in 1..100 {
+            // At once at an acceleration below its limit, with a hundred times the jerk.
+            let (time_s, acceleration) = (f64::from(cycle) * period_s, 0.9 * LIMITS.acceleration);
+            let position = acceleration * time_s * time_s / 2.0;
+            stream(&mut rig, State { position, velocity: acceleration * time_s, acceleration });
+            rig.run(1);
+        }
+        let highest = highest_jerk(&rig, before);
+        assert!(highest <= JERK_AT_MOST, "{highest} after {waited_for} cycles");
+        let rules: Vec<Rule> = rig.stops().iter().map(|stop| stop.rule()).collect();
+        assert_eq!(rules, [Rule::JerkLimit], "after {waited_for} cycles");
+    }
+}
+
+/// Near all limits, on the way to the highest position.
+fn near_its_limits(limits: &AxisLimits) -> (Profile, i32) {
     let nearly = AxisLimits {
         velocity: 0.95 * limits.velocity,
         acceleration: 0.9 * limits.acceleration,
         deceleration: 0.9 * limits.deceleration,
         jerk: 0.9 * limits.jerk,
         position_max: 0.99 * limits.position_max,
-        ..limits
+        ..*limits
     };
     let profile = to_the_limit(&nearly);
-    let period_s = PERIOD_NS as f64 * 1e-9;
-    let cycles = (profile.duration_s() / period_s).ceil() as usize;
+    let cycles = (profile.duration_s() / (PERIOD_NS as f64 * 1e-9)).ceil() as i32;
+    (profile, cycles)
+}
+
+/// Streams a motion near all limits, of which commands come only in some cycles. Returns how far the set-points have been from
+/// it at most, while it moved and at its end.
+fn streamed_with_gaps(rig: &mut Rig, says_all: bool, comes: impl Fn(i32) -> bool) -> (f64, f64) {
+    let (profile, cycles) = near_its_limits(&rig.engine.axes()[0].parameters().limits);
+    rig.request(Request::Stream);
+    let (mut farthest, mut last) = (0.0_f64, 0.0);
+    for cycle in 1..=cycles + 100 {
+        let state = profile.sample(f64::from(cycle) * PERIOD_NS as f64 * 1e-9);
+        if comes(cycle) {
+            stream(rig, if says_all { state } else { State::rest(state.position) });
+        }
+        rig.run(1);
+        last = (rig.engine.axes()[0].set_point().position - state.position).abs();
+        farthest = farthest.max(last);
+    }
+    (farthest, last)
+}
+
+/// As clients do that wake up a little late: the set-point of one cycle never comes, and the next one is on time.
+#[test]
+fn a_stream_near_its_limits_that_misses_a_command_now_and_then_goes_on_whether_it_says_its_velocity_or_not() {
     for missing in 2..40 {
         for says_all in [false, true] {
-            let mut rig = streaming_within(limits, ControlLaw::Position, OnViolation::Reject);
-            let mut farthest = 0.0_f64;
-            for cycle in 1..=cycles {
-                let state = profile.sample(cycle as f64 * period_s);
-                if cycle % 40 != missing {
-                    stream(&mut rig, if says_all { state } else { State::rest(state.position) });
+            let (mut rig, before) = holding(JERK);
+            let (farthest, last) = streamed_with_gaps(&mut rig, says_all, |cycle| cycle % 40 != missing);
+            assert_eq!((rig.stops(), rig.phase()), (vec![], Phase::Streaming), "{missing}, {says_all}");
+            let highest = highest_jerk(&rig, before);
+            assert!(highest <= JERK_AT_MOST, "{missing}, {says_all}: {highest}");
+            assert!(farthest > 0.0 && farthest < 1e-4, "{missing}, {says_all}: {farthest:e}");
+            assert!(last < 1e-9, "{missing}, {says_all}: {last:e} at the end");
+        }
+    }
+}
+
+#[test]
+fn a_stream_near_its_limits_that_is_slower_than_the_cycle_is_followed_within_all_of_them() {
+    for every in 2..=5 {
+        for (says_all, jerk) in [(false, JERK), (true, JERK), (false, f64::INFINITY)] {
+            let (mut rig, before) = holding(jerk);
+            let (farthest, last) = streamed_with_gaps(&mut rig, says_all, |cycle| cycle % every == 0);
+            let what = format!("every {every}, {says_all}, jerk {jerk}");
+            assert_eq!((rig.stops(), rig.phase()), (vec![], Phase::Streaming), "{what}");
+            rig.assert_limits_kept();
+            let highest = highest_jerk(&rig, before);
+            assert!(jerk.is_infinite() || highest <= JERK_AT_MOST, "{what}: {highest}");
+            // It is near its limits too when it has to catch up.
+            assert!(farthest < 2e-3, "{what}: {farthest:e}");
+            assert!(last < 1e-9, "{what}: {last:e} at the end");
+        }
+    }
+}
+
+#[test]
+fn a_stream_that_is_slower_than_the_cycle_and_leaps_is_stopped_by_its_jerk() {
+    let period_s = PERIOD_NS as f64 * 1e-9;
+    for every in 1..=5 {
+        for says_all in [false, true] {
+            let (mut rig, before) = holding(JERK);
+            rig.request(Request::Stream);
+            let (mut position, mut velocity, mut acceleration) = (0.0, 0.0, 0.0);
+            for cycle in 1..=100 {
+                // From an acceleration of 3.6 rad/s² to its opposite.
+                let is_leaping = cycle == 41;
+                acceleration = match cycle {
+                    ..=40 => acceleration + 0.9 * JERK * period_s,
+                    _ if is_leaping => -acceleration,
+                    _ => acceleration,
+                };
+                velocity += acceleration * period_s;
+                position += velocity * period_s;
+                if cycle % every == 0 {
+                    let state = State { position, velocity, acceleration };
+                    stream(&mut rig, if says_all { state } else { State::rest(position) });
                 }
                 rig.run(1);
-                farthest = farthest.max((rig.engine.axes()[0].set_point().position - state.position).abs());
+                assert!(
+                    cycle > 40 || rig.stops().is_empty(),
+                    "every {every}: {:?} in cycle {cycle}",
+                    rig.stops()
+                );
             }
-            assert_eq!((rig.stops(), rig.phase()), (vec![], Phase::Streaming), "{missing}, {says_all}");
-            // At constant velocity it would be off by half of it, or all of it where only steps are known.
-            let acceleration = limits.acceleration * period_s * period_s;
-            assert!(farthest > 0.0 && farthest < 0.1 * acceleration, "{missing}, {says_all}: {farthest:e}");
+            let highest = highest_jerk(&rig, before);
+            assert!(highest <= JERK_AT_MOST, "every {every}, {says_all}: {highest}");
+            let rules: Vec<Rule> = rig.stops().iter().map(|stop| stop.rule()).collect();
+            assert_eq!(rules, [Rule::JerkLimit], "every {every}, {says_all}");
         }
     }
 }

@@ -1,16 +1,16 @@
-//! How long a frame can be on the wire at most: every field of the format, the most stuff bits that its bits can
-//! need, and the intermission that no other frame can use.
+//! The longest time that a frame can take on the wire: every field of its format, the most stuff bits that these fields can need,
+//! and the intermission, which no other frame can use.
 
 use takt_rt::FrameKind;
 
-/// What decides the length of a frame.
+/// The properties of a frame that decide its longest time on the wire.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FrameShape {
     /// Its kind.
     pub kind: FrameKind,
     /// Whether its identifier has 29 bits.
     pub is_extended: bool,
-    /// Its length in bytes, as the length code says it.
+    /// Its length in bytes, as in its length code.
     pub length: usize,
 }
 
@@ -21,28 +21,27 @@ impl FrameShape {
     }
 }
 
-/// Bits of a frame by the bit rate that they are sent at.
+/// The bits of a frame at each of both bit rates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BitCount {
-    /// At the nominal bit rate.
+    /// Bits at the nominal bit rate.
     pub nominal: u32,
-    /// At the bit rate of the data phase.
+    /// Bits at the bit rate of the data phase.
     pub data: u32,
 }
 
-/// CRC delimiter, acknowledge slot and delimiter, end of frame, intermission: bits that are never stuffed.
+/// The bits that are never stuffed: CRC delimiter, acknowledge slot and its delimiter, end of frame, intermission.
 const TAIL: u32 = 1 + 1 + 1 + 7 + 3;
 
 /// The most bits that a frame of this shape can have, intermission included.
 ///
-/// Classic frames: start of frame, identifier, RTR, IDE and reserved bits, length code, data and CRC are stuffed (54
-/// bits beside the data with a 29-bit identifier, else 34), and S such bits need (S − 1) / 4 stuff bits at most,
-/// because a stuff bit is itself the first of the next five: Davis, Burns, Bril and Lukkien, Real-Time Systems 35
-/// (2007).
+/// Classic frames: start of frame, identifier, RTR, IDE and reserved bits, length code, data and CRC are stuffed. Beside the data
+/// these are 54 bits with a 29-bit identifier, and 34 otherwise. S such bits need at most (S − 1) / 4 stuff bits, because a
+/// stuff bit is the first of the next five bits (Davis, Burns, Bril and Lukkien, Real-Time Systems 35, 2007).
 ///
-/// CAN FD (ISO 11898-1:2015): the same rule from the start of frame to the end of the data; then the stuff count
-/// with its parity (4 bits) and a CRC of 17 bits (21 above 16 bytes), with one fixed stuff bit before and one after
-/// every fourth bit. The rate changes within BRS and within the CRC delimiter; both are counted as nominal here.
+/// CAN FD (ISO 11898-1:2015): the same rule holds from the start of frame to the end of the data. Then follow the stuff count with
+/// its parity (4 bits) and a CRC of 17 bits (21 above 16 bytes), with a fixed stuff bit before them and after every
+/// fourth bit. The bit rate changes within BRS and within the CRC delimiter. Both bits count as nominal here.
 pub fn worst_case_bits(shape: FrameShape) -> BitCount {
     let length = u32::try_from(shape.length).unwrap_or(u32::MAX / 16);
     match shape.kind {
@@ -80,19 +79,19 @@ fn most_stuff_bits(stuffable: u32) -> u32 {
 /// The bit rates of a bus in bit/s.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BitRates {
-    /// Of classic frames and of the arbitration phase.
+    /// The bit rate of classic frames and of the arbitration phase.
     pub nominal: u32,
-    /// Of the data phase of CAN FD frames with bit-rate switching.
+    /// The bit rate of the data phase of CAN FD frames with bit-rate switching.
     pub data: u32,
 }
 
 impl BitRates {
-    /// How long these bits take, rounded up to whole nanoseconds.
+    /// The duration of these bits, rounded up to whole nanoseconds.
     pub fn duration_ns(self, bits: BitCount) -> u64 {
         bits_ns(bits.nominal, self.nominal) + bits_ns(bits.data, self.data)
     }
 
-    /// One bit of the arbitration phase.
+    /// The duration of one bit of the arbitration phase, rounded up to whole nanoseconds.
     pub fn bit_ns(self) -> u64 {
         bits_ns(1, self.nominal)
     }
@@ -154,7 +153,7 @@ mod tests {
         assert_eq!(BitRates { nominal: 3_000_000, data: 3_000_000 }.bit_ns(), 334);
     }
 
-    /// Counts stuff bits as a transmitter inserts them.
+    /// Counts the stuff bits that a transmitter inserts.
     fn stuff_bits(bits: &[bool]) -> u32 {
         let (mut last, mut run, mut stuffed) = (None, 0, 0);
         for &bit in bits {

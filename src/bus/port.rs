@@ -1,4 +1,4 @@
-//! The port of a configured bus, whatever it is connected to.
+//! The port of a configured bus, of any kind.
 
 use arrayvec::ArrayVec;
 use takt_rt::Frame;
@@ -9,7 +9,7 @@ use super::interface::{InterfaceError, InterfaceSettings, prepare_interface};
 use super::socketcan::{SocketCanError, SocketCanOptions, open_socketcan};
 use super::trace::{Trace, TracedPort, traced};
 use crate::config::{Config, Interface};
-use crate::faults::{Breakable, CannotBreak, DriveTrouble, FaultyPort, Heard};
+use crate::faults::{Delivery, DriveEffect, FaultyPort, InjectError, Injectable};
 use crate::sim::SimulatedBus;
 
 /// Frames that the trace to the logger holds: almost one second of a fully loaded bus at 1 Mbit/s.
@@ -17,7 +17,7 @@ const TRACE_FRAMES: usize = 1 << 13;
 
 /// A bus port of any kind.
 pub enum Port {
-    /// Simulated drives inside this process.
+    /// A bus with simulated drives inside this process.
     Simulated(Box<SimulatedBus>),
     /// A CAN interface of this machine.
     SocketCan(Box<SocketCanPort>),
@@ -33,18 +33,18 @@ pub enum OpenError {
     /// The interface is missing, down or set up differently.
     #[error("bus `{bus}`: {error}")]
     Interface {
-        /// The bus.
+        /// The name of the bus.
         bus: String,
-        /// Why.
+        /// The reason.
         #[source]
         error: InterfaceError,
     },
     /// No socket could be opened on the interface.
     #[error("bus `{bus}`: {error}")]
     Socket {
-        /// The bus.
+        /// The name of the bus.
         bus: String,
-        /// Why.
+        /// The reason.
         #[source]
         error: SocketCanError,
     },
@@ -73,15 +73,15 @@ impl Port {
         }
     }
 
-    /// The same port, and a trace of its frames.
+    /// This port with a trace, which receives a copy of every frame, and the trace.
     pub fn traced(self, name: &str) -> (Self, Trace) {
         let (port, trace) = traced(self, name, TRACE_FRAMES);
         (Self::Traced(Box::new(port)), trace)
     }
 }
 
-/// Brings the interface of bus number `bus` up, as far as that is needed and permitted, and opens it. `None` when the
-/// bus is a simulated one.
+/// Brings the interface of bus number `bus` up, as far as needed and permitted, and opens it. Returns `None` for a simulated
+/// bus.
 ///
 /// # Errors
 /// See [`OpenError`].
@@ -156,25 +156,25 @@ impl BusPort for Port {
     }
 }
 
-impl Breakable for Port {
-    fn say(&mut self, now_ns: Nanoseconds, frame: &Frame) -> Heard {
+impl Injectable for Port {
+    fn send_foreign(&mut self, now_ns: Nanoseconds, frame: &Frame) -> Delivery {
         match self {
-            Self::Simulated(port) => Breakable::say(port.as_mut(), now_ns, frame),
+            Self::Simulated(port) => Injectable::send_foreign(port.as_mut(), now_ns, frame),
             Self::SocketCan(port) => {
                 port.send(now_ns, &[*frame]);
-                Heard::ByOthers
+                Delivery::ToOthers
             }
-            Self::Traced(port) => port.say(now_ns, frame),
-            Self::Faulty(port) => port.say(now_ns, frame),
+            Self::Traced(port) => port.send_foreign(now_ns, frame),
+            Self::Faulty(port) => port.send_foreign(now_ns, frame),
         }
     }
 
-    fn trouble(&mut self, node: u8, trouble: DriveTrouble, is_present: bool) -> Result<(), CannotBreak> {
+    fn inject(&mut self, node: u8, effect: DriveEffect, is_present: bool) -> Result<(), InjectError> {
         match self {
-            Self::Simulated(port) => port.trouble(node, trouble, is_present),
-            Self::SocketCan(_) => Err(CannotBreak::NotSimulated),
-            Self::Traced(port) => port.trouble(node, trouble, is_present),
-            Self::Faulty(port) => port.trouble(node, trouble, is_present),
+            Self::Simulated(port) => port.inject(node, effect, is_present),
+            Self::SocketCan(_) => Err(InjectError::NotSimulated),
+            Self::Traced(port) => port.inject(node, effect, is_present),
+            Self::Faulty(port) => port.inject(node, effect, is_present),
         }
     }
 }

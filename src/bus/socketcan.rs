@@ -1,4 +1,4 @@
-//! Opening a SocketCAN interface as a bus port for the real-time thread.
+//! Opens a SocketCAN interface as a bus port for the real-time thread.
 
 use std::io;
 use std::os::fd::AsRawFd;
@@ -10,8 +10,8 @@ use thiserror::Error;
 
 use crate::config::Config;
 
-/// What the kernel reserves for one frame that waits in a socket's buffer: the frame with its bookkeeping, 768
-/// bytes on Linux 6.1, up to 960 since 6.3.
+/// Bytes that the kernel reserves for one frame that waits in the buffer of a socket. The frame with its bookkeeping takes 768 bytes
+/// on Linux 6.1, and up to 960 since 6.3.
 const BYTES_PER_FRAME: usize = 1_024;
 
 /// The most filters that a socket takes (`CAN_RAW_FILTER_MAX`).
@@ -20,15 +20,15 @@ const FILTER_LIMIT: usize = 512;
 /// How a socket is opened.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SocketCanOptions {
-    /// The identifiers of all data frames that are received **and sent**: own frames come back through the same
-    /// filters, and one that does not would never count as sent. Empty: no filter.
+    /// The identifiers of all data frames that are received **and sent**; empty for no filter. Own frames come back through the same
+    /// filters. A frame that does not come back never counts as sent.
     pub identifiers: Vec<Id>,
-    /// Bit/s of classic frames and of the arbitration phase; only the report of the bus load depends on it.
+    /// The bit rate of classic frames and of the arbitration phase, in bit/s. Only the bus load depends on it.
     pub bit_rate: u32,
-    /// Bit/s of the data phase of CAN FD frames.
+    /// The bit rate of the data phase of CAN FD frames, in bit/s.
     pub data_bit_rate: Option<u32>,
-    /// How many frames of this socket may wait in the interfaces' queues; more are not taken. Not much above what is
-    /// sent in a cycle: set-points that wait longer are stale.
+    /// How many frames of this socket may wait in the queues of the interfaces; the kernel does not take more. Choose not much more
+    /// than a cycle sends: set-points that wait longer are stale.
     pub transmit_frames: usize,
     /// How many received frames the kernel keeps until they are read. A process without CAP_NET_ADMIN may get fewer
     /// (`net.core.rmem_max`).
@@ -36,8 +36,8 @@ pub struct SocketCanOptions {
 }
 
 impl SocketCanOptions {
-    /// For bus number `bus` of a configuration, as its master: every identifier that CANopen gives to the nodes on
-    /// it (CiA 301, 7.3.3), in both directions.
+    /// The options of the master on bus number `bus` of a configuration. They let pass every identifier that CANopen gives to the
+    /// nodes on this bus (CiA 301, 7.3.3), in both directions.
     pub fn of_master(config: &Config, bus: usize) -> Self {
         let nodes = config.axes.iter().filter(|axis| axis.bus == bus).map(|axis| axis.node);
         let functions = (1..=0xE).map(|function| function << 7);
@@ -62,15 +62,15 @@ const SYNC: u16 = 0x080;
 const TIME: u16 = 0x100;
 const HEARTBEAT: u16 = 0x700;
 
-/// Set-points of an axis in a cycle, at most: as many as a drive has PDOs for them.
+/// The most set-point frames of an axis in a cycle: a drive has four receive PDOs.
 const COMMANDS_PER_AXIS: usize = 4;
-/// SYNC and services in a cycle, at most.
+/// The most SYNC and service frames of a bus in a cycle.
 const SERVICE_FRAMES: usize = 8;
 /// Enough for a reader that stalls for 30 ms on a fully loaded bus.
 const RECEIVE_FRAMES: usize = 1_024;
 
 impl Default for SocketCanOptions {
-    /// Everything is received, 1 Mbit/s, 32 frames may wait to be sent and 1024 to be read.
+    /// No filter, 1 Mbit/s. 32 frames may wait to be sent, and 1,024 to be read.
     fn default() -> Self {
         Self {
             identifiers: vec![],
@@ -88,15 +88,18 @@ impl Default for SocketCanOptions {
 pub struct SocketCanError {
     /// The interface.
     pub interface: String,
-    /// What was tried.
+    /// The action that failed.
     pub action: &'static str,
-    /// What the system said.
+    /// The error of the system.
     #[source]
     pub error: io::Error,
 }
 
-/// Opens an interface, which must exist, as a port: CAN FD frames and error frames on, own frames received back as
-/// confirmations, kernel time stamps and overflow counter on.
+/// Opens an interface, which must exist, as a port. It receives CAN FD frames, error frames and, as confirmations, its own frames.
+/// Kernel time stamps and the overflow counter are on.
+///
+/// # Errors
+/// [`SocketCanError`]: the action that the system refused.
 pub fn open_socketcan(interface: &str, options: &SocketCanOptions) -> Result<SocketCanPort, SocketCanError> {
     let failed = |action| move |error| SocketCanError { interface: interface.into(), action, error };
     let socket = CanFdSocket::open(interface).map_err(failed("opening a socket"))?;
@@ -109,12 +112,12 @@ pub fn open_socketcan(interface: &str, options: &SocketCanOptions) -> Result<Soc
         .set_socket_option_int(libc::SOL_SOCKET, libc::SO_RXQ_OVFL, 1)
         .map_err(failed("asking for the overflow counter"))?;
     SocketCanPort::new(socket.as_raw_fd(), options.bit_rate, options.data_bit_rate)
-        .map_err(io::Error::from_raw_os_error)
+        .map_err(|error| io::Error::from_raw_os_error(error.errno))
         .map_err(failed("duplicating the socket"))
 }
 
-/// One filter for each identifier: the kernel keeps those that name an identifier exactly, and data frames alone,
-/// in a table of its own, in which the number of filters costs nothing.
+/// Sets one filter for each identifier. The kernel keeps filters for exactly one identifier and only data frames in a table of
+/// their own. There, the number of filters costs no time.
 fn set_filters(socket: &CanFdSocket, identifiers: &[Id]) -> io::Result<()> {
     if identifiers.is_empty() || identifiers.len() > FILTER_LIMIT {
         return socket.set_filter_accept_all();
@@ -132,7 +135,8 @@ fn filter(id: Id) -> CanFilter {
     }
 }
 
-/// The kernel doubles what is asked for, to have its bookkeeping in it; here that is part of a frame's bytes.
+/// Sets the sizes of the buffers. The kernel doubles the requested size for its bookkeeping, which [`BYTES_PER_FRAME`] includes
+/// already.
 fn set_buffers(socket: &CanFdSocket, options: &SocketCanOptions) -> io::Result<()> {
     let bytes = |frames: usize| i32::try_from(frames.saturating_mul(BYTES_PER_FRAME) / 2).unwrap_or(i32::MAX);
     socket.set_socket_option_int(libc::SOL_SOCKET, libc::SO_SNDBUF, bytes(options.transmit_frames))?;

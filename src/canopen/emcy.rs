@@ -1,4 +1,4 @@
-//! Emergency messages (CiA 301, 7.2.7) and error codes in words (CiA 301, table 26; CiA 402, error codes of 603F).
+//! Emergency messages (CiA 301, 7.2.7), and the names of error codes (CiA 301, table 26; CiA 402, object 603F).
 
 use std::fmt;
 
@@ -9,18 +9,18 @@ use super::{function_code, node_of};
 /// An emergency message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Emergency {
-    /// Who sends it, 1 to 127.
+    /// The sender's node ID, 1 to 127.
     pub node: u8,
-    /// What has happened; [`ErrorCode::NONE`] when an error has gone.
+    /// The error code; a code 00xx means that the error has been reset.
     pub code: ErrorCode,
     /// Object 1001 of the sender.
     pub register: ErrorRegister,
-    /// Five bytes of the manufacturer's.
+    /// Five manufacturer-specific bytes.
     pub manufacturer: [u8; 5],
 }
 
 impl Emergency {
-    /// Reads a message on the pre-defined identifier 0x80 + node; `None` when it is none.
+    /// Decodes a message with the pre-defined identifier 0x80 + node ID; `None` for other frames.
     pub fn decode(frame: &Frame) -> Option<Self> {
         let node = node_of(frame, function_code::EMERGENCY)?;
         let &[low, high, register, a, b, c, d, e] = frame.payload() else { return None };
@@ -56,7 +56,7 @@ impl fmt::Display for Emergency {
 pub struct ErrorRegister(pub u8);
 
 impl ErrorRegister {
-    /// Any error at all.
+    /// Generic error.
     pub const GENERIC: u8 = 0x01;
     /// Current.
     pub const CURRENT: u8 = 0x02;
@@ -66,9 +66,9 @@ impl ErrorRegister {
     pub const TEMPERATURE: u8 = 0x08;
     /// Communication.
     pub const COMMUNICATION: u8 = 0x10;
-    /// What the device profile says.
+    /// Specific to the device profile.
     pub const DEVICE_PROFILE: u8 = 0x20;
-    /// What the manufacturer says.
+    /// Specific to the manufacturer.
     pub const MANUFACTURER: u8 = 0x80;
 
     const NAMES: [(u8, &'static str); 7] = [
@@ -90,15 +90,15 @@ impl fmt::Display for ErrorRegister {
     }
 }
 
-/// An error code as emergency messages and object 603F carry it.
+/// An error code of emergency messages and object 603F.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct ErrorCode(pub u16);
 
 impl ErrorCode {
-    /// No error, or: the error has gone.
+    /// No error, or the error has been reset.
     pub const NONE: Self = Self(0);
 
-    /// What the code means; the class that it belongs to when the standards do not list it.
+    /// The name of the code; for codes that the standards do not list, the name of its class.
     pub fn words(self) -> &'static str {
         let exact = SPECIFIC.iter().find(|(code, _)| *code == self.0);
         let class =
@@ -113,7 +113,7 @@ impl fmt::Display for ErrorCode {
     }
 }
 
-/// Codes with a meaning of their own.
+/// Codes with their own name.
 const SPECIFIC: [(u16, &str); 92] = [
     (0x0000, "no error"),
     (0x2110, "short circuit or earth leakage at the input"),
@@ -209,7 +209,7 @@ const SPECIFIC: [(u16, &str); 92] = [
     (0x8612, "reference limit reached"),
 ];
 
-/// Mask, value and meaning of the classes, the narrower ones first.
+/// Mask, value and name of the classes, narrower ones first.
 const CLASSES: [(u16, u16, &str); 41] = [
     (0xFF00, 0x0000, "error reset"),
     (0xFF00, 0x1000, "generic error"),
@@ -259,7 +259,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_emergency_is_read_field_by_field() {
+    fn an_emergency_message_is_decoded_field_by_field() {
         let bytes = [0x0F, 0x73, 0x81, 1, 2, 3, 4, 5];
         let emergency = Emergency::decode(&Frame::of(Id::canopen(0x80, 2), bytes)).unwrap();
         let expected = Emergency {
@@ -278,14 +278,14 @@ mod tests {
     }
 
     #[test]
-    fn sync_and_short_frames_are_no_emergency() {
+    fn sync_and_short_frames_are_not_emergency_messages() {
         assert_eq!(Emergency::decode(&Frame::of(Id::canopen(0x80, 0), [0; 8])), None);
         assert_eq!(Emergency::decode(&Frame::of(Id::canopen(0x80, 1), [0; 7])), None);
         assert_eq!(Emergency::decode(&Frame::of(Id::canopen(0x100, 0), [0; 8])), None);
     }
 
     #[test]
-    fn codes_are_put_into_words_by_the_narrowest_entry() {
+    fn codes_are_named_by_the_narrowest_entry() {
         assert_eq!(ErrorCode(0x8130).words(), "heartbeat or life guard of the master lost");
         assert_eq!(ErrorCode(0x3210).words(), "DC link over-voltage");
         assert_eq!(ErrorCode(0x3299).words(), "voltage inside the device");
@@ -295,7 +295,7 @@ mod tests {
     }
 
     #[test]
-    fn every_class_of_table_26_has_its_words() {
+    fn every_class_of_table_26_has_a_name() {
         let table = [
             (0x0000, "no error"),
             (0x1000, "generic error"),
@@ -339,7 +339,7 @@ mod tests {
     }
 
     #[test]
-    fn every_bit_of_the_register_that_the_standard_names_has_its_word() {
+    fn every_bit_of_the_register_in_the_standard_has_a_name() {
         let named: Vec<String> =
             (0..8).map(|bit| ErrorRegister(1 << bit).to_string()).filter(|name| name != "no error").collect();
         let expected = [
@@ -355,7 +355,7 @@ mod tests {
     }
 
     #[test]
-    fn the_tables_hold_no_code_twice_and_no_class_hides_a_narrower_one() {
+    fn the_tables_have_no_code_twice_and_no_class_hides_a_narrower_one() {
         for (place, (code, _)) in SPECIFIC.iter().enumerate() {
             assert!(!SPECIFIC[..place].iter().any(|(other, _)| other == code), "{code:#06x} twice");
         }
@@ -366,7 +366,7 @@ mod tests {
     }
 
     #[test]
-    fn a_register_without_bits_tells_of_no_error() {
+    fn a_register_without_bits_means_no_error() {
         assert_eq!(ErrorRegister(0).to_string(), "no error");
         assert_eq!(ErrorRegister(0x15).to_string(), "generic + voltage + communication");
     }

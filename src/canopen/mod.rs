@@ -1,17 +1,17 @@
-//! The CANopen services (CiA 301) as a master needs them, without input and output: time and frames are handed in,
-//! frames are handed out.
+//! The CANopen services (CiA 301) of a master, without input and output: the caller passes time and frames in, and
+//! sends the frames that come out.
 //!
 //! - [`nmt`]: network management: commands, states, boot-up and heartbeat.
-//! - [`sdo`]: service data objects: what is on the wire, and a client that moves one object at a time,
-//!   expedited, segmented or in blocks.
-//! - [`emcy`]: emergency messages and what their codes mean.
+//! - [`sdo`]: service data objects: the messages, and a client that transfers one object at a time, expedited,
+//!   segmented or in blocks.
+//! - [`emcy`]: emergency messages and the names of their codes.
 //! - [`sync`]: the SYNC message; [`time`]: the TIME message.
-//! - [`heartbeat`]: the nodes whose heartbeat is watched.
-//! - [`lss`]: layer setting services: node numbers and bit rates for devices that have none.
-//! - [`dcf`]: what a configuration file has written to a device, and in which order.
+//! - [`heartbeat`]: heartbeat consumers.
+//! - [`lss`]: layer setting services: node IDs and bit rates.
+//! - [`dcf`]: the values that a configuration file writes to a device, and their order.
 //! - [`eds`]: electronic data sheets and device configuration files.
-//! - [`pdo_configuration`]: how a PDO is configured, as a device or a file tells it; [`pdo_inquiry`] asks a device.
-//! - [`object`]: an object's address, type and name; [`objects`]: the standard ones used here.
+//! - [`pdo_configuration`]: the configuration of a PDO, from a device or a file; [`pdo_reader`] reads it from a device.
+//! - [`object`]: an object's address, type and name; [`objects`]: the standard objects used here.
 
 pub mod dcf;
 pub mod eds;
@@ -22,16 +22,16 @@ pub mod nmt;
 pub mod object;
 pub mod objects;
 pub mod pdo_configuration;
-pub mod pdo_inquiry;
+pub mod pdo_reader;
 pub mod sdo;
 pub mod sync;
 pub mod time;
 
-/// Function codes of the pre-defined connection set (CiA 301, 7.3.3), to which the node number is added.
+/// Function codes of the pre-defined connection set (CiA 301, 7.3.3), to which the node ID is added.
 pub mod function_code {
-    /// SYNC, without a node number.
+    /// SYNC, without a node ID.
     pub const SYNC: u16 = 0x080;
-    /// TIME, without a node number.
+    /// TIME, without a node ID.
     pub const TIME: u16 = 0x100;
     /// EMCY of a device.
     pub const EMERGENCY: u16 = 0x080;
@@ -43,7 +43,7 @@ pub mod function_code {
     pub const ERROR_CONTROL: u16 = 0x700;
 }
 
-/// The node of a frame that carries `function`'s 11-bit identifier; `None` for every other frame.
+/// The node ID of a frame with `function`'s 11-bit identifier; `None` for other frames.
 fn node_of(frame: &takt_rt::Frame, function: u16) -> Option<u8> {
     let id = frame.id();
     let node = id.value().checked_sub(function.into())?;

@@ -1,5 +1,5 @@
-//! Network management (CiA 301, 7.2.8): the master's commands, the states of a node, and its boot-up and heartbeat
-//! messages with a consumer that notices when they cease.
+//! Network management (CiA 301, 7.2.8): the master's commands, the NMT states, boot-up and heartbeat messages, and a
+//! heartbeat consumer.
 
 use std::fmt;
 
@@ -11,15 +11,15 @@ use super::{function_code, node_of};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[repr(u8)]
 pub enum NmtCommand {
-    /// Enter operational: every service runs.
+    /// Enter operational: all services work.
     Start = 0x01,
-    /// Enter stopped: only NMT and error control run; the SDO server is silent.
+    /// Enter stopped: only NMT and error control work; the SDO server does not answer.
     Stop = 0x02,
-    /// Enter pre-operational: SDO runs, PDO does not.
+    /// Enter pre-operational: SDO works, PDOs do not.
     EnterPreOperational = 0x80,
-    /// Restart the whole application.
+    /// Reset the whole application.
     ResetNode = 0x81,
-    /// Set the communication parameters back to their stored values and boot.
+    /// Restore the stored communication parameters and boot.
     ResetCommunication = 0x82,
 }
 
@@ -28,7 +28,7 @@ impl NmtCommand {
     pub const ALL: [Self; 5] =
         [Self::Start, Self::Stop, Self::EnterPreOperational, Self::ResetNode, Self::ResetCommunication];
 
-    /// The frame that gives this command.
+    /// The frame of this command.
     pub fn frame(self, target: NmtTarget) -> Frame {
         let node = match target {
             NmtTarget::All => 0,
@@ -37,7 +37,7 @@ impl NmtCommand {
         Frame::of(Id::canopen(0, 0), [self as u8, node])
     }
 
-    /// Reads a command frame; `None` when it is none.
+    /// Decodes a command; `None` for other frames.
     pub fn decode(frame: &Frame) -> Option<(Self, NmtTarget)> {
         let (0, false, &[command, node]) = (frame.id().value(), frame.id().is_extended(), frame.payload())
         else {
@@ -52,26 +52,26 @@ impl NmtCommand {
     }
 }
 
-/// Who obeys a command.
+/// The addressee of a command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum NmtTarget {
-    /// Every node of the bus.
+    /// Every node on the bus.
     All,
     /// One node, 1 to 127.
     Node(u8),
 }
 
-/// The state of a node as its error control messages tell it (CiA 301, 7.2.8.3.2.2).
+/// The state of a node in its error control messages (CiA 301, 7.2.8.3.2.2).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[repr(u8)]
 pub enum NmtState {
-    /// It has just booted and is now pre-operational.
+    /// The node has just booted and is now pre-operational.
     BootUp = 0x00,
-    /// Only NMT and error control run.
+    /// Only NMT and error control work.
     Stopped = 0x04,
-    /// Every service runs.
+    /// All services work.
     Operational = 0x05,
-    /// SDO runs, PDO does not.
+    /// SDO works, PDOs do not.
     PreOperational = 0x7F,
 }
 
@@ -94,15 +94,15 @@ impl fmt::Display for NmtState {
 /// A boot-up or heartbeat message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ErrorControl {
-    /// Who sends it, 1 to 127.
+    /// The sender's node ID, 1 to 127.
     pub node: u8,
     /// The sender's state.
     pub state: NmtState,
 }
 
 impl ErrorControl {
-    /// Reads a message; `None` when it is none, or names a state that does not exist. The top bit, which toggles
-    /// in answers to node guarding, does not count.
+    /// Decodes a message; `None` for other frames and unknown states. The top bit, which toggles in node guarding, is
+    /// ignored.
     pub fn decode(frame: &Frame) -> Option<Self> {
         let node = node_of(frame, function_code::ERROR_CONTROL)?;
         let &[byte] = frame.payload() else { return None };
@@ -110,60 +110,60 @@ impl ErrorControl {
         Some(Self { node, state })
     }
 
-    /// The message as a frame: the heartbeat that a producer sends.
+    /// The frame of this message: a heartbeat.
     pub fn frame(self) -> Frame {
         Frame::of(Id::canopen(function_code::ERROR_CONTROL, self.node), [self.state as u8])
     }
 }
 
-/// Watches the heartbeat of one node (CiA 301, 7.2.8.2.2.2). The watch begins with the first message.
+/// Monitors the heartbeat of one node (CiA 301, 7.2.8.2.2.2), from its first message on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct HeartbeatConsumer {
     node: u8,
     timeout_ns: Nanoseconds,
     state: Option<NmtState>,
-    heard_at_ns: Nanoseconds,
+    received_at_ns: Nanoseconds,
     is_lost: bool,
 }
 
-/// What a heartbeat, or its absence, tells.
+/// An event of a heartbeat consumer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum HeartbeatEvent {
-    /// The node has booted: everything it was told over the bus is forgotten.
+    /// The node has booted: its configuration over the bus is lost.
     BootUp,
-    /// The node is in another state than before. Also the first message after silence.
+    /// The node has changed its state. Also the first message, and the first one after a loss.
     Changed {
-        /// Its state before; `None` when it was not known.
+        /// The state before; `None` if it was not known.
         from: Option<NmtState>,
-        /// Its state now.
+        /// The state now.
         to: NmtState,
     },
-    /// Nothing was heard for the agreed time.
+    /// The heartbeat timed out.
     Lost {
-        /// The state of which the node told last.
+        /// The last reported state.
         last: NmtState,
-        /// How long nothing has been heard.
+        /// Time since the last message.
         silence_ns: Nanoseconds,
     },
 }
 
 impl HeartbeatConsumer {
-    /// Watches `node`, which must be heard at least every `timeout_ns`.
+    /// Monitors `node` with this timeout.
     pub const fn new(node: u8, timeout_ns: Nanoseconds) -> Self {
-        Self { node, timeout_ns, state: None, heard_at_ns: 0, is_lost: false }
+        Self { node, timeout_ns, state: None, received_at_ns: 0, is_lost: false }
     }
 
-    /// The state of which the node told last; `None` before its first message and after its loss.
+    /// The last reported state; `None` before the first message and after a loss.
     pub fn state(&self) -> Option<NmtState> {
         self.state.filter(|_| !self.is_lost)
     }
 
-    /// Takes a frame that was received at `now_ns`; every other frame is passed over.
+    /// Receives a frame at `now_ns`; other frames are ignored.
     pub fn receive(&mut self, now_ns: Nanoseconds, frame: &Frame) -> Option<HeartbeatEvent> {
         let message = ErrorControl::decode(frame).filter(|message| message.node == self.node)?;
         let from = self.state();
         self.state = Some(message.state);
-        self.heard_at_ns = now_ns;
+        self.received_at_ns = now_ns;
         self.is_lost = false;
         match message.state {
             NmtState::BootUp => Some(HeartbeatEvent::BootUp),
@@ -172,11 +172,11 @@ impl HeartbeatConsumer {
         }
     }
 
-    /// Tells once that the heartbeat has been lost.
+    /// Returns once that the heartbeat has timed out.
     pub fn poll(&mut self, now_ns: Nanoseconds) -> Option<HeartbeatEvent> {
         let last = self.state()?;
-        let silence_ns = now_ns.saturating_sub(self.heard_at_ns);
-        // A node that has only booted need not produce heartbeats yet.
+        let silence_ns = now_ns.saturating_sub(self.received_at_ns);
+        // A node that has only booted may not produce a heartbeat yet.
         if last == NmtState::BootUp || silence_ns <= self.timeout_ns {
             return None;
         }
@@ -194,13 +194,13 @@ mod tests {
     }
 
     #[test]
-    fn commands_are_the_bytes_of_the_standard() {
+    fn commands_are_encoded_as_in_the_standard() {
         assert_eq!(format!("{:?}", NmtCommand::ResetCommunication.frame(NmtTarget::Node(2))), "000#8202");
         assert_eq!(format!("{:?}", NmtCommand::Start.frame(NmtTarget::All)), "000#0100");
     }
 
     #[test]
-    fn every_command_is_read_back_as_itself() {
+    fn every_command_is_decoded_to_itself() {
         for command in NmtCommand::ALL {
             for target in [NmtTarget::All, NmtTarget::Node(1), NmtTarget::Node(127)] {
                 assert_eq!(NmtCommand::decode(&command.frame(target)), Some((command, target)));
@@ -209,7 +209,7 @@ mod tests {
     }
 
     #[test]
-    fn frames_that_are_no_command_are_not_taken_for_one() {
+    fn other_frames_are_not_decoded_as_commands() {
         let nmt = Id::canopen(0, 0);
         assert_eq!(NmtCommand::decode(&Frame::of(nmt, [0x03, 1])), None);
         assert_eq!(NmtCommand::decode(&Frame::of(nmt, [0x01, 128])), None);
@@ -218,7 +218,7 @@ mod tests {
     }
 
     #[test]
-    fn error_control_messages_are_read_by_node_and_state() {
+    fn error_control_messages_are_decoded_to_node_and_state() {
         let read = |bytes: &[u8]| ErrorControl::decode(&Frame::data(Id::canopen(0x700, 2), bytes).unwrap());
         assert_eq!(read(&[0x00]), Some(ErrorControl { node: 2, state: NmtState::BootUp }));
         assert_eq!(read(&[0x85]), Some(ErrorControl { node: 2, state: NmtState::Operational }));
@@ -230,11 +230,11 @@ mod tests {
     }
 
     #[test]
-    fn a_consumer_tells_of_changes_and_of_silence_once() {
+    fn a_consumer_reports_changes_and_each_timeout_once() {
         let mut consumer = HeartbeatConsumer::new(2, 100);
-        assert_eq!(consumer.poll(1_000), None, "nothing is watched before the first message");
+        assert_eq!(consumer.poll(1_000), None, "not monitored before the first message");
         assert_eq!(consumer.receive(1_000, &heartbeat(NmtState::BootUp)), Some(HeartbeatEvent::BootUp));
-        assert_eq!(consumer.poll(5_000), None, "a boot-up alone promises no heartbeat");
+        assert_eq!(consumer.poll(5_000), None, "a boot-up message alone does not start monitoring");
         let changed = HeartbeatEvent::Changed { from: Some(NmtState::BootUp), to: NmtState::PreOperational };
         assert_eq!(consumer.receive(5_000, &heartbeat(NmtState::PreOperational)), Some(changed));
         assert_eq!(consumer.receive(5_050, &heartbeat(NmtState::PreOperational)), None);
@@ -248,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn a_consumer_hears_its_own_node_only() {
+    fn a_consumer_ignores_other_nodes() {
         let mut consumer = HeartbeatConsumer::new(2, 100);
         let other = ErrorControl { node: 3, state: NmtState::Operational }.frame();
         assert_eq!((consumer.receive(0, &other), consumer.state()), (None, None));

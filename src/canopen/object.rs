@@ -1,4 +1,4 @@
-//! An object of a device's dictionary: where it is, what it holds, what it is called.
+//! An object of a device's object dictionary: address, data type and name.
 
 use std::fmt;
 
@@ -24,7 +24,7 @@ impl fmt::Display for ObjectAddress {
     }
 }
 
-/// The numeric types that CiA 301 and CiA 402 give to their objects.
+/// The integer types of CiA 301 and CiA 402 objects.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum DataType {
     /// UNSIGNED8
@@ -42,7 +42,7 @@ pub enum DataType {
 }
 
 impl DataType {
-    /// The length on the wire in bytes.
+    /// The length in bytes.
     pub const fn length(self) -> usize {
         match self {
             Self::U8 | Self::I8 => 1,
@@ -51,7 +51,7 @@ impl DataType {
         }
     }
 
-    /// The type of so many bytes whose sign is that of this one; `None` where there is none.
+    /// The type with this length and the sign of this one; `None` if there is none.
     pub const fn of_length(self, length: usize) -> Option<Self> {
         let is_signed = matches!(self, Self::I8 | Self::I16 | Self::I32);
         Some(match (length, is_signed) {
@@ -65,7 +65,7 @@ impl DataType {
         })
     }
 
-    /// The value on the wire, low byte first; `None` when it does not fit the type.
+    /// Encodes a value, little-endian; `None` when it does not fit the type.
     pub fn encode(self, value: i64) -> Option<Vec<u8>> {
         Some(match self {
             Self::U8 => u8::try_from(value).ok()?.to_le_bytes().into(),
@@ -77,7 +77,7 @@ impl DataType {
         })
     }
 
-    /// The value of bytes from the wire; `None` when their number is not that of the type.
+    /// Decodes a value; `None` when the number of bytes differs from the type's.
     pub fn decode(self, bytes: &[u8]) -> Option<i64> {
         Some(match self {
             Self::U8 => u8::from_le_bytes(bytes.try_into().ok()?).into(),
@@ -90,14 +90,14 @@ impl DataType {
     }
 }
 
-/// An object that holds a number.
+/// An object with a numeric value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Object {
-    /// Where it is.
+    /// Index and sub-index.
     pub address: ObjectAddress,
-    /// What it holds.
+    /// The data type.
     pub data_type: DataType,
-    /// What people call it.
+    /// The name for people.
     pub name: &'static str,
 }
 
@@ -107,7 +107,7 @@ impl Object {
         Self { address: ObjectAddress::new(index, subindex), data_type, name }
     }
 
-    /// A value of this object as people read it: addresses, words and masks in hexadecimal, amounts in decimal.
+    /// A value as text: identifiers, words and masks in hexadecimal, quantities in decimal.
     pub fn show(&self, value: i64) -> String {
         let is_pattern = matches!(
             self.address.index,
@@ -137,7 +137,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn whatever_fits_a_type_comes_back_from_the_wire(value: i64, data_type in 0..TYPES.len(), shift in 0..64u32) {
+        fn a_value_that_fits_a_type_survives_encoding(value: i64, data_type in 0..TYPES.len(), shift in 0..64u32) {
             let (value, data_type) = (value >> shift, TYPES[data_type]);
             if let Some(bytes) = data_type.encode(value) {
                 prop_assert_eq!(bytes.len(), data_type.length());
@@ -146,7 +146,7 @@ mod tests {
         }
 
         #[test]
-        fn bytes_of_the_wrong_number_are_no_value(bytes in prop::collection::vec(any::<u8>(), 0..10)) {
+        fn a_wrong_number_of_bytes_is_not_decoded(bytes in prop::collection::vec(any::<u8>(), 0..10)) {
             for data_type in TYPES {
                 prop_assert_eq!(data_type.decode(&bytes).is_some(), bytes.len() == data_type.length());
             }
@@ -161,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn identifiers_are_shown_in_hexadecimal_and_amounts_in_decimal() {
+    fn identifiers_are_shown_in_hexadecimal_and_quantities_in_decimal() {
         let cob_id = Object::new(0x1400, 1, DataType::U32, "RPDO COB-ID");
         let velocity = Object::new(0x60FF, 0, DataType::I32, "target velocity");
         assert_eq!(cob_id.show(0x8000_0202), "0x80000202");

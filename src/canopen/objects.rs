@@ -1,25 +1,25 @@
-//! The standard objects that a bring-up touches: communication profile (CiA 301) and drive profile (CiA 402).
+//! The standard objects that a bring-up uses: communication profile (CiA 301) and drive profile (CiA 402).
 
 use super::object::{DataType, Object, ObjectAddress};
 
-/// 1000: the profile that the device follows.
+/// 1000: device type, with the profile number in its low 16 bits.
 pub const DEVICE_TYPE: Object = Object::new(0x1000, 0, DataType::U32, "device type");
-/// 1005: the identifier of SYNC; bit 30 makes the device its producer.
+/// 1005: the identifier of SYNC; bit 30 makes the device the SYNC producer.
 pub const SYNC_COB_ID: Object = Object::new(0x1005, 0, DataType::U32, "COB-ID SYNC");
 /// 1006: the period of SYNC in µs.
 pub const COMMUNICATION_CYCLE_PERIOD: Object =
     Object::new(0x1006, 0, DataType::U32, "communication cycle period");
-/// 1016:1: node (bits 16 to 22) and time in ms (bits 0 to 15) of the heartbeat that the device watches.
+/// 1016:1: node ID (bits 16 to 22) and timeout in ms (bits 0 to 15) of the heartbeat that the device consumes.
 pub const CONSUMER_HEARTBEAT_TIME: Object = Object::new(0x1016, 1, DataType::U32, "consumer heartbeat time");
 /// 1017: the period of the device's own heartbeat in ms.
 pub const PRODUCER_HEARTBEAT_TIME: Object = Object::new(0x1017, 0, DataType::U16, "producer heartbeat time");
 /// 1018:1
-pub const VENDOR_ID: Object = Object::new(0x1018, 1, DataType::U32, "vendor id");
+pub const VENDOR_ID: Object = Object::new(0x1018, 1, DataType::U32, "vendor ID");
 /// 1018:2
 pub const PRODUCT_CODE: Object = Object::new(0x1018, 2, DataType::U32, "product code");
 /// 1018:3
 pub const REVISION_NUMBER: Object = Object::new(0x1018, 3, DataType::U32, "revision number");
-/// 1029:1: the NMT state to enter on a communication error, see [`error_behaviour`].
+/// 1029:1: the NMT state after a communication error, see [`error_behaviour`].
 pub const COMMUNICATION_ERROR_BEHAVIOUR: Object =
     Object::new(0x1029, 1, DataType::U8, "error behaviour on communication error");
 
@@ -29,7 +29,7 @@ pub const ERROR_CODE: Object = Object::new(0x603F, 0, DataType::U16, "error code
 pub const CONTROLWORD: Object = Object::new(0x6040, 0, DataType::U16, "controlword");
 /// 6041
 pub const STATUSWORD: Object = Object::new(0x6041, 0, DataType::U16, "statusword");
-/// 605A: what the drive does on a quick stop.
+/// 605A: the reaction to a quick stop.
 pub const QUICK_STOP_OPTION_CODE: Object = Object::new(0x605A, 0, DataType::I16, "quick stop option code");
 /// 6060
 pub const MODES_OF_OPERATION: Object = Object::new(0x6060, 0, DataType::I8, "modes of operation");
@@ -64,10 +64,10 @@ pub const POSITION_OFFSET: Object = Object::new(0x60B0, 0, DataType::I32, "posit
 pub const VELOCITY_OFFSET: Object = Object::new(0x60B1, 0, DataType::I32, "velocity offset");
 /// 60B2
 pub const TORQUE_OFFSET: Object = Object::new(0x60B2, 0, DataType::I16, "torque offset");
-/// 60C2:1: mantissa of the period of set-points.
+/// 60C2:1: mantissa of the set-point period.
 pub const INTERPOLATION_TIME_PERIOD: Object =
     Object::new(0x60C2, 1, DataType::U8, "interpolation time period value");
-/// 60C2:2: decimal exponent of the period of set-points in s.
+/// 60C2:2: decimal exponent of the set-point period in s.
 pub const INTERPOLATION_TIME_INDEX: Object = Object::new(0x60C2, 2, DataType::I8, "interpolation time index");
 /// 60FF
 pub const TARGET_VELOCITY: Object = Object::new(0x60FF, 0, DataType::I32, "target velocity");
@@ -93,11 +93,11 @@ pub const SOFTWARE_VERSION: ObjectAddress = ObjectAddress::new(0x100A, 0);
 
 /// Bit of a PDO's COB-ID that makes the PDO invalid (CiA 301, 7.5.2.35).
 pub const PDO_INVALID: u32 = 1 << 31;
-/// The bits of a PDO's COB-ID that say whether it is valid, and its 11-bit identifier. Bit 30 (no RTR), which some
-/// devices force, is not among them.
+/// The valid bit and the 11-bit identifier of a PDO's COB-ID. Bit 30 (no RTR) is excluded, because some devices force
+/// it.
 pub const PDO_IDENTITY: u32 = PDO_INVALID | 0x7FF;
 
-/// Which way a PDO goes, as the device sees it.
+/// The direction of a PDO, seen from the device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PdoDirection {
     /// RPDO: the device receives it.
@@ -107,7 +107,7 @@ pub enum PdoDirection {
 }
 
 impl PdoDirection {
-    /// What PDOs of this direction are called.
+    /// The name of a PDO of this direction.
     pub const fn word(self) -> &'static str {
         match self {
             Self::Receive => "RPDO",
@@ -124,12 +124,12 @@ pub struct PdoParameters {
 }
 
 impl PdoParameters {
-    /// Those of PDO `number`, counted from 1. Number 0 is taken for 1.
+    /// The parameters of PDO `number`, counted from 1. Number 0 counts as 1.
     pub const fn of(direction: PdoDirection, number: u8) -> Self {
         Self::at(direction, number as u16)
     }
 
-    /// As [`PdoParameters::of`], for all 512 that there may be; numbers beyond are taken for 512.
+    /// As [`PdoParameters::of`], for up to 512 PDOs; higher numbers count as 512.
     pub const fn at(direction: PdoDirection, number: u16) -> Self {
         let offset = if number > 512 { 511 } else { number.saturating_sub(1) };
         match direction {
@@ -138,7 +138,7 @@ impl PdoParameters {
         }
     }
 
-    /// Sub-index 1: identifier and valid bit.
+    /// Sub-index 1: COB-ID with the valid bit.
     pub const fn cob_id(self) -> Object {
         Object::new(self.communication, 1, DataType::U32, "PDO COB-ID")
     }
@@ -158,7 +158,7 @@ impl PdoParameters {
         Object::new(self.communication, 5, DataType::U16, "PDO event timer")
     }
 
-    /// Sub-index 0 of the mapping: how many objects are mapped.
+    /// Sub-index 0 of the mapping: the number of mapped objects.
     pub const fn mapped_count(self) -> Object {
         Object::new(self.mapping, 0, DataType::U8, "number of mapped objects")
     }

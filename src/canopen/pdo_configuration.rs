@@ -1,39 +1,39 @@
-//! How a PDO is configured, whoever tells: a device over SDO, or a file that describes it.
+//! The configuration of a PDO, from a device by SDO or from a file.
 
 use takt_rt::{Frame, Id, MappedObject};
 
 use super::object::ObjectAddress;
 use super::objects::{PDO_INVALID, PdoDirection, PdoParameters};
 
-/// Bit of a COB-ID that makes the identifier one of 29 bits.
+/// Bit of a COB-ID for a 29-bit identifier.
 const EXTENDED: u32 = 1 << 29;
-/// Values of the number of mapped objects that mean multiplexed PDOs, which map nothing themselves (CiA 301, 7.5.2.36).
+/// Numbers of mapped objects from this one on mean multiplexed PDOs, which have no mapping of their own (CiA 301,
+/// 7.5.2.36).
 const MULTIPLEXED: u32 = 0xFE;
 
 /// The configuration of one PDO.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PdoConfiguration {
-    /// Which way it goes, as the device sees it.
+    /// The direction, seen from the device.
     pub direction: PdoDirection,
     /// Its number, counted from 1.
     pub number: u16,
-    /// Its identifier; `None` where nobody tells.
+    /// Its identifier; `None` if it is not known.
     pub id: Option<Id>,
-    /// Whether it exists on the bus.
+    /// Whether the PDO is valid.
     pub is_valid: bool,
-    /// Its transmission type (CiA 301, 7.5.2.36); `None` where nobody tells.
+    /// Its transmission type (CiA 301, 7.5.2.36); `None` if it is not known.
     pub transmission_type: Option<u8>,
-    /// The shortest time between two of them in 100 µs, where it has one.
+    /// The inhibit time in 100 µs, if it has one.
     pub inhibit_time_100us: Option<u16>,
-    /// The longest time between two of them in ms (for RPDOs: until it is missed), where it has one.
+    /// The event timer in ms, if it has one; for an RPDO the reception timeout.
     pub event_timer_ms: Option<u16>,
-    /// What it carries, in order.
+    /// The mapped objects, in order.
     pub objects: Vec<MappedObject>,
 }
 
 impl PdoConfiguration {
-    /// Reads a configuration, wherever the numbers of objects come from; `None` when neither its identifier nor its
-    /// mapping is known.
+    /// Reads a configuration from any source of object values; `None` when neither COB-ID nor mapping is known.
     pub fn read(
         direction: PdoDirection,
         number: u16,
@@ -71,8 +71,8 @@ impl PdoConfiguration {
         self.bits().div_ceil(8)
     }
 
-    /// The objects that a frame of this PDO carries, each with its bits as an unsigned number; `None` for another frame,
-    /// and for one that is shorter than the mapping. Of an object of more than 64 bits the lowest are given.
+    /// The values of the mapped objects in a frame of this PDO, as unsigned bits; the lowest 64 bits of longer objects.
+    /// `None` for other frames and for frames shorter than the mapping.
     pub fn values(&self, frame: &Frame) -> Option<Vec<(MappedObject, u64)>> {
         let payload = frame.payload();
         if !self.is_valid || Some(frame.id()) != self.id || payload.len() < self.length() {
@@ -103,7 +103,7 @@ fn identifier(cob_id: u32) -> Option<Id> {
 mod tests {
     use super::*;
 
-    /// TPDO 1: position before statusword, then four bits of something and four of a gap.
+    /// TPDO 1: position, statusword, four bits of another object, and a gap of four bits.
     fn configuration(cob_id: u32) -> PdoConfiguration {
         let parameters = PdoParameters::at(PdoDirection::Transmit, 1);
         let read = |ObjectAddress { index, subindex }| {
@@ -123,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_is_decoded_by_the_mapping_that_was_read() {
+    fn a_frame_is_decoded_by_the_mapping() {
         let pdo = configuration(0x4000_0182);
         assert_eq!((pdo.length(), pdo.transmission_type, pdo.event_timer_ms), (7, Some(255), Some(100)));
         assert_eq!(pdo.inhibit_time_100us, None);
@@ -133,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn other_frames_and_short_ones_are_not_decoded() {
+    fn other_frames_and_short_frames_are_not_decoded() {
         let pdo = configuration(0x182);
         assert_eq!(pdo.values(&Frame::of(Id::canopen(0x180, 3), [0; 7])), None);
         assert_eq!(pdo.values(&Frame::of(Id::canopen(0x180, 2), [0; 6])), None);

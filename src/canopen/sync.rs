@@ -1,18 +1,18 @@
-//! The SYNC message (CiA 301, 7.2.5): without data, or with a counter from 1 up to an agreed overflow value.
+//! The SYNC message (CiA 301, 7.2.5), with or without a counter.
 
 use takt_rt::{Frame, FrameKind, Id};
 
 use super::function_code;
 
-/// A SYNC message as it is received.
+/// A received SYNC message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Sync {
-    /// Its counter, 1 to 240; `None` in a message without data.
+    /// Its counter, 1 to 240; `None` without data.
     pub counter: Option<u8>,
 }
 
 impl Sync {
-    /// Reads a message on the pre-defined identifier 0x80; `None` when it is none, or has a counter that cannot be.
+    /// Decodes a message with the pre-defined identifier 0x80; `None` for other frames and impossible counters.
     pub fn decode(frame: &Frame) -> Option<Self> {
         if frame.id() != Id::canopen(function_code::SYNC, 0) || frame.kind() != FrameKind::Data {
             return None;
@@ -24,8 +24,8 @@ impl Sync {
         }
     }
 
-    /// How many messages are missing between the one before and this one, by their counters and the overflow value
-    /// (object 1019, 2 to 240); 0 where one of them has no counter.
+    /// Number of missing messages between `before` and this one, by their counters and the overflow value (object 1019,
+    /// 2 to 240); 0 when one of them has no counter.
     pub fn missing_since(self, before: Self, overflow: u8) -> u8 {
         let (Some(now), Some(before)) = (self.counter, before.counter) else { return 0 };
         let due = if before >= overflow { 1 } else { before + 1 };
@@ -46,13 +46,13 @@ struct Counter {
 }
 
 impl SyncProducer {
-    /// SYNC without a counter, as drives without object 1019 expect it.
+    /// SYNC without a counter, for drives without object 1019.
     pub const fn new() -> Self {
         Self { counter: None }
     }
 
-    /// SYNC with a counter that runs from 1 to `overflow` (object 1019) and starts again at 1. `None` outside
-    /// 2 to 240 (CiA 301, 7.5.2.22).
+    /// SYNC with a counter from 1 to `overflow` (object 1019), then from 1 again. `None` outside 2 to 240 (CiA 301,
+    /// 7.5.2.22).
     pub const fn with_counter(overflow: u8) -> Option<Self> {
         match overflow {
             2..=240 => Some(Self { counter: Some(Counter { last: 0, overflow }) }),
@@ -60,7 +60,7 @@ impl SyncProducer {
         }
     }
 
-    /// Starts the counter again at 1, as a change of the NMT state from stopped to another one does.
+    /// Restarts the counter at 1, as when the NMT state stopped is left.
     pub fn restart(&mut self) {
         if let Some(counter) = &mut self.counter {
             counter.last = 0;
@@ -91,7 +91,7 @@ mod tests {
     }
 
     #[test]
-    fn the_counter_runs_from_one_to_its_overflow_and_starts_again() {
+    fn the_counter_runs_from_one_to_its_overflow_and_restarts() {
         let mut sync = SyncProducer::with_counter(3).unwrap();
         let mut next = || sync.next_frame().payload().to_vec();
         assert_eq!([next(), next(), next(), next()], [[1], [2], [3], [1]]);
@@ -100,7 +100,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_produced_is_read_again_and_gaps_are_counted() {
+    fn produced_messages_are_decoded_and_gaps_are_counted() {
         let mut producer = SyncProducer::with_counter(5).unwrap();
         let syncs: Vec<Sync> = (0..8).map(|_| Sync::decode(&producer.next_frame()).unwrap()).collect();
         for pair in syncs.windows(2) {

@@ -1,8 +1,8 @@
 //! `takt check`: everything that can be known before motion.
 
 mod text;
+mod unattended;
 
-use std::f64::consts::TAU;
 use std::path::PathBuf;
 
 use clap::Args;
@@ -13,6 +13,7 @@ use takt::config::{Axis, Config, Control, Travel};
 use super::exit::Exit;
 use super::print;
 use super::usage_error::UsageError;
+use unattended::Unattended;
 
 /// Check a configuration: limits, units, bus load, and the worst-case response time of every message
 #[derive(Args, Clone, Debug)]
@@ -24,7 +25,7 @@ pub struct Arguments {
     json: bool,
 }
 
-/// Checks a configuration and tells the result. The exit code is 0 when it can be run, else 2.
+/// Checks a configuration and prints the result. The exit code is 0 when it can be run, else 2.
 pub fn run(arguments: &Arguments) -> Exit {
     let config = match Config::load(&arguments.config) {
         Ok(config) => config,
@@ -39,14 +40,14 @@ pub fn run(arguments: &Arguments) -> Exit {
     }
 }
 
-/// What was found out.
+/// The result.
 #[derive(Serialize)]
 struct Check {
     name: String,
     fits: bool,
     cycle_ns: u64,
     command_phase_ns: u64,
-    /// What `command_phase = "auto"` stands for; `None` where no command phase suits every bus.
+    /// The value of `command_phase = "auto"`; `None` where no command phase suits every bus.
     automatic_command_phase_ns: Option<u64>,
     axes: Vec<AxisCheck>,
     buses: Vec<BusSchedule>,
@@ -70,6 +71,10 @@ struct AxisCheck {
     torque: f64,
     following_error: f64,
     following_error_time_ns: u64,
+    /// How far off its target a program may leave it.
+    target_tolerance: f64,
+    /// What it does when the controller is gone.
+    without_controller: Unattended,
     counts_per_unit: f64,
     /// What one count is.
     resolution: f64,
@@ -96,11 +101,7 @@ impl Check {
 
 impl AxisCheck {
     fn of(axis: &Axis, config: &Config) -> Self {
-        let travel_per_turn = match axis.travel {
-            Travel::Rotary => TAU,
-            Travel::Linear { lead_m } => lead_m,
-        };
-        let counts_per_unit = axis.counts_per_turn * axis.gear_ratio / travel_per_turn;
+        let counts_per_unit = axis.counts_per_turn * axis.gear_ratio / axis.travel.per_turn();
         let direction = if axis.reversed { -1.0 } else { 1.0 };
         let counts =
             |position: f64| (direction * position * counts_per_unit + f64::from(axis.zero_counts)).round();
@@ -129,6 +130,8 @@ impl AxisCheck {
             torque: axis.limits.torque,
             following_error: axis.following_error.limit,
             following_error_time_ns: axis.following_error.time_ns,
+            target_tolerance: axis.target_tolerance,
+            without_controller: Unattended::of(axis, config),
             counts_per_unit,
             resolution: 1.0 / counts_per_unit,
             counts_per_cycle: axis.limits.velocity

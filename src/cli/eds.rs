@@ -74,7 +74,7 @@ struct PrintedProblem {
 
 fn problems(findings: &Findings) -> Vec<PrintedProblem> {
     let printed = |problem| {
-        let place = findings.place(problem);
+        let place = findings.position(problem);
         PrintedProblem {
             severity: match problem.kind.severity() {
                 Severity::Warning => "warning",

@@ -15,8 +15,10 @@ use takt::config::{Config, Interface, Master};
 use takt::controller::realtime_thread::StartError;
 use takt::controller::session::{self, Session, SessionError, SessionOptions};
 use takt::controller::{Interrupt, Outcome, Progress};
-use takt::faults::{Fault, Rehearsal, Scenario, ScenarioError, Tidings};
-use takt::telemetry::{Destination, Machine, Notice, RealtimeReport, RunEnd, RunOutcome, RunReport, words};
+use takt::faults::{FaultEvents, FaultInjector, Scenario, ScenarioError, ScenarioFault};
+use takt::telemetry::{
+    Machine, Notice, RealtimeReport, RecordingDestination, RunEnd, RunOutcome, RunReport, words,
+};
 use takt_rt::{Event, EventKind, StopReason};
 
 use super::configuration::{self, BusOverride};
@@ -83,10 +85,11 @@ pub fn run(arguments: Arguments) -> Exit {
     if let Err(refused) = schedule::verify(&config) {
         return UsageError::from(refused.to_string()).print(arguments.json);
     }
-    let rehearsal = match arguments.faults.as_deref().map(|path| rehearsal(path, &config)).transpose() {
-        Ok(rehearsal) => rehearsal,
-        Err(error) => return error.print(arguments.json),
-    };
+    let fault_injector =
+        match arguments.faults.as_deref().map(|path| fault_injector(path, &config)).transpose() {
+            Ok(fault_injector) => fault_injector,
+            Err(error) => return error.print(arguments.json),
+        };
     let mut signals = match Signals::watch() {
         Ok(signals) => signals,
         Err(error) => {
@@ -97,18 +100,20 @@ pub fn run(arguments: Arguments) -> Exit {
     let bar = progress_bar(&config);
     let options = SessionOptions {
         duration_ns: arguments.duration.map(|duration| duration.as_nanos() as u64),
-        recording: arguments.record.map(Destination::File),
+        recording: arguments.record.map(RecordingDestination::File),
         is_realtime_required: arguments.require_realtime,
-        rehearsal: rehearsal.clone(),
+        fault_injector: fault_injector.clone(),
         if_owned: ownership::if_owned(arguments.take_over),
     };
     let notify = notices(&bar, Machine::of(&config));
     let mut throttled_bar = ThrottledBar::new(bar.clone());
     let mut full_queues = FullQueues::new(&config);
-    let mut tidings = Tidings::default();
+    let mut fault_events = FaultEvents::default();
     let mut tell = || {
-        let news = rehearsal.as_deref().map_or_else(Vec::new, |rehearsal| tidings.next(rehearsal));
-        news.iter().for_each(|tiding| bar.suspend(|| say!("takt: {tiding}")));
+        let news = fault_injector
+            .as_deref()
+            .map_or_else(Vec::new, |fault_injector| fault_events.next(fault_injector));
+        news.iter().for_each(|fault_event| bar.suspend(|| say!("takt: {fault_event}")));
     };
     let session = session::run(&config, options, notify, |snapshot, progress| {
         throttled_bar.show(&progress);
@@ -125,13 +130,14 @@ pub fn run(arguments: Arguments) -> Exit {
 }
 
 /// Reads a scenario. Warns before faults are injected on real drives.
-fn rehearsal(path: &Path, config: &Config) -> Result<Arc<Rehearsal>, UsageError> {
+fn fault_injector(path: &Path, config: &Config) -> Result<Arc<FaultInjector>, UsageError> {
     let scenario = Scenario::load(path, config).map_err(|error| match error {
         ScenarioError::Wrong(error) => UsageError::from(error),
         unreadable @ ScenarioError::Unreadable { .. } => unreadable.to_string().into(),
     })?;
-    let is_real =
-        |fault: &Fault| config.buses.get(fault.bus).is_some_and(|bus| bus.interface != Interface::Simulated);
+    let is_real = |fault: &ScenarioFault| {
+        config.buses.get(fault.bus).is_some_and(|bus| bus.interface != Interface::Simulated)
+    };
     if let Some(fault) = scenario.faults.iter().find(|fault| is_real(fault)) {
         say!(
             "takt: fault `{}` (line {}) is played on real drives: keep away from them, and keep the emergency stop in \
@@ -140,7 +146,7 @@ fn rehearsal(path: &Path, config: &Config) -> Result<Arc<Rehearsal>, UsageError>
             fault.line
         );
     }
-    Ok(Arc::new(Rehearsal::new(scenario)))
+    Ok(Arc::new(FaultInjector::new(scenario)))
 }
 
 fn refuse(error: &SessionError, is_json: bool) -> Exit {
@@ -192,14 +198,14 @@ fn report(config: &Config, session: &Session, as_json: bool) -> Exit {
     match failure {
         Some(failure) if ended == RunEnd::TakenOver => {
             say!("takt: {failure}");
-            print::text(&report.picture(print::emphasis()), exit)
+            print::text(&report.render(print::emphasis()), exit)
         }
         Some(failure) => {
             say!("takt: {failure}");
             report.telemetry.black_boxes.iter().for_each(|path| say!("black box: {}", path.display()));
             exit
         }
-        None => print::text(&report.picture(print::emphasis()), exit),
+        None => print::text(&report.render(print::emphasis()), exit),
     }
 }
 

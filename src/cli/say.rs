@@ -12,6 +12,7 @@ macro_rules! say {
     ($($words:tt)*) => { $crate::cli::say::line(format_args!($($words)*)) };
 }
 
+/// What comes from outside (arguments, names of files, other processes) moves no cursor and colours nothing.
 pub fn line(words: fmt::Arguments<'_>) {
     let _ = writeln!(stderr(), "{}", printable(&words.to_string()));
 }

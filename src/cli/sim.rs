@@ -39,6 +39,9 @@ pub fn run(arguments: &Arguments) -> Exit {
         Ok(locked) => locked,
         Err(error) => return UsageError::from(error.to_string()).print(false),
     };
+    if let Err(error) = config.validate() {
+        return UsageError::from(error).print(false);
+    }
     let drives = match open(&config) {
         Ok(drives) => drives,
         Err(error) => return UsageError::from(error.to_string()).print(false),

@@ -1,5 +1,6 @@
 //! Why a command was refused before it did anything, as text or, with `--json`, as one object.
 
+use std::env;
 use std::ffi::OsStr;
 
 use serde::Serialize;
@@ -23,6 +24,8 @@ pub enum UsageError {
 struct Printed {
     error: String,
     problems: Vec<Problem>,
+    /// How many problems there are besides these.
+    omitted: usize,
 }
 
 #[derive(Serialize)]
@@ -50,9 +53,10 @@ impl UsageError {
 
     fn printed(self) -> Printed {
         match self {
-            Self::Words(error) => Printed { error, problems: vec![] },
+            Self::Words(error) => Printed { error, problems: vec![], omitted: 0 },
             Self::File(error) => Printed {
                 error: error.to_string(),
+                omitted: error.omitted(),
                 problems: error
                     .problems()
                     .iter()
@@ -87,7 +91,7 @@ impl From<&str> for UsageError {
 
 /// Prints what is wrong with the command line, or the help that it has asked for.
 pub fn of_command_line(error: &clap::Error) -> Exit {
-    let is_json = std::env::args_os().any(|argument| argument == OsStr::new("--json"));
+    let is_json = env::args_os().any(|argument| argument == OsStr::new("--json"));
     if error.use_stderr() && is_json {
         let words = error.render().to_string();
         return UsageError::from(words.trim_start_matches("error: ").trim_end()).print(true);

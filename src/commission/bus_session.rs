@@ -1,40 +1,42 @@
-//! Carries a procedure out on a bus, in the time of a clock.
+//! Runs a procedure on a bus, paced by a clock.
 
 use std::collections::VecDeque;
 
 use takt_rt::{BusPort, Clock, Frame, Nanoseconds, ReceiveBatch};
 
-use super::event::Event;
-use super::procedure::{Failed, Procedure};
+use super::event::ProcedureEvent;
+use super::procedure::{Procedure, ProcedureError};
 use super::report::Report;
 
-/// Between two looks at the bus.
-const TURN_NS: Nanoseconds = 500_000;
-/// The last frames may leave for so long after the end.
-const FAREWELL_NS: Nanoseconds = 10_000_000;
+/// Interval between two polls of the bus.
+const POLL_NS: Nanoseconds = 500_000;
+/// Longest time that the last frames may take to leave after the procedure has ended.
+const DRAIN_NS: Nanoseconds = 10_000_000;
 
-/// What is seen of a procedure at work.
+/// An event of the session, for an observer.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Seen {
-    /// It has something to say.
-    Event(Event),
-    /// A frame that it sends.
+pub enum SessionEvent {
+    /// An event of the procedure.
+    Procedure(ProcedureEvent),
+    /// A frame that the procedure sends.
     Sent(Frame),
-    /// A frame that has arrived.
+    /// A frame that the port received.
     Received(Frame),
 }
 
-/// Runs a procedure to its end. `is_interrupted` is asked in every turn, and tells each request to end once; `see` is
-/// shown everything with the time since the beginning.
+/// Runs a procedure to its end.
+///
+/// `is_interrupted` is called at each poll; each `true` interrupts the procedure once. `see` gets every event
+/// with the time since the beginning.
 pub fn run(
     mut procedure: Procedure,
     port: &mut impl BusPort,
     clock: &mut impl Clock,
     mut is_interrupted: impl FnMut() -> bool,
-    mut see: impl FnMut(Nanoseconds, Seen),
-) -> Result<Report, Failed> {
+    mut see: impl FnMut(Nanoseconds, SessionEvent),
+) -> Result<Report, ProcedureError> {
     let began_ns = clock.now_ns();
-    let mut turn_ns = began_ns;
+    let mut next_poll_ns = began_ns;
     let mut sending = VecDeque::new();
     let mut ended_ns = None;
     loop {
@@ -43,7 +45,7 @@ pub fn run(
         let mut batch = ReceiveBatch::new();
         port.receive(now_ns, &mut batch);
         for received in &batch {
-            see(at_ns, Seen::Received(received.frame));
+            see(at_ns, SessionEvent::Received(received.frame));
             procedure.receive(&received.frame);
         }
         if is_interrupted() {
@@ -51,12 +53,12 @@ pub fn run(
         }
         let mut fresh = vec![];
         procedure.poll(now_ns, &mut |frame| fresh.push(frame));
-        // The steps before the frames that they send.
+        // Report the step events before the frames that those steps send.
         while let Some(event) = procedure.take_event() {
-            see(at_ns, Seen::Event(event));
+            see(at_ns, SessionEvent::Procedure(event));
         }
         for frame in fresh {
-            see(at_ns, Seen::Sent(frame));
+            see(at_ns, SessionEvent::Sent(frame));
             sending.push_back(frame);
         }
         let taken = port.send(now_ns, sending.make_contiguous());
@@ -64,11 +66,11 @@ pub fn run(
         if let Some(outcome) = procedure.outcome() {
             let since_ns = *ended_ns.get_or_insert(now_ns);
             let has_left = sending.is_empty() && port.unconfirmed(now_ns) == 0;
-            if has_left || now_ns.saturating_sub(since_ns) >= FAREWELL_NS {
+            if has_left || now_ns.saturating_sub(since_ns) >= DRAIN_NS {
                 return outcome.clone();
             }
         }
-        turn_ns = turn_ns.saturating_add(TURN_NS).max(now_ns.saturating_add(TURN_NS / 2));
-        clock.wait_until(turn_ns);
+        next_poll_ns = next_poll_ns.saturating_add(POLL_NS).max(now_ns.saturating_add(POLL_NS / 2));
+        clock.wait_until(next_poll_ns);
     }
 }

@@ -1,30 +1,31 @@
-//! The first words with a drive: does it answer, and is it the one that was meant.
+//! First contact with a drive: checks that it answers SDO requests, and that its vendor ID is the expected one.
 
 use takt_rt::{Frame, Id};
 
-use super::conversation::Conversation;
 use super::failure::Failure;
 use super::family::Family;
-use super::subject::Subject;
+use super::sdo_session::SdoSession;
+use super::target::TargetDrive;
 use crate::canopen::nmt::NmtCommand;
 use crate::canopen::objects::{DEVICE_TYPE, VENDOR_ID};
 use crate::canopen::sdo::SdoError;
 use crate::drive::Access;
 
-/// How long to listen for the answer in another protocol.
+/// How long to wait for an answer in the vendor's own protocol.
 const OTHER_PROTOCOL_NS: u64 = 50_000_000;
-/// After a change of its NMT state.
+/// Wait after an NMT command.
 const NMT_PAUSE_NS: u64 = 20_000_000;
 
-/// Waits until the drive answers. A node that is stopped hears no SDO: it is led to pre-operational once.
-pub async fn reach(c: &Conversation, subject: &Subject) -> Result<(), Failure> {
+/// Waits until the drive answers an SDO upload of object 1000. A node in NMT state stopped does not answer SDO, so it
+/// is commanded to pre-operational once.
+pub async fn connect(c: &SdoSession, target: &TargetDrive) -> Result<(), Failure> {
     c.step("contact");
     let began_ns = c.now_ns();
     let mut is_woken = false;
     loop {
         match c.upload(DEVICE_TYPE.address).await? {
             Ok(_) | Err(SdoError::Aborted(_)) => return Ok(()),
-            Err(SdoError::NoReply { .. }) if c.now_ns().saturating_sub(began_ns) < subject.patience_ns => {}
+            Err(SdoError::NoReply { .. }) if c.now_ns().saturating_sub(began_ns) < target.patience_ns => {}
             Err(SdoError::NoReply { .. }) if !is_woken => {
                 is_woken = true;
                 c.step("wake from NMT state stopped");
@@ -32,10 +33,10 @@ pub async fn reach(c: &Conversation, subject: &Subject) -> Result<(), Failure> {
                 c.pause(NMT_PAUSE_NS).await?;
             }
             Err(SdoError::NoReply { .. }) => {
-                c.go_on_with("contact");
-                let other_protocol = other_protocol(c, subject).await?;
+                c.resume_step("contact");
+                let other_protocol = other_protocol(c, target).await?;
                 let reported = c.nmt_state();
-                return Err(Failure::Silent { node: subject.node, reported, other_protocol });
+                return Err(Failure::Silent { node: target.node, reported, other_protocol });
             }
             Err(error) => {
                 return Err(Failure::Transfer { object: DEVICE_TYPE, access: Access::Read, error });
@@ -44,26 +45,26 @@ pub async fn reach(c: &Conversation, subject: &Subject) -> Result<(), Failure> {
     }
 }
 
-/// As [`reach`], and the vendor must be the family's.
-pub async fn reach_family(c: &Conversation, subject: &Subject) -> Result<(), Failure> {
-    reach(c, subject).await?;
+/// As [`connect`], and checks that the vendor ID (object 1018:01) is the family's.
+pub async fn connect_family(c: &SdoSession, target: &TargetDrive) -> Result<(), Failure> {
+    connect(c, target).await?;
     c.step("identity");
     let received = c.read(&VENDOR_ID).await? as u32;
-    let (family, expected) = (subject.family.word(), subject.family.vendor_id());
+    let (family, expected) = (target.family.word(), target.family.vendor_id());
     if received == expected { Ok(()) } else { Err(Failure::OtherDrive { family, expected, received }) }
 }
 
-/// eRob firmware without CANopen speaks the vendor's own protocol: reading the position (0x0002) harms nobody. From
-/// node 64 up its identifiers are those of other nodes' SDO.
-async fn other_protocol(c: &Conversation, subject: &Subject) -> Result<Option<&'static str>, Failure> {
-    let node = subject.node;
-    if subject.family != Family::ErobCanopen || !(1..=63).contains(&node) {
+/// Checks for eRob firmware without CANopen. Such firmware answers the vendor's command 0x0002 (read position), which
+/// changes nothing. Above node ID 63 the request would use the SDO identifiers of other nodes.
+async fn other_protocol(c: &SdoSession, target: &TargetDrive) -> Result<Option<&'static str>, Failure> {
+    let node = target.node;
+    if target.family != Family::ErobCanopen || !(1..=63).contains(&node) {
         return Ok(None);
     }
     let id = |base: u32| Id::base(base + u32::from(node));
     let (Ok(question), Ok(answer)) = (id(0x640), id(0x5C0)) else { return Ok(None) };
     c.send(Frame::of(question, [0x00, 0x02]));
-    let heard = c.listen(OTHER_PROTOCOL_NS).await?;
-    let has_answered = heard.iter().any(|frame| frame.id() == answer);
+    let collected = c.collect_frames(OTHER_PROTOCOL_NS).await?;
+    let has_answered = collected.iter().any(|frame| frame.id() == answer);
     Ok(has_answered.then_some("vendor's custom CAN protocol"))
 }

@@ -1,101 +1,109 @@
-//! The objects of a family as people meet them: names, access, units.
+//! A family's object dictionary for the operator: names, access, units.
 
 use crate::canopen::object::{DataType, Object, ObjectAddress};
 use crate::config::Quantity;
 
 use super::failure::Failure;
 use super::family::Family;
-use super::subject::Subject;
+use super::target::TargetDrive;
 
-/// What may be done with an object.
+/// Access to an object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Permission {
-    /// Reading.
+    /// Read only.
     Read,
-    /// Reading and writing.
+    /// Read and write.
     Write,
 }
 
-/// The unit of an object's number.
+/// The unit of an object's value.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Unit {
-    /// A bare number, a pattern of bits, a choice.
+pub enum ObjectUnit {
+    /// No unit: a plain number, bits, or a choice.
     None,
-    /// Counts of a position.
+    /// A position in counts.
     Position,
-    /// Counts of a distance.
+    /// A distance in counts.
     Distance,
     /// The drive's unit of velocity.
     Velocity,
-    /// A tenth of it.
+    /// A tenth of the drive's unit of velocity.
     VelocityTenth,
     /// The drive's unit of acceleration.
     Acceleration,
     /// Per mille of the rated torque.
     Torque,
-    /// So many of this unit for one of the object's.
+    /// One count is this factor times the named unit.
     Of(f64, &'static str),
 }
 
-/// An object with what is known of it.
+/// An object dictionary entry with its unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Entry {
+pub struct ObjectEntry {
     /// Address, type and name.
     pub object: Object,
-    /// What may be done with it.
+    /// Access to it.
     pub permission: Permission,
     /// Its unit.
-    pub unit: Unit,
+    pub unit: ObjectUnit,
 }
 
-impl Entry {
-    /// An object that can be read.
-    pub const fn read(object: Object, unit: Unit) -> Self {
+impl ObjectEntry {
+    /// A read-only object.
+    pub const fn read(object: Object, unit: ObjectUnit) -> Self {
         Self { object, permission: Permission::Read, unit }
     }
 
-    /// An object that can be read and written.
-    pub const fn write(object: Object, unit: Unit) -> Self {
+    /// A writable object.
+    pub const fn write(object: Object, unit: ObjectUnit) -> Self {
         Self { object, permission: Permission::Write, unit }
     }
 
-    /// A value with its unit, as the joint has it; `None` when the number says everything.
-    pub fn physical(&self, subject: &Subject, value: i64) -> Option<(f64, String)> {
+    /// The value in SI units with its text; `None` for an object without a unit.
+    pub fn physical(&self, target: &TargetDrive, value: i64) -> Option<(f64, String)> {
         let shown = |quantity: Quantity, value: f64| Some((value, quantity.show(value)));
         match self.unit {
-            Unit::Position => shown(subject.position_quantity(), subject.position(value)),
-            Unit::Distance => shown(subject.position_quantity(), value as f64 / subject.scale.resolution()),
-            Unit::Velocity => shown(subject.velocity_quantity(), subject.velocity(value as f64)),
-            Unit::VelocityTenth => shown(subject.velocity_quantity(), subject.velocity(value as f64 / 10.0)),
-            Unit::Acceleration => shown(subject.acceleration_quantity(), subject.acceleration(value as f64)),
-            Unit::Of(factor, unit) => {
+            ObjectUnit::Position => shown(target.position_quantity(), target.position(value)),
+            ObjectUnit::Distance => {
+                shown(target.position_quantity(), value as f64 / target.scale.resolution())
+            }
+            ObjectUnit::Velocity => shown(target.velocity_quantity(), target.velocity(value as f64)),
+            ObjectUnit::VelocityTenth => {
+                shown(target.velocity_quantity(), target.velocity(value as f64 / 10.0))
+            }
+            ObjectUnit::Acceleration => {
+                shown(target.acceleration_quantity(), target.acceleration(value as f64))
+            }
+            ObjectUnit::Of(factor, unit) => {
                 let value = value as f64 * factor;
                 let rounded = (value * 1e6).round() / 1e6;
                 Some((value, format!("{rounded} {unit}")))
             }
-            Unit::Torque => Some((value as f64 / 1000.0, format!("{} % of rated", value as f64 / 10.0))),
-            Unit::None => None,
+            ObjectUnit::Torque => {
+                Some((value as f64 / 1000.0, format!("{} % of rated", value as f64 / 10.0)))
+            }
+            ObjectUnit::None => None,
         }
     }
 
-    /// The number to write for `text`: with a unit a joint value, plain a number of the drive's where the object has no
-    /// unit or `is_raw`.
+    /// Parses the raw number to write. Text with a unit is a joint value. A plain number is a drive value: it needs
+    /// `is_raw`, or an object without a unit.
     ///
     /// # Errors
-    /// [`Failure::Unsuitable`] for what is no value of this object.
-    pub fn parse(&self, subject: &Subject, text: &str, is_raw: bool) -> Result<i64, Failure> {
+    /// [`Failure::Unsuitable`] when the text is not a value of this object.
+    pub fn parse(&self, target: &TargetDrive, text: &str, is_raw: bool) -> Result<i64, Failure> {
         let unsuitable = |reason: String| Failure::Unsuitable(format!("{}: {reason}", self.object));
-        if is_raw || matches!(self.unit, Unit::None) {
+        if is_raw || matches!(self.unit, ObjectUnit::None) {
             return integer(text).ok_or_else(|| unsuitable(format!("`{text}` is no whole number")));
         }
         let quantity = match self.unit {
-            Unit::Position | Unit::Distance => subject.position_quantity(),
-            Unit::Velocity => subject.velocity_quantity(),
-            Unit::Acceleration => subject.acceleration_quantity(),
-            Unit::Torque | Unit::Of(..) | Unit::VelocityTenth | Unit::None => {
+            ObjectUnit::Position | ObjectUnit::Distance => target.position_quantity(),
+            ObjectUnit::Velocity => target.velocity_quantity(),
+            ObjectUnit::Acceleration => target.acceleration_quantity(),
+            ObjectUnit::Torque | ObjectUnit::Of(..) | ObjectUnit::VelocityTenth | ObjectUnit::None => {
                 let reason = match self.unit {
-                    Unit::Torque => "give per mille of the rated torque with `--raw`".to_owned(),
-                    Unit::Of(factor, unit) => {
+                    ObjectUnit::Torque => "give per mille of the rated torque with `--raw`".to_owned(),
+                    ObjectUnit::Of(factor, unit) => {
                         format!("give a number of {factor} {unit} with `--raw`")
                     }
                     _ => String::new(),
@@ -103,46 +111,48 @@ impl Entry {
                 return Err(unsuitable(reason));
             }
         };
-        let value =
-            super::amount::parse(text, quantity, false).map_err(|error| unsuitable(error.to_string()))?;
+        let value = super::command_value::parse(text, quantity, false)
+            .map_err(|error| unsuitable(error.to_string()))?;
         Ok(match self.unit {
-            Unit::Position => subject.position_counts(value),
-            Unit::Distance => subject.distance_counts(value).abs(),
-            Unit::Velocity if self.object.data_type == DataType::U32 => subject.velocity_raw(value).abs(),
-            Unit::Velocity => subject.velocity_raw(value),
-            _ => subject.acceleration_raw(value),
+            ObjectUnit::Position => target.position_counts(value),
+            ObjectUnit::Distance => target.distance_counts(value).abs(),
+            ObjectUnit::Velocity if self.object.data_type == DataType::U32 => {
+                target.velocity_raw(value).abs()
+            }
+            ObjectUnit::Velocity => target.velocity_raw(value),
+            _ => target.acceleration_raw(value),
         })
     }
 }
 
-/// An object as it was asked for.
+/// An object selected by the user.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Choice {
-    /// One that the family's table has.
-    Known(Entry),
-    /// Another one; the type was told or is that of its length.
+pub enum SelectedObject {
+    /// An object in the family's table.
+    Known(ObjectEntry),
+    /// An object that is not in the table; its type is given by the user or guessed from its length.
     Unknown(ObjectAddress),
 }
 
-/// Finds an object by `index:subindex` (hexadecimal, `6064`, `0x6064:00`, `60FBh:01`) or by its name, or the beginning
-/// of it.
+/// Finds an object by `index:subindex` (hexadecimal: `6064`, `0x6064:00`, `60FBh:01`), or by its name or the
+/// beginning of its name.
 ///
 /// # Errors
-/// [`Failure::Unsuitable`] for what is neither, or for a name that several objects begin with.
-pub fn find(family: Family, text: &str) -> Result<Choice, Failure> {
+/// [`Failure::Unsuitable`] when nothing matches, or when several names begin like this.
+pub fn find(family: Family, text: &str) -> Result<SelectedObject, Failure> {
     let entries = family.objects();
     if let Some(address) = address(text) {
         let known = entries.iter().find(|entry| entry.object.address == address);
-        return Ok(known.map_or(Choice::Unknown(address), |entry| Choice::Known(*entry)));
+        return Ok(known.map_or(SelectedObject::Unknown(address), |entry| SelectedObject::Known(*entry)));
     }
     let wanted = plain(text);
-    let named = |is_it: &dyn Fn(&str) -> bool| -> Vec<&Entry> {
+    let named = |is_it: &dyn Fn(&str) -> bool| -> Vec<&ObjectEntry> {
         entries.iter().filter(|entry| is_it(&plain(entry.object.name))).collect()
     };
     let exact = named(&|name| name == wanted);
     let found = if exact.is_empty() { named(&|name| name.starts_with(&wanted)) } else { exact };
     match found.as_slice() {
-        [one] => Ok(Choice::Known(**one)),
+        [one] => Ok(SelectedObject::Known(**one)),
         [] => Err(Failure::Unsuitable(format!(
             "`{text}` is no object: give index:subindex in hexadecimal (6064, 1018:01) or a name, such as \
              `position actual value`"
@@ -170,7 +180,7 @@ fn address(text: &str) -> Option<ObjectAddress> {
     Some(ObjectAddress::new(u16::try_from(index).ok()?, u8::try_from(hexadecimal(subindex)?).ok()?))
 }
 
-/// A whole number, decimal or hexadecimal (`0x…`), with `_` between digits where that helps.
+/// Parses a whole number, decimal or hexadecimal (`0x…`), with optional `_` between digits.
 pub fn integer(text: &str) -> Option<i64> {
     let text = text.trim().replace('_', "").replace('−', "-");
     let (is_negative, digits) = text.strip_prefix('-').map_or((false, text.as_str()), |rest| (true, rest));
@@ -182,7 +192,7 @@ pub fn integer(text: &str) -> Option<i64> {
     Some(if is_negative { -value } else { value })
 }
 
-/// The type with this name.
+/// The data type with this name.
 pub fn data_type(name: &str) -> Option<DataType> {
     Some(match name.to_lowercase().as_str() {
         "u8" | "unsigned8" => DataType::U8,
@@ -201,8 +211,8 @@ mod tests {
 
     fn address_of(text: &str) -> Option<ObjectAddress> {
         match find(Family::ErobCanopen, text) {
-            Ok(Choice::Known(entry)) => Some(entry.object.address),
-            Ok(Choice::Unknown(address)) => Some(address),
+            Ok(SelectedObject::Known(entry)) => Some(entry.object.address),
+            Ok(SelectedObject::Unknown(address)) => Some(address),
             Err(_) => None,
         }
     }
@@ -218,7 +228,7 @@ mod tests {
     }
 
     #[test]
-    fn objects_are_found_by_their_name_or_the_beginning_of_it() {
+    fn objects_are_found_by_their_name_or_its_beginning() {
         assert_eq!(address_of("position actual value"), Some(ObjectAddress::new(0x6064, 0)));
         assert_eq!(address_of("Position-Actual"), Some(ObjectAddress::new(0x6064, 0)));
         let ambiguous = find(Family::ErobCanopen, "profile").unwrap_err().to_string();

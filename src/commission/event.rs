@@ -1,35 +1,35 @@
-//! What a procedure has to say while it runs.
+//! Events of a running procedure.
 
 use takt_rt::Nanoseconds;
 
-/// Something to tell people.
+/// An event for the operator.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Event {
+pub enum ProcedureEvent {
     /// A step has begun.
     Step(&'static str),
-    /// Something worth knowing.
+    /// A note.
     Note(String),
-    /// Where the axis is and how it fares.
-    Reading(Reading),
+    /// A reading of the axis.
+    Reading(AxisReading),
 }
 
-/// What was read of an axis in one go. Positions and velocities in rad (m) and seconds.
+/// One reading of an axis, in SI units: rad (m) and seconds.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Reading {
-    /// When, on the clock of the procedure.
+pub struct AxisReading {
+    /// Time of the reading on the procedure's clock.
     pub at_ns: Nanoseconds,
     /// Position: rad (m).
     pub position: f64,
-    /// What the drive calls its position.
+    /// Position in counts, as the drive reports it.
     pub position_counts: i64,
     /// Velocity: rad/s (m/s).
     pub velocity: f64,
-    /// Torque in N·m (N), where the drive tells.
+    /// Torque in N·m (N), if the drive reports it.
     pub torque: Option<f64>,
-    /// Motor current in A, where the drive tells.
+    /// Motor current in A, if the drive reports it.
     pub current_a: Option<f64>,
     /// The statusword.
     pub statusword: u16,
-    /// What the statusword says, in a word or two.
+    /// The state in the statusword, as a name.
     pub state: &'static str,
 }

@@ -1,4 +1,4 @@
-//! Why a procedure could not be done.
+//! Why a procedure failed.
 
 use takt_rt::Nanoseconds;
 
@@ -8,20 +8,20 @@ use crate::canopen::sdo::{AbortCode, SdoError};
 use crate::config::Quantity;
 use crate::drive::Access;
 
-/// Why a procedure has ended before its end.
+/// Why a procedure failed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Failure {
-    /// It was asked to end; the axis was stopped in control and disabled.
+    /// It was interrupted; the axis was stopped and disabled.
     #[error("interrupted")]
     Interrupted,
-    /// Nothing answers under this node number.
+    /// No drive answers under this node ID.
     #[error("node {node} does not answer{}{}", nmt_words(*.reported), other_words(*.other_protocol))]
     Silent {
-        /// The node.
+        /// The node ID.
         node: u8,
-        /// The last state that it has reported.
+        /// The last NMT state that it has reported.
         reported: Option<NmtState>,
-        /// Another protocol in which it did answer.
+        /// Another protocol that did get an answer.
         other_protocol: Option<&'static str>,
     },
     /// A transfer failed.
@@ -29,12 +29,12 @@ pub enum Failure {
     Transfer {
         /// The object.
         object: Object,
-        /// What was being done.
+        /// The attempted access.
         access: Access,
         /// Why it failed.
         error: SdoError,
     },
-    /// Reading a text or bytes failed.
+    /// AxisReading a text or bytes failed.
     #[error("reading {object}: {error}")]
     TextTransfer {
         /// The object.
@@ -42,7 +42,7 @@ pub enum Failure {
         /// Why it failed.
         error: SdoError,
     },
-    /// An object holds no number of this length.
+    /// An object's data has the wrong length for a number.
     #[error("reading {object}: expected {} bytes, got {received}", object.data_type.length())]
     Length {
         /// The object.
@@ -58,41 +58,41 @@ pub enum Failure {
         /// The value.
         value: i64,
     },
-    /// The drive accepted a value and has another one.
+    /// The drive accepted a value but holds another one.
     #[error("{object}: {} was written and accepted, {} is read back", object.show(*.written), object.show(*.received))]
     NotKept {
         /// The object.
         object: Object,
-        /// What was written.
+        /// The value that was written.
         written: i64,
-        /// What is there.
+        /// The value that was read back.
         received: i64,
     },
-    /// Something did not become as wanted in time.
-    #[error("{what} did not come within {} ms; {object} is {}", waited_ns / 1_000_000, object.show(*.last))]
+    /// A condition was not met in time.
+    #[error("timeout waiting for {what} after {} ms; {object} is {}", waited_ns / 1_000_000, object.show(*.last))]
     NotInTime {
         /// The object.
         object: Object,
         /// What was waited for.
         what: &'static str,
-        /// Its last value.
+        /// The value at the end.
         last: i64,
-        /// How long was waited.
+        /// How long the procedure waited.
         waited_ns: Nanoseconds,
     },
-    /// Another drive than expected.
+    /// Another drive than expected answers.
     #[error(
-        "another drive answers: its vendor id (1018:01) is 0x{received:08X}, a {family} has 0x{expected:08X}"
+        "another drive answers: its vendor ID (1018:01) is 0x{received:08X}, a {family} has 0x{expected:08X}"
     )]
     OtherDrive {
-        /// What was expected.
+        /// The expected family.
         family: &'static str,
-        /// Its vendor id.
+        /// The family's vendor ID.
         expected: u32,
-        /// The one that was read.
+        /// The vendor ID that was read.
         received: u32,
     },
-    /// The drive is in a fault, and nothing moves before that is cleared.
+    /// The drive is in a fault, which must be cleared first.
     #[error("the drive is in a fault: {what}{}", advice_words(.advice))]
     Faulted {
         /// The fault.
@@ -100,7 +100,7 @@ pub enum Failure {
         /// What to do about it.
         advice: Option<&'static str>,
     },
-    /// The fault is still there after it was cleared.
+    /// The fault did not go away.
     #[error("the fault persists: {what}{}", advice_words(.advice))]
     FaultPersists {
         /// The fault.
@@ -108,10 +108,10 @@ pub enum Failure {
         /// What to do about it.
         advice: Option<&'static str>,
     },
-    /// The drive has torque where it must have none.
+    /// The drive is enabled but must not be.
     #[error("the drive is enabled: disable it first")]
     Enabled,
-    /// The drive has lost torque on its own.
+    /// The drive left the enabled state by itself.
     #[error("the drive is no longer enabled (statusword 0x{statusword:04X})")]
     Disabled {
         /// Its statusword.
@@ -120,7 +120,7 @@ pub enum Failure {
     /// A value lies outside the limits of the axis.
     #[error("{} lies outside the limits of the axis, {} to {}", quantity.show(*.value), quantity.show(*.low), quantity.show(*.high))]
     OutsideLimits {
-        /// What it is.
+        /// The quantity.
         quantity: Quantity,
         /// The value in SI units.
         value: f64,
@@ -129,19 +129,19 @@ pub enum Failure {
         /// The highest permitted.
         high: f64,
     },
-    /// The axis has come to its limit while it moved, and was stopped.
+    /// The axis reached a limit during the motion and was stopped.
     #[error("stopped at the limit of the axis: {} of {} to {}", quantity.show(*.value), quantity.show(*.low), quantity.show(*.high))]
     AtLimit {
-        /// What it is.
+        /// The quantity.
         quantity: Quantity,
-        /// Where it was stopped, in SI units.
+        /// The value at the limit, in SI units.
         value: f64,
         /// The lowest permitted.
         low: f64,
         /// The highest permitted.
         high: f64,
     },
-    /// A joint value is meant, but the axis' units are not known.
+    /// A value is required here, because no default is known.
     #[error("{what} must be given: {why}")]
     Missing {
         /// What is missing.
@@ -149,35 +149,35 @@ pub enum Failure {
         /// Why it is needed.
         why: &'static str,
     },
-    /// The axis moves although it should not.
+    /// The axis moved while it was being enabled.
     #[error("the axis has moved by {counts} counts while it was being enabled")]
     Jumped {
-        /// How far.
+        /// How far, in counts.
         counts: i64,
     },
-    /// This drive cannot do that.
+    /// This drive does not support the task.
     #[error("{what}; {instead}")]
     Unsupported {
-        /// What it cannot.
+        /// What it does not support.
         what: String,
-        /// What can be done.
+        /// What to do instead.
         instead: String,
     },
-    /// Nothing was done because it was not agreed to.
+    /// The task was not done, because the user did not confirm it.
     #[error("{consequence}; add {option} to do it")]
     NeedsConsent {
-        /// What would happen.
+        /// What the task would cause.
         consequence: &'static str,
-        /// The option that agrees.
+        /// The option that confirms it.
         option: &'static str,
     },
-    /// A homing run failed.
+    /// Homing failed.
     #[error("homing failed: {0}")]
     Homing(&'static str),
-    /// Not what must be written.
+    /// The request itself is not valid.
     #[error("{0}")]
     Unsuitable(String),
-    /// The drive has confirmed one thing and does another.
+    /// The drive confirmed a value but behaves otherwise.
     #[error("{0}")]
     Contradicted(String),
 }
@@ -197,7 +197,7 @@ fn advice_words(advice: &Option<&'static str>) -> String {
 }
 
 impl Failure {
-    /// Whether the drive says that it does not have the object.
+    /// Whether the drive reports that the object does not exist.
     pub fn means_absent(&self) -> bool {
         match self {
             Self::Transfer { error: SdoError::Aborted(code), .. } => code.means_absent(),
@@ -205,7 +205,7 @@ impl Failure {
         }
     }
 
-    /// Whether nothing was done, because what was asked for cannot be or may not be.
+    /// Whether the request was refused before anything was changed.
     pub fn is_refusal(&self) -> bool {
         matches!(
             self,
@@ -218,16 +218,16 @@ impl Failure {
         )
     }
 
-    /// What to try.
+    /// The remedy.
     pub fn advice(&self) -> Option<&'static str> {
         match self {
             Self::Silent { other_protocol: Some(_), .. } => Some("load CANopen firmware into the drive"),
             Self::Silent { .. } => Some(
-                "check the node number (`--node`), the drive's supply, the wiring and the termination of the bus, and \
+                "check the node ID (`--node`), the drive's supply, the wiring and the termination of the bus, and \
                  its bit rate",
             ),
             Self::Transfer { error: SdoError::NoReply { .. }, .. } => {
-                Some("the drive has fallen silent: check its supply, the wiring and the bus load")
+                Some("the drive no longer answers: check its supply, the wiring and the bus load")
             }
             Self::Transfer { error: SdoError::Aborted(AbortCode::PresentDeviceState), .. } => {
                 Some("the drive refuses this in its present state: disable it, or clear its fault")
@@ -236,7 +236,7 @@ impl Failure {
                 Some("the drive has no such object")
             }
             Self::Faulted { advice: None, .. } => Some("clear it with `clear-fault`"),
-            Self::OtherDrive { .. } => Some("check the node number and the family"),
+            Self::OtherDrive { .. } => Some("check the node ID and the family"),
             _ => None,
         }
     }

@@ -1,13 +1,13 @@
-//! What commissioning knows of the families of drives.
+//! The properties of each drive family for commissioning.
 
 use takt_rt::Frame;
 
-use super::dictionary::Entry;
-use super::line::Manners;
-use super::subject::Subject;
+use super::dictionary::ObjectEntry;
+use super::session_state::SdoQuirks;
+use super::target::TargetDrive;
 use super::{erob_canopen, yz_aim};
 use crate::canopen::object::Object;
-use crate::canopen::sdo::Timing;
+use crate::canopen::sdo::SdoTiming;
 
 pub use crate::config::DriveFamily as Family;
 
@@ -15,7 +15,7 @@ impl Family {
     /// Every family.
     pub const ALL: [Self; 2] = [Self::ErobCanopen, Self::YzAim];
 
-    /// Object 1018:1.
+    /// Vendor ID, object 1018:1.
     pub const fn vendor_id(self) -> u32 {
         match self {
             Self::ErobCanopen => 0x5A65_726F,
@@ -23,32 +23,32 @@ impl Family {
         }
     }
 
-    /// How its SDO server wants to be spoken to. A YZ-AIM drops requests that overlap or come too soon.
-    pub const fn manners(self) -> Manners {
-        let timing = Timing { reply_timeout_ns: 100_000_000, retries: 2 };
+    /// Timing and quirks of the SDO server. A YZ-AIM drops requests that overlap or follow too soon.
+    pub const fn sdo_quirks(self) -> SdoQuirks {
+        let timing = SdoTiming { reply_timeout_ns: 100_000_000, retries: 2 };
         match self {
-            Self::ErobCanopen => Manners { timing, gap_ns: 0, has_short_replies: false },
-            Self::YzAim => Manners { timing, gap_ns: 2_000_000, has_short_replies: true },
+            Self::ErobCanopen => SdoQuirks { timing, gap_ns: 0, has_short_replies: false },
+            Self::YzAim => SdoQuirks { timing, gap_ns: 2_000_000, has_short_replies: true },
         }
     }
 
-    /// The objects that a drive of this family has.
-    pub const fn objects(self) -> &'static [Entry] {
+    /// The object dictionary of this family.
+    pub const fn objects(self) -> &'static [ObjectEntry] {
         match self {
             Self::ErobCanopen => erob_canopen::OBJECTS,
             Self::YzAim => yz_aim::OBJECTS,
         }
     }
 
-    /// What a PDO of the drive holds, where that is known.
-    pub fn process_data_words(self, subject: &Subject, frame: &Frame) -> Option<String> {
+    /// Describes the contents of a PDO, if known.
+    pub fn process_data_words(self, target: &TargetDrive, frame: &Frame) -> Option<String> {
         match self {
-            Self::ErobCanopen => erob_canopen::process_data_words(subject, frame),
-            Self::YzAim => yz_aim::process_data_words(subject, frame),
+            Self::ErobCanopen => erob_canopen::process_data_words(target, frame),
+            Self::YzAim => yz_aim::process_data_words(target, frame),
         }
     }
 
-    /// What a value of an object means, in words, where it has more meaning than its number.
+    /// The meaning of an object's value in words, if it has one beyond its number.
     pub fn meaning(self, object: &Object, value: i64) -> Option<String> {
         match self {
             Self::ErobCanopen => erob_canopen::meaning(object, value),

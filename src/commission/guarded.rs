@@ -1,16 +1,16 @@
-//! Whatever happens to a motion, its axis is brought to rest and disabled.
+//! Brings an axis to standstill and disables it after every motion, whatever the result.
 
 use serde_json::Value;
 
-use super::conversation::Conversation;
 use super::failure::Failure;
 use super::report::Report;
-use super::subject::Subject;
+use super::sdo_session::SdoSession;
+use super::target::TargetDrive;
 
-/// Does `work`; then, unless that succeeded and torque is to stay on, does `rest`. A second request to end cuts `rest`
-/// short and does `cut` at once.
+/// Runs `work`, then `rest`. `rest` is left out when `work` succeeded and the axis stays enabled. A further
+/// interruption cuts `rest` short and runs `cut`, which takes the torque off at once.
 pub async fn guarded(
-    c: &Conversation,
+    c: &SdoSession,
     keeps_enabled: bool,
     work: impl Future<Output = Result<Report, Failure>>,
     rest: impl Future<Output = Result<(), Failure>>,
@@ -34,20 +34,20 @@ pub async fn guarded(
         rested => rested,
     };
     match (done, rested) {
-        (Err(failure), Err(trouble)) => {
-            c.note(format!("the axis may not be at rest: {trouble}; use the emergency stop"));
+        (Err(failure), Err(stop_failure)) => {
+            c.note(format!("the axis may still be moving: {stop_failure}; use the emergency stop"));
             Err(failure)
         }
         (Err(failure), Ok(())) => Err(failure),
-        (Ok(_), Err(trouble)) => Err(trouble),
+        (Ok(_), Err(stop_failure)) => Err(stop_failure),
         (Ok(report), Ok(())) => Ok(report),
     }
 }
 
-/// Adds where the axis has ended: to the report, or as a note to what went wrong.
-pub fn tell_end(
-    c: &Conversation,
-    subject: &Subject,
+/// Adds the final position to the report, or notes it when the procedure failed.
+pub fn add_final_position(
+    c: &SdoSession,
+    target: &TargetDrive,
     ended: Result<Report, Failure>,
     summary: Result<Report, Failure>,
 ) -> Result<Report, Failure> {
@@ -60,7 +60,7 @@ pub fn tell_end(
         (Err(failure), Ok(summary)) => {
             let position = summary.get("position").and_then(Value::as_f64).unwrap_or_default();
             let state = summary.get("state").and_then(Value::as_str).unwrap_or_default();
-            c.note(format!("the axis is at {}, {state}", subject.position_quantity().show(position)));
+            c.note(format!("the axis is at {}, {state}", target.position_quantity().show(position)));
             Err(failure)
         }
         (Err(failure), Err(_)) => Err(failure),

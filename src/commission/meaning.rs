@@ -1,46 +1,46 @@
-//! What a frame means, in words: for whoever watches a procedure at work.
+//! Describes frames in words, for the trace of a procedure.
 
 use takt_rt::Frame;
 
-use super::dictionary::Entry;
+use super::dictionary::ObjectEntry;
 use super::family::Family;
-use super::subject::Subject;
+use super::target::TargetDrive;
 use crate::canopen::emcy::Emergency;
 use crate::canopen::nmt::{ErrorControl, NmtCommand, NmtState, NmtTarget};
 use crate::canopen::object::{DataType, Object, ObjectAddress};
-use crate::canopen::sdo::{Request, Response};
+use crate::canopen::sdo::{SdoRequest, SdoResponse};
 
-/// The meaning of a frame on the bus of `subject`.
-pub fn of(subject: &Subject, frame: &Frame) -> String {
+/// Describes a frame on the bus of `target`.
+pub fn of(target: &TargetDrive, frame: &Frame) -> String {
     if let Some((command, target)) = NmtCommand::decode(frame) {
         return nmt(command, target);
     }
-    if let Some((node, request)) = Request::decode(frame) {
-        return at_node(subject, node, requested(subject, &request));
+    if let Some((node, request)) = SdoRequest::decode(frame) {
+        return at_node(target, node, requested(target, &request));
     }
     let whole = Frame::of(frame.id(), frame.first_word().to_le_bytes());
-    if let Some((node, response)) = Response::decode(&whole).filter(|_| !frame.payload().is_empty()) {
-        return at_node(subject, node, answered(subject, &response));
+    if let Some((node, response)) = SdoResponse::decode(&whole).filter(|_| !frame.payload().is_empty()) {
+        return at_node(target, node, answered(target, &response));
     }
     if let Some(message) = ErrorControl::decode(frame) {
         let words = match message.state {
             NmtState::BootUp => "boot-up".to_owned(),
-            // This drive's heartbeat says so when it has an alarm.
-            NmtState::Stopped if subject.family == Family::YzAim && message.node == subject.node => {
+            // A YZ-AIM with an alarm sends the state "stopped" in its heartbeat.
+            NmtState::Stopped if target.family == Family::YzAim && message.node == target.node => {
                 "heartbeat: alarm".to_owned()
             }
             state => format!("heartbeat: {state}"),
         };
-        return at_node(subject, message.node, words);
+        return at_node(target, message.node, words);
     }
     if let Some(emergency) = Emergency::decode(frame) {
-        return at_node(subject, emergency.node, format!("emergency: {emergency}"));
+        return at_node(target, emergency.node, format!("emergency: {emergency}"));
     }
-    other(subject, frame)
+    other(target, frame)
 }
 
-fn at_node(subject: &Subject, node: u8, words: String) -> String {
-    if node == subject.node { words } else { format!("node {node}: {words}") }
+fn at_node(target: &TargetDrive, node: u8, words: String) -> String {
+    if node == target.node { words } else { format!("node {node}: {words}") }
 }
 
 fn nmt(command: NmtCommand, target: NmtTarget) -> String {
@@ -57,57 +57,57 @@ fn nmt(command: NmtCommand, target: NmtTarget) -> String {
     }
 }
 
-fn requested(subject: &Subject, request: &Request) -> String {
+fn requested(target: &TargetDrive, request: &SdoRequest) -> String {
     match request {
-        Request::Upload { object } => format!("read {}", named(subject, *object)),
-        Request::DownloadExpedited { object, data } => {
-            format!("set {} to {}", named(subject, *object), value(subject, *object, data.bytes()))
+        SdoRequest::Upload { object } => format!("read {}", named(target, *object)),
+        SdoRequest::DownloadExpedited { object, data } => {
+            format!("set {} to {}", named(target, *object), value(target, *object, data.bytes()))
         }
-        Request::Abort { object, code } => format!("give up {}: {code}", named(subject, *object)),
-        Request::UploadSegment { .. } => "next segment".to_owned(),
+        SdoRequest::Abort { object, code } => format!("abort {}: {code}", named(target, *object)),
+        SdoRequest::UploadSegment { .. } => "next segment".to_owned(),
         other => format!("{other:?}"),
     }
 }
 
-fn answered(subject: &Subject, response: &Response) -> String {
+fn answered(target: &TargetDrive, response: &SdoResponse) -> String {
     match response {
-        Response::UploadExpedited { object, data } => {
-            format!("{} is {}", named(subject, *object), value(subject, *object, data.bytes()))
+        SdoResponse::UploadExpedited { object, data } => {
+            format!("{} is {}", named(target, *object), value(target, *object, data.bytes()))
         }
-        Response::DownloadAccepted { object } => format!("{} accepted", named(subject, *object)),
-        Response::Abort { object, code } => format!("{} refused: {code}", named(subject, *object)),
-        Response::UploadSegmented { object, .. } => {
-            format!("{} follows in segments", named(subject, *object))
+        SdoResponse::DownloadAccepted { object } => format!("{} accepted", named(target, *object)),
+        SdoResponse::Abort { object, code } => format!("{} refused: {code}", named(target, *object)),
+        SdoResponse::UploadSegmented { object, .. } => {
+            format!("{} follows in segments", named(target, *object))
         }
-        Response::UploadSegment { data, .. } => format!("segment {:02X?}", data.bytes()),
+        SdoResponse::UploadSegment { data, .. } => format!("segment {:02X?}", data.bytes()),
         other => format!("{other:?}"),
     }
 }
 
-fn entry(subject: &Subject, address: ObjectAddress) -> Option<&'static Entry> {
-    subject.family.objects().iter().find(|entry| entry.object.address == address)
+fn entry(target: &TargetDrive, address: ObjectAddress) -> Option<&'static ObjectEntry> {
+    target.family.objects().iter().find(|entry| entry.object.address == address)
 }
 
-fn named(subject: &Subject, address: ObjectAddress) -> String {
-    entry(subject, address).map_or_else(|| address.to_string(), |entry| entry.object.to_string())
+fn named(target: &TargetDrive, address: ObjectAddress) -> String {
+    entry(target, address).map_or_else(|| address.to_string(), |entry| entry.object.to_string())
 }
 
-fn value(subject: &Subject, address: ObjectAddress, bytes: &[u8]) -> String {
-    let entry = entry(subject, address);
-    let object = entry.map_or_else(|| untold(address, bytes.len()), |entry| entry.object);
-    // What the drive calls otherwise than the table is shown by its bytes.
+fn value(target: &TargetDrive, address: ObjectAddress, bytes: &[u8]) -> String {
+    let entry = entry(target, address);
+    let object = entry.map_or_else(|| unnamed_object(address, bytes.len()), |entry| entry.object);
+    // A value of another length than in the table is shown as bytes.
     let Some(number) = object.data_type.decode(bytes) else { return format!("{bytes:02X?}") };
     let shown = object.show(number);
-    if let Some(meaning) = subject.family.meaning(&object, number) {
+    if let Some(meaning) = target.family.meaning(&object, number) {
         return format!("{shown}: {meaning}");
     }
-    match entry.and_then(|entry| entry.physical(subject, number)) {
+    match entry.and_then(|entry| entry.physical(target, number)) {
         Some((_, physical)) => format!("{shown} = {physical}"),
         None => shown,
     }
 }
 
-fn untold(address: ObjectAddress, length: usize) -> Object {
+fn unnamed_object(address: ObjectAddress, length: usize) -> Object {
     let data_type = match length {
         1 => DataType::U8,
         2 => DataType::U16,
@@ -116,7 +116,7 @@ fn untold(address: ObjectAddress, length: usize) -> Object {
     Object { address, data_type, name: "object" }
 }
 
-fn other(subject: &Subject, frame: &Frame) -> String {
+fn other(target: &TargetDrive, frame: &Frame) -> String {
     let id = frame.id().value();
     let node = id & 0x7F;
     let kind = match id & 0x780 {
@@ -130,10 +130,10 @@ fn other(subject: &Subject, frame: &Frame) -> String {
         0x300 => "RPDO2",
         0x400 => "RPDO3",
         0x500 => "RPDO4",
-        0x580 if node < 64 && frame.payload().len() < 8 => "answer in the vendor's own protocol",
-        0x640..=0x67F => "question in the vendor's own protocol",
-        _ => "not known",
+        0x580 if node < 64 && frame.payload().len() < 8 => "reply in the vendor's own protocol",
+        0x640..=0x67F => "request in the vendor's own protocol",
+        _ => "unknown",
     };
-    let words = subject.family.process_data_words(subject, frame).unwrap_or_else(|| kind.to_owned());
-    if node == u32::from(subject.node) { words } else { format!("node {node}: {kind}") }
+    let words = target.family.process_data_words(target, frame).unwrap_or_else(|| kind.to_owned());
+    if node == u32::from(target.node) { words } else { format!("node {node}: {kind}") }
 }

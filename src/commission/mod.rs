@@ -1,22 +1,21 @@
-//! Commissioning one drive: what the vendors' host tools do with it, as procedures without input and output.
+//! Commissioning of one drive: the tasks of the vendors' host tools, as procedures without input and output.
 //!
 //! ```text
-//! request ── procedure ── the present and frames in, frames, events and an outcome out
-//!               │
-//!          conversation ── transfers, pauses, conditions to await
-//!               │
-//!      erob_canopen, yz_aim ── what each family does: objects, alarms, the way to every motion
-//!               │
-//!       subject, pace ── the joint's units and limits
+//! task ── procedure ── takes the time and frames; returns frames, events and an outcome
+//!            │
+//!       sdo_session ── transfers, pauses and conditions to await
+//!            │
+//!   erob_canopen, yz_aim ── one folder a family: objects, alarms, motions
+//!            │
+//!     target, motion_profile ── units and limits of the axis
 //! ```
 //!
-//! [`bus_session::run`] carries a procedure out on a bus, [`meaning`] tells what its frames mean. Devices that have no
-//! node number yet are set up by [`layer_settings`].
+//! [`bus_session::run`] runs a procedure on a bus, and [`meaning`] describes its frames. Devices without a node ID are
+//! set up by [`layer_settings`].
 
-pub mod amount;
 pub mod bus_session;
+pub mod command_value;
 mod contact;
-mod conversation;
 pub mod dictionary;
 pub mod erob_canopen;
 mod event;
@@ -24,41 +23,42 @@ mod failure;
 mod family;
 mod guarded;
 pub mod layer_settings;
-mod line;
-mod looking;
 pub mod meaning;
+mod motion_profile;
 mod objects;
-mod pace;
+mod polling;
 mod procedure;
 mod report;
-mod request;
 mod scan;
-mod subject;
+mod sdo_session;
+mod session_state;
+mod target;
+mod task;
 pub mod yz_aim;
 
-pub use conversation::Conversation;
-pub use event::{Event, Reading};
+pub use event::{AxisReading, ProcedureEvent};
 pub use failure::Failure;
 pub use family::Family;
-pub use line::Manners;
-pub use pace::{GENTLE, Pace, Profile};
-pub use procedure::{Failed, Procedure};
-pub use report::{Finding, Report};
-pub use request::{Course, ReadObject, Request};
-pub use subject::{Amount, Subject};
+pub use motion_profile::{DEFAULT_SHARE, DriveProfile, MotionProfile};
+pub use procedure::{Procedure, ProcedureError};
+pub use report::{Report, ReportItem};
+pub use sdo_session::SdoSession;
+pub use session_state::SdoQuirks;
+pub use target::{CommandValue, TargetDrive};
+pub use task::{MoveKind, ReadObject, Task};
 
-/// The procedure that does what is asked for with this drive.
-pub fn procedure(subject: Subject, request: Request) -> Procedure {
-    let (node, manners) = (subject.node, subject.family.manners());
-    Procedure::new(node, manners, move |conversation| async move {
-        match request {
-            Request::Read { objects } => objects::read(&conversation, &subject, &objects).await,
-            Request::Write { object, value, entry } => {
-                objects::write(&conversation, &subject, object, value, entry).await
+/// The procedure that carries out a task with this drive.
+pub fn procedure(target: TargetDrive, task: Task) -> Procedure {
+    let (node, sdo_quirks) = (target.node, target.family.sdo_quirks());
+    Procedure::new(node, sdo_quirks, move |session| async move {
+        match task {
+            Task::Read { objects } => objects::read(&session, &target, &objects).await,
+            Task::Write { object, value, entry } => {
+                objects::write(&session, &target, object, value, entry).await
             }
-            request => match subject.family {
-                Family::ErobCanopen => erob_canopen::carry_out(&conversation, &subject, request).await,
-                Family::YzAim => yz_aim::carry_out(&conversation, &subject, request).await,
+            task => match target.family {
+                Family::ErobCanopen => erob_canopen::carry_out(&session, &target, task).await,
+                Family::YzAim => yz_aim::carry_out(&session, &target, task).await,
             },
         }
     })

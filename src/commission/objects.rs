@@ -1,20 +1,20 @@
-//! Reading and writing any object.
+//! Reads and writes any object.
 
 use serde_json::json;
 
 use super::contact;
-use super::conversation::{Conversation, number};
-use super::dictionary::{Entry, Permission};
+use super::dictionary::{ObjectEntry, Permission};
 use super::failure::Failure;
 use super::report::Report;
-use super::request::ReadObject;
-use super::subject::Subject;
+use super::sdo_session::{SdoSession, number};
+use super::target::TargetDrive;
+use super::task::ReadObject;
 use crate::canopen::object::Object;
 use crate::canopen::sdo::Uploaded;
 
-/// Reads objects, one after the other.
-pub async fn read(c: &Conversation, subject: &Subject, objects: &[ReadObject]) -> Result<Report, Failure> {
-    contact::reach(c, subject).await?;
+/// Reads objects in order.
+pub async fn read(c: &SdoSession, target: &TargetDrive, objects: &[ReadObject]) -> Result<Report, Failure> {
+    contact::connect(c, target).await?;
     c.step("read");
     let mut values = vec![];
     let mut report = Report::new();
@@ -35,15 +35,15 @@ pub async fn read(c: &Conversation, subject: &Subject, objects: &[ReadObject]) -
             report.add("", &address.to_string(), serde_json::Value::Null, text);
             continue;
         };
-        // A type that was told must be that of what comes; the table's is only a guess of the length.
+        // A type given by the user must match the data. The table's type only suggests the length.
         let value = match wanted.data_type {
             Some(data_type) => uploaded
                 .number(data_type)
                 .ok_or(Failure::Length { object, received: uploaded.bytes.len() })?,
             None => number(&object, &uploaded)?,
         };
-        let physical = wanted.entry.and_then(|entry| entry.physical(subject, value));
-        let meaning = subject.family.meaning(&object, value);
+        let physical = wanted.entry.and_then(|entry| entry.physical(target, value));
+        let meaning = target.family.meaning(&object, value);
         let mut text = object.show(value);
         if let Some((_, shown)) = &physical {
             text = format!("{text} = {shown}");
@@ -62,17 +62,17 @@ pub async fn read(c: &Conversation, subject: &Subject, objects: &[ReadObject]) -
 
 /// Writes an object and reads it back.
 pub async fn write(
-    c: &Conversation,
-    subject: &Subject,
+    c: &SdoSession,
+    target: &TargetDrive,
     object: Object,
     value: i64,
-    entry: Option<Entry>,
+    entry: Option<ObjectEntry>,
 ) -> Result<Report, Failure> {
     if entry.is_some_and(|entry| entry.permission == Permission::Read) {
         return Err(Failure::Unsuitable(format!("{object} can only be read")));
     }
     object.data_type.encode(value).ok_or(Failure::DoesNotFit { object, value })?;
-    contact::reach(c, subject).await?;
+    contact::connect(c, target).await?;
     c.step("write");
     c.write(&object, value).await?;
     c.step("read back");
@@ -81,9 +81,9 @@ pub async fn write(
     report.add("object", "object", object.address.to_string(), object.to_string());
     report.add("written", "written", value, object.show(value));
     if let Some(back) = back {
-        let meaning = subject.family.meaning(&object, back);
+        let meaning = target.family.meaning(&object, back);
         let mut text = object.show(back);
-        if let Some((_, shown)) = entry.and_then(|entry| entry.physical(subject, back)) {
+        if let Some((_, shown)) = entry.and_then(|entry| entry.physical(target, back)) {
             text = format!("{text} = {shown}");
         }
         if let Some(meaning) = meaning {
@@ -91,7 +91,7 @@ pub async fn write(
         }
         report.add("read_back", "read back", back, text);
         if back != value {
-            c.note("the drive has another value than was written: it may be a command, or out of the drive's range");
+            c.note("the drive holds another value than was written: it may be a command object, or limit the value");
         }
     }
     Ok(report)

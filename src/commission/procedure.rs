@@ -1,4 +1,4 @@
-//! A procedure on one drive: time and frames go in, frames and events come out, and in the end an outcome.
+//! A procedure on one drive: it takes time and frames, and returns frames, events and an outcome.
 
 use std::fmt;
 use std::future::Future;
@@ -7,27 +7,27 @@ use std::task::{Context, Poll, Waker};
 
 use takt_rt::{Frame, Nanoseconds};
 
-use super::conversation::Conversation;
-use super::event::Event;
+use super::event::ProcedureEvent;
 use super::failure::Failure;
-use super::line::Manners;
 use super::report::Report;
+use super::sdo_session::SdoSession;
+use super::session_state::SdoQuirks;
 
-/// Why a procedure has ended before its end, and in which step.
+/// Why a procedure failed, and in which step.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{step}: {failure}")]
-pub struct Failed {
-    /// The step.
+pub struct ProcedureError {
+    /// The failed step.
     pub step: &'static str,
-    /// Why.
+    /// The reason.
     pub failure: Failure,
 }
 
-/// A procedure under way.
+/// A running procedure.
 pub struct Procedure {
-    conversation: Conversation,
+    session: SdoSession,
     work: Pin<Box<dyn Future<Output = Result<Report, Failure>>>>,
-    outcome: Option<Result<Report, Failed>>,
+    outcome: Option<Result<Report, ProcedureError>>,
     began_ns: Option<Nanoseconds>,
 }
 
@@ -38,64 +38,64 @@ impl fmt::Debug for Procedure {
 }
 
 impl Procedure {
-    /// A procedure on the node that has not begun.
-    pub fn new<W>(node: u8, manners: Manners, work: impl FnOnce(Conversation) -> W) -> Self
+    /// A procedure that has not begun, for the drive with this node ID.
+    pub fn new<W>(node: u8, sdo_quirks: SdoQuirks, work: impl FnOnce(SdoSession) -> W) -> Self
     where
         W: Future<Output = Result<Report, Failure>> + 'static,
     {
-        let conversation = Conversation::new(node, manners);
-        let work = Box::pin(work(conversation.clone()));
-        Self { conversation, work, outcome: None, began_ns: None }
+        let session = SdoSession::new(node, sdo_quirks);
+        let work = Box::pin(work(session.clone()));
+        Self { session, work, outcome: None, began_ns: None }
     }
 
-    /// Lets time pass and hands out what is to be sent. The procedure's own clock begins at the first call.
+    /// Advances the procedure to `now_ns` and sends its frames. The procedure's clock begins at the first call.
     pub fn poll(&mut self, now_ns: Nanoseconds, send: &mut impl FnMut(Frame)) {
         let began_ns = *self.began_ns.get_or_insert(now_ns);
-        self.conversation.line_mut().now_ns = now_ns.saturating_sub(began_ns);
+        self.session.state_mut().now_ns = now_ns.saturating_sub(began_ns);
         self.send_requests(send);
         if self.outcome.is_none() {
             let mut context = Context::from_waker(Waker::noop());
             if let Poll::Ready(outcome) = self.work.as_mut().poll(&mut context) {
-                let step = self.conversation.line().failing_step.unwrap_or(self.conversation.line().step);
-                self.outcome = Some(outcome.map_err(|failure| Failed { step, failure }));
+                let step = self.session.state().failing_step.unwrap_or(self.session.state().step);
+                self.outcome = Some(outcome.map_err(|failure| ProcedureError { step, failure }));
             }
         }
         self.send_requests(send);
-        let mut line = self.conversation.line_mut();
-        if let Some(heartbeat) = line.heartbeat() {
+        let mut state = self.session.state_mut();
+        if let Some(heartbeat) = state.heartbeat() {
             send(heartbeat);
         }
     }
 
     fn send_requests(&self, send: &mut impl FnMut(Frame)) {
-        let mut line = self.conversation.line_mut();
-        while let Some(frame) = line.outgoing.pop_front() {
+        let mut state = self.session.state_mut();
+        while let Some(frame) = state.outgoing.pop_front() {
             send(frame);
         }
-        let now_ns = line.now_ns;
-        while let Some(frame) = line.client.poll(now_ns) {
+        let now_ns = state.now_ns;
+        while let Some(frame) = state.client.poll(now_ns) {
             send(frame);
         }
     }
 
-    /// Takes a frame that was received on the drive's bus.
+    /// Passes a frame received on the drive's bus.
     pub fn receive(&mut self, frame: &Frame) {
-        self.conversation.line_mut().receive(frame);
+        self.session.state_mut().receive(frame);
     }
 
-    /// Asks it to end: an axis that moves is stopped in control and disabled. RequestEnvelope again, it is disabled at once.
+    /// Interrupts the procedure: a moving axis is stopped, then disabled. A second call disables it at once.
     pub fn interrupt(&mut self) {
-        let mut line = self.conversation.line_mut();
-        line.interruptions = line.interruptions.saturating_add(1);
+        let mut state = self.session.state_mut();
+        state.interruptions = state.interruptions.saturating_add(1);
     }
 
-    /// The oldest event that was not taken.
-    pub fn take_event(&mut self) -> Option<Event> {
-        self.conversation.line_mut().events.pop_front()
+    /// Removes and returns the oldest event.
+    pub fn take_event(&mut self) -> Option<ProcedureEvent> {
+        self.session.state_mut().events.pop_front()
     }
 
-    /// How it has ended; `None` while it is under way.
-    pub fn outcome(&self) -> Option<&Result<Report, Failed>> {
+    /// The result; `None` while the procedure runs.
+    pub fn outcome(&self) -> Option<&Result<Report, ProcedureError>> {
         self.outcome.as_ref()
     }
 }

@@ -1,14 +1,14 @@
-//! What a procedure has found or done: an ordered list of named values, for people and for programs.
+//! The result of a procedure: an ordered list of named values, for people and for programs.
 
 use serde::ser::{Serialize, SerializeMap, Serializer};
 use serde_json::Value;
 
-/// One finding.
+/// One named value.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Finding {
-    /// Its name for programs, with the unit.
+pub struct ReportItem {
+    /// The key for programs, with the unit.
     pub key: &'static str,
-    /// Its name for people.
+    /// The label for people.
     pub label: String,
     /// The value for programs.
     pub value: Value,
@@ -16,46 +16,46 @@ pub struct Finding {
     pub text: String,
 }
 
-/// What was found, in the order in which people want to read it. Serialises as one map.
+/// Named values in reading order. It serialises as one map.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Report {
-    findings: Vec<Finding>,
-    /// What programs get in place of the findings.
+    items: Vec<ReportItem>,
+    /// Replaces the items when the report is serialised.
     value: Option<(&'static str, Value)>,
 }
 
 impl Report {
-    /// Nothing yet.
+    /// An empty report.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Adds a finding.
+    /// Adds a value.
     pub fn add(&mut self, key: &'static str, label: &str, value: impl Into<Value>, text: impl Into<String>) {
-        let finding = Finding { key, label: label.to_owned(), value: value.into(), text: text.into() };
-        self.findings.push(finding);
+        let item = ReportItem { key, label: label.to_owned(), value: value.into(), text: text.into() };
+        self.items.push(item);
     }
 
-    /// The same for people, and one value under this key for programs.
+    /// Serialises as one key and value instead of the items; people still see the items.
     #[must_use]
     pub fn under(mut self, key: &'static str, value: Value) -> Self {
         self.value = Some((key, value));
         self
     }
 
-    /// The findings.
-    pub fn findings(&self) -> &[Finding] {
-        &self.findings
+    /// The values in order.
+    pub fn items(&self) -> &[ReportItem] {
+        &self.items
     }
 
     /// The value with this key.
     pub fn get(&self, key: &str) -> Option<&Value> {
-        self.findings.iter().find(|finding| finding.key == key).map(|finding| &finding.value)
+        self.items.iter().find(|item| item.key == key).map(|item| &item.value)
     }
 
-    /// Adds the findings of another report.
+    /// Adds the values of another report.
     pub fn append(&mut self, other: Self) {
-        self.findings.extend(other.findings);
+        self.items.extend(other.items);
     }
 }
 
@@ -66,8 +66,8 @@ impl Serialize for Report {
             map.serialize_entry(key, value)?;
             return map.end();
         }
-        for finding in &self.findings {
-            map.serialize_entry(finding.key, &finding.value)?;
+        for item in &self.items {
+            map.serialize_entry(item.key, &item.value)?;
         }
         map.end()
     }

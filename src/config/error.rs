@@ -1,79 +1,153 @@
-//! What is wrong with a configuration: every problem with its place in the file and what to do about it.
+//! What is wrong with a configuration: every problem, its place, and what to do about it.
 
 use std::fmt;
 use std::ops::Range;
 
-use miette::{Diagnostic, LabeledSpan, NamedSource, SourceCode};
+use miette::{Diagnostic, LabeledSpan, SourceCode};
 use thiserror::Error;
 
 use crate::canopen::dcf::DcfError;
 
 use super::problem_kind::ProblemKind;
-use crate::printable::printable;
+use super::source_view::SourceView;
+use crate::printable::{letter_start, printable};
 
-/// A configuration that cannot be used, with all of its problems in the order of the file. `miette` shows each of
-/// them with its line.
+/// The most problems that are shown of one configuration; the rest are counted. Whoever gets more of them has given another
+/// file, or will see the rest after the first are mended.
+const SHOWN_AT_MOST: usize = 20;
+
+/// The most bytes of a file that are underlined.
+const LONGEST_SPAN: usize = 200;
+
+/// A configuration that cannot be used, with its first twenty problems in the order of the file. `miette` shows each of them
+/// with its line.
 #[derive(Debug)]
 pub struct ConfigError(Box<Inner>);
 
 #[derive(Debug)]
 struct Inner {
-    source: NamedSource<String>,
-    text: String,
+    name: String,
+    /// The text of the file; `None` where the configuration was made in code or could not be read.
+    source: Option<SourceView>,
+    lines: LineStarts,
     problems: Vec<Problem>,
+    omitted: usize,
 }
 
 impl ConfigError {
-    pub(super) fn new(source_name: &str, text: &str, mut problems: Vec<Problem>) -> Self {
-        problems.sort_by_key(|problem| problem.span.as_ref().map(|span| (span.start, span.end)));
-        let mut seen: Vec<Problem> = Vec::with_capacity(problems.len());
-        for problem in problems {
-            if !seen.contains(&problem) {
-                seen.push(problem);
+    /// A file, or another text, that is wrong.
+    pub(super) fn of_text(name: &str, text: &str, problems: Vec<Problem>) -> Self {
+        let name = printable(name);
+        let source = Some(SourceView::new(&name, printable(text)));
+        let shorten = |problem: &mut Problem| {
+            if let Location::Text { span, .. } = &mut problem.location {
+                let end = span.end.min(span.start.saturating_add(LONGEST_SPAN));
+                span.end = letter_start(text, end).max(span.start);
             }
+        };
+        let mut error = Self::new(name, source, LineStarts::of(text), problems);
+        error.0.problems.iter_mut().for_each(shorten);
+        error
+    }
+
+    /// A file that cannot be read.
+    pub(super) fn unreadable(name: &str, reason: String) -> Self {
+        let kind = ProblemKind::Unreadable { reason };
+        let problems = vec![Problem { kind, location: Location::Nowhere }];
+        Self::new(printable(name), None, LineStarts::of(""), problems)
+    }
+
+    /// A configuration, by its own name, with fields that are wrong.
+    pub(super) fn of_fields(name: &str, problems: Vec<Problem>) -> Self {
+        let name = format!("the configuration {:?}", printable(name));
+        Self::new(name, None, LineStarts::of(""), problems)
+    }
+
+    fn new(name: String, source: Option<SourceView>, lines: LineStarts, mut problems: Vec<Problem>) -> Self {
+        problems.sort_by_key(|problem| problem.span().map(|span| (span.start, span.end)));
+        // The defaults of axes are read once for each axis, with the same problems.
+        let mut shown: Vec<Problem> = Vec::with_capacity(SHOWN_AT_MOST);
+        let mut omitted = 0;
+        for problem in problems {
+            let at = problem.span();
+            let mut of_place = shown.iter().rev().take_while(|earlier| at.is_none() || earlier.span() == at);
+            if of_place.any(|earlier| *earlier == problem) {
+                continue;
+            }
+            if shown.len() < SHOWN_AT_MOST { shown.push(problem) } else { omitted += 1 }
         }
-        let source = NamedSource::new(source_name, printable(text));
-        Self(Box::new(Inner { source, text: text.to_owned(), problems: seen }))
+        Self(Box::new(Inner { name, source, lines, problems: shown, omitted }))
     }
 
     /// The text of a file.
     pub(crate) fn text_of(source_name: &str, bytes: Vec<u8>) -> Result<String, Self> {
         String::from_utf8(bytes).map_err(|error| {
             let at = error.utf8_error().valid_up_to();
-            // What stands in the place of the byte is as long as that many bytes.
+            // The character that replaces the byte is longer than the byte.
             let span = at..at + char::REPLACEMENT_CHARACTER.len_utf8();
-            let problem = Problem { kind: ProblemKind::NotText, span: Some(span), first_line: None };
-            Self::new(source_name, &String::from_utf8_lossy(error.as_bytes()), vec![problem])
+            let location = Location::Text { span, first_line: None };
+            let problem = Problem { kind: ProblemKind::NotText, location };
+            Self::of_text(source_name, &String::from_utf8_lossy(error.as_bytes()), vec![problem])
         })
     }
 
-    /// The problems in the order of the file; never empty.
+    /// The first twenty problems in the order of the file; never empty.
     pub fn problems(&self) -> &[Problem] {
         &self.0.problems
     }
 
-    /// The name of the file (or whatever the text came from).
-    pub fn source_name(&self) -> &str {
-        self.0.source.name()
+    /// How many problems there are besides [`ConfigError::problems`].
+    pub fn omitted(&self) -> usize {
+        self.0.omitted
     }
 
-    /// The line of a problem, counted from 1; `None` where the file could not even be read.
+    /// The name of the file, or of the configuration that was made in code.
+    pub fn source_name(&self) -> &str {
+        &self.0.name
+    }
+
+    /// The line of a problem, counted from 1; `None` where the configuration is no text.
     pub fn line(&self, problem: &Problem) -> Option<usize> {
-        Some(line_of(&self.0.text, problem.span.as_ref()?.start))
+        Some(self.0.lines.line_of(problem.span()?.start))
     }
 }
 
-/// The line in which a byte stands, counted from 1.
-pub(super) fn line_of(text: &str, at: usize) -> usize {
-    text.bytes().take(at).filter(|byte| *byte == b'\n').count() + 1
+/// Where each line of a text begins.
+#[derive(Clone, Debug)]
+pub(super) struct LineStarts(Vec<usize>);
+
+impl LineStarts {
+    pub fn of(text: &str) -> Self {
+        let ends = text.bytes().enumerate().filter(|(_, byte)| *byte == b'\n');
+        Self(std::iter::once(0).chain(ends.map(|(at, _)| at + 1)).collect())
+    }
+
+    /// Where a line begins, counted from 0.
+    pub fn start_of(&self, line: usize) -> usize {
+        self.0.get(line).copied().unwrap_or(0)
+    }
+
+    /// The line in which a byte is, counted from 1.
+    pub fn line_of(&self, at: usize) -> usize {
+        self.0.partition_point(|start| *start <= at)
+    }
 }
 
 impl fmt::Display for ConfigError {
+    /// One line. The problems of fields are part of it, since they have no lines that a report could show.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.problems() {
-            [_] => write!(f, "{} cannot be used", self.source_name()),
-            problems => write!(f, "{} cannot be used: {} problems", self.source_name(), problems.len()),
+        write!(f, "{} cannot be used", self.source_name())?;
+        match (self.problems().len() + self.omitted(), self.omitted()) {
+            (1, _) => {}
+            (count, 0) => write!(f, ": {count} problems")?,
+            (count, _) => write!(f, ": {count} problems, of which the first {SHOWN_AT_MOST} follow")?,
         }
+        let fields =
+            self.problems().iter().filter(|problem| matches!(problem.location, Location::Field { .. }));
+        for problem in fields {
+            write!(f, "; {problem} ({})", problem.kind.help())?;
+        }
+        Ok(())
     }
 }
 
@@ -81,7 +155,10 @@ impl std::error::Error for ConfigError {}
 
 impl Diagnostic for ConfigError {
     fn source_code(&self) -> Option<&dyn SourceCode> {
-        Some(&self.0.source)
+        self.0.source.as_ref().map(|source| {
+            let source: &dyn SourceCode = source;
+            source
+        })
     }
 
     fn related<'a>(&'a self) -> Option<Box<dyn Iterator<Item = &'a dyn Diagnostic> + 'a>> {
@@ -94,14 +171,51 @@ impl Diagnostic for ConfigError {
 
 /// One problem.
 #[derive(Clone, Debug, PartialEq, Error)]
-#[error("{kind}")]
+#[error("{location}{kind}")]
 pub struct Problem {
     /// What is wrong.
     pub kind: ProblemKind,
-    /// The bytes of the file that are wrong; `None` where the file could not even be read.
-    pub span: Option<Range<usize>>,
-    /// The line that this one contradicts, counted from 1.
-    pub first_line: Option<usize>,
+    /// Where it is wrong.
+    pub location: Location,
+}
+
+/// Where a problem is.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Location {
+    /// The file could not even be read.
+    Nowhere,
+    /// In the text of a file.
+    Text {
+        /// The bytes that are wrong.
+        span: Range<usize>,
+        /// The line that this one contradicts, counted from 1.
+        first_line: Option<usize>,
+    },
+    /// In a field of a configuration that was made or changed in code.
+    Field {
+        /// The element of a list that has the field, as in `axes[2] "elbow"`; empty for a field of no list.
+        of: String,
+    },
+}
+
+impl fmt::Display for Location {
+    /// What goes before the words of a problem. A line of a file is shown beside them.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Field { of } if !of.is_empty() => write!(f, "{of}: "),
+            _ => Ok(()),
+        }
+    }
+}
+
+impl Problem {
+    /// The bytes of the file that are wrong, the first 200 of them; `None` where there is no file, or it could not be read.
+    pub fn span(&self) -> Option<Range<usize>> {
+        match &self.location {
+            Location::Text { span, .. } => Some(span.clone()),
+            Location::Nowhere | Location::Field { .. } => None,
+        }
+    }
 }
 
 impl Diagnostic for Problem {
@@ -117,10 +231,11 @@ impl Diagnostic for Problem {
     }
 
     fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
-        let text = match self.first_line {
+        let Location::Text { span, first_line } = &self.location else { return None };
+        let text = match first_line {
             Some(line) => format!("{}; first in line {line}", self.kind.label()),
             None => self.kind.label().to_owned(),
         };
-        Some(Box::new(self.span.iter().map(move |span| LabeledSpan::at(span.clone(), text.clone()))))
+        Some(Box::new(std::iter::once(LabeledSpan::at(span.clone(), text))))
     }
 }

@@ -6,6 +6,7 @@ use std::str::FromStr;
 use thiserror::Error;
 
 use super::model::Interface;
+use crate::printable::excerpt;
 
 /// The longest name of a network interface of Linux (IFNAMSIZ less the final zero).
 const LONGEST_NAME: usize = 15;
@@ -19,7 +20,7 @@ impl FromStr for Interface {
             return Ok(Self::Simulated);
         }
         if let Some(device) = text.strip_prefix("slcan:") {
-            return Err(InterfaceError::SerialLine { device: device.to_owned() });
+            return Err(InterfaceError::SerialLine { device: excerpt(device) });
         }
         let is_sound = (1..=LONGEST_NAME).contains(&text.len())
             && !matches!(text, "." | "..")
@@ -27,7 +28,7 @@ impl FromStr for Interface {
         if is_sound {
             Ok(Self::SocketCan(text.to_owned()))
         } else {
-            Err(InterfaceError::Name { name: text.to_owned() })
+            Err(InterfaceError::Name { name: excerpt(text) })
         }
     }
 }

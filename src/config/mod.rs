@@ -4,18 +4,24 @@
 //! [`ConfigError`] with every problem of the file, each with its line and a way out. Quantities are bare numbers in SI
 //! units or texts with a unit (`"137 deg/s"`). `configs/reference.toml` is the description of the format.
 
+pub(crate) mod bounds;
 pub(crate) mod defaults;
 mod error;
 mod interface;
 mod model;
 mod problem_kind;
+mod quantities;
 mod quantity;
+mod ranges;
 pub(crate) mod read;
+mod rules;
+mod source_view;
 mod spelling;
+pub(crate) mod spot;
 
 use std::path::Path;
 
-pub use error::{ConfigError, Problem};
+pub use error::{ConfigError, Location, Problem};
 pub use interface::InterfaceError;
 pub use model::*;
 pub use problem_kind::ProblemKind;
@@ -32,10 +38,7 @@ impl Config {
         let name = printable_path(path);
         match crate::text_file::read(path) {
             Ok(bytes) => Self::parse(&name, &ConfigError::text_of(&name, bytes)?),
-            Err(error) => {
-                let kind = ProblemKind::Unreadable { reason: error.to_string() };
-                Err(ConfigError::new(&name, "", vec![Problem { kind, span: None, first_line: None }]))
-            }
+            Err(error) => Err(ConfigError::unreadable(&name, error.to_string())),
         }
     }
 

@@ -1,7 +1,8 @@
-//! The checked configuration as plain data. Whoever holds a [`Config`] that was read from a file may rely on every
-//! value being possible. The defaults that are named here hold where the file says nothing; they are constants of
+//! The configuration as plain data. Every value of a [`Config`] that was read from a file is possible. One that was changed in
+//! code is checked by [`Config::validate`]. The defaults that are named here hold where the file says nothing; they are constants of
 //! `defaults.rs`, and `configs/reference.toml` shows them as a file.
 
+use std::f64::consts::TAU;
 use std::path::PathBuf;
 
 use serde::Serialize;
@@ -50,8 +51,7 @@ pub struct Cycle {
     /// Period of SYNC and set-points; 250 µs to 100 ms in whole microseconds. Default 1 ms.
     pub period_ns: u64,
     /// When the command phase begins, after the start of the slot; 5 % to 95 % of the period. Default 55 %. A file
-    /// may leave it to [`automatic_command_phase`](crate::bus::schedule::automatic_command_phase); what that finds
-    /// stands here.
+    /// may leave it to [`automatic_command_phase`](crate::bus::schedule::automatic_command_phase); this is what that finds.
     pub command_phase_ns: u64,
 }
 
@@ -66,14 +66,14 @@ impl Config {
 /// When missed slots are too many: a bucket that every missed slot fills by one and that loses one in a while.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MissedSlots {
-    /// Slots in the bucket from which on it is told. Default 10.
+    /// Slots in the bucket from which on the operator is warned. Default 10.
     pub warning: u32,
     /// Slots from which on no stream is begun. Default 50.
     pub degraded: u32,
     /// Slots from which on the group stops, unless all of its buses are simulated. Default 250.
     pub stop: u32,
-    /// The time in which the bucket loses one. Default 10 ms.
-    pub leak_ns: u64,
+    /// Used slots after which the bucket loses one. Default 10.
+    pub leak_slots: u32,
 }
 
 /// What is asked of the operating system for the real-time thread.
@@ -95,7 +95,7 @@ pub struct Realtime {
 /// This controller as a CANopen node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Master {
-    /// Its own node number, under which its heartbeat is sent. Default 127.
+    /// Its own node ID, under which its heartbeat is sent. Default 127.
     pub node: u8,
     /// Period of its heartbeat in whole milliseconds; `None` sends none. Default 100 ms.
     pub heartbeat_ns: Option<u64>,
@@ -147,7 +147,7 @@ pub struct Axis {
     pub name: String,
     /// Its bus, an index into [`Config::buses`].
     pub bus: usize,
-    /// Its CANopen node number, 1 to 127.
+    /// Its CANopen node ID, 1 to 127.
     pub node: u8,
     /// The family of the drive.
     pub drive: DriveFamily,
@@ -169,6 +169,9 @@ pub struct Axis {
     pub following_error: FollowingError,
     /// How far from the joint a stream of set-points may begin: rad (m). Default 0.02 rad or 0.002 m.
     pub start_tolerance: f64,
+    /// How far from its target a program may leave the joint and still be finished: rad (m). Default 0.01 rad or 1 mm; in CST
+    /// 1.5 · coulomb_friction / stiffness where that is more, since static friction holds a joint off its target there.
+    pub target_tolerance: f64,
     /// What is done with set-points of a stream that break a limit. Default: the group stops.
     pub on_violation: OnViolation,
     /// Cycles without feedback before the group stops. Default 5.
@@ -204,6 +207,16 @@ pub enum DriveFamily {
     ErobCanopen,
     /// YZ-AIM integrated servo, CANopen edition.
     YzAim,
+}
+
+impl Travel {
+    /// How far the joint gets in one turn: rad (m).
+    pub const fn per_turn(self) -> f64 {
+        match self {
+            Self::Rotary => TAU,
+            Self::Linear { lead_m } => lead_m,
+        }
+    }
 }
 
 impl DriveFamily {

@@ -36,6 +36,16 @@ pub enum ProblemKind {
         /// The keys that mean something in this place.
         known: Vec<&'static str>,
     },
+    /// A key that means nothing beside another one.
+    #[error("`{key}` means nothing beside `{beside}`")]
+    Ignored {
+        /// The key.
+        key: String,
+        /// The other one.
+        beside: &'static str,
+        /// When it means something.
+        belongs: &'static str,
+    },
     /// A key that is needed and not there.
     #[error("`{key}` is missing")]
     MissingKey {
@@ -104,7 +114,7 @@ pub enum ProblemKind {
         /// What it may be.
         allowed: String,
     },
-    /// A word that is not one of those that may stand here.
+    /// A word that is not one of those that are allowed here.
     #[error("`{key}` cannot be {given:?}")]
     UnknownChoice {
         /// The key.
@@ -113,7 +123,7 @@ pub enum ProblemKind {
         given: String,
         /// What was probably meant.
         nearest: Option<&'static str>,
-        /// The words that may stand here.
+        /// The words that are allowed here.
         choices: Vec<&'static str>,
     },
     /// A name that is empty or has characters that names cannot have.
@@ -125,11 +135,11 @@ pub enum ProblemKind {
         given: String,
     },
     /// The same thing twice in a list.
-    #[error("{given:?} stands twice in `{key}`")]
+    #[error("{given:?} is in `{key}` twice")]
     Repeated {
         /// The key of the list.
         key: String,
-        /// What stands twice.
+        /// What is there twice.
         given: String,
     },
     /// Two buses or two axes of the same name.
@@ -140,8 +150,8 @@ pub enum ProblemKind {
         /// The name.
         name: String,
     },
-    /// Two nodes of the same number on a bus.
-    #[error("node {node} is already taken on the bus {bus:?}")]
+    /// Two nodes with the same node ID on a bus.
+    #[error("the node ID {node} is already taken on the bus {bus:?}")]
     DuplicateNode {
         /// The bus.
         bus: String,
@@ -248,12 +258,14 @@ impl ProblemKind {
             }
             Self::NotText => "a configuration is TOML in UTF-8; is this another file?".into(),
             Self::Syntax { .. } => {
-                "the TOML rules are at https://toml.io; texts and units stand in quotes".into()
+                "the rules of TOML are at https://toml.io; texts, and numbers with units, are in quotes"
+                    .into()
             }
             Self::UnknownKey { nearest: Some(nearest), .. } => format!("did you mean `{nearest}`?"),
             Self::UnknownKey { nearest: None, known, .. } => {
-                format!("what may stand here: {}", known.join(", "))
+                format!("allowed here: {}", known.join(", "))
             }
+            Self::Ignored { belongs, .. } => (*belongs).into(),
             Self::MissingKey { says, .. } => (*says).into(),
             Self::WrongType { expected, .. } => format!("write {expected}"),
             Self::NotAQuantity { quantity, .. } | Self::WrongUnit { quantity, .. } => {
@@ -273,11 +285,11 @@ impl ProblemKind {
             }
             Self::UnknownChoice { nearest: None, choices, .. } => show_choices(choices),
             Self::BadName { .. } => "a name has 1 to 32 letters, digits or -_.".into(),
-            Self::Repeated { .. } => "leave one of them out".into(),
+            Self::Repeated { .. } => "remove one of them".into(),
             Self::DuplicateName { what, .. } => format!("give each {what} a name of its own"),
             Self::DuplicateNode { .. } => {
-                "give each node of a bus a number of its own, 1 to 127; the controller \
-                                           itself is [master] node on every bus"
+                "give each node of a bus a node ID of its own, 1 to 127; on every bus, \
+                                           [master] node is the ID of the controller"
                     .into()
             }
             Self::DuplicateInterface { .. } => "give each bus an interface of its own".into(),
@@ -306,6 +318,7 @@ impl ProblemKind {
         match self {
             Self::NotText | Self::Syntax { .. } => "here",
             Self::UnknownKey { .. } => "not known here",
+            Self::Ignored { .. } => "means nothing here",
             Self::MissingKey { .. } => "missing in here",
             Self::WrongType { .. } => "wrong type",
             Self::UnknownUnit { .. } | Self::WrongUnit { .. } => "wrong unit",
@@ -342,7 +355,7 @@ fn show_quantity(quantity: Quantity) -> String {
 
 fn show_choices(choices: &[&str]) -> String {
     let quoted: Vec<_> = choices.iter().map(|choice| format!("{choice:?}")).collect();
-    format!("what may stand here: {}", quoted.join(", "))
+    format!("allowed here: {}", quoted.join(", "))
 }
 
 fn article(noun: &str) -> &'static str {

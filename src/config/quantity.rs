@@ -1,4 +1,4 @@
-//! Numbers with units, as people write them: `"137 deg/s"`, `"500 us"`, `"87 Nm"`, `"2.5 kg m^2"`.
+//! Numbers with units, as they are written in a file: `"137 deg/s"`, `"500 us"`, `"87 Nm"`, `"2.5 kg m^2"`.
 //!
 //! A unit is a product of known symbols with small exponents. It is reduced to a factor and a [`Dimension`], and the
 //! dimension is compared with the one that the key asks for, so a velocity can never be taken for a position.
@@ -44,7 +44,7 @@ pub struct Quantity {
     pub name: &'static str,
     /// Its SI unit, in which bare numbers are taken; empty for a bare ratio.
     pub unit: &'static str,
-    /// How a person might write one.
+    /// An example as it is written in a file.
     pub example: &'static str,
     dimension: Dimension,
 }

@@ -1,4 +1,4 @@
-//! What somebody probably meant.
+//! The known word that is most like a misspelt one.
 
 /// The candidate most like a word, if any is like it at all.
 pub fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {

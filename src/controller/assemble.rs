@@ -1,45 +1,29 @@
-//! From the checked configuration to what the real-time thread works with.
-
-use std::f64::consts::TAU;
+//! Makes the engine and the slot plan from a configuration.
 
 use takt_rt::{
     AxisParameters, BusParameters, CommandPdo, Engine, EngineParameters, FeedbackSince, Heartbeat, Id,
-    MAX_AXES, MAX_BUSES, Mapping, MappingError, Pdo, Scale, ScaleError, ScaleParameters, SetUpError,
-    SlotPlan, TimingLadder,
+    Mapping, MappingError, Pdo, Scale, ScaleError, ScaleParameters, SetUpError, SlotPlan, TimingLadder,
 };
 
-use crate::config::{Axis, Config, DriveFamily, Interface, Travel};
+use crate::config::{Axis, Config, ConfigError, DriveFamily, Interface};
 use crate::drive::{PdoPlan, ProcessData, yz_aim};
 
 /// How long the drives may take from the first controlword to operation enabled.
 const ENABLE_TIMEOUT_NS: u64 = 5_000_000_000;
 /// How long a drive may take to acknowledge a target in profile position.
 const ACKNOWLEDGE_TIMEOUT_NS: u64 = 500_000_000;
-/// How long set-points may fail to get onto the wire before the group stops.
+/// If set-points are not transmitted for longer than this, the group stops.
 const NOT_TRANSMITTED_NS: u64 = 4_000_000;
 /// The most service frames on a bus in one cycle before set-points are sent.
 const SERVICE_FRAMES_PASSIVE: usize = 6;
 
-/// What a configuration asks for that the real-time thread cannot do.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+/// Why the real-time thread cannot execute a configuration.
+#[derive(Debug, thiserror::Error)]
 pub enum AssembleError {
-    /// More axes than one controller moves.
-    #[error("{given} axes: one controller moves at most {limit}")]
-    TooManyAxes {
-        /// How many there are.
-        given: usize,
-        /// How many there may be.
-        limit: usize,
-    },
-    /// More buses than one controller owns.
-    #[error("{given} buses: one controller owns at most {limit}")]
-    TooManyBuses {
-        /// How many there are.
-        given: usize,
-        /// How many there may be.
-        limit: usize,
-    },
-    /// A mapping that cannot be.
+    /// A value that cannot be: see [`Config::validate`].
+    #[error(transparent)]
+    Configuration(#[from] ConfigError),
+    /// An impossible mapping.
     #[error("axis {axis}: its process data cannot be mapped ({error:?})")]
     Mapping {
         /// The axis.
@@ -47,7 +31,7 @@ pub enum AssembleError {
         /// Why.
         error: MappingError,
     },
-    /// A scale that cannot be.
+    /// An impossible scale.
     #[error("axis {axis}: its units cannot be converted ({error:?})")]
     Scale {
         /// The axis.
@@ -55,7 +39,7 @@ pub enum AssembleError {
         /// Why.
         error: ScaleError,
     },
-    /// Refused by the engine.
+    /// The engine rejects its parameters.
     #[error("the cycle cannot be set up ({0:?})")]
     Engine(SetUpError),
 }
@@ -68,15 +52,9 @@ pub fn slot_plan(config: &Config) -> SlotPlan {
 /// The engine of a configuration.
 ///
 /// # Errors
-/// What the configuration asks for that cannot be done. A configuration that passed its checks has none of it.
+/// See [`AssembleError`]. A configuration that has passed its checks gives no error.
 pub fn engine(config: &Config) -> Result<Engine, AssembleError> {
-    let (axes, buses) = (config.axes.len(), config.buses.len());
-    if axes > MAX_AXES {
-        return Err(AssembleError::TooManyAxes { given: axes, limit: MAX_AXES });
-    }
-    if buses > MAX_BUSES {
-        return Err(AssembleError::TooManyBuses { given: buses, limit: MAX_BUSES });
-    }
+    config.validate()?;
     let period_ns = config.cycle.period_ns;
     let cycles = |ns: u64| u32::try_from(ns.div_ceil(period_ns.max(1))).unwrap_or(u32::MAX);
     let axes = config
@@ -91,7 +69,7 @@ pub fn engine(config: &Config) -> Result<Engine, AssembleError> {
         service_frames_active: bus.service_frames_per_cycle,
         service_frames_passive: SERVICE_FRAMES_PASSIVE.max(bus.service_frames_per_cycle),
     });
-    let bears_missed_slots = !config.simulation.stops_for_missed_slots
+    let tolerates_missed_slots = !config.simulation.stops_for_missed_slots
         && config.buses.iter().all(|bus| bus.interface == Interface::Simulated);
     let heartbeat = config.master.heartbeat_ns.map(|ns| Heartbeat {
         node: config.master.node,
@@ -110,8 +88,8 @@ pub fn engine(config: &Config) -> Result<Engine, AssembleError> {
         timing: TimingLadder {
             warning: config.missed_slots.warning,
             degraded: config.missed_slots.degraded,
-            unfit: if bears_missed_slots { u32::MAX } else { config.missed_slots.stop },
-            leak_cycles: cycles(config.missed_slots.leak_ns).max(1),
+            unfit: if tolerates_missed_slots { u32::MAX } else { config.missed_slots.stop },
+            leak_slots: config.missed_slots.leak_slots,
         },
         acknowledge_timeout_cycles: cycles(ACKNOWLEDGE_TIMEOUT_NS),
     })
@@ -155,7 +133,7 @@ fn axis_parameters(
         limits: axis.limits,
         start_tolerance: axis.start_tolerance,
         on_violation: axis.on_violation,
-        // A heartbeat that comes a little late is not one that is lost.
+        // A heartbeat that is a little late is not lost.
         heartbeat_timeout_cycles: axis.heartbeat_ns.map(|period_ns| cycles(3 * period_ns)),
         following_error_limit: axis.following_error.limit,
         following_error_cycles: cycles(axis.following_error.time_ns),
@@ -166,7 +144,7 @@ fn axis_parameters(
 /// Transmission types up to this one answer SYNC (CiA 301, 7.5.2.36).
 const LAST_SYNCHRONOUS: u8 = 240;
 
-/// What the feedback of a drive answers.
+/// Since when the feedback of a drive is expected.
 fn feedback_since(feedback: &[PdoPlan]) -> FeedbackSince {
     if feedback.iter().all(|pdo| pdo.transmission_type <= LAST_SYNCHRONOUS) {
         FeedbackSince::Sync
@@ -175,20 +153,17 @@ fn feedback_since(feedback: &[PdoPlan]) -> FeedbackSince {
     }
 }
 
-/// SI to the drive units of an axis. The rated torque is the configured one until the drive has been asked.
+/// The conversion of SI units to the drive units of an axis. The rated torque is the configured one until the drive has
+/// reported its own.
 ///
 /// # Errors
-/// A parameter that is not possible.
+/// An impossible parameter.
 pub fn scale(axis: &Axis) -> Result<Scale, ScaleError> {
-    let travel_per_turn = match axis.travel {
-        Travel::Rotary => TAU,
-        Travel::Linear { lead_m } => lead_m,
-    };
     Scale::new(ScaleParameters {
         counts_per_turn: axis.counts_per_turn,
         velocity_units_per_turn: axis.drive.velocity_units_per_turn(axis.counts_per_turn),
         gear_ratio: axis.gear_ratio,
-        travel_per_turn,
+        travel_per_turn: axis.travel.per_turn(),
         reversed: axis.reversed,
         zero_counts: axis.zero_counts.into(),
         rated_torque: axis.simulated.rated_torque,

@@ -1,5 +1,5 @@
-//! The door between the real-time thread and everything else, as seen from outside: [`channels`] makes every
-//! channel with all its memory and hands out its three sides.
+//! The channels between the real-time thread and the rest of the program. [`channels`] allocates all of them, and returns
+//! their three sides.
 //!
 //! ```text
 //! HostSide ── requests, newest streamed command, service frames ──▶ RtSide (takt_rt::HostInterface)
@@ -7,8 +7,7 @@
 //! LogSide  ◀── cycle records, events ── RtSide
 //! ```
 //!
-//! No call on [`RtSide`] allocates, locks or waits, whatever the other threads do or however long they have been
-//! preempted in the middle of something.
+//! No call on [`RtSide`] allocates, locks or waits, even if another thread is preempted in the middle of a call.
 
 mod latest;
 mod motion_words;
@@ -30,28 +29,28 @@ use records::{RecordConsumer, RecordProducer};
 pub use request_numbers::RequestNumbers;
 pub use ring::{Consumer, Producer, ring};
 
-/// How much each channel can hold.
+/// The capacity of each channel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ChannelSizes {
     /// Axes of the controller, up to [`takt_rt::MAX_AXES`].
     pub axes: usize,
     /// Buses of the controller, up to [`takt_rt::MAX_BUSES`].
     pub buses: usize,
-    /// Cycle records on the way to the logger.
+    /// Cycle records that wait for the logger.
     pub records: usize,
-    /// Events on the way to the logger.
+    /// Events that wait for the logger.
     pub events: usize,
     /// Requests that wait for the next cycle.
     pub requests: usize,
     /// Service frames that wait to be sent, for each bus.
     pub service_out: usize,
-    /// Service frames that were received and wait to be taken, all buses together.
+    /// Received service frames that wait for the host, of all buses together.
     pub service_in: usize,
 }
 
 impl ChannelSizes {
-    /// Sizes for a configuration: the record ring as configured; room for a burst of SDO traffic of every node, and
-    /// for more events than a logger that is late by a second can miss.
+    /// Sizes for a configuration. The record ring is configured. The others hold a burst of SDO traffic of every node, and
+    /// the events of a second in which the logger is late.
     pub fn of(config: &Config) -> Self {
         Self {
             axes: config.axes.len(),
@@ -65,23 +64,23 @@ impl ChannelSizes {
     }
 }
 
-/// Why something was not handed over.
+/// Why a request or frame was not accepted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ChannelError {
-    /// The channel holds all that it can: the real-time thread does not take, or is given too much.
+    /// The channel is full: the real-time thread does not run, or gets too much.
     #[error("the channel to the real-time thread is full")]
     Full,
     /// No bus has this number.
-    #[error("there is no bus {bus}: the controller has {buses}")]
+    #[error("there is no bus {bus}: the controller has {buses} buses")]
     NoSuchBus {
-        /// The number asked for.
+        /// The number of the bus.
         bus: usize,
-        /// How many there are.
+        /// The number of buses.
         buses: usize,
     },
 }
 
-/// Makes the channels. All their memory is allocated, and touched, here.
+/// Makes the channels, and allocates and touches all their memory.
 pub fn channels(sizes: &ChannelSizes) -> (RtSide, HostSide, LogSide) {
     let (request_in, request_out) = ring(sizes.requests);
     let (stream_in, stream_out) = latest::latest(words::stream_words(sizes.axes));
@@ -125,8 +124,8 @@ pub struct RtSide {
     snapshot: Writer,
 }
 
-/// Attempts to read the streamed command in one cycle. One is enough unless the host writes several commands within
-/// the fraction of a microsecond that a read takes.
+/// Attempts to read the streamed command in one cycle. One is enough, unless the host writes several commands within the
+/// fraction of a microsecond that a read takes.
 const STREAM_ATTEMPTS: usize = 3;
 
 impl HostInterface for RtSide {
@@ -170,7 +169,7 @@ impl HostInterface for RtSide {
     }
 }
 
-/// The side of whoever commands the controller.
+/// The side of the program that commands the controller.
 pub struct HostSide {
     requests: Producer<RequestEnvelope>,
     numbers: RequestNumbers,
@@ -181,43 +180,43 @@ pub struct HostSide {
 }
 
 impl HostSide {
-    /// Asks for something. It is taken up in the next cycle, requests in their order. Returns the number by which
-    /// [`Snapshot::answers`] tells of it.
+    /// Sends a request. The engine handles the requests in their order, from its next cycle on. Returns the id of the request,
+    /// for [`Snapshot::answers`] and [`Snapshot::motions`].
     ///
     /// # Errors
-    /// [`ChannelError::Full`]; nothing has been asked then.
+    /// [`ChannelError::Full`]; the request is not sent then.
     pub fn request(&mut self, request: Request) -> Result<RequestId, ChannelError> {
         let id = self.numbers.next();
-        self.ask(RequestEnvelope { id, request }).map(|()| id)
+        self.submit(RequestEnvelope { id, request }).map(|()| id)
     }
 
-    /// As [`HostSide::request`], under a number of [`HostSide::numbers`].
+    /// Sends a request with an id of [`HostSide::numbers`].
     ///
     /// # Errors
-    /// [`ChannelError::Full`]; nothing has been asked then.
-    pub fn ask(&mut self, asked: RequestEnvelope) -> Result<(), ChannelError> {
-        if self.requests.push(asked) { Ok(()) } else { Err(ChannelError::Full) }
+    /// [`ChannelError::Full`]; the request is not sent then.
+    pub fn submit(&mut self, envelope: RequestEnvelope) -> Result<(), ChannelError> {
+        if self.requests.push(envelope) { Ok(()) } else { Err(ChannelError::Full) }
     }
 
-    /// Where whoever asks takes the numbers of requests from.
+    /// The source of request ids.
     pub fn numbers(&self) -> RequestNumbers {
         self.numbers.clone()
     }
 
-    /// Replaces the streamed command; the real-time thread takes the newest one at its next cycle. Set-points
-    /// beyond the axes of the controller are not carried.
+    /// Replaces the streamed command. The real-time thread takes the newest one at its next cycle. Set-points beyond the axes
+    /// of the controller are ignored.
     pub fn stream(&mut self, command: &StreamCommand) {
         if let Some(streamer) = &mut self.streamer {
             streamer.stream(command);
         }
     }
 
-    /// Hands the streaming over to another thread; [`HostSide::stream`] does nothing from then on.
+    /// The streaming end, for another thread. Afterwards [`HostSide::stream`] does nothing.
     pub fn take_streamer(&mut self) -> Option<Streamer> {
         self.streamer.take()
     }
 
-    /// Hands over a service frame to be sent after the set-points of a coming cycle.
+    /// Queues a service frame. It is sent after the set-points of a later cycle.
     ///
     /// # Errors
     /// [`ChannelError::Full`] or [`ChannelError::NoSuchBus`]; the frame will not be sent then.
@@ -232,49 +231,44 @@ impl HostSide {
         self.received.pop()
     }
 
-    /// Received service frames that found no room since the start.
-    pub fn service_dropped(&self) -> u64 {
-        self.received.dropped()
-    }
-
     /// The state after the newest complete cycle.
     pub fn snapshot(&self) -> Snapshot {
         self.observer.snapshot()
     }
 
-    /// A handle for somebody else who wants to see the state.
+    /// A handle to the state for another thread.
     pub fn observer(&self) -> Observer {
         self.observer.clone()
     }
 }
 
-/// The end of the mailbox of streamed commands, of which the real-time thread takes the newest.
+/// The writing end of the streamed commands. The real-time thread takes the newest one.
 pub struct Streamer {
     axes: usize,
     stream: Writer,
 }
 
 impl Streamer {
-    /// Replaces the streamed command. Set-points beyond the axes of the controller are not carried.
+    /// Replaces the streamed command. Set-points beyond the axes of the controller are ignored.
     pub fn stream(&mut self, command: &StreamCommand) {
         self.stream.write(|words| words::put_stream(command, self.axes, words));
     }
 }
 
-/// Sees the state of the controller at any time, without disturbing it. Clone it for every thread.
+/// Reads the state of the controller at any time, without disturbing it. Clone it for every thread.
 #[derive(Clone)]
 pub struct Observer {
     snapshot: Reader,
 }
 
 impl Observer {
-    /// The state after the newest complete cycle; before the first one, a passive controller without axes.
+    /// The state after the newest complete cycle. Before the first one, it is a passive controller without axes.
     pub fn snapshot(&self) -> Snapshot {
         loop {
             match self.snapshot.attempt(0, words::take_snapshot) {
                 Attempt::Whole(snapshot, _) => return snapshot,
                 Attempt::Nothing => return words::NO_SNAPSHOT,
-                // Three cycles have passed during the read: this thread was not running.
+                // Three cycles have passed during the read, because this thread was preempted.
                 Attempt::Torn => std::hint::spin_loop(),
             }
         }
@@ -288,27 +282,27 @@ pub struct LogSide {
 }
 
 impl LogSide {
-    /// Shows the oldest cycle record that waits to `look`, in place. Axes that do not count may hold anything.
-    pub fn next_record<T>(&mut self, look: impl FnOnce(&CycleRecord) -> T) -> Option<T> {
-        self.records.next(look)
+    /// Passes the oldest waiting cycle record to `read`, in place. Axes beyond `axis_count` hold arbitrary values.
+    pub fn next_record<T>(&mut self, read: impl FnOnce(&CycleRecord) -> T) -> Option<T> {
+        self.records.next(read)
     }
 
-    /// The oldest event that waits.
+    /// The oldest waiting event.
     pub fn take_event(&mut self) -> Option<Event> {
         self.events.pop()
     }
 
-    /// Records handed over since the start.
+    /// The number of records written since the start.
     pub fn records_written(&self) -> u64 {
         self.records.pushed()
     }
 
-    /// Records that found no room since the start.
+    /// The number of records dropped since the start.
     pub fn records_dropped(&self) -> u64 {
         self.records.dropped()
     }
 
-    /// Events that found no room since the start.
+    /// The number of events dropped since the start.
     pub fn events_dropped(&self) -> u64 {
         self.events.dropped()
     }
@@ -329,7 +323,7 @@ mod tests {
     }
 
     #[test]
-    fn requests_arrive_in_order_and_one_too_many_is_refused() {
+    fn requests_arrive_in_order_and_one_too_many_is_an_error() {
         let (mut rt, mut host, _log) = channels(&SIZES);
         let first = host.request(Request::Enable).unwrap();
         let second = host.request(Request::Stop(StopCategory::Two)).unwrap();
@@ -363,7 +357,7 @@ mod tests {
         assert_eq!([0, 1, 1].map(|bus| rt.received(bus, &received)), [true, true, false]);
         assert_eq!(host.take_service(), Some((0, received)));
         assert_eq!(host.take_service(), Some((1, received)));
-        assert_eq!((host.take_service(), host.service_dropped()), (None, 1));
+        assert_eq!(host.take_service(), None);
     }
 
     #[test]
@@ -377,7 +371,7 @@ mod tests {
     }
 
     #[test]
-    fn the_log_side_gets_records_and_events_and_learns_what_was_dropped() {
+    fn the_log_side_gets_records_and_events_and_the_numbers_of_dropped_ones() {
         let (mut rt, _host, mut log) = channels(&SIZES);
         let record = CycleRecord { axis_count: 2, ..CycleRecord::default() };
         assert_eq!((0..6).filter(|_| rt.record(&record)).count(), 4);

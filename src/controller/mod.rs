@@ -1,22 +1,22 @@
-//! A running controller: the engine of a configuration, the real-time thread that paces it, and the life cycle
-//! around it.
+//! A running controller: the engine of a configuration, the real-time thread that runs it, and the life cycle of a run.
 
+mod arrival;
 pub mod assemble;
 pub mod channels;
 mod handle;
 mod outcome;
 mod program;
-pub mod quiet;
 pub mod realtime_thread;
 pub mod session;
+pub mod sleep_alignment;
 mod supervisor;
 mod time_of_day;
 mod virtual_time;
 
 pub use handle::{
-    CommandError, Controller, Motion, MotionError, MoveOptions, Refused, StartFailure, Stopped,
+    CommandError, Controller, MotionError, MotionId, MoveOptions, Refused, StartFailure, Stopped,
 };
 pub use outcome::{Interrupt, Outcome, Progress};
-pub use program::{ProgramRunner, Step};
+pub use program::{ProgramRunner, ProgramStep};
 pub use supervisor::Supervisor;
 pub use virtual_time::{VirtualClock, VirtualRun};

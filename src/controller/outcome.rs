@@ -1,4 +1,4 @@
-//! How a run goes and how it ends.
+//! The progress of a run, and its outcome.
 
 use takt_rt::{Phase, RequestError, StopReason};
 
@@ -9,27 +9,27 @@ use crate::telemetry::{Machine, words};
 /// How a run ended.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Outcome {
-    /// The program was done, or its time was over.
+    /// The program has finished, or its time has passed.
     Finished,
-    /// Somebody interrupted it; the axes were stopped in control unless it was asked otherwise.
+    /// It was interrupted. The axes were stopped in control, unless an immediate stop was asked for.
     Interrupted,
     /// Another process took the buses over; the axes were stopped in control for it.
     TakenOver {
         /// The process.
         process: Process,
     },
-    /// The group stopped by itself.
+    /// The group stopped for a fault.
     Stopped(StopReason),
     /// The drives could not be brought up.
     BringUpFailed(BringUpError),
-    /// A drive is in a fault that a reset does not clear.
+    /// A fault reset does not clear the fault of a drive.
     FaultPersists {
         /// The axis.
         axis: usize,
         /// Object 603F or the code of the emergency message.
         code: u16,
     },
-    /// A drive does not report.
+    /// A drive does not send feedback.
     NotHeard {
         /// The axis.
         axis: usize,
@@ -38,29 +38,43 @@ pub enum Outcome {
     MoveRefused {
         /// The move.
         number: u64,
-        /// Why, if that is still known.
+        /// The reason, if it is still known.
         refusal: Option<RequestError>,
+    },
+    /// The program is done, but a joint is farther off its target than its `target_tolerance`.
+    OffTarget {
+        /// The axis.
+        axis: usize,
+        /// How far beyond its target it is: rad (m).
+        distance: f64,
+        /// How far it may be: rad (m).
+        tolerance: f64,
+    },
+    /// A motion of another client has replaced a move of the program; counted from 1.
+    MoveReplaced {
+        /// The move.
+        number: u64,
     },
     /// A function that the caller gave to the run panicked, and the axes were stopped in control.
     CallbackPanicked {
-        /// What the panic said.
+        /// The message of the panic.
         message: String,
     },
-    /// The real-time thread ended by itself, which only a defect of takt can bring about.
+    /// The real-time thread has panicked. That is a defect of takt.
     ThreadDied,
-    /// The group did not get where it was told to in time.
+    /// The group did not reach the next phase in time.
     Stuck {
-        /// What it was doing.
+        /// The phase in which it remained.
         phase: Phase,
     },
 }
 
 impl Outcome {
-    /// It in words, with the names of the axes.
+    /// The outcome as a sentence, with the names of the axes.
     pub fn words(&self, machine: &Machine) -> String {
         let name = |axis: usize| u8::try_from(axis).map_or("?".to_owned(), |axis| machine.axis_name(axis));
         match self {
-            Self::Finished => "the run is over".to_owned(),
+            Self::Finished => "the run has finished".to_owned(),
             Self::Interrupted => "the run was interrupted".to_owned(),
             Self::TakenOver { process } => {
                 format!("{process} has taken the buses over; the axes were stopped in control for it")
@@ -77,36 +91,48 @@ impl Outcome {
             ),
             Self::MoveRefused { number, refusal } => {
                 let why = refusal.map(|refusal| words::rejection(&refusal, machine));
-                let why = why.unwrap_or_else(|| "why is no longer known".to_owned());
-                format!("move {number} of the program could not be begun: {why}")
+                let why = why.unwrap_or_else(|| "the reason is no longer known".to_owned());
+                format!("move {number} of the program was refused: {why}")
+            }
+            Self::MoveReplaced { number } => {
+                format!("another client has moved the group during move {number} of the program")
+            }
+            Self::OffTarget { axis, distance, tolerance } => {
+                format!(
+                    "{}: the program is done, but the joint is {:.6} rad (m) off its target, and target_tolerance is {:.6}; \
+                     in CSV and CST, look at the gains of the loop, and at the friction that is fed forward",
+                    name(*axis),
+                    distance.abs(),
+                    tolerance
+                )
             }
             Self::CallbackPanicked { message } => {
-                format!("a defect of takt (please report it) ended the run in a controlled stop: {message}")
+                format!("a callback panicked, and the run ended in a controlled stop: {message}")
             }
             Self::Stuck { phase } => {
-                format!("the group did not get any further while it was {}", words::phase(*phase))
+                format!("the group remained {} for too long", words::phase(*phase))
             }
             Self::ThreadDied => {
-                "the real-time thread ended by itself; this is a defect of takt, please report it".to_owned()
+                "the real-time thread has panicked; this is a defect of takt, please report it".to_owned()
             }
         }
     }
 }
 
-/// Who asks a run to end before its program does.
+/// How a run is asked to end before its program has finished.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Interrupt {
-    /// Decelerate, hold, disable, leave.
+    /// Decelerate, hold, disable, shut down.
     Controlled,
-    /// Take the power now and leave without farewell.
+    /// Remove the power now, and end without a shut-down of the drives.
     Immediate,
 }
 
-/// What the run is doing, for a progress bar.
+/// The progress of a run, for a progress bar.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Progress {
-    /// In a few words.
+    /// The present step in a few words.
     pub what: String,
-    /// 0 to 1 where that is known.
+    /// 0 to 1, if it is known.
     pub fraction: Option<f64>,
 }

@@ -1,8 +1,8 @@
-//! The motion program: which move is next, and when.
+//! The motion program: decides which move is next, and when.
 
 use takt_rt::{
-    Answer, MAX_AXES, MotionState, Move, Phase, ProfileMove, ProfileTarget, Request, RequestEnvelope,
-    RequestError, RequestId, Snapshot,
+    Answer, MAX_AXES, MotionState, Move, ProfileMove, ProfileTarget, Request, RequestEnvelope, RequestError,
+    RequestId, Snapshot,
 };
 
 use super::channels::RequestNumbers;
@@ -16,33 +16,40 @@ pub struct ProgramRunner {
     repeat: Option<u64>,
     /// Moves begun so far.
     begun: u64,
-    /// The numbers of the requests that ask for it.
-    asked: Vec<RequestId>,
-    state: State,
+    /// The requests for the present motion.
+    requests: Vec<RequestId>,
+    progress: MoveProgress,
 }
 
+/// How far the present move of the program is.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum State {
+enum MoveProgress {
+    /// The next move is due.
     Next,
+    /// The axes move to their targets, or drives reach a velocity or a torque.
     Moving,
-    /// Drives go at a speed, or push with a torque.
-    Driving {
-        until_ns: u64,
-    },
-    Stopping,
-    Dwelling {
-        until_ns: u64,
-    },
+    /// Drives keep a velocity or a torque.
+    Driving { until_ns: u64 },
+    /// Drives end a velocity or a torque.
+    ComingToRest,
+    /// The move is over, and its dwell time passes.
+    Dwelling { until_ns: u64 },
+    /// The program is over.
     Finished,
 }
 
 /// What the program wants now.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Step {
+pub enum ProgramStep {
     /// Nothing but time.
     Wait,
-    /// This, in this order.
+    /// These requests, in this order.
     Begin(Vec<RequestEnvelope>),
+    /// A motion of another client has replaced the move with this number, counted from 1.
+    Replaced {
+        /// The move.
+        number: u64,
+    },
     /// The real-time thread has refused the move with this number, counted from 1.
     Refused {
         /// The move.
@@ -54,87 +61,105 @@ pub enum Step {
     Finished,
 }
 
-/// How much longer than asked for a speed or a torque is valid: it ends by being set to zero, and if nobody does that
-/// by expiring.
+/// How much longer than asked for a velocity or a torque is valid. It ends by being set to zero; if that fails, it
+/// expires.
 const EXPIRY_NS: u64 = 1_000_000_000;
-/// How long the drives may take to reach a speed or a torque.
+/// How long the drives may take to reach a velocity or a torque.
 const REACHING_NS: u64 = 10_000_000_000;
 
+/// What has become of the motion that a program has asked for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum MotionResult {
+    Open,
+    Finished,
+    Refused(Option<RequestError>),
+    Replaced,
+}
+
 impl ProgramRunner {
-    /// A program from its beginning; `endless` repeats it until somebody stops it.
+    /// A program from its beginning; `endless` repeats it until it is stopped.
     pub fn new(program: &Program, endless: bool) -> Self {
         let repeat = (!endless).then(|| u64::from(program.repeat.max(1)));
-        let state = if program.moves.is_empty() { State::Finished } else { State::Next };
-        Self { moves: program.moves.clone(), repeat, begun: 0, asked: vec![], state }
+        let progress = if program.moves.is_empty() { MoveProgress::Finished } else { MoveProgress::Next };
+        Self { moves: program.moves.clone(), repeat, begun: 0, requests: vec![], progress }
     }
 
-    /// Takes the state of the group and says what is to happen. The requests of a step bear `numbers`, so that nobody
-    /// else's refusal is taken for theirs.
-    pub fn poll(&mut self, now_ns: u64, snapshot: &Snapshot, numbers: &RequestNumbers) -> Step {
-        let is_reached = self.is_reached(snapshot);
-        let is_done = is_reached && snapshot.phase == Phase::Holding;
-        if let (State::Moving | State::Stopping, Some(refusal)) = (self.state, self.refusal(snapshot)) {
-            self.state = State::Finished;
-            return Step::Refused { number: self.begun, refusal };
-        }
-        match self.state {
-            State::Finished => Step::Finished,
-            State::Next if self.repeat.is_some_and(|times| self.begun >= times * self.moves.len() as u64) => {
-                self.state = State::Finished;
-                Step::Finished
-            }
-            State::Next => {
+    /// Takes the state of the group and says what is to happen. The requests of a step have ids from `numbers`, so that the
+    /// program knows the answers to its own requests.
+    pub fn poll(&mut self, now_ns: u64, snapshot: &Snapshot, numbers: &RequestNumbers) -> ProgramStep {
+        let is_count_reached = self.repeat.is_some_and(|times| self.begun >= times * self.moves.len() as u64);
+        match self.progress {
+            MoveProgress::Finished => ProgramStep::Finished,
+            MoveProgress::Next if is_count_reached => self.finish(ProgramStep::Finished),
+            MoveProgress::Next => {
                 self.begun += 1;
-                self.state = State::Moving;
-                Step::Begin(self.present_requests(now_ns, 1.0, numbers))
+                self.progress = MoveProgress::Moving;
+                ProgramStep::Begin(self.present_requests(now_ns, 1.0, numbers))
             }
-            State::Moving => {
-                match self.present_duration_ns() {
-                    Some(duration_ns) if is_reached => {
-                        self.state = State::Driving { until_ns: now_ns + duration_ns };
-                    }
-                    None if is_done => self.dwell(now_ns),
-                    _ => {}
+            MoveProgress::Moving | MoveProgress::ComingToRest => match self.motion_result(snapshot) {
+                MotionResult::Open => ProgramStep::Wait,
+                MotionResult::Finished => {
+                    self.go_on(now_ns);
+                    ProgramStep::Wait
                 }
-                Step::Wait
-            }
-            State::Driving { until_ns } if now_ns >= until_ns => {
-                self.state = State::Stopping;
-                Step::Begin(self.present_requests(now_ns, 0.0, numbers))
-            }
-            State::Driving { .. } => Step::Wait,
-            State::Stopping => {
-                if is_done {
-                    self.dwell(now_ns);
+                MotionResult::Refused(refusal) => {
+                    self.finish(ProgramStep::Refused { number: self.begun, refusal })
                 }
-                Step::Wait
+                MotionResult::Replaced => self.finish(ProgramStep::Replaced { number: self.begun }),
+            },
+            MoveProgress::Driving { until_ns } if now_ns >= until_ns => {
+                self.progress = MoveProgress::ComingToRest;
+                ProgramStep::Begin(self.present_requests(now_ns, 0.0, numbers))
             }
-            State::Dwelling { until_ns } => {
+            MoveProgress::Driving { .. } => ProgramStep::Wait,
+            MoveProgress::Dwelling { until_ns } => {
                 if now_ns >= until_ns {
-                    self.state = State::Next;
+                    self.progress = MoveProgress::Next;
                 }
-                Step::Wait
+                ProgramStep::Wait
             }
         }
     }
 
-    /// Whether every motion of the present requests has reached its target.
-    fn is_reached(&self, snapshot: &Snapshot) -> bool {
-        let is_finished = |asked: &RequestId| snapshot.motions.of(*asked) == Some(MotionState::Finished);
-        !self.asked.is_empty() && self.asked.iter().all(is_finished)
+    fn finish(&mut self, last: ProgramStep) -> ProgramStep {
+        self.progress = MoveProgress::Finished;
+        last
     }
 
-    /// Why one of the present requests was refused, if one was and that is still known.
-    fn refusal(&self, snapshot: &Snapshot) -> Option<Option<RequestError>> {
-        self.asked.iter().find_map(|asked| match snapshot.answers.of(*asked) {
+    /// What has become of the present motion.
+    fn motion_result(&self, snapshot: &Snapshot) -> MotionResult {
+        let refusal = self.requests.iter().find_map(|request| match snapshot.answers.of(*request) {
             Answer::Rejected(refusal) => Some(refusal),
             Answer::None | Answer::Granted => None,
-        })
+        });
+        if let Some(refusal) = refusal {
+            return MotionResult::Refused(refusal);
+        }
+        let states = self.requests.iter().map(|request| match snapshot.motions.of(*request) {
+            Some(MotionState::Finished) => MotionResult::Finished,
+            Some(MotionState::Replaced { .. }) => MotionResult::Replaced,
+            Some(MotionState::InProgress | MotionState::Stopped(_)) => MotionResult::Open,
+            // Many motions have followed it, and none of them is the program's.
+            None if snapshot.answers.of(*request) == Answer::Granted => MotionResult::Replaced,
+            None => MotionResult::Open,
+        });
+        // All of them are finished, or the first that is not tells.
+        states.into_iter().find(|state| *state != MotionResult::Finished).unwrap_or(MotionResult::Finished)
+    }
+
+    /// The present motion has reached its targets.
+    fn go_on(&mut self, now_ns: u64) {
+        match (self.progress, self.present_duration_ns()) {
+            (MoveProgress::Moving, Some(duration_ns)) => {
+                self.progress = MoveProgress::Driving { until_ns: now_ns + duration_ns };
+            }
+            _ => self.dwell(now_ns),
+        }
     }
 
     fn dwell(&mut self, now_ns: u64) {
         let dwell_s = self.present().map_or(0.0, |present| present.dwell_s);
-        self.state = State::Dwelling { until_ns: now_ns + (dwell_s * 1e9) as u64 };
+        self.progress = MoveProgress::Dwelling { until_ns: now_ns + (dwell_s * 1e9) as u64 };
     }
 
     fn present(&self) -> Option<&ProgramMove> {
@@ -142,7 +167,7 @@ impl ProgramRunner {
         self.moves.get((self.begun.saturating_sub(1) % count.max(1)) as usize)
     }
 
-    /// How long drives go on at what the present move wants; `None` for one that ends where it leads.
+    /// How long drives keep the velocity or torque of the present move; `None` for a move to a position.
     fn present_duration_ns(&self) -> Option<u64> {
         match self.present()?.target {
             ProgramTarget::Position(_) => None,
@@ -152,8 +177,7 @@ impl ProgramRunner {
         }
     }
 
-    /// The requests of the present move, its speeds and torques times `factor`. All of them are one move with a number of
-    /// its own.
+    /// The requests of the present move, its velocities and torques times `factor`.
     fn present_requests(
         &mut self,
         now_ns: u64,
@@ -175,11 +199,12 @@ impl ProgramRunner {
             ProgramTarget::Velocity { velocity, .. } => drive(velocity, ProfileTarget::Velocity),
             ProgramTarget::Torque { torque, .. } => drive(torque, ProfileTarget::Torque),
         };
-        self.asked = requests.iter().map(|_| numbers.next()).collect();
-        self.asked.iter().zip(requests).map(|(id, request)| RequestEnvelope { id: *id, request }).collect()
+        self.requests = requests.iter().map(|_| numbers.next()).collect();
+        self.requests.iter().zip(requests).map(|(id, request)| RequestEnvelope { id: *id, request }).collect()
     }
 
-    /// Where the present move leads (rad or m), an axis each; `None` before the first, and where it leads nowhere.
+    /// The target of the present move (rad or m), one value for each axis. `None` before the first move, and for a move that
+    /// has no target position.
     pub fn target(&self) -> Option<&[f64]> {
         match self.present().filter(|_| self.begun > 0).map(|present| &present.target)? {
             ProgramTarget::Position(position) => Some(position),
@@ -208,7 +233,7 @@ fn move_of(present: &ProgramMove, position: &[f64]) -> Move {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use takt_rt::{RejectReason, RequestKind};
+    use takt_rt::{Phase, RejectReason, RequestKind};
 
     fn program(repeat: u32) -> Program {
         let to = |target: f64| ProgramMove {
@@ -221,11 +246,12 @@ mod tests {
         Program { repeat, moves: vec![to(1.0), to(2.0)] }
     }
 
-    /// The group holds after the motions of these requests have reached their targets.
-    fn done(motions: &[RequestId]) -> Snapshot {
+    /// The state after these requests have begun motions that reached their targets.
+    fn finished(requests: &[RequestId]) -> Snapshot {
         let mut snapshot = Snapshot { phase: Phase::Holding, ..Snapshot::default() };
-        for (axis, request) in (0..).zip(motions) {
-            snapshot.motions.begin(*request, Some(axis), |_| false);
+        for request in requests {
+            snapshot.answers.note(*request, None);
+            snapshot.motions.begin(*request, None, |_| false);
         }
         snapshot.motions.end_all(MotionState::Finished, |_| {});
         snapshot
@@ -238,8 +264,8 @@ mod tests {
         phase: Phase::Holding,
     };
 
-    fn rejecting(ids: &[RequestId]) -> Snapshot {
-        let mut snapshot = done(&[]);
+    fn refusing(ids: &[RequestId]) -> Snapshot {
+        let mut snapshot = finished(&[]);
         for id in ids {
             snapshot.rejected += 1;
             snapshot.answers.note(*id, Some(REJECTED));
@@ -255,13 +281,13 @@ mod tests {
             Self(ProgramRunner::new(program, false), RequestNumbers::default())
         }
 
-        fn poll(&mut self, now_ns: u64, snapshot: &Snapshot) -> Step {
+        fn poll(&mut self, now_ns: u64, snapshot: &Snapshot) -> ProgramStep {
             self.0.poll(now_ns, snapshot, &self.1)
         }
 
         fn begin(&mut self, now_ns: u64, snapshot: &Snapshot) -> Option<(RequestId, Move)> {
             match self.poll(now_ns, snapshot) {
-                Step::Begin(requests) => match requests[..] {
+                ProgramStep::Begin(requests) => match requests[..] {
                     [RequestEnvelope { id, request: Request::Move(begun) }] => Some((id, begun)),
                     _ => panic!("{requests:?}"),
                 },
@@ -271,91 +297,104 @@ mod tests {
     }
 
     #[test]
-    fn a_speed_is_held_for_its_time_and_then_set_to_zero() {
+    fn a_velocity_is_kept_for_its_time_and_then_set_to_zero() {
         let target = ProgramTarget::Velocity { velocity: vec![0.3, 0.5], duration_s: 2.0 };
         let spin = ProgramMove { target, ..program(1).moves[0].clone() };
         let mut runner = Running::new(&Program { repeat: 1, moves: vec![spin] });
         let asked = |step| match step {
-            Step::Begin(requests) => match requests[..] {
+            ProgramStep::Begin(requests) => match requests[..] {
                 [
-                    RequestEnvelope { id: one, request: Request::SetProfileTarget(first) },
-                    RequestEnvelope { id: other, request: Request::SetProfileTarget(second) },
+                    RequestEnvelope { id, request: Request::SetProfileTarget(first) },
+                    RequestEnvelope { id: next_id, request: Request::SetProfileTarget(second) },
                 ] => {
                     assert_eq!((first.axis, second.axis), (0, 1));
-                    ([one, other], first.target, second.target)
+                    ([id, next_id], first.target, second.target)
                 }
                 _ => panic!("{requests:?}"),
             },
             step => panic!("{step:?}"),
         };
         let speeds = |first, second| (ProfileTarget::Velocity(first), ProfileTarget::Velocity(second));
-        let (spin, first, second) = asked(runner.poll(0, &done(&[])));
+        let (spin, first, second) = asked(runner.poll(0, &finished(&[])));
         assert_eq!((first, second), speeds(0.3, 0.5));
-        let driving = Snapshot { phase: Phase::Moving, ..done(&spin) };
-        assert_eq!(runner.poll(500_000_000, &driving), Step::Wait);
-        assert_eq!(runner.poll(2_499_000_000, &driving), Step::Wait);
+        let one_of_two = Snapshot { phase: Phase::Moving, ..finished(&spin[..1]) };
+        assert_eq!(runner.poll(400_000_000, &one_of_two), ProgramStep::Wait);
+        let driving = Snapshot { phase: Phase::Moving, ..finished(&spin) };
+        assert_eq!(runner.poll(500_000_000, &driving), ProgramStep::Wait);
+        assert_eq!(runner.poll(2_499_000_000, &driving), ProgramStep::Wait);
         let (rest, first, second) = asked(runner.poll(2_500_000_000, &driving));
         assert_eq!((first, second), speeds(0.0, 0.0));
-        assert_eq!(runner.poll(2_600_000_000, &driving), Step::Wait);
-        assert_eq!(runner.poll(3_000_000_000, &done(&rest)), Step::Wait);
-        assert_eq!((runner.poll(3_100_000_000, &done(&rest)), runner.0.target()), (Step::Wait, None));
-        assert_eq!(runner.poll(3_100_000_000, &done(&rest)), Step::Finished);
+        assert_eq!(runner.poll(2_600_000_000, &driving), ProgramStep::Wait);
+        let at_rest = finished(&rest);
+        assert_eq!(runner.poll(3_000_000_000, &at_rest), ProgramStep::Wait);
+        assert_eq!((runner.poll(3_100_000_000, &at_rest), runner.0.target()), (ProgramStep::Wait, None));
+        assert_eq!(runner.poll(3_100_000_000, &at_rest), ProgramStep::Finished);
     }
 
     #[test]
     fn moves_follow_one_another_after_their_dwell_as_often_as_asked() {
         let mut runner = Running::new(&program(2));
         let mut targets = vec![];
-        let mut snapshot = done(&[]);
+        let mut snapshot = finished(&[]);
         for now_ms in 0..2_000 {
-            if let Some((motion, begun)) = runner.begin(now_ms * 1_000_000, &snapshot) {
+            if let Some((request, begun)) = runner.begin(now_ms * 1_000_000, &snapshot) {
                 targets.push((now_ms, begun.target[0]));
-                snapshot = done(&[motion]);
+                snapshot = finished(&[request]);
             }
         }
         let only: Vec<f64> = targets.iter().map(|(_, target)| *target).collect();
         assert_eq!(only, [1.0, 2.0, 1.0, 2.0]);
         assert!(targets.windows(2).all(|pair| pair[1].0 - pair[0].0 >= 100), "{targets:?}");
-        assert_eq!(runner.poll(3_000_000_000, &snapshot), Step::Finished);
+        assert_eq!(runner.poll(3_000_000_000, &snapshot), ProgramStep::Finished);
     }
 
     #[test]
     fn the_next_move_waits_for_the_present_one() {
         let mut runner = Running::new(&program(1));
-        let (_, first) = runner.begin(0, &done(&[])).unwrap();
+        let (request, first) = runner.begin(0, &finished(&[])).unwrap();
         assert_eq!((first.velocity_scale, first.acceleration_scale), (0.5, 0.25));
-        let moving = Snapshot { phase: Phase::Moving, ..done(&[]) };
+        let mut moving = Snapshot { phase: Phase::Moving, ..finished(&[]) };
+        moving.motions.begin(request, None, |_| true);
         for now_s in 0..100 {
-            assert_eq!(runner.poll(now_s * 1_000_000_000, &moving), Step::Wait);
+            assert_eq!(runner.poll(now_s * 1_000_000_000, &moving), ProgramStep::Wait);
         }
     }
 
     #[test]
     fn a_refused_move_ends_the_program_with_its_number_and_why() {
         let mut runner = Running::new(&program(1));
-        let (asked, _) = runner.begin(0, &done(&[])).unwrap();
-        assert_eq!(
-            runner.poll(1, &rejecting(&[asked])),
-            Step::Refused { number: 1, refusal: Some(REJECTED) }
-        );
-        assert_eq!(runner.poll(2, &rejecting(&[asked])), Step::Finished);
+        let (request, _) = runner.begin(0, &finished(&[])).unwrap();
+        let refused = ProgramStep::Refused { number: 1, refusal: Some(REJECTED) };
+        assert_eq!(runner.poll(1, &refusing(&[request])), refused);
+        assert_eq!(runner.poll(2, &refusing(&[request])), ProgramStep::Finished);
     }
 
     #[test]
-    fn what_is_refused_to_somebody_else_is_not_the_program_s() {
+    fn a_move_that_another_client_replaces_ends_the_program_with_its_number() {
+        let mut runner = Running::new(&program(1));
+        let (request, _) = runner.begin(0, &finished(&[])).unwrap();
+        let mut snapshot = finished(&[]);
+        snapshot.motions.begin(request, None, |_| true);
+        snapshot.motions.begin(runner.1.next(), None, |_| true);
+        assert_eq!(runner.poll(1, &snapshot), ProgramStep::Replaced { number: 1 });
+        assert_eq!(runner.poll(2, &snapshot), ProgramStep::Finished);
+    }
+
+    #[test]
+    fn a_request_of_another_client_that_is_refused_does_not_end_the_program() {
         let mut runner = Running::new(&program(1));
         let before = runner.1.next();
-        let (asked, _) = runner.begin(0, &done(&[])).unwrap();
+        let (request, _) = runner.begin(0, &finished(&[])).unwrap();
         let others = [before, runner.1.next(), runner.1.next()];
-        assert_eq!(runner.poll(1, &rejecting(&others)), Step::Wait);
-        let finished = Snapshot { motions: done(&[asked]).motions, ..rejecting(&others) };
-        assert_eq!(runner.poll(2, &finished), Step::Wait);
-        assert!(runner.begin(200_000_000, &finished).is_none());
-        assert!(runner.begin(200_000_001, &finished).is_some_and(|(next, _)| next > asked));
+        assert_eq!(runner.poll(1, &refusing(&others)), ProgramStep::Wait);
+        let arrived = Snapshot { motions: finished(&[request]).motions, ..refusing(&others) };
+        assert_eq!(runner.poll(2, &arrived), ProgramStep::Wait);
+        assert!(runner.begin(200_000_000, &arrived).is_none());
+        assert!(runner.begin(200_000_001, &arrived).is_some_and(|(next, _)| next > request));
     }
 
     #[test]
     fn a_program_without_moves_is_finished_at_once() {
-        assert_eq!(Running::new(&Program::default()).poll(0, &done(&[])), Step::Finished);
+        assert_eq!(Running::new(&Program::default()).poll(0, &finished(&[])), ProgramStep::Finished);
     }
 }

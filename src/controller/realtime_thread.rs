@@ -1,4 +1,4 @@
-//! The thread in which the cycle runs: started, elevated, paced, and asked afterwards how it was.
+//! The real-time thread, in which the cycle runs.
 
 use std::sync::mpsc;
 use std::thread::{Builder, JoinHandle};
@@ -6,10 +6,10 @@ use std::thread::{Builder, JoinHandle};
 use takt_rt::linux::{PacedClock, PageFaults, RealtimeThread, ThreadConfig, ThreadReport};
 use takt_rt::{BusPort, Clock, Cycle, Engine, Flow, Grid, HostInterface, SlotPlan};
 
-use super::quiet;
+use super::sleep_alignment;
 use crate::config::Realtime;
 
-/// Stack that the thread touches before it begins; the cycle uses a small part of it.
+/// Stack that the thread touches before its first cycle. The cycle uses a small part of it.
 const STACK_BYTES: usize = 256 * 1024;
 /// Wake-ups measured before the first slot to choose the spin guard.
 const MEASURED_WAKE_UPS: u32 = 200;
@@ -17,13 +17,13 @@ const MEASURED_SLEEP_NS: u64 = 250_000;
 /// From the end of the set-up to the first slot.
 const LEAD_IN_NS: u64 = 2_000_000;
 
-/// What is asked of the operating system, from the configuration. Without a named CPU the last one that this
-/// process may use is taken: the first one serves most interrupts.
+/// The real-time set-up that a configuration asks for. Without a configured CPU, it is the last one that this process may
+/// use, since the first one serves most interrupts.
 pub fn thread_config(realtime: &Realtime) -> ThreadConfig {
     let last = || core_affinity::get_core_ids().and_then(|cores| cores.last().map(|core| core.id));
     ThreadConfig {
         priority: realtime.priority,
-        // Without FIFO, pinning would only bind the thread to a CPU that others keep busy.
+        // Without SCHED_FIFO, a pinned thread would have to share a busy CPU.
         cpu: realtime.cpu.or_else(|| realtime.priority.and_then(|_| last())),
         lock_memory: realtime.lock_memory,
         hold_dma_latency: realtime.hold_dma_latency,
@@ -31,33 +31,33 @@ pub fn thread_config(realtime: &Realtime) -> ThreadConfig {
     }
 }
 
-/// The beginning: what came of the set-up.
+/// The result of the real-time set-up.
 #[derive(Clone, Copy, Debug)]
 pub struct Begun {
-    /// What was asked, what was granted, what is in force.
+    /// Each step with its result, and the settings in force.
     pub report: ThreadReport,
 }
 
-/// The end: how it was.
+/// Measurements of a loop that has ended.
 #[derive(Clone, Copy, Debug)]
 pub struct Ended {
-    /// Page faults that the loop took between its first and its last cycle.
+    /// Page faults between the first and the last cycle.
     pub page_faults: PageFaults,
-    /// How long before a slot the thread stopped sleeping and spun, at the end.
+    /// The final spin guard: the time before a slot during which the thread spins instead of sleeping.
     pub spin_guard_ns: u64,
 }
 
-/// What the thread works with. All of it is made, and its memory touched, before the thread is elevated.
-pub struct Work<P, D> {
+/// The parts of the loop. All of them are made, and their memory touched, before the thread becomes real-time.
+pub struct LoopParts<P, H> {
     /// The cycle as computation.
     pub engine: Box<Engine>,
-    /// When things happen in a slot.
+    /// The times within a slot.
     pub plan: SlotPlan,
     /// The buses.
     pub ports: Vec<P>,
-    /// The door to the rest.
-    pub host: D,
-    /// A fixed spin guard; `None` measures, a tenth of the period at most.
+    /// The channels to the rest of the program.
+    pub host: H,
+    /// A fixed spin guard; `None` measures it, up to a tenth of the period.
     pub spin_guard_ns: Option<u64>,
     /// Whether a refused step ends the thread before its first cycle.
     pub is_realtime_required: bool,
@@ -69,13 +69,13 @@ pub struct Running {
     begun: Begun,
 }
 
-/// Why the thread does not run.
+/// Why the thread could not be started.
 #[derive(Debug, thiserror::Error)]
 pub enum StartError {
-    /// The system has no thread for us.
+    /// The operating system gives no thread.
     #[error("the real-time thread could not be started: {0}")]
     Spawn(std::io::Error),
-    /// It ended before it had begun, which only a defect of takt can bring about.
+    /// It ended before its first cycle. That is a defect of takt.
     #[error("the real-time thread ended before its first cycle")]
     Died,
     /// Real-time set-up was required, and at least one step was refused.
@@ -87,20 +87,20 @@ pub enum StartError {
 ///
 /// # Errors
 /// See [`StartError`].
-pub fn start<P, D>(config: ThreadConfig, work: Work<P, D>) -> Result<Running, StartError>
+pub fn start<P, H>(config: ThreadConfig, parts: LoopParts<P, H>) -> Result<Running, StartError>
 where
     P: BusPort + Send + 'static,
-    D: HostInterface + Send + 'static,
+    H: HostInterface + Send + 'static,
 {
-    let (say, hear) = mpsc::sync_channel(1);
-    let body = move || loop_body(&config, work, &say);
+    let (begun_in, begun_out) = mpsc::sync_channel(1);
+    let body = move || loop_body(&config, parts, &begun_in);
     let thread = Builder::new().name("takt-rt".into()).spawn(body).map_err(StartError::Spawn)?;
-    let begun = hear.recv().map_err(|_| StartError::Died)?.map_err(StartError::Refused)?;
+    let begun = begun_out.recv().map_err(|_| StartError::Died)?.map_err(StartError::Refused)?;
     Ok(Running { thread, begun })
 }
 
 impl Running {
-    /// What came of the set-up.
+    /// The result of the real-time set-up.
     pub fn begun(&self) -> Begun {
         self.begun
     }
@@ -110,39 +110,39 @@ impl Running {
         self.thread.is_finished()
     }
 
-    /// Waits for the thread's end. `None` if it did not end by itself.
+    /// Waits for the end of the thread. `None` if it panicked.
     pub fn join(self) -> Option<Ended> {
         self.thread.join().ok().flatten()
     }
 }
 
-fn loop_body<P: BusPort, D: HostInterface>(
+fn loop_body<P: BusPort, H: HostInterface>(
     config: &ThreadConfig,
-    mut work: Work<P, D>,
-    say: &mpsc::SyncSender<Result<Begun, Box<ThreadReport>>>,
+    mut parts: LoopParts<P, H>,
+    begun: &mpsc::SyncSender<Result<Begun, Box<ThreadReport>>>,
 ) -> Option<Ended> {
     let realtime = RealtimeThread::enter(config);
     let report = *realtime.report();
-    if work.is_realtime_required && report.refused().next().is_some() {
-        // Whoever started the thread waits for exactly one message.
-        let _ = say.send(Err(Box::new(report)));
+    if parts.is_realtime_required && report.refused().next().is_some() {
+        // The starting thread waits for exactly one message.
+        let _ = begun.send(Err(Box::new(report)));
         return None;
     }
-    let period_ns = work.engine.period_ns();
-    let mut clock = match work.spin_guard_ns {
+    let period_ns = parts.engine.period_ns();
+    let mut clock = match parts.spin_guard_ns {
         Some(fixed_ns) => PacedClock::fixed(fixed_ns.min(period_ns / 2)),
         None => measured_clock(period_ns / 10),
     };
-    let _ = say.send(Ok(Begun { report }));
-    let epoch_ns = quiet::first_slot_after(clock.now_ns() + LEAD_IN_NS, period_ns);
-    let mut cycle = Cycle::new(Grid::new(epoch_ns, period_ns)?, work.plan);
+    let _ = begun.send(Ok(Begun { report }));
+    let epoch_ns = sleep_alignment::first_slot_after(clock.now_ns() + LEAD_IN_NS, period_ns);
+    let mut cycle = Cycle::new(Grid::new(epoch_ns, period_ns)?, parts.plan);
     let before = realtime.page_faults();
-    while cycle.run(&mut work.engine, &mut clock, &mut work.ports, &mut work.host) == Flow::Continue {}
+    while cycle.run(&mut parts.engine, &mut clock, &mut parts.ports, &mut parts.host) == Flow::Continue {}
     let page_faults = realtime.page_faults().since(before);
     Some(Ended { page_faults, spin_guard_ns: clock.guard_ns() })
 }
 
-/// A clock that has slept some times, so that its guard is of use in the first slot.
+/// A clock that has measured some wake-ups, so that its guard fits from the first slot on.
 fn measured_clock(cap_ns: u64) -> PacedClock {
     let mut clock = PacedClock::measured(cap_ns);
     for _ in 0..MEASURED_WAKE_UPS {

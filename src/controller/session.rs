@@ -1,4 +1,4 @@
-//! A controller in real time, from the configuration to what is left of the run.
+//! A run in real time, from the configuration to its result.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, mpsc};
@@ -11,63 +11,63 @@ use super::assemble::{self, AssembleError};
 use super::channels::{ChannelSizes, Observer, RequestNumbers, Streamer, channels};
 use super::handle::WaitingRequests;
 use super::outcome::{Interrupt, Outcome, Progress};
-use super::quiet;
-use super::realtime_thread::{self, Begun, Ended, StartError, Work};
+use super::realtime_thread::{self, Begun, Ended, LoopParts, StartError};
+use super::sleep_alignment;
 use super::supervisor::Supervisor;
 use super::time_of_day::TimeOfDayKeeper;
 use crate::bus::ownership::{ClaimError, IfOwned, Ownership};
 use crate::bus::port::{OpenError, Port};
 use crate::bus::trace::Trace;
 use crate::config::Config;
-use crate::faults::Rehearsal;
+use crate::faults::FaultInjector;
 use crate::telemetry::{
-    BlackBoxOptions, Destination, Fault, LogSummary, Logger, LoggerOptions, LoggerThread, Machine, Notice,
-    WallClock, panic_message,
+    BlackBoxOptions, Incident, LogSummary, Logger, LoggerOptions, LoggerThread, Machine, Notice,
+    RecordingDestination, WallClock, panic_message,
 };
 
-/// A pause between two looks at the controller.
+/// The pause between two polls of the controller.
 const PAUSE: Duration = Duration::from_millis(1);
 
-/// What a run is asked for beside its configuration.
+/// Options of a run beside its configuration.
 #[derive(Default)]
 pub struct SessionOptions {
     /// Repeat the program until this time is over.
     pub duration_ns: Option<u64>,
-    /// Where to record to, instead of where the configuration says.
-    pub recording: Option<Destination>,
+    /// Where to record; `None` as the configuration says.
+    pub recording: Option<RecordingDestination>,
     /// Whether a refused step of the real-time set-up ends the run before anything moves.
     pub is_realtime_required: bool,
-    /// Faults that are played on the buses.
-    pub rehearsal: Option<Arc<Rehearsal>>,
+    /// Faults that are injected into the buses.
+    pub fault_injector: Option<Arc<FaultInjector>>,
     /// What happens when another process of this host is the master of a bus already.
     pub if_owned: IfOwned,
 }
 
-/// What is left of a run.
+/// The result of a run.
 #[derive(Clone, Debug)]
 pub struct Session {
     /// How it ended.
     pub outcome: Outcome,
     /// The state after the last cycle.
     pub snapshot: Snapshot,
-    /// Where the last move led (rad or m), an axis each; `None` if the program did not finish.
+    /// The target of the last move (rad or m), one value for each axis; `None` if the program did not finish.
     pub target: Option<Vec<f64>>,
-    /// The axes whose drives could not be reached in the end: see [`Supervisor::unreached`].
+    /// The axes whose drives did not answer during the shut-down: see [`Supervisor::unreached`].
     pub unreached: Vec<usize>,
-    /// What came of the real-time set-up.
+    /// The result of the real-time set-up.
     pub begun: Begun,
-    /// How the loop was; `None` if the thread died.
+    /// Measurements of the loop; `None` if its thread panicked.
     pub ended: Option<Ended>,
-    /// How long the buses were open.
+    /// The time for which the buses were open.
     pub open_ns: u64,
-    /// What the logger leaves behind.
+    /// The result of the logger.
     pub log: LogSummary,
 }
 
-/// Why there was no run.
+/// Why a run did not begin.
 #[derive(Debug, thiserror::Error)]
 pub enum SessionError {
-    /// The configuration asks for what cannot be done.
+    /// The configuration cannot be executed.
     #[error(transparent)]
     Assemble(#[from] AssembleError),
     /// A bus may not be commanded by this process.
@@ -76,22 +76,19 @@ pub enum SessionError {
     /// A bus cannot be opened.
     #[error(transparent)]
     Open(#[from] OpenError),
-    /// The logger has no thread.
+    /// The thread of the logger could not be started.
     #[error("the logger could not be started: {0}")]
     Logger(std::io::Error),
-    /// The real-time thread does not run.
+    /// The real-time thread could not be started.
     #[error(transparent)]
     Start(#[from] StartError),
 }
 
-/// Runs the program of a configuration. `notify` hears what the logger has to say, from its thread. `watch` is called
-/// about once in a millisecond with the newest state and what the run is doing, and may ask it to end.
+/// Runs the program of a configuration. The logger calls `notify` from its thread. `watch` is called about once in a
+/// millisecond with the newest state and the progress of the run, and may ask the run to end.
 ///
-/// Before anything is sent, the real buses are locked and listened to, see [`crate::bus::ownership`]. Another process may ask
-/// for the buses later: the group then stops in category 2, and the run ends as [`Outcome::TakenOver`].
-///
-/// When `notify` or `watch` panics, the panic is caught, that one is not called again, and the group stops in category 1;
-/// the run then ends as [`Outcome::CallbackPanicked`].
+/// If `notify` or `watch` panics, the panic is caught, the function is not called again, and the group stops in category 1.
+/// The run then ends as [`Outcome::CallbackPanicked`].
 ///
 /// # Errors
 /// See [`SessionError`]; nothing has moved then.
@@ -101,20 +98,29 @@ pub fn run(
     notify: Box<dyn FnMut(&Notice) + Send>,
     watch: impl FnMut(&Snapshot, Progress) -> Option<Interrupt>,
 ) -> Result<Session, SessionError> {
-    lead(config, options, notify, watch, None)
+    run_with(config, options, notify, watch, None)
 }
 
-/// Somebody who commands the group from another thread, in place of the program.
+/// A client in another thread that commands the group, in place of the program.
 pub(super) struct Remote {
-    /// What is asked of the group.
+    /// The requests of the client.
     pub requests: Arc<WaitingRequests>,
-    /// Where the ways to see the state and to stream are handed out, and the numbers of requests, once the real-time
-    /// thread runs.
-    pub introduce: mpsc::SyncSender<(Observer, Streamer, RequestNumbers)>,
+    /// Takes the client's handles once the real-time thread runs.
+    pub handles: mpsc::SyncSender<RemoteHandles>,
 }
 
-/// As [`run`]; with a remote, the group does what that asks for.
-pub(super) fn lead(
+/// The handles of a client to a running controller.
+pub(super) struct RemoteHandles {
+    /// Reads the state.
+    pub observer: Observer,
+    /// Sends streamed set-points.
+    pub streamer: Streamer,
+    /// Gives the ids of requests.
+    pub numbers: RequestNumbers,
+}
+
+/// The same as [`run`]. With a remote, the group executes its requests instead of a program.
+pub(super) fn run_with(
     config: &Config,
     options: SessionOptions,
     notify: Box<dyn FnMut(&Notice) + Send>,
@@ -135,32 +141,35 @@ fn lead_as_owner(
     mut ownership: Ownership,
 ) -> Result<Session, SessionError> {
     let mut clock = MonotonicClock::default();
+    config.validate_on_this_machine().map_err(AssembleError::from)?;
     let engine = Box::new(assemble::engine(config)?);
-    let (ports, traces) = open_ports(config, options.rehearsal.as_deref())?;
+    let (ports, traces) = open_ports(config, options.fault_injector.as_deref())?;
     let (rt, mut host, log) = channels(&ChannelSizes::of(config));
     let mut supervisor = match remote {
         Some(_) => Supervisor::serving(config),
         None => Supervisor::new(config, options.duration_ns),
     };
 
-    let own = |is_wanted: bool| is_wanted.then(|| Destination::Directory(config.telemetry.directory.clone()));
+    let directory = |is_wanted: bool| {
+        is_wanted.then(|| RecordingDestination::Directory(config.telemetry.directory.clone()))
+    };
     let started_ns = clock.now_ns();
     let logger_options = LoggerOptions {
         machine: Machine::of(config),
         wall_clock: WallClock::starting_now(started_ns),
         started_ns,
-        recording: options.recording.or_else(|| own(config.telemetry.is_recorded)),
-        candump: own(config.telemetry.is_candump_written),
+        recording: options.recording.or_else(|| directory(config.telemetry.is_recorded)),
+        candump: directory(config.telemetry.is_candump_written),
         black_box: config
             .telemetry
             .black_box_ns
             .map(|span_ns| BlackBoxOptions { span_ns, directory: config.telemetry.directory.clone() }),
         traces,
     };
-    // The logger's thread starts before the real-time thread is elevated and inherits nothing of it.
+    // The logger's thread starts first, so that it does not inherit the real-time priority.
     let logger =
         LoggerThread::start(Logger::new(log, logger_options, notify)).map_err(SessionError::Logger)?;
-    let work = Work {
+    let parts = LoopParts {
         engine,
         plan: assemble::slot_plan(config),
         ports,
@@ -168,7 +177,7 @@ fn lead_as_owner(
         spin_guard_ns: config.realtime.spin_guard_ns,
         is_realtime_required: options.is_realtime_required,
     };
-    let running = match realtime_thread::start(realtime_thread::thread_config(&config.realtime), work) {
+    let running = match realtime_thread::start(realtime_thread::thread_config(&config.realtime), parts) {
         Ok(running) => running,
         Err(error) => {
             logger.finish();
@@ -177,23 +186,27 @@ fn lead_as_owner(
     };
     let begun = running.begun();
     if let (Some(remote), Some(streamer)) = (&remote, host.take_streamer()) {
-        // Whoever no longer waits for it has given up; the run then ends as it was told to.
-        let _ = remote.introduce.send((host.observer(), streamer, host.numbers()));
+        // This fails only if the client has given up. It has then asked the run to end.
+        let _ = remote.handles.send(RemoteHandles {
+            observer: host.observer(),
+            streamer,
+            numbers: host.numbers(),
+        });
     }
     let mut time_of_day = TimeOfDayKeeper::of(config);
-    let mut time_to_tell = None;
+    let mut time_request = None;
     let (mut panicked, mut is_watched) = (None, true);
     let mut taken_over_by = None;
     while !running.is_finished() {
         supervisor.poll(clock.now_ns(), &mut host);
         let now_ns = clock.now_ns();
         let time = time_of_day.poll(now_ns, || WallClock::starting_now(now_ns));
-        time_to_tell = time.or(time_to_tell).filter(|time| host.request(*time).is_err());
+        time_request = time.or(time_request).filter(|time| host.request(*time).is_err());
         if let Some(remote) = &remote {
-            remote.requests.hand_over(|asked| host.ask(asked).is_ok());
+            remote.requests.hand_over(|envelope| host.submit(envelope).is_ok());
         }
-        if let Some(rehearsal) = &options.rehearsal {
-            rehearsal.observe(&host.snapshot());
+        if let Some(fault_injector) = &options.fault_injector {
+            fault_injector.observe(&host.snapshot());
         }
         if let Some(process) = ownership.poll_release_request() {
             taken_over_by = Some(process);
@@ -201,12 +214,12 @@ fn lead_as_owner(
         }
         let mut panics_now = None;
         if is_watched {
-            // What the caller's function has left half done is the caller's; it is not called again.
+            // After a panic the function is not called again, so its broken state has no effect.
             match catch_unwind(AssertUnwindSafe(|| watch(&host.snapshot(), supervisor.progress()))) {
                 Ok(interrupt) => interrupt.into_iter().for_each(|interrupt| supervisor.interrupt(interrupt)),
                 Err(payload) => {
                     let message = panic_message(&*payload);
-                    logger.fault(Fault::CallbackPanicked(message.clone()));
+                    logger.incident(Incident::CallbackPanicked(message.clone()));
                     is_watched = false;
                     panics_now = Some(message);
                 }
@@ -215,18 +228,18 @@ fn lead_as_owner(
         if panicked.is_none() {
             panicked = panics_now.or_else(|| logger.panic().map(str::to_owned));
             if panicked.is_some() {
-                // The queue is emptied in every cycle; were it full, the way out below disables the group as well.
+                // The engine empties the queue in every cycle. If it is full, the interrupt below disables the group as well.
                 let _ = host.request(Request::Stop(StopCategory::One));
                 supervisor.interrupt(Interrupt::Controlled);
             }
         }
-        quiet::sleep(PAUSE, config.cycle.period_ns);
+        sleep_alignment::sleep(PAUSE, config.cycle.period_ns);
     }
     let ended = running.join();
     // The ports are closed with the thread. What is left to be done here does not concern the buses.
     drop(ownership);
     if ended.is_none() {
-        logger.fault(Fault::ThreadDied);
+        logger.incident(Incident::ThreadDied);
     }
     let outcome =
         match (supervisor.outcome().cloned().unwrap_or(Outcome::ThreadDied), panicked, taken_over_by) {
@@ -236,8 +249,8 @@ fn lead_as_owner(
             (Outcome::Interrupted, None, Some(process)) => Outcome::TakenOver { process },
             (outcome, ..) => outcome,
         };
-    let target =
-        supervisor.target().filter(|_| outcome == Outcome::Finished && options.duration_ns.is_none());
+    let is_done = matches!(outcome, Outcome::Finished | Outcome::OffTarget { .. });
+    let target = supervisor.target().filter(|_| is_done && options.duration_ns.is_none());
     Ok(Session {
         snapshot: host.snapshot(),
         target: target.map(<[f64]>::to_vec),
@@ -250,14 +263,17 @@ fn lead_as_owner(
     })
 }
 
-fn open_ports(config: &Config, rehearsal: Option<&Rehearsal>) -> Result<(Vec<Port>, Vec<Trace>), OpenError> {
+fn open_ports(
+    config: &Config,
+    fault_injector: Option<&FaultInjector>,
+) -> Result<(Vec<Port>, Vec<Trace>), OpenError> {
     let mut ports = Vec::with_capacity(config.buses.len());
     let mut traces = Vec::new();
     let is_traced = config.telemetry.is_candump_written || config.telemetry.black_box_ns.is_some();
     for (index, bus) in config.buses.iter().enumerate() {
         let port = Port::open(config, index)?;
-        let port = match rehearsal {
-            Some(rehearsal) => rehearsal.wrap(index, port),
+        let port = match fault_injector {
+            Some(fault_injector) => fault_injector.wrap(index, port),
             None => port,
         };
         ports.push(if is_traced {

@@ -1,12 +1,12 @@
-//! The life cycle of a run, without input and output: bring-up, enable, motion program, stop, disable, leave.
+//! The life cycle of a run, without input and output: bring-up, enabling, motion program, stop, disabling, shut-down.
 //!
 //! ```text
-//! Configure → Start → Activate → Enable → Run → Settle → Disable → Leave → Done
+//! Configure → Start → Activate → Enable → Run → Settle → Disable → ShutDown → Done
 //!     └────────── any failure, stop or interrupt ─────────┴──────────↗
 //! ```
 //!
-//! [`Supervisor::poll`] is called now and then with the host's side of the host interface. It never blocks, so it runs beside the
-//! real-time thread as well as between the cycles of a run in virtual time.
+//! [`Supervisor::poll`] is called repeatedly with the host's side of the channels. It never blocks. So it runs beside the
+//! real-time thread, and also between the cycles of a run in virtual time.
 
 use std::collections::VecDeque;
 
@@ -14,15 +14,16 @@ use takt_rt::{
     AxisSnapshot, Frame, Phase, Request, RequestEnvelope, Rule, Snapshot, StopCategory, StopReason,
 };
 
+use super::arrival::{ARRIVAL_NS, Arrival};
 use super::channels::{HostSide, RequestNumbers};
 use super::outcome::{Interrupt, Outcome, Progress};
-use super::program::{ProgramRunner, Step};
+use super::program::{ProgramRunner, ProgramStep};
 use crate::config::Config;
-use crate::drive::{AxisFacts, BringUp, Leave};
+use crate::drive::{AxisFacts, BringUp, Shutdown};
 
-/// The group must get where it was told to within this time; the engine has time-outs of its own, which are shorter.
-const PATIENCE_NS: u64 = 8_000_000_000;
-/// Standstill before the brakes: the drives settle on their last set-point.
+/// A stage must be completed within this time. The engine has its own, shorter time-outs.
+const STAGE_TIMEOUT_NS: u64 = 8_000_000_000;
+/// The drives settle on their last set-point for this time, before they are disabled and the brakes engage.
 const SETTLE_NS: u64 = 300_000_000;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,20 +38,21 @@ enum Stage {
         until_ns: u64,
     },
     Disable,
-    Leave,
-    /// The power is being taken without farewell.
-    Cut,
+    ShutDown,
+    /// The power is being removed, without a shut-down of the drives.
+    RemovePower,
     Done,
 }
 
-/// Leads a controller through its life.
+/// Takes a controller through its life cycle.
 pub struct Supervisor {
     axes: usize,
     stage: Stage,
     stage_since_ns: Option<u64>,
     bring_up: BringUp,
-    leave: Leave,
+    shutdown: Shutdown,
     program: ProgramRunner,
+    arrival: Arrival,
     facts: Vec<AxisFacts>,
     outgoing: VecDeque<RequestEnvelope>,
     numbers: RequestNumbers,
@@ -60,7 +62,7 @@ pub struct Supervisor {
     unreached: Vec<usize>,
     deadline_ns: Option<u64>,
     duration_ns: Option<u64>,
-    /// Whether somebody else commands the group once it is enabled.
+    /// Whether a client commands the group, in place of the program.
     is_serving: bool,
 }
 
@@ -72,8 +74,9 @@ impl Supervisor {
             stage: Stage::Configure,
             stage_since_ns: None,
             bring_up: BringUp::new(config),
-            leave: Leave::new(config),
+            shutdown: Shutdown::new(config),
             program: ProgramRunner::new(&config.program, duration_ns.is_some()),
+            arrival: Arrival::of(config),
             facts: Vec::new(),
             outgoing: VecDeque::new(),
             numbers: RequestNumbers::default(),
@@ -86,13 +89,13 @@ impl Supervisor {
         }
     }
 
-    /// A group that is brought up and enabled, and then left to somebody else's requests until it is interrupted. A stop
-    /// does not end the run: whoever commands the group decides what follows it.
+    /// A run without a program: the group is brought up and enabled, and then executes the requests of clients until it is
+    /// interrupted. A stop does not end this run, since the client decides what follows it.
     pub fn serving(config: &Config) -> Self {
         Self { is_serving: true, ..Self::new(config, None) }
     }
 
-    /// Asks the run to end. A harder interrupt overtakes a softer one.
+    /// Asks the run to end. An immediate interrupt replaces a controlled one.
     pub fn interrupt(&mut self, interrupt: Interrupt) {
         self.interrupt = self.interrupt.max(Some(interrupt));
     }
@@ -102,35 +105,34 @@ impl Supervisor {
         if self.stage == Stage::Done { self.outcome.as_ref() } else { None }
     }
 
-    /// The axes whose drives gave no answer to the farewell, though they had been brought up: nobody has heard whether they
-    /// have stopped.
+    /// The axes whose drives were brought up and did not answer during the shut-down. It is unknown whether they have stopped.
     pub fn unreached(&self) -> &[usize] {
         &self.unreached
     }
 
-    /// What the drives have said of themselves; empty before they are configured.
+    /// The data that the drives have reported about themselves; empty before they are configured.
     pub fn facts(&self) -> &[AxisFacts] {
         &self.facts
     }
 
-    /// Where the last move led (rad or m), an axis each.
+    /// The target of the last move (rad or m), one value for each axis.
     pub fn target(&self) -> Option<&[f64]> {
         self.program.target()
     }
 
-    /// Does what is due.
+    /// Takes received frames and the newest state, and sends the frames and requests that are due.
     pub fn poll(&mut self, now_ns: u64, host: &mut HostSide) {
         while let Some((bus, received)) = host.take_service() {
             self.bring_up.receive(bus, &received.frame);
-            self.leave.receive(bus, &received.frame);
+            self.shutdown.receive(bus, &received.frame);
         }
         let snapshot = host.snapshot();
         self.numbers = host.numbers();
-        self.heed_interrupt(now_ns);
+        self.handle_interrupt(now_ns);
         let since_ns = *self.stage_since_ns.get_or_insert(now_ns);
         self.step(now_ns, now_ns.saturating_sub(since_ns), &snapshot, host);
         while let Some(request) = self.outgoing.front() {
-            if host.ask(*request).is_err() {
+            if host.submit(*request).is_err() {
                 break;
             }
             self.outgoing.pop_front();
@@ -147,31 +149,35 @@ impl Supervisor {
             Stage::Run => self.run(now_ns, snapshot),
             Stage::Settle { until_ns } => {
                 let is_moving = matches!(snapshot.phase, Phase::Moving | Phase::Streaming | Phase::Stopping);
-                if let Some(stop) = own_stop(snapshot) {
+                let missed = self.missed_target(snapshot);
+                let is_waited_for = (is_moving && elapsed_ns <= STAGE_TIMEOUT_NS)
+                    || (missed.is_some() && elapsed_ns <= ARRIVAL_NS);
+                if let Some(stop) = fault_stop(snapshot) {
                     self.end(now_ns, Outcome::Stopped(stop));
-                } else if is_moving && elapsed_ns <= PATIENCE_NS {
+                } else if is_waited_for {
                     self.stage = Stage::Settle { until_ns: now_ns + SETTLE_NS };
-                } else if is_moving || now_ns >= until_ns {
-                    // Whoever still moves the group by then does not want it to end: it is stopped first.
+                } else if is_moving || missed.is_some() || now_ns >= until_ns {
+                    self.outcome = missed.or(self.outcome.take());
+                    // A client may still be moving the group: disabling stops it first.
                     self.begin_disable(now_ns);
                 }
             }
             Stage::Disable => {
                 if matches!(snapshot.phase, Phase::Disabled | Phase::Passive) {
-                    self.note_fault_of_disabling(snapshot);
-                    self.begin_leave(now_ns);
-                } else if elapsed_ns > PATIENCE_NS {
+                    self.note_fault_while_disabling(snapshot);
+                    self.begin_shut_down(now_ns);
+                } else if elapsed_ns > STAGE_TIMEOUT_NS {
                     self.outcome.get_or_insert(Outcome::Stuck { phase: snapshot.phase });
-                    self.begin_leave(now_ns);
+                    self.begin_shut_down(now_ns);
                 }
             }
-            Stage::Leave => self.say_farewell(now_ns, elapsed_ns, host),
-            Stage::Cut => {
-                // The last controlwords take effect at the SYNC after them, and may have to wait for the bus: the loop goes
-                // on until it shows, or until the engine waits no longer.
+            Stage::ShutDown => self.shut_down(now_ns, elapsed_ns, host),
+            Stage::RemovePower => {
+                // The last controlwords take effect at the next SYNC, and may wait for the bus. So the loop goes on until the
+                // group is disabled.
                 let is_off = matches!(snapshot.phase, Phase::Disabled | Phase::Passive);
-                if (is_off && elapsed_ns > 0) || elapsed_ns > PATIENCE_NS {
-                    self.ask(Request::Shutdown);
+                if (is_off && elapsed_ns > 0) || elapsed_ns > STAGE_TIMEOUT_NS {
+                    self.request(Request::Shutdown);
                     self.enter(Stage::Done, now_ns);
                 }
             }
@@ -180,21 +186,21 @@ impl Supervisor {
     }
 
     fn configure(&mut self, now_ns: u64, host: &mut HostSide) {
-        self.bring_up.poll(now_ns, &mut sending_through(host));
+        self.bring_up.poll(now_ns, &mut service_sender(host));
         match self.bring_up.outcome() {
             None => {}
             Some(Err(error)) => self.end(now_ns, Outcome::BringUpFailed(error)),
             Some(Ok(facts)) => {
                 for (axis, facts) in (0..).zip(&facts) {
                     if let Some(data) = &facts.process_data {
-                        self.ask(data.request(axis));
+                        self.request(data.request(axis));
                     }
                     if let Some(torque) = facts.rated_torque {
-                        self.ask(Request::RatedTorque { axis, torque });
+                        self.request(Request::RatedTorque { axis, torque });
                     }
                 }
                 self.facts = facts;
-                // It has just succeeded, so the second stage can begin.
+                // The first part of the bring-up has succeeded, so the second part can begin.
                 let _ = self.bring_up.start();
                 self.enter(Stage::Start, now_ns);
             }
@@ -202,37 +208,37 @@ impl Supervisor {
     }
 
     fn start(&mut self, now_ns: u64, host: &mut HostSide) {
-        self.bring_up.poll(now_ns, &mut sending_through(host));
+        self.bring_up.poll(now_ns, &mut service_sender(host));
         match self.bring_up.outcome() {
             None => {}
             Some(Err(error)) => self.end(now_ns, Outcome::BringUpFailed(error)),
             Some(Ok(facts)) => {
-                // Some drives report by process data only when they are given a target.
+                // Some drives send feedback by process data only after they have received a target.
                 let positions = (0..)
                     .zip(&facts)
                     .map(|(axis, facts)| Request::Position { axis, counts: facts.position_counts });
-                positions.for_each(|position| self.ask(position));
-                // Every node is operational: each answers the first SYNC, unless it always answers late.
-                self.ask(Request::Sync(true));
-                self.ask(Request::Activate);
+                positions.for_each(|position| self.request(position));
+                // Every node is operational now. Each answers the first SYNC, or is a drive that always answers late.
+                self.request(Request::Sync(true));
+                self.request(Request::Activate);
                 self.enter(Stage::Activate, now_ns);
             }
         }
     }
 
     fn activate(&mut self, now_ns: u64, elapsed_ns: u64, snapshot: &Snapshot) {
-        let silent = self.shown(snapshot).iter().position(|axis| !axis.is_heard);
+        let silent = self.axes_of(snapshot).iter().position(|axis| !axis.is_heard);
         match silent {
             None if snapshot.phase == Phase::Disabled => {
                 if self.faulted(snapshot).is_some() {
-                    self.ask(Request::ResetFaults);
+                    self.request(Request::ResetFaults);
                     self.enter(Stage::ResetFaults, now_ns);
                 } else {
                     self.begin_enable(now_ns);
                 }
             }
-            Some(axis) if elapsed_ns > PATIENCE_NS => self.end(now_ns, Outcome::NotHeard { axis }),
-            _ if elapsed_ns > PATIENCE_NS => self.end(now_ns, Outcome::Stuck { phase: snapshot.phase }),
+            Some(axis) if elapsed_ns > STAGE_TIMEOUT_NS => self.end(now_ns, Outcome::NotHeard { axis }),
+            _ if elapsed_ns > STAGE_TIMEOUT_NS => self.end(now_ns, Outcome::Stuck { phase: snapshot.phase }),
             _ => {}
         }
     }
@@ -240,7 +246,7 @@ impl Supervisor {
     fn reset_faults(&mut self, now_ns: u64, elapsed_ns: u64, snapshot: &Snapshot) {
         match self.faulted(snapshot) {
             None => self.begin_enable(now_ns),
-            Some((axis, code)) if elapsed_ns > PATIENCE_NS / 4 => {
+            Some((axis, code)) if elapsed_ns > STAGE_TIMEOUT_NS / 4 => {
                 self.end(now_ns, Outcome::FaultPersists { axis, code });
             }
             Some(_) => {}
@@ -248,20 +254,20 @@ impl Supervisor {
     }
 
     fn begin_enable(&mut self, now_ns: u64) {
-        self.ask(Request::Enable);
+        self.request(Request::Enable);
         self.enter(Stage::Enable, now_ns);
     }
 
     fn enable(&mut self, now_ns: u64, elapsed_ns: u64, snapshot: &Snapshot) {
-        // Whoever commands the group may have been quicker to see that it holds.
+        // A client may already have moved the group before this poll.
         let is_enabled =
             matches!(snapshot.phase, Phase::Holding | Phase::Moving | Phase::Streaming | Phase::Stopping);
-        if let Some(stop) = own_stop(snapshot).filter(|_| !(self.is_serving && is_enabled)) {
+        if let Some(stop) = fault_stop(snapshot).filter(|_| !(self.is_serving && is_enabled)) {
             self.end(now_ns, Outcome::Stopped(stop));
         } else if is_enabled {
             self.deadline_ns = self.duration_ns.map(|duration_ns| now_ns + duration_ns);
             self.enter(Stage::Run, now_ns);
-        } else if elapsed_ns > PATIENCE_NS {
+        } else if elapsed_ns > STAGE_TIMEOUT_NS {
             self.end(now_ns, Outcome::Stuck { phase: snapshot.phase });
         }
     }
@@ -270,40 +276,51 @@ impl Supervisor {
         if self.is_serving {
             return;
         }
-        if let Some(stop) = own_stop(snapshot) {
+        if let Some(stop) = fault_stop(snapshot) {
             return self.end(now_ns, Outcome::Stopped(stop));
         }
         if self.deadline_ns.is_some_and(|deadline_ns| now_ns >= deadline_ns) {
-            self.ask(Request::Stop(StopCategory::Two));
+            self.request(Request::Stop(StopCategory::Two));
             return self.end(now_ns, Outcome::Finished);
         }
         match self.program.poll(now_ns, snapshot, &self.numbers) {
-            Step::Wait => {}
-            Step::Begin(requests) => self.outgoing.extend(requests),
-            Step::Refused { number, refusal } => self.end(now_ns, Outcome::MoveRefused { number, refusal }),
-            Step::Finished => self.end(now_ns, Outcome::Finished),
+            ProgramStep::Wait => {}
+            ProgramStep::Begin(requests) => self.outgoing.extend(requests),
+            ProgramStep::Refused { number, refusal } => {
+                self.end(now_ns, Outcome::MoveRefused { number, refusal });
+            }
+            ProgramStep::Replaced { number } => self.end(now_ns, Outcome::MoveReplaced { number }),
+            ProgramStep::Finished => self.end(now_ns, Outcome::Finished),
         }
     }
 
-    fn heed_interrupt(&mut self, now_ns: u64) {
+    fn handle_interrupt(&mut self, now_ns: u64) {
         match (self.interrupt, self.stage) {
-            (None, _) | (_, Stage::Done | Stage::Cut) => {}
+            (None, _) | (_, Stage::Done | Stage::RemovePower) => {}
             (Some(Interrupt::Immediate), _) => {
-                self.ask(Request::InhibitEnable);
-                self.ask(Request::Stop(StopCategory::Zero));
+                self.request(Request::InhibitEnable);
+                self.request(Request::Stop(StopCategory::Zero));
                 self.outcome.get_or_insert(Outcome::Interrupted);
-                self.enter(Stage::Cut, now_ns);
+                self.enter(Stage::RemovePower, now_ns);
             }
-            (Some(Interrupt::Controlled), Stage::Settle { .. } | Stage::Disable | Stage::Leave) => {}
+            (Some(Interrupt::Controlled), Stage::Settle { .. } | Stage::Disable | Stage::ShutDown) => {}
             (Some(Interrupt::Controlled), Stage::Run) => {
-                self.ask(Request::Stop(StopCategory::Two));
+                self.request(Request::Stop(StopCategory::Two));
                 self.end(now_ns, Outcome::Interrupted);
             }
             (Some(Interrupt::Controlled), _) => self.end(now_ns, Outcome::Interrupted),
         }
     }
 
-    /// Begins the way out from wherever the run is.
+    /// The joint that the finished program has left off its target, if there is one. A program that was cut off by its
+    /// duration has no target that counts.
+    fn missed_target(&self, snapshot: &Snapshot) -> Option<Outcome> {
+        let has_finished = self.outcome == Some(Outcome::Finished) && self.duration_ns.is_none();
+        let target = self.program.target().filter(|_| has_finished)?;
+        self.arrival.missed(target, snapshot)
+    }
+
+    /// Begins the end of the run, from any stage.
     fn end(&mut self, now_ns: u64, outcome: Outcome) {
         let was_running = matches!(self.stage, Stage::Run);
         let has_been_active = !matches!(self.stage, Stage::Configure | Stage::Start);
@@ -313,44 +330,44 @@ impl Supervisor {
         } else if has_been_active {
             self.begin_disable(now_ns);
         } else {
-            self.begin_leave(now_ns);
+            self.begin_shut_down(now_ns);
         }
     }
 
     fn begin_disable(&mut self, now_ns: u64) {
-        // In this order, so that nobody enables what has just been disabled.
-        self.ask(Request::InhibitEnable);
-        self.ask(Request::Disable);
+        // In this order, so that no client can enable the group after it has been disabled.
+        self.request(Request::InhibitEnable);
+        self.request(Request::Disable);
         self.enter(Stage::Disable, now_ns);
     }
 
-    /// A run that had been well so far was not, if the drives did not let themselves be disabled as they should.
-    fn note_fault_of_disabling(&mut self, snapshot: &Snapshot) {
-        let fault = own_stop(snapshot).filter(|stop| stop.phase == Phase::Disabling);
+    /// A fault during disabling is the outcome of a run that was without faults before.
+    fn note_fault_while_disabling(&mut self, snapshot: &Snapshot) {
+        let fault = fault_stop(snapshot).filter(|stop| stop.phase == Phase::Disabling);
         if let (Some(stop), Some(Outcome::Finished | Outcome::Interrupted)) = (fault, &self.outcome) {
             self.outcome = Some(Outcome::Stopped(stop));
         }
     }
 
-    fn begin_leave(&mut self, now_ns: u64) {
-        self.enter(Stage::Leave, now_ns);
+    fn begin_shut_down(&mut self, now_ns: u64) {
+        self.enter(Stage::ShutDown, now_ns);
     }
 
-    fn say_farewell(&mut self, now_ns: u64, elapsed_ns: u64, host: &mut HostSide) {
-        self.leave.poll(now_ns, &mut sending_through(host));
-        let left = self.leave.outcome();
-        if left.is_some() || elapsed_ns > PATIENCE_NS {
-            if let (Some(Err(error)), false) = (left, self.facts.is_empty()) {
+    fn shut_down(&mut self, now_ns: u64, elapsed_ns: u64, host: &mut HostSide) {
+        self.shutdown.poll(now_ns, &mut service_sender(host));
+        let outcome = self.shutdown.outcome();
+        if outcome.is_some() || elapsed_ns > STAGE_TIMEOUT_NS {
+            if let (Some(Err(error)), false) = (outcome, self.facts.is_empty()) {
                 let silent = error.failures.into_iter().filter(|failure| failure.cause.is_silence());
                 self.unreached = silent.map(|failure| failure.axis).collect();
             }
-            self.ask(Request::Sync(false));
-            self.ask(Request::Shutdown);
+            self.request(Request::Sync(false));
+            self.request(Request::Shutdown);
             self.enter(Stage::Done, now_ns);
         }
     }
 
-    fn ask(&mut self, request: Request) {
+    fn request(&mut self, request: Request) {
         self.outgoing.push_back(RequestEnvelope { id: self.numbers.next(), request });
     }
 
@@ -359,16 +376,16 @@ impl Supervisor {
         self.stage_since_ns = Some(now_ns);
     }
 
-    fn shown<'a>(&self, snapshot: &'a Snapshot) -> &'a [AxisSnapshot] {
+    fn axes_of<'a>(&self, snapshot: &'a Snapshot) -> &'a [AxisSnapshot] {
         snapshot.axes.get(..self.axes).unwrap_or(&snapshot.axes)
     }
 
     fn faulted(&self, snapshot: &Snapshot) -> Option<(usize, u16)> {
-        let axes = self.shown(snapshot);
+        let axes = self.axes_of(snapshot);
         axes.iter().position(|axis| axis.drive_state.is_faulted()).map(|axis| (axis, axes[axis].error_code))
     }
 
-    /// What the run is doing.
+    /// The present step of the run.
     pub fn progress(&self) -> Progress {
         let (what, fraction) = match self.stage {
             Stage::Configure | Stage::Start => {
@@ -383,22 +400,22 @@ impl Supervisor {
             }
             Stage::Settle { .. } => ("settling".to_owned(), Some(1.0)),
             Stage::Disable => ("stopping".to_owned(), Some(1.0)),
-            Stage::Leave => ("leaving".to_owned(), Some(1.0)),
-            Stage::Cut => ("cutting the power".to_owned(), Some(1.0)),
+            Stage::ShutDown => ("shutting down".to_owned(), Some(1.0)),
+            Stage::RemovePower => ("removing the power".to_owned(), Some(1.0)),
             Stage::Done => ("done".to_owned(), Some(1.0)),
         };
         Progress { what, fraction }
     }
 }
 
-/// A stop that nobody asked for.
-fn own_stop(snapshot: &Snapshot) -> Option<StopReason> {
+/// A stop for a fault.
+fn fault_stop(snapshot: &Snapshot) -> Option<StopReason> {
     snapshot.stop.filter(|stop| stop.rule() != Rule::Requested)
 }
 
-/// Hands the frames of a procedure to the service channel. A frame that finds no room is lost like one on a bad bus:
-/// the procedure asks again.
-fn sending_through(host: &mut HostSide) -> impl FnMut(usize, Frame) {
+/// Passes the frames of a procedure to the service channel. If the channel is full, the frame is lost as on a disturbed bus,
+/// and the procedure repeats it.
+fn service_sender(host: &mut HostSide) -> impl FnMut(usize, Frame) {
     |bus, frame| {
         let _ = host.send_service(bus, frame);
     }

@@ -1,4 +1,4 @@
-//! Telling the cycle the time of day, which its clock does not know.
+//! Gives the cycle the time of day, which its monotonic clock does not have.
 
 use takt_rt::Request;
 
@@ -6,14 +6,13 @@ use crate::canopen::time::since_epoch_ns;
 use crate::config::Config;
 use crate::telemetry::WallClock;
 
-/// How long the cycle goes by the time that it was told last. After that it is told again, since the system's clock may
-/// have been set.
+/// The interval at which the cycle gets the time of day again, since the system's clock may have been set.
 const RENEWAL_NS: u64 = 60_000_000_000;
 
-/// When the cycle of a configuration that sends TIME is to be told the time of day.
+/// Decides when the cycle gets the time of day, if the configuration sends TIME.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct TimeOfDayKeeper {
-    /// `None` where no TIME is sent.
+    /// `None` if no TIME is sent.
     due_ns: Option<u64>,
 }
 
@@ -22,7 +21,7 @@ impl TimeOfDayKeeper {
         Self { due_ns: config.master.time_ns.map(|_| 0) }
     }
 
-    /// What the cycle is to be told now.
+    /// The request that is due now.
     pub fn poll(&mut self, now_ns: u64, wall_clock: impl FnOnce() -> WallClock) -> Option<Request> {
         let due_ns = self.due_ns.as_mut().filter(|due_ns| now_ns >= **due_ns)?;
         *due_ns = now_ns.saturating_add(RENEWAL_NS);
@@ -35,13 +34,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_time_is_told_at_once_and_again_every_minute_in_case_the_clock_was_set() {
+    fn the_time_is_given_at_once_and_again_every_minute() {
         let mut keeper = TimeOfDayKeeper { due_ns: Some(0) };
-        let mut told = |now_ns, unix_s: u64| keeper.poll(now_ns, || WallClock::fixed(unix_s * 1_000_000_000));
-        assert_eq!(told(5, 441_763_200), Some(Request::TimeOfDay { at_zero_ns: 0 }));
-        assert_eq!(told(60_000_000_000, 441_763_200), None);
+        let mut given =
+            |now_ns, unix_s: u64| keeper.poll(now_ns, || WallClock::fixed(unix_s * 1_000_000_000));
+        assert_eq!(given(5, 441_763_200), Some(Request::TimeOfDay { at_zero_ns: 0 }));
+        assert_eq!(given(60_000_000_000, 441_763_200), None);
         let set = Request::TimeOfDay { at_zero_ns: 7_000_000_000 };
-        assert_eq!(told(60_000_000_005, 441_763_207), Some(set));
+        assert_eq!(given(60_000_000_005, 441_763_207), Some(set));
         let mut silent = TimeOfDayKeeper { due_ns: None };
         assert_eq!(silent.poll(0, || WallClock::fixed(0)), None);
     }

@@ -1,6 +1,5 @@
-//! A whole controller in virtual time: the same engine, cycle, channels, life cycle and logger as in the real-time
-//! thread, but in one thread and on a clock that jumps, so that hours of motion take seconds and the same
-//! configuration gives the same run bit for bit.
+//! A controller in virtual time: the same engine, cycle, channels, life cycle and logger as in real time, but in one thread
+//! and on a clock that jumps. Hours of motion take seconds, and the same configuration gives the same run bit for bit.
 
 use std::sync::Arc;
 
@@ -13,34 +12,74 @@ use super::supervisor::Supervisor;
 use super::time_of_day::TimeOfDayKeeper;
 use crate::bus::port::Port;
 use crate::config::Config;
-use crate::faults::Rehearsal;
+use crate::faults::FaultInjector;
 use crate::sim::SimulatedBus;
 use crate::telemetry::WallClock;
 
 /// Zero of virtual time: 2000-01-01 00:00:00 UTC, in ns since 1970-01-01.
 const VIRTUAL_EPOCH_NS: u64 = 946_684_800_000_000_000;
 
-/// A clock that is always on time, unless it is told to be late.
+/// A clock that is always on time, unless [`VirtualClock::stall`] makes it late.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct VirtualClock {
     now_ns: u64,
     stall_ns: u64,
+    /// By how much every wait is late.
+    lateness_ns: u64,
+    /// What passes unseen: between the next wake-up of a slot and its SYNC, and while the next cycle is computed.
+    before_sync_ns: u64,
+    computing_ns: u64,
+    /// What passes before the next look at the clock, and right after it.
+    before_look_ns: u64,
+    after_look_ns: u64,
 }
 
 impl VirtualClock {
-    /// The next wait ends this much later than asked for.
+    /// Makes the next wait end later by `ns`.
     pub fn stall(&mut self, ns: u64) {
         self.stall_ns += ns;
+    }
+
+    /// From now on every wait ends this much later than asked for.
+    pub fn be_late(&mut self, ns: u64) {
+        self.lateness_ns = ns;
+    }
+
+    /// The thread is held up between its next wake-up for a slot and the SYNC of that slot.
+    pub fn hold_up_sync(&mut self, ns: u64) {
+        self.before_sync_ns = ns;
+    }
+
+    /// The next cycle takes this long to compute.
+    pub fn compute_for(&mut self, ns: u64) {
+        self.computing_ns = ns;
     }
 }
 
 impl Clock for VirtualClock {
     fn now_ns(&mut self) -> u64 {
-        self.now_ns
+        let seen_ns = self.now_ns + std::mem::take(&mut self.before_look_ns);
+        self.now_ns = seen_ns + std::mem::take(&mut self.after_look_ns);
+        seen_ns
     }
 
+    /// In a cycle this is the wait for the command phase, after which the clock is looked at, and computing begins.
     fn wait_until(&mut self, deadline_ns: u64) -> Wake {
-        let timer_latency_ns = std::mem::take(&mut self.stall_ns);
+        let wake = self.wake(deadline_ns);
+        self.after_look_ns = std::mem::take(&mut self.computing_ns);
+        wake
+    }
+
+    fn wait_to_send(&mut self, deadline_ns: u64) -> Wake {
+        let wake = self.wake(deadline_ns);
+        self.before_look_ns = std::mem::take(&mut self.before_sync_ns);
+        wake
+    }
+}
+
+impl VirtualClock {
+    fn wake(&mut self, deadline_ns: u64) -> Wake {
+        let timer_latency_ns = self.lateness_ns + std::mem::take(&mut self.stall_ns);
         self.now_ns = self.now_ns.max(deadline_ns) + timer_latency_ns;
         Wake { now_ns: self.now_ns, timer_latency_ns }
     }
@@ -56,10 +95,10 @@ pub struct VirtualRun<P> {
     host: HostSide,
     supervisor: Supervisor,
     time_of_day: TimeOfDayKeeper,
-    rehearsal: Option<Arc<Rehearsal>>,
-    /// Cycles from one look of the life cycle to the next, and since the last one.
-    neglect: u64,
-    neglected: u64,
+    fault_injector: Option<Arc<FaultInjector>>,
+    /// Cycles from one poll of the life cycle to the next, and since the last poll.
+    poll_interval: u64,
+    cycles_since_poll: u64,
     is_over: bool,
 }
 
@@ -69,21 +108,27 @@ impl VirtualRun<SimulatedBus> {
     /// # Errors
     /// See [`assemble::engine`].
     pub fn simulated(config: &Config) -> Result<(Self, LogSide), AssembleError> {
+        // The simulated drives take the values as they are.
+        config.validate()?;
         let ports = (0..config.buses.len()).map(|bus| SimulatedBus::new(config, bus)).collect();
         Self::new(config, ports)
     }
 }
 
 impl VirtualRun<Port> {
-    /// A controller of this configuration on simulated buses on which a scenario is played, and the side for its logger.
+    /// A controller of this configuration on simulated buses with injected faults, and the side for its logger.
     ///
     /// # Errors
     /// See [`assemble::engine`].
-    pub fn rehearsed(config: &Config, rehearsal: Arc<Rehearsal>) -> Result<(Self, LogSide), AssembleError> {
+    pub fn with_faults(
+        config: &Config,
+        fault_injector: Arc<FaultInjector>,
+    ) -> Result<(Self, LogSide), AssembleError> {
+        config.validate()?;
         let simulated = |bus| Port::Simulated(Box::new(SimulatedBus::new(config, bus)));
-        let ports = (0..config.buses.len()).map(|bus| rehearsal.wrap(bus, simulated(bus))).collect();
+        let ports = (0..config.buses.len()).map(|bus| fault_injector.wrap(bus, simulated(bus))).collect();
         let (run, log) = Self::new(config, ports)?;
-        Ok((Self { rehearsal: Some(rehearsal), ..run }, log))
+        Ok((Self { fault_injector: Some(fault_injector), ..run }, log))
     }
 }
 
@@ -93,19 +138,19 @@ impl<P: BusPort> VirtualRun<P> {
     /// # Errors
     /// See [`assemble::engine`].
     pub fn new(config: &Config, ports: Vec<P>) -> Result<(Self, LogSide), AssembleError> {
-        Self::led_by(Supervisor::new(config, None), config, ports)
+        Self::with_supervisor(Supervisor::new(config, None), config, ports)
     }
 
-    /// As [`VirtualRun::new`], for a group that is brought up and enabled and then left to whoever commands it through
+    /// The same as [`VirtualRun::new`], without a program: after bring-up the group executes the requests of
     /// [`VirtualRun::host`], until it is interrupted.
     ///
     /// # Errors
     /// See [`assemble::engine`].
     pub fn serving(config: &Config, ports: Vec<P>) -> Result<(Self, LogSide), AssembleError> {
-        Self::led_by(Supervisor::serving(config), config, ports)
+        Self::with_supervisor(Supervisor::serving(config), config, ports)
     }
 
-    fn led_by(
+    fn with_supervisor(
         supervisor: Supervisor,
         config: &Config,
         ports: Vec<P>,
@@ -124,31 +169,31 @@ impl<P: BusPort> VirtualRun<P> {
             host,
             supervisor,
             time_of_day: TimeOfDayKeeper::of(config),
-            rehearsal: None,
-            neglect: 1,
-            neglected: 0,
+            fault_injector: None,
+            poll_interval: 1,
+            cycles_since_poll: 0,
             is_over: false,
         };
         Ok((run, log))
     }
 
-    /// One cycle and what the life cycle has to do after it. Returns `false` once the loop has ended.
+    /// Runs one cycle, and polls the life cycle after it. Returns `false` once the loop has ended.
     pub fn step(&mut self) -> bool {
         if self.is_over {
             return false;
         }
         let flow = self.cycle.run(&mut self.engine, &mut self.clock, &mut self.ports, &mut self.rt);
-        self.neglected += 1;
-        if self.neglected >= self.neglect {
-            self.neglected = 0;
+        self.cycles_since_poll += 1;
+        if self.cycles_since_poll >= self.poll_interval {
+            self.cycles_since_poll = 0;
             self.supervisor.poll(self.clock.now_ns, &mut self.host);
         }
         if let Some(time) = self.time_of_day.poll(self.clock.now_ns, || WallClock::fixed(VIRTUAL_EPOCH_NS)) {
-            // One that finds the queue full is told again in a minute.
+            // If the queue is full, the next one follows in a minute.
             let _ = self.host.request(time);
         }
-        if let Some(rehearsal) = &self.rehearsal {
-            rehearsal.observe(&self.host.snapshot());
+        if let Some(fault_injector) = &self.fault_injector {
+            fault_injector.observe(&self.host.snapshot());
         }
         self.is_over = flow == Flow::Shutdown;
         !self.is_over
@@ -157,19 +202,18 @@ impl<P: BusPort> VirtualRun<P> {
     /// Runs to the end of the life cycle, or for `at_most` cycles. Calls `each` after every cycle.
     pub fn run(&mut self, at_most: u64, mut each: impl FnMut(&mut Self)) -> Option<Outcome> {
         for _ in 0..at_most {
-            let goes_on = self.step();
+            let is_running = self.step();
             each(self);
-            if !goes_on {
+            if !is_running {
                 break;
             }
         }
         self.supervisor.outcome().cloned()
     }
 
-    /// From now on the life cycle is looked after only once in so many cycles, as on a machine that has no time for it: what
-    /// leads it is no real-time thread.
-    pub fn neglect_life_cycle(&mut self, cycles: u64) {
-        self.neglect = cycles;
+    /// From now on the life cycle is polled only once in so many cycles, as on a busy computer: its thread is not real-time.
+    pub fn poll_life_cycle_every(&mut self, cycles: u64) {
+        self.poll_interval = cycles;
     }
 
     /// Asks the run to end.
@@ -197,7 +241,7 @@ impl<P: BusPort> VirtualRun<P> {
         &mut self.clock
     }
 
-    /// The ports, to look at the simulated drives or to break something.
+    /// The ports, to observe the simulated drives or to inject faults.
     pub fn ports(&mut self) -> &mut [P] {
         &mut self.ports
     }

@@ -4,7 +4,7 @@ use super::examination::Examination;
 use super::finding::{Finding, Group, Verdict};
 use super::self_test::{Grade, SelfTest};
 use crate::telemetry::Emphasis;
-use crate::telemetry::picture::{duration, line};
+use crate::telemetry::render::{duration, line};
 
 /// Where the text of a check begins: mark, title.
 const INDENT: usize = 24;

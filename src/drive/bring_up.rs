@@ -1,14 +1,14 @@
-//! Bringing drives up and leaving them, all axes of all buses side by side.
+//! Brings drives up and shuts them down, all axes of all buses in parallel.
 //!
-//! [`BringUp`] has two stages. [`Stage::Configure`] leaves every drive pre-operational, without torque, mapped, in its
-//! mode, with its target at its actual position. Then [`BringUp::start`] begins [`Stage::Start`], which makes the nodes
-//! operational, and SYNC may begin. [`Leave`] is the polite farewell after motion.
+//! [`BringUp`] has two stages. [`Stage::Configure`] leaves every drive in NMT pre-operational, without torque, with its
+//! PDO mapping and mode set, and its target at the actual position. Then [`BringUp::start`] begins [`Stage::Start`],
+//! which makes the nodes operational; after that SYNC may begin. [`Shutdown`] follows the last motion.
 //!
-//! There is no input and output here: [`BringUp::poll`] hands out frames, [`BringUp::receive`] takes them. Both may be
-//! called as often as is convenient; a drive has at most one SDO outstanding.
+//! There is no input and output here: [`BringUp::poll`] returns frames, [`BringUp::receive`] takes them. Both may be
+//! called at any rate. Each drive has at most one SDO transfer under way.
 //!
-//! Where the configuration gives the master a heartbeat, the drives watch it from the end of [`Stage::Configure`] on:
-//! it must be sent from before the bring-up until [`Leave`] is done, or until a failed bring-up has been left.
+//! If the configuration gives the master a heartbeat, the drives monitor it from the end of [`Stage::Configure`] on.
+//! The caller sends it from before the bring-up until [`Shutdown`] is done, also after a failed bring-up.
 
 use takt_rt::{Frame, Nanoseconds};
 
@@ -16,37 +16,37 @@ use super::axis_run::{AxisRun, Policy};
 use super::erob_canopen;
 use super::facts::AxisFacts;
 use super::failure::{AxisFailure, BringUpError};
-use super::step::Step;
+use super::step::ProcedureStep;
 use super::yz_aim;
 use crate::canopen::sdo;
 use crate::config::{Axis, Config, DriveFamily};
 
-/// How long to wait for what.
+/// The timeouts of bring-up and shutdown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BringUpTiming {
-    /// For a node's boot-up after its reset. A drive that has just been powered needs its power-up time (eRob: 8 s).
+    /// Timeout of a node's boot-up after a reset. It includes the boot time after power-up (eRob: 8 s).
     pub boot_up_timeout_ns: Nanoseconds,
-    /// Between two resets of a node that does not boot.
+    /// Interval between two resets of a node that does not boot.
     pub reset_repeat_ns: Nanoseconds,
-    /// For a mode, a state or standstill to be reached.
+    /// Timeout of a mode change, a state change or standstill.
     pub confirm_timeout_ns: Nanoseconds,
-    /// For an SDO reply, and how often to ask again.
-    pub sdo: sdo::Timing,
+    /// SDO reply timeout and retries.
+    pub sdo: sdo::SdoTiming,
 }
 
 impl Default for BringUpTiming {
     fn default() -> Self {
         Self {
             boot_up_timeout_ns: 12_000_000_000,
-            // No divisor of whole seconds: a drive that needs eight of them is not reset just when it has booted.
+            // Not a divisor of 8 s: a drive with that boot time would be reset again just after it has booted.
             reset_repeat_ns: 700_000_000,
             confirm_timeout_ns: 2_000_000_000,
-            sdo: sdo::Timing::default(),
+            sdo: sdo::SdoTiming::default(),
         }
     }
 }
 
-/// How far a [`BringUp`] has been asked to go.
+/// The stage of a [`BringUp`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
     /// From any state to pre-operational, configured, without torque.
@@ -55,28 +55,28 @@ pub enum Stage {
     Start,
 }
 
-/// How far a procedure has come, for a progress bar.
+/// The progress of a bring-up or shutdown, for a progress bar.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Progress {
+pub struct BringUpProgress {
     /// 0 to 1.
     pub fraction: f64,
-    /// What the slowest axis is doing; empty when all is done.
+    /// The step of the slowest axis; empty when all axes are done.
     pub step: &'static str,
     /// The slowest axis, an index into the configuration.
     pub axis: usize,
 }
 
-/// Brings every axis of a configuration up.
+/// Brings up every axis of a configuration.
 #[derive(Debug)]
 pub struct BringUp {
     group: Group,
-    start_steps: Vec<Vec<Step>>,
+    start_steps: Vec<Vec<ProcedureStep>>,
     stage: Stage,
 }
 
-/// [`Stage::Start`] was begun before [`Stage::Configure`] had succeeded, or twice.
+/// [`BringUp::start`] was called before [`Stage::Configure`] had succeeded, or a second time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("the drives are not configured, or have been started before")]
+#[error("the drives are not configured yet, or have already been started")]
 pub struct NotConfigured;
 
 impl BringUp {
@@ -85,7 +85,7 @@ impl BringUp {
         Self::with_timing(config, BringUpTiming::default())
     }
 
-    /// As [`BringUp::new`], with other time-outs.
+    /// As [`BringUp::new`], with other timeouts.
     pub fn with_timing(config: &Config, timing: BringUpTiming) -> Self {
         let group = Group::new(config, |axis| {
             let (steps, other_protocol) = match axis.drive {
@@ -94,7 +94,7 @@ impl BringUp {
                 }
                 DriveFamily::YzAim => (yz_aim::configure(config, axis, &timing), None),
             };
-            // A drive that has restarted has already obeyed the first step, the reset.
+            // The first step is the reset; a drive that has restarted does not need it again.
             AxisRun::new(axis, timing.sdo, steps, Policy::RestartFrom(1), other_protocol)
         });
         let start_steps = config.axes.iter().map(|axis| match axis.drive {
@@ -104,8 +104,7 @@ impl BringUp {
         Self { group, start_steps: start_steps.collect(), stage: Stage::Configure }
     }
 
-    /// Begins [`Stage::Start`]. The outcome is open again until the stage is done. Nodes that have become operational wait
-    /// for SYNC.
+    /// Begins [`Stage::Start`]. The outcome is `None` again until this stage is done. Operational nodes wait for SYNC.
     pub fn start(&mut self) -> Result<(), NotConfigured> {
         if self.stage != Stage::Configure || !matches!(self.outcome(), Some(Ok(_))) {
             return Err(NotConfigured);
@@ -117,77 +116,76 @@ impl BringUp {
         Ok(())
     }
 
-    /// The stage that runs or has run.
+    /// The current or last stage.
     pub const fn stage(&self) -> Stage {
         self.stage
     }
 
-    /// Sends what is due, with the index of its bus, and lets time pass.
+    /// Advances to `now_ns`, and sends each frame that is due with the index of its bus.
     pub fn poll(&mut self, now_ns: Nanoseconds, send: &mut impl FnMut(usize, Frame)) {
         self.group.poll(now_ns, send);
     }
 
-    /// Takes a frame that was received on the bus with this index. Frames of others are passed over.
+    /// Takes a frame received on the bus with this index. Frames of other nodes are ignored.
     pub fn receive(&mut self, bus: usize, frame: &Frame) {
         self.group.receive(bus, frame);
     }
 
-    /// How far the present stage has come.
-    pub fn progress(&self) -> Progress {
+    /// The progress of the current stage.
+    pub fn progress(&self) -> BringUpProgress {
         self.group.progress()
     }
 
-    /// What is known of the drives in the order of the configuration, or every drive that failed; `None` while the
-    /// present stage runs. A drive in a fault does not fail the bring-up: see [`AxisFacts::fault`].
+    /// The facts of all drives in the order of the configuration, or all failures; `None` while the current stage runs.
+    /// A drive fault does not fail the bring-up: see [`AxisFacts::fault`].
     pub fn outcome(&self) -> Option<Result<Vec<AxisFacts>, BringUpError>> {
         self.group.outcome()
     }
 }
 
-/// Leaves every axis of a configuration politely: pre-operational, without torque, and without watching for the
-/// heartbeat of a master that will fall silent. The axes should have been disabled by the cycle before; one that still
-/// has torque is brought to rest and switched off.
+/// Shuts every axis of a configuration down: NMT pre-operational, without torque, heartbeat watchdog off. The cycle
+/// should have disabled the axes before; an axis that still has torque is stopped and disabled.
 ///
-/// The master's heartbeat must go on until this is done.
+/// The master's heartbeat must continue until this is done.
 #[derive(Debug)]
-pub struct Leave {
+pub struct Shutdown {
     group: Group,
 }
 
-impl Leave {
-    /// Prepares to leave every axis. Nothing is sent before [`Leave::poll`].
+impl Shutdown {
+    /// Prepares the shutdown of every axis. Nothing is sent before [`Shutdown::poll`].
     pub fn new(config: &Config) -> Self {
         Self::with_timing(config, BringUpTiming::default())
     }
 
-    /// As [`Leave::new`], with other time-outs.
+    /// As [`Shutdown::new`], with other timeouts.
     pub fn with_timing(config: &Config, timing: BringUpTiming) -> Self {
         let group = Group::new(config, |axis| {
             let steps = match axis.drive {
-                DriveFamily::ErobCanopen => erob_canopen::leave(axis, &timing),
-                DriveFamily::YzAim => yz_aim::leave(axis, &timing),
+                DriveFamily::ErobCanopen => erob_canopen::shut_down(axis, &timing),
+                DriveFamily::YzAim => yz_aim::shut_down(axis, &timing),
             };
             AxisRun::new(axis, timing.sdo, steps, Policy::BestEffort, None)
         });
         Self { group }
     }
 
-    /// Sends what is due, with the index of its bus, and lets time pass.
+    /// Advances to `now_ns`, and sends each frame that is due with the index of its bus.
     pub fn poll(&mut self, now_ns: Nanoseconds, send: &mut impl FnMut(usize, Frame)) {
         self.group.poll(now_ns, send);
     }
 
-    /// Takes a frame that was received on the bus with this index. Frames of others are passed over.
+    /// Takes a frame received on the bus with this index. Frames of other nodes are ignored.
     pub fn receive(&mut self, bus: usize, frame: &Frame) {
         self.group.receive(bus, frame);
     }
 
-    /// How far it has come.
-    pub fn progress(&self) -> Progress {
+    /// The progress.
+    pub fn progress(&self) -> BringUpProgress {
         self.group.progress()
     }
 
-    /// What is known of the drives in the order of the configuration, or what could not be done; `None` while it runs.
+    /// The facts of all drives in the order of the configuration, or all failures; `None` while it runs.
     pub fn outcome(&self) -> Option<Result<Vec<AxisFacts>, BringUpError>> {
         self.group.outcome()
     }
@@ -232,12 +230,12 @@ impl Group {
         }
     }
 
-    fn progress(&self) -> Progress {
+    fn progress(&self) -> BringUpProgress {
         let fraction_of = |(done, all): (usize, usize)| if all == 0 { 1.0 } else { done as f64 / all as f64 };
         let open = self.members.iter().enumerate().filter(|(_, member)| !member.run.is_over());
         let slowest = open.min_by_key(|(_, member)| member.run.progress().0);
         let sum: f64 = self.members.iter().map(|member| fraction_of(member.run.progress())).sum();
-        Progress {
+        BringUpProgress {
             fraction: if slowest.is_none() { 1.0 } else { sum / self.members.len() as f64 },
             step: slowest.and_then(|(_, member)| member.run.step_name()).unwrap_or(""),
             axis: slowest.map_or(0, |(index, _)| index),

@@ -1,4 +1,4 @@
-//! What a bring-up learns of a drive.
+//! What a bring-up reads from a drive.
 
 use takt_rt::{Dialect, DriveState};
 
@@ -7,14 +7,14 @@ use super::step::{Fact, TextFact};
 use crate::canopen::emcy::{Emergency, ErrorCode};
 use crate::canopen::object::ObjectAddress;
 
-/// What a drive has said of itself. Numbers are as of the last time they were read.
+/// What a drive has reported, each value as it was last read.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct AxisFacts {
-    /// How it speaks.
+    /// The codec of its statusword.
     pub dialect: Dialect,
-    /// Who it is.
+    /// Its identity.
     pub identity: DeviceIdentity,
-    /// What it calls itself and its parts, where it does.
+    /// Its names and versions, where it has them.
     pub texts: DeviceTexts,
     /// Object 6502: a bit for each mode.
     pub supported_modes: u32,
@@ -24,22 +24,22 @@ pub struct AxisFacts {
     pub error_code: ErrorCode,
     /// Object 6064 in counts.
     pub position_counts: i32,
-    /// Object 6076 in N·m: 1000 per mille of torque objects. `None` when the drive does not tell.
+    /// Object 6076 in N·m: 1000 per mille of torque objects. `None` when the drive does not report it.
     pub rated_torque: Option<f64>,
-    /// Object 6075 in A: 1000 per mille of current objects. `None` when the drive does not tell.
+    /// Object 6075 in A: 1000 per mille of current objects. `None` when the drive does not report it.
     pub rated_current_a: Option<f64>,
-    /// Object 6072 in per mille of the rated torque. `None` when the drive has none.
+    /// Object 6072 in per mille of the rated torque. `None` when the drive does not have it.
     pub max_torque_per_mille: Option<u16>,
-    /// Object 605A. `None` when the drive has none.
+    /// Object 605A. `None` when the drive does not have it.
     pub quick_stop_option_code: Option<i16>,
-    /// The last emergency message, unless it told that the error has gone.
+    /// The last emergency message, unless an "error reset" message (code 00xx) followed.
     pub emergency: Option<Emergency>,
-    /// The process data that the drive has reported, where that counts.
+    /// The process data that the drive has reported, if its own mapping is used.
     pub process_data: Option<ProcessData>,
-    /// Optional objects that the drive has refused.
+    /// Optional objects that the drive does not have.
     pub absent: Vec<ObjectAddress>,
-    /// How often it has booted again after its first boot-up, and was configured anew. A drive that is reset just when
-    /// it has powered up obeys late, which counts too.
+    /// Number of boot-ups after the first one; each led to a new configuration. A reset during the drive's power-up
+    /// also counts, because the drive executes it later.
     pub restarts: u8,
 }
 
@@ -56,7 +56,7 @@ pub struct DeviceIdentity {
     pub revision_number: u32,
 }
 
-/// Objects 1008, 1009 and 100A, each where the drive has it.
+/// Objects 1008, 1009 and 100A, where they exist.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct DeviceTexts {
     /// Object 1008.
@@ -73,7 +73,7 @@ impl AxisFacts {
         self.dialect.state(self.statusword)
     }
 
-    /// What is wrong, when the drive is in a fault: object 603F, or when that is zero the code of the last emergency.
+    /// The error code of a drive in a fault: object 603F; when it is zero, the code of the last emergency message.
     pub fn fault(&self) -> Option<ErrorCode> {
         let reported = match self.error_code {
             ErrorCode::NONE => self.emergency.map_or(ErrorCode::NONE, |emergency| emergency.code),
@@ -82,7 +82,7 @@ impl AxisFacts {
         self.state().is_faulted().then_some(reported)
     }
 
-    /// Keeps a number. The number fits: it was decoded by the object's type.
+    /// Stores a number. It fits, because it was decoded by the object's type.
     pub(super) fn keep(&mut self, fact: Fact, value: i64) {
         let thousandths = |value: i64| (value > 0).then_some(value as f64 / 1000.0);
         match fact {

@@ -1,4 +1,4 @@
-//! Why a procedure on a drive has failed: which axis, which step, what was expected, what came, what to try.
+//! Why a procedure on a drive failed: axis, step, expected and received value, remedy.
 
 use std::fmt;
 
@@ -9,10 +9,10 @@ use super::step::{Access, Check};
 use crate::canopen::emcy::Emergency;
 use crate::canopen::nmt::NmtState;
 use crate::canopen::object::{Object, ObjectAddress};
-use crate::canopen::pdo_inquiry::PdoInquiryError;
+use crate::canopen::pdo_reader::PdoReadError;
 use crate::canopen::sdo::{AbortCode, SdoError};
 
-/// The drives that could not be brought up (or left), each with its reason.
+/// The drives that failed during bring-up or shutdown.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BringUpError {
     /// One for each axis that failed, in the order of the configuration. Never empty.
@@ -31,7 +31,7 @@ impl fmt::Display for BringUpError {
 
 impl std::error::Error for BringUpError {}
 
-/// Why one axis has failed.
+/// Why one axis failed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AxisFailure {
     /// The axis, an index into the configuration.
@@ -40,20 +40,20 @@ pub struct AxisFailure {
     pub name: String,
     /// The name of its bus.
     pub bus: String,
-    /// Its node number.
+    /// Its node ID.
     pub node: u8,
-    /// The step.
+    /// The failed step.
     pub step: &'static str,
-    /// What was expected and what came.
-    pub cause: Cause,
+    /// The cause.
+    pub cause: FailureCause,
     /// The last emergency message of the drive.
     pub emergency: Option<Emergency>,
-    /// What the step suggests to try; [`AxisFailure::advice`] knows better where the cause tells more.
+    /// The remedy of the step. [`AxisFailure::advice`] may know a better one from the cause.
     pub step_advice: &'static str,
 }
 
 impl AxisFailure {
-    /// What to try.
+    /// The remedy.
     pub fn advice(&self) -> &'static str {
         self.cause.advice().unwrap_or(self.step_advice)
     }
@@ -70,25 +70,25 @@ impl fmt::Display for AxisFailure {
     }
 }
 
-/// What was expected and what came.
+/// The cause of a failure: what was expected and what was received.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Cause {
-    /// The node never reported the state that it was commanded to.
+pub enum FailureCause {
+    /// The node did not report the commanded NMT state.
     StateNotReached {
         /// The state.
         awaited: NmtState,
-        /// The last state that it reported at all.
+        /// The last state that it reported.
         reported: Option<NmtState>,
-        /// How long was waited.
+        /// How long the procedure waited.
         waited_ns: Nanoseconds,
-        /// Who answered when asked otherwise.
-        answered: Answered,
+        /// The answer to a probe with other services.
+        probe_result: ProbeResult,
     },
     /// A transfer failed.
     Transfer {
         /// The object.
         object: Object,
-        /// What was being done.
+        /// The attempted access.
         access: Access,
         /// Why it failed.
         error: SdoError,
@@ -100,46 +100,46 @@ pub enum Cause {
         /// Why it failed.
         error: SdoError,
     },
-    /// An object holds another number of bytes than its type.
+    /// An object's data has another length than its type.
     Length {
         /// The object.
         object: Object,
-        /// How many bytes came.
+        /// Number of received bytes.
         received: usize,
     },
     /// An object has another value.
     Value {
         /// The object.
         object: Object,
-        /// How the value came about.
+        /// The access that brought the value.
         access: Access,
         /// What was expected.
         expected: Check,
-        /// What came.
+        /// The received value.
         received: i64,
-        /// How long was waited for it; 0 when it was read once.
+        /// How long the procedure waited for it; 0 when it was read once.
         waited_ns: Nanoseconds,
     },
     /// Writing a configured value, or reading it back, failed.
     ConfigurationTransfer {
         /// The object.
         object: ObjectAddress,
-        /// What was to be written.
+        /// The bytes to write.
         written: Content,
-        /// Whether it had been written and was being read back.
+        /// Whether it was being read back after the write.
         is_reading_back: bool,
         /// Why it failed.
         error: SdoError,
-        /// Whether this is how the drive says that it has no such object.
+        /// Whether this error means that the drive does not have the object.
         means_absent: bool,
     },
-    /// A configured value reads back as another one.
+    /// A configured value reads back differently.
     ConfigurationDiffers {
         /// The object.
         object: ObjectAddress,
-        /// What was written.
+        /// The written bytes.
         written: Content,
-        /// What came.
+        /// The received bytes.
         received: Content,
     },
     /// A value does not fit the object.
@@ -149,28 +149,28 @@ pub enum Cause {
         /// The value.
         value: i64,
     },
-    /// Reading how the PDOs are configured failed.
-    Inquiry(PdoInquiryError),
+    /// Reading the PDO configuration failed.
+    PdoRead(PdoReadError),
     /// The PDOs that the drive reports do not suit the axis.
     Mapping(MappingProblem),
-    /// The node has restarted, and what it was told is lost.
+    /// The node has restarted and lost its configuration.
     Restarted {
-        /// How often.
+        /// How many times.
         times: u8,
     },
 }
 
-/// The bytes of an object, as far as they are shown.
+/// The bytes of an object, shortened for display.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Content {
-    /// How many there are.
+    /// Their number.
     pub length: usize,
     /// The first of them.
     pub first: [u8; 8],
 }
 
 impl Content {
-    /// Of these bytes.
+    /// The content of these bytes.
     pub fn of(bytes: &[u8]) -> Self {
         let mut first = [0; 8];
         for (place, byte) in first.iter_mut().zip(bytes) {
@@ -181,7 +181,7 @@ impl Content {
 }
 
 impl fmt::Display for Content {
-    /// Numbers as such, low byte first; longer ones byte by byte.
+    /// Up to eight bytes are shown as a little-endian number, longer content byte by byte.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.length {
             0 => f.write_str("nothing"),
@@ -191,34 +191,31 @@ impl fmt::Display for Content {
     }
 }
 
-/// Who answered a node's silence when asked otherwise.
+/// The answer of a node that did not report the awaited state to a probe.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Answered {
-    /// Nobody was asked.
-    NotAsked,
+pub enum ProbeResult {
     /// Nothing answered.
     Nothing,
     /// Its SDO server.
     Sdo,
-    /// It speaks this other protocol.
+    /// The drive, in this other protocol.
     OtherProtocol(&'static str),
 }
 
-impl fmt::Display for Cause {
+impl fmt::Display for FailureCause {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let ms = |ns: Nanoseconds| ns / 1_000_000;
         match self {
-            Self::StateNotReached { awaited, reported, waited_ns, answered } => {
+            Self::StateNotReached { awaited, reported, waited_ns, probe_result } => {
                 write!(f, "expected the state {awaited}, waited {} ms, ", ms(*waited_ns))?;
                 match reported {
                     Some(state) => write!(f, "it last reported {state}")?,
                     None => f.write_str("it reported nothing")?,
                 }
-                match answered {
-                    Answered::NotAsked => Ok(()),
-                    Answered::Nothing => f.write_str(" and answered neither SDO nor any other protocol"),
-                    Answered::Sdo => f.write_str(", but its SDO server did answer"),
-                    Answered::OtherProtocol(name) => write!(f, ", but it did answer the {name}"),
+                match probe_result {
+                    ProbeResult::Nothing => f.write_str(" and answered neither SDO nor any other protocol"),
+                    ProbeResult::Sdo => f.write_str(", but its SDO server answers"),
+                    ProbeResult::OtherProtocol(name) => write!(f, ", but it answers the {name}"),
                 }
             }
             Self::Transfer { object, access: access @ Access::Write(_), error } => {
@@ -258,44 +255,44 @@ impl fmt::Display for Cause {
                 let bits = 8 * object.data_type.length();
                 write!(f, "writing {value} to {object}: it does not fit {bits} bits")
             }
-            Self::Inquiry(error) => write!(f, "{error}"),
+            Self::PdoRead(error) => write!(f, "{error}"),
             Self::Mapping(problem) => write!(f, "{problem}"),
             Self::Restarted { times } => {
-                write!(f, "expected it to keep running, it has restarted {times} times")
+                write!(f, "expected it to keep running, but it has restarted {times} times")
             }
         }
     }
 }
 
-impl Cause {
-    /// Whether the drive gave no answer.
+impl FailureCause {
+    /// Whether the drive did not answer.
     pub fn is_silence(&self) -> bool {
         matches!(
             self,
             Self::Transfer { error: SdoError::NoReply { .. }, .. }
-                | Self::Inquiry(_)
-                | Self::StateNotReached { answered: Answered::Nothing, .. }
+                | Self::PdoRead(_)
+                | Self::StateNotReached { probe_result: ProbeResult::Nothing, .. }
         )
     }
 
-    /// What to try, where the cause itself tells more than the step.
+    /// The remedy, if the cause is more specific than the step.
     fn advice(&self) -> Option<&'static str> {
         match self {
-            Self::StateNotReached { answered: Answered::OtherProtocol(_), .. } => {
+            Self::StateNotReached { probe_result: ProbeResult::OtherProtocol(_), .. } => {
                 Some("load CANopen firmware into the drive, or configure the protocol that it speaks")
             }
-            Self::StateNotReached { answered: Answered::Sdo, .. } => Some(
-                "the drive runs but does not obey NMT: look for a second master on the bus, and power-cycle the drive",
+            Self::StateNotReached { probe_result: ProbeResult::Sdo, .. } => Some(
+                "the drive runs but ignores NMT: look for a second master on the bus, and power-cycle the drive",
             ),
             Self::ConfigurationTransfer { error: SdoError::NoReply { .. }, means_absent: true, .. } => Some(
-                "this drive gives no answer at all for an object that it does not have: leave the object out of the file \
+                "this drive does not answer at all for an object that it does not have: leave the object out of the file \
                  named by `dcf`; if it has the object, check its supply and the wiring",
             ),
             Self::Transfer { error: SdoError::NoReply { .. }, .. }
             | Self::ConfigurationTransfer { error: SdoError::NoReply { .. }, .. }
-            | Self::Inquiry(PdoInquiryError { error: SdoError::NoReply { .. }, .. })
+            | Self::PdoRead(PdoReadError { error: SdoError::NoReply { .. }, .. })
             | Self::TextTransfer { error: SdoError::NoReply { .. }, .. } => Some(
-                "the drive has fallen silent: check its supply, the wiring and the bus load, and that no other master \
+                "the drive no longer answers: check its supply, the wiring and the bus load, and that no other master \
                  stops it",
             ),
             Self::Transfer { error: SdoError::Aborted(AbortCode::PresentDeviceState), .. } => Some(

@@ -1,9 +1,9 @@
-//! What differs from one family of drives to the next: process data, bring-up, parameters.
+//! What differs between drive families: process data, bring-up, parameters.
 //!
-//! A family writes its procedures down as lists of steps (`erob_canopen`, `yz_aim`, `step_list`, `step`); one machine
-//! carries them out for every family (`axis_run`), for all axes at once ([`BringUp`], [`Leave`]); what was learnt is in [`AxisFacts`], what
-//! went wrong in [`BringUpError`]. Which objects travel in which PDO is in [`ProcessData`]: as it is written to the drive,
-//! or as the drive reports it (`reported_mapping`).
+//! A family describes its procedures as lists of steps (`erob_canopen`, `yz_aim`, `step_list`, `step`). One engine runs
+//! them for every family (`axis_run`), for all axes in parallel ([`BringUp`], [`Shutdown`]). [`AxisFacts`] has what the
+//! drive has reported, [`BringUpError`] what failed. [`ProcessData`] says which objects each PDO carries: as written to
+//! the drive, or as the drive reports it (`reported_mapping`).
 
 mod axis_run;
 mod bring_up;
@@ -16,9 +16,9 @@ mod step;
 mod step_list;
 pub mod yz_aim;
 
-pub use bring_up::{BringUp, BringUpTiming, Leave, NotConfigured, Progress, Stage};
+pub use bring_up::{BringUp, BringUpProgress, BringUpTiming, NotConfigured, Shutdown, Stage};
 pub use facts::{AxisFacts, DeviceIdentity, DeviceTexts};
-pub use failure::{Answered, AxisFailure, BringUpError, Cause, Content};
+pub use failure::{AxisFailure, BringUpError, Content, FailureCause, ProbeResult};
 pub use process_data::{PdoPlan, ProcessData};
 pub use reported_mapping::MappingProblem;
 pub use step::{Access, Check, mode_words};

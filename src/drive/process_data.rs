@@ -1,4 +1,4 @@
-//! Which objects travel in which PDO. Bring-up programs it, the cycle compiles it, and the bus arithmetic counts it.
+//! Which objects each PDO carries. Bring-up writes it to the drive, the cycle compiles it, and the bus load counts it.
 
 use takt_rt::{
     AxisProcessData, CommandSlot, Id, MAX_PDOS, MappedObject, MappedPdo, Request, TransmissionType,
@@ -17,7 +17,7 @@ const STATUSWORD: MappedObject = MappedObject::new(0x6041, 0, 16);
 const POSITION: MappedObject = MappedObject::new(0x6064, 0, 32);
 
 const PDO_BITS: u32 = 64;
-/// A byte of a PDO of which nothing is known but that it may be there.
+/// A placeholder for one byte of a PDO with unknown content.
 const ANY_BYTE: MappedObject = MappedObject::new(0x0005, 0, 8);
 
 /// One PDO of a drive.
@@ -29,9 +29,9 @@ pub struct PdoPlan {
     pub id: Id,
     /// Its transmission type (CiA 301, 7.5.2.36).
     pub transmission_type: u8,
-    /// What it carries, in order.
+    /// The mapped objects, in order.
     pub objects: Vec<MappedObject>,
-    /// When it is sent, if by us.
+    /// Condition the controller sends it, for an RPDO.
     pub cadence: TransmissionType,
 }
 
@@ -45,29 +45,29 @@ impl PdoPlan {
 /// The PDOs of one axis.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ProcessData {
-    /// What we send (RPDOs of the drive).
+    /// The PDOs that the controller sends (RPDOs of the drive).
     pub commands: Vec<PdoPlan>,
-    /// What the drive sends each cycle and the controller works with (its TPDOs).
+    /// The PDOs that the controller evaluates (TPDOs of the drive).
     pub feedback: Vec<PdoPlan>,
-    /// What the drive sends beside that.
+    /// The other TPDOs that the drive sends.
     pub unused: Vec<PdoPlan>,
 }
 
 impl ProcessData {
-    /// The process data of an axis. Where its drive's own mapping is to be used, it is known only when the drive has
-    /// told ([`ProcessData::as_reported`]): until then as many PDOs as would be written, with all the bytes that they
-    /// can have.
+    /// The process data of an axis. If the drive's own mapping is used, it is known only after the drive has reported
+    /// it ([`ProcessData::as_reported`]). Until then this has the same number of PDOs as a written mapping, each of
+    /// full length.
     pub fn of(axis: &Axis) -> Self {
         match axis.drive {
             DriveFamily::ErobCanopen if axis.mapping == PdoMapping::AsStored => {
-                Self::mapped_freely(axis).filled_up()
+                Self::mapped_freely(axis).padded()
             }
             DriveFamily::ErobCanopen => Self::mapped_freely(axis),
             DriveFamily::YzAim => Self::of_yz_aim(axis),
         }
     }
 
-    fn filled_up(mut self) -> Self {
+    fn padded(mut self) -> Self {
         for pdo in self.commands.iter_mut().chain(&mut self.feedback) {
             let free_bytes = (PDO_BITS as usize / 8).saturating_sub(pdo.length());
             pdo.objects.extend(std::iter::repeat_n(ANY_BYTE, free_bytes));
@@ -75,7 +75,7 @@ impl ProcessData {
         self
     }
 
-    /// What a drive that is mapped freely must be sent in every cycle.
+    /// The objects that a drive with free mapping must receive in every cycle.
     pub(super) fn needed_commands(axis: &Axis) -> Vec<MappedObject> {
         let target = match axis.control.target_slot() {
             CommandSlot::TargetVelocity => TARGET_VELOCITY,
@@ -85,12 +85,12 @@ impl ProcessData {
         vec![CONTROLWORD, target]
     }
 
-    /// What a drive that is mapped freely must report in every cycle.
+    /// The objects that a drive with free mapping must send in every cycle.
     pub(super) fn needed_feedback(axis: &Axis) -> Vec<MappedObject> {
         [STATUSWORD, POSITION].into_iter().chain(axis.feedback.iter().copied().map(mapped)).collect()
     }
 
-    /// A drive that is mapped as we like. A command fits one PDO; feedback takes as many as it needs, statusword and
+    /// Maps a drive with free mapping: the command in one PDO, the feedback in as many as it needs, statusword and
     /// position first.
     fn mapped_freely(axis: &Axis) -> Self {
         let mut feedback = vec![vec![]];
@@ -151,7 +151,7 @@ impl ProcessData {
         Self { commands, feedback: vec![transmit(feedback)], unused }
     }
 
-    /// Tells the cycle to exchange this process data with the drive of an axis.
+    /// The request that makes the cycle exchange this process data with the drive of an axis.
     pub fn request(&self, axis: u8) -> Request {
         fn each<T>(plans: &[PdoPlan], part: impl Fn(&PdoPlan) -> T) -> [Option<T>; MAX_PDOS] {
             std::array::from_fn(|at| plans.get(at).map(&part))
@@ -169,7 +169,7 @@ impl ProcessData {
         })
     }
 
-    /// The PDO among the unused ones with which the drive answers each command at once.
+    /// The unused TPDO that the drive sends in reply to each command.
     pub fn answer(&self) -> Option<&PdoPlan> {
         let command = self.commands.iter().find(|command| command.cadence == TransmissionType::EveryCycle)?;
         self.unused.iter().find(|pdo| pdo.number == command.number)

@@ -1,5 +1,5 @@
-//! The process data of a drive as the drive itself reports it: which of its PDOs carry what the axis needs, or why they
-//! do not.
+//! Process data by the mapping that the drive reports: which of its PDOs carry the objects that the axis needs, or why
+//! they do not.
 
 use takt_rt::{CommandSlot, Id, MappedObject, TransmissionType};
 
@@ -9,40 +9,40 @@ use crate::canopen::objects::PdoDirection;
 use crate::canopen::pdo_configuration::PdoConfiguration;
 use crate::config::{Axis, DriveFamily};
 
-/// Why an axis cannot work with the PDOs that its drive reports.
+/// Why the PDOs that the drive reports do not suit the axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum MappingProblem {
-    /// No PDO that is switched on carries an object.
-    #[error("no {} that is switched on carries {}, which the axis needs", direction.word(), named(*object))]
+    /// No valid PDO carries the object.
+    #[error("no valid {} carries {}, which the axis needs", direction.word(), named(*object))]
     NotMapped {
-        /// Which way.
+        /// The direction.
         direction: PdoDirection,
         /// The object.
         object: MappedObject,
     },
-    /// An object has another length than it must have.
+    /// An object is mapped with another length than required.
     #[error("{} {number} carries {} with {} bits, expected {expected_bits}", direction.word(), named(*object), object.bits)]
     Length {
-        /// Which way.
+        /// The direction.
         direction: PdoDirection,
         /// The PDO, counted from 1.
         number: u16,
         /// The object as it is mapped.
         object: MappedObject,
-        /// Its length in bits.
+        /// The required length in bits.
         expected_bits: u8,
     },
-    /// An object is not a whole number of up to four bytes.
-    #[error("{} {number} carries {} with {} bits: only 8, 16 and 32 can be taken apart", direction.word(), named(*object), object.bits)]
+    /// An object is mapped with a length other than one, two or four bytes.
+    #[error("{} {number} carries {} with {} bits: only 8, 16 and 32 bits are supported", direction.word(), named(*object), object.bits)]
     Width {
-        /// Which way.
+        /// The direction.
         direction: PdoDirection,
         /// The PDO, counted from 1.
         number: u16,
         /// The object as it is mapped.
         object: MappedObject,
     },
-    /// A PDO that must be sent carries an object that nobody has a value for.
+    /// An RPDO that must be sent carries an object for which there is no value.
     #[error("RPDO {number} also carries {}, for which there is no value to send", named(*object))]
     NothingToSend {
         /// The PDO, counted from 1.
@@ -50,56 +50,56 @@ pub enum MappingProblem {
         /// The object.
         object: MappedObject,
     },
-    /// A PDO has another identifier than the pre-defined one.
+    /// A PDO has another identifier than in the pre-defined connection set.
     #[error("{} {number} has the identifier {}, expected 0x{:03X}", direction.word(), shown(*reported), expected.value())]
     Identifier {
-        /// Which way.
+        /// The direction.
         direction: PdoDirection,
         /// The PDO, counted from 1.
         number: u16,
-        /// What the drive says.
+        /// The identifier that the drive reports.
         reported: Option<Id>,
-        /// That of the pre-defined connection set.
+        /// The identifier in the pre-defined connection set.
         expected: Id,
     },
-    /// A PDO comes, or takes effect, otherwise than it was counted on.
+    /// A PDO has another transmission type than configured.
     #[error("{} {number} has the transmission type {}, expected {expected}", direction.word(), type_shown(*reported))]
     TransmissionType {
-        /// Which way.
+        /// The direction.
         direction: PdoDirection,
         /// The PDO, counted from 1.
         number: u16,
-        /// What the drive says.
+        /// The transmission type that the drive reports.
         reported: Option<u8>,
-        /// What is configured.
+        /// The configured transmission type.
         expected: u8,
     },
-    /// There are more PDOs than the bus was checked with.
-    #[error("it has {found} {}s to exchange, the load of the bus was checked with {counted}", direction.word())]
+    /// There are more PDOs than the check of the bus load has counted.
+    #[error("the drive exchanges {found} {}s, but the bus load was checked with {counted}", direction.word())]
     TooMany {
-        /// Which way.
+        /// The direction.
         direction: PdoDirection,
-        /// How many there are.
+        /// Number of PDOs.
         found: usize,
-        /// How many were counted.
+        /// Number of counted PDOs.
         counted: usize,
     },
-    /// A PDO is longer than the bus was checked with.
-    #[error("{} {number} has {bits} bits, the load of the bus was checked with {counted_bits}", direction.word())]
+    /// A PDO is longer than the check of the bus load has counted.
+    #[error("{} {number} has {bits} bits, but the bus load was checked with {counted_bits}", direction.word())]
     TooLong {
-        /// Which way.
+        /// The direction.
         direction: PdoDirection,
         /// The PDO, counted from 1.
         number: u16,
         /// Its length in bits.
         bits: usize,
-        /// What was counted.
+        /// The counted length in bits.
         counted_bits: usize,
     },
 }
 
 impl MappingProblem {
-    /// What to try.
+    /// The remedy.
     pub const fn advice(self) -> &'static str {
         match self {
             Self::NotMapped { .. }
@@ -110,13 +110,13 @@ impl MappingProblem {
                  controller write it where the drive allows that: mapping = \"written\""
             }
             Self::Identifier { .. } => {
-                "give the PDO the identifier of the pre-defined connection set, or switch it off"
+                "give the PDO the identifier of the pre-defined connection set, or make it invalid (bit 31 of its COB-ID)"
             }
             Self::TransmissionType { .. } => {
                 "set `transmission_type` of the axis to that of the drive, or that of the drive to the axis'"
             }
             Self::TooMany { .. } | Self::TooLong { .. } => {
-                "switch off the PDOs that are not needed (bit 31 of their COB-ID), or name the objects that they carry \
+                "make the PDOs that are not needed invalid (bit 31 of their COB-ID), or name the objects that they carry \
                  in `feedback`, so that they are counted"
             }
         }
@@ -153,11 +153,11 @@ fn named(object: MappedObject) -> String {
 }
 
 impl ProcessData {
-    /// The process data of an axis by what its drive reports. Of drives that map freely any PDOs will do that carry what
-    /// is needed; of a YZ-AIM each PDO has its purpose, and one of which it does not tell is taken to be the manual's.
+    /// The process data of an axis by the drive's report. With free mapping, any PDOs with the needed objects will do.
+    /// Each PDO of a YZ-AIM has a fixed purpose; a PDO that it does not report is as in the manual.
     ///
     /// # Errors
-    /// The first reason for which the axis cannot work with it, or the bus might not carry it.
+    /// The first reason for which the axis cannot work with it, or the bus load is not covered by the check.
     pub fn as_reported(axis: &Axis, reported: &[PdoConfiguration]) -> Result<Self, MappingProblem> {
         let counted = Self::of(axis);
         match axis.drive {
@@ -207,7 +207,7 @@ fn by_content(
     })
 }
 
-/// The PDOs that carry what is needed, in their order, each once.
+/// The PDOs that carry the needed objects, in order, each once.
 fn carriers<'a>(
     pdos: &[&'a PdoConfiguration],
     direction: PdoDirection,
@@ -226,7 +226,7 @@ fn carriers<'a>(
     Ok(chosen)
 }
 
-/// The object as a PDO maps it.
+/// The object as this PDO maps it.
 fn carried(pdo: &PdoConfiguration, object: MappedObject) -> Option<MappedObject> {
     let is_it = |mapped: &&MappedObject| (mapped.index, mapped.subindex) == (object.index, object.subindex);
     pdo.objects.iter().find(is_it).copied()
@@ -244,8 +244,8 @@ fn check_length(
     Err(MappingProblem::Length { direction, number, object: mapped, expected_bits: needed.bits })
 }
 
-/// Everything that is sent must have a value: a gap, what is needed, or a target and an offset of other modes, for which
-/// zero is as good as any.
+/// Checks that every object of an RPDO has a value: dummy entries, needed objects, and targets or offsets of other
+/// modes, which are sent as zero.
 fn check_values(pdo: &PdoConfiguration, needed: &[MappedObject]) -> Result<(), MappingProblem> {
     let has_value = |object: &MappedObject| {
         object.is_dummy()
@@ -255,8 +255,7 @@ fn check_values(pdo: &PdoConfiguration, needed: &[MappedObject]) -> Result<(), M
                 CommandSlot::OperationMode
                     | CommandSlot::TargetVelocity
                     | CommandSlot::TargetTorque
-                    | CommandSlot::VelocityOffset
-                    | CommandSlot::TorqueOffset
+                    | CommandSlot::Offset
             )
     };
     match pdo.objects.iter().find(|object| !has_value(object)) {
@@ -349,33 +348,33 @@ mod tests {
         }
     }
 
-    fn told(pdo: PdoConfiguration) -> Result<ProcessData, MappingProblem> {
+    fn as_reported(pdo: PdoConfiguration) -> Result<ProcessData, MappingProblem> {
         ProcessData::as_reported(&yz_aim(), &[pdo])
     }
 
     #[test]
-    fn a_pdo_of_which_a_yz_aim_does_not_tell_is_the_manuals() {
+    fn a_pdo_that_a_yz_aim_does_not_report_is_as_in_the_manual() {
         let axis = yz_aim();
         assert_eq!(ProcessData::as_reported(&axis, &[]), Ok(ProcessData::of(&axis)));
     }
 
     #[test]
-    fn the_order_of_a_yz_aim_is_its_own_business() {
-        let data = told(reported(PdoDirection::Transmit, 2, &[0x6041_0010, 0x6064_0020])).unwrap();
+    fn a_yz_aim_may_map_its_objects_in_any_order() {
+        let data = as_reported(reported(PdoDirection::Transmit, 2, &[0x6041_0010, 0x6064_0020])).unwrap();
         let objects: Vec<u16> = data.feedback[0].objects.iter().map(|object| object.index).collect();
         assert_eq!(objects, [0x6041, 0x6064]);
         assert_eq!(data.commands, ProcessData::of(&yz_aim()).commands);
     }
 
     #[test]
-    fn a_yz_aim_that_carries_something_else_is_refused_by_pdo_and_object() {
+    fn a_yz_aim_with_another_mapping_is_refused_with_pdo_and_object() {
         let (receive, transmit) = (PdoDirection::Receive, PdoDirection::Transmit);
         let off = PdoConfiguration { is_valid: false, ..reported(receive, 4, &[0x607A_0020]) };
         let elsewhere = PdoConfiguration { id: None, ..reported(receive, 4, &[0x607A_0020]) };
         for (pdo, text) in [
             (
                 reported(transmit, 2, &[0x6064_0020, 0x606C_0020]),
-                "no TPDO that is switched on carries 6041:00 (statusword), which the axis needs",
+                "no valid TPDO carries 6041:00 (statusword), which the axis needs",
             ),
             (
                 reported(transmit, 2, &[0x6064_0010, 0x6041_0010]),
@@ -383,16 +382,16 @@ mod tests {
             ),
             (
                 reported(transmit, 2, &[0x6064_0020, 0x6041_0010, 0x260E_0010]),
-                "TPDO 2 has 64 bits, the load of the bus was checked with 48",
+                "TPDO 2 has 64 bits, but the bus load was checked with 48",
             ),
             (
                 reported(receive, 4, &[0x607A_0020, 0x6081_0020]),
                 "RPDO 4 also carries 6081:00 (profile velocity), for which there is no value to send",
             ),
-            (off, "no RPDO that is switched on carries 607A:00 (target position), which the axis needs"),
+            (off, "no valid RPDO carries 607A:00 (target position), which the axis needs"),
             (elsewhere, "RPDO 4 has the identifier none, expected 0x505"),
         ] {
-            assert_eq!(told(pdo).unwrap_err().to_string(), text);
+            assert_eq!(as_reported(pdo).unwrap_err().to_string(), text);
         }
     }
 }

@@ -1,5 +1,4 @@
-//! A procedure on one drive as a list of steps: plain data that a family of drives writes down and
-//! [`AxisRun`](super::axis_run::AxisRun) carries out.
+//! A procedure on one drive as a list of steps: plain data that describes a family's procedure. `axis_run` runs it.
 
 use takt_rt::{DriveState, Nanoseconds, OperationMode};
 
@@ -9,90 +8,90 @@ use crate::canopen::object::{Object, ObjectAddress};
 
 /// One step.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Step {
-    /// What it is about, for progress and failures.
+pub(super) struct ProcedureStep {
+    /// Its name, for progress and failures.
     pub name: &'static str,
-    /// What to try when it fails.
+    /// The remedy when it fails.
     pub advice: &'static str,
-    /// Whether it is done at all.
-    pub when: When,
-    /// What is done.
+    /// The condition under which it is done.
+    pub condition: Condition,
+    /// What it does.
     pub action: Action,
 }
 
-/// Whether a step is done.
+/// The condition under which a step is done.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum When {
+pub(super) enum Condition {
     /// In any case.
     Always,
-    /// Only when the last statusword shows torque on the motor.
+    /// Condition the last statusword shows torque on the motor.
     HasTorque,
 }
 
 /// What a step does.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Action {
-    /// Commands a state and waits until the node reports it.
+    /// Commands an NMT state and waits until the node reports it.
     Nmt {
         command: NmtCommand,
         /// The state to wait for; `None` when the node produces no heartbeat to report it with.
         awaited: Option<NmtState>,
-        /// For how long to wait.
+        /// The timeout.
         within_ns: Nanoseconds,
-        /// When to command again: the first frame may have come before the node could hear.
+        /// Condition to repeat the command, because a booting node may have missed it.
         repeat_ns: Nanoseconds,
     },
-    /// Commands a state and asks for the device type, both again and again, until the node answers. It may have been away, and
-    /// a stopped one has no SDO server before it is commanded.
-    Reach { command: NmtCommand },
+    /// Repeats an NMT command and an SDO upload of object 1000 until the node answers. The node may have been absent,
+    /// and a node in NMT stopped has no SDO server before the command.
+    WakeUp { command: NmtCommand },
     /// Reads a number.
     Read {
         object: Object,
         check: Check,
         keep: Option<Fact>,
-        /// Whether the drive may refuse: then the object is noted as absent.
+        /// Whether the drive may refuse; the object is then recorded as absent.
         is_optional: bool,
     },
-    /// Reads a text, which the drive may refuse.
+    /// Reads a text. The drive may refuse.
     ReadText { object: ObjectAddress, keep: TextFact },
     /// Writes a number.
     Write {
         object: Object,
-        value: Source,
+        value: ValueSource,
         read_back: ReadBack,
-        /// Whether the drive may say that it has no such object: then it is noted as absent.
+        /// Whether the object may be missing; it is then recorded as absent.
         is_optional: bool,
     },
-    /// Writes bytes, and reads them back where they can be read.
+    /// Writes bytes, and reads them back unless the object is write-only.
     WriteBytes(Download),
-    /// Reads how the PDOs are configured, and settles the process data by it.
+    /// Reads the PDO configuration, and takes the process data from it.
     ReadProcessData,
-    /// Reads a number again and again until it is as wanted.
+    /// Polls a number until it passes the check.
     Await { object: Object, check: Check, keep: Option<Fact>, within_ns: Nanoseconds },
 }
 
-/// The number to write.
+/// The source of a number to write.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Source {
+pub(super) enum ValueSource {
     Value(i64),
-    /// The position that was read last.
+    /// The last position that was read.
     ActualPosition,
 }
 
-/// Whether a written number is read again.
+/// Whether a written number is read back.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum ReadBack {
     No,
-    /// It must be the same in these bits.
+    /// It must match in these bits.
     Masked(u32),
 }
 
 impl ReadBack {
-    /// It must be the same.
+    /// All bits must match.
     pub const EXACT: Self = Self::Masked(u32::MAX);
 }
 
-/// Where a number is kept.
+/// The fact that a number is stored as.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Fact {
     DeviceType,
@@ -109,7 +108,7 @@ pub(super) enum Fact {
     QuickStopOptionCode,
 }
 
-/// Where a text is kept.
+/// The fact that a text is stored as.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum TextFact {
     DeviceName,
@@ -117,10 +116,10 @@ pub(super) enum TextFact {
     SoftwareVersion,
 }
 
-/// What a number must be.
+/// The condition that a number must meet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Check {
-    /// Anything.
+    /// Any number.
     Any,
     /// This number.
     Equals(i64),
@@ -131,20 +130,20 @@ pub enum Check {
         /// The bits.
         mask: u32,
     },
-    /// A number whose low 16 bits are those of the profile in object 1000.
+    /// A device type (object 1000) with this profile number in its low 16 bits.
     Profile(u16),
-    /// A number with the bit of this mode in object 6502.
+    /// Supported modes (object 6502) with the bit of this mode.
     Supports(OperationMode),
     /// A statusword of a state without torque.
     NoTorque,
-    /// A velocity of at most this many drive units either way.
+    /// A velocity of at most this many drive units in either direction.
     AtMost(i64),
     /// More than zero.
     Positive,
 }
 
 impl Check {
-    /// Whether `value` passes.
+    /// Whether `value` meets the condition.
     pub fn passes(self, value: i64) -> bool {
         match self {
             Self::Any => true,
@@ -158,7 +157,7 @@ impl Check {
         }
     }
 
-    /// In words, for a value of `object`.
+    /// The condition in words, for a value of `object`.
     pub fn words(self, object: &Object) -> String {
         match self {
             Self::Any => "any value".into(),
@@ -174,7 +173,7 @@ impl Check {
         }
     }
 
-    /// What a value means, beside the number itself.
+    /// The meaning of a value that does not pass, beyond its number.
     pub fn meaning(self, value: i64) -> Option<String> {
         match self {
             Self::NoTorque => Some(format!("{:?}", DriveState::decode(value as u16))),
@@ -189,7 +188,7 @@ impl Check {
     }
 }
 
-/// A mode of operation as CiA 402 calls it.
+/// The name of a mode of operation in CiA 402.
 pub fn mode_words(mode: OperationMode) -> &'static str {
     match mode {
         OperationMode::ProfilePosition => "profile position",
@@ -204,19 +203,19 @@ pub fn mode_words(mode: OperationMode) -> &'static str {
     }
 }
 
-/// What was being done to an object.
+/// An access to an object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Access {
-    /// It was being read.
+    /// Reading it.
     Read,
-    /// This was being written to it.
+    /// Writing this value to it.
     Write(i64),
-    /// It was being read after this had been written to it.
+    /// Reading it back after this value was written.
     ReadBack(i64),
 }
 
 impl Access {
-    /// In words, for `object`.
+    /// The access in words, for `object`.
     pub fn words(self, object: &Object) -> String {
         match self {
             Self::Read => format!("reading {object}"),

@@ -1,11 +1,11 @@
-//! Writing down a list of steps, and the numbers that every family of drives is given.
+//! Builds lists of steps, and computes numbers that every family needs.
 
 use std::f64::consts::TAU;
 
 use takt_rt::Nanoseconds;
 
 use super::bring_up::BringUpTiming;
-use super::step::{Action, Check, Fact, ReadBack, Source, Step, When};
+use super::step::{Action, Check, Condition, Fact, ProcedureStep, ReadBack, ValueSource};
 use crate::canopen::nmt::{NmtCommand, NmtState};
 use crate::canopen::object::Object;
 use crate::canopen::objects::{self, PDO_IDENTITY, PdoParameters};
@@ -13,7 +13,7 @@ use crate::config::{Axis, Config, Travel};
 
 const PROFILE_CIA402: u16 = 402;
 
-/// Turns of the drive's position for a distance (rad, m), or per second for one per second.
+/// Turns of the drive's encoder for a distance (rad, m), or turns per second for a velocity.
 pub(super) fn turns(axis: &Axis, distance: f64) -> f64 {
     let travel_per_turn = match axis.travel {
         Travel::Rotary => TAU,
@@ -22,7 +22,7 @@ pub(super) fn turns(axis: &Axis, distance: f64) -> f64 {
     (distance / travel_per_turn * axis.gear_ratio).abs()
 }
 
-/// A distance (rad, m), or one per second (per second), in counts; at least 1, at most what 32 bits hold.
+/// Counts for a distance (rad, m), a velocity or an acceleration: at least 1, at most the range of 32 bits.
 pub(super) fn counts(axis: &Axis, distance: f64) -> i64 {
     (turns(axis, distance) * axis.counts_per_turn).round().clamp(1.0, u32::MAX.into()) as i64
 }
@@ -34,7 +34,7 @@ pub(super) fn rounded_up(ns: Nanoseconds, unit_ns: Nanoseconds) -> i64 {
 /// A state is not waited for when the drive reports it less often than this: Ctrl-C would take as long.
 const LONGEST_AWAITED_HEARTBEAT_NS: Nanoseconds = 1_000_000_000;
 
-/// Object 1016:1 of a drive that is to notice the master's silence; 0 where the master has no heartbeat.
+/// The value of object 1016:1: the master's node ID and heartbeat timeout; 0 without a master heartbeat.
 pub(super) fn watched_heartbeat(config: &Config) -> i64 {
     config.master.heartbeat_ns.map_or(0, |_| {
         let timeout_ms = rounded_up(config.master.heartbeat_timeout_ns, 1_000_000).min(u16::MAX.into());
@@ -42,25 +42,30 @@ pub(super) fn watched_heartbeat(config: &Config) -> i64 {
     })
 }
 
-/// Steps under construction: each belongs to the subject that was named last.
-pub(super) struct List {
-    pub steps: Vec<Step>,
+/// A list of steps under construction. New steps get the name and the remedy that were set last.
+pub(super) struct StepList {
+    pub steps: Vec<ProcedureStep>,
     name: &'static str,
     advice: &'static str,
-    pub when: When,
+    pub condition: Condition,
 }
 
-impl List {
+impl StepList {
     pub fn new(name: &'static str, advice: &'static str) -> Self {
-        Self { steps: vec![], name, advice, when: When::Always }
+        Self { steps: vec![], name, advice, condition: Condition::Always }
     }
 
-    pub fn about(&mut self, name: &'static str, advice: &'static str) {
+    pub fn begin(&mut self, name: &'static str, advice: &'static str) {
         (self.name, self.advice) = (name, advice);
     }
 
     pub fn push(&mut self, action: Action) {
-        self.steps.push(Step { name: self.name, advice: self.advice, when: self.when, action });
+        self.steps.push(ProcedureStep {
+            name: self.name,
+            advice: self.advice,
+            condition: self.condition,
+            action,
+        });
     }
 
     pub fn nmt(
@@ -73,9 +78,9 @@ impl List {
         self.push(Action::Nmt { command, awaited, within_ns, repeat_ns });
     }
 
-    /// See [`Action::Reach`].
-    pub fn reach(&mut self, command: NmtCommand) {
-        self.push(Action::Reach { command });
+    /// See [`Action::WakeUp`].
+    pub fn wake_up(&mut self, command: NmtCommand) {
+        self.push(Action::WakeUp { command });
     }
 
     /// Commands a state that the drive's heartbeat must report, if it has one that comes soon.
@@ -100,10 +105,9 @@ impl List {
         self.push(Action::Read { object, check: Check::Any, keep: Some(keep), is_optional: true });
     }
 
-    /// What the configuration file of the axis has written: before all that the controller itself needs to be set, so
-    /// that this has the last word.
+    /// Writes the axis' configuration file (`dcf`). It comes first, so that the controller's own settings override it.
     pub fn configuration_file(&mut self, axis: &Axis) {
-        self.about(
+        self.begin(
             "configuration file",
             "the file named by `dcf` does not suit this drive: correct it there, or leave the object out",
         );
@@ -112,12 +116,12 @@ impl List {
         }
     }
 
-    /// Compares what the drive says of itself with what is configured.
+    /// Checks the drive's identity against the configuration.
     pub fn identity(&mut self, axis: &Axis) {
-        self.about(
+        self.begin(
             "identity",
-            "another drive than configured answers under this node number: check the wiring and the node numbers, or \
-             correct `identity` in the configuration",
+            "another drive than configured answers under this node ID: check the wiring and the node IDs, or correct \
+             `identity` in the configuration",
         );
         let expected = |value: Option<u32>| value.map_or(Check::Any, |value| Check::Equals(value.into()));
         let device_type = axis.identity.device_type;
@@ -128,14 +132,14 @@ impl List {
         self.read(objects::REVISION_NUMBER, expected(axis.identity.revision), Fact::RevisionNumber);
     }
 
-    /// Reads how the drive's PDOs are configured, and works with that.
+    /// Reads the drive's PDO configuration, and takes the process data from it.
     pub fn reported_process_data(&mut self) {
-        self.about("PDO mapping", "the drive's own mapping does not suit this axis");
+        self.begin("PDO mapping", "the drive's own mapping does not suit this axis");
         self.push(Action::ReadProcessData);
     }
 
     pub fn write_with(&mut self, object: Object, value: i64, read_back: ReadBack, is_optional: bool) {
-        self.push(Action::Write { object, value: Source::Value(value), read_back, is_optional });
+        self.push(Action::Write { object, value: ValueSource::Value(value), read_back, is_optional });
     }
 
     pub fn write(&mut self, object: Object, value: i64) {
@@ -164,7 +168,7 @@ mod tests {
     fn commanded(heartbeat_ns: Option<u64>) -> Action {
         let mut config = Config::load(Path::new("configs/single-erob.toml")).unwrap();
         config.axes[0].heartbeat_ns = heartbeat_ns;
-        let mut list = List::new("start", "");
+        let mut list = StepList::new("start", "");
         let timing = BringUpTiming::default();
         list.nmt_reported(NmtCommand::Start, NmtState::Operational, &config.axes[0], &timing);
         list.steps.remove(0).action

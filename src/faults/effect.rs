@@ -1,72 +1,72 @@
-//! What a fault does.
+//! The effects of faults.
 
 use takt_rt::{Frame, FrameKind, Id, Nanoseconds};
 
-use super::breakable::DriveTrouble;
+use super::injectable::DriveEffect;
 
-/// What a fault does while it is there.
+/// The effect of a fault while it is active.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Effect {
-    /// Something happens to the selected frames.
+    /// On the selected frames.
     Frames(FrameEffect),
-    /// Something happens to the interface.
+    /// On the interface.
     Interface(InterfaceEffect),
-    /// Somebody else speaks on the bus.
+    /// Frames from a foreign station.
     Foreign(ForeignFrames),
-    /// Something happens to a simulated drive.
+    /// On a simulated drive.
     Drive {
-        /// Its node number.
+        /// The node ID.
         node: u8,
-        /// What.
-        trouble: DriveTrouble,
+        /// The effect.
+        effect: DriveEffect,
     },
 }
 
-/// What happens to a selected frame.
+/// The effect on a selected frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FrameEffect {
-    /// It is lost on the way; a sent one counts as confirmed.
+    /// The frame is lost; a sent one counts as confirmed.
     Drop,
-    /// It comes so much later; what comes after it does not wait.
+    /// The frame is delayed; later frames overtake it.
     Delay {
-        /// How much.
+        /// The delay.
         by_ns: Nanoseconds,
-        /// Where a received one is held up.
+        /// Where a received frame is delayed.
         place: DelayPlace,
     },
-    /// It comes so many more times.
+    /// The frame is repeated.
     Duplicate {
-        /// How many.
+        /// Number of additional copies.
         copies: u8,
     },
-    /// Some of its bits are turned.
+    /// Some bits are inverted.
     Corrupt {
-        /// How many.
+        /// Number of bits.
         bits: u8,
-        /// Where.
+        /// The part of the frame.
         part: Part,
     },
-    /// It changes places with the other selected ones that are sent or received in one go.
+    /// The selected frames of one call are shuffled.
     Reorder,
-    /// It is sent, but never confirmed as long as the fault is there.
+    /// The frame is sent, but not confirmed while the fault is active.
     EchoLoss,
-    /// The interface has no room for it and for what would be sent after it.
+    /// The interface has no room for the frame and for those after it.
     FullQueue,
 }
 
 impl FrameEffect {
-    /// Whether it can only happen to what is sent.
+    /// Whether this effect exists for sent frames only.
     pub const fn is_of_sending(self) -> bool {
         matches!(self, Self::EchoLoss | Self::FullQueue)
     }
 }
 
-/// Where a received frame is held up.
+/// Where a received frame is delayed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DelayPlace {
-    /// In the machine: it tells when it arrived.
+    /// In the machine: its timestamp stays that of its arrival.
     Machine,
-    /// On its way to it, as one that is sent late: it arrives so much later.
+    /// On the bus: it arrives later, and its timestamp is later.
     Bus,
 }
 
@@ -79,7 +79,7 @@ pub enum Part {
     Identifier,
 }
 
-/// What happens to the interface.
+/// The effect on the interface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum InterfaceEffect {
     /// The controller has gone off the bus: nothing is sent or received.
@@ -90,33 +90,33 @@ pub enum InterfaceEffect {
     Down,
 }
 
-/// What somebody else says.
+/// The frames of a foreign station.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ForeignFrames {
-    /// The same frame, once or in a rhythm.
+    /// One frame, once or periodically.
     Frame {
         /// The frame.
         frame: Frame,
-        /// The rhythm; `None` says it once.
+        /// The period; `None` sends it once.
         period_ns: Option<Nanoseconds>,
     },
-    /// Another master commands a node what the controller had commanded it last when the fault began.
+    /// Another master repeats the last set-points that the controller had sent when the fault began.
     SetPoints {
         /// The identifier of the set-points.
         id: Id,
-        /// The rhythm.
+        /// The period.
         period_ns: Nanoseconds,
     },
-    /// A second node of the same number: boots, and then sends its heartbeat as pre-operational.
+    /// A second node with the same node ID boots, then sends its heartbeat as pre-operational.
     DuplicateNode {
-        /// The number.
+        /// The node ID.
         node: u8,
         /// The period of the heartbeat.
         period_ns: Nanoseconds,
     },
 }
 
-/// Turns `bits` bits of a frame, each somewhere in `part`. `below` gives a random number below another.
+/// Inverts `bits` bits of a frame, each anywhere in `part`. `below(n)` returns a random number below n.
 pub fn corrupted(frame: &Frame, bits: u8, part: Part, mut below: impl FnMut(usize) -> usize) -> Frame {
     let mut data = [0; Frame::MAX_BYTES];
     let length = frame.payload().len();
@@ -150,7 +150,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn one_turned_bit_changes_one_bit(id in 0u32..0x800, data: [u8; 8], length in 1usize..=8, at: usize) {
+        fn one_inverted_bit_changes_one_bit(id in 0u32..0x800, data: [u8; 8], length in 1usize..=8, at: usize) {
             let frame = Frame::data(Id::base(id).unwrap(), &data[..length]).unwrap();
             let payload = corrupted(&frame, 1, Part::Payload, |limit| at % limit);
             prop_assert_eq!(payload.id(), frame.id());
@@ -162,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn what_has_no_data_cannot_be_broken_there() {
+    fn a_frame_without_data_keeps_its_payload() {
         let remote = Frame::remote(Id::canopen(0x700, 1), 1).unwrap();
         assert_eq!(corrupted(&remote, 3, Part::Payload, |_| 0), remote);
     }

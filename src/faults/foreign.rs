@@ -1,73 +1,73 @@
-//! Somebody else on the bus.
+//! A foreign station on the bus.
 
 use takt_rt::{Frame, Nanoseconds};
 
 use super::effect::ForeignFrames;
 use crate::canopen::nmt::{ErrorControl, NmtState};
 
-/// Frames said in one look at the time at most, so that a long pause of the caller does not end in a storm.
+/// Most frames sent in one call, so that a long pause between calls does not cause a burst.
 const FRAMES_AT_ONCE: u32 = 64;
 
-/// Somebody else who speaks in a rhythm.
+/// A foreign station that sends periodically.
 #[derive(Debug)]
-pub struct Foreigner {
+pub struct ForeignStation {
     frames: ForeignFrames,
     due_ns: Option<Nanoseconds>,
-    said: u64,
-    said_at_once: u32,
-    /// What the controller has commanded last under the identifier of [`ForeignFrames::SetPoints`].
-    overheard: Option<Frame>,
+    sent: u64,
+    sent_at_once: u32,
+    /// The controller's last frame with the identifier of [`ForeignFrames::SetPoints`].
+    last_set_points: Option<Frame>,
 }
 
-impl Foreigner {
+impl ForeignStation {
     pub fn new(frames: ForeignFrames) -> Self {
-        Self { frames, due_ns: None, said: 0, said_at_once: 0, overheard: None }
+        Self { frames, due_ns: None, sent: 0, sent_at_once: 0, last_set_points: None }
     }
 
     pub fn begin(&mut self, now_ns: Nanoseconds) {
         self.due_ns = Some(now_ns);
     }
 
-    /// Hears what the controller sends. Once it speaks itself, it repeats what it had heard before.
-    pub fn overhear(&mut self, frame: &Frame) {
+    /// Takes a frame that the controller sends. Once the station has begun, it repeats the last frame from before.
+    pub fn observe(&mut self, frame: &Frame) {
         if let ForeignFrames::SetPoints { id, .. } = self.frames
             && frame.id() == id
             && self.due_ns.is_none()
         {
-            self.overheard = Some(*frame);
+            self.last_set_points = Some(*frame);
         }
     }
 
-    /// What it says next, and when it was due; `None` when there is nothing more to say up to `now_ns`.
+    /// The next frame and its due time; `None` when no frame is due up to `now_ns`.
     pub fn next(&mut self, now_ns: Nanoseconds) -> Option<(Nanoseconds, Frame)> {
         let due_ns = self.due_ns.filter(|due_ns| *due_ns <= now_ns);
         let Some(due_ns) = due_ns else {
-            self.said_at_once = 0;
+            self.sent_at_once = 0;
             return None;
         };
-        if self.said_at_once == FRAMES_AT_ONCE {
-            self.said_at_once = 0;
+        if self.sent_at_once == FRAMES_AT_ONCE {
+            self.sent_at_once = 0;
             self.due_ns = self.period_ns().map(|period_ns| now_ns.saturating_add(period_ns.max(1)));
             return None;
         }
         let frame = self.frame()?;
-        self.said += 1;
-        self.said_at_once += 1;
+        self.sent += 1;
+        self.sent_at_once += 1;
         self.due_ns = self.period_ns().map(|period_ns| due_ns.saturating_add(period_ns.max(1)));
         Some((due_ns, frame))
     }
 
-    /// Whether it has said everything.
-    pub fn is_silent(&self) -> bool {
+    /// Whether every frame has been sent.
+    pub fn is_finished(&self) -> bool {
         self.due_ns.is_none()
     }
 
     fn frame(&self) -> Option<Frame> {
         match self.frames {
             ForeignFrames::Frame { frame, .. } => Some(frame),
-            ForeignFrames::SetPoints { .. } => self.overheard,
+            ForeignFrames::SetPoints { .. } => self.last_set_points,
             ForeignFrames::DuplicateNode { node, .. } => {
-                let state = if self.said == 0 { NmtState::BootUp } else { NmtState::PreOperational };
+                let state = if self.sent == 0 { NmtState::BootUp } else { NmtState::PreOperational };
                 Some(ErrorControl { node, state }.frame())
             }
         }

@@ -5,103 +5,110 @@ use std::sync::Arc;
 
 use takt_rt::{BusHealth, BusPort, BusState, Frame, Nanoseconds, ReceiveBatch, Received};
 
-use super::breakable::{Breakable, CannotBreak, DriveTrouble, Heard};
-use super::cue::Cues;
 use super::effect::{DelayPlace, Effect, FrameEffect, InterfaceEffect, corrupted};
-use super::foreign::Foreigner;
-use super::scenario::Fault;
+use super::foreign::ForeignStation;
+use super::injectable::{Delivery, DriveEffect, InjectError, Injectable};
+use super::scenario::ScenarioFault;
 use super::selection::{Direction, Selector};
-use super::window::{Course, Edge, Timer};
+use super::trigger::TriggerTimes;
+use super::window::{Edge, FaultProgress, WindowTimer};
 
-/// Frames that one call can make of those it was handed.
-const OUTGOING: usize = 256;
-/// Frames that can be held back, and as many that have arrived and wait to be taken.
-const HELD: usize = 1024;
-/// Batches taken from the port within, in one call.
-const BATCHES: usize = 32;
+/// Capacity for the frames that one call can make of the frames passed to it.
+const MAX_OUTGOING: usize = 256;
+/// Capacity for delayed frames, and for frames that have arrived but are not yet taken.
+const CAPACITY: usize = 1024;
+/// Batches taken from the inner port in one call at most.
+const MAX_BATCHES: usize = 32;
 
-/// A port with one fault. Without it, or before and after, everything passes as it is. Faults compose by wrapping a
-/// port again: the innermost is nearest to the wire.
+/// A port with one fault. Outside the fault's window everything passes unchanged. Faults compose by nesting: the
+/// innermost is nearest to the wire.
 ///
-/// Time is looked at in every call, so a fault begins and ends with a call of the cycle. All memory is taken at the
-/// construction; what finds no room is lost and counted as an overrun.
+/// Every call checks the time, so a fault begins and ends with a call of the cycle. All memory is allocated at
+/// construction; a frame that finds no room is lost and counted as an overrun.
 pub struct FaultyPort<P> {
     port: P,
-    timer: Timer,
+    timer: WindowTimer,
     selector: Selector,
     effect: Effect,
-    foreigner: Option<Foreigner>,
-    /// What one call sends, each with the number of the frame that it was made of.
+    foreign_station: Option<ForeignStation>,
+    /// The frames of one call, each with the index of the frame that it was made of.
     outgoing: Vec<(usize, Frame)>,
     batch: Vec<Frame>,
-    /// Sent frames that are held back, each with the time at which it leaves.
-    held: VecDeque<(Nanoseconds, Frame)>,
+    /// Delayed frames to send, each with its due time.
+    delayed_tx: VecDeque<(Nanoseconds, Frame)>,
     incoming: Box<ReceiveBatch>,
-    /// Received frames that lie in the machine, each with the time at which it can be taken.
-    late: VecDeque<(Nanoseconds, Received)>,
+    /// Delayed frames that were received, each with the time at which it can be taken.
+    delayed_rx: VecDeque<(Nanoseconds, Received)>,
     arrived: VecDeque<Received>,
     unconfirmed: usize,
-    /// Places of frames that change them.
+    /// Positions of the frames to shuffle.
     places: Vec<usize>,
-    /// What the fault adds to the counters of the port.
+    /// What the fault adds to the port's counters.
     added: BusHealth,
 }
 
-/// What becomes of a selected frame.
-enum Fate {
-    Copies(Frame, usize),
-    Moved,
-    Late(Nanoseconds, DelayPlace),
-    Lost,
-    Refused,
+/// What happens to a selected frame.
+enum FrameAction {
+    Pass(Frame, usize),
+    Shuffle,
+    Delay(Nanoseconds, DelayPlace),
+    Drop,
+    Refuse,
 }
 
-impl<P: Breakable> FaultyPort<P> {
-    /// Wraps `port`. The fault waits for `cues` and tells `course` how it goes.
-    pub fn new(port: P, fault: &Fault, cues: Arc<Cues>, course: Arc<Course>) -> Self {
-        let foreigner = match fault.effect {
-            Effect::Foreign(frames) => Some(Foreigner::new(frames)),
+impl<P: Injectable> FaultyPort<P> {
+    /// Wraps `port`. The fault waits for a time in `triggers` and records its state in `progress`.
+    pub fn new(
+        port: P,
+        fault: &ScenarioFault,
+        trigger_times: Arc<TriggerTimes>,
+        progress: Arc<FaultProgress>,
+    ) -> Self {
+        let foreign_station = match fault.effect {
+            Effect::Foreign(frames) => Some(ForeignStation::new(frames)),
             _ => None,
         };
         Self {
             port,
-            timer: Timer::new(fault.window, cues, course),
+            timer: WindowTimer::new(fault.window, trigger_times, progress),
             selector: Selector::new(fault.selection.clone()),
             effect: fault.effect,
-            foreigner,
-            outgoing: Vec::with_capacity(OUTGOING),
-            batch: Vec::with_capacity(OUTGOING),
-            held: VecDeque::with_capacity(HELD),
+            foreign_station,
+            outgoing: Vec::with_capacity(MAX_OUTGOING),
+            batch: Vec::with_capacity(MAX_OUTGOING),
+            delayed_tx: VecDeque::with_capacity(CAPACITY),
             incoming: Box::default(),
-            late: VecDeque::with_capacity(HELD),
-            arrived: VecDeque::with_capacity(HELD),
+            delayed_rx: VecDeque::with_capacity(CAPACITY),
+            arrived: VecDeque::with_capacity(CAPACITY),
             unconfirmed: 0,
-            places: Vec::with_capacity(HELD),
+            places: Vec::with_capacity(CAPACITY),
             added: BusHealth::default(),
         }
     }
 
-    /// The port within.
+    /// The inner port.
     pub fn inner_mut(&mut self) -> &mut P {
         &mut self.port
     }
 
-    /// Does what is due.
-    fn turn(&mut self, now_ns: Nanoseconds) {
-        match self.timer.look(now_ns) {
+    /// Begins or ends the fault when it is time, and sends the frames that are due.
+    fn advance(&mut self, now_ns: Nanoseconds) {
+        match self.timer.poll(now_ns) {
             Edge::None => {}
             Edge::Began => self.begin(now_ns),
             Edge::Ended => self.end(),
         }
-        while let Some((due_ns, frame)) = self.held.front().copied().filter(|(due_ns, _)| *due_ns <= now_ns) {
-            self.held.pop_front();
+        while let Some((due_ns, frame)) =
+            self.delayed_tx.front().copied().filter(|(due_ns, _)| *due_ns <= now_ns)
+        {
+            self.delayed_tx.pop_front();
             if self.port.send(due_ns, &[frame]) == 0 {
                 self.added.tx_overruns += 1;
             }
         }
-        self.release_late(now_ns);
+        self.release_delayed(now_ns);
         if self.timer.is_active() {
-            self.let_foreigner_speak(now_ns);
+            self.send_foreign_frames(now_ns);
         }
     }
 
@@ -110,17 +117,17 @@ impl<P: Breakable> FaultyPort<P> {
             Effect::Interface(effect) => {
                 self.added.errors += u64::from(effect != InterfaceEffect::Down);
             }
-            Effect::Drive { node, trouble } => {
-                if self.port.trouble(node, trouble, true).is_err() {
-                    self.timer.course().was_impossible();
+            Effect::Drive { node, effect } => {
+                if self.port.inject(node, effect, true).is_err() {
+                    self.timer.progress().set_impossible();
                 }
-                if trouble.is_event() {
+                if effect.is_event() {
                     self.timer.end(now_ns);
                 }
             }
             Effect::Foreign(_) => {
-                if let Some(foreigner) = &mut self.foreigner {
-                    foreigner.begin(now_ns);
+                if let Some(foreign_station) = &mut self.foreign_station {
+                    foreign_station.begin(now_ns);
                 }
             }
             Effect::Frames(_) => {}
@@ -129,90 +136,93 @@ impl<P: Breakable> FaultyPort<P> {
 
     fn end(&mut self) {
         self.unconfirmed = 0;
-        if let Effect::Drive { node, trouble } = self.effect {
-            // What could not be broken cannot be mended either, and has been told of.
-            let _ = self.port.trouble(node, trouble, false);
+        if let Effect::Drive { node, effect } = self.effect {
+            // A drive that could not get the effect cannot lose it either; the beginning has reported that.
+            let _ = self.port.inject(node, effect, false);
         }
     }
 
-    fn let_foreigner_speak(&mut self, now_ns: Nanoseconds) {
-        let Some(foreigner) = &mut self.foreigner else { return };
-        while let Some((due_ns, frame)) = foreigner.next(now_ns) {
-            self.timer.course().count_frame();
-            if self.port.say(due_ns, &frame) == Heard::ByOthers && self.arrived.len() < HELD {
+    fn send_foreign_frames(&mut self, now_ns: Nanoseconds) {
+        let Some(foreign_station) = &mut self.foreign_station else { return };
+        while let Some((due_ns, frame)) = foreign_station.next(now_ns) {
+            self.timer.progress().count_frame();
+            if self.port.send_foreign(due_ns, &frame) == Delivery::ToOthers && self.arrived.len() < CAPACITY {
                 self.arrived.push_back(Received { frame, at_ns: due_ns });
             }
         }
-        if foreigner.is_silent() {
+        if foreign_station.is_finished() {
             self.timer.end(now_ns);
         }
     }
 
-    /// Whether the interface is cut off from its bus.
-    fn is_cut(&self) -> bool {
+    /// Whether the interface is disconnected from its bus.
+    fn is_disconnected(&self) -> bool {
         let cuts = matches!(self.effect, Effect::Interface(InterfaceEffect::BusOff | InterfaceEffect::Down));
         cuts && self.timer.is_active()
     }
 
-    /// What becomes of a frame.
-    fn fate(&mut self, now_ns: Nanoseconds, frame: &Frame, direction: Direction) -> Fate {
-        let Effect::Frames(effect) = self.effect else { return Fate::Copies(*frame, 1) };
+    /// Decides what happens to a frame.
+    fn action(&mut self, now_ns: Nanoseconds, frame: &Frame, direction: Direction) -> FrameAction {
+        let Effect::Frames(effect) = self.effect else { return FrameAction::Pass(*frame, 1) };
         let is_possible = direction == Direction::Sent || !effect.is_of_sending();
         if !self.timer.is_active() || !is_possible || !self.selector.picks(frame, direction) {
-            return Fate::Copies(*frame, 1);
+            return FrameAction::Pass(*frame, 1);
         }
-        self.timer.course().count_frame();
+        self.timer.progress().count_frame();
         if self.selector.is_exhausted() && effect != FrameEffect::EchoLoss {
             self.timer.end(now_ns);
         }
         match effect {
-            FrameEffect::Drop => Fate::Lost,
-            FrameEffect::Delay { by_ns, place } => Fate::Late(by_ns, place),
-            FrameEffect::Duplicate { copies } => Fate::Copies(*frame, 1 + usize::from(copies)),
+            FrameEffect::Drop => FrameAction::Drop,
+            FrameEffect::Delay { by_ns, place } => FrameAction::Delay(by_ns, place),
+            FrameEffect::Duplicate { copies } => FrameAction::Pass(*frame, 1 + usize::from(copies)),
             FrameEffect::Corrupt { bits, part } => {
-                Fate::Copies(corrupted(frame, bits, part, |limit| self.selector.below(limit)), 1)
+                FrameAction::Pass(corrupted(frame, bits, part, |limit| self.selector.below(limit)), 1)
             }
-            FrameEffect::Reorder => Fate::Moved,
+            FrameEffect::Reorder => FrameAction::Shuffle,
             FrameEffect::EchoLoss => {
                 self.unconfirmed += 1;
-                Fate::Copies(*frame, 1)
+                FrameAction::Pass(*frame, 1)
             }
-            FrameEffect::FullQueue => Fate::Refused,
+            FrameEffect::FullQueue => FrameAction::Refuse,
         }
     }
 
-    /// Sends what has become of `frames`, and returns how many of them are gone.
+    /// Sends the altered frames, and returns how many of `frames` were taken.
     fn send_altered(&mut self, now_ns: Nanoseconds, frames: &[Frame]) -> usize {
         self.outgoing.clear();
         self.places.clear();
         let mut gone = frames.len();
         for (number, frame) in frames.iter().enumerate() {
-            match self.fate(now_ns, frame, Direction::Sent) {
-                Fate::Copies(frame, copies) if self.outgoing.len() + copies <= OUTGOING => {
+            match self.action(now_ns, frame, Direction::Sent) {
+                FrameAction::Pass(frame, copies) if self.outgoing.len() + copies <= MAX_OUTGOING => {
                     self.outgoing.extend(std::iter::repeat_n((number, frame), copies));
                     continue;
                 }
-                Fate::Moved if self.outgoing.len() < OUTGOING => {
+                FrameAction::Shuffle if self.outgoing.len() < MAX_OUTGOING => {
                     self.places.push(self.outgoing.len());
                     self.outgoing.push((number, *frame));
                     continue;
                 }
-                Fate::Late(by_ns, _) if self.held.len() < HELD => {
-                    self.held.push_back((now_ns.saturating_add(by_ns), *frame));
+                FrameAction::Delay(by_ns, _) if self.delayed_tx.len() < CAPACITY => {
+                    self.delayed_tx.push_back((now_ns.saturating_add(by_ns), *frame));
                     continue;
                 }
-                Fate::Lost => {
+                FrameAction::Drop => {
                     self.added.tx_frames += 1;
                     continue;
                 }
-                Fate::Copies(..) | Fate::Moved | Fate::Late(..) | Fate::Refused => {}
+                FrameAction::Pass(..)
+                | FrameAction::Shuffle
+                | FrameAction::Delay(..)
+                | FrameAction::Refuse => {}
             }
             gone = number;
             self.added.tx_overruns += (frames.len() - number) as u64;
             break;
         }
         for_each_swap(&self.places, &mut self.selector, |a, b| {
-            // The places keep their numbers, the frames change.
+            // The indices stay in place, the frames are exchanged.
             let (first, second) = (self.outgoing[a].1, self.outgoing[b].1);
             (self.outgoing[a].1, self.outgoing[b].1) = (second, first);
         });
@@ -222,64 +232,66 @@ impl<P: Breakable> FaultyPort<P> {
         self.outgoing.get(taken).map_or(gone, |(number, _)| *number)
     }
 
-    fn release_late(&mut self, now_ns: Nanoseconds) {
-        while let Some((_, received)) = self.late.front().copied().filter(|(due_ns, _)| *due_ns <= now_ns) {
-            self.late.pop_front();
+    fn release_delayed(&mut self, now_ns: Nanoseconds) {
+        while let Some((_, received)) =
+            self.delayed_rx.front().copied().filter(|(due_ns, _)| *due_ns <= now_ns)
+        {
+            self.delayed_rx.pop_front();
             self.arrive(received);
         }
     }
 
     fn arrive(&mut self, received: Received) {
-        if self.arrived.len() < HELD {
+        if self.arrived.len() < CAPACITY {
             self.arrived.push_back(received);
         } else {
             self.added.rx_overruns += 1;
         }
     }
 
-    /// Takes what the port within has received. Returns whether there was anything.
+    /// Takes what the inner port has received. Returns whether there was anything.
     fn take_incoming(&mut self, now_ns: Nanoseconds) -> bool {
         self.incoming.clear();
         self.port.receive(now_ns, &mut self.incoming);
-        if self.is_cut() {
+        if self.is_disconnected() {
             return !self.incoming.is_empty();
         }
         self.places.clear();
         for index in 0..self.incoming.len() {
             let Some(received) = self.incoming.get(index).copied() else { break };
-            match self.fate(now_ns, &received.frame, Direction::Received) {
-                Fate::Copies(frame, copies) => {
+            match self.action(now_ns, &received.frame, Direction::Received) {
+                FrameAction::Pass(frame, copies) => {
                     for _ in 0..copies {
                         self.arrive(Received { frame, ..received });
                     }
                 }
-                Fate::Moved => {
-                    if self.arrived.len() < HELD {
+                FrameAction::Shuffle => {
+                    if self.arrived.len() < CAPACITY {
                         self.places.push(self.arrived.len());
                     }
                     self.arrive(received);
                 }
-                Fate::Late(by_ns, place) if self.late.len() < HELD => {
+                FrameAction::Delay(by_ns, place) if self.delayed_rx.len() < CAPACITY => {
                     let due_ns = received.at_ns.saturating_add(by_ns);
                     let at_ns = match place {
-                        // It has arrived when it did: nobody has come to take it yet.
+                        // It arrived in time but was not taken yet.
                         DelayPlace::Machine => received.at_ns,
                         DelayPlace::Bus => due_ns,
                     };
-                    self.late.push_back((due_ns, Received { at_ns, ..received }));
+                    self.delayed_rx.push_back((due_ns, Received { at_ns, ..received }));
                 }
-                Fate::Late(..) => self.added.rx_overruns += 1,
-                Fate::Lost | Fate::Refused => {}
+                FrameAction::Delay(..) => self.added.rx_overruns += 1,
+                FrameAction::Drop | FrameAction::Refuse => {}
             }
         }
         for_each_swap(&self.places, &mut self.selector, |a, b| self.arrived.swap(a, b));
-        // Some of it may have been late before anybody came for it.
-        self.release_late(now_ns);
+        // Some delayed frames may already be due.
+        self.release_delayed(now_ns);
         !self.incoming.is_empty()
     }
 }
 
-/// The swaps that bring what stands in these places into a random order (Fisher and Yates).
+/// Swaps that bring the items at these positions into a random order (Fisher and Yates).
 fn for_each_swap(places: &[usize], selector: &mut Selector, mut swap: impl FnMut(usize, usize)) {
     for (index, last) in places.iter().enumerate().skip(1).rev() {
         if let Some(other) = places.get(selector.below(index + 1)) {
@@ -288,15 +300,15 @@ fn for_each_swap(places: &[usize], selector: &mut Selector, mut swap: impl FnMut
     }
 }
 
-impl<P: Breakable> BusPort for FaultyPort<P> {
+impl<P: Injectable> BusPort for FaultyPort<P> {
     fn send(&mut self, now_ns: Nanoseconds, frames: &[Frame]) -> usize {
-        self.turn(now_ns);
-        // As the kernel's interfaces do: that it is down is the loss, there is no queue that had no room.
-        if self.is_cut() {
+        self.advance(now_ns);
+        // Like the kernel: frames on an interface that is down do not count as overruns.
+        if self.is_disconnected() {
             return 0;
         }
-        if let Some(foreigner) = &mut self.foreigner {
-            frames.iter().for_each(|frame| foreigner.overhear(frame));
+        if let Some(foreign_station) = &mut self.foreign_station {
+            frames.iter().for_each(|frame| foreign_station.observe(frame));
         }
         if self.timer.is_active() && matches!(self.effect, Effect::Frames(_)) {
             self.send_altered(now_ns, frames)
@@ -306,8 +318,8 @@ impl<P: Breakable> BusPort for FaultyPort<P> {
     }
 
     fn receive(&mut self, now_ns: Nanoseconds, batch: &mut ReceiveBatch) {
-        self.turn(now_ns);
-        for _ in 0..BATCHES {
+        self.advance(now_ns);
+        for _ in 0..MAX_BATCHES {
             while !batch.is_full()
                 && let Some(received) = self.arrived.pop_front()
             {
@@ -320,8 +332,8 @@ impl<P: Breakable> BusPort for FaultyPort<P> {
     }
 
     fn unconfirmed(&mut self, now_ns: Nanoseconds) -> usize {
-        self.turn(now_ns);
-        self.port.unconfirmed(now_ns) + self.held.len() + self.unconfirmed
+        self.advance(now_ns);
+        self.port.unconfirmed(now_ns) + self.delayed_tx.len() + self.unconfirmed
     }
 
     fn health(&mut self) -> BusHealth {
@@ -346,12 +358,12 @@ impl<P: Breakable> BusPort for FaultyPort<P> {
     }
 }
 
-impl<P: Breakable> Breakable for FaultyPort<P> {
-    fn say(&mut self, now_ns: Nanoseconds, frame: &Frame) -> Heard {
-        self.port.say(now_ns, frame)
+impl<P: Injectable> Injectable for FaultyPort<P> {
+    fn send_foreign(&mut self, now_ns: Nanoseconds, frame: &Frame) -> Delivery {
+        self.port.send_foreign(now_ns, frame)
     }
 
-    fn trouble(&mut self, node: u8, trouble: DriveTrouble, is_present: bool) -> Result<(), CannotBreak> {
-        self.port.trouble(node, trouble, is_present)
+    fn inject(&mut self, node: u8, effect: DriveEffect, is_present: bool) -> Result<(), InjectError> {
+        self.port.inject(node, effect, is_present)
     }
 }

@@ -4,28 +4,28 @@ use super::effect::Effect;
 use super::selection::Selection;
 use super::window::Window;
 
-/// What is to go wrong in a run.
+/// The faults of a run.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Scenario {
     /// The faults, in the order of the file.
-    pub faults: Vec<Fault>,
+    pub faults: Vec<ScenarioFault>,
 }
 
-/// One fault.
+/// One fault of a scenario.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Fault {
-    /// Its kind, as the file says it: `drop`.
+pub struct ScenarioFault {
+    /// Its kind, as the file names it: `drop`.
     pub kind: &'static str,
-    /// What it happens to, for people: `bus base`, `axis joint2`.
-    pub place: String,
-    /// The line of the file in which it begins, counted from 1.
+    /// Where it is injected, for people: `bus base`, `axis joint2`.
+    pub location: String,
+    /// The line of the file at which it begins, counted from 1.
     pub line: usize,
     /// The bus, an index into the configuration.
     pub bus: usize,
-    /// From when to when.
+    /// When it is active.
     pub window: Window,
-    /// Which frames; concerns [`Effect::Frames`] only, but for the seed.
+    /// The selected frames. Only for [`Effect::Frames`], except for the seed.
     pub selection: Selection,
-    /// What happens.
+    /// Its effect.
     pub effect: Effect,
 }

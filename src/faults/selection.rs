@@ -1,4 +1,4 @@
-//! Which frames a fault concerns.
+//! Selects the frames that a fault affects.
 
 use std::ops::RangeInclusive;
 
@@ -6,7 +6,7 @@ use takt_rt::Frame;
 
 use crate::sim::random::Random;
 
-/// Which way a frame goes, seen from the controller.
+/// The direction of a frame, seen from the controller.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Direction {
     /// From the controller.
@@ -18,27 +18,27 @@ pub enum Direction {
     Both,
 }
 
-/// What a frame is for, by the pre-defined connection set (CiA 301, 7.3.3).
+/// The function of a frame by the pre-defined connection set (CiA 301, 7.3.3).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FrameFunction {
     /// Network management, 000.
     Nmt,
-    /// 080.
+    /// SYNC, 080.
     Sync,
     /// Emergency messages, 081 to 0FF.
     Emergency,
-    /// What drives report, 180, 280, 380 and 480.
+    /// TPDOs of the drives, 180, 280, 380 and 480.
     Tpdo,
-    /// What drives are commanded, 200, 300, 400 and 500.
+    /// RPDOs of the drives, 200, 300, 400 and 500.
     Rpdo,
-    /// Requests and replies, 580 and 600.
+    /// SDO responses and requests, 580 and 600.
     Sdo,
-    /// Boot-up, heartbeat and guarding, 700.
+    /// Boot-up, heartbeat and node guarding, 700.
     Heartbeat,
 }
 
 impl FrameFunction {
-    /// Whether an identifier serves this function.
+    /// Whether an identifier has this function.
     pub const fn includes(self, id: u32) -> bool {
         match self {
             Self::Nmt => id == 0x000,
@@ -52,27 +52,27 @@ impl FrameFunction {
     }
 }
 
-/// Which frames a fault concerns: those to which all of this applies.
+/// Selects frames: a frame must meet all of these conditions.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Selection {
-    /// Which way they go.
+    /// The direction.
     pub direction: Direction,
-    /// Their identifiers.
+    /// The identifiers.
     pub ids: RangeInclusive<u32>,
-    /// What they are for; `None` for anything.
+    /// The function; `None` for any.
     pub function: Option<FrameFunction>,
-    /// The node whose number is in their identifier; `None` for any.
+    /// The node ID in the identifier; `None` for any.
     pub node: Option<u8>,
-    /// How probable each of them is to be concerned, 0 to 1.
+    /// The probability of being selected, 0 to 1.
     pub probability: f64,
-    /// How many of them at most; the fault ends with the last. `None` for any number.
+    /// The largest number of frames; the fault ends with the last one. `None`: no limit.
     pub count: Option<u64>,
-    /// Seed of everything random about the fault.
+    /// The seed of everything random in this fault.
     pub seed: u64,
 }
 
 impl Default for Selection {
-    /// All of them.
+    /// All frames.
     fn default() -> Self {
         Self {
             direction: Direction::Both,
@@ -87,7 +87,7 @@ impl Default for Selection {
 }
 
 impl Selection {
-    /// Whether a frame that goes this way ([`Direction::Sent`] or [`Direction::Received`]) is a candidate.
+    /// Whether a frame of this direction ([`Direction::Sent`] or [`Direction::Received`]) meets the conditions.
     pub fn includes(&self, frame: &Frame, direction: Direction) -> bool {
         let id = frame.id().value();
         let is_canopen = !frame.id().is_extended();
@@ -98,7 +98,7 @@ impl Selection {
     }
 }
 
-/// Picks frames, one after the other.
+/// Picks frames, with probability and count.
 #[derive(Clone, Debug)]
 pub struct Selector {
     selection: Selection,
@@ -113,12 +113,12 @@ impl Selector {
         Self { selection, random, left }
     }
 
-    /// Whether this frame is concerned.
+    /// Whether this frame is selected.
     pub fn picks(&mut self, frame: &Frame, direction: Direction) -> bool {
         if self.left == 0 || !self.selection.includes(frame, direction) {
             return false;
         }
-        // 53 bits are what an `f64` holds exactly.
+        // An `f64` holds 53 bits exactly.
         let share = (self.random.next() >> 11) as f64 / (1u64 << 53) as f64;
         let is_picked = share < self.selection.probability;
         if is_picked && self.selection.count.is_some() {
@@ -127,7 +127,7 @@ impl Selector {
         is_picked
     }
 
-    /// Whether there will be no further one.
+    /// Whether no further frame will be selected.
     pub fn is_exhausted(&self) -> bool {
         self.left == 0
     }
@@ -169,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn every_function_has_its_identifiers() {
+    fn every_function_is_recognised_by_its_identifiers() {
         use FrameFunction::*;
         let of = |id: u32| {
             [Nmt, Sync, Emergency, Tpdo, Rpdo, Sdo, Heartbeat]
@@ -194,7 +194,7 @@ mod tests {
     }
 
     #[test]
-    fn a_share_is_picked_and_the_same_one_with_the_same_seed() {
+    fn the_share_is_random_and_repeatable_with_the_same_seed() {
         let selection = Selection { probability: 0.3, ..Selection::default() };
         let first = picked(selection.clone(), 10_000);
         assert_eq!(first, picked(selection.clone(), 10_000));

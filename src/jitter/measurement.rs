@@ -10,8 +10,8 @@ use crate::bus::port::{OpenError, Port};
 use crate::config::{Config, ConfigError, Interface, Realtime};
 use crate::controller::assemble::{self, AssembleError};
 use crate::controller::channels::{ChannelSizes, LogSide, channels};
-use crate::controller::quiet;
-use crate::controller::realtime_thread::{self, Begun, StartError, Work};
+use crate::controller::realtime_thread::{self, Begun, LoopParts, StartError};
+use crate::controller::sleep_alignment;
 use crate::telemetry::Statistics;
 
 /// The pause between two polls of the loop; the ring of cycle records holds many times as much.
@@ -136,7 +136,7 @@ pub fn measure(
     };
     let has_bus = !ports.is_empty();
     let (rt, mut host, mut log) = channels(&ChannelSizes::of(&config));
-    let work = Work {
+    let work = LoopParts {
         engine: Box::new(assemble::engine(&config)?),
         plan: SlotPlan::usual(config.cycle.period_ns, config.cycle.command_phase_ns),
         ports,
@@ -158,7 +158,7 @@ pub fn measure(
         if done >= options.cycles || !watch(done) || ownership.poll_release_request().is_some() {
             let _ = host.request(Request::Shutdown);
         }
-        quiet::sleep(PAUSE, options.period_ns);
+        sleep_alignment::sleep(PAUSE, options.period_ns);
     }
     let ended = running.join().ok_or(JitterError::Died)?;
     collect(&mut log, &mut statistics, options.cycles);

@@ -2,7 +2,7 @@
 
 use super::report::{JitterReport, PassReport};
 use crate::telemetry::Emphasis;
-use crate::telemetry::picture::{duration, histograms, latency_table, line, missed_slots, realtime};
+use crate::telemetry::render::{duration, histograms, latency_table, line, missed_slots, realtime};
 
 impl JitterReport {
     /// The report as text of at most 100 columns (but for commands, which are not broken).

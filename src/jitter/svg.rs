@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use super::measurement::{Measurement, Pacing};
 use crate::telemetry::Latency;
-use crate::telemetry::picture::duration;
+use crate::telemetry::render::duration;
 
 const WIDTH: f64 = 1_000.0;
 const HEIGHT: f64 = 470.0;

@@ -1,56 +1,56 @@
-//! What can be wrong with a simulated drive or its joint beyond the causes of alarms
-//! ([`DriveFault`](super::DriveFault)): things that the drive itself may not even notice.
+//! Defects of a simulated drive or its joint. Unlike a [`DriveFault`](super::DriveFault), the drive itself may not
+//! detect them.
 
 use takt_rt::Frame;
 
-/// Something wrong with a drive or its joint. Some are states that last until they are mended, the others
-/// ([`Defect::is_event`]) just happen.
+/// A defect of a drive or its joint. Most are states that last until they are removed; the others are momentary events
+/// ([`Defect::is_event`]).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Defect {
-    /// The joint is held fast and cannot move at all.
+    /// The joint is blocked.
     BlockedJoint,
-    /// The brake stays engaged, whatever the drive does.
+    /// The brake stays engaged, whatever the drive commands.
     StuckBrake,
-    /// The SDO server gives no replies; everything else works.
+    /// The SDO server does not reply; everything else works.
     SilentSdoServer,
-    /// The feedback PDOs carry other objects than they were mapped to: the position of the motor's encoder where the
-    /// joint's belongs.
+    /// The feedback PDOs carry another object than the mapping says: the motor encoder (2240) instead of the position
+    /// (6064).
     OtherObjectMapped,
-    /// The feedback PDOs are a byte shorter than they were mapped.
+    /// The feedback PDOs are one byte shorter than their mapping.
     ShortFeedback,
-    /// The statusword in the feedback has other bits than the drive's state: some are set, some cleared.
+    /// The statusword in the feedback has wrong bits.
     Statusword {
-        /// Bits of object 6041 that are shown as 1.
+        /// Bits of object 6041 that are sent as 1.
         set: u16,
-        /// Bits of object 6041 that are shown as 0, unless they are among `set`.
+        /// Bits of object 6041 that are sent as 0, unless they are in `set`.
         clear: u16,
     },
-    /// The feedback shows this mode of operation (object 6061).
+    /// The feedback has this mode of operation (object 6061).
     OperationModeDisplay {
         /// The number of the mode.
         mode: i8,
     },
-    /// The encoder slips: the position that the drive works with jumps.
+    /// The actual position of the drive jumps.
     EncoderJump {
-        /// By so much at the joint: rad (m).
+        /// The distance at the joint: rad (m).
         distance: f64,
     },
-    /// The drive detects an error with this code (object 603F) and goes to fault with an emergency message.
+    /// The drive detects an error with this code (object 603F), sends an emergency message and enters the fault state.
     Alarm {
-        /// The code.
+        /// The error code.
         code: u16,
     },
-    /// The drive sends an emergency message with this code and goes on: a warning.
+    /// The drive sends an emergency message with this code and continues, as for a warning.
     Emergency {
-        /// The code.
+        /// The error code.
         code: u16,
     },
-    /// The torque is taken from outside (safe torque off): the drive leaves operation enabled without a fault.
+    /// Safe torque off: the drive leaves operation enabled without a fault.
     TorqueOff,
 }
 
 impl Defect {
-    /// Whether this happens once and is over, and there is nothing to mend.
+    /// Whether this is a momentary event, so that nothing has to be removed later.
     pub const fn is_event(self) -> bool {
         matches!(
             self,
@@ -59,18 +59,18 @@ impl Defect {
     }
 }
 
-/// A frame without its last byte.
+/// The frame without its last byte.
 pub(super) fn shorter(frame: Frame) -> Frame {
     let shorter = frame.payload().split_last().and_then(|(_, rest)| Frame::data(frame.id(), rest).ok());
     shorter.unwrap_or(frame)
 }
 
-/// This simulated drive cannot be broken in this way.
+/// This simulated drive cannot have the defect.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error("{reason}")]
 pub struct Unsupported {
-    /// What it should have had.
+    /// The defect.
     pub defect: Defect,
-    /// Why it cannot, for people: names the family.
+    /// The reason, for people; it names the family.
     pub reason: &'static str,
 }

@@ -1,48 +1,52 @@
-//! What a simulated drive is to its bus: a passive machine that is handed frames and time, and leaves frames in its
-//! mailbox. It has no thread and asks no clock, so that the same drive runs on a simulated bus in virtual time, on one
-//! in wall-clock time, and behind a real interface.
+//! The interface of a simulated drive: a passive state machine. The bus passes frames and time to it, and takes frames
+//! from its mailbox. It has no thread and reads no clock, so the same drive runs in virtual time, in wall-clock time,
+//! and on a real interface.
 
 use takt_rt::{DriveState, Frame, Nanoseconds};
 
 use super::defect::{Defect, Unsupported};
 use super::mailbox::Mailbox;
 
-/// A simulated drive on a CAN bus. Time never runs backwards between calls, and no call takes heap memory.
+/// A simulated drive on a CAN bus. Time never runs backwards between calls, and no call allocates memory.
 pub trait Drive: Send {
-    /// Its node number.
+    /// Its node ID.
     fn node(&self) -> u8;
 
-    /// Takes a frame of another station, whose last bit came at `now_ns`.
+    /// Receives a frame of another station, whose last bit arrived at `now_ns`.
     fn receive(&mut self, now_ns: Nanoseconds, frame: &Frame, mailbox: &mut Mailbox);
 
-    /// Lives on until `now_ns` and does what is due.
+    /// Advances to `now_ns` and does what is due.
     fn advance(&mut self, now_ns: Nanoseconds, mailbox: &mut Mailbox);
 
-    /// When it wants to be advanced next, always after the present that it was last told.
+    /// The time of its next action, always later than the `now_ns` of the last call.
     fn wake_ns(&self) -> Nanoseconds;
 
-    /// What an observer with eyes for everything sees at `now_ns`. Looking changes nothing.
+    /// The true state at `now_ns`. Observing changes nothing.
     fn observe(&mut self, now_ns: Nanoseconds) -> Observation;
 
-    /// Something breaks. The drive notices it when it is advanced next.
-    fn inject(&mut self, fault: DriveFault);
+    /// Injects a fault. The drive detects it at its next advance.
+    fn inject_fault(&mut self, fault: DriveFault);
 
-    /// The supply is cut and returns at once: the drive starts anew, with what it had saved. The joint keeps its
+    /// Cuts the supply and restores it at once: the drive boots with its saved parameters. The joint keeps its
     /// position, and the brake stops it.
     fn power_cycle(&mut self, now_ns: Nanoseconds, mailbox: &mut Mailbox);
 
-    /// Sets a torque from outside on the joint: N·m (N). It lasts until it is set again.
+    /// Sets the external load torque on the joint: N·m (N). It lasts until it is set again.
     fn set_load_torque(&mut self, torque: f64);
 
-    /// Something about the drive or its joint is wrong from `now_ns` on (`is_present`), or is well again. An event just
-    /// happens when it comes, and has nothing to mend.
+    /// Injects a defect from `now_ns` on (`is_present`), or removes it. An event happens at once and is not removed.
     ///
     /// # Errors
-    /// [`Unsupported`] when this drive cannot be broken in this way; nothing has changed then.
-    fn afflict(&mut self, now_ns: Nanoseconds, defect: Defect, is_present: bool) -> Result<(), Unsupported>;
+    /// [`Unsupported`] when this drive cannot have the defect; nothing has changed then.
+    fn inject_defect(
+        &mut self,
+        now_ns: Nanoseconds,
+        defect: Defect,
+        is_present: bool,
+    ) -> Result<(), Unsupported>;
 }
 
-/// The truth about a simulated drive and its joint.
+/// The true state of a simulated drive and its joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Observation {
     /// True position of the joint: rad (m).
@@ -51,37 +55,37 @@ pub struct Observation {
     pub velocity: f64,
     /// Torque of the motor at the joint: N·m (N).
     pub torque: f64,
-    /// What the drive reports as position: counts.
+    /// The reported position in counts.
     pub position_counts: i32,
-    /// The state of its CiA 402 machine.
+    /// Its CiA 402 state.
     pub state: DriveState,
     /// Its statusword (object 6041).
     pub statusword: u16,
     /// Its error code (object 603F).
     pub error_code: u16,
-    /// The mode of operation that is in force (object 6061).
+    /// The current mode of operation (object 6061).
     pub operation_mode: i8,
-    /// Its state as a CANopen node.
-    pub nmt: NmtState,
+    /// Its NMT state.
+    pub nmt: NodeState,
     /// Whether the brake is engaged.
     pub is_braked: bool,
 }
 
-/// The state of a CANopen node (CiA 301, 7.3.2).
+/// The NMT state of a simulated drive (CiA 301, 7.3.2).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum NmtState {
-    /// Starting; says and hears nothing.
+pub enum NodeState {
+    /// Booting; neither sends nor receives.
     Initialising,
-    /// SDO, no PDO.
+    /// SDO works, PDOs do not.
     PreOperational,
-    /// Everything.
+    /// All services work.
     Operational,
-    /// NMT and error control only.
+    /// Only NMT and error control work.
     Stopped,
 }
 
-impl NmtState {
-    /// The number in heartbeat and guarding frames.
+impl NodeState {
+    /// The code in heartbeat and node guarding frames.
     pub const fn code(self) -> u8 {
         match self {
             Self::Initialising => 0,
@@ -92,8 +96,8 @@ impl NmtState {
     }
 }
 
-/// Something that breaks in a drive. The error codes are those of CiA 402-2 (IEC 61800-7-201), unless the drive's
-/// own is known.
+/// The cause of a drive fault. The error codes are those of CiA 402-2 (IEC 61800-7-201), unless the drive's own is
+/// known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DriveFault {
     /// Short circuit or over-current at the motor: 0x2310. Power is cut at once.
@@ -102,14 +106,14 @@ pub enum DriveFault {
     OverVoltage,
     /// Under-voltage in the intermediate circuit: 0x3220. Power is cut at once.
     UnderVoltage,
-    /// The drive is too hot: 0x4310. The drive decelerates first.
+    /// Over-temperature: 0x4310. The drive decelerates first.
     OverTemperature,
-    /// The position encoder has failed: 0x7305. Power is cut at once.
+    /// Failure of the position encoder: 0x7305. Power is cut at once.
     Encoder,
     /// The battery of the multi-turn encoder is empty: 0x730F. A fault reset does not clear it.
     MultiTurnBattery,
-    /// Something holds the rotor: 0x7121. Power is cut at once.
+    /// Blocked rotor: 0x7121. Power is cut at once.
     BlockedRotor,
-    /// The motor does not come to the demanded speed: 0x8400. Power is cut at once.
+    /// The motor does not reach the demanded speed: 0x8400. Power is cut at once.
     Stall,
 }

@@ -1,4 +1,4 @@
-//! Switches along the travel of a joint, as they are wired to a drive's inputs.
+//! Limit and home switches along the travel of a joint, wired to a drive's inputs.
 
 /// A switch that is closed over a part of the travel.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -10,12 +10,12 @@ pub struct Switch {
 }
 
 impl Switch {
-    /// Closed at this position and above: what stands at the upper end of the travel.
+    /// A switch at the upper end of the travel: closed at this position and above.
     pub const fn above(position: f64) -> Self {
         Self { from: position, to: f64::INFINITY }
     }
 
-    /// Closed at this position and below: what stands at the lower end of the travel.
+    /// A switch at the lower end of the travel: closed at this position and below.
     pub const fn below(position: f64) -> Self {
         Self { from: f64::NEG_INFINITY, to: position }
     }
@@ -26,7 +26,7 @@ impl Switch {
     }
 }
 
-/// The two inputs of a YZ-AIM servo that can carry switches; an input without one stays low.
+/// The two inputs of a YZ-AIM servo for switches; an input without one stays low.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct HomingSwitches {
     /// On DIR: the negative limit (method 17) or the home switch (methods 19 to 22).

@@ -1,4 +1,4 @@
-//! Simulated drives on a real interface, in wall-clock time: for any master to talk to.
+//! Simulated drives on a real interface in wall-clock time, for any master.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -7,30 +7,30 @@ use takt_rt::linux::{MonotonicClock, SocketCanPort};
 use takt_rt::{BusHealth, BusPort, Clock, Nanoseconds, ReceiveBatch};
 
 use super::drive::Drive;
-use super::mailbox::{Mailbox, Order};
+use super::mailbox::{Mailbox, QueueOrder};
 use super::port::{DRIVE_MAILBOX, drives_of};
 use crate::config::Config;
 
-/// How long a wait is at most, so that a request to stop is seen.
+/// Longest wait, so that a request to stop is noticed.
 const LONGEST_WAIT_NS: Nanoseconds = 20_000_000;
 
-/// Drives that share one interface. Their frames leave in the order of their identifiers, as they would win the
-/// arbitration of a bus; what the interface has no room for waits.
+/// Drives that share one interface. Their frames are sent in the order of bus arbitration. Frames that the interface
+/// has no room for wait.
 pub struct LiveDrives {
     port: SocketCanPort,
     stations: Vec<(Box<dyn Drive>, Mailbox)>,
-    /// Frames that have won, with the index of their sender; the port takes them next.
+    /// Frames in arbitration order, each with the index of its sender; the port takes them next.
     leaving: Vec<(usize, Frame)>,
-    /// The time of the drives begins with them.
+    /// Start of the drives' time.
     epoch_ns: Nanoseconds,
 }
 
 impl LiveDrives {
-    /// A drive for every axis of the bus with this index in the configuration. Their supply comes on now.
+    /// One drive for every axis on the bus with this index in the configuration. The supply is switched on now.
     pub fn new(config: &Config, bus: usize, port: SocketCanPort) -> Self {
         let stations = drives_of(config, bus)
             .into_iter()
-            .map(|drive| (drive, Mailbox::new(Order::Priority, DRIVE_MAILBOX)));
+            .map(|drive| (drive, Mailbox::new(QueueOrder::Priority, DRIVE_MAILBOX)));
         Self {
             port,
             stations: stations.collect(),
@@ -39,36 +39,36 @@ impl LiveDrives {
         }
     }
 
-    /// Lives until `is_stopped`. Sleeps whenever there is nothing to do.
+    /// Runs until `is_stopped`. Sleeps while there is nothing to do.
     pub fn run(&mut self, is_stopped: &AtomicBool) {
         while !is_stopped.load(Ordering::Relaxed) {
-            let next_ns = self.turn();
+            let next_ns = self.poll();
             self.port.wait(next_ns.saturating_sub(self.now_ns()).min(LONGEST_WAIT_NS));
         }
     }
 
-    /// For how long they have lived.
+    /// Time since the drives were created.
     pub fn now_ns(&self) -> Nanoseconds {
         MonotonicClock::default().now_ns().saturating_sub(self.epoch_ns)
     }
 
-    /// Does what is due now, and returns when something will be due again if no frame comes before.
-    pub fn turn(&mut self) -> Nanoseconds {
+    /// Does what is due now, and returns when the next action is due unless a frame arrives before.
+    pub fn poll(&mut self) -> Nanoseconds {
         let now_ns = self.now_ns();
-        // As on the simulated bus: what was due comes before what has arrived.
+        // As on the simulated bus, due actions come before received frames.
         for (drive, mailbox) in &mut self.stations {
             if drive.wake_ns() <= now_ns {
                 drive.advance(now_ns, mailbox);
             }
         }
-        self.hear(now_ns);
-        self.speak(now_ns);
+        self.receive_frames(now_ns);
+        self.send_frames(now_ns);
         let due_ns = self.stations.iter().map(|(drive, _)| drive.wake_ns()).min().unwrap_or(u64::MAX);
-        // What found no room is offered again soon.
+        // Frames that found no room are offered again soon.
         if self.leaving.is_empty() { due_ns } else { due_ns.min(now_ns + RETRY_NS) }
     }
 
-    /// Their node numbers, in the order of the configuration.
+    /// The node IDs, in the order of the configuration.
     pub fn nodes(&self) -> impl Iterator<Item = u8> + '_ {
         self.stations.iter().map(|(drive, _)| drive.node())
     }
@@ -78,7 +78,7 @@ impl LiveDrives {
         self.port.health()
     }
 
-    fn hear(&mut self, now_ns: Nanoseconds) {
+    fn receive_frames(&mut self, now_ns: Nanoseconds) {
         let mut batch = ReceiveBatch::new();
         loop {
             batch.clear();
@@ -92,7 +92,7 @@ impl LiveDrives {
         }
     }
 
-    /// Hands a frame to every drive but its sender.
+    /// Delivers a frame to every drive except its sender.
     fn deliver(&mut self, now_ns: Nanoseconds, frame: &Frame, sender: Option<usize>) {
         for (index, (drive, mailbox)) in self.stations.iter_mut().enumerate() {
             if Some(index) != sender {
@@ -101,7 +101,7 @@ impl LiveDrives {
         }
     }
 
-    fn speak(&mut self, now_ns: Nanoseconds) {
+    fn send_frames(&mut self, now_ns: Nanoseconds) {
         if self.leaving.is_empty() {
             for (index, (_, mailbox)) in self.stations.iter_mut().enumerate() {
                 while let Some(frame) = mailbox.pop() {
@@ -134,8 +134,8 @@ mod tests {
 
     use super::*;
 
-    /// The drives of the first bus of a configuration on one end of a pair of sockets, and the other end. Everything
-    /// but the interface is as it is on a real one.
+    /// The drives of the first bus of a configuration on one end of a socket pair, and the other end. Only the
+    /// interface differs from a real one.
     fn connected() -> (LiveDrives, SocketCanPort) {
         let mut config = Config::load(Path::new("configs/arm6-erob.toml")).unwrap();
         config.axes.iter_mut().for_each(|axis| axis.simulated.power_up_ns = 1_000_000);
@@ -144,11 +144,11 @@ mod tests {
         (LiveDrives::new(&config, 0, port(&ours)), port(&theirs))
     }
 
-    /// Lives until the master has heard `count` frames; they come in the drives' own time.
-    fn heard(drives: &mut LiveDrives, master: &mut SocketCanPort, count: usize) -> Vec<Frame> {
+    /// Runs until the master has received `count` frames.
+    fn received(drives: &mut LiveDrives, master: &mut SocketCanPort, count: usize) -> Vec<Frame> {
         let mut frames = vec![];
         while frames.len() < count {
-            let next_ns = drives.turn();
+            let next_ns = drives.poll();
             let mut batch = ReceiveBatch::new();
             master.receive(0, &mut batch);
             frames.extend(batch.iter().map(|received| received.frame));
@@ -159,22 +159,22 @@ mod tests {
     }
 
     #[test]
-    fn drives_boot_and_answer_whoever_asks() {
+    fn drives_boot_and_answer_sdo_requests() {
         let (mut drives, mut master) = connected();
         let nodes: Vec<u8> = drives.nodes().collect();
         let boot_up: Vec<Frame> =
             nodes.iter().map(|node| Frame::of(Id::canopen(0x700, *node), [0])).collect();
-        assert_eq!(heard(&mut drives, &mut master, nodes.len()), boot_up);
+        assert_eq!(received(&mut drives, &mut master, nodes.len()), boot_up);
         let read_device_type = [0x40, 0x00, 0x10, 0, 0, 0, 0, 0];
         assert_eq!(master.send(0, &[Frame::of(Id::canopen(0x600, nodes[1]), read_device_type)]), 1);
-        let answer = heard(&mut drives, &mut master, 1);
+        let answer = received(&mut drives, &mut master, 1);
         assert_eq!(answer[0].id(), Id::canopen(0x580, nodes[1]));
         assert_eq!(answer[0].payload()[..4], [0x43, 0x00, 0x10, 0]);
         assert_eq!(drives.health().rx_frames, 1);
     }
 
     #[test]
-    fn their_time_begins_with_them_and_not_with_the_machine() {
+    fn the_time_of_the_drives_begins_at_zero() {
         let (drives, _master) = connected();
         let uptime_ns = MonotonicClock::default().now_ns();
         assert!(drives.now_ns() < uptime_ns / 2);

@@ -1,4 +1,4 @@
-//! A device that can be given its node number and bit rate by LSS (CiA 305), and does nothing else.
+//! A simulated device with LSS (CiA 305) for node ID and bit rate, and no other service.
 
 use std::collections::VecDeque;
 
@@ -7,40 +7,40 @@ use takt_rt::{BusHealth, BusPort, Frame, Nanoseconds, ReceiveBatch, Received};
 use crate::canopen::lss::{BitTiming, Inquiry, LssAddress, LssMode, LssRequest, LssResponse, LssResult};
 use crate::canopen::nmt::{ErrorControl, NmtState};
 
-/// The node number of a device that has none.
+/// The node ID of an unconfigured device.
 const NO_NODE: u8 = 0xFF;
-/// The value of `lowest_bit` that begins a scan.
+/// The value of `lowest_bit` that begins an LSS fastscan.
 const SCAN_BEGINS: u8 = 0x80;
 
-/// What the device keeps.
+/// The settings of the device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Settings {
     node: Option<u8>,
     bit_timing: BitTiming,
 }
 
-/// The device.
+/// A simulated LSS device.
 #[derive(Clone, Copy, Debug)]
 pub struct LssDevice {
     address: LssAddress,
     mode: LssMode,
-    /// What it is on the bus.
+    /// The settings in use.
     active: Settings,
-    /// What it will be.
+    /// The settings that were configured but are not in use yet.
     pending: Settings,
-    /// What it will be after power-up.
+    /// The settings that were stored for the next power-up.
     stored: Settings,
-    /// How many values of a selection, or of a span of identities, have been right in their order.
+    /// Number of matching values of a selection, and of an identification, in their order so far.
     selected: u8,
     identified: u8,
-    /// The value that the fast scan asks for next.
+    /// The identity part that the fastscan checks next.
     scan_part: u8,
-    /// Whether it can store.
+    /// Whether it supports the store service.
     pub can_store: bool,
 }
 
 impl LssDevice {
-    /// A device with this identity, and the node number that it has stored.
+    /// A device with this identity and a stored node ID.
     pub fn new(address: LssAddress, node: Option<u8>) -> Self {
         let settings = Settings { node, bit_timing: BitTiming::Kilobits1000 };
         Self {
@@ -56,22 +56,22 @@ impl LssDevice {
         }
     }
 
-    /// Its node number; `None` while it has none and is silent.
+    /// Its node ID; `None` while it is unconfigured.
     pub fn node(&self) -> Option<u8> {
         self.active.node
     }
 
-    /// The bit rate that it uses.
+    /// The bit rate in use.
     pub fn bit_timing(&self) -> BitTiming {
         self.active.bit_timing
     }
 
-    /// Whether it waits or obeys.
+    /// Its LSS state.
     pub fn mode(&self) -> LssMode {
         self.mode
     }
 
-    /// The supply returns: it has what it had stored, and boots when that is a node number.
+    /// Cuts and restores the supply: the stored settings take effect, and the device boots if it has a node ID.
     pub fn power_cycle(&mut self) -> Option<Frame> {
         *self = Self { can_store: self.can_store, ..Self::new(self.address, None).with(self.stored) };
         self.boot_up()
@@ -81,7 +81,7 @@ impl LssDevice {
         Self { active: settings, pending: settings, stored: settings, ..self }
     }
 
-    /// Takes a frame of the master; returns what it says to it.
+    /// Receives a frame of the master and returns the response.
     pub fn receive(&mut self, frame: &Frame) -> Option<Frame> {
         let request = LssRequest::decode(frame)?;
         let answer = match request {
@@ -113,12 +113,12 @@ impl LssDevice {
                 LssResponse::Stored(LssResult::OK)
             }
             LssRequest::Store => LssResponse::Stored(LssResult::REFUSED),
-            LssRequest::Inquire(inquiry) => LssResponse::Told(inquiry, self.told(inquiry)),
+            LssRequest::Inquire(inquiry) => LssResponse::Inquired(inquiry, self.identity_part(inquiry)),
         };
         Some(answer.frame())
     }
 
-    fn told(&self, inquiry: Inquiry) -> u32 {
+    fn identity_part(&self, inquiry: Inquiry) -> u32 {
         match inquiry {
             Inquiry::Vendor => self.address.vendor,
             Inquiry::Product => self.address.product,
@@ -128,7 +128,7 @@ impl LssDevice {
         }
     }
 
-    /// A device that had no node number boots with the one that it was given.
+    /// Changes the LSS state. An unconfigured device that got a node ID boots when it leaves configuration state.
     fn switch(&mut self, mode: LssMode) -> Option<Frame> {
         self.mode = mode;
         self.selected = 0;
@@ -209,7 +209,7 @@ impl LssDevice {
     }
 }
 
-/// A bus with nothing but such devices on it, which answer at once.
+/// A bus with only LSS devices, which answer at once.
 #[derive(Debug, Default)]
 pub struct LssBus {
     devices: Vec<LssDevice>,
@@ -218,7 +218,7 @@ pub struct LssBus {
 }
 
 impl LssBus {
-    /// With these devices.
+    /// A bus with these devices.
     pub fn new(devices: impl IntoIterator<Item = LssDevice>) -> Self {
         Self { devices: devices.into_iter().collect(), ..Self::default() }
     }

@@ -1,25 +1,26 @@
-//! One CAN bus: who may send next, for how long the wire is taken, and when a frame has arrived.
+//! One CAN bus: arbitration, occupation of the wire, and arrival of frames.
 //!
-//! Whenever the wire is free, every station with a frame waiting takes part in the arbitration; the strongest
-//! identifier wins and the others wait for the end of it. There are no bit errors, and every frame is
-//! acknowledged (there is always another receiver). Two stations that send the same identifier at once would
-//! destroy each other's frames on a real bus; here the one with the lower number goes first.
+//! Whenever the wire is free, every station with a waiting frame takes part in the arbitration. The frame with the
+//! highest priority wins; the others wait until it has been sent. There are no bit errors, and every frame is
+//! acknowledged. Two stations that send the same identifier at once would destroy each other's frames on a real bus;
+//! here the station with the lower number goes first.
 
-use takt_rt::{Frame, INTERMISSION_BITS, Nanoseconds, WireLength, bits_ns};
+use takt_rt::{Frame, Nanoseconds};
 
-use super::mailbox::{Mailbox, Order, priority};
+use super::mailbox::{Mailbox, QueueOrder, priority};
+use super::wire_length::{INTERMISSION_BITS, WireLength, bits_ns};
 
 /// The bit rates of a bus in bit/s.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct BitRates {
-    /// Of classic frames and of the arbitration phase.
+pub struct WireBitRates {
+    /// Bit rate of classic frames and of the arbitration phase.
     pub nominal: u32,
-    /// Of the data phase of CAN FD frames with bit-rate switching.
+    /// Bit rate of the data phase of CAN FD frames with bit-rate switching.
     pub data: Option<u32>,
 }
 
-impl BitRates {
-    /// How long a frame occupies the wire, intermission included.
+impl WireBitRates {
+    /// How long a frame occupies the wire, including the intermission.
     pub fn duration_ns(self, frame: &Frame) -> Nanoseconds {
         WireLength::of(frame).duration_ns(self.nominal, self.data)
     }
@@ -27,75 +28,80 @@ impl BitRates {
 
 /// A frame on the wire.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Transmission {
+pub struct FrameOnWire {
     /// The frame.
     pub frame: Frame,
-    /// Who sends it, by the number of its mailbox.
+    /// The index of its sender's mailbox.
     pub sender: usize,
-    /// When it has arrived: the end of its last bit before the intermission.
+    /// When it arrives: the end of its last bit before the intermission.
     pub arrives_ns: Nanoseconds,
-    /// When the wire is free for the next one.
+    /// When the wire is free again.
     pub free_ns: Nanoseconds,
 }
 
-/// The wire and the mailboxes of the stations on it.
+/// The wire and the mailboxes of its stations.
 #[derive(Debug)]
 pub struct Medium {
-    rates: BitRates,
+    rates: WireBitRates,
     mailboxes: Vec<Mailbox>,
     is_connected: Vec<bool>,
-    on_wire: Option<Transmission>,
+    on_wire: Option<FrameOnWire>,
     free_ns: Nanoseconds,
     busy_ns: Nanoseconds,
 }
 
 impl Medium {
     /// A free bus with one station for each mailbox.
-    pub fn new(rates: BitRates, mailboxes: Vec<Mailbox>) -> Self {
+    pub fn new(rates: WireBitRates, mailboxes: Vec<Mailbox>) -> Self {
         let is_connected = vec![true; mailboxes.len()];
         Self { rates, mailboxes, is_connected, on_wire: None, free_ns: 0, busy_ns: 0 }
     }
 
-    /// The usual bus: station 0 is the master with a queue like a network interface's, and so many drives with a
-    /// buffer for each message follow.
-    pub fn with_master(rates: BitRates, master_frames: usize, drives: usize, drive_frames: usize) -> Self {
-        let master = Mailbox::new(Order::FirstInFirstOut, master_frames);
-        let drives = (0..drives).map(|_| Mailbox::new(Order::Priority, drive_frames));
+    /// The usual bus: station 0 is the master with a FIFO queue, followed by this number of drives with priority
+    /// queues.
+    pub fn with_master(
+        rates: WireBitRates,
+        master_frames: usize,
+        drives: usize,
+        drive_frames: usize,
+    ) -> Self {
+        let master = Mailbox::new(QueueOrder::FirstInFirstOut, master_frames);
+        let drives = (0..drives).map(|_| Mailbox::new(QueueOrder::Priority, drive_frames));
         Self::new(rates, std::iter::once(master).chain(drives).collect())
     }
 
-    /// The mailbox of a station, which must exist.
+    /// The mailbox of an existing station.
     pub fn mailbox(&self, station: usize) -> &Mailbox {
         &self.mailboxes[station]
     }
 
-    /// The mailbox of a station, which must exist.
+    /// The mailbox of an existing station.
     pub fn mailbox_mut(&mut self, station: usize) -> &mut Mailbox {
         &mut self.mailboxes[station]
     }
 
-    /// Cuts a station off or connects it again. What it had begun to send still arrives.
+    /// Disconnects a station or connects it again. A frame that it has begun to send still arrives.
     pub fn disconnect(&mut self, station: usize, is_cut_off: bool) {
         self.is_connected[station] = !is_cut_off;
     }
 
-    /// Whether a station hears and is heard.
+    /// Whether a station is connected.
     pub fn is_connected(&self, station: usize) -> bool {
         self.is_connected[station]
     }
 
     /// The frame on the wire.
-    pub fn on_wire(&self) -> Option<&Transmission> {
+    pub fn on_wire(&self) -> Option<&FrameOnWire> {
         self.on_wire.as_ref()
     }
 
-    /// For how long the wire has been occupied.
+    /// How long the wire has been occupied in total.
     pub fn busy_ns(&self) -> Nanoseconds {
         self.busy_ns
     }
 
-    /// When the next thing happens here: the frame on the wire arrives, or a waiting one can start. `None` when
-    /// nothing waits.
+    /// The time of the next event: the frame on the wire arrives, or a waiting one can start. `None` when no frame
+    /// waits.
     pub fn next_ns(&self, now_ns: Nanoseconds) -> Option<Nanoseconds> {
         match &self.on_wire {
             Some(transmission) => Some(transmission.arrives_ns),
@@ -103,9 +109,8 @@ impl Medium {
         }
     }
 
-    /// Does what is due at `now_ns`: returns the frame that has just arrived, or else holds an arbitration when
-    /// the wire is free.
-    pub fn step(&mut self, now_ns: Nanoseconds) -> Option<Transmission> {
+    /// Does what is due at `now_ns`: returns the frame that has just arrived, or starts the next frame on a free wire.
+    pub fn step(&mut self, now_ns: Nanoseconds) -> Option<FrameOnWire> {
         if let Some(transmission) = self.on_wire {
             if transmission.arrives_ns > now_ns {
                 return None;
@@ -119,7 +124,7 @@ impl Medium {
         None
     }
 
-    /// What the connected stations have to send.
+    /// The frames that the connected stations offer.
     fn offers(&self) -> impl Iterator<Item = (usize, &Frame)> {
         let stations = self.mailboxes.iter().zip(&self.is_connected).enumerate();
         stations
@@ -136,7 +141,7 @@ impl Medium {
         self.busy_ns += duration_ns;
         self.free_ns = now_ns + duration_ns;
         let arrives_ns = self.free_ns - bits_ns(INTERMISSION_BITS, self.rates.nominal).min(duration_ns);
-        self.on_wire = Some(Transmission { frame, sender, arrives_ns, free_ns: self.free_ns });
+        self.on_wire = Some(FrameOnWire { frame, sender, arrives_ns, free_ns: self.free_ns });
     }
 }
 
@@ -145,13 +150,13 @@ mod tests {
     use super::*;
     use takt_rt::Id;
 
-    const RATES: BitRates = BitRates { nominal: 1_000_000, data: None };
+    const RATES: WireBitRates = WireBitRates { nominal: 1_000_000, data: None };
 
     fn frame(id: u32) -> Frame {
         Frame::of(Id::base(id).unwrap(), [0x55; 8])
     }
 
-    /// Runs the bus until nothing waits and returns what arrived: when, from whom, which identifier.
+    /// Runs the bus until no frame waits; returns arrival time, station and identifier of each frame.
     fn run(medium: &mut Medium) -> Vec<(Nanoseconds, usize, u32)> {
         let mut arrived = vec![];
         let mut now_ns = 0;
@@ -165,13 +170,13 @@ mod tests {
     }
 
     #[test]
-    fn the_strongest_identifier_of_all_stations_goes_first() {
+    fn the_highest_priority_identifier_of_all_stations_goes_first() {
         let mut medium = Medium::with_master(RATES, 8, 2, 8);
         for (station, id) in [(1, 0x581), (1, 0x181), (2, 0x182), (0, 0x201), (0, 0x080)] {
             assert!(medium.mailbox_mut(station).push(frame(id)));
         }
         let order: Vec<_> = run(&mut medium).into_iter().map(|(_, station, id)| (station, id)).collect();
-        // The master's queue offers 0x201 until it is gone, although 0x080 behind it is stronger than everything.
+        // The master's FIFO offers 0x201 first, although 0x080 behind it has a higher priority.
         assert_eq!(order, [(1, 0x181), (2, 0x182), (0, 0x201), (0, 0x080), (1, 0x581)]);
     }
 
@@ -191,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_that_comes_late_does_not_interrupt_the_one_on_the_wire() {
+    fn a_later_frame_does_not_interrupt_the_frame_on_the_wire() {
         let mut medium = Medium::with_master(RATES, 8, 1, 8);
         medium.mailbox_mut(1).push(frame(0x701));
         medium.step(0);

@@ -1,13 +1,13 @@
-//! Simulated drives on simulated buses: what stands in for the hardware in the default configuration, in tests, and
-//! behind `takt sim`. A product of its own: nothing in here knows the controller.
+//! Simulated drives on simulated buses. They replace the hardware in the default configuration, in tests, and in
+//! `takt sim`. The simulation is independent: it does not depend on the controller.
 //!
 //! ```text
 //!                port ── SimulatedBus: a bus as the real-time thread sees it (BusPort)
 //!                 │
-//!       ┌─────────┴──────────┐
-//!     medium               drive ── Drive: what every simulated drive is to its bus
+//!     medium               drive ── Drive: the interface between a simulated drive and its bus
+//!     arbitration           │
 //!     who sends, when       │
-//!       │                  erob ── the eRob joint: dictionary, SDO, NMT, PDO, CiA 402, modes, loops
+//!     mailbox  wire        yz_aim ── the YZ-AIM servo: the same parts, own controlword, homing, alarms
 //!     mailbox  wire        yz_aim ── the YZ-AIM servo: the same, its own controlword, homing, alarms
 //!     frames   bits,        │
 //!     waiting  stuffing   servo ── position, velocity and torque loops
@@ -15,14 +15,13 @@
 //!                         plant ── inertia, friction, brake, end stops, encoder; homing switches
 //! ```
 //!
-//! Everything is passive: there are no threads and no clocks. Time is a number that is handed in, so the same code
-//! runs in virtual time (hours in seconds, the same bytes in every run) and on a wall clock, and takes no heap memory
-//! once it is built.
+//! Everything is passive, without threads and clocks. The caller passes the time in, so the same code runs in virtual
+//! time (hours in seconds, the same result in every run) and in wall-clock time. It allocates no memory after
+//! construction.
 //!
 //! ```
-//! use takt::sim::{BitRates, SimulatedBus};
-//! use takt_rt::{Frame, Id};
-//! use takt_rt::{BusPort, ReceiveBatch};
+//! use takt::sim::{WireBitRates, SimulatedBus};
+//! use takt_rt::{BusPort, Frame, Id, ReceiveBatch};
 //!
 //! # fn parameters() -> takt::sim::erob::ErobParameters {
 //! #     use takt::sim::erob::ErobParameters;
@@ -37,11 +36,11 @@
 //! #     }
 //! # }
 //! let drive = takt::sim::erob::ErobJoint::new(parameters());
-//! let rates = BitRates { nominal: 1_000_000, data: None };
+//! let rates = WireBitRates { nominal: 1_000_000, data: None };
 //! let mut bus = SimulatedBus::with_drives(rates, u64::MAX, vec![Box::new(drive)]);
 //!
 //! let mut batch = ReceiveBatch::new();
-//! bus.send(0, &[]); // the supply comes on
+//! bus.send(0, &[]); // the supply is switched on
 //! bus.receive(2_000_000, &mut batch); // two milliseconds later
 //! assert_eq!(batch[0].frame, Frame::of(Id::canopen(0x700, 5), [0])); // boot-up
 //! ```
@@ -58,12 +57,13 @@ pub mod plant;
 mod port;
 pub(crate) mod random;
 mod servo;
+mod wire_length;
 pub mod yz_aim;
 
 pub use defect::{Defect, Unsupported};
-pub use drive::{Drive, DriveFault, NmtState, Observation};
+pub use drive::{Drive, DriveFault, NodeState, Observation};
 pub use live::LiveDrives;
-pub use mailbox::{Mailbox, Order};
-pub use medium::{BitRates, Medium, Transmission};
-pub use port::{AfflictError, SimulatedBus, UnknownNode};
-pub use takt_rt::{INTERMISSION_BITS, WireLength, bits_ns};
+pub use mailbox::{Mailbox, QueueOrder};
+pub use medium::{FrameOnWire, Medium, WireBitRates};
+pub use port::{InjectDefectError, SimulatedBus, UnknownNode};
+pub use wire_length::{INTERMISSION_BITS, WireLength, bits_ns};

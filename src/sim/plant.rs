@@ -1,20 +1,20 @@
-//! The mechanics of one joint: inertia, friction, brake, and the encoder on it. SI units; for a linear axis read
-//! metres and newtons.
+//! The mechanics of one joint: inertia, friction, brake, end stops and encoder, in SI units. A linear axis has metres
+//! and newtons instead of radians and newton metres.
 
-/// A joint as it is built. All values are at the output side.
+/// The parameters of a joint, at the output side.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointParameters {
-    /// Rotor and load: kg·m² (kg).
+    /// Inertia of rotor and load: kg·m² (kg).
     pub inertia: f64,
-    /// N·m·s/rad (N·s/m).
+    /// Viscous friction: N·m·s/rad (N·s/m).
     pub viscous_friction: f64,
-    /// N·m (N), the same at rest and in motion.
+    /// Coulomb friction: N·m (N), the same at rest and in motion.
     pub coulomb_friction: f64,
-    /// What the engaged brake holds or, in motion, takes: N·m (N).
+    /// Friction of the engaged brake: N·m (N).
     pub brake_torque: f64,
 }
 
-/// Where the travel of a joint ends at something solid.
+/// The mechanical end stops of the travel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EndStops {
     /// rad (m)
@@ -29,7 +29,7 @@ pub struct Joint {
     parameters: JointParameters,
     position: f64,
     velocity: f64,
-    /// Torque from outside: gravity, contact.
+    /// External torque: gravity, contact.
     load_torque: f64,
     stops: Option<EndStops>,
 }
@@ -40,7 +40,7 @@ impl Joint {
         Self { parameters, position, velocity: 0.0, load_torque: 0.0, stops: None }
     }
 
-    /// The same joint between end stops, which take every torque and give nothing back.
+    /// The same joint with end stops, which stop it without rebound.
     pub fn between(self, stops: Option<EndStops>) -> Self {
         Self { stops, ..self }
     }
@@ -55,21 +55,21 @@ impl Joint {
         self.velocity
     }
 
-    /// Sets the torque from outside (N·m, N), which lasts until it is set again.
+    /// Sets the external torque (N·m, N), which lasts until it is set again.
     pub fn set_load_torque(&mut self, torque: f64) {
         self.load_torque = torque;
     }
 
-    /// Stands still at once, as a joint that hits something hard.
+    /// Stops at once, like a joint that hits an obstacle.
     pub fn halt(&mut self) {
         self.velocity = 0.0;
     }
 
-    /// Moves on by `duration_s` under a constant motor torque.
+    /// Advances by `duration_s` under a constant motor torque.
     ///
-    /// Friction is taken exactly: where the velocity would change its sign within the step, the step is cut at
-    /// the standstill, and the joint stays there as long as the friction can hold it. So it neither creeps nor
-    /// chatters at rest. Viscous friction is taken implicitly, which is stable for any coefficient.
+    /// Coulomb friction is exact: a step in which the velocity would change its sign is split at standstill, and the
+    /// joint stays there while the friction can hold it. So it neither creeps nor chatters. Viscous friction is
+    /// integrated implicitly, which is stable for any coefficient.
     pub fn step(&mut self, duration_s: f64, motor_torque: f64, is_braked: bool) {
         let brake = if is_braked { self.parameters.brake_torque } else { 0.0 };
         let friction = self.parameters.coulomb_friction + brake;
@@ -110,17 +110,17 @@ impl Joint {
     }
 }
 
-/// The encoder that a drive reports its position from.
+/// The encoder of a drive.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Encoder {
-    /// Counts per rad (m); negative where positive counts are negative travel.
+    /// Counts per rad (m); negative when the count decreases with the position.
     pub counts_per_unit: f64,
-    /// The count at which the joint's position is zero.
+    /// The count at position zero.
     pub zero_counts: f64,
 }
 
 impl Encoder {
-    /// The count that shows at a position, in the 32 bits of the position objects, which wrap.
+    /// The count at a position, wrapped to the 32 bits of the position objects.
     pub fn counts(&self, position: f64) -> i32 {
         ((position * self.counts_per_unit + self.zero_counts).round_ties_even() as i64) as i32
     }
@@ -141,7 +141,7 @@ mod tests {
     const STEP_S: f64 = 125e-6;
 
     #[test]
-    fn a_torque_below_the_friction_moves_nothing_at_all() {
+    fn a_torque_below_the_friction_moves_nothing() {
         let mut joint = Joint::new(PARAMETERS, 0.5);
         for _ in 0..10_000 {
             joint.step(STEP_S, 3.999, false);
@@ -150,7 +150,7 @@ mod tests {
     }
 
     #[test]
-    fn a_constant_torque_leads_to_the_velocity_at_which_friction_balances_it() {
+    fn a_constant_torque_leads_to_the_velocity_where_friction_balances_it() {
         let mut joint = Joint::new(PARAMETERS, 0.0);
         for _ in 0..80_000 {
             joint.step(STEP_S, 10.0, false);
@@ -183,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn an_end_stop_takes_every_torque_and_lets_the_joint_go_back() {
+    fn an_end_stop_holds_any_torque_and_releases_the_joint_in_the_other_direction() {
         let stops = EndStops { lowest: -1.0, highest: 0.5 };
         let mut joint = Joint::new(PARAMETERS, 0.4).between(Some(stops));
         for _ in 0..8_000 {
@@ -208,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn the_encoder_shows_the_nearest_count_and_wraps_at_32_bits() {
+    fn the_encoder_rounds_to_the_nearest_count_and_wraps_at_32_bits() {
         let encoder = Encoder { counts_per_unit: -100.0, zero_counts: 7.0 };
         assert_eq!(encoder.counts(0.0249), 5);
         assert_eq!(encoder.counts(-21_474_837.0), i32::MIN + 59);

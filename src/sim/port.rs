@@ -1,9 +1,7 @@
-//! A simulated bus as the real-time thread sees it: the drives, the wire between them, and the queues of the
-//! interface, behind [`BusPort`].
+//! A simulated bus behind [`BusPort`]: the drives, the wire between them, and the queues of the interface.
 //!
-//! The world inside has a time of its own that starts with the first call and is carried on by the present that
-//! every call names, in virtual time or on a wall clock alike. It runs on the caller's thread and takes no heap
-//! memory after its construction.
+//! The simulation has its own time, which starts at the first call and advances to the time of every call, virtual or
+//! wall-clock. It runs in the caller's thread and allocates no memory after construction.
 
 use std::collections::VecDeque;
 
@@ -12,38 +10,38 @@ use takt_rt::{BusHealth, BusPort, BusState, Frame, Nanoseconds, ReceiveBatch, Re
 use super::defect::{Defect, Unsupported};
 use super::drive::{Drive, DriveFault, Observation};
 use super::erob::{ErobJoint, ErobParameters};
-use super::medium::{BitRates, Medium, Transmission};
+use super::medium::{FrameOnWire, Medium, WireBitRates};
 use super::yz_aim::{YzAimJoint, YzAimParameters};
 use crate::config::{Axis, Config, DriveFamily};
 
-/// Frames the interface's transmit queue holds.
+/// Capacity of the interface's transmit queue.
 const TRANSMIT_QUEUE: usize = 256;
-/// Frames the interface's receive queue holds.
+/// Capacity of the interface's receive queue.
 const RECEIVE_QUEUE: usize = 1024;
-/// Frames a drive's controller holds.
+/// Capacity of a drive's mailbox.
 pub(super) const DRIVE_MAILBOX: usize = 16;
-/// The master's station on the bus; the drives follow, and behind them one for whoever else speaks.
+/// The master's station. The drives follow, and after them a foreign station.
 const MASTER: usize = 0;
 
 /// A bus with simulated drives.
 ///
-/// The master's frames wait in one queue in the order of the calls, as in the kernel: what is handed over behind a
-/// set-point goes out behind it, however strong its identifier. Every drive offers its strongest frame first.
+/// The master's frames wait in a FIFO queue like the kernel's: a frame behind a set-point is sent after it, whatever
+/// its priority. Every drive offers its highest-priority frame first.
 pub struct SimulatedBus {
     medium: Medium,
     drives: Vec<Box<dyn Drive>>,
     received: VecDeque<Received>,
     health: BusHealth,
     longest_gap_ns: Nanoseconds,
-    /// The caller's present at the last call.
+    /// The time of the last call.
     called_ns: Option<Nanoseconds>,
-    /// What the caller's clock is ahead of the world's: where it began, and all pauses.
+    /// The difference between the caller's time and the simulation's: its start and all pauses.
     offset_ns: Nanoseconds,
     paused_ns: Nanoseconds,
     now_ns: Nanoseconds,
 }
 
-/// The drive that stands in for an axis.
+/// The drive that simulates an axis.
 fn simulated(axis: &Axis, config: &Config) -> Box<dyn Drive> {
     let simulation = &config.simulation;
     match axis.drive {
@@ -55,43 +53,47 @@ fn simulated(axis: &Axis, config: &Config) -> Box<dyn Drive> {
     }
 }
 
-/// The drives that stand in for the axes of a bus.
+/// The drives that simulate the axes of a bus.
 pub(super) fn drives_of(config: &Config, bus: usize) -> Vec<Box<dyn Drive>> {
     let axes = config.axes.iter().filter(|axis| axis.bus == bus);
     axes.map(|axis| simulated(axis, config)).collect()
 }
 
-/// There is no drive with this node number on the bus.
+/// The bus has no drive with this node ID.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("no simulated drive with node number {node} on this bus")]
+#[error("no simulated drive with node ID {node} on this bus")]
 pub struct UnknownNode {
-    /// The number that was asked for.
+    /// The requested node ID.
     pub node: u8,
 }
 
-/// Why a drive has not been given a defect.
+/// Why a defect could not be injected.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-pub enum AfflictError {
-    /// It is not there.
+pub enum InjectDefectError {
+    /// The drive does not exist.
     #[error(transparent)]
     UnknownNode(#[from] UnknownNode),
-    /// It cannot have it.
+    /// The drive cannot have the defect.
     #[error(transparent)]
     Unsupported(#[from] Unsupported),
 }
 
 impl SimulatedBus {
-    /// The bus with this index in the configuration, with a drive for every axis on it.
+    /// The bus with this index in the configuration, with one drive for every axis on it.
     pub fn new(config: &Config, bus: usize) -> Self {
-        let rates = config.buses.get(bus).map_or(BitRates { nominal: 1_000_000, data: None }, |bus| {
-            BitRates { nominal: bus.bit_rate, data: bus.data_bit_rate }
+        let rates = config.buses.get(bus).map_or(WireBitRates { nominal: 1_000_000, data: None }, |bus| {
+            WireBitRates { nominal: bus.bit_rate, data: bus.data_bit_rate }
         });
         Self::with_drives(rates, config.simulation.longest_gap_ns, drives_of(config, bus))
     }
 
-    /// A bus with these drives, whose supply comes on at the first call. When a call names a present more than
-    /// `longest_gap_ns` after the one before, the world inside stands still for what is beyond.
-    pub fn with_drives(rates: BitRates, longest_gap_ns: Nanoseconds, drives: Vec<Box<dyn Drive>>) -> Self {
+    /// A bus with these drives, whose supply is switched on at the first call. When two calls are more than
+    /// `longest_gap_ns` apart, the simulation pauses for the rest of the gap.
+    pub fn with_drives(
+        rates: WireBitRates,
+        longest_gap_ns: Nanoseconds,
+        drives: Vec<Box<dyn Drive>>,
+    ) -> Self {
         Self {
             medium: Medium::with_master(rates, TRANSMIT_QUEUE, drives.len() + 1, DRIVE_MAILBOX),
             drives,
@@ -105,41 +107,46 @@ impl SimulatedBus {
         }
     }
 
-    /// The node numbers of the drives on this bus.
+    /// The node IDs of the drives on this bus.
     pub fn nodes(&self) -> impl Iterator<Item = u8> + '_ {
         self.drives.iter().map(|drive| drive.node())
     }
 
-    /// The truth about a drive, as of the last call.
+    /// The true state of a drive at the last call.
     pub fn observe(&mut self, node: u8) -> Result<Observation, UnknownNode> {
         let station = self.station(node)?;
         Ok(self.drives[station - 1].observe(self.now_ns))
     }
 
-    /// Breaks something in a drive.
-    pub fn inject(&mut self, node: u8, fault: DriveFault) -> Result<(), UnknownNode> {
+    /// Injects a fault into a drive.
+    pub fn inject_fault(&mut self, node: u8, fault: DriveFault) -> Result<(), UnknownNode> {
         let station = self.station(node)?;
-        self.drives[station - 1].inject(fault);
+        self.drives[station - 1].inject_fault(fault);
         Ok(())
     }
 
-    /// Gives a drive a defect, or mends it.
+    /// Injects a defect into a drive, or removes it.
     ///
     /// # Errors
-    /// See [`AfflictError`]; nothing has changed then.
-    pub fn afflict(&mut self, node: u8, defect: Defect, is_present: bool) -> Result<(), AfflictError> {
+    /// See [`InjectDefectError`]; nothing has changed then.
+    pub fn inject_defect(
+        &mut self,
+        node: u8,
+        defect: Defect,
+        is_present: bool,
+    ) -> Result<(), InjectDefectError> {
         let station = self.station(node)?;
-        Ok(self.drives[station - 1].afflict(self.now_ns, defect, is_present)?)
+        Ok(self.drives[station - 1].inject_defect(self.now_ns, defect, is_present)?)
     }
 
-    /// Lets a station that is neither the master nor one of the drives send a frame: it takes part in the arbitration,
-    /// and everybody hears it. Returns whether that station had room for it.
-    pub fn say(&mut self, now_ns: Nanoseconds, frame: &Frame) -> bool {
+    /// Lets a foreign station send a frame: it takes part in the arbitration, and every station receives it. Returns
+    /// whether that station had room for it.
+    pub fn send_foreign(&mut self, now_ns: Nanoseconds, frame: &Frame) -> bool {
         self.advance_to(now_ns);
         self.medium.mailbox_mut(self.drives.len() + 1).push(*frame)
     }
 
-    /// Cuts a drive off from the bus or connects it again. It lives on meanwhile.
+    /// Disconnects a drive from the bus or connects it again. It keeps running meanwhile.
     pub fn silence(&mut self, node: u8, is_silent: bool) -> Result<(), UnknownNode> {
         let station = self.station(node)?;
         self.medium.disconnect(station, is_silent);
@@ -153,25 +160,25 @@ impl SimulatedBus {
         Ok(())
     }
 
-    /// Sets a torque from outside on a joint (N·m, N), until it is set again.
+    /// Sets the external torque on a joint (N·m, N), which lasts until it is set again.
     pub fn set_load_torque(&mut self, node: u8, torque: f64) -> Result<(), UnknownNode> {
         let station = self.station(node)?;
         self.drives[station - 1].set_load_torque(torque);
         Ok(())
     }
 
-    /// For how long the world has stood still because the caller was away, in total.
+    /// How long the simulation has paused in total, because the caller was late.
     pub fn paused_ns(&self) -> Nanoseconds {
         self.paused_ns
     }
 
-    /// The number of the station of a drive; the drive itself is one before.
+    /// The station of a drive, one more than its index.
     fn station(&self, node: u8) -> Result<usize, UnknownNode> {
         let at = self.drives.iter().position(|drive| drive.node() == node);
         at.map(|at| at + 1).ok_or(UnknownNode { node })
     }
 
-    /// Carries the world on to the caller's present.
+    /// Advances the simulation to the caller's time.
     fn advance_to(&mut self, called_ns: Nanoseconds) {
         let before_ns = *self.called_ns.get_or_insert_with(|| {
             self.offset_ns = called_ns;
@@ -189,15 +196,14 @@ impl SimulatedBus {
         self.now_ns = self.now_ns.max(until_ns);
     }
 
-    /// When the next thing happens in the world.
+    /// The time of the next event in the simulation.
     fn next_ns(&self) -> Option<Nanoseconds> {
         let wire = self.medium.next_ns(self.now_ns);
         let drives = self.drives.iter().map(|drive| drive.wake_ns().max(self.now_ns));
         drives.chain(wire).min()
     }
 
-    /// Everything that happens at one instant: the drives first, so that what they have to send takes part in the
-    /// arbitration.
+    /// Handles all events of one instant. The drives come first, so that their new frames take part in the arbitration.
     fn step(&mut self, now_ns: Nanoseconds) {
         for (drive, station) in self.drives.iter_mut().zip(1..) {
             if drive.wake_ns() <= now_ns {
@@ -209,8 +215,8 @@ impl SimulatedBus {
         }
     }
 
-    fn deliver(&mut self, now_ns: Nanoseconds, transmission: &Transmission) {
-        let Transmission { frame, sender, .. } = transmission;
+    fn deliver(&mut self, now_ns: Nanoseconds, transmission: &FrameOnWire) {
+        let FrameOnWire { frame, sender, .. } = transmission;
         for (drive, station) in self.drives.iter_mut().zip(1..) {
             if station != *sender && self.medium.is_connected(station) {
                 drive.receive(now_ns, frame, self.medium.mailbox_mut(station));

@@ -1,5 +1,5 @@
-//! Numbers that look random and are the same in every run with the same seed (SplitMix64; G. Steele, D. Lea,
-//! C. Flood, "Fast splittable pseudorandom number generators", OOPSLA 2014).
+//! Reproducible pseudo-random numbers (SplitMix64; G. Steele, D. Lea, C. Flood, "Fast splittable pseudorandom number
+//! generators", OOPSLA 2014).
 
 /// A reproducible sequence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -21,7 +21,7 @@ impl Random {
         mixed ^ mixed >> 31
     }
 
-    /// A number in a range, its end excluded; the start of an empty one.
+    /// A number in a range without its end; the start for an empty range.
     pub fn within(&mut self, range: std::ops::Range<u64>) -> u64 {
         let width = range.end.saturating_sub(range.start).max(1);
         range.start + self.next() % width

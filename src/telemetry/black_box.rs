@@ -1,9 +1,9 @@
-//! The black box: the last seconds of cycles, events, frames and the health of the buses, always in memory, and written
-//! to a file of their own at every fault, with what led to it and half a second of what came of it.
+//! The black box: the last seconds of cycles, events, frames and bus health. They are always in memory. At every incident
+//! they are written to a file of their own, together with the half second that follows.
 //!
-//! A fault in a run is seldom alone: what follows within that half second goes to the same file. A run leaves
-//! [`FILES`] files at most. When there are more faults, the first ones and the very last one are kept: the first ones
-//! are the causes, and the last one is how it ended.
+//! One fault often leads to others. An incident within that half second goes into the same file. A run leaves at most
+//! [`FILES`] files. If there are more incidents, the first ones and the last one are kept: the first ones show the cause,
+//! the last one shows how the run ended.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -15,27 +15,27 @@ use takt_rt::{
     StopReason,
 };
 
-use super::destination::Destination;
+use super::destination::RecordingDestination;
+use super::history::{Entry, History, OnBus};
 use super::machine::Machine;
-use super::past::{Entry, OnBus, Past};
 use super::recording::Recording;
 use super::wall_clock::WallClock;
 use super::words;
 use crate::bus::trace::{TracedFrame, TracedHealth};
 
-/// Files that a run leaves at most.
+/// The most files that a run leaves.
 pub const FILES: usize = 16;
-/// How long a file goes on after the last fault in it: the way to rest.
+/// How long a file goes on after the last incident in it. Within this time the axes come to rest.
 const AFTER_NS: Nanoseconds = 500_000_000;
-/// How long a file goes on when fault follows fault.
+/// How long a file goes on when incident follows incident.
 const LONGEST_AFTER_NS: Nanoseconds = 5_000_000_000;
-/// The name of the metadata record with the fault.
+/// The name of the metadata record that describes the incident.
 pub const METADATA: &str = "black_box";
 
-/// What the black box is to do.
+/// Settings of the black box.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct BlackBoxOptions {
-    /// How much of the past it keeps.
+    /// The time span that it keeps.
     pub span_ns: Nanoseconds,
     /// The folder for its files. It is made if it does not exist.
     pub directory: PathBuf,
@@ -43,10 +43,10 @@ pub struct BlackBoxOptions {
 
 /// What makes the black box write a file.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Fault {
-    /// The group stopped, and nobody had asked for it.
+pub enum Incident {
+    /// The group stopped for a fault.
     Stop(StopReason),
-    /// A drive reports a fault while the group is not under power, so that there is nothing to stop.
+    /// A drive reports a fault while the group is not enabled: no stop follows.
     Drive {
         /// The axis.
         axis: u8,
@@ -59,12 +59,12 @@ pub enum Fault {
     },
     /// The real-time thread ended by itself.
     ThreadDied,
-    /// A function that the caller gave to the run panicked: what it said.
+    /// A function that the caller gave to the run panicked, with this message.
     CallbackPanicked(String),
 }
 
-impl Fault {
-    /// The rule by its key, for the name of the file.
+impl Incident {
+    /// Its key, for the name of the file.
     pub fn key(&self) -> &'static str {
         match self {
             Self::Stop(stop) => words::rule_key(stop.rule()),
@@ -74,7 +74,7 @@ impl Fault {
         }
     }
 
-    /// What happened, in words.
+    /// A sentence that says what happened.
     pub fn words(&self, machine: &Machine) -> String {
         match self {
             Self::Stop(stop) => words::stop(stop, machine),
@@ -93,7 +93,7 @@ impl Fault {
         }
     }
 
-    /// `last_slot` is the last one that was seen, where the fault has none of its own.
+    /// The metadata record. `last_slot` is the last slot that was seen; it is used for an incident without a slot.
     fn metadata(&self, machine: &Machine, last_slot: u64) -> BTreeMap<String, String> {
         let mut metadata = BTreeMap::from([
             ("rule".to_owned(), self.key().to_owned()),
@@ -138,7 +138,7 @@ struct OpenFile {
 
 /// The black box.
 pub struct BlackBox {
-    past: Past,
+    history: History,
     directory: PathBuf,
     wall_clock: WallClock,
     started_ns: Nanoseconds,
@@ -151,7 +151,7 @@ pub struct BlackBox {
 }
 
 impl BlackBox {
-    /// A black box with all its memory, of a run that begins now.
+    /// Allocates all memory of the black box, for a run that begins at `started_ns`.
     pub fn new(
         options: BlackBoxOptions,
         machine: &Machine,
@@ -159,7 +159,7 @@ impl BlackBox {
         started_ns: Nanoseconds,
     ) -> Self {
         Self {
-            past: Past::new(options.span_ns, machine.cycle_ns, machine.axes.len(), machine.buses.len()),
+            history: History::new(options.span_ns, machine.cycle_ns, machine.axes.len(), machine.buses.len()),
             directory: options.directory,
             wall_clock,
             started_ns,
@@ -172,9 +172,9 @@ impl BlackBox {
         }
     }
 
-    /// Takes a cycle.
+    /// Adds a cycle.
     pub fn cycle(&mut self, record: &CycleRecord) {
-        self.past.cycle(record);
+        self.history.cycle(record);
         let now_ns = record.timing.slot_start_ns;
         if self.open.as_ref().is_some_and(|open| now_ns > open.until_ns) {
             self.close();
@@ -182,19 +182,19 @@ impl BlackBox {
         self.write(|recording| recording.cycle(record));
     }
 
-    /// Takes an event, which is also said in words, and says whether it is a fault.
-    pub fn event(&mut self, event: &Event, text: &str) -> Option<Fault> {
-        self.past.event(event);
+    /// Adds an event and its text. Returns the incident, if the event is one.
+    pub fn event(&mut self, event: &Event, text: &str) -> Option<Incident> {
+        self.history.event(event);
         self.write(|recording| recording.event(event, text));
         match event.kind {
-            EventKind::Stop(stop) if stop.rule() != Rule::Requested => Some(Fault::Stop(stop)),
+            EventKind::Stop(stop) if stop.rule() != Rule::Requested => Some(Incident::Stop(stop)),
             EventKind::DriveState { axis, state, .. } => {
                 let known = self.drives.get_mut(usize::from(axis))?.replace(state);
-                let phase = self.past.last_phase();
-                // Under power the engine stops the group and says why. Before the bring-up is over, a fault is an old one.
+                let phase = self.history.last_phase();
+                // While the group is enabled, the engine stops it and reports the fault. During bring-up, a fault is an old one.
                 let is_new = known.is_some_and(|known| !known.is_faulted()) && state.is_faulted();
-                let code = self.past.last_error_code(axis.into());
-                (is_new && matches!(phase, Phase::Disabled | Phase::Disabling)).then_some(Fault::Drive {
+                let code = self.history.last_error_code(axis.into());
+                (is_new && matches!(phase, Phase::Disabled | Phase::Disabling)).then_some(Incident::Drive {
                     axis,
                     code,
                     slot: event.slot,
@@ -205,35 +205,35 @@ impl BlackBox {
         }
     }
 
-    /// Takes a frame.
+    /// Adds a frame.
     pub fn frame(&mut self, frame: &OnBus<TracedFrame>) {
-        self.past.frame(frame);
+        self.history.frame(frame);
         self.write(|recording| recording.frame(frame));
     }
 
-    /// Takes a change of a bus' health.
+    /// Adds a change of the health of a bus.
     pub fn health(&mut self, health: &OnBus<TracedHealth>) {
-        self.past.health(health);
+        self.history.health(health);
         self.write(|recording| recording.health(health));
     }
 
-    /// Writes the past to a file, or adds the fault to the file that is open.
-    pub fn fault(&mut self, fault: &Fault, machine: &Machine) {
-        let (slot, at_ns) = self.past.last_slot().unwrap_or((0, self.started_ns));
+    /// Writes the history to a new file, or adds the incident to the file that is open.
+    pub fn incident(&mut self, incident: &Incident, machine: &Machine) {
+        let (slot, at_ns) = self.history.last_slot().unwrap_or((0, self.started_ns));
         if let Some(open) = &mut self.open {
             open.until_ns = (at_ns + AFTER_NS).min(open.latest_ns);
-            let metadata = fault.metadata(machine, slot);
+            let metadata = incident.metadata(machine, slot);
             return self.write(|recording| recording.metadata(METADATA, metadata));
         }
         if let Some(last) = self.files.get(FILES - 1) {
-            // Only the latest of the many is worth its place; that it cannot be removed changes nothing else.
+            // The newest incident takes the last place. If the old file cannot be removed, it stays.
             let _ = fs::remove_file(last);
             self.files.truncate(FILES - 1);
             self.replaced += 1;
         }
         let stem =
-            format!("{}-{}-black-box-{}", machine.name, self.wall_clock.file_stamp(at_ns), fault.key());
-        let opened = match Destination::Directory(self.directory.clone()).open(&stem, "mcap") {
+            format!("{}-{}-black-box-{}", machine.name, self.wall_clock.file_stamp(at_ns), incident.key());
+        let opened = match RecordingDestination::Directory(self.directory.clone()).open(&stem, "mcap") {
             Ok(opened) => opened,
             Err(error) => return self.fail(format!("no black box: cannot write {error}")),
         };
@@ -241,8 +241,8 @@ impl BlackBox {
         let label = opened.label.clone();
         let begun = Recording::begin(opened, machine, self.wall_clock).and_then(|mut recording| {
             recording.add_buses(machine)?;
-            recording.metadata(METADATA, fault.metadata(machine, slot))?;
-            write_past(&self.past, &mut recording, machine)?;
+            recording.metadata(METADATA, incident.metadata(machine, slot))?;
+            write_history(&self.history, &mut recording, machine)?;
             Ok(recording)
         });
         match begun {
@@ -254,7 +254,7 @@ impl BlackBox {
                 });
             }
             Err(error) => {
-                self.fail(format!("the black box is not whole: cannot write {label}: {}", reason(&error)))
+                self.fail(format!("the black box is incomplete: cannot write {label}: {}", reason(&error)))
             }
         }
     }
@@ -264,21 +264,21 @@ impl BlackBox {
         let Some(OpenFile { recording, .. }) = self.open.take() else { return };
         let label = recording.label.clone();
         if let Err(error) = recording.finish() {
-            self.fail(format!("the black box has no end: cannot write {label}: {}", reason(&error)));
+            self.fail(format!("the black box is incomplete: cannot write {label}: {}", reason(&error)));
         }
     }
 
-    /// What could not be written, and why; said once, however often it happens.
+    /// What could not be written, and why. Only the first failure is reported.
     pub fn take_failure(&mut self) -> Option<String> {
         self.failure.take()
     }
 
-    /// The files, if only in part, the oldest first.
+    /// The files, complete or not, the oldest first.
     pub fn files(&self) -> &[PathBuf] {
         &self.files
     }
 
-    /// Files that had to make room for later ones.
+    /// How many files were removed for later ones.
     pub fn replaced(&self) -> u64 {
         self.replaced
     }
@@ -299,18 +299,18 @@ impl BlackBox {
     }
 }
 
-fn write_past(past: &Past, recording: &mut Recording, machine: &Machine) -> McapResult<()> {
-    past.visit(|entry| match entry {
+fn write_history(history: &History, recording: &mut Recording, machine: &Machine) -> McapResult<()> {
+    history.visit(|entry| match entry {
         Entry::Cycle(record) => recording.cycle(record),
         Entry::Event(event) => recording.event(event, &words::event(event, machine)),
         Entry::Frame(frame) => recording.frame(&frame),
         Entry::Health(health) => recording.health(health),
     })?;
-    // What led to the fault is safe from now on, whatever happens next.
+    // From now on, the history before the incident is in the file.
     recording.flush()
 }
 
-/// The reason in an error of the MCAP writer, without what is clear from the context.
+/// The reason of an error of the MCAP writer, without its prefix.
 pub fn reason(error: &McapError) -> String {
     match error {
         McapError::Io(error) => error.to_string(),

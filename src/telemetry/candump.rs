@@ -6,17 +6,17 @@ use std::io::{self, BufWriter, Write};
 use takt_rt::{NANOSECONDS_PER_SECOND, Nanoseconds};
 
 use super::destination::Opened;
-use super::past::OnBus;
+use super::history::OnBus;
 use super::wall_clock::WallClock;
 use crate::bus::trace::{Trace, TracedFrame};
 
-/// Received frames are read some time after they arrived, when others have been sent, and the buses are read one
-/// after the other: frames wait this long before they are written, so that the log is in the order of time.
+/// Frames wait this long before they are written, so that the log is in the order of time. Received frames are read some
+/// time after their arrival, and the buses are read one after the other.
 const REORDER_NS: Nanoseconds = 20_000_000;
 
 /// A log that is being written.
 pub struct CandumpLog {
-    /// What to call it in messages.
+    /// Its name in messages.
     pub label: String,
     writer: BufWriter<Box<dyn Write + Send>>,
     wall_clock: WallClock,
@@ -29,12 +29,12 @@ impl CandumpLog {
         Self { label: opened.label, writer, wall_clock, waiting: Vec::new() }
     }
 
-    /// Takes a frame.
+    /// Adds a frame.
     pub fn add(&mut self, OnBus { bus, what }: &OnBus<TracedFrame>) {
         self.waiting.push((*what, *bus));
     }
 
-    /// Writes what is old enough.
+    /// Writes the frames that have waited long enough.
     pub fn write(&mut self, traces: &[Trace]) -> io::Result<()> {
         self.waiting.sort_by_key(|(frame, _)| frame.at_ns);
         let newest_ns = self.waiting.last().map_or(0, |(frame, _)| frame.at_ns);

@@ -1,23 +1,24 @@
-//! Where a recording goes. An existing file is never overwritten.
+//! Where a recording or a log is written. An existing file is never overwritten.
 
+use crate::printable::printable_path;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 /// Where a recording or a log is written.
-pub enum Destination {
+pub enum RecordingDestination {
     /// A new file in this folder, named after the machine and the time. The folder is made if it does not exist.
     Directory(PathBuf),
-    /// This file; with `-2`, `-3` … before its extension if it exists already. Its folder is made if need be. A folder or
-    /// a device is no file.
+    /// This file; with `-2`, `-3` … before its extension if it exists already. Its folder is made if it does not exist. A
+    /// folder or a device is an error.
     File(PathBuf),
-    /// Anything that takes bytes, and what to call it in messages.
+    /// Any writer, with its name in messages.
     Stream(String, Box<dyn Write + Send>),
 }
 
-/// Something open for writing.
+/// An open destination.
 pub struct Opened {
-    /// What to call it in messages.
+    /// Its name in messages.
     pub label: String,
     /// The file, if it is one.
     pub path: Option<PathBuf>,
@@ -25,7 +26,7 @@ pub struct Opened {
     pub writer: Box<dyn Write + Send>,
 }
 
-/// What could not be opened, and why.
+/// Why a file could not be opened.
 #[derive(Debug, thiserror::Error)]
 #[error("{path}: {reason}")]
 pub struct OpenError {
@@ -33,8 +34,8 @@ pub struct OpenError {
     reason: io::Error,
 }
 
-impl Destination {
-    /// Opens it; `stem` and `extension` make the file name where the destination leaves it open.
+impl RecordingDestination {
+    /// Opens it. For a folder, `stem` and `extension` make the file name.
     pub fn open(self, stem: &str, extension: &str) -> Result<Opened, OpenError> {
         let path = match self {
             Self::Directory(directory) => directory.join(format!("{}.{extension}", file_name(stem))),
@@ -42,12 +43,12 @@ impl Destination {
             Self::Stream(label, writer) => return Ok(Opened { label, path: None, writer }),
         };
         let (path, file) =
-            create_new(&path).map_err(|reason| OpenError { path: path.display().to_string(), reason })?;
-        Ok(Opened { label: path.display().to_string(), path: Some(path), writer: Box::new(file) })
+            create_new(&path).map_err(|reason| OpenError { path: printable_path(&path), reason })?;
+        Ok(Opened { label: printable_path(&path), path: Some(path), writer: Box::new(file) })
     }
 }
 
-/// Replaces what may not stand in a file name.
+/// Replaces the characters that a file name may not have.
 fn file_name(stem: &str) -> String {
     stem.chars()
         .map(|letter| if letter.is_alphanumeric() || "-_.".contains(letter) { letter } else { '_' })
@@ -63,13 +64,13 @@ fn create_new(path: &Path) -> io::Result<(PathBuf, File)> {
         match OpenOptions::new().write(true).create_new(true).open(&candidate) {
             Ok(file) => return Ok((candidate, file)),
             Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {
-                // Beside a folder or a device nobody would look for it.
+                // A file beside a folder or a device would not be found.
                 match fs::metadata(&candidate) {
                     Ok(found) if found.is_dir() => {
-                        return Err(io::Error::other("this is a folder: name a file in it"));
+                        return Err(io::Error::other("this is a folder; name a file in it"));
                     }
                     Ok(found) if !found.is_file() => {
-                        return Err(io::Error::other("this is no ordinary file"));
+                        return Err(io::Error::other("this is not a regular file"));
                     }
                     _ => {}
                 }
@@ -97,11 +98,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_folder_is_made_and_an_existing_file_is_left_alone() {
+    fn a_missing_folder_is_made_and_an_existing_file_is_not_overwritten() {
         let folder = tempfile::tempdir().unwrap();
         let open = || {
             let mut opened =
-                Destination::Directory(folder.path().join("a/b")).open("arm 6/x", "mcap").unwrap();
+                RecordingDestination::Directory(folder.path().join("a/b")).open("arm 6/x", "mcap").unwrap();
             opened.writer.write_all(b"!").unwrap();
             opened.path.unwrap()
         };
@@ -110,14 +111,15 @@ mod tests {
     }
 
     #[test]
-    fn a_folder_or_a_device_in_place_of_the_file_is_an_error_and_nothing_is_written_beside_it() {
+    fn a_folder_or_a_device_in_place_of_the_file_is_an_error() {
         let folder = tempfile::tempdir().unwrap();
         let inside = folder.path().join("runs");
         fs::create_dir(&inside).unwrap();
-        let error =
-            |path: &Path| Destination::File(path.to_owned()).open("arm", "mcap").err().unwrap().to_string();
-        assert_eq!(error(&inside), format!("{}: this is a folder: name a file in it", inside.display()));
-        assert_eq!(error(Path::new("/dev/null")), "/dev/null: this is no ordinary file");
+        let error = |path: &Path| {
+            RecordingDestination::File(path.to_owned()).open("arm", "mcap").err().unwrap().to_string()
+        };
+        assert_eq!(error(&inside), format!("{}: this is a folder; name a file in it", inside.display()));
+        assert_eq!(error(Path::new("/dev/null")), "/dev/null: this is not a regular file");
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
     }
 
@@ -126,7 +128,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let obstacle = folder.path().join("runs");
         fs::write(&obstacle, "in the way").unwrap();
-        let error = Destination::Directory(obstacle.clone()).open("arm", "mcap").err().unwrap();
+        let error = RecordingDestination::Directory(obstacle.clone()).open("arm", "mcap").err().unwrap();
         assert!(error.to_string().starts_with(&format!("{}/arm.mcap: ", obstacle.display())), "{error}");
     }
 }

@@ -1,19 +1,19 @@
-//! The function of the caller that hears of events and failures. Whatever it does, the logger goes on.
+//! The caller's function that is notified of events and failures. The logger goes on even if this function panics.
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, OnceLock};
 
-use super::black_box::Fault;
+use super::black_box::Incident;
 use super::logger::Notice;
 
-/// A function that hears of events and failures.
+/// A function that is notified of events and failures.
 pub type Notify = Box<dyn FnMut(&Notice) + Send>;
 
 /// The caller's function, until it panics.
 pub struct Listener {
     notify: Option<Notify>,
-    /// What it said when it panicked.
+    /// The message of its panic.
     pub panic: Arc<OnceLock<String>>,
 }
 
@@ -25,23 +25,23 @@ impl Listener {
         Self { notify: Some(notify), panic: Arc::default() }
     }
 
-    /// Tells it something. A function that has panicked is in no known state and is not called again.
-    pub fn tell(&mut self, notice: &Notice) -> Result<(), Panicked> {
+    /// Calls the function. After a panic its state is unknown, so it is not called again.
+    pub fn notify(&mut self, notice: &Notice) -> Result<(), Panicked> {
         let Some(notify) = &mut self.notify else { return Ok(()) };
         let Err(payload) = catch_unwind(AssertUnwindSafe(|| notify(notice))) else { return Ok(()) };
         self.notify = None;
-        // There is only one first time.
+        // A panic is set only once, since the function is not called again.
         let _ = self.panic.set(panic_message(&*payload));
         Err(Panicked)
     }
 
-    /// The panic as a fault.
-    pub fn fault(&self) -> Option<Fault> {
-        self.panic.get().cloned().map(Fault::CallbackPanicked)
+    /// The panic as an incident.
+    pub fn incident(&self) -> Option<Incident> {
+        self.panic.get().cloned().map(Incident::CallbackPanicked)
     }
 }
 
-/// What a panic said.
+/// The message of a panic.
 pub fn panic_message(payload: &(dyn Any + Send)) -> String {
     let text = payload.downcast_ref::<&str>().copied();
     text.or_else(|| payload.downcast_ref::<String>().map(String::as_str)).unwrap_or("no message").to_owned()

@@ -1,4 +1,5 @@
-//! The logger: empties the rings, reckons, writes. It never waits and holds nothing that the motion needs.
+//! The logger drains the rings, computes statistics and writes files. It never waits for the real-time thread, and the
+//! real-time thread never waits for it.
 
 use std::fs::File;
 use std::path::PathBuf;
@@ -7,20 +8,21 @@ use std::sync::{Arc, OnceLock};
 use mcap::McapError;
 use takt_rt::{Event, Nanoseconds};
 
-use super::black_box::{BlackBox, BlackBoxOptions, Fault, reason};
+use super::black_box::{BlackBox, BlackBoxOptions, Incident, reason};
 use super::candump::CandumpLog;
-use super::destination::Destination;
+use super::destination::RecordingDestination;
+use super::history::OnBus;
 use super::listener::{Listener, Notify};
 use super::machine::Machine;
-use super::past::OnBus;
 use super::recording::Recording;
 use super::statistics::Statistics;
 use super::wall_clock::WallClock;
 use super::words;
 use crate::bus::trace::Trace;
 use crate::controller::channels::LogSide;
+use crate::printable::printable_path;
 
-/// What a logger is to do.
+/// Settings of a logger.
 pub struct LoggerOptions {
     /// Names and units.
     pub machine: Machine,
@@ -29,30 +31,30 @@ pub struct LoggerOptions {
     /// The monotonic time at which the run begins, for the names of files.
     pub started_ns: Nanoseconds,
     /// Where the MCAP recording goes; `None` makes none.
-    pub recording: Option<Destination>,
+    pub recording: Option<RecordingDestination>,
     /// Where the candump log of `traces` goes; `None` makes none.
-    pub candump: Option<Destination>,
-    /// What is kept and written at a fault; `None` has no black box.
+    pub candump: Option<RecordingDestination>,
+    /// Settings of the black box; `None` makes none.
     pub black_box: Option<BlackBoxOptions>,
-    /// The buses whose frames are to be logged or kept.
+    /// The frames of the buses, for the candump log and the black box.
     pub traces: Vec<Trace>,
 }
 
-/// Something that people may want to hear at once.
+/// Something that people may want to know at once.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Notice {
-    /// Something happened; [`words::event`] says it.
+    /// An event; [`words::event`] gives its text.
     Event(Event),
-    /// Something is no longer written: what, where and why. Said once; the motion goes on.
+    /// A file can no longer be written: which one, and why. Each failure is reported once. The motion goes on.
     NotWritten(String),
 }
 
-/// What a logger leaves behind.
+/// The result of a logger.
 #[derive(Clone, Debug)]
 pub struct LogSummary {
     /// Names and units.
     pub machine: Machine,
-    /// What was reckoned from the records.
+    /// The statistics of the records.
     pub statistics: Statistics,
     /// Records that came through the ring.
     pub records: u64,
@@ -66,23 +68,24 @@ pub struct LogSummary {
     pub recording: Option<PathBuf>,
     /// The candump log, if it was written to a file, even in part.
     pub candump: Option<PathBuf>,
-    /// What the black box left.
+    /// The files of the black box.
     pub black_boxes: BlackBoxes,
-    /// What was not written, or not to its end, and why.
+    /// The files that were not written, or not to their end, and why. If this is not empty, the run has lost data that it was
+    /// asked to write.
     pub not_written: Vec<String>,
 }
 
-/// What the black box has left of a run.
+/// The files that the black box has left of a run.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct BlackBoxes {
-    /// Its files, even if only in part, the oldest first.
+    /// Its files, complete or not, the oldest first.
     pub files: Vec<PathBuf>,
-    /// Files that had to make room for later ones.
+    /// How many files were removed for later ones.
     pub replaced: u64,
 }
 
-/// Empties the rings step by step. Nothing but [`Logger::drain`] and [`Logger::finish`] does any work, so in virtual
-/// time the same run leaves the same files, byte for byte.
+/// Drains the rings step by step. Only [`Logger::drain`] and [`Logger::finish`] do any work. So in virtual time the same run
+/// leaves the same files, byte for byte.
 pub struct Logger {
     source: LogSide,
     machine: Machine,
@@ -97,8 +100,8 @@ pub struct Logger {
 }
 
 impl Logger {
-    /// Opens what is to be written. What cannot be opened is told to `notify` and left out. `notify` is also told of
-    /// every event; it is called by whoever drains. When it panics it is never called again; see [`Self::panic`].
+    /// Opens the files. A file that cannot be opened is reported to `notify` and left out. `notify` also gets every event. It
+    /// is called in the thread that drains. After a panic it is never called again; see [`Self::panic`].
     pub fn new(source: LogSide, options: LoggerOptions, notify: Notify) -> Self {
         let LoggerOptions { machine, wall_clock, started_ns, recording, candump, black_box, traces } =
             options;
@@ -125,23 +128,23 @@ impl Logger {
                     logger.paths[1].clone_from(&opened.path);
                     logger.candump = Some(CandumpLog::new(opened, wall_clock));
                 }
-                Err(error) => logger.give_up(format!("no candump log: cannot write {error}")),
+                Err(error) => logger.report_failure(format!("no candump log: cannot write {error}")),
             }
         }
         logger
     }
 
-    fn begin_recording(&mut self, destination: Destination, stem: &str, wall_clock: WallClock) {
+    fn begin_recording(&mut self, destination: RecordingDestination, stem: &str, wall_clock: WallClock) {
         let opened = match destination.open(stem, "mcap") {
             Ok(opened) => opened,
-            Err(error) => return self.give_up(format!("no recording: cannot write {error}")),
+            Err(error) => return self.report_failure(format!("no recording: cannot write {error}")),
         };
         self.paths[0].clone_from(&opened.path);
         let label = opened.label.clone();
         match Recording::begin(opened, &self.machine, wall_clock) {
             Ok(recording) => self.recording = Some(recording),
             Err(error) => {
-                self.give_up(format!("no recording: cannot write {label}: {}", reason(&error)));
+                self.report_failure(format!("no recording: cannot write {label}: {}", reason(&error)));
             }
         }
     }
@@ -151,17 +154,17 @@ impl Logger {
         self.machine.cycle_ns
     }
 
-    /// What `notify` said when it panicked, if it has; it can be asked from any thread.
+    /// The message of the panic of `notify`, if it has panicked. Any thread can read it.
     pub fn panic(&self) -> Arc<OnceLock<String>> {
         Arc::clone(&self.listener.panic)
     }
 
-    /// Takes and works off all that waits. Returns how many records and events that was.
+    /// Processes all waiting records, events and frames. Returns the number of records and events.
     pub fn drain(&mut self) -> usize {
         self.drain_traces();
         let taken = self.drain_records() + self.drain_events();
         if let Some(message) = self.black_box.as_mut().and_then(BlackBox::take_failure) {
-            self.give_up(message);
+            self.report_failure(message);
         }
         taken
     }
@@ -187,7 +190,7 @@ impl Logger {
 
     fn drain_events(&mut self) -> usize {
         let mut taken = 0;
-        let mut faults = Vec::new();
+        let mut incidents = Vec::new();
         while let Some(event) = self.source.take_event() {
             taken += 1;
             let text = words::event(&event, &self.machine);
@@ -196,31 +199,31 @@ impl Logger {
                 let failure = self.recording.take().map(|recording| (recording.label, error));
                 self.end_recording(failure);
             }
-            faults.extend(self.black_box.as_mut().and_then(|black_box| black_box.event(&event, &text)));
-            if self.listener.tell(&Notice::Event(event)).is_err() {
-                faults.extend(self.listener.fault());
+            incidents.extend(self.black_box.as_mut().and_then(|black_box| black_box.event(&event, &text)));
+            if self.listener.notify(&Notice::Event(event)).is_err() {
+                incidents.extend(self.listener.incident());
             }
         }
-        // The file bears the name of the stop, if there is one. A drive whose fault made the group stop may be without
-        // power by now, which makes it no second fault.
-        faults.sort_by_key(|fault| !matches!(fault, Fault::Stop(_)));
-        if matches!(faults.first(), Some(Fault::Stop(_))) {
-            faults.retain(|fault| !matches!(fault, Fault::Drive { .. }));
+        // A stop names the file. The drive fault that caused the stop may be seen after the power was removed: that is not
+        // a second incident.
+        incidents.sort_by_key(|incident| !matches!(incident, Incident::Stop(_)));
+        if matches!(incidents.first(), Some(Incident::Stop(_))) {
+            incidents.retain(|incident| !matches!(incident, Incident::Drive { .. }));
         }
-        faults.iter().for_each(|fault| self.fault(fault));
+        incidents.iter().for_each(|incident| self.incident(incident));
         taken
     }
 
-    /// Has the black box written because of this.
-    pub fn fault(&mut self, fault: &Fault) {
+    /// Makes the black box write a file for this incident.
+    pub fn incident(&mut self, incident: &Incident) {
         if let Some(black_box) = &mut self.black_box {
-            black_box.fault(fault, &self.machine);
+            black_box.incident(incident, &self.machine);
         }
     }
 
     fn end_recording(&mut self, failure: Option<(String, McapError)>) {
         if let Some((label, error)) = failure {
-            self.give_up(format!("the recording ends here: cannot write {label}: {}", reason(&error)));
+            self.report_failure(format!("the recording ends here: cannot write {label}: {}", reason(&error)));
         }
     }
 
@@ -246,37 +249,40 @@ impl Logger {
         {
             let label = log.label.clone();
             self.candump = None;
-            self.give_up(format!("the candump log ends here: cannot write {label}: {error}"));
+            self.report_failure(format!("the candump log ends here: cannot write {label}: {error}"));
         }
     }
 
-    /// Works off the rest and closes the files.
+    /// Processes the rest and closes the files.
     pub fn finish(mut self) -> LogSummary {
         self.drain();
         if let Some(recording) = self.recording.take() {
             let label = recording.label.clone();
             if let Err(error) = recording.finish() {
-                self.give_up(format!("the recording has no end: cannot write {label}: {}", reason(&error)));
+                self.report_failure(format!(
+                    "the recording is incomplete: cannot write {label}: {}",
+                    reason(&error)
+                ));
             }
         }
         if let Some(log) = self.candump.take() {
             let label = log.label.clone();
             if let Err(error) = log.finish(&self.traces) {
-                self.give_up(format!("the candump log has no end: cannot write {label}: {error}"));
+                self.report_failure(format!("the candump log is incomplete: cannot write {label}: {error}"));
             }
         }
         let mut black_boxes = BlackBoxes::default();
         if let Some(mut black_box) = self.black_box.take() {
             black_box.close();
             if let Some(message) = black_box.take_failure() {
-                self.give_up(message);
+                self.report_failure(message);
             }
             black_boxes = BlackBoxes { files: black_box.files().to_vec(), replaced: black_box.replaced() };
         }
         let [recording, candump] = std::mem::take(&mut self.paths);
-        let [recording, candump] = [recording, candump].map(|path| self.still_there(path));
+        let [recording, candump] = [recording, candump].map(|path| self.verified(path));
         black_boxes.files =
-            black_boxes.files.into_iter().filter_map(|path| self.still_there(Some(path))).collect();
+            black_boxes.files.into_iter().filter_map(|path| self.verified(Some(path))).collect();
         LogSummary {
             machine: self.machine,
             statistics: self.statistics,
@@ -291,29 +297,29 @@ impl Logger {
         }
     }
 
-    /// A file that somebody has removed during the run is none: writing to it goes on to the end, into nothing. So it does
-    /// on a disk that has failed or a file system that has turned read-only, which is not told before one asks.
-    fn still_there(&mut self, path: Option<PathBuf>) -> Option<PathBuf> {
+    /// Checks that a file exists and is on the disk. Writing succeeds although the file was removed during the run. It also
+    /// succeeds on a failed disk or a read-only file system, until the data is synced.
+    fn verified(&mut self, path: Option<PathBuf>) -> Option<PathBuf> {
         let path = path?;
         if !path.exists() {
-            self.give_up(format!("{} was removed during the run", path.display()));
+            self.report_failure(format!("{} was removed during the run", printable_path(&path)));
             return None;
         }
         if let Err(error) = File::open(&path).and_then(|file| file.sync_data()) {
-            self.give_up(format!(
-                "{} may not be whole: cannot bring it to the disk: {error}",
-                path.display()
+            self.report_failure(format!(
+                "{} may be incomplete: cannot write it to the disk: {error}",
+                printable_path(&path)
             ));
         }
         Some(path)
     }
 
-    fn give_up(&mut self, message: String) {
+    fn report_failure(&mut self, message: String) {
         self.not_written.push(message.clone());
-        if self.listener.tell(&Notice::NotWritten(message)).is_err()
-            && let Some(fault) = self.listener.fault()
+        if self.listener.notify(&Notice::NotWritten(message)).is_err()
+            && let Some(incident) = self.listener.incident()
         {
-            self.fault(&fault);
+            self.incident(&incident);
         }
     }
 }

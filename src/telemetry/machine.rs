@@ -1,8 +1,9 @@
-//! What people call the parts of the machine that records and events know by number.
+//! Names and units of the parts of the machine. Records and events have only their numbers.
 
 use std::f64::consts::TAU;
 
 use serde::Serialize;
+use takt_rt::ControlLaw;
 
 use crate::config::{Axis, Config, Interface, Travel};
 
@@ -24,17 +25,19 @@ pub struct Machine {
 pub struct AxisDescription {
     /// Its name in the configuration.
     pub name: String,
-    /// The name of the bus it is on; `None` where a recording of an earlier version does not say it.
+    /// The name of its bus; `None` in a recording of an earlier version without this name.
     pub bus: Option<String>,
-    /// Whether it turns or slides.
+    /// The unit of its position.
     pub unit: Unit,
+    /// Whether its drive plans its own profile to a target (a profile mode), instead of following set-points.
+    pub plans_own_profile: bool,
     /// Counts per rad (m) of the position that the drive reports.
     pub counts_per_unit: f64,
-    /// What its set-points may reach.
+    /// The limits of its set-points.
     pub limits: SetPointMagnitudes,
 }
 
-/// How large the derivatives of a set-point are, or may be, in rad (m) and seconds.
+/// Magnitudes, or limits, of the derivatives of a set-point, in rad (m) and seconds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct SetPointMagnitudes {
     /// rad/s (m/s)
@@ -50,7 +53,7 @@ pub struct SetPointMagnitudes {
 pub struct BusDescription {
     /// Its name in the configuration.
     pub name: String,
-    /// What it is connected to: `sim`, or the name of a network interface.
+    /// `sim`, or the name of its network interface.
     pub interface: String,
 }
 
@@ -99,14 +102,19 @@ impl Machine {
         }
     }
 
-    /// The name of an axis; its number when it has none.
+    /// The name of an axis; its number if it is unknown.
     pub fn axis_name(&self, axis: u8) -> String {
         self.axes.get(usize::from(axis)).map_or_else(|| format!("axis {axis}"), |axis| axis.name.clone())
     }
 
-    /// The name of a bus; its number when it has none.
+    /// The name of a bus; its number if it is unknown.
     pub fn bus_name(&self, bus: u8) -> String {
         self.buses.get(usize::from(bus)).map_or_else(|| format!("bus {bus}"), |bus| bus.name.clone())
+    }
+
+    /// Whether the drive of an axis plans its own profile, instead of following set-points.
+    pub fn plans_own_profile(&self, axis: u8) -> bool {
+        self.axes.get(usize::from(axis)).is_some_and(|axis| axis.plans_own_profile)
     }
 
     /// The unit of an axis.
@@ -126,6 +134,10 @@ impl AxisDescription {
             name: axis.name.clone(),
             bus: config.buses.get(axis.bus).map(|bus| bus.name.clone()),
             unit,
+            plans_own_profile: matches!(
+                axis.control,
+                ControlLaw::ProfilePosition | ControlLaw::ProfileVelocity | ControlLaw::ProfileTorque
+            ),
             counts_per_unit: axis.counts_per_turn * axis.gear_ratio / travel_per_turn,
             limits: SetPointMagnitudes {
                 velocity: axis.limits.velocity,

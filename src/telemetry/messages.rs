@@ -1,5 +1,5 @@
-//! What stands in a recording: ROS 2 messages, as text for the schemas and as CDR for the data. Foxglove,
-//! PlotJuggler and the ROS 2 tools read them without knowing takt.
+//! The messages of a recording: ROS 2 definitions as schemas, and CDR as the encoding. Foxglove, PlotJuggler and the ROS 2
+//! tools can read them.
 
 mod decode;
 
@@ -14,12 +14,12 @@ pub use decode::{decode_axis, decode_bus, decode_cycle, decode_event};
 pub struct MessageType {
     pub name: &'static str,
     pub definition: &'static str,
-    /// How many of the fields at the end the recordings of each earlier version do not have.
+    /// The numbers of last fields that are missing in recordings of earlier versions.
     pub later_fields: &'static [usize],
 }
 
 impl MessageType {
-    /// Whether messages of another definition of this type can be read.
+    /// Whether messages with another definition of this type can be read.
     pub fn can_be_read_as(&self, definition: &str) -> bool {
         let (known, other) = (layout(self.definition), layout(definition));
         let is_earlier = self.later_fields.iter().any(|later| known.len() == other.len() + later);
@@ -62,10 +62,10 @@ pub const BUS: MessageType = MessageType {
     later_fields: &[],
 };
 
-/// The messages that are read again.
+/// The messages that the reader of recordings knows.
 pub const READ: [&MessageType; 4] = [&CYCLE, &AXIS, &EVENT, &BUS];
 
-/// What of a definition settles where the fields are: everything but comments and constants.
+/// The lines of a definition that determine the layout: all but comments and constants.
 fn layout(definition: &str) -> Vec<&str> {
     // Recordings of earlier versions have another name for the field `reason`.
     let renamed = |line| if line == "uint8 objection" { "uint8 reason" } else { line };
@@ -131,9 +131,9 @@ struct EventFields {
     error_code: u16,
     error_register: u8,
     manufacturer: [u8; 5],
-    /// What was asked for and what stands against it, by their numbers; `None` in a recording of an earlier version.
+    /// The numbers of the request and the reason; `None` in a recording of an earlier version.
     refusal: Option<(u8, u8)>,
-    /// `None` in a recording of an earlier version too.
+    /// The bus; also `None` in a recording of an earlier version.
     bus: Option<u8>,
 }
 

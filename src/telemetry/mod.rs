@@ -1,43 +1,42 @@
-//! What becomes visible of a run: statistics, recordings, the report, and everything said in words.
+//! What a run makes visible: statistics, recordings, reports, and texts about events.
 //!
-//! The real-time thread leaves a record of every cycle and an event for whatever happens in lock-free rings
-//! ([`crate::controller::channels`]). A [`Logger`] empties them: as a thread of its own that is not real-time
-//! ([`LoggerThread`]), or step by step in virtual time. Nothing that goes wrong here ever reaches the motion: a full
-//! ring drops and counts, a full disk ends the recording with one message, a caller's function that panics is not called
-//! again.
+//! The real-time thread puts a record of every cycle, and an event for each change, into lock-free rings
+//! ([`crate::controller::channels`]). A [`Logger`] empties them, in a thread of its own that is not real-time
+//! ([`LoggerThread`]), or step by step in virtual time. A failure in this module never reaches the motion. A full ring
+//! drops records and counts them. A full disk ends the recording with one message. A caller's function that panics is not
+//! called again.
 //!
-//! The last seconds are also kept in memory, frames included, and written to a file of their own at every [`Fault`]:
-//! the black box ([`BlackBoxOptions`]). [`Recorded`] reads such files and recordings again, and [`RecordingReport`] says
-//! what they tell.
+//! The black box ([`BlackBoxOptions`]) keeps the last seconds in memory, frames included. It writes them to a file of
+//! their own at every [`Incident`]. [`Recorded`] reads such files and recordings, and [`RecordingReport`] summarises them.
 
 mod black_box;
 mod candump;
 mod cdr;
 mod destination;
+mod history;
 mod listener;
 mod logger;
 mod machine;
 mod messages;
-mod past;
-pub(crate) mod picture;
 mod realtime;
 mod recorded;
 mod recording;
 mod recording_report;
+pub(crate) mod render;
 mod report;
 mod statistics;
 mod thread;
 mod wall_clock;
 pub mod words;
 
-pub use black_box::{BlackBoxOptions, Fault};
-pub use destination::Destination;
+pub use black_box::{BlackBoxOptions, Incident};
+pub use destination::RecordingDestination;
 pub use listener::{Notify, panic_message};
 pub use logger::{BlackBoxes, LogSummary, Logger, LoggerOptions, Notice};
 pub use machine::{AxisDescription, BusDescription, Machine, SetPointMagnitudes, Unit};
-pub use picture::Emphasis;
-pub use recorded::{Cause, Recorded, RecordedError, RecordedEvent, WalkError};
+pub use recorded::{Cause, Recorded, RecordedCycle, RecordedError, RecordedEvent, WalkError};
 pub use recording_report::{AxisCycle, AxisCycles, AxisSummary, BusChange, RecordingReport, ReportedEvent};
+pub use render::Emphasis;
 pub use report::{
     AxisReport, BusReport, LatencyReport, RealtimeReport, RunEnd, RunOutcome, RunReport, SetPointParts,
     StopReport, TelemetryReport,

@@ -1,4 +1,4 @@
-//! What the operating system granted the real-time thread, in words, and the commands that grant the rest.
+//! The report of the real-time set-up: what the operating system granted, and the commands that grant the rest.
 
 use std::env;
 
@@ -8,7 +8,7 @@ use takt_rt::linux::{Outcome, Policy, Step, StepResult, ThreadReport};
 use super::report::RealtimeReport;
 
 impl RealtimeReport {
-    /// Puts the set-up of the thread in words. `page_faults` are those of the loop.
+    /// Makes the report. `page_faults` are those of the loop.
     pub fn new(report: &ThreadReport, spin_guard_ns: u64, page_faults: u64) -> Self {
         let is_fifo = report.scheduling.policy == Policy::Fifo;
         Self {
@@ -40,10 +40,10 @@ fn policy_name(policy: Policy) -> &'static str {
 fn refusal(result: StepResult) -> String {
     let what = match result.step {
         Step::TimerSlack => "timers without slack",
-        Step::CpuAffinity => "staying on one CPU",
+        Step::CpuAffinity => "CPU affinity",
         Step::LockMemory => "locked memory",
-        Step::PrefaultStack => "a stack touched in advance",
-        Step::DmaLatency => "keeping the CPU out of deep idle states (/dev/cpu_dma_latency)",
+        Step::PrefaultStack => "prefaulted stack",
+        Step::DmaLatency => "no deep idle states of the CPU (/dev/cpu_dma_latency)",
         Step::Fifo => "SCHED_FIFO scheduling",
     };
     match result.outcome {
@@ -52,7 +52,7 @@ fn refusal(result: StepResult) -> String {
     }
 }
 
-/// The exact commands, for this executable.
+/// The commands that grant the refused steps to this executable.
 fn commands(report: &ThreadReport) -> Vec<String> {
     let is_refused = |step| matches!(report.outcome(step), Outcome::Refused { .. });
     let mut commands = Vec::new();

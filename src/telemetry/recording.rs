@@ -1,6 +1,6 @@
-//! The MCAP recording: `/cycle` with the times, `/axis/<name>` for each axis, `/events`, and where the buses are recorded
-//! too, `/bus/<name>` with their health and `/frames/<name>`. Every message has the start of its slot, or the time of
-//! what it tells, as time of day, for its time.
+//! The MCAP recording: `/cycle` with the times, `/axis/<name>` for each axis, and `/events`. A black box also has
+//! `/bus/<name>` with the health of each bus, and `/frames/<name>`. The time of a message is a time of day: that of its
+//! event or frame, or the start of its slot.
 
 use std::collections::BTreeMap;
 use std::io::{BufWriter, Write};
@@ -12,22 +12,22 @@ use takt_rt::{CycleRecord, Event, Phase};
 
 use super::cdr::CdrEncoder;
 use super::destination::Opened;
+use super::history::OnBus;
 use super::machine::Machine;
 use super::messages::{self, MessageType};
-use super::past::OnBus;
 use super::wall_clock::WallClock;
 use crate::bus::trace::{TracedFrame, TracedHealth};
 
-/// Chunks of this size reach the file in one go: a third of a second of six axes at 1 ms, which is what a crash of
-/// the whole machine costs.
+/// A chunk is written to the file as a whole. It holds a third of a second of six axes at 1 ms. A crash of the computer
+/// loses at most that.
 const CHUNK_BYTES: u64 = 256 * 1024;
 
-/// The name of the metadata record that says what the machine is.
+/// The name of the metadata record that describes the machine.
 pub const METADATA: &str = "takt";
 
 /// A recording that is being written.
 pub struct Recording {
-    /// What to call it in messages.
+    /// Its name in messages.
     pub label: String,
     writer: mcap::Writer<NoSeek<BufWriter<Box<dyn Write + Send>>>>,
     encoder: CdrEncoder,
@@ -46,7 +46,7 @@ struct BusChannels {
 }
 
 impl Recording {
-    /// Writes the beginning: schemas, channels, and what the machine is.
+    /// Writes the beginning: schemas, channels, and the description of the machine.
     pub fn begin(opened: Opened, machine: &Machine, wall_clock: WallClock) -> McapResult<Self> {
         let mut writer = WriteOptions::new()
             .profile("ros2")
@@ -71,6 +71,7 @@ impl Recording {
                 ("index".to_owned(), index.to_string()),
                 ("name".to_owned(), description.name.clone()),
                 ("unit".to_owned(), description.unit.symbol().to_owned()),
+                ("plans_own_profile".to_owned(), description.plans_own_profile.to_string()),
                 ("counts_per_unit".to_owned(), description.counts_per_unit.to_string()),
                 ("velocity_limit".to_owned(), description.limits.velocity.to_string()),
                 ("acceleration_limit".to_owned(), description.limits.acceleration.to_string()),
@@ -79,7 +80,7 @@ impl Recording {
             metadata.extend(description.bus.clone().map(|bus| ("bus".to_owned(), bus)));
             axis_channels.push(channel(axis, &format!("/axis/{}", description.name), &metadata)?);
         }
-        // An empty recording shows at once whether it can be written, and can be opened while it grows.
+        // A file that cannot be written fails here already, and the file can be opened while it grows.
         writer.flush()?;
         Ok(Self {
             label: opened.label,
@@ -127,14 +128,14 @@ impl Recording {
         self.write(channels.frames, 0, what.at_ns)
     }
 
-    /// Writes how a bus is, if it is recorded.
+    /// Writes the health of a bus, if the bus is recorded.
     pub fn health(&mut self, OnBus { bus, what }: &OnBus<TracedHealth>) -> McapResult<()> {
         let Some(channels) = self.bus_channels.get(*bus) else { return Ok(()) };
         messages::encode_bus(what, &mut self.encoder);
         self.write(channels.health, 0, what.at_ns)
     }
 
-    /// Lets everything that was written reach the file.
+    /// Writes everything to the file that is still in memory.
     pub fn flush(&mut self) -> McapResult<()> {
         self.writer.flush()
     }
@@ -149,13 +150,13 @@ impl Recording {
             messages::encode_axis(slot, axis, &mut self.encoder);
             self.write(channel, slot, start_ns)?;
         }
-        // What led to a stop is what somebody will look for, whatever happens next.
+        // The cycles before a stop show its cause: they are in the file from now on.
         let begins_to_stop = record.phase == Phase::Stopping && self.last_phase != Phase::Stopping;
         self.last_phase = record.phase;
         if begins_to_stop { self.writer.flush() } else { Ok(()) }
     }
 
-    /// Writes an event, which is also said in words.
+    /// Writes an event and its text.
     pub fn event(&mut self, event: &Event, text: &str) -> McapResult<()> {
         messages::encode_event(event, text, &mut self.encoder);
         self.write(self.event_channel, event.slot, event.at_ns)

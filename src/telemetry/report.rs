@@ -1,4 +1,4 @@
-//! The report of a run as data: what `takt run --json` prints.
+//! The report of a run as data, as `takt run --json` prints it.
 
 use std::fs;
 use std::path::PathBuf;
@@ -34,21 +34,21 @@ pub struct RunReport {
     pub machine: String,
     /// How the run ended.
     pub ended: RunEnd,
-    /// From the first cycle to the end of the last one.
+    /// Time from the start of the first cycle to the end of the last one.
     pub duration_s: f64,
     /// Period of the cycle.
     pub cycle_ns: u64,
-    /// Cycles that ran.
+    /// The number of cycles.
     pub cycles: u64,
     /// Slots that passed unused because the thread was late.
     pub missed_slots: u64,
-    /// How late the timer woke the thread.
+    /// Wake-up latency: how late the timer woke the thread.
     pub wake_ns: LatencyReport,
     /// SYNC release error: how late SYNC was handed over, against the grid.
     pub sync_ns: LatencyReport,
-    /// From feedback to set-points, without I/O.
+    /// Computing time from feedback to set-points, without I/O.
     pub compute_ns: LatencyReport,
-    /// When the last set-point had been handed over, after the start of the slot.
+    /// Time from the start of the slot until the last set-point was handed over.
     pub sent_ns: LatencyReport,
     /// What the operating system granted.
     pub realtime: RealtimeReport,
@@ -56,9 +56,9 @@ pub struct RunReport {
     pub axes: Vec<AxisReport>,
     /// The buses in the order of the configuration.
     pub buses: Vec<BusReport>,
-    /// What was written down.
+    /// What was recorded.
     pub telemetry: TelemetryReport,
-    /// Why the group stopped before the end of its program; `None` when it did not, or had not been enabled.
+    /// Why the run ended before its program; `None` if the program finished.
     pub stop: Option<StopReport>,
 }
 
@@ -75,8 +75,8 @@ pub struct LatencyReport {
     pub max: u64,
     /// Minimum.
     pub min: u64,
-    /// How many cycles lay in each range: six ranges a decade from 100 ns to 100 ms. The first holds everything
-    /// below it too, the last everything above.
+    /// The number of cycles in each range. There are six ranges in each decade from 100 ns to 100 ms. The first range also
+    /// counts all shorter times, the last one all longer times.
     pub histogram: Vec<u64>,
 }
 
@@ -93,13 +93,13 @@ pub struct RealtimeReport {
     pub memory_locked: bool,
     /// Whether the kernel is PREEMPT_RT.
     pub preempt_rt: bool,
-    /// How long before a deadline the thread stopped sleeping and spun.
+    /// The time before a deadline during which the thread spun instead of sleeping.
     pub spin_guard_ns: u64,
     /// Page faults of the real-time thread, minor and major, from its first cycle to its last.
     pub page_faults: u64,
-    /// Each step that was refused, with the reason.
+    /// Each refused step, with the reason.
     pub refused: Vec<String>,
-    /// Commands that grant what was refused.
+    /// The commands that grant the refused steps.
     pub grant_with: Vec<String>,
 }
 
@@ -112,25 +112,26 @@ pub struct AxisReport {
     pub unit: &'static str,
     /// The largest following error while the axis was enabled; `None` when it never was.
     pub following_error_max: Option<f64>,
-    /// When that was, after the first cycle.
+    /// The time of that error, after the first cycle.
     pub following_error_at_s: Option<f64>,
-    /// The velocity asked for then, per second.
+    /// The velocity set-point at that time, per second.
     pub following_error_velocity: Option<f64>,
     /// The largest velocity, acceleration and jerk of its set-points.
     pub set_point_max: SetPointMagnitudes,
-    /// What they may be; the jerk is `null` where it is not limited.
+    /// Their limits; the jerk is `null` if it is not limited.
     pub limits: SetPointMagnitudes,
-    /// The one as a part of the other: 1 is a limit that was reached; the jerk is `null` where it is not limited.
+    /// The largest values as fractions of their limits: 1 means that a limit was reached. The jerk is `null` if it is not
+    /// limited.
     pub set_point_part: SetPointParts,
-    /// The last position under power.
+    /// The last position while enabled.
     pub final_position: f64,
-    /// Where it was to be.
+    /// The target of the last move.
     pub target_position: f64,
     /// The difference between the two in counts of the encoder.
     pub final_error_counts: f64,
 }
 
-/// The largest derivatives of an axis' set-points as parts of their limits.
+/// The largest derivatives of an axis' set-points as fractions of their limits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct SetPointParts {
     /// Of the velocity limit.
@@ -159,7 +160,7 @@ pub struct BusReport {
     pub name: String,
     /// `sim`, or the name of a network interface.
     pub interface: String,
-    /// The part of the time during which the wire was occupied.
+    /// The fraction of the time in which the wire was occupied, in percent.
     pub load_percent: f64,
     /// Frames sent and seen on the wire.
     pub tx_frames: u64,
@@ -171,11 +172,11 @@ pub struct BusReport {
     pub rx_overruns: u64,
     /// Error frames and bus errors.
     pub errors: u64,
-    /// The fault confinement state at the end, in words.
+    /// The fault confinement state at the end.
     pub state: &'static str,
 }
 
-/// What was written down.
+/// What was recorded.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct TelemetryReport {
     /// Cycle records that reached the logger.
@@ -190,11 +191,11 @@ pub struct TelemetryReport {
     pub recording_bytes: Option<u64>,
     /// The candump log.
     pub candump: Option<PathBuf>,
-    /// What the black box has written, a file a fault, the oldest first.
+    /// The files of the black box, one for each incident, the oldest first.
     pub black_boxes: Vec<PathBuf>,
-    /// Files of the black box that had to make room for later ones.
+    /// How many files of the black box were removed for later ones.
     pub black_boxes_replaced: u64,
-    /// What was not written, or not to its end, and why.
+    /// The files that were not written, or not to their end, and why.
     pub not_written: Vec<String>,
 }
 
@@ -203,25 +204,25 @@ pub struct TelemetryReport {
 pub struct StopReport {
     /// IEC 60204-1: 0, 1 or 2.
     pub category: u8,
-    /// In words.
+    /// The reason as a sentence.
     pub reason: String,
-    /// The rule by its key: `following_error` …
+    /// The key of the rule: `following_error` …
     pub rule: &'static str,
     /// The axis concerned.
     pub axis: Option<String>,
     /// The bus concerned.
     pub bus: Option<String>,
-    /// What was seen, in the unit of the rule.
+    /// The value that was seen, in the unit of the rule.
     pub value: f64,
-    /// What would have been allowed.
+    /// The value that is allowed.
     pub limit: f64,
     /// The slot in which it was seen.
     pub slot: u64,
-    /// What the group was doing.
+    /// The phase of the group.
     pub phase: &'static str,
 }
 
-/// What the report needs beside the logger's summary.
+/// The data of a report that the logger does not have.
 #[derive(Clone, Debug)]
 pub struct RunOutcome {
     /// How the run ended.
@@ -230,7 +231,7 @@ pub struct RunOutcome {
     pub realtime: RealtimeReport,
     /// The state after the last cycle, with the counters of the buses.
     pub last: Snapshot,
-    /// How long the buses were open, for their load.
+    /// The time for which the buses were open. The bus load refers to it.
     pub buses_open_ns: Nanoseconds,
     /// The targets of the program's last move, in rad (m); `None` takes the last set-points.
     pub targets: Option<Vec<f64>>,
@@ -242,11 +243,11 @@ pub struct RunOutcome {
 pub(super) const RANGES_PER_DECADE: usize = 6;
 /// Decades of [`LatencyReport::histogram`].
 pub(super) const DECADES: usize = 6;
-/// Where [`LatencyReport::histogram`] begins.
+/// The lower bound of [`LatencyReport::histogram`].
 const SHORTEST_NS: f64 = 100.0;
 
 impl RunReport {
-    /// Puts the report together.
+    /// Makes the report.
     pub fn new(log: &LogSummary, outcome: &RunOutcome) -> Self {
         let (machine, statistics, last) = (&log.machine, &log.statistics, &outcome.last);
         let covered_ns = statistics.last_ns.saturating_sub(statistics.first_ns) + machine.cycle_ns;
@@ -261,7 +262,7 @@ impl RunReport {
             duration_s: if statistics.cycles == 0 { 0.0 } else { seconds(covered_ns) },
             cycle_ns: machine.cycle_ns,
             cycles: statistics.cycles + log.records_dropped,
-            // A record that was dropped took its missed slots with it; the snapshot has counted them.
+            // The missed slots of a dropped record are counted by the snapshot only.
             missed_slots: statistics.missed_slots.max(last.missed_slots),
             wake_ns: LatencyReport::new(&statistics.wake),
             sync_ns: LatencyReport::new(&statistics.sync),
@@ -281,7 +282,7 @@ fn seconds(ns: Nanoseconds) -> f64 {
 }
 
 impl LatencyReport {
-    /// Puts a distribution in numbers.
+    /// The numbers of a distribution.
     pub fn new(latency: &Latency) -> Self {
         let bound = |index: usize| {
             let decades = index as f64 / RANGES_PER_DECADE as f64;
@@ -327,7 +328,7 @@ impl AxisReport {
 }
 
 impl BusReport {
-    /// A fault confinement state in words.
+    /// The name of a fault confinement state.
     pub(super) const fn state_words(state: BusState) -> &'static str {
         match state {
             BusState::ErrorActive => "error active",

@@ -1,11 +1,11 @@
-//! What is reckoned from the cycle records while they pass.
+//! Statistics of the cycle records.
 
 use hdrhistogram::Histogram;
 use takt_rt::{AxisRecord, CycleRecord, Nanoseconds, Phase};
 
 use super::machine::SetPointMagnitudes;
 
-/// Times are told apart to three digits, up to a minute; a longer one counts as a minute, except in the maximum.
+/// Times are resolved to three digits, up to a minute. A longer time counts as a minute, except in the maximum.
 const LONGEST_NS: u64 = 60_000_000_000;
 
 /// The distribution of a time.
@@ -19,7 +19,7 @@ pub struct Latency {
 
 impl Default for Latency {
     fn default() -> Self {
-        // The bounds are constants that the histogram accepts; without it there would be no quantiles.
+        // The histogram accepts these constant bounds. If it did not, there would be no quantiles.
         let histogram = Histogram::new_with_bounds(1, LONGEST_NS, 3).ok();
         Self { histogram, count: 0, min_ns: u64::MAX, max_ns: 0 }
     }
@@ -36,7 +36,7 @@ impl Latency {
         self.max_ns = self.max_ns.max(ns);
     }
 
-    /// How many times were added.
+    /// The number of times that were added.
     pub fn count(&self) -> u64 {
         self.count
     }
@@ -57,13 +57,8 @@ impl Latency {
         value.clamp(self.min_ns(), self.max_ns)
     }
 
-    /// The mean, to three digits.
-    pub fn mean_ns(&self) -> f64 {
-        self.histogram.as_ref().map_or(0.0, Histogram::mean)
-    }
-
-    /// How many lay in each of the ranges between neighbouring `bounds_ns` (ascending; a bound belongs to the range
-    /// above it). What lies outside is counted in the first and the last.
+    /// The counts in the ranges between neighbouring `bounds_ns`. The bounds ascend, and a bound belongs to the range above
+    /// it. Times outside all ranges count in the first and the last range.
     pub fn counts(&self, bounds_ns: &[u64]) -> Vec<u64> {
         let mut counts = vec![0; bounds_ns.len().saturating_sub(1)];
         for step in self.histogram.iter().flat_map(Histogram::iter_recorded) {
@@ -77,18 +72,18 @@ impl Latency {
     }
 }
 
-/// The largest following error of an axis, and the circumstances, which usually explain it.
+/// The largest following error of an axis, and the state of the axis at that moment.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FollowingErrorMaximum {
     /// rad (m), without sign.
     pub error: f64,
     /// Start of the cycle in which it was seen.
     pub at_ns: Nanoseconds,
-    /// What the group was doing then.
+    /// The phase of the group then.
     pub phase: Phase,
-    /// The velocity asked for then, in rad/s (m/s).
+    /// The velocity set-point then, in rad/s (m/s).
     pub velocity_set: f64,
-    /// The acceleration asked for then, in rad/s² (m/s²).
+    /// The acceleration set-point then, in rad/s² (m/s²).
     pub acceleration_set: f64,
 }
 
@@ -99,7 +94,7 @@ pub struct AxisStatistics {
     pub following_error_max: Option<FollowingErrorMaximum>,
     /// The largest magnitudes of the set-points that were sent while the axis was enabled.
     pub set_point_max: SetPointMagnitudes,
-    /// The last set-point while enabled, in rad (m); without ever being enabled, the last one of all.
+    /// The last set-point while enabled, in rad (m). If the axis was never enabled, the last one of the run.
     pub position_set: f64,
     /// The position reported together with it.
     pub position: f64,
@@ -139,7 +134,7 @@ impl AxisStatistics {
     }
 }
 
-/// Whether the drives follow set-points in this phase, on purpose and all of them.
+/// Whether all drives are meant to follow set-points in this phase.
 const fn is_enabled(phase: Phase) -> bool {
     matches!(phase, Phase::Holding | Phase::Moving | Phase::Streaming | Phase::Stopping)
 }
@@ -221,14 +216,14 @@ mod tests {
     }
 
     #[test]
-    fn nothing_measured_is_all_zero() {
+    fn without_any_time_every_number_is_zero() {
         let latency = Latency::default();
         assert_eq!((latency.min_ns(), latency.max_ns(), latency.quantile_ns(0.99)), (0, 0, 0));
         assert_eq!(latency.counts(&[1, 10, 100]), [0, 0]);
     }
 
     #[test]
-    fn a_stall_longer_than_the_histogram_is_kept_in_the_maximum() {
+    fn the_maximum_keeps_a_time_that_is_longer_than_the_histogram() {
         let mut latency = Latency::default();
         latency.add(3 * LONGEST_NS);
         assert_eq!(latency.max_ns(), 3 * LONGEST_NS);
@@ -242,7 +237,7 @@ mod tests {
     }
 
     #[test]
-    fn following_error_counts_while_enabled_only_and_tells_where_it_was() {
+    fn the_largest_following_error_is_that_of_an_enabled_axis_with_its_circumstances() {
         let mut statistics = Statistics::new(1);
         let axis = |following_error, velocity_set| AxisRecord {
             following_error,

@@ -11,21 +11,21 @@ use std::time::Duration;
 use nix::sys::signal::{SigSet, Signal};
 use takt_rt::linux::set_nice;
 
-use super::black_box::Fault;
+use super::black_box::Incident;
 use super::logger::{LogSummary, Logger};
-use crate::controller::quiet;
+use crate::controller::sleep_alignment;
 
-/// A pause between two looks at the rings; at 1 ms, five records.
+/// The pause between two drains of the rings: five records at a cycle of 1 ms.
 const PAUSE: Duration = Duration::from_millis(5);
 
-/// Ahead of ordinary work, which on a busy CPU would let the ring run full; far behind everything that is real-time.
+/// Before ordinary threads, which would let the ring fill up on a busy CPU, and behind all real-time threads.
 const NICE: i8 = -15;
 
-/// A logger in a thread of its own. Start it before the real-time thread is elevated, so that it inherits neither
-/// the priority nor the CPU.
+/// A logger in a thread of its own. Start it before the calling thread becomes real-time: otherwise it inherits the
+/// priority and the CPU.
 pub struct LoggerThread {
     is_over: Arc<AtomicBool>,
-    faults: Sender<Fault>,
+    incidents: Sender<Incident>,
     panic: Arc<OnceLock<String>>,
     thread: JoinHandle<LogSummary>,
 }
@@ -34,41 +34,41 @@ impl LoggerThread {
     /// Starts the thread.
     ///
     /// # Errors
-    /// The operating system's, when it gives no thread.
+    /// The operating system gives no thread.
     pub fn start(mut logger: Logger) -> io::Result<Self> {
         let is_over = Arc::new(AtomicBool::new(false));
-        let told = Arc::clone(&is_over);
+        let end = Arc::clone(&is_over);
         let period_ns = logger.period_ns();
         let panic = logger.panic();
-        let (faults, told_faults) = mpsc::channel::<Fault>();
+        let (incidents, reported) = mpsc::channel::<Incident>();
         let thread = thread::Builder::new().name("takt-logger".to_owned()).spawn(move || {
             survive_size_limits();
-            // Where there is no right to it, the ring alone bridges the time in which others have the CPU.
+            // Without the permission, the ring alone bridges the time in which other threads have the CPU.
             let _ = set_nice(NICE);
-            while !told.load(Ordering::Acquire) {
+            while !end.load(Ordering::Acquire) {
                 logger.drain();
-                told_faults.try_iter().for_each(|fault| logger.fault(&fault));
-                thread::park_timeout(quiet::pause(PAUSE, period_ns));
+                reported.try_iter().for_each(|incident| logger.incident(&incident));
+                thread::park_timeout(sleep_alignment::pause(PAUSE, period_ns));
             }
             logger.drain();
-            told_faults.try_iter().for_each(|fault| logger.fault(&fault));
+            reported.try_iter().for_each(|incident| logger.incident(&incident));
             logger.finish()
         })?;
-        Ok(Self { is_over, faults, panic, thread })
+        Ok(Self { is_over, incidents, panic, thread })
     }
 
-    /// Has the black box written because of something that the records do not show.
-    pub fn fault(&self, fault: Fault) {
-        // A logger that is gone has said why itself.
-        let _ = self.faults.send(fault);
+    /// Makes the black box write a file for an incident that the records do not show.
+    pub fn incident(&self, incident: Incident) {
+        // A logger that has ended by itself has already reported why.
+        let _ = self.incidents.send(incident);
     }
 
-    /// What `notify` said when it panicked, if it has.
+    /// The message of the panic of `notify`, if it has panicked.
     pub fn panic(&self) -> Option<&str> {
         self.panic.get().map(String::as_str)
     }
 
-    /// Lets the thread work off what waits and close its files. Call it when nothing more will be handed over.
+    /// Lets the thread drain the rings and close its files. Call it when nothing more will be put into the rings.
     pub fn finish(self) -> LogSummary {
         self.is_over.store(true, Ordering::Release);
         self.thread.thread().unpark();
@@ -76,11 +76,11 @@ impl LoggerThread {
     }
 }
 
-/// A file that grows beyond what the process may write (`RLIMIT_FSIZE`) is a full disk, not a reason to die in motion:
-/// the kernel's signal for it, which comes to the thread that writes, is not taken, and the call fails instead.
+/// Blocks SIGXFSZ, which would end the process in motion when a file reaches `RLIMIT_FSIZE`. The kernel sends the signal to
+/// the thread that writes. With the signal blocked, the write fails, as on a full disk.
 fn survive_size_limits() {
     let mut signals = SigSet::empty();
     signals.add(Signal::SIGXFSZ);
-    // It can only fail for a signal that does not exist.
+    // This call fails only for a signal that does not exist.
     let _ = signals.thread_block();
 }

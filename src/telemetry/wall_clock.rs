@@ -1,4 +1,4 @@
-//! From the monotonic clock, on which everything runs, to the time of day, which people and files use.
+//! Converts the monotonic clock of a run to the time of day of files and reports.
 
 use std::time::{SystemTime, UNIX_EPOCH};
 
@@ -6,8 +6,8 @@ use takt_rt::{NANOSECONDS_PER_SECOND, Nanoseconds};
 
 const DAYS_PER_400_YEARS: u64 = 146_097;
 
-/// What the time of day was at zero of the monotonic clock. It is taken once, so recorded times stay monotonic when
-/// the system's clock is set during a run.
+/// The time of day at zero of the monotonic clock. It is read once, so recorded times stay monotonic when the system's clock
+/// is set during a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct WallClock {
     unix_at_zero_ns: u64,
@@ -55,7 +55,7 @@ fn civil_date(days_since_1970: u64) -> (u64, u64, u64) {
     // 719 468 days lie between 0000-03-01 and 1970-01-01.
     let days = days_since_1970 + 719_468;
     let (era, day_of_era) = (days / DAYS_PER_400_YEARS, days % DAYS_PER_400_YEARS);
-    // Take out the leap days of 4 years, of 100 years (none) and of 400 years to get whole years of 365 days.
+    // Without the leap days of 4, 100 (none) and 400 years, every year has 365 days.
     let year_of_era =
         (day_of_era - day_of_era / 1460 + day_of_era / 36_524 - day_of_era / (DAYS_PER_400_YEARS - 1)) / 365;
     let day_of_year = day_of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);

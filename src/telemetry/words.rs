@@ -1,4 +1,4 @@
-//! Stops, phases and events in words, with the names of the axes and the units of the values.
+//! The texts of stops, phases, events and rejections, with the names of the axes and the units of the values.
 
 use takt_rt::{DriveState, Event, EventKind, OperationMode, Phase, Rule, StopCategory, TimingLevel};
 
@@ -10,7 +10,7 @@ mod stop;
 pub use rejection::{rejection, request};
 pub use stop::{stop, stop_cause};
 
-/// What the group was doing, as a verb: "moving".
+/// The name of a phase: "moving".
 pub const fn phase(phase: Phase) -> &'static str {
     match phase {
         Phase::Passive => "passive",
@@ -24,12 +24,12 @@ pub const fn phase(phase: Phase) -> &'static str {
     }
 }
 
-/// A rule by its key in reports: `following_error`.
+/// The key of a rule in reports: `following_error`.
 pub const fn rule_key(rule: Rule) -> &'static str {
     rule.key()
 }
 
-/// What a category does (IEC 60204-1, 9.2.2).
+/// The text of a stop category (IEC 60204-1, 9.2.2).
 pub const fn category(category: StopCategory) -> &'static str {
     match category {
         StopCategory::Zero => "category 0: power removed at once",
@@ -38,7 +38,7 @@ pub const fn category(category: StopCategory) -> &'static str {
     }
 }
 
-/// A state of a drive (CiA 402).
+/// The name of a drive state (CiA 402).
 pub const fn state(state: DriveState) -> &'static str {
     match state {
         DriveState::NotReadyToSwitchOn => "not ready to switch on",
@@ -53,7 +53,7 @@ pub const fn state(state: DriveState) -> &'static str {
     }
 }
 
-/// A mode of operation by its number.
+/// The name of a mode of operation, with its number (object 6060).
 fn mode(number: f64) -> String {
     let name = match OperationMode::from_number(number as i8) {
         Some(OperationMode::ProfilePosition) => "profile position",
@@ -80,21 +80,21 @@ pub fn event(event: &Event, machine: &Machine) -> String {
             format!("{}: {} (statusword 0x{statusword:04X})", machine.axis_name(axis), state(to))
         }
         EventKind::Emergency { axis, code: 0, .. } => {
-            format!("{}: emergency message: all errors gone", machine.axis_name(axis))
+            format!("{}: emergency message: no error any more", machine.axis_name(axis))
         }
         EventKind::Emergency { axis, code, register, manufacturer: [a, b, c, d, e] } => format!(
             "{}: emergency message: error 0x{code:04X}, register 0x{register:02X}, \
              manufacturer {a:02X} {b:02X} {c:02X} {d:02X} {e:02X}",
             machine.axis_name(axis)
         ),
-        EventKind::Timing { level: TimingLevel::Normal } => "slots are hardly missed any more".to_owned(),
-        EventKind::Timing { level: TimingLevel::Warning } => "slots are missed often".to_owned(),
+        EventKind::Timing { level: TimingLevel::Normal } => "missed slots: normal again".to_owned(),
+        EventKind::Timing { level: TimingLevel::Warning } => "missed slots: many".to_owned(),
         EventKind::Timing { level: TimingLevel::Degraded } => {
-            "slots are missed so often that no stream is begun".to_owned()
+            "missed slots: too many to begin a stream".to_owned()
         }
-        EventKind::Timing { level: TimingLevel::Unfit } => "slots are missed too often to go on".to_owned(),
-        EventKind::MissedSlots { count: 1 } => "1 slot passed unused: the thread was late".to_owned(),
-        EventKind::MissedSlots { count } => format!("{count} slots passed unused: the thread was late"),
+        EventKind::Timing { level: TimingLevel::Unfit } => "missed slots: too many to go on".to_owned(),
+        EventKind::MissedSlots { count: 1 } => "1 slot was missed: the thread was late".to_owned(),
+        EventKind::MissedSlots { count } => format!("{count} slots were missed: the thread was late"),
         EventKind::Rejected(rejected) => rejection(&rejected, machine),
     }
 }
@@ -110,6 +110,7 @@ mod tests {
             name: name.to_owned(),
             bus: None,
             unit,
+            plans_own_profile: false,
             counts_per_unit: 1.0,
             limits: SetPointMagnitudes::default(),
         };
@@ -141,10 +142,7 @@ mod tests {
             }),
             "slide: emergency message: error 0x7305, register 0x21, manufacturer 01 02 03 04 FF"
         );
-        assert_eq!(
-            words(EventKind::MissedSlots { count: 30 }),
-            "30 slots passed unused: the thread was late"
-        );
+        assert_eq!(words(EventKind::MissedSlots { count: 30 }), "30 slots were missed: the thread was late");
         assert_eq!(
             words(EventKind::Rejected(RequestError {
                 request: RequestKind::Enable,

@@ -1,4 +1,4 @@
-//! A drive is configured by a DCF or concise DCF, before the controller has the last word.
+//! A drive is configured from a DCF or concise DCF before the controller writes its own values.
 
 use std::path::Path;
 
@@ -14,7 +14,8 @@ use takt_rt::{BusPort, ReceiveBatch};
 use super::scripted_drive::{ScriptedDrive, at};
 use super::world::{World, config};
 
-/// Profile deceleration of a homing that takt does not touch, a mapping that it overwrites, and a controlword.
+/// The profile deceleration, a homing object that takt does not write, a mapping that takt overwrites, and a
+/// controlword.
 const FILE: &str = "\
 [609A]\nParameterName=Homing acceleration\nDataType=7\nAccessType=rw\nParameterValue=1500\n\
 [1800sub1]\nParameterName=COB-ID\nDataType=7\nAccessType=rw\nParameterValue=$NODEID+0x180\n\
@@ -41,7 +42,7 @@ fn run(config: &Config, spoil: impl FnOnce(&mut ScriptedDrive)) -> (World, Resul
 }
 
 #[test]
-fn its_values_are_written_in_order_and_the_controllers_own_come_after_them() {
+fn the_values_of_the_file_are_written_before_those_of_the_controller() {
     let (mut world, outcome) = run(&configured(FILE), |_| {});
     outcome.unwrap();
     let drive = world.drive();
@@ -67,7 +68,7 @@ fn its_values_are_written_in_order_and_the_controllers_own_come_after_them() {
 }
 
 #[test]
-fn a_concise_dcf_is_written_as_it_stands() {
+fn a_concise_dcf_is_written_unchanged() {
     let list = [
         Download { object: at(0x2380, 1), data: vec![7, 0] },
         Download { object: at(0x609A, 0), data: vec![1, 0, 0, 0] },
@@ -85,9 +86,9 @@ fn a_concise_dcf_is_written_as_it_stands() {
 }
 
 #[test]
-fn a_value_that_is_acknowledged_and_forgotten_is_told() {
+fn a_value_that_is_acknowledged_but_not_kept_is_reported() {
     let (_, outcome) = run(&configured(FILE), |drive| {
-        drive.flaws.forgetful.insert(at(0x609A, 0));
+        drive.flaws.not_stored.insert(at(0x609A, 0));
     });
     let message = outcome.unwrap_err().to_string();
     for part in ["configuration file", "609A:00", "0x000005DC", "got 0x00000000", "`dcf`"] {
@@ -96,7 +97,7 @@ fn a_value_that_is_acknowledged_and_forgotten_is_told() {
 }
 
 #[test]
-fn a_value_that_is_refused_is_told() {
+fn a_value_that_is_refused_is_reported() {
     let (_, outcome) = run(&configured(FILE), |drive| {
         drive.flaws.refused.insert(at(0x609A, 0), AbortCode::ValueTooHigh);
     });
@@ -107,10 +108,10 @@ fn a_value_that_is_refused_is_told() {
 }
 
 #[test]
-fn the_simulated_erob_takes_its_own_data_sheet_as_a_configuration() {
+fn the_simulated_erob_accepts_its_own_eds_as_a_configuration() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/eds/erob-canopen.eds");
     let text = std::fs::read_to_string(path).unwrap();
-    // Every default configured, as the tools of makers export a DCF.
+    // Every default is configured, as in a DCF that a manufacturer's tool exports.
     let file: String = text
         .lines()
         .map(|line| match line.strip_prefix("DefaultValue=").filter(|value| !value.is_empty()) {

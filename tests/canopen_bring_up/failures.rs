@@ -1,16 +1,16 @@
-//! Each kind of failure, in the words that a person reads.
+//! The message of each kind of failure.
 
 use takt::canopen::emcy::{Emergency, ErrorCode, ErrorRegister};
 use takt::canopen::sdo::AbortCode;
 use takt::config::Control;
-use takt::drive::{Answered, BringUp, Cause, Leave};
+use takt::drive::{BringUp, FailureCause, ProbeResult, Shutdown};
 use takt_rt::DriveState;
 
 use super::scripted_drive::{ScriptedDrive, at};
 use super::started;
 use super::world::{World, config};
 
-/// What is said about a drive with these flaws.
+/// The message about a drive with these flaws.
 fn message(spoil: impl FnOnce(&mut ScriptedDrive)) -> String {
     let config = config(&[(0, 2)]);
     let mut world = World::of(&config);
@@ -19,58 +19,57 @@ fn message(spoil: impl FnOnce(&mut ScriptedDrive)) -> String {
 }
 
 #[test]
-fn a_drive_that_is_not_there() {
+fn the_drive_is_missing() {
     assert_eq!(
         message(|drive| drive.power_up_at(u64::MAX)),
         "axis `joint1` (node 2 on bus `bus0`), restart of its communication: expected the state boot-up, waited \
          12000 ms, it reported nothing and answered neither SDO nor any other protocol; try: check that the drive is \
-         powered (it needs 8 s), the wiring and the termination of the bus, its bit rate (1 Mbit/s), and its node \
-         number"
+         powered (it needs 8 s), the wiring and the termination of the bus, its bit rate (1 Mbit/s), and its node ID"
     );
 }
 
 #[test]
-fn a_drive_that_speaks_the_vendors_protocol_only() {
+fn the_drive_uses_the_vendors_protocol_only() {
     assert_eq!(
-        message(|drive| drive.flaws.has_other_firmware = true),
+        message(|drive| drive.flaws.uses_vendor_protocol = true),
         "axis `joint1` (node 2 on bus `bus0`), restart of its communication: expected the state boot-up, waited \
-         12000 ms, it reported nothing, but it did answer the vendor's custom CAN protocol; try: load CANopen \
+         12000 ms, it reported nothing, but it answers the vendor's custom CAN protocol; try: load CANopen \
          firmware into the drive, or configure the protocol that it speaks"
     );
 }
 
 #[test]
-fn a_drive_that_does_not_obey_nmt() {
+fn the_drive_ignores_nmt() {
     let config = config(&[(0, 2)]);
     let mut world = World::of(&config);
-    world.drive().flaws.is_deaf_to_nmt = true;
+    world.drive().flaws.ignores_nmt = true;
     let failure = world.run(&mut BringUp::new(&config)).unwrap_err().failures.remove(0);
-    assert!(matches!(failure.cause, Cause::StateNotReached { answered: Answered::Sdo, .. }));
+    assert!(matches!(failure.cause, FailureCause::StateNotReached { probe_result: ProbeResult::Sdo, .. }));
     assert!(failure.advice().contains("second master"));
 }
 
 #[test]
-fn a_drive_of_another_vendor() {
+fn the_drive_is_from_another_vendor() {
     let mut config = config(&[(0, 2)]);
     config.axes[0].identity.vendor = Some(0x5A65_726F);
     let mut world = World::of(&config);
     world.drive().set(0x1018, 1, &0x331_u32.to_le_bytes());
     assert_eq!(
         world.run(&mut BringUp::new(&config)).unwrap_err().to_string(),
-        "axis `joint1` (node 2 on bus `bus0`), identity: reading 1018:01 (vendor id): expected 0x5A65726F, got \
-         0x00000331; try: another drive than configured answers under this node number: check the wiring and the \
-         node numbers, or correct `identity` in the configuration"
+        "axis `joint1` (node 2 on bus `bus0`), identity: reading 1018:01 (vendor ID): expected 0x5A65726F, got \
+         0x00000331; try: another drive than configured answers under this node ID: check the wiring and the \
+         node IDs, or correct `identity` in the configuration"
     );
 }
 
 #[test]
-fn a_device_that_is_no_drive() {
+fn the_device_is_not_a_drive() {
     let message = message(|drive| drive.set(0x1000, 0, &0x0000_0191_u32.to_le_bytes()));
     assert!(message.contains("1000:00 (device type): expected a device of profile CiA 402, got 0x00000191"));
 }
 
 #[test]
-fn a_mode_that_the_firmware_does_not_have() {
+fn the_firmware_lacks_the_mode() {
     let message = message(|drive| drive.set(0x6502, 0, &0x0D_u32.to_le_bytes()));
     assert!(
         message.contains(
@@ -82,9 +81,9 @@ fn a_mode_that_the_firmware_does_not_have() {
 }
 
 #[test]
-fn a_mode_that_is_not_taken() {
+fn the_mode_is_not_adopted() {
     let message = message(|drive| {
-        drive.flaws.forgetful.insert(at(0x6060, 0));
+        drive.flaws.not_stored.insert(at(0x6060, 0));
     });
     assert!(
         message.contains(
@@ -95,7 +94,7 @@ fn a_mode_that_is_not_taken() {
 }
 
 #[test]
-fn an_object_that_cannot_be_mapped() {
+fn the_object_cannot_be_mapped() {
     let message = message(|drive| {
         drive.flaws.refused.insert(at(0x1A00, 3), AbortCode::ObjectCannotBeMapped);
     });
@@ -109,9 +108,9 @@ fn an_object_that_cannot_be_mapped() {
 }
 
 #[test]
-fn a_write_that_is_acknowledged_and_forgotten() {
+fn a_write_is_acknowledged_but_not_kept() {
     let message = message(|drive| {
-        drive.flaws.forgetful.insert(at(0x1029, 1));
+        drive.flaws.not_stored.insert(at(0x1029, 1));
     });
     assert!(
         message.contains(
@@ -123,21 +122,21 @@ fn a_write_that_is_acknowledged_and_forgotten() {
 }
 
 #[test]
-fn a_drive_that_falls_silent() {
+fn the_drive_stops_answering() {
     let message = message(|drive| {
         drive.flaws.silent.insert(at(0x1006, 0));
     });
     assert!(
         message.contains(
             "SYNC: writing 1000 to 1006:00 (communication cycle period): expected it to be accepted, got no reply \
-             within 500 ms, asked 3 times; try: the drive has fallen silent"
+             within 500 ms in 3 attempts; try: the drive no longer answers"
         ),
         "{message}"
     );
 }
 
 #[test]
-fn an_object_of_another_length() {
+fn an_object_has_another_length() {
     let message = message(|drive| drive.set(0x6064, 0, &[1, 2]));
     assert!(
         message.contains("reading 6064:00 (position actual value): expected 4 bytes, got 2"),
@@ -146,7 +145,7 @@ fn an_object_of_another_length() {
 }
 
 #[test]
-fn a_refusal_because_of_the_drives_state() {
+fn a_write_is_refused_because_of_the_drives_state() {
     let message = message(|drive| {
         drive.flaws.refused.insert(at(0x6060, 0), AbortCode::PresentDeviceState);
     });
@@ -157,10 +156,10 @@ fn a_refusal_because_of_the_drives_state() {
 }
 
 #[test]
-fn a_drive_that_keeps_its_torque() {
+fn the_drive_keeps_its_torque() {
     let message = message(|drive| {
         drive.state = DriveState::OperationEnabled;
-        drive.flaws.is_stubborn = true;
+        drive.flaws.ignores_controlwords = true;
     });
     assert!(
         message.contains(
@@ -193,7 +192,7 @@ fn a_drive_without_a_rated_torque_cannot_be_commanded_in_torque() {
 }
 
 #[test]
-fn a_value_that_the_object_cannot_hold() {
+fn a_value_does_not_fit_its_object() {
     let mut config = config(&[(0, 2)]);
     config.axes[0].heartbeat_ns = Some(70_000_000_000);
     let message = World::of(&config).run(&mut BringUp::new(&config)).unwrap_err().to_string();
@@ -204,18 +203,18 @@ fn a_value_that_the_object_cannot_hold() {
 }
 
 #[test]
-fn a_drive_that_keeps_restarting() {
+fn the_drive_restarts_repeatedly() {
     let message = message(|drive| drive.flaws.restarts_at = Some((at(0x1006, 0), usize::MAX)));
     assert!(
         message.contains(
-            "SYNC: expected it to keep running, it has restarted 4 times; try: check the drive's supply"
+            "SYNC: expected it to keep running, but it has restarted 4 times; try: check the drive's supply"
         ),
         "{message}"
     );
 }
 
 #[test]
-fn a_drive_that_restarts_while_it_is_started() {
+fn the_drive_restarts_while_it_is_started() {
     let config = config(&[(0, 2)]);
     let mut world = World::of(&config);
     let mut bring_up = BringUp::new(&config);
@@ -225,11 +224,11 @@ fn a_drive_that_restarts_while_it_is_started() {
     let now_ns = world.now_ns;
     world.drive().power_up_at(now_ns);
     let failure = world.run(&mut bring_up).unwrap_err().failures.remove(0);
-    assert_eq!(failure.cause, Cause::Restarted { times: 1 });
+    assert_eq!(failure.cause, FailureCause::Restarted { times: 1 });
 }
 
 #[test]
-fn the_last_emergency_message_is_told_with_the_failure() {
+fn the_last_emergency_message_is_reported_with_the_failure() {
     let config = config(&[(0, 2)]);
     let mut world = World::of(&config);
     world.drive().flaws.refused.insert(at(0x6060, 0), AbortCode::General);
@@ -261,21 +260,21 @@ fn every_axis_that_fails_is_named_and_the_others_are_not() {
 }
 
 #[test]
-fn leaving_goes_on_after_a_refusal_and_tells_of_it_in_the_end() {
+fn the_shutdown_continues_after_a_refusal_and_reports_it() {
     let config = config(&[(0, 2)]);
     let mut world = started(&config);
     world.drive().flaws.refused.insert(at(0x6040, 0), AbortCode::General);
-    let error = world.run(&mut Leave::new(&config)).unwrap_err();
+    let error = world.run(&mut Shutdown::new(&config)).unwrap_err();
     assert_eq!((error.failures.len(), error.failures[0].step), (1, "standstill without torque"));
-    assert_eq!(world.drive().number(0x1016, 1), 0, "the watch was ended all the same");
+    assert_eq!(world.drive().number(0x1016, 1), 0, "the heartbeat consumer was disabled nevertheless");
 }
 
 #[test]
-fn leaving_a_drive_that_has_gone_ends_soon() {
+fn the_shutdown_of_a_missing_drive_ends_soon() {
     let config = config(&[(0, 2)]);
     let mut world = started(&config);
     let begin = world.now_ns;
     world.drive().powered_up_at_ns = u64::MAX;
-    world.run(&mut Leave::new(&config)).unwrap_err();
+    world.run(&mut Shutdown::new(&config)).unwrap_err();
     assert!(world.now_ns - begin < 5_000_000_000, "{} ms", (world.now_ns - begin) / 1_000_000);
 }

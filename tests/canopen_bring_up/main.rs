@@ -1,5 +1,5 @@
-//! The bring-up of eRob joints against drives with an object dictionary: what is set, what is learnt, and what is said
-//! when something goes wrong.
+//! The bring-up of eRob joints against scripted drives with an object dictionary.
+//! The tests check the objects that are written, the facts that are read, and the messages of failures.
 
 mod configuration_file;
 mod failures;
@@ -11,11 +11,11 @@ use scripted_drive::at;
 use takt::canopen::emcy::ErrorCode;
 use takt::canopen::nmt::NmtState;
 use takt::config::{Config, Control};
-use takt::drive::{BringUp, BringUpTiming, Leave, NotConfigured, Progress, Stage};
+use takt::drive::{BringUp, BringUpProgress, BringUpTiming, NotConfigured, Shutdown, Stage};
 use takt_rt::{DriveState, Frame, Id};
 use world::{World, config};
 
-/// A world whose drives have been configured and started.
+/// A world whose drives are configured and started.
 fn started(config: &Config) -> World {
     let mut world = World::of(config);
     let mut bring_up = BringUp::new(config);
@@ -106,7 +106,7 @@ fn a_pdo_is_mapped_in_the_order_that_the_drive_needs() {
 }
 
 #[test]
-fn the_facts_are_what_the_drive_says_of_itself_in_si_units() {
+fn the_facts_are_read_from_the_drive_and_converted_to_si_units() {
     let config = config(&[(0, 2)]);
     let facts = World::of(&config).run(&mut BringUp::new(&config)).unwrap().remove(0);
     assert_eq!((facts.rated_torque, facts.rated_current_a), (Some(31.0), Some(6.3)));
@@ -141,7 +141,7 @@ fn every_mode_maps_its_own_target() {
 }
 
 #[test]
-fn axes_of_several_buses_are_brought_up_side_by_side() {
+fn axes_of_several_buses_are_brought_up_in_parallel() {
     let axes = [(0, 1), (0, 2), (0, 3), (1, 1), (1, 2), (1, 3)];
     let (one, six) = (config(&axes[..1]), config(&axes));
     let duration = |config: &Config| {
@@ -151,7 +151,8 @@ fn axes_of_several_buses_are_brought_up_side_by_side() {
     };
     let begin = World::of(&one).now_ns;
     let (alone, together) = (duration(&one) - begin, duration(&six) - begin);
-    // Three axes share a channel of two frames a cycle: the longest queue is three frames, so two cycles an exchange.
+    // Three axes share a channel of two frames a cycle: the longest queue is three frames, so one exchange takes two
+    // cycles.
     assert!(together <= 2 * alone + 10_000_000, "{together} ns instead of {alone} ns");
 }
 
@@ -179,12 +180,12 @@ fn without_heartbeats_nothing_waits_for_one() {
     let mut world = started(&config);
     assert_eq!(world.drive().nmt, NmtState::Operational);
     assert_eq!((world.drive().number(0x1016, 1), world.drive().number(0x1017, 0)), (0, 0));
-    world.run(&mut Leave::new(&config)).unwrap();
+    world.run(&mut Shutdown::new(&config)).unwrap();
     assert_eq!(world.drive().nmt, NmtState::PreOperational);
 }
 
 #[test]
-fn nodes_left_stopped_or_operational_are_recovered() {
+fn nodes_that_are_stopped_or_operational_are_recovered() {
     for left in [NmtState::Stopped, NmtState::Operational] {
         let config = config(&[(0, 2)]);
         let mut world = World::of(&config);
@@ -195,7 +196,7 @@ fn nodes_left_stopped_or_operational_are_recovered() {
 }
 
 #[test]
-fn a_drive_that_is_still_powering_up_is_waited_for() {
+fn the_bring_up_waits_for_a_drive_that_is_still_powering_up() {
     let config = config(&[(0, 1), (0, 2)]);
     let mut world = World::of(&config);
     let begin = world.now_ns;
@@ -206,7 +207,7 @@ fn a_drive_that_is_still_powering_up_is_waited_for() {
 }
 
 #[test]
-fn a_drive_left_enabled_is_stopped_by_its_ramp_and_switched_off_before_anything_is_changed() {
+fn an_enabled_drive_is_stopped_by_its_ramp_and_disabled_before_any_change() {
     let config = config(&[(0, 2)]);
     let mut world = World::of(&config);
     world.drive().state = DriveState::OperationEnabled;
@@ -241,7 +242,7 @@ fn a_fault_is_reported_and_does_not_end_the_bring_up() {
 }
 
 #[test]
-fn lost_replies_are_asked_for_again() {
+fn requests_are_repeated_after_lost_replies() {
     let config = config(&[(0, 2)]);
     let mut world = World::of(&config);
     world.drive().flaws.lost_replies = 2;
@@ -249,7 +250,7 @@ fn lost_replies_are_asked_for_again() {
 }
 
 #[test]
-fn a_drive_that_restarts_in_the_middle_is_configured_anew() {
+fn a_drive_that_restarts_during_the_bring_up_is_configured_again() {
     let config = config(&[(0, 2)]);
     let mut world = World::of(&config);
     world.drive().flaws.restarts_at = Some((at(0x1016, 1), 2));
@@ -259,11 +260,11 @@ fn a_drive_that_restarts_in_the_middle_is_configured_anew() {
 }
 
 #[test]
-fn a_polite_leave_disables_and_ends_the_watch_for_the_masters_heartbeat() {
+fn a_shutdown_disables_the_drive_and_its_heartbeat_consumer() {
     let config = config(&[(0, 2)]);
     let mut world = started(&config);
     world.drive().state = DriveState::ReadyToSwitchOn;
-    let facts = world.run(&mut Leave::new(&config)).unwrap();
+    let facts = world.run(&mut Shutdown::new(&config)).unwrap();
     let drive = world.drive();
     assert_eq!((drive.nmt, drive.state), (NmtState::PreOperational, DriveState::SwitchOnDisabled));
     assert_eq!((drive.number(0x1016, 1), drive.number(0x1017, 0)), (0, 0));
@@ -271,23 +272,23 @@ fn a_polite_leave_disables_and_ends_the_watch_for_the_masters_heartbeat() {
 }
 
 #[test]
-fn leaving_an_axis_that_still_has_torque_brings_it_to_rest() {
+fn the_shutdown_of_an_axis_with_torque_stops_it() {
     let config = config(&[(0, 2)]);
     let mut world = started(&config);
     world.drive().state = DriveState::OperationEnabled;
-    world.run(&mut Leave::new(&config)).unwrap();
+    world.run(&mut Shutdown::new(&config)).unwrap();
     assert_eq!(world.drive().state, DriveState::SwitchOnDisabled);
 }
 
 #[test]
-fn progress_goes_from_nothing_to_all_and_names_the_slowest_axis() {
+fn progress_rises_to_the_end_and_names_the_slowest_axis() {
     let config = config(&[(0, 1), (0, 2)]);
     let mut world = World::of(&config);
     let begin = world.now_ns;
     world.drives[1].1.power_up_at(begin + 2_000_000_000);
     let mut bring_up = BringUp::new(&config);
     let reset = "restart of its communication";
-    assert_eq!(bring_up.progress(), Progress { fraction: 0.0, step: reset, axis: 0 });
+    assert_eq!(bring_up.progress(), BringUpProgress { fraction: 0.0, step: reset, axis: 0 });
     let mut last = 0.0;
     while bring_up.outcome().is_none() {
         world.step(&mut bring_up);
@@ -295,7 +296,7 @@ fn progress_goes_from_nothing_to_all_and_names_the_slowest_axis() {
         assert!((last..=1.0).contains(&progress.fraction));
         last = progress.fraction;
         if world.now_ns == begin + 1_000_000_000 {
-            assert_eq!(progress, Progress { fraction: 0.5, step: reset, axis: 1 });
+            assert_eq!(progress, BringUpProgress { fraction: 0.5, step: reset, axis: 1 });
         }
     }
     assert!(world.now_ns > begin + 1_000_000_000);
@@ -303,7 +304,7 @@ fn progress_goes_from_nothing_to_all_and_names_the_slowest_axis() {
 }
 
 #[test]
-fn time_outs_are_those_of_the_caller() {
+fn the_caller_sets_the_time_outs() {
     let config = config(&[(0, 2)]);
     let mut world = World::of(&config);
     let begin = world.now_ns;
@@ -313,7 +314,7 @@ fn time_outs_are_those_of_the_caller() {
     assert!(world.now_ns - begin < 2_000_000_000, "300 ms, and three questions of 500 ms each");
 }
 
-/// Frames that a drive might send, about objects that a bring-up touches.
+/// Frames that a drive might send about objects of the bring-up.
 fn any_frame() -> impl Strategy<Value = Frame> {
     let id = prop_oneof![6 => Just(0x582), 2 => Just(0x702), 1 => Just(0x082), 1 => 0..0x7FFu32];
     let first = prop_oneof![Just(0x43), Just(0x4F), Just(0x60), Just(0x80), Just(0x41), any::<u8>()];
@@ -327,7 +328,7 @@ fn any_frame() -> impl Strategy<Value = Frame> {
 
 proptest! {
     #[test]
-    fn a_bus_full_of_nonsense_neither_panics_nor_brings_a_drive_up(
+    fn arbitrary_frames_never_panic_and_never_complete_a_bring_up(
         frames in prop::collection::vec((any_frame(), 0..200_000_000u64), 0..200),
     ) {
         let config = config(&[(0, 2)]);
@@ -336,7 +337,7 @@ proptest! {
         for (frame, pause_ns) in frames {
             let mut requests = 0;
             bring_up.poll(now_ns, &mut |_, frame| {
-                // An abort expects no answer, so a request may follow it at once.
+                // An abort has no reply, so a request may follow it at once.
                 let is_abort = frame.payload().first() == Some(&0x80);
                 requests += usize::from(frame.id().value() == 0x602 && !is_abort);
             });

@@ -1,33 +1,33 @@
-//! A node with an object dictionary, strict about what the standard forbids, and told by a test what to do wrong.
+//! A node with an object dictionary. It reports violations of the standard, and a test can give it flaws.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use takt::canopen::nmt::{ErrorControl, NmtCommand, NmtState, NmtTarget};
 use takt::canopen::object::ObjectAddress;
-use takt::canopen::sdo::{AbortCode, Expedited, Request, Response, Segment};
+use takt::canopen::sdo::{AbortCode, Expedited, SdoRequest, SdoResponse, Segment};
 use takt_rt::{Command, DriveState, Frame, Id, controlword};
 
 const INVALID: u32 = 1 << 31;
 
-/// What a test wants to go wrong.
+/// The flaws that a test can set.
 #[derive(Default)]
 pub struct Flaws {
     /// Objects whose access is aborted.
     pub refused: BTreeMap<ObjectAddress, AbortCode>,
-    /// Objects about which the drive says nothing.
+    /// Objects whose requests get no reply.
     pub silent: BTreeSet<ObjectAddress>,
-    /// Objects whose writing is acknowledged and forgotten.
-    pub forgetful: BTreeSet<ObjectAddress>,
-    /// How many replies are lost before the next one is sent.
+    /// Objects whose download is acknowledged but not stored.
+    pub not_stored: BTreeSet<ObjectAddress>,
+    /// The number of replies that are lost before the next one is sent.
     pub lost_replies: usize,
-    /// The drive restarts when this object is written, so many times.
+    /// The drive restarts when this object is written, this many times.
     pub restarts_at: Option<(ObjectAddress, usize)>,
-    /// The drive obeys no controlword.
-    pub is_stubborn: bool,
-    /// The drive speaks the vendor's own protocol only.
-    pub has_other_firmware: bool,
-    /// The drive obeys no NMT command.
-    pub is_deaf_to_nmt: bool,
+    /// The drive ignores controlwords.
+    pub ignores_controlwords: bool,
+    /// The drive uses the vendor's own protocol only.
+    pub uses_vendor_protocol: bool,
+    /// The drive ignores NMT commands.
+    pub ignores_nmt: bool,
 }
 
 pub struct ScriptedDrive {
@@ -36,11 +36,11 @@ pub struct ScriptedDrive {
     pub dictionary: BTreeMap<ObjectAddress, Vec<u8>>,
     pub state: DriveState,
     pub flaws: Flaws,
-    /// Before this time it hears and says nothing.
+    /// Before this time it neither sends nor receives.
     pub powered_up_at_ns: u64,
     /// Every object that was written, with its bytes.
     pub writes: Vec<(ObjectAddress, Vec<u8>)>,
-    /// Statements of the standard that the master has violated.
+    /// The rules of the standard that the master has violated.
     pub violations: Vec<String>,
     has_booted: bool,
     heartbeat_at_ns: u64,
@@ -53,7 +53,7 @@ pub fn at(index: u16, subindex: u8) -> ObjectAddress {
 }
 
 impl ScriptedDrive {
-    /// An eRob as it is delivered.
+    /// An eRob with factory settings.
     pub fn erob(node: u8) -> Self {
         let mut drive = Self {
             node,
@@ -105,7 +105,7 @@ impl ScriptedDrive {
         drive
     }
 
-    /// The communication parameters as they are after a reset.
+    /// Sets the communication parameters to their values after a reset.
     fn reset_communication(&mut self) {
         self.upload = None;
         for (index, subindex, bytes) in [
@@ -148,7 +148,7 @@ impl ScriptedDrive {
         now_ns >= self.powered_up_at_ns
     }
 
-    /// What it sends at this time.
+    /// Returns the frames that are due at this time.
     pub fn poll(&mut self, now_ns: u64) -> Vec<Frame> {
         if !self.is_powered_up(now_ns) {
             return vec![];
@@ -157,14 +157,14 @@ impl ScriptedDrive {
             self.boot();
         }
         let period_ns = self.number(0x1017, 0) * 1_000_000;
-        if period_ns > 0 && now_ns >= self.heartbeat_at_ns && !self.flaws.has_other_firmware {
+        if period_ns > 0 && now_ns >= self.heartbeat_at_ns && !self.flaws.uses_vendor_protocol {
             self.heartbeat_at_ns = now_ns + period_ns;
             self.replies.push(ErrorControl { node: self.node, state: self.nmt }.frame());
         }
         std::mem::take(&mut self.replies)
     }
 
-    /// Lets it power up only at `at_ns`.
+    /// Delays the boot-up to `at_ns`.
     pub fn power_up_at(&mut self, at_ns: u64) {
         self.powered_up_at_ns = at_ns;
         self.has_booted = false;
@@ -174,7 +174,7 @@ impl ScriptedDrive {
         self.has_booted = true;
         self.reset_communication();
         self.nmt = NmtState::PreOperational;
-        if !self.flaws.has_other_firmware {
+        if !self.flaws.uses_vendor_protocol {
             self.replies.push(ErrorControl { node: self.node, state: NmtState::BootUp }.frame());
         }
     }
@@ -183,7 +183,7 @@ impl ScriptedDrive {
         if !self.is_powered_up(now_ns) {
             return;
         }
-        if self.flaws.has_other_firmware {
+        if self.flaws.uses_vendor_protocol {
             if frame.id().value() == 0x640 + u32::from(self.node) && frame.payload() == [0x00, 0x02] {
                 let id = Id::base(0x5C0 + u32::from(self.node)).unwrap();
                 self.replies.push(Frame::of(id, [0, 0, 0, 1, 0x3E]));
@@ -194,9 +194,9 @@ impl ScriptedDrive {
             && matches!(target, NmtTarget::All | NmtTarget::Node(_))
             && (target == NmtTarget::All || target == NmtTarget::Node(self.node))
         {
-            self.obey(command);
+            self.apply_nmt(command);
         }
-        match Request::decode(frame) {
+        match SdoRequest::decode(frame) {
             Some((node, request)) if node == self.node && self.nmt != NmtState::Stopped => {
                 self.serve(request)
             }
@@ -204,8 +204,8 @@ impl ScriptedDrive {
         }
     }
 
-    fn obey(&mut self, command: NmtCommand) {
-        if self.flaws.is_deaf_to_nmt {
+    fn apply_nmt(&mut self, command: NmtCommand) {
+        if self.flaws.ignores_nmt {
             return;
         }
         match command {
@@ -217,22 +217,22 @@ impl ScriptedDrive {
         self.heartbeat_at_ns = 0;
     }
 
-    fn reply(&mut self, response: Response) {
+    fn reply(&mut self, response: SdoResponse) {
         if self.flaws.lost_replies > 0 {
             self.flaws.lost_replies -= 1;
             return;
         }
-        if self.replies.iter().any(|frame| Response::decode(frame).is_some()) {
+        if self.replies.iter().any(|frame| SdoResponse::decode(frame).is_some()) {
             self.violations.push("an SDO request came before the last one was answered".into());
         }
         self.replies.push(response.frame(self.node));
     }
 
-    fn serve(&mut self, request: Request) {
+    fn serve(&mut self, request: SdoRequest) {
         match request {
-            Request::Upload { object } => self.upload(object),
-            Request::UploadSegment { toggle } => self.upload_segment(toggle),
-            Request::DownloadExpedited { object, data } => self.download(object, data.bytes().to_vec()),
+            SdoRequest::Upload { object } => self.upload(object),
+            SdoRequest::UploadSegment { toggle } => self.upload_segment(toggle),
+            SdoRequest::DownloadExpedited { object, data } => self.download(object, data.bytes().to_vec()),
             other => self.violations.push(format!("not expected in a bring-up: {other:?}")),
         }
     }
@@ -242,25 +242,25 @@ impl ScriptedDrive {
             return;
         }
         if let Some(code) = self.flaws.refused.get(&object).copied() {
-            return self.reply(Response::Abort { object, code });
+            return self.reply(SdoResponse::Abort { object, code });
         }
         self.dictionary.insert(at(0x6041, 0), self.statusword().to_le_bytes().to_vec());
         let Some(bytes) = self.dictionary.get(&object).cloned() else {
-            return self.reply(Response::Abort { object, code: AbortCode::ObjectDoesNotExist });
+            return self.reply(SdoResponse::Abort { object, code: AbortCode::ObjectDoesNotExist });
         };
         match Expedited::of(&bytes) {
-            Some(data) => self.reply(Response::UploadExpedited { object, data }),
+            Some(data) => self.reply(SdoResponse::UploadExpedited { object, data }),
             None => {
                 let size = Some(bytes.len() as u32);
                 self.upload = Some((bytes, false));
-                self.reply(Response::UploadSegmented { object, size });
+                self.reply(SdoResponse::UploadSegmented { object, size });
             }
         }
     }
 
     fn upload_segment(&mut self, toggle: bool) {
         let Some((bytes, expected)) = self.upload.take() else {
-            return self.violations.push("a segment was asked for outside a transfer".into());
+            return self.violations.push("a segment was requested outside a transfer".into());
         };
         if toggle != expected {
             self.violations.push("the toggle bit did not alternate".into());
@@ -271,7 +271,7 @@ impl ScriptedDrive {
         if !is_last {
             self.upload = Some((rest, !expected));
         }
-        self.reply(Response::UploadSegment { toggle, data, is_last });
+        self.reply(SdoResponse::UploadSegment { toggle, data, is_last });
     }
 
     fn download(&mut self, object: ObjectAddress, bytes: Vec<u8>) {
@@ -286,18 +286,18 @@ impl ScriptedDrive {
             return;
         }
         let refused = self.flaws.refused.get(&object).copied();
-        if let Some(code) = refused.or_else(|| self.objection(object, &bytes)) {
-            return self.reply(Response::Abort { object, code });
+        if let Some(code) = refused.or_else(|| self.abort_code(object, &bytes)) {
+            return self.reply(SdoResponse::Abort { object, code });
         }
         self.writes.push((object, bytes.clone()));
         self.check_mapping_rules(object, &bytes);
-        if !self.flaws.forgetful.contains(&object) {
-            self.take(object, bytes);
+        if !self.flaws.not_stored.contains(&object) {
+            self.store(object, bytes);
         }
-        self.reply(Response::DownloadAccepted { object });
+        self.reply(SdoResponse::DownloadAccepted { object });
     }
 
-    fn objection(&self, object: ObjectAddress, bytes: &[u8]) -> Option<AbortCode> {
+    fn abort_code(&self, object: ObjectAddress, bytes: &[u8]) -> Option<AbortCode> {
         match self.dictionary.get(&object) {
             None => Some(AbortCode::ObjectDoesNotExist),
             Some(present) if present.len() != bytes.len() => Some(AbortCode::LengthMismatch),
@@ -305,10 +305,10 @@ impl ScriptedDrive {
         }
     }
 
-    fn take(&mut self, object: ObjectAddress, bytes: Vec<u8>) {
+    fn store(&mut self, object: ObjectAddress, bytes: Vec<u8>) {
         match object {
             _ if object == at(0x6060, 0) => self.set(0x6061, 0, &bytes),
-            _ if object == at(0x6040, 0) && !self.flaws.is_stubborn => {
+            _ if object == at(0x6040, 0) && !self.flaws.ignores_controlwords => {
                 let word = u16::from_le_bytes([bytes[0], bytes[1]]);
                 let edge = word & controlword::FAULT_RESET != 0 && self.number(0x6040, 0) & 0x80 == 0;
                 self.state = self.state.after(Command::decode(word), edge);
@@ -318,7 +318,7 @@ impl ScriptedDrive {
         self.dictionary.insert(object, bytes);
     }
 
-    /// With the bits that real units set without meaning anything by them.
+    /// Contains the bits that real units set without a meaning.
     fn statusword(&self) -> u16 {
         0x1280 | self.state.statusword_bits()
     }

@@ -1,9 +1,9 @@
-//! Drives on buses whose service channel carries two frames a millisecond each way, and a configuration for them.
+//! Drives on buses whose service channel carries two frames per millisecond in each direction, and a configuration.
 
 use std::path::PathBuf;
 
 use takt::config::*;
-use takt::drive::{AxisFacts, BringUp, BringUpError, Leave};
+use takt::drive::{AxisFacts, BringUp, BringUpError, Shutdown};
 use takt_rt::Frame;
 
 use super::scripted_drive::ScriptedDrive;
@@ -17,7 +17,7 @@ pub struct World {
     queues: Vec<Vec<Frame>>,
 }
 
-/// What a [`BringUp`] and a [`Leave`] have in common.
+/// The common interface of a [`BringUp`] and a [`Shutdown`].
 pub trait Procedure {
     fn poll(&mut self, now_ns: u64, send: &mut impl FnMut(usize, Frame));
     fn receive(&mut self, bus: usize, frame: &Frame);
@@ -40,10 +40,10 @@ macro_rules! procedure {
     };
 }
 procedure!(BringUp);
-procedure!(Leave);
+procedure!(Shutdown);
 
 impl World {
-    /// An eRob as delivered for each axis.
+    /// One eRob with factory settings per axis.
     pub fn of(config: &Config) -> Self {
         let drives = config.axes.iter().map(|axis| (axis.bus, ScriptedDrive::erob(axis.node))).collect();
         Self { now_ns: 5_000_000_000, drives, queues: vec![vec![]; config.buses.len()] }
@@ -73,7 +73,7 @@ impl World {
         }
     }
 
-    /// Runs a procedure to its end and checks that the master has kept to the standard.
+    /// Runs a procedure to its end and checks that the master has obeyed the standard.
     pub fn run(&mut self, procedure: &mut impl Procedure) -> Result<Vec<AxisFacts>, BringUpError> {
         for _ in 0..100_000 {
             if let Some(outcome) = procedure.outcome() {
@@ -88,13 +88,13 @@ impl World {
     }
 }
 
-/// Axes as pairs of bus and node, in cyclic synchronous position.
+/// Axes as pairs of bus and node ID, in cyclic synchronous position mode.
 pub fn config(axes: &[(usize, u8)]) -> Config {
     let buses = axes.iter().map(|(bus, _)| bus + 1).max().unwrap_or(0);
     Config {
         name: "test".into(),
         cycle: Cycle { period_ns: 1_000_000, command_phase_ns: 550_000 },
-        missed_slots: MissedSlots { warning: 10, degraded: 100, stop: 500, leak_ns: 10_000_000 },
+        missed_slots: MissedSlots { warning: 10, degraded: 100, stop: 500, leak_slots: 10 },
         stops: Default::default(),
         realtime: Realtime {
             priority: None,
@@ -163,6 +163,7 @@ fn axis(number: usize, bus: usize, node: u8) -> Axis {
         feedback: vec![Feedback::Torque],
         mapping: PdoMapping::Written,
         answers_sync: true,
+        target_tolerance: 0.01,
         start_tolerance: 0.02,
         on_violation: Default::default(),
         feedback_delay_ns: 20_000,

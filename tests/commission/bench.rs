@@ -1,11 +1,12 @@
-//! A bench with one simulated drive in virtual time, and everything that is seen of a procedure on it.
+//! A test bench: one simulated drive in virtual time, and a record of a procedure on it.
 
 use std::cell::Cell;
 
-use takt::commission::bus_session::{self, Seen};
-use takt::commission::dictionary::{self, Choice};
+use takt::commission::bus_session::{self, SessionEvent};
+use takt::commission::dictionary::{self, SelectedObject};
 use takt::commission::{
-    Amount, Course, Event, Failed, Pace, ReadObject, Report, Request, Subject, procedure,
+    CommandValue, MotionProfile, MoveKind, ProcedureError, ProcedureEvent, ReadObject, Report, TargetDrive,
+    Task, procedure,
 };
 use takt::controller::VirtualClock;
 use takt::sim::{Observation, SimulatedBus};
@@ -16,41 +17,41 @@ pub const SECOND: u64 = 1_000 * MS;
 pub const NODE: u8 = 1;
 
 pub struct Bench {
-    pub subject: Subject,
+    pub target: TargetDrive,
     pub bus: SimulatedBus,
     pub clock: VirtualClock,
     pub sent: Vec<Frame>,
     pub steps: Vec<&'static str>,
     pub notes: Vec<String>,
-    /// The highest speed of the joint that a reading has shown: rad/s.
+    /// The highest joint speed in a reading: rad/s.
     pub fastest: f64,
 }
 
 impl Bench {
-    pub fn of(subject: Subject, bus: SimulatedBus) -> Self {
+    pub fn of(target: TargetDrive, bus: SimulatedBus) -> Self {
         let clock = VirtualClock::default();
-        Self { subject, bus, clock, sent: vec![], steps: vec![], notes: vec![], fastest: 0.0 }
+        Self { target, bus, clock, sent: vec![], steps: vec![], notes: vec![], fastest: 0.0 }
     }
 
-    pub fn run(&mut self, request: Request) -> Result<Report, Failed> {
+    pub fn run(&mut self, request: Task) -> Result<Report, ProcedureError> {
         self.run_interrupted(request, |_| 0)
     }
 
-    /// `interruptions` tells how many requests to end there have been up to a step.
+    /// `interruptions` returns the number of interruptions until a step.
     pub fn run_interrupted(
         &mut self,
-        request: Request,
+        request: Task,
         interruptions: impl Fn(&str) -> usize,
-    ) -> Result<Report, Failed> {
-        self.run_as(self.subject.clone(), request, interruptions)
+    ) -> Result<Report, ProcedureError> {
+        self.run_as(self.target.clone(), request, interruptions)
     }
 
     pub fn run_as(
         &mut self,
-        subject: Subject,
-        request: Request,
+        target: TargetDrive,
+        request: Task,
         interruptions: impl Fn(&str) -> usize,
-    ) -> Result<Report, Failed> {
+    ) -> Result<Report, ProcedureError> {
         let Self { bus, clock, sent, steps, notes, fastest, .. } = self;
         sent.clear();
         steps.clear();
@@ -62,26 +63,28 @@ impl Bench {
             asked += usize::from(is_more);
             is_more
         };
-        bus_session::run(procedure(subject, request), bus, clock, is_interrupted, |_, seen| match seen {
-            Seen::Event(Event::Step(name)) => {
+        bus_session::run(procedure(target, request), bus, clock, is_interrupted, |_, seen| match seen {
+            SessionEvent::Procedure(ProcedureEvent::Step(name)) => {
                 step.set(name);
                 steps.push(name);
             }
-            Seen::Event(Event::Note(text)) => notes.push(text),
-            Seen::Event(Event::Reading(reading)) => *fastest = fastest.max(reading.velocity.abs()),
-            Seen::Sent(frame) => sent.push(frame),
-            Seen::Received(_) => {}
+            SessionEvent::Procedure(ProcedureEvent::Note(text)) => notes.push(text),
+            SessionEvent::Procedure(ProcedureEvent::Reading(reading)) => {
+                *fastest = fastest.max(reading.velocity.abs())
+            }
+            SessionEvent::Sent(frame) => sent.push(frame),
+            SessionEvent::Received(_) => {}
         })
     }
 
-    /// Runs a procedure for a time at most; `touch` may do something to the bus meanwhile.
+    /// Runs a procedure for a limited time; `touch` may change the bus meanwhile.
     pub fn run_for(
         &mut self,
-        request: Request,
+        request: Task,
         until_ns: u64,
         mut touch: impl FnMut(&mut SimulatedBus, u64),
-    ) -> Option<Result<Report, Failed>> {
-        let mut procedure = procedure(self.subject.clone(), request);
+    ) -> Option<Result<Report, ProcedureError>> {
+        let mut procedure = procedure(self.target.clone(), request);
         for now_ns in (0..until_ns).step_by((MS / 2) as usize) {
             touch(&mut self.bus, now_ns);
             let mut batch = ReceiveBatch::new();
@@ -101,27 +104,27 @@ impl Bench {
         self.bus.observe(NODE).unwrap()
     }
 
-    /// Position of this frame among the frames that were sent.
+    /// The index of this frame among the sent frames.
     pub fn sent_at(&self, frame: Frame) -> usize {
         let found = self.sent.iter().position(|sent| *sent == frame);
         found.unwrap_or_else(|| panic!("{frame:?} was not sent: {:?}", self.sent))
     }
 }
 
-pub fn degrees(degrees: f64) -> Amount {
-    Amount::Joint(degrees.to_radians())
+pub fn degrees(degrees: f64) -> CommandValue {
+    CommandValue::Joint(degrees.to_radians())
 }
 
-pub fn move_to(course: Course) -> Request {
-    Request::Move { course, pace: brisk(), keeps_enabled: false }
+pub fn move_to(kind: MoveKind) -> Task {
+    Task::Move { kind, profile: brisk(), keeps_enabled: false }
 }
 
-pub fn absolute(position: f64) -> Course {
-    Course::Absolute { to: degrees(position), is_immediate: false }
+pub fn absolute(position: f64) -> MoveKind {
+    MoveKind::Absolute { to: degrees(position), is_immediate: false }
 }
 
-pub fn brisk() -> Pace {
-    Pace {
+pub fn brisk() -> MotionProfile {
+    MotionProfile {
         velocity: Some(degrees(60.0)),
         acceleration: Some(degrees(200.0)),
         deceleration: Some(degrees(200.0)),
@@ -138,8 +141,10 @@ pub fn number(report: &Report, key: &str) -> f64 {
 }
 
 pub fn read(bench: &mut Bench, name: &str) -> i64 {
-    let Ok(Choice::Known(entry)) = dictionary::find(bench.subject.family, name) else { panic!("{name}") };
+    let Ok(SelectedObject::Known(entry)) = dictionary::find(bench.target.family, name) else {
+        panic!("{name}")
+    };
     let object = ReadObject { address: entry.object.address, entry: Some(entry), data_type: None };
-    let report = bench.run(Request::Read { objects: vec![object] }).unwrap();
+    let report = bench.run(Task::Read { objects: vec![object] }).unwrap();
     serde_json::to_value(&report).unwrap()["objects"][0]["raw"].as_i64().unwrap()
 }

@@ -1,24 +1,24 @@
-//! Against the simulated YZ-AIM, and against the frames that its manual prints.
+//! Commissioning of the simulated YZ-AIM, compared with the frames in its manual.
 
 use std::f64::consts::TAU;
 
-use takt::commission::{Amount, Course, Failure, Family, Pace, Request, Subject};
+use takt::commission::{CommandValue, Failure, Family, MotionProfile, MoveKind, TargetDrive, Task};
 use takt::config::{Limits, Travel};
 use takt::sim::homing_switches::{HomingSwitches, Switch};
 use takt::sim::plant::{EndStops, JointParameters};
 use takt::sim::yz_aim::{Gearing, Model, Quirks, YzAimJoint, YzAimParameters};
-use takt::sim::{BitRates, Drive, DriveFault, SimulatedBus};
+use takt::sim::{Drive, DriveFault, SimulatedBus, WireBitRates};
 use takt_rt::{BusPort, Clock, Frame, Id, Scale, ScaleParameters};
 
 use super::bench::*;
 
-/// Turns of the motor for one of the joint.
+/// Turns of the motor for one turn of the joint.
 const RATIO: f64 = 10.0;
 
-/// The rows of the manual's frames.
+/// The frames of the manual.
 const VECTORS: &str = include_str!("../vectors/yz-aim-vectors.csv");
 
-/// The frame on the wire of a row.
+/// The frame of a row.
 fn vector(id: &str) -> Frame {
     let row = VECTORS.lines().find(|row| row.starts_with(&format!("{id},"))).unwrap();
     let wire = row.split("WIRE=").nth(1).unwrap().trim_end_matches('"');
@@ -57,7 +57,7 @@ fn with(drives: Vec<YzAimParameters>) -> Bench {
         zero_counts: 0.0,
         rated_torque: 1.0,
     };
-    let subject = Subject {
+    let target = TargetDrive {
         name: "joint".to_owned(),
         node: NODE,
         family: Family::YzAim,
@@ -67,10 +67,10 @@ fn with(drives: Vec<YzAimParameters>) -> Bench {
         limits: Some(limits()),
         patience_ns: SECOND,
     };
-    let rates = BitRates { nominal: 1_000_000, data: None };
+    let rates = WireBitRates { nominal: 1_000_000, data: None };
     let boxed = |parameters| -> Box<dyn Drive> { Box::new(YzAimJoint::new(parameters)) };
     let drives = drives.into_iter().map(boxed).collect();
-    Bench::of(subject, SimulatedBus::with_drives(rates, u64::MAX, drives))
+    Bench::of(target, SimulatedBus::with_drives(rates, u64::MAX, drives))
 }
 
 fn bench() -> Bench {
@@ -78,20 +78,20 @@ fn bench() -> Bench {
 }
 
 /// 1000 r/min and 20000 (r/min)/s, as in the manual's examples.
-fn pace() -> Pace {
-    Pace {
-        velocity: Some(Amount::Drive(1000)),
-        acceleration: Some(Amount::Drive(20_000)),
+fn profile() -> MotionProfile {
+    MotionProfile {
+        velocity: Some(CommandValue::Drive(1000)),
+        acceleration: Some(CommandValue::Drive(20_000)),
         deceleration: None,
     }
 }
 
-fn move_to(course: Course) -> Request {
-    Request::Move { course, pace: pace(), keeps_enabled: false }
+fn move_to(kind: MoveKind) -> Task {
+    Task::Move { kind, profile: profile(), keeps_enabled: false }
 }
 
-fn raw(position: i64) -> Course {
-    Course::Absolute { to: Amount::Drive(position), is_immediate: false }
+fn raw(position: i64) -> MoveKind {
+    MoveKind::Absolute { to: CommandValue::Drive(position), is_immediate: false }
 }
 
 fn is_enabled(bench: &mut Bench) -> bool {
@@ -109,9 +109,9 @@ fn assert_sent(bench: &Bench, rows: &[&str]) {
 }
 
 #[test]
-fn info_tells_alarm_supply_battery_gear_and_special_function() {
+fn info_reports_alarm_supply_battery_gear_and_special_function() {
     let mut bench = bench();
-    let report = bench.run(Request::Info).unwrap();
+    let report = bench.run(Task::Info).unwrap();
     assert_eq!(number(&report, "vendor_id"), f64::from(0x331));
     assert_eq!(number(&report, "alarm"), 0.0);
     assert!((number(&report, "voltage_v") - 24.0).abs() < 0.1, "{report:?}");
@@ -123,7 +123,7 @@ fn info_tells_alarm_supply_battery_gear_and_special_function() {
 }
 
 #[test]
-fn an_absolute_move_is_that_of_the_manual_and_survives_an_ignored_first_target() {
+fn an_absolute_move_is_as_in_the_manual_and_survives_an_ignored_first_target() {
     for quirks in [Quirks::none(), Quirks::default()] {
         let mut bench = with(vec![YzAimParameters { quirks, ..parameters() }]);
         let report = bench.run(move_to(raw(50_000))).unwrap();
@@ -138,11 +138,11 @@ fn an_absolute_move_is_that_of_the_manual_and_survives_an_ignored_first_target()
 }
 
 #[test]
-fn a_relative_move_is_that_of_the_manual_and_is_made_once() {
+fn a_relative_move_is_as_in_the_manual_and_is_sent_once() {
     for quirks in [Quirks::none(), Quirks::default()] {
         let mut bench = with(vec![YzAimParameters { quirks, ..parameters() }]);
         for expected in [50_000, 100_000] {
-            bench.run(move_to(Course::Relative(Amount::Drive(50_000)))).unwrap();
+            bench.run(move_to(MoveKind::Relative(CommandValue::Drive(50_000)))).unwrap();
             // 6060 = 1, 6081, 6083, 000F, 607A = 50000, 004F, 005F, 6041?
             assert_sent(&bench, &["V019", "V023", "V025", "V017", "V021", "V027", "V029", "V031"]);
             let counts = bench.observe().position_counts;
@@ -152,25 +152,25 @@ fn a_relative_move_is_that_of_the_manual_and_is_made_once() {
 }
 
 #[test]
-fn a_target_outside_the_limits_is_refused_and_the_drive_is_left_as_it_is() {
+fn a_target_outside_the_limits_is_refused_and_the_drive_is_not_changed() {
     let mut bench = bench();
-    for course in [
-        Course::Absolute { to: Amount::Joint(20.1), is_immediate: false },
-        Course::Relative(Amount::Joint(-20.1)),
-        Course::Reciprocate { to: Amount::Joint(21.0), times: 1, dwell_ns: 0 },
+    for kind in [
+        MoveKind::Absolute { to: CommandValue::Joint(20.1), is_immediate: false },
+        MoveKind::Relative(CommandValue::Joint(-20.1)),
+        MoveKind::Reciprocate { to: CommandValue::Joint(21.0), times: 1, dwell_ns: 0 },
     ] {
-        let failed = bench.run(move_to(course)).unwrap_err();
+        let failed = bench.run(move_to(kind)).unwrap_err();
         assert!(matches!(failed.failure, Failure::OutsideLimits { .. }), "{failed:?}");
         assert!(bench.sent.iter().all(|frame| frame.payload()[0] == 0x40), "{:?}", bench.sent);
     }
 }
 
 #[test]
-fn a_velocity_is_that_of_the_manual_and_ends_in_a_ramp() {
+fn a_velocity_run_is_as_in_the_manual_and_ends_with_a_ramp() {
     let mut bench = bench();
-    let request = Request::Velocity {
-        velocity: Amount::Drive(1000),
-        pace: Pace::default(),
+    let request = Task::Velocity {
+        velocity: CommandValue::Drive(1000),
+        profile: MotionProfile::default(),
         duration_ns: Some(SECOND),
         keeps_enabled: false,
     };
@@ -183,14 +183,14 @@ fn a_velocity_is_that_of_the_manual_and_ends_in_a_ramp() {
 }
 
 #[test]
-fn reciprocating_and_continuous_moves_end_at_rest() {
+fn reciprocating_and_continuous_moves_end_at_standstill() {
     let mut bench = bench();
-    let course = Course::Reciprocate { to: Amount::Joint(1.0), times: 2, dwell_ns: 20 * MS };
-    let report = bench.run(move_to(course)).unwrap();
+    let kind = MoveKind::Reciprocate { to: CommandValue::Joint(1.0), times: 2, dwell_ns: 20 * MS };
+    let report = bench.run(move_to(kind)).unwrap();
     assert_eq!(number(&report, "moves"), 4.0);
     assert!(bench.observe().position.abs() < 1e-2);
-    let course = Course::Continuous { is_forward: false, duration_ns: None };
-    let failed = bench.run(move_to(course)).unwrap_err();
+    let kind = MoveKind::Continuous { is_forward: false, duration_ns: None };
+    let failed = bench.run(move_to(kind)).unwrap_err();
     assert!(matches!(failed.failure, Failure::AtLimit { .. }), "{failed:?}");
     let position = bench.observe().position;
     assert!((-20.0..-15.0).contains(&position), "{position}");
@@ -199,12 +199,14 @@ fn reciprocating_and_continuous_moves_end_at_rest() {
 
 #[test]
 fn ctrl_c_stops_and_disables_in_every_mode() {
-    let forever = Course::Continuous { is_forward: true, duration_ns: None };
-    let slow = Pace { velocity: Some(Amount::Drive(100)), ..pace() };
-    let far = Course::Absolute { to: Amount::Drive(200_000), is_immediate: false };
-    for (course, at) in [(forever, "run"), (far, "move"), (Course::Relative(Amount::Joint(5.0)), "move")] {
+    let forever = MoveKind::Continuous { is_forward: true, duration_ns: None };
+    let slow = MotionProfile { velocity: Some(CommandValue::Drive(100)), ..profile() };
+    let far = MoveKind::Absolute { to: CommandValue::Drive(200_000), is_immediate: false };
+    for (kind, at) in
+        [(forever, "run"), (far, "move"), (MoveKind::Relative(CommandValue::Joint(5.0)), "move")]
+    {
         let mut bench = bench();
-        let request = Request::Move { course, pace: slow, keeps_enabled: true };
+        let request = Task::Move { kind, profile: slow, keeps_enabled: true };
         let failed = bench.run_interrupted(request, |step| usize::from(step == at)).unwrap_err();
         assert_eq!((failed.failure, failed.step), (Failure::Interrupted, at));
         assert!(!is_enabled(&mut bench));
@@ -213,33 +215,33 @@ fn ctrl_c_stops_and_disables_in_every_mode() {
 }
 
 #[test]
-fn torque_stays_on_only_when_that_is_asked_for() {
+fn torque_stays_on_only_on_request() {
     let mut bench = bench();
-    bench.run(Request::Enable { hold_ns: Some(SECOND / 5), keeps_enabled: false }).unwrap();
+    bench.run(Task::Enable { hold_ns: Some(SECOND / 5), keeps_enabled: false }).unwrap();
     assert!(!is_enabled(&mut bench));
-    bench.run(Request::Enable { hold_ns: None, keeps_enabled: true }).unwrap();
+    bench.run(Task::Enable { hold_ns: None, keeps_enabled: true }).unwrap();
     assert!(is_enabled(&mut bench));
-    // The watch over the master is armed again by a heartbeat only, which nobody sends.
-    bench.run(Request::Watch { every_ns: 100 * MS, duration_ns: Some(5 * SECOND) }).unwrap();
+    // Only a heartbeat would arm the heartbeat watchdog again, and no node sends one.
+    bench.run(Task::Watch { every_ns: 100 * MS, duration_ns: Some(5 * SECOND) }).unwrap();
     assert!(is_enabled(&mut bench));
     assert_eq!(read(&mut bench, "consumer heartbeat time"), 0x007F_07D0);
-    assert_eq!(bench.run(Request::Save).unwrap_err().failure, Failure::Enabled);
-    bench.run(Request::Disable).unwrap();
+    assert_eq!(bench.run(Task::Save).unwrap_err().failure, Failure::Enabled);
+    bench.run(Task::Disable).unwrap();
     assert!(!is_enabled(&mut bench));
 }
 
 #[test]
-fn an_axis_that_is_enabled_already_is_not_let_go_for_the_next_motion() {
+fn an_enabled_axis_stays_enabled_for_the_next_motion() {
     let mut bench = bench();
-    bench.run(Request::Enable { hold_ns: None, keeps_enabled: true }).unwrap();
-    let velocity = Request::Velocity {
-        velocity: Amount::Drive(300),
-        pace: pace(),
+    bench.run(Task::Enable { hold_ns: None, keeps_enabled: true }).unwrap();
+    let velocity = Task::Velocity {
+        velocity: CommandValue::Drive(300),
+        profile: profile(),
         duration_ns: Some(SECOND / 2),
         keeps_enabled: true,
     };
-    let course = Course::Relative(Amount::Drive(20_000));
-    for request in [velocity, Request::Move { course, pace: pace(), keeps_enabled: true }] {
+    let kind = MoveKind::Relative(CommandValue::Drive(20_000));
+    for request in [velocity, Task::Move { kind, profile: profile(), keeps_enabled: true }] {
         bench.run(request).unwrap();
         let shutdown = Frame::of(Id::canopen(0x600, NODE), [0x2B, 0x40, 0x60, 0, 0x06, 0, 0, 0]);
         assert!(!bench.sent.contains(&shutdown), "{:?}", bench.sent);
@@ -248,11 +250,11 @@ fn an_axis_that_is_enabled_already_is_not_let_go_for_the_next_motion() {
 }
 
 #[test]
-fn a_drive_whose_master_dies_in_a_motion_stops_by_itself() {
+fn a_drive_stops_by_itself_when_its_master_dies_in_a_motion() {
     let mut bench = bench();
-    let request = Request::Velocity {
-        velocity: Amount::Drive(300),
-        pace: pace(),
+    let request = Task::Velocity {
+        velocity: CommandValue::Drive(300),
+        profile: profile(),
         duration_ns: None,
         keeps_enabled: false,
     };
@@ -263,13 +265,13 @@ fn a_drive_whose_master_dies_in_a_motion_stops_by_itself() {
 }
 
 #[test]
-fn homing_finds_the_switch_by_the_mode_alone() {
+fn homing_finds_the_switch_by_setting_the_mode() {
     let mut bench = with(vec![YzAimParameters {
         switches: HomingSwitches { dir: Some(Switch::below(-0.6)), pu: None },
         end_stops: Some(EndStops { lowest: -1.0, highest: 1.0 }),
         ..parameters()
     }]);
-    let home = |method| Request::Home { method, within_ns: 30 * SECOND, is_forced: false };
+    let home = |method| Task::Home { method, within_ns: 30 * SECOND, is_forced: false };
     let report = bench.run(home(Some(17))).unwrap();
     assert_sent(&bench, &["V046", "V048", "V050"]);
     assert!(number(&report, "home_counts").abs() < 300.0, "{report:?}");
@@ -285,7 +287,7 @@ fn homing_finds_the_switch_by_the_mode_alone() {
 #[test]
 fn homing_that_takes_too_long_is_halted() {
     let mut bench = bench();
-    let request = Request::Home { method: Some(17), within_ns: SECOND, is_forced: false };
+    let request = Task::Home { method: Some(17), within_ns: SECOND, is_forced: false };
     let failed = bench.run(request).unwrap_err();
     assert!(matches!(failed.failure, Failure::Homing(words) if words.contains("in time")), "{failed:?}");
     let seen = bench.observe();
@@ -296,22 +298,22 @@ fn homing_that_takes_too_long_is_halted() {
 fn the_multi_turn_zero_is_set_with_consent_and_verified() {
     let mut bench = bench();
     bench.run(move_to(raw(40_000))).unwrap();
-    assert!(bench.run(Request::Zero { is_agreed: false }).unwrap_err().failure.is_refusal());
-    let report = bench.run(Request::Zero { is_agreed: true }).unwrap();
+    assert!(bench.run(Task::Zero { is_confirmed: false }).unwrap_err().failure.is_refusal());
+    let report = bench.run(Task::Zero { is_confirmed: true }).unwrap();
     assert_sent(&bench, &["D016", "D017"]);
     assert!((0.0..=9.0).contains(&number(&report, "after_counts")), "{report:?}");
 }
 
 #[test]
-fn what_is_stored_is_there_after_a_power_cycle() {
+fn stored_parameters_survive_a_power_cycle() {
     let mut bench = bench();
-    let gains = |position_proportional| Request::Gains {
+    let gains = |position_proportional| Task::Gains {
         position_proportional,
         velocity_proportional: None,
         velocity_integration: None,
     };
     bench.run(gains(Some(2_500))).unwrap();
-    bench.run(Request::Save).unwrap();
+    bench.run(Task::Save).unwrap();
     assert_sent(&bench, &["D013", "D014"]);
     bench.run(gains(Some(900))).unwrap();
     bench.bus.power_cycle(NODE).unwrap();
@@ -319,68 +321,68 @@ fn what_is_stored_is_there_after_a_power_cycle() {
 }
 
 #[test]
-fn another_node_number_needs_the_drive_alone_on_its_bus() {
+fn another_node_id_needs_the_drive_alone_on_its_bus() {
     let mut bench = with(vec![parameters(), YzAimParameters { node: 5, ..parameters() }]);
-    let failed = bench.run(Request::SetId { node: 2 }).unwrap_err();
+    let failed = bench.run(Task::SetId { node: 2 }).unwrap_err();
     assert!(matches!(&failed.failure, Failure::Unsuitable(words) if words.contains("(5)")), "{failed:?}");
     let mut bench = self::bench();
-    bench.run(Request::SetId { node: 2 }).unwrap();
+    bench.run(Task::SetId { node: 2 }).unwrap();
     assert_sent(&bench, &["D026", "D013", "D014"]);
     bench.bus.power_cycle(NODE).unwrap();
-    bench.subject.node = 2;
-    bench.run(Request::Info).unwrap();
+    bench.target.node = 2;
+    bench.run(Task::Info).unwrap();
 }
 
 #[test]
 fn the_bit_rate_is_changed_by_four_writes_in_order() {
     let mut bench = bench();
-    bench.run(Request::SetBitRate { bit_rate: 500_000 }).unwrap();
+    bench.run(Task::SetBitRate { bit_rate: 500_000 }).unwrap();
     assert_sent(&bench, &["D019", "D021", "D024", "D025"]);
     assert!(bench.notes.iter().any(|note| note.contains("power-cycle") && note.contains("6083:00 = 20000")));
-    let failed = bench.run(Request::SetBitRate { bit_rate: 800_000 }).unwrap_err();
+    let failed = bench.run(Task::SetBitRate { bit_rate: 800_000 }).unwrap_err();
     assert!(matches!(failed.failure, Failure::Unsupported { .. }), "{failed:?}");
 }
 
 #[test]
-fn alarms_are_named_and_each_is_cleared_in_its_way() {
+fn alarms_are_named_and_each_is_cleared_in_its_own_way() {
     let mut bench = bench();
-    bench.run(Request::Info).unwrap();
-    bench.bus.inject(NODE, DriveFault::BlockedRotor).unwrap();
+    bench.run(Task::Info).unwrap();
+    bench.bus.inject_fault(NODE, DriveFault::BlockedRotor).unwrap();
     let failed = bench.run(move_to(raw(1000))).unwrap_err();
     assert!(failed.failure.to_string().contains("12h (blocked rotor)"), "{failed:?}");
-    bench.run(Request::ClearFault { is_agreed: false }).unwrap();
+    bench.run(Task::ClearFault { is_confirmed: false }).unwrap();
     assert_sent(&bench, &["D027"]);
-    bench.bus.inject(NODE, DriveFault::MultiTurnBattery).unwrap();
-    let failed = bench.run(Request::ClearFault { is_agreed: false }).unwrap_err();
+    bench.bus.inject_fault(NODE, DriveFault::MultiTurnBattery).unwrap();
+    let failed = bench.run(Task::ClearFault { is_confirmed: false }).unwrap_err();
     assert!(matches!(failed.failure, Failure::NeedsConsent { .. }), "{failed:?}");
-    bench.run(Request::ClearFault { is_agreed: true }).unwrap();
+    bench.run(Task::ClearFault { is_confirmed: true }).unwrap();
     assert_sent(&bench, &["D016", "D017"]);
     bench.run(move_to(raw(1000))).unwrap();
 }
 
 #[test]
-fn a_lost_master_is_cleared_by_a_heartbeat_and_nothing_moves() {
+fn a_lost_master_is_cleared_by_a_heartbeat_without_motion() {
     let mut bench = bench();
-    bench.run(Request::Enable { hold_ns: None, keeps_enabled: true }).unwrap();
-    // Another master sent one heartbeat, and has died.
+    bench.run(Task::Enable { hold_ns: None, keeps_enabled: true }).unwrap();
+    // Another master sent one heartbeat and then stopped.
     let now_ns = bench.clock.now_ns();
     bench.bus.send(now_ns, &[vector("D011")]);
-    bench.run(Request::Watch { every_ns: 100 * MS, duration_ns: Some(3 * SECOND) }).unwrap();
+    bench.run(Task::Watch { every_ns: 100 * MS, duration_ns: Some(3 * SECOND) }).unwrap();
     assert_eq!(read(&mut bench, "alarm code"), 0x20);
     let before = bench.observe().position_counts;
-    let report = bench.run(Request::ClearFault { is_agreed: false }).unwrap();
+    let report = bench.run(Task::ClearFault { is_confirmed: false }).unwrap();
     assert_eq!(report.get("cleared"), Some(&true.into()));
     assert_sent(&bench, &["D011"]);
-    bench.run(Request::Watch { every_ns: 100 * MS, duration_ns: Some(5 * SECOND) }).unwrap();
+    bench.run(Task::Watch { every_ns: 100 * MS, duration_ns: Some(5 * SECOND) }).unwrap();
     assert_eq!(read(&mut bench, "alarm code"), 0);
     assert!((bench.observe().position_counts - before).abs() < 10);
     assert!(!is_enabled(&mut bench));
 }
 
 #[test]
-fn what_moves_the_motor_at_power_up_needs_consent() {
+fn motion_at_power_up_needs_consent() {
     let mut bench = bench();
-    let auto_home = |is_on, is_agreed| Request::AutoHome { is_on, is_agreed };
+    let auto_home = |is_on, is_confirmed| Task::AutoHome { is_on, is_confirmed };
     assert!(bench.run(auto_home(true, false)).unwrap_err().failure.is_refusal());
     let report = bench.run(auto_home(true, true)).unwrap();
     assert_sent(&bench, &["D018", "D013", "D014"]);
@@ -392,7 +394,7 @@ fn what_moves_the_motor_at_power_up_needs_consent() {
 #[test]
 fn interpolation_is_set_up_and_stored_without_a_ramp() {
     let mut bench = bench();
-    bench.run(Request::Interpolation).unwrap();
+    bench.run(Task::Interpolation).unwrap();
     assert_sent(&bench, &["D012", "D013", "D014"]);
     bench.bus.power_cycle(NODE).unwrap();
     assert_eq!(read(&mut bench, "special function"), 7);
@@ -400,27 +402,27 @@ fn interpolation_is_set_up_and_stored_without_a_ramp() {
 }
 
 #[test]
-fn the_gear_is_read_and_changed_and_keys_are_no_numerators() {
+fn the_gear_is_read_and_changed_and_command_keys_are_refused() {
     let mut bench = bench();
-    let report = bench.run(Request::Gear { ratio: Some((256, 25)) }).unwrap();
+    let report = bench.run(Task::Gear { ratio: Some((256, 25)) }).unwrap();
     assert_eq!(number(&report, "pulses_per_turn"), 3200.0);
-    let failed = bench.run(Request::Gear { ratio: Some((60_006, 1)) }).unwrap_err();
+    let failed = bench.run(Task::Gear { ratio: Some((60_006, 1)) }).unwrap_err();
     assert!(failed.failure.is_refusal(), "{failed:?}");
     assert_eq!(read(&mut bench, "electronic gear numerator"), 256);
 }
 
 #[test]
-fn an_object_that_the_drive_lacks_ends_in_silence_and_is_named() {
+fn a_missing_object_is_named_after_a_timeout() {
     let mut bench = bench();
     let object = takt::commission::ReadObject {
         address: takt::canopen::object::ObjectAddress::new(0x6502, 0),
         entry: None,
         data_type: None,
     };
-    let failed = bench.run(Request::Read { objects: vec![object] }).unwrap_err();
+    let failed = bench.run(Task::Read { objects: vec![object] }).unwrap_err();
     assert!(failed.failure.to_string().starts_with("reading 6502:00: no reply"), "{failed:?}");
     assert!(matches!(
-        bench.run(Request::Torque { torque: Amount::Drive(1), velocity_limit: None, duration_ns: None }),
+        bench.run(Task::Torque { torque: CommandValue::Drive(1), velocity_limit: None, duration_ns: None }),
         Err(failed) if failed.failure.is_refusal()
     ));
 }

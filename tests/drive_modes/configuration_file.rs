@@ -78,7 +78,7 @@ fn an_object_that_a_yz_aim_does_not_have_is_named_with_the_node_and_the_silence(
         "axis `x` (node 1 on bus `can`), configuration file",
         "writing 0x000005DC to 6084:00",
         "no reply within",
-        "no answer at all for an object that it does not have",
+        "this drive does not answer at all for an object that it does not have",
         "`dcf`",
     ] {
         assert!(text.contains(part), "{part} is not in: {text}");

@@ -5,6 +5,7 @@ mod world;
 
 mod arrival;
 mod bus_budget;
+mod closed_loops;
 mod configuration_file;
 mod interpolation;
 mod profile_position;
@@ -17,3 +18,4 @@ mod statuswords;
 mod stream;
 mod time_of_day;
 mod trajectory_time;
+mod unattended;

@@ -289,7 +289,7 @@ fn a_yz_aim_moves_to_targets_by_its_own_profile_and_stops_without_going_back() {
 fn a_joint_that_does_not_get_to_its_target_stops_the_group_instead_of_moving_for_ever() {
     let mut world = World::holding(erob());
     in_motion(&mut world);
-    world.port(0).bus.afflict(1, Defect::BlockedJoint, true).unwrap();
+    world.port(0).bus.inject_defect(1, Defect::BlockedJoint, true).unwrap();
     world.run_until(|world| !world.stops().is_empty());
     let stops = world.stops();
     let seen = [Rule::FollowingError, Rule::DriveFault, Rule::DriveDisabled];

@@ -3,7 +3,7 @@
 use takt::config::Config;
 use takt::controller::Outcome;
 use takt::sim::erob::{ErobJoint, ErobParameters};
-use takt::sim::{BitRates, Drive, SimulatedBus};
+use takt::sim::{Drive, SimulatedBus, WireBitRates};
 use takt_rt::{DriveState, Phase, ProfileMove, ProfileTarget, Request, Rule, StopCategory};
 
 use crate::world::{World, load, word};
@@ -13,7 +13,7 @@ fn erob_with(config: Config, change: impl Fn(&mut ErobParameters)) -> (Config, V
     let mut parameters = ErobParameters::of(&config.axes[0], &config.simulation);
     change(&mut parameters);
     let drive: Box<dyn Drive> = Box::new(ErobJoint::new(parameters));
-    let rates = BitRates { nominal: 1_000_000, data: None };
+    let rates = WireBitRates { nominal: 1_000_000, data: None };
     let bus = SimulatedBus::with_drives(rates, config.simulation.longest_gap_ns, vec![drive]);
     (config, vec![bus])
 }

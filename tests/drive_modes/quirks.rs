@@ -3,7 +3,7 @@
 use takt::config::Config;
 use takt::controller::Outcome;
 use takt::sim::yz_aim::{Quirks, YzAimJoint, YzAimParameters};
-use takt::sim::{BitRates, Drive, SimulatedBus};
+use takt::sim::{Drive, SimulatedBus, WireBitRates};
 use takt_rt::Phase;
 
 use crate::world::{World, counts_per_unit, id, load};
@@ -15,7 +15,7 @@ fn gantry_with(config: Config, change: impl Fn(&mut YzAimParameters)) -> World {
         change(&mut parameters);
         Box::new(YzAimJoint::new(parameters))
     });
-    let rates = BitRates { nominal: 1_000_000, data: None };
+    let rates = WireBitRates { nominal: 1_000_000, data: None };
     let bus = SimulatedBus::with_drives(rates, config.simulation.longest_gap_ns, drives.collect());
     World::on(config, vec![bus])
 }

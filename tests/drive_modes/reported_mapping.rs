@@ -7,7 +7,7 @@ use takt::canopen::eds;
 use takt::config::Config;
 use takt::controller::Outcome;
 use takt::sim::yz_aim::{Quirks, YzAimJoint, YzAimParameters};
-use takt::sim::{BitRates, Drive, SimulatedBus};
+use takt::sim::{Drive, SimulatedBus, WireBitRates};
 
 use crate::world::{World, counts_per_unit, id, load, one_yz_aim, parse, text_of, word};
 
@@ -105,17 +105,14 @@ fn statusword_and_position_may_come_in_two_frames_where_two_were_counted() {
     assert_eq!(world.run_to_the_end(|_| {}), Outcome::Finished, "{:?}", world.stops());
     assert!(world.observe(0).position.abs() < 1e-4);
     let text = refusal(stored("mode = \"csp\"", &split));
-    assert!(text.contains("it has 2 TPDOs to exchange, the load of the bus was checked with 1"), "{text}");
+    assert!(text.contains("the drive exchanges 2 TPDOs, but the bus load was checked with 1"), "{text}");
     assert!(text.contains("`feedback`"), "{text}");
 }
 
 #[test]
 fn the_factorys_mapping_has_no_target_and_is_refused_by_the_object() {
     let text = refusal(stored("mode = \"csp\"", &[pdo('T', 4, 1, OFF)]));
-    assert!(
-        text.contains("no RPDO that is switched on carries 607A:00 (target position), which the axis needs"),
-        "{text}"
-    );
+    assert!(text.contains("no valid RPDO carries 607A:00 (target position), which the axis needs"), "{text}");
     assert!(text.contains("mapping = \"written\""), "{text}");
 }
 
@@ -124,15 +121,11 @@ fn what_does_not_suit_the_mode_is_refused_by_object_type_and_number() {
     let command = pdo('R', 1, 1, Some((1, &[CONTROLWORD, TARGET])));
     let feedback = pdo('T', 1, 1, Some((1, &[STATUSWORD, POSITION])));
     for (mode, pdos, words) in [
-        (
-            "csv",
-            vec![command.clone(), feedback.clone()],
-            "no RPDO that is switched on carries 60FF:00 (target velocity)",
-        ),
+        ("csv", vec![command.clone(), feedback.clone()], "no valid RPDO carries 60FF:00 (target velocity)"),
         (
             "csp",
             vec![command.clone(), pdo('T', 1, 1, Some((1, &[STATUSWORD])))],
-            "no TPDO that is switched on carries 6064:00 (position)",
+            "no valid TPDO carries 6064:00 (position)",
         ),
         (
             "csp",
@@ -170,7 +163,7 @@ fn state_first(config: Config) -> World {
         let quirks = Quirks { reports_state_first: true, ..parameters.quirks };
         Box::new(YzAimJoint::new(YzAimParameters { quirks, ..parameters }))
     });
-    let rates = BitRates { nominal: 1_000_000, data: None };
+    let rates = WireBitRates { nominal: 1_000_000, data: None };
     let bus = SimulatedBus::with_drives(rates, config.simulation.longest_gap_ns, drives.collect());
     World::on(config, vec![bus])
 }

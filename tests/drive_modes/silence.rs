@@ -107,7 +107,7 @@ fn an_erob_whose_controller_was_away_has_stopped_and_left_operational_and_stays_
         let mut world = away(load(&format!("erob-modes/{name}.toml")), 300);
         let before = positions_before_return(&mut world);
         let seen = world.observe(0);
-        assert_eq!((seen.nmt, seen.state), (takt::sim::NmtState::Stopped, DriveState::Fault), "{name}");
+        assert_eq!((seen.nmt, seen.state), (takt::sim::NodeState::Stopped, DriveState::Fault), "{name}");
         assert!(seen.velocity.abs() < 1e-3, "{name}: {seen:?}");
         let way = largest_way_to_the_end(&mut world, &before);
         assert!(way <= TOLERANCE_COUNTS, "{name}: {way} counts");

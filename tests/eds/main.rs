@@ -1,4 +1,4 @@
-//! Reading EDS and DCF files as they are met.
+//! Reading of real EDS and DCF files and of files with anomalies.
 
 mod odd_files;
 mod real_files;

@@ -1,14 +1,14 @@
-//! One oddity a row: what it says, the warnings or errors with their lines, and what is made of it.
+//! One anomaly per row: the text, the warnings or errors with their lines, and the resulting dictionary.
 
 use takt::canopen::eds::{
-    self, AccessType, DataType, DictionaryEntry, Findings, ObjectDictionary, ObjectType, Severity, Value,
+    self, AccessType, DataTypeCode, DictionaryEntry, Findings, ObjectDictionary, ObjectType, Severity, Value,
 };
 use takt::canopen::object::ObjectAddress;
 
-/// Follows every row, so that its object 2000 is listed.
+/// The end of every file. It lists object 2000.
 const LIST: &str = "[ManufacturerObjects]\nSupportedObjects=1\n1=0x2000\n";
 
-/// What is found: severity, line, and a part of the message or of the help.
+/// An expected problem: severity, line, and a part of the message or of the help text.
 type Found = (Severity, usize, &'static str);
 
 const fn warning(line: usize, part: &'static str) -> Found {
@@ -23,7 +23,7 @@ fn entry(dictionary: &ObjectDictionary, subindex: u8) -> &DictionaryEntry {
     dictionary.entry(ObjectAddress::new(0x2000, subindex)).unwrap()
 }
 
-/// The default of 2000:subindex in a device of node 5.
+/// The default of 2000:subindex in a device with node ID 5.
 fn number(dictionary: &ObjectDictionary, subindex: u8) -> Option<i128> {
     dictionary.number(ObjectAddress::new(0x2000, subindex), Some(5))
 }
@@ -43,7 +43,7 @@ fn check(what: &str, file: &[u8], expected: &[Found], is_right: impl Fn(&ObjectD
         .iter()
         .map(|problem| {
             let text = format!("{problem}; {}", problem.kind.help());
-            (problem.kind.severity(), findings.place(problem).line, text)
+            (problem.kind.severity(), findings.position(problem).line, text)
         })
         .collect();
     assert_eq!(found.len(), expected.len(), "{what}: {}", show(&findings));
@@ -65,7 +65,7 @@ fn check(what: &str, file: &[u8], expected: &[Found], is_right: impl Fn(&ObjectD
     }
 }
 
-/// A variable 2000 of UNSIGNED32 with these lines more; they begin in line 6.
+/// A variable 2000 of UNSIGNED32 with additional lines, which begin in line 6.
 fn variable(lines: &str) -> String {
     format!("[2000]\nParameterName=x\nObjectType=0x7\nDataType=0x0007\nAccessType=rw\n{lines}\n{LIST}")
 }
@@ -74,40 +74,45 @@ fn variable(lines: &str) -> String {
 fn odd_numbers() {
     type Row = (&'static str, &'static str, &'static [Found], Option<i128>);
     const ROWS: [Row; 24] = [
-        ("the usual node number", "DefaultValue=$NODEID+0x200", &[], Some(0x205)),
+        ("the usual node ID", "DefaultValue=$NODEID+0x200", &[], Some(0x205)),
         ("reversed, lower case", "DefaultValue=0x200 + $nodeid", &[], Some(0x205)),
         ("mixed case", "DefaultValue=$NodeID+512", &[], Some(0x205)),
-        ("node number alone", "DefaultValue=$NODEID", &[], Some(5)),
-        ("no dollar sign", "DefaultValue=NODEID+0x200", &[warning(6, "taken as $NODEID")], Some(0x205)),
-        ("another name", "DefaultValue=$NODE+0x200", &[error(6, "written $NODEID")], None),
-        ("node number subtracted", "DefaultValue=0x200-$NODEID", &[error(6, "no number")], None),
+        ("node ID alone", "DefaultValue=$NODEID", &[], Some(5)),
+        ("no dollar sign", "DefaultValue=NODEID+0x200", &[warning(6, "read as $NODEID")], Some(0x205)),
+        ("another name", "DefaultValue=$NODE+0x200", &[error(6, "as $NODEID")], None),
+        ("node ID subtracted", "DefaultValue=0x200-$NODEID", &[error(6, "not a number")], None),
         ("octal", "DefaultValue=010", &[warning(6, "octal")], Some(8)),
         ("octal that decimal agrees with", "DefaultValue=007", &[], Some(7)),
-        ("octal-looking", "DefaultValue=019", &[warning(6, "taken as decimal")], Some(19)),
+        ("octal-looking", "DefaultValue=019", &[warning(6, "read as decimal")], Some(19)),
         ("capital X", "DefaultValue=0X1F", &[], Some(31)),
         ("assembler's hexadecimal", "DefaultValue=1Fh", &[warning(6, "write 0x")], Some(31)),
-        ("a comment behind it", "DefaultValue=31 ; counts", &[warning(6, "comment")], Some(31)),
-        ("a word", "DefaultValue=true", &[warning(6, "taken as 1")], Some(1)),
+        ("a comment after it", "DefaultValue=31 ; counts", &[warning(6, "comment")], Some(31)),
+        ("a word", "DefaultValue=true", &[warning(6, "read as 1")], Some(1)),
         ("nothing", "DefaultValue=", &[], None),
-        ("no number", "DefaultValue=fast", &[error(6, "no number")], None),
-        ("a fraction", "DefaultValue=1.5", &[error(6, "no number")], None),
+        ("no number", "DefaultValue=fast", &[error(6, "not a number")], None),
+        ("a fraction", "DefaultValue=1.5", &[error(6, "not a number")], None),
         ("too large", "DefaultValue=0x100000000", &[error(6, "UNSIGNED32 is 0 to 4294967295")], None),
         ("negative", "DefaultValue=-1", &[error(6, "UNSIGNED32")], None),
-        ("too large for any type", "DefaultValue=0x10000000000000000", &[error(6, "no number")], None),
+        ("too large for any type", "DefaultValue=0x10000000000000000", &[error(6, "not a number")], None),
         (
             "limits in the wrong order",
             "LowLimit=9\nHighLimit=1\nDefaultValue=3",
             &[warning(7, "above")],
             Some(3),
         ),
-        ("a limit outside the type", "LowLimit=-5\nDefaultValue=3", &[warning(6, "left out")], Some(3)),
+        (
+            "a limit outside the type",
+            "LowLimit=-5\nDefaultValue=3",
+            &[warning(6, "limit was ignored")],
+            Some(3),
+        ),
         (
             "outside the limits",
             "LowLimit=1\nHighLimit=9\nDefaultValue=10",
             &[warning(8, "outside")],
             Some(10),
         ),
-        ("limits that are none", "LowLimit=0\nHighLimit=0\nDefaultValue=10", &[], Some(10)),
+        ("limits that are both 0", "LowLimit=0\nHighLimit=0\nDefaultValue=10", &[], Some(10)),
     ];
     for (what, lines, expected, value) in ROWS {
         check(what, variable(lines).as_bytes(), expected, |dictionary| number(dictionary, 0) == value);
@@ -140,12 +145,7 @@ fn odd_texts() {
     check("Latin-1", &latin1, &[], |dictionary| entry(dictionary, 0).name == "Temperatur °C");
     let comments = plain.replace("ObjectType", "; a comment\n# another\nObjectType");
     check("comments", comments.as_bytes(), &[], seven);
-    check(
-        "a stray line",
-        variable("DefaultValue=7\nand so on").as_bytes(),
-        &[warning(7, "passed over")],
-        seven,
-    );
+    check("a stray line", variable("DefaultValue=7\nand so on").as_bytes(), &[warning(7, "ignored")], seven);
     check("before any section", format!("x=1\n{plain}").as_bytes(), &[warning(1, "before the first")], seven);
     check(
         "an open bracket",
@@ -154,14 +154,11 @@ fn odd_texts() {
         seven,
     );
     check("0x in a section", plain.replacen("[2000]", "[0x2000]", 1).as_bytes(), &[], seven);
-    check("nothing at all", b"", &[error(1, "no section")], |_| false);
+    check("an empty file", b"", &[error(1, "no section")], |_| false);
     check("no objects", b"[FileInfo]\nFileName=x\n", &[error(1, "no section")], |_| false);
-    check(
-        "another format",
-        br#"{"device": "x"}"#,
-        &[warning(1, "passed over"), error(1, "no section")],
-        |_| false,
-    );
+    check("another format", br#"{"device": "x"}"#, &[warning(1, "ignored"), error(1, "no section")], |_| {
+        false
+    });
 }
 
 #[test]
@@ -176,28 +173,28 @@ fn odd_keys_and_sections() {
     check(
         "twice, differing",
         variable("DefaultValue=7\nDefaultValue=8").as_bytes(),
-        &[warning(7, "first one counts")],
+        &[warning(7, "first one is used")],
         seven,
     );
     check(
         "configured twice",
         variable("ParameterValue=7\nParameterValue=8").as_bytes(),
-        &[error(7, "there twice")],
+        &[error(7, "appears twice")],
         |_| false,
     );
     check("first empty", variable("DefaultValue=\nDefaultValue=7").as_bytes(), &[], seven);
     let twice = format!("{}[2000]\nDefaultValue=7\nPDOMapping=1\n", variable(""));
-    check("a section twice", twice.as_bytes(), &[warning(10, "there twice")], |dictionary| {
+    check("a section twice", twice.as_bytes(), &[warning(10, "appears twice")], |dictionary| {
         seven(dictionary) && entry(dictionary, 0).is_mappable
     });
     check(
-        "a slip in a key",
+        "a misspelt key",
         variable("DefautValue=7").as_bytes(),
         &[warning(6, "`DefaultValue`")],
         |dictionary| number(dictionary, 0).is_none(),
     );
     check(
-        "a slip in a section",
+        "a misspelt section",
         format!("{}[DeviceInfos]\n", variable("")).as_bytes(),
         &[warning(10, "[DeviceInfo]")],
         |_| true,
@@ -208,7 +205,7 @@ fn odd_keys_and_sections() {
         &[warning(10, "hexadecimal digits")],
         |_| true,
     );
-    check("a maker's own key", variable("Description=x").as_bytes(), &[], |_| true);
+    check("a manufacturer's own key", variable("Description=x").as_bytes(), &[], |_| true);
     check("a vendor's own section", format!("{}[AcmeStuff]\nx=1\n", variable("")).as_bytes(), &[], |_| true);
 }
 
@@ -219,19 +216,19 @@ fn odd_objects() {
     check(
         "no data type",
         of("ParameterName=x\nAccessType=ro\nDefaultValue=7").as_bytes(),
-        &[warning(1, "its type is not known")],
+        &[warning(1, "its type is unknown")],
         |dictionary| entry(dictionary, 0).data_type.is_none() && number(dictionary, 0) == Some(7),
     );
     check(
         "data type by name",
         of(&named("ParameterName=x\ntype=unsigned16\naccess=ro")).as_bytes(),
         &[warning(3, "write its code, 0x0006")],
-        |dictionary| entry(dictionary, 0).data_type == Some(DataType::UNSIGNED16),
+        |dictionary| entry(dictionary, 0).data_type == Some(DataTypeCode::UNSIGNED16),
     );
     check(
-        "no such data type",
+        "unknown data type",
         of(&named("ParameterName=x\ntype=word\naccess=ro")).as_bytes(),
-        &[error(3, "no data type")],
+        &[error(3, "not a data type")],
         |_| false,
     );
     check(
@@ -243,7 +240,7 @@ fn odd_objects() {
     check(
         "no access type",
         of(&named("ParameterName=x\ntype=7")).as_bytes(),
-        &[warning(1, "taken as ro")],
+        &[warning(1, "read as ro")],
         |dictionary| entry(dictionary, 0).access == AccessType::ReadOnly,
     );
     check(
@@ -260,7 +257,7 @@ fn odd_objects() {
     );
     check("no name", of(&named("type=7\naccess=rw")).as_bytes(), &[warning(1, "`ParameterName`")], |_| true);
     check(
-        "a variable called a record",
+        "a variable declared as a record",
         of(&named("ParameterName=x\nObjectType=9\ntype=7\naccess=rw")).as_bytes(),
         &[warning(3, "is VAR")],
         |dictionary| {
@@ -269,7 +266,7 @@ fn odd_objects() {
         },
     );
     check(
-        "no such object type",
+        "unknown object type",
         of(&named("ParameterName=x\nObjectType=0x11\ntype=7\naccess=rw")).as_bytes(),
         &[warning(3, "from the sections")],
         |_| true,
@@ -295,7 +292,7 @@ fn odd_objects() {
     check(
         "half a byte",
         of(&named("ParameterName=x\ntype=0xA\naccess=rw\nDefaultValue=012")).as_bytes(),
-        &[error(5, "no row of bytes")],
+        &[error(5, "not a list of bytes")],
         |_| false,
     );
     check(
@@ -306,7 +303,7 @@ fn odd_objects() {
     );
 }
 
-/// An object 2000 with two sub-objects of UNSIGNED32 and 7 in the second.
+/// An object 2000 with two sub-objects of UNSIGNED32. The second has the value 7.
 fn record(header: &str) -> String {
     let sub = |number: &str, data_type: &str, value: &str| {
         format!(
@@ -322,42 +319,42 @@ fn odd_sub_objects() {
         number(dictionary, 1) == Some(7) && dictionary.objects[0].object_type.has_sub_objects()
     };
     let header = "[2000]\nParameterName=x\nObjectType=9\nSubNumber=2\n";
-    check("as it should be", record(header).as_bytes(), &[], seven);
+    check("valid", record(header).as_bytes(), &[], seven);
     check(
-        "called a variable",
+        "declared as a variable",
         record(&header.replace('9', "7")).as_bytes(),
         &[warning(3, "is RECORD")],
         seven,
     );
     check(
-        "called nothing",
+        "without an object type",
         record("[2000]\nParameterName=x\n").as_bytes(),
         &[warning(1, "`ObjectType`")],
         seven,
     );
     check(
-        "a count that is wrong",
+        "a wrong count",
         record(&header.replace("=2", "=5")).as_bytes(),
         &[warning(4, "there are 2")],
         seven,
     );
     check("no object", record("").as_bytes(), &[warning(1, "no section [2000]")], seven);
     check(
-        "more than there are",
+        "a wrong number of entries",
         record(header).replace("DefaultValue=1\n", "DefaultValue=4\n").as_bytes(),
-        &[warning(9, "says 4")],
+        &[warning(9, "is 4")],
         seven,
     );
     check(
-        "a type left out",
+        "a missing data type",
         record(header).replace("DataType=5\n", "").as_bytes(),
-        &[warning(5, "taken as UNSIGNED8")],
+        &[warning(5, "read as UNSIGNED8")],
         seven,
     );
     check(
         "sub-index of three digits",
         record(&header.replace("[2000]", "[2000sub100]\n[2000]")).as_bytes(),
-        &[warning(1, "means nothing")],
+        &[warning(1, "is unknown")],
         seven,
     );
 }
@@ -372,17 +369,17 @@ fn compact_sub_objects() {
         names == ["NrOfObjects", "Gain1", "Gain2", "Gain3"]
             && number(dictionary, 0) == Some(3)
             && number(dictionary, 3) == Some(3)
-            && entry(dictionary, 2).data_type == Some(DataType::UNSIGNED16)
+            && entry(dictionary, 2).data_type == Some(DataTypeCode::UNSIGNED16)
     });
     let lists = "[2000Name]\nNrOfEntries=1\n2=Integral\n[2000VALUE]\nNrOfEntries=2\n1=0x10\n2=$NODEID\n[2000Denotation]\n3=spare\n";
-    check("names and values apart", file(lists).as_bytes(), &[], |dictionary| {
+    check("separate names and values", file(lists).as_bytes(), &[], |dictionary| {
         entry(dictionary, 2).name == "Integral"
             && (number(dictionary, 1), number(dictionary, 2), number(dictionary, 3))
                 == (Some(16), Some(5), Some(3))
             && entry(dictionary, 3).denotation.as_deref() == Some("spare")
     });
     check(
-        "a count that is wrong",
+        "a wrong count",
         file("[2000Name]\nNrOfEntries=4\n2=Integral\n").as_bytes(),
         &[warning(9, "there are 1")],
         |_| true,
@@ -406,7 +403,7 @@ fn odd_lists() {
     let exists = |dictionary: &ObjectDictionary| dictionary.object(0x2000).is_some();
     check("not listed", with("").as_bytes(), &[warning(1, "none of the lists")], exists);
     check(
-        "a count that is wrong",
+        "a wrong count",
         with("[ManufacturerObjects]\nSupportedObjects=9\n1=0x2000\n").as_bytes(),
         &[warning(8, "there are 1")],
         exists,
@@ -432,13 +429,13 @@ fn odd_lists() {
     check(
         "no index",
         with("[ManufacturerObjects]\nSupportedObjects=1\n1=0x2000\n2=x\n").as_bytes(),
-        &[warning(10, "passed over")],
+        &[warning(10, "ignored")],
         exists,
     );
 }
 
 #[test]
-fn pdos_that_are_only_counted_are_those_of_the_predefined_connection_set() {
+fn pdos_that_are_only_counted_have_the_predefined_identifiers() {
     let file =
         "[DeviceInfo]\nCompactPDO=0x13\nGranularity=8\nNrOfRXPDO=5\nNrOfTXPDO=1\n".to_owned() + &variable("");
     check("compact PDOs", file.as_bytes(), &[], |dictionary| {
@@ -455,7 +452,7 @@ fn pdos_that_are_only_counted_are_those_of_the_predefined_connection_set() {
 }
 
 #[test]
-fn mappings_that_cannot_be_are_told() {
+fn impossible_mappings_are_reported() {
     let mapping = |value: &str, dummy: &str| {
         format!(
             "[1600]\nParameterName=m\nObjectType=9\nSubNumber=2\n[1600sub0]\nParameterName=n\nDataType=5\nAccessType=rw\n\
@@ -465,12 +462,17 @@ fn mappings_that_cannot_be_are_told() {
         )
     };
     for (what, value, dummy, expected) in [
-        ("as it should be", "0x20000020", "0", &[][..]),
-        ("another length", "0x20000010", "0", &[warning(14, "maps 16 bits, and UNSIGNED32 has 32")]),
-        ("no such object", "0x20010020", "0", &[warning(14, "no such object")]),
+        ("valid", "0x20000020", "0", &[][..]),
+        (
+            "another length",
+            "0x20000010",
+            "0",
+            &[warning(14, "the mapping has 16 bits, but UNSIGNED32 has 32")],
+        ),
+        ("no such object", "0x20010020", "0", &[warning(14, "does not exist")]),
         ("not mappable", "0x16000108", "0", &[warning(14, "PDOMapping is 0")]),
-        ("a dummy", "0x00050008", "1", &[]),
-        ("a dummy that is not allowed", "0x00050008", "0", &[warning(14, "[DummyUsage]")]),
+        ("a dummy entry", "0x00050008", "1", &[]),
+        ("a dummy entry that is not allowed", "0x00050008", "0", &[warning(14, "[DummyUsage]")]),
     ] {
         check(what, mapping(value, dummy).as_bytes(), expected, |_| true);
     }
@@ -492,17 +494,17 @@ fn both_spellings_of_commissioning_are_read() {
         });
     }
     let file = format!("{}[DeviceComissioning]\nNodeID=128\n", variable(""));
-    check("a node that cannot be", file.as_bytes(), &[error(11, "1 to 127")], |_| false);
+    check("an impossible node ID", file.as_bytes(), &[error(11, "1 to 127")], |_| false);
 }
 
 #[test]
-fn every_problem_is_told_at_once_with_line_and_column() {
+fn all_problems_are_reported_together_with_line_and_column() {
     let file = variable("DefaultValue = fast\nLowLimit=slow\nHighLimit=-1\nPDOMapping=maybe");
     let findings = eds::parse("odd.eds", file.as_bytes()).unwrap_err();
     let places: Vec<(usize, usize)> = findings
         .problems()
         .iter()
-        .map(|problem| findings.place(problem))
+        .map(|problem| findings.position(problem))
         .map(|place| (place.line, place.column))
         .collect();
     assert_eq!(places, [(6, 16), (7, 10), (8, 11), (9, 12)]);

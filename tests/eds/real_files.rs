@@ -1,6 +1,6 @@
-//! Whole files.
+//! Complete files.
 
-use takt::canopen::eds::{self, AccessType, DataType, DictionaryEntry, Loaded, ObjectType};
+use takt::canopen::eds::{self, AccessType, DataTypeCode, DictionaryEntry, Loaded, ObjectType};
 use takt::canopen::object::ObjectAddress;
 use takt::canopen::objects::PdoDirection;
 use takt::sim::erob;
@@ -27,7 +27,7 @@ fn the_yz_aim_file_has_its_objects_entries_and_pdo_lengths() {
 }
 
 #[test]
-fn the_yz_aim_identifiers_follow_the_node() {
+fn the_yz_aim_identifiers_depend_on_the_node_id() {
     let dictionary = load("configs/eds/yz-aim.eds").dictionary;
     let ids = |node| -> Vec<u32> {
         dictionary.pdos(Some(node)).iter().filter_map(|pdo| Some(pdo.id?.value())).collect()
@@ -38,7 +38,7 @@ fn the_yz_aim_identifiers_follow_the_node() {
 }
 
 #[test]
-fn the_erob_file_is_in_order_and_maps_what_the_drive_maps_by_default() {
+fn the_erob_file_is_valid_and_has_the_default_mapping_of_the_drive() {
     let loaded = load("configs/eds/erob-canopen.eds");
     assert_eq!(loaded.warnings.problems(), []);
     let dictionary = &loaded.dictionary;
@@ -59,7 +59,7 @@ fn the_erob_file_is_in_order_and_maps_what_the_drive_maps_by_default() {
 }
 
 #[test]
-fn the_erob_file_agrees_with_the_simulated_drive_entry_for_entry() {
+fn every_entry_of_the_erob_file_agrees_with_the_simulated_drive() {
     let dictionary = load("configs/eds/erob-canopen.eds").dictionary;
     let entries: Vec<&DictionaryEntry> = dictionary.entries().collect();
     assert_eq!(entries.len(), erob::OBJECTS.len());
@@ -67,22 +67,23 @@ fn the_erob_file_agrees_with_the_simulated_drive_entry_for_entry() {
         let address = ObjectAddress::new(object.index, object.subindex);
         let entry = dictionary.entry(address).unwrap_or_else(|| panic!("{address} is missing"));
         let code = match object.data_type {
-            erob::DataType::I8 => 2,
-            erob::DataType::I16 => 3,
-            erob::DataType::I32 => 4,
-            erob::DataType::U8 => 5,
-            erob::DataType::U16 => 6,
-            erob::DataType::U32 => 7,
+            erob::ErobDataType::I8 => 2,
+            erob::ErobDataType::I16 => 3,
+            erob::ErobDataType::I32 => 4,
+            erob::ErobDataType::U8 => 5,
+            erob::ErobDataType::U16 => 6,
+            erob::ErobDataType::U32 => 7,
         };
         let access = match object.access {
-            erob::Access::ReadOnly => AccessType::ReadOnly,
-            erob::Access::ReadWrite => AccessType::ReadWrite,
-            erob::Access::WriteOnly => AccessType::WriteOnly,
+            erob::ErobAccess::ReadOnly => AccessType::ReadOnly,
+            erob::ErobAccess::ReadWrite => AccessType::ReadWrite,
+            erob::ErobAccess::WriteOnly => AccessType::WriteOnly,
         };
-        assert_eq!((entry.data_type, entry.access), (Some(DataType(code)), access), "{address}");
+        assert_eq!((entry.data_type, entry.access), (Some(DataTypeCode(code)), access), "{address}");
         assert_eq!(entry.is_mappable, object.is_mappable, "{address}");
-        // A default that the file leaves open is one that nobody knows.
-        if let Some(bytes) = entry.default.as_ref().map(|stated| stated.value.encode(DataType(code), Some(2)))
+        // A default that the file leaves open is unknown.
+        if let Some(bytes) =
+            entry.default.as_ref().map(|stated| stated.value.encode(DataTypeCode(code), Some(2)))
         {
             let default = object.default + if object.adds_node { 2 } else { 0 };
             let length = object.data_type.bytes();

@@ -1,11 +1,11 @@
-//! Whatever the bytes are, a file is read or refused, and what is wrong with it can be shown.
+//! The reader accepts or refuses any bytes, and every problem can be displayed.
 
 use proptest::prelude::*;
 use takt::canopen::eds::{self, Findings};
 
 fn show(findings: &Findings) {
     for problem in findings.problems() {
-        let place = findings.place(problem);
+        let place = findings.position(problem);
         assert!(place.line >= 1 && place.column >= 1);
         let _ = (problem.to_string(), problem.kind.help(), findings.source_line(problem));
     }
@@ -26,7 +26,7 @@ fn read(bytes: &[u8]) {
     }
 }
 
-/// What lines that are nearly right are made of, so that reading gets far.
+/// Parts of almost valid lines, so that the reader gets past the first check.
 const HEADERS: [&str; 20] = [
     "[1018]",
     "[1018sub0]",

@@ -7,18 +7,18 @@ use std::sync::Arc;
 use takt::bus::port::Port;
 use takt::config::{Axis, Config, Feedback};
 use takt::controller::{Outcome, VirtualRun};
-use takt::faults::{Rehearsal, Scenario, Tidings};
+use takt::faults::{FaultEvents, FaultInjector, Scenario};
 use takt::sim::Observation;
 use takt_rt::{AxisSnapshot, DriveState, EventKind, Phase, StopReason};
 
-/// Twenty seconds are more than its shortened program takes.
+/// Timeout: twenty seconds are longer than the shortened program.
 const CYCLES_AT_MOST: u64 = 20_000;
 
 pub fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("configs")
 }
 
-/// The example with two of its moves, drives that are up at once, and the mode of operation among the feedback.
+/// The example with two of its moves, fast-booting drives, and the mode of operation in the feedback.
 pub fn arm() -> Config {
     let mut config = Config::load(&folder().join("arm6-erob.toml")).unwrap();
     config.program.moves.truncate(2);
@@ -36,31 +36,31 @@ pub fn scenario(text: &str, config: &Config) -> Scenario {
     })
 }
 
-/// What is left of a run.
+/// The results of a run.
 #[derive(Debug)]
 pub struct Played {
     pub outcome: Option<Outcome>,
-    /// Every phase that the group went through, one after the other.
+    /// Every phase of the group, in order.
     pub phases: Vec<Phase>,
     pub stops: Vec<StopReason>,
     /// Emergency messages: the axis and the code.
     pub emergencies: Vec<(u8, u16)>,
     pub missed_slots: u64,
-    pub news: Vec<String>,
-    /// Frames concerned, a fault each.
+    pub events: Vec<String>,
+    /// The affected frames of each fault.
     pub frames: Vec<u64>,
-    /// Everything the cycle left behind, as one number.
+    /// A hash of everything that the cycle recorded.
     pub fingerprint: u64,
-    /// The largest step of any set-point between two cycles in which the drive really was enabled, in velocity limits
+    /// The largest step of any set-point between two cycles in which the drive was really enabled, in velocity limits
     /// of its axis.
     pub largest_step: f64,
-    /// The largest acceleration of each joint in truth, from cycle to cycle, in acceleration limits of its axis.
+    /// The largest true acceleration of each joint between two cycles, in acceleration limits of its axis.
     pub accelerations: Vec<f64>,
-    /// From the beginning of the last fault to the command phase in which the first stop was begun.
+    /// Time from the beginning of the last fault to the command phase in which the first stop began.
     pub detection_ms: Option<f64>,
     /// The last state of each bus.
     pub health: Vec<takt_rt::BusHealth>,
-    /// The speed of the fastest joint at the end of the run, in truth.
+    /// The true speed of the fastest joint at the end of the run.
     pub speed_at_end: f64,
 }
 
@@ -69,11 +69,11 @@ pub fn play(config: &Config, text: &str) -> Played {
 }
 
 pub fn play_scenario(config: &Config, scenario: Scenario) -> Played {
-    let rehearsal = Arc::new(Rehearsal::new(scenario));
-    let (mut run, mut log) = VirtualRun::rehearsed(config, Arc::clone(&rehearsal)).unwrap();
-    let mut tidings = Tidings::default();
+    let fault_injector = Arc::new(FaultInjector::new(scenario));
+    let (mut run, mut log) = VirtualRun::with_faults(config, Arc::clone(&fault_injector)).unwrap();
+    let mut fault_events = FaultEvents::default();
     let mut hasher = DefaultHasher::new();
-    let (mut phases, mut stops, mut emergencies, mut news) = (vec![], vec![], vec![], vec![]);
+    let (mut phases, mut stops, mut emergencies, mut events) = (vec![], vec![], vec![], vec![]);
     let mut last: Vec<Option<f64>> = vec![None; config.axes.len()];
     let mut largest_step = 0.0_f64;
     let mut velocities = vec![0.0; config.axes.len()];
@@ -90,7 +90,7 @@ pub fn play_scenario(config: &Config, scenario: Scenario) -> Played {
                 _ => {}
             }
         }
-        news.extend(tidings.next(&rehearsal).iter().map(ToString::to_string));
+        events.extend(fault_events.next(&fault_injector).iter().map(ToString::to_string));
         let snapshot = run.snapshot();
         if phases.last() != Some(&snapshot.phase) {
             phases.push(snapshot.phase);
@@ -111,7 +111,7 @@ pub fn play_scenario(config: &Config, scenario: Scenario) -> Played {
         }
     });
     let snapshot = run.snapshot();
-    let began_ns = rehearsal.courses().filter_map(|(_, course)| course.began_ns()).max();
+    let began_ns = fault_injector.progress().filter_map(|(_, progress)| progress.began_ns()).max();
     let stopped_ns = stops
         .first()
         .map(|stop: &StopReason| (stop.slot + 1) * config.cycle.period_ns + config.cycle.command_phase_ns);
@@ -121,8 +121,8 @@ pub fn play_scenario(config: &Config, scenario: Scenario) -> Played {
         stops,
         emergencies,
         missed_slots: snapshot.missed_slots,
-        news,
-        frames: rehearsal.courses().map(|(_, course)| course.frames()).collect(),
+        events,
+        frames: fault_injector.progress().map(|(_, progress)| progress.frames()).collect(),
         fingerprint: hasher.finish(),
         largest_step,
         accelerations,
@@ -134,7 +134,7 @@ pub fn play_scenario(config: &Config, scenario: Scenario) -> Played {
     }
 }
 
-/// The set-points of the drives that follow them in truth.
+/// The set-points of the drives that are really enabled.
 fn enabled_set_points(config: &Config, run: &mut VirtualRun<Port>) -> Vec<Option<f64>> {
     let snapshot = run.snapshot();
     let of = |(axis, shown): (&Axis, &AxisSnapshot)| {
@@ -144,7 +144,7 @@ fn enabled_set_points(config: &Config, run: &mut VirtualRun<Port>) -> Vec<Option
     config.axes.iter().zip(&snapshot.axes).map(of).collect()
 }
 
-/// The truth about the drive of an axis.
+/// The true state of the drive of an axis.
 fn truth(run: &mut VirtualRun<Port>, axis: &Axis) -> Observation {
     run.ports()[axis.bus].simulated_mut().unwrap().observe(axis.node).unwrap()
 }

@@ -19,7 +19,7 @@ fn run(faults: &Path) -> Output {
 }
 
 #[test]
-fn a_rehearsal_says_when_each_fault_began_and_the_run_ends_in_the_stop() {
+fn a_run_with_faults_reports_when_each_began_and_ends_with_the_stop() {
     let output = run(&folder().join("faults/drive-reboots.toml"));
     let said = String::from_utf8(output.stderr).unwrap();
     assert!(said.contains("fault `reboot` on axis joint3 (line 5) has begun"), "{said}");
@@ -29,7 +29,7 @@ fn a_rehearsal_says_when_each_fault_began_and_the_run_ends_in_the_stop() {
 }
 
 #[test]
-fn a_wrong_scenario_is_refused_before_anything_moves() {
+fn an_invalid_scenario_is_refused_before_any_motion() {
     let place = tempfile::tempdir().unwrap();
     let faults = place.path().join("wrong.toml");
     fs::write(&faults, "[[fault]]\nkind = \"stall\"\naxis = \"elbow\"\n").unwrap();

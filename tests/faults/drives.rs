@@ -1,9 +1,9 @@
-//! What is wrong with the simulated drives, seen from the bus.
+//! The defects of the simulated drives, as seen on the bus.
 
 use std::path::Path;
 
 use takt::config::Config;
-use takt::sim::{AfflictError, Defect, SimulatedBus};
+use takt::sim::{Defect, InjectDefectError, SimulatedBus};
 use takt_rt::{BusPort, Frame, Id, ReceiveBatch};
 
 fn bus() -> SimulatedBus {
@@ -12,12 +12,12 @@ fn bus() -> SimulatedBus {
     config.axes.iter_mut().for_each(|axis| axis.simulated.power_up_ns = 1_000_000);
     config.simulation.longest_gap_ns = u64::MAX;
     let mut bus = SimulatedBus::new(&config, 0);
-    heard(&mut bus, 0);
-    heard(&mut bus, 3_000_000);
+    received(&mut bus, 0);
+    received(&mut bus, 3_000_000);
     bus
 }
 
-fn heard(bus: &mut SimulatedBus, now_ns: u64) -> Vec<Frame> {
+fn received(bus: &mut SimulatedBus, now_ns: u64) -> Vec<Frame> {
     let mut batch = ReceiveBatch::new();
     bus.receive(now_ns, &mut batch);
     batch.iter().map(|received| received.frame).collect()
@@ -26,14 +26,14 @@ fn heard(bus: &mut SimulatedBus, now_ns: u64) -> Vec<Frame> {
 const READ_DEVICE_TYPE: [u8; 8] = [0x40, 0x00, 0x10, 0, 0, 0, 0, 0];
 
 #[test]
-fn a_mute_sdo_server_gives_no_reply_until_it_is_mended() {
+fn a_silent_sdo_server_does_not_reply_until_the_defect_is_removed() {
     let mut bus = bus();
-    bus.afflict(1, Defect::SilentSdoServer, true).unwrap();
+    bus.inject_defect(1, Defect::SilentSdoServer, true).unwrap();
     bus.send(4_000_000, &[Frame::of(Id::canopen(0x600, 1), READ_DEVICE_TYPE)]);
-    assert_eq!(heard(&mut bus, 8_000_000), []);
-    bus.afflict(1, Defect::SilentSdoServer, false).unwrap();
+    assert_eq!(received(&mut bus, 8_000_000), []);
+    bus.inject_defect(1, Defect::SilentSdoServer, false).unwrap();
     bus.send(9_000_000, &[Frame::of(Id::canopen(0x600, 1), READ_DEVICE_TYPE)]);
-    assert_eq!(heard(&mut bus, 12_000_000).len(), 1);
+    assert_eq!(received(&mut bus, 12_000_000).len(), 1);
 }
 
 #[test]
@@ -42,8 +42,8 @@ fn an_emergency_message_is_sent_without_a_fault_and_an_alarm_with_one() {
         [(Defect::Emergency { code: 0x4210 }, 0x4210, false), (Defect::Alarm { code: 0x7500 }, 0x7500, true)]
     {
         let mut bus = bus();
-        bus.afflict(2, defect, true).unwrap();
-        let frames = heard(&mut bus, 6_000_000);
+        bus.inject_defect(2, defect, true).unwrap();
+        let frames = received(&mut bus, 6_000_000);
         assert_eq!((frames.len(), frames[0].id()), (1, Id::canopen(0x080, 2)));
         assert_eq!(frames[0].first_word() as u16, code);
         let seen = bus.observe(2).unwrap();
@@ -52,10 +52,10 @@ fn an_emergency_message_is_sent_without_a_fault_and_an_alarm_with_one() {
 }
 
 #[test]
-fn an_encoder_jump_moves_the_counts_and_not_the_joint() {
+fn an_encoder_jump_changes_the_counts_but_not_the_joint() {
     let mut bus = bus();
     let before = bus.observe(3).unwrap();
-    bus.afflict(3, Defect::EncoderJump { distance: 0.1 }, true).unwrap();
+    bus.inject_defect(3, Defect::EncoderJump { distance: 0.1 }, true).unwrap();
     let after = bus.observe(3).unwrap();
     assert_eq!(after.position, before.position);
     // This axis is reversed.
@@ -67,26 +67,26 @@ fn an_encoder_jump_moves_the_counts_and_not_the_joint() {
 fn a_blocked_joint_withstands_any_torque() {
     let mut bus = bus();
     let before = bus.observe(1).unwrap().position;
-    bus.afflict(1, Defect::BlockedJoint, true).unwrap();
+    bus.inject_defect(1, Defect::BlockedJoint, true).unwrap();
     bus.set_load_torque(1, 1e6).unwrap();
-    heard(&mut bus, 100_000_000);
+    received(&mut bus, 100_000_000);
     assert_eq!(bus.observe(1).unwrap().position, before);
-    bus.afflict(1, Defect::BlockedJoint, false).unwrap();
-    heard(&mut bus, 110_000_000);
+    bus.inject_defect(1, Defect::BlockedJoint, false).unwrap();
+    received(&mut bus, 110_000_000);
     assert_ne!(bus.observe(1).unwrap().position, before);
 }
 
 #[test]
-fn a_foreigner_is_heard_by_the_master_and_by_the_drives() {
+fn a_frame_of_a_foreign_station_reaches_the_master_and_the_drives() {
     let mut bus = bus();
     let start = Frame::of(Id::canopen(0, 0), [1, 0]);
-    assert!(bus.say(4_000_000, &start));
-    assert_eq!(heard(&mut bus, 5_000_000)[0], start);
-    assert_eq!(bus.observe(1).unwrap().nmt, takt::sim::NmtState::Operational);
+    assert!(bus.send_foreign(4_000_000, &start));
+    assert_eq!(received(&mut bus, 5_000_000)[0], start);
+    assert_eq!(bus.observe(1).unwrap().nmt, takt::sim::NodeState::Operational);
 }
 
 #[test]
-fn a_node_that_is_not_there_is_named() {
-    let error = bus().afflict(99, Defect::StuckBrake, true);
-    assert!(matches!(error, Err(AfflictError::UnknownNode(unknown)) if unknown.node == 99), "{error:?}");
+fn a_missing_node_is_named() {
+    let error = bus().inject_defect(99, Defect::StuckBrake, true);
+    assert!(matches!(error, Err(InjectDefectError::UnknownNode(unknown)) if unknown.node == 99), "{error:?}");
 }

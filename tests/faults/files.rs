@@ -1,4 +1,4 @@
-//! Scenario files: the examples, the reference, and what is said of wrong ones.
+//! Scenario files: the examples, the reference, and the messages about invalid files.
 
 use takt::config::Config;
 use takt::controller::Outcome;
@@ -6,7 +6,7 @@ use takt::faults::Scenario;
 
 use crate::arm::{arm, folder, play_scenario};
 
-/// The example with its whole program, as a person would rehearse with it.
+/// The example with its whole program.
 fn example(name: &str) -> Scenario {
     let config = Config::load(&folder().join("arm6-erob.toml")).unwrap();
     Scenario::load(&folder().join("faults").join(name), &config)
@@ -14,7 +14,7 @@ fn example(name: &str) -> Scenario {
 }
 
 #[test]
-fn every_example_is_sound_and_does_what_it_says() {
+fn every_example_is_valid_and_does_what_it_says() {
     let mut names: Vec<String> = std::fs::read_dir(folder().join("faults"))
         .unwrap()
         .map(|entry| entry.unwrap().file_name().into_string().unwrap())
@@ -25,8 +25,8 @@ fn every_example_is_sound_and_does_what_it_says() {
         .filter(|name| name != "reference.toml")
         .map(|name| {
             let played = play_scenario(&arm(), example(&name));
-            let began = played.news.iter().filter(|news| news.ends_with("has begun")).count();
-            assert_eq!(began, example(&name).faults.len(), "{name}: {:?}", played.news);
+            let began = played.events.iter().filter(|events| events.ends_with("has begun")).count();
+            assert_eq!(began, example(&name).faults.len(), "{name}: {:?}", played.events);
             (name, played.outcome == Some(Outcome::Finished))
         })
         .collect();
@@ -57,7 +57,7 @@ fn the_reference_shows_every_kind() {
     }
 }
 
-/// Text of a file, the line of the problem, and what is said there.
+/// Text of a file, the line of the problem, and parts of its message and help.
 const WRONG: [(&str, usize, &str, &str); 31] = [
     ("", 1, "`fault` is missing", "[[fault]]"),
     ("[[fault]", 1, "this is not TOML", "toml.io"),
@@ -88,7 +88,7 @@ const WRONG: [(&str, usize, &str, &str); 31] = [
         "[[fault]]\nkind = \"stall\"\naxis = \"joint1\"\nprobability = 0.5",
         4,
         "means nothing here",
-        "what may stand",
+        "allowed here",
     ),
     (
         "[[fault]]\nkind = \"reboot\"\naxis = \"joint1\"\nfor = \"1 s\"",
@@ -153,7 +153,7 @@ const WRONG: [(&str, usize, &str, &str); 31] = [
 ];
 
 #[test]
-fn what_is_wrong_is_said_with_its_line_and_a_way_out() {
+fn every_problem_is_reported_with_its_line_and_a_remedy() {
     let config = arm();
     for (text, line, said, help) in WRONG {
         let Err(error) = Scenario::parse("scenario", text, &config) else { panic!("{text} is taken") };
@@ -165,7 +165,7 @@ fn what_is_wrong_is_said_with_its_line_and_a_way_out() {
 }
 
 #[test]
-fn every_problem_of_a_file_is_found_at_once() {
+fn all_problems_of_a_file_are_reported_together() {
     let text = "[[fault]]\nkind = \"drop\"\nbus = \"bass\"\nprobability = 2\n\n[[fault]]\nkind = \"stall\"\naxis = \"elbow\"\nfro = 1";
     let error = Scenario::parse("scenario", text, &arm()).unwrap_err();
     let lines: Vec<_> = error.problems().iter().map(|problem| error.line(problem).unwrap()).collect();
@@ -173,7 +173,7 @@ fn every_problem_of_a_file_is_found_at_once() {
 }
 
 #[test]
-fn drives_behind_a_real_interface_cannot_be_broken_but_its_frames_can() {
+fn faults_behind_a_real_interface_are_possible_for_frames_but_not_for_drives() {
     let mut config = arm();
     config.override_interface("wrist", "can0").unwrap();
     let text = "[[fault]]\nkind = \"stall\"\naxis = \"joint5\"";
@@ -193,7 +193,7 @@ fn a_machine_with_one_bus_need_not_name_it() {
 }
 
 #[test]
-fn a_file_that_is_not_there_is_named() {
+fn a_missing_file_is_named() {
     let error = Scenario::load(&folder().join("faults/none.toml"), &arm()).unwrap_err().to_string();
     assert!(error.contains("none.toml"), "{error}");
 }

@@ -1,4 +1,4 @@
-//! What the controller does about what goes wrong with YZ-AIM servos.
+//! Reactions of the controller to faults of YZ-AIM servos.
 
 use takt::config::Config;
 use takt::controller::Outcome;
@@ -7,7 +7,7 @@ use takt_rt::{Phase, Rule, StopCategory};
 
 use crate::arm::{folder, play};
 
-/// The example with two of its moves and drives that are up at once.
+/// The example with two of its moves and fast-booting drives.
 fn gantry() -> Config {
     let mut config = Config::load(&folder().join("gantry-yz-aim.toml")).unwrap();
     config.program.moves.truncate(2);
@@ -15,9 +15,9 @@ fn gantry() -> Config {
     config
 }
 
-/// What goes wrong with an axis well into the first move, the rule that sees it, and in how many milliseconds at the latest.
+/// A fault of an axis during the first move, the rule that detects it, and the longest detection time in milliseconds.
 const STOPS: [(&str, Rule, f64); 9] = [
-    // The joint must fall behind first, and the window of the following error be over.
+    // The joint must first fall behind, and then the time of the following error must pass.
     ("kind = \"stall\"", Rule::FollowingError, 300.0),
     ("kind = \"encoder-jump\"\nby = \"20 mm\"", Rule::ImplausibleFeedback, 5.0),
     // Feedback may be missing for five cycles of 2 ms.
@@ -31,7 +31,7 @@ const STOPS: [(&str, Rule, f64); 9] = [
 ];
 
 #[test]
-fn every_fault_with_a_rule_stops_the_whole_gantry_in_time_and_says_why() {
+fn every_fault_with_a_rule_stops_the_whole_gantry_in_time_with_the_reason() {
     for (fault, rule, within_ms) in STOPS {
         let text = format!("[[fault]]\n{fault}\naxis = \"y\"\nwhen = \"moving\"\nat = \"300 ms\"");
         let played = play(&gantry(), &text);
@@ -46,7 +46,7 @@ fn every_fault_with_a_rule_stops_the_whole_gantry_in_time_and_says_why() {
 }
 
 #[test]
-fn a_servo_without_sdo_replies_cannot_be_brought_up_and_in_motion_nobody_misses_them() {
+fn a_servo_without_sdo_replies_fails_bring_up_but_does_not_stop_a_motion() {
     let stuck = "[[fault]]\nkind = \"stuck-sdo\"\naxis = \"y\"\nfor = \"0.5 s\"\n";
     let played = play(&gantry(), &format!("{}when = \"start\"", stuck.replace("0.5 s", "5 s")));
     assert!(matches!(played.outcome, Some(Outcome::BringUpFailed(_))), "{:?}", played.outcome);
@@ -54,7 +54,7 @@ fn a_servo_without_sdo_replies_cannot_be_brought_up_and_in_motion_nobody_misses_
     assert_eq!(played.outcome, Some(Outcome::Finished));
 }
 
-/// What a YZ-AIM cannot have: the keys, the line that is to blame, what is said there, and why.
+/// A fault that a YZ-AIM cannot have: the keys, the line, the message, and the reason.
 const REFUSED: [(&str, &str, usize, &str, &str); 8] = [
     ("stuck-brake", "", 3, "`fault.axis` cannot be \"y\"", "a YZ-AIM has no brake"),
     ("mode-display", "mode = 1", 3, "`fault.axis` cannot be \"y\"", "the PDOs of a YZ-AIM show no mode"),
@@ -67,7 +67,7 @@ const REFUSED: [(&str, &str, usize, &str, &str); 8] = [
 ];
 
 #[test]
-fn what_a_servo_cannot_have_is_refused_where_the_file_says_it_with_the_reason() {
+fn a_fault_that_a_servo_cannot_have_is_refused_at_its_line_with_the_reason() {
     for (kind, keys, line, said, why) in REFUSED {
         let text = format!("[[fault]]\nkind = \"{kind}\"\naxis = \"y\"\n{keys}");
         let error = Scenario::parse("scenario", &text, &gantry()).unwrap_err();

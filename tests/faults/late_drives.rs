@@ -1,4 +1,4 @@
-//! Drives that always answer whole cycles late, SYNC or set-points: each answer looks like one to the next.
+//! Drives whose replies are always whole cycles late, so that each reply looks like one to the next SYNC or set-point.
 
 use takt::controller::Outcome;
 use takt_rt::{Phase, Rule, StopCategory};
@@ -8,9 +8,9 @@ use takt::config::Config;
 use crate::arm::{arm, folder, play};
 
 #[test]
-fn a_drive_that_always_reports_whole_cycles_late_is_not_enabled_and_is_named_with_its_lateness() {
+fn a_drive_whose_feedback_is_always_whole_cycles_late_is_not_enabled_and_named_with_its_lateness() {
     for cycles in [1, 2, 5, 20] {
-        // It comes a little after the SYNC that it seems to answer.
+        // The feedback arrives shortly after the SYNC that it seems to answer.
         let by_us = 1000 * cycles + 100;
         let late = format!(
             "[[fault]]\nkind = \"delay\"\naxis = \"joint5\"\nfunction = \"tpdo\"\nby = \"{by_us} us\"\nwhere = \"bus\"\n\
@@ -29,7 +29,7 @@ fn a_drive_that_always_reports_whole_cycles_late_is_not_enabled_and_is_named_wit
 }
 
 #[test]
-fn feedback_that_was_lost_or_late_before_the_axes_are_enabled_is_no_late_drive() {
+fn occasional_lost_or_late_feedback_before_enabling_is_tolerated() {
     for fault in [
         "kind = \"drop\"\naxis = \"joint5\"\nfunction = \"tpdo\"\ncount = 3",
         "kind = \"delay\"\naxis = \"joint5\"\nfunction = \"tpdo\"\nby = \"2100 us\"\nwhere = \"bus\"\ncount = 1",
@@ -41,7 +41,7 @@ fn feedback_that_was_lost_or_late_before_the_axes_are_enabled_is_no_late_drive()
     }
 }
 
-/// The gantry with drives that answer set-points alone.
+/// The gantry with drives that reply to set-points only.
 fn answering_set_points() -> Config {
     let mut config = Config::load(&folder().join("gantry-yz-aim.toml")).unwrap();
     config.program.moves.truncate(1);
@@ -53,7 +53,7 @@ fn answering_set_points() -> Config {
 }
 
 #[test]
-fn a_drive_that_always_answers_set_points_whole_cycles_late_is_not_enabled_and_is_named_with_its_lateness() {
+fn a_drive_that_always_answers_set_points_whole_cycles_late_is_not_enabled_and_named_with_its_lateness() {
     for cycles in [1, 2, 5, 20] {
         let by_us = 2000 * cycles + 100;
         let late = format!(
@@ -72,7 +72,7 @@ fn a_drive_that_always_answers_set_points_whole_cycles_late_is_not_enabled_and_i
 }
 
 #[test]
-fn an_answer_to_a_set_point_that_was_lost_or_late_before_the_axes_are_enabled_is_no_late_drive() {
+fn occasional_lost_or_late_replies_to_set_points_before_enabling_are_tolerated() {
     for fault in [
         "kind = \"drop\"\naxis = \"y\"\nfunction = \"tpdo\"\ncount = 3",
         "kind = \"drop\"\naxis = \"y\"\nfunction = \"rpdo\"\ncount = 4",

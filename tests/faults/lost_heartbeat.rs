@@ -1,4 +1,4 @@
-//! A heartbeat of the controller that no drive hears: drives begin to watch with the first that they hear.
+//! A lost heartbeat of the controller: drives begin to monitor it with the first one that they receive.
 
 use takt::config::Config;
 use takt::controller::VirtualRun;
@@ -9,11 +9,11 @@ use crate::arm::folder;
 
 const MILLISECOND_NS: u64 = 1_000_000;
 
-/// A simulated bus on which one of the controller's heartbeats is lost.
+/// A simulated bus that loses one of the controller's heartbeats.
 struct LossyBus {
     bus: SimulatedBus,
     heartbeat: Id,
-    /// Which one, counted from 0.
+    /// The index of the lost heartbeat, counted from 0.
     lost: Option<usize>,
     heartbeats: usize,
 }
@@ -47,7 +47,7 @@ impl BusPort for LossyBus {
     }
 }
 
-/// The first axis of a machine whose controller beats so seldom that the drives hear it by chance only.
+/// The first axis of a machine, with a long heartbeat period of the controller.
 fn machine(name: &str) -> Config {
     let mut config = Config::load(&folder().join(format!("{name}.toml"))).unwrap();
     config.axes.iter_mut().for_each(|axis| axis.simulated.power_up_ns = 5 * MILLISECOND_NS);
@@ -56,7 +56,8 @@ fn machine(name: &str) -> Config {
     config
 }
 
-/// Plays until all axes are enabled and the first move has begun. Returns how many heartbeats were sent on the first bus.
+/// Runs until all axes are enabled and the first move has begun. Returns the number of heartbeats sent on the first
+/// bus.
 fn enabled(config: &Config, lost: Option<usize>) -> (VirtualRun<LossyBus>, usize) {
     let heartbeat = Id::canopen(0x700, config.master.node);
     let buses = (0..config.buses.len()).map(|bus| SimulatedBus::new(config, bus));
@@ -70,7 +71,7 @@ fn enabled(config: &Config, lost: Option<usize>) -> (VirtualRun<LossyBus>, usize
 }
 
 #[test]
-fn a_drive_whose_controller_dies_as_soon_as_it_is_enabled_stops_whichever_heartbeat_was_lost() {
+fn a_just_enabled_drive_stops_when_its_controller_dies_whichever_heartbeat_was_lost() {
     for name in ["single-erob", "gantry-yz-aim"] {
         let config = machine(name);
         let sent = enabled(&config, None).1;
@@ -86,7 +87,7 @@ fn a_drive_whose_controller_dies_as_soon_as_it_is_enabled_stops_whichever_heartb
             assert!(observed(died_ns).iter().all(|state| *state == DriveState::OperationEnabled));
             let ticks = died_ns..=died_ns + config.master.heartbeat_timeout_ns;
             let states = ticks.step_by(MILLISECOND_NS as usize).map(observed).last().unwrap();
-            // That of a YZ-AIM stays on its place, with an alarm.
+            // The heartbeat alarm of a YZ-AIM stops it and keeps its shaft locked.
             assert!(
                 states.iter().all(|state| state.is_faulted()),
                 "{name}, {lost} of {sent} lost: {states:?}"

@@ -1,18 +1,18 @@
-//! What the controller does about each fault, for which there is a rule; and what holds whatever happens.
+//! The controller's reaction to each fault that has a rule, and the invariants for all faults.
 
 use takt::controller::Outcome;
 use takt_rt::{BusState, Origin, Phase, Rule, StopCategory};
 
 use crate::arm::{Played, arm, play};
 
-/// Well into the first move.
+/// During the first move.
 const IN_MOTION: &str = "when = \"moving\"\nat = \"300 ms\"";
 
 fn in_motion(fault: &str) -> Played {
     play(&arm(), &format!("[[fault]]\n{fault}\n{IN_MOTION}"))
 }
 
-/// What holds whatever goes wrong. A velocity limit is kept to the last bits of a sum.
+/// The invariants for all faults. The tolerance of the velocity limit is for rounding.
 fn assert_safe(fault: &str, played: &Played) {
     assert!(played.outcome.is_some(), "{fault}: the run does not end");
     assert!(played.stops.len() <= 1, "{fault}: {:?}", played.stops);
@@ -21,7 +21,7 @@ fn assert_safe(fault: &str, played: &Played) {
     assert_eq!(played.missed_slots, 0, "{fault}");
 }
 
-/// The stop that a fault leads to, whom it names, and in how many milliseconds it is begun at the latest.
+/// A fault that leads to a stop: its keys, the rule, the origin, and the longest detection time in milliseconds.
 struct Stops(&'static str, Rule, Origin, f64);
 
 const STOPS: [Stops; 38] = {
@@ -32,7 +32,7 @@ const STOPS: [Stops; 38] = {
         Stops("kind = \"drop\"\nbus = \"base\"\nfunction = \"tpdo\"", MissedFeedback, Axis(0), 6.0),
         Stops("kind = \"drop\"\naxis = \"joint5\"\nfunction = \"tpdo\"", MissedFeedback, Axis(4), 6.0),
         Stops("kind = \"drop\"\nbus = \"base\"\nfunction = \"sync\"", MissedFeedback, Axis(0), 7.0),
-        // Late is missed, however regularly it comes.
+        // A regular delay is a missed feedback too.
         Stops(
             "kind = \"delay\"\nbus = \"base\"\nfunction = \"tpdo\"\nby = \"1 cycles\"",
             MissedFeedback,
@@ -95,7 +95,7 @@ const STOPS: [Stops; 38] = {
             2.0,
         ),
         Stops("kind = \"duplicate\"\nbus = \"base\"", DuplicateNode, Axis(0), 9.0),
-        // Whoever takes a number that is in use boots first.
+        // A node that takes a node ID in use boots first.
         Stops("kind = \"duplicate-node\"\naxis = \"joint1\"", UnexpectedBootUp, Axis(0), 2.0),
         Stops("kind = \"emergency\"\naxis = \"joint1\"\ncode = 0x4210", EmergencyMessage, Axis(0), 6.0),
         Stops(
@@ -108,7 +108,7 @@ const STOPS: [Stops; 38] = {
         Stops("kind = \"bus-off\"\nbus = \"wrist\"", BusLost, Bus(1), 1.0),
         Stops("kind = \"bus-off\"\nbus = \"wrist\"\nrestart = \"100 ms\"", BusLost, Bus(1), 1.0),
         Stops("kind = \"interface-down\"\nbus = \"base\"\nfor = \"100 ms\"", BusLost, Bus(0), 1.0),
-        // The window of the following error is 50 ms; before that the joint must fall behind by 0.1 rad.
+        // The following error must first exceed 0.1 rad, and then last for 50 ms.
         Stops("kind = \"stall\"\naxis = \"joint1\"", FollowingError, Axis(0), 200.0),
         Stops("kind = \"stuck-brake\"\naxis = \"joint1\"", FollowingError, Axis(0), 200.0),
         Stops("kind = \"drop\"\naxis = \"joint1\"\nfunction = \"rpdo\"", FollowingError, Axis(0), 200.0),
@@ -124,7 +124,7 @@ const STOPS: [Stops; 38] = {
 };
 
 #[test]
-fn every_fault_with_a_rule_stops_the_whole_arm_in_time_and_says_why() {
+fn every_fault_with_a_rule_stops_the_whole_arm_in_time_with_the_reason() {
     for Stops(fault, rule, origin, within_ms) in STOPS {
         let played = in_motion(fault);
         assert_safe(fault, &played);
@@ -137,10 +137,10 @@ fn every_fault_with_a_rule_stops_the_whole_arm_in_time_and_says_why() {
     }
 }
 
-/// Feedback proves a drive alive in every cycle. A drive may have a heartbeat beside it, and is watched by that too: it is
-/// lost after three periods without one.
+/// The feedback of every cycle shows that a drive works. If the drive also has a heartbeat, that is monitored too: it
+/// is lost after three periods.
 #[test]
-fn a_drive_whose_heartbeat_ceases_stops_the_whole_arm_though_it_still_reports() {
+fn a_drive_that_loses_its_heartbeat_stops_the_whole_arm_although_its_feedback_continues() {
     let mut config = arm();
     config.axes[3].heartbeat_ns = Some(20_000_000);
     let fault = "kind = \"drop\"\naxis = \"joint4\"\nfunction = \"heartbeat\"\ndirection = \"received\"";
@@ -153,7 +153,7 @@ fn a_drive_whose_heartbeat_ceases_stops_the_whole_arm_though_it_still_reports() 
     assert_eq!(well.outcome, Some(Outcome::Finished));
 }
 
-/// Faults of one axis or one bus, in the middle of the fast part of a move, and the axes that still obey.
+/// Faults of one axis or one bus in the fast part of a move, and the axes that still follow.
 const COORDINATED: [(&str, std::ops::Range<usize>); 10] = [
     ("kind = \"alarm\"\naxis = \"joint1\"\ncode = 0x4310", 1..6),
     ("kind = \"over-current\"\naxis = \"joint1\"", 1..6),
@@ -168,13 +168,13 @@ const COORDINATED: [(&str, std::ops::Range<usize>); 10] = [
 ];
 
 #[test]
-fn the_axes_that_still_obey_decelerate_within_their_limits() {
+fn the_axes_that_still_follow_decelerate_within_their_limits() {
     for (fault, obeying) in COORDINATED {
         let text = format!("[[fault]]\n{fault}\nwhen = \"moving\"\nat = \"900 ms\"");
         let played = play(&arm(), &text);
         let Some(Outcome::Stopped(stop)) = &played.outcome else { panic!("{fault}: {:?}", played.outcome) };
         assert_eq!(stop.category, StopCategory::One, "{fault}: the stop became harder on its way");
-        // The loops of the drives overshoot a little when the acceleration changes.
+        // The control loops of the drives overshoot a little when the acceleration changes.
         let largest = played.accelerations[obeying].iter().copied().fold(0.0, f64::max);
         assert!(largest < 1.6, "{fault}: {:?} acceleration limits", played.accelerations);
     }
@@ -187,7 +187,7 @@ fn the_code_of_an_alarm_is_the_value_of_the_stop() {
     assert_eq!(played.emergencies, [(3, 0x7500)]);
 }
 
-/// Faults that are within what the machine must bear.
+/// Faults that the machine must tolerate.
 const BORNE: [&str; 12] = [
     "kind = \"delay\"\nbus = \"base\"\nfunction = \"tpdo\"\nby = \"100 us\"",
     "kind = \"delay\"\nbus = \"base\"\nfunction = \"tpdo\"\nby = \"1 cycles\"\nfor = \"5 cycles\"",
@@ -204,7 +204,7 @@ const BORNE: [&str; 12] = [
 ];
 
 #[test]
-fn what_the_machine_must_bear_does_not_stop_it() {
+fn tolerated_faults_do_not_stop_the_machine() {
     for fault in BORNE {
         let played = in_motion(fault);
         assert_safe(fault, &played);
@@ -213,14 +213,14 @@ fn what_the_machine_must_bear_does_not_stop_it() {
 }
 
 #[test]
-fn an_error_passive_interface_stops_the_arm_under_power() {
+fn an_error_passive_interface_stops_the_arm_but_keeps_it_enabled() {
     let played = in_motion("kind = \"error-passive\"\nbus = \"wrist\"\nfor = \"0.5 s\"");
     let [stop] = played.stops.as_slice() else { panic!("{:?}", played.outcome) };
     assert_eq!((stop.rule(), stop.category), (Rule::BusErrorPassive, StopCategory::Two));
 }
 
 #[test]
-fn an_interface_that_goes_bus_off_after_it_was_error_passive_has_the_arm_disabled() {
+fn an_interface_that_goes_bus_off_after_error_passive_disables_the_arm() {
     let played = play(
         &arm(),
         "[[fault]]\nkind = \"error-passive\"\nbus = \"wrist\"\nfor = \"20 ms\"\nwhen = \"moving\"\nat = \"300 ms\"\n\
@@ -235,14 +235,14 @@ fn an_interface_that_goes_bus_off_after_it_was_error_passive_has_the_arm_disable
 }
 
 #[test]
-fn a_single_false_statusword_neither_stops_the_arm_nor_moves_it_otherwise() {
+fn a_single_wrong_statusword_neither_stops_the_arm_nor_disturbs_its_motion() {
     let played = in_motion("kind = \"statusword\"\naxis = \"joint2\"\nclear = 0x0004\nfor = \"1 cycles\"");
     assert_eq!(played.outcome, Some(Outcome::Finished));
     let largest = played.accelerations.iter().copied().fold(0.0, f64::max);
     assert!(largest < 1.6, "{:?} acceleration limits", played.accelerations);
 }
 
-/// Faults for which there is no rule that must see them; whatever the controller makes of them, it is safe.
+/// Faults without a rule that must detect them. Whatever the controller does, it is safe.
 const WITHOUT_A_RULE: [&str; 6] = [
     "kind = \"drop\"\nbus = \"base\"\nfunction = \"heartbeat\"",
     "kind = \"delay\"\nbus = \"base\"\nby = \"300 us\"",
@@ -253,21 +253,21 @@ const WITHOUT_A_RULE: [&str; 6] = [
 ];
 
 #[test]
-fn whatever_happens_no_set_point_leaps_and_the_arm_is_at_rest_in_the_end() {
+fn no_fault_makes_a_set_point_jump_and_the_arm_is_at_standstill_at_the_end() {
     for fault in WITHOUT_A_RULE {
         assert_safe(fault, &in_motion(fault));
     }
 }
 
 #[test]
-fn a_node_that_starts_again_in_motion_does_not_take_part_any_more() {
+fn a_node_that_reboots_in_motion_does_not_take_part_any_more() {
     let played = in_motion("kind = \"reboot\"\naxis = \"joint6\"");
     let stopping = played.phases.iter().position(|phase| *phase == Phase::Stopping).unwrap();
     assert!(!played.phases[stopping..].contains(&Phase::Enabling), "{:?}", played.phases);
 }
 
 #[test]
-fn the_state_of_an_interface_is_shown_while_it_lasts_and_its_errors_stay() {
+fn the_state_of_an_interface_is_reported_while_it_lasts_and_its_errors_stay_counted() {
     let shown = |fault: &str| in_motion(fault).health[1];
     let passive = shown("kind = \"error-passive\"\nbus = \"wrist\"");
     assert_eq!((passive.state, passive.errors), (BusState::ErrorPassive, 1));

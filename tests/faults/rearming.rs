@@ -1,11 +1,11 @@
-//! After a fault: what is asked to bring the group back.
+//! Recovery after a fault: reset and enable.
 
 use std::sync::Arc;
 
 use takt::bus::port::Port;
 use takt::config::Config;
 use takt::controller::VirtualRun;
-use takt::faults::Rehearsal;
+use takt::faults::FaultInjector;
 use takt::sim::SimulatedBus;
 use takt_rt::{Fault, Phase, Request, Rule, StopCause, StopReason};
 
@@ -13,17 +13,17 @@ use crate::arm::{arm, folder, scenario};
 
 const CYCLES_AT_MOST: usize = 20_000;
 
-/// An enabled group without a program, on which this fault of its first axis is played.
+/// An enabled group without a program, with this fault of its first axis.
 fn faulted(config: &Config, kind: &str) -> VirtualRun<Port> {
     let axis = &config.axes[0].name;
     let fault =
         format!("[[fault]]\nkind = \"{kind}\"\naxis = \"{axis}\"\nwhen = \"enabled\"\nat = \"100 ms\"\n");
-    let rehearsal = Arc::new(Rehearsal::new(scenario(&fault, config)));
+    let fault_injector = Arc::new(FaultInjector::new(scenario(&fault, config)));
     let simulated = |bus| Port::Simulated(Box::new(SimulatedBus::new(config, bus)));
-    let ports = (0..config.buses.len()).map(|bus| rehearsal.wrap(bus, simulated(bus))).collect();
+    let ports = (0..config.buses.len()).map(|bus| fault_injector.wrap(bus, simulated(bus))).collect();
     let (mut run, _) = VirtualRun::serving(config, ports).unwrap();
     run_until(&mut run, |run| {
-        rehearsal.observe(&run.snapshot());
+        fault_injector.observe(&run.snapshot());
         latched(run).is_some() && run.snapshot().phase == Phase::Disabled
     });
     run
@@ -50,10 +50,10 @@ fn machines() -> [Config; 2] {
 }
 
 #[test]
-fn a_group_that_is_reset_and_enabled_in_one_breath_holds_again() {
+fn a_group_that_is_reset_and_enabled_at_once_holds_again() {
     for config in machines() {
         let mut run = faulted(&config, "over-voltage");
-        // A YZ-AIM cannot be reset before the voltage is right again.
+        // A YZ-AIM cannot be reset before the over-voltage is over.
         (0..200).for_each(|_| assert!(run.step()));
         run.host().request(Request::ResetFaults).unwrap();
         run.host().request(Request::Enable).unwrap();

@@ -1,4 +1,4 @@
-//! The same scenario is the same run, bit for bit.
+//! The same scenario gives the same run, bit for bit.
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 
@@ -40,7 +40,7 @@ fn the_same_scenario_gives_the_same_run_bit_for_bit() {
     assert_eq!(format!("{first:?}"), format!("{second:?}"));
     assert!(first.frames[0] > 100, "{:?}", first.frames);
     let other = play(&config, &LOSSY.replace("seed = 5", "seed = 6"));
-    assert_ne!(first.fingerprint, other.fingerprint, "the fingerprint sees something");
+    assert_ne!(first.fingerprint, other.fingerprint, "the fingerprint detects differences");
 }
 
 #[test]
@@ -57,11 +57,11 @@ fn a_fault_that_never_begins_changes_nothing() {
     });
     let late = play(&config, "[[fault]]\nkind = \"drop\"\nbus = \"base\"\nat = \"1000 s\"");
     assert_eq!(late.fingerprint, hasher.finish());
-    assert!(late.news.is_empty(), "{:?}", late.news);
+    assert!(late.events.is_empty(), "{:?}", late.events);
 }
 
 #[test]
-fn what_begins_and_ends_is_told_once_with_its_place_and_its_time() {
+fn each_beginning_and_end_of_a_fault_is_reported_once_with_location_and_time() {
     let played = play(
         &arm(),
         "\n[[fault]]\nkind = \"drop\"\naxis = \"joint2\"\ncount = 2\n\
@@ -70,15 +70,15 @@ fn what_begins_and_ends_is_told_once_with_its_place_and_its_time() {
     );
     let expected = [
         "0.0000 s after enabling: fault `drop` on axis joint2 (line 2) has begun",
-        "0.0000 s after enabling: fault `drop` on axis joint2 (line 2) is over; it concerned 2 frames",
+        "0.0000 s after enabling: fault `drop` on axis joint2 (line 2) has ended; it affected 2 frames",
         "0.1000 s after enabling: fault `load` on axis joint1 (line 6) has begun",
-        "0.1100 s after enabling: fault `load` on axis joint1 (line 6) is over",
+        "0.1100 s after enabling: fault `load` on axis joint1 (line 6) has ended",
         "0.2000 s after enabling: fault `emergency` on axis joint1 (line 12) has begun",
     ];
-    let told: Vec<&str> = played.news.iter().map(|news| news.split_once(' ').unwrap().1).collect();
-    assert_eq!(told, expected.map(|news| news.split_once(' ').unwrap().1));
+    let told: Vec<&str> = played.events.iter().map(|events| events.split_once(' ').unwrap().1).collect();
+    assert_eq!(told, expected.map(|events| events.split_once(' ').unwrap().1));
     let at_s: Vec<f64> =
-        played.news.iter().map(|news| news.split(' ').next().unwrap().parse().unwrap()).collect();
+        played.events.iter().map(|events| events.split(' ').next().unwrap().parse().unwrap()).collect();
     let due_s = [0.0, 0.0, 0.1, 0.11, 0.2];
     // A fault begins with the next call of the cycle.
     assert!(at_s.iter().zip(due_s).all(|(at_s, due_s)| (0.0..=0.001).contains(&(at_s - due_s))), "{at_s:?}");

@@ -1,11 +1,11 @@
-//! Drives that cannot be reached any more: how a run ends without them.
+//! Drives that can no longer be reached, and the end of a run without them.
 
 use std::sync::Arc;
 
 use takt::bus::port::Port;
 use takt::config::Config;
 use takt::controller::{Outcome, VirtualRun};
-use takt::faults::Rehearsal;
+use takt::faults::FaultInjector;
 use takt_rt::{Phase, Rule};
 
 use crate::arm::{arm, scenario};
@@ -20,24 +20,24 @@ struct Ended {
     over_ns: u64,
 }
 
-/// Plays a fault that begins in motion to the end of the run.
+/// Runs to the end with a fault that begins in motion.
 fn ended(config: &Config, fault: &str) -> Ended {
     let text = format!("[[fault]]\n{fault}\nwhen = \"moving\"\nat = \"300 ms\"");
-    let rehearsal = Arc::new(Rehearsal::new(scenario(&text, config)));
-    let (mut run, _) = VirtualRun::rehearsed(config, Arc::clone(&rehearsal)).unwrap();
+    let fault_injector = Arc::new(FaultInjector::new(scenario(&text, config)));
+    let (mut run, _) = VirtualRun::with_faults(config, Arc::clone(&fault_injector)).unwrap();
     let mut disabled_ns = None;
     while run.step() {
-        if rehearsal.courses().any(|(_, course)| course.began_ns().is_some())
+        if fault_injector.progress().any(|(_, progress)| progress.began_ns().is_some())
             && run.snapshot().phase == Phase::Disabled
         {
             disabled_ns = disabled_ns.or(Some(run.snapshot().at_ns));
         }
     }
-    let began_ns = rehearsal.courses().find_map(|(_, course)| course.began_ns()).unwrap();
+    let began_ns = fault_injector.progress().find_map(|(_, progress)| progress.began_ns()).unwrap();
     Ended { began_ns, disabled_ns: disabled_ns.unwrap(), over_ns: run.snapshot().at_ns, run }
 }
 
-/// The axes of a bus, with whether their drives have torque in truth.
+/// The axes of a bus, and whether their drives really have torque.
 fn torques(config: &Config, run: &mut VirtualRun<Port>, bus: &str) -> Vec<(usize, bool)> {
     let mut torques = Vec::new();
     for (index, axis) in config.axes.iter().enumerate().filter(|(_, axis)| config.buses[axis.bus].name == bus)
@@ -49,7 +49,7 @@ fn torques(config: &Config, run: &mut VirtualRun<Port>, bus: &str) -> Vec<(usize
 }
 
 #[test]
-fn a_run_whose_drives_cannot_be_reached_ends_when_their_own_watchdogs_have_fired_and_names_them() {
+fn a_run_with_unreachable_drives_ends_after_their_watchdogs_have_fired_and_names_them() {
     let config = arm();
     let mut ended = ended(&config, BUS_OFF);
     let Some(Outcome::Stopped(stop)) = ended.run.supervisor().outcome().cloned() else {
@@ -65,7 +65,7 @@ fn a_run_whose_drives_cannot_be_reached_ends_when_their_own_watchdogs_have_fired
     let timeout_ns = config.master.heartbeat_timeout_ns;
     let waited_ns = ended.disabled_ns - ended.began_ns;
     assert!((timeout_ns..timeout_ns + SECOND_NS / 4).contains(&waited_ns), "{waited_ns} ns");
-    // The farewell is said three times.
+    // The shutdown command is sent three times.
     assert!(ended.over_ns - ended.disabled_ns < 2 * SECOND_NS);
 }
 

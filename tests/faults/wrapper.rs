@@ -1,23 +1,23 @@
-//! The wrapper around a port, each effect by itself.
+//! The wrapper around a port: each effect by itself.
 
 use std::sync::Arc;
 
 use proptest::prelude::*;
 use takt::faults::{
-    Breakable, Course, Cue, Cues, DelayPlace, Direction, Effect, Fault, FaultyPort, ForeignFrames,
-    FrameEffect, InterfaceEffect, Part, Selection, Window,
+    DelayPlace, Direction, Effect, FaultProgress, FaultyPort, ForeignFrames, FrameEffect, Injectable,
+    InterfaceEffect, Part, ScenarioFault, Selection, Trigger, TriggerTimes, Window,
 };
 use takt_rt::{BusHealth, BusPort, BusState, Frame, Id, ReceiveBatch, Received};
 
-/// Keeps what it is sent, and has received what it is told to have.
+/// A port that keeps the sent frames, and receives the frames that the test gives it.
 #[derive(Default)]
-struct Line {
+struct RecordingPort {
     sent: Vec<(u64, Frame)>,
     waiting: Vec<Received>,
     room: Option<usize>,
 }
 
-impl BusPort for Line {
+impl BusPort for RecordingPort {
     fn send(&mut self, now_ns: u64, frames: &[Frame]) -> usize {
         let taken = frames.len().min(self.room.unwrap_or(usize::MAX));
         self.sent.extend(frames.iter().take(taken).map(|frame| (now_ns, *frame)));
@@ -38,7 +38,7 @@ impl BusPort for Line {
     }
 }
 
-impl Breakable for Line {}
+impl Injectable for RecordingPort {}
 
 fn frame(id: u32, byte: u8) -> Frame {
     Frame::of(Id::base(id).unwrap(), [byte; 8])
@@ -48,53 +48,66 @@ fn numbered(count: u8) -> Vec<Frame> {
     (0..count).map(|number| frame(0x200 + u32::from(number), number)).collect()
 }
 
-fn wrapped(effect: Effect, selection: Selection, lasts_ns: Option<u64>) -> (FaultyPort<Line>, Arc<Course>) {
-    let window = Window { cue: Cue::Start, after_ns: 0, lasts_ns };
-    let fault = Fault { kind: "", place: String::new(), line: 1, bus: 0, window, selection, effect };
-    let course = Arc::new(Course::default());
-    (FaultyPort::new(Line::default(), &fault, Arc::new(Cues::default()), Arc::clone(&course)), course)
+fn wrapped(
+    effect: Effect,
+    selection: Selection,
+    lasts_ns: Option<u64>,
+) -> (FaultyPort<RecordingPort>, Arc<FaultProgress>) {
+    let window = Window { trigger: Trigger::Start, after_ns: 0, lasts_ns };
+    let fault =
+        ScenarioFault { kind: "", location: String::new(), line: 1, bus: 0, window, selection, effect };
+    let progress = Arc::new(FaultProgress::default());
+    (
+        FaultyPort::new(
+            RecordingPort::default(),
+            &fault,
+            Arc::new(TriggerTimes::default()),
+            Arc::clone(&progress),
+        ),
+        progress,
+    )
 }
 
-fn frames(effect: FrameEffect) -> FaultyPort<Line> {
+fn frames(effect: FrameEffect) -> FaultyPort<RecordingPort> {
     wrapped(Effect::Frames(effect), Selection::default(), None).0
 }
 
-fn received(port: &mut FaultyPort<Line>, now_ns: u64) -> Vec<Received> {
+fn received(port: &mut FaultyPort<RecordingPort>, now_ns: u64) -> Vec<Received> {
     let mut batch = ReceiveBatch::new();
     port.receive(now_ns, &mut batch);
     batch.to_vec()
 }
 
-fn sent(port: &mut FaultyPort<Line>) -> Vec<Frame> {
+fn sent(port: &mut FaultyPort<RecordingPort>) -> Vec<Frame> {
     port.inner_mut().sent.iter().map(|(_, frame)| *frame).collect()
 }
 
-fn hears(port: &mut FaultyPort<Line>, frames: &[Frame], at_ns: u64) {
+fn receives(port: &mut FaultyPort<RecordingPort>, frames: &[Frame], at_ns: u64) {
     port.inner_mut().waiting.extend(frames.iter().map(|frame| Received { frame: *frame, at_ns }));
 }
 
 #[test]
-fn a_dropped_frame_is_gone_and_counts_as_sent() {
+fn a_dropped_frame_is_lost_and_counts_as_sent() {
     let mut port = frames(FrameEffect::Drop);
     assert_eq!(port.send(0, &numbered(3)), 3);
-    hears(&mut port, &numbered(2), 0);
+    receives(&mut port, &numbered(2), 0);
     assert_eq!((sent(&mut port), received(&mut port, 1)), (vec![], vec![]));
     assert_eq!((port.unconfirmed(1), port.health().tx_frames), (0, 3));
 }
 
 #[test]
-fn only_the_selected_frames_are_concerned_and_the_others_keep_their_order() {
+fn only_selected_frames_are_affected_and_the_others_keep_their_order() {
     let selection = Selection { ids: 0x201..=0x202, direction: Direction::Sent, ..Selection::default() };
-    let (mut port, course) = wrapped(Effect::Frames(FrameEffect::Drop), selection, None);
+    let (mut port, progress) = wrapped(Effect::Frames(FrameEffect::Drop), selection, None);
     assert_eq!(port.send(0, &numbered(5)), 5);
     let left: Vec<u32> = sent(&mut port).iter().map(|frame| frame.id().value()).collect();
-    assert_eq!((left, course.frames()), (vec![0x200, 0x203, 0x204], 2));
-    hears(&mut port, &numbered(5), 0);
+    assert_eq!((left, progress.frames()), (vec![0x200, 0x203, 0x204], 2));
+    receives(&mut port, &numbered(5), 0);
     assert_eq!(received(&mut port, 1).len(), 5);
 }
 
 #[test]
-fn a_delayed_frame_leaves_in_its_own_time_and_is_unconfirmed_until_then() {
+fn a_delayed_frame_is_sent_at_its_time_and_is_unconfirmed_until_then() {
     let selection = Selection { ids: 0x201..=0x201, ..Selection::default() };
     let (mut port, _) = wrapped(
         Effect::Frames(FrameEffect::Delay { by_ns: 300, place: DelayPlace::Machine }),
@@ -109,20 +122,20 @@ fn a_delayed_frame_leaves_in_its_own_time_and_is_unconfirmed_until_then() {
 }
 
 #[test]
-fn a_late_arrival_is_taken_later_and_tells_when_it_arrived() {
+fn a_frame_delayed_in_the_machine_keeps_its_arrival_time() {
     let mut port = frames(FrameEffect::Delay { by_ns: 300, place: DelayPlace::Machine });
-    hears(&mut port, &[frame(0x181, 1)], 1000);
+    receives(&mut port, &[frame(0x181, 1)], 1000);
     assert_eq!(received(&mut port, 1010), []);
     assert_eq!(received(&mut port, 1299), []);
     assert_eq!(received(&mut port, 1300), [Received { frame: frame(0x181, 1), at_ns: 1000 }]);
-    hears(&mut port, &[frame(0x181, 2)], 2000);
+    receives(&mut port, &[frame(0x181, 2)], 2000);
     assert_eq!(received(&mut port, 2400), [Received { frame: frame(0x181, 2), at_ns: 2000 }]);
 }
 
 #[test]
-fn a_frame_that_is_late_on_the_bus_tells_of_its_late_arrival() {
+fn a_frame_delayed_on_the_bus_has_a_later_arrival_time() {
     let mut port = frames(FrameEffect::Delay { by_ns: 300, place: DelayPlace::Bus });
-    hears(&mut port, &[frame(0x181, 1)], 1000);
+    receives(&mut port, &[frame(0x181, 1)], 1000);
     assert_eq!(received(&mut port, 1299), []);
     assert_eq!(received(&mut port, 1300), [Received { frame: frame(0x181, 1), at_ns: 1300 }]);
 }
@@ -133,12 +146,12 @@ fn duplicates_follow_their_original() {
     assert_eq!(port.send(0, &numbered(2)), 2);
     let ids: Vec<u32> = sent(&mut port).iter().map(|frame| frame.id().value()).collect();
     assert_eq!(ids, [0x200, 0x200, 0x200, 0x201, 0x201, 0x201]);
-    hears(&mut port, &numbered(1), 5);
+    receives(&mut port, &numbered(1), 5);
     assert_eq!(received(&mut port, 5).len(), 3);
 }
 
 #[test]
-fn what_the_interface_had_no_room_for_is_said_in_frames_of_the_caller() {
+fn the_number_of_refused_frames_is_that_of_the_caller() {
     let mut port = frames(FrameEffect::Duplicate { copies: 2 });
     port.inner_mut().room = Some(4);
     assert_eq!(port.send(0, &numbered(4)), 1);
@@ -147,13 +160,13 @@ fn what_the_interface_had_no_room_for_is_said_in_frames_of_the_caller() {
 #[test]
 fn more_copies_than_a_batch_holds_are_received_in_the_next_one() {
     let mut port = frames(FrameEffect::Duplicate { copies: 8 });
-    hears(&mut port, &numbered(60), 5);
+    receives(&mut port, &numbered(60), 5);
     let counts: Vec<usize> = (0..10).map(|now_ns| received(&mut port, now_ns).len()).collect();
     assert_eq!(counts, [64, 64, 64, 64, 64, 64, 64, 64, 28, 0]);
 }
 
 #[test]
-fn a_full_queue_takes_no_selected_frame_and_nothing_behind_it() {
+fn a_full_queue_refuses_selected_frames_and_all_after_them() {
     let selection = Selection { ids: 0x202..=0x202, ..Selection::default() };
     let (mut port, _) = wrapped(Effect::Frames(FrameEffect::FullQueue), selection, None);
     assert_eq!(port.send(0, &numbered(5)), 2);
@@ -161,23 +174,23 @@ fn a_full_queue_takes_no_selected_frame_and_nothing_behind_it() {
 }
 
 #[test]
-fn lost_echoes_stay_unconfirmed_as_long_as_the_fault_is_there() {
+fn frames_with_a_lost_echo_stay_unconfirmed_while_the_fault_is_active() {
     let effect = Effect::Frames(FrameEffect::EchoLoss);
     let (mut port, _) = wrapped(effect, Selection::default(), Some(100));
     assert_eq!(port.send(0, &numbered(3)), 3);
-    hears(&mut port, &numbered(5), 10);
+    receives(&mut port, &numbered(5), 10);
     assert_eq!(received(&mut port, 20).len(), 5);
     assert_eq!((sent(&mut port).len(), port.unconfirmed(50), port.unconfirmed(100)), (3, 3, 0));
 }
 
 #[test]
-fn a_cut_interface_neither_sends_nor_receives_and_forgets_what_came_meanwhile() {
+fn a_disconnected_interface_neither_sends_nor_receives_and_drops_frames_meanwhile() {
     for (effect, state) in
         [(InterfaceEffect::BusOff, BusState::BusOff), (InterfaceEffect::Down, BusState::Down)]
     {
         let (mut port, _) = wrapped(Effect::Interface(effect), Selection::default(), Some(100));
         assert_eq!(port.send(0, &numbered(3)), 0);
-        hears(&mut port, &numbered(3), 0);
+        receives(&mut port, &numbered(3), 0);
         assert_eq!((received(&mut port, 50), port.health().state), (vec![], state));
         assert_eq!((received(&mut port, 100), port.health().state), (vec![], BusState::ErrorActive));
         assert_eq!(port.send(101, &numbered(3)), 3);
@@ -186,7 +199,7 @@ fn a_cut_interface_neither_sends_nor_receives_and_forgets_what_came_meanwhile() 
 }
 
 #[test]
-fn corruption_turns_bits_of_the_part_that_was_named() {
+fn corruption_inverts_bits_of_the_selected_part() {
     let mut port = frames(FrameEffect::Corrupt { bits: 1, part: Part::Payload });
     assert_eq!(port.send(0, &numbered(4)), 4);
     for (broken, whole) in sent(&mut port).iter().zip(numbered(4)) {
@@ -196,20 +209,20 @@ fn corruption_turns_bits_of_the_part_that_was_named() {
 }
 
 #[test]
-fn a_foreigner_speaks_in_its_rhythm_and_is_heard_here_too() {
+fn a_foreign_station_sends_periodically_and_is_received_here_too() {
     let says = frame(0x123, 9);
     let effect = Effect::Foreign(ForeignFrames::Frame { frame: says, period_ns: Some(100) });
-    let (mut port, course) = wrapped(effect, Selection::default(), Some(350));
+    let (mut port, progress) = wrapped(effect, Selection::default(), Some(350));
     received(&mut port, 0);
-    let heard: Vec<u64> = received(&mut port, 320).iter().map(|received| received.at_ns).collect();
-    assert_eq!(heard, [100, 200, 300]);
+    let received_ns: Vec<u64> = received(&mut port, 320).iter().map(|received| received.at_ns).collect();
+    assert_eq!(received_ns, [100, 200, 300]);
     assert_eq!(received(&mut port, 1000), []);
     let said: Vec<u64> = port.inner_mut().sent.iter().map(|(at_ns, _)| *at_ns).collect();
-    assert_eq!((said, course.frames()), (vec![0, 100, 200, 300], 4));
+    assert_eq!((said, progress.frames()), (vec![0, 100, 200, 300], 4));
 }
 
 #[test]
-fn after_a_long_pause_a_foreigner_does_not_make_up_for_what_it_has_not_said() {
+fn a_foreign_station_does_not_catch_up_after_a_long_pause() {
     let effect = Effect::Foreign(ForeignFrames::Frame { frame: frame(1, 0), period_ns: Some(20) });
     let (mut port, _) = wrapped(effect, Selection::default(), None);
     port.send(0, &[]);
@@ -218,19 +231,19 @@ fn after_a_long_pause_a_foreigner_does_not_make_up_for_what_it_has_not_said() {
 }
 
 #[test]
-fn another_master_repeats_what_was_commanded_when_it_began() {
+fn another_master_repeats_the_set_points_from_before_it_began() {
     let effect = Effect::Foreign(ForeignFrames::SetPoints { id: Id::canopen(0x200, 1), period_ns: 100 });
-    let window = Window { cue: Cue::Start, after_ns: 1000, lasts_ns: None };
-    let fault = Fault {
+    let window = Window { trigger: Trigger::Start, after_ns: 1000, lasts_ns: None };
+    let fault = ScenarioFault {
         kind: "",
-        place: String::new(),
+        location: String::new(),
         line: 1,
         bus: 0,
         window,
         selection: Selection::default(),
         effect,
     };
-    let mut port = FaultyPort::new(Line::default(), &fault, Arc::default(), Arc::default());
+    let mut port = FaultyPort::new(RecordingPort::default(), &fault, Arc::default(), Arc::default());
     port.send(0, &[frame(0x201, 1), frame(0x202, 2)]);
     port.send(900, &[frame(0x201, 3)]);
     port.send(1000, &[frame(0x201, 4)]);
@@ -253,16 +266,16 @@ fn any_effect() -> impl Strategy<Value = FrameEffect> {
 }
 
 proptest! {
-    /// Whatever is sent and received, a reordering loses nothing and makes nothing up.
+    /// Reordering neither loses nor adds frames.
     #[test]
     fn reordering_keeps_every_frame(seed: u64, count in 1u8..60) {
         let selection = Selection { seed, ids: 0x200..=0x210, ..Selection::default() };
         let (mut port, _) = wrapped(Effect::Frames(FrameEffect::Reorder), selection, None);
         prop_assert_eq!(port.send(0, &numbered(count)), usize::from(count));
-        hears(&mut port, &numbered(count), 0);
+        receives(&mut port, &numbered(count), 0);
         let heard: Vec<Frame> = received(&mut port, 1).iter().map(|received| received.frame).collect();
         for mut passed in [sent(&mut port), heard] {
-            // Unselected frames keep their places.
+            // Frames that are not selected keep their positions.
             for (at, frame) in passed.iter().enumerate().skip(0x11) {
                 prop_assert_eq!(frame.id().value(), 0x200 + at as u32);
             }
@@ -271,7 +284,7 @@ proptest! {
         }
     }
 
-    /// Two wrappers around each other: no call panics, no promise of a port is broken, and memory stays bounded.
+    /// Two nested wrappers: no call panics, every promise of a port is kept, and memory stays bounded.
     #[test]
     fn any_two_effects_compose(
         effects in (any_effect(), any_effect()),
@@ -279,12 +292,12 @@ proptest! {
         calls in proptest::collection::vec((0u64..2_000, 0u8..60, 0u8..60), 1..40),
     ) {
         let selection = || Selection { probability, ..Selection::default() };
-        let fault = |effect| Fault {
-            kind: "", place: String::new(), line: 1, bus: 0,
-            window: Window { cue: Cue::Start, after_ns: 500, lasts_ns: Some(20_000) },
+        let fault = |effect| ScenarioFault {
+            kind: "", location: String::new(), line: 1, bus: 0,
+            window: Window { trigger: Trigger::Start, after_ns: 500, lasts_ns: Some(20_000) },
             selection: selection(), effect: Effect::Frames(effect),
         };
-        let inner = FaultyPort::new(Line::default(), &fault(effects.0), Arc::default(), Arc::default());
+        let inner = FaultyPort::new(RecordingPort::default(), &fault(effects.0), Arc::default(), Arc::default());
         let mut port = FaultyPort::new(inner, &fault(effects.1), Arc::default(), Arc::default());
         let mut now_ns = 0;
         for (pause_ns, sends, hears) in calls {
@@ -297,7 +310,7 @@ proptest! {
             prop_assert!(batch.iter().all(|received| received.at_ns <= now_ns));
             port.unconfirmed(now_ns);
         }
-        // Long after the end nothing is held back any more.
+        // Long after the end no frame is delayed any more.
         port.unconfirmed(now_ns + 1_000_000);
         prop_assert_eq!(port.unconfirmed(now_ns + 1_000_001), 0);
     }

@@ -1,4 +1,4 @@
-"""Every object of a data sheet, read from the device that it describes."""
+"""Reads every object of an EDS from the device that it describes."""
 
 import canopen
 from canopen.objectdictionary import ODVariable
@@ -16,8 +16,8 @@ def name(entry):
 
 
 def check_against(node, constants, other_sizes=(), without_data=()):
-    """Reads all that can be read. The size must be that of the type, and the value that of the data sheet for the `constants`
-    (indices). Returns how many were read."""
+    """Reads all readable objects. The size must be that of the type. The value of the `constants` (indices) must be that of the EDS.
+    Returns the number of objects."""
     count = 0
     for entry in entries(node.object_dictionary):
         if not entry.readable:

@@ -1,4 +1,4 @@
-"""A difference between what was expected and what came, told in a sentence."""
+"""A difference between expected and received values, described in a sentence."""
 
 import time
 
@@ -6,7 +6,7 @@ from canopen import SdoAbortedError
 
 
 class Difference(Exception):
-    """What differs."""
+    """The difference."""
 
 
 def expect(what, actual, wanted):
@@ -20,7 +20,7 @@ def expect_near(what, actual, wanted, tolerance):
 
 
 def wait_until(what, is_reached, within_s=30.0):
-    """Waits for something that must happen sooner or later; the limit is for what never does."""
+    """Waits for an event that must happen. The limit is for an event that never happens."""
     end = time.monotonic() + within_s
     while not is_reached():
         if time.monotonic() > end:
@@ -29,7 +29,7 @@ def wait_until(what, is_reached, within_s=30.0):
 
 
 def expect_abort(what, code, action):
-    """The device must refuse, with this abort code."""
+    """The device must refuse with this abort code."""
     try:
         action()
     except SdoAbortedError as abort:

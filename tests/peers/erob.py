@@ -1,4 +1,4 @@
-"""The simulated eRob, driven by the package `canopen` with our data sheet of it."""
+"""The simulated eRob, driven by the package `canopen` with the EDS."""
 
 import time
 
@@ -30,7 +30,7 @@ def run(network, interface, case):
     node = BaseNode402(NODE, DATA_SHEET)
     network.add_node(node)
     node.sdo.RESPONSE_TIMEOUT = 5.0
-    # The helper's own limits are for a machine that is not emulated.
+    # The default limits of the helper are for a machine that is not emulated.
     node.TIMEOUT_SWITCH_STATE_SINGLE = node.TIMEOUT_SWITCH_OP_MODE = node.TIMEOUT_CHECK_TPDO = 5.0
     node.TIMEOUT_SWITCH_STATE_FINAL = 30.0
     states = []
@@ -115,7 +115,7 @@ def default_process_data(node):
 
 
 def map_process_data(node):
-    """Feedback every 20 ms for the profile modes; for the cyclic ones a target and its answer with SYNC."""
+    """Feedback every 20 ms for the profile modes. For the cyclic modes, a target and feedback at SYNC."""
     set_up(node.rpdo[1], [0x6040, 0x6060, 0x607A], 255)
     set_up(node.tpdo[1], [0x6041, 0x6061, 0x6064], 255, event_timer=20)
     set_up(node.rpdo[2], [0x6040, 0x607A], 1)
@@ -198,7 +198,7 @@ def cyclic_position(network, node):
     node.sdo[0x60C2][1].raw = round(CYCLE_S * 1000)
     command, feedback = node.rpdo[2], node.tpdo[2]
     start = node.sdo[0x6064].raw
-    # Both RPDOs carry the target, so both must hold the same.
+    # Both RPDOs contain the target, so both must have the same value.
     node.rpdo_pointers[0x607A].raw = start
     node.state = "OPERATION ENABLED"
     positions = []
@@ -211,11 +211,11 @@ def cyclic_position(network, node):
         command.transmit()
         network.sync.transmit()
         wait_until(f"answer to SYNC {cycle}", lambda: len(positions) >= cycle)
-        # After the answer, so that the drive never has less than its interpolation time.
+        # Sent after the feedback, so that the drive always has its interpolation time.
         time.sleep(CYCLE_S)
     wait_until("target reached", lambda: abs(node.sdo[0x6064].raw - end) <= 100)
     expect("answers to SYNC", len(positions), cycles)
-    # At a SYNC the target of the last one has been reached.
+    # At a SYNC, the target of the previous SYNC has been reached.
     for before, position in enumerate(positions):
         expect_near(f"position at SYNC {before + 1}", position, start + step * before, 2 * step)
     node.state = "SWITCH ON DISABLED"
@@ -250,5 +250,5 @@ def master_lost(network, node):
     expect("emergencies while the master is there", node.emcy.active, [])
     heartbeat.stop()
     if node.emcy.wait(0x8130, timeout=30) is None:
-        raise Difference("no emergency message came of the loss of the heartbeat")
+        raise Difference("no emergency message was sent after the loss of the heartbeat")
     node.sdo[0x1016][1].raw = 0

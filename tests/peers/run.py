@@ -1,8 +1,8 @@
-"""Has the package `canopen` meet takt on CAN interfaces, subject by subject.
+"""Tests takt with the package `canopen` on CAN interfaces, one subject after the other.
 
     python tests/peers/run.py erob=vcan0 yz_aim=vcan1
 
-TAKT names the program. Ends with 1 and a sentence at the first difference.
+TAKT is the path of the program. Ends with 1 and a sentence at the first difference.
 """
 
 import importlib
@@ -17,13 +17,13 @@ from difference import Difference
 
 
 def main(subjects):
-    # Whatever matters is told as a difference.
+    # Every problem is reported as a difference.
     logging.disable(logging.CRITICAL)
     for subject in subjects:
         name, interface = subject.split("=")
         begin = time.monotonic()
         network = canopen.Network()
-        # The package's own turn is a second, by which every end would be late.
+        # The package polls once a second by default, which would delay every end.
         network.NOTIFIER_CYCLE = 0.1
         network.connect(interface="socketcan", channel=interface)
         try:

@@ -1,4 +1,4 @@
-"""`takt sim` as the other side of a bus."""
+"""`takt sim` as the devices of a bus."""
 
 import contextlib
 import os
@@ -10,7 +10,7 @@ TAKT = os.environ["TAKT"]
 
 @contextlib.contextmanager
 def drives(config, bus, interface):
-    """The drives of a configuration, for as long as the context lasts."""
+    """The drives of a configuration, while the context lasts."""
     messages = os.path.join(os.environ["OUT"], f"sim-{interface}.txt")
     with open(messages, "wb") as stderr:
         process = subprocess.Popen([TAKT, "sim", config, "--bus", f"{bus}={interface}"], stderr=stderr)

@@ -1,7 +1,6 @@
-"""A slave made of the package `canopen` and our data sheet of the eRob, which `takt run` brings up, enables, moves and leaves.
+"""A slave made of the package `canopen` and our data sheet of the eRob, which `takt run` brings up, enables, moves and shuts down.
 
-It is a drive as far as a master sees one: NMT, SDO and PDOs are the package's; here are the states of CiA 402 and a joint that is
-always where it should be.
+The package provides NMT, SDO and PDOs. This file provides the states of CiA 402 and a joint that is always at its target.
 """
 
 import json
@@ -87,7 +86,7 @@ class Slave:
         if node not in (0, NODE):
             return
         if command in (RESET_NODE, RESET_COMMUNICATION):
-            # The package changes its state, and leaves the boot-up to the application.
+            # The package changes the state, but the application must send the boot-up message.
             self.start_from_defaults(COMMUNICATION)
             self.node.nmt.send_command(command)
             self.node.nmt.send_command(ENTER_PRE_OPERATIONAL)
@@ -99,7 +98,7 @@ class Slave:
         self.segments += data[0] & 0xE0 == UPLOAD_SEGMENT
 
     def synchronise(self, can_id, data, timestamp):
-        """What has come by RPDO1 takes effect, and TPDO1 answers: both as the master has mapped them."""
+        """Applies the data of RPDO1 and sends TPDO1, both with the mapping of the master."""
         if self.node.nmt.state != "OPERATIONAL":
             return
         command, feedback = self.node.rpdo[1], self.node.tpdo[1]
@@ -137,7 +136,7 @@ def run(network, interface, case):
 
 def takt_run(interface, exit_code):
     command = [simulated.TAKT, "run", os.path.abspath(CONFIG), "--bus", f"can={interface}", "--json"]
-    # There it leaves its own log of the bus.
+    # There it writes its own log of the bus.
     result = subprocess.run(command, cwd=os.environ["OUT"], capture_output=True, text=True, timeout=120)
     if result.returncode != exit_code:
         raise Difference(f"`takt run` ended with {result.returncode}: {result.stderr.strip()} {result.stdout.strip()}")
@@ -150,9 +149,9 @@ def communication(slave):
     expect("cycle period in µs", slave.last_written(0x1006), 50_000)
     expect("error behaviour", slave.last_written(0x1029, 1), 2)
     consumer = [value for index, _, value in slave.writes if index == 0x1016]
-    expect("heartbeat that the drive watches, and that it ceases to watch in the end", consumer, [127 << 16 | 20_000, 0])
+    expect("heartbeat consumer of the drive, and its end", consumer, [127 << 16 | 20_000, 0])
     producer = [value for index, _, value in slave.writes if index == 0x1017]
-    expect("the drive's own heartbeat, and its end", producer, [200, 0])
+    expect("heartbeat producer of the drive, and its end", producer, [200, 0])
 
 
 def mapping(slave):
@@ -191,5 +190,5 @@ def emergency(slave, interface):
     slave.position = 0
     slave.breaks_above = COUNTS_PER_TURN * 5 // 360
     stop = takt_run(interface, 1)["stop"]
-    # Its error code object stays 0: only the message tells.
+    # Object 603F stays 0, so only the emergency message shows the error.
     expect("why the run stopped", (stop["rule"], stop["axis"], stop["value"]), ("drive_fault", "joint", BLOCKED_ROTOR))

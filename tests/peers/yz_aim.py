@@ -1,6 +1,6 @@
-"""The simulated YZ-AIM, driven by the package `canopen` with our data sheet of it, by the examples of the manual.
+"""The simulated YZ-AIM, driven by the package `canopen` with the EDS, as in the examples of the manual.
 
-Its statusword is not that of CiA 402 (no mode display, no bit 6), so that the package's helper for that profile does not apply.
+Its statusword differs from CiA 402 (no mode display, no bit 6), so the helper of the package for that profile cannot be used.
 """
 
 import time
@@ -20,11 +20,11 @@ READ_ONLY = 0x0601_0002
 POSITION, VELOCITY, HOMING, INTERPOLATION = 1, 3, 6, 7
 ENABLED = 0x0037
 TARGET_REACHED, HOMED, HOMING_ERROR = 0x0400, 0x1000, 0x2000
-# A drive takes no notice of a controlword that leads further sooner than 20 ms after the last one.
+# The drive ignores a controlword for the next state within 20 ms after the previous controlword.
 CONTROLWORD_PAUSE_S = 0.03
 COMMUNICATION_LOST = 0x20
 IN_ALARM = 4
-# The package's own limit is for a machine that is not emulated.
+# The default limit of the package is for a machine that is not emulated.
 RESPONSE_TIMEOUT_S = 5.0
 
 
@@ -55,7 +55,7 @@ def run(network, interface, case):
 
 def data_sheet(node):
     constants = {0x1000, 0x1005, 0x1016, 0x1017, 0x1018} | set(range(0x1400, 0x1A04))
-    # 606Ch has 16 bits by SDO and 32 in TPDO3, which is what the data sheet says (manual, object table and 5.08.3).
+    # Object 606C has 16 bits by SDO and 32 in TPDO3. The EDS has 32 (manual, object table and 5.08.3).
     count = dictionary.check_against(node, constants, other_sizes={0x606C})
     expect("number of objects that can be read", count, 109)
 
@@ -67,7 +67,7 @@ def refusals(node):
         try:
             node.sdo.upload(index, 0)
         except canopen.SdoAbortedError as abort:
-            raise Difference(f"{index:04X} was refused ({abort}), where silence was expected") from abort
+            raise Difference(f"{index:04X} was refused ({abort}), but no reply was expected") from abort
         except canopen.SdoCommunicationError:
             continue
         raise Difference(f"{index:04X} has a value")
@@ -135,7 +135,7 @@ def wait_for_target(node):
 
 
 def enable(node):
-    """A cold drive wants 0006h, 0007h and 000Fh, with pauses; the manual's 000Fh alone is the last of them."""
+    """After power-up the drive needs 0006h, 0007h and 000Fh with pauses. The manual shows only 000Fh."""
     for word in (0x06, 0x07, 0x0F):
         node.sdo[0x6040].raw = word
         time.sleep(CONTROLWORD_PAUSE_S)
@@ -147,7 +147,7 @@ def home(node):
     node.sdo[0x6060].raw = HOMING
     wait_until("homing complete", lambda: statusword(node) & HOMED)
     expect("homing error", statusword(node) & HOMING_ERROR, 0)
-    # The zero is where the switch opens; the motor comes to rest a little behind it.
+    # The zero is the position where the switch opens. The motor stops a little behind it.
     expect_near("position after homing", position(node), 0, 2000)
 
 
@@ -156,7 +156,7 @@ def absolute_position(node):
     node.sdo[0x6060].raw = POSITION
     node.sdo[0x6081].raw = 1000
     node.sdo[0x6083].raw = 20_000
-    # A stale target must not move the shaft when bit 5 is set; and the first target after enabling is not followed.
+    # A stale target must not move the shaft when bit 5 is set, and the drive ignores the first target after enabling.
     node.sdo[0x607A].raw = position(node)
     node.sdo[0x6040].raw = 0x2F
     node.sdo[0x607A].raw = position(node)
@@ -199,7 +199,7 @@ def velocity(node):
 
 
 def rpm(node):
-    """By SDO 606Ch has 16 bits and 0.1 r/min (manual, object table)."""
+    """By SDO, object 606C has 16 bits with a unit of 0.1 r/min (manual, object table)."""
     return int.from_bytes(node.sdo.upload(0x606C, 0)[:2], "little", signed=True) / 10
 
 
@@ -218,7 +218,7 @@ def position_by_pdo(network, node):
             "target reached, by TPDO1",
             lambda: abs(answers[-1][0x6064] - target) <= 50 and answers[-1][0x6041] == ENABLED | TARGET_REACHED,
         )
-    # RPDO2 with the target it has moves nothing, and is answered by TPDO2.
+    # RPDO2 with the current target moves nothing, and TPDO2 replies.
     answers = answers_of(node.tpdo[2])
     node.rpdo[2][0x607A].raw = start
     node.rpdo[2][0x6081].raw = 1000
@@ -240,7 +240,7 @@ def velocity_by_pdo(node):
 
 
 def answers_of(pdo):
-    """What a TPDO brings from now on, as a list that grows."""
+    """A list that collects the data of a TPDO from now on."""
     answers = []
     pdo.callbacks.clear()
     pdo.add_callback(lambda received: answers.append({variable.index: variable.raw for variable in received}))
@@ -257,7 +257,7 @@ def interpolate(network, *nodes):
         starts.append(position(node))
         answers.append(answers_of(node.tpdo[4]))
         on_sync.append(answers_of(node.tpdo[2]))
-    # Both at once, in a proportion of 3 to 1, the third axis downwards.
+    # Two axes move at once in a proportion of 3 to 1, the third axis moves downwards.
     steps = (300, -100)
     cycles = 100
 
@@ -266,7 +266,7 @@ def interpolate(network, *nodes):
             node.rpdo[4][0x607A].raw = start + step * cycle
             node.rpdo[4].transmit()
 
-    # The first target after enabling, the one of cycle 0, is not followed.
+    # The drive ignores the first target after enabling, which is that of cycle 0.
     for cycle in range(cycles + 1):
         send(cycle)
         network.sync.transmit()
@@ -274,7 +274,7 @@ def interpolate(network, *nodes):
     ends = [start + step * cycles for start, step in zip(starts, steps)]
     for node, end in zip(nodes, ends):
         wait_until("end of the line", lambda: abs(position(node) - end) <= 50)
-    # Without SYNC a target is held and moves nothing.
+    # Without SYNC a target is stored and moves nothing.
     send(cycles + 50)
     wait_until("answers to the targets that are held", lambda: all(len(each) == cycles + 2 for each in answers))
     time.sleep(0.2)
@@ -294,7 +294,7 @@ def master_lost(network, node):
     states = []
     node.nmt.add_heartbeat_callback(states.append)
     heartbeat = network.send_periodic(0x700 + MASTER, [5], 0.05)
-    # A move of some seconds, under way when the master is lost.
+    # A move of some seconds, during which the master is lost.
     start = position(node)
     target = start + 600_000
     node.sdo[0x6081].raw = 300
@@ -303,12 +303,12 @@ def master_lost(network, node):
     node.sdo[0x607A].raw = target
     wait_until("motor under way", lambda: position(node) > start + 50_000)
     heartbeat.stop()
-    wait_until("heartbeat that says alarm", lambda: states[-1] == IN_ALARM)
+    wait_until("heartbeat with the alarm code", lambda: states[-1] == IN_ALARM)
     expect("alarm code", node.sdo["Alarm code"].raw, COMMUNICATION_LOST)
     wait_until("standstill", lambda: abs(rpm(node)) < 1)
     expect("whether the drive had arrived before", position(node) < target - 100_000, True)
     heartbeat = network.send_periodic(0x700 + MASTER, [5], 0.05)
-    wait_until("heartbeat that says operational", lambda: states[-1] == 5)
+    wait_until("heartbeat with the state operational", lambda: states[-1] == 5)
     expect("alarm code", node.sdo["Alarm code"].raw, 0)
     wait_until("the motor resumes by itself", lambda: abs(position(node) - target) <= 50)
     heartbeat.stop()

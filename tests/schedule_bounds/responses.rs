@@ -12,8 +12,8 @@ use crate::traffic::{Traffic, longest_response_ns};
 const CLASSIC: BitRates = BitRates { nominal: 1_000_000, data: 1_000_000 };
 const FLEXIBLE: BitRates = BitRates { nominal: 1_000_000, data: 5_000_000 };
 
-fn simulated(rates: BitRates) -> sim::BitRates {
-    sim::BitRates { nominal: rates.nominal, data: Some(rates.data) }
+fn simulated(rates: BitRates) -> sim::WireBitRates {
+    sim::WireBitRates { nominal: rates.nominal, data: Some(rates.data) }
 }
 
 /// A message of the analysis with the frame that carries it.

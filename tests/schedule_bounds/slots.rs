@@ -4,13 +4,13 @@
 use proptest::prelude::*;
 use takt::bus::schedule::{self, BusSchedule, MessageKind, MessageSchedule};
 use takt::config::Config;
-use takt::sim::BitRates;
+use takt::sim::WireBitRates;
 use takt_rt::{Frame, FrameKind, Id};
 
 use crate::frames::longest;
 use crate::traffic::{Arrival, Traffic};
 
-const RATES: BitRates = BitRates { nominal: 1_000_000, data: None };
+const RATES: WireBitRates = WireBitRates { nominal: 1_000_000, data: None };
 const CONTROLLER: usize = 0;
 
 /// Axes on one bus, with the nodes in the order of the axes or in the opposite one.

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, HashMap, VecDeque};
 
-use takt::sim::{BitRates, Mailbox, Medium, Order};
+use takt::sim::{Mailbox, Medium, QueueOrder, WireBitRates};
 use takt_rt::{Frame, Id};
 
 /// A frame that has been received, times in ns.
@@ -34,13 +34,16 @@ pub struct Traffic {
 
 impl Traffic {
     /// Station 0 is the controller with its queue; the others send by priority.
-    pub fn new(rates: BitRates, drives: usize) -> Self {
+    pub fn new(rates: WireBitRates, drives: usize) -> Self {
         Self::on(Medium::with_master(rates, 256, drives, 64))
     }
 
     /// Every station sends by priority.
-    pub fn by_priority(rates: BitRates, stations: usize) -> Self {
-        Self::on(Medium::new(rates, (0..stations).map(|_| Mailbox::new(Order::Priority, 1024)).collect()))
+    pub fn by_priority(rates: WireBitRates, stations: usize) -> Self {
+        Self::on(Medium::new(
+            rates,
+            (0..stations).map(|_| Mailbox::new(QueueOrder::Priority, 1024)).collect(),
+        ))
     }
 
     fn on(medium: Medium) -> Self {

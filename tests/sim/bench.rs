@@ -1,15 +1,15 @@
-//! A bus with one simulated eRob joint and a master's hands on it, in virtual time.
+//! A bus with simulated eRob joints and a master that the test controls, in virtual time.
 
 use takt::sim::erob::{ErobJoint, ErobParameters};
 use takt::sim::plant::{Encoder, JointParameters};
-use takt::sim::{BitRates, Drive, Observation, SimulatedBus};
+use takt::sim::{Drive, Observation, SimulatedBus, WireBitRates};
 use takt_rt::{BusPort, Frame, Id, ReceiveBatch, Received};
 
 pub const NODE: u8 = 5;
 pub const MILLISECOND_NS: u64 = 1_000_000;
 pub const COUNTS_PER_RADIAN: f64 = 524_288.0 / std::f64::consts::TAU;
 
-/// A joint of the size 80H-80.
+/// A joint of size 80H-80.
 pub fn parameters(node: u8) -> ErobParameters {
     ErobParameters {
         node,
@@ -37,12 +37,12 @@ pub fn parameters(node: u8) -> ErobParameters {
 pub struct Bench {
     pub bus: SimulatedBus,
     pub now_ns: u64,
-    /// Everything the drives have said and nobody has looked at.
+    /// All frames of the drives that the test has not taken yet.
     pub heard: Vec<Received>,
 }
 
 impl Bench {
-    /// A bus with these modules, which have booted; their boot-up messages have been heard.
+    /// A bus with these modules after their boot-up messages, which are discarded.
     pub fn with(modules: Vec<ErobParameters>) -> Self {
         let mut drives: Vec<Box<dyn Drive>> = vec![];
         for module in modules {
@@ -53,7 +53,7 @@ impl Bench {
 
     /// A bus with any drives that boot within 10 ms.
     pub fn of(drives: Vec<Box<dyn Drive>>) -> Self {
-        let rates = BitRates { nominal: 1_000_000, data: None };
+        let rates = WireBitRates { nominal: 1_000_000, data: None };
         let bus = SimulatedBus::with_drives(rates, u64::MAX, drives);
         let mut bench = Self { bus, now_ns: 0, heard: vec![] };
         bench.run_ns(0);
@@ -67,7 +67,7 @@ impl Bench {
         Self::with(vec![parameters(NODE)])
     }
 
-    /// Lets time pass and listens.
+    /// Lets time pass and collects the received frames.
     pub fn run_ns(&mut self, duration_ns: u64) {
         self.now_ns += duration_ns;
         let mut batch = ReceiveBatch::new();
@@ -91,11 +91,11 @@ impl Bench {
     }
 
     /// Sends a data frame.
-    pub fn say<const N: usize>(&mut self, id: u32, bytes: [u8; N]) {
+    pub fn send_data<const N: usize>(&mut self, id: u32, bytes: [u8; N]) {
         self.send(Frame::of(Id::base(id).unwrap(), bytes));
     }
 
-    /// What was heard under an identifier since the last time, in order.
+    /// Returns the frames received under an identifier since the last call, in order.
     pub fn take(&mut self, id: u32) -> Vec<Vec<u8>> {
         let (mine, others): (Vec<_>, Vec<_>) =
             self.heard.drain(..).partition(|received| received.frame.id().value() == id);
@@ -103,16 +103,16 @@ impl Bench {
         mine.into_iter().map(|received| received.frame.payload().to_vec()).collect()
     }
 
-    /// One SDO request and its answer, which must come within 2 ms.
+    /// Sends one SDO request and returns its reply, which must arrive within 2 ms.
     pub fn sdo(&mut self, request: [u8; 8]) -> [u8; 8] {
-        self.say(0x600 + u32::from(NODE), request);
+        self.send_data(0x600 + u32::from(NODE), request);
         self.run_ms(2);
         let answers = self.take(0x580 + u32::from(NODE));
         assert_eq!(answers.len(), 1, "answers to {request:02X?}");
         answers[0].clone().try_into().unwrap()
     }
 
-    /// Writes an object of so many bytes; the abort code when it is refused.
+    /// Writes an object of this many bytes. The error is the abort code.
     pub fn write(&mut self, index: u16, subindex: u8, bytes: u8, value: i64) -> Result<(), u32> {
         let [low, high] = index.to_le_bytes();
         let [a, b, c, d, ..] = value.to_le_bytes();
@@ -124,7 +124,7 @@ impl Bench {
         }
     }
 
-    /// Reads an object; the abort code when it is refused.
+    /// Reads an object. The error is the abort code.
     pub fn read(&mut self, index: u16, subindex: u8) -> Result<u32, u32> {
         let [low, high] = index.to_le_bytes();
         let answer = self.sdo([0x40, low, high, subindex, 0, 0, 0, 0]);
@@ -140,12 +140,12 @@ impl Bench {
     }
 
     pub fn nmt(&mut self, command: u8) {
-        self.say(0x000, [command, NODE]);
+        self.send_data(0x000, [command, NODE]);
         self.run_ms(2);
     }
 
-    /// Maps RPDO1 to the controlword and `target`, TPDO1 to statusword and position, both at every SYNC, and
-    /// starts the node.
+    /// Maps RPDO1 to the controlword and `target` and TPDO1 to statusword and position, both sent at every SYNC.
+    /// Then starts the node.
     pub fn start_process_data(&mut self, target: u32) {
         for (communication, mapping, id, objects) in [
             (0x1400, 0x1600, 0x200, [0x6040_0010, target]),
@@ -166,19 +166,20 @@ impl Bench {
         self.heard.clear();
     }
 
-    /// One cycle of 1 ms: SYNC, then at 60 % the set-point. Returns what TPDO1 said: statusword and position.
+    /// One cycle of 1 ms: SYNC, then the set-point at 60 %. Returns statusword and position from TPDO1.
     pub fn cycle(&mut self, controlword: u16, target: i32) -> (u16, i32) {
-        self.say(0x080, []);
+        self.send_data(0x080, []);
         self.run_ns(600_000);
         let [low, high] = controlword.to_le_bytes();
         let [a, b, c, d] = target.to_le_bytes();
-        self.say(0x200 + u32::from(NODE), [low, high, a, b, c, d]);
+        self.send_data(0x200 + u32::from(NODE), [low, high, a, b, c, d]);
         self.run_ns(400_000);
         let tpdo = self.take(0x180 + u32::from(NODE)).pop().expect("TPDO1 after SYNC");
         (u16::from_le_bytes([tpdo[0], tpdo[1]]), i32::from_le_bytes([tpdo[2], tpdo[3], tpdo[4], tpdo[5]]))
     }
 
-    /// Sets a mode and enables, with `target` in every set-point; in a position mode the actual position.
+    /// Sets a mode and enables the drive with `target` in every set-point. In a position mode it is the actual
+    /// position.
     pub fn enable(&mut self, mode: i8, target_object: u32, target: i32) {
         self.write(0x6060, 0, 1, mode.into()).unwrap();
         assert_eq!(self.read(0x6061, 0), Ok(mode as u32));

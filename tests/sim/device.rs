@@ -1,4 +1,4 @@
-//! The CiA 402 state machine: statuswords as real units show them, faults, the ways out of them.
+//! The CiA 402 state machine: the statuswords of real units, faults and fault resets.
 
 use takt::sim::DriveFault;
 use takt::sim::erob::ErobParameters;
@@ -11,7 +11,7 @@ const TARGET_VELOCITY: u32 = 0x60FF_0020;
 const WARNING: u16 = 0x80;
 
 #[test]
-fn statuswords_are_those_of_real_units_with_and_without_the_warning_bit() {
+fn statuswords_equal_those_of_real_units_with_and_without_the_warning_bit() {
     let mut warnings = std::collections::BTreeSet::new();
     for seed in 0..8 {
         let mut bench = Bench::with(vec![ErobParameters { seed, ..parameters(NODE) }]);
@@ -26,7 +26,7 @@ fn statuswords_are_those_of_real_units_with_and_without_the_warning_bit() {
         bench.cycle(0x0F, 60_000);
         bench.cycle(0x0F, 60_000);
         seen.push(bench.cycle(0x0F, 60_000).0);
-        bench.bus.inject(NODE, DriveFault::OverCurrent).unwrap();
+        bench.bus.inject_fault(NODE, DriveFault::OverCurrent).unwrap();
         bench.cycle(0x0F, 60_000);
         seen.push(bench.cycle(0x0F, 60_000).0);
         warnings.extend(seen.iter().map(|word| word & WARNING));
@@ -37,7 +37,7 @@ fn statuswords_are_those_of_real_units_with_and_without_the_warning_bit() {
 }
 
 #[test]
-fn each_controlword_takes_the_transition_of_the_standard() {
+fn each_controlword_causes_the_transition_of_cia_402() {
     let mut bench = Bench::new();
     bench.write(0x6060, 0, 1, 8).unwrap();
     let steps = [
@@ -66,7 +66,7 @@ fn each_controlword_takes_the_transition_of_the_standard() {
 }
 
 #[test]
-fn the_brake_is_engaged_exactly_when_there_is_no_torque() {
+fn the_brake_is_engaged_if_and_only_if_there_is_no_torque() {
     let mut bench = Bench::new();
     bench.bus.set_load_torque(NODE, 20.0).unwrap();
     bench.run_ms(100);
@@ -76,7 +76,7 @@ fn the_brake_is_engaged_exactly_when_there_is_no_torque() {
     for _ in 0..1000 {
         bench.cycle(0x0F, 0);
     }
-    // The integral holds what the brake held, to the count.
+    // The integral part equals the torque that the brake held, so the position stays the same count.
     assert!(bench.observe().position_counts.abs() <= 1);
     for _ in 0..3 {
         bench.cycle(0x06, 0);
@@ -85,16 +85,16 @@ fn the_brake_is_engaged_exactly_when_there_is_no_torque() {
 }
 
 #[test]
-fn a_fault_is_left_by_a_rising_edge_that_is_held_for_several_cycles() {
+fn a_fault_reset_needs_a_rising_edge_held_for_several_cycles() {
     let mut bench = Bench::new();
     bench.enable(8, TARGET_POSITION, 0);
-    bench.bus.inject(NODE, DriveFault::Encoder).unwrap();
+    bench.bus.inject_fault(NODE, DriveFault::Encoder).unwrap();
     for _ in 0..3 {
         bench.cycle(0x0F, 0);
     }
     assert_eq!(bench.take(0x085), [[0x05, 0x73, 0x21, 0, 0, 0, 0, 0]]);
     assert_eq!((bench.observe().state, bench.observe().error_code), (DriveState::Fault, 0x7305));
-    // An edge that is too short, then one that is long enough.
+    // One edge is too short, the next one is long enough.
     for (controlword, cycles, state) in [
         (0x80, 2, DriveState::Fault),
         (0x06, 3, DriveState::Fault),
@@ -111,12 +111,12 @@ fn a_fault_is_left_by_a_rising_edge_that_is_held_for_several_cycles() {
 }
 
 #[test]
-fn a_battery_fault_is_left_only_after_its_own_reset_which_loses_the_turns() {
+fn a_battery_fault_needs_its_own_reset_which_clears_the_turn_count() {
     let far = ErobParameters { initial_position: 20.0, ..parameters(NODE) };
     let mut bench = Bench::with(vec![far]);
     let before = bench.observe().position_counts;
     assert!(before > 3 * 524_288);
-    bench.bus.inject(NODE, DriveFault::MultiTurnBattery).unwrap();
+    bench.bus.inject_fault(NODE, DriveFault::MultiTurnBattery).unwrap();
     bench.run_ms(2);
     for _ in 0..2 {
         bench.write(0x6040, 0, 2, 0x00).unwrap();
@@ -135,14 +135,14 @@ fn a_battery_fault_is_left_only_after_its_own_reset_which_loses_the_turns() {
 }
 
 #[test]
-fn a_lost_master_makes_an_enabled_drive_decelerate_before_it_cuts_power() {
+fn an_enabled_drive_decelerates_and_disables_when_the_master_is_lost() {
     let mut bench = Bench::new();
     bench.write(0x6085, 0, 4, 800_000).unwrap();
     bench.write(0x1016, 1, 4, 0x0001_0014).unwrap();
     bench.write(0x1029, 1, 1, 1).unwrap();
     bench.enable(9, TARGET_VELOCITY, 0);
     for _ in 0..300 {
-        bench.say(0x701, [5]);
+        bench.send_data(0x701, [5]);
         bench.cycle(0x0F, 160_000);
     }
     let (mut reacting, mut last) = (0, bench.observe().velocity);
@@ -179,7 +179,7 @@ fn a_quick_stop_runs_its_ramp_and_ends_without_power() {
 }
 
 #[test]
-fn shutdown_is_immediate_or_after_a_ramp_as_605b_says() {
+fn shutdown_follows_the_option_code_605b() {
     for (option, still_enabled) in [(0, false), (1, true)] {
         let mut bench = Bench::new();
         bench.write(0x605B, 0, 2, option).unwrap();
@@ -200,7 +200,7 @@ fn shutdown_is_immediate_or_after_a_ramp_as_605b_says() {
 }
 
 #[test]
-fn leaving_the_following_error_window_is_a_fault() {
+fn exceeding_the_following_error_window_is_a_fault() {
     let mut bench = Bench::new();
     bench.write(0x6065, 0, 4, 500).unwrap();
     bench.write(0x6085, 0, 4, 1_600_000).unwrap();
@@ -214,7 +214,7 @@ fn leaving_the_following_error_window_is_a_fault() {
 }
 
 #[test]
-fn the_mode_follows_only_in_a_disabled_drive_and_only_if_it_is_supported() {
+fn the_mode_changes_only_in_a_disabled_drive_and_only_if_it_is_supported() {
     let mut bench = Bench::new();
     for (mode, display) in [(8, 8), (6, 8), (7, 8), (2, 8), (3, 3), (0, 3), (10, 10)] {
         bench.write(0x6060, 0, 1, mode).unwrap();
@@ -227,7 +227,7 @@ fn the_mode_follows_only_in_a_disabled_drive_and_only_if_it_is_supported() {
 }
 
 #[test]
-fn a_power_cycle_disables_brakes_and_starts_anew() {
+fn a_power_cycle_disables_the_drive_engages_the_brake_and_restarts() {
     let mut bench = Bench::new();
     bench.enable(9, TARGET_VELOCITY, 0);
     for _ in 0..300 {
@@ -239,7 +239,7 @@ fn a_power_cycle_disables_brakes_and_starts_anew() {
     assert_eq!(bench.take(0x705), [[0]]);
     let observed = bench.observe();
     assert_eq!((observed.state, observed.velocity), (DriveState::SwitchOnDisabled, 0.0));
-    // The brake took a few hundredths of a radian, and the joint stayed where it then was.
+    // The brake needed a few hundredths of a radian, and the joint stayed at rest there.
     assert!((0.0..0.05).contains(&(observed.position - position)));
 }
 

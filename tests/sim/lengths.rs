@@ -1,5 +1,5 @@
-//! The bits that the simulation counts against the worst case that the bus arithmetic promises: two calculations that
-//! know nothing of each other.
+//! The frame lengths of the simulation against the worst case of the bus load calculation.
+//! The two calculations are independent.
 
 use proptest::prelude::*;
 use takt::bus::frame_time::{FrameShape, worst_case_bits};

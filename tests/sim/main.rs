@@ -1,4 +1,4 @@
-//! The simulated bus and the simulated drives, as a master sees them.
+//! The simulated bus and the simulated drives from the point of view of a master.
 
 mod bench;
 mod device;

@@ -1,4 +1,4 @@
-//! The modes in which the master makes the trajectory: CSP, CSV, CST.
+//! The modes in which the master generates the trajectory: CSP, CSV, CST.
 
 use takt::sim::erob::ErobParameters;
 use takt::sim::plant::Encoder;
@@ -22,8 +22,8 @@ fn csp_follows_a_move_and_rests_within_one_count() {
     bench.enable(8, TARGET_POSITION, 0);
     let mut worst = 0;
     for cycle in 0..2500 {
-        // Sent in this cycle, latched at the next SYNC, reached at the one after: the position sampled now belongs
-        // to what was sent two cycles ago.
+        // A target is sent in one cycle, latched at the next SYNC and reached at the one after.
+        // The position sampled now therefore belongs to the target of two cycles ago.
         let (_, position) = bench.cycle(0x0F, quintic(cycle));
         worst = worst.max((position - quintic(cycle - 2)).abs());
     }
@@ -40,7 +40,7 @@ fn csp_follows_a_ramp_with_an_error_that_does_not_grow() {
     for cycle in 0..3_000 {
         let (_, position) = bench.cycle(0x0F, 150 * cycle);
         let error = position - 150 * (cycle - 2);
-        // The step of the velocity at the beginning takes the loops some 100 ms.
+        // The control loops need about 100 ms for the velocity step at the beginning.
         assert!(cycle < 300 || error.abs() <= 3, "{error} in cycle {cycle}");
     }
 }
@@ -67,7 +67,7 @@ fn csp_rests_within_one_count_after_many_small_and_large_moves() {
 }
 
 #[test]
-fn a_reversed_joint_with_an_offset_obeys_in_its_own_direction() {
+fn a_reversed_joint_with_an_offset_moves_in_its_own_direction() {
     let encoder = Encoder { counts_per_unit: -COUNTS_PER_RADIAN, zero_counts: 1000.0 };
     let mut bench = Bench::with(vec![ErobParameters { encoder, ..parameters(NODE) }]);
     bench.enable(8, TARGET_POSITION, 1000);
@@ -94,29 +94,29 @@ fn enabling_with_a_stale_target_makes_the_axis_jump() {
 }
 
 #[test]
-fn when_sync_stays_away_the_last_target_is_reached_and_held() {
+fn the_last_target_is_reached_and_held_when_sync_is_missing() {
     let mut bench = Bench::new();
     bench.enable(8, TARGET_POSITION, 0);
     for cycle in 0..1000 {
         bench.cycle(0x0F, 100 * cycle);
     }
     bench.run_ms(2_000);
-    // The one of cycle 998 was latched at the last SYNC, the one of cycle 999 still waits.
+    // The target of cycle 998 was latched at the last SYNC, and that of cycle 999 is still buffered.
     assert!((bench.observe().position_counts - 99_800).abs() <= 1);
     assert_eq!(bench.observe().state, DriveState::OperationEnabled);
 }
 
 #[test]
-fn syncs_that_come_late_do_not_shake_the_joint() {
+fn late_syncs_do_not_disturb_the_motion() {
     let mut bench = Bench::new();
     bench.enable(8, TARGET_POSITION, 0);
     for cycle in 0..1_500i32 {
-        // 0 to 300 µs late, in no order.
+        // Each SYNC is 0 to 300 µs late, in irregular order.
         let late_ns = (cycle * 7_919) % 300 * 1_000;
         bench.run_ns(late_ns as u64);
-        bench.say(0x080, []);
+        bench.send_data(0x080, []);
         let [a, b, c, d] = (150 * cycle).to_le_bytes();
-        bench.say(0x205, [0x0F, 0, a, b, c, d]);
+        bench.send_data(0x205, [0x0F, 0, a, b, c, d]);
         bench.run_ns(MILLISECOND_NS - late_ns as u64);
         if cycle > 300 {
             let velocity = bench.observe().velocity * COUNTS_PER_RADIAN;
@@ -126,7 +126,7 @@ fn syncs_that_come_late_do_not_shake_the_joint() {
 }
 
 #[test]
-fn csp_with_rpdos_that_act_at_once_follows_too() {
+fn csp_also_works_with_event_driven_rpdos() {
     let mut bench = Bench::new();
     bench.enable(8, TARGET_POSITION, 0);
     bench.write(0x1400, 2, 1, 255).unwrap();
@@ -134,7 +134,7 @@ fn csp_with_rpdos_that_act_at_once_follows_too() {
     for cycle in 0..2_000 {
         let (_, position) = bench.cycle(0x0F, 100 * cycle);
         if cycle > 300 {
-            // Taken at 0.7 of a cycle and reached one period later: at the arrival of SYNC a third is done.
+            // The target arrives at 0.7 of a cycle and is reached one period later, so a third is done at SYNC.
             worst = worst.max((position - 100 * (cycle - 2) - 33).abs());
         }
     }
@@ -142,7 +142,7 @@ fn csp_with_rpdos_that_act_at_once_follows_too() {
 }
 
 #[test]
-fn csv_turns_at_the_velocity_that_it_is_told() {
+fn csv_reaches_the_target_velocity() {
     let mut bench = Bench::new();
     bench.enable(9, TARGET_VELOCITY, 0);
     for _ in 0..300 {
@@ -157,7 +157,7 @@ fn csv_turns_at_the_velocity_that_it_is_told() {
 }
 
 #[test]
-fn cst_accelerates_the_inertia_with_the_torque_left_by_friction() {
+fn cst_accelerates_the_inertia_with_the_torque_minus_friction() {
     let mut bench = Bench::new();
     bench.enable(10, TARGET_TORQUE, 0);
     // 400 per mille of 31 N·m less 4 N·m: 8.4 N·m on 0.4 kg·m².

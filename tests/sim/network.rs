@@ -1,7 +1,7 @@
-//! NMT, boot-up, heartbeat in both directions, guarding, emergency messages.
+//! NMT, boot-up, heartbeat producer and consumer, node guarding, emergency messages.
 
 use takt::sim::erob::ErobParameters;
-use takt::sim::{DriveFault, NmtState};
+use takt::sim::{DriveFault, NodeState};
 use takt_rt::{DriveState, Frame, Id};
 
 use super::bench::{Bench, MILLISECOND_NS, NODE, parameters};
@@ -9,24 +9,24 @@ use super::bench::{Bench, MILLISECOND_NS, NODE, parameters};
 const MASTER_HEARTBEAT: u32 = 0x701;
 
 #[test]
-fn a_drive_is_mute_until_its_boot_up_message() {
+fn a_drive_sends_nothing_before_its_boot_up_message() {
     let slow = ErobParameters { power_up_ns: 8_000 * MILLISECOND_NS, ..parameters(NODE) };
     let mut bench = Bench::with(vec![slow]);
-    bench.say(0x605, [0x40, 0x00, 0x10, 0, 0, 0, 0, 0]);
-    bench.say(0x000, [0x01, 0x00]);
+    bench.send_data(0x605, [0x40, 0x00, 0x10, 0, 0, 0, 0, 0]);
+    bench.send_data(0x000, [0x01, 0x00]);
     bench.run_ms(7_989);
     assert!(bench.heard.is_empty());
     bench.run_ms(2);
     let [boot_up] = &bench.heard[..] else { panic!("{} frames", bench.heard.len()) };
     assert_eq!(boot_up.frame, Frame::of(Id::canopen(0x700, NODE), [0]));
-    assert_eq!(bench.observe().nmt, NmtState::PreOperational);
+    assert_eq!(bench.observe().nmt, NodeState::PreOperational);
 }
 
 #[test]
-fn a_stopped_node_answers_no_sdo_until_it_is_reset() {
+fn a_stopped_node_answers_no_sdo_request_until_it_is_reset() {
     let mut bench = Bench::new();
     bench.nmt(0x02);
-    bench.say(0x605, [0x40, 0x00, 0x10, 0, 0, 0, 0, 0]);
+    bench.send_data(0x605, [0x40, 0x00, 0x10, 0, 0, 0, 0, 0]);
     bench.run_ms(5);
     assert!(bench.heard.is_empty());
     let reset_ns = bench.now_ns;
@@ -38,32 +38,32 @@ fn a_stopped_node_answers_no_sdo_until_it_is_reset() {
 }
 
 #[test]
-fn commands_reach_the_node_that_they_name_and_node_0_is_every_one() {
+fn nmt_commands_address_one_node_or_all_with_node_id_0() {
     let mut bench = Bench::with(vec![parameters(NODE), parameters(6)]);
-    bench.say(0x000, [0x01, 6]);
+    bench.send_data(0x000, [0x01, 6]);
     bench.run_ms(1);
     let state = |bench: &mut Bench, node| bench.bus.observe(node).unwrap().nmt;
     assert_eq!(
         (state(&mut bench, NODE), state(&mut bench, 6)),
-        (NmtState::PreOperational, NmtState::Operational)
+        (NodeState::PreOperational, NodeState::Operational)
     );
-    bench.say(0x000, [0x80, 0]);
+    bench.send_data(0x000, [0x80, 0]);
     bench.run_ms(1);
-    bench.say(0x000, [0x01, 0]);
+    bench.send_data(0x000, [0x01, 0]);
     bench.run_ms(1);
     assert_eq!(
         (state(&mut bench, NODE), state(&mut bench, 6)),
-        (NmtState::Operational, NmtState::Operational)
+        (NodeState::Operational, NodeState::Operational)
     );
-    // A command of the wrong length or number changes nothing.
-    bench.say(0x000, [0x02, NODE, 0]);
-    bench.say(0x000, [0x03, NODE]);
+    // A command with a wrong length or node ID changes nothing.
+    bench.send_data(0x000, [0x02, NODE, 0]);
+    bench.send_data(0x000, [0x03, NODE]);
     bench.run_ms(1);
-    assert_eq!(state(&mut bench, NODE), NmtState::Operational);
+    assert_eq!(state(&mut bench, NODE), NodeState::Operational);
 }
 
 #[test]
-fn reset_communication_restores_communication_only_and_reset_node_everything() {
+fn reset_communication_restores_the_communication_objects_and_reset_node_all() {
     let mut bench = Bench::new();
     bench.write(0x1006, 0, 4, 1000).unwrap();
     bench.write(0x6081, 0, 4, 5566).unwrap();
@@ -98,16 +98,16 @@ fn the_heartbeat_shows_the_state_at_its_period() {
     assert_eq!(bench.take(0x705).last().unwrap(), &[4]);
 }
 
-/// A started drive that has heard one heartbeat of the master and expects more, and then the time-out passes.
+/// A started drive that consumes the master's heartbeat, receives it once, and then reaches the time-out.
 fn loses_master(error_behaviour: i64) -> Bench {
     let mut bench = Bench::new();
     bench.write(0x1016, 1, 4, 0x0001_0032).unwrap();
     bench.write(0x1029, 1, 1, error_behaviour).unwrap();
     bench.nmt(0x01);
     bench.run_ms(200);
-    assert_eq!(bench.observe().nmt, NmtState::Operational, "watched before the first heartbeat");
+    assert_eq!(bench.observe().nmt, NodeState::Operational, "watched before the first heartbeat");
     for _ in 0..5 {
-        bench.say(MASTER_HEARTBEAT, [5]);
+        bench.send_data(MASTER_HEARTBEAT, [5]);
         bench.run_ms(40);
     }
     assert_eq!(bench.observe().state, DriveState::SwitchOnDisabled);
@@ -118,26 +118,26 @@ fn loses_master(error_behaviour: i64) -> Bench {
 }
 
 #[test]
-fn a_lost_master_is_a_fault_an_emergency_message_and_the_state_that_1029_says() {
+fn a_lost_master_causes_a_fault_an_emergency_message_and_the_state_of_1029() {
     let mut bench = loses_master(0);
     assert_eq!(bench.take(0x085), [[0x30, 0x81, 0x11, 0, 0, 0, 0, 0]]);
-    assert_eq!((bench.observe().nmt, bench.observe().state), (NmtState::PreOperational, DriveState::Fault));
+    assert_eq!((bench.observe().nmt, bench.observe().state), (NodeState::PreOperational, DriveState::Fault));
     assert_eq!(bench.read(0x1003, 1), Ok(0x8130));
-    assert_eq!(loses_master(1).observe().nmt, NmtState::Operational);
-    assert_eq!(loses_master(2).observe().nmt, NmtState::Stopped);
+    assert_eq!(loses_master(1).observe().nmt, NodeState::Operational);
+    assert_eq!(loses_master(2).observe().nmt, NodeState::Stopped);
 }
 
 #[test]
-fn without_a_programmed_consumer_the_masters_death_goes_unnoticed() {
+fn without_a_heartbeat_consumer_a_lost_master_is_not_detected() {
     let mut bench = Bench::new();
     bench.nmt(0x01);
-    bench.say(MASTER_HEARTBEAT, [5]);
+    bench.send_data(MASTER_HEARTBEAT, [5]);
     bench.run_ms(5_000);
-    assert_eq!((bench.observe().nmt, bench.observe().error_code), (NmtState::Operational, 0));
+    assert_eq!((bench.observe().nmt, bench.observe().error_code), (NodeState::Operational, 0));
 }
 
 #[test]
-fn guarding_is_answered_with_a_toggling_bit_unless_there_is_a_heartbeat() {
+fn node_guarding_is_answered_with_a_toggle_bit_unless_the_heartbeat_is_on() {
     let mut bench = Bench::new();
     let request = Frame::remote(Id::canopen(0x700, NODE), 1).unwrap();
     for expected in [127, 255, 127] {
@@ -152,7 +152,7 @@ fn guarding_is_answered_with_a_toggling_bit_unless_there_is_a_heartbeat() {
 }
 
 #[test]
-fn a_guarded_node_notices_when_the_guard_stays_away() {
+fn a_guarded_node_detects_missing_guarding() {
     let mut bench = Bench::new();
     bench.write(0x100C, 0, 2, 20).unwrap();
     bench.write(0x100D, 0, 1, 3).unwrap();
@@ -161,17 +161,17 @@ fn a_guarded_node_notices_when_the_guard_stays_away() {
     bench.run_ms(59);
     assert_eq!(bench.observe().error_code, 0);
     bench.run_ms(3);
-    assert_eq!((bench.observe().error_code, bench.observe().nmt), (0x8130, NmtState::PreOperational));
+    assert_eq!((bench.observe().error_code, bench.observe().nmt), (0x8130, NodeState::PreOperational));
 }
 
 #[test]
-fn errors_fill_the_history_newest_first_and_0_empties_it() {
+fn errors_fill_the_history_newest_first_and_writing_0_clears_it() {
     let mut bench = Bench::new();
     assert_eq!(bench.read(0x1003, 0), Ok(0));
     assert_eq!(bench.read(0x1003, 1), Err(0x0800_0024));
-    bench.bus.inject(NODE, DriveFault::OverCurrent).unwrap();
+    bench.bus.inject_fault(NODE, DriveFault::OverCurrent).unwrap();
     bench.run_ms(1);
-    bench.bus.inject(NODE, DriveFault::Encoder).unwrap();
+    bench.bus.inject_fault(NODE, DriveFault::Encoder).unwrap();
     bench.run_ms(1);
     assert_eq!(bench.take(0x085), [[0x10, 0x23, 0x03, 0, 0, 0, 0, 0], [0x05, 0x73, 0x23, 0, 0, 0, 0, 0]]);
     assert_eq!((bench.read(0x1003, 0), bench.read(0x1001, 0)), (Ok(2), Ok(0x23)));
@@ -182,16 +182,16 @@ fn errors_fill_the_history_newest_first_and_0_empties_it() {
 }
 
 #[test]
-fn frames_that_are_not_the_drives_own_leave_it_silent() {
+fn the_drive_ignores_frames_of_other_protocols_and_nodes() {
     let mut bench = Bench::new();
     bench.nmt(0x01);
     bench.run_ms(5);
     bench.heard.clear();
-    // The vendor's other protocol, another node's services, an extended identifier, a CAN FD frame.
-    bench.say(0x645, [0x00, 0x02]);
-    bench.say(0x606, [0x40, 0x00, 0x10, 0, 0, 0, 0, 0]);
-    bench.say(0x206, [0x06, 0x00]);
-    bench.say(0x305, [0x06, 0x00, 0, 0, 0, 0]);
+    // The vendor's other protocol, services of another node, an extended identifier, a CAN FD frame.
+    bench.send_data(0x645, [0x00, 0x02]);
+    bench.send_data(0x606, [0x40, 0x00, 0x10, 0, 0, 0, 0, 0]);
+    bench.send_data(0x206, [0x06, 0x00]);
+    bench.send_data(0x305, [0x06, 0x00, 0, 0, 0, 0]);
     bench.send(Frame::of(Id::extended(0x605).unwrap(), [0x40, 0x00, 0x10, 0, 0, 0, 0, 0]));
     bench.send(Frame::fd(Id::canopen(0x600, NODE), &[0x40, 0x00, 0x10, 0, 0, 0, 0, 0], false).unwrap());
     bench.run_ms(20);

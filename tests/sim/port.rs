@@ -2,12 +2,12 @@
 
 use takt::config::{Config, Travel};
 use takt::sim::erob::ErobJoint;
-use takt::sim::{BitRates, SimulatedBus, UnknownNode, WireLength};
+use takt::sim::{SimulatedBus, UnknownNode, WireBitRates, WireLength};
 use takt_rt::{BusPort, BusState, Frame, Id, RECEIVE_BATCH, ReceiveBatch};
 
 use super::bench::{Bench, MILLISECOND_NS, NODE, parameters};
 
-const RATES: BitRates = BitRates { nominal: 1_000_000, data: None };
+const RATES: WireBitRates = WireBitRates { nominal: 1_000_000, data: None };
 
 fn bus(longest_gap_ns: u64) -> SimulatedBus {
     SimulatedBus::with_drives(RATES, longest_gap_ns, vec![Box::new(ErobJoint::new(parameters(NODE)))])
@@ -20,7 +20,7 @@ fn received(bus: &mut SimulatedBus, now_ns: u64) -> Vec<(u64, u32)> {
 }
 
 #[test]
-fn the_world_begins_with_the_first_call_whatever_the_clock_says() {
+fn simulated_time_begins_with_the_first_call_at_any_clock_value() {
     let start_ns = 77_123_456_789;
     let mut bus = bus(u64::MAX);
     assert!(received(&mut bus, start_ns).is_empty());
@@ -53,7 +53,7 @@ fn frames_beyond_the_queue_are_refused_and_counted() {
 }
 
 #[test]
-fn a_batch_is_never_overfilled_and_the_rest_comes_next_time() {
+fn a_batch_is_never_overfilled_and_the_rest_follows_in_the_next() {
     let mut bench = Bench::new();
     bench.write(0x1017, 0, 2, 1).unwrap();
     let mut batch = ReceiveBatch::new();
@@ -72,7 +72,7 @@ fn a_batch_is_never_overfilled_and_the_rest_comes_next_time() {
 }
 
 #[test]
-fn a_pause_of_the_caller_stops_the_world_too() {
+fn a_pause_of_the_caller_stops_the_simulated_time() {
     let mut bus = bus(5 * MILLISECOND_NS);
     bus.send(0, &[]);
     let mut now_ns = 0;
@@ -80,7 +80,7 @@ fn a_pause_of_the_caller_stops_the_world_too() {
         now_ns += MILLISECOND_NS;
         received(&mut bus, now_ns);
     }
-    // The drive expects a heartbeat every 50 ms; the caller is away for a second, and comes back in time.
+    // The drive expects a heartbeat every 50 ms. The caller pauses for a second and then resumes in time.
     for frame in [
         Frame::of(Id::canopen(0x600, NODE), [0x23, 0x16, 0x10, 1, 50, 0, 1, 0]),
         Frame::of(Id::canopen(0x700, 1), [5]),
@@ -93,14 +93,14 @@ fn a_pause_of_the_caller_stops_the_world_too() {
     received(&mut bus, now_ns);
     assert_eq!(bus.paused_ns(), 995 * MILLISECOND_NS);
     assert_eq!(bus.observe(NODE).unwrap().error_code, 0);
-    // What arrives afterwards carries the caller's time.
+    // Frames that arrive afterwards carry the caller's time.
     bus.send(now_ns, &[Frame::of(Id::canopen(0x600, NODE), [0x40, 0x00, 0x10, 0, 0, 0, 0, 0])]);
     let answer = received(&mut bus, now_ns + 2 * MILLISECOND_NS);
     assert!(answer.len() == 1 && (now_ns..now_ns + 2 * MILLISECOND_NS).contains(&answer[0].0));
 }
 
 #[test]
-fn a_clock_that_stands_still_or_steps_back_moves_nothing() {
+fn a_clock_that_stops_or_steps_back_moves_nothing() {
     let mut bus = bus(u64::MAX);
     bus.send(10 * MILLISECOND_NS, &[]);
     received(&mut bus, 20 * MILLISECOND_NS);
@@ -111,7 +111,7 @@ fn a_clock_that_stands_still_or_steps_back_moves_nothing() {
 }
 
 #[test]
-fn a_silenced_drive_neither_hears_nor_speaks_but_lives_on() {
+fn a_silenced_drive_neither_sends_nor_receives_but_keeps_running() {
     let mut bench = Bench::new();
     bench.enable(9, 0x60FF_0020, 0);
     for _ in 0..300 {
@@ -120,7 +120,7 @@ fn a_silenced_drive_neither_hears_nor_speaks_but_lives_on() {
     bench.bus.silence(NODE, true).unwrap();
     let before = bench.observe().position;
     for _ in 0..100 {
-        bench.say(0x080, []);
+        bench.send_data(0x080, []);
         bench.run_ms(1);
     }
     assert!(bench.heard.is_empty());
@@ -130,26 +130,26 @@ fn a_silenced_drive_neither_hears_nor_speaks_but_lives_on() {
 }
 
 #[test]
-fn drives_that_are_not_there_are_named() {
+fn a_missing_drive_is_named_in_the_error() {
     let mut bus = bus(u64::MAX);
     let error = UnknownNode { node: 9 };
     assert_eq!(bus.observe(9), Err(error));
     assert_eq!(bus.silence(9, true), Err(error));
-    assert_eq!(error.to_string(), "no simulated drive with node number 9 on this bus");
+    assert_eq!(error.to_string(), "no simulated drive with node ID 9 on this bus");
     assert_eq!(bus.nodes().collect::<Vec<_>>(), [NODE]);
 }
 
 #[test]
-fn tpdos_of_several_drives_come_in_the_order_of_their_identifiers_without_a_gap() {
+fn tpdos_of_several_drives_follow_in_identifier_order_without_a_gap() {
     let mut bench = Bench::with([7, 5, 6].map(parameters).to_vec());
     for node in [5u8, 6, 7] {
-        bench.say(0x600 + u32::from(node), [0x2F, 0x00, 0x18, 2, 1, 0, 0, 0]);
+        bench.send_data(0x600 + u32::from(node), [0x2F, 0x00, 0x18, 2, 1, 0, 0, 0]);
     }
     bench.run_ms(3);
-    bench.say(0x000, [1, 0]);
+    bench.send_data(0x000, [1, 0]);
     bench.run_ms(3);
     bench.heard.clear();
-    bench.say(0x080, []);
+    bench.send_data(0x080, []);
     bench.run_ms(1);
     let ids: Vec<_> = bench.heard.iter().map(|received| received.frame.id().value()).collect();
     assert_eq!(ids, [0x185, 0x186, 0x187]);
@@ -166,10 +166,10 @@ fn the_same_calls_give_the_same_bytes_at_the_same_times() {
         bench.enable(8, 0x607A_0020, 0);
         let mut heard = vec![];
         for cycle in 0..500i32 {
-            bench.say(0x080, []);
+            bench.send_data(0x080, []);
             bench.run_ns(600_000);
             let [a, b, c, d] = (40 * cycle).to_le_bytes();
-            bench.say(0x205, [0x0F, 0, a, b, c, d]);
+            bench.send_data(0x205, [0x0F, 0, a, b, c, d]);
             bench.run_ns(400_000);
             heard.append(&mut bench.heard);
         }
@@ -195,7 +195,7 @@ fn config() -> Config {
 }
 
 #[test]
-fn a_configured_bus_has_a_drive_for_each_of_its_axes_with_the_axis_own_scale() {
+fn a_configured_bus_has_one_drive_per_axis_with_the_scale_of_the_axis() {
     let config = config();
     assert_eq!(SimulatedBus::new(&config, 0).nodes().collect::<Vec<_>>(), [1]);
     let mut bus = SimulatedBus::new(&config, 1);
@@ -203,9 +203,9 @@ fn a_configured_bus_has_a_drive_for_each_of_its_axes_with_the_axis_own_scale() {
     bus.send(0, &[]);
     let counts = [2, 3].map(|node| bus.observe(node).unwrap().position_counts);
     assert_eq!(counts, [1000 - 41_722, 52_428_800]);
-    // Half the bit rate, twice the time: the boot-up messages follow each other.
+    // Half the bit rate doubles the time between the boot-up messages.
     let boot_ups = received(&mut bus, 4 * MILLISECOND_NS);
-    let slow = BitRates { nominal: 500_000, data: None };
+    let slow = WireBitRates { nominal: 500_000, data: None };
     let duration_ns = slow.duration_ns(&Frame::of(Id::canopen(0x700, 3), [0]));
     assert_eq!(boot_ups[1].0 - boot_ups[0].0, duration_ns);
 }

@@ -1,4 +1,4 @@
-//! When PDOs act, and what they do with frames that do not fit (CiA 301, 7.2.2).
+//! The time at which PDOs act, and PDOs of a wrong length (CiA 301, 7.2.2).
 
 use takt_rt::{Frame, Id};
 
@@ -10,17 +10,17 @@ const TARGET_POSITION: u32 = 0x607A_0020;
 fn nothing_is_sent_at_sync_before_the_node_is_started() {
     let mut bench = Bench::new();
     bench.write(0x1800, 2, 1, 1).unwrap();
-    bench.say(0x080, []);
+    bench.send_data(0x080, []);
     bench.run_ms(2);
     assert!(bench.heard.is_empty());
     bench.nmt(0x01);
-    bench.say(0x080, []);
+    bench.send_data(0x080, []);
     bench.run_ms(2);
     assert_eq!(bench.take(0x185).len(), 1);
 }
 
 #[test]
-fn a_tpdo_of_type_n_comes_at_every_nth_sync_and_shortly_after_it() {
+fn a_tpdo_of_type_n_is_sent_shortly_after_every_nth_sync() {
     for transmission_type in [1, 3, 240] {
         let mut bench = Bench::new();
         bench.write(0x1800, 2, 1, transmission_type).unwrap();
@@ -28,7 +28,7 @@ fn a_tpdo_of_type_n_comes_at_every_nth_sync_and_shortly_after_it() {
         let mut syncs_ns = vec![];
         for _ in 0..480 {
             syncs_ns.push(bench.now_ns);
-            bench.say(0x080, []);
+            bench.send_data(0x080, []);
             bench.run_ms(1);
         }
         let expected: Vec<_> = syncs_ns
@@ -38,7 +38,7 @@ fn a_tpdo_of_type_n_comes_at_every_nth_sync_and_shortly_after_it() {
             .collect();
         assert_eq!(bench.heard.len(), expected.len());
         for (received, sync_ns) in bench.heard.iter().zip(expected) {
-            // SYNC, 20 µs, the frame of two bytes.
+            // SYNC, 20 µs, then the frame of two bytes.
             let latency_ns = received.at_ns - sync_ns;
             assert!((110_000..160_000).contains(&latency_ns), "{latency_ns}");
         }
@@ -46,23 +46,23 @@ fn a_tpdo_of_type_n_comes_at_every_nth_sync_and_shortly_after_it() {
 }
 
 #[test]
-fn type_0_is_sent_at_sync_only_after_a_change() {
+fn transmission_type_0_is_sent_at_sync_only_after_a_change() {
     let mut bench = Bench::new();
     bench.write(0x1800, 2, 1, 0).unwrap();
     bench.nmt(0x01);
     for expected in [1, 0, 0] {
-        bench.say(0x080, []);
+        bench.send_data(0x080, []);
         bench.run_ms(2);
         assert_eq!(bench.take(0x185).len(), expected);
     }
     bench.write(0x6040, 0, 2, 6).unwrap();
-    bench.say(0x080, []);
+    bench.send_data(0x080, []);
     bench.run_ms(2);
     assert_eq!(bench.take(0x185).len(), 1);
 }
 
 #[test]
-fn an_event_driven_tpdo_comes_at_the_start_and_with_every_change_of_state() {
+fn an_event_driven_tpdo_is_sent_at_the_start_and_at_every_change_of_state() {
     let mut bench = Bench::new();
     bench.nmt(0x01);
     bench.run_ms(20);
@@ -74,7 +74,7 @@ fn an_event_driven_tpdo_comes_at_the_start_and_with_every_change_of_state() {
 }
 
 #[test]
-fn the_event_timer_repeats_a_tpdo_and_the_inhibit_time_spaces_it() {
+fn the_event_timer_repeats_a_tpdo_and_the_inhibit_time_limits_its_rate() {
     let mut bench = Bench::new();
     bench.write(0x1800, 5, 2, 10).unwrap();
     bench.nmt(0x01);
@@ -93,55 +93,55 @@ fn the_event_timer_repeats_a_tpdo_and_the_inhibit_time_spaces_it() {
 }
 
 #[test]
-fn a_synchronous_rpdo_waits_for_sync_and_an_event_driven_one_acts_at_once() {
+fn a_synchronous_rpdo_acts_at_sync_and_an_event_driven_one_at_once() {
     for (transmission_type, is_immediate) in [(0, false), (1, false), (240, false), (254, true), (255, true)]
     {
         let mut bench = Bench::new();
         bench.write(0x1400, 2, 1, transmission_type).unwrap();
         bench.nmt(0x01);
-        bench.say(0x205, [0x06, 0x00]);
+        bench.send_data(0x205, [0x06, 0x00]);
         bench.run_ms(2);
         assert_eq!(bench.read(0x6040, 0), Ok(if is_immediate { 6 } else { 0 }), "type {transmission_type}");
-        bench.say(0x080, []);
+        bench.send_data(0x080, []);
         bench.run_ms(2);
         assert_eq!(bench.read(0x6040, 0), Ok(6));
     }
 }
 
 #[test]
-fn a_short_rpdo_changes_nothing_and_raises_one_emergency_message_until_a_good_one_comes() {
+fn a_short_rpdo_is_ignored_and_causes_one_emergency_message_until_a_valid_one() {
     let mut bench = Bench::new();
     bench.start_process_data(TARGET_POSITION);
     for _ in 0..3 {
-        bench.say(0x205, [0x06, 0x00, 1, 2, 3]);
+        bench.send_data(0x205, [0x06, 0x00, 1, 2, 3]);
         bench.run_ms(1);
     }
     assert_eq!(bench.take(0x085), [[0x10, 0x82, 0x11, 0, 0, 0, 0, 0]]);
-    bench.say(0x080, []);
+    bench.send_data(0x080, []);
     bench.run_ms(1);
     assert_eq!((bench.read(0x6040, 0), bench.read(0x607A, 0)), (Ok(0), Ok(0)));
-    // Longer than the mapping is good: what is beyond is not used.
-    bench.say(0x205, [0x06, 0x00, 1, 0, 0, 0, 9, 9]);
-    bench.say(0x080, []);
+    // A longer frame than the mapping is accepted, and its additional bytes are ignored.
+    bench.send_data(0x205, [0x06, 0x00, 1, 0, 0, 0, 9, 9]);
+    bench.send_data(0x080, []);
     bench.run_ms(1);
     assert_eq!(bench.take(0x085), [[0; 8]]);
     assert_eq!((bench.read(0x6040, 0), bench.read(0x607A, 0)), (Ok(6), Ok(1)));
 }
 
 #[test]
-fn what_was_latched_is_forgotten_when_the_node_leaves_operational() {
+fn latched_data_is_discarded_when_the_node_leaves_operational() {
     let mut bench = Bench::new();
     bench.start_process_data(TARGET_POSITION);
-    bench.say(0x205, [0x06, 0x00, 1, 0, 0, 0]);
+    bench.send_data(0x205, [0x06, 0x00, 1, 0, 0, 0]);
     bench.nmt(0x80);
     bench.nmt(0x01);
-    bench.say(0x080, []);
+    bench.send_data(0x080, []);
     bench.run_ms(1);
     assert_eq!(bench.read(0x6040, 0), Ok(0));
 }
 
 #[test]
-fn a_remote_request_for_a_tpdo_is_answered_with_the_present_values() {
+fn a_remote_request_for_a_tpdo_is_answered_with_the_current_values() {
     let mut bench = Bench::new();
     bench.start_process_data(TARGET_POSITION);
     bench.send(Frame::remote(Id::canopen(0x180, NODE), 6).unwrap());
@@ -156,22 +156,22 @@ fn sync_may_have_another_identifier() {
     bench.write(0x1005, 0, 4, 0x0A0).unwrap();
     bench.write(0x1800, 2, 1, 1).unwrap();
     bench.nmt(0x01);
-    bench.say(0x080, []);
+    bench.send_data(0x080, []);
     bench.run_ms(1);
     assert!(bench.take(0x185).is_empty());
-    bench.say(0x0A0, []);
+    bench.send_data(0x0A0, []);
     bench.run_ms(1);
     assert_eq!(bench.take(0x185).len(), 1);
 }
 
 #[test]
-fn the_position_sampled_is_that_of_the_sync_and_not_of_the_sending() {
+fn the_position_is_sampled_at_sync_and_not_at_transmission() {
     let mut bench = Bench::new();
     bench.enable(9, 0x60FF_0020, 0);
     for _ in 0..300 {
         bench.cycle(0x0F, 80_000);
     }
-    // At a constant velocity the positions of equidistant SYNCs are equidistant.
+    // At a constant velocity, the positions at equidistant SYNCs are equidistant.
     let mut positions = vec![];
     for _ in 0..50 {
         positions.push(bench.cycle(0x0F, 80_000).1);

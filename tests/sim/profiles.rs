@@ -1,4 +1,4 @@
-//! The modes in which the drive makes its own trajectory: PP, PV, PT.
+//! The modes in which the drive generates the trajectory: PP, PV, PT.
 
 use takt_rt::statusword::{BIT_12, TARGET_REACHED};
 
@@ -16,7 +16,7 @@ fn in_profile_position(velocity: i64, acceleration: i64) -> Bench {
     bench
 }
 
-/// Cycles until the target is reached; how many that took, and the last position.
+/// Runs until the target is reached. Returns the number of cycles and the last position.
 fn until_reached(bench: &mut Bench, controlword: u16, target: i32) -> (usize, i32) {
     for cycle in 0..20_000 {
         let (statusword, position) = bench.cycle(controlword, target);
@@ -51,7 +51,7 @@ fn a_set_point_is_acknowledged_and_reached_in_the_time_of_its_profile() {
 }
 
 #[test]
-fn enabling_does_not_move_and_a_level_of_bit_4_is_no_new_set_point() {
+fn enabling_does_not_move_and_bit_4_needs_a_rising_edge() {
     let mut bench = in_profile_position(100_000, 400_000);
     for _ in 0..200 {
         bench.cycle(0x0F, 50_000);
@@ -66,7 +66,7 @@ fn enabling_does_not_move_and_a_level_of_bit_4_is_no_new_set_point() {
 }
 
 #[test]
-fn a_second_set_point_waits_its_turn_unless_it_is_to_change_at_once() {
+fn a_second_set_point_is_buffered_unless_bit_5_is_set() {
     for (bit_5, goes_beyond) in [(0x00, true), (0x20, false)] {
         let mut bench = in_profile_position(100_000, 400_000);
         for (controlword, target, cycles) in
@@ -104,7 +104,7 @@ fn relative_targets_add_up() {
 }
 
 #[test]
-fn profile_velocity_0_stops_a_move_and_another_one_lets_it_go_on() {
+fn profile_velocity_0_pauses_a_move_and_another_value_resumes_it() {
     let mut bench = in_profile_position(100_000, 400_000);
     for _ in 0..300 {
         bench.cycle(0x1F, 90_000);
@@ -120,7 +120,7 @@ fn profile_velocity_0_stops_a_move_and_another_one_lets_it_go_on() {
 }
 
 #[test]
-fn halt_stops_a_profile_and_holds() {
+fn halt_stops_a_profile_and_holds_the_position() {
     let mut bench = in_profile_position(100_000, 400_000);
     for _ in 0..300 {
         bench.cycle(0x1F, 90_000);
@@ -135,7 +135,7 @@ fn halt_stops_a_profile_and_holds() {
 }
 
 #[test]
-fn software_limits_end_every_move() {
+fn software_limits_stop_every_move() {
     let mut bench = Bench::new();
     bench.write(0x607D, 1, 4, -10_000).unwrap();
     bench.write(0x607D, 2, 4, 30_000).unwrap();
@@ -184,7 +184,7 @@ fn profile_torque_rises_with_its_slope() {
     for _ in 0..100 {
         bench.cycle(0x0F, 200);
     }
-    // 100 per mille of 31 N·m, less than the friction: nothing moves yet.
+    // 100 per mille of 31 N·m is less than the friction, so nothing moves yet.
     let torque = bench.observe().torque;
     assert!((2.9..3.2).contains(&torque), "{torque}");
     assert_eq!(bench.observe().velocity, 0.0);

@@ -1,4 +1,4 @@
-//! SDO conversations, byte for byte (CiA 301, 7.2.4).
+//! SDO transfers, byte for byte (CiA 301, 7.2.4).
 
 use super::bench::{Bench, MILLISECOND_NS, NODE, parameters};
 
@@ -14,7 +14,7 @@ const NOT_MAPPABLE: u32 = 0x0604_0041;
 const PDO_TOO_LONG: u32 = 0x0604_0042;
 
 #[test]
-fn the_identity_reads_as_that_of_the_real_unit() {
+fn the_identity_equals_that_of_the_real_unit() {
     let mut bench = Bench::new();
     assert_eq!(bench.sdo([0x40, 0x00, 0x10, 0, 0, 0, 0, 0]), [0x43, 0x00, 0x10, 0, 0x92, 0x01, 0x42, 0x00]);
     assert_eq!(bench.sdo([0x40, 0x18, 0x10, 1, 0, 0, 0, 0]), [0x43, 0x18, 0x10, 1, 0x6F, 0x72, 0x65, 0x5A]);
@@ -26,7 +26,7 @@ fn the_identity_reads_as_that_of_the_real_unit() {
 }
 
 #[test]
-fn values_of_one_two_and_four_bytes_come_expedited_with_their_size() {
+fn values_of_one_two_and_four_bytes_are_uploaded_expedited_with_their_size() {
     let mut bench = Bench::new();
     assert_eq!(bench.sdo([0x40, 0x18, 0x10, 0, 0, 0, 0, 0]), [0x4F, 0x18, 0x10, 0, 3, 0, 0, 0]);
     assert_eq!(bench.sdo([0x40, 0x5E, 0x60, 0, 0, 0, 0, 0]), [0x4B, 0x5E, 0x60, 0, 2, 0, 0, 0]);
@@ -34,7 +34,7 @@ fn values_of_one_two_and_four_bytes_come_expedited_with_their_size() {
 }
 
 #[test]
-fn every_refusal_carries_its_own_abort_code() {
+fn every_refusal_has_its_own_abort_code() {
     let mut bench = Bench::new();
     assert_eq!(bench.sdo([0x40, 0x72, 0x60, 0, 0, 0, 0, 0]), [0x80, 0x72, 0x60, 0, 0x00, 0x00, 0x02, 0x06]);
     assert_eq!(bench.read(0x605A, 0), Err(NO_OBJECT));
@@ -48,23 +48,23 @@ fn every_refusal_carries_its_own_abort_code() {
     assert_eq!(bench.write(0x60B2, 0, 2, -3000), Ok(()));
     assert_eq!(bench.write(0x1005, 0, 4, 0x4000_0080), Err(VALUE));
     assert_eq!(bench.write(0x1010, 1, 4, 1), Err(0x0800_0020));
-    // A download that does not say its size is taken as the object's.
+    // A download without a size is accepted with the size of the object.
     assert_eq!(bench.sdo([0x22, 0x60, 0x60, 0, 3, 0xFF, 0xFF, 0xFF])[0], 0x60);
     assert_eq!(bench.read(0x6060, 0), Ok(3));
 }
 
 #[test]
-fn a_segmented_download_is_taken_segment_by_segment() {
+fn a_segmented_download_is_accepted() {
     let mut bench = Bench::new();
     assert_eq!(bench.sdo([0x21, 0x81, 0x60, 0, 4, 0, 0, 0]), [0x60, 0x81, 0x60, 0, 0, 0, 0, 0]);
-    // Two bytes, toggle 0; the other two, toggle 1, last.
+    // Two bytes with toggle 0, then the last two with toggle 1.
     assert_eq!(bench.sdo([0x0A, 0x11, 0x22, 0, 0, 0, 0, 0]), [0x20, 0, 0, 0, 0, 0, 0, 0]);
     assert_eq!(bench.sdo([0x1B, 0x33, 0x44, 0, 0, 0, 0, 0]), [0x30, 0, 0, 0, 0, 0, 0, 0]);
     assert_eq!(bench.read(0x6081, 0), Ok(0x4433_2211));
 }
 
 #[test]
-fn segments_are_refused_out_of_turn_and_out_of_size() {
+fn segments_with_a_wrong_toggle_bit_or_size_are_refused() {
     let mut bench = Bench::new();
     let toggle = [0x80, 0x81, 0x60, 0, 0x00, 0x00, 0x03, 0x05];
     let command = [0x80, 0, 0, 0, 0x01, 0x00, 0x04, 0x05];
@@ -72,15 +72,15 @@ fn segments_are_refused_out_of_turn_and_out_of_size() {
     // The first segment must have toggle 0.
     assert_eq!(bench.sdo(begin)[0], 0x60);
     assert_eq!(bench.sdo([0x17, 1, 2, 3, 4, 0, 0, 0]), toggle);
-    // That has ended the transfer.
+    // The wrong toggle bit has ended the transfer.
     assert_eq!(bench.sdo([0x07, 0, 0, 0, 4, 0, 0, 0]), command);
     assert_eq!(bench.sdo([0x60, 0, 0, 0, 0, 0, 0, 0]), command);
-    // Five bytes for four, and three.
+    // Five bytes and three bytes for an object of four.
     assert_eq!(bench.sdo(begin)[0], 0x60);
     assert_eq!(bench.sdo([0x05, 1, 2, 3, 4, 5, 0, 0])[4..], TOO_LONG.to_le_bytes());
     assert_eq!(bench.sdo(begin)[0], 0x60);
     assert_eq!(bench.sdo([0x09, 1, 2, 3, 0, 0, 0, 0])[4..], TOO_SHORT.to_le_bytes());
-    // A size that cannot be is refused at once.
+    // An impossible size is refused at once.
     assert_eq!(bench.sdo([0x21, 0x81, 0x60, 0, 5, 0, 0, 0])[4..], TOO_LONG.to_le_bytes());
     assert_eq!(bench.read(0x6081, 0), Ok(10_000));
 }
@@ -100,19 +100,19 @@ fn block_transfer_is_refused_and_an_abort_is_not_answered() {
     let mut bench = Bench::new();
     assert_eq!(bench.sdo([0xA4, 0x18, 0x10, 1, 0, 0, 0, 0]), [0x80, 0x18, 0x10, 1, 0x01, 0x00, 0x04, 0x05]);
     assert_eq!(bench.sdo([0xC2, 0x81, 0x60, 0, 4, 0, 0, 0])[4..], 0x0504_0001u32.to_le_bytes());
-    bench.say(0x605, [0x80, 0x81, 0x60, 0, 0, 0, 0, 0]);
+    bench.send_data(0x605, [0x80, 0x81, 0x60, 0, 0, 0, 0, 0]);
     bench.run_ms(3);
     assert!(bench.heard.is_empty());
 }
 
 #[test]
-fn an_answer_takes_a_third_of_a_millisecond_to_one_and_a_request_before_it_is_lost() {
+fn a_reply_takes_up_to_a_millisecond_and_an_overlapping_request_is_lost() {
     let mut bench = Bench::new();
     for _ in 0..50 {
-        bench.say(0x605, [0x40, 0x00, 0x10, 0, 0, 0, 0, 0]);
+        bench.send_data(0x605, [0x40, 0x00, 0x10, 0, 0, 0, 0, 0]);
         let asked_ns = bench.now_ns;
         bench.run_ns(200_000);
-        bench.say(0x605, [0x40, 0x41, 0x60, 0, 0, 0, 0, 0]);
+        bench.send_data(0x605, [0x40, 0x41, 0x60, 0, 0, 0, 0, 0]);
         bench.run_ms(2);
         let [answer] = &bench.heard[..] else { panic!("{} answers", bench.heard.len()) };
         assert_eq!(answer.frame.payload()[..3], [0x43, 0x00, 0x10]);
@@ -125,13 +125,13 @@ fn an_answer_takes_a_third_of_a_millisecond_to_one_and_a_request_before_it_is_lo
 #[test]
 fn a_request_that_is_not_eight_bytes_long_is_ignored() {
     let mut bench = Bench::new();
-    bench.say(0x605, [0x40, 0x00, 0x10, 0]);
+    bench.send_data(0x605, [0x40, 0x00, 0x10, 0]);
     bench.run_ms(3);
     assert!(bench.heard.is_empty());
 }
 
 #[test]
-fn a_mapping_changes_only_while_its_pdo_does_not_exist_and_counts_nothing() {
+fn a_mapping_changes_only_while_its_pdo_is_disabled_and_its_count_is_0() {
     let mut bench = Bench::new();
     assert_eq!(bench.write(0x1A00, 0, 1, 0), Err(DEVICE_STATE));
     assert_eq!(bench.write(0x1800, 1, 4, 0x0000_0186), Err(DEVICE_STATE));
@@ -145,12 +145,12 @@ fn a_mapping_changes_only_while_its_pdo_does_not_exist_and_counts_nothing() {
 }
 
 #[test]
-fn only_what_fits_a_pdo_can_be_mapped() {
+fn only_mappable_objects_that_fit_a_pdo_can_be_mapped() {
     let mut bench = Bench::new();
     bench.write(0x1401, 0x01, 4, 0x8000_0305).unwrap();
     bench.write(0x1601, 0, 1, 0).unwrap();
     bench.write(0x1A01, 0, 1, 0).unwrap();
-    // Not mappable; read-only in an RPDO; not there; no such sub-index; the wrong length.
+    // In turn: not mappable, read-only in an RPDO, missing object, missing sub-index, wrong length.
     assert_eq!(bench.write(0x1A01, 1, 4, 0x22A2_0010), Err(NOT_MAPPABLE));
     assert_eq!(bench.write(0x1601, 1, 4, 0x6064_0020), Err(NOT_MAPPABLE));
     assert_eq!(bench.write(0x1A01, 1, 4, 0x6072_0010), Err(NO_OBJECT));
@@ -180,7 +180,7 @@ fn identifiers_and_transmission_types_out_of_range_are_refused() {
 }
 
 #[test]
-fn what_was_saved_survives_a_power_cycle_three_seconds_later_and_the_rest_does_not() {
+fn saved_values_survive_a_power_cycle_three_seconds_later_and_others_do_not() {
     let mut bench = Bench::new();
     bench.write(0x6085, 0, 4, 1234).unwrap();
     bench.write(0x1010, 1, 4, u32::from_le_bytes(*b"save").into()).unwrap();

@@ -1,4 +1,4 @@
-//! Every CANopen conversation that the manual prints, byte for byte.
+//! Every CANopen exchange that the manual prints, byte for byte.
 
 use super::bench::{Bench, parameters};
 
@@ -9,7 +9,7 @@ struct Row {
     data: Vec<u8>,
 }
 
-/// The rows with CANopen identifiers that are not misprints, in order.
+/// The rows with CANopen identifiers without misprints, in order.
 fn rows() -> Vec<Row> {
     let text = include_str!("../vectors/erob-can.csv");
     let rows = text.lines().skip(1).filter_map(|line| {
@@ -28,7 +28,7 @@ fn rows() -> Vec<Row> {
     rows.collect()
 }
 
-/// Splits a line of the table at its commas outside quotation marks.
+/// Splits a line of the table at commas outside quotation marks.
 fn split(line: &str) -> Vec<String> {
     let mut columns = vec![String::new()];
     let mut is_quoted = false;
@@ -43,8 +43,8 @@ fn split(line: &str) -> Vec<String> {
 }
 
 #[test]
-fn the_drive_answers_every_printed_canopen_conversation_as_printed() {
-    // One capture shows mode 7 being accepted, which 6502 of other units denies.
+fn the_drive_answers_every_printed_canopen_exchange_as_printed() {
+    // One capture shows that mode 7 is accepted, although object 6502 of other units excludes it.
     let mut bench = Bench::with(vec![takt::sim::erob::ErobParameters {
         has_interpolated_position: true,
         ..parameters(2)

@@ -1,4 +1,4 @@
-//! The simulated YZ-AIM servo, as a master sees it.
+//! The simulated YZ-AIM servo from the point of view of a master.
 
 mod alarms;
 mod defects;
@@ -30,7 +30,7 @@ fn parameters(node: u8) -> YzAimParameters {
     }
 }
 
-/// The same without what real units do beside the manual.
+/// The same drive without the behaviour of real units that the manual does not describe.
 fn by_the_manual(node: u8) -> YzAimParameters {
     YzAimParameters { quirks: Quirks::none(), ..parameters(node) }
 }
@@ -39,7 +39,7 @@ fn bench(parameters: YzAimParameters) -> Bench {
     Bench::of(vec![Box::new(YzAimJoint::new(parameters))])
 }
 
-/// What a TPDO 1, 2 or 4 says: position and statusword.
+/// Position and statusword in the payload of TPDO 1, 2 or 4.
 fn decoded(payload: &[u8]) -> (i32, u16) {
     let [a, b, c, d, low, high] = *payload else { panic!("{payload:02X?}") };
     (i32::from_le_bytes([a, b, c, d]), u16::from_le_bytes([low, high]))
@@ -62,7 +62,7 @@ impl Bench {
         self.read(0x260E, 0).unwrap()
     }
 
-    /// 06, 07, 0F as far apart as real units want it.
+    /// Sends the controlwords 06, 07 and 0F at the intervals that real units need.
     fn enable_in_steps(&mut self) {
         for word in [0x06, 0x07, 0x0F] {
             self.control(word);
@@ -71,7 +71,7 @@ impl Bench {
         assert_eq!(self.statusword() & 0x37, 0x37);
     }
 
-    /// Stores the parameters and waits for it.
+    /// Stores the parameters and waits for the end of storing.
     fn save(&mut self) {
         self.write(0x2614, 0, 2, 1).unwrap();
         assert_eq!(self.read(0x2614, 0), Ok(1));
@@ -89,18 +89,18 @@ impl Bench {
         self.heard.clear();
     }
 
-    /// RPDO4 and its answer.
+    /// Sends RPDO4 and returns its reply.
     fn hold_target(&mut self, target: i32) -> (i32, u16) {
-        self.say(0x500 + u32::from(NODE), target.to_le_bytes());
+        self.send_data(0x500 + u32::from(NODE), target.to_le_bytes());
         self.run_ns(500_000);
         let answer = self.take(0x480 + u32::from(NODE)).pop().expect("TPDO4 after RPDO4");
         decoded(&answer)
     }
 
-    /// A cycle of 2 ms: RPDO4, then SYNC. Returns what TPDO2 says after SYNC.
+    /// A cycle of 2 ms: RPDO4, then SYNC. Returns the content of TPDO2 after SYNC.
     fn interpolate(&mut self, target: i32) -> (i32, u16) {
         self.hold_target(target);
-        self.say(0x080, []);
+        self.send_data(0x080, []);
         self.run_ns(1_500_000);
         let answer = self.take(0x280 + u32::from(NODE)).pop().expect("TPDO2 after SYNC");
         decoded(&answer)

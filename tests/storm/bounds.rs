@@ -5,6 +5,9 @@ use takt::config::{Axis, Config, DriveFamily};
 /// How far behind its set-point a joint may be that obeys.
 const LAG_S: f64 = 0.4;
 
+/// The longest time after which a drive misses the heartbeat: a YZ-AIM whose communication has been reset has its factory setting.
+const WATCHDOG_AT_MOST_S: f64 = 2.2;
+
 fn stopping_s(axis: &Axis) -> f64 {
     let limits = &axis.limits;
     // At full speed and in full acceleration: the acceleration is taken back, turned round, and taken back again; and where a
@@ -36,6 +39,12 @@ pub fn coasting_s(axis: &Axis) -> f64 {
         DriveFamily::YzAim => axis.limits.velocity * joint.inertia / joint.coulomb_friction,
         DriveFamily::ErobCanopen => 0.0,
     }
+}
+
+/// From the moment from which nothing gets to a drive any more until it has no torque: it misses the heartbeats, and its own
+/// reaction brings the joint to rest.
+pub fn unreached_s(config: &Config) -> f64 {
+    WATCHDOG_AT_MOST_S + to_rest_s(config)
 }
 
 /// The most cycles in a phase that must pass by itself.

@@ -6,6 +6,7 @@ use takt::faults::Scenario;
 
 use crate::dice::Dice;
 use crate::machine;
+use crate::overload::Overload;
 use crate::weather::{KINDS, NEEDS_EROB, fault, when};
 
 pub struct Case {
@@ -24,6 +25,7 @@ pub struct Case {
     /// The cycle in which it is interrupted all the same, enabled or not.
     pub broken_off: Option<u64>,
     pub hardship: Hardship,
+    pub overload: Overload,
     pub dice: Dice,
 }
 
@@ -52,6 +54,19 @@ pub fn scenario(text: &str, config: &Config) -> Scenario {
 
 impl Case {
     pub fn of(seed: u64) -> Self {
+        let mut case = Self::in_hardship(seed);
+        let mut dice = Dice::new(seed).split(u64::MAX - 1);
+        if dice.chance(0.25) {
+            case.overload = Overload::of(&mut dice, &case.config, case.length);
+            if dice.chance(0.6) {
+                (case.text, case.scenario) = (String::new(), Scenario::default());
+            }
+        }
+        case
+    }
+
+    /// One on a machine that has time enough, whatever else makes it hard.
+    pub fn in_hardship(seed: u64) -> Self {
         let mut hard = Dice::new(seed).split(u64::MAX);
         let crowd = hard.chance(0.003).then(machine::crowd);
         let mut case = Self::with(seed, crowd);
@@ -92,7 +107,20 @@ impl Case {
         let interrupt = if dice.chance(0.15) { Interrupt::Immediate } else { Interrupt::Controlled };
         let broken_off = dice.chance(0.03).then(|| dice.below(1500) as u64);
         let hardship = Hardship::default();
-        Self { config, text, scenario, is_serving, clients, length, interrupt, broken_off, hardship, dice }
+        let overload = Overload::default();
+        Self {
+            config,
+            text,
+            scenario,
+            is_serving,
+            clients,
+            length,
+            interrupt,
+            broken_off,
+            hardship,
+            overload,
+            dice,
+        }
     }
 
     fn harden(&mut self, dice: &mut Dice) {

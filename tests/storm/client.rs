@@ -10,10 +10,8 @@ use crate::dice::Dice;
 
 /// What has been asked of the group up to a cycle, as far as invariants depend on it.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct RequestEnvelope {
-    /// A command of a stream has been handed over since the cycle before.
-    pub has_streamed: bool,
-    /// Somebody has asked for a reset of faults since the cycle before.
+pub struct RecentRequests {
+    /// A reset of faults that somebody has asked for was granted in this cycle.
     pub has_reset: bool,
     /// The same, not long ago.
     pub has_reset_lately: bool,

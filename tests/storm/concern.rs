@@ -4,8 +4,8 @@ use takt::bus::schedule::analyse;
 use takt::canopen::nmt::{NmtCommand, NmtTarget};
 use takt::config::{Axis, Config, DriveFamily};
 use takt::faults::{
-    Direction, DriveTrouble, Effect, ForeignFrames, FrameEffect, FrameFunction, InterfaceEffect, Part,
-    Rehearsal, Selection,
+    Direction, DriveEffect, Effect, FaultInjector, ForeignFrames, FrameEffect, FrameFunction,
+    InterfaceEffect, Part, Selection,
 };
 use takt::sim::Defect;
 
@@ -14,8 +14,7 @@ use takt::sim::Defect;
 pub struct Concern {
     /// A fault concerns this joint, its drive or its bus: it may not obey.
     pub is_present: bool,
-    /// A torque from outside acts on it, another master commands its drive between two looks, or its drive by itself does what
-    /// nobody has asked for.
+    /// A torque from outside acts on it, another master commands its drive, or its drive does by itself what it was not asked to.
     pub is_driven_by_others: bool,
     /// What is sent to its drive is corrupted with a right CRC: it does what it hears.
     pub is_misled: bool,
@@ -27,6 +26,10 @@ pub struct Concern {
     pub is_crowded: bool,
     /// Something pushes the joint for as long as it lasts, also in the end.
     pub is_loaded: bool,
+    /// The loop is late, and the heartbeat may stay away for so long that its drive reports a fault.
+    pub is_watchdog_due: bool,
+    /// Since when nothing that is sent to its drive gets there any more: ns.
+    pub unreachable_since_ns: Option<u64>,
 }
 
 impl Concern {
@@ -39,6 +42,8 @@ impl Concern {
             is_cut_off: self.is_cut_off || other.is_cut_off,
             is_crowded: self.is_crowded || other.is_crowded,
             is_loaded: self.is_loaded || other.is_loaded,
+            is_watchdog_due: self.is_watchdog_due || other.is_watchdog_due,
+            unreachable_since_ns: self.unreachable_since_ns.or(other.unreachable_since_ns),
         }
     }
 }
@@ -55,28 +60,60 @@ pub struct Concerns {
     pub by_bus: Vec<bool>,
     /// Whether a bus cannot carry in time what is asked of it, an entry a bus: `takt run` refuses such a machine.
     pub is_overloaded: Vec<bool>,
+    bus_of_axis: Vec<usize>,
 }
 
 impl Concerns {
-    pub fn new(config: &Config, rehearsal: &Rehearsal) -> Self {
-        let of_fault = |fault: &takt::faults::Fault| -> Vec<Concern> {
+    pub fn new(config: &Config, fault_injector: &FaultInjector) -> Self {
+        let of_fault = |fault: &takt::faults::ScenarioFault| -> Vec<Concern> {
             config.axes.iter().map(|axis| concern(axis, fault)).collect()
         };
-        let by_fault: Vec<Vec<Concern>> = rehearsal.courses().map(|(fault, _)| of_fault(fault)).collect();
+        let by_fault: Vec<Vec<Concern>> =
+            fault_injector.progress().map(|(fault, _)| of_fault(fault)).collect();
         Self {
             has_begun: vec![false; by_fault.len()],
-            buses: rehearsal.courses().map(|(fault, _)| fault.bus).collect(),
+            buses: fault_injector.progress().map(|(fault, _)| fault.bus).collect(),
             by_fault,
             by_axis: vec![Concern::default(); config.axes.len()],
             by_bus: vec![false; config.buses.len()],
             is_overloaded: analyse(config).iter().map(|bus| !bus.fits()).collect(),
+            bus_of_axis: config.axes.iter().map(|axis| axis.bus).collect(),
+        }
+    }
+
+    /// The loop is late: frames may meet those of the next cycle on any bus.
+    pub fn crowd(&mut self) {
+        self.by_bus.fill(true);
+        for concern in &mut self.by_axis {
+            (concern.is_crowded, concern.is_watchdog_due) = (true, true);
+        }
+    }
+
+    /// From now on the loop is too late in every slot.
+    pub fn miss_every_slot(&mut self, now_ns: u64) {
+        self.crowd();
+        for concern in &mut self.by_axis {
+            concern.is_present = true;
+            concern.unreachable_since_ns.get_or_insert(now_ns);
+        }
+    }
+
+    /// The queue of a bus does not drain: for a time, or from now on for ever.
+    pub fn clog(&mut self, bus: usize, now_ns: u64, is_for_ever: bool) {
+        self.by_bus[bus] = true;
+        for (concern, _) in self.by_axis.iter_mut().zip(&self.bus_of_axis).filter(|(_, of)| **of == bus) {
+            (concern.is_present, concern.is_crowded, concern.is_watchdog_due) = (true, true, true);
+            concern.is_cut_off |= is_for_ever;
+            if is_for_ever {
+                concern.unreachable_since_ns.get_or_insert(now_ns);
+            }
         }
     }
 
     /// Looks which faults have begun since the last look, and calls `begun` with the number of each.
-    pub fn observe(&mut self, rehearsal: &Rehearsal, mut begun: impl FnMut(usize)) {
-        for (number, (_, course)) in rehearsal.courses().enumerate() {
-            if !self.has_begun[number] && course.began_ns().is_some() {
+    pub fn observe(&mut self, fault_injector: &FaultInjector, mut begun: impl FnMut(usize)) {
+        for (number, (_, progress)) in fault_injector.progress().enumerate() {
+            if !self.has_begun[number] && progress.began_ns().is_some() {
                 self.has_begun[number] = true;
                 self.by_bus[self.buses[number]] = true;
                 for (present, new) in self.by_axis.iter_mut().zip(&self.by_fault[number]) {
@@ -88,12 +125,12 @@ impl Concerns {
     }
 }
 
-fn concern(axis: &Axis, fault: &takt::faults::Fault) -> Concern {
+fn concern(axis: &Axis, fault: &takt::faults::ScenarioFault) -> Concern {
     if fault.bus != axis.bus {
         return Concern::default();
     }
-    let is_own = fault.place == format!("axis {}", axis.name);
-    let is_at_another_axis = fault.place.starts_with("axis ") && !is_own;
+    let is_own = fault.location == format!("axis {}", axis.name);
+    let is_at_another_axis = fault.location.starts_with("axis ") && !is_own;
     let own = |id: u32| (id & 0x7F) == u32::from(axis.node);
     let is_present = match fault.effect {
         Effect::Drive { node, .. } => node == axis.node,
@@ -131,8 +168,8 @@ fn concern(axis: &Axis, fault: &takt::faults::Fault) -> Concern {
                 && node.is_none_or(|node| node == axis.node)
                 && *probability == 1.0
         }
-        Effect::Drive { node, trouble } => {
-            node == axis.node && trouble == DriveTrouble::Defect(Defect::SilentSdoServer)
+        Effect::Drive { node, effect } => {
+            node == axis.node && effect == DriveEffect::Defect(Defect::SilentSdoServer)
         }
         _ => false,
     };
@@ -146,5 +183,7 @@ fn concern(axis: &Axis, fault: &takt::faults::Fault) -> Concern {
         is_crowded: matches!(fault.effect, Effect::Foreign(_)),
         is_driven_by_others: is_own && (matches!(fault.kind, "load" | "foreign-set-points") || is_led_astray),
         is_loaded: is_own && fault.kind == "load",
+        is_watchdog_due: false,
+        unreachable_since_ns: None,
     }
 }

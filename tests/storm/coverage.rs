@@ -10,12 +10,12 @@ use crate::case::Case;
 use crate::run::Done;
 use crate::weather::KINDS;
 
-/// How often a kind of fault has come in which situation, and what it led to.
+/// How often a kind of fault came in each situation, and what it led to.
 #[derive(Clone, Debug, Default)]
-struct Faced {
+struct Situations {
     /// Before the axes were enabled for the first time.
     bringing_up: u64,
-    /// While they were led up, held still, moved, and came to rest or were off.
+    /// While they were being enabled, held still, moved, and came to rest or were off.
     enabling: u64,
     holding: u64,
     moving: u64,
@@ -23,7 +23,7 @@ struct Faced {
     reactions: BTreeMap<&'static str, u64>,
 }
 
-impl Faced {
+impl Situations {
     fn all(&self) -> u64 {
         self.bringing_up + self.enabling + self.holding + self.moving + self.ending
     }
@@ -33,7 +33,7 @@ impl Faced {
 pub struct Coverage {
     pub cycles: u64,
     pub cases: u64,
-    faced: BTreeMap<&'static str, Faced>,
+    situations: BTreeMap<&'static str, Situations>,
     /// Family, mode, and the period of the bus in µs.
     drives: BTreeMap<(&'static str, u8, u64), u64>,
     serving: u64,
@@ -47,29 +47,31 @@ impl Coverage {
         self.cases += 1;
         self.serving += u64::from(case.is_serving);
         self.several_clients += u64::from(case.clients > 1);
-        self.several_faults += u64::from(done.struck.len() > 1);
+        self.several_faults += u64::from(done.outcomes.len() > 1);
         for axis in &case.config.axes {
             let period_us =
                 case.config.cycle.period_ns * u64::from(case.config.buses[axis.bus].divider) / 1000;
             let mode = axis.control.operation_mode() as u8;
             *self.drives.entry((axis.drive.word(), mode, period_us)).or_default() += 1;
         }
-        for struck in &done.struck {
-            let faced = self.faced.entry(case.scenario.faults[struck.fault].kind).or_default();
-            let count = match struck.phase {
-                Phase::Enabling => &mut faced.enabling,
-                _ if !struck.is_brought_up => &mut faced.bringing_up,
-                Phase::Holding => &mut faced.holding,
-                Phase::Moving | Phase::Streaming => &mut faced.moving,
-                Phase::Passive | Phase::Disabled | Phase::Stopping | Phase::Disabling => &mut faced.ending,
+        for outcome in &done.outcomes {
+            let situations = self.situations.entry(case.scenario.faults[outcome.fault].kind).or_default();
+            let count = match outcome.phase {
+                Phase::Enabling => &mut situations.enabling,
+                _ if !outcome.is_brought_up => &mut situations.bringing_up,
+                Phase::Holding => &mut situations.holding,
+                Phase::Moving | Phase::Streaming => &mut situations.moving,
+                Phase::Passive | Phase::Disabled | Phase::Stopping | Phase::Disabling => {
+                    &mut situations.ending
+                }
             };
             *count += 1;
-            let reaction = match struck.stop {
+            let reaction = match outcome.stop {
                 Some(rule) => rule.key(),
-                None if done.is_bring_up_failed && !struck.is_brought_up => "no bring-up",
-                None => "borne",
+                None if done.is_bring_up_failed && !outcome.is_brought_up => "no bring-up",
+                None => "tolerated",
             };
-            *faced.reactions.entry(reaction).or_default() += 1;
+            *situations.reactions.entry(reaction).or_default() += 1;
         }
     }
 
@@ -79,14 +81,17 @@ impl Coverage {
         self.serving += other.serving;
         self.several_clients += other.several_clients;
         self.several_faults += other.several_faults;
-        for (kind, faced) in &other.faced {
-            let sum = self.faced.entry(kind).or_default();
-            sum.bringing_up += faced.bringing_up;
-            sum.enabling += faced.enabling;
-            sum.holding += faced.holding;
-            sum.moving += faced.moving;
-            sum.ending += faced.ending;
-            faced.reactions.iter().for_each(|(rule, count)| *sum.reactions.entry(rule).or_default() += count);
+        for (kind, situations) in &other.situations {
+            let sum = self.situations.entry(kind).or_default();
+            sum.bringing_up += situations.bringing_up;
+            sum.enabling += situations.enabling;
+            sum.holding += situations.holding;
+            sum.moving += situations.moving;
+            sum.ending += situations.ending;
+            situations
+                .reactions
+                .iter()
+                .for_each(|(rule, count)| *sum.reactions.entry(rule).or_default() += count);
         }
         other.drives.iter().for_each(|(drive, count)| *self.drives.entry(*drive).or_default() += count);
     }
@@ -95,11 +100,11 @@ impl Coverage {
     pub fn gaps(&self) -> Vec<String> {
         let mut gaps = vec![];
         for kind in KINDS {
-            let faced = self.faced.get(kind).cloned().unwrap_or_default();
+            let situations = self.situations.get(kind).cloned().unwrap_or_default();
             for (count, when) in [
-                (faced.bringing_up, "before the axes are enabled"),
-                (faced.holding + faced.moving, "with the axes enabled"),
-                (faced.moving, "in motion"),
+                (situations.bringing_up, "before the axes are enabled"),
+                (situations.holding + situations.moving, "with the axes enabled"),
+                (situations.moving, "in motion"),
             ] {
                 if count == 0 {
                     gaps.push(format!("{kind} {when}"));
@@ -117,7 +122,10 @@ impl Coverage {
             (self.serving, "a group that clients command"),
             (self.several_clients, "several clients"),
             (self.several_faults, "several faults"),
-            (self.faced.values().map(|faced| faced.enabling).sum(), "a fault while the axes are led up"),
+            (
+                self.situations.values().map(|situations| situations.enabling).sum(),
+                "a fault while the axes are being enabled",
+            ),
         ] {
             if count == 0 {
                 gaps.push(what.to_owned());
@@ -134,20 +142,20 @@ impl Coverage {
             self.cycles, self.cases, self.serving, self.several_clients, self.several_faults,
         );
         for kind in KINDS {
-            let faced = self.faced.get(kind).cloned().unwrap_or_default();
-            let mut reactions: Vec<_> = faced.reactions.iter().collect();
+            let situations = self.situations.get(kind).cloned().unwrap_or_default();
+            let mut reactions: Vec<_> = situations.reactions.iter().collect();
             reactions.sort_by_key(|(_, count)| std::cmp::Reverse(**count));
             let reactions: Vec<String> =
                 reactions.iter().map(|(rule, count)| format!("{rule} {count}")).collect();
             let _ = writeln!(
                 text,
                 "| {kind} | {} | {} | {} | {} | {} | {} | {} |",
-                faced.all(),
-                faced.bringing_up,
-                faced.enabling,
-                faced.holding,
-                faced.moving,
-                faced.ending,
+                situations.all(),
+                situations.bringing_up,
+                situations.enabling,
+                situations.holding,
+                situations.moving,
+                situations.ending,
                 reactions.join(", "),
             );
         }

@@ -15,7 +15,7 @@ impl Fingerprint {
         self.0 = (self.0.rotate_left(5) ^ word).wrapping_mul(0x517C_C1B7_2722_0A95);
     }
 
-    /// Takes what has been sent, told and done in a cycle.
+    /// Takes what has been sent, reported and done in a cycle.
     pub fn take_cycle(&mut self, world: &World) {
         for (bus, frames) in world.sent.iter().enumerate() {
             for frame in frames {

@@ -33,7 +33,7 @@ const CROWD: &str = "axes32-erob";
 const RANDOM_SHARE: f64 = 0.5;
 const EROB_MODES: [&str; 8] = ["csp", "csp", "csv", "cst", "ip", "pp", "pv", "pt"];
 const YZ_AIM_MODES: [&str; 3] = ["ip", "pp", "pv"];
-/// Nobody reads more than the newest one.
+/// Only the newest one is read.
 const RECORDS: usize = 16;
 
 /// A shipped machine, read once.

@@ -1,5 +1,5 @@
-//! Storms: random machines, programs, requests and faults on the whole controller against the simulated drives, in
-//! virtual time.
+//! Storms: the whole controller against simulated drives, in virtual time, with random machines, programs, requests and
+//! faults.
 //!
 //! `TAKT_STORM_CYCLES=100000000` for a long one (with `--release`), `TAKT_STORM_FIRST=…` for the cases from this seed on in
 //! place of those from 0 on, `TAKT_STORM_SEED=…` for one case again, `TAKT_STORM_TABLE=1` for the tables of what has been gone
@@ -14,6 +14,7 @@ mod dice;
 mod fingerprint;
 mod invariants;
 mod machine;
+mod overload;
 mod regressions;
 mod run;
 mod table;
@@ -35,7 +36,7 @@ use run::{Done, play};
 const CYCLES: u64 = 1_040_000;
 /// Which seeds are played depends on the first one and the number of cycles alone, not on the number of processors.
 const SHARDS: u64 = 16;
-/// So many failures of a shard are told of at once.
+/// A shard ends after so many failures.
 const FAILURES_AT_MOST: usize = 5;
 
 fn number(variable: &str) -> Option<u64> {
@@ -48,7 +49,11 @@ fn attempt(seed: u64) -> Result<(Case, Done), String> {
         let case = Case::of(seed);
         match play(&case) {
             Ok(done) => Ok((case, done)),
-            Err(wrong) => Err(format!("{} {wrong}\n{}", case.config.name, case.text)),
+            Err(wrong) => {
+                let overload =
+                    if case.overload.is_present() { format!("{:?}\n", case.overload) } else { String::new() };
+                Err(format!("{} {wrong}\n{overload}{}", case.config.name, case.text))
+            }
         }
     }));
     played

@@ -6,30 +6,33 @@ use takt::bus::port::Port;
 use takt::config::Config;
 use takt::controller::channels::LogSide;
 use takt::controller::{Outcome, VirtualRun};
-use takt::faults::{Rehearsal, Scenario};
+use takt::faults::{FaultInjector, Scenario};
 use takt::sim::{Observation, SimulatedBus};
-use takt_rt::{BusPort, DriveState, Event, EventKind, Frame, Phase, ReceiveBatch, Request, Rule, Snapshot};
+use takt_rt::{
+    Answer, BusPort, DriveState, Event, EventKind, Frame, Phase, ReceiveBatch, Request, RequestId, Rule,
+    Snapshot,
+};
 
 use crate::case::Case;
-use crate::client::{Client, RequestEnvelope, is_open};
+use crate::client::{Client, RecentRequests, is_open};
 use crate::concern::Concerns;
 use crate::fingerprint::Fingerprint;
 use crate::invariants::{Invariants, REST, Seen};
 use crate::tap::Tap;
 use crate::wire::Wire;
 
-/// Bring-up, farewell and every patience of the life cycle together.
+/// Bring-up, shutdown and all time-outs of the life cycle together.
 const END_AT_MOST_S: f64 = 45.0;
 /// A YZ-AIM whose communication has been reset watches the controller for its factory setting of 2 s; then it stops.
 const WATCHDOG_MS: u64 = 3000;
-/// A request waits in the host interface and then takes so many cycles of the slowest bus to show.
+/// A reset of faults that has been granted takes so many cycles of the slowest bus to show.
 const RESET_CYCLES: u64 = 60;
 
 /// A controller in virtual time of which everything is seen.
 pub struct World {
     pub run: VirtualRun<Tap>,
     pub log: LogSide,
-    pub rehearsal: Arc<Rehearsal>,
+    pub fault_injector: Arc<FaultInjector>,
     pub snapshot: Snapshot,
     /// Of the present cycle.
     pub sent: Vec<Vec<Frame>>,
@@ -44,23 +47,23 @@ impl World {
     }
 
     fn with(config: &Config, scenario: &Scenario, is_serving: bool) -> Self {
-        let rehearsal = Arc::new(Rehearsal::new(scenario.clone()));
+        let fault_injector = Arc::new(FaultInjector::new(scenario.clone()));
         let simulated = |bus| Port::Simulated(Box::new(SimulatedBus::new(config, bus)));
         let ports =
-            (0..config.buses.len()).map(|bus| Tap::new(rehearsal.wrap(bus, simulated(bus)))).collect();
+            (0..config.buses.len()).map(|bus| Tap::new(fault_injector.wrap(bus, simulated(bus)))).collect();
         let made =
             if is_serving { VirtualRun::serving(config, ports) } else { VirtualRun::new(config, ports) };
         let (run, log) = made.unwrap();
         let snapshot = run.snapshot();
         let sent = vec![vec![]; config.buses.len()];
-        Self { run, log, rehearsal, snapshot, sent, truth: vec![], events: vec![] }
+        Self { run, log, fault_injector, snapshot, sent, truth: vec![], events: vec![] }
     }
 
     /// One cycle. Returns whether the run goes on.
     pub fn step(&mut self, config: &Config) -> bool {
         let goes_on = self.run.step();
         self.snapshot = self.run.snapshot();
-        self.rehearsal.observe(&self.snapshot);
+        self.fault_injector.observe(&self.snapshot);
         let ports = self.run.ports();
         for (sent, port) in self.sent.iter_mut().zip(ports.iter_mut()) {
             sent.clear();
@@ -76,9 +79,9 @@ impl World {
     }
 }
 
-/// How a fault went.
+/// What became of a fault.
 #[derive(Clone, Copy, Debug)]
-pub struct Struck {
+pub struct FaultOutcome {
     /// Its number in the scenario.
     pub fault: usize,
     /// What the group was doing when it began.
@@ -98,7 +101,7 @@ pub struct Done {
     /// Of all records, events and frames.
     pub fingerprint: u64,
     /// Every fault that has begun.
-    pub struck: Vec<Struck>,
+    pub outcomes: Vec<FaultOutcome>,
     /// Whether the drives could not be brought up.
     pub is_bring_up_failed: bool,
 }
@@ -110,17 +113,18 @@ pub struct Done {
 pub fn play(case: &Case) -> Result<Done, String> {
     let config = &case.config;
     let mut world = World::with(config, &case.scenario, case.is_serving);
-    let rehearsal = Arc::clone(&world.rehearsal);
+    let fault_injector = Arc::clone(&world.fault_injector);
     let mut invariants = Invariants::new(config);
-    let mut concerns = Concerns::new(config, &rehearsal);
+    let mut concerns = Concerns::new(config, &fault_injector);
     let mut wire = Wire::new(config);
     let mut clients = Clients::new(case);
     let mut fingerprint = Fingerprint::default();
-    let mut struck: Vec<Struck> = vec![];
+    let mut outcomes: Vec<FaultOutcome> = vec![];
     let at_most = case.length + (END_AT_MOST_S * 1e9 / config.cycle.period_ns as f64) as u64;
     let (mut enabled, mut cycles) = (None, 0);
     let mut goes_on = true;
-    world.run.neglect_life_cycle(case.hardship.neglect.max(1));
+    let mut overload_dice = case.dice.split(u64::MAX - 2);
+    world.run.poll_life_cycle_every(case.hardship.neglect.max(1));
     while goes_on {
         let phase = world.snapshot.phase;
         goes_on = world.step(config);
@@ -128,12 +132,12 @@ pub fn play(case: &Case) -> Result<Done, String> {
         let wrong =
             |snapshot: &Snapshot, what: String| format!("cycle {cycles}, {:?}: {what}", snapshot.phase);
         wire.read(&world.sent);
-        concerns.observe(&rehearsal, |fault| {
-            struck
+        concerns.observe(&fault_injector, |fault| {
+            outcomes
                 .iter_mut()
-                .filter(|struck| struck.stop.is_none())
-                .for_each(|struck| struck.is_overtaken = true);
-            struck.push(Struck {
+                .filter(|outcomes| outcomes.stop.is_none())
+                .for_each(|outcomes| outcomes.is_overtaken = true);
+            outcomes.push(FaultOutcome {
                 fault,
                 phase,
                 is_brought_up: enabled.is_some(),
@@ -141,7 +145,8 @@ pub fn play(case: &Case) -> Result<Done, String> {
                 is_overtaken: false,
             });
         });
-        note_stop(&world.events, &mut struck);
+        note_stop(&world.events, &mut outcomes);
+        clients.note_answers(&world.snapshot);
         fingerprint.take_cycle(&world);
         let World { log, snapshot, truth, events, .. } = &mut world;
         let mut look = |record: &_| {
@@ -150,13 +155,14 @@ pub fn play(case: &Case) -> Result<Done, String> {
                 config,
                 snapshot,
                 record,
-                told: &wire.told,
+                sent: &wire.values,
                 truth,
                 events,
                 concerns: &concerns.by_axis,
                 troubled_buses: &concerns.by_bus,
                 overloaded_buses: &concerns.is_overloaded,
                 asked: clients.asked,
+                has_faults: !case.scenario.faults.is_empty(),
             })
         };
         while let Some(checked) = log.next_record(&mut look) {
@@ -174,31 +180,34 @@ pub fn play(case: &Case) -> Result<Done, String> {
         let is_raging = enabled.is_some_and(|enabled| cycles < enabled + case.length);
         let is_open = is_raging || enabled.is_some() && case.hardship.are_clients_stubborn;
         clients.act(case, &mut world, is_open);
+        case.overload.act(cycles, &mut overload_dice, &mut world.run, &mut concerns);
         for (_, late_ns) in case.hardship.stalls.iter().filter(|(cycle, _)| *cycle == cycles) {
             world.run.clock().stall(*late_ns);
         }
     }
     at_rest(case, &mut concerns, &mut world)?;
     let is_bring_up_failed = matches!(world.run.supervisor().outcome(), Some(Outcome::BringUpFailed(_)));
-    Ok(Done { cycles, fingerprint: fingerprint.value(), struck, is_bring_up_failed })
+    Ok(Done { cycles, fingerprint: fingerprint.value(), outcomes, is_bring_up_failed })
 }
 
-fn note_stop(events: &[Event], struck: &mut [Struck]) {
+fn note_stop(events: &[Event], outcomes: &mut [FaultOutcome]) {
     for event in events {
         if let EventKind::Stop(reason) = event.kind
             && reason.rule() != Rule::Requested
         {
-            struck.iter_mut().filter(|struck| !struck.is_overtaken).for_each(|struck| {
-                struck.stop.get_or_insert(reason.rule());
+            outcomes.iter_mut().filter(|outcomes| !outcomes.is_overtaken).for_each(|outcomes| {
+                outcomes.stop.get_or_insert(reason.rule());
             });
         }
     }
 }
 
-/// Those who ask for things, all at one door.
+/// Those who ask for things, all through one queue.
 struct Clients {
     all: Vec<Client>,
-    asked: RequestEnvelope,
+    asked: RecentRequests,
+    /// Resets of faults that wait in the queue. Each counts when it is granted: a fault may come up before that, and is reset too.
+    awaited_resets: Vec<RequestId>,
     since_reset: u64,
 }
 
@@ -207,31 +216,34 @@ impl Clients {
         let all = (0..case.clients as u64)
             .map(|number| Client::new(case.dice.split(number), case.hardship.are_streams_wild))
             .collect();
-        Self { all, asked: RequestEnvelope::default(), since_reset: u64::MAX }
+        Self { all, asked: RecentRequests::default(), awaited_resets: vec![], since_reset: u64::MAX }
+    }
+
+    /// Looks which resets have been granted in the last cycle.
+    fn note_answers(&mut self, snapshot: &Snapshot) {
+        let answers = &snapshot.answers;
+        self.asked.has_reset = self.awaited_resets.iter().any(|id| answers.of(*id) == Answer::Granted);
+        self.awaited_resets.retain(|id| answers.of(*id) == Answer::None && !answers.have_forgotten(*id));
+        self.since_reset = if self.asked.has_reset { 0 } else { self.since_reset.saturating_add(1) };
+        self.asked.has_reset_lately = self.since_reset < RESET_CYCLES;
     }
 
     fn act(&mut self, case: &Case, world: &mut World, is_raging: bool) {
-        (self.asked.has_streamed, self.asked.has_reset) = (false, false);
-        self.since_reset = self.since_reset.saturating_add(1);
         let snapshot = &world.snapshot;
         let is_waited_for = snapshot.phase == Phase::Passive || !case.is_serving && !is_open(snapshot);
         if is_raging && !is_waited_for {
             for client in &mut self.all {
                 let wishes = client.wishes(&case.config, snapshot);
                 for request in &wishes.requests {
-                    if world.run.host().request(*request).is_ok() && *request == Request::ResetFaults {
-                        self.since_reset = 0;
-                        self.asked.has_reset = true;
-                    }
+                    let id = world.run.host().request(*request).ok();
+                    self.awaited_resets.extend(id.filter(|_| *request == Request::ResetFaults));
                 }
                 if let Some(command) = wishes.stream {
                     world.run.host().stream(&command);
-                    self.asked.has_streamed = true;
                 }
                 world.run.clock().stall(wishes.late_ns);
             }
         }
-        self.asked.has_reset_lately = self.since_reset < RESET_CYCLES;
     }
 }
 
@@ -246,11 +258,11 @@ fn at_rest(case: &Case, concerns: &mut Concerns, world: &mut World) -> Result<()
         }
     }
     // A fault may have begun in that time.
-    concerns.observe(&world.rehearsal, |_| ());
+    concerns.observe(&world.fault_injector, |_| ());
     for (axis, concern) in case.config.axes.iter().zip(&concerns.by_axis) {
         let truth = world.run.ports()[axis.bus].observe(axis.node);
         let is_driven = truth.state == DriveState::OperationEnabled;
-        // Nothing stops a drive that watches nobody any more and that nothing gets to.
+        // Nothing stops a drive that has no watchdog any more and that no frame reaches.
         let is_beyond_reach = concern.is_unwatched && concern.is_cut_off;
         if (truth.velocity.abs() > REST || is_driven) && !concern.is_loaded && !is_beyond_reach {
             return Err(format!("{} is not at rest in the end: {truth:?}", axis.name));

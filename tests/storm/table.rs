@@ -34,18 +34,18 @@ struct Reaction {
     noticed_cycles: f64,
     /// From then on until every joint stood that hears what its drive is sent.
     rest_ms: f64,
-    /// The same of those whose drives are told something else.
+    /// The same of the joints whose drives receive something else.
     misled_rest_ms: f64,
 }
 
 fn reaction(config: &Config, scenario: &Scenario) -> Option<Reaction> {
     let mut world = World::new(config, scenario);
     let mut stop: Option<(StopReason, u64)> = None;
-    let mut concerns = Concerns::new(config, &world.rehearsal);
+    let mut concerns = Concerns::new(config, &world.fault_injector);
     let (mut last_motion_ns, mut last_misled_ns) = (0, 0);
     for _ in 0..bounds::cycles(config, LONGEST_S) {
         let goes_on = world.step(config);
-        concerns.observe(&world.rehearsal, |_| ());
+        concerns.observe(&world.fault_injector, |_| ());
         while world.log.next_record(|_| ()).is_some() {}
         for event in &world.events {
             match event.kind {
@@ -67,7 +67,7 @@ fn reaction(config: &Config, scenario: &Scenario) -> Option<Reaction> {
         }
     }
     let (reason, stopped_ns) = stop?;
-    let began_ns = world.rehearsal.courses().next().and_then(|(_, course)| course.began_ns())?;
+    let began_ns = world.fault_injector.progress().next().and_then(|(_, progress)| progress.began_ns())?;
     let noticed_ns = stopped_ns.saturating_sub(began_ns) as f64;
     let rest_ms = |last_ns: u64| last_ns.saturating_sub(stopped_ns) as f64 * 1e-6;
     Some(Reaction {
@@ -78,7 +78,7 @@ fn reaction(config: &Config, scenario: &Scenario) -> Option<Reaction> {
     })
 }
 
-/// The reactions to so many faults of a kind, at different places and times in motion; fewer where it was borne.
+/// The reactions to so many faults of a kind, at different places and times in motion; fewer where it was tolerated.
 fn reactions(number: u64, config: &Config, kind: &str, times: u64) -> Option<Vec<Reaction>> {
     let mut reactions = vec![];
     for time in 0..times {
@@ -110,7 +110,7 @@ fn table(config: &Config, times: u64) -> (String, Vec<f64>) {
     for (number, kind) in (0..).zip(KINDS) {
         let Some(reactions) = reactions(number, config, kind, times) else { continue };
         if reactions.is_empty() {
-            let _ = writeln!(text, "| {kind} | 0 of {times} | borne | – | – |");
+            let _ = writeln!(text, "| {kind} | 0 of {times} | tolerated | – | – |");
             continue;
         }
         let mut rules: BTreeMap<String, u64> = BTreeMap::new();

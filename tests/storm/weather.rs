@@ -46,7 +46,7 @@ pub const KINDS: [&str; 35] = [
 /// Those that only the simulated eRob can have.
 pub const NEEDS_EROB: [&str; 4] = ["stuck-brake", "mode-display", "torque-off", "emergency"];
 
-/// What a fault needs to be told beside its kind.
+/// What a fault names beside its kind.
 enum Place {
     Bus,
     Axis,

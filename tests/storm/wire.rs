@@ -1,4 +1,4 @@
-//! What the controller has told each drive in a cycle, read off the wire.
+//! What the controller has sent to each drive in a cycle, read from its PDOs.
 
 use takt::config::Config;
 use takt::drive::ProcessData;
@@ -9,9 +9,9 @@ const TARGET_POSITION: u16 = 0x607A;
 const TARGET_VELOCITY: u16 = 0x60FF;
 const TARGET_TORQUE: u16 = 0x6071;
 
-/// What a drive has been told in a cycle, in its own units.
+/// What was sent to a drive in a cycle, in its own units.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Told {
+pub struct SentValues {
     pub controlword: Option<u16>,
     pub position: Option<i32>,
     pub velocity: Option<i32>,
@@ -29,7 +29,7 @@ struct Command {
 /// Reads the process data of every axis.
 pub struct Wire {
     commands: Vec<Command>,
-    pub told: Vec<Told>,
+    pub values: Vec<SentValues>,
 }
 
 impl Wire {
@@ -48,33 +48,33 @@ impl Wire {
         };
         Self {
             commands: config.axes.iter().enumerate().flat_map(of_axis).collect(),
-            told: vec![Told::default(); config.axes.len()],
+            values: vec![SentValues::default(); config.axes.len()],
         }
     }
 
     /// Reads what was sent in a cycle, an entry a bus.
     pub fn read(&mut self, sent: &[Vec<Frame>]) {
-        self.told.fill(Told::default());
+        self.values.fill(SentValues::default());
         for (bus, frames) in sent.iter().enumerate() {
             for frame in frames {
                 let id = frame.id().value();
                 let own = self.commands.iter().find(|command| command.bus == bus && command.id == id);
                 if let Some(command) = own.filter(|_| !frame.id().is_extended()) {
-                    take(&mut self.told[command.axis], &command.objects, frame.first_word());
+                    take(&mut self.values[command.axis], &command.objects, frame.first_word());
                 }
             }
         }
     }
 }
 
-fn take(told: &mut Told, objects: &[(MappedObject, u32)], payload: u64) {
+fn take(values: &mut SentValues, objects: &[(MappedObject, u32)], payload: u64) {
     for (object, shift) in objects {
         let word = payload >> shift;
         match object.index {
-            CONTROLWORD => told.controlword = Some(word as u16),
-            TARGET_POSITION => told.position = Some(word as i32),
-            TARGET_VELOCITY => told.velocity = Some(word as i32),
-            TARGET_TORQUE => told.torque = Some((word as i16).into()),
+            CONTROLWORD => values.controlword = Some(word as u16),
+            TARGET_POSITION => values.position = Some(word as i32),
+            TARGET_VELOCITY => values.velocity = Some(word as i32),
+            TARGET_TORQUE => values.torque = Some((word as i16).into()),
             _ => {}
         }
     }

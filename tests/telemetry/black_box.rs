@@ -3,7 +3,7 @@ use std::path::{Path, PathBuf};
 
 use takt::bus::trace::{TracedPort, traced};
 use takt::controller::channels::RtSide;
-use takt::telemetry::{BlackBoxOptions, Fault, LogSummary, Logger, LoggerOptions, Notice};
+use takt::telemetry::{BlackBoxOptions, Incident, LogSummary, Logger, LoggerOptions, Notice};
 use takt_rt::{
     BusHealth, BusPort, BusState, CycleRecord, DriveState, EventKind, Frame, HostInterface, Id, Phase,
     ReceiveBatch, Received, Rule, StopCause, StopReason,
@@ -12,7 +12,7 @@ use takt_rt::{
 use crate::reader::{Value, messages};
 use crate::run::{CYCLE_NS, EPOCH_NS, Notices, STOP, UNIX_AT_ZERO_NS, cycle, event, options, sides};
 
-/// A bus on which a drive answers every SYNC, until it is broken.
+/// A bus on which a drive answers every SYNC, until the bus fails.
 struct Bus {
     health: BusHealth,
 }
@@ -45,7 +45,7 @@ fn answer() -> Frame {
 
 const SPAN_NS: u64 = 1_000_000_000;
 
-/// A run whose black box keeps a second.
+/// A run with a black box of one second.
 struct Run {
     rt: RtSide,
     logger: Logger,
@@ -114,7 +114,7 @@ fn names(files: &[PathBuf]) -> Vec<String> {
 }
 
 #[test]
-fn a_fault_writes_the_last_second_and_half_a_second_after_it_without_any_recording() {
+fn a_fault_writes_the_last_second_and_the_next_half_second_without_a_recording() {
     let folder = tempfile::tempdir().unwrap();
     let mut run = Run::new(folder.path());
     run.cycles(3000);
@@ -124,7 +124,7 @@ fn a_fault_writes_the_last_second_and_half_a_second_after_it_without_any_recordi
     assert_eq!(summary.recording, None);
     assert_eq!(names(&summary.black_boxes.files), ["arm-20231114T221323Z-black-box-following_error.mcap"]);
     let bytes = fs::read(&summary.black_boxes.files[0]).unwrap();
-    // The event was handed over with the record of slot 3000.
+    // The event came with the record of slot 3000.
     assert_eq!(slots(&bytes), (2001..=3500).collect::<Vec<_>>());
     assert_eq!(messages(&bytes, "/axis/slide").len(), 1500);
     let text = &messages(&bytes, "/events")[0].1["text"];
@@ -132,7 +132,7 @@ fn a_fault_writes_the_last_second_and_half_a_second_after_it_without_any_recordi
 }
 
 #[test]
-fn the_frames_of_every_bus_are_in_it_with_their_direction_and_what_was_wrong_with_the_bus() {
+fn it_has_the_frames_of_every_bus_with_their_direction_and_the_health_of_the_bus() {
     let folder = tempfile::tempdir().unwrap();
     let mut run = Run::new(folder.path());
     run.cycles(10);
@@ -155,7 +155,7 @@ fn the_frames_of_every_bus_are_in_it_with_their_direction_and_what_was_wrong_wit
 }
 
 #[test]
-fn errors_on_a_bus_are_in_it_when_they_have_changed() {
+fn it_has_the_errors_of_a_bus_when_they_have_changed() {
     let folder = tempfile::tempdir().unwrap();
     let (rt, _host, log) = sides(8);
     let health =
@@ -177,7 +177,7 @@ fn errors_on_a_bus_are_in_it_when_they_have_changed() {
 }
 
 #[test]
-fn the_reason_is_in_the_metadata_and_a_fault_that_follows_at_once_is_in_the_same_file() {
+fn the_metadata_has_the_reason_and_a_fault_that_follows_at_once_is_in_the_same_file() {
     let folder = tempfile::tempdir().unwrap();
     let mut run = Run::new(folder.path());
     run.cycles(50);
@@ -206,7 +206,7 @@ fn the_reason_is_in_the_metadata_and_a_fault_that_follows_at_once_is_in_the_same
 }
 
 #[test]
-fn a_run_that_ends_soon_after_the_fault_leaves_a_whole_file() {
+fn a_run_that_ends_soon_after_the_fault_leaves_a_complete_file() {
     let folder = tempfile::tempdir().unwrap();
     let mut run = Run::new(folder.path());
     run.cycles(50);
@@ -217,7 +217,7 @@ fn a_run_that_ends_soon_after_the_fault_leaves_a_whole_file() {
 }
 
 #[test]
-fn the_past_is_in_the_file_as_soon_as_the_fault_is_seen() {
+fn the_history_is_in_the_file_as_soon_as_the_fault_is_seen() {
     let folder = tempfile::tempdir().unwrap();
     let mut run = Run::new(folder.path());
     run.cycles(500);
@@ -242,7 +242,7 @@ fn a_requested_stop_writes_nothing() {
 }
 
 #[test]
-fn a_drive_that_faults_without_power_is_a_fault_and_one_that_was_faulted_before_is_none() {
+fn a_new_drive_fault_without_power_is_an_incident_and_an_old_one_is_not() {
     let folder = tempfile::tempdir().unwrap();
     let mut run = Run::new(folder.path());
     let faulted = |slot| {
@@ -275,7 +275,7 @@ fn a_drive_that_faults_without_power_is_a_fault_and_one_that_was_faulted_before_
 }
 
 #[test]
-fn a_drive_whose_fault_stops_the_group_is_one_fault_even_if_the_power_is_gone_when_it_is_seen() {
+fn a_drive_fault_that_stops_the_group_is_one_incident_even_if_it_is_seen_after_the_power_is_off() {
     let folder = tempfile::tempdir().unwrap();
     let mut run = Run::new(folder.path());
     run.rt.event(&event(
@@ -296,7 +296,7 @@ fn a_drive_whose_fault_stops_the_group_is_one_fault_even_if_the_power_is_gone_wh
 }
 
 #[test]
-fn of_many_faults_the_first_fifteen_and_the_very_last_are_kept() {
+fn of_many_incidents_the_first_fifteen_and_the_last_are_kept() {
     let folder = tempfile::tempdir().unwrap();
     let mut run = Run::new(folder.path());
     for _ in 0..20 {
@@ -318,7 +318,7 @@ fn of_many_faults_the_first_fifteen_and_the_very_last_are_kept() {
 }
 
 #[test]
-fn a_folder_that_cannot_be_written_is_told_once_and_costs_nothing_else() {
+fn an_unwritable_folder_is_reported_once_and_the_run_goes_on() {
     let folder = tempfile::tempdir().unwrap();
     let obstacle = folder.path().join("runs");
     fs::write(&obstacle, "a file in place of the folder").unwrap();
@@ -341,10 +341,10 @@ fn a_folder_that_cannot_be_written_is_told_once_and_costs_nothing_else() {
 }
 
 #[test]
-fn the_death_of_the_real_time_thread_is_a_fault_even_before_its_first_cycle() {
+fn the_death_of_the_real_time_thread_is_an_incident_even_before_its_first_cycle() {
     let folder = tempfile::tempdir().unwrap();
     let mut run = Run::new(folder.path());
-    run.logger.fault(&Fault::ThreadDied);
+    run.logger.incident(&Incident::ThreadDied);
     let summary = run.finish();
     assert_eq!(names(&summary.black_boxes.files), ["arm-20231114T221320Z-black-box-thread_died.mcap"]);
     let bytes = fs::read(&summary.black_boxes.files[0]).unwrap();
@@ -352,7 +352,7 @@ fn the_death_of_the_real_time_thread_is_a_fault_even_before_its_first_cycle() {
 }
 
 #[test]
-fn a_file_that_somebody_removes_is_not_listed_as_there() {
+fn a_file_that_is_removed_is_not_listed() {
     let folder = tempfile::tempdir().unwrap();
     let mut run = Run::new(&folder.path().join("runs"));
     run.cycles(50);
@@ -368,7 +368,7 @@ fn a_file_that_somebody_removes_is_not_listed_as_there() {
 }
 
 #[test]
-fn a_listener_that_panics_is_not_called_again_and_everything_is_still_recorded() {
+fn a_callback_that_panics_is_not_called_again_and_everything_is_still_recorded() {
     let folder = tempfile::tempdir().unwrap();
     let notices = Notices::default();
     let mut run = Run::with(folder.path(), notices.clone(), |notices| {

@@ -1,14 +1,13 @@
 use std::fs::{self, OpenOptions};
 
 use takt::bus::trace::{TracedPort, traced};
-use takt::telemetry::{Destination, Logger, Notice};
+use takt::telemetry::{Logger, Notice, RecordingDestination};
 use takt_rt::{BusHealth, BusPort, EventKind, Frame, HostInterface, Id, ReceiveBatch, RequestId};
 
 use crate::run::{Disk, Notices, cycle, event, options, run, sides};
 
-/// Runs 5000 cycles, far more than the chunks that are held back, into a destination that fails; returns what was
-/// said of it.
-fn say(destination: Destination) -> Vec<Notice> {
+/// Records 5000 cycles, many more than a chunk holds, into a destination that fails. Returns the notices.
+fn record_into(destination: RecordingDestination) -> Vec<Notice> {
     let (mut rt, _host, log) = sides(8);
     let notices = Notices::default();
     let mut logger = Logger::new(log, options(Some(destination)), notices.sink());
@@ -27,15 +26,15 @@ fn assert_one_message(notices: &[Notice], beginning: &str, reason: &str) {
 #[test]
 fn a_full_disk_ends_the_recording_with_one_message_and_nothing_else() {
     let full = OpenOptions::new().write(true).open("/dev/full").unwrap();
-    let notices = say(Destination::Stream("/dev/full".to_owned(), Box::new(full)));
+    let notices = record_into(RecordingDestination::Stream("/dev/full".to_owned(), Box::new(full)));
     assert_one_message(&notices, "no recording: cannot write /dev/full: ", "No space left");
 }
 
 #[test]
-fn wherever_a_disk_becomes_full_there_is_one_message() {
+fn a_disk_that_becomes_full_at_any_point_gives_one_message() {
     for room in [0, 1, 100, 3_000, 10_000, 300_000, 700_000, 1_000_000] {
         let disk = Disk::new(room);
-        let notices = say(disk.destination());
+        let notices = record_into(disk.destination());
         let beginning = if room <= 3_000 { "no recording: " } else { "the recording ends here: " };
         assert_one_message(&notices, beginning, "cannot write the disk: no storage space");
         assert!(disk.bytes.lock().unwrap().len() <= room);
@@ -43,36 +42,36 @@ fn wherever_a_disk_becomes_full_there_is_one_message() {
 }
 
 #[test]
-fn a_disk_that_becomes_full_at_the_very_end_is_told_too() {
+fn a_disk_that_becomes_full_at_the_very_end_is_reported_too() {
     let (mut rt, _host, log) = sides(8);
     let (notices, disk) = (Notices::default(), Disk::new(8_000));
     let mut logger = Logger::new(log, options(Some(disk.destination())), notices.sink());
     run(&mut rt, &mut logger, 0..20);
     assert_eq!(notices.all(), []);
     let summary = logger.finish();
-    assert_one_message(&notices.all(), "the recording has no end: cannot write the disk: ", "no storage");
+    assert_one_message(&notices.all(), "the recording is incomplete: cannot write the disk: ", "no storage");
     assert_eq!(summary.statistics.cycles, 20);
 }
 
 #[test]
-fn an_unwritable_folder_is_one_message_with_what_where_and_why() {
+fn an_unwritable_folder_gives_one_message_with_the_path_and_the_reason() {
     let folder = tempfile::tempdir().unwrap();
     let obstacle = folder.path().join("runs");
     fs::write(&obstacle, "a file in place of the folder").unwrap();
     let beginning = format!("no recording: cannot write {}/arm-", obstacle.display());
-    assert_one_message(&say(Destination::Directory(obstacle)), &beginning, "exists");
+    assert_one_message(&record_into(RecordingDestination::Directory(obstacle)), &beginning, "exists");
 }
 
 #[test]
-fn a_full_ring_drops_counts_and_reports() {
+fn a_full_ring_drops_records_and_counts_them() {
     let (mut rt, _host, log) = sides(8);
     let disk = Disk::new(usize::MAX);
     let mut logger = Logger::new(log, options(Some(disk.destination())), Notices::default().sink());
     assert_eq!((0..20).filter(|slot| rt.record(&cycle(*slot))).count(), 8);
-    let taken = (0..20)
+    let accepted = (0..20)
         .filter(|id| rt.event(&event(0, EventKind::MotionFinished { request: RequestId(*id) })))
         .count();
-    assert_eq!(taken, 16);
+    assert_eq!(accepted, 16);
     assert_eq!(logger.drain(), 24);
     run(&mut rt, &mut logger, 20..30);
     let summary = logger.finish();

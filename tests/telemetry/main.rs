@@ -1,4 +1,4 @@
-//! The logger over a run in virtual time: what it writes, what it reckons, and what it does when it cannot write.
+//! The logger of a run in virtual time: its files, its statistics, and its behaviour when it cannot write.
 
 mod black_box;
 mod failures;

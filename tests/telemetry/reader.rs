@@ -1,9 +1,8 @@
-//! Reads messages by nothing but the schema in the recording, as any other program would: the ROS 2 interface
-//! language, and CDR.
+//! Reads messages by the schema in the recording alone, as another program does: the ROS 2 interface language, and CDR.
 
 use std::collections::BTreeMap;
 
-/// The fields of a message by name; numbers of every kind as `f64`, arrays by their elements `name[0]` ….
+/// The fields of a message by name. Every number is an `f64`, and an array has its elements `name[0]` ….
 pub type Fields = BTreeMap<String, Value>;
 
 #[derive(Clone, Debug, PartialEq)]

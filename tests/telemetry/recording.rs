@@ -2,7 +2,7 @@ use std::fs;
 use std::path::Path;
 
 use takt::bus::trace::traced;
-use takt::telemetry::{Destination, Logger};
+use takt::telemetry::{Logger, RecordingDestination};
 use takt_rt::{
     BusHealth, BusPort, EventKind, Frame, HostInterface, Id, Phase, ReceiveBatch, Received, RejectReason,
     RequestError, RequestKind,
@@ -13,7 +13,7 @@ use crate::run::{
     CYCLE_NS, Disk, EPOCH_NS, Notices, STOP, UNIX_AT_ZERO_NS, cycle, event, machine, options, run, sides,
 };
 
-/// Records twenty cycles and some events; returns the bytes.
+/// Records twenty cycles and some events, and returns the bytes.
 fn record() -> Vec<u8> {
     let (mut rt, _host, log) = sides(8);
     let disk = Disk::new(usize::MAX);
@@ -44,7 +44,7 @@ fn number(value: impl Into<f64>) -> Value {
 }
 
 #[test]
-fn every_field_of_every_record_can_be_read_by_the_schema_in_the_file() {
+fn every_field_can_be_read_by_the_schema_in_the_file() {
     let recording = record();
     for (index, name) in ["shoulder", "slide"].into_iter().enumerate() {
         let messages = messages(&recording, &format!("/axis/{name}"));
@@ -90,7 +90,7 @@ fn every_field_of_every_record_can_be_read_by_the_schema_in_the_file() {
 }
 
 #[test]
-fn events_are_recorded_in_words_and_in_numbers() {
+fn events_are_recorded_as_text_and_as_numbers() {
     let events = messages(&record(), "/events");
     let texts: Vec<_> = events.iter().map(|(_, fields)| fields["text"].clone()).collect();
     let expected = [
@@ -120,7 +120,7 @@ fn events_are_recorded_in_words_and_in_numbers() {
 }
 
 #[test]
-fn a_recording_has_an_index_and_tells_what_the_machine_is() {
+fn a_recording_has_an_index_and_the_description_of_the_machine() {
     let recording = record();
     let summary = mcap::Summary::read(&recording).unwrap().unwrap();
     let statistics = summary.stats.unwrap();
@@ -165,7 +165,7 @@ fn recordings_are_named_after_machine_and_time_and_never_overwritten() {
     let folder = tempfile::tempdir().unwrap();
     let record = || {
         let (mut rt, _host, log) = sides(8);
-        let directory = Destination::Directory(folder.path().join("runs"));
+        let directory = RecordingDestination::Directory(folder.path().join("runs"));
         let mut logger = Logger::new(log, options(Some(directory)), Notices::default().sink());
         run(&mut rt, &mut logger, 0..5);
         logger.finish().recording.unwrap()
@@ -178,7 +178,7 @@ fn recordings_are_named_after_machine_and_time_and_never_overwritten() {
     }
 }
 
-/// Brings one frame that arrived 50 µs earlier.
+/// Receives one frame that arrived 50 µs earlier.
 struct Port;
 
 impl BusPort for Port {
@@ -207,7 +207,7 @@ fn a_candump_log_has_every_frame_of_every_bus_in_the_order_of_time() {
     let ((mut left, left_trace), (mut right, right_trace)) =
         (traced(Port, "can0", 64), traced(Port, "sim right", 64));
     let mut options = options(None);
-    options.candump = Some(Destination::Directory(folder.path().to_owned()));
+    options.candump = Some(RecordingDestination::Directory(folder.path().to_owned()));
     options.traces = vec![left_trace, right_trace];
     let mut logger = Logger::new(log, options, Notices::default().sink());
 

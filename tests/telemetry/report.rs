@@ -1,6 +1,6 @@
 use serde_json::{Value, json};
 use takt::telemetry::{
-    Destination, Emphasis, LogSummary, Logger, RealtimeReport, RunEnd, RunOutcome, RunReport,
+    Emphasis, LogSummary, Logger, RealtimeReport, RecordingDestination, RunEnd, RunOutcome, RunReport,
 };
 use takt_rt::{BusHealth, BusState, HostInterface, Snapshot, StopReason};
 
@@ -25,8 +25,8 @@ fn outcome(last: Snapshot, stop: Option<StopReason>) -> RunOutcome {
     }
 }
 
-/// Twenty cycles, of which the ring had no room for two, on a bus that was occupied half of the time.
-fn run_and_summarise(destination: Option<Destination>) -> (LogSummary, Snapshot) {
+/// Twenty cycles, two of which the ring dropped, on a bus that was occupied for half of the time.
+fn run_and_summarise(destination: Option<RecordingDestination>) -> (LogSummary, Snapshot) {
     let (mut rt, host, log) = sides(8);
     let mut logger = Logger::new(log, options(destination), Notices::default().sink());
     run(&mut rt, &mut logger, 0..10);
@@ -99,7 +99,7 @@ fn the_report_has_the_keys_of_the_contract_with_the_values_of_the_run() {
 }
 
 #[test]
-fn a_finished_program_has_no_stop_and_may_bring_its_targets() {
+fn the_report_of_a_finished_program_has_no_stop_and_has_its_targets() {
     let (log, last) = run_and_summarise(None);
     let outcome = RunOutcome { targets: Some(vec![17.0, 17.4375]), ..outcome(last, None) };
     let report = RunReport::new(&log, &outcome);
@@ -114,13 +114,13 @@ fn a_run_without_a_cycle_can_be_reported() {
     let log = Logger::new(log, options(None), Notices::default().sink()).finish();
     let report = RunReport::new(&log, &outcome(host.snapshot(), Some(STOP)));
     assert_eq!((report.cycles, report.duration_s, report.axes[0].following_error_max), (0, 0.0, None));
-    assert!(report.picture(Emphasis::None).contains("never enabled"));
+    assert!(report.render(Emphasis::None).contains("never enabled"));
 }
 
 #[test]
-fn the_picture_says_what_a_person_needs_to_know() {
+fn the_text_has_every_part_of_the_report() {
     let (log, last) = run_and_summarise(Some(Disk::new(3).destination()));
-    let picture = RunReport::new(&log, &outcome(last, Some(STOP))).picture(Emphasis::None);
+    let text = RunReport::new(&log, &outcome(last, Some(STOP))).render(Emphasis::None);
     for part in [
         "arm  ✗ category 1 stop after 20 cycles of 1 ms, 0.02 s",
         "slide was 0.2500 m from its set-point (allowed: 0.1250 m) while moving (slot 7)",
@@ -134,20 +134,20 @@ fn the_picture_says_what_a_person_needs_to_know() {
         "refused: SCHED_FIFO priority 80: operation not permitted",
         "sudo setcap cap_sys_nice+ep target/release/takt",
     ] {
-        assert!(picture.contains(part), "{part:?} is not in\n{picture}");
+        assert!(text.contains(part), "{part:?} is not in\n{text}");
     }
 }
 
 #[test]
-fn the_picture_has_colour_codes_only_when_asked_and_no_line_is_too_long() {
+fn the_text_has_colours_only_on_request_and_no_line_is_too_long() {
     let (log, last) = run_and_summarise(None);
     let report = RunReport::new(&log, &outcome(last, Some(STOP)));
-    let plain = report.picture(Emphasis::None);
+    let plain = report.render(Emphasis::None);
     assert!(!plain.contains('\x1b'));
     for line in plain.lines() {
         assert!(line.chars().count() <= COLUMNS && !line.ends_with(' '), "{line:?}");
     }
-    let coloured = report.picture(Emphasis::Ansi);
+    let coloured = report.render(Emphasis::Ansi);
     let stripped: String = coloured
         .split('\x1b')
         .enumerate()

@@ -1,12 +1,12 @@
-//! A run in virtual time, made of records and events as the engine leaves them.
+//! A run in virtual time, made of records and events like those of the engine.
 
 use std::io::{self, Write};
 use std::sync::{Arc, Mutex};
 
 use takt::controller::channels::{ChannelSizes, HostSide, LogSide, RtSide, channels};
 use takt::telemetry::{
-    AxisDescription, BusDescription, Destination, Logger, LoggerOptions, Machine, Notice, SetPointMagnitudes,
-    Unit, WallClock,
+    AxisDescription, BusDescription, Logger, LoggerOptions, Machine, Notice, RecordingDestination,
+    SetPointMagnitudes, Unit, WallClock,
 };
 use takt_rt::{
     AxisRecord, CycleRecord, CycleTiming, DriveState, Event, EventKind, Fault, HostInterface, MAX_AXES,
@@ -43,6 +43,7 @@ pub fn machine() -> Machine {
         name: name.to_owned(),
         bus: None,
         unit,
+        plans_own_profile: false,
         counts_per_unit: 83_443.0,
         limits: SetPointMagnitudes { velocity: 2.0, acceleration: 10.0, jerk: 50.0 },
     };
@@ -54,7 +55,7 @@ pub fn machine() -> Machine {
     }
 }
 
-pub fn options(recording: Option<Destination>) -> LoggerOptions {
+pub fn options(recording: Option<RecordingDestination>) -> LoggerOptions {
     LoggerOptions {
         machine: machine(),
         wall_clock: WallClock::fixed(UNIX_AT_ZERO_NS),
@@ -66,7 +67,7 @@ pub fn options(recording: Option<Destination>) -> LoggerOptions {
     }
 }
 
-/// A cycle in which every field has a value of its own.
+/// A cycle in which every field has a different value.
 pub fn cycle(slot: u64) -> CycleRecord {
     let mut axes = [AxisRecord::default(); MAX_AXES];
     for (axis, record) in axes.iter_mut().take(2).enumerate() {
@@ -111,7 +112,7 @@ pub fn event(slot: u64, kind: EventKind) -> Event {
     Event { slot, at_ns: EPOCH_NS + slot * CYCLE_NS, kind }
 }
 
-/// Hands over the cycles of these slots, and lets the logger work after each.
+/// Hands over the cycles of these slots, and drains the logger after each.
 pub fn run(rt: &mut RtSide, logger: &mut Logger, slots: std::ops::Range<u64>) {
     for slot in slots {
         assert!(rt.record(&cycle(slot)));
@@ -119,7 +120,7 @@ pub fn run(rt: &mut RtSide, logger: &mut Logger, slots: std::ops::Range<u64>) {
     }
 }
 
-/// Everything that a logger had to say.
+/// All notices of a logger.
 #[derive(Clone, Default)]
 pub struct Notices(Arc<Mutex<Vec<Notice>>>);
 
@@ -146,8 +147,8 @@ impl Disk {
         Self { bytes: Arc::default(), room }
     }
 
-    pub fn destination(&self) -> Destination {
-        Destination::Stream("the disk".to_owned(), Box::new(self.clone()))
+    pub fn destination(&self) -> RecordingDestination {
+        RecordingDestination::Stream("the disk".to_owned(), Box::new(self.clone()))
     }
 }
 

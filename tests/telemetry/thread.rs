@@ -1,17 +1,17 @@
 use std::fs;
 
-use takt::telemetry::{Destination, Logger, LoggerThread, Notice};
+use takt::telemetry::{Logger, LoggerThread, Notice, RecordingDestination};
 use takt_rt::{EventKind, HostInterface, RequestId};
 
 use crate::reader::messages;
 use crate::run::{Notices, cycle, event, options, sides};
 
 #[test]
-fn the_thread_writes_all_that_was_handed_over_before_it_was_told_to_finish() {
+fn the_thread_writes_everything_that_was_handed_over_before_finish() {
     let folder = tempfile::tempdir().unwrap();
     let (mut rt, _host, log) = sides(64);
     let notices = Notices::default();
-    let options = options(Some(Destination::File(folder.path().join("run.mcap"))));
+    let options = options(Some(RecordingDestination::File(folder.path().join("run.mcap"))));
     let thread = LoggerThread::start(Logger::new(log, options, notices.sink())).unwrap();
     let last = event(999, EventKind::MotionFinished { request: RequestId(4) });
     let mut dropped = 0;

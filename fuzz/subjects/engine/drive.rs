@@ -31,7 +31,7 @@ pub struct ObedientDrive {
     target_torque: i32,
     /// The target of profile position that it has taken.
     taken: i32,
-    told: Vec<Frame>,
+    sent_before: Vec<Frame>,
     /// When its last heartbeat was due.
     heartbeat_ns: u64,
 }
@@ -52,7 +52,7 @@ impl ObedientDrive {
             target_velocity: 0,
             target_torque: 0,
             taken: 0,
-            told: vec![],
+            sent_before: vec![],
             heartbeat_ns: 0,
         }
     }
@@ -80,7 +80,7 @@ impl ObedientDrive {
         if self.is_silent {
             return vec![];
         }
-        let before = std::mem::replace(&mut self.told, frames.clone());
+        let before = std::mem::replace(&mut self.sent_before, frames.clone());
         if self.is_late { before } else { frames }
     }
 

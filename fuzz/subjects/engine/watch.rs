@@ -26,8 +26,8 @@ pub struct Watch {
     phase: Phase,
     is_retired: bool,
     refused: u64,
-    /// The reason of the last stop, as it was told.
-    told: Option<StopReason>,
+    /// The reason of the last stop, as its event gave it.
+    reported: Option<StopReason>,
     stopping_cycles: u32,
     stopping_at_most: u32,
 }
@@ -47,7 +47,7 @@ impl Watch {
             phase: Phase::Passive,
             is_retired: false,
             refused: 0,
-            told: None,
+            reported: None,
             stopping_cycles: 0,
             stopping_at_most: (patience_s * 1e9 / config.cycle.period_ns as f64) as u32,
         }
@@ -61,9 +61,9 @@ impl Watch {
     /// Looks at a cycle. `has_acted` tells whether set-points could leave.
     pub fn look(&mut self, engine: &Engine, events: &[Event], snapshot: &Snapshot, has_acted: bool) {
         events.iter().for_each(|event| self.hear(event));
-        assert_eq!(self.phase, engine.phase(), "a phase that nobody was told of");
+        assert_eq!(self.phase, engine.phase(), "a phase without an event");
         assert_eq!(self.phase, snapshot.phase);
-        assert_eq!(self.refused, snapshot.rejected, "a refusal that nobody was told of");
+        assert_eq!(self.refused, snapshot.rejected, "a rejection without an event");
         self.look_at_stop(snapshot, has_acted);
         if has_acted {
             self.look_at_set_points(engine);
@@ -89,7 +89,7 @@ impl Watch {
             }
             EventKind::Stop(stop) => {
                 assert_eq!(stop.phase, self.phase, "{stop:?}");
-                self.told = Some(stop);
+                self.reported = Some(stop);
             }
             EventKind::Rejected(rejected) => self.hear_rejection(&rejected),
             _ => {}
@@ -116,9 +116,12 @@ impl Watch {
             assert!(!is_on_way, "{:?} in spite of {stop:?}", self.phase);
         }
         if let Some(stop) = snapshot.stop {
-            let told = self.told.expect("nobody was told of the stop");
-            assert_eq!((told.rule(), told.origin, told.slot), (stop.rule(), stop.origin, stop.slot));
-            assert!(stop.category <= told.category, "{stop:?} was {told:?}");
+            let reported = self.reported.expect("a stop without an event");
+            assert_eq!(
+                (reported.rule(), reported.origin, reported.slot),
+                (stop.rule(), stop.origin, stop.slot)
+            );
+            assert!(stop.category <= reported.category, "{stop:?} was {reported:?}");
         }
         if self.phase == Phase::Stopping {
             assert!(snapshot.stop.is_some(), "a stop without a reason");

@@ -1,10 +1,10 @@
-//! Random problems from a fixed seed, in the distribution of Ruckig's own benchmark.
+//! Random problems from a fixed seed, with the distribution of Ruckig's own benchmark.
 
 pub mod rsruckig;
 
 use takt_rt::plan::{Limits, PlanOptions, Problem, Profile, State, synchronised};
 
-/// Which derivative is limited.
+/// The highest derivative that is limited.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Order {
     /// Acceleration.
@@ -45,7 +45,7 @@ pub fn problems(seed: u64, axes: usize, order: Order) -> Vec<Problem> {
     (0..axes).map(|_| problem(&mut random, order)).collect()
 }
 
-/// From the state at this part of the time of each motion, to the same target: what a controller does that plans anew.
+/// Problems from the state at this part of the duration of each motion to the same target, as when a controller plans again.
 pub fn planned_anew(seed: u64, axes: usize, part: f64) -> Vec<Problem> {
     let mut set = problems(seed, axes, Order::Third);
     let mut profiles = vec![Profile::hold(0.0); axes];

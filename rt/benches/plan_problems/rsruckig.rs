@@ -1,9 +1,9 @@
-//! The problems as `rsruckig` takes them.
+//! Converts the problems to the input of `rsruckig`.
 
 use rsruckig::prelude::{ControlInterface, DataArrayOrVec, InputParameter};
 use takt_rt::plan::Problem;
 
-/// The same problem for `rsruckig`, of the velocity interface if `velocity`.
+/// The same problem for `rsruckig`; with `velocity`, for its velocity interface.
 pub fn input<const AXES: usize>(problems: &[Problem], velocity: bool) -> InputParameter<AXES> {
     let all = |of: fn(&Problem) -> f64| {
         let mut values = DataArrayOrVec::<f64, AXES>::new(None, 0.0);

@@ -1,9 +1,9 @@
 //! One trajectory time for axes on buses with different cycles.
 //!
-//! A set-point leaves in a cycle of its bus, is latched at the SYNC after it, and reached one cycle of that bus later:
-//! the joint is where the trajectory was two bus cycles ago. On a slower bus that is longer ago, so that a joint there
-//! would be behind the others on the common path. The set-points of the faster buses wait for the difference; to send
-//! those of the slower one ahead of their time would need a future that a stream does not have.
+//! A set-point leaves in a cycle of its bus, is latched at the next SYNC, and is reached one cycle of that bus later: the
+//! joint is where the trajectory was two bus cycles ago. On a slower bus that is longer ago, so a joint there would be behind
+//! the others on the common path. The set-points of the faster buses therefore wait for the difference. Those of the slower
+//! bus cannot be sent earlier instead: a stream has no future.
 
 use crate::plan::State;
 
@@ -30,7 +30,7 @@ impl SetPointDelay {
         self.cycles = (cycles as usize).min(LENGTH - 1);
     }
 
-    /// As if the axis had always been there. As many places as set-points wait: this is done in every cycle of an axis
+    /// As if the axis had always been there. Only the places in use are written, since this is done in every cycle of an axis
     /// that is not enabled.
     pub fn fill(&mut self, state: State) {
         self.newest = self.cycles;

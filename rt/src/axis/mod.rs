@@ -1,6 +1,7 @@
 //! One axis: what its drive reported, where it is to be, and the numbers that go onto the wire.
 //!
 //! The parts of an [`Axis`], a file each: `set_points` and `delay` (where it is to be, and the guard),
+//! `stream` (the set-points of a stream),
 //! `profile_mode` (targets instead of set-points), `joint` and `plausibility` (where the joint is), `reception` and
 //! `late_reply` (which feedback has arrived, and in time), `drive_report` (state and errors), `power`, `controlword`,
 //! `sdo_fallback` (the controlword when process data do not arrive), `command` (the frames), `rest` (has the joint stopped).
@@ -33,6 +34,7 @@ mod reception;
 mod rest;
 mod sdo_fallback;
 mod set_points;
+mod stream;
 
 use arrayvec::ArrayVec;
 
@@ -51,9 +53,12 @@ use profile_mode::ProfileMode;
 use reception::Reception;
 use sdo_fallback::SdoFallback;
 use set_points::SetPoints;
+use stream::StreamFollower;
 
 pub use feedback::Jump;
-pub use parameters::{AxisParameters, CommandPdo, FeedbackSince, MAX_PDOS, Pdo, TransmissionType};
+pub use parameters::{
+    AxisParameters, AxisParametersError, CommandPdo, FeedbackSince, MAX_PDOS, Pdo, TransmissionType,
+};
 
 /// Cycles of its bus after which a drive has obeyed a controlword and has said so.
 const SETTLED_CYCLES: u32 = 4;
@@ -66,6 +71,7 @@ pub struct Axis {
     command: ProcessImage,
     feedback: ProcessImage,
     set_points: SetPoints,
+    stream: StreamFollower,
     profile: ProfileMode,
     joint: JointEstimate,
     following: FollowingErrorGuard,
@@ -94,6 +100,7 @@ impl Axis {
             command,
             feedback: ProcessImage::default(),
             set_points: SetPoints::default(),
+            stream: StreamFollower::default(),
             profile: ProfileMode::default(),
             joint: JointEstimate::default(),
             following,

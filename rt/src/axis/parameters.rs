@@ -2,10 +2,10 @@
 
 use arrayvec::ArrayVec;
 
-use crate::control::ControlLaw;
+use crate::control::{ControlLaw, GainError};
 use crate::dialect::Dialect;
 use crate::frame::Id;
-use crate::guard::{AxisLimits, OnViolation};
+use crate::guard::{AxisLimits, LimitError, OnViolation};
 use crate::pdo::Mapping;
 use crate::units::Scale;
 
@@ -65,7 +65,7 @@ pub enum FeedbackSince {
 pub struct AxisParameters {
     /// The bus, an index into the engine's buses.
     pub bus: u8,
-    /// The node number.
+    /// The node ID, 1 to 127.
     pub node: u8,
     /// What is sent, in order.
     pub commands: ArrayVec<CommandPdo, MAX_PDOS>,
@@ -98,4 +98,154 @@ pub struct AxisParameters {
     pub following_error_cycles: u32,
     /// Cycles of the bus in a row without feedback that are bridged.
     pub missed_feedback_cycles: u16,
+}
+
+/// The node IDs of CANopen (CiA 301, 7.3.2): 0 is for all nodes, and more than 7 bits do not fit into an identifier.
+const NODE_IDS: core::ops::RangeInclusive<u8> = 1..=127;
+
+/// Why an axis cannot be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum AxisParametersError {
+    /// The node ID is not one from 1 to 127.
+    NodeId {
+        /// What it is.
+        node: u8,
+    },
+    /// There is no PDO in one of the directions.
+    NoPdo,
+    /// A limit is not a number that can be kept.
+    Limit(LimitError),
+    /// A gain is not a number that can be used.
+    Gain(GainError),
+    /// The limit of the following error is not a positive number.
+    FollowingErrorLimit {
+        /// What it is.
+        value: f64,
+    },
+    /// The distance from the joint at which a stream may begin is negative or no number.
+    StartTolerance {
+        /// What it is.
+        value: f64,
+    },
+}
+
+impl core::error::Error for AxisParametersError {}
+
+impl core::fmt::Display for AxisParametersError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::NodeId { node } => write!(f, "{node} is no node ID: those are 1 to 127"),
+            Self::NoPdo => f.write_str("there must be a PDO to the drive and one from it"),
+            Self::Limit(error) => error.fmt(f),
+            Self::Gain(error) => error.fmt(f),
+            Self::FollowingErrorLimit { value } => {
+                write!(f, "the limit of the following error must be a positive number: {value}")
+            }
+            Self::StartTolerance { value } => {
+                write!(f, "the tolerance of a stream's start must not be negative: {value}")
+            }
+        }
+    }
+}
+
+impl AxisParameters {
+    /// Checks everything that an axis relies on. A [`Scale`] and a [`Mapping`] are checked when they are made.
+    pub fn validate(&self) -> Result<(), AxisParametersError> {
+        if !NODE_IDS.contains(&self.node) {
+            return Err(AxisParametersError::NodeId { node: self.node });
+        }
+        if self.commands.is_empty() || self.feedback.is_empty() {
+            return Err(AxisParametersError::NoPdo);
+        }
+        self.limits.validate().map_err(AxisParametersError::Limit)?;
+        self.law.validate().map_err(AxisParametersError::Gain)?;
+        let value = self.following_error_limit;
+        // An infinite one is no limit, which is allowed; what is no number would be none unseen.
+        if value.is_nan() || value <= 0.0 {
+            return Err(AxisParametersError::FollowingErrorLimit { value });
+        }
+        let value = self.start_tolerance;
+        if value.is_nan() || value < 0.0 {
+            return Err(AxisParametersError::StartTolerance { value });
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pdo::MappedObject;
+    use crate::units::ScaleParameters;
+    use core::f64::consts::TAU;
+
+    fn parameters() -> AxisParameters {
+        let pdo = |id, objects: &[MappedObject], compile: fn(&[MappedObject]) -> Result<Mapping, _>| Pdo {
+            id,
+            mapping: compile(objects).unwrap(),
+        };
+        let command = pdo(Id::canopen(0x200, 5), &[MappedObject::new(0x6040, 0, 16)], Mapping::commands);
+        let feedback = pdo(Id::canopen(0x180, 5), &[MappedObject::new(0x6041, 0, 16)], Mapping::feedback);
+        AxisParameters {
+            bus: 0,
+            node: 5,
+            commands: [CommandPdo::every_cycle(command)].into_iter().collect(),
+            feedback: [feedback].into_iter().collect(),
+            feedback_since: FeedbackSince::Sync,
+            unused: ArrayVec::new(),
+            dialect: Dialect::Cia402,
+            controlword_spacing_cycles: 0,
+            law: ControlLaw::Position,
+            scale: Scale::new(ScaleParameters {
+                counts_per_turn: 524_288.0,
+                velocity_units_per_turn: 524_288.0,
+                gear_ratio: 1.0,
+                travel_per_turn: TAU,
+                reversed: false,
+                zero_counts: 0.0,
+                rated_torque: 31.0,
+            })
+            .unwrap(),
+            limits: AxisLimits {
+                position_min: -3.0,
+                position_max: 3.0,
+                velocity: 2.0,
+                acceleration: 10.0,
+                deceleration: 10.0,
+                jerk: f64::INFINITY,
+                torque: 40.0,
+            },
+            start_tolerance: 0.01,
+            on_violation: OnViolation::Reject,
+            heartbeat_timeout_cycles: None,
+            following_error_limit: 0.1,
+            following_error_cycles: 10,
+            missed_feedback_cycles: 3,
+        }
+    }
+
+    fn error_of(change: impl Fn(&mut AxisParameters)) -> AxisParametersError {
+        let mut changed = parameters();
+        change(&mut changed);
+        changed.validate().unwrap_err()
+    }
+
+    #[test]
+    fn what_an_axis_relies_on_is_checked_and_named() {
+        assert_eq!(parameters().validate(), Ok(()));
+        for node in [0, 128, 129, 255] {
+            assert_eq!(error_of(|axis| axis.node = node), AxisParametersError::NodeId { node });
+        }
+        assert_eq!(error_of(|axis| axis.feedback.clear()), AxisParametersError::NoPdo);
+        let error = error_of(|axis| axis.limits.velocity = -1.0);
+        assert_eq!(error, AxisParametersError::Limit(LimitError::Velocity { value: -1.0 }));
+        let error = error_of(|axis| axis.law = ControlLaw::Velocity { position_gain: f64::INFINITY });
+        assert!(matches!(error, AxisParametersError::Gain(_)));
+        for bad in [f64::NAN, 0.0, -0.1] {
+            let error = error_of(|axis| axis.following_error_limit = bad);
+            assert!(matches!(error, AxisParametersError::FollowingErrorLimit { .. }));
+        }
+        let error = error_of(|axis| axis.start_tolerance = f64::NAN);
+        assert!(matches!(error, AxisParametersError::StartTolerance { .. }));
+    }
 }

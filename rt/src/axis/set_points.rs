@@ -92,9 +92,14 @@ impl Axis {
         if self.is_profile() {
             return;
         }
+        self.set_points.refine_newest(self.state_by_steps(period_s));
+    }
+
+    /// The state of the newest set-point, as the steps to it show it.
+    pub(super) fn state_by_steps(&self, period_s: f64) -> State {
         let [newest, last, before] = self.set_points.positions();
         let steps = SetPointSteps { sent: [last, before, before], next: newest, period_s };
-        self.set_points.refine_newest(steps.state(&self.parameters.limits));
+        steps.state(&self.parameters.limits)
     }
 
     /// Makes the actual position the set-point, as if it had always been: for an axis whose drive has been sent none.
@@ -145,17 +150,16 @@ impl Axis {
         guard::check(&self.parameters.limits, period_s, before_last, last, next)
     }
 
-    /// Checks the next set-point of a stream, beyond [`Axis::check`]. After a command that did not come and was bridged the
-    /// jerk is not the stream's own, and is not judged.
-    pub fn check_stream(&self, next: &State, period_s: f64, is_bridged: bool) -> Result<(), Violation> {
+    /// Checks the next set-point of a stream, beyond [`Axis::check`].
+    pub fn check_stream(&self, next: &State, period_s: f64) -> Result<(), Violation> {
         let limits = &self.parameters.limits;
-        let jerk = if is_bridged { f64::INFINITY } else { limits.jerk };
-        guard::check_jerk(jerk, &self.steps(next, period_s))?;
+        guard::check_jerk(limits.jerk, &self.steps(next, period_s))?;
         guard::check_braking(limits, &self.steps(next, period_s))
     }
 
     /// The set-point within the limits that is nearest to one of a stream.
-    pub fn clamped(&self, next: &State, period_s: f64) -> State {
+    pub fn clamped(&mut self, next: &State, period_s: f64) -> State {
+        self.follow_commands();
         guard::clamp(&self.parameters.limits, &self.steps(next, period_s))
     }
 
@@ -175,30 +179,6 @@ impl Axis {
             velocity: within(next.velocity, step - room, step + room),
             acceleration: within(next.acceleration, -most, most),
         }
-    }
-
-    /// What takes the place of the next command of a stream when it does not come in time: for one cycle the motion goes on as
-    /// it did, with its acceleration, so that the one after it fits in; from then on at its velocity. What the stream says of
-    /// itself counts if its steps agree; of one that says nothing they are all that is known.
-    pub fn extrapolated(&self, command: &State, period_s: f64) -> State {
-        let limits = &self.parameters.limits;
-        let most = limits.acceleration.max(limits.deceleration);
-        let [newest, last, before] = self.set_points.positions();
-        let (step, step_before) = ((newest - last) / period_s, (last - before) / period_s);
-        let says_something = command.velocity != 0.0 || command.acceleration != 0.0;
-        let is_said = says_something && (command.velocity - step).abs() <= most * period_s;
-        let (velocity, change) = if is_said {
-            (command.velocity, command.acceleration * period_s)
-        } else {
-            (step, step - step_before)
-        };
-        let end = velocity + change.max(-most * period_s).min(most * period_s);
-        // It neither turns round nor leaves the limits by itself.
-        let is_turned = end * velocity < 0.0;
-        let end = if is_turned { 0.0 } else { end.max(-limits.velocity).min(limits.velocity) };
-        // What it says is its velocity at the end of a step, and what the steps show is that of their middle.
-        let mean = if is_said { (velocity + end) / 2.0 } else { end };
-        State { position: command.position + mean * period_s, velocity: end, acceleration: 0.0 }
     }
 
     fn steps(&self, next: &State, period_s: f64) -> SetPointSteps {

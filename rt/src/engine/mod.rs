@@ -162,7 +162,7 @@ pub enum Deadline {
 ///     not_transmitted_cycles: 5,
 ///     acknowledge_timeout_cycles: 500,
 ///     categories: StopCategories::default(),
-///     timing: TimingLadder { warning: 10, degraded: 50, unfit: 250, leak_cycles: 20 },
+///     timing: TimingLadder { warning: 10, degraded: 50, unfit: 250, leak_slots: 20 },
 /// })
 /// .unwrap();
 ///

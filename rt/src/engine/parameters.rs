@@ -3,7 +3,7 @@
 use arrayvec::ArrayVec;
 
 use super::SEND_BATCH;
-use crate::axis::{Axis, AxisParameters};
+use crate::axis::{Axis, AxisParameters, AxisParametersError};
 use crate::dispatch::{Dispatch, IdTaken};
 use crate::frame::Id;
 use crate::record::{MAX_AXES, MAX_BUSES};
@@ -83,29 +83,24 @@ pub enum SetUpError {
         /// The axis.
         axis: usize,
     },
-    /// A node ID is not 1 to 127, or is that of another node on the same bus.
-    NodeId {
-        /// The axis; `None` for the controller.
-        axis: Option<usize>,
+    /// An axis cannot be set up.
+    Axis {
+        /// The axis.
+        axis: usize,
+        /// The reason.
+        error: AxisParametersError,
+    },
+    /// The node ID of the controller is not 1 to 127.
+    MasterNodeId {
         /// The node ID.
         node: u8,
     },
-    /// An axis has no PDO in one of the directions.
-    NoPdo {
-        /// The axis.
+    /// Two nodes have one node ID: two axes of a bus, or an axis and the controller.
+    DuplicateNodeId {
+        /// The axis that came second, or that has the node ID of the controller.
         axis: usize,
-    },
-    /// A limit of an axis is not a number that can be kept.
-    ImpossibleLimits {
-        /// The axis.
-        axis: usize,
-    },
-    /// A tolerance of an axis, or a gain of its control law, is not a number that can be used: negative, infinite or none.
-    ImpossibleNumber {
-        /// The axis.
-        axis: usize,
-        /// The number.
-        value: f64,
+        /// The node ID.
+        node: u8,
     },
     /// A number of cycles is zero where at least one must pass.
     NoCycles {
@@ -160,16 +155,12 @@ impl core::fmt::Display for SetUpError {
                 write!(f, "bus {bus}: a cycle of {divider} slots is not possible (1 to 32)")
             }
             Self::UnknownBus { axis } => write!(f, "axis {axis} names a bus that does not exist"),
-            Self::NodeId { axis: Some(axis), node } => {
-                write!(f, "axis {axis}: node ID {node} is not possible (1 to 127, one node each)")
+            Self::Axis { axis, error } => write!(f, "axis {axis}: {error}"),
+            Self::MasterNodeId { node } => {
+                write!(f, "{node} is not a node ID for the controller: 1 to 127 are")
             }
-            Self::NodeId { axis: None, node } => {
-                write!(f, "the controller: node ID {node} is not possible (1 to 127, one node each)")
-            }
-            Self::NoPdo { axis } => write!(f, "axis {axis} has no PDO in one of the directions"),
-            Self::ImpossibleLimits { axis } => write!(f, "axis {axis}: its limits cannot be kept"),
-            Self::ImpossibleNumber { axis, value } => {
-                write!(f, "axis {axis}: {value} is not possible as a tolerance or a gain")
+            Self::DuplicateNodeId { axis, node } => {
+                write!(f, "axis {axis}: another node has its node ID, {node}")
             }
             Self::NoCycles { of } => write!(f, "at least one cycle must pass ({of:?})"),
             Self::IdTaken { axis, id } => write!(f, "axis {axis}: identifier {id:?} is in use already"),
@@ -204,9 +195,11 @@ impl<const AXES: usize, const BUSES: usize> EngineParameters<AXES, BUSES> {
             self.validate_axis(axis, own)?;
         }
         if let Some(node) = self.heartbeat.map(|heartbeat| heartbeat.node) {
-            let is_taken = self.axes.iter().any(|axis| axis.node == node);
-            if is_taken || !is_node_id(node) {
-                return Err(SetUpError::NodeId { axis: None, node });
+            if !(1..=127).contains(&node) {
+                return Err(SetUpError::MasterNodeId { node });
+            }
+            if let Some(axis) = self.axes.iter().position(|axis| axis.node == node) {
+                return Err(SetUpError::DuplicateNodeId { axis, node });
             }
         }
         for (bus, own) in self.buses.iter().enumerate() {
@@ -246,27 +239,13 @@ impl<const AXES: usize, const BUSES: usize> EngineParameters<AXES, BUSES> {
         if usize::from(own.bus) >= self.buses.len() {
             return Err(SetUpError::UnknownBus { axis });
         }
-        let is_taken =
-            self.axes.iter().take(axis).any(|other| (other.bus, other.node) == (own.bus, own.node));
-        if is_taken || !is_node_id(own.node) {
-            return Err(SetUpError::NodeId { axis: Some(axis), node: own.node });
+        own.validate().map_err(|error| SetUpError::Axis { axis, error })?;
+        let mut before = self.axes.iter().take(axis);
+        if before.any(|other| (other.bus, other.node) == (own.bus, own.node)) {
+            return Err(SetUpError::DuplicateNodeId { axis, node: own.node });
         }
-        if own.commands.is_empty() || own.feedback.is_empty() {
-            return Err(SetUpError::NoPdo { axis });
-        }
-        if !own.limits.are_possible() {
-            return Err(SetUpError::ImpossibleLimits { axis });
-        }
-        let numbers = [own.following_error_limit, own.start_tolerance].into_iter().chain(own.law.gains());
-        match numbers.into_iter().find(|value| !(value.is_finite() && *value >= 0.0)) {
-            Some(value) => Err(SetUpError::ImpossibleNumber { axis, value }),
-            None => Ok(()),
-        }
+        Ok(())
     }
-}
-
-const fn is_node_id(node: u8) -> bool {
-    1 <= node && node <= 127
 }
 
 /// The axes. The set-points of those on faster buses wait for those on the slowest: a joint is where the trajectory was two

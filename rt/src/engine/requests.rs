@@ -151,6 +151,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
             return Err(RejectReason::MissedSlots { missed, limit: self.slots.degraded() }.into());
         }
         self.stop = None;
+        self.axes.iter_mut().for_each(Axis::begin_stream);
         self.enter(GroupState::Streaming(Stream::Awaited));
         Ok(())
     }

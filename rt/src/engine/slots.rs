@@ -36,7 +36,7 @@ impl SlotWatch {
         let elapsed = self.present.map_or(1, |last| slot.saturating_sub(last));
         self.present = Some(slot);
         let was_late = self.late_cycles > 0;
-        self.bucket.take(elapsed.saturating_sub(1) + u64::from(was_late), self.ladder.leak_cycles);
+        self.bucket.take(elapsed.saturating_sub(1) + u64::from(was_late), self.ladder.leak_slots);
         self.missed_now = elapsed.saturating_sub(1);
         self.missed += self.missed_now;
         elapsed

@@ -47,8 +47,10 @@ pub(super) enum Stream<const AXES: usize> {
     Awaited,
     /// The first command has come, and has yet to be checked against where the joints are.
     Begins(StreamCommand<AXES>),
-    /// The newest command, carried on where no newer one has come.
+    /// A command has come, and has yet to be made set-points of.
     Follows(StreamCommand<AXES>),
+    /// No newer command has come than this one: the motion of the stream goes on, up to its expiry.
+    Continues(StreamCommand<AXES>),
 }
 
 /// How the power is taken.

@@ -34,7 +34,7 @@ impl<const AXES: usize> Stream<AXES> {
         *self = match self {
             Self::Awaited if command.valid_until_ns < now_ns => Self::Awaited,
             Self::Awaited | Self::Begins(_) => Self::Begins(command),
-            Self::Follows(_) => Self::Follows(command),
+            Self::Follows(_) | Self::Continues(_) => Self::Follows(command),
         };
     }
 }
@@ -260,16 +260,10 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
     }
 
     fn step_stream(&mut self, stream: Stream<AXES>) -> Result<(), Failure> {
-        let command = match stream {
-            Stream::Awaited => {
-                let (cycles, limit) = (self.state_cycles, self.enable_timeout_cycles);
-                if cycles > limit {
-                    return Err((Origin::Group, Fault::StreamNotBegun { cycles, limit }));
-                }
-                self.hold();
-                return Ok(());
-            }
-            Stream::Begins(command) | Stream::Follows(command) => command,
+        let (command, is_new) = match stream {
+            Stream::Awaited => return self.await_stream(),
+            Stream::Begins(command) | Stream::Follows(command) => (command, true),
+            Stream::Continues(command) => (command, false),
         };
         if self.now_ns > command.valid_until_ns {
             let age_cycles = (self.now_ns - command.valid_until_ns).div_ceil(self.period_ns);
@@ -278,41 +272,44 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         if matches!(stream, Stream::Begins(_)) {
             self.first_violation(&command.set_points, Axis::check_start)?;
         }
-        let next = self.streamed(&command.set_points)?;
+        let next = self.streamed(&command.set_points, is_new)?;
         self.check(&next)?;
         self.take_set_points(&next);
-        // Until the next command comes the present one is carried on, up to its expiry.
-        let mut carried = command;
-        for (axis, point) in self.axes.iter().zip(&mut carried.set_points) {
-            *point = axis.extrapolated(point, self.period_s);
-        }
-        self.state = GroupState::Streaming(Stream::Follows(carried));
+        self.state = GroupState::Streaming(Stream::Continues(command));
         Ok(())
     }
 
-    /// The set-points of a stream as the guard lets them pass.
-    fn streamed(&mut self, wanted: &[State]) -> Result<ArrayVec<State, AXES>, Failure> {
+    fn await_stream(&mut self) -> Result<(), Failure> {
+        let (cycles, limit) = (self.state_cycles, self.enable_timeout_cycles);
+        if cycles > limit {
+            return Err((Origin::Group, Fault::StreamNotBegun { cycles, limit }));
+        }
+        self.hold();
+        self.axes.iter_mut().for_each(Axis::await_stream);
+        Ok(())
+    }
+
+    /// The next set-points of a stream, each within all limits.
+    fn streamed(&mut self, commands: &[State], are_new: bool) -> Result<ArrayVec<State, AXES>, Failure> {
         let period_s = self.period_s;
-        let check = |axis: &Axis, next: &State| {
-            axis.check(next, period_s).and_then(|()| axis.check_stream(next, period_s, false))
-        };
         let mut next: ArrayVec<State, AXES> = ArrayVec::new();
-        for (axis, wanted) in self.axes.iter().zip(wanted) {
-            let is_clamped = axis.parameters().on_violation == OnViolation::Clamp
-                && axis.is_enabled()
-                && !axis.is_profile()
-                && check(axis, wanted).is_err();
-            self.snapshot.clamped += u64::from(is_clamped);
-            next.push(if is_clamped {
-                axis.clamped(wanted, period_s)
-            } else {
-                axis.agreeing(wanted, period_s)
+        for (index, (axis, command)) in self.axes.iter_mut().zip(commands).enumerate() {
+            if !axis.is_enabled() || axis.is_profile() {
+                next.push(*command);
+                continue;
+            }
+            let streamed = axis.streamed(are_new.then_some(command), period_s);
+            next.push(match (streamed, axis.parameters().on_violation) {
+                (Ok(set_point), _) => set_point,
+                (Err(_), OnViolation::Clamp) => {
+                    self.snapshot.clamped += 1;
+                    axis.clamped(command, period_s)
+                }
+                (Err(violation), OnViolation::Reject) => {
+                    return Err((Origin::Axis(index as u8), violation.into()));
+                }
             });
         }
-        self.first_violation(&next, |axis, state| match axis.parameters().on_violation {
-            OnViolation::Reject => check(axis, state),
-            OnViolation::Clamp => Ok(()),
-        })?;
         Ok(next)
     }
 }

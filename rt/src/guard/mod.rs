@@ -1,5 +1,6 @@
-//! The last look at every set-point, whoever made it, before it becomes a frame.
+//! The guard: the last check of every set-point, whatever its source, before it becomes a frame.
 
+mod commands;
 mod following_error;
 #[cfg(test)]
 mod planned;
@@ -9,6 +10,7 @@ mod stream;
 use crate::fault::{Fault, Rule};
 use crate::plan::State;
 
+pub use commands::StreamCommands;
 pub use following_error::FollowingErrorGuard;
 pub use stopping_bound::braking_distance;
 pub use stream::{OnViolation, SetPointSteps, check_braking, check_jerk, clamp};
@@ -32,18 +34,80 @@ pub struct AxisLimits {
     pub torque: f64,
 }
 
+/// A limit that is not a number that can be kept.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum LimitError {
+    /// The range of positions is empty or not finite.
+    PositionRange {
+        /// The lowest position.
+        position_min: f64,
+        /// The highest position.
+        position_max: f64,
+    },
+    /// The velocity is not a positive, finite number.
+    Velocity {
+        /// What it is.
+        value: f64,
+    },
+    /// The acceleration is not a positive, finite number.
+    Acceleration {
+        /// What it is.
+        value: f64,
+    },
+    /// The deceleration is not a positive, finite number.
+    Deceleration {
+        /// What it is.
+        value: f64,
+    },
+    /// The jerk is not a positive number.
+    Jerk {
+        /// What it is.
+        value: f64,
+    },
+    /// The torque is not a positive, finite number.
+    Torque {
+        /// What it is.
+        value: f64,
+    },
+}
+
+impl core::error::Error for LimitError {}
+
+impl core::fmt::Display for LimitError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let (name, value) = match self {
+            Self::PositionRange { position_min, position_max } => {
+                return write!(f, "positions from {position_min} to {position_max} are no range");
+            }
+            Self::Jerk { value } => return write!(f, "the jerk limit must be a positive number: {value}"),
+            Self::Velocity { value } => ("velocity", value),
+            Self::Acceleration { value } => ("acceleration", value),
+            Self::Deceleration { value } => ("deceleration", value),
+            Self::Torque { value } => ("torque", value),
+        };
+        write!(f, "the {name} limit must be a positive, finite number: {value}")
+    }
+}
+
 impl AxisLimits {
-    /// Whether every limit is a number that can be kept.
-    pub fn are_possible(&self) -> bool {
+    /// Checks that every limit is a number that can be kept.
+    pub fn validate(&self) -> Result<(), LimitError> {
         let positive = |value: f64| value > 0.0 && value.is_finite();
-        self.position_min.is_finite()
-            && self.position_max.is_finite()
-            && self.position_min < self.position_max
-            && positive(self.velocity)
-            && positive(self.acceleration)
-            && positive(self.deceleration)
-            && self.jerk > 0.0
-            && positive(self.torque)
+        let (position_min, position_max) = (self.position_min, self.position_max);
+        if !(position_min.is_finite() && position_max.is_finite() && position_min < position_max) {
+            return Err(LimitError::PositionRange { position_min, position_max });
+        }
+        for (value, error) in [
+            (self.velocity, LimitError::Velocity { value: self.velocity }),
+            (self.acceleration, LimitError::Acceleration { value: self.acceleration }),
+            (self.deceleration, LimitError::Deceleration { value: self.deceleration }),
+            (self.torque, LimitError::Torque { value: self.torque }),
+        ] {
+            if !positive(value) {
+                return Err(error);
+            }
+        }
+        if self.jerk > 0.0 { Ok(()) } else { Err(LimitError::Jerk { value: self.jerk }) }
     }
 
     /// How fast the velocity, with its sign, may rise and how fast it may fall when a joint at this velocity is stopped: all

@@ -3,7 +3,7 @@
 use super::AxisLimits;
 use crate::plan::State;
 
-/// What a joint reaches at least towards positive positions, if it is stopped at the limits from now on.
+/// What a joint reaches at least towards positive positions if it is stopped from now on, as fast as the limits allow.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct StoppingBound {
     /// The velocity, with its sign, once an acceleration in this direction has been taken back.

@@ -1,5 +1,5 @@
-//! What a set-point of a stream must keep to beyond [`check`](super::check): its maker is not known, and nobody has
-//! planned how it goes on.
+//! What a set-point of a stream must keep beyond [`check`](super::check): no planner has made it, and how it goes on is not
+//! known.
 
 use super::stopping_bound::StoppingBound;
 use super::{AxisLimits, TOLERANCE, Violation};
@@ -8,19 +8,19 @@ use crate::plan::State;
 
 /// By how much a position may be off, relative to it or to 1 rad: whoever samples a trajectory adds up times and evaluates
 /// polynomials, each with a rounding. The third difference divides what comes of it by the cube of the period.
-const ROUNDINGS: f64 = 64.0;
+pub(super) const ROUNDINGS: f64 = 64.0;
 
 /// Relative to the limits that a stop must be able to keep: half of what [`check`](super::check) allows, so that every step of
 /// the stop passes it.
 const BRAKING_TOLERANCE: f64 = TOLERANCE / 2.0;
 
-/// What is done with a set-point of a stream that breaks a limit.
+/// What is done with a command of a stream that breaks a limit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum OnViolation {
     /// The group stops.
     #[default]
     Reject,
-    /// The nearest set-point within the limits takes its place, and is counted.
+    /// A set-point within the limits, on the way to the command, takes its place and is counted.
     Clamp,
 }
 
@@ -82,18 +82,18 @@ impl SetPointSteps {
 
     /// The state at the end of the next step, as the steps show it, for a stop that begins there. They leave open what the
     /// acceleration has become since the beginning of the step: it counts as unchanged, unless only a joint that has been
-    /// braked since can be stopped within the limits. Whatever is planned from there goes on with these steps without a leap
+    /// braked since can be stopped within the limits. Whatever is planned from there goes on with these steps without a jump
     /// of the acceleration; one beyond the limit of its direction is for the planner to take back.
     pub fn state(&self, limits: &AxisLimits) -> State {
         let even = self.even_end();
-        let too_far = Direction::both(self, limits).find(|way| {
-            let state = if way.sign < 0.0 { mirrored(&even) } else { even };
-            !way.is_kept(&StoppingBound::of(&state, limits))
+        let too_far = Direction::both(self, limits).find(|direction| {
+            let state = if direction.sign < 0.0 { mirrored(&even) } else { even };
+            !direction.is_kept(&StoppingBound::of(&state, limits))
         });
         match too_far {
             None => even,
-            Some(way) if way.sign < 0.0 => mirrored(&way.steps.braked_end(limits)),
-            Some(way) => way.steps.braked_end(limits),
+            Some(direction) if direction.sign < 0.0 => mirrored(&direction.steps.braked_end(limits)),
+            Some(direction) => direction.steps.braked_end(limits),
         }
     }
 
@@ -116,7 +116,7 @@ fn mirrored(state: &State) -> State {
     State { position: -state.position, velocity: -state.velocity, acceleration: -state.acceleration }
 }
 
-/// A steps seen in one of the two directions, which is positive here.
+/// The steps as seen in one of the two directions, which is positive here.
 struct Direction<'a> {
     steps: SetPointSteps,
     sign: f64,

@@ -1,10 +1,10 @@
-//! The kernel's monotonic clock.
+//! The monotonic clock of the kernel.
 
 use crate::port::{Clock, Wake};
 use crate::time::{NANOSECONDS_PER_SECOND, Nanoseconds};
 
-/// `CLOCK_MONOTONIC`, waited on by an absolute sleep (`clock_nanosleep` with `TIMER_ABSTIME`), so that being interrupted
-/// between reading the clock and going to sleep delays nothing.
+/// `CLOCK_MONOTONIC` with absolute sleeps (`clock_nanosleep` with `TIMER_ABSTIME`). The thread can be interrupted between reading
+/// the clock and going to sleep: an absolute sleep still ends on time.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct MonotonicClock {}
 
@@ -19,7 +19,7 @@ impl Clock for MonotonicClock {
             return Wake { now_ns, timer_latency_ns: 0 };
         }
         sleep_until(deadline_ns);
-        // Should the kernel refuse to sleep, the time is waited for all the same.
+        // If the kernel refuses to sleep, the wait goes on as a spin.
         let mut now_ns = monotonic_ns();
         while now_ns < deadline_ns {
             core::hint::spin_loop();
@@ -29,12 +29,12 @@ impl Clock for MonotonicClock {
     }
 }
 
-/// Reads the clock; through the vDSO, so it costs no system call.
+/// Reads the clock. The vDSO does it without a system call.
 pub(super) fn monotonic_ns() -> Nanoseconds {
     read_clock(libc::CLOCK_MONOTONIC)
 }
 
-/// The time of day, which may be set while the program runs.
+/// The time of day. Somebody can set it while the program runs.
 pub(super) fn real_time_ns() -> Nanoseconds {
     read_clock(libc::CLOCK_REALTIME)
 }
@@ -42,19 +42,19 @@ pub(super) fn real_time_ns() -> Nanoseconds {
 /// Reads a clock of the kernel.
 fn read_clock(clock: libc::clockid_t) -> Nanoseconds {
     let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
-    // SAFETY: `time` is valid for writing; the call fails only for a clock that does not exist.
+    // SAFETY: `time` is valid for writing. The call fails only for a clock that does not exist.
     unsafe { libc::clock_gettime(clock, &mut time) };
     nanoseconds_of(&time)
 }
 
-/// A kernel time as nanoseconds; what lies before zero is zero.
+/// A time of the kernel in nanoseconds. A negative time becomes zero.
 pub(super) fn nanoseconds_of(time: &libc::timespec) -> Nanoseconds {
     let seconds = u64::try_from(time.tv_sec).unwrap_or(0);
     let nanoseconds = u64::try_from(time.tv_nsec).unwrap_or(0);
     seconds.saturating_mul(NANOSECONDS_PER_SECOND).saturating_add(nanoseconds)
 }
 
-/// Nanoseconds as a kernel time.
+/// Nanoseconds as a time of the kernel.
 pub(super) fn timespec_of(time_ns: Nanoseconds) -> libc::timespec {
     libc::timespec {
         tv_sec: libc::time_t::try_from(time_ns / NANOSECONDS_PER_SECOND).unwrap_or(libc::time_t::MAX),
@@ -62,11 +62,11 @@ pub(super) fn timespec_of(time_ns: Nanoseconds) -> libc::timespec {
     }
 }
 
-/// Sleeps until the clock reads `deadline_ns`; a signal handled meanwhile does not end the sleep.
+/// Sleeps until the clock reads `deadline_ns`. A signal that is handled meanwhile does not end the sleep.
 fn sleep_until(deadline_ns: Nanoseconds) {
     let time = timespec_of(deadline_ns);
-    // SAFETY: `time` is a valid time for reading; an absolute sleep writes no remainder, so null is allowed.
-    // The loop ends: the time is absolute, and every other error is returned without sleeping (the caller spins).
+    // SAFETY: `time` is valid for reading. An absolute sleep writes no remainder, so null is allowed.
+    // The loop ends with the time, which is absolute. Any other error ends it at once, and the caller spins.
     while unsafe {
         libc::clock_nanosleep(libc::CLOCK_MONOTONIC, libc::TIMER_ABSTIME, &time, core::ptr::null_mut())
     } == libc::EINTR

@@ -14,16 +14,17 @@ pub fn is_preempt_rt() -> bool {
     is_preempt_rt_version(version)
 }
 
-/// Whether a kernel's version string (`uname -v`) names PREEMPT_RT. It is the one sign that every such kernel
-/// gives: `/sys/kernel/realtime` came with patches that not all of them carry, and patched kernels before 5.3
-/// wrote the two words apart. PREEMPT_DYNAMIC and plain PREEMPT are something else.
+/// Whether the version string of a kernel (`uname -v`) names PREEMPT_RT.
+///
+/// Every such kernel has it in its version; not every one has `/sys/kernel/realtime`. Patched kernels before 5.3 wrote
+/// "PREEMPT RT" in two words. PREEMPT_DYNAMIC and plain PREEMPT are other preemption models.
 pub fn is_preempt_rt_version(version: &[u8]) -> bool {
     let text = version.split(|byte| *byte == 0).next().unwrap_or_default();
     text.split(|byte| *byte == b' ').any(|word| word == b"PREEMPT_RT")
         || text.windows(PATCHED.len()).any(|window| window == PATCHED)
 }
 
-/// How kernels with the patch before 5.3 wrote it.
+/// The spelling of patched kernels before 5.3.
 const PATCHED: &[u8] = b" PREEMPT RT ";
 
 #[cfg(test)]

@@ -1,18 +1,18 @@
-//! Memory that is there when the loop touches it.
+//! Memory without page faults: locked pages and a stack that was touched in advance.
 
 use super::step::Outcome;
 
-/// The most stack that is touched in advance.
+/// The most stack that is touched in advance, in bytes.
 pub const PREFAULT_LIMIT_BYTES: usize = 256 * 1024;
 
 const PAGE_BYTES: usize = 4096;
 
-/// Locks every page of the process in memory, present and future.
+/// Locks all present and future pages of the process in memory.
 ///
-/// Under a finite `RLIMIT_MEMLOCK` without `CAP_IPC_LOCK` a later mapping beyond the limit fails, in any thread:
-/// what the process needs is mapped before.
+/// With a finite `RLIMIT_MEMLOCK` and without `CAP_IPC_LOCK`, a later mapping beyond the limit fails, in any thread. So map
+/// all memory that the process needs before this call.
 pub(super) fn lock_all() -> Outcome {
-    // SAFETY: takes flags only.
+    // SAFETY: the call takes flags only.
     Outcome::of(unsafe { libc::mlockall(libc::MCL_CURRENT | libc::MCL_FUTURE) })
 }
 
@@ -23,8 +23,8 @@ pub(super) fn prefault_stack(bytes: usize) -> usize {
     bytes
 }
 
-/// Writes one page of stack and goes on below it. The page is used again after the inner call, so that the
-/// recursion cannot become a loop over one and the same page.
+/// Writes one page of the stack and continues below it. The page is used again after the inner call. Otherwise the compiler could
+/// turn the recursion into a loop over a single page.
 #[inline(never)]
 fn touch_pages(count: usize) {
     if count == 0 {
@@ -39,18 +39,18 @@ fn touch_pages(count: usize) {
 /// Page faults of the calling thread (getrusage(2)).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PageFaults {
-    /// Served from memory: a page was mapped or copied.
+    /// Faults served from memory: a page was mapped or copied.
     pub minor: u64,
-    /// Served from a disk.
+    /// Faults served from a disk.
     pub major: u64,
 }
 
 impl PageFaults {
-    /// Those of the calling thread since it began.
+    /// The page faults of the calling thread since its start.
     pub fn of_this_thread() -> Self {
         // SAFETY: all-zero bytes are a valid `rusage`.
         let mut usage: libc::rusage = unsafe { core::mem::zeroed() };
-        // SAFETY: `usage` is valid for writing; the call fails only for an unknown `who`.
+        // SAFETY: `usage` is valid for writing. The call fails only for an unknown `who`.
         unsafe { libc::getrusage(libc::RUSAGE_THREAD, &mut usage) };
         Self {
             minor: u64::try_from(usage.ru_minflt).unwrap_or(0),
@@ -58,7 +58,7 @@ impl PageFaults {
         }
     }
 
-    /// Those that came after `earlier`.
+    /// The page faults after `earlier`.
     pub const fn since(self, earlier: Self) -> Self {
         Self {
             minor: self.minor.saturating_sub(earlier.minor),

@@ -1,12 +1,12 @@
 //! Linux: the only part of this crate that touches the operating system.
 //!
-//! - [`MonotonicClock`]: absolute sleep; [`PacedClock`]: the same and a spin, for the loop; [`SpinGuard`] computes how
-//!   long the spin must be.
-//! - [`RealtimeThread`]: elevates the calling thread step by step and keeps what came of each step.
-//! - [`SocketCanPort`]: a raw CAN socket as a bus port.
+//! - [`MonotonicClock`] sleeps until an absolute time. [`PacedClock`] does the same and spins for the rest; the loop uses it.
+//!   [`SpinGuard`] computes how long the spin must be.
+//! - [`RealtimeThread`] makes the calling thread a real-time thread, step by step, and keeps the outcome of each step.
+//! - [`SocketCanPort`] is a raw CAN socket as a bus port.
 //!
-//! Nothing here formats, allocates or decides: refusals are plain data, and the user's side puts them in words.
-#![allow(unsafe_code)] // System calls cannot be made without it; every one says why it is sound.
+//! The real-time path formats nothing and allocates nothing. Failures are plain data; their texts are made elsewhere.
+#![allow(unsafe_code)] // System calls need it. Every unsafe block says why it is sound.
 
 mod can;
 mod clock;
@@ -20,7 +20,7 @@ mod spin_guard;
 mod step;
 mod thread;
 
-pub use can::SocketCanPort;
+pub use can::{DescriptorError, SocketCanPort};
 pub use clock::MonotonicClock;
 pub use kernel::{is_preempt_rt, is_preempt_rt_version};
 pub use memory::{PREFAULT_LIMIT_BYTES, PageFaults};
@@ -30,8 +30,8 @@ pub use spin_guard::SpinGuard;
 pub use step::{Outcome, STEP_COUNT, Step, StepResult};
 pub use thread::{RealtimeThread, ThreadConfig, ThreadReport};
 
-/// The error number of the system call that has just failed.
+/// The error number of the system call that has just failed (errno(3)).
 fn errno() -> i32 {
-    // SAFETY: the location is this thread's own and always valid.
+    // SAFETY: the location belongs to this thread and is always valid.
     unsafe { *libc::__errno_location() }
 }

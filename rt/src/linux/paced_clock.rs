@@ -1,4 +1,4 @@
-//! The clock of the loop: when a frame must leave on time, it is ready before.
+//! The clock of the loop. Where a frame must leave on time, it wakes early and spins for the rest.
 
 use super::clock::{MonotonicClock, monotonic_ns};
 use super::kernel::is_preempt_rt;
@@ -7,15 +7,15 @@ use super::spin_guard::SpinGuard;
 use crate::port::{Clock, Wake};
 use crate::time::Nanoseconds;
 
-/// `CLOCK_MONOTONIC`, waited on by an absolute sleep; where a frame must leave on time
-/// ([`Clock::wait_to_send`]) the sleep ends the guard time earlier, and the rest is a spin.
+/// `CLOCK_MONOTONIC` with absolute sleeps. Where a frame must leave on time ([`Clock::wait_to_send`]), the sleep ends earlier by
+/// the guard time, and the thread spins for the rest.
 ///
-/// A thread woken by the timer is late by the kernel's latency. On a PREEMPT_RT kernel it may then have to wait for the
-/// locks that sending takes; that is done before the spin, so that the guard time absorbs both, and what remains is the
-/// spin's own granularity of some ten nanoseconds.
+/// The kernel wakes a thread late, by its latency. On a PREEMPT_RT kernel, sending may then have to wait for locks. The clock takes
+/// and releases these locks before the spin, so the guard time absorbs both delays. The remaining error is the granularity
+/// of the spin, some ten nanoseconds.
 ///
-/// The latency is there at every wake-up, and can be measured. A lock that is held for long is met once in some ten
-/// thousand: no past tells of the first one, and only time set aside for it beforehand keeps that frame punctual.
+/// The latency occurs at every wake-up, so it can be measured. A lock that is held for long occurs about once in ten thousand
+/// sends. No measurement announces the first one, so only a guard time that is reserved for it keeps that frame punctual.
 #[derive(Debug)]
 pub struct PacedClock {
     clock: MonotonicClock,
@@ -31,13 +31,15 @@ enum Guard {
 }
 
 impl PacedClock {
-    /// With a guard time of `guard_ns`; with 0 it only sleeps.
+    /// A clock with a guard time of `guard_ns`, in ns. With 0 it only sleeps.
     pub fn fixed(guard_ns: Nanoseconds) -> Self {
         Self::new(Guard::Fixed { guard_ns }, guard_ns > 0)
     }
 
-    /// With a guard time of its own finding. Where sending takes no locks it follows what each wait to send turns out to
-    /// need, `cap_ns` at most; the first waits only sleep: make some before it matters. Where it does, it is `cap_ns`.
+    /// A clock that finds its own guard time, at most `cap_ns`, in ns.
+    ///
+    /// Where sending takes no locks, the guard time follows the measured latencies. The first waits only sleep, so make some
+    /// waits before punctuality matters. On a PREEMPT_RT kernel, where sending takes locks, the guard time is `cap_ns`.
     pub fn measured(cap_ns: Nanoseconds) -> Self {
         let clock = Self::new(Guard::Measured { latencies: SpinGuard::new(cap_ns) }, cap_ns > 0);
         if clock.send_path.is_some() {
@@ -47,14 +49,14 @@ impl PacedClock {
         }
     }
 
-    /// Other kernels have no such locks. Without CAN there is nothing to walk.
+    /// Takes the locks of sending only on a PREEMPT_RT kernel that has CAN sockets. Other kernels have no such locks.
     fn new(guard: Guard, has_spin: bool) -> Self {
         let has_locks = has_spin && is_preempt_rt();
         let send_path = has_locks.then(SendPath::new).and_then(Result::ok);
         Self { clock: MonotonicClock::default(), guard, send_path }
     }
 
-    /// How long before an instant of sending the sleep ends.
+    /// How long before the time of sending the sleep ends, in ns.
     pub fn guard_ns(&self) -> Nanoseconds {
         match &self.guard {
             Guard::Fixed { guard_ns } => *guard_ns,

@@ -1,28 +1,28 @@
 //! Policy, priority and CPU of the calling thread.
 //!
-//! The scheduling calls are made directly: they concern one thread, and musl's wrappers of them answer ENOSYS
-//! because POSIX asks for a whole process.
+//! The scheduling calls are made directly, because they concern one thread. The wrappers of musl answer ENOSYS, because POSIX
+//! defines these calls for a whole process.
 
 use super::step::Outcome;
 
 /// A scheduling policy (sched(7)).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Policy {
-    /// The ordinary time-sharing policy.
+    /// The ordinary time-sharing policy (`SCHED_OTHER`).
     Other,
     /// Time-sharing for batch work.
     Batch,
     /// Time-sharing when nothing else wants to run.
     Idle,
-    /// First in, first out: runs until it blocks or a higher priority wants to.
+    /// First in, first out: the thread runs until it blocks or a thread of higher priority wants to run (`SCHED_FIFO`).
     Fifo,
     /// FIFO with a time slice among equals.
     RoundRobin,
     /// Earliest deadline first.
     Deadline,
-    /// One that this program does not know.
+    /// A policy that this program does not know.
     Unknown {
-        /// The kernel's number for it.
+        /// The number of the policy in the kernel.
         number: u32,
     },
 }
@@ -53,11 +53,11 @@ pub struct Scheduling {
 }
 
 impl Scheduling {
-    /// That of the calling thread.
+    /// The scheduling of the calling thread.
     pub fn of_this_thread() -> Self {
         let mut attributes = empty_attributes();
-        // SAFETY: `attributes` is valid for writing and as long as is said; the kernel writes no more than that.
-        // It fails only for a thread that does not exist, and then leaves the time-sharing policy in place.
+        // SAFETY: `attributes` is valid for writing and has the stated size; the kernel writes no more than that. The call
+        // fails only for a thread that does not exist, and then the time-sharing policy stays in place.
         unsafe { libc::syscall(libc::SYS_sched_getattr, 0, &raw mut attributes, attributes.size, 0) };
         Self {
             policy: Policy::of_number(attributes.sched_policy),
@@ -70,30 +70,32 @@ impl Scheduling {
 const RESET_ON_FORK: u64 = libc::SCHED_FLAG_RESET_ON_FORK as u64;
 
 fn empty_attributes() -> libc::sched_attr {
-    // SAFETY: all-zero bytes are a valid `sched_attr`: it holds numbers only.
+    // SAFETY: all-zero bytes are a valid `sched_attr`, which holds numbers only.
     let mut attributes: libc::sched_attr = unsafe { core::mem::zeroed() };
     attributes.size = size_of::<libc::sched_attr>() as u32;
     attributes
 }
 
-/// Gives the calling thread `SCHED_FIFO` at `priority`; what it starts later does not inherit it.
+/// Gives the calling thread `SCHED_FIFO` at `priority` (1 to 99). Threads that it starts later do not inherit it.
 pub(super) fn set_fifo(priority: u8) -> Outcome {
     let mut attributes = empty_attributes();
     attributes.sched_policy = libc::SCHED_FIFO as u32;
     attributes.sched_priority = priority.into();
     attributes.sched_flags = RESET_ON_FORK;
-    // SAFETY: `attributes` is valid for reading and says its own size; thread 0 is the caller.
+    // SAFETY: `attributes` is valid for reading and contains its own size. Thread 0 is the caller.
     Outcome::of(unsafe { libc::syscall(libc::SYS_sched_setattr, 0, &raw const attributes, 0) })
 }
 
-/// Gives the calling thread, which is scheduled in turn with others, `nice` (-20, which gets the most of the CPU, to 19).
-/// Threads and processes that it starts inherit it. Without the right to it (`RLIMIT_NICE`) it keeps what it has.
+/// Sets the nice value of the calling thread, from -20 (most CPU time) to 19, for a time-sharing policy.
+///
+/// Threads and processes that it starts inherit the value. Without the right to it (`RLIMIT_NICE`), the old value stays and the
+/// outcome is [`Outcome::Refused`].
 pub fn set_nice(nice: i8) -> Outcome {
-    // SAFETY: takes numbers only; thread 0 is the caller.
+    // SAFETY: the call takes numbers only. Thread 0 is the caller.
     Outcome::of(unsafe { libc::setpriority(libc::PRIO_PROCESS, 0, nice.into()) })
 }
 
-/// Pins the calling thread to `cpu`.
+/// Binds the calling thread to `cpu`, counted from 0.
 pub(super) fn pin_to(cpu: usize) -> Outcome {
     if cpu >= libc::CPU_SETSIZE as usize {
         return Outcome::Refused { errno: libc::EINVAL };
@@ -102,15 +104,15 @@ pub(super) fn pin_to(cpu: usize) -> Outcome {
     let mut set: libc::cpu_set_t = unsafe { core::mem::zeroed() };
     // SAFETY: `cpu` lies within the set, as checked above.
     unsafe { libc::CPU_SET(cpu, &mut set) };
-    // SAFETY: `set` is valid for reading and as long as is said; thread 0 is the caller.
+    // SAFETY: `set` is valid for reading and has the stated size. Thread 0 is the caller.
     Outcome::of(unsafe { libc::sched_setaffinity(0, size_of::<libc::cpu_set_t>(), &set) })
 }
 
-/// The CPU that the calling thread is bound to; `None` when it may run on several.
+/// The CPU that the calling thread is bound to; `None` if it may run on several.
 pub(super) fn pinned_cpu() -> Option<usize> {
     // SAFETY: all-zero bytes are the empty set.
     let mut set: libc::cpu_set_t = unsafe { core::mem::zeroed() };
-    // SAFETY: `set` is valid for writing and as long as is said; thread 0 is the caller.
+    // SAFETY: `set` is valid for writing and has the stated size. Thread 0 is the caller.
     if unsafe { libc::sched_getaffinity(0, size_of::<libc::cpu_set_t>(), &mut set) } < 0 {
         return None;
     }

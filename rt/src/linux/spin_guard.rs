@@ -1,41 +1,42 @@
-//! How long before a deadline the sleep must end.
+//! Computes how long before a deadline the sleep must end.
 
 use crate::time::Nanoseconds;
 
-/// Resolution of the measurement: the cap is divided into this many buckets.
+/// The resolution of the measurement: the cap is divided into this many buckets.
 const BUCKETS: usize = 64;
 
-/// One sample in this many may be later than the guard time absorbs.
+/// One sample in this many may be later than the guard time.
 const TOLERATED: u32 = 5_000;
 
-/// Samples after which the past counts half: the guard follows a machine whose load changes within seconds, in both
-/// directions.
+/// After this many samples all counts are halved. So the guard time follows a load that changes within seconds, in both
+/// directions, and no counter overflows.
 const MEMORY: u32 = 16_384;
 
-/// Computes the guard time from measured wake-up latencies: the shortest that would have absorbed all but one
-/// wake-up in five thousand of the last ten thousand or so, and one bucket (1/64 of the cap) for the way from the timer to
-/// the spin.
+/// Computes the guard time from measured wake-up latencies.
 ///
-/// A percentile, not the maximum: a single stall of milliseconds, as virtual machines have them, must not turn
-/// the rest of the run into spinning. The cap bounds the processor time that is given away, and a machine whose
-/// latency lies above it everywhere does not get better by spinning.
+/// It is the shortest time that absorbs all but one in five thousand of about the last ten thousand wake-ups, and one bucket (1/64
+/// of the cap) for the time from the timer to the spin.
+///
+/// It is a percentile and not the maximum: a single stall of milliseconds, as on virtual machines, must not turn the rest of the
+/// run into spinning. The cap bounds the processor time that the spin takes.
 #[derive(Clone, Debug)]
 pub struct SpinGuard {
     cap_ns: Nanoseconds,
+    /// The count of samples in each bucket.
     within: [u32; BUCKETS],
-    /// Those later than the cap.
+    /// The count of samples later than the cap.
     beyond: u32,
-    /// All of them.
+    /// The count of all samples.
     samples: u32,
 }
 
 impl SpinGuard {
-    /// A guard time of at most `cap_ns`; a tenth of the period is a good measure. With 0 there is never a spin.
+    /// A guard time of at most `cap_ns`, in ns; a tenth of the period is a good value. With 0 there is no spin.
     pub const fn new(cap_ns: Nanoseconds) -> Self {
         Self { cap_ns, within: [0; BUCKETS], beyond: 0, samples: 0 }
     }
 
-    /// Takes in by how much a thread was ready late against its timer.
+    /// Adds a sample: by how many ns the thread was ready later than its timer.
     pub fn record(&mut self, latency_ns: Nanoseconds) {
         if self.samples >= MEMORY {
             self.forget_half();
@@ -45,7 +46,7 @@ impl SpinGuard {
         self.samples += 1;
     }
 
-    /// The guard time: 0 before the first sample, at most the cap.
+    /// The guard time in ns: 0 before the first sample, at most the cap.
     pub fn guard_ns(&self) -> Nanoseconds {
         if self.samples == 0 {
             return 0;
@@ -63,7 +64,7 @@ impl SpinGuard {
         edge_ns.min(self.cap_ns)
     }
 
-    /// The sum is made anew: halves are rounded down.
+    /// Halves all counts. The sum is computed again, because halves are rounded down.
     fn forget_half(&mut self) {
         self.within.iter_mut().chain([&mut self.beyond]).for_each(|count| *count /= 2);
         self.samples = self.within.iter().sum::<u32>() + self.beyond;

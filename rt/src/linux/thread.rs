@@ -1,4 +1,4 @@
-//! Making the calling thread a real-time thread, and the truth about how far that went.
+//! Makes the calling thread a real-time thread, and reports how far the system allowed it.
 
 use core::marker::PhantomData;
 
@@ -8,46 +8,46 @@ use super::memory::{PageFaults, lock_all, prefault_stack};
 use super::scheduling::{Scheduling, pin_to, pinned_cpu, set_fifo};
 use super::step::{Outcome, STEP_COUNT, Step, StepResult};
 
-/// What a thread is to become.
+/// The settings that a real-time thread asks for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ThreadConfig {
-    /// The FIFO priority, 1 to 99; `None` leaves the scheduling policy as it is. The kernel's threaded interrupt
-    /// handlers run at 50: above that the loop preempts the CAN driver, below it the driver preempts the loop.
+    /// The FIFO priority, 1 to 99; `None` leaves the scheduling policy as it is. The threaded interrupt handlers of the kernel run
+    /// at 50: above that the loop preempts the CAN driver, below it the driver preempts the loop.
     pub priority: Option<u8>,
-    /// The CPU to stay on; `None` leaves the choice to the kernel.
+    /// The CPU to stay on, counted from 0; `None` leaves the choice to the kernel.
     pub cpu: Option<usize>,
     /// Whether to lock all memory of the process.
     pub lock_memory: bool,
     /// Whether to keep the CPUs out of idle states that take long to leave.
     pub hold_dma_latency: bool,
-    /// How much stack to touch in advance, in bytes, at most [`PREFAULT_LIMIT_BYTES`](super::PREFAULT_LIMIT_BYTES);
-    /// 0 for none.
+    /// How much stack to touch in advance, in bytes; 0 for none, and at most
+    /// [`PREFAULT_LIMIT_BYTES`](super::PREFAULT_LIMIT_BYTES).
     pub stack_bytes: usize,
 }
 
-/// What was asked for, what came of it, and what is in force. Plain data, to be put in words elsewhere.
+/// The outcome of each step, and the settings that are in force, as read back from the kernel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ThreadReport {
-    /// Each step with its outcome, in the order in which they were taken.
+    /// Each step with its outcome, in the order in which they were carried out.
     pub steps: [StepResult; STEP_COUNT],
     /// Policy and priority as read back from the kernel.
     pub scheduling: Scheduling,
-    /// The CPU that the thread is bound to; `None` when it may run on several.
+    /// The CPU that the thread is bound to; `None` if it may run on several.
     pub cpu: Option<usize>,
     /// Whether all memory of the process is locked.
     pub memory_locked: bool,
     /// How much stack was touched in advance, in bytes.
     pub stack_bytes: usize,
-    /// The timer slack as read back from the kernel, in nanoseconds; a FIFO thread has none, whatever it says.
+    /// The timer slack as read back from the kernel, in ns. A FIFO thread has none, whatever this says.
     pub timer_slack_ns: u64,
     /// Whether the CPUs are kept out of idle states that take long to leave.
     pub dma_latency_held: bool,
-    /// Whether the kernel is fully preemptible.
+    /// Whether the kernel is fully preemptible (PREEMPT_RT).
     pub preempt_rt: bool,
 }
 
 impl ThreadReport {
-    /// What came of a step.
+    /// The outcome of a step.
     pub fn outcome(&self, step: Step) -> Outcome {
         self.steps
             .iter()
@@ -55,14 +55,16 @@ impl ThreadReport {
             .map_or(Outcome::NotAsked, |result| result.outcome)
     }
 
-    /// The steps that were asked for and refused.
+    /// The steps that were asked for and that the system refused.
     pub fn refused(&self) -> impl Iterator<Item = StepResult> + '_ {
         self.steps.iter().copied().filter(|result| matches!(result.outcome, Outcome::Refused { .. }))
     }
 }
 
-/// The calling thread, made real-time as far as the system allows. Stays in the thread that made it; when it is
-/// dropped the CPUs may idle deeply again, everything else lasts as long as the thread.
+/// The calling thread, made a real-time thread as far as the system allows.
+///
+/// It cannot leave the thread that made it. When it is dropped, the CPUs may enter deep idle states again. Everything else lasts
+/// as long as the thread.
 #[derive(Debug)]
 pub struct RealtimeThread {
     report: ThreadReport,
@@ -72,8 +74,9 @@ pub struct RealtimeThread {
 }
 
 impl RealtimeThread {
-    /// Takes every step that is asked for, whatever became of the ones before it. FIFO is the last one, so that
-    /// locking and touching memory, which may take long, does not hold up the rest of the system.
+    /// Carries out every step that `config` asks for, also after a step that was refused; see [`RealtimeThread::report`].
+    ///
+    /// FIFO scheduling is the last step. Locking and touching memory can take long, and must not hold up the rest of the system.
     pub fn enter(config: &ThreadConfig) -> Self {
         let timer_slack = remove_timer_slack();
         let affinity = config.cpu.map_or(Outcome::NotAsked, pin_to);
@@ -112,12 +115,12 @@ impl RealtimeThread {
         }
     }
 
-    /// What was asked for, what came of it, and what is in force.
+    /// The outcome of each step, and the settings that are in force.
     pub const fn report(&self) -> &ThreadReport {
         &self.report
     }
 
-    /// The page faults this thread has taken since its set-up. A loop at work takes none.
+    /// The page faults of this thread since [`RealtimeThread::enter`]. A running loop takes none.
     pub fn page_faults(&self) -> PageFaults {
         PageFaults::of_this_thread().since(self.faults_at_start)
     }

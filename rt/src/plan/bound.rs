@@ -1,4 +1,4 @@
-//! The bound on the planner's work, by counting.
+//! Counts the work of the planner and compares it with the promised bound.
 
 extern crate std;
 
@@ -15,11 +15,11 @@ use super::{
     synchronised_velocity,
 };
 
-/// The most searches for an axis whose motions leave their position limits: three rounds of two motions with a stop in
-/// between and of planning all axes anew, behind the first plan.
+/// The most searches for an axis whose motions leave their position limits. After the first plan there are three rounds. Each
+/// plans two motions with a stop between them, and then all axes again.
 const SEARCHES_WITHIN_LIMITS_MAX: u32 = SEARCHES_MAX + 3 * (2 * SEARCHES_MAX + SEARCHES_MAX);
 
-/// Numbers of usual sizes, integers where one type of profile meets another, and those that are next to nothing or huge.
+/// Numbers of usual sizes, integers (where one type of profile meets another), and tiny and huge numbers.
 fn number() -> impl Strategy<Value = f64> {
     prop_oneof![
         4 => -4.0..4.0_f64,
@@ -72,7 +72,7 @@ fn timing() -> impl Strategy<Value = PlanOptions> {
     )
 }
 
-/// Whether what has been done since the last call keeps the bound.
+/// Checks that the work since the last call keeps the bound.
 fn keeps_bound(searches_max: u32) -> Result<(), TestCaseError> {
     let (searches, evaluations) = work::take();
     prop_assert!(searches <= searches_max, "{searches} searches of {searches_max}");
@@ -115,7 +115,7 @@ proptest! {
         keeps_bound(2 * SEARCHES_WITHIN_LIMITS_MAX)?;
     }
 
-    /// The axis moves on into every cycle of its motion, where roots are next to the ends of their brackets.
+    /// The axis is planned again from every cycle of its motion. There, roots are close to the ends of their brackets.
     #[test]
     fn planning_anew_never_exceeds_the_bound(problem in problem(), cycles in 5..50_u32) {
         let mut problem = Problem {

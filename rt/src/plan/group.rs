@@ -1,25 +1,26 @@
-//! Trajectories of a fixed number of axes, in vectors of `nalgebra`.
+//! Trajectories of a fixed number of axes, with `nalgebra` vectors.
 
 use nalgebra::SVector;
 
 use super::error::PlanError;
+use super::options::PlanOptions;
 use super::problem::{Limits, Problem, State};
 use super::profile::{Extrema, Profile};
-use super::synchronisation::{PlanOptions, stop, synchronised};
+use super::synchronisation::{stop, synchronised};
 
-/// The state of motion of `AXES` axes.
+/// The state of motion of `AXES` axes. Linear axes use m in place of rad.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GroupState<const AXES: usize> {
-    /// Positions, rad or m.
+    /// Positions, in rad.
     pub position: SVector<f64, AXES>,
-    /// Velocities, rad/s or m/s.
+    /// Velocities, in rad/s.
     pub velocity: SVector<f64, AXES>,
-    /// Accelerations, rad/s² or m/s².
+    /// Accelerations, in rad/s².
     pub acceleration: SVector<f64, AXES>,
 }
 
 impl<const AXES: usize> GroupState<AXES> {
-    /// At rest at these positions.
+    /// The state at rest at these positions, in rad.
     pub fn rest(position: SVector<f64, AXES>) -> Self {
         Self { position, velocity: SVector::zeros(), acceleration: SVector::zeros() }
     }
@@ -34,7 +35,7 @@ impl<const AXES: usize> GroupState<AXES> {
     }
 }
 
-/// The trajectory of `AXES` axes.
+/// The trajectory of `AXES` axes from one state to another, within the limits of each axis.
 ///
 /// ```
 /// use nalgebra::vector;
@@ -51,26 +52,34 @@ pub struct Trajectory<const AXES: usize> {
     duration_s: f64,
 }
 
-/// Why there is no trajectory, and what to do in place of it.
+/// Why there is no trajectory to the target, and the stop to carry out instead.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Refusal<const AXES: usize> {
-    /// What is wrong.
+pub struct PlanFailure<const AXES: usize> {
+    /// What is wrong, and with which axis.
     pub error: PlanError,
-    /// The fastest coordinated stop, if the start and the limits allow one to be planned.
+    /// The fastest coordinated stop; `None` if the start or the limits are invalid.
     pub stop: Option<Trajectory<AXES>>,
 }
 
+impl<const AXES: usize> core::fmt::Display for PlanFailure<AXES> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        self.error.fmt(f)
+    }
+}
+
+impl<const AXES: usize> core::error::Error for PlanFailure<AXES> {}
+
 impl<const AXES: usize> Trajectory<AXES> {
-    /// Plans from `start` to `target`, see [`synchronised`].
+    /// Plans from `start` to `target`; see [`synchronised`].
     ///
     /// # Errors
-    /// What is wrong with the first axis that something is wrong with, and a stop.
+    /// [`PlanFailure`]: the error of the first axis that has one, and the stop to carry out instead.
     pub fn plan(
         start: &GroupState<AXES>,
         target: &GroupState<AXES>,
         limits: &[Limits; AXES],
         timing: PlanOptions,
-    ) -> Result<Self, Refusal<AXES>> {
+    ) -> Result<Self, PlanFailure<AXES>> {
         let rest = Problem {
             start: State::rest(0.0),
             target: State::rest(0.0),
@@ -84,11 +93,11 @@ impl<const AXES: usize> Trajectory<AXES> {
         let mut profiles = [Profile::hold(0.0); AXES];
         match synchronised(&problems, &mut profiles, timing) {
             Ok(duration_s) => Ok(Self { profiles, duration_s }),
-            Err(error) => Err(Refusal { error, stop: Self::stop(start, limits).ok() }),
+            Err(error) => Err(PlanFailure { error, stop: Self::stop(start, limits).ok() }),
         }
     }
 
-    /// Plans the fastest coordinated stop, see [`stop`].
+    /// Plans the fastest coordinated stop; see [`stop`].
     ///
     /// # Errors
     /// As [`stop`].
@@ -107,7 +116,7 @@ impl<const AXES: usize> Trajectory<AXES> {
         self.duration_s
     }
 
-    /// The state `time_s` after the start, see [`Profile::sample`].
+    /// The state `time_s` seconds after the start; see [`Profile::sample`].
     pub fn sample(&self, time_s: f64) -> GroupState<AXES> {
         let mut group = GroupState::<AXES>::rest(SVector::zeros());
         let rates = group.velocity.iter_mut().zip(group.acceleration.iter_mut());
@@ -119,12 +128,12 @@ impl<const AXES: usize> Trajectory<AXES> {
         group
     }
 
-    /// The exact extrema of every axis.
+    /// The exact extrema of every axis, over the whole trajectory.
     pub fn extrema(&self) -> [Extrema; AXES] {
         self.profiles.map(|profile| profile.extrema())
     }
 
-    /// The trajectory of every axis.
+    /// The profile of every axis.
     pub fn profiles(&self) -> &[Profile; AXES] {
         &self.profiles
     }

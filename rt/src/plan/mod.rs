@@ -1,9 +1,9 @@
 //! Trajectories: from any state to any state in minimum time within limits, for any number of axes at once.
 //!
-//! A [`Problem`] says where an axis is, where it shall be and what it must keep; its answer is a [`Profile`],
-//! an exact trajectory made of phases of constant jerk. [`synchronised`] plans all axes so that they arrive
-//! together, [`stop`] brings them to rest together. Planning anew in every cycle from the commanded state,
-//! `profile.sample(t)`, gives the same motion again.
+//! A [`Problem`] has the start state of an axis, its target state and its limits. The answer is a [`Profile`], an exact
+//! trajectory made of phases of constant jerk. [`synchronised`] plans all axes so that they arrive together, and [`stop`]
+//! brings them to rest together. Planning again in every cycle from the commanded state, `profile.sample(t)`, gives the
+//! same motion again.
 //!
 //! ```
 //! use takt_rt::plan::{Limits, Problem, Profile, State, PlanOptions, synchronised};
@@ -15,11 +15,15 @@
 //! assert_eq!(profiles[1].sample(duration_s), State::rest(-0.25));
 //! ```
 //!
-//! The planner allocates nothing, panics on nothing and always ends, for its work has a fixed bound. Planning an axis searches at
-//! most 32 roots, each with at most 96 evaluations of a polynomial with two square roots (five are usual); where position limits
-//! are left, motions within them are planned in at most three rounds, which makes at most 320 searches. A stop
-//! has none, but halves a range 48 times where it must turn around at a position limit. All of this once for every axis,
-//! and once more for a straight line.
+//! The planner does not allocate, does not panic, and always ends: its work has a fixed bound. Planning one axis searches at
+//! most 32 roots. Each search evaluates a polynomial with two square roots at most 96 times (five times is usual). Where
+//! position limits are left, motions within them are planned in at most three rounds, with at most 320 searches in all. A stop
+//! searches no roots, but it halves a range 48 times where it must reverse at a position limit. All of this is done once for each
+//! axis, and once more for a straight line.
+//!
+//! A reader may start with `synchronisation`, which plans all axes. `jerk_limited` and `trapezoid` plan one axis, and
+//! `second_order` is the closed form that both use. `travel` keeps position limits, `straight` keeps axes on a line, and
+//! `tracking` follows a moving target.
 
 #[cfg(test)]
 mod bound;
@@ -27,9 +31,10 @@ mod choice;
 mod error;
 mod group;
 mod jerk_limited;
+mod options;
 mod problem;
 mod profile;
-mod ramp;
+mod second_order;
 mod straight;
 mod synchronisation;
 mod tracking;
@@ -37,9 +42,8 @@ mod trapezoid;
 mod travel;
 
 pub use error::{Limit, PlanError, Quantity};
-pub use group::{GroupState, Refusal, Trajectory};
+pub use group::{GroupState, PlanFailure, Trajectory};
+pub use options::{PlanOptions, Return, Synchronisation};
 pub use problem::{Limits, Problem, State};
 pub use profile::{Blocked, Extrema, PHASES_MAX, Phase, Profile, Range};
-pub use synchronisation::{
-    PlanOptions, Return, Synchronisation, position, stop, synchronised, synchronised_velocity, velocity,
-};
+pub use synchronisation::{position, stop, synchronised, synchronised_velocity, velocity};

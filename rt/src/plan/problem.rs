@@ -1,58 +1,67 @@
-//! The planning problem of one axis: where it is, where it shall be, what it must keep.
+//! The planning problem of one axis: its start state, its target state and its limits.
 
 use super::choice::smaller;
 use super::error::{Limit, PlanError, Quantity};
 
 /// The state of motion of one axis, in rad, rad/s and rad/s² (m, m/s and m/s² for a linear axis).
 ///
-/// The planner itself is free of units: any consistent set will do.
+/// The planner works with any consistent units: encoder counts give the same motion as radians.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct State {
-    /// Position.
+    /// Position, in rad.
     pub position: f64,
-    /// Velocity.
+    /// Velocity, in rad/s.
     pub velocity: f64,
-    /// Acceleration. Second-order planning neither reads it in a start state nor reaches it in a target state.
+    /// Acceleration, in rad/s². Second-order planning does not read it: there the acceleration can jump.
     pub acceleration: f64,
 }
 
 impl State {
-    /// At rest at this position.
+    /// The state at rest at this position, in rad.
     pub const fn rest(position: f64) -> Self {
         Self { position, velocity: 0.0, acceleration: 0.0 }
     }
+
+    /// After this time with the same acceleration; before it, if the time is negative.
+    pub fn after(&self, time_s: f64) -> Self {
+        let Self { position, velocity, acceleration } = *self;
+        Self {
+            position: position + time_s * (velocity + 0.5 * acceleration * time_s),
+            velocity: velocity + acceleration * time_s,
+            acceleration,
+        }
+    }
 }
 
-/// What the motion of one axis must keep.
+/// The limits of the motion of one axis.
 ///
-/// The upper limits of velocity and acceleration are positive and the lower ones negative. A limit may be far
-/// away, but not infinite, except for the position and the jerk.
+/// Every magnitude must be from 1e-30 to 1e30. Only the position limits and the jerk limit may be infinite.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
-    /// Largest velocity, positive.
+    /// Largest velocity, positive, in rad/s.
     pub velocity_max: f64,
-    /// Smallest velocity, negative.
+    /// Smallest velocity, negative, in rad/s.
     pub velocity_min: f64,
-    /// Largest acceleration, positive.
+    /// Largest acceleration, positive, in rad/s².
     pub acceleration_max: f64,
-    /// Smallest acceleration, negative.
+    /// Smallest acceleration, negative, in rad/s².
     pub acceleration_min: f64,
-    /// Largest magnitude of the jerk, positive. `f64::INFINITY` gives the second-order problem: the
-    /// acceleration may jump.
+    /// Largest magnitude of the jerk, positive, in rad/s³. `f64::INFINITY` gives the second-order problem, in which the
+    /// acceleration can jump.
     pub jerk_max: f64,
-    /// Largest position; `f64::INFINITY` where there is none.
+    /// Largest position, in rad; `f64::INFINITY` for no limit.
     pub position_max: f64,
-    /// Smallest position; `f64::NEG_INFINITY` where there is none.
+    /// Smallest position, in rad, below the largest one; `f64::NEG_INFINITY` for no limit.
     pub position_min: f64,
 }
 
 impl Limits {
-    /// The same limits in both directions, and no limit of position. All arguments are positive magnitudes.
+    /// The same limits in both directions, without position limits. All arguments are positive magnitudes.
     pub const fn symmetric(velocity: f64, acceleration: f64, jerk: f64) -> Self {
         Self::asymmetric(velocity, -velocity, acceleration, -acceleration, jerk)
     }
 
-    /// Different limits in the two directions, and no limit of position. The minima are negative.
+    /// Different limits in the two directions, without position limits. The minima are negative.
     pub const fn asymmetric(
         velocity_max: f64,
         velocity_min: f64,
@@ -71,7 +80,7 @@ impl Limits {
         }
     }
 
-    /// The same limits with these limits of position.
+    /// These limits with position limits, in rad.
     pub const fn with_position(mut self, position_min: f64, position_max: f64) -> Self {
         self.position_min = position_min;
         self.position_max = position_max;
@@ -91,7 +100,7 @@ impl Limits {
         smaller(smaller(velocity, acceleration), self.jerk_max)
     }
 
-    /// Whether no limit but an infinite jerk is too large.
+    /// Whether no limit is too large, apart from an infinite jerk limit.
     #[inline]
     fn is_moderate(&self) -> bool {
         let widths =
@@ -99,14 +108,14 @@ impl Limits {
         widths < SIZE_MAX && (self.jerk_max < SIZE_MAX || self.is_second_order())
     }
 
-    /// Checks signs and finiteness.
+    /// Checks that every limit has the right sign and is finite where it must be.
     ///
     /// # Errors
-    /// [`PlanError::InvalidLimit`] with axis 0 and the first limit that cannot be kept by any motion.
+    /// [`PlanError::InvalidLimit`] with axis 0 and the first limit that is invalid.
     #[inline]
     pub fn validate(&self) -> Result<(), PlanError> {
         let positive = |value: f64| value > 0.0 && value < f64::INFINITY;
-        // The usual case at once: a sum is finite only if all of its numbers are.
+        // The usual case is checked at once: a sum is finite only if all of its numbers are.
         let signs = (self.velocity_max > 0.0)
             & (self.velocity_min < 0.0)
             & (self.acceleration_max > 0.0)
@@ -134,25 +143,26 @@ impl Limits {
     }
 }
 
-/// Larger numbers are refused, limits too, and limits smaller than its inverse: their powers would leave the range of `f64`.
+/// The largest number that the planner accepts. It does not accept limits below the inverse of this either: the powers of such
+/// numbers would leave the range of `f64`.
 pub(super) const SIZE_MAX: f64 = 1e30;
 
-/// Relative to a limit, being beyond it by this much is rounding.
+/// Exceeding a limit by this much, relative to the limit, is rounding.
 const ROUNDING: f64 = 1e-13;
 
-/// From where to where, within which limits: the problem of one axis.
+/// The planning problem of one axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Problem {
-    /// The state at time 0. It may be outside the limits: the motion then first returns into them.
+    /// The state at time 0. If it is outside the limits, the motion first returns into them.
     pub start: State,
-    /// The state at the end. The velocity interface does not read its position.
+    /// The state at the end. Planning to a velocity does not read its position.
     pub target: State,
-    /// What the motion keeps.
+    /// The limits of the motion.
     pub limits: Limits,
 }
 
 impl Problem {
-    /// Checks that every number is finite, the limits are limits, and the target keeps them.
+    /// Checks that every number is finite, that the limits are valid, and that the target keeps them.
     #[inline]
     pub(super) fn validate(&self) -> Result<(), PlanError> {
         self.limits.validate()?;
@@ -200,13 +210,14 @@ impl Problem {
         }
         Ok(())
     }
-    /// Checks that the target can be reached without breaking a velocity limit just before.
+
+    /// Checks that a motion can reach the target without breaking a velocity limit just before.
     pub(super) fn validate_approach(&self) -> Result<(), PlanError> {
         let (target, limits) = (&self.target, &self.limits);
         if limits.is_second_order() {
             return Ok(());
         }
-        // At least this was the velocity when the jerk began to build up the acceleration.
+        // The velocity at which the jerk must have begun to build up the acceleration of the target, at the latest.
         let before =
             target.velocity - 0.5 * target.acceleration * target.acceleration.abs() / limits.jerk_max;
         if before > limits.velocity_max * (1.0 + ROUNDING) {

@@ -1,28 +1,27 @@
-//! The trajectory of one axis: phases of constant jerk.
+//! The trajectory of one axis, made of phases of constant jerk.
 
 use super::choice::{larger, smaller};
 use super::error::PlanError;
 use super::problem::{SIZE_MAX, State};
 
-/// The most phases a profile can have: two of the brake, and those of two seven-phase profiles laid over
-/// each other.
+/// The most phases of a profile: two of the brake, and those of a mixture of two seven-phase profiles.
 pub const PHASES_MAX: usize = 16;
 
-/// A stretch of time in which the jerk is constant.
+/// A time in which the jerk is constant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Phase {
-    /// When the phase starts, in s from the start of the profile.
+    /// When the phase starts, in s after the start of the profile.
     pub start_s: f64,
     /// How long it lasts, in s.
     pub duration_s: f64,
     /// The state at its start.
     pub start: State,
-    /// The jerk, rad/s³.
+    /// The jerk, in rad/s³.
     pub jerk: f64,
 }
 
 impl Phase {
-    /// The state `elapsed_s` after the start of the phase.
+    /// The state `elapsed_s` seconds after the start of the phase.
     pub fn sample(&self, elapsed_s: f64) -> State {
         integrate(&self.start, self.jerk, elapsed_s)
     }
@@ -55,32 +54,34 @@ pub struct Extrema {
     pub position: Range,
     /// Velocity.
     pub velocity: Range,
-    /// Acceleration. At a jump of the acceleration both sides count.
+    /// Acceleration. Where the acceleration jumps, both values count.
     pub acceleration: Range,
 }
 
-/// A time interval in which the axis cannot arrive, in s: too late for one way, too early for the other.
+/// A blocked interval: the axis cannot make its motion in any duration inside it.
+///
+/// It occurs where the target moves: the durations before the interval belong to one motion, those behind it to another.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Blocked {
-    /// The latest duration that is possible before the interval.
+    /// The longest possible duration before the interval, in s.
     pub after_s: f64,
-    /// The earliest duration that is possible behind it.
+    /// The shortest possible duration behind the interval, in s.
     pub before_s: f64,
 }
 
-/// The most blocked intervals an axis can have.
+/// The most blocked intervals that are kept for an axis.
 pub(super) const BLOCKED_MAX: usize = 4;
 
 /// The trajectory of one axis: up to [`PHASES_MAX`] phases of constant jerk, then the target state.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Profile {
-    // Start times apart from the rest, infinite behind the last phase, so that finding a phase reads little.
+    // The start times are apart from the rest, so that finding a phase reads little. They are infinite behind the last phase.
     starts_s: [f64; PHASES_MAX],
     phases: [Coefficients; PHASES_MAX],
     count: usize,
     duration_s: f64,
-    // Between two numbers that are stored one by one and read at the same time: read as a pair, they would have to wait for
-    // the cache.
+    // This field stands between two numbers that are stored one by one and read together. Side by side, the compiler would
+    // read them as a pair, and the processor would have to wait for the cache.
     minimum_duration_s: f64,
     end: State,
     blocked: [Blocked; BLOCKED_MAX],
@@ -108,7 +109,7 @@ pub(super) fn integrate(start: &State, jerk: f64, elapsed_s: f64) -> State {
 }
 
 impl Profile {
-    /// Rest at this position, for 0 s and ever after.
+    /// A profile that lasts 0 s and rests at this position, in rad, ever after.
     pub const fn hold(position: f64) -> Self {
         Self {
             starts_s: [f64::INFINITY; PHASES_MAX],
@@ -127,21 +128,21 @@ impl Profile {
         self.duration_s
     }
 
-    /// The shortest time in which this axis alone could have made the motion, in s.
+    /// The shortest time in which this axis alone could make the motion, in s.
     pub fn minimum_duration_s(&self) -> f64 {
         self.minimum_duration_s
     }
 
-    /// The durations above [`minimum_duration_s`](Self::minimum_duration_s) that are impossible for this axis,
-    /// in ascending order.
+    /// The durations above [`minimum_duration_s`](Self::minimum_duration_s) that are impossible for this axis, in
+    /// ascending order.
     pub fn blocked(&self) -> &[Blocked] {
         self.blocked.get(..self.blocked_count).unwrap_or_default()
     }
 
-    /// The state `time_s` after the start.
+    /// The state `time_s` seconds after the start.
     ///
-    /// Before the start it is the start state. At the end it is exactly the target state, and from then on
-    /// the axis goes on with the target velocity and without acceleration.
+    /// Before the start it is the start state. At the end it is exactly the target state. After the end the axis goes on with
+    /// the target velocity and without acceleration.
     #[inline]
     pub fn sample(&self, time_s: f64) -> State {
         if time_s >= self.duration_s {
@@ -154,7 +155,7 @@ impl Profile {
             };
         }
         let time_s = if time_s > 0.0 { time_s } else { 0.0 };
-        // From one cycle to the next the phase is the same: the processor guesses every comparison right.
+        // The phase is mostly the same as in the last cycle, so the processor predicts every comparison.
         let index = self.starts_s.iter().skip(1).take_while(|start_s| **start_s <= time_s).count();
         match (self.phases.get(index), self.starts_s.get(index)) {
             (Some(phase), Some(start_s)) => integrate(&phase.start, phase.jerk, time_s - start_s),
@@ -185,7 +186,8 @@ impl Profile {
         })
     }
 
-    /// The exact extrema from the start to the end, found where the derivative is zero within a phase.
+    /// The exact extrema from the start to the end. They are at the ends of the phases, and where the derivative is zero inside a
+    /// phase.
     pub fn extrema(&self) -> Extrema {
         let mut extrema = Extrema {
             position: Range::at(self.end.position),
@@ -196,13 +198,13 @@ impl Profile {
             extrema.include(&phase.start);
             extrema.include(&phase.sample(phase.duration_s));
             let inside = |elapsed_s: f64| elapsed_s > 0.0 && elapsed_s < phase.duration_s;
-            let velocity_turns_s = -phase.start.acceleration / phase.jerk;
-            if inside(velocity_turns_s) {
-                extrema.velocity.include(phase.sample(velocity_turns_s).velocity);
+            let velocity_extremum_s = -phase.start.acceleration / phase.jerk;
+            if inside(velocity_extremum_s) {
+                extrema.velocity.include(phase.sample(velocity_extremum_s).velocity);
             }
-            for position_turns_s in standstills_s(&phase) {
-                if inside(position_turns_s) {
-                    extrema.position.include(phase.sample(position_turns_s).position);
+            for position_extremum_s in standstills_s(&phase) {
+                if inside(position_extremum_s) {
+                    extrema.position.include(phase.sample(position_extremum_s).position);
                 }
             }
         }
@@ -210,10 +212,10 @@ impl Profile {
     }
 }
 
-/// When the velocity of the phase is zero; a time that is not a number means never.
+/// When the velocity of the phase is zero, in s after its start; not a number where it never is.
 fn standstills_s(phase: &Phase) -> [f64; 2] {
     let State { velocity, acceleration, .. } = phase.start;
-    // v + a·t + j/2·t² = 0 in the form that does not cancel.
+    // The roots of v + a·t + j/2·t² = 0, in the form without cancellation.
     let discriminant = acceleration * acceleration - 2.0 * phase.jerk * velocity;
     let q = -(acceleration + libm::copysign(libm::sqrt(discriminant), acceleration));
     [2.0 * velocity / q, q / phase.jerk]
@@ -227,9 +229,9 @@ impl Extrema {
     }
 }
 
-/// Building a profile, phase by phase.
+// Building a profile, phase by phase.
 impl Profile {
-    /// Forgets the phases and starts at this state. What durations are possible is kept.
+    /// Removes all phases and starts at this state. The minimum duration and the blocked intervals stay.
     pub(super) fn begin(&mut self, start: State) {
         self.starts_s = [f64::INFINITY; PHASES_MAX];
         self.count = 0;
@@ -237,12 +239,13 @@ impl Profile {
         self.end = start;
     }
 
-    /// Appends a phase in which the acceleration is constant; one that is not longer than 0 s is left out.
+    /// Appends a phase of constant acceleration. A phase that is not longer than 0 s is left out.
     pub(super) fn accelerate(&mut self, duration_s: f64, acceleration: f64) {
         self.append(duration_s, acceleration, 0.0);
     }
 
-    /// Appends phases of constant acceleration to the state that is reached, leaving out those that are not longer than 0 s.
+    /// Appends phases of constant acceleration to the state that was reached. Phases that are not longer than 0 s are left
+    /// out.
     #[inline]
     pub(super) fn accelerate_all<const COUNT: usize>(
         &mut self,
@@ -253,12 +256,12 @@ impl Profile {
         self.append_all(reached, durations_s, accelerations, |_, acceleration| (acceleration, 0.0));
     }
 
-    /// Appends a phase of constant jerk; one that is not longer than 0 s is left out.
+    /// Appends a phase of constant jerk. A phase that is not longer than 0 s is left out.
     pub(super) fn shift(&mut self, duration_s: f64, jerk: f64) {
         self.append(duration_s, self.end.acceleration, jerk);
     }
 
-    /// Appends phases of constant jerk to the state that is reached, leaving out those that are not longer than 0 s.
+    /// Appends phases of constant jerk to the state that was reached. Phases that are not longer than 0 s are left out.
     #[inline]
     pub(super) fn shift_all<const COUNT: usize>(
         &mut self,
@@ -269,7 +272,7 @@ impl Profile {
         self.append_all(reached, durations_s, jerks, |acceleration, jerk| (acceleration, jerk));
     }
 
-    /// Takes away what rounding has put the acceleration beyond its limits.
+    /// Cuts the acceleration that was reached off at its limits, which it exceeds only by rounding.
     pub(super) fn limit_acceleration(&mut self, min: f64, max: f64) {
         self.end.acceleration = smaller(larger(self.end.acceleration, min), max);
     }
@@ -279,11 +282,11 @@ impl Profile {
         self.append_all(self.end, &[duration_s], &[jerk], |_, jerk| (acceleration, jerk));
     }
 
-    /// Appends phases. `rates` gives the acceleration at the start and the jerk, from the acceleration reached and
-    /// the parameter of the phase.
+    /// Appends phases. `rates` gives the acceleration at the start of a phase and its jerk, from the acceleration that was
+    /// reached and the parameter of the phase.
     ///
-    /// The state that is reached comes from the caller, who has just made it: read again, it would have to wait for the cache.
-    /// Whether a phase is left out is a coin toss, so it is written in any case and only the count depends on it.
+    /// The caller hands in the state that was reached, because reading it again would wait for the cache. The processor cannot
+    /// predict whether a phase is left out. So every phase is written, and only the count depends on its duration.
     #[inline]
     fn append_all<const COUNT: usize>(
         &mut self,
@@ -299,7 +302,7 @@ impl Profile {
             if let (Some(phase), Some(start_s)) = (self.phases.get_mut(count), self.starts_s.get_mut(count)) {
                 *phase = Coefficients { start: end, jerk };
                 *start_s = time_s;
-                // Not the other way round: what is not a number must not look like no time.
+                // In this order, a duration that is not a number stays one, and does not become 0 s.
                 let elapsed_s = larger(0.0, *duration_s);
                 count += 1 - usize::from(*duration_s <= 0.0);
                 time_s += elapsed_s;
@@ -312,15 +315,19 @@ impl Profile {
         (self.end, self.duration_s, self.count) = (end, time_s, count);
     }
 
-    /// The profile is complete: at its end it is exactly at the target.
+    /// Completes the profile. Its end is exactly the target.
     pub(super) fn finish(&mut self, target: State) -> Result<(), PlanError> {
         self.finish_at(target, self.duration_s)
     }
 
-    /// The profile is complete, and lasts exactly this long; the last phase takes up the rounding.
+    /// Completes the profile. Its end is exactly the target, and it lasts exactly this long. The last phase takes up the
+    /// rounding.
+    ///
+    /// # Errors
+    /// [`PlanError::NotRepresentable`] with axis 0 if a number of the profile is not finite.
     pub(super) fn finish_at(&mut self, target: State, duration_s: f64) -> Result<(), PlanError> {
         if self.count == 0 && duration_s > 0.0 {
-            // A time that is itself rounding: every phase of it was none.
+            // The whole duration is rounding, so every phase was left out.
             self.append(duration_s, self.end.acceleration, 0.0);
         }
         let reached = self.end;
@@ -332,25 +339,25 @@ impl Profile {
         if finite { Ok(()) } else { Err(PlanError::NotRepresentable { axis: 0 }) }
     }
 
-    /// Leaves the profile without its phases: it would last `duration_s`, and a longer one takes its place.
+    /// Leaves the profile without phases. It would last `duration_s`, but a longer one will replace it.
     pub(super) fn leave_open(&mut self, duration_s: f64) -> Result<(), PlanError> {
-        // Equal to no duration, not even to one that has overflowed.
+        // Not a number is equal to no duration, not even to one that has overflowed.
         self.duration_s = f64::NAN;
         if duration_s < SIZE_MAX { Ok(()) } else { Err(PlanError::NotRepresentable { axis: 0 }) }
     }
 
-    /// Where the building has arrived.
+    /// The state that the phases reach so far.
     pub(super) fn reached(&self) -> State {
         self.end
     }
 
-    /// Sets the shortest duration, not yet any blocked interval.
+    /// Sets the minimum duration, and removes all blocked intervals.
     pub(super) fn set_minimum_duration(&mut self, minimum_duration_s: f64) {
         self.minimum_duration_s = minimum_duration_s;
         self.blocked_count = 0;
     }
 
-    /// Notes a blocked interval, unless it is empty.
+    /// Adds a blocked interval, unless it is empty.
     pub(super) fn block(&mut self, after_s: f64, before_s: f64) {
         if after_s >= before_s {
             return;
@@ -361,7 +368,7 @@ impl Profile {
         }
     }
 
-    /// Stretches the profile in space, from this start to this target.
+    /// Multiplies the profile by `ratio`, and moves it to this start position and this target.
     pub(super) fn scale(&mut self, ratio: f64, start_position: f64, target: State) {
         let from = self.start().position;
         for phase in self.phases.iter_mut().take(self.count) {
@@ -376,18 +383,18 @@ impl Profile {
         self.end = target;
     }
 
-    /// What durations are possible.
+    /// The minimum duration and the blocked intervals.
     pub(super) fn possible(&self) -> (f64, ([Blocked; BLOCKED_MAX], usize)) {
         (self.minimum_duration_s, (self.blocked, self.blocked_count))
     }
 
-    /// Sets what durations are possible.
+    /// Sets the minimum duration and the blocked intervals.
     pub(super) fn set_possible(&mut self, minimum_duration_s: f64, blocked: ([Blocked; BLOCKED_MAX], usize)) {
         self.minimum_duration_s = minimum_duration_s;
         (self.blocked, self.blocked_count) = blocked;
     }
 
-    /// At rest at its end, the profile stays there until this time.
+    /// Extends a profile that ends at rest: it stays there until this time, in s after its start.
     pub(super) fn rest_until(&mut self, time_s: f64) {
         let target = self.end;
         self.append(time_s - self.duration_s, 0.0, 0.0);
@@ -395,7 +402,7 @@ impl Profile {
         self.duration_s = self.duration_s.max(time_s);
     }
 
-    /// Goes on with this profile, which starts where this one ends.
+    /// Appends another profile, which starts where this one ends.
     pub(super) fn join(&mut self, next: &Self) {
         for phase in next.phases() {
             self.end = phase.start;

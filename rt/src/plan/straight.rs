@@ -1,23 +1,23 @@
-//! Straight lines: all axes follow one profile, each in its own proportion (`otg.md` section 2, 6).
+//! Straight lines (the paper's "phase synchronisation"): all axes follow one profile, each multiplied by its own ratio.
 
 use super::error::PlanError;
 use super::problem::{Limits, Problem, State};
 use super::profile::Profile;
 
-/// Relative to its size, a quantity may be this far from its proportion.
+/// A quantity may differ from its proportion by this much, relative to its size.
 const PROPORTION: f64 = 1e-9;
 
-/// Relative to positions and limits, differences up to this are rounding.
+/// A difference up to this, relative to positions and limits, is rounding.
 const ROUNDING: f64 = 1024.0 * f64::EPSILON;
 
-/// The direction of a motion on a straight line: every axis moves in proportion to one of them.
+/// The straight line of a motion: every axis moves in proportion to one of them, the reference axis.
 #[derive(Clone, Copy)]
 pub(super) struct Line {
     reference: usize,
     problem: Problem,
 }
 
-/// What must be in proportion: distance, velocities and accelerations at both ends.
+/// The quantities that must be in proportion: the distance, and the velocities and accelerations at both ends.
 fn quantities(problem: &Problem) -> [f64; 5] {
     let Problem { start, target, limits } = problem;
     let accelerations =
@@ -30,9 +30,9 @@ impl Line {
     /// The line on which all axes move.
     ///
     /// # Errors
-    /// [`PlanError::NotStraight`] when an axis is not in proportion to the others.
+    /// [`PlanError::NotStraight`] if an axis is not in proportion to the others.
     pub(super) fn of(problems: &[Problem]) -> Result<Self, PlanError> {
-        // The axis with the longest way; where none has any, the fastest, or the one that accelerates most.
+        // The axis with the longest distance. If all distances are zero: the fastest axis, or the one that accelerates most.
         let mut reference = (
             0,
             Problem {
@@ -63,7 +63,7 @@ impl Line {
         Ok(line)
     }
 
-    /// How far the axis moves when the reference moves by one.
+    /// How far the axis moves when the reference axis moves by one.
     fn ratio(&self, problem: &Problem) -> f64 {
         let all = quantities(&self.problem).into_iter().zip(quantities(problem));
         all.into_iter()
@@ -84,7 +84,7 @@ impl Line {
         })
     }
 
-    /// The problem of the reference axis within limits that keep those of all axes.
+    /// The problem of the reference axis, with limits so that every axis keeps its own.
     pub(super) fn projected(&self, problems: &[Problem]) -> Problem {
         let mut limits =
             Limits { position_max: f64::INFINITY, position_min: f64::NEG_INFINITY, ..self.problem.limits };
@@ -126,7 +126,7 @@ impl Line {
             value >= min * (1.0 + ROUNDING) && value <= max * (1.0 + ROUNDING)
         };
         let extrema = reference.extrema();
-        // Without a limit of the jerk the acceleration leaps between the phases.
+        // Without a jerk limit the acceleration jumps between the phases.
         let jerk = match self.problem.limits.is_second_order() {
             true => f64::INFINITY,
             false => reference.phases().fold(0.0_f64, |largest, phase| largest.max(phase.jerk.abs())),

@@ -1,78 +1,34 @@
-//! Several axes, one duration (`otg.md` section 2, 4).
+//! Several axes with one duration (the paper's "time synchronisation").
+//!
+//! 1. Each axis finds its fastest profile and its blocked durations.
+//! 2. The common duration is the shortest one that is long enough for every axis and that no axis blocks.
+//! 3. Each axis finds the profile of exactly that duration.
+//! 4. Where a profile leaves a position limit, `travel` replaces it.
 
 use super::error::PlanError;
-use super::problem::{Limits, Problem, SIZE_MAX, State};
+use super::options::{PlanOptions, Return, Synchronisation};
+use super::problem::{Limits, Problem, State};
 use super::profile::{BLOCKED_MAX, Profile};
 use super::straight::Line;
 use super::{jerk_limited, trapezoid, travel};
 
-/// What the axes have in common.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Synchronisation {
-    /// All axes arrive at the same time, as soon as the slowest can.
-    #[default]
-    Time,
-    /// As [`Time`](Self::Time), and on a straight line where that takes no longer.
-    Phase,
-    /// On a straight line, be it slower; an error where start and target are not on one.
-    Straight,
-    /// Every axis takes its own shortest time, and goes on with its target velocity until all have arrived.
-    Independent,
-}
-
-/// How a velocity beyond its limit, as after a limit was lowered in motion, comes back to it.
-///
-/// Second-order planning makes no difference: its deceleration can end in an instant.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Return {
-    /// As fast as possible. At the limit the deceleration is still large, so the velocity goes on below it
-    /// before the motion to the target can take over, even to a reversal.
-    #[default]
-    Fastest,
-    /// Such that the velocity ends at the limit without deceleration, and never went below.
-    Settled,
-}
-
-/// When a motion shall end, and how it gets there.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct PlanOptions {
-    /// What the axes have in common.
-    pub synchronisation: Synchronisation,
-    /// The motion takes at least this long, in s. 0 for as fast as possible.
-    pub minimum_duration_s: f64,
-    /// The duration is a multiple of this cycle, in s.
-    pub cycle_s: Option<f64>,
-    /// How a velocity beyond its limit comes back to it.
-    pub return_to_limits: Return,
-}
-
-impl PlanOptions {
-    fn validate(&self) -> Result<(), PlanError> {
-        let least_valid = self.minimum_duration_s >= 0.0 && self.minimum_duration_s < SIZE_MAX;
-        let cycle_valid = self.cycle_s.is_none_or(|cycle_s| cycle_s > 1.0 / SIZE_MAX && cycle_s < SIZE_MAX);
-        if least_valid && cycle_valid { Ok(()) } else { Err(PlanError::InvalidTiming) }
-    }
-}
-
-/// What is controlled: where an axis arrives, or only how fast it then is.
+/// What the target of an axis is: a position with the velocity and acceleration there, or a velocity alone.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Interface {
     Position(Return),
     Velocity,
 }
 
-/// Plans the motion of all axes to their targets and gives its duration in s.
+/// Plans the motion of all axes to their targets and returns its duration in s.
 ///
-/// Profile by profile: from the start state, back into the limits if it is outside of them, to exactly the
-/// target state, within the limits at every instant. A problem with an infinite jerk limit is planned in
-/// second order.
+/// Each profile goes from the start state to exactly the target state, within the limits at every instant. A start outside the
+/// limits is first brought back into them. A problem with an infinite jerk limit is planned in second order.
 ///
-/// The work is bounded: each axis is solved at most twice, and the search for a duration that no axis blocks
-/// looks at each blocked interval at most once more than there are intervals.
+/// The method is that of L. Berscheid and T. Kröger (RSS 2021). The work is bounded: see the [module](super).
 ///
 /// # Errors
-/// The first thing that is wrong with a problem, with the index of its axis; the profiles are then of no use,
-/// except after [`PlanError::PositionBeyondLimit`], where they hold a coordinated [`stop`].
+/// The first thing that is wrong with a problem, with the index of its axis. Do not use the profiles then, except after
+/// [`PlanError::PositionBeyondLimit`]: there they hold a coordinated [`stop`].
 pub fn synchronised(
     problems: &[Problem],
     profiles: &mut [Profile],
@@ -93,7 +49,7 @@ pub fn synchronised(
     }
 }
 
-/// The first position limit that is left.
+/// The first axis that leaves a position limit.
 fn first_left(problems: &[Problem], profiles: &[Profile]) -> Option<PlanError> {
     let mut axes = problems.iter().zip(profiles).enumerate();
     axes.find_map(|(axis, (problem, profile))| {
@@ -101,15 +57,15 @@ fn first_left(problems: &[Problem], profiles: &[Profile]) -> Option<PlanError> {
     })
 }
 
-/// Replaces the motions that leave a position limit. Where that takes longer, all axes are planned once more for the
-/// longer time.
+/// Replaces the motions that leave a position limit. If a new one takes longer, all axes are planned again for the longer
+/// time.
 fn keep_travel(
     problems: &[Problem],
     profiles: &mut [Profile],
     timing: PlanOptions,
     duration_s: f64,
 ) -> Result<f64, PlanError> {
-    let manner = timing.return_to_limits;
+    let return_to_limits = timing.return_to_limits;
     let own_time = timing.synchronisation == Synchronisation::Independent;
     let mut duration_s = duration_s;
     for _ in 0..ROUNDS_MAX {
@@ -120,10 +76,10 @@ fn keep_travel(
             }
             let on_axis = |error: PlanError| error.on_axis(axis);
             let least_s = if own_time { profile.duration_s() } else { duration_s };
-            travel::motion_within(problem, manner, least_s, profile).map_err(on_axis)?;
+            travel::motion_within(problem, return_to_limits, least_s, profile).map_err(on_axis)?;
             let own_s = on_grid(profile.duration_s(), timing.cycle_s);
             if own_s > profile.duration_s() {
-                travel::motion_within(problem, manner, own_s, profile).map_err(on_axis)?;
+                travel::motion_within(problem, return_to_limits, own_s, profile).map_err(on_axis)?;
             }
             longest_s = longest_s.max(profile.duration_s());
         }
@@ -132,7 +88,7 @@ fn keep_travel(
         }
         let timing =
             PlanOptions { minimum_duration_s: longest_s, synchronisation: Synchronisation::Time, ..timing };
-        duration_s = plan(Interface::Position(manner), problems, profiles, timing)?;
+        duration_s = plan(Interface::Position(return_to_limits), problems, profiles, timing)?;
         if first_left(problems, profiles).is_none() {
             return Ok(duration_s);
         }
@@ -140,10 +96,10 @@ fn keep_travel(
     Err(first_left(problems, profiles).unwrap_or(PlanError::InvalidTiming))
 }
 
-/// Plans the motion of all axes to their target velocities, wherever that leads, and gives its duration in s.
+/// Plans the motion of all axes to their target velocities and returns its duration in s.
 ///
-/// The target positions are not read. Limits of position and velocity are not looked at: leaving them may be the only way to
-/// reach the velocity; see [`Profile::extrema`].
+/// The target positions are not read. The limits of position and velocity are not checked, because a motion may have to leave
+/// them to reach the velocity. [`Profile::extrema`] says what the motion keeps.
 ///
 /// # Errors
 /// As [`synchronised`].
@@ -155,19 +111,21 @@ pub fn synchronised_velocity(
     plan(Interface::Velocity, problems, profiles, timing)
 }
 
-/// Plans the fastest coordinated stop: every axis comes to rest, all at the same time. Gives the duration in s.
+/// Plans the fastest coordinated stop: all axes come to rest at the same time. Returns the duration in s.
 ///
-/// An axis that would leave its position limits that way stops by itself and waits for the others: as fast as it can or,
-/// where that leads beyond a limit, by decelerating further, so that it turns around just there and swings back. From
-/// a start within the limits of acceleration,
+/// An axis that would leave a position limit in the coordinated stop does not take part in it. It stops as fast as it can
+/// and waits for the others. If the fastest stop leaves the limit too, the axis goes on decelerating at the standstill: it
+/// reverses its direction at the limit and comes to rest on the near side of it.
 ///
-/// - the position limit it runs towards is kept whenever any motion within the limits of acceleration and jerk keeps it; where none does,
-///   the way beyond it is the shortest;
-/// - the velocity limits are kept, too, whenever any such motion keeps them together with that position limit; where
-///   none does, the position comes first and the swing back is as slow as it can be.
+/// If the acceleration at the start is within its limits, then:
 ///
-/// Where both position limits are nearer to each other than such a swing is wide, it may leave the other one. What the
-/// motion does keep in the end is in [`Profile::extrema`].
+/// - The axis keeps the position limit that it moves towards whenever any motion within the limits of acceleration and jerk
+///   keeps it. Where none does, the axis goes as little beyond the limit as possible.
+/// - The axis keeps its velocity limits too, whenever any such motion keeps both. Where none does, the position limit comes
+///   first, and the axis moves back as slowly as possible.
+///
+/// Where the two position limits are close together, the motion back may leave the other limit.
+/// [`Profile::extrema`] says what the motion keeps.
 ///
 /// # Errors
 /// As [`synchronised`].
@@ -177,7 +135,7 @@ pub fn stop(starts: &[State], limits: &[Limits], profiles: &mut [Profile]) -> Re
     halt(starts.iter().copied().zip(limits.iter().copied()), profiles)
 }
 
-/// Plans one axis to its target in the shortest time.
+/// Plans the motion of one axis to its target in the shortest time.
 ///
 /// # Errors
 /// As [`synchronised`], with axis 0.
@@ -188,7 +146,7 @@ pub fn position(problem: &Problem) -> Result<Profile, PlanError> {
     Ok(profile)
 }
 
-/// Plans one axis to its target velocity in the shortest time.
+/// Plans the motion of one axis to its target velocity in the shortest time.
 ///
 /// # Errors
 /// As [`synchronised`], with axis 0.
@@ -237,7 +195,7 @@ fn plan(
     timing.validate()?;
     let mut longest_s = timing.minimum_duration_s;
     for (axis, (problem, profile)) in problems.iter().zip(profiles.iter_mut()).enumerate() {
-        // An axis that will be made to last longer needs no phases yet.
+        // An axis that must last longer than this needs no phases yet.
         let least_s = if timing.synchronisation == Synchronisation::Independent { 0.0 } else { longest_s };
         let fastest_s = fastest(interface, problem, least_s, profile).map_err(|error| error.on_axis(axis))?;
         longest_s = longest_s.max(fastest_s);
@@ -266,7 +224,7 @@ fn plan(
     Ok(duration_s)
 }
 
-/// Puts the axes on a straight line if the one with the longest way is on a profile that all can follow.
+/// Puts the axes on a straight line if all of them can follow the profile of the axis with the longest distance.
 fn follow_line(problems: &[Problem], profiles: &mut [Profile]) {
     if let Ok(line) = Line::of(problems)
         && let Some(reference) = profiles.get(line.reference()).copied()
@@ -276,7 +234,7 @@ fn follow_line(problems: &[Problem], profiles: &mut [Profile]) {
     }
 }
 
-/// Plans the motion on a straight line, within the limits of all axes projected on it.
+/// Plans the motion on a straight line, within the limits of all axes projected on that line.
 fn straight(
     interface: Interface,
     problems: &[Problem],
@@ -299,7 +257,7 @@ fn expect_length(expected: usize, received: usize) -> Result<(), PlanError> {
     if expected == received { Ok(()) } else { Err(PlanError::LengthMismatch { expected, received }) }
 }
 
-/// The fastest profile of one axis, and its duration in s. Its phases are left out where it lasts less than `least_s`.
+/// Plans the fastest profile of one axis and returns its duration in s. A profile shorter than `least_s` gets no phases.
 fn fastest(
     interface: Interface,
     problem: &Problem,
@@ -313,15 +271,15 @@ fn fastest(
     match (interface, problem.limits.is_second_order()) {
         (Interface::Position(_), true) => trapezoid::fastest_position(problem, least_s, profile),
         (Interface::Velocity, true) => trapezoid::fastest_velocity(problem, profile),
-        (Interface::Position(manner), false) => {
-            jerk_limited::fastest_position(problem, manner, least_s, profile)
+        (Interface::Position(return_to_limits), false) => {
+            jerk_limited::fastest_position(problem, return_to_limits, least_s, profile)
         }
         (Interface::Velocity, false) => jerk_limited::fastest_velocity(problem, least_s, profile),
     }?;
     Ok(profile.minimum_duration_s())
 }
 
-/// The profile of one axis that lasts this long; it holds the fastest one before, unless that is shorter.
+/// Plans the profile of one axis that lasts this long. `profile` must hold what [`fastest`] has made of it.
 fn lasting(
     interface: Interface,
     problem: &Problem,
@@ -334,28 +292,27 @@ fn lasting(
     match (interface, problem.limits.is_second_order()) {
         (Interface::Position(_), true) => trapezoid::position_lasting(problem, duration_s, profile),
         (Interface::Velocity, true) => trapezoid::velocity_lasting(problem, duration_s, profile),
-        (Interface::Position(manner), false) => {
-            jerk_limited::position_lasting(problem, manner, duration_s, profile)
+        (Interface::Position(return_to_limits), false) => {
+            jerk_limited::position_lasting(problem, return_to_limits, duration_s, profile)
         }
         (Interface::Velocity, false) => jerk_limited::velocity_lasting(problem, duration_s, profile),
     }
 }
 
-/// Relative to a duration, being above a multiple of the cycle by this much is rounding.
+/// A duration above a multiple of the cycle by this much, relative to it, counts as that multiple: the rest is rounding.
 const GRID_ROUNDING: f64 = 1e-11;
 
-/// How often a longer time for one axis may ask for a longer time for another.
+/// How often a longer time for one axis may require a longer time for another axis.
 const ROUNDS_MAX: u32 = 3;
 
-/// Relative to a duration, a difference up to this is rounding.
+/// A difference of two durations up to this, relative to them, is rounding.
 const ROUNDING: f64 = 1024.0 * f64::EPSILON;
 
-/// The shortest duration from this one on that no axis blocks.
+/// The shortest duration that is not below `least_s` and that no axis blocks.
 ///
-/// Every step jumps over at least one blocked interval and none comes back, so there are at most as many steps
-/// as intervals.
+/// Every step passes at least one blocked interval for good. So there are at most as many steps as intervals.
 fn unblocked(least_s: f64, profiles: &[Profile], cycle_s: Option<f64>) -> f64 {
-    // Durations that differ by rounding are the same: two axes with the same motion must not block each other.
+    // Durations that differ by rounding are equal. Two axes with the same motion must not block each other.
     let rounding = if cycle_s.is_some() { GRID_ROUNDING } else { ROUNDING };
     let mut duration_s = on_grid(least_s, cycle_s);
     for _ in 0..=profiles.len().saturating_mul(BLOCKED_MAX) {
@@ -371,7 +328,7 @@ fn unblocked(least_s: f64, profiles: &[Profile], cycle_s: Option<f64>) -> f64 {
     duration_s
 }
 
-/// The first multiple of the cycle that is not less, apart from rounding.
+/// The smallest multiple of the cycle that is not below this duration, apart from rounding.
 fn on_grid(duration_s: f64, cycle_s: Option<f64>) -> f64 {
     match cycle_s {
         Some(cycle_s) => libm::ceil(duration_s / cycle_s * (1.0 - GRID_ROUNDING)) * cycle_s,

@@ -1,21 +1,22 @@
-//! Following a target that moves: given anew in every cycle, with velocity and acceleration.
+//! Tracking: following a moving target that comes with a velocity and an acceleration in every cycle.
 //!
-//! Seen from the target, the axis has to come to rest at the origin, within limits that are shifted by the target's
-//! velocity and acceleration. That is a problem like any other, and one without blocked intervals.
+//! In the frame of the target, the axis must come to rest at the origin. The limits there are shifted by the velocity and the
+//! acceleration of the target. That is an ordinary planning problem, without blocked intervals.
 
 use super::error::PlanError;
+use super::options::{PlanOptions, Return, Synchronisation};
 use super::problem::{Limits, Problem, State};
 use super::profile::Profile;
-use super::synchronisation::{PlanOptions, Return, Synchronisation, synchronised};
+use super::synchronisation::synchronised;
 use super::travel;
 
-/// The share of the acceleration limits that a target may use; the rest is for catching up with it.
+/// The share of the acceleration limits that a target may use. The axis needs the rest to catch up with the target.
 const ACCELERATION_SHARE: f64 = 0.95;
 
-/// Relative to the velocity limits, being bound beyond them by this much is rounding.
+/// A velocity that will exceed its limits by this much, relative to their width, exceeds them by rounding only.
 const ROUNDING: f64 = 1e-12;
 
-/// A velocity limit is come back to without going below it.
+/// The timing of a tracked motion: a velocity beyond its limit comes back to the limit without falling below it.
 const SETTLED: PlanOptions = PlanOptions {
     synchronisation: Synchronisation::Time,
     minimum_duration_s: 0.0,
@@ -27,22 +28,24 @@ const SETTLED: PlanOptions = PlanOptions {
 const VELOCITY_SHARE: f64 = 1.0 - 1e-9;
 
 impl Problem {
-    /// The state to command one cycle from now, on the way to a target that moves on as it does now.
+    /// The state to command one cycle (`cycle_s`, in s, positive and finite) from now, on the way to a moving target.
     ///
-    /// `target` is where the target is now, how fast and with what acceleration it moves; what it asks for beyond the
-    /// limits is cut off at them. Called in every cycle with its last answer as the start, it follows any target that
-    /// keeps the limits, with an error that stems from the change of the target's acceleration within a cycle only.
-    /// The position limits are kept whenever a stop from the start keeps them, and from one cycle to the next the position
-    /// changes by no more than the velocity limit allows.
+    /// `target` is the present position, velocity and acceleration of the target; the acceleration is taken as constant. A
+    /// target beyond the limits is cut off at them.
+    ///
+    /// Call this in every cycle, with the last result as the start. Then the axis follows any target that keeps the limits.
+    /// The remaining error comes only from the change of the target's acceleration within one cycle. The position limits are
+    /// kept whenever a stop from the start keeps them. From one cycle to the next the position changes by no more than the
+    /// velocity limit allows.
     ///
     /// # Errors
-    /// As [`synchronised`], with axis 0.
+    /// [`PlanError::InvalidTiming`] for a cycle that is not positive and finite; otherwise as [`synchronised`], with axis 0.
     pub fn track(&self, cycle_s: f64) -> Result<State, PlanError> {
         if !(cycle_s > 0.0 && cycle_s.is_finite()) {
             return Err(PlanError::InvalidTiming);
         }
         self.validate().or_else(|error| match error {
-            // The target is cut off at the limits.
+            // `feasible_target` cuts the target off at the limits.
             PlanError::TargetBeyondLimit { .. } => Ok(()),
             other => Err(other),
         })?;
@@ -51,9 +54,9 @@ impl Problem {
         if self.keeps_step(&met, cycle_s) && self.can_go_on(&met)? {
             return Ok(met);
         }
-        // The target is bound for a limit, and following it as closely as possible would be, too.
+        // The target moves towards a limit, and so would an axis that follows it as closely as possible.
         let mut profile = Profile::hold(0.0);
-        let waypoint = State { acceleration: 0.0, ..moved(&target, cycle_s) };
+        let waypoint = State { acceleration: 0.0, ..target.after(cycle_s) };
         let absolute = Self { target: self.within_limits(&waypoint), ..*self };
         let planned = synchronised(&[absolute], core::slice::from_mut(&mut profile), SETTLED);
         let next = profile.sample(cycle_s);
@@ -64,10 +67,10 @@ impl Problem {
         Ok(profile.sample(cycle_s))
     }
 
-    /// The first cycle of the fastest way to meet the target and move with it, as seen from the target.
+    /// The first cycle of the fastest motion to the target, planned in the frame of the target.
     fn relative_step(&self, now: &State, cycle_s: f64) -> Result<State, PlanError> {
         let Self { start, limits, .. } = self;
-        let then = moved(now, cycle_s);
+        let then = now.after(cycle_s);
         let seen = Self {
             start: State {
                 position: start.position - now.position,
@@ -95,7 +98,8 @@ impl Problem {
 
     /// Whether the position changes in the cycle by no more than the velocity limits allow.
     ///
-    /// Seen from a target that accelerates, a velocity may swing and be back within the cycle; on the axis it must not.
+    /// In the frame of an accelerating target the velocity may rise and fall again within the cycle. On the axis it must
+    /// not exceed its limit meanwhile.
     fn keeps_step(&self, next: &State, cycle_s: f64) -> bool {
         let Self { start, limits, .. } = self;
         let step = next.position - start.position;
@@ -105,18 +109,18 @@ impl Problem {
             && step >= cycle_s * limits.velocity_min.min(start.velocity) - rounding
     }
 
-    /// Whether the axis can keep its limits from this state on.
+    /// Whether the axis can still keep its limits after this state.
     fn can_go_on(&self, next: &State) -> Result<bool, PlanError> {
         let Self { start, limits, .. } = self;
-        let bound_for = |state: &State| {
+        let excess_ahead = |state: &State| {
             let coming = 0.5 * state.acceleration * state.acceleration.abs() / limits.jerk_max;
             let highest = state.velocity + coming.max(0.0);
             let lowest = state.velocity + coming.min(0.0);
             (highest - limits.velocity_max).max(limits.velocity_min - lowest)
         };
-        // From a start beyond a limit it is enough to come nearer.
+        // For a start beyond a limit it is enough to come nearer to the limit.
         let rounding = ROUNDING * (limits.velocity_max - limits.velocity_min);
-        if bound_for(next) > bound_for(start).max(rounding) {
+        if excess_ahead(next) > excess_ahead(start).max(rounding) {
             return Ok(false);
         }
         let mut profile = Profile::hold(0.0);
@@ -131,14 +135,14 @@ impl Problem {
         State { velocity: state.velocity.clamp(velocity_min, velocity_max), ..*state }
     }
 
-    /// Whether the state is within the position limits, or at least no further out than the start.
+    /// Whether the state is within the position limits, or not further out than the start.
     fn within_travel(&self, state: &State) -> bool {
         let Self { start, limits, .. } = self;
         state.position <= limits.position_max.max(start.position)
             && state.position >= limits.position_min.min(start.position)
     }
 
-    /// The target, as far as the limits let the axis be there and move with it.
+    /// The target, cut off where the limits do not let the axis be there or move with it.
     fn feasible_target(&self, cycle_s: f64) -> State {
         let Self { target, limits, .. } = self;
         let position = target.position.clamp(limits.position_min, limits.position_max);
@@ -151,19 +155,9 @@ impl Problem {
             ACCELERATION_SHARE * limits.acceleration_min,
             ACCELERATION_SHARE * limits.acceleration_max,
         );
-        // At a velocity limit, or beyond it after the cycle, the acceleration is none the axis could follow.
+        // The axis cannot follow an acceleration that leads beyond a velocity limit within the cycle.
         let within = (slowest..=fastest).contains(&(velocity + acceleration * cycle_s));
         let follows = within && velocity == target.velocity && !limits.is_second_order();
         State { position, velocity, acceleration: if follows { acceleration } else { 0.0 } }
-    }
-}
-
-/// Where a target with constant acceleration is after this time.
-fn moved(target: &State, time_s: f64) -> State {
-    let State { position, velocity, acceleration } = *target;
-    State {
-        position: position + time_s * (velocity + 0.5 * acceleration * time_s),
-        velocity: velocity + acceleration * time_s,
-        acceleration,
     }
 }

@@ -1,15 +1,15 @@
-//! Second order: accelerate, cruise, decelerate, in closed form: see [`Ramp`].
+//! Second order, without a jerk limit: accelerate, cruise, decelerate. It is solved in closed form; see [`SecondOrder`].
 
 use super::choice::{larger, smaller};
 use super::error::PlanError;
 use super::problem::{Limits, Problem, State};
 use super::profile::Profile;
-use super::ramp::{Ramp, Slopes, Stretches};
+use super::second_order::{SecondOrder, Slopes, ThreePhases};
 
-/// Relative to the sizes of a problem, differences up to this are rounding.
+/// A difference up to this, relative to the sizes of a problem, is rounding.
 const ROUNDING: f64 = 1024.0 * f64::EPSILON;
 
-/// Begins the profile with the way of the velocity back to its limit, and gives the state behind it.
+/// Begins the profile with the brake: the velocity returns to its limit. Returns the state behind the brake.
 #[inline]
 fn brake(start: &State, limits: &Limits, profile: &mut Profile) -> State {
     let start = State { acceleration: 0.0, ..*start };
@@ -24,18 +24,18 @@ fn brake(start: &State, limits: &Limits, profile: &mut Profile) -> State {
     State { velocity, ..profile.reached() }
 }
 
-/// The problem from this state, which must be within the limits.
+/// The second-order problem from this state, which must be within the limits.
 #[inline(always)]
-fn ramp(start: &State, target: &State, limits: &Limits) -> Result<Ramp, PlanError> {
+fn second_order_problem(start: &State, target: &State, limits: &Limits) -> Result<SecondOrder, PlanError> {
     let slopes = Slopes::asymmetric(limits.acceleration_max, limits.acceleration_min);
-    // The state may have gone through many cycles of sampling and planning.
+    // The state may have gone through many cycles of sampling and planning, each of which rounds.
     let fastest = larger(limits.velocity_max, -limits.velocity_min);
     let places = slopes.mean() * (start.position.abs() + target.position.abs());
-    let rounding = ROUNDING * (places + slopes.swing(fastest));
+    let rounding = ROUNDING * (places + slopes.area_to_rate(fastest));
     if !rounding.is_finite() {
         return Err(PlanError::NotRepresentable { axis: 0 });
     }
-    Ok(Ramp {
+    Ok(SecondOrder {
         area: slopes.mean() * (target.position - start.position),
         rounding,
         start: start.velocity,
@@ -47,25 +47,25 @@ fn ramp(start: &State, target: &State, limits: &Limits) -> Result<Ramp, PlanErro
 }
 
 #[inline(always)]
-fn drive(reached: State, stretches: &Stretches, profile: &mut Profile) {
-    profile.accelerate_all(reached, &stretches.durations, &stretches.slopes);
+fn append(reached: State, phases: &ThreePhases, profile: &mut Profile) {
+    profile.accelerate_all(reached, &phases.durations, &phases.slopes);
 }
 
 fn target(problem: &Problem) -> State {
     State { acceleration: 0.0, ..problem.target }
 }
 
-/// The fastest profile to the target position and velocity, with its blocked interval. Its phases are left out where it
-/// lasts less than `least_s`.
+/// Plans the fastest profile to the target position and velocity, with its blocked interval. A profile shorter than
+/// `least_s` gets no phases.
 pub(super) fn fastest_position(
     problem: &Problem,
     least_s: f64,
     profile: &mut Profile,
 ) -> Result<(), PlanError> {
     let start = brake(&problem.start, &problem.limits, profile);
-    let ramp = ramp(&start, &problem.target, &problem.limits)?;
+    let core = second_order_problem(&start, &problem.target, &problem.limits)?;
     let brake_s = profile.duration_s();
-    let fastest = ramp.fastest();
+    let fastest = core.fastest();
     let fastest_s = brake_s + fastest.duration;
     profile.set_minimum_duration(fastest_s);
     if let Some((after, before)) = fastest.blocked {
@@ -74,24 +74,24 @@ pub(super) fn fastest_position(
     if fastest_s < least_s {
         return profile.leave_open(fastest_s);
     }
-    drive(start, &ramp.stretches(fastest.way), profile);
+    append(start, &core.phases(fastest.cruise), profile);
     profile.finish_at(target(problem), fastest_s)
 }
 
-/// The profile to the target position and velocity that lasts this long.
+/// Plans the profile to the target position and velocity that lasts this long.
 pub(super) fn position_lasting(
     problem: &Problem,
     duration_s: f64,
     profile: &mut Profile,
 ) -> Result<(), PlanError> {
     let start = brake(&problem.start, &problem.limits, profile);
-    let ramp = ramp(&start, &problem.target, &problem.limits)?;
-    let way = ramp.lasting(duration_s - profile.duration_s());
-    drive(start, &ramp.stretches(way), profile);
+    let core = second_order_problem(&start, &problem.target, &problem.limits)?;
+    let cruise = core.lasting(duration_s - profile.duration_s());
+    append(start, &core.phases(cruise), profile);
     profile.finish_at(target(problem), duration_s)
 }
 
-/// The fastest profile to the target velocity, wherever that leads.
+/// Plans the fastest profile to the target velocity, whatever its final position is.
 pub(super) fn fastest_velocity(problem: &Problem, profile: &mut Profile) -> Result<(), PlanError> {
     let Problem { start, target, limits } = problem;
     profile.begin(State { acceleration: 0.0, ..*start });
@@ -104,7 +104,7 @@ pub(super) fn fastest_velocity(problem: &Problem, profile: &mut Profile) -> Resu
     Ok(())
 }
 
-/// The profile to the target velocity that lasts this long: with a smaller acceleration.
+/// Plans the profile to the target velocity that lasts this long, with a smaller acceleration than the limit.
 pub(super) fn velocity_lasting(
     problem: &Problem,
     duration_s: f64,

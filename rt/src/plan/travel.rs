@@ -1,19 +1,19 @@
-//! Position limits: what to do where the fastest motion, or the coordinated stop, would leave them.
+//! Position limits: what an axis does where its motion, or the coordinated stop, would leave them.
 //!
-//! In place of a motion that swings beyond a limit, the axis arrives early and waits, or first stops and then goes to
-//! the target from rest. In place of a stop that runs on to be coordinated, it stops as fast as it can, or on a
-//! shorter way, on which it still decelerates when the motion turns around.
+//! - A motion that leaves a limit is replaced: the axis arrives early and waits. If that is not possible, it first stops and
+//!   then goes to the target from rest.
+//! - A coordinated stop that leaves a limit is replaced by the fastest stop, or by one that reverses at the limit.
 
 use super::error::{Limit, PlanError};
+use super::options::Return;
 use super::problem::{Limits, Problem, State};
 use super::profile::Profile;
-use super::synchronisation::Return;
 use super::{jerk_limited, trapezoid};
 
-/// Relative to the positions, leaving a limit by this much is rounding.
+/// Leaving a position limit by this much, relative to the positions, is rounding.
 const ROUNDING: f64 = 1e-12;
 
-/// The position limit that the profile leaves, if any. From a start outside of them it may only come back.
+/// The position limit that the profile leaves, if any. A profile that starts outside a limit must not go further out.
 pub(super) fn limit_left(problem: &Problem, profile: &Profile) -> Option<Limit> {
     let Problem { start, limits, .. } = problem;
     if limits.position_max == f64::INFINITY && limits.position_min == f64::NEG_INFINITY {
@@ -30,7 +30,7 @@ pub(super) fn limit_left(problem: &Problem, profile: &Profile) -> Option<Limit> 
     }
 }
 
-/// The fastest stop, or where that leaves a position limit the one that turns around at it: see
+/// Plans the fastest stop. If it leaves a position limit, plans the stop that reverses at that limit; see
 /// [`stop`](super::stop) for what it keeps.
 pub(super) fn stop_within(start: State, limits: &Limits, profile: &mut Profile) -> Result<(), PlanError> {
     let problem = Problem { start, target: State::rest(start.position), limits: *limits };
@@ -39,18 +39,18 @@ pub(super) fn stop_within(start: State, limits: &Limits, profile: &mut Profile) 
     }
     jerk_limited::fastest_velocity(&problem, 0.0, profile)?;
     if let Some(limit) = limit_left(&problem, profile) {
-        jerk_limited::stop_turning(&problem, limit, profile)?;
+        jerk_limited::reversing_stop(&problem, limit, profile)?;
     }
     Ok(())
 }
 
-/// A motion to the target within the position limits that lasts at least this long.
+/// Plans a motion to the target within the position limits that lasts at least `least_s`.
 ///
 /// # Errors
-/// The limit that none of the motions keeps, in a [`PlanError::PositionBeyondLimit`] of axis 0.
+/// [`PlanError::PositionBeyondLimit`] with axis 0 and the limit that none of the motions keeps.
 pub(super) fn motion_within(
     problem: &Problem,
-    manner: Return,
+    return_to_limits: Return,
     least_s: f64,
     profile: &mut Profile,
 ) -> Result<(), PlanError> {
@@ -59,7 +59,7 @@ pub(super) fn motion_within(
         if limits.is_second_order() {
             trapezoid::fastest_position(problem, 0.0, profile)
         } else {
-            jerk_limited::fastest_position(problem, manner, 0.0, profile)
+            jerk_limited::fastest_position(problem, return_to_limits, 0.0, profile)
         }
     };
     fastest(problem, profile)?;
@@ -73,7 +73,7 @@ pub(super) fn motion_within(
     let speeds = profile.extrema().velocity;
     let (min, max) = (limits.velocity_min.min(start.velocity), limits.velocity_max.max(start.velocity));
     if speeds.max > max * (1.0 + ROUNDING) || speeds.min < min * (1.0 + ROUNDING) {
-        // The stop is short enough only because it swings back faster than the axis may go.
+        // The stop keeps the position limit, but it moves back faster than the velocity limit allows.
         let limit = if start.velocity > 0.0 { Limit::PositionMax } else { Limit::PositionMin };
         return Err(PlanError::PositionBeyondLimit { axis: 0, limit });
     }

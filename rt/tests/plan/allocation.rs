@@ -1,4 +1,4 @@
-//! Nothing allocates, on any path (`otg.md` section 4, 9): every allocation of the thread is counted.
+//! The planner allocates nothing on any path: every allocation of the thread is counted.
 
 use super::families::FAMILIES;
 use super::random::Random;
@@ -13,10 +13,10 @@ thread_local! {
     static ALLOCATIONS: Cell<u64> = const { Cell::new(0) };
 }
 
-/// The system's allocator, with a count for each thread.
+/// The allocator of the system, with a count for each thread.
 struct Counting;
 
-// SAFETY: every call is handed on unchanged to the system's allocator; the count touches no memory of the heap.
+// SAFETY: every call goes unchanged to the allocator of the system. The count touches no memory of the heap.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         let _ = ALLOCATIONS.try_with(|count| count.set(count.get() + 1));
@@ -62,7 +62,7 @@ fn no_plan_stop_sample_or_step_of_tracking_allocates() {
     let (mut planned, mut refused) = (0, 0);
     for number in 0..6000 {
         let family = FAMILIES[number % FAMILIES.len()];
-        // Every third set within position limits, which some of the motions leave.
+        // Every third set has position limits, which some of the motions leave.
         let problems: [Problem; 3] = [(); 3].map(|()| {
             let problem = family.problem(&mut random);
             let (one, other) = (problem.start.position, problem.target.position);
@@ -103,7 +103,7 @@ fn no_plan_stop_sample_or_step_of_tracking_allocates() {
     assert!(planned > 3000 && refused > 500, "{planned} {refused}");
 }
 
-/// Plain data: they can be copied and compared, so there is no string in them.
+/// Errors are plain data: they can be copied and compared, so they contain no string.
 fn assert_plain<Data: Copy + Eq + 'static>(_: &Data) {}
 
 #[test]

@@ -1,4 +1,4 @@
-//! Any input at all: an answer or an error, in bounded time, and never a number that is none.
+//! Any input gives an answer or an error, in bounded time, and never a result that is not a number.
 
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
@@ -7,7 +7,7 @@ use takt_rt::plan::{
     synchronised_velocity,
 };
 
-/// Numbers of all sizes, with those at which programs break.
+/// Numbers of all sizes, and those at which programs often fail.
 fn number() -> impl Strategy<Value = f64> {
     prop_oneof![
         4 => -10.0..10.0_f64,
@@ -107,7 +107,7 @@ fn limits_that_are_next_to_nothing_are_refused() {
     assert_eq!(stop(&[start], &[limits], &mut profiles), refused);
 }
 
-/// Found by the fuzzer: each number is far below the end of the range, the products of some are beyond it.
+/// Found by the fuzzer: each number is far below the end of the range of `f64`, but some of their products are beyond it.
 #[test]
 fn states_and_limits_whose_products_overflow_are_refused() {
     let limits = Limits::symmetric(3.5e59, 3.5e59, 3.4e59);
@@ -116,7 +116,7 @@ fn states_and_limits_whose_products_overflow_are_refused() {
     assert_eq!(answer, Err(PlanError::NotRepresentable { axis: 0 }));
 }
 
-/// Found by the fuzzer, too.
+/// Found by the fuzzer.
 #[test]
 fn limits_that_are_beyond_all_measure_are_refused() {
     let limits = Limits::symmetric(8.2e136, 8.2e136, 6.8e136);
@@ -125,7 +125,7 @@ fn limits_that_are_beyond_all_measure_are_refused() {
     assert_eq!(answer, Err(PlanError::NotRepresentable { axis: 0 }));
 }
 
-/// Found by the fuzzer: more cycles than a number can count.
+/// Found by the fuzzer: the duration has more cycles than an `f64` can count.
 #[test]
 fn a_cycle_that_is_next_to_nothing_is_refused() {
     let limits = Limits::symmetric(1.0, 1.0, 1.0);
@@ -143,7 +143,7 @@ fn a_cycle_that_is_next_to_nothing_is_refused() {
     }
 }
 
-/// Found by the fuzzer: every phase of a motion that lasts 2e-307 s is too short to be one.
+/// Found by the fuzzer: the motion lasts 2e-307 s, and every phase of it is too short to exist.
 #[test]
 fn a_motion_that_lasts_next_to_no_time_is_where_it_should_be() {
     let start = State { position: 1.5e11, velocity: 3.399_986_479_566_3e-311, acceleration: 1.5e11 };
@@ -160,7 +160,7 @@ fn a_motion_that_lasts_next_to_no_time_is_where_it_should_be() {
     assert_eq!(profiles[0].phases().count(), 1);
 }
 
-/// Found by the fuzzer: rounding had made the duration negative, and then it was no number.
+/// Found by the fuzzer: rounding made the duration negative, and a result was not a number.
 #[test]
 fn a_motion_that_takes_no_time_beyond_a_position_limit_is_waited_for_or_refused() {
     let limits =

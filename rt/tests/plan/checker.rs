@@ -1,17 +1,17 @@
-//! A judge of profiles that shares no code with the planner: it looks at the phases only.
+//! Checks profiles. It shares no code with the planner, and reads the phases only.
 
 use takt_rt::plan::{Limits, Problem, Profile, State};
 
-/// What the profile must end in.
+/// The end that a profile must have.
 #[derive(Clone, Copy, PartialEq)]
 pub enum Arrival {
     /// At the target state.
     State,
-    /// At the target velocity and acceleration, anywhere.
+    /// At the target velocity and acceleration, at any position.
     Velocity,
 }
 
-/// How far a number may be off, for each quantity, from the sizes that occur in the profile.
+/// The tolerance of each quantity, from the sizes that occur in the profile.
 struct Tolerance {
     position: f64,
     velocity: f64,
@@ -32,8 +32,8 @@ impl Tolerance {
         let second_order = jerk_max.is_infinite();
         let velocity = sizes[1].max(velocity_max).max(-velocity_min);
         let reach = velocity * (profile.duration_s() + velocity / acceleration_max.min(-acceleration_min));
-        // Times, too, have only so many digits; and where the way is short beside the positions, the digits of these
-        // leave the times open, so that a multiple of the cycle may be met a little early.
+        // Times have a limited number of digits too. Where the distance is small beside the positions, the digits of the
+        // positions do not determine the times, so a multiple of the cycle may be met a little early.
         let digits = 4.0 * f64::EPSILON;
         let open = (digits * sizes[0] / sizes[1].max(f64::MIN_POSITIVE)).min(1e-11 * profile.duration_s());
         let time = if second_order { 0.0 } else { digits * profile.duration_s() + open };
@@ -61,7 +61,7 @@ fn check(kept: bool, what: impl Fn() -> String) -> Result<(), String> {
     if kept { Ok(()) } else { Err(what()) }
 }
 
-/// Says what is wrong with the profile as an answer to the problem.
+/// Says what is wrong with the profile as the answer to the problem.
 pub fn judge(problem: &Problem, profile: &Profile, arrival: Arrival) -> Result<(), String> {
     let tolerance = Tolerance::of(problem, profile);
     let second_order = problem.limits.jerk_max.is_infinite();
@@ -116,7 +116,7 @@ fn arrives(
     check(second_order || miss.abs() <= tolerance.acceleration, || format!("acceleration missed by {miss:e}"))
 }
 
-/// Whether the motion has come into the limits yet: from then on it must keep them.
+/// Whether the motion has entered the limits. From then on it must keep them.
 struct Inside {
     now: bool,
     velocity_matters: bool,
@@ -142,7 +142,7 @@ impl Inside {
                 ..=limits.acceleration_max + tolerance.acceleration)
                 .contains(&acceleration)
         };
-        // Inside is also to be able to stay there: the jerk takes the acceleration away in time.
+        // A state is inside only if it can stay there: the jerk can take the acceleration away in time.
         let bound_for =
             start.velocity + start.acceleration * start.acceleration.abs() / (2.0 * limits.jerk_max);
         self.now |= keeps_velocity(start.velocity)

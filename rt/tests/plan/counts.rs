@@ -1,4 +1,4 @@
-//! Commands in the counts of an encoder (`otg.md` section 4, 8).
+//! Commands that are rounded to the counts of an encoder.
 
 use core::f64::consts::TAU;
 use takt_rt::plan::{Limits, PlanOptions, Problem, Profile, State, position, synchronised};
@@ -52,7 +52,7 @@ fn counts_are_half_a_count_off_at_most_and_step_no_further_than_the_velocity_lim
     }
 }
 
-/// Sent there and back for a long time, from the own command and never from what was rounded.
+/// The axis goes there and back for a long time. Each motion starts from the last command, not from the rounded one.
 #[test]
 fn counts_do_not_drift() {
     let limits = Limits::symmetric(2.5, 15.0, 1000.0);
@@ -73,7 +73,7 @@ fn counts_do_not_drift() {
     }
 }
 
-/// What a drive is fed forward is that of the trajectory: taken from the counts, the acceleration would break its limit.
+/// The feed-forward comes from the trajectory. Computed from the counts, the acceleration would break its limit.
 #[test]
 fn velocity_and_acceleration_for_the_drive_are_those_of_the_trajectory_and_not_of_the_counts() {
     let limits = Limits::symmetric(2.5, 15.0, 1000.0);

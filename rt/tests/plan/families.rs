@@ -1,4 +1,4 @@
-//! The families of problems of `otg_oracle.py`, drawn at random.
+//! Random problems, from the same families as those of the oracle's generator.
 
 use super::checker::Arrival;
 use super::random::Random;

@@ -1,5 +1,4 @@
-//! Properties of the jerk-limited planner, and the problems on which planners are known to fail
-//! (`otg.md` section 4).
+//! Properties of the jerk-limited planner, and problems on which other planners are known to fail.
 
 use super::checker::{Arrival, judge};
 use proptest::prelude::*;
@@ -21,7 +20,7 @@ fn limits() -> impl Strategy<Value = Limits> {
     )
 }
 
-/// Any start, also outside the limits, and any target that can be reached within them.
+/// Any start, also one outside the limits, and any target that can be reached within them.
 pub fn problem() -> impl Strategy<Value = Problem> {
     let or_zero = |range: core::ops::Range<f64>| prop_oneof![1 => Just(0.0), 3 => range];
     let start = (-4.0..4.0, or_zero(-3.0..3.0), or_zero(-3.0..3.0));
@@ -30,7 +29,7 @@ pub fn problem() -> impl Strategy<Value = Problem> {
         let of = |part: f64, max: f64, min: f64| if part > 0.0 { part * max } else { -part * min };
         let af = of(a_part, limits.acceleration_max, limits.acceleration_min);
         let vf = of(v_part, limits.velocity_max, limits.velocity_min);
-        // Within what is left by the acceleration's own way.
+        // Within the velocities that the acceleration leaves.
         let before = af * af.abs() / (2.0 * limits.jerk_max);
         let vf = vf.clamp(
             limits.velocity_min + before.max(0.0),
@@ -72,7 +71,7 @@ fn reversed(problem: &Problem) -> Problem {
     turned(problem, turn(&problem.target), turn(&problem.start), false)
 }
 
-/// The same problem in a unit that is so many times smaller.
+/// The same problem in a unit that is smaller by this factor.
 pub fn scaled(problem: &Problem, factor: f64) -> Problem {
     let scale = |of: &State| state(of.position * factor, of.velocity * factor, of.acceleration * factor);
     let Limits { velocity_max, velocity_min, acceleration_max, acceleration_min, jerk_max, .. } =
@@ -164,7 +163,6 @@ proptest! {
         }
     }
 
-    /// `otg.md` section 4, 4.
     #[test]
     fn extrema_are_the_envelope_of_all_samples(problem in problem()) {
         let profile = position(&problem).unwrap();
@@ -177,7 +175,7 @@ proptest! {
             fastest = fastest.max(now.acceleration.abs());
             prop_assert!(now.velocity >= extrema.velocity.min - 1e-9 && now.velocity <= extrema.velocity.max + 1e-9);
         }
-        // Samples miss a turn by at most half a step, where the position is quadratic in time.
+        // Samples miss an extremum by at most half a step, where the position is quadratic in time.
         let step_s = profile.duration_s() / f64::from(samples);
         let slack = fastest * step_s * step_s + 1e-9 * (1.0 + high.abs() + low.abs());
         prop_assert!(extrema.position.min <= low + 1e-9 && extrema.position.min >= low - slack, "{extrema:?} {low}");
@@ -278,7 +276,7 @@ proptest! {
             return Ok(());
         }
         let Problem { start, limits, .. } = problem;
-        // Full deceleration, in small steps, until the motion turns around.
+        // Full deceleration, in small steps, until the motion reverses.
         let (mut state, step_s) = (start, 1e-4);
         while state.velocity > 0.0 {
             let acceleration = (state.acceleration - limits.jerk_max * step_s).max(limits.acceleration_min);
@@ -300,14 +298,14 @@ proptest! {
         if !starts_inside(&problem) || start.velocity <= 0.0 || turns_anyway {
             return Ok(());
         }
-        // How far the axis comes at least: decelerating fully until it turns around, in the first case only so much that
-        // the swing back keeps the velocity limit.
-        let swing = (-2.0 * limits.jerk_max * limits.velocity_min).sqrt().min(-limits.acceleration_min);
+        // The least distance of the axis: it decelerates fully until it reverses. In the first case it decelerates only so
+        // much that the motion back keeps the velocity limit.
+        let back = (-2.0 * limits.jerk_max * limits.velocity_min).sqrt().min(-limits.acceleration_min);
         let full = (2.0 * limits.jerk_max * start.velocity + start.acceleration.powi(2)).sqrt().min(-limits.acceleration_min);
         let turn = |deceleration: f64| {
             velocity(&Problem { target: state(0.0, 0.0, -deceleration), ..problem }).unwrap().end().position
         };
-        let (keeping_both, shortest) = (turn(swing.min(full)), turn(full));
+        let (keeping_both, shortest) = (turn(back.min(full)), turn(full));
         let end = velocity(&Problem { target: State::rest(0.0), ..problem }).unwrap().end().position;
         let high = shortest + room * (end - shortest);
         let mut profiles = [Profile::hold(0.0)];
@@ -319,7 +317,7 @@ proptest! {
         if keeping_both <= high {
             prop_assert!(extrema.velocity.min >= limits.velocity_min * (1.0 + 1e-9), "{extrema:?}");
         } else {
-            // Position comes first; the swing back is as slow as it can be, for the axis turns around only just there.
+            // The position comes first. The motion back is as slow as possible, because the axis reverses exactly at the limit.
             prop_assert!(extrema.position.max >= high - rounding, "{extrema:?}");
         }
     }
@@ -344,7 +342,7 @@ proptest! {
     }
 }
 
-/// `otg.md` section 4, 1.
+/// Ruckig 0.19.4 crashes on this problem.
 #[test]
 fn the_problem_that_crashes_ruckig_is_solved() {
     let problem = Problem {
@@ -358,7 +356,7 @@ fn the_problem_that_crashes_ruckig_is_solved() {
     assert!((profile.duration_s() - 1.0).abs() < 1e-12);
 }
 
-/// `otg.md` section 4, 2.
+/// Planners with absolute tolerances fail on large or small units.
 #[test]
 fn an_arm_in_counts_needs_the_same_time_as_in_radians() {
     let radians = Problem {
@@ -374,7 +372,7 @@ fn an_arm_in_counts_needs_the_same_time_as_in_radians() {
     }
 }
 
-/// `otg.md` section 4, 3.
+/// Rest to rest where the largest acceleration is just reached.
 #[test]
 fn rest_to_rest_just_where_the_acceleration_limit_is_reached_is_solved_for_plain_decimals() {
     for acceleration in 2..=40 {
@@ -396,7 +394,7 @@ fn rest_to_rest_just_where_the_acceleration_limit_is_reached_is_solved_for_plain
     }
 }
 
-/// `otg.md` section 4, 4.
+/// Ruckig 0.19.4 skips phases of constant acceleration here.
 #[test]
 fn extrema_are_found_within_phases_of_constant_acceleration() {
     let problem = Problem {
@@ -406,11 +404,11 @@ fn extrema_are_found_within_phases_of_constant_acceleration() {
     };
     let profile = position(&problem).unwrap();
     let extrema = profile.extrema();
-    // 3 rad/s at −1 rad/s² turn around after 4.5 rad.
+    // An axis at 3 rad/s with −1 rad/s² reverses after 4.5 rad.
     assert!((extrema.position.max - 4.5).abs() < 1e-9, "{extrema:?}");
 }
 
-/// `otg.md` section 4, 5.
+/// A lower velocity limit while the axis cruises.
 #[test]
 fn a_lower_velocity_limit_while_cruising_does_not_reverse_the_joint() {
     let problem = Problem {
@@ -422,11 +420,11 @@ fn a_lower_velocity_limit_while_cruising_does_not_reverse_the_joint() {
         plan(&[problem], PlanOptions { return_to_limits: Return::Settled, ..PlanOptions::default() }).1[0];
     assert_eq!(judge(&problem, &settled, Arrival::State), Ok(()));
     assert!(settled.extrema().velocity.min >= 0.0);
-    // As fast as possible, it is back at 0.5 rad/s sooner but goes on to −0.5 rad/s.
+    // The fastest return reaches 0.5 rad/s earlier, but goes on to −0.5 rad/s.
     assert!(position(&problem).unwrap().extrema().velocity.min < -0.4);
 }
 
-/// `otg.md` section 4, 6.
+/// Durations that are a multiple of the cycle.
 #[test]
 fn discrete_durations_hit_a_moving_target_in_every_mode() {
     let moving = Problem {
@@ -453,7 +451,7 @@ fn discrete_durations_hit_a_moving_target_in_every_mode() {
     }
 }
 
-/// `otg.md` section 4, 7.
+/// Motions on a straight line.
 #[test]
 fn a_straight_line_is_kept_by_random_motions_from_rest_to_rest_and_planned_anew_on_the_line() {
     let all_limits = [

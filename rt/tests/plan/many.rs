@@ -1,4 +1,4 @@
-//! Random problems in large numbers, from the families of `otg_oracle.py`, judged without the oracle.
+//! Many random problems, checked without the oracle.
 //!
 //! `TAKT_PLAN_PROBLEMS=1000000 cargo test --release -p takt-rt --test plan many` solves that many.
 
@@ -7,7 +7,7 @@ use super::families::{AXES, FAMILIES, Family};
 use super::random::Random;
 use takt_rt::plan::{PlanOptions, Problem, Profile, Synchronisation, synchronised, synchronised_velocity};
 
-/// How many problems are solved when nobody asks for more.
+/// How many problems are solved by default.
 const PROBLEMS: u64 = 100_000;
 
 fn timing(random: &mut Random) -> PlanOptions {
@@ -22,7 +22,7 @@ fn timing(random: &mut Random) -> PlanOptions {
     }
 }
 
-/// Plans and judges; says what is wrong.
+/// Plans, checks the result, and says what is wrong.
 fn solve(family: Family, problems: &[Problem], timing: PlanOptions) -> Result<(), String> {
     let mut profiles = vec![Profile::hold(0.0); problems.len()];
     let arrival = family.arrival();

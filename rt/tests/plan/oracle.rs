@@ -36,8 +36,8 @@ fn problems(line: &Value) -> Vec<Problem> {
         .collect()
 }
 
-/// Whether the duration is that of the oracle, or shorter: the judge has accepted the trajectory then, and the
-/// oracle has missed one (it does so where start and target state are the same, and at the ends of its brake).
+/// Whether the duration is that of the oracle, or shorter. For a shorter one, the checker has accepted the trajectory, and the
+/// oracle has missed it. The oracle does so for equal start and target states, and at the ends of its brake.
 fn agrees(own_s: f64, oracle_s: f64) -> bool {
     own_s <= oracle_s + 1e-6 * oracle_s + 1e-9
 }
@@ -69,7 +69,7 @@ fn compare(line: &Value) -> Result<(), String> {
     if line["result"] != "ok" {
         return Ok(());
     }
-    // The oracle takes a position for reached that is 1e-8 away, and so may not move at all where it should.
+    // The oracle counts a position as reached that is 1e-8 away. So it may not move where it should.
     let near = |problem: &Problem| (problem.target.position - problem.start.position).abs() < 1e-8;
     let fastest: Vec<f64> = profiles.iter().map(Profile::minimum_duration_s).collect();
     let oracle: Vec<f64> = line["t_min"].as_array().unwrap().iter().map(number).collect();
@@ -104,7 +104,7 @@ fn durations_are_those_of_ruckig_or_shorter_in_every_family() {
     compare_all(include_str!("oracle/all.jsonl"));
 }
 
-/// More problems, from a file that `otg_oracle.py` has written: `TAKT_ORACLE=problems.jsonl cargo test oracle`.
+/// More problems, from a file that the generator has written: `TAKT_ORACLE=problems.jsonl cargo test oracle`.
 #[test]
 fn the_answers_in_a_file_of_one_s_own_are_those_of_ruckig() {
     if let Some(path) = std::env::var_os("TAKT_ORACLE") {

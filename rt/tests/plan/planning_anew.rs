@@ -1,7 +1,7 @@
-//! Planning anew in every cycle from the own commanded state: the motion stays the one that was planned first.
+//! Planning again in every cycle from the last command: the motion stays the one that was planned first.
 //!
-//! Where an axis passes its target at speed, the states on its last stretch lie on a line, and rounding leads off it: one
-//! cycle's worth each time. A planner that takes that for a state from which the target is just missed goes round again.
+//! Where an axis passes its target at speed, the states of its last phases lie on a line. Each cycle rounds, so the state drifts
+//! off that line. A planner that takes such a state for one that just misses the target makes a long detour.
 
 use super::checker::Arrival;
 use super::families::{FAMILIES, Family};
@@ -12,13 +12,13 @@ use proptest::strategy::ValueTree;
 use proptest::test_runner::{RngSeed, TestRunner};
 use takt_rt::plan::{Limits, Problem, position};
 
-/// Follows the motion in so many cycles; says when a plan arrives at another time than the first one.
+/// Follows the motion in this many cycles. Says so if a plan arrives at another time than the first one.
 fn follow(problem: &Problem, cycles: u32) -> Result<(), String> {
     let mut profile = position(problem).map_err(|error| format!("{error:?}"))?;
     let total_s = profile.duration_s();
     let cycle_s = total_s / f64::from(cycles);
-    // At the end of a stop a rounding error of the position costs its third root in time. And a motion over nothing but
-    // rounding takes no time that means anything.
+    // At the end of a stop, a rounding error of the position costs its third root in time. The time of a motion over a
+    // distance that is only rounding means nothing.
     let Problem { start, target, limits } = problem;
     let rounding = 1024.0 * f64::EPSILON * (start.position.abs() + target.position.abs());
     let tolerance_s = 1e-4 * total_s
@@ -36,7 +36,7 @@ fn follow(problem: &Problem, cycles: u32) -> Result<(), String> {
     Ok(())
 }
 
-/// Whether no state on the way to the target is bound for a velocity limit: seen by itself, such a state has to brake.
+/// Whether no state on the way leads beyond a velocity limit. Planned alone, such a state would have to brake.
 fn can_stay(problem: &Problem) -> bool {
     starts_inside(problem) && starts_inside(&Problem { start: problem.target, ..*problem })
 }
@@ -70,10 +70,10 @@ proptest! {
     }
 }
 
-/// How many motions of either kind are followed when nobody asks for more.
+/// How many motions of each kind are followed by default.
 const MOTIONS: u64 = 5_000;
 
-/// Follows so many motions as `TAKT_PLAN_ANEW` says, drawn by their number:
+/// Follows as many random motions as `TAKT_PLAN_ANEW` says:
 /// `TAKT_PLAN_ANEW=1000000 cargo test --release -p takt-rt --test plan planning_anew` follows a million.
 fn follow_many(draw: impl Fn(u64) -> (Problem, u32)) {
     let asked = std::env::var("TAKT_PLAN_ANEW").ok().and_then(|count| count.parse().ok());
@@ -117,19 +117,19 @@ fn motions_past_any_target_planned_anew_in_every_cycle_arrive_at_the_same_time()
 /// Found by random search.
 #[test]
 fn a_target_passed_at_speed_is_not_missed_for_the_rounding_of_the_last_cycle() {
-    // On the last arc the velocity exceeds that of the arc by an ulp: exactly, the axis would go round again for 47 s.
+    // In the last phase the velocity is too high by one ulp. Taken exactly, the axis would make a detour of 47 s.
     let last = Problem {
         start: state(-0.11081321593078976, 2.4893951181331904, -0.007315574582064072),
         target: state(-0.10057604718445656, 2.489380076111012, 0.0),
         limits: Limits::asymmetric(10.0, -4.7, 0.115, -7.1, 1.778937393862769),
     };
     assert!(position(&last).unwrap().duration_s() < 0.01);
-    // A tenth of a millimetre more is no rounding error.
+    // A difference of a tenth of a millimetre is not a rounding error.
     let missed = Problem { start: state(-0.1107, last.start.velocity, last.start.acceleration), ..last };
     assert!(position(&missed).unwrap().duration_s() > 1.0);
 }
 
-/// Found by random search: between accelerations of one sign there is just one arc, the lens is but a point.
+/// Found by random search: a single phase leads from start to target acceleration, and the same-sign region is one point.
 #[test]
 fn a_target_passed_at_speed_with_an_acceleration_is_not_missed_for_rounding() {
     let last = Problem {
@@ -146,8 +146,8 @@ fn a_target_passed_at_speed_with_an_acceleration_is_not_missed_for_rounding() {
     assert!(position(&last).unwrap().duration_s() < 0.21);
 }
 
-/// Found by random search: the last two phases meet at next to no acceleration, which then grows with the root of the
-/// rounding of the velocities. The position has drifted further than rounding leads by itself.
+/// Found by random search: the last two phases meet at almost zero acceleration, which grows with the root of the rounding of
+/// the velocities. The position has drifted further than its own rounding explains.
 #[test]
 fn a_target_passed_at_speed_behind_a_turn_at_next_to_no_acceleration_is_not_missed_for_rounding() {
     let motions = [
@@ -183,7 +183,7 @@ fn a_target_passed_at_speed_behind_a_turn_at_next_to_no_acceleration_is_not_miss
     let start = state(-2.6092710608342715, -6.4965475278538865, -0.9432320154702393);
     let last = Problem { start, target, limits };
     assert!(position(&last).unwrap().duration_s() < 0.2);
-    // A hundredth of a millimetre more is no rounding error.
+    // A difference of a hundredth of a millimetre is not a rounding error.
     let missed = Problem { start: state(start.position + 1e-5, start.velocity, start.acceleration), ..last };
     assert!(position(&missed).unwrap().duration_s() > 1.0);
 }

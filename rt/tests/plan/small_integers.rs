@@ -1,4 +1,4 @@
-//! Every problem whose numbers are small integers: the places where one type of profile meets another.
+//! All problems whose numbers are small integers. There, one type of profile often meets another.
 
 use super::checker::{Arrival, judge};
 use takt_rt::plan::{Limits, Problem, State, position, velocity};
@@ -7,13 +7,13 @@ fn integers(range: core::ops::RangeInclusive<i32>) -> Vec<f64> {
     range.map(f64::from).collect()
 }
 
-/// Every velocity and acceleration whose size is at most `largest`.
+/// Every velocity and acceleration with a magnitude of at most `largest`.
 fn rates(largest: i32) -> Vec<(f64, f64)> {
     let values = integers(-largest..=largest);
     values.iter().flat_map(|velocity| values.iter().map(|acceleration| (*velocity, *acceleration))).collect()
 }
 
-/// Every set of limits from 1 to `largest`; the lower ones mirror the upper ones.
+/// Every set of limits from 1 to `largest`, the same in both directions.
 fn limits(largest: i32) -> Vec<Limits> {
     let sizes = integers(1..=largest);
     let mut all = Vec::new();
@@ -37,14 +37,14 @@ fn state(position: f64, (velocity, acceleration): (f64, f64)) -> State {
     State { position, velocity, acceleration }
 }
 
-/// Solves all problems with rates up to `rate`, limits up to `limit`, and these distances; gives how many there were, and
-/// how many started within the limits.
+/// Solves all problems with rates up to `rate`, limits up to `limit`, and these distances. Returns how many there were, and how
+/// many started within the limits.
 fn solve(rate: i32, limit: i32, distances: &[f64]) -> (u32, u32) {
     let (mut solved, mut inside) = (0, 0);
     for limits in limits(limit) {
         for target in rates(rate) {
             for start in rates(rate) {
-                // Backwards in time a start is a target.
+                // Backwards in time, the start is a target.
                 let starts_inside = is_target(&limits, (start.0, -start.1));
                 for distance in distances {
                     let problem =
@@ -62,15 +62,15 @@ fn solve(rate: i32, limit: i32, distances: &[f64]) -> (u32, u32) {
     (solved, inside)
 }
 
-/// Start and target positions from −2 to 2 are 25 pairs with nine distances; more pairs of the same distance would be
-/// the same problem again.
+/// Start and target positions from −2 to 2 are 25 pairs with nine distances. Pairs with the same distance are the same
+/// problem.
 #[test]
 fn every_problem_of_small_integers_is_solved() {
     let (solved, inside) = solve(2, 3, &integers(-4..=4));
     assert_eq!((solved, inside), (97_875, 72_171));
 }
 
-/// Half integers, too, and longer ways: distances from −10 to 10 in steps of a half, velocities and accelerations from −2
+/// Half integers and longer distances: distances from −10 to 10 in steps of a half, velocities and accelerations from −2
 /// to 2, limits from 1 to 3.
 #[test]
 fn every_problem_of_small_integers_over_half_an_integer_is_solved() {
@@ -78,9 +78,7 @@ fn every_problem_of_small_integers_over_half_an_integer_is_solved() {
     assert_eq!(solve(2, 3, &halves), (445_875, 328_779));
 }
 
-/// Wider in everything: rates from −3 to 3, limits from 1 to 4, distances from −12 to 12. `otg.md` section 4 counts 337,875
-/// valid problems in its grid without saying which they are; any such grid of small integers is a part of this one, or of
-/// the one above.
+/// A wider range of everything: rates from −3 to 3, limits from 1 to 4, distances from −12 to 12.
 #[test]
 fn every_problem_of_integers_up_to_a_dozen_is_solved() {
     assert_eq!(solve(3, 4, &integers(-12..=12)), (1_930_600, 1_213_400));

@@ -83,7 +83,7 @@ proptest! {
                 prop_assert!(next.velocity.abs() <= 2.5 * (1.0 + 1e-6), "{next:?}");
                 prop_assert!(next.acceleration.abs() <= 15.0 * (1.0 + 1e-6), "{next:?}");
                 prop_assert!(next.position.abs() <= 1.0 + 1e-6, "{next:?}");
-                // The jerk limit holds but for the change of the target's acceleration, which is followed.
+                // The axis keeps its jerk limit, apart from the change of the target's acceleration, which it follows.
                 prop_assert!((next.position - command.position).abs() <= 2.5 * CYCLE_S * (1.0 + 1e-6));
                 command = next;
             }
@@ -105,7 +105,7 @@ fn a_group_that_would_leave_its_position_limits_is_refused_with_a_stop() {
     assert_eq!(stop.extrema()[1].velocity.max, 2.0);
 }
 
-/// Found by random search: the velocity went beyond its limit within the cycle and was back at its end.
+/// Found by random search: the velocity exceeded its limit within the cycle, and was back at the limit at its end.
 #[test]
 fn the_step_of_a_cycle_at_the_velocity_limit_is_not_too_far_while_the_target_accelerates() {
     let limits = Limits { jerk_max: 4127.0, ..ARM }.with_position(-1.0, 1.0);

@@ -18,7 +18,7 @@ fn state(position: f64, velocity: f64) -> State {
     State { position, velocity, acceleration: 0.0 }
 }
 
-/// Any start, also outside the velocity limits, and any target within them; often exactly at rest.
+/// Any start, also one outside the velocity limits, and any target within them; often exactly at rest.
 fn problem() -> impl Strategy<Value = Problem> {
     let rest_or = |range: core::ops::Range<f64>| prop_oneof![1 => Just(0.0), 3 => range];
     (limits(), -4.0..4.0, rest_or(-3.0..3.0), -4.0..4.0, rest_or(-1.0..1.0)).prop_map(
@@ -123,7 +123,7 @@ proptest! {
         let duration_s = position(&problem).unwrap().duration_s();
         let mirror_s = position(&mirrored(&problem)).unwrap().duration_s();
         prop_assert!(close(duration_s, mirror_s, 1e-12), "{duration_s} {mirror_s}");
-        // Backwards in time the velocities change their sign and the accelerations do not.
+        // Backwards in time, the velocities change their signs and the accelerations do not.
         let reverse = Problem {
             start: State { velocity: -vf, ..problem.target },
             target: State { velocity: -v0, ..problem.start },
@@ -146,7 +146,7 @@ proptest! {
             }
             let remaining_s = synchronised(&problems, &mut profiles, PlanOptions::default()).unwrap();
             time_s += cycle_s;
-            // Where a rounding error asks for a detour, its time is the square root of the error.
+            // A detour for a rounding error takes the square root of that error in time.
             prop_assert!(close(time_s + remaining_s, total_s, 1e-6), "{} {total_s}", time_s + remaining_s);
         }
         for (problem, profile) in problems.iter().zip(&profiles) {
@@ -166,7 +166,7 @@ proptest! {
             prop_assert!(state.acceleration >= extrema.acceleration.min && state.acceleration <= extrema.acceleration.max);
         }
         prop_assert!(extrema.position.min <= seen.0 + 1e-12 && extrema.position.max >= seen.1 - 1e-12);
-        // 4000 samples miss a turn by at most half a step, where the position is quadratic in time.
+        // 4,000 samples miss an extremum by at most half a step, where the position is quadratic in time.
         let step_s = profile.duration_s() / 4000.0;
         let slack = 12.0 * step_s * step_s + 1e-12;
         prop_assert!(extrema.position.min >= seen.0 - slack && extrema.position.max <= seen.1 + slack);
@@ -239,7 +239,7 @@ fn at_the_target_already_the_motion_takes_no_time() {
 
 #[test]
 fn an_axis_that_cannot_wait_makes_the_others_wait() {
-    // The first axis passes through its target at speed: a little later is too late, it would have to come back.
+    // The first axis passes its target at speed. If it arrives a little later, it has to come back.
     let passing = Problem { start: state(0.0, 1.0), target: state(0.05, 1.0), limits: SECOND_ORDER };
     let other = Problem { start: State::rest(0.0), target: State::rest(0.02), limits: SECOND_ORDER };
     let alone = [position(&passing).unwrap(), position(&other).unwrap()];

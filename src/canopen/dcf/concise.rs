@@ -1,13 +1,13 @@
-//! Concise DCF: the form in which a configuration is handed to a manager (CiA 302-3, object 1F22): a count of 32 bits,
-//! then index, sub-index, length of 32 bits and data of each write, low byte first.
+//! Concise DCF (CiA 302-3, object 1F22): a count of 32 bits, then index, sub-index, length (32 bits) and data of each
+//! write, all little-endian.
 
 use super::Download;
 use crate::canopen::object::ObjectAddress;
 
-/// What precedes the data of an entry.
+/// Bytes before the data of an entry.
 const ENTRY_HEADER_BYTES: usize = 7;
 
-/// Why bytes are no concise DCF.
+/// Why bytes are not a concise DCF.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ConciseError {
     /// The bytes end early.
@@ -15,18 +15,18 @@ pub enum ConciseError {
     Truncated {
         /// The entry, counted from 1; 0 for the count itself.
         entry: u32,
-        /// How many are announced.
+        /// The announced number of entries.
         count: u32,
     },
     /// Bytes follow the last entry.
     #[error("{bytes} bytes follow the last entry")]
     Trailing {
-        /// How many.
+        /// Number of bytes.
         bytes: usize,
     },
 }
 
-/// The bytes of a list of writes.
+/// Encodes a list of writes.
 pub fn encode(downloads: &[Download]) -> Vec<u8> {
     let mut bytes = (downloads.len() as u32).to_le_bytes().to_vec();
     for Download { object, data } in downloads {
@@ -38,7 +38,7 @@ pub fn encode(downloads: &[Download]) -> Vec<u8> {
     bytes
 }
 
-/// The list of writes that bytes hold.
+/// Decodes a list of writes.
 pub fn decode(bytes: &[u8]) -> Result<Vec<Download>, ConciseError> {
     let truncated = |entry, count| ConciseError::Truncated { entry, count };
     let (count, mut rest) = bytes.split_first_chunk().ok_or(truncated(0, 0))?;
@@ -65,7 +65,7 @@ mod tests {
     use proptest::prelude::*;
 
     #[test]
-    fn the_bytes_are_those_of_object_1f22() {
+    fn the_encoding_is_that_of_object_1f22() {
         let downloads = [
             Download { object: ObjectAddress::new(0x1017, 0), data: vec![0x64, 0] },
             Download { object: ObjectAddress::new(0x1800, 2), data: vec![1] },
@@ -80,7 +80,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn what_is_read_is_written_again(bytes in prop::collection::vec(0..3_u8, 0..40)) {
+        fn a_decoded_list_is_encoded_to_the_same_bytes(bytes in prop::collection::vec(0..3_u8, 0..40)) {
             if let Ok(downloads) = decode(&bytes) {
                 prop_assert_eq!(encode(&downloads), bytes);
             }

@@ -1,10 +1,10 @@
-//! Device configuration: what a DCF (CiA 306) or a concise DCF (CiA 302-3, object 1F22) has written to a device.
+//! Device configuration: the values that a DCF (CiA 306) or a concise DCF (CiA 302-3, object 1F22) writes to a device.
 //!
-//! A DCF says what shall be, not in which order. [`DeviceConfiguration::of`] gives the writes in an order that devices
-//! accept: everything by its index, and each PDO switched off, mapped anew and switched on again (CiA 301, 7.5.2.36). A
-//! concise DCF is such a list already and keeps its own order.
+//! A DCF has values but no order. [`DeviceConfiguration::of`] gives the writes in an order that devices accept: by
+//! index, and each PDO is made invalid, mapped, and made valid again (CiA 301, 7.5.2.36). A concise DCF is an ordered
+//! list and keeps its order.
 //!
-//! What commands rather than configures is left out: see [`Omission`].
+//! Commands and set-points are not written: see [`Omission`].
 
 mod concise;
 mod order;
@@ -22,14 +22,14 @@ use crate::printable::printable_path;
 /// One value to write.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Download {
-    /// Where.
+    /// The object.
     pub object: ObjectAddress,
-    /// What, low byte first.
+    /// The little-endian data.
     pub data: Vec<u8>,
 }
 
 impl Download {
-    /// Whether the object, read back, holds what was written. Devices force bit 30 of a PDO's identifier (no RTR).
+    /// Whether the value read back matches the written one. Devices may force bit 30 (no RTR) of a PDO's COB-ID.
     pub fn is_held_by(&self, received: &Uploaded) -> bool {
         const NO_RTR: u32 = 1 << 30;
         let Self { object, data } = self;
@@ -45,25 +45,25 @@ impl Download {
     }
 }
 
-/// What is to be written to a device, in its order.
+/// The writes that configure a device, in order.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DeviceConfiguration {
     /// The file.
     pub path: PathBuf,
     /// The writes.
     pub downloads: Vec<Download>,
-    /// What the file configures too, and is not written.
+    /// The configured values that are not written, with the reason.
     pub omitted: Vec<(ObjectAddress, Omission)>,
 }
 
 /// Why a configured value is not written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Omission {
-    /// Storing and restoring parameters, or loading a program (1010, 1011, 1F50 to 1F57): commands.
+    /// A command: it stores or restores parameters, or loads a program (1010, 1011, 1F50 to 1F57).
     Command,
-    /// Controlword, mode and set-points: they would move the drive, or let it jump when it is enabled.
+    /// A controlword, mode or set-point: it could move the drive, or make it jump when it is enabled.
     Motion,
-    /// The value has no bytes that SDO could carry: its type is not known, is DOMAIN, or has no such characters.
+    /// The value cannot be encoded: its type is unknown or DOMAIN, or it has characters that the type does not allow.
     NoBytes,
 }
 
@@ -71,8 +71,8 @@ impl fmt::Display for Omission {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Command => "a command, not a parameter",
-            Self::Motion => "set-points are the controller's alone",
-            Self::NoBytes => "its bytes are not known",
+            Self::Motion => "a set-point, which only the controller may write",
+            Self::NoBytes => "a value that cannot be encoded",
         })
     }
 }
@@ -83,12 +83,12 @@ pub enum DcfError {
     /// The file has errors.
     #[error("{}", findings_words(.0))]
     File(Findings),
-    /// The file is not readable.
+    /// The file cannot be read.
     #[error("{path} cannot be read: {reason}")]
     Unreadable {
         /// The file.
         path: String,
-        /// What the operating system said.
+        /// The operating system's reason.
         reason: String,
     },
     /// The file was made for another node.
@@ -98,10 +98,10 @@ pub enum DcfError {
         path: String,
         /// The node of the file.
         made_for: u8,
-        /// The node that it was to configure.
+        /// The node to configure.
         node: u8,
     },
-    /// The file configures nothing.
+    /// The file has no configured value.
     #[error("{path} configures nothing: no object has a ParameterValue")]
     Nothing {
         /// The file.
@@ -110,35 +110,35 @@ pub enum DcfError {
 }
 
 impl DcfError {
-    /// What to do about it.
+    /// The remedy.
     pub fn help(&self) -> &'static str {
         match self {
-            Self::File(_) => "`takt eds FILE` shows all that is wrong with it",
+            Self::File(_) => "`takt eds FILE` shows all problems of the file",
             Self::Unreadable { .. } => "a relative path begins at the folder of this configuration",
             Self::OtherNode { .. } => {
-                "export it for this node; without NodeID in [DeviceComissioning] it is for every node"
+                "export it for this node; without NodeID in [DeviceComissioning] it is valid for every node"
             }
-            Self::Nothing { .. } => "an EDS describes a device; what configures one is a DCF",
+            Self::Nothing { .. } => "an EDS only describes a device; use a DCF, which configures it",
         }
     }
 }
 
 fn findings_words(findings: &Findings) -> String {
-    let is_error = |problem: &&eds::Problem| problem.kind.severity() == Severity::Error;
+    let is_error = |problem: &&eds::EdsProblem| problem.kind.severity() == Severity::Error;
     let first = findings.problems().iter().find(is_error).map(|problem| {
-        let place = findings.place(problem);
-        format!("; line {}: {problem}", place.line)
+        let position = findings.position(problem);
+        format!("; line {}: {problem}", position.line)
     });
     format!("{findings}{}", first.unwrap_or_default())
 }
 
 impl DeviceConfiguration {
-    /// Reads a DCF, or a concise DCF, for a node.
+    /// Loads a DCF or a concise DCF for a node.
     pub fn load(path: &Path, node: u8) -> Result<Self, DcfError> {
         let name = printable_path(path);
         let bytes = crate::text_file::read(path)
             .map_err(|error| DcfError::Unreadable { path: name.clone(), reason: error.to_string() })?;
-        // As a text, the first bytes of a DCF would count more entries than any file has room for.
+        // A DCF is not mistaken for a concise DCF: its first bytes, read as a count, exceed any file.
         if let Ok(downloads) = decode_concise(&bytes) {
             return Ok(Self::of_list(path, downloads));
         }
@@ -153,7 +153,7 @@ impl DeviceConfiguration {
         Ok(configuration)
     }
 
-    /// The writes that configure a node as a dictionary says.
+    /// The writes that a dictionary configures for a node.
     pub fn of(path: &Path, dictionary: &ObjectDictionary, node: u8) -> Self {
         let mut configuration = Self { path: path.to_owned(), downloads: vec![], omitted: vec![] };
         for entry in dictionary.entries() {
@@ -211,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn writable_values_are_written_by_index_and_others_are_not() {
+    fn configured_values_are_written_by_index_if_they_are_writable() {
         let file = variable("6081", 7, "rw", "1000")
             + &variable("1017", 6, "rw", "100")
             + &variable("1000", 7, "ro", "0x20192")
@@ -224,7 +224,7 @@ mod tests {
     }
 
     #[test]
-    fn a_pdo_is_switched_off_mapped_and_switched_on_again() {
+    fn a_pdo_is_made_invalid_mapped_and_made_valid_again() {
         let sub = |index: &str, sub: u8, data_type: u8, value: &str| {
             variable(&format!("{index}sub{sub}"), data_type, "rw", value)
         };
@@ -251,7 +251,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_read_back_may_differ_in_the_bit_that_devices_force() {
+    fn a_value_read_back_may_differ_in_the_bit_that_devices_force() {
         let download =
             |index, data: [u8; 4]| Download { object: ObjectAddress::new(index, 1), data: data.into() };
         let read = |bytes: &[u8], is_size_known| Uploaded { bytes: bytes.into(), is_size_known };
@@ -260,12 +260,12 @@ mod tests {
         assert!(!cob_id.is_held_by(&read(&[0x82, 1, 0, 0x80], true)), "it is not valid");
         assert!(!download(0x2000, [0x82, 1, 0, 0]).is_held_by(&read(&[0x82, 1, 0, 0x40], true)));
         let short = Download { object: ObjectAddress::new(0x2000, 1), data: vec![7] };
-        assert!(short.is_held_by(&read(&[7, 0, 0, 0], false)), "its size was not told");
+        assert!(short.is_held_by(&read(&[7, 0, 0, 0], false)), "its size was not indicated");
         assert!(!short.is_held_by(&read(&[7, 0, 0, 0], true)));
     }
 
     #[test]
-    fn a_mapping_alone_is_switched_by_the_identifier_that_the_device_has() {
+    fn a_mapping_without_a_cob_id_uses_the_cob_id_of_the_device() {
         let mapping = variable("1601sub1", 7, "rw", "0x60400010");
         let known =
             "[1401sub1]\nParameterName=x\nDataType=7\nAccessType=rw\nDefaultValue=0x80000300+$NODEID\n";

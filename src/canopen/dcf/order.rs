@@ -7,7 +7,7 @@ use crate::canopen::eds::ObjectDictionary;
 use crate::canopen::object::ObjectAddress;
 use crate::canopen::objects::{PDO_INVALID, PdoDirection, PdoParameters};
 
-/// Puts writes in order: by index, and the PDOs one by one between the rest of the communication profile and the others.
+/// Sorts the writes by index. The PDOs come after the rest of the communication profile, one by one.
 pub(super) fn ordered(downloads: Vec<Download>, dictionary: &ObjectDictionary, node: u8) -> Vec<Download> {
     let mut plain = BTreeMap::new();
     let mut pdos: BTreeMap<u16, Vec<Download>> = BTreeMap::new();
@@ -26,7 +26,7 @@ pub(super) fn ordered(downloads: Vec<Download>, dictionary: &ObjectDictionary, n
     plain.into_values().chain(pdos).chain(behind.into_values()).collect()
 }
 
-/// The communication parameter of the PDO that an object belongs to.
+/// The index of the communication parameter of the PDO that an object belongs to.
 fn communication_parameter(index: u16) -> Option<u16> {
     match index {
         0x1400..=0x15FF | 0x1800..=0x19FF => Some(index),
@@ -35,10 +35,10 @@ fn communication_parameter(index: u16) -> Option<u16> {
     }
 }
 
-/// What is written of one PDO.
+/// The writes of one PDO.
 struct Pdo {
     parameters: PdoParameters,
-    /// The identifier that it shall have; `None` where nobody knows it.
+    /// The COB-ID at the end; `None` if it is not known.
     cob_id: Option<u32>,
     values: BTreeMap<ObjectAddress, Vec<u8>>,
 }
@@ -57,7 +57,7 @@ impl Pdo {
         let configured =
             values.remove(&address).and_then(|data| Some(u32::from_le_bytes(data.try_into().ok()?)));
         let described = || u32::try_from(dictionary.number(address, Some(node))?).ok();
-        // The pre-defined connection set, in which only the first is valid for certain.
+        // The pre-defined connection set, in which only the first PDO is certainly valid.
         let predefined = || {
             let id = first_id + 0x100 * u32::from(place) + u32::from(node);
             (place < 4).then_some(if place == 0 { id } else { id | PDO_INVALID })
@@ -65,7 +65,7 @@ impl Pdo {
         Self { parameters, cob_id: configured.or_else(described).or_else(predefined), values }
     }
 
-    /// Off; nothing mapped; the mapping, then how much of it; the rest; on.
+    /// Invalid; no mapping; the mapping and its count; the rest; valid.
     fn in_order(mut self) -> Vec<Download> {
         let parameters = self.parameters;
         let switch =

@@ -1,27 +1,27 @@
-//! `CompactPDO`: PDOs that the device has without the file describing them. Bit n stands for sub-index n+1 of the
-//! communication parameter. Their values are those of the pre-defined connection set (CiA 301, 7.3.3): the first four
-//! of each direction are valid, the others are not, and nothing is mapped.
+//! `CompactPDO`: PDOs that the file counts but does not describe. Bit n of the key stands for sub-index n+1 of the
+//! communication parameter. The values are those of the pre-defined connection set (CiA 301, 7.3.3): the first four
+//! PDOs of each direction are valid, the others are not, and nothing is mapped.
 
-use super::data_type::DataType;
-use super::dictionary::{AccessType, DictionaryObject, ObjectDictionary, ObjectType, Stated};
+use super::data_type::DataTypeCode;
+use super::dictionary::{AccessType, DictionaryObject, LocatedValue, ObjectDictionary, ObjectType};
 use super::number::Number;
 use super::objects::{implied, list_of};
 use super::value::Value;
 use crate::canopen::objects::PDO_INVALID;
 
-/// PDOs that there may be in one direction.
-const MOST_PDOS: u16 = 512;
+/// The largest number of PDOs in one direction.
+const MAX_PDOS: u16 = 512;
 
-const SUB_OBJECTS: [(u8, &str, DataType); 6] = [
-    (1, "COB-ID", DataType::UNSIGNED32),
-    (2, "Transmission type", DataType::UNSIGNED8),
-    (3, "Inhibit time", DataType::UNSIGNED16),
-    (4, "Compatibility entry", DataType::UNSIGNED8),
-    (5, "Event timer", DataType::UNSIGNED16),
-    (6, "SYNC start value", DataType::UNSIGNED8),
+const SUB_OBJECTS: [(u8, &str, DataTypeCode); 6] = [
+    (1, "COB-ID", DataTypeCode::UNSIGNED32),
+    (2, "Transmission type", DataTypeCode::UNSIGNED8),
+    (3, "Inhibit time", DataTypeCode::UNSIGNED16),
+    (4, "Compatibility entry", DataTypeCode::UNSIGNED8),
+    (5, "Event timer", DataTypeCode::UNSIGNED16),
+    (6, "SYNC start value", DataTypeCode::UNSIGNED8),
 ];
 
-/// Adds the objects of every PDO that is counted and not described.
+/// Adds the objects of every PDO that is counted but not described.
 pub(super) fn expand(dictionary: &mut ObjectDictionary) {
     let mask = dictionary.device.compact_pdo;
     if mask == 0 {
@@ -33,7 +33,7 @@ pub(super) fn expand(dictionary: &mut ObjectDictionary) {
         (0x200, 0x1400, 0x1600, dictionary.device.rpdo_count),
         (0x180, 0x1800, 0x1A00, dictionary.device.tpdo_count),
     ] {
-        for place in 0..count.unwrap_or(0).min(MOST_PDOS) {
+        for place in 0..count.unwrap_or(0).min(MAX_PDOS) {
             if dictionary.object(communication + place).is_none() {
                 let object = communication_parameter(communication + place, place, first_id, mask);
                 insert(dictionary, object);
@@ -56,7 +56,7 @@ fn communication_parameter(index: u16, place: u16, first_id: u32, mask: u8) -> D
         index,
         0,
         "Highest sub-index supported",
-        DataType::UNSIGNED8,
+        DataTypeCode::UNSIGNED8,
         AccessType::Constant,
         stated(Number::constant(highest.into())),
     )];
@@ -79,8 +79,8 @@ fn mapping_parameter(index: u16, mapped: u8) -> DictionaryObject {
         let default = stated(Number::constant(0));
         implied(index, subindex, name, data_type, AccessType::ReadWrite, default)
     };
-    let mut entries = vec![entry(0, "Number of mapped objects", DataType::UNSIGNED8)];
-    entries.extend((1..=mapped).map(|subindex| entry(subindex, "Mapped object", DataType::UNSIGNED32)));
+    let mut entries = vec![entry(0, "Number of mapped objects", DataTypeCode::UNSIGNED8)];
+    entries.extend((1..=mapped).map(|subindex| entry(subindex, "Mapped object", DataTypeCode::UNSIGNED32)));
     record(index, "PDO mapping parameter", entries)
 }
 
@@ -89,9 +89,9 @@ fn record(index: u16, name: &str, entries: Vec<super::dictionary::DictionaryEntr
     DictionaryObject { index, name: name.to_owned(), object_type, list: list_of(index), entries, line: None }
 }
 
-/// A value that stands nowhere in the file.
-fn stated(number: Number) -> Option<Stated> {
-    Some(Stated { value: Value::Number(number), line: 0, span: 0..0 })
+/// A value that is not written in the file.
+fn stated(number: Number) -> Option<LocatedValue> {
+    Some(LocatedValue { value: Value::Number(number), line: 0, span: 0..0 })
 }
 
 fn insert(dictionary: &mut ObjectDictionary, object: DictionaryObject) {

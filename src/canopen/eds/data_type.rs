@@ -1,15 +1,15 @@
 //! The data types of object dictionaries (CiA 301, table 44).
 
-/// The code of a data type. Codes that the standard does not define are the device's own.
+/// The code of a data type. Codes that the standard does not define belong to the manufacturer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct DataType(pub u16);
+pub struct DataTypeCode(pub u16);
 
-/// What the values of a type are.
+/// The kind of a type's values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ValueKind {
-    /// Whole numbers of this many bits, zero and above.
+    /// Unsigned integers with this number of bits.
     Unsigned(u8),
-    /// Whole numbers of this many bits, either way.
+    /// Signed integers with this number of bits.
     Signed(u8),
     /// Floating-point numbers of 32 or 64 bits (IEEE 754).
     Real(u8),
@@ -17,7 +17,7 @@ pub enum ValueKind {
     Text,
     /// Bytes.
     Bytes,
-    /// Nothing is known about them.
+    /// Unknown.
     Other,
 }
 
@@ -52,7 +52,7 @@ const NAMES: [(u16, &str, ValueKind); 28] = [
     (0x23, "IDENTITY", ValueKind::Other),
 ];
 
-impl DataType {
+impl DataTypeCode {
     /// UNSIGNED8
     pub const UNSIGNED8: Self = Self(0x05);
     /// UNSIGNED16
@@ -64,17 +64,17 @@ impl DataType {
     /// DOMAIN
     pub const DOMAIN: Self = Self(0x0F);
 
-    /// The type of a name as the standard writes it, in any case.
+    /// The type with this name in the standard, in any case.
     pub fn from_name(name: &str) -> Option<Self> {
         NAMES.iter().find(|(_, known, _)| known.eq_ignore_ascii_case(name)).map(|(code, ..)| Self(*code))
     }
 
-    /// What its values are.
+    /// The kind of its values.
     pub fn kind(self) -> ValueKind {
         NAMES.iter().find(|(code, ..)| *code == self.0).map_or(ValueKind::Other, |(.., kind)| *kind)
     }
 
-    /// The length of a value in bits, where every value has the same.
+    /// The length of a value in bits, if it is fixed.
     pub fn bits(self) -> Option<u8> {
         match self.kind() {
             ValueKind::Unsigned(bits) | ValueKind::Signed(bits) | ValueKind::Real(bits) => Some(bits),
@@ -82,7 +82,7 @@ impl DataType {
         }
     }
 
-    /// The lowest and the highest value of a type of whole numbers.
+    /// The range of an integer type.
     pub fn range(self) -> Option<(i128, i128)> {
         match self.kind() {
             ValueKind::Unsigned(bits) => Some((0, (1 << bits) - 1)),
@@ -91,8 +91,8 @@ impl DataType {
         }
     }
 
-    /// The type that the standards give to an object (CiA 301; CiA 402 for the objects that takt uses), for files that do
-    /// not say it.
+    /// The type of a standard object (CiA 301; CiA 402 for the objects that takt uses), for files without this
+    /// information.
     pub(super) fn of_standard_object(index: u16, subindex: u8) -> Option<Self> {
         Some(Self(match (index, subindex) {
             (0x1000 | 0x1002 | 0x1005..=0x1007 | 0x1012..=0x1014, 0) => 0x07,
@@ -115,7 +115,7 @@ impl DataType {
     }
 }
 
-impl std::fmt::Display for DataType {
+impl std::fmt::Display for DataTypeCode {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match NAMES.iter().find(|(code, ..)| *code == self.0) {
             Some((_, name, _)) => f.pad(name),

@@ -1,15 +1,15 @@
-//! What a file says, checked: a device and its object dictionary.
+//! The checked content of a file: a device and its object dictionary.
 
 use std::fmt;
 use std::ops::Range;
 
-use super::data_type::DataType;
+use super::data_type::DataTypeCode;
 use super::value::Value;
 use crate::canopen::object::ObjectAddress;
 use crate::canopen::objects::{PdoDirection, PdoParameters};
 use crate::canopen::pdo_configuration::PdoConfiguration;
 
-/// A device and the objects that it has.
+/// A device and its objects.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ObjectDictionary {
     /// `[FileInfo]`
@@ -18,15 +18,15 @@ pub struct ObjectDictionary {
     pub device: DeviceInfo,
     /// `[DeviceComissioning]` of a DCF, in either spelling.
     pub commissioning: Option<DeviceCommissioning>,
-    /// `[DummyUsage]`: the data types that may be mapped to fill gaps.
-    pub dummies: Vec<DataType>,
+    /// `[DummyUsage]`: the data types that may be mapped as placeholders.
+    pub dummies: Vec<DataTypeCode>,
     /// `[Comments]`, line by line.
     pub comments: Vec<String>,
     /// The objects in the order of their indices.
     pub objects: Vec<DictionaryObject>,
 }
 
-/// Where the file comes from.
+/// The origin of the file.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct FileInfo {
     /// `FileName`
@@ -45,7 +45,7 @@ pub struct FileInfo {
     pub last_eds: Option<String>,
 }
 
-/// What the device is and can do.
+/// Identity and features of the device.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct DeviceInfo {
     /// `VendorName`
@@ -60,7 +60,7 @@ pub struct DeviceInfo {
     pub revision_number: Option<u32>,
     /// `OrderCode`
     pub order_code: Option<String>,
-    /// The bit rates that it knows, in bit/s.
+    /// The supported bit rates in bit/s.
     pub bit_rates: Vec<u32>,
     /// `SimpleBootUpMaster`
     pub is_simple_boot_up_master: bool,
@@ -74,11 +74,11 @@ pub struct DeviceInfo {
     pub tpdo_count: Option<u16>,
     /// `LSS_Supported`
     pub has_lss: bool,
-    /// `CompactPDO`: bit n for sub-index n+1 of communication parameters that are there without being described.
+    /// `CompactPDO`: bit n for sub-index n+1 of communication parameters that the file does not describe.
     pub compact_pdo: u8,
 }
 
-/// How a DCF configures its device in the network.
+/// The settings of the device in the network, in a DCF.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct DeviceCommissioning {
     /// `NodeID`, 1 to 127.
@@ -95,12 +95,12 @@ pub struct DeviceCommissioning {
     pub serial_number: Option<u32>,
 }
 
-/// The kind of an object (CiA 301, table 42).
+/// The type of an object (CiA 301, table 42).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum ObjectType {
     /// 0
     Null,
-    /// 2: a lot of data, such as a program.
+    /// 2: a large amount of data, such as a program.
     Domain,
     /// 5: the definition of a data type.
     DefType,
@@ -134,12 +134,12 @@ impl ObjectType {
         Self::CODES.iter().map(of).find(|object_type| object_type.word().eq_ignore_ascii_case(word))
     }
 
-    /// Whether it consists of sub-objects.
+    /// Whether it has sub-objects.
     pub const fn has_sub_objects(self) -> bool {
         matches!(self, Self::Array | Self::Record | Self::DefStruct)
     }
 
-    /// The standard's word for it.
+    /// Its name in the standard.
     pub const fn word(self) -> &'static str {
         match self {
             Self::Null => "NULL",
@@ -153,20 +153,20 @@ impl ObjectType {
     }
 }
 
-/// What SDO may do with an object.
+/// SDO access to an object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum AccessType {
-    /// Read.
+    /// Read (`ro`).
     ReadOnly,
-    /// Write.
+    /// Write (`wo`).
     WriteOnly,
-    /// Both (`rw`).
+    /// Read and write (`rw`).
     ReadWrite,
-    /// Both; in a TPDO when it is mapped (`rwr`).
+    /// Read and write; mappable to a TPDO (`rwr`).
     ReadWriteRead,
-    /// Both; in an RPDO when it is mapped (`rww`).
+    /// Read and write; mappable to an RPDO (`rww`).
     ReadWriteWrite,
-    /// Read, and it never changes.
+    /// Read; the value never changes (`const`).
     Constant,
 }
 
@@ -184,14 +184,9 @@ impl AccessType {
         Self::WORDS.iter().find(|(known, _)| known.eq_ignore_ascii_case(word)).map(|(_, access)| *access)
     }
 
-    /// The standard's word for it.
+    /// Its name in the standard.
     pub fn word(self) -> &'static str {
         Self::WORDS.iter().find(|(_, known)| *known == self).map_or("ro", |(word, _)| word)
-    }
-
-    /// Whether it can be read.
-    pub const fn is_readable(self) -> bool {
-        !matches!(self, Self::WriteOnly)
     }
 
     /// Whether it can be written.
@@ -200,7 +195,7 @@ impl AccessType {
     }
 }
 
-/// Which list names an object.
+/// The list that contains an object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum ObjectList {
     /// `[MandatoryObjects]`
@@ -218,46 +213,46 @@ pub struct DictionaryObject {
     pub index: u16,
     /// Its name.
     pub name: String,
-    /// Its kind.
+    /// Its type.
     pub object_type: ObjectType,
-    /// The list that names it; by its index where none does.
+    /// The list that contains it; if none does, the list of its index range.
     pub list: ObjectList,
-    /// Its values in the order of their sub-indices. A variable has one, sub-index 0.
+    /// Its values in the order of their sub-indices. A variable has only sub-index 0.
     pub entries: Vec<DictionaryEntry>,
-    /// The line of its section, counted from 1; `None` when no section describes it.
+    /// The line of its section, counted from 1; `None` without a section.
     pub line: Option<usize>,
 }
 
 /// One value of an object.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DictionaryEntry {
-    /// Where it is.
+    /// Index and sub-index.
     pub address: ObjectAddress,
     /// Its name.
     pub name: String,
-    /// Its type; `None` when neither the file nor the standard tells.
-    pub data_type: Option<DataType>,
-    /// What SDO may do with it.
+    /// Its data type; `None` if neither the file nor the standard defines it.
+    pub data_type: Option<DataTypeCode>,
+    /// SDO access to it.
     pub access: AccessType,
     /// `DefaultValue`
-    pub default: Option<Stated>,
-    /// `ParameterValue`: what a DCF configures.
-    pub configured: Option<Stated>,
+    pub default: Option<LocatedValue>,
+    /// `ParameterValue`: the value that a DCF configures.
+    pub configured: Option<LocatedValue>,
     /// `LowLimit`
     pub low: Option<Value>,
     /// `HighLimit`
     pub high: Option<Value>,
-    /// `PDOMapping`: whether it can be mapped.
+    /// `PDOMapping`: whether a PDO can map it.
     pub is_mappable: bool,
-    /// `ObjFlags`, bit 0: a DCF's value is not written.
+    /// `ObjFlags`, bit 0: the configured value must not be written.
     pub is_write_refused: bool,
-    /// `Denotation`: what the configurer calls it.
+    /// `Denotation`: the name given by the configuration tool.
     pub denotation: Option<String>,
 }
 
-/// A value and where the file states it.
+/// A value and its position in the file.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Stated {
+pub struct LocatedValue {
     /// The value.
     pub value: Value,
     /// The line, counted from 1.
@@ -267,20 +262,20 @@ pub struct Stated {
 }
 
 impl DictionaryEntry {
-    /// The configured value, else the default.
+    /// The configured value, otherwise the default.
     pub fn value(&self) -> Option<&Value> {
         self.configured.as_ref().or(self.default.as_ref()).map(|stated| &stated.value)
     }
 }
 
 impl ObjectDictionary {
-    /// An object.
+    /// Finds an object.
     pub fn object(&self, index: u16) -> Option<&DictionaryObject> {
         let place = self.objects.binary_search_by_key(&index, |object| object.index).ok()?;
         self.objects.get(place)
     }
 
-    /// A value of an object.
+    /// Finds a value of an object.
     pub fn entry(&self, address: ObjectAddress) -> Option<&DictionaryEntry> {
         let object = self.object(address.index)?;
         object.entries.iter().find(|entry| entry.address == address)
@@ -291,23 +286,22 @@ impl ObjectDictionary {
         self.objects.iter().flat_map(|object| &object.entries)
     }
 
-    /// The number that a device with this node number holds after power-up (or after being configured), as far as the
-    /// file tells.
+    /// The number that a device with this node ID holds after power-up or configuration, as far as the file says.
     pub fn number(&self, address: ObjectAddress, node: Option<u8>) -> Option<i128> {
         self.entry(address)?.value()?.number(node)
     }
 
-    /// The node that the file was made for.
+    /// The node ID that the file was made for.
     pub fn commissioned_node(&self) -> Option<u8> {
         self.commissioning.as_ref()?.node
     }
 
-    /// Whether the file configures anything.
+    /// Whether the file configures a device.
     pub fn is_configuration(&self) -> bool {
         self.commissioning.is_some() || self.entries().any(|entry| entry.configured.is_some())
     }
 
-    /// The PDOs of a device with this node number, in the order of their indices.
+    /// The PDOs of a device with this node ID, in the order of their indices.
     pub fn pdos(&self, node: Option<u8>) -> Vec<PdoConfiguration> {
         let directions =
             [(PdoDirection::Receive, 0x1400..=0x15FF), (PdoDirection::Transmit, 0x1800..=0x19FF)];

@@ -1,4 +1,4 @@
-//! The problems of a file with their places: collected while it is read, and shown at their lines.
+//! Collects the problems of a file with their positions, and shows them at their lines.
 
 use std::fmt;
 use std::ops::Range;
@@ -6,44 +6,44 @@ use std::sync::Arc;
 
 use miette::{Diagnostic, NamedSource, SourceCode};
 
-use super::problem::{Problem, ProblemKind, Severity};
+use super::problem::{EdsProblem, EdsProblemKind, Severity};
 
-/// The most problems that are shown with their lines; [`Findings::problems`] has all of them.
-const MOST_SHOWN: usize = 100;
+/// The largest number of problems that are shown with their lines; [`Findings::problems`] has all.
+const MAX_SHOWN: usize = 100;
 
-/// What was found in a file, in its order. `miette` shows each problem with its line.
+/// The problems of a file, in its order. `miette` shows each problem with its line.
 #[derive(Clone)]
 pub struct Findings(Arc<Inner>);
 
 struct Inner {
     source: NamedSource<String>,
     line_starts: Vec<usize>,
-    problems: Vec<Problem>,
+    problems: Vec<EdsProblem>,
 }
 
-/// A place in a file.
+/// A position in a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Place {
+pub struct SourcePosition {
     /// The line, counted from 1.
     pub line: usize,
-    /// The character in the line, counted from 1.
+    /// The column, counted in characters from 1.
     pub column: usize,
 }
 
 impl Findings {
-    pub(super) fn new(source_name: &str, text: String, mut problems: Vec<Problem>) -> Self {
+    pub(super) fn new(source_name: &str, text: String, mut problems: Vec<EdsProblem>) -> Self {
         problems.sort_by_key(|problem| (problem.span.start, problem.span.end));
         let line_starts = std::iter::once(0).chain(text.match_indices('\n').map(|(at, _)| at + 1)).collect();
         Self(Arc::new(Inner { source: NamedSource::new(source_name, text), line_starts, problems }))
     }
 
     pub(super) fn unreadable(source_name: &str, reason: String) -> Self {
-        let kind = ProblemKind::Unreadable { reason };
-        Self::new(source_name, String::new(), vec![Problem { kind, span: 0..0, first_line: None }])
+        let kind = EdsProblemKind::Unreadable { reason };
+        Self::new(source_name, String::new(), vec![EdsProblem { kind, span: 0..0, first_line: None }])
     }
 
     /// Every problem in the order of the file.
-    pub fn problems(&self) -> &[Problem] {
+    pub fn problems(&self) -> &[EdsProblem] {
         &self.0.problems
     }
 
@@ -52,28 +52,28 @@ impl Findings {
         self.0.source.name()
     }
 
-    /// Whether the file is not usable.
+    /// Whether the file has errors, so that it cannot be used.
     pub fn has_errors(&self) -> bool {
         self.problems().iter().any(|problem| problem.kind.severity() == Severity::Error)
     }
 
-    /// Whether nothing was found.
+    /// Whether there are no problems.
     pub fn is_empty(&self) -> bool {
         self.problems().is_empty()
     }
 
-    /// Where a problem is.
-    pub fn place(&self, problem: &Problem) -> Place {
+    /// The position of a problem.
+    pub fn position(&self, problem: &EdsProblem) -> SourcePosition {
         let text = self.0.source.inner();
         let at = problem.span.start.min(text.len());
         let line = self.0.line_starts.partition_point(|start| *start <= at);
         let start = line.checked_sub(1).and_then(|line| self.0.line_starts.get(line)).copied().unwrap_or(0);
         let column = text.get(start..at).map_or(0, |before| before.chars().count()) + 1;
-        Place { line, column }
+        SourcePosition { line, column }
     }
 
-    /// The line that a problem is in, without blanks at its ends.
-    pub fn source_line(&self, problem: &Problem) -> &str {
+    /// The line of a problem, without blanks at its ends.
+    pub fn source_line(&self, problem: &EdsProblem) -> &str {
         let text = self.0.source.inner();
         let start = problem.span.start.min(text.len());
         let from = text.get(..start).and_then(|before| before.rfind('\n')).map_or(0, |at| at + 1);
@@ -106,7 +106,7 @@ impl fmt::Display for Findings {
         let (errors, warnings) = (of(Severity::Error), of(Severity::Warning));
         let name = self.source_name();
         match (errors, warnings) {
-            (0, 0) => write!(f, "{name} is in order")?,
+            (0, 0) => write!(f, "{name} is valid")?,
             (0, _) => write!(f, "{name} is usable: {}", counted(warnings, "warning"))?,
             (_, 0) => write!(f, "{name} cannot be used: {}", counted(errors, "error"))?,
             _ => write!(
@@ -116,8 +116,8 @@ impl fmt::Display for Findings {
                 counted(warnings, "warning")
             )?,
         }
-        if self.problems().len() > MOST_SHOWN {
-            write!(f, "; the first {MOST_SHOWN} are shown")?;
+        if self.problems().len() > MAX_SHOWN {
+            write!(f, "; the first {MAX_SHOWN} are shown")?;
         }
         Ok(())
     }
@@ -134,16 +134,16 @@ impl Diagnostic for Findings {
         Some(&self.0.source)
     }
 
-    /// The first of them; errors before warnings, should there be many.
+    /// The first problems; if there are too many to show, errors come before warnings.
     fn related<'a>(&'a self) -> Option<Box<dyn Iterator<Item = &'a dyn Diagnostic> + 'a>> {
-        fn diagnostic(problem: &Problem) -> &dyn Diagnostic {
+        fn diagnostic(problem: &EdsProblem) -> &dyn Diagnostic {
             problem
         }
-        let is_many = self.problems().len() > MOST_SHOWN;
-        let is_error = |problem: &&Problem| problem.kind.severity() == Severity::Error;
+        let is_many = self.problems().len() > MAX_SHOWN;
+        let is_error = |problem: &&EdsProblem| problem.kind.severity() == Severity::Error;
         let first = self.problems().iter().filter(move |problem| !is_many || is_error(problem));
         let then = self.problems().iter().filter(move |problem| is_many && !is_error(problem));
-        Some(Box::new(first.chain(then).take(MOST_SHOWN).map(diagnostic)))
+        Some(Box::new(first.chain(then).take(MAX_SHOWN).map(diagnostic)))
     }
 }
 
@@ -151,7 +151,7 @@ impl Diagnostic for Findings {
 #[derive(Debug)]
 pub(super) struct Reporter {
     line_starts: Vec<usize>,
-    problems: Vec<Problem>,
+    problems: Vec<EdsProblem>,
 }
 
 impl Reporter {
@@ -160,14 +160,14 @@ impl Reporter {
         Self { line_starts, problems: vec![] }
     }
 
-    pub fn report(&mut self, kind: ProblemKind, span: Range<usize>) {
-        self.problems.push(Problem { kind, span, first_line: None });
+    pub fn report(&mut self, kind: EdsProblemKind, span: Range<usize>) {
+        self.problems.push(EdsProblem { kind, span, first_line: None });
     }
 
-    /// Reports what contradicts or repeats something that begins at `first`.
-    pub fn report_against(&mut self, kind: ProblemKind, span: Range<usize>, first: usize) {
+    /// Reports a problem that contradicts or repeats something at `first`.
+    pub fn report_against(&mut self, kind: EdsProblemKind, span: Range<usize>, first: usize) {
         let first_line = Some(self.line_of(first));
-        self.problems.push(Problem { kind, span, first_line });
+        self.problems.push(EdsProblem { kind, span, first_line });
     }
 
     /// The line of a byte, counted from 1.
@@ -175,7 +175,7 @@ impl Reporter {
         self.line_starts.partition_point(|start| *start <= at)
     }
 
-    pub fn into_problems(self) -> Vec<Problem> {
+    pub fn into_problems(self) -> Vec<EdsProblem> {
         self.problems
     }
 }

@@ -1,12 +1,12 @@
-//! The form of the file: sections, keys and values, each with its place. Names are found whatever their case.
+//! The syntax of the file: sections, keys and values with their positions. Names are compared without case.
 
 use std::collections::HashMap;
 use std::ops::Range;
 
 use super::findings::Reporter;
-use super::problem::ProblemKind;
+use super::problem::EdsProblemKind;
 
-/// The sections of a file in its order; those of the same name are one.
+/// The sections of a file in order. Sections with the same name are merged.
 #[derive(Debug, Default)]
 pub(super) struct Document<'t> {
     sections: Vec<Section<'t>>,
@@ -18,7 +18,7 @@ pub(super) struct Document<'t> {
 pub(super) struct Section<'t> {
     /// Its name as written.
     pub name: &'t str,
-    /// Where its header is.
+    /// The position of its header.
     pub header: Range<usize>,
     pairs: Vec<Pair<'t>>,
     by_key: HashMap<String, usize>,
@@ -29,19 +29,19 @@ pub(super) struct Section<'t> {
 pub(super) struct Pair<'t> {
     /// The key as written.
     pub key: &'t str,
-    /// Where the key is.
+    /// The position of the key.
     pub key_span: Range<usize>,
-    /// The value; never empty where it was found by [`Section::get`].
+    /// The value; never empty in a result of [`Section::get`].
     pub value: &'t str,
-    /// Where the value is.
+    /// The position of the value.
     pub span: Range<usize>,
 }
 
-/// Keys whose value is written to a device, or chooses which: two that differ are no matter of taste.
-const BEYOND_DOUBT: [&str; 2] = ["parametervalue", "nodeid"];
+/// Keys whose value is written to a device or selects the device: two different values are an error.
+const MUST_NOT_DIFFER: [&str; 2] = ["parametervalue", "nodeid"];
 
 impl<'t> Document<'t> {
-    /// Reads every line. What is no line of an EDS is passed over with a warning.
+    /// Parses every line. Lines that are not valid in an EDS are ignored with a warning.
     pub fn parse(text: &'t str, reporter: &mut Reporter) -> Self {
         let mut document = Self::default();
         let mut current = None;
@@ -58,44 +58,44 @@ impl<'t> Document<'t> {
                 current = document.open(inner, span, reporter);
             } else if let Some((key, value)) = trimmed.split_once('=') {
                 let Some(section) = current.and_then(|section| document.sections.get_mut(section)) else {
-                    reporter.report(ProblemKind::OutsideSections, span);
+                    reporter.report(EdsProblemKind::OutsideSections, span);
                     continue;
                 };
                 section.add(pair(trimmed, at, key, value), reporter);
             } else {
-                reporter.report(ProblemKind::NotALine, span);
+                reporter.report(EdsProblemKind::NotALine, span);
             }
         }
         document
     }
 
-    /// A section by its name.
+    /// Finds a section by its name.
     pub fn section(&self, name: &str) -> Option<&Section<'t>> {
         self.sections.get(*self.by_name.get(&folded(name))?)
     }
 
-    /// Every section.
+    /// All sections.
     pub fn sections(&self) -> impl Iterator<Item = &Section<'t>> {
         self.sections.iter()
     }
 
-    /// Begins a section, or goes on with the earlier one of that name. `None` where the header has no name.
+    /// Begins a section, or continues an earlier one with the same name. `None` if the header has no name.
     fn open(&mut self, inner: &'t str, span: Range<usize>, reporter: &mut Reporter) -> Option<usize> {
         let name = match inner.split_once(']') {
             Some((name, _)) => name.trim(),
             None => {
-                reporter.report(ProblemKind::UnclosedHeader, span.clone());
+                reporter.report(EdsProblemKind::UnclosedHeader, span.clone());
                 inner.trim()
             }
         };
         if name.is_empty() {
-            reporter.report(ProblemKind::NotALine, span);
+            reporter.report(EdsProblemKind::NotALine, span);
             return None;
         }
         if let Some(&first) = self.by_name.get(&folded(name)) {
             let first_header = self.sections.get(first)?.header.clone();
             reporter.report_against(
-                ProblemKind::RepeatedSection { name: name.to_owned() },
+                EdsProblemKind::RepeatedSection { name: name.to_owned() },
                 span,
                 first_header.start,
             );
@@ -108,12 +108,12 @@ impl<'t> Document<'t> {
 }
 
 impl<'t> Section<'t> {
-    /// A key with its value; `None` when the key is absent or its value empty.
+    /// Finds a key with a value; `None` when the key is absent or its value is empty.
     pub fn get(&self, key: &str) -> Option<&Pair<'t>> {
         self.pairs.get(*self.by_key.get(&folded(key))?).filter(|pair| !pair.value.is_empty())
     }
 
-    /// Every key in the order of the file, those without a value too.
+    /// All keys in order, including those without a value.
     pub fn pairs(&self) -> &[Pair<'t>] {
         &self.pairs
     }
@@ -128,11 +128,11 @@ impl<'t> Section<'t> {
         };
         let shown = pair.key.to_owned();
         let kind = if first.value.eq_ignore_ascii_case(pair.value) {
-            ProblemKind::RepeatedKey { key: shown }
-        } else if BEYOND_DOUBT.contains(&key.as_str()) {
-            ProblemKind::Contradiction { key: shown }
+            EdsProblemKind::RepeatedKey { key: shown }
+        } else if MUST_NOT_DIFFER.contains(&key.as_str()) {
+            EdsProblemKind::Contradiction { key: shown }
         } else {
-            ProblemKind::RepeatedKeyDiffers { key: shown, counts: first.value.to_owned() }
+            EdsProblemKind::RepeatedKeyDiffers { key: shown, counts: first.value.to_owned() }
         };
         reporter.report_against(kind, pair.key_span, first.key_span.start);
     }
@@ -154,12 +154,12 @@ fn trimmed(text: &str) -> &str {
     text.trim_matches(|c: char| c.is_whitespace() || c == '\0' || c == '\u{FEFF}')
 }
 
-/// Where a part of a text begins in it. Both are slices of the same file.
+/// The offset of a part in its text. Both are slices of the same file.
 fn offset(whole: &str, part: &str) -> usize {
     (part.as_ptr() as usize).saturating_sub(whole.as_ptr() as usize).min(whole.len())
 }
 
-/// A name as it is looked up: case and blanks do not count.
+/// A name without case and blanks, for comparison.
 fn folded(name: &str) -> String {
     name.chars().filter(|c| !c.is_whitespace()).flat_map(char::to_lowercase).collect()
 }
@@ -169,20 +169,20 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_are_found_in_any_case_and_values_keep_their_place() {
+    fn names_are_found_in_any_case_and_values_keep_their_position() {
         let text = "; comment\r\n[ 1018Sub1 ]\r\n  ParameterName = Vendor ID \r\nDEFAULTVALUE=\r\n";
         let mut reporter = Reporter::new(text);
         let document = Document::parse(text, &mut reporter);
         let section = document.section("1018sub1").unwrap();
         let name = section.get("parametername").unwrap();
         assert_eq!((name.value, &text[name.span.clone()]), ("Vendor ID", "Vendor ID"));
-        assert!(section.get("DefaultValue").is_none(), "an empty value is none");
+        assert!(section.get("DefaultValue").is_none(), "an empty value does not count");
         assert_eq!(section.pairs().len(), 2);
         assert!(reporter.into_problems().is_empty());
     }
 
     #[test]
-    fn the_first_of_two_counts() {
+    fn the_first_of_two_values_is_used() {
         let text = "[a]\nx=1\n[A]\nX=2\ny=3\n";
         let mut reporter = Reporter::new(text);
         let document = Document::parse(text, &mut reporter);

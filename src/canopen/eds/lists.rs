@@ -1,4 +1,4 @@
-//! The lists of objects, which must agree with the sections and seldom do.
+//! The lists of objects, which should agree with the sections.
 
 use std::collections::BTreeMap;
 
@@ -7,7 +7,7 @@ use super::entry;
 use super::findings::Reporter;
 use super::ini::{Document, Pair, Section};
 use super::number;
-use super::problem::ProblemKind;
+use super::problem::EdsProblemKind;
 
 const LISTS: [(&str, ObjectList); 3] = [
     ("MandatoryObjects", ObjectList::Mandatory),
@@ -15,7 +15,7 @@ const LISTS: [(&str, ObjectList); 3] = [
     ("ManufacturerObjects", ObjectList::Manufacturer),
 ];
 
-/// Notes which list names each object, and warns of disagreement.
+/// Records the list of each object, and warns of disagreement.
 pub(super) fn check(document: &Document<'_>, dictionary: &mut ObjectDictionary, reporter: &mut Reporter) {
     let mut listed = BTreeMap::new();
     for (name, list) in LISTS {
@@ -28,9 +28,9 @@ pub(super) fn check(document: &Document<'_>, dictionary: &mut ObjectDictionary, 
             None => {
                 let section = document.section(&format!("{:04X}", object.index));
                 let span = section.map_or(0..0, |section| section.header.clone());
-                // An object without its own section has been told of already.
+                // An object without its own section has already been reported.
                 if section.is_some() {
-                    reporter.report(ProblemKind::NotListed { index: object.index }, span);
+                    reporter.report(EdsProblemKind::NotListed { index: object.index }, span);
                 }
             }
         }
@@ -52,23 +52,23 @@ fn read(
         let Some(index) = index(pair, dictionary, reporter) else { continue };
         found += 1;
         if dictionary.object(index).is_none() {
-            reporter.report(ProblemKind::ListedOnly { index }, pair.span.clone());
+            reporter.report(EdsProblemKind::ListedOnly { index }, pair.span.clone());
         } else if listed.insert(index, list).is_some() {
-            reporter.report(ProblemKind::ListedTwice { index }, pair.span.clone());
+            reporter.report(EdsProblemKind::ListedTwice { index }, pair.span.clone());
         }
     }
     if let Some(pair) = section.get("SupportedObjects")
         && let Some(stated) = entry::whole(section, "SupportedObjects", reporter)
         && usize::try_from(stated) != Ok(found)
     {
-        let kind = ProblemKind::Count { key: pair.key.to_owned(), stated, found };
+        let kind = EdsProblemKind::Count { key: pair.key.to_owned(), stated, found };
         reporter.report(kind, pair.span.clone());
     }
 }
 
-/// The index that a line names: hexadecimal without its `0x` too, where that is an object and the number is not.
+/// The index in a line. A hexadecimal number without `0x` is accepted if only that is an object.
 fn index(pair: &Pair<'_>, dictionary: &ObjectDictionary, reporter: &mut Reporter) -> Option<u16> {
-    let number = number::read(pair.value).and_then(|reading| reading.number.at(None));
+    let number = number::read(pair.value).and_then(|parsed| parsed.number.at(None));
     let number = number.and_then(|number| u16::try_from(number).ok());
     if let Some(index) = number.filter(|index| dictionary.object(*index).is_some()) {
         return Some(index);
@@ -76,14 +76,14 @@ fn index(pair: &Pair<'_>, dictionary: &ObjectDictionary, reporter: &mut Reporter
     let given = pair.value.to_owned();
     let hexadecimal = u16::from_str_radix(pair.value, 16).ok();
     if let Some(index) = hexadecimal.filter(|index| dictionary.object(*index).is_some()) {
-        reporter.report(ProblemKind::DecimalIndex { given, index }, pair.span.clone());
+        reporter.report(EdsProblemKind::DecimalIndex { given, index }, pair.span.clone());
         return Some(index);
     }
     if number.is_none() {
-        let kind = ProblemKind::UnknownWord {
+        let kind = EdsProblemKind::UnknownWord {
             key: pair.key.to_owned(),
             given,
-            repair: "it was passed over; an index may stand here, as in 0x1018",
+            repair: "it was ignored; allowed: an index, as in 0x1018",
         };
         reporter.report(kind, pair.span.clone());
     }

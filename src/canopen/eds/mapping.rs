@@ -1,17 +1,17 @@
-//! Whether PDO mappings name objects that are there, can be mapped, and have the length that the mapping says.
+//! Checks that PDO mappings refer to existing, mappable objects with the right length.
 
 use takt_rt::MappedObject;
 
-use super::data_type::{DataType, ValueKind};
+use super::data_type::{DataTypeCode, ValueKind};
 use super::dictionary::{DictionaryEntry, ObjectDictionary};
 use super::findings::Reporter;
-use super::problem::ProblemKind;
+use super::problem::EdsProblemKind;
 use crate::canopen::object::ObjectAddress;
 
-/// The indices of simple data types, which are mapped to leave a gap.
+/// The indices of simple data types, which are mapped as placeholders.
 const DUMMIES: std::ops::RangeInclusive<u16> = 0x0001..=0x0007;
 
-/// Warns of mapped objects that the dictionary contradicts.
+/// Warns of mapped objects that contradict the dictionary.
 pub(super) fn check(dictionary: &ObjectDictionary, reporter: &mut Reporter) {
     let is_mapping = |index| matches!(index, 0x1600..=0x17FF | 0x1A00..=0x1BFF);
     for object in dictionary.objects.iter().filter(|object| is_mapping(object.index)) {
@@ -31,7 +31,7 @@ fn check_entry(dictionary: &ObjectDictionary, entry: &DictionaryEntry, reporter:
     };
     let mapped = MappedObject::from_parameter(parameter);
     let Some(reason) = contradiction(dictionary, mapped) else { return };
-    let kind = ProblemKind::BadMapping {
+    let kind = EdsProblemKind::BadMapping {
         mapping: entry.address.to_string(),
         mapped: ObjectAddress::new(mapped.index, mapped.subindex).to_string(),
         reason,
@@ -41,11 +41,11 @@ fn check_entry(dictionary: &ObjectDictionary, entry: &DictionaryEntry, reporter:
 
 fn contradiction(dictionary: &ObjectDictionary, mapped: MappedObject) -> Option<String> {
     if DUMMIES.contains(&mapped.index) && mapped.subindex == 0 {
-        let is_declared = dictionary.dummies.contains(&DataType(mapped.index));
+        let is_declared = dictionary.dummies.contains(&DataTypeCode(mapped.index));
         return (!is_declared).then(|| "[DummyUsage] does not allow this dummy".to_owned());
     }
     let Some(entry) = dictionary.entry(ObjectAddress::new(mapped.index, mapped.subindex)) else {
-        return Some("there is no such object".to_owned());
+        return Some("this object does not exist".to_owned());
     };
     if !entry.is_mappable {
         return Some("its PDOMapping is 0".to_owned());
@@ -55,5 +55,5 @@ fn contradiction(dictionary: &ObjectDictionary, mapped: MappedObject) -> Option<
     // Devices map BOOLEAN as one bit or as a byte.
     let is_boolean_byte = data_type.kind() == ValueKind::Unsigned(1) && mapped.bits == 8;
     (bits != mapped.bits && !is_boolean_byte)
-        .then(|| format!("it maps {} bits, and {data_type} has {bits}", mapped.bits))
+        .then(|| format!("the mapping has {} bits, but {data_type} has {bits}", mapped.bits))
 }

@@ -1,22 +1,22 @@
-//! Electronic data sheets and device configuration files (CiA 306): what a device's object dictionary holds, read from
-//! files as they are rather than as they should be.
+//! Electronic data sheets and device configuration files (CiA 306): reads a device's object dictionary from files as
+//! they are found in practice.
 //!
-//! [`load`] and [`parse`] give an [`ObjectDictionary`] with [`Findings`]: every repair that was made is a warning with its
-//! place. What cannot be repaired is an error, and all of them are told at once:
+//! [`load`] and [`parse`] return an [`ObjectDictionary`] with [`Findings`]. Each repair is a warning with its position.
+//! What cannot be repaired is an error; all errors are reported together:
 //!
-//! - **Repaired**: another case or spelling of keys, sections and `$NODEID`; counts and lists that disagree with the
-//!   sections; missing data types, access types and names; object types that the sub-objects contradict; limits that
-//!   cannot be; keys and sections that are there twice (the first counts, as Windows' profile functions have it); lines
-//!   that are none.
-//! - **Refused**: values that are no value of their type, because a wrong one could reach a drive; a configured value that
-//!   is there twice and differs; files without any object.
+//! - **Repaired**: case and spelling of keys, sections and `$NODEID`; counts and lists that disagree with the sections;
+//!   missing data types, access types and names; object types that the sub-objects contradict; impossible limits;
+//!   repeated keys and sections (the first one is used, as by the profile functions of Windows); lines that are not
+//!   valid.
+//! - **Refused**: values that do not fit their type, because a wrong value could reach a drive; a configured value that
+//!   appears twice with different values; files without any object.
 //!
-//! A number with a leading zero is octal, as the standard has it, with a warning where the decimal reading would give
-//! another number; digits that octal does not have make it decimal, with a warning too. A hexadecimal number of a signed
-//! type may be its bit pattern (`0xFFFFFFFF` is -1 in INTEGER32).
+//! A number with a leading zero is octal, by the standard, with a warning if the decimal number would differ. With
+//! digits that are not octal it is decimal, with a warning too. A hexadecimal number of a signed type may be its bit
+//! pattern (`0xFFFFFFFF` is -1 in INTEGER32).
 //!
 //! ```text
-//! parse ── text ── ini: sections, keys and values with their places
+//! parse ── text ── ini: sections, keys and values with their positions
 //!   └── read ── device, objects (entry, value, number), lists, compact_pdo, mapping
 //! ```
 
@@ -36,26 +36,25 @@ mod section_name;
 mod text;
 mod value;
 
+use crate::printable::printable_path;
 use std::path::Path;
 
-use crate::printable::printable_path;
-
-pub use data_type::{DataType, ValueKind};
+pub use data_type::{DataTypeCode, ValueKind};
 pub use dictionary::{
-    AccessType, DeviceCommissioning, DeviceInfo, DictionaryEntry, DictionaryObject, FileInfo,
-    ObjectDictionary, ObjectList, ObjectType, Stated,
+    AccessType, DeviceCommissioning, DeviceInfo, DictionaryEntry, DictionaryObject, FileInfo, LocatedValue,
+    ObjectDictionary, ObjectList, ObjectType,
 };
-pub use findings::{Findings, Place};
-pub use number::{Number, Oddity};
-pub use problem::{Problem, ProblemKind, Severity};
+pub use findings::{Findings, SourcePosition};
+pub use number::{Anomaly, Number};
+pub use problem::{EdsProblem, EdsProblemKind, Severity};
 pub use value::Value;
 
-/// A file that could be read.
+/// A readable file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Loaded {
-    /// What it says.
+    /// Its content.
     pub dictionary: ObjectDictionary,
-    /// What had to be repaired; all of them are warnings.
+    /// The repairs; all of them are warnings.
     pub warnings: Findings,
 }
 
@@ -68,7 +67,7 @@ pub fn load(path: &Path) -> Result<Loaded, Findings> {
     }
 }
 
-/// Reads an EDS or DCF. `source_name` is what messages call it.
+/// Reads an EDS or DCF. Messages call it `source_name`.
 pub fn parse(source_name: &str, bytes: &[u8]) -> Result<Loaded, Findings> {
     let text = text::decode(bytes);
     let (dictionary, problems) = read::read(&text);

@@ -1,21 +1,21 @@
-//! Whole numbers as files write them, with the node number as a possible summand.
+//! Integers in files, with the node ID as a possible summand.
 
-/// A whole number, to which the device's node number may have to be added.
+/// An integer, with the device's node ID as an optional summand.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Number {
-    /// What the file says without the node number.
+    /// The number without the node ID.
     pub constant: i128,
-    /// Whether `$NODEID` is a summand.
+    /// Whether `$NODEID` is added.
     pub adds_node: bool,
 }
 
 impl Number {
-    /// A number that does not depend on the node.
+    /// A number that does not depend on the node ID.
     pub const fn constant(constant: i128) -> Self {
         Self { constant, adds_node: false }
     }
 
-    /// The number for a node; `None` when it depends on the node and none is given.
+    /// The number for a node ID; `None` when it needs a node ID and none is given.
     pub fn at(self, node: Option<u8>) -> Option<i128> {
         match (self.adds_node, node) {
             (false, _) => Some(self.constant),
@@ -25,36 +25,36 @@ impl Number {
     }
 }
 
-/// A number that was read, and what is odd about the way it is written.
+/// A parsed number, and the anomaly in its spelling.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Reading {
+pub(super) struct ParsedNumber {
     pub number: Number,
-    pub oddity: Option<Oddity>,
-    /// Whether it is written in hexadecimal, and so may be meant as a pattern of bits.
+    pub anomaly: Option<Anomaly>,
+    /// Whether it is hexadecimal, so that it may be a bit pattern.
     pub is_pattern: bool,
 }
 
-/// A spelling that is repaired.
+/// An anomaly in the spelling of a number, which is repaired.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Oddity {
-    /// A leading zero makes it octal, which is another number than its digits in decimal.
+pub enum Anomaly {
+    /// A leading zero makes it octal, which differs from its decimal parsed.
     Octal,
-    /// A leading zero before digits that octal does not have: it is taken as decimal.
+    /// A leading zero before digits that are not octal: it is read as decimal.
     NotOctal,
     /// `200h` for 0x200.
     Suffix,
-    /// `NODEID` without its dollar sign.
+    /// `NODEID` without the dollar sign.
     NoDollar,
-    /// Something behind a semicolon.
+    /// Text behind a semicolon.
     Comment,
     /// `true` or `false`, `yes` or `no`.
     Word,
 }
 
-/// Reads a sum of numbers and at most one `$NODEID`; `None` when the text is something else.
-pub(super) fn read(text: &str) -> Option<Reading> {
-    let (sum, mut oddity) = match text.split_once(';') {
-        Some((sum, _)) => (sum, Some(Oddity::Comment)),
+/// Parses a sum of numbers and at most one `$NODEID`; `None` for any other text.
+pub(super) fn read(text: &str) -> Option<ParsedNumber> {
+    let (sum, mut anomaly) = match text.split_once(';') {
+        Some((sum, _)) => (sum, Some(Anomaly::Comment)),
         None => (text, None),
     };
     let mut number = Number::constant(0);
@@ -69,7 +69,7 @@ pub(super) fn read(text: &str) -> Option<Reading> {
         let end = rest.find(['+', '-']).unwrap_or(rest.len());
         let (term, tail) = rest.split_at(end);
         let term = read_term(term.trim())?;
-        oddity = oddity.or(term.oddity);
+        anomaly = anomaly.or(term.anomaly);
         is_pattern |= term.is_pattern && !is_negative;
         match (term.number.adds_node, is_negative) {
             (true, true) => return None,
@@ -79,47 +79,47 @@ pub(super) fn read(text: &str) -> Option<Reading> {
             (false, false) => number.constant += term.number.constant,
         }
         if tail.is_empty() {
-            return Some(Reading { number, oddity, is_pattern });
+            return Some(ParsedNumber { number, anomaly, is_pattern });
         }
         is_negative = tail.starts_with('-');
         rest = tail.get(1..)?.trim_start();
     }
 }
 
-fn read_term(term: &str) -> Option<Reading> {
-    let of = |constant: u64, oddity, is_pattern| {
-        Some(Reading { number: Number::constant(constant.into()), oddity, is_pattern })
+fn read_term(term: &str) -> Option<ParsedNumber> {
+    let of = |constant: u64, anomaly, is_pattern| {
+        Some(ParsedNumber { number: Number::constant(constant.into()), anomaly, is_pattern })
     };
     let lower = term.to_ascii_lowercase();
-    let node = |oddity| {
+    let node = |anomaly| {
         let number = Number { constant: 0, adds_node: true };
-        Some(Reading { number, oddity, is_pattern: false })
+        Some(ParsedNumber { number, anomaly, is_pattern: false })
     };
     match lower.as_str() {
         "$nodeid" => return node(None),
-        "nodeid" => return node(Some(Oddity::NoDollar)),
-        "true" | "yes" => return of(1, Some(Oddity::Word), false),
-        "false" | "no" => return of(0, Some(Oddity::Word), false),
+        "nodeid" => return node(Some(Anomaly::NoDollar)),
+        "true" | "yes" => return of(1, Some(Anomaly::Word), false),
+        "false" | "no" => return of(0, Some(Anomaly::Word), false),
         _ => {}
     }
     if let Some(digits) = lower.strip_prefix("0x") {
         return of(digits_in(digits, 16)?, None, true);
     }
     if let Some(digits) = lower.strip_suffix('h') {
-        return of(digits_in(digits, 16)?, Some(Oddity::Suffix), true);
+        return of(digits_in(digits, 16)?, Some(Anomaly::Suffix), true);
     }
     let decimal = digits_in(&lower, 10)?;
     if lower.len() == 1 || !lower.starts_with('0') {
         return of(decimal, None, false);
     }
     match digits_in(&lower, 8) {
-        None => of(decimal, Some(Oddity::NotOctal), false),
-        Some(octal) => of(octal, (octal != decimal).then_some(Oddity::Octal), false),
+        None => of(decimal, Some(Anomaly::NotOctal), false),
+        Some(octal) => of(octal, (octal != decimal).then_some(Anomaly::Octal), false),
     }
 }
 
 fn digits_in(digits: &str, radix: u32) -> Option<u64> {
-    // The standard library takes a sign too, of which there has been one already.
+    // The standard library would accept another sign here.
     digits.chars().all(|c| c.is_digit(radix)).then(|| u64::from_str_radix(digits, radix).ok())?
 }
 
@@ -127,12 +127,12 @@ fn digits_in(digits: &str, radix: u32) -> Option<u64> {
 mod tests {
     use super::*;
 
-    fn value(text: &str) -> Option<(i128, Option<Oddity>)> {
-        read(text).map(|reading| (reading.number.at(Some(5)).unwrap(), reading.oddity))
+    fn value(text: &str) -> Option<(i128, Option<Anomaly>)> {
+        read(text).map(|parsed| (parsed.number.at(Some(5)).unwrap(), parsed.anomaly))
     }
 
     #[test]
-    fn the_node_number_is_read_in_any_spelling_and_order() {
+    fn the_node_id_is_parsed_in_any_spelling_and_order() {
         for text in [
             "$NODEID+0x200",
             "0x200+$NODEID",
@@ -145,25 +145,25 @@ mod tests {
         }
         assert_eq!(value("$NODEID"), Some((5, None)));
         assert_eq!(value("$NODEID-1"), Some((4, None)));
-        assert_eq!(value("NODEID+0x80"), Some((0x85, Some(Oddity::NoDollar))));
+        assert_eq!(value("NODEID+0x80"), Some((0x85, Some(Anomaly::NoDollar))));
     }
 
     #[test]
     fn numbers_are_decimal_hexadecimal_or_octal() {
         assert_eq!(value("42"), Some((42, None)));
         assert_eq!(value("0X2a"), Some((42, None)));
-        assert_eq!(value("052"), Some((42, Some(Oddity::Octal))));
+        assert_eq!(value("052"), Some((42, Some(Anomaly::Octal))));
         assert_eq!(value("07"), Some((7, None)));
         assert_eq!(value("00"), Some((0, None)));
-        assert_eq!(value("089"), Some((89, Some(Oddity::NotOctal))));
-        assert_eq!(value("2Ah"), Some((42, Some(Oddity::Suffix))));
+        assert_eq!(value("089"), Some((89, Some(Anomaly::NotOctal))));
+        assert_eq!(value("2Ah"), Some((42, Some(Anomaly::Suffix))));
         assert_eq!(value("-0x2A"), Some((-42, None)));
-        assert_eq!(value("42 ; forty-two"), Some((42, Some(Oddity::Comment))));
+        assert_eq!(value("42 ; forty-two"), Some((42, Some(Anomaly::Comment))));
         assert_eq!(value("0xFFFFFFFFFFFFFFFF"), Some((u64::MAX.into(), None)));
     }
 
     #[test]
-    fn what_is_no_number_is_none() {
+    fn other_texts_are_not_numbers() {
         for text in [
             "",
             "abc",

@@ -1,19 +1,21 @@
-//! Objects and their sub-objects, from the sections that describe them, in full or compactly.
+//! Reads objects and sub-objects from the sections that describe them, in full or compactly.
 
 use std::collections::BTreeMap;
 
-use super::data_type::DataType;
-use super::dictionary::{AccessType, DictionaryEntry, DictionaryObject, ObjectList, ObjectType, Stated};
+use super::data_type::DataTypeCode;
+use super::dictionary::{
+    AccessType, DictionaryEntry, DictionaryObject, LocatedValue, ObjectList, ObjectType,
+};
 use super::entry::{self, Context};
 use super::findings::Reporter;
 use super::ini::{Document, Pair, Section};
 use super::number::{self, Number};
-use super::problem::ProblemKind;
+use super::problem::EdsProblemKind;
 use super::section_name::SectionName;
 use super::value::Value;
 use crate::canopen::object::ObjectAddress;
 
-/// The highest sub-index of a value; 255 describes the structure of its object.
+/// The highest sub-index of a value; 255 describes the structure of the object.
 const HIGHEST_SUBINDEX: u8 = 254;
 
 /// The sections of one object.
@@ -49,7 +51,7 @@ pub(super) fn read(document: &Document<'_>, reporter: &mut Reporter) -> Vec<Dict
         .collect()
 }
 
-/// The list to which an object belongs by its index (CiA 306, section 4.6.3).
+/// The list of an object by its index (CiA 306, section 4.6.3).
 pub(super) fn list_of(index: u16) -> ObjectList {
     match index {
         0x1000 | 0x1001 | 0x1018 => ObjectList::Mandatory,
@@ -78,7 +80,7 @@ impl Reader<'_, '_, '_> {
         let name = name.map(|pair| pair.value.to_owned()).unwrap_or_default();
         if let Some(section) = self.parts.object.filter(|_| object_type.has_sub_objects()) {
             if name.is_empty() {
-                let kind = ProblemKind::MissingKey {
+                let kind = EdsProblemKind::MissingKey {
                     key: "ParameterName",
                     object: format!("{:04X}", self.index),
                     repair: "it has no name".to_owned(),
@@ -98,7 +100,7 @@ impl Reader<'_, '_, '_> {
         }
     }
 
-    /// How many sub-objects the object's own section describes at once.
+    /// The number of sub-objects that the object's own section describes.
     fn compact_count(&mut self) -> u8 {
         let Some(section) = self.parts.object else { return 0 };
         let count = entry::whole(section, "CompactSubObj", self.reporter).unwrap_or(0);
@@ -106,18 +108,19 @@ impl Reader<'_, '_, '_> {
             && let Some(pair) = section.get("CompactSubObj")
         {
             let kind =
-                ProblemKind::OutOfRange { key: pair.key.to_owned(), value: count, allowed: "0 to 254" };
+                EdsProblemKind::OutOfRange { key: pair.key.to_owned(), value: count, allowed: "0 to 254" };
             self.reporter.report(kind, pair.span.clone());
         }
         count.clamp(0, HIGHEST_SUBINDEX.into()) as u8
     }
 
-    /// What the object is: what its section says, unless the others contradict it.
+    /// The object type in the section, unless the other sections contradict it.
     fn object_type(&mut self, compact: u8) -> ObjectType {
         let has_sub_objects = compact > 0 || !self.parts.sub_objects.is_empty();
         let Some(section) = self.parts.object else {
             if let Some(first) = self.parts.sub_objects.values().next() {
-                self.reporter.report(ProblemKind::MissingObject { index: self.index }, first.header.clone());
+                self.reporter
+                    .report(EdsProblemKind::MissingObject { index: self.index }, first.header.clone());
             }
             return ObjectType::Record;
         };
@@ -127,24 +130,24 @@ impl Reader<'_, '_, '_> {
             (false, _) => ObjectType::Variable,
         };
         let Some(pair) = section.get("ObjectType") else {
-            // A section without it is that of a variable (CiA 306).
+            // A section without this key describes a variable (CiA 306).
             if has_sub_objects {
-                let kind = ProblemKind::MissingKey {
+                let kind = EdsProblemKind::MissingKey {
                     key: "ObjectType",
                     object: format!("{:04X}", self.index),
-                    repair: format!("it was taken as {found}"),
+                    repair: format!("it was read as {found}"),
                 };
                 self.reporter.report(kind, section.header.clone());
             }
             return found;
         };
-        let code = number::read(pair.value).and_then(|reading| reading.number.at(None));
+        let code = number::read(pair.value).and_then(|parsed| parsed.number.at(None));
         let word = || ObjectType::from_word(pair.value);
         let Some(declared) = code.and_then(ObjectType::from_code).or_else(word) else {
-            let kind = ProblemKind::UnknownWord {
+            let kind = EdsProblemKind::UnknownWord {
                 key: pair.key.to_owned(),
                 given: pair.value.to_owned(),
-                repair: "it was taken from the sections; what may stand here: 0x2, 0x5 to 0x9",
+                repair: "it was derived from the sections; allowed: 0x2, 0x5 to 0x9",
             };
             self.reporter.report(kind, pair.span.clone());
             return found;
@@ -157,7 +160,7 @@ impl Reader<'_, '_, '_> {
         if !is_contradicted {
             return declared;
         }
-        let kind = ProblemKind::WrongObjectType {
+        let kind = EdsProblemKind::WrongObjectType {
             index: self.index,
             declared: declared.word(),
             found: found.word(),
@@ -167,7 +170,7 @@ impl Reader<'_, '_, '_> {
     }
 
     fn variable(&mut self, section: &Section<'_>, object_type: ObjectType) -> DictionaryEntry {
-        let usual_type = matches!(object_type, ObjectType::Domain).then_some(DataType::DOMAIN);
+        let usual_type = matches!(object_type, ObjectType::Domain).then_some(DataTypeCode::DOMAIN);
         let context = Context { address: ObjectAddress::new(self.index, 0), usual_type };
         entry::read(section, context, self.reporter)
     }
@@ -183,10 +186,10 @@ impl Reader<'_, '_, '_> {
                 entries.insert(subindex, DictionaryEntry { name, address, ..template.clone() });
             }
         }
-        let usual_type = |subindex| if subindex == 0 { Some(DataType::UNSIGNED8) } else { None };
+        let usual_type = |subindex| if subindex == 0 { Some(DataTypeCode::UNSIGNED8) } else { None };
         let mut first_type = None;
         for (subindex, section) in self.parts.sub_objects.clone() {
-            // Elements of an array have one type; so, mostly, have those of records that leave it out.
+            // The elements of an array have one type; usually so do elements of records without a type.
             let usual_type = usual_type(subindex).or(first_type);
             let context = Context { address: ObjectAddress::new(self.index, subindex), usual_type };
             let entry = entry::read(section, context, self.reporter);
@@ -194,7 +197,7 @@ impl Reader<'_, '_, '_> {
                 first_type = first_type.or(entry.data_type);
             }
             if entries.insert(subindex, entry).is_some() && subindex > 0 {
-                let kind = ProblemKind::CompactAndFull { index: self.index, subindex };
+                let kind = EdsProblemKind::CompactAndFull { index: self.index, subindex };
                 self.reporter.report(kind, section.header.clone());
             }
         }
@@ -207,15 +210,22 @@ impl Reader<'_, '_, '_> {
     }
 
     fn compact_count_entry(&self, compact: u8) -> DictionaryEntry {
-        // The count of errors is the one that is written, to clear them.
+        // The number of errors is writable, so that they can be cleared.
         let access = if self.index == 0x1003 { AccessType::ReadWrite } else { AccessType::ReadOnly };
         let line = self.parts.object.map_or(0, |section| self.reporter.line_of(section.header.start));
         let span = self.parts.object.map_or(0..0, |section| section.header.clone());
         let value = Value::Number(Number::constant(compact.into()));
-        implied(self.index, 0, "NrOfObjects", DataType::UNSIGNED8, access, Some(Stated { value, line, span }))
+        implied(
+            self.index,
+            0,
+            "NrOfObjects",
+            DataTypeCode::UNSIGNED8,
+            access,
+            Some(LocatedValue { value, line, span }),
+        )
     }
 
-    /// Names, values and denotations of sub-objects that are listed in sections of their own.
+    /// Applies names, values and denotations from separate sections.
     fn apply_lists(&mut self, entries: &mut [DictionaryEntry]) {
         for (subindex, pair) in self.listed(self.parts.names) {
             if let Some(entry) = find(entries, subindex) {
@@ -234,7 +244,7 @@ impl Reader<'_, '_, '_> {
         }
     }
 
-    /// `1=…`, `2=…` of a section that begins with their count.
+    /// The entries `1=…`, `2=…` of a section that begins with their count.
     fn listed<'t>(&mut self, section: Option<&Section<'t>>) -> Vec<(u8, Pair<'t>)> {
         let Some(section) = section else { return vec![] };
         let listed: Vec<(u8, Pair<'t>)> = section
@@ -247,7 +257,7 @@ impl Reader<'_, '_, '_> {
             && let Some(stated) = entry::whole(section, "NrOfEntries", self.reporter)
             && usize::try_from(stated) != Ok(listed.len())
         {
-            let kind = ProblemKind::Count { key: pair.key.to_owned(), stated, found: listed.len() };
+            let kind = EdsProblemKind::Count { key: pair.key.to_owned(), stated, found: listed.len() };
             self.reporter.report(kind, pair.span.clone());
         }
         listed
@@ -258,12 +268,12 @@ impl Reader<'_, '_, '_> {
         let Some(stated) = entry::whole(section, "SubNumber", self.reporter) else { return };
         let found = self.parts.sub_objects.len();
         if usize::try_from(stated) != Ok(found) {
-            let kind = ProblemKind::Count { key: pair.key.to_owned(), stated, found };
+            let kind = EdsProblemKind::Count { key: pair.key.to_owned(), stated, found };
             self.reporter.report(kind, pair.span.clone());
         }
     }
 
-    /// Sub-index 0 tells the highest sub-index, or how many of the others count at present.
+    /// Checks sub-index 0, which holds the highest sub-index or the number of valid entries.
     fn check_highest(&mut self, entries: &[DictionaryEntry]) {
         let Some(stated) = entries.first().filter(|entry| entry.address.subindex == 0) else { return };
         let Some((stated, number)) =
@@ -274,7 +284,7 @@ impl Reader<'_, '_, '_> {
         let highest = entries.last().map_or(0, |entry| entry.address.subindex);
         if number > i128::from(highest) {
             let key = format!("DefaultValue of {:04X}:00", self.index);
-            let kind = ProblemKind::Count { key, stated: number, found: highest.into() };
+            let kind = EdsProblemKind::Count { key, stated: number, found: highest.into() };
             self.reporter.report(kind, stated.span.clone());
         }
     }
@@ -285,9 +295,9 @@ pub(super) fn implied(
     index: u16,
     subindex: u8,
     name: &str,
-    data_type: DataType,
+    data_type: DataTypeCode,
     access: AccessType,
-    default: Option<Stated>,
+    default: Option<LocatedValue>,
 ) -> DictionaryEntry {
     DictionaryEntry {
         address: ObjectAddress::new(index, subindex),

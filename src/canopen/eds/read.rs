@@ -1,7 +1,7 @@
-//! From the sections of a file to an object dictionary.
+//! Reads an object dictionary from the sections of a file.
 
 use super::compact_pdo;
-use super::data_type::DataType;
+use super::data_type::DataTypeCode;
 use super::dictionary::{DeviceCommissioning, DeviceInfo, FileInfo, ObjectDictionary};
 use super::entry::{self, check_keys};
 use super::findings::Reporter;
@@ -10,10 +10,10 @@ use super::lists;
 use super::mapping;
 use super::number;
 use super::objects;
-use super::problem::{Problem, ProblemKind};
+use super::problem::{EdsProblem, EdsProblemKind};
 use super::section_name::SectionName;
 
-/// Sections beside those of objects (CiA 306), as the standard spells them, and those of modular devices.
+/// The sections besides those of objects (CiA 306), as the standard spells them, and those of modular devices.
 const SECTIONS: [&str; 15] = [
     "FileInfo",
     "DeviceInfo",
@@ -32,7 +32,7 @@ const SECTIONS: [&str; 15] = [
     "NotSupported",
 ];
 
-/// Bit rates with a key of their own, in kbit/s.
+/// Bit rates that have their own key, in kbit/s.
 const BIT_RATES: [u32; 8] = [10, 20, 50, 125, 250, 500, 800, 1000];
 
 const DEVICE_KEYS: [&str; 28] = [
@@ -66,8 +66,8 @@ const DEVICE_KEYS: [&str; 28] = [
     "CompactPDO",
 ];
 
-/// Reads a text. There is no dictionary where the file describes no object.
-pub(super) fn read(text: &str) -> (Option<ObjectDictionary>, Vec<Problem>) {
+/// Reads a text. The dictionary is `None` when the file describes no object.
+pub(super) fn read(text: &str) -> (Option<ObjectDictionary>, Vec<EdsProblem>) {
     let mut reporter = Reporter::new(text);
     let document = Document::parse(text, &mut reporter);
     check_sections(&document, &mut reporter);
@@ -80,7 +80,7 @@ pub(super) fn read(text: &str) -> (Option<ObjectDictionary>, Vec<Problem>) {
         objects: objects::read(&document, &mut reporter),
     };
     if dictionary.objects.is_empty() {
-        reporter.report(ProblemKind::NoObjects, 0..0);
+        reporter.report(EdsProblemKind::NoObjects, 0..0);
         return (None, reporter.into_problems());
     }
     lists::check(&document, &mut dictionary, &mut reporter);
@@ -95,7 +95,8 @@ fn check_sections(document: &Document<'_>, reporter: &mut Reporter) {
             SectionName::Malformed => None,
             SectionName::Other => {
                 let is_known = SECTIONS.iter().any(|known| known.eq_ignore_ascii_case(section.name));
-                let Some(nearest) = entry::slip_of(section.name, &SECTIONS).filter(|_| !is_known) else {
+                let Some(nearest) = entry::misspelling_of(section.name, &SECTIONS).filter(|_| !is_known)
+                else {
                     continue;
                 };
                 Some(nearest)
@@ -103,7 +104,7 @@ fn check_sections(document: &Document<'_>, reporter: &mut Reporter) {
             _ => continue,
         };
         let name = section.name.to_owned();
-        reporter.report(ProblemKind::UnknownSection { name, nearest }, section.header.clone());
+        reporter.report(EdsProblemKind::UnknownSection { name, nearest }, section.header.clone());
     }
 }
 
@@ -129,11 +130,12 @@ fn device(document: &Document<'_>, reporter: &mut Reporter) -> DeviceInfo {
     check_keys(section, &DEVICE_KEYS, reporter);
     let mut bit_rates = vec![];
     for kilobits in BIT_RATES {
-        if soft_number(section, &format!("BaudRate_{kilobits}"), reporter).is_some_and(|value| value != 0) {
+        if optional_number(section, &format!("BaudRate_{kilobits}"), reporter).is_some_and(|value| value != 0)
+        {
             bit_rates.push(1000 * kilobits);
         }
     }
-    let mut number = |key| soft_number(section, key, reporter);
+    let mut number = |key| optional_number(section, key, reporter);
     let is_set = |value: Option<u32>| value.is_some_and(|value| value != 0);
     let short = |value: Option<u32>| value.and_then(|value| u16::try_from(value).ok());
     let byte = |value: Option<u32>| value.and_then(|value| u8::try_from(value).ok()).unwrap_or(0);
@@ -155,16 +157,16 @@ fn device(document: &Document<'_>, reporter: &mut Reporter) -> DeviceInfo {
     }
 }
 
-/// A number that only describes: one that is none is left out.
-fn soft_number(section: &Section<'_>, key: &str, reporter: &mut Reporter) -> Option<u32> {
+/// A number for information only: an invalid one is ignored with a warning.
+fn optional_number(section: &Section<'_>, key: &str, reporter: &mut Reporter) -> Option<u32> {
     let pair = section.get(key)?;
-    let number = number::read(pair.value).and_then(|reading| reading.number.at(None));
+    let number = number::read(pair.value).and_then(|parsed| parsed.number.at(None));
     let number = number.and_then(|number| u32::try_from(number).ok());
     if number.is_none() {
-        let kind = ProblemKind::UnknownWord {
+        let kind = EdsProblemKind::UnknownWord {
             key: pair.key.to_owned(),
             given: pair.value.to_owned(),
-            repair: "it was left out; a number of 32 bits may stand here",
+            repair: "it was ignored; allowed: a number of 32 bits",
         };
         reporter.report(kind, pair.span.clone());
     }
@@ -172,42 +174,43 @@ fn soft_number(section: &Section<'_>, key: &str, reporter: &mut Reporter) -> Opt
 }
 
 fn commissioning(document: &Document<'_>, reporter: &mut Reporter) -> Option<DeviceCommissioning> {
-    // The standard's own spelling first.
+    // The standard's own spelling comes first.
     let section =
         document.section("DeviceComissioning").or_else(|| document.section("DeviceCommissioning"))?;
     let node = entry::whole(section, "NodeID", reporter);
     if let Some(value) = node.filter(|node| !(1..=127).contains(node))
         && let Some(pair) = section.get("NodeID")
     {
-        let kind = ProblemKind::OutOfRange { key: pair.key.to_owned(), value, allowed: "1 to 127" };
+        let kind = EdsProblemKind::OutOfRange { key: pair.key.to_owned(), value, allowed: "1 to 127" };
         reporter.report(kind, pair.span.clone());
     }
     Some(DeviceCommissioning {
         node: node.and_then(|node| u8::try_from(node).ok()),
         node_name: text(Some(section), "NodeName"),
-        bit_rate: soft_number(section, "Baudrate", reporter).map(|kilobits| kilobits.saturating_mul(1000)),
-        network: soft_number(section, "NetNumber", reporter),
+        bit_rate: optional_number(section, "Baudrate", reporter)
+            .map(|kilobits| kilobits.saturating_mul(1000)),
+        network: optional_number(section, "NetNumber", reporter),
         network_name: text(Some(section), "NetworkName"),
-        serial_number: soft_number(section, "LSS_SerialNumber", reporter),
+        serial_number: optional_number(section, "LSS_SerialNumber", reporter),
     })
 }
 
-fn dummies(document: &Document<'_>, reporter: &mut Reporter) -> Vec<DataType> {
+fn dummies(document: &Document<'_>, reporter: &mut Reporter) -> Vec<DataTypeCode> {
     let Some(section) = document.section("DummyUsage") else { return vec![] };
     let mut dummies = vec![];
     for pair in section.pairs() {
         let code = pair.key.to_ascii_lowercase();
         let code = code.strip_prefix("dummy").and_then(|digits| u16::from_str_radix(digits, 16).ok());
         if let Some(code) = code
-            && soft_number(section, pair.key, reporter).is_some_and(|value| value != 0)
+            && optional_number(section, pair.key, reporter).is_some_and(|value| value != 0)
         {
-            dummies.push(DataType(code));
+            dummies.push(DataTypeCode(code));
         }
     }
     dummies
 }
 
-/// `Line1`, `Line2` …; how many `Lines` says there are makes no difference.
+/// `Line1`, `Line2` …; the count in `Lines` is not used.
 fn comments(document: &Document<'_>) -> Vec<String> {
     let Some(section) = document.section("Comments") else { return vec![] };
     let number_of =

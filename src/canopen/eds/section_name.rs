@@ -1,6 +1,6 @@
-//! What a section describes, by its name.
+//! The meaning of a section by its name.
 
-/// What a section describes.
+/// The meaning of a section.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum SectionName {
     /// `[1018]`
@@ -11,18 +11,18 @@ pub(super) enum SectionName {
     Names(u16),
     /// `[1018Value]`: configured values of compact sub-objects.
     Values(u16),
-    /// `[1018Denotation]`: the configurer's names of compact sub-objects.
+    /// `[1018Denotation]`: the configuration tool's names of compact sub-objects.
     Denotations(u16),
     /// `[1018ObjectLinks]`: not used here.
     ObjectLinks,
-    /// It begins like an object and is none.
+    /// A name that begins like an object but is not valid.
     Malformed,
-    /// Something else.
+    /// Any other section.
     Other,
 }
 
 impl SectionName {
-    /// Reads a name, whatever its case and its blanks.
+    /// Reads a name, without case and blanks.
     pub fn read(name: &str) -> Self {
         let lower: String =
             name.chars().filter(|c| !c.is_whitespace()).flat_map(char::to_lowercase).collect();
@@ -55,7 +55,7 @@ mod tests {
     use super::SectionName::{self, *};
 
     #[test]
-    fn sections_are_known_by_index_and_suffix_in_any_case() {
+    fn sections_are_recognised_by_index_and_suffix_in_any_case() {
         for (name, expected) in [
             ("1018", Object(0x1018)),
             ("1a00", Object(0x1A00)),

@@ -1,10 +1,10 @@
-//! From the bytes of a file to text: the encodings and line ends that are met.
+//! Decodes a file to text: the encodings and line ends that occur in practice.
 
 use crate::printable::printable;
 
-/// Decodes a file. The standard asks for ASCII; UTF-8 (with or without its mark), UTF-16 (with its mark) and Latin-1
-/// are met. What no terminal should be shown is replaced. Every line of the result ends with a line feed alone, or with
-/// it after a carriage return.
+/// Decodes a file. The standard requires ASCII. UTF-8 (with or without byte order mark), UTF-16 (with byte order mark)
+/// and Latin-1 also occur. Characters that are unsafe on a terminal are replaced. Every line of the result ends with a
+/// line feed, with or without a carriage return before it.
 pub(super) fn decode(bytes: &[u8]) -> String {
     let text = match bytes {
         [0xEF, 0xBB, 0xBF, rest @ ..] => utf8_or_latin1(rest),
@@ -34,7 +34,7 @@ mod tests {
     use super::decode;
 
     #[test]
-    fn every_encoding_that_is_met_gives_the_same_text() {
+    fn every_supported_encoding_gives_the_same_text() {
         let wanted = "[1000]\nDescription=90 °C";
         let utf16: Vec<u8> = wanted.encode_utf16().flat_map(u16::to_le_bytes).collect();
         assert_eq!(decode(wanted.as_bytes()), wanted);

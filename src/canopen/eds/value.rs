@@ -1,12 +1,12 @@
-//! Values of objects: as files write them, and as SDO carries them.
+//! Values of objects: their text in files, and their bytes in SDO transfers.
 
-use super::data_type::{DataType, ValueKind};
-use super::number::{self, Number, Oddity};
+use super::data_type::{DataTypeCode, ValueKind};
+use super::number::{self, Anomaly, Number};
 
-/// A value as a file says it.
+/// A value in a file.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Value {
-    /// A whole number, of any type of whole numbers, or of an object whose type is not known.
+    /// An integer, of an integer type or of an unknown type.
     Number(Number),
     /// A floating-point number.
     Real(f64),
@@ -16,35 +16,40 @@ pub enum Value {
     Bytes(Vec<u8>),
 }
 
-/// Why a text is no value of a type.
+/// Why a text is not a value of a type.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Misfit {
-    /// It is no number.
+pub(super) enum ValueError {
+    /// It is not a number.
     NotANumber,
-    /// It is no list of bytes in hexadecimal.
+    /// It is not a list of bytes in hexadecimal.
     NotBytes,
-    /// The number is outside the type.
+    /// The number is outside the range of the type.
     OutOfRange { value: i128 },
 }
 
 impl Value {
-    /// Reads a value of a type.
-    pub(super) fn read(text: &str, data_type: Option<DataType>) -> Result<(Self, Option<Oddity>), Misfit> {
-        match data_type.map_or(ValueKind::Other, DataType::kind) {
+    /// Parses a value of a type.
+    pub(super) fn read(
+        text: &str,
+        data_type: Option<DataTypeCode>,
+    ) -> Result<(Self, Option<Anomaly>), ValueError> {
+        match data_type.map_or(ValueKind::Other, DataTypeCode::kind) {
             ValueKind::Text => Ok((Self::Text(text.to_owned()), None)),
-            ValueKind::Bytes => bytes(text).map(|bytes| (Self::Bytes(bytes), None)).ok_or(Misfit::NotBytes),
+            ValueKind::Bytes => {
+                bytes(text).map(|bytes| (Self::Bytes(bytes), None)).ok_or(ValueError::NotBytes)
+            }
             ValueKind::Real(bits) => {
-                real(text, bits).map(|real| (Self::Real(real), None)).ok_or(Misfit::NotANumber)
+                real(text, bits).map(|real| (Self::Real(real), None)).ok_or(ValueError::NotANumber)
             }
             ValueKind::Unsigned(_) | ValueKind::Signed(_) => whole(text, data_type),
             ValueKind::Other => Ok(match number::read(text) {
-                Some(reading) => (Self::Number(reading.number), reading.oddity),
+                Some(parsed) => (Self::Number(parsed.number), parsed.anomaly),
                 None => (Self::Text(text.to_owned()), None),
             }),
         }
     }
 
-    /// The number for a node, where it is a whole one.
+    /// The integer for a node ID, if it is one.
     pub fn number(&self, node: Option<u8>) -> Option<i128> {
         match self {
             Self::Number(number) => number.at(node),
@@ -52,9 +57,9 @@ impl Value {
         }
     }
 
-    /// The bytes that SDO carries, low byte first; `None` when the value depends on a node and none is given, when it does
-    /// not fit the type, or when the type has no such values.
-    pub fn encode(&self, data_type: DataType, node: Option<u8>) -> Option<Vec<u8>> {
+    /// The little-endian bytes of an SDO transfer. `None`: the value needs a node ID and none is given, it does not fit
+    /// the type, or the type has no such values.
+    pub fn encode(&self, data_type: DataTypeCode, node: Option<u8>) -> Option<Vec<u8>> {
         match (self, data_type.kind()) {
             (Self::Number(number), ValueKind::Unsigned(bits) | ValueKind::Signed(bits)) => {
                 let value = number.at(node)?;
@@ -64,10 +69,10 @@ impl Value {
             }
             (Self::Real(real), ValueKind::Real(32)) => Some((*real as f32).to_le_bytes().into()),
             (Self::Real(real), ValueKind::Real(_)) => Some(real.to_le_bytes().into()),
-            (Self::Text(text), ValueKind::Text) if data_type == DataType::UNICODE_STRING => {
+            (Self::Text(text), ValueKind::Text) if data_type == DataTypeCode::UNICODE_STRING => {
                 Some(text.encode_utf16().flat_map(u16::to_le_bytes).collect())
             }
-            // VISIBLE_STRING is ISO 646: what is beyond has no bytes.
+            // VISIBLE_STRING is ISO 646: other characters cannot be encoded.
             (Self::Text(text), ValueKind::Text) => text.is_ascii().then(|| text.clone().into_bytes()),
             (Self::Bytes(bytes), ValueKind::Bytes) => Some(bytes.clone()),
             _ => None,
@@ -75,29 +80,29 @@ impl Value {
     }
 }
 
-fn whole(text: &str, data_type: Option<DataType>) -> Result<(Value, Option<Oddity>), Misfit> {
-    let reading = number::read(text).ok_or(Misfit::NotANumber)?;
-    let Some((low, high)) = data_type.and_then(DataType::range) else {
-        return Ok((Value::Number(reading.number), reading.oddity));
+fn whole(text: &str, data_type: Option<DataTypeCode>) -> Result<(Value, Option<Anomaly>), ValueError> {
+    let parsed = number::read(text).ok_or(ValueError::NotANumber)?;
+    let Some((low, high)) = data_type.and_then(DataTypeCode::range) else {
+        return Ok((Value::Number(parsed.number), parsed.anomaly));
     };
-    let mut number = reading.number;
+    let mut number = parsed.number;
     let width = high - low + 1;
-    // A pattern of bits: the upper half of them are the negative numbers.
-    if reading.is_pattern && low < 0 && number.constant > high && number.constant < width {
+    // A bit pattern: its upper half are the negative numbers.
+    if parsed.is_pattern && low < 0 && number.constant > high && number.constant < width {
         number.constant -= width;
     }
-    // The highest node number must fit too.
+    // The value must also fit with the highest node ID.
     let highest = number.constant + if number.adds_node { 127 } else { 0 };
     if number.constant < low || highest > high {
-        return Err(Misfit::OutOfRange { value: number.constant });
+        return Err(ValueError::OutOfRange { value: number.constant });
     }
-    Ok((Value::Number(number), reading.oddity))
+    Ok((Value::Number(number), parsed.anomaly))
 }
 
-/// Hexadecimal is the pattern of bits.
+/// Parses a real number. Hexadecimal is its bit pattern.
 fn real(text: &str, bits: u8) -> Option<f64> {
-    if let Some(reading) = number::read(text).filter(|reading| reading.is_pattern) {
-        let pattern = reading.number.at(None)?;
+    if let Some(parsed) = number::read(text).filter(|parsed| parsed.is_pattern) {
+        let pattern = parsed.number.at(None)?;
         return Some(match bits {
             32 => f32::from_bits(u32::try_from(pattern).ok()?).into(),
             _ => f64::from_bits(u64::try_from(pattern).ok()?),
@@ -106,7 +111,7 @@ fn real(text: &str, bits: u8) -> Option<f64> {
     text.parse().ok()
 }
 
-/// Pairs of hexadecimal digits, with or without blanks between them, perhaps after `0x`.
+/// Parses pairs of hexadecimal digits, with or without blanks between them, optionally after `0x`.
 fn bytes(text: &str) -> Option<Vec<u8>> {
     let text = text.strip_prefix("0x").or_else(|| text.strip_prefix("0X")).unwrap_or(text);
     let digits: Vec<u32> =
@@ -126,38 +131,41 @@ fn bytes(text: &str) -> Option<Vec<u8>> {
 mod tests {
     use super::*;
 
-    const INTEGER32: DataType = DataType(0x04);
-    const REAL32: DataType = DataType(0x08);
+    const INTEGER32: DataTypeCode = DataTypeCode(0x04);
+    const REAL32: DataTypeCode = DataTypeCode(0x08);
 
-    fn encoded(text: &str, data_type: DataType) -> Result<Option<Vec<u8>>, Misfit> {
+    fn encoded(text: &str, data_type: DataTypeCode) -> Result<Option<Vec<u8>>, ValueError> {
         Value::read(text, Some(data_type)).map(|(value, _)| value.encode(data_type, Some(2)))
     }
 
     #[test]
-    fn numbers_become_as_many_bytes_as_their_type_has() {
-        assert_eq!(encoded("$NODEID+0x180", DataType::UNSIGNED32), Ok(Some(vec![0x82, 1, 0, 0])));
+    fn numbers_are_encoded_with_the_length_of_their_type() {
+        assert_eq!(encoded("$NODEID+0x180", DataTypeCode::UNSIGNED32), Ok(Some(vec![0x82, 1, 0, 0])));
         assert_eq!(encoded("-2", INTEGER32), Ok(Some(vec![0xFE, 0xFF, 0xFF, 0xFF])));
         assert_eq!(encoded("0xFFFFFFFE", INTEGER32), Ok(Some(vec![0xFE, 0xFF, 0xFF, 0xFF])));
-        assert_eq!(encoded("1", DataType(0x01)), Ok(Some(vec![1])));
-        assert_eq!(encoded("0x123456", DataType(0x16)), Ok(Some(vec![0x56, 0x34, 0x12])));
+        assert_eq!(encoded("1", DataTypeCode(0x01)), Ok(Some(vec![1])));
+        assert_eq!(encoded("0x123456", DataTypeCode(0x16)), Ok(Some(vec![0x56, 0x34, 0x12])));
     }
 
     #[test]
-    fn numbers_outside_their_type_are_refused() {
-        assert_eq!(encoded("256", DataType::UNSIGNED8), Err(Misfit::OutOfRange { value: 256 }));
-        assert_eq!(encoded("-1", DataType::UNSIGNED8), Err(Misfit::OutOfRange { value: -1 }));
-        assert_eq!(encoded("4294967295", INTEGER32), Err(Misfit::OutOfRange { value: 4_294_967_295 }));
-        assert_eq!(encoded("$NODEID+200", DataType::UNSIGNED8), Err(Misfit::OutOfRange { value: 200 }));
-        assert_eq!(encoded("fast", INTEGER32), Err(Misfit::NotANumber));
+    fn numbers_outside_the_range_of_their_type_are_refused() {
+        assert_eq!(encoded("256", DataTypeCode::UNSIGNED8), Err(ValueError::OutOfRange { value: 256 }));
+        assert_eq!(encoded("-1", DataTypeCode::UNSIGNED8), Err(ValueError::OutOfRange { value: -1 }));
+        assert_eq!(encoded("4294967295", INTEGER32), Err(ValueError::OutOfRange { value: 4_294_967_295 }));
+        assert_eq!(
+            encoded("$NODEID+200", DataTypeCode::UNSIGNED8),
+            Err(ValueError::OutOfRange { value: 200 })
+        );
+        assert_eq!(encoded("fast", INTEGER32), Err(ValueError::NotANumber));
     }
 
     #[test]
-    fn reals_texts_and_bytes_have_their_own_forms() {
+    fn reals_texts_and_bytes_have_their_own_notations() {
         assert_eq!(encoded("1.5", REAL32), Ok(Some(1.5_f32.to_le_bytes().into())));
         assert_eq!(encoded("0x3FC00000", REAL32), Ok(Some(1.5_f32.to_le_bytes().into())));
-        assert_eq!(encoded("abc", DataType(0x09)), Ok(Some(b"abc".into())));
-        assert_eq!(encoded("ab", DataType::UNICODE_STRING), Ok(Some(b"a\0b\0".into())));
-        assert_eq!(encoded("01 a0 FF", DataType(0x0A)), Ok(Some(vec![0x01, 0xA0, 0xFF])));
-        assert_eq!(encoded("01a", DataType(0x0A)), Err(Misfit::NotBytes));
+        assert_eq!(encoded("abc", DataTypeCode(0x09)), Ok(Some(b"abc".into())));
+        assert_eq!(encoded("ab", DataTypeCode::UNICODE_STRING), Ok(Some(b"a\0b\0".into())));
+        assert_eq!(encoded("01 a0 FF", DataTypeCode(0x0A)), Ok(Some(vec![0x01, 0xA0, 0xFF])));
+        assert_eq!(encoded("01a", DataTypeCode(0x0A)), Err(ValueError::NotBytes));
     }
 }

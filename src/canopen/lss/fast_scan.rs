@@ -1,54 +1,54 @@
-//! Fast scan (CiA 305, section 6.5.3): finds the identity of one device without a node number, bit by bit. A device
-//! answers when the bits that were asked for are its own; that nobody answers is an answer too. Of several devices the
-//! one with the lowest identity is found, since a 0 that anybody has is followed.
+//! LSS fastscan (CiA 305, section 6.5.3): finds the identity of one device without a node ID, bit by bit. A device
+//! replies when the requested bits match its own; silence means that no device matches. With several devices the lowest
+//! identity is found, because a 0 bit of any device is followed.
 
 use super::LssAddress;
 use super::wire::LssRequest;
 
-/// The value of `lowest_bit` that begins a scan.
+/// The value of `lowest_bit` that begins a fastscan.
 const BEGIN: u8 = 0x80;
 
-/// What is known of the identity beforehand, in the order of [`LssAddress::values`]. What is known is asked for at once
-/// instead of bit by bit, and a device that has another value is not found.
-pub type Known = [Option<u32>; 4];
+/// The known parts of the identity, in the order of [`LssAddress::values`]. A known part is confirmed in one request. A
+/// device with another value is not found.
+pub type KnownIdentity = [Option<u32>; 4];
 
-/// How far a scan has come.
+/// The state of a fastscan.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct FastScan {
-    known: Known,
+    known: KnownIdentity,
     values: [u32; 4],
     stage: Stage,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Stage {
-    /// Is there anybody?
+    /// Asks whether any device is there.
     Begin,
-    /// Is this bit of this value 0?
+    /// Asks whether this bit of this part is 0.
     Bit { part: u8, bit: u8 },
-    /// Is this the whole value? Then the next one is meant.
+    /// Asks whether the part is complete, and switches to the next one.
     Confirm { part: u8 },
 }
 
-/// What an answer, or silence, has led to.
+/// The result of one request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Scanned {
-    /// The next question is due.
-    GoOn,
-    /// Nobody is there.
-    Nobody,
-    /// This device; it is in configuration now.
+    /// The next request is due.
+    Continue,
+    /// No device matches.
+    NotFound,
+    /// This device was found; it is in configuration state.
     Found(LssAddress),
-    /// The value that was put together is nobody's: answers were lost.
-    Lost,
+    /// No device has the identity that was found bit by bit: replies were lost.
+    ReplyLost,
 }
 
 impl FastScan {
-    pub fn new(known: Known) -> Self {
+    pub fn new(known: KnownIdentity) -> Self {
         Self { known, values: [0; 4], stage: Stage::Begin }
     }
 
-    /// The question that is due.
+    /// The request that is due.
     pub fn request(&self) -> LssRequest {
         match self.stage {
             Stage::Begin => LssRequest::FastScan { value: 0, lowest_bit: BEGIN, part: 0, next: 0 },
@@ -56,20 +56,20 @@ impl FastScan {
                 LssRequest::FastScan { value: self.value(part), lowest_bit: bit, part, next: part }
             }
             Stage::Confirm { part } => {
-                // After the last value the first one is meant, and the device changes to configuration.
+                // After the last part the first one follows, and the device enters configuration state.
                 let next = (part + 1) % 4;
                 LssRequest::FastScan { value: self.value(part), lowest_bit: 0, part, next }
             }
         }
     }
 
-    /// Takes note whether anybody has answered the question.
-    pub fn answered(&mut self, is_answered: bool) -> Scanned {
-        match (self.stage, is_answered) {
-            (Stage::Begin, false) => return Scanned::Nobody,
+    /// Evaluates whether any device has replied.
+    pub fn evaluate(&mut self, has_reply: bool) -> Scanned {
+        match (self.stage, has_reply) {
+            (Stage::Begin, false) => return Scanned::NotFound,
             (Stage::Begin, true) => self.begin(0),
             (Stage::Bit { part, bit }, _) => {
-                if !is_answered && let Some(value) = self.values.get_mut(usize::from(part)) {
+                if !has_reply && let Some(value) = self.values.get_mut(usize::from(part)) {
                     *value |= 1 << bit;
                 }
                 self.stage = match bit.checked_sub(1) {
@@ -81,10 +81,10 @@ impl FastScan {
                 return Scanned::Found(LssAddress::from_values(self.values));
             }
             (Stage::Confirm { part }, true) => self.begin(part + 1),
-            (Stage::Confirm { part }, false) if self.known(part).is_some() => return Scanned::Nobody,
-            (Stage::Confirm { .. }, false) => return Scanned::Lost,
+            (Stage::Confirm { part }, false) if self.known(part).is_some() => return Scanned::NotFound,
+            (Stage::Confirm { .. }, false) => return Scanned::ReplyLost,
         }
-        Scanned::GoOn
+        Scanned::Continue
     }
 
     fn begin(&mut self, part: u8) {

@@ -1,93 +1,93 @@
-//! The master's side of LSS: one task at a time, every wait bounded.
+//! The LSS master: one task at a time, with a timeout for every wait.
 
 use takt_rt::{Frame, Nanoseconds};
 
 use super::LssAddress;
-use super::fast_scan::{FastScan, Known, Scanned};
+use super::fast_scan::{FastScan, KnownIdentity, Scanned};
 use super::wire::{BitTiming, Inquiry, LssMode, LssRequest, LssResponse, LssResult};
 
-/// What to do.
+/// A task of the LSS master.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LssTask {
-    /// Every device changes to this mode. Nobody answers.
+    /// Switches every device to this state. No reply.
     SwitchGlobal(LssMode),
-    /// This device changes to configuration.
+    /// Switches one device to configuration state.
     SwitchSelective(LssAddress),
-    /// The device in configuration takes this node number, 1 to 127; 255 takes it away.
+    /// Configures the node ID of the device in configuration state: 1 to 127, or 255 for none.
     ConfigureNode(u8),
-    /// The device in configuration takes this bit rate once it is activated.
+    /// Configures the bit rate of the device in configuration state; it takes effect when it is activated.
     ConfigureBitTiming(BitTiming),
-    /// Devices in configuration change to the configured bit rate after so long, and speak after as long again. The
-    /// master must change its own meanwhile. Nobody answers.
+    /// Activates the configured bit rate: the devices change it after the delay, and send again after another delay.
+    /// The master must change its own bit rate in between. No reply.
     ActivateBitTiming {
-        /// In ms.
+        /// The delay in ms.
         delay_ms: u16,
     },
-    /// The device in configuration keeps its node number and bit rate.
+    /// Stores the node ID and bit rate of the device in configuration state.
     Store,
-    /// The device in configuration tells one thing.
+    /// Reads one value of the device in configuration state.
     Inquire(Inquiry),
-    /// The device in configuration tells its identity.
+    /// Reads the identity of the device in configuration state.
     InquireAddress,
-    /// Is there a device with an identity between these? Vendor and product are those of the first.
+    /// Asks for a device with an identity in a range. Vendor and product are those of `lowest`.
     IdentifyRemote {
         /// The lowest revision and serial number.
         lowest: LssAddress,
-        /// The highest.
+        /// The highest revision and serial number.
         highest: LssAddress,
     },
-    /// Is there a device without a node number?
+    /// Asks for a device without a node ID.
     IdentifyUnconfigured,
-    /// Finds a device without a node number and switches it to configuration.
-    FastScan(Known),
+    /// Finds a device without a node ID and switches it to configuration state.
+    FastScan(KnownIdentity),
 }
 
-/// What has come of a task.
+/// The result of a task.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LssOutcome {
-    /// It is done.
+    /// The task is done.
     Done,
-    /// The answer to [`LssTask::Inquire`].
-    Told(u32),
-    /// The identity of the device that is in configuration.
+    /// The value read by [`LssTask::Inquire`].
+    Value(u32),
+    /// The identity of the device in configuration state.
     Device(LssAddress),
-    /// Whether somebody has answered.
+    /// Whether a device has replied.
     Exists(bool),
-    /// [`LssTask::FastScan`] has found nobody.
-    Nobody,
+    /// [`LssTask::FastScan`] has found no device.
+    NotFound,
 }
 
-/// Why a task has failed.
+/// Why a task failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum LssError {
-    /// Nobody has answered.
+    /// No device has replied.
     #[error("no device answered within {} ms", reply_timeout_ns / 1_000_000)]
     NoReply {
-        /// How long was waited.
+        /// The timeout.
         reply_timeout_ns: Nanoseconds,
     },
-    /// The device has refused.
+    /// The device refused the request.
     #[error("the device refused: error {}, its own reason {}", result.code, result.specific)]
     Refused {
-        /// How.
+        /// The error.
         result: LssResult,
     },
-    /// Answers of the fast scan have been lost.
-    #[error("the device found bit by bit does not exist: answers were lost")]
+    /// Replies of the fastscan were lost.
+    #[error("no device has the identity found by the fastscan: replies were lost")]
     ScanLost,
 }
 
-/// A task is under way, or its outcome has not been taken.
+/// A task is running, or its outcome has not been taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("an LSS task is under way")]
+#[error("an LSS task is running")]
 pub struct LssBusy;
 
-/// How long to wait.
+/// The timeouts of the LSS master.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LssTiming {
-    /// For an answer to anything but the fast scan.
+    /// The reply timeout of all requests except fastscan.
     pub reply_timeout_ns: Nanoseconds,
-    /// For an answer to a question of the fast scan. Half of some 130 questions are answered by silence.
+    /// The reply timeout of a fastscan request. About half of its 130 requests end with the timeout.
     pub scan_timeout_ns: Nanoseconds,
 }
 
@@ -97,7 +97,7 @@ impl Default for LssTiming {
     }
 }
 
-/// Carries out tasks on the devices of one bus.
+/// Runs tasks for the devices of one bus.
 #[derive(Debug)]
 pub struct LssMaster {
     timing: LssTiming,
@@ -114,33 +114,33 @@ enum Activity {
 #[derive(Debug)]
 struct Job {
     kind: Kind,
-    /// When the last request was sent; `None` while one is due.
+    /// When the last request was sent; `None` while a request is due.
     sent_at_ns: Option<Nanoseconds>,
-    /// Whether the present question of a scan has been answered.
-    is_answered: bool,
+    /// Whether the current fastscan request has a reply.
+    has_reply: bool,
 }
 
 #[derive(Debug)]
 enum Kind {
-    /// Requests without an answer but, perhaps, to the last one.
+    /// Requests of which only the last one may have a reply.
     Sequence {
         requests: Vec<LssRequest>,
         sent: usize,
-        answer: Answer,
+        reply: ExpectedReply,
     },
     Address {
-        told: Vec<u32>,
+        values: Vec<u32>,
     },
     Scan(FastScan),
 }
 
-/// What ends a sequence.
+/// The reply that ends a sequence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Answer {
+enum ExpectedReply {
     Nothing,
     Switched,
     Result,
-    Told(Inquiry),
+    Value(Inquiry),
     Existence,
 }
 
@@ -150,12 +150,12 @@ impl LssMaster {
         Self { timing, activity: Activity::Idle }
     }
 
-    /// Begins a task. [`LssMaster::poll`] sends, [`LssMaster::receive`] listens, [`LssMaster::take_outcome`] tells.
+    /// Begins a task. Then call [`LssMaster::poll`], [`LssMaster::receive`] and [`LssMaster::take_outcome`].
     pub fn start(&mut self, task: LssTask) -> Result<(), LssBusy> {
         if self.is_busy() {
             return Err(LssBusy);
         }
-        self.activity = Activity::Active(Job { kind: Kind::of(task), sent_at_ns: None, is_answered: false });
+        self.activity = Activity::Active(Job { kind: Kind::of(task), sent_at_ns: None, has_reply: false });
         Ok(())
     }
 
@@ -172,17 +172,17 @@ impl LssMaster {
         if job.sent_at_ns.is_some() {
             return None;
         }
-        let (request, is_last_word) = job.next_request()?;
+        let (request, is_last_without_reply) = job.next_request()?;
         job.sent_at_ns = Some(now_ns);
         match &mut job.kind {
-            _ if is_last_word => self.activity = Activity::Finished(Ok(LssOutcome::Done)),
+            _ if is_last_without_reply => self.activity = Activity::Finished(Ok(LssOutcome::Done)),
             Kind::Sequence { requests, sent, .. } if *sent < requests.len() => job.sent_at_ns = None,
             _ => {}
         }
         Some(request.frame())
     }
 
-    /// Takes a frame that was received; frames that are no answer to the task are passed over.
+    /// Receives a frame; frames that are not a reply to the task are ignored.
     pub fn receive(&mut self, frame: &Frame) {
         let Activity::Active(job) = &mut self.activity else { return };
         if job.sent_at_ns.is_none() {
@@ -194,7 +194,7 @@ impl LssMaster {
         }
     }
 
-    /// The outcome of the task, once it is over. The master is free for the next one then.
+    /// The outcome of the task when it is finished. The master is then free for the next task.
     pub fn take_outcome(&mut self) -> Option<Result<LssOutcome, LssError>> {
         match std::mem::replace(&mut self.activity, Activity::Idle) {
             Activity::Finished(outcome) => Some(outcome),
@@ -205,7 +205,7 @@ impl LssMaster {
         }
     }
 
-    /// Whether a task is under way or its outcome has not been taken.
+    /// Whether a task is running or its outcome has not been taken.
     pub const fn is_busy(&self) -> bool {
         !matches!(self.activity, Activity::Idle)
     }
@@ -213,24 +213,30 @@ impl LssMaster {
 
 impl Kind {
     fn of(task: LssTask) -> Self {
-        let sequence = |requests, answer| Self::Sequence { requests, sent: 0, answer };
+        let sequence = |requests, reply| Self::Sequence { requests, sent: 0, reply };
         match task {
-            LssTask::SwitchGlobal(mode) => sequence(vec![LssRequest::SwitchGlobal(mode)], Answer::Nothing),
+            LssTask::SwitchGlobal(mode) => {
+                sequence(vec![LssRequest::SwitchGlobal(mode)], ExpectedReply::Nothing)
+            }
             LssTask::SwitchSelective(address) => {
                 let requests = (0..).zip(address.values());
                 let requests = requests.map(|(part, value)| LssRequest::SwitchSelective { part, value });
-                sequence(requests.collect(), Answer::Switched)
+                sequence(requests.collect(), ExpectedReply::Switched)
             }
-            LssTask::ConfigureNode(node) => sequence(vec![LssRequest::ConfigureNode(node)], Answer::Result),
+            LssTask::ConfigureNode(node) => {
+                sequence(vec![LssRequest::ConfigureNode(node)], ExpectedReply::Result)
+            }
             LssTask::ConfigureBitTiming(timing) => {
-                sequence(vec![LssRequest::ConfigureBitTiming(timing)], Answer::Result)
+                sequence(vec![LssRequest::ConfigureBitTiming(timing)], ExpectedReply::Result)
             }
             LssTask::ActivateBitTiming { delay_ms } => {
-                sequence(vec![LssRequest::ActivateBitTiming { delay_ms }], Answer::Nothing)
+                sequence(vec![LssRequest::ActivateBitTiming { delay_ms }], ExpectedReply::Nothing)
             }
-            LssTask::Store => sequence(vec![LssRequest::Store], Answer::Result),
-            LssTask::Inquire(inquiry) => sequence(vec![LssRequest::Inquire(inquiry)], Answer::Told(inquiry)),
-            LssTask::InquireAddress => Self::Address { told: vec![] },
+            LssTask::Store => sequence(vec![LssRequest::Store], ExpectedReply::Result),
+            LssTask::Inquire(inquiry) => {
+                sequence(vec![LssRequest::Inquire(inquiry)], ExpectedReply::Value(inquiry))
+            }
+            LssTask::InquireAddress => Self::Address { values: vec![] },
             LssTask::IdentifyRemote { lowest, highest } => {
                 let values = [
                     lowest.vendor,
@@ -242,10 +248,10 @@ impl Kind {
                 ];
                 let requests =
                     (0..).zip(values).map(|(part, value)| LssRequest::IdentifyRemote { part, value });
-                sequence(requests.collect(), Answer::Existence)
+                sequence(requests.collect(), ExpectedReply::Existence)
             }
             LssTask::IdentifyUnconfigured => {
-                sequence(vec![LssRequest::IdentifyUnconfigured], Answer::Existence)
+                sequence(vec![LssRequest::IdentifyUnconfigured], ExpectedReply::Existence)
             }
             LssTask::FastScan(known) => Self::Scan(FastScan::new(known)),
         }
@@ -253,16 +259,16 @@ impl Kind {
 }
 
 impl Job {
-    /// The request that is due, and whether nothing follows it.
+    /// The request that is due, and whether it is the last one and has no reply.
     fn next_request(&mut self) -> Option<(LssRequest, bool)> {
         match &mut self.kind {
-            Kind::Sequence { requests, sent, answer } => {
+            Kind::Sequence { requests, sent, reply } => {
                 let request = requests.get(*sent).copied()?;
                 *sent += 1;
-                Some((request, *sent == requests.len() && *answer == Answer::Nothing))
+                Some((request, *sent == requests.len() && *reply == ExpectedReply::Nothing))
             }
-            Kind::Address { told } => {
-                Some((LssRequest::Inquire(Inquiry::ALL.get(told.len()).copied()?), false))
+            Kind::Address { values } => {
+                Some((LssRequest::Inquire(Inquiry::ALL.get(values.len()).copied()?), false))
             }
             Kind::Scan(scan) => Some((scan.request(), false)),
         }
@@ -271,28 +277,30 @@ impl Job {
     fn receive(&mut self, response: LssResponse) -> Option<Result<LssOutcome, LssError>> {
         match (&mut self.kind, response) {
             (Kind::Scan(_), LssResponse::Identified) => {
-                // Others may be answering the same question: it is over when its time is.
-                self.is_answered = true;
+                // Other devices may reply too, so the request ends with its timeout.
+                self.has_reply = true;
                 None
             }
-            (Kind::Address { told }, LssResponse::Told(inquiry, value))
-                if Inquiry::ALL.get(told.len()) == Some(&inquiry) =>
+            (Kind::Address { values }, LssResponse::Inquired(inquiry, value))
+                if Inquiry::ALL.get(values.len()) == Some(&inquiry) =>
             {
-                told.push(value);
+                values.push(value);
                 self.sent_at_ns = None;
-                let values = <[u32; 4]>::try_from(told.as_slice()).ok()?;
+                let values = <[u32; 4]>::try_from(values.as_slice()).ok()?;
                 Some(Ok(LssOutcome::Device(LssAddress::from_values(values))))
             }
-            (Kind::Sequence { requests, answer, .. }, response) => match (*answer, response) {
-                (Answer::Switched, LssResponse::Switched) => Some(Ok(LssOutcome::Done)),
-                (Answer::Told(wanted), LssResponse::Told(inquiry, value)) if wanted == inquiry => {
-                    Some(Ok(LssOutcome::Told(value)))
+            (Kind::Sequence { requests, reply, .. }, response) => match (*reply, response) {
+                (ExpectedReply::Switched, LssResponse::Switched) => Some(Ok(LssOutcome::Done)),
+                (ExpectedReply::Value(wanted), LssResponse::Inquired(inquiry, value))
+                    if wanted == inquiry =>
+                {
+                    Some(Ok(LssOutcome::Value(value)))
                 }
-                (Answer::Result, response) => match result_of(requests.last(), response)? {
+                (ExpectedReply::Result, response) => match result_of(requests.last(), response)? {
                     result if result.code == 0 => Some(Ok(LssOutcome::Done)),
                     result => Some(Err(LssError::Refused { result })),
                 },
-                (Answer::Existence, LssResponse::Identified | LssResponse::IdentifiedUnconfigured) => {
+                (ExpectedReply::Existence, LssResponse::Identified | LssResponse::IdentifiedUnconfigured) => {
                     Some(Ok(LssOutcome::Exists(true)))
                 }
                 _ => None,
@@ -301,7 +309,7 @@ impl Job {
         }
     }
 
-    /// What follows when nothing more comes for so long.
+    /// The outcome when the timeout of a request has passed.
     fn waited(&mut self, waited_ns: Nanoseconds, timing: &LssTiming) -> Option<Result<LssOutcome, LssError>> {
         let reply_timeout_ns = match &self.kind {
             Kind::Scan(_) => timing.scan_timeout_ns,
@@ -312,22 +320,22 @@ impl Job {
         }
         match &mut self.kind {
             Kind::Scan(scan) => {
-                let scanned = scan.answered(std::mem::take(&mut self.is_answered));
+                let scanned = scan.evaluate(std::mem::take(&mut self.has_reply));
                 self.sent_at_ns = None;
                 match scanned {
-                    Scanned::GoOn => None,
-                    Scanned::Nobody => Some(Ok(LssOutcome::Nobody)),
+                    Scanned::Continue => None,
+                    Scanned::NotFound => Some(Ok(LssOutcome::NotFound)),
                     Scanned::Found(address) => Some(Ok(LssOutcome::Device(address))),
-                    Scanned::Lost => Some(Err(LssError::ScanLost)),
+                    Scanned::ReplyLost => Some(Err(LssError::ScanLost)),
                 }
             }
-            Kind::Sequence { answer: Answer::Existence, .. } => Some(Ok(LssOutcome::Exists(false))),
+            Kind::Sequence { reply: ExpectedReply::Existence, .. } => Some(Ok(LssOutcome::Exists(false))),
             Kind::Sequence { .. } | Kind::Address { .. } => Some(Err(LssError::NoReply { reply_timeout_ns })),
         }
     }
 }
 
-/// The result that answers this request.
+/// The result in the response to this request.
 fn result_of(request: Option<&LssRequest>, response: LssResponse) -> Option<LssResult> {
     match (request?, response) {
         (LssRequest::ConfigureNode(_), LssResponse::NodeConfigured(result))

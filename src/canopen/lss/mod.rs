@@ -1,22 +1,21 @@
-//! Layer setting services (CiA 305): giving a device its node number and bit rate over the bus, by its identity.
+//! Layer setting services (CiA 305): configure the node ID and bit rate of a device over the bus, by its identity.
 //!
-//! [`LssRequest`] and [`LssResponse`] are what is on the wire; both sides can be written with them. [`LssMaster`] carries
-//! out one [`LssTask`] at a time, without input and output; finding a device whose identity nobody knows
-//! ([`LssTask::FastScan`]) is in `fast_scan`.
+//! [`LssRequest`] and [`LssResponse`] are the messages; both sides can be written with them. [`LssMaster`] runs one
+//! [`LssTask`] at a time, without input and output. [`LssTask::FastScan`] finds a device with an unknown identity.
 //!
-//! A device without a node number is silent: it sends no boot-up and no heartbeat until it has one. That there are such
-//! devices is asked with [`LssTask::IdentifyUnconfigured`]. A device boots as soon as it is given a node number and
-//! switched to waiting; a device that had another one before keeps it until it is reset.
+//! A device without a node ID sends neither boot-up nor heartbeat. [`LssTask::IdentifyUnconfigured`] asks for such
+//! devices. A device boots when it has got a node ID and is switched to waiting state. A device that had another node
+//! ID keeps it until it is reset.
 
 mod fast_scan;
 mod master;
 mod wire;
 
-pub use fast_scan::Known;
+pub use fast_scan::KnownIdentity;
 pub use master::{LssBusy, LssError, LssMaster, LssOutcome, LssTask, LssTiming};
 pub use wire::{BitTiming, Inquiry, LssMode, LssRequest, LssResponse, LssResult};
 
-/// What LSS knows a device by: the four values of object 1018, together unique in the world.
+/// The LSS address of a device: the four values of object 1018, which are unique together.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct LssAddress {
     /// 1018:1
@@ -30,12 +29,12 @@ pub struct LssAddress {
 }
 
 impl LssAddress {
-    /// The four values in their order.
+    /// The four values in order.
     pub const fn values(self) -> [u32; 4] {
         [self.vendor, self.product, self.revision, self.serial]
     }
 
-    /// From the four values in their order.
+    /// The address from the four values in order.
     pub const fn from_values([vendor, product, revision, serial]: [u32; 4]) -> Self {
         Self { vendor, product, revision, serial }
     }

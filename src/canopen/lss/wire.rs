@@ -2,9 +2,9 @@
 
 use takt_rt::{Frame, Id};
 
-/// What the master sends under.
+/// COB-ID of the LSS master.
 const MASTER: u16 = 0x7E5;
-/// What every slave sends under.
+/// COB-ID of the LSS slaves.
 const SLAVE: u16 = 0x7E4;
 
 const SWITCH_GLOBAL: u8 = 4;
@@ -21,16 +21,16 @@ const IDENTIFIED_UNCONFIGURED: u8 = 80;
 const FAST_SCAN: u8 = 81;
 const INQUIRE: u8 = 90;
 
-/// What a device does with LSS messages.
+/// The LSS state of a device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LssMode {
-    /// It waits to be switched.
+    /// Waiting state: the device waits to be switched.
     Waiting,
-    /// It obeys.
+    /// Configuration state: the device accepts configuration requests.
     Configuration,
 }
 
-/// A bit rate of the table that every device knows (CiA 305, table 1).
+/// A bit rate of the standard table (CiA 305, table 1).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum BitTiming {
@@ -50,7 +50,7 @@ pub enum BitTiming {
     Kilobits20 = 7,
     /// 10 kbit/s
     Kilobits10 = 8,
-    /// The device finds it out.
+    /// Automatic bit rate detection.
     Automatic = 9,
 }
 
@@ -67,12 +67,12 @@ impl BitTiming {
         (Self::Automatic, 0),
     ];
 
-    /// The entry for a bit rate in bit/s; `None` when the table has none.
+    /// The entry for a bit rate in bit/s; `None` if the table does not have it.
     pub fn of(bit_rate: u32) -> Option<Self> {
         Self::RATES.iter().find(|(_, rate)| *rate == bit_rate && bit_rate > 0).map(|(timing, _)| *timing)
     }
 
-    /// The bit rate in bit/s; `None` when the device finds it out.
+    /// The bit rate in bit/s; `None` for automatic detection.
     pub fn bit_rate(self) -> Option<u32> {
         Self::RATES.iter().find(|(timing, _)| *timing == self).map(|(_, rate)| *rate).filter(|rate| *rate > 0)
     }
@@ -82,7 +82,7 @@ impl BitTiming {
     }
 }
 
-/// What can be asked of the device that is in configuration.
+/// The values that can be read from the device in configuration state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Inquiry {
@@ -94,59 +94,61 @@ pub enum Inquiry {
     Revision = 2,
     /// 1018:4
     Serial = 3,
-    /// The node number; 255 when it has none.
+    /// The node ID; 255 when it has none.
     Node = 4,
 }
 
 impl Inquiry {
-    /// Every question.
+    /// Every value.
     pub const ALL: [Self; 5] = [Self::Vendor, Self::Product, Self::Revision, Self::Serial, Self::Node];
 }
 
-/// What the master sends.
+/// A request of the LSS master.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LssRequest {
-    /// Every device: change to this mode. No answer.
+    /// Switch every device to this state. No response.
     SwitchGlobal(LssMode),
-    /// One of the four values of the device that shall change to configuration: 0 to 3. It answers the last one.
+    /// One of the four identity values (0 to 3) of the device to switch to configuration state. It responds to the last
+    /// one.
     SwitchSelective {
-        /// Which value, an index into [`LssAddress::values`](super::LssAddress::values).
+        /// The part, an index into [`LssAddress::values`](super::LssAddress::values).
         part: u8,
         /// The value.
         value: u32,
     },
-    /// The device in configuration: take this node number, 1 to 127; 255 takes it away.
+    /// Configure the node ID: 1 to 127, or 255 for none.
     ConfigureNode(u8),
-    /// The device in configuration: take this bit rate once it is activated.
+    /// Configure the bit rate; it takes effect when it is activated.
     ConfigureBitTiming(BitTiming),
-    /// Devices in configuration: be silent, change the bit rate after this time, and be silent as long again. No answer.
+    /// Activate the bit rate: devices stop sending, change it after the delay, and send again after another delay. No
+    /// response.
     ActivateBitTiming {
-        /// In ms.
+        /// The delay in ms.
         delay_ms: u16,
     },
-    /// The device in configuration: keep node number and bit rate.
+    /// Store the node ID and bit rate.
     Store,
-    /// The device in configuration: tell this.
+    /// Read this value.
     Inquire(Inquiry),
-    /// One of the six values of a span of identities; whoever is within answers the last one. Vendor, product, lowest
-    /// and highest revision, lowest and highest serial number.
+    /// One of the six values of an identity range: vendor, product, lowest and highest revision, lowest and highest
+    /// serial number. Devices in the range respond to the last one.
     IdentifyRemote {
-        /// Which value, 0 to 5.
+        /// The part, 0 to 5.
         part: u8,
         /// The value.
         value: u32,
     },
-    /// Whoever has no node number: answer.
+    /// Devices without a node ID respond.
     IdentifyUnconfigured,
-    /// A question of the fast scan to devices that have no node number.
+    /// A fastscan request to devices without a node ID.
     FastScan {
-        /// The bits of the value that is asked for.
+        /// The value to compare.
         value: u32,
-        /// The lowest bit that counts; 128 to begin anew.
+        /// The lowest compared bit; 128 begins a new fastscan.
         lowest_bit: u8,
-        /// Which of the four values.
+        /// The part of the identity.
         part: u8,
-        /// Which value is asked for next, if this one was right.
+        /// The part of the next request, if this one matches.
         next: u8,
     },
 }
@@ -169,7 +171,7 @@ impl LssRequest {
             }
             Self::ConfigureNode(node) => [bytes[0], bytes[1]] = [CONFIGURE_NODE, node],
             Self::ConfigureBitTiming(timing) => {
-                // Table 0 is the standard's.
+                // Table selector 0 is the standard table.
                 [bytes[0], bytes[1], bytes[2]] = [CONFIGURE_BIT_TIMING, 0, timing as u8];
             }
             Self::ActivateBitTiming { delay_ms } => {
@@ -188,7 +190,7 @@ impl LssRequest {
         Frame::of(id(MASTER), bytes)
     }
 
-    /// Reads a request; `None` when a frame is none.
+    /// Decodes a request; `None` for other frames.
     pub fn decode(frame: &Frame) -> Option<Self> {
         let bytes = payload(frame, MASTER)?;
         let value = u32::from_le_bytes([bytes[1], bytes[2], bytes[3], bytes[4]]);
@@ -215,38 +217,38 @@ impl LssRequest {
     }
 }
 
-/// How a device has taken a setting.
+/// The result of a configuration request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LssResult {
-    /// 0 when it has been taken; 1 when it is out of range or not supported; 255 for the device's own reason.
+    /// 0: success; 1: out of range or not supported; 255: see `specific`.
     pub code: u8,
-    /// The device's own reason.
+    /// The manufacturer's error code.
     pub specific: u8,
 }
 
 impl LssResult {
-    /// It has been taken.
+    /// Success.
     pub const OK: Self = Self { code: 0, specific: 0 };
-    /// It is out of range, or not supported.
+    /// Out of range, or not supported.
     pub const REFUSED: Self = Self { code: 1, specific: 0 };
 }
 
-/// What a device sends.
+/// A response of an LSS slave.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LssResponse {
-    /// It is the one that was selected, and is in configuration.
+    /// The selected device is in configuration state.
     Switched,
-    /// Answer to [`LssRequest::ConfigureNode`].
+    /// Response to [`LssRequest::ConfigureNode`].
     NodeConfigured(LssResult),
-    /// Answer to [`LssRequest::ConfigureBitTiming`].
+    /// Response to [`LssRequest::ConfigureBitTiming`].
     BitTimingConfigured(LssResult),
-    /// Answer to [`LssRequest::Store`].
+    /// Response to [`LssRequest::Store`].
     Stored(LssResult),
-    /// Answer to [`LssRequest::Inquire`].
-    Told(Inquiry, u32),
-    /// Its identity is within the span, or it agrees with a question of the fast scan. All that do answer alike.
+    /// Response to [`LssRequest::Inquire`].
+    Inquired(Inquiry, u32),
+    /// The identity is in the range, or matches the fastscan request. All matching devices send the same frame.
     Identified,
-    /// It has no node number.
+    /// The device has no node ID.
     IdentifiedUnconfigured,
 }
 
@@ -261,7 +263,7 @@ impl LssResponse {
             Self::NodeConfigured(result) => of_result(CONFIGURE_NODE, result),
             Self::BitTimingConfigured(result) => of_result(CONFIGURE_BIT_TIMING, result),
             Self::Stored(result) => of_result(STORE, result),
-            Self::Told(inquiry, value) => {
+            Self::Inquired(inquiry, value) => {
                 let [a, b, c, d] = value.to_le_bytes();
                 [INQUIRE + inquiry as u8, a, b, c, d, 0, 0, 0]
             }
@@ -271,7 +273,7 @@ impl LssResponse {
         Frame::of(id(SLAVE), bytes)
     }
 
-    /// Reads a response; `None` when a frame is none.
+    /// Decodes a response; `None` for other frames.
     pub fn decode(frame: &Frame) -> Option<Self> {
         let bytes = payload(frame, SLAVE)?;
         let result = LssResult { code: bytes[1], specific: bytes[2] };
@@ -289,7 +291,7 @@ impl LssResponse {
                     Inquiry::Node => bytes[1].into(),
                     _ => u32::from_le_bytes([bytes[1], bytes[2], bytes[3], bytes[4]]),
                 };
-                Self::Told(inquiry, value)
+                Self::Inquired(inquiry, value)
             }
         })
     }
@@ -313,7 +315,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn what_is_read_from_any_frame_is_read_again_from_its_own_frame(bytes: [u8; 8], specifier in 0..100_u8) {
+        fn a_decoded_message_is_encoded_and_decoded_to_the_same(bytes: [u8; 8], specifier in 0..100_u8) {
             let bytes = [specifier, bytes[1], bytes[2], bytes[3], bytes[4], bytes[5], bytes[6], bytes[7]];
             if let Some(request) = LssRequest::decode(&Frame::of(id(MASTER), bytes)) {
                 prop_assert_eq!(LssRequest::decode(&request.frame()), Some(request));
@@ -325,7 +327,7 @@ mod tests {
     }
 
     #[test]
-    fn the_bytes_are_those_of_the_standard() {
+    fn requests_are_encoded_as_in_the_standard() {
         let shown = |request: LssRequest| format!("{:?}", request.frame());
         assert_eq!(shown(LssRequest::SwitchGlobal(LssMode::Configuration)), "7E5#0401000000000000");
         assert_eq!(shown(LssRequest::SwitchSelective { part: 3, value: 0x1234 }), "7E5#4334120000000000");

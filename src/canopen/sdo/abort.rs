@@ -1,4 +1,4 @@
-//! Why an SDO transfer was given up (CiA 301, 7.2.4.3.17).
+//! SDO abort codes (CiA 301, 7.2.4.3.17).
 
 use std::fmt;
 
@@ -8,15 +8,15 @@ macro_rules! abort_codes {
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
         pub enum AbortCode {
             $(#[doc = $words] $name,)*
-            /// A code that the standard does not list.
+            /// A code that is not in the standard.
             Other(u32),
         }
 
         impl AbortCode {
-            /// Every code that the standard lists.
+            /// Every code in the standard.
             pub const LISTED: &[Self] = &[$(Self::$name),*];
 
-            /// The code with this number. A number that is listed never becomes [`AbortCode::Other`].
+            /// The code with this number. A standard number never becomes [`AbortCode::Other`].
             pub const fn from_number(number: u32) -> Self {
                 match number {
                     $($code => Self::$name,)*
@@ -24,7 +24,7 @@ macro_rules! abort_codes {
                 }
             }
 
-            /// Its number on the wire.
+            /// Its number.
             pub const fn number(self) -> u32 {
                 match self {
                     $(Self::$name => $code,)*
@@ -32,11 +32,11 @@ macro_rules! abort_codes {
                 }
             }
 
-            /// Its meaning in words.
+            /// Its meaning.
             pub const fn words(self) -> &'static str {
                 match self {
                     $(Self::$name => $words,)*
-                    Self::Other(_) => "a code of the manufacturer's",
+                    Self::Other(_) => "manufacturer-specific code",
                 }
             }
         }
@@ -78,7 +78,7 @@ abort_codes! {
 }
 
 impl AbortCode {
-    /// Whether the device says that it does not have the object, or not for this kind of access.
+    /// Whether the object does not exist, or not for this kind of access.
     pub const fn means_absent(self) -> bool {
         matches!(
             self,

@@ -1,11 +1,11 @@
-//! The client's side of writing in blocks, once it has been initiated (CiA 301, 7.2.4.3.10 to 12).
+//! The client side of a block download after its initiation (CiA 301, 7.2.4.3.10 to 12).
 
 use super::abort::AbortCode;
 use super::block_upload::LOST_BLOCKS;
 use super::crc::checksum;
-use super::exchange::{Parting, Step};
-use super::request::Request;
-use super::response::Response;
+use super::exchange::{ExchangeStep, FinalRequest};
+use super::request::SdoRequest;
+use super::response::SdoResponse;
 use super::transfer::{Completed, SdoError};
 use super::wire::{BlockSegment, BlockSize};
 
@@ -15,19 +15,19 @@ const SEGMENT_BYTES: usize = 7;
 pub(super) struct BlockDownload {
     /// Bytes that the server has acknowledged.
     confirmed: usize,
-    /// Segments of the present block that have been sent.
+    /// Segments of the current block that have been sent.
     sent: u8,
     block_size: BlockSize,
     has_crc: bool,
     lost_blocks: u8,
 }
 
-/// What is sent next.
+/// The next frame.
 pub(super) enum Next {
-    /// A segment; when it does not end the block, another one follows at once.
+    /// A segment; unless it ends the block, another one follows at once.
     Segment { segment: BlockSegment, ends_block: bool },
     /// The end of the transfer.
-    End(Request),
+    End(SdoRequest),
 }
 
 impl BlockDownload {
@@ -48,34 +48,34 @@ impl BlockDownload {
         }
     }
 
-    fn end(&self, data: &[u8]) -> Request {
+    fn end(&self, data: &[u8]) -> SdoRequest {
         let unused = (SEGMENT_BYTES - data.len() % SEGMENT_BYTES) % SEGMENT_BYTES;
         let crc = if self.has_crc { checksum(data) } else { 0 };
-        Request::BlockDownloadEnd { unused: unused as u8, crc }
+        SdoRequest::BlockDownloadEnd { unused: unused as u8, crc }
     }
 
-    pub fn receive(&mut self, length: usize, response: Option<Response>) -> Step {
+    pub fn receive(&mut self, length: usize, response: Option<SdoResponse>) -> ExchangeStep {
         let is_all_confirmed = self.confirmed >= length;
         match response {
-            Some(Response::BlockAcknowledge { last, block_size }) if !is_all_confirmed => {
+            Some(SdoResponse::BlockAcknowledge { last, block_size }) if !is_all_confirmed => {
                 self.acknowledged(length, last, block_size)
             }
-            Some(Response::BlockDownloadEnd) if is_all_confirmed => {
-                Step::Finish { outcome: Ok(Completed::Downloaded), parting: Parting::Nothing }
+            Some(SdoResponse::BlockDownloadEnd) if is_all_confirmed => {
+                ExchangeStep::Finish { outcome: Ok(Completed::Downloaded), final_request: FinalRequest::None }
             }
-            _ => Step::Unusable,
+            _ => ExchangeStep::Unusable,
         }
     }
 
-    /// What was not acknowledged is sent again.
-    fn acknowledged(&mut self, length: usize, last: u8, block_size: BlockSize) -> Step {
+    /// Segments that were not acknowledged are sent again.
+    fn acknowledged(&mut self, length: usize, last: u8, block_size: BlockSize) -> ExchangeStep {
         self.lost_blocks = if last == 0 { self.lost_blocks + 1 } else { 0 };
         if last > self.sent || self.lost_blocks >= LOST_BLOCKS {
-            return Step::fail(SdoError::BlockSequence, AbortCode::InvalidSequenceNumber);
+            return ExchangeStep::fail(SdoError::BlockSequence, AbortCode::InvalidSequenceNumber);
         }
         self.confirmed = (self.confirmed + SEGMENT_BYTES * usize::from(last)).min(length);
         self.block_size = block_size;
         self.sent = 0;
-        Step::Send
+        ExchangeStep::Send
     }
 }

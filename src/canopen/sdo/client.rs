@@ -1,49 +1,49 @@
-//! The master's side of SDO for one node: one transfer at a time, every wait bounded.
+//! The SDO client for one node: one transfer at a time, with a timeout for every wait.
 //!
-//! A request that is not answered is repeated. A reply that comes after its repetition was sent would leave a second,
-//! stale reply under way, which a later transfer of the same object could take for its own: after a repeated transfer
-//! the client therefore stays quiet until no reply can be outstanding any more.
+//! A request without a response is repeated. A response that arrives after the repetition leaves a second, stale
+//! response under way, which a later transfer of the same object could mistake for its own. So after a repeated
+//! transfer, the client sends nothing until no response can be outstanding.
 
 use takt_rt::{Frame, Nanoseconds};
 
 use super::abort::AbortCode;
-use super::exchange::{Exchange, Step};
-use super::request::Request;
+use super::exchange::{Exchange, ExchangeStep};
+use super::request::SdoRequest;
 use super::transfer::{Completed, SdoError, Transfer};
 use crate::canopen::{function_code, node_of};
 
-/// How long to wait, and how often to ask again.
+/// Reply timeout and retries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Timing {
-    /// From a request to its response.
+pub struct SdoTiming {
+    /// Timeout from a request to its response.
     pub reply_timeout_ns: Nanoseconds,
-    /// How often a transfer is begun again after silence.
+    /// How many times a transfer is restarted after a timeout.
     pub retries: u8,
 }
 
-impl Default for Timing {
-    /// Half a second and two retries: drives answer within about 1 ms, but requests share the bus with process data
-    /// and wait their turn.
+impl Default for SdoTiming {
+    /// 0.5 s and two retries: drives answer within about 1 ms, but requests share the bus with process data and may
+    /// have to wait.
     fn default() -> Self {
         Self { reply_timeout_ns: 500_000_000, retries: 2 }
     }
 }
 
-/// A transfer is under way, or its outcome has not been taken.
+/// A transfer is running, or its outcome has not been taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("an SDO transfer with this node is under way")]
-pub struct Busy;
+#[error("an SDO transfer with this node is running")]
+pub struct SdoBusy;
 
 /// The client of one node's SDO server.
 #[derive(Debug)]
-pub struct Client {
+pub struct SdoClient {
     node: u8,
-    timing: Timing,
+    timing: SdoTiming,
     activity: Activity,
-    /// What must leave before anything else does: the last word about a transfer that is over.
-    parting: Option<Request>,
-    /// No request leaves before this time.
-    quiet_until_ns: Nanoseconds,
+    /// The final request of a finished transfer; it is sent before anything else.
+    final_request: Option<SdoRequest>,
+    /// No request is sent before this time.
+    blocked_until_ns: Nanoseconds,
 }
 
 #[derive(Debug)]
@@ -56,54 +56,54 @@ enum Activity {
 #[derive(Debug)]
 struct Attempt {
     exchange: Exchange,
-    /// How often the transfer was begun.
+    /// How many times the transfer was started.
     number: u8,
     unusable: u16,
-    /// When the present request was sent; `None` while there is something to send.
+    /// When the current request was sent; `None` while a frame is due.
     sent_at_ns: Option<Nanoseconds>,
 }
 
-impl Client {
-    /// The client for `node` (1 to 127).
-    pub const fn new(node: u8, timing: Timing) -> Self {
-        Self { node, timing, activity: Activity::Idle, parting: None, quiet_until_ns: 0 }
+impl SdoClient {
+    /// The client for a node ID (1 to 127).
+    pub const fn new(node: u8, timing: SdoTiming) -> Self {
+        Self { node, timing, activity: Activity::Idle, final_request: None, blocked_until_ns: 0 }
     }
 
-    /// Begins a transfer. [`Client::poll`] sends, [`Client::receive`] listens, [`Client::take_outcome`] tells.
-    pub fn start(&mut self, transfer: Transfer) -> Result<(), Busy> {
+    /// Begins a transfer. Then call [`SdoClient::poll`], [`SdoClient::receive`] and [`SdoClient::take_outcome`].
+    pub fn start(&mut self, transfer: Transfer) -> Result<(), SdoBusy> {
         if self.is_busy() {
-            return Err(Busy);
+            return Err(SdoBusy);
         }
         let exchange = Exchange::new(transfer);
         self.activity = Activity::Active(Attempt { exchange, number: 0, unusable: 0, sent_at_ns: None });
         Ok(())
     }
 
-    /// Drops whatever is under way, without a word to the server: for a node that has restarted.
+    /// Discards a running transfer without an abort, for a node that has restarted.
     pub fn reset(&mut self) {
         self.activity = Activity::Idle;
-        self.parting = None;
+        self.final_request = None;
     }
 
     /// The next frame to send, if one is due. Call it until it returns `None`.
     pub fn poll(&mut self, now_ns: Nanoseconds) -> Option<Frame> {
         self.expire(now_ns);
-        if let Some(parting) = self.parting.take() {
-            return Some(parting.frame(self.node));
+        if let Some(final_request) = self.final_request.take() {
+            return Some(final_request.frame(self.node));
         }
         let Activity::Active(attempt) = &mut self.activity else { return None };
-        if attempt.sent_at_ns.is_some() || now_ns < self.quiet_until_ns {
+        if attempt.sent_at_ns.is_some() || now_ns < self.blocked_until_ns {
             return None;
         }
         if attempt.exchange.is_initiating() {
             attempt.number = attempt.number.saturating_add(1);
         }
-        let (frame, is_answer_due) = attempt.exchange.next_frame(self.node);
-        attempt.sent_at_ns = is_answer_due.then_some(now_ns);
+        let (frame, is_response_due) = attempt.exchange.next_frame(self.node);
+        attempt.sent_at_ns = is_response_due.then_some(now_ns);
         Some(frame)
     }
 
-    /// Takes a frame that was received; frames that are not from this node's SDO server are passed over.
+    /// Receives a frame; frames from other nodes are ignored.
     pub fn receive(&mut self, frame: &Frame) {
         if node_of(frame, function_code::SDO_RESPONSE) != Some(self.node) {
             return;
@@ -111,24 +111,24 @@ impl Client {
         let Activity::Active(attempt) = &mut self.activity else { return };
         let Some(sent_at_ns) = attempt.sent_at_ns else { return };
         match attempt.exchange.receive(frame) {
-            Step::Unusable => attempt.unusable = attempt.unusable.saturating_add(1),
-            Step::Wait => {}
-            Step::Send => attempt.sent_at_ns = None,
-            Step::BeginSimpler => {
-                attempt.exchange.begin_simpler();
+            ExchangeStep::Unusable => attempt.unusable = attempt.unusable.saturating_add(1),
+            ExchangeStep::Wait => {}
+            ExchangeStep::Send => attempt.sent_at_ns = None,
+            ExchangeStep::FallBack => {
+                attempt.exchange.fall_back();
                 (attempt.number, attempt.sent_at_ns) = (0, None);
             }
-            Step::Finish { outcome, parting } => {
+            ExchangeStep::Finish { outcome, final_request } => {
                 if attempt.number > 1 {
-                    self.quiet_until_ns = sent_at_ns.saturating_add(self.timing.reply_timeout_ns);
+                    self.blocked_until_ns = sent_at_ns.saturating_add(self.timing.reply_timeout_ns);
                 }
-                self.parting = parting.request(attempt.exchange.object());
+                self.final_request = final_request.request(attempt.exchange.object());
                 self.activity = Activity::Finished(outcome);
             }
         }
     }
 
-    /// The outcome of the transfer, once it is over. The client is free for the next one then.
+    /// The outcome of the transfer when it is finished. The client is then free for the next transfer.
     pub fn take_outcome(&mut self) -> Option<Result<Completed, SdoError>> {
         match std::mem::replace(&mut self.activity, Activity::Idle) {
             Activity::Finished(outcome) => Some(outcome),
@@ -139,12 +139,12 @@ impl Client {
         }
     }
 
-    /// Whether a transfer is under way or its outcome has not been taken.
+    /// Whether a transfer is running or its outcome has not been taken.
     pub const fn is_busy(&self) -> bool {
         !matches!(self.activity, Activity::Idle)
     }
 
-    /// Begins again, or gives up, when the present request has been waiting for too long.
+    /// Restarts the transfer, or fails, when the reply timeout has passed.
     fn expire(&mut self, now_ns: Nanoseconds) {
         let Activity::Active(attempt) = &mut self.activity else { return };
         let Some(sent_at_ns) = attempt.sent_at_ns else { return };
@@ -154,7 +154,7 @@ impl Client {
         }
         if attempt.exchange.is_server_in_transfer() {
             let object = attempt.exchange.object();
-            self.parting = Some(Request::Abort { object, code: AbortCode::ProtocolTimedOut });
+            self.final_request = Some(SdoRequest::Abort { object, code: AbortCode::ProtocolTimedOut });
         }
         if attempt.number > self.timing.retries {
             let (attempts, unusable) = (attempt.number, attempt.unusable);

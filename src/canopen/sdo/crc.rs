@@ -1,6 +1,6 @@
-//! The checksum of a block transfer (CiA 301, 7.2.4.3.16): polynomial x¹⁶ + x¹² + x⁵ + 1, beginning with 0.
+//! The CRC of a block transfer (CiA 301, 7.2.4.3.16): polynomial x¹⁶ + x¹² + x⁵ + 1, start value 0.
 
-/// The checksum of all data of a transfer.
+/// The CRC of all data of a transfer.
 pub(super) fn checksum(data: &[u8]) -> u16 {
     data.iter().fold(0, |crc, byte| {
         (0..8).fold(
@@ -17,7 +17,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_check_value_of_the_standard_comes_out() {
+    fn the_crc_of_the_standards_check_string_is_right() {
         assert_eq!(checksum(b"123456789"), 0x31C3);
         assert_eq!(checksum(b""), 0);
     }

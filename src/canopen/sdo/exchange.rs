@@ -1,12 +1,12 @@
-//! One transfer from its initiation to its end, without regard to time.
+//! The state machine of one transfer, without timing.
 
 use takt_rt::{Frame, Id};
 
 use super::abort::AbortCode;
 use super::block_download::{BlockDownload, Next};
 use super::block_upload::BlockUpload;
-use super::request::Request;
-use super::response::Response;
+use super::request::SdoRequest;
+use super::response::SdoResponse;
 use super::transfer::{Completed, MAX_UPLOAD_BYTES, SdoError, Transfer, Uploaded};
 use super::wire::{self, BlockSize, Expedited, Segment};
 use crate::canopen::function_code;
@@ -15,11 +15,11 @@ use crate::canopen::object::ObjectAddress;
 #[derive(Debug)]
 pub(super) struct Exchange {
     transfer: Transfer,
-    phase: Phase,
+    phase: ExchangePhase,
 }
 
 #[derive(Debug)]
-enum Phase {
+enum ExchangePhase {
     Initiate,
     UploadSegments { bytes: Vec<u8>, size: Option<u32>, toggle: bool },
     DownloadSegments { sent: usize, toggle: bool },
@@ -27,45 +27,45 @@ enum Phase {
     BlockDownload(BlockDownload),
 }
 
-/// What a frame does to an exchange.
+/// The effect of a received frame on the transfer.
 #[derive(Debug)]
-pub(super) enum Step {
-    /// It is no answer.
+pub(super) enum ExchangeStep {
+    /// It is not a response to this transfer.
     Unusable,
-    /// It is part of an answer.
+    /// It is part of a response.
     Wait,
     /// The next frame is due.
     Send,
-    /// The server does not know this kind of transfer: begin with a simpler one.
-    BeginSimpler,
-    /// The transfer is over.
-    Finish { outcome: Result<Completed, SdoError>, parting: Parting },
+    /// The server does not support this kind of transfer: a simpler one is used.
+    FallBack,
+    /// The transfer is finished.
+    Finish { outcome: Result<Completed, SdoError>, final_request: FinalRequest },
 }
 
-/// The last word about a transfer that is over.
+/// The final request of a finished transfer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Parting {
-    /// The server knows.
-    Nothing,
-    /// The client gives it up.
+pub(super) enum FinalRequest {
+    /// None, because the server has finished the transfer.
+    None,
+    /// The client aborts the transfer.
     Abort(AbortCode),
-    /// All blocks have come.
+    /// The client confirms the end of a block upload.
     BlockUploadEnd,
 }
 
-impl Parting {
-    pub fn request(self, object: ObjectAddress) -> Option<Request> {
+impl FinalRequest {
+    pub fn request(self, object: ObjectAddress) -> Option<SdoRequest> {
         match self {
-            Self::Nothing => None,
-            Self::Abort(code) => Some(Request::Abort { object, code }),
-            Self::BlockUploadEnd => Some(Request::BlockUploadEnd),
+            Self::None => None,
+            Self::Abort(code) => Some(SdoRequest::Abort { object, code }),
+            Self::BlockUploadEnd => Some(SdoRequest::BlockUploadEnd),
         }
     }
 }
 
-impl Step {
+impl ExchangeStep {
     pub fn fail(error: SdoError, code: AbortCode) -> Self {
-        Self::Finish { outcome: Err(error), parting: Parting::Abort(code) }
+        Self::Finish { outcome: Err(error), final_request: FinalRequest::Abort(code) }
     }
 
     pub fn too_long() -> Self {
@@ -74,11 +74,11 @@ impl Step {
 
     fn uploaded(bytes: Vec<u8>, is_size_known: bool) -> Self {
         let outcome = Ok(Completed::Uploaded(Uploaded { bytes, is_size_known }));
-        Self::Finish { outcome, parting: Parting::Nothing }
+        Self::Finish { outcome, final_request: FinalRequest::None }
     }
 
     fn downloaded() -> Self {
-        Self::Finish { outcome: Ok(Completed::Downloaded), parting: Parting::Nothing }
+        Self::Finish { outcome: Ok(Completed::Downloaded), final_request: FinalRequest::None }
     }
 }
 
@@ -90,7 +90,7 @@ impl Exchange {
             }
             transfer => transfer,
         };
-        Self { transfer, phase: Phase::Initiate }
+        Self { transfer, phase: ExchangePhase::Initiate }
     }
 
     pub fn object(&self) -> ObjectAddress {
@@ -98,22 +98,22 @@ impl Exchange {
     }
 
     pub fn is_initiating(&self) -> bool {
-        matches!(self.phase, Phase::Initiate)
+        matches!(self.phase, ExchangePhase::Initiate)
     }
 
-    /// Whether the server may be waiting for more than an initiation.
+    /// Whether the server may be in the middle of this transfer.
     pub fn is_server_in_transfer(&self) -> bool {
         let is_done_at_once =
-            matches!(self.initiation(), Request::DownloadExpedited { .. } | Request::Upload { .. });
+            matches!(self.initiation(), SdoRequest::DownloadExpedited { .. } | SdoRequest::Upload { .. });
         !self.is_initiating() || !is_done_at_once
     }
 
     pub fn begin_again(&mut self) {
-        self.phase = Phase::Initiate;
+        self.phase = ExchangePhase::Initiate;
     }
 
-    /// The kind of transfer that every server knows.
-    pub fn begin_simpler(&mut self) {
+    /// Falls back to the kind of transfer that every server supports.
+    pub fn fall_back(&mut self) {
         let data = match &mut self.transfer {
             Transfer::BlockDownload { data, .. } | Transfer::Download { data, .. } => {
                 Some(std::mem::take(data))
@@ -125,119 +125,123 @@ impl Exchange {
             Some(data) => Transfer::Download { object, data },
             None => Transfer::Upload { object },
         };
-        self.phase = Phase::Initiate;
+        self.phase = ExchangePhase::Initiate;
     }
 
-    /// The frame that is due, and whether an answer is due then (else another frame).
+    /// The frame that is due, and whether a response follows it (otherwise another frame).
     pub fn next_frame(&mut self, node: u8) -> (Frame, bool) {
         let request = match (&mut self.phase, &self.transfer) {
-            (Phase::UploadSegments { toggle, .. }, _) => Request::UploadSegment { toggle: *toggle },
-            (Phase::DownloadSegments { sent, toggle }, Transfer::Download { data, .. }) => {
+            (ExchangePhase::UploadSegments { toggle, .. }, _) => {
+                SdoRequest::UploadSegment { toggle: *toggle }
+            }
+            (ExchangePhase::DownloadSegments { sent, toggle }, Transfer::Download { data, .. }) => {
                 let rest = data.get(*sent..).unwrap_or(&[]);
                 let is_last = rest.len() <= Segment::MAX_BYTES;
-                Request::DownloadSegment { toggle: *toggle, data: Segment::first_of(rest), is_last }
+                SdoRequest::DownloadSegment { toggle: *toggle, data: Segment::first_of(rest), is_last }
             }
-            (Phase::BlockUpload(block), _) => block.next_request(),
-            (Phase::BlockDownload(block), Transfer::BlockDownload { data, .. }) => match block.next(data) {
-                Next::Segment { segment, ends_block } => {
-                    let id = Id::canopen(function_code::SDO_REQUEST, node);
-                    return (Frame::of(id, segment.encode()), ends_block);
+            (ExchangePhase::BlockUpload(block), _) => block.next_request(),
+            (ExchangePhase::BlockDownload(block), Transfer::BlockDownload { data, .. }) => {
+                match block.next(data) {
+                    Next::Segment { segment, ends_block } => {
+                        let id = Id::canopen(function_code::SDO_REQUEST, node);
+                        return (Frame::of(id, segment.encode()), ends_block);
+                    }
+                    Next::End(request) => request,
                 }
-                Next::End(request) => request,
-            },
+            }
             _ => self.initiation(),
         };
         (request.frame(node), true)
     }
 
-    fn initiation(&self) -> Request {
+    fn initiation(&self) -> SdoRequest {
         let size_of = |data: &[u8]| u32::try_from(data.len()).ok();
         match &self.transfer {
-            Transfer::Upload { object } => Request::Upload { object: *object },
+            Transfer::Upload { object } => SdoRequest::Upload { object: *object },
             Transfer::Download { object, data } => match Expedited::of(data) {
-                Some(data) => Request::DownloadExpedited { object: *object, data },
-                None => Request::DownloadSegmented { object: *object, size: size_of(data) },
+                Some(data) => SdoRequest::DownloadExpedited { object: *object, data },
+                None => SdoRequest::DownloadSegmented { object: *object, size: size_of(data) },
             },
             Transfer::BlockUpload { object } => {
-                Request::BlockUpload { object: *object, block_size: BlockSize::OF_UPLOADS, has_crc: true }
+                SdoRequest::BlockUpload { object: *object, block_size: BlockSize::FOR_UPLOADS, has_crc: true }
             }
             Transfer::BlockDownload { object, data } => {
-                Request::BlockDownload { object: *object, size: size_of(data), has_crc: true }
+                SdoRequest::BlockDownload { object: *object, size: size_of(data), has_crc: true }
             }
         }
     }
 
-    /// Takes a frame of the server.
-    pub fn receive(&mut self, frame: &Frame) -> Step {
-        let Some(bytes) = wire::eight_bytes(frame) else { return Step::Unusable };
-        let response = Response::decode(frame).map(|(_, response)| response);
+    /// Receives a frame of the server.
+    pub fn receive(&mut self, frame: &Frame) -> ExchangeStep {
+        let Some(bytes) = wire::eight_bytes(frame) else { return ExchangeStep::Unusable };
+        let response = SdoResponse::decode(frame).map(|(_, response)| response);
         let wanted = self.object();
-        if let Some(Response::Abort { object, code }) = response {
-            return if object == wanted { self.aborted(code) } else { Step::Unusable };
+        if let Some(SdoResponse::Abort { object, code }) = response {
+            return if object == wanted { self.aborted(code) } else { ExchangeStep::Unusable };
         }
         match (&mut self.phase, &self.transfer) {
-            (Phase::Initiate, _) => self.initiated(response),
-            (Phase::UploadSegments { bytes, size, toggle }, _) => {
+            (ExchangePhase::Initiate, _) => self.initiated(response),
+            (ExchangePhase::UploadSegments { bytes, size, toggle }, _) => {
                 uploaded_segment(bytes, *size, toggle, response)
             }
-            (Phase::DownloadSegments { sent, toggle }, Transfer::Download { data, .. }) => {
+            (ExchangePhase::DownloadSegments { sent, toggle }, Transfer::Download { data, .. }) => {
                 downloaded_segment(data.len(), sent, toggle, response)
             }
-            (Phase::BlockUpload(block), _) => block.receive(bytes, response),
-            (Phase::BlockDownload(block), Transfer::BlockDownload { data, .. }) => {
+            (ExchangePhase::BlockUpload(block), _) => block.receive(bytes, response),
+            (ExchangePhase::BlockDownload(block), Transfer::BlockDownload { data, .. }) => {
                 block.receive(data.len(), response)
             }
-            _ => Step::Unusable,
+            _ => ExchangeStep::Unusable,
         }
     }
 
-    fn aborted(&self, code: AbortCode) -> Step {
+    fn aborted(&self, code: AbortCode) -> ExchangeStep {
         let is_block = matches!(self.transfer, Transfer::BlockUpload { .. } | Transfer::BlockDownload { .. });
         if is_block && self.is_initiating() && code == AbortCode::CommandSpecifierUnknown {
-            return Step::BeginSimpler;
+            return ExchangeStep::FallBack;
         }
-        Step::Finish { outcome: Err(SdoError::Aborted(code)), parting: Parting::Nothing }
+        ExchangeStep::Finish { outcome: Err(SdoError::Aborted(code)), final_request: FinalRequest::None }
     }
 
-    fn initiated(&mut self, response: Option<Response>) -> Step {
+    fn initiated(&mut self, response: Option<SdoResponse>) -> ExchangeStep {
         let wanted = self.object();
         self.phase = match (&self.transfer, response) {
-            (Transfer::Upload { .. }, Some(Response::UploadExpedited { object, data }))
+            (Transfer::Upload { .. }, Some(SdoResponse::UploadExpedited { object, data }))
                 if object == wanted =>
             {
-                return Step::uploaded(data.bytes().into(), data.is_size_indicated());
+                return ExchangeStep::uploaded(data.bytes().into(), data.is_size_indicated());
             }
-            (Transfer::Upload { .. }, Some(Response::UploadSegmented { object, size }))
+            (Transfer::Upload { .. }, Some(SdoResponse::UploadSegmented { object, size }))
                 if object == wanted =>
             {
                 if is_too_long(size) {
-                    return Step::too_long();
+                    return ExchangeStep::too_long();
                 }
-                Phase::UploadSegments { bytes: vec![], size, toggle: false }
+                ExchangePhase::UploadSegments { bytes: vec![], size, toggle: false }
             }
-            (Transfer::Download { data, .. }, Some(Response::DownloadAccepted { object }))
+            (Transfer::Download { data, .. }, Some(SdoResponse::DownloadAccepted { object }))
                 if object == wanted =>
             {
                 if Expedited::of(data).is_some() {
-                    return Step::downloaded();
+                    return ExchangeStep::downloaded();
                 }
-                Phase::DownloadSegments { sent: 0, toggle: false }
+                ExchangePhase::DownloadSegments { sent: 0, toggle: false }
             }
-            (Transfer::BlockUpload { .. }, Some(Response::BlockUpload { object, size, has_crc }))
+            (Transfer::BlockUpload { .. }, Some(SdoResponse::BlockUpload { object, size, has_crc }))
                 if object == wanted =>
             {
                 if is_too_long(size) {
-                    return Step::too_long();
+                    return ExchangeStep::too_long();
                 }
-                Phase::BlockUpload(BlockUpload::new(size, has_crc))
+                ExchangePhase::BlockUpload(BlockUpload::new(size, has_crc))
             }
             (
                 Transfer::BlockDownload { .. },
-                Some(Response::BlockDownload { object, block_size, has_crc }),
-            ) if object == wanted => Phase::BlockDownload(BlockDownload::new(block_size, has_crc)),
-            _ => return Step::Unusable,
+                Some(SdoResponse::BlockDownload { object, block_size, has_crc }),
+            ) if object == wanted => ExchangePhase::BlockDownload(BlockDownload::new(block_size, has_crc)),
+            _ => return ExchangeStep::Unusable,
         };
-        Step::Send
+        ExchangeStep::Send
     }
 }
 
@@ -249,28 +253,30 @@ fn uploaded_segment(
     bytes: &mut Vec<u8>,
     size: Option<u32>,
     expected: &mut bool,
-    response: Option<Response>,
-) -> Step {
-    let Some(Response::UploadSegment { toggle, data, is_last }) = response else { return Step::Unusable };
+    response: Option<SdoResponse>,
+) -> ExchangeStep {
+    let Some(SdoResponse::UploadSegment { toggle, data, is_last }) = response else {
+        return ExchangeStep::Unusable;
+    };
     if toggle != *expected {
         return toggle_not_alternated();
     }
     if data.bytes().is_empty() && !is_last {
-        return Step::fail(SdoError::EmptySegment, AbortCode::General);
+        return ExchangeStep::fail(SdoError::EmptySegment, AbortCode::General);
     }
     bytes.extend_from_slice(data.bytes());
     if bytes.len() > MAX_UPLOAD_BYTES {
-        return Step::too_long();
+        return ExchangeStep::too_long();
     }
     let received = bytes.len() as u32;
     match size {
         Some(announced) if received > announced || (is_last && received != announced) => {
-            Step::fail(SdoError::SizeMismatch { announced, received }, AbortCode::LengthMismatch)
+            ExchangeStep::fail(SdoError::SizeMismatch { announced, received }, AbortCode::LengthMismatch)
         }
-        _ if is_last => Step::uploaded(std::mem::take(bytes), true),
+        _ if is_last => ExchangeStep::uploaded(std::mem::take(bytes), true),
         _ => {
             *expected = !*expected;
-            Step::Send
+            ExchangeStep::Send
         }
     }
 }
@@ -279,20 +285,22 @@ fn downloaded_segment(
     length: usize,
     sent: &mut usize,
     expected: &mut bool,
-    response: Option<Response>,
-) -> Step {
-    let Some(Response::DownloadSegmentAccepted { toggle }) = response else { return Step::Unusable };
+    response: Option<SdoResponse>,
+) -> ExchangeStep {
+    let Some(SdoResponse::DownloadSegmentAccepted { toggle }) = response else {
+        return ExchangeStep::Unusable;
+    };
     if toggle != *expected {
         return toggle_not_alternated();
     }
     *sent = (*sent + Segment::MAX_BYTES).min(length);
     if *sent == length {
-        return Step::downloaded();
+        return ExchangeStep::downloaded();
     }
     *expected = !*expected;
-    Step::Send
+    ExchangeStep::Send
 }
 
-fn toggle_not_alternated() -> Step {
-    Step::fail(SdoError::ToggleNotAlternated, AbortCode::ToggleBitNotAlternated)
+fn toggle_not_alternated() -> ExchangeStep {
+    ExchangeStep::fail(SdoError::ToggleNotAlternated, AbortCode::ToggleBitNotAlternated)
 }

@@ -1,10 +1,10 @@
-//! Service data objects (CiA 301, 7.2.4): reading and writing objects of one node, expedited, segmented and in blocks.
+//! Service data objects (CiA 301, 7.2.4): read and write objects of one node, expedited, segmented and in blocks.
 //!
-//! The frames are [`Request`] and [`Response`], which can only be valid ones; both sides of the conversation can be
-//! written with them. [`Client`] is the master's side.
+//! [`SdoRequest`] and [`SdoResponse`] are the messages; only valid ones can be built, and both sides can be written
+//! with them. [`SdoClient`] is the SDO client.
 //!
 //! ```text
-//! client ── when to send, to repeat, to give up
+//! client ── sending, repeating, timeouts
 //!   │
 //! exchange ── one transfer: initiation and segments
 //!   ├── block_upload, block_download ── crc
@@ -24,8 +24,8 @@ mod transfer;
 mod wire;
 
 pub use abort::AbortCode;
-pub use client::{Busy, Client, Timing};
-pub use request::Request;
-pub use response::Response;
+pub use client::{SdoBusy, SdoClient, SdoTiming};
+pub use request::SdoRequest;
+pub use response::SdoResponse;
 pub use transfer::{Completed, MAX_UPLOAD_BYTES, SdoError, Transfer, Uploaded};
 pub use wire::{BlockSegment, BlockSize, Expedited, Segment};

@@ -1,4 +1,4 @@
-//! What a client sends.
+//! Requests of an SDO client.
 
 use takt_rt::{Frame, Id};
 
@@ -15,90 +15,89 @@ const DOWNLOAD: u8 = 1;
 const UPLOAD: u8 = 2;
 const UPLOAD_SEGMENT: u8 = 3;
 
-/// A frame from client to server (CiA 301, 7.2.4.3). Bits that the standard reserves are sent as zero and not looked
-/// at when reading.
+/// A frame from client to server (CiA 301, 7.2.4.3). Reserved bits are sent as zero and ignored when decoding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Request {
-    /// Write this object; here is the data.
+pub enum SdoRequest {
+    /// Expedited download.
     DownloadExpedited {
         /// The object.
         object: ObjectAddress,
         /// Its new value.
         data: Expedited,
     },
-    /// Write this object; the data follows in segments.
+    /// Initiate a segmented download.
     DownloadSegmented {
         /// The object.
         object: ObjectAddress,
-        /// How many bytes will follow, if that is told.
+        /// The announced size in bytes, if indicated.
         size: Option<u32>,
     },
-    /// A piece of the data that is being written.
+    /// A segment of a download.
     DownloadSegment {
-        /// Alternates, beginning with `false`.
+        /// The toggle bit, beginning with `false`.
         toggle: bool,
-        /// The piece.
+        /// The segment's data.
         data: Segment,
         /// Whether it is the last one.
         is_last: bool,
     },
-    /// Read this object.
+    /// Initiate an upload.
     Upload {
         /// The object.
         object: ObjectAddress,
     },
-    /// Send the next piece of the data that is being read.
+    /// Request the next segment of an upload.
     UploadSegment {
-        /// Alternates, beginning with `false`.
+        /// The toggle bit, beginning with `false`.
         toggle: bool,
     },
-    /// Read this object in blocks.
+    /// Initiate a block upload.
     BlockUpload {
         /// The object.
         object: ObjectAddress,
-        /// How many segments to send before waiting for an acknowledgement.
+        /// Number of segments in a block.
         block_size: BlockSize,
-        /// Whether the client can check the checksum.
+        /// Whether the client supports the CRC.
         has_crc: bool,
     },
-    /// Begin to send the blocks.
+    /// Start a block upload.
     BlockUploadStart,
-    /// A block has come, or the beginning of it.
+    /// Acknowledge a block, in full or in part.
     BlockAcknowledge {
-        /// The last segment that came in order; 0 for none.
+        /// The last segment that arrived in order; 0 for none.
         last: u8,
-        /// How many segments the next block may have.
+        /// Number of segments in the next block.
         block_size: BlockSize,
     },
-    /// All blocks have come and are right.
+    /// End a block upload.
     BlockUploadEnd,
-    /// Write this object in blocks.
+    /// Initiate a block download.
     BlockDownload {
         /// The object.
         object: ObjectAddress,
-        /// How many bytes will follow, if that is told.
+        /// The announced size in bytes, if indicated.
         size: Option<u32>,
-        /// Whether the client can make the checksum.
+        /// Whether the client supports the CRC.
         has_crc: bool,
     },
-    /// All blocks have been sent.
+    /// End a block download.
     BlockDownloadEnd {
-        /// How many bytes of the last segment do not count: 0 to 7.
+        /// Number of unused bytes in the last segment: 0 to 7.
         unused: u8,
-        /// The checksum of all data; 0 when it was not agreed on.
+        /// The CRC of all data; 0 if it is not used.
         crc: u16,
     },
-    /// Give the transfer up.
+    /// Abort the transfer.
     Abort {
-        /// The object that was being transferred.
+        /// The object of the transfer.
         object: ObjectAddress,
-        /// Why.
+        /// The abort code.
         code: AbortCode,
     },
 }
 
-impl Request {
-    /// The frame that carries this request to `node` (1 to 127).
+impl SdoRequest {
+    /// The frame of this request to a node ID (1 to 127).
     pub fn frame(self, node: u8) -> Frame {
         let bytes = match self {
             Self::DownloadExpedited { object, data } => data.encode(DOWNLOAD, object),
@@ -126,8 +125,8 @@ impl Request {
         Frame::of(Id::canopen(function_code::SDO_REQUEST, node), bytes)
     }
 
-    /// Reads the node and the request of a frame; `None` when it is none. The segments of a block look like other
-    /// requests: they are read with [`BlockSegment`](super::BlockSegment) where they are due.
+    /// Decodes node ID and request; `None` for other frames. The segments of a block look like other requests: decode
+    /// them with [`BlockSegment`](super::BlockSegment) during a block.
     pub fn decode(frame: &Frame) -> Option<(u8, Self)> {
         let node = node_of(frame, function_code::SDO_REQUEST)?;
         Some((node, Self::from_bytes(wire::eight_bytes(frame)?)?))
@@ -162,7 +161,7 @@ impl Request {
             },
             BLOCK_PRODUCER if bytes[0] & 0x01 == 0 => Self::BlockDownload {
                 object,
-                size: wire::block_size_told(bytes),
+                size: wire::indicated_block_size(bytes),
                 has_crc: bytes[0] & CRC_SUPPORTED != 0,
             },
             BLOCK_PRODUCER => {
@@ -181,23 +180,27 @@ mod tests {
 
     proptest! {
         #[test]
-        fn what_is_read_from_any_frame_is_read_again_from_its_own_frame(bytes: [u8; 8], node in 1..=127u8) {
+        fn a_decoded_request_is_encoded_and_decoded_to_the_same(bytes: [u8; 8], node in 1..=127u8) {
             let id = Id::canopen(function_code::SDO_REQUEST, node);
-            if let Some((sender, request)) = Request::decode(&Frame::of(id, bytes)) {
+            if let Some((sender, request)) = SdoRequest::decode(&Frame::of(id, bytes)) {
                 prop_assert_eq!(sender, node);
-                prop_assert_eq!(Request::decode(&request.frame(node)), Some((node, request)));
+                prop_assert_eq!(SdoRequest::decode(&request.frame(node)), Some((node, request)));
             }
         }
     }
 
     #[test]
-    fn frames_that_cannot_be_requests_are_refused() {
+    fn frames_that_cannot_be_requests_are_not_decoded() {
         let id = Id::canopen(function_code::SDO_REQUEST, 2);
-        assert_eq!(Request::decode(&Frame::of(id, [0x40, 0x61, 0x60, 0, 0, 0, 0])), None, "seven bytes");
-        assert_eq!(Request::decode(&Frame::remote(id, 8).unwrap()), None, "remote frame");
-        assert_eq!(Request::decode(&Frame::of(id, [0xA4, 0, 0, 0, 0, 0, 0, 0])), None, "no segments");
-        assert_eq!(Request::decode(&Frame::of(id, [0xE0, 0, 0, 0, 0, 0, 0, 0])), None, "no such specifier");
+        assert_eq!(SdoRequest::decode(&Frame::of(id, [0x40, 0x61, 0x60, 0, 0, 0, 0])), None, "seven bytes");
+        assert_eq!(SdoRequest::decode(&Frame::remote(id, 8).unwrap()), None, "remote frame");
+        assert_eq!(SdoRequest::decode(&Frame::of(id, [0xA4, 0, 0, 0, 0, 0, 0, 0])), None, "no segments");
+        assert_eq!(
+            SdoRequest::decode(&Frame::of(id, [0xE0, 0, 0, 0, 0, 0, 0, 0])),
+            None,
+            "no such specifier"
+        );
         let server = Id::canopen(function_code::SDO_RESPONSE, 2);
-        assert_eq!(Request::decode(&Frame::of(server, [0x40; 8])), None, "other identifier");
+        assert_eq!(SdoRequest::decode(&Frame::of(server, [0x40; 8])), None, "other identifier");
     }
 }

@@ -1,4 +1,4 @@
-//! What a server sends.
+//! Responses of an SDO server.
 
 use takt_rt::{Frame, Id};
 
@@ -15,88 +15,87 @@ const DOWNLOAD_SEGMENT: u8 = 1;
 const UPLOAD: u8 = 2;
 const DOWNLOAD: u8 = 3;
 
-/// A frame from server to client (CiA 301, 7.2.4.3). Bits that the standard reserves are sent as zero and not looked
-/// at when reading.
+/// A frame from server to client (CiA 301, 7.2.4.3). Reserved bits are sent as zero and ignored when decoding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Response {
-    /// This is the object's value.
+pub enum SdoResponse {
+    /// Expedited upload.
     UploadExpedited {
         /// The object.
         object: ObjectAddress,
         /// Its value.
         data: Expedited,
     },
-    /// The object's value will come in segments.
+    /// A segmented upload follows.
     UploadSegmented {
         /// The object.
         object: ObjectAddress,
-        /// How many bytes will come, if that is told.
+        /// The announced size in bytes, if indicated.
         size: Option<u32>,
     },
-    /// A piece of the data that is being read.
+    /// A segment of an upload.
     UploadSegment {
-        /// That of the request.
+        /// The toggle bit of the request.
         toggle: bool,
-        /// The piece.
+        /// The segment's data.
         data: Segment,
         /// Whether it is the last one.
         is_last: bool,
     },
-    /// The object has been written, or its segments may come.
+    /// The object has been written, or its segments may follow.
     DownloadAccepted {
         /// The object.
         object: ObjectAddress,
     },
-    /// The segment has been taken.
+    /// The segment has been received.
     DownloadSegmentAccepted {
-        /// That of the request.
+        /// The toggle bit of the request.
         toggle: bool,
     },
-    /// The object's value will come in blocks.
+    /// A block upload follows.
     BlockUpload {
         /// The object.
         object: ObjectAddress,
-        /// How many bytes will come, if that is told.
+        /// The announced size in bytes, if indicated.
         size: Option<u32>,
-        /// Whether the server can make the checksum.
+        /// Whether the server supports the CRC.
         has_crc: bool,
     },
-    /// All blocks have been sent.
+    /// End a block upload.
     BlockUploadEnd {
-        /// How many bytes of the last segment do not count: 0 to 7.
+        /// Number of unused bytes in the last segment: 0 to 7.
         unused: u8,
-        /// The checksum of all data; 0 when it was not agreed on.
+        /// The CRC of all data; 0 if it is not used.
         crc: u16,
     },
-    /// Blocks may come.
+    /// A block download may follow.
     BlockDownload {
         /// The object.
         object: ObjectAddress,
-        /// How many segments to send before waiting for an acknowledgement.
+        /// Number of segments in a block.
         block_size: BlockSize,
-        /// Whether the server can check the checksum.
+        /// Whether the server supports the CRC.
         has_crc: bool,
     },
-    /// A block has come, or the beginning of it.
+    /// Acknowledge a block, in full or in part.
     BlockAcknowledge {
-        /// The last segment that came in order; 0 for none.
+        /// The last segment that arrived in order; 0 for none.
         last: u8,
-        /// How many segments the next block may have.
+        /// Number of segments in the next block.
         block_size: BlockSize,
     },
-    /// All blocks have come and are right.
+    /// End a block download.
     BlockDownloadEnd,
-    /// The transfer is given up.
+    /// Abort the transfer.
     Abort {
-        /// The object that was being transferred.
+        /// The object of the transfer.
         object: ObjectAddress,
-        /// Why.
+        /// The abort code.
         code: AbortCode,
     },
 }
 
-impl Response {
-    /// The frame that carries this response from `node` (1 to 127).
+impl SdoResponse {
+    /// The frame of this response from a node ID (1 to 127).
     pub fn frame(self, node: u8) -> Frame {
         let bytes = match self {
             Self::UploadExpedited { object, data } => data.encode(UPLOAD, object),
@@ -125,8 +124,8 @@ impl Response {
         Frame::of(Id::canopen(function_code::SDO_RESPONSE, node), bytes)
     }
 
-    /// Reads the node and the response of a frame; `None` when it is none. The segments of a block look like other
-    /// responses: they are read with [`BlockSegment`](super::BlockSegment) where they are due.
+    /// Decodes node ID and response; `None` for other frames. The segments of a block look like other responses: decode
+    /// them with [`BlockSegment`](super::BlockSegment) during a block.
     pub fn decode(frame: &Frame) -> Option<(u8, Self)> {
         let node = node_of(frame, function_code::SDO_RESPONSE)?;
         Some((node, Self::from_bytes(wire::eight_bytes(frame)?)?))
@@ -161,7 +160,7 @@ impl Response {
             },
             BLOCK_PRODUCER if bytes[0] & 0x01 == 0 => Self::BlockUpload {
                 object,
-                size: wire::block_size_told(bytes),
+                size: wire::indicated_block_size(bytes),
                 has_crc: bytes[0] & CRC_SUPPORTED != 0,
             },
             BLOCK_PRODUCER => {
@@ -180,20 +179,24 @@ mod tests {
 
     proptest! {
         #[test]
-        fn what_is_read_from_any_frame_is_read_again_from_its_own_frame(bytes: [u8; 8], node in 1..=127u8) {
+        fn a_decoded_response_is_encoded_and_decoded_to_the_same(bytes: [u8; 8], node in 1..=127u8) {
             let id = Id::canopen(function_code::SDO_RESPONSE, node);
-            if let Some((sender, response)) = Response::decode(&Frame::of(id, bytes)) {
+            if let Some((sender, response)) = SdoResponse::decode(&Frame::of(id, bytes)) {
                 prop_assert_eq!(sender, node);
-                prop_assert_eq!(Response::decode(&response.frame(node)), Some((node, response)));
+                prop_assert_eq!(SdoResponse::decode(&response.frame(node)), Some((node, response)));
             }
         }
     }
 
     #[test]
-    fn frames_that_cannot_be_responses_are_refused() {
+    fn frames_that_cannot_be_responses_are_not_decoded() {
         let id = Id::canopen(function_code::SDO_RESPONSE, 2);
-        assert_eq!(Response::decode(&Frame::of(id, [0x60, 0x60, 0x60, 0])), None, "four bytes");
-        assert_eq!(Response::decode(&Frame::of(id, [0xE0, 0, 0, 0, 0, 0, 0, 0])), None, "no such specifier");
-        assert_eq!(Response::decode(&Frame::of(Id::canopen(0x580, 0), [0x60; 8])), None, "no node");
+        assert_eq!(SdoResponse::decode(&Frame::of(id, [0x60, 0x60, 0x60, 0])), None, "four bytes");
+        assert_eq!(
+            SdoResponse::decode(&Frame::of(id, [0xE0, 0, 0, 0, 0, 0, 0, 0])),
+            None,
+            "no such specifier"
+        );
+        assert_eq!(SdoResponse::decode(&Frame::of(Id::canopen(0x580, 0), [0x60; 8])), None, "no node");
     }
 }

@@ -1,4 +1,4 @@
-//! What can be transferred, what comes of it, and why it may fail.
+//! Transfers, their results and errors.
 
 use takt_rt::Nanoseconds;
 
@@ -6,10 +6,10 @@ use super::abort::AbortCode;
 use crate::canopen::object::{DataType, ObjectAddress};
 use crate::printable::printable;
 
-/// The most bytes that an upload takes; what a server sends beyond is refused.
+/// The largest upload in bytes; a longer one fails.
 pub const MAX_UPLOAD_BYTES: usize = 1 << 16;
 
-/// What to transfer.
+/// A transfer to start.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Transfer {
     /// Read an object.
@@ -17,13 +17,13 @@ pub enum Transfer {
         /// The object.
         object: ObjectAddress,
     },
-    /// Read a long object in blocks; as [`Transfer::Upload`] when the server has no block transfer.
+    /// Read a long object in blocks; falls back to [`Transfer::Upload`] when the server has no block transfer.
     BlockUpload {
         /// The object.
         object: ObjectAddress,
     },
-    /// Write a long object in blocks; as [`Transfer::Download`] when the server has no block transfer, and up to four
-    /// bytes in any case.
+    /// Write a long object in blocks; falls back to [`Transfer::Download`] when the server has no block transfer, and
+    /// for up to four bytes.
     BlockDownload {
         /// The object.
         object: ObjectAddress,
@@ -34,7 +34,7 @@ pub enum Transfer {
     Download {
         /// The object.
         object: ObjectAddress,
-        /// Its new value; up to four bytes go in one frame, more (or none) in segments.
+        /// Its new value; up to four bytes are expedited, other lengths are segmented.
         data: Vec<u8>,
     },
 }
@@ -51,29 +51,29 @@ impl Transfer {
     }
 }
 
-/// What an upload has brought.
+/// The data of an upload.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Uploaded {
-    /// The bytes; four when the server did not tell how many count.
+    /// The bytes; four when the server did not indicate the size.
     pub bytes: Vec<u8>,
-    /// Whether the server told how many bytes count.
+    /// Whether the server indicated the size.
     pub is_size_known: bool,
 }
 
 impl Uploaded {
-    /// The number that the bytes hold; `None` when there are not as many as the type needs.
+    /// Decodes a number; `None` when the number of bytes differs from the type's.
     pub fn number(&self, data_type: DataType) -> Option<i64> {
         let counted = if self.is_size_known { self.bytes.len() } else { data_type.length() };
         data_type.decode(self.bytes.get(..counted)?)
     }
 
-    /// The text that the bytes hold (VISIBLE_STRING), without trailing zeros and blanks.
+    /// Decodes a text (VISIBLE_STRING), without trailing zeros and blanks.
     pub fn text(&self) -> String {
         printable(String::from_utf8_lossy(&self.bytes).trim_end_matches(['\0', ' ']))
     }
 }
 
-/// How a transfer has succeeded.
+/// The result of a successful transfer.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Completed {
     /// The object has been read.
@@ -82,31 +82,31 @@ pub enum Completed {
     Downloaded,
 }
 
-/// Why a transfer has failed.
+/// Why a transfer failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SdoError {
-    /// Nothing usable came in time.
-    #[error("no reply within {} ms, asked {attempts} times{}", reply_timeout_ns / 1_000_000, unusable_words(*.unusable))]
+    /// No valid response arrived in time.
+    #[error("no reply within {} ms in {attempts} attempts{}", reply_timeout_ns / 1_000_000, unusable_words(*.unusable))]
     NoReply {
-        /// How often the transfer was begun.
+        /// How many times the transfer was started.
         attempts: u8,
-        /// How long was waited each time.
+        /// The timeout of each request.
         reply_timeout_ns: Nanoseconds,
-        /// Frames on the node's reply identifier that were no answer to this transfer.
+        /// Frames with the node's response identifier that did not belong to this transfer.
         unusable: u16,
     },
-    /// The server gave it up.
+    /// The server aborted the transfer.
     #[error("abort {0}")]
     Aborted(AbortCode),
     /// The toggle bit of a segment did not alternate.
     #[error("the toggle bit of a segment did not alternate")]
     ToggleNotAlternated,
-    /// The segments hold another number of bytes than announced.
-    #[error("{received} bytes came where {announced} were announced")]
+    /// The size differs from the announced one.
+    #[error("{received} bytes received, but {announced} were announced")]
     SizeMismatch {
-        /// What the server announced.
+        /// The announced size.
         announced: u32,
-        /// What came, as far as it was taken.
+        /// The received size so far.
         received: u32,
     },
     /// More than [`MAX_UPLOAD_BYTES`].
@@ -116,25 +116,25 @@ pub enum SdoError {
         limit: u32,
     },
     /// A segment without data that is not the last one: the transfer would never end.
-    #[error("an empty segment came that is not the last one")]
+    #[error("an empty segment was received that is not the last one")]
     EmptySegment,
-    /// The checksum of a block transfer is another one than that of the data.
-    #[error("checksum 0x{received:04X} came for data with 0x{computed:04X}")]
+    /// The CRC of a block transfer is wrong.
+    #[error("the CRC is 0x{received:04X}, but that of the received data is 0x{computed:04X}")]
     Checksum {
-        /// That of the data that came.
+        /// The CRC of the received data.
         computed: u16,
-        /// That of the server.
+        /// The CRC that the server sent.
         received: u16,
     },
-    /// A block was acknowledged that was not sent, or blocks were lost again and again.
-    #[error("blocks were lost again and again, or acknowledged without having been sent")]
+    /// An acknowledgement for segments that were not sent, or repeated loss of blocks.
+    #[error("blocks were lost repeatedly, or segments were acknowledged that had not been sent")]
     BlockSequence,
 }
 
 fn unusable_words(count: u16) -> String {
     match count {
         0 => String::new(),
-        1 => ", one frame came that is no answer to it".to_owned(),
-        _ => format!(", {count} frames came that are no answer to it"),
+        1 => ", one frame received did not belong to it".to_owned(),
+        _ => format!(", {count} frames received did not belong to it"),
     }
 }

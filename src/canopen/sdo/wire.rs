@@ -1,32 +1,32 @@
-//! The parts that requests and responses share: addresses, and data of at most four or seven bytes.
+//! The common parts of requests and responses: addresses, and data of at most four or seven bytes.
 
 use takt_rt::{Frame, FrameKind};
 
 use crate::canopen::object::ObjectAddress;
 
-/// Where an upload or a download begins, in bits 5 to 7 of the first byte; requests call it ccs, responses scs.
+/// Position of the command specifier in the first byte (ccs of requests, scs of responses).
 pub(super) const SPECIFIER_SHIFT: u8 = 5;
-/// Bit 1 of the first byte of an initiation: the data is in this frame.
+/// Bit 1 of the first byte of an initiation: expedited, the data is in this frame.
 pub(super) const EXPEDITED: u8 = 0x02;
-/// Bit 0 of the first byte of an initiation: the size is told.
+/// Bit 0 of the first byte of an initiation: the size is indicated.
 pub(super) const SIZE_INDICATED: u8 = 0x01;
-/// Bit 4 of the first byte of a segment: alternates, beginning with 0.
+/// Bit 4 of the first byte of a segment: the toggle bit, beginning with 0.
 pub(super) const TOGGLE: u8 = 0x10;
-/// Bit 0 of the first byte of a segment: there are no more.
+/// Bit 0 of the first byte of a segment: the last one.
 pub(super) const LAST: u8 = 0x01;
-/// The specifier of an abort, in both directions.
+/// The command specifier of an abort, in both directions.
 pub(super) const ABORT: u8 = 4;
 
-/// The specifier of what the server of a block download sends, and the client of a block upload.
+/// The command specifier of the receiver of blocks: the server of a block download, the client of a block upload.
 pub(super) const BLOCK_CONSUMER: u8 = 5;
-/// The specifier of what the server of a block upload sends, and the client of a block download.
+/// The command specifier of the sender of blocks: the server of a block upload, the client of a block download.
 pub(super) const BLOCK_PRODUCER: u8 = 6;
-/// Bit 2 of the first byte of a block initiation: the sender can make the checksum.
+/// Bit 2 of the first byte of a block initiation: the sender supports the CRC.
 pub(super) const CRC_SUPPORTED: u8 = 0x04;
-/// Bit 1 of the first byte of a block initiation by the producer: the size is told.
+/// Bit 1 of the first byte of a block initiation by the producer: the size is indicated.
 pub(super) const BLOCK_SIZE_INDICATED: u8 = 0x02;
 
-/// The eight bytes of an SDO frame; every other frame is none.
+/// The eight bytes of an SDO frame; `None` for other frames.
 pub(super) fn eight_bytes(frame: &Frame) -> Option<[u8; 8]> {
     if frame.kind() != FrameKind::Data {
         return None;
@@ -50,18 +50,18 @@ pub(super) fn tail([_, _, _, _, a, b, c, d]: [u8; 8]) -> [u8; 4] {
     [a, b, c, d]
 }
 
-/// The size that a segmented initiation tells, if it does.
+/// The size in a segmented initiation, if indicated.
 pub(super) fn size(bytes: [u8; 8]) -> Option<u32> {
     (bytes[0] & SIZE_INDICATED != 0).then(|| u32::from_le_bytes(tail(bytes)))
 }
 
-/// The flags and bytes of a segmented initiation.
+/// The bytes of a segmented initiation.
 pub(super) fn with_size(specifier: u8, object: ObjectAddress, size: Option<u32>) -> [u8; 8] {
     let flags = if size.is_some() { SIZE_INDICATED } else { 0 };
     with_address(specifier << SPECIFIER_SHIFT | flags, object, size.unwrap_or(0).to_le_bytes())
 }
 
-/// Data that fits the initiation itself: one to four bytes, or four of which it is not told how many count.
+/// Data of an expedited transfer: one to four bytes, or four bytes without an indicated size.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Expedited {
     bytes: [u8; 4],
@@ -79,17 +79,12 @@ impl Expedited {
         Some(Self { bytes, length: Some(data.len() as u8) })
     }
 
-    /// Four bytes of which it is not told how many count.
-    pub const fn without_size(bytes: [u8; 4]) -> Self {
-        Self { bytes, length: None }
-    }
-
-    /// The bytes; all four when it is not told how many count.
+    /// The bytes; all four when the size is not indicated.
     pub fn bytes(&self) -> &[u8] {
         self.bytes.get(..self.length.unwrap_or(4).into()).unwrap_or(&self.bytes)
     }
 
-    /// Whether it is told how many bytes count.
+    /// Whether the size is indicated.
     pub const fn is_size_indicated(&self) -> bool {
         self.length.is_some()
     }
@@ -116,7 +111,7 @@ pub struct Segment {
 }
 
 impl Segment {
-    /// The most bytes that a segment carries.
+    /// The largest number of bytes in a segment.
     pub const MAX_BYTES: usize = 7;
 
     /// The first bytes of `data`, as many as fit.
@@ -144,14 +139,14 @@ impl Segment {
     }
 }
 
-/// How many segments a block has: 1 to 127.
+/// Number of segments in a block: 1 to 127.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BlockSize(u8);
 
 impl BlockSize {
-    /// What the client asks of a server: few enough segments to leave the bus to others (32 frames last 4 ms at
-    /// 1 Mbit/s), and with them the first byte of a segment that comes late is never that of an initiation.
-    pub(super) const OF_UPLOADS: Self = Self(32);
+    /// The block size that the client requests. 32 frames last 4 ms at 1 Mbit/s, which leaves the bus to others. With
+    /// such sequence numbers, the first byte of a late segment never looks like an initiation.
+    pub(super) const FOR_UPLOADS: Self = Self(32);
 
     /// `None` outside 1 to 127.
     pub const fn new(segments: u8) -> Option<Self> {
@@ -167,7 +162,7 @@ impl BlockSize {
     }
 }
 
-/// One segment of a block. Its bytes can mean anything else outside of a block, so it is read only where one is due.
+/// One segment of a block. Outside a block its bytes have another meaning, so it is decoded only during a block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BlockSegment {
     number: u8,
@@ -178,8 +173,8 @@ pub struct BlockSegment {
 impl BlockSegment {
     const LAST: u8 = 0x80;
 
-    /// Segment `number` of its block, with the first seven bytes of `data` (missing ones are zero). `is_last` tells that
-    /// no more segments follow in the whole transfer. `None` when the number is not 1 to 127.
+    /// Segment `number` of its block, with the first seven bytes of `data`, filled with zeros. `is_last`: it is the
+    /// last segment of the transfer. `None` when the number is not 1 to 127.
     pub fn new(number: u8, data: &[u8], is_last: bool) -> Option<Self> {
         let number = BlockSize::new(number)?.segments();
         let mut bytes = [0; 7];
@@ -187,12 +182,12 @@ impl BlockSegment {
         Some(Self { number, data: bytes, is_last })
     }
 
-    /// Its number in the block, counted from 1.
+    /// Its sequence number in the block, counted from 1.
     pub const fn number(self) -> u8 {
         self.number
     }
 
-    /// Its seven bytes, of which those of the last segment need not all count.
+    /// Its seven bytes; some of the last segment may be unused.
     pub const fn data(self) -> [u8; 7] {
         self.data
     }
@@ -202,31 +197,31 @@ impl BlockSegment {
         self.is_last
     }
 
-    /// Its eight bytes on the wire.
+    /// Encodes it.
     pub const fn encode(self) -> [u8; 8] {
         let [a, b, c, d, e, f, g] = self.data;
         let last = if self.is_last { Self::LAST } else { 0 };
         [self.number | last, a, b, c, d, e, f, g]
     }
 
-    /// Reads it from eight bytes; `None` when the number is 0, which in a block can only be an abort.
+    /// Decodes it; `None` when the number is 0, which during a block can only be an abort.
     pub fn decode([first, a, b, c, d, e, f, g]: [u8; 8]) -> Option<Self> {
         Self::new(first & !Self::LAST, &[a, b, c, d, e, f, g], first & Self::LAST != 0)
     }
 }
 
-/// The end of a producer's blocks: how many bytes of the last segment do not count, and the checksum.
+/// Encodes the end of a block transfer: number of unused bytes in the last segment, and CRC.
 pub(super) fn block_end(unused: u8, crc: u16) -> [u8; 8] {
     let [low, high] = crc.to_le_bytes();
     [BLOCK_PRODUCER << SPECIFIER_SHIFT | (unused & 0x07) << 2 | 1, low, high, 0, 0, 0, 0, 0]
 }
 
-/// Unused bytes and checksum of the end of a producer's blocks.
+/// Decodes the unused bytes and the CRC of the end of a block transfer.
 pub(super) fn read_block_end([first, low, high, ..]: [u8; 8]) -> (u8, u16) {
     (first >> 2 & 0x07, u16::from_le_bytes([low, high]))
 }
 
-/// The beginning of a producer's blocks.
+/// Encodes the initiation by the producer.
 pub(super) fn block_producer_initiation(object: ObjectAddress, size: Option<u32>, has_crc: bool) -> [u8; 8] {
     let crc = if has_crc { CRC_SUPPORTED } else { 0 };
     let indicated = if size.is_some() { BLOCK_SIZE_INDICATED } else { 0 };
@@ -234,18 +229,18 @@ pub(super) fn block_producer_initiation(object: ObjectAddress, size: Option<u32>
     with_address(first, object, size.unwrap_or(0).to_le_bytes())
 }
 
-/// The size that the beginning of a producer's blocks tells, if it does.
-pub(super) fn block_size_told(bytes: [u8; 8]) -> Option<u32> {
+/// The size in the producer's initiation, if indicated.
+pub(super) fn indicated_block_size(bytes: [u8; 8]) -> Option<u32> {
     (bytes[0] & BLOCK_SIZE_INDICATED != 0).then(|| u32::from_le_bytes(tail(bytes)))
 }
 
-/// The beginning of a consumer's blocks.
+/// Encodes the initiation by the consumer.
 pub(super) fn block_consumer_initiation(object: ObjectAddress, size: BlockSize, has_crc: bool) -> [u8; 8] {
     let crc = if has_crc { CRC_SUPPORTED } else { 0 };
     with_address(BLOCK_CONSUMER << SPECIFIER_SHIFT | crc, object, [size.segments(), 0, 0, 0])
 }
 
-/// A consumer's acknowledgement: the last segment that came in order, and the size of the next block.
+/// Encodes a consumer's acknowledgement: the last segment in order, and the size of the next block.
 pub(super) fn block_acknowledgement(last: u8, next: BlockSize) -> [u8; 8] {
     [BLOCK_CONSUMER << SPECIFIER_SHIFT | 2, last, next.segments(), 0, 0, 0, 0, 0]
 }

@@ -1,4 +1,4 @@
-//! What `takt check` found out, for people. Axes and buses that are alike are shown once.
+//! The result of `takt check` as text. Axes and buses that are alike are shown once.
 
 use std::fmt::Write as _;
 
@@ -10,7 +10,7 @@ use takt::printable::printable_path;
 use super::{AxisCheck, Check};
 use crate::cli::table::Table;
 
-/// All of it.
+/// The whole text.
 pub fn whole(check: &Check, config: &Config) -> String {
     let mut text = format!(
         "{}: {} axes on {} buses, a cycle of {} with the command phase at {} µs{}\n",
@@ -23,6 +23,11 @@ pub fn whole(check: &Check, config: &Config) -> String {
     );
     let axes = alike(&check.axes, is_shown_alike);
     let _ = write!(text, "\nLimits\n{}\nUnits\n{}", limits_table(&axes), units_table(&axes));
+    let _ = write!(
+        text,
+        "\nIf the controller is gone at full speed (kill -9, a broken cable)\n{}",
+        unattended_table(&axes)
+    );
 
     text.push_str(&configuration_files(config));
     let both: Vec<_> = check.buses.iter().zip(&config.buses).collect();
@@ -156,6 +161,18 @@ fn units_table(axes: &[&[AxisCheck]]) -> Table {
             format!("{:.3} µ{}", axis.resolution * 1e6, axis.unit()),
             format!("{:.1}", axis.counts_per_cycle),
             format!("{lowest} to {highest}"),
+        ]);
+    }
+    table
+}
+
+fn unattended_table(axes: &[&[AxisCheck]]) -> Table {
+    let mut table = Table::new(["axis", "mode", "what the drive does"]);
+    for (group, axis) in axes.iter().filter_map(|group| Some((group, group.first()?))) {
+        table.row([
+            counted_span(group.iter().map(|axis| axis.name.as_str())),
+            axis.mode.to_owned(),
+            axis.without_controller.words(axis.is_linear),
         ]);
     }
     table

@@ -5,8 +5,8 @@ use std::time::Duration;
 use clap::{Args, Subcommand};
 
 use takt::canopen::object::{DataType, Object};
-use takt::commission::dictionary::{self, Choice};
-use takt::commission::{Failure, ReadObject, Request, Subject};
+use takt::commission::dictionary::{self, SelectedObject};
+use takt::commission::{Failure, ReadObject, TargetDrive, Task};
 
 use super::super::configuration;
 
@@ -71,13 +71,13 @@ impl Action {
         }
     }
 
-    /// The request to the drive.
-    pub fn request(&self, subject: &Subject, is_raw: bool) -> Result<Request, Failure> {
+    /// The task to the drive.
+    pub fn task(&self, target: &TargetDrive, is_raw: bool) -> Result<Task, Failure> {
         match self {
-            Self::Info => Ok(Request::Info),
-            Self::Read(read) => read.request(subject),
-            Self::Write(write) => write.request(subject, is_raw),
-            Self::Watch(watch) => Ok(Request::Watch {
+            Self::Info => Ok(Task::Info),
+            Self::Read(read) => read.task(target),
+            Self::Write(write) => write.task(target, is_raw),
+            Self::Watch(watch) => Ok(Task::Watch {
                 every_ns: watch.interval.as_nanos() as u64,
                 duration_ns: watch.duration.map(|duration| duration.as_nanos() as u64),
             }),
@@ -86,49 +86,51 @@ impl Action {
 }
 
 impl Read {
-    fn request(&self, subject: &Subject) -> Result<Request, Failure> {
+    fn task(&self, target: &TargetDrive) -> Result<Task, Failure> {
         let objects = self.objects.iter().map(|text| {
-            Ok(match dictionary::find(subject.family, text)? {
-                Choice::Known(entry) => ReadObject {
+            Ok(match dictionary::find(target.family, text)? {
+                SelectedObject::Known(entry) => ReadObject {
                     address: entry.object.address,
                     entry: Some(entry),
                     data_type: self.data_type,
                 },
-                Choice::Unknown(address) => ReadObject { address, entry: None, data_type: self.data_type },
+                SelectedObject::Unknown(address) => {
+                    ReadObject { address, entry: None, data_type: self.data_type }
+                }
             })
         });
-        Ok(Request::Read { objects: objects.collect::<Result<_, Failure>>()? })
+        Ok(Task::Read { objects: objects.collect::<Result<_, Failure>>()? })
     }
 }
 
 impl Write {
-    fn request(&self, subject: &Subject, is_raw: bool) -> Result<Request, Failure> {
-        let found = dictionary::find(subject.family, &self.object)?;
+    fn task(&self, target: &TargetDrive, is_raw: bool) -> Result<Task, Failure> {
+        let found = dictionary::find(target.family, &self.object)?;
         let (object, entry) = match (found, self.data_type) {
-            (Choice::Known(entry), None) => (entry.object, Some(entry)),
-            (Choice::Known(entry), Some(data_type)) if data_type == entry.object.data_type => {
+            (SelectedObject::Known(entry), None) => (entry.object, Some(entry)),
+            (SelectedObject::Known(entry), Some(data_type)) if data_type == entry.object.data_type => {
                 (entry.object, Some(entry))
             }
-            (Choice::Known(entry), Some(_)) => {
+            (SelectedObject::Known(entry), Some(_)) => {
                 return Err(Failure::Unsuitable(format!(
                     "{} is {:?}, not what --type says",
                     entry.object, entry.object.data_type
                 )));
             }
-            (Choice::Unknown(address), Some(data_type)) => {
+            (SelectedObject::Unknown(address), Some(data_type)) => {
                 (Object { address, data_type, name: "object" }, None)
             }
-            (Choice::Unknown(address), None) => {
+            (SelectedObject::Unknown(address), None) => {
                 return Err(Failure::Unsuitable(format!(
                     "nothing is known of {address}: say its type with --type (u8, i8, u16, i16, u32, i32)"
                 )));
             }
         };
         let value = match entry {
-            Some(entry) => entry.parse(subject, &self.value, is_raw)?,
+            Some(entry) => entry.parse(target, &self.value, is_raw)?,
             None => dictionary::integer(&self.value)
                 .ok_or_else(|| Failure::Unsuitable(format!("`{}` is no whole number", self.value)))?,
         };
-        Ok(Request::Write { object, value, entry })
+        Ok(Task::Write { object, value, entry })
     }
 }

@@ -9,7 +9,7 @@ mod upkeep;
 
 use clap::{Args, Subcommand};
 
-use takt::commission::{Failure, Request, Subject};
+use takt::commission::{Failure, TargetDrive, Task};
 
 use super::exit::Exit;
 use super::ownership::if_owned;
@@ -71,26 +71,26 @@ impl Action {
         }
     }
 
-    fn request(&self, subject: &Subject, is_raw: bool) -> Result<Request, Failure> {
+    fn task(&self, target: &TargetDrive, is_raw: bool) -> Result<Task, Failure> {
         match self {
-            Self::Inspect(action) => action.request(subject, is_raw),
-            Self::Motion(action) => action.request(subject, is_raw),
-            Self::Upkeep(action) => action.request(is_raw),
+            Self::Inspect(action) => action.task(target, is_raw),
+            Self::Motion(action) => action.task(target, is_raw),
+            Self::Upkeep(action) => action.task(is_raw),
         }
     }
 }
 
 /// Runs it.
 pub fn run(arguments: &Arguments) -> Exit {
-    let (subject, bus) = match arguments.target.resolve() {
+    let (target, bus) = match arguments.target.resolve() {
         Ok(resolved) => resolved,
         Err(error) => return error.print(arguments.options.json),
     };
-    let mut output = output::Output::new(&subject, arguments.action.name(), arguments.options);
-    match arguments.action.request(&subject, arguments.options.raw) {
-        Ok(request) => {
+    let mut output = output::Output::new(&target, arguments.action.name(), arguments.options);
+    match arguments.action.task(&target, arguments.options.raw) {
+        Ok(task) => {
             let if_owned = if_owned(arguments.take_over);
-            session::run(subject, request, bus, if_owned, arguments.options, output)
+            session::run(target, task, bus, if_owned, arguments.options, output)
         }
         Err(failure) => output.refuse(&failure),
     }

@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use clap::{Args, Subcommand, ValueEnum};
 
-use takt::commission::amount::{self, AmountError};
-use takt::commission::{Amount, Course, Failure, Pace, Request, Subject};
+use takt::commission::command_value::{self, CommandValueError};
+use takt::commission::{CommandValue, Failure, MotionProfile, MoveKind, TargetDrive, Task};
 use takt::config::Quantity;
 
 use super::super::configuration;
@@ -55,7 +55,7 @@ enum MoveKindArguments {
         #[arg(long)]
         immediate: bool,
         #[command(flatten)]
-        pace: MotionProfileArguments,
+        profile: MotionProfileArguments,
     },
     /// By a distance
     Relative {
@@ -63,7 +63,7 @@ enum MoveKindArguments {
         #[arg(allow_hyphen_values = true)]
         distance: String,
         #[command(flatten)]
-        pace: MotionProfileArguments,
+        profile: MotionProfileArguments,
     },
     /// To a position and back
     Reciprocate {
@@ -77,7 +77,7 @@ enum MoveKindArguments {
         #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = configuration::seconds)]
         dwell: Option<Duration>,
         #[command(flatten)]
-        pace: MotionProfileArguments,
+        profile: MotionProfileArguments,
     },
     /// Without end in one direction, until Ctrl-C or a limit
     Continuous {
@@ -87,7 +87,7 @@ enum MoveKindArguments {
         #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = configuration::seconds)]
         duration: Option<Duration>,
         #[command(flatten)]
-        pace: MotionProfileArguments,
+        profile: MotionProfileArguments,
     },
 }
 
@@ -174,31 +174,31 @@ impl Action {
         }
     }
 
-    /// The request to the drive.
-    pub fn request(&self, subject: &Subject, is_raw: bool) -> Result<Request, Failure> {
+    /// The task to the drive.
+    pub fn task(&self, target: &TargetDrive, is_raw: bool) -> Result<Task, Failure> {
         let read = |text: &str, quantity| read(text, quantity, is_raw);
         Ok(match self {
             Self::Enable(enable) => {
-                Request::Enable { hold_ns: nanoseconds(enable.duration), keeps_enabled: enable.keep_enabled }
+                Task::Enable { hold_ns: nanoseconds(enable.duration), keeps_enabled: enable.keep_enabled }
             }
-            Self::Disable => Request::Disable,
-            Self::Move(arguments) => arguments.kind.request(subject, is_raw)?,
-            Self::Velocity(arguments) => Request::Velocity {
-                velocity: read(&arguments.velocity, subject.velocity_quantity())?,
-                pace: arguments.ramps.pace(subject, None, is_raw)?,
+            Self::Disable => Task::Disable,
+            Self::Move(arguments) => arguments.kind.task(target, is_raw)?,
+            Self::Velocity(arguments) => Task::Velocity {
+                velocity: read(&arguments.velocity, target.velocity_quantity())?,
+                profile: arguments.ramps.profile(target, None, is_raw)?,
                 duration_ns: nanoseconds(arguments.duration),
                 keeps_enabled: arguments.keep_enabled,
             },
-            Self::Torque(arguments) => Request::Torque {
-                torque: read(&arguments.torque, subject.effort_quantity())?,
+            Self::Torque(arguments) => Task::Torque {
+                torque: read(&arguments.torque, target.effort_quantity())?,
                 velocity_limit: optional(
                     arguments.max_velocity.as_ref(),
-                    subject.velocity_quantity(),
+                    target.velocity_quantity(),
                     is_raw,
                 )?,
                 duration_ns: nanoseconds(arguments.duration),
             },
-            Self::Home(arguments) => Request::Home {
+            Self::Home(arguments) => Task::Home {
                 method: arguments.method,
                 within_ns: arguments.within.as_nanos() as u64,
                 is_forced: arguments.force,
@@ -208,33 +208,40 @@ impl Action {
 }
 
 impl MoveKindArguments {
-    fn request(&self, subject: &Subject, is_raw: bool) -> Result<Request, Failure> {
-        let position = subject.position_quantity();
-        let (course, pace) = match self {
-            Self::Absolute { position: to, immediate, pace } => {
-                (Course::Absolute { to: read(to, position, is_raw)?, is_immediate: *immediate }, pace)
+    fn task(&self, target: &TargetDrive, is_raw: bool) -> Result<Task, Failure> {
+        let position = target.position_quantity();
+        let (kind, profile) = match self {
+            Self::Absolute { position: to, immediate, profile } => {
+                (MoveKind::Absolute { to: read(to, position, is_raw)?, is_immediate: *immediate }, profile)
             }
-            Self::Relative { distance, pace } => (Course::Relative(read(distance, position, is_raw)?), pace),
-            Self::Reciprocate { position: to, times, dwell, pace } => {
+            Self::Relative { distance, profile } => {
+                (MoveKind::Relative(read(distance, position, is_raw)?), profile)
+            }
+            Self::Reciprocate { position: to, times, dwell, profile } => {
                 let dwell_ns = nanoseconds(*dwell).unwrap_or(0);
-                (Course::Reciprocate { to: read(to, position, is_raw)?, times: *times, dwell_ns }, pace)
+                (MoveKind::Reciprocate { to: read(to, position, is_raw)?, times: *times, dwell_ns }, profile)
             }
-            Self::Continuous { direction, duration, pace } => {
+            Self::Continuous { direction, duration, profile } => {
                 let is_forward = matches!(direction, Direction::Forward);
-                (Course::Continuous { is_forward, duration_ns: nanoseconds(*duration) }, pace)
+                (MoveKind::Continuous { is_forward, duration_ns: nanoseconds(*duration) }, profile)
             }
         };
-        let keeps_enabled = pace.keep_enabled;
-        let pace = pace.ramps.pace(subject, pace.velocity.as_ref(), is_raw)?;
-        Ok(Request::Move { course, pace, keeps_enabled })
+        let keeps_enabled = profile.keep_enabled;
+        let profile = profile.ramps.profile(target, profile.velocity.as_ref(), is_raw)?;
+        Ok(Task::Move { kind, profile, keeps_enabled })
     }
 }
 
 impl RampArguments {
-    fn pace(&self, subject: &Subject, velocity: Option<&String>, is_raw: bool) -> Result<Pace, Failure> {
-        let acceleration = subject.acceleration_quantity();
-        Ok(Pace {
-            velocity: optional(velocity, subject.velocity_quantity(), is_raw)?,
+    fn profile(
+        &self,
+        target: &TargetDrive,
+        velocity: Option<&String>,
+        is_raw: bool,
+    ) -> Result<MotionProfile, Failure> {
+        let acceleration = target.acceleration_quantity();
+        Ok(MotionProfile {
+            velocity: optional(velocity, target.velocity_quantity(), is_raw)?,
             acceleration: optional(self.acceleration.as_ref(), acceleration, is_raw)?,
             deceleration: optional(self.deceleration.as_ref(), acceleration, is_raw)?,
         })
@@ -245,21 +252,26 @@ fn nanoseconds(duration: Option<Duration>) -> Option<u64> {
     duration.map(|duration| duration.as_nanos() as u64)
 }
 
-fn read(text: &str, quantity: Quantity, is_raw: bool) -> Result<Amount, Failure> {
-    amount::parse(text, quantity, is_raw).map_err(|error: AmountError| Failure::Unsuitable(error.to_string()))
+fn read(text: &str, quantity: Quantity, is_raw: bool) -> Result<CommandValue, Failure> {
+    command_value::parse(text, quantity, is_raw)
+        .map_err(|error: CommandValueError| Failure::Unsuitable(error.to_string()))
 }
 
 /// How fast, or how soon: no direction.
-fn magnitude(text: &str, quantity: Quantity, is_raw: bool) -> Result<Amount, Failure> {
-    let amount = read(text, quantity, is_raw)?;
-    match amount {
-        Amount::Joint(value) if value < 0.0 => {}
-        Amount::Drive(value) if value < 0 => {}
-        _ => return Ok(amount),
+fn magnitude(text: &str, quantity: Quantity, is_raw: bool) -> Result<CommandValue, Failure> {
+    let command_value = read(text, quantity, is_raw)?;
+    match command_value {
+        CommandValue::Joint(value) if value < 0.0 => {}
+        CommandValue::Drive(value) if value < 0 => {}
+        _ => return Ok(command_value),
     }
     Err(Failure::Unsuitable(format!("`{text}` is below zero: a limit and a profile have no direction")))
 }
 
-fn optional(text: Option<&String>, quantity: Quantity, is_raw: bool) -> Result<Option<Amount>, Failure> {
+fn optional(
+    text: Option<&String>,
+    quantity: Quantity,
+    is_raw: bool,
+) -> Result<Option<CommandValue>, Failure> {
     text.map(|text| magnitude(text, quantity, is_raw)).transpose()
 }

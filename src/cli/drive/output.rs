@@ -6,8 +6,8 @@ use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 use serde_json::json;
 
-use takt::commission::bus_session::Seen;
-use takt::commission::{Event, Failed, Failure, Reading, Report, Subject, meaning};
+use takt::commission::bus_session::SessionEvent;
+use takt::commission::{AxisReading, Failure, ProcedureError, ProcedureEvent, Report, TargetDrive, meaning};
 use takt_rt::{Frame, Nanoseconds};
 
 use super::super::exit::Exit;
@@ -16,7 +16,7 @@ use super::Options;
 
 /// Shows a procedure and its result.
 pub struct Output {
-    subject: Subject,
+    target: TargetDrive,
     action: &'static str,
     options: Options,
     line: ProgressBar,
@@ -44,34 +44,34 @@ struct Printed<'a> {
 
 impl Output {
     /// For one action on one drive.
-    pub fn new(subject: &Subject, action: &'static str, options: Options) -> Self {
+    pub fn new(target: &TargetDrive, action: &'static str, options: Options) -> Self {
         let line = if stderr().is_terminal() && !options.verbose {
             let line = ProgressBar::new_spinner();
             if let Ok(style) = ProgressStyle::with_template("{prefix}  {wide_msg}") {
                 line.set_style(style);
             }
-            line.set_prefix(subject.name.clone());
+            line.set_prefix(target.name.clone());
             line
         } else {
             ProgressBar::hidden()
         };
-        Self { subject: subject.clone(), action, options, line, step: "", notes: vec![], unshown: None }
+        Self { target: target.clone(), action, options, line, step: "", notes: vec![], unshown: None }
     }
 
     /// Shows what has just happened. Returns whether readings can still be printed.
-    pub fn see(&mut self, at_ns: Nanoseconds, seen: Seen) -> bool {
+    pub fn see(&mut self, at_ns: Nanoseconds, seen: SessionEvent) -> bool {
         match seen {
-            Seen::Event(Event::Step(name)) => {
+            SessionEvent::Procedure(ProcedureEvent::Step(name)) => {
                 self.step = name;
                 self.line.set_message(name);
                 if self.options.verbose {
                     say!("{} ── {name}", seconds(at_ns));
                 }
             }
-            Seen::Event(Event::Note(text)) => self.hint(&text),
-            Seen::Event(Event::Reading(reading)) => self.read(at_ns, &reading),
-            Seen::Sent(frame) => self.frame(at_ns, '>', &frame),
-            Seen::Received(frame) => self.frame(at_ns, '<', &frame),
+            SessionEvent::Procedure(ProcedureEvent::Note(text)) => self.hint(&text),
+            SessionEvent::Procedure(ProcedureEvent::Reading(reading)) => self.read(at_ns, &reading),
+            SessionEvent::Sent(frame) => self.frame(at_ns, '>', &frame),
+            SessionEvent::Received(frame) => self.frame(at_ns, '<', &frame),
         }
         self.unshown.is_none()
     }
@@ -86,12 +86,12 @@ impl Output {
 
     fn frame(&self, at_ns: Nanoseconds, direction: char, frame: &Frame) {
         if self.options.verbose {
-            let (frame, words) = (format!("{frame:?}"), meaning::of(&self.subject, frame));
+            let (frame, words) = (format!("{frame:?}"), meaning::of(&self.target, frame));
             say!("{} {direction} {frame:<21}  {words}", seconds(at_ns));
         }
     }
 
-    fn read(&mut self, at_ns: Nanoseconds, reading: &Reading) {
+    fn read(&mut self, at_ns: Nanoseconds, reading: &AxisReading) {
         let is_watched = self.action == "watch";
         if is_watched && self.options.json {
             self.print(&format!("{}\n", self.reading_json(at_ns, reading)));
@@ -110,7 +110,7 @@ impl Output {
         });
     }
 
-    fn reading_json(&self, at_ns: Nanoseconds, reading: &Reading) -> serde_json::Value {
+    fn reading_json(&self, at_ns: Nanoseconds, reading: &AxisReading) -> serde_json::Value {
         json!({
             "time_s": at_ns as f64 / 1e9, "position": reading.position,
             "position_counts": reading.position_counts, "velocity": reading.velocity,
@@ -119,12 +119,12 @@ impl Output {
         })
     }
 
-    fn reading_words(&self, reading: &Reading) -> String {
-        let position = self.subject.position_quantity().show(reading.position);
-        let velocity = self.subject.velocity_quantity().show(reading.velocity);
+    fn reading_words(&self, reading: &AxisReading) -> String {
+        let position = self.target.position_quantity().show(reading.position);
+        let velocity = self.target.velocity_quantity().show(reading.velocity);
         let mut words = format!("{position}  {velocity}");
         if let Some(torque) = reading.torque {
-            words = format!("{words}  {}", self.subject.effort_quantity().show(torque));
+            words = format!("{words}  {}", self.target.effort_quantity().show(torque));
         }
         if let Some(current) = reading.current_a {
             words = format!("{words}  {current:.3} A");
@@ -134,15 +134,15 @@ impl Output {
 
     /// Reports that the procedure was not begun.
     pub fn refuse(&mut self, failure: &Failure) -> Exit {
-        self.finish(&Err(Failed { step: "command line", failure: failure.clone() }))
+        self.finish(&Err(ProcedureError { step: "command line", failure: failure.clone() }))
     }
 
     /// Shows the result.
-    pub fn finish(&mut self, outcome: &Result<Report, Failed>) -> Exit {
+    pub fn finish(&mut self, outcome: &Result<Report, ProcedureError>) -> Exit {
         self.line.finish_and_clear();
         let (ended, exit) = match outcome {
             Ok(_) => ("done", Exit::Done),
-            Err(Failed { failure: Failure::Interrupted, .. }) => {
+            Err(ProcedureError { failure: Failure::Interrupted, .. }) => {
                 ("interrupted", self.unshown.unwrap_or(Exit::Interrupted))
             }
             Err(failed) if failed.failure.is_refusal() => ("refused", Exit::Usage),
@@ -160,16 +160,16 @@ impl Output {
         }
     }
 
-    fn finish_json(&self, outcome: &Result<Report, Failed>, ended: &'static str, exit: Exit) -> Exit {
+    fn finish_json(&self, outcome: &Result<Report, ProcedureError>, ended: &'static str, exit: Exit) -> Exit {
         let failed = outcome.as_ref().err();
         // A watch has printed its readings, one object each; only what went wrong is left to say.
         if self.action == "watch" && failed.is_none_or(|failed| failed.failure == Failure::Interrupted) {
             return exit;
         }
         let printed = Printed {
-            axis: &self.subject.name,
-            node: self.subject.node,
-            family: self.subject.family.word(),
+            axis: &self.target.name,
+            node: self.target.node,
+            family: self.target.family.word(),
             action: self.action,
             ended,
             step: failed.map(|failed| failed.step),
@@ -181,8 +181,8 @@ impl Output {
         print::json(&printed, exit)
     }
 
-    fn say_failed(&self, failed: &Failed) {
-        let name = &self.subject.name;
+    fn say_failed(&self, failed: &ProcedureError) {
+        let name = &self.target.name;
         match &failed.failure {
             Failure::Interrupted if self.action == "watch" => {}
             Failure::Interrupted => say!("takt: {name}: interrupted in `{}`", failed.step),
@@ -203,7 +203,7 @@ fn seconds(at_ns: Nanoseconds) -> String {
 }
 
 fn render(report: &Report) -> String {
-    let findings = report.findings();
+    let findings = report.items();
     let width = findings.iter().map(|finding| finding.label.chars().count()).max().unwrap_or(0);
     let lines = findings.iter().map(|finding| format!("  {:<width$}  {}\n", finding.label, finding.text));
     lines.collect()

@@ -6,7 +6,7 @@ use std::sync::atomic::Ordering;
 use takt::bus::ownership::{BusClaim, IfOwned, MasterTraffic, Ownership};
 use takt::bus::port::{OpenError, Port, open_configured};
 use takt::bus::{InterfaceSettings, SocketCanOptions, open_socketcan, prepare_interface};
-use takt::commission::{Failure, Request, Subject, bus_session, procedure};
+use takt::commission::{Failure, TargetDrive, Task, bus_session, procedure};
 use takt::controller::VirtualClock;
 use takt::sim::SimulatedBus;
 use takt_rt::linux::MonotonicClock;
@@ -23,17 +23,17 @@ use super::target::Bus;
 /// The time in milliseconds after which the kernel restarts a controller that is bus-off.
 const RESTART_MS: u32 = 100;
 
-/// Runs a request on a drive.
+/// Runs a task on a drive.
 pub fn run(
-    subject: Subject,
-    request: Request,
+    target: TargetDrive,
+    task: Task,
     bus: Bus,
     if_owned: IfOwned,
     options: Options,
     mut output: Output,
 ) -> Exit {
     // Reading needs it, too: a drive has room for the SDO requests of one master, and a silent one is sent an NMT command.
-    let claim = claim(&bus, subject.node);
+    let claim = claim(&bus, target.node);
     let mut ownership = match Ownership::claim(claim.into_iter().collect(), if_owned) {
         Ok(ownership) => ownership,
         Err(error) => return ownership::usage_error(&error).print(options.json),
@@ -50,7 +50,7 @@ pub fn run(
         }
     };
     let is_simulated = matches!(port, Port::Simulated(_));
-    let procedure = procedure(subject, request);
+    let procedure = procedure(target, task);
     let taken_over_by = Cell::new(None);
     let is_interrupted = || {
         let asking = ownership.poll_release_request();

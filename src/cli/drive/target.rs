@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use takt::commission::{Family, Subject};
+use takt::commission::{Family, TargetDrive};
 use takt::config::{Config, Interface, Quantity};
 
 use super::super::configuration;
@@ -64,15 +64,15 @@ fn family(text: &str) -> Result<Family, String> {
 
 impl Target {
     /// The drive and its bus.
-    pub fn resolve(&self) -> Result<(Subject, Bus), UsageError> {
-        let (subject, bus) = match &self.config {
+    pub fn resolve(&self) -> Result<(TargetDrive, Bus), UsageError> {
+        let (target, bus) = match &self.config {
             Some(config) => self.of_configuration(config)?,
             None => self.of_interface()?,
         };
-        Ok((subject, bus))
+        Ok((target, bus))
     }
 
-    fn of_interface(&self) -> Result<(Subject, Bus), UsageError> {
+    fn of_interface(&self) -> Result<(TargetDrive, Bus), UsageError> {
         let (Some(bus), Some(node), Some(family)) = (&self.bus, self.node, self.family) else {
             return Err(
                 "name the drive: CONFIG AXIS, or --bus INTERFACE --node N --family FAMILY (all three)".into(),
@@ -81,9 +81,9 @@ impl Target {
         let interface = bus.parse::<Interface>();
         match interface {
             Ok(Interface::SocketCan(name)) => {
-                let subject = Subject::unconfigured(node, family)
+                let target = TargetDrive::unconfigured(node, family)
                     .map_err(|error| format!("the units cannot be converted ({error:?})"))?;
-                Ok((subject, Bus::Interface { name, bit_rate: self.bit_rate }))
+                Ok((target, Bus::Interface { name, bit_rate: self.bit_rate }))
             }
             Ok(Interface::Simulated) => {
                 Err("a simulated drive needs a configuration that says what it is: takt drive CONFIG AXIS …"
@@ -93,7 +93,7 @@ impl Target {
         }
     }
 
-    fn of_configuration(&self, path: &Path) -> Result<(Subject, Bus), UsageError> {
+    fn of_configuration(&self, path: &Path) -> Result<(TargetDrive, Bus), UsageError> {
         let mut config = configuration::load(path, &[])?;
         let known: Vec<&str> = config.axes.iter().map(|axis| axis.name.as_str()).collect();
         let index = match (&self.axis, known.as_slice()) {
@@ -113,14 +113,14 @@ impl Target {
             let (name, interface) = bus.split_once('=').unwrap_or((&own, bus));
             config.override_interface(name, interface).map_err(|error| format!("--bus {bus}: {error}"))?;
         }
-        let mut subject = Subject::of(&axis)
+        let mut target = TargetDrive::of(&axis)
             .map_err(|error| format!("axis {}: its units cannot be converted ({error:?})", axis.name))?;
-        if let Some(family) = self.family.filter(|family| *family != subject.family) {
-            let (name, configured, other) = (&axis.name, subject.family.word(), family.word());
+        if let Some(family) = self.family.filter(|family| *family != target.family) {
+            let (name, configured, other) = (&axis.name, target.family.word(), family.word());
             return Err(format!("the axis {name} is configured as {configured}, not {other}").into());
         }
         // A drive that still has the factory's node ID is addressed by that ID.
-        subject.node = self.node.unwrap_or(subject.node);
-        Ok((subject, Bus::Configured { config: Box::new(config), bus: axis.bus }))
+        target.node = self.node.unwrap_or(target.node);
+        Ok((target, Bus::Configured { config: Box::new(config), bus: axis.bus }))
     }
 }

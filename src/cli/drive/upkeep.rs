@@ -2,7 +2,7 @@
 
 use clap::{Args, Subcommand, ValueEnum};
 
-use takt::commission::{Failure, Request};
+use takt::commission::{Failure, Task};
 use takt::config::Quantity;
 
 /// Setting a drive up.
@@ -111,24 +111,24 @@ impl Action {
         }
     }
 
-    /// The request to the drive.
-    pub fn request(&self, is_raw: bool) -> Result<Request, Failure> {
+    /// The task to the drive.
+    pub fn task(&self, is_raw: bool) -> Result<Task, Failure> {
         Ok(match self {
-            Self::Zero(agreement) => Request::Zero { is_agreed: agreement.yes },
-            Self::Save => Request::Save,
-            Self::SetId { id } => Request::SetId { node: *id },
-            Self::SetBitRate { rate } => Request::SetBitRate { bit_rate: bit_rate(rate, is_raw)? },
-            Self::ClearFault(agreement) => Request::ClearFault { is_agreed: agreement.yes },
-            Self::Gains(gains) => Request::Gains {
+            Self::Zero(agreement) => Task::Zero { is_confirmed: agreement.yes },
+            Self::Save => Task::Save,
+            Self::SetId { id } => Task::SetId { node: *id },
+            Self::SetBitRate { rate } => Task::SetBitRate { bit_rate: bit_rate(rate, is_raw)? },
+            Self::ClearFault(agreement) => Task::ClearFault { is_confirmed: agreement.yes },
+            Self::Gains(gains) => Task::Gains {
                 position_proportional: gains.position_proportional.map(i64::from),
                 velocity_proportional: gains.velocity_proportional.map(i64::from),
                 velocity_integration: gains.velocity_integration.map(i64::from),
             },
-            Self::Gear { ratio } => Request::Gear { ratio: *ratio },
+            Self::Gear { ratio } => Task::Gear { ratio: *ratio },
             Self::AutoHome { switch, agreement } => {
-                Request::AutoHome { is_on: matches!(switch, Switch::On), is_agreed: agreement.yes }
+                Task::AutoHome { is_on: matches!(switch, Switch::On), is_confirmed: agreement.yes }
             }
-            Self::Interpolation => Request::Interpolation,
+            Self::Interpolation => Task::Interpolation,
         })
     }
 }

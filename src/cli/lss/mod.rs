@@ -10,7 +10,7 @@ use clap::{Args, Subcommand};
 use takt::bus::ownership::{BusClaim, IfOwned, MasterTraffic, Ownership};
 use takt::bus::{InterfaceSettings, SocketCanOptions, open_socketcan};
 use takt::canopen::lss::{BitTiming, Inquiry, LssAddress, LssOutcome, LssTask};
-use takt::commission::layer_settings::{Choice, LayerSettingFailure, LayerSettings};
+use takt::commission::layer_settings::{DeviceSelection, LayerSettingFailure, LayerSettings};
 use takt::config::{Interface, Quantity};
 use takt::controller::VirtualClock;
 use takt::sim::lss::{LssBus, LssDevice};
@@ -251,9 +251,9 @@ fn act<P: BusPort, C: Clock>(
     is_boot_up_awaited: &mut bool,
 ) -> Result<(), LayerSettingFailure> {
     let choice = match (arguments.device, arguments.only) {
-        (Some(address), _) => Choice::Identity(address),
-        (None, true) => Choice::Only,
-        (None, false) => Choice::Unconfigured,
+        (Some(address), _) => DeviceSelection::Identity(address),
+        (None, true) => DeviceSelection::Only,
+        (None, false) => DeviceSelection::Unconfigured,
     };
     let mut is_stored = false;
     match arguments.action {
@@ -318,7 +318,7 @@ fn node_of<P: BusPort, C: Clock>(
     settings: &mut LayerSettings<'_, P, C>,
 ) -> Result<Option<u8>, LayerSettingFailure> {
     Ok(match settings.perform(LssTask::Inquire(Inquiry::Node))? {
-        LssOutcome::Told(number) => u8::try_from(number).ok().filter(|node| *node != NO_NODE),
+        LssOutcome::Value(number) => u8::try_from(number).ok().filter(|node| *node != NO_NODE),
         _ => None,
     })
 }

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use takt::canopen::lss::{LssAddress, LssError, LssRequest, LssResponse};
-use takt::commission::bus_session::Seen;
+use takt::commission::bus_session::SessionEvent;
 use takt::commission::layer_settings::LayerSettingFailure;
 use takt_rt::Nanoseconds;
 
@@ -74,13 +74,15 @@ struct Printed<'a> {
 }
 
 /// Shows a frame with its meaning in LSS.
-pub fn show(at_ns: Nanoseconds, seen: &Seen) {
+pub fn show(at_ns: Nanoseconds, seen: &SessionEvent) {
     let (direction, frame, words) = match seen {
-        Seen::Sent(frame) => ('>', frame, LssRequest::decode(frame).map(|request| format!("{request:?}"))),
-        Seen::Received(frame) => {
+        SessionEvent::Sent(frame) => {
+            ('>', frame, LssRequest::decode(frame).map(|request| format!("{request:?}")))
+        }
+        SessionEvent::Received(frame) => {
             ('<', frame, LssResponse::decode(frame).map(|response| format!("{response:?}")))
         }
-        Seen::Event(_) => return,
+        SessionEvent::Procedure(_) => return,
     };
     let at_s = at_ns as f64 / 1e9;
     say!("{at_s:11.6} {direction} {:<22} {}", format!("{frame:?}"), words.unwrap_or_default());
@@ -88,7 +90,7 @@ pub fn show(at_ns: Nanoseconds, seen: &Seen) {
 
 fn advice(failure: LayerSettingFailure) -> Option<&'static str> {
     match failure {
-        LayerSettingFailure::Nobody => Some(
+        LayerSettingFailure::NoDevice => Some(
             "check its supply, the wiring and the bit rate; a device that has a node ID is named by --device or \
              --only; a device without LSS cannot be found in this way",
         ),

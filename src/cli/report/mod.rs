@@ -57,7 +57,7 @@ fn tell(arguments: &Arguments) -> Result<Exit, UsageError> {
     Ok(if arguments.json {
         print::json(&report, exit)
     } else {
-        print::text(&report.picture(print::emphasis()), exit)
+        print::text(&report.render(print::emphasis()), exit)
     })
 }
 

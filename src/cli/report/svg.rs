@@ -1,7 +1,7 @@
 //! The cycles before and after a stop as SVG.
 
-use takt::telemetry::{Recorded, RecordedError};
-use takt_rt::{AxisRecord, CycleRecord, CycleTiming, NANOSECONDS_PER_SECOND};
+use takt::telemetry::{Recorded, RecordedCycle, RecordedError};
+use takt_rt::{AxisRecord, CycleTiming, NANOSECONDS_PER_SECOND};
 
 use crate::cli::chart::{COLOURS, Chart, Curve, Panel};
 
@@ -19,10 +19,10 @@ pub fn render(recorded: &Recorded, axis: Option<usize>) -> Result<String, Record
     let zero = cause.as_ref().map_or(*slots.end(), |cause| cause.slot);
     let period_s = cycle_ns as f64 / NANOSECONDS_PER_SECOND as f64;
     let time_s = |slot: u64| (slot as f64 - zero as f64) * period_s;
-    let points = |value: &dyn Fn(&CycleRecord) -> Option<f64>| -> Vec<(f64, f64)> {
+    let points = |value: &dyn Fn(&RecordedCycle) -> Option<f64>| -> Vec<(f64, f64)> {
         cycles.iter().filter_map(|record| Some((time_s(record.timing.slot), value(record)?))).collect()
     };
-    let of_axis = |value: fn(&AxisRecord) -> f64| points(&|record| record.axes().get(axis?).map(value));
+    let of_axis = |value: fn(&AxisRecord) -> f64| points(&|record| record.axes.get(axis?).map(value));
     let of_timing =
         |value: fn(&CycleTiming) -> u64| points(&|record| Some(value(&record.timing) as f64 * 1e-3));
     let panel = |name: String, curves: Vec<(&str, Vec<(f64, f64)>)>| {

@@ -1,4 +1,4 @@
-//! Torque on and torque off, and everything that must be right before an eRob moves.
+//! Enabling and disabling an eRob, with the checks before motion.
 
 use takt_rt::{DriveState, Nanoseconds, OperationMode, controlword};
 
@@ -7,41 +7,41 @@ use super::state::modes_words;
 use crate::canopen::nmt::NmtCommand;
 use crate::canopen::objects::*;
 use crate::commission::contact;
-use crate::commission::conversation::Conversation;
 use crate::commission::failure::Failure;
-use crate::commission::pace::Profile;
+use crate::commission::motion_profile::DriveProfile;
 use crate::commission::report::Report;
-use crate::commission::subject::{Amount, Subject};
+use crate::commission::sdo_session::SdoSession;
+use crate::commission::target::{CommandValue, TargetDrive};
 use crate::drive::mode_words;
 
-/// A state of the drive follows its controlword within this; the brake takes part of it.
+/// Longest time for a CiA 402 state change after a controlword; releasing the brake takes part of it.
 const STATE_NS: Nanoseconds = 2_000_000_000;
-/// The node under which the drive is watched over.
+/// Node ID of this program's heartbeat, which the drive consumes.
 const MASTER: u8 = 127;
-/// Between two heartbeats, and after how long without any the drive stops by itself.
+/// Heartbeat period and the drive's heartbeat timeout (object 1016:01).
 const HEARTBEAT_NS: Nanoseconds = 100_000_000;
 const HEARTBEAT_TIMEOUT_MS: i64 = 500;
-/// A drive that answers `start` needs no time for it; this leaves some.
+/// Wait after NMT start; the drive changes state at once.
 const NMT_PAUSE_NS: Nanoseconds = 20_000_000;
 
-/// The state of the drive.
-pub async fn state(c: &Conversation) -> Result<DriveState, Failure> {
+/// Reads the CiA 402 state.
+pub async fn state(c: &SdoSession) -> Result<DriveState, Failure> {
     Ok(DriveState::decode(c.read(&STATUSWORD).await? as u16))
 }
 
-/// The right drive, without a fault.
-pub async fn greet(c: &Conversation, s: &Subject) -> Result<(), Failure> {
-    contact::reach_family(c, s).await?;
+/// Checks the vendor ID and that the drive has no fault.
+pub async fn check_ready(c: &SdoSession, s: &TargetDrive) -> Result<(), Failure> {
+    contact::connect_family(c, s).await?;
     c.step("fault check");
     if state(c).await?.is_faulted() { Err(reading::fault(c).await?) } else { Ok(()) }
 }
 
-/// The drive without torque, in this mode, and stopping by itself when takt falls silent.
+/// Disables the drive, sets the mode and the profile, and arms the drive's heartbeat watchdog.
 pub async fn prepare(
-    c: &Conversation,
-    s: &Subject,
+    c: &SdoSession,
+    s: &TargetDrive,
     mode: OperationMode,
-    profile: &Profile,
+    profile: &DriveProfile,
 ) -> Result<(), Failure> {
     come_to_rest(c, s).await?;
     c.step("supported modes");
@@ -55,7 +55,7 @@ pub async fn prepare(
     c.step("NMT start");
     c.command(NmtCommand::Start);
     c.pause(NMT_PAUSE_NS).await?;
-    watch_over(c, s).await?;
+    arm_watchdog(c, s).await?;
     c.step("mode of operation");
     c.write(&MODES_OF_OPERATION, mode as i64).await?;
     c.wait_for(&MODES_OF_OPERATION_DISPLAY, "the mode", STATE_NS, |value| value == mode as i64).await?;
@@ -73,20 +73,21 @@ pub async fn prepare(
     Ok(())
 }
 
-/// The drive enters NMT stopped, and with that stops its motion, when the heartbeat of this program ceases.
-async fn watch_over(c: &Conversation, s: &Subject) -> Result<(), Failure> {
+/// Arms the heartbeat watchdog (1016:01, 1029:01): without this program's heartbeat the drive enters NMT stopped, which
+/// stops its motion.
+async fn arm_watchdog(c: &SdoSession, s: &TargetDrive) -> Result<(), Failure> {
     if s.node == MASTER {
-        c.note("node 127 cannot be watched over: should this program die, the drive goes on");
+        c.note("node 127 cannot use the heartbeat watchdog: if this program ends unexpectedly, the drive keeps moving");
         return Ok(());
     }
     c.step("heartbeat");
-    c.beat(MASTER, Some(HEARTBEAT_NS));
+    c.set_heartbeat(MASTER, Some(HEARTBEAT_NS));
     c.write(&COMMUNICATION_ERROR_BEHAVIOUR, error_behaviour::STOPPED.into()).await?;
     c.write(&CONSUMER_HEARTBEAT_TIME, i64::from(MASTER) << 16 | HEARTBEAT_TIMEOUT_MS).await
 }
 
-/// Torque on, with every target where the axis is.
-pub async fn enable(c: &Conversation, s: &Subject) -> Result<i64, Failure> {
+/// Enables the drive with every target at the actual value.
+pub async fn enable(c: &SdoSession, s: &TargetDrive) -> Result<i64, Failure> {
     c.step("target at the actual position");
     let position = c.read(&POSITION_ACTUAL_VALUE).await?;
     c.write(&TARGET_POSITION, position).await?;
@@ -113,8 +114,8 @@ pub async fn enable(c: &Conversation, s: &Subject) -> Result<i64, Failure> {
     if moved.abs() > permitted { Err(Failure::Jumped { counts: moved }) } else { Ok(position) }
 }
 
-/// From any motion to rest without torque. Does nothing to a drive that has no torque.
-pub async fn come_to_rest(c: &Conversation, s: &Subject) -> Result<(), Failure> {
+/// Stops any motion by quick stop, then disables. Does nothing to a drive without torque.
+pub async fn come_to_rest(c: &SdoSession, s: &TargetDrive) -> Result<(), Failure> {
     if !state(c).await?.has_torque() {
         return Ok(());
     }
@@ -129,38 +130,41 @@ pub async fn come_to_rest(c: &Conversation, s: &Subject) -> Result<(), Failure> 
     let velocity = c.read(&VELOCITY_ACTUAL_VALUE).await?;
     c.write(&CONTROLWORD, controlword::QUICK_STOP.into()).await?;
     let within_ns = s.stopping_ns(velocity, deceleration.max(1));
-    let crawl = crawl(s);
-    c.wait_for(&VELOCITY_ACTUAL_VALUE, "standstill", within_ns, |velocity| velocity.abs() <= crawl).await?;
+    let standstill_threshold = standstill_threshold(s);
+    c.wait_for(&VELOCITY_ACTUAL_VALUE, "standstill", within_ns, |velocity| {
+        velocity.abs() <= standstill_threshold
+    })
+    .await?;
     torque_off(c).await
 }
 
-/// Torque off at once. Also leaves bit 7 low, so that a later fault reset is a rising edge.
-pub async fn torque_off(c: &Conversation) -> Result<(), Failure> {
+/// Disables at once (controlword: disable voltage). Bit 7 stays low, so that a later fault reset is a rising edge.
+pub async fn torque_off(c: &SdoSession) -> Result<(), Failure> {
     c.step("disable");
     c.write(&CONTROLWORD, controlword::DISABLE_VOLTAGE.into()).await?;
     let has_none = |word: i64| !DriveState::decode(word as u16).has_torque();
     c.wait_for(&STATUSWORD, "a state without torque", STATE_NS, has_none).await.map(|_| ())
 }
 
-/// What a motion is ended with: rest, no torque, nobody watching.
-pub async fn leave(c: &Conversation, s: &Subject) -> Result<(), Failure> {
+/// Ends a motion: standstill, torque off, heartbeat watchdog off, NMT pre-operational.
+pub async fn shut_down(c: &SdoSession, s: &TargetDrive) -> Result<(), Failure> {
     come_to_rest(c, s).await?;
-    c.step("farewell");
+    c.step("shut down");
     c.write(&CONSUMER_HEARTBEAT_TIME, 0).await?;
-    c.beat(MASTER, None);
+    c.set_heartbeat(MASTER, None);
     c.command(NmtCommand::EnterPreOperational);
     Ok(())
 }
 
-/// Slower than this (drive units) the brake may engage: a hundredth of the highest velocity.
-fn crawl(s: &Subject) -> i64 {
-    let limit = s.limits.map(|limits| s.velocity_raw(Amount::Joint(limits.velocity)).abs() / 100);
+/// Standstill threshold in drive units, a hundredth of the velocity limit. Below it the brake may engage.
+fn standstill_threshold(s: &TargetDrive) -> i64 {
+    let limit = s.limits.map(|limits| s.velocity_raw(CommandValue::Joint(limits.velocity)).abs() / 100);
     limit.unwrap_or((s.counts_per_turn / 360.0) as i64)
 }
 
 /// `disable`
-pub async fn disable(c: &Conversation, s: &Subject) -> Result<Report, Failure> {
-    contact::reach_family(c, s).await?;
+pub async fn disable(c: &SdoSession, s: &TargetDrive) -> Result<Report, Failure> {
+    contact::connect_family(c, s).await?;
     c.step("state");
     let had_torque = state(c).await?.has_torque();
     come_to_rest(c, s).await?;

@@ -1,4 +1,4 @@
-//! Clearing a fault: the rising edge of controlword bit 7, and for the multi-turn battery what goes before it.
+//! Clears a fault by a rising edge of controlword bit 7; a multi-turn battery fault needs object 2242 first.
 
 use takt_rt::{DriveState, Nanoseconds, controlword};
 
@@ -7,20 +7,20 @@ use super::reading::{advice, error_code, in_words, summary};
 use super::upkeep::clear_turns;
 use crate::canopen::objects::*;
 use crate::commission::contact;
-use crate::commission::conversation::Conversation;
 use crate::commission::failure::Failure;
 use crate::commission::report::Report;
-use crate::commission::subject::Subject;
+use crate::commission::sdo_session::SdoSession;
+use crate::commission::target::TargetDrive;
 use crate::drive::erob_canopen::MULTI_TURN_BATTERY;
 
-/// The edge must stay for several cycles of the drive.
+/// Controlword bit 7 must stay set for several cycles of the drive.
 const EDGE_NS: Nanoseconds = 50_000_000;
-/// The fault reaction may still run; then the fault goes.
+/// Longest time from the fault reset until the fault state ends; the fault reaction may still be active.
 const CLEARING_NS: Nanoseconds = 1_000_000_000;
 
 /// `clear-fault`
-pub async fn clear(c: &Conversation, s: &Subject, is_agreed: bool) -> Result<Report, Failure> {
-    contact::reach_family(c, s).await?;
+pub async fn clear(c: &SdoSession, s: &TargetDrive, is_confirmed: bool) -> Result<Report, Failure> {
+    contact::connect_family(c, s).await?;
     c.step("fault");
     let mut report = Report::new();
     if !state(c).await?.is_faulted() {
@@ -31,7 +31,7 @@ pub async fn clear(c: &Conversation, s: &Subject, is_agreed: bool) -> Result<Rep
     let code = error_code(c).await?;
     report.add("fault", "fault", format!("0x{:04X}", code.0), in_words(code));
     if code == MULTI_TURN_BATTERY {
-        if !is_agreed {
+        if !is_confirmed {
             return Err(Failure::NeedsConsent {
                 consequence: "the battery of the multi-turn encoder is empty or was disconnected; clearing this fault \
                               (2242 = 1) clears the count of turns too, and the joint's zero must be set again",

@@ -1,4 +1,4 @@
-//! Homing of an eRob: firmware that declares it may take the present position as zero. The known firmware does not.
+//! Homing of an eRob. The known firmware has no homing mode; firmware that declares one can use methods 35 and 37.
 
 use takt_rt::{Nanoseconds, OperationMode, controlword, statusword};
 
@@ -8,19 +8,19 @@ use super::state::modes_words;
 use super::{enabling, reading};
 use crate::canopen::objects::*;
 use crate::commission::contact;
-use crate::commission::conversation::Conversation;
 use crate::commission::failure::Failure;
-use crate::commission::pace::Profile;
+use crate::commission::motion_profile::DriveProfile;
 use crate::commission::report::Report;
-use crate::commission::subject::Subject;
+use crate::commission::sdo_session::SdoSession;
+use crate::commission::target::TargetDrive;
 
-/// CiA 402: the present position, the axis does not move. 37 is its newer number.
+/// Homing methods on the current position, without motion. 37 replaces 35 in newer versions of CiA 402.
 const PRESENT_POSITION: [i8; 2] = [35, 37];
 
 /// `home`
 pub async fn home(
-    c: &Conversation,
-    s: &Subject,
+    c: &SdoSession,
+    s: &TargetDrive,
     method: Option<i8>,
     within_ns: Nanoseconds,
 ) -> Result<Report, Failure> {
@@ -31,7 +31,7 @@ pub async fn home(
             instead: "method 35 or 37 takes the present position as zero".to_owned(),
         });
     }
-    contact::reach_family(c, s).await?;
+    contact::connect_family(c, s).await?;
     c.step("supported modes");
     let supported = c.read(&SUPPORTED_DRIVE_MODES).await? as u32;
     let has_method = c.read_optional(&HOMING_METHOD).await?.is_some();
@@ -43,7 +43,7 @@ pub async fn home(
         });
     }
     let work = async {
-        enabling::prepare(c, s, OperationMode::Homing, &Profile::default()).await?;
+        enabling::prepare(c, s, OperationMode::Homing, &DriveProfile::default()).await?;
         c.step("homing method");
         c.write_and_check(&HOMING_METHOD, method.into()).await?;
         c.write_optional(&HOME_OFFSET, 0).await?;

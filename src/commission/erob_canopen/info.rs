@@ -1,4 +1,4 @@
-//! Who an eRob is and how it fares.
+//! Identity, ratings, condition and errors of an eRob.
 
 use takt_rt::DriveState;
 
@@ -8,17 +8,17 @@ use super::state::{modes_words, state_words, statusword_words};
 use crate::canopen::emcy::ErrorCode;
 use crate::canopen::objects::*;
 use crate::commission::contact;
-use crate::commission::conversation::Conversation;
 use crate::commission::failure::Failure;
 use crate::commission::report::Report;
-use crate::commission::subject::Subject;
+use crate::commission::sdo_session::SdoSession;
+use crate::commission::target::TargetDrive;
 use crate::drive::mode_words;
 use serde_json::json;
 use takt_rt::OperationMode;
 
 /// `info`
-pub async fn info(c: &Conversation, s: &Subject) -> Result<Report, Failure> {
-    contact::reach(c, s).await?;
+pub async fn info(c: &SdoSession, s: &TargetDrive) -> Result<Report, Failure> {
+    contact::connect(c, s).await?;
     let mut report = Report::new();
     identity(c, s, &mut report).await?;
     let rated = ratings(c, s, &mut report).await?;
@@ -27,7 +27,7 @@ pub async fn info(c: &Conversation, s: &Subject) -> Result<Report, Failure> {
     Ok(report)
 }
 
-async fn identity(c: &Conversation, s: &Subject, report: &mut Report) -> Result<(), Failure> {
+async fn identity(c: &SdoSession, s: &TargetDrive, report: &mut Report) -> Result<(), Failure> {
     c.step("identity");
     for (key, object) in [
         ("device_type", DEVICE_TYPE),
@@ -38,7 +38,10 @@ async fn identity(c: &Conversation, s: &Subject, report: &mut Report) -> Result<
         let value = c.read(&object).await?;
         report.add(key, object.name, value, object.show(value));
         if object == VENDOR_ID && value != i64::from(s.family.vendor_id()) {
-            c.note(format!("another vendor than {}'s: is this the drive that you mean?", s.family.word()));
+            c.note(format!(
+                "the vendor ID is not that of {}: check that this is the intended drive",
+                s.family.word()
+            ));
         }
     }
     for (key, label, address) in [
@@ -53,7 +56,7 @@ async fn identity(c: &Conversation, s: &Subject, report: &mut Report) -> Result<
     Ok(())
 }
 
-async fn ratings(c: &Conversation, s: &Subject, report: &mut Report) -> Result<Option<f64>, Failure> {
+async fn ratings(c: &SdoSession, s: &TargetDrive, report: &mut Report) -> Result<Option<f64>, Failure> {
     c.step("ratings");
     if let Some(current) = c.read_optional(&MOTOR_RATED_CURRENT).await? {
         let amperes = current as f64 / 1000.0;
@@ -69,8 +72,8 @@ async fn ratings(c: &Conversation, s: &Subject, report: &mut Report) -> Result<O
 }
 
 async fn condition(
-    c: &Conversation,
-    s: &Subject,
+    c: &SdoSession,
+    s: &TargetDrive,
     rated: Option<f64>,
     report: &mut Report,
 ) -> Result<(), Failure> {
@@ -100,7 +103,7 @@ async fn condition(
     Ok(())
 }
 
-async fn errors(c: &Conversation, report: &mut Report) -> Result<(), Failure> {
+async fn errors(c: &SdoSession, report: &mut Report) -> Result<(), Failure> {
     c.step("errors");
     let code = ErrorCode(c.read(&ERROR_CODE).await? as u16);
     report.add("error_code", "error", code.0, in_words(code));

@@ -1,4 +1,4 @@
-//! ZeroErr eRob with CANopen firmware (eRunner manual 1.7, chapter 5, and what real units add to it), by SDO alone.
+//! ZeroErr eRob with CANopen firmware, commissioned by SDO (eRunner manual 1.7, chapter 5, and field experience).
 
 mod enabling;
 mod fault;
@@ -12,58 +12,58 @@ mod upkeep;
 
 pub use objects::{OBJECTS, meaning, process_data_words};
 
-use super::conversation::Conversation;
 use super::failure::Failure;
 use super::report::Report;
-use super::request::{Course, Request};
-use super::subject::Subject;
+use super::sdo_session::SdoSession;
+use super::target::TargetDrive;
+use super::task::{MoveKind, Task};
 
-/// Does what is asked for. Reading and writing objects is the same for every family and not done here.
-pub(super) async fn carry_out(c: &Conversation, s: &Subject, request: Request) -> Result<Report, Failure> {
-    match request {
-        Request::Info => info::info(c, s).await,
-        Request::Watch { every_ns, duration_ns } => reading::watch(c, s, every_ns, duration_ns).await,
-        Request::Enable { hold_ns, keeps_enabled } => motion::enable(c, s, hold_ns, keeps_enabled).await,
-        Request::Disable => enabling::disable(c, s).await,
-        Request::Move { course: Course::Continuous { is_forward, duration_ns }, pace, keeps_enabled } => {
-            motion::continuous(c, s, is_forward, pace, duration_ns, keeps_enabled).await
+/// Carries out a task. AxisReading and writing objects is the same for every family and is done elsewhere.
+pub(super) async fn carry_out(c: &SdoSession, s: &TargetDrive, task: Task) -> Result<Report, Failure> {
+    match task {
+        Task::Info => info::info(c, s).await,
+        Task::Watch { every_ns, duration_ns } => reading::watch(c, s, every_ns, duration_ns).await,
+        Task::Enable { hold_ns, keeps_enabled } => motion::enable(c, s, hold_ns, keeps_enabled).await,
+        Task::Disable => enabling::disable(c, s).await,
+        Task::Move { kind: MoveKind::Continuous { is_forward, duration_ns }, profile, keeps_enabled } => {
+            motion::continuous(c, s, is_forward, profile, duration_ns, keeps_enabled).await
         }
-        Request::Move { course, pace, keeps_enabled } => {
-            motion::position::run(c, s, course, pace, keeps_enabled).await
+        Task::Move { kind, profile, keeps_enabled } => {
+            motion::position::run(c, s, kind, profile, keeps_enabled).await
         }
-        Request::Velocity { velocity, pace, duration_ns, keeps_enabled } => {
-            motion::velocity(c, s, velocity, pace, duration_ns, keeps_enabled).await
+        Task::Velocity { velocity, profile, duration_ns, keeps_enabled } => {
+            motion::velocity(c, s, velocity, profile, duration_ns, keeps_enabled).await
         }
-        Request::Torque { torque, velocity_limit, duration_ns } => {
+        Task::Torque { torque, velocity_limit, duration_ns } => {
             motion::torque::run(c, s, torque, velocity_limit, duration_ns).await
         }
-        Request::Home { method, within_ns, .. } => homing::home(c, s, method, within_ns).await,
-        Request::Zero { is_agreed } => upkeep::zero(c, s, is_agreed).await,
-        Request::Save => upkeep::save(c, s).await,
-        Request::ClearFault { is_agreed } => fault::clear(c, s, is_agreed).await,
-        request => Err(unsupported(&request)),
+        Task::Home { method, within_ns, .. } => homing::home(c, s, method, within_ns).await,
+        Task::Zero { is_confirmed } => upkeep::zero(c, s, is_confirmed).await,
+        Task::Save => upkeep::save(c, s).await,
+        Task::ClearFault { is_confirmed } => fault::clear(c, s, is_confirmed).await,
+        task => Err(unsupported(&task)),
     }
 }
 
-fn unsupported(request: &Request) -> Failure {
-    let (what, instead) = match request {
-        Request::SetId { .. } => (
-            "the node number of an eRob is in no object of its CANopen firmware",
+fn unsupported(task: &Task) -> Failure {
+    let (what, instead) = match task {
+        Task::SetId { .. } => (
+            "the CANopen firmware of an eRob has no object for its node ID",
             "set it with the vendor's custom CAN protocol (object 0043: `640+n: 00 43 00 00 00 id`, then save with \
              `640+n: 00 E8` and power-cycle) or with the vendor's tool",
         ),
-        Request::SetBitRate { .. } => {
+        Task::SetBitRate { .. } => {
             ("the bit rate of an eRob is fixed at 1 Mbit/s", "set the bus to 1 Mbit/s instead")
         }
-        Request::Gains { .. } => (
+        Task::Gains { .. } => (
             "the gains of an eRob are set with the vendor's tool and suit most applications",
             "they can be read and written as the objects 2380, 2381 and 2382",
         ),
-        Request::Gear { .. } => (
+        Task::Gear { .. } => (
             "an eRob has no electronic gear",
             "it counts its output; scale with `gear_ratio` in the configuration",
         ),
-        Request::AutoHome { .. } => ("an eRob does not move by itself at power-up", "move it with `move`"),
+        Task::AutoHome { .. } => ("an eRob does not move by itself at power-up", "move it with `move`"),
         _ => (
             "an eRob needs no set-up for interpolation",
             "its cyclic modes interpolate between set-points by themselves",

@@ -1,9 +1,9 @@
-//! The objects of an eRob with CANopen firmware, with their units (vendor's EDS, CiA 402, and what real units do).
+//! Object dictionary of an eRob with CANopen firmware, with units (vendor's EDS, CiA 402, field experience).
 
 use crate::canopen::object::{DataType, Object};
 use crate::canopen::objects::*;
-use crate::commission::dictionary::{Entry, Unit};
-use crate::commission::subject::Subject;
+use crate::commission::dictionary::{ObjectEntry, ObjectUnit};
+use crate::commission::target::TargetDrive;
 use crate::drive::mode_words;
 
 use super::state;
@@ -22,9 +22,9 @@ pub const fn error_history(entry: u8) -> Object {
 pub const STORE: Object = Object::new(0x1010, 1, DataType::U32, "store parameters");
 /// 22A2: °C.
 pub const TEMPERATURE: Object = Object::new(0x22A2, 0, DataType::U16, "temperature");
-/// 2242: 1 clears the fault of the multi-turn battery, and the count of turns.
+/// 2242: writing 1 clears the multi-turn battery fault and the turn count.
 pub const MULTI_TURN_RESET: Object = Object::new(0x2242, 0, DataType::U16, "reset of the multi-turn count");
-/// 6065: the joint calls this INTEGER32.
+/// 6065: INTEGER32 on this drive; CiA 402 has UNSIGNED32.
 pub const FOLLOWING_ERROR_WINDOW: Object = Object::new(0x6065, 0, DataType::I32, "following error window");
 /// 6077: per mille of the rated torque.
 pub const TORQUE_ACTUAL_VALUE: Object = Object::new(0x6077, 0, DataType::I16, "torque actual value");
@@ -50,92 +50,92 @@ const fn u16_at(index: u16, subindex: u8, name: &'static str) -> Object {
     Object::new(index, subindex, DataType::U16, name)
 }
 
-/// What the drive has, PDO parameters apart.
-pub const OBJECTS: &[Entry] = &[
-    Entry::read(DEVICE_TYPE, Unit::None),
-    Entry::read(ERROR_REGISTER, Unit::None),
-    Entry::write(ERROR_HISTORY_COUNT, Unit::None),
-    Entry::read(error_history(1), Unit::None),
-    Entry::read(error_history(2), Unit::None),
-    Entry::read(error_history(3), Unit::None),
-    Entry::read(error_history(4), Unit::None),
-    Entry::write(SYNC_COB_ID, Unit::None),
-    Entry::write(COMMUNICATION_CYCLE_PERIOD, Unit::Of(1.0, "µs")),
-    Entry::write(STORE, Unit::None),
-    Entry::write(CONSUMER_HEARTBEAT_TIME, Unit::None),
-    Entry::write(PRODUCER_HEARTBEAT_TIME, Unit::Of(1.0, "ms")),
-    Entry::read(VENDOR_ID, Unit::None),
-    Entry::read(PRODUCT_CODE, Unit::None),
-    Entry::read(REVISION_NUMBER, Unit::None),
-    Entry::write(COMMUNICATION_ERROR_BEHAVIOUR, Unit::None),
-    Entry::read(i32_at(0x20A0, 0, "load encoder"), Unit::None),
-    Entry::read(i16_at(0x2205, 0, "analogue input"), Unit::None),
-    Entry::read(i32_at(0x2240, 0, "motor encoder"), Unit::None),
-    Entry::read(i32_at(0x2241, 0, "encoder difference"), Unit::None),
-    Entry::write(MULTI_TURN_RESET, Unit::None),
-    Entry::read(TEMPERATURE, Unit::Of(1.0, "°C")),
-    Entry::write(u16_at(0x2380, 1, "current loop gain 1"), Unit::None),
-    Entry::write(u16_at(0x2380, 2, "current loop gain 2"), Unit::None),
-    Entry::write(u16_at(0x2381, 1, "velocity loop gain 1"), Unit::None),
-    Entry::write(u16_at(0x2381, 2, "velocity loop gain 2"), Unit::None),
-    Entry::write(u16_at(0x2382, 1, "position loop gain 1"), Unit::None),
-    Entry::write(u16_at(0x2382, 2, "position loop gain 2"), Unit::None),
-    Entry::write(u32_at(0x3B60, 0, "velocity error window"), Unit::Velocity),
-    Entry::read(i32_at(0x3B69, 0, "torque estimate"), Unit::Of(0.001, "Nm")),
-    Entry::read(ERROR_CODE, Unit::None),
-    Entry::write(CONTROLWORD, Unit::None),
-    Entry::read(STATUSWORD, Unit::None),
-    Entry::write(i16_at(0x605B, 0, "shutdown option code"), Unit::None),
-    Entry::write(i16_at(0x605E, 0, "fault reaction option code"), Unit::None),
-    Entry::write(MODES_OF_OPERATION, Unit::None),
-    Entry::read(MODES_OF_OPERATION_DISPLAY, Unit::None),
-    Entry::read(i32_at(0x6062, 0, "position demand value"), Unit::Position),
-    Entry::read(POSITION_ACTUAL_VALUE, Unit::Position),
-    Entry::write(FOLLOWING_ERROR_WINDOW, Unit::Distance),
-    Entry::write(i32_at(0x6067, 0, "position window"), Unit::Distance),
-    Entry::write(i16_at(0x6068, 0, "position window time"), Unit::Of(1.0, "ms")),
-    Entry::read(i32_at(0x606B, 0, "velocity demand value"), Unit::Velocity),
-    Entry::read(VELOCITY_ACTUAL_VALUE, Unit::Velocity),
-    Entry::write(i16_at(0x606D, 0, "velocity window"), Unit::Velocity),
-    Entry::write(i16_at(0x606E, 0, "velocity window time"), Unit::Of(1.0, "ms")),
-    Entry::write(u16_at(0x606F, 0, "velocity threshold"), Unit::Velocity),
-    Entry::write(TARGET_TORQUE, Unit::Torque),
-    Entry::read(i16_at(0x6074, 0, "torque demand value"), Unit::Torque),
-    Entry::read(MOTOR_RATED_CURRENT, Unit::Of(0.001, "A")),
-    Entry::read(MOTOR_RATED_TORQUE, Unit::Of(0.001, "Nm")),
-    Entry::read(TORQUE_ACTUAL_VALUE, Unit::Torque),
-    Entry::read(CURRENT_ACTUAL_VALUE, Unit::Torque),
-    Entry::read(DC_LINK_VOLTAGE, Unit::Of(0.001, "V")),
-    Entry::write(TARGET_POSITION, Unit::Position),
-    Entry::write(HOME_OFFSET, Unit::Distance),
-    Entry::write(i32_at(0x607D, 1, "software position limit, lowest"), Unit::Position),
-    Entry::write(i32_at(0x607D, 2, "software position limit, highest"), Unit::Position),
-    Entry::write(u32_at(0x607F, 0, "max profile velocity"), Unit::Velocity),
-    Entry::write(u32_at(0x6080, 0, "max motor speed"), Unit::None),
-    Entry::write(PROFILE_VELOCITY, Unit::Velocity),
-    Entry::write(PROFILE_ACCELERATION, Unit::Acceleration),
-    Entry::write(PROFILE_DECELERATION, Unit::Acceleration),
-    Entry::write(QUICK_STOP_DECELERATION, Unit::Acceleration),
-    Entry::write(i16_at(0x6086, 0, "motion profile type"), Unit::None),
-    Entry::write(u32_at(0x6087, 0, "torque slope"), Unit::None),
-    Entry::write(HOMING_METHOD, Unit::None),
-    Entry::write(u32_at(0x6099, 1, "homing speed, to the switch"), Unit::Velocity),
-    Entry::write(u32_at(0x6099, 2, "homing speed, to the zero"), Unit::Velocity),
-    Entry::write(u32_at(0x609A, 0, "homing acceleration"), Unit::Acceleration),
-    Entry::write(POSITION_OFFSET, Unit::Distance),
-    Entry::write(VELOCITY_OFFSET, Unit::Velocity),
-    Entry::write(TORQUE_OFFSET, Unit::Torque),
-    Entry::write(INTERPOLATION_TIME_PERIOD, Unit::None),
-    Entry::write(INTERPOLATION_TIME_INDEX, Unit::None),
-    Entry::write(u32_at(0x60C5, 0, "max acceleration"), Unit::Acceleration),
-    Entry::write(u32_at(0x60C6, 0, "max deceleration"), Unit::Acceleration),
-    Entry::read(i32_at(0x60F4, 0, "following error actual value"), Unit::Distance),
-    Entry::read(u32_at(0x60FD, 0, "digital inputs"), Unit::None),
-    Entry::write(TARGET_VELOCITY, Unit::Velocity),
-    Entry::read(SUPPORTED_DRIVE_MODES, Unit::None),
+/// The objects of the drive, without the PDO parameters.
+pub const OBJECTS: &[ObjectEntry] = &[
+    ObjectEntry::read(DEVICE_TYPE, ObjectUnit::None),
+    ObjectEntry::read(ERROR_REGISTER, ObjectUnit::None),
+    ObjectEntry::write(ERROR_HISTORY_COUNT, ObjectUnit::None),
+    ObjectEntry::read(error_history(1), ObjectUnit::None),
+    ObjectEntry::read(error_history(2), ObjectUnit::None),
+    ObjectEntry::read(error_history(3), ObjectUnit::None),
+    ObjectEntry::read(error_history(4), ObjectUnit::None),
+    ObjectEntry::write(SYNC_COB_ID, ObjectUnit::None),
+    ObjectEntry::write(COMMUNICATION_CYCLE_PERIOD, ObjectUnit::Of(1.0, "µs")),
+    ObjectEntry::write(STORE, ObjectUnit::None),
+    ObjectEntry::write(CONSUMER_HEARTBEAT_TIME, ObjectUnit::None),
+    ObjectEntry::write(PRODUCER_HEARTBEAT_TIME, ObjectUnit::Of(1.0, "ms")),
+    ObjectEntry::read(VENDOR_ID, ObjectUnit::None),
+    ObjectEntry::read(PRODUCT_CODE, ObjectUnit::None),
+    ObjectEntry::read(REVISION_NUMBER, ObjectUnit::None),
+    ObjectEntry::write(COMMUNICATION_ERROR_BEHAVIOUR, ObjectUnit::None),
+    ObjectEntry::read(i32_at(0x20A0, 0, "load encoder"), ObjectUnit::None),
+    ObjectEntry::read(i16_at(0x2205, 0, "analogue input"), ObjectUnit::None),
+    ObjectEntry::read(i32_at(0x2240, 0, "motor encoder"), ObjectUnit::None),
+    ObjectEntry::read(i32_at(0x2241, 0, "encoder difference"), ObjectUnit::None),
+    ObjectEntry::write(MULTI_TURN_RESET, ObjectUnit::None),
+    ObjectEntry::read(TEMPERATURE, ObjectUnit::Of(1.0, "°C")),
+    ObjectEntry::write(u16_at(0x2380, 1, "current loop gain 1"), ObjectUnit::None),
+    ObjectEntry::write(u16_at(0x2380, 2, "current loop gain 2"), ObjectUnit::None),
+    ObjectEntry::write(u16_at(0x2381, 1, "velocity loop gain 1"), ObjectUnit::None),
+    ObjectEntry::write(u16_at(0x2381, 2, "velocity loop gain 2"), ObjectUnit::None),
+    ObjectEntry::write(u16_at(0x2382, 1, "position loop gain 1"), ObjectUnit::None),
+    ObjectEntry::write(u16_at(0x2382, 2, "position loop gain 2"), ObjectUnit::None),
+    ObjectEntry::write(u32_at(0x3B60, 0, "velocity error window"), ObjectUnit::Velocity),
+    ObjectEntry::read(i32_at(0x3B69, 0, "torque estimate"), ObjectUnit::Of(0.001, "Nm")),
+    ObjectEntry::read(ERROR_CODE, ObjectUnit::None),
+    ObjectEntry::write(CONTROLWORD, ObjectUnit::None),
+    ObjectEntry::read(STATUSWORD, ObjectUnit::None),
+    ObjectEntry::write(i16_at(0x605B, 0, "shutdown option code"), ObjectUnit::None),
+    ObjectEntry::write(i16_at(0x605E, 0, "fault reaction option code"), ObjectUnit::None),
+    ObjectEntry::write(MODES_OF_OPERATION, ObjectUnit::None),
+    ObjectEntry::read(MODES_OF_OPERATION_DISPLAY, ObjectUnit::None),
+    ObjectEntry::read(i32_at(0x6062, 0, "position demand value"), ObjectUnit::Position),
+    ObjectEntry::read(POSITION_ACTUAL_VALUE, ObjectUnit::Position),
+    ObjectEntry::write(FOLLOWING_ERROR_WINDOW, ObjectUnit::Distance),
+    ObjectEntry::write(i32_at(0x6067, 0, "position window"), ObjectUnit::Distance),
+    ObjectEntry::write(i16_at(0x6068, 0, "position window time"), ObjectUnit::Of(1.0, "ms")),
+    ObjectEntry::read(i32_at(0x606B, 0, "velocity demand value"), ObjectUnit::Velocity),
+    ObjectEntry::read(VELOCITY_ACTUAL_VALUE, ObjectUnit::Velocity),
+    ObjectEntry::write(i16_at(0x606D, 0, "velocity window"), ObjectUnit::Velocity),
+    ObjectEntry::write(i16_at(0x606E, 0, "velocity window time"), ObjectUnit::Of(1.0, "ms")),
+    ObjectEntry::write(u16_at(0x606F, 0, "velocity threshold"), ObjectUnit::Velocity),
+    ObjectEntry::write(TARGET_TORQUE, ObjectUnit::Torque),
+    ObjectEntry::read(i16_at(0x6074, 0, "torque demand value"), ObjectUnit::Torque),
+    ObjectEntry::read(MOTOR_RATED_CURRENT, ObjectUnit::Of(0.001, "A")),
+    ObjectEntry::read(MOTOR_RATED_TORQUE, ObjectUnit::Of(0.001, "Nm")),
+    ObjectEntry::read(TORQUE_ACTUAL_VALUE, ObjectUnit::Torque),
+    ObjectEntry::read(CURRENT_ACTUAL_VALUE, ObjectUnit::Torque),
+    ObjectEntry::read(DC_LINK_VOLTAGE, ObjectUnit::Of(0.001, "V")),
+    ObjectEntry::write(TARGET_POSITION, ObjectUnit::Position),
+    ObjectEntry::write(HOME_OFFSET, ObjectUnit::Distance),
+    ObjectEntry::write(i32_at(0x607D, 1, "software position limit, lowest"), ObjectUnit::Position),
+    ObjectEntry::write(i32_at(0x607D, 2, "software position limit, highest"), ObjectUnit::Position),
+    ObjectEntry::write(u32_at(0x607F, 0, "max profile velocity"), ObjectUnit::Velocity),
+    ObjectEntry::write(u32_at(0x6080, 0, "max motor speed"), ObjectUnit::None),
+    ObjectEntry::write(PROFILE_VELOCITY, ObjectUnit::Velocity),
+    ObjectEntry::write(PROFILE_ACCELERATION, ObjectUnit::Acceleration),
+    ObjectEntry::write(PROFILE_DECELERATION, ObjectUnit::Acceleration),
+    ObjectEntry::write(QUICK_STOP_DECELERATION, ObjectUnit::Acceleration),
+    ObjectEntry::write(i16_at(0x6086, 0, "motion profile type"), ObjectUnit::None),
+    ObjectEntry::write(u32_at(0x6087, 0, "torque slope"), ObjectUnit::None),
+    ObjectEntry::write(HOMING_METHOD, ObjectUnit::None),
+    ObjectEntry::write(u32_at(0x6099, 1, "homing speed, to the switch"), ObjectUnit::Velocity),
+    ObjectEntry::write(u32_at(0x6099, 2, "homing speed, to the zero"), ObjectUnit::Velocity),
+    ObjectEntry::write(u32_at(0x609A, 0, "homing acceleration"), ObjectUnit::Acceleration),
+    ObjectEntry::write(POSITION_OFFSET, ObjectUnit::Distance),
+    ObjectEntry::write(VELOCITY_OFFSET, ObjectUnit::Velocity),
+    ObjectEntry::write(TORQUE_OFFSET, ObjectUnit::Torque),
+    ObjectEntry::write(INTERPOLATION_TIME_PERIOD, ObjectUnit::None),
+    ObjectEntry::write(INTERPOLATION_TIME_INDEX, ObjectUnit::None),
+    ObjectEntry::write(u32_at(0x60C5, 0, "max acceleration"), ObjectUnit::Acceleration),
+    ObjectEntry::write(u32_at(0x60C6, 0, "max deceleration"), ObjectUnit::Acceleration),
+    ObjectEntry::read(i32_at(0x60F4, 0, "following error actual value"), ObjectUnit::Distance),
+    ObjectEntry::read(u32_at(0x60FD, 0, "digital inputs"), ObjectUnit::None),
+    ObjectEntry::write(TARGET_VELOCITY, ObjectUnit::Velocity),
+    ObjectEntry::read(SUPPORTED_DRIVE_MODES, ObjectUnit::None),
 ];
 
-/// What a value means beside its number.
+/// The meaning of an object's value in words.
 pub fn meaning(object: &Object, value: i64) -> Option<String> {
     match object.address.index {
         0x6040 => Some(state::controlword_words(value as u16)),
@@ -149,16 +149,16 @@ pub fn meaning(object: &Object, value: i64) -> Option<String> {
         0x1003 if object.address.subindex > 0 => Some(state::error_words(value as u16).to_owned()),
         0x1001 => Some(crate::canopen::emcy::ErrorRegister(value as u8).to_string()),
         0x1016 if object.address.subindex == 1 => Some(match value & 0xFFFF {
-            0 => "no master is watched".to_owned(),
-            time_ms => format!("node {} is watched, {time_ms} ms", value >> 16 & 0x7F),
+            0 => "heartbeat watchdog off".to_owned(),
+            time_ms => format!("monitors the heartbeat of node {}, timeout {time_ms} ms", value >> 16 & 0x7F),
         }),
         0x1010 if value == state::SAVE_SIGNATURE => Some("\"save\"".to_owned()),
         _ => None,
     }
 }
 
-/// What TPDO1 holds, as it is mapped by default and by takt: the statusword first.
-pub fn process_data_words(s: &Subject, frame: &Frame) -> Option<String> {
+/// Describes TPDO1: with the default mapping and with takt's, the statusword comes first.
+pub fn process_data_words(s: &TargetDrive, frame: &Frame) -> Option<String> {
     let word = u16::from_le_bytes(frame.payload().get(..2)?.try_into().ok()?);
     (frame.id() == Id::canopen(0x180, s.node))
         .then(|| format!("TPDO1: statusword 0x{word:04X}: {}", state::statusword_words(word)))
@@ -170,7 +170,7 @@ mod tests {
     use crate::sim::erob::OBJECTS as SIMULATED;
 
     #[test]
-    fn every_object_is_one_of_the_simulated_drive_with_the_same_length() {
+    fn every_object_has_the_same_length_in_the_simulated_drive() {
         for entry in OBJECTS {
             let address = entry.object.address;
             let simulated = SIMULATED

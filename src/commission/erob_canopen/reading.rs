@@ -1,4 +1,4 @@
-//! Where an eRob is and how it fares.
+//! Reads position, velocity, torque and faults of an eRob.
 
 use takt_rt::{DriveState, Nanoseconds};
 
@@ -7,33 +7,33 @@ use super::state::{error_words, state_words};
 use crate::canopen::emcy::ErrorCode;
 use crate::canopen::objects::*;
 use crate::commission::contact;
-use crate::commission::conversation::Conversation;
-use crate::commission::event::Reading;
+use crate::commission::event::AxisReading;
 use crate::commission::failure::Failure;
-use crate::commission::looking;
+use crate::commission::polling;
 use crate::commission::report::Report;
-use crate::commission::subject::Subject;
+use crate::commission::sdo_session::SdoSession;
+use crate::commission::target::TargetDrive;
 use crate::drive::erob_canopen::MULTI_TURN_BATTERY;
 
-/// What the drive calls rated torque, in N·m; `None` when it does not tell.
-pub async fn rated_torque(c: &Conversation) -> Result<Option<f64>, Failure> {
+/// The rated torque (6076) in N·m; `None` when the drive does not report it.
+pub async fn rated_torque(c: &SdoSession) -> Result<Option<f64>, Failure> {
     let rated = c.read_optional(&MOTOR_RATED_TORQUE).await?;
     Ok(rated.filter(|rated| *rated > 0).map(|rated| rated as f64 / 1000.0))
 }
 
-/// Torque of per mille of the rated one.
-pub fn torque(s: &Subject, rated: Option<f64>, per_mille: i64) -> Option<f64> {
+/// Converts per mille of the rated torque to a torque.
+pub fn torque(s: &TargetDrive, rated: Option<f64>, per_mille: i64) -> Option<f64> {
     let scale = s.scale.with_rated_torque(rated?).ok()?;
     Some(scale.torque_from_per_mille(i32::try_from(per_mille).ok()?))
 }
 
-/// Reads position, velocity, torque and statusword.
-pub async fn read(c: &Conversation, s: &Subject, rated: Option<f64>) -> Result<Reading, Failure> {
+/// Reads position (6064), velocity (606C), torque (6077) and statusword (6041).
+pub async fn read(c: &SdoSession, s: &TargetDrive, rated: Option<f64>) -> Result<AxisReading, Failure> {
     let counts = c.read(&POSITION_ACTUAL_VALUE).await?;
     let velocity = c.read(&VELOCITY_ACTUAL_VALUE).await?;
     let per_mille = c.read(&TORQUE_ACTUAL_VALUE).await?;
     let word = c.read(&STATUSWORD).await? as u16;
-    Ok(Reading {
+    Ok(AxisReading {
         at_ns: c.now_ns(),
         position: s.position(counts),
         position_counts: counts,
@@ -45,8 +45,12 @@ pub async fn read(c: &Conversation, s: &Subject, rated: Option<f64>) -> Result<R
     })
 }
 
-/// As [`read`], of an axis that moves: it must be enabled.
-pub async fn read_enabled(c: &Conversation, s: &Subject, rated: Option<f64>) -> Result<Reading, Failure> {
+/// As [`read`], and checks that the axis is still enabled.
+pub async fn read_enabled(
+    c: &SdoSession,
+    s: &TargetDrive,
+    rated: Option<f64>,
+) -> Result<AxisReading, Failure> {
     let reading = read(c, s, rated).await?;
     c.show(reading);
     match DriveState::decode(reading.statusword) {
@@ -56,44 +60,44 @@ pub async fn read_enabled(c: &Conversation, s: &Subject, rated: Option<f64>) -> 
     }
 }
 
-/// The fault that the drive is in.
-pub async fn fault(c: &Conversation) -> Result<Failure, Failure> {
+/// The current fault as a failure.
+pub async fn fault(c: &SdoSession) -> Result<Failure, Failure> {
     let code = error_code(c).await?;
     Ok(Failure::Faulted { what: in_words(code), advice: advice(code) })
 }
 
-/// Object 603F, or when that is zero the code of the last emergency.
-pub async fn error_code(c: &Conversation) -> Result<ErrorCode, Failure> {
+/// The error code (603F); when it is zero, the code of the last emergency message.
+pub async fn error_code(c: &SdoSession) -> Result<ErrorCode, Failure> {
     let code = ErrorCode(c.read(&ERROR_CODE).await? as u16);
     Ok(if code == ErrorCode::NONE { c.emergency().map_or(code, |emergency| emergency.code) } else { code })
 }
 
-/// An error code with its meaning.
+/// The error code with its meaning.
 pub fn in_words(code: ErrorCode) -> String {
     format!("0x{:04X} ({})", code.0, error_words(code.0))
 }
 
-/// What to do about an error.
+/// The remedy for an error.
 pub fn advice(code: ErrorCode) -> Option<&'static str> {
     (code == MULTI_TURN_BATTERY).then_some(
-        "replace the battery, then use `clear-fault --yes`: it clears the count of turns too, so that the joint's zero \
+        "replace the battery, then use `clear-fault --yes`; this also clears the turn count, so the joint's zero \
          must be set again",
     )
 }
 
 /// `watch`
 pub async fn watch(
-    c: &Conversation,
-    s: &Subject,
+    c: &SdoSession,
+    s: &TargetDrive,
     every_ns: Nanoseconds,
     duration_ns: Option<Nanoseconds>,
 ) -> Result<Report, Failure> {
-    contact::reach(c, s).await?;
+    contact::connect(c, s).await?;
     let rated = rated_torque(c).await?;
-    looking::watch(c, every_ns, duration_ns, async || read(c, s, rated).await).await
+    polling::watch(c, every_ns, duration_ns, async || read(c, s, rated).await).await
 }
 
-/// Position and state in the end.
-pub async fn summary(c: &Conversation, s: &Subject) -> Result<Report, Failure> {
-    Ok(looking::summary(s, &read(c, s, None).await?))
+/// Final position and state.
+pub async fn summary(c: &SdoSession, s: &TargetDrive) -> Result<Report, Failure> {
+    Ok(polling::summary(s, &read(c, s, None).await?))
 }

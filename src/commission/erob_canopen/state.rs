@@ -1,14 +1,14 @@
-//! Statusword, controlword, modes and errors of an eRob in words.
+//! Names of statusword bits, controlword bits, modes and errors of an eRob.
 
 use takt_rt::{Command, DriveState, OperationMode, controlword, statusword};
 
 use crate::canopen::emcy::ErrorCode;
 use crate::drive::{erob_canopen, mode_words};
 
-/// What 1010:1 must be given, "save" in the order of the wire.
+/// The signature for 1010:1: "save" in little-endian order.
 pub const SAVE_SIGNATURE: i64 = 0x6576_6173;
 
-/// The state of the drive in words.
+/// The name of a CiA 402 state.
 pub const fn state_words(state: DriveState) -> &'static str {
     match state {
         DriveState::NotReadyToSwitchOn => "not ready to switch on",
@@ -23,7 +23,7 @@ pub const fn state_words(state: DriveState) -> &'static str {
     }
 }
 
-/// DriveState and bits of a statusword. Bit 7 and bit 12 are often set without a reason on this drive.
+/// State and bits of a statusword. Bits 7 and 12 are often set without a reason on this drive.
 pub fn statusword_words(word: u16) -> String {
     let bits = [
         (statusword::WARNING, "warning"),
@@ -56,13 +56,13 @@ pub fn controlword_words(word: u16) -> String {
     std::iter::once(command).chain(set).collect::<Vec<_>>().join(", ")
 }
 
-/// The modes of object 6502.
+/// The names of the modes in object 6502.
 pub fn modes_words(supported: u32) -> String {
     let modes = OperationMode::ALL.into_iter().filter(|mode| supported & mode.supported_bit() != 0);
     modes.map(mode_words).collect::<Vec<_>>().join(", ")
 }
 
-/// An error code in words.
+/// The name of an error code.
 pub fn error_words(code: u16) -> &'static str {
     erob_canopen::error_words(ErrorCode(code))
 }
@@ -72,7 +72,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn words_of_status_and_control_are_read_by_their_masks() {
+    fn statusword_and_controlword_are_decoded_by_their_masks() {
         assert_eq!(statusword_words(0x16B7), "operation enabled, warning, target reached");
         assert_eq!(statusword_words(0x1208), "fault");
         assert_eq!(controlword_words(0x1F), "enable operation, new set-point");

@@ -1,4 +1,4 @@
-//! Zero and store.
+//! Clears the turn count, and stores the parameters.
 
 use takt_rt::Nanoseconds;
 
@@ -9,32 +9,32 @@ use crate::canopen::object::{DataType, Object};
 use crate::canopen::objects::*;
 use crate::canopen::sdo::{AbortCode, SdoError};
 use crate::commission::contact;
-use crate::commission::conversation::Conversation;
 use crate::commission::failure::Failure;
 use crate::commission::report::Report;
-use crate::commission::subject::Subject;
+use crate::commission::sdo_session::SdoSession;
+use crate::commission::target::TargetDrive;
 
-/// The supply must stay on for so long after the command to store.
+/// Time for which the supply must stay on after the store command.
 const STORING_NS: Nanoseconds = 3_000_000_000;
-/// The count of turns is gone this long after the command, at the latest.
+/// Longest time until the turn count is cleared.
 const ZEROING_NS: Nanoseconds = 500_000_000;
 
-/// `zero`: clears the multi-turn count (2242 = 1). What is left is the position within one turn.
-pub async fn zero(c: &Conversation, s: &Subject, is_agreed: bool) -> Result<Report, Failure> {
-    if !is_agreed {
+/// `zero`: clears the turn count (2242 = 1). The position within one turn remains.
+pub async fn zero(c: &SdoSession, s: &TargetDrive, is_confirmed: bool) -> Result<Report, Failure> {
+    if !is_confirmed {
         return Err(Failure::NeedsConsent {
-            consequence: "this clears the drive's count of turns (2242 = 1): the position becomes the one within a \
+            consequence: "this clears the drive's turn count (2242 = 1): the position becomes the one within a \
                           turn, and the joint's zero must be set again",
             option: "--yes",
         });
     }
-    contact::reach_family(c, s).await?;
+    contact::connect_family(c, s).await?;
     c.step("state");
     if state(c).await?.has_torque() {
         return Err(Failure::Enabled);
     }
     let before = c.read(&POSITION_ACTUAL_VALUE).await?;
-    c.step("clear the count of turns");
+    c.step("clear the turn count");
     clear_turns(c).await?;
     let turn = s.counts_per_turn as i64;
     let within = |counts: i64| (0..turn).contains(&counts);
@@ -49,8 +49,8 @@ pub async fn zero(c: &Conversation, s: &Subject, is_agreed: bool) -> Result<Repo
     Ok(report)
 }
 
-/// 2242 = 1. Its type is not published: what is told to be too long or too short is tried in another length.
-pub async fn clear_turns(c: &Conversation) -> Result<(), Failure> {
+/// Writes 2242 = 1. The object's type is not published, so a length error leads to another attempt with another length.
+pub async fn clear_turns(c: &SdoSession) -> Result<(), Failure> {
     let mut outcome = c.write(&MULTI_TURN_RESET, 1).await;
     for data_type in [DataType::U8, DataType::U32] {
         if !matches!(
@@ -69,9 +69,9 @@ pub async fn clear_turns(c: &Conversation) -> Result<(), Failure> {
     outcome
 }
 
-/// `save`: 1010:1 = "save", and three seconds of patience.
-pub async fn save(c: &Conversation, s: &Subject) -> Result<Report, Failure> {
-    contact::reach_family(c, s).await?;
+/// `save`: writes "save" to 1010:1 and waits three seconds.
+pub async fn save(c: &SdoSession, s: &TargetDrive) -> Result<Report, Failure> {
+    contact::connect_family(c, s).await?;
     c.step("state");
     if state(c).await?.has_torque() {
         return Err(Failure::Enabled);
@@ -81,7 +81,7 @@ pub async fn save(c: &Conversation, s: &Subject) -> Result<Report, Failure> {
     c.note("do not cut the supply for 3 s");
     let paused = c.pause(STORING_NS).await;
     if paused.is_err() {
-        c.note("the parameters are being stored all the same: do not cut the supply yet");
+        c.note("the drive is still storing the parameters: do not cut the supply yet");
     }
     paused?;
     let mut report = Report::new();

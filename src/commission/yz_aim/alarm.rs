@@ -1,4 +1,4 @@
-//! The alarms of a YZ-AIM, object 260E (manual IIb.3), and how each is cleared.
+//! The alarms of a YZ-AIM, object 260E (manual IIb.3), and how to clear each.
 
 use std::fmt;
 
@@ -15,20 +15,20 @@ pub enum Alarm {
     LossOfSpeed,
     /// 15h
     OverVoltage,
-    /// 20h: the master's heartbeat has ceased.
+    /// 20h: the heartbeat of the master timed out.
     CommunicationLost,
     /// A code that the manual does not list.
     Other(u16),
 }
 
-/// How an alarm is cleared.
+/// How to clear an alarm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Clearing {
     /// Controlword bit 7, or 2601h = 1.
     Reset,
     /// The multi-turn zero procedure.
     Zero,
-    /// A heartbeat of the master.
+    /// A heartbeat from the master.
     Heartbeat,
 }
 
@@ -46,7 +46,7 @@ impl Alarm {
         }
     }
 
-    /// Its code.
+    /// The alarm's code.
     pub const fn code(self) -> u16 {
         match self {
             Self::None => 0,
@@ -71,7 +71,7 @@ impl Alarm {
         }
     }
 
-    /// How it is cleared. For over-voltage and for unknown codes the manual does not say: a reset is tried.
+    /// How to clear it. The manual does not cover over-voltage and unknown codes; a reset is tried.
     pub const fn clearing(self) -> Clearing {
         match self {
             Self::Battery => Clearing::Zero,
@@ -80,19 +80,19 @@ impl Alarm {
         }
     }
 
-    /// What people do about it; `None` for no alarm.
+    /// The remedy for people; `None` without an alarm.
     pub const fn advice(self) -> Option<&'static str> {
         Some(match self {
             Self::None => return None,
             Self::Battery => {
-                "check the battery, move the axis to its zero, then `clear-fault --yes` does the multi-turn zero anew"
+                "check the battery, move the axis to its zero, then use `clear-fault --yes` to set the multi-turn zero"
             }
             Self::BlockedRotor => "free the shaft, then `clear-fault`",
             Self::LossOfSpeed => "reduce the load or the acceleration, then `clear-fault`",
             Self::OverVoltage => {
                 "lower the supply or fit a discharge module, then `clear-fault`; if it stays, power-cycle the drive"
             }
-            Self::CommunicationLost => "`clear-fault` sends the heartbeat that the drive waits for",
+            Self::CommunicationLost => "use `clear-fault`: it sends the heartbeat that the drive waits for",
             Self::Other(_) => "`clear-fault` tries a reset; if it stays, power-cycle the drive",
         })
     }
@@ -112,7 +112,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_alarm_comes_back_from_its_code() {
+    fn every_code_converts_to_an_alarm_and_back() {
         for code in 0..=0x40 {
             assert_eq!(Alarm::of(code).code(), code);
         }

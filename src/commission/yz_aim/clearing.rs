@@ -1,5 +1,5 @@
-//! Clearing an alarm, each in its own way (manual IIb.3, 5.11.2). The targets are withdrawn first: a drive that has
-//! lost its master resumes its motion by itself when the heartbeat returns.
+//! Clears an alarm in the way that the manual gives for it (IIb.3, 5.11.2). The targets are reset first: after a loss
+//! of communication the drive resumes its motion as soon as the heartbeat returns.
 
 use takt_rt::Nanoseconds;
 
@@ -11,23 +11,23 @@ use super::{reading, storing};
 use crate::canopen::nmt::{ErrorControl, NmtState};
 use crate::canopen::objects::*;
 use crate::commission::contact;
-use crate::commission::conversation::Conversation;
 use crate::commission::failure::Failure;
 use crate::commission::report::Report;
-use crate::commission::subject::Subject;
+use crate::commission::sdo_session::SdoSession;
+use crate::commission::target::TargetDrive;
 
-/// The drive takes its time to see a controlword.
+/// Time until the drive has processed a controlword.
 const CONTROL_NS: Nanoseconds = 20_000_000;
-/// An alarm goes within this.
+/// Longest time until an alarm is cleared.
 const CLEARING_NS: Nanoseconds = 500_000_000;
-/// Above this voltage (V) the over-voltage alarm comes at once again.
+/// Above this voltage (V) the over-voltage alarm returns at once.
 const HIGHEST_VOLTAGE: f64 = 52.0;
-/// The node that the drive watches when its consumer names none.
+/// Node ID for the heartbeat when 1016:01 names none.
 const MASTER: u8 = 127;
 
 /// `clear-fault`
-pub async fn clear(c: &Conversation, s: &Subject, is_agreed: bool) -> Result<Report, Failure> {
-    contact::reach_family(c, s).await?;
+pub async fn clear(c: &SdoSession, s: &TargetDrive, is_confirmed: bool) -> Result<Report, Failure> {
+    contact::connect_family(c, s).await?;
     c.step("alarm");
     let alarm = reading::alarm(c).await?;
     let has_alarm = statusword(c).await? & words::ALARM != 0 || alarm != Alarm::None;
@@ -38,7 +38,7 @@ pub async fn clear(c: &Conversation, s: &Subject, is_agreed: bool) -> Result<Rep
         return Ok(report);
     }
     report.add("fault", "alarm", alarm.code(), alarm.to_string());
-    if alarm.clearing() == Clearing::Zero && !is_agreed {
+    if alarm.clearing() == Clearing::Zero && !is_confirmed {
         return Err(Failure::NeedsConsent {
             consequence: "the multi-turn position is lost; clearing this alarm makes the present position the \
                           multi-turn zero",
@@ -61,16 +61,16 @@ pub async fn clear(c: &Conversation, s: &Subject, is_agreed: bool) -> Result<Rep
     Ok(report)
 }
 
-/// Nothing is to move when the alarm goes: targets at the actual position, velocity 0, not enabled.
-async fn withdraw(c: &Conversation) -> Result<(), Failure> {
-    c.step("withdraw the targets");
+/// Sets the targets so that nothing moves when the alarm ends: velocity 0, disabled, target position at the actual one.
+async fn withdraw(c: &SdoSession) -> Result<(), Failure> {
+    c.step("reset the targets");
     c.write(&TARGET_VELOCITY, 0).await?;
     c.write(&CONTROLWORD, 0).await?;
     let position = c.read(&POSITION_ACTUAL_VALUE).await?;
     c.write(&TARGET_POSITION, position).await
 }
 
-async fn reset(c: &Conversation, alarm: Alarm) -> Result<(), Failure> {
+async fn reset(c: &SdoSession, alarm: Alarm) -> Result<(), Failure> {
     if alarm == Alarm::OverVoltage {
         let voltage = c.read(&VOLTAGE).await? as f64 / 327.0;
         if voltage > HIGHEST_VOLTAGE {
@@ -89,8 +89,8 @@ async fn reset(c: &Conversation, alarm: Alarm) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The drive waits for a heartbeat and would want more of them: it watches nobody from then on.
-async fn heartbeat(c: &Conversation) -> Result<(), Failure> {
+/// Sends the heartbeat that the drive waits for, then turns its heartbeat watchdog off: no more heartbeats will follow.
+async fn heartbeat(c: &SdoSession) -> Result<(), Failure> {
     c.step("heartbeat");
     let watched = c.read(&CONSUMER_HEARTBEAT_TIME).await?;
     let node = u8::try_from(watched >> 16 & 0x7F).unwrap_or(MASTER);
@@ -100,13 +100,13 @@ async fn heartbeat(c: &Conversation) -> Result<(), Failure> {
     c.write(&CONSUMER_HEARTBEAT_TIME, 0).await?;
     c.send(ErrorControl { node, state: NmtState::Operational }.frame());
     c.note(format!(
-        "the drive does not watch its master any more (1016:01 = 0, it was 0x{watched:08X}) until a master sets it, or it \
+        "the drive does not monitor its master any more (1016:01 = 0, it was 0x{watched:08X}) until a master sets it, or it \
          is reset: do not store that"
     ));
     Ok(())
 }
 
-async fn is_gone(c: &Conversation) -> Result<bool, Failure> {
+async fn is_gone(c: &SdoSession) -> Result<bool, Failure> {
     match c.wait_for(&ALARM, "no alarm", CLEARING_NS, |code| code == 0).await {
         Ok(_) => Ok(statusword(c).await? & words::ALARM == 0),
         Err(Failure::NotInTime { .. }) => Ok(false),

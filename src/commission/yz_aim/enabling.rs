@@ -1,4 +1,4 @@
-//! Torque on and torque off, and everything that must be right before a YZ-AIM moves.
+//! Enabling and disabling a YZ-AIM, with the checks before motion.
 
 use takt_rt::Nanoseconds;
 
@@ -9,31 +9,31 @@ use super::words::{self, control};
 use crate::canopen::nmt::NmtCommand;
 use crate::canopen::objects::*;
 use crate::commission::contact;
-use crate::commission::conversation::Conversation;
 use crate::commission::failure::Failure;
-use crate::commission::pace::Profile;
+use crate::commission::motion_profile::DriveProfile;
 use crate::commission::report::Report;
-use crate::commission::subject::Subject;
+use crate::commission::sdo_session::SdoSession;
+use crate::commission::target::TargetDrive;
 
-/// A cold drive ignores controlwords that follow each other sooner.
+/// Pause between controlwords; a drive that has just booted ignores controlwords that follow sooner.
 const CONTROL_NS: Nanoseconds = 20_000_000;
-/// After NMT start, as working code waits.
+/// Pause after NMT start, as in field-tested code.
 const NMT_PAUSE_NS: Nanoseconds = 100_000_000;
-/// The statusword follows the controlword within this.
+/// Longest time until the statusword follows the controlword.
 const STATE_NS: Nanoseconds = 1_000_000_000;
-/// After a ramp to standstill, before the torque goes.
+/// Pause after a ramp to standstill, before the torque goes off.
 const REST_NS: Nanoseconds = 200_000_000;
-/// A ramp may take so much longer than it should.
+/// Tolerance of a ramp's duration.
 const RAMP_NS: Nanoseconds = 2_000_000_000;
-/// A halt, which may not be obeyed at all.
+/// Time given to a halt, which the drive may ignore.
 const HALT_NS: Nanoseconds = 300_000_000;
-/// Slower than this (r/min) is standstill.
+/// Standstill threshold in r/min.
 const STANDING_RPM: f64 = 1.0;
-/// From here on 6083 is no ramp: the drive stops as fast as it can.
+/// At this value of 6083 and above the drive uses no ramp: it stops as fast as it can.
 const NO_RAMP: i64 = 60_000;
-/// The node under which the drive is watched over.
+/// Node ID of this program's heartbeat, which the drive consumes.
 const MASTER: u8 = 127;
-/// Between two heartbeats, and after how long without any the drive stops by itself.
+/// Heartbeat period and the drive's heartbeat timeout (object 1016:01).
 const HEARTBEAT_NS: Nanoseconds = 100_000_000;
 const HEARTBEAT_TIMEOUT_MS: i64 = 500;
 
@@ -47,29 +47,34 @@ pub mod mode {
     pub const HOMING: i64 = 6;
 }
 
-/// The statusword.
-pub async fn statusword(c: &Conversation) -> Result<u16, Failure> {
+/// Reads the statusword.
+pub async fn statusword(c: &SdoSession) -> Result<u16, Failure> {
     Ok(c.read(&STATUSWORD).await? as u16)
 }
 
-/// Refuses a drive with torque.
-pub async fn refuse_enabled(c: &Conversation) -> Result<(), Failure> {
+/// Refuses a drive that is enabled.
+pub async fn refuse_enabled(c: &SdoSession) -> Result<(), Failure> {
     c.step("state");
     if words::is_enabled(statusword(c).await?) { Err(Failure::Enabled) } else { Ok(()) }
 }
 
-/// The right drive, without an alarm.
-pub async fn greet(c: &Conversation, s: &Subject) -> Result<(), Failure> {
-    contact::reach_family(c, s).await?;
+/// Checks the vendor ID and that the drive has no alarm.
+pub async fn check_ready(c: &SdoSession, s: &TargetDrive) -> Result<(), Failure> {
+    contact::connect_family(c, s).await?;
     c.step("alarm check");
     let alarm = reading::alarm(c).await?;
     let has_alarm = statusword(c).await? & words::ALARM != 0;
     if has_alarm || alarm != Alarm::None { Err(reading::faulted(alarm)) } else { Ok(()) }
 }
 
-/// The drive at rest, in this mode, with this profile, and stopping by itself when takt falls silent.
-pub async fn prepare(c: &Conversation, s: &Subject, mode: i64, profile: &Profile) -> Result<(), Failure> {
-    // An axis that is enabled already is stopped and not let go: a loaded one would fall.
+/// Stops the drive, sets the mode and the profile, and arms the drive's heartbeat watchdog.
+pub async fn prepare(
+    c: &SdoSession,
+    s: &TargetDrive,
+    mode: i64,
+    profile: &DriveProfile,
+) -> Result<(), Failure> {
+    // An enabled axis is stopped but stays enabled, because a loaded axis would fall.
     if words::is_enabled(statusword(c).await?) {
         stop(c).await?;
     }
@@ -77,13 +82,13 @@ pub async fn prepare(c: &Conversation, s: &Subject, mode: i64, profile: &Profile
     c.command(NmtCommand::Start);
     c.pause(NMT_PAUSE_NS).await?;
     if s.node == MASTER {
-        c.note("node 127 cannot be watched over: should this program die, the drive goes on");
+        c.note("node 127 cannot use the heartbeat watchdog: if this program ends unexpectedly, the drive keeps moving");
     } else {
         c.step("heartbeat");
-        c.beat(MASTER, Some(HEARTBEAT_NS));
+        c.set_heartbeat(MASTER, Some(HEARTBEAT_NS));
         c.write(&CONSUMER_HEARTBEAT_TIME, i64::from(MASTER) << 16 | HEARTBEAT_TIMEOUT_MS).await?;
     }
-    c.step("targets that move nothing");
+    c.step("targets at the actual position");
     c.write(&TARGET_VELOCITY, 0).await?;
     let position = c.read(&POSITION_ACTUAL_VALUE).await?;
     c.write(&TARGET_POSITION, position).await?;
@@ -99,8 +104,8 @@ pub async fn prepare(c: &Conversation, s: &Subject, mode: i64, profile: &Profile
     Ok(())
 }
 
-/// Torque on, with every target where the axis is. An axis that is enabled already is not let go.
-pub async fn enable(c: &Conversation, s: &Subject) -> Result<i64, Failure> {
+/// Enables the drive with every target at the actual value. An axis that is already enabled stays so.
+pub async fn enable(c: &SdoSession, s: &TargetDrive) -> Result<i64, Failure> {
     c.step("target at the actual position");
     let position = c.read(&POSITION_ACTUAL_VALUE).await?;
     c.write(&TARGET_POSITION, position).await?;
@@ -123,8 +128,8 @@ pub async fn enable(c: &Conversation, s: &Subject) -> Result<i64, Failure> {
     if moved.abs() > permitted { Err(Failure::Jumped { counts: moved }) } else { Ok(position) }
 }
 
-/// From any motion to rest without torque.
-pub async fn come_to_rest(c: &Conversation) -> Result<(), Failure> {
+/// Stops any motion, then disables.
+pub async fn come_to_rest(c: &SdoSession) -> Result<(), Failure> {
     let rested = stop(c).await;
     if rested == Err(Failure::Interrupted) {
         return rested;
@@ -133,9 +138,9 @@ pub async fn come_to_rest(c: &Conversation) -> Result<(), Failure> {
     rested
 }
 
-/// From any motion to rest: the velocity ramps down, other modes halt. A drive that has never been enabled homes all the
-/// same and may take no notice of a halt: position mode ends its homing.
-async fn stop(c: &Conversation) -> Result<(), Failure> {
+/// Stops any motion: velocity mode ramps down, other modes halt. A drive that was never enabled can still run homing
+/// and may ignore a halt; changing to position mode ends its homing.
+async fn stop(c: &SdoSession) -> Result<(), Failure> {
     c.step("stop in control");
     c.write(&TARGET_VELOCITY, 0).await?;
     if c.read(&MODES_OF_OPERATION).await? == mode::VELOCITY {
@@ -152,8 +157,8 @@ async fn stop(c: &Conversation) -> Result<(), Failure> {
     }
 }
 
-/// Waits for the end of a ramp: v/a and `patience_ns` at most, and 200 ms after it.
-async fn standstill(c: &Conversation, patience_ns: Nanoseconds) -> Result<(), Failure> {
+/// Waits for standstill: the ramp time v/a plus `patience_ns` at most, then 200 ms more.
+async fn standstill(c: &SdoSession, patience_ns: Nanoseconds) -> Result<(), Failure> {
     let velocity = (c.read(&VELOCITY).await? as f64 * TENTHS).abs();
     let acceleration = c.read(&ACCELERATION).await?.clamp(1, NO_RAMP);
     let ramp_ns = (velocity / acceleration as f64 * 1e9) as Nanoseconds;
@@ -162,13 +167,13 @@ async fn standstill(c: &Conversation, patience_ns: Nanoseconds) -> Result<(), Fa
     c.pause(REST_NS).await
 }
 
-/// Waits for the end of a ramp that was commanded.
-pub async fn ramp_down(c: &Conversation) -> Result<(), Failure> {
+/// Waits for the end of a commanded ramp.
+pub async fn ramp_down(c: &SdoSession) -> Result<(), Failure> {
     standstill(c, RAMP_NS).await
 }
 
-/// Torque off at once.
-pub async fn torque_off(c: &Conversation) -> Result<(), Failure> {
+/// Disables at once.
+pub async fn torque_off(c: &SdoSession) -> Result<(), Failure> {
     c.step("disable");
     for word in [control::SWITCH_ON, control::SHUTDOWN] {
         c.write(&CONTROLWORD, word).await?;
@@ -178,25 +183,24 @@ pub async fn torque_off(c: &Conversation) -> Result<(), Failure> {
     c.wait_for(&STATUSWORD, "not enabled", STATE_NS, is_off).await.map(|_| ())
 }
 
-/// What a motion is ended with: rest, no torque, and the watch over the master as the drive had it: armed by the next
-/// heartbeat.
-pub async fn leave(c: &Conversation, watch: i64) -> Result<(), Failure> {
+/// Ends a motion: standstill, torque off, and the heartbeat watchdog as it was before. The next heartbeat arms it.
+pub async fn shut_down(c: &SdoSession, consumer_heartbeat: i64) -> Result<(), Failure> {
     come_to_rest(c).await?;
-    c.step("farewell");
+    c.step("shut down");
     c.write(&MODES_OF_OPERATION, mode::POSITION).await?;
-    release(c, watch).await
+    restore_watchdog(c, consumer_heartbeat).await
 }
 
-/// Ends the watch, and sets it up again for whoever comes next.
-pub async fn release(c: &Conversation, watch: i64) -> Result<(), Failure> {
+/// Turns the heartbeat watchdog off, then restores the value of 1016:01 for the next master.
+pub async fn restore_watchdog(c: &SdoSession, consumer_heartbeat: i64) -> Result<(), Failure> {
     c.write(&CONSUMER_HEARTBEAT_TIME, 0).await?;
-    c.beat(MASTER, None);
-    c.write(&CONSUMER_HEARTBEAT_TIME, watch).await
+    c.set_heartbeat(MASTER, None);
+    c.write(&CONSUMER_HEARTBEAT_TIME, consumer_heartbeat).await
 }
 
 /// `disable`
-pub async fn disable(c: &Conversation, s: &Subject) -> Result<Report, Failure> {
-    contact::reach_family(c, s).await?;
+pub async fn disable(c: &SdoSession, s: &TargetDrive) -> Result<Report, Failure> {
+    contact::connect_family(c, s).await?;
     c.step("state");
     let was_enabled = words::is_enabled(statusword(c).await?);
     if was_enabled {

@@ -1,4 +1,4 @@
-//! Homing (manual 5.09): the mode alone starts it; bit 12 tells its end, bit 13 an error.
+//! Homing (manual 5.09). Setting the mode starts it; statusword bit 12 reports its end, bit 13 an error.
 
 use takt_rt::Nanoseconds;
 
@@ -8,34 +8,34 @@ use super::objects::HOMING_METHOD;
 use super::reading;
 use super::words::{self, control};
 use crate::canopen::objects::*;
-use crate::commission::conversation::Conversation;
 use crate::commission::failure::Failure;
-use crate::commission::pace::Profile;
+use crate::commission::motion_profile::DriveProfile;
 use crate::commission::report::Report;
-use crate::commission::subject::Subject;
+use crate::commission::sdo_session::SdoSession;
+use crate::commission::target::TargetDrive;
 
 /// The methods that the manual describes.
 const DESCRIBED: [i8; 4] = [17, 18, 19, 21];
-/// The methods that it names without describing them.
+/// The methods that the manual names but does not describe.
 const NAMED: [i8; 2] = [20, 22];
-/// The bits of an earlier homing are gone after this.
+/// Time until the statusword bits of an earlier homing are gone.
 const BEGIN_NS: Nanoseconds = 50_000_000;
-/// Between two looks.
-const LOOK_NS: Nanoseconds = 20_000_000;
-/// When nothing has moved for so long, the start that CiA 402 knows is tried.
+/// Interval between two readings.
+const POLL_NS: Nanoseconds = 20_000_000;
+/// Time without motion after which the start sequence of CiA 402 is tried.
 const START_NS: Nanoseconds = 1_000_000_000;
 
 /// `home`
 pub async fn home(
-    c: &Conversation,
-    s: &Subject,
+    c: &SdoSession,
+    s: &TargetDrive,
     method: Option<i8>,
     within_ns: Nanoseconds,
     is_forced: bool,
 ) -> Result<Report, Failure> {
     let method = check(method, is_forced)?;
     let work = async {
-        enabling::prepare(c, s, mode::POSITION, &Profile::default()).await?;
+        enabling::prepare(c, s, mode::POSITION, &DriveProfile::default()).await?;
         c.step("homing method");
         c.write_and_check(&HOMING_METHOD, method.into()).await?;
         let began = c.read(&POSITION_ACTUAL_VALUE).await?;
@@ -62,7 +62,7 @@ fn check(method: Option<i8>, is_forced: bool) -> Result<i8, Failure> {
     }
     if NAMED.contains(&method) {
         return Err(Failure::NeedsConsent {
-            consequence: "the manual names this method and does not describe it: which way the axis goes is not known",
+            consequence: "the manual names this method but does not describe it: the direction is not known",
             option: "--force",
         });
     }
@@ -72,7 +72,7 @@ fn check(method: Option<i8>, is_forced: bool) -> Result<i8, Failure> {
     })
 }
 
-async fn wait(c: &Conversation, s: &Subject, began: i64, within_ns: Nanoseconds) -> Result<i64, Failure> {
+async fn wait(c: &SdoSession, s: &TargetDrive, began: i64, within_ns: Nanoseconds) -> Result<i64, Failure> {
     let began_ns = c.now_ns();
     let near = (s.counts_per_turn / 100.0) as i64;
     let mut is_started = false;
@@ -87,23 +87,23 @@ async fn wait(c: &Conversation, s: &Subject, began: i64, within_ns: Nanoseconds)
             return Err(Failure::Homing("the drive reports a homing error (statusword bit 13)"));
         }
         if word & words::HOMING_COMPLETE != 0 {
-            // The position of this reading may be older than the zero.
+            // The position in `reading` may be older than the new zero.
             return c.read(&POSITION_ACTUAL_VALUE).await;
         }
         let waited_ns = c.now_ns().saturating_sub(began_ns);
         if waited_ns >= within_ns {
             c.write(&CONTROLWORD, control::HALT).await?;
-            return Err(Failure::Homing("the home was not found in time; the axis was halted"));
+            return Err(Failure::Homing("the home position was not found in time; the axis was halted"));
         }
         let has_moved = is_started || (reading.position_counts - began).abs() > near;
         is_started = has_moved;
         if !has_moved && waited_ns >= START_NS {
-            c.note("nothing moves in homing mode: starting it with controlword 000Fh and 001Fh");
+            c.note("no motion in homing mode: starting it with controlword 000Fh and 001Fh");
             c.write(&CONTROLWORD, control::ENABLE).await?;
-            c.pause(LOOK_NS).await?;
+            c.pause(POLL_NS).await?;
             c.write(&CONTROLWORD, control::RUN).await?;
             is_started = true;
         }
-        c.pause(LOOK_NS).await?;
+        c.pause(POLL_NS).await?;
     }
 }

@@ -1,4 +1,4 @@
-//! Who a YZ-AIM is and how it fares.
+//! Identity, condition and settings of a YZ-AIM.
 
 use super::objects::*;
 use super::reading::{self, alarm};
@@ -7,14 +7,14 @@ use crate::canopen::object::Object;
 use crate::canopen::objects::*;
 use crate::canopen::sdo::SdoError;
 use crate::commission::contact;
-use crate::commission::conversation::Conversation;
 use crate::commission::failure::Failure;
 use crate::commission::report::Report;
-use crate::commission::subject::Subject;
+use crate::commission::sdo_session::SdoSession;
+use crate::commission::target::TargetDrive;
 
 /// `info`
-pub async fn info(c: &Conversation, s: &Subject) -> Result<Report, Failure> {
-    contact::reach(c, s).await?;
+pub async fn info(c: &SdoSession, s: &TargetDrive) -> Result<Report, Failure> {
+    contact::connect(c, s).await?;
     let mut report = Report::new();
     identity(c, s, &mut report).await?;
     condition(c, s, &mut report).await?;
@@ -22,7 +22,7 @@ pub async fn info(c: &Conversation, s: &Subject) -> Result<Report, Failure> {
     Ok(report)
 }
 
-async fn identity(c: &Conversation, s: &Subject, report: &mut Report) -> Result<(), Failure> {
+async fn identity(c: &SdoSession, s: &TargetDrive, report: &mut Report) -> Result<(), Failure> {
     c.step("identity");
     for (key, object) in [
         ("device_type", DEVICE_TYPE),
@@ -33,13 +33,16 @@ async fn identity(c: &Conversation, s: &Subject, report: &mut Report) -> Result<
         let value = c.read(&object).await?;
         report.add(key, object.name, value, object.show(value));
         if object == VENDOR_ID && value != i64::from(s.family.vendor_id()) {
-            c.note(format!("another vendor than {}'s: is this the drive that you mean?", s.family.word()));
+            c.note(format!(
+                "the vendor ID is not that of {}: check that this is the intended drive",
+                s.family.word()
+            ));
         }
     }
     Ok(())
 }
 
-async fn condition(c: &Conversation, s: &Subject, report: &mut Report) -> Result<(), Failure> {
+async fn condition(c: &SdoSession, s: &TargetDrive, report: &mut Report) -> Result<(), Failure> {
     c.step("condition");
     let alarm = alarm(c).await?;
     let clearing = alarm.advice().map_or(String::new(), |advice| format!("; {advice}"));
@@ -71,7 +74,7 @@ async fn condition(c: &Conversation, s: &Subject, report: &mut Report) -> Result
     Ok(())
 }
 
-async fn settings(c: &Conversation, report: &mut Report) -> Result<(), Failure> {
+async fn settings(c: &SdoSession, report: &mut Report) -> Result<(), Failure> {
     c.step("settings");
     if let (Some(numerator), Some(denominator)) =
         (optional(c, &GEAR_NUMERATOR).await?, optional(c, &GEAR_DENOMINATOR).await?)
@@ -102,8 +105,8 @@ async fn settings(c: &Conversation, report: &mut Report) -> Result<(), Failure> 
     Ok(())
 }
 
-/// An object that a unit may lack: then it refuses, or does not answer at all.
-async fn optional(c: &Conversation, object: &Object) -> Result<Option<i64>, Failure> {
+/// Reads an object that a unit may lack: such a unit aborts the transfer or does not answer.
+async fn optional(c: &SdoSession, object: &Object) -> Result<Option<i64>, Failure> {
     match c.read_optional(object).await {
         Err(Failure::Transfer { error: SdoError::NoReply { .. }, .. }) => Ok(None),
         other => other,

@@ -1,12 +1,12 @@
-//! The PDOs of a YZ-AIM in words: their mapping is fixed (manual 5.08).
+//! Describes the PDOs of a YZ-AIM. Their mapping is fixed (manual 5.08).
 
 use takt_rt::Frame;
 
 use super::words;
-use crate::commission::subject::Subject;
+use crate::commission::target::TargetDrive;
 
-/// What a PDO holds; `None` for what is none of this drive's.
-pub fn words(s: &Subject, frame: &Frame) -> Option<String> {
+/// Describes a PDO; `None` for other frames.
+pub fn words(s: &TargetDrive, frame: &Frame) -> Option<String> {
     let id = frame.id().value();
     if frame.id().is_extended() || id & 0x7F != u32::from(s.node) {
         return None;

@@ -1,4 +1,4 @@
-//! Where a YZ-AIM is and how it fares.
+//! Reads position, velocity, current and alarms of a YZ-AIM.
 
 use takt_rt::Nanoseconds;
 
@@ -7,23 +7,23 @@ use super::objects::{ALARM, CURRENT, VELOCITY};
 use super::words;
 use crate::canopen::objects::*;
 use crate::commission::contact;
-use crate::commission::conversation::Conversation;
-use crate::commission::event::Reading;
+use crate::commission::event::AxisReading;
 use crate::commission::failure::Failure;
-use crate::commission::looking;
+use crate::commission::polling;
 use crate::commission::report::Report;
-use crate::commission::subject::Subject;
+use crate::commission::sdo_session::SdoSession;
+use crate::commission::target::TargetDrive;
 
-/// The scale of 606C by SDO: 0.1 r/min (object table; the only example of TPDO3 contradicts it there).
+/// The scale of 606C by SDO: 0.1 r/min by the object table, although the manual's example of TPDO3 contradicts it.
 pub const TENTHS: f64 = 0.1;
 
 /// Reads position, velocity, current and statusword.
-pub async fn read(c: &Conversation, s: &Subject) -> Result<Reading, Failure> {
+pub async fn read(c: &SdoSession, s: &TargetDrive) -> Result<AxisReading, Failure> {
     let counts = c.read(&POSITION_ACTUAL_VALUE).await?;
     let velocity = c.read(&VELOCITY).await?;
     let current = c.read(&CURRENT).await?;
     let word = c.read(&STATUSWORD).await? as u16;
-    Ok(Reading {
+    Ok(AxisReading {
         at_ns: c.now_ns(),
         position: s.position(counts),
         position_counts: counts,
@@ -35,8 +35,8 @@ pub async fn read(c: &Conversation, s: &Subject) -> Result<Reading, Failure> {
     })
 }
 
-/// As [`read`], of an axis that moves: it must be enabled and without an alarm.
-pub async fn read_enabled(c: &Conversation, s: &Subject) -> Result<Reading, Failure> {
+/// As [`read`], and checks that the axis is enabled and has no alarm.
+pub async fn read_enabled(c: &SdoSession, s: &TargetDrive) -> Result<AxisReading, Failure> {
     let reading = read(c, s).await?;
     c.show(reading);
     if reading.statusword & words::ALARM != 0 {
@@ -48,28 +48,28 @@ pub async fn read_enabled(c: &Conversation, s: &Subject) -> Result<Reading, Fail
     Err(Failure::Disabled { statusword: reading.statusword })
 }
 
-/// Object 260E.
-pub async fn alarm(c: &Conversation) -> Result<Alarm, Failure> {
+/// Reads the alarm, object 260E.
+pub async fn alarm(c: &SdoSession) -> Result<Alarm, Failure> {
     Ok(Alarm::of(c.read(&ALARM).await? as u16))
 }
 
-/// The failure that an alarm is.
+/// The failure for an alarm.
 pub fn faulted(alarm: Alarm) -> Failure {
     Failure::Faulted { what: format!("alarm {alarm}"), advice: alarm.advice() }
 }
 
 /// `watch`
 pub async fn watch(
-    c: &Conversation,
-    s: &Subject,
+    c: &SdoSession,
+    s: &TargetDrive,
     every_ns: Nanoseconds,
     duration_ns: Option<Nanoseconds>,
 ) -> Result<Report, Failure> {
-    contact::reach(c, s).await?;
-    looking::watch(c, every_ns, duration_ns, async || read(c, s).await).await
+    contact::connect(c, s).await?;
+    polling::watch(c, every_ns, duration_ns, async || read(c, s).await).await
 }
 
-/// Position and state in the end.
-pub async fn summary(c: &Conversation, s: &Subject) -> Result<Report, Failure> {
-    Ok(looking::summary(s, &read(c, s).await?))
+/// Final position and state.
+pub async fn summary(c: &SdoSession, s: &TargetDrive) -> Result<Report, Failure> {
+    Ok(polling::summary(s, &read(c, s).await?))
 }

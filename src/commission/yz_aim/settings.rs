@@ -1,31 +1,31 @@
-//! Gains, electronic gear, what the drive does at power-up, and the set-up for interpolation.
+//! Gains, electronic gear, motion at power-up, and the set-up for interpolation.
 
 use super::enabling::refuse_enabled;
 use super::objects::*;
 use super::storing::store;
 use super::words;
 use crate::commission::contact;
-use crate::commission::conversation::Conversation;
 use crate::commission::failure::Failure;
 use crate::commission::report::Report;
-use crate::commission::subject::Subject;
+use crate::commission::sdo_session::SdoSession;
+use crate::commission::target::TargetDrive;
 
-/// 2619: return to the multi-turn zero at power-up.
+/// 2619 = 6: return to the multi-turn zero at power-up.
 const RETURN_TO_ZERO: i64 = 6;
-/// 2619: interpolation.
+/// 2619 = 7: interpolation.
 const INTERPOLATION: i64 = 7;
-/// 6083: no ramp of the drive's own. Its last digit is the speed of the return to zero: 100 r/min.
+/// 6083 = 60000: no ramp. Its last digit 0 sets the speed of the return to zero: 100 r/min.
 const NO_RAMP: i64 = 60_000;
 
 /// `gains`
 pub async fn gains(
-    c: &Conversation,
-    s: &Subject,
+    c: &SdoSession,
+    s: &TargetDrive,
     position_proportional: Option<i64>,
     velocity_proportional: Option<i64>,
     velocity_integration: Option<i64>,
 ) -> Result<Report, Failure> {
-    contact::reach_family(c, s).await?;
+    contact::connect_family(c, s).await?;
     let wanted = [
         ("position_proportional", POSITION_PROPORTIONAL, position_proportional),
         ("velocity_proportional", VELOCITY_PROPORTIONAL, velocity_proportional),
@@ -55,15 +55,14 @@ pub async fn gains(
     Ok(report)
 }
 
-/// `gear`: of the pulse input. Whether it also scales the positions of the bus is not said; the manual's examples show
-/// none.
-pub async fn gear(c: &Conversation, s: &Subject, ratio: Option<(u16, u16)>) -> Result<Report, Failure> {
+/// `gear`: the electronic gear of the pulse input. The manual does not say whether it also scales positions on the bus.
+pub async fn gear(c: &SdoSession, s: &TargetDrive, ratio: Option<(u16, u16)>) -> Result<Report, Failure> {
     if let Some((numerator, _)) = ratio
         && let Some(key) = words::gear_key(numerator.into())
     {
-        return Err(Failure::Unsuitable(format!("{numerator} is no numerator but a key: {key}")));
+        return Err(Failure::Unsuitable(format!("{numerator} is not a numerator but a command key: {key}")));
     }
-    contact::reach_family(c, s).await?;
+    contact::connect_family(c, s).await?;
     c.step("electronic gear");
     if let Some((numerator, denominator)) = ratio {
         c.write_and_check(&GEAR_NUMERATOR, numerator.into()).await?;
@@ -90,23 +89,23 @@ fn greatest_common_divisor(a: u16, b: u16) -> u16 {
 
 /// `auto-home`
 pub async fn auto_home(
-    c: &Conversation,
-    s: &Subject,
+    c: &SdoSession,
+    s: &TargetDrive,
     is_on: bool,
-    is_agreed: bool,
+    is_confirmed: bool,
 ) -> Result<Report, Failure> {
-    if is_on && !is_agreed {
+    if is_on && !is_confirmed {
         return Err(Failure::NeedsConsent {
             consequence: "the motor will move to its multi-turn zero by itself whenever its supply comes on",
             option: "--yes",
         });
     }
-    contact::reach_family(c, s).await?;
+    contact::connect_family(c, s).await?;
     refuse_enabled(c).await?;
     c.step("special function");
     let before = c.read(&SPECIAL_FUNCTION).await?;
     if before == INTERPOLATION {
-        c.note("interpolation (7) is given up: the drive has one special function");
+        c.note("interpolation (7) is turned off: the drive has one special function at a time");
     }
     let function = if is_on { RETURN_TO_ZERO } else { 0 };
     c.write_and_check(&SPECIAL_FUNCTION, function).await?;
@@ -122,16 +121,18 @@ pub async fn auto_home(
 }
 
 /// `interpolation`
-pub async fn interpolation(c: &Conversation, s: &Subject) -> Result<Report, Failure> {
-    contact::reach_family(c, s).await?;
+pub async fn interpolation(c: &SdoSession, s: &TargetDrive) -> Result<Report, Failure> {
+    contact::connect_family(c, s).await?;
     refuse_enabled(c).await?;
     c.step("special function");
     let before = c.read(&SPECIAL_FUNCTION).await?;
     if before == RETURN_TO_ZERO {
-        c.note("the return to zero at power-up (6) is given up: the drive has one special function");
+        c.note(
+            "the return to zero at power-up (6) is turned off: the drive has one special function at a time",
+        );
     }
     c.write_and_check(&SPECIAL_FUNCTION, INTERPOLATION).await?;
-    c.step("no ramp of the drive's own");
+    c.step("no acceleration ramp");
     let acceleration = c.read(&ACCELERATION).await?;
     if acceleration < NO_RAMP {
         c.write_and_check(&ACCELERATION, NO_RAMP).await?;
@@ -139,12 +140,7 @@ pub async fn interpolation(c: &Conversation, s: &Subject) -> Result<Report, Fail
     store(c).await?;
     let mut report = special_function(before, INTERPOLATION);
     let acceleration = c.read(&ACCELERATION).await?;
-    report.add(
-        "acceleration",
-        "acceleration",
-        acceleration,
-        format!("{acceleration}: no ramp of the drive's own"),
-    );
+    report.add("acceleration", "acceleration", acceleration, format!("{acceleration}: no ramp in the drive"));
     c.note("power-cycle the drive: the special function must be stored before it is used");
     Ok(report)
 }

@@ -1,4 +1,5 @@
-//! Storing parameters, and what is stored: the multi-turn zero, node address, bit rate (manual V.2, V.3.B, 5.04, 5.13).
+//! Stores parameters, and changes stored settings: multi-turn zero, node address, bit rate (manual V.2, V.3.B, 5.04,
+//! 5.13).
 
 use takt_rt::Nanoseconds;
 
@@ -8,31 +9,31 @@ use super::objects::*;
 use super::reading;
 use crate::canopen::objects::*;
 use crate::commission::contact;
-use crate::commission::conversation::Conversation;
 use crate::commission::failure::Failure;
 use crate::commission::report::Report;
 use crate::commission::scan;
-use crate::commission::subject::Subject;
+use crate::commission::sdo_session::SdoSession;
+use crate::commission::target::TargetDrive;
 
-/// The manual gives no time for storing.
+/// Timeout of storing; the manual gives no time.
 const STORING_NS: Nanoseconds = 10_000_000_000;
-/// 260A returns to its stored value, and the position to zero, within this.
+/// Longest time until 260A has its stored value again and the position is zero.
 const ZEROING_NS: Nanoseconds = 1_000_000_000;
-/// How often the two keys are written.
+/// How many times the two keys are written.
 const ZERO_ATTEMPTS: u8 = 3;
-/// "0 or plus a single digit"
+/// Positions that count as zero: "0 or plus a single digit" (manual).
 const ZERO_COUNTS: std::ops::RangeInclusive<i64> = 0..=9;
 
-/// Starts storing and waits for its end.
-pub async fn store(c: &Conversation) -> Result<(), Failure> {
+/// Starts storing (2614 = 1) and waits for its end (2614 = 2).
+pub async fn store(c: &SdoSession) -> Result<(), Failure> {
     c.step("store");
     c.write(&SAVE_FLAG, 1).await?;
     c.wait_for(&SAVE_FLAG, "stored (2)", STORING_NS, |flag| flag == 2).await.map(|_| ())
 }
 
 /// `save`
-pub async fn save(c: &Conversation, s: &Subject) -> Result<Report, Failure> {
-    contact::reach_family(c, s).await?;
+pub async fn save(c: &SdoSession, s: &TargetDrive) -> Result<Report, Failure> {
+    contact::connect_family(c, s).await?;
     refuse_enabled(c).await?;
     store(c).await?;
     let mut report = Report::new();
@@ -41,21 +42,21 @@ pub async fn save(c: &Conversation, s: &Subject) -> Result<Report, Failure> {
 }
 
 /// `zero`
-pub async fn zero(c: &Conversation, s: &Subject, is_agreed: bool) -> Result<Report, Failure> {
-    if !is_agreed {
+pub async fn zero(c: &SdoSession, s: &TargetDrive, is_confirmed: bool) -> Result<Report, Failure> {
+    if !is_confirmed {
         return Err(Failure::NeedsConsent {
-            consequence: "this makes the present position the multi-turn zero: every stored position gets another \
+            consequence: "this makes the current position the multi-turn zero: every stored position changes its \
                           meaning",
             option: "--yes",
         });
     }
-    contact::reach_family(c, s).await?;
+    contact::connect_family(c, s).await?;
     refuse_enabled(c).await?;
     set_zero(c).await
 }
 
-/// 260A = 60006, then 60016; success is that 260A has its stored value again and the position is zero.
-pub async fn set_zero(c: &Conversation) -> Result<Report, Failure> {
+/// Writes 60006 and 60016 to 260A. It succeeded when 260A has its stored value again and the position is zero.
+pub async fn set_zero(c: &SdoSession) -> Result<Report, Failure> {
     let before = c.read(&POSITION_ACTUAL_VALUE).await?;
     let numerator = c.read(&GEAR_NUMERATOR).await?;
     for attempt in 1..=ZERO_ATTEMPTS {
@@ -78,26 +79,26 @@ pub async fn set_zero(c: &Conversation) -> Result<Report, Failure> {
             return Ok(report);
         }
         if attempt < ZERO_ATTEMPTS {
-            c.note(format!("the position is {after} counts, the alarm {alarm}: once more"));
+            c.note(format!("the position is {after} counts, the alarm is {alarm}: repeating"));
         }
     }
     if c.read(&GEAR_NUMERATOR).await? != numerator {
         c.write(&GEAR_NUMERATOR, numerator).await?;
     }
     Err(Failure::Contradicted(format!(
-        "the drive did not take the multi-turn zero after {ZERO_ATTEMPTS} attempts: has this model a battery?"
+        "the drive did not set the multi-turn zero in {ZERO_ATTEMPTS} attempts: check that this model has a battery"
     )))
 }
 
 /// `set-id`
-pub async fn set_id(c: &Conversation, s: &Subject, node: u8) -> Result<Report, Failure> {
-    contact::reach_family(c, s).await?;
+pub async fn set_id(c: &SdoSession, s: &TargetDrive, node: u8) -> Result<Report, Failure> {
+    contact::connect_family(c, s).await?;
     refuse_enabled(c).await?;
     let others = scan::others(c).await?;
     if !others.is_empty() {
         let nodes: Vec<String> = others.iter().map(u8::to_string).collect();
         return Err(Failure::Unsuitable(format!(
-            "there are other nodes on this bus ({}): connect the one drive alone, since two drives with the same number \
+            "there are other nodes on this bus ({}): connect this drive alone, since two drives with the same node ID \
              cannot be told apart",
             nodes.join(", ")
         )));
@@ -114,17 +115,17 @@ pub async fn set_id(c: &Conversation, s: &Subject, node: u8) -> Result<Report, F
 /// The bit rates and their codes.
 const BIT_RATES: [(u32, i64); 4] = [(1_000_000, 803), (500_000, 802), (250_000, 801), (125_000, 800)];
 
-/// `set-bitrate`: four writes in this order, and a power cycle. No storing: the manual lists none.
-pub async fn set_bit_rate(c: &Conversation, s: &Subject, bit_rate: u32) -> Result<Report, Failure> {
+/// `set-bitrate`: four writes in this order, then a power cycle. The manual does not ask for storing.
+pub async fn set_bit_rate(c: &SdoSession, s: &TargetDrive, bit_rate: u32) -> Result<Report, Failure> {
     let Some((_, code)) = BIT_RATES.iter().find(|(known, _)| *known == bit_rate) else {
         return Err(Failure::Unsupported {
             what: format!("this drive has no bit rate of {bit_rate} bit/s"),
             instead: "it has 1 Mbit/s, 500, 250 and 125 kbit/s".to_owned(),
         });
     };
-    contact::reach_family(c, s).await?;
+    contact::connect_family(c, s).await?;
     refuse_enabled(c).await?;
-    c.step("mailboxes as they are");
+    c.step("read the key objects");
     let mut before = vec![];
     for object in [ACCELERATION, FLUX_WEAKENING_ANGLE, MODBUS_ENABLE] {
         before.push((object, c.read(&object).await?));
@@ -140,7 +141,7 @@ pub async fn set_bit_rate(c: &Conversation, s: &Subject, bit_rate: u32) -> Resul
     let values: Vec<String> =
         before.iter().map(|(object, value)| format!("{} = {value}", object.address)).collect();
     c.note(format!(
-        "power-cycle the drive, then see whether it still has what it had before ({}) and write back what has changed",
+        "power-cycle the drive, then read these objects ({}) and write back what has changed",
         values.join(", ")
     ));
     Ok(report)

@@ -1,12 +1,12 @@
-//! Statusword, controlword, modes and special functions of a YZ-AIM in words. Its statusword is not that of CiA 402:
-//! bits 6, 7, 9 and 11 are missing and the values on record match none of its states, so that every bit is read by
-//! itself (manual 5.06 to 5.09, tables of 6040h and 6041h).
+//! Names of statusword bits, controlword bits, modes and special functions of a YZ-AIM. Its statusword differs from CiA
+//! 402: bits 6, 7, 9 and 11 are missing, and the documented values match none of the CiA 402 states. Therefore each bit
+//! is decoded by itself (manual 5.06 to 5.09, tables of 6040h and 6041h).
 
-/// The bits that an enabled drive has set.
+/// The bits that are set in an enabled drive.
 pub const ENABLED: u16 = 0x0037;
 /// Bit 2: the motor is energised, with or without a controlword (0404h at power-up, 0014h in homing).
 pub const ENERGISED: u16 = 1 << 2;
-/// Bit 3: an alarm, whatever else is set.
+/// Bit 3: alarm, valid whatever the other bits are.
 pub const ALARM: u16 = 1 << 3;
 /// Bit 10.
 pub const TARGET_REACHED: u16 = 1 << 10;
@@ -15,21 +15,21 @@ pub const HOMING_COMPLETE: u16 = 1 << 12;
 /// Bit 13, in homing mode only.
 pub const HOMING_ERROR: u16 = 1 << 13;
 
-/// Controlwords as the manual uses them.
+/// Controlwords of the manual.
 pub mod control {
-    /// 0006h: not enabled. What it does to the power stage is not described.
+    /// 0006h: not enabled. The manual does not describe its effect on the power stage.
     pub const SHUTDOWN: i64 = 0x0006;
-    /// 0007h: started, no operation.
+    /// 0007h: switched on, operation not enabled.
     pub const SWITCH_ON: i64 = 0x0007;
     /// 000Fh: enabled; absolute.
     pub const ENABLE: i64 = 0x000F;
     /// 001Fh: enabled; run to the new set-point.
     pub const RUN: i64 = 0x001F;
-    /// 002Fh: enabled; every write of the target moves at once.
+    /// 002Fh: enabled; every write of the target starts a move at once.
     pub const IMMEDIATE: i64 = 0x002F;
     /// 004Fh: enabled; relative.
     pub const RELATIVE: i64 = 0x004F;
-    /// 005Fh: enabled; relative, go. The drive clears the bit itself.
+    /// 005Fh: enabled; start a relative move. The drive clears the bit itself.
     pub const RELATIVE_RUN: i64 = 0x005F;
     /// 0080h: clear an alarm.
     pub const RESET: i64 = 0x0080;
@@ -37,12 +37,12 @@ pub mod control {
     pub const HALT: i64 = 0x010F;
 }
 
-/// Whether the drive has been enabled by its controlword.
+/// Whether the drive is enabled by its controlword.
 pub const fn is_enabled(statusword: u16) -> bool {
     statusword & ENABLED == ENABLED
 }
 
-/// The state in a word or two.
+/// The name of the state.
 pub const fn state(statusword: u16) -> &'static str {
     if statusword & ALARM != 0 {
         "alarm"
@@ -84,17 +84,17 @@ fn set(bits: &[(u16, &str)], word: u16) -> String {
     if words.is_empty() { "no bit".to_owned() } else { words.join(", ") }
 }
 
-/// The bits of a statusword.
+/// The names of the set bits of a statusword.
 pub fn statusword(word: u16) -> String {
     set(&STATUS, word)
 }
 
-/// The bits of a controlword.
+/// The names of the set bits of a controlword.
 pub fn controlword(word: u16) -> String {
     set(&CONTROL, word)
 }
 
-/// Object 6060.
+/// The name of a mode, object 6060.
 pub const fn mode(value: i64) -> Option<&'static str> {
     Some(match value {
         1 => "position",
@@ -105,7 +105,7 @@ pub const fn mode(value: i64) -> Option<&'static str> {
     })
 }
 
-/// Object 2614.
+/// The name of the save flag, object 2614.
 pub const fn save_flag(value: i64) -> Option<&'static str> {
     Some(match value {
         0 => "not stored",
@@ -115,7 +115,7 @@ pub const fn save_flag(value: i64) -> Option<&'static str> {
     })
 }
 
-/// Object 2619.
+/// The name of a special function, object 2619.
 pub fn special_function(value: i64) -> String {
     match value {
         0 => "pulse and direction".to_owned(),
@@ -131,7 +131,7 @@ pub fn special_function(value: i64) -> String {
     }
 }
 
-/// Values of object 260A that are no numerator.
+/// The values of object 260A that are command keys, not numerators.
 pub const fn gear_key(value: i64) -> Option<&'static str> {
     Some(match value {
         0 => "communication control from power-up",
@@ -141,11 +141,11 @@ pub const fn gear_key(value: i64) -> Option<&'static str> {
     })
 }
 
-/// Object 1016:1.
+/// The meaning of object 1016:1.
 pub fn consumer_heartbeat(value: u32) -> String {
     match value & 0xFFFF {
-        0 => "no master is watched".to_owned(),
-        time_ms => format!("node {} is watched, {time_ms} ms", value >> 16 & 0x7F),
+        0 => "heartbeat watchdog off".to_owned(),
+        time_ms => format!("monitors the heartbeat of node {}, timeout {time_ms} ms", value >> 16 & 0x7F),
     }
 }
 
@@ -154,7 +154,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_statuswords_of_the_manual_are_read_by_single_bits() {
+    fn statuswords_of_the_manual_are_decoded_bit_by_bit() {
         assert_eq!((state(0x0437), is_enabled(0x0437)), ("enabled", true));
         assert_eq!((state(0x0404), is_enabled(0x0404)), ("not enabled, energised", false));
         assert_eq!(state(0x0014), "not enabled, energised");

@@ -6,21 +6,23 @@ use takt_rt::MAX_AXES;
 
 use super::bus::ReadBus;
 use super::control::control;
-use super::entry::{Bounds, Entry, Problems};
-use super::limits::{contains, following_error, limits, show_range};
+use super::entry::Entry;
+use super::limits::{following_error, limits};
 use super::machine::{boolean, heartbeat, node};
 use super::section::Section;
-use super::travel::{Counting, Quantities, counting, travel};
+use super::travel::{counting, travel};
 use crate::canopen::dcf::DeviceConfiguration;
 use crate::config::defaults;
 use crate::config::model::{
-    Axis, Control, DriveFamily, Feedback, Identity, Limits, Master, OnViolation, PdoMapping, SimulatedJoint,
-    Travel,
+    Axis, Control, DriveFamily, Feedback, Identity, Interface, Limits, OnViolation, PdoMapping,
+    SimulatedJoint, Travel,
 };
 use crate::config::problem_kind::ProblemKind;
-use crate::config::quantity::Quantity;
-use crate::config::spelling;
-use crate::drive::yz_aim;
+use crate::config::quantities::Quantities;
+use crate::config::ranges;
+use crate::config::rules;
+use crate::config::rules::loops::Surroundings;
+use crate::config::rules::program::AxisView;
 
 /// The families of drives by their words.
 const DRIVES: [(&str, DriveFamily); 2] = [
@@ -39,76 +41,113 @@ pub struct ReadAxis {
     header: Range<usize>,
 }
 
-pub fn axes<'a>(
-    sections: Vec<Section<'a>>,
-    buses: &[ReadBus],
-    cycle_ns: u64,
-    master: &Master,
-    problems: &'a Problems<'a>,
-) -> Vec<ReadAxis> {
+impl ReadAxis {
+    /// What a move needs to know of it.
+    pub fn view(&self) -> AxisView<'_> {
+        AxisView {
+            name: self.name.as_deref().unwrap_or_default(),
+            quantities: self.quantities,
+            limits: self.limits.as_ref(),
+            control: self.axis.as_ref().map(|axis| axis.control),
+        }
+    }
+}
+
+/// What the axes need of the rest of the file.
+pub struct Machine<'a> {
+    pub buses: &'a [ReadBus<'a>],
+    pub cycle_ns: u64,
+    pub master_node: u8,
+}
+
+impl Machine<'_> {
+    fn bus(&self, bus: Option<usize>) -> Option<&ReadBus<'_>> {
+        self.buses.get(bus?)
+    }
+
+    /// The period of a bus; `None` when it could not be read.
+    fn period_ns(&self, bus: Option<usize>) -> Option<u64> {
+        Some(self.cycle_ns * u64::from(self.bus(bus)?.divider?))
+    }
+}
+
+/// The axes, but no more than one beyond those that a controller can have: the rest are only counted.
+pub fn axes(sections: Vec<Section<'_>>, machine: &Machine<'_>) -> Vec<ReadAxis> {
     let count = sections.len();
-    let mut axes: Vec<ReadAxis> = Vec::with_capacity(count);
-    for section in sections {
-        let header = section.header();
-        axes.push(axis(section, buses, cycle_ns, master, &axes, problems));
-        if axes.len() == MAX_AXES + 1 {
-            problems.report(ProblemKind::TooMany { what: "axes", given: count, limit: MAX_AXES }, header);
+    let mut axes: Vec<ReadAxis> = Vec::with_capacity(MAX_AXES + 1);
+    for section in sections.into_iter().take(MAX_AXES + 1) {
+        let spot = section.header_spot();
+        let read = axis(section, machine, &axes);
+        axes.push(read);
+        if axes.len() > MAX_AXES {
+            spot.report(rules::axis::too_many(count));
         }
     }
     axes
 }
 
-fn axis<'a>(
-    mut section: Section<'a>,
-    buses: &[ReadBus],
-    cycle_ns: u64,
-    master: &Master,
-    earlier: &[ReadAxis],
-    problems: &'a Problems<'a>,
-) -> ReadAxis {
+fn axis(mut section: Section<'_>, machine: &Machine<'_>, earlier: &[ReadAxis]) -> ReadAxis {
     let header = section.header();
     let name = section.require_own("name", "the name of the axis: name = \"joint1\"").and_then(|entry| {
         let name = entry.name()?.to_owned();
         if let Some(first) = earlier.iter().find(|axis| axis.name.as_ref() == Some(&name)) {
-            let kind = ProblemKind::DuplicateName { what: "axis", name: name.clone() };
-            problems.report_against(kind, entry.span.clone(), first.header.clone());
+            entry.spot.report_against(rules::axis::duplicate_name(&name), &first.header);
         }
         Some(name)
     });
-    let bus = section.require("bus", "the name of its bus").and_then(|entry| bus_index(&entry, buses));
-    let node = section.require_own("node", "its node number, 1 to 127").and_then(|entry| {
+    let bus =
+        section.require("bus", "the name of its bus").and_then(|entry| bus_index(&entry, machine.buses));
+    let node = section.require_own("node", "its node ID, 1 to 127").and_then(|entry| {
         let node = node(&entry)?;
-        check_node(&entry, node, bus, buses, master, earlier, problems);
+        check_node(&entry, node, bus, machine, earlier);
         Some(node)
     });
     let drive = section
         .require("drive", "the family of the drive: drive = \"erob-canopen\"")
         .and_then(|entry| entry.choice(&DRIVES));
-    check_bit_rate(drive, bus.and_then(|bus| buses.get(bus)), problems);
+    if let Some((drive, bus)) = drive.zip(machine.bus(bus))
+        && let Some(spot) = &bus.bit_rate_spot
+    {
+        rules::axis::bit_rate(spot, drive, bus.bit_rate);
+    }
 
     let travel = travel(&mut section);
-    let quantities = Quantities::of(travel.unwrap_or(Travel::Rotary));
-    let counting = counting(&mut section, drive);
-    let limits = limits(section.section("limits"), quantities, travel, &counting);
-    let following_error = following_error(section.section("following_error"), quantities);
-    let simulated = simulated(section.section("simulated"), quantities, limits.as_ref(), name.as_deref());
-    let control = control(&mut section, drive, quantities, &simulated);
+    let q = Quantities::of(travel.unwrap_or(Travel::Rotary));
+    let counting = counting(&mut section, drive, travel);
+    let limits = limits(section.section("limits"), q, counting.as_ref());
+    let following_error = following_error(section.section("following_error"), q);
+    let simulated = simulated(section.section("simulated"), q, limits.as_ref(), name.as_deref());
+    let transmission_type = transmission_type(&mut section);
+    let period_ns = machine.period_ns(bus);
+    let surroundings = period_ns.map(|period_ns| {
+        let interface = machine.bus(bus).and_then(|bus| bus.bus.as_ref()).map(|bus| &bus.interface);
+        let is_simulated = interface == Some(&Interface::Simulated);
+        Surroundings::new(period_ns, transmission_type, simulated.inertia, is_simulated)
+    });
+    let control = control(&mut section, drive, q, &simulated, surroundings.as_ref());
     if drive == Some(DriveFamily::YzAim) {
-        check_period(control, bus.and_then(|bus| buses.get(bus)), cycle_ns, problems);
-        check_speed(&section, limits.as_ref(), &counting, travel, quantities);
+        if let (Some(control), Some(period_ns), Some(bus)) = (control, period_ns, machine.bus(bus)) {
+            rules::axis::interpolation_period(&bus.spot, control, period_ns);
+        }
+        if let (Some(limits), Some(counting)) = (&limits, &counting) {
+            let spot = section.section("limits").spot("velocity");
+            rules::axis::motor_speed(&spot, limits, counting, q);
+        }
     }
     let mapping = mapping(&mut section, drive);
     let feedback = feedback(&mut section, drive, mapping);
     let answers_sync = boolean(&mut section, "answers_sync", defaults::ANSWERS_SYNC);
-    let transmission_type = transmission_type(&mut section);
-    let start_tolerance = section
-        .get("start_tolerance")
-        .and_then(|entry| entry.quantity(quantities.position, Bounds::Positive));
+    let mut tolerance =
+        |key| section.get(key).and_then(|entry: Entry<'_>| entry.quantity(q.position, q.ranges.deviation));
+    let start_tolerance = tolerance("start_tolerance");
+    let target_tolerance = tolerance("target_tolerance");
     let on_violation = section
         .get("on_violation")
         .and_then(|entry| entry.choice(&[("reject", OnViolation::Reject), ("clamp", OnViolation::Clamp)]));
-    let missed = section.get("missed_feedback_cycles").and_then(|entry| entry.integer(1..1001));
-    let feedback_delay = section.get("feedback_delay").and_then(|entry| entry.nanoseconds(0.0, 0.01));
+    let missed =
+        section.get("missed_feedback_cycles").and_then(|entry| entry.integer(ranges::MISSED_FEEDBACK_CYCLES));
+    let feedback_delay =
+        section.get("feedback_delay").and_then(|entry| entry.nanoseconds(ranges::FEEDBACK_DELAY_S));
     let heartbeat_ns = section.get("heartbeat").and_then(|entry| heartbeat(&entry));
     let identity = identity(section.section("identity"), drive);
     let dcf = section.get("dcf").and_then(|entry| dcf(&entry, node));
@@ -117,23 +156,25 @@ fn axis<'a>(
     let place = bus.zip(node);
     let build = || {
         let (bus, node) = place?;
+        let (travel, control, counting) = (travel?, control?, counting?);
         Some(Axis {
             name: name.clone()?,
             bus,
             node,
             drive: drive?,
-            control: control?,
-            travel: travel?,
+            control,
+            travel,
             counts_per_turn: counting.counts_per_turn,
             gear_ratio: counting.gear_ratio,
             reversed: counting.reversed,
             zero_counts: counting.zero_counts,
             limits: limits?,
             following_error,
-            start_tolerance: start_tolerance.unwrap_or(match travel? {
+            start_tolerance: start_tolerance.unwrap_or(match travel {
                 Travel::Rotary => defaults::START_TOLERANCE_RAD,
                 Travel::Linear { .. } => defaults::START_TOLERANCE_M,
             }),
+            target_tolerance: target_tolerance.unwrap_or_else(|| default_target_tolerance(travel, &control)),
             on_violation: on_violation.unwrap_or_default(),
             missed_feedback_cycles: missed
                 .and_then(|cycles| u16::try_from(cycles).ok())
@@ -150,85 +191,41 @@ fn axis<'a>(
         })
     };
     let axis = build();
-    ReadAxis { name, quantities, limits, axis, place, header }
+    ReadAxis { name, quantities: q, limits, axis, place, header }
 }
 
-fn bus_index(entry: &Entry<'_>, buses: &[ReadBus]) -> Option<usize> {
+/// In CST the loop has no integral part: static friction holds the joint off its target by friction / stiffness at most.
+fn default_target_tolerance(travel: Travel, control: &Control) -> f64 {
+    let own = match travel {
+        Travel::Rotary => defaults::TARGET_TOLERANCE_RAD,
+        Travel::Linear { .. } => defaults::TARGET_TOLERANCE_M,
+    };
+    match control {
+        Control::Torque { stiffness, coulomb_friction, .. } => {
+            own.max(defaults::TARGET_TOLERANCE_PER_FRICTION * coulomb_friction / stiffness)
+        }
+        _ => own,
+    }
+}
+
+fn bus_index(entry: &Entry<'_>, buses: &[ReadBus<'_>]) -> Option<usize> {
     let given = entry.text()?;
     let found = buses.iter().position(|bus| bus.name.as_deref() == Some(given));
     if found.is_none() && buses.iter().all(|bus| bus.name.is_some()) {
-        let known: Vec<String> = buses.iter().filter_map(|bus| bus.name.clone()).collect();
-        let nearest = spelling::nearest(given, known.iter().map(String::as_str)).map(str::to_owned);
-        entry.report(ProblemKind::UnknownBus { name: given.to_owned(), nearest, known });
+        let known: Vec<&str> = buses.iter().filter_map(|bus| bus.name.as_deref()).collect();
+        entry.report(rules::axis::unknown_bus(given, &known));
     }
     found
 }
 
-fn check_node(
-    entry: &Entry<'_>,
-    node: u8,
-    bus: Option<usize>,
-    buses: &[ReadBus],
-    master: &Master,
-    earlier: &[ReadAxis],
-    problems: &Problems<'_>,
-) {
+fn check_node(entry: &Entry<'_>, node: u8, bus: Option<usize>, machine: &Machine<'_>, earlier: &[ReadAxis]) {
     let Some(bus) = bus else { return };
-    let bus_name = buses.get(bus).and_then(|bus| bus.name.clone()).unwrap_or_default();
-    let kind = ProblemKind::DuplicateNode { bus: bus_name, node };
+    let bus_name = machine.bus(Some(bus)).and_then(|bus| bus.name.as_deref()).unwrap_or_default();
+    let kind = rules::axis::duplicate_node(bus_name, node);
     if let Some(first) = earlier.iter().find(|axis| axis.place == Some((bus, node))) {
-        problems.report_against(kind, entry.span.clone(), first.header.clone());
-    } else if node == master.node {
+        entry.spot.report_against(kind, &first.header);
+    } else if node == machine.master_node {
         entry.report(kind);
-    }
-}
-
-/// An eRob knows one bit rate (eRunner manual, section 1 of the specification), a YZ-AIM four (manual, 5.13).
-fn check_bit_rate(drive: Option<DriveFamily>, bus: Option<&ReadBus>, problems: &Problems<'_>) {
-    let (rates, allowed): (&[u32], _) = match drive {
-        Some(DriveFamily::ErobCanopen) => {
-            (&[1_000_000], "1 Mbit/s, the one bit rate of the eRobs on this bus")
-        }
-        Some(DriveFamily::YzAim) => (
-            &[125_000, 250_000, 500_000, 1_000_000],
-            "125, 250 or 500 kbit/s or 1 Mbit/s, the bit rates of the YZ-AIMs on this bus",
-        ),
-        None => return,
-    };
-    if let Some(bus) = bus.filter(|bus| !rates.contains(&bus.bit_rate))
-        && let Some(span) = bus.bit_rate_span.clone()
-    {
-        let (key, value) = ("bus.bit_rate".to_owned(), Quantity::BIT_RATE.show(bus.bit_rate.into()));
-        problems.report(ProblemKind::OutOfRange { key, value, allowed: allowed.to_owned() }, span);
-    }
-}
-
-/// A YZ-AIM interpolates from target to target in 2 ms (manual, 5.10.3).
-fn check_period(control: Option<Control>, bus: Option<&ReadBus>, cycle_ns: u64, problems: &Problems<'_>) {
-    let (Some(Control::Interpolated), Some(bus)) = (control, bus) else { return };
-    let Some(divider) = bus.divider else { return };
-    let period_ns = cycle_ns * u64::from(divider);
-    if period_ns != yz_aim::INTERPOLATION_PERIOD_NS {
-        let (key, value) = ("bus.period".to_owned(), Quantity::DURATION.show(period_ns as f64 / 1e9));
-        let allowed = "2 ms, the period of a YZ-AIM that interpolates: period = \"2 ms\"".to_owned();
-        problems.report(ProblemKind::OutOfRange { key, value, allowed }, bus.header.clone());
-    }
-}
-
-/// Objects 6081 and 60FF of a YZ-AIM end at 3000 r/min of the motor.
-fn check_speed(
-    section: &Section<'_>,
-    limits: Option<&Limits>,
-    counting: &Counting,
-    travel: Option<Travel>,
-    q: Quantities,
-) {
-    let Some(limits) = limits else { return };
-    let turns_per_unit = counting.counts_per_unit(travel) / counting.counts_per_turn;
-    let highest = yz_aim::HIGHEST_SPEED_RPM / 60.0 / turns_per_unit;
-    if limits.velocity > highest * (1.0 + 1e-9) {
-        let allowed = format!("at most {}, 3000 r/min of the motor", q.velocity.show(highest));
-        section.report_default_out_of_range("limits.velocity", q.velocity.show(limits.velocity), allowed);
     }
 }
 
@@ -241,21 +238,17 @@ fn simulated(
     let mut value = |key, quantity, bounds| {
         section.get(key).and_then(|entry: Entry<'_>| entry.quantity(quantity, bounds))
     };
-    let inertia = value("inertia", q.inertia, Bounds::Positive);
-    let viscous_friction = value("viscous_friction", q.damping, Bounds::NotNegative);
-    let coulomb_friction = value("coulomb_friction", q.effort, Bounds::NotNegative);
-    let rated_torque = value("rated_torque", q.effort, Bounds::Positive);
-    let peak_torque = value("peak_torque", q.effort, Bounds::Positive);
-    let power_up_ns = section.get("power_up").and_then(|entry| entry.nanoseconds(0.0, 60.0));
+    let ranges = q.ranges;
+    let inertia = value("inertia", q.inertia, ranges.inertia);
+    let viscous_friction = value("viscous_friction", q.damping, ranges.viscous_friction);
+    let coulomb_friction = value("coulomb_friction", q.effort, ranges.friction);
+    let rated_torque = value("rated_torque", q.effort, ranges.effort);
+    let peak_torque = value("peak_torque", q.effort, ranges.effort);
+    let power_up_ns = section.get("power_up").and_then(|entry| entry.nanoseconds(ranges::POWER_UP_S));
     let initial = section.get("initial_position").and_then(|entry| {
-        let position = entry.quantity(q.position, Bounds::Finite)?;
-        if let Some(limits) = limits.filter(|limits| !contains(limits, position)) {
-            entry.report(ProblemKind::InitialPositionOutsideLimits {
-                axis: name.unwrap_or_default().to_owned(),
-                value: q.position.show(position),
-                allowed: show_range(limits, q),
-            });
-        }
+        let position = entry.unbounded(q.position)?;
+        let name = name.unwrap_or_default();
+        rules::simulation::initial_position(&entry.spot, position, q, limits, name);
         Some(position)
     });
     section.finish();
@@ -275,21 +268,20 @@ fn simulated(
 }
 
 fn mapping(section: &mut Section<'_>, drive: Option<DriveFamily>) -> PdoMapping {
-    let is_fixed = drive == Some(DriveFamily::YzAim);
     let choices = [("written", PdoMapping::Written), ("as-stored", PdoMapping::AsStored)];
     let read = section.get("mapping").and_then(|entry| {
         let mapping = entry.choice(&choices)?;
-        if is_fixed && mapping == PdoMapping::Written {
-            let allowed = "as-stored, since the PDOs of a YZ-AIM are fixed".to_owned();
-            entry.report_range("written".to_owned(), allowed);
+        if let Some(drive) = drive {
+            rules::axis::mapping(&entry.spot, drive, mapping);
         }
         Some(mapping)
     });
+    let is_fixed = drive == Some(DriveFamily::YzAim);
     read.unwrap_or(if is_fixed { PdoMapping::AsStored } else { PdoMapping::Written })
 }
 
-/// A drive whose PDOs are written reports its mode of operation unless another list is given: nothing else tells that
-/// somebody has changed it.
+/// A drive whose PDOs are written reports its mode of operation (object 6061) unless another list is given. Nothing else shows that
+/// another master has changed the mode.
 fn feedback(section: &mut Section<'_>, drive: Option<DriveFamily>, mapping: PdoMapping) -> Vec<Feedback> {
     let choices = Feedback::ALL.map(|feedback| (feedback.word(), feedback));
     let Some(entry) = section.get("feedback") else {
@@ -298,27 +290,16 @@ fn feedback(section: &mut Section<'_>, drive: Option<DriveFamily>, mapping: PdoM
     let mut feedback = vec![];
     for entry in entry.list().into_iter().flatten() {
         let Some(object) = entry.choice(&choices) else { continue };
-        if drive == Some(DriveFamily::YzAim) {
-            let given = entry.text().unwrap_or_default().to_owned();
-            entry.report_range(given, "nothing, since the PDOs of a YZ-AIM are fixed".to_owned());
-        }
-        if feedback.contains(&object) {
-            let given = entry.text().unwrap_or_default().to_owned();
-            entry.report(ProblemKind::Repeated { key: entry.path.clone(), given });
-        } else {
-            feedback.push(object);
-        }
+        rules::axis::feedback(&entry.spot, drive, object, &feedback);
+        feedback.push(object);
     }
     feedback
 }
 
-/// 1 to 240: every so many SYNCs; 254 and 255: on the drive's own events (CiA 301, 7.5.2.36 and 7.5.2.38).
 fn transmission_type(section: &mut Section<'_>) -> u8 {
     let read = section.get("transmission_type").and_then(|entry| {
-        let value = u8::try_from(entry.integer(1..256)?).ok()?;
-        if matches!(value, 241..=253) {
-            entry.report_range(value.to_string(), "1 to 240 (SYNC), 254 or 255 (event)".to_owned());
-        }
+        let value = u8::try_from(entry.integer(ranges::TRANSMISSION_TYPE)?).ok()?;
+        rules::axis::transmission_type(&entry.spot, value);
         Some(value)
     });
     read.unwrap_or(defaults::TRANSMISSION_TYPE)

@@ -1,67 +1,109 @@
 //! The mode of an axis, and the loops that the controller closes for it.
 
-use super::entry::{Bounds, Entry};
 use super::section::Section;
-use super::travel::Quantities;
+use crate::config::bounds::Bounds;
 use crate::config::defaults;
 use crate::config::model::{Control, DriveFamily, SimulatedJoint};
+use crate::config::quantities::Quantities;
 use crate::config::quantity::Quantity;
+use crate::config::ranges;
+use crate::config::rules::loops::{self, Origin, Surroundings, TorqueLoop};
 use crate::drive::yz_aim;
 
-/// The mode, with the gains of the loop that it needs. The gains of the other loops are checked and not used, so that
-/// the mode can be changed in one line.
+/// The mode, with the gains of the loop that it needs. The gains of the other loops are read and not used, so that the mode
+/// can be changed in one line. Without the surroundings, whose period could not be read, no loop is judged.
 pub fn control(
     section: &mut Section<'_>,
     drive: Option<DriveFamily>,
     q: Quantities,
     joint: &SimulatedJoint,
+    surroundings: Option<&Surroundings>,
 ) -> Option<Control> {
-    let velocity_loop = velocity_loop(section.section("velocity_loop"));
-    let torque_loop = torque_loop(section.section("torque_loop"), q, joint);
+    let period_s =
+        surroundings.map_or(defaults::PERIOD_NS, |surroundings| surroundings.period_ns) as f64 / 1e9;
+    let mut velocity_section = section.section("velocity_loop");
+    let mut torque_section = section.section("torque_loop");
+    let velocity_loop = velocity_loop(&mut velocity_section, period_s);
+    let (torque_loop, origin) = torque_loop(&mut torque_section, q, joint, period_s).unzip();
     let modes = [
-        ("csp", Control::Position),
+        ("csp", Some(Control::Position)),
         ("csv", velocity_loop),
         ("cst", torque_loop),
-        ("ip", Control::Interpolated),
-        ("pp", Control::ProfilePosition),
-        ("pv", Control::ProfileVelocity),
-        ("pt", Control::ProfileTorque),
+        ("ip", Some(Control::Interpolated)),
+        ("pp", Some(Control::ProfilePosition)),
+        ("pv", Some(Control::ProfileVelocity)),
+        ("pt", Some(Control::ProfileTorque)),
     ];
-    match (section.get("mode"), drive) {
+    let control = match (section.get("mode"), drive) {
         (Some(entry), Some(DriveFamily::YzAim)) => {
-            let own: Vec<_> = modes.into_iter().filter(|(_, control)| yz_aim::has_mode(control)).collect();
-            entry.choice(&own)
+            let is_own = |control: &Option<Control>| control.as_ref().is_some_and(yz_aim::has_mode);
+            let own: Vec<_> = modes.into_iter().filter(|(_, control)| is_own(control)).collect();
+            entry.choice(&own).flatten()
         }
-        (Some(entry), _) => entry.choice(&modes),
+        (Some(entry), _) => entry.choice(&modes).flatten(),
         (None, Some(DriveFamily::YzAim)) => Some(Control::Interpolated),
         (None, _) => Some(Control::Position),
-    }
-}
-
-fn velocity_loop(mut section: Section<'_>) -> Control {
-    let gain =
-        section.get("position_gain").and_then(|entry| entry.quantity(Quantity::GAIN, Bounds::Positive));
-    section.finish();
-    Control::Velocity { position_gain: gain.unwrap_or(defaults::POSITION_GAIN) }
-}
-
-fn torque_loop(mut section: Section<'_>, q: Quantities, joint: &SimulatedJoint) -> Control {
-    let mut value = |key, quantity, bounds| {
-        section.get(key).and_then(|entry: Entry<'_>| entry.quantity(quantity, bounds))
     };
-    let bandwidth =
-        value("bandwidth", Quantity::GAIN, Bounds::Positive).unwrap_or(defaults::TORQUE_LOOP_BANDWIDTH);
-    let inertia = value("inertia", q.inertia, Bounds::NotNegative).unwrap_or(joint.inertia);
-    let stiffness = value("stiffness", q.stiffness, Bounds::Positive);
-    let damping = value("damping", q.damping, Bounds::NotNegative);
-    let viscous_friction = value("viscous_friction", q.damping, Bounds::NotNegative);
-    let coulomb_friction = value("coulomb_friction", q.effort, Bounds::NotNegative);
-    section.finish();
-    Control::Torque {
-        stiffness: stiffness.unwrap_or(inertia * bandwidth * bandwidth),
-        damping: damping.unwrap_or(2.0 * inertia * bandwidth),
-        inertia,
-        viscous_friction: viscous_friction.unwrap_or(joint.viscous_friction),
-        coulomb_friction: coulomb_friction.unwrap_or(joint.coulomb_friction),
+    if let Some(surroundings) = surroundings {
+        match control {
+            Some(Control::Velocity { position_gain }) => {
+                loops::velocity_loop(&velocity_section.spot("position_gain"), position_gain, surroundings);
+            }
+            Some(Control::Torque { stiffness, damping, inertia, .. }) => {
+                let gains = TorqueLoop { stiffness, damping, inertia, simulated_inertia: joint.inertia };
+                let origin = origin.unwrap_or(Origin::Gains);
+                gains.check(q, surroundings, |key| torque_section.spot(key), origin);
+            }
+            _ => {}
+        }
     }
+    velocity_section.finish();
+    torque_section.finish();
+    control
+}
+
+/// `None` where a gain is wrong.
+fn velocity_loop(section: &mut Section<'_>, period_s: f64) -> Option<Control> {
+    let gain =
+        section.get("position_gain").map(|entry| entry.quantity(Quantity::GAIN, ranges::POSITION_GAIN));
+    let position_gain = gain.unwrap_or_else(|| Some(defaults::position_gain(period_s)))?;
+    Some(Control::Velocity { position_gain })
+}
+
+/// `None` where a gain is wrong. The keys that the gains come from are those to name when they do not suit the loop.
+fn torque_loop(
+    section: &mut Section<'_>,
+    q: Quantities,
+    joint: &SimulatedJoint,
+    period_s: f64,
+) -> Option<(Control, Origin)> {
+    let mut value = |key, quantity, bounds: Bounds, default: Option<f64>| match section.get(key) {
+        Some(entry) => entry.quantity(quantity, bounds),
+        None => default,
+    };
+    let default_bandwidth = Some(defaults::torque_loop_bandwidth(period_s));
+    let bandwidth = value("bandwidth", Quantity::GAIN, ranges::BANDWIDTH, default_bandwidth);
+    let inertia = value("inertia", q.inertia, q.ranges.fed_forward_inertia, Some(joint.inertia));
+    let by_bandwidth = |gain: fn(f64, f64) -> f64| Some(gain(inertia?, bandwidth?));
+    let default_stiffness = by_bandwidth(|inertia, bandwidth| inertia * bandwidth * bandwidth);
+    let default_damping = by_bandwidth(|inertia, bandwidth| 2.0 * inertia * bandwidth);
+    let stiffness = value("stiffness", q.stiffness, q.ranges.stiffness, default_stiffness);
+    let damping = value("damping", q.damping, q.ranges.damping, default_damping);
+    let viscous_friction =
+        value("viscous_friction", q.damping, q.ranges.viscous_friction, Some(joint.viscous_friction));
+    let coulomb_friction =
+        value("coulomb_friction", q.effort, q.ranges.friction, Some(joint.coulomb_friction));
+    let are_given = [stiffness != default_stiffness, damping != default_damping];
+    let origin = match bandwidth {
+        Some(bandwidth) if are_given == [false; 2] => Origin::Bandwidth(bandwidth),
+        _ => Origin::Gains,
+    };
+    let law = Control::Torque {
+        stiffness: stiffness?,
+        damping: damping?,
+        inertia: inertia?,
+        viscous_friction: viscous_friction?,
+        coulomb_friction: coulomb_friction?,
+    };
+    Some((law, origin))
 }

@@ -1,54 +1,52 @@
 //! `[axis.limits]` and `[axis.following_error]`.
 
-use super::entry::{Bounds, Entry};
+use super::entry::Entry;
 use super::section::Section;
-use super::travel::{Counting, Quantities};
 use crate::config::defaults;
-use crate::config::model::{FollowingError, Limits, Travel};
-use crate::config::problem_kind::ProblemKind;
+use crate::config::model::{FollowingError, Limits};
+use crate::config::quantities::{Counting, Quantities};
 use crate::config::quantity::Quantity;
+use crate::config::ranges;
+use crate::config::rules;
 
-pub fn limits(
-    mut section: Section<'_>,
-    q: Quantities,
-    travel: Option<Travel>,
-    counting: &Counting,
-) -> Option<Limits> {
+/// The limits; `None` where something about them is wrong.
+pub fn limits(mut section: Section<'_>, q: Quantities, counting: Option<&Counting>) -> Option<Limits> {
     let position = section
         .require("position", "lowest and highest position: position = [\"-170 deg\", \"170 deg\"]")
         .and_then(|entry| {
-            let (low, high) = position_range(&entry, q)?;
-            check_counts(&entry, &[low, high].map(|position| counting.position(position, travel)));
-            Some((low, high))
+            let range = position_range(&entry, q)?;
+            rules::limits::position_range(&entry.spot, range, q, counting).then_some(range)
         });
-    let velocity = section.require("velocity", "highest speed: velocity = \"137 deg/s\"").and_then(|entry| {
-        let velocity = entry.quantity(q.velocity, Bounds::Positive)?;
-        check_counts(&entry, &[velocity * counting.counts_per_unit(travel)]);
-        Some(velocity)
-    });
+    let velocity = section
+        .require("velocity", "highest speed: velocity = \"137 deg/s\"")
+        .and_then(|entry| rules::limits::velocity(&entry.spot, entry.unbounded(q.velocity)?, q, counting));
     let acceleration = section
         .require("acceleration", "highest acceleration: acceleration = \"8 rad/s^2\"")
-        .and_then(|entry| entry.quantity(q.acceleration, Bounds::Positive));
+        .and_then(|entry| entry.quantity(q.acceleration, q.ranges.acceleration));
     let deceleration =
-        section.get("deceleration").map(|entry| entry.quantity(q.acceleration, Bounds::Positive));
-    let jerk = section.get("jerk").map(|entry| entry.quantity(q.jerk, Bounds::PositiveOrInfinite));
+        section.get("deceleration").map(|entry| entry.quantity(q.acceleration, q.ranges.acceleration));
+    let jerk = section.get("jerk").map(|entry| entry.quantity(q.jerk, q.ranges.jerk));
     let torque = section
         .require("torque", "highest torque, or force of a linear axis: torque = \"87 Nm\"")
-        .and_then(|entry| entry.quantity(q.effort, Bounds::Positive));
+        .and_then(|entry| entry.quantity(q.effort, q.ranges.effort));
+    let build = || {
+        let [position_min, position_max] = position?;
+        Some(Limits {
+            position_min,
+            position_max,
+            velocity: velocity?,
+            acceleration: acceleration?,
+            deceleration: deceleration.unwrap_or(acceleration)?,
+            jerk: jerk.unwrap_or(Some(f64::INFINITY))?,
+            torque: torque?,
+        })
+    };
+    let limits = build().filter(|limits| rules::limits::stopping_time(limits, q, |key| section.spot(key)));
     section.finish();
-    let (position_min, position_max) = position?;
-    Some(Limits {
-        position_min,
-        position_max,
-        velocity: velocity?,
-        acceleration: acceleration?,
-        deceleration: deceleration.unwrap_or(acceleration)?,
-        jerk: jerk.unwrap_or(Some(f64::INFINITY))?,
-        torque: torque?,
-    })
+    limits
 }
 
-fn position_range(entry: &Entry<'_>, q: Quantities) -> Option<(f64, f64)> {
+fn position_range(entry: &Entry<'_>, q: Quantities) -> Option<[f64; 2]> {
     let list = entry.list()?;
     let [low, high] = list.as_slice() else {
         entry.report_range(
@@ -57,25 +55,13 @@ fn position_range(entry: &Entry<'_>, q: Quantities) -> Option<(f64, f64)> {
         );
         return None;
     };
-    let (low, high) = (low.quantity(q.position, Bounds::Finite), high.quantity(q.position, Bounds::Finite));
-    let (low, high) = (low?, high?);
-    if low < high {
-        return Some((low, high));
-    }
-    entry.report(ProblemKind::EmptyRange { low: q.position.show(low), high: q.position.show(high) });
-    None
-}
-
-/// A drive counts positions and speeds in 32 bits.
-fn check_counts(entry: &Entry<'_>, counts: &[f64]) {
-    if let Some(&counts) = counts.iter().find(|counts| counts.abs() > f64::from(i32::MAX)) {
-        entry.report(ProblemKind::BeyondCounts { key: entry.path.clone(), counts });
-    }
+    let (low, high) = (low.unbounded(q.position), high.unbounded(q.position));
+    Some([low?, high?])
 }
 
 pub fn following_error(mut section: Section<'_>, q: Quantities) -> FollowingError {
-    let limit = section.get("limit").and_then(|entry| entry.quantity(q.position, Bounds::Positive));
-    let time_ns = section.get("time").and_then(|entry| entry.nanoseconds(0.0, 10.0));
+    let limit = section.get("limit").and_then(|entry| entry.quantity(q.position, q.ranges.deviation));
+    let time_ns = section.get("time").and_then(|entry| entry.nanoseconds(ranges::FOLLOWING_ERROR_TIME_S));
     section.finish();
     let default = if q.position == Quantity::ANGLE {
         defaults::FOLLOWING_ERROR_RAD
@@ -86,14 +72,4 @@ pub fn following_error(mut section: Section<'_>, q: Quantities) -> FollowingErro
         limit: limit.unwrap_or(default),
         time_ns: time_ns.unwrap_or(defaults::FOLLOWING_ERROR_TIME_NS),
     }
-}
-
-/// Whether a position is within the limits.
-pub fn contains(limits: &Limits, position: f64) -> bool {
-    (limits.position_min..=limits.position_max).contains(&position)
-}
-
-/// The position limits for people.
-pub fn show_range(limits: &Limits, q: Quantities) -> String {
-    format!("{} to {}", q.position.show(limits.position_min), q.position.show(limits.position_max))
 }

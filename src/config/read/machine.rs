@@ -2,28 +2,24 @@
 
 use std::path::PathBuf;
 
-use super::entry::{Bounds, Entry};
+use super::entry::Entry;
 use super::section::Section;
 use crate::bus::schedule::automatic_command_phase;
+use crate::config::bounds::Bounds;
 use crate::config::defaults;
-use crate::config::model::{Config, Cycle, Master, Realtime, Simulation, Telemetry};
+use crate::config::model::{Axis, Config, Control, Cycle, Master, Realtime, Simulation, Telemetry};
 use crate::config::problem_kind::ProblemKind;
 use crate::config::quantity::Quantity;
-
-/// The cycle must leave room on both sides of the command phase.
-const COMMAND_PHASE_RANGE: (f64, f64) = (0.05, 0.95);
+use crate::config::ranges;
+use crate::config::rules;
+use crate::config::spot::Spot;
 
 /// The cycle, and where the file leaves its command phase to the analysis of the buses.
 pub fn cycle(mut section: Section<'_>) -> (Cycle, Option<Entry<'_>>) {
-    let period = section.get("period");
-    let period_ns = period.as_ref().and_then(|entry| entry.nanoseconds(250e-6, 0.1));
-    if let (Some(entry), Some(ns)) = (&period, period_ns)
-        && ns % 1000 != 0
-    {
-        // Object 1006 of the drives is in whole microseconds.
-        entry.report_range(Quantity::DURATION.show(ns as f64 / 1e9), "whole microseconds".to_owned());
-    }
-    let period_ns = period_ns.unwrap_or(defaults::PERIOD_NS);
+    let period_ns = section
+        .get("period")
+        .and_then(|entry| rules::cycle::period(&entry.spot, entry.nanoseconds(ranges::PERIOD_S)?))
+        .unwrap_or(defaults::PERIOD_NS);
     let (automatic, command_phase) = match section.get("command_phase") {
         Some(entry) if entry.is_word("auto") => (Some(entry), None),
         entry => (None, entry.and_then(|entry| fraction_of_period(&entry, period_ns))),
@@ -43,15 +39,14 @@ pub fn resolve_command_phase(config: &mut Config, automatic: &Entry<'_>) {
 
 /// A bare number or a percentage is a fraction of the period, anything else a duration.
 fn fraction_of_period(entry: &Entry<'_>, period_ns: u64) -> Option<u64> {
-    let (low, high) = COMMAND_PHASE_RANGE;
-    let period_s = period_ns as f64 / 1e9;
     let is_fraction =
         entry.is_bare_number() || entry.text().is_some_and(|text| text.trim_end().ends_with('%'));
     if is_fraction {
-        let fraction = entry.quantity(Quantity::FRACTION, Bounds::Between(low, high))?;
+        let bounds = Bounds::Between(*ranges::COMMAND_PHASE.start(), *ranges::COMMAND_PHASE.end());
+        let fraction = entry.quantity(Quantity::FRACTION, bounds)?;
         Some((fraction * period_ns as f64).round() as u64)
     } else {
-        entry.nanoseconds(low * period_s, high * period_s)
+        rules::cycle::command_phase(&entry.spot, entry.unbounded(Quantity::DURATION)?, period_ns)
     }
 }
 
@@ -60,18 +55,22 @@ pub fn realtime(mut section: Section<'_>, period_ns: u64) -> Realtime {
         if entry.is_word("off") {
             None
         } else {
-            entry.integer(1..100).and_then(|value| u8::try_from(value).ok())
+            entry.integer(ranges::PRIORITY).and_then(|value| u8::try_from(value).ok())
         }
     });
     let cpu = section.get("cpu").and_then(|entry| {
         if entry.is_word("last") {
             None
         } else {
-            entry.integer(0..1024).and_then(|value| usize::try_from(value).ok())
+            entry.integer(ranges::CPU).and_then(|value| usize::try_from(value).ok())
         }
     });
     let spin_guard_ns = section.get("spin_guard").and_then(|entry| {
-        if entry.is_word("measure") { None } else { entry.nanoseconds(0.0, period_ns as f64 / 2e9) }
+        if entry.is_word("measure") {
+            None
+        } else {
+            entry.nanoseconds(rules::realtime::spin_guard(period_ns))
+        }
     });
     let realtime = Realtime {
         priority: priority.unwrap_or(Some(defaults::PRIORITY)),
@@ -84,70 +83,87 @@ pub fn realtime(mut section: Section<'_>, period_ns: u64) -> Realtime {
     realtime
 }
 
-pub fn master(mut section: Section<'_>) -> Master {
-    let node = section.get("node").and_then(|entry| node(&entry));
-    let heartbeat = section.get("heartbeat").map(|entry| heartbeat(&entry));
-    let heartbeat_ns = heartbeat.unwrap_or(Some(defaults::MASTER_HEARTBEAT_NS));
-    let timeout = section.get("heartbeat_timeout");
-    let heartbeat_timeout_ns = timeout
-        .as_ref()
-        .and_then(|entry| milliseconds(entry, 1e-3))
-        .unwrap_or(defaults::HEARTBEAT_TIMEOUT_NS);
-    if let Some(period_ns) = heartbeat_ns
-        && heartbeat_timeout_ns <= period_ns
-    {
-        let (value, period) = (heartbeat_timeout_ns as f64 / 1e9, period_ns as f64 / 1e9);
-        let allowed = format!("longer than heartbeat, {}", Quantity::DURATION.show(period));
-        match timeout {
-            Some(entry) => entry.report_range(Quantity::DURATION.show(value), allowed),
-            None => section.report_default_out_of_range(
-                "heartbeat_timeout",
-                Quantity::DURATION.show(value),
-                allowed,
-            ),
-        }
-    }
-    let time_ns = section.get("time").and_then(|entry| time_period(&entry));
-    section.finish();
-    Master { node: node.unwrap_or(defaults::MASTER_NODE), heartbeat_ns, heartbeat_timeout_ns, time_ns }
+/// `[master]` as the file gives it. The default of its heartbeat depends on the modes of the axes.
+pub struct ReadMaster<'a> {
+    pub node: u8,
+    /// The outer `None`: nothing is said.
+    heartbeat_ns: Option<Option<u64>>,
+    heartbeat_timeout_ns: Option<u64>,
+    time_ns: Option<u64>,
+    timeout_spot: Spot<'a>,
 }
 
-/// A node number of CANopen.
+pub fn master(mut section: Section<'_>) -> ReadMaster<'_> {
+    let node = section.get("node").and_then(|entry| node(&entry));
+    let heartbeat_ns = section.get("heartbeat").map(|entry| heartbeat(&entry));
+    let heartbeat_timeout_ns = section.get("heartbeat_timeout").and_then(|entry| {
+        rules::master::heartbeat_timeout(&entry.spot, entry.nanoseconds(ranges::HEARTBEAT_TIMEOUT_S)?)
+    });
+    let time_ns = section.get("time").and_then(|entry| time_period(&entry));
+    let timeout_spot = section.spot("heartbeat_timeout");
+    section.finish();
+    let node = node.unwrap_or(defaults::MASTER_NODE);
+    ReadMaster { node, heartbeat_ns, heartbeat_timeout_ns, time_ns, timeout_spot }
+}
+
+impl ReadMaster<'_> {
+    /// The whole of it, once the axes are known. A drive that would go on moving without the controller is to notice soon
+    /// that it is gone.
+    pub fn complete(self, axes: &[Axis], period_ns: u64) -> Master {
+        let is_urgent = axes.iter().any(|axis| goes_on_alone(&axis.control));
+        let default_ns = if is_urgent {
+            // The heartbeat leaves in a cycle, in whole milliseconds.
+            defaults::URGENT_HEARTBEAT_NS.max(period_ns.next_multiple_of(1_000_000))
+        } else {
+            defaults::MASTER_HEARTBEAT_NS
+        };
+        let heartbeat_ns = self.heartbeat_ns.unwrap_or(Some(default_ns));
+        let timeout_at_most_ns = (ranges::HEARTBEAT_TIMEOUT_S.end() * 1e9) as u64;
+        let default_timeout_ns = heartbeat_ns.map_or(defaults::HEARTBEAT_TIMEOUT_NS, |heartbeat_ns| {
+            (heartbeat_ns * defaults::HEARTBEATS_IN_TIMEOUT).min(timeout_at_most_ns)
+        });
+        let heartbeat_timeout_ns = self.heartbeat_timeout_ns.unwrap_or(default_timeout_ns);
+        rules::master::outlasts_heartbeat(&self.timeout_spot, heartbeat_timeout_ns, heartbeat_ns);
+        Master { node: self.node, heartbeat_ns, heartbeat_timeout_ns, time_ns: self.time_ns }
+    }
+}
+
+/// Whether a drive in this mode keeps a speed or a torque when the controller is gone.
+fn goes_on_alone(control: &Control) -> bool {
+    matches!(
+        control,
+        Control::Velocity { .. } | Control::Torque { .. } | Control::ProfileVelocity | Control::ProfileTorque
+    )
+}
+
+/// A node ID of CANopen.
 pub fn node(entry: &Entry<'_>) -> Option<u8> {
-    entry.integer(1..128).and_then(|value| u8::try_from(value).ok())
+    entry.integer(ranges::NODE_ID).and_then(|value| u8::try_from(value).ok())
 }
 
 /// The period of a heartbeat, or `"off"`.
 pub fn heartbeat(entry: &Entry<'_>) -> Option<u64> {
-    if entry.is_word("off") { None } else { milliseconds(entry, 10e-3) }
-}
-
-/// The period of TIME, or `"off"`. More often than every 10 ms tells nobody more; seldom is up to an hour.
-fn time_period(entry: &Entry<'_>) -> Option<u64> {
-    if entry.is_word("off") { None } else { entry.nanoseconds(10e-3, 3600.0) }
-}
-
-/// Objects 1016 and 1017 hold whole milliseconds in 16 bits (CiA 301, 7.5.2.16 and 7.5.2.17).
-fn milliseconds(entry: &Entry<'_>, low_s: f64) -> Option<u64> {
-    let ns = entry.nanoseconds(low_s, 65.535)?;
-    if ns % 1_000_000 != 0 {
-        entry.report_range(Quantity::DURATION.show(ns as f64 / 1e9), "whole milliseconds".to_owned());
+    if entry.is_word("off") {
+        return None;
     }
-    Some(ns)
+    rules::master::heartbeat(&entry.spot, entry.nanoseconds(ranges::HEARTBEAT_S)?)
+}
+
+/// The period of TIME, or `"off"`.
+fn time_period(entry: &Entry<'_>) -> Option<u64> {
+    if entry.is_word("off") { None } else { entry.nanoseconds(ranges::TIME_S) }
 }
 
 pub fn telemetry(mut section: Section<'_>) -> Telemetry {
     let directory = section.get("directory").and_then(|entry| {
-        let text = entry.text()?;
-        if text.is_empty() {
-            entry.report_range("an empty text".to_owned(), "the path of a folder".to_owned());
-        }
-        Some(PathBuf::from(text))
+        let directory = PathBuf::from(entry.text()?);
+        rules::telemetry::directory(&entry.spot, &directory);
+        Some(directory)
     });
     let black_box_ns = section
         .get("black_box")
-        .map(|entry| if entry.is_word("off") { None } else { entry.nanoseconds(0.1, 60.0) });
-    let ring_records = section.get("ring_records").and_then(|entry| entry.integer(64..1_048_577));
+        .map(|entry| if entry.is_word("off") { None } else { entry.nanoseconds(ranges::BLACK_BOX_S) });
+    let ring_records = section.get("ring_records").and_then(|entry| entry.integer(ranges::RING_RECORDS));
     let telemetry = Telemetry {
         directory: directory.unwrap_or_else(|| PathBuf::from(defaults::DIRECTORY)),
         is_recorded: boolean(&mut section, "record", true),
@@ -161,12 +177,12 @@ pub fn telemetry(mut section: Section<'_>) -> Telemetry {
     telemetry
 }
 
-/// Within a cycle the simulated world never stands still.
 pub fn simulation(mut section: Section<'_>, period_ns: u64) -> Simulation {
     let seed =
         section.get("seed").and_then(|entry| entry.integer(0..i64::MAX)).and_then(|v| u64::try_from(v).ok());
-    let longest_gap_ns =
-        section.get("longest_gap").and_then(|entry| entry.nanoseconds(period_ns as f64 / 1e9, 1.0));
+    let longest_gap_ns = section
+        .get("longest_gap")
+        .and_then(|entry| entry.nanoseconds(rules::simulation::longest_gap(period_ns)));
     let stops_for_missed_slots =
         boolean(&mut section, "stops_for_missed_slots", defaults::STOPS_FOR_MISSED_SLOTS);
     section.finish();

@@ -1,8 +1,7 @@
 //! From the text of a file to a checked [`Config`].
 //!
-//! `toml` gives the tree with the place of every key and value. It is read here key by key rather than by derived
-//! `serde` code, because that would end at the first problem; a person who sets up a machine wants to hear of all of
-//! them at once.
+//! `toml` gives the tree with the place of every key and value. It is read here key by key, not by derived `serde` code, which
+//! ends at the first problem. Whoever sets up a machine needs all problems at once.
 
 mod axis;
 mod bus;
@@ -17,10 +16,10 @@ mod travel;
 
 use toml::de::DeTable;
 
-use super::error::{ConfigError, Problem};
+use super::error::{ConfigError, Location, Problem};
 use super::model::Config;
 use super::problem_kind::ProblemKind;
-use entry::Problems;
+use super::spot::Problems;
 use section::Section;
 
 /// Reads and checks a configuration.
@@ -32,14 +31,14 @@ pub fn parse(source_name: &str, text: &str) -> Result<Config, ConfigError> {
 pub(crate) fn document<T>(
     source_name: &str,
     text: &str,
-    read: impl for<'a> FnOnce(&'a DeTable<'a>, &'a Problems<'a>) -> Option<T>,
+    read: impl for<'a> FnOnce(&'a DeTable<'a>, &'a Problems) -> Option<T>,
 ) -> Result<T, ConfigError> {
-    let refuse = |problems| ConfigError::new(source_name, text, problems);
+    let refuse = |problems| ConfigError::of_text(source_name, text, problems);
     let (document, errors) = DeTable::parse_recoverable(text);
     if !errors.is_empty() {
         return Err(refuse(errors.iter().map(|error| syntax_problem(error, text)).collect()));
     }
-    let problems = Problems::new(source_name, text);
+    let problems = Problems::in_text(source_name, text);
     let found = read(document.get_ref(), &problems);
     let problems = problems.into_vec();
     match found {
@@ -50,11 +49,12 @@ pub(crate) fn document<T>(
 
 fn syntax_problem(error: &toml::de::Error, text: &str) -> Problem {
     let kind = ProblemKind::Syntax { message: error.message().to_owned() };
-    Problem { kind, span: Some(error.span().unwrap_or(text.len()..text.len())), first_line: None }
+    let span = error.span().unwrap_or(text.len()..text.len());
+    Problem { kind, location: Location::Text { span, first_line: None } }
 }
 
 /// Reads every section, even after one has failed.
-fn read<'a>(document: &'a DeTable<'a>, problems: &'a Problems<'a>) -> Option<Config> {
+fn read<'a>(document: &'a DeTable<'a>, problems: &'a Problems) -> Option<Config> {
     let mut root = Section::new("", 0..0, document, problems);
     let name =
         root.require("name", "the name of the machine: name = \"arm6\"").and_then(|entry| entry.name());
@@ -68,7 +68,7 @@ fn read<'a>(document: &'a DeTable<'a>, problems: &'a Problems<'a>) -> Option<Con
     let simulation = machine::simulation(root.section("simulation"), cycle.period_ns);
 
     root.require("bus", "at least one [[bus]]");
-    let buses = bus::buses(root.sections("bus"), cycle.period_ns, problems);
+    let buses = bus::buses(root.sections("bus"), cycle.period_ns);
 
     let mut defaults = root.section("defaults");
     let axis_defaults = defaults.get("axis").and_then(|entry| entry.table());
@@ -76,11 +76,14 @@ fn read<'a>(document: &'a DeTable<'a>, problems: &'a Problems<'a>) -> Option<Con
     root.require("axis", "at least one [[axis]]");
     let axes =
         root.sections("axis").into_iter().map(|section| section.with_defaults(axis_defaults)).collect();
-    let axes = axis::axes(axes, &buses, cycle.period_ns, &master, problems);
+    let machine = axis::Machine { buses: &buses, cycle_ns: cycle.period_ns, master_node: master.node };
+    let axes = axis::axes(axes, &machine);
 
     let program = program::program(root.section("program"), &axes);
     root.finish();
 
+    let axes: Option<Vec<_>> = axes.into_iter().map(|axis| axis.axis).collect();
+    let master = master.complete(axes.as_deref().unwrap_or_default(), cycle.period_ns);
     let mut config = Config {
         name: name?.to_owned(),
         cycle,
@@ -89,7 +92,7 @@ fn read<'a>(document: &'a DeTable<'a>, problems: &'a Problems<'a>) -> Option<Con
         realtime,
         master,
         buses: buses.into_iter().map(|bus| bus.bus).collect::<Option<_>>()?,
-        axes: axes.into_iter().map(|axis| axis.axis).collect::<Option<_>>()?,
+        axes: axes?,
         program,
         telemetry,
         simulation,

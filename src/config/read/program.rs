@@ -1,19 +1,18 @@
 //! `[program]`
 
 use super::axis::ReadAxis;
-use super::entry::{Bounds, Entry};
-use super::limits::{contains, show_range};
+use super::entry::Entry;
 use super::section::Section;
 use crate::config::defaults;
-use crate::config::model::{Control, Limits, Program, ProgramMove, ProgramTarget};
+use crate::config::model::{Program, ProgramMove, ProgramTarget};
 use crate::config::problem_kind::ProblemKind;
 use crate::config::quantity::Quantity;
-
-/// Moves and rests longer than this are slips of the unit.
-const LONGEST_S: f64 = 3600.0;
+use crate::config::ranges;
+use crate::config::rules::program::{self as rules, AxisView};
+use crate::config::spot::Spot;
 
 pub fn program(mut section: Section<'_>, axes: &[ReadAxis]) -> Program {
-    let repeat = section.get("repeat").and_then(|entry| entry.integer(1..1_000_001));
+    let repeat = section.get("repeat").and_then(|entry| entry.integer(ranges::REPEAT));
     let moves =
         section.sections("move").into_iter().filter_map(|section| program_move(section, axes)).collect();
     section.finish();
@@ -26,13 +25,9 @@ pub fn program(mut section: Section<'_>, axes: &[ReadAxis]) -> Program {
 fn program_move(mut section: Section<'_>, axes: &[ReadAxis]) -> Option<ProgramMove> {
     let target = program_target(&mut section, axes);
     let mut share =
-        |key| section.get(key).and_then(|entry: Entry<'_>| entry.quantity(Quantity::FRACTION, Bounds::Share));
+        |key| section.get(key).and_then(|entry: Entry<'_>| entry.quantity(Quantity::FRACTION, ranges::SCALE));
     let (velocity_scale, acceleration_scale) = (share("velocity"), share("acceleration"));
-    let mut seconds = |key| {
-        section
-            .get(key)
-            .and_then(|entry: Entry<'_>| entry.quantity(Quantity::DURATION, Bounds::Between(0.0, LONGEST_S)))
-    };
+    let mut seconds = |key| section.get(key).and_then(|entry: Entry<'_>| duration(&entry));
     let (minimum_duration_s, dwell_s) = (seconds("minimum_duration"), seconds("dwell"));
     section.finish();
     Some(ProgramMove {
@@ -44,100 +39,72 @@ fn program_move(mut section: Section<'_>, axes: &[ReadAxis]) -> Option<ProgramMo
     })
 }
 
+fn duration(entry: &Entry<'_>) -> Option<f64> {
+    entry.quantity(Quantity::DURATION, rules::duration_bounds())
+}
+
 /// One of `to`, `speed` and `torque`; the latter two last for a time.
 fn program_target(section: &mut Section<'_>, axes: &[ReadAxis]) -> Option<ProgramTarget> {
-    let (speed, torque) = (section.get("speed"), section.get("torque"));
-    let duration = section.get("for");
-    let duration_s = |section: &mut Section<'_>| match &duration {
-        Some(entry) => entry.quantity(Quantity::DURATION, Bounds::Between(0.0, LONGEST_S)),
+    let (to, speed, torque) = (section.get("to"), section.get("speed"), section.get("torque"));
+    let lasting = section.get("for");
+    let ignored = |entry: &Option<Entry<'_>>, beside, belongs| {
+        if let Some(entry) = entry {
+            entry.report(ProblemKind::Ignored { key: entry.spot.key.clone(), beside, belongs });
+        }
+    };
+    let one_of = "a move has one of `to`, `speed` and `torque`";
+    let duration_s = |section: &mut Section<'_>| match &lasting {
+        Some(entry) => duration(entry),
         None => {
             section.require("for", "how long to go on: for = \"2 s\"");
             None
         }
     };
     match (speed, torque) {
-        (Some(entry), _) => {
-            let velocity =
-                target(&entry, axes, driven_at_speed).filter(|all| some_axis_is_driven(&entry, all));
+        (Some(entry), torque) => {
+            ignored(&to, "speed", one_of);
+            ignored(&torque, "speed", one_of);
+            let velocity = target(&entry, axes, |axis| axis.quantities.velocity, rules::speed)
+                .filter(|all| rules::some_axis_is_driven(&entry.spot, all));
             let duration_s = duration_s(section);
             Some(ProgramTarget::Velocity { velocity: velocity?, duration_s: duration_s? })
         }
         (None, Some(entry)) => {
-            let torque =
-                target(&entry, axes, driven_with_torque).filter(|all| some_axis_is_driven(&entry, all));
+            ignored(&to, "torque", one_of);
+            let torque = target(&entry, axes, |axis| axis.quantities.effort, rules::torque)
+                .filter(|all| rules::some_axis_is_driven(&entry.spot, all));
             let duration_s = duration_s(section);
             Some(ProgramTarget::Torque { torque: torque?, duration_s: duration_s? })
         }
-        (None, None) => section
-            .require("to", "a target for every axis, to = [\"30 deg\", …], or one for all of them")
-            .and_then(|entry| target(&entry, axes, axis_target))
-            .map(ProgramTarget::Position),
+        (None, None) => {
+            let says = "a target for every axis, to = [\"30 deg\", …], or one for all of them";
+            let entry = section.require("to", says)?;
+            ignored(
+                &lasting,
+                "to",
+                "`for` belongs to `speed` or `torque`; `dwell` is standstill after a move",
+            );
+            target(&entry, axes, |axis| axis.quantities.position, rules::position)
+                .map(ProgramTarget::Position)
+        }
     }
 }
 
 fn target(
     entry: &Entry<'_>,
     axes: &[ReadAxis],
-    read: fn(&Entry<'_>, &ReadAxis) -> Option<f64>,
+    quantity: fn(&ReadAxis) -> Quantity,
+    check: fn(&Spot<'_>, f64, &AxisView<'_>),
 ) -> Option<Vec<f64>> {
     let entries = if entry.is_list() { entry.list()? } else { vec![entry.clone(); axes.len()] };
-    if entries.len() != axes.len() {
-        entry.report(ProblemKind::TargetCount { given: entries.len(), axes: axes.len() });
+    if !rules::count(&entry.spot, entries.len(), axes.len()) {
         return None;
     }
-    let targets: Vec<_> = entries.iter().zip(axes).map(|(entry, axis)| read(entry, axis)).collect();
-    targets.into_iter().collect()
-}
-
-/// Zero is where such a step ends by itself.
-fn some_axis_is_driven(entry: &Entry<'_>, values: &[f64]) -> bool {
-    let is_any = values.iter().any(|value| *value != 0.0);
-    if !is_any {
-        entry.report_range("0 for every axis".to_owned(), "more or less than 0 for one of them".to_owned());
-    }
-    is_any
-}
-
-fn driven_at_speed(entry: &Entry<'_>, axis: &ReadAxis) -> Option<f64> {
-    driven(entry, axis, axis.quantities.velocity, Control::ProfileVelocity, |limits| limits.velocity)
-}
-
-fn driven_with_torque(entry: &Entry<'_>, axis: &ReadAxis) -> Option<f64> {
-    driven(entry, axis, axis.quantities.effort, Control::ProfileTorque, |limits| limits.torque)
-}
-
-/// A speed or a torque within the limit of an axis, whose mode must take one unless it is 0.
-fn driven(
-    entry: &Entry<'_>,
-    axis: &ReadAxis,
-    quantity: Quantity,
-    mode: Control,
-    limit: fn(&Limits) -> f64,
-) -> Option<f64> {
-    let value = entry.quantity(quantity, Bounds::Finite)?;
-    let name = axis.name.as_deref().unwrap_or_default();
-    if value != 0.0 && axis.axis.as_ref().is_some_and(|axis| axis.control != mode) {
-        let word = if mode == Control::ProfileTorque { "pt" } else { "pv" };
-        entry.report_range(quantity.show(value), format!("0, since {name} is not in mode = \"{word}\""));
-    }
-    if let Some(limit) = axis.limits.as_ref().map(limit).filter(|limit| value.abs() > *limit) {
-        entry.report_range(
-            quantity.show(value),
-            format!("at most {}, the limit of {name}", quantity.show(limit)),
-        );
-    }
-    Some(value)
-}
-
-fn axis_target(entry: &Entry<'_>, axis: &ReadAxis) -> Option<f64> {
-    let quantity = axis.quantities.position;
-    let target = entry.quantity(quantity, Bounds::Finite)?;
-    if let Some(limits) = axis.limits.as_ref().filter(|limits| !contains(limits, target)) {
-        entry.report(ProblemKind::TargetOutsideLimits {
-            axis: axis.name.clone().unwrap_or_default(),
-            value: quantity.show(target),
-            allowed: show_range(limits, axis.quantities),
-        });
-    }
-    Some(target)
+    let read = entries.iter().zip(axes).map(|(entry, axis)| {
+        let value = entry.unbounded(quantity(axis))?;
+        check(&entry.spot, value, &axis.view());
+        Some(value)
+    });
+    // Every target is read, so that all problems of a list are found.
+    read.collect::<Vec<_>>().into_iter().collect()
 }

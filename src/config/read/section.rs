@@ -1,17 +1,21 @@
-//! A table of the file, with the table of defaults that stands behind it.
+//! A table of the file, with the table of its defaults.
 
 use std::ops::Range;
 
 use toml::Spanned;
-use toml::de::{DeTable, DeValue};
+use toml::de::{DeString, DeTable, DeValue};
 
-use super::entry::{Entry, Problems};
+use super::entry::Entry;
 use crate::config::problem_kind::ProblemKind;
 use crate::config::spelling;
-use crate::printable::printable;
+use crate::config::spot::{Problems, Spot};
+use crate::printable::excerpt;
 
-/// A table that is being read. It remembers which keys were asked for: what is left over at the end is unknown, and
-/// what was asked for in vain is missing.
+/// The most unknown keys of a table for which the key that was meant is looked for. No more problems are shown anyway.
+const SUGGESTED_AT_MOST: usize = 20;
+
+/// A table that is being read. It remembers which keys were looked up: the others are unknown, and required ones that were not
+/// found are missing.
 pub struct Section<'a> {
     path: String,
     header: Range<usize>,
@@ -21,13 +25,13 @@ pub struct Section<'a> {
     known: Vec<&'static str>,
     known_in_defaults: Vec<&'static str>,
     missing: Vec<(&'static str, &'static str)>,
-    /// Whether something else stands where the table should: what it lacks is not the problem then.
+    /// Whether the file has something other than a table here. Its missing keys are not reported then.
     is_no_table: bool,
-    problems: &'a Problems<'a>,
+    problems: &'a Problems,
 }
 
 impl<'a> Section<'a> {
-    pub fn new(path: &str, header: Range<usize>, own: &'a DeTable<'a>, problems: &'a Problems<'a>) -> Self {
+    pub fn new(path: &str, header: Range<usize>, own: &'a DeTable<'a>, problems: &'a Problems) -> Self {
         Self {
             path: path.to_owned(),
             header,
@@ -51,14 +55,17 @@ impl<'a> Section<'a> {
         self.header.clone()
     }
 
-    /// Reports a problem of the section as a whole.
-    pub fn report_here(&self, kind: ProblemKind) {
-        self.problems.report(kind, self.header());
+    /// Where the section begins, as a spot to report what concerns all of it.
+    pub fn header_spot(&self) -> Spot<'a> {
+        Spot::in_text(self.path.clone(), self.header(), self.problems)
     }
 
-    /// Reports a value that no key of the file states: a default that the rest of the file makes impossible.
-    pub fn report_default_out_of_range(&self, key: &str, value: String, allowed: String) {
-        self.report_here(ProblemKind::OutOfRange { key: self.path_of(key), value, allowed });
+    /// Where a key of this section is, or else where it would be.
+    pub fn spot(&self, key: &str) -> Spot<'a> {
+        match find(self.own, key).or_else(|| find(self.defaults, key)) {
+            Some(found) => self.entry(key, found).spot,
+            None => Spot::in_text(self.path_of(key), self.header(), self.problems),
+        }
     }
 
     /// What a key says, here or else in the defaults.
@@ -95,7 +102,8 @@ impl<'a> Section<'a> {
         self.know(key, true);
         let own = find(self.own, key).map(|found| self.entry(key, found));
         let defaults = find(self.defaults, key).map(|found| self.entry(key, found));
-        let header = own.as_ref().map_or_else(|| self.header(), |entry| entry.span.clone());
+        let span = own.as_ref().and_then(|entry| entry.spot.span());
+        let header = span.unwrap_or_else(|| self.header());
         let own_table = own.as_ref().and_then(|entry| entry.table());
         let default_table = defaults.as_ref().and_then(|entry| entry.table());
         Section {
@@ -117,7 +125,8 @@ impl<'a> Section<'a> {
         let Some(list) = self.get(key).and_then(|entry| entry.tables()) else { return vec![] };
         list.into_iter()
             .filter_map(|entry| {
-                Some(Section::new(&entry.path, entry.span.clone(), entry.table()?, self.problems))
+                let table = entry.table()?;
+                Some(Section::new(&entry.spot.key, entry.spot.span()?, table, self.problems))
             })
             .collect()
     }
@@ -127,16 +136,20 @@ impl<'a> Section<'a> {
     pub fn finish(self) {
         let mut meant = vec![];
         for (table, known) in [(self.own, &self.known), (self.defaults, &self.known_in_defaults)] {
-            for (key, _) in table.into_iter().flat_map(DeTable::iter) {
-                if known.iter().any(|known| known == key.get_ref()) {
-                    continue;
-                }
-                let absent = known.iter().copied().filter(|known| find(table, known).is_none());
-                let nearest = spelling::nearest(key.get_ref(), absent);
-                meant.extend(nearest);
+            let keys = table.into_iter().flat_map(DeTable::iter).map(|(key, _)| key);
+            let is_unknown = |key: &&Spanned<DeString<'_>>| !known.iter().any(|known| known == key.get_ref());
+            let mut unknown: Vec<_> = keys.filter(is_unknown).collect();
+            unknown.sort_by_key(|key| key.span().start);
+            for (index, key) in unknown.into_iter().enumerate() {
+                // Looking for the key that was meant takes long, and only the first problems are shown.
+                let nearest = (index < SUGGESTED_AT_MOST).then(|| {
+                    let absent = known.iter().copied().filter(|known| find(table, known).is_none());
+                    spelling::nearest(key.get_ref(), absent)
+                });
+                meant.extend(nearest.flatten());
                 let kind = ProblemKind::UnknownKey {
-                    key: printable(&self.path_of(key.get_ref())),
-                    nearest,
+                    key: self.path_of(&excerpt(key.get_ref())),
+                    nearest: nearest.flatten(),
                     known: known.clone(),
                 };
                 self.problems.report(kind, key.span());
@@ -169,5 +182,5 @@ impl<'a> Section<'a> {
 }
 
 fn find<'a>(table: Option<&'a DeTable<'a>>, key: &str) -> Option<&'a Spanned<DeValue<'a>>> {
-    table?.iter().find(|(name, _)| name.get_ref() == key).map(|(_, value)| value)
+    table?.get(key)
 }

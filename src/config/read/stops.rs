@@ -5,6 +5,8 @@ use takt_rt::{Rule, StopCategory};
 use super::section::Section;
 use crate::config::defaults;
 use crate::config::model::{MissedSlots, StopCategories};
+use crate::config::ranges;
+use crate::config::rules;
 
 /// A category for each rule, by its key.
 pub fn stops(mut section: Section<'_>) -> StopCategories {
@@ -24,21 +26,22 @@ pub fn stops(mut section: Section<'_>) -> StopCategories {
 
 /// The steps of the ladder, each at least as high as the one before.
 pub fn missed_slots(mut section: Section<'_>) -> MissedSlots {
-    let mut lowest = 1;
-    let mut slots = |section: &mut Section<'_>, key, default: u32| {
-        let entry = section.get(key);
-        let read = entry.as_ref().and_then(|entry| entry.integer(lowest..1_000_001));
-        let value = read.and_then(|value| u32::try_from(value).ok()).unwrap_or(default);
-        if entry.is_none() && i64::from(value) < lowest {
-            section.report_default_out_of_range(key, value.to_string(), format!("at least {lowest}"));
+    let mut earlier = 0;
+    let mut slots = |key, default: u32| {
+        let read = section.get(key).map(|entry| entry.integer(ranges::MISSED_SLOTS));
+        let value = read.unwrap_or(Some(default.into())).and_then(|value| u32::try_from(value).ok());
+        if let Some(value) = value {
+            rules::cycle::missed_slots(&section.spot(key), value, earlier);
+            earlier = earlier.max(value);
         }
-        lowest = lowest.max(value.into());
-        value
+        value.unwrap_or(default)
     };
-    let warning = slots(&mut section, "warning", defaults::MISSED_SLOTS_WARNING);
-    let degraded = slots(&mut section, "degraded", defaults::MISSED_SLOTS_DEGRADED);
-    let stop = slots(&mut section, "stop", defaults::MISSED_SLOTS_STOP);
-    let leak_ns = section.get("leak").and_then(|entry| entry.nanoseconds(250e-6, 60.0));
+    let warning = slots("warning", defaults::MISSED_SLOTS_WARNING);
+    let degraded = slots("degraded", defaults::MISSED_SLOTS_DEGRADED);
+    let stop = slots("stop", defaults::MISSED_SLOTS_STOP);
+    let leak_slots = section.get("leak_slots").and_then(|entry| entry.integer(ranges::MISSED_SLOTS));
+    let leak_slots = leak_slots.and_then(|slots| u32::try_from(slots).ok());
     section.finish();
-    MissedSlots { warning, degraded, stop, leak_ns: leak_ns.unwrap_or(defaults::MISSED_SLOTS_LEAK_NS) }
+    let leak_slots = leak_slots.unwrap_or(defaults::MISSED_SLOTS_LEAK_SLOTS);
+    MissedSlots { warning, degraded, stop, leak_slots }
 }

@@ -1,10 +1,10 @@
-//! The newest value of something, from one writer to any number of readers: the writer never waits, no reader can
-//! disturb it, and a reader gets a whole value or knows that it did not.
+//! The newest value, from one writer to any number of readers. The writer never waits, and no reader can disturb it. A
+//! reader gets a whole value, or knows that it did not.
 //!
-//! A value is an array of 64-bit words, each an atomic, so that no reader ever sees half a word and no `unsafe` is
-//! needed. It is a sequence lock (Boehm, "Can seqlocks get along with programming language memory models?", MSPC
-//! 2012) over four slots in turn: a reader uses the last complete slot, so even a writer that was preempted
-//! half-way through costs it nothing. A read is torn only when the writer has come round to the same slot meanwhile.
+//! A value is an array of 64-bit atomic words, so that no reader sees half a word and no `unsafe` is needed. It is a
+//! sequence lock (Boehm, "Can seqlocks get along with programming language memory models?", MSPC 2012) over four slots in
+//! turn. A reader uses the last complete slot, so it need not wait for a writer that was preempted during a write. A read
+//! is torn only if the writer has reached the same slot again meanwhile.
 
 use std::slice;
 use std::sync::Arc;
@@ -25,7 +25,7 @@ impl Shared {
     }
 }
 
-/// A place for values of up to `words` words, as its two ends.
+/// A mailbox for values of up to `words` words, as its two ends.
 pub fn latest(words: usize) -> (Writer, Reader) {
     let slot = || (0..words).map(|_| AtomicU64::new(0)).collect();
     let slots = (0..SLOTS).map(|_| slot()).collect();
@@ -40,10 +40,10 @@ pub struct Writer {
 }
 
 impl Writer {
-    /// Writes a value, word by word, and shows it.
+    /// Writes a value, word by word, and publishes it.
     pub fn write(&mut self, encode: impl FnOnce(&mut Words<'_>)) {
         let number = self.completed + 1;
-        // Whoever sees one of the words stored below also sees the `completed` stored before.
+        // A reader that sees one of the words stored below also sees the `completed` stored before.
         fence(Ordering::Release);
         encode(&mut Words(self.shared.slot(number).iter()));
         self.completed = number;
@@ -51,20 +51,20 @@ impl Writer {
     }
 }
 
-/// An end that reads; clone it for every reader.
+/// The reading end. Clone it for every reader.
 #[derive(Clone)]
 pub struct Reader {
     shared: Arc<Shared>,
 }
 
-/// What came of one attempt to read.
+/// The result of one attempt to read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Attempt<T> {
-    /// No newer value has been written.
+    /// There is no newer value.
     Nothing,
     /// A whole value, and its number.
     Whole(T, u64),
-    /// The writer has overwritten the value while it was read.
+    /// The writer has overwritten the value during the read.
     Torn,
 }
 
@@ -87,7 +87,7 @@ impl Reader {
 pub struct Words<'a>(slice::Iter<'a, AtomicU64>);
 
 impl Words<'_> {
-    /// Stores the next word. Beyond the last one nothing happens.
+    /// Stores the next word. Words beyond the last one are ignored.
     pub fn put(&mut self, word: u64) {
         if let Some(cell) = self.0.next() {
             cell.store(word, Ordering::Relaxed);
@@ -116,7 +116,7 @@ mod tests {
     use std::sync::atomic::AtomicUsize;
 
     #[test]
-    fn a_value_is_new_once() {
+    fn a_value_is_new_only_once() {
         let (mut writer, reader) = latest(1);
         assert_eq!(reader.attempt(0, |words| words.take()), Attempt::Nothing);
         writer.write(|words| words.put(7));
@@ -138,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn a_reader_that_was_overtaken_in_its_slot_knows_it() {
+    fn a_reader_detects_that_its_slot_was_overwritten() {
         for (overtaken_by, is_whole) in [(0, true), (2, true), (3, false), (9, false)] {
             let (mut writer, reader) = latest(1);
             writer.write(|words| words.put(5));
@@ -153,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn no_reader_ever_takes_a_mixture_for_a_whole_value() {
+    fn no_reader_gets_a_mixture_of_two_values() {
         const WORDS: usize = 64;
         const READERS: usize = 3;
         let (mut writer, reader) = latest(WORDS);

@@ -1,4 +1,4 @@
-//! How the reports of motions are laid out in 64-bit words.
+//! The layout of the reports of motions in 64-bit words.
 
 use takt_rt::{MotionReport, MotionReports, MotionState, RequestId};
 

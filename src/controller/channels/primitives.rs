@@ -1,5 +1,5 @@
-//! What the channels are built on. They take it from here and from nowhere else, so that `tests/loom` can build the
-//! very same channels on loom's atomics and try every schedule.
+//! The primitives of the channels. The channels import them only from here, so that `tests/loom` can build the same channels
+//! with loom's atomics and try every schedule.
 
 pub use std::sync::atomic::{AtomicU64, Ordering, fence};
 

@@ -1,7 +1,7 @@
-//! The way of the cycle records to the logger. A record of 32 axes is almost 2 kB, and a ring that takes it by value
-//! copies it two or three times. Here the slots themselves travel: the real-time thread fills in the axes that count,
-//! and the logger sends the slot back. The slot that came back last is used first, so that as long as the logger
-//! keeps up, a handful of slots go round and stay in the cache, however many there are.
+//! The channel of the cycle records to the logger. A record of 32 axes has almost 2 kB, and a ring of values would copy it
+//! two or three times. So the rings carry boxed slots. The real-time thread fills in the axes that count, and the logger
+//! returns the slot. The slot that was returned last is used first. So, as long as the logger keeps up, only a few slots
+//! are in use, and they stay in the cache.
 
 use takt_rt::CycleRecord;
 
@@ -11,18 +11,18 @@ use super::ring::{Consumer, Producer, ring};
 pub fn record_ring(capacity: usize) -> (RecordProducer, RecordConsumer) {
     let (empty_in, empty_out) = ring(capacity);
     let (full_in, full_out) = ring(capacity);
-    let at_hand = (0..capacity.max(1)).map(|_| Box::default()).collect();
+    let free = (0..capacity.max(1)).map(|_| Box::default()).collect();
     (
-        RecordProducer { at_hand, empty: empty_out, full: full_in },
+        RecordProducer { free, empty: empty_out, full: full_in },
         RecordConsumer { empty: empty_in, full: full_out },
     )
 }
 
-/// The end of the real-time thread.
+/// The real-time thread's end.
 pub struct RecordProducer {
-    /// Empty slots, the warmest last. It has room for every slot there is, so it never grows.
+    /// The empty slots; the one that was returned last is at the end. There is room for every slot, so it never grows.
     #[expect(clippy::vec_box, reason = "the boxes are what goes through the rings")]
-    at_hand: Vec<Box<CycleRecord>>,
+    free: Vec<Box<CycleRecord>>,
     empty: Consumer<Box<CycleRecord>>,
     full: Producer<Box<CycleRecord>>,
 }
@@ -30,11 +30,11 @@ pub struct RecordProducer {
 impl RecordProducer {
     /// Copies a record into the ring. Returns whether there was room.
     pub fn push(&mut self, record: &CycleRecord) -> bool {
-        // Two for the one that is used, so that none stays away for long.
+        // Each push uses one slot and takes back up to two, so that no returned slot stays in the ring for long.
         for _ in 0..2 {
-            self.at_hand.extend(self.empty.pop());
+            self.free.extend(self.empty.pop());
         }
-        let Some(mut slot) = self.at_hand.pop() else {
+        let Some(mut slot) = self.free.pop() else {
             self.full.count_dropped();
             return false;
         };
@@ -49,27 +49,27 @@ impl RecordProducer {
     }
 }
 
-/// The end of the logger.
+/// The logger's end.
 pub struct RecordConsumer {
     empty: Producer<Box<CycleRecord>>,
     full: Consumer<Box<CycleRecord>>,
 }
 
 impl RecordConsumer {
-    /// Shows the oldest record that waits to `look`, and frees its slot. Axes that do not count may hold anything.
-    pub fn next<T>(&mut self, look: impl FnOnce(&CycleRecord) -> T) -> Option<T> {
+    /// Passes the oldest waiting record to `read`, and frees its slot. Axes beyond `axis_count` hold arbitrary values.
+    pub fn next<T>(&mut self, read: impl FnOnce(&CycleRecord) -> T) -> Option<T> {
         let slot = self.full.pop()?;
-        let seen = look(&slot);
+        let result = read(&slot);
         self.empty.push(slot);
-        Some(seen)
+        Some(result)
     }
 
-    /// Records that were put in since the start.
+    /// The number of records written since the start.
     pub fn pushed(&self) -> u64 {
         self.full.pushed()
     }
 
-    /// Records that found no room since the start.
+    /// The number of records dropped since the start.
     pub fn dropped(&self) -> u64 {
         self.full.dropped()
     }
@@ -117,15 +117,15 @@ mod tests {
     }
 
     #[test]
-    fn after_every_way_of_filling_and_emptying_all_slots_are_there_and_no_memory_was_asked_for() {
+    fn no_slot_is_lost_and_no_memory_is_allocated_while_the_ring_fills_and_empties() {
         let (mut producer, mut consumer) = record_ring(16);
-        let room = producer.at_hand.capacity();
+        let room = producer.free.capacity();
         for fill in (0..=16).chain([3, 16, 1, 16]) {
             assert_eq!((0..20).filter(|slot| producer.push(&record(*slot, 1))).count(), 16);
             let emptied = (0..fill).map_while(|_| consumer.next(|_| ())).count();
             assert_eq!((0..20).filter(|slot| producer.push(&record(*slot, 1))).count(), emptied);
             while consumer.next(|_| ()).is_some() {}
         }
-        assert_eq!(producer.at_hand.capacity(), room);
+        assert_eq!(producer.free.capacity(), room);
     }
 }

@@ -1,20 +1,20 @@
-//! The numbers of requests: whoever asks takes them from the same place, so that no two have the same.
+//! The ids of requests. All clients take them from one counter, so that no two requests have the same id.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use takt_rt::RequestId;
 
-/// Gives out numbers of requests. Clone it for every thread that asks.
+/// Gives the ids of requests. Clone it for every thread that sends requests.
 #[derive(Clone, Debug, Default)]
 pub struct RequestNumbers {
     given: Arc<AtomicU64>,
 }
 
 impl RequestNumbers {
-    /// The next number, from 1 on.
+    /// The next id. The first one is 1.
     pub fn next(&self) -> RequestId {
-        // Nothing but the number itself is handed from one thread to the other.
+        // Relaxed is enough: no other data depends on the counter.
         RequestId(self.given.fetch_add(1, Ordering::Relaxed) + 1)
     }
 }
@@ -26,7 +26,7 @@ mod tests {
     use std::thread;
 
     #[test]
-    fn no_two_of_many_threads_get_the_same_number() {
+    fn no_two_threads_get_the_same_id() {
         let numbers = RequestNumbers::default();
         let taking = |_| {
             let numbers = numbers.clone();

@@ -1,9 +1,9 @@
 //! A bounded ring from one thread to one other, on crossbeam's `ArrayQueue`, that never waits.
 //!
-//! `ArrayQueue` alone is not enough for a real-time thread: its `push` and `pop` spin while another thread is
-//! half-way through an operation on the same slot. When that other thread has been preempted by the real-time
-//! thread itself, on the same CPU, the spin never ends. Both ends here therefore count what they have *completed*,
-//! and touch the queue only where the other end is known to be done with the slot: every call is wait-free.
+//! `ArrayQueue` alone is not enough for a real-time thread: its `push` and `pop` spin while another thread is in the middle
+//! of an operation on the same slot. If the real-time thread has preempted that thread on the same CPU, the spin never
+//! ends. Therefore both ends count their *completed* operations. An end accesses the queue only if the other end has
+//! completed its operation on the slot. So every call is wait-free.
 
 use std::sync::Arc;
 
@@ -32,11 +32,11 @@ pub fn ring<T>(capacity: usize) -> (Producer<T>, Consumer<T>) {
     )
 }
 
-/// The end that puts items in. There is only one, so it can tell without asking how much it has put in.
+/// The only end that puts items in. So it knows their number without an atomic read.
 pub struct Producer<T> {
     shared: Arc<Shared<T>>,
     pushed: u64,
-    /// What the consumer was last seen to have completed; asked again only when the ring looks full.
+    /// The consumer's completed operations when they were last read. They are read again only when the ring looks full.
     popped: u64,
     dropped: u64,
 }
@@ -48,7 +48,7 @@ impl<T> Producer<T> {
         if self.pushed - self.popped >= capacity {
             self.popped = self.shared.popped.load(Ordering::Acquire);
         }
-        // Fewer than `capacity` items are in or on their way out, so the slot at the tail has been given back.
+        // Fewer than `capacity` items are in the ring or being taken out, so the slot at the tail is free.
         if self.pushed - self.popped >= capacity || self.shared.queue.push(item).is_err() {
             self.count_dropped();
             return false;
@@ -68,7 +68,7 @@ impl<T> Producer<T> {
 /// The end that takes items out.
 pub struct Consumer<T> {
     shared: Arc<Shared<T>>,
-    /// What the producer was last seen to have completed; asked again only when the ring looks empty.
+    /// The producer's completed operations when they were last read. They are read again only when the ring looks empty.
     pushed: u64,
     popped: u64,
 }
@@ -82,19 +82,19 @@ impl<T> Consumer<T> {
                 return None;
             }
         }
-        // The item at the head is completely in: it has been counted after it was written.
+        // The item at the head is complete, because the producer counts an item after it has written it.
         let item = self.shared.queue.pop()?;
         self.popped += 1;
         self.shared.popped.store(self.popped, Ordering::Release);
         Some(item)
     }
 
-    /// Items that were put in since the ring was made.
+    /// The number of items put in since the ring was made.
     pub fn pushed(&self) -> u64 {
         self.shared.pushed.load(Ordering::Acquire)
     }
 
-    /// Items that found no room since the ring was made.
+    /// The number of items dropped since the ring was made.
     pub fn dropped(&self) -> u64 {
         self.shared.dropped.load(Ordering::Relaxed)
     }
@@ -115,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn a_ring_for_nothing_still_holds_one() {
+    fn a_ring_of_capacity_0_holds_one_item() {
         let (mut producer, mut consumer) = ring(0);
         assert!(producer.push('a'));
         assert!(!producer.push('b'));
@@ -124,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn between_two_threads_nothing_is_lost_reordered_or_seen_twice() {
+    fn between_two_threads_no_item_is_lost_reordered_or_repeated() {
         const ITEMS: u64 = 20_000;
         let (mut producer, mut consumer) = ring(61);
         std::thread::scope(|scope| {

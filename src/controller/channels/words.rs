@@ -1,4 +1,4 @@
-//! How a snapshot and a streamed command are laid out in 64-bit words.
+//! The layout of a snapshot and of a streamed command in 64-bit words.
 
 use takt_rt::plan;
 use takt_rt::{
@@ -10,12 +10,12 @@ use takt_rt::{
 use super::latest::Words;
 use super::motion_words::{MOTION_WORDS, put_motions, take_motions};
 
-/// Words of a snapshot of so many axes and buses.
+/// The largest number of words of a snapshot of so many axes and buses.
 pub const fn snapshot_words(axes: usize, buses: usize) -> usize {
     17 + MOTION_WORDS + 4 * Answers::EXPLAINED + 4 * axes + 7 * buses
 }
 
-/// Words of a streamed command for so many axes.
+/// The number of words of a streamed command for so many axes.
 pub const fn stream_words(axes: usize) -> usize {
     1 + 3 * axes
 }
@@ -428,7 +428,7 @@ mod tests {
         fn a_snapshot_comes_out_as_it_went_in(before in snapshots(), snapshot in snapshots()) {
             let words = snapshot_words(MAX_AXES, MAX_BUSES);
             let (mut writer, reader) = latest(words);
-            // What an earlier, longer value has left in a slot must not show.
+            // The rest of an earlier, longer value in a slot must have no effect.
             (0..4).for_each(|_| writer.write(|words| put_snapshot(&before, words)));
             writer.write(|words| put_snapshot(&snapshot, words));
             prop_assert_eq!(reader.attempt(4, take_snapshot), Attempt::Whole(snapshot, 5));

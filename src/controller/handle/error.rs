@@ -1,44 +1,48 @@
-//! Why a controller does not start, a command is not given, a motion does not get to its end.
+//! Errors of an embedded controller. Their `Debug` text is their `Display` text, so that `?` in `main` prints a sentence.
+
+use std::fmt;
 
 use takt_rt::{RequestError, StopReason};
 
 use crate::controller::session::{Session, SessionError};
 use crate::telemetry::{Machine, words};
 
-/// Why there is no controller.
-#[derive(Debug, thiserror::Error)]
+/// Why a controller could not be started.
+#[derive(thiserror::Error)]
 pub enum StartFailure {
-    /// Nothing was begun.
+    /// The session could not be started: nothing was sent to the drives.
     #[error(transparent)]
     Session(#[from] SessionError),
-    /// The drives could not be brought up or enabled; what is left of the attempt.
+    /// The drives could not be brought up or enabled. The session tells why.
     #[error("the drives could not be enabled: {}", .0.outcome.words(&.0.log.machine))]
     NotEnabled(Box<Session>),
-    /// The thread that leads the controller has died, which only a defect of takt can bring about.
-    #[error("the thread that leads the controller has died")]
+    /// The session thread has panicked. That is a defect of takt.
+    #[error("the session thread has panicked; this is a defect of takt, please report it")]
     Died,
 }
 
 /// The real-time thread has refused a request.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, PartialEq, thiserror::Error)]
 #[error("{words}")]
 pub struct Refused {
-    /// What was refused and why; `None` when so many others were refused since that it is no longer known.
+    /// The request and the reason; `None` if many later refusals have replaced it.
     pub refusal: Option<RequestError>,
     words: String,
 }
 
 impl Refused {
     pub(super) fn new(refusal: Option<RequestError>, machine: &Machine) -> Self {
-        let forgotten =
-            || "the request was refused, as were so many since that why is no longer known".to_owned();
+        let forgotten = || {
+            "the request was refused; the reason is no longer known, because many later requests were refused"
+                .to_owned()
+        };
         let words = refusal.map_or_else(forgotten, |refusal| words::rejection(&refusal, machine));
         Self { refusal, words }
     }
 }
 
 /// The group has stopped.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, PartialEq, thiserror::Error)]
 #[error("the group has stopped: {words}")]
 pub struct Stopped {
     /// Why.
@@ -52,67 +56,67 @@ impl Stopped {
     }
 }
 
-/// Why a command was not given; nothing has changed then.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+/// Why a command was not executed. It has changed nothing.
+#[derive(Clone, PartialEq, thiserror::Error)]
 pub enum CommandError {
-    /// A value for each axis is needed.
-    #[error("{given} values for {axes} axes")]
+    /// The number of values is not the number of axes.
+    #[error("{given} values were given for {axes} axes")]
     Count {
-        /// How many there were.
+        /// The number of values.
         given: usize,
-        /// How many there are to be.
+        /// The number of axes.
         axes: usize,
     },
     /// There is no such axis.
-    #[error("there is no axis {axis}: the controller has {axes}")]
+    #[error("there is no axis {axis}: the controller has {axes} axes")]
     NoSuchAxis {
-        /// The number asked for.
+        /// The number of the axis.
         axis: usize,
-        /// How many there are.
+        /// The number of axes.
         axes: usize,
     },
-    /// The value is outside the limits of the axis, or no number.
-    #[error("{axis}: {value} is outside {lowest} to {highest}")]
+    /// The value is outside the limits of the axis, or not a number.
+    #[error("{axis}: {value} is not within its limits, {lowest} to {highest}")]
     OutsideLimits {
         /// The axis.
         axis: String,
-        /// What was asked for: rad, rad/s, N·m (m, m/s, N).
+        /// The value: rad, rad/s, N·m (m, m/s, N).
         value: f64,
-        /// The lowest that is allowed.
+        /// The lowest allowed value.
         lowest: f64,
-        /// The highest that is allowed.
+        /// The highest allowed value.
         highest: f64,
     },
-    /// The axis is not in the mode that takes this.
+    /// The mode of the axis does not take this command.
     #[error("{axis} is not in {needed}")]
     WrongMode {
         /// The axis.
         axis: String,
-        /// The mode that takes it.
+        /// The mode that takes this command.
         needed: &'static str,
     },
-    /// More has been asked for than the real-time thread has taken up yet; a stop always finds room.
-    #[error("{waiting} requests are waiting already")]
+    /// Too many requests wait for the real-time thread. A stop always finds room.
+    #[error("{waiting} requests are already waiting")]
     Full {
-        /// How many.
+        /// The number of waiting requests.
         waiting: usize,
     },
     /// The real-time thread has refused it.
     #[error(transparent)]
     Refused(#[from] Refused),
-    /// So many requests have followed it that what became of it is not known.
-    #[error("too many requests have followed it to know what became of it")]
+    /// Its answer is no longer known, because many requests have followed it.
+    #[error("the answer to the request is no longer known, because many requests have followed it")]
     Unanswered,
-    /// A stop has overtaken it before the real-time thread had taken it up.
-    #[error("a stop has overtaken the request")]
+    /// A stop has discarded the request before the real-time thread took it.
+    #[error("a stop has discarded the request before it began")]
     Overtaken,
     /// The controller has ended.
     #[error("the controller has ended")]
     Ended,
 }
 
-/// Why a motion did not get to its end.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+/// Why a motion did not reach its targets.
+#[derive(Clone, PartialEq, thiserror::Error)]
 pub enum MotionError {
     /// The group has stopped.
     #[error(transparent)]
@@ -120,13 +124,32 @@ pub enum MotionError {
     /// The real-time thread has refused it.
     #[error(transparent)]
     Refused(#[from] Refused),
-    /// A stop has overtaken it before the real-time thread had taken it up.
-    #[error("a stop has overtaken the motion")]
+    /// A stop has discarded the request before the real-time thread took it.
+    #[error("a stop has discarded the motion before it began")]
     Overtaken,
-    /// It was not over in time; it goes on.
-    #[error("the motion was not over in time")]
+    /// A later motion has replaced it.
+    #[error("a later motion has replaced the motion")]
+    Replaced,
+    /// Its result is no longer known, because many motions have followed it.
+    #[error("the result of the motion is no longer known, because many motions have followed it")]
+    Forgotten,
+    /// It has not ended in time, and goes on.
+    #[error("the motion has not ended in time, and goes on")]
     NotInTime,
     /// The controller has ended.
     #[error("the controller has ended")]
     Ended,
 }
+
+/// `main` prints the error that `?` hands it by `Debug`. A session, for example, would be hundreds of lines.
+macro_rules! debug_as_displayed {
+    ($($error:ty),*) => {$(
+        impl fmt::Debug for $error {
+            fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+                fmt::Display::fmt(self, formatter)
+            }
+        }
+    )*};
+}
+
+debug_as_displayed!(StartFailure, Refused, Stopped, CommandError, MotionError);

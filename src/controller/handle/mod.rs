@@ -1,5 +1,5 @@
-//! A controller to embed: brought up and enabled by [`Controller::start`], commanded by a program's own threads, brought
-//! to rest and left by [`Controller::finish`].
+//! A controller to embed in a program. [`Controller::start`] brings the drives up and enables them. The program's own threads
+//! command it. [`Controller::finish`] brings the axes to rest and shuts the drives down.
 //!
 //! ```no_run
 //! use std::time::Duration;
@@ -10,8 +10,8 @@
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let config = Config::load("configs/arm6-erob.toml".as_ref()).map_err(miette::Report::new)?;
 //! let mut arm = Controller::start(config, SessionOptions::default())?;
-//! let there = arm.move_to(&[0.3, -0.2, 0.1, -0.5, 0.0, 0.4])?;
-//! arm.wait(there, Duration::from_secs(10))?;
+//! let motion = arm.move_to(&[0.3, -0.2, 0.1, -0.5, 0.0, 0.4])?;
+//! arm.wait(motion, Duration::from_secs(10))?;
 //! let session = arm.finish()?;
 //! println!("{:?}", session.outcome);
 //! # Ok(())
@@ -36,7 +36,7 @@ use takt_rt::{
 
 use super::channels::{Observer, RequestNumbers, Streamer};
 use super::outcome::{Interrupt, Outcome};
-use super::session::{self, Remote, Session, SessionError, SessionOptions};
+use super::session::{self, Remote, RemoteHandles, Session, SessionError, SessionOptions};
 use crate::config::{Axis, Config};
 use crate::telemetry::Machine;
 use waiting_requests::REQUESTS_AT_MOST;
@@ -45,12 +45,12 @@ pub(super) use waiting_requests::WaitingRequests;
 
 pub use error::{CommandError, MotionError, Refused, StartFailure, Stopped};
 
-/// Between two looks at the state by whoever waits.
-const LOOK: Duration = Duration::from_millis(1);
-/// Enabling takes the drives' power-up time at the most, and somewhat longer for all of them.
-const ENABLE_PATIENCE: Duration = Duration::from_secs(60);
+/// The time between two polls of the state.
+const POLL_INTERVAL: Duration = Duration::from_millis(1);
+/// The drives must be enabled within this time. It covers the power-up time of all drives.
+const ENABLE_TIMEOUT: Duration = Duration::from_secs(60);
 
-/// A group of axes that is enabled and obeys. Dropping it brings the axes to rest, disables and leaves them.
+/// A group of axes that is enabled. Dropping it brings the axes to rest, and disables and shuts down the drives.
 pub struct Controller {
     axes: Vec<Axis>,
     machine: Machine,
@@ -62,22 +62,18 @@ pub struct Controller {
     thread: Option<JoinHandle<Result<Session, SessionError>>>,
 }
 
-/// A motion that was asked for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Motion {
-    request: RequestId,
-    slot: u64,
-    ends_at_rest: bool,
-}
+/// Identifies a motion, for [`Controller::wait`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct MotionId(RequestId);
 
-/// How a move is made.
+/// Parameters of a move.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MoveOptions {
     /// Fraction of the velocity limits, above 0 up to 1.
     pub velocity_scale: f64,
     /// Fraction of the acceleration and jerk limits, above 0 up to 1.
     pub acceleration_scale: f64,
-    /// It takes at least this long, in seconds.
+    /// The shortest duration of the move, in seconds.
     pub minimum_duration_s: f64,
 }
 
@@ -94,30 +90,30 @@ impl Controller {
     /// See [`StartFailure`]; nothing has moved then.
     pub fn start(config: Config, options: SessionOptions) -> Result<Self, StartFailure> {
         let requests = Arc::new(WaitingRequests::default());
-        let (introduce, introduced) = mpsc::sync_channel(1);
-        let remote = Remote { requests: Arc::clone(&requests), introduce };
+        let (handles_in, handles_out) = mpsc::sync_channel(1);
+        let remote = Remote { requests: Arc::clone(&requests), handles: handles_in };
         let is_ending = Arc::new(AtomicBool::new(false));
         let (axes, machine) = (config.axes.clone(), Machine::of(&config));
         let thread = {
             let is_ending = Arc::clone(&is_ending);
             let watch =
                 move |_: &Snapshot, _| is_ending.load(Ordering::Relaxed).then_some(Interrupt::Controlled);
-            let lead = move || session::lead(&config, options, Box::new(|_| {}), watch, Some(remote));
-            thread::Builder::new().name("takt-lead".into()).spawn(lead)
+            let run = move || session::run_with(&config, options, Box::new(|_| {}), watch, Some(remote));
+            thread::Builder::new().name("takt-session".into()).spawn(run)
         };
         let thread = thread.map_err(SessionError::Logger)?;
-        let Ok((observer, streamer, numbers)) = introduced.recv() else {
+        let Ok(RemoteHandles { observer, streamer, numbers }) = handles_out.recv() else {
             return Err(failed(thread));
         };
         let thread = Some(thread);
         let mut controller = Self { axes, machine, requests, numbers, observer, streamer, is_ending, thread };
         let begun = Instant::now();
         while controller.state().phase != Phase::Holding {
-            if controller.has_ended() || begun.elapsed() > ENABLE_PATIENCE {
+            if controller.has_ended() || begun.elapsed() > ENABLE_TIMEOUT {
                 controller.is_ending.store(true, Ordering::Relaxed);
                 return Err(controller.thread.take().map_or(StartFailure::Died, failed));
             }
-            thread::sleep(LOOK);
+            thread::sleep(POLL_INTERVAL);
         }
         Ok(controller)
     }
@@ -132,34 +128,31 @@ impl Controller {
         self.observer.snapshot()
     }
 
-    /// A handle for another thread that wants to see the state.
+    /// A handle to the state for another thread.
     pub fn observer(&self) -> Observer {
         self.observer.clone()
     }
 
-    /// Moves every axis to its target (rad or m), coordinated, to rest. A move under way is re-planned from where it is.
-    /// Drives in profile position make their own way; those in profile velocity and torque are left as they are.
+    /// Starts a coordinated move of every axis to its target (rad or m), where the axes come to rest. A move in progress is
+    /// replanned from the present set-points. A drive in profile position plans its own profile. A drive in profile velocity
+    /// or profile torque keeps its velocity or torque.
     ///
     /// # Errors
     /// See [`CommandError`]; nothing has changed then.
-    pub fn move_to(&mut self, target: &[f64]) -> Result<Motion, CommandError> {
+    pub fn move_to(&mut self, target: &[f64]) -> Result<MotionId, CommandError> {
         self.move_with(target, MoveOptions::default())
     }
 
-    /// As [`Controller::move_to`], within fractions of the limits.
+    /// The same as [`Controller::move_to`], within fractions of the limits.
     ///
     /// # Errors
     /// See [`CommandError`]; nothing has changed then.
-    pub fn move_with(&mut self, target: &[f64], options: MoveOptions) -> Result<Motion, CommandError> {
+    pub fn move_with(&mut self, target: &[f64], options: MoveOptions) -> Result<MotionId, CommandError> {
         if target.len() != self.axes.len() {
             return Err(CommandError::Count { given: target.len(), axes: self.axes.len() });
         }
         for (axis, value) in self.axes.iter().zip(target) {
-            let is_positioned =
-                !matches!(axis.control, ControlLaw::ProfileVelocity | ControlLaw::ProfileTorque);
-            if is_positioned {
-                within(axis, *value, axis.limits.position_min, axis.limits.position_max)?;
-            }
+            within(axis, *value, axis.limits.position_min, axis.limits.position_max)?;
         }
         let mut all = [0.0; MAX_AXES];
         all.iter_mut().zip(target).for_each(|(to, from)| *to = *from);
@@ -171,11 +164,11 @@ impl Controller {
             acceleration_scale: options.acceleration_scale,
             minimum_duration_s: options.minimum_duration_s,
         });
-        self.begin(id, request, true)
+        self.begin(id, request)
     }
 
-    /// Lets a drive in profile velocity go at a speed (rad/s or m/s). When that has not been renewed within `valid_for`,
-    /// the group stops.
+    /// Gives a drive in profile velocity a velocity (rad/s or m/s). Unless it is given again within `valid_for`, the group
+    /// stops.
     ///
     /// # Errors
     /// See [`CommandError`]; nothing has changed then.
@@ -184,34 +177,38 @@ impl Controller {
         axis: usize,
         velocity: f64,
         valid_for: Duration,
-    ) -> Result<Motion, CommandError> {
+    ) -> Result<MotionId, CommandError> {
         let own = self.axis(axis, ControlLaw::ProfileVelocity, "profile velocity, mode = \"pv\"")?;
         within(own, velocity, -own.limits.velocity, own.limits.velocity)?;
-        self.drive(axis, ProfileTarget::Velocity(velocity), velocity == 0.0, valid_for)
+        self.drive(axis, ProfileTarget::Velocity(velocity), valid_for)
     }
 
-    /// Lets a drive in profile torque push with a torque (N·m or N). When that has not been renewed within `valid_for`,
-    /// the group stops.
+    /// Gives a drive in profile torque a torque (N·m or N). Unless it is given again within `valid_for`, the group stops.
     ///
     /// # Errors
     /// See [`CommandError`]; nothing has changed then.
-    pub fn torque(&mut self, axis: usize, torque: f64, valid_for: Duration) -> Result<Motion, CommandError> {
+    pub fn torque(
+        &mut self,
+        axis: usize,
+        torque: f64,
+        valid_for: Duration,
+    ) -> Result<MotionId, CommandError> {
         let own = self.axis(axis, ControlLaw::ProfileTorque, "profile torque, mode = \"pt\"")?;
         within(own, torque, -own.limits.torque, own.limits.torque)?;
-        self.drive(axis, ProfileTarget::Torque(torque), torque == 0.0, valid_for)
+        self.drive(axis, ProfileTarget::Torque(torque), valid_for)
     }
 
-    /// Begins to follow [`Controller::stream`]: what is streamed from now on counts. The first set-points must come within
-    /// the time that enabling may take, and begin where the joints are.
+    /// Begins to follow [`Controller::stream`]. The first set-points must come within the enable time-out, and must be near
+    /// the present positions.
     ///
     /// # Errors
     /// [`CommandError::Refused`] unless the group holds its position and is punctual, [`CommandError::Full`], [`CommandError::Ended`].
     pub fn begin_stream(&mut self) -> Result<(), CommandError> {
-        self.obtain(Request::Stream)
+        self.request_and_wait(Request::Stream)
     }
 
-    /// Replaces the streamed set-points, one for each axis; the real-time thread takes the newest ones. They expire after
-    /// `valid_for`: then the group decelerates and holds.
+    /// Replaces the streamed set-points, one for each axis. The real-time thread uses the newest ones. They expire after
+    /// `valid_for`; then the group decelerates and holds.
     ///
     /// # Errors
     /// [`CommandError::Count`].
@@ -225,31 +222,30 @@ impl Controller {
         Ok(())
     }
 
-    /// Stops the group by this category. That is never refused, and not waited for. Whatever has been asked for before and is
-    /// still waiting is forgotten, so that it neither holds the stop up nor is begun after it.
+    /// Requests a stop of this category, and returns at once. A stop is never refused. It discards all requests that are still
+    /// waiting, so that they neither delay the stop nor begin after it.
     ///
     /// # Errors
     /// [`CommandError::Ended`].
     pub fn stop(&mut self, category: StopCategory) -> Result<(), CommandError> {
-        self.ask(Request::Stop(category)).map(drop)
+        self.send(Request::Stop(category)).map(drop)
     }
 
-    /// Begins to bring the axes to rest if need be, and to disable them. It overtakes what is waiting as [`Controller::stop`]
-    /// does.
+    /// Begins to bring the axes to rest and to disable them. It discards waiting requests as [`Controller::stop`] does.
     ///
     /// # Errors
     /// [`CommandError::Refused`], [`CommandError::Ended`].
     pub fn disable(&mut self) -> Result<(), CommandError> {
-        self.obtain(Request::Disable)
+        self.request_and_wait(Request::Disable)
     }
 
-    /// Begins to enable the axes again, after [`Controller::disable`], or after a fault and [`Controller::reset_faults`].
+    /// Begins to enable the axes again: after [`Controller::disable`], or after a fault and [`Controller::reset_faults`].
     ///
     /// # Errors
     /// [`CommandError::Refused`] unless the axes are disabled and no fault is latched, [`CommandError::Full`],
     /// [`CommandError::Ended`].
     pub fn enable(&mut self) -> Result<(), CommandError> {
-        self.obtain(Request::Enable)
+        self.request_and_wait(Request::Enable)
     }
 
     /// Clears latched faults.
@@ -257,62 +253,70 @@ impl Controller {
     /// # Errors
     /// [`CommandError::Refused`] in motion, [`CommandError::Full`], [`CommandError::Ended`].
     pub fn reset_faults(&mut self) -> Result<(), CommandError> {
-        self.obtain(Request::ResetFaults)
+        self.request_and_wait(Request::ResetFaults)
     }
 
-    /// Waits until a motion is over: until the axes are at rest at their targets, or a speed or torque has been reached.
+    /// Waits until a motion has reached its targets: until the axes are at rest there, or a velocity or torque is reached. The
+    /// result is that of this motion, independent of what the group did before and after it.
     ///
     /// # Errors
     /// See [`MotionError`].
-    pub fn wait(&self, motion: Motion, at_most: Duration) -> Result<(), MotionError> {
+    pub fn wait(&self, motion: MotionId, at_most: Duration) -> Result<(), MotionError> {
         let begun = Instant::now();
         loop {
-            let state = self.state();
-            match state.motions.of(motion.request) {
-                Some(MotionState::Finished) if !motion.ends_at_rest || state.phase == Phase::Holding => {
-                    return Ok(());
-                }
-                Some(MotionState::Stopped(reason)) => return Err(Stopped::new(reason, &self.machine).into()),
-                Some(MotionState::Replaced { .. }) => return Err(MotionError::Overtaken),
-                _ => {}
+            // This is read before the state, so that the state includes the last cycle before the end.
+            let has_ended = self.has_ended();
+            if let Some(result) = self.result_of(motion) {
+                return result;
             }
-            if let Answer::Rejected(refusal) = state.answers.of(motion.request) {
-                return Err(Refused::new(refusal, &self.machine).into());
-            }
-            if self.requests.has_forgotten(motion.request) {
-                return Err(MotionError::Overtaken);
-            }
-            if self.has_ended() {
+            if has_ended {
                 return Err(MotionError::Ended);
             }
             if begun.elapsed() > at_most {
                 return Err(MotionError::NotInTime);
             }
-            thread::sleep(LOOK);
+            thread::sleep(POLL_INTERVAL);
         }
     }
 
-    /// Waits for a phase. Returns whether it came in time.
+    /// How a motion ended, if it has.
+    fn result_of(&self, MotionId(request): MotionId) -> Option<Result<(), MotionError>> {
+        let state = self.state();
+        let result = match (state.motions.of(request), state.answers.of(request)) {
+            (Some(MotionState::InProgress), _) => return None,
+            (Some(MotionState::Finished), _) => Ok(()),
+            (Some(MotionState::Stopped(reason)), _) => Err(Stopped::new(reason, &self.machine).into()),
+            (Some(MotionState::Replaced { .. }), _) => Err(MotionError::Replaced),
+            (None, Answer::Rejected(refusal)) => Err(Refused::new(refusal, &self.machine).into()),
+            (None, Answer::Granted) => Err(MotionError::Forgotten),
+            (None, Answer::None) if state.answers.have_forgotten(request) => Err(MotionError::Forgotten),
+            (None, Answer::None) if self.requests.is_discarded(request) => Err(MotionError::Overtaken),
+            (None, Answer::None) => return None,
+        };
+        Some(result)
+    }
+
+    /// Waits until the group is in a phase. Returns whether that happened in time.
     pub fn wait_for(&self, phase: Phase, at_most: Duration) -> bool {
         let begun = Instant::now();
         while self.state().phase != phase {
             if self.has_ended() || begun.elapsed() > at_most {
                 return false;
             }
-            thread::sleep(LOOK);
+            thread::sleep(POLL_INTERVAL);
         }
         true
     }
 
-    /// Brings the axes to rest, disables and leaves them, and tells what is left of the run.
+    /// Brings the axes to rest, disables and shuts down the drives, and returns the result of the run.
     ///
     /// # Errors
-    /// [`StartFailure::Died`] when the thread that leads the controller did not end by itself.
+    /// [`StartFailure::Died`] if the session thread has panicked.
     pub fn finish(mut self) -> Result<Session, StartFailure> {
         self.begin_end();
         let Some(thread) = self.thread.take() else { return Err(StartFailure::Died) };
         match thread.join() {
-            // To be asked to end is how such a run is over.
+            // An interrupt is the regular end of this run.
             Ok(Ok(session)) if session.outcome == Outcome::Interrupted => {
                 Ok(Session { outcome: Outcome::Finished, ..session })
             }
@@ -321,10 +325,10 @@ impl Controller {
         }
     }
 
-    /// Ends the run from its present motion: what waits behind it is not begun any more.
+    /// Stops the present motion and ends the run. Waiting requests are discarded.
     fn begin_end(&self) {
-        // Where the controller has ended there is nothing to stop.
-        let _ = self.ask(Request::Stop(StopCategory::Two));
+        // This fails only if the controller has already ended.
+        let _ = self.send(Request::Stop(StopCategory::Two));
         self.is_ending.store(true, Ordering::Relaxed);
     }
 
@@ -345,47 +349,45 @@ impl Controller {
         &mut self,
         axis: usize,
         target: ProfileTarget,
-        ends_at_rest: bool,
         valid_for: Duration,
-    ) -> Result<Motion, CommandError> {
+    ) -> Result<MotionId, CommandError> {
         let id = self.numbers.next();
-        // An axis that exists has a number that fits.
+        // The number of an existing axis fits.
         let axis = axis as u8;
         let wanted = ProfileMove { axis, target, valid_until_ns: expiry_ns(valid_for) };
-        self.begin(id, Request::SetProfileTarget(wanted), ends_at_rest)
+        self.begin(id, Request::SetProfileTarget(wanted))
     }
 
-    fn begin(&self, id: RequestId, request: Request, ends_at_rest: bool) -> Result<Motion, CommandError> {
-        let slot = self.state().slot;
-        self.hand_in(RequestEnvelope { id, request })?;
-        Ok(Motion { request: id, slot, ends_at_rest })
+    fn begin(&self, id: RequestId, request: Request) -> Result<MotionId, CommandError> {
+        self.submit(RequestEnvelope { id, request })?;
+        Ok(MotionId(id))
     }
 
-    /// Asks for something, and waits until it has been granted.
-    fn obtain(&self, request: Request) -> Result<(), CommandError> {
-        let asked = self.ask(request)?;
+    /// Sends a request and waits until it is granted.
+    fn request_and_wait(&self, request: Request) -> Result<(), CommandError> {
+        let id = self.send(request)?;
         loop {
             let answers = self.state().answers;
-            match answers.of(asked) {
+            match answers.of(id) {
                 Answer::Granted => return Ok(()),
                 Answer::Rejected(refusal) => return Err(Refused::new(refusal, &self.machine).into()),
-                Answer::None if answers.have_forgotten(asked) => return Err(CommandError::Unanswered),
-                Answer::None if self.requests.has_forgotten(asked) => return Err(CommandError::Overtaken),
+                Answer::None if answers.have_forgotten(id) => return Err(CommandError::Unanswered),
+                Answer::None if self.requests.is_discarded(id) => return Err(CommandError::Overtaken),
                 Answer::None if self.has_ended() => return Err(CommandError::Ended),
-                Answer::None => thread::sleep(LOOK),
+                Answer::None => thread::sleep(POLL_INTERVAL),
             }
         }
     }
 
-    fn ask(&self, request: Request) -> Result<RequestId, CommandError> {
+    fn send(&self, request: Request) -> Result<RequestId, CommandError> {
         let id = self.numbers.next();
-        self.hand_in(RequestEnvelope { id, request }).map(|()| id)
+        self.submit(RequestEnvelope { id, request }).map(|()| id)
     }
 
-    fn hand_in(&self, asked: RequestEnvelope) -> Result<(), CommandError> {
+    fn submit(&self, envelope: RequestEnvelope) -> Result<(), CommandError> {
         if self.has_ended() {
             Err(CommandError::Ended)
-        } else if self.requests.ask(asked) {
+        } else if self.requests.submit(envelope) {
             Ok(())
         } else {
             Err(CommandError::Full { waiting: REQUESTS_AT_MOST })
@@ -397,7 +399,7 @@ impl Drop for Controller {
     fn drop(&mut self) {
         self.begin_end();
         if let Some(thread) = self.thread.take() {
-            // Its outcome interests nobody any more.
+            // A dropped controller has no receiver for its result.
             let _ = thread.join();
         }
     }

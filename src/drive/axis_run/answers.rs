@@ -1,73 +1,80 @@
-//! What becomes of a step once the drive has answered: values judged and kept, writes read back, silence understood.
+//! Evaluates the drive's SDO responses: checks and stores values, verifies writes, and classifies missing answers.
 
 use takt_rt::{Dialect, Nanoseconds};
 
-use super::{AWAIT_PAUSE_NS, AxisRun, Phase, Progress};
+use super::{AWAIT_PAUSE_NS, AxisRun, StepPhase, StepResult};
 use crate::canopen::dcf::Download;
 use crate::canopen::object::Object;
 use crate::canopen::objects::DEVICE_TYPE;
-use crate::canopen::pdo_inquiry::PdoInquiry;
+use crate::canopen::pdo_reader::PdoReader;
 use crate::canopen::sdo::{AbortCode, Completed, SdoError, Transfer};
-use crate::drive::failure::{Answered, Cause, Content};
+use crate::drive::failure::{Content, FailureCause, ProbeResult};
 use crate::drive::process_data::ProcessData;
 use crate::drive::step::{Access, Action, Check, Fact, ReadBack};
 
 impl AxisRun {
-    /// A transfer is over.
+    /// Evaluates a finished transfer.
     pub(super) fn transferred(
         &mut self,
         now_ns: Nanoseconds,
         outcome: Result<Completed, SdoError>,
-    ) -> Progress {
+    ) -> StepResult {
         match (self.phase, self.action()) {
             (
-                Phase::Inquire { waited_ns, has_answered },
+                StepPhase::Probe { waited_ns, has_answered },
                 Some(Action::Nmt { awaited: Some(awaited), .. }),
             ) => {
-                let answered = match (outcome, has_answered, self.other_protocol) {
-                    (Ok(_) | Err(SdoError::Aborted(_)), _, _) => Answered::Sdo,
-                    (_, true, Some(other)) => Answered::OtherProtocol(other.name),
-                    _ => Answered::Nothing,
+                let probe_result = match (outcome, has_answered, self.other_protocol) {
+                    (Ok(_) | Err(SdoError::Aborted(_)), _, _) => ProbeResult::Sdo,
+                    (_, true, Some(other)) => ProbeResult::OtherProtocol(other.name),
+                    _ => ProbeResult::Nothing,
                 };
-                Err(Cause::StateNotReached { awaited, reported: self.reported, waited_ns, answered })
+                Err(FailureCause::StateNotReached {
+                    awaited,
+                    reported: self.reported,
+                    waited_ns,
+                    probe_result,
+                })
             }
-            (Phase::ReadBack { written }, Some(Action::Write { object, read_back, .. })) => {
+            (StepPhase::ReadBack { written }, Some(Action::Write { object, read_back, .. })) => {
                 self.read_back(object, written, read_back, outcome)
             }
-            (Phase::Transfer { .. }, Some(Action::Write { object, value, read_back, is_optional })) => {
+            (StepPhase::Transfer { .. }, Some(Action::Write { object, value, read_back, is_optional })) => {
                 self.written(object, self.value_of(value), read_back, is_optional, outcome)
             }
-            (Phase::Transfer { .. }, Some(Action::Read { object, check, keep, is_optional })) => {
+            (StepPhase::Transfer { .. }, Some(Action::Read { object, check, keep, is_optional })) => {
                 self.read(object, check, keep, is_optional, outcome)
             }
-            (Phase::Transfer { .. }, Some(Action::Reach { .. })) => match outcome {
+            (StepPhase::Transfer { .. }, Some(Action::WakeUp { .. })) => match outcome {
                 Ok(_) | Err(SdoError::Aborted(_)) => {
                     self.next_step();
                     Ok(())
                 }
-                Err(error) => Err(Cause::Transfer { object: DEVICE_TYPE, access: Access::Read, error }),
+                Err(error) => {
+                    Err(FailureCause::Transfer { object: DEVICE_TYPE, access: Access::Read, error })
+                }
             },
-            (Phase::Transfer { .. }, Some(Action::ReadText { object, keep })) => {
+            (StepPhase::Transfer { .. }, Some(Action::ReadText { object, keep })) => {
                 match outcome {
                     Ok(Completed::Uploaded(uploaded)) => self.facts.keep_text(keep, uploaded.text()),
                     Ok(Completed::Downloaded) | Err(SdoError::Aborted(_)) => self.facts.absent.push(object),
-                    Err(error) => return Err(Cause::TextTransfer { object, error }),
+                    Err(error) => return Err(FailureCause::TextTransfer { object, error }),
                 }
                 self.next_step();
                 Ok(())
             }
-            (Phase::Transfer { .. }, Some(Action::WriteBytes(download))) => {
+            (StepPhase::Transfer { .. }, Some(Action::WriteBytes(download))) => {
                 self.bytes_written(&download, outcome)
             }
-            (Phase::Verify, Some(Action::WriteBytes(download))) => self.verify(&download, outcome),
-            (Phase::Transfer { began_ns }, Some(Action::Await { object, check, keep, within_ns })) => {
+            (StepPhase::Verify, Some(Action::WriteBytes(download))) => self.verify(&download, outcome),
+            (StepPhase::Transfer { began_ns }, Some(Action::Await { object, check, keep, within_ns })) => {
                 let received = self.number(object, Access::Read, outcome)?;
                 self.keep(keep, received);
                 let waited_ns = now_ns.saturating_sub(began_ns);
                 if check.passes(received) {
                     self.next_step();
                 } else if waited_ns >= within_ns {
-                    return Err(Cause::Value {
+                    return Err(FailureCause::Value {
                         object,
                         access: Access::Read,
                         expected: check,
@@ -75,7 +82,8 @@ impl AxisRun {
                         waited_ns,
                     });
                 } else {
-                    self.phase = Phase::Pause { began_ns, until_ns: now_ns.saturating_add(AWAIT_PAUSE_NS) };
+                    self.phase =
+                        StepPhase::Pause { began_ns, until_ns: now_ns.saturating_add(AWAIT_PAUSE_NS) };
                 }
                 Ok(())
             }
@@ -83,25 +91,25 @@ impl AxisRun {
         }
     }
 
-    /// Settles the process data once the drive has told of it.
-    pub(super) fn inquired(&mut self) -> Progress {
-        let Some(outcome) = self.inquiry.as_ref().and_then(PdoInquiry::outcome) else { return Ok(()) };
-        self.inquiry = None;
+    /// Takes the PDO configuration that the drive has reported.
+    pub(super) fn take_pdo_configuration(&mut self) -> StepResult {
+        let Some(outcome) = self.pdo_reader.as_ref().and_then(PdoReader::outcome) else { return Ok(()) };
+        self.pdo_reader = None;
         let reported = match outcome {
             Ok(reported) => reported,
             Err(failure) if self.means_absent(failure.error) => {
                 self.facts.absent.push(failure.object);
                 vec![]
             }
-            Err(failure) => return Err(Cause::Inquiry(failure)),
+            Err(failure) => return Err(FailureCause::PdoRead(failure)),
         };
-        let data = ProcessData::as_reported(&self.axis, &reported).map_err(Cause::Mapping)?;
+        let data = ProcessData::as_reported(&self.axis, &reported).map_err(FailureCause::Mapping)?;
         self.facts.process_data = Some(data);
         self.next_step();
         Ok(())
     }
 
-    /// Whether an error says that the drive has no such object. A YZ-AIM says so by silence.
+    /// Whether an error means that the object does not exist. A YZ-AIM does not answer then.
     fn means_absent(&self, error: SdoError) -> bool {
         match error {
             SdoError::Aborted(code) => code.means_absent(),
@@ -117,7 +125,7 @@ impl AxisRun {
         keep: Option<Fact>,
         is_optional: bool,
         outcome: Result<Completed, SdoError>,
-    ) -> Progress {
+    ) -> StepResult {
         let is_absent = match outcome {
             Err(SdoError::Aborted(_)) => true,
             Err(error) => self.means_absent(error),
@@ -132,7 +140,7 @@ impl AxisRun {
         self.keep(keep, received);
         if !check.passes(received) {
             let access = Access::Read;
-            return Err(Cause::Value { object, access, expected: check, received, waited_ns: 0 });
+            return Err(FailureCause::Value { object, access, expected: check, received, waited_ns: 0 });
         }
         self.next_step();
         Ok(())
@@ -145,17 +153,17 @@ impl AxisRun {
         read_back: ReadBack,
         is_optional: bool,
         outcome: Result<Completed, SdoError>,
-    ) -> Progress {
+    ) -> StepResult {
         match outcome {
             Err(error) if is_optional && self.means_absent(error) => {
                 self.facts.absent.push(object.address);
                 self.next_step();
             }
-            Err(error) => return Err(Cause::Transfer { object, access: Access::Write(value), error }),
+            Err(error) => return Err(FailureCause::Transfer { object, access: Access::Write(value), error }),
             Ok(_) if read_back == ReadBack::No => self.next_step(),
             Ok(_) => {
                 self.start(Transfer::Upload { object: object.address });
-                self.phase = Phase::ReadBack { written: value };
+                self.phase = StepPhase::ReadBack { written: value };
             }
         }
         Ok(())
@@ -167,7 +175,7 @@ impl AxisRun {
         written: i64,
         read_back: ReadBack,
         outcome: Result<Completed, SdoError>,
-    ) -> Progress {
+    ) -> StepResult {
         let access = Access::ReadBack(written);
         let received = self.number(object, access, outcome)?;
         let expected = match read_back {
@@ -176,15 +184,15 @@ impl AxisRun {
             ReadBack::Masked(mask) => Check::Masked { value: written, mask },
         };
         if !expected.passes(received) {
-            return Err(Cause::Value { object, access, expected, received, waited_ns: 0 });
+            return Err(FailureCause::Value { object, access, expected, received, waited_ns: 0 });
         }
         self.next_step();
         Ok(())
     }
 
-    fn bytes_written(&mut self, download: &Download, outcome: Result<Completed, SdoError>) -> Progress {
+    fn bytes_written(&mut self, download: &Download, outcome: Result<Completed, SdoError>) -> StepResult {
         let Download { object, data } = download;
-        outcome.map_err(|error| Cause::ConfigurationTransfer {
+        outcome.map_err(|error| FailureCause::ConfigurationTransfer {
             object: *object,
             written: Content::of(data),
             is_reading_back: false,
@@ -192,23 +200,23 @@ impl AxisRun {
             means_absent: self.means_absent(error),
         })?;
         self.start(Transfer::Upload { object: *object });
-        self.phase = Phase::Verify;
+        self.phase = StepPhase::Verify;
         Ok(())
     }
 
-    fn verify(&mut self, download: &Download, outcome: Result<Completed, SdoError>) -> Progress {
+    fn verify(&mut self, download: &Download, outcome: Result<Completed, SdoError>) -> StepResult {
         let Download { object, data } = download;
         let (object, written) = (*object, Content::of(data));
         let received = match outcome {
             Ok(Completed::Uploaded(uploaded)) => uploaded,
-            // It cannot be read.
+            // The object is write-only.
             Ok(Completed::Downloaded) | Err(SdoError::Aborted(AbortCode::WriteOnly)) => {
                 self.next_step();
                 return Ok(());
             }
             Err(error) => {
                 let means_absent = self.means_absent(error);
-                return Err(Cause::ConfigurationTransfer {
+                return Err(FailureCause::ConfigurationTransfer {
                     object,
                     written,
                     is_reading_back: true,
@@ -219,7 +227,7 @@ impl AxisRun {
         };
         if !download.is_held_by(&received) {
             let received = Content::of(&received.bytes);
-            return Err(Cause::ConfigurationDiffers { object, written, received });
+            return Err(FailureCause::ConfigurationDiffers { object, written, received });
         }
         self.next_step();
         Ok(())
@@ -230,11 +238,11 @@ impl AxisRun {
         object: Object,
         access: Access,
         outcome: Result<Completed, SdoError>,
-    ) -> Result<i64, Cause> {
+    ) -> Result<i64, FailureCause> {
         match outcome {
             Ok(Completed::Uploaded(uploaded)) => {
                 let received = uploaded.bytes.len();
-                // The manual of a YZ-AIM gives 606C two lengths (A27): its answer says which is right.
+                // The manual of a YZ-AIM gives 606C two lengths (A27), so the length of its response counts.
                 let of_other_length = || {
                     let data_type = object.data_type.of_length(received)?;
                     uploaded.number(data_type).filter(|_| self.facts.dialect == Dialect::YzAim)
@@ -242,10 +250,10 @@ impl AxisRun {
                 uploaded
                     .number(object.data_type)
                     .or_else(of_other_length)
-                    .ok_or(Cause::Length { object, received })
+                    .ok_or(FailureCause::Length { object, received })
             }
-            Ok(Completed::Downloaded) => Err(Cause::Length { object, received: 0 }),
-            Err(error) => Err(Cause::Transfer { object, access, error }),
+            Ok(Completed::Downloaded) => Err(FailureCause::Length { object, received: 0 }),
+            Err(error) => Err(FailureCause::Transfer { object, access, error }),
         }
     }
 

@@ -1,31 +1,32 @@
-//! The keys that many kinds of fault have in common: where, when, which frames.
+//! The keys that many kinds of fault share: location, window, selection.
 
 use std::ops::RangeInclusive;
 
 use takt_rt::Nanoseconds;
 
-use crate::config::read::entry::{Bounds, Entry};
+use crate::config::bounds::Bounds;
+use crate::config::read::entry::Entry;
 use crate::config::read::section::Section;
 use crate::config::{Axis, Config, Interface, Quantity};
-use crate::faults::cue::Cue;
 use crate::faults::selection::{Direction, FrameFunction, Selection};
+use crate::faults::trigger::Trigger;
 use crate::faults::window::Window;
 
-/// Later than this, or longer, is a slip of the unit.
+/// The longest duration; a longer one is a mistake in the unit.
 const LONGEST_S: f64 = 86_400.0;
-/// The largest identifier there is.
+/// The number of identifiers, standard and extended.
 const IDS: i64 = 1 << 29;
 
-/// Where a fault happens.
-pub struct Place<'c, 'a> {
+/// Where a fault is injected.
+pub struct Location<'c, 'a> {
     pub bus: usize,
     /// The axis, if one is named.
     pub axis: Option<&'c Axis>,
-    /// Where the file names it.
+    /// The entry of the file that names it.
     pub entry: Option<Entry<'a>>,
 }
 
-impl Place<'_, '_> {
+impl Location<'_, '_> {
     pub fn show(&self, config: &Config) -> String {
         match self.axis {
             Some(axis) => format!("axis {}", axis.name),
@@ -39,7 +40,8 @@ impl Place<'_, '_> {
         match (interface, &self.entry) {
             (Some(Interface::Simulated), _) => true,
             (Some(interface), Some(entry)) => {
-                let allowed = "an axis on a simulated bus: only simulated drives can be broken".to_owned();
+                let allowed = "an axis on a simulated bus: faults can only be injected into simulated drives"
+                    .to_owned();
                 entry.report_range(format!("an axis on {interface}"), allowed);
                 false
             }
@@ -48,12 +50,12 @@ impl Place<'_, '_> {
     }
 }
 
-/// `bus` and `axis`.
-pub fn place<'c, 'a>(
+/// Reads `bus` and `axis`.
+pub fn location<'c, 'a>(
     section: &mut Section<'a>,
     config: &'c Config,
     needs_axis: bool,
-) -> Option<Place<'c, 'a>> {
+) -> Option<Location<'c, 'a>> {
     let axis_entry = if needs_axis {
         Some(section.require("axis", "the axis concerned: axis = \"joint1\"")?)
     } else {
@@ -61,7 +63,7 @@ pub fn place<'c, 'a>(
     };
     if let Some(entry) = axis_entry {
         let axis = named(&entry, &config.axes, |axis| &axis.name)?;
-        return Some(Place { bus: axis.bus, axis: Some(axis), entry: Some(entry) });
+        return Some(Location { bus: axis.bus, axis: Some(axis), entry: Some(entry) });
     }
     let entry = match config.buses.as_slice() {
         [_] => section.get("bus"),
@@ -74,7 +76,7 @@ pub fn place<'c, 'a>(
             config.buses.iter().position(|other| other.name == bus.name)?
         }
     };
-    Some(Place { bus, axis: None, entry })
+    Some(Location { bus, axis: None, entry })
 }
 
 fn named<'c, T>(entry: &Entry<'_>, all: &'c [T], name: impl Fn(&T) -> &String) -> Option<&'c T> {
@@ -87,24 +89,24 @@ fn named<'c, T>(entry: &Entry<'_>, all: &'c [T], name: impl Fn(&T) -> &String) -
     found
 }
 
-/// `when` and `at`, without an end.
+/// Reads `when` and `at`; the window has no end.
 pub fn beginning(section: &mut Section<'_>, config: &Config) -> Option<Window> {
-    let cues = [
-        ("start", Cue::Start),
-        ("enabled", Cue::Enabled),
-        ("moving", Cue::Moving),
-        ("stopping", Cue::Stopping),
+    let trigger_times = [
+        ("start", Trigger::Start),
+        ("enabled", Trigger::Enabled),
+        ("moving", Trigger::Moving),
+        ("stopping", Trigger::Stopping),
     ];
-    let cue = section.get("when").map(|entry| entry.choice(&cues));
+    let trigger = section.get("when").map(|entry| entry.choice(&trigger_times));
     let after_ns = section.get("at").map(|entry| duration(&entry, config));
     Some(Window {
-        cue: cue.unwrap_or(Some(Cue::Enabled))?,
+        trigger: trigger.unwrap_or(Some(Trigger::Enabled))?,
         after_ns: after_ns.unwrap_or(Some(0))?,
         lasts_ns: None,
     })
 }
 
-/// `when`, `at` and the length under `key`.
+/// Reads `when`, `at`, and the duration under `key`.
 pub fn window(section: &mut Section<'_>, key: &'static str, config: &Config) -> Option<Window> {
     let beginning = beginning(section, config);
     let lasts_ns = section.get(key).map(|entry| duration(&entry, config));
@@ -115,7 +117,7 @@ pub fn window(section: &mut Section<'_>, key: &'static str, config: &Config) -> 
     Some(Window { lasts_ns, ..beginning? })
 }
 
-/// A duration, or a number of cycles (`"20 cycles"`).
+/// Reads a duration, or a number of cycles (`"20 cycles"`).
 pub fn duration(entry: &Entry<'_>, config: &Config) -> Option<Nanoseconds> {
     if !entry.is_bare_number()
         && let Some(cycles) = entry.text()?.strip_suffix("cycles").or(entry.text()?.strip_suffix("cycle"))
@@ -123,10 +125,10 @@ pub fn duration(entry: &Entry<'_>, config: &Config) -> Option<Nanoseconds> {
     {
         return Some(Nanoseconds::from(cycles) * config.cycle.period_ns);
     }
-    entry.nanoseconds(0.0, LONGEST_S)
+    entry.nanoseconds(0.0..=LONGEST_S)
 }
 
-/// A rhythm; absent, it is `default_ns`.
+/// Reads `period`; the default is `default_ns`.
 pub fn period(section: &mut Section<'_>, default_ns: Nanoseconds, config: &Config) -> Option<Nanoseconds> {
     let Some(entry) = section.get("period") else { return Some(default_ns) };
     let period_ns = duration(&entry, config)?;
@@ -140,17 +142,17 @@ pub fn period(section: &mut Section<'_>, default_ns: Nanoseconds, config: &Confi
     Some(period_ns)
 }
 
-/// A frame of a classic bus takes longer than this.
+/// A classic CAN frame takes longer than this.
 const SHORTEST_PERIOD_NS: Nanoseconds = 20_000;
 
-/// `seed`
+/// Reads `seed`.
 pub fn seed(section: &mut Section<'_>) -> Option<u64> {
     let seed = section.get("seed").map(|entry| entry.integer(0..i64::MAX));
     u64::try_from(seed.unwrap_or(Some(1))?).ok()
 }
 
-/// `id`, `function`, `direction`, `probability`, `count` and `seed`. What is only ever sent has no direction.
-pub fn selection(section: &mut Section<'_>, place: &Place<'_, '_>, is_sent: bool) -> Option<Selection> {
+/// Reads `id`, `function`, `direction`, `probability`, `count` and `seed`. With `is_sent` the direction is fixed.
+pub fn selection(section: &mut Section<'_>, location: &Location<'_, '_>, is_sent: bool) -> Option<Selection> {
     let all = Selection::default();
     let ids = section.get("id").map(|entry| ids(&entry));
     let functions = [
@@ -180,7 +182,7 @@ pub fn selection(section: &mut Section<'_>, place: &Place<'_, '_>, is_sent: bool
             None => None,
             Some(function) => Some(function?),
         },
-        node: place.axis.map(|axis| axis.node),
+        node: location.axis.map(|axis| axis.node),
         probability: probability.unwrap_or(Some(all.probability))?,
         count: match count {
             None => None,
@@ -190,7 +192,7 @@ pub fn selection(section: &mut Section<'_>, place: &Place<'_, '_>, is_sent: bool
     })
 }
 
-/// One identifier, or the first and the last of a range.
+/// Reads one identifier, or the first and the last of a range.
 fn ids(entry: &Entry<'_>) -> Option<RangeInclusive<u32>> {
     let id = |entry: &Entry<'_>| u32::try_from(entry.integer(0..IDS)?).ok();
     if !entry.is_list() {

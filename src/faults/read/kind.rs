@@ -1,21 +1,22 @@
-//! The kinds of fault and the keys of each.
+//! The kinds of fault and their keys.
 
 use takt_rt::{Frame, Id};
 
-use super::common::{self, Place};
+use super::common::{self, Location};
 use crate::canopen::nmt::{NmtCommand, NmtTarget};
-use crate::config::read::entry::{Bounds, Entry};
+use crate::config::bounds::Bounds;
+use crate::config::read::entry::Entry;
 use crate::config::read::section::Section;
 use crate::config::{Axis, Config, Quantity, Travel};
-use crate::faults::breakable::{Breakable, DriveTrouble};
 use crate::faults::effect::{DelayPlace, Effect, ForeignFrames, FrameEffect, InterfaceEffect, Part};
+use crate::faults::injectable::{DriveEffect, Injectable};
 use crate::faults::selection::Selection;
 use crate::faults::window::Window;
 use crate::sim::{Defect, DriveFault, SimulatedBus};
 
-/// The word for a kind of fault.
+/// A kind of fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Word {
+pub enum FaultKind {
     Drop,
     Delay,
     Duplicate,
@@ -32,12 +33,12 @@ pub enum Word {
     ForeignFrame,
     DuplicateNode,
     Flood,
-    Drive(Trouble),
+    Drive(DriveFaultKind),
 }
 
-/// The word for something that happens to a drive.
+/// A kind of fault of a drive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Trouble {
+pub enum DriveFaultKind {
     Stall,
     StuckBrake,
     Load,
@@ -54,121 +55,126 @@ pub enum Trouble {
     Cause(DriveFault),
 }
 
-/// All of them.
-pub const WORDS: [(&str, Word); 35] = [
-    ("drop", Word::Drop),
-    ("delay", Word::Delay),
-    ("duplicate", Word::Duplicate),
-    ("corrupt", Word::Corrupt),
-    ("reorder", Word::Reorder),
-    ("echo-loss", Word::EchoLoss),
-    ("full-queue", Word::FullQueue),
-    ("bus-off", Word::BusOff),
-    ("error-passive", Word::ErrorPassive),
-    ("interface-down", Word::InterfaceDown),
-    ("foreign-sync", Word::ForeignSync),
-    ("foreign-set-points", Word::ForeignSetPoints),
-    ("foreign-nmt", Word::ForeignNmt),
-    ("foreign-frame", Word::ForeignFrame),
-    ("duplicate-node", Word::DuplicateNode),
-    ("flood", Word::Flood),
-    ("stall", Word::Drive(Trouble::Stall)),
-    ("stuck-brake", Word::Drive(Trouble::StuckBrake)),
-    ("load", Word::Drive(Trouble::Load)),
-    ("encoder-jump", Word::Drive(Trouble::EncoderJump)),
-    ("silent-node", Word::Drive(Trouble::SilentNode)),
-    ("reboot", Word::Drive(Trouble::Reboot)),
-    ("stuck-sdo", Word::Drive(Trouble::StuckSdo)),
-    ("wrong-mapping", Word::Drive(Trouble::WrongMapping)),
-    ("statusword", Word::Drive(Trouble::Statusword)),
-    ("mode-display", Word::Drive(Trouble::ModeDisplay)),
-    ("torque-off", Word::Drive(Trouble::TorqueOff)),
-    ("alarm", Word::Drive(Trouble::Alarm)),
-    ("emergency", Word::Drive(Trouble::Emergency)),
-    ("over-current", Word::Drive(Trouble::Cause(DriveFault::OverCurrent))),
-    ("over-voltage", Word::Drive(Trouble::Cause(DriveFault::OverVoltage))),
-    ("under-voltage", Word::Drive(Trouble::Cause(DriveFault::UnderVoltage))),
-    ("over-temperature", Word::Drive(Trouble::Cause(DriveFault::OverTemperature))),
-    ("encoder-failure", Word::Drive(Trouble::Cause(DriveFault::Encoder))),
-    ("battery", Word::Drive(Trouble::Cause(DriveFault::MultiTurnBattery))),
+/// All kinds, by their names in the file.
+pub const KINDS: [(&str, FaultKind); 35] = [
+    ("drop", FaultKind::Drop),
+    ("delay", FaultKind::Delay),
+    ("duplicate", FaultKind::Duplicate),
+    ("corrupt", FaultKind::Corrupt),
+    ("reorder", FaultKind::Reorder),
+    ("echo-loss", FaultKind::EchoLoss),
+    ("full-queue", FaultKind::FullQueue),
+    ("bus-off", FaultKind::BusOff),
+    ("error-passive", FaultKind::ErrorPassive),
+    ("interface-down", FaultKind::InterfaceDown),
+    ("foreign-sync", FaultKind::ForeignSync),
+    ("foreign-set-points", FaultKind::ForeignSetPoints),
+    ("foreign-nmt", FaultKind::ForeignNmt),
+    ("foreign-frame", FaultKind::ForeignFrame),
+    ("duplicate-node", FaultKind::DuplicateNode),
+    ("flood", FaultKind::Flood),
+    ("stall", FaultKind::Drive(DriveFaultKind::Stall)),
+    ("stuck-brake", FaultKind::Drive(DriveFaultKind::StuckBrake)),
+    ("load", FaultKind::Drive(DriveFaultKind::Load)),
+    ("encoder-jump", FaultKind::Drive(DriveFaultKind::EncoderJump)),
+    ("silent-node", FaultKind::Drive(DriveFaultKind::SilentNode)),
+    ("reboot", FaultKind::Drive(DriveFaultKind::Reboot)),
+    ("stuck-sdo", FaultKind::Drive(DriveFaultKind::StuckSdo)),
+    ("wrong-mapping", FaultKind::Drive(DriveFaultKind::WrongMapping)),
+    ("statusword", FaultKind::Drive(DriveFaultKind::Statusword)),
+    ("mode-display", FaultKind::Drive(DriveFaultKind::ModeDisplay)),
+    ("torque-off", FaultKind::Drive(DriveFaultKind::TorqueOff)),
+    ("alarm", FaultKind::Drive(DriveFaultKind::Alarm)),
+    ("emergency", FaultKind::Drive(DriveFaultKind::Emergency)),
+    ("over-current", FaultKind::Drive(DriveFaultKind::Cause(DriveFault::OverCurrent))),
+    ("over-voltage", FaultKind::Drive(DriveFaultKind::Cause(DriveFault::OverVoltage))),
+    ("under-voltage", FaultKind::Drive(DriveFaultKind::Cause(DriveFault::UnderVoltage))),
+    ("over-temperature", FaultKind::Drive(DriveFaultKind::Cause(DriveFault::OverTemperature))),
+    ("encoder-failure", FaultKind::Drive(DriveFaultKind::Cause(DriveFault::Encoder))),
+    ("battery", FaultKind::Drive(DriveFaultKind::Cause(DriveFault::MultiTurnBattery))),
 ];
 
-impl Word {
-    /// As the file says it.
+impl FaultKind {
+    /// The name in the file.
     pub fn name(self) -> &'static str {
-        WORDS.iter().find(|(_, other)| *other == self).map_or("", |(name, _)| *name)
+        KINDS.iter().find(|(_, other)| *other == self).map_or("", |(name, _)| *name)
     }
 
-    /// Whether it happens to an axis rather than to a bus.
+    /// Whether it concerns an axis and not a bus.
     pub fn needs_axis(self) -> bool {
         matches!(self, Self::Drive(_) | Self::ForeignSetPoints | Self::DuplicateNode)
     }
 }
 
-/// What the keys of a fault say: when, which frames, what.
+/// The content of a fault: window, selection and effect.
 pub type Read = (Window, Selection, Effect);
 
-/// Reads the keys of a kind.
-pub fn read(section: &mut Section<'_>, word: Word, place: &Place<'_, '_>, config: &Config) -> Option<Read> {
-    match word {
-        Word::Drop => frames(section, place, config, |_| Some(FrameEffect::Drop)),
-        Word::Delay => frames(section, place, config, |section| {
+/// Reads the keys of a kind of fault.
+pub fn read(
+    section: &mut Section<'_>,
+    kind: FaultKind,
+    location: &Location<'_, '_>,
+    config: &Config,
+) -> Option<Read> {
+    match kind {
+        FaultKind::Drop => frames(section, location, config, |_| Some(FrameEffect::Drop)),
+        FaultKind::Delay => frames(section, location, config, |section| {
             let entry = section.require("by", "how much later they come: by = \"300 us\"")?;
             let by_ns = common::duration(&entry, config);
             let places = [("machine", DelayPlace::Machine), ("bus", DelayPlace::Bus)];
             let place = section.get("where").map_or(Some(DelayPlace::Machine), |entry| entry.choice(&places));
             Some(FrameEffect::Delay { by_ns: by_ns?, place: place? })
         }),
-        Word::Duplicate => frames(section, place, config, |section| {
+        FaultKind::Duplicate => frames(section, location, config, |section| {
             let copies = section.get("copies").map_or(Some(1), |entry| entry.integer(1..9))?;
             Some(FrameEffect::Duplicate { copies: u8::try_from(copies).ok()? })
         }),
-        Word::Corrupt => frames(section, place, config, |section| {
+        FaultKind::Corrupt => frames(section, location, config, |section| {
             let parts = [("payload", Part::Payload), ("identifier", Part::Identifier)];
             let part = section.get("part").map_or(Some(Part::Payload), |entry| entry.choice(&parts));
             let bits = section.get("bits").map_or(Some(1), |entry| entry.integer(1..65));
             Some(FrameEffect::Corrupt { bits: u8::try_from(bits?).ok()?, part: part? })
         }),
-        Word::Reorder => frames(section, place, config, |_| Some(FrameEffect::Reorder)),
-        Word::EchoLoss => sent_frames(section, place, config, FrameEffect::EchoLoss),
-        Word::FullQueue => sent_frames(section, place, config, FrameEffect::FullQueue),
-        Word::BusOff => interface(section, config, "restart", InterfaceEffect::BusOff),
-        Word::ErrorPassive => interface(section, config, "for", InterfaceEffect::ErrorPassive),
-        Word::InterfaceDown => interface(section, config, "for", InterfaceEffect::Down),
-        Word::ForeignSync
-        | Word::ForeignSetPoints
-        | Word::ForeignNmt
-        | Word::ForeignFrame
-        | Word::DuplicateNode
-        | Word::Flood => {
+        FaultKind::Reorder => frames(section, location, config, |_| Some(FrameEffect::Reorder)),
+        FaultKind::EchoLoss => sent_frames(section, location, config, FrameEffect::EchoLoss),
+        FaultKind::FullQueue => sent_frames(section, location, config, FrameEffect::FullQueue),
+        FaultKind::BusOff => interface(section, config, "restart", InterfaceEffect::BusOff),
+        FaultKind::ErrorPassive => interface(section, config, "for", InterfaceEffect::ErrorPassive),
+        FaultKind::InterfaceDown => interface(section, config, "for", InterfaceEffect::Down),
+        FaultKind::ForeignSync
+        | FaultKind::ForeignSetPoints
+        | FaultKind::ForeignNmt
+        | FaultKind::ForeignFrame
+        | FaultKind::DuplicateNode
+        | FaultKind::Flood => {
             let window = common::window(section, "for", config);
-            let frames = foreign(section, word, place, config);
+            let frames = foreign(section, kind, location, config);
             Some((window?, Selection::default(), Effect::Foreign(frames?)))
         }
-        Word::Drive(trouble) => drive(section, trouble, place, config),
+        FaultKind::Drive(effect) => drive(section, effect, location, config),
     }
 }
 
 fn frames<'a>(
     section: &mut Section<'a>,
-    place: &Place<'_, '_>,
+    location: &Location<'_, '_>,
     config: &Config,
     effect: impl FnOnce(&mut Section<'a>) -> Option<FrameEffect>,
 ) -> Option<Read> {
     let window = common::window(section, "for", config);
-    let selection = common::selection(section, place, false);
+    let selection = common::selection(section, location, false);
     let effect = effect(section);
     Some((window?, selection?, Effect::Frames(effect?)))
 }
 
 fn sent_frames(
     section: &mut Section<'_>,
-    place: &Place<'_, '_>,
+    location: &Location<'_, '_>,
     config: &Config,
     effect: FrameEffect,
 ) -> Option<Read> {
     let window = common::window(section, "for", config);
-    let selection = common::selection(section, place, true);
+    let selection = common::selection(section, location, true);
     Some((window?, selection?, Effect::Frames(effect)))
 }
 
@@ -182,32 +188,32 @@ fn interface(
     Some((window, Selection::default(), Effect::Interface(effect)))
 }
 
-/// Where another node's heartbeat usually lies.
+/// A usual heartbeat period.
 const HEARTBEAT_NS: u64 = 100_000_000;
-/// Faster than frames of eight bytes can follow each other at 1 Mbit/s: the bus is never free for others.
+/// Shorter than a frame of eight bytes at 1 Mbit/s: the bus is never free for other frames.
 const FLOOD_NS: u64 = 100_000;
 
 fn foreign(
     section: &mut Section<'_>,
-    word: Word,
-    place: &Place<'_, '_>,
+    kind: FaultKind,
+    location: &Location<'_, '_>,
     config: &Config,
 ) -> Option<ForeignFrames> {
     let every = |frame, period_ns| ForeignFrames::Frame { frame, period_ns: Some(period_ns) };
-    match word {
-        Word::ForeignSync => {
+    match kind {
+        FaultKind::ForeignSync => {
             let period_ns = common::period(section, config.cycle.period_ns, config)?;
             Some(every(Frame::of(Id::canopen(0x080, 0), []), period_ns))
         }
-        Word::ForeignSetPoints => {
+        FaultKind::ForeignSetPoints => {
             let period_ns = common::period(section, config.cycle.period_ns, config)?;
-            Some(ForeignFrames::SetPoints { id: Id::canopen(0x200, place.axis?.node), period_ns })
+            Some(ForeignFrames::SetPoints { id: Id::canopen(0x200, location.axis?.node), period_ns })
         }
-        Word::DuplicateNode => {
+        FaultKind::DuplicateNode => {
             let period_ns = common::period(section, HEARTBEAT_NS, config)?;
-            Some(ForeignFrames::DuplicateNode { node: place.axis?.node, period_ns })
+            Some(ForeignFrames::DuplicateNode { node: location.axis?.node, period_ns })
         }
-        Word::ForeignNmt => {
+        FaultKind::ForeignNmt => {
             let commands = [
                 ("start", NmtCommand::Start),
                 ("stop", NmtCommand::Stop),
@@ -218,10 +224,10 @@ fn foreign(
             let command = section
                 .require("command", "what it commands: command = \"stop\"")
                 .and_then(|entry| entry.choice(&commands));
-            let target = place.axis.map_or(NmtTarget::All, |axis| NmtTarget::Node(axis.node));
+            let target = location.axis.map_or(NmtTarget::All, |axis| NmtTarget::Node(axis.node));
             Some(ForeignFrames::Frame { frame: command?.frame(target), period_ns: None })
         }
-        Word::Flood => {
+        FaultKind::Flood => {
             let id = section.get("id").map_or(Some(1), |entry| entry.integer(0..0x800));
             let period_ns = common::period(section, FLOOD_NS, config);
             let id = Id::base(u32::try_from(id?).ok()?).ok()?;
@@ -251,23 +257,28 @@ fn bytes(entry: &Entry<'_>) -> Option<Vec<u8>> {
     list.iter().map(|byte| u8::try_from(byte.integer(0..256)?).ok()).collect()
 }
 
-fn drive(section: &mut Section<'_>, kind: Trouble, place: &Place<'_, '_>, config: &Config) -> Option<Read> {
-    let axis = place.axis?;
-    let trouble = drive_trouble(section, kind, axis);
-    // Without knowing whether it lasts, an end is not called unknown.
-    let window = match trouble {
-        Some(trouble) if trouble.is_event() => common::beginning(section, config),
+fn drive(
+    section: &mut Section<'_>,
+    kind: DriveFaultKind,
+    location: &Location<'_, '_>,
+    config: &Config,
+) -> Option<Read> {
+    let axis = location.axis?;
+    let effect = drive_trouble(section, kind, axis);
+    // When the effect is wrong, it is unknown whether it lasts; then `for` is not reported as an unknown key.
+    let window = match effect {
+        Some(effect) if effect.is_event() => common::beginning(section, config),
         _ => common::window(section, "for", config),
     };
-    let trouble = trouble?;
-    if !place.is_simulated(config) {
+    let effect = effect?;
+    if !location.is_simulated(config) {
         return None;
     }
-    // Whether that drive can have it is best tried with one like it.
+    // A trial with a simulated drive of the same configuration shows whether it can have the effect.
     let mut trial = SimulatedBus::new(config, axis.bus);
-    if let (Err(error), Some(entry)) = (trial.trouble(axis.node, trouble, true), &place.entry) {
-        let name = Word::Drive(kind).name();
-        match particular(section, trouble) {
+    if let (Err(error), Some(entry)) = (trial.inject(axis.node, effect, true), &location.entry) {
+        let name = FaultKind::Drive(kind).name();
+        match particular(section, effect) {
             Some((particular, value)) => {
                 let allowed = format!("what axis {:?} can have as {name:?}; {error}", axis.name);
                 particular.report_range(value, allowed);
@@ -279,60 +290,60 @@ fn drive(section: &mut Section<'_>, kind: Trouble, place: &Place<'_, '_>, config
         }
         return None;
     }
-    Some((window?, Selection::default(), Effect::Drive { node: axis.node, trouble }))
+    Some((window?, Selection::default(), Effect::Drive { node: axis.node, effect }))
 }
 
-/// The key, with its value, that decides whether a drive can have it: another one may suit the same axis.
-fn particular<'a>(section: &mut Section<'a>, trouble: DriveTrouble) -> Option<(Entry<'a>, String)> {
-    match trouble {
-        DriveTrouble::Defect(Defect::Alarm { code }) => Some((section.get("code")?, format!("{code:#06x}"))),
-        DriveTrouble::Defect(Defect::OtherObjectMapped) => {
+/// The key, with its value, that the drive refuses: another value may be possible for the same axis.
+fn particular<'a>(section: &mut Section<'a>, effect: DriveEffect) -> Option<(Entry<'a>, String)> {
+    match effect {
+        DriveEffect::Defect(Defect::Alarm { code }) => Some((section.get("code")?, format!("{code:#06x}"))),
+        DriveEffect::Defect(Defect::OtherObjectMapped) => {
             Some((section.get("contents")?, "\"other\"".to_owned()))
         }
         _ => None,
     }
 }
 
-fn drive_trouble(section: &mut Section<'_>, trouble: Trouble, axis: &Axis) -> Option<DriveTrouble> {
+fn drive_trouble(section: &mut Section<'_>, effect: DriveFaultKind, axis: &Axis) -> Option<DriveEffect> {
     let is_linear = matches!(axis.travel, Travel::Linear { .. });
     let word = |entry: Entry<'_>| u16::try_from(entry.integer(0..0x1_0000)?).ok();
-    let defect = match trouble {
-        Trouble::SilentNode => return Some(DriveTrouble::Silent),
-        Trouble::Reboot => return Some(DriveTrouble::Reboot),
-        Trouble::Cause(fault) => return Some(DriveTrouble::Cause(fault)),
-        Trouble::Load => {
+    let defect = match effect {
+        DriveFaultKind::SilentNode => return Some(DriveEffect::Silent),
+        DriveFaultKind::Reboot => return Some(DriveEffect::Reboot),
+        DriveFaultKind::Cause(fault) => return Some(DriveEffect::Cause(fault)),
+        DriveFaultKind::Load => {
             let quantity = if is_linear { Quantity::FORCE } else { Quantity::TORQUE };
             let entry = section.require("torque", "the torque from outside: torque = \"40 Nm\"")?;
-            return Some(DriveTrouble::LoadTorque(entry.quantity(quantity, Bounds::Finite)?));
+            return Some(DriveEffect::LoadTorque(entry.quantity(quantity, Bounds::Finite)?));
         }
-        Trouble::Stall => Defect::BlockedJoint,
-        Trouble::StuckBrake => Defect::StuckBrake,
-        Trouble::StuckSdo => Defect::SilentSdoServer,
-        Trouble::TorqueOff => Defect::TorqueOff,
-        Trouble::EncoderJump => {
+        DriveFaultKind::Stall => Defect::BlockedJoint,
+        DriveFaultKind::StuckBrake => Defect::StuckBrake,
+        DriveFaultKind::StuckSdo => Defect::SilentSdoServer,
+        DriveFaultKind::TorqueOff => Defect::TorqueOff,
+        DriveFaultKind::EncoderJump => {
             let quantity = if is_linear { Quantity::LENGTH } else { Quantity::ANGLE };
             let entry = section.require("by", "how far the position jumps: by = \"5 deg\"")?;
             Defect::EncoderJump { distance: entry.quantity(quantity, Bounds::Finite)? }
         }
-        Trouble::WrongMapping => {
+        DriveFaultKind::WrongMapping => {
             let choices = [("other", Defect::OtherObjectMapped), ("short", Defect::ShortFeedback)];
             section.get("contents").map_or(Some(Defect::OtherObjectMapped), |entry| entry.choice(&choices))?
         }
-        Trouble::Statusword => {
+        DriveFaultKind::Statusword => {
             let set = section.get("set").map_or(Some(0), word);
             let clear = section.get("clear").map_or(Some(0), word);
             Defect::Statusword { set: set?, clear: clear? }
         }
-        Trouble::ModeDisplay => {
+        DriveFaultKind::ModeDisplay => {
             let entry = section.require("mode", "the number of the mode that is shown: mode = 1")?;
             Defect::OperationModeDisplay { mode: i8::try_from(entry.integer(-128..128)?).ok()? }
         }
-        Trouble::Alarm => {
+        DriveFaultKind::Alarm => {
             Defect::Alarm { code: section.require("code", "the error code: code = 0x3210").and_then(word)? }
         }
-        Trouble::Emergency => Defect::Emergency {
+        DriveFaultKind::Emergency => Defect::Emergency {
             code: section.require("code", "the error code: code = 0x4210").and_then(word)?,
         },
     };
-    Some(DriveTrouble::Defect(defect))
+    Some(DriveEffect::Defect(defect))
 }

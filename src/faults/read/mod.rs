@@ -1,5 +1,5 @@
-//! From the text of a scenario file to a checked [`Scenario`], with the reader of the configuration: every problem of the
-//! file is found, each with its line and a way out. `configs/faults/` has examples.
+//! Reads and checks a [`Scenario`] file with the configuration's reader. Every problem of the file is reported with its
+//! line and a remedy. `configs/faults/` has examples.
 
 mod common;
 mod kind;
@@ -8,17 +8,17 @@ use std::path::Path;
 
 use toml::de::DeTable;
 
-use super::scenario::{Fault, Scenario};
+use super::scenario::{Scenario, ScenarioFault};
 use crate::config::read::document;
-use crate::config::read::entry::Problems;
 use crate::config::read::section::Section;
+use crate::config::spot::Problems;
 use crate::config::{Config, ConfigError, ProblemKind};
 use crate::printable::printable_path;
 
-/// More faults than this in one file are a slip.
+/// The largest number of faults in one file.
 const FAULTS_AT_MOST: usize = 64;
 
-/// A scenario that cannot be played.
+/// Why a scenario cannot be used.
 #[derive(Debug, thiserror::Error, miette::Diagnostic)]
 pub enum ScenarioError {
     /// The file cannot be read.
@@ -26,17 +26,17 @@ pub enum ScenarioError {
     Unreadable {
         /// The path.
         path: String,
-        /// What the operating system said.
+        /// The operating system's reason.
         reason: String,
     },
-    /// It is not right, or does not suit the configuration. `miette` shows each problem with its line.
+    /// The content is invalid or does not suit the configuration. `miette` shows each problem with its line.
     #[error(transparent)]
     #[diagnostic(transparent)]
     Wrong(#[from] ConfigError),
 }
 
 impl Scenario {
-    /// Reads a file and checks it against the configuration that it is to be played with.
+    /// Reads a file and checks it against the configuration that it will be used with.
     ///
     /// # Errors
     /// See [`ScenarioError`].
@@ -48,7 +48,7 @@ impl Scenario {
         }
     }
 
-    /// Reads and checks the text of a scenario. `source_name` is what messages call it.
+    /// Reads and checks the text of a scenario. Messages call it `source_name`.
     ///
     /// # Errors
     /// Every problem of the text.
@@ -57,12 +57,7 @@ impl Scenario {
     }
 }
 
-fn read<'a>(
-    table: &'a DeTable<'a>,
-    problems: &'a Problems<'a>,
-    text: &str,
-    config: &Config,
-) -> Option<Scenario> {
+fn read<'a>(table: &'a DeTable<'a>, problems: &'a Problems, text: &str, config: &Config) -> Option<Scenario> {
     let mut root = Section::new("", 0..0, table, problems);
     root.require("fault", "at least one [[fault]]");
     let sections = root.sections("fault");
@@ -70,43 +65,43 @@ fn read<'a>(
     if given > FAULTS_AT_MOST
         && let Some(beyond) = sections.get(FAULTS_AT_MOST)
     {
-        beyond.report_here(ProblemKind::OutOfRange {
+        beyond.header_spot().report(ProblemKind::OutOfRange {
             key: "fault".to_owned(),
             value: format!("a list of {given}"),
             allowed: format!("1 to {FAULTS_AT_MOST} faults"),
         });
     }
-    let faults: Vec<Option<Fault>> =
+    let faults: Vec<Option<ScenarioFault>> =
         sections.into_iter().map(|section| fault(section, text, config)).collect();
     root.finish();
     Some(Scenario { faults: faults.into_iter().collect::<Option<_>>()? })
 }
 
-fn fault(mut section: Section<'_>, text: &str, config: &Config) -> Option<Fault> {
+fn fault(mut section: Section<'_>, text: &str, config: &Config) -> Option<ScenarioFault> {
     let line = 1 + text.get(..section.header().start).map_or(0, |before| before.matches('\n').count());
     let Some(entry) = section.get("kind") else {
         let says = "what goes wrong: kind = \"drop\"";
-        section.report_here(ProblemKind::MissingKey { key: "fault.kind".to_owned(), says });
+        section.header_spot().report(ProblemKind::MissingKey { key: "fault.kind".to_owned(), says });
         return None;
     };
-    // Without a kind nobody can say which other keys mean anything.
-    let word = entry.choice(&kind::WORDS)?;
-    let place = common::place(&mut section, config, word.needs_axis());
-    let Some(place) = place else {
-        // Its other keys are looked at all the same, as if they concerned the first axis.
-        let first = common::Place { bus: 0, axis: config.axes.first(), entry: None };
-        kind::read(&mut section, word, &first, config);
+    // Without a valid kind it is unknown which other keys are valid.
+    let kind = entry.choice(&kind::KINDS)?;
+    let location = common::location(&mut section, config, kind.needs_axis());
+    let Some(location) = location else {
+        // The other keys are still checked, as if they concerned the first axis.
+        let first = common::Location { bus: 0, axis: config.axes.first(), entry: None };
+        kind::read(&mut section, kind, &first, config);
         section.finish();
         return None;
     };
-    let read = kind::read(&mut section, word, &place, config);
+    let read = kind::read(&mut section, kind, &location, config);
     section.finish();
     let (window, selection, effect) = read?;
-    Some(Fault {
-        kind: word.name(),
-        place: place.show(config),
+    Some(ScenarioFault {
+        kind: kind.name(),
+        location: location.show(config),
         line,
-        bus: place.bus,
+        bus: location.bus,
         window,
         selection,
         effect,

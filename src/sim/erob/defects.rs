@@ -1,18 +1,18 @@
-//! What is wrong with the module or its joint, and how that shows in its feedback.
+//! The defects of an eRob, and their effect on its feedback.
 
 use takt_rt::Frame;
 
-use super::dictionary::{Dictionary, at};
+use super::dictionary::{ErobDictionary, at};
 use crate::sim::defect::{Defect, shorter};
 
-/// The lasting defects of one module.
+/// The lasting defects of one eRob.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Defects {
-    /// The joint does not move.
+pub struct ErobDefects {
+    /// The joint cannot move.
     pub is_joint_blocked: bool,
-    /// The brake does not open.
+    /// The brake does not release.
     pub is_brake_stuck: bool,
-    /// The SDO server is mute.
+    /// The SDO server does not reply.
     pub is_sdo_silent: bool,
     is_other_object_mapped: bool,
     is_feedback_short: bool,
@@ -20,15 +20,15 @@ pub struct Defects {
     operation_mode: Option<i8>,
 }
 
-/// The entries that a defect can show wrongly in the feedback.
+/// The entries that a defect can change in the feedback.
 const SHOWN: [usize; 3] = [at::STATUSWORD, at::OPERATION_MODE_DISPLAY, at::POSITION];
 
-/// What these entries hold in truth.
+/// The true values of these entries.
 #[derive(Clone, Copy, Debug)]
 pub struct Truth([u32; SHOWN.len()]);
 
-impl Defects {
-    /// A lasting defect comes or goes; events leave nothing here.
+impl ErobDefects {
+    /// Sets or removes a lasting defect; events change nothing here.
     pub fn set(&mut self, defect: Defect, is_present: bool) {
         match defect {
             Defect::BlockedJoint => self.is_joint_blocked = is_present,
@@ -45,8 +45,8 @@ impl Defects {
         }
     }
 
-    /// Puts into the dictionary what the feedback is to show; [`Truth::restore`] takes it out again.
-    pub fn forge(&self, dictionary: &mut Dictionary) -> Truth {
+    /// Writes the defective values to the dictionary; [`Truth::restore`] restores the true ones.
+    pub fn falsify(&self, dictionary: &mut ErobDictionary) -> Truth {
         let truth = Truth(SHOWN.map(|at| dictionary.get(at)));
         if let Some((set, clear)) = self.statusword {
             let word = dictionary.get(at::STATUSWORD) & !u32::from(clear) | u32::from(set);
@@ -61,15 +61,15 @@ impl Defects {
         truth
     }
 
-    /// A feedback PDO as it leaves the drive.
+    /// A feedback PDO as it is sent.
     pub fn sent(&self, frame: Frame) -> Frame {
         if self.is_feedback_short { shorter(frame) } else { frame }
     }
 }
 
 impl Truth {
-    /// Puts the entries back.
-    pub fn restore(self, dictionary: &mut Dictionary) {
+    /// Restores the entries.
+    pub fn restore(self, dictionary: &mut ErobDictionary) {
         for (at, value) in SHOWN.into_iter().zip(self.0) {
             dictionary.set(at, value);
         }

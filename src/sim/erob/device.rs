@@ -1,30 +1,29 @@
-//! The CiA 402 state machine of the drive: controlword in, statusword out, with the ramps that some transitions
-//! take and the reaction to faults.
+//! The CiA 402 state machine: controlword, state, statusword, the ramps of some transitions, and the fault reaction.
 
 use takt_rt::{Command, DriveState, Nanoseconds, controlword, statusword};
 
-use super::dictionary::{Dictionary, at};
+use super::dictionary::{ErobDictionary, at};
 
-/// For how long bit 7 must stay high to reset a fault (real units want it "held for several cycles").
+/// Minimum time for which controlword bit 7 must stay set to reset a fault (field experience: several cycles).
 const FAULT_RESET_NS: Nanoseconds = 3_000_000;
 /// Statusword bit 4: voltage on the power stage.
 const VOLTAGE_ENABLED: u16 = 0x10;
 
-/// A deceleration on the way from one state to another.
+/// A deceleration before a state change.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stop {
     /// In counts/s².
     pub deceleration: f64,
-    /// The state at its end.
+    /// The state after it.
     pub then: DriveState,
 }
 
-/// What a change of state means to the motion.
+/// What a state change means for the motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Change {
     /// Nothing.
     None,
-    /// Torque is on from now: the motion starts from where the joint is.
+    /// Torque is on: the motion starts at the actual position.
     Enabled,
     /// A fault was reset.
     FaultReset,
@@ -32,7 +31,7 @@ pub enum Change {
 
 /// The state machine.
 #[derive(Clone, Copy, Debug)]
-pub struct Device {
+pub struct ErobDevice {
     state: DriveState,
     controlword: u16,
     reset_since_ns: Option<Nanoseconds>,
@@ -40,8 +39,8 @@ pub struct Device {
     has_warning: bool,
 }
 
-impl Device {
-    /// A drive that is starting. The warning bit is as the unit happens to have it.
+impl ErobDevice {
+    /// A drive that is booting. The warning bit differs from unit to unit.
     pub fn starting(has_warning: bool) -> Self {
         Self {
             state: DriveState::NotReadyToSwitchOn,
@@ -62,26 +61,26 @@ impl Device {
         self.state
     }
 
-    /// The controlword that was evaluated last.
+    /// The last evaluated controlword.
     pub fn controlword(&self) -> u16 {
         self.controlword
     }
 
-    /// The deceleration under way.
+    /// The current deceleration.
     pub fn stop(&self) -> Option<Stop> {
         self.stop
     }
 
-    /// Initialisation is over (transition 1).
+    /// Ends the initialisation (transition 1).
     pub fn started(&mut self) {
         if self.state == DriveState::NotReadyToSwitchOn {
             self.state = DriveState::SwitchOnDisabled;
         }
     }
 
-    /// Evaluates the controlword, which the drive does in every step of its loop and whenever it is written.
-    /// `is_cleared` tells that the cause of a fault is gone.
-    pub fn evaluate(&mut self, now_ns: Nanoseconds, dictionary: &Dictionary, is_cleared: bool) -> Change {
+    /// Evaluates the controlword. The drive does this in every step of its loop and after every write of 6040.
+    /// `is_cleared`: the cause of a fault is gone.
+    pub fn evaluate(&mut self, now_ns: Nanoseconds, dictionary: &ErobDictionary, is_cleared: bool) -> Change {
         let word = dictionary.get(at::CONTROLWORD) as u16;
         let rising = word & !self.controlword;
         self.controlword = word;
@@ -111,7 +110,7 @@ impl Device {
         Change::FaultReset
     }
 
-    fn evaluate_command(&mut self, command: Command, dictionary: &Dictionary) -> Change {
+    fn evaluate_command(&mut self, command: Command, dictionary: &ErobDictionary) -> Change {
         if self.stop.is_some() && command != Command::DisableVoltage {
             return Change::None;
         }
@@ -127,7 +126,7 @@ impl Device {
         }
         self.stop = None;
         if next == DriveState::QuickStopActive && self.state != next {
-            // Without object 605A the quick stop ends as its default 2 says: power off after the ramp.
+            // The drive has no object 605A; it acts like its default 2: disable after the quick stop ramp.
             let deceleration = dictionary.real(at::QUICK_STOP_DECELERATION);
             self.stop = Some(Stop { deceleration, then: DriveState::SwitchOnDisabled });
         }
@@ -135,14 +134,14 @@ impl Device {
         if next == DriveState::OperationEnabled && !had_torque { Change::Enabled } else { Change::None }
     }
 
-    /// The deceleration has come to rest.
+    /// Ends the deceleration at standstill.
     pub fn stopped(&mut self) {
         if let Some(stop) = self.stop.take() {
             self.state = stop.then;
         }
     }
 
-    /// The torque is gone without a fault, as after safe torque off.
+    /// Removes the torque without a fault, like safe torque off.
     pub fn lose_torque(&mut self) {
         if self.state.has_torque() && !self.state.is_faulted() {
             self.state = DriveState::SwitchOnDisabled;
@@ -150,9 +149,9 @@ impl Device {
         }
     }
 
-    /// A fault has been noticed. Without torque, or when power must be cut, the reaction is over at once; otherwise
-    /// the drive decelerates as object 605E says first.
-    pub fn fault(&mut self, cuts_power: bool, dictionary: &Dictionary) {
+    /// Enters the fault state. Without torque, or when power must be cut, this happens at once. Otherwise the drive
+    /// decelerates first, by object 605E.
+    pub fn fault(&mut self, cuts_power: bool, dictionary: &ErobDictionary) {
         if self.state.is_faulted() && !(cuts_power && self.state == DriveState::FaultReactionActive) {
             return;
         }
@@ -166,9 +165,8 @@ impl Device {
         self.state = if self.stop.is_some() { DriveState::FaultReactionActive } else { DriveState::Fault };
     }
 
-    /// The statusword as real units set it: bit 9 always, bit 4 as long as there is no
-    /// fault, bit 7 on some units, bit 12 always but in an enabled profile position mode. `mode_bits` are bits 10 to
-    /// 13 as the mode of an enabled drive sets them.
+    /// The statusword as real units set it: bit 9 always, bit 4 unless there is a fault, bit 7 on some units, bit 12
+    /// except in enabled profile position mode. `mode_bits` are bits 10 to 13, which the mode sets in an enabled drive.
     pub fn statusword(&self, mode_bits: u16) -> u16 {
         let bits = match self.state {
             DriveState::OperationEnabled => mode_bits,
@@ -176,7 +174,7 @@ impl Device {
         };
         let voltage = if self.state.is_faulted() { 0 } else { VOLTAGE_ENABLED };
         let warning = if self.has_warning { statusword::WARNING } else { 0 };
-        // Bit 5 shows "no quick stop" only where the standard tells states apart by it.
+        // Bit 5 means "no quick stop" only in states that the standard distinguishes by it.
         self.state.statusword_bits() | statusword::REMOTE | voltage | warning | bits
     }
 }

@@ -1,11 +1,11 @@
-//! The values behind the object dictionary, and the non-volatile store under them.
+//! The values of the object dictionary, and the non-volatile memory.
 
-use super::objects::{Access, DataType, Missing, OBJECTS, find, place};
+use super::objects::{ErobAccess, ErobDataType, Missing, OBJECTS, find, place};
 
-/// The SDO abort codes that this drive gives (CiA 301, 7.2.4.3.17).
+/// The SDO abort codes of this drive (CiA 301, 7.2.4.3.17).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
-pub enum AbortCode {
+pub enum ErobAbortCode {
     /// Toggle bit not alternated.
     Toggle = 0x0503_0000,
     /// Command specifier not valid or unknown.
@@ -36,7 +36,7 @@ pub enum AbortCode {
     NoData = 0x0800_0024,
 }
 
-impl From<Missing> for AbortCode {
+impl From<Missing> for ErobAbortCode {
     fn from(missing: Missing) -> Self {
         match missing {
             Missing::Index => Self::NoObject,
@@ -45,15 +45,15 @@ impl From<Missing> for AbortCode {
     }
 }
 
-/// The values of all entries, each as the bits that an SDO would carry, in the order of [`OBJECTS`].
+/// The values of all entries in the order of [`OBJECTS`], each with the bits of its SDO transfer.
 #[derive(Clone, Debug)]
-pub struct Dictionary {
+pub struct ErobDictionary {
     values: [u32; OBJECTS.len()],
     saved: [u32; OBJECTS.len()],
 }
 
-impl Dictionary {
-    /// The dictionary of a new drive with this node number.
+impl ErobDictionary {
+    /// The dictionary of a new drive with this node ID.
     pub fn new(node: u8) -> Self {
         let values = OBJECTS.map(|object| {
             mask(object.data_type, object.default + if object.adds_node { node.into() } else { 0 })
@@ -61,13 +61,13 @@ impl Dictionary {
         Self { values, saved: values }
     }
 
-    /// Sets what a drive of this build has from the factory, so that it is there after every start.
+    /// Sets a factory default, which every restart restores.
     pub fn set_factory(&mut self, at: usize, value: u32) {
         self.set(at, value);
         self.saved[at] = self.values[at];
     }
 
-    /// What "save" does: keeps every parameter.
+    /// Saves every parameter, as "save" does.
     pub fn save(&mut self) {
         for ((object, saved), value) in OBJECTS.iter().zip(&mut self.saved).zip(&self.values) {
             if object.is_saved {
@@ -76,7 +76,7 @@ impl Dictionary {
         }
     }
 
-    /// What a start does: every entry whose index is in `indices` gets back what was saved or its default.
+    /// Restores the saved values or defaults of every entry with an index in `indices`, as a restart does.
     pub fn restore(&mut self, indices: std::ops::RangeInclusive<u16>) {
         for ((object, value), saved) in OBJECTS.iter().zip(&mut self.values).zip(&self.saved) {
             if indices.contains(&object.index) {
@@ -85,16 +85,16 @@ impl Dictionary {
         }
     }
 
-    /// Where an entry stands, for a reader.
-    pub fn for_reading(index: u16, subindex: u8) -> Result<usize, AbortCode> {
+    /// The position of an entry for a read access.
+    pub fn for_reading(index: u16, subindex: u8) -> Result<usize, ErobAbortCode> {
         let at = find(index, subindex)?;
-        if OBJECTS[at].access == Access::WriteOnly { Err(AbortCode::WriteOnly) } else { Ok(at) }
+        if OBJECTS[at].access == ErobAccess::WriteOnly { Err(ErobAbortCode::WriteOnly) } else { Ok(at) }
     }
 
-    /// Where an entry stands, for a writer.
-    pub fn for_writing(index: u16, subindex: u8) -> Result<usize, AbortCode> {
+    /// The position of an entry for a write access.
+    pub fn for_writing(index: u16, subindex: u8) -> Result<usize, ErobAbortCode> {
         let at = find(index, subindex)?;
-        if OBJECTS[at].access == Access::ReadOnly { Err(AbortCode::ReadOnly) } else { Ok(at) }
+        if OBJECTS[at].access == ErobAccess::ReadOnly { Err(ErobAbortCode::ReadOnly) } else { Ok(at) }
     }
 
     /// The bits of an entry.
@@ -106,8 +106,8 @@ impl Dictionary {
     pub fn signed(&self, at: usize) -> i32 {
         let value = self.values[at];
         match OBJECTS[at].data_type {
-            DataType::I8 => i32::from(value as u8 as i8),
-            DataType::I16 => i32::from(value as u16 as i16),
+            ErobDataType::I8 => i32::from(value as u8 as i8),
+            ErobDataType::I16 => i32::from(value as u16 as i16),
             _ => value as i32,
         }
     }
@@ -122,24 +122,24 @@ impl Dictionary {
         f64::from(self.signed(at))
     }
 
-    /// Sets an entry; bits beyond its type are cut off.
+    /// Sets an entry; bits beyond its type are discarded.
     pub fn set(&mut self, at: usize, value: u32) {
         self.values[at] = mask(OBJECTS[at].data_type, value);
     }
 
-    /// Sets a signed entry to the nearest value that it can hold.
+    /// Sets a signed entry to the nearest value within its range.
     pub fn set_real(&mut self, at: usize, value: f64) {
         let nearest = value.round_ties_even();
         let value = match OBJECTS[at].data_type {
-            DataType::I8 => (nearest as i8).into(),
-            DataType::I16 => (nearest as i16).into(),
+            ErobDataType::I8 => (nearest as i8).into(),
+            ErobDataType::I16 => (nearest as i16).into(),
             _ => nearest as i32,
         };
         self.set(at, value as u32);
     }
 }
 
-fn mask(data_type: DataType, value: u32) -> u32 {
+fn mask(data_type: ErobDataType, value: u32) -> u32 {
     match data_type.bytes() {
         1 => value & 0xFF,
         2 => value & 0xFFFF,
@@ -147,7 +147,7 @@ fn mask(data_type: DataType, value: u32) -> u32 {
     }
 }
 
-/// Places of the entries that the drive itself works with, by what they mean.
+/// Positions of the entries that the drive itself uses.
 pub mod at {
     use super::place;
 
@@ -222,16 +222,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn defaults_with_the_node_number_carry_it() {
-        let dictionary = Dictionary::new(5);
+    fn cob_id_defaults_contain_the_node_id() {
+        let dictionary = ErobDictionary::new(5);
         assert_eq!(dictionary.get(place(0x1400, 1)), 0x205);
         assert_eq!(dictionary.get(place(0x1801, 1)), 0x8000_0285);
         assert_eq!(dictionary.get(place(0x1014, 0)), 0x85);
     }
 
     #[test]
-    fn saved_parameters_come_back_and_set_points_do_not() {
-        let mut dictionary = Dictionary::new(5);
+    fn a_restore_brings_back_saved_parameters_but_not_set_points() {
+        let mut dictionary = ErobDictionary::new(5);
         dictionary.set(at::PROFILE_VELOCITY, 77);
         dictionary.set(at::TARGET_POSITION, 88);
         dictionary.save();
@@ -242,7 +242,7 @@ mod tests {
 
     #[test]
     fn signed_values_keep_their_sign_and_saturate() {
-        let mut dictionary = Dictionary::new(5);
+        let mut dictionary = ErobDictionary::new(5);
         dictionary.set_real(at::TORQUE, -5.0);
         assert_eq!((dictionary.get(at::TORQUE), dictionary.signed(at::TORQUE)), (0xFFFB, -5));
         dictionary.set_real(at::TORQUE, 1e9);

@@ -1,30 +1,30 @@
 //! Errors of the drive: emergency messages, the error register and the error history (CiA 301, 7.2.7, 7.5.2.2,
 //! 7.5.2.4).
 
-use super::dictionary::{Dictionary, at};
+use super::dictionary::{ErobDictionary, at};
 use crate::sim::drive::DriveFault;
 
-/// Emergency messages that can wait to be sent.
+/// Capacity for emergency messages that wait to be sent.
 const PENDING: usize = 8;
 /// Entries of the error history 1003.
 const HISTORY: usize = 4;
 
-/// What can be wrong, from outside or from within.
+/// An error of the drive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Error {
-    /// Something broke.
+pub enum ErobError {
+    /// An injected fault.
     Fault(DriveFault),
-    /// Something broke that only its code is known of.
+    /// An injected error code.
     Alarm(u16),
-    /// The heartbeat or the guarding of the master has stayed away.
+    /// The heartbeat or the node guarding of the master timed out.
     MasterLost,
     /// A PDO was shorter than its mapping.
     PdoLength,
-    /// The position has left the following-error window.
+    /// The following error exceeded its window.
     PositionLost,
 }
 
-impl Error {
+impl ErobError {
     /// The emergency error code.
     pub const fn code(self) -> u16 {
         match self {
@@ -43,7 +43,7 @@ impl Error {
         }
     }
 
-    /// The bits of the error register, the generic one included.
+    /// The bits of the error register, including the generic error bit.
     const fn register(self) -> u32 {
         1 | match self.code() >> 12 {
             2 => 1 << 1,
@@ -54,8 +54,8 @@ impl Error {
         }
     }
 
-    /// Whether power must be cut at once, because no controlled deceleration is possible any more: after faults of
-    /// current (2xxx), voltage (3xxx), hardware (5xxx) and sensors (73xx).
+    /// Whether power is cut at once, because a controlled deceleration is not possible: faults of current (2xxx),
+    /// voltage (3xxx), hardware (5xxx) and sensors (73xx).
     pub const fn cuts_power(self) -> bool {
         match self {
             Self::Fault(DriveFault::OverTemperature)
@@ -68,16 +68,16 @@ impl Error {
     }
 }
 
-/// Emergency messages on their way.
+/// Emergency messages that wait to be sent.
 #[derive(Clone, Debug, Default)]
-pub struct Errors {
+pub struct ErobErrors {
     pending: [[u8; 8]; PENDING],
     count: usize,
 }
 
-impl Errors {
-    /// Notes an error: register, history, and an emergency message.
-    pub fn raise(&mut self, error: Error, dictionary: &mut Dictionary) {
+impl ErobErrors {
+    /// Records an error in register and history, and queues an emergency message.
+    pub fn raise(&mut self, error: ErobError, dictionary: &mut ErobDictionary) {
         let register = dictionary.get(at::ERROR_REGISTER) | error.register();
         dictionary.set(at::ERROR_REGISTER, register);
         for at in (at::ERROR_HISTORY + 2..=at::ERROR_HISTORY + HISTORY).rev() {
@@ -89,8 +89,8 @@ impl Errors {
         self.queue(error.code(), register);
     }
 
-    /// Notes that no error is left.
-    pub fn clear(&mut self, dictionary: &mut Dictionary) {
+    /// Clears the error register and queues the "error reset" message.
+    pub fn clear(&mut self, dictionary: &mut ErobDictionary) {
         if dictionary.get(at::ERROR_REGISTER) != 0 {
             dictionary.set(at::ERROR_REGISTER, 0);
             self.queue(0, 0);
@@ -102,7 +102,7 @@ impl Errors {
         self.count > 0
     }
 
-    /// The oldest emergency message that waits.
+    /// Removes and returns the oldest emergency message.
     pub fn next(&mut self) -> Option<[u8; 8]> {
         let first = *self.pending.first().filter(|_| self.count > 0)?;
         self.pending.rotate_left(1);
@@ -110,7 +110,7 @@ impl Errors {
         Some(first)
     }
 
-    /// Forgets what waits.
+    /// Discards the waiting messages.
     pub fn reset(&mut self) {
         self.count = 0;
     }

@@ -1,4 +1,4 @@
-//! The whole drive: frames and time come in, the parts do their work, frames go out.
+//! The complete eRob: it receives frames and time, advances its parts, and sends frames.
 
 mod access;
 mod frames;
@@ -7,14 +7,14 @@ mod loops;
 use takt_rt::{DriveState, Frame, Nanoseconds, OperationMode};
 
 use super::ErobParameters;
-use super::defects::Defects;
-use super::device::{Change, Device};
-use super::dictionary::{Dictionary, at};
-use super::errors::{Error, Errors};
-use super::motion::{Actual, Motion};
-use super::network::Network;
-use super::process_data::ProcessData;
-use super::sdo::SdoServer;
+use super::defects::ErobDefects;
+use super::device::{Change, ErobDevice};
+use super::dictionary::{ErobDictionary, at};
+use super::errors::{ErobError, ErobErrors};
+use super::motion::{ErobActual, ErobMotion};
+use super::network::ErobNetwork;
+use super::process_data::ErobProcessData;
+use super::sdo::ErobSdoServer;
 use crate::sim::defect::{Defect, Unsupported};
 use crate::sim::drive::{Drive, DriveFault, Observation};
 use crate::sim::mailbox::Mailbox;
@@ -22,7 +22,7 @@ use crate::sim::plant::Joint;
 use crate::sim::random::Random;
 use crate::sim::servo::Servo;
 
-/// Without anything to do the drive looks up this often.
+/// Longest time between two advances.
 const IDLE_NS: Nanoseconds = 1_000_000;
 /// Counts of the motor encoder for one of the output encoder.
 const MOTOR_ENCODER_RATIO: f64 = 100.0;
@@ -34,34 +34,34 @@ const NEVER: Nanoseconds = Nanoseconds::MAX;
 #[derive(Clone, Debug)]
 pub struct ErobJoint {
     parameters: ErobParameters,
-    dictionary: Dictionary,
-    network: Network,
-    sdo: SdoServer,
-    process_data: ProcessData,
-    errors: Errors,
-    device: Device,
-    motion: Motion,
+    dictionary: ErobDictionary,
+    network: ErobNetwork,
+    sdo: ErobSdoServer,
+    process_data: ErobProcessData,
+    errors: ErobErrors,
+    device: ErobDevice,
+    motion: ErobMotion,
     servo: Servo,
     joint: Joint,
     torque: f64,
-    /// What is added to the encoder's counts, because turns were lost.
+    /// Offset added to the encoder's counts, because the turn count was lost.
     counts_offset: i32,
     has_battery_fault: bool,
     has_pdo_error: bool,
-    /// What broke since the last look.
+    /// A fault injected since the last advance.
     injected: Option<DriveFault>,
-    defects: Defects,
+    defects: ErobDefects,
     save_ns: Nanoseconds,
-    /// How far the loops have come.
+    /// The time up to which the loops have run.
     stepped_ns: Nanoseconds,
     now_ns: Nanoseconds,
     wake_ns: Nanoseconds,
 }
 
 impl ErobJoint {
-    /// A module whose supply comes on at time 0.
+    /// A module whose supply is switched on at time 0.
     pub fn new(parameters: ErobParameters) -> Self {
-        let mut dictionary = Dictionary::new(parameters.node);
+        let mut dictionary = ErobDictionary::new(parameters.node);
         dictionary.set_factory(at::RATED_TORQUE, (1000.0 * parameters.rated_torque).round() as u32);
         let rated_current_ma = 1000.0 * parameters.rated_torque / TORQUE_PER_AMPERE;
         dictionary.set_factory(at::RATED_CURRENT, rated_current_ma.round() as u32);
@@ -73,12 +73,12 @@ impl ErobJoint {
         let mut module = Self {
             parameters,
             dictionary,
-            network: Network::starting(parameters.node, parameters.power_up_ns),
-            sdo: SdoServer::new(random, parameters.is_upload_segmented),
-            process_data: ProcessData::default(),
-            errors: Errors::default(),
-            device: Device::starting(has_warning),
-            motion: Motion::new(counts_per_second),
+            network: ErobNetwork::starting(parameters.node, parameters.power_up_ns),
+            sdo: ErobSdoServer::new(random, parameters.is_upload_segmented),
+            process_data: ErobProcessData::default(),
+            errors: ErobErrors::default(),
+            device: ErobDevice::starting(has_warning),
+            motion: ErobMotion::new(counts_per_second),
             servo: Servo::new(parameters.joint.inertia, parameters.peak_torque, velocity_limit),
             joint: Joint::new(parameters.joint, parameters.initial_position),
             torque: 0.0,
@@ -86,7 +86,7 @@ impl ErobJoint {
             has_battery_fault: false,
             has_pdo_error: false,
             injected: None,
-            defects: Defects::default(),
+            defects: ErobDefects::default(),
             save_ns: NEVER,
             stepped_ns: 0,
             now_ns: 0,
@@ -111,17 +111,17 @@ impl ErobJoint {
         self.parameters.encoder.counts(self.joint.position()).wrapping_add(self.counts_offset)
     }
 
-    fn actual(&self) -> Actual {
+    fn actual(&self) -> ErobActual {
         let velocity = self.parameters.encoder.counts_per_second(self.joint.velocity());
-        Actual { position: self.counts().into(), velocity }
+        ErobActual { position: self.counts().into(), velocity }
     }
 
-    /// The mode in force, as 6061 shows it.
+    /// The current mode of operation, as in 6061.
     fn mode(&self) -> Option<OperationMode> {
         OperationMode::from_number(self.dictionary.signed(at::OPERATION_MODE_DISPLAY) as i8)
     }
 
-    /// Lets the state machine and the profile handshake see the present controlword.
+    /// Evaluates the controlword in the state machine and in the profile position handshake.
     fn evaluate(&mut self, now_ns: Nanoseconds) {
         let previous = self.device.controlword();
         let had_stop = self.device.stop().is_some();
@@ -145,7 +145,7 @@ impl ErobJoint {
         }
     }
 
-    /// 6061 follows 6060 in a drive that is not enabled, if the unit has the mode.
+    /// 6061 follows 6060 while the drive is not enabled, if the unit has the mode.
     fn follow_mode(&mut self) {
         if self.device.state().has_torque() {
             return;
@@ -161,8 +161,8 @@ impl ErobJoint {
         }
     }
 
-    /// A fault: error code, emergency message, reaction.
-    fn fail(&mut self, error: Error) {
+    /// Enters a fault: error code, emergency message, fault reaction.
+    fn fail(&mut self, error: ErobError) {
         self.dictionary.set(at::ERROR_CODE, error.code().into());
         self.errors.raise(error, &mut self.dictionary);
         self.device.fault(error.cuts_power(), &self.dictionary);
@@ -173,7 +173,7 @@ impl ErobJoint {
         }
     }
 
-    /// Brings measured quantities into the dictionary.
+    /// Writes the measured values to the dictionary.
     fn measure(&mut self) {
         let actual = self.actual();
         let per_mille = 1000.0 * self.torque / self.parameters.rated_torque;
@@ -196,11 +196,11 @@ impl ErobJoint {
         dictionary.set(at::STATUSWORD, statusword.into());
     }
 
-    /// Brings measured quantities into the dictionary and lets the PDOs take from it what they are to carry, with
-    /// what is wrong about that.
-    fn report<T>(&mut self, take: impl FnOnce(&mut ProcessData, &Dictionary) -> T) -> T {
+    /// Writes the measured values to the dictionary with the effect of the defects, and lets the PDOs take their
+    /// objects.
+    fn report<T>(&mut self, take: impl FnOnce(&mut ErobProcessData, &ErobDictionary) -> T) -> T {
         self.measure();
-        let truth = self.defects.forge(&mut self.dictionary);
+        let truth = self.defects.falsify(&mut self.dictionary);
         let taken = take(&mut self.process_data, &self.dictionary);
         truth.restore(&mut self.dictionary);
         taken
@@ -212,14 +212,14 @@ impl ErobJoint {
         self.device.statusword(bits)
     }
 
-    /// What a start leaves of the drive: everything but the joint and the store.
+    /// Restarts everything except the joint and the saved parameters.
     fn start(&mut self, now_ns: Nanoseconds) {
         self.dictionary.restore(0..=u16::MAX);
         if !self.parameters.has_battery {
             self.lose_turns();
         }
         let Self { parameters, dictionary, .. } = self;
-        self.network = Network::starting(parameters.node, now_ns + parameters.power_up_ns);
+        self.network = ErobNetwork::starting(parameters.node, now_ns + parameters.power_up_ns);
         self.sdo.reset();
         self.errors.reset();
         self.process_data.compile(dictionary);
@@ -230,7 +230,7 @@ impl ErobJoint {
         self.save_ns = NEVER;
     }
 
-    /// The multi-turn count becomes 0.
+    /// Sets the turn count to 0.
     fn lose_turns(&mut self) {
         let turn = self.parameters.counts_per_turn.max(1.0) as i64;
         let single = i64::from(self.counts()).rem_euclid(turn);
@@ -259,7 +259,7 @@ impl Drive for ErobJoint {
     fn receive(&mut self, now_ns: Nanoseconds, frame: &Frame, mailbox: &mut Mailbox) {
         self.now_ns = now_ns;
         self.run_loops(now_ns);
-        self.take(now_ns, frame, mailbox);
+        self.receive_frame(now_ns, frame, mailbox);
         self.schedule(now_ns);
     }
 
@@ -268,11 +268,11 @@ impl Drive for ErobJoint {
         self.run_loops(now_ns);
         if let Some(fault) = self.injected.take() {
             self.has_battery_fault |= fault == DriveFault::MultiTurnBattery;
-            self.fail(Error::Fault(fault));
+            self.fail(ErobError::Fault(fault));
         }
-        if self.network.loses_master(now_ns, &self.dictionary) {
-            self.fail(Error::MasterLost);
-            self.rest();
+        if self.network.check_master(now_ns, &self.dictionary) {
+            self.fail(ErobError::MasterLost);
+            self.stop_services();
         }
         if now_ns >= self.save_ns {
             self.save_ns = NEVER;
@@ -302,7 +302,7 @@ impl Drive for ErobJoint {
         }
     }
 
-    fn inject(&mut self, fault: DriveFault) {
+    fn inject_fault(&mut self, fault: DriveFault) {
         self.injected = Some(fault);
         self.wake_ns = self.now_ns + 1;
     }
@@ -318,7 +318,12 @@ impl Drive for ErobJoint {
         self.joint.set_load_torque(torque);
     }
 
-    fn afflict(&mut self, now_ns: Nanoseconds, defect: Defect, is_present: bool) -> Result<(), Unsupported> {
+    fn inject_defect(
+        &mut self,
+        now_ns: Nanoseconds,
+        defect: Defect,
+        is_present: bool,
+    ) -> Result<(), Unsupported> {
         self.run_loops(now_ns);
         self.defects.set(defect, is_present);
         match defect {
@@ -326,9 +331,9 @@ impl Drive for ErobJoint {
                 let counts = (distance * self.parameters.encoder.counts_per_unit).round() as i64 as i32;
                 self.counts_offset = self.counts_offset.wrapping_add(counts);
             }
-            Defect::Alarm { code } if is_present => self.fail(Error::Alarm(code)),
+            Defect::Alarm { code } if is_present => self.fail(ErobError::Alarm(code)),
             Defect::Emergency { code } if is_present => {
-                self.errors.raise(Error::Alarm(code), &mut self.dictionary);
+                self.errors.raise(ErobError::Alarm(code), &mut self.dictionary);
             }
             Defect::TorqueOff if is_present => {
                 self.device.lose_torque();

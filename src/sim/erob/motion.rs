@@ -1,14 +1,14 @@
-//! From set-points to what the loops are to follow, in every mode of operation. Counts, counts/s, per mille.
+//! The set-points of the control loops in every mode of operation. Units: counts, counts/s, per mille.
 
 mod status;
 
 use takt_rt::{OperationMode, controlword};
 
-use super::dictionary::{Dictionary, at};
+use super::dictionary::{ErobDictionary, at};
 
-/// What the loops are to follow in one step.
+/// The set-point of the loops for one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Demand {
+pub enum ErobDemand {
     /// A position (counts) with its velocity (counts/s) and a torque fed forward (per mille).
     Position {
         /// counts
@@ -29,41 +29,41 @@ pub enum Demand {
     Torque(f64),
 }
 
-/// The way from one latched CSP target to the next.
+/// The interpolation from one CSP target to the next.
 #[derive(Clone, Copy, Debug, Default)]
 struct Interpolation {
     target: f64,
     left_s: f64,
     /// Velocity from the difference of the last two targets.
     velocity: f64,
-    /// For how long it goes on being fed forward.
+    /// How long this velocity is still fed forward.
     forward_s: f64,
 }
 
-/// The set-points of profile position: one under way, one behind it.
+/// The set-points of profile position mode: an active one and a buffered one.
 #[derive(Clone, Copy, Debug, Default)]
 struct SetPoints {
     active: Option<f64>,
     buffered: Option<f64>,
-    /// The last target taken, to which relative ones are added.
+    /// The last accepted target, to which relative targets are added.
     last: f64,
     is_acknowledged: bool,
 }
 
-/// The feed-forward of the velocity in CSP passes a low-pass of this time, since targets are whole counts.
+/// Time constant of the low-pass for the velocity feed-forward in CSP, because targets are whole counts.
 const FORWARD_FILTER_S: f64 = 1e-3;
-/// The velocity is fed forward for this many periods, so that a SYNC that is less than a period late does not shake
-/// the joint.
+/// Number of periods for which the velocity is fed forward, so that a SYNC up to one period late does not disturb the
+/// joint.
 const FORWARD_PERIODS: f64 = 2.0;
-/// A target of interpolated position that is further away than this many of the steps that the profile velocity allows
-/// is not one of a stream, but a move.
-const STREAMED_REACH: f64 = 1.5;
-/// Closer than this (counts) a profile has arrived.
+/// In interpolated position mode, a target up to this multiple of the longest step (profile velocity times period)
+/// belongs to a stream. A more distant one is a move.
+const STREAMED_STEPS: f64 = 1.5;
+/// Tolerance in counts within which a profile has reached its target.
 const ARRIVED: f64 = 0.01;
 
-/// The reference generator.
+/// Generates the set-points of the loops.
 #[derive(Clone, Copy, Debug)]
-pub struct Motion {
+pub struct ErobMotion {
     mode: Option<OperationMode>,
     velocity_limit: f64,
     position: f64,
@@ -71,25 +71,25 @@ pub struct Motion {
     torque: f64,
     forward: f64,
     interpolation: Interpolation,
-    /// Whether targets of interpolated position come as a stream, each within reach of the last.
+    /// Whether the targets of interpolated position mode come as a stream.
     is_streamed: bool,
     set_points: SetPoints,
-    /// For how long the actual value has been within its window.
+    /// How long the actual value has been within its window.
     in_window_s: f64,
     is_limited: bool,
 }
 
-/// What the joint really does.
+/// The measured motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Actual {
+pub struct ErobActual {
     /// counts
     pub position: f64,
     /// counts/s
     pub velocity: f64,
 }
 
-impl Motion {
-    /// A generator at rest. The limit (counts/s) is the drive's own highest speed.
+impl ErobMotion {
+    /// A generator at standstill. The limit (counts/s) is the drive's own.
     pub fn new(velocity_limit: f64) -> Self {
         Self {
             mode: None,
@@ -106,9 +106,9 @@ impl Motion {
         }
     }
 
-    /// Torque comes on: everything begins at the actual position. The target of CSP is whatever object 607A holds,
-    /// so a stale one makes the axis jump.
-    pub fn engage(&mut self, mode: Option<OperationMode>, actual: Actual, dictionary: &Dictionary) {
+    /// Starts at the actual position, when torque comes on. The CSP target is the value of object 607A, so an old one
+    /// makes the axis jump.
+    pub fn engage(&mut self, mode: Option<OperationMode>, actual: ErobActual, dictionary: &ErobDictionary) {
         *self = Self {
             mode,
             position: actual.position,
@@ -120,17 +120,17 @@ impl Motion {
         self.latch(dictionary);
     }
 
-    /// While there is no torque, the demand is where the joint is.
-    pub fn follow(&mut self, actual: Actual) {
+    /// Without torque, the demand follows the actual position.
+    pub fn follow(&mut self, actual: ErobActual) {
         self.position = actual.position;
         self.velocity = 0.0;
         self.torque = 0.0;
     }
 
-    /// Takes the target of CSP, or of interpolated position while bit 4 is set, from the dictionary: at SYNC, or when it
-    /// has been written in between. It is reached at the end of the interpolation period, so at the next SYNC. The same
-    /// target again changes nothing while it is still under way.
-    pub fn latch(&mut self, dictionary: &Dictionary) {
+    /// Latches the target of CSP, or of interpolated position mode while controlword bit 4 is set: at SYNC, or after a
+    /// write in between. It is reached at the end of the interpolation period, at the next SYNC. The same target again
+    /// changes nothing while the interpolation runs.
+    pub fn latch(&mut self, dictionary: &ErobDictionary) {
         let is_interpolating = self.mode == Some(OperationMode::InterpolatedPosition)
             && dictionary.get(at::CONTROLWORD) as u16 & controlword::BIT_4 != 0;
         if self.mode != Some(OperationMode::CyclicSynchronousPosition) && !is_interpolating {
@@ -144,13 +144,14 @@ impl Motion {
             return;
         }
         if is_interpolating {
-            let reach = dictionary.real(at::PROFILE_VELOCITY).min(self.velocity_limit(dictionary)) * period_s;
-            let is_in_reach = (target - self.position).abs() <= STREAMED_REACH * reach;
-            if !self.is_streamed && is_in_reach {
+            let longest_step =
+                dictionary.real(at::PROFILE_VELOCITY).min(self.velocity_limit(dictionary)) * period_s;
+            let is_within_stream = (target - self.position).abs() <= STREAMED_STEPS * longest_step;
+            if !self.is_streamed && is_within_stream {
                 self.interpolation.target = self.position;
             }
-            self.is_streamed = is_in_reach;
-            if !is_in_reach {
+            self.is_streamed = is_within_stream;
+            if !is_within_stream {
                 return;
             }
         }
@@ -160,8 +161,8 @@ impl Motion {
             Interpolation { target, left_s: period_s, velocity, forward_s: FORWARD_PERIODS * period_s };
     }
 
-    /// Evaluates the bits of the controlword that belong to profile position, in an enabled drive.
-    pub fn evaluate(&mut self, word: u16, previous: u16, dictionary: &Dictionary) {
+    /// Evaluates the controlword bits of profile position mode in an enabled drive.
+    pub fn evaluate(&mut self, word: u16, previous: u16, dictionary: &ErobDictionary) {
         if !self.is_profile_position() {
             return;
         }
@@ -184,16 +185,22 @@ impl Motion {
         }
     }
 
-    /// Moves on by `duration_s` and says what the loops are to follow: a position is that of the beginning of the
-    /// step, which is when the actual one was measured.
-    pub fn step(&mut self, word: u16, actual: Actual, dictionary: &Dictionary, duration_s: f64) -> Demand {
+    /// Advances by `duration_s` and returns the set-point. A position is that of the beginning of the step, when the
+    /// actual position was measured.
+    pub fn step(
+        &mut self,
+        word: u16,
+        actual: ErobActual,
+        dictionary: &ErobDictionary,
+        duration_s: f64,
+    ) -> ErobDemand {
         let is_halted = word & controlword::HALT != 0;
         let torque = dictionary.signed_real(at::TORQUE_OFFSET);
         let position = self.position;
         match self.mode {
             Some(OperationMode::InterpolatedPosition) if self.is_streamed && !is_halted => {
                 self.step_interpolation(dictionary, duration_s);
-                Demand::Position { position, velocity: self.forward, torque: 0.0 }
+                ErobDemand::Position { position, velocity: self.forward, torque: 0.0 }
             }
             Some(OperationMode::ProfilePosition | OperationMode::InterpolatedPosition) => {
                 if is_halted {
@@ -201,58 +208,58 @@ impl Motion {
                 } else {
                     self.step_profile(dictionary, duration_s);
                 }
-                Demand::Position { position, velocity: self.velocity, torque: 0.0 }
+                ErobDemand::Position { position, velocity: self.velocity, torque: 0.0 }
             }
             Some(OperationMode::ProfileVelocity) => {
                 let wanted = if is_halted { 0.0 } else { dictionary.signed_real(at::TARGET_VELOCITY) };
                 self.position = actual.position;
                 let wanted = self.velocity_within_limits(wanted, dictionary);
                 self.ramp_velocity(wanted, dictionary, duration_s);
-                Demand::Velocity { velocity: self.velocity, torque: 0.0 }
+                ErobDemand::Velocity { velocity: self.velocity, torque: 0.0 }
             }
             Some(OperationMode::ProfileTorque) => {
                 let wanted = if is_halted { 0.0 } else { dictionary.signed_real(at::TARGET_TORQUE) };
                 let slope = dictionary.real(at::TORQUE_SLOPE);
-                // A slope of 0 is none: the torque steps.
+                // A slope of 0 means no slope: the torque steps.
                 let most = if slope > 0.0 { slope * duration_s } else { f64::INFINITY };
                 self.torque += (wanted - self.torque).clamp(-most, most);
-                Demand::Torque(self.torque)
+                ErobDemand::Torque(self.torque)
             }
             Some(OperationMode::CyclicSynchronousPosition) => {
                 self.step_interpolation(dictionary, duration_s);
                 let velocity = self.forward + dictionary.signed_real(at::VELOCITY_OFFSET);
-                Demand::Position { position, velocity, torque }
+                ErobDemand::Position { position, velocity, torque }
             }
             Some(OperationMode::CyclicSynchronousVelocity) => {
                 let wanted =
                     dictionary.signed_real(at::TARGET_VELOCITY) + dictionary.signed_real(at::VELOCITY_OFFSET);
                 self.position = actual.position;
                 self.velocity = self.velocity_within_limits(wanted, dictionary);
-                Demand::Velocity { velocity: self.velocity, torque }
+                ErobDemand::Velocity { velocity: self.velocity, torque }
             }
             Some(OperationMode::CyclicSynchronousTorque) => {
                 self.torque = dictionary.signed_real(at::TARGET_TORQUE) + torque;
-                Demand::Torque(self.torque)
+                ErobDemand::Torque(self.torque)
             }
-            _ => Demand::Position { position, velocity: 0.0, torque: 0.0 },
+            _ => ErobDemand::Position { position, velocity: 0.0, torque: 0.0 },
         }
     }
 
-    /// Decelerates, whatever the mode, and says whether the demand has come to rest.
-    pub fn step_stop(&mut self, deceleration: f64, duration_s: f64) -> (Demand, bool) {
+    /// Decelerates in any mode, and returns whether the demand is at standstill.
+    pub fn step_stop(&mut self, deceleration: f64, duration_s: f64) -> (ErobDemand, bool) {
         let most = deceleration * duration_s;
         self.velocity -= self.velocity.clamp(-most, most);
         self.position += self.velocity * duration_s;
-        (Demand::Velocity { velocity: self.velocity, torque: 0.0 }, self.velocity == 0.0)
+        (ErobDemand::Velocity { velocity: self.velocity, torque: 0.0 }, self.velocity == 0.0)
     }
 
-    /// A deceleration begins: the demand takes over the actual velocity.
-    pub fn begin_stop(&mut self, actual: Actual) {
+    /// Begins a deceleration from the actual velocity.
+    pub fn begin_stop(&mut self, actual: ErobActual) {
         self.position = actual.position;
         self.velocity = actual.velocity;
     }
 
-    /// Whether the mode has a position to follow, and with it a following error.
+    /// Whether the mode follows a position, and so has a following error.
     pub fn follows_position(&self) -> bool {
         matches!(self.mode, Some(OperationMode::CyclicSynchronousPosition)) || self.is_profile_position()
     }
@@ -268,8 +275,8 @@ impl Motion {
     }
 
     fn is_profile_position(&self) -> bool {
-        // Mode 7, where a unit has it, moves like mode 1 (eRunner manual 1.7, 5.7: a move to an absolute
-        // target that bit 4 starts and profile velocity 0 stops), unless the targets come as a stream.
+        // Mode 7 behaves like mode 1 where a unit has it, unless the targets come as a stream. eRunner manual 1.7, 5.7:
+        // bit 4 starts a move to an absolute target, and profile velocity 0 stops it.
         matches!(self.mode, Some(OperationMode::ProfilePosition | OperationMode::InterpolatedPosition))
     }
 
@@ -277,11 +284,11 @@ impl Motion {
         self.mode.is_some_and(|mode| mode as i8 >= OperationMode::CyclicSynchronousPosition as i8)
     }
 
-    fn velocity_limit(&self, dictionary: &Dictionary) -> f64 {
+    fn velocity_limit(&self, dictionary: &ErobDictionary) -> f64 {
         dictionary.real(at::MAX_PROFILE_VELOCITY).min(self.velocity_limit)
     }
 
-    fn within_software_limits(&mut self, position: f64, dictionary: &Dictionary) -> f64 {
+    fn within_software_limits(&mut self, position: f64, dictionary: &ErobDictionary) -> f64 {
         let lowest = dictionary.signed_real(at::POSITION_MIN);
         let highest = dictionary.signed_real(at::POSITION_MAX);
         let limited = position.min(highest).max(lowest);
@@ -289,8 +296,8 @@ impl Motion {
         limited
     }
 
-    /// A velocity that does not lead beyond the software limits.
-    fn velocity_within_limits(&mut self, velocity: f64, dictionary: &Dictionary) -> f64 {
+    /// Limits a velocity so that it does not go beyond the software limits.
+    fn velocity_within_limits(&mut self, velocity: f64, dictionary: &ErobDictionary) -> f64 {
         let limit = self.velocity_limit(dictionary);
         let is_beyond = velocity > 0.0 && self.position >= dictionary.signed_real(at::POSITION_MAX)
             || velocity < 0.0 && self.position <= dictionary.signed_real(at::POSITION_MIN);
@@ -298,11 +305,11 @@ impl Motion {
         if is_beyond { 0.0 } else { velocity.clamp(-limit, limit) }
     }
 
-    fn step_interpolation(&mut self, dictionary: &Dictionary, duration_s: f64) {
+    fn step_interpolation(&mut self, dictionary: &ErobDictionary, duration_s: f64) {
         let Interpolation { target, left_s, velocity, forward_s } = self.interpolation;
         let most = self.velocity_limit(dictionary) * duration_s;
         let distance = target - self.position;
-        // Without a new target the last one is reached and held.
+        // Without a new target, the last one is reached and held.
         let share = if left_s > duration_s { duration_s / left_s } else { 1.0 };
         let step = (distance * share).clamp(-most, most);
         self.position += step;
@@ -314,14 +321,14 @@ impl Motion {
     }
 
     /// One step of a trapezoidal profile to the active set-point.
-    fn step_profile(&mut self, dictionary: &Dictionary, duration_s: f64) {
+    fn step_profile(&mut self, dictionary: &ErobDictionary, duration_s: f64) {
         let Some(target) = self.set_points.active else {
             self.ramp_velocity(0.0, dictionary, duration_s);
             return;
         };
         let distance = target - self.position;
         let deceleration = deceleration(dictionary);
-        // The highest velocity from which whole steps of the deceleration lead exactly to the target.
+        // The highest velocity from which whole steps of the deceleration end exactly at the target.
         let step = deceleration * duration_s;
         let highest = step * ((0.25 + 2.0 * distance.abs() / (step * duration_s)).sqrt() - 0.5);
         let limit = dictionary.real(at::PROFILE_VELOCITY).min(self.velocity_limit(dictionary));
@@ -333,8 +340,8 @@ impl Motion {
         }
     }
 
-    /// Brings the demanded velocity nearer to `wanted` by the profile's acceleration or deceleration, and moves.
-    fn ramp_velocity(&mut self, wanted: f64, dictionary: &Dictionary, duration_s: f64) {
+    /// Ramps the demanded velocity towards `wanted` by the profile, and moves.
+    fn ramp_velocity(&mut self, wanted: f64, dictionary: &ErobDictionary, duration_s: f64) {
         let is_faster = wanted * self.velocity >= 0.0 && wanted.abs() > self.velocity.abs();
         let rate = if is_faster { acceleration(dictionary) } else { deceleration(dictionary) };
         let most = rate * duration_s;
@@ -343,17 +350,17 @@ impl Motion {
     }
 }
 
-fn acceleration(dictionary: &Dictionary) -> f64 {
+fn acceleration(dictionary: &ErobDictionary) -> f64 {
     dictionary.real(at::PROFILE_ACCELERATION).min(dictionary.real(at::MAX_ACCELERATION))
 }
 
-/// At least 1 count/s², since a profile without any would never end.
-fn deceleration(dictionary: &Dictionary) -> f64 {
+/// At least 1 count/s², because a profile without deceleration would never end.
+fn deceleration(dictionary: &ErobDictionary) -> f64 {
     dictionary.real(at::PROFILE_DECELERATION).min(dictionary.real(at::MAX_DECELERATION)).max(1.0)
 }
 
-/// The period over which CSP interpolates: the SYNC period 1006, or else 60C2, or else 1 ms.
-fn interpolation_period_s(dictionary: &Dictionary) -> f64 {
+/// The period over which CSP interpolates: the SYNC period 1006, otherwise 60C2, otherwise 1 ms.
+fn interpolation_period_s(dictionary: &ErobDictionary) -> f64 {
     let cycle_us = dictionary.real(at::CYCLE_PERIOD);
     if cycle_us > 0.0 {
         return cycle_us * 1e-6;

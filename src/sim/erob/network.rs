@@ -1,19 +1,18 @@
-//! The node's life on the network: NMT state, boot-up, heartbeat in both directions, node guarding (CiA 301, 7.2.8,
-//! 7.3.2).
+//! NMT state, boot-up, heartbeat producer and consumer, node guarding (CiA 301, 7.2.8, 7.3.2).
 
 use takt_rt::Nanoseconds;
 
-use super::dictionary::{Dictionary, at};
-use crate::sim::drive::NmtState;
+use super::dictionary::{ErobDictionary, at};
+use crate::sim::drive::NodeState;
 
 /// From "reset communication" to the boot-up message (0 to 1 ms in the manual's captures).
 const RESET_COMMUNICATION_NS: Nanoseconds = 500_000;
 const NEVER: Nanoseconds = Nanoseconds::MAX;
 const MILLISECOND_NS: Nanoseconds = 1_000_000;
 
-/// What an NMT command makes the rest of the drive do.
+/// What the drive resets after an NMT command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Reset {
+pub enum ErobReset {
     /// Communication parameters only.
     Communication,
     /// The whole node.
@@ -22,24 +21,24 @@ pub enum Reset {
 
 /// NMT slave, error control, and their timers.
 #[derive(Clone, Copy, Debug)]
-pub struct Network {
+pub struct ErobNetwork {
     node: u8,
-    state: NmtState,
+    state: NodeState,
     boot_ns: Nanoseconds,
     heartbeat_ns: Nanoseconds,
-    /// By when the next heartbeat of the master must come; [`NEVER`] until it was heard once.
+    /// Deadline of the master's next heartbeat; [`NEVER`] until the first one.
     master_deadline_ns: Nanoseconds,
-    /// The same for guarding requests.
+    /// Deadline of the next node guarding request.
     guard_deadline_ns: Nanoseconds,
     guard_toggle: bool,
 }
 
-impl Network {
-    /// A node that is starting and will be there at `boot_ns`.
+impl ErobNetwork {
+    /// A node that boots and is ready at `boot_ns`.
     pub fn starting(node: u8, boot_ns: Nanoseconds) -> Self {
         Self {
             node,
-            state: NmtState::Initialising,
+            state: NodeState::Initialising,
             boot_ns,
             heartbeat_ns: NEVER,
             master_deadline_ns: NEVER,
@@ -49,34 +48,34 @@ impl Network {
     }
 
     /// The NMT state.
-    pub fn state(&self) -> NmtState {
+    pub fn state(&self) -> NodeState {
         self.state
     }
 
-    /// Whether SDO and emergency messages are alive.
+    /// Whether SDO and emergency messages work.
     pub fn has_services(&self) -> bool {
-        matches!(self.state, NmtState::PreOperational | NmtState::Operational)
+        matches!(self.state, NodeState::PreOperational | NodeState::Operational)
     }
 
-    /// When something is due.
+    /// The time of the next action.
     pub fn due_ns(&self) -> Nanoseconds {
         self.boot_ns.min(self.heartbeat_ns).min(self.master_deadline_ns).min(self.guard_deadline_ns)
     }
 
-    /// Whether the node comes up now; then its boot-up message is to be sent.
-    pub fn boots(&mut self, now_ns: Nanoseconds, dictionary: &Dictionary) -> bool {
+    /// Boots when it is time. Returns whether the boot-up message is to be sent.
+    pub fn boot_if_due(&mut self, now_ns: Nanoseconds, dictionary: &ErobDictionary) -> bool {
         if now_ns < self.boot_ns {
             return false;
         }
         self.boot_ns = NEVER;
-        self.state = NmtState::PreOperational;
+        self.state = NodeState::PreOperational;
         self.guard_toggle = false;
         self.schedule_heartbeat(now_ns, dictionary);
         true
     }
 
-    /// The byte of a heartbeat that is to be sent now.
-    pub fn heartbeat(&mut self, now_ns: Nanoseconds, dictionary: &Dictionary) -> Option<u8> {
+    /// The byte of a heartbeat that is due.
+    pub fn heartbeat(&mut self, now_ns: Nanoseconds, dictionary: &ErobDictionary) -> Option<u8> {
         if now_ns < self.heartbeat_ns {
             return None;
         }
@@ -84,30 +83,30 @@ impl Network {
         Some(self.state.code())
     }
 
-    /// Starts the heartbeat's period anew, as after a change of object 1017.
-    pub fn schedule_heartbeat(&mut self, now_ns: Nanoseconds, dictionary: &Dictionary) {
+    /// Restarts the heartbeat period, as after a write of object 1017.
+    pub fn schedule_heartbeat(&mut self, now_ns: Nanoseconds, dictionary: &ErobDictionary) {
         let period_ms = Nanoseconds::from(dictionary.get(at::PRODUCER_HEARTBEAT));
         self.heartbeat_ns = if period_ms == 0 { NEVER } else { now_ns + period_ms * MILLISECOND_NS };
     }
 
     /// Takes an NMT command of two bytes.
-    pub fn command(&mut self, now_ns: Nanoseconds, command: u8) -> Option<Reset> {
+    pub fn command(&mut self, now_ns: Nanoseconds, command: u8) -> Option<ErobReset> {
         match command {
-            0x01 => self.state = NmtState::Operational,
-            0x02 => self.state = NmtState::Stopped,
-            0x80 => self.state = NmtState::PreOperational,
-            0x81 => return Some(Reset::Node),
+            0x01 => self.state = NodeState::Operational,
+            0x02 => self.state = NodeState::Stopped,
+            0x80 => self.state = NodeState::PreOperational,
+            0x81 => return Some(ErobReset::Node),
             0x82 => {
                 *self = Self::starting(self.node, now_ns + RESET_COMMUNICATION_NS);
-                return Some(Reset::Communication);
+                return Some(ErobReset::Communication);
             }
             _ => {}
         }
         None
     }
 
-    /// Takes the heartbeat of another node.
-    pub fn heard(&mut self, now_ns: Nanoseconds, node: u8, dictionary: &Dictionary) {
+    /// Receives the heartbeat of another node.
+    pub fn receive_heartbeat(&mut self, now_ns: Nanoseconds, node: u8, dictionary: &ErobDictionary) {
         let [low, high, watched, _] = dictionary.get(at::CONSUMER_HEARTBEAT).to_le_bytes();
         let timeout_ms = u16::from_le_bytes([low, high]);
         if watched == node && timeout_ms > 0 {
@@ -115,14 +114,14 @@ impl Network {
         }
     }
 
-    /// Ceases to watch the master until it is heard again, as after a change of object 1016.
-    pub fn forget_master(&mut self) {
+    /// Stops monitoring the master until its next heartbeat, as after a write of object 1016.
+    pub fn stop_master_monitor(&mut self) {
         self.master_deadline_ns = NEVER;
     }
 
-    /// Takes a guarding request and returns the byte of its answer. With a heartbeat there is no guarding.
-    pub fn guarded(&mut self, now_ns: Nanoseconds, dictionary: &Dictionary) -> Option<u8> {
-        if self.heartbeat_ns != NEVER || self.state == NmtState::Initialising {
+    /// Answers a node guarding request. There is no node guarding while a heartbeat is produced.
+    pub fn guarded(&mut self, now_ns: Nanoseconds, dictionary: &ErobDictionary) -> Option<u8> {
+        if self.heartbeat_ns != NEVER || self.state == NodeState::Initialising {
             return None;
         }
         let guard_time_ms = Nanoseconds::from(dictionary.get(at::GUARD_TIME));
@@ -134,8 +133,8 @@ impl Network {
         Some(byte)
     }
 
-    /// Whether the master has just been lost; then the NMT state has changed as object 1029 says.
-    pub fn loses_master(&mut self, now_ns: Nanoseconds, dictionary: &Dictionary) -> bool {
+    /// Whether the master has just been lost; the NMT state has then changed by object 1029.
+    pub fn check_master(&mut self, now_ns: Nanoseconds, dictionary: &ErobDictionary) -> bool {
         if now_ns < self.master_deadline_ns && now_ns < self.guard_deadline_ns {
             return false;
         }
@@ -145,8 +144,8 @@ impl Network {
             self.guard_deadline_ns = NEVER;
         }
         match dictionary.get(at::ERROR_BEHAVIOUR) {
-            0 if self.state == NmtState::Operational => self.state = NmtState::PreOperational,
-            2 => self.state = NmtState::Stopped,
+            0 if self.state == NodeState::Operational => self.state = NodeState::PreOperational,
+            2 => self.state = NodeState::Stopped,
             _ => {}
         }
         true

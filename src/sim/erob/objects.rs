@@ -1,9 +1,9 @@
-//! The object dictionary of the eRob's CANopen firmware as data, as its EDS lists it. What is not listed there does
-//! not exist here either. Defaults that are not known are 0, or what is noted beside them.
+//! The object dictionary of the eRob's CANopen firmware by its EDS. Objects that are not in the EDS do not exist here.
+//! Unknown defaults are 0, or as noted.
 
 /// The data type of an object (CiA 301, 7.4.7).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum DataType {
+pub enum ErobDataType {
     /// INTEGER8
     I8,
     /// INTEGER16
@@ -18,7 +18,7 @@ pub enum DataType {
     U32,
 }
 
-impl DataType {
+impl ErobDataType {
     /// The size in bytes.
     pub const fn bytes(self) -> usize {
         match self {
@@ -29,40 +29,46 @@ impl DataType {
     }
 }
 
-/// How an object may be reached by SDO.
+/// SDO access to an object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Access {
-    /// Reading only.
+pub enum ErobAccess {
+    /// Read only.
     ReadOnly,
-    /// Reading and writing.
+    /// Read and write.
     ReadWrite,
-    /// Writing only.
+    /// Write only.
     WriteOnly,
 }
 
-/// One entry of the dictionary.
+/// One entry of the object dictionary.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Object {
+pub struct ErobObject {
     /// Index.
     pub index: u16,
     /// Sub-index.
     pub subindex: u8,
     /// Data type.
-    pub data_type: DataType,
+    pub data_type: ErobDataType,
     /// Access by SDO.
-    pub access: Access,
-    /// Whether a PDO may carry it.
+    pub access: ErobAccess,
+    /// Whether a PDO can map it.
     pub is_mappable: bool,
-    /// Whether "save" (1010:1) keeps it.
+    /// Whether "save" (1010:1) saves it.
     pub is_saved: bool,
     /// Value after the first power-up.
     pub default: u32,
-    /// Whether the node number is added to the default.
+    /// Whether the node ID is added to the default.
     pub adds_node: bool,
 }
 
-impl Object {
-    const fn new(index: u16, subindex: u8, data_type: DataType, access: Access, default: i64) -> Self {
+impl ErobObject {
+    const fn new(
+        index: u16,
+        subindex: u8,
+        data_type: ErobDataType,
+        access: ErobAccess,
+        default: i64,
+    ) -> Self {
         let (is_mappable, is_saved, adds_node) = (false, false, false);
         Self { index, subindex, data_type, access, is_mappable, is_saved, default: default as u32, adds_node }
     }
@@ -80,32 +86,32 @@ impl Object {
     }
 }
 
-use Access::{ReadOnly, ReadWrite, WriteOnly};
-use DataType::{I8, I16, I32, U8, U16, U32};
+use ErobAccess::{ReadOnly, ReadWrite, WriteOnly};
+use ErobDataType::{I8, I16, I32, U8, U16, U32};
 
 /// Read-only.
-const fn ro(index: u16, subindex: u8, data_type: DataType, default: i64) -> Object {
-    Object::new(index, subindex, data_type, ReadOnly, default)
+const fn ro(index: u16, subindex: u8, data_type: ErobDataType, default: i64) -> ErobObject {
+    ErobObject::new(index, subindex, data_type, ReadOnly, default)
 }
 
 /// Read-only and mappable.
-const fn ro_pdo(index: u16, data_type: DataType, default: i64) -> Object {
+const fn ro_pdo(index: u16, data_type: ErobDataType, default: i64) -> ErobObject {
     ro(index, 0, data_type, default).mappable()
 }
 
 /// A parameter: read, written, saved.
-const fn rw(index: u16, subindex: u8, data_type: DataType, default: i64) -> Object {
-    Object::new(index, subindex, data_type, ReadWrite, default).saved()
+const fn rw(index: u16, subindex: u8, data_type: ErobDataType, default: i64) -> ErobObject {
+    ErobObject::new(index, subindex, data_type, ReadWrite, default).saved()
 }
 
 /// A parameter that is also mappable.
-const fn rw_pdo(index: u16, subindex: u8, data_type: DataType, default: i64) -> Object {
+const fn rw_pdo(index: u16, subindex: u8, data_type: ErobDataType, default: i64) -> ErobObject {
     rw(index, subindex, data_type, default).mappable()
 }
 
 /// A command or set-point: read, written, mappable, never saved.
-const fn command(index: u16, data_type: DataType, default: i64) -> Object {
-    Object::new(index, 0, data_type, ReadWrite, default).mappable()
+const fn command(index: u16, data_type: ErobDataType, default: i64) -> ErobObject {
+    ErobObject::new(index, 0, data_type, ReadWrite, default).mappable()
 }
 
 const NO_LIMIT: i64 = u32::MAX as i64;
@@ -114,10 +120,10 @@ const MAPS_6040: i64 = 0x6040_0010;
 const MAPS_6041: i64 = 0x6041_0010;
 
 /// Every entry, in ascending order.
-pub const OBJECTS: [Object; 217] = [
+pub const OBJECTS: [ErobObject; 217] = [
     ro(0x1000, 0, U32, 0x0042_0192),
     ro(0x1001, 0, U8, 0).mappable(),
-    Object::new(0x1003, 0, U8, ReadWrite, 0),
+    ErobObject::new(0x1003, 0, U8, ReadWrite, 0),
     ro(0x1003, 1, U32, 0),
     ro(0x1003, 2, U32, 0),
     ro(0x1003, 3, U32, 0),
@@ -127,7 +133,7 @@ pub const OBJECTS: [Object; 217] = [
     rw(0x100C, 0, U16, 0),
     rw(0x100D, 0, U8, 0),
     ro(0x1010, 0, U8, 1),
-    Object::new(0x1010, 1, U32, ReadWrite, 1),
+    ErobObject::new(0x1010, 1, U32, ReadWrite, 1),
     ro(0x1014, 0, U32, 0x80).plus_node(),
     ro(0x1016, 0, U8, 1),
     rw(0x1016, 1, U32, 0),
@@ -260,10 +266,10 @@ pub const OBJECTS: [Object; 217] = [
     // Manufacturer's own
     ro_pdo(0x20A0, I32, 0),
     ro_pdo(0x2205, I16, 0),
-    ro_pdo(0x2240, I32, 0),                    // motor encoder
-    ro_pdo(0x2241, I32, 0),                    // encoder difference
-    Object::new(0x2242, 0, U16, WriteOnly, 0), // 1 clears the battery fault; type and access are guesses
-    ro(0x22A2, 0, U16, 0),                     // temperature
+    ro_pdo(0x2240, I32, 0),                        // motor encoder
+    ro_pdo(0x2241, I32, 0),                        // encoder difference
+    ErobObject::new(0x2242, 0, U16, WriteOnly, 0), // 1 clears the battery fault; type and access are guesses
+    ro(0x22A2, 0, U16, 0),                         // temperature
     ro(0x2380, 0, U8, 2),
     rw(0x2380, 1, U16, 0), // gains; their scale is not known, and they have no effect here
     rw(0x2380, 2, U16, 0),
@@ -326,8 +332,8 @@ pub const OBJECTS: [Object; 217] = [
     command(0x60B2, I16, 0),
     command(0x60C0, I16, 0),
     ro(0x60C1, 0, U8, 2),
-    Object::new(0x60C1, 1, I16, ReadWrite, 0).mappable(),
-    Object::new(0x60C1, 2, I16, ReadWrite, 0).mappable(),
+    ErobObject::new(0x60C1, 1, I16, ReadWrite, 0).mappable(),
+    ErobObject::new(0x60C1, 2, I16, ReadWrite, 0).mappable(),
     ro(0x60C2, 0, U8, 2),
     rw_pdo(0x60C2, 1, U8, 1),
     rw(0x60C2, 2, I8, -3),
@@ -340,8 +346,7 @@ pub const OBJECTS: [Object; 217] = [
     ro_pdo(0x6502, U32, 909),
 ];
 
-/// Where an entry stands in [`OBJECTS`]. For entries that are known when the program is written: another one does
-/// not compile.
+/// The position of an entry in [`OBJECTS`], for constants: an unknown entry does not compile.
 pub const fn place(index: u16, subindex: u8) -> usize {
     let mut at = 0;
     while at < OBJECTS.len() {
@@ -353,7 +358,7 @@ pub const fn place(index: u16, subindex: u8) -> usize {
     panic!("no such object")
 }
 
-/// Where an entry stands in [`OBJECTS`], or whether at least its index exists.
+/// The position of an entry in [`OBJECTS`].
 pub fn find(index: u16, subindex: u8) -> Result<usize, Missing> {
     OBJECTS.binary_search_by_key(&(index, subindex), |object| (object.index, object.subindex)).map_err(|at| {
         // Every index begins with sub-index 0, so a neighbour has it.
@@ -362,7 +367,7 @@ pub fn find(index: u16, subindex: u8) -> Result<usize, Missing> {
     })
 }
 
-/// What is not there.
+/// What does not exist.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Missing {
     /// The whole index.
@@ -378,14 +383,14 @@ mod tests {
     #[test]
     fn the_table_is_in_order_and_every_index_begins_with_subindex_0() {
         for pair in OBJECTS.windows(2) {
-            let key = |object: &Object| (object.index, object.subindex);
+            let key = |object: &ErobObject| (object.index, object.subindex);
             assert!(key(&pair[0]) < key(&pair[1]), "{:04X}:{}", pair[1].index, pair[1].subindex);
             assert!(pair[0].index == pair[1].index || pair[1].subindex == 0, "{:04X}", pair[1].index);
         }
     }
 
     #[test]
-    fn what_the_firmware_lacks_is_missing_here() {
+    fn objects_that_the_firmware_lacks_do_not_exist() {
         for index in [0x1011, 0x1015, 0x1019, 0x605A, 0x605C, 0x605D, 0x6063, 0x6072, 0x607E, 0x60FE, 0x6007]
         {
             assert_eq!(find(index, 0), Err(Missing::Index), "{index:04X}");
@@ -396,7 +401,7 @@ mod tests {
     }
 
     #[test]
-    fn the_default_mappings_name_mappable_objects_of_the_right_length() {
+    fn default_mappings_contain_mappable_objects_of_the_right_length() {
         let mappings = OBJECTS.iter().filter(|object| {
             matches!(object.index, 0x1600..=0x1603 | 0x1A00..=0x1A03)
                 && object.subindex > 0

@@ -1,9 +1,9 @@
-//! The four RPDOs and four TPDOs: their parameters, their compiled mappings, and when they act (CiA 301, 7.2.2).
+//! The four RPDOs and four TPDOs: parameters, compiled mappings, and transmission types (CiA 301, 7.2.2).
 
 use takt_rt::{Frame, Id, MappedObject, Nanoseconds};
 
-use super::dictionary::{AbortCode, Dictionary, at};
-use super::objects::{Access, OBJECTS, find, place};
+use super::dictionary::{ErobAbortCode, ErobDictionary, at};
+use super::objects::{ErobAccess, OBJECTS, find, place};
 
 /// PDOs in each direction.
 pub const PDOS: usize = 4;
@@ -17,18 +17,18 @@ const TPDO_COMMUNICATION: [usize; PDOS] =
     [place(0x1800, 0), place(0x1801, 0), place(0x1802, 0), place(0x1803, 0)];
 const TPDO_MAPPING: [usize; PDOS] = [place(0x1A00, 0), place(0x1A01, 0), place(0x1A02, 0), place(0x1A03, 0)];
 
-/// Bit 31 of a PDO's COB-ID: it does not exist.
+/// Bit 31 of a PDO's COB-ID: the PDO is invalid.
 const INVALID: u32 = 1 << 31;
-/// Bit 29: a 29-bit identifier, which this drive does not have.
+/// Bit 29 of a COB-ID: a 29-bit identifier, which this drive does not support.
 const EXTENDED: u32 = 1 << 29;
 const ID: u32 = 0x7FF;
 const INHIBIT_UNIT_NS: Nanoseconds = 100_000;
 const EVENT_UNIT_NS: Nanoseconds = 1_000_000;
-/// An event-driven TPDO without an inhibit time is sent at most this often.
+/// Minimum interval of an event-driven TPDO without an inhibit time.
 const LEAST_INTERVAL_NS: Nanoseconds = 1_000_000;
 const NEVER: Nanoseconds = Nanoseconds::MAX;
 
-/// One mapped object: which entry, and where in the eight bytes.
+/// One mapped object: its entry, and its position in the payload.
 #[derive(Clone, Copy, Debug, Default)]
 struct Field {
     at: usize,
@@ -42,10 +42,10 @@ impl Field {
     }
 }
 
-/// A PDO as its parameters make it.
+/// A PDO compiled from its parameters.
 #[derive(Clone, Copy, Debug, Default)]
 struct Pdo {
-    /// `None` while the valid bit says that it does not exist.
+    /// `None` while the PDO is invalid.
     id: Option<Id>,
     transmission_type: u8,
     inhibit_ns: Nanoseconds,
@@ -56,7 +56,7 @@ struct Pdo {
 }
 
 impl Pdo {
-    fn compile(communication: usize, mapping: usize, dictionary: &Dictionary) -> Self {
+    fn compile(communication: usize, mapping: usize, dictionary: &ErobDictionary) -> Self {
         let id = dictionary.get(communication + 1);
         let mut pdo = Self {
             id: (id & INVALID == 0).then(|| Id::base(id & ID).ok()).flatten(),
@@ -82,22 +82,22 @@ impl Pdo {
         &self.fields[..self.count]
     }
 
-    /// Whether it acts at SYNC: types 0 to 240.
+    /// Whether it is synchronous: transmission types 0 to 240.
     fn is_synchronous(&self) -> bool {
         self.transmission_type <= 240
     }
 }
 
-/// What has been received for an RPDO.
+/// The result of receiving an RPDO.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Received {
-    /// The identifier belongs to none of them.
+pub enum RpdoReception {
+    /// The identifier belongs to no RPDO of this drive.
     NotMine,
-    /// It waits for SYNC.
+    /// The data waits for SYNC.
     Latched,
-    /// It has changed the dictionary already.
+    /// The data has been written to the dictionary.
     Applied,
-    /// It was shorter than its mapping and has changed nothing.
+    /// The frame is shorter than the mapping and was ignored.
     TooShort,
 }
 
@@ -111,10 +111,10 @@ struct Inbound {
 struct Outbound {
     pdo: Pdo,
     syncs: u8,
-    /// The sampled payload that is to be sent, and when.
+    /// The sampled payload, and when it is to be sent.
     sampled: u64,
     due_ns: Nanoseconds,
-    /// The events of the last payload sent, to see a change.
+    /// The event objects of the last sent payload, to detect a change.
     events: u64,
     last_ns: Nanoseconds,
     is_sent: bool,
@@ -136,14 +136,14 @@ impl Default for Outbound {
 
 /// All PDOs of the drive.
 #[derive(Clone, Debug, Default)]
-pub struct ProcessData {
+pub struct ErobProcessData {
     inbound: [Inbound; PDOS],
     outbound: [Outbound; PDOS],
 }
 
-impl ProcessData {
-    /// Takes over the parameters of the dictionary. Latched and sampled data are forgotten.
-    pub fn compile(&mut self, dictionary: &Dictionary) {
+impl ErobProcessData {
+    /// Compiles the parameters of the dictionary. Latched and sampled data is discarded.
+    pub fn compile(&mut self, dictionary: &ErobDictionary) {
         let parameters = RPDO_COMMUNICATION.into_iter().zip(RPDO_MAPPING);
         for (inbound, (communication, mapping)) in self.inbound.iter_mut().zip(parameters) {
             *inbound =
@@ -156,24 +156,29 @@ impl ProcessData {
         }
     }
 
-    /// Takes a frame in operational. Synchronous RPDOs wait for SYNC, the others act at once.
-    pub fn receive(&mut self, frame: &Frame, dictionary: &mut Dictionary, write: WriteField) -> Received {
+    /// Receives a frame in NMT operational. A synchronous RPDO waits for SYNC, the others act at once.
+    pub fn receive(
+        &mut self,
+        frame: &Frame,
+        dictionary: &mut ErobDictionary,
+        write: WriteField,
+    ) -> RpdoReception {
         let Some(inbound) = self.inbound.iter_mut().find(|inbound| inbound.pdo.id == Some(frame.id())) else {
-            return Received::NotMine;
+            return RpdoReception::NotMine;
         };
         if frame.payload().len() < inbound.pdo.bytes {
-            return Received::TooShort;
+            return RpdoReception::TooShort;
         }
         if inbound.pdo.is_synchronous() {
             inbound.latched = Some(frame.first_word());
-            return Received::Latched;
+            return RpdoReception::Latched;
         }
         unpack(&inbound.pdo, frame.first_word(), dictionary, write);
-        Received::Applied
+        RpdoReception::Applied
     }
 
-    /// SYNC, first half: what was latched acts now.
-    pub fn apply_latched(&mut self, dictionary: &mut Dictionary, write: WriteField) {
+    /// SYNC, first part: applies the latched data.
+    pub fn apply_latched(&mut self, dictionary: &mut ErobDictionary, write: WriteField) {
         for inbound in &mut self.inbound {
             if let Some(word) = inbound.latched.take() {
                 unpack(&inbound.pdo, word, dictionary, write);
@@ -181,8 +186,8 @@ impl ProcessData {
         }
     }
 
-    /// SYNC, second half: samples what is to be sent and sends it `latency_ns` later.
-    pub fn sample(&mut self, now_ns: Nanoseconds, latency_ns: Nanoseconds, dictionary: &Dictionary) {
+    /// SYNC, second part: samples the synchronous TPDOs, which are sent `latency_ns` later.
+    pub fn sample(&mut self, now_ns: Nanoseconds, latency_ns: Nanoseconds, dictionary: &ErobDictionary) {
         for outbound in &mut self.outbound {
             if outbound.pdo.id.is_none() || !outbound.pdo.is_synchronous() {
                 continue;
@@ -203,9 +208,9 @@ impl ProcessData {
         }
     }
 
-    /// Looks whether an event-driven TPDO (types 254 and 255) has an event: a change of any object that it maps
-    /// except measured quantities, the end of its event timer, or its first time.
-    pub fn sample_events(&mut self, now_ns: Nanoseconds, dictionary: &Dictionary) {
+    /// Checks the event-driven TPDOs (types 254 and 255). Events: the first time, the event timer, and a change of a
+    /// mapped object other than measured values.
+    pub fn sample_events(&mut self, now_ns: Nanoseconds, dictionary: &ErobDictionary) {
         for outbound in &mut self.outbound {
             let pdo = &outbound.pdo;
             if pdo.id.is_none() || pdo.transmission_type < 254 || outbound.due_ns != NEVER {
@@ -227,12 +232,12 @@ impl ProcessData {
         }
     }
 
-    /// When the next sampled TPDO is to be sent.
+    /// When the next sampled TPDO is due.
     pub fn due_ns(&self) -> Nanoseconds {
         self.outbound.iter().map(|outbound| outbound.due_ns).min().unwrap_or(NEVER)
     }
 
-    /// A TPDO that is to be sent now.
+    /// A TPDO that is due.
     pub fn next(&mut self, now_ns: Nanoseconds) -> Option<Frame> {
         let outbound = self.outbound.iter_mut().find(|outbound| outbound.due_ns <= now_ns)?;
         outbound.due_ns = NEVER;
@@ -240,15 +245,15 @@ impl ProcessData {
         Frame::data(outbound.pdo.id?, &bytes[..outbound.pdo.bytes]).ok()
     }
 
-    /// Answers a remote request for a TPDO with its present values.
-    pub fn requested(&self, id: Id, dictionary: &Dictionary) -> Option<Frame> {
+    /// Answers a remote request for a TPDO with the current values.
+    pub fn requested(&self, id: Id, dictionary: &ErobDictionary) -> Option<Frame> {
         let pdo = &self.outbound.iter().find(|outbound| outbound.pdo.id == Some(id))?.pdo;
         let bytes = pack(pdo.fields(), dictionary).to_le_bytes();
         Frame::data(id, &bytes[..pdo.bytes]).ok()
     }
 
-    /// Leaving operational: nothing latched or sampled is kept.
-    pub fn rest(&mut self) {
+    /// Discards latched and sampled data, when NMT operational ends.
+    pub fn stop(&mut self) {
         for inbound in &mut self.inbound {
             inbound.latched = None;
         }
@@ -258,25 +263,25 @@ impl ProcessData {
     }
 }
 
-/// How an RPDO writes one entry; the drive may refuse a value.
-pub type WriteField = fn(&mut Dictionary, usize, u32);
+/// Writes one entry from an RPDO; the drive may refuse the value.
+pub type WriteField = fn(&mut ErobDictionary, usize, u32);
 
-fn unpack(pdo: &Pdo, word: u64, dictionary: &mut Dictionary, write: WriteField) {
+fn unpack(pdo: &Pdo, word: u64, dictionary: &mut ErobDictionary, write: WriteField) {
     for field in pdo.fields() {
         write(dictionary, field.at, (word >> field.shift & field.mask()) as u32);
     }
 }
 
-fn pack(fields: &[Field], dictionary: &Dictionary) -> u64 {
+fn pack(fields: &[Field], dictionary: &ErobDictionary) -> u64 {
     fields.iter().fold(0, |word, field| word | u64::from(dictionary.get(field.at)) << field.shift)
 }
 
-fn pack_events(fields: &[Field], dictionary: &Dictionary) -> u64 {
+fn pack_events(fields: &[Field], dictionary: &ErobDictionary) -> u64 {
     let events = fields.iter().filter(|field| !is_measured(field.at));
     events.fold(0, |word, field| word | u64::from(dictionary.get(field.at)) << field.shift)
 }
 
-/// Whether an entry changes all the time by itself.
+/// Whether an entry is a measured value, which changes all the time.
 fn is_measured(at: usize) -> bool {
     matches!(
         at,
@@ -294,11 +299,11 @@ fn is_measured(at: usize) -> bool {
     )
 }
 
-/// Whether `value` may be written to a PDO parameter now.
+/// Checks whether `value` may be written to a PDO parameter now.
 ///
-/// A COB-ID may change only from or to "does not exist"; the mapping only while the PDO does not exist, and its
+/// The identifier may only change while the PDO is invalid. The mapping may only change while the PDO is invalid, its
 /// entries only while their count is 0.
-pub fn check_parameter(dictionary: &Dictionary, at: usize, value: u32) -> Result<(), AbortCode> {
+pub fn check_parameter(dictionary: &ErobDictionary, at: usize, value: u32) -> Result<(), ErobAbortCode> {
     let object = OBJECTS[at];
     let number = usize::from(object.index & 0x1FF).min(PDOS - 1);
     let is_outbound = object.index >= 0x1800;
@@ -310,51 +315,51 @@ pub fn check_parameter(dictionary: &Dictionary, at: usize, value: u32) -> Result
     let is_mapping = matches!(object.index & 0xFE00, 0x1600 | 0x1A00);
     match (is_mapping, object.subindex) {
         (false, 1) => check_id(dictionary.get(communication + 1), value),
-        (false, 2) if (241..254).contains(&value) => Err(AbortCode::Value),
+        (false, 2) if (241..254).contains(&value) => Err(ErobAbortCode::Value),
         (false, _) => Ok(()),
-        (true, _) if dictionary.get(communication + 1) & INVALID == 0 => Err(AbortCode::DeviceState),
+        (true, _) if dictionary.get(communication + 1) & INVALID == 0 => Err(ErobAbortCode::DeviceState),
         (true, 0) => check_count(dictionary, mapping, value),
-        (true, _) if dictionary.get(mapping) != 0 => Err(AbortCode::DeviceState),
+        (true, _) if dictionary.get(mapping) != 0 => Err(ErobAbortCode::DeviceState),
         (true, _) if value == 0 => Ok(()),
         (true, _) => check_mapped(value, is_outbound).map(|_| ()),
     }
 }
 
-fn check_id(present: u32, value: u32) -> Result<(), AbortCode> {
+fn check_id(present: u32, value: u32) -> Result<(), ErobAbortCode> {
     let stays_valid = (present | value) & INVALID == 0;
     if stays_valid && (present ^ value) & ID != 0 {
-        return Err(AbortCode::DeviceState);
+        return Err(ErobAbortCode::DeviceState);
     }
     if value & EXTENDED != 0 || value & INVALID == 0 && is_restricted(value & ID) {
-        return Err(AbortCode::Value);
+        return Err(ErobAbortCode::Value);
     }
     Ok(())
 }
 
-/// Identifiers that no PDO may have (CiA 301, 7.3.5).
+/// Identifiers that a PDO must not use (CiA 301, 7.3.5).
 fn is_restricted(id: u32) -> bool {
     matches!(id, 0x000..=0x080 | 0x101..=0x180 | 0x581..=0x5FF | 0x601..=0x67F | 0x6E0..=0x6FF | 0x701..=0x7FF)
 }
 
-fn check_count(dictionary: &Dictionary, mapping: usize, count: u32) -> Result<(), AbortCode> {
+fn check_count(dictionary: &ErobDictionary, mapping: usize, count: u32) -> Result<(), ErobAbortCode> {
     if count as usize > MAX_OBJECTS {
-        return Err(AbortCode::PdoTooLong);
+        return Err(ErobAbortCode::PdoTooLong);
     }
     let is_outbound = OBJECTS[mapping].index >= 0x1A00;
     let mut bits = 0;
     for entry in (mapping + 1..).take(count as usize) {
         bits += check_mapped(dictionary.get(entry), is_outbound)?;
     }
-    if bits > MAX_BITS { Err(AbortCode::PdoTooLong) } else { Ok(()) }
+    if bits > MAX_BITS { Err(ErobAbortCode::PdoTooLong) } else { Ok(()) }
 }
 
-/// Checks one mapping entry and returns its length in bits. An empty entry is none that could be counted.
-fn check_mapped(value: u32, is_outbound: bool) -> Result<u32, AbortCode> {
+/// Checks one mapping entry and returns its length in bits. An empty entry is not mappable.
+fn check_mapped(value: u32, is_outbound: bool) -> Result<u32, ErobAbortCode> {
     let mapped = MappedObject::from_parameter(value);
     let object = OBJECTS[find(mapped.index, mapped.subindex)?];
-    let is_allowed = object.is_mappable && (is_outbound || object.access != Access::ReadOnly);
+    let is_allowed = object.is_mappable && (is_outbound || object.access != ErobAccess::ReadOnly);
     if !is_allowed || usize::from(mapped.bits) != 8 * object.data_type.bytes() {
-        return Err(AbortCode::NotMappable);
+        return Err(ErobAbortCode::NotMappable);
     }
     Ok(mapped.bits.into())
 }

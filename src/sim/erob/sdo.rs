@@ -1,29 +1,29 @@
-//! The SDO server: one transfer at a time, expedited or segmented (CiA 301, 7.2.4). Block transfer is refused.
+//! The SDO server: one transfer at a time, expedited or segmented (CiA 301, 7.2.4). It refuses block transfers.
 //!
-//! The server holds the state of a transfer and speaks its frames; what an object's value is and whether it may be
-//! written is asked of the [`Access`] that is handed in with each request.
+//! The server holds the state of a transfer and encodes its frames. [`ErobObjectAccess`], passed with each request,
+//! reads and writes the objects.
 
 use takt_rt::Nanoseconds;
 
-use super::dictionary::AbortCode;
+use super::dictionary::ErobAbortCode;
 use crate::sim::random::Random;
 
-/// Shortest and longest time from a request to its answer as seen on real units.
+/// Range of the response time, as measured on real units.
 const LATENCY_NS: std::ops::Range<Nanoseconds> = 300_000..1_000_000;
 
-/// The objects behind the server.
-pub trait Access {
-    /// The value of an entry, as its bytes with the low one first, and how many they are.
-    fn read(&mut self, index: u16, subindex: u8) -> Result<([u8; 4], usize), AbortCode>;
+/// Access to the objects behind the server.
+pub trait ErobObjectAccess {
+    /// The value of an entry as little-endian bytes, and their number.
+    fn read(&mut self, index: u16, subindex: u8) -> Result<([u8; 4], usize), ErobAbortCode>;
 
-    /// Checks that an entry can be written, before its value is there. Returns its size in bytes.
-    fn check_write(&self, index: u16, subindex: u8) -> Result<usize, AbortCode>;
+    /// Checks that an entry can be written, before the value is complete. Returns its size in bytes.
+    fn check_write(&self, index: u16, subindex: u8) -> Result<usize, ErobAbortCode>;
 
-    /// Writes an entry, all of whose bytes are there.
-    fn write(&mut self, index: u16, subindex: u8, value: [u8; 4]) -> Result<(), AbortCode>;
+    /// Writes an entry with its complete value.
+    fn write(&mut self, index: u16, subindex: u8, value: [u8; 4]) -> Result<(), ErobAbortCode>;
 }
 
-/// A transfer in segments.
+/// A segmented transfer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Transfer {
     Download {
@@ -34,7 +34,7 @@ enum Transfer {
         value: [u8; 4],
         toggle: bool,
     },
-    /// Every value fits one segment, so its toggle bit is always 0.
+    /// Every value fits one segment, so the toggle bit is always 0.
     Upload {
         index: u16,
         subindex: u8,
@@ -43,7 +43,7 @@ enum Transfer {
     },
 }
 
-/// An answer that waits for its time.
+/// A response and its due time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Answer {
     due_ns: Nanoseconds,
@@ -52,40 +52,39 @@ struct Answer {
 
 /// The server of one node.
 #[derive(Clone, Debug)]
-pub struct SdoServer {
+pub struct ErobSdoServer {
     transfer: Option<Transfer>,
     answer: Option<Answer>,
     latency: Random,
     is_upload_segmented: bool,
 }
 
-impl SdoServer {
-    /// A server at rest. `is_upload_segmented` lets it answer every upload in segments, as CiA 301 permits, although
-    /// no object of this drive is longer than four bytes.
+impl ErobSdoServer {
+    /// An idle server. With `is_upload_segmented` it answers every upload in segments, which CiA 301 permits.
     pub fn new(latency: Random, is_upload_segmented: bool) -> Self {
         Self { transfer: None, answer: None, latency, is_upload_segmented }
     }
 
-    /// Forgets everything.
+    /// Discards the transfer and the response.
     pub fn reset(&mut self) {
         self.transfer = None;
         self.answer = None;
     }
 
-    /// When the pending answer is due.
+    /// When the pending response is due.
     pub fn due_ns(&self) -> Option<Nanoseconds> {
         self.answer.map(|answer| answer.due_ns)
     }
 
-    /// The answer, when it is due.
+    /// The response, when it is due.
     pub fn answer(&mut self, now_ns: Nanoseconds) -> Option<[u8; 8]> {
         let answer = self.answer.filter(|answer| answer.due_ns <= now_ns)?;
         self.answer = None;
         Some(answer.bytes)
     }
 
-    /// Takes a request. One that comes before the last one was answered is lost, as the drive has one buffer.
-    pub fn request(&mut self, now_ns: Nanoseconds, request: [u8; 8], access: &mut impl Access) {
+    /// Takes a request. A request before the last response was sent is lost, because the drive has one buffer.
+    pub fn request(&mut self, now_ns: Nanoseconds, request: [u8; 8], access: &mut impl ErobObjectAccess) {
         if self.answer.is_some() {
             return;
         }
@@ -100,7 +99,7 @@ impl SdoServer {
                 self.transfer = None;
                 return;
             }
-            _ => Err(AbortCode::Command),
+            _ => Err(ErobAbortCode::Command),
         };
         let bytes = reply.unwrap_or_else(|code| {
             let (index, subindex) = self.transfer.take().map_or((index, subindex), Transfer::multiplexer);
@@ -114,8 +113,8 @@ impl SdoServer {
         request: [u8; 8],
         index: u16,
         subindex: u8,
-        access: &mut impl Access,
-    ) -> Result<[u8; 8], AbortCode> {
+        access: &mut impl ErobObjectAccess,
+    ) -> Result<[u8; 8], ErobAbortCode> {
         self.transfer = None;
         let size = access.check_write(index, subindex)?;
         let is_expedited = request[0] & 0b10 != 0;
@@ -127,8 +126,8 @@ impl SdoServer {
             (_, false) => None,
         };
         match announced {
-            Some(announced) if announced > size => return Err(AbortCode::LengthTooHigh),
-            Some(announced) if announced < size => return Err(AbortCode::LengthTooLow),
+            Some(announced) if announced > size => return Err(ErobAbortCode::LengthTooHigh),
+            Some(announced) if announced < size => return Err(ErobAbortCode::LengthTooLow),
             _ => {}
         }
         if is_expedited {
@@ -141,18 +140,22 @@ impl SdoServer {
         Ok(addressed(0x60, index, subindex, [0; 4]))
     }
 
-    fn download_segment(&mut self, request: [u8; 8], access: &mut impl Access) -> Result<[u8; 8], AbortCode> {
+    fn download_segment(
+        &mut self,
+        request: [u8; 8],
+        access: &mut impl ErobObjectAccess,
+    ) -> Result<[u8; 8], ErobAbortCode> {
         let Some(Transfer::Download { index, subindex, size, received, mut value, toggle }) = self.transfer
         else {
-            return Err(AbortCode::Command);
+            return Err(ErobAbortCode::Command);
         };
         if (request[0] & 0x10 != 0) != toggle {
-            return Err(AbortCode::Toggle);
+            return Err(ErobAbortCode::Toggle);
         }
         let length = 7 - usize::from(request[0] >> 1 & 0b111);
         let ended = received + length;
         if ended > size {
-            return Err(AbortCode::LengthTooHigh);
+            return Err(ErobAbortCode::LengthTooHigh);
         }
         for (to, from) in value.iter_mut().skip(received).zip(request.iter().skip(1).take(length)) {
             *to = *from;
@@ -160,7 +163,7 @@ impl SdoServer {
         let is_last = request[0] & 1 != 0;
         if is_last {
             if ended < size {
-                return Err(AbortCode::LengthTooLow);
+                return Err(ErobAbortCode::LengthTooLow);
             }
             access.write(index, subindex, value)?;
             self.transfer = None;
@@ -172,7 +175,12 @@ impl SdoServer {
         Ok([0x20 | u8::from(toggle) << 4, 0, 0, 0, 0, 0, 0, 0])
     }
 
-    fn upload(&mut self, index: u16, subindex: u8, access: &mut impl Access) -> Result<[u8; 8], AbortCode> {
+    fn upload(
+        &mut self,
+        index: u16,
+        subindex: u8,
+        access: &mut impl ErobObjectAccess,
+    ) -> Result<[u8; 8], ErobAbortCode> {
         self.transfer = None;
         let (value, size) = access.read(index, subindex)?;
         if self.is_upload_segmented {
@@ -183,12 +191,12 @@ impl SdoServer {
         Ok(addressed(0x43 | unused << 2, index, subindex, value))
     }
 
-    fn upload_segment(&mut self, request: [u8; 8]) -> Result<[u8; 8], AbortCode> {
+    fn upload_segment(&mut self, request: [u8; 8]) -> Result<[u8; 8], ErobAbortCode> {
         let Some(Transfer::Upload { size, value, .. }) = self.transfer else {
-            return Err(AbortCode::Command);
+            return Err(ErobAbortCode::Command);
         };
         if request[0] & 0x10 != 0 {
-            return Err(AbortCode::Toggle);
+            return Err(ErobAbortCode::Toggle);
         }
         let mut answer = [0; 8];
         answer[0] = (7 - size.min(7) as u8) << 1 | 1;
@@ -216,6 +224,6 @@ fn addressed(command: u8, index: u16, subindex: u8, data: [u8; 4]) -> [u8; 8] {
     [command, low, high, subindex, a, b, c, d]
 }
 
-fn aborted(index: u16, subindex: u8, code: AbortCode) -> [u8; 8] {
+fn aborted(index: u16, subindex: u8, code: ErobAbortCode) -> [u8; 8] {
     addressed(0x80, index, subindex, (code as u32).to_le_bytes())
 }

@@ -1,4 +1,4 @@
-//! Alarms: what is wrong, what the motor does about it, and what clears it (manual, chapter IIb.3).
+//! Alarms of a YZ-AIM: causes, effect on the motor, and how they are cleared (manual, chapter IIb.3).
 
 use takt_rt::Nanoseconds;
 
@@ -8,9 +8,9 @@ use takt_rt::Nanoseconds;
 pub enum StoppingAlarm {
     /// The rotor is blocked.
     BlockedRotor = 0x12,
-    /// The motor does not come to the demanded speed.
+    /// The motor does not reach the demanded speed.
     Stall = 0x14,
-    /// More than 52 V.
+    /// A supply above 52 V.
     OverVoltage = 0x15,
 }
 
@@ -21,24 +21,24 @@ impl StoppingAlarm {
     }
 }
 
-/// The code of the battery's power lost.
+/// Code of the alarm for lost battery power.
 pub const BATTERY: u16 = 0x10;
-/// The code of the communication lost.
+/// Code of the alarm for lost communication.
 pub const COMMUNICATION_LOST: u16 = 0x20;
-/// How long an over-voltage lasts. It cannot be cleared before it is over.
+/// Duration of an over-voltage. It cannot be cleared earlier.
 const OVER_VOLTAGE_NS: Nanoseconds = 100_000_000;
 
-/// All alarms but the one of the communication, which comes and goes with the heartbeat.
+/// All alarms except lost communication, which follows the heartbeat.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Alarms {
     stopping: Option<StoppingAlarm>,
-    /// The multi-turn position was lost with the battery's power. The motor keeps running.
+    /// The turn count was lost with the battery power. The motor keeps running.
     pub has_lost_battery: bool,
     over_voltage_until_ns: Nanoseconds,
 }
 
 impl Alarms {
-    /// Something is wrong that stops the motor. The first alarm stays.
+    /// Raises an alarm that stops the motor. The first alarm stays.
     pub fn raise(&mut self, now_ns: Nanoseconds, alarm: StoppingAlarm) {
         if alarm == StoppingAlarm::OverVoltage {
             self.over_voltage_until_ns = now_ns + OVER_VOLTAGE_NS;
@@ -46,17 +46,17 @@ impl Alarms {
         self.stopping.get_or_insert(alarm);
     }
 
-    /// Whether the motor is stopped until the alarm is cleared.
+    /// Whether an alarm stops the motor.
     pub fn is_stopped(&self) -> bool {
         self.stopping.is_some()
     }
 
-    /// Whether the supply's voltage is too high now.
+    /// Whether the supply voltage is too high now.
     pub fn has_over_voltage(&self, now_ns: Nanoseconds) -> bool {
         now_ns < self.over_voltage_until_ns
     }
 
-    /// What bit 7 of the controlword and 2601h = 1 do. Returns whether the motor may turn again.
+    /// Clears the alarm, as controlword bit 7 and 2601h = 1 do. Returns whether the motor may turn again.
     pub fn clear(&mut self, now_ns: Nanoseconds) -> bool {
         if self.has_over_voltage(now_ns) {
             return false;
@@ -64,12 +64,12 @@ impl Alarms {
         self.stopping.take().is_some()
     }
 
-    /// What is left of them when the supply returns.
+    /// The alarms that remain after a power cycle.
     pub fn after_power_up(&self) -> Self {
         Self { has_lost_battery: self.has_lost_battery, ..Self::default() }
     }
 
-    /// The code in 260Eh: what stops the motor before what does not.
+    /// The code in 260Eh: alarms that stop the motor come first.
     pub fn code(&self, is_master_lost: bool) -> u16 {
         match self.stopping {
             Some(alarm) => alarm as u16,

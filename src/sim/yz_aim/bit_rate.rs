@@ -1,11 +1,11 @@
-//! The procedure that changes the bit rate: four writes in order (manual 5.13).
+//! The procedure that changes the bit rate: four writes in a fixed order (manual 5.13).
 
 use super::objects::at;
 
-/// How much of the procedure has been written.
+/// The progress of the procedure.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum BitRateChange {
-    /// Nothing.
+    /// Not begun.
     #[default]
     None,
     /// 2600h = 1.
@@ -17,8 +17,8 @@ pub enum BitRateChange {
 }
 
 impl BitRateChange {
-    /// Sees a write. Returns the new bit rate (bit/s) with the last one of the procedure; it counts from the next
-    /// power-up on.
+    /// Takes a write. The last write of the procedure returns the new bit rate (bit/s), which takes effect at the next
+    /// power-up.
     pub fn written(&mut self, at: usize, value: i64) -> Option<u32> {
         let (next, rate) = match (*self, at, value) {
             (_, at::MODBUS_ENABLE, 1) => (Self::Begun, None),
@@ -45,7 +45,7 @@ mod tests {
     }
 
     #[test]
-    fn only_the_four_writes_in_order_change_the_rate() {
+    fn only_the_four_writes_in_the_right_order_change_the_bit_rate() {
         let write = |code| {
             [
                 (at::MODBUS_ENABLE, 1),

@@ -1,26 +1,26 @@
-//! What is wrong with the servo or its joint, beyond its alarms.
+//! The defects of a YZ-AIM that raise no alarm by themselves.
 
 use takt_rt::Frame;
 
 use crate::sim::defect::{Defect, Unsupported, shorter};
 
-/// The lasting defects of one servo.
+/// The lasting defects of one YZ-AIM.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Defects {
-    /// The joint does not move.
+pub struct YzAimDefects {
+    /// The joint cannot move.
     pub is_joint_blocked: bool,
-    /// The SDO server is mute.
+    /// The SDO server does not reply.
     pub is_sdo_silent: bool,
     is_feedback_short: bool,
-    /// The bits that TPDOs show as 1, and those that they show as 0.
+    /// The bits that TPDOs send as 1, and those that they send as 0.
     statusword: Option<(u16, u16)>,
 }
 
-impl Defects {
-    /// A lasting defect comes or goes; events leave nothing here.
+impl YzAimDefects {
+    /// Sets or removes a lasting defect; events change nothing here.
     ///
     /// # Errors
-    /// [`Unsupported`] for what this servo cannot have.
+    /// [`Unsupported`] when this drive cannot have the defect.
     pub fn set(&mut self, defect: Defect, is_present: bool) -> Result<(), Unsupported> {
         let refused = |reason| Err(Unsupported { defect, reason });
         match defect {
@@ -40,13 +40,13 @@ impl Defects {
         Ok(())
     }
 
-    /// The statusword that TPDOs show in place of the true one.
+    /// The statusword that TPDOs send instead of the true one.
     pub fn shown(&self, statusword: u16) -> u16 {
         let (set, clear) = self.statusword.unwrap_or_default();
         statusword & !clear | set
     }
 
-    /// A TPDO as it leaves the drive.
+    /// A TPDO as it is sent.
     pub fn sent(&self, frame: Frame) -> Frame {
         if self.is_feedback_short { shorter(frame) } else { frame }
     }

@@ -1,14 +1,14 @@
-//! Controlword in, statusword out (manual 5.04). This drive has no CiA 402 machine: there is only how far its controlword has
-//! led it.
+//! Controlword and statusword (manual 5.04). This drive has no CiA 402 state machine, only a level that the controlword
+//! sets.
 
 use takt_rt::{DriveState, Nanoseconds, controlword};
 
 use super::parameters::Quirks;
 
-/// How far the controlword has led the drive.
+/// The level that the controlword has set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Level {
-    /// No controlword has come since power-up; the shaft is held.
+    /// No controlword since power-up: the shaft is held.
     Cold,
     /// Off: the shaft is free.
     Off,
@@ -16,7 +16,7 @@ pub enum Level {
     Ready,
     /// 0007h: the shaft is free.
     SwitchedOn,
-    /// 000Fh: set-points are followed.
+    /// 000Fh: the drive follows set-points.
     Enabled,
 }
 
@@ -31,7 +31,7 @@ impl Level {
         }
     }
 
-    /// As a state of CiA 402, for an observer.
+    /// The corresponding CiA 402 state, for an observer.
     pub fn state(self) -> DriveState {
         match self {
             Self::Cold | Self::Off => DriveState::SwitchOnDisabled,
@@ -42,63 +42,63 @@ impl Level {
     }
 }
 
-/// Bits of the statusword that come from elsewhere.
+/// Conditions for other bits of the statusword.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Conditions {
-    /// Bit 2: the motor stage works.
+    /// Bit 2: the motor is energised.
     pub is_energised: bool,
-    /// Bit 3.
+    /// Bit 3: alarm.
     pub has_alarm: bool,
-    /// Bit 10.
+    /// Bit 10: target reached.
     pub is_target_reached: bool,
-    /// Bit 4 in mode 6, in which the motor turns without any controlword.
+    /// Bit 4 in mode 6, in which the motor turns without a controlword.
     pub is_homing: bool,
-    /// Bit 12.
+    /// Bit 12: homing complete.
     pub is_homed: bool,
-    /// Bit 13.
+    /// Bit 13: homing error.
     pub has_homing_error: bool,
 }
 
-/// What the controlword has made of the drive.
+/// The state that the controlword has set.
 #[derive(Clone, Copy, Debug)]
-pub struct Device {
+pub struct YzAimDevice {
     level: Level,
-    /// Whether 0006h has come since power-up.
+    /// Whether 0006h has been received since power-up.
     has_shut_down: bool,
     word: u16,
     raised_ns: Option<Nanoseconds>,
 }
 
-impl Device {
+impl YzAimDevice {
     /// A drive after power-up.
     pub const fn cold() -> Self {
         Self { level: Level::Cold, has_shut_down: false, word: 0, raised_ns: None }
     }
 
-    /// How far the controlword has led it.
+    /// The level.
     pub fn level(&self) -> Level {
         self.level
     }
 
-    /// Whether bit 8 stops the motion.
+    /// Whether controlword bit 8 halts the motion.
     pub fn is_halted(&self) -> bool {
         self.level == Level::Enabled && self.word & controlword::HALT != 0
     }
 
-    /// Bit 5: a target moves the motor when it is written.
+    /// Controlword bit 5: a written target starts a move at once.
     pub fn is_immediate(&self) -> bool {
         self.word & controlword::BIT_5 != 0
     }
 
-    /// Bit 6: targets are distances.
+    /// Controlword bit 6: targets are relative.
     pub fn is_relative(&self) -> bool {
         self.word & controlword::RELATIVE != 0
     }
 
     /// Takes a controlword.
     ///
-    /// One that leads further than a cold drive goes, or that comes too soon after the one before, has no effect, as
-    /// the quirks say.
+    /// With the quirks, two kinds of controlword have no effect: one that skips 0006h after power-up, and one that
+    /// raises the level too soon after the last.
     pub fn take(&mut self, now_ns: Nanoseconds, word: u16, quirks: &Quirks) {
         let wanted = Level::wanted(word);
         let is_raising = wanted > self.level.max(Level::Off);
@@ -146,8 +146,8 @@ mod tests {
     }
 
     #[test]
-    fn a_cold_drive_takes_no_notice_of_0007_and_000f_before_0006() {
-        let mut device = Device::cold();
+    fn a_drive_after_power_up_ignores_0007_and_000f_before_0006() {
+        let mut device = YzAimDevice::cold();
         for word in [0x07, 0x0F, 0x2F] {
             device.take(0, word, &Quirks::default());
             assert_eq!(device.statusword(energised()), 0x0404);
@@ -161,8 +161,8 @@ mod tests {
     }
 
     #[test]
-    fn a_controlword_that_comes_too_soon_is_lost_and_one_that_leads_down_never() {
-        let mut device = Device::cold();
+    fn a_controlword_too_soon_is_ignored_unless_it_lowers_the_level() {
+        let mut device = YzAimDevice::cold();
         device.take(0, 0x06, &Quirks::default());
         device.take(19 * MILLISECOND_NS, 0x07, &Quirks::default());
         assert_eq!(device.level(), Level::Ready);
@@ -173,8 +173,8 @@ mod tests {
     }
 
     #[test]
-    fn by_the_manual_000f_alone_enables() {
-        let mut device = Device::cold();
+    fn without_quirks_000f_alone_enables() {
+        let mut device = YzAimDevice::cold();
         device.take(0, 0x0F, &Quirks::none());
         assert_eq!(device.level(), Level::Enabled);
     }

@@ -1,4 +1,4 @@
-//! The values behind the object dictionary, and the non-volatile store under them.
+//! The values of the object dictionary, and the non-volatile memory.
 
 use std::ops::RangeInclusive;
 
@@ -6,13 +6,13 @@ use super::objects::{OBJECTS, at};
 
 /// The values of all entries, in the order of [`OBJECTS`].
 #[derive(Clone, Debug)]
-pub struct Dictionary {
+pub struct YzAimDictionary {
     values: [i64; OBJECTS.len()],
     stored: [i64; OBJECTS.len()],
 }
 
-impl Dictionary {
-    /// The dictionary of a new drive with this node number.
+impl YzAimDictionary {
+    /// The dictionary of a new drive with this node ID.
     pub fn new(node: u8) -> Self {
         let values = OBJECTS.map(|object| object.default);
         let mut dictionary = Self { values, stored: values };
@@ -21,7 +21,7 @@ impl Dictionary {
         dictionary
     }
 
-    /// Lets the COB-IDs follow the node number.
+    /// Updates the COB-IDs for a node ID.
     pub fn address(&mut self, node: u8) {
         for (object, value) in OBJECTS.iter().zip(&mut self.values) {
             if object.adds_node {
@@ -30,13 +30,13 @@ impl Dictionary {
         }
     }
 
-    /// Sets what this unit has from the factory.
+    /// Sets a factory default.
     pub fn set_factory(&mut self, at: usize, value: i64) {
         self.values[at] = value;
         self.stored[at] = value;
     }
 
-    /// Keeps every parameter.
+    /// Stores every parameter.
     pub fn store(&mut self) {
         for ((object, stored), value) in OBJECTS.iter().zip(&mut self.stored).zip(&self.values) {
             if object.is_stored {
@@ -45,7 +45,7 @@ impl Dictionary {
         }
     }
 
-    /// Every entry whose index is in `indices` gets back what was stored or its default; COB-IDs stay.
+    /// Restores the stored values or defaults of every entry with an index in `indices`. COB-IDs stay.
     pub fn restore(&mut self, indices: RangeInclusive<u16>) {
         for ((object, value), stored) in OBJECTS.iter().zip(&mut self.values).zip(&self.stored) {
             if indices.contains(&object.index) && !object.adds_node {
@@ -64,7 +64,7 @@ impl Dictionary {
         self.values[at] as f64
     }
 
-    /// What is stored of an entry.
+    /// The stored value of an entry.
     pub fn stored(&self, at: usize) -> i64 {
         self.stored[at]
     }
@@ -79,7 +79,7 @@ impl Dictionary {
         self.set(at, value.round_ties_even() as i64);
     }
 
-    /// The bytes of an entry as a frame carries them, and how many they are.
+    /// The bytes of an entry in a frame, and their number.
     pub fn encode(&self, at: usize) -> ([u8; 4], usize) {
         let [a, b, c, d, ..] = self.values[at].to_le_bytes();
         let mut bytes = [a, b, c, d];
@@ -89,7 +89,7 @@ impl Dictionary {
     }
 }
 
-/// What the bytes of a frame mean for an entry.
+/// Decodes the bytes of an entry.
 pub fn decode(at: usize, bytes: [u8; 4]) -> i64 {
     let object = OBJECTS[at];
     let unused = 32 - u32::from(object.bits);
@@ -102,8 +102,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_cob_ids_follow_the_node_and_nothing_restores_them() {
-        let mut dictionary = Dictionary::new(5);
+    fn the_cob_ids_follow_the_node_id_and_survive_a_restore() {
+        let mut dictionary = YzAimDictionary::new(5);
         assert_eq!((dictionary.get(at::RPDO4 + 1), dictionary.get(at::TPDO2 + 1)), (0x505, 0x285));
         dictionary.address(9);
         dictionary.restore(0..=0xFFFF);
@@ -113,7 +113,7 @@ mod tests {
 
     #[test]
     fn parameters_are_stored_and_set_points_are_not() {
-        let mut dictionary = Dictionary::new(5);
+        let mut dictionary = YzAimDictionary::new(5);
         dictionary.set(at::PROFILE_VELOCITY, 77);
         dictionary.set(at::TARGET_POSITION, 88);
         dictionary.store();
@@ -123,8 +123,8 @@ mod tests {
     }
 
     #[test]
-    fn signed_entries_keep_their_sign_on_both_ways() {
-        let mut dictionary = Dictionary::new(5);
+    fn signed_entries_keep_their_sign_in_both_directions() {
+        let mut dictionary = YzAimDictionary::new(5);
         assert_eq!(decode(at::TARGET_VELOCITY, (-600i32).to_le_bytes()), -600);
         assert_eq!(decode(at::CONTROLWORD, [0x0F, 0xFF, 0x77, 0x77]), 0xFF0F);
         dictionary.set_real(at::VELOCITY, -600.4);

@@ -1,6 +1,6 @@
 //! Homing on a switch (manual 5.09, with the directions of CiA 402-2).
 
-/// The input that a method watches.
+/// The switch input that a method uses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Input {
     /// DIR
@@ -9,13 +9,13 @@ pub enum Input {
     Pu,
 }
 
-/// What a method looks for: the point where the switch changes while the motor goes in one direction.
+/// The edge that a method searches: the point where the switch changes in one direction of motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Search {
     input: Input,
-    /// The direction in which the edge is looked for: 1 or −1.
+    /// The direction of the search: 1 or −1.
     direction: f64,
-    /// Whether the switch closes at the edge, and does not open.
+    /// Whether the switch closes at the edge; otherwise it opens.
     closes: bool,
 }
 
@@ -33,15 +33,15 @@ impl Search {
     }
 }
 
-/// How far a homing has come.
+/// The state of a homing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum State {
     Idle,
-    /// Fast, against the direction of the search, to the other side of the edge.
+    /// Fast, against the search direction, to the other side of the edge.
     Approaching(Search),
-    /// Slowly in the direction of the search; whether the other side of the edge has been seen on the way.
+    /// Slowly in the search direction. The flag: the other side of the edge has been seen.
     Searching(Search, bool),
-    /// The zero is set; the motor comes to rest.
+    /// The zero is set; the motor decelerates to standstill.
     Settling,
     Done,
     Failed,
@@ -55,45 +55,45 @@ pub struct Homing {
 }
 
 impl Homing {
-    /// None.
+    /// No homing.
     pub const fn idle() -> Self {
         Self { state: State::Idle, elapsed_s: 0.0 }
     }
 
-    /// Begins. A method that the unit does not have fails at once.
+    /// Starts a homing. A method that the unit does not have fails at once.
     pub fn start(method: i64, has_undescribed_methods: bool) -> Self {
         let search = Search::of(method, has_undescribed_methods);
         Self { state: search.map_or(State::Failed, State::Approaching), elapsed_s: 0.0 }
     }
 
-    /// Gives up.
+    /// Aborts the homing.
     pub fn fail(&mut self) {
         if self.is_running() {
             self.state = State::Failed;
         }
     }
 
-    /// Whether it is under way.
+    /// Whether the homing is running.
     pub fn is_running(&self) -> bool {
         matches!(self.state, State::Approaching(_) | State::Searching(..) | State::Settling)
     }
 
-    /// Whether it has been begun, and perhaps ended, since the mode was set.
+    /// Whether a homing was started since the mode was set.
     pub fn is_begun(&self) -> bool {
         self.state != State::Idle
     }
 
-    /// Bit 12.
+    /// Statusword bit 12: homing complete.
     pub fn is_done(&self) -> bool {
         self.state == State::Done
     }
 
-    /// Bit 13.
+    /// Statusword bit 13: homing error.
     pub fn has_failed(&self) -> bool {
         self.state == State::Failed
     }
 
-    /// The input to watch.
+    /// The input that is evaluated.
     pub fn input(&self) -> Option<Input> {
         match self.state {
             State::Approaching(search) | State::Searching(search, _) => Some(search.input),
@@ -101,12 +101,12 @@ impl Homing {
         }
     }
 
-    /// For how long it has been under way.
+    /// How long the homing has run.
     pub fn elapsed_s(&self) -> f64 {
         self.elapsed_s
     }
 
-    /// The velocity that it wants, in units of the fast speed.
+    /// The velocity set-point, relative to the fast speed.
     pub fn speed(&self) -> Option<f64> {
         match self.state {
             State::Approaching(search) => Some(-search.direction),
@@ -116,14 +116,14 @@ impl Homing {
         }
     }
 
-    /// Looks at the switch after `duration_s` more, while the motor turns at `velocity`. Returns whether this is the zero.
+    /// Evaluates the switch after a step of `duration_s` at `velocity`. Returns whether this is the zero position.
     pub fn step(&mut self, is_closed: bool, velocity: f64, is_at_rest: bool, duration_s: f64) -> bool {
         self.elapsed_s += duration_s;
         match self.state {
             State::Approaching(search) if is_closed != search.closes => {
                 self.state = State::Searching(search, false);
             }
-            // On the way back from where the approach has overshot.
+            // The motor moves back from the overshoot of the approach.
             State::Searching(search, has_seen) if velocity * search.direction > 0.0 => {
                 if has_seen && is_closed == search.closes {
                     self.state = State::Settling;

@@ -1,39 +1,39 @@
-//! The whole drive: frames and time come in, the parts do their work, frames go out.
+//! The complete YZ-AIM: it receives frames and time, advances its parts, and sends frames.
 
 mod access;
 mod commands;
 mod frames;
+mod load_monitor;
 mod loops;
 mod measurement;
-mod watch;
 
 use takt_rt::{DriveState, Frame, Nanoseconds};
 
 use super::alarms::{Alarms, StoppingAlarm};
 use super::bit_rate::BitRateChange;
-use super::defects::Defects;
-use super::device::{Device, Level};
-use super::dictionary::Dictionary;
+use super::defects::YzAimDefects;
+use super::device::{Level, YzAimDevice};
+use super::dictionary::YzAimDictionary;
 use super::homing::Homing;
-use super::motion::{Actual, Motion};
-use super::network::Network;
+use super::motion::{YzAimActual, YzAimMotion};
+use super::network::YzAimNetwork;
 use super::objects::at;
 use super::parameters::{COUNTS_PER_SECOND_PER_RPM, COUNTS_PER_TURN, YzAimParameters};
-use super::process_data::{ProcessData, report_state_first};
-use super::sdo::SdoServer;
+use super::process_data::{YzAimProcessData, report_state_first};
+use super::sdo::YzAimSdoServer;
 use crate::sim::defect::{Defect, Unsupported};
-use crate::sim::drive::{Drive, DriveFault, NmtState, Observation};
+use crate::sim::drive::{Drive, DriveFault, NodeState, Observation};
 use crate::sim::mailbox::Mailbox;
 use crate::sim::plant::Joint;
 use crate::sim::random::Random;
 use crate::sim::servo::Servo;
-use watch::Watch;
+use load_monitor::LoadMonitor;
 
-/// Without anything to do the drive looks up this often.
+/// Longest time between two advances.
 const IDLE_NS: Nanoseconds = 1_000_000;
-/// What the loops may add to the highest speed to catch up.
+/// Factor by which the loops may exceed the highest speed to catch up.
 const SPEED_RESERVE: f64 = 1.1;
-/// Slower than this the motor stands: r/min.
+/// Standstill threshold: r/min.
 const STANDSTILL_RPM: f64 = 1.0;
 const NEVER: Nanoseconds = Nanoseconds::MAX;
 
@@ -49,51 +49,51 @@ mod mode {
 #[derive(Clone, Debug)]
 pub struct YzAimJoint {
     parameters: YzAimParameters,
-    dictionary: Dictionary,
-    network: Network,
-    sdo: SdoServer,
-    process_data: ProcessData,
-    device: Device,
+    dictionary: YzAimDictionary,
+    network: YzAimNetwork,
+    sdo: YzAimSdoServer,
+    process_data: YzAimProcessData,
+    device: YzAimDevice,
     alarms: Alarms,
-    motion: Motion,
+    motion: YzAimMotion,
     homing: Homing,
     servo: Servo,
     joint: Joint,
-    watch: Watch,
+    load_monitor: LoadMonitor,
     bit_rate_change: BitRateChange,
     random: Random,
-    /// The node number in force.
+    /// The node ID in use.
     node: u8,
-    /// The bit rate in force, and the one from the next power-up on.
+    /// The bit rate in use, and the one after the next power-up.
     bit_rate: u32,
     next_bit_rate: u32,
-    /// The special function in force: what was stored when the supply came on.
+    /// The special function in use: the value that was stored at power-up.
     special_function: i64,
     torque: f64,
-    /// What is added to the encoder's counts.
+    /// Offset added to the encoder's counts.
     counts_offset: i32,
-    /// Whether the first target after enabling is still to come, and to be ignored.
+    /// Whether the first target after enabling is still to come; it will be ignored.
     ignores_target: bool,
-    /// The speed of a move that the drive makes by itself after power-up: counts/s.
+    /// The speed of a move after power-up: counts/s.
     power_up_speed: Option<f64>,
     has_started: bool,
     is_starting_cold: bool,
     was_energised: bool,
-    /// 260Ah = 60006 has been written.
+    /// Whether 260Ah = 60006 has been written.
     is_zero_armed: bool,
     injected: Option<DriveFault>,
-    defects: Defects,
+    defects: YzAimDefects,
     save_ns: Nanoseconds,
-    /// How far the loops have come.
+    /// The time up to which the loops have run.
     stepped_ns: Nanoseconds,
     now_ns: Nanoseconds,
     wake_ns: Nanoseconds,
 }
 
 impl YzAimJoint {
-    /// A servo whose supply comes on at time 0.
+    /// A servo whose supply is switched on at time 0.
     pub fn new(parameters: YzAimParameters) -> Self {
-        let mut dictionary = Dictionary::new(parameters.node);
+        let mut dictionary = YzAimDictionary::new(parameters.node);
         dictionary.set_factory(at::SPECIAL_FUNCTION, parameters.special_function.into());
         dictionary.set_factory(at::ACCELERATION, parameters.acceleration.into());
         dictionary.set_factory(at::TEMPERATURE, 35);
@@ -107,16 +107,16 @@ impl YzAimJoint {
         let mut unit = Self {
             parameters,
             dictionary,
-            network: Network::starting(NEVER, NmtState::PreOperational, false),
-            sdo: SdoServer::new(random),
-            process_data: ProcessData::at_rest(),
-            device: Device::cold(),
+            network: YzAimNetwork::starting(NEVER, NodeState::PreOperational, false),
+            sdo: YzAimSdoServer::new(random),
+            process_data: YzAimProcessData::at_rest(),
+            device: YzAimDevice::cold(),
             alarms: Alarms::default(),
-            motion: Motion::new(highest_speed),
+            motion: YzAimMotion::new(highest_speed),
             homing: Homing::idle(),
             servo: Servo::new(parameters.joint.inertia, parameters.peak_torque, velocity_limit),
             joint,
-            watch: Watch::default(),
+            load_monitor: LoadMonitor::default(),
             bit_rate_change: BitRateChange::None,
             random,
             node: parameters.node,
@@ -132,7 +132,7 @@ impl YzAimJoint {
             was_energised: false,
             is_zero_armed: false,
             injected: None,
-            defects: Defects::default(),
+            defects: YzAimDefects::default(),
             save_ns: NEVER,
             stepped_ns: 0,
             now_ns: 0,
@@ -142,7 +142,7 @@ impl YzAimJoint {
         unit
     }
 
-    /// The bit rate at which it listens and speaks: bit/s. At another one than its bus has it is deaf and mute.
+    /// The bit rate in use: bit/s. At another bit rate than its bus, it neither receives nor sends.
     pub fn bit_rate(&self) -> u32 {
         self.bit_rate
     }
@@ -163,9 +163,9 @@ impl YzAimJoint {
         self.encoder_counts().wrapping_add(self.counts_offset)
     }
 
-    fn actual(&self) -> Actual {
+    fn actual(&self) -> YzAimActual {
         let velocity = self.parameters.encoder.counts_per_second(self.joint.velocity());
-        Actual { position: self.counts().into(), velocity }
+        YzAimActual { position: self.counts().into(), velocity }
     }
 
     fn velocity_rpm(&self) -> f64 {
@@ -184,12 +184,12 @@ impl YzAimJoint {
         self.mode() == mode && self.device.level() == Level::Enabled
     }
 
-    /// Whether targets are taken at every SYNC: 2619h was stored as 7 before the supply came on.
+    /// Whether a target takes effect at every SYNC: 2619h = 7 was stored at power-up.
     fn interpolates(&self) -> bool {
         self.is_in_mode(mode::INTERPOLATION) && self.special_function == mode::INTERPOLATION
     }
 
-    /// Whether the motor stage works. A cold drive holds its shaft; homing wants no controlword.
+    /// Whether the motor is energised. It holds its shaft after power-up, and homing needs no controlword.
     fn is_energised(&self) -> bool {
         let is_commanded = matches!(self.device.level(), Level::Cold | Level::Enabled)
             || self.mode() == mode::HOMING && self.homing.is_begun();
@@ -204,27 +204,27 @@ impl YzAimJoint {
         self.alarms.code(self.network.is_master_lost())
     }
 
-    /// Whether heartbeat and statusword show an alarm.
+    /// Whether heartbeat and statusword report an alarm.
     fn shows_alarm(&self) -> bool {
         self.alarms.is_stopped()
             || self.network.is_master_lost()
             || self.alarms.has_lost_battery && self.parameters.quirks.shows_battery_alarm
     }
 
-    /// Lets the present position be this count.
+    /// Sets the count of the current position.
     fn set_counts(&mut self, counts: i32) {
         let before = self.counts();
         self.counts_offset = counts.wrapping_sub(self.encoder_counts());
         self.motion.shift(f64::from(counts) - f64::from(before));
     }
 
-    /// An alarm that stops the motor: the output goes off until the alarm is cleared.
+    /// Raises an alarm that stops the motor: the output is off until it is cleared.
     fn fail(&mut self, now_ns: Nanoseconds, alarm: StoppingAlarm) {
         self.alarms.raise(now_ns, alarm);
         self.dictionary.set(at::OUTPUT_ENABLE, 0);
     }
 
-    /// The supply comes on.
+    /// Powers up.
     fn power_up(&mut self, now_ns: Nanoseconds) {
         self.alarms = self.alarms.after_power_up();
         self.node = self.dictionary.stored(at::NODE_ADDRESS) as u8;
@@ -235,14 +235,17 @@ impl YzAimJoint {
             let counts = self.encoder_counts();
             self.counts_offset = counts.rem_euclid(COUNTS_PER_TURN as i32).wrapping_sub(counts);
         }
-        let state =
-            if self.parameters.starts_operational { NmtState::Operational } else { NmtState::PreOperational };
+        let state = if self.parameters.starts_operational {
+            NodeState::Operational
+        } else {
+            NodeState::PreOperational
+        };
         self.start(now_ns, state, self.parameters.quirks.announces_power_up);
         self.is_starting_cold = true;
     }
 
-    /// What power-up and "reset node" have in common: what was stored is back, and the drive is cold.
-    fn start(&mut self, now_ns: Nanoseconds, state: NmtState, is_announced: bool) {
+    /// Common part of power-up and NMT "reset node": stored values are restored, and the drive is not enabled.
+    fn start(&mut self, now_ns: Nanoseconds, state: NodeState, is_announced: bool) {
         self.dictionary.restore(0..=u16::MAX);
         if self.dictionary.get(at::GEAR_NUMERATOR) == 0 {
             self.dictionary.set(at::MODBUS_ENABLE, 1);
@@ -250,10 +253,10 @@ impl YzAimJoint {
         if self.alarms.is_stopped() {
             self.dictionary.set(at::OUTPUT_ENABLE, 0);
         }
-        self.network = Network::starting(now_ns + self.parameters.power_up_ns, state, is_announced);
+        self.network = YzAimNetwork::starting(now_ns + self.parameters.power_up_ns, state, is_announced);
         self.sdo.reset();
-        self.process_data = ProcessData::at_rest();
-        self.device = Device::cold();
+        self.process_data = YzAimProcessData::at_rest();
+        self.device = YzAimDevice::cold();
         self.homing = Homing::idle();
         self.bit_rate_change = BitRateChange::None;
         self.has_started = false;
@@ -286,7 +289,7 @@ impl Drive for YzAimJoint {
         self.now_ns = now_ns;
         self.run_loops(now_ns);
         if self.is_on_bus() {
-            self.take(now_ns, frame);
+            self.receive_frame(now_ns, frame);
         }
         self.schedule(now_ns);
     }
@@ -295,9 +298,9 @@ impl Drive for YzAimJoint {
         self.now_ns = now_ns;
         self.run_loops(now_ns);
         if let Some(fault) = self.injected.take() {
-            self.break_down(now_ns, fault);
+            self.apply_fault(now_ns, fault);
         }
-        self.network.watch_master(now_ns);
+        self.network.check_master(now_ns);
         if now_ns >= self.save_ns {
             self.save_ns = NEVER;
             self.dictionary.store();
@@ -328,7 +331,7 @@ impl Drive for YzAimJoint {
         }
     }
 
-    fn inject(&mut self, fault: DriveFault) {
+    fn inject_fault(&mut self, fault: DriveFault) {
         self.injected = Some(fault);
         self.wake_ns = self.now_ns + 1;
     }
@@ -344,7 +347,12 @@ impl Drive for YzAimJoint {
         self.joint.set_load_torque(torque);
     }
 
-    fn afflict(&mut self, now_ns: Nanoseconds, defect: Defect, is_present: bool) -> Result<(), Unsupported> {
+    fn inject_defect(
+        &mut self,
+        now_ns: Nanoseconds,
+        defect: Defect,
+        is_present: bool,
+    ) -> Result<(), Unsupported> {
         self.run_loops(now_ns);
         self.defects.set(defect, is_present)?;
         match defect {

@@ -1,19 +1,18 @@
-//! The object dictionary as data, as the manual's chapter VI lists it with the entries that CiA 301 implies. What is not
-//! listed there does not exist here either. The manual gives hardly any defaults beside the communication parameters;
-//! the others are a unit's as it was bought.
+//! The object dictionary by the manual's chapter VI, with the entries that CiA 301 implies. Other objects do not exist
+//! here. The manual gives few defaults outside the communication parameters; the others are from a new unit.
 
 /// One entry of the dictionary.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Object {
+pub struct YzAimObject {
     /// Index.
     pub index: u16,
     /// Sub-index.
     pub subindex: u8,
     /// Length in bits: 8, 16 or 32.
     pub bits: u8,
-    /// Whether SDO may write it.
+    /// Whether SDO can write it.
     pub is_writable: bool,
-    /// Whether 2614h keeps it.
+    /// Whether 2614h stores it.
     pub is_stored: bool,
     /// The lowest value; negative for signed entries.
     pub lowest: i64,
@@ -21,11 +20,11 @@ pub struct Object {
     pub highest: i64,
     /// Value of a new unit.
     pub default: i64,
-    /// Whether the node number is added to the default.
+    /// Whether the node ID is added to the default.
     pub adds_node: bool,
 }
 
-impl Object {
+impl YzAimObject {
     const fn plus_node(self) -> Self {
         Self { adds_node: true, ..self }
     }
@@ -41,8 +40,8 @@ const FULL_16: [i64; 2] = [0, 0xFFFF];
 const SIGNED_32: [i64; 2] = [i32::MIN as i64, i32::MAX as i64];
 
 /// Read-only and unsigned.
-const fn ro(index: u16, subindex: u8, bits: u8, default: i64) -> Object {
-    Object {
+const fn ro(index: u16, subindex: u8, bits: u8, default: i64) -> YzAimObject {
+    YzAimObject {
         index,
         subindex,
         bits,
@@ -55,25 +54,25 @@ const fn ro(index: u16, subindex: u8, bits: u8, default: i64) -> Object {
     }
 }
 
-/// Measured: read-only within a range.
-const fn measured(index: u16, bits: u8, range: [i64; 2]) -> Object {
+/// A measured value: read-only, within a range.
+const fn measured(index: u16, bits: u8, range: [i64; 2]) -> YzAimObject {
     let [lowest, highest] = range;
-    Object { lowest, highest, ..ro(index, 0, bits, 0) }
+    YzAimObject { lowest, highest, ..ro(index, 0, bits, 0) }
 }
 
-/// A command, set-point or switch: read and written, never stored.
-const fn command(index: u16, subindex: u8, bits: u8, range: [i64; 2], default: i64) -> Object {
+/// A command, set-point or switch: readable and writable, never stored.
+const fn command(index: u16, subindex: u8, bits: u8, range: [i64; 2], default: i64) -> YzAimObject {
     let [lowest, highest] = range;
-    Object { is_writable: true, lowest, highest, ..ro(index, subindex, bits, default) }
+    YzAimObject { is_writable: true, lowest, highest, ..ro(index, subindex, bits, default) }
 }
 
-/// A parameter: read, written, stored.
-const fn rw(index: u16, subindex: u8, bits: u8, range: [i64; 2], default: i64) -> Object {
-    Object { is_stored: true, ..command(index, subindex, bits, range, default) }
+/// A parameter: readable, writable, stored.
+const fn rw(index: u16, subindex: u8, bits: u8, range: [i64; 2], default: i64) -> YzAimObject {
+    YzAimObject { is_stored: true, ..command(index, subindex, bits, range, default) }
 }
 
 /// Every entry, in ascending order.
-pub const OBJECTS: [Object; 109] = [
+pub const OBJECTS: [YzAimObject; 109] = [
     ro(0x1000, 0, 32, 0x0002_0192),
     ro(0x1001, 0, 8, 0),
     ro(0x1005, 0, 32, 0x80),
@@ -185,8 +184,7 @@ pub const OBJECTS: [Object; 109] = [
     command(0x60FF, 0, 32, [-3000, 3000], 0), // Velocity-mode target speed
 ];
 
-/// Where an entry stands in [`OBJECTS`]. For entries that are known when the program is written: another one does
-/// not compile.
+/// The position of an entry in [`OBJECTS`], for constants: an unknown entry does not compile.
 const fn place(index: u16, subindex: u8) -> usize {
     let mut at = 0;
     while at < OBJECTS.len() {
@@ -198,12 +196,12 @@ const fn place(index: u16, subindex: u8) -> usize {
     panic!("no such object")
 }
 
-/// Where an entry stands in [`OBJECTS`].
+/// The position of an entry in [`OBJECTS`].
 pub fn find(index: u16, subindex: u8) -> Option<usize> {
     OBJECTS.binary_search_by_key(&(index, subindex), |object| (object.index, object.subindex)).ok()
 }
 
-/// Places of the entries that the drive itself works with, by what they mean.
+/// Positions of the entries that the drive itself uses.
 pub mod at {
     use super::place;
 
@@ -269,13 +267,13 @@ mod tests {
     #[test]
     fn the_table_is_in_order() {
         for pair in OBJECTS.windows(2) {
-            let key = |object: &Object| (object.index, object.subindex);
+            let key = |object: &YzAimObject| (object.index, object.subindex);
             assert!(key(&pair[0]) < key(&pair[1]), "{:04X}:{}", pair[1].index, pair[1].subindex);
         }
     }
 
     #[test]
-    fn what_real_units_lack_is_missing_here() {
+    fn objects_that_real_units_lack_do_not_exist() {
         for index in [0x6061, 0x6502, 0x603F, 0x60C2, 0x6065, 0x6071, 0x6077, 0x6084, 0x1003, 0x1010] {
             assert_eq!(find(index, 0), None, "{index:04X}");
         }

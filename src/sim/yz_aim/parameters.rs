@@ -1,4 +1,4 @@
-//! One YZ-AIM servo as it is built, mounted and set up.
+//! The parameters of one YZ-AIM servo and its joint.
 
 use std::f64::consts::TAU;
 
@@ -8,12 +8,12 @@ use crate::config::{Axis, Control, Simulation, Travel};
 use crate::sim::homing_switches::{HomingSwitches, Switch};
 use crate::sim::plant::{Encoder, EndStops, JointParameters};
 
-/// Counts of one turn of the motor.
+/// Counts per turn of the motor.
 pub const COUNTS_PER_TURN: f64 = 32_768.0;
 /// Counts per second at one r/min.
 pub(super) const COUNTS_PER_SECOND_PER_RPM: f64 = COUNTS_PER_TURN / 60.0;
 
-/// The models of the manual's table (chapter II) that differ to a controller.
+/// The models of the manual's table (chapter II) that differ for a controller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Model {
     /// 42AIM10C: 0.33 N·m, single-turn.
@@ -34,7 +34,7 @@ pub enum Model {
     Aim60x25CH,
 }
 
-/// The figures of a model, at the motor.
+/// The ratings of a model, at the motor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ratings {
     /// N·m
@@ -45,12 +45,12 @@ pub struct Ratings {
     pub maximum_speed_rpm: f64,
     /// V
     pub supply_voltage: f64,
-    /// Whether a battery keeps the multi-turn position.
+    /// Whether a battery keeps the turn count.
     pub has_battery: bool,
 }
 
 impl Model {
-    /// Its figures.
+    /// The ratings.
     pub const fn ratings(self) -> Ratings {
         let (torque, current, maximum_speed_rpm, supply_voltage, has_battery) = match self {
             Self::Aim42x10C => (0.33, 1.6, 1500.0, 24.0, false),
@@ -66,14 +66,14 @@ impl Model {
     }
 }
 
-/// How the motor turns the joint.
+/// The gear between motor and joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gearing {
-    /// Turns of the motor for one of the gear's output.
+    /// Turns of the motor for one turn of the gear's output.
     pub ratio: f64,
     /// Travel of the joint for one turn of the gear's output: 2π rad, or the lead in m.
     pub travel_per_turn: f64,
-    /// Whether positive counts are negative travel.
+    /// Whether the count decreases with the position.
     pub is_reversed: bool,
     /// The count at the joint's zero, if the drive counts turns.
     pub zero_counts: f64,
@@ -86,32 +86,32 @@ impl Gearing {
     }
 }
 
-/// What real units do beside the manual. All of it can be switched off.
+/// Deviations of real units from the manual. Each can be switched off.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Quirks {
-    /// An unknown object gets neither value nor abort.
+    /// An SDO request for an unknown object gets no response.
     pub is_silent_on_unknown_objects: bool,
-    /// A cold drive takes no notice of 0007h and 000Fh before it has had 0006h.
+    /// After power-up, 0007h and 000Fh are ignored before 0006h.
     pub needs_shutdown_first: bool,
-    /// A controlword that leads further sooner than this after the last one that did is lost.
+    /// A controlword that raises the level is ignored sooner than this after the last one.
     pub controlword_interval_ns: Nanoseconds,
-    /// The first target after enabling is not followed.
+    /// The first target after enabling is ignored.
     pub ignores_first_target: bool,
-    /// Whether the battery alarm 10h, which does not stop the motor, shows in statusword and heartbeat.
+    /// Whether statusword and heartbeat report the battery alarm 10h, which does not stop the motor.
     pub shows_battery_alarm: bool,
-    /// Whether sub-indices 02, 03 and 05 of 14xxh and 18xxh can be written.
+    /// Whether sub-indices 02, 03 and 05 of 14xxh and 18xxh are writable.
     pub has_settable_pdos: bool,
-    /// Whether TPDO3 carries 0.1 r/min per bit, like 606Ch read by SDO, and not 1 r/min as in the manual's example.
+    /// Whether TPDO3 has 0.1 r/min per bit like 606Ch by SDO, instead of 1 r/min as in the manual's example.
     pub has_fine_velocity_in_tpdo3: bool,
-    /// The TPDOs begin with what the manual has last: the statusword before the position, and TPDO3 carries the velocity and
-    /// the statusword in place of the position and the velocity. Their mapping tells it.
+    /// TPDO1, 2 and 4 have the statusword before the position, and TPDO3 has velocity and statusword instead of
+    /// position and velocity. The mapping objects contain this order.
     pub reports_state_first: bool,
-    /// Whether a boot-up message is sent at power-up too, and not only after NMT 81h and 82h.
+    /// Whether power-up sends a boot-up message, not only NMT 81h and 82h.
     pub announces_power_up: bool,
 }
 
 impl Default for Quirks {
-    /// As seen on real units.
+    /// The behaviour of real units.
     fn default() -> Self {
         Self {
             is_silent_on_unknown_objects: true,
@@ -128,7 +128,7 @@ impl Default for Quirks {
 }
 
 impl Quirks {
-    /// As the manual's examples show it.
+    /// The behaviour in the manual's examples.
     pub fn none() -> Self {
         Self {
             is_silent_on_unknown_objects: false,
@@ -140,14 +140,14 @@ impl Quirks {
     }
 }
 
-/// How the unit homes, since there are no objects for it.
+/// The homing parameters of the unit, for which there are no objects.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HomingBehaviour {
-    /// Speed towards the switch: r/min. The edge is looked for at a tenth of it.
+    /// Speed towards the switch: r/min. The edge is searched at a tenth of it.
     pub speed_rpm: f64,
-    /// After this time without the switch comes the homing error; `None`: never.
+    /// Timeout of the search, followed by the homing error; `None`: no timeout.
     pub gives_up_ns: Option<Nanoseconds>,
-    /// Whether methods 20 and 22 work as in CiA 402; otherwise they end in the homing error at once.
+    /// Whether methods 20 and 22 work as in CiA 402; otherwise they lead to the homing error at once.
     pub has_undescribed_methods: bool,
 }
 
@@ -157,56 +157,56 @@ impl Default for HomingBehaviour {
     }
 }
 
-/// One servo as it is built, mounted and set up.
+/// The parameters of one servo.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct YzAimParameters {
-    /// Node number, 1 to 127, that is stored in 2615h.
+    /// Node ID, 1 to 127, stored in 2615h.
     pub node: u8,
-    /// Bit rate of the bus it is on: bit/s. The drive begins with the same one.
+    /// Bit rate of the bus: bit/s. The drive starts with the same one.
     pub bit_rate: u32,
-    /// The mechanics at the joint, the rotor's inertia included. There is no brake.
+    /// The mechanics at the joint, including the rotor's inertia. There is no brake.
     pub joint: JointParameters,
-    /// Where the travel ends at something solid.
+    /// The mechanical end stops.
     pub end_stops: Option<EndStops>,
-    /// Switches along the travel.
+    /// The switches along the travel.
     pub switches: HomingSwitches,
     /// The motor's encoder, seen from the joint: 32768 counts per turn of the motor.
     pub encoder: Encoder,
     /// Position at the first power-up: rad (m).
     pub initial_position: f64,
-    /// Torque at the joint with rated current: N·m (N).
+    /// Torque at the joint at the rated current: N·m (N).
     pub rated_torque: f64,
     /// Highest torque at the joint: N·m (N).
     pub peak_torque: f64,
-    /// A
+    /// Rated current: A.
     pub rated_current: f64,
     /// The highest speed of the motor: r/min.
     pub maximum_speed_rpm: f64,
-    /// V
+    /// Supply voltage: V.
     pub supply_voltage: f64,
-    /// Whether a battery keeps the multi-turn position; without one the position after power-up is within one turn.
+    /// Whether a battery keeps the turn count; without it the position after power-up is within one turn.
     pub has_battery: bool,
-    /// What is stored in 2619h; interpolation wants 7.
+    /// The value stored in 2619h; interpolation needs 7.
     pub special_function: u16,
-    /// What is stored in 6083h: (r/min)/s; from 60000 on there is no ramp.
+    /// The value stored in 6083h: (r/min)/s; at 60000 and above there is no ramp.
     pub acceleration: u16,
-    /// From power-up or "reset node" until the drive is there.
+    /// Boot time after power-up or "reset node".
     pub power_up_ns: Nanoseconds,
-    /// Whether the drive is operational after power-up, and not pre-operational.
+    /// Whether the drive boots into NMT operational instead of pre-operational.
     pub starts_operational: bool,
-    /// From a frame until the PDO that answers it is ready to be sent.
+    /// Time from a frame until the PDO that replies to it is ready to send.
     pub feedback_delay_ns: Nanoseconds,
-    /// Homing.
+    /// The homing parameters.
     pub homing: HomingBehaviour,
-    /// Quirks.
+    /// The quirks.
     pub quirks: Quirks,
-    /// Seed of what differs from unit to unit and from time to time: SDO latencies, the digit after a zeroing.
+    /// Seed of what differs between units and runs: SDO latencies, the digit after setting the zero.
     pub seed: u64,
 }
 
 impl YzAimParameters {
-    /// A new unit of a model on a bus at 1 Mbit/s, that turns a joint through a gear. The peak torque is three times the
-    /// rated one.
+    /// A new unit of a model on a bus at 1 Mbit/s, with a gear and a joint. The peak torque is three times the rated
+    /// torque.
     pub fn new(node: u8, model: Model, gearing: Gearing, joint: JointParameters) -> Self {
         let ratings = model.ratings();
         let direction = if gearing.is_reversed { -1.0 } else { 1.0 };
@@ -239,9 +239,8 @@ impl YzAimParameters {
         }
     }
 
-    /// The unit that stands in for an axis of a configuration. Interpolation is stored where the axis wants it; limit
-    /// switches stand just beyond the axis' limits, the lower one at DIR and the upper one at PU, and end stops behind
-    /// them.
+    /// The unit that simulates a configured axis. Interpolation is stored if the axis uses it. Limit switches are just
+    /// beyond the axis' limits, the lower one at DIR and the upper one at PU, with end stops behind them.
     pub fn of(axis: &Axis, bit_rate: u32, simulation: &Simulation) -> Self {
         let travel_per_turn = match axis.travel {
             Travel::Rotary => TAU,
@@ -300,13 +299,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_gear_turns_counts_and_torque_into_those_of_the_joint() {
+    fn a_gear_converts_counts_and_torque_to_the_joint() {
         let joint =
             JointParameters { inertia: 1.0, viscous_friction: 0.0, coulomb_friction: 0.0, brake_torque: 0.0 };
         let screw = Gearing { ratio: 2.0, travel_per_turn: 0.005, is_reversed: true, zero_counts: 7.0 };
         let parameters = YzAimParameters::new(3, Model::Aim57x30C, screw, joint);
         assert_eq!(parameters.encoder.counts(0.005), -65_536 + 7);
-        // 0.96 N·m do the work of 2π rad on 2.5 mm.
+        // 0.96 N·m over 2π rad do the same work as the force over 2.5 mm.
         assert!((parameters.rated_torque * 0.0025 - 0.96 * TAU).abs() < 1e-9);
     }
 }

@@ -1,15 +1,15 @@
-//! The four RPDOs and four TPDOs, whose mapping is fixed, and when they act (manual 5.08).
+//! The four RPDOs and four TPDOs with fixed mapping, and their transmission types (manual 5.08).
 
 use takt_rt::{Frame, Id, Nanoseconds};
 
-use super::dictionary::Dictionary;
+use super::dictionary::YzAimDictionary;
 use super::objects::at;
 
 /// PDOs in each direction.
 pub const PDOS: usize = 4;
-/// RPDO4, whose data wait for SYNC, and TPDO4, its answer.
+/// RPDO4, whose data waits for SYNC, and TPDO4, its reply.
 pub const PDO4: usize = 3;
-/// What each RPDO carries.
+/// The mapping of each RPDO.
 pub const RPDO_MAPPING: [&[usize]; PDOS] = [
     &[at::CONTROLWORD, at::OPERATION_MODE, at::TARGET_POSITION],
     &[at::TARGET_POSITION, at::PROFILE_VELOCITY],
@@ -28,13 +28,13 @@ const POSITION: i64 = 0x6064_0020;
 const VELOCITY: i64 = 0x606C_0020;
 const INHIBIT_UNIT_NS: Nanoseconds = 100_000;
 const EVENT_UNIT_NS: Nanoseconds = 1_000_000;
-/// Transmission types up to this one act at SYNC.
+/// FrameOnWire types up to this one are synchronous.
 const LAST_SYNCHRONOUS: i64 = 240;
 const NEVER: Nanoseconds = Nanoseconds::MAX;
 
-/// What TPDOs say.
+/// The values that TPDOs carry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Feedback {
+pub struct YzAimFeedback {
     /// 6064h
     pub position: i32,
     /// 6041h
@@ -45,11 +45,11 @@ pub struct Feedback {
 
 #[derive(Clone, Copy, Debug)]
 struct Outbound {
-    /// What is to be sent.
-    sampled: Feedback,
-    /// When it is to be sent.
+    /// The values to send.
+    sampled: YzAimFeedback,
+    /// When they are to be sent.
     due_ns: Nanoseconds,
-    /// When the inhibit time is over.
+    /// When the inhibit time ends.
     free_ns: Nanoseconds,
     /// When the event timer ends.
     event_ns: Nanoseconds,
@@ -57,7 +57,7 @@ struct Outbound {
 }
 
 const AT_REST: Outbound = Outbound {
-    sampled: Feedback { position: 0, statusword: 0, velocity: 0 },
+    sampled: YzAimFeedback { position: 0, statusword: 0, velocity: 0 },
     due_ns: NEVER,
     free_ns: 0,
     event_ns: NEVER,
@@ -66,70 +66,70 @@ const AT_REST: Outbound = Outbound {
 
 /// All PDOs of the drive.
 #[derive(Clone, Copy, Debug)]
-pub struct ProcessData {
+pub struct YzAimProcessData {
     held: [Option<[u8; 8]>; PDOS],
     outbound: [Outbound; PDOS],
 }
 
-impl ProcessData {
-    /// Nothing held, nothing to send.
+impl YzAimProcessData {
+    /// No data held, nothing to send.
     pub const fn at_rest() -> Self {
         Self { held: [None; PDOS], outbound: [AT_REST; PDOS] }
     }
 
-    /// Operational begins: the event timers run.
-    pub fn start(&mut self, now_ns: Nanoseconds, dictionary: &Dictionary) {
+    /// Enters NMT operational: the event timers start.
+    pub fn start(&mut self, now_ns: Nanoseconds, dictionary: &YzAimDictionary) {
         *self = Self::at_rest();
         self.schedule_events(now_ns, dictionary);
     }
 
-    /// Starts the event timers anew, as after a change of theirs.
-    pub fn schedule_events(&mut self, now_ns: Nanoseconds, dictionary: &Dictionary) {
+    /// Restarts the event timers, as after a write of them.
+    pub fn schedule_events(&mut self, now_ns: Nanoseconds, dictionary: &YzAimDictionary) {
         for (outbound, parameters) in self.outbound.iter_mut().zip(TPDO) {
             outbound.event_ns = event_ns(now_ns, parameters, dictionary);
         }
     }
 
-    /// Which RPDO an identifier belongs to.
+    /// The RPDO that an identifier belongs to.
     pub fn number(id: Id, node: u8) -> Option<usize> {
         RPDO_ID.iter().position(|function| Id::canopen(*function, node) == id)
     }
 
-    /// Whether the data of an RPDO wait for SYNC.
-    pub fn waits_for_sync(number: usize, dictionary: &Dictionary) -> bool {
+    /// Whether the data of an RPDO waits for SYNC.
+    pub fn waits_for_sync(number: usize, dictionary: &YzAimDictionary) -> bool {
         dictionary.get(RPDO[number] + 2) <= LAST_SYNCHRONOUS
     }
 
-    /// Holds the data of an RPDO until SYNC, in place of older ones.
+    /// Holds the data of an RPDO until SYNC; newer data replaces older data.
     pub fn hold(&mut self, number: usize, data: [u8; 8]) {
         self.held[number] = Some(data);
     }
 
-    /// Gives out what an RPDO has held.
+    /// Takes the held data of an RPDO.
     pub fn release(&mut self, number: usize) -> Option<[u8; 8]> {
         self.held[number].take()
     }
 
-    /// Has a TPDO sent `latency_ns` from now, or when its inhibit time is over.
+    /// Sends a TPDO `latency_ns` from now, or when its inhibit time is over.
     pub fn answer(
         &mut self,
         number: usize,
         now_ns: Nanoseconds,
         latency_ns: Nanoseconds,
-        feedback: Feedback,
+        feedback: YzAimFeedback,
     ) {
         let outbound = &mut self.outbound[number];
         outbound.sampled = feedback;
         outbound.due_ns = outbound.due_ns.min((now_ns + latency_ns).max(outbound.free_ns));
     }
 
-    /// SYNC has come: the TPDOs with a synchronous type are due with what is measured now.
+    /// Handles SYNC: the synchronous TPDOs are due with the current values.
     pub fn sync(
         &mut self,
         now_ns: Nanoseconds,
         latency_ns: Nanoseconds,
-        feedback: Feedback,
-        dictionary: &Dictionary,
+        feedback: YzAimFeedback,
+        dictionary: &YzAimDictionary,
     ) {
         for (number, parameters) in TPDO.into_iter().enumerate() {
             let every = dictionary.get(parameters + 2);
@@ -142,8 +142,8 @@ impl ProcessData {
         }
     }
 
-    /// Has every TPDO sent whose event timer has ended.
-    pub fn run_events(&mut self, now_ns: Nanoseconds, feedback: Feedback, dictionary: &Dictionary) {
+    /// Sends every TPDO whose event timer has ended.
+    pub fn run_events(&mut self, now_ns: Nanoseconds, feedback: YzAimFeedback, dictionary: &YzAimDictionary) {
         for (number, parameters) in TPDO.into_iter().enumerate() {
             if self.outbound[number].event_ns <= now_ns {
                 self.outbound[number].event_ns = event_ns(now_ns, parameters, dictionary);
@@ -152,14 +152,14 @@ impl ProcessData {
         }
     }
 
-    /// When something is due.
+    /// The time of the next action.
     pub fn due_ns(&self) -> Nanoseconds {
         let due = self.outbound.iter().map(|outbound| outbound.due_ns.min(outbound.event_ns));
         due.min().unwrap_or(NEVER)
     }
 
-    /// A TPDO that is to be sent now.
-    pub fn next(&mut self, now_ns: Nanoseconds, node: u8, dictionary: &Dictionary) -> Option<Frame> {
+    /// A TPDO that is due.
+    pub fn next(&mut self, now_ns: Nanoseconds, node: u8, dictionary: &YzAimDictionary) -> Option<Frame> {
         let number = self.outbound.iter().position(|outbound| outbound.due_ns <= now_ns)?;
         let outbound = &mut self.outbound[number];
         let inhibit = dictionary.get(TPDO[number] + 3) as Nanoseconds;
@@ -170,15 +170,15 @@ impl ProcessData {
     }
 }
 
-fn event_ns(now_ns: Nanoseconds, parameters: usize, dictionary: &Dictionary) -> Nanoseconds {
+fn event_ns(now_ns: Nanoseconds, parameters: usize, dictionary: &YzAimDictionary) -> Nanoseconds {
     match dictionary.get(parameters + 5) as Nanoseconds {
         0 => NEVER,
         period_ms => now_ns + period_ms * EVENT_UNIT_NS,
     }
 }
 
-/// The TPDOs of firmware that reports its state first.
-pub fn report_state_first(dictionary: &mut Dictionary) {
+/// Sets the TPDO mapping of firmware that sends the statusword first.
+pub fn report_state_first(dictionary: &mut YzAimDictionary) {
     for mapping in [at::TPDO1_MAPPING, at::TPDO2_MAPPING, at::TPDO4_MAPPING] {
         dictionary.set_factory(mapping + 1, STATUSWORD);
         dictionary.set_factory(mapping + 2, POSITION);
@@ -187,8 +187,8 @@ pub fn report_state_first(dictionary: &mut Dictionary) {
     dictionary.set_factory(at::TPDO3_MAPPING + 2, STATUSWORD);
 }
 
-/// What the mapping says, in its order.
-fn pack(id: Id, mapping: usize, feedback: Feedback, dictionary: &Dictionary) -> Frame {
+/// Encodes a TPDO by its mapping.
+fn pack(id: Id, mapping: usize, feedback: YzAimFeedback, dictionary: &YzAimDictionary) -> Frame {
     let mut payload = [0; 8];
     let mut length = 0;
     for entry in (mapping + 1..).take(dictionary.get(mapping) as usize) {

@@ -4,13 +4,13 @@ use takt_rt::Nanoseconds;
 
 use crate::sim::random::Random;
 
-/// From a request to its answer, as seen on real units: about 0.3 ms.
+/// Range of the response time, as measured on real units: about 0.3 ms.
 const LATENCY_NS: std::ops::Range<Nanoseconds> = 270_000..330_000;
 
-/// Why a request is refused. The manual names no abort codes; these are those of CiA 301, 7.2.4.3.17.
+/// The abort codes. The manual names none; these are those of CiA 301, 7.2.4.3.17.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
-pub enum AbortCode {
+pub enum YzAimAbortCode {
     /// Command specifier not valid or unknown.
     Command = 0x0504_0001,
     /// Attempt to write a read-only object.
@@ -23,37 +23,38 @@ pub enum AbortCode {
     Value = 0x0609_0030,
 }
 
-/// A request, read from its frame.
+/// A decoded request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Request {
+pub enum YzAimRequest {
     /// 40h
     Read,
     /// 2Fh, 2Bh, 27h, 23h; 22h without a size.
     Write {
-        /// The bytes that follow.
+        /// The data bytes.
         data: [u8; 4],
-        /// How many of them count.
+        /// How many of them are valid, if indicated.
         size: Option<usize>,
     },
-    /// 80h: the client gives up.
+    /// 80h: the client aborts.
     Abort,
     /// Anything else.
     Other,
 }
 
-/// A request with what it names.
+/// A request and its object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Addressed {
     /// Index.
     pub index: u16,
     /// Sub-index.
     pub subindex: u8,
-    /// What is wanted.
-    pub request: Request,
+    /// The request.
+    pub request: YzAimRequest,
 }
 
 impl Addressed {
-    /// Reads a frame. Unpadded ones of four bytes and more are taken, since published masters send such.
+    /// Decodes a frame. Frames of four bytes and more are accepted without padding, because published masters send them
+    /// so.
     pub fn decode(payload: &[u8]) -> Option<Self> {
         let &[command, low, high, subindex, ref rest @ ..] = payload else { return None };
         let mut data = [0; 4];
@@ -61,29 +62,29 @@ impl Addressed {
             *to = *from;
         }
         let request = match command {
-            0x40 => Request::Read,
-            0x22 => Request::Write { data, size: None },
+            0x40 => YzAimRequest::Read,
+            0x22 => YzAimRequest::Write { data, size: None },
             0x23 | 0x27 | 0x2B | 0x2F => {
-                Request::Write { data, size: Some(4 - usize::from(command >> 2 & 3)) }
+                YzAimRequest::Write { data, size: Some(4 - usize::from(command >> 2 & 3)) }
             }
-            0x80 => Request::Abort,
-            _ => Request::Other,
+            0x80 => YzAimRequest::Abort,
+            _ => YzAimRequest::Other,
         };
         Some(Self { index: u16::from_le_bytes([low, high]), subindex, request })
     }
 
-    /// The answer to a reader.
+    /// The response to a read request.
     pub fn value(&self, value: [u8; 4], size: usize) -> [u8; 8] {
         self.answer(0x43 | (4 - size.min(4) as u8) << 2, value)
     }
 
-    /// The answer to a writer.
+    /// The response to a write request.
     pub fn written(&self) -> [u8; 8] {
         self.answer(0x60, [0; 4])
     }
 
-    /// The answer to whoever is refused.
-    pub fn refused(&self, code: AbortCode) -> [u8; 8] {
+    /// The abort response.
+    pub fn refused(&self, code: YzAimAbortCode) -> [u8; 8] {
         self.answer(0x80, (code as u32).to_le_bytes())
     }
 
@@ -93,40 +94,40 @@ impl Addressed {
     }
 }
 
-/// The one buffer for an answer. While it is full, requests are lost.
+/// The server, with one buffer for the response. Requests are lost while it is full.
 #[derive(Clone, Copy, Debug)]
-pub struct SdoServer {
+pub struct YzAimSdoServer {
     pending: Option<(Nanoseconds, Option<[u8; 8]>)>,
     latency: Random,
 }
 
-impl SdoServer {
-    /// A server at rest.
+impl YzAimSdoServer {
+    /// An idle server.
     pub fn new(latency: Random) -> Self {
         Self { pending: None, latency }
     }
 
-    /// Forgets everything.
+    /// Discards the response.
     pub fn reset(&mut self) {
         self.pending = None;
     }
 
-    /// Whether a request is being worked on; another one that comes now is lost.
+    /// Whether a request is being processed; a further one is lost.
     pub fn is_busy(&self) -> bool {
         self.pending.is_some()
     }
 
-    /// Takes the answer; a request without one takes its time all the same.
+    /// Queues the response; a request without a response takes the same time.
     pub fn answer(&mut self, now_ns: Nanoseconds, answer: Option<[u8; 8]>) {
         self.pending = Some((now_ns + self.latency.within(LATENCY_NS), answer));
     }
 
-    /// When the present request is done with.
+    /// When the current request is finished.
     pub fn due_ns(&self) -> Option<Nanoseconds> {
         self.pending.map(|(due_ns, _)| due_ns)
     }
 
-    /// Gives the answer out, when it is due.
+    /// The response, when it is due.
     pub fn take(&mut self, now_ns: Nanoseconds) -> Option<[u8; 8]> {
         let (_, answer) = self.pending.filter(|(due_ns, _)| *due_ns <= now_ns)?;
         self.pending = None;

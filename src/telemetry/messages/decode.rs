@@ -1,4 +1,4 @@
-//! From the messages of a recording back to records.
+//! Decodes the messages of a recording.
 
 use takt_rt::{
     AxisRecord, BusHealth, BusState, CycleRecord, CycleTiming, DriveState, EventKind, Origin, Phase,
@@ -121,7 +121,7 @@ impl EventFields {
         }
     }
 
-    /// The event that these are the fields of, if this version knows it.
+    /// The event with these fields, if this version knows its kind.
     fn kind(&self, slot: u64) -> Option<EventKind> {
         Some(match self.kind {
             0 => EventKind::PhaseChanged { from: phase(self.phase_from)?, to: phase(self.phase_to)? },
@@ -183,9 +183,9 @@ mod tests {
         phase: Phase::Holding,
     };
 
-    /// The last bytes are two for the refusal and two, at an even place, for the bus.
+    /// The last four bytes are two for the rejection and two for the bus.
     #[test]
-    fn an_event_of_an_earlier_version_is_read_as_far_as_it_goes_and_keeps_its_words() {
+    fn an_event_of_an_earlier_version_is_read_without_its_later_fields() {
         let of_a_bus = StopReason { origin: Origin::Bus(1), ..STOP };
         let of_no_bus = StopReason { origin: Origin::Group, ..STOP };
         for (kind, without_bus, without_both) in [

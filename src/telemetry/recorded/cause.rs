@@ -1,4 +1,4 @@
-//! Why the group stopped, as a recording tells it, and where to look for what led to it.
+//! Why the group stopped, according to a recording, and which slots and axis show it.
 
 use std::ops::RangeInclusive;
 
@@ -11,33 +11,33 @@ use crate::telemetry::words;
 /// Why the group stopped.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Cause {
-    /// In words.
+    /// The reason as a sentence.
     pub reason: String,
-    /// The rule by its key.
+    /// The key of the rule.
     pub rule: String,
-    /// IEC 60204-1: 0, 1 or 2; `None` when there was nothing to stop.
+    /// IEC 60204-1: 0, 1 or 2; `None` if the group did not move.
     pub category: Option<u8>,
     /// The axis concerned.
     pub axis: Option<String>,
     /// The bus concerned.
     pub bus: Option<String>,
-    /// What was seen, in the unit of the rule.
+    /// The value that was seen, in the unit of the rule.
     pub value: Option<f64>,
-    /// What would have been allowed.
+    /// The value that is allowed.
     pub limit: Option<f64>,
     /// The slot in which it was seen.
     pub slot: u64,
-    /// What the group was doing.
+    /// The phase of the group.
     pub phase: Option<String>,
 }
 
 impl Recorded {
-    /// Why the group stopped: what the black box was written for, else the first stop that nobody had asked for, else
-    /// the first that somebody had.
+    /// Why the group stopped: the incident of a black box, or else the first stop for a fault, or else the first stop on
+    /// request.
     pub fn cause(&self) -> Option<Cause> {
-        if let Some(fault) = self.faults.first() {
-            let text = |key: &str| fault.get(key).cloned();
-            let number = |key: &str| fault.get(key)?.parse::<f64>().ok();
+        if let Some(incident) = self.incidents.first() {
+            let text = |key: &str| incident.get(key).cloned();
+            let number = |key: &str| incident.get(key)?.parse::<f64>().ok();
             return Some(Cause {
                 reason: text("reason").unwrap_or_default(),
                 rule: text("rule").unwrap_or_default(),
@@ -46,7 +46,7 @@ impl Recorded {
                 bus: text("bus"),
                 value: number("value"),
                 limit: number("limit"),
-                slot: fault.get("slot").and_then(|slot| slot.parse().ok()).unwrap_or(0),
+                slot: incident.get("slot").and_then(|slot| slot.parse().ok()).unwrap_or(0),
                 phase: text("phase"),
             });
         }
@@ -74,15 +74,15 @@ impl Recorded {
         }
     }
 
-    /// The slots from so many before the cause (or the end, when there is none) to so many after it.
+    /// The slots from `before` slots before the cause to `after` slots after it. Without a cause, those before the end.
     pub fn slots_around_cause(&self, before: u64, after: u64) -> RangeInclusive<u64> {
         let (first, last) = self.slots.unwrap_or((0, 0));
         let slot = self.cause().map_or(last, |cause| cause.slot).clamp(first, last);
         slot.saturating_sub(before).max(first)..=slot.saturating_add(after).min(last)
     }
 
-    /// The number of the axis with this name; without a name, of the axis concerned, or else of the one that was
-    /// furthest from its set-points: of those on the bus concerned, where the recording says which these are.
+    /// The number of the axis with this name. Without a name: the axis of the cause, or else the axis with the largest
+    /// following error. If the cause is a bus, only the axes of this bus count, if the recording names them.
     pub fn axis(&self, name: Option<&str>) -> Option<usize> {
         let position = |name: &str| self.machine.axes.iter().position(|axis| axis.name == name);
         if let Some(name) = name {
@@ -94,15 +94,15 @@ impl Recorded {
         };
         let cause = self.cause();
         let bus = cause.as_ref().and_then(|cause| cause.bus.as_ref());
-        let is_on_it = |axis: &usize| {
+        let is_on_bus = |axis: &usize| {
             bus.is_some() && self.machine.axes.get(*axis).is_some_and(|axis| axis.bus.as_ref() == bus)
         };
-        let furthest = || {
+        let largest_error = || {
             let axes = || 0..self.machine.axes.len();
             let by_error = |a: &usize, b: &usize| error(a).total_cmp(&error(b)).then(b.cmp(a));
-            axes().filter(is_on_it).max_by(by_error).or_else(|| axes().max_by(by_error))
+            axes().filter(is_on_bus).max_by(by_error).or_else(|| axes().max_by(by_error))
         };
-        cause.as_ref().and_then(|cause| position(cause.axis.as_ref()?)).or_else(furthest)
+        cause.as_ref().and_then(|cause| position(cause.axis.as_ref()?)).or_else(largest_error)
     }
 
     pub(in crate::telemetry) fn seconds(&self, at_ns: u64) -> f64 {

@@ -1,7 +1,7 @@
-//! Reads a recording or a black box: what it is of, what happened in it, how the timing was, and any of its cycles.
+//! Reads a recording or a black box: the machine, the events, the timing, and the cycles.
 
 mod cause;
-mod lengths;
+mod records;
 mod walk;
 
 use std::collections::{BTreeMap, HashMap};
@@ -10,18 +10,18 @@ use std::io::{self, BufReader};
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
-use mcap::records::Record;
-use takt_rt::{CycleRecord, EventKind, Nanoseconds};
+use takt_rt::{AxisRecord, CycleRecord, CycleTiming, EventKind, MAX_BUSES, Nanoseconds, Phase};
 
 use super::black_box;
+use super::history::OnBus;
 use super::machine::{AxisDescription, BusDescription, Machine, SetPointMagnitudes, Unit};
 use super::messages::{self, MessageType};
-use super::past::OnBus;
 use super::recording;
 use super::statistics::Statistics;
 use super::wall_clock::WallClock;
 use crate::bus::trace::TracedHealth;
 use crate::printable::printable;
+use records::Record;
 
 pub use cause::Cause;
 pub use walk::WalkError;
@@ -29,7 +29,7 @@ pub use walk::WalkError;
 /// Why a file cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordedError {
-    /// It is none that can be read.
+    /// It cannot be read.
     #[error("{path}: {error}")]
     Unreadable {
         /// The file.
@@ -38,14 +38,14 @@ pub enum RecordedError {
         #[source]
         error: WalkError,
     },
-    /// It is an MCAP file of something else.
+    /// It is an MCAP file of another program.
     #[error(
-        "{path}: no recording of takt (it was written by {library:?}); name one that `takt run` has left"
+        "{path}: this is not a recording of takt (it was written by {library:?}); name a file of `takt run`"
     )]
     Foreign {
         /// The file.
         path: PathBuf,
-        /// What the file says of its writer.
+        /// The program that wrote it, according to the file.
         library: String,
     },
     /// Its messages have other fields.
@@ -60,20 +60,41 @@ pub enum RecordedError {
     },
 }
 
-/// An event with what the recording says of it in words.
+/// An event with its text.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RecordedEvent {
     /// The slot in which it was seen.
     pub slot: u64,
     /// When, on the monotonic clock of the run.
     pub at_ns: Nanoseconds,
-    /// In words.
+    /// Its text.
     pub text: String,
-    /// What it was; `None` when it is of a kind that this version does not know.
+    /// Its kind; `None` if this version does not know it.
     pub kind: Option<EventKind>,
 }
 
-/// A recording, but for its cycles.
+/// A cycle with the axes that the recording has.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RecordedCycle {
+    /// When.
+    pub timing: CycleTiming,
+    /// The phase of the group.
+    pub phase: Phase,
+    /// Whether set-points were sent in this cycle.
+    pub is_commanded: bool,
+    /// The axes in the order of the configuration.
+    pub axes: Vec<AxisRecord>,
+}
+
+impl RecordedCycle {
+    fn of(record: &CycleRecord) -> Self {
+        let CycleRecord { timing, phase, is_commanded, .. } = *record;
+        // No room for axes that are not there: a recording has millions of cycles.
+        Self { timing, phase, is_commanded, axes: record.axes().to_vec() }
+    }
+}
+
+/// A recording without its cycles.
 #[derive(Clone, Debug)]
 pub struct Recorded {
     /// The file.
@@ -82,19 +103,19 @@ pub struct Recorded {
     pub version: String,
     /// Names, units and limits.
     pub machine: Machine,
-    /// The faults for which a black box was written, each with its keys; none in an ordinary recording.
-    pub faults: Vec<BTreeMap<String, String>>,
-    /// What happened, in the order of the file.
+    /// The incidents for which a black box was written, each with its keys; none in an ordinary recording.
+    pub incidents: Vec<BTreeMap<String, String>>,
+    /// The events in the order of the file.
     pub events: Vec<RecordedEvent>,
-    /// How the buses were, whenever that changed, with the number of the bus.
+    /// Every change of the health of a bus, with the number of the bus.
     pub health: Vec<(usize, TracedHealth)>,
     /// Timing and following errors of the whole recording.
     pub statistics: Statistics,
-    /// The lowest and the highest slot; those of a damaged file need not be in order.
+    /// The lowest and the highest slot. In a damaged file, slots may be out of order.
     pub slots: Option<(u64, u64)>,
     /// The time of day.
     pub wall_clock: Option<WallClock>,
-    /// What is not as it should be with the file.
+    /// Defects of the file.
     pub warnings: Vec<String>,
 }
 
@@ -108,7 +129,7 @@ impl Recorded {
             path: path.to_owned(),
             version: String::new(),
             machine: Machine { name: String::new(), cycle_ns: 0, axes: Vec::new(), buses: Vec::new() },
-            faults: Vec::new(),
+            incidents: Vec::new(),
             events: Vec::new(),
             health: Vec::new(),
             statistics: Statistics::default(),
@@ -118,7 +139,7 @@ impl Recorded {
         };
         if fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir()) {
             let error = io::Error::other(
-                "this is no ordinary file, and a recording is read more than once: save it first",
+                "this is not a regular file, and a recording is read more than once; save it to a file first",
             );
             return Err(RecordedError::Unreadable { path: path.to_owned(), error: error.into() });
         }
@@ -131,14 +152,14 @@ impl Recorded {
     ///
     /// # Errors
     /// See [`RecordedError`].
-    pub fn cycles(&self, slots: &RangeInclusive<u64>) -> Result<Vec<CycleRecord>, RecordedError> {
+    pub fn cycles(&self, slots: &RangeInclusive<u64>) -> Result<Vec<RecordedCycle>, RecordedError> {
         let mut cycles = Vec::new();
         let mut copy = Self { warnings: Vec::new(), ..self.clone() };
         copy.read(|_, item| {
             if let Item::Cycle(record, _) = item
                 && slots.contains(&record.timing.slot)
             {
-                cycles.push(*record);
+                cycles.push(RecordedCycle::of(record));
             }
         })?;
         Ok(cycles)
@@ -147,15 +168,17 @@ impl Recorded {
     fn take(&mut self, item: Item<'_>) {
         match item {
             Item::Machine(described) => {
-                let text = |key: &str| described.get(key).map_or_else(String::new, |text| printable(text));
+                let text = |key: &str| described.get(key).map_or_else(String::new, |text| name(text));
                 self.version = text("version");
                 self.machine.name = text("machine");
                 self.machine.cycle_ns = text("cycle_ns").parse().unwrap_or(0);
-                let bus = |name: &str| BusDescription { name: name.to_owned(), interface: String::new() };
-                self.machine.buses = text("buses").lines().map(bus).collect();
+                let bus = |line: &str| BusDescription { name: name(line), interface: String::new() };
+                let buses = described.get("buses").map_or("", String::as_str);
+                self.machine.buses = buses.lines().take(MAX_BUSES).map(bus).collect();
             }
-            Item::Fault(fault) => {
-                self.faults.push(fault.into_iter().map(|(key, text)| (key, printable(&text))).collect());
+            Item::Incident(incident) => {
+                self.incidents
+                    .push(incident.into_iter().map(|(key, text)| (key, printable(&text))).collect());
             }
             Item::Cycle(record, log_time_ns) => {
                 let (slot, start_ns) = (record.timing.slot, record.timing.slot_start_ns);
@@ -173,7 +196,7 @@ impl Recorded {
         }
     }
 
-    /// Shows everything in the file to `take`.
+    /// Passes everything in the file to `take`.
     fn read(&mut self, mut take: impl FnMut(&mut Self, Item<'_>)) -> Result<Decoder, RecordedError> {
         let path = self.path.clone();
         let unreadable = |error| RecordedError::Unreadable { path: path.clone(), error };
@@ -192,29 +215,37 @@ impl Recorded {
             return Err(RecordedError::Foreign { path, library });
         }
         if !condition.is_whole {
-            self.warnings.push("the file is cut off; this is what there is of it".to_owned());
+            self.warnings.push("the file is cut off; it is read to its last whole record".to_owned());
         }
         if condition.damaged_chunks > 0 {
-            self.warnings.push(format!("{} damaged parts were left out", condition.damaged_chunks));
+            self.warnings.push(format!("{} damaged chunks were skipped", condition.damaged_chunks));
         }
         if decoder.malformed > 0 {
-            self.warnings.push(format!("{} malformed messages were left out", decoder.malformed));
+            self.warnings.push(format!("{} malformed messages were skipped", decoder.malformed));
         }
         Ok(decoder)
     }
 }
 
-/// What a recording consists of.
+/// Names are repeated in every row of a report, so that a longer one would cost much more than its place in the file.
+const LONGEST_NAME: usize = 200;
+
+/// A name that can be shown.
+fn name(text: &str) -> String {
+    printable(&text.chars().take(LONGEST_NAME).collect::<String>())
+}
+
+/// An item of a recording.
 enum Item<'a> {
     Machine(BTreeMap<String, String>),
-    Fault(BTreeMap<String, String>),
+    Incident(BTreeMap<String, String>),
     /// With its time of day.
     Cycle(&'a CycleRecord, u64),
     Event(RecordedEvent),
     Health(OnBus<TracedHealth>),
 }
 
-/// What a channel carries.
+/// The kind of messages of a channel.
 #[derive(Clone, Copy)]
 enum Carries {
     Cycles,
@@ -223,7 +254,7 @@ enum Carries {
     Health(usize),
 }
 
-/// From records to items.
+/// Makes items from records.
 #[derive(Default)]
 struct Decoder {
     library: String,
@@ -232,41 +263,34 @@ struct Decoder {
     schemas: HashMap<u16, &'static MessageType>,
     channels: HashMap<u16, Carries>,
     axes: BTreeMap<usize, AxisDescription>,
-    /// The cycle whose axes follow, its time of day, and how many of them have been seen.
+    /// The cycle whose axes follow, its time of day, and the number of axes seen so far.
     cycle: Option<(Box<CycleRecord>, u64, usize)>,
     malformed: u64,
 }
 
 impl Decoder {
     fn record(&mut self, opcode: u8, body: &[u8], give: &mut impl FnMut(Item<'_>)) {
-        use mcap::records::op;
-        if !matches!(opcode, op::HEADER | op::SCHEMA | op::CHANNEL | op::MESSAGE | op::METADATA) {
-            return;
-        }
-        if !lengths::fit(opcode, body) {
-            self.malformed += 1;
-            return;
-        }
-        match mcap::parse_record(opcode, body) {
-            Ok(Record::Header(header)) => self.library = header.library,
-            Ok(Record::Schema { header, data }) => self.schema(header.id, &header.name, &data),
-            Ok(Record::Channel(channel)) => self.channel(&channel),
-            Ok(Record::Metadata(metadata)) if metadata.name == recording::METADATA => {
+        match records::parse(opcode, body) {
+            None => {}
+            Some(Ok(Record::Header { library })) => self.library = library,
+            Some(Ok(Record::Schema { id, name, definition })) => self.schema(id, &name, definition),
+            Some(Ok(Record::Channel { id, schema, metadata })) => self.channel(id, schema, &metadata),
+            Some(Ok(Record::Metadata { name, entries })) if name == recording::METADATA => {
                 self.is_of_takt = true;
-                give(Item::Machine(metadata.metadata));
+                give(Item::Machine(entries));
             }
-            Ok(Record::Metadata(metadata)) if metadata.name == black_box::METADATA => {
-                give(Item::Fault(metadata.metadata));
+            Some(Ok(Record::Metadata { name, entries })) if name == black_box::METADATA => {
+                give(Item::Incident(entries));
             }
-            Ok(Record::Message { header, data }) => {
-                if let Some(carries) = self.channels.get(&header.channel_id)
-                    && self.message(*carries, header.log_time, &data, give).is_none()
+            Some(Ok(Record::Metadata { .. })) => {}
+            Some(Ok(Record::Message { channel, log_time_ns, data })) => {
+                if let Some(carries) = self.channels.get(&channel)
+                    && self.message(*carries, log_time_ns, data, give).is_none()
                 {
                     self.malformed += 1;
                 }
             }
-            Ok(_) => {}
-            Err(_) => self.malformed += 1,
+            Some(Err(records::Malformed)) => self.malformed += 1,
         }
     }
 
@@ -280,19 +304,21 @@ impl Decoder {
         }
     }
 
-    fn channel(&mut self, channel: &mcap::records::Channel) {
-        let Some(schema) = self.schemas.get(&channel.schema_id) else { return };
-        let text = |key: &str| channel.metadata.get(key).map_or("", String::as_str);
+    fn channel(&mut self, id: u16, schema: u16, metadata: &BTreeMap<String, String>) {
+        let Some(schema) = self.schemas.get(&schema) else { return };
+        let text = |key: &str| metadata.get(key).map_or("", String::as_str);
         let number = |key: &str| text(key).parse().unwrap_or(f64::INFINITY);
         let index = text("index").parse::<usize>().ok();
         let carries = match (schema.name, index) {
-            (name, _) if name == messages::CYCLE.name => Carries::Cycles,
-            (name, _) if name == messages::EVENT.name => Carries::Events,
-            (name, Some(index)) if name == messages::AXIS.name => {
+            (message, _) if message == messages::CYCLE.name => Carries::Cycles,
+            (message, _) if message == messages::EVENT.name => Carries::Events,
+            (message, Some(index)) if message == messages::AXIS.name => {
                 let description = AxisDescription {
-                    name: printable(text("name")),
-                    bus: channel.metadata.get("bus").map(|bus| printable(bus)),
+                    name: name(text("name")),
+                    bus: metadata.get("bus").map(|bus| name(bus)),
                     unit: if text("unit") == Unit::Metre.symbol() { Unit::Metre } else { Unit::Radian },
+                    // Recordings of earlier versions do not have it.
+                    plans_own_profile: text("plans_own_profile") == "true",
                     counts_per_unit: number("counts_per_unit"),
                     limits: SetPointMagnitudes {
                         velocity: number("velocity_limit"),
@@ -303,10 +329,10 @@ impl Decoder {
                 self.axes.insert(index, description);
                 Carries::Axis(index)
             }
-            (name, Some(index)) if name == messages::BUS.name => Carries::Health(index),
+            (message, Some(index)) if message == messages::BUS.name => Carries::Health(index),
             _ => return,
         };
-        self.channels.insert(channel.id, carries);
+        self.channels.insert(id, carries);
     }
 
     fn message(
@@ -342,7 +368,7 @@ impl Decoder {
         Some(())
     }
 
-    /// Gives the last cycle, unless some of its axes are missing.
+    /// Passes on the last cycle, unless some of its axes are missing.
     fn finish(&mut self, give: &mut impl FnMut(Item<'_>)) {
         if let Some((record, log_time_ns, seen)) = self.cycle.take()
             && seen == self.axes.len()

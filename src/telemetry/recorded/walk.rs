@@ -1,5 +1,5 @@
-//! From the bytes of an MCAP file to its records, as far as they go. A file that was cut off (`kill -9`, a power cut) is
-//! read to its last whole record, also within a chunk; a chunk whose checksum is wrong is left out.
+//! Splits an MCAP file into its records. A file that was cut off (`kill -9`, a power cut) is read to its last whole record,
+//! also within a chunk. A chunk with a wrong checksum is skipped.
 
 use std::io::{self, Read};
 
@@ -8,36 +8,36 @@ use mcap::records::op;
 
 use crate::printable::printable;
 
-/// No record of takt is longer. A length beyond it is no length.
+/// No record of takt is longer. A longer record means that the file is damaged.
 const LONGEST_RECORD: u64 = 1 << 28;
 
-/// What a file is, at its end.
+/// The condition of a file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Condition {
     /// Whether it was read to the end of its data.
     pub is_whole: bool,
-    /// Chunks that were left out because they are damaged.
+    /// The number of damaged chunks, which were skipped.
     pub damaged_chunks: u64,
 }
 
-/// Why nothing can be read.
+/// Why a file cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum WalkError {
     /// The file cannot be read.
     #[error(transparent)]
     Io(#[from] io::Error),
-    /// There is nothing in it.
+    /// The file is empty.
     #[error("the file is empty: nothing was recorded")]
     Empty,
-    /// It is something else.
-    #[error("this is no MCAP file; name a recording or a black box that `takt run` has left")]
+    /// It is not an MCAP file.
+    #[error("this is not an MCAP file; name a recording or a black box of `takt run`")]
     NotMcap,
-    /// takt compresses nothing.
+    /// takt does not compress chunks.
     #[error("its chunks are compressed ({0}); takt writes and reads uncompressed ones only")]
     Compressed(String),
 }
 
-/// Shows every record with its opcode to `visit`, in the order of the file.
+/// Passes every record with its opcode to `visit`, in the order of the file.
 pub fn walk(mut file: impl Read, mut visit: impl FnMut(u8, &[u8])) -> Result<Condition, WalkError> {
     let mut condition = Condition::default();
     let mut body = Vec::new();
@@ -58,8 +58,8 @@ pub fn walk(mut file: impl Read, mut visit: impl FnMut(u8, &[u8])) -> Result<Con
         match opcode {
             op::DATA_END | op::FOOTER => return Ok(Condition { is_whole: true, ..condition }),
             op::CHUNK => {
-                let is_sound = walk_chunk(&body, is_whole, &mut visit)?;
-                condition.damaged_chunks += u64::from(!is_sound);
+                let is_undamaged = walk_chunk(&body, is_whole, &mut visit)?;
+                condition.damaged_chunks += u64::from(!is_undamaged);
             }
             _ if is_whole => visit(opcode, &body),
             _ => {}
@@ -85,7 +85,7 @@ fn read_up_to(file: &mut impl Read, length: u64, into: &mut Vec<u8>) -> io::Resu
     Ok(())
 }
 
-/// Returns whether the chunk is sound, as far as that can be told.
+/// Returns whether the chunk is undamaged. The checksum of a chunk that was cut off cannot be checked.
 fn walk_chunk(body: &[u8], is_whole: bool, visit: &mut impl FnMut(u8, &[u8])) -> Result<bool, WalkError> {
     let Some(chunk) = Chunk::parse(body) else { return Ok(!is_whole) };
     if !chunk.compression.is_empty() {
@@ -114,8 +114,8 @@ struct Chunk<'a> {
 }
 
 impl<'a> Chunk<'a> {
-    /// Start and end time, uncompressed size and its CRC, the compression's name, the size, and the records, which may
-    /// have been cut off.
+    /// Reads start time, end time, uncompressed size, CRC, name of the compression, size, and records. The records may have
+    /// been cut off.
     fn parse(body: &'a [u8]) -> Option<Self> {
         let (_, rest) = body.split_at_checked(8 + 8 + 8)?;
         let (crc, rest) = rest.split_first_chunk::<4>()?;
@@ -156,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn records_are_seen_in_and_between_chunks_up_to_the_end_of_the_data() {
+    fn records_are_read_inside_and_between_chunks_up_to_the_end_of_the_data() {
         let inner = [record(op::MESSAGE, b"b"), record(op::MESSAGE, b"c")].concat();
         let chunk = chunk("", crc32fast::hash(&inner), &inner);
         let end = record(op::DATA_END, &[0; 4]);
@@ -167,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn a_chunk_that_is_cut_off_gives_its_whole_records_and_a_damaged_one_none() {
+    fn a_cut_off_chunk_gives_its_whole_records_and_a_damaged_chunk_gives_none() {
         let inner = [record(op::MESSAGE, b"one"), record(op::MESSAGE, b"two")].concat();
         let sound = chunk("", crc32fast::hash(&inner), &inner);
         let (bodies, condition) = seen(&file(&[&sound[..sound.len() - 1]])).unwrap();
@@ -187,7 +187,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn no_bytes_bring_it_down(
+        fn no_input_makes_it_panic(
             parts in prop::collection::vec((0u8..0x12, prop::collection::vec(any::<u8>(), 0..80)), 0..6),
             cut in 0usize..400,
             at in 0usize..400,

@@ -1,18 +1,18 @@
-//! What a recording or a black box tells: why the group stopped, what led to it, how the timing was.
+//! The report of a recording or a black box: why the group stopped, the cycles before, and the timing.
 
-mod picture;
+mod render;
 
 use std::path::PathBuf;
 
 use serde::Serialize;
-use takt_rt::{AxisRecord, CycleRecord, EventKind};
+use takt_rt::{AxisRecord, EventKind};
 
 use super::machine::SetPointMagnitudes;
-use super::recorded::{Cause, Recorded, RecordedError};
+use super::recorded::{Cause, Recorded, RecordedCycle, RecordedError};
 use super::report::{BusReport, LatencyReport, SetPointParts};
 use super::words;
 
-/// Events that are told before the cause, and after it.
+/// The numbers of events that are shown before the cause, and after it.
 const EVENTS: (usize, usize) = (24, 12);
 
 /// A recording in numbers and words.
@@ -26,39 +26,39 @@ pub struct RecordingReport {
     pub machine: String,
     /// Period of the cycle.
     pub cycle_ns: u64,
-    /// When it begins, in UTC.
+    /// The time of its first cycle, in UTC.
     pub begins: Option<String>,
     /// Cycles in it.
     pub cycles: u64,
     /// Whether it is the file of a black box.
     pub is_black_box: bool,
-    /// What is not as it should be with the file.
+    /// Defects of the file.
     pub warnings: Vec<String>,
-    /// Why the group stopped; `None` when it did not.
+    /// Why the group stopped; `None` if it did not.
     pub cause: Option<Cause>,
-    /// The axis concerned, or the one that was asked for; `None` when there is no cycle.
+    /// The axis of the cause, or the one that was asked for; `None` if there is no cycle.
     pub axis: Option<AxisCycles>,
-    /// What happened around the cause, or at last.
+    /// The events around the cause, or the last ones.
     pub events: Vec<ReportedEvent>,
     /// Every emergency message of a drive.
     pub emergencies: Vec<ReportedEvent>,
-    /// How late the timer woke the thread.
+    /// Wake-up latency.
     pub wake_ns: LatencyReport,
     /// SYNC release error.
     pub sync_ns: LatencyReport,
-    /// From feedback to set-points, without I/O.
+    /// Computing time from feedback to set-points, without I/O.
     pub compute_ns: LatencyReport,
-    /// When the last set-point had been handed over, after the start of the slot.
+    /// Time from the start of the slot until the last set-point was handed over.
     pub sent_ns: LatencyReport,
     /// Slots that passed unused.
     pub missed_slots: u64,
     /// The axes in the order of the configuration.
     pub axes: Vec<AxisSummary>,
-    /// What became worse on the buses; an ordinary recording does not have it.
+    /// The changes of the buses' health. Only a black box has them.
     pub buses: Vec<BusChange>,
 }
 
-/// The cycles of one axis that led to the cause.
+/// The cycles of one axis before the cause.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct AxisCycles {
     /// Its name.
@@ -74,13 +74,13 @@ pub struct AxisCycles {
 pub struct AxisCycle {
     /// The slot.
     pub slot: u64,
-    /// What the group was doing.
+    /// The phase of the group.
     pub phase: &'static str,
     /// The set-point.
     pub position_set: f64,
-    /// What the drive reported.
+    /// The position that the drive reported.
     pub position: f64,
-    /// The velocity that was asked for.
+    /// The velocity set-point.
     pub velocity_set: f32,
     /// Actual velocity.
     pub velocity: f32,
@@ -109,18 +109,18 @@ pub struct AxisSummary {
     pub following_error_max: Option<f64>,
     /// The largest velocity, acceleration and jerk of its set-points.
     pub set_point_max: SetPointMagnitudes,
-    /// As parts of their limits.
+    /// The same as fractions of their limits.
     pub set_point_part: SetPointParts,
 }
 
-/// Something that happened.
+/// An event.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ReportedEvent {
     /// The slot in which it was seen.
     pub slot: u64,
-    /// After the beginning of the recording; negative for what was before it.
+    /// Seconds after the beginning of the recording; negative for an earlier event.
     pub at_s: f64,
-    /// In words.
+    /// Its text.
     pub text: String,
 }
 
@@ -129,7 +129,7 @@ pub struct ReportedEvent {
 pub struct BusChange {
     /// Its name.
     pub name: String,
-    /// After the beginning of the recording.
+    /// Seconds after the beginning of the recording.
     pub at_s: f64,
     /// The fault confinement state.
     pub state: &'static str,
@@ -142,7 +142,7 @@ pub struct BusChange {
 }
 
 impl RecordingReport {
-    /// Puts it together, with so many cycles of the axis concerned, or of `axis`.
+    /// Makes the report, with so many cycles of `axis`, or of the axis of the cause.
     ///
     /// # Errors
     /// See [`RecordedError`].
@@ -151,7 +151,7 @@ impl RecordingReport {
         let window = recorded.cycles(&recorded.slots_around_cause(cycles.saturating_sub(1), 0))?;
         let shown = axis.or_else(|| recorded.axis(None)).and_then(|axis| {
             let description = machine.axes.get(axis)?;
-            let row = |record: &CycleRecord| Some(AxisCycle::new(record, record.axes().get(axis)?));
+            let row = |cycle: &RecordedCycle| Some(AxisCycle::new(cycle, cycle.axes.get(axis)?));
             Some(AxisCycles {
                 name: description.name.clone(),
                 unit: description.unit.symbol(),
@@ -203,7 +203,7 @@ impl RecordingReport {
             cycle_ns: machine.cycle_ns,
             begins: recorded.wall_clock.map(|clock| clock.moment(statistics.first_ns)),
             cycles: statistics.cycles,
-            is_black_box: !recorded.faults.is_empty(),
+            is_black_box: !recorded.incidents.is_empty(),
             warnings: recorded.warnings.clone(),
             cause,
             axis: shown,
@@ -221,10 +221,10 @@ impl RecordingReport {
 }
 
 impl AxisCycle {
-    fn new(record: &CycleRecord, axis: &AxisRecord) -> Self {
+    fn new(cycle: &RecordedCycle, axis: &AxisRecord) -> Self {
         Self {
-            slot: record.timing.slot,
-            phase: words::phase(record.phase),
+            slot: cycle.timing.slot,
+            phase: words::phase(cycle.phase),
             position_set: axis.position_set,
             position: axis.position,
             velocity_set: axis.velocity_set,

@@ -1,11 +1,11 @@
-//! Rejected requests in words.
+//! The texts of rejected requests.
 
 use takt_rt::{MappedObject, RejectReason, RequestError, RequestKind};
 
 use super::{mode, phase, rule_key};
 use crate::telemetry::machine::{Machine, Unit};
 
-/// What was asked for: "the move".
+/// The name of a request: "the move".
 pub const fn request(kind: RequestKind) -> &'static str {
     match kind {
         RequestKind::Sync => "switching SYNC",
@@ -26,7 +26,7 @@ pub const fn request(kind: RequestKind) -> &'static str {
     }
 }
 
-/// What was rejected and why: "the move was rejected while holding: shoulder cannot go to 3.5000 rad, beyond its position
+/// The rejected request and the reason: "the move was rejected while holding: shoulder cannot go to 3.5000 rad, beyond its position
 /// limit of 2.9671 rad".
 pub fn rejection(rejected: &RequestError, machine: &Machine) -> String {
     let (what, during) = (request(rejected.request), phase(rejected.phase));
@@ -51,7 +51,7 @@ fn reason(rejected: &RequestError, machine: &Machine) -> String {
         }
         RejectReason::EnableInhibited => "the run is ending".to_owned(),
         RejectReason::MissedSlots { missed, limit } => {
-            format!("{missed} slots were missed of late, and from {limit} on no stream begins")
+            format!("{missed} slots were missed recently, and a stream needs fewer than {limit}")
         }
         RejectReason::UnknownAxis { axis, axes } => {
             format!("there is no axis {axis}: there are {axes}, counted from 0")
@@ -110,6 +110,7 @@ mod tests {
             name: name.to_owned(),
             bus: None,
             unit,
+            plans_own_profile: false,
             counts_per_unit: 1.0,
             limits: SetPointMagnitudes::default(),
         };

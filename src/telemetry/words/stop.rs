@@ -1,23 +1,34 @@
-//! Why the group stopped, in words.
+//! The texts of stops.
 
 use takt_rt::{Fault, StopCause, StopReason};
 
 use super::{category, mode, phase};
 use crate::telemetry::machine::{Machine, Unit};
 
-/// Why the group stopped, without how and when: "joint3 was 0.0214 rad from its set-point (allowed: 0.0200 rad)".
+/// The cause of a stop, without phase and category: "joint3 was 0.0214 rad from its set-point (allowed: 0.0200 rad)".
 pub fn stop_cause(stop: &StopReason, machine: &Machine) -> String {
     let axis = stop.axis().map_or_else(|| "an axis".to_owned(), |axis| machine.axis_name(axis));
     let bus =
         stop.origin.bus().map_or_else(|| "a bus".to_owned(), |bus| format!("bus {}", machine.bus_name(bus)));
     let unit = stop.axis().map_or(Unit::Radian, |axis| machine.axis_unit(axis)).symbol();
-    let StopCause::Fault(fault) = stop.cause else { return "a stop was asked for".to_owned() };
+    let StopCause::Fault(fault) = stop.cause else { return "a stop was requested".to_owned() };
+    // No set-point is sent to a drive that plans its own profile: its measured motion is checked.
+    let is_measured = stop.axis().is_some_and(|axis| machine.plans_own_profile(axis));
     match fault {
+        Fault::PositionLimit { position, limit } if is_measured => format!(
+            "{axis} would come to rest at {position:.4} {unit}, outside its position limit of {limit:.4} {unit}"
+        ),
+        Fault::VelocityLimit { velocity, limit } if is_measured => {
+            format!("{axis} moved at {velocity:.3} {unit}/s (allowed: {limit:.3} {unit}/s)")
+        }
+        Fault::FollowingError { .. } if is_measured => {
+            format!("{axis} stood still, and its drive had not reached its target")
+        }
         Fault::NotFinite { position } => {
             format!("the set-point of {axis} was not a finite number ({position})")
         }
         Fault::PositionLimit { position, limit } => format!(
-            "the set-point of {axis}, {position:.4} {unit}, lay outside its position limit of {limit:.4} {unit}"
+            "the set-point of {axis}, {position:.4} {unit}, was outside its position limit of {limit:.4} {unit}"
         ),
         // Asked for by a set-point, or measured where the drive plans its own motion (PP, PV, PT).
         Fault::VelocityLimit { velocity, limit } => {
@@ -89,9 +100,9 @@ pub fn stop_cause(stop: &StopReason, machine: &Machine) -> String {
             )
         }
         Fault::TimingUnfit { missed, limit } => {
-            format!("the controller misses its slots too often: {missed} of late (allowed: {limit})")
+            format!("the controller misses its slots too often: {missed} recently (allowed: {limit})")
         }
-        Fault::BusErrorPassive => format!("{bus} is error-passive: hardly a frame gets through"),
+        Fault::BusErrorPassive => format!("{bus} is error-passive: almost no frame gets through"),
         Fault::BusLost => format!("{bus} is bus-off or its interface is down"),
         Fault::EnableTimeout { limit, .. } => format!(
             "the drive of {axis} did not reach operation enabled within {} ({:.1} s)",
@@ -99,11 +110,11 @@ pub fn stop_cause(stop: &StopReason, machine: &Machine) -> String {
             f64::from(limit) * machine.cycle_ns as f64 * 1e-9
         ),
         Fault::NoTrajectory if stop.axis().is_some() => {
-            format!("no trajectory leads {axis} to what was asked")
+            format!("no trajectory within the limits of {axis} leads to its target")
         }
-        Fault::NoTrajectory => "no trajectory leads to what was asked".to_owned(),
+        Fault::NoTrajectory => "no trajectory within the limits leads to the target".to_owned(),
         Fault::NotTransmitted { cycles: blocked, .. } => {
-            format!("set-points are not getting onto the wire of {bus} for {}", cycles(blocked))
+            format!("set-points on {bus} were not transmitted for {}", cycles(blocked))
         }
     }
 }
@@ -115,7 +126,7 @@ fn cycles(count: impl Into<u32>) -> String {
     }
 }
 
-/// The whole story of a stop: cause, what was going on, and how.
+/// The full text of a stop: cause, phase, and category.
 pub fn stop(stop: &StopReason, machine: &Machine) -> String {
     format!("{} while {}; {}", stop_cause(stop, machine), phase(stop.phase), category(stop.category))
 }
@@ -226,7 +237,7 @@ mod tests {
                 Origin::Bus(0),
                 6.0,
                 0.0,
-                "set-points are not getting onto the wire of bus left for 6 cycles",
+                "set-points on bus left were not transmitted for 6 cycles",
             ),
             (
                 Rule::StartPose,
@@ -275,14 +286,14 @@ mod tests {
                 Origin::Group,
                 250.0,
                 250.0,
-                "the controller misses its slots too often: 250 of late (allowed: 250)",
+                "the controller misses its slots too often: 250 recently (allowed: 250)",
             ),
             (
                 Rule::BusErrorPassive,
                 Origin::Bus(0),
                 0.0,
                 0.0,
-                "bus left is error-passive: hardly a frame gets through",
+                "bus left is error-passive: almost no frame gets through",
             ),
             (
                 Rule::NotAcknowledged,
@@ -298,10 +309,26 @@ mod tests {
     }
 
     #[test]
-    fn a_stop_tells_cause_phase_and_category() {
+    fn the_text_of_a_stop_has_cause_phase_and_category() {
         assert_eq!(
             stop(&reason(Rule::Requested, Origin::Group, 0.0, 0.0), &machine()),
-            "a stop was asked for while moving; category 1: decelerated, then power removed"
+            "a stop was requested while moving; category 1: decelerated, then power removed"
+        );
+    }
+
+    #[test]
+    fn for_a_drive_that_plans_its_own_profile_the_measured_motion_is_named_and_no_set_point() {
+        let mut machine = machine();
+        machine.axes[1].plans_own_profile = true;
+        let text = |rule, value, limit| stop_cause(&reason(rule, Origin::Axis(1), value, limit), &machine);
+        assert_eq!(text(Rule::VelocityLimit, 2.5, 2.0), "slide moved at 2.500 m/s (allowed: 2.000 m/s)");
+        assert_eq!(
+            text(Rule::PositionLimit, 1.25, 1.0),
+            "slide would come to rest at 1.2500 m, outside its position limit of 1.0000 m"
+        );
+        assert_eq!(
+            text(Rule::FollowingError, 0.5, 0.02),
+            "slide stood still, and its drive had not reached its target"
         );
     }
 

@@ -101,7 +101,7 @@ fn cycles() -> Option<Phase> {
         not_transmitted_cycles: 5,
         acknowledge_timeout_cycles: 500,
         categories: StopCategories::default(),
-        timing: TimingLadder { warning: 10, degraded: 50, unfit: 250, leak_cycles: 20 },
+        timing: TimingLadder { warning: 10, degraded: 50, unfit: 250, leak_slots: 20 },
     };
     let mut engine: Engine<1, 1> = Engine::new(parameters).ok()?;
     let requests = [Some(Request::Sync(true)), Some(Request::Activate), Some(Request::Enable)];

@@ -1,4 +1,4 @@
-//! The mailbox and the ring with every access relaxed; the fences are as they should be.
+//! The mailbox and the ring with every access relaxed. The fences are the real ones.
 
 #[path = "../../../src/controller/channels/latest.rs"]
 pub mod latest;

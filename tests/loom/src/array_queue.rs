@@ -1,8 +1,8 @@
-//! What a ring asks of crossbeam's `ArrayQueue`, and no more. The real queue orders what its two ends do to a slot, and
-//! for that it waits when it meets an end half-way through. This one orders nothing: loom fails a test in which both
-//! ends touch a slot without an order between them, and a slot that is not as expected is a failure, too. Where this
-//! queue passes, the other end has always finished with the slot before, so the real one has nothing to wait for.
-//! What the real one does within a slot is left to crossbeam's own tests.
+//! The part of crossbeam's `ArrayQueue` that a ring uses. The real queue orders the accesses of its two ends to a slot, and
+//! so it waits for an end in the middle of an access. This queue orders nothing. Loom fails a test in which both ends
+//! access a slot without an order between them. A slot with an unexpected content is a failure, too. If the tests pass with
+//! this queue, the other end has always completed its access before, so the real queue never waits. The real queue's
+//! accesses within a slot are covered by crossbeam's own tests.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -10,7 +10,7 @@ use loom::cell::UnsafeCell;
 
 pub struct ArrayQueue<T> {
     slots: Box<[UnsafeCell<Option<T>>]>,
-    // The standard library's atomics are unseen by loom: only one end uses each, and they order nothing for loom.
+    // Loom does not see the standard library's atomics. Each is used by one end only, and they order nothing for loom.
     pushed: AtomicUsize,
     popped: AtomicUsize,
 }
@@ -45,7 +45,7 @@ impl<T> ArrayQueue<T> {
 
     fn with_next<R>(&self, count: &AtomicUsize, access: impl FnOnce(&mut Option<T>) -> R) -> R {
         let slot = &self.slots[count.fetch_add(1, Ordering::Relaxed) % self.slots.len()];
-        // SAFETY: loom has checked that nobody else has the slot when it calls this, and the reference ends with it.
+        // SAFETY: loom has checked that the other end does not access the slot during this call, and the reference ends with it.
         slot.with_mut(|slot| access(unsafe { &mut *slot }))
     }
 }

@@ -1,14 +1,14 @@
-//! The lock-free channels of the host interface, the very source files of takt, built on loom's atomics: loom runs a test again
-//! and again, through every order in which the threads can be scheduled and every value that a load may see.
+//! The lock-free channels of takt, from their own source files, built with loom's atomics. Loom repeats a test with every
+//! order in which the threads can be scheduled, and with every value that a load may see.
 //!
-//! What is proven here holds for the bounds that each test names. Loom knows the relaxed, acquire and release accesses
-//! and fences that the channels use, and keeps the last seven values of an atomic; no test here writes more. It does
-//! not let a load see a store that is executed later (load buffering). The mailbox has no such executions, for
-//! only one end stores, nor has the ring, for what an end stores for the other is a release store, which no earlier
-//! access of its thread can come after.
+//! The proof holds for the bounds that each test names. Loom knows the relaxed, acquire and release accesses and fences of
+//! the channels. It keeps the last seven values of an atomic, and no test here writes more. It does not model load
+//! buffering: a load never sees a store that is executed later. The mailbox has no such executions, since only one end
+//! stores. The ring has none either: an end stores for the other end with release, and no earlier access of its thread can
+//! come after a release store.
 //!
-//! [`without_fences`] and [`all_relaxed`] are the same sources once more with the ordering taken away. They must
-//! fail: that shows that the tests would notice.
+//! [`without_fences`] and [`all_relaxed`] are the same sources without the ordering. They must fail: that shows that the
+//! tests detect a missing ordering.
 
 #![expect(clippy::duplicate_mod, reason = "the same source on other atomics is what the weakened ones are")]
 

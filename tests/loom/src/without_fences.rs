@@ -1,4 +1,4 @@
-//! The mailbox with fences that do nothing.
+//! The mailbox with fences that have no effect.
 
 #[path = "../../../src/controller/channels/latest.rs"]
 pub mod latest;

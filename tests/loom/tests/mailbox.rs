@@ -1,5 +1,5 @@
-//! The mailbox of the newest value. Two words are enough for a mixture; the second use of a slot, which is what a read
-//! can be torn by, comes with the fifth value.
+//! The mailbox of the newest value. Two words are enough for a mixture of two values. The fifth value is the second use of
+//! a slot, which can tear a read.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -18,15 +18,15 @@ fn take(words: &mut Words<'_>) -> [u64; WORDS] {
     [(); WORDS].map(|()| words.take())
 }
 
-/// A mailbox that has seen `written` values, each made of its own number.
+/// A mailbox after `written` values. All words of a value are its number.
 fn mailbox(written: u64) -> (Writer, Reader) {
     let (mut writer, reader) = latest(WORDS);
     (1..=written).for_each(|number| write(&mut writer, number));
     (writer, reader)
 }
 
-/// What a reader sees in so many attempts, each of which may only be whole and newer, nothing, or torn. Returns the
-/// number of the newest value, and how many attempts were torn.
+/// Makes so many attempts to read. Each must give a whole and newer value, nothing, or a torn read. Returns the number of
+/// the newest value and the number of torn reads.
 fn follow(reader: &Reader, attempts: usize) -> (u64, u64) {
     let (mut seen, mut torn, mut is_after_torn) = (0, 0, false);
     for _ in 0..attempts {
@@ -46,8 +46,8 @@ fn follow(reader: &Reader, attempts: usize) -> (u64, u64) {
     (seen, torn)
 }
 
-/// One reader makes `attempts` while a mailbox that has `before` values gets values up to number `last`. Returns how
-/// many attempts were torn in the worst of all schedules.
+/// One reader makes `attempts` while the mailbox goes from value `before` to value `last`. Returns the largest number of torn
+/// reads of all schedules.
 fn reader_beside_writer(before: u64, last: u64, attempts: usize) -> u64 {
     let worst = Arc::new(AtomicU64::new(0));
     let worst_so_far = Arc::clone(&worst);
@@ -57,7 +57,7 @@ fn reader_beside_writer(before: u64, last: u64, attempts: usize) -> u64 {
         let following = thread::spawn(move || follow(&observer, attempts));
         (before + 1..=last).for_each(|number| write(&mut writer, number));
         let (_, torn) = following.join().unwrap();
-        // A read is torn only by three values that were completed meanwhile.
+        // Only three values that are completed during a read can tear it.
         assert!(torn <= (last - before) / 3, "{torn} torn reads");
         assert_eq!(reader.attempt(0, take), Attempt::Whole([last; WORDS], last));
         worst_so_far.fetch_max(torn, Ordering::Relaxed);
@@ -66,12 +66,12 @@ fn reader_beside_writer(before: u64, last: u64, attempts: usize) -> u64 {
 }
 
 #[test]
-fn a_reader_from_the_first_value_on_sees_whole_values_each_newer_than_the_last() {
+fn a_reader_sees_whole_values_and_each_is_newer_than_the_one_before() {
     assert_eq!(reader_beside_writer(0, 3, 3), 0);
 }
 
 #[test]
-fn a_reader_whose_slot_is_used_again_sees_a_whole_value_or_knows_that_it_did_not_and_next_time_does() {
+fn a_reader_whose_slot_is_used_again_sees_a_whole_value_or_a_torn_read_and_then_a_whole_value() {
     assert_eq!(reader_beside_writer(1, 5, 3), 1);
 }
 
@@ -125,7 +125,7 @@ fn a_writer_does_not_wait_for_a_reader_that_was_preempted_in_the_middle_of_a_val
     }
 }
 
-/// The same as above, short, for a mailbox that is not as it should be.
+/// The same as above, in short, for a mailbox without its ordering.
 macro_rules! reader_beside_writer_of {
     ($latest:ident, $values:literal) => {
         loom::model(|| {

@@ -1,4 +1,4 @@
-//! The slots of the cycle records, which go round between the real-time thread and the logger.
+//! The slots of the cycle records, which circulate between the real-time thread and the logger.
 
 use loom::thread;
 use takt_loom::records::{RecordConsumer, record_ring};
@@ -6,7 +6,7 @@ use takt_rt::{AxisRecord, CycleRecord};
 
 const PUSHES: u64 = 4;
 
-/// A record that says its number at its beginning and at its end.
+/// A record that has its number at its beginning and at its end.
 fn record(number: u64) -> CycleRecord {
     let mut record = CycleRecord { axis_count: 1, ..CycleRecord::default() };
     record.timing.slot = number;
@@ -36,7 +36,7 @@ fn under_every_schedule_records_arrive_whole_and_in_order_and_no_slot_is_lost() 
             arrived.extend(std::iter::from_fn(|| next(&mut consumer)));
             assert_eq!(arrived, pushed);
             assert_eq!(consumer.dropped(), PUSHES - pushed.len() as u64);
-            // All slots have come back: exactly as many records find room as at the start.
+            // All slots have been returned: as many records find room as at the start.
             let room = (1..=2 * capacity as u64).filter(|number| producer.push(&record(*number))).count();
             assert_eq!(room, capacity);
         });

@@ -1,4 +1,4 @@
-//! The ring from one thread to one other, for every capacity that fills up and comes round within a few items.
+//! The ring between two threads, for every capacity that fills up and wraps around within a few items.
 
 use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex};
@@ -7,11 +7,11 @@ use loom::thread;
 use takt_loom::all_relaxed;
 use takt_loom::ring::ring;
 
-/// Items that are pushed, and attempts to pop beside that.
+/// The number of pushed items, and of attempts to pop at the same time.
 const ITEMS: u64 = 4;
 
 #[test]
-fn every_item_that_found_room_comes_out_once_and_in_order_and_the_others_are_counted() {
+fn every_accepted_item_comes_out_once_and_in_order_and_the_others_are_counted() {
     for capacity in 1..=3 {
         let fates = Arc::new(Mutex::new(BTreeSet::new()));
         let fates_so_far = Arc::clone(&fates);
@@ -28,13 +28,13 @@ fn every_item_that_found_room_comes_out_once_and_in_order_and_the_others_are_cou
             assert_eq!((consumer.pushed(), consumer.dropped()), (counted, ITEMS - counted));
             fates_so_far.lock().unwrap().insert(pushed.len());
         });
-        // Among the schedules are those in which the consumer came too late for every item, or for none.
+        // In some schedules the consumer is too late for every item, in others for none.
         assert_eq!(*fates.lock().unwrap(), (capacity..=ITEMS as usize).collect());
     }
 }
 
 #[test]
-fn a_count_that_was_seen_never_promises_more_than_can_be_popped() {
+fn the_count_of_pushed_items_is_never_larger_than_what_can_be_popped() {
     loom::model(|| {
         let (mut producer, mut consumer) = ring(2);
         let pushing = thread::spawn(move || (0..3).filter(|item| producer.push(*item)).count());

@@ -1,4 +1,4 @@
-//! Alarms: what they do to the motor, how they show, what clears them.
+//! Alarms: their effect on the motor, their signals, and how they are cleared.
 
 use takt::sim::DriveFault;
 use takt::sim::plant::EndStops;
@@ -6,7 +6,7 @@ use takt_rt::DriveState;
 
 use super::{Bench, NODE, Quirks, YzAimParameters, bench, by_the_manual, parameters};
 
-/// An enabled drive that turns at 500 r/min in mode 3, with its heartbeat every 100 ms.
+/// An enabled drive that turns at 500 r/min in mode 3 with a heartbeat every 100 ms.
 pub fn turning() -> Bench {
     let mut bench = bench(by_the_manual(NODE));
     bench.write(0x1017, 0, 2, 100).unwrap();
@@ -29,7 +29,7 @@ fn last_heartbeat(bench: &mut Bench) -> Vec<u8> {
 }
 
 #[test]
-fn stopping_alarms_show_everywhere_and_free_the_motor_until_they_are_cleared() {
+fn stopping_alarms_are_signalled_and_release_the_motor_until_they_are_cleared() {
     let faults = [
         (DriveFault::BlockedRotor, 0x12),
         (DriveFault::OverCurrent, 0x12),
@@ -38,7 +38,7 @@ fn stopping_alarms_show_everywhere_and_free_the_motor_until_they_are_cleared() {
     ];
     for (fault, code) in faults {
         let mut bench = turning();
-        bench.bus.inject(NODE, fault).unwrap();
+        bench.bus.inject_fault(NODE, fault).unwrap();
         bench.run_ms(2_000);
         assert_eq!((bench.alarm(), bench.statusword() & 0x0F), (code, 0x0B));
         assert_eq!((bench.observe().state, bench.observe().error_code), (DriveState::Fault, code as u16));
@@ -56,9 +56,9 @@ fn stopping_alarms_show_everywhere_and_free_the_motor_until_they_are_cleared() {
 }
 
 #[test]
-fn the_output_enable_clears_an_alarm_too_and_the_motor_runs_again() {
+fn the_output_enable_also_clears_an_alarm_and_restarts_the_motor() {
     let mut bench = turning();
-    bench.bus.inject(NODE, DriveFault::Stall).unwrap();
+    bench.bus.inject_fault(NODE, DriveFault::Stall).unwrap();
     bench.run_ms(1_000);
     bench.write(0x2601, 0, 2, 1).unwrap();
     bench.run_ms(500);
@@ -71,10 +71,10 @@ fn the_output_enable_clears_an_alarm_too_and_the_motor_runs_again() {
 }
 
 #[test]
-fn an_over_voltage_shows_in_6079_and_is_not_cleared_while_it_lasts() {
+fn an_over_voltage_appears_in_6079_and_cannot_be_cleared_while_it_lasts() {
     let mut bench = turning();
     assert_eq!(bench.read(0x6079, 0), Ok(24 * 327));
-    bench.bus.inject(NODE, DriveFault::OverVoltage).unwrap();
+    bench.bus.inject_fault(NODE, DriveFault::OverVoltage).unwrap();
     bench.run_ms(10);
     assert!(bench.read(0x6079, 0).unwrap() > 52 * 327);
     bench.control(0x80);
@@ -86,10 +86,10 @@ fn an_over_voltage_shows_in_6079_and_is_not_cleared_while_it_lasts() {
 }
 
 #[test]
-fn the_battery_alarm_lets_the_motor_run_and_only_the_multi_turn_zero_clears_it() {
+fn the_battery_alarm_does_not_stop_the_motor_and_only_the_multi_turn_zero_clears_it() {
     let mut bench = turning();
     assert_eq!(bench.read(0x261E, 0), Ok(10));
-    bench.bus.inject(NODE, DriveFault::MultiTurnBattery).unwrap();
+    bench.bus.inject_fault(NODE, DriveFault::MultiTurnBattery).unwrap();
     bench.run_ms(500);
     assert!((speed_rpm(&mut bench) - 500.0).abs() < 1.0);
     assert_eq!((bench.alarm(), bench.statusword(), bench.read(0x261E, 0)), (0x10, 0x043F, Ok(0)));
@@ -111,15 +111,15 @@ fn the_battery_alarm_lets_the_motor_run_and_only_the_multi_turn_zero_clears_it()
 }
 
 #[test]
-fn whether_the_battery_alarm_shows_in_bit_3_is_the_units_own() {
+fn statusword_bit_3_shows_the_battery_alarm_only_on_some_units() {
     let quirks = Quirks { shows_battery_alarm: false, ..Quirks::default() };
     let mut bench = bench(YzAimParameters { quirks, ..parameters(NODE) });
-    bench.bus.inject(NODE, DriveFault::MultiTurnBattery).unwrap();
+    bench.bus.inject_fault(NODE, DriveFault::MultiTurnBattery).unwrap();
     bench.run_ms(10);
     assert_eq!((bench.alarm(), bench.statusword()), (0x10, 0x0404));
 }
 
-/// Drives against an end stop with this in 2618h and waits 5 s.
+/// Drives against an end stop with this value in object 2618 and waits 5 s.
 fn against_the_end_stop(standstill_output: i64) -> Bench {
     let mut bench = bench(YzAimParameters {
         end_stops: Some(EndStops { lowest: -0.1, highest: 0.1 }),
@@ -135,7 +135,7 @@ fn against_the_end_stop(standstill_output: i64) -> Bench {
 }
 
 #[test]
-fn a_blocked_rotor_is_noticed_after_the_seconds_in_the_ones_digit_of_2618() {
+fn a_blocked_rotor_is_detected_after_the_seconds_in_the_ones_digit_of_2618() {
     assert_eq!(against_the_end_stop(603).alarm(), 0x12);
     assert_eq!(against_the_end_stop(609).alarm(), 0);
     assert_eq!(against_the_end_stop(600).alarm(), 0);
@@ -145,11 +145,11 @@ fn a_blocked_rotor_is_noticed_after_the_seconds_in_the_ones_digit_of_2618() {
 fn the_limits_of_current_and_output_bound_the_torque_at_standstill() {
     let full = against_the_end_stop(600).observe().torque;
     let half = against_the_end_stop(300).observe().torque;
-    // 10 A of a motor that gives 0.96 N·m with 4.4 A.
+    // 10 A in a motor that produces 0.96 N·m at 4.4 A.
     assert!((full - 10.0 / 4.4 * 0.96 * super::RATIO).abs() < 1e-9, "{full}");
     assert!((half - full / 2.0).abs() < 1e-9, "{half}");
     let mut bench = against_the_end_stop(600);
-    // 4.4 A are the rated torque; 6078h counts 2000 per ampere.
+    // 4.4 A is the current at the rated torque. Object 6078 counts 2000 per ampere.
     bench.write(0x261D, 0, 2, 2_200).unwrap();
     bench.run_ms(10);
     assert!((bench.observe().torque - 0.48 * super::RATIO).abs() < 1e-9);
@@ -160,7 +160,7 @@ fn the_limits_of_current_and_output_bound_the_torque_at_standstill() {
 }
 
 #[test]
-fn a_load_that_holds_the_speed_down_is_a_stall() {
+fn a_load_that_limits_the_speed_is_a_stall() {
     let mut bench = turning();
     bench.write(0x60FF, 0, 4, 1_400).unwrap();
     bench.run_ms(500);

@@ -1,4 +1,4 @@
-//! What is wrong with the servo or its joint: how it shows, and what the drive makes of it.
+//! Defects of the servo or its joint: their signals and the drive's reactions.
 
 use takt::sim::Defect;
 
@@ -6,61 +6,61 @@ use super::alarms::{speed_rpm, turning};
 use super::{Bench, NODE, YzAimParameters, bench, by_the_manual, decoded};
 
 impl Bench {
-    fn afflict(&mut self, defect: Defect) {
-        self.bus.afflict(NODE, defect, true).unwrap();
+    fn inject_defect(&mut self, defect: Defect) {
+        self.bus.inject_defect(NODE, defect, true).unwrap();
     }
 
-    fn mend(&mut self, defect: Defect) {
-        self.bus.afflict(NODE, defect, false).unwrap();
+    fn remove_defect(&mut self, defect: Defect) {
+        self.bus.inject_defect(NODE, defect, false).unwrap();
     }
 }
 
-/// The TPDO that answers RPDO4.
+/// The TPDO that replies to RPDO4.
 fn tpdo4(bench: &mut Bench) -> Vec<u8> {
-    bench.say(0x500 + u32::from(NODE), [0; 4]);
+    bench.send_data(0x500 + u32::from(NODE), [0; 4]);
     bench.run_ms(1);
     bench.take(0x480 + u32::from(NODE)).pop().unwrap()
 }
 
 #[test]
-fn a_blocked_joint_withstands_the_motor_until_that_notices_its_blocked_rotor() {
+fn a_blocked_joint_does_not_move_until_the_servo_detects_the_blocked_rotor() {
     let mut bench = turning();
     bench.write(0x2618, 0, 2, 602).unwrap();
-    bench.afflict(Defect::BlockedJoint);
+    bench.inject_defect(Defect::BlockedJoint);
     let before = bench.position();
     bench.run_ms(1_800);
     assert_eq!((bench.position(), bench.alarm()), (before, 0));
     assert!(bench.observe().torque > 1.0);
     bench.run_ms(700);
     assert_eq!((bench.position(), bench.alarm()), (before, 0x12));
-    bench.mend(Defect::BlockedJoint);
+    bench.remove_defect(Defect::BlockedJoint);
     bench.control(0x8F);
     bench.run_ms(500);
     assert!((speed_rpm(&mut bench) - 500.0).abs() < 1.0);
 }
 
 #[test]
-fn a_mute_sdo_server_neither_answers_nor_does_what_it_is_told_and_everything_else_works() {
+fn a_silent_sdo_server_ignores_requests_and_everything_else_works() {
     let mut bench = turning();
-    bench.afflict(Defect::SilentSdoServer);
+    bench.inject_defect(Defect::SilentSdoServer);
     let halt = [0x2B, 0x40, 0x60, 0, 0x0F, 0x01, 0, 0];
-    bench.say(0x600 + u32::from(NODE), halt);
+    bench.send_data(0x600 + u32::from(NODE), halt);
     bench.take(0x705);
     bench.run_ms(300);
     assert!(bench.take(0x580 + u32::from(NODE)).is_empty());
     assert_eq!(bench.take(0x705), [[5]; 3]);
     assert!((speed_rpm(&mut bench) - 500.0).abs() < 1.0);
-    bench.mend(Defect::SilentSdoServer);
+    bench.remove_defect(Defect::SilentSdoServer);
     assert_eq!(bench.read(0x6040, 0), Ok(0x0F));
 }
 
 #[test]
-fn an_encoder_jump_moves_the_counts_at_once_and_the_servo_brings_them_back_to_the_target() {
+fn an_encoder_jump_changes_the_counts_at_once_and_the_servo_returns_to_the_target() {
     let mut bench = bench(by_the_manual(NODE));
     bench.control(0x2F);
     bench.run_ms(100);
     let (before, position) = (bench.observe(), bench.position());
-    bench.afflict(Defect::EncoderJump { distance: 0.01 });
+    bench.inject_defect(Defect::EncoderJump { distance: 0.01 });
     let after = bench.observe();
     let counts = (0.01 / super::TAU * super::RATIO * 32_768.0).round() as i32;
     assert_eq!(after.position, before.position);
@@ -71,31 +71,31 @@ fn an_encoder_jump_moves_the_counts_at_once_and_the_servo_brings_them_back_to_th
 }
 
 #[test]
-fn short_feedback_lacks_the_last_byte_of_every_tpdo_until_it_is_mended() {
+fn short_feedback_lacks_the_last_byte_of_every_tpdo_until_the_defect_is_removed() {
     let mut bench = turning();
     let whole = tpdo4(&mut bench).len();
-    bench.afflict(Defect::ShortFeedback);
+    bench.inject_defect(Defect::ShortFeedback);
     assert_eq!((whole, tpdo4(&mut bench).len()), (6, 5));
-    bench.mend(Defect::ShortFeedback);
+    bench.remove_defect(Defect::ShortFeedback);
     assert_eq!(tpdo4(&mut bench).len(), 6);
 }
 
 #[test]
-fn a_false_statusword_is_in_the_tpdos_only_and_what_is_both_set_and_cleared_is_set() {
+fn a_false_statusword_affects_the_tpdos_only_and_set_bits_win_over_cleared_ones() {
     let mut bench = turning();
     let defect = Defect::Statusword { set: 0x0048, clear: 0x0044 };
-    bench.afflict(defect);
+    bench.inject_defect(defect);
     assert_eq!(decoded(&tpdo4(&mut bench)).1, 0x047B);
     assert_eq!((bench.statusword(), bench.observe().statusword), (0x0437, 0x0437));
-    bench.mend(defect);
+    bench.remove_defect(defect);
     assert_eq!(decoded(&tpdo4(&mut bench)).1, 0x0437);
 }
 
 #[test]
-fn every_alarm_of_the_manual_can_come_and_stops_the_motor_unless_it_is_the_batterys() {
+fn every_alarm_of_the_manual_except_the_battery_alarm_stops_the_motor() {
     for (code, turns) in [(0x10, true), (0x12, false), (0x14, false), (0x15, false), (0x20, false)] {
         let mut bench = turning();
-        bench.afflict(Defect::Alarm { code });
+        bench.inject_defect(Defect::Alarm { code });
         assert_eq!((bench.alarm(), bench.statusword() & 8), (u32::from(code), 8));
         bench.run_ms(2_000);
         assert_eq!(speed_rpm(&mut bench).abs() > 1.0, turns, "{code:#x}");
@@ -105,23 +105,23 @@ fn every_alarm_of_the_manual_can_come_and_stops_the_motor_unless_it_is_the_batte
 #[test]
 fn the_alarm_of_the_lost_communication_ends_with_the_next_heartbeat_of_the_master() {
     let mut bench = turning();
-    bench.afflict(Defect::Alarm { code: 0x20 });
+    bench.inject_defect(Defect::Alarm { code: 0x20 });
     bench.run_ms(500);
-    bench.say(0x77F, [0x05]);
+    bench.send_data(0x77F, [0x05]);
     bench.run_ms(500);
     assert_eq!(bench.alarm(), 0);
     assert!((speed_rpm(&mut bench) - 500.0).abs() < 1.0);
 }
 
 #[test]
-fn a_code_that_is_none_of_its_alarms_is_refused_and_changes_nothing() {
+fn an_unknown_alarm_code_is_refused_and_changes_nothing() {
     let without_battery = YzAimParameters { has_battery: false, ..by_the_manual(NODE) };
     for (parameters, code) in
         [(by_the_manual(NODE), 0), (by_the_manual(NODE), 0x7500), (without_battery, 0x10)]
     {
         let mut bench = bench(parameters);
         let before = bench.statusword();
-        assert!(bench.bus.afflict(NODE, Defect::Alarm { code }, true).is_err(), "{code:#x}");
+        assert!(bench.bus.inject_defect(NODE, Defect::Alarm { code }, true).is_err(), "{code:#x}");
         assert_eq!((bench.alarm(), bench.statusword()), (0, before));
     }
 }

@@ -1,4 +1,4 @@
-//! Homing on the switches at DIR and PU.
+//! Homing on the switches at the inputs DIR and PU.
 
 use takt::sim::homing_switches::{HomingSwitches, Switch};
 use takt::sim::plant::EndStops;
@@ -9,8 +9,8 @@ use super::{Bench, NODE, YzAimParameters, bench, parameters};
 const HOMING: HomingBehaviour =
     HomingBehaviour { speed_rpm: 300.0, gives_up_ns: Some(5_000_000_000), has_undescribed_methods: false };
 
-/// A homing by this method from this position (rad) with these switches, until it ends or 10 s have passed. A cold drive
-/// homes without any controlword.
+/// Homes by this method from this position (rad) with these switches, until homing ends or 10 s have passed.
+/// The drive homes after power-up without any controlword.
 fn home(method: i64, from: f64, switches: HomingSwitches, homing: HomingBehaviour) -> Bench {
     let mut bench = bench(YzAimParameters {
         initial_position: from,
@@ -32,12 +32,12 @@ fn home(method: i64, from: f64, switches: HomingSwitches, homing: HomingBehaviou
     bench
 }
 
-/// Homes and expects that the zero is found at this position (rad).
+/// Homes and expects the zero at this position (rad).
 fn finds(method: i64, from: f64, switches: HomingSwitches, zero: f64) {
     let homing = HomingBehaviour { has_undescribed_methods: true, ..HOMING };
     let mut bench = home(method, from, switches, homing);
     assert_eq!(bench.statusword(), 0x1414, "method {method} from {from}");
-    // A few counts to come to rest from 30 r/min.
+    // The drive needs a few counts to stop from 30 r/min.
     assert!(bench.position().abs() < 200, "method {method}: {}", bench.position());
     let counts = bench.position();
     let position = bench.observe().position;
@@ -60,7 +60,7 @@ fn method_18_finds_the_positive_limit_on_pu() {
 }
 
 #[test]
-fn methods_19_to_22_find_the_side_of_the_home_switch_that_they_come_from() {
+fn methods_19_to_22_find_the_near_side_of_the_home_switch() {
     let above = HomingSwitches { dir: Some(Switch::above(0.2)), pu: None };
     let below = HomingSwitches { dir: Some(Switch::below(-0.2)), pu: None };
     for from in [-0.5, 0.5] {
@@ -72,7 +72,7 @@ fn methods_19_to_22_find_the_side_of_the_home_switch_that_they_come_from() {
 }
 
 #[test]
-fn a_home_switch_that_is_overshot_is_found_on_the_way_back() {
+fn an_overshot_home_switch_is_found_on_the_way_back() {
     let narrow = HomingSwitches { dir: Some(Switch { from: 0.2, to: 0.201 }), pu: None };
     finds(19, -0.5, narrow, 0.2);
     finds(21, 0.5, narrow, 0.201);
@@ -89,7 +89,7 @@ fn methods_20_and_22_end_in_the_homing_error() {
 }
 
 #[test]
-fn a_missing_switch_is_a_homing_error_or_no_end() {
+fn a_missing_switch_causes_a_homing_error_or_an_endless_search() {
     let mut bench = home(17, 0.9, HomingSwitches::default(), HomingBehaviour { speed_rpm: 10.0, ..HOMING });
     assert_eq!(bench.statusword() & 0x3000, 0x2000);
     let endless = HomingBehaviour { gives_up_ns: None, speed_rpm: 10.0, ..HOMING };

@@ -5,7 +5,7 @@ use takt::sim::yz_aim::YzAimJoint;
 
 use super::{Bench, MILLISECOND_NS, NODE, YzAimParameters, bench, by_the_manual, parameters};
 
-/// A unit that was set up for interpolation, enabled in mode 7 while the cycle runs.
+/// A unit set up for interpolation and enabled in mode 7 while the cycle runs.
 fn interpolating() -> Bench {
     let mut bench = bench(YzAimParameters { special_function: 7, ..parameters(NODE) });
     bench.write(0x6060, 0, 1, 7).unwrap();
@@ -18,7 +18,7 @@ fn interpolating() -> Bench {
 }
 
 #[test]
-fn targets_are_followed_from_sync_to_sync() {
+fn targets_are_interpolated_from_sync_to_sync() {
     let mut bench = interpolating();
     let mut target = 0;
     // 1000 r/min are 1092 counts per 2 ms.
@@ -36,18 +36,18 @@ fn targets_are_followed_from_sync_to_sync() {
 }
 
 #[test]
-fn a_held_target_moves_nothing_before_sync() {
+fn a_target_has_no_effect_before_sync() {
     let mut bench = interpolating();
     bench.hold_target(500);
     bench.run_ms(50);
     assert_eq!(bench.hold_target(500), (0, 0x0437));
-    bench.say(0x080, []);
+    bench.send_data(0x080, []);
     bench.run_ms(500);
     assert_eq!(bench.position(), 500);
 }
 
 #[test]
-fn a_step_beyond_the_highest_speed_is_followed_as_fast_as_the_motor_can() {
+fn a_step_beyond_the_highest_speed_is_followed_at_the_highest_speed() {
     let mut bench = interpolating();
     bench.interpolate(50_000);
     bench.run_ms(18);
@@ -105,22 +105,22 @@ fn the_first_target_after_enabling_is_ignored() {
 }
 
 #[test]
-fn of_two_targets_before_sync_the_newer_counts_and_without_one_the_last_is_held() {
+fn the_newest_target_before_sync_applies_and_the_last_one_is_held() {
     let mut bench = interpolating();
     bench.hold_target(100);
     bench.hold_target(300);
-    bench.say(0x080, []);
+    bench.send_data(0x080, []);
     bench.run_ms(500);
     assert_eq!(bench.position(), 300);
     for _ in 0..10 {
-        bench.say(0x080, []);
+        bench.send_data(0x080, []);
         bench.run_ms(2);
     }
     assert_eq!((bench.position(), bench.statusword()), (300, 0x0437));
 }
 
 #[test]
-fn a_halt_holds_the_shaft_while_targets_come_and_ends_in_a_chase() {
+fn after_a_halt_the_motor_runs_to_the_latest_target_at_full_speed() {
     let mut bench = interpolating();
     bench.control(0x10F);
     for k in 0..100 {
@@ -136,10 +136,10 @@ fn a_halt_holds_the_shaft_while_targets_come_and_ends_in_a_chase() {
 }
 
 #[test]
-fn after_a_lost_heartbeat_the_motor_goes_on_by_itself_to_wherever_the_targets_have_gone() {
+fn after_a_lost_heartbeat_the_motor_runs_on_to_the_latest_target() {
     let mut bench = interpolating();
     bench.write(0x1016, 1, 4, 0x007F_0032).unwrap();
-    bench.say(0x77F, [5]);
+    bench.send_data(0x77F, [5]);
     for k in 0..200 {
         bench.interpolate(50 * k);
     }
@@ -147,7 +147,7 @@ fn after_a_lost_heartbeat_the_motor_goes_on_by_itself_to_wherever_the_targets_ha
     let stopped = bench.position();
     assert!((1_000..1_600).contains(&stopped), "{stopped}");
     for _ in 0..20 {
-        bench.say(0x77F, [5]);
+        bench.send_data(0x77F, [5]);
         bench.run_ms(25);
     }
     assert_eq!((bench.alarm(), bench.position()), (0, 50 * 199));
@@ -160,27 +160,27 @@ fn three_axes(setting: fn(u8) -> YzAimParameters) -> Bench {
         drives.push(Box::new(YzAimJoint::new(setting(node))));
     }
     let mut bench = Bench::of(drives);
-    bench.say(0x000, [1, 0]);
+    bench.send_data(0x000, [1, 0]);
     bench.run_ms(1);
     bench
 }
 
 #[test]
-fn all_axes_take_their_target_at_the_same_sync() {
+fn all_axes_apply_their_target_at_the_same_sync() {
     let mut bench = three_axes(|node| YzAimParameters { special_function: 7, ..by_the_manual(node) });
     for node in [NODE, 6, 7].map(u32::from) {
-        bench.say(0x600 + node, [0x2F, 0x60, 0x60, 0, 7, 0, 0, 0]);
+        bench.send_data(0x600 + node, [0x2F, 0x60, 0x60, 0, 7, 0, 0, 0]);
         bench.run_ms(1);
-        bench.say(0x600 + node, [0x2B, 0x40, 0x60, 0, 0x0F, 0, 0, 0]);
+        bench.send_data(0x600 + node, [0x2B, 0x40, 0x60, 0, 0x0F, 0, 0, 0]);
         bench.run_ms(1);
     }
     for cycle in 0i32..500 {
         let target = cycle.pow(2).min(900 * cycle);
         for node in [NODE, 6, 7].map(u32::from) {
-            bench.say(0x500 + node, target.to_le_bytes());
+            bench.send_data(0x500 + node, target.to_le_bytes());
             bench.run_ns(200_000);
         }
-        bench.say(0x080, []);
+        bench.send_data(0x080, []);
         for _ in 0..7 {
             bench.run_ns(200_000);
             let counts = [NODE, 6, 7].map(|node| bench.bus.observe(node).unwrap().position_counts);
@@ -191,11 +191,11 @@ fn all_axes_take_their_target_at_the_same_sync() {
 }
 
 #[test]
-fn the_loops_begin_anew_with_sync_wherever_it_falls() {
-    // Between two SYNCs it would show how many steps of the loops there have been.
+fn the_control_loops_restart_with_every_sync() {
+    // Between two SYNCs, the result would depend on the number of control steps so far.
     let positions = |phase_ns: u64| {
         let mut bench = interpolating();
-        // Nothing else on the bus may delay SYNC.
+        // No other frame on the bus may delay SYNC.
         for (index, subindex) in [(0x1017, 0), (0x1800, 5), (0x1802, 5)] {
             bench.write(index, subindex, 2, 0).unwrap();
         }
@@ -203,7 +203,7 @@ fn the_loops_begin_anew_with_sync_wherever_it_falls() {
         let mut answers = vec![];
         for cycle in 0i32..100 {
             answers.push(bench.hold_target(cycle.pow(2)).0);
-            bench.say(0x080, []);
+            bench.send_data(0x080, []);
             bench.run_ns(1_500_000);
         }
         answers
@@ -218,15 +218,15 @@ fn the_loops_begin_anew_with_sync_wherever_it_falls() {
 fn without_interpolation_sync_starts_profiles_together() {
     let mut bench = three_axes(by_the_manual);
     for node in [NODE, 6, 7].map(u32::from) {
-        bench.say(0x600 + node, [0x2B, 0x40, 0x60, 0, 0x2F, 0, 0, 0]);
+        bench.send_data(0x600 + node, [0x2B, 0x40, 0x60, 0, 0x2F, 0, 0, 0]);
         bench.run_ms(1);
-        bench.say(0x500 + node, 20_000i32.to_le_bytes());
+        bench.send_data(0x500 + node, 20_000i32.to_le_bytes());
         bench.run_ms(20);
     }
     let positions =
         |bench: &mut Bench| [NODE, 6, 7].map(|node| bench.bus.observe(node).unwrap().position_counts);
     assert_eq!(positions(&mut bench), [0; 3]);
-    bench.say(0x080, []);
+    bench.send_data(0x080, []);
     bench.run_ms(100);
     let [first, others @ ..] = positions(&mut bench);
     assert!(first > 5_000 && others.iter().all(|other| (other - first).abs() <= 1));
@@ -235,15 +235,15 @@ fn without_interpolation_sync_starts_profiles_together() {
 }
 
 #[test]
-fn the_same_life_gives_the_same_frames_however_often_somebody_looks() {
+fn the_frames_do_not_depend_on_how_often_the_drive_is_polled() {
     let live = |glances: u64| {
         let mut bench = interpolating();
         bench.heard.clear();
         let began_ns = bench.now_ns;
         for cycle in 0..300i32 {
-            bench.say(0x500 + u32::from(NODE), (cycle * 100).to_le_bytes());
+            bench.send_data(0x500 + u32::from(NODE), (cycle * 100).to_le_bytes());
             bench.run_ns(MILLISECOND_NS);
-            bench.say(0x080, []);
+            bench.send_data(0x080, []);
             for _ in 0..glances {
                 bench.run_ns(MILLISECOND_NS / glances);
                 bench.observe();

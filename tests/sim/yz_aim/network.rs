@@ -1,23 +1,23 @@
-//! NMT, heartbeat in both directions, PDO timing.
+//! NMT, heartbeat producer and consumer, PDO timing.
 
 use takt::sim::yz_aim::YzAimJoint;
-use takt::sim::{Drive, Mailbox, NmtState, Order};
+use takt::sim::{Drive, Mailbox, NodeState, QueueOrder};
 use takt_rt::{Frame, Id};
 
 use super::{Bench, MILLISECOND_NS, NODE, Quirks, YzAimParameters, bench, by_the_manual, parameters};
 
 fn host_heartbeat(bench: &mut Bench) {
-    bench.say(0x77F, [5]);
+    bench.send_data(0x77F, [5]);
 }
 
 #[test]
-fn a_stopped_drive_is_silent_and_still_hears_nmt() {
+fn a_stopped_drive_sends_no_pdo_and_still_receives_nmt() {
     let mut bench = bench(parameters(NODE));
     bench.nmt(0x02);
     bench.heard.clear();
-    bench.say(0x605, [0x40, 0, 0x10, 0, 0, 0, 0, 0]);
-    bench.say(0x205, [0x2F, 0, 1, 0, 0, 0, 0]);
-    bench.say(0x080, []);
+    bench.send_data(0x605, [0x40, 0, 0x10, 0, 0, 0, 0, 0]);
+    bench.send_data(0x205, [0x2F, 0, 1, 0, 0, 0, 0]);
+    bench.send_data(0x080, []);
     bench.run_ms(3_000);
     assert!(bench.heard.is_empty());
     bench.nmt(0x01);
@@ -26,7 +26,7 @@ fn a_stopped_drive_is_silent_and_still_hears_nmt() {
 }
 
 #[test]
-fn resets_say_boot_up_once_and_lead_to_pre_operational() {
+fn resets_send_one_boot_up_message_and_lead_to_pre_operational() {
     for command in [0x81, 0x82] {
         let mut bench = bench(parameters(NODE));
         bench.nmt(0x01);
@@ -46,11 +46,11 @@ fn resets_say_boot_up_once_and_lead_to_pre_operational() {
 }
 
 #[test]
-fn the_state_after_power_up_and_its_announcement_are_the_units_own() {
+fn the_state_after_power_up_and_its_boot_up_message_differ_between_units() {
     let quirks = Quirks { announces_power_up: false, ..Quirks::default() };
     let unit = YzAimParameters { starts_operational: true, quirks, ..parameters(NODE) };
     let mut unit = bench(unit);
-    assert_eq!(unit.observe().nmt, NmtState::Operational);
+    assert_eq!(unit.observe().nmt, NodeState::Operational);
     unit.run_ms(1_000);
     assert_eq!(unit.take(0x705), [[5]]);
     unit.bus.power_cycle(NODE).unwrap();
@@ -63,7 +63,7 @@ fn the_state_after_power_up_and_its_announcement_are_the_units_own() {
 }
 
 #[test]
-fn without_a_first_heartbeat_the_master_is_never_watched() {
+fn without_a_first_heartbeat_the_master_is_not_monitored() {
     let mut bench = bench(by_the_manual(NODE));
     bench.control(0x0F);
     bench.run_ms(5_000);
@@ -71,7 +71,7 @@ fn without_a_first_heartbeat_the_master_is_never_watched() {
 }
 
 #[test]
-fn a_lost_master_stops_the_motor_and_its_return_lets_it_go_on_to_the_old_target() {
+fn a_lost_master_stops_the_motor_and_its_return_resumes_the_old_target() {
     let mut bench = bench(by_the_manual(NODE));
     bench.write(0x1016, 1, 4, 0x007F_0064).unwrap();
     bench.nmt(0x01);
@@ -96,10 +96,10 @@ fn a_lost_master_stops_the_motor_and_its_return_lets_it_go_on_to_the_old_target(
 }
 
 #[test]
-fn only_node_127_counts_and_a_time_of_0_watches_nobody() {
+fn only_node_127_is_monitored_and_a_time_of_0_disables_monitoring() {
     let mut bench = bench(by_the_manual(NODE));
     bench.write(0x1016, 1, 4, 0x007F_0064).unwrap();
-    bench.say(0x701, [5]);
+    bench.send_data(0x701, [5]);
     bench.run_ms(500);
     assert_eq!(bench.alarm(), 0);
     bench.write(0x1016, 1, 4, 0x007F_0000).unwrap();
@@ -109,13 +109,13 @@ fn only_node_127_counts_and_a_time_of_0_watches_nobody() {
 }
 
 #[test]
-fn tpdo1_and_tpdo3_come_every_100_ms_and_tpdo2_with_every_sync() {
+fn tpdo1_and_tpdo3_are_sent_every_100_ms_and_tpdo2_at_every_sync() {
     let mut bench = bench(parameters(NODE));
     bench.nmt(0x01);
     bench.run_ms(1_000);
     assert_eq!((bench.take(0x185).len(), bench.take(0x385).len()), (10, 10));
     for _ in 0..10 {
-        bench.say(0x080, []);
+        bench.send_data(0x080, []);
         bench.run_ms(2);
     }
     assert_eq!(bench.take(0x285).len(), 10);
@@ -125,16 +125,16 @@ fn tpdo1_and_tpdo3_come_every_100_ms_and_tpdo2_with_every_sync() {
     bench.write(0x1801, 2, 1, 255).unwrap();
     bench.heard.clear();
     for _ in 0..100 {
-        bench.say(0x080, []);
+        bench.send_data(0x080, []);
         bench.run_ms(2);
     }
     assert_eq!([0x185, 0x285, 0x385].map(|id| bench.take(id).len()), [0, 0, 10]);
 }
 
 #[test]
-fn an_event_timer_that_is_set_before_operational_waits_for_it_and_wakes_nobody() {
+fn an_event_timer_set_before_operational_has_no_effect_until_then() {
     let mut joint = YzAimJoint::new(parameters(NODE));
-    let mut mailbox = Mailbox::new(Order::FirstInFirstOut, 8);
+    let mut mailbox = Mailbox::new(QueueOrder::FirstInFirstOut, 8);
     joint.advance(10 * MILLISECOND_NS, &mut mailbox);
     let write = Frame::of(Id::canopen(0x600, NODE), [0x2B, 0x00, 0x18, 5, 20, 0, 0, 0]);
     joint.receive(11 * MILLISECOND_NS, &write, &mut mailbox);
@@ -153,17 +153,17 @@ fn a_unit_may_refuse_other_pdo_parameters() {
 }
 
 #[test]
-fn answers_to_rpdos_keep_the_inhibit_time() {
+fn replies_to_rpdos_respect_the_inhibit_time() {
     let mut bench = bench(parameters(NODE));
     bench.nmt(0x01);
     bench.write(0x1803, 3, 2, 100).unwrap();
     bench.heard.clear();
     for _ in 0..5 {
-        bench.say(0x505, [0, 0, 0, 0]);
+        bench.send_data(0x505, [0, 0, 0, 0]);
         bench.run_ms(1);
     }
     bench.run_ms(20);
-    // One at once, and one with the newest data 10 ms later.
+    // One frame is sent at once, and one with the newest data 10 ms later.
     let answers: Vec<_> =
         bench.heard.iter().filter(|heard| heard.frame.id() == Id::canopen(0x480, NODE)).collect();
     assert_eq!(answers.len(), 2);
@@ -174,31 +174,31 @@ fn answers_to_rpdos_keep_the_inhibit_time() {
 #[test]
 fn pdos_and_sync_do_nothing_before_operational() {
     let mut bench = bench(by_the_manual(NODE));
-    bench.say(0x205, [0x2F, 0, 1, 0x50, 0xC3, 0, 0]);
-    bench.say(0x080, []);
+    bench.send_data(0x205, [0x2F, 0, 1, 0x50, 0xC3, 0, 0]);
+    bench.send_data(0x080, []);
     bench.run_ms(300);
     assert_eq!((bench.position(), bench.statusword()), (0, 0x0404));
     assert!(bench.heard.is_empty());
 }
 
 #[test]
-fn an_overlapping_sdo_is_lost_and_answers_take_about_300_microseconds() {
+fn an_overlapping_sdo_request_is_lost_and_replies_take_about_300_microseconds() {
     let mut bench = bench(parameters(NODE));
     let began_ns = bench.now_ns;
     for index in [0x00, 0x17, 0x05] {
-        bench.say(0x605, [0x40, index, 0x10, 0, 0, 0, 0, 0]);
+        bench.send_data(0x605, [0x40, index, 0x10, 0, 0, 0, 0, 0]);
     }
     bench.run_ms(5);
     let [answer] = &bench.heard[..] else { panic!("{} answers", bench.heard.len()) };
     assert_eq!(answer.frame, Frame::of(Id::canopen(0x580, NODE), [0x43, 0, 0x10, 0, 0x92, 0x01, 0x02, 0]));
-    // Two frames of about 0.12 ms on the wire and the drive's time.
+    // The time of two frames of about 0.12 ms each on the wire plus the drive's reply time.
     assert!((450_000..700_000).contains(&(answer.at_ns - began_ns)));
 }
 
 #[test]
-fn an_unknown_object_gets_no_answer_at_all() {
+fn a_request_for_an_unknown_object_gets_no_reply() {
     let mut bench = bench(parameters(NODE));
-    bench.say(0x605, [0x23, 0x84, 0x60, 0, 0x10, 0x27, 0, 0]);
+    bench.send_data(0x605, [0x23, 0x84, 0x60, 0, 0x10, 0x27, 0, 0]);
     bench.run_ms(100);
     assert!(bench.heard.is_empty());
     assert_eq!(bench.read(0x1018, 1), Ok(0x331));

@@ -33,7 +33,7 @@ fn bit_4_starts_relative_moves_and_clears_itself() {
     }
 }
 
-/// Time in ms until a move of 10 turns at 1000 r/min is over.
+/// Time in ms until a move of 10 turns at 1000 r/min has ended.
 fn duration_ms(acceleration: i64) -> u64 {
     let mut bench = bench(by_the_manual(NODE));
     bench.write(0x6083, 0, 4, acceleration).unwrap();
@@ -47,8 +47,8 @@ fn duration_ms(acceleration: i64) -> u64 {
 }
 
 #[test]
-fn a_ramp_takes_its_time_and_60000_is_no_ramp() {
-    // 10 turns at 1000 r/min take 600 ms; the ramp adds 1000 r/min over its slope.
+fn a_ramp_prolongs_the_move_and_60000_means_no_ramp() {
+    // 10 turns at 1000 r/min take 600 ms. The ramp adds 1000 r/min divided by its slope.
     assert!(duration_ms(2_000).abs_diff(1_100) < 30);
     assert!(duration_ms(10_000).abs_diff(700) < 30);
     let without_ramp = duration_ms(60_000);
@@ -56,7 +56,7 @@ fn a_ramp_takes_its_time_and_60000_is_no_ramp() {
 }
 
 #[test]
-fn the_speed_of_a_move_is_6081_and_never_above_what_the_motor_can() {
+fn a_move_runs_at_6081_limited_to_the_highest_motor_speed() {
     for (asked, expected) in [(300, 300.0), (3_000, 1_500.0)] {
         let mut bench = bench(by_the_manual(NODE));
         bench.write(0x6081, 0, 4, asked).unwrap();
@@ -95,7 +95,7 @@ fn velocity_follows_60ff_and_bit_8_stops_it_with_the_shaft_held() {
 }
 
 #[test]
-fn a_reversed_spindle_counts_backwards() {
+fn a_reversed_spindle_counts_in_the_other_direction() {
     let spindle = Gearing { ratio: 2.0, travel_per_turn: 0.005, is_reversed: true, zero_counts: 1_000.0 };
     // 100 kg on the spindle, seen from the nut.
     let nut = JointParameters {
@@ -131,7 +131,7 @@ fn the_first_target_after_enabling_is_ignored_and_its_repetition_followed() {
 }
 
 #[test]
-fn a_cold_drive_holds_its_shaft_and_0006_releases_it() {
+fn after_power_up_the_drive_holds_its_shaft_and_0006_releases_it() {
     let mut bench = bench(parameters(NODE));
     bench.bus.set_load_torque(NODE, 5.0).unwrap();
     bench.run_ms(300);
@@ -159,30 +159,30 @@ fn an_increment_is_counted_before_the_electronic_gear_and_acts_at_once() {
 }
 
 #[test]
-fn an_rpdo2_moves_only_what_is_enabled_with_bit_5() {
+fn rpdo2_moves_the_motor_only_when_enabled_with_bit_5() {
     let mut bench = bench(by_the_manual(NODE));
     bench.nmt(0x01);
     let rpdo2 = [0x50, 0xC3, 0, 0, 0xE8, 0x03, 0, 0];
-    bench.say(0x305, rpdo2);
+    bench.send_data(0x305, rpdo2);
     bench.run_ms(100);
     assert_eq!(super::decoded(&bench.take(0x285)[0]), (0, 0x0404));
-    bench.say(0x205, [0x2F, 0, 1, 0x50, 0xC3, 0, 0]);
+    bench.send_data(0x205, [0x2F, 0, 1, 0x50, 0xC3, 0, 0]);
     bench.run_ms(1);
     assert_eq!(super::decoded(bench.take(0x185).last().unwrap()).1, 0x0037);
     bench.run_ms(1000);
-    bench.say(0x305, rpdo2);
+    bench.send_data(0x305, rpdo2);
     bench.run_ms(1);
     assert_eq!(super::decoded(&bench.take(0x285)[0]), (50_000, 0x0437));
 }
 
 #[test]
-fn tpdo3_says_the_velocity_in_r_min_or_in_tenths_as_the_unit_is() {
+fn tpdo3_contains_the_velocity_in_r_min_or_tenths_depending_on_the_unit() {
     for (has_fine_velocity_in_tpdo3, expected) in [(false, -600), (true, -6_000)] {
         let quirks = Quirks { has_fine_velocity_in_tpdo3, ..Quirks::none() };
         let mut bench = bench(YzAimParameters { quirks, ..parameters(NODE) });
         bench.nmt(0x01);
         for _ in 0..300 {
-            bench.say(0x405, [0x0F, 0, 3, 0xA8, 0xFD, 0xFF, 0xFF]);
+            bench.send_data(0x405, [0x0F, 0, 3, 0xA8, 0xFD, 0xFF, 0xFF]);
             bench.run_ms(1);
         }
         let answer = bench.take(0x385).pop().unwrap();
@@ -192,7 +192,7 @@ fn tpdo3_says_the_velocity_in_r_min_or_in_tenths_as_the_unit_is() {
 }
 
 #[test]
-fn a_change_of_mode_in_full_flight_ends_the_old_motion() {
+fn a_change_of_mode_during_a_move_ends_it() {
     let mut bench = bench(by_the_manual(NODE));
     bench.control(0x2F);
     bench.write(0x607A, 0, 4, 3_276_800).unwrap();
@@ -203,7 +203,7 @@ fn a_change_of_mode_in_full_flight_ends_the_old_motion() {
     let rest = bench.position();
     bench.write(0x6060, 0, 1, 1).unwrap();
     bench.run_ms(300);
-    assert!((bench.position() - rest).abs() < 5, "the old target is forgotten");
+    assert!((bench.position() - rest).abs() < 5, "the old target was discarded");
 }
 
 #[test]

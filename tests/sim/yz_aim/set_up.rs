@@ -1,13 +1,13 @@
-//! What is stored, what needs a power cycle, and what the drive does by itself after one.
+//! Stored parameters, parameters that need a power cycle, and the drive's own move after power-up.
 
 use takt::sim::yz_aim::{Model, YzAimJoint};
-use takt::sim::{Drive, Mailbox, Order};
+use takt::sim::{Drive, Mailbox, QueueOrder};
 use takt_rt::{Frame, Id};
 
 use super::{Bench, MILLISECOND_NS, NODE, YzAimParameters, bench, by_the_manual, parameters};
 
 #[test]
-fn parameters_outlive_the_supply_only_when_they_were_stored_to_the_end() {
+fn parameters_survive_a_power_cycle_only_after_storing_has_finished() {
     let mut bench = bench(parameters(NODE));
     bench.write(0x6083, 0, 4, 5_000).unwrap();
     bench.write(0x2614, 0, 2, 1).unwrap();
@@ -21,7 +21,7 @@ fn parameters_outlive_the_supply_only_when_they_were_stored_to_the_end() {
 }
 
 #[test]
-fn a_node_address_counts_when_it_was_stored_and_the_supply_returns() {
+fn a_new_node_id_applies_after_storing_and_a_power_cycle() {
     let mut bench = bench(parameters(NODE));
     bench.write(0x2615, 0, 2, 9).unwrap();
     bench.power_cycle();
@@ -33,22 +33,22 @@ fn a_node_address_counts_when_it_was_stored_and_the_supply_returns() {
     bench.run_ms(10);
     assert_eq!(bench.bus.nodes().collect::<Vec<_>>(), [9]);
     assert_eq!(bench.take(0x709), [[0]]);
-    bench.say(0x609, [0x40, 0x00, 0x14, 1, 0, 0, 0, 0]);
-    bench.say(0x605, [0x40, 0x00, 0x14, 1, 0, 0, 0, 0]);
+    bench.send_data(0x609, [0x40, 0x00, 0x14, 1, 0, 0, 0, 0]);
+    bench.send_data(0x605, [0x40, 0x00, 0x14, 1, 0, 0, 0, 0]);
     bench.run_ms(5);
     assert_eq!(bench.take(0x589), [[0x43, 0x00, 0x14, 1, 0x09, 0x02, 0, 0]]);
     assert!(bench.heard.is_empty());
     for address in [0, 128] {
-        bench.say(0x609, [0x2B, 0x15, 0x26, 0, address, 0, 0, 0]);
+        bench.send_data(0x609, [0x2B, 0x15, 0x26, 0, address, 0, 0, 0]);
         bench.run_ms(5);
         assert_eq!(bench.take(0x589)[0][0], 0x80);
     }
 }
 
 #[test]
-fn at_a_new_bit_rate_the_drive_is_deaf_and_mute_on_the_old_bus() {
+fn after_a_change_of_bit_rate_the_drive_is_unreachable_on_the_old_bus() {
     let mut drive = YzAimJoint::new(parameters(NODE));
-    let mut mailbox = Mailbox::new(Order::Priority, 16);
+    let mut mailbox = Mailbox::new(QueueOrder::Priority, 16);
     let mut now_ns = 10 * MILLISECOND_NS;
     let mut ask = |drive: &mut YzAimJoint, request: [u8; 8]| {
         drive.receive(now_ns, &Frame::of(Id::canopen(0x600, NODE), request), &mut mailbox);
@@ -56,7 +56,7 @@ fn at_a_new_bit_rate_the_drive_is_deaf_and_mute_on_the_old_bus() {
         drive.advance(now_ns, &mut mailbox);
         std::iter::from_fn(|| mailbox.pop()).count()
     };
-    drive.advance(10 * MILLISECOND_NS, &mut Mailbox::new(Order::Priority, 16));
+    drive.advance(10 * MILLISECOND_NS, &mut Mailbox::new(QueueOrder::Priority, 16));
     for request in [
         [0x2B, 0x00, 0x26, 0, 1, 0, 0, 0],
         [0x23, 0x83, 0x60, 0, 0x22, 3, 0, 0],
@@ -66,7 +66,7 @@ fn at_a_new_bit_rate_the_drive_is_deaf_and_mute_on_the_old_bus() {
         assert_eq!(ask(&mut drive, request), 1);
     }
     assert_eq!(drive.bit_rate(), 1_000_000, "until the supply returns");
-    drive.power_cycle(20 * MILLISECOND_NS, &mut Mailbox::new(Order::Priority, 16));
+    drive.power_cycle(20 * MILLISECOND_NS, &mut Mailbox::new(QueueOrder::Priority, 16));
     assert_eq!(drive.bit_rate(), 500_000);
     for _ in 0..2_000 {
         assert_eq!(ask(&mut drive, [0x40, 0, 0x10, 0, 0, 0, 0, 0]), 0);
@@ -92,7 +92,7 @@ fn without_a_battery_the_position_after_power_up_is_within_one_turn() {
     assert!((multi.position() - first).abs() < 2);
 }
 
-/// A drive at 50 000 counts that was set up with this special function and ramp, right after power-up.
+/// A drive at 50 000 counts, set up with this special function and ramp, directly after power-up.
 fn after_power_up(special_function: i64, acceleration: i64) -> Bench {
     let mut bench = bench(by_the_manual(NODE));
     bench.write(0x260C, 0, 4, 12_500).unwrap();
@@ -107,7 +107,7 @@ fn after_power_up(special_function: i64, acceleration: i64) -> Bench {
 }
 
 #[test]
-fn special_function_6_returns_to_the_zero_by_itself_as_fast_as_6083_says() {
+fn special_function_6_returns_to_zero_at_the_speed_in_6083() {
     for (acceleration, speed) in [(20_000, 100.0), (20_004, 500.0)] {
         let mut bench = after_power_up(6, acceleration);
         bench.run_ms(100);
@@ -119,14 +119,14 @@ fn special_function_6_returns_to_the_zero_by_itself_as_fast_as_6083_says() {
 }
 
 #[test]
-fn special_functions_from_30_on_turn_to_an_angle() {
+fn special_functions_from_30_on_move_to_an_angle() {
     let mut bench = after_power_up(1_000, 20_009);
     bench.run_ms(1_000);
     assert_eq!(bench.position(), 32_768 + 1_000);
 }
 
 #[test]
-fn after_its_own_move_the_drive_makes_others_as_fast_as_6081_says() {
+fn after_the_move_at_power_up_the_speed_of_moves_is_6081() {
     let mut bench = after_power_up(6, 20_000);
     bench.run_ms(2_000);
     bench.write(0x260C, 0, 4, 100_000).unwrap();
@@ -180,11 +180,11 @@ fn writes_that_the_dictionary_does_not_allow_are_aborted() {
 }
 
 #[test]
-fn unpadded_requests_are_taken() {
+fn unpadded_requests_are_accepted() {
     let mut bench = bench(parameters(NODE));
-    bench.say(0x605, [0x2F, 0x60, 0x60, 0, 3]);
+    bench.send_data(0x605, [0x2F, 0x60, 0x60, 0, 3]);
     bench.run_ms(2);
-    bench.say(0x605, [0x40, 0x60, 0x60, 0]);
+    bench.send_data(0x605, [0x40, 0x60, 0x60, 0]);
     bench.run_ms(2);
     assert_eq!(bench.take(0x585), [[0x60, 0x60, 0x60, 0, 0, 0, 0, 0], [0x4F, 0x60, 0x60, 0, 3, 0, 0, 0]]);
 }

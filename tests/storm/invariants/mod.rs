@@ -1,24 +1,25 @@
 //! What holds after every cycle, whatever has been asked for and whatever has broken.
 
-mod course;
+mod motion;
 mod origins;
 mod phases;
 mod power;
 mod releases;
+mod set_points;
 mod stops;
 
 use takt::config::Config;
 use takt::sim::Observation;
 use takt_rt::{CycleRecord, Event, Snapshot};
 
-use crate::client::RequestEnvelope;
+use crate::client::RecentRequests;
 use crate::concern::Concern;
-use crate::wire::Told;
+use crate::wire::SentValues;
 
-use course::Course;
 use phases::Phases;
 use power::Power;
 use releases::Releases;
+use set_points::SetPoints;
 use stops::Stops;
 
 /// Slower than this is rest: rad/s (m/s).
@@ -31,11 +32,11 @@ pub struct Seen<'a> {
     pub snapshot: &'a Snapshot,
     /// What it has left for the logger.
     pub record: &'a CycleRecord,
-    /// What was told to the drives on the wire, an axis each.
-    pub told: &'a [Told],
+    /// What was sent to the drives, an entry an axis.
+    pub sent: &'a [SentValues],
     /// What is true of the drives, an axis each.
     pub truth: &'a [Observation],
-    /// What was told to people.
+    /// The events of the cycle.
     pub events: &'a [Event],
     /// What cannot be expected of the joints any more, an axis each.
     pub concerns: &'a [Concern],
@@ -44,11 +45,13 @@ pub struct Seen<'a> {
     /// Whether a bus cannot carry in time what is asked of it, an entry a bus.
     pub overloaded_buses: &'a [bool],
     /// What had been asked for before it.
-    pub asked: RequestEnvelope,
+    pub asked: RecentRequests,
+    /// Whether anything else is wrong than that the machine has too little time.
+    pub has_faults: bool,
 }
 
 pub struct Invariants {
-    courses: Vec<Course>,
+    set_points: Vec<SetPoints>,
     power: Power,
     phases: Phases,
     stops: Stops,
@@ -57,9 +60,9 @@ pub struct Invariants {
 
 impl Invariants {
     pub fn new(config: &Config) -> Self {
-        let courses = config.axes.iter().map(|axis| Course::new(config, axis));
+        let set_points = config.axes.iter().map(|axis| SetPoints::new(config, axis));
         Self {
-            courses: courses.collect(),
+            set_points: set_points.collect(),
             power: Power::new(config.axes.len()),
             phases: Phases::default(),
             stops: Stops::new(config.axes.len()),
@@ -69,10 +72,13 @@ impl Invariants {
 
     /// Looks at a cycle.
     pub fn check(&mut self, seen: &Seen<'_>) -> Result<(), String> {
-        for (axis, course) in self.courses.iter_mut().enumerate() {
-            course.check(seen, axis).map_err(|wrong| format!("{}: {wrong}", seen.config.axes[axis].name))?;
+        for (axis, set_points) in self.set_points.iter_mut().enumerate() {
+            set_points
+                .check(seen, axis)
+                .map_err(|wrong| format!("{}: {wrong}", seen.config.axes[axis].name))?;
         }
         origins::check(seen)?;
+        motion::check(seen)?;
         self.stops.check(seen)?;
         self.releases.check(seen)?;
         self.power.check(seen)?;

@@ -15,6 +15,8 @@ pub fn check(seen: &Seen<'_>) -> Result<(), String> {
 fn check_reason(seen: &Seen<'_>, reason: &StopReason) -> Result<(), String> {
     let is_troubled =
         |axis: u8| seen.concerns.get(usize::from(axis)).is_some_and(|concern| concern.is_present);
+    let is_watchdog_due =
+        |axis: u8| seen.concerns.get(usize::from(axis)).is_some_and(|concern| concern.is_watchdog_due);
     let is_crowded = |axis: u8| {
         let is_overloaded =
             seen.config.axes.get(usize::from(axis)).is_some_and(|axis| seen.overloaded_buses[axis.bus]);
@@ -36,6 +38,7 @@ fn check_reason(seen: &Seen<'_>, reason: &StopReason) -> Result<(), String> {
             Origin::Axis(_),
         ) => true,
         (Rule::MissedFeedback, Origin::Axis(axis)) if is_crowded(axis) => true,
+        (Rule::DriveFault, Origin::Axis(axis)) if is_watchdog_due(axis) => true,
         (
             Rule::FollowingError
             | Rule::MissedFeedback

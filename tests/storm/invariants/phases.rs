@@ -51,12 +51,12 @@ impl Phases {
         }
         if self.is_latched && shown.is_none() {
             if !seen.asked.has_reset_lately {
-                return Err("the reason of a stop is gone, and nobody has asked for that".to_owned());
+                return Err("the reason of a stop is gone without a reset".to_owned());
             }
             self.is_latched = false;
         }
         if shown.is_some() && !self.is_latched {
-            return Err(format!("nobody was told of {shown:?}"));
+            return Err(format!("no event has reported {shown:?}"));
         }
         let must_have_reason = seen.snapshot.phase == Phase::Stopping;
         match must_have_reason && seen.snapshot.stop.is_none() {

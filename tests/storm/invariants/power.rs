@@ -8,7 +8,7 @@ use takt::sim::Observation;
 
 /// Bit 7 of a controlword.
 const FAULT_RESET: u16 = 0x80;
-/// How far up a controlword leads: the same in both families.
+/// The level that switches a drive on: the same in both families.
 const SWITCHED_ON: u8 = 2;
 /// Cycles from a controlword on the wire to a drive that has taken it.
 const OBEYING_CYCLES: u64 = 12;
@@ -35,7 +35,7 @@ pub struct Power {
     since_enabling: u64,
     /// Cycles for which the group has been disabled.
     disabled: u64,
-    /// Whether somebody has asked for a reset since the last fault came up. On a bus that is busy it waits.
+    /// Whether a reset has been granted since the last fault came up. On a bus that is busy its controlwords wait.
     is_reset_awaited: bool,
 }
 
@@ -76,14 +76,14 @@ impl Power {
         Ok(())
     }
 
-    /// A drive is led up only while the group is being enabled, and reset only when somebody has asked for it.
+    /// A drive is enabled only while the group is being enabled, and reset only when that was asked for.
     fn check_controlword(&mut self, seen: &Seen<'_>, index: usize) -> Result<(), String> {
-        let Some(word) = seen.told[index].controlword else { return Ok(()) };
+        let Some(word) = seen.sent[index].controlword else { return Ok(()) };
         let (phase, new) = (seen.record.phase, level(word));
         let last = std::mem::replace(&mut self.axes[index].level, new);
         // The last of them may follow the phase: it ends as soon as the drives show that they are enabled.
         if new >= SWITCHED_ON && new > last && self.since_enabling > OBEYING_CYCLES {
-            return Err(format!("led up by controlword {word:#06x} in phase {phase:?}"));
+            return Err(format!("enabled by controlword {word:#06x} in phase {phase:?}"));
         }
         if new >= SWITCHED_ON && matches!(phase, Phase::Disabled | Phase::Passive) {
             return Err(format!("controlword {word:#06x} in a disabled group"));
@@ -91,7 +91,7 @@ impl Power {
         let is_reset = word & FAULT_RESET != 0;
         let is_asked_for = self.is_reset_awaited || seen.asked.has_reset_lately;
         match is_reset && self.has_enabled && !is_asked_for {
-            true => Err(format!("reset by controlword {word:#06x}, and nobody has asked for that")),
+            true => Err(format!("reset by controlword {word:#06x}, which was not asked for")),
             false => Ok(()),
         }
     }

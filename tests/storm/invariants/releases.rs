@@ -1,11 +1,11 @@
-//! No drive lets its joint go, or brakes it, before it stands: in a stop that takes the time for that.
+//! No drive loses its torque, or applies its brake, before its joint stands, in a stop that waits for that.
 
 use takt::sim::Observation;
 use takt_rt::StopCategory;
 
 use super::Seen;
 
-/// A joint slower than this fraction of its velocity limit may be let go.
+/// A joint slower than this fraction of its velocity limit may lose its torque.
 const SLOW: f64 = 0.02;
 
 pub struct Releases {
@@ -31,14 +31,14 @@ impl Releases {
         let axes = seen.config.axes.iter().zip(seen.truth).zip(seen.concerns);
         for (last, ((axis, now), concern)) in self.axes.iter_mut().zip(axes) {
             let Some(before) = last.replace(*now) else { continue };
-            let is_let_go = before.state.has_torque() && !now.state.has_torque();
+            let is_released = before.state.has_torque() && !now.state.has_torque();
             let is_braked = !before.is_braked && now.is_braked;
             let speed = before.velocity.abs();
             // It has gone on slowing down since the last look.
             let slow = SLOW * axis.limits.velocity + axis.limits.deceleration * elapsed_s;
-            if (is_let_go || is_braked) && !self.is_cut && !concern.is_present && speed > slow {
+            if (is_released || is_braked) && !self.is_cut && !concern.is_present && speed > slow {
                 return Err(format!(
-                    "{}: let go at {speed} of {}: {now:?}, {:?}",
+                    "{}: power taken at {speed} of {}: {now:?}, {:?}",
                     axis.name, axis.limits.velocity, seen.snapshot.stop
                 ));
             }

@@ -54,8 +54,8 @@ joint=(drive configs/single-erob.toml joint --bus can=vcan0)
 yz=(drive --bus vcan1 --node 1 --family yz-aim)
 x=(drive configs/gantry-yz-aim.toml x --bus gantry=vcan1)
 
-expect "eRob by node: info" 0 'vendor id +0x5A65726F' "${erob[@]}" info
-expect "eRob by axis: info" 0 'vendor id +0x5A65726F' "${joint[@]}" info
+expect "eRob by node: info" 0 'vendor ID +0x5A65726F' "${erob[@]}" info
+expect "eRob by axis: info" 0 'vendor ID +0x5A65726F' "${joint[@]}" info
 expect "eRob: enable and hold" 0 'state +switch on disabled' "${joint[@]}" enable --duration 0.3
 holds "eRob: move to 10 deg" 'abs(r["position"] - 0.17453) < 1e-3 and r["state"] == "switch on disabled"' "${joint[@]}" move absolute "10 deg" --velocity "60 deg/s"
 holds "eRob by node: 14564 counts back" 'abs(r["position_counts"]) < 200' "${erob[@]}" --raw move relative -14564 --velocity 100000 --acceleration 400000 --deceleration 400000
@@ -73,8 +73,8 @@ expect "eRob: nothing to clear" 0 'none, nothing to clear' "${joint[@]}" clear-f
 expect "eRob: watch" 0 'switch on disabled' "${joint[@]}" watch --duration 0.5
 [ "$(wc -l < "$printed")" -ge 5 ] && passes "eRob: watch shows several readings" || fails "eRob: watch shows several readings"
 
-expect "YZ-AIM by node: info" 0 'vendor id +0x00000331' "${yz[@]}" info
-expect "YZ-AIM by axis: info" 0 'vendor id +0x00000331' "${x[@]}" info
+expect "YZ-AIM by node: info" 0 'vendor ID +0x00000331' "${yz[@]}" info
+expect "YZ-AIM by axis: info" 0 'vendor ID +0x00000331' "${x[@]}" info
 expect "YZ-AIM: enable and hold" 0 'state' "${x[@]}" enable --duration 0.3
 holds "YZ-AIM: move to 20 mm" 'abs(r["position"] - 0.02) < 1e-4' "${x[@]}" move absolute "20 mm" --velocity "50 mm/s"
 holds "YZ-AIM by node: one turn back" '30000 < r["position_counts"] < 35000' "${yz[@]}" --raw move relative -32768 --velocity 300

@@ -2,7 +2,8 @@
 
 use super::super::clock::nanoseconds_of;
 use super::super::errno;
-use super::wire_format::{self, EMPTY, Message};
+use super::arrival::{Arrival, MessageSource, Sender};
+use super::wire_format::{self, EMPTY};
 use crate::frame::Frame;
 use crate::port::RECEIVE_BATCH;
 use crate::time::Nanoseconds;
@@ -10,53 +11,18 @@ use crate::time::Nanoseconds;
 /// The most frames handed to the kernel in one call.
 pub(super) const SEND_BATCH: usize = 64;
 
-/// Room for a time stamp and the overflow counter, with their headers.
+/// Room for a time stamp and the overflow counter, with their headers, in bytes.
 const CONTROL_BYTES: usize = 64;
 
 #[derive(Clone, Copy)]
 #[repr(C, align(8))]
 struct Control([u8; CONTROL_BYTES]);
 
-/// The buffers of one socket. The descriptor is somebody else's.
-pub(super) struct Batch {
+/// The messages of one socket, with the buffers to receive them. The descriptor belongs to the port.
+pub(super) struct SocketSource {
+    descriptor: libc::c_int,
     frames: [libc::canfd_frame; RECEIVE_BATCH],
     control: [Control; RECEIVE_BATCH],
-}
-
-/// One message as the kernel handed it over.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Arrival {
-    /// What it holds.
-    pub(super) message: Message,
-    /// Who sent it.
-    pub(super) sender: Sender,
-    /// When the kernel saw it, on `CLOCK_REALTIME`; `None` without a time stamp.
-    pub(super) real_time_ns: Option<Nanoseconds>,
-    /// How many messages this socket has lost so far for want of room (`SO_RXQ_OVFL`), modulo 2³².
-    pub(super) lost: Option<u32>,
-}
-
-/// Who sent a message, as far as the kernel tells.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Sender {
-    /// This socket: the message is back from the wire (`MSG_CONFIRM`).
-    ThisSocket,
-    /// Another socket of this machine (`MSG_DONTROUTE`).
-    ThisMachine,
-    /// Another device on the bus.
-    Wire,
-}
-
-impl Sender {
-    const fn of(flags: libc::c_int) -> Self {
-        if flags & libc::MSG_CONFIRM != 0 {
-            Self::ThisSocket
-        } else if flags & libc::MSG_DONTROUTE != 0 {
-            Self::ThisMachine
-        } else {
-            Self::Wire
-        }
-    }
 }
 
 /// Where a message goes.
@@ -68,19 +34,19 @@ pub(super) enum Destination {
     Interface(libc::c_int),
 }
 
-impl Batch {
-    pub(super) const fn new() -> Self {
-        Self { frames: [EMPTY; RECEIVE_BATCH], control: [Control([0; CONTROL_BYTES]); RECEIVE_BATCH] }
+impl SocketSource {
+    /// The messages of the socket `descriptor`, which must live as long as this is used.
+    pub(super) const fn new(descriptor: libc::c_int) -> Self {
+        Self {
+            descriptor,
+            frames: [EMPTY; RECEIVE_BATCH],
+            control: [Control([0; CONTROL_BYTES]); RECEIVE_BATCH],
+        }
     }
+}
 
-    /// Takes up to `limit` messages without waiting, hands each to `take`, and returns how many there were. The
-    /// error is the system's number; an empty queue is not an error.
-    pub(super) fn receive(
-        &mut self,
-        descriptor: libc::c_int,
-        limit: usize,
-        mut take: impl FnMut(Arrival),
-    ) -> Result<usize, i32> {
+impl MessageSource for SocketSource {
+    fn receive(&mut self, limit: usize, mut take: impl FnMut(Arrival)) -> Result<usize, i32> {
         let mut vectors = [NO_VECTOR; RECEIVE_BATCH];
         let mut headers = [NO_HEADER; RECEIVE_BATCH];
         let buffers = self.frames.iter_mut().zip(&mut self.control);
@@ -93,11 +59,11 @@ impl Batch {
             header.msg_hdr.msg_controllen = CONTROL_BYTES as _;
         }
         let limit = limit.min(RECEIVE_BATCH);
-        // SAFETY: the first `limit` headers point to buffers of the lengths they say, which live and are not
-        // touched otherwise until the call has returned. There is no time-out to point to.
+        // SAFETY: the first `limit` headers point to buffers of the stated lengths. The buffers live until the call has
+        // returned, and nothing else touches them meanwhile. There is no time-out.
         let count = unsafe {
             libc::recvmmsg(
-                descriptor,
+                self.descriptor,
                 headers.as_mut_ptr(),
                 limit as libc::c_uint,
                 libc::MSG_DONTWAIT as _,
@@ -123,8 +89,11 @@ impl Batch {
     }
 }
 
-/// Hands frames to the kernel without waiting, the first one first, and returns how many it took. An error means
-/// that it took none, and is the system's number. Of more frames than [`SEND_BATCH`] it is given the first ones.
+/// Hands frames to the kernel without waiting, the first one first, and returns how many it took. Of more frames than
+/// [`SEND_BATCH`], it gets the first ones.
+///
+/// # Errors
+/// The error number of the system. The kernel took no frame then.
 pub(super) fn send<'a>(
     descriptor: libc::c_int,
     frames: impl Iterator<Item = (Destination, &'a Frame)>,
@@ -147,13 +116,13 @@ pub(super) fn send<'a>(
         }
         count += 1;
     }
-    // SAFETY: the first `count` headers point to addresses and buffers of the lengths they say, which outlive the call.
+    // SAFETY: the first `count` headers point to addresses and buffers of the stated lengths, which outlive the call.
     let sent = unsafe { libc::sendmmsg(descriptor, headers.as_mut_ptr(), count, libc::MSG_DONTWAIT as _) };
     usize::try_from(sent).map_err(|_| errno())
 }
 
 const NO_ADDRESS: libc::sockaddr_can = {
-    // SAFETY: it holds numbers, of which any are possible.
+    // SAFETY: it holds numbers only, for which zero is valid.
     let mut address: libc::sockaddr_can = unsafe { core::mem::zeroed() };
     address.can_family = libc::AF_CAN as libc::sa_family_t;
     address
@@ -162,23 +131,23 @@ const NO_ADDRESS: libc::sockaddr_can = {
 const NO_VECTOR: libc::iovec = libc::iovec { iov_base: core::ptr::null_mut(), iov_len: 0 };
 
 const NO_HEADER: libc::mmsghdr = {
-    // SAFETY: it holds numbers and pointers that may be null.
+    // SAFETY: it holds numbers and pointers, for which zero and null are valid.
     unsafe { core::mem::zeroed() }
 };
 
 /// The time stamp and the overflow counter that came with a message.
 fn ancillary(header: &libc::msghdr) -> (Option<Nanoseconds>, Option<u32>) {
     let (mut stamp, mut lost) = (None, None);
-    // SAFETY: the kernel has filled the control buffer and set its length; the macros stay within it.
+    // SAFETY: the kernel has filled the control buffer and set its length. The macros stay within it.
     let mut next = unsafe { libc::CMSG_FIRSTHDR(header) };
-    // SAFETY: a header that the macros return lies within the control buffer, which is aligned for it.
+    // SAFETY: a header that the macros return is within the control buffer, which is aligned for it.
     while let Some(entry) = unsafe { next.as_ref() } {
         if entry.cmsg_level == libc::SOL_SOCKET && entry.cmsg_type == libc::SCM_TIMESTAMPNS {
-            // SAFETY: this type carries a `timespec`, for which the buffer has room; it need not be aligned.
+            // SAFETY: a message of this type holds a `timespec`, and the buffer has room for it. It need not be aligned.
             let time = unsafe { libc::CMSG_DATA(entry).cast::<libc::timespec>().read_unaligned() };
             stamp = Some(nanoseconds_of(&time));
         } else if entry.cmsg_level == libc::SOL_SOCKET && entry.cmsg_type == libc::SO_RXQ_OVFL {
-            // SAFETY: this type carries 32 bits, for which the buffer has room; they need not be aligned.
+            // SAFETY: a message of this type holds 32 bits, and the buffer has room for them. They need not be aligned.
             lost = Some(unsafe { libc::CMSG_DATA(entry).cast::<u32>().read_unaligned() });
         }
         // SAFETY: as for the first one.

@@ -1,25 +1,24 @@
-//! What a driver reports in error frames (`linux/can/error.h`).
+//! The meaning of error frames, in which a driver reports errors and states (`linux/can/error.h`).
 
 use crate::port::BusState;
 
-/// What an error frame means for the port.
+/// The meaning of one error frame for the port.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Report {
-    /// The state that the controller has entered; `None` when the frame does not say.
+    /// The state that the controller has entered; `None` if the frame does not say.
     pub(super) state: Option<BusState>,
-    /// Whether frames that the driver still had to send are lost: it drops them when it leaves the bus and when
-    /// it comes back to it.
+    /// Whether the driver has dropped the frames that it still had to send. It does so at bus-off and at the restart.
     pub(super) has_dropped_transmissions: bool,
-    /// Whether something went wrong; a controller that recovers reports too, and that is no error.
+    /// Whether this is an error. A controller that recovers sends a report too, which is not an error.
     pub(super) is_error: bool,
-    /// Whether the controller itself lost a received frame.
+    /// Whether the controller has lost a received frame.
     pub(super) has_lost_received: bool,
 }
 
-/// The index of the byte that details `CAN_ERR_CRTL`.
+/// The index of the data byte with the details of `CAN_ERR_CRTL`.
 const CONTROLLER_DETAIL: usize = 1;
 
-/// Reads the error classes of a frame's identifier and the details in its data.
+/// Reads an error frame: the error classes in its identifier and the details in its data.
 pub(super) fn read(class: u32, details: [u8; 8]) -> Report {
     let controller = if class & libc::CAN_ERR_CRTL != 0 {
         i32::from(details.get(CONTROLLER_DETAIL).copied().unwrap_or(0))
@@ -36,7 +35,7 @@ pub(super) fn read(class: u32, details: [u8; 8]) -> Report {
             () => controller_state(controller),
         },
         has_dropped_transmissions: is_off || is_restarted,
-        // Losing arbitration is how a bus works; only drivers that were asked to report it.
+        // A lost arbitration is normal on a bus. A driver reports it only on request.
         is_error: !is_recovery && class & !(libc::CAN_ERR_LOSTARB | libc::CAN_ERR_CNT) != 0,
         has_lost_received: controller & libc::CAN_ERR_CRTL_RX_OVERFLOW != 0,
     }

@@ -1,14 +1,14 @@
-//! Whether the interface of a socket can send at all, from the kernel itself.
+//! Asks the kernel whether the interface of a socket can send at all.
 //!
-//! While an interface is taken down, the kernel takes frames and drops them without a word for some milliseconds, before
-//! it tells the socket (`ENETDOWN`). Its flags show it from the beginning: `IFF_RUNNING` is gone as soon as the queue is
+//! While an interface is taken down, the kernel takes frames and silently drops them for some milliseconds. Only then the socket
+//! gets an error (`ENETDOWN`). The flags of the interface show it earlier: `IFF_RUNNING` is gone as soon as the queue is
 //! closed. An interface that is removed unbinds the socket.
 
 /// The interface that a socket is bound to.
 #[derive(Clone, Copy)]
 pub(super) struct Link {
     descriptor: libc::c_int,
-    /// `None` where the socket is no CAN socket that is bound to one interface.
+    /// `None` if the socket is not a CAN socket that is bound to one interface.
     interface: Option<Interface>,
 }
 
@@ -24,42 +24,42 @@ impl Link {
         let interface = bound_interface(descriptor).filter(|index| *index > 0).and_then(|index| {
             let mut request = NO_REQUEST;
             request.ifr_ifru.ifru_ifindex = index;
-            // SAFETY: this call reads the index from the request and writes the name into it.
+            // SAFETY: the call reads the index from the request and writes the name into it.
             let named = unsafe { libc::ioctl(descriptor, libc::SIOCGIFNAME as _, &raw mut request) };
             (named == 0).then_some(Interface { index, name: request.ifr_name })
         });
         Self { descriptor, interface }
     }
 
-    /// The kernel's number of the interface.
+    /// The index of the interface in the kernel.
     pub(super) fn index(&self) -> Option<libc::c_int> {
         self.interface.map(|interface| interface.index)
     }
 
-    /// Whether the interface is down, going down or gone. One of which nothing is known is not.
+    /// Whether the interface is down, going down or removed. An unknown interface counts as present.
     pub(super) fn is_lost(&self) -> bool {
         let Some(interface) = self.interface else { return false };
-        // Asking for one that is gone by its name would have the kernel look for a module of that name.
+        // This check comes first: for the name of a removed interface, the kernel would look for a module of that name.
         if bound_interface(self.descriptor) == Some(0) {
             return true;
         }
         let mut request = libc::ifreq { ifr_name: interface.name, ..NO_REQUEST };
-        // SAFETY: this call reads the name from the request and writes the flags into it.
+        // SAFETY: the call reads the name from the request and writes the flags into it.
         let answered = unsafe { libc::ioctl(self.descriptor, libc::SIOCGIFFLAGS as _, &raw mut request) };
-        // SAFETY: the kernel has written the flags if it has answered, and any bits are flags.
+        // SAFETY: the kernel has written the flags if the call succeeded, and any bits are valid flags.
         answered != 0 || !is_running(unsafe { request.ifr_ifru.ifru_flags })
     }
 }
 
-/// Whether an interface with these flags sends what it takes.
+/// Whether an interface with these flags sends the frames that it takes.
 const fn is_running(flags: libc::c_short) -> bool {
     let needed = libc::IFF_UP | libc::IFF_RUNNING;
     flags as libc::c_int & needed == needed
 }
 
-/// The index of the interface that a CAN socket is bound to, 0 for none; `None` for another socket.
+/// The index of the interface that a CAN socket is bound to; 0 for none, `None` for a socket that is not a CAN socket.
 fn bound_interface(descriptor: libc::c_int) -> Option<libc::c_int> {
-    // SAFETY: it holds numbers, of which any are possible.
+    // SAFETY: it holds numbers only, for which zero is valid.
     let mut address: libc::sockaddr_can = unsafe { core::mem::zeroed() };
     let mut length = size_of::<libc::sockaddr_can>() as libc::socklen_t;
     // SAFETY: the kernel writes no more than `length` bytes.
@@ -68,7 +68,7 @@ fn bound_interface(descriptor: libc::c_int) -> Option<libc::c_int> {
 }
 
 const NO_REQUEST: libc::ifreq = {
-    // SAFETY: it holds bytes and numbers, of which any are possible.
+    // SAFETY: it holds bytes and numbers only, for which zero is valid.
     unsafe { core::mem::zeroed() }
 };
 

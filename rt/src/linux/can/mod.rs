@@ -1,12 +1,25 @@
-//! A raw CAN socket of Linux (SocketCAN) as a [`BusPort`](crate::port::BusPort): many frames a system call, no
-//! blocking, no allocation.
+//! A raw CAN socket of Linux (SocketCAN) as a [`BusPort`](crate::port::BusPort).
+//!
+//! - `port`: the socket, as the owner makes it and sends on it; `bus_port`: what the cycle calls; `together`: one system
+//!   call for the frames of several buses.
+//! - `batch`: many frames in one system call; `wire_format`: the kernel's layout of a frame.
+//! - `reading`: takes what has arrived, with bounded work; `arrival`: one message as the kernel hands it over;
+//!   `arrival_time`: its time of arrival on the monotonic clock.
+//! - `accounting`: the counters and the state of the bus; `error_frame`: what the driver reports; `link`: whether the
+//!   interface can send at all.
+//!
+//! No call here waits or allocates, except [`SocketCanPort::wait`], which waits on request.
 
-mod account;
+mod accounting;
+mod arrival;
+mod arrival_time;
 mod batch;
+mod bus_port;
 mod error_frame;
 mod link;
 mod port;
+mod reading;
 mod together;
 mod wire_format;
 
-pub use port::SocketCanPort;
+pub use port::{DescriptorError, SocketCanPort};

@@ -1,31 +1,31 @@
-//! The kernel's representation of a frame (`linux/can.h`) and ours.
+//! Converts a frame to and from the layout of the kernel (`linux/can.h`).
 
 use crate::frame::{Frame, FrameKind, Id};
 
-/// What a message of a raw CAN socket can hold.
+/// The content of a message from a raw CAN socket.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Message {
     /// A frame of the bus.
     Frame(Frame),
-    /// A report of the driver about errors, states and losses; see [`super::error_frame`].
+    /// A report of the driver about errors, states and losses; see `error_frame`.
     Error {
-        /// The classes of error, `CAN_ERR_…`.
+        /// The classes of the error, `CAN_ERR_…`.
         class: u32,
-        /// Details by class.
+        /// The details of each class.
         details: [u8; 8],
     },
-    /// None of these: a message of a length or with a content that no CAN frame has.
+    /// A message with a length or a content that no CAN frame has.
     Unknown,
 }
 
-/// An empty buffer that holds either kind of frame.
+/// An empty buffer for a classic or a CAN FD frame.
 pub(super) const EMPTY: libc::canfd_frame = {
     // SAFETY: it holds numbers only, for which zero is valid.
     unsafe { core::mem::zeroed() }
 };
 
-/// Writes a frame as the kernel wants it and returns how many bytes of the buffer are the message: the length
-/// tells the kernel classic from FD frames.
+/// Writes a frame in the layout of the kernel. Returns how many bytes of the buffer are the message: by the length, the kernel
+/// tells classic from CAN FD frames.
 pub(super) fn write(frame: &Frame, to: &mut libc::canfd_frame) -> usize {
     let id = frame.id().value() | if frame.id().is_extended() { libc::CAN_EFF_FLAG } else { 0 };
     *to = EMPTY;

@@ -1,20 +1,20 @@
-//! The brake: back inside the limits before anything else (`otg.md` section 2, 1).
+//! The brake: brings the start inside the limits, before the motion to the target is planned.
 //!
-//! Outside are an acceleration or a velocity beyond its limit, and an acceleration so large that the velocity will
-//! go beyond its limit even when the jerk takes it away at once. The brake has at most two phases.
+//! The start is outside if its acceleration or velocity is beyond a limit. It is also outside if the velocity will go beyond its
+//! limit even when the jerk takes the acceleration away at once. The paper's brake has at most two phases.
 
 use super::super::choice::{larger, smaller};
 use super::super::problem::{Limits, State};
 use super::super::profile::Profile;
-use super::motion::Swing;
+use super::motion::VelocityStep;
 
-/// Relative to a limit, being beyond it by this much is rounding and no reason to brake.
+/// Exceeding a limit by this much, relative to the limit, is rounding and needs no brake.
 const ROUNDING: f64 = 1e-13;
 
-/// Duration and jerk of the phases.
+/// The duration and the jerk of each phase.
 type Phases = [(f64, f64); 2];
 
-/// Begins the profile with the brake, as fast as possible, and gives the state behind it.
+/// Begins the profile with the fastest brake, and returns the state behind it.
 pub(super) fn brake(start: &State, limits: &Limits, profile: &mut Profile) -> State {
     profile.begin(*start);
     let Some(phases) = phases(limits, start.velocity, start.acceleration) else { return *start };
@@ -25,7 +25,7 @@ pub(super) fn brake(start: &State, limits: &Limits, profile: &mut Profile) -> St
     profile.reached()
 }
 
-/// Begins the profile with the way to an acceleration within its limits, and gives the state behind it.
+/// Begins the profile with a phase that brings the acceleration within its limits, and returns the state behind it.
 #[inline]
 pub(super) fn relax(start: &State, limits: &Limits, profile: &mut Profile) -> State {
     let Limits { acceleration_min, acceleration_max, jerk_max, .. } = *limits;
@@ -40,8 +40,8 @@ pub(super) fn relax(start: &State, limits: &Limits, profile: &mut Profile) -> St
     profile.reached()
 }
 
-/// Begins the profile with the way to the velocity limit that does not go below it, with acceleration zero at its end, and gives
-/// the state behind it.
+/// Begins the profile with the brake that ends at the velocity limit with zero acceleration, so that the velocity does not fall
+/// below the limit. Returns the state behind it.
 pub(super) fn settle(start: &State, limits: &Limits, profile: &mut Profile) -> State {
     let Limits { velocity_max, velocity_min, acceleration_min, acceleration_max, jerk_max, .. } = *limits;
     let relaxed = relax(start, limits, profile);
@@ -57,16 +57,17 @@ pub(super) fn settle(start: &State, limits: &Limits, profile: &mut Profile) -> S
     profile.reached()
 }
 
-/// Down by `step` to acceleration zero, from an acceleration that adds to it when positive.
+/// Reduces the velocity by `step` and ends with zero acceleration. `sign` is 1 for the mirror image. A positive start
+/// acceleration adds to the step.
 fn slow_down(step: f64, acceleration: f64, limit: f64, jerk: f64, sign: f64, profile: &mut Profile) {
-    let swing = Swing::over(jerk * step + 0.5 * acceleration * acceleration, limit);
-    profile.shift((swing.peak + acceleration) / jerk, sign * jerk);
-    profile.shift(swing.hold / jerk, 0.0);
-    profile.shift(swing.peak / jerk, -sign * jerk);
+    let step = VelocityStep::over(jerk * step + 0.5 * acceleration * acceleration, limit);
+    profile.shift((step.peak + acceleration) / jerk, sign * jerk);
+    profile.shift(step.hold / jerk, 0.0);
+    profile.shift(step.peak / jerk, -sign * jerk);
     profile.limit_acceleration(0.0, 0.0);
 }
 
-/// What brings this state back, unless it is inside the limits.
+/// The phases that bring this state back inside the limits; `None` if it is inside.
 fn phases(limits: &Limits, velocity: f64, acceleration: f64) -> Option<Phases> {
     let half_square = 0.5 * acceleration * acceleration / limits.jerk_max;
     let beyond_max = velocity + if acceleration > 0.0 { half_square } else { 0.0 };
@@ -86,7 +87,7 @@ fn phases(limits: &Limits, velocity: f64, acceleration: f64) -> Option<Phases> {
         jerk: limits.jerk_max,
     };
     let mirrored = |phases: Phases| phases.map(|(duration_s, jerk)| (duration_s, -jerk));
-    // What the acceleration is about to do comes before what the velocity already is.
+    // The limit that the acceleration leads towards comes before the limit that the velocity exceeds already.
     if acceleration >= 0.0 && too_fast || acceleration <= 0.0 && too_fast && !too_slow {
         Some(up.slow_down(velocity, acceleration))
     } else if too_slow {
@@ -100,7 +101,7 @@ fn phases(limits: &Limits, velocity: f64, acceleration: f64) -> Option<Phases> {
     }
 }
 
-/// The limits seen from the side on which the velocity is, or will be, beyond its maximum.
+/// The limits, mirrored if needed, so that the velocity is or will be beyond its maximum.
 struct Side {
     velocity_max: f64,
     velocity_min: f64,
@@ -109,7 +110,8 @@ struct Side {
 }
 
 impl Side {
-    /// Until the velocity is back at its maximum, but not so long that it would then go below its minimum.
+    /// Slows down until the velocity is back at its maximum. It ends earlier where the velocity would otherwise fall below
+    /// its minimum later.
     fn slow_down(&self, velocity: f64, acceleration: f64) -> Phases {
         let deceleration_max = -self.acceleration_min;
         let held = |from: f64, deceleration: f64| {
@@ -117,12 +119,12 @@ impl Side {
             ((from - self.velocity_max.max(lowest)) / deceleration).max(0.0)
         };
         if acceleration < self.acceleration_min {
-            // Too much already: less at first, down to what may be held.
+            // The deceleration exceeds its limit already. The first phase reduces it to the limit.
             let excess_s = (self.acceleration_min - acceleration) / self.jerk;
             let then = velocity + 0.5 * (acceleration + self.acceleration_min) * excess_s;
             return [(excess_s, self.jerk), (held(then, deceleration_max), 0.0)];
         }
-        // On the arc of negative jerk the velocity is `peak − deceleration²/2J`.
+        // In the phase of negative jerk the velocity is `peak − deceleration²/2J`.
         let peak = velocity + 0.5 * acceleration * acceleration / self.jerk;
         let to_max = libm::sqrt((2.0 * self.jerk * (peak - self.velocity_max)).max(0.0));
         let to_min = libm::sqrt((self.jerk * (peak - self.velocity_min)).max(0.0));

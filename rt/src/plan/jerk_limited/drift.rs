@@ -1,64 +1,68 @@
-//! Motions that only rounding denies.
+//! Two-step motions that only rounding makes impossible.
 //!
-//! With an acceleration that goes straight to one value, stays there if it is the limit, and goes straight on to that of the
-//! target, an axis has nothing left to choose: the three numbers of its state must lie on a surface. Such [`Turn`]s
-//! are the last two phases of every motion. Planned anew in every cycle, the state drifts off that surface by the
-//! rounding of each cycle, and where it passes the target at speed, the next motion that meets it exactly has to go
-//! round again. So a state from which the target would be met but for that drift counts as on the surface.
+//! A two-step motion takes the acceleration straight to one value, holds it there if that is the limit, and takes it straight to
+//! that of the target (UD: the first three phases of ACC0 or NONE). It leaves the axis no choice: its start must lie on a
+//! surface in the space of position, velocity and acceleration. The last phases of every motion are such a motion.
 //!
-//! How far it may have drifted depends on where it came from, not on how little is left of its way: the measure is the
-//! distance to brake from the largest velocity. What the velocities have drifted weighs the more the smaller the
-//! acceleration at the turn, for that grows with their root. So where the turn that meets the velocity does not meet the
-//! position as nearly, it is the next one that does, as far as the drift of the velocities explains it.
+//! An axis that is planned again in every cycle drifts off that surface by the rounding of each cycle. Where it passes its
+//! target at speed, the next exact motion to the target is a long detour. So a state from which the target would be met
+//! without the drift counts as on the surface.
+//!
+//! How far a state may have drifted depends on where it came from, not on the rest of its way. The measure is the distance to
+//! brake from the largest velocity. The drift of the velocities matters more for a smaller peak of the acceleration, which
+//! grows with their root. So if the two-step motion that meets the velocity misses the position, the next one that meets
+//! the position is taken, as far as the drift of the velocities explains the difference.
 
 use super::ROUNDING;
-use super::motion::{Motion, Shape, Swing, square_positive};
-use super::step1::Edges;
+use super::motion::{Motion, SevenPhases, VelocityStep, square_positive};
 
-/// How far many cycles of sampling and planning may have led a state astray.
+/// How far a state may have drifted over many cycles of sampling and planning.
 struct Drift {
     distance: f64,
     velocity: f64,
 }
 
 impl Drift {
-    fn of(edges: &Edges) -> Self {
-        let Motion { a0, af, vmax, vmin, up, down, .. } = edges.motion;
+    /// The drift in this motion, whose distance has this rounding error besides.
+    fn of(motion: &Motion, rounding: f64) -> Self {
+        let Motion { a0, af, vmax, vmin, up, down, .. } = *motion;
         let speed = vmax.max(-vmin);
-        let braking_distance = speed * Swing::over(speed, up.min(down)).duration();
+        let braking_distance = speed * VelocityStep::over(speed, up.min(down)).duration();
         Self {
-            distance: edges.rounding + ROUNDING * braking_distance,
+            distance: rounding + ROUNDING * braking_distance,
             velocity: ROUNDING * (vmax - vmin + a0 * a0 + af * af),
         }
     }
 }
 
-/// Up to an acceleration, which is held if it is the limit, and down from it.
+/// A two-step motion: up to an acceleration, which is held if it is the limit, and down from it.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Turn {
-    /// Down and up instead: everything else is as seen in the mirror.
+pub(super) struct TwoStep {
+    /// Whether this is the mirror image: down, hold, up. Then all other fields are mirrored too.
     mirrored: bool,
-    /// The acceleration at the turn. It is negative where a deceleration becomes less and then more again.
+    /// The acceleration between both steps. It is negative where a deceleration becomes less and then more again.
     peak: f64,
     hold: f64,
 }
 
-/// All turns of one motion whose peak is of one sign. The sum of the times of both arcs, seen from where they have, or would
-/// have, no acceleration, is proportional to the distance.
-struct Turns<'a> {
+/// All two-step motions of one problem whose peak has one sign.
+///
+/// Each step is a phase of full jerk. Count its time from where its acceleration is zero, or would be zero if the step were
+/// longer. The sum of both times is proportional to the distance.
+struct TwoSteps<'a> {
     motion: &'a Motion,
     mirrored: bool,
     /// 1 or −1.
     sign: f64,
 }
 
-impl Turns<'_> {
-    /// The turn that comes nearest to the wanted distance, how far it is off, and how long it takes.
-    fn nearest(&self, drift: &Drift) -> Option<(Turn, f64, f64)> {
+impl TwoSteps<'_> {
+    /// The two-step motion that is nearest to the wanted distance, its error of the distance, and its duration.
+    fn nearest(&self, drift: &Drift) -> Option<(TwoStep, f64, f64)> {
         let Motion { a0, vf, af, up, distance, .. } = *self.motion;
         let (first, last) = (self.motion.start_root(), vf + 0.5 * af * af);
         let outer = a0.max(af);
-        // Both accelerations must be below the peak, whose square the step of the velocity is until the limit is reached.
+        // Both accelerations must be below the peak. Until the limit is reached, the velocity step is the square of the peak.
         let (least, most, limit) = if self.sign > 0.0 {
             (square_positive(outer), f64::INFINITY, up)
         } else {
@@ -71,54 +75,55 @@ impl Turns<'_> {
         }
         let speed = 0.5 * (first + last);
         let beside = first * a0 + a0 * a0 * a0 / 6.0 + last * af - af * af * af / 6.0;
-        let arcs = |step: f64| self.sign * Swing::over(step, limit).duration();
-        let exact = arcs(step.clamp(low, high));
-        let miss = |arcs: f64| speed * arcs - beside - distance;
-        // No more than need be, for what is put into the velocities here is drift in the next cycle.
+        let times = |step: f64| self.sign * VelocityStep::over(step, limit).duration();
+        let exact = times(step.clamp(low, high));
+        let miss = |times: f64| speed * times - beside - distance;
+        // The velocities are changed no more than needed, because that change is drift in the next cycle.
         let tolerated = 0.5 * drift.distance;
         let beyond = miss(exact) - miss(exact).clamp(-tolerated, tolerated);
-        let arcs = if beyond == 0.0 {
+        let times = if beyond == 0.0 {
             exact
         } else {
-            let (one, other) = (arcs(low), arcs(high));
+            let (one, other) = (times(low), times(high));
             (exact - beyond / speed).min(one.max(other)).max(one.min(other))
         };
-        let peak = (0.5 * arcs).min(limit);
-        let turn = Turn { mirrored: self.mirrored, peak, hold: arcs - 2.0 * peak };
-        Some((turn, miss(arcs).abs(), arcs - a0 - af))
+        let peak = (0.5 * times).min(limit);
+        let two_step = TwoStep { mirrored: self.mirrored, peak, hold: times - 2.0 * peak };
+        Some((two_step, miss(times).abs(), times - a0 - af))
     }
 }
 
-impl Turn {
-    /// The phases of the turn, from start to target of the motion.
-    pub(super) fn shape(&self, motion: &Motion) -> Shape {
+impl TwoStep {
+    /// The phases from start to target of the motion.
+    pub(super) fn phases(&self, motion: &Motion) -> SevenPhases {
         let seen = if self.mirrored { motion.mirrored() } else { *motion };
-        let shape = Shape {
+        let phases = SevenPhases {
             durations: [self.peak - seen.a0, self.hold, self.peak - seen.af, 0.0, 0.0, 0.0, 0.0],
             jerks: [1.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0],
         };
-        if self.mirrored { shape.mirrored() } else { shape }
+        if self.mirrored { phases.mirrored() } else { phases }
     }
 }
 
-impl Edges {
-    /// The turn that would be the fastest motion but for drift, and how long it takes, if the fastest one is a detour in place of
-    /// it.
-    pub(super) fn but_for_drift(&self, fastest: f64) -> Option<(Turn, f64)> {
-        let drift = Drift::of(self);
-        let mirrored = self.motion.mirrored();
-        let seen = [(&self.motion, false), (&mirrored, true)];
-        let turns = seen.into_iter().flat_map(|(motion, mirrored)| {
-            [1.0, -1.0].map(|sign| Turns { motion, mirrored, sign }.nearest(&drift))
-        });
-        let explained = turns.flatten().filter(|(_, error, duration)| {
-            // At rest, an error of the distance costs its third root in time: that is no detour.
-            let lost = fastest - duration;
-            *error <= drift.distance && lost * lost * lost > DETOUR * (error + f64::EPSILON * drift.distance)
-        });
-        explained.map(|(turn, _, duration)| (turn, duration)).min_by(|one, other| one.1.total_cmp(&other.1))
-    }
+/// The two-step motion that would be the fastest one without drift, and its duration; `None` if `fastest`, the duration of
+/// the fastest exact motion, is no detour in place of it. `rounding` is the rounding error of the distance.
+pub(super) fn but_for_drift(motion: &Motion, rounding: f64, fastest: f64) -> Option<(TwoStep, f64)> {
+    let drift = Drift::of(motion, rounding);
+    let mirrored = motion.mirrored();
+    let seen = [(motion, false), (&mirrored, true)];
+    let motions = seen.into_iter().flat_map(|(motion, mirrored)| {
+        [1.0, -1.0].map(|sign| TwoSteps { motion, mirrored, sign }.nearest(&drift))
+    });
+    let explained = motions.flatten().filter(|(_, error, duration)| {
+        // At rest, an error of the distance costs its third root in time. That is no detour.
+        let lost = fastest - duration;
+        *error <= drift.distance && lost * lost * lost > DETOUR * (error + f64::EPSILON * drift.distance)
+    });
+    explained
+        .map(|(two_step, _, duration)| (two_step, duration))
+        .min_by(|one, other| one.1.total_cmp(&other.1))
 }
 
-/// A jerk of one and of minus one in turns, from rest to rest, covers this part of its duration's third power.
+/// The third power of the duration of a motion from rest to rest with full jerk (UDDU without plateaus), divided by its
+/// distance.
 const DETOUR: f64 = 32.0;

@@ -1,10 +1,10 @@
-//! The problem without units: time counted in `amax/J`, so that the jerk and the upper acceleration are one.
+//! The problem without units. Time is counted in `amax/J`, so the jerk limit and the upper acceleration limit are one.
 //!
-//! The same motion in radians, degrees or encoder counts is then the same numbers, and tolerances are relative.
+//! The same motion in radians, degrees or encoder counts then has the same numbers, and all tolerances are relative.
 
 use super::super::problem::{Limits, State};
 
-/// A motion from within the limits, with jerk one.
+/// A problem without units: from a start within the limits, over a distance, to a target. The jerk limit is one.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Motion {
     pub(super) distance: f64,
@@ -20,7 +20,7 @@ pub(super) struct Motion {
     pub(super) down: f64,
 }
 
-/// What a unit of time, velocity and distance is.
+/// The sizes of the units of time, acceleration, velocity and distance.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Scale {
     pub(super) time_s: f64,
@@ -37,7 +37,7 @@ impl Scale {
         Self { time_s, acceleration, velocity, distance: velocity * time_s }
     }
 
-    /// The motion from this state (its position is not read) over this distance.
+    /// The problem from this state over this distance. The position of the state is not read.
     pub(super) fn motion(&self, start: &State, distance: f64, target: &State, limits: &Limits) -> Motion {
         let (per_velocity, per_acceleration) = (1.0 / self.velocity, 1.0 / self.acceleration);
         Motion {
@@ -55,7 +55,7 @@ impl Scale {
 }
 
 impl Motion {
-    /// Positive and negative direction exchanged: every jerk changes its sign.
+    /// The mirror image: positive and negative direction are exchanged, and every jerk changes its sign.
     pub(super) fn mirrored(&self) -> Self {
         Self {
             distance: -self.distance,
@@ -70,7 +70,7 @@ impl Motion {
         }
     }
 
-    /// Backwards in time: velocities and jerks change their signs, accelerations do not.
+    /// The motion backwards in time: velocities and jerks change their signs, accelerations do not.
     pub(super) fn reversed(&self) -> Self {
         Self {
             distance: -self.distance,
@@ -85,27 +85,28 @@ impl Motion {
         }
     }
 
-    /// The velocity reached when the acceleration is taken back to zero at once.
+    /// The velocity that the axis reaches if it takes its start acceleration to zero at once.
     pub(super) fn velocity_behind_start(&self) -> f64 {
         self.v0 + 0.5 * self.a0 * self.a0.abs()
     }
 
-    /// The velocity from which the target is reached by building up its acceleration at once.
+    /// The velocity from which the axis reaches the target by building up the target acceleration at once.
     pub(super) fn velocity_before_target(&self) -> f64 {
         self.vf - 0.5 * self.af * self.af.abs()
     }
 
-    /// The velocity at which the first arc of positive jerk has, or would have had, no acceleration.
+    /// The velocity at which the first phase of positive jerk has zero acceleration, or would have it if it were longer.
     pub(super) fn start_root(&self) -> f64 {
         self.v0 - 0.5 * self.a0 * self.a0
     }
 
-    /// The velocity at which the last arc of positive jerk has, or would have had, no acceleration.
+    /// The velocity at which the last phase of positive jerk has zero acceleration, or would have it if it were longer.
     pub(super) fn target_root(&self) -> f64 {
         self.vf - 0.5 * self.af * self.af
     }
 
-    /// What the arcs beside the two roots add to the distance of the motion between them.
+    /// The distance beside the motion between the two roots: of the last phase behind its root, less that of the first phase
+    /// before its root.
     pub(super) fn arcs_distance(&self) -> f64 {
         let before = self.a0 * (self.start_root() + self.a0 * self.a0 / 6.0);
         let behind = self.af * (self.target_root() + self.af * self.af / 6.0);
@@ -118,16 +119,17 @@ pub(super) fn square_positive(x: f64) -> f64 {
     if x > 0.0 { x * x } else { 0.0 }
 }
 
-/// A change of velocity by `step` from zero to zero acceleration, as fast as possible.
+/// The fastest change of the velocity from zero to zero acceleration: jerk up (U), hold, jerk down (D).
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Swing {
-    /// The acceleration that is reached.
+pub(super) struct VelocityStep {
+    /// The acceleration that is reached; also the duration of each of the two phases of jerk.
     pub(super) peak: f64,
-    /// How long it is held.
+    /// How long the acceleration is held.
     pub(super) hold: f64,
 }
 
-impl Swing {
+impl VelocityStep {
+    /// The change by `step`, with accelerations up to `limit`.
     #[inline]
     pub(super) fn over(step: f64, limit: f64) -> Self {
         if step > limit * limit {
@@ -143,19 +145,21 @@ impl Swing {
     }
 }
 
-/// Seven phases of constant jerk.
+/// Seven phases of constant jerk: the profile of a motion.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Shape {
+pub(super) struct SevenPhases {
     pub(super) durations: [f64; 7],
     pub(super) jerks: [f64; 7],
 }
 
-impl Shape {
+impl SevenPhases {
+    /// The same with positive and negative direction exchanged.
     pub(super) fn mirrored(mut self) -> Self {
         self.jerks = self.jerks.map(|jerk| -jerk);
         self
     }
 
+    /// The same backwards in time.
     pub(super) fn reversed(mut self) -> Self {
         self.durations.reverse();
         self.jerks.reverse();

@@ -2,19 +2,19 @@
 
 use super::super::choice::select;
 
-/// The most evaluations for one root. Newton's method from a bracket ends after about five; when it leaves the
-/// bracket it is halved, and 64 halvings exhaust the 53 bits of a number.
+/// The most evaluations for one root. Newton's method inside a bracket ends after about five. A step out of the bracket
+/// halves it instead, and 64 halvings exhaust the 53 bits of a number.
 pub(in super::super) const EVALUATIONS_MAX: u32 = 96;
 
-/// A value and its derivative.
+/// The value of a function and its derivative.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Point {
     pub(super) value: f64,
     pub(super) slope: f64,
 }
 
-/// By how much a distance exceeds the one that is wanted: nothing, where it is no more than the rounding of terms of this
-/// size. Without that, a search would go on among digits that mean nothing.
+/// By how much a distance exceeds the wanted one. The result is 0 where the excess is not more than the rounding of terms of this
+/// size: otherwise a search would go on among digits without meaning.
 #[inline]
 pub(super) fn excess(distance: f64, size: f64, wanted: f64) -> f64 {
     let excess = distance - wanted;
@@ -25,17 +25,17 @@ pub(super) fn excess(distance: f64, size: f64, wanted: f64) -> f64 {
 #[derive(Clone, Copy)]
 struct End {
     at: f64,
-    /// Whether the function has been looked at there.
+    /// Whether the function has been evaluated there.
     seen: bool,
 }
 
-/// Where `function` is zero, given that it rises from `low` (value not above 0) to `high` (not below 0).
+/// The root of `function`, which must rise from `low` (value not above 0) to `high` (value not below 0).
 ///
-/// A step of Newton's method that leaves the bracket goes to its end: the root often is there, and from there the method
-/// comes from the other side. Only when that has been tried the bracket is halved.
+/// A step of Newton's method that leaves the bracket goes to the end of the bracket instead. The root is often there, and
+/// otherwise the method approaches it from the other side. Only after that the bracket is halved.
 #[inline]
 pub(super) fn rising_root(low: f64, high: f64, guess: f64, function: impl Fn(f64) -> Point) -> f64 {
-    /// Newton's method doubles the digits: after a relative step this small, all are right.
+    /// Newton's method doubles the right digits with each step. After a relative step this small, all digits are right.
     const LAST_STEP: f64 = 1e-9;
     let mut x = guess.clamp(low.min(high), high.max(low));
     #[cfg(test)]
@@ -52,7 +52,7 @@ pub(super) fn rising_root(low: f64, high: f64, guess: f64, function: impl Fn(f64
         } else {
             break;
         };
-        // On the wrong side already at the end: rounding has put the root beyond it.
+        // The sign is wrong at the end of the bracket: rounding has put the root beyond it.
         if x == other.at {
             break;
         }
@@ -76,7 +76,7 @@ pub(super) fn rising_root(low: f64, high: f64, guess: f64, function: impl Fn(f64
     x
 }
 
-/// What the searches of this thread have cost, for the tests of the bound.
+/// Counts the searches of this thread, for the tests of the bound.
 #[cfg(test)]
 pub(in super::super) mod work {
     extern crate std;
@@ -96,7 +96,7 @@ pub(in super::super) mod work {
         EVALUATIONS.set(EVALUATIONS.get() + 1);
     }
 
-    /// The searches and the evaluations since the last call.
+    /// The searches and evaluations since the last call.
     pub(in super::super::super) fn take() -> (u32, u32) {
         (SEARCHES.take(), EVALUATIONS.take())
     }

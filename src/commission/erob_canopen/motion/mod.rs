@@ -1,4 +1,4 @@
-//! Every motion of an eRob: prepared, watched, and ended at rest.
+//! Motion of an eRob: every motion is prepared, monitored and ended at standstill.
 
 pub mod position;
 pub mod torque;
@@ -7,46 +7,46 @@ use takt_rt::{Nanoseconds, OperationMode};
 
 use super::{enabling, reading};
 use crate::canopen::objects::*;
-use crate::commission::conversation::Conversation;
-use crate::commission::event::Reading;
+use crate::commission::event::AxisReading;
 use crate::commission::failure::Failure;
-use crate::commission::guarded::{guarded, tell_end};
-use crate::commission::looking;
-use crate::commission::pace::{Pace, Profile};
+use crate::commission::guarded::{add_final_position, guarded};
+use crate::commission::motion_profile::{DriveProfile, MotionProfile};
+use crate::commission::polling;
 use crate::commission::report::Report;
-use crate::commission::subject::{Amount, Subject};
+use crate::commission::sdo_session::SdoSession;
+use crate::commission::target::{CommandValue, TargetDrive};
 
-/// Between two looks at an axis that moves.
-const LOOK_NS: Nanoseconds = 20_000_000;
+/// Interval between two readings of a moving axis.
+const POLL_NS: Nanoseconds = 20_000_000;
 
-/// Prepares the drive, does `work` with it, and leaves it at rest.
+/// Checks the drive, runs `work`, and disables the drive at standstill afterwards.
 pub(super) async fn with_torque(
-    c: &Conversation,
-    s: &Subject,
+    c: &SdoSession,
+    s: &TargetDrive,
     keeps_enabled: bool,
     work: impl Future<Output = Result<Report, Failure>>,
 ) -> Result<Report, Failure> {
-    enabling::greet(c, s).await?;
-    let ended = guarded(c, keeps_enabled, work, enabling::leave(c, s), enabling::torque_off(c)).await;
-    tell_end(c, s, ended, reading::summary(c, s).await)
+    enabling::check_ready(c, s).await?;
+    let ended = guarded(c, keeps_enabled, work, enabling::shut_down(c, s), enabling::torque_off(c)).await;
+    add_final_position(c, s, ended, reading::summary(c, s).await)
 }
 
 /// `enable`
 pub async fn enable(
-    c: &Conversation,
-    s: &Subject,
+    c: &SdoSession,
+    s: &TargetDrive,
     hold_ns: Option<Nanoseconds>,
     keeps_enabled: bool,
 ) -> Result<Report, Failure> {
     let work = async {
-        let rated = begin(c, s, OperationMode::ProfilePosition, &Profile::default()).await?;
+        let rated = begin(c, s, OperationMode::ProfilePosition, &DriveProfile::default()).await?;
         let position = enabling::enable(c, s).await?;
         if keeps_enabled {
-            // Nobody would feed the watch after the end of this program.
+            // The watchdog is disarmed, because the heartbeat ends with this program.
             c.write(&CONSUMER_HEARTBEAT_TIME, 0).await?;
         } else {
             c.step("hold");
-            tend(c, s, rated, hold_ns, LOOK_NS, |_| Ok(())).await?;
+            poll_until(c, s, rated, hold_ns, POLL_NS, |_| Ok(())).await?;
         }
         let mut report = Report::new();
         report.add(
@@ -62,55 +62,55 @@ pub async fn enable(
 
 /// `velocity`
 pub async fn velocity(
-    c: &Conversation,
-    s: &Subject,
-    velocity: Amount,
-    pace: Pace,
+    c: &SdoSession,
+    s: &TargetDrive,
+    velocity: CommandValue,
+    profile: MotionProfile,
     duration_ns: Option<Nanoseconds>,
     keeps_enabled: bool,
 ) -> Result<Report, Failure> {
     let raw = s.velocity_raw(velocity);
     s.check_velocity(raw)?;
-    let profile = s.profile(&Pace { velocity: None, ..pace })?;
+    let profile = s.drive_profile(&MotionProfile { velocity: None, ..profile })?;
     with_torque(c, s, keeps_enabled, run_at(c, s, raw, profile, duration_ns, keeps_enabled)).await
 }
 
 /// `move continuous`
 pub async fn continuous(
-    c: &Conversation,
-    s: &Subject,
+    c: &SdoSession,
+    s: &TargetDrive,
     is_forward: bool,
-    pace: Pace,
+    profile: MotionProfile,
     duration_ns: Option<Nanoseconds>,
     keeps_enabled: bool,
 ) -> Result<Report, Failure> {
-    let profile = s.profile(&pace)?;
+    let profile = s.drive_profile(&profile)?;
     let speed = profile.velocity.ok_or(Failure::Missing {
         what: "--velocity",
         why: "without a configuration nothing is known of the axis' limits",
     })?;
-    let forward = s.velocity_raw(Amount::Joint(1.0)).signum() * if is_forward { 1 } else { -1 };
+    let forward = s.velocity_raw(CommandValue::Joint(1.0)).signum() * if is_forward { 1 } else { -1 };
     let run = run_at(c, s, forward * speed, profile, duration_ns, keeps_enabled);
     with_torque(c, s, keeps_enabled, run).await
 }
 
 async fn run_at(
-    c: &Conversation,
-    s: &Subject,
+    c: &SdoSession,
+    s: &TargetDrive,
     raw: i64,
-    profile: Profile,
+    profile: DriveProfile,
     duration_ns: Option<Nanoseconds>,
     keeps_enabled: bool,
 ) -> Result<Report, Failure> {
     let rated = begin(c, s, OperationMode::ProfileVelocity, &profile).await?;
     let began = enabling::enable(c, s).await?;
-    s.check_way(began, raw)?;
+    s.check_direction(began, raw)?;
     c.step("run");
     c.write(&TARGET_VELOCITY, raw).await?;
     let mut fastest = 0.0_f64;
-    tend(c, s, rated, duration_ns, LOOK_NS, |reading| {
+    poll_until(c, s, rated, duration_ns, POLL_NS, |reading| {
         fastest = if reading.velocity.abs() > fastest.abs() { reading.velocity } else { fastest };
-        s.check_room(reading, None)
+        s.check_stopping_distance(reading, None)
     })
     .await?;
     c.step("ramp to standstill");
@@ -126,29 +126,29 @@ async fn run_at(
         c.write(&CONSUMER_HEARTBEAT_TIME, 0).await?;
     }
     let ended = c.read(&POSITION_ACTUAL_VALUE).await?;
-    Ok(looking::run_report(s, raw, fastest, began, ended))
+    Ok(polling::run_report(s, raw, fastest, began, ended))
 }
 
-/// [`enabling::prepare`], and the rated torque.
+/// Prepares the drive and reads its rated torque.
 async fn begin(
-    c: &Conversation,
-    s: &Subject,
+    c: &SdoSession,
+    s: &TargetDrive,
     mode: OperationMode,
-    profile: &Profile,
+    profile: &DriveProfile,
 ) -> Result<Option<f64>, Failure> {
     enabling::prepare(c, s, mode, profile).await?;
     reading::rated_torque(c).await
 }
 
-/// Looks after an enabled axis for a time.
-async fn tend(
-    c: &Conversation,
-    s: &Subject,
+/// Polls an enabled axis for a time.
+async fn poll_until(
+    c: &SdoSession,
+    s: &TargetDrive,
     rated: Option<f64>,
     duration_ns: Option<Nanoseconds>,
     every_ns: Nanoseconds,
-    look: impl FnMut(&Reading) -> Result<(), Failure>,
+    check: impl FnMut(&AxisReading) -> Result<(), Failure>,
 ) -> Result<(), Failure> {
     let read = async || reading::read_enabled(c, s, rated).await;
-    looking::tend(c, every_ns, duration_ns, read, look).await
+    polling::poll_until(c, every_ns, duration_ns, read, check).await
 }

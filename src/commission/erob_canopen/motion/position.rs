@@ -1,42 +1,42 @@
-//! Profile position: every target with its handshake (607A, bit 4, status bit 12, bit 4 off, status bit 12 off).
+//! Profile position mode. Each target (607A) uses the handshake of controlword bit 4 and statusword bit 12.
 
 use takt_rt::{Nanoseconds, OperationMode, controlword, statusword};
 
-use super::{LOOK_NS, begin, with_torque};
+use super::{POLL_NS, begin, with_torque};
 use crate::canopen::objects::*;
-use crate::commission::conversation::Conversation;
 use crate::commission::erob_canopen::{enabling, reading};
 use crate::commission::failure::Failure;
-use crate::commission::looking;
-use crate::commission::pace::{Pace, Profile};
+use crate::commission::motion_profile::{DriveProfile, MotionProfile};
+use crate::commission::polling;
 use crate::commission::report::Report;
-use crate::commission::request::Course;
-use crate::commission::subject::Subject;
+use crate::commission::sdo_session::SdoSession;
+use crate::commission::target::TargetDrive;
+use crate::commission::task::MoveKind;
 
-/// The drive acknowledges a set-point within this.
+/// Longest time until the drive acknowledges a set-point (statusword bit 12).
 const ACKNOWLEDGE_NS: Nanoseconds = 1_000_000_000;
 
 /// `move absolute`, `move relative`, `move reciprocate`
 pub async fn run(
-    c: &Conversation,
-    s: &Subject,
-    course: Course,
-    pace: Pace,
+    c: &SdoSession,
+    s: &TargetDrive,
+    kind: MoveKind,
+    profile: MotionProfile,
     keeps_enabled: bool,
 ) -> Result<Report, Failure> {
-    let profile = s.profile(&pace)?;
-    looking::check_course(c, s, course).await?;
-    let is_immediate = matches!(course, Course::Absolute { is_immediate: true, .. });
+    let profile = s.drive_profile(&profile)?;
+    polling::check_target(c, s, kind).await?;
+    let is_immediate = matches!(kind, MoveKind::Absolute { is_immediate: true, .. });
     let work = async {
         let rated = begin(c, s, OperationMode::ProfilePosition, &profile).await?;
         let profile = complete(c, profile).await?;
-        c.step("way");
+        c.step("plan the move");
         let here = c.read(&POSITION_ACTUAL_VALUE).await?;
-        let (target, stops, dwell_ns) = match course {
-            Course::Absolute { to, .. } => (s.position_counts(to), 1, 0),
-            Course::Relative(by) => (here.saturating_add(s.distance_counts(by)), 1, 0),
-            Course::Reciprocate { to, times, dwell_ns } => (s.position_counts(to), 2 * times, dwell_ns),
-            Course::Continuous { .. } => {
+        let (target, stops, dwell_ns) = match kind {
+            MoveKind::Absolute { to, .. } => (s.position_counts(to), 1, 0),
+            MoveKind::Relative(by) => (here.saturating_add(s.distance_counts(by)), 1, 0),
+            MoveKind::Reciprocate { to, times, dwell_ns } => (s.position_counts(to), 2 * times, dwell_ns),
+            MoveKind::Continuous { .. } => {
                 return Err(Failure::Unsuitable("a continuous move has no target".to_owned()));
             }
         };
@@ -53,13 +53,13 @@ pub async fn run(
             c.write(&CONSUMER_HEARTBEAT_TIME, 0).await?;
         }
         let reached = c.read(&POSITION_ACTUAL_VALUE).await?;
-        Ok(looking::move_report(s, here, target, stops, reached - at))
+        Ok(polling::move_report(s, here, target, stops, reached - at))
     };
     with_torque(c, s, keeps_enabled, work).await
 }
 
-/// What the profile leaves to the drive, as the drive has it.
-async fn complete(c: &Conversation, profile: Profile) -> Result<Profile, Failure> {
+/// Reads from the drive what the profile leaves open.
+async fn complete(c: &SdoSession, profile: DriveProfile) -> Result<DriveProfile, Failure> {
     let velocity = match profile.velocity {
         Some(velocity) => velocity,
         None => c.read(&PROFILE_VELOCITY).await?,
@@ -71,10 +71,10 @@ async fn complete(c: &Conversation, profile: Profile) -> Result<Profile, Failure
         (Some(acceleration), Some(deceleration)) => acceleration.min(deceleration),
         _ => c.read(&PROFILE_ACCELERATION).await?.min(c.read(&PROFILE_DECELERATION).await?),
     };
-    Ok(Profile { velocity: Some(velocity), acceleration: Some(acceleration.max(1)), ..profile })
+    Ok(DriveProfile { velocity: Some(velocity), acceleration: Some(acceleration.max(1)), ..profile })
 }
 
-async fn set_point(c: &Conversation, target: i64, is_immediate: bool) -> Result<(), Failure> {
+async fn set_point(c: &SdoSession, target: i64, is_immediate: bool) -> Result<(), Failure> {
     c.step("set-point");
     c.write(&TARGET_POSITION, target).await?;
     let is_acknowledged = |word: i64| word as u16 & statusword::BIT_12 != 0;
@@ -88,10 +88,10 @@ async fn set_point(c: &Conversation, target: i64, is_immediate: bool) -> Result<
 }
 
 async fn arrive(
-    c: &Conversation,
-    s: &Subject,
+    c: &SdoSession,
+    s: &TargetDrive,
     rated: Option<f64>,
-    profile: &Profile,
+    profile: &DriveProfile,
     from: i64,
     to: i64,
 ) -> Result<(), Failure> {
@@ -111,6 +111,6 @@ async fn arrive(
             let (object, last) = (POSITION_ACTUAL_VALUE, reading.position_counts);
             return Err(Failure::NotInTime { object, what: "the target", last, waited_ns });
         }
-        c.pause(LOOK_NS).await?;
+        c.pause(POLL_NS).await?;
     }
 }

@@ -1,45 +1,45 @@
-//! Profile torque, with an eye on the velocity: nothing else limits it in this mode.
+//! Profile torque mode. The velocity is monitored here, because the drive does not limit it in this mode.
 
 use takt_rt::{Nanoseconds, OperationMode};
 
-use super::{begin, tend, with_torque};
+use super::{begin, poll_until, with_torque};
 use crate::canopen::objects::*;
-use crate::commission::conversation::Conversation;
 use crate::commission::erob_canopen::enabling;
 use crate::commission::failure::Failure;
-use crate::commission::pace::Profile;
+use crate::commission::motion_profile::DriveProfile;
 use crate::commission::report::Report;
-use crate::commission::subject::{Amount, Subject};
+use crate::commission::sdo_session::SdoSession;
+use crate::commission::target::{CommandValue, TargetDrive};
 
-/// Between two looks: an unloaded joint gains speed quickly.
-const LOOK_NS: Nanoseconds = 2_000_000;
-/// The part of the axis' velocity limit that is permitted when nothing else is asked for.
+/// Interval between two readings; short, because an unloaded joint accelerates quickly.
+const POLL_NS: Nanoseconds = 2_000_000;
+/// Default velocity limit as a share of the axis' limit.
 const PERMITTED: f64 = 0.25;
 
 /// `torque`
 pub async fn run(
-    c: &Conversation,
-    s: &Subject,
-    torque: Amount,
-    velocity_limit: Option<Amount>,
+    c: &SdoSession,
+    s: &TargetDrive,
+    torque: CommandValue,
+    velocity_limit: Option<CommandValue>,
     duration_ns: Option<Nanoseconds>,
 ) -> Result<Report, Failure> {
-    if let Amount::Joint(torque) = torque {
+    if let CommandValue::Joint(torque) = torque {
         s.check_torque(torque)?;
     }
-    let permitted = s.limits.map(|limits| Amount::Joint(PERMITTED * limits.velocity));
+    let permitted = s.limits.map(|limits| CommandValue::Joint(PERMITTED * limits.velocity));
     let limit = velocity_limit.or(permitted).map(|limit| s.velocity_raw(limit));
     let limit = limit.ok_or(Failure::Missing {
         what: "--max-velocity",
-        why: "a torque alone limits no speed, and without a configuration nothing is known of the axis' limits",
+        why: "a torque command does not limit the velocity, and without a configuration the axis has no known limits",
     })?;
     s.check_velocity(limit)?;
     let limit = s.velocity(limit as f64).abs();
     let work = async {
-        let rated = begin(c, s, OperationMode::ProfileTorque, &Profile::default()).await?;
+        let rated = begin(c, s, OperationMode::ProfileTorque, &DriveProfile::default()).await?;
         let Some(rated) = rated else {
             return Err(Failure::Unsupported {
-                what: "the drive does not tell its rated torque (6076)".to_owned(),
+                what: "the drive does not report its rated torque (6076)".to_owned(),
                 instead: "torque cannot be commanded without it".to_owned(),
             });
         };
@@ -50,9 +50,9 @@ pub async fn run(
         c.step("torque");
         c.write(&TARGET_TORQUE, per_mille).await?;
         let mut fastest = 0.0_f64;
-        tend(c, s, Some(rated), duration_ns, LOOK_NS, |reading| {
+        poll_until(c, s, Some(rated), duration_ns, POLL_NS, |reading| {
             fastest = if reading.velocity.abs() > fastest.abs() { reading.velocity } else { fastest };
-            s.check_room(reading, None)?;
+            s.check_stopping_distance(reading, None)?;
             if reading.velocity.abs() <= limit {
                 return Ok(());
             }
@@ -80,11 +80,11 @@ pub async fn run(
     with_torque(c, s, false, work).await
 }
 
-/// Torque to per mille of the rated torque: 6071 is 16 bits in per mille, whatever the vendor's screens say.
-fn per_mille(s: &Subject, torque: Amount, rated: f64) -> Result<i64, Failure> {
+/// Converts a torque to per mille of the rated torque, the unit of object 6071 (16 bits).
+fn per_mille(s: &TargetDrive, torque: CommandValue, rated: f64) -> Result<i64, Failure> {
     match torque {
-        Amount::Drive(per_mille) => Ok(per_mille),
-        Amount::Joint(torque) => {
+        CommandValue::Drive(per_mille) => Ok(per_mille),
+        CommandValue::Joint(torque) => {
             let scale = s.scale.with_rated_torque(rated);
             let scale = scale.map_err(|error| Failure::Contradicted(format!("rated torque: {error:?}")))?;
             Ok(scale.torque_to_per_mille(torque).into())

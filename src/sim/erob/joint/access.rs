@@ -1,19 +1,19 @@
-//! The dictionary as the master reaches it, by SDO and by RPDO, with everything that a write sets in motion.
+//! Access of the master to the object dictionary by SDO and RPDO, with the effects of each write.
 
 use takt_rt::{DriveState, Nanoseconds};
 
 use super::ErobJoint;
-use crate::sim::erob::dictionary::{AbortCode, Dictionary, at};
+use crate::sim::erob::dictionary::{ErobAbortCode, ErobDictionary, at};
 use crate::sim::erob::objects::OBJECTS;
 use crate::sim::erob::{process_data, sdo};
 
-/// What must be written to 1010:1.
+/// The signature for object 1010:1.
 const SAVE_SIGNATURE: u32 = u32::from_le_bytes(*b"save");
-/// "save" is in effect this long after it was accepted: the manual asks to wait 3 s before the supply is cut.
+/// Time from "save" until it takes effect: the manual requires a wait of 3 s before the supply is cut.
 const SAVE_NS: Nanoseconds = 3_000_000_000;
 
-/// How an RPDO writes an entry: an enabled drive keeps its mode, and values out of range are left.
-pub(super) fn write_field(dictionary: &mut Dictionary, at: usize, value: u32) {
+/// Writes an entry from an RPDO. An enabled drive keeps its mode; a value out of range is ignored.
+pub(super) fn write_field(dictionary: &mut ErobDictionary, at: usize, value: u32) {
     let is_enabled = DriveState::decode(dictionary.get(at::STATUSWORD) as u16).has_torque();
     if at == at::OPERATION_MODE && is_enabled {
         return;
@@ -23,8 +23,8 @@ pub(super) fn write_field(dictionary: &mut Dictionary, at: usize, value: u32) {
     }
 }
 
-/// Values that an entry never takes.
-fn check_range(at: usize, value: u32) -> Result<(), AbortCode> {
+/// Checks the range of an entry.
+fn check_range(at: usize, value: u32) -> Result<(), ErobAbortCode> {
     let is_in_range = match at {
         at::ERROR_HISTORY => value == 0,
         // Bit 30: the drive cannot produce SYNC. Bit 29: it has no 29-bit identifiers.
@@ -35,36 +35,36 @@ fn check_range(at: usize, value: u32) -> Result<(), AbortCode> {
         at::TORQUE_OFFSET => (-3000..=3000).contains(&i32::from(value as u16 as i16)),
         _ => true,
     };
-    if is_in_range { Ok(()) } else { Err(AbortCode::Value) }
+    if is_in_range { Ok(()) } else { Err(ErobAbortCode::Value) }
 }
 
-/// The dictionary as the SDO server reaches it, with everything that a write sets in motion.
+/// The object dictionary as the SDO server accesses it.
 pub(super) struct Objects<'a> {
     pub(super) module: &'a mut ErobJoint,
     pub(super) now_ns: Nanoseconds,
 }
 
-impl sdo::Access for Objects<'_> {
-    fn read(&mut self, index: u16, subindex: u8) -> Result<([u8; 4], usize), AbortCode> {
-        let at = Dictionary::for_reading(index, subindex)?;
+impl sdo::ErobObjectAccess for Objects<'_> {
+    fn read(&mut self, index: u16, subindex: u8) -> Result<([u8; 4], usize), ErobAbortCode> {
+        let at = ErobDictionary::for_reading(index, subindex)?;
         let history = self.module.dictionary.get(at::ERROR_HISTORY);
         if OBJECTS[at].index == 0x1003 && u32::from(subindex) > history {
-            return Err(AbortCode::NoData);
+            return Err(ErobAbortCode::NoData);
         }
         self.module.measure();
         Ok((self.module.dictionary.get(at).to_le_bytes(), OBJECTS[at].data_type.bytes()))
     }
 
-    fn check_write(&self, index: u16, subindex: u8) -> Result<usize, AbortCode> {
-        let at = Dictionary::for_writing(index, subindex)?;
+    fn check_write(&self, index: u16, subindex: u8) -> Result<usize, ErobAbortCode> {
+        let at = ErobDictionary::for_writing(index, subindex)?;
         if at == at::OPERATION_MODE && self.module.device.state().has_torque() {
-            return Err(AbortCode::DeviceState);
+            return Err(ErobAbortCode::DeviceState);
         }
         Ok(OBJECTS[at].data_type.bytes())
     }
 
-    fn write(&mut self, index: u16, subindex: u8, value: [u8; 4]) -> Result<(), AbortCode> {
-        let at = Dictionary::for_writing(index, subindex)?;
+    fn write(&mut self, index: u16, subindex: u8, value: [u8; 4]) -> Result<(), ErobAbortCode> {
+        let at = ErobDictionary::for_writing(index, subindex)?;
         let size = OBJECTS[at].data_type.bytes();
         let value = u32::from_le_bytes(value) & (u32::MAX >> (32 - 8 * size));
         check_range(at, value)?;
@@ -72,7 +72,7 @@ impl sdo::Access for Objects<'_> {
         match index {
             0x1010 => {
                 if value != SAVE_SIGNATURE {
-                    return Err(AbortCode::CannotStore);
+                    return Err(ErobAbortCode::CannotStore);
                 }
                 module.save_ns = *now_ns + SAVE_NS;
                 return Ok(());
@@ -89,14 +89,14 @@ impl sdo::Access for Objects<'_> {
 }
 
 impl ErobJoint {
-    /// What follows from a new value of an entry.
+    /// Applies the effects of a new value.
     fn written(&mut self, at: usize, now_ns: Nanoseconds) {
         match at {
             at::CONTROLWORD => self.evaluate(now_ns),
             at::TARGET_POSITION => self.motion.latch(&self.dictionary),
             at::OPERATION_MODE => self.follow_mode(),
             at::PRODUCER_HEARTBEAT => self.network.schedule_heartbeat(now_ns, &self.dictionary),
-            at::CONSUMER_HEARTBEAT => self.network.forget_master(),
+            at::CONSUMER_HEARTBEAT => self.network.stop_master_monitor(),
             at::BATTERY_RESET if self.dictionary.get(at) == 1 => {
                 self.has_battery_fault = false;
                 self.lose_turns();

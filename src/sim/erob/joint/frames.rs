@@ -1,18 +1,18 @@
-//! Frames in, frames out.
+//! Receives and sends frames.
 
 use takt_rt::{Frame, FrameKind, Id, Nanoseconds};
 
 use super::ErobJoint;
 use super::access::{Objects, write_field};
-use crate::sim::drive::{DriveFault, NmtState};
+use crate::sim::drive::{DriveFault, NodeState};
 use crate::sim::erob::dictionary::at;
-use crate::sim::erob::errors::Error;
-use crate::sim::erob::network::Reset;
-use crate::sim::erob::process_data::Received;
+use crate::sim::erob::errors::ErobError;
+use crate::sim::erob::network::ErobReset;
+use crate::sim::erob::process_data::RpdoReception;
 use crate::sim::mailbox::Mailbox;
 
 impl ErobJoint {
-    pub(super) fn take(&mut self, now_ns: Nanoseconds, frame: &Frame, mailbox: &mut Mailbox) {
+    pub(super) fn receive_frame(&mut self, now_ns: Nanoseconds, frame: &Frame, mailbox: &mut Mailbox) {
         if frame.id().is_extended() || frame.is_fd() {
             return;
         }
@@ -23,7 +23,7 @@ impl ErobJoint {
         let id = frame.id().value();
         match id {
             0x000 => self.take_nmt(now_ns, frame.payload()),
-            0x701..=0x77F => self.network.heard(now_ns, (id & 0x7F) as u8, &self.dictionary),
+            0x701..=0x77F => self.network.receive_heartbeat(now_ns, (id & 0x7F) as u8, &self.dictionary),
             _ if id == 0x600 + node => {
                 if self.network.has_services()
                     && !self.defects.is_sdo_silent
@@ -32,7 +32,7 @@ impl ErobJoint {
                     self.take_request(now_ns, request);
                 }
             }
-            _ if self.network.state() != NmtState::Operational => {}
+            _ if self.network.state() != NodeState::Operational => {}
             _ if id == self.dictionary.get(at::SYNC_ID) & 0x7FF => self.take_sync(now_ns),
             _ => self.take_pdo(now_ns, frame),
         }
@@ -43,7 +43,7 @@ impl ErobJoint {
             if let Some(byte) = self.network.guarded(now_ns, &self.dictionary) {
                 mailbox.push(Frame::of(frame.id(), [byte]));
             }
-        } else if self.network.state() == NmtState::Operational {
+        } else if self.network.state() == NodeState::Operational {
             let answer = self.report(|data, dictionary| data.requested(frame.id(), dictionary));
             if let Some(answer) = answer {
                 mailbox.put(self.defects.sent(answer));
@@ -53,25 +53,25 @@ impl ErobJoint {
 
     fn take_nmt(&mut self, now_ns: Nanoseconds, payload: &[u8]) {
         let &[command, node] = payload else { return };
-        if node != 0 && node != self.parameters.node || self.network.state() == NmtState::Initialising {
+        if node != 0 && node != self.parameters.node || self.network.state() == NodeState::Initialising {
             return;
         }
         match self.network.command(now_ns, command) {
-            Some(Reset::Node) => self.start(now_ns),
-            Some(Reset::Communication) => {
-                // The error register and history tell of the drive, not of the communication.
+            Some(ErobReset::Node) => self.start(now_ns),
+            Some(ErobReset::Communication) => {
+                // The error register and history are not communication parameters, so they stay.
                 self.dictionary.restore(0x1005..=0x1FFF);
                 self.process_data.compile(&self.dictionary);
             }
             None => {}
         }
-        self.rest();
+        self.stop_services();
     }
 
-    /// Stops what the NMT state no longer allows.
-    pub(super) fn rest(&mut self) {
-        if self.network.state() != NmtState::Operational {
-            self.process_data.rest();
+    /// Stops the services that the NMT state does not allow.
+    pub(super) fn stop_services(&mut self) {
+        if self.network.state() != NodeState::Operational {
+            self.process_data.stop();
         }
         if !self.network.has_services() {
             self.sdo.reset();
@@ -91,16 +91,16 @@ impl ErobJoint {
     fn take_pdo(&mut self, now_ns: Nanoseconds, frame: &Frame) {
         let target = self.dictionary.get(at::TARGET_POSITION);
         match self.process_data.receive(frame, &mut self.dictionary, write_field) {
-            Received::NotMine => {}
-            Received::TooShort => {
-                // One message for a row of them.
+            RpdoReception::NotMine => {}
+            RpdoReception::TooShort => {
+                // A series of short PDOs leads to one message.
                 if !self.has_pdo_error {
                     self.has_pdo_error = true;
-                    self.errors.raise(Error::PdoLength, &mut self.dictionary);
+                    self.errors.raise(ErobError::PdoLength, &mut self.dictionary);
                 }
             }
-            Received::Latched => self.clear_pdo_error(),
-            Received::Applied => {
+            RpdoReception::Latched => self.clear_pdo_error(),
+            RpdoReception::Applied => {
                 self.clear_pdo_error();
                 self.follow_mode();
                 self.evaluate(now_ns);
@@ -119,19 +119,19 @@ impl ErobJoint {
     }
 
     fn take_request(&mut self, now_ns: Nanoseconds, request: [u8; 8]) {
-        // The server is taken out for the time of the call, since it works on the rest of the drive.
+        // The server is copied for the call, because it accesses the rest of the drive.
         let mut server = self.sdo.clone();
         server.request(now_ns, request, &mut Objects { module: self, now_ns });
         self.sdo = server;
     }
 
-    /// Sends what is due.
+    /// Sends the frames that are due.
     pub(super) fn send_due(&mut self, now_ns: Nanoseconds, mailbox: &mut Mailbox) {
         let node = self.parameters.node;
-        if self.network.boots(now_ns, &self.dictionary) {
+        if self.network.boot_if_due(now_ns, &self.dictionary) {
             self.device.started();
             if self.has_battery_fault {
-                self.fail(Error::Fault(DriveFault::MultiTurnBattery));
+                self.fail(ErobError::Fault(DriveFault::MultiTurnBattery));
             }
             mailbox.push(Frame::of(Id::canopen(0x700, node), [0]));
         }
@@ -146,7 +146,7 @@ impl ErobJoint {
                 mailbox.push(Frame::of(Id::canopen(0x080, node), message));
             }
         }
-        if self.network.state() == NmtState::Operational {
+        if self.network.state() == NodeState::Operational {
             self.report(|data, dictionary| data.sample_events(now_ns, dictionary));
             while let Some(frame) = self.process_data.next(now_ns) {
                 mailbox.put(self.defects.sent(frame));

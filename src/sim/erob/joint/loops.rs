@@ -1,24 +1,24 @@
-//! The control loops and the joint that they drive, step by step.
+//! Steps the control loops and the joint.
 
 use takt_rt::{NANOSECONDS_PER_SECOND, Nanoseconds};
 
 use super::ErobJoint;
 use crate::sim::erob::dictionary::at;
-use crate::sim::erob::errors::Error;
-use crate::sim::erob::motion::{Actual, Demand};
+use crate::sim::erob::errors::ErobError;
+use crate::sim::erob::motion::{ErobActual, ErobDemand};
 
 /// The control loops and the plant run at 8 kHz.
 const STEP_NS: Nanoseconds = 125_000;
 
 impl ErobJoint {
-    /// Runs the loops on their grid up to `now_ns`.
+    /// Runs the loops in steps up to `now_ns`.
     pub(super) fn run_loops(&mut self, now_ns: Nanoseconds) {
         while self.stepped_ns + STEP_NS <= now_ns {
             self.step(STEP_NS);
         }
     }
 
-    /// Runs the loops up to exactly `now_ns` and starts their grid anew there: the lock to SYNC.
+    /// Runs the loops exactly up to `now_ns`, so that their steps are locked to SYNC.
     pub(super) fn lock_loops(&mut self, now_ns: Nanoseconds) {
         self.run_loops(now_ns);
         if now_ns > self.stepped_ns {
@@ -53,7 +53,7 @@ impl ErobJoint {
         self.dictionary.set(at::STATUSWORD, self.device.statusword(bits).into());
     }
 
-    /// Set-point, loops, torque of one step.
+    /// One step of set-point, loops and torque.
     fn drive(&mut self, duration_s: f64) {
         let actual = self.actual();
         let velocity = self.joint.velocity() * self.direction();
@@ -70,26 +70,26 @@ impl ErobJoint {
         let unit = 1.0 / self.parameters.encoder.counts_per_unit.abs();
         let per_mille = self.parameters.rated_torque / 1000.0;
         self.torque = match demand {
-            Demand::Position { position, velocity: forward, torque } => {
+            ErobDemand::Position { position, velocity: forward, torque } => {
                 let error = (position - actual.position) * unit;
                 self.servo.position(error, forward * unit, velocity, torque * per_mille, duration_s)
             }
-            Demand::Velocity { velocity: wanted, torque } => {
+            ErobDemand::Velocity { velocity: wanted, torque } => {
                 self.servo.velocity(wanted * unit, velocity, torque * per_mille, duration_s)
             }
-            Demand::Torque(torque) => self.servo.torque(torque * per_mille, velocity),
+            ErobDemand::Torque(torque) => self.servo.torque(torque * per_mille, velocity),
         };
         if !self.device.state().has_torque() {
             self.torque = 0.0;
         }
     }
 
-    fn check_following_error(&mut self, actual: Actual) {
+    fn check_following_error(&mut self, actual: ErobActual) {
         let window = self.dictionary.signed_real(at::FOLLOWING_ERROR_WINDOW);
         let error = self.motion.position() - actual.position;
         let is_watched = window >= 0.0 && self.motion.follows_position() && self.device.stop().is_none();
         if is_watched && error.abs() > window {
-            self.fail(Error::PositionLost);
+            self.fail(ErobError::PositionLost);
         }
     }
 }

@@ -1,17 +1,17 @@
-//! What the statusword tells of the motion: whether the target is reached, a limit acts, a set-point is taken.
+//! The motion bits of the statusword: target reached, internal limit, set-point acknowledged.
 
 use takt_rt::{OperationMode, controlword, statusword};
 
-use super::{ARRIVED, Actual, Motion};
-use crate::sim::erob::dictionary::{Dictionary, at};
+use super::{ARRIVED, ErobActual, ErobMotion};
+use crate::sim::erob::dictionary::{ErobDictionary, at};
 
-impl Motion {
-    /// Bits 10 to 13 of the statusword of an enabled drive, after `duration_s` more.
+impl ErobMotion {
+    /// Statusword bits 10 to 13 of an enabled drive, after a step of `duration_s`.
     pub fn status_bits(
         &mut self,
-        actual: Actual,
+        actual: ErobActual,
         word: u16,
-        dictionary: &Dictionary,
+        dictionary: &ErobDictionary,
         duration_s: f64,
     ) -> u16 {
         let is_reached = self.is_target_reached(actual, word, dictionary, duration_s);
@@ -35,9 +35,9 @@ impl Motion {
 
     fn is_target_reached(
         &mut self,
-        actual: Actual,
+        actual: ErobActual,
         word: u16,
-        dictionary: &Dictionary,
+        dictionary: &ErobDictionary,
         duration_s: f64,
     ) -> bool {
         let milliseconds = |at| dictionary.signed_real(at) * 1e-3;

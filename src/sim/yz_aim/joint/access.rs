@@ -1,14 +1,14 @@
-//! The dictionary as the master reaches it, by SDO and by RPDO.
+//! Access of the master to the object dictionary by SDO and RPDO.
 
 use takt_rt::{Nanoseconds, controlword};
 
 use super::YzAimJoint;
 use crate::sim::yz_aim::dictionary::decode;
-use crate::sim::yz_aim::objects::{OBJECTS, Object, at, find};
-use crate::sim::yz_aim::process_data::{PDO4, ProcessData, RPDO_MAPPING};
-use crate::sim::yz_aim::sdo::{AbortCode, Addressed, Request};
+use crate::sim::yz_aim::objects::{OBJECTS, YzAimObject, at, find};
+use crate::sim::yz_aim::process_data::{PDO4, RPDO_MAPPING, YzAimProcessData};
+use crate::sim::yz_aim::sdo::{Addressed, YzAimAbortCode, YzAimRequest};
 
-/// Whether an entry takes a value.
+/// Whether an entry accepts a value.
 fn is_in_range(at: usize, value: i64) -> bool {
     let object = OBJECTS[at];
     (object.lowest..=object.highest).contains(&value)
@@ -20,25 +20,25 @@ fn is_in_range(at: usize, value: i64) -> bool {
 }
 
 impl YzAimJoint {
-    /// Works on an SDO request. While another one is being worked on it is lost.
+    /// Processes an SDO request. It is lost while another one is being processed.
     pub(super) fn take_request(&mut self, now_ns: Nanoseconds, payload: &[u8]) {
         if self.sdo.is_busy() {
             return;
         }
         let Some(addressed) = Addressed::decode(payload) else { return };
         let answer = match (addressed.request, find(addressed.index, addressed.subindex)) {
-            (Request::Abort, _) => return,
-            (Request::Other, _) => Some(addressed.refused(AbortCode::Command)),
+            (YzAimRequest::Abort, _) => return,
+            (YzAimRequest::Other, _) => Some(addressed.refused(YzAimAbortCode::Command)),
             (_, None) => {
                 let is_silent = self.parameters.quirks.is_silent_on_unknown_objects;
-                (!is_silent).then(|| addressed.refused(AbortCode::NoObject))
+                (!is_silent).then(|| addressed.refused(YzAimAbortCode::NoObject))
             }
-            (Request::Read, Some(at)) => {
+            (YzAimRequest::Read, Some(at)) => {
                 self.measure();
                 let (value, size) = self.dictionary.encode(at);
                 Some(addressed.value(value, size))
             }
-            (Request::Write { data, size }, Some(at)) => {
+            (YzAimRequest::Write { data, size }, Some(at)) => {
                 let written = self.write(now_ns, at, data, size);
                 Some(written.map_or_else(|code| addressed.refused(code), |()| addressed.written()))
             }
@@ -52,17 +52,17 @@ impl YzAimJoint {
         at: usize,
         data: [u8; 4],
         size: Option<usize>,
-    ) -> Result<(), AbortCode> {
+    ) -> Result<(), YzAimAbortCode> {
         let object = OBJECTS[at];
         if !self.is_writable(object) {
-            return Err(AbortCode::ReadOnly);
+            return Err(YzAimAbortCode::ReadOnly);
         }
         if size.is_some_and(|size| size != object.bytes()) {
-            return Err(AbortCode::Length);
+            return Err(YzAimAbortCode::Length);
         }
         let value = decode(at, data);
         if !is_in_range(at, value) {
-            return Err(AbortCode::Value);
+            return Err(YzAimAbortCode::Value);
         }
         let before = self.dictionary.get(at);
         self.dictionary.set(at, value);
@@ -70,12 +70,12 @@ impl YzAimJoint {
         Ok(())
     }
 
-    fn is_writable(&self, object: Object) -> bool {
+    fn is_writable(&self, object: YzAimObject) -> bool {
         let is_pdo_parameter = matches!(object.index, 0x1400..=0x1403 | 0x1800..=0x1803);
         object.is_writable && (!is_pdo_parameter || self.parameters.quirks.has_settable_pdos)
     }
 
-    /// Takes over the data of an RPDO. A controlword acts last but for a target that it makes valid at once.
+    /// Applies the data of an RPDO. The controlword takes effect last, except for a target that it activates at once.
     pub(super) fn apply(&mut self, now_ns: Nanoseconds, number: usize, data: [u8; 8]) {
         let mode = self.mode();
         let mut rest = &data[..];
@@ -98,7 +98,7 @@ impl YzAimJoint {
             self.take_controlword(now_ns);
         }
         let has_started = carries(at::CONTROLWORD) && word & controlword::BIT_4 != 0;
-        if number == PDO4 && ProcessData::waits_for_sync(number, &self.dictionary) {
+        if number == PDO4 && YzAimProcessData::waits_for_sync(number, &self.dictionary) {
             self.interpolate();
         } else if carries(at::TARGET_POSITION) && !has_started {
             self.take_target();

@@ -1,14 +1,14 @@
-//! What the values that a master writes make the drive do.
+//! The effects of the values that a master writes.
 
 use takt_rt::{Nanoseconds, controlword};
 
 use super::{COUNTS_PER_SECOND_PER_RPM, COUNTS_PER_TURN, YzAimJoint, mode};
-use crate::sim::drive::NmtState;
+use crate::sim::drive::NodeState;
 use crate::sim::yz_aim::device::Level;
 use crate::sim::yz_aim::homing::Homing;
 use crate::sim::yz_aim::objects::at;
 
-/// From 2614h = 1 until everything is stored.
+/// Time from 2614h = 1 until everything is stored.
 const SAVE_NS: Nanoseconds = 50_000_000;
 /// The two values of 260Ah that set the multi-turn zero.
 const ZERO_ARM: i64 = 60_006;
@@ -17,7 +17,7 @@ const ZERO: i64 = 60_016;
 const RETURN_TO_ZERO: i64 = 6;
 
 impl YzAimJoint {
-    /// Acts on a controlword, which is in the dictionary already.
+    /// Applies the controlword in the dictionary.
     pub(super) fn take_controlword(&mut self, now_ns: Nanoseconds) {
         let word = self.dictionary.get(at::CONTROLWORD) as u16;
         // The drive clears bit 4 by itself.
@@ -39,7 +39,7 @@ impl YzAimJoint {
         }
     }
 
-    /// Acts on a change of 6060h.
+    /// Applies a change of 6060h.
     pub(super) fn change_mode(&mut self, before: i64) {
         let mode = self.mode();
         if mode == before {
@@ -57,7 +57,7 @@ impl YzAimJoint {
         self.homing = Homing::start(self.dictionary.get(at::HOMING_METHOD), has_undescribed_methods);
     }
 
-    /// Acts on a target in 607Ah that bit 5 makes valid at once.
+    /// Applies a target in 607Ah that bit 5 activates at once.
     pub(super) fn take_target(&mut self) {
         if self.is_in_mode(mode::PROFILE_POSITION) && self.device.is_immediate() {
             self.follow_target();
@@ -72,7 +72,7 @@ impl YzAimJoint {
         self.motion.move_to(base + self.dictionary.real(at::TARGET_POSITION));
     }
 
-    /// Acts on a target that SYNC has made valid.
+    /// Applies a target that SYNC activates.
     pub(super) fn interpolate(&mut self) {
         if !self.interpolates() {
             return self.take_target();
@@ -82,7 +82,7 @@ impl YzAimJoint {
         }
     }
 
-    /// What follows from a value that SDO has written.
+    /// Applies the effects of a value that was written by SDO.
     pub(super) fn written(&mut self, at: usize, before: i64, now_ns: Nanoseconds) {
         let value = self.dictionary.get(at);
         if let Some(bit_rate) = self.bit_rate_change.written(at, value) {
@@ -93,14 +93,14 @@ impl YzAimJoint {
             at::OPERATION_MODE => self.change_mode(before),
             at::TARGET_POSITION => self.take_target(),
             at::PRODUCER_HEARTBEAT => self.network.schedule_heartbeat(now_ns, &self.dictionary),
-            at::CONSUMER_HEARTBEAT => self.network.forget_master(),
+            at::CONSUMER_HEARTBEAT => self.network.stop_master_monitor(),
             at::OUTPUT_ENABLE if value == 1 => self.clear_alarms(now_ns),
             at::INCREMENTAL_POSITION => self.travel(value as f64),
             at::GEAR_NUMERATOR => self.take_gear_numerator(value),
             at::SAVE_FLAG if value == 1 => self.save_ns = now_ns + SAVE_NS,
-            // In other states no event timer runs: they start when the node becomes operational.
+            // Event timers run in NMT operational only; they start when the node enters it.
             _ if (at::TPDO1..=at::TPDO4 + 5).contains(&at)
-                && self.network.state() == NmtState::Operational =>
+                && self.network.state() == NodeState::Operational =>
             {
                 self.process_data.schedule_events(now_ns, &self.dictionary);
             }
@@ -117,33 +117,33 @@ impl YzAimJoint {
         }
     }
 
-    /// An increment of 260Ch, in pulses before the electronic gear; it acts at once.
+    /// Moves by an increment of 260Ch, in pulses before the electronic gear.
     fn travel(&mut self, steps: f64) {
         let is_positioning = self.is_in_mode(mode::PROFILE_POSITION) || self.device.level() == Level::Cold;
         if !is_positioning || !self.is_energised() {
             return;
         }
         self.power_up_speed = None;
-        // A numerator of 0 is a switch and no ratio.
+        // A numerator of 0 is a switch, not a ratio.
         let numerator = self.dictionary.real(at::GEAR_NUMERATOR);
         let gear = if numerator > 0.0 { numerator / self.dictionary.real(at::GEAR_DENOMINATOR) } else { 1.0 };
         self.motion.move_to(self.motion.target() + (steps * gear).round());
     }
 
-    /// The multi-turn zero (manual V.2): 60006, then 60016.
+    /// Sets the multi-turn zero (manual V.2): 60006, then 60016.
     fn take_gear_numerator(&mut self, value: i64) {
         let is_armed = std::mem::replace(&mut self.is_zero_armed, value == ZERO_ARM);
         if value != ZERO || !is_armed || !self.parameters.has_battery {
             return;
         }
-        // 0, or a small positive number of one digit.
+        // The new position is 0 or a positive number of one digit.
         let counts = self.random.within(0..10) as i32;
         self.set_counts(counts);
         self.alarms.has_lost_battery = false;
         self.dictionary.set(at::GEAR_NUMERATOR, self.dictionary.stored(at::GEAR_NUMERATOR));
     }
 
-    /// The move that the special function asks for at power-up (manual V.3.B).
+    /// Starts the move of the special function at power-up (manual V.3.B).
     pub(super) fn move_after_power_up(&mut self) {
         let turn = COUNTS_PER_TURN as i32;
         let target = match self.special_function {
@@ -151,7 +151,7 @@ impl YzAimJoint {
             angle @ 30.. => f64::from(self.counts().div_euclid(turn) * turn) + angle as f64,
             _ => return,
         };
-        // The ones digit of 6083h: 0 to 9 are 100 to 1000 r/min.
+        // The last digit of 6083h: 0 to 9 for 100 to 1000 r/min.
         let digit = self.dictionary.get(at::ACCELERATION) % 10;
         self.power_up_speed = Some((digit + 1) as f64 * 100.0 * COUNTS_PER_SECOND_PER_RPM);
         self.engage();

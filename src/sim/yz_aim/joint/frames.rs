@@ -1,31 +1,31 @@
-//! Frames in, frames out.
+//! Receives and sends frames.
 
 use takt_rt::{Frame, FrameKind, Id, Nanoseconds};
 
 use super::YzAimJoint;
-use crate::sim::drive::NmtState;
+use crate::sim::drive::NodeState;
 use crate::sim::mailbox::Mailbox;
-use crate::sim::yz_aim::network::Reset;
+use crate::sim::yz_aim::network::YzAimReset;
 use crate::sim::yz_aim::objects::OBJECTS;
-use crate::sim::yz_aim::process_data::{PDOS, ProcessData, RPDO_MAPPING};
+use crate::sim::yz_aim::process_data::{PDOS, RPDO_MAPPING, YzAimProcessData};
 
 const SYNC: u32 = 0x080;
 
 impl YzAimJoint {
-    pub(super) fn take(&mut self, now_ns: Nanoseconds, frame: &Frame) {
+    pub(super) fn receive_frame(&mut self, now_ns: Nanoseconds, frame: &Frame) {
         let is_data = frame.kind() == FrameKind::Data && !frame.id().is_extended();
-        if !is_data || self.network.state() == NmtState::Initialising {
+        if !is_data || self.network.state() == NodeState::Initialising {
             return;
         }
         match frame.id().value() {
             0x000 => self.take_nmt(now_ns, frame.payload()),
-            id @ 0x701..=0x77F => self.network.heard(now_ns, (id & 0x7F) as u8, &self.dictionary),
+            id @ 0x701..=0x77F => self.network.receive_heartbeat(now_ns, (id & 0x7F) as u8, &self.dictionary),
             _ if frame.id() == Id::canopen(0x600, self.node) => {
                 if self.network.has_services() && !self.defects.is_sdo_silent {
                     self.take_request(now_ns, frame.payload());
                 }
             }
-            _ if self.network.state() != NmtState::Operational => {}
+            _ if self.network.state() != NodeState::Operational => {}
             SYNC => self.take_sync(now_ns),
             _ => self.take_pdo(now_ns, frame),
         }
@@ -38,15 +38,15 @@ impl YzAimJoint {
         }
         let before = self.network.state();
         match self.network.command(now_ns, command) {
-            Some(Reset::Node) => self.start(now_ns, NmtState::PreOperational, true),
-            Some(Reset::Communication) => self.dictionary.restore(0x1005..=0x1FFF),
+            Some(YzAimReset::Node) => self.start(now_ns, NodeState::PreOperational, true),
+            Some(YzAimReset::Communication) => self.dictionary.restore(0x1005..=0x1FFF),
             None => {}
         }
         let state = self.network.state();
-        if state == NmtState::Operational && before != state {
+        if state == NodeState::Operational && before != state {
             self.process_data.start(now_ns, &self.dictionary);
-        } else if state != NmtState::Operational {
-            self.process_data = ProcessData::at_rest();
+        } else if state != NodeState::Operational {
+            self.process_data = YzAimProcessData::at_rest();
         }
         if !self.network.has_services() {
             self.sdo.reset();
@@ -67,13 +67,13 @@ impl YzAimJoint {
     }
 
     fn take_pdo(&mut self, now_ns: Nanoseconds, frame: &Frame) {
-        let Some(number) = ProcessData::number(frame.id(), self.node) else { return };
+        let Some(number) = YzAimProcessData::number(frame.id(), self.node) else { return };
         let mapped: usize = RPDO_MAPPING[number].iter().map(|at| OBJECTS[*at].bytes()).sum();
         if frame.payload().len() < mapped {
             return;
         }
         let data = frame.first_word().to_le_bytes();
-        if ProcessData::waits_for_sync(number, &self.dictionary) {
+        if YzAimProcessData::waits_for_sync(number, &self.dictionary) {
             self.process_data.hold(number, data);
         } else {
             self.apply(now_ns, number, data);
@@ -82,12 +82,12 @@ impl YzAimJoint {
         self.process_data.answer(number, now_ns, self.parameters.feedback_delay_ns, feedback);
     }
 
-    /// Sends what is due. At a wrong bit rate nothing reaches the bus.
+    /// Sends the frames that are due. At a wrong bit rate nothing is sent.
     pub(super) fn send_due(&mut self, now_ns: Nanoseconds, mailbox: &mut Mailbox) {
         let is_on_bus = self.is_on_bus();
         let mut send = |frame| is_on_bus && mailbox.push(frame);
         let has_alarm = self.shows_alarm();
-        if let Some(boot_up) = self.network.boots(now_ns, &self.dictionary) {
+        if let Some(boot_up) = self.network.boot_if_due(now_ns, &self.dictionary) {
             if boot_up.is_announced {
                 send(Frame::of(Id::canopen(0x700, self.node), [0]));
             }
@@ -99,7 +99,7 @@ impl YzAimJoint {
         if let Some(answer) = self.sdo.take(now_ns) {
             send(Frame::of(Id::canopen(0x580, self.node), answer));
         }
-        if self.network.state() == NmtState::Operational {
+        if self.network.state() == NodeState::Operational {
             let feedback = self.feedback();
             self.process_data.run_events(now_ns, feedback, &self.dictionary);
             while let Some(frame) = self.process_data.next(now_ns, self.node, &self.dictionary) {
@@ -110,13 +110,13 @@ impl YzAimJoint {
         }
     }
 
-    /// The node is there: after power-up and "reset node" the motor stage comes on.
+    /// Completes the boot: after power-up and "reset node" the motor is energised.
     fn boot(&mut self, now_ns: Nanoseconds) {
         self.has_started = true;
         if std::mem::take(&mut self.is_starting_cold) {
             self.move_after_power_up();
         }
-        if self.network.state() == NmtState::Operational {
+        if self.network.state() == NodeState::Operational {
             self.process_data.start(now_ns, &self.dictionary);
         }
     }

@@ -1,28 +1,28 @@
-//! The control loops on their grid: from the order of the moment to torque, and the joint under it.
+//! Steps the control loops and the joint.
 
 use takt_rt::{NANOSECONDS_PER_SECOND, Nanoseconds};
 
-use super::watch::Watch;
+use super::load_monitor::LoadMonitor;
 use super::{COUNTS_PER_SECOND_PER_RPM, NEVER, YzAimJoint, mode};
 use crate::sim::yz_aim::device::Level;
 use crate::sim::yz_aim::homing::Input;
-use crate::sim::yz_aim::motion::Order;
+use crate::sim::yz_aim::motion::MotionCommand;
 use crate::sim::yz_aim::objects::at;
 
 /// The control loops and the plant run at 8 kHz.
 const STEP_NS: Nanoseconds = 125_000;
-/// 6083h from here on: no ramp (manual IV.1).
+/// 6083h: at this value and above there is no ramp (manual IV.1).
 const NO_RAMP: i64 = 60_000;
 
 impl YzAimJoint {
-    /// Runs the loops on their grid up to `now_ns`.
+    /// Runs the loops in steps up to `now_ns`.
     pub(super) fn run_loops(&mut self, now_ns: Nanoseconds) {
         while self.stepped_ns + STEP_NS <= now_ns {
             self.step(STEP_NS);
         }
     }
 
-    /// Runs the loops up to exactly `now_ns` and starts their grid anew there: the lock to SYNC.
+    /// Runs the loops exactly up to `now_ns`, so that their steps are locked to SYNC.
     pub(super) fn lock_loops(&mut self, now_ns: Nanoseconds) {
         self.run_loops(now_ns);
         if now_ns > self.stepped_ns {
@@ -51,53 +51,55 @@ impl YzAimJoint {
             self.joint.step(duration_s, self.torque * self.direction(), false);
         }
         if is_energised {
-            self.watch(duration_s);
+            self.monitor_load(duration_s);
         } else {
             self.motion.engage(self.actual());
         }
     }
 
-    /// Torque comes on, or another order begins: everything starts where the joint is.
+    /// Restarts the motion at the actual position, when torque comes on or the command changes.
     pub(super) fn engage(&mut self) {
         if !self.was_energised {
             self.servo.reset();
-            self.watch = Watch::default();
+            self.load_monitor = LoadMonitor::default();
         }
         self.motion.engage(self.actual());
     }
 
-    fn order(&self) -> Order {
+    fn motion_command(&self) -> MotionCommand {
         if self.network.is_master_lost() || self.device.is_halted() {
-            return Order::Stop;
+            return MotionCommand::Stop;
         }
         if let Some(speed) = self.homing.speed() {
-            return Order::Velocity(speed * self.parameters.homing.speed_rpm * COUNTS_PER_SECOND_PER_RPM);
+            return MotionCommand::Velocity(
+                speed * self.parameters.homing.speed_rpm * COUNTS_PER_SECOND_PER_RPM,
+            );
         }
         let profile_speed = self.dictionary.real(at::PROFILE_VELOCITY) * COUNTS_PER_SECOND_PER_RPM;
         match (self.device.level(), self.mode()) {
-            (Level::Cold, _) => Order::Profile(self.power_up_speed.unwrap_or(profile_speed)),
-            (Level::Enabled, mode::PROFILE_POSITION) => Order::Profile(profile_speed),
+            (Level::Cold, _) => MotionCommand::Profile(self.power_up_speed.unwrap_or(profile_speed)),
+            (Level::Enabled, mode::PROFILE_POSITION) => MotionCommand::Profile(profile_speed),
             (Level::Enabled, mode::VELOCITY) => {
-                Order::Velocity(self.dictionary.real(at::TARGET_VELOCITY) * COUNTS_PER_SECOND_PER_RPM)
+                MotionCommand::Velocity(self.dictionary.real(at::TARGET_VELOCITY) * COUNTS_PER_SECOND_PER_RPM)
             }
-            (Level::Enabled, _) if self.interpolates() => Order::Interpolate,
-            _ => Order::Stop,
+            (Level::Enabled, _) if self.interpolates() => MotionCommand::Interpolate,
+            _ => MotionCommand::Stop,
         }
     }
 
-    /// The ramp of the drive: counts/s².
+    /// The acceleration ramp: counts/s².
     fn acceleration(&self) -> f64 {
         match self.dictionary.get(at::ACCELERATION) {
             NO_RAMP.. => f64::INFINITY,
-            // A ramp of none at all would never stop the motor.
+            // At least 1: a ramp of 0 would never stop the motor.
             slope => slope.max(1) as f64 * COUNTS_PER_SECOND_PER_RPM,
         }
     }
 
-    /// Order, loops, torque of one step.
+    /// One step of command, loops and torque.
     fn drive(&mut self, duration_s: f64) {
         let actual = self.actual();
-        let demand = self.motion.step(self.order(), self.acceleration(), actual, duration_s);
+        let demand = self.motion.step(self.motion_command(), self.acceleration(), actual, duration_s);
         let unit = 1.0 / self.parameters.encoder.counts_per_unit.abs();
         let velocity = self.joint.velocity() * self.direction();
         self.servo.set_torque_limit(self.torque_limit());

@@ -1,19 +1,19 @@
-//! What is measured, as the objects and the TPDOs show it.
+//! The measured values in the object dictionary and the TPDOs.
 
 use super::{COUNTS_PER_SECOND_PER_RPM, YzAimJoint, mode};
 use crate::sim::yz_aim::device::{Conditions, Level};
 use crate::sim::yz_aim::objects::at;
-use crate::sim::yz_aim::process_data::Feedback;
+use crate::sim::yz_aim::process_data::YzAimFeedback;
 
-/// 6079h for one volt.
+/// Counts of 6079h for one volt.
 const VOLTAGE_SCALE: f64 = 327.0;
-/// What over-voltage shows: V.
+/// The reported voltage at an over-voltage: V.
 const OVER_VOLTAGE: f64 = 53.0;
-/// 6078h for one ampere.
+/// Counts of 6078h for one ampere.
 const CURRENT_SCALE: f64 = 2000.0;
-/// Closer than this to its target (counts) the motor has reached it.
+/// Position window of "target reached": counts.
 const POSITION_WINDOW: f64 = 10.0;
-/// The same for a speed (r/min).
+/// Speed window of "target reached": r/min.
 const SPEED_WINDOW_RPM: f64 = 5.0;
 const FULL_BATTERY: i64 = 10;
 
@@ -46,24 +46,24 @@ impl YzAimJoint {
         }
     }
 
-    /// What the TPDOs say now.
-    pub(super) fn feedback(&self) -> Feedback {
+    /// The current values for the TPDOs.
+    pub(super) fn feedback(&self) -> YzAimFeedback {
         let scale = if self.parameters.quirks.has_fine_velocity_in_tpdo3 { 10.0 } else { 1.0 };
-        Feedback {
+        YzAimFeedback {
             position: self.counts(),
             statusword: self.defects.shown(self.statusword()),
             velocity: (scale * self.velocity_rpm()).round_ties_even() as i32,
         }
     }
 
-    /// Brings measured quantities into the dictionary.
+    /// Writes the measured values to the dictionary.
     pub(super) fn measure(&mut self) {
         let position = i64::from(self.counts());
         let velocity = self.actual().velocity;
         let amperes = self.torque.abs() / self.parameters.torque_per_ampere();
         let has_over_voltage = self.alarms.has_over_voltage(self.now_ns);
         let volts = if has_over_voltage { OVER_VOLTAGE } else { self.parameters.supply_voltage };
-        // A rough picture: the counter-voltage takes four fifths of the output at the highest speed.
+        // Approximation: the back-EMF takes four fifths of the output at the highest speed.
         let output = 0.8 * velocity / self.parameters.highest_speed()
             + 0.2 * self.torque / self.parameters.peak_torque;
         let has_battery = self.parameters.has_battery && !self.alarms.has_lost_battery;

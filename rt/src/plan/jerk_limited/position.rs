@@ -1,0 +1,151 @@
+//! Plans to a position, with the velocity and the acceleration there.
+
+use super::super::choice::larger;
+use super::super::error::PlanError;
+use super::super::options::Return;
+use super::super::problem::Problem;
+use super::super::profile::Profile;
+use super::motion::{Scale, SevenPhases};
+use super::step1::{Candidate, Edges};
+use super::step2::Slower;
+use super::{ROUNDING, brake};
+
+/// A duration this close to a blocked interval, relative to the duration, is at its edge.
+const EDGE: f64 = 3e-11;
+
+/// The problem behind the brake, without units.
+struct Inside {
+    edges: Edges,
+    scale: Scale,
+    brake_s: f64,
+}
+
+impl Inside {
+    fn of(problem: &Problem, return_to_limits: Return, profile: &mut Profile) -> Result<Self, PlanError> {
+        let Problem { start, target, limits } = problem;
+        let reached = match return_to_limits {
+            Return::Fastest => brake::brake(start, limits, profile),
+            Return::Settled => brake::settle(start, limits, profile),
+        };
+        let scale = Scale::of(limits);
+        let distance = target.position - reached.position;
+        let motion = scale.motion(&reached, distance, target, limits);
+        let mut edges = Edges::of(&motion);
+        // A rounding error of the direct motion must not become a detour.
+        edges.round(ROUNDING * (reached.position.abs() + target.position.abs()) / scale.distance);
+        let representable = scale.distance > 0.0
+            && scale.distance.is_finite()
+            && distance.is_finite()
+            && motion.distance.is_finite();
+        if representable {
+            Ok(Self { edges, scale, brake_s: profile.duration_s() })
+        } else {
+            Err(PlanError::NotRepresentable { axis: 0 })
+        }
+    }
+
+    /// Appends these phases to the profile, in the units of the problem.
+    fn append(&self, phases: &SevenPhases, jerk_max: f64, profile: &mut Profile) {
+        let durations_s = phases.durations.map(|duration| duration * self.scale.time_s);
+        profile.shift_all(profile.reached(), &durations_s, &phases.jerks.map(|jerk| jerk * jerk_max));
+    }
+}
+
+/// Plans the fastest profile to the target state, with its blocked intervals. A profile shorter than `least_s` gets no phases.
+///
+/// # Errors
+/// [`PlanError::NotRepresentable`] with axis 0.
+pub(in super::super) fn fastest_position(
+    problem: &Problem,
+    return_to_limits: Return,
+    least_s: f64,
+    profile: &mut Profile,
+) -> Result<(), PlanError> {
+    let inside = Inside::of(problem, return_to_limits, profile)?;
+    let candidates = inside.edges.candidates();
+    let Some((fastest, others)) = candidates.split_first() else {
+        return Err(PlanError::NotRepresentable { axis: 0 });
+    };
+    // A duration of zero must not become negative by rounding.
+    let duration_s = |duration: f64| inside.brake_s + larger(duration, 0.0) * inside.scale.time_s;
+    let fastest_s = duration_s(fastest.duration);
+    profile.set_minimum_duration(fastest_s);
+    if fastest_s < least_s {
+        profile.leave_open(fastest_s)?;
+    } else {
+        inside.append(&inside.edges.phases(fastest), problem.limits.jerk_max, profile);
+        profile.finish_at(problem.target, fastest_s)?;
+    }
+    for pair in others.chunks_exact(2) {
+        if let [after, before] = pair {
+            let rounding = ROUNDING * (1.0 + after.duration);
+            profile.block(duration_s(after.duration + rounding), duration_s(before.duration));
+        }
+    }
+    Ok(())
+}
+
+/// Plans the profile to the target state that lasts this long. `profile` must hold what [`fastest_position`] has made of it.
+///
+/// # Errors
+/// [`PlanError::NotRepresentable`] with axis 0.
+pub(in super::super) fn position_lasting(
+    problem: &Problem,
+    return_to_limits: Return,
+    duration_s: f64,
+    profile: &mut Profile,
+) -> Result<(), PlanError> {
+    let edge = profile.blocked().iter().any(|blocked| {
+        let rounding_s = EDGE * duration_s;
+        (blocked.before_s - duration_s).abs() <= rounding_s
+            || (blocked.after_s - duration_s).abs() <= rounding_s
+    });
+    let inside = Inside::of(problem, return_to_limits, profile)?;
+    let duration = (duration_s - inside.brake_s) / inside.scale.time_s;
+    let jerk_max = problem.limits.jerk_max;
+    // At the edge of a blocked interval, the motion is the candidate there.
+    let candidates = if edge { inside.edges.candidates() } else { Default::default() };
+    let apart = |candidate: &Candidate| (candidate.duration - duration).abs();
+    match candidates.iter().min_by(|one, other| apart(one).total_cmp(&apart(other))) {
+        Some(candidate) => inside.append(&inside.edges.phases(candidate), jerk_max, profile),
+        None => match inside.edges.lasting(duration) {
+            Slower::Plain(phases) => inside.append(&phases, jerk_max, profile),
+            Slower::Mixture { first, second, share } => {
+                mix(&inside, &first, &second, share, jerk_max, profile);
+            }
+        },
+    }
+    profile.finish_at(problem.target, duration_s)
+}
+
+/// Appends `share · first + (1 − share) · second`: at each time, the mixture of both jerks.
+fn mix(
+    inside: &Inside,
+    first: &SevenPhases,
+    second: &SevenPhases,
+    share: f64,
+    jerk_max: f64,
+    profile: &mut Profile,
+) {
+    let mut both = [first, second]
+        .map(|phases| phases.durations.iter().zip(&phases.jerks).filter(|(duration, _)| **duration > 0.0));
+    let [first, second] = &mut both;
+    let (mut one, mut other) = (first.next(), second.next());
+    let (mut one_left, mut other_left) =
+        (one.map_or(0.0, |(duration, _)| *duration), other.map_or(0.0, |(duration, _)| *duration));
+    while let (Some((_, jerk)), Some((_, other_jerk))) = (one, other) {
+        let duration = one_left.min(other_left);
+        let mixed = share * jerk + (1.0 - share) * other_jerk;
+        profile.shift(duration * inside.scale.time_s, mixed * jerk_max);
+        one_left -= duration;
+        other_left -= duration;
+        if one_left <= 0.0 {
+            one = first.next();
+            one_left = one.map_or(0.0, |(duration, _)| *duration);
+        }
+        if other_left <= 0.0 {
+            other = second.next();
+            other_left = other.map_or(0.0, |(duration, _)| *duration);
+        }
+    }
+}

@@ -1,0 +1,88 @@
+//! What an axis does when the controller is gone, by `kill -9` or by a broken cable, until its drive acts.
+
+use serde::Serialize;
+use takt::config::{Axis, Config, Control};
+
+/// What an axis does without the controller.
+#[derive(Clone, PartialEq, Serialize)]
+#[serde(tag = "does", rename_all = "snake_case")]
+pub enum Unattended {
+    /// It stops at its last set-point. What is left is the distance from it.
+    HoldsLastSetPoint {
+        /// rad (m)
+        travel: f64,
+    },
+    /// It ends its move by itself.
+    EndsItsMove,
+    /// It goes on until the drive misses the heartbeat, and then brakes.
+    GoesOn {
+        /// The time until the drive misses the heartbeat.
+        timeout_ns: u64,
+        /// The time until the joint is at rest.
+        time_ns: u64,
+        /// The travel until the joint is at rest, from full speed: rad (m).
+        travel: f64,
+    },
+    /// It goes on, and no heartbeat stops it.
+    GoesOnForEver,
+}
+
+impl Unattended {
+    /// The worst case: at full speed (with a torque: in full acceleration), with the last heartbeat just sent, and a drive that
+    /// brakes with the deceleration limit.
+    pub fn of(axis: &Axis, config: &Config) -> Self {
+        let (limits, master) = (&axis.limits, &config.master);
+        match axis.control {
+            Control::Position | Control::Interpolated => {
+                let cycle_s = config.bus_cycle(axis.bus).period_ns as f64 / 1e9;
+                Self::HoldsLastSetPoint { travel: axis.following_error.limit + limits.velocity * cycle_s }
+            }
+            Control::ProfilePosition => Self::EndsItsMove,
+            _ if master.heartbeat_ns.is_none() => Self::GoesOnForEver,
+            control => {
+                let timeout_s = master.heartbeat_timeout_ns as f64 / 1e9;
+                // A torque goes on to accelerate the joint; a speed is kept.
+                let acceleration = match control {
+                    Control::Torque { .. } | Control::ProfileTorque => limits.acceleration,
+                    _ => 0.0,
+                };
+                let speed = limits.velocity + acceleration * timeout_s;
+                let braking_s = speed / limits.deceleration;
+                let until_braking = 0.5 * (limits.velocity + speed) * timeout_s;
+                Self::GoesOn {
+                    timeout_ns: master.heartbeat_timeout_ns,
+                    time_ns: ((timeout_s + braking_s) * 1e9).round() as u64,
+                    travel: until_braking + 0.5 * speed * braking_s,
+                }
+            }
+        }
+    }
+
+    /// It in words.
+    pub fn words(&self, is_linear: bool) -> String {
+        let distance = |travel: f64| {
+            if is_linear {
+                format!("{travel:.4} m")
+            } else {
+                format!("{travel:.4} rad ({:.1} deg)", travel.to_degrees())
+            }
+        };
+        let milliseconds = |ns: u64| ns.div_ceil(1_000_000);
+        match self {
+            Self::HoldsLastSetPoint { travel } => {
+                format!(
+                    "holds its last set-point, {} away at most (following error and one cycle)",
+                    distance(*travel)
+                )
+            }
+            Self::EndsItsMove => "ends its move by itself, at its target".to_owned(),
+            Self::GoesOn { timeout_ns, time_ns, travel } => format!(
+                "goes on for {} ms, then brakes: at rest after {} ms and {} at most",
+                milliseconds(*timeout_ns),
+                milliseconds(*time_ns),
+                distance(*travel)
+            ),
+            Self::GoesOnForEver => "goes on FOR EVER: [master] heartbeat is off".to_owned(),
+        }
+    }
+}

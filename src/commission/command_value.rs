@@ -1,0 +1,108 @@
+//! Parses command values: a joint value has a unit, a drive value is a plain number.
+
+use crate::config::{Quantity, QuantityError};
+
+use super::dictionary::integer;
+use super::target::CommandValue;
+
+/// Why a text is not a valid value.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum CommandValueError {
+    /// It is not a number.
+    #[error("`{text}` is no {quantity}: write for example \"{example}\"")]
+    NoNumber {
+        /// The text as written.
+        text: String,
+        /// The expected quantity.
+        quantity: &'static str,
+        /// An example of valid text.
+        example: &'static str,
+    },
+    /// It is not a whole number of drive units.
+    #[error("`{text}` is no whole number, as values of the drive are (`--raw`)")]
+    NoInteger {
+        /// The text as written.
+        text: String,
+    },
+    /// It has no unit.
+    #[error(
+        "`{text}` has no unit: write for example \"{example}\", or `--raw` for a number in the drive's unit"
+    )]
+    NoUnit {
+        /// The text as written.
+        text: String,
+        /// An example of valid text.
+        example: &'static str,
+    },
+    /// It has an unknown unit.
+    #[error("the unit `{symbol}` is not known: write for example \"{example}\"")]
+    UnknownUnit {
+        /// The symbol.
+        symbol: String,
+        /// An example of valid text.
+        example: &'static str,
+    },
+    /// It has the unit of another quantity.
+    #[error("`{unit}` is not the unit of {article} {quantity}: write for example \"{example}\"")]
+    OtherQuantity {
+        /// The unit.
+        unit: String,
+        /// The article of the quantity: a or an.
+        article: &'static str,
+        /// The expected quantity.
+        quantity: &'static str,
+        /// An example of valid text.
+        example: &'static str,
+    },
+}
+
+/// Parses a value.
+///
+/// # Errors
+/// See [`CommandValueError`].
+pub fn parse(text: &str, quantity: Quantity, is_raw: bool) -> Result<CommandValue, CommandValueError> {
+    if is_raw {
+        let number = integer(text).ok_or_else(|| CommandValueError::NoInteger { text: text.to_owned() })?;
+        return Ok(CommandValue::Drive(number));
+    }
+    let Quantity { name, example, .. } = quantity;
+    let text_owned = || text.to_owned();
+    let value = quantity.parse(text).map_err(|error| match error {
+        QuantityError::NoNumber => {
+            CommandValueError::NoNumber { text: text_owned(), quantity: name, example }
+        }
+        QuantityError::NoUnit => CommandValueError::NoUnit { text: text_owned(), example },
+        QuantityError::UnknownUnit { symbol } => CommandValueError::UnknownUnit { symbol, example },
+        QuantityError::OtherQuantity { unit } => {
+            let article = if name.starts_with('a') { "an" } else { "a" };
+            CommandValueError::OtherQuantity { unit, article, quantity: name, example }
+        }
+    })?;
+    if value.is_finite() {
+        return Ok(CommandValue::Joint(value));
+    }
+    Err(CommandValueError::NoNumber { text: text_owned(), quantity: name, example })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_value_with_a_unit_is_a_joint_value_and_a_raw_value_is_a_drive_value() {
+        let angle = Quantity::ANGLE;
+        assert_eq!(parse("1 rad", angle, false), Ok(CommandValue::Joint(1.0)));
+        assert_eq!(parse("-1000", angle, true), Ok(CommandValue::Drive(-1000)));
+    }
+
+    #[test]
+    fn invalid_values_are_refused_with_an_example() {
+        let words = |text: &str, is_raw: bool| parse(text, Quantity::ANGLE, is_raw).unwrap_err().to_string();
+        assert!(words("5", false).contains("has no unit: write for example \"170 deg\", or `--raw`"));
+        assert!(words("5 deg/s", false).contains("`deg/s` is not the unit of an angle"));
+        assert!(words("5 furlong", false).contains("`furlong` is not known"));
+        assert!(words("five", false).contains("`five` is no angle"));
+        assert!(words("inf rad", false).contains("is no angle"));
+        assert!(words("1.5", true).contains("is no whole number"));
+    }
+}

@@ -1,0 +1,169 @@
+//! The tasks that commissioning can carry out with a drive.
+
+use takt_rt::Nanoseconds;
+
+use super::dictionary::ObjectEntry;
+use super::motion_profile::MotionProfile;
+use super::target::CommandValue;
+use crate::canopen::object::{DataType, Object, ObjectAddress};
+
+/// A task with one drive.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Task {
+    /// Read identity, ratings and condition.
+    Info,
+    /// Read objects.
+    Read {
+        /// The objects.
+        objects: Vec<ReadObject>,
+    },
+    /// Write an object, and read it back if it is readable.
+    Write {
+        /// The object.
+        object: Object,
+        /// The raw value.
+        value: i64,
+        /// The dictionary entry, if the object is known.
+        entry: Option<ObjectEntry>,
+    },
+    /// Enable the drive for a time.
+    Enable {
+        /// How long; `None`: until it is interrupted.
+        hold_ns: Option<Nanoseconds>,
+        /// Leave the drive enabled at the end, without holding first.
+        keeps_enabled: bool,
+    },
+    /// Stop and disable.
+    Disable,
+    /// Move to a position.
+    Move {
+        /// The kind of move.
+        kind: MoveKind,
+        /// Velocity and accelerations.
+        profile: MotionProfile,
+        /// Leave the drive enabled at the end.
+        keeps_enabled: bool,
+    },
+    /// Run at a velocity.
+    Velocity {
+        /// The velocity.
+        velocity: CommandValue,
+        /// Accelerations.
+        profile: MotionProfile,
+        /// How long; `None`: until it is interrupted.
+        duration_ns: Option<Nanoseconds>,
+        /// Leave the drive enabled at the end, at standstill.
+        keeps_enabled: bool,
+    },
+    /// Apply a torque.
+    Torque {
+        /// The torque.
+        torque: CommandValue,
+        /// The axis is stopped above this velocity.
+        velocity_limit: Option<CommandValue>,
+        /// How long; `None`: until it is interrupted.
+        duration_ns: Option<Nanoseconds>,
+    },
+    /// Run homing.
+    Home {
+        /// Homing method, object 6098; `None`: the family's default.
+        method: Option<i8>,
+        /// The timeout.
+        within_ns: Nanoseconds,
+        /// Allow a method that the manual does not describe.
+        is_forced: bool,
+    },
+    /// Make the current position zero.
+    Zero {
+        /// Whether the user confirmed it.
+        is_confirmed: bool,
+    },
+    /// Store the parameters.
+    Save,
+    /// Change the node ID.
+    SetId {
+        /// The new node ID, 1 to 127.
+        node: u8,
+    },
+    /// Change the bit rate.
+    SetBitRate {
+        /// bit/s
+        bit_rate: u32,
+    },
+    /// Clear the drive's fault.
+    ClearFault {
+        /// Whether the user confirmed the loss of the turn count, where clearing causes it.
+        is_confirmed: bool,
+    },
+    /// Show readings of the axis.
+    Watch {
+        /// The interval.
+        every_ns: Nanoseconds,
+        /// How long; `None`: until it is interrupted.
+        duration_ns: Option<Nanoseconds>,
+    },
+    /// Read the gains, or change the given ones.
+    Gains {
+        /// Proportional gain of the position loop.
+        position_proportional: Option<i64>,
+        /// Proportional gain of the velocity loop.
+        velocity_proportional: Option<i64>,
+        /// Integration time of the velocity loop.
+        velocity_integration: Option<i64>,
+    },
+    /// Read or set the electronic gear of the pulse input (YZ-AIM).
+    Gear {
+        /// Numerator and denominator.
+        ratio: Option<(u16, u16)>,
+    },
+    /// Set whether the drive moves to its multi-turn zero at power-up (YZ-AIM).
+    AutoHome {
+        /// Whether it does so.
+        is_on: bool,
+        /// Whether the user confirmed it.
+        is_confirmed: bool,
+    },
+    /// Set the drive up for interpolation over the bus (YZ-AIM).
+    Interpolation,
+}
+
+/// An object to read.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ReadObject {
+    /// Its address.
+    pub address: ObjectAddress,
+    /// Its dictionary entry, if it is known.
+    pub entry: Option<ObjectEntry>,
+    /// The data type given by the user.
+    pub data_type: Option<DataType>,
+}
+
+/// The kind of a move.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum MoveKind {
+    /// To a position.
+    Absolute {
+        /// The position.
+        to: CommandValue,
+        /// Take over the new target at once, also during a motion. A YZ-AIM always does so.
+        is_immediate: bool,
+    },
+    /// By a distance.
+    Relative(CommandValue),
+    /// To a position and back, repeatedly.
+    Reciprocate {
+        /// The position.
+        to: CommandValue,
+        /// Number of repetitions.
+        times: u32,
+        /// Dwell time at each end.
+        dwell_ns: Nanoseconds,
+    },
+    /// Without a target.
+    Continuous {
+        /// Forward or backward.
+        is_forward: bool,
+        /// How long; `None`: until it is interrupted.
+        duration_ns: Option<Nanoseconds>,
+    },
+}

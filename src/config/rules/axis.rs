@@ -1,0 +1,198 @@
+//! The axes.
+
+use takt_rt::MAX_AXES;
+
+use super::loops::Surroundings;
+use super::{Fields, limits, loops, master, name, simulation};
+use crate::config::model::{
+    Axis, Config, Control, DriveFamily, Feedback, Interface, Limits, PdoMapping, Travel,
+};
+use crate::config::problem_kind::ProblemKind;
+use crate::config::quantities::{Counting, Quantities};
+use crate::config::quantity::{Quantity, Short};
+use crate::config::ranges;
+use crate::config::spelling;
+use crate::config::spot::Spot;
+use crate::drive::yz_aim;
+use crate::printable::excerpt;
+
+pub fn validate(config: &Config, whole: &Fields<'_>) {
+    let axes = &config.axes;
+    if axes.is_empty() {
+        let says = "at least one [[axis]]";
+        whole.at("axis").report(ProblemKind::MissingKey { key: "axis".to_owned(), says });
+    }
+    if axes.len() > MAX_AXES {
+        whole.at("axis").report(too_many(axes.len()));
+        return;
+    }
+    for (index, axis) in axes.iter().enumerate() {
+        let fields = whole.element("axis", "axes", index, &axis.name);
+        let earlier = axes.get(..index).unwrap_or_default();
+        name(&fields.at("name"), &axis.name);
+        if earlier.iter().any(|other| other.name == axis.name) {
+            fields.at("name").report(duplicate_name(&axis.name));
+        }
+        validate_place(axis, earlier, config, &fields);
+        validate_motion(axis, config, &fields);
+        validate_process_data(axis, &fields);
+    }
+}
+
+pub fn too_many(given: usize) -> ProblemKind {
+    ProblemKind::TooMany { what: "axes", given, limit: MAX_AXES }
+}
+
+pub fn duplicate_name(name: &str) -> ProblemKind {
+    ProblemKind::DuplicateName { what: "axis", name: name.to_owned() }
+}
+
+/// The bus, and the node ID on it.
+fn validate_place(axis: &Axis, earlier: &[Axis], config: &Config, fields: &Fields<'_>) {
+    let Some(bus) = config.buses.get(axis.bus) else {
+        let known: Vec<&str> = config.buses.iter().map(|bus| bus.name.as_str()).collect();
+        fields.at("bus").report(unknown_bus(&axis.bus.to_string(), &known));
+        return;
+    };
+    let spot = fields.at("node");
+    if spot.integer(axis.node, &ranges::NODE_ID).is_some() {
+        let is_taken = earlier.iter().any(|other| (other.bus, other.node) == (axis.bus, axis.node));
+        if is_taken || axis.node == config.master.node {
+            spot.report(duplicate_node(&bus.name, axis.node));
+        }
+    }
+    bit_rate(&fields.at("bus.bit_rate"), axis.drive, bus.bit_rate);
+}
+
+pub fn unknown_bus(given: &str, known: &[&str]) -> ProblemKind {
+    let nearest = spelling::nearest(given, known.iter().copied()).map(str::to_owned);
+    let known = known.iter().map(|name| (*name).to_owned()).collect();
+    ProblemKind::UnknownBus { name: excerpt(given), nearest, known }
+}
+
+pub fn duplicate_node(bus: &str, node: u8) -> ProblemKind {
+    ProblemKind::DuplicateNode { bus: bus.to_owned(), node }
+}
+
+/// An eRob knows one bit rate (eRunner manual, section 1 of the specification), a YZ-AIM four (manual, 5.13).
+pub fn bit_rate(spot: &Spot<'_>, drive: DriveFamily, rate: u32) {
+    let (rates, allowed): (&[u32], _) = match drive {
+        DriveFamily::ErobCanopen => (&[1_000_000], "1 Mbit/s, the one bit rate of the eRobs on this bus"),
+        DriveFamily::YzAim => (
+            &[125_000, 250_000, 500_000, 1_000_000],
+            "125, 250 or 500 kbit/s or 1 Mbit/s, the bit rates of the YZ-AIMs on this bus",
+        ),
+    };
+    if !rates.contains(&rate) {
+        let value = Quantity::BIT_RATE.show(rate.into());
+        let key = "bus.bit_rate".to_owned();
+        spot.report(ProblemKind::OutOfRange { key, value, allowed: allowed.to_owned() });
+    }
+}
+
+/// Units, limits, mode, loops, and the simulated joint.
+fn validate_motion(axis: &Axis, config: &Config, fields: &Fields<'_>) {
+    let q = Quantities::of(axis.travel);
+    let counting = Counting::of(axis);
+    let is_countable = validate_counting(axis, fields);
+    let are_sound =
+        is_countable && limits::validate(&axis.limits, q, Some(&counting), &fields.within("limits"));
+    let limits = are_sound.then_some(&axis.limits);
+    limits::validate_following_error(&axis.following_error, q, &fields.within("following_error"));
+    for (key, value) in
+        [("start_tolerance", axis.start_tolerance), ("target_tolerance", axis.target_tolerance)]
+    {
+        fields.at(key).quantity(value, q.position, q.ranges.deviation);
+    }
+    simulation::validate_joint(&axis.simulated, q, limits, &axis.name, &fields.within("simulated"));
+
+    let period_ns = config.bus_cycle(axis.bus).period_ns;
+    mode(&fields.at("mode"), axis.drive, axis.control);
+    if axis.drive == DriveFamily::YzAim {
+        interpolation_period(&fields.at("bus.period"), axis.control, period_ns);
+        if let Some(limits) = limits {
+            motor_speed(&fields.at("limits.velocity"), limits, &counting, q);
+        }
+    }
+    let is_simulated = config.buses.get(axis.bus).is_some_and(|bus| bus.interface == Interface::Simulated);
+    let surroundings =
+        Surroundings::new(period_ns, axis.transmission_type, axis.simulated.inertia, is_simulated);
+    loops::validate(axis.control, q, axis.simulated.inertia, &surroundings, fields);
+}
+
+fn validate_counting(axis: &Axis, fields: &Fields<'_>) -> bool {
+    let show = |value: f64| Short(value).to_string();
+    let lead = match axis.travel {
+        Travel::Rotary => Some(0.0),
+        Travel::Linear { lead_m } => fields.at("lead").quantity(lead_m, Quantity::LENGTH, ranges::LEAD),
+    };
+    let counts = fields.at("counts_per_turn").bounded(axis.counts_per_turn, ranges::COUNTS_PER_TURN, show);
+    let gear = fields.at("gear_ratio").bounded(axis.gear_ratio, ranges::GEAR_RATIO, show);
+    lead.is_some() && counts.is_some() && gear.is_some()
+}
+
+/// What is exchanged with the drive in every cycle, and its heartbeat.
+fn validate_process_data(axis: &Axis, fields: &Fields<'_>) {
+    mapping(&fields.at("mapping"), axis.drive, axis.mapping);
+    for (index, object) in axis.feedback.iter().enumerate() {
+        let earlier = axis.feedback.get(..index).unwrap_or_default();
+        feedback(&fields.at("feedback"), Some(axis.drive), *object, earlier);
+    }
+    transmission_type(&fields.at("transmission_type"), axis.transmission_type);
+    let missed = fields.at("missed_feedback_cycles");
+    missed.integer(axis.missed_feedback_cycles, &ranges::MISSED_FEEDBACK_CYCLES);
+    fields.at("feedback_delay").duration(axis.feedback_delay_ns, ranges::FEEDBACK_DELAY_S);
+    if let Some(heartbeat_ns) = axis.heartbeat_ns {
+        master::heartbeat(&fields.at("heartbeat"), heartbeat_ns);
+    }
+}
+
+/// A mode that drives of the family know.
+fn mode(spot: &Spot<'_>, drive: DriveFamily, control: Control) {
+    if drive == DriveFamily::YzAim && !yz_aim::has_mode(&control) {
+        let allowed = "a mode of YZ-AIM drives: \"ip\", \"pp\" or \"pv\"".to_owned();
+        spot.report_range(format!("{:?}", control.operation_mode()), allowed);
+    }
+}
+
+/// A YZ-AIM interpolates from target to target in 2 ms (manual, 5.10.3).
+pub fn interpolation_period(spot: &Spot<'_>, control: Control, period_ns: u64) {
+    if control == Control::Interpolated && period_ns != yz_aim::INTERPOLATION_PERIOD_NS {
+        let (key, value) = ("bus.period".to_owned(), Quantity::DURATION.show(period_ns as f64 / 1e9));
+        let allowed = "2 ms, the period of a YZ-AIM that interpolates: period = \"2 ms\"".to_owned();
+        spot.report(ProblemKind::OutOfRange { key, value, allowed });
+    }
+}
+
+/// Objects 6081 and 60FF of a YZ-AIM end at 3000 r/min of the motor.
+pub fn motor_speed(spot: &Spot<'_>, limits: &Limits, counting: &Counting, q: Quantities) {
+    let highest = yz_aim::HIGHEST_SPEED_RPM / 60.0 / counting.turns_per_unit();
+    if limits.velocity > highest * (1.0 + 1e-9) {
+        let allowed = format!("at most {}, 3000 r/min of the motor", q.velocity.show(highest));
+        spot.report_range(q.velocity.show(limits.velocity), allowed);
+    }
+}
+
+pub fn mapping(spot: &Spot<'_>, drive: DriveFamily, mapping: PdoMapping) {
+    if drive == DriveFamily::YzAim && mapping == PdoMapping::Written {
+        let allowed = "as-stored, since the PDOs of a YZ-AIM are fixed".to_owned();
+        spot.report_range("written".to_owned(), allowed);
+    }
+}
+
+pub fn feedback(spot: &Spot<'_>, drive: Option<DriveFamily>, object: Feedback, earlier: &[Feedback]) {
+    let given = object.word().to_owned();
+    if drive == Some(DriveFamily::YzAim) {
+        spot.report_range(given.clone(), "nothing, since the PDOs of a YZ-AIM are fixed".to_owned());
+    }
+    if earlier.contains(&object) {
+        spot.report(ProblemKind::Repeated { key: spot.key.clone(), given });
+    }
+}
+
+/// 1 to 240: every so many SYNCs; 254 and 255: on the drive's own events (CiA 301, 7.5.2.36 and 7.5.2.38).
+pub fn transmission_type(spot: &Spot<'_>, value: u8) {
+    if spot.integer(value, &ranges::TRANSMISSION_TYPE).is_some() && matches!(value, 241..=253) {
+        spot.report_range(value.to_string(), "1 to 240 (SYNC), 254 or 255 (event)".to_owned());
+    }
+}

@@ -1,0 +1,94 @@
+//! The buses.
+
+use takt_rt::MAX_BUSES;
+
+use super::{Fields, name};
+use crate::config::bounds::Bounds;
+use crate::config::model::{Config, Interface};
+use crate::config::problem_kind::ProblemKind;
+use crate::config::quantity::Quantity;
+use crate::config::ranges;
+use crate::config::spot::Spot;
+
+pub fn validate(config: &Config, whole: &Fields<'_>) {
+    let buses = &config.buses;
+    if buses.is_empty() {
+        let says = "at least one [[bus]]";
+        whole.at("bus").report(ProblemKind::MissingKey { key: "bus".to_owned(), says });
+    }
+    if buses.len() > MAX_BUSES {
+        whole.at("bus").report(too_many(buses.len()));
+        return;
+    }
+    for (index, bus) in buses.iter().enumerate() {
+        let fields = whole.element("bus", "buses", index, &bus.name);
+        let earlier = buses.get(..index).unwrap_or_default();
+        name(&fields.at("name"), &bus.name);
+        if earlier.iter().any(|other| other.name == bus.name) {
+            fields.at("name").report(duplicate_name(&bus.name));
+        }
+        interface(&fields.at("interface"), &bus.interface);
+        if earlier.iter().any(|other| is_same_device(&other.interface, &bus.interface)) {
+            fields.at("interface").report(duplicate_interface(&bus.interface));
+        }
+        divider(&fields.at("period"), bus.divider, config.cycle.period_ns);
+        bit_rate(&fields.at("bit_rate"), f64::from(bus.bit_rate));
+        if let Some(rate) = bus.data_bit_rate {
+            data_bit_rate(&fields.at("data_bit_rate"), f64::from(rate), bus.bit_rate);
+        }
+        fields.at("restart_ms").integer(bus.restart_ms, &ranges::RESTART_MS);
+        let service_frames = fields.at("service_frames_per_cycle");
+        service_frames.integer(bus.service_frames_per_cycle, &ranges::SERVICE_FRAMES);
+    }
+}
+
+pub fn too_many(given: usize) -> ProblemKind {
+    ProblemKind::TooMany { what: "buses", given, limit: MAX_BUSES }
+}
+
+pub fn duplicate_name(name: &str) -> ProblemKind {
+    ProblemKind::DuplicateName { what: "bus", name: name.to_owned() }
+}
+
+pub fn duplicate_interface(interface: &Interface) -> ProblemKind {
+    ProblemKind::DuplicateInterface { interface: interface.to_string() }
+}
+
+/// Simulated buses are each a bus of their own.
+pub fn is_same_device(one: &Interface, other: &Interface) -> bool {
+    one == other && *one != Interface::Simulated
+}
+
+/// A name that was set in code is one that could have been read.
+fn interface(spot: &Spot<'_>, interface: &Interface) {
+    let Interface::SocketCan(given) = interface else { return };
+    match given.parse::<Interface>() {
+        Ok(parsed) if parsed == *interface => {}
+        Ok(_) => {
+            spot.report_range(format!("{given:?}"), "Interface::Simulated, which is not SocketCAN".to_owned())
+        }
+        Err(reason) => spot.report(ProblemKind::Interface { reason }),
+    }
+}
+
+/// A bus has one cycle in one or several of the controller's.
+pub fn divider(spot: &Spot<'_>, divider: u32, cycle_ns: u64) -> Option<u32> {
+    let period_ns = cycle_ns.saturating_mul(divider.into());
+    let cycle_s = cycle_ns as f64 / 1e9;
+    spot.duration(period_ns, cycle_s..=ranges::BUS_PERIOD_AT_MOST_S.max(cycle_s)).map(|_| divider)
+}
+
+pub fn bit_rate(spot: &Spot<'_>, rate: f64) -> Option<u32> {
+    let found = ranges::BIT_RATES.into_iter().find(|allowed| (f64::from(*allowed) - rate).abs() < 1.0);
+    if found.is_none() {
+        let allowed = ranges::BIT_RATES.map(|rate| Quantity::BIT_RATE.show(rate.into())).join(", ");
+        spot.report_range(Quantity::BIT_RATE.show(rate), allowed);
+    }
+    found
+}
+
+/// The data phase is at least as fast as the arbitration phase.
+pub fn data_bit_rate(spot: &Spot<'_>, rate: f64, bit_rate: u32) -> Option<u32> {
+    let bounds = Bounds::Between(bit_rate.into(), ranges::DATA_BIT_RATE_AT_MOST);
+    spot.quantity(rate, Quantity::BIT_RATE, bounds).map(|rate| rate.round() as u32)
+}

@@ -1,0 +1,110 @@
+//! The limits of an axis, and the following error.
+
+use super::Fields;
+use crate::config::bounds::Bounds;
+use crate::config::model::{FollowingError, Limits};
+use crate::config::problem_kind::ProblemKind;
+use crate::config::quantities::{Counting, Quantities};
+use crate::config::quantity::Quantity;
+use crate::config::ranges;
+use crate::config::spot::Spot;
+
+/// Returns whether the limits are sound, so that what depends on them can be judged.
+pub fn validate(limits: &Limits, q: Quantities, counting: Option<&Counting>, fields: &Fields<'_>) -> bool {
+    let is_range =
+        position_range(&fields.at("position"), [limits.position_min, limits.position_max], q, counting);
+    let checks = [
+        velocity(&fields.at("velocity"), limits.velocity, q, counting),
+        fields.at("acceleration").quantity(limits.acceleration, q.acceleration, q.ranges.acceleration),
+        fields.at("deceleration").quantity(limits.deceleration, q.acceleration, q.ranges.acceleration),
+        fields.at("jerk").quantity(limits.jerk, q.jerk, q.ranges.jerk),
+        fields.at("torque").quantity(limits.torque, q.effort, q.ranges.effort),
+    ];
+    let are_in_range = checks.iter().all(Option::is_some);
+    is_range && are_in_range && stopping_time(limits, q, |key| fields.at(key))
+}
+
+/// The lowest position is below the highest, by a count at least, and a drive can count both. The latter is judged where
+/// it is known how the drive counts.
+pub fn position_range(
+    spot: &Spot<'_>,
+    [low, high]: [f64; 2],
+    q: Quantities,
+    counting: Option<&Counting>,
+) -> bool {
+    let is_finite = [low, high].map(|position| spot.quantity(position, q.position, Bounds::Finite).is_some());
+    if is_finite != [true; 2] {
+        return false;
+    }
+    if low >= high {
+        spot.report(ProblemKind::EmptyRange { low: q.position.show(low), high: q.position.show(high) });
+        return false;
+    }
+    let Some(counting) = counting else { return true };
+    let resolution = 1.0 / counting.counts_per_unit();
+    if high - low < resolution {
+        let allowed = format!("a range of {} at least, one count of the drive", q.position.show(resolution));
+        spot.report_range(format!("a range of {}", q.position.show(high - low)), allowed);
+        return false;
+    }
+    fits_counts(spot, &[low, high].map(|position| counting.position(position)))
+}
+
+pub fn velocity(spot: &Spot<'_>, velocity: f64, q: Quantities, counting: Option<&Counting>) -> Option<f64> {
+    let velocity = spot.quantity(velocity, q.velocity, q.ranges.velocity)?;
+    let counts = counting.map(|counting| velocity * counting.counts_per_unit());
+    fits_counts(spot, counts.as_slice()).then_some(velocity)
+}
+
+/// A drive counts positions and speeds in 32 bits.
+fn fits_counts(spot: &Spot<'_>, counts: &[f64]) -> bool {
+    let beyond = counts.iter().find(|counts| counts.abs() > f64::from(i32::MAX));
+    if let Some(&counts) = beyond {
+        spot.report(ProblemKind::BeyondCounts { key: spot.key.clone(), counts });
+    }
+    beyond.is_none()
+}
+
+/// A stop from full speed must end within seconds: Ctrl-C and every controlled stop wait for it.
+pub fn stopping_time<'a>(limits: &Limits, q: Quantities, at: impl Fn(&'static str) -> Spot<'a>) -> bool {
+    let Limits { velocity, deceleration, jerk, .. } = *limits;
+    let without_jerk_s = velocity / deceleration;
+    let time_s = stopping_time_s(limits);
+    if time_s <= ranges::STOP_AT_MOST_S {
+        return true;
+    }
+    let (key, value) = if without_jerk_s > ranges::STOP_AT_MOST_S {
+        let key = if deceleration == limits.acceleration { "acceleration" } else { "deceleration" };
+        (key, q.acceleration.show(deceleration))
+    } else {
+        ("jerk", q.jerk.show(jerk))
+    };
+    let allowed = format!(
+        "what stops the joint from {} within {}, not in {}",
+        q.velocity.show(velocity),
+        Quantity::DURATION.show(ranges::STOP_AT_MOST_S),
+        Quantity::DURATION.show(time_s),
+    );
+    at(key).report_range(value, allowed);
+    false
+}
+
+/// The shortest time (s) of a stop from the highest speed, from constant speed to rest.
+fn stopping_time_s(limits: &Limits) -> f64 {
+    let Limits { velocity, deceleration, jerk, .. } = *limits;
+    if velocity * jerk >= deceleration * deceleration {
+        velocity / deceleration + deceleration / jerk
+    } else {
+        2.0 * (velocity / jerk).sqrt()
+    }
+}
+
+pub fn validate_following_error(following_error: &FollowingError, q: Quantities, fields: &Fields<'_>) {
+    fields.at("limit").quantity(following_error.limit, q.position, q.ranges.deviation);
+    fields.at("time").duration(following_error.time_ns, ranges::FOLLOWING_ERROR_TIME_S);
+}
+
+/// Whether a position is within the limits.
+pub fn contains(limits: &Limits, position: f64) -> bool {
+    (limits.position_min..=limits.position_max).contains(&position)
+}

@@ -1,0 +1,52 @@
+//! How simulated buses and joints behave.
+
+use std::ops::RangeInclusive;
+
+use super::Fields;
+use super::limits::contains;
+use crate::config::bounds::Bounds;
+use crate::config::model::{Limits, SimulatedJoint, Simulation};
+use crate::config::problem_kind::ProblemKind;
+use crate::config::quantities::Quantities;
+use crate::config::ranges;
+use crate::config::spot::Spot;
+
+pub fn validate(simulation: &Simulation, period_ns: u64, fields: &Fields<'_>) {
+    fields.at("longest_gap").duration(simulation.longest_gap_ns, longest_gap(period_ns));
+}
+
+/// The range of the longest gap, in seconds. The simulated world never pauses within a cycle.
+pub fn longest_gap(period_ns: u64) -> RangeInclusive<f64> {
+    let period_s = period_ns as f64 / 1e9;
+    period_s..=ranges::LONGEST_GAP_AT_MOST_S.max(period_s)
+}
+
+/// The simulated joint of an axis. Its initial position is judged only where the limits are sound.
+pub fn validate_joint(
+    joint: &SimulatedJoint,
+    q: Quantities,
+    limits: Option<&Limits>,
+    axis: &str,
+    fields: &Fields<'_>,
+) {
+    fields.at("inertia").quantity(joint.inertia, q.inertia, q.ranges.inertia);
+    fields.at("viscous_friction").quantity(joint.viscous_friction, q.damping, q.ranges.viscous_friction);
+    fields.at("coulomb_friction").quantity(joint.coulomb_friction, q.effort, q.ranges.friction);
+    fields.at("rated_torque").quantity(joint.rated_torque, q.effort, q.ranges.effort);
+    fields.at("peak_torque").quantity(joint.peak_torque, q.effort, q.ranges.effort);
+    initial_position(&fields.at("initial_position"), joint.initial_position, q, limits, axis);
+    fields.at("power_up").duration(joint.power_up_ns, ranges::POWER_UP_S);
+}
+
+pub fn initial_position(spot: &Spot<'_>, position: f64, q: Quantities, limits: Option<&Limits>, axis: &str) {
+    if spot.quantity(position, q.position, Bounds::Finite).is_none() {
+        return;
+    }
+    if let Some(limits) = limits.filter(|limits| !contains(limits, position)) {
+        spot.report(ProblemKind::InitialPositionOutsideLimits {
+            axis: axis.to_owned(),
+            value: q.position.show(position),
+            allowed: q.show_range(limits),
+        });
+    }
+}

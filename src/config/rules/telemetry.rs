@@ -1,0 +1,22 @@
+//! What is written down.
+
+use std::path::Path;
+
+use super::Fields;
+use crate::config::model::Telemetry;
+use crate::config::ranges;
+use crate::config::spot::Spot;
+
+pub fn validate(telemetry: &Telemetry, fields: &Fields<'_>) {
+    directory(&fields.at("directory"), &telemetry.directory);
+    if let Some(black_box_ns) = telemetry.black_box_ns {
+        fields.at("black_box").duration(black_box_ns, ranges::BLACK_BOX_S);
+    }
+    fields.at("ring_records").integer(telemetry.ring_records, &ranges::RING_RECORDS);
+}
+
+pub fn directory(spot: &Spot<'_>, directory: &Path) {
+    if directory.as_os_str().is_empty() {
+        spot.report_range("an empty text".to_owned(), "the path of a folder".to_owned());
+    }
+}

@@ -1,0 +1,162 @@
+//! Renders the report of a recording as text for people.
+
+use std::fmt::Write;
+
+use takt_rt::Rule;
+
+use super::{AxisCycle, RecordingReport};
+use crate::telemetry::render::{self, Emphasis, latency_table, line, missed_slots, wrap};
+use crate::telemetry::report::SetPointParts;
+use crate::telemetry::words;
+
+impl RecordingReport {
+    /// The report as text of at most 100 columns. Paths are not broken and may be longer.
+    pub fn render(&self, emphasis: Emphasis) -> String {
+        let mut text = String::new();
+        let kind = if self.is_black_box { "black box" } else { "recording" };
+        let cycle_ms = self.cycle_ns as f64 * 1e-6;
+        let begins = self.begins.as_ref().map_or_else(String::new, |begins| format!(" from {begins}"));
+        let heading = emphasis.heading(&self.machine);
+        line(&mut text, &format!("{heading}  {kind} of {} cycles of {cycle_ms} ms{begins}", self.cycles));
+        for warning in &self.warnings {
+            wrap(&mut text, &emphasis.bad("file"), 4, std::slice::from_ref(warning));
+        }
+        match &self.cause {
+            Some(cause) if cause.rule == words::rule_key(Rule::Requested) => {
+                wrap(&mut text, "stop", 4, &[format!("{} (slot {})", cause.reason, cause.slot)]);
+            }
+            Some(cause) => {
+                wrap(
+                    &mut text,
+                    &emphasis.bad("why"),
+                    3,
+                    &[format!("{} (slot {})", cause.reason, cause.slot)],
+                );
+            }
+            None => wrap(&mut text, "stop", 4, &["none".to_owned()]),
+        }
+        self.axis_cycles(&mut text, emphasis);
+        self.event_table(&mut text, emphasis);
+        line(&mut text, "");
+        let rows = [
+            ("wake-up", &self.wake_ns),
+            ("SYNC release", &self.sync_ns),
+            ("computing", &self.compute_ns),
+            ("set-points out at", &self.sent_ns),
+        ];
+        latency_table(&mut text, emphasis, &rows);
+        missed_slots(&mut text, emphasis, self.missed_slots, self.cycles);
+        self.axis_table(&mut text, emphasis);
+        self.bus_table(&mut text, emphasis);
+        text
+    }
+
+    fn axis_cycles(&self, text: &mut String, emphasis: Emphasis) {
+        let Some(axis) = self.axis.as_ref().filter(|axis| !axis.cycles.is_empty()) else { return };
+        let milli = if axis.unit == "m" { "mm" } else { "mrad" };
+        let until = if self.cause.is_some() { "up to the stop" } else { "at the end" };
+        line(text, "");
+        line(
+            text,
+            &emphasis.heading(&format!("{}, the last {} cycles {until}", axis.name, axis.cycles.len())),
+        );
+        let units =
+            [axis.unit.to_owned(), axis.unit.to_owned(), format!("{}/s", axis.unit), milli.to_owned()];
+        let [set, actual, velocity, error] = units;
+        line(
+            text,
+            &emphasis.heading(&format!(
+                "{:>8} {:<9}{:>10}{:>10}{:>9}{:>9}  {:<28}{:>6}{:>4}",
+                "slot", "phase", "set", "actual", "velocity", "error", "statusword", "6040", "age"
+            )),
+        );
+        line(text, &format!("{:>8} {:<9}{set:>10}{actual:>10}{velocity:>9}{error:>9}", "", ""));
+        for cycle in &axis.cycles {
+            line(text, &cycle.row());
+        }
+    }
+
+    fn event_table(&self, text: &mut String, emphasis: Emphasis) {
+        if !self.events.is_empty() {
+            line(text, "");
+            line(text, &emphasis.heading(&format!("{:>8} {:>10}  event", "slot", "s")));
+        }
+        for event in &self.events {
+            let is_of_cause = self.cause.as_ref().is_some_and(|cause| cause.slot == event.slot);
+            let row = format!("{:>8} {:>10.3}  {}", event.slot, event.at_s, event.text);
+            let is_shown_above = is_of_cause && event.text.starts_with("stop: ");
+            line(text, &if is_shown_above { emphasis.bad(&cut(&row)) } else { cut(&row) });
+        }
+        if !self.emergencies.is_empty() {
+            let lines: Vec<String> =
+                self.emergencies.iter().map(|event| format!("{:.3} s: {}", event.at_s, event.text)).collect();
+            line(text, "");
+            wrap(text, &emphasis.heading("emergencies"), 11, &lines);
+        }
+    }
+
+    fn axis_table(&self, text: &mut String, emphasis: Emphasis) {
+        line(text, "");
+        let titles = format!(
+            "{:<16}{:>18}{:>14}{:>14}{:>12}   {}",
+            "axis", "following error", "velocity", "acceleration", "jerk", "(largest, of the limit)"
+        );
+        line(text, &emphasis.heading(&titles));
+        for axis in &self.axes {
+            let milli = if axis.unit == "m" { "mm" } else { "mrad" };
+            let error = axis.following_error_max;
+            let error = error
+                .map_or_else(|| "never enabled".to_owned(), |error| format!("{:.3} {milli}", error * 1e3));
+            let SetPointParts { velocity, acceleration, jerk } = axis.set_point_part;
+            let [velocity, acceleration, jerk] = [velocity, acceleration, jerk].map(render::part);
+            let name = render::shortened(&axis.name, 16);
+            line(text, &format!("{name:<16}{error:>18}{velocity:>14}{acceleration:>14}{jerk:>12}"));
+        }
+    }
+
+    fn bus_table(&self, text: &mut String, emphasis: Emphasis) {
+        if self.buses.is_empty() {
+            return;
+        }
+        line(text, "");
+        let titles = format!(
+            "{:<16}{:>10}  {:<16}{:>10}{:>18}{:>20}",
+            "bus", "s", "state", "errors", "sending overruns", "receiving overruns"
+        );
+        line(text, &emphasis.heading(&titles));
+        for bus in &self.buses {
+            let name = render::shortened(&bus.name, 16);
+            let row = format!(
+                "{name:<16}{:>10.3}  {:<16}{:>10}{:>18}{:>20}",
+                bus.at_s, bus.state, bus.errors, bus.tx_overruns, bus.rx_overruns
+            );
+            line(text, &row);
+        }
+    }
+}
+
+/// At most 100 columns of a line.
+fn cut(row: &str) -> String {
+    let mut cut: String = row.chars().take(99).collect();
+    if row.chars().count() > 99 {
+        let _ = write!(cut, "…");
+    }
+    cut
+}
+
+impl AxisCycle {
+    fn row(&self) -> String {
+        let status = format!("{:04X} {}", self.statusword, self.state);
+        format!(
+            "{:>8} {:<9}{:>10.5}{:>10.5}{:>+9.3}{:>+9.3}  {status:<28}{:>6}{:>4}",
+            self.slot,
+            self.phase,
+            self.position_set,
+            self.position,
+            self.velocity,
+            self.following_error * 1e3,
+            format!("{:04X}", self.controlword),
+            self.feedback_age,
+        )
+    }
+}

@@ -1,0 +1,250 @@
+//! The set-points of an axis keep its limits: as they were planned, and on the wire in drive units.
+
+use std::collections::VecDeque;
+
+use takt::config::{Axis, Config, OnViolation};
+use takt::controller::assemble;
+use takt_rt::{DriveState, Event, EventKind, Phase, Scale};
+
+use super::Seen;
+
+/// A set-point that was sent.
+#[derive(Clone, Copy, Debug)]
+struct Point {
+    /// As it was planned: rad (m).
+    position: f64,
+    /// As it went onto the wire; `None` where the wire carries no position.
+    counts: Option<i32>,
+    /// Since the set-point before: cycles in which the trajectory went on.
+    cycles: u32,
+}
+
+/// Room for the rounding of floating-point sums, relative to a limit.
+const ROUNDING: f64 = 1e-6;
+/// When none has got to the drive for longer than this, it stands where the last one led.
+const GAP_S: f64 = 0.004;
+
+pub struct SetPoints {
+    scale: Scale,
+    period_s: f64,
+    /// What was sent to the enabled drive, newest first.
+    points: [Option<Point>; 3],
+    /// Where the trajectory has led, newest first. What is on the wire is so many cycles old: an axis on a faster bus waits
+    /// for those that follow set-points on slower ones.
+    planned: VecDeque<f64>,
+    delay_cycles: usize,
+    /// The last position on the wire while the drive really was enabled, and in which slot.
+    on_wire: Option<(u64, i32)>,
+    /// The speed of the joint when its drive was not enabled the last time it was looked at.
+    coasting: f64,
+    /// Cycles in which the trajectory went on since the last set-point.
+    cycles: u32,
+    /// The slot of the last set-point.
+    sent_slot: u64,
+    /// What the last cycle was: the phase, and where the set-point was.
+    last: Option<(Phase, f64)>,
+    /// Cycles in which the trajectory went on since the last one whose jerk is not limited.
+    kept: u32,
+}
+
+impl SetPoints {
+    pub fn new(config: &Config, axis: &Axis) -> Self {
+        let divider = |axis: &Axis| config.buses[axis.bus].divider;
+        let follow = config.axes.iter().filter(|axis| !axis.control.is_profile());
+        let slowest = follow.map(divider).max().unwrap_or(1).max(divider(axis));
+        Self {
+            scale: assemble::scale(axis).unwrap(),
+            period_s: config.cycle.period_ns as f64 * 1e-9,
+            points: [None; 3],
+            planned: VecDeque::new(),
+            delay_cycles: 2 * (slowest - divider(axis)) as usize,
+            on_wire: None,
+            coasting: 0.0,
+            cycles: 0,
+            sent_slot: 0,
+            last: None,
+            kept: u32::MAX,
+        }
+    }
+
+    pub fn check(&mut self, seen: &Seen<'_>, index: usize) -> Result<(), String> {
+        let axis = &seen.config.axes[index];
+        self.cycles += u32::from(seen.record.is_commanded);
+        self.note_jerk(seen, axis);
+        self.check_rates(seen, index)?;
+        self.check_wire(seen, index)?;
+        if axis.control.is_profile() {
+            return Ok(());
+        }
+        let record = &seen.record.axes()[index];
+        // The state as the controller knows it: for a drive that it takes for disabled it plans nothing.
+        if record.drive_state != DriveState::OperationEnabled {
+            self.points = [None; 3];
+            self.planned.clear();
+            self.last = None;
+            return Ok(());
+        }
+        if seen.record.is_commanded {
+            self.planned.push_front(record.position_set);
+            self.planned.truncate(self.delay_cycles + 1);
+        }
+        let phase = seen.record.phase;
+        if let Some((Phase::Holding, position)) = self.last
+            && phase == Phase::Holding
+            && position != record.position_set
+            && !is_asked_to_move(seen.events)
+        {
+            return Err(format!("holding, and from {position} to {}", record.position_set));
+        }
+        self.last = Some((phase, record.position_set));
+        let sent = &seen.sent[index];
+        if sent.position.or(sent.velocity).or(sent.torque).is_none() || !seen.record.is_commanded {
+            return Ok(());
+        }
+        let cycles = std::mem::take(&mut self.cycles);
+        let nominal_s = self.period_s * f64::from(seen.config.buses[axis.bus].divider);
+        let slot = seen.snapshot.slot;
+        let silent_s = (slot - std::mem::replace(&mut self.sent_slot, slot)) as f64 * self.period_s;
+        // An axis that is given up because its set-points do not get through stays where the last one led.
+        let is_given_up = silent_s > nominal_s * (1.0 + ROUNDING)
+            && self.points[0].is_some_and(|last| last.position == record.position_set);
+        if is_given_up || silent_s > GAP_S.max(nominal_s) * (1.0 + ROUNDING) {
+            self.points = [None; 3];
+        }
+        let point = Point { position: record.position_set, counts: sent.position, cycles };
+        self.check_point(axis, &point)?;
+        self.points = [Some(point), self.points[0], self.points[1]];
+        Ok(())
+    }
+
+    /// A stream that is clamped is held to the limits of velocity and acceleration, and not to that of the jerk. Whatever else is
+    /// sent keeps it, also the stop that begins in the midst of such a stream.
+    fn note_jerk(&mut self, seen: &Seen<'_>, axis: &Axis) {
+        let is_streaming = seen.record.phase == Phase::Streaming;
+        if is_streaming && axis.on_violation == OnViolation::Clamp {
+            self.kept = 0;
+        } else if seen.record.is_commanded {
+            self.kept = self.kept.saturating_add(1);
+        }
+    }
+
+    /// The planned set-point, by differences of what was sent, and what is on the wire of it.
+    fn check_point(&self, axis: &Axis, next: &Point) -> Result<(), String> {
+        let Some(last) = self.points[0] else { return Ok(()) };
+        if let (Some(counts), Some(before)) = (next.counts, last.counts) {
+            let meant = self.planned.get(self.delay_cycles).map(|due| self.scale.position_to_counts(*due));
+            if let Some(meant) = meant
+                && counts != meant
+                && counts != before
+            {
+                return Err(format!("{counts} counts on the wire for {meant}"));
+            }
+        }
+        let limits = &axis.limits;
+        let noise = 8.0 * f64::EPSILON * (1.0 + next.position.abs());
+        let step_s = |point: &Point| f64::from(point.cycles) * self.period_s;
+        let (next_s, last_s) = (step_s(next), step_s(&last));
+        let velocity = (next.position - last.position) / next_s;
+        if velocity.abs() > limits.velocity * (1.0 + ROUNDING) + noise / next_s {
+            return Err(format!("set-point at {velocity} beyond {}", limits.velocity));
+        }
+        let room = ROUNDING * (limits.position_max - limits.position_min);
+        let is_further_out = next.position > limits.position_max + room && next.position > last.position
+            || next.position < limits.position_min - room && next.position < last.position;
+        if is_further_out {
+            return Err(format!("set-point from {} to {}, out of the limits", last.position, next.position));
+        }
+        let Some(before) = self.points[1] else { return Ok(()) };
+        let before_s = step_s(&before);
+        let limit = limits.acceleration.max(limits.deceleration);
+        let last_velocity = (last.position - before.position) / last_s;
+        let span_s = (next_s + last_s) / 2.0;
+        let acceleration = (velocity - last_velocity) / span_s;
+        if acceleration.abs() > limit * (1.0 + ROUNDING) + 4.0 * noise / (span_s * next_s.min(last_s)) {
+            return Err(format!("set-point with acceleration {acceleration} beyond {limit}"));
+        }
+        if next.cycles == last.cycles
+            && let (Some(newest), Some(newer), Some(older)) = (next.counts, last.counts, before.counts)
+        {
+            // Each of the three is rounded by up to half a count, the one in the middle counts twice.
+            let second = i64::from(newest) - 2 * i64::from(newer) + i64::from(older);
+            let allowed = limit * span_s * span_s * self.scale.resolution() * (1.0 + ROUNDING) + 2.0;
+            if second.unsigned_abs() as f64 > allowed {
+                return Err(format!("second difference of {second} counts on the wire beyond {allowed}"));
+            }
+        }
+        let Some(oldest) = self.points[2] else { return Ok(()) };
+        let is_even = next.cycles == last.cycles && last.cycles == before.cycles;
+        // Over steps of several cycles it is a weighted mean of those over one: so far back as to the first of them.
+        let is_kept = self.kept > 3 * next.cycles.saturating_sub(1);
+        if is_even && is_kept && limits.jerk.is_finite() {
+            let oldest_velocity = (before.position - oldest.position) / before_s;
+            let jerk = (acceleration - (last_velocity - oldest_velocity) / span_s) / span_s;
+            if jerk.abs() > limits.jerk * (1.0 + ROUNDING) + 8.0 * noise / span_s.powi(3) {
+                return Err(format!("set-point with jerk {jerk} beyond {}", limits.jerk));
+            }
+        }
+        Ok(())
+    }
+
+    /// Velocities and torques on the wire keep their limits, in every state of the drive.
+    fn check_rates(&self, seen: &Seen<'_>, index: usize) -> Result<(), String> {
+        let (limits, sent) = (&seen.config.axes[index].limits, &seen.sent[index]);
+        let velocity = self.scale.velocity_to_drive(limits.velocity).abs() + 1;
+        if let Some(sent) = sent.velocity.filter(|sent| sent.abs() > velocity) {
+            return Err(format!("velocity {sent} on the wire beyond {velocity}"));
+        }
+        let torque = self.scale.torque_to_per_mille(limits.torque).abs() + 1;
+        match sent.torque.filter(|sent| sent.abs() > torque) {
+            Some(sent) => Err(format!("torque {sent} on the wire beyond {torque}")),
+            None => Ok(()),
+        }
+    }
+
+    /// Positions on the wire keep the limits while the drive is enabled in truth, whatever the controller takes it for.
+    fn check_wire(&mut self, seen: &Seen<'_>, index: usize) -> Result<(), String> {
+        let (axis, concern, truth) = (&seen.config.axes[index], &seen.concerns[index], &seen.truth[index]);
+        if truth.state != DriveState::OperationEnabled {
+            self.on_wire = None;
+            self.coasting = truth.velocity.abs();
+            return Ok(());
+        }
+        let Some(counts) = seen.sent[index].position else { return Ok(()) };
+        let before = self.on_wire.replace((seen.snapshot.slot, counts));
+        let position = self.scale.position_from_counts(counts);
+        let count = 1.0 / self.scale.resolution();
+        let limits = &axis.limits;
+        let Some((slot, before)) = before else {
+            // The drive is enabled on where it is. Whoever lies about that, or moves it, is a fault.
+            let there = self.scale.position_from_counts(truth.position_counts);
+            let reach = self.coasting.max(truth.velocity.abs()) * GAP_S + 4.0 * count;
+            let is_judged = !concern.is_present && !seen.config.axes[index].control.is_profile();
+            return match is_judged && (position - there).abs() > reach {
+                true => Err(format!("enabled at {there}, and sent to {position}")),
+                false => Ok(()),
+            };
+        };
+        let last = self.scale.position_from_counts(before);
+        let is_further_out = |position: f64, last: f64| {
+            position > limits.position_max + count && position > last.max(limits.position_max) + count
+                || position < limits.position_min - count && position < last.min(limits.position_min) - count
+        };
+        // A drive in profile position is stopped where the joint comes to rest, which may be where it was when it last reported.
+        let reference =
+            if axis.control.is_profile() { truth.position - truth.velocity * GAP_S } else { last };
+        if !concern.is_present && is_further_out(position, last) && is_further_out(position, reference) {
+            return Err(format!("from {last} to {position} on the wire, out of the limits"));
+        }
+        let elapsed_s = (seen.snapshot.slot - slot) as f64 * seen.config.cycle.period_ns as f64 * 1e-9;
+        let (step, limit) = ((position - last).abs(), limits.velocity * elapsed_s * (1.0 + ROUNDING) + count);
+        if step > limit && !axis.control.is_profile() {
+            return Err(format!("step of {step} on the wire beyond {limit}"));
+        }
+        Ok(())
+    }
+}
+
+/// Whether the group has left standstill in this cycle, if only for a move that ends in it.
+fn is_asked_to_move(events: &[Event]) -> bool {
+    events.iter().any(|event| matches!(event.kind, EventKind::PhaseChanged { from: Phase::Holding, .. }))
+}
