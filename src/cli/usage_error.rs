@@ -99,7 +99,7 @@ pub fn of_command_line(error: &clap::Error) -> Exit {
     // clap prints arguments unchanged on a terminal.
     let is_printable =
         |argument: &OsStr| printable(&argument.to_string_lossy()) == argument.to_string_lossy();
-    if error.use_stderr() && !std::env::args_os().all(|argument| is_printable(&argument)) {
+    if error.use_stderr() && !env::args_os().all(|argument| is_printable(&argument)) {
         say!("{}", error.render().to_string().trim_end());
     } else {
         // The reader may have ended.
