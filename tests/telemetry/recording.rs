@@ -111,8 +111,7 @@ fn events_are_recorded_as_text_and_as_numbers() {
         assert_eq!(emergency[field], number(value), "{field}");
     }
     let (_, rejection) = &events[3];
-    for (field, value) in
-        [("axis", 1.0), ("value", 1.25), ("limit", 0.75), ("request", 7.0), ("reason", 7.0)]
+    for (field, value) in [("axis", 1.0), ("value", 1.25), ("limit", 0.75), ("request", 7.0), ("reason", 7.0)]
     {
         assert_eq!(rejection[field], number(value), "{field}");
     }
