@@ -90,6 +90,8 @@ struct Hall {
     services: VecDeque<Frame>,
     events: Vec<Event>,
     is_retired: bool,
+    /// Whether set-points left with the last cycle, by its record.
+    is_commanded: bool,
     snapshot: Snapshot,
 }
 
@@ -115,6 +117,7 @@ impl HostInterface for Hall {
 
     fn record(&mut self, record: &CycleRecord) -> bool {
         assert!(record.axes().iter().all(|axis| axis.position_set.is_finite()), "{:?}", record.axes());
+        self.is_commanded = record.is_commanded;
         true
     }
 
@@ -265,10 +268,11 @@ impl Machine {
         let is_held = |bus| held_back.contains(bus) || disturbed == Disturbed::Late;
         let may_stop = |frame: &Frame| matches!(frame.id().value() & 0x780, 0x000 | 0x600);
         assert!(sent.iter().enumerate().all(|(bus, batch)| !is_held(bus) || batch.iter().all(may_stop)));
-        let has_commands = deadline == Deadline::Met && self.engine.phase() != Phase::Passive;
-        self.obey(&sent, before, has_commands);
         let timing = CycleTiming { slot: self.slot, ..CycleTiming::default() };
         self.engine.finish(timing, now_ns, &self.buses, &mut self.hall);
+        let has_commands = self.hall.is_commanded;
+        assert!(!has_commands || deadline == Deadline::Met);
+        self.obey(&sent, before, has_commands);
         self.watch.look(&self.engine, &self.hall.events, &self.hall.snapshot, has_commands);
         self.hall.events.clear();
         if self.hall.is_retired {
