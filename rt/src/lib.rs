@@ -1,23 +1,28 @@
 //! The real-time half of takt: everything that runs inside the real-time thread, and nothing else.
 //!
-//! This crate is `no_std` and does not link an allocator, so the loop cannot allocate. It formats nothing, takes
-//! no lock, and never panics on data from outside. It is sans-I/O: time and frames are handed in, frames are
-//! handed out; the only place that touches an operating system is `linux`, behind a feature.
+//! This crate is `no_std` and does not link an allocator, so that the loop cannot allocate. It formats nothing, takes no lock,
+//! and never panics on data from outside. It is sans-I/O: time and frames are handed in, frames are handed out. The only place
+//! that touches an operating system is `linux`, behind a feature.
 //!
-//! From the wire inwards:
+//! # The tour
+//! Read the files in this order:
 //!
-//! - [`time`], [`time_of_day`], [`frame`]: integer nanoseconds and the grid; what the drives are told the time is; CAN
-//!   frames that can only be valid.
-//! - [`port`], [`door`]: what the cycle needs from the world, and what it shares with the rest of the program, as
-//!   small traits.
-//! - [`pdo`], [`units`], [`cia402`], [`dialect`], [`profile`]: process data compiled to shifts and masks; SI to drive
-//!   units; the state machine of drives, those that speak otherwise, and those that make their own way to a target.
-//! - [`plan`], [`guard`], [`control`], [`stop`]: trajectories, the last look at every set-point, the loops closed here,
-//!   and the reasons to stop.
-//! - [`axis`], [`engine`]: one joint, and the group that moves together; [`engine::Engine::compute`] is a cycle's thinking.
-//! - [`watch`]: what is watched over time: missed slots, nodes that fall silent, two nodes with one number.
-//! - [`cycle`]: the paced loop around it: SYNC, feedback, set-points, skip and never burst.
-//! - [`record`], [`refusal`]: what each cycle leaves behind; why a request was refused.
+//! 1. `cycle`: [`Cycle::run`] is one whole cycle on one screen: SYNC, feedback, compute, encode, send.
+//! 2. `engine`: [`Engine`] is one group of axes. Its documentation has the order of calls and a program of its own;
+//!    `engine/state` has the table of phases.
+//! 3. `axis`: [`Axis`] is one joint: its set-points, where the joint is, the power of its drive.
+//! 4. `guard`: the last check of every set-point; [`AxisLimits`] is what it checks against.
+//! 5. [`plan`]: the trajectory planner, of use by itself; `group_trajectory` is what the engine makes of it.
+//! 6. `cia402`, `dialect`, `profile`, `control`, `units`, `pdo`: how a drive is spoken to: its state machine ([`DriveState`]),
+//!    deviations of a family ([`Dialect`]), the handshake of profile position, the loops closed here ([`ControlLaw`]), SI to
+//!    drive units ([`Scale`]), and PDO mappings compiled to shifts and masks ([`Mapping`]).
+//!
+//! What crosses the border of the real-time thread:
+//!
+//! - [`HostInterface`]: requests in ([`Request`]), state and records out ([`Snapshot`], [`CycleRecord`], [`Event`]);
+//! - [`BusPort`] and [`Clock`]: what the cycle needs of a bus and of time; `dispatch` finds the axis of an identifier;
+//! - [`Fault`] and [`StopReason`]: what can go wrong, and how the group stops for it; [`RejectReason`]: why a request is rejected;
+//! - [`TimingLadder`], `watch`: what is watched over time: missed slots, silent nodes, duplicate node IDs.
 #![no_std]
 #![deny(unsafe_code)]
 
@@ -54,10 +59,7 @@ mod watch;
 mod wire;
 
 pub use answers::{Answer, Answers};
-pub use axis::{
-    Axis, AxisParameters, AxisParametersError, CommandPdo, FeedbackSince, Jump, MAX_PDOS, Pdo,
-    TransmissionType,
-};
+pub use axis::{Axis, AxisParameters, AxisParametersError, CommandPdo, FeedbackSince, Jump, Pdo};
 pub use bus_set::BusSet;
 pub use cia402::{Command, DriveState, Goal, OperationMode, controlword, statusword};
 pub use control::{ControlLaw, Gain, GainError, LoopInput};
@@ -69,11 +71,12 @@ pub use engine::{
 };
 pub use fault::{Fault, Rule};
 pub use frame::{Frame, FrameError, FrameKind, Id};
-pub use guard::{AxisLimits, LimitError, OnViolation, Violation, braking_distance};
+pub use guard::{AxisLimits, LimitError, OnViolation, braking_distance};
 pub use host::{AxisSnapshot, HostInterface, Snapshot, StreamCommand};
 pub use motion_reports::{MotionReport, MotionReports, MotionState};
 pub use pdo::{
-    CommandSlot, FeedbackSlot, MAX_OBJECTS, MappedObject, Mapping, MappingError, ProcessImage, TooShort,
+    CommandSlot, FeedbackSlot, MAX_OBJECTS, MAX_PDOS, MappedObject, Mapping, MappingError, ProcessImage,
+    TooShort, TransmissionType,
 };
 pub use phase::Phase;
 pub use port::{BusHealth, BusPort, BusState, Clock, Outgoing, RECEIVE_BATCH, ReceiveBatch, Received, Wake};

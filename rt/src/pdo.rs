@@ -3,6 +3,18 @@
 
 use arrayvec::ArrayVec;
 
+/// The PDOs that a CANopen drive has in each direction here.
+pub const MAX_PDOS: usize = 4;
+
+/// When a command is sent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TransmissionType {
+    /// In every cycle of its bus.
+    EveryCycle,
+    /// When the controlword changes, and again while the drive is not enabled or is not to be.
+    OnControlword,
+}
+
 /// The most objects one PDO maps here (byte-wise mapping of classic frames).
 pub const MAX_OBJECTS: usize = 8;
 

@@ -1,10 +1,9 @@
 //! What can be asked of the group, and why it may be rejected.
 
-use crate::axis::{MAX_PDOS, TransmissionType};
 use crate::cia402::OperationMode;
 use crate::fault::Rule;
 use crate::frame::Id;
-use crate::pdo::{MAX_OBJECTS, MappedObject};
+use crate::pdo::{MAX_OBJECTS, MAX_PDOS, MappedObject, TransmissionType};
 use crate::phase::Phase;
 use crate::profile::ProfileTarget;
 use crate::record::MAX_AXES;
@@ -443,3 +442,59 @@ pub struct RequestError {
     /// What the group was doing.
     pub phase: Phase,
 }
+
+impl core::fmt::Display for RejectReason {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match *self {
+            Self::Phase => f.write_str("not possible in this phase"),
+            Self::StopLatched { rule } => {
+                write!(f, "a fault ({}) has stopped the group and must be reset first", rule.key())
+            }
+            Self::EnableInhibited => f.write_str("enabling is inhibited"),
+            Self::MissedSlots { missed, limit } => {
+                write!(f, "{missed} slots were missed of late; from {limit} on no stream begins")
+            }
+            Self::UnknownAxis { axis, axes } => write!(f, "there is no axis {axis}: there are {axes}"),
+            Self::WrongMode { mode } => write!(f, "the axis is in {mode:?}, which takes no such target"),
+            Self::NotFinite { value } => write!(f, "{value} is not a finite number"),
+            Self::PositionLimit { position, limit } => {
+                write!(f, "position {position} is beyond the limit of {limit}")
+            }
+            Self::VelocityLimit { velocity, limit } => {
+                write!(f, "velocity {velocity} is beyond the limit of {limit}")
+            }
+            Self::TorqueLimit { torque, limit } => {
+                write!(f, "torque {torque} is beyond the limit of {limit}")
+            }
+            Self::NoRoomToStop { rest, limit } => {
+                write!(f, "the axis would come to rest at {rest}, beyond its limit of {limit}")
+            }
+            Self::VelocityScale { scale } | Self::AccelerationScale { scale } => {
+                write!(f, "{scale} is not a fraction above 0 and up to 1")
+            }
+            Self::MinimumDuration { duration_s } => write!(f, "{duration_s} s is not a possible duration"),
+            Self::NoTrajectory => f.write_str("no trajectory within the limits leads there"),
+            Self::RatedTorque { torque } => write!(f, "{torque} is not a possible rated torque"),
+            Self::NoProcessData => f.write_str("there would be no PDO in one direction"),
+            Self::TooManyObjects => f.write_str("a PDO would have too many objects"),
+            Self::Mapping { object } => {
+                write!(f, "object {:04X}:{:02X} cannot be mapped", object.index, object.subindex)
+            }
+            Self::IdTaken { id } => write!(f, "identifier {id:?} is in use"),
+            Self::TooManyFrames { frames, limit } => write!(f, "{frames} frames in a cycle; {limit} fit"),
+            Self::NoTime => f.write_str("TIME is not sent"),
+        }
+    }
+}
+
+impl core::fmt::Display for RequestError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, "{:?} was rejected in phase {:?}", self.request, self.phase)?;
+        match self.axis {
+            Some(axis) => write!(f, ", axis {axis}: {}", self.reason),
+            None => write!(f, ": {}", self.reason),
+        }
+    }
+}
+
+impl core::error::Error for RequestError {}

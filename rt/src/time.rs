@@ -12,7 +12,7 @@ pub const NANOSECONDS_PER_SECOND: u64 = 1_000_000_000;
 /// The absolute time grid of the cycle.
 ///
 /// ```
-/// use takt_rt::time::Grid;
+/// use takt_rt::Grid;
 /// let grid = Grid::new(5_000, 1_000_000).unwrap();
 /// assert_eq!(grid.slot_start_ns(3), 3_005_000);
 /// assert_eq!(grid.slot_at(3_004_999), 2);

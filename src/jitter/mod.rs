@@ -1,6 +1,6 @@
 //! How evenly this machine paces the loop: `takt jitter`, and the self-test of `takt doctor`.
 //!
-//! What is measured is the loop itself ([`takt_rt::cycle`]) in its own thread, with its own clock, spin guard and
+//! What is measured is the loop itself ([`takt_rt::Cycle`]) in its own thread, with its own clock, spin guard and
 //! set-up, around an engine whose only axis stays passive: nothing is commanded. With a bus, SYNC leaves in every
 //! slot, and the bus is read as in a run.
 

@@ -1,11 +1,11 @@
 //! What is sent to the drive of an axis.
 
 use super::late_reply::SetPointSkip;
-use super::{Axis, CommandPdo, TransmissionType};
+use super::{Axis, CommandPdo};
 use crate::cia402::{Goal, controlword};
 use crate::control::{ControlLaw, LoopInput};
 use crate::frame::Frame;
-use crate::pdo::CommandSlot;
+use crate::pdo::{CommandSlot, TransmissionType};
 
 impl Axis {
     /// Writes the command of this cycle of the axis' bus: the target, and one step of the drive towards `goal`, unless another

@@ -40,7 +40,7 @@ use arrayvec::ArrayVec;
 
 use crate::cia402::DriveState;
 use crate::guard::FollowingErrorGuard;
-use crate::pdo::{CommandSlot, FeedbackSlot, ProcessImage};
+use crate::pdo::{CommandSlot, FeedbackSlot, MAX_PDOS, ProcessImage};
 use crate::record::AxisRecord;
 use crate::watch::{DuplicateNodeDetector, NodeMonitor};
 
@@ -56,9 +56,7 @@ use set_points::SetPoints;
 use stream::StreamFollower;
 
 pub use feedback::Jump;
-pub use parameters::{
-    AxisParameters, AxisParametersError, CommandPdo, FeedbackSince, MAX_PDOS, Pdo, TransmissionType,
-};
+pub use parameters::{AxisParameters, AxisParametersError, CommandPdo, FeedbackSince, Pdo};
 
 /// Cycles of its bus after which a drive has obeyed a controlword and has said so.
 const SETTLED_CYCLES: u32 = 4;

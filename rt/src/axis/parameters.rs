@@ -6,11 +6,8 @@ use crate::control::{ControlLaw, GainError};
 use crate::dialect::Dialect;
 use crate::frame::Id;
 use crate::guard::{AxisLimits, LimitError, OnViolation};
-use crate::pdo::Mapping;
+use crate::pdo::{MAX_PDOS, Mapping, TransmissionType};
 use crate::units::Scale;
-
-/// The PDOs that a CANopen drive has in each direction here.
-pub const MAX_PDOS: usize = 4;
 
 /// A PDO: its identifier and its compiled mapping.
 #[derive(Clone, Debug, PartialEq)]
@@ -19,15 +16,6 @@ pub struct Pdo {
     pub id: Id,
     /// What it carries.
     pub mapping: Mapping,
-}
-
-/// When a command is sent.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum TransmissionType {
-    /// In every cycle of its bus.
-    EveryCycle,
-    /// When the controlword changes, and again while the drive is not enabled or is not to be.
-    OnControlword,
 }
 
 /// A PDO that is sent to the drive.

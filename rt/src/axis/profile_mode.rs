@@ -3,8 +3,7 @@
 use super::Axis;
 use crate::control::ControlLaw;
 use crate::dialect::Dialect;
-use crate::fault::Rule;
-use crate::guard::Violation;
+use crate::fault::Fault;
 use crate::plan::State;
 use crate::profile::{ProfileCommand, ProfileTarget};
 use crate::time::Nanoseconds;
@@ -235,25 +234,17 @@ impl Axis {
 
     /// Watches what the drive makes of its target, since no set-point passes the guard: the joint must be able to come
     /// to rest before a position limit, and keep to its velocity limit.
-    pub fn check_profile(&self) -> Result<(), Violation> {
+    pub fn check_profile(&self) -> Result<(), Fault> {
         let limits = &self.parameters.limits;
         if !self.is_profile() || self.feedback_age() > 0 {
             return Ok(());
         }
         if self.velocity().abs() > VELOCITY_OVERSHOOT * limits.velocity {
-            return Err(Violation {
-                rule: Rule::VelocityLimit,
-                value: self.velocity(),
-                limit: limits.velocity,
-            });
+            return Err(Fault::VelocityLimit { velocity: self.velocity(), limit: limits.velocity });
         }
         if self.profile.is_stalled(self.parameters.following_error_cycles) {
             let value = self.shown_set_point().position - self.position();
-            return Err(Violation {
-                rule: Rule::FollowingError,
-                value,
-                limit: self.parameters.following_error_limit,
-            });
+            return Err(Fault::FollowingError { error: value, limit: self.parameters.following_error_limit });
         }
         if !self.is_moving_on_command() && !self.is_coasting() {
             return Ok(());
@@ -262,7 +253,7 @@ impl Axis {
         let rest = self.position() + distance;
         let limit = if distance > 0.0 { limits.position_max } else { limits.position_min };
         let is_beyond = (distance > 0.0 && rest > limit) || (distance < 0.0 && rest < limit);
-        if is_beyond { Err(Violation { rule: Rule::PositionLimit, value: rest, limit }) } else { Ok(()) }
+        if is_beyond { Err(Fault::PositionLimit { position: rest, limit }) } else { Ok(()) }
     }
 
     /// What is shown as the set-point of an axis in a profile mode.

@@ -3,8 +3,8 @@
 use super::Axis;
 use super::delay::SetPointDelay;
 use super::power::Power;
-use crate::fault::Rule;
-use crate::guard::{self, SetPointSteps, Violation};
+use crate::fault::Fault;
+use crate::guard::{self, SetPointSteps};
 use crate::plan::State;
 
 /// The set-points of an axis, on their way from the source to the drive.
@@ -145,13 +145,13 @@ impl Axis {
     }
 
     /// Checks the next set-point against the guard.
-    pub fn check(&self, next: &State, period_s: f64) -> Result<(), Violation> {
+    pub fn check(&self, next: &State, period_s: f64) -> Result<(), Fault> {
         let [last, before_last, _] = self.set_points.positions();
         guard::check(&self.parameters.limits, period_s, before_last, last, next)
     }
 
     /// Checks the next set-point of a stream, beyond [`Axis::check`].
-    pub fn check_stream(&self, next: &State, period_s: f64) -> Result<(), Violation> {
+    pub fn check_stream(&self, next: &State, period_s: f64) -> Result<(), Fault> {
         let limits = &self.parameters.limits;
         guard::check_jerk(limits.jerk, &self.steps(next, period_s))?;
         guard::check_braking(limits, &self.steps(next, period_s))
@@ -186,18 +186,14 @@ impl Axis {
     }
 
     /// Checks that a stream begins where the joint is. What is no number is left to [`Axis::check`].
-    pub fn check_start(&self, first: &State) -> Result<(), Violation> {
+    pub fn check_start(&self, first: &State) -> Result<(), Fault> {
         let (distance, limit) =
             ((first.position - self.joint.position()).abs(), self.parameters.start_tolerance);
-        if distance > limit {
-            Err(Violation { rule: Rule::StartPose, value: distance, limit })
-        } else {
-            Ok(())
-        }
+        if distance > limit { Err(Fault::StartPose { distance, limit }) } else { Ok(()) }
     }
 
     /// Checks for how long the following error has been too large, if there is feedback of this cycle. [`Axis::watch`] counts.
-    pub fn check_following(&self) -> Result<(), Violation> {
+    pub fn check_following(&self) -> Result<(), Fault> {
         if self.feedback_age() > 0 { Ok(()) } else { self.following.check() }
     }
 

@@ -1,9 +1,9 @@
 //! The set-points of a stream: its commands where they come and fit, and otherwise the motion that they show.
 
 use super::Axis;
-use crate::fault::Rule;
+use crate::fault::Fault;
 use crate::group_trajectory::stop_limits;
-use crate::guard::{StreamCommands, Violation};
+use crate::guard::StreamCommands;
 use crate::plan::{Problem, State};
 
 /// Steps before a set-point in its third difference.
@@ -54,7 +54,7 @@ impl Axis {
     ///
     /// # Errors
     /// The limit that the stream breaks.
-    pub fn streamed(&mut self, command: Option<&State>, period_s: f64) -> Result<State, Violation> {
+    pub fn streamed(&mut self, command: Option<&State>, period_s: f64) -> Result<State, Fault> {
         self.stream.commands.pass();
         let Some(command) = command else {
             return self.follow_motion(period_s);
@@ -68,10 +68,10 @@ impl Axis {
                 self.stream.following = Following::Commands;
                 return Ok(self.agreeing(command, period_s));
             }
-            (Err(violation), following)
-                if following == Following::Commands || violation.rule == Rule::NotFinite =>
+            (Err(fault), following)
+                if following == Following::Commands || matches!(fault, Fault::NotFinite { .. }) =>
             {
-                return Err(violation);
+                return Err(fault);
             }
             _ => self.stream.commands.check(&self.parameters.limits, period_s)?,
         }
@@ -90,13 +90,13 @@ impl Axis {
                 };
                 Ok(State { position: command.position, ..next })
             }
-            Err(violation) if distance > self.parameters.start_tolerance => Err(violation),
+            Err(fault) if distance > self.parameters.start_tolerance => Err(fault),
             _ => Ok(next),
         }
     }
 
     /// The next set-point on the way to the motion that the commands of a stream show.
-    fn follow_motion(&mut self, period_s: f64) -> Result<State, Violation> {
+    fn follow_motion(&mut self, period_s: f64) -> Result<State, Fault> {
         let limits = &self.parameters.limits;
         let start = match self.stream.following {
             Following::Motion { .. } => self.set_points.newest(),
@@ -113,8 +113,7 @@ impl Axis {
             None => {
                 let target = State { acceleration: 0.0, ..motion.after(-period_s).state };
                 let problem = Problem { start, target, limits: stop_limits(&start, limits) };
-                let untracked =
-                    |_| Violation { rule: Rule::NoTrajectory, value: target.position, limit: 0.0 };
+                let untracked = |_| Fault::NoTrajectory;
                 problem.track(period_s).map_err(untracked)?
             }
         };

@@ -296,6 +296,6 @@ impl AxisCheck {
             return Some(Fault::NotAcknowledged { cycles, limit });
         }
         let checked = axis.check_following().and_then(|()| axis.check_profile());
-        checked.err().map(Fault::from)
+        checked.err()
     }
 }

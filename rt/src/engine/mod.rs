@@ -183,9 +183,11 @@ pub enum Deadline {
 ///     let mut batch = SendBatch::new();
 ///     engine.encode(0, Deadline::Met, &mut host, &mut batch);
 ///     // It obeys the controlword, the first two bytes of its command.
-///     if let Some([0x0F, ..]) = batch.first().map(Frame::payload) {
-///         statusword = 0x0237; // operation enabled
-///     }
+///     statusword = match batch.first().map(Frame::payload) {
+///         Some([0x07, ..]) => 0x0233, // switched on
+///         Some([0x0F, ..]) => 0x0237, // operation enabled
+///         _ => statusword,
+///     };
 ///     let timing = CycleTiming { slot, ..CycleTiming::default() };
 ///     engine.finish(timing, now_ns, &buses, &mut host);
 /// }

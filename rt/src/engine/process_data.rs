@@ -5,9 +5,9 @@ use arrayvec::ArrayVec;
 use super::parameters::OTHER_FRAMES;
 use super::targets::Rejection;
 use super::{Engine, SEND_BATCH};
-use crate::axis::{CommandPdo, MAX_PDOS, Pdo};
+use crate::axis::{CommandPdo, Pdo};
 use crate::dispatch::IdTaken;
-use crate::pdo::{MAX_OBJECTS, MappedObject, Mapping, MappingError};
+use crate::pdo::{MAX_OBJECTS, MAX_PDOS, MappedObject, Mapping, MappingError};
 use crate::phase::Phase;
 use crate::request::{AxisProcessData, MappedPdo, RejectReason};
 

@@ -9,7 +9,7 @@ use super::state::{GroupState, PowerRemoval, Stream};
 use super::{Commands, Engine};
 use crate::axis::{Axis, FeedbackSince};
 use crate::fault::Fault;
-use crate::guard::{OnViolation, Violation};
+use crate::guard::OnViolation;
 use crate::host::StreamCommand;
 use crate::motion_reports::MotionState;
 use crate::plan::State;
@@ -194,18 +194,18 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
     }
 
     fn check(&self, next: &[State]) -> Result<(), Failure> {
-        self.first_violation(next, |axis, state| axis.check(state, self.period_s))
+        self.first_fault(next, |axis, state| axis.check(state, self.period_s))
     }
 
     /// The first axis that follows set-points and whose next one does not pass a check.
-    fn first_violation(
+    fn first_fault(
         &self,
         next: &[State],
-        check: impl Fn(&Axis, &State) -> Result<(), Violation>,
+        check: impl Fn(&Axis, &State) -> Result<(), Fault>,
     ) -> Result<(), Failure> {
         for (index, (axis, state)) in self.axes.iter().zip(next).enumerate() {
             if axis.is_enabled() && !axis.is_profile() {
-                check(axis, state).map_err(|violation| (Origin::Axis(index as u8), violation.into()))?;
+                check(axis, state).map_err(|fault| (Origin::Axis(index as u8), fault))?;
             }
         }
         Ok(())
@@ -269,7 +269,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
             return Err((Origin::Group, Fault::StaleCommand { age_cycles }));
         }
         if matches!(stream, Stream::Begins(_)) {
-            self.first_violation(&command.set_points, Axis::check_start)?;
+            self.first_fault(&command.set_points, Axis::check_start)?;
         }
         let next = self.streamed(&command.set_points, is_new)?;
         self.check(&next)?;
@@ -304,8 +304,8 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
                     self.snapshot.clamped += 1;
                     axis.clamped(command, period_s)
                 }
-                (Err(violation), OnViolation::Reject) => {
-                    return Err((Origin::Axis(index as u8), violation.into()));
+                (Err(fault), OnViolation::Reject) => {
+                    return Err((Origin::Axis(index as u8), fault));
                 }
             });
         }

@@ -1,8 +1,8 @@
 //! The last commands of a stream for one axis, judged as what they are: samples of its owner's motion, with gaps between them.
 
 use super::stream::ROUNDINGS;
-use super::{AxisLimits, TOLERANCE, Violation};
-use crate::fault::Rule;
+use super::{AxisLimits, TOLERANCE};
+use crate::fault::Fault;
 use crate::plan::{self, Limits, Problem, State};
 
 /// How many are kept: a third difference needs four.
@@ -17,6 +17,14 @@ const KEPT: usize = 4;
 pub struct StreamCommands {
     positions: [f64; KEPT],
     ages: [u32; KEPT],
+}
+
+/// Which mean of the stream's motion a divided difference stands for.
+#[derive(Clone, Copy)]
+enum Difference {
+    Velocity,
+    Acceleration,
+    Jerk,
 }
 
 /// Divided differences of the last commands, from the velocity to the jerk divided by 3!, and the spans between them.
@@ -66,7 +74,7 @@ impl StreamCommands {
     ///
     /// # Errors
     /// The first limit that they break.
-    pub fn check(&self, limits: &AxisLimits, period_s: f64) -> Result<(), Violation> {
+    pub fn check(&self, limits: &AxisLimits, period_s: f64) -> Result<(), Fault> {
         let [position, last, ..] = self.positions;
         let room = TOLERANCE * (limits.position_max - limits.position_min);
         for (limit, is_deeper) in [
@@ -74,7 +82,7 @@ impl StreamCommands {
             (limits.position_min, position < limits.position_min - room && position < last),
         ] {
             if is_deeper {
-                return Err(Violation { rule: Rule::PositionLimit, value: position, limit });
+                return Err(Fault::PositionLimit { position, limit });
             }
         }
         let Differences { first, second, third, spans_s: [nearest_s, middle_s, farthest_s] } =
@@ -83,14 +91,18 @@ impl StreamCommands {
         let shortest_s = middle_s.min(farthest_s - nearest_s);
         let steepest = limits.acceleration.max(limits.deceleration);
         let checks = [
-            (Rule::VelocityLimit, first, limits.velocity, noise),
-            (Rule::AccelerationLimit, 2.0 * second, steepest, noise / shortest_s),
-            (Rule::JerkLimit, 6.0 * third, limits.jerk, noise / shortest_s / farthest_s * 6.0),
+            (Difference::Velocity, first, limits.velocity, noise),
+            (Difference::Acceleration, 2.0 * second, steepest, noise / shortest_s),
+            (Difference::Jerk, 6.0 * third, limits.jerk, noise / shortest_s / farthest_s * 6.0),
         ];
-        for (rule, value, limit, noise) in checks {
+        for (of, value, limit, noise) in checks {
             // Not a number is beyond every limit.
             if value.is_nan() || value.abs() > limit * (1.0 + TOLERANCE) + noise {
-                return Err(Violation { rule, value, limit });
+                return Err(match of {
+                    Difference::Velocity => Fault::VelocityLimit { velocity: value, limit },
+                    Difference::Acceleration => Fault::AccelerationLimit { acceleration: value, limit },
+                    Difference::Jerk => Fault::JerkLimit { jerk: value, limit },
+                });
             }
         }
         Ok(())

@@ -1,7 +1,6 @@
 //! For how long a joint has been too far from its set-point.
 
-use super::Violation;
-use crate::fault::Rule;
+use crate::fault::Fault;
 
 /// The following error of a joint, and for how long it has been too large.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,9 +34,9 @@ impl FollowingErrorGuard {
     }
 
     /// Whether the error has been too large for too long.
-    pub fn check(&self) -> Result<(), Violation> {
+    pub fn check(&self) -> Result<(), Fault> {
         if self.cycles > self.allowed_cycles {
-            return Err(Violation { rule: Rule::FollowingError, value: self.error, limit: self.limit });
+            return Err(Fault::FollowingError { error: self.error, limit: self.limit });
         }
         Ok(())
     }
@@ -75,7 +74,7 @@ mod tests {
         for _ in 0..3 {
             assert_eq!(take(0.2), Ok(()));
         }
-        assert_eq!(take(0.2), Err(Violation { rule: Rule::FollowingError, value: 0.2, limit: 0.1 }));
+        assert_eq!(take(0.2), Err(Fault::FollowingError { error: 0.2, limit: 0.1 }));
         guard.restart();
         assert_eq!((guard.check(), guard.error()), (Ok(()), 0.2));
     }

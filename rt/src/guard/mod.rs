@@ -7,7 +7,7 @@ mod planned;
 mod stopping_bound;
 mod stream;
 
-use crate::fault::{Fault, Rule};
+use crate::fault::Fault;
 use crate::plan::State;
 
 pub use commands::StreamCommands;
@@ -129,23 +129,6 @@ impl AxisLimits {
     }
 }
 
-/// A set-point that would have broken a rule.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Violation {
-    /// Which rule.
-    pub rule: Rule,
-    /// What was asked for, in the unit of the rule.
-    pub value: f64,
-    /// What is allowed.
-    pub limit: f64,
-}
-
-impl From<Violation> for Fault {
-    fn from(Violation { rule, value, limit }: Violation) -> Self {
-        Self::from_numbers(rule, value, limit).unwrap_or(Self::NoTrajectory)
-    }
-}
-
 /// Room for the rounding of floating-point differences, relative to the limit.
 const TOLERANCE: f64 = 1e-6;
 
@@ -159,9 +142,9 @@ pub fn check(
     before_last: f64,
     last: f64,
     next: &State,
-) -> Result<(), Violation> {
+) -> Result<(), Fault> {
     if !(next.position.is_finite() && next.velocity.is_finite() && next.acceleration.is_finite()) {
-        return Err(Violation { rule: Rule::NotFinite, value: next.position, limit: 0.0 });
+        return Err(Fault::NotFinite { position: next.position });
     }
     let room = TOLERANCE * (limits.position_max - limits.position_min);
     for (limit, beyond, deeper) in [
@@ -169,12 +152,12 @@ pub fn check(
         (limits.position_min, next.position < limits.position_min - room, next.position < last),
     ] {
         if beyond && deeper {
-            return Err(Violation { rule: Rule::PositionLimit, value: next.position, limit });
+            return Err(Fault::PositionLimit { position: next.position, limit });
         }
     }
     let velocity = (next.position - last) / period_s;
     if velocity.abs() > limits.velocity * (1.0 + TOLERANCE) {
-        return Err(Violation { rule: Rule::VelocityLimit, value: velocity, limit: limits.velocity });
+        return Err(Fault::VelocityLimit { velocity, limit: limits.velocity });
     }
     let last_velocity = (last - before_last) / period_s;
     let acceleration = (velocity - last_velocity) / period_s;
@@ -183,7 +166,7 @@ pub fn check(
     // turns into visible acceleration.
     let noise = 4.0 * f64::EPSILON * (1.0 + next.position.abs()) / (period_s * period_s);
     if acceleration.abs() > limit * (1.0 + TOLERANCE) + noise {
-        return Err(Violation { rule: Rule::AccelerationLimit, value: acceleration, limit });
+        return Err(Fault::AccelerationLimit { acceleration, limit });
     }
     Ok(())
 }
@@ -191,6 +174,7 @@ pub fn check(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fault::Rule;
     use proptest::prelude::*;
 
     const LIMITS: AxisLimits = AxisLimits {
@@ -209,7 +193,7 @@ mod tests {
     }
 
     fn rule(before_last: f64, last: f64, next: State) -> Option<Rule> {
-        check(&LIMITS, PERIOD_S, before_last, last, &next).err().map(|violation| violation.rule)
+        check(&LIMITS, PERIOD_S, before_last, last, &next).err().map(|fault| fault.rule())
     }
 
     #[test]

@@ -8,9 +8,8 @@ use std::vec::Vec;
 
 use proptest::prelude::*;
 
-use super::{
-    AxisLimits, SetPointSteps, TOLERANCE, Violation, braking_distance, check, check_braking, check_jerk,
-};
+use super::{AxisLimits, SetPointSteps, TOLERANCE, braking_distance, check, check_braking, check_jerk};
+use crate::fault::Fault;
 use crate::group_trajectory::{GroupTrajectory, Leg};
 use crate::plan::State;
 
@@ -26,12 +25,12 @@ impl Stream {
         Self { sent: [position; 3], limits, period_s }
     }
 
-    fn check(&self, next: f64) -> Result<(), Violation> {
+    fn check(&self, next: f64) -> Result<(), Fault> {
         self.check_steps(next)?;
         check_braking(&self.limits, &self.steps(next))
     }
 
-    fn check_steps(&self, next: f64) -> Result<(), Violation> {
+    fn check_steps(&self, next: f64) -> Result<(), Fault> {
         let state = State { position: next, ..State::default() };
         check(&self.limits, self.period_s, self.sent[1], self.sent[0], &state)?;
         check_jerk(self.limits.jerk, &self.steps(next))

@@ -2,8 +2,8 @@
 //! known.
 
 use super::stopping_bound::StoppingBound;
-use super::{AxisLimits, TOLERANCE, Violation};
-use crate::fault::Rule;
+use super::{AxisLimits, TOLERANCE};
+use crate::fault::Fault;
 use crate::plan::State;
 
 /// By how much a position may be off, relative to it or to 1 rad: whoever samples a trajectory adds up times and evaluates
@@ -138,21 +138,16 @@ impl<'a> Direction<'a> {
     }
 
     /// Checks that they can be kept, but for the tolerance.
-    fn check(&self) -> Result<(), Violation> {
+    fn check(&self) -> Result<(), Fault> {
         let bound = StoppingBound::of(&self.steps.braked_end(self.limits), self.limits);
         let fastest = self.limits.velocity;
         if bound.velocity > fastest * (1.0 + BRAKING_TOLERANCE) + self.steps.noise(1) {
-            return Err(Violation {
-                rule: Rule::VelocityLimit,
-                value: self.sign * bound.velocity,
-                limit: fastest,
-            });
+            return Err(Fault::VelocityLimit { velocity: self.sign * bound.velocity, limit: fastest });
         }
         let room = BRAKING_TOLERANCE * (self.limits.position_max - self.limits.position_min);
         if bound.position > (self.farthest + room).max(self.steps.next) + self.steps.noise(0) {
-            return Err(Violation {
-                rule: Rule::PositionLimit,
-                value: self.sign * bound.position,
+            return Err(Fault::PositionLimit {
+                position: self.sign * bound.position,
                 limit: self.sign * self.farthest,
             });
         }
@@ -161,10 +156,10 @@ impl<'a> Direction<'a> {
 }
 
 /// Checks that a jerk limit is kept.
-pub fn check_jerk(limit: f64, steps: &SetPointSteps) -> Result<(), Violation> {
+pub fn check_jerk(limit: f64, steps: &SetPointSteps) -> Result<(), Fault> {
     let jerk = steps.jerk();
     if jerk.abs() > limit * (1.0 + TOLERANCE) + steps.noise(3) {
-        return Err(Violation { rule: Rule::JerkLimit, value: jerk, limit });
+        return Err(Fault::JerkLimit { jerk, limit });
     }
     Ok(())
 }
@@ -174,7 +169,7 @@ pub fn check_jerk(limit: f64, steps: &SetPointSteps) -> Result<(), Violation> {
 /// What can is let pass: every motion within the limits, sampled once a period. What cannot is refused: whatever passes can
 /// be stopped from [`SetPointSteps::state`] with all of its steps within the limits, but for the tolerance that every check of the
 /// guard has for rounding, a millionth of the limit (of the range of positions).
-pub fn check_braking(limits: &AxisLimits, steps: &SetPointSteps) -> Result<(), Violation> {
+pub fn check_braking(limits: &AxisLimits, steps: &SetPointSteps) -> Result<(), Fault> {
     Direction::both(steps, limits).try_for_each(|direction| direction.check())
 }
 
@@ -257,9 +252,10 @@ mod tests {
     fn a_stream_must_leave_room_to_stop_before_the_limit() {
         // 2 rad/s at 20 rad/s² take 0.1 rad; the joint has been braked for half a step in which it has lost 0.01 rad/s.
         assert_eq!(check_braking(&LIMITS, &moving_at(1.9, 2.0)), Ok(()));
-        let violation = check_braking(&LIMITS, &moving_at(1.91, 2.0)).unwrap_err();
-        assert_eq!((violation.rule, violation.limit), (Rule::PositionLimit, 2.0));
-        assert!((violation.value - (1.91 + 1.99 * 1.99 / 40.0)).abs() < 1e-9);
+        let fault = check_braking(&LIMITS, &moving_at(1.91, 2.0)).unwrap_err();
+        let Fault::PositionLimit { position, limit } = fault else { panic!("{fault:?}") };
+        assert_eq!(limit, 2.0);
+        assert!((position - (1.91 + 1.99 * 1.99 / 40.0)).abs() < 1e-9);
         assert_eq!(check_braking(&LIMITS, &moving_at(1.99, -2.0)), Ok(()));
         assert!(check_braking(&LIMITS, &moving_at(-0.95, -2.0)).is_err());
     }
@@ -268,7 +264,7 @@ mod tests {
     fn jerk_is_the_third_difference() {
         let third = |jerk: f64| SetPointSteps { next: jerk * PERIOD_S.powi(3), ..moving_at(0.0, 0.0) };
         assert_eq!(check_jerk(100.0, &third(99.0)), Ok(()));
-        assert_eq!(check_jerk(100.0, &third(101.0)).unwrap_err().rule, Rule::JerkLimit);
+        assert!(matches!(check_jerk(100.0, &third(101.0)), Err(Fault::JerkLimit { .. })));
     }
 
     proptest! {
