@@ -44,6 +44,13 @@ struct Clog {
     cycles: u64,
 }
 
+impl Clog {
+    /// Whether the queue is stuck in this cycle.
+    fn is_on(self, cycle: u64) -> bool {
+        (self.from_cycle..self.from_cycle.saturating_add(self.cycles)).contains(&cycle)
+    }
+}
+
 #[derive(Clone, Copy)]
 enum Kind {
     SlowComputing,
@@ -112,15 +119,11 @@ impl Overload {
             run.clock().be_late(ns);
             concerns.miss_every_slot(now_ns);
         }
-        for clog in &self.clogs {
-            let port = &mut run.ports()[clog.bus];
-            if cycle == clog.from_cycle {
-                port.is_clogged = true;
-                concerns.clog(clog.bus, now_ns, clog.cycles == FOR_EVER);
-            }
-            if cycle == clog.from_cycle.saturating_add(clog.cycles) {
-                port.is_clogged = false;
-            }
+        for clog in self.clogs.iter().filter(|clog| cycle == clog.from_cycle) {
+            concerns.clog(clog.bus, now_ns, clog.cycles == FOR_EVER);
+        }
+        for (bus, port) in run.ports().iter_mut().enumerate() {
+            port.is_clogged = self.clogs.iter().any(|clog| clog.bus == bus && clog.is_on(cycle));
         }
     }
 }

@@ -55,8 +55,8 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
             _ => Commands::Made,
         };
         if must_wait || is_held {
-            // Drives may have obeyed what was said by SDO. Their set-points go no further.
-            return self.end_disabling(false);
+            // Drives may have obeyed what was said by SDO.
+            return self.end_disabling();
         }
         for _ in 0..ATTEMPTS {
             match self.step_phase() {
@@ -79,7 +79,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
             GroupState::Stopping => self.step_stop()?,
             GroupState::Disabling(_) => {
                 self.come_to_rest();
-                self.end_disabling(!self.motion.is_finished());
+                self.end_disabling();
             }
         }
         Ok(())
@@ -228,11 +228,13 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
     }
 
     /// Ends the disabling when no drive is waited for any more. A drive that does not show that it has obeyed is not waited
-    /// for without end. `is_on_way` tells whether set-points still go on to rest.
-    fn end_disabling(&mut self, is_on_way: bool) {
+    /// for without end; nor are set-points that cannot leave because the thread is always late.
+    fn end_disabling(&mut self) {
         if !matches!(self.state, GroupState::Disabling(_)) {
             return;
         }
+        let is_always_late = self.slots.late_cycles > self.not_transmitted_cycles;
+        let is_on_way = !self.motion.is_finished() && !is_always_late;
         let is_patient = is_on_way || self.state_cycles <= self.enable_timeout_cycles;
         // A drive that says nothing has either received what it was told, or has missed the heartbeats for so long that it has
         // stopped by itself. One that PDOs do not reach is told by SDO.
