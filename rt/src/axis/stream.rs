@@ -4,7 +4,7 @@ use super::Axis;
 use crate::fault::Fault;
 use crate::group_trajectory::stop_limits;
 use crate::guard::StreamCommands;
-use crate::plan::{Problem, State};
+use crate::plan::{self, Limits, Problem, Profile, State};
 
 /// Steps before a set-point in its third difference.
 const STEPS_OF_JERK: u8 = 3;
@@ -113,8 +113,11 @@ impl Axis {
             None => {
                 let target = State { acceleration: 0.0, ..motion.after(-period_s).state };
                 let problem = Problem { start, target, limits: stop_limits(&start, limits) };
-                let untracked = |_| Fault::NoTrajectory;
-                problem.track(period_s).map_err(untracked)?
+                match problem.track(period_s).ok().filter(is_within) {
+                    Some(next) => next,
+                    // Whatever was sent before could be stopped within the limits from there.
+                    None => stopped(&start, &problem.limits, period_s)?,
+                }
             }
         };
         self.stream.following = Following::Motion { met: 0 };
@@ -127,5 +130,14 @@ impl Axis {
         let limits = &self.parameters.limits;
         let steepest = limits.acceleration.max(limits.deceleration);
         MET_SHARE * (limits.jerk * period_s).min(steepest) * period_s * period_s
+    }
+}
+
+/// The first set-point of the shortest stop.
+fn stopped(start: &State, limits: &Limits, period_s: f64) -> Result<State, Fault> {
+    let mut stop = [Profile::hold(start.position)];
+    match plan::stop(&[*start], &[*limits], &mut stop) {
+        Ok(_) => Ok(stop.map(|profile| profile.sample(period_s))[0]),
+        Err(_) => Err(Fault::NoTrajectory),
     }
 }
