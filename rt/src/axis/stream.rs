@@ -3,7 +3,7 @@
 use super::Axis;
 use crate::fault::Fault;
 use crate::group_trajectory::stop_limits;
-use crate::guard::StreamCommands;
+use crate::guard::{StreamCommands, braking_distance};
 use crate::plan::{self, Limits, Problem, Profile, State};
 
 /// Steps before a set-point in its third difference.
@@ -103,8 +103,17 @@ impl Axis {
             Following::Commands | Following::Awaited => self.state_by_steps(period_s),
         };
         let motion = self.stream.commands.motion(period_s, limits);
+        // What is planned here is known to its acceleration, and must be possible to stop from that.
+        let can_stop = |next: &State| {
+            let (position, velocity, acceleration) = (next.position, next.velocity, next.acceleration);
+            let highest = position + braking_distance(limits, velocity, acceleration);
+            let lowest = position - braking_distance(limits, -velocity, -acceleration);
+            highest <= limits.position_max.max(start.position)
+                && lowest >= limits.position_min.min(start.position)
+        };
         let is_within = |next: &State| {
-            self.check(next, period_s).and_then(|()| self.check_stream(next, period_s)).is_ok()
+            can_stop(next)
+                && self.check(next, period_s).and_then(|()| self.check_stream(next, period_s)).is_ok()
         };
         let met = motion.meet(&start, limits, period_s).filter(is_within);
         let next = match met {
