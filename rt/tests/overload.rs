@@ -169,3 +169,15 @@ fn a_command_that_was_written_before_the_stream_was_asked_for_begins_it_wherever
         assert_eq!(rig.stops()[0].rule(), Rule::StaleCommand, "it has begun, and it expires");
     }
 }
+
+#[test]
+fn slots_that_were_missed_before_enabling_do_not_make_it_fail() {
+    let mut rig = Rig::new(3);
+    rig.host.requests.extend([Request::Sync(true), Request::Activate]);
+    rig.run(5);
+    rig.clock.lateness_ns.push_back(600 * PERIOD_NS);
+    rig.host.requests.push_back(Request::Enable);
+    rig.run_until(Phase::Holding, 60);
+    assert_eq!(rig.stops(), []);
+    assert_eq!(rig.host.snapshot.timing, takt_rt::TimingLevel::Normal);
+}
