@@ -50,6 +50,7 @@ mod port;
 mod profile;
 mod record;
 mod request;
+mod source;
 mod stop;
 mod stop_category;
 mod time;
@@ -85,6 +86,10 @@ pub use record::{AxisRecord, CycleRecord, CycleTiming, Event, EventKind, MAX_AXE
 pub use request::{
     AxisProcessData, MappedPdo, Move, ProfileMove, RejectReason, Request, RequestEnvelope, RequestError,
     RequestId, RequestKind,
+};
+pub use source::{
+    AxisPoint, AxisTarget, Follow, LookAhead, LookAheadParameters, POINTS_AT_MOST, PointError, PointRole, StreamCounts, StreamDelay,
+    StreamPoint, StreamSample, StreamState, StreamWish, follow,
 };
 pub use stop::{Origin, StopCategories, StopCause, StopReason};
 pub use stop_category::StopCategory;

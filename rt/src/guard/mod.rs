@@ -90,6 +90,17 @@ impl core::fmt::Display for LimitError {
 }
 
 impl AxisLimits {
+    /// No limit at all. No axis may have these; they are for what is not to be limited before it is checked.
+    pub const NONE: Self = Self {
+        position_min: f64::NEG_INFINITY,
+        position_max: f64::INFINITY,
+        velocity: f64::INFINITY,
+        acceleration: f64::INFINITY,
+        deceleration: f64::INFINITY,
+        jerk: f64::INFINITY,
+        torque: f64::INFINITY,
+    };
+
     /// Checks that every limit is a number that can be kept.
     pub fn validate(&self) -> Result<(), LimitError> {
         let positive = |value: f64| value > 0.0 && value.is_finite();
