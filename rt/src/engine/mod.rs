@@ -29,6 +29,7 @@ mod slots;
 mod state;
 mod step;
 mod targets;
+mod unsent_steps;
 
 use arrayvec::ArrayVec;
 
@@ -50,6 +51,7 @@ use outbox::Outbox;
 use parameters::{axes_of, dispatch_of};
 use slots::SlotWatch;
 use state::GroupState;
+use unsent_steps::UnsentSteps;
 
 pub use parameters::{BusParameters, CycleCount, EngineParameters, Heartbeat, SetUpError};
 pub use sense::Receiver;
@@ -216,6 +218,7 @@ pub struct Engine<const AXES: usize = MAX_AXES, const BUSES: usize = MAX_BUSES> 
     /// Cycles of a fault reset that are still to come.
     fault_reset_cycles: u32,
     commands: Commands,
+    unsent: UnsentSteps<BUSES>,
     /// Whether the commands of this cycle were ready in time, as far as is known.
     deadline: Deadline,
     requested: Requested,
@@ -248,8 +251,6 @@ enum Commands {
     None,
     /// They are to leave with this cycle.
     Made,
-    /// They were made in an earlier cycle, and were ready too late. They leave with the next one, in place of new ones.
-    Held,
 }
 
 /// What was asked for that no later request takes back.
@@ -303,6 +304,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
             stop: None,
             fault_reset_cycles: 0,
             commands: Commands::None,
+            unsent: UnsentSteps::default(),
             deadline: Deadline::Met,
             requested: Requested::default(),
             now_ns: 0,
@@ -400,9 +402,6 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         self.dropped += u64::from(!host.record(&self.record));
         self.show(timing.slot, now_ns, buses);
         host.publish(&self.snapshot);
-        if is_late && self.commands == Commands::Made {
-            self.commands = Commands::Held;
-        }
     }
 
     fn show(&mut self, slot: u64, now_ns: Nanoseconds, buses: &[BusHealth]) {
