@@ -134,6 +134,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
         if !self.shared.buses.get(bus).is_some_and(|bus| has_cycle(bus, slot)) {
             return;
         }
+        self.group.unsent.clear(bus);
         for axis in self.axes.iter_mut().filter(|axis| usize::from(axis.parameters().bus) == bus) {
             axis.command(self.group.goal_of(axis, self.shared), self.group.fault_reset_word(axis));
             let lost = axis.frames().filter(|frame| batch.try_push(*frame).is_err()).count();
@@ -142,12 +143,12 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
     }
 }
 
-impl<const AXES: usize> Group<AXES> {
+impl<const AXES: usize, const BUSES: usize> Group<AXES, BUSES> {
     /// Where a drive is led in this cycle.
     ///
     /// A drive that falls out of operation enabled is not enabled again by what the others are still to do. None is enabled
     /// before its joint is at rest with its target there, nor before it watches the controller by the heartbeat.
-    fn goal_of<const BUSES: usize>(&self, axis: &Axis, shared: &Shared<AXES, BUSES>) -> Goal {
+    fn goal_of(&self, axis: &Axis, shared: &Shared<AXES, BUSES>) -> Goal {
         let goal = self.state.goal();
         let is_shutting_down = self.state == GroupState::Disabling(PowerRemoval::Shutdown);
         if is_shutting_down && axis.must_quick_stop() {

@@ -4,6 +4,7 @@ use core::ops::Range;
 
 use super::shared::Shared;
 use super::state::GroupState;
+use super::unsent_steps::UnsentSteps;
 use crate::axis::Axis;
 use crate::bus_set::BusSet;
 use crate::group_trajectory::{GroupTrajectory, Profiles};
@@ -12,7 +13,7 @@ use crate::stop::StopReason;
 
 /// What belongs to one group.
 #[derive(Clone, Debug)]
-pub(super) struct Group<const AXES: usize> {
+pub(super) struct Group<const AXES: usize, const BUSES: usize> {
     /// Where its axes stand among those of the engine, which has them beside each other.
     pub(super) places: Range<usize>,
     /// The buses that concern it.
@@ -27,6 +28,7 @@ pub(super) struct Group<const AXES: usize> {
     /// Cycles of a fault reset that are still to come.
     pub(super) fault_reset_cycles: u32,
     pub(super) commands: Commands,
+    pub(super) unsent: UnsentSteps<BUSES>,
 }
 
 /// What becomes of the commands of a cycle.
@@ -36,11 +38,9 @@ pub(super) enum Commands {
     None,
     /// They are to leave with this cycle.
     Made,
-    /// They were made in an earlier cycle, and were ready too late. They leave with the next one, in place of new ones.
-    Held,
 }
 
-impl<const AXES: usize> Group<AXES> {
+impl<const AXES: usize, const BUSES: usize> Group<AXES, BUSES> {
     /// A passive group.
     pub(super) fn new(places: Range<usize>, buses: BusSet) -> Self {
         Self {
@@ -52,6 +52,7 @@ impl<const AXES: usize> Group<AXES> {
             stop: None,
             fault_reset_cycles: 0,
             commands: Commands::None,
+            unsent: UnsentSteps::default(),
         }
     }
 
@@ -63,19 +64,17 @@ impl<const AXES: usize> Group<AXES> {
         }
     }
 
-    /// Ends the cycle. Commands that were ready too late leave with the next one.
+    /// Ends the cycle, whose commands have left, or were ready too late.
     pub(super) fn end_cycle(&mut self, is_late: bool) {
-        match self.commands {
-            Commands::Made if is_late => self.commands = Commands::Held,
-            Commands::Made => self.fault_reset_cycles = self.fault_reset_cycles.saturating_sub(1),
-            Commands::None | Commands::Held => {}
+        if self.commands == Commands::Made && !is_late {
+            self.fault_reset_cycles = self.fault_reset_cycles.saturating_sub(1);
         }
     }
 }
 
 /// A group in a cycle: with its axes, and with what it shares with the other groups.
 pub(super) struct GroupContext<'a, const AXES: usize, const BUSES: usize> {
-    pub(super) group: &'a mut Group<AXES>,
+    pub(super) group: &'a mut Group<AXES, BUSES>,
     /// Its axes.
     pub(super) axes: &'a mut [Axis],
     /// Their planned motions, in the same order.

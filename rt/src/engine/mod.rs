@@ -33,6 +33,7 @@ mod slots;
 mod state;
 mod step;
 mod targets;
+mod unsent_steps;
 
 use arrayvec::ArrayVec;
 
@@ -198,7 +199,7 @@ pub struct Engine<const AXES: usize = MAX_AXES, const BUSES: usize = MAX_BUSES> 
     dispatch: [Dispatch; BUSES],
     axes: ArrayVec<Axis, AXES>,
     profiles: ProfileStore<AXES>,
-    groups: ArrayVec<Group<AXES>, MAX_GROUPS>,
+    groups: ArrayVec<Group<AXES, BUSES>, MAX_GROUPS>,
     shared: Shared<AXES, BUSES>,
 }
 
@@ -286,7 +287,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         host: &mut impl HostInterface<AXES, BUSES>,
     ) {
         let is_late = self.shared.deadline == Deadline::Missed;
-        let is_made = self.groups.iter().any(|group| group.commands == Commands::Made);
+        let is_commanded = !is_late && self.groups.iter().any(|group| group.commands == Commands::Made);
         self.groups.iter_mut().for_each(|group| group.end_cycle(is_late));
         let shared = &mut self.shared;
         shared.slots.end(is_late);
@@ -295,7 +296,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         }
         shared.dropped += shared.events.drain(|event| host.event(event));
         shared.record.timing = CycleTiming { missed_slots: shared.slots.missed_now, ..timing };
-        shared.record.is_commanded = is_made && !is_late;
+        shared.record.is_commanded = is_commanded;
         if let Some(group) = self.groups.first() {
             shared.record.phase = group.state.phase();
         }

@@ -38,23 +38,26 @@ impl<const AXES: usize> Stream<AXES> {
 }
 
 impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
-    /// Makes the next set-points, unless those of the last cycle have still to leave, or every bus is behind.
+    /// Makes the next set-points, unless those of the last cycles have still to leave, or every bus is behind.
     pub(super) fn step(&mut self) {
-        let is_every_bus_behind = self.group.buses.is_within(self.shared.backlog.behind());
+        let (own, behind) = (self.group.buses, self.shared.backlog.behind());
         // A group that stops does not wait for the wire any longer, whatever it stops for.
         let is_over_waiting = self.group.stop.is_some()
-            && self.shared.backlog.longest_blocked(self.group.buses).1 > self.shared.not_transmitted_cycles;
-        let must_wait = is_every_bus_behind && !is_over_waiting;
-        let is_held = self.group.commands == Commands::Held;
+            && self.shared.backlog.longest_blocked(own).1 > self.shared.not_transmitted_cycles;
+        let must_wait = own.is_within(behind) && !is_over_waiting;
         self.group.commands = match self.group.state {
             GroupState::Passive => Commands::None,
-            _ if must_wait && is_held => Commands::Held,
             _ if must_wait => Commands::None,
             _ => Commands::Made,
         };
-        if must_wait || is_held {
+        let on_time = own.without(behind);
+        if must_wait || self.group.unsent.are_enough(&self.shared.buses, on_time) {
             // Drives may have obeyed what was said by SDO.
             return self.end_disabling();
+        }
+        if self.group.commands == Commands::Made {
+            self.group.unsent.count(on_time);
+            self.shared.snapshot.steps += 1;
         }
         for _ in 0..ATTEMPTS {
             match self.step_phase() {
