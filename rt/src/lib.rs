@@ -72,8 +72,8 @@ pub use engine::{
 };
 pub use fault::{Fault, Rule};
 pub use frame::{Frame, FrameError, FrameKind, Id};
-pub use guard::{AxisLimits, LimitError, OnViolation, braking_distance};
-pub use host::{AxisSnapshot, HostInterface, Snapshot, StreamCommand};
+pub use guard::{AxisLimits, LimitError, braking_distance};
+pub use host::{AxisSnapshot, HostInterface, Snapshot};
 pub use motion_reports::{MotionReport, MotionReports, MotionState};
 pub use pdo::{
     CommandSlot, FeedbackSlot, MAX_OBJECTS, MAX_PDOS, MappedObject, Mapping, MappingError, ProcessImage,
@@ -89,7 +89,7 @@ pub use request::{
 };
 pub use source::{
     AxisPoint, AxisTarget, Follow, LookAhead, LookAheadParameters, POINTS_AT_MOST, PointError, PointRole, StreamCounts, StreamDelay,
-    StreamPoint, StreamSample, StreamState, StreamWish, follow,
+    StreamPoint, StreamReport, StreamSample, StreamState, StreamWish, follow,
 };
 pub use stop::{Origin, StopCategories, StopCause, StopReason};
 pub use stop_category::StopCategory;

@@ -13,6 +13,7 @@ use crate::phase::Phase;
 use crate::plan::{PlanError, State};
 use crate::profile::ProfileTarget;
 use crate::record::EventKind;
+use crate::source::StreamSample;
 use crate::request::{Move, ProfileMove, RejectReason, Request, RequestId};
 use crate::stop::{Origin, StopCause};
 use crate::stop_category::StopCategory;
@@ -102,8 +103,8 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
             return Err(RejectReason::MissedSlots { missed, limit: self.shared.slots.degraded() }.into());
         }
         self.group.stop = None;
-        self.axes.iter_mut().for_each(Axis::begin_stream);
-        self.enter(GroupState::Streaming(Stream::Awaited));
+        self.group.stream = StreamSample::default();
+        self.enter(GroupState::Streaming(Stream::Requested));
         Ok(())
     }
 

@@ -21,12 +21,11 @@
 //! A number in brackets is a stop category of IEC 60204-1.
 
 use crate::cia402::Goal;
-use crate::host::StreamCommand;
 use crate::phase::Phase;
 
 /// What the group is doing.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum GroupState<const AXES: usize> {
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum GroupState {
     Passive,
     Disabled,
     Enabling,
@@ -35,22 +34,22 @@ pub(super) enum GroupState<const AXES: usize> {
         /// Whether the end of the motion has been reported; a velocity or a torque goes on after that.
         is_reported: bool,
     },
-    Streaming(Stream<AXES>),
+    Streaming(Stream),
     Stopping,
     Disabling(PowerRemoval),
 }
 
-/// What a stream has brought so far.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Stream<const AXES: usize> {
-    /// No command yet: the set-points stay.
+/// How far a stream has come.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Stream {
+    /// It was asked for, and the host has yet to be told.
+    Requested,
+    /// No point has come yet: the set-points stay.
     Awaited,
-    /// The first command has come, and has yet to be checked against where the joints are.
-    Begins(StreamCommand<AXES>),
-    /// A command has come, and has yet to be made set-points of.
-    Follows(StreamCommand<AXES>),
-    /// No newer command has come than this one: the motion of the stream goes on, up to its expiry.
-    Continues(StreamCommand<AXES>),
+    /// The axes follow the points.
+    Following,
+    /// The points have run out: the axes come to rest.
+    Dry,
 }
 
 /// How the power is taken.
@@ -62,7 +61,7 @@ pub(super) enum PowerRemoval {
     DisableVoltage,
 }
 
-impl<const AXES: usize> GroupState<AXES> {
+impl GroupState {
     /// The phase that observers see.
     pub(super) const fn phase(&self) -> Phase {
         match self {

@@ -1,6 +1,5 @@
 //! The guard: the last check of every set-point, whatever its source, before it becomes a frame.
 
-mod commands;
 mod following_error;
 #[cfg(test)]
 mod planned;
@@ -10,10 +9,9 @@ mod stream;
 use crate::fault::Fault;
 use crate::plan::State;
 
-pub use commands::StreamCommands;
 pub use following_error::FollowingErrorGuard;
 pub use stopping_bound::braking_distance;
-pub use stream::{OnViolation, SetPointSteps, check_braking, check_jerk, clamp};
+pub use stream::{SetPointSteps, check_braking, check_jerk};
 
 /// What an axis may never be asked to do. rad (m) and seconds.
 #[derive(Clone, Copy, Debug, PartialEq)]

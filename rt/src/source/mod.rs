@@ -21,5 +21,5 @@ pub use delay::StreamDelay;
 pub use follower::follow;
 pub use look_ahead::{LookAhead, LookAheadParameters, POINTS_AT_MOST, PointError};
 pub use target::{
-    AxisPoint, AxisTarget, Follow, PointRole, StreamCounts, StreamPoint, StreamSample, StreamState, StreamWish,
+    AxisPoint, AxisTarget, Follow, PointRole, StreamCounts, StreamPoint, StreamReport, StreamSample, StreamState, StreamWish,
 };

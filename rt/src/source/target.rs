@@ -141,6 +141,15 @@ pub struct StreamCounts {
     pub lost_points: u64,
 }
 
+/// What observers see of a stream.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct StreamReport {
+    /// What it is doing.
+    pub state: StreamState,
+    /// How it has gone so far.
+    pub counts: StreamCounts,
+}
+
 /// What a stream wants in one slot.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum StreamWish<const AXES: usize = MAX_AXES> {
