@@ -284,10 +284,10 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         let dispatch = dispatch_of(&parameters)?;
         let axes = axes_of(&parameters);
         let axis_count = parameters.axes.len() as u8;
+        let buses = parameters.buses.len();
         let slowest_divider = parameters.buses.iter().map(|bus| bus.divider).max().unwrap_or(1);
-        let heartbeat =
-            parameters.heartbeat.map(|heartbeat| HeartbeatProducer::new(heartbeat, slowest_divider));
-        let bus_count = parameters.buses.len() as u8;
+        let heartbeat = parameters.heartbeat.map(|own| HeartbeatProducer::new(own, buses, slowest_divider));
+        let bus_count = buses as u8;
         Ok(Self {
             period_ns: parameters.period_ns,
             period_s: parameters.period_ns as f64 / NANOSECONDS_PER_SECOND as f64,
@@ -304,12 +304,12 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
             stop: None,
             fault_reset_cycles: 0,
             commands: Commands::None,
-            unsent: UnsentSteps::default(),
+            unsent: UnsentSteps::new(buses),
             deadline: Deadline::Met,
             requested: Requested::default(),
             now_ns: 0,
             slots: SlotWatch::new(parameters.timing),
-            backlog: Backlog::default(),
+            backlog: Backlog::new(buses),
             skip_sync: BusSet::default(),
             asked_by_sync: BusSet::default(),
             foreign_frame: None,
