@@ -3,20 +3,23 @@
 use std::path::Path;
 use std::time::Duration;
 
-use takt::config::Config;
+use takt::config::{Config, Follow};
 use takt::controller::session::SessionOptions;
 use takt::controller::{CommandError, Controller, MotionError, MoveOptions, Outcome, StartFailure};
-use takt_rt::plan::State;
 use takt_rt::{Phase, RequestKind, Rule, StopCategory};
 
 const PATIENCE: Duration = Duration::from_secs(30);
 
-fn start(name: &str) -> Controller {
+fn config(name: &str) -> Config {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs").join(name);
     let mut config = Config::load(&path).unwrap();
     config.telemetry.is_recorded = false;
     config.telemetry.black_box_ns = None;
-    Controller::start(config, SessionOptions::default()).unwrap()
+    config
+}
+
+fn start(name: &str) -> Controller {
+    Controller::start(config(name), SessionOptions::default()).unwrap()
 }
 
 #[test]
@@ -60,10 +63,11 @@ fn a_velocity_is_reached_and_ended_and_an_expired_one_stops_the_group() {
 
 #[test]
 fn after_a_fault_each_request_is_refused_with_the_reason_until_the_fault_is_reset() {
-    let mut joint = start("single-erob.toml");
+    let mut config = config("single-erob.toml");
+    config.axes[0].follow = Follow::Exact;
+    let mut joint = Controller::start(config, SessionOptions::default()).unwrap();
     joint.begin_stream().unwrap();
-    let far = State { position: 1.0, ..State::default() };
-    joint.stream(&[far], PATIENCE).unwrap();
+    joint.stream().push_now(&[1.0]).unwrap();
     let begun = std::time::Instant::now();
     while joint.state().stop.is_none() && begun.elapsed() < PATIENCE {
         std::thread::sleep(Duration::from_millis(1));

@@ -2,7 +2,8 @@
 //! their three sides.
 //!
 //! ```text
-//! HostSide ── requests, newest streamed command, service frames ──▶ RtSide (takt_rt::HostInterface)
+//! HostSide ── requests, service frames ──▶ RtSide
+//! clients  ── points of a stream, from any number of threads ──▶ RtSide (takt_rt::HostInterface)
 //! HostSide ◀── service frames, newest snapshot (any number of observers) ── RtSide
 //! LogSide  ◀── cycle records, events ── RtSide
 //! ```
@@ -15,23 +16,30 @@ mod primitives;
 mod records;
 mod request_numbers;
 mod ring;
+mod stream;
 mod words;
 
 use takt_rt::{
-    CycleRecord, Event, Frame, HostInterface, Received, Request, RequestEnvelope, RequestId, Snapshot,
-    StreamCommand,
+    CycleRecord, Event, Frame, HostInterface, LookAheadParameters, Nanoseconds, Received, Request,
+    RequestEnvelope, RequestId, Snapshot, StreamSample,
 };
 
+use super::assemble;
 use crate::config::Config;
 use latest::{Attempt, Reader, Writer};
 use records::{RecordConsumer, RecordProducer};
 
 pub use request_numbers::RequestNumbers;
+use stream::{StreamReceiver, stream_channel};
+
 pub use ring::{Consumer, Producer, ring};
+pub use stream::Streamer;
 
 /// The capacity of each channel.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug)]
 pub struct ChannelSizes {
+    /// How streams are looked ahead.
+    pub stream: LookAheadParameters,
     /// Axes of the controller, up to [`takt_rt::MAX_AXES`].
     pub axes: usize,
     /// Buses of the controller, up to [`takt_rt::MAX_BUSES`].
@@ -53,6 +61,7 @@ impl ChannelSizes {
     /// the events of a second in which the logger is late.
     pub fn of(config: &Config) -> Self {
         Self {
+            stream: assemble::look_ahead(config),
             axes: config.axes.len(),
             buses: config.buses.len(),
             records: config.telemetry.ring_records,
@@ -83,17 +92,15 @@ pub enum ChannelError {
 /// Makes the channels, and allocates and touches all their memory.
 pub fn channels(sizes: &ChannelSizes) -> (RtSide, HostSide, LogSide) {
     let (request_in, request_out) = ring(sizes.requests);
-    let (stream_in, stream_out) = latest::latest(words::stream_words(sizes.axes));
+    let (streamer, stream) = stream_channel(sizes.stream.clone());
     let (snapshot_in, snapshot_out) = latest::latest(words::snapshot_words(sizes.axes, sizes.buses));
     let (service_in, service_out) = (0..sizes.buses).map(|_| ring(sizes.service_out)).unzip();
     let (received_in, received_out) = ring(sizes.service_in);
     let (record_in, record_out) = records::record_ring(sizes.records);
     let (event_in, event_out) = ring(sizes.events);
     let rt = RtSide {
-        axes: sizes.axes,
         requests: request_out,
-        stream: stream_out,
-        stream_seen: 0,
+        stream,
         service: service_out,
         received: received_in,
         records: record_in,
@@ -103,7 +110,7 @@ pub fn channels(sizes: &ChannelSizes) -> (RtSide, HostSide, LogSide) {
     let host = HostSide {
         requests: request_in,
         numbers: RequestNumbers::default(),
-        streamer: Some(Streamer { axes: sizes.axes, stream: stream_in }),
+        streamer,
         service: service_in,
         received: received_out,
         observer: Observer { snapshot: snapshot_out },
@@ -113,10 +120,8 @@ pub fn channels(sizes: &ChannelSizes) -> (RtSide, HostSide, LogSide) {
 
 /// The real-time thread's side.
 pub struct RtSide {
-    axes: usize,
     requests: Consumer<RequestEnvelope>,
-    stream: Reader,
-    stream_seen: u64,
+    stream: StreamReceiver,
     service: Vec<Consumer<Frame>>,
     received: Producer<(usize, Received)>,
     records: RecordProducer,
@@ -124,28 +129,17 @@ pub struct RtSide {
     snapshot: Writer,
 }
 
-/// Attempts to read the streamed command in one cycle. One is enough, unless the host writes several commands within the
-/// fraction of a microsecond that a read takes.
-const STREAM_ATTEMPTS: usize = 3;
-
 impl HostInterface for RtSide {
     fn request(&mut self) -> Option<RequestEnvelope> {
         self.requests.pop()
     }
 
-    fn stream(&mut self) -> Option<StreamCommand> {
-        for _ in 0..STREAM_ATTEMPTS {
-            let decode = |words: &mut latest::Words<'_>| words::take_stream(self.axes, words);
-            match self.stream.attempt(self.stream_seen, decode) {
-                Attempt::Whole(command, number) => {
-                    self.stream_seen = number;
-                    return Some(command);
-                }
-                Attempt::Nothing => return None,
-                Attempt::Torn => {}
-            }
-        }
-        None
+    fn begin_stream(&mut self, _group: u8) {
+        self.stream.begin();
+    }
+
+    fn stream(&mut self, _group: u8, slot_start_ns: Nanoseconds) -> StreamSample {
+        self.stream.sample(slot_start_ns)
     }
 
     fn service_frame(&mut self, bus: usize) -> Option<Frame> {
@@ -173,7 +167,7 @@ impl HostInterface for RtSide {
 pub struct HostSide {
     requests: Producer<RequestEnvelope>,
     numbers: RequestNumbers,
-    streamer: Option<Streamer>,
+    streamer: Streamer,
     service: Vec<Producer<Frame>>,
     received: Consumer<(usize, Received)>,
     observer: Observer,
@@ -203,17 +197,9 @@ impl HostSide {
         self.numbers.clone()
     }
 
-    /// Replaces the streamed command. The real-time thread takes the newest one at its next cycle. Set-points beyond the axes
-    /// of the controller are ignored.
-    pub fn stream(&mut self, command: &StreamCommand) {
-        if let Some(streamer) = &mut self.streamer {
-            streamer.stream(command);
-        }
-    }
-
-    /// The streaming end, for another thread. Afterwards [`HostSide::stream`] does nothing.
-    pub fn take_streamer(&mut self) -> Option<Streamer> {
-        self.streamer.take()
+    /// The writing end of the points of a stream, for any thread.
+    pub fn streamer(&self) -> Streamer {
+        self.streamer.clone()
     }
 
     /// Queues a service frame. It is sent after the set-points of a later cycle.
@@ -239,19 +225,6 @@ impl HostSide {
     /// A handle to the state for another thread.
     pub fn observer(&self) -> Observer {
         self.observer.clone()
-    }
-}
-
-/// The writing end of the streamed commands. The real-time thread takes the newest one.
-pub struct Streamer {
-    axes: usize,
-    stream: Writer,
-}
-
-impl Streamer {
-    /// Replaces the streamed command. Set-points beyond the axes of the controller are ignored.
-    pub fn stream(&mut self, command: &StreamCommand) {
-        self.stream.write(|words| words::put_stream(command, self.axes, words));
     }
 }
 
@@ -312,19 +285,24 @@ impl LogSide {
 mod tests {
     use super::*;
     use takt_rt::Id;
-    use takt_rt::plan;
-    use takt_rt::{EventKind, MAX_AXES, Phase, StopCategory};
+    use takt_rt::{EventKind, Phase, StopCategory};
 
-    const SIZES: ChannelSizes =
-        ChannelSizes { axes: 2, buses: 2, records: 4, events: 2, requests: 2, service_out: 2, service_in: 2 };
-
-    fn command(valid_until_ns: u64) -> StreamCommand {
-        StreamCommand { valid_until_ns, set_points: [plan::State::default(); MAX_AXES] }
+    fn sizes() -> ChannelSizes {
+        ChannelSizes {
+            stream: LookAheadParameters::default(),
+            axes: 2,
+            buses: 2,
+            records: 4,
+            events: 2,
+            requests: 2,
+            service_out: 2,
+            service_in: 2,
+        }
     }
 
     #[test]
     fn requests_arrive_in_order_and_one_too_many_is_an_error() {
-        let (mut rt, mut host, _log) = channels(&SIZES);
+        let (mut rt, mut host, _log) = channels(&sizes());
         let first = host.request(Request::Enable).unwrap();
         let second = host.request(Request::Stop(StopCategory::Two)).unwrap();
         assert!(first < second);
@@ -336,17 +314,8 @@ mod tests {
     }
 
     #[test]
-    fn only_the_newest_streamed_command_is_seen_and_only_once() {
-        let (mut rt, mut host, _log) = channels(&SIZES);
-        assert_eq!(rt.stream(), None);
-        (1..=9).for_each(|valid_until_ns| host.stream(&command(valid_until_ns)));
-        assert_eq!(rt.stream(), Some(command(9)));
-        assert_eq!(rt.stream(), None);
-    }
-
-    #[test]
     fn service_frames_keep_to_their_bus_in_both_directions() {
-        let (mut rt, mut host, _log) = channels(&SIZES);
+        let (mut rt, mut host, _log) = channels(&sizes());
         let frame = Frame::of(Id::canopen(0x600, 5), [0x40, 0x00, 0x10, 0x00]);
         host.send_service(1, frame).unwrap();
         assert_eq!(host.send_service(2, frame), Err(ChannelError::NoSuchBus { bus: 2, buses: 2 }));
@@ -362,7 +331,7 @@ mod tests {
 
     #[test]
     fn every_observer_sees_the_newest_snapshot() {
-        let (mut rt, host, _log) = channels(&SIZES);
+        let (mut rt, host, _log) = channels(&sizes());
         let observer = host.observer();
         assert_eq!(observer.snapshot(), words::NO_SNAPSHOT);
         let snapshot = Snapshot { slot: 9, phase: Phase::Holding, axis_count: 2, ..words::NO_SNAPSHOT };
@@ -372,7 +341,7 @@ mod tests {
 
     #[test]
     fn the_log_side_gets_records_and_events_and_the_numbers_of_dropped_ones() {
-        let (mut rt, _host, mut log) = channels(&SIZES);
+        let (mut rt, _host, mut log) = channels(&sizes());
         let record = CycleRecord { axis_count: 2, ..CycleRecord::default() };
         assert_eq!((0..6).filter(|_| rt.record(&record)).count(), 4);
         let event =

@@ -113,7 +113,7 @@ pub(super) struct Remote {
 pub(super) struct RemoteHandles {
     /// Reads the state.
     pub observer: Observer,
-    /// Sends streamed set-points.
+    /// Sends the points of a stream.
     pub streamer: Streamer,
     /// Gives the ids of requests.
     pub numbers: RequestNumbers,
@@ -185,11 +185,11 @@ fn lead_as_owner(
         }
     };
     let begun = running.begun();
-    if let (Some(remote), Some(streamer)) = (&remote, host.take_streamer()) {
+    if let Some(remote) = &remote {
         // This fails only if the client has given up. It has then asked the run to end.
         let _ = remote.handles.send(RemoteHandles {
             observer: host.observer(),
-            streamer,
+            streamer: host.streamer(),
             numbers: host.numbers(),
         });
     }

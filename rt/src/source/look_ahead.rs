@@ -42,6 +42,14 @@ pub struct LookAheadParameters<const AXES: usize = MAX_AXES> {
     pub delay: StreamDelay,
 }
 
+impl<const AXES: usize> Default for LookAheadParameters<AXES> {
+    /// Of no axes, sampled once in a millisecond.
+    fn default() -> Self {
+        let period_ns = NANOSECONDS_PER_SECOND / 1000;
+        Self { limits: ArrayVec::new(), period_ns, delay: StreamDelay::Automatic }
+    }
+}
+
 /// Why a point cannot be used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PointError {

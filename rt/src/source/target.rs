@@ -43,6 +43,12 @@ impl AxisPoint {
     }
 }
 
+impl From<f64> for AxisPoint {
+    fn from(position: f64) -> Self {
+        Self::position(position)
+    }
+}
+
 impl From<State> for AxisPoint {
     fn from(state: State) -> Self {
         Self {

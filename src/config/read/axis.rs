@@ -14,7 +14,7 @@ use super::travel::{counting, travel};
 use crate::canopen::dcf::DeviceConfiguration;
 use crate::config::defaults;
 use crate::config::model::{
-    Axis, Control, DriveFamily, Feedback, Identity, Interface, Limits, OnViolation, PdoMapping,
+    Axis, Control, DriveFamily, Feedback, Identity, Follow, Interface, Limits, PdoMapping,
     SimulatedJoint, Travel,
 };
 use crate::config::problem_kind::ProblemKind;
@@ -141,9 +141,13 @@ fn axis(mut section: Section<'_>, machine: &Machine<'_>, earlier: &[ReadAxis]) -
         |key| section.get(key).and_then(|entry: Entry<'_>| entry.quantity(q.position, q.ranges.deviation));
     let start_tolerance = tolerance("start_tolerance");
     let target_tolerance = tolerance("target_tolerance");
-    let on_violation = section
-        .get("on_violation")
-        .and_then(|entry| entry.choice(&[("reject", OnViolation::Reject), ("clamp", OnViolation::Clamp)]));
+    let follow = section
+        .get("follow")
+        .and_then(|entry| entry.choice(&[("smooth", Follow::Smooth), ("exact", Follow::Exact)]));
+    if let Some(entry) = section.get("on_violation") {
+        let by = "follow = \"smooth\" (as close as the limits allow) or follow = \"exact\" (or else a stop)";
+        entry.report(ProblemKind::Replaced { key: entry.spot.key.clone(), by });
+    }
     let missed =
         section.get("missed_feedback_cycles").and_then(|entry| entry.integer(ranges::MISSED_FEEDBACK_CYCLES));
     let feedback_delay =
@@ -175,7 +179,7 @@ fn axis(mut section: Section<'_>, machine: &Machine<'_>, earlier: &[ReadAxis]) -
                 Travel::Linear { .. } => defaults::START_TOLERANCE_M,
             }),
             target_tolerance: target_tolerance.unwrap_or_else(|| default_target_tolerance(travel, &control)),
-            on_violation: on_violation.unwrap_or_default(),
+            follow: follow.unwrap_or_default(),
             missed_feedback_cycles: missed
                 .and_then(|cycles| u16::try_from(cycles).ok())
                 .unwrap_or(defaults::MISSED_FEEDBACK_CYCLES),

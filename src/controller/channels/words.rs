@@ -11,7 +11,7 @@ use super::motion_words::{MOTION_WORDS, put_motions, take_motions};
 
 /// The largest number of words of a snapshot of so many axes and buses.
 pub const fn snapshot_words(axes: usize, buses: usize) -> usize {
-    18 + MOTION_WORDS + 4 * Answers::EXPLAINED + 4 * axes + 7 * buses
+    22 + MOTION_WORDS + 4 * Answers::EXPLAINED + 4 * axes + 7 * buses
 }
 
 /// The snapshot before the first cycle: passive, of no axes and no buses.

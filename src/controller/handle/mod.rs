@@ -19,6 +19,7 @@
 //! ```
 
 mod error;
+mod stream;
 mod waiting_requests;
 
 use std::sync::Arc;
@@ -28,10 +29,9 @@ use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use takt_rt::linux::MonotonicClock;
-use takt_rt::plan::State;
 use takt_rt::{
     Answer, Clock, ControlLaw, MAX_AXES, MotionState, Move, Phase, ProfileMove, ProfileTarget, Request,
-    RequestEnvelope, RequestId, Snapshot, StopCategory, StreamCommand,
+    RequestEnvelope, RequestId, Snapshot, StopCategory,
 };
 
 use super::channels::{Observer, RequestNumbers, Streamer};
@@ -42,6 +42,8 @@ use crate::telemetry::Machine;
 use waiting_requests::REQUESTS_AT_MOST;
 
 pub(super) use waiting_requests::WaitingRequests;
+
+pub use stream::{StreamError, StreamHandle};
 
 pub use error::{CommandError, MotionError, Refused, StartFailure, Stopped};
 
@@ -198,28 +200,13 @@ impl Controller {
         self.drive(axis, ProfileTarget::Torque(torque), valid_for)
     }
 
-    /// Begins to follow [`Controller::stream`]. The first set-points must come within the enable time-out, and must be near
-    /// the present positions.
+    /// Begins to follow the points of [`Controller::stream`]. The first one must come within the enable time-out. The axes are led
+    /// to it within their limits; where an axis is to `follow = "exact"`, it must be near the joint.
     ///
     /// # Errors
     /// [`CommandError::Refused`] unless the group holds its position and is punctual, [`CommandError::Full`], [`CommandError::Ended`].
     pub fn begin_stream(&mut self) -> Result<(), CommandError> {
         self.request_and_wait(Request::Stream)
-    }
-
-    /// Replaces the streamed set-points, one for each axis. The real-time thread uses the newest ones. They expire after
-    /// `valid_for`; then the group decelerates and holds.
-    ///
-    /// # Errors
-    /// [`CommandError::Count`].
-    pub fn stream(&mut self, set_points: &[State], valid_for: Duration) -> Result<(), CommandError> {
-        if set_points.len() != self.axes.len() {
-            return Err(CommandError::Count { given: set_points.len(), axes: self.axes.len() });
-        }
-        let mut all = [State::default(); MAX_AXES];
-        all.iter_mut().zip(set_points).for_each(|(to, from)| *to = *from);
-        self.streamer.stream(&StreamCommand { valid_until_ns: expiry_ns(valid_for), set_points: all });
-        Ok(())
     }
 
     /// Requests a stop of this category, and returns at once. A stop is never refused. It discards all requests that are still
