@@ -20,8 +20,8 @@ use takt::telemetry::{
 };
 use takt_rt::linux::MonotonicClock;
 use takt_rt::{
-    BusHealth, BusPort, Clock, EventKind, Frame, Phase, ReceiveBatch, Request, Snapshot,
-    StopCategory, StreamPoint,
+    BusHealth, BusPort, Clock, EventKind, Frame, Phase, ReceiveBatch, Request, Snapshot, StopCategory,
+    StreamPoint,
 };
 
 fn arm(directory: &Path) -> Config {

@@ -88,8 +88,8 @@ pub use request::{
     RequestId, RequestKind,
 };
 pub use source::{
-    AxisPoint, AxisTarget, Follow, LookAhead, LookAheadParameters, POINTS_AT_MOST, PointError, PointRole, StreamCounts, StreamDelay,
-    StreamPoint, StreamReport, StreamSample, StreamState, StreamWish, follow,
+    AxisPoint, AxisTarget, Follow, LookAhead, LookAheadParameters, POINTS_AT_MOST, PointError, PointRole,
+    StreamCounts, StreamDelay, StreamPoint, StreamReport, StreamSample, StreamState, StreamWish, follow,
 };
 pub use stop::{Origin, StopCategories, StopCause, StopReason};
 pub use stop_category::StopCategory;

@@ -5,8 +5,8 @@ mod fixture;
 
 use fixture::{PERIOD_NS, Rig, parameters};
 use takt_rt::{
-    BusState, EventKind, Frame, Id, MappedObject, Mapping, Origin, Phase, RejectReason, Request,
-    Rule, StopCategory, TimingLevel,
+    BusState, EventKind, Frame, Id, MappedObject, Mapping, Origin, Phase, RejectReason, Request, Rule,
+    StopCategory, TimingLevel,
 };
 
 fn moving() -> Rig {

@@ -5,9 +5,9 @@ mod fixture;
 use fixture::{Rig, jerk_limited, move_to, parameters, scale};
 use proptest::prelude::*;
 use takt_rt::{
-    Answer, AxisParameters, AxisParametersError, BusState, ControlLaw, DriveState, Engine, EventKind, Follow, Frame,
-    Id, MAX_AXES, Move, OperationMode, Origin, Phase, ProfileMove, ProfileTarget, RejectReason, Request,
-    RequestId, Rule, SetUpError, StopCategory,
+    Answer, AxisParameters, AxisParametersError, BusState, ControlLaw, DriveState, Engine, EventKind, Follow,
+    Frame, Id, MAX_AXES, Move, OperationMode, Origin, Phase, ProfileMove, ProfileTarget, RejectReason,
+    Request, RequestId, Rule, SetUpError, StopCategory,
 };
 
 fn rules(rig: &Rig) -> Vec<Rule> {

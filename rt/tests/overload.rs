@@ -4,9 +4,7 @@
 mod fixture;
 
 use fixture::{PERIOD_NS, Rig, parameters};
-use takt_rt::{
-    Engine, Frame, Id, MAX_AXES, MappedObject, Mapping, Pdo, Phase, Request, Rule, SetUpError,
-};
+use takt_rt::{Engine, Frame, Id, MAX_AXES, MappedObject, Mapping, Pdo, Phase, Request, Rule, SetUpError};
 
 /// Object 6040 = 0 (disable voltage), as an SDO download.
 const DISABLE_VOLTAGE_BY_SDO: [u8; 8] = [0x2B, 0x40, 0x60, 0, 0, 0, 0, 0];

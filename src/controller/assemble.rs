@@ -1,9 +1,9 @@
 //! Makes the engine and the slot plan from a configuration.
 
 use takt_rt::{
-    AxisLimits, Follow, LookAheadParameters, MAX_AXES,
-    AxisParameters, BusParameters, CommandPdo, Engine, EngineParameters, FeedbackSince, Heartbeat, Id,
-    Mapping, MappingError, Pdo, Scale, ScaleError, ScaleParameters, SetUpError, SlotPlan, TimingLadder,
+    AxisLimits, AxisParameters, BusParameters, CommandPdo, Engine, EngineParameters, FeedbackSince, Follow,
+    Heartbeat, Id, LookAheadParameters, MAX_AXES, Mapping, MappingError, Pdo, Scale, ScaleError,
+    ScaleParameters, SetUpError, SlotPlan, TimingLadder,
 };
 
 use crate::config::{Axis, Config, ConfigError, DriveFamily, Interface};

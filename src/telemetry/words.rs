@@ -1,6 +1,8 @@
 //! The texts of stops, phases, events and rejections, with the names of the axes and the units of the values.
 
-use takt_rt::{DriveState, Event, EventKind, OperationMode, Phase, Rule, StopCategory, StreamState, TimingLevel};
+use takt_rt::{
+    DriveState, Event, EventKind, OperationMode, Phase, Rule, StopCategory, StreamState, TimingLevel,
+};
 
 use super::machine::Machine;
 

@@ -44,7 +44,8 @@ impl Client {
 
     /// What it wants after a cycle.
     pub fn wishes(&mut self, config: &Config, snapshot: &Snapshot) -> Wishes {
-        let points = self.stream.as_mut().map_or_else(Vec::new, |stream| stream.points(config, snapshot.at_ns));
+        let points =
+            self.stream.as_mut().map_or_else(Vec::new, |stream| stream.points(config, snapshot.at_ns));
         let mut wishes = Wishes { points, ..Wishes::default() };
         if !self.dice.chance(self.restlessness) {
             return wishes;
@@ -137,7 +138,8 @@ impl Client {
         let positions: Vec<f64> =
             snapshot.axes[..config.axes.len()].iter().map(|axis| axis.position_set).collect();
         let dice = self.dice.split(snapshot.slot);
-        self.stream = Some(ClientStream::new(dice, config, snapshot.at_ns, &positions, self.are_streams_wild));
+        self.stream =
+            Some(ClientStream::new(dice, config, snapshot.at_ns, &positions, self.are_streams_wild));
     }
 }
 

@@ -126,7 +126,8 @@ impl ClientStream {
                 1 => PointRole::Single,
                 _ => PointRole::Chunk { is_first: number == 0, is_last: number + 1 == count },
             };
-            let mut point = StreamPoint { at_ns: self.time_ns(stamp_s), role, axes: self.axes(config, meant_s) };
+            let mut point =
+                StreamPoint { at_ns: self.time_ns(stamp_s), role, axes: self.axes(config, meant_s) };
             if self.dice.chance(0.02) {
                 self.spoil(&mut point);
             }
@@ -148,7 +149,8 @@ impl ClientStream {
             let limits = &axis.limits;
             let highest = limits.acceleration.min(limits.deceleration);
             // At both limits in turn, with a share of 1.
-            let (way, rate) = (self.share * limits.velocity * limits.velocity / highest, highest / limits.velocity);
+            let (way, rate) =
+                (self.share * limits.velocity * limits.velocity / highest, highest / limits.velocity);
             // Eases in with no velocity, no acceleration and little jerk.
             let ease = (time_s / 0.5).clamp(0.0, 1.0);
             let ease = ease * ease * ease * (10.0 + ease * (6.0 * ease - 15.0));
@@ -159,10 +161,14 @@ impl ClientStream {
             axes[index] = match self.words {
                 Words::Nothing => AxisPoint::position(position),
                 Words::Velocity => AxisPoint::moving(position, velocity),
-                Words::All => AxisPoint { position, velocity: Some(velocity), acceleration: Some(acceleration) },
-                Words::False => {
-                    AxisPoint { position, velocity: Some(-3.0 * velocity), acceleration: Some(1e3 * velocity) }
+                Words::All => {
+                    AxisPoint { position, velocity: Some(velocity), acceleration: Some(acceleration) }
                 }
+                Words::False => AxisPoint {
+                    position,
+                    velocity: Some(-3.0 * velocity),
+                    acceleration: Some(1e3 * velocity),
+                },
             };
         }
         axes

@@ -6,8 +6,8 @@ use crate::control::{ControlLaw, GainError};
 use crate::dialect::Dialect;
 use crate::frame::Id;
 use crate::guard::{AxisLimits, LimitError};
-use crate::source::Follow;
 use crate::pdo::{MAX_PDOS, Mapping, TransmissionType};
+use crate::source::Follow;
 use crate::units::Scale;
 
 /// A PDO: its identifier and its compiled mapping.

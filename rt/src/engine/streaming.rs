@@ -49,25 +49,32 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
     pub(super) fn step_stream(&mut self, before: Stream) -> Result<(), Failure> {
         let wish = self.group.stream.wish;
         match &wish {
-            StreamWish::Awaited => self.await_stream(),
+            StreamWish::Awaited if matches!(before, Stream::Requested | Stream::Awaited) => {
+                self.await_stream()
+            }
+            // Whoever has begun to lead the axes lets them come to rest.
+            StreamWish::Awaited => self.run_dry(before, |axis| AxisTarget::Position(axis.set_point())),
             StreamWish::Targets(targets) => {
-                if before == Stream::Awaited {
+                if matches!(before, Stream::Requested | Stream::Awaited) {
                     self.check_start(targets)?;
                 }
                 self.enter_stream(Stream::Following);
                 self.stream_to(|axis, period_s| axis.streamed(&axis.own(targets), period_s))
             }
-            StreamWish::Dry(last) => {
-                if before != Stream::Dry {
-                    for axis in self.axes.iter_mut() {
-                        let last = axis.own(last);
-                        axis.begin_rest(&last, self.shared.period_s);
-                    }
-                }
-                self.enter_stream(Stream::Dry);
-                self.stream_to(Axis::resting)
+            StreamWish::Dry(last) => self.run_dry(before, |axis| axis.own(last)),
+        }
+    }
+
+    /// The points have run out: the axes come to rest.
+    fn run_dry(&mut self, before: Stream, last_of: impl Fn(&Axis) -> AxisTarget) -> Result<(), Failure> {
+        if before != Stream::Dry {
+            for axis in self.axes.iter_mut() {
+                let last = last_of(axis);
+                axis.begin_rest(&last, self.shared.period_s);
             }
         }
+        self.enter_stream(Stream::Dry);
+        self.stream_to(Axis::resting)
     }
 
     fn await_stream(&mut self) -> Result<(), Failure> {

@@ -128,7 +128,8 @@ impl DelayEstimator {
         };
         let chosen_ns = whole(needed_ns.saturating_add(room_ns));
         let is_too_short = needed_ns > self.goal_ns;
-        let is_too_long = self.arrival_count > ARRIVALS && self.goal_ns - chosen_ns > room_ns.saturating_mul(2);
+        let is_too_long =
+            self.arrival_count > ARRIVALS && self.goal_ns - chosen_ns > room_ns.saturating_mul(2);
         if is_too_short || is_too_long {
             self.goal_ns = chosen_ns;
         }

@@ -21,12 +21,7 @@ const CORRECTING: f64 = 5.0;
 ///
 /// # Errors
 /// What is no number, or no number that can be planned with.
-pub fn follow(
-    start: &State,
-    target: &State,
-    limits: &AxisLimits,
-    period_s: f64,
-) -> Result<State, PlanError> {
+pub fn follow(start: &State, target: &State, limits: &AxisLimits, period_s: f64) -> Result<State, PlanError> {
     match corrected(start, target, limits, period_s) {
         Some(next) => Ok(next),
         None => tracked(start, target, limits, period_s),
@@ -46,7 +41,8 @@ fn corrected(start: &State, target: &State, limits: &AxisLimits, period_s: f64) 
     let by_velocity = (target.velocity - coasting.velocity) * h;
     let by_acceleration = (target.acceleration - start.acceleration) * h * h;
     // What the jerk of the target makes of them, if it is where it was expected.
-    let (off_position, off_velocity) = (by_position - by_acceleration / 6.0, by_velocity - by_acceleration / 2.0);
+    let (off_position, off_velocity) =
+        (by_position - by_acceleration / 6.0, by_velocity - by_acceleration / 2.0);
     let share = (h / SETTLING_S).min(1.0);
     let (position_gain, velocity_gain) = (share * share, share * (2.0 - share));
     let cubed = h * h * h;

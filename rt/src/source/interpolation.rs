@@ -47,8 +47,7 @@ impl Window {
             to_ns.wrapping_sub(from_ns) as i64 as f64 / NANOSECONDS_PER_SECOND as f64
         };
         let [t0, t1, t2, t3, t4, t5] = *stamps_ns;
-        let steps_s =
-            [seconds(t0, t1), seconds(t1, t2), seconds(t2, t3), seconds(t3, t4), seconds(t4, t5)];
+        let steps_s = [seconds(t0, t1), seconds(t1, t2), seconds(t2, t3), seconds(t3, t4), seconds(t4, t5)];
         let [h0, h1, h2, h3, h4] = steps_s;
         Self {
             from,
@@ -248,7 +247,8 @@ impl<'a> Differences<'a> {
     /// The velocity over all points that are known.
     fn mean_velocity(&self) -> f64 {
         let steps = self.window.from..self.window.to.saturating_sub(1);
-        let ways = self.first.iter().zip(&self.window.steps_s).map(|(slope, step_s)| (slope * step_s, *step_s));
+        let ways =
+            self.first.iter().zip(&self.window.steps_s).map(|(slope, step_s)| (slope * step_s, *step_s));
         let (way, time_s) = ways
             .skip(steps.start)
             .take(steps.len())

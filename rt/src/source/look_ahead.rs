@@ -4,9 +4,7 @@ use arrayvec::ArrayVec;
 
 use super::delay::{DelayEstimator, StreamDelay};
 use super::interpolation::{BEGIN, WINDOW, Window};
-use super::target::{
-    AxisPoint, AxisTarget, PointRole, StreamCounts, StreamPoint, StreamSample, StreamWish,
-};
+use super::target::{AxisPoint, AxisTarget, PointRole, StreamCounts, StreamPoint, StreamSample, StreamWish};
 use crate::guard::AxisLimits;
 use crate::plan::State;
 use crate::record::MAX_AXES;
@@ -422,8 +420,7 @@ where
             (from, to) = (from.min(place), place + 1);
         }
         let last_ns = stamps_ns.get(BEGIN + 1).copied().unwrap_or(0);
-        let coasted_s =
-            played_ns.saturating_sub(last_ns) as f64 / NANOSECONDS_PER_SECOND as f64;
+        let coasted_s = played_ns.saturating_sub(last_ns) as f64 / NANOSECONDS_PER_SECOND as f64;
         let window = Window::new(&stamps_ns, from, to, played_ns.min(last_ns));
         let rate = self.delay.time_rate();
         let mut targets = [AxisTarget::default(); AXES];

@@ -21,5 +21,6 @@ pub use delay::StreamDelay;
 pub use follower::follow;
 pub use look_ahead::{LookAhead, LookAheadParameters, POINTS_AT_MOST, PointError};
 pub use target::{
-    AxisPoint, AxisTarget, Follow, PointRole, StreamCounts, StreamPoint, StreamReport, StreamSample, StreamState, StreamWish,
+    AxisPoint, AxisTarget, Follow, PointRole, StreamCounts, StreamPoint, StreamReport, StreamSample,
+    StreamState, StreamWish,
 };

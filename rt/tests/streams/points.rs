@@ -98,7 +98,11 @@ fn sine(time_s: f64) -> State {
 /// Points of a motion, in time.
 fn points(motion: impl Fn(f64) -> State, rate_hz: f64, duration_s: f64, says_all: bool) -> Vec<Arrival> {
     let of = |state: State| {
-        if says_all { AxisPoint::moving(state.position, state.velocity) } else { AxisPoint::position(state.position) }
+        if says_all {
+            AxisPoint::moving(state.position, state.velocity)
+        } else {
+            AxisPoint::position(state.position)
+        }
     };
     (0..(duration_s * rate_hz) as u32)
         .map(|number| f64::from(number) / rate_hz)
@@ -166,8 +170,10 @@ fn a_joint_is_led_to_a_stream_that_begins_far_from_it() {
 fn what_a_standing_stream_says_of_its_velocity_moves_nothing() {
     for (velocity, acceleration) in [(1e9, None), (1.5, Some(-1e9)), (-1.5, Some(9.0))] {
         let axis = AxisPoint { position: 0.0, velocity: Some(velocity), acceleration };
-        let points: Vec<Arrival> =
-            (0..100).map(|number| 0.02 * f64::from(number)).map(|time_s| single(time_s, time_s, axis)).collect();
+        let points: Vec<Arrival> = (0..100)
+            .map(|number| 0.02 * f64::from(number))
+            .map(|time_s| single(time_s, time_s, axis))
+            .collect();
         let streamed = stream(&points, Follow::Smooth, StreamDelay::Automatic, 1.9);
         assert!(streamed.set.iter().all(|(_, set)| set.abs() < 1e-12));
     }
@@ -204,7 +210,13 @@ fn points_in_any_order_and_twice_make_the_same_motion() {
 }
 
 /// Chunks of so many points, each of which replaces the future of the one before; each was begun so long before it comes.
-fn chunks(motion: impl Fn(f64) -> State, length: usize, every_s: f64, latency_s: f64, duration_s: f64) -> Vec<Arrival> {
+fn chunks(
+    motion: impl Fn(f64) -> State,
+    length: usize,
+    every_s: f64,
+    latency_s: f64,
+    duration_s: f64,
+) -> Vec<Arrival> {
     let mut arrivals = vec![];
     let mut begun_s = 0.0;
     while begun_s < duration_s {

@@ -99,7 +99,10 @@ fn what_is_no_number_stops_the_group_where_it_can() {
         rig.stream_state(bad);
         rig.run_until(Phase::Holding, 1_000);
         let stops = rig.stops();
-        assert_eq!((stops.len(), stops[0].rule(), stops[0].category), (1, Rule::NotFinite, StopCategory::Two));
+        assert_eq!(
+            (stops.len(), stops[0].rule(), stops[0].category),
+            (1, Rule::NotFinite, StopCategory::Two)
+        );
         assert_differences_kept(&rig, JERK);
     }
 }

@@ -14,8 +14,8 @@ use super::travel::{counting, travel};
 use crate::canopen::dcf::DeviceConfiguration;
 use crate::config::defaults;
 use crate::config::model::{
-    Axis, Control, DriveFamily, Feedback, Identity, Follow, Interface, Limits, PdoMapping,
-    SimulatedJoint, Travel,
+    Axis, Control, DriveFamily, Feedback, Follow, Identity, Interface, Limits, PdoMapping, SimulatedJoint,
+    Travel,
 };
 use crate::config::problem_kind::ProblemKind;
 use crate::config::quantities::Quantities;
@@ -144,10 +144,6 @@ fn axis(mut section: Section<'_>, machine: &Machine<'_>, earlier: &[ReadAxis]) -
     let follow = section
         .get("follow")
         .and_then(|entry| entry.choice(&[("smooth", Follow::Smooth), ("exact", Follow::Exact)]));
-    if let Some(entry) = section.get("on_violation") {
-        let by = "follow = \"smooth\" (as close as the limits allow) or follow = \"exact\" (or else a stop)";
-        entry.report(ProblemKind::Replaced { key: entry.spot.key.clone(), by });
-    }
     let missed =
         section.get("missed_feedback_cycles").and_then(|entry| entry.integer(ranges::MISSED_FEEDBACK_CYCLES));
     let feedback_delay =

@@ -7,7 +7,9 @@ use super::section::Section;
 use crate::bus::schedule::automatic_command_phase;
 use crate::config::bounds::Bounds;
 use crate::config::defaults;
-use crate::config::model::{Axis, Config, Control, Cycle, Master, Realtime, Simulation, StreamDelay, Telemetry};
+use crate::config::model::{
+    Axis, Config, Control, Cycle, Master, Realtime, Simulation, StreamDelay, Telemetry,
+};
 use crate::config::problem_kind::ProblemKind;
 use crate::config::quantity::Quantity;
 use crate::config::ranges;

@@ -128,7 +128,9 @@ mod tests {
                 std::thread::spawn(move || {
                     for (number, axes) in chunk.iter().enumerate().skip(half).step_by(2) {
                         let at_ns = (10 + 10 * number as u64) * MILLISECOND_NS;
-                        streamer.push(&[StreamPoint { at_ns, role: PointRole::Single, axes: *axes }]).unwrap();
+                        streamer
+                            .push(&[StreamPoint { at_ns, role: PointRole::Single, axes: *axes }])
+                            .unwrap();
                     }
                 })
             })

@@ -2,8 +2,8 @@
 
 use takt_rt::{
     AxisRecord, BusHealth, BusState, CycleRecord, CycleTiming, DriveState, EventKind, Origin, Phase,
-    RejectReason, RequestError, RequestId, RequestKind, Rule, StopCategory, StopCause, StopReason, StreamState,
-    TimingLevel,
+    RejectReason, RequestError, RequestId, RequestKind, Rule, StopCategory, StopCause, StopReason,
+    StreamState, TimingLevel,
 };
 
 use super::EventFields;
