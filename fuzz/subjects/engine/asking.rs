@@ -122,7 +122,7 @@ pub fn point(engine: &Engine, now_ns: u64, input: &mut Input<'_>) -> StreamPoint
     let scale = input.byte();
     let largest_step = STREAM_STEP * f64::from(1u32 << (scale % 20));
     let role = match scale / 64 {
-        0 => PointRole::Chunk { is_first: scale % 2 == 0, is_last: scale % 5 == 0 },
+        0 => PointRole::Chunk { is_first: scale.is_multiple_of(2), is_last: scale.is_multiple_of(5) },
         _ => PointRole::Single,
     };
     let mut axes = [AxisPoint::default(); MAX_AXES];

@@ -48,7 +48,9 @@ fn corrected(start: &State, target: &State, limits: &AxisLimits, period_s: f64) 
     let cubed = h * h * h;
     let correction = (position_gain * off_position.abs() + velocity_gain * off_velocity.abs()) / cubed;
     let steepest = limits.acceleration.min(limits.deceleration);
-    if !(correction <= limits.jerk.min(steepest / (CORRECTING * SETTLING_S))) {
+    // What is no number is not small either.
+    let is_small = correction <= limits.jerk.min(steepest / (CORRECTING * SETTLING_S));
+    if !is_small {
         return None;
     }
     let jerk = (by_acceleration + position_gain * off_position + velocity_gain * off_velocity) / cubed;
