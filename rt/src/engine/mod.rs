@@ -37,7 +37,7 @@ use crate::bus_set::BusSet;
 use crate::dispatch::Dispatch;
 use crate::frame::{Frame, Id};
 use crate::group_trajectory::GroupTrajectory;
-use crate::host::{AxisSnapshot, HostInterface, Snapshot};
+use crate::host::{HostInterface, Snapshot};
 use crate::phase::Phase;
 use crate::port::BusHealth;
 use crate::record::{CycleRecord, CycleTiming, Event, EventKind, MAX_AXES, MAX_BUSES};
@@ -419,16 +419,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         };
         snapshot.stop = self.stop;
         for (axis, shown) in self.axes.iter().zip(&mut snapshot.axes) {
-            *shown = AxisSnapshot {
-                position_set: axis.set_point().position,
-                position: axis.position(),
-                velocity: axis.velocity(),
-                statusword: axis.statusword(),
-                drive_state: axis.drive_state(),
-                error_code: axis.error_code(),
-                is_heard: axis.is_heard(),
-                unanswered: axis.unanswered(),
-            };
+            axis.show(shown);
         }
         for (shown, health) in snapshot.buses.iter_mut().zip(buses) {
             *shown = *health;

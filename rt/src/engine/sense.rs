@@ -92,13 +92,15 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         self.backlog.pass(input.behind);
         let elapsed_s = self.period_s * elapsed as f64;
         let asked_by_sync = core::mem::take(&mut self.asked_by_sync);
-        for axis in &mut self.axes {
+        for (axis, shown) in self.axes.iter_mut().zip(&mut self.snapshot.axes) {
             // A drive that was not asked, because the thread was late or the bus behind, has not missed its answer.
             let is_unasked = self.requested.sync
                 && axis.parameters().feedback_since == FeedbackSince::Sync
                 && !asked_by_sync.contains(axis.parameters().bus.into());
             if has_cycle_of(&self.buses, axis, input.slot) && !is_unasked {
-                axis.begin_cycle(elapsed_s);
+                if axis.begin_cycle(elapsed_s) {
+                    (shown.feedback_slot, shown.feedback_ns) = (input.slot, input.now_ns);
+                }
                 if axis.parameters().feedback_since != FeedbackSince::Sync {
                     axis.expect_feedback(input.now_ns);
                 }
