@@ -142,14 +142,34 @@ fn put_answers(answers: &Answers, words: &mut Words<'_>) {
             words.put(0);
             return;
         };
-        let axis = refused.axis.map_or(0, |axis| u64::from(axis) << 32 | 1 << 40);
-        let kinds = pack([refused.request as u8, refused.reason.number(), refused.phase as u8, 1]);
-        let (asked, allowed) = refused.reason.numbers();
-        words.put(kinds | axis);
+        put_rejection(refused, words);
         words.put(*id);
-        words.put_f64(asked);
-        words.put_f64(allowed);
     }
+}
+
+pub fn put_rejection(refused: &RequestError, words: &mut Words<'_>) {
+    let axis = refused.axis.map_or(0, |axis| u64::from(axis) << 32 | 1 << 40);
+    let kinds = pack([refused.request as u8, refused.reason.number(), refused.phase as u8, 1]);
+    let (asked, allowed) = refused.reason.numbers();
+    words.put(kinds | axis);
+    words.put_f64(asked);
+    words.put_f64(allowed);
+}
+
+/// `None` at the end of the rejections.
+pub fn take_rejection(words: &mut Words<'_>) -> Option<RequestError> {
+    let packed = words.take();
+    let [request, reason, phase, is_there] = unpack(packed);
+    if is_there == 0 {
+        return None;
+    }
+    let (asked, allowed) = (words.take_f64(), words.take_f64());
+    Some(RequestError {
+        request: RequestKind::ALL.get(usize::from(request)).copied().unwrap_or(RequestKind::Shutdown),
+        reason: RejectReason::from_numbers(reason, asked, allowed).unwrap_or(RejectReason::Phase),
+        axis: (packed >> 40 & 1 == 1).then_some((packed >> 32) as u8),
+        phase: phase_of(phase),
+    })
 }
 
 fn take_answers(words: &mut Words<'_>) -> Answers {
@@ -157,19 +177,8 @@ fn take_answers(words: &mut Words<'_>) -> Answers {
     let mut bits = || u128::from(words.take()) | u128::from(words.take()) << 64;
     let mut answers = Answers { newest, taken_up: bits(), rejected: bits(), ..Answers::default() };
     for place in &mut answers.rejections {
-        let packed = words.take();
-        let [request, reason, phase, is_there] = unpack(packed);
-        if is_there == 0 {
-            break;
-        }
+        let Some(rejected) = take_rejection(words) else { break };
         let id = RequestId(words.take());
-        let (asked, allowed) = (words.take_f64(), words.take_f64());
-        let rejected = RequestError {
-            request: RequestKind::ALL.get(usize::from(request)).copied().unwrap_or(RequestKind::Shutdown),
-            reason: RejectReason::from_numbers(reason, asked, allowed).unwrap_or(RejectReason::Phase),
-            axis: (packed >> 40 & 1 == 1).then_some((packed >> 32) as u8),
-            phase: phase_of(phase),
-        };
         *place = Some((id, rejected));
     }
     answers
@@ -315,11 +324,11 @@ fn take_bus(words: &mut Words<'_>) -> BusHealth {
     }
 }
 
-fn phase_of(number: u8) -> Phase {
+pub fn phase_of(number: u8) -> Phase {
     Phase::ALL.get(usize::from(number)).copied().unwrap_or_default()
 }
 
-fn drive_state_of(number: u8) -> DriveState {
+pub fn drive_state_of(number: u8) -> DriveState {
     DriveState::ALL.get(usize::from(number)).copied().unwrap_or_default()
 }
 
@@ -332,13 +341,13 @@ fn unpack(word: u64) -> [u8; 4] {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::controller::channels::latest::{Attempt, latest};
     use proptest::prelude::*;
     use takt_rt::{MotionReport, MotionState};
 
-    fn stop_reasons() -> impl Strategy<Value = StopReason> {
+    pub fn stop_reasons() -> impl Strategy<Value = StopReason> {
         let categories = prop::sample::select(vec![StopCategory::Zero, StopCategory::One, StopCategory::Two]);
         let (rules, phases) = (prop::sample::select(&Rule::ALL[..]), prop::sample::select(&Phase::ALL[..]));
         let origins = prop_oneof![
@@ -359,7 +368,7 @@ mod tests {
         )
     }
 
-    fn rejections() -> impl Strategy<Value = RequestError> {
+    pub fn rejections() -> impl Strategy<Value = RequestError> {
         let requests = prop::sample::select(&RequestKind::ALL[..]);
         let reasons = prop::sample::select(&RejectReason::ALL[..]);
         let phases = prop::sample::select(&Phase::ALL[..]);
