@@ -1,5 +1,7 @@
 //! Own frames that have not got onto the wire, bus by bus.
 
+use arrayvec::ArrayVec;
+
 use crate::bus_set::BusSet;
 
 /// The buses that are behind, and for how long.
@@ -9,29 +11,33 @@ pub(super) struct Backlog<const BUSES: usize> {
     behind: BusSet,
     /// The interfaces that had no room for a frame since the last cycle.
     not_taken: BusSet,
-    /// Cycles in a row in which a bus was behind, a bus each.
-    behind_cycles: [u32; BUSES],
-    /// Cycles in a row in which a bus was behind or had no room, a bus each.
-    blocked_cycles: [u32; BUSES],
+    buses: ArrayVec<BusBacklog, BUSES>,
 }
 
-impl<const BUSES: usize> Default for Backlog<BUSES> {
-    fn default() -> Self {
-        let (behind, not_taken) = (BusSet::default(), BusSet::default());
-        Self { behind, not_taken, behind_cycles: [0; BUSES], blocked_cycles: [0; BUSES] }
-    }
+/// One bus, in cycles in a row.
+#[derive(Clone, Copy, Debug, Default)]
+struct BusBacklog {
+    /// It was behind.
+    behind_cycles: u32,
+    /// It was behind or had no room.
+    blocked_cycles: u32,
 }
 
 impl<const BUSES: usize> Backlog<BUSES> {
+    /// For so many buses.
+    pub(super) fn new(buses: usize) -> Self {
+        let buses = core::iter::repeat_n(BusBacklog::default(), buses.min(BUSES)).collect();
+        Self { behind: BusSet::default(), not_taken: BusSet::default(), buses }
+    }
+
     /// Takes the buses that are behind in this cycle.
     pub(super) fn pass(&mut self, behind: BusSet) {
         self.behind = behind;
         let not_taken = core::mem::take(&mut self.not_taken);
-        for (bus, cycles) in self.behind_cycles.iter_mut().enumerate() {
-            *cycles = counted(*cycles, behind.contains(bus));
-        }
-        for (bus, cycles) in self.blocked_cycles.iter_mut().enumerate() {
-            *cycles = counted(*cycles, behind.contains(bus) || not_taken.contains(bus));
+        for (bus, own) in self.buses.iter_mut().enumerate() {
+            let is_behind = behind.contains(bus);
+            own.behind_cycles = counted(own.behind_cycles, is_behind);
+            own.blocked_cycles = counted(own.blocked_cycles, is_behind || not_taken.contains(bus));
         }
     }
 
@@ -52,12 +58,12 @@ impl<const BUSES: usize> Backlog<BUSES> {
 
     /// Cycles in a row in which a bus was behind.
     pub(super) fn behind_cycles(&self, bus: usize) -> u32 {
-        self.behind_cycles.get(bus).copied().unwrap_or(0)
+        self.buses.get(bus).map_or(0, |bus| bus.behind_cycles)
     }
 
     /// The bus that has been behind, or without room, for the longest time, and the cycles in a row.
     pub(super) fn longest_blocked(&self) -> (usize, u32) {
-        let blocked = self.blocked_cycles.iter().copied().enumerate().rev();
+        let blocked = self.buses.iter().map(|bus| bus.blocked_cycles).enumerate().rev();
         blocked.max_by_key(|(_, cycles)| *cycles).unwrap_or_default()
     }
 }
@@ -79,7 +85,7 @@ mod tests {
 
     #[test]
     fn buses_that_are_behind_one_after_the_other_are_not_taken_for_one() {
-        let mut backlog: Backlog<3> = Backlog::default();
+        let mut backlog: Backlog<3> = Backlog::new(3);
         for cycle in 0..30 {
             backlog.pass(set(cycle % 3));
             assert!(backlog.longest_blocked().1 <= 1);
@@ -90,7 +96,7 @@ mod tests {
 
     #[test]
     fn an_interface_without_room_counts_until_it_takes_every_frame() {
-        let mut backlog: Backlog<2> = Backlog::default();
+        let mut backlog: Backlog<2> = Backlog::new(2);
         for cycles in 1..5 {
             backlog.note_not_taken(set(0));
             backlog.pass(BusSet::default());

@@ -93,6 +93,9 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
             return;
         }
         let slot = self.present_slot();
+        if self.buses.get(bus).is_some_and(|bus| has_cycle(bus, slot)) {
+            self.unsent.clear(bus);
+        }
         for index in 0..self.axes.len() {
             let Some(axis) = self.axes.get(index) else { continue };
             if usize::from(axis.parameters().bus) != bus || !has_cycle_of(&self.buses, axis, slot) {

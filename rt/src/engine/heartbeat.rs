@@ -1,5 +1,7 @@
 //! The heartbeat of this controller (CiA 301, 7.2.8.3.2), which the drives watch: when it leaves on each bus.
 
+use arrayvec::ArrayVec;
+
 use super::parameters::Heartbeat;
 use crate::frame::{Frame, Id};
 
@@ -17,18 +19,26 @@ pub(super) struct HeartbeatProducer<const BUSES: usize> {
     heartbeat: Heartbeat,
     /// Cycles for which it waits after an absence.
     held_cycles: u32,
-    /// Cycles until the next one, on each bus.
-    due: [u32; BUSES],
-    /// Cycles for which one has been due and could not leave, on each bus.
-    overdue: [u32; BUSES],
-    /// Heartbeats that have still to leave before any drive is enabled, on each bus.
-    awaited: [u32; BUSES],
+    buses: ArrayVec<BusHeartbeat, BUSES>,
+}
+
+/// The heartbeat on one bus.
+#[derive(Clone, Copy, Debug, Default)]
+struct BusHeartbeat {
+    /// Cycles until the next one.
+    due: u32,
+    /// Cycles for which one has been due and could not leave.
+    overdue: u32,
+    /// Heartbeats that have still to leave before any drive is enabled.
+    awaited: u32,
 }
 
 impl<const BUSES: usize> HeartbeatProducer<BUSES> {
-    pub(super) fn new(heartbeat: Heartbeat, slowest_divider: u32) -> Self {
+    /// For so many buses, the slowest of which has a cycle of so many slots.
+    pub(super) fn new(heartbeat: Heartbeat, buses: usize, slowest_divider: u32) -> Self {
         let held_cycles = HELD_BUS_CYCLES.saturating_mul(slowest_divider);
-        Self { heartbeat, held_cycles, due: [0; BUSES], overdue: [0; BUSES], awaited: [0; BUSES] }
+        let buses = core::iter::repeat_n(BusHeartbeat::default(), buses.min(BUSES)).collect();
+        Self { heartbeat, held_cycles, buses }
     }
 
     /// Cycles without a heartbeat after which the drives stop by themselves.
@@ -39,7 +49,7 @@ impl<const BUSES: usize> HeartbeatProducer<BUSES> {
     /// Lets slots pass. After an absence that a drive may have noticed, the heartbeat waits.
     pub(super) fn pass(&mut self, elapsed: u64) {
         let was_away = elapsed > self.heartbeat.cycles.into();
-        for (due, overdue) in self.due.iter_mut().zip(&mut self.overdue) {
+        for BusHeartbeat { due, overdue, .. } in &mut self.buses {
             *overdue = if *due == 0 { overdue.saturating_add(1) } else { 0 };
             *due = if was_away { (*due).max(self.held_cycles) } else { due.saturating_sub(1) };
         }
@@ -48,25 +58,25 @@ impl<const BUSES: usize> HeartbeatProducer<BUSES> {
     /// A drive watches the controller from the first heartbeat on that it receives after its set-up: that one leaves before
     /// the drive is enabled, and not only after a whole period.
     pub(super) fn hasten(&mut self) {
-        self.awaited = [BEFORE_ENABLING; BUSES];
-        self.due.iter_mut().for_each(|due| *due = (*due).min(self.held_cycles));
+        for bus in &mut self.buses {
+            bus.awaited = BEFORE_ENABLING;
+            bus.due = bus.due.min(self.held_cycles);
+        }
     }
 
     /// Whether enough heartbeats have left on a bus, or leave with this cycle, for its drives to be enabled.
     pub(super) fn allows_enabling(&self, bus: usize) -> bool {
-        let (awaited, due) = (self.awaited.get(bus), self.due.get(bus));
-        awaited.copied().unwrap_or(0) <= u32::from(due == Some(&0))
+        self.buses.get(bus).is_none_or(|bus| bus.awaited <= u32::from(bus.due == 0))
     }
 
     /// The heartbeat of a bus, if it is due. It counts as sent. One that could not leave for a whole period has been missed by
     /// the drives as in an absence.
     pub(super) fn take(&mut self, bus: usize) -> Option<Frame> {
-        let (due, awaited) = (self.due.get_mut(bus)?, self.awaited.get_mut(bus)?);
+        let BusHeartbeat { due, overdue, awaited } = self.buses.get_mut(bus)?;
         if *due > 0 {
             return None;
         }
-        let overdue = core::mem::take(self.overdue.get_mut(bus)?);
-        if overdue > self.heartbeat.cycles {
+        if core::mem::take(overdue) > self.heartbeat.cycles {
             *due = self.held_cycles;
             return None;
         }

@@ -29,6 +29,7 @@ mod slots;
 mod state;
 mod step;
 mod targets;
+mod unsent_steps;
 
 use arrayvec::ArrayVec;
 
@@ -50,6 +51,7 @@ use outbox::Outbox;
 use parameters::{axes_of, dispatch_of};
 use slots::SlotWatch;
 use state::GroupState;
+use unsent_steps::UnsentSteps;
 
 pub use parameters::{BusParameters, CycleCount, EngineParameters, Heartbeat, SetUpError};
 pub use sense::Receiver;
@@ -216,6 +218,7 @@ pub struct Engine<const AXES: usize = MAX_AXES, const BUSES: usize = MAX_BUSES> 
     /// Cycles of a fault reset that are still to come.
     fault_reset_cycles: u32,
     commands: Commands,
+    unsent: UnsentSteps<BUSES>,
     /// Whether the commands of this cycle were ready in time, as far as is known.
     deadline: Deadline,
     requested: Requested,
@@ -248,8 +251,6 @@ enum Commands {
     None,
     /// They are to leave with this cycle.
     Made,
-    /// They were made in an earlier cycle, and were ready too late. They leave with the next one, in place of new ones.
-    Held,
 }
 
 /// What was asked for that no later request takes back.
@@ -283,10 +284,10 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         let dispatch = dispatch_of(&parameters)?;
         let axes = axes_of(&parameters);
         let axis_count = parameters.axes.len() as u8;
+        let buses = parameters.buses.len();
         let slowest_divider = parameters.buses.iter().map(|bus| bus.divider).max().unwrap_or(1);
-        let heartbeat =
-            parameters.heartbeat.map(|heartbeat| HeartbeatProducer::new(heartbeat, slowest_divider));
-        let bus_count = parameters.buses.len() as u8;
+        let heartbeat = parameters.heartbeat.map(|own| HeartbeatProducer::new(own, buses, slowest_divider));
+        let bus_count = buses as u8;
         Ok(Self {
             period_ns: parameters.period_ns,
             period_s: parameters.period_ns as f64 / NANOSECONDS_PER_SECOND as f64,
@@ -303,11 +304,12 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
             stop: None,
             fault_reset_cycles: 0,
             commands: Commands::None,
+            unsent: UnsentSteps::new(buses),
             deadline: Deadline::Met,
             requested: Requested::default(),
             now_ns: 0,
             slots: SlotWatch::new(parameters.timing),
-            backlog: Backlog::default(),
+            backlog: Backlog::new(buses),
             skip_sync: BusSet::default(),
             asked_by_sync: BusSet::default(),
             foreign_frame: None,
@@ -400,9 +402,6 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         self.dropped += u64::from(!host.record(&self.record));
         self.show(timing.slot, now_ns, buses);
         host.publish(&self.snapshot);
-        if is_late && self.commands == Commands::Made {
-            self.commands = Commands::Held;
-        }
     }
 
     fn show(&mut self, slot: u64, now_ns: Nanoseconds, buses: &[BusHealth]) {

@@ -40,23 +40,25 @@ impl<const AXES: usize> Stream<AXES> {
 }
 
 impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
-    /// Makes the next set-points, unless those of the last cycle have still to leave, or every bus is behind.
+    /// Makes the next set-points, unless those of the last cycles have still to leave, or every bus is behind.
     pub(super) fn step(&mut self) {
-        let is_every_bus_behind = self.backlog.behind().is_every_of(self.buses.len());
+        let behind = self.backlog.behind();
         // A group that stops does not wait for the wire any longer, whatever it stops for.
         let is_over_waiting =
             self.stop.is_some() && self.backlog.longest_blocked().1 > self.not_transmitted_cycles;
-        let must_wait = is_every_bus_behind && !is_over_waiting;
-        let is_held = self.commands == Commands::Held;
+        let must_wait = behind.is_every_of(self.buses.len()) && !is_over_waiting;
         self.commands = match self.state {
             GroupState::Passive => Commands::None,
-            _ if must_wait && is_held => Commands::Held,
             _ if must_wait => Commands::None,
             _ => Commands::Made,
         };
-        if must_wait || is_held {
+        if must_wait || self.unsent.are_enough(&self.buses, behind) {
             // Drives may have obeyed what was said by SDO.
             return self.end_disabling();
+        }
+        if self.commands == Commands::Made {
+            self.unsent.count(behind);
+            self.snapshot.steps += 1;
         }
         for _ in 0..ATTEMPTS {
             match self.step_phase() {
