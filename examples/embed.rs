@@ -18,7 +18,7 @@ use takt::controller::session::SessionOptions;
 fn main() -> miette::Result<()> {
     let path = std::env::args().nth(1).map_or_else(|| PathBuf::from("configs/arm6-erob.toml"), PathBuf::from);
     let config = Config::load(&path)?;
-    let mut arm = Controller::start(config, SessionOptions::default()).into_diagnostic()?;
+    let arm = Controller::start(config, SessionOptions::default()).into_diagnostic()?;
 
     let middle = |axis: &takt::config::Axis| 0.5 * (axis.limits.position_min + axis.limits.position_max);
     let targets: Vec<f64> = arm.axes().iter().map(middle).collect();

@@ -2,16 +2,19 @@
 //! their three sides.
 //!
 //! ```text
-//! HostSide ── requests, service frames ──▶ RtSide
-//! clients  ── points of a stream, from any number of threads ──▶ RtSide (takt_rt::HostInterface)
-//! HostSide ◀── service frames, newest snapshot (any number of observers) ── RtSide
+//! HostSide ── requests, service frames ──▶ RtSide (takt_rt::HostInterface)
+//! clients  ── requests, stops and points of a stream, from any number of threads ──▶ RtSide
+//! HostSide ◀── service frames, newest snapshot, last events (any number of observers) ── RtSide
 //! LogSide  ◀── cycle records, events ── RtSide
 //! ```
 //!
 //! No call on [`RtSide`] allocates, locks or waits, even if another thread is preempted in the middle of a call.
 
+mod client_requests;
+mod event_words;
 mod latest;
 mod motion_words;
+mod observed_events;
 mod primitives;
 mod records;
 mod request_numbers;
@@ -26,12 +29,15 @@ use takt_rt::{
 
 use super::assemble;
 use crate::config::Config;
+use client_requests::{TakenRequests, client_requests};
 use latest::{Attempt, Reader, Writer};
+use observed_events::{EventWriter, observed_events};
 use records::{RecordConsumer, RecordProducer};
-
-pub use request_numbers::RequestNumbers;
 use stream::{StreamReceiver, stream_channel};
 
+pub use client_requests::{ClientRequests, MotionEnd, WAITING_AT_MOST};
+pub use observed_events::EventReader;
+pub use request_numbers::RequestNumbers;
 pub use ring::{Consumer, Producer, ring};
 pub use stream::Streamer;
 
@@ -46,7 +52,7 @@ pub struct ChannelSizes {
     pub buses: usize,
     /// Cycle records that wait for the logger.
     pub records: usize,
-    /// Events that wait for the logger.
+    /// Events that wait for the logger, and events that an observer can be behind.
     pub events: usize,
     /// Requests that wait for the next cycle.
     pub requests: usize,
@@ -98,18 +104,26 @@ pub fn channels(sizes: &ChannelSizes) -> (RtSide, HostSide, LogSide) {
     let (received_in, received_out) = ring(sizes.service_in);
     let (record_in, record_out) = records::record_ring(sizes.records);
     let (event_in, event_out) = ring(sizes.events);
+    let (observed_in, observed_out) = observed_events(sizes.events);
+    let numbers = RequestNumbers::default();
+    let (clients, taken) = client_requests(numbers.clone(), WAITING_AT_MOST);
     let rt = RtSide {
         requests: request_out,
+        clients: taken,
+        is_client_next: true,
         stream,
         service: service_out,
         received: received_in,
         records: record_in,
         events: event_in,
+        observed: observed_in,
         snapshot: snapshot_in,
     };
     let host = HostSide {
         requests: request_in,
-        numbers: RequestNumbers::default(),
+        numbers,
+        clients,
+        observed: observed_out,
         streamer,
         service: service_in,
         received: received_out,
@@ -121,17 +135,27 @@ pub fn channels(sizes: &ChannelSizes) -> (RtSide, HostSide, LogSide) {
 /// The real-time thread's side.
 pub struct RtSide {
     requests: Consumer<RequestEnvelope>,
+    clients: TakenRequests,
+    /// Whether a client's request comes before the next one of the host. They alternate, so that no flood of the one holds up
+    /// the other.
+    is_client_next: bool,
     stream: StreamReceiver,
     service: Vec<Consumer<Frame>>,
     received: Producer<(usize, Received)>,
     records: RecordProducer,
     events: Producer<Event>,
+    observed: EventWriter,
     snapshot: Writer,
 }
 
 impl HostInterface for RtSide {
     fn request(&mut self) -> Option<RequestEnvelope> {
-        self.requests.pop()
+        self.is_client_next = !self.is_client_next;
+        if self.is_client_next {
+            self.requests.pop().or_else(|| self.clients.take())
+        } else {
+            self.clients.take().or_else(|| self.requests.pop())
+        }
     }
 
     fn begin_stream(&mut self, _group: u8) {
@@ -155,6 +179,7 @@ impl HostInterface for RtSide {
     }
 
     fn event(&mut self, event: &Event) -> bool {
+        self.observed.write(event);
         self.events.push(*event)
     }
 
@@ -167,6 +192,8 @@ impl HostInterface for RtSide {
 pub struct HostSide {
     requests: Producer<RequestEnvelope>,
     numbers: RequestNumbers,
+    clients: ClientRequests,
+    observed: EventReader,
     streamer: Streamer,
     service: Vec<Producer<Frame>>,
     received: Consumer<(usize, Received)>,
@@ -195,6 +222,16 @@ impl HostSide {
     /// The source of request ids.
     pub fn numbers(&self) -> RequestNumbers {
         self.numbers.clone()
+    }
+
+    /// The way for requests from other threads.
+    pub fn clients(&self) -> ClientRequests {
+        self.clients.clone()
+    }
+
+    /// The events from now on, for another thread.
+    pub fn events(&self) -> EventReader {
+        self.observed.from_now_on()
     }
 
     /// The writing end of the points of a stream, for any thread.
@@ -314,6 +351,16 @@ mod tests {
     }
 
     #[test]
+    fn neither_the_host_nor_a_client_holds_up_the_other() {
+        let (mut rt, mut host, _log) = channels(&sizes());
+        let client = host.clients();
+        let own: Vec<_> = (0..2).map(|_| host.request(Request::Enable).unwrap()).collect();
+        let theirs: Vec<_> = (0..4).map(|_| client.submit(Request::ResetFaults).unwrap()).collect();
+        let taken: Vec<_> = std::iter::from_fn(|| rt.request()).map(|envelope| envelope.id).collect();
+        assert_eq!(taken, [theirs[0], own[0], theirs[1], own[1], theirs[2], theirs[3]]);
+    }
+
+    #[test]
     fn service_frames_keep_to_their_bus_in_both_directions() {
         let (mut rt, mut host, _log) = channels(&sizes());
         let frame = Frame::of(Id::canopen(0x600, 5), [0x40, 0x00, 0x10, 0x00]);
@@ -341,14 +388,17 @@ mod tests {
 
     #[test]
     fn the_log_side_gets_records_and_events_and_the_numbers_of_dropped_ones() {
-        let (mut rt, _host, mut log) = channels(&sizes());
+        let (mut rt, host, mut log) = channels(&sizes());
         let record = CycleRecord { axis_count: 2, ..CycleRecord::default() };
         assert_eq!((0..6).filter(|_| rt.record(&record)).count(), 4);
+        let mut observer = host.events();
         let event =
             |slot| Event { slot, at_ns: 0, kind: EventKind::MotionFinished { request: RequestId(1) } };
         assert_eq!((0..3).filter(|slot| rt.event(&event(*slot))).count(), 2);
         assert_eq!(log.next_record(|seen| *seen), Some(record));
         assert_eq!(log.take_event(), Some(event(0)));
+        assert_eq!(observer.by_ref().map(|seen| seen.slot).collect::<Vec<_>>(), [1, 2]);
+        assert_eq!((observer.missed(), log.events_dropped()), (1, 1));
         assert_eq!((log.records_written(), log.records_dropped(), log.events_dropped()), (4, 2, 1));
     }
 }

@@ -3,10 +3,10 @@
 use std::time::Duration;
 
 use takt_rt::linux::MonotonicClock;
-use takt_rt::{AxisPoint, Clock, MAX_AXES, Nanoseconds, PointRole, StreamPoint, StreamReport};
+use takt_rt::{AxisPoint, Clock, MAX_AXES, Nanoseconds, PointRole, Request, StreamPoint, StreamReport};
 
-use super::Controller;
-use crate::controller::channels::{Observer, Streamer};
+use super::Handle;
+use super::error::CommandError;
 
 /// Why points were not taken; none of them was, then.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -32,6 +32,9 @@ pub enum StreamError {
     /// Too many points wait: the group does not stream, or gets more than it can look ahead.
     #[error("too many points wait for the controller: does it stream?")]
     Full,
+    /// The controller has ended, or is about to.
+    #[error("the controller has ended")]
+    Ended,
 }
 
 /// Hands points to the stream of a controller, from any thread. Clones are cheap and equal.
@@ -40,19 +43,11 @@ pub enum StreamError {
 /// [`lag`](StreamHandle::lag), which depends on the interval of the points, on how late they come, and on the configuration
 /// (`[stream] delay`).
 ///
-/// A group follows the points from [`Controller::begin_stream`] on.
+/// A group follows the points from [`Handle::begin_stream`] on.
 #[derive(Clone)]
-pub struct StreamHandle {
-    axes: usize,
-    streamer: Streamer,
-    observer: Observer,
-}
+pub struct StreamHandle(Handle);
 
 impl StreamHandle {
-    pub(super) fn new(axes: usize, streamer: Streamer, observer: Observer) -> Self {
-        Self { axes, streamer, observer }
-    }
-
     /// The present time on the clock of the stamps: `CLOCK_MONOTONIC`.
     pub fn now_ns() -> Nanoseconds {
         MonotonicClock::default().now_ns()
@@ -66,7 +61,7 @@ impl StreamHandle {
     pub fn push<P: Copy + Into<AxisPoint>>(&self, at_ns: Nanoseconds, axes: &[P]) -> Result<(), StreamError> {
         let axes = self.entries(0, axes)?;
         let point = StreamPoint { at_ns, role: PointRole::Single, axes };
-        self.streamer.push(&[point]).map_err(|_| StreamError::Full)
+        self.0.0.streamer.push(&[point]).map_err(|_| StreamError::Full)
     }
 
     /// The same as [`StreamHandle::push`] for a point that is meant for now.
@@ -91,12 +86,12 @@ impl StreamHandle {
         let entries = |(index, axes): (usize, &A)| self.entries(index, axes.as_ref());
         let points = points.iter().enumerate().map(entries).collect::<Result<Vec<_>, _>>()?;
         let interval_ns = u64::try_from(interval.as_nanos()).unwrap_or(u64::MAX);
-        self.streamer.push_chunk(from_ns, interval_ns, &points).map_err(|_| StreamError::Full)
+        self.0.0.streamer.push_chunk(from_ns, interval_ns, &points).map_err(|_| StreamError::Full)
     }
 
     /// What the stream is doing, how far it is behind the stamps, and how many points have come, came late or were lost.
     pub fn report(&self) -> StreamReport {
-        self.observer.snapshot().stream
+        self.0.state().stream
     }
 
     /// How far the set-points are behind the stamps now.
@@ -109,8 +104,12 @@ impl StreamHandle {
         point: usize,
         axes: &[P],
     ) -> Result<[AxisPoint; MAX_AXES], StreamError> {
-        if axes.len() != self.axes {
-            return Err(StreamError::Count { given: axes.len(), axes: self.axes });
+        if self.0.0.life.is_ending() {
+            return Err(StreamError::Ended);
+        }
+        let expected = self.0.axes().len();
+        if axes.len() != expected {
+            return Err(StreamError::Count { given: axes.len(), axes: expected });
         }
         let mut all = [AxisPoint::default(); MAX_AXES];
         for (axis, (to, from)) in all.iter_mut().zip(axes).enumerate() {
@@ -123,9 +122,18 @@ impl StreamHandle {
     }
 }
 
-impl Controller {
+impl Handle {
+    /// Begins to follow the points of [`Handle::stream`]. The first one must come within the enable time-out. The axes are led to it
+    /// within their limits; where an axis is to `follow = "exact"`, it must be near the joint.
+    ///
+    /// # Errors
+    /// [`CommandError::Refused`] unless the group holds its position and is punctual, [`CommandError::Full`], [`CommandError::Ended`].
+    pub fn begin_stream(&self) -> Result<(), CommandError> {
+        self.request(Request::Stream)
+    }
+
     /// A handle to stream points by, for any thread.
     pub fn stream(&self) -> StreamHandle {
-        StreamHandle::new(self.axes.len(), self.streamer.clone(), self.observer.clone())
+        StreamHandle(self.clone())
     }
 }
