@@ -33,3 +33,4 @@ pub mod printable;
 pub mod sim;
 pub mod telemetry;
 mod text_file;
+pub mod trajectory;

@@ -50,6 +50,7 @@ mod port;
 mod profile;
 mod record;
 mod request;
+mod source;
 mod stop;
 mod stop_category;
 mod time;
@@ -86,6 +87,7 @@ pub use request::{
     AxisProcessData, MappedPdo, Move, ProfileMove, RejectReason, Request, RequestEnvelope, RequestError,
     RequestId, RequestKind,
 };
+pub use source::{PathTime, Polynomial, TimeLawPhase, TrajectorySample, TrajectoryView};
 pub use stop::{Origin, StopCategories, StopCause, StopReason};
 pub use stop_category::StopCategory;
 pub use time::{Grid, NANOSECONDS_PER_SECOND, Nanoseconds};
