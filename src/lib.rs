@@ -29,6 +29,7 @@ pub mod doctor;
 pub mod drive;
 pub mod faults;
 pub mod jitter;
+pub mod play;
 pub mod printable;
 pub mod sim;
 pub mod telemetry;

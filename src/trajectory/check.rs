@@ -81,16 +81,24 @@ fn position_violation(
     duration_s: f64,
     limits: &AxisLimits,
 ) -> Option<Violation> {
+    let mut times = turns.iter().copied().chain([duration_s]);
+    times.find_map(|time_s| {
+        let (broken, value, limit) = position_beyond(value(&of.position, time_s), limits)?;
+        Some(Violation { broken, time_s, value, limit })
+    })
+}
+
+/// A position that is beyond a limit, and the limit.
+pub(super) fn position_beyond(position: f64, limits: &AxisLimits) -> Option<(BrokenLimit, f64, f64)> {
     let room = TOLERANCE * (limits.position_max - limits.position_min);
-    let extrema = turns.iter().copied().chain([duration_s]).map(|time_s| (time_s, value(&of.position, time_s)));
-    let beyond = extrema.filter_map(|(time_s, position)| {
-        let limit = if position > limits.position_max { limits.position_max } else { limits.position_min };
-        let is_within = (limits.position_min - room..=limits.position_max + room).contains(&position);
-        (!is_within).then_some((time_s, position, limit))
-    });
-    beyond
-        .min_by(|one, other| one.0.total_cmp(&other.0))
-        .map(|(time_s, value, limit)| Violation { broken: BrokenLimit::Position, time_s, value, limit })
+    let limit = if position > limits.position_max { limits.position_max } else { limits.position_min };
+    let is_within = (limits.position_min - room..=limits.position_max + room).contains(&position);
+    (!is_within).then_some((BrokenLimit::Position, position, limit))
+}
+
+/// A value that is beyond a limit of its magnitude, and the limit with the sign of the value.
+pub(super) fn beyond(value: f64, broken: BrokenLimit, limit: f64) -> Option<(BrokenLimit, f64, f64)> {
+    is_beyond(value, limit).then_some((broken, value, limit.copysign(value)))
 }
 
 /// The largest magnitude at some times, if it is beyond the limit.

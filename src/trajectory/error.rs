@@ -185,7 +185,9 @@ impl TrajectoryError {
             Self::Missing { quantity, .. } => {
                 let others = match quantity {
                     PointQuantity::Position => "each point needs one",
-                    PointQuantity::Velocity => "all points or none have one, and those with accelerations need one",
+                    PointQuantity::Velocity => {
+                        "all points or none have one, and those with accelerations need one"
+                    }
                     PointQuantity::Acceleration => "all points or none have one",
                 };
                 format!("its {quantity} is missing: {others}")

@@ -75,9 +75,9 @@ mod tests {
     #[test]
     fn simple_roots_are_found_to_the_last_bits() {
         assert_eq!(sign_changes(&[-1.0, 2.0], 3.0).as_slice(), [0.5]);
-        assert_eq!(sign_changes(&[-1.0, 2.0], 0.4).as_slice(), []);
-        assert_eq!(sign_changes(&[3.0], 3.0).as_slice(), []);
-        assert_eq!(sign_changes(&[0.0; 5], 3.0).as_slice(), []);
+        assert!(sign_changes(&[-1.0, 2.0], 0.4).is_empty());
+        assert!(sign_changes(&[3.0], 3.0).is_empty());
+        assert!(sign_changes(&[0.0; 5], 3.0).is_empty());
         let found = sign_changes(&product(&[0.25, 0.5, 1.5, 2.75]), 3.0);
         assert!(found.iter().zip([0.25, 0.5, 1.5, 2.75]).all(|(found, root)| (found - root).abs() < 1e-14));
         assert_eq!(found.len(), 4);

@@ -111,7 +111,10 @@ fn cubics(knots: &Knots<'_>, velocities: &[f64]) -> Vec<Polynomial> {
 
 fn quintics(knots: &Knots<'_>, velocities: &[f64], accelerations: &[f64]) -> Vec<Polynomial> {
     let ends = velocities.windows(2).zip(accelerations.windows(2));
-    intervals(knots).zip(ends).map(|(interval, (v, a))| interval.quintic((v[0], a[0]), (v[1], a[1]))).collect()
+    intervals(knots)
+        .zip(ends)
+        .map(|(interval, (v, a))| interval.quintic((v[0], a[0]), (v[1], a[1])))
+        .collect()
 }
 
 /// At each point the mean of the accelerations of the polynomials of the third degree on both sides of it. Those of the spline

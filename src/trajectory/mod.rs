@@ -25,13 +25,13 @@ mod error;
 mod extrema;
 mod interpolation;
 mod point;
+#[cfg(test)]
+mod tests;
 
 use std::sync::Arc;
 
 use takt_rt::plan::State;
-use takt_rt::{
-    AxisLimits, Polynomial, TimeLawPhase, TrajectorySample, TrajectoryView, braking_distance,
-};
+use takt_rt::{AxisLimits, Polynomial, TimeLawPhase, TrajectorySample, TrajectoryView, braking_distance};
 
 use interpolation::Knots;
 
@@ -103,7 +103,7 @@ impl Trajectory {
         let knot_times: Vec<f64> =
             is_from_here.then_some(0.0).into_iter().chain(times_s.iter().copied()).collect();
         let states = axes.iter().zip(conditions.start).zip(conditions.limits).enumerate();
-        let mut of_axes = Vec::with_capacity(axes.len());
+        let mut columns = Vec::with_capacity(axes.len());
         for (axis, ((points, start), limits)) in states {
             let points = if is_from_here {
                 with_start(points, start)
@@ -112,10 +112,18 @@ impl Trajectory {
                 continued(points, start)
             };
             check_end(axis, &points, limits, conditions.period_s)?;
-            of_axes.push(polynomials(&knot_times, &points, start, limits));
+            columns.push(points);
         }
+        let first = usize::from(is_from_here);
+        check_points(&knot_times, &columns, conditions.limits, first)?;
+        let of_axes: Vec<_> = columns
+            .iter()
+            .zip(conditions.start)
+            .zip(conditions.limits)
+            .map(|((points, start), limits)| polynomials(&knot_times, points, start, limits))
+            .collect();
         let path = Path::new(knot_times, &of_axes);
-        path.check(conditions.limits, usize::from(is_from_here))?;
+        path.check(conditions.limits, first)?;
         Ok(Self::as_written(path))
     }
 
@@ -226,6 +234,39 @@ fn check_values(points: usize, axes: &[AxisPoints]) -> Result<(), TrajectoryErro
     Ok(())
 }
 
+/// Checks what the points say by themselves, and the mean speeds between them: what breaks a limit there breaks it however one
+/// goes from point to point, and is the reason for what polynomials do around it. `first` is as for [`Path::check`].
+fn check_points(
+    times_s: &[f64],
+    axes: &[AxisPoints],
+    limits: &[AxisLimits],
+    first: usize,
+) -> Result<(), TrajectoryError> {
+    for (index, time_s) in times_s.iter().copied().enumerate().skip(first) {
+        for (axis, (points, limits)) in axes.iter().zip(limits).enumerate() {
+            let of =
+                |values: &Option<Vec<f64>>| values.as_ref().and_then(|values| values.get(index).copied());
+            let position = points.positions.get(index).copied().unwrap_or(0.0);
+            let before = index
+                .checked_sub(1)
+                .and_then(|before| Some((times_s.get(before)?, points.positions.get(before)?)));
+            let speed = before.map(|(before_s, before)| (position - before) / (time_s - before_s));
+            let found = check::position_beyond(position, limits)
+                .or_else(|| check::beyond(of(&points.velocities)?, BrokenLimit::Velocity, limits.velocity))
+                .or_else(|| check::beyond(speed?, BrokenLimit::Velocity, limits.velocity))
+                .or_else(|| {
+                    let steepest = limits.acceleration.max(limits.deceleration);
+                    check::beyond(of(&points.accelerations)?, BrokenLimit::Acceleration, steepest)
+                });
+            if let Some((broken, value, limit)) = found {
+                let point = index - first;
+                return Err(TrajectoryError::Limit { point, axis, broken, time_s, value, limit });
+            }
+        }
+    }
+    Ok(())
+}
+
 /// The points of an axis behind its present state.
 fn with_start(points: &AxisPoints, start: &State) -> AxisPoints {
     let behind = |first: f64, values: &[f64]| [first].into_iter().chain(values.iter().copied()).collect();
@@ -262,12 +303,16 @@ fn check_start(
     };
     let steepest = limits.acceleration.max(limits.deceleration);
     // Without a limit of the jerk the acceleration may step.
-    let same_acceleration =
-        if limits.jerk.is_finite() { SAME_RATE * steepest } else { 2.0 * steepest };
+    let same_acceleration = if limits.jerk.is_finite() { SAME_RATE * steepest } else { 2.0 * steepest };
     let position = points.positions.first().copied().unwrap_or(start.position);
     for (quantity, given, present, same) in [
         (PointQuantity::Position, position, start.position, SAME_POSITION),
-        (PointQuantity::Velocity, first(&points.velocities, start.velocity), start.velocity, SAME_RATE * limits.velocity),
+        (
+            PointQuantity::Velocity,
+            first(&points.velocities, start.velocity),
+            start.velocity,
+            SAME_RATE * limits.velocity,
+        ),
         (
             PointQuantity::Acceleration,
             first(&points.accelerations, start.acceleration),
@@ -290,7 +335,8 @@ fn check_end(
     limits: &AxisLimits,
     period_s: f64,
 ) -> Result<(), TrajectoryError> {
-    let last = |values: &Option<Vec<f64>>| values.as_ref().and_then(|values| values.last().copied()).unwrap_or(0.0);
+    let last =
+        |values: &Option<Vec<f64>>| values.as_ref().and_then(|values| values.last().copied()).unwrap_or(0.0);
     let (velocity, acceleration) = (last(&points.velocities), last(&points.accelerations));
     if acceleration != 0.0 && limits.jerk.is_finite() {
         return Err(TrajectoryError::EndAcceleration { axis, acceleration });
