@@ -73,6 +73,8 @@ pub struct Snapshot<const AXES: usize = MAX_AXES, const BUSES: usize = MAX_BUSES
     pub phase: Phase,
     /// Slots that passed unused since the start.
     pub missed_slots: u64,
+    /// Cycles in which the set-points went on, since the start. In the others the last ones had still to leave, or none can.
+    pub steps: u64,
     /// How late the controller has been of late.
     pub timing: TimingLevel,
     /// Set-points of streams that were replaced by the nearest ones within the limits, since the start.
@@ -106,6 +108,7 @@ impl<const AXES: usize, const BUSES: usize> Default for Snapshot<AXES, BUSES> {
             at_ns: 0,
             phase: Phase::default(),
             missed_slots: 0,
+            steps: 0,
             timing: TimingLevel::Normal,
             clamped: 0,
             dropped: 0,

@@ -11,6 +11,8 @@ use crate::watch::TimingLevel;
 pub const MAX_AXES: usize = 32;
 /// The most buses one controller owns.
 pub const MAX_BUSES: usize = 16;
+/// The most groups that the axes of one controller are in.
+pub const MAX_GROUPS: usize = 8;
 
 /// The times of one cycle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -2,7 +2,7 @@
 
 mod fixture;
 
-use fixture::{LIMITS, PERIOD_NS, Rig, parameters};
+use fixture::{LIMITS, PERIOD_NS, Rig, parameters, scale};
 use takt_rt::{EngineParameters, Id, Origin, Phase, Request, Rule};
 
 /// Three axes on a bus with a cycle in every slot, three on one with a cycle in every second.
@@ -43,7 +43,7 @@ fn one_move_leads_the_axes_of_both_buses_to_their_targets_at_one_time() {
     }
     rig.run(4);
     for (axis, fastest) in fastest.into_iter().enumerate() {
-        assert_eq!(rig.drive(axis).position, fixture::scale().position_to_counts(1.25));
+        assert_eq!(rig.drive(axis).position, scale().position_to_counts(1.25));
         assert!((fastest - LIMITS.velocity).abs() < 0.1, "axis {axis} was seen at {fastest}");
     }
     assert_eq!(rig.stops(), []);
@@ -162,4 +162,35 @@ fn two_buses_that_are_behind_one_after_the_other_are_no_bus_that_does_not_transm
     rig.run(5);
     let stops = rig.stops();
     assert_eq!((stops.len(), stops[0].rule(), stops[0].origin), (1, Rule::NotTransmitted, Origin::Bus(0)));
+}
+
+#[test]
+fn a_slow_bus_that_missed_its_slot_sends_the_way_of_one_of_its_cycles_and_not_more() {
+    // Commands that are ready too late, or a wake-up that misses whole slots, in slots of both buses and of the fast one alone.
+    for (compute_ns, late_ns) in [(PERIOD_NS, 0), (0, PERIOD_NS / 2), (0, 2 * PERIOD_NS)] {
+        for before in 300..304 {
+            let mut rig = Rig::of(two_rates()).enable();
+            rig.move_to(1.25);
+            rig.run(before);
+            rig.clock.compute_ns = compute_ns;
+            rig.clock.lateness_ns.push_back(late_ns);
+            rig.run(1);
+            rig.clock.compute_ns = 0;
+            let mut last = rig.drive(3).position;
+            let mut fastest = 0;
+            for _ in 0..20 {
+                rig.run(1);
+                let position = rig.drive(3).position;
+                fastest = fastest.max((position - last).abs());
+                last = position;
+            }
+            let count = scale().resolution();
+            let allowed = LIMITS.velocity * 2.0 * PERIOD_NS as f64 * 1e-9 * count + 1.0;
+            assert!(f64::from(fastest) > 0.9 * allowed, "it is under way: {fastest} of {allowed}");
+            assert!(
+                f64::from(fastest) <= allowed,
+                "{fastest} of {allowed} counts, {compute_ns} ns, {before}"
+            );
+        }
+    }
 }

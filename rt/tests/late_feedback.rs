@@ -181,7 +181,7 @@ fn an_answer_that_was_lost_before_costs_one_sync_and_nothing_else() {
 /// The velocities that an axis makes of a joint's reports, while its drive is asked for them so much too late.
 fn velocities(feedback_since: FeedbackSince, late_ns: &[u64], missed_every: u64) -> Vec<f64> {
     let period_s = PERIOD_NS as f64 * 1e-9;
-    let mut axis = Axis::new(AxisParameters { feedback_since, ..axis(0, 1) });
+    let mut axis = Axis::new(0, AxisParameters { feedback_since, ..axis(0, 1) });
     axis.set_cycle(period_s);
     let (mut velocities, mut last_slot) = (vec![], 0);
     for (slot, late_ns) in (1..400).zip(late_ns.iter().cycle()).filter(|(slot, _)| slot % missed_every != 0) {

@@ -182,10 +182,17 @@ const FAILED_IN_HARDSHIP: [(u64, &str); 9] = [
 ];
 
 /// The same of those on a machine that has too little time.
-const FAILED_IN_OVERLOAD: [(u64, &str); 1] = [(
-    424_242_620,
-    "A drive reported a fault for want of the heartbeat of a machine that was late in every cycle",
-)];
+const FAILED_IN_OVERLOAD: [(u64, &str); 3] = [
+    (
+        424_242_620,
+        "A drive reported a fault for want of the heartbeat of a machine that was late in every cycle",
+    ),
+    (
+        987_655_925,
+        "A slow bus sent three steps in one of its cycles, after commands that were ready too late",
+    ),
+    (424_246_056, "Set-points that had still to leave were counted as steps of the trajectory"),
+];
 
 #[test]
 fn storms_that_have_failed_in_overload_pass() {

@@ -84,11 +84,12 @@ pub struct Axis {
     duplicate_node: DuplicateNodeDetector,
     /// The torque that is commanded: N·m (N).
     torque_set: f64,
+    number: u8,
 }
 
 impl Axis {
-    /// An axis whose drive has reported nothing yet.
-    pub fn new(parameters: AxisParameters) -> Self {
+    /// The axis with this number, whose drive has reported nothing yet.
+    pub fn new(number: u8, parameters: AxisParameters) -> Self {
         let following =
             FollowingErrorGuard::new(parameters.following_error_limit, parameters.following_error_cycles);
         let mut command = ProcessImage::default();
@@ -112,7 +113,18 @@ impl Axis {
             node_monitor: NodeMonitor::default(),
             duplicate_node: DuplicateNodeDetector::default(),
             torque_set: 0.0,
+            number,
         }
+    }
+
+    /// Its number among the axes of the controller, in the order of the configuration.
+    pub const fn number(&self) -> u8 {
+        self.number
+    }
+
+    /// What is its own of what there is of every axis of the controller.
+    pub fn own<T: Copy + Default>(&self, all: &[T]) -> T {
+        all.get(usize::from(self.number)).copied().unwrap_or_default()
     }
 
     /// What does not change.

@@ -1,5 +1,7 @@
 //! Own frames that have not got onto the wire, bus by bus.
 
+use arrayvec::ArrayVec;
+
 use crate::bus_set::BusSet;
 
 /// The buses that are behind, and for how long.
@@ -9,29 +11,34 @@ pub(super) struct Backlog<const BUSES: usize> {
     behind: BusSet,
     /// The interfaces that had no room for a frame since the last cycle.
     not_taken: BusSet,
-    /// Cycles in a row in which a bus was behind, a bus each.
-    behind_cycles: [u32; BUSES],
-    /// Cycles in a row in which a bus was behind or had no room, a bus each.
-    blocked_cycles: [u32; BUSES],
+    /// For how long, a bus each.
+    cycles: ArrayVec<Cycles, BUSES>,
 }
 
-impl<const BUSES: usize> Default for Backlog<BUSES> {
-    fn default() -> Self {
-        let (behind, not_taken) = (BusSet::default(), BusSet::default());
-        Self { behind, not_taken, behind_cycles: [0; BUSES], blocked_cycles: [0; BUSES] }
-    }
+/// Cycles in a row.
+#[derive(Clone, Copy, Debug, Default)]
+struct Cycles {
+    /// In which the bus was behind.
+    behind: u32,
+    /// In which it was behind or had no room.
+    blocked: u32,
 }
 
 impl<const BUSES: usize> Backlog<BUSES> {
+    /// So many buses, none of which is behind.
+    pub(super) fn new(buses: usize) -> Self {
+        let cycles = (0..buses.min(BUSES)).map(|_| Cycles::default()).collect();
+        Self { behind: BusSet::default(), not_taken: BusSet::default(), cycles }
+    }
+
     /// Takes the buses that are behind in this cycle.
     pub(super) fn pass(&mut self, behind: BusSet) {
         self.behind = behind;
         let not_taken = core::mem::take(&mut self.not_taken);
-        for (bus, cycles) in self.behind_cycles.iter_mut().enumerate() {
-            *cycles = counted(*cycles, behind.contains(bus));
-        }
-        for (bus, cycles) in self.blocked_cycles.iter_mut().enumerate() {
-            *cycles = counted(*cycles, behind.contains(bus) || not_taken.contains(bus));
+        for (bus, cycles) in self.cycles.iter_mut().enumerate() {
+            let is_behind = behind.contains(bus);
+            cycles.behind = counted(cycles.behind, is_behind);
+            cycles.blocked = counted(cycles.blocked, is_behind || not_taken.contains(bus));
         }
     }
 
@@ -52,13 +59,16 @@ impl<const BUSES: usize> Backlog<BUSES> {
 
     /// Cycles in a row in which a bus was behind.
     pub(super) fn behind_cycles(&self, bus: usize) -> u32 {
-        self.behind_cycles.get(bus).copied().unwrap_or(0)
+        self.cycles.get(bus).map_or(0, |cycles| cycles.behind)
     }
 
-    /// The bus that has been behind, or without room, for the longest time, and the cycles in a row.
-    pub(super) fn longest_blocked(&self) -> (usize, u32) {
-        let blocked = self.blocked_cycles.iter().copied().enumerate().rev();
-        blocked.max_by_key(|(_, cycles)| *cycles).unwrap_or_default()
+    /// The one of these buses that has been behind, or without room, for the longest time, and the cycles in a row.
+    pub(super) fn longest_blocked(&self, buses: BusSet) -> (usize, u32) {
+        let of_these = self.cycles.iter().enumerate().rev().filter(|(bus, _)| buses.contains(*bus));
+        of_these
+            .map(|(bus, cycles)| (bus, cycles.blocked))
+            .max_by_key(|(_, cycles)| *cycles)
+            .unwrap_or_default()
     }
 }
 
@@ -79,25 +89,28 @@ mod tests {
 
     #[test]
     fn buses_that_are_behind_one_after_the_other_are_not_taken_for_one() {
-        let mut backlog: Backlog<3> = Backlog::default();
+        let mut backlog: Backlog<3> = Backlog::new(3);
         for cycle in 0..30 {
             backlog.pass(set(cycle % 3));
-            assert!(backlog.longest_blocked().1 <= 1);
+            assert!(backlog.longest_blocked(BusSet::first(3)).1 <= 1);
         }
         (0..4).for_each(|_| backlog.pass(set(1)));
-        assert_eq!((backlog.longest_blocked(), backlog.behind_cycles(1)), ((1, 4), 4));
+        assert_eq!((backlog.longest_blocked(BusSet::first(3)), backlog.behind_cycles(1)), ((1, 4), 4));
     }
 
     #[test]
     fn an_interface_without_room_counts_until_it_takes_every_frame() {
-        let mut backlog: Backlog<2> = Backlog::default();
+        let mut backlog: Backlog<2> = Backlog::new(2);
         for cycles in 1..5 {
             backlog.note_not_taken(set(0));
             backlog.pass(BusSet::default());
-            assert_eq!((backlog.longest_blocked(), backlog.behind_cycles(0)), ((0, cycles), 0));
+            assert_eq!(
+                (backlog.longest_blocked(BusSet::first(2)), backlog.behind_cycles(0)),
+                ((0, cycles), 0)
+            );
         }
         backlog.note_not_taken(BusSet::default());
         backlog.pass(BusSet::default());
-        assert_eq!(backlog.longest_blocked().1, 0);
+        assert_eq!(backlog.longest_blocked(BusSet::first(3)).1, 0);
     }
 }

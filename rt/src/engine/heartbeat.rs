@@ -1,5 +1,7 @@
 //! The heartbeat of this controller (CiA 301, 7.2.8.3.2), which the drives watch: when it leaves on each bus.
 
+use arrayvec::ArrayVec;
+
 use super::parameters::Heartbeat;
 use crate::frame::{Frame, Id};
 
@@ -17,18 +19,26 @@ pub(super) struct HeartbeatProducer<const BUSES: usize> {
     heartbeat: Heartbeat,
     /// Cycles for which it waits after an absence.
     held_cycles: u32,
-    /// Cycles until the next one, on each bus.
-    due: [u32; BUSES],
-    /// Cycles for which one has been due and could not leave, on each bus.
-    overdue: [u32; BUSES],
-    /// Heartbeats that have still to leave before any drive is enabled, on each bus.
-    awaited: [u32; BUSES],
+    /// A bus each.
+    buses: ArrayVec<OnBus, BUSES>,
+}
+
+/// The heartbeat on one bus.
+#[derive(Clone, Copy, Debug, Default)]
+struct OnBus {
+    /// Cycles until the next one.
+    due: u32,
+    /// Cycles for which one has been due and could not leave.
+    overdue: u32,
+    /// Heartbeats that have still to leave before any drive is enabled.
+    awaited: u32,
 }
 
 impl<const BUSES: usize> HeartbeatProducer<BUSES> {
-    pub(super) fn new(heartbeat: Heartbeat, slowest_divider: u32) -> Self {
+    pub(super) fn new(heartbeat: Heartbeat, slowest_divider: u32, buses: usize) -> Self {
         let held_cycles = HELD_BUS_CYCLES.saturating_mul(slowest_divider);
-        Self { heartbeat, held_cycles, due: [0; BUSES], overdue: [0; BUSES], awaited: [0; BUSES] }
+        let buses = (0..buses.min(BUSES)).map(|_| OnBus::default()).collect();
+        Self { heartbeat, held_cycles, buses }
     }
 
     /// Cycles without a heartbeat after which the drives stop by themselves.
@@ -39,40 +49,40 @@ impl<const BUSES: usize> HeartbeatProducer<BUSES> {
     /// Lets slots pass. After an absence that a drive may have noticed, the heartbeat waits.
     pub(super) fn pass(&mut self, elapsed: u64) {
         let was_away = elapsed > self.heartbeat.cycles.into();
-        for (due, overdue) in self.due.iter_mut().zip(&mut self.overdue) {
-            *overdue = if *due == 0 { overdue.saturating_add(1) } else { 0 };
-            *due = if was_away { (*due).max(self.held_cycles) } else { due.saturating_sub(1) };
+        for bus in &mut self.buses {
+            bus.overdue = if bus.due == 0 { bus.overdue.saturating_add(1) } else { 0 };
+            bus.due = if was_away { bus.due.max(self.held_cycles) } else { bus.due.saturating_sub(1) };
         }
     }
 
     /// A drive watches the controller from the first heartbeat on that it receives after its set-up: that one leaves before
     /// the drive is enabled, and not only after a whole period.
     pub(super) fn hasten(&mut self) {
-        self.awaited = [BEFORE_ENABLING; BUSES];
-        self.due.iter_mut().for_each(|due| *due = (*due).min(self.held_cycles));
+        for bus in &mut self.buses {
+            bus.awaited = BEFORE_ENABLING;
+            bus.due = bus.due.min(self.held_cycles);
+        }
     }
 
     /// Whether enough heartbeats have left on a bus, or leave with this cycle, for its drives to be enabled.
     pub(super) fn allows_enabling(&self, bus: usize) -> bool {
-        let (awaited, due) = (self.awaited.get(bus), self.due.get(bus));
-        awaited.copied().unwrap_or(0) <= u32::from(due == Some(&0))
+        self.buses.get(bus).is_some_and(|bus| bus.awaited <= u32::from(bus.due == 0))
     }
 
     /// The heartbeat of a bus, if it is due. It counts as sent. One that could not leave for a whole period has been missed by
     /// the drives as in an absence.
     pub(super) fn take(&mut self, bus: usize) -> Option<Frame> {
-        let (due, awaited) = (self.due.get_mut(bus)?, self.awaited.get_mut(bus)?);
-        if *due > 0 {
+        let bus = self.buses.get_mut(bus)?;
+        if bus.due > 0 {
             return None;
         }
-        let overdue = core::mem::take(self.overdue.get_mut(bus)?);
-        if overdue > self.heartbeat.cycles {
-            *due = self.held_cycles;
+        if core::mem::take(&mut bus.overdue) > self.heartbeat.cycles {
+            bus.due = self.held_cycles;
             return None;
         }
-        *awaited = awaited.saturating_sub(1);
+        bus.awaited = bus.awaited.saturating_sub(1);
         // While more are awaited, the next one comes as soon as after an absence.
-        *due = if *awaited > 0 {
+        bus.due = if bus.awaited > 0 {
             self.heartbeat.cycles.min(self.held_cycles + 1)
         } else {
             self.heartbeat.cycles

@@ -12,7 +12,7 @@ use super::motion_words::{MOTION_WORDS, put_motions, take_motions};
 
 /// The largest number of words of a snapshot of so many axes and buses.
 pub const fn snapshot_words(axes: usize, buses: usize) -> usize {
-    17 + MOTION_WORDS + 4 * Answers::EXPLAINED + 4 * axes + 7 * buses
+    18 + MOTION_WORDS + 4 * Answers::EXPLAINED + 4 * axes + 7 * buses
 }
 
 /// The number of words of a streamed command for so many axes.
@@ -26,6 +26,7 @@ pub const NO_SNAPSHOT: Snapshot = Snapshot {
     at_ns: 0,
     phase: Phase::Passive,
     missed_slots: 0,
+    steps: 0,
     timing: TimingLevel::Normal,
     clamped: 0,
     dropped: 0,
@@ -72,6 +73,7 @@ pub fn put_snapshot(snapshot: &Snapshot, words: &mut Words<'_>) {
         u8::from(snapshot.stop.is_some()) | (snapshot.timing as u8) << 1,
     ]));
     words.put(snapshot.missed_slots);
+    words.put(snapshot.steps);
     words.put(snapshot.clamped);
     words.put(snapshot.dropped);
     words.put(snapshot.rejected);
@@ -97,6 +99,7 @@ pub fn take_snapshot(words: &mut Words<'_>) -> Snapshot {
         at_ns,
         phase: phase_of(phase),
         missed_slots: words.take(),
+        steps: words.take(),
         clamped: words.take(),
         timing: TimingLevel::ALL.get(usize::from(flags >> 1)).copied().unwrap_or_default(),
         dropped: words.take(),
@@ -388,10 +391,10 @@ mod tests {
         );
         let refusals = prop::collection::vec((any::<u64>(), rejections()), 0..=Answers::EXPLAINED);
         let answers = (any::<(u64, u64, u128, u128)>(), refusals, motions());
-        (counted, any::<(u64, u64, u64, u64, f64)>(), answers).prop_map(
+        (counted, any::<(u64, u64, u64, u64, u64, f64)>(), answers).prop_map(
             |(
                 (axes, buses, stop, phase),
-                (slot, at_ns, missed_slots, dropped, remaining_s),
+                (slot, at_ns, missed_slots, steps, dropped, remaining_s),
                 ((refused, newest, taken_up, refused_bits), refusals, motions),
             )| {
                 let mut snapshot = Snapshot {
@@ -399,6 +402,7 @@ mod tests {
                     at_ns,
                     phase,
                     missed_slots,
+                    steps,
                     dropped,
                     rejected: refused,
                     answers: Answers {

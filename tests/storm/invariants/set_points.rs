@@ -39,6 +39,8 @@ pub struct SetPoints {
     coasting: f64,
     /// Cycles in which the trajectory went on since the last set-point.
     cycles: u32,
+    /// Since the start.
+    steps: u64,
     /// The slot of the last set-point.
     sent_slot: u64,
     /// What the last cycle was: the phase, and where the set-point was.
@@ -61,6 +63,7 @@ impl SetPoints {
             on_wire: None,
             coasting: 0.0,
             cycles: 0,
+            steps: 0,
             sent_slot: 0,
             last: None,
             kept: u32::MAX,
@@ -69,8 +72,9 @@ impl SetPoints {
 
     pub fn check(&mut self, seen: &Seen<'_>, index: usize) -> Result<(), String> {
         let axis = &seen.config.axes[index];
-        self.cycles += u32::from(seen.record.is_commanded);
-        self.note_jerk(seen, axis);
+        let steps = seen.snapshot.steps - std::mem::replace(&mut self.steps, seen.snapshot.steps);
+        self.cycles += steps as u32;
+        self.note_jerk(seen, axis, steps);
         self.check_rates(seen, index)?;
         self.check_wire(seen, index)?;
         if axis.control.is_profile() {
@@ -84,7 +88,7 @@ impl SetPoints {
             self.last = None;
             return Ok(());
         }
-        if seen.record.is_commanded {
+        if steps > 0 {
             self.planned.push_front(record.position_set);
             self.planned.truncate(self.delay_cycles + 1);
         }
@@ -101,7 +105,6 @@ impl SetPoints {
         if sent.position.or(sent.velocity).or(sent.torque).is_none() || !seen.record.is_commanded {
             return Ok(());
         }
-        let cycles = std::mem::take(&mut self.cycles);
         let nominal_s = self.period_s * f64::from(seen.config.buses[axis.bus].divider);
         let slot = seen.snapshot.slot;
         let silent_s = (slot - std::mem::replace(&mut self.sent_slot, slot)) as f64 * self.period_s;
@@ -111,6 +114,11 @@ impl SetPoints {
         if is_given_up || silent_s > GAP_S.max(nominal_s) * (1.0 + ROUNDING) {
             self.points = [None; 3];
         }
+        // What was sent before is sent again, until every bus has sent what was ready too late.
+        let cycles = std::mem::take(&mut self.cycles);
+        if cycles == 0 {
+            return Ok(());
+        }
         let point = Point { position: record.position_set, counts: sent.position, cycles };
         self.check_point(axis, &point)?;
         self.points = [Some(point), self.points[0], self.points[1]];
@@ -119,11 +127,11 @@ impl SetPoints {
 
     /// A stream that is clamped is held to the limits of velocity and acceleration, and not to that of the jerk. Whatever else is
     /// sent keeps it, also the stop that begins in the midst of such a stream.
-    fn note_jerk(&mut self, seen: &Seen<'_>, axis: &Axis) {
+    fn note_jerk(&mut self, seen: &Seen<'_>, axis: &Axis, steps: u64) {
         let is_streaming = seen.record.phase == Phase::Streaming;
         if is_streaming && axis.on_violation == OnViolation::Clamp {
             self.kept = 0;
-        } else if seen.record.is_commanded {
+        } else if steps > 0 {
             self.kept = self.kept.saturating_add(1);
         }
     }
