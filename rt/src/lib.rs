@@ -84,8 +84,8 @@ pub use port::{BusHealth, BusPort, BusState, Clock, Outgoing, RECEIVE_BATCH, Rec
 pub use profile::ProfileTarget;
 pub use record::{AxisRecord, CycleRecord, CycleTiming, Event, EventKind, MAX_AXES, MAX_BUSES, MAX_GROUPS};
 pub use request::{
-    AxisProcessData, MappedPdo, Move, ProfileMove, RejectReason, Request, RequestEnvelope, RequestError,
-    RequestId, RequestKind,
+    AxisProcessData, ExecutionStart, MappedPdo, Move, ProfileMove, RejectReason, Request, RequestEnvelope,
+    RequestError, RequestId, RequestKind,
 };
 pub use source::{PathTime, Polynomial, TimeLawPhase, TrajectorySample, TrajectoryView};
 pub use stop::{Origin, StopCategories, StopCause, StopReason};

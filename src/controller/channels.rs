@@ -2,8 +2,8 @@
 //! their three sides.
 //!
 //! ```text
-//! HostSide ── requests, newest streamed command, service frames ──▶ RtSide (takt_rt::HostInterface)
-//! HostSide ◀── service frames, newest snapshot (any number of observers) ── RtSide
+//! HostSide ── requests, newest streamed command, trajectories, service frames ──▶ RtSide (takt_rt::HostInterface)
+//! HostSide ◀── trajectories that are done with, service frames, newest snapshot (any number of observers) ── RtSide
 //! LogSide  ◀── cycle records, events ── RtSide
 //! ```
 //!
@@ -15,19 +15,24 @@ mod primitives;
 mod records;
 mod request_numbers;
 mod ring;
+mod trajectories;
 mod words;
 
+use std::sync::Arc;
+
 use takt_rt::{
-    CycleRecord, Event, Frame, HostInterface, Received, Request, RequestEnvelope, RequestId, Snapshot,
-    StreamCommand,
+    CycleRecord, Event, ExecutionStart, Frame, HostInterface, Received, Request, RequestEnvelope, RequestId,
+    Snapshot, StreamCommand, TrajectorySample,
 };
 
 use crate::config::Config;
 use latest::{Attempt, Reader, Writer};
 use records::{RecordConsumer, RecordProducer};
+use trajectories::{Handed, TrajectoryGiver, TrajectoryTaker};
 
 pub use request_numbers::RequestNumbers;
 pub use ring::{Consumer, Producer, ring};
+pub use trajectories::GivenTrajectory;
 
 /// The capacity of each channel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -89,11 +94,13 @@ pub fn channels(sizes: &ChannelSizes) -> (RtSide, HostSide, LogSide) {
     let (received_in, received_out) = ring(sizes.service_in);
     let (record_in, record_out) = records::record_ring(sizes.records);
     let (event_in, event_out) = ring(sizes.events);
+    let (giver, taker) = trajectories::trajectories();
     let rt = RtSide {
         axes: sizes.axes,
         requests: request_out,
         stream: stream_out,
         stream_seen: 0,
+        trajectories: taker,
         service: service_out,
         received: received_in,
         records: record_in,
@@ -103,6 +110,7 @@ pub fn channels(sizes: &ChannelSizes) -> (RtSide, HostSide, LogSide) {
     let host = HostSide {
         requests: request_in,
         numbers: RequestNumbers::default(),
+        trajectories: giver,
         streamer: Some(Streamer { axes: sizes.axes, stream: stream_in }),
         service: service_in,
         received: received_out,
@@ -117,6 +125,7 @@ pub struct RtSide {
     requests: Consumer<RequestEnvelope>,
     stream: Reader,
     stream_seen: u64,
+    trajectories: TrajectoryTaker,
     service: Vec<Consumer<Frame>>,
     received: Producer<(usize, Received)>,
     records: RecordProducer,
@@ -148,6 +157,14 @@ impl HostInterface for RtSide {
         None
     }
 
+    fn trajectory(&mut self, group: u8, request: RequestId, at_s: f64) -> Option<TrajectorySample> {
+        self.trajectories.sample(group, request, at_s)
+    }
+
+    fn keep_trajectories(&mut self, group: u8, needed: [Option<RequestId>; 2]) {
+        self.trajectories.keep(group, needed);
+    }
+
     fn service_frame(&mut self, bus: usize) -> Option<Frame> {
         self.service.get_mut(bus)?.pop()
     }
@@ -173,6 +190,7 @@ impl HostInterface for RtSide {
 pub struct HostSide {
     requests: Producer<RequestEnvelope>,
     numbers: RequestNumbers,
+    trajectories: TrajectoryGiver,
     streamer: Option<Streamer>,
     service: Vec<Producer<Frame>>,
     received: Consumer<(usize, Received)>,
@@ -196,6 +214,29 @@ impl HostSide {
     /// [`ChannelError::Full`]; the request is not sent then.
     pub fn submit(&mut self, envelope: RequestEnvelope) -> Result<(), ChannelError> {
         if self.requests.push(envelope) { Ok(()) } else { Err(ChannelError::Full) }
+    }
+
+    /// Asks for a trajectory of the group to be carried out, under an id of [`HostSide::numbers`].
+    ///
+    /// # Errors
+    /// [`ChannelError::Full`]; nothing is sent then.
+    pub fn execute(
+        &mut self,
+        id: RequestId,
+        given: &Arc<GivenTrajectory>,
+        start: ExecutionStart,
+    ) -> Result<(), ChannelError> {
+        if !self.requests.has_room() || !self.trajectories.has_room() {
+            return Err(ChannelError::Full);
+        }
+        // The trajectory is there before its request is.
+        self.trajectories.give(Handed { group: 0, request: id, given: Arc::clone(given) });
+        self.submit(RequestEnvelope { id, request: Request::Execute(start) })
+    }
+
+    /// Frees the trajectories that the real-time thread has given back.
+    pub fn release_trajectories(&mut self) {
+        self.trajectories.release();
     }
 
     /// The source of request ids.
