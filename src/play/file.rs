@@ -1,10 +1,22 @@
 //! A file of points: what its columns mean, and its rows as numbers.
 
+use std::io;
+use std::path::Path;
+
 use super::error::{FileProblem, PlayFileError};
 use super::table::{self, Cell};
+use crate::text_file;
 
 /// Longer than thirty years is a slip, and would not fit the clock in nanoseconds.
 const LONGEST_S: f64 = 1e9;
+
+/// Reads the bytes of a file of points.
+///
+/// # Errors
+/// It cannot be read, is no regular file, or is longer than 64 MiB.
+pub fn read(path: &Path) -> io::Result<Vec<u8>> {
+    text_file::read(path)
+}
 
 /// Points in the order of their arrival.
 #[derive(Clone, Debug, PartialEq)]
