@@ -136,6 +136,19 @@ impl Frame {
         Ok(Self::filled(id, FrameKind::Data, bytes))
     }
 
+    /// A classic data frame of the first `length` of these bytes; of all of them if it is larger.
+    pub(crate) fn packed(id: Id, bytes: [u8; 8], length: usize) -> Self {
+        let length = length.min(bytes.len());
+        let unused_bits = 64 - 8 * length as u32;
+        let kept = u64::MAX.checked_shr(unused_bits).unwrap_or(0);
+        let word = u64::from_le_bytes(bytes) & kept;
+        let mut data = [0; Self::MAX_BYTES];
+        if let Some(first) = data.first_chunk_mut() {
+            *first = word.to_le_bytes();
+        }
+        Self { id, kind: FrameKind::Data, length: length as u8, data }
+    }
+
     /// A classic data frame of 0 to 8 bytes. The compiler checks the length.
     pub fn of<const N: usize>(id: Id, bytes: [u8; N]) -> Self {
         const { assert!(N <= 8) };

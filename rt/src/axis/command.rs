@@ -107,9 +107,9 @@ impl Axis {
                     TransmissionType::OnControlword => self.controlwords.is_due(),
                 }
         };
-        self.parameters.commands.iter().filter(move |command| is_due(command)).filter_map(|command| {
-            let payload = command.pdo.mapping.pack(&self.command);
-            Frame::data(command.pdo.id, payload.get(..command.pdo.mapping.length())?).ok()
+        self.parameters.commands.iter().filter(move |command| is_due(command)).map(|command| {
+            let mapping = &command.pdo.mapping;
+            Frame::packed(command.pdo.id, mapping.pack(&self.command), mapping.length())
         })
     }
 }

@@ -11,34 +11,33 @@ pub(super) struct Backlog<const BUSES: usize> {
     behind: BusSet,
     /// The interfaces that had no room for a frame since the last cycle.
     not_taken: BusSet,
-    /// For how long, a bus each.
-    cycles: ArrayVec<Cycles, BUSES>,
+    buses: ArrayVec<BusBacklog, BUSES>,
 }
 
-/// Cycles in a row.
+/// One bus, in cycles in a row.
 #[derive(Clone, Copy, Debug, Default)]
-struct Cycles {
-    /// In which the bus was behind.
-    behind: u32,
-    /// In which it was behind or had no room.
-    blocked: u32,
+struct BusBacklog {
+    /// It was behind.
+    behind_cycles: u32,
+    /// It was behind or had no room.
+    blocked_cycles: u32,
 }
 
 impl<const BUSES: usize> Backlog<BUSES> {
-    /// So many buses, none of which is behind.
+    /// For so many buses.
     pub(super) fn new(buses: usize) -> Self {
-        let cycles = (0..buses.min(BUSES)).map(|_| Cycles::default()).collect();
-        Self { behind: BusSet::default(), not_taken: BusSet::default(), cycles }
+        let buses = core::iter::repeat_n(BusBacklog::default(), buses.min(BUSES)).collect();
+        Self { behind: BusSet::default(), not_taken: BusSet::default(), buses }
     }
 
     /// Takes the buses that are behind in this cycle.
     pub(super) fn pass(&mut self, behind: BusSet) {
         self.behind = behind;
         let not_taken = core::mem::take(&mut self.not_taken);
-        for (bus, cycles) in self.cycles.iter_mut().enumerate() {
+        for (bus, own) in self.buses.iter_mut().enumerate() {
             let is_behind = behind.contains(bus);
-            cycles.behind = counted(cycles.behind, is_behind);
-            cycles.blocked = counted(cycles.blocked, is_behind || not_taken.contains(bus));
+            own.behind_cycles = counted(own.behind_cycles, is_behind);
+            own.blocked_cycles = counted(own.blocked_cycles, is_behind || not_taken.contains(bus));
         }
     }
 
@@ -59,16 +58,13 @@ impl<const BUSES: usize> Backlog<BUSES> {
 
     /// Cycles in a row in which a bus was behind.
     pub(super) fn behind_cycles(&self, bus: usize) -> u32 {
-        self.cycles.get(bus).map_or(0, |cycles| cycles.behind)
+        self.buses.get(bus).map_or(0, |bus| bus.behind_cycles)
     }
 
     /// The one of these buses that has been behind, or without room, for the longest time, and the cycles in a row.
     pub(super) fn longest_blocked(&self, buses: BusSet) -> (usize, u32) {
-        let of_these = self.cycles.iter().enumerate().rev().filter(|(bus, _)| buses.contains(*bus));
-        of_these
-            .map(|(bus, cycles)| (bus, cycles.blocked))
-            .max_by_key(|(_, cycles)| *cycles)
-            .unwrap_or_default()
+        let blocked = self.buses.iter().map(|bus| bus.blocked_cycles).enumerate().rev();
+        blocked.filter(|(bus, _)| buses.contains(*bus)).max_by_key(|(_, cycles)| *cycles).unwrap_or_default()
     }
 }
 
@@ -105,7 +101,7 @@ mod tests {
             backlog.note_not_taken(set(0));
             backlog.pass(BusSet::default());
             assert_eq!(
-                (backlog.longest_blocked(BusSet::first(2)), backlog.behind_cycles(0)),
+                (backlog.longest_blocked(BusSet::first(3)), backlog.behind_cycles(0)),
                 ((0, cycles), 0)
             );
         }

@@ -19,13 +19,12 @@ pub(super) struct HeartbeatProducer<const BUSES: usize> {
     heartbeat: Heartbeat,
     /// Cycles for which it waits after an absence.
     held_cycles: u32,
-    /// A bus each.
-    buses: ArrayVec<OnBus, BUSES>,
+    buses: ArrayVec<BusHeartbeat, BUSES>,
 }
 
 /// The heartbeat on one bus.
 #[derive(Clone, Copy, Debug, Default)]
-struct OnBus {
+struct BusHeartbeat {
     /// Cycles until the next one.
     due: u32,
     /// Cycles for which one has been due and could not leave.
@@ -35,9 +34,10 @@ struct OnBus {
 }
 
 impl<const BUSES: usize> HeartbeatProducer<BUSES> {
-    pub(super) fn new(heartbeat: Heartbeat, slowest_divider: u32, buses: usize) -> Self {
+    /// For so many buses, the slowest of which has a cycle of so many slots.
+    pub(super) fn new(heartbeat: Heartbeat, buses: usize, slowest_divider: u32) -> Self {
         let held_cycles = HELD_BUS_CYCLES.saturating_mul(slowest_divider);
-        let buses = (0..buses.min(BUSES)).map(|_| OnBus::default()).collect();
+        let buses = core::iter::repeat_n(BusHeartbeat::default(), buses.min(BUSES)).collect();
         Self { heartbeat, held_cycles, buses }
     }
 
@@ -49,9 +49,9 @@ impl<const BUSES: usize> HeartbeatProducer<BUSES> {
     /// Lets slots pass. After an absence that a drive may have noticed, the heartbeat waits.
     pub(super) fn pass(&mut self, elapsed: u64) {
         let was_away = elapsed > self.heartbeat.cycles.into();
-        for bus in &mut self.buses {
-            bus.overdue = if bus.due == 0 { bus.overdue.saturating_add(1) } else { 0 };
-            bus.due = if was_away { bus.due.max(self.held_cycles) } else { bus.due.saturating_sub(1) };
+        for BusHeartbeat { due, overdue, .. } in &mut self.buses {
+            *overdue = if *due == 0 { overdue.saturating_add(1) } else { 0 };
+            *due = if was_away { (*due).max(self.held_cycles) } else { due.saturating_sub(1) };
         }
     }
 
@@ -66,23 +66,23 @@ impl<const BUSES: usize> HeartbeatProducer<BUSES> {
 
     /// Whether enough heartbeats have left on a bus, or leave with this cycle, for its drives to be enabled.
     pub(super) fn allows_enabling(&self, bus: usize) -> bool {
-        self.buses.get(bus).is_some_and(|bus| bus.awaited <= u32::from(bus.due == 0))
+        self.buses.get(bus).is_none_or(|bus| bus.awaited <= u32::from(bus.due == 0))
     }
 
     /// The heartbeat of a bus, if it is due. It counts as sent. One that could not leave for a whole period has been missed by
     /// the drives as in an absence.
     pub(super) fn take(&mut self, bus: usize) -> Option<Frame> {
-        let bus = self.buses.get_mut(bus)?;
-        if bus.due > 0 {
+        let BusHeartbeat { due, overdue, awaited } = self.buses.get_mut(bus)?;
+        if *due > 0 {
             return None;
         }
-        if core::mem::take(&mut bus.overdue) > self.heartbeat.cycles {
-            bus.due = self.held_cycles;
+        if core::mem::take(overdue) > self.heartbeat.cycles {
+            *due = self.held_cycles;
             return None;
         }
-        bus.awaited = bus.awaited.saturating_sub(1);
+        *awaited = awaited.saturating_sub(1);
         // While more are awaited, the next one comes as soon as after an absence.
-        bus.due = if bus.awaited > 0 {
+        *due = if *awaited > 0 {
             self.heartbeat.cycles.min(self.held_cycles + 1)
         } else {
             self.heartbeat.cycles

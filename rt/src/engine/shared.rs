@@ -79,7 +79,7 @@ impl<const AXES: usize, const BUSES: usize> Shared<AXES, BUSES> {
         let (axis_count, bus_count) = (parameters.axes.len() as u8, parameters.buses.len() as u8);
         let slowest_divider = parameters.buses.iter().map(|bus| bus.divider).max().unwrap_or(1);
         let buses = parameters.buses.len();
-        let heartbeat = |heartbeat| HeartbeatProducer::new(heartbeat, slowest_divider, buses);
+        let heartbeat = |heartbeat| HeartbeatProducer::new(heartbeat, buses, slowest_divider);
         Self {
             period_ns: parameters.period_ns,
             period_s: parameters.period_ns as f64 / NANOSECONDS_PER_SECOND as f64,
