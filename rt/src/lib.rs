@@ -85,7 +85,7 @@ pub use profile::ProfileTarget;
 pub use record::{AxisRecord, CycleRecord, CycleTiming, Event, EventKind, MAX_AXES, MAX_BUSES, MAX_GROUPS};
 pub use request::{
     AxisProcessData, ExecutionStart, MappedPdo, Move, ProfileMove, RejectReason, Request, RequestEnvelope,
-    RequestError, RequestId, RequestKind,
+    RequestError, RequestId, RequestKind, TrajectoryId,
 };
 pub use source::{PathTime, Polynomial, TimeLawPhase, TrajectorySample, TrajectoryView};
 pub use stop::{Origin, StopCategories, StopCause, StopReason};

@@ -63,9 +63,13 @@ pub enum Request<const AXES: usize = MAX_AXES> {
     /// Follow [`HostInterface::stream`](crate::HostInterface::stream). A command that was written before counts, unless it has
     /// expired by the cycle that takes this request up.
     Stream,
-    /// Carry out the trajectory that the host has under the number of this request: see
-    /// [`HostInterface::trajectory`](crate::HostInterface::trajectory).
-    Execute(ExecutionStart),
+    /// Carry out a trajectory of the host: see [`HostInterface::trajectory`](crate::HostInterface::trajectory).
+    Execute {
+        /// Which.
+        trajectory: TrajectoryId,
+        /// When it begins.
+        start: ExecutionStart,
+    },
     /// Stop by this category.
     Stop(StopCategory),
     /// Bring every drive to ready to switch on, decelerating first if need be.
@@ -92,7 +96,7 @@ impl<const AXES: usize> Request<AXES> {
             Self::Move(_) => RequestKind::Move,
             Self::SetProfileTarget(_) => RequestKind::SetProfileTarget,
             Self::Stream => RequestKind::Stream,
-            Self::Execute(_) => RequestKind::Execute,
+            Self::Execute { .. } => RequestKind::Execute,
             Self::Stop(_) => RequestKind::Stop,
             Self::Disable => RequestKind::Disable,
             Self::ResetFaults => RequestKind::ResetFaults,
@@ -102,6 +106,10 @@ impl<const AXES: usize> Request<AXES> {
     }
 }
 
+/// The number under which the host has a trajectory.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct TrajectoryId(pub u64);
+
 /// When a trajectory begins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ExecutionStart {
@@ -109,8 +117,8 @@ pub enum ExecutionStart {
     Now,
     /// In place of another trajectory, where that one is at a later cycle.
     After {
-        /// The request under whose number the host has the present trajectory.
-        request: RequestId,
+        /// The present trajectory.
+        trajectory: TrajectoryId,
         /// So many cycles of the present trajectory are carried out before.
         cycles: u64,
         /// Whether it is the same motion, at another speed along its path. Otherwise it replaces that motion.
@@ -338,7 +346,7 @@ pub enum RejectReason {
     },
     /// The drives are not told the time of day.
     NoTime,
-    /// The host has no trajectory under the number of the request.
+    /// The host has no trajectory under this number.
     UnknownTrajectory,
     /// A trajectory does not begin where the axis is, or not at its velocity and acceleration.
     StartMismatch {

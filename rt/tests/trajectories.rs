@@ -6,7 +6,7 @@ use fixture::{LIMITS, PERIOD_NS, Rig, TestTrajectory, axis_in, move_to, paramete
 use takt_rt::plan::State;
 use takt_rt::{
     ControlLaw, EventKind, ExecutionStart, MotionState, Phase, Polynomial, ProfileMove, ProfileTarget,
-    RejectReason, Request, RequestId, Rule, StopCategory, TimeLawPhase,
+    RejectReason, Request, RequestId, Rule, StopCategory, TimeLawPhase, TrajectoryId,
 };
 
 const PERIOD_S: f64 = 0.001;
@@ -30,12 +30,12 @@ fn least_jerk(from: f64, to: f64, duration_s: f64) -> [Polynomial; 2] {
 }
 
 fn trajectory(polynomials: &[[Polynomial; 2]], duration_s: f64) -> TestTrajectory {
-    let of = |point: usize| polynomials.iter().map(move |axis| axis[point]);
+    let at = |point: usize| polynomials.iter().map(move |axis| axis[point]);
     TestTrajectory {
-        request: RequestId(0),
+        id: TrajectoryId(0),
         axes: polynomials.len(),
         times_s: vec![0.0, duration_s],
-        polynomials: of(0).chain(of(1)).collect(),
+        polynomials: at(0).chain(at(1)).collect(),
         law: vec![TimeLawPhase::constant(0.0, 0.0, 1.0)],
         duration_s,
     }
@@ -53,12 +53,17 @@ fn from_here(rig: &Rig) -> TestTrajectory {
     trajectory(&polynomials, 1.0005)
 }
 
-/// Asks for a trajectory, and returns the number of the request.
+/// Asks for a trajectory, and returns the number of the request. Its own number is ten times that.
 fn execute(rig: &mut Rig, trajectory: TestTrajectory, start: ExecutionStart) -> RequestId {
     let request = RequestId(rig.host.taken + 1);
-    rig.host.trajectories.push(TestTrajectory { request, ..trajectory });
-    rig.request(Request::Execute(start));
+    rig.host.trajectories.push(TestTrajectory { id: of(request), ..trajectory });
+    rig.request(Request::Execute { trajectory: of(request), start });
     request
+}
+
+/// The number of the trajectory of a request.
+fn of(request: RequestId) -> TrajectoryId {
+    TrajectoryId(10 * request.0)
 }
 
 fn state(rig: &Rig, request: RequestId) -> Option<MotionState> {
@@ -71,14 +76,14 @@ fn last_rejection(rig: &Rig) -> RejectReason {
 
 /// What a trajectory under way is to be replaced after: so many cycles of it.
 fn after(request: RequestId, cycles: u64, is_same_motion: bool) -> ExecutionStart {
-    ExecutionStart::After { request, cycles, is_same_motion }
+    ExecutionStart::After { trajectory: of(request), cycles, is_same_motion }
 }
 
 #[test]
 fn a_trajectory_is_carried_out_exactly_and_reported_when_it_is_finished() {
     let mut rig = Rig::enabled(2);
     let begun = from_here(&rig);
-    let copy = TestTrajectory { request: RequestId(0), ..from_here(&rig) };
+    let copy = TestTrajectory { id: TrajectoryId(0), ..from_here(&rig) };
     let request = execute(&mut rig, begun, ExecutionStart::Now);
     for cycle in 1..=1_001 {
         let wanted = copy.sample(f64::from(cycle) * PERIOD_S);
@@ -126,7 +131,7 @@ fn a_trajectory_that_does_not_begin_where_the_axes_are_is_refused() {
     let moving = at.iter().map(|from| [Polynomial::linear(*from, 0.1), Polynomial::linear(*from, 0.1)]);
     execute(&mut rig, trajectory(&moving.collect::<Vec<_>>(), 1.0), ExecutionStart::Now);
     assert!(matches!(last_rejection(&rig), RejectReason::StartMismatch { .. }));
-    rig.request(Request::Execute(ExecutionStart::Now));
+    rig.request(Request::Execute { trajectory: TrajectoryId(7), start: ExecutionStart::Now });
     assert_eq!(last_rejection(&rig), RejectReason::UnknownTrajectory);
     assert_eq!((rig.phase(), here(&rig)), (Phase::Holding, at));
 }
@@ -231,7 +236,7 @@ fn slower(from: &TestTrajectory, cycles: u64) -> TestTrajectory {
     let ramp = TimeLawPhase { from_s: 0.0, path_s };
     let end = ramp.at(t);
     TestTrajectory {
-        request: RequestId(0),
+        id: TrajectoryId(0),
         axes: from.axes,
         times_s: from.times_s.clone(),
         polynomials: from.polynomials.clone(),
@@ -247,14 +252,14 @@ fn the_same_path_goes_on_at_another_speed_as_the_same_motion() {
     let request = execute(&mut rig, begun, ExecutionStart::Now);
     rig.run(200);
     let slow = execute(&mut rig, slower(&copy, 300), after(request, 300, true));
-    assert_eq!(rig.host.needed, [Some(request), Some(slow)]);
+    assert_eq!(rig.host.needed, [Some(of(request)), Some(of(slow))]);
     assert_eq!(rig.engine.axes()[0].set_point(), copy.sample(202.0 * PERIOD_S).states[0]);
     rig.run(98);
     assert_eq!(rig.engine.axes()[0].set_point(), copy.sample(0.3).states[0]);
     rig.run(1);
     assert_eq!(rig.engine.axes()[0].set_point(), slower(&copy, 300).sample(PERIOD_S).states[0]);
     rig.run(1);
-    assert_eq!(rig.host.needed, [Some(slow), None]);
+    assert_eq!(rig.host.needed, [Some(of(slow)), None]);
     let velocity = rig.engine.axes()[0].set_point().velocity;
     rig.run(400);
     assert!(rig.engine.axes()[0].set_point().velocity < velocity);

@@ -22,7 +22,7 @@ use std::sync::Arc;
 
 use takt_rt::{
     CycleRecord, Event, ExecutionStart, Frame, HostInterface, Received, Request, RequestEnvelope, RequestId,
-    Snapshot, StreamCommand, TrajectorySample,
+    Snapshot, StreamCommand, TrajectoryId, TrajectorySample,
 };
 
 use crate::config::Config;
@@ -157,11 +157,11 @@ impl HostInterface for RtSide {
         None
     }
 
-    fn trajectory(&mut self, group: u8, request: RequestId, at_s: f64) -> Option<TrajectorySample> {
-        self.trajectories.sample(group, request, at_s)
+    fn trajectory(&mut self, group: u8, trajectory: TrajectoryId, at_s: f64) -> Option<TrajectorySample> {
+        self.trajectories.sample(group, trajectory, at_s)
     }
 
-    fn keep_trajectories(&mut self, group: u8, needed: [Option<RequestId>; 2]) {
+    fn keep_trajectories(&mut self, group: u8, needed: [Option<TrajectoryId>; 2]) {
         self.trajectories.keep(group, needed);
     }
 
@@ -230,8 +230,9 @@ impl HostSide {
             return Err(ChannelError::Full);
         }
         // The trajectory is there before its request is.
-        self.trajectories.give(Handed { group: 0, request: id, given: Arc::clone(given) });
-        self.submit(RequestEnvelope { id, request: Request::Execute(start) })
+        let trajectory = TrajectoryId(id.0);
+        self.trajectories.give(Handed { group: 0, id: trajectory, given: Arc::clone(given) });
+        self.submit(RequestEnvelope { id, request: Request::Execute { trajectory, start } })
     }
 
     /// Frees the trajectories that the real-time thread has given back.

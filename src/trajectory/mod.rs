@@ -111,7 +111,6 @@ impl Trajectory {
                 check_start(axis, points, start, limits)?;
                 continued(points, start)
             };
-            check_end(axis, &points, limits, conditions.period_s)?;
             columns.push(points);
         }
         let first = usize::from(is_from_here);
@@ -124,6 +123,9 @@ impl Trajectory {
             .collect();
         let path = Path::new(knot_times, &of_axes);
         path.check(conditions.limits, first)?;
+        for (axis, (points, limits)) in columns.iter().zip(conditions.limits).enumerate() {
+            check_end(axis, points, limits, conditions.period_s)?;
+        }
         Ok(Self::as_written(path))
     }
 

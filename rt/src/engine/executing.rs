@@ -15,7 +15,7 @@ use crate::fault::Fault;
 use crate::host::HostInterface;
 use crate::phase::Phase;
 use crate::plan::State;
-use crate::request::{ExecutionStart, RejectReason, RequestId};
+use crate::request::{ExecutionStart, RejectReason, RequestId, TrajectoryId};
 use crate::source::TrajectorySample;
 use crate::stop::{Origin, StopCause};
 use crate::stop_category::StopCategory;
@@ -25,8 +25,8 @@ use crate::stop_category::StopCategory;
 pub(super) struct Execution<const AXES: usize> {
     /// The request that began the motion.
     pub(super) motion: RequestId,
-    /// The request under whose number the host has the trajectory.
-    pub(super) trajectory: RequestId,
+    /// The number under which the host has the trajectory.
+    pub(super) trajectory: TrajectoryId,
     /// Cycles of the trajectory that have been carried out.
     pub(super) cycles: u64,
     /// What takes its place.
@@ -38,10 +38,11 @@ pub(super) struct Execution<const AXES: usize> {
 /// What takes the place of a trajectory.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Successor {
-    trajectory: RequestId,
+    trajectory: TrajectoryId,
+    /// The motion that goes on with it: the present one, or one of its own.
+    motion: RequestId,
     /// Once so many cycles of the present trajectory have been carried out.
     after_cycles: u64,
-    is_same_motion: bool,
 }
 
 impl<const AXES: usize> Execution<AXES> {
@@ -49,7 +50,7 @@ impl<const AXES: usize> Execution<AXES> {
     fn next(&self) -> Self {
         match self.successor {
             Some(successor) if self.cycles >= successor.after_cycles => Self {
-                motion: if successor.is_same_motion { self.motion } else { successor.trajectory },
+                motion: successor.motion,
                 trajectory: successor.trajectory,
                 cycles: 1,
                 successor: None,
@@ -60,7 +61,7 @@ impl<const AXES: usize> Execution<AXES> {
     }
 
     /// The trajectories that are still needed.
-    fn in_use(&self) -> [Option<RequestId>; 2] {
+    fn in_use(&self) -> [Option<TrajectoryId>; 2] {
         [Some(self.trajectory), self.successor.map(|successor| successor.trajectory)]
     }
 }
@@ -82,16 +83,16 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
 }
 
 impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
-    /// Begins a trajectory that the host has under the number of the request. `number` is that of the group.
+    /// Begins a trajectory of the host. `number` is that of the group.
     pub(super) fn begin_execution(
         &mut self,
         number: u8,
         id: RequestId,
-        start: ExecutionStart,
+        (trajectory, start): (TrajectoryId, ExecutionStart),
         host: &mut impl HostInterface<AXES, BUSES>,
     ) -> Handled {
-        // Asked for in any case, so that the host knows that this request has been handled.
-        let first = host.trajectory(number, id, 0.0);
+        // Asked for in any case, so that the host gets it back in any case.
+        let first = host.trajectory(number, trajectory, 0.0);
         self.require_phase(&[Phase::Holding, Phase::Moving])?;
         self.require_no_fault()?;
         let first = first.ok_or(RejectReason::UnknownTrajectory)?;
@@ -103,10 +104,10 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
                 self.shared.snapshot.motions.begin(id, None, |axis| axis.is_none());
                 self.group.stop = None;
                 let execution =
-                    Execution { motion: id, trajectory: id, cycles: 0, successor: None, wanted: None };
+                    Execution { motion: id, trajectory, cycles: 0, successor: None, wanted: None };
                 self.enter(GroupState::Executing(execution));
             }
-            ExecutionStart::After { request, cycles, is_same_motion } => {
+            ExecutionStart::After { trajectory: present, cycles, is_same_motion } => {
                 let GroupState::Executing(execution) = self.group.state else {
                     return Err(RejectReason::Phase.into());
                 };
@@ -114,14 +115,15 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
                     return Err(RejectReason::SuccessorPending.into());
                 }
                 let at_s = cycles as f64 * self.shared.period_s;
-                let then = host.trajectory(number, request, at_s);
-                let then = then.filter(|then| then.remaining_s > 0.0 && request == execution.trajectory);
+                let then = host.trajectory(number, present, at_s);
+                let then = then.filter(|then| then.remaining_s > 0.0 && present == execution.trajectory);
                 let then = then.filter(|_| cycles > execution.cycles).ok_or(RejectReason::TooLate)?;
                 self.check_first(&first, |axis| axis.own(&then.states))?;
                 if !is_same_motion {
                     self.shared.snapshot.motions.begin(id, None, |_| false);
                 }
-                let successor = Successor { trajectory: id, after_cycles: cycles, is_same_motion };
+                let motion = if is_same_motion { execution.motion } else { id };
+                let successor = Successor { trajectory, motion, after_cycles: cycles };
                 let execution = Execution { successor: Some(successor), ..execution };
                 self.group.state = GroupState::Executing(execution);
             }

@@ -37,7 +37,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
             | Request::RatedTorque { .. }
             | Request::ProcessData(_)
             | Request::Position { .. }
-            | Request::Execute(_)
+            | Request::Execute { .. }
             | Request::InhibitEnable
             | Request::Shutdown => {}
         }

@@ -80,9 +80,9 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
             | Request::ResetFaults => {
                 self.group(FIRST).map_or(Ok(()), |mut group| group.try_request(id, request))?;
             }
-            Request::Execute(start) => {
-                let group = self.group(FIRST);
-                group.map_or(Ok(()), |mut group| group.begin_execution(FIRST, id, *start, host))?;
+            Request::Execute { trajectory, start } => {
+                let (group, execution) = (self.group(FIRST), (*trajectory, *start));
+                group.map_or(Ok(()), |mut group| group.begin_execution(FIRST, id, execution, host))?;
             }
             Request::InhibitEnable => {
                 self.shared.requested.ending = self.shared.requested.ending.max(Ending::EnableInhibited)

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use arrayvec::ArrayVec;
-use takt_rt::{RequestId, TrajectorySample};
+use takt_rt::{TrajectoryId, TrajectorySample};
 
 use super::ring::{Consumer, Producer, ring};
 use crate::trajectory::Trajectory;
@@ -37,10 +37,10 @@ impl GivenTrajectory {
     }
 }
 
-/// A trajectory for a group, under the number of the request to carry it out.
+/// A trajectory for a group, under its number.
 pub(super) struct Handed {
     pub group: u8,
-    pub request: RequestId,
+    pub id: TrajectoryId,
     pub given: Arc<GivenTrajectory>,
 }
 
@@ -96,8 +96,8 @@ struct Held {
 
 impl TrajectoryTaker {
     /// See [`takt_rt::HostInterface::trajectory`].
-    pub(super) fn sample(&mut self, group: u8, request: RequestId, at_s: f64) -> Option<TrajectorySample> {
-        let is_wanted = |held: &Held| held.handed.request == request && held.handed.group == group;
+    pub(super) fn sample(&mut self, group: u8, id: TrajectoryId, at_s: f64) -> Option<TrajectorySample> {
+        let is_wanted = |held: &Held| held.handed.id == id && held.handed.group == group;
         // Trajectories come in the order of their requests.
         while !self.held.iter().any(is_wanted) && !self.held.is_full() {
             let handed = self.take.pop()?;
@@ -109,10 +109,10 @@ impl TrajectoryTaker {
     }
 
     /// See [`takt_rt::HostInterface::keep_trajectories`].
-    pub(super) fn keep(&mut self, group: u8, needed: [Option<RequestId>; 2]) {
+    pub(super) fn keep(&mut self, group: u8, needed: [Option<TrajectoryId>; 2]) {
         let mut index = 0;
         while let Some(held) = self.held.get(index) {
-            if held.handed.group != group || needed.contains(&Some(held.handed.request)) {
+            if held.handed.group != group || needed.contains(&Some(held.handed.id)) {
                 held.handed.given.at_s.store(held.asked_s.to_bits(), Ordering::Relaxed);
                 index += 1;
             } else if let Some(held) = self.held.swap_pop(index) {
@@ -148,16 +148,16 @@ mod tests {
     fn a_trajectory_is_borrowed_under_its_number_and_comes_back_when_it_is_not_needed() {
         let (mut giver, mut taker) = trajectories();
         let all: Vec<Arc<GivenTrajectory>> = (1..=3).map(|number| given(f64::from(number))).collect();
-        for (request, given) in (1..).map(RequestId).zip(&all) {
-            giver.give(Handed { group: 0, request, given: Arc::clone(given) });
+        for (id, given) in (1..).map(TrajectoryId).zip(&all) {
+            giver.give(Handed { group: 0, id, given: Arc::clone(given) });
         }
-        let position = |taker: &mut TrajectoryTaker, request: u64| {
-            taker.sample(0, RequestId(request), 0.5).map(|sample| sample.states[0].position)
+        let position = |taker: &mut TrajectoryTaker, id: u64| {
+            taker.sample(0, TrajectoryId(id), 0.5).map(|sample| sample.states[0].position)
         };
         assert_eq!(position(&mut taker, 2), Some(2.0));
-        assert_eq!(taker.sample(1, RequestId(2), 0.5), None, "it is for another group");
+        assert_eq!(taker.sample(1, TrajectoryId(2), 0.5), None, "it is for another group");
         assert_eq!(all[1].at_s(), 0.0, "the cycle is not over");
-        taker.keep(0, [Some(RequestId(2)), None]);
+        taker.keep(0, [Some(TrajectoryId(2)), None]);
         assert_eq!(all[1].at_s(), 0.5);
         giver.release();
         // The first one has been passed over, the second is needed, and the third was asked for by nobody but is here.
@@ -175,10 +175,10 @@ mod tests {
         let mut count = 0;
         while giver.has_room() {
             count += 1;
-            giver.give(Handed { group: 0, request: RequestId(count), given: Arc::clone(&one) });
+            giver.give(Handed { group: 0, id: TrajectoryId(count), given: Arc::clone(&one) });
         }
         assert_eq!(count, TRAJECTORIES_AT_MOST as u64);
-        assert!(taker.sample(0, RequestId(count), 0.0).is_some());
+        assert!(taker.sample(0, TrajectoryId(count), 0.0).is_some());
         taker.keep(0, [None; 2]);
         assert!(giver.has_room());
         assert_eq!((Arc::strong_count(&one), giver.given), (1, 0));
