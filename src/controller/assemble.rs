@@ -1,5 +1,7 @@
 //! Makes the engine and the slot plan from a configuration.
 
+use std::fmt;
+
 use takt_rt::{
     AxisParameters, BusParameters, CommandPdo, Engine, EngineParameters, FeedbackSince, Heartbeat, Id,
     Mapping, MappingError, Pdo, Scale, ScaleError, ScaleParameters, SetUpError, SlotPlan, TimingLadder,
@@ -18,7 +20,7 @@ const NOT_TRANSMITTED_NS: u64 = 4_000_000;
 const SERVICE_FRAMES_PASSIVE: usize = 6;
 
 /// Why the real-time thread cannot execute a configuration.
-#[derive(Debug, thiserror::Error)]
+#[derive(thiserror::Error)]
 pub enum AssembleError {
     /// A value that cannot be: see [`Config::validate`].
     #[error(transparent)]
@@ -42,6 +44,16 @@ pub enum AssembleError {
     /// The engine rejects its parameters.
     #[error("the cycle cannot be set up ({0:?})")]
     Engine(SetUpError),
+}
+
+impl fmt::Debug for AssembleError {
+    /// For `main`: the sentence, or the problems of a configuration.
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Configuration(error) => fmt::Debug::fmt(error, formatter),
+            other => fmt::Display::fmt(other, formatter),
+        }
+    }
 }
 
 /// The plan of a slot.

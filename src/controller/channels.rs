@@ -3,14 +3,19 @@
 //!
 //! ```text
 //! HostSide ── requests, newest streamed command, trajectories, service frames ──▶ RtSide (takt_rt::HostInterface)
-//! HostSide ◀── trajectories that are done with, service frames, newest snapshot (any number of observers) ── RtSide
+//! clients  ── requests and stops, trajectories, from any number of threads ──▶ RtSide
+//! HostSide ◀── service frames, newest snapshot, last events (any number of observers) ── RtSide
+//! clients  ◀── trajectories that are done with ── RtSide
 //! LogSide  ◀── cycle records, events ── RtSide
 //! ```
 //!
 //! No call on [`RtSide`] allocates, locks or waits, even if another thread is preempted in the middle of a call.
 
+mod client_requests;
+mod event_words;
 mod latest;
 mod motion_words;
+mod observed_events;
 mod primitives;
 mod records;
 mod request_numbers;
@@ -26,13 +31,17 @@ use takt_rt::{
 };
 
 use crate::config::Config;
+use client_requests::{TakenRequests, client_requests};
 use latest::{Attempt, Reader, Writer};
+use observed_events::{EventWriter, observed_events};
 use records::{RecordConsumer, RecordProducer};
-use trajectories::{Handed, TrajectoryGiver, TrajectoryTaker};
+use trajectories::TrajectoryTaker;
 
+pub use client_requests::{ClientRequests, MotionEnd, WAITING_AT_MOST};
+pub use observed_events::EventReader;
 pub use request_numbers::RequestNumbers;
 pub use ring::{Consumer, Producer, ring};
-pub use trajectories::GivenTrajectory;
+pub use trajectories::{GivenTrajectory, TrajectoryGiver};
 
 /// The capacity of each channel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -43,7 +52,7 @@ pub struct ChannelSizes {
     pub buses: usize,
     /// Cycle records that wait for the logger.
     pub records: usize,
-    /// Events that wait for the logger.
+    /// Events that wait for the logger, and events that an observer can be behind.
     pub events: usize,
     /// Requests that wait for the next cycle.
     pub requests: usize,
@@ -95,9 +104,14 @@ pub fn channels(sizes: &ChannelSizes) -> (RtSide, HostSide, LogSide) {
     let (record_in, record_out) = records::record_ring(sizes.records);
     let (event_in, event_out) = ring(sizes.events);
     let (giver, taker) = trajectories::trajectories();
+    let (observed_in, observed_out) = observed_events(sizes.events);
+    let numbers = RequestNumbers::default();
+    let (clients, taken) = client_requests(numbers.clone(), WAITING_AT_MOST);
     let rt = RtSide {
         axes: sizes.axes,
         requests: request_out,
+        clients: taken,
+        is_client_next: true,
         stream: stream_out,
         stream_seen: 0,
         trajectories: taker,
@@ -105,12 +119,15 @@ pub fn channels(sizes: &ChannelSizes) -> (RtSide, HostSide, LogSide) {
         received: received_in,
         records: record_in,
         events: event_in,
+        observed: observed_in,
         snapshot: snapshot_in,
     };
     let host = HostSide {
         requests: request_in,
-        numbers: RequestNumbers::default(),
         trajectories: giver,
+        numbers,
+        clients,
+        observed: observed_out,
         streamer: Some(Streamer { axes: sizes.axes, stream: stream_in }),
         service: service_in,
         received: received_out,
@@ -123,6 +140,10 @@ pub fn channels(sizes: &ChannelSizes) -> (RtSide, HostSide, LogSide) {
 pub struct RtSide {
     axes: usize,
     requests: Consumer<RequestEnvelope>,
+    clients: TakenRequests,
+    /// Whether a client's request comes before the next one of the host. They alternate, so that no flood of the one holds up
+    /// the other.
+    is_client_next: bool,
     stream: Reader,
     stream_seen: u64,
     trajectories: TrajectoryTaker,
@@ -130,6 +151,7 @@ pub struct RtSide {
     received: Producer<(usize, Received)>,
     records: RecordProducer,
     events: Producer<Event>,
+    observed: EventWriter,
     snapshot: Writer,
 }
 
@@ -139,7 +161,12 @@ const STREAM_ATTEMPTS: usize = 3;
 
 impl HostInterface for RtSide {
     fn request(&mut self) -> Option<RequestEnvelope> {
-        self.requests.pop()
+        self.is_client_next = !self.is_client_next;
+        if self.is_client_next {
+            self.requests.pop().or_else(|| self.clients.take())
+        } else {
+            self.clients.take().or_else(|| self.requests.pop())
+        }
     }
 
     fn stream(&mut self) -> Option<StreamCommand> {
@@ -178,6 +205,7 @@ impl HostInterface for RtSide {
     }
 
     fn event(&mut self, event: &Event) -> bool {
+        self.observed.write(event);
         self.events.push(*event)
     }
 
@@ -191,6 +219,8 @@ pub struct HostSide {
     requests: Producer<RequestEnvelope>,
     numbers: RequestNumbers,
     trajectories: TrajectoryGiver,
+    clients: ClientRequests,
+    observed: EventReader,
     streamer: Option<Streamer>,
     service: Vec<Producer<Frame>>,
     received: Consumer<(usize, Received)>,
@@ -216,33 +246,41 @@ impl HostSide {
         if self.requests.push(envelope) { Ok(()) } else { Err(ChannelError::Full) }
     }
 
-    /// Asks for a trajectory of the group to be carried out, under an id of [`HostSide::numbers`].
+    /// Asks for a trajectory of the group to be carried out. Returns the number of the request.
     ///
     /// # Errors
     /// [`ChannelError::Full`]; nothing is sent then.
     pub fn execute(
         &mut self,
-        id: RequestId,
         given: &Arc<GivenTrajectory>,
         start: ExecutionStart,
-    ) -> Result<(), ChannelError> {
-        if !self.requests.has_room() || !self.trajectories.has_room() {
-            return Err(ChannelError::Full);
+    ) -> Result<RequestId, ChannelError> {
+        let trajectory = self.trajectories.give(0, given).ok_or(ChannelError::Full)?;
+        let requested = self.request(Request::Execute { trajectory, start });
+        if requested.is_err() {
+            self.trajectories.take_back(trajectory);
         }
-        // The trajectory is there before its request is.
-        let trajectory = TrajectoryId(id.0);
-        self.trajectories.give(Handed { group: 0, id: trajectory, given: Arc::clone(given) });
-        self.submit(RequestEnvelope { id, request: Request::Execute { trajectory, start } })
+        requested
     }
 
-    /// Frees the trajectories that the real-time thread has given back.
-    pub fn release_trajectories(&mut self) {
-        self.trajectories.release();
+    /// The end that gives trajectories, for another thread.
+    pub fn trajectories(&self) -> TrajectoryGiver {
+        self.trajectories.clone()
     }
 
     /// The source of request ids.
     pub fn numbers(&self) -> RequestNumbers {
         self.numbers.clone()
+    }
+
+    /// The way for requests from other threads.
+    pub fn clients(&self) -> ClientRequests {
+        self.clients.clone()
+    }
+
+    /// The events from now on, for another thread.
+    pub fn events(&self) -> EventReader {
+        self.observed.from_now_on()
     }
 
     /// Replaces the streamed command. The real-time thread takes the newest one at its next cycle. Set-points beyond the axes
@@ -378,6 +416,16 @@ mod tests {
     }
 
     #[test]
+    fn neither_the_host_nor_a_client_holds_up_the_other() {
+        let (mut rt, mut host, _log) = channels(&SIZES);
+        let client = host.clients();
+        let own: Vec<_> = (0..2).map(|_| host.request(Request::Enable).unwrap()).collect();
+        let theirs: Vec<_> = (0..4).map(|_| client.submit(Request::ResetFaults).unwrap()).collect();
+        let taken: Vec<_> = std::iter::from_fn(|| rt.request()).map(|envelope| envelope.id).collect();
+        assert_eq!(taken, [theirs[0], own[0], theirs[1], own[1], theirs[2], theirs[3]]);
+    }
+
+    #[test]
     fn only_the_newest_streamed_command_is_seen_and_only_once() {
         let (mut rt, mut host, _log) = channels(&SIZES);
         assert_eq!(rt.stream(), None);
@@ -414,14 +462,17 @@ mod tests {
 
     #[test]
     fn the_log_side_gets_records_and_events_and_the_numbers_of_dropped_ones() {
-        let (mut rt, _host, mut log) = channels(&SIZES);
+        let (mut rt, host, mut log) = channels(&SIZES);
         let record = CycleRecord { axis_count: 2, ..CycleRecord::default() };
         assert_eq!((0..6).filter(|_| rt.record(&record)).count(), 4);
+        let mut observer = host.events();
         let event =
             |slot| Event { slot, at_ns: 0, kind: EventKind::MotionFinished { request: RequestId(1) } };
         assert_eq!((0..3).filter(|slot| rt.event(&event(*slot))).count(), 2);
         assert_eq!(log.next_record(|seen| *seen), Some(record));
         assert_eq!(log.take_event(), Some(event(0)));
+        assert_eq!(observer.by_ref().map(|seen| seen.slot).collect::<Vec<_>>(), [1, 2]);
+        assert_eq!((observer.missed(), log.events_dropped()), (1, 1));
         assert_eq!((log.records_written(), log.records_dropped(), log.events_dropped()), (4, 2, 1));
     }
 }

@@ -92,9 +92,7 @@ impl Stage for VirtualStage<'_> {
     }
 
     fn execute(&mut self, trajectory: Trajectory) -> Option<RequestId> {
-        let host = self.run.host();
-        let id = host.numbers().next();
         let given = Arc::new(GivenTrajectory::new(trajectory));
-        host.execute(id, &given, ExecutionStart::Now).ok().map(|()| id)
+        self.run.host().execute(&given, ExecutionStart::Now).ok()
     }
 }

@@ -44,7 +44,7 @@ use crate::bus_set::BusSet;
 use crate::dispatch::Dispatch;
 use crate::frame::Frame;
 use crate::group_trajectory::ProfileStore;
-use crate::host::{AxisSnapshot, HostInterface};
+use crate::host::HostInterface;
 use crate::phase::Phase;
 use crate::port::BusHealth;
 use crate::record::{CycleTiming, EventKind, MAX_AXES, MAX_BUSES, MAX_GROUPS};
@@ -325,16 +325,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
             snapshot.stop = group.stop;
         }
         for (axis, shown) in self.axes.iter().zip(&mut snapshot.axes) {
-            *shown = AxisSnapshot {
-                position_set: axis.set_point().position,
-                position: axis.position(),
-                velocity: axis.velocity(),
-                statusword: axis.statusword(),
-                drive_state: axis.drive_state(),
-                error_code: axis.error_code(),
-                is_heard: axis.is_heard(),
-                unanswered: axis.unanswered(),
-            };
+            axis.show(shown);
         }
         for (shown, health) in snapshot.buses.iter_mut().zip(buses) {
             *shown = *health;

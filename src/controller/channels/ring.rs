@@ -44,23 +44,18 @@ pub struct Producer<T> {
 impl<T> Producer<T> {
     /// Puts an item in, or drops and counts it when the ring is full. Returns whether there was room.
     pub fn push(&mut self, item: T) -> bool {
+        let capacity = self.shared.queue.capacity() as u64;
+        if self.pushed - self.popped >= capacity {
+            self.popped = self.shared.popped.load(Ordering::Acquire);
+        }
         // Fewer than `capacity` items are in the ring or being taken out, so the slot at the tail is free.
-        if !self.has_room() || self.shared.queue.push(item).is_err() {
+        if self.pushed - self.popped >= capacity || self.shared.queue.push(item).is_err() {
             self.count_dropped();
             return false;
         }
         self.pushed += 1;
         self.shared.pushed.store(self.pushed, Ordering::Release);
         true
-    }
-
-    /// Whether there is room for one more item.
-    pub fn has_room(&mut self) -> bool {
-        let capacity = self.shared.queue.capacity() as u64;
-        if self.pushed - self.popped >= capacity {
-            self.popped = self.shared.popped.load(Ordering::Acquire);
-        }
-        self.pushed - self.popped < capacity
     }
 
     /// Counts an item that was dropped before it came here.

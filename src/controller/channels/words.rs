@@ -12,8 +12,11 @@ use super::motion_words::{MOTION_WORDS, put_motions, take_motions};
 
 /// The largest number of words of a snapshot of so many axes and buses.
 pub const fn snapshot_words(axes: usize, buses: usize) -> usize {
-    18 + MOTION_WORDS + 4 * Answers::EXPLAINED + 4 * axes + 7 * buses
+    18 + MOTION_WORDS + 4 * Answers::EXPLAINED + AXIS_WORDS * axes + 7 * buses
 }
+
+/// The number of words of an axis of a snapshot.
+const AXIS_WORDS: usize = 11;
 
 /// The number of words of a streamed command for so many axes.
 pub const fn stream_words(axes: usize) -> usize {
@@ -43,13 +46,22 @@ pub const NO_SNAPSHOT: Snapshot = Snapshot {
     axis_count: 0,
     axes: [AxisSnapshot {
         position_set: 0.0,
+        velocity_set: 0.0,
+        torque_set: 0.0,
         position: 0.0,
         velocity: 0.0,
+        following_error: 0.0,
+        torque: None,
+        current_per_mille: None,
+        mode: None,
         statusword: 0,
         drive_state: DriveState::NotReadyToSwitchOn,
         error_code: 0,
         is_heard: false,
         unanswered: 0,
+        feedback_age: 0,
+        feedback_slot: 0,
+        feedback_ns: 0,
     }; MAX_AXES],
     bus_count: 0,
     buses: [BusHealth {
@@ -133,14 +145,34 @@ fn put_answers(answers: &Answers, words: &mut Words<'_>) {
             words.put(0);
             return;
         };
-        let axis = refused.axis.map_or(0, |axis| u64::from(axis) << 32 | 1 << 40);
-        let kinds = pack([refused.request as u8, refused.reason.number(), refused.phase as u8, 1]);
-        let (asked, allowed) = refused.reason.numbers();
-        words.put(kinds | axis);
+        put_rejection(refused, words);
         words.put(*id);
-        words.put_f64(asked);
-        words.put_f64(allowed);
     }
+}
+
+pub fn put_rejection(refused: &RequestError, words: &mut Words<'_>) {
+    let axis = refused.axis.map_or(0, |axis| u64::from(axis) << 32 | 1 << 40);
+    let kinds = pack([refused.request as u8, refused.reason.number(), refused.phase as u8, 1]);
+    let (asked, allowed) = refused.reason.numbers();
+    words.put(kinds | axis);
+    words.put_f64(asked);
+    words.put_f64(allowed);
+}
+
+/// `None` at the end of the rejections.
+pub fn take_rejection(words: &mut Words<'_>) -> Option<RequestError> {
+    let packed = words.take();
+    let [request, reason, phase, is_there] = unpack(packed);
+    if is_there == 0 {
+        return None;
+    }
+    let (asked, allowed) = (words.take_f64(), words.take_f64());
+    Some(RequestError {
+        request: RequestKind::ALL.get(usize::from(request)).copied().unwrap_or(RequestKind::Shutdown),
+        reason: RejectReason::from_numbers(reason, asked, allowed).unwrap_or(RejectReason::Phase),
+        axis: (packed >> 40 & 1 == 1).then_some((packed >> 32) as u8),
+        phase: phase_of(phase),
+    })
 }
 
 fn take_answers(words: &mut Words<'_>) -> Answers {
@@ -148,19 +180,8 @@ fn take_answers(words: &mut Words<'_>) -> Answers {
     let mut bits = || u128::from(words.take()) | u128::from(words.take()) << 64;
     let mut answers = Answers { newest, taken_up: bits(), rejected: bits(), ..Answers::default() };
     for place in &mut answers.rejections {
-        let packed = words.take();
-        let [request, reason, phase, is_there] = unpack(packed);
-        if is_there == 0 {
-            break;
-        }
+        let Some(rejected) = take_rejection(words) else { break };
         let id = RequestId(words.take());
-        let (asked, allowed) = (words.take_f64(), words.take_f64());
-        let rejected = RequestError {
-            request: RequestKind::ALL.get(usize::from(request)).copied().unwrap_or(RequestKind::Shutdown),
-            reason: RejectReason::from_numbers(reason, asked, allowed).unwrap_or(RejectReason::Phase),
-            axis: (packed >> 40 & 1 == 1).then_some((packed >> 32) as u8),
-            phase: phase_of(phase),
-        };
         *place = Some((id, rejected));
     }
     answers
@@ -227,28 +248,53 @@ pub fn take_stop(words: &mut Words<'_>) -> StopReason {
 }
 
 fn put_axis(axis: &AxisSnapshot, words: &mut Words<'_>) {
-    words.put_f64(axis.position_set);
-    words.put_f64(axis.position);
-    words.put_f64(axis.velocity);
+    let numbers = [
+        axis.position_set,
+        axis.velocity_set,
+        axis.torque_set,
+        axis.position,
+        axis.velocity,
+        axis.following_error,
+        axis.torque.unwrap_or_default(),
+    ];
+    numbers.into_iter().for_each(|number| words.put_f64(number));
     let is_heard = u64::from(axis.is_heard) << 32;
     let drive_state = (axis.drive_state as u64) << 40;
     let unanswered = u64::from(axis.unanswered) << 48;
     let words_of_drive = u64::from(axis.statusword) | u64::from(axis.error_code) << 16;
     words.put(words_of_drive | is_heard | drive_state | unanswered);
+    let current = u64::from(axis.current_per_mille.unwrap_or_default() as u16) << 16;
+    let mode = u64::from(axis.mode.unwrap_or_default() as u8) << 32;
+    let are_reported = [axis.torque.is_some(), axis.current_per_mille.is_some(), axis.mode.is_some()];
+    let reported = are_reported.iter().rev().fold(0, |bits, is_reported| bits << 1 | u64::from(*is_reported));
+    words.put(u64::from(axis.feedback_age) | current | mode | reported << 40);
+    words.put(axis.feedback_slot);
+    words.put(axis.feedback_ns);
 }
 
 fn take_axis(words: &mut Words<'_>) -> AxisSnapshot {
-    let (position_set, position, velocity) = (words.take_f64(), words.take_f64(), words.take_f64());
-    let packed = words.take();
+    let [position_set, velocity_set, torque_set, position, velocity, following_error, torque] =
+        [(); 7].map(|()| words.take_f64());
+    let (packed, reported) = (words.take(), words.take());
+    let is_reported = |bit: u32| reported >> (40 + bit) & 1 == 1;
     AxisSnapshot {
         position_set,
+        velocity_set,
+        torque_set,
         position,
         velocity,
+        following_error,
+        torque: is_reported(0).then_some(torque),
+        current_per_mille: is_reported(1).then_some((reported >> 16) as i16),
+        mode: is_reported(2).then_some((reported >> 32) as i8),
         statusword: packed as u16,
         drive_state: drive_state_of((packed >> 40) as u8),
         error_code: (packed >> 16) as u16,
         is_heard: packed >> 32 & 1 == 1,
         unanswered: (packed >> 48) as u16,
+        feedback_age: reported as u16,
+        feedback_slot: words.take(),
+        feedback_ns: words.take(),
     }
 }
 
@@ -281,11 +327,11 @@ fn take_bus(words: &mut Words<'_>) -> BusHealth {
     }
 }
 
-fn phase_of(number: u8) -> Phase {
+pub fn phase_of(number: u8) -> Phase {
     Phase::ALL.get(usize::from(number)).copied().unwrap_or_default()
 }
 
-fn drive_state_of(number: u8) -> DriveState {
+pub fn drive_state_of(number: u8) -> DriveState {
     DriveState::ALL.get(usize::from(number)).copied().unwrap_or_default()
 }
 
@@ -298,13 +344,13 @@ fn unpack(word: u64) -> [u8; 4] {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::controller::channels::latest::{Attempt, latest};
     use proptest::prelude::*;
     use takt_rt::{MotionReport, MotionState};
 
-    fn stop_reasons() -> impl Strategy<Value = StopReason> {
+    pub fn stop_reasons() -> impl Strategy<Value = StopReason> {
         let categories = prop::sample::select(vec![StopCategory::Zero, StopCategory::One, StopCategory::Two]);
         let (rules, phases) = (prop::sample::select(&Rule::ALL[..]), prop::sample::select(&Phase::ALL[..]));
         let origins = prop_oneof![
@@ -325,7 +371,7 @@ mod tests {
         )
     }
 
-    fn rejections() -> impl Strategy<Value = RequestError> {
+    pub fn rejections() -> impl Strategy<Value = RequestError> {
         let requests = prop::sample::select(&RequestKind::ALL[..]);
         let reasons = prop::sample::select(&RejectReason::ALL[..]);
         let phases = prop::sample::select(&Phase::ALL[..]);
@@ -348,23 +394,31 @@ mod tests {
 
     fn axes() -> impl Strategy<Value = AxisSnapshot> {
         let states = prop::sample::select(&DriveState::ALL[..]);
-        (any::<(f64, f64, f64, u16, u16, bool, u16)>(), states).prop_map(
-            |(
-                (position_set, position, velocity, statusword, error_code, is_heard, unanswered),
+        let reported = any::<(Option<f64>, Option<i16>, Option<i8>, u16, u16, bool, u16, u16, [u64; 2])>();
+        (any::<[f64; 6]>(), reported, states).prop_map(|(numbers, reported, drive_state)| {
+            let [position_set, velocity_set, torque_set, position, velocity, following_error] = numbers;
+            let (torque, current_per_mille, mode, statusword, error_code, is_heard, unanswered, age, at) =
+                reported;
+            AxisSnapshot {
+                position_set,
+                velocity_set,
+                torque_set,
+                position,
+                velocity,
+                following_error,
+                torque,
+                current_per_mille,
+                mode,
+                statusword,
                 drive_state,
-            )| {
-                AxisSnapshot {
-                    position_set,
-                    position,
-                    velocity,
-                    statusword,
-                    drive_state,
-                    error_code,
-                    is_heard,
-                    unanswered,
-                }
-            },
-        )
+                error_code,
+                is_heard,
+                unanswered,
+                feedback_age: age,
+                feedback_slot: at[0],
+                feedback_ns: at[1],
+            }
+        })
     }
 
     fn buses() -> impl Strategy<Value = BusHealth> {
