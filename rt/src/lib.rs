@@ -84,12 +84,13 @@ pub use port::{BusHealth, BusPort, BusState, Clock, Outgoing, RECEIVE_BATCH, Rec
 pub use profile::ProfileTarget;
 pub use record::{AxisRecord, CycleRecord, CycleTiming, Event, EventKind, MAX_AXES, MAX_BUSES, MAX_GROUPS};
 pub use request::{
-    AxisProcessData, MappedPdo, Move, ProfileMove, RejectReason, Request, RequestEnvelope, RequestError,
-    RequestId, RequestKind,
+    AxisProcessData, ExecutionStart, MappedPdo, Move, ProfileMove, RejectReason, Request, RequestEnvelope,
+    RequestError, RequestId, RequestKind, TrajectoryId,
 };
 pub use source::{
-    AxisPoint, AxisTarget, Follow, LookAhead, LookAheadParameters, POINTS_AT_MOST, PointError, PointRole,
-    StreamCounts, StreamDelay, StreamPoint, StreamReport, StreamSample, StreamState, StreamWish, follow,
+    AxisPoint, AxisTarget, Follow, LookAhead, LookAheadParameters, POINTS_AT_MOST, PathTime, PointError,
+    PointRole, Polynomial, StreamCounts, StreamDelay, StreamPoint, StreamReport, StreamSample, StreamState,
+    StreamWish, TimeLawPhase, TrajectorySample, TrajectoryView, follow,
 };
 pub use stop::{Origin, StopCategories, StopCause, StopReason};
 pub use stop_category::StopCategory;

@@ -19,7 +19,7 @@ pub(super) struct Group<const AXES: usize, const BUSES: usize> {
     pub(super) places: Range<usize>,
     /// The buses that concern it.
     pub(super) buses: BusSet,
-    pub(super) state: GroupState,
+    pub(super) state: GroupState<AXES>,
     /// What its stream wants in this slot, while it streams.
     pub(super) stream: StreamSample<AXES>,
     /// Cycles since the state was entered.
@@ -64,6 +64,7 @@ impl<const AXES: usize, const BUSES: usize> Group<AXES, BUSES> {
     pub(super) fn remaining_s(&self) -> f64 {
         match self.state {
             GroupState::Moving { .. } | GroupState::Stopping => self.motion.remaining_s(),
+            GroupState::Executing(execution) => execution.wanted.map_or(0.0, |wanted| wanted.remaining_s),
             _ => 0.0,
         }
     }
@@ -88,7 +89,7 @@ pub(super) struct GroupContext<'a, const AXES: usize, const BUSES: usize> {
 
 impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
     /// Enters a state. One that goes on as it was, is not entered: what it may last counts from its first beginning.
-    pub(super) fn enter(&mut self, state: GroupState) {
+    pub(super) fn enter(&mut self, state: GroupState<AXES>) {
         let (from, to) = (self.group.state.phase(), state.phase());
         self.group.state = state;
         if from != to {

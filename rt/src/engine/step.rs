@@ -62,6 +62,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
             GroupState::Disabled | GroupState::Holding => self.hold(),
             GroupState::Enabling => self.step_enabling(),
             GroupState::Moving { is_reported } => self.step_move(is_reported)?,
+            GroupState::Executing(execution) => self.step_execution(&execution)?,
             GroupState::Streaming(stream) => self.step_stream(stream)?,
             GroupState::Stopping => self.step_stop()?,
             GroupState::Disabling(_) => {
