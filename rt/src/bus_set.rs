@@ -32,8 +32,23 @@ impl BusSet {
         self.0 == 0
     }
 
-    /// Whether all of so many buses, at least one, are in the set.
-    pub const fn is_every_of(self, buses: usize) -> bool {
-        buses > 0 && self.0.count_ones() as usize >= buses
+    /// So many buses, from the first on.
+    pub const fn first(buses: usize) -> Self {
+        if buses >= 32 { Self(u32::MAX) } else { Self((1 << buses) - 1) }
+    }
+
+    /// The buses, in the order of their numbers.
+    pub fn iter(self) -> impl Iterator<Item = usize> {
+        let mut rest = self.0;
+        core::iter::from_fn(move || {
+            let bus = (rest != 0).then(|| rest.trailing_zeros() as usize);
+            rest &= rest.wrapping_sub(1);
+            bus
+        })
+    }
+
+    /// Whether all of these buses, at least one, are in another set too.
+    pub const fn is_within(self, other: Self) -> bool {
+        self.0 != 0 && self.0 & !other.0 == 0
     }
 }

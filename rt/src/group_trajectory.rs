@@ -1,18 +1,46 @@
 //! The motion of the whole group: one trajectory for every axis, with one time.
 
+use core::ops::Range;
+
 use arrayvec::ArrayVec;
 
 use crate::guard::AxisLimits;
 use crate::plan::{self, Limits, PlanError, PlanOptions, Problem, Profile, Return, State, Synchronisation};
 
-/// The trajectory that the group is on.
+/// The planned motions of the axes of every group.
 ///
-/// There is room for two: the next one is planned beside the present one and takes its place only when all of it is
-/// there, without being copied.
+/// There is room for two of each axis: the next one is planned beside the present one and takes its place only when that of
+/// the whole group is there, without being copied.
 #[derive(Clone, Debug)]
-pub struct GroupTrajectory<const AXES: usize> {
+pub struct ProfileStore<const AXES: usize> {
     first: [Profile; AXES],
     second: [Profile; AXES],
+}
+
+impl<const AXES: usize> Default for ProfileStore<AXES> {
+    fn default() -> Self {
+        let hold = [Profile::hold(0.0); AXES];
+        Self { first: hold, second: hold }
+    }
+}
+
+impl<const AXES: usize> ProfileStore<AXES> {
+    /// Those of the axes of one group, which stand beside each other; `None` if there are not so many.
+    pub fn of(&mut self, places: Range<usize>) -> Option<Profiles<'_, AXES>> {
+        Some(Profiles { first: self.first.get_mut(places.clone())?, second: self.second.get_mut(places)? })
+    }
+}
+
+/// The planned motions of the axes of one group.
+#[derive(Debug)]
+pub struct Profiles<'a, const AXES: usize> {
+    first: &'a mut [Profile],
+    second: &'a mut [Profile],
+}
+
+/// The trajectory that a group is on: the time on the motions of its axes, which are in a [`ProfileStore`].
+#[derive(Clone, Copy, Debug, Default)]
+pub struct GroupTrajectory {
     is_second_present: bool,
     duration_s: f64,
     time_s: f64,
@@ -37,18 +65,12 @@ impl<'a> Leg<'a> {
     }
 }
 
-impl<const AXES: usize> Default for GroupTrajectory<AXES> {
-    fn default() -> Self {
-        let hold = [Profile::hold(0.0); AXES];
-        Self { first: hold, second: hold, is_second_present: false, duration_s: 0.0, time_s: 0.0 }
-    }
-}
-
-impl<const AXES: usize> GroupTrajectory<AXES> {
+impl GroupTrajectory {
     /// Plans a coordinated move within fractions of the limits: on a straight line from rest to rest, and otherwise where
     /// that takes no longer. On error the present motion goes on.
-    pub fn move_to<'a>(
+    pub fn move_to<'a, const AXES: usize>(
         &mut self,
+        profiles: &mut Profiles<'_, AXES>,
         legs: impl Iterator<Item = Leg<'a>>,
         velocity_scale: f64,
         acceleration_scale: f64,
@@ -71,28 +93,31 @@ impl<const AXES: usize> GroupTrajectory<AXES> {
         let return_to_limits = Return::Settled;
         let timing =
             PlanOptions { synchronisation, minimum_duration_s, return_to_limits, ..PlanOptions::default() };
-        let duration_s = plan::synchronised(&problems, self.free(problems.len()), timing)?;
+        let duration_s = plan::synchronised(&problems, self.free(profiles), timing)?;
         self.begin(duration_s);
         Ok(())
     }
 
     /// Plans the fastest coordinated stop. On error the present motion goes on.
-    pub fn stop<'a>(&mut self, axes: impl Iterator<Item = (State, &'a AxisLimits)>) -> Result<(), PlanError> {
+    pub fn stop<'a, const AXES: usize>(
+        &mut self,
+        profiles: &mut Profiles<'_, AXES>,
+        axes: impl Iterator<Item = (State, &'a AxisLimits)>,
+    ) -> Result<(), PlanError> {
         let mut starts: ArrayVec<State, AXES> = ArrayVec::new();
         let mut limits: ArrayVec<Limits, AXES> = ArrayVec::new();
         for (start, axis) in axes.take(AXES) {
             starts.push(start);
             limits.push(stop_limits(&start, axis));
         }
-        let duration_s = plan::stop(&starts, &limits, self.free(starts.len()))?;
+        let duration_s = plan::stop(&starts, &limits, self.free(profiles))?;
         self.begin(duration_s);
         Ok(())
     }
 
-    /// Where the next trajectory of so many axes is planned.
-    fn free(&mut self, axes: usize) -> &mut [Profile] {
-        let free = if self.is_second_present { &mut self.first } else { &mut self.second };
-        free.get_mut(..axes).unwrap_or_default()
+    /// Where the next trajectory is planned.
+    fn free<'a, const AXES: usize>(&self, profiles: &'a mut Profiles<'_, AXES>) -> &'a mut [Profile] {
+        if self.is_second_present { profiles.first } else { profiles.second }
     }
 
     /// The trajectory that was planned last becomes the present one.
@@ -112,11 +137,11 @@ impl<const AXES: usize> GroupTrajectory<AXES> {
         self.time_s += period_s;
     }
 
-    /// Where the axes are to be now, in their order; behind the last one more, at rest. Targets that are passed at speed
-    /// are passed between two cycles: in the one after it the axes have gone on at that speed.
-    pub fn states(&self) -> impl Iterator<Item = State> + '_ {
+    /// Where the axes are to be now, in their order. Targets that are passed at speed are passed between two cycles: in the
+    /// one after it the axes have gone on at that speed.
+    pub fn states<const AXES: usize>(&self, profiles: &Profiles<'_, AXES>) -> impl Iterator<Item = State> {
         let since_end_s = self.time_s - self.duration_s;
-        let present = if self.is_second_present { &self.second } else { &self.first };
+        let present = if self.is_second_present { &profiles.second } else { &profiles.first };
         present.iter().map(move |profile| {
             // By the end of all, so that none is a rounding short of its own.
             let time_s = if since_end_s < 0.0 { self.time_s } else { profile.duration_s() + since_end_s };
@@ -197,11 +222,14 @@ mod tests {
     fn a_move_that_is_to_be_gentle_takes_a_high_acceleration_back_before_the_velocity_limit() {
         let start = State { position: 0.0, velocity: 1.9, acceleration: 4.0 };
         let target = State { position: 2.5, ..State::default() };
-        let mut motion = GroupTrajectory::<2>::default();
-        motion.move_to([Leg { start, target, limits: &LIMITS }].into_iter(), 1.0, 0.1, 0.0).unwrap();
+        let (mut store, mut motion) = (ProfileStore::<2>::default(), GroupTrajectory::default());
+        let mut profiles = store.of(0..1).unwrap();
+        motion
+            .move_to(&mut profiles, [Leg { start, target, limits: &LIMITS }].into_iter(), 1.0, 0.1, 0.0)
+            .unwrap();
         while !motion.is_finished() {
             motion.advance(0.001);
-            let velocity = motion.states().next().unwrap().velocity;
+            let velocity = motion.states(&profiles).next().unwrap().velocity;
             assert!(velocity <= LIMITS.velocity * (1.0 + 1e-9), "{velocity}");
         }
     }
@@ -212,13 +240,14 @@ mod tests {
         let slow = AxisLimits { deceleration: 1.0, ..LIMITS };
         for jerk in [100.0, f64::INFINITY] {
             let (quick, slow) = (AxisLimits { jerk, ..LIMITS }, AxisLimits { jerk, ..slow });
-            let mut motion = GroupTrajectory::<2>::default();
+            let (mut store, mut motion) = (ProfileStore::<2>::default(), GroupTrajectory::default());
+            let mut profiles = store.of(0..2).unwrap();
             // 0.5 rad/s at 8 rad/s² take less than 0.06 rad; in the 2 s of the other axis they would take 0.5 rad.
-            motion.stop([(at(2.9, 0.5), &quick), (at(0.0, 2.0), &slow)].into_iter()).unwrap();
+            motion.stop(&mut profiles, [(at(2.9, 0.5), &quick), (at(0.0, 2.0), &slow)].into_iter()).unwrap();
             let mut farthest: f64 = 2.9;
             while !motion.is_finished() {
                 motion.advance(0.001);
-                farthest = farthest.max(motion.states().next().unwrap().position);
+                farthest = farthest.max(motion.states(&profiles).next().unwrap().position);
             }
             assert!(farthest > 2.9 && farthest <= 3.0, "{farthest} with jerk {jerk}");
         }
@@ -230,12 +259,15 @@ mod tests {
             let limits = AxisLimits { jerk, ..LIMITS };
             let start = State::default();
             let target = State { position: 0.333, velocity: 1.1, acceleration: 0.0 };
-            let mut motion = GroupTrajectory::<2>::default();
-            motion.move_to([Leg { start, target, limits: &limits }].into_iter(), 0.7, 0.7, 0.0).unwrap();
+            let (mut store, mut motion) = (ProfileStore::<2>::default(), GroupTrajectory::default());
+            let mut profiles = store.of(0..1).unwrap();
+            motion
+                .move_to(&mut profiles, [Leg { start, target, limits: &limits }].into_iter(), 0.7, 0.7, 0.0)
+                .unwrap();
             let (mut last, mut before) = (start, start);
             while !motion.is_finished() {
                 motion.advance(0.001);
-                let next = motion.states().next().unwrap();
+                let next = motion.states(&profiles).next().unwrap();
                 let acceleration = (next.position - 2.0 * last.position + before.position) / 1e-6;
                 assert!(acceleration.abs() <= limits.acceleration, "{acceleration} with jerk {jerk}");
                 (last, before) = (next, last);

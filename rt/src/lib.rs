@@ -8,8 +8,8 @@
 //! Read the files in this order:
 //!
 //! 1. `cycle`: [`Cycle::run`] is one whole cycle on one screen: SYNC, feedback, compute, encode, send.
-//! 2. `engine`: [`Engine`] is one group of axes. Its documentation has the order of calls and a program of its own;
-//!    `engine/state` has the table of phases.
+//! 2. `engine`: [`Engine`] has the axes and the groups that they move in. Its documentation has the order of calls and a program
+//!    of its own; `engine/state` has the table of phases.
 //! 3. `axis`: [`Axis`] is one joint: its set-points, where the joint is, the power of its drive.
 //! 4. `guard`: the last check of every set-point; [`AxisLimits`] is what it checks against.
 //! 5. [`plan`]: the trajectory planner, of use by itself; `group_trajectory` is what the engine makes of it.
@@ -81,7 +81,7 @@ pub use pdo::{
 pub use phase::Phase;
 pub use port::{BusHealth, BusPort, BusState, Clock, Outgoing, RECEIVE_BATCH, ReceiveBatch, Received, Wake};
 pub use profile::ProfileTarget;
-pub use record::{AxisRecord, CycleRecord, CycleTiming, Event, EventKind, MAX_AXES, MAX_BUSES};
+pub use record::{AxisRecord, CycleRecord, CycleTiming, Event, EventKind, MAX_AXES, MAX_BUSES, MAX_GROUPS};
 pub use request::{
     AxisProcessData, MappedPdo, Move, ProfileMove, RejectReason, Request, RequestEnvelope, RequestError,
     RequestId, RequestKind,

@@ -11,6 +11,8 @@ use crate::watch::TimingLevel;
 pub const MAX_AXES: usize = 32;
 /// The most buses one controller owns.
 pub const MAX_BUSES: usize = 16;
+/// The most groups that the axes of one controller are in.
+pub const MAX_GROUPS: usize = 8;
 
 /// The times of one cycle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -61,7 +63,7 @@ pub struct AxisRecord {
     pub statusword: u16,
     /// Object 603F if it is mapped or was announced by an emergency message; else 0.
     pub error_code: u16,
-    /// Cycles since the drive last reported in time.
+    /// Cycles of its bus since the drive last reported in time, with those in which it was not asked.
     pub feedback_age: u16,
     /// The command on the wire in drive units: counts, counts/s or per mille, by mode.
     pub command_raw: i32,

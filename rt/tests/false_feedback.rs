@@ -163,12 +163,15 @@ fn a_drive_that_is_enabled_already_when_the_group_becomes_active_is_not_moved() 
 fn a_drive_that_hears_its_controlword_now_and_then_only_is_told_again_however_disabled_it_seems() {
     let rare = |command: CommandPdo| CommandPdo { transmission: TransmissionType::OnControlword, ..command };
     let usual = axis(0, 1);
-    let mut drive = Axis::new(AxisParameters {
-        dialect: Dialect::YzAim,
-        controlword_spacing_cycles: 10,
-        commands: usual.commands.iter().cloned().map(rare).collect(),
-        ..usual
-    });
+    let mut drive = Axis::new(
+        0,
+        AxisParameters {
+            dialect: Dialect::YzAim,
+            controlword_spacing_cycles: 10,
+            commands: usual.commands.iter().cloned().map(rare).collect(),
+            ..usual
+        },
+    );
     drive.set_reported_position(0);
     let told = (0..100).filter(|_| {
         assert!(!drive.is_enabled());

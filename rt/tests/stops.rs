@@ -310,7 +310,7 @@ fn a_joint_that_coasts_is_not_taken_for_standing_when_slots_are_missed() {
     // It answers set-points: the first report after slots that were missed is older than they are.
     let parameters = AxisParameters { feedback_since: FeedbackSince::SetPoint, ..axis(0, 1) };
     let may_be_enabled = |speed: f64, missed_slots: u32| {
-        let mut axis = Axis::new(parameters.clone());
+        let mut axis = Axis::new(0, parameters.clone());
         axis.set_cycle(period_s);
         let (mut position, mut unreported_slots) = (0.0, 1);
         for cycle in 0..40 {

@@ -85,11 +85,12 @@ pub struct Axis {
     duplicate_node: DuplicateNodeDetector,
     /// The torque that is commanded: N·m (N).
     torque_set: f64,
+    number: u8,
 }
 
 impl Axis {
-    /// An axis whose drive has reported nothing yet.
-    pub fn new(parameters: AxisParameters) -> Self {
+    /// The axis with this number, whose drive has reported nothing yet.
+    pub fn new(number: u8, parameters: AxisParameters) -> Self {
         let following =
             FollowingErrorGuard::new(parameters.following_error_limit, parameters.following_error_cycles);
         let mut command = ProcessImage::default();
@@ -113,7 +114,18 @@ impl Axis {
             node_monitor: NodeMonitor::default(),
             duplicate_node: DuplicateNodeDetector::default(),
             torque_set: 0.0,
+            number,
         }
+    }
+
+    /// Its number among the axes of the controller, in the order of the configuration.
+    pub const fn number(&self) -> u8 {
+        self.number
+    }
+
+    /// What is its own of what there is of every axis of the controller.
+    pub fn own<T: Copy + Default>(&self, all: &[T]) -> T {
+        all.get(usize::from(self.number)).copied().unwrap_or_default()
     }
 
     /// What does not change.
@@ -223,7 +235,7 @@ impl Axis {
             error_code: self.error_code(),
             is_heard: self.is_heard(),
             unanswered: self.unanswered(),
-            feedback_age: self.feedback_age(),
+            feedback_age: self.cycles_since_report(),
             feedback_slot: shown.feedback_slot,
             feedback_ns: shown.feedback_ns,
         };
@@ -247,7 +259,7 @@ impl Axis {
             controlword: self.controlword(),
             statusword: self.statusword(),
             error_code: self.error_code(),
-            feedback_age: self.feedback_age(),
+            feedback_age: self.cycles_since_report(),
             command_raw: self.command.command(self.parameters.law.target_slot()),
             position_raw: self.feedback.feedback(FeedbackSlot::Position),
         };

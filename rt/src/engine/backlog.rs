@@ -61,10 +61,10 @@ impl<const BUSES: usize> Backlog<BUSES> {
         self.buses.get(bus).map_or(0, |bus| bus.behind_cycles)
     }
 
-    /// The bus that has been behind, or without room, for the longest time, and the cycles in a row.
-    pub(super) fn longest_blocked(&self) -> (usize, u32) {
+    /// The one of these buses that has been behind, or without room, for the longest time, and the cycles in a row.
+    pub(super) fn longest_blocked(&self, buses: BusSet) -> (usize, u32) {
         let blocked = self.buses.iter().map(|bus| bus.blocked_cycles).enumerate().rev();
-        blocked.max_by_key(|(_, cycles)| *cycles).unwrap_or_default()
+        blocked.filter(|(bus, _)| buses.contains(*bus)).max_by_key(|(_, cycles)| *cycles).unwrap_or_default()
     }
 }
 
@@ -88,10 +88,10 @@ mod tests {
         let mut backlog: Backlog<3> = Backlog::new(3);
         for cycle in 0..30 {
             backlog.pass(set(cycle % 3));
-            assert!(backlog.longest_blocked().1 <= 1);
+            assert!(backlog.longest_blocked(BusSet::first(3)).1 <= 1);
         }
         (0..4).for_each(|_| backlog.pass(set(1)));
-        assert_eq!((backlog.longest_blocked(), backlog.behind_cycles(1)), ((1, 4), 4));
+        assert_eq!((backlog.longest_blocked(BusSet::first(3)), backlog.behind_cycles(1)), ((1, 4), 4));
     }
 
     #[test]
@@ -100,10 +100,13 @@ mod tests {
         for cycles in 1..5 {
             backlog.note_not_taken(set(0));
             backlog.pass(BusSet::default());
-            assert_eq!((backlog.longest_blocked(), backlog.behind_cycles(0)), ((0, cycles), 0));
+            assert_eq!(
+                (backlog.longest_blocked(BusSet::first(3)), backlog.behind_cycles(0)),
+                ((0, cycles), 0)
+            );
         }
         backlog.note_not_taken(BusSet::default());
         backlog.pass(BusSet::default());
-        assert_eq!(backlog.longest_blocked().1, 0);
+        assert_eq!(backlog.longest_blocked(BusSet::first(3)).1, 0);
     }
 }

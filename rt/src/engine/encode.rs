@@ -3,8 +3,10 @@
 //! One rule decides, in one place ([`Engine::may_leave`]): after its deadline, or behind a backlog, nothing leaves except what
 //! stops the drives.
 
+use super::group::{Commands, Group, GroupContext};
+use super::shared::Shared;
 use super::state::{GroupState, PowerRemoval};
-use super::{Commands, Deadline, Engine, SendBatch, has_cycle, has_cycle_of};
+use super::{Deadline, Engine, SendBatch, has_cycle};
 use crate::axis::{Axis, FeedbackSince};
 use crate::bus_set::BusSet;
 use crate::cia402::{Goal, controlword};
@@ -27,30 +29,30 @@ enum Purpose {
 impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
     /// After its deadline, or behind a backlog, nothing leaves except what stops the drives.
     fn may_leave(&self, bus: usize, deadline: Deadline, purpose: Purpose) -> bool {
-        purpose == Purpose::Stop || deadline == Deadline::Met && !self.backlog.behind().contains(bus)
+        purpose == Purpose::Stop || deadline == Deadline::Met && !self.shared.backlog.behind().contains(bus)
     }
 
     /// The buses that were behind in the last cycle: before [`Engine::sync`], whoever drives the engine may look again, and name
     /// those that have caught up since by [`Engine::note_caught_up`].
     pub fn behind(&self) -> BusSet {
-        self.backlog.behind()
+        self.shared.backlog.behind()
     }
 
     /// Takes the buses that have caught up since the last cycle.
     pub fn note_caught_up(&mut self, buses: BusSet) {
-        self.backlog.clear(buses);
+        self.shared.backlog.clear(buses);
     }
 
     /// The SYNC of a bus, if one is to be sent in this slot, now. Answers to an earlier one are late from now on.
     pub fn sync(&mut self, bus: usize, slot: u64, now_ns: Nanoseconds) -> Option<Frame> {
-        let parameters = self.buses.get(bus)?;
+        let parameters = self.shared.buses.get(bus)?;
         let sync_id = parameters.sync_id;
-        let is_due = self.requested.sync && has_cycle(parameters, slot);
+        let is_due = self.shared.requested.sync && has_cycle(parameters, slot);
         if !is_due || !self.may_leave(bus, Deadline::Met, Purpose::Operate) {
             return None;
         }
-        self.asked_by_sync.insert(bus);
-        let is_skipped = self.skip_sync.take(bus);
+        self.shared.asked_by_sync.insert(bus);
+        let is_skipped = self.shared.skip_sync.take(bus);
         for axis in self.axes_of(bus) {
             match axis.parameters().feedback_since {
                 FeedbackSince::Sync if is_skipped => axis.skip_request(now_ns),
@@ -63,7 +65,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
 
     /// These interfaces had no room for all that they were handed: set-points may be missing.
     pub fn not_taken(&mut self, buses: BusSet) {
-        self.backlog.note_not_taken(buses);
+        self.shared.backlog.note_not_taken(buses);
     }
 
     /// The frames of a bus in this cycle, in the order in which they are to leave. Ask for it after [`Engine::compute`], with
@@ -75,45 +77,78 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         host: &mut impl HostInterface<AXES, BUSES>,
         batch: &mut SendBatch,
     ) {
-        self.deadline = deadline;
+        self.shared.deadline = deadline;
         if self.may_leave(bus, deadline, Purpose::Operate) {
-            self.encode_set_points(bus, batch);
+            self.for_each_group(|group| group.encode_set_points(bus, batch));
             self.encode_heartbeat_and_time(bus, batch);
         }
         self.encode_services(bus, deadline, host, batch);
     }
 
     fn push(&mut self, frame: Frame, batch: &mut SendBatch) {
-        self.dropped += u64::from(batch.try_push(frame).is_err());
+        self.shared.dropped += u64::from(batch.try_push(frame).is_err());
     }
 
+    fn encode_heartbeat_and_time(&mut self, bus: usize, batch: &mut SendBatch) {
+        let heartbeat = self.shared.heartbeat.as_mut().and_then(|heartbeat| heartbeat.take(bus));
+        let time = self.shared.time.and_then(|time| time.message());
+        for frame in heartbeat.into_iter().chain(time) {
+            self.push(frame, batch);
+        }
+    }
+
+    /// Service frames as far as the budget goes. Those that stop a drive come first, and leave in any case.
+    fn encode_services(
+        &mut self,
+        bus: usize,
+        deadline: Deadline,
+        host: &mut impl HostInterface<AXES, BUSES>,
+        batch: &mut SendBatch,
+    ) {
+        let Some(parameters) = self.shared.buses.get(bus) else { return };
+        let is_passive = self.groups.iter().all(|group| group.state == GroupState::Passive);
+        let budget =
+            if is_passive { parameters.service_frames_passive } else { parameters.service_frames_active };
+        let may_serve = self.may_leave(bus, deadline, Purpose::Operate);
+        for number in 0..budget.max(1).min(batch.remaining_capacity()) {
+            let stopping = self.sdo_fallback_frame(bus);
+            let frame = match stopping {
+                None if may_serve && number < budget => host.service_frame(bus),
+                stopping => stopping,
+            };
+            match frame {
+                Some(frame) => self.push(frame, batch),
+                None => break,
+            }
+        }
+    }
+}
+
+impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
     /// Controlwords and set-points, where the bus has a cycle in this slot.
     fn encode_set_points(&mut self, bus: usize, batch: &mut SendBatch) {
-        if self.commands != Commands::Made {
+        if self.group.commands != Commands::Made || !self.group.buses.contains(bus) {
             return;
         }
-        let slot = self.present_slot();
-        if self.buses.get(bus).is_some_and(|bus| has_cycle(bus, slot)) {
-            self.unsent.clear(bus);
+        let slot = self.shared.present_slot();
+        if !self.shared.buses.get(bus).is_some_and(|bus| has_cycle(bus, slot)) {
+            return;
         }
-        for index in 0..self.axes.len() {
-            let Some(axis) = self.axes.get(index) else { continue };
-            if usize::from(axis.parameters().bus) != bus || !has_cycle_of(&self.buses, axis, slot) {
-                continue;
-            }
-            let (goal, reset_word) = (self.goal_of(axis, bus), self.fault_reset_word(axis));
-            let Some(axis) = self.axes.get_mut(index) else { continue };
-            axis.command(goal, reset_word);
+        self.group.unsent.clear(bus);
+        for axis in self.axes.iter_mut().filter(|axis| usize::from(axis.parameters().bus) == bus) {
+            axis.command(self.group.goal_of(axis, self.shared), self.group.fault_reset_word(axis));
             let lost = axis.frames().filter(|frame| batch.try_push(*frame).is_err()).count();
-            self.dropped += lost as u64;
+            self.shared.dropped += lost as u64;
         }
     }
+}
 
+impl<const AXES: usize, const BUSES: usize> Group<AXES, BUSES> {
     /// Where a drive is led in this cycle.
     ///
     /// A drive that falls out of operation enabled is not enabled again by what the others are still to do. None is enabled
     /// before its joint is at rest with its target there, nor before it watches the controller by the heartbeat.
-    fn goal_of(&self, axis: &Axis, bus: usize) -> Goal {
+    fn goal_of(&self, axis: &Axis, shared: &Shared<AXES, BUSES>) -> Goal {
         let goal = self.state.goal();
         let is_shutting_down = self.state == GroupState::Disabling(PowerRemoval::Shutdown);
         if is_shutting_down && axis.must_quick_stop() {
@@ -129,9 +164,12 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         }
         let may_be_enabled = match self.state {
             GroupState::Enabling => {
-                self.heartbeat.as_ref().is_none_or(|heartbeat| heartbeat.allows_enabling(bus))
+                shared
+                    .heartbeat
+                    .as_ref()
+                    .is_none_or(|heartbeat| heartbeat.allows_enabling(axis.parameters().bus.into()))
                     && axis.is_power_granted()
-                    && (axis.is_enabled() || axis.is_on_joint(self.period_s))
+                    && (axis.is_enabled() || axis.is_on_joint(shared.period_s))
             }
             _ => axis.is_enabled(),
         };
@@ -147,40 +185,5 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
             _ => controlword::DISABLE_VOLTAGE,
         };
         axis.drive_state().is_faulted().then_some(word)
-    }
-
-    fn encode_heartbeat_and_time(&mut self, bus: usize, batch: &mut SendBatch) {
-        let heartbeat = self.heartbeat.as_mut().and_then(|heartbeat| heartbeat.take(bus));
-        let time = self.time.and_then(|time| time.message());
-        for frame in heartbeat.into_iter().chain(time) {
-            self.push(frame, batch);
-        }
-    }
-
-    /// Service frames as far as the budget goes. Those that stop a drive come first, and leave in any case.
-    fn encode_services(
-        &mut self,
-        bus: usize,
-        deadline: Deadline,
-        host: &mut impl HostInterface<AXES, BUSES>,
-        batch: &mut SendBatch,
-    ) {
-        let Some(parameters) = self.buses.get(bus) else { return };
-        let budget = match self.state {
-            GroupState::Passive => parameters.service_frames_passive,
-            _ => parameters.service_frames_active,
-        };
-        let may_serve = self.may_leave(bus, deadline, Purpose::Operate);
-        for number in 0..budget.max(1).min(batch.remaining_capacity()) {
-            let stopping = self.sdo_fallback_frame(bus);
-            let frame = match stopping {
-                None if may_serve && number < budget => host.service_frame(bus),
-                stopping => stopping,
-            };
-            match frame {
-                Some(frame) => self.push(frame, batch),
-                None => break,
-            }
-        }
     }
 }

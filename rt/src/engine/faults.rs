@@ -1,6 +1,7 @@
 //! What is wrong with the group, and how it stops.
 
 use super::Engine;
+use super::group::GroupContext;
 use super::state::{GroupState, PowerRemoval};
 use crate::axis::Axis;
 use crate::control::ControlLaw;
@@ -17,17 +18,28 @@ use crate::watch::{NodeFault, TimingLevel};
 const LATE_CYCLES_AT_MOST: u32 = 50;
 
 impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
+    /// Lets every group look for what is wrong.
+    pub(super) fn check_faults(&mut self, buses: &[BusHealth]) {
+        self.for_each_group(|group| group.check_faults(buses));
+        // While no drive has power it stays, until a group is enabled.
+        if self.groups.iter().any(|group| group.state.has_power()) {
+            self.shared.foreign_frame = None;
+        }
+    }
+}
+
+impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
     /// Begins a stop for everything that is wrong while drives may have torque.
     pub(super) fn check_faults(&mut self, buses: &[BusHealth]) {
-        if !self.state.has_power() {
+        if !self.group.state.has_power() {
             return;
         }
         self.check_buses(buses);
         self.check_timing();
         self.check_transmission();
         for index in 0..self.axes.len() {
-            if let Some(fault) = self.check_axis(index) {
-                self.fail(Origin::Axis(index as u8), fault);
+            if let Some((axis, fault)) = self.check_axis(index) {
+                self.fail(Origin::Axis(axis), fault);
             }
         }
         self.check_enable_timeout();
@@ -36,27 +48,28 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
 
     /// Whether slots are missed too often. A thread that is late in every cycle cannot go on, however many slots may be missed.
     fn check_timing(&mut self) {
-        if self.slots.level() == TimingLevel::Unfit {
-            let (missed, limit) = self.slots.unforgiven();
+        if self.shared.slots.level() == TimingLevel::Unfit {
+            let (missed, limit) = self.shared.slots.unforgiven();
             self.fail(Origin::Group, Fault::TimingUnfit { missed, limit });
-        } else if self.slots.late_cycles > LATE_CYCLES_AT_MOST {
-            let missed = self.slots.late_cycles;
+        } else if self.shared.slots.late_cycles > LATE_CYCLES_AT_MOST {
+            let missed = self.shared.slots.late_cycles;
             self.fail(Origin::Group, Fault::TimingUnfit { missed, limit: LATE_CYCLES_AT_MOST });
         }
     }
 
     fn check_enable_timeout(&mut self) {
-        let (cycles, limit) = (self.state_cycles, self.enable_timeout_cycles);
-        if self.state != GroupState::Enabling || cycles <= limit {
+        let (cycles, limit) = (self.group.state_cycles, self.shared.enable_timeout_cycles);
+        if self.group.state != GroupState::Enabling || cycles <= limit {
             return;
         }
-        let late = self.axes.iter().position(|axis| !axis.is_enabled());
-        let origin = late.map_or(Origin::Group, |axis| Origin::Axis(axis as u8));
+        let late = self.axes.iter().find(|axis| !axis.is_enabled());
+        let origin = late.map_or(Origin::Group, |axis| Origin::Axis(axis.number()));
         self.fail(origin, Fault::EnableTimeout { cycles, limit });
     }
 
     fn check_buses(&mut self, buses: &[BusHealth]) {
-        for (bus, health) in buses.iter().enumerate().take(self.buses.len()) {
+        let own = self.group.buses;
+        for (bus, health) in buses.iter().enumerate().filter(|(bus, _)| own.contains(*bus)) {
             let fault = match health.state {
                 BusState::BusOff | BusState::Down => Fault::BusLost,
                 BusState::ErrorPassive => Fault::BusErrorPassive,
@@ -64,32 +77,33 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
             };
             self.fail(Origin::Bus(bus as u8), fault);
         }
-        if let Some((bus, id)) = self.foreign_frame.take() {
+        if let Some((bus, id)) = self.shared.foreign_frame.filter(|(bus, _)| own.contains(usize::from(*bus)))
+        {
             self.fail(Origin::Bus(bus), Fault::ForeignMaster { id });
         }
     }
 
     /// Whether own frames get onto the wire.
     fn check_transmission(&mut self) {
-        let limit = self.not_transmitted_cycles;
-        let (bus, cycles) = self.backlog.longest_blocked();
+        let limit = self.shared.not_transmitted_cycles;
+        let (bus, cycles) = self.shared.backlog.longest_blocked(self.group.buses);
         if cycles <= limit {
             return;
         }
         // The drives of such a bus are where the last set-point left them, and get no other before they are disabled. Those on
         // a bus that is behind for a cycle or two, while another one is lost, stop with the rest.
-        for axis in &mut self.axes {
-            if self.backlog.behind_cycles(axis.parameters().bus.into()) > limit {
+        for axis in self.axes.iter_mut() {
+            if self.shared.backlog.behind_cycles(axis.parameters().bus.into()) > limit {
                 axis.latch_off();
             }
         }
         self.fail(Origin::Bus(bus as u8), Fault::NotTransmitted { cycles, limit });
     }
 
-    fn check_axis(&mut self, index: usize) -> Option<Fault> {
-        let state = &self.state;
+    fn check_axis(&mut self, index: usize) -> Option<(u8, Fault)> {
+        let state = &self.group.state;
         let axis = self.axes.get_mut(index)?;
-        let is_resetting = self.fault_reset_cycles > 0 && axis.is_being_reset();
+        let is_resetting = self.group.fault_reset_cycles > 0 && axis.is_being_reset();
         let check = AxisCheck {
             // It stops by its own quick stop, which ends without torque.
             may_be_disabled: matches!(state, GroupState::Enabling | GroupState::Disabling(_))
@@ -97,52 +111,50 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
             is_fault_expected: is_resetting,
             is_mode_free: matches!(state, GroupState::Disabling(_)),
             is_in_operation: !matches!(state, GroupState::Enabling | GroupState::Disabling(_)),
-            acknowledge_limit: {
-                // An axis counts in cycles of its bus.
-                let divider = self.buses.get(usize::from(axis.parameters().bus)).map_or(1, |bus| bus.divider);
-                self.acknowledge_timeout_cycles.div_ceil(divider)
-            },
+            // An axis counts in cycles of its bus.
+            acknowledge_limit: self.shared.acknowledge_timeout_cycles.div_ceil(self.shared.divider_of(axis)),
         };
         // Whatever else is wrong with the drive: it is not enabled again.
         if check.is_disabled(axis) || check.is_faulted(axis) {
             axis.latch_off();
         }
-        check.fault_of(axis)
+        check.fault_of(axis).map(|fault| (axis.number(), fault))
     }
 
     /// A stop whose commands have not left for too long, because the thread is always late, does not wait for a punctual
     /// set-point: it takes the power, by SDO.
     fn take_power_if_cut_off(&mut self) {
-        let is_cut_off = self.slots.late_cycles > self.not_transmitted_cycles;
-        if let Some(stop) = self.stop.filter(|_| is_cut_off && self.state == GroupState::Stopping) {
+        let is_cut_off = self.shared.slots.late_cycles > self.shared.not_transmitted_cycles;
+        if let Some(stop) = self.group.stop.filter(|_| is_cut_off && self.group.state == GroupState::Stopping)
+        {
             self.begin_stop(stop.cause, stop.origin, StopCategory::Zero);
         }
     }
 
     /// Begins the stop that the configuration has for a fault.
     pub(super) fn fail(&mut self, origin: Origin, fault: Fault) {
-        self.begin_stop(StopCause::Fault(fault), origin, self.categories.of(fault.rule()));
+        self.begin_stop(StopCause::Fault(fault), origin, self.shared.categories.of(fault.rule()));
     }
 
     /// Begins a stop. The first fault stays the reason, and a later one can only make the stop harder. That somebody asked
     /// for the stop is no fault: the first one that comes up before that stop is over takes its place, and must be reset.
     pub(super) fn begin_stop(&mut self, cause: StopCause, origin: Origin, category: StopCategory) {
         let wanted = self.possible(category);
-        let (slot, phase) = (self.present_slot(), self.state.phase());
-        let is_under_way = matches!(self.state, GroupState::Stopping | GroupState::Disabling(_));
-        let present = self.stop.filter(|present| is_under_way || !present.is_requested());
+        let (slot, phase) = (self.shared.present_slot(), self.group.state.phase());
+        let is_under_way = matches!(self.group.state, GroupState::Stopping | GroupState::Disabling(_));
+        let present = self.group.stop.filter(|present| is_under_way || !present.is_requested());
         let hardest = present.map_or(wanted, |present| present.category.min(wanted));
         let kept = present.filter(|present| !present.is_requested() || cause == StopCause::Requested);
         let reason = kept.unwrap_or(StopReason { category: wanted, cause, origin, slot, phase });
         let reason = StopReason { category: hardest, ..reason };
-        self.stop = Some(reason);
+        self.group.stop = Some(reason);
         if kept.is_none() {
             if cause != StopCause::Requested {
                 // A reset that is under way is not for this fault.
-                self.fault_reset_cycles = 0;
+                self.group.fault_reset_cycles = 0;
             }
-            self.emit(EventKind::Stop(reason));
-            self.snapshot.motions.end_all(MotionState::Stopped(reason), |_| {});
+            self.shared.emit(EventKind::Stop(reason));
+            self.shared.snapshot.motions.end_all(MotionState::Stopped(reason), |_| {});
         }
         if present.is_none_or(|present| wanted < present.category) {
             self.carry_out(wanted);
@@ -162,12 +174,13 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
     /// Whether joints have yet to come to rest before their power is taken: all of them when the group moves, and in one that
     /// holds those that are still behind their set-points.
     pub(super) fn must_come_to_rest(&self) -> bool {
-        self.is_under_way() || self.state == GroupState::Holding && self.axes.iter().any(Axis::is_catching_up)
+        self.is_under_way()
+            || self.group.state == GroupState::Holding && self.axes.iter().any(Axis::is_catching_up)
     }
 
     /// Whether a stop has something to bring to rest. A joint in profile torque may begin to move by itself.
     pub(super) fn is_under_way(&self) -> bool {
-        match self.state {
+        match self.group.state {
             GroupState::Moving { .. } | GroupState::Streaming(_) => true,
             GroupState::Holding => self.axes.iter().any(Axis::is_coasting),
             _ => false,
@@ -175,7 +188,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
     }
 
     fn carry_out(&mut self, category: StopCategory) {
-        match (&self.state, category) {
+        match (&self.group.state, category) {
             (GroupState::Passive | GroupState::Disabled, _) => {}
             // While the power goes, the set-points go on to rest at the limits: a drive that is slow to obey
             // gets no step. Without a trajectory to rest they stay where they are.
@@ -197,29 +210,35 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
 
     fn remove_power_now(&mut self) {
         if self.plan_stop().is_err() {
-            self.motion.cancel();
+            self.group.motion.cancel();
         }
         self.enter(GroupState::Disabling(PowerRemoval::DisableVoltage));
     }
 
     /// Every axis stays on its set-point.
     pub(super) fn plan_standstill(&mut self) -> Result<(), PlanError> {
-        self.motion.stop(self.axes.iter().map(|axis| {
-            let standing = State { position: axis.set_point().position, ..State::default() };
-            (standing, &axis.parameters().limits)
-        }))
+        self.group.motion.stop(
+            &mut self.profiles,
+            self.axes.iter().map(|axis| {
+                let standing = State { position: axis.set_point().position, ..State::default() };
+                (standing, &axis.parameters().limits)
+            }),
+        )
     }
 
     fn plan_stop(&mut self) -> Result<(), PlanError> {
         self.axes.iter_mut().for_each(Axis::begin_stop);
-        if matches!(self.state, GroupState::Streaming(_)) {
-            self.axes.iter_mut().for_each(|axis| axis.derive_from_steps(self.period_s));
+        if matches!(self.group.state, GroupState::Streaming(_)) {
+            self.axes.iter_mut().for_each(|axis| axis.derive_from_steps(self.shared.period_s));
         }
-        self.motion.stop(self.axes.iter().map(|axis| {
-            let here = axis.set_point();
-            let standing = State { position: here.position, ..State::default() };
-            (if axis.is_profile() { standing } else { here }, &axis.parameters().limits)
-        }))
+        self.group.motion.stop(
+            &mut self.profiles,
+            self.axes.iter().map(|axis| {
+                let here = axis.set_point();
+                let standing = State { position: here.position, ..State::default() };
+                (if axis.is_profile() { standing } else { here }, &axis.parameters().limits)
+            }),
+        )
     }
 }
 

@@ -1,14 +1,15 @@
-//! The cycle of one group as pure computation: frames and time in, frames out.
+//! The cycle as pure computation: frames and time in, frames out.
 //!
-//! [`Engine`] holds the axes of a group and what the group is doing. It knows neither clocks nor buses: [`crate::cycle`]
-//! drives it. Each cycle reads
+//! [`Engine`] holds the axes and what each of their groups is doing. It knows neither clocks nor buses: [`crate::cycle`]
+//! drives it. What belongs to one group is in `group`, what the groups share in `shared`. Each cycle reads
 //!
 //! ```text
 //! sync → receive … → compute { sense → handle_requests → check_faults → step } → encode → finish
 //! ```
 //!
 //! - `sense` counts slots and takes what the drives have reported;
-//! - `requests` handles what was asked for; `targets` checks the targets; `process_data` exchanges mappings;
+//! - `requests` handles what was asked for, `group_requests` what was asked of a group; `targets` checks the targets;
+//!   `process_data` exchanges mappings;
 //! - `faults` looks for the first thing that is wrong, and begins stops;
 //! - `step` makes the next set-points of the phase that the group is in (`state` has the table of phases);
 //! - `encode` makes frames of them, and decides what may leave; `sdo_fallback` stops drives that PDOs do not reach.
@@ -18,6 +19,8 @@
 mod backlog;
 mod encode;
 mod faults;
+mod group;
+mod group_requests;
 mod heartbeat;
 mod outbox;
 mod parameters;
@@ -25,6 +28,7 @@ mod process_data;
 mod requests;
 mod sdo_fallback;
 mod sense;
+mod shared;
 mod slots;
 mod state;
 mod step;
@@ -36,22 +40,16 @@ use arrayvec::ArrayVec;
 use crate::axis::Axis;
 use crate::bus_set::BusSet;
 use crate::dispatch::Dispatch;
-use crate::frame::{Frame, Id};
-use crate::group_trajectory::GroupTrajectory;
-use crate::host::{HostInterface, Snapshot};
+use crate::frame::Frame;
+use crate::group_trajectory::ProfileStore;
+use crate::host::HostInterface;
 use crate::phase::Phase;
 use crate::port::BusHealth;
-use crate::record::{CycleRecord, CycleTiming, Event, EventKind, MAX_AXES, MAX_BUSES};
-use crate::stop::{StopCategories, StopReason};
-use crate::time::{NANOSECONDS_PER_SECOND, Nanoseconds};
-use crate::time_of_day::TimeProducer;
-use backlog::Backlog;
-use heartbeat::HeartbeatProducer;
-use outbox::Outbox;
+use crate::record::{CycleTiming, EventKind, MAX_AXES, MAX_BUSES, MAX_GROUPS};
+use crate::time::Nanoseconds;
+use group::{Commands, Group, GroupContext};
 use parameters::{axes_of, dispatch_of};
-use slots::SlotWatch;
-use state::GroupState;
-use unsent_steps::UnsentSteps;
+use shared::{Ending, Shared};
 
 pub use parameters::{BusParameters, CycleCount, EngineParameters, Heartbeat, SetUpError};
 pub use sense::Receiver;
@@ -84,7 +82,7 @@ pub enum Deadline {
     Missed,
 }
 
-/// A group of axes that move together.
+/// The axes of a controller, in groups that each move together.
 ///
 /// `AXES` and `BUSES` are the most axes and buses that there is room for. An engine needs about 5 kB for each axis, 4 kB for each
 /// bus, and 7 kB beside: 21 kB for two axes on one bus, 229 kB for 32 axes on 16 buses.
@@ -198,80 +196,11 @@ pub enum Deadline {
 /// ```
 #[derive(Debug)]
 pub struct Engine<const AXES: usize = MAX_AXES, const BUSES: usize = MAX_BUSES> {
-    period_ns: Nanoseconds,
-    period_s: f64,
-    enable_timeout_cycles: u32,
-    not_transmitted_cycles: u32,
-    acknowledge_timeout_cycles: u32,
-    categories: StopCategories,
-    buses: ArrayVec<BusParameters, BUSES>,
     dispatch: [Dispatch; BUSES],
-
     axes: ArrayVec<Axis, AXES>,
-    state: GroupState<AXES>,
-    /// Cycles since the state was entered.
-    state_cycles: u32,
-    /// What is planned, while the group moves or stops.
-    motion: GroupTrajectory<AXES>,
-    /// Why the group stops or has stopped. It stays until a request ends it: a fault must be reset.
-    stop: Option<StopReason>,
-    /// Cycles of a fault reset that are still to come.
-    fault_reset_cycles: u32,
-    commands: Commands,
-    unsent: UnsentSteps<BUSES>,
-    /// Whether the commands of this cycle were ready in time, as far as is known.
-    deadline: Deadline,
-    requested: Requested,
-
-    /// The time of the present cycle.
-    now_ns: Nanoseconds,
-    slots: SlotWatch,
-    backlog: Backlog<BUSES>,
-    /// The buses whose next SYNC is skipped, see [`Engine::probe_late_drives`].
-    skip_sync: BusSet,
-    /// The buses whose drives have been asked for feedback by SYNC in this slot.
-    asked_by_sync: BusSet,
-    /// The bus and the identifier of a frame that only this controller may send.
-    foreign_frame: Option<(u8, Id)>,
-    heartbeat: Option<HeartbeatProducer<BUSES>>,
-    time: Option<TimeProducer>,
-
-    events: Outbox,
-    /// Events, records and frames that found no room.
-    dropped: u64,
-    record: CycleRecord<AXES>,
-    /// What observers see; the answers to requests are kept in it.
-    snapshot: Snapshot<AXES, BUSES>,
-}
-
-/// What becomes of the commands of a cycle.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Commands {
-    /// There are none: the group is passive, or every bus is behind.
-    None,
-    /// They are to leave with this cycle.
-    Made,
-}
-
-/// What was asked for that no later request takes back.
-#[derive(Clone, Copy, Debug, Default)]
-struct Requested {
-    /// Whether SYNC is sent.
-    sync: bool,
-    /// How the run is to end.
-    ending: Ending,
-}
-
-/// How far a run is on its way to the end.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
-enum Ending {
-    /// It goes on.
-    #[default]
-    NotBegun,
-    /// Nothing is enabled any more.
-    EnableInhibited,
-    /// The loop ends after this cycle.
-    Shutdown,
+    profiles: ProfileStore<AXES>,
+    groups: ArrayVec<Group<AXES, BUSES>, MAX_GROUPS>,
+    shared: Shared<AXES, BUSES>,
 }
 
 impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
@@ -281,60 +210,30 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
     /// A parameter that is not possible. Everything that the engine relies on is checked here.
     pub fn new(parameters: EngineParameters<AXES, BUSES>) -> Result<Self, SetUpError> {
         parameters.validate()?;
-        let dispatch = dispatch_of(&parameters)?;
-        let axes = axes_of(&parameters);
-        let axis_count = parameters.axes.len() as u8;
-        let buses = parameters.buses.len();
-        let slowest_divider = parameters.buses.iter().map(|bus| bus.divider).max().unwrap_or(1);
-        let heartbeat = parameters.heartbeat.map(|own| HeartbeatProducer::new(own, buses, slowest_divider));
-        let bus_count = buses as u8;
+        let mut groups = ArrayVec::new();
+        groups.push(Group::new(0..parameters.axes.len(), BusSet::first(parameters.buses.len())));
         Ok(Self {
-            period_ns: parameters.period_ns,
-            period_s: parameters.period_ns as f64 / NANOSECONDS_PER_SECOND as f64,
-            enable_timeout_cycles: parameters.enable_timeout_cycles,
-            not_transmitted_cycles: parameters.not_transmitted_cycles,
-            acknowledge_timeout_cycles: parameters.acknowledge_timeout_cycles,
-            categories: parameters.categories,
-            buses: parameters.buses,
-            dispatch,
-            axes,
-            state: GroupState::Passive,
-            state_cycles: 0,
-            motion: GroupTrajectory::default(),
-            stop: None,
-            fault_reset_cycles: 0,
-            commands: Commands::None,
-            unsent: UnsentSteps::new(buses),
-            deadline: Deadline::Met,
-            requested: Requested::default(),
-            now_ns: 0,
-            slots: SlotWatch::new(parameters.timing),
-            backlog: Backlog::new(buses),
-            skip_sync: BusSet::default(),
-            asked_by_sync: BusSet::default(),
-            foreign_frame: None,
-            heartbeat,
-            time: parameters.time_cycles.map(TimeProducer::new),
-            events: Outbox::default(),
-            dropped: 0,
-            record: CycleRecord { axis_count, ..CycleRecord::default() },
-            snapshot: Snapshot { axis_count, bus_count, ..Snapshot::default() },
+            dispatch: dispatch_of(&parameters)?,
+            axes: axes_of(&parameters),
+            profiles: ProfileStore::default(),
+            groups,
+            shared: Shared::new(parameters),
         })
     }
 
     /// How many buses there are.
     pub fn bus_count(&self) -> usize {
-        self.buses.len()
+        self.shared.buses.len()
     }
 
     /// The period of the cycle.
     pub fn period_ns(&self) -> Nanoseconds {
-        self.period_ns
+        self.shared.period_ns
     }
 
     /// What the group is doing.
     pub fn phase(&self) -> Phase {
-        self.state.phase()
+        self.groups.first().map_or(Phase::Passive, |group| group.state.phase())
     }
 
     /// The axes.
@@ -344,7 +243,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
 
     /// Whether the loop is to end after this cycle.
     pub fn is_shutting_down(&self) -> bool {
-        self.requested.ending == Ending::Shutdown
+        self.shared.requested.ending == Ending::Shutdown
     }
 
     /// What one cycle decides. [`Engine::encode`] makes frames of it.
@@ -352,26 +251,30 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         self.sense(input);
         self.handle_requests(host);
         self.check_faults(input.buses);
-        self.step();
-        self.update_sdo_fallback();
-        self.state_cycles = self.state_cycles.saturating_add(1);
+        self.for_each_group(|group| {
+            group.step();
+            group.update_sdo_fallback();
+            group.group.state_cycles = group.group.state_cycles.saturating_add(1);
+        });
     }
 
-    fn emit(&mut self, kind: EventKind) {
-        self.events.push(Event { slot: self.present_slot(), at_ns: self.now_ns, kind });
+    /// A group with its axes and what it shares with the others.
+    fn group(&mut self, number: u8) -> Option<GroupContext<'_, AXES, BUSES>> {
+        let group = self.groups.get_mut(usize::from(number))?;
+        Some(GroupContext {
+            axes: self.axes.get_mut(group.places.clone())?,
+            profiles: self.profiles.of(group.places.clone())?,
+            group,
+            shared: &mut self.shared,
+        })
     }
 
-    fn present_slot(&self) -> u64 {
-        self.slots.present.unwrap_or(0)
-    }
-
-    /// Enters a state. One that goes on as it was, is not entered: what it may last counts from its first beginning.
-    fn enter(&mut self, state: GroupState<AXES>) {
-        let (from, to) = (self.state.phase(), state.phase());
-        self.state = state;
-        if from != to {
-            self.emit(EventKind::PhaseChanged { from, to });
-            self.state_cycles = 0;
+    /// Lets every group act, one after the other.
+    fn for_each_group(&mut self, mut act: impl FnMut(&mut GroupContext<'_, AXES, BUSES>)) {
+        for number in 0..self.groups.len() as u8 {
+            if let Some(mut group) = self.group(number) {
+                act(&mut group);
+            }
         }
     }
 
@@ -383,40 +286,41 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         buses: &[BusHealth],
         host: &mut impl HostInterface<AXES, BUSES>,
     ) {
-        let is_late = self.deadline == Deadline::Missed;
-        let is_commanded = self.commands == Commands::Made && !is_late;
-        self.slots.end(is_late);
+        let is_late = self.shared.deadline == Deadline::Missed;
+        let is_commanded = !is_late && self.groups.iter().any(|group| group.commands == Commands::Made);
+        self.groups.iter_mut().for_each(|group| group.end_cycle(is_late));
+        let shared = &mut self.shared;
+        shared.slots.end(is_late);
         if is_late {
-            self.emit(EventKind::MissedSlots { count: 1 });
+            shared.emit(EventKind::MissedSlots { count: 1 });
         }
-        if is_commanded {
-            self.fault_reset_cycles = self.fault_reset_cycles.saturating_sub(1);
+        shared.dropped += shared.events.drain(|event| host.event(event));
+        shared.record.timing = CycleTiming { missed_slots: shared.slots.missed_now, ..timing };
+        shared.record.is_commanded = is_commanded;
+        if let Some(group) = self.groups.first() {
+            shared.record.phase = group.state.phase();
         }
-        self.dropped += self.events.drain(|event| host.event(event));
-        self.record.timing = CycleTiming { missed_slots: self.slots.missed_now, ..timing };
-        self.record.phase = self.state.phase();
-        self.record.is_commanded = is_commanded;
-        for (axis, record) in self.axes.iter().zip(&mut self.record.axes) {
-            axis.record(self.period_s, record);
+        for (axis, record) in self.axes.iter().zip(&mut shared.record.axes) {
+            axis.record(shared.period_s, record);
         }
-        self.dropped += u64::from(!host.record(&self.record));
+        shared.dropped += u64::from(!host.record(&shared.record));
         self.show(timing.slot, now_ns, buses);
-        host.publish(&self.snapshot);
+        host.publish(&self.shared.snapshot);
     }
 
     fn show(&mut self, slot: u64, now_ns: Nanoseconds, buses: &[BusHealth]) {
-        let snapshot = &mut self.snapshot;
+        let shared = &mut self.shared;
+        let snapshot = &mut shared.snapshot;
         snapshot.slot = slot;
         snapshot.at_ns = now_ns;
-        snapshot.phase = self.state.phase();
-        snapshot.missed_slots = self.slots.missed;
-        snapshot.timing = self.slots.level();
-        snapshot.dropped = self.dropped;
-        snapshot.remaining_s = match self.state {
-            GroupState::Moving { .. } | GroupState::Stopping => self.motion.remaining_s(),
-            _ => 0.0,
-        };
-        snapshot.stop = self.stop;
+        snapshot.missed_slots = shared.slots.missed;
+        snapshot.timing = shared.slots.level();
+        snapshot.dropped = shared.dropped;
+        if let Some(group) = self.groups.first() {
+            snapshot.phase = group.state.phase();
+            snapshot.remaining_s = group.remaining_s();
+            snapshot.stop = group.stop;
+        }
         for (axis, shown) in self.axes.iter().zip(&mut snapshot.axes) {
             axis.show(shown);
         }
@@ -429,9 +333,4 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
 /// Whether a bus has SYNC, feedback and set-points in this slot.
 const fn has_cycle(bus: &BusParameters, slot: u64) -> bool {
     slot.is_multiple_of(bus.divider as u64)
-}
-
-/// As [`has_cycle`], for the bus of an axis.
-fn has_cycle_of(buses: &[BusParameters], axis: &Axis, slot: u64) -> bool {
-    buses.get(usize::from(axis.parameters().bus)).is_some_and(|bus| has_cycle(bus, slot))
 }

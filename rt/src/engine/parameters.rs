@@ -253,7 +253,8 @@ impl<const AXES: usize, const BUSES: usize> EngineParameters<AXES, BUSES> {
 pub(super) fn axes_of<const AXES: usize, const BUSES: usize>(
     parameters: &EngineParameters<AXES, BUSES>,
 ) -> ArrayVec<Axis, AXES> {
-    let mut axes: ArrayVec<Axis, AXES> = parameters.axes.iter().cloned().map(Axis::new).collect();
+    let mut axes: ArrayVec<Axis, AXES> =
+        (0..).zip(&parameters.axes).map(|(number, own)| Axis::new(number, own.clone())).collect();
     let divider =
         |axis: &Axis| parameters.buses.get(usize::from(axis.parameters().bus)).map_or(1, |bus| bus.divider);
     // A drive in a profile mode gets no set-points, so that no other axis waits for it.

@@ -15,10 +15,10 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
     /// Changes what is exchanged with an axis' drive. Not where something moves already, the axis is not there, it has no PDO
     /// in one direction, an object has no use or value, or an identifier has another one. Then nothing is changed.
     pub(super) fn set_process_data(&mut self, data: &AxisProcessData) -> Result<(), Rejection> {
-        self.require_phase(&[Phase::Passive])?;
+        self.require_phase_of(data.axis, &[Phase::Passive])?;
         let index = usize::from(data.axis);
         let bus = usize::from(self.axis_mut(data.axis)?.parameters().bus);
-        self.exchange(data, index, bus).map_err(|reason| reason.of_axis(index))
+        self.exchange(data, index, bus).map_err(|reason| reason.of_axis(data.axis))
     }
 
     fn exchange(&mut self, data: &AxisProcessData, index: usize, bus: usize) -> Result<(), RejectReason> {
@@ -84,7 +84,7 @@ fn objects(pdo: &MappedPdo) -> ArrayVec<MappedObject, MAX_OBJECTS> {
 
 fn command(pdo: &MappedPdo) -> Result<CommandPdo, MappingError> {
     let mapping = Mapping::commands(&objects(pdo))?;
-    Ok(CommandPdo { pdo: Pdo { id: pdo.id, mapping }, transmission: pdo.cadence })
+    Ok(CommandPdo { pdo: Pdo { id: pdo.id, mapping }, transmission: pdo.transmission })
 }
 
 fn feedback(pdo: &MappedPdo) -> Result<Pdo, MappingError> {

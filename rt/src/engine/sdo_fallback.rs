@@ -3,6 +3,7 @@
 //! always late or the bus always behind: the way to switch a drive off does not need a punctual set-point.
 
 use super::Engine;
+use super::group::GroupContext;
 use super::state::GroupState;
 use crate::cia402::controlword;
 use crate::frame::Frame;
@@ -15,19 +16,20 @@ const ANSWER_NS: Nanoseconds = NANOSECONDS_PER_SECOND / 100;
 /// again after 20 ms.
 const OBEYING_NS: Nanoseconds = NANOSECONDS_PER_SECOND / 20;
 
-impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
+impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
     /// Decides which drives are to be stopped by SDO.
     pub(super) fn update_sdo_fallback(&mut self) {
-        let has_power = self.state.has_power();
-        let is_disabling = matches!(self.state, GroupState::Disabling(_));
-        let is_overdue = Nanoseconds::from(self.state_cycles).saturating_mul(self.period_ns) > OBEYING_NS;
-        let is_always_late = self.slots.late_cycles > self.not_transmitted_cycles;
-        for axis in &mut self.axes {
+        let has_power = self.group.state.has_power();
+        let is_disabling = matches!(self.group.state, GroupState::Disabling(_));
+        let is_overdue =
+            Nanoseconds::from(self.group.state_cycles).saturating_mul(self.shared.period_ns) > OBEYING_NS;
+        let is_always_late = self.shared.slots.late_cycles > self.shared.not_transmitted_cycles;
+        for axis in self.axes.iter_mut() {
             if has_power {
                 axis.note_pdo_reachability();
             }
-            let behind_cycles = self.backlog.behind_cycles(axis.parameters().bus.into());
-            let is_cut_off = is_always_late || behind_cycles > self.not_transmitted_cycles;
+            let behind_cycles = self.shared.backlog.behind_cycles(axis.parameters().bus.into());
+            let is_cut_off = is_always_late || behind_cycles > self.shared.not_transmitted_cycles;
             // Whether such a drive receives its PDOs is not known.
             let is_silent = axis.feedback_age() > axis.parameters().missed_feedback_cycles;
             let is_to_be_switched_off = axis.is_pdo_unreachable()
@@ -44,12 +46,15 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
             axis.command_by_service(word);
         }
     }
+}
 
+impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
     /// The frame that is due for a drive on a bus.
     pub(super) fn sdo_fallback_frame(&mut self, bus: usize) -> Option<Frame> {
         // Every other drive has its turn before one is told again: two frames each, one in a slot.
         let turns = 2 * self.axes.len() as u32;
-        let repeat_slots = u32::try_from(ANSWER_NS.div_ceil(self.period_ns)).unwrap_or(u32::MAX).max(turns);
+        let repeat_slots =
+            u32::try_from(ANSWER_NS.div_ceil(self.shared.period_ns)).unwrap_or(u32::MAX).max(turns);
         self.axes_of(bus).find_map(|axis| axis.service_frame(repeat_slots))
     }
 

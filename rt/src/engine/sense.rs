@@ -1,6 +1,6 @@
 //! What the cycle begins with: the slot, the frames that have arrived, and what the drives report by them.
 
-use super::{CycleInput, Deadline, Engine, has_cycle_of};
+use super::{CycleInput, Deadline, Engine};
 use crate::axis::{Axis, FeedbackSince};
 use crate::dispatch::Destination;
 use crate::frame::Frame;
@@ -37,7 +37,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
                 }
             }
             Destination::Foreign => {
-                self.foreign_frame.get_or_insert((bus as u8, received.frame.id()));
+                self.shared.foreign_frame.get_or_insert((bus as u8, received.frame.id()));
                 self.receive_foreign_nmt(bus, &received.frame);
             }
             Destination::Service => self.receive_sdo_response(bus, &received.frame),
@@ -52,7 +52,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
             axis.receive_emergency(code);
         }
         let kind = EventKind::Emergency { axis, code, register, manufacturer };
-        self.events.push(Event { slot: self.present_slot(), at_ns: received.at_ns, kind });
+        self.shared.events.push(Event { slot: self.shared.present_slot(), at_ns: received.at_ns, kind });
     }
 
     /// Takes what another master has told the nodes of a bus.
@@ -65,7 +65,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
 
     /// A received frame for the host found no room there.
     pub fn count_dropped(&mut self) {
-        self.dropped += 1;
+        self.shared.dropped += 1;
     }
 
     pub(super) fn axes_of(&mut self, bus: usize) -> impl Iterator<Item = &mut Axis> {
@@ -74,31 +74,33 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
 
     /// Begins the cycle of a slot with what has been received.
     pub(super) fn sense(&mut self, input: &CycleInput<'_>) {
-        self.now_ns = input.now_ns;
-        self.deadline = Deadline::Met;
-        let elapsed = self.slots.begin(input.slot);
-        if self.slots.missed_now > 0 {
-            self.emit(EventKind::MissedSlots { count: self.slots.missed_now });
+        self.shared.now_ns = input.now_ns;
+        self.shared.deadline = Deadline::Met;
+        let elapsed = self.shared.slots.begin(input.slot);
+        if self.shared.slots.missed_now > 0 {
+            self.shared.emit(EventKind::MissedSlots { count: self.shared.slots.missed_now });
         }
-        if let Some(level) = self.slots.changed_level() {
-            self.emit(EventKind::Timing { level });
+        if let Some(level) = self.shared.slots.changed_level() {
+            self.shared.emit(EventKind::Timing { level });
         }
-        if let Some(heartbeat) = &mut self.heartbeat {
+        if let Some(heartbeat) = &mut self.shared.heartbeat {
             heartbeat.pass(elapsed);
         }
-        if let Some(time) = &mut self.time {
+        if let Some(time) = &mut self.shared.time {
             time.pass(elapsed, input.now_ns);
         }
-        self.backlog.pass(input.behind);
-        let elapsed_s = self.period_s * elapsed as f64;
-        let asked_by_sync = core::mem::take(&mut self.asked_by_sync);
-        for (axis, shown) in self.axes.iter_mut().zip(&mut self.snapshot.axes) {
+        self.shared.backlog.pass(input.behind);
+        let elapsed_s = self.shared.period_s * elapsed as f64;
+        let asked_by_sync = core::mem::take(&mut self.shared.asked_by_sync);
+        for (axis, shown) in self.axes.iter_mut().zip(0..) {
             // A drive that was not asked, because the thread was late or the bus behind, has not missed its answer.
-            let is_unasked = self.requested.sync
+            let is_unasked = self.shared.requested.sync
                 && axis.parameters().feedback_since == FeedbackSince::Sync
                 && !asked_by_sync.contains(axis.parameters().bus.into());
-            if has_cycle_of(&self.buses, axis, input.slot) && !is_unasked {
-                if axis.begin_cycle(elapsed_s) {
+            if self.shared.has_cycle_of(axis, input.slot) && !is_unasked {
+                if axis.begin_cycle(elapsed_s)
+                    && let Some(shown) = self.shared.snapshot.axes.get_mut::<usize>(shown)
+                {
                     (shown.feedback_slot, shown.feedback_ns) = (input.slot, input.now_ns);
                 }
                 if axis.parameters().feedback_since != FeedbackSince::Sync {
@@ -115,12 +117,13 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
     /// Emits an event for each drive whose state has changed since the last record.
     fn report_drive_states(&mut self) {
         for index in 0..self.axes.len() {
-            let (Some(axis), Some(recorded)) = (self.axes.get(index), self.record.axes.get(index)) else {
+            let (Some(axis), Some(recorded)) = (self.axes.get(index), self.shared.record.axes.get(index))
+            else {
                 continue;
             };
             let (state, statusword) = (axis.drive_state(), axis.statusword());
             if recorded.drive_state != state {
-                self.emit(EventKind::DriveState { axis: index as u8, state, statusword });
+                self.shared.emit(EventKind::DriveState { axis: index as u8, state, statusword });
             }
         }
     }

@@ -5,15 +5,13 @@
 
 use arrayvec::ArrayVec;
 
+use super::group::{Commands, GroupContext};
 use super::state::{GroupState, PowerRemoval, Stream};
-use super::{Commands, Engine};
 use crate::axis::{Axis, FeedbackSince};
 use crate::fault::Fault;
 use crate::guard::OnViolation;
 use crate::host::StreamCommand;
-use crate::motion_reports::MotionState;
 use crate::plan::State;
-use crate::record::{Event, EventKind};
 use crate::stop::{Origin, StopCause};
 use crate::stop_category::StopCategory;
 use crate::time::Nanoseconds;
@@ -39,31 +37,32 @@ impl<const AXES: usize> Stream<AXES> {
     }
 }
 
-impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
+impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
     /// Makes the next set-points, unless those of the last cycles have still to leave, or every bus is behind.
     pub(super) fn step(&mut self) {
-        let behind = self.backlog.behind();
+        let (own, behind) = (self.group.buses, self.shared.backlog.behind());
         // A group that stops does not wait for the wire any longer, whatever it stops for.
-        let is_over_waiting =
-            self.stop.is_some() && self.backlog.longest_blocked().1 > self.not_transmitted_cycles;
-        let must_wait = behind.is_every_of(self.buses.len()) && !is_over_waiting;
-        self.commands = match self.state {
+        let is_over_waiting = self.group.stop.is_some()
+            && self.shared.backlog.longest_blocked(own).1 > self.shared.not_transmitted_cycles;
+        let must_wait = own.is_within(behind) && !is_over_waiting;
+        self.group.commands = match self.group.state {
             GroupState::Passive => Commands::None,
             _ if must_wait => Commands::None,
             _ => Commands::Made,
         };
-        if must_wait || self.unsent.are_enough(&self.buses, behind) {
+        let on_time = own.without(behind);
+        if must_wait || self.group.unsent.are_enough(&self.shared.buses, on_time) {
             // Drives may have obeyed what was said by SDO.
             return self.end_disabling();
         }
-        if self.commands == Commands::Made {
-            self.unsent.count(behind);
-            self.snapshot.steps += 1;
+        if self.group.commands == Commands::Made {
+            self.group.unsent.count(on_time);
+            self.shared.snapshot.steps += 1;
         }
         for _ in 0..ATTEMPTS {
             match self.step_phase() {
                 Ok(()) => return,
-                Err((origin, fault)) if self.state == GroupState::Stopping => {
+                Err((origin, fault)) if self.group.state == GroupState::Stopping => {
                     self.begin_stop(StopCause::Fault(fault), origin, StopCategory::Zero);
                 }
                 Err((origin, fault)) => self.fail(origin, fault),
@@ -72,7 +71,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
     }
 
     fn step_phase(&mut self) -> Result<(), Failure> {
-        match self.state {
+        match self.group.state {
             GroupState::Passive => {}
             GroupState::Disabled | GroupState::Holding => self.hold(),
             GroupState::Enabling => self.step_enabling(),
@@ -89,15 +88,15 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
 
     /// Enabled axes stay on their set-point; the set-point of the others follows them.
     fn hold(&mut self) {
-        for axis in &mut self.axes {
-            if axis.is_enabled() { axis.stay() } else { axis.follow_actual(self.period_s) }
+        for axis in self.axes.iter_mut() {
+            if axis.is_enabled() { axis.stay() } else { axis.follow_actual(self.shared.period_s) }
         }
     }
 
     fn step_enabling(&mut self) {
         self.hold();
         self.probe_late_drives();
-        self.axes.iter_mut().for_each(|axis| axis.prepare_to_enable(self.period_s));
+        self.axes.iter_mut().for_each(|axis| axis.prepare_to_enable(self.shared.period_s));
         if self.axes.iter().all(|axis| axis.is_power_granted() && axis.is_enabled()) {
             self.enter(GroupState::Holding);
         }
@@ -106,27 +105,27 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
     /// Skips what requests feedback from a drive that has not answered every time in its own cycle, a SYNC of its bus or a
     /// set-point: before the drives are enabled, that disturbs nothing.
     fn probe_late_drives(&mut self) {
-        if !self.state_cycles.is_multiple_of(PROBE_AGAIN_CYCLES) {
+        if !self.group.state_cycles.is_multiple_of(PROBE_AGAIN_CYCLES) {
             return;
         }
         for axis in self.axes.iter_mut().filter(|axis| axis.is_reply_unverified()) {
             match axis.parameters().feedback_since {
                 FeedbackSince::SetPoint => axis.skip_next_set_point(),
-                _ => self.skip_sync.insert(axis.parameters().bus.into()),
+                _ => self.shared.skip_sync.insert(axis.parameters().bus.into()),
             }
         }
     }
 
     fn step_move(&mut self, is_reported: bool) -> Result<(), Failure> {
-        for (index, axis) in self.axes.iter().enumerate() {
-            let expired_ns = axis.expired_ns(self.now_ns);
+        for axis in self.axes.iter() {
+            let expired_ns = axis.expired_ns(self.shared.now_ns);
             if expired_ns > 0 {
-                let age_cycles = expired_ns.div_ceil(self.period_ns);
-                return Err((Origin::Axis(index as u8), Fault::StaleCommand { age_cycles }));
+                let age_cycles = expired_ns.div_ceil(self.shared.period_ns);
+                return Err((Origin::Axis(axis.number()), Fault::StaleCommand { age_cycles }));
             }
         }
         self.follow_motion()?;
-        if self.motion.is_finished() {
+        if self.group.motion.is_finished() {
             self.end_move(is_reported);
         }
         Ok(())
@@ -134,16 +133,13 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
 
     /// The planned part of a move is over; drives in profile modes may still be on their way.
     fn end_move(&mut self, is_reported: bool) {
-        let is_passing = self.motion.states().take(self.axes.len()).any(|state| state.velocity != 0.0);
+        let is_passing = self.group.motion.states(&self.profiles).any(|state| state.velocity != 0.0);
         if !is_passing && !self.axes.iter().all(Axis::is_target_reached) {
             return;
         }
         if !is_reported {
-            self.state = GroupState::Moving { is_reported: true };
-            let (slot, at_ns, events) = (self.present_slot(), self.now_ns, &mut self.events);
-            self.snapshot.motions.end_all(MotionState::Finished, |request| {
-                events.push(Event { slot, at_ns, kind: EventKind::MotionFinished { request } });
-            });
+            self.group.state = GroupState::Moving { is_reported: true };
+            self.shared.finish_motions();
         }
         if is_passing {
             self.begin_stop(StopCause::Requested, Origin::Group, StopCategory::Two);
@@ -154,7 +150,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
 
     fn step_stop(&mut self) -> Result<(), Failure> {
         self.follow_motion()?;
-        if self.motion.is_finished() {
+        if self.group.motion.is_finished() {
             self.end_stop();
         }
         Ok(())
@@ -163,9 +159,9 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
     /// The planned part of a stop is over. A joint in a profile mode gets the time that its limits allow for, and one that
     /// follows set-points some to catch up before its power is taken.
     fn end_stop(&mut self) {
-        let category = self.stop.map(|stop| stop.category);
-        let stopping_for_s = f64::from(self.state_cycles) * self.period_s;
-        let standing_for_s = self.motion.overrun_s();
+        let category = self.group.stop.map(|stop| stop.category);
+        let stopping_for_s = f64::from(self.group.state_cycles) * self.shared.period_s;
+        let standing_for_s = self.group.motion.overrun_s();
         let is_waited_for = |axis: &Axis| {
             let is_in_time = match axis.is_profile() {
                 true => stopping_for_s < stopping_s(axis),
@@ -184,7 +180,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
 
     /// Goes on by one period on the planned motion.
     fn follow_motion(&mut self) -> Result<(), Failure> {
-        self.motion.advance(self.period_s);
+        self.group.motion.advance(self.shared.period_s);
         let next = self.planned();
         self.check(&next)?;
         self.take_set_points(&next);
@@ -192,11 +188,11 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
     }
 
     fn planned(&self) -> ArrayVec<State, AXES> {
-        self.motion.states().take(self.axes.len()).collect()
+        self.group.motion.states(&self.profiles).collect()
     }
 
     fn check(&self, next: &[State]) -> Result<(), Failure> {
-        self.first_fault(next, |axis, state| axis.check(state, self.period_s))
+        self.first_fault(next, |axis, state| axis.check(state, self.shared.period_s))
     }
 
     /// The first axis that follows set-points and whose next one does not pass a check.
@@ -205,9 +201,9 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         next: &[State],
         check: impl Fn(&Axis, &State) -> Result<(), Fault>,
     ) -> Result<(), Failure> {
-        for (index, (axis, state)) in self.axes.iter().zip(next).enumerate() {
+        for (axis, state) in self.axes.iter().zip(next) {
             if axis.is_enabled() && !axis.is_profile() {
-                check(axis, state).map_err(|fault| (Origin::Axis(index as u8), fault))?;
+                check(axis, state).map_err(|fault| (Origin::Axis(axis.number()), fault))?;
             }
         }
         Ok(())
@@ -222,28 +218,28 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
     /// What is still on its way to rest goes on as far as the guard agrees, and everything else stays where it is. No set-point
     /// follows a joint: a drive whose statusword is false still obeys.
     fn come_to_rest(&mut self) {
-        if !self.motion.is_finished() && self.follow_motion().is_ok() {
+        if !self.group.motion.is_finished() && self.follow_motion().is_ok() {
             return;
         }
-        self.motion.cancel();
+        self.group.motion.cancel();
         self.axes.iter_mut().for_each(Axis::stay);
     }
 
     /// Ends the disabling when no drive is waited for any more. A drive that does not show that it has obeyed is not waited
     /// for without end; nor are set-points that cannot leave because the thread is always late.
     fn end_disabling(&mut self) {
-        if !matches!(self.state, GroupState::Disabling(_)) {
+        if !matches!(self.group.state, GroupState::Disabling(_)) {
             return;
         }
-        let is_always_late = self.slots.late_cycles > self.not_transmitted_cycles;
-        let is_on_way = !self.motion.is_finished() && !is_always_late;
-        let is_patient = is_on_way || self.state_cycles <= self.enable_timeout_cycles;
+        let is_always_late = self.shared.slots.late_cycles > self.shared.not_transmitted_cycles;
+        let is_on_way = !self.group.motion.is_finished() && !is_always_late;
+        let is_patient = is_on_way || self.group.state_cycles <= self.shared.enable_timeout_cycles;
         // A drive that says nothing has either received what it was told, or has missed the heartbeats for so long that it has
         // stopped by itself. One that PDOs do not reach is told by SDO.
         let has_stopped_by_itself = |axis: &Axis| {
-            let divider = self.buses.get(usize::from(axis.parameters().bus)).map_or(1, |bus| bus.divider);
-            let silent_cycles = u32::from(axis.feedback_age()).saturating_mul(divider);
-            let is_over = self.heartbeat.as_ref().is_some_and(|beat| silent_cycles > beat.timeout_cycles());
+            let silent_cycles = u32::from(axis.feedback_age()).saturating_mul(self.shared.divider_of(axis));
+            let is_over =
+                self.shared.heartbeat.as_ref().is_some_and(|beat| silent_cycles > beat.timeout_cycles());
             is_over && !is_on_way && !axis.is_pdo_unreachable()
         };
         // The set-points of a drive that seems to follow go on to rest, though it may have said otherwise by SDO; and
@@ -257,7 +253,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         if is_patient && self.axes.iter().any(is_waited_for) {
             return;
         }
-        self.motion.cancel();
+        self.group.motion.cancel();
         self.axes.iter_mut().for_each(Axis::release_latch);
         self.enter(GroupState::Disabled);
     }
@@ -268,22 +264,24 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
             Stream::Begins(command) | Stream::Follows(command) => (command, true),
             Stream::Continues(command) => (command, false),
         };
-        if self.now_ns > command.valid_until_ns {
-            let age_cycles = (self.now_ns - command.valid_until_ns).div_ceil(self.period_ns);
+        if self.shared.now_ns > command.valid_until_ns {
+            let age_cycles = (self.shared.now_ns - command.valid_until_ns).div_ceil(self.shared.period_ns);
             return Err((Origin::Group, Fault::StaleCommand { age_cycles }));
         }
         if matches!(stream, Stream::Begins(_)) {
-            self.first_fault(&command.set_points, Axis::check_start)?;
+            let first: ArrayVec<State, AXES> =
+                self.axes.iter().map(|axis| axis.own(&command.set_points)).collect();
+            self.first_fault(&first, Axis::check_start)?;
         }
         let next = self.streamed(&command.set_points, is_new)?;
         self.check(&next)?;
         self.take_set_points(&next);
-        self.state = GroupState::Streaming(Stream::Continues(command));
+        self.group.state = GroupState::Streaming(Stream::Continues(command));
         Ok(())
     }
 
     fn await_stream(&mut self) -> Result<(), Failure> {
-        let (cycles, limit) = (self.state_cycles, self.enable_timeout_cycles);
+        let (cycles, limit) = (self.group.state_cycles, self.shared.enable_timeout_cycles);
         if cycles > limit {
             return Err((Origin::Group, Fault::StreamNotBegun { cycles, limit }));
         }
@@ -294,9 +292,10 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
 
     /// The next set-points of a stream, each within all limits.
     fn streamed(&mut self, commands: &[State], are_new: bool) -> Result<ArrayVec<State, AXES>, Failure> {
-        let period_s = self.period_s;
+        let period_s = self.shared.period_s;
         let mut next: ArrayVec<State, AXES> = ArrayVec::new();
-        for (index, (axis, command)) in self.axes.iter_mut().zip(commands).enumerate() {
+        for axis in self.axes.iter_mut() {
+            let command = &axis.own(commands);
             if !axis.is_enabled() || axis.is_profile() {
                 next.push(*command);
                 continue;
@@ -305,11 +304,11 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
             next.push(match (streamed, axis.parameters().on_violation) {
                 (Ok(set_point), _) => set_point,
                 (Err(_), OnViolation::Clamp) => {
-                    self.snapshot.clamped += 1;
+                    self.shared.snapshot.clamped += 1;
                     axis.clamped(command, period_s)
                 }
                 (Err(fault), OnViolation::Reject) => {
-                    return Err((Origin::Axis(index as u8), fault));
+                    return Err((Origin::Axis(axis.number()), fault));
                 }
             });
         }

@@ -3,7 +3,6 @@
 use crate::axis::Axis;
 use crate::control::ControlLaw;
 use crate::guard;
-use crate::plan::PlanError;
 use crate::profile::ProfileTarget;
 use crate::request::{Move, RejectReason};
 
@@ -22,19 +21,8 @@ impl From<RejectReason> for Rejection {
 
 impl RejectReason {
     /// This reason, for an axis.
-    pub(super) fn of_axis(self, index: usize) -> Rejection {
-        Rejection { reason: self, axis: u8::try_from(index).ok() }
-    }
-}
-
-/// What keeps a move from being planned.
-pub(super) fn plan_rejection(error: PlanError, minimum_duration_s: f64) -> Rejection {
-    match (error, error.axis()) {
-        (PlanError::InvalidTiming, _) => {
-            RejectReason::MinimumDuration { duration_s: minimum_duration_s }.into()
-        }
-        (_, Some(index)) => RejectReason::NoTrajectory.of_axis(index),
-        (_, None) => RejectReason::NoTrajectory.into(),
+    pub(super) const fn of_axis(self, axis: u8) -> Rejection {
+        Rejection { reason: self, axis: Some(axis) }
     }
 }
 

@@ -10,7 +10,7 @@ use proptest::prelude::*;
 
 use super::{AxisLimits, SetPointSteps, TOLERANCE, braking_distance, check, check_braking, check_jerk};
 use crate::fault::Fault;
-use crate::group_trajectory::{GroupTrajectory, Leg};
+use crate::group_trajectory::{GroupTrajectory, Leg, ProfileStore};
 use crate::plan::State;
 
 /// A stream of positions of one axis, which is all that the guard looks at.
@@ -94,7 +94,8 @@ proptest! {
         let mut streams: Vec<Stream> =
             all.iter().map(|limits| Stream::at_rest(0.0, *limits, period_s)).collect();
         let mut states = vec![State::default(); all.len()];
-        let mut motion = GroupTrajectory::<4>::default();
+        let (mut store, mut motion) = (ProfileStore::<4>::default(), GroupTrajectory::default());
+        let mut profiles = store.of(0..all.len()).unwrap();
         // To rest where the last one is passed at speed.
         for (share, speed, cycles) in targets.into_iter().chain([(0.5, 0.0, usize::MAX)]) {
             let legs = all.iter().zip(&states).map(|(limits, start)| Leg {
@@ -103,16 +104,16 @@ proptest! {
                 limits,
             });
             // The way may be too short for the speed.
-            if motion.move_to(legs, 1.0, 1.0, 0.0).is_err() {
+            if motion.move_to(&mut profiles, legs, 1.0, 1.0, 0.0).is_err() {
                 let here = states.iter().copied().zip(&all);
-                motion.stop(here).unwrap();
+                motion.stop(&mut profiles, here).unwrap();
             }
             for _ in 0..cycles {
                 if motion.is_finished() {
                     break;
                 }
                 motion.advance(period_s);
-                states = motion.states().take(all.len()).collect();
+                states = motion.states(&profiles).collect();
                 for (stream, state) in streams.iter_mut().zip(&states) {
                     let passed = stream.check(state.position);
                     prop_assert!(passed.is_ok(), "{passed:?} at {state:?} of {:?}", stream.limits);
@@ -142,17 +143,18 @@ proptest! {
         };
         let steepest = limits.acceleration.max(limits.deceleration);
         let mut stream = Stream::at_rest(0.0, limits, period_s);
-        let mut motion = GroupTrajectory::<4>::default();
+        let (mut store, mut motion) = (ProfileStore::<4>::default(), GroupTrajectory::default());
+        let mut profiles = store.of(0..1).unwrap();
         let mut state = State::default();
         let targets = targets.into_iter().map(|(share, _, cycles)| (share, cycles));
         let positions = targets.flat_map(|(share, cycles)| {
             let target = target(&wider, share, 0.0, period_s);
             // Where that is not possible the motion goes on as it is.
-            let _ = motion.move_to([Leg { start: state, target, limits: &wider }].into_iter(), 1.0, 1.0, 0.0);
+            let _ = motion.move_to(&mut profiles, [Leg { start: state, target, limits: &wider }].into_iter(), 1.0, 1.0, 0.0);
             let mut leg = Vec::new();
             while !motion.is_finished() && leg.len() < cycles {
                 motion.advance(period_s);
-                state = motion.states().next().unwrap();
+                state = motion.states(&profiles).next().unwrap();
                 leg.push(state.position);
             }
             leg
@@ -174,10 +176,10 @@ proptest! {
             prop_assert!(worst < 4.0 * TOLERANCE, "{excesses:?} was let pass");
         }
         // Wherever the stream has ended, refused or not.
-        motion.stop([(stream.state(), &limits)].into_iter()).unwrap();
+        motion.stop(&mut profiles, [(stream.state(), &limits)].into_iter()).unwrap();
         while !motion.is_finished() {
             motion.advance(period_s);
-            let next = motion.states().next().unwrap().position;
+            let next = motion.states(&profiles).next().unwrap().position;
             let passed = stream.check_steps(next);
             prop_assert!(passed.is_ok(), "{passed:?} at {next} of {limits:?}");
             let farthest = limits.position_max + 1.1 * TOLERANCE * range;

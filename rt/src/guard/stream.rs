@@ -224,7 +224,7 @@ fn nearest(wanted: f64, end: f64, is_possible: impl Fn(f64) -> bool) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::group_trajectory::GroupTrajectory;
+    use crate::group_trajectory::{GroupTrajectory, ProfileStore};
     use crate::guard;
     use proptest::prelude::*;
 
@@ -295,11 +295,12 @@ mod tests {
                 sent = [next.position, sent[0], sent[1]];
             }
             let last = SetPointSteps { sent: [sent[1], sent[2], sent[2]], next: sent[0], period_s: PERIOD_S };
-            let mut motion = GroupTrajectory::<4>::default();
-            motion.stop([(last.state(&limits), &limits)].into_iter()).unwrap();
+            let (mut store, mut motion) = (ProfileStore::<4>::default(), GroupTrajectory::default());
+            let mut profiles = store.of(0..1).unwrap();
+            motion.stop(&mut profiles, [(last.state(&limits), &limits)].into_iter()).unwrap();
             while !motion.is_finished() {
                 motion.advance(PERIOD_S);
-                let position = motion.states().next().unwrap().position;
+                let position = motion.states(&profiles).next().unwrap().position;
                 prop_assert!((-1.000_001..=2.000_001).contains(&position), "{position}");
             }
         }
@@ -325,11 +326,12 @@ mod tests {
                 }
             }
             let last = SetPointSteps { sent: [sent[1], sent[2], sent[2]], next: sent[0], period_s: PERIOD_S };
-            let mut motion = GroupTrajectory::<4>::default();
-            motion.stop([(last.state(&limits), &limits)].into_iter()).unwrap();
+            let (mut store, mut motion) = (ProfileStore::<4>::default(), GroupTrajectory::default());
+            let mut profiles = store.of(0..1).unwrap();
+            motion.stop(&mut profiles, [(last.state(&limits), &limits)].into_iter()).unwrap();
             while !motion.is_finished() {
                 motion.advance(PERIOD_S);
-                let next = motion.states().next().unwrap();
+                let next = motion.states(&profiles).next().unwrap();
                 let passed = guard::check(&limits, PERIOD_S, sent[1], sent[0], &next)
                     .and_then(|()| check_jerk(limits.jerk, &SetPointSteps { sent, next: next.position, period_s: PERIOD_S }));
                 prop_assert!(passed.is_ok(), "{passed:?} from {sent:?} to {next:?}");

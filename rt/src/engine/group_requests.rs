@@ -1,0 +1,215 @@
+//! What is asked of a group, and what of it is possible now.
+
+use super::encode::FAULT_RESET_CYCLES;
+use super::group::GroupContext;
+use super::requests::{Handled, require_phase};
+use super::shared::Ending;
+use super::state::{GroupState, PowerRemoval, Stream};
+use super::targets::{Rejection, check_profile_target, check_scales, check_target};
+use crate::axis::Axis;
+use crate::control::ControlLaw;
+use crate::group_trajectory::Leg;
+use crate::phase::Phase;
+use crate::plan::{PlanError, State};
+use crate::profile::ProfileTarget;
+use crate::record::EventKind;
+use crate::request::{Move, ProfileMove, RejectReason, Request, RequestId};
+use crate::stop::{Origin, StopCause};
+use crate::stop_category::StopCategory;
+use crate::time::Nanoseconds;
+use crate::watch::TimingLevel;
+
+impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
+    /// Handles what was asked of the group.
+    pub(super) fn try_request(&mut self, id: RequestId, request: &Request<AXES>) -> Handled {
+        match request {
+            Request::Activate => self.activate()?,
+            Request::Enable => self.begin_enabling()?,
+            Request::Move(parameters) => self.begin_move(id, parameters)?,
+            Request::SetProfileTarget(target) => self.set_profile_target(id, target)?,
+            Request::Stream => self.begin_stream()?,
+            Request::Stop(category) => self.begin_stop(StopCause::Requested, Origin::Group, *category),
+            Request::Disable => self.begin_disabling()?,
+            Request::ResetFaults => self.reset_faults()?,
+            // The engine has handled what concerns all groups.
+            Request::Sync(_)
+            | Request::TimeOfDay { .. }
+            | Request::RatedTorque { .. }
+            | Request::ProcessData(_)
+            | Request::Position { .. }
+            | Request::InhibitEnable
+            | Request::Shutdown => {}
+        }
+        Ok(())
+    }
+
+    fn require_phase(&self, possible: &[Phase]) -> Handled {
+        require_phase(self.group.state.phase(), possible)
+    }
+
+    fn axis_mut(&mut self, number: u8) -> Result<&mut Axis, Rejection> {
+        let unknown = RejectReason::UnknownAxis { axis: number, axes: self.axes.len() as u8 };
+        self.axes.iter_mut().find(|axis| axis.number() == number).ok_or(unknown.into())
+    }
+
+    /// A fault that has stopped the group must be reset before anything moves.
+    fn require_no_fault(&self) -> Handled {
+        match self.group.stop.filter(|stop| !stop.is_requested()) {
+            Some(stop) => {
+                Err(Rejection { reason: RejectReason::StopLatched { rule: stop.rule() }, axis: stop.axis() })
+            }
+            None => Ok(()),
+        }
+    }
+
+    fn activate(&mut self) -> Handled {
+        self.require_phase(&[Phase::Passive])?;
+        self.axes.iter_mut().for_each(Axis::start_from_actual);
+        self.enter(GroupState::Disabled);
+        Ok(())
+    }
+
+    fn begin_enabling(&mut self) -> Handled {
+        if self.shared.requested.ending >= Ending::EnableInhibited {
+            return Err(RejectReason::EnableInhibited.into());
+        }
+        self.require_phase(&[Phase::Disabled])?;
+        self.require_no_fault()?;
+        self.group.stop = None;
+        self.forget_observations();
+        if let Some(heartbeat) = &mut self.shared.heartbeat {
+            heartbeat.hasten();
+        }
+        self.enter(GroupState::Enabling);
+        Ok(())
+    }
+
+    /// Forgets what was observed while nothing could move.
+    fn forget_observations(&mut self) {
+        self.axes.iter_mut().for_each(Axis::begin_watch);
+        self.shared.foreign_frame = None;
+        self.shared.slots.forgive();
+        if let Some(level) = self.shared.slots.changed_level() {
+            self.shared.emit(EventKind::Timing { level });
+        }
+    }
+
+    fn begin_stream(&mut self) -> Handled {
+        self.require_phase(&[Phase::Holding])?;
+        self.require_no_fault()?;
+        if self.shared.slots.level() >= TimingLevel::Degraded {
+            let (missed, _) = self.shared.slots.unforgiven();
+            return Err(RejectReason::MissedSlots { missed, limit: self.shared.slots.degraded() }.into());
+        }
+        self.group.stop = None;
+        self.axes.iter_mut().for_each(Axis::begin_stream);
+        self.enter(GroupState::Streaming(Stream::Awaited));
+        Ok(())
+    }
+
+    fn enter_motion(&mut self) {
+        self.group.stop = None;
+        self.enter(GroupState::Moving { is_reported: false });
+    }
+
+    fn begin_move(&mut self, id: RequestId, parameters: &Move<AXES>) -> Handled {
+        self.require_phase(&[Phase::Holding, Phase::Moving])?;
+        self.require_no_fault()?;
+        check_scales(parameters)?;
+        let target_of = |axis: &Axis| (axis.own(&parameters.target), axis.own(&parameters.target_velocity));
+        for axis in self.axes.iter() {
+            let (position, velocity) = target_of(axis);
+            check_target(axis, position, velocity, self.shared.period_s)
+                .map_err(|reason| reason.of_axis(axis.number()))?;
+        }
+        let legs = self.axes.iter().map(|axis| {
+            let (position, velocity) = target_of(axis);
+            let start = axis.set_point();
+            let target = State { position, velocity, acceleration: 0.0 };
+            let limits = &axis.parameters().limits;
+            // A drive in a profile mode makes its own way: nothing is planned for it.
+            if axis.is_profile() {
+                Leg::standing(start.position, limits)
+            } else {
+                Leg { start, target, limits }
+            }
+        });
+        let minimum_duration_s = parameters.minimum_duration_s;
+        self.group
+            .motion
+            .move_to(
+                &mut self.profiles,
+                legs,
+                parameters.velocity_scale,
+                parameters.acceleration_scale,
+                minimum_duration_s,
+            )
+            .map_err(|error| self.plan_rejection(error, minimum_duration_s))?;
+        for axis in self.axes.iter_mut() {
+            let position = axis.own(&parameters.target);
+            if axis.accepts(ProfileTarget::Position(position)) {
+                axis.set_profile_target(ProfileTarget::Position(position), Nanoseconds::MAX);
+            }
+        }
+        // It takes over what was planned, and the drives that find their own way to a position.
+        let is_positioned = |number: u8| {
+            let mut positioned =
+                self.axes.iter().filter(|axis| axis.parameters().law == ControlLaw::ProfilePosition);
+            positioned.any(|axis| axis.number() == number)
+        };
+        self.shared.snapshot.motions.begin(id, None, |axis| axis.is_none_or(is_positioned));
+        self.enter_motion();
+        Ok(())
+    }
+
+    /// What keeps a motion from being planned. The planner counts the axes of the group.
+    fn plan_rejection(&self, error: PlanError, minimum_duration_s: f64) -> Rejection {
+        let axis = error.axis().and_then(|place| self.axes.get(place));
+        match (error, axis) {
+            (PlanError::InvalidTiming, _) => {
+                RejectReason::MinimumDuration { duration_s: minimum_duration_s }.into()
+            }
+            (_, Some(axis)) => RejectReason::NoTrajectory.of_axis(axis.number()),
+            (_, None) => RejectReason::NoTrajectory.into(),
+        }
+    }
+
+    fn set_profile_target(&mut self, id: RequestId, wanted: &ProfileMove) -> Handled {
+        self.require_phase(&[Phase::Holding, Phase::Moving])?;
+        self.require_no_fault()?;
+        check_profile_target(self.axis_mut(wanted.axis)?, wanted.target)
+            .map_err(|reason| reason.of_axis(wanted.axis))?;
+        // The other axes stay where they are, not where the last trajectory ended.
+        if self.group.state == GroupState::Holding {
+            self.plan_standstill().map_err(|error| self.plan_rejection(error, 0.0))?;
+        }
+        self.axis_mut(wanted.axis)?.set_profile_target(wanted.target, wanted.valid_until_ns);
+        let is_position = matches!(wanted.target, ProfileTarget::Position(_));
+        let takes_over = |axis: Option<u8>| axis.map_or(is_position, |axis| axis == wanted.axis);
+        self.shared.snapshot.motions.begin(id, Some(wanted.axis), takes_over);
+        self.enter_motion();
+        Ok(())
+    }
+
+    fn begin_disabling(&mut self) -> Handled {
+        match self.group.state {
+            GroupState::Passive => return Err(RejectReason::Phase.into()),
+            GroupState::Disabled | GroupState::Disabling(_) => {}
+            _ if self.must_come_to_rest() || self.group.state == GroupState::Stopping => {
+                self.begin_stop(StopCause::Requested, Origin::Group, StopCategory::One);
+            }
+            _ => self.enter(GroupState::Disabling(PowerRemoval::Shutdown)),
+        }
+        Ok(())
+    }
+
+    fn reset_faults(&mut self) -> Handled {
+        self.require_phase(&[Phase::Disabled, Phase::Holding])?;
+        if self.group.state == GroupState::Disabled {
+            self.group.fault_reset_cycles = 3 * FAULT_RESET_CYCLES;
+            self.axes.iter_mut().for_each(Axis::begin_fault_reset);
+        }
+        self.group.stop = None;
+        Ok(())
+    }
+}

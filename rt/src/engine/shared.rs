@@ -1,0 +1,133 @@
+//! What the groups of a controller share: the grid, the buses, the heartbeat, and what observers see.
+
+use arrayvec::ArrayVec;
+
+use super::backlog::Backlog;
+use super::heartbeat::HeartbeatProducer;
+use super::outbox::Outbox;
+use super::parameters::{BusParameters, EngineParameters};
+use super::slots::SlotWatch;
+use super::{Deadline, has_cycle};
+use crate::axis::Axis;
+use crate::bus_set::BusSet;
+use crate::frame::Id;
+use crate::host::Snapshot;
+use crate::motion_reports::MotionState;
+use crate::record::{CycleRecord, Event, EventKind};
+use crate::stop::StopCategories;
+use crate::time::{NANOSECONDS_PER_SECOND, Nanoseconds};
+use crate::time_of_day::TimeProducer;
+
+/// What the groups share.
+#[derive(Clone, Debug)]
+pub(super) struct Shared<const AXES: usize, const BUSES: usize> {
+    pub(super) period_ns: Nanoseconds,
+    pub(super) period_s: f64,
+    pub(super) enable_timeout_cycles: u32,
+    pub(super) not_transmitted_cycles: u32,
+    pub(super) acknowledge_timeout_cycles: u32,
+    pub(super) categories: StopCategories,
+    pub(super) buses: ArrayVec<BusParameters, BUSES>,
+    pub(super) requested: Requested,
+    /// Whether the commands of this cycle were ready in time, as far as is known.
+    pub(super) deadline: Deadline,
+
+    /// The time of the present cycle.
+    pub(super) now_ns: Nanoseconds,
+    pub(super) slots: SlotWatch,
+    pub(super) backlog: Backlog<BUSES>,
+    /// The buses whose next SYNC is skipped, because a drive on them has to show that its answers are not late.
+    pub(super) skip_sync: BusSet,
+    /// The buses whose drives have been asked for feedback by SYNC in this slot.
+    pub(super) asked_by_sync: BusSet,
+    /// The bus and the identifier of a frame that only this controller may send.
+    pub(super) foreign_frame: Option<(u8, Id)>,
+    pub(super) heartbeat: Option<HeartbeatProducer<BUSES>>,
+    pub(super) time: Option<TimeProducer>,
+
+    pub(super) events: Outbox,
+    /// Events, records and frames that found no room.
+    pub(super) dropped: u64,
+    pub(super) record: CycleRecord<AXES>,
+    /// What observers see; the answers to requests are kept in it.
+    pub(super) snapshot: Snapshot<AXES, BUSES>,
+}
+
+/// What was asked for that no later request takes back.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Requested {
+    /// Whether SYNC is sent.
+    pub(super) sync: bool,
+    /// How the run is to end.
+    pub(super) ending: Ending,
+}
+
+/// How far a run is on its way to the end.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Ending {
+    /// It goes on.
+    #[default]
+    NotBegun,
+    /// Nothing is enabled any more.
+    EnableInhibited,
+    /// The loop ends after this cycle.
+    Shutdown,
+}
+
+impl<const AXES: usize, const BUSES: usize> Shared<AXES, BUSES> {
+    pub(super) fn new(parameters: EngineParameters<AXES, BUSES>) -> Self {
+        let (axis_count, bus_count) = (parameters.axes.len() as u8, parameters.buses.len() as u8);
+        let slowest_divider = parameters.buses.iter().map(|bus| bus.divider).max().unwrap_or(1);
+        let buses = parameters.buses.len();
+        let heartbeat = |heartbeat| HeartbeatProducer::new(heartbeat, buses, slowest_divider);
+        Self {
+            period_ns: parameters.period_ns,
+            period_s: parameters.period_ns as f64 / NANOSECONDS_PER_SECOND as f64,
+            enable_timeout_cycles: parameters.enable_timeout_cycles,
+            not_transmitted_cycles: parameters.not_transmitted_cycles,
+            acknowledge_timeout_cycles: parameters.acknowledge_timeout_cycles,
+            categories: parameters.categories,
+            requested: Requested::default(),
+            deadline: Deadline::Met,
+            now_ns: 0,
+            slots: SlotWatch::new(parameters.timing),
+            backlog: Backlog::new(buses),
+            skip_sync: BusSet::default(),
+            asked_by_sync: BusSet::default(),
+            foreign_frame: None,
+            heartbeat: parameters.heartbeat.map(heartbeat),
+            time: parameters.time_cycles.map(TimeProducer::new),
+            events: Outbox::default(),
+            dropped: 0,
+            record: CycleRecord { axis_count, ..CycleRecord::default() },
+            snapshot: Snapshot { axis_count, bus_count, ..Snapshot::default() },
+            buses: parameters.buses,
+        }
+    }
+
+    pub(super) fn emit(&mut self, kind: EventKind) {
+        self.events.push(Event { slot: self.present_slot(), at_ns: self.now_ns, kind });
+    }
+
+    pub(super) fn present_slot(&self) -> u64 {
+        self.slots.present.unwrap_or(0)
+    }
+
+    /// Slots in one cycle of the bus of an axis.
+    pub(super) fn divider_of(&self, axis: &Axis) -> u32 {
+        self.buses.get(usize::from(axis.parameters().bus)).map_or(1, |bus| bus.divider)
+    }
+
+    /// Whether the bus of an axis has SYNC, feedback and set-points in this slot.
+    pub(super) fn has_cycle_of(&self, axis: &Axis, slot: u64) -> bool {
+        self.buses.get(usize::from(axis.parameters().bus)).is_some_and(|bus| has_cycle(bus, slot))
+    }
+
+    /// The motions in progress have reached their targets.
+    pub(super) fn finish_motions(&mut self) {
+        let (slot, at_ns, events) = (self.present_slot(), self.now_ns, &mut self.events);
+        self.snapshot.motions.end_all(MotionState::Finished, |request| {
+            events.push(Event { slot, at_ns, kind: EventKind::MotionFinished { request } });
+        });
+    }
+}
