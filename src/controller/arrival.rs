@@ -48,8 +48,7 @@ mod tests {
         let config = Config::parse("arm6-erob.toml", include_str!("../../configs/arm6-erob.toml")).unwrap();
         let arrival = Arrival::of(&config);
         let heard = AxisSnapshot { is_heard: true, feedback_slot: 70, ..AxisSnapshot::default() };
-        let mut snapshot = Snapshot::default();
-        snapshot.axes = [heard; takt_rt::MAX_AXES];
+        let mut snapshot = Snapshot { axes: [heard; takt_rt::MAX_AXES], ..Snapshot::default() };
         assert_eq!(arrival.missed(&[0.0; 6], &snapshot), None);
         snapshot.axes[2].position = 0.5;
         assert!(matches!(arrival.missed(&[0.0; 6], &snapshot), Some(Outcome::OffTarget { axis: 2, .. })));
