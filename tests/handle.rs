@@ -443,3 +443,31 @@ fn many_threads_command_stop_wait_and_observe_at_once() {
     assert!(stops > 20 && events.missed() == 0, "{stops} stops");
     assert_eq!(joint.finish().unwrap().outcome, Outcome::Finished);
 }
+
+/// What `main` prints of an error.
+fn printed(error: impl Into<takt::Error>) -> String {
+    let error: takt::Error = error.into();
+    format!("{error:?}")
+}
+
+#[test]
+fn main_prints_errors_as_sentences_and_a_wrong_file_with_its_lines() {
+    let text = include_str!("../configs/single-erob.toml").replace("node = 1\n", "node = 1000\n");
+    let wrong = printed(Config::parse("joint.toml", &text).unwrap_err());
+    assert!(
+        wrong.contains("joint.toml:") && wrong.contains("node = 1000") && wrong.contains("1 to 127"),
+        "{wrong}"
+    );
+    assert!(wrong.len() < 1_000 && !wrong.contains("ConfigError"), "{wrong}");
+
+    let mut config = Config::parse("joint.toml", include_str!("../configs/single-erob.toml")).unwrap();
+    config.axes[0].node = 200;
+    let field = printed(Controller::start(config, SessionOptions::default()).err().unwrap());
+    assert!(field.contains("`axis.node` cannot be 200") && field.len() < 1_000, "{field}");
+
+    let joint = start("single-erob.toml");
+    let count = joint.move_to(&[0.0, 0.0]).unwrap_err();
+    assert_eq!(printed(count.clone()), count.to_string());
+    assert_eq!(printed(WaitError::Ended), "the controller has ended");
+    assert_eq!(format!("{:?}", MotionError::Replaced), "a later motion has replaced the motion");
+}

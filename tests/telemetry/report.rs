@@ -129,7 +129,7 @@ fn the_text_has_every_part_of_the_report() {
         "slide was 0.2500 m from its set-point (allowed: 0.1250 m) while moving (slot 7)",
         "missed slots             3 of 23",
         "slide                1062.500 mm   0.02 s, +1.50 m/s = 708.3 ms late         17.43750 m     -5215.2",
-        "shoulder           1062.500 mrad  0.02 s, +1.50 rad/s = 708.3 ms late               never reported",
+        "shoulder           1062.500 mrad   0.02 s, +1.50 rad/s = 708.3 ms late               never reported",
         "slide                    75.00 %         25.00 %         80.00 %",
         "left            can0           50.0 %          80          40          5        6  error passive",
         "18 records, 2 dropped",
