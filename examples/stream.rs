@@ -1,4 +1,5 @@
-//! Streams set-points of its own: a slow circle of the first two joints, in step with the cycles.
+//! Streams positions: a slow circle of the first two joints, a point every 10 ms from an ordinary thread. The controller
+//! interpolates, and keeps every limit, however unevenly the points come.
 //!
 //! ```text
 //! cargo run --release --example stream configs/arm6-erob.toml
@@ -6,45 +7,42 @@
 
 use std::f64::consts::TAU;
 use std::path::Path;
-use std::time::Duration;
+use std::thread;
+use std::time::{Duration, Instant};
 
-use takt::plan::State;
-use takt::{Config, Controller, SessionOptions};
-
-const PATIENCE: Duration = Duration::from_secs(30);
+use takt::{Config, Controller, SessionOptions, StreamHandle};
 
 fn main() -> takt::Result {
     let path = std::env::args().nth(1).unwrap_or_else(|| "configs/arm6-erob.toml".to_owned());
     run(Config::load(Path::new(&path))?)
 }
 
-/// Streams for two seconds.
-pub fn run(mut config: Config) -> takt::Result {
-    // This thread is not real-time, so its set-points come unevenly. Those beyond the limits are clamped.
-    config.axes.iter_mut().for_each(|axis| axis.on_violation = takt::config::OnViolation::Clamp);
-    let period_s = config.cycle.period_ns as f64 * 1e-9;
+/// Streams for two seconds, and then a chunk of points that are meant for later.
+pub fn run(config: Config) -> takt::Result {
     let arm = Controller::start(config, SessionOptions::default())?;
     let centre: Vec<f64> = arm.state().axes().iter().map(|axis| axis.position_set).collect();
 
+    let stream = arm.stream();
     arm.begin_stream()?;
-    let mut slot = arm.state().slot;
-    let end = slot + (2.0 / period_s) as u64;
-    let first = slot;
-    while slot < end {
-        // The set-points are those of a slot. The present time of this thread would make them uneven.
-        slot = arm.cycle_after(slot, PATIENCE)?.slot;
-        let at = |slot: u64| circle(&centre, (slot - first) as f64 * period_s);
-        let next = at(slot + 1);
-        let velocity = |(to, from): (&f64, f64)| (to - from) / period_s;
-        let velocities: Vec<f64> = next.iter().zip(at(slot)).map(velocity).collect();
-        let states = next.iter().zip(velocities);
-        let states: Vec<State> = states
-            .map(|(position, velocity)| State { position: *position, velocity, acceleration: 0.0 })
-            .collect();
-        arm.stream(&states, Duration::from_millis(100))?;
+    let begun = Instant::now();
+    while begun.elapsed() < Duration::from_secs(2) {
+        // Stamped on its arrival.
+        stream.push_now(&circle(&centre, begun.elapsed().as_secs_f64()))?;
+        thread::sleep(Duration::from_millis(10));
     }
-    let off = arm.state().axes().iter().map(|axis| axis.following_error.abs()).fold(0.0, f64::max);
-    println!("streamed {} slots, {off:.4} rad off at most at the end", slot - first);
+    println!("followed {:?} behind", stream.lag());
+
+    // The next half second at once, as a policy gives it. A later chunk would take the place of what is left of this one.
+    let (from_s, interval) = (begun.elapsed().as_secs_f64(), Duration::from_millis(20));
+    let at = |number: i32| circle(&centre, from_s + f64::from(number) * interval.as_secs_f64());
+    let chunk: Vec<Vec<f64>> = (0..25).map(at).collect();
+    stream.push_chunk(StreamHandle::now_ns(), interval, &chunk)?;
+    thread::sleep(Duration::from_secs(1));
+
+    // The points have run out, so the arm has come to rest. It would go on with the next ones.
+    let report = stream.report();
+    println!("{:?} after {} points", report.state, report.counts.points);
+    arm.finish()?;
     Ok(())
 }
 

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use takt::config::{
     Axis, Bus, Config, Control, DriveFamily, Feedback, Interface, Limits, Program, ProgramMove,
-    ProgramTarget, Travel,
+    ProgramTarget, StreamDelay, Travel,
 };
 use takt::controller::session::SessionOptions;
 use takt::controller::{Controller, VirtualRun, assemble};
@@ -47,6 +47,11 @@ const CASES: &[Case] = &[
     ("falling ladder", |c| c.missed_slots.stop = 1, &["`cycle.missed_slots.stop` cannot be 1", "50 to"]),
     ("endless ladder", |c| c.missed_slots.degraded = u32::MAX, &["`cycle.missed_slots.degraded`"]),
     ("no leak", |c| c.missed_slots.leak_slots = 0, &["`cycle.missed_slots.leak_slots` cannot be 0"]),
+    (
+        "stream delay",
+        |c| c.stream_delay = StreamDelay::Fixed(2_000_000_000),
+        &["`stream.delay` cannot be 2 s", "0 s to 1 s"],
+    ),
     ("priority", |c| c.realtime.priority = Some(0), &["`realtime.priority` cannot be 0", "1 to 99"]),
     ("priority", |c| c.realtime.priority = Some(255), &["`realtime.priority` cannot be 255"]),
     ("CPU", |c| c.realtime.cpu = Some(usize::MAX), &["`realtime.cpu` cannot be 18446744073709551615"]),

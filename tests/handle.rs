@@ -4,23 +4,27 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use takt::config::Feedback;
-use takt::plan::State;
+use takt::config::{Feedback, Follow};
 use takt::rt::RequestKind;
 use takt::rt::linux::{Policy, Step};
 use takt::{
     CommandError, Config, Controller, DriveState, Event, EventKind, Events, Handle, MotionError, MoveOptions,
-    Outcome, Phase, Rule, SessionOptions, Snapshot, StartFailure, StopCategory, WaitError,
+    Outcome, Phase, Rule, SessionOptions, Snapshot, StartFailure, StopCategory, StreamError, StreamHandle,
+    StreamState, WaitError,
 };
 
 const PATIENCE: Duration = Duration::from_secs(30);
 
-fn start(name: &str) -> Controller {
+fn config(name: &str) -> Config {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs").join(name);
     let mut config = Config::load(&path).unwrap();
     config.telemetry.is_recorded = false;
     config.telemetry.black_box_ns = None;
-    Controller::start(config, SessionOptions::default()).unwrap()
+    config
+}
+
+fn start(name: &str) -> Controller {
+    Controller::start(config(name), SessionOptions::default()).unwrap()
 }
 
 #[test]
@@ -64,10 +68,11 @@ fn a_velocity_is_reached_and_ended_and_an_expired_one_stops_the_group() {
 
 #[test]
 fn after_a_fault_each_request_is_refused_with_the_reason_until_the_fault_is_reset() {
-    let joint = start("single-erob.toml");
+    let mut config = config("single-erob.toml");
+    config.axes[0].follow = Follow::Exact;
+    let joint = Controller::start(config, SessionOptions::default()).unwrap();
     joint.begin_stream().unwrap();
-    let far = State { position: 1.0, ..State::default() };
-    joint.stream(&[far], PATIENCE).unwrap();
+    joint.stream().push_now(&[1.0]).unwrap();
     let begun = std::time::Instant::now();
     while joint.state().stop.is_none() && begun.elapsed() < PATIENCE {
         std::thread::sleep(Duration::from_millis(1));
@@ -257,7 +262,7 @@ fn a_handle_says_after_the_end_that_the_controller_has_ended() {
     assert_eq!(handle.stop(StopCategory::Zero), Err(CommandError::Ended));
     let answers = [handle.disable(), handle.enable(), handle.reset_faults(), handle.begin_stream()];
     assert_eq!(answers, [const { Err(CommandError::Ended) }; 4]);
-    assert_eq!(handle.stream(&[State::default()], PATIENCE), Err(CommandError::Ended));
+    assert_eq!(handle.stream().push_now(&[0.0]), Err(StreamError::Ended));
     assert_eq!(handle.next_cycle(PATIENCE).err(), Some(WaitError::Ended));
     assert_eq!(handle.wait_for(Phase::Moving, PATIENCE), Err(WaitError::Ended));
     // What was before the end is still known.
@@ -470,4 +475,41 @@ fn main_prints_errors_as_sentences_and_a_wrong_file_with_its_lines() {
     assert_eq!(printed(count.clone()), count.to_string());
     assert_eq!(printed(WaitError::Ended), "the controller has ended");
     assert_eq!(format!("{:?}", MotionError::Replaced), "a later motion has replaced the motion");
+}
+
+#[test]
+fn points_from_two_threads_are_followed_and_the_end_of_them_is_reported() {
+    let arm = start("arm6-erob.toml");
+    let home: Vec<f64> = arm.state().axes[..6].iter().map(|axis| axis.position_set).collect();
+    arm.begin_stream().unwrap();
+    let begun_ns = StreamHandle::now_ns();
+    // Each thread has every second point of a slow ramp of 20 ms steps.
+    std::thread::scope(|scope| {
+        for half in 0..2 {
+            let (stream, home) = (arm.stream(), &home);
+            scope.spawn(move || {
+                for number in (half..50).step_by(2) {
+                    let point: Vec<f64> = home.iter().map(|axis| axis + 0.001 * number as f64).collect();
+                    stream.push(begun_ns + 20_000_000 * (number + 5), &point).unwrap();
+                    std::thread::sleep(Duration::from_millis(40));
+                }
+            });
+        }
+    });
+    let begun = std::time::Instant::now();
+    while arm.stream().report().state != StreamState::Dry {
+        assert!(begun.elapsed() < PATIENCE, "{:?}", arm.stream().report());
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    std::thread::sleep(Duration::from_millis(300));
+    let state = arm.state();
+    assert_eq!((state.phase, state.stop), (Phase::Streaming, None));
+    assert_eq!(state.stream.counts.points, 50);
+    for (axis, home) in state.axes.iter().zip(&home) {
+        assert!((axis.position_set - home - 0.05).abs() < 5e-3, "{} from {home}", axis.position_set);
+    }
+    assert!(matches!(arm.stream().push_now(&[0.0; 5]), Err(StreamError::Count { given: 5, axes: 6 })));
+    assert!(matches!(arm.stream().push_now(&[f64::NAN; 6]), Err(StreamError::NotFinite { axis: 0, .. })));
+    arm.stop(StopCategory::Two).unwrap();
+    assert_eq!(arm.wait_for(Phase::Holding, PATIENCE), Ok(()));
 }

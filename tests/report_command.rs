@@ -419,6 +419,7 @@ fn a_length_that_a_file_lies_about_costs_no_memory() {
 fn many_short_cycles_and_a_long_name_take_no_more_memory_than_the_file() {
     let folder = tempfile::tempdir().unwrap();
     let sizes = ChannelSizes {
+        stream: Default::default(),
         axes: 0,
         buses: 1,
         records: 1024,

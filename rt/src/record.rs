@@ -3,6 +3,7 @@
 use crate::cia402;
 use crate::phase::Phase;
 use crate::request::{RequestError, RequestId};
+use crate::source::StreamState;
 use crate::stop::StopReason;
 use crate::time::Nanoseconds;
 use crate::watch::TimingLevel;
@@ -128,6 +129,11 @@ pub enum EventKind {
     },
     /// A stop began; one for each stop, and a second one when a fault comes up on the way of a stop that was asked for.
     Stop(StopReason),
+    /// A stream has begun, has run dry, or goes on again.
+    Stream {
+        /// What it is doing from now on.
+        state: StreamState,
+    },
     /// A motion has reached its target.
     MotionFinished {
         /// The request that began it.

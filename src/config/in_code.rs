@@ -23,7 +23,7 @@
 
 use std::path::PathBuf;
 
-use takt_rt::{OnViolation, StopCategories};
+use takt_rt::{Follow, StopCategories, StreamDelay};
 
 use super::defaults;
 use super::model::{
@@ -46,6 +46,7 @@ impl Config {
                 heartbeat_timeout_ns: defaults::HEARTBEAT_TIMEOUT_NS,
                 time_ns: None,
             },
+            stream_delay: StreamDelay::default(),
             buses,
             axes,
             program: Program { repeat: defaults::REPEAT, moves: vec![] },
@@ -144,7 +145,7 @@ impl Axis {
             },
             start_tolerance: defaults::start_tolerance(travel),
             target_tolerance: defaults::target_tolerance(travel, &control),
-            on_violation: OnViolation::default(),
+            follow: Follow::default(),
             missed_feedback_cycles: defaults::MISSED_FEEDBACK_CYCLES,
             transmission_type: defaults::TRANSMISSION_TYPE,
             mapping,

@@ -115,7 +115,7 @@ pub fn run(
 pub(super) struct RemoteHandles {
     /// Reads the state.
     pub observer: Observer,
-    /// Sends streamed set-points.
+    /// Sends the points of a stream.
     pub streamer: Streamer,
     /// Sends requests.
     pub clients: ClientRequests,
@@ -130,7 +130,7 @@ impl RemoteHandles {
     fn of(host: &mut HostSide, begun: &Begun) -> Option<Self> {
         Some(Self {
             observer: host.observer(),
-            streamer: host.take_streamer()?,
+            streamer: host.streamer(),
             clients: host.clients(),
             events: host.events(),
             realtime: begun.report,

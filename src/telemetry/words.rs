@@ -2,7 +2,7 @@
 
 use takt_rt::{
     AxisSnapshot, DriveState, Event, EventKind, OperationMode, Phase, Rule, Snapshot, StopCategory,
-    TimingLevel,
+    StreamState, TimingLevel,
 };
 
 use super::machine::Machine;
@@ -79,6 +79,12 @@ pub fn event(event: &Event, machine: &Machine) -> String {
         EventKind::PhaseChanged { from, to } => format!("{} → {}", phase(from), phase(to)),
         EventKind::Stop(reason) => format!("stop: {}", stop(&reason, machine)),
         EventKind::MotionFinished { request } => format!("motion {} finished", request.0),
+        EventKind::Stream { state: StreamState::Idle } => "stream: over".to_owned(),
+        EventKind::Stream { state: StreamState::Awaited } => "stream: awaited".to_owned(),
+        EventKind::Stream { state: StreamState::Following } => "stream: followed".to_owned(),
+        EventKind::Stream { state: StreamState::Dry } => {
+            "stream: the points have run out, the axes come to rest".to_owned()
+        }
         EventKind::DriveState { axis, state: to, statusword } => {
             format!("{}: {} (statusword 0x{statusword:04X})", machine.axis_name(axis), state(to))
         }

@@ -28,6 +28,7 @@ pub const STOP: StopReason = StopReason {
 
 pub fn sides(records: usize) -> (RtSide, HostSide, LogSide) {
     channels(&ChannelSizes {
+        stream: Default::default(),
         axes: 2,
         buses: 1,
         records,

@@ -54,7 +54,6 @@ use profile_mode::ProfileMode;
 use reception::Reception;
 use sdo_fallback::SdoFallback;
 use set_points::SetPoints;
-use stream::StreamFollower;
 
 pub use feedback::Jump;
 pub use parameters::{AxisParameters, AxisParametersError, CommandPdo, FeedbackSince, Pdo};
@@ -70,7 +69,8 @@ pub struct Axis {
     command: ProcessImage,
     feedback: ProcessImage,
     set_points: SetPoints,
-    stream: StreamFollower,
+    /// Where the axis rests while a stream has run dry.
+    stream_rest: f64,
     profile: ProfileMode,
     joint: JointEstimate,
     following: FollowingErrorGuard,
@@ -100,7 +100,7 @@ impl Axis {
             command,
             feedback: ProcessImage::default(),
             set_points: SetPoints::default(),
-            stream: StreamFollower::default(),
+            stream_rest: 0.0,
             profile: ProfileMode::default(),
             joint: JointEstimate::default(),
             following,

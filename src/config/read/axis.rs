@@ -14,7 +14,7 @@ use super::travel::{counting, travel};
 use crate::canopen::dcf::DeviceConfiguration;
 use crate::config::defaults;
 use crate::config::model::{
-    Axis, DriveFamily, Feedback, Identity, Interface, Limits, OnViolation, PdoMapping, SimulatedJoint, Travel,
+    Axis, DriveFamily, Feedback, Follow, Identity, Interface, Limits, PdoMapping, SimulatedJoint, Travel,
 };
 use crate::config::problem_kind::ProblemKind;
 use crate::config::quantities::Quantities;
@@ -140,9 +140,9 @@ fn axis(mut section: Section<'_>, machine: &Machine<'_>, earlier: &[ReadAxis]) -
         |key| section.get(key).and_then(|entry: Entry<'_>| entry.quantity(q.position, q.ranges.deviation));
     let start_tolerance = tolerance("start_tolerance");
     let target_tolerance = tolerance("target_tolerance");
-    let on_violation = section
-        .get("on_violation")
-        .and_then(|entry| entry.choice(&[("reject", OnViolation::Reject), ("clamp", OnViolation::Clamp)]));
+    let follow = section
+        .get("follow")
+        .and_then(|entry| entry.choice(&[("smooth", Follow::Smooth), ("exact", Follow::Exact)]));
     let missed =
         section.get("missed_feedback_cycles").and_then(|entry| entry.integer(ranges::MISSED_FEEDBACK_CYCLES));
     let feedback_delay =
@@ -172,7 +172,7 @@ fn axis(mut section: Section<'_>, machine: &Machine<'_>, earlier: &[ReadAxis]) -
             start_tolerance: start_tolerance.unwrap_or(defaults::start_tolerance(travel)),
             target_tolerance: target_tolerance
                 .unwrap_or_else(|| defaults::target_tolerance(travel, &control)),
-            on_violation: on_violation.unwrap_or_default(),
+            follow: follow.unwrap_or_default(),
             missed_feedback_cycles: missed
                 .and_then(|cycles| u16::try_from(cycles).ok())
                 .unwrap_or(defaults::MISSED_FEEDBACK_CYCLES),

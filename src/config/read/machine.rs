@@ -1,4 +1,4 @@
-//! The sections that exist once: `[cycle]`, `[realtime]`, `[master]`, `[telemetry]`, `[simulation]`.
+//! The sections that exist once: `[cycle]`, `[stream]`, `[realtime]`, `[master]`, `[telemetry]`, `[simulation]`.
 
 use std::path::PathBuf;
 
@@ -7,7 +7,7 @@ use super::section::Section;
 use crate::bus::schedule::automatic_command_phase;
 use crate::config::bounds::Bounds;
 use crate::config::defaults;
-use crate::config::model::{Axis, Config, Cycle, Master, Realtime, Simulation, Telemetry};
+use crate::config::model::{Axis, Config, Cycle, Master, Realtime, Simulation, StreamDelay, Telemetry};
 use crate::config::problem_kind::ProblemKind;
 use crate::config::quantity::Quantity;
 use crate::config::ranges;
@@ -48,6 +48,14 @@ fn fraction_of_period(entry: &Entry<'_>, period_ns: u64) -> Option<u64> {
     } else {
         rules::cycle::command_phase(&entry.spot, entry.unbounded(Quantity::DURATION)?, period_ns)
     }
+}
+
+/// `[stream]`
+pub fn stream_delay(mut section: Section<'_>) -> StreamDelay {
+    let delay = section.get("delay").filter(|entry| !entry.is_word("auto"));
+    let fixed = delay.and_then(|entry| entry.nanoseconds(ranges::STREAM_DELAY_S)).map(StreamDelay::Fixed);
+    section.finish();
+    fixed.unwrap_or_default()
 }
 
 pub fn realtime(mut section: Section<'_>, period_ns: u64) -> Realtime {
