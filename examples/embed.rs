@@ -1,63 +1,47 @@
-//! Embeds the controller in a program. It moves the arm, prints the positions, and streams positions: a slow circle
-//! of the first two joints.
+//! The first program: brings the drives of an arm up, moves it, and shuts them down.
 //!
 //! ```text
 //! cargo run --release --example embed configs/arm6-erob.toml
 //! ```
 
-use std::f64::consts::TAU;
-use std::path::PathBuf;
-use std::thread;
-use std::time::{Duration, Instant};
+use std::path::Path;
+use std::time::Duration;
 
-use miette::IntoDiagnostic;
-use takt::config::Config;
-use takt::controller::Controller;
-use takt::controller::session::SessionOptions;
+use takt::{Config, Controller, MoveOptions, SessionOptions};
 
-fn main() -> miette::Result<()> {
-    let path = std::env::args().nth(1).map_or_else(|| PathBuf::from("configs/arm6-erob.toml"), PathBuf::from);
-    let config = Config::load(&path)?;
-    let arm = Controller::start(config, SessionOptions::default()).into_diagnostic()?;
+fn main() -> takt::Result {
+    let path = std::env::args().nth(1).unwrap_or_else(|| "configs/arm6-erob.toml".to_owned());
+    run(Config::load(Path::new(&path))?)
+}
 
-    let middle = |axis: &takt::config::Axis| 0.5 * (axis.limits.position_min + axis.limits.position_max);
-    let targets: Vec<f64> = arm.axes().iter().map(middle).collect();
-    let motion = arm.move_to(&targets).into_diagnostic()?;
-    arm.wait(motion, Duration::from_secs(30)).into_diagnostic()?;
-    print(&arm, "moved");
-
-    // A hundred times a second, a position for every axis, at whatever moment this thread happens to run.
-    let stream = arm.stream();
-    arm.begin_stream().into_diagnostic()?;
-    let begun = Instant::now();
-    while begun.elapsed() < Duration::from_secs(3) {
-        stream.push_now(&circle(&targets, begun.elapsed().as_secs_f64())).into_diagnostic()?;
-        thread::sleep(Duration::from_millis(10));
+/// Moves every axis to the middle of its travel, and to a tenth of its travel above it.
+pub fn run(config: Config) -> takt::Result {
+    let arm = Controller::start(config, SessionOptions::default())?;
+    for refused in arm.realtime().refused() {
+        println!("the loop is less punctual than it could be: {refused:?}");
     }
-    print(&arm, "streamed");
-    let report = stream.report();
-    println!("{} points, followed {:?} behind", report.counts.points, stream.lag());
+    let pose = |part: f64| -> Vec<f64> {
+        let limits = arm.axes().iter().map(|axis| axis.limits);
+        limits.map(|of| of.position_min + part * (of.position_max - of.position_min)).collect()
+    };
 
-    let session = arm.finish().into_diagnostic()?;
-    println!("{:?} after {} cycles", session.outcome, session.log.statistics.cycles);
+    // As fast as the limits allow. All axes arrive at the same time.
+    let motion = arm.move_to(&pose(0.5))?;
+    arm.wait(motion, Duration::from_secs(30))?;
+
+    // At half the velocity, within 3 s at the earliest. A move replaces the one that is under way.
+    let gently = MoveOptions { velocity_scale: 0.5, minimum_duration_s: 3.0, ..MoveOptions::default() };
+    let motion = arm.move_with(&pose(0.6), gently)?;
+    arm.wait(motion, Duration::from_secs(30))?;
+
+    for (axis, now) in arm.axes().iter().zip(arm.state().axes()) {
+        println!(
+            "{:<10} {:+.4} rad, {:+.1e} off its set-point",
+            axis.name, now.position, now.following_error
+        );
+    }
+    // Dropping the controller would do the same, without the result.
+    let session = arm.finish()?;
+    println!("{:?}", session.outcome);
     Ok(())
-}
-
-/// The first two joints circle around their targets, from rest to rest. The amplitude rises and falls with the fourth power
-/// of a sine.
-fn circle(targets: &[f64], time_s: f64) -> Vec<f64> {
-    let amplitude = 0.1 * (TAU / 6.0 * time_s).sin().max(0.0).powi(4);
-    let mut positions = targets.to_vec();
-    for (position, phase) in positions.iter_mut().zip([0.0, TAU / 4.0]) {
-        *position += amplitude * (TAU / 3.0 * time_s + phase).sin();
-    }
-    positions
-}
-
-fn print(arm: &Controller, label: &str) {
-    let state = arm.state();
-    println!("{label}: {:?}{}", state.phase, state.stop.map_or(String::new(), |stop| format!(", {stop:?}")));
-    for (axis, now) in arm.axes().iter().zip(state.axes) {
-        println!("  {:<10} {:+.4}", axis.name, now.position);
-    }
 }

@@ -178,7 +178,7 @@ pub struct AxisSnapshot {
     /// SYNCs, or set-points where it answers these, that the drive has left without an answer, or has not answered yet. One that stays so may have been lost, or
     /// every answer since then comes so many cycles late: that is looked into whenever the group is enabled.
     pub unanswered: u16,
-    /// Cycles of its bus in which the drive was asked for feedback, and gave none, since its last feedback.
+    /// Cycles of its bus since its last feedback, with those in which it was not asked for any.
     pub feedback_age: u16,
     /// The slot of the last feedback; everything that the drive reports is from then, or older. 0 before the first one.
     pub feedback_slot: u64,

@@ -64,7 +64,7 @@ pub struct AxisRecord {
     pub statusword: u16,
     /// Object 603F if it is mapped or was announced by an emergency message; else 0.
     pub error_code: u16,
-    /// Cycles since the drive last reported in time.
+    /// Cycles of its bus since the drive last reported in time, with those in which it was not asked.
     pub feedback_age: u16,
     /// The command on the wire in drive units: counts, counts/s or per mille, by mode.
     pub command_raw: i32,

@@ -261,7 +261,10 @@ fn lead_as_owner(
             (Outcome::Interrupted, None, Some(process)) => Outcome::TakenOver { process },
             (outcome, ..) => outcome,
         };
-    let is_done = matches!(outcome, Outcome::Finished | Outcome::OffTarget { .. });
+    let is_done = matches!(
+        outcome,
+        Outcome::Finished | Outcome::OffTarget { .. } | Outcome::PositionNotReported { .. }
+    );
     let target = supervisor.target().filter(|_| is_done && options.duration_ns.is_none());
     Ok(Session {
         snapshot: host.snapshot(),

@@ -235,7 +235,7 @@ impl Axis {
             error_code: self.error_code(),
             is_heard: self.is_heard(),
             unanswered: self.unanswered(),
-            feedback_age: self.feedback_age(),
+            feedback_age: self.cycles_since_report(),
             feedback_slot: shown.feedback_slot,
             feedback_ns: shown.feedback_ns,
         };
@@ -259,7 +259,7 @@ impl Axis {
             controlword: self.controlword(),
             statusword: self.statusword(),
             error_code: self.error_code(),
-            feedback_age: self.feedback_age(),
+            feedback_age: self.cycles_since_report(),
             command_raw: self.command.command(self.parameters.law.target_slot()),
             position_raw: self.feedback.feedback(FeedbackSlot::Position),
         };

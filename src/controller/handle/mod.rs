@@ -159,8 +159,8 @@ impl Drop for Controller {
 
 /// Commands and observes a running controller, from any thread. Clones are cheap and equal.
 ///
-/// No command waits for a lock that another thread could hold. [`Handle::stop`] is wait-free, so it may also be called in a
-/// signal handler.
+/// No command waits for a lock that another thread could hold; only clients that push points of a stream wait for each other.
+/// [`Handle::stop`] is wait-free, so it may also be called in a signal handler.
 #[derive(Clone)]
 pub struct Handle(Arc<Shared>);
 
