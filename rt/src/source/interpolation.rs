@@ -45,8 +45,7 @@ impl Window {
             to_ns.wrapping_sub(from_ns) as i64 as f64 / NANOSECONDS_PER_SECOND as f64
         };
         let [t0, t1, t2, t3, t4, t5] = *stamps_ns;
-        let steps_s =
-            [seconds(t0, t1), seconds(t1, t2), seconds(t2, t3), seconds(t3, t4), seconds(t4, t5)];
+        let steps_s = [seconds(t0, t1), seconds(t1, t2), seconds(t2, t3), seconds(t3, t4), seconds(t4, t5)];
         let [h0, h1, h2, h3, h4] = steps_s;
         Self {
             from,

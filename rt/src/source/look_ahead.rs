@@ -426,8 +426,7 @@ where
             self.update_pieces(begin);
             self.pieces_of = Some((self.revision, begin_ns));
         }
-        let since_begin_s =
-            played_ns.wrapping_sub(begin_ns) as i64 as f64 / NANOSECONDS_PER_SECOND as f64;
+        let since_begin_s = played_ns.wrapping_sub(begin_ns) as i64 as f64 / NANOSECONDS_PER_SECOND as f64;
         let rate = self.delay.time_rate();
         let mut targets = [AxisTarget::default(); AXES];
         for (target, (piece, limits)) in targets.iter_mut().zip(self.pieces.iter().zip(&self.limits)) {
