@@ -477,3 +477,80 @@ where
         present - past
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::source::AxisPoint;
+
+    const MILLISECOND_NS: u64 = 1_000_000;
+
+    fn look_ahead(capacity: usize) -> LookAhead<1, [StreamPoint<1>; 8]> {
+        let parameters = LookAheadParameters {
+            limits: [AxisLimits::NONE].into_iter().collect(),
+            period_ns: MILLISECOND_NS,
+            delay: StreamDelay::Fixed(0),
+        };
+        let mut look_ahead = LookAhead::new([StreamPoint::default(); 8], parameters);
+        look_ahead.capacity = capacity;
+        look_ahead
+    }
+
+    fn point(at_ms: u64, position: f64) -> StreamPoint<1> {
+        let axes = [AxisPoint::position(position)];
+        StreamPoint { at_ns: at_ms * MILLISECOND_NS, role: PointRole::Single, axes }
+    }
+
+    fn stamps_ms(look_ahead: &LookAhead<1, [StreamPoint<1>; 8]>) -> impl Iterator<Item = (u64, f64)> + '_ {
+        (0..look_ahead.count).map(|index| {
+            let point = look_ahead.point(index).unwrap();
+            assert_eq!(point.at_ns, look_ahead.stamp(index));
+            (point.at_ns / MILLISECOND_NS, point.axes[0].position)
+        })
+    }
+
+    #[test]
+    fn points_stand_in_the_order_of_their_stamps_and_the_last_one_of_a_stamp_counts() {
+        let mut look_ahead = look_ahead(8);
+        for (at_ms, position) in [(30, 3.0), (10, 1.0), (20, 2.0), (40, 4.0), (20, 2.5)] {
+            assert_eq!(look_ahead.insert(&point(at_ms, position), 0), Ok(()));
+        }
+        assert!(stamps_ms(&look_ahead).eq([(10, 1.0), (20, 2.5), (30, 3.0), (40, 4.0)]));
+    }
+
+    #[test]
+    fn without_room_the_farthest_point_is_the_one_that_is_lost() {
+        let mut look_ahead = look_ahead(3);
+        for at_ms in [10, 20, 30] {
+            look_ahead.insert(&point(at_ms, 0.0), 0).unwrap();
+        }
+        assert_eq!(look_ahead.insert(&point(40, 0.0), 0), Err(PointError::Full));
+        assert_eq!(look_ahead.insert(&point(15, 0.0), 0), Ok(()));
+        assert!(stamps_ms(&look_ahead).map(|(at_ms, _)| at_ms).eq([10, 15, 20]));
+        assert_eq!(look_ahead.counts().lost_points, 2);
+    }
+
+    #[test]
+    fn a_chunk_takes_the_place_of_what_came_before_from_its_first_stamp_on() {
+        let mut look_ahead = look_ahead(8);
+        for at_ms in [10, 20, 30, 40, 50] {
+            look_ahead.insert(&point(at_ms, 1.0), 0).unwrap();
+        }
+        for (at_ms, is_first, is_last) in [(25, true, false), (35, false, false), (45, false, true)] {
+            let role = PointRole::Chunk { is_first, is_last };
+            look_ahead.insert(&StreamPoint { role, ..point(at_ms, 2.0) }, 0).unwrap();
+        }
+        let expected = [(10, 1.0), (20, 1.0), (25, 2.0), (35, 2.0), (45, 2.0)];
+        assert!(stamps_ms(&look_ahead).eq(expected), "{:?}", look_ahead.stamps());
+    }
+
+    #[test]
+    fn what_cannot_be_used_is_counted_and_changes_nothing() {
+        let mut look_ahead = look_ahead(8);
+        look_ahead.insert(&point(10, 1.0), 0).unwrap();
+        assert_eq!(look_ahead.insert(&point(20, f64::NAN), 0), Err(PointError::NotFinite { axis: 0 }));
+        assert_eq!(look_ahead.insert(&point(90_000, 1.0), 0), Err(PointError::FarAway));
+        assert!(stamps_ms(&look_ahead).eq([(10, 1.0)]));
+        assert_eq!((look_ahead.counts().points, look_ahead.counts().lost_points), (3, 2));
+    }
+}

@@ -311,8 +311,9 @@ proptest! {
         let mut count = 0;
         for number in 0..(1.5 * rate_hz) as u32 {
             let time_s = f64::from(number) / rate_hz;
-            let lost = random() < loss;
-            let at_s = time_s + random() * jitter / rate_hz;
+            // The first one comes in time for the stream to begin.
+            let (lost, late) = (random() < loss, random() * jitter / rate_hz);
+            let (lost, at_s) = if number == 0 { (false, 0.0) } else { (lost, time_s + late) };
             if lost {
                 continue;
             }
