@@ -2,14 +2,15 @@
 
 use takt_rt::{Answer, MotionState, Phase, RequestError, RequestId, Snapshot, StopReason};
 
-use super::error::PlayFileError;
 use super::set_points::ArmedFrom;
 use super::trajectory::FileTrajectory;
-use crate::config::Axis;
-use crate::trajectory::Trajectory;
+use crate::trajectory::{Trajectory, TrajectoryConditions, TrajectoryError};
 
 /// The fraction of the limits with which the arm is led to the first point.
 pub const APPROACH_SCALE: f64 = 0.3;
+
+/// Makes a trajectory from where the axes are.
+pub type MakeTrajectory<'a> = &'a dyn Fn(&TrajectoryConditions<'_>) -> Result<Trajectory, TrajectoryError>;
 
 /// An arm that is enabled.
 pub trait Stage {
@@ -19,11 +20,17 @@ pub trait Stage {
     /// Lets some time pass. Returns whether the run goes on: it ends by itself, or because it is interrupted.
     fn pass(&mut self) -> bool;
 
-    /// Begins a move of every axis to rest, within [`APPROACH_SCALE`]. `None` if the run has ended.
-    fn move_to(&mut self, target: &[f64]) -> Option<RequestId>;
+    /// Begins a move of every axis to rest, within [`APPROACH_SCALE`].
+    ///
+    /// # Errors
+    /// See [`PlayError`].
+    fn move_to(&mut self, target: &[f64]) -> Result<RequestId, PlayError>;
 
-    /// Begins a trajectory. `None` if the run has ended.
-    fn execute(&mut self, trajectory: Trajectory) -> Option<RequestId>;
+    /// Begins a trajectory, which is made from where the axes are.
+    ///
+    /// # Errors
+    /// See [`PlayError`].
+    fn execute(&mut self, make: MakeTrajectory<'_>) -> Result<RequestId, PlayError>;
 }
 
 /// Why a performance ended before the end of the file.
@@ -37,21 +44,15 @@ pub enum PlayError {
     Replaced,
     /// The real-time thread has refused a request.
     Refused(Option<RequestError>),
-    /// From where the arm stands now, the file cannot be executed.
-    File(PlayFileError),
+    /// A command failed; the words say why.
+    Command(String),
 }
 
 /// Leads the arm to the first point of the file, and executes it.
 ///
 /// # Errors
 /// See [`PlayError`].
-pub fn execute(
-    stage: &mut impl Stage,
-    file: &FileTrajectory,
-    axes: &[Axis],
-    period_s: f64,
-    armed: &ArmedFrom,
-) -> Result<(), PlayError> {
+pub fn execute(stage: &mut impl Stage, file: &FileTrajectory, armed: &ArmedFrom) -> Result<(), PlayError> {
     while stage.snapshot().phase != Phase::Holding {
         pass(stage)?;
     }
@@ -62,13 +63,10 @@ pub fn execute(
         .zip(&snapshot.axes)
         .map(|(first, axis)| first.unwrap_or(axis.position_set))
         .collect();
-    let approach = stage.move_to(&target).ok_or(PlayError::Ended)?;
+    let approach = stage.move_to(&target)?;
     wait(stage, approach)?;
-    let snapshot = stage.snapshot();
-    let positions: Vec<f64> = snapshot.axes.iter().take(axes.len()).map(|axis| axis.position_set).collect();
-    let trajectory = file.trajectory(&positions, axes, period_s).map_err(PlayError::File)?;
-    armed.set(snapshot.slot + 1);
-    let motion = stage.execute(trajectory).ok_or(PlayError::Ended)?;
+    armed.set(stage.snapshot().slot + 1);
+    let motion = stage.execute(&|conditions| file.trajectory(conditions))?;
     wait(stage, motion)
 }
 
