@@ -45,7 +45,7 @@ pub use config::{Config, ConfigError};
 pub use controller::session::{Session, SessionError, SessionOptions};
 pub use controller::{
     CommandError, Controller, Events, Handle, MotionError, MotionId, MoveOptions, Outcome, Refused,
-    StartFailure, Stopped, TrajectoryProgress, VirtualRun, WaitError,
+    StartFailure, Stopped, StreamError, StreamHandle, TrajectoryProgress, VirtualRun, WaitError,
 };
 pub use error::{Error, Result};
 pub use faults::{FaultInjector, Scenario};
@@ -55,6 +55,7 @@ pub use trajectory::{Trajectory, TrajectoryError, TrajectoryPoint};
 /// What runs inside the real-time thread: its types as they come out of a [`Handle`], and the planner.
 pub use takt_rt as rt;
 pub use takt_rt::{
-    AxisSnapshot, BusHealth, DriveState, Event, EventKind, Origin, Phase, RejectReason, RequestError,
-    RequestId, Rule, Snapshot, StopCategory, StopCause, StopReason, TimingLevel, linux::ThreadReport, plan,
+    AxisPoint, AxisSnapshot, BusHealth, DriveState, Event, EventKind, Origin, Phase, RejectReason,
+    RequestError, RequestId, Rule, Snapshot, StopCategory, StopCause, StopReason, StreamCounts, StreamReport,
+    StreamState, TimingLevel, linux::ThreadReport, plan,
 };

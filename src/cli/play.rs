@@ -4,8 +4,9 @@ use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
+use std::time::Duration;
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 use serde::Serialize;
 
 use takt::bus::schedule;
@@ -14,11 +15,11 @@ use takt::controller::realtime_thread::StartError;
 use takt::controller::session::{SessionError, SessionOptions};
 use takt::controller::{Controller, Outcome, StartFailure};
 use takt::play::{
-    ArmedFrom, AxisMaxima, FileTrajectory, PlayError, PlayFile, PlayFileError, RealStage, SetPointLog,
-    SharedSetPointLog, VirtualStage, execute,
+    ArmedFrom, AxisMaxima, FileStream, FileTrajectory, PlayError, PlayFile, PlayFileError, RealStage,
+    SetPointLog, SharedSetPointLog, Stage, StreamSummary, VirtualStage, execute, stream,
 };
 use takt::telemetry::{Machine, StopReport, words};
-use takt_rt::{NANOSECONDS_PER_SECOND, StopReason};
+use takt_rt::{Follow, NANOSECONDS_PER_SECOND, StopReason, StreamDelay};
 
 use super::configuration::{self, BusOverride};
 use super::exit::Exit;
@@ -37,6 +38,12 @@ pub struct Arguments {
     config: PathBuf,
     /// The points (CSV)
     file: PathBuf,
+    /// What is done where the points ask for more than the limits allow: smooth follows as closely as they go, exact stops
+    #[arg(long, value_enum, conflicts_with = "trajectory")]
+    follow: Option<FollowArgument>,
+    /// How far the set-points run behind the times of the points, in seconds [default: as the points and their lateness need]
+    #[arg(long, value_name = "S", conflicts_with = "trajectory", allow_negative_numbers = true, value_parser = delay)]
+    delay: Option<Duration>,
     /// Execute the rows, by the times that they are meant for, as one trajectory that is checked as a whole before it starts
     #[arg(long)]
     trajectory: bool,
@@ -60,6 +67,51 @@ pub struct Arguments {
     json: bool,
 }
 
+/// `--follow`
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum FollowArgument {
+    Smooth,
+    Exact,
+}
+
+/// The longest delay that the configuration allows.
+const LONGEST_DELAY_S: f64 = 1.0;
+
+fn delay(text: &str) -> Result<Duration, String> {
+    let number: f64 = text.parse().map_err(|_| format!("`{text}` is not a number of seconds"))?;
+    if (0.0..=LONGEST_DELAY_S).contains(&number) {
+        Ok(Duration::from_secs_f64(number))
+    } else {
+        Err(format!("a delay is a number of seconds from 0 to {LONGEST_DELAY_S}"))
+    }
+}
+
+/// What is played.
+enum Piece {
+    Trajectory(FileTrajectory),
+    Stream(FileStream),
+}
+
+impl Piece {
+    /// The time of the set-points from which a trajectory begins. A stream has the clock of its file.
+    fn begins_s(&self) -> f64 {
+        match self {
+            Self::Trajectory(trajectory) => trajectory.begins_s(),
+            Self::Stream(_) => 0.0,
+        }
+    }
+
+    fn play(&self, stage: &mut impl Stage, armed: &ArmedFrom) -> Result<StreamSummary, PlayError> {
+        match self {
+            // A trajectory has no late points, and its set-points are on time.
+            Self::Trajectory(trajectory) => {
+                execute(stage, trajectory, armed).map(|()| StreamSummary::default())
+            }
+            Self::Stream(file) => stream(stage, file, armed),
+        }
+    }
+}
+
 /// The result.
 #[derive(Serialize)]
 struct Printed {
@@ -69,6 +121,8 @@ struct Printed {
     failure: Option<String>,
     points: usize,
     late_points: u64,
+    /// Points that found no room, or could not be used.
+    lost_points: u64,
     lag_s: f64,
     lag_max_s: f64,
     axes: Vec<AxisMaxima>,
@@ -90,10 +144,20 @@ struct PlaceOfProblem {
 
 /// Plays the file.
 pub fn run(arguments: &Arguments) -> Exit {
-    let config = match configuration::load(&arguments.config, &arguments.buses) {
+    let mut config = match configuration::load(&arguments.config, &arguments.buses) {
         Ok(config) => config,
         Err(error) => return error.print(arguments.json),
     };
+    if let Some(follow) = arguments.follow {
+        let follow = match follow {
+            FollowArgument::Smooth => Follow::Smooth,
+            FollowArgument::Exact => Follow::Exact,
+        };
+        config.axes.iter_mut().for_each(|axis| axis.follow = follow);
+    }
+    if let Some(delay) = arguments.delay {
+        config.stream_delay = StreamDelay::Fixed(delay.as_nanos() as u64);
+    }
     if let Err(error) = config.validate() {
         return UsageError::from(error).print(arguments.json);
     }
@@ -102,7 +166,7 @@ pub fn run(arguments: &Arguments) -> Exit {
     {
         return UsageError::from(refused.to_string()).print(arguments.json);
     }
-    let (file, trajectory) = match read(arguments, &config) {
+    let (file, piece) = match read(arguments, &config) {
         Ok(read) => read,
         Err(exit) => return exit,
     };
@@ -119,11 +183,11 @@ pub fn run(arguments: &Arguments) -> Exit {
     };
     let armed = ArmedFrom::default();
     let names: Vec<String> = config.axes.iter().map(|axis| axis.name.clone()).collect();
-    let log = SetPointLog::new(&names, config.cycle.period_ns, trajectory.begins_s(), armed.clone(), out);
+    let log = SetPointLog::new(&names, config.cycle.period_ns, piece.begins_s(), armed.clone(), out);
     let played = if arguments.is_virtual {
-        play_in_virtual_time(&config, &trajectory, log, &armed, &interrupted)
+        play_in_virtual_time(&config, &piece, log, &armed, &interrupted)
     } else {
-        play_in_real_time(arguments, config.clone(), &trajectory, log, &armed, &interrupted)
+        play_in_real_time(arguments, config.clone(), &piece, log, &armed, &interrupted)
     };
     match played {
         Ok(played) => report(arguments, &config, &file, played),
@@ -131,8 +195,8 @@ pub fn run(arguments: &Arguments) -> Exit {
     }
 }
 
-/// The file, and the trajectory that it makes.
-fn read(arguments: &Arguments, config: &Config) -> Result<(PlayFile, FileTrajectory), Exit> {
+/// The file, and what is to be played of it.
+fn read(arguments: &Arguments, config: &Config) -> Result<(PlayFile, Piece), Exit> {
     let wrong_file = |error: PlayFileError| print_problem(&arguments.file, &error, arguments.json);
     let bytes = takt::play::read(&arguments.file).map_err(|error| {
         let words = format!("cannot read {}: {error}", arguments.file.display());
@@ -141,18 +205,18 @@ fn read(arguments: &Arguments, config: &Config) -> Result<(PlayFile, FileTraject
     let names: Vec<String> = config.axes.iter().map(|axis| axis.name.clone()).collect();
     let file = PlayFile::parse(&bytes, &names).map_err(wrong_file)?;
     if !arguments.trajectory {
-        let words = "takt play needs --trajectory so far: streams are not played yet";
-        return Err(UsageError::from(words).print(arguments.json));
+        let stream = FileStream::new(&file, &config.axes).map_err(wrong_file)?;
+        return Ok((file, Piece::Stream(stream)));
     }
     let trajectory = FileTrajectory::new(&file, config.axes.len()).map_err(wrong_file)?;
     let period_s = config.cycle.period_ns as f64 / NANOSECONDS_PER_SECOND as f64;
     trajectory.check(&config.axes, period_s).map_err(wrong_file)?;
-    Ok((file, trajectory))
+    Ok((file, Piece::Trajectory(trajectory)))
 }
 
 /// What came of it.
 struct Played {
-    result: Result<(), PlayError>,
+    result: Result<StreamSummary, PlayError>,
     /// How the run ended, where that was not because the file was over.
     outcome: Option<Outcome>,
     last_stop: Option<StopReason>,
@@ -168,14 +232,14 @@ enum Refused {
 
 fn play_in_virtual_time(
     config: &Config,
-    trajectory: &FileTrajectory,
+    piece: &Piece,
     log: SetPointLog,
     armed: &ArmedFrom,
     interrupted: &AtomicBool,
 ) -> Result<Played, Refused> {
     let stage = VirtualStage::new(config, log, interrupted);
     let mut stage = stage.map_err(|error| Refused::Words(error.to_string()))?;
-    let result = execute(&mut stage, trajectory, armed);
+    let result = piece.play(&mut stage, armed);
     let (outcome, snapshot, log) = stage.finish();
     let (axes, not_written) = log.finish();
     Ok(Played { result, outcome, last_stop: snapshot.stop, axes, not_written })
@@ -184,7 +248,7 @@ fn play_in_virtual_time(
 fn play_in_real_time(
     arguments: &Arguments,
     config: Config,
-    trajectory: &FileTrajectory,
+    piece: &Piece,
     log: SetPointLog,
     armed: &ArmedFrom,
     interrupted: &AtomicBool,
@@ -200,7 +264,7 @@ fn play_in_real_time(
     let (result, session, was_interrupted) = match Controller::start(config, options) {
         Ok(controller) => {
             let mut stage = RealStage::new(controller, log.clone(), interrupted);
-            let result = execute(&mut stage, trajectory, armed);
+            let result = piece.play(&mut stage, armed);
             let was_interrupted = stage.was_interrupted();
             (result, stage.finish(), was_interrupted)
         }
@@ -235,6 +299,7 @@ fn refuse(error: &Refused, is_json: bool) -> Exit {
 
 fn report(arguments: &Arguments, config: &Config, file: &PlayFile, played: Played) -> Exit {
     let machine = Machine::of(config);
+    let summary = played.result.clone().unwrap_or_default();
     let (exit, stop, failure) = ending(played.result, played.outcome, played.last_stop, &machine);
     let exit = match (&played.not_written, &arguments.out) {
         (Some(error), Some(path)) => {
@@ -247,10 +312,10 @@ fn report(arguments: &Arguments, config: &Config, file: &PlayFile, played: Playe
         stop: stop.map(|stop| StopReport::new(&stop, &machine)),
         failure,
         points: file.rows.len(),
-        // A trajectory has no late points, and its set-points are on time.
-        late_points: 0,
-        lag_s: 0.0,
-        lag_max_s: 0.0,
+        late_points: summary.late_points,
+        lost_points: summary.lost_points,
+        lag_s: summary.lag_ns as f64 / 1e9,
+        lag_max_s: summary.lag_max_ns as f64 / 1e9,
         axes: played.axes,
     };
     if arguments.json { print::json(&printed, exit) } else { print::text(&text(&printed, config), exit) }
@@ -276,7 +341,7 @@ fn print_problem(path: &Path, error: &PlayFileError, is_json: bool) -> Exit {
 
 /// The exit code, the stop, and the failure in words.
 fn ending(
-    result: Result<(), PlayError>,
+    result: Result<StreamSummary, PlayError>,
     outcome: Option<Outcome>,
     last_stop: Option<StopReason>,
     machine: &Machine,
@@ -288,7 +353,7 @@ fn ending(
         }
         (Err(PlayError::Ended), Some(outcome)) => (Exit::Stopped, None, Some(outcome.words(machine))),
         (Err(error), _) => (Exit::Stopped, None, Some(failure(error, machine))),
-        (Ok(()), _) => (Exit::Done, None, None),
+        (Ok(_), _) => (Exit::Done, None, None),
     }
 }
 
@@ -312,9 +377,10 @@ fn text(printed: &Printed, config: &Config) -> String {
         text += &format!("{failure}\n");
     }
     text += &format!(
-        "{} points, {} late; lag {:.1} ms, {:.1} ms at most\n",
+        "{} points, {} late, {} lost; lag {:.1} ms, {:.1} ms at most\n",
         printed.points,
         printed.late_points,
+        printed.lost_points,
         printed.lag_s * 1e3,
         printed.lag_max_s * 1e3
     );

@@ -6,12 +6,12 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use takt_rt::{CycleRecord, RequestId, Snapshot};
+use takt_rt::{CycleRecord, Nanoseconds, RequestId, Snapshot, StopCategory, StreamPoint};
 
 use super::performance::{APPROACH_SCALE, MakeTrajectory, PlayError, Stage};
 use super::set_points::{AxisMaxima, SetPointLog};
 use crate::controller::session::Session;
-use crate::controller::{Controller, MoveOptions, StartFailure};
+use crate::controller::{Controller, MoveOptions, StartFailure, StreamHandle};
 
 /// The time from one look at the state to the next.
 const LOOK: Duration = Duration::from_millis(1);
@@ -111,5 +111,24 @@ impl Stage for RealStage<'_> {
     fn execute(&mut self, make: MakeTrajectory<'_>) -> Result<RequestId, PlayError> {
         let motion = self.controller.execute_with(make);
         motion.map(|motion| motion.request()).map_err(|error| PlayError::Command(error.to_string()))
+    }
+
+    fn begin_stream(&mut self) -> Result<RequestId, PlayError> {
+        self.controller.begin_stream().map_err(|error| PlayError::Command(error.to_string()))?;
+        // It has been granted.
+        Ok(RequestId::default())
+    }
+
+    fn push(&mut self, points: &[StreamPoint]) -> bool {
+        self.controller.stream().push_points(points).is_ok()
+    }
+
+    fn stop(&mut self) -> Result<(), PlayError> {
+        let stopped = self.controller.stop(StopCategory::Two);
+        stopped.map_err(|error| PlayError::Command(error.to_string()))
+    }
+
+    fn time_ns(&mut self) -> Nanoseconds {
+        StreamHandle::now_ns()
     }
 }

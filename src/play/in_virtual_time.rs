@@ -5,7 +5,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use takt_rt::plan::State;
 use takt_rt::{
-    AxisLimits, ExecutionStart, MAX_AXES, Move, NANOSECONDS_PER_SECOND, Request, RequestId, Snapshot,
+    AxisLimits, ExecutionStart, MAX_AXES, Move, NANOSECONDS_PER_SECOND, Nanoseconds, Request, RequestId,
+    Snapshot, StopCategory, StreamPoint,
 };
 
 use super::performance::{APPROACH_SCALE, MakeTrajectory, PlayError, Stage};
@@ -24,6 +25,7 @@ pub struct VirtualStage<'a> {
     set_points: SetPointLog,
     limits: Vec<AxisLimits>,
     period_s: f64,
+    period_ns: Nanoseconds,
     interrupted: &'a AtomicBool,
     was_interrupted: bool,
 }
@@ -47,6 +49,7 @@ impl<'a> VirtualStage<'a> {
             set_points,
             limits: config.axes.iter().map(|axis| axis.limits).collect(),
             period_s: config.cycle.period_ns as f64 / NANOSECONDS_PER_SECOND as f64,
+            period_ns: config.cycle.period_ns.max(1),
             interrupted,
             was_interrupted: false,
         })
@@ -111,5 +114,23 @@ impl Stage for VirtualStage<'_> {
         let given = Arc::new(GivenTrajectory::new(trajectory));
         let executed = self.run.host().execute(&given, ExecutionStart::Now);
         executed.map_err(|error| PlayError::Command(error.to_string()))
+    }
+
+    fn begin_stream(&mut self) -> Result<RequestId, PlayError> {
+        self.run.host().request(Request::Stream).map_err(|error| PlayError::Command(error.to_string()))
+    }
+
+    fn push(&mut self, points: &[StreamPoint]) -> bool {
+        self.run.host().streamer().push(points).is_ok()
+    }
+
+    fn stop(&mut self) -> Result<(), PlayError> {
+        let requested = self.run.host().request(Request::Stop(StopCategory::Two));
+        requested.map(drop).map_err(|error| PlayError::Command(error.to_string()))
+    }
+
+    /// The beginning of the next slot. The slots of virtual time begin at multiples of the period.
+    fn time_ns(&mut self) -> Nanoseconds {
+        (self.run.snapshot().at_ns / self.period_ns + 1) * self.period_ns
     }
 }

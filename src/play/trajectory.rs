@@ -28,7 +28,7 @@ impl FileTrajectory {
     pub fn new(file: &PlayFile, axes: usize) -> Result<Self, PlayFileError> {
         if file.torque_column.is_some() {
             let words = "a trajectory takes no torques; play the file without --trajectory".to_owned();
-            let problem = FileProblem::Trajectory { joint: None, words };
+            let problem = FileProblem::Rows { joint: None, words };
             return Err(PlayFileError { line: 1, column: file.torque_column, problem });
         }
         let mut rows: Vec<&PlayRow> = file.rows.iter().collect();
@@ -115,6 +115,6 @@ impl FileTrajectory {
             }
             _ => error.words(),
         };
-        PlayFileError { line, column: None, problem: FileProblem::Trajectory { joint, words } }
+        PlayFileError { line, column: None, problem: FileProblem::Rows { joint, words } }
     }
 }

@@ -14,6 +14,7 @@ use crate::plan::{PlanError, State};
 use crate::profile::ProfileTarget;
 use crate::record::EventKind;
 use crate::request::{Move, ProfileMove, RejectReason, Request, RequestId};
+use crate::source::StreamSample;
 use crate::stop::{Origin, StopCause};
 use crate::stop_category::StopCategory;
 use crate::time::Nanoseconds;
@@ -103,8 +104,8 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
             return Err(RejectReason::MissedSlots { missed, limit: self.shared.slots.degraded() }.into());
         }
         self.group.stop = None;
-        self.axes.iter_mut().for_each(Axis::begin_stream);
-        self.enter(GroupState::Streaming(Stream::Awaited));
+        self.group.stream = StreamSample::default();
+        self.enter(GroupState::Streaming(Stream::Requested));
         Ok(())
     }
 

@@ -11,8 +11,8 @@
 //! - `requests` handles what was asked for, `group_requests` what was asked of a group; `targets` checks the targets;
 //!   `process_data` exchanges mappings;
 //! - `faults` looks for the first thing that is wrong, and begins stops;
-//! - `step` makes the next set-points of the phase that the group is in (`state` has the table of phases); `executing` those of
-//!   trajectories;
+//! - `step` makes the next set-points of the phase that the group is in (`state` has the table of phases), `streaming` those
+//!   of a stream, `executing` those of a trajectory;
 //! - `encode` makes frames of them, and decides what may leave; `sdo_fallback` stops drives that PDOs do not reach.
 //!
 //! Events wait in an outbox until [`Engine::finish`] hands them to the host.
@@ -34,6 +34,7 @@ mod shared;
 mod slots;
 mod state;
 mod step;
+mod streaming;
 mod targets;
 mod unsent_steps;
 
@@ -67,6 +68,8 @@ pub type SendBatch = ArrayVec<Frame, SEND_BATCH>;
 pub struct CycleInput<'a> {
     /// The slot.
     pub slot: u64,
+    /// Its start on the grid: the time that its set-points stand for.
+    pub slot_start_ns: Nanoseconds,
     /// The time.
     pub now_ns: Nanoseconds,
     /// The state of each bus.
@@ -143,7 +146,7 @@ pub enum Deadline {
 ///         torque: 40.0,
 ///     },
 ///     start_tolerance: 0.02,
-///     on_violation: OnViolation::Reject,
+///     follow: Follow::Smooth,
 ///     heartbeat_timeout_cycles: None,
 ///     following_error_limit: 0.1,
 ///     following_error_cycles: 50,
@@ -182,7 +185,7 @@ pub enum Deadline {
 ///         engine.receive(0, &Received { frame, at_ns: now_ns });
 ///     }
 ///     let buses = [BusHealth::default()];
-///     engine.compute(&CycleInput { slot, now_ns, buses: &buses, behind: BusSet::default() }, &mut host);
+///     engine.compute(&CycleInput { slot, slot_start_ns: now_ns, now_ns, buses: &buses, behind: BusSet::default() }, &mut host);
 ///     let mut batch = SendBatch::new();
 ///     engine.encode(0, Deadline::Met, &mut host, &mut batch);
 ///     // It obeys the controlword, the first two bytes of its command.
@@ -252,6 +255,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
     pub fn compute(&mut self, input: &CycleInput<'_>, host: &mut impl HostInterface<AXES, BUSES>) {
         self.sense(input);
         self.handle_requests(host);
+        self.sample_streams(input.slot_start_ns, host);
         self.check_faults(input.buses);
         self.sample_trajectories(host);
         self.for_each_group(|group| {
@@ -320,6 +324,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         snapshot.timing = shared.slots.level();
         snapshot.dropped = shared.dropped;
         if let Some(group) = self.groups.first() {
+            snapshot.stream = group.stream_report();
             snapshot.phase = group.state.phase();
             snapshot.remaining_s = group.remaining_s();
             snapshot.stop = group.stop;

@@ -33,7 +33,7 @@ mod trajectory;
 mod waiting;
 
 use std::ops::Deref;
-use std::sync::{Arc, Mutex, mpsc};
+use std::sync::{Arc, mpsc};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
@@ -52,6 +52,7 @@ use trajectory::Trajectories;
 pub use error::{CommandError, MotionError, Refused, StartFailure, Stopped, WaitError};
 pub use events::Events;
 pub use motion::{MotionId, MoveOptions};
+pub use stream::{StreamError, StreamHandle};
 pub use trajectory::TrajectoryProgress;
 
 /// The drives must be enabled within this time. It covers the power-up time of all drives.
@@ -92,7 +93,6 @@ impl Controller {
         let Ok(remote) = handles_out.recv() else { return Err(failed(thread)) };
         let RemoteHandles { observer, streamer, clients, trajectories, events, realtime } = remote;
         let trajectories = Trajectories::new(trajectories);
-        let streamer = Mutex::new(streamer);
         let handle = Handle(Arc::new(Shared {
             axes,
             machine,
@@ -164,8 +164,8 @@ impl Drop for Controller {
 
 /// Commands and observes a running controller, from any thread. Clones are cheap and equal.
 ///
-/// No command waits for a lock that another thread could hold. [`Handle::stop`] is wait-free, so it may also be called in a
-/// signal handler.
+/// No command waits for a lock that another thread could hold; only clients that push points of a stream wait for each other.
+/// [`Handle::stop`] is wait-free, so it may also be called in a signal handler.
 #[derive(Clone)]
 pub struct Handle(Arc<Shared>);
 
@@ -176,7 +176,7 @@ struct Shared {
     clients: ClientRequests,
     observer: Observer,
     events: EventReader,
-    streamer: Mutex<Streamer>,
+    streamer: Streamer,
     trajectories: Trajectories,
     messages: Arc<Messages>,
     life: Arc<Life>,
