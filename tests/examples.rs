@@ -20,6 +20,7 @@ programs! {
     profile_modes: "../examples/profile_modes.rs",
     stream: "../examples/stream.rs",
     supervise: "../examples/supervise.rs",
+    trajectory: "../examples/trajectory.rs",
     virtual_time: "../examples/virtual_time.rs",
 }
 
@@ -67,4 +68,9 @@ fn after_each_stop_the_arm_is_enabled_again() {
 #[test]
 fn a_program_runs_in_virtual_time() {
     virtual_time::run(config("arm6-erob.toml")).unwrap();
+}
+
+#[test]
+fn a_trajectory_is_executed_slowed_down_and_paused() {
+    trajectory::run(config("arm6-erob.toml")).unwrap();
 }
