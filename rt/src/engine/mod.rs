@@ -42,7 +42,7 @@ use crate::bus_set::BusSet;
 use crate::dispatch::Dispatch;
 use crate::frame::Frame;
 use crate::group_trajectory::ProfileStore;
-use crate::host::{AxisSnapshot, HostInterface};
+use crate::host::{AxisSnapshot, GroupSnapshot, HostInterface};
 use crate::phase::Phase;
 use crate::port::BusHealth;
 use crate::record::{CycleTiming, EventKind, MAX_AXES, MAX_BUSES, MAX_GROUPS};
@@ -51,7 +51,7 @@ use group::{Commands, Group, GroupContext};
 use parameters::{axes_of, dispatch_of};
 use shared::{Ending, Shared};
 
-pub use parameters::{BusParameters, CycleCount, EngineParameters, Heartbeat, SetUpError};
+pub use parameters::{BusParameters, CycleCount, EngineParameters, GroupParameters, Heartbeat, SetUpError};
 pub use sense::Receiver;
 
 /// The most frames that the engine hands to one bus in one cycle.
@@ -100,7 +100,11 @@ pub enum Deadline {
 ///
 /// impl HostInterface<1, 1> for Host {
 ///     fn request(&mut self) -> Option<RequestEnvelope<1>> {
-///         self.requests.pop().map(|request| RequestEnvelope { id: RequestId(0), request })
+///         self.requests.pop().map(|request| RequestEnvelope {
+///             id: RequestId(0),
+///             target: RequestTarget::All,
+///             request,
+///         })
 ///     }
 ///     fn publish(&mut self, snapshot: &Snapshot<1, 1>) {
 ///         self.phase = snapshot.phase;
@@ -156,6 +160,7 @@ pub enum Deadline {
 /// let mut engine: Engine<1, 1> = Engine::new(EngineParameters {
 ///     period_ns: 1_000_000,
 ///     axes: [axis].into_iter().collect(),
+///     groups: Default::default(),
 ///     buses: [bus].into_iter().collect(),
 ///     heartbeat: None,
 ///     time_cycles: None,
@@ -210,8 +215,16 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
     /// A parameter that is not possible. Everything that the engine relies on is checked here.
     pub fn new(parameters: EngineParameters<AXES, BUSES>) -> Result<Self, SetUpError> {
         parameters.validate()?;
-        let mut groups = ArrayVec::new();
-        groups.push(Group::new(0..parameters.axes.len(), BusSet::first(parameters.buses.len())));
+        let mut groups: ArrayVec<Group<AXES, BUSES>, MAX_GROUPS> = ArrayVec::new();
+        let mut first = 0;
+        for (number, axes) in (0..).zip(parameters.axes_of_groups()) {
+            let places = first..first + axes.len();
+            first = places.end;
+            groups.push(Group::new(number, places, parameters.buses_of(&axes)));
+        }
+        for (group, own) in groups.iter_mut().zip(&parameters.groups) {
+            group.stops_with = own.stops_with.clone();
+        }
         Ok(Self {
             dispatch: dispatch_of(&parameters)?,
             axes: axes_of(&parameters),
@@ -231,12 +244,12 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         self.shared.period_ns
     }
 
-    /// What the group is doing.
-    pub fn phase(&self) -> Phase {
-        self.groups.first().map_or(Phase::Passive, |group| group.state.phase())
+    /// What a group is doing; `None` if there is no such group.
+    pub fn phase(&self, group: u8) -> Option<Phase> {
+        self.groups.get(usize::from(group)).map(|group| group.state.phase())
     }
 
-    /// The axes.
+    /// The axes, group by group: see [`Axis::number`].
     pub fn axes(&self) -> &[Axis] {
         &self.axes
     }
@@ -251,6 +264,8 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         self.sense(input);
         self.handle_requests(host);
         self.check_faults(input.buses);
+        self.couple_stops();
+        self.probe_late_drives();
         self.for_each_group(|group| {
             group.step();
             group.update_sdo_fallback();
@@ -292,16 +307,20 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         let shared = &mut self.shared;
         shared.slots.end(is_late);
         if is_late {
-            shared.emit(EventKind::MissedSlots { count: 1 });
+            shared.emit(None, EventKind::MissedSlots { count: 1 });
         }
         shared.dropped += shared.events.drain(|event| host.event(event));
         shared.record.timing = CycleTiming { missed_slots: shared.slots.missed_now, ..timing };
         shared.record.is_commanded = is_commanded;
-        if let Some(group) = self.groups.first() {
-            shared.record.phase = group.state.phase();
+        for (group, phase) in self.groups.iter().zip(&mut shared.record.group_phases) {
+            *phase = group.state.phase();
         }
-        for (axis, record) in self.axes.iter().zip(&mut shared.record.axes) {
-            axis.record(shared.period_s, record);
+        let [first, ..] = shared.record.group_phases;
+        shared.record.phase = first;
+        for axis in &self.axes {
+            if let Some(record) = shared.record.axes.get_mut(usize::from(axis.number())) {
+                axis.record(shared.period_s, record);
+            }
         }
         shared.dropped += u64::from(!host.record(&shared.record));
         self.show(timing.slot, now_ns, buses);
@@ -316,12 +335,17 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         snapshot.missed_slots = shared.slots.missed;
         snapshot.timing = shared.slots.level();
         snapshot.dropped = shared.dropped;
-        if let Some(group) = self.groups.first() {
-            snapshot.phase = group.state.phase();
-            snapshot.remaining_s = group.remaining_s();
-            snapshot.stop = group.stop;
+        for (group, shown) in self.groups.iter().zip(&mut snapshot.groups) {
+            *shown = GroupSnapshot {
+                phase: group.state.phase(),
+                remaining_s: group.remaining_s(),
+                stop: group.stop,
+            };
         }
-        for (axis, shown) in self.axes.iter().zip(&mut snapshot.axes) {
+        let [GroupSnapshot { phase, remaining_s, stop }, ..] = snapshot.groups;
+        (snapshot.phase, snapshot.remaining_s, snapshot.stop) = (phase, remaining_s, stop);
+        for axis in &self.axes {
+            let Some(shown) = snapshot.axes.get_mut(usize::from(axis.number())) else { continue };
             *shown = AxisSnapshot {
                 position_set: axis.set_point().position,
                 position: axis.position(),
