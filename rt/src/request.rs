@@ -131,7 +131,7 @@ pub struct MappedPdo {
     /// The identifier.
     pub id: Id,
     /// When it is sent, if by us.
-    pub cadence: TransmissionType,
+    pub transmission: TransmissionType,
     /// What it carries, in order.
     pub objects: [Option<MappedObject>; MAX_OBJECTS],
 }

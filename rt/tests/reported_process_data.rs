@@ -18,7 +18,7 @@ fn pdo(function: u16, objects: &[MappedObject]) -> MappedPdo {
     for (place, object) in mapped.iter_mut().zip(objects) {
         *place = Some(*object);
     }
-    MappedPdo { id: Id::canopen(function, 1), cadence: TransmissionType::EveryCycle, objects: mapped }
+    MappedPdo { id: Id::canopen(function, 1), transmission: TransmissionType::EveryCycle, objects: mapped }
 }
 
 fn data(command: &[MappedObject], feedback: &[MappedObject]) -> AxisProcessData {

@@ -12,4 +12,5 @@ pub use interface::{
     ControllerTiming, InterfaceError, InterfaceSettings, InterfaceStatus, interface_status,
     prepare_interface, transmit_queue_length,
 };
+pub use port::open_interface;
 pub use socketcan::{SocketCanError, SocketCanOptions, open_socketcan};

@@ -92,11 +92,37 @@ pub fn open_configured(
 ) -> Result<Option<SocketCanPort>, OpenError> {
     let Some(bus) = config.buses.get(bus) else { return Ok(None) };
     let Interface::SocketCan(interface) = &bus.interface else { return Ok(None) };
-    prepare_interface(interface, &InterfaceSettings::of(bus))
-        .map_err(|error| OpenError::Interface { bus: bus.name.clone(), error })?;
-    let port = open_socketcan(interface, options)
-        .map_err(|error| OpenError::Socket { bus: bus.name.clone(), error })?;
-    Ok(Some(port))
+    open_interface(&bus.name, interface, &InterfaceSettings::of(bus), options).map(Some)
+}
+
+/// Prepares an interface and opens a socket on it, for the bus of this name.
+///
+/// # Errors
+/// See [`OpenError`].
+pub fn open_interface(
+    bus: &str,
+    interface: &str,
+    settings: &InterfaceSettings,
+    options: &SocketCanOptions,
+) -> Result<SocketCanPort, OpenError> {
+    prepare(bus, interface, settings)?;
+    open_socket(bus, interface, options)
+}
+
+/// Brings an interface up with these settings, or checks that it has them.
+pub(super) fn prepare(bus: &str, interface: &str, settings: &InterfaceSettings) -> Result<(), OpenError> {
+    match prepare_interface(interface, settings) {
+        Ok(_) => Ok(()),
+        Err(error) => Err(OpenError::Interface { bus: bus.to_owned(), error }),
+    }
+}
+
+pub(super) fn open_socket(
+    bus: &str,
+    interface: &str,
+    options: &SocketCanOptions,
+) -> Result<SocketCanPort, OpenError> {
+    open_socketcan(interface, options).map_err(|error| OpenError::Socket { bus: bus.to_owned(), error })
 }
 
 impl BusPort for Port {

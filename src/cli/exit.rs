@@ -7,7 +7,7 @@ use std::process::{ExitCode, Termination};
 pub enum Exit {
     /// Everything was done.
     Done,
-    /// The run ended in a stop or a fault, a check found an obstacle, or a result could not be written.
+    /// The run ended in a stop or a fault, a check found a problem, or a result could not be written.
     Stopped,
     /// The configuration or the command line is wrong; nothing was done.
     Usage,

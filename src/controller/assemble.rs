@@ -106,7 +106,7 @@ fn axis_parameters(
     let wrong_mapping = |error| AssembleError::Mapping { axis: index, error };
     let command = |plan: &PdoPlan| -> Result<CommandPdo, MappingError> {
         let pdo = Pdo { id: plan.id, mapping: Mapping::commands(&plan.objects)? };
-        Ok(CommandPdo { pdo, transmission: plan.cadence })
+        Ok(CommandPdo { pdo, transmission: plan.transmission })
     };
     let feedback = |plan: &PdoPlan| Ok(Pdo { id: plan.id, mapping: Mapping::feedback(&plan.objects)? });
     let spacing_ns = match axis.drive {

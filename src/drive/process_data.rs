@@ -32,7 +32,7 @@ pub struct PdoPlan {
     /// The mapped objects, in order.
     pub objects: Vec<MappedObject>,
     /// Condition the controller sends it, for an RPDO.
-    pub cadence: TransmissionType,
+    pub transmission: TransmissionType,
 }
 
 impl PdoPlan {
@@ -122,9 +122,9 @@ impl ProcessData {
 
     /// The fixed PDOs of a YZ-AIM (manual, 5.08): it answers RPDO n with TPDO n at once, and SYNC with TPDO 2.
     fn of_yz_aim(axis: &Axis) -> Self {
-        let receive = |number, objects, cadence| PdoPlan {
+        let receive = |number, objects, transmission| PdoPlan {
             transmission_type: if number == 4 { 1 } else { 255 },
-            ..pdo(PdoDirection::Receive, number, axis.node, objects, cadence)
+            ..pdo(PdoDirection::Receive, number, axis.node, objects, transmission)
         };
         let transmit = |number: u8| {
             let objects = vec![POSITION, if number == 3 { mapped(Feedback::Velocity) } else { STATUSWORD }];
@@ -158,7 +158,7 @@ impl ProcessData {
         }
         let mapped = |plan: &PdoPlan| MappedPdo {
             id: plan.id,
-            cadence: plan.cadence,
+            transmission: plan.transmission,
             objects: std::array::from_fn(|at| plan.objects.get(at).copied()),
         };
         Request::ProcessData(AxisProcessData {
@@ -171,7 +171,8 @@ impl ProcessData {
 
     /// The unused TPDO that the drive sends in reply to each command.
     pub fn answer(&self) -> Option<&PdoPlan> {
-        let command = self.commands.iter().find(|command| command.cadence == TransmissionType::EveryCycle)?;
+        let command =
+            self.commands.iter().find(|command| command.transmission == TransmissionType::EveryCycle)?;
         self.unused.iter().find(|pdo| pdo.number == command.number)
     }
 }
@@ -181,10 +182,10 @@ fn pdo(
     number: u8,
     node: u8,
     objects: Vec<MappedObject>,
-    cadence: TransmissionType,
+    transmission: TransmissionType,
 ) -> PdoPlan {
     let id = pdo_id(direction, number, node);
-    PdoPlan { number, id, transmission_type: 0, objects, cadence }
+    PdoPlan { number, id, transmission_type: 0, objects, transmission }
 }
 
 /// The identifier of PDO 1 to 4 in the pre-defined connection set.

@@ -267,7 +267,7 @@ fn check_values(pdo: &PdoConfiguration, needed: &[MappedObject]) -> Result<(), M
 fn plan_of(
     pdo: &PdoConfiguration,
     axis: &Axis,
-    cadence: TransmissionType,
+    transmission: TransmissionType,
 ) -> Result<PdoPlan, MappingProblem> {
     let PdoConfiguration { direction, number, id: reported, transmission_type, .. } = *pdo;
     let expected = pdo_id(direction, number as u8, axis.node);
@@ -282,7 +282,7 @@ fn plan_of(
         id: expected,
         transmission_type: transmission_type.unwrap_or(axis.transmission_type),
         objects: pdo.objects.clone(),
-        cadence,
+        transmission,
     })
 }
 
@@ -310,7 +310,7 @@ fn by_number(
             return Err(MappingProblem::TooLong { direction, number: pdo.number, bits, counted_bits });
         }
         let transmission_type = plan.transmission_type;
-        Ok(PdoPlan { transmission_type, ..plan_of(pdo, axis, plan.cadence)? })
+        Ok(PdoPlan { transmission_type, ..plan_of(pdo, axis, plan.transmission)? })
     };
     let all = |direction, plans: Vec<PdoPlan>| -> Result<Vec<PdoPlan>, MappingProblem> {
         plans.into_iter().map(|plan| resolve(direction, plan)).collect()

@@ -211,6 +211,8 @@ mod tests {
     use proptest::prelude::*;
     use takt_rt::{Id, UnstuffedLength};
 
+    use crate::bus::frame_time::stuff_bits_of;
+
     /// The bits of a classic frame up to and with the CRC, one by one, as the standard writes them.
     fn bits_of(frame: &Frame) -> Vec<bool> {
         let mut bits = vec![];
@@ -242,21 +244,6 @@ mod tests {
         }
         (0..15).rev().for_each(|bit| bits.push(register >> bit & 1 == 1));
         bits
-    }
-
-    /// Stuffs one by one.
-    fn stuff_bits_of(bits: &[bool]) -> u32 {
-        let (mut last, mut run, mut stuffed) = (None, 0, 0);
-        for &bit in bits {
-            run = if last == Some(bit) { run + 1 } else { 1 };
-            last = Some(bit);
-            if run == 5 {
-                stuffed += 1;
-                last = Some(!bit);
-                run = 1;
-            }
-        }
-        stuffed
     }
 
     #[test]

@@ -126,9 +126,9 @@ mod tests {
     #[test]
     fn a_file_in_place_of_the_folder_is_an_error_that_names_it() {
         let folder = tempfile::tempdir().unwrap();
-        let obstacle = folder.path().join("runs");
-        fs::write(&obstacle, "in the way").unwrap();
-        let error = RecordingDestination::Directory(obstacle.clone()).open("arm", "mcap").err().unwrap();
-        assert!(error.to_string().starts_with(&format!("{}/arm.mcap: ", obstacle.display())), "{error}");
+        let file = folder.path().join("runs");
+        fs::write(&file, "in the way").unwrap();
+        let error = RecordingDestination::Directory(file.clone()).open("arm", "mcap").err().unwrap();
+        assert!(error.to_string().starts_with(&format!("{}/arm.mcap: ", file.display())), "{error}");
     }
 }

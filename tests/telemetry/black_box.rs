@@ -320,9 +320,9 @@ fn of_many_incidents_the_first_fifteen_and_the_last_are_kept() {
 #[test]
 fn an_unwritable_folder_is_reported_once_and_the_run_goes_on() {
     let folder = tempfile::tempdir().unwrap();
-    let obstacle = folder.path().join("runs");
-    fs::write(&obstacle, "a file in place of the folder").unwrap();
-    let mut run = Run::new(&obstacle);
+    let file = folder.path().join("runs");
+    fs::write(&file, "a file in place of the folder").unwrap();
+    let mut run = Run::new(&file);
     for _ in 0..3 {
         run.cycles(600);
         run.stop(Rule::FollowingError);

@@ -56,10 +56,10 @@ fn a_disk_that_becomes_full_at_the_very_end_is_reported_too() {
 #[test]
 fn an_unwritable_folder_gives_one_message_with_the_path_and_the_reason() {
     let folder = tempfile::tempdir().unwrap();
-    let obstacle = folder.path().join("runs");
-    fs::write(&obstacle, "a file in place of the folder").unwrap();
-    let beginning = format!("no recording: cannot write {}/arm-", obstacle.display());
-    assert_one_message(&record_into(RecordingDestination::Directory(obstacle)), &beginning, "exists");
+    let file = folder.path().join("runs");
+    fs::write(&file, "a file in place of the folder").unwrap();
+    let beginning = format!("no recording: cannot write {}/arm-", file.display());
+    assert_one_message(&record_into(RecordingDestination::Directory(file)), &beginning, "exists");
 }
 
 #[test]

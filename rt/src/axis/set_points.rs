@@ -164,8 +164,8 @@ impl Axis {
     }
 
     /// A set-point of a stream, of which the position counts: what it says of its velocity and acceleration is fed forward
-    /// as far as its step and the limits agree, so that nobody turns a joint by words alone. What is no number is left to
-    /// [`Axis::check`].
+    /// as far as its step and the limits agree, so that a stated velocity without a step of the position moves no joint. What is
+    /// no number is left to [`Axis::check`].
     pub fn agreeing(&self, next: &State, period_s: f64) -> State {
         let limits = &self.parameters.limits;
         let most = limits.acceleration.max(limits.deceleration);

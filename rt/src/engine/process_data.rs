@@ -84,7 +84,7 @@ fn objects(pdo: &MappedPdo) -> ArrayVec<MappedObject, MAX_OBJECTS> {
 
 fn command(pdo: &MappedPdo) -> Result<CommandPdo, MappingError> {
     let mapping = Mapping::commands(&objects(pdo))?;
-    Ok(CommandPdo { pdo: Pdo { id: pdo.id, mapping }, transmission: pdo.cadence })
+    Ok(CommandPdo { pdo: Pdo { id: pdo.id, mapping }, transmission: pdo.transmission })
 }
 
 fn feedback(pdo: &MappedPdo) -> Result<Pdo, MappingError> {

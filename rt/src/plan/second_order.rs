@@ -23,6 +23,7 @@
 //! becomes the change of the rate in that time at slope `h`. Only the results are divided again.
 
 use super::choice::{larger, select, smaller};
+use super::profile::Profile;
 
 /// A difference up to this, relative to the sizes of a problem, is rounding.
 const ROUNDING: f64 = 1024.0 * f64::EPSILON;
@@ -83,6 +84,21 @@ pub(super) struct Fastest {
     pub(super) cruise: Cruise,
     pub(super) duration: f64,
     pub(super) blocked: Option<(f64, f64)>,
+}
+
+impl Fastest {
+    /// Notes in a profile, which has only its first phases so far, how short it can be, and which durations are blocked.
+    /// Returns the shortest duration, in s.
+    #[inline(always)]
+    pub(super) fn note_in(&self, profile: &mut Profile) -> f64 {
+        let begun_s = profile.duration_s();
+        let shortest_s = begun_s + self.duration;
+        profile.set_minimum_duration(shortest_s);
+        if let Some((after, before)) = self.blocked {
+            profile.block(begun_s + after, begun_s + before);
+        }
+        shortest_s
+    }
 }
 
 /// The direct motion: a single slope from start to target.

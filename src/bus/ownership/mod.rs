@@ -12,8 +12,9 @@ use std::io;
 use takt_rt::linux::MonotonicClock;
 use takt_rt::{BusPort, Clock, Nanoseconds, ReceiveBatch};
 
-use super::interface::{InterfaceError, InterfaceSettings, interface_index, prepare_interface};
-use super::socketcan::{SocketCanError, SocketCanOptions, open_socketcan};
+use super::interface::{InterfaceSettings, interface_index};
+use super::port::{OpenError, open_socket, prepare};
+use super::socketcan::SocketCanOptions;
 use crate::config::{Config, Interface};
 
 pub use listening::{HeardMaster, Listening, MasterActivity, MasterTraffic, Verdict};
@@ -63,24 +64,9 @@ impl BusClaim {
 /// Why this process may not command a bus. Nothing has been sent then.
 #[derive(Debug, thiserror::Error)]
 pub enum ClaimError {
-    /// The interface is missing, down or set up differently.
-    #[error("bus `{bus}`: {error}")]
-    Interface {
-        /// The bus.
-        bus: String,
-        /// Why.
-        #[source]
-        error: InterfaceError,
-    },
-    /// No socket could be opened on the interface.
-    #[error("bus `{bus}`: {error}")]
-    Socket {
-        /// The bus.
-        bus: String,
-        /// Why.
-        #[source]
-        error: SocketCanError,
-    },
+    /// The interface could not be opened.
+    #[error(transparent)]
+    Open(#[from] OpenError),
     /// The lock could not be created.
     #[error("bus `{bus}`: locking {interface}: {error}")]
     Lock {
@@ -173,14 +159,12 @@ impl Ownership {
         }
         // Only now: until the lock is taken, the interface belongs to another process.
         for (_, claim) in &indexed {
-            prepare_interface(&claim.interface, &claim.settings)
-                .map_err(|error| ClaimError::Interface { bus: claim.bus.clone(), error })?;
+            prepare(&claim.bus, &claim.interface, &claim.settings)?;
         }
         let mut clock = MonotonicClock::default();
         let mut buses = vec![];
         for (_, claim) in &indexed {
-            let port = open_socketcan(&claim.interface, &SocketCanOptions::default())
-                .map_err(|error| ClaimError::Socket { bus: claim.bus.clone(), error })?;
+            let port = open_socket(&claim.bus, &claim.interface, &SocketCanOptions::default())?;
             buses.push((port, Listening::new(claim.traffic.clone(), clock.now_ns())));
         }
         match listen(&mut buses, &mut clock) {
@@ -217,7 +201,8 @@ pub fn lock_for_simulator(bus: &str, interface: &str) -> Result<InterfaceLock, C
 }
 
 fn index_of(bus: &str, interface: &str) -> Result<u32, ClaimError> {
-    interface_index(interface).map_err(|error| ClaimError::Interface { bus: bus.to_owned(), error })
+    let index = interface_index(interface);
+    Ok(index.map_err(|error| OpenError::Interface { bus: bus.to_owned(), error })?)
 }
 
 /// The lock is named after the index of the interface, which stays the same when the interface is renamed.

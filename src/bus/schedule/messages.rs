@@ -151,7 +151,7 @@ fn axis_messages(index: usize, axis: &Axis, period_ns: u64) -> Vec<BusMessage> {
     }));
     // A controlword that is sent when it changes goes to one axis in a cycle while they are enabled, and the group
     // stands still then: its delay does no harm, and it is not part of the sums.
-    let every_cycle = data.commands.iter().filter(|pdo| pdo.cadence == TransmissionType::EveryCycle);
+    let every_cycle = data.commands.iter().filter(|pdo| pdo.transmission == TransmissionType::EveryCycle);
     messages.extend(every_cycle.map(|pdo| of_axis(MessageKind::SetPoint, pdo, period_ns)));
     messages.extend(axis.heartbeat_ns.map(|heartbeat_ns| {
         let id = Id::canopen(0x700, axis.node);

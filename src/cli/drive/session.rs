@@ -5,7 +5,7 @@ use std::sync::atomic::Ordering;
 
 use takt::bus::ownership::{BusClaim, IfOwned, MasterTraffic, Ownership};
 use takt::bus::port::{OpenError, Port, open_configured};
-use takt::bus::{InterfaceSettings, SocketCanOptions, open_socketcan, prepare_interface};
+use takt::bus::{InterfaceSettings, SocketCanOptions, open_interface};
 use takt::commission::{Failure, TargetDrive, Task, bus_session, procedure};
 use takt::controller::VirtualClock;
 use takt::sim::SimulatedBus;
@@ -118,10 +118,7 @@ fn open(bus: &Bus) -> Result<Port, OpenError> {
             })
         }
         Bus::Interface { name, bit_rate } => {
-            prepare_interface(name, &settings(*bit_rate))
-                .map_err(|error| OpenError::Interface { bus: name.clone(), error })?;
-            let port = open_socketcan(name, &of_bit_rate(Some(*bit_rate)))
-                .map_err(|error| OpenError::Socket { bus: name.clone(), error })?;
+            let port = open_interface(name, name, &settings(*bit_rate), &of_bit_rate(Some(*bit_rate)))?;
             Ok(Port::SocketCan(Box::new(port)))
         }
     }

@@ -54,13 +54,8 @@ pub(in super::super) fn fastest_velocity(
 ) -> Result<(), PlanError> {
     let start = brake::relax(&problem.start, &problem.limits, profile);
     let core = velocity_problem(&start, &problem.target, &problem.limits)?;
-    let brake_s = profile.duration_s();
     let fastest = core.fastest();
-    let fastest_s = brake_s + fastest.duration;
-    profile.set_minimum_duration(fastest_s);
-    if let Some((after, before)) = fastest.blocked {
-        profile.block(brake_s + after, brake_s + before);
-    }
+    let fastest_s = fastest.note_in(profile);
     if fastest_s < least_s {
         return profile.leave_open(fastest_s);
     }
