@@ -22,7 +22,7 @@ fn main() -> miette::Result<()> {
     // This thread is not real-time, so its set-points come unevenly. Those beyond the limits are clamped.
     config.axes.iter_mut().for_each(|axis| axis.on_violation = OnViolation::Clamp);
     let cycle_ns = config.cycle.period_ns;
-    let mut arm = Controller::start(config, SessionOptions::default()).into_diagnostic()?;
+    let arm = Controller::start(config, SessionOptions::default()).into_diagnostic()?;
 
     let middle = |axis: &takt::config::Axis| 0.5 * (axis.limits.position_min + axis.limits.position_max);
     let targets: Vec<f64> = arm.axes().iter().map(middle).collect();

@@ -313,7 +313,7 @@ fn no_axis_whatever_its_mode_is_sent_where_it_cannot_be() {
     config.telemetry.is_recorded = false;
     config.telemetry.black_box_ns = None;
     config.program = Program { repeat: 1, moves: vec![] };
-    let mut controller = Controller::start(config, SessionOptions::default()).unwrap();
+    let controller = Controller::start(config, SessionOptions::default()).unwrap();
     for target in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e9, -1e9] {
         assert!(controller.move_to(&[target]).is_err(), "{target}");
     }

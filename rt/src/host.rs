@@ -105,6 +105,18 @@ pub struct Snapshot<const AXES: usize = MAX_AXES, const BUSES: usize = MAX_BUSES
     pub buses: [BusHealth; BUSES],
 }
 
+impl<const AXES: usize, const BUSES: usize> Snapshot<AXES, BUSES> {
+    /// The axes that count.
+    pub fn axes(&self) -> &[AxisSnapshot] {
+        self.axes.get(..self.axis_count.into()).unwrap_or(&self.axes)
+    }
+
+    /// The buses that count.
+    pub fn buses(&self) -> &[BusHealth] {
+        self.buses.get(..self.bus_count.into()).unwrap_or(&self.buses)
+    }
+}
+
 impl<const AXES: usize, const BUSES: usize> Default for Snapshot<AXES, BUSES> {
     fn default() -> Self {
         Self {
@@ -154,10 +166,23 @@ pub struct GroupSnapshot {
 pub struct AxisSnapshot {
     /// Set-point (rad or m).
     pub position_set: f64,
+    /// Set-point of the velocity (rad/s or m/s).
+    pub velocity_set: f64,
+    /// Torque that is sent (N·m or N): the command in CST, else the feed-forward; 0 when none is sent.
+    pub torque_set: f64,
     /// Actual position (rad or m).
     pub position: f64,
-    /// Actual velocity (rad/s or m/s).
+    /// Actual velocity (rad/s or m/s): reported, or else derived from the positions.
     pub velocity: f64,
+    /// Distance between the set-point that was in force at the SYNC of the last feedback and the position reported for it
+    /// (rad or m).
+    pub following_error: f64,
+    /// Object 6077 (N·m or N); `None` if the drive does not report it.
+    pub torque: Option<f64>,
+    /// Object 6078, in thousandths of the rated current; `None` if the drive does not report it.
+    pub current_per_mille: Option<i16>,
+    /// Object 6061, the mode of operation that the drive shows; `None` if the drive does not report it.
+    pub mode: Option<i8>,
     /// Object 6041.
     pub statusword: u16,
     /// What it says of the drive.
@@ -169,4 +194,22 @@ pub struct AxisSnapshot {
     /// SYNCs, or set-points where it answers these, that the drive has left without an answer, or has not answered yet. One that stays so may have been lost, or
     /// every answer since then comes so many cycles late: that is looked into whenever the group is enabled.
     pub unanswered: u16,
+    /// Cycles of its bus in which the drive was asked for feedback, and gave none, since its last feedback.
+    pub feedback_age: u16,
+    /// The slot of the last feedback; everything that the drive reports is from then, or older. 0 before the first one.
+    pub feedback_slot: u64,
+    /// The time at which the last feedback was taken; 0 before the first one.
+    pub feedback_ns: Nanoseconds,
+}
+
+impl AxisSnapshot {
+    /// Whether what the drive reports is not from its last cycle: it has not reported yet, or has left out a cycle.
+    pub const fn is_stale(&self) -> bool {
+        !self.is_heard || self.feedback_age > 0
+    }
+
+    /// How old what the drive reports is at a time; `None` if it has not reported yet.
+    pub fn feedback_age_ns(&self, now_ns: Nanoseconds) -> Option<Nanoseconds> {
+        self.is_heard.then(|| now_ns.saturating_sub(self.feedback_ns))
+    }
 }

@@ -24,10 +24,10 @@ impl Arrival {
     }
 
     /// The first joint that is farther off its target than it may be, as an outcome.
-    pub fn missed(&self, target: &[f64], snapshot: &Snapshot) -> Option<Outcome> {
-        let joints = self.tolerances.iter().zip(target).zip(&snapshot.axes).enumerate();
+    pub fn missed(&self, targets: &[Option<f64>], snapshot: &Snapshot) -> Option<Outcome> {
+        let joints = self.tolerances.iter().zip(targets).zip(&snapshot.axes).enumerate();
         joints.into_iter().find_map(|(axis, ((tolerance, target), joint))| {
-            let (tolerance, distance) = ((*tolerance)?, joint.position - target);
+            let (tolerance, distance) = ((*tolerance)?, joint.position - (*target)?);
             // A position that is no number is nowhere near.
             let is_there = distance.abs() <= tolerance;
             (!is_there).then_some(Outcome::OffTarget { axis, distance, tolerance })

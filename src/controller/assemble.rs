@@ -1,8 +1,12 @@
 //! Makes the engine and the slot plan from a configuration.
 
+use std::fmt;
+
+use arrayvec::ArrayVec;
 use takt_rt::{
-    AxisParameters, BusParameters, CommandPdo, Engine, EngineParameters, FeedbackSince, Heartbeat, Id,
-    Mapping, MappingError, Pdo, Scale, ScaleError, ScaleParameters, SetUpError, SlotPlan, TimingLadder,
+    AxisParameters, BusParameters, CommandPdo, Engine, EngineParameters, FeedbackSince, GroupParameters,
+    Heartbeat, Id, MAX_AXES, MAX_GROUPS, Mapping, MappingError, Pdo, Scale, ScaleError, ScaleParameters,
+    SetUpError, SlotPlan, TimingLadder,
 };
 
 use crate::config::{Axis, Config, ConfigError, DriveFamily, Interface};
@@ -18,7 +22,7 @@ const NOT_TRANSMITTED_NS: u64 = 4_000_000;
 const SERVICE_FRAMES_PASSIVE: usize = 6;
 
 /// Why the real-time thread cannot execute a configuration.
-#[derive(Debug, thiserror::Error)]
+#[derive(thiserror::Error)]
 pub enum AssembleError {
     /// A value that cannot be: see [`Config::validate`].
     #[error(transparent)]
@@ -42,6 +46,16 @@ pub enum AssembleError {
     /// The engine rejects its parameters.
     #[error("the cycle cannot be set up ({0:?})")]
     Engine(SetUpError),
+}
+
+impl fmt::Debug for AssembleError {
+    /// For `main`: the sentence, or the problems of a configuration.
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Configuration(error) => fmt::Debug::fmt(error, formatter),
+            other => fmt::Display::fmt(other, formatter),
+        }
+    }
 }
 
 /// The plan of a slot.
@@ -79,6 +93,7 @@ pub fn engine(config: &Config) -> Result<Engine, AssembleError> {
     Engine::new(EngineParameters {
         period_ns,
         axes,
+        groups: groups(config),
         buses: buses.collect(),
         heartbeat,
         time_cycles: config.master.time_ns.map(&cycles),
@@ -94,6 +109,16 @@ pub fn engine(config: &Config) -> Result<Engine, AssembleError> {
         acknowledge_timeout_cycles: cycles(ACKNOWLEDGE_TIMEOUT_NS),
     })
     .map_err(AssembleError::Engine)
+}
+
+/// The groups with their numbers in place of the names. A checked configuration has no number that does not fit.
+fn groups(config: &Config) -> ArrayVec<GroupParameters, MAX_GROUPS> {
+    let number = |index: &usize| u8::try_from(*index).unwrap_or(u8::MAX);
+    let groups = config.groups.iter().take(MAX_GROUPS).map(|group| GroupParameters {
+        axes: group.axes.iter().take(MAX_AXES).map(number).collect(),
+        stops_with: group.stops_with.iter().take(MAX_GROUPS).map(number).collect(),
+    });
+    groups.collect()
 }
 
 fn axis_parameters(

@@ -3,14 +3,18 @@
 //!
 //! ```text
 //! HostSide ── requests, newest streamed command, service frames ──▶ RtSide (takt_rt::HostInterface)
-//! HostSide ◀── service frames, newest snapshot (any number of observers) ── RtSide
+//! clients  ── requests and stops, from any number of threads ──▶ RtSide
+//! HostSide ◀── service frames, newest snapshot, last events (any number of observers) ── RtSide
 //! LogSide  ◀── cycle records, events ── RtSide
 //! ```
 //!
 //! No call on [`RtSide`] allocates, locks or waits, even if another thread is preempted in the middle of a call.
 
+mod client_requests;
+mod event_words;
 mod latest;
 mod motion_words;
+mod observed_events;
 mod primitives;
 mod records;
 mod request_numbers;
@@ -18,27 +22,33 @@ mod ring;
 mod words;
 
 use takt_rt::{
-    CycleRecord, Event, Frame, HostInterface, Received, Request, RequestEnvelope, RequestId, Snapshot,
-    StreamCommand,
+    CycleRecord, Event, Frame, HostInterface, Received, Request, RequestEnvelope, RequestId, RequestTarget,
+    Snapshot, StreamCommand,
 };
 
 use crate::config::Config;
+use client_requests::{TakenRequests, client_requests};
 use latest::{Attempt, Reader, Writer};
+use observed_events::{EventWriter, observed_events};
 use records::{RecordConsumer, RecordProducer};
 
+pub use client_requests::{ClientRequests, MotionEnd, WAITING_AT_MOST};
+pub use observed_events::EventReader;
 pub use request_numbers::RequestNumbers;
 pub use ring::{Consumer, Producer, ring};
 
 /// The capacity of each channel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ChannelSizes {
+    /// Groups of the controller, up to [`takt_rt::MAX_GROUPS`].
+    pub groups: usize,
     /// Axes of the controller, up to [`takt_rt::MAX_AXES`].
     pub axes: usize,
     /// Buses of the controller, up to [`takt_rt::MAX_BUSES`].
     pub buses: usize,
     /// Cycle records that wait for the logger.
     pub records: usize,
-    /// Events that wait for the logger.
+    /// Events that wait for the logger, and events that an observer can be behind.
     pub events: usize,
     /// Requests that wait for the next cycle.
     pub requests: usize,
@@ -53,6 +63,7 @@ impl ChannelSizes {
     /// the events of a second in which the logger is late.
     pub fn of(config: &Config) -> Self {
         Self {
+            groups: config.groups.len().max(1),
             axes: config.axes.len(),
             buses: config.buses.len(),
             records: config.telemetry.ring_records,
@@ -84,25 +95,34 @@ pub enum ChannelError {
 pub fn channels(sizes: &ChannelSizes) -> (RtSide, HostSide, LogSide) {
     let (request_in, request_out) = ring(sizes.requests);
     let (stream_in, stream_out) = latest::latest(words::stream_words(sizes.axes));
-    let (snapshot_in, snapshot_out) = latest::latest(words::snapshot_words(sizes.axes, sizes.buses));
+    let (snapshot_in, snapshot_out) =
+        latest::latest(words::snapshot_words(sizes.groups, sizes.axes, sizes.buses));
     let (service_in, service_out) = (0..sizes.buses).map(|_| ring(sizes.service_out)).unzip();
     let (received_in, received_out) = ring(sizes.service_in);
     let (record_in, record_out) = records::record_ring(sizes.records);
     let (event_in, event_out) = ring(sizes.events);
+    let (observed_in, observed_out) = observed_events(sizes.events);
+    let numbers = RequestNumbers::default();
+    let (clients, taken) = client_requests(numbers.clone(), WAITING_AT_MOST);
     let rt = RtSide {
         axes: sizes.axes,
         requests: request_out,
+        clients: taken,
+        is_client_next: true,
         stream: stream_out,
         stream_seen: 0,
         service: service_out,
         received: received_in,
         records: record_in,
         events: event_in,
+        observed: observed_in,
         snapshot: snapshot_in,
     };
     let host = HostSide {
         requests: request_in,
-        numbers: RequestNumbers::default(),
+        numbers,
+        clients,
+        observed: observed_out,
         streamer: Some(Streamer { axes: sizes.axes, stream: stream_in }),
         service: service_in,
         received: received_out,
@@ -115,12 +135,17 @@ pub fn channels(sizes: &ChannelSizes) -> (RtSide, HostSide, LogSide) {
 pub struct RtSide {
     axes: usize,
     requests: Consumer<RequestEnvelope>,
+    clients: TakenRequests,
+    /// Whether a client's request comes before the next one of the host. They alternate, so that no flood of the one holds up
+    /// the other.
+    is_client_next: bool,
     stream: Reader,
     stream_seen: u64,
     service: Vec<Consumer<Frame>>,
     received: Producer<(usize, Received)>,
     records: RecordProducer,
     events: Producer<Event>,
+    observed: EventWriter,
     snapshot: Writer,
 }
 
@@ -130,7 +155,12 @@ const STREAM_ATTEMPTS: usize = 3;
 
 impl HostInterface for RtSide {
     fn request(&mut self) -> Option<RequestEnvelope> {
-        self.requests.pop()
+        self.is_client_next = !self.is_client_next;
+        if self.is_client_next {
+            self.requests.pop().or_else(|| self.clients.take())
+        } else {
+            self.clients.take().or_else(|| self.requests.pop())
+        }
     }
 
     fn stream(&mut self) -> Option<StreamCommand> {
@@ -161,6 +191,7 @@ impl HostInterface for RtSide {
     }
 
     fn event(&mut self, event: &Event) -> bool {
+        self.observed.write(event);
         self.events.push(*event)
     }
 
@@ -173,6 +204,8 @@ impl HostInterface for RtSide {
 pub struct HostSide {
     requests: Producer<RequestEnvelope>,
     numbers: RequestNumbers,
+    clients: ClientRequests,
+    observed: EventReader,
     streamer: Option<Streamer>,
     service: Vec<Producer<Frame>>,
     received: Consumer<(usize, Received)>,
@@ -187,7 +220,7 @@ impl HostSide {
     /// [`ChannelError::Full`]; the request is not sent then.
     pub fn request(&mut self, request: Request) -> Result<RequestId, ChannelError> {
         let id = self.numbers.next();
-        self.submit(RequestEnvelope { id, request }).map(|()| id)
+        self.submit(RequestEnvelope { id, target: RequestTarget::All, request }).map(|()| id)
     }
 
     /// Sends a request with an id of [`HostSide::numbers`].
@@ -201,6 +234,16 @@ impl HostSide {
     /// The source of request ids.
     pub fn numbers(&self) -> RequestNumbers {
         self.numbers.clone()
+    }
+
+    /// The way for requests from other threads.
+    pub fn clients(&self) -> ClientRequests {
+        self.clients.clone()
+    }
+
+    /// The events from now on, for another thread.
+    pub fn events(&self) -> EventReader {
+        self.observed.from_now_on()
     }
 
     /// Replaces the streamed command. The real-time thread takes the newest one at its next cycle. Set-points beyond the axes
@@ -315,8 +358,20 @@ mod tests {
     use takt_rt::plan;
     use takt_rt::{EventKind, MAX_AXES, Phase, StopCategory};
 
-    const SIZES: ChannelSizes =
-        ChannelSizes { axes: 2, buses: 2, records: 4, events: 2, requests: 2, service_out: 2, service_in: 2 };
+    const SIZES: ChannelSizes = ChannelSizes {
+        groups: 1,
+        axes: 2,
+        buses: 2,
+        records: 4,
+        events: 2,
+        requests: 2,
+        service_out: 2,
+        service_in: 2,
+    };
+
+    fn envelope(id: RequestId, request: Request) -> RequestEnvelope {
+        RequestEnvelope { id, target: RequestTarget::All, request }
+    }
 
     fn command(valid_until_ns: u64) -> StreamCommand {
         StreamCommand { valid_until_ns, set_points: [plan::State::default(); MAX_AXES] }
@@ -329,10 +384,20 @@ mod tests {
         let second = host.request(Request::Stop(StopCategory::Two)).unwrap();
         assert!(first < second);
         assert_eq!(host.request(Request::Shutdown), Err(ChannelError::Full));
-        assert_eq!(rt.request(), Some(RequestEnvelope { id: first, request: Request::Enable }));
+        assert_eq!(rt.request(), Some(envelope(first, Request::Enable)));
         let request = Request::Stop(StopCategory::Two);
-        assert_eq!(rt.request(), Some(RequestEnvelope { id: second, request }));
+        assert_eq!(rt.request(), Some(envelope(second, request)));
         assert_eq!(rt.request(), None);
+    }
+
+    #[test]
+    fn neither_the_host_nor_a_client_holds_up_the_other() {
+        let (mut rt, mut host, _log) = channels(&SIZES);
+        let client = host.clients();
+        let own: Vec<_> = (0..2).map(|_| host.request(Request::Enable).unwrap()).collect();
+        let theirs: Vec<_> = (0..4).map(|_| client.submit(Request::ResetFaults).unwrap()).collect();
+        let taken: Vec<_> = std::iter::from_fn(|| rt.request()).map(|envelope| envelope.id).collect();
+        assert_eq!(taken, [theirs[0], own[0], theirs[1], own[1], theirs[2], theirs[3]]);
     }
 
     #[test]
@@ -365,21 +430,29 @@ mod tests {
         let (mut rt, host, _log) = channels(&SIZES);
         let observer = host.observer();
         assert_eq!(observer.snapshot(), words::NO_SNAPSHOT);
-        let snapshot = Snapshot { slot: 9, phase: Phase::Holding, axis_count: 2, ..words::NO_SNAPSHOT };
+        let mut snapshot = Snapshot { slot: 9, phase: Phase::Holding, axis_count: 2, ..words::NO_SNAPSHOT };
+        snapshot.groups[0].phase = Phase::Holding;
         rt.publish(&snapshot);
         assert_eq!((observer.snapshot(), host.snapshot()), (snapshot, snapshot));
     }
 
     #[test]
     fn the_log_side_gets_records_and_events_and_the_numbers_of_dropped_ones() {
-        let (mut rt, _host, mut log) = channels(&SIZES);
+        let (mut rt, host, mut log) = channels(&SIZES);
         let record = CycleRecord { axis_count: 2, ..CycleRecord::default() };
         assert_eq!((0..6).filter(|_| rt.record(&record)).count(), 4);
-        let event =
-            |slot| Event { slot, at_ns: 0, kind: EventKind::MotionFinished { request: RequestId(1) } };
+        let mut observer = host.events();
+        let event = |slot| Event {
+            slot,
+            at_ns: 0,
+            group: None,
+            kind: EventKind::MotionFinished { request: RequestId(1) },
+        };
         assert_eq!((0..3).filter(|slot| rt.event(&event(*slot))).count(), 2);
         assert_eq!(log.next_record(|seen| *seen), Some(record));
         assert_eq!(log.take_event(), Some(event(0)));
+        assert_eq!(observer.by_ref().map(|seen| seen.slot).collect::<Vec<_>>(), [1, 2]);
+        assert_eq!((observer.missed(), log.events_dropped()), (1, 1));
         assert_eq!((log.records_written(), log.records_dropped(), log.events_dropped()), (4, 2, 1));
     }
 }

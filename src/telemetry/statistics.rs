@@ -199,6 +199,7 @@ mod tests {
             is_commanded: true,
             axis_count: 1,
             axes: [axis; MAX_AXES],
+            ..CycleRecord::default()
         }
     }
 

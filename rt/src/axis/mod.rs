@@ -40,6 +40,7 @@ use arrayvec::ArrayVec;
 
 use crate::cia402::DriveState;
 use crate::guard::FollowingErrorGuard;
+use crate::host::AxisSnapshot;
 use crate::pdo::{CommandSlot, FeedbackSlot, MAX_PDOS, ProcessImage};
 use crate::record::AxisRecord;
 use crate::watch::{DuplicateNodeDetector, NodeMonitor};
@@ -214,6 +215,30 @@ impl Axis {
     /// Whether the drive follows set-points.
     pub fn is_enabled(&self) -> bool {
         self.drive_state() == DriveState::OperationEnabled && self.power != Power::LatchedOff
+    }
+
+    /// Shows the state to observers. `shown` keeps when the drive reported last.
+    pub(crate) fn show(&self, shown: &mut AxisSnapshot) {
+        let set_point = self.set_point();
+        *shown = AxisSnapshot {
+            position_set: set_point.position,
+            velocity_set: set_point.velocity,
+            torque_set: self.torque_set,
+            position: self.joint.position(),
+            velocity: self.joint.velocity(),
+            following_error: self.following.error(),
+            torque: self.torque(),
+            current_per_mille: self.current_per_mille(),
+            mode: self.mode(),
+            statusword: self.statusword(),
+            drive_state: self.drive_state(),
+            error_code: self.error_code(),
+            is_heard: self.is_heard(),
+            unanswered: self.unanswered(),
+            feedback_age: self.feedback_age(),
+            feedback_slot: shown.feedback_slot,
+            feedback_ns: shown.feedback_ns,
+        };
     }
 
     /// What this cycle leaves behind.

@@ -42,7 +42,7 @@ use crate::bus_set::BusSet;
 use crate::dispatch::Dispatch;
 use crate::frame::Frame;
 use crate::group_trajectory::ProfileStore;
-use crate::host::{AxisSnapshot, GroupSnapshot, HostInterface};
+use crate::host::{GroupSnapshot, HostInterface};
 use crate::phase::Phase;
 use crate::port::BusHealth;
 use crate::record::{CycleTiming, EventKind, MAX_AXES, MAX_BUSES, MAX_GROUPS};
@@ -345,17 +345,9 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         let [GroupSnapshot { phase, remaining_s, stop }, ..] = snapshot.groups;
         (snapshot.phase, snapshot.remaining_s, snapshot.stop) = (phase, remaining_s, stop);
         for axis in &self.axes {
-            let Some(shown) = snapshot.axes.get_mut(usize::from(axis.number())) else { continue };
-            *shown = AxisSnapshot {
-                position_set: axis.set_point().position,
-                position: axis.position(),
-                velocity: axis.velocity(),
-                statusword: axis.statusword(),
-                drive_state: axis.drive_state(),
-                error_code: axis.error_code(),
-                is_heard: axis.is_heard(),
-                unanswered: axis.unanswered(),
-            };
+            if let Some(shown) = snapshot.axes.get_mut(usize::from(axis.number())) {
+                axis.show(shown);
+            }
         }
         for (shown, health) in snapshot.buses.iter_mut().zip(buses) {
             *shown = *health;

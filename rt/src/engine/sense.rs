@@ -108,7 +108,11 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
                 && axis.parameters().feedback_since == FeedbackSince::Sync
                 && !asked_by_sync.contains(axis.parameters().bus.into());
             if self.shared.has_cycle_of(axis, input.slot) && !is_unasked {
-                axis.begin_cycle(elapsed_s);
+                let has_reported = axis.begin_cycle(elapsed_s);
+                let shown = self.shared.snapshot.axes.get_mut(usize::from(axis.number()));
+                if let Some(shown) = shown.filter(|_| has_reported) {
+                    (shown.feedback_slot, shown.feedback_ns) = (input.slot, input.now_ns);
+                }
                 if axis.parameters().feedback_since != FeedbackSince::Sync {
                     axis.expect_feedback(input.now_ns);
                 }

@@ -2,18 +2,24 @@
 
 use takt_rt::plan;
 use takt_rt::{
-    Answers, AxisSnapshot, BusHealth, BusState, DriveState, MAX_AXES, MAX_BUSES, MotionReports, Origin,
-    Phase, RejectReason, RequestError, RequestId, RequestKind, Rule, Snapshot, StopCategory, StopCause,
-    StopReason, StreamCommand, TimingLevel,
+    Answers, AxisSnapshot, BusHealth, BusState, DriveState, GroupSnapshot, MAX_AXES, MAX_BUSES, MAX_GROUPS,
+    MotionReports, Origin, Phase, RejectReason, RequestError, RequestId, RequestKind, Rule, Snapshot,
+    StopCategory, StopCause, StopReason, StreamCommand, TimingLevel,
 };
 
 use super::latest::Words;
 use super::motion_words::{MOTION_WORDS, put_motions, take_motions};
 
 /// The largest number of words of a snapshot of so many axes and buses.
-pub const fn snapshot_words(axes: usize, buses: usize) -> usize {
-    18 + MOTION_WORDS + 4 * Answers::EXPLAINED + 4 * axes + 7 * buses
+pub const fn snapshot_words(groups: usize, axes: usize, buses: usize) -> usize {
+    12 + MOTION_WORDS + 4 * Answers::EXPLAINED + GROUP_WORDS * groups + AXIS_WORDS * axes + 7 * buses
 }
+
+/// The largest number of words of a group of a snapshot: its phase, the time left, and a stop.
+const GROUP_WORDS: usize = 2 + 4;
+
+/// The number of words of an axis of a snapshot.
+const AXIS_WORDS: usize = 11;
 
 /// The number of words of a streamed command for so many axes.
 pub const fn stream_words(axes: usize) -> usize {
@@ -40,16 +46,27 @@ pub const NO_SNAPSHOT: Snapshot = Snapshot {
     motions: MotionReports { reports: [None; MotionReports::CAPACITY] },
     remaining_s: 0.0,
     stop: None,
+    group_count: 1,
+    groups: [GroupSnapshot { phase: Phase::Passive, remaining_s: 0.0, stop: None }; MAX_GROUPS],
     axis_count: 0,
     axes: [AxisSnapshot {
         position_set: 0.0,
+        velocity_set: 0.0,
+        torque_set: 0.0,
         position: 0.0,
         velocity: 0.0,
+        following_error: 0.0,
+        torque: None,
+        current_per_mille: None,
+        mode: None,
         statusword: 0,
         drive_state: DriveState::NotReadyToSwitchOn,
         error_code: 0,
         is_heard: false,
         unanswered: 0,
+        feedback_age: 0,
+        feedback_slot: 0,
+        feedback_ns: 0,
     }; MAX_AXES],
     bus_count: 0,
     buses: [BusHealth {
@@ -66,12 +83,7 @@ pub const NO_SNAPSHOT: Snapshot = Snapshot {
 pub fn put_snapshot(snapshot: &Snapshot, words: &mut Words<'_>) {
     words.put(snapshot.slot);
     words.put(snapshot.at_ns);
-    words.put(pack([
-        snapshot.phase as u8,
-        snapshot.axis_count,
-        snapshot.bus_count,
-        u8::from(snapshot.stop.is_some()) | (snapshot.timing as u8) << 1,
-    ]));
+    words.put(pack([snapshot.group_count, snapshot.axis_count, snapshot.bus_count, snapshot.timing as u8]));
     words.put(snapshot.missed_slots);
     words.put(snapshot.steps);
     words.put(snapshot.clamped);
@@ -79,10 +91,7 @@ pub fn put_snapshot(snapshot: &Snapshot, words: &mut Words<'_>) {
     words.put(snapshot.rejected);
     put_answers(&snapshot.answers, words);
     put_motions(&snapshot.motions, words);
-    words.put_f64(snapshot.remaining_s);
-    if let Some(stop) = snapshot.stop {
-        put_stop(&stop, words);
-    }
+    snapshot.groups().iter().for_each(|group| put_group(group, words));
     for axis in snapshot.axes.iter().take(snapshot.axis_count.into()) {
         put_axis(axis, words);
     }
@@ -93,25 +102,28 @@ pub fn put_snapshot(snapshot: &Snapshot, words: &mut Words<'_>) {
 
 pub fn take_snapshot(words: &mut Words<'_>) -> Snapshot {
     let (slot, at_ns, packed) = (words.take(), words.take(), words.take());
-    let [phase, axis_count, bus_count, flags] = unpack(packed);
+    let [group_count, axis_count, bus_count, timing] = unpack(packed);
     let mut snapshot = Snapshot {
         slot,
         at_ns,
-        phase: phase_of(phase),
         missed_slots: words.take(),
         steps: words.take(),
         clamped: words.take(),
-        timing: TimingLevel::ALL.get(usize::from(flags >> 1)).copied().unwrap_or_default(),
+        timing: TimingLevel::ALL.get(usize::from(timing)).copied().unwrap_or_default(),
         dropped: words.take(),
         rejected: words.take(),
         answers: take_answers(words),
         motions: take_motions(words),
-        remaining_s: words.take_f64(),
-        stop: (flags & 1 == 1).then(|| take_stop(words)),
+        group_count,
         axis_count,
         bus_count,
         ..NO_SNAPSHOT
     };
+    for group in snapshot.groups.iter_mut().take(group_count.into()) {
+        *group = take_group(words);
+    }
+    let [GroupSnapshot { phase, remaining_s, stop }, ..] = snapshot.groups;
+    (snapshot.phase, snapshot.remaining_s, snapshot.stop) = (phase, remaining_s, stop);
     for axis in snapshot.axes.iter_mut().take(axis_count.into()) {
         *axis = take_axis(words);
     }
@@ -119,6 +131,23 @@ pub fn take_snapshot(words: &mut Words<'_>) -> Snapshot {
         *bus = take_bus(words);
     }
     snapshot
+}
+
+fn put_group(group: &GroupSnapshot, words: &mut Words<'_>) {
+    words.put(pack([group.phase as u8, u8::from(group.stop.is_some()), 0, 0]));
+    words.put_f64(group.remaining_s);
+    if let Some(stop) = group.stop {
+        put_stop(&stop, words);
+    }
+}
+
+fn take_group(words: &mut Words<'_>) -> GroupSnapshot {
+    let [phase, is_stopped, ..] = unpack(words.take());
+    GroupSnapshot {
+        phase: phase_of(phase),
+        remaining_s: words.take_f64(),
+        stop: (is_stopped == 1).then(|| take_stop(words)),
+    }
 }
 
 fn put_answers(answers: &Answers, words: &mut Words<'_>) {
@@ -133,14 +162,34 @@ fn put_answers(answers: &Answers, words: &mut Words<'_>) {
             words.put(0);
             return;
         };
-        let axis = refused.axis.map_or(0, |axis| u64::from(axis) << 32 | 1 << 40);
-        let kinds = pack([refused.request as u8, refused.reason.number(), refused.phase as u8, 1]);
-        let (asked, allowed) = refused.reason.numbers();
-        words.put(kinds | axis);
+        put_rejection(refused, words);
         words.put(*id);
-        words.put_f64(asked);
-        words.put_f64(allowed);
     }
+}
+
+pub fn put_rejection(refused: &RequestError, words: &mut Words<'_>) {
+    let axis = refused.axis.map_or(0, |axis| u64::from(axis) << 32 | 1 << 40);
+    let kinds = pack([refused.request as u8, refused.reason.number(), refused.phase as u8, 1]);
+    let (asked, allowed) = refused.reason.numbers();
+    words.put(kinds | axis);
+    words.put_f64(asked);
+    words.put_f64(allowed);
+}
+
+/// `None` at the end of the rejections.
+pub fn take_rejection(words: &mut Words<'_>) -> Option<RequestError> {
+    let packed = words.take();
+    let [request, reason, phase, is_there] = unpack(packed);
+    if is_there == 0 {
+        return None;
+    }
+    let (asked, allowed) = (words.take_f64(), words.take_f64());
+    Some(RequestError {
+        request: RequestKind::ALL.get(usize::from(request)).copied().unwrap_or(RequestKind::Shutdown),
+        reason: RejectReason::from_numbers(reason, asked, allowed).unwrap_or(RejectReason::Phase),
+        axis: (packed >> 40 & 1 == 1).then_some((packed >> 32) as u8),
+        phase: phase_of(phase),
+    })
 }
 
 fn take_answers(words: &mut Words<'_>) -> Answers {
@@ -148,19 +197,8 @@ fn take_answers(words: &mut Words<'_>) -> Answers {
     let mut bits = || u128::from(words.take()) | u128::from(words.take()) << 64;
     let mut answers = Answers { newest, taken_up: bits(), rejected: bits(), ..Answers::default() };
     for place in &mut answers.rejections {
-        let packed = words.take();
-        let [request, reason, phase, is_there] = unpack(packed);
-        if is_there == 0 {
-            break;
-        }
+        let Some(rejected) = take_rejection(words) else { break };
         let id = RequestId(words.take());
-        let (asked, allowed) = (words.take_f64(), words.take_f64());
-        let rejected = RequestError {
-            request: RequestKind::ALL.get(usize::from(request)).copied().unwrap_or(RequestKind::Shutdown),
-            reason: RejectReason::from_numbers(reason, asked, allowed).unwrap_or(RejectReason::Phase),
-            axis: (packed >> 40 & 1 == 1).then_some((packed >> 32) as u8),
-            phase: phase_of(phase),
-        };
         *place = Some((id, rejected));
     }
     answers
@@ -227,28 +265,53 @@ pub fn take_stop(words: &mut Words<'_>) -> StopReason {
 }
 
 fn put_axis(axis: &AxisSnapshot, words: &mut Words<'_>) {
-    words.put_f64(axis.position_set);
-    words.put_f64(axis.position);
-    words.put_f64(axis.velocity);
+    let numbers = [
+        axis.position_set,
+        axis.velocity_set,
+        axis.torque_set,
+        axis.position,
+        axis.velocity,
+        axis.following_error,
+        axis.torque.unwrap_or_default(),
+    ];
+    numbers.into_iter().for_each(|number| words.put_f64(number));
     let is_heard = u64::from(axis.is_heard) << 32;
     let drive_state = (axis.drive_state as u64) << 40;
     let unanswered = u64::from(axis.unanswered) << 48;
     let words_of_drive = u64::from(axis.statusword) | u64::from(axis.error_code) << 16;
     words.put(words_of_drive | is_heard | drive_state | unanswered);
+    let current = u64::from(axis.current_per_mille.unwrap_or_default() as u16) << 16;
+    let mode = u64::from(axis.mode.unwrap_or_default() as u8) << 32;
+    let are_reported = [axis.torque.is_some(), axis.current_per_mille.is_some(), axis.mode.is_some()];
+    let reported = are_reported.iter().rev().fold(0, |bits, is_reported| bits << 1 | u64::from(*is_reported));
+    words.put(u64::from(axis.feedback_age) | current | mode | reported << 40);
+    words.put(axis.feedback_slot);
+    words.put(axis.feedback_ns);
 }
 
 fn take_axis(words: &mut Words<'_>) -> AxisSnapshot {
-    let (position_set, position, velocity) = (words.take_f64(), words.take_f64(), words.take_f64());
-    let packed = words.take();
+    let [position_set, velocity_set, torque_set, position, velocity, following_error, torque] =
+        [(); 7].map(|()| words.take_f64());
+    let (packed, reported) = (words.take(), words.take());
+    let is_reported = |bit: u32| reported >> (40 + bit) & 1 == 1;
     AxisSnapshot {
         position_set,
+        velocity_set,
+        torque_set,
         position,
         velocity,
+        following_error,
+        torque: is_reported(0).then_some(torque),
+        current_per_mille: is_reported(1).then_some((reported >> 16) as i16),
+        mode: is_reported(2).then_some((reported >> 32) as i8),
         statusword: packed as u16,
         drive_state: drive_state_of((packed >> 40) as u8),
         error_code: (packed >> 16) as u16,
         is_heard: packed >> 32 & 1 == 1,
         unanswered: (packed >> 48) as u16,
+        feedback_age: reported as u16,
+        feedback_slot: words.take(),
+        feedback_ns: words.take(),
     }
 }
 
@@ -281,11 +344,11 @@ fn take_bus(words: &mut Words<'_>) -> BusHealth {
     }
 }
 
-fn phase_of(number: u8) -> Phase {
+pub fn phase_of(number: u8) -> Phase {
     Phase::ALL.get(usize::from(number)).copied().unwrap_or_default()
 }
 
-fn drive_state_of(number: u8) -> DriveState {
+pub fn drive_state_of(number: u8) -> DriveState {
     DriveState::ALL.get(usize::from(number)).copied().unwrap_or_default()
 }
 
@@ -298,13 +361,13 @@ fn unpack(word: u64) -> [u8; 4] {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::controller::channels::latest::{Attempt, latest};
     use proptest::prelude::*;
     use takt_rt::{MotionReport, MotionState};
 
-    fn stop_reasons() -> impl Strategy<Value = StopReason> {
+    pub fn stop_reasons() -> impl Strategy<Value = StopReason> {
         let categories = prop::sample::select(vec![StopCategory::Zero, StopCategory::One, StopCategory::Two]);
         let (rules, phases) = (prop::sample::select(&Rule::ALL[..]), prop::sample::select(&Phase::ALL[..]));
         let origins = prop_oneof![
@@ -325,7 +388,7 @@ mod tests {
         )
     }
 
-    fn rejections() -> impl Strategy<Value = RequestError> {
+    pub fn rejections() -> impl Strategy<Value = RequestError> {
         let requests = prop::sample::select(&RequestKind::ALL[..]);
         let reasons = prop::sample::select(&RejectReason::ALL[..]);
         let phases = prop::sample::select(&Phase::ALL[..]);
@@ -340,31 +403,40 @@ mod tests {
             stop_reasons().prop_map(MotionState::Stopped),
             any::<u64>().prop_map(|by| MotionState::Replaced { by: RequestId(by) }),
         ];
-        let reports = (any::<u64>(), any::<Option<u8>>(), states)
-            .prop_map(|(request, axis, state)| MotionReport { request: RequestId(request), axis, state });
+        let reports = (any::<u64>(), any::<u8>(), any::<Option<u8>>(), states).prop_map(
+            |(request, group, axis, state)| MotionReport { request: RequestId(request), group, axis, state },
+        );
         prop::collection::vec(reports, 0..=MotionReports::CAPACITY)
             .prop_map(|reports| MotionReports { reports: std::array::from_fn(|at| reports.get(at).copied()) })
     }
 
     fn axes() -> impl Strategy<Value = AxisSnapshot> {
         let states = prop::sample::select(&DriveState::ALL[..]);
-        (any::<(f64, f64, f64, u16, u16, bool, u16)>(), states).prop_map(
-            |(
-                (position_set, position, velocity, statusword, error_code, is_heard, unanswered),
+        let reported = any::<(Option<f64>, Option<i16>, Option<i8>, u16, u16, bool, u16, u16, [u64; 2])>();
+        (any::<[f64; 6]>(), reported, states).prop_map(|(numbers, reported, drive_state)| {
+            let [position_set, velocity_set, torque_set, position, velocity, following_error] = numbers;
+            let (torque, current_per_mille, mode, statusword, error_code, is_heard, unanswered, age, at) =
+                reported;
+            AxisSnapshot {
+                position_set,
+                velocity_set,
+                torque_set,
+                position,
+                velocity,
+                following_error,
+                torque,
+                current_per_mille,
+                mode,
+                statusword,
                 drive_state,
-            )| {
-                AxisSnapshot {
-                    position_set,
-                    position,
-                    velocity,
-                    statusword,
-                    drive_state,
-                    error_code,
-                    is_heard,
-                    unanswered,
-                }
-            },
-        )
+                error_code,
+                is_heard,
+                unanswered,
+                feedback_age: age,
+                feedback_slot: at[0],
+                feedback_ns: at[1],
+            }
+        })
     }
 
     fn buses() -> impl Strategy<Value = BusHealth> {
@@ -382,25 +454,30 @@ mod tests {
         )
     }
 
+    fn groups() -> impl Strategy<Value = GroupSnapshot> {
+        let phases = prop::sample::select(&Phase::ALL[..]);
+        (phases, any::<f64>(), prop::option::of(stop_reasons()))
+            .prop_map(|(phase, remaining_s, stop)| GroupSnapshot { phase, remaining_s, stop })
+    }
+
     fn snapshots() -> impl Strategy<Value = Snapshot> {
         let counted = (
             prop::collection::vec(axes(), 0..=MAX_AXES),
             prop::collection::vec(buses(), 0..=MAX_BUSES),
-            prop::option::of(stop_reasons()),
-            prop::sample::select(&Phase::ALL[..]),
+            prop::collection::vec(groups(), 1..=MAX_GROUPS),
         );
         let refusals = prop::collection::vec((any::<u64>(), rejections()), 0..=Answers::EXPLAINED);
         let answers = (any::<(u64, u64, u128, u128)>(), refusals, motions());
-        (counted, any::<(u64, u64, u64, u64, u64, f64)>(), answers).prop_map(
+        (counted, any::<(u64, u64, u64, u64, u64)>(), answers).prop_map(
             |(
-                (axes, buses, stop, phase),
-                (slot, at_ns, missed_slots, steps, dropped, remaining_s),
+                (axes, buses, groups),
+                (slot, at_ns, missed_slots, steps, dropped),
                 ((refused, newest, taken_up, refused_bits), refusals, motions),
             )| {
                 let mut snapshot = Snapshot {
                     slot,
                     at_ns,
-                    phase,
+                    phase: groups[0].phase,
                     missed_slots,
                     steps,
                     dropped,
@@ -414,12 +491,14 @@ mod tests {
                         }),
                     },
                     motions,
-                    remaining_s,
-                    stop,
+                    remaining_s: groups[0].remaining_s,
+                    stop: groups[0].stop,
+                    group_count: groups.len() as u8,
                     axis_count: axes.len() as u8,
                     bus_count: buses.len() as u8,
                     ..NO_SNAPSHOT
                 };
+                snapshot.groups[..groups.len()].copy_from_slice(&groups);
                 snapshot.axes[..axes.len()].copy_from_slice(&axes);
                 snapshot.buses[..buses.len()].copy_from_slice(&buses);
                 snapshot
@@ -430,7 +509,7 @@ mod tests {
     proptest! {
         #[test]
         fn a_snapshot_comes_out_as_it_went_in(before in snapshots(), snapshot in snapshots()) {
-            let words = snapshot_words(MAX_AXES, MAX_BUSES);
+            let words = snapshot_words(MAX_GROUPS, MAX_AXES, MAX_BUSES);
             let (mut writer, reader) = latest(words);
             // The rest of an earlier, longer value in a slot must have no effect.
             (0..4).for_each(|_| writer.write(|words| put_snapshot(&before, words)));
@@ -440,7 +519,11 @@ mod tests {
 
         #[test]
         fn a_snapshot_fits_the_words_reckoned_for_it(snapshot in snapshots()) {
-            let words = snapshot_words(snapshot.axis_count.into(), snapshot.bus_count.into());
+            let words = snapshot_words(
+                snapshot.group_count.into(),
+                snapshot.axis_count.into(),
+                snapshot.bus_count.into(),
+            );
             let (mut writer, reader) = latest(words);
             writer.write(|words| put_snapshot(&snapshot, words));
             prop_assert_eq!(reader.attempt(0, take_snapshot), Attempt::Whole(snapshot, 1));
