@@ -33,10 +33,12 @@ pub mod drive;
 mod error;
 pub mod faults;
 pub mod jitter;
+pub mod play;
 pub mod printable;
 pub mod sim;
 pub mod telemetry;
 mod text_file;
+pub mod trajectory;
 
 pub use bus::ownership::IfOwned;
 pub use config::{Config, ConfigError};

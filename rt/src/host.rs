@@ -9,7 +9,8 @@ use crate::phase::Phase;
 use crate::plan;
 use crate::port::{BusHealth, Received};
 use crate::record::{CycleRecord, Event, MAX_AXES, MAX_BUSES, MAX_GROUPS};
-use crate::request::RequestEnvelope;
+use crate::request::{RequestEnvelope, TrajectoryId};
+use crate::source::TrajectorySample;
 use crate::stop::StopReason;
 use crate::time::Nanoseconds;
 use crate::watch::TimingLevel;
@@ -27,6 +28,21 @@ pub trait HostInterface<const AXES: usize = MAX_AXES, const BUSES: usize = MAX_B
     fn stream(&mut self) -> Option<StreamCommand<AXES>> {
         None
     }
+
+    /// What a trajectory wants of a group so many seconds after its beginning. Asked for once in each cycle in which the group is
+    /// on it, and when a [`Request::Execute`](crate::Request::Execute) is handled. `None` if there is no such trajectory, or it is
+    /// one for another group.
+    fn trajectory(
+        &mut self,
+        _group: u8,
+        _trajectory: TrajectoryId,
+        _at_s: f64,
+    ) -> Option<TrajectorySample<AXES>> {
+        None
+    }
+
+    /// Called once in each cycle for each group: of the trajectories that the group has asked for, only these are still needed.
+    fn keep_trajectories(&mut self, _group: u8, _needed: [Option<TrajectoryId>; 2]) {}
 
     /// The oldest service frame (NMT, SDO …) that waits to be sent on this bus. Not asked for while the bus cannot take it.
     fn service_frame(&mut self, _bus: usize) -> Option<Frame> {

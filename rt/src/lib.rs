@@ -50,6 +50,7 @@ mod port;
 mod profile;
 mod record;
 mod request;
+mod source;
 mod stop;
 mod stop_category;
 mod time;
@@ -83,9 +84,10 @@ pub use port::{BusHealth, BusPort, BusState, Clock, Outgoing, RECEIVE_BATCH, Rec
 pub use profile::ProfileTarget;
 pub use record::{AxisRecord, CycleRecord, CycleTiming, Event, EventKind, MAX_AXES, MAX_BUSES, MAX_GROUPS};
 pub use request::{
-    AxisProcessData, MappedPdo, Move, ProfileMove, RejectReason, Request, RequestEnvelope, RequestError,
-    RequestId, RequestKind, RequestTarget,
+    AxisProcessData, ExecutionStart, MappedPdo, Move, ProfileMove, RejectReason, Request, RequestEnvelope,
+    RequestError, RequestId, RequestKind, RequestTarget, TrajectoryId,
 };
+pub use source::{PathTime, Polynomial, TimeLawPhase, TrajectorySample, TrajectoryView};
 pub use stop::{Origin, StopCategories, StopCause, StopReason};
 pub use stop_category::StopCategory;
 pub use time::{Grid, NANOSECONDS_PER_SECOND, Nanoseconds};

@@ -2,9 +2,10 @@
 //! their three sides.
 //!
 //! ```text
-//! HostSide ── requests, newest streamed command, service frames ──▶ RtSide (takt_rt::HostInterface)
-//! clients  ── requests and stops, from any number of threads ──▶ RtSide
+//! HostSide ── requests, newest streamed command, trajectories, service frames ──▶ RtSide (takt_rt::HostInterface)
+//! clients  ── requests and stops, trajectories, from any number of threads ──▶ RtSide
 //! HostSide ◀── service frames, newest snapshot, last events (any number of observers) ── RtSide
+//! clients  ◀── trajectories that are done with ── RtSide
 //! LogSide  ◀── cycle records, events ── RtSide
 //! ```
 //!
@@ -19,11 +20,14 @@ mod primitives;
 mod records;
 mod request_numbers;
 mod ring;
+mod trajectories;
 mod words;
 
+use std::sync::Arc;
+
 use takt_rt::{
-    CycleRecord, Event, Frame, HostInterface, Received, Request, RequestEnvelope, RequestId, RequestTarget,
-    Snapshot, StreamCommand,
+    CycleRecord, Event, ExecutionStart, Frame, HostInterface, Received, Request, RequestEnvelope, RequestId,
+    RequestTarget, Snapshot, StreamCommand, TrajectoryId, TrajectorySample,
 };
 
 use crate::config::Config;
@@ -31,11 +35,13 @@ use client_requests::{TakenRequests, client_requests};
 use latest::{Attempt, Reader, Writer};
 use observed_events::{EventWriter, observed_events};
 use records::{RecordConsumer, RecordProducer};
+use trajectories::TrajectoryTaker;
 
 pub use client_requests::{ClientRequests, MotionEnd, WAITING_AT_MOST};
 pub use observed_events::EventReader;
 pub use request_numbers::RequestNumbers;
 pub use ring::{Consumer, Producer, ring};
+pub use trajectories::{GivenTrajectory, TrajectoryGiver};
 
 /// The capacity of each channel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -101,6 +107,7 @@ pub fn channels(sizes: &ChannelSizes) -> (RtSide, HostSide, LogSide) {
     let (received_in, received_out) = ring(sizes.service_in);
     let (record_in, record_out) = records::record_ring(sizes.records);
     let (event_in, event_out) = ring(sizes.events);
+    let (giver, taker) = trajectories::trajectories();
     let (observed_in, observed_out) = observed_events(sizes.events);
     let numbers = RequestNumbers::default();
     let (clients, taken) = client_requests(numbers.clone(), WAITING_AT_MOST);
@@ -111,6 +118,7 @@ pub fn channels(sizes: &ChannelSizes) -> (RtSide, HostSide, LogSide) {
         is_client_next: true,
         stream: stream_out,
         stream_seen: 0,
+        trajectories: taker,
         service: service_out,
         received: received_in,
         records: record_in,
@@ -120,6 +128,7 @@ pub fn channels(sizes: &ChannelSizes) -> (RtSide, HostSide, LogSide) {
     };
     let host = HostSide {
         requests: request_in,
+        trajectories: giver,
         numbers,
         clients,
         observed: observed_out,
@@ -141,6 +150,7 @@ pub struct RtSide {
     is_client_next: bool,
     stream: Reader,
     stream_seen: u64,
+    trajectories: TrajectoryTaker,
     service: Vec<Consumer<Frame>>,
     received: Producer<(usize, Received)>,
     records: RecordProducer,
@@ -178,6 +188,14 @@ impl HostInterface for RtSide {
         None
     }
 
+    fn trajectory(&mut self, group: u8, trajectory: TrajectoryId, at_s: f64) -> Option<TrajectorySample> {
+        self.trajectories.sample(group, trajectory, at_s)
+    }
+
+    fn keep_trajectories(&mut self, group: u8, needed: [Option<TrajectoryId>; 2]) {
+        self.trajectories.keep(group, needed);
+    }
+
     fn service_frame(&mut self, bus: usize) -> Option<Frame> {
         self.service.get_mut(bus)?.pop()
     }
@@ -204,6 +222,7 @@ impl HostInterface for RtSide {
 pub struct HostSide {
     requests: Producer<RequestEnvelope>,
     numbers: RequestNumbers,
+    trajectories: TrajectoryGiver,
     clients: ClientRequests,
     observed: EventReader,
     streamer: Option<Streamer>,
@@ -229,6 +248,28 @@ impl HostSide {
     /// [`ChannelError::Full`]; the request is not sent then.
     pub fn submit(&mut self, envelope: RequestEnvelope) -> Result<(), ChannelError> {
         if self.requests.push(envelope) { Ok(()) } else { Err(ChannelError::Full) }
+    }
+
+    /// Asks for a trajectory of the group to be carried out. Returns the number of the request.
+    ///
+    /// # Errors
+    /// [`ChannelError::Full`]; nothing is sent then.
+    pub fn execute(
+        &mut self,
+        given: &Arc<GivenTrajectory>,
+        start: ExecutionStart,
+    ) -> Result<RequestId, ChannelError> {
+        let trajectory = self.trajectories.give(0, given).ok_or(ChannelError::Full)?;
+        let requested = self.request(Request::Execute { trajectory, start });
+        if requested.is_err() {
+            self.trajectories.take_back(trajectory);
+        }
+        requested
+    }
+
+    /// The end that gives trajectories, for another thread.
+    pub fn trajectories(&self) -> TrajectoryGiver {
+        self.trajectories.clone()
     }
 
     /// The source of request ids.

@@ -372,7 +372,8 @@ impl TelemetryReport {
 }
 
 impl StopReport {
-    fn new(stop: &StopReason, machine: &Machine) -> Self {
+    /// A stop, with the names of the machine.
+    pub fn new(stop: &StopReason, machine: &Machine) -> Self {
         Self {
             category: stop.category as u8,
             reason: words::stop_cause(stop, machine),

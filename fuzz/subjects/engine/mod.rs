@@ -239,7 +239,7 @@ impl Machine {
                 let drive = usize::from(input.byte()) % self.drives.len();
                 self.drives[drive].is_late = !self.drives[drive].is_late;
             }
-            _ => self.hall.services.push_back(input.frame()),
+            _ => self.serve(input.frame()),
         }
     }
 
@@ -296,6 +296,13 @@ impl Machine {
         }
         journey.taken += asked;
         journey.refused = self.hall.snapshot.rejected;
+    }
+
+    /// The host wants to send a frame: any one but process data, which are the engine's alone.
+    fn serve(&mut self, frame: Frame) {
+        if !self.drives.iter().any(|drive| drive.is_commanded_by(frame.id())) {
+            self.hall.services.push_back(frame);
+        }
     }
 
     /// SYNC, and what the drives say to it.

@@ -72,6 +72,7 @@ impl<const AXES: usize, const BUSES: usize> Group<AXES, BUSES> {
     pub(super) fn remaining_s(&self) -> f64 {
         match self.state {
             GroupState::Moving { .. } | GroupState::Stopping => self.motion.remaining_s(),
+            GroupState::Executing(execution) => execution.wanted.map_or(0.0, |wanted| wanted.remaining_s),
             _ => 0.0,
         }
     }

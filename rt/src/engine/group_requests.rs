@@ -52,19 +52,20 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
             Request::Stop(category) => self.begin_stop(StopCause::Requested, Origin::Group, *category),
             Request::Disable => self.begin_disabling(),
             Request::ResetFaults => self.reset_faults(),
-            // The engine has handled what concerns all groups.
+            // The engine has handled what concerns all groups, or the host.
             Request::Sync(_)
             | Request::TimeOfDay { .. }
             | Request::RatedTorque { .. }
             | Request::ProcessData(_)
             | Request::Position { .. }
+            | Request::Execute { .. }
             | Request::InhibitEnable
             | Request::Shutdown => {}
         }
         Ok(())
     }
 
-    fn require_phase(&self, possible: &[Phase]) -> Handled {
+    pub(super) fn require_phase(&self, possible: &[Phase]) -> Handled {
         require_phase(self.group.state.phase(), possible)
     }
 
@@ -74,7 +75,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
     }
 
     /// A fault that has stopped the group must be reset before anything moves.
-    fn require_no_fault(&self) -> Handled {
+    pub(super) fn require_no_fault(&self) -> Handled {
         match self.group.stop.filter(|stop| !stop.is_requested()) {
             Some(stop) => {
                 Err(Rejection { axis: stop.axis(), ..RejectReason::StopLatched { rule: stop.rule() }.into() })
@@ -182,6 +183,9 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
     }
 
     fn set_profile_target(&mut self, id: RequestId, wanted: &ProfileMove) -> Handled {
+        if matches!(self.group.state, GroupState::Executing(_)) {
+            return Err(RejectReason::Phase.into());
+        }
         check_profile_target(self.axis_mut(wanted.axis)?, wanted.target)
             .map_err(|reason| reason.of_axis(wanted.axis))?;
         // The other axes stay where they are, not where the last trajectory ended.

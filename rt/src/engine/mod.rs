@@ -11,13 +11,15 @@
 //! - `requests` handles what was asked for, `group_requests` what was asked of a group; `targets` checks the targets;
 //!   `process_data` exchanges mappings;
 //! - `faults` looks for the first thing that is wrong, and begins stops;
-//! - `step` makes the next set-points of the phase that the group is in (`state` has the table of phases);
+//! - `step` makes the next set-points of the phase that the group is in (`state` has the table of phases); `executing` those of
+//!   trajectories;
 //! - `encode` makes frames of them, and decides what may leave; `sdo_fallback` stops drives that PDOs do not reach.
 //!
 //! Events wait in an outbox until [`Engine::finish`] hands them to the host.
 
 mod backlog;
 mod encode;
+mod executing;
 mod faults;
 mod group;
 mod group_requests;
@@ -266,6 +268,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         self.check_faults(input.buses);
         self.couple_stops();
         self.probe_late_drives();
+        self.sample_trajectories(host);
         self.for_each_group(|group| {
             group.step();
             group.update_sdo_fallback();

@@ -10,7 +10,10 @@ use crate::axis::Axis;
 use crate::host::HostInterface;
 use crate::phase::Phase;
 use crate::record::EventKind;
-use crate::request::{RejectReason, Request, RequestEnvelope, RequestError, RequestId, RequestTarget};
+use crate::request::{
+    ExecutionStart, RejectReason, Request, RequestEnvelope, RequestError, RequestId, RequestTarget,
+    TrajectoryId,
+};
 
 /// Requests that are handled in one cycle; the rest waits, so that a flood of them costs a bounded time.
 const REQUESTS_PER_CYCLE: usize = 4;
@@ -22,7 +25,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
     pub(super) fn handle_requests(&mut self, host: &mut impl HostInterface<AXES, BUSES>) {
         for _ in 0..REQUESTS_PER_CYCLE {
             let Some(envelope) = host.request() else { break };
-            self.handle_request(&envelope);
+            self.handle_request(&envelope, host);
         }
         let now_ns = self.shared.now_ns;
         for group in &mut self.groups {
@@ -34,9 +37,13 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         }
     }
 
-    fn handle_request(&mut self, envelope: &RequestEnvelope<AXES>) {
+    fn handle_request(
+        &mut self,
+        envelope: &RequestEnvelope<AXES>,
+        host: &mut impl HostInterface<AXES, BUSES>,
+    ) {
         let RequestEnvelope { id, target, request } = envelope;
-        let rejection = self.try_request(*id, *target, request).err();
+        let rejection = self.try_request(*id, *target, request, host).err();
         let of_group = rejection.and_then(|Rejection { axis, group, .. }| {
             group.or_else(|| axis.and_then(|axis| self.group_of(axis).ok()))
         });
@@ -53,7 +60,13 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         }
     }
 
-    fn try_request(&mut self, id: RequestId, target: RequestTarget, request: &Request<AXES>) -> Handled {
+    fn try_request(
+        &mut self,
+        id: RequestId,
+        target: RequestTarget,
+        request: &Request<AXES>,
+        host: &mut impl HostInterface<AXES, BUSES>,
+    ) -> Handled {
         match request {
             Request::Sync(is_on) => {
                 if *is_on && !self.shared.requested.sync {
@@ -75,6 +88,9 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
             | Request::Stop(_)
             | Request::Disable
             | Request::ResetFaults => self.ask_groups(id, target, request)?,
+            Request::Execute { trajectory, start } => {
+                self.execute(id, target, request, (*trajectory, *start), host)?
+            }
             Request::InhibitEnable => {
                 self.shared.requested.ending = self.shared.requested.ending.max(Ending::EnableInhibited)
             }
@@ -113,6 +129,25 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         }
     }
 
+    /// Begins a trajectory of the host. It is asked for in any case, so that the host gets it back in any case.
+    fn execute(
+        &mut self,
+        id: RequestId,
+        target: RequestTarget,
+        request: &Request<AXES>,
+        execution: (TrajectoryId, ExecutionStart),
+        host: &mut impl HostInterface<AXES, BUSES>,
+    ) -> Handled {
+        let asked = self.asked_groups(target, request);
+        if asked.is_err() {
+            let _ = host.trajectory(0, execution.0, 0.0);
+        }
+        let number = asked?.start;
+        let Some(mut group) = self.group(number) else { return Ok(()) };
+        let begun = group.begin_execution(id, execution, host);
+        begun.map_err(|rejection| Rejection { group: Some(number), ..rejection })
+    }
+
     /// The numbers of the groups that a request is for.
     fn asked_groups(&self, target: RequestTarget, request: &Request<AXES>) -> Result<Range<u8>, Rejection> {
         let groups = self.groups.len() as u8;
@@ -132,7 +167,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
                 Err(RejectReason::OtherGroup { asked, of_axis }.into())
             }
             (Some(asked), ..) => Ok(asked..asked + 1),
-            (None, _, Request::Move(_) | Request::Stream) if groups > 1 => {
+            (None, _, Request::Move(_) | Request::Stream | Request::Execute { .. }) if groups > 1 => {
                 Err(RejectReason::GroupNotNamed { groups }.into())
             }
             (None, ..) => Ok(0..groups),

@@ -2,12 +2,12 @@
 
 use arrayvec::ArrayVec;
 
+use super::Deadline;
 use super::backlog::Backlog;
 use super::heartbeat::HeartbeatProducer;
 use super::outbox::Outbox;
 use super::parameters::{BusParameters, EngineParameters};
 use super::slots::SlotWatch;
-use super::{Deadline, has_cycle};
 use crate::axis::Axis;
 use crate::bus_set::BusSet;
 use crate::frame::Id;
@@ -117,10 +117,5 @@ impl<const AXES: usize, const BUSES: usize> Shared<AXES, BUSES> {
     /// Slots in one cycle of the bus of an axis.
     pub(super) fn divider_of(&self, axis: &Axis) -> u32 {
         self.buses.get(usize::from(axis.parameters().bus)).map_or(1, |bus| bus.divider)
-    }
-
-    /// Whether the bus of an axis has SYNC, feedback and set-points in this slot.
-    pub(super) fn has_cycle_of(&self, axis: &Axis, slot: u64) -> bool {
-        self.buses.get(usize::from(axis.parameters().bus)).is_some_and(|bus| has_cycle(bus, slot))
     }
 }

@@ -7,7 +7,7 @@
 //! Disabled   Request::Enable                                                         Enabling
 //! Enabling   every drive shows operation enabled                                     Holding
 //!            a stop, Request::Disable                                                Disabling
-//! Holding    Request::Move, Request::SetProfileTarget                                Moving
+//! Holding    Request::Move, Request::SetProfileTarget, Request::Execute              Moving
 //!            Request::Stream                                                         Streaming
 //!            Request::Disable, a stop of category 1 or 0                             Stopping, Disabling
 //! Moving     the targets are reached                                                 Holding
@@ -20,6 +20,7 @@
 //!
 //! A number in brackets is a stop category of IEC 60204-1.
 
+use super::executing::Execution;
 use crate::cia402::Goal;
 use crate::host::StreamCommand;
 use crate::phase::Phase;
@@ -35,6 +36,8 @@ pub(super) enum GroupState<const AXES: usize> {
         /// Whether the end of the motion has been reported; a velocity or a torque goes on after that.
         is_reported: bool,
     },
+    /// On a trajectory of the host.
+    Executing(Execution<AXES>),
     Streaming(Stream<AXES>),
     Stopping,
     Disabling(PowerRemoval),
@@ -70,7 +73,7 @@ impl<const AXES: usize> GroupState<AXES> {
             Self::Disabled => Phase::Disabled,
             Self::Enabling => Phase::Enabling,
             Self::Holding => Phase::Holding,
-            Self::Moving { .. } => Phase::Moving,
+            Self::Moving { .. } | Self::Executing(_) => Phase::Moving,
             Self::Streaming(_) => Phase::Streaming,
             Self::Stopping => Phase::Stopping,
             Self::Disabling(_) => Phase::Disabling,
@@ -82,9 +85,12 @@ impl<const AXES: usize> GroupState<AXES> {
         match self {
             Self::Passive | Self::Disabled | Self::Disabling(PowerRemoval::Shutdown) => Goal::Disabled,
             Self::Disabling(PowerRemoval::DisableVoltage) => Goal::NoVoltage,
-            Self::Enabling | Self::Holding | Self::Moving { .. } | Self::Streaming(_) | Self::Stopping => {
-                Goal::Enabled
-            }
+            Self::Enabling
+            | Self::Holding
+            | Self::Moving { .. }
+            | Self::Executing(_)
+            | Self::Streaming(_)
+            | Self::Stopping => Goal::Enabled,
         }
     }
 

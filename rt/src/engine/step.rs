@@ -26,7 +26,7 @@ const CATCHING_UP_S: f64 = 0.5;
 const ATTEMPTS: usize = 3;
 
 /// The first thing that keeps a step from being made.
-type Failure = (Origin, Fault);
+pub(super) type Failure = (Origin, Fault);
 
 impl<const AXES: usize> Stream<AXES> {
     /// Takes the newest command. One that has expired before the stream begins is none.
@@ -114,6 +114,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
             GroupState::Disabled | GroupState::Holding => self.hold(),
             GroupState::Enabling => self.step_enabling(),
             GroupState::Moving { is_reported } => self.step_move(is_reported)?,
+            GroupState::Executing(execution) => self.step_execution(&execution)?,
             GroupState::Streaming(stream) => self.step_stream(stream)?,
             GroupState::Stopping => self.step_stop()?,
             GroupState::Disabling(_) => {
@@ -214,7 +215,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
         self.group.motion.states(&self.profiles).collect()
     }
 
-    fn check(&self, next: &[State]) -> Result<(), Failure> {
+    pub(super) fn check(&self, next: &[State]) -> Result<(), Failure> {
         self.first_fault(next, |axis, state| axis.check(state, self.shared.period_s))
     }
 
@@ -232,7 +233,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
         Ok(())
     }
 
-    fn take_set_points(&mut self, next: &[State]) {
+    pub(super) fn take_set_points(&mut self, next: &[State]) {
         for (axis, state) in self.axes.iter_mut().zip(next) {
             if axis.is_enabled() { axis.advance(*state) } else { axis.stay() }
         }
