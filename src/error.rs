@@ -5,7 +5,7 @@ use std::fmt;
 use crate::config::{ConfigError, OverrideError};
 use crate::controller::assemble::AssembleError;
 use crate::controller::session::SessionError;
-use crate::controller::{CommandError, MotionError, StartFailure, WaitError};
+use crate::controller::{CommandError, MotionError, StartFailure, StreamError, WaitError};
 use crate::faults::ScenarioError;
 
 /// The result of a program, or of a function of it.
@@ -50,6 +50,9 @@ pub enum Error {
     /// A motion did not reach its targets.
     #[error(transparent)]
     Motion(#[from] MotionError),
+    /// Points were not taken.
+    #[error(transparent)]
+    Stream(#[from] StreamError),
     /// A wait did not end with what it was for.
     #[error(transparent)]
     Wait(#[from] WaitError),
@@ -66,6 +69,7 @@ impl fmt::Debug for Error {
             Self::Assemble(error) => error,
             Self::Command(error) => error,
             Self::Motion(error) => error,
+            Self::Stream(error) => error,
             Self::Wait(error) => error,
         };
         inner.fmt(formatter)

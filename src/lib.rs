@@ -45,7 +45,7 @@ pub use config::{Config, ConfigError};
 pub use controller::session::{Session, SessionError, SessionOptions};
 pub use controller::{
     CommandError, Controller, Events, Handle, MotionError, MotionId, MoveOptions, Outcome, Refused,
-    StartFailure, Stopped, VirtualRun, WaitError,
+    StartFailure, Stopped, StreamError, StreamHandle, VirtualRun, WaitError,
 };
 pub use error::{Error, Result};
 pub use faults::{FaultInjector, Scenario};
@@ -54,6 +54,7 @@ pub use telemetry::{Notice, RecordingDestination};
 /// What runs inside the real-time thread: its types as they come out of a [`Handle`], and the planner.
 pub use takt_rt as rt;
 pub use takt_rt::{
-    AxisSnapshot, BusHealth, DriveState, Event, EventKind, Origin, Phase, RejectReason, RequestError,
-    RequestId, Rule, Snapshot, StopCategory, StopCause, StopReason, TimingLevel, linux::ThreadReport, plan,
+    AxisPoint, AxisSnapshot, BusHealth, DriveState, Event, EventKind, Origin, Phase, RejectReason,
+    RequestError, RequestId, Rule, Snapshot, StopCategory, StopCause, StopReason, StreamCounts, StreamReport,
+    StreamState, TimingLevel, linux::ThreadReport, plan,
 };

@@ -6,11 +6,10 @@ use crate::cia402;
 use crate::frame::Frame;
 use crate::motion_reports::MotionReports;
 use crate::phase::Phase;
-use crate::plan;
 use crate::port::{BusHealth, Received};
 use crate::record::{CycleRecord, Event, MAX_AXES, MAX_BUSES, MAX_GROUPS};
 use crate::request::{RequestEnvelope, TrajectoryId};
-use crate::source::TrajectorySample;
+use crate::source::{StreamReport, StreamSample, TrajectorySample};
 use crate::stop::StopReason;
 use crate::time::Nanoseconds;
 use crate::watch::TimingLevel;
@@ -23,10 +22,13 @@ pub trait HostInterface<const AXES: usize = MAX_AXES, const BUSES: usize = MAX_B
         None
     }
 
-    /// The newest streamed command, if one has come since the last call. Asked for in each cycle in which the group streams,
-    /// and in no other.
-    fn stream(&mut self) -> Option<StreamCommand<AXES>> {
-        None
+    /// A stream of a group was asked for, and begins: what was streamed before is over.
+    fn begin_stream(&mut self, _group: u8) {}
+
+    /// What the stream of a group wants in the slot that begins at this time. Asked for once in each slot in which the group
+    /// streams, and in no other. [`crate::LookAhead`] makes it of points.
+    fn stream(&mut self, _group: u8, _slot_start_ns: Nanoseconds) -> StreamSample<AXES> {
+        StreamSample::default()
     }
 
     /// What a trajectory wants of a group so many seconds after its beginning. Asked for once in each cycle in which the group is
@@ -68,16 +70,6 @@ pub trait HostInterface<const AXES: usize = MAX_AXES, const BUSES: usize = MAX_B
     fn publish(&mut self, _snapshot: &Snapshot<AXES, BUSES>) {}
 }
 
-/// One streamed set-point for every axis, with the time at which it loses its meaning.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StreamCommand<const AXES: usize = MAX_AXES> {
-    /// When this command expires; after that the group decelerates and holds.
-    pub valid_until_ns: Nanoseconds,
-    /// Position, velocity and acceleration, an axis each. The position counts; the others are fed forward as far as they
-    /// agree with its steps and the limits.
-    pub set_points: [plan::State; AXES],
-}
-
 /// The state of the controller after a cycle, for any number of observers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Snapshot<const AXES: usize = MAX_AXES, const BUSES: usize = MAX_BUSES> {
@@ -93,8 +85,8 @@ pub struct Snapshot<const AXES: usize = MAX_AXES, const BUSES: usize = MAX_BUSES
     pub steps: u64,
     /// How late the controller has been of late.
     pub timing: TimingLevel,
-    /// Set-points of streams that were replaced by the nearest ones within the limits, since the start.
-    pub clamped: u64,
+    /// The stream, or the last one.
+    pub stream: StreamReport,
     /// Events and records that found no room, since the start.
     pub dropped: u64,
     /// Requests that were rejected, since the start.
@@ -142,7 +134,7 @@ impl<const AXES: usize, const BUSES: usize> Default for Snapshot<AXES, BUSES> {
             missed_slots: 0,
             steps: 0,
             timing: TimingLevel::Normal,
-            clamped: 0,
+            stream: StreamReport::default(),
             dropped: 0,
             rejected: 0,
             answers: Answers::default(),
@@ -210,7 +202,7 @@ pub struct AxisSnapshot {
     /// SYNCs, or set-points where it answers these, that the drive has left without an answer, or has not answered yet. One that stays so may have been lost, or
     /// every answer since then comes so many cycles late: that is looked into whenever the group is enabled.
     pub unanswered: u16,
-    /// Cycles of its bus in which the drive was asked for feedback, and gave none, since its last feedback.
+    /// Cycles of its bus since its last feedback, with those in which it was not asked for any.
     pub feedback_age: u16,
     /// The slot of the last feedback; everything that the drive reports is from then, or older. 0 before the first one.
     pub feedback_slot: u64,

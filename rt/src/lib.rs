@@ -72,8 +72,8 @@ pub use engine::{
 };
 pub use fault::{Fault, Rule};
 pub use frame::{Frame, FrameError, FrameKind, Id};
-pub use guard::{AxisLimits, LimitError, OnViolation, braking_distance};
-pub use host::{AxisSnapshot, GroupSnapshot, HostInterface, Snapshot, StreamCommand};
+pub use guard::{AxisLimits, LimitError, braking_distance};
+pub use host::{AxisSnapshot, GroupSnapshot, HostInterface, Snapshot};
 pub use motion_reports::{MotionReport, MotionReports, MotionState};
 pub use pdo::{
     CommandSlot, FeedbackSlot, MAX_OBJECTS, MAX_PDOS, MappedObject, Mapping, MappingError, ProcessImage,
@@ -87,7 +87,11 @@ pub use request::{
     AxisProcessData, ExecutionStart, MappedPdo, Move, ProfileMove, RejectReason, Request, RequestEnvelope,
     RequestError, RequestId, RequestKind, RequestTarget, TrajectoryId,
 };
-pub use source::{PathTime, Polynomial, TimeLawPhase, TrajectorySample, TrajectoryView};
+pub use source::{
+    AxisPoint, AxisTarget, Follow, LookAhead, LookAheadParameters, POINTS_AT_MOST, PathTime, PointError,
+    PointRole, Polynomial, StreamCounts, StreamDelay, StreamPoint, StreamReport, StreamSample, StreamState,
+    StreamWish, TimeLawPhase, TrajectorySample, TrajectoryView, follow,
+};
 pub use stop::{Origin, StopCategories, StopCause, StopReason};
 pub use stop_category::StopCategory;
 pub use time::{Grid, NANOSECONDS_PER_SECOND, Nanoseconds};

@@ -7,6 +7,7 @@
 pub(crate) mod bounds;
 pub(crate) mod defaults;
 mod error;
+mod in_code;
 mod interface;
 mod model;
 mod problem_kind;

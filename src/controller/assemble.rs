@@ -4,9 +4,9 @@ use std::fmt;
 
 use arrayvec::ArrayVec;
 use takt_rt::{
-    AxisParameters, BusParameters, CommandPdo, Engine, EngineParameters, FeedbackSince, GroupParameters,
-    Heartbeat, Id, MAX_AXES, MAX_GROUPS, Mapping, MappingError, Pdo, Scale, ScaleError, ScaleParameters,
-    SetUpError, SlotPlan, TimingLadder,
+    AxisLimits, AxisParameters, BusParameters, CommandPdo, Engine, EngineParameters, FeedbackSince, Follow,
+    GroupParameters, Heartbeat, Id, LookAheadParameters, MAX_AXES, MAX_GROUPS, Mapping, MappingError, Pdo,
+    Scale, ScaleError, ScaleParameters, SetUpError, SlotPlan, TimingLadder,
 };
 
 use crate::config::{Axis, Config, ConfigError, DriveFamily, Interface};
@@ -157,7 +157,7 @@ fn axis_parameters(
         scale: scale(axis).map_err(|error| AssembleError::Scale { axis: index, error })?,
         limits: axis.limits,
         start_tolerance: axis.start_tolerance,
-        on_violation: axis.on_violation,
+        follow: axis.follow,
         // A heartbeat that is a little late is not lost.
         heartbeat_timeout_cycles: axis.heartbeat_ns.map(|period_ns| cycles(3 * period_ns)),
         following_error_limit: axis.following_error.limit,
@@ -193,4 +193,17 @@ pub fn scale(axis: &Axis) -> Result<Scale, ScaleError> {
         zero_counts: axis.zero_counts.into(),
         rated_torque: axis.simulated.rated_torque,
     })
+}
+
+/// How the streams of a configuration are looked ahead. What is to be followed exactly is not limited before it is checked.
+pub fn look_ahead(config: &Config) -> LookAheadParameters {
+    let limits = config.axes.iter().map(|axis| match axis.follow {
+        Follow::Smooth => axis.limits,
+        Follow::Exact => AxisLimits::NONE,
+    });
+    LookAheadParameters {
+        limits: limits.take(MAX_AXES).collect(),
+        period_ns: config.cycle.period_ns,
+        delay: config.stream_delay,
+    }
 }

@@ -2,8 +2,8 @@
 //! their three sides.
 //!
 //! ```text
-//! HostSide ── requests, newest streamed command, trajectories, service frames ──▶ RtSide (takt_rt::HostInterface)
-//! clients  ── requests and stops, trajectories, from any number of threads ──▶ RtSide
+//! HostSide ── requests, trajectories, service frames ──▶ RtSide (takt_rt::HostInterface)
+//! clients  ── requests, stops, trajectories, points of a stream, from any number of threads ──▶ RtSide
 //! HostSide ◀── service frames, newest snapshot, last events (any number of observers) ── RtSide
 //! clients  ◀── trajectories that are done with ── RtSide
 //! LogSide  ◀── cycle records, events ── RtSide
@@ -20,34 +20,41 @@ mod primitives;
 mod records;
 mod request_numbers;
 mod ring;
+mod stream;
 mod trajectories;
 mod words;
 
 use std::sync::Arc;
 
 use takt_rt::{
-    CycleRecord, Event, ExecutionStart, Frame, HostInterface, Received, Request, RequestEnvelope, RequestId,
-    RequestTarget, Snapshot, StreamCommand, TrajectoryId, TrajectorySample,
+    CycleRecord, Event, ExecutionStart, Frame, HostInterface, LookAheadParameters, Nanoseconds, Received,
+    Request, RequestEnvelope, RequestId, RequestTarget, Snapshot, StreamSample, TrajectoryId,
+    TrajectorySample,
 };
 
+use super::assemble;
 use crate::config::Config;
 use client_requests::{TakenRequests, client_requests};
 use latest::{Attempt, Reader, Writer};
 use observed_events::{EventWriter, observed_events};
 use records::{RecordConsumer, RecordProducer};
+use stream::{StreamReceiver, stream_channel};
 use trajectories::TrajectoryTaker;
 
 pub use client_requests::{ClientRequests, MotionEnd, WAITING_AT_MOST};
 pub use observed_events::EventReader;
 pub use request_numbers::RequestNumbers;
 pub use ring::{Consumer, Producer, ring};
+pub use stream::Streamer;
 pub use trajectories::{GivenTrajectory, TrajectoryGiver};
 
 /// The capacity of each channel.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug)]
 pub struct ChannelSizes {
     /// Groups of the controller, up to [`takt_rt::MAX_GROUPS`].
     pub groups: usize,
+    /// How streams are looked ahead.
+    pub stream: LookAheadParameters,
     /// Axes of the controller, up to [`takt_rt::MAX_AXES`].
     pub axes: usize,
     /// Buses of the controller, up to [`takt_rt::MAX_BUSES`].
@@ -70,6 +77,7 @@ impl ChannelSizes {
     pub fn of(config: &Config) -> Self {
         Self {
             groups: config.groups.len().max(1),
+            stream: assemble::look_ahead(config),
             axes: config.axes.len(),
             buses: config.buses.len(),
             records: config.telemetry.ring_records,
@@ -100,7 +108,7 @@ pub enum ChannelError {
 /// Makes the channels, and allocates and touches all their memory.
 pub fn channels(sizes: &ChannelSizes) -> (RtSide, HostSide, LogSide) {
     let (request_in, request_out) = ring(sizes.requests);
-    let (stream_in, stream_out) = latest::latest(words::stream_words(sizes.axes));
+    let (streamer, stream) = stream_channel(sizes.stream.clone());
     let (snapshot_in, snapshot_out) =
         latest::latest(words::snapshot_words(sizes.groups, sizes.axes, sizes.buses));
     let (service_in, service_out) = (0..sizes.buses).map(|_| ring(sizes.service_out)).unzip();
@@ -112,12 +120,10 @@ pub fn channels(sizes: &ChannelSizes) -> (RtSide, HostSide, LogSide) {
     let numbers = RequestNumbers::default();
     let (clients, taken) = client_requests(numbers.clone(), WAITING_AT_MOST);
     let rt = RtSide {
-        axes: sizes.axes,
         requests: request_out,
         clients: taken,
         is_client_next: true,
-        stream: stream_out,
-        stream_seen: 0,
+        stream,
         trajectories: taker,
         service: service_out,
         received: received_in,
@@ -132,7 +138,7 @@ pub fn channels(sizes: &ChannelSizes) -> (RtSide, HostSide, LogSide) {
         numbers,
         clients,
         observed: observed_out,
-        streamer: Some(Streamer { axes: sizes.axes, stream: stream_in }),
+        streamer,
         service: service_in,
         received: received_out,
         observer: Observer { snapshot: snapshot_out },
@@ -142,14 +148,12 @@ pub fn channels(sizes: &ChannelSizes) -> (RtSide, HostSide, LogSide) {
 
 /// The real-time thread's side.
 pub struct RtSide {
-    axes: usize,
     requests: Consumer<RequestEnvelope>,
     clients: TakenRequests,
     /// Whether a client's request comes before the next one of the host. They alternate, so that no flood of the one holds up
     /// the other.
     is_client_next: bool,
-    stream: Reader,
-    stream_seen: u64,
+    stream: StreamReceiver,
     trajectories: TrajectoryTaker,
     service: Vec<Consumer<Frame>>,
     received: Producer<(usize, Received)>,
@@ -158,10 +162,6 @@ pub struct RtSide {
     observed: EventWriter,
     snapshot: Writer,
 }
-
-/// Attempts to read the streamed command in one cycle. One is enough, unless the host writes several commands within the
-/// fraction of a microsecond that a read takes.
-const STREAM_ATTEMPTS: usize = 3;
 
 impl HostInterface for RtSide {
     fn request(&mut self) -> Option<RequestEnvelope> {
@@ -173,19 +173,12 @@ impl HostInterface for RtSide {
         }
     }
 
-    fn stream(&mut self) -> Option<StreamCommand> {
-        for _ in 0..STREAM_ATTEMPTS {
-            let decode = |words: &mut latest::Words<'_>| words::take_stream(self.axes, words);
-            match self.stream.attempt(self.stream_seen, decode) {
-                Attempt::Whole(command, number) => {
-                    self.stream_seen = number;
-                    return Some(command);
-                }
-                Attempt::Nothing => return None,
-                Attempt::Torn => {}
-            }
-        }
-        None
+    fn begin_stream(&mut self, _group: u8) {
+        self.stream.begin();
+    }
+
+    fn stream(&mut self, _group: u8, slot_start_ns: Nanoseconds) -> StreamSample {
+        self.stream.sample(slot_start_ns)
     }
 
     fn trajectory(&mut self, group: u8, trajectory: TrajectoryId, at_s: f64) -> Option<TrajectorySample> {
@@ -225,7 +218,7 @@ pub struct HostSide {
     trajectories: TrajectoryGiver,
     clients: ClientRequests,
     observed: EventReader,
-    streamer: Option<Streamer>,
+    streamer: Streamer,
     service: Vec<Producer<Frame>>,
     received: Consumer<(usize, Received)>,
     observer: Observer,
@@ -287,17 +280,9 @@ impl HostSide {
         self.observed.from_now_on()
     }
 
-    /// Replaces the streamed command. The real-time thread takes the newest one at its next cycle. Set-points beyond the axes
-    /// of the controller are ignored.
-    pub fn stream(&mut self, command: &StreamCommand) {
-        if let Some(streamer) = &mut self.streamer {
-            streamer.stream(command);
-        }
-    }
-
-    /// The streaming end, for another thread. Afterwards [`HostSide::stream`] does nothing.
-    pub fn take_streamer(&mut self) -> Option<Streamer> {
-        self.streamer.take()
+    /// The writing end of the points of a stream, for any thread.
+    pub fn streamer(&self) -> Streamer {
+        self.streamer.clone()
     }
 
     /// Queues a service frame. It is sent after the set-points of a later cycle.
@@ -323,19 +308,6 @@ impl HostSide {
     /// A handle to the state for another thread.
     pub fn observer(&self) -> Observer {
         self.observer.clone()
-    }
-}
-
-/// The writing end of the streamed commands. The real-time thread takes the newest one.
-pub struct Streamer {
-    axes: usize,
-    stream: Writer,
-}
-
-impl Streamer {
-    /// Replaces the streamed command. Set-points beyond the axes of the controller are ignored.
-    pub fn stream(&mut self, command: &StreamCommand) {
-        self.stream.write(|words| words::put_stream(command, self.axes, words));
     }
 }
 
@@ -396,31 +368,29 @@ impl LogSide {
 mod tests {
     use super::*;
     use takt_rt::Id;
-    use takt_rt::plan;
-    use takt_rt::{EventKind, MAX_AXES, Phase, StopCategory};
-
-    const SIZES: ChannelSizes = ChannelSizes {
-        groups: 1,
-        axes: 2,
-        buses: 2,
-        records: 4,
-        events: 2,
-        requests: 2,
-        service_out: 2,
-        service_in: 2,
-    };
+    use takt_rt::{EventKind, Phase, StopCategory};
 
     fn envelope(id: RequestId, request: Request) -> RequestEnvelope {
         RequestEnvelope { id, target: RequestTarget::All, request }
     }
 
-    fn command(valid_until_ns: u64) -> StreamCommand {
-        StreamCommand { valid_until_ns, set_points: [plan::State::default(); MAX_AXES] }
+    fn sizes() -> ChannelSizes {
+        ChannelSizes {
+            stream: LookAheadParameters::default(),
+            groups: 1,
+            axes: 2,
+            buses: 2,
+            records: 4,
+            events: 2,
+            requests: 2,
+            service_out: 2,
+            service_in: 2,
+        }
     }
 
     #[test]
     fn requests_arrive_in_order_and_one_too_many_is_an_error() {
-        let (mut rt, mut host, _log) = channels(&SIZES);
+        let (mut rt, mut host, _log) = channels(&sizes());
         let first = host.request(Request::Enable).unwrap();
         let second = host.request(Request::Stop(StopCategory::Two)).unwrap();
         assert!(first < second);
@@ -433,7 +403,7 @@ mod tests {
 
     #[test]
     fn neither_the_host_nor_a_client_holds_up_the_other() {
-        let (mut rt, mut host, _log) = channels(&SIZES);
+        let (mut rt, mut host, _log) = channels(&sizes());
         let client = host.clients();
         let own: Vec<_> = (0..2).map(|_| host.request(Request::Enable).unwrap()).collect();
         let theirs: Vec<_> = (0..4).map(|_| client.submit(Request::ResetFaults).unwrap()).collect();
@@ -442,17 +412,8 @@ mod tests {
     }
 
     #[test]
-    fn only_the_newest_streamed_command_is_seen_and_only_once() {
-        let (mut rt, mut host, _log) = channels(&SIZES);
-        assert_eq!(rt.stream(), None);
-        (1..=9).for_each(|valid_until_ns| host.stream(&command(valid_until_ns)));
-        assert_eq!(rt.stream(), Some(command(9)));
-        assert_eq!(rt.stream(), None);
-    }
-
-    #[test]
     fn service_frames_keep_to_their_bus_in_both_directions() {
-        let (mut rt, mut host, _log) = channels(&SIZES);
+        let (mut rt, mut host, _log) = channels(&sizes());
         let frame = Frame::of(Id::canopen(0x600, 5), [0x40, 0x00, 0x10, 0x00]);
         host.send_service(1, frame).unwrap();
         assert_eq!(host.send_service(2, frame), Err(ChannelError::NoSuchBus { bus: 2, buses: 2 }));
@@ -468,7 +429,7 @@ mod tests {
 
     #[test]
     fn every_observer_sees_the_newest_snapshot() {
-        let (mut rt, host, _log) = channels(&SIZES);
+        let (mut rt, host, _log) = channels(&sizes());
         let observer = host.observer();
         assert_eq!(observer.snapshot(), words::NO_SNAPSHOT);
         let mut snapshot = Snapshot { slot: 9, phase: Phase::Holding, axis_count: 2, ..words::NO_SNAPSHOT };
@@ -479,7 +440,7 @@ mod tests {
 
     #[test]
     fn the_log_side_gets_records_and_events_and_the_numbers_of_dropped_ones() {
-        let (mut rt, host, mut log) = channels(&SIZES);
+        let (mut rt, host, mut log) = channels(&sizes());
         let record = CycleRecord { axis_count: 2, ..CycleRecord::default() };
         assert_eq!((0..6).filter(|_| rt.record(&record)).count(), 4);
         let mut observer = host.events();

@@ -116,7 +116,7 @@ pub fn run(
 pub(super) struct RemoteHandles {
     /// Reads the state.
     pub observer: Observer,
-    /// Sends streamed set-points.
+    /// Sends the points of a stream.
     pub streamer: Streamer,
     /// Sends requests.
     pub clients: ClientRequests,
@@ -131,7 +131,7 @@ impl RemoteHandles {
     fn of(host: &mut HostSide, begun: &Begun) -> Option<Self> {
         Some(Self {
             observer: host.observer(),
-            streamer: host.take_streamer()?,
+            streamer: host.streamer(),
             clients: host.clients(),
             events: host.events(),
             realtime: begun.report,
@@ -262,7 +262,10 @@ fn lead_as_owner(
             (Outcome::Interrupted, None, Some(process)) => Outcome::TakenOver { process },
             (outcome, ..) => outcome,
         };
-    let is_done = matches!(outcome, Outcome::Finished | Outcome::OffTarget { .. });
+    let is_done = matches!(
+        outcome,
+        Outcome::Finished | Outcome::OffTarget { .. } | Outcome::PositionNotReported { .. }
+    );
     let has_arrived = is_done && options.duration_ns.is_none();
     Ok(Session {
         snapshot: host.snapshot(),

@@ -142,7 +142,12 @@ impl Axis {
         self.joint.is_heard()
     }
 
-    /// Cycles of the bus since the drive last reported in time.
+    /// Cycles of the bus since the drive last reported in time, with those in which it was not asked.
+    pub fn cycles_since_report(&self) -> u16 {
+        self.reception.cycles_since_report()
+    }
+
+    /// Cycles of the bus in which the drive was asked and did not report in time, since its last report.
     pub fn feedback_age(&self) -> u16 {
         self.reception.age_cycles()
     }

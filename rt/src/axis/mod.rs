@@ -54,7 +54,6 @@ use profile_mode::ProfileMode;
 use reception::Reception;
 use sdo_fallback::SdoFallback;
 use set_points::SetPoints;
-use stream::StreamFollower;
 
 pub use feedback::Jump;
 pub use parameters::{AxisParameters, AxisParametersError, CommandPdo, FeedbackSince, Pdo};
@@ -70,7 +69,8 @@ pub struct Axis {
     command: ProcessImage,
     feedback: ProcessImage,
     set_points: SetPoints,
-    stream: StreamFollower,
+    /// Where the axis rests while a stream has run dry.
+    stream_rest: f64,
     profile: ProfileMode,
     joint: JointEstimate,
     following: FollowingErrorGuard,
@@ -100,7 +100,7 @@ impl Axis {
             command,
             feedback: ProcessImage::default(),
             set_points: SetPoints::default(),
-            stream: StreamFollower::default(),
+            stream_rest: 0.0,
             profile: ProfileMode::default(),
             joint: JointEstimate::default(),
             following,
@@ -235,7 +235,7 @@ impl Axis {
             error_code: self.error_code(),
             is_heard: self.is_heard(),
             unanswered: self.unanswered(),
-            feedback_age: self.feedback_age(),
+            feedback_age: self.cycles_since_report(),
             feedback_slot: shown.feedback_slot,
             feedback_ns: shown.feedback_ns,
         };
@@ -259,7 +259,7 @@ impl Axis {
             controlword: self.controlword(),
             statusword: self.statusword(),
             error_code: self.error_code(),
-            feedback_age: self.feedback_age(),
+            feedback_age: self.cycles_since_report(),
             command_raw: self.command.command(self.parameters.law.target_slot()),
             position_raw: self.feedback.feedback(FeedbackSlot::Position),
         };

@@ -6,6 +6,7 @@ use super::power::Power;
 use crate::fault::Fault;
 use crate::guard::{self, SetPointSteps};
 use crate::plan::State;
+use crate::source::Follow;
 
 /// The set-points of an axis, on their way from the source to the drive.
 #[derive(Clone, Debug, Default)]
@@ -86,17 +87,17 @@ impl Axis {
         self.set_points.newest()
     }
 
-    /// Gives the newest set-point the velocity and the acceleration that its steps show. Used when a stream ends: what it said
-    /// of its velocity may be wrong, where it has led is known. Whatever is planned from now on goes on from that.
+    /// Gives the newest set-point the velocity and the acceleration that its steps show, where a stream was followed exactly:
+    /// what it said of its velocity may be wrong, where it has led is known. Whatever is planned from now on goes on from that.
     pub fn derive_from_steps(&mut self, period_s: f64) {
-        if self.is_profile() {
+        if self.is_profile() || self.parameters.follow == Follow::Smooth {
             return;
         }
         self.set_points.refine_newest(self.state_by_steps(period_s));
     }
 
     /// The state of the newest set-point, as the steps to it show it.
-    pub(super) fn state_by_steps(&self, period_s: f64) -> State {
+    fn state_by_steps(&self, period_s: f64) -> State {
         let [newest, last, before] = self.set_points.positions();
         let steps = SetPointSteps { sent: [last, before, before], next: newest, period_s };
         steps.state(&self.parameters.limits)
@@ -155,12 +156,6 @@ impl Axis {
         let limits = &self.parameters.limits;
         guard::check_jerk(limits.jerk, &self.steps(next, period_s))?;
         guard::check_braking(limits, &self.steps(next, period_s))
-    }
-
-    /// The set-point within the limits that is nearest to one of a stream.
-    pub fn clamped(&mut self, next: &State, period_s: f64) -> State {
-        self.follow_commands();
-        guard::clamp(&self.parameters.limits, &self.steps(next, period_s))
     }
 
     /// A set-point of a stream, of which the position counts: what it says of its velocity and acceleration is fed forward

@@ -12,6 +12,7 @@ use crate::bus_set::BusSet;
 use crate::group_trajectory::{GroupTrajectory, Profiles};
 use crate::motion_reports::MotionState;
 use crate::record::{Event, EventKind, MAX_GROUPS};
+use crate::source::StreamSample;
 use crate::stop::StopReason;
 
 /// What belongs to one group.
@@ -26,6 +27,8 @@ pub(super) struct Group<const AXES: usize, const BUSES: usize> {
     /// The buses that concern it.
     pub(super) buses: BusSet,
     pub(super) state: GroupState<AXES>,
+    /// What its stream wants in this slot, while it streams.
+    pub(super) stream: StreamSample<AXES>,
     /// Cycles since the state was entered.
     pub(super) state_cycles: u32,
     /// What is planned, while the group moves or stops.
@@ -58,6 +61,7 @@ impl<const AXES: usize, const BUSES: usize> Group<AXES, BUSES> {
             places,
             buses,
             state: GroupState::Passive,
+            stream: StreamSample::default(),
             state_cycles: 0,
             motion: GroupTrajectory::default(),
             stop: None,

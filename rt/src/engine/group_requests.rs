@@ -13,6 +13,7 @@ use crate::phase::Phase;
 use crate::plan::{PlanError, State};
 use crate::profile::ProfileTarget;
 use crate::request::{Move, ProfileMove, RejectReason, Request, RequestId};
+use crate::source::StreamSample;
 use crate::stop::{Origin, StopCause};
 use crate::stop_category::StopCategory;
 use crate::time::Nanoseconds;
@@ -110,8 +111,8 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
 
     fn begin_stream(&mut self) {
         self.group.stop = None;
-        self.axes.iter_mut().for_each(Axis::begin_stream);
-        self.enter(GroupState::Streaming(Stream::Awaited));
+        self.group.stream = StreamSample::default();
+        self.enter(GroupState::Streaming(Stream::Requested));
     }
 
     fn enter_motion(&mut self) {

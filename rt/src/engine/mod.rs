@@ -11,8 +11,8 @@
 //! - `requests` handles what was asked for, `group_requests` what was asked of a group; `targets` checks the targets;
 //!   `process_data` exchanges mappings;
 //! - `faults` looks for the first thing that is wrong, and begins stops;
-//! - `step` makes the next set-points of the phase that the group is in (`state` has the table of phases); `executing` those of
-//!   trajectories;
+//! - `step` makes the next set-points of the phase that the group is in (`state` has the table of phases), `streaming` those
+//!   of a stream, `executing` those of a trajectory;
 //! - `encode` makes frames of them, and decides what may leave; `sdo_fallback` stops drives that PDOs do not reach.
 //!
 //! Events wait in an outbox until [`Engine::finish`] hands them to the host.
@@ -34,6 +34,7 @@ mod shared;
 mod slots;
 mod state;
 mod step;
+mod streaming;
 mod targets;
 mod unsent_steps;
 
@@ -52,6 +53,7 @@ use crate::time::Nanoseconds;
 use group::{Commands, Group, GroupContext};
 use parameters::{axes_of, dispatch_of};
 use shared::{Ending, Shared};
+use state::GroupState;
 
 pub use parameters::{BusParameters, CycleCount, EngineParameters, GroupParameters, Heartbeat, SetUpError};
 pub use sense::Receiver;
@@ -67,6 +69,8 @@ pub type SendBatch = ArrayVec<Frame, SEND_BATCH>;
 pub struct CycleInput<'a> {
     /// The slot.
     pub slot: u64,
+    /// Its start on the grid: the time that its set-points stand for.
+    pub slot_start_ns: Nanoseconds,
     /// The time.
     pub now_ns: Nanoseconds,
     /// The state of each bus.
@@ -147,7 +151,7 @@ pub enum Deadline {
 ///         torque: 40.0,
 ///     },
 ///     start_tolerance: 0.02,
-///     on_violation: OnViolation::Reject,
+///     follow: Follow::Smooth,
 ///     heartbeat_timeout_cycles: None,
 ///     following_error_limit: 0.1,
 ///     following_error_cycles: 50,
@@ -187,7 +191,7 @@ pub enum Deadline {
 ///         engine.receive(0, &Received { frame, at_ns: now_ns });
 ///     }
 ///     let buses = [BusHealth::default()];
-///     engine.compute(&CycleInput { slot, now_ns, buses: &buses, behind: BusSet::default() }, &mut host);
+///     engine.compute(&CycleInput { slot, slot_start_ns: now_ns, now_ns, buses: &buses, behind: BusSet::default() }, &mut host);
 ///     let mut batch = SendBatch::new();
 ///     engine.encode(0, Deadline::Met, &mut host, &mut batch);
 ///     // It obeys the controlword, the first two bytes of its command.
@@ -265,6 +269,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
     pub fn compute(&mut self, input: &CycleInput<'_>, host: &mut impl HostInterface<AXES, BUSES>) {
         self.sense(input);
         self.handle_requests(host);
+        self.sample_streams(input.slot_start_ns, host);
         self.check_faults(input.buses);
         self.couple_stops();
         self.probe_late_drives();
@@ -338,6 +343,10 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         snapshot.missed_slots = shared.slots.missed;
         snapshot.timing = shared.slots.level();
         snapshot.dropped = shared.dropped;
+        let streaming = self.groups.iter().find(|group| matches!(group.state, GroupState::Streaming(_)));
+        if let Some(group) = streaming.or(self.groups.first()) {
+            snapshot.stream = group.stream_report();
+        }
         for (group, shown) in self.groups.iter().zip(&mut snapshot.groups) {
             *shown = GroupSnapshot {
                 phase: group.state.phase(),

@@ -4,7 +4,6 @@ use core::ops::Range;
 
 use super::Engine;
 use super::shared::Ending;
-use super::state::GroupState;
 use super::targets::Rejection;
 use crate::axis::Axis;
 use crate::host::HostInterface;
@@ -26,14 +25,6 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         for _ in 0..REQUESTS_PER_CYCLE {
             let Some(envelope) = host.request() else { break };
             self.handle_request(&envelope, host);
-        }
-        let now_ns = self.shared.now_ns;
-        for group in &mut self.groups {
-            if let GroupState::Streaming(stream) = &mut group.state
-                && let Some(command) = host.stream()
-            {
-                stream.receive(command, now_ns);
-            }
         }
     }
 

@@ -22,7 +22,6 @@
 
 use super::executing::Execution;
 use crate::cia402::Goal;
-use crate::host::StreamCommand;
 use crate::phase::Phase;
 
 /// What the group is doing.
@@ -38,22 +37,22 @@ pub(super) enum GroupState<const AXES: usize> {
     },
     /// On a trajectory of the host.
     Executing(Execution<AXES>),
-    Streaming(Stream<AXES>),
+    Streaming(Stream),
     Stopping,
     Disabling(PowerRemoval),
 }
 
-/// What a stream has brought so far.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Stream<const AXES: usize> {
-    /// No command yet: the set-points stay.
+/// How far a stream has come.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Stream {
+    /// It was asked for, and the host has yet to be told.
+    Requested,
+    /// No point has come yet: the set-points stay.
     Awaited,
-    /// The first command has come, and has yet to be checked against where the joints are.
-    Begins(StreamCommand<AXES>),
-    /// A command has come, and has yet to be made set-points of.
-    Follows(StreamCommand<AXES>),
-    /// No newer command has come than this one: the motion of the stream goes on, up to its expiry.
-    Continues(StreamCommand<AXES>),
+    /// The axes follow the points.
+    Following,
+    /// The points have run out: the axes come to rest.
+    Dry,
 }
 
 /// How the power is taken.

@@ -7,16 +7,13 @@ use arrayvec::ArrayVec;
 
 use super::Engine;
 use super::group::{Commands, Group, GroupContext};
-use super::state::{GroupState, PowerRemoval, Stream};
+use super::state::{GroupState, PowerRemoval};
 use crate::axis::{Axis, FeedbackSince};
 use crate::bus_set::BusSet;
 use crate::fault::Fault;
-use crate::guard::OnViolation;
-use crate::host::StreamCommand;
 use crate::plan::State;
 use crate::stop::{Origin, StopCause};
 use crate::stop_category::StopCategory;
-use crate::time::Nanoseconds;
 
 /// Cycles from one probe for late drives to the next: their silence must have been received.
 const PROBE_AGAIN_CYCLES: u32 = 64;
@@ -27,17 +24,6 @@ const ATTEMPTS: usize = 3;
 
 /// The first thing that keeps a step from being made.
 pub(super) type Failure = (Origin, Fault);
-
-impl<const AXES: usize> Stream<AXES> {
-    /// Takes the newest command. One that has expired before the stream begins is none.
-    pub(super) fn receive(&mut self, command: StreamCommand<AXES>, now_ns: Nanoseconds) {
-        *self = match self {
-            Self::Awaited if command.valid_until_ns < now_ns => Self::Awaited,
-            Self::Awaited | Self::Begins(_) => Self::Begins(command),
-            Self::Follows(_) | Self::Continues(_) => Self::Follows(command),
-        };
-    }
-}
 
 impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
     /// Skips what requests feedback from drives that have not answered every time in their own cycle, a SYNC of their bus or a
@@ -126,7 +112,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
     }
 
     /// Enabled axes stay on their set-point; the set-point of the others follows them.
-    fn hold(&mut self) {
+    pub(super) fn hold(&mut self) {
         for axis in self.axes.iter_mut() {
             if axis.is_enabled() { axis.stay() } else { axis.follow_actual(self.shared.period_s) }
         }
@@ -220,7 +206,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
     }
 
     /// The first axis that follows set-points and whose next one does not pass a check.
-    fn first_fault(
+    pub(super) fn first_fault(
         &self,
         next: &[State],
         check: impl Fn(&Axis, &State) -> Result<(), Fault>,
@@ -280,63 +266,6 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
         self.group.motion.cancel();
         self.axes.iter_mut().for_each(Axis::release_latch);
         self.enter(GroupState::Disabled);
-    }
-
-    fn step_stream(&mut self, stream: Stream<AXES>) -> Result<(), Failure> {
-        let (command, is_new) = match stream {
-            Stream::Awaited => return self.await_stream(),
-            Stream::Begins(command) | Stream::Follows(command) => (command, true),
-            Stream::Continues(command) => (command, false),
-        };
-        if self.shared.now_ns > command.valid_until_ns {
-            let age_cycles = (self.shared.now_ns - command.valid_until_ns).div_ceil(self.shared.period_ns);
-            return Err((Origin::Group, Fault::StaleCommand { age_cycles }));
-        }
-        if matches!(stream, Stream::Begins(_)) {
-            let first: ArrayVec<State, AXES> =
-                self.axes.iter().map(|axis| axis.own(&command.set_points)).collect();
-            self.first_fault(&first, Axis::check_start)?;
-        }
-        let next = self.streamed(&command.set_points, is_new)?;
-        self.check(&next)?;
-        self.take_set_points(&next);
-        self.group.state = GroupState::Streaming(Stream::Continues(command));
-        Ok(())
-    }
-
-    fn await_stream(&mut self) -> Result<(), Failure> {
-        let (cycles, limit) = (self.group.state_cycles, self.shared.enable_timeout_cycles);
-        if cycles > limit {
-            return Err((Origin::Group, Fault::StreamNotBegun { cycles, limit }));
-        }
-        self.hold();
-        self.axes.iter_mut().for_each(Axis::await_stream);
-        Ok(())
-    }
-
-    /// The next set-points of a stream, each within all limits.
-    fn streamed(&mut self, commands: &[State], are_new: bool) -> Result<ArrayVec<State, AXES>, Failure> {
-        let period_s = self.shared.period_s;
-        let mut next: ArrayVec<State, AXES> = ArrayVec::new();
-        for axis in self.axes.iter_mut() {
-            let command = &axis.own(commands);
-            if !axis.is_enabled() || axis.is_profile() {
-                next.push(*command);
-                continue;
-            }
-            let streamed = axis.streamed(are_new.then_some(command), period_s);
-            next.push(match (streamed, axis.parameters().on_violation) {
-                (Ok(set_point), _) => set_point,
-                (Err(_), OnViolation::Clamp) => {
-                    self.shared.snapshot.clamped += 1;
-                    axis.clamped(command, period_s)
-                }
-                (Err(fault), OnViolation::Reject) => {
-                    return Err((Origin::Axis(axis.number()), fault));
-                }
-            });
-        }
-        Ok(next)
     }
 }
 

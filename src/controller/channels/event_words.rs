@@ -1,6 +1,8 @@
 //! The layout of an event in 64-bit words.
 
-use takt_rt::{Event, EventKind, Phase, RejectReason, RequestError, RequestId, RequestKind, TimingLevel};
+use takt_rt::{
+    Event, EventKind, Phase, RejectReason, RequestError, RequestId, RequestKind, StreamState, TimingLevel,
+};
 
 use super::latest::Words;
 use super::words::{drive_state_of, phase_of, put_rejection, put_stop, take_rejection, take_stop};
@@ -17,6 +19,7 @@ const EMERGENCY: u8 = 5;
 const MISSED_SLOTS: u8 = 6;
 const TIMING: u8 = 7;
 const REJECTED: u8 = 8;
+const STREAM: u8 = 9;
 
 pub fn put_event(event: &Event, words: &mut Words<'_>) {
     words.put(event.slot);
@@ -48,6 +51,7 @@ pub fn put_event(event: &Event, words: &mut Words<'_>) {
             put_kind(MISSED_SLOTS, [0; 5]);
             words.put(*count);
         }
+        EventKind::Stream { state } => put_kind(STREAM, [*state as u8, 0, 0, 0, 0]),
         EventKind::Timing { level } => put_kind(TIMING, [*level as u8, 0, 0, 0, 0]),
         EventKind::Rejected(rejected) => {
             put_kind(REJECTED, [0; 5]);
@@ -74,6 +78,9 @@ pub fn take_event(words: &mut Words<'_>) -> Event {
             EventKind::Emergency { axis: a, code: u16::from_le_bytes([b, c]), register: d, manufacturer }
         }
         MISSED_SLOTS => EventKind::MissedSlots { count: words.take() },
+        STREAM => {
+            EventKind::Stream { state: StreamState::ALL.get(usize::from(a)).copied().unwrap_or_default() }
+        }
         TIMING => {
             EventKind::Timing { level: TimingLevel::ALL.get(usize::from(a)).copied().unwrap_or_default() }
         }
@@ -101,6 +108,7 @@ mod tests {
     fn kinds() -> impl Strategy<Value = EventKind> {
         let phases = || prop::sample::select(&Phase::ALL[..]);
         let states = prop::sample::select(&DriveState::ALL[..]);
+        let streams = prop::sample::select(&StreamState::ALL[..]);
         let levels = prop::sample::select(&TimingLevel::ALL[..]);
         prop_oneof![
             (phases(), phases()).prop_map(|(from, to)| EventKind::PhaseChanged { from, to }),
@@ -115,6 +123,7 @@ mod tests {
                 EventKind::Emergency { axis, code, register, manufacturer }
             }),
             any::<u64>().prop_map(|count| EventKind::MissedSlots { count }),
+            streams.prop_map(|state| EventKind::Stream { state }),
             levels.prop_map(|level| EventKind::Timing { level }),
             rejections().prop_map(EventKind::Rejected),
         ]

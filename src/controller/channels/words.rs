@@ -1,10 +1,9 @@
-//! The layout of a snapshot and of a streamed command in 64-bit words.
+//! The layout of a snapshot in 64-bit words.
 
-use takt_rt::plan;
 use takt_rt::{
     Answers, AxisSnapshot, BusHealth, BusState, DriveState, GroupSnapshot, MAX_AXES, MAX_BUSES, MAX_GROUPS,
     MotionReports, Origin, Phase, RejectReason, RequestError, RequestId, RequestKind, Rule, Snapshot,
-    StopCategory, StopCause, StopReason, StreamCommand, TimingLevel,
+    StopCategory, StopCause, StopReason, StreamCounts, StreamReport, StreamState, TimingLevel,
 };
 
 use super::latest::Words;
@@ -12,7 +11,7 @@ use super::motion_words::{MOTION_WORDS, put_motions, take_motions};
 
 /// The largest number of words of a snapshot of so many axes and buses.
 pub const fn snapshot_words(groups: usize, axes: usize, buses: usize) -> usize {
-    12 + MOTION_WORDS + 4 * Answers::EXPLAINED + GROUP_WORDS * groups + AXIS_WORDS * axes + 7 * buses
+    16 + MOTION_WORDS + 4 * Answers::EXPLAINED + GROUP_WORDS * groups + AXIS_WORDS * axes + 7 * buses
 }
 
 /// The largest number of words of a group of a snapshot: its phase, the time left, and a stop.
@@ -20,11 +19,6 @@ const GROUP_WORDS: usize = 2 + 4;
 
 /// The number of words of an axis of a snapshot.
 const AXIS_WORDS: usize = 11;
-
-/// The number of words of a streamed command for so many axes.
-pub const fn stream_words(axes: usize) -> usize {
-    1 + 3 * axes
-}
 
 /// The snapshot before the first cycle: passive, of no axes and no buses.
 pub const NO_SNAPSHOT: Snapshot = Snapshot {
@@ -34,7 +28,10 @@ pub const NO_SNAPSHOT: Snapshot = Snapshot {
     missed_slots: 0,
     steps: 0,
     timing: TimingLevel::Normal,
-    clamped: 0,
+    stream: StreamReport {
+        state: StreamState::Idle,
+        counts: StreamCounts { lag_ns: 0, points: 0, late_points: 0, lost_points: 0 },
+    },
     dropped: 0,
     rejected: 0,
     answers: Answers {
@@ -86,7 +83,7 @@ pub fn put_snapshot(snapshot: &Snapshot, words: &mut Words<'_>) {
     words.put(pack([snapshot.group_count, snapshot.axis_count, snapshot.bus_count, snapshot.timing as u8]));
     words.put(snapshot.missed_slots);
     words.put(snapshot.steps);
-    words.put(snapshot.clamped);
+    put_stream(&snapshot.stream, words);
     words.put(snapshot.dropped);
     words.put(snapshot.rejected);
     put_answers(&snapshot.answers, words);
@@ -108,7 +105,7 @@ pub fn take_snapshot(words: &mut Words<'_>) -> Snapshot {
         at_ns,
         missed_slots: words.take(),
         steps: words.take(),
-        clamped: words.take(),
+        stream: take_stream(words),
         timing: TimingLevel::ALL.get(usize::from(timing)).copied().unwrap_or_default(),
         dropped: words.take(),
         rejected: words.take(),
@@ -204,28 +201,16 @@ fn take_answers(words: &mut Words<'_>) -> Answers {
     answers
 }
 
-pub fn put_stream(command: &StreamCommand, axes: usize, words: &mut Words<'_>) {
-    words.put(command.valid_until_ns);
-    for set_point in command.set_points.iter().take(axes) {
-        words.put_f64(set_point.position);
-        words.put_f64(set_point.velocity);
-        words.put_f64(set_point.acceleration);
-    }
+fn put_stream(stream: &StreamReport, words: &mut Words<'_>) {
+    let StreamCounts { lag_ns, points, late_points, lost_points } = stream.counts;
+    words.put(stream.state as u64);
+    [lag_ns, points, late_points, lost_points].into_iter().for_each(|word| words.put(word));
 }
 
-pub fn take_stream(axes: usize, words: &mut Words<'_>) -> StreamCommand {
-    let mut command = StreamCommand {
-        valid_until_ns: words.take(),
-        set_points: [plan::State { position: 0.0, velocity: 0.0, acceleration: 0.0 }; MAX_AXES],
-    };
-    for set_point in command.set_points.iter_mut().take(axes) {
-        *set_point = plan::State {
-            position: words.take_f64(),
-            velocity: words.take_f64(),
-            acceleration: words.take_f64(),
-        };
-    }
-    command
+fn take_stream(words: &mut Words<'_>) -> StreamReport {
+    let state = StreamState::ALL.get(words.take() as usize).copied().unwrap_or_default();
+    let [lag_ns, points, late_points, lost_points] = [(); 4].map(|()| words.take());
+    StreamReport { state, counts: StreamCounts { lag_ns, points, late_points, lost_points } }
 }
 
 pub fn put_stop(stop: &StopReason, words: &mut Words<'_>) {
@@ -527,21 +512,6 @@ pub(super) mod tests {
             let (mut writer, reader) = latest(words);
             writer.write(|words| put_snapshot(&snapshot, words));
             prop_assert_eq!(reader.attempt(0, take_snapshot), Attempt::Whole(snapshot, 1));
-        }
-
-        #[test]
-        fn a_streamed_command_comes_out_as_it_went_in(
-            valid_until_ns in any::<u64>(),
-            numbers in prop::collection::vec(any::<[f64; 3]>(), 1..=MAX_AXES),
-        ) {
-            let axes = numbers.len();
-            let mut command = StreamCommand { valid_until_ns, set_points: Default::default() };
-            for (to, [position, velocity, acceleration]) in command.set_points.iter_mut().zip(numbers) {
-                *to = plan::State { position, velocity, acceleration };
-            }
-            let (mut writer, reader) = latest(stream_words(axes));
-            writer.write(|words| put_stream(&command, axes, words));
-            prop_assert_eq!(reader.attempt(0, |words| take_stream(axes, words)), Attempt::Whole(command, 1));
         }
     }
 }

@@ -32,7 +32,7 @@ mod stream;
 mod waiting;
 
 use std::ops::Deref;
-use std::sync::{Arc, Mutex, mpsc};
+use std::sync::{Arc, mpsc};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
@@ -50,6 +50,7 @@ use messages::Messages;
 pub use error::{CommandError, MotionError, Refused, StartFailure, Stopped, WaitError};
 pub use events::Events;
 pub use motion::{MotionId, MoveOptions};
+pub use stream::{StreamError, StreamHandle};
 
 /// The drives must be enabled within this time. It covers the power-up time of all drives.
 const ENABLE_TIMEOUT: Duration = Duration::from_secs(60);
@@ -88,7 +89,6 @@ impl Controller {
         let thread = thread.map_err(SessionError::Logger)?;
         let Ok(remote) = handles_out.recv() else { return Err(failed(thread)) };
         let RemoteHandles { observer, streamer, clients, events, realtime } = remote;
-        let streamer = Mutex::new(streamer);
         let handle = Handle(Arc::new(Shared {
             axes,
             machine,
@@ -159,8 +159,8 @@ impl Drop for Controller {
 
 /// Commands and observes a running controller, from any thread. Clones are cheap and equal.
 ///
-/// No command waits for a lock that another thread could hold. [`Handle::stop`] is wait-free, so it may also be called in a
-/// signal handler.
+/// No command waits for a lock that another thread could hold; only clients that push points of a stream wait for each other.
+/// [`Handle::stop`] is wait-free, so it may also be called in a signal handler.
 #[derive(Clone)]
 pub struct Handle(Arc<Shared>);
 
@@ -171,7 +171,7 @@ struct Shared {
     clients: ClientRequests,
     observer: Observer,
     events: EventReader,
-    streamer: Mutex<Streamer>,
+    streamer: Streamer,
     messages: Arc<Messages>,
     life: Arc<Life>,
 }
