@@ -118,7 +118,7 @@ pub fn channels(sizes: &ChannelSizes) -> (RtSide, HostSide, LogSide) {
     let (giver, taker) = trajectories::trajectories();
     let (observed_in, observed_out) = observed_events(sizes.events);
     let numbers = RequestNumbers::default();
-    let (clients, taken) = client_requests(numbers.clone(), WAITING_AT_MOST);
+    let (clients, taken) = client_requests(numbers.clone(), WAITING_AT_MOST, sizes.groups);
     let rt = RtSide {
         requests: request_out,
         clients: taken,
