@@ -21,6 +21,7 @@ const PUSHES: u64 = 32;
 
 fn sides(axes: usize) -> (RtSide, HostSide, LogSide) {
     channels(&ChannelSizes {
+        groups: 1,
         stream: Default::default(),
         axes,
         buses: axes.div_ceil(3),
@@ -91,6 +92,7 @@ fn logger(criterion: &mut Criterion) {
                 cycle_ns: 1_000_000,
                 axes: (0..axes).map(axis).collect(),
                 buses: Vec::new(),
+                groups: Vec::new(),
             },
             wall_clock: WallClock::fixed(0),
             started_ns: 0,

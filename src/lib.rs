@@ -44,8 +44,8 @@ pub use bus::ownership::IfOwned;
 pub use config::{Config, ConfigError};
 pub use controller::session::{Session, SessionError, SessionOptions};
 pub use controller::{
-    CommandError, Controller, Events, Handle, MotionError, MotionId, MoveOptions, Outcome, Refused,
-    StartFailure, Stopped, StreamError, StreamHandle, TrajectoryProgress, VirtualRun, WaitError,
+    CommandError, Controller, Events, GroupHandle, Handle, MotionError, MotionId, MoveOptions, Outcome,
+    Refused, StartFailure, Stopped, StreamError, StreamHandle, TrajectoryProgress, VirtualRun, WaitError,
 };
 pub use error::{Error, Result};
 pub use faults::{FaultInjector, Scenario};

@@ -30,7 +30,8 @@ fn run_and_measure(config: &Config) -> Vec<f64> {
     let mut errors = vec![];
     let outcome = run.run(CYCLES_AT_MOST, |run| {
         let snapshot = run.snapshot();
-        if let (Phase::Holding, Some(target)) = (snapshot.phase, run.supervisor().target()) {
+        let targets: Option<Vec<f64>> = run.supervisor().targets().into_iter().collect();
+        if let (Phase::Holding, Some(target)) = (snapshot.phase, targets) {
             errors = target
                 .iter()
                 .zip(&snapshot.axes)
@@ -187,8 +188,8 @@ fn after_an_hour_of_motion_the_axis_still_reaches_its_targets_exactly() {
         let snapshot = run.snapshot();
         holding = if snapshot.phase == Phase::Holding { holding + 1 } else { 0 };
         // The joint has settled a tenth of a second after each move.
-        if let (100, Some(target)) = (holding, run.supervisor().target()) {
-            let counts = (snapshot.axes[0].position - target[0]) * config.axes[0].counts_per_turn / TAU;
+        if let (100, [Some(target)]) = (holding, &run.supervisor().targets()[..]) {
+            let counts = (snapshot.axes[0].position - target) * config.axes[0].counts_per_turn / TAU;
             largest_counts = largest_counts.max(counts.abs());
         }
     });

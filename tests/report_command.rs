@@ -198,7 +198,7 @@ fn run_with_a_lost_bus(bus: &str, restart: &str, folder: &Path) -> (LogSummary, 
         realtime: RealtimeReport::default(),
         last: run.snapshot(),
         buses_open_ns: 1_000_000_000,
-        targets: None,
+        targets: vec![],
         stop: Some(stop),
     };
     (logger.finish(), outcome)
@@ -454,6 +454,7 @@ fn a_length_that_a_file_lies_about_costs_no_memory() {
 fn many_short_cycles_and_a_long_name_take_no_more_memory_than_the_file() {
     let folder = tempfile::tempdir().unwrap();
     let sizes = ChannelSizes {
+        groups: 1,
         stream: Default::default(),
         axes: 0,
         buses: 1,
@@ -465,7 +466,8 @@ fn many_short_cycles_and_a_long_name_take_no_more_memory_than_the_file() {
     };
     let (mut rt, _host, log) = channels(&sizes);
     let bus = BusDescription { name: "b".repeat(1 << 20), interface: String::new() };
-    let machine = Machine { name: "m".to_owned(), cycle_ns: 1_000_000, axes: vec![], buses: vec![bus] };
+    let machine =
+        Machine { name: "m".to_owned(), cycle_ns: 1_000_000, axes: vec![], buses: vec![bus], groups: vec![] };
     let file = folder.path().join("many.mcap");
     let mut logger = Logger::new(log, recording_to(&file, machine), Box::new(|_| {}));
     // All of them in the slot that a report shows.

@@ -7,7 +7,7 @@ use crate::frame::Frame;
 use crate::motion_reports::MotionReports;
 use crate::phase::Phase;
 use crate::port::{BusHealth, Received};
-use crate::record::{CycleRecord, Event, MAX_AXES, MAX_BUSES};
+use crate::record::{CycleRecord, Event, MAX_AXES, MAX_BUSES, MAX_GROUPS};
 use crate::request::{RequestEnvelope, TrajectoryId};
 use crate::source::{StreamReport, StreamSample, TrajectorySample};
 use crate::stop::StopReason;
@@ -77,7 +77,7 @@ pub struct Snapshot<const AXES: usize = MAX_AXES, const BUSES: usize = MAX_BUSES
     pub slot: u64,
     /// The time at which it was made.
     pub at_ns: Nanoseconds,
-    /// What the group is doing.
+    /// What the first group is doing: the only one, unless there are several.
     pub phase: Phase,
     /// Slots that passed unused since the start.
     pub missed_slots: u64,
@@ -95,10 +95,14 @@ pub struct Snapshot<const AXES: usize = MAX_AXES, const BUSES: usize = MAX_BUSES
     pub answers: Answers,
     /// What became of the last motions.
     pub motions: MotionReports,
-    /// Planned time left of the present move or stop, in seconds.
+    /// Planned time left of the present move or stop of the first group, in seconds.
     pub remaining_s: f64,
-    /// Why the group stopped or is stopping; `None` again after it has been re-enabled.
+    /// Why the first group stopped or is stopping; `None` again after it has been re-enabled.
     pub stop: Option<StopReason>,
+    /// How many of `groups` count.
+    pub group_count: u8,
+    /// Every group, in the order of the configuration.
+    pub groups: [GroupSnapshot; MAX_GROUPS],
     /// How many of `axes` count.
     pub axis_count: u8,
     /// The axes in the order of the configuration.
@@ -137,12 +141,32 @@ impl<const AXES: usize, const BUSES: usize> Default for Snapshot<AXES, BUSES> {
             motions: MotionReports::default(),
             remaining_s: 0.0,
             stop: None,
+            group_count: 1,
+            groups: [GroupSnapshot::default(); MAX_GROUPS],
             axis_count: 0,
             axes: [AxisSnapshot::default(); AXES],
             bus_count: 0,
             buses: [BusHealth::default(); BUSES],
         }
     }
+}
+
+impl<const AXES: usize, const BUSES: usize> Snapshot<AXES, BUSES> {
+    /// The groups that count.
+    pub fn groups(&self) -> &[GroupSnapshot] {
+        self.groups.get(..self.group_count.into()).unwrap_or(&self.groups)
+    }
+}
+
+/// One group after a cycle.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct GroupSnapshot {
+    /// What it is doing.
+    pub phase: Phase,
+    /// Planned time left of its present move or stop, in seconds.
+    pub remaining_s: f64,
+    /// Why it stopped or is stopping; `None` again after it has been re-enabled.
+    pub stop: Option<StopReason>,
 }
 
 /// One axis after a cycle.

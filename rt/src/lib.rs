@@ -67,13 +67,13 @@ pub use control::{ControlLaw, Gain, GainError, LoopInput};
 pub use cycle::{Cycle, Flow, SlotPlan};
 pub use dialect::Dialect;
 pub use engine::{
-    BusParameters, CycleCount, CycleInput, Deadline, Engine, EngineParameters, Heartbeat, Receiver,
-    SEND_BATCH, SendBatch, SetUpError,
+    BusParameters, CycleCount, CycleInput, Deadline, Engine, EngineParameters, GroupParameters, Heartbeat,
+    Receiver, SEND_BATCH, SendBatch, SetUpError,
 };
 pub use fault::{Fault, Rule};
 pub use frame::{Frame, FrameError, FrameKind, Id};
 pub use guard::{AxisLimits, LimitError, braking_distance};
-pub use host::{AxisSnapshot, HostInterface, Snapshot};
+pub use host::{AxisSnapshot, GroupSnapshot, HostInterface, Snapshot};
 pub use motion_reports::{MotionReport, MotionReports, MotionState};
 pub use pdo::{
     CommandSlot, FeedbackSlot, MAX_OBJECTS, MAX_PDOS, MappedObject, Mapping, MappingError, ProcessImage,
@@ -85,7 +85,7 @@ pub use profile::ProfileTarget;
 pub use record::{AxisRecord, CycleRecord, CycleTiming, Event, EventKind, MAX_AXES, MAX_BUSES, MAX_GROUPS};
 pub use request::{
     AxisProcessData, ExecutionStart, MappedPdo, Move, ProfileMove, RejectReason, Request, RequestEnvelope,
-    RequestError, RequestId, RequestKind, TrajectoryId,
+    RequestError, RequestId, RequestKind, RequestTarget, TrajectoryId,
 };
 pub use source::{
     AxisPoint, AxisTarget, Follow, LookAhead, LookAheadParameters, POINTS_AT_MOST, PathTime, PointError,

@@ -1,6 +1,6 @@
 //! What became of the motions that were begun last: each motion by the request that began it.
 
-use crate::record::MAX_AXES;
+use crate::record::{MAX_AXES, MAX_GROUPS};
 use crate::request::RequestId;
 use crate::stop::StopReason;
 
@@ -25,6 +25,8 @@ pub enum MotionState {
 pub struct MotionReport {
     /// The request that began it.
     pub request: RequestId,
+    /// The group that moves.
+    pub group: u8,
     /// The axis, if it is the motion of one drive in a profile mode; `None` if it is one of the whole group.
     pub axis: Option<u8>,
     /// What has become of it.
@@ -34,6 +36,10 @@ pub struct MotionReport {
 impl MotionReport {
     fn is_in_progress(&self) -> bool {
         self.state == MotionState::InProgress
+    }
+
+    fn is_under_way_in(&self, group: u8) -> bool {
+        self.group == group && self.is_in_progress()
     }
 }
 
@@ -53,9 +59,9 @@ impl Default for MotionReports {
 impl MotionReports {
     /// How many motions are remembered that have ended.
     pub const ENDED: usize = 8;
-    /// There is room for a motion of each axis, one of the group, and one that is to take its place, all in progress, beside those
-    /// that have ended.
-    pub const CAPACITY: usize = MAX_AXES + 2 + Self::ENDED;
+    /// There is room for a motion of each axis, and for one of each group and one that is to take its place, all in progress,
+    /// beside those that have ended.
+    pub const CAPACITY: usize = MAX_AXES + 2 * MAX_GROUPS + Self::ENDED;
 
     /// What has become of the motion that a request began. `None` if the request began no motion, or one that has ended and
     /// was followed by many others.
@@ -68,17 +74,23 @@ impl MotionReports {
         self.reports.iter().map_while(Option::as_ref)
     }
 
-    /// Begins a motion. Those in progress whose axis (`None`: the group) it takes over are replaced.
-    pub fn begin(&mut self, request: RequestId, axis: Option<u8>, takes_over: impl Fn(Option<u8>) -> bool) {
+    /// Begins a motion of a group. Those of that group in progress whose axis (`None`: all of it) it takes over are replaced.
+    pub fn begin(
+        &mut self,
+        request: RequestId,
+        group: u8,
+        axis: Option<u8>,
+        takes_over: impl Fn(Option<u8>) -> bool,
+    ) {
         for report in self.reports.iter_mut().flatten() {
-            if report.is_in_progress() && takes_over(report.axis) {
+            if report.is_under_way_in(group) && takes_over(report.axis) {
                 report.state = MotionState::Replaced { by: request };
             }
         }
         self.forget_old();
         self.reports.rotate_right(1);
         if let Some(newest) = self.reports.first_mut() {
-            *newest = Some(MotionReport { request, axis, state: MotionState::InProgress });
+            *newest = Some(MotionReport { request, group, axis, state: MotionState::InProgress });
         }
     }
 
@@ -91,9 +103,9 @@ impl MotionReports {
         }
     }
 
-    /// Ends every motion that is in progress, and names the request that began each.
-    pub fn end_all(&mut self, state: MotionState, mut ended: impl FnMut(RequestId)) {
-        for report in self.reports.iter_mut().flatten().filter(|report| report.is_in_progress()) {
+    /// Ends every motion of a group that is in progress, and names the request that began each.
+    pub fn end_all(&mut self, group: u8, state: MotionState, mut ended: impl FnMut(RequestId)) {
+        for report in self.reports.iter_mut().flatten().filter(|report| report.is_under_way_in(group)) {
             report.state = state;
             ended(report.request);
         }
@@ -121,7 +133,7 @@ mod tests {
     use super::*;
     use std::vec::Vec;
 
-    const GROUP: fn(Option<u8>) -> bool = |axis| axis.is_none();
+    const WHOLE: fn(Option<u8>) -> bool = |axis| axis.is_none();
 
     fn of(reports: &MotionReports, request: u64) -> Option<MotionState> {
         reports.of(RequestId(request))
@@ -130,12 +142,12 @@ mod tests {
     #[test]
     fn a_motion_that_is_followed_by_another_one_was_replaced_by_it_and_stays_so() {
         let mut reports = MotionReports::default();
-        reports.begin(RequestId(4), None, GROUP);
-        reports.begin(RequestId(7), None, GROUP);
+        reports.begin(RequestId(4), 0, None, WHOLE);
+        reports.begin(RequestId(7), 0, None, WHOLE);
         assert_eq!(of(&reports, 4), Some(MotionState::Replaced { by: RequestId(7) }));
         let end = |reports: &mut MotionReports| {
             let mut ended = Vec::new();
-            reports.end_all(MotionState::Finished, |request| ended.push(request));
+            reports.end_all(0, MotionState::Finished, |request| ended.push(request));
             ended
         };
         assert_eq!(end(&mut reports), [RequestId(7)]);
@@ -147,9 +159,9 @@ mod tests {
     #[test]
     fn a_motion_of_one_axis_replaces_only_that_of_the_same_axis() {
         let mut reports = MotionReports::default();
-        reports.begin(RequestId(1), Some(0), |axis| axis == Some(0));
-        reports.begin(RequestId(2), Some(1), |axis| axis == Some(1));
-        reports.begin(RequestId(3), Some(0), |axis| axis == Some(0));
+        reports.begin(RequestId(1), 0, Some(0), |axis| axis == Some(0));
+        reports.begin(RequestId(2), 0, Some(1), |axis| axis == Some(1));
+        reports.begin(RequestId(3), 0, Some(0), |axis| axis == Some(0));
         assert_eq!(of(&reports, 1), Some(MotionState::Replaced { by: RequestId(3) }));
         assert_eq!(of(&reports, 2), Some(MotionState::InProgress));
     }
@@ -159,14 +171,27 @@ mod tests {
         let mut reports = MotionReports::default();
         let axes = MAX_AXES as u8;
         for axis in 0..axes {
-            reports.begin(RequestId(u64::from(axis)), Some(axis), |other| other == Some(axis));
+            reports.begin(RequestId(u64::from(axis)), 0, Some(axis), |other| other == Some(axis));
         }
         for request in 1_000..1_100 {
-            reports.begin(RequestId(request), None, GROUP);
+            reports.begin(RequestId(request), 0, None, WHOLE);
         }
         assert!((0..axes).all(|axis| of(&reports, axis.into()) == Some(MotionState::InProgress)));
         let remembered: Vec<u64> =
             reports.iter().filter(|report| report.axis.is_none()).map(|report| report.request.0).collect();
         assert_eq!(remembered, (1_091..1_100).rev().collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn the_motion_of_a_group_neither_replaces_nor_ends_that_of_another() {
+        let mut reports = MotionReports::default();
+        reports.begin(RequestId(1), 0, None, WHOLE);
+        reports.begin(RequestId(2), 1, None, WHOLE);
+        assert_eq!(of(&reports, 1), Some(MotionState::InProgress));
+        reports.end_all(1, MotionState::Finished, |request| assert_eq!(request, RequestId(2)));
+        assert_eq!(
+            (of(&reports, 1), of(&reports, 2)),
+            (Some(MotionState::InProgress), Some(MotionState::Finished))
+        );
     }
 }

@@ -77,8 +77,12 @@ pub struct AxisRecord {
 pub struct CycleRecord<const AXES: usize = MAX_AXES> {
     /// When.
     pub timing: CycleTiming,
-    /// What the group was doing.
+    /// What the first group was doing: the only one, unless there are several.
     pub phase: Phase,
+    /// What every group was doing.
+    pub group_phases: [Phase; MAX_GROUPS],
+    /// How many of `group_phases` count.
+    pub group_count: u8,
     /// Whether set-points were sent in this cycle; if not, the drives hold the last ones.
     pub is_commanded: bool,
     /// How many of `axes` count.
@@ -92,6 +96,8 @@ impl<const AXES: usize> Default for CycleRecord<AXES> {
         Self {
             timing: CycleTiming::default(),
             phase: Phase::default(),
+            group_phases: [Phase::default(); MAX_GROUPS],
+            group_count: 1,
             is_commanded: false,
             axis_count: 0,
             axes: [AxisRecord::default(); AXES],
@@ -100,6 +106,11 @@ impl<const AXES: usize> Default for CycleRecord<AXES> {
 }
 
 impl<const AXES: usize> CycleRecord<AXES> {
+    /// What each group was doing.
+    pub fn group_phases(&self) -> &[Phase] {
+        self.group_phases.get(..self.group_count.into()).unwrap_or(&self.group_phases)
+    }
+
     /// The axes that count.
     pub fn axes(&self) -> &[AxisRecord] {
         self.axes.get(..self.axis_count.into()).unwrap_or(&self.axes)
@@ -113,6 +124,8 @@ pub struct Event {
     pub slot: u64,
     /// The time at which it was seen.
     pub at_ns: Nanoseconds,
+    /// The group that it concerns, by its number; `None` when it concerns the controller as a whole.
+    pub group: Option<u8>,
     /// What it was.
     pub kind: EventKind,
 }

@@ -1,4 +1,4 @@
-//! What can be asked of the group, and why it may be rejected.
+//! What can be asked of the controller and of its groups, and why it may be rejected.
 
 use crate::cia402::OperationMode;
 use crate::fault::Rule;
@@ -19,11 +19,25 @@ pub struct RequestId(pub u64);
 pub struct RequestEnvelope<const AXES: usize = MAX_AXES> {
     /// The number.
     pub id: RequestId,
+    /// Who it is for.
+    pub target: RequestTarget,
     /// The request.
     pub request: Request<AXES>,
 }
 
-/// What can be asked of the group.
+/// Who a request is for. What concerns the controller as a whole (SYNC, the time of day, the end), and what names its axis, is
+/// the same whoever it is for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum RequestTarget {
+    /// Every group: all of them do it, or none. A motion of several groups does not exist: where there is more than one,
+    /// [`Request::Move`] and [`Request::Stream`] must name theirs.
+    #[default]
+    All,
+    /// The group with this number.
+    Group(u8),
+}
+
+/// What can be asked.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[expect(clippy::large_enum_variant, reason = "there is no heap to put the large ones on")]
 pub enum Request<const AXES: usize = MAX_AXES> {
@@ -359,11 +373,30 @@ pub enum RejectReason {
     TooLate,
     /// Another trajectory is already to take the place of the present one.
     SuccessorPending,
+    /// There is no such group.
+    UnknownGroup {
+        /// The number that was asked for.
+        group: u8,
+        /// How many groups there are.
+        groups: u8,
+    },
+    /// It is for one group, there are several, and none is named.
+    GroupNotNamed {
+        /// How many groups there are.
+        groups: u8,
+    },
+    /// The axis is in another group.
+    OtherGroup {
+        /// The group that was asked.
+        asked: u8,
+        /// The group that the axis is in.
+        of_axis: u8,
+    },
 }
 
 impl RejectReason {
     /// One of each, in the order of their numbers, with numbers of no meaning.
-    pub const ALL: [Self; 26] = [
+    pub const ALL: [Self; 29] = [
         Self::Phase,
         Self::StopLatched { rule: Rule::FollowingError },
         Self::EnableInhibited,
@@ -390,6 +423,9 @@ impl RejectReason {
         Self::StartMismatch { position: 1.0, present: 2.0 },
         Self::TooLate,
         Self::SuccessorPending,
+        Self::UnknownGroup { group: 1, groups: 2 },
+        Self::GroupNotNamed { groups: 2 },
+        Self::OtherGroup { asked: 1, of_axis: 2 },
     ];
 
     /// The number that stands for it in recordings.
@@ -421,6 +457,9 @@ impl RejectReason {
             Self::StartMismatch { .. } => 23,
             Self::TooLate => 24,
             Self::SuccessorPending => 25,
+            Self::UnknownGroup { .. } => 26,
+            Self::GroupNotNamed { .. } => 27,
+            Self::OtherGroup { .. } => 28,
         }
     }
 
@@ -443,6 +482,9 @@ impl RejectReason {
             Self::Mapping { object } => (object.parameter().into(), 0.0),
             Self::IdTaken { id } => (id.value().into(), 0.0),
             Self::TooManyFrames { frames, limit } => (frames.into(), limit.into()),
+            Self::UnknownGroup { group, groups } => (group.into(), groups.into()),
+            Self::GroupNotNamed { groups } => (groups.into(), 0.0),
+            Self::OtherGroup { asked, of_axis } => (asked.into(), of_axis.into()),
             Self::StartMismatch { position, present } => (position, present),
             Self::UnknownTrajectory
             | Self::TooLate
@@ -485,6 +527,9 @@ impl RejectReason {
             23 => Self::StartMismatch { position: asked, present: allowed },
             24 => Self::TooLate,
             25 => Self::SuccessorPending,
+            26 => Self::UnknownGroup { group: asked as u8, groups: allowed as u8 },
+            27 => Self::GroupNotNamed { groups: asked as u8 },
+            28 => Self::OtherGroup { asked: asked as u8, of_axis: allowed as u8 },
             _ => return None,
         })
     }
@@ -543,6 +588,13 @@ impl core::fmt::Display for RejectReason {
             Self::IdTaken { id } => write!(f, "identifier {id:?} is in use"),
             Self::TooManyFrames { frames, limit } => write!(f, "{frames} frames in a cycle; {limit} fit"),
             Self::NoTime => f.write_str("TIME is not sent"),
+            Self::UnknownGroup { group, groups } => {
+                write!(f, "there is no group {group}: there are {groups}")
+            }
+            Self::GroupNotNamed { groups } => write!(f, "it must name one of the {groups} groups"),
+            Self::OtherGroup { asked, of_axis } => {
+                write!(f, "the axis is in group {of_axis}, not in group {asked}")
+            }
             Self::UnknownTrajectory => f.write_str("the host has no such trajectory"),
             Self::StartMismatch { position, present } => {
                 write!(

@@ -182,7 +182,7 @@ fn report(config: &Config, session: &Session, as_json: bool) -> Exit {
         realtime: RealtimeReport::new(&session.begun.report, spin_guard_ns, faults),
         last: session.snapshot,
         buses_open_ns: session.open_ns,
-        targets: session.target.clone(),
+        targets: session.targets.clone(),
         stop: stop_of(session),
     };
     let report = RunReport::new(&session.log, &outcome);

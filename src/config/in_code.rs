@@ -49,6 +49,7 @@ impl Config {
             stream_delay: StreamDelay::default(),
             buses,
             axes,
+            groups: vec![],
             program: Program { repeat: defaults::REPEAT, moves: vec![] },
             telemetry: Telemetry::default(),
             simulation: Simulation {

@@ -39,6 +39,8 @@ pub struct Config {
     pub buses: Vec<Bus>,
     /// The axes, in the order of the file.
     pub axes: Vec<Axis>,
+    /// The groups, each axis in one of them. Without any, all axes are one group.
+    pub groups: Vec<Group>,
     /// What `takt run` does with them.
     pub program: Program,
     /// What is written down.
@@ -57,7 +59,26 @@ pub struct Cycle {
     pub command_phase_ns: u64,
 }
 
+/// Axes that start, move, stop and fault together.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Group {
+    /// Its name in the configuration and the report.
+    pub name: String,
+    /// Its axes, indices into [`Config::axes`].
+    pub axes: Vec<usize>,
+    /// The groups that stop this one, too, when they stop, indices into [`Config::groups`]. Default: none.
+    pub stops_with: Vec<usize>,
+}
+
 impl Config {
+    /// The axes of a group, indices into [`Config::axes`]; without groups, all of them.
+    pub fn axes_of_group(&self, group: usize) -> Vec<usize> {
+        match self.groups.get(group) {
+            Some(group) => group.axes.clone(),
+            None => (0..self.axes.len()).collect(),
+        }
+    }
+
     /// The cycle of a bus: as the controller's, or a multiple of it. A bus that is not there has the controller's.
     pub fn bus_cycle(&self, bus: usize) -> Cycle {
         let divider = self.buses.get(bus).map_or(1, |bus| bus.divider.max(1));
@@ -353,7 +374,9 @@ pub struct Program {
 /// A coordinated move of every axis to rest, or for drives in profile velocity or torque a time at one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ProgramMove {
-    /// What is wanted of the axes, in their order.
+    /// The group that moves, an index into [`Config::groups`]; 0 where there are no groups.
+    pub group: usize,
+    /// What is wanted of the axes of the group, in their order.
     pub target: ProgramTarget,
     /// Fraction of the velocity limits. Default 1.
     pub velocity_scale: f64,

@@ -150,10 +150,10 @@ pub enum ProblemKind {
         /// What is there twice.
         given: String,
     },
-    /// Two buses or two axes of the same name.
+    /// Two buses, axes or groups of the same name.
     #[error("there is already {} called {name:?}", article_of(what))]
     DuplicateName {
-        /// `bus` or `axis`.
+        /// `bus`, `axis` or `group`.
         what: &'static str,
         /// The name.
         name: String,
@@ -182,6 +182,38 @@ pub enum ProblemKind {
         /// The buses that are there.
         known: Vec<String>,
     },
+    /// An axis or a group that is not there.
+    #[error("there is no {what} called {name:?}")]
+    UnknownName {
+        /// `axis` or `group`.
+        what: &'static str,
+        /// The name.
+        name: String,
+        /// What was probably meant.
+        nearest: Option<String>,
+        /// Those that are there.
+        known: Vec<String>,
+    },
+    /// An axis that two groups name.
+    #[error("{axis:?} is in the group {group:?} already")]
+    InTwoGroups {
+        /// The axis.
+        axis: String,
+        /// The group that named it first.
+        group: String,
+    },
+    /// An axis that no group names, though there are groups.
+    #[error("{axis:?} is in no group")]
+    InNoGroup {
+        /// The axis.
+        axis: String,
+    },
+    /// A group that is to stop with itself.
+    #[error("{name:?} cannot stop with itself")]
+    StopsWithItself {
+        /// The group.
+        name: String,
+    },
     /// An interface that takt cannot use.
     #[error("{reason}")]
     Interface {
@@ -190,12 +222,14 @@ pub enum ProblemKind {
         reason: InterfaceError,
     },
     /// A target that is not one number for every axis.
-    #[error("the move has {given} targets, but there are {axes} axes")]
+    #[error("the move has {given} targets, but there are {axes} axes{}", of_group(group.as_deref()))]
     TargetCount {
         /// How many targets there are.
         given: usize,
         /// How many axes there are.
         axes: usize,
+        /// The group that moves, where there are several.
+        group: Option<String>,
     },
     /// A target that an axis may not go to.
     #[error("{axis:?} may not go to {value}")]
@@ -248,7 +282,7 @@ pub enum ProblemKind {
     /// More than one controller can do.
     #[error("{given} {what} are more than the {limit} that one controller can do")]
     TooMany {
-        /// `axes` or `buses`.
+        /// `axes`, `buses` or `groups`.
         what: &'static str,
         /// How many there are.
         given: usize,
@@ -304,8 +338,28 @@ impl ProblemKind {
             Self::DuplicateInterface { .. } => "give each bus an interface of its own".into(),
             Self::UnknownBus { nearest: Some(nearest), .. } => format!("did you mean {nearest:?}?"),
             Self::UnknownBus { nearest: None, known, .. } => format!("the buses are: {}", known.join(", ")),
+            Self::UnknownName { nearest: Some(nearest), .. } => format!("did you mean {nearest:?}?"),
+            Self::UnknownName { known, .. } if known.is_empty() => {
+                "there is no [[group]]: all axes move together, and no group is named".into()
+            }
+            Self::UnknownName { what, known, .. } => {
+                let plural = if *what == "axis" { "axes" } else { "groups" };
+                format!("the {plural} are: {}", known.join(", "))
+            }
+            Self::InTwoGroups { .. } => "leave it in one of them".into(),
+            Self::InNoGroup { .. } => {
+                "add it to the axes of a [[group]], or give it a [[group]] of its own: every axis is in one \
+                 group, or there is no [[group]]"
+                    .into()
+            }
+            Self::StopsWithItself { .. } => "name other groups, or leave `stops_with` out".into(),
             Self::Interface { reason } => reason.help(),
-            Self::TargetCount { .. } => {
+            Self::TargetCount { group: Some(_), .. } => {
+                "one target for every axis of the group in the order in which it names them, or one number \
+                 for all of them"
+                    .into()
+            }
+            Self::TargetCount { group: None, .. } => {
                 "one target for every axis in the order of the file, or one number for all \
                                          of them"
                     .into()
@@ -334,9 +388,11 @@ impl ProblemKind {
             Self::UnknownUnit { .. } | Self::WrongUnit { .. } => "wrong unit",
             Self::NotAQuantity { .. } => "no number",
             Self::MissingUnit { .. } => "no unit",
-            Self::DuplicateName { .. } | Self::DuplicateNode { .. } | Self::DuplicateInterface { .. } => {
-                "again"
-            }
+            Self::DuplicateName { .. }
+            | Self::DuplicateNode { .. }
+            | Self::DuplicateInterface { .. }
+            | Self::InTwoGroups { .. } => "again",
+            Self::InNoGroup { .. } => "in no group",
             Self::TargetCount { .. } => "wrong length",
             Self::TargetOutsideLimits { .. } | Self::InitialPositionOutsideLimits { .. } => {
                 "outside the limits"
@@ -361,6 +417,10 @@ fn show_quantity(quantity: Quantity) -> String {
             quantity.example
         ),
     }
+}
+
+fn of_group(group: Option<&str>) -> String {
+    group.map_or(String::new(), |group| format!(" in the group {group:?}"))
 }
 
 fn show_choices(choices: &[&str]) -> String {

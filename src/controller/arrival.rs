@@ -24,10 +24,10 @@ impl Arrival {
     }
 
     /// The first joint that is farther off its target than it may be, or whose drive does not report where it is, as an outcome.
-    pub fn missed(&self, target: &[f64], snapshot: &Snapshot) -> Option<Outcome> {
-        let joints = self.tolerances.iter().zip(target).zip(&snapshot.axes).enumerate();
+    pub fn missed(&self, targets: &[Option<f64>], snapshot: &Snapshot) -> Option<Outcome> {
+        let joints = self.tolerances.iter().zip(targets).zip(&snapshot.axes).enumerate();
         joints.into_iter().find_map(|(axis, ((tolerance, target), joint))| {
-            let (tolerance, distance) = ((*tolerance)?, joint.position - target);
+            let (tolerance, distance) = ((*tolerance)?, joint.position - (*target)?);
             if joint.is_stale() {
                 return Some(Outcome::PositionNotReported { axis, since_slot: joint.feedback_slot });
             }
@@ -49,13 +49,16 @@ mod tests {
         let arrival = Arrival::of(&config);
         let heard = AxisSnapshot { is_heard: true, feedback_slot: 70, ..AxisSnapshot::default() };
         let mut snapshot = Snapshot { axes: [heard; takt_rt::MAX_AXES], ..Snapshot::default() };
-        assert_eq!(arrival.missed(&[0.0; 6], &snapshot), None);
+        assert_eq!(arrival.missed(&[Some(0.0); 6], &snapshot), None);
         snapshot.axes[2].position = 0.5;
-        assert!(matches!(arrival.missed(&[0.0; 6], &snapshot), Some(Outcome::OffTarget { axis: 2, .. })));
+        assert!(matches!(
+            arrival.missed(&[Some(0.0); 6], &snapshot),
+            Some(Outcome::OffTarget { axis: 2, .. })
+        ));
         for position in [0.0, 0.5] {
             snapshot.axes[2] = AxisSnapshot { position, feedback_age: 1, ..heard };
             let outcome = Outcome::PositionNotReported { axis: 2, since_slot: 70 };
-            assert_eq!(arrival.missed(&[0.0; 6], &snapshot), Some(outcome));
+            assert_eq!(arrival.missed(&[Some(0.0); 6], &snapshot), Some(outcome));
         }
     }
 }

@@ -2,10 +2,11 @@
 
 use std::fmt;
 
+use arrayvec::ArrayVec;
 use takt_rt::{
     AxisLimits, AxisParameters, BusParameters, CommandPdo, Engine, EngineParameters, FeedbackSince, Follow,
-    Heartbeat, Id, LookAheadParameters, MAX_AXES, Mapping, MappingError, Pdo, Scale, ScaleError,
-    ScaleParameters, SetUpError, SlotPlan, TimingLadder,
+    GroupParameters, Heartbeat, Id, LookAheadParameters, MAX_AXES, MAX_GROUPS, Mapping, MappingError, Pdo,
+    Scale, ScaleError, ScaleParameters, SetUpError, SlotPlan, TimingLadder,
 };
 
 use crate::config::{Axis, Config, ConfigError, DriveFamily, Interface};
@@ -92,6 +93,7 @@ pub fn engine(config: &Config) -> Result<Engine, AssembleError> {
     Engine::new(EngineParameters {
         period_ns,
         axes,
+        groups: groups(config),
         buses: buses.collect(),
         heartbeat,
         time_cycles: config.master.time_ns.map(&cycles),
@@ -107,6 +109,16 @@ pub fn engine(config: &Config) -> Result<Engine, AssembleError> {
         acknowledge_timeout_cycles: cycles(ACKNOWLEDGE_TIMEOUT_NS),
     })
     .map_err(AssembleError::Engine)
+}
+
+/// The groups with their numbers in place of the names. A checked configuration has no number that does not fit.
+fn groups(config: &Config) -> ArrayVec<GroupParameters, MAX_GROUPS> {
+    let number = |index: &usize| u8::try_from(*index).unwrap_or(u8::MAX);
+    let groups = config.groups.iter().take(MAX_GROUPS).map(|group| GroupParameters {
+        axes: group.axes.iter().take(MAX_AXES).map(number).collect(),
+        stops_with: group.stops_with.iter().take(MAX_GROUPS).map(number).collect(),
+    });
+    groups.collect()
 }
 
 fn axis_parameters(

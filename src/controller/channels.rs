@@ -28,7 +28,8 @@ use std::sync::Arc;
 
 use takt_rt::{
     CycleRecord, Event, ExecutionStart, Frame, HostInterface, LookAheadParameters, Nanoseconds, Received,
-    Request, RequestEnvelope, RequestId, Snapshot, StreamSample, TrajectoryId, TrajectorySample,
+    Request, RequestEnvelope, RequestId, RequestTarget, Snapshot, StreamSample, TrajectoryId,
+    TrajectorySample,
 };
 
 use super::assemble;
@@ -50,6 +51,8 @@ pub use trajectories::{GivenTrajectory, TrajectoryGiver};
 /// The capacity of each channel.
 #[derive(Clone, Debug)]
 pub struct ChannelSizes {
+    /// Groups of the controller, up to [`takt_rt::MAX_GROUPS`].
+    pub groups: usize,
     /// How streams are looked ahead.
     pub stream: LookAheadParameters,
     /// Axes of the controller, up to [`takt_rt::MAX_AXES`].
@@ -73,6 +76,7 @@ impl ChannelSizes {
     /// the events of a second in which the logger is late.
     pub fn of(config: &Config) -> Self {
         Self {
+            groups: config.groups.len().max(1),
             stream: assemble::look_ahead(config),
             axes: config.axes.len(),
             buses: config.buses.len(),
@@ -105,7 +109,8 @@ pub enum ChannelError {
 pub fn channels(sizes: &ChannelSizes) -> (RtSide, HostSide, LogSide) {
     let (request_in, request_out) = ring(sizes.requests);
     let (streamer, stream) = stream_channel(sizes.stream.clone());
-    let (snapshot_in, snapshot_out) = latest::latest(words::snapshot_words(sizes.axes, sizes.buses));
+    let (snapshot_in, snapshot_out) =
+        latest::latest(words::snapshot_words(sizes.groups, sizes.axes, sizes.buses));
     let (service_in, service_out) = (0..sizes.buses).map(|_| ring(sizes.service_out)).unzip();
     let (received_in, received_out) = ring(sizes.service_in);
     let (record_in, record_out) = records::record_ring(sizes.records);
@@ -113,7 +118,7 @@ pub fn channels(sizes: &ChannelSizes) -> (RtSide, HostSide, LogSide) {
     let (giver, taker) = trajectories::trajectories();
     let (observed_in, observed_out) = observed_events(sizes.events);
     let numbers = RequestNumbers::default();
-    let (clients, taken) = client_requests(numbers.clone(), WAITING_AT_MOST);
+    let (clients, taken) = client_requests(numbers.clone(), WAITING_AT_MOST, sizes.groups);
     let rt = RtSide {
         requests: request_out,
         clients: taken,
@@ -227,7 +232,7 @@ impl HostSide {
     /// [`ChannelError::Full`]; the request is not sent then.
     pub fn request(&mut self, request: Request) -> Result<RequestId, ChannelError> {
         let id = self.numbers.next();
-        self.submit(RequestEnvelope { id, request }).map(|()| id)
+        self.submit(RequestEnvelope { id, target: RequestTarget::All, request }).map(|()| id)
     }
 
     /// Sends a request with an id of [`HostSide::numbers`].
@@ -365,9 +370,14 @@ mod tests {
     use takt_rt::Id;
     use takt_rt::{EventKind, Phase, StopCategory};
 
+    fn envelope(id: RequestId, request: Request) -> RequestEnvelope {
+        RequestEnvelope { id, target: RequestTarget::All, request }
+    }
+
     fn sizes() -> ChannelSizes {
         ChannelSizes {
             stream: LookAheadParameters::default(),
+            groups: 1,
             axes: 2,
             buses: 2,
             records: 4,
@@ -385,9 +395,9 @@ mod tests {
         let second = host.request(Request::Stop(StopCategory::Two)).unwrap();
         assert!(first < second);
         assert_eq!(host.request(Request::Shutdown), Err(ChannelError::Full));
-        assert_eq!(rt.request(), Some(RequestEnvelope { id: first, request: Request::Enable }));
+        assert_eq!(rt.request(), Some(envelope(first, Request::Enable)));
         let request = Request::Stop(StopCategory::Two);
-        assert_eq!(rt.request(), Some(RequestEnvelope { id: second, request }));
+        assert_eq!(rt.request(), Some(envelope(second, request)));
         assert_eq!(rt.request(), None);
     }
 
@@ -422,7 +432,8 @@ mod tests {
         let (mut rt, host, _log) = channels(&sizes());
         let observer = host.observer();
         assert_eq!(observer.snapshot(), words::NO_SNAPSHOT);
-        let snapshot = Snapshot { slot: 9, phase: Phase::Holding, axis_count: 2, ..words::NO_SNAPSHOT };
+        let mut snapshot = Snapshot { slot: 9, phase: Phase::Holding, axis_count: 2, ..words::NO_SNAPSHOT };
+        snapshot.groups[0].phase = Phase::Holding;
         rt.publish(&snapshot);
         assert_eq!((observer.snapshot(), host.snapshot()), (snapshot, snapshot));
     }
@@ -433,8 +444,12 @@ mod tests {
         let record = CycleRecord { axis_count: 2, ..CycleRecord::default() };
         assert_eq!((0..6).filter(|_| rt.record(&record)).count(), 4);
         let mut observer = host.events();
-        let event =
-            |slot| Event { slot, at_ns: 0, kind: EventKind::MotionFinished { request: RequestId(1) } };
+        let event = |slot| Event {
+            slot,
+            at_ns: 0,
+            group: None,
+            kind: EventKind::MotionFinished { request: RequestId(1) },
+        };
         assert_eq!((0..3).filter(|slot| rt.event(&event(*slot))).count(), 2);
         assert_eq!(log.next_record(|seen| *seen), Some(record));
         assert_eq!(log.take_event(), Some(event(0)));

@@ -14,8 +14,8 @@ mod time_of_day;
 mod virtual_time;
 
 pub use handle::{
-    CommandError, Controller, Events, Handle, MotionError, MotionId, MoveOptions, Refused, StartFailure,
-    Stopped, StreamError, StreamHandle, TrajectoryProgress, WaitError,
+    CommandError, Controller, Events, GroupHandle, Handle, MotionError, MotionId, MoveOptions, Refused,
+    StartFailure, Stopped, StreamError, StreamHandle, TrajectoryProgress, WaitError,
 };
 pub use outcome::{Interrupt, Outcome, Progress};
 pub use program::{ProgramRunner, ProgramStep};

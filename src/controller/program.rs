@@ -2,15 +2,18 @@
 
 use takt_rt::{
     Answer, MAX_AXES, MotionState, Move, ProfileMove, ProfileTarget, Request, RequestEnvelope, RequestError,
-    RequestId, Snapshot,
+    RequestId, RequestTarget, Snapshot,
 };
 
 use super::channels::RequestNumbers;
 use crate::config::{Program, ProgramMove, ProgramTarget};
 
-/// Runs through the moves of a configuration, one at a time.
+/// Runs through the moves of one group of a configuration, one at a time.
 #[derive(Clone, Debug)]
 pub struct ProgramRunner {
+    group: u8,
+    /// The axes of the group, by their numbers.
+    axes: Vec<usize>,
     moves: Vec<ProgramMove>,
     /// Times that the list is run; `None` for ever.
     repeat: Option<u64>,
@@ -77,11 +80,14 @@ enum MotionResult {
 }
 
 impl ProgramRunner {
-    /// A program from its beginning; `endless` repeats it until it is stopped.
-    pub fn new(program: &Program, endless: bool) -> Self {
+    /// The moves of a group, whose axes have these numbers, from the beginning; `endless` repeats them until the group is stopped.
+    pub fn new(program: &Program, group: usize, axes: Vec<usize>, endless: bool) -> Self {
         let repeat = (!endless).then(|| u64::from(program.repeat.max(1)));
-        let progress = if program.moves.is_empty() { MoveProgress::Finished } else { MoveProgress::Next };
-        Self { moves: program.moves.clone(), repeat, begun: 0, requests: vec![], progress }
+        let moves: Vec<_> = program.moves.iter().filter(|own| own.group == group).cloned().collect();
+        let progress = if moves.is_empty() { MoveProgress::Finished } else { MoveProgress::Next };
+        // A checked configuration has no group whose number does not fit.
+        let group = u8::try_from(group).unwrap_or(u8::MAX);
+        Self { group, axes, moves, repeat, begun: 0, requests: vec![], progress }
     }
 
     /// Takes the state of the group and says what is to happen. The requests of a step have ids from `numbers`, so that the
@@ -187,46 +193,60 @@ impl ProgramRunner {
         let valid_until_ns = now_ns + self.present_duration_ns().unwrap_or(0) + REACHING_NS + EXPIRY_NS;
         let Some(present) = self.present() else { return vec![] };
         let drive = |values: &[f64], target: fn(f64) -> ProfileTarget| -> Vec<Request> {
-            let axes = (0..).zip(values).filter(|(_, value)| **value != 0.0);
-            axes.map(|(axis, value)| {
-                let target = target(value * factor);
-                Request::SetProfileTarget(ProfileMove { axis, target, valid_until_ns })
-            })
-            .collect()
+            let axes = self.axes.iter().zip(values).filter(|(_, value)| **value != 0.0);
+            axes.filter_map(|(axis, value)| Some((u8::try_from(*axis).ok()?, value)))
+                .map(|(axis, value)| {
+                    let target = target(value * factor);
+                    Request::SetProfileTarget(ProfileMove { axis, target, valid_until_ns })
+                })
+                .collect()
         };
         let requests = match &present.target {
-            ProgramTarget::Position(position) => vec![Request::Move(move_of(present, position))],
+            ProgramTarget::Position(position) => vec![Request::Move(self.move_of(present, position))],
             ProgramTarget::Velocity { velocity, .. } => drive(velocity, ProfileTarget::Velocity),
             ProgramTarget::Torque { torque, .. } => drive(torque, ProfileTarget::Torque),
         };
         self.requests = requests.iter().map(|_| numbers.next()).collect();
-        self.requests.iter().zip(requests).map(|(id, request)| RequestEnvelope { id: *id, request }).collect()
+        self.requests
+            .iter()
+            .zip(requests)
+            .map(|(id, request)| RequestEnvelope {
+                id: *id,
+                target: RequestTarget::Group(self.group),
+                request,
+            })
+            .collect()
     }
 
-    /// The target of the present move (rad or m), one value for each axis. `None` before the first move, and for a move that
-    /// has no target position.
-    pub fn target(&self) -> Option<&[f64]> {
-        match self.present().filter(|_| self.begun > 0).map(|present| &present.target)? {
-            ProgramTarget::Position(position) => Some(position),
-            ProgramTarget::Velocity { .. } | ProgramTarget::Torque { .. } => None,
+    /// The targets of the present move (rad or m), each with the number of its axis. None before the first move, and for a move
+    /// that has no target position.
+    pub fn targets(&self) -> impl Iterator<Item = (usize, f64)> {
+        let position = match self.present().filter(|_| self.begun > 0).map(|present| &present.target) {
+            Some(ProgramTarget::Position(position)) => position.as_slice(),
+            Some(ProgramTarget::Velocity { .. } | ProgramTarget::Torque { .. }) | None => &[],
+        };
+        self.axes.iter().copied().zip(position.iter().copied())
+    }
+
+    fn move_of(&self, present: &ProgramMove, position: &[f64]) -> Move {
+        let mut target = [0.0; MAX_AXES];
+        for (axis, position) in self.axes.iter().zip(position) {
+            if let Some(target) = target.get_mut(*axis) {
+                *target = *position;
+            }
+        }
+        Move {
+            target,
+            target_velocity: [0.0; MAX_AXES],
+            velocity_scale: present.velocity_scale,
+            acceleration_scale: present.acceleration_scale,
+            minimum_duration_s: present.minimum_duration_s,
         }
     }
 
     /// Moves begun, and how many there are in all if that is known.
     pub fn progress(&self) -> (u64, Option<u64>) {
         (self.begun, self.repeat.map(|times| times * self.moves.len() as u64))
-    }
-}
-
-fn move_of(present: &ProgramMove, position: &[f64]) -> Move {
-    let mut target = [0.0; MAX_AXES];
-    target.iter_mut().zip(position).for_each(|(to, from)| *to = *from);
-    Move {
-        target,
-        target_velocity: [0.0; MAX_AXES],
-        velocity_scale: present.velocity_scale,
-        acceleration_scale: present.acceleration_scale,
-        minimum_duration_s: present.minimum_duration_s,
     }
 }
 
@@ -237,6 +257,7 @@ mod tests {
 
     fn program(repeat: u32) -> Program {
         let to = |target: f64| ProgramMove {
+            group: 0,
             target: ProgramTarget::Position(vec![target]),
             velocity_scale: 0.5,
             acceleration_scale: 0.25,
@@ -251,9 +272,9 @@ mod tests {
         let mut snapshot = Snapshot { phase: Phase::Holding, ..Snapshot::default() };
         for request in requests {
             snapshot.answers.note(*request, None);
-            snapshot.motions.begin(*request, None, |_| false);
+            snapshot.motions.begin(*request, 0, None, |_| false);
         }
-        snapshot.motions.end_all(MotionState::Finished, |_| {});
+        snapshot.motions.end_all(0, MotionState::Finished, |_| {});
         snapshot
     }
 
@@ -278,7 +299,7 @@ mod tests {
 
     impl Running {
         fn new(program: &Program) -> Self {
-            Self(ProgramRunner::new(program, false), RequestNumbers::default())
+            Self(ProgramRunner::new(program, 0, vec![0, 1], false), RequestNumbers::default())
         }
 
         fn poll(&mut self, now_ns: u64, snapshot: &Snapshot) -> ProgramStep {
@@ -288,7 +309,7 @@ mod tests {
         fn begin(&mut self, now_ns: u64, snapshot: &Snapshot) -> Option<(RequestId, Move)> {
             match self.poll(now_ns, snapshot) {
                 ProgramStep::Begin(requests) => match requests[..] {
-                    [RequestEnvelope { id, request: Request::Move(begun) }] => Some((id, begun)),
+                    [RequestEnvelope { id, request: Request::Move(begun), .. }] => Some((id, begun)),
                     _ => panic!("{requests:?}"),
                 },
                 _ => None,
@@ -304,8 +325,8 @@ mod tests {
         let asked = |step| match step {
             ProgramStep::Begin(requests) => match requests[..] {
                 [
-                    RequestEnvelope { id, request: Request::SetProfileTarget(first) },
-                    RequestEnvelope { id: next_id, request: Request::SetProfileTarget(second) },
+                    RequestEnvelope { id, request: Request::SetProfileTarget(first), .. },
+                    RequestEnvelope { id: next_id, request: Request::SetProfileTarget(second), .. },
                 ] => {
                     assert_eq!((first.axis, second.axis), (0, 1));
                     ([id, next_id], first.target, second.target)
@@ -327,7 +348,10 @@ mod tests {
         assert_eq!(runner.poll(2_600_000_000, &driving), ProgramStep::Wait);
         let at_rest = finished(&rest);
         assert_eq!(runner.poll(3_000_000_000, &at_rest), ProgramStep::Wait);
-        assert_eq!((runner.poll(3_100_000_000, &at_rest), runner.0.target()), (ProgramStep::Wait, None));
+        assert_eq!(
+            (runner.poll(3_100_000_000, &at_rest), runner.0.targets().count()),
+            (ProgramStep::Wait, 0)
+        );
         assert_eq!(runner.poll(3_100_000_000, &at_rest), ProgramStep::Finished);
     }
 
@@ -354,7 +378,7 @@ mod tests {
         let (request, first) = runner.begin(0, &finished(&[])).unwrap();
         assert_eq!((first.velocity_scale, first.acceleration_scale), (0.5, 0.25));
         let mut moving = Snapshot { phase: Phase::Moving, ..finished(&[]) };
-        moving.motions.begin(request, None, |_| true);
+        moving.motions.begin(request, 0, None, |_| true);
         for now_s in 0..100 {
             assert_eq!(runner.poll(now_s * 1_000_000_000, &moving), ProgramStep::Wait);
         }
@@ -374,8 +398,8 @@ mod tests {
         let mut runner = Running::new(&program(1));
         let (request, _) = runner.begin(0, &finished(&[])).unwrap();
         let mut snapshot = finished(&[]);
-        snapshot.motions.begin(request, None, |_| true);
-        snapshot.motions.begin(runner.1.next(), None, |_| true);
+        snapshot.motions.begin(request, 0, None, |_| true);
+        snapshot.motions.begin(runner.1.next(), 0, None, |_| true);
         assert_eq!(runner.poll(1, &snapshot), ProgramStep::Replaced { number: 1 });
         assert_eq!(runner.poll(2, &snapshot), ProgramStep::Finished);
     }

@@ -54,8 +54,9 @@ pub struct Session {
     pub outcome: Outcome,
     /// The state after the last cycle.
     pub snapshot: Snapshot,
-    /// The target of the last move (rad or m), one value for each axis; `None` if the program did not finish.
-    pub target: Option<Vec<f64>>,
+    /// The target of the last move of each axis (rad or m); `None` where that has no target position. Empty if the program did
+    /// not finish.
+    pub targets: Vec<Option<f64>>,
     /// The axes whose drives did not answer during the shut-down: see [`Supervisor::unreached`].
     pub unreached: Vec<usize>,
     /// The result of the real-time set-up.
@@ -272,10 +273,10 @@ fn lead_as_owner(
         outcome,
         Outcome::Finished | Outcome::OffTarget { .. } | Outcome::PositionNotReported { .. }
     );
-    let target = supervisor.target().filter(|_| is_done && options.duration_ns.is_none());
+    let has_arrived = is_done && options.duration_ns.is_none();
     Ok(Session {
         snapshot: host.snapshot(),
-        target: target.map(<[f64]>::to_vec),
+        targets: if has_arrived { supervisor.targets() } else { vec![] },
         unreached: supervisor.unreached().to_vec(),
         outcome,
         begun,

@@ -11,7 +11,8 @@
 use std::collections::VecDeque;
 
 use takt_rt::{
-    AxisSnapshot, Frame, Phase, Request, RequestEnvelope, Rule, Snapshot, StopCategory, StopReason,
+    AxisSnapshot, Frame, Phase, Request, RequestEnvelope, RequestTarget, Rule, Snapshot, StopCategory,
+    StopReason,
 };
 
 use super::arrival::{ARRIVAL_NS, Arrival};
@@ -51,7 +52,8 @@ pub struct Supervisor {
     stage_since_ns: Option<u64>,
     bring_up: BringUp,
     shutdown: Shutdown,
-    program: ProgramRunner,
+    /// The program of each group.
+    programs: Vec<ProgramRunner>,
     arrival: Arrival,
     facts: Vec<AxisFacts>,
     outgoing: VecDeque<RequestEnvelope>,
@@ -75,7 +77,12 @@ impl Supervisor {
             stage_since_ns: None,
             bring_up: BringUp::new(config),
             shutdown: Shutdown::new(config),
-            program: ProgramRunner::new(&config.program, duration_ns.is_some()),
+            programs: (0..config.groups.len().max(1))
+                .map(|group| {
+                    let axes = config.axes_of_group(group);
+                    ProgramRunner::new(&config.program, group, axes, duration_ns.is_some())
+                })
+                .collect(),
             arrival: Arrival::of(config),
             facts: Vec::new(),
             outgoing: VecDeque::new(),
@@ -115,9 +122,16 @@ impl Supervisor {
         &self.facts
     }
 
-    /// The target of the last move (rad or m), one value for each axis.
-    pub fn target(&self) -> Option<&[f64]> {
-        self.program.target()
+    /// The target of the last move of each axis (rad or m); `None` before the first one, and after one that has no target
+    /// position.
+    pub fn targets(&self) -> Vec<Option<f64>> {
+        let mut targets = vec![None; self.axes];
+        for (axis, target) in self.programs.iter().flat_map(ProgramRunner::targets) {
+            if let Some(place) = targets.get_mut(axis) {
+                *place = Some(target);
+            }
+        }
+        targets
     }
 
     /// Takes received frames and the newest state, and sends the frames and requests that are due.
@@ -148,7 +162,9 @@ impl Supervisor {
             Stage::Enable => self.enable(now_ns, elapsed_ns, snapshot),
             Stage::Run => self.run(now_ns, snapshot),
             Stage::Settle { until_ns } => {
-                let is_moving = matches!(snapshot.phase, Phase::Moving | Phase::Streaming | Phase::Stopping);
+                let is_moving = is_any(snapshot, |phase| {
+                    matches!(phase, Phase::Moving | Phase::Streaming | Phase::Stopping)
+                });
                 let missed = self.missed_target(snapshot);
                 let is_waited_for = (is_moving && elapsed_ns <= STAGE_TIMEOUT_NS)
                     || (missed.is_some() && elapsed_ns <= ARRIVAL_NS);
@@ -163,11 +179,12 @@ impl Supervisor {
                 }
             }
             Stage::Disable => {
-                if matches!(snapshot.phase, Phase::Disabled | Phase::Passive) {
+                if is_every_group_off(snapshot) {
                     self.note_fault_while_disabling(snapshot);
                     self.begin_shut_down(now_ns);
                 } else if elapsed_ns > STAGE_TIMEOUT_NS {
-                    self.outcome.get_or_insert(Outcome::Stuck { phase: snapshot.phase });
+                    let phase = stuck_phase(snapshot, |phase| !is_off(phase));
+                    self.outcome.get_or_insert(Outcome::Stuck { phase });
                     self.begin_shut_down(now_ns);
                 }
             }
@@ -175,8 +192,7 @@ impl Supervisor {
             Stage::RemovePower => {
                 // The last controlwords take effect at the next SYNC, and may wait for the bus. So the loop goes on until the
                 // group is disabled.
-                let is_off = matches!(snapshot.phase, Phase::Disabled | Phase::Passive);
-                if (is_off && elapsed_ns > 0) || elapsed_ns > STAGE_TIMEOUT_NS {
+                if (is_every_group_off(snapshot) && elapsed_ns > 0) || elapsed_ns > STAGE_TIMEOUT_NS {
                     self.request(Request::Shutdown);
                     self.enter(Stage::Done, now_ns);
                 }
@@ -229,7 +245,7 @@ impl Supervisor {
     fn activate(&mut self, now_ns: u64, elapsed_ns: u64, snapshot: &Snapshot) {
         let silent = self.axes_of(snapshot).iter().position(|axis| !axis.is_heard);
         match silent {
-            None if snapshot.phase == Phase::Disabled => {
+            None if !is_any(snapshot, |phase| phase != Phase::Disabled) => {
                 if self.faulted(snapshot).is_some() {
                     self.request(Request::ResetFaults);
                     self.enter(Stage::ResetFaults, now_ns);
@@ -238,7 +254,10 @@ impl Supervisor {
                 }
             }
             Some(axis) if elapsed_ns > STAGE_TIMEOUT_NS => self.end(now_ns, Outcome::NotHeard { axis }),
-            _ if elapsed_ns > STAGE_TIMEOUT_NS => self.end(now_ns, Outcome::Stuck { phase: snapshot.phase }),
+            _ if elapsed_ns > STAGE_TIMEOUT_NS => {
+                let phase = stuck_phase(snapshot, |phase| phase != Phase::Disabled);
+                self.end(now_ns, Outcome::Stuck { phase });
+            }
             _ => {}
         }
     }
@@ -260,15 +279,15 @@ impl Supervisor {
 
     fn enable(&mut self, now_ns: u64, elapsed_ns: u64, snapshot: &Snapshot) {
         // A client may already have moved the group before this poll.
-        let is_enabled =
-            matches!(snapshot.phase, Phase::Holding | Phase::Moving | Phase::Streaming | Phase::Stopping);
+        let is_enabled = !is_any(snapshot, |phase| !is_in_operation(phase));
         if let Some(stop) = fault_stop(snapshot).filter(|_| !(self.is_serving && is_enabled)) {
             self.end(now_ns, Outcome::Stopped(stop));
         } else if is_enabled {
             self.deadline_ns = self.duration_ns.map(|duration_ns| now_ns + duration_ns);
             self.enter(Stage::Run, now_ns);
         } else if elapsed_ns > STAGE_TIMEOUT_NS {
-            self.end(now_ns, Outcome::Stuck { phase: snapshot.phase });
+            let phase = stuck_phase(snapshot, |phase| !is_in_operation(phase));
+            self.end(now_ns, Outcome::Stuck { phase });
         }
     }
 
@@ -283,14 +302,23 @@ impl Supervisor {
             self.request(Request::Stop(StopCategory::Two));
             return self.end(now_ns, Outcome::Finished);
         }
-        match self.program.poll(now_ns, snapshot, &self.numbers) {
-            ProgramStep::Wait => {}
-            ProgramStep::Begin(requests) => self.outgoing.extend(requests),
-            ProgramStep::Refused { number, refusal } => {
-                self.end(now_ns, Outcome::MoveRefused { number, refusal });
+        let (mut ending, mut are_finished) = (None, true);
+        for program in &mut self.programs {
+            let step = program.poll(now_ns, snapshot, &self.numbers);
+            are_finished &= step == ProgramStep::Finished;
+            match step {
+                ProgramStep::Wait | ProgramStep::Finished => {}
+                ProgramStep::Begin(requests) => self.outgoing.extend(requests),
+                ProgramStep::Refused { number, refusal } => {
+                    ending = ending.or(Some(Outcome::MoveRefused { number, refusal }));
+                }
+                ProgramStep::Replaced { number } => {
+                    ending = ending.or(Some(Outcome::MoveReplaced { number }))
+                }
             }
-            ProgramStep::Replaced { number } => self.end(now_ns, Outcome::MoveReplaced { number }),
-            ProgramStep::Finished => self.end(now_ns, Outcome::Finished),
+        }
+        if let Some(outcome) = ending.or(are_finished.then_some(Outcome::Finished)) {
+            self.end(now_ns, outcome);
         }
     }
 
@@ -316,8 +344,7 @@ impl Supervisor {
     /// duration has no target that counts.
     fn missed_target(&self, snapshot: &Snapshot) -> Option<Outcome> {
         let has_finished = self.outcome == Some(Outcome::Finished) && self.duration_ns.is_none();
-        let target = self.program.target().filter(|_| has_finished)?;
-        self.arrival.missed(target, snapshot)
+        if has_finished { self.arrival.missed(&self.targets(), snapshot) } else { None }
     }
 
     /// Begins the end of the run, from any stage.
@@ -368,7 +395,11 @@ impl Supervisor {
     }
 
     fn request(&mut self, request: Request) {
-        self.outgoing.push_back(RequestEnvelope { id: self.numbers.next(), request });
+        self.outgoing.push_back(RequestEnvelope {
+            id: self.numbers.next(),
+            target: RequestTarget::All,
+            request,
+        });
     }
 
     fn enter(&mut self, stage: Stage, now_ns: u64) {
@@ -385,6 +416,14 @@ impl Supervisor {
         axes.iter().position(|axis| axis.drive_state.is_faulted()).map(|axis| (axis, axes[axis].error_code))
     }
 
+    /// Moves begun by all groups, and how many there are in all if that is known.
+    fn programs_progress(&self) -> (u64, Option<u64>) {
+        let all = self.programs.iter().map(ProgramRunner::progress);
+        all.fold((0, Some(0)), |(begun, all), (own_begun, own_all)| {
+            (begun + own_begun, all.zip(own_all).map(|(all, own)| all + own))
+        })
+    }
+
     /// The present step of the run.
     pub fn progress(&self) -> Progress {
         let (what, fraction) = match self.stage {
@@ -394,7 +433,7 @@ impl Supervisor {
             }
             Stage::Activate | Stage::ResetFaults | Stage::Enable => ("enabling".to_owned(), None),
             Stage::Run => {
-                let (begun, all) = self.program.progress();
+                let (begun, all) = self.programs_progress();
                 let of = all.map_or(String::new(), |all| format!(" of {all}"));
                 (format!("move {begun}{of}"), all.map(|all| begun.saturating_sub(1) as f64 / all as f64))
             }
@@ -408,9 +447,33 @@ impl Supervisor {
     }
 }
 
-/// A stop for a fault.
+/// The first stop for a fault, of any group.
 fn fault_stop(snapshot: &Snapshot) -> Option<StopReason> {
-    snapshot.stop.filter(|stop| stop.rule() != Rule::Requested)
+    let stops = snapshot.groups().iter().filter_map(|group| group.stop);
+    stops.filter(|stop| stop.rule() != Rule::Requested).min_by_key(|stop| stop.slot)
+}
+
+/// Whether a group is in such a phase.
+fn is_any(snapshot: &Snapshot, is_such: impl Fn(Phase) -> bool) -> bool {
+    snapshot.groups().iter().any(|group| is_such(group.phase))
+}
+
+fn is_off(phase: Phase) -> bool {
+    matches!(phase, Phase::Disabled | Phase::Passive)
+}
+
+fn is_in_operation(phase: Phase) -> bool {
+    matches!(phase, Phase::Holding | Phase::Moving | Phase::Streaming | Phase::Stopping)
+}
+
+fn is_every_group_off(snapshot: &Snapshot) -> bool {
+    !is_any(snapshot, |phase| !is_off(phase))
+}
+
+/// The phase of the first group that is in one which it should have left.
+fn stuck_phase(snapshot: &Snapshot, should_be_left: impl Fn(Phase) -> bool) -> Phase {
+    let mut groups = snapshot.groups().iter().map(|group| group.phase);
+    groups.find(|phase| should_be_left(*phase)).unwrap_or(snapshot.phase)
 }
 
 /// Passes the frames of a procedure to the service channel. If the channel is full, the frame is lost as on a disturbed bus,

@@ -291,6 +291,7 @@ mod tests {
             history.event(&Event {
                 slot,
                 at_ns: slot * CYCLE_NS + 1,
+                group: None,
                 kind: EventKind::MissedSlots { count: slot },
             });
             history.cycle(&record(slot));
@@ -346,6 +347,7 @@ mod tests {
                 history.event(&Event {
                     slot,
                     at_ns: slot * CYCLE_NS,
+                    group: None,
                     kind: EventKind::MissedSlots { count: 1 },
                 });
                 history.health(&OnBus { bus: 0, what: health });

@@ -18,6 +18,8 @@ pub struct Machine {
     pub axes: Vec<AxisDescription>,
     /// The buses in the order of the configuration.
     pub buses: Vec<BusDescription>,
+    /// The names of the groups in the order of the configuration; none where all axes are one group.
+    pub groups: Vec<String>,
 }
 
 /// Name, unit and resolution of an axis.
@@ -99,6 +101,7 @@ impl Machine {
             cycle_ns: config.cycle.period_ns,
             axes: config.axes.iter().map(|axis| AxisDescription::of(axis, config)).collect(),
             buses: config.buses.iter().map(bus).collect(),
+            groups: config.groups.iter().map(|group| group.name.clone()).collect(),
         }
     }
 
@@ -110,6 +113,11 @@ impl Machine {
     /// The name of a bus; its number if it is unknown.
     pub fn bus_name(&self, bus: u8) -> String {
         self.buses.get(usize::from(bus)).map_or_else(|| format!("bus {bus}"), |bus| bus.name.clone())
+    }
+
+    /// The name of a group; its number if it is unknown.
+    pub fn group_name(&self, group: u8) -> String {
+        self.groups.get(usize::from(group)).map_or_else(|| format!("group {group}"), Clone::clone)
     }
 
     /// Whether the drive of an axis plans its own profile, instead of following set-points.

@@ -209,7 +209,8 @@ pub fn encode_event(event: &Event, text: &str, encoder: &mut CdrEncoder) {
         .octets(fields.manufacturer)
         .u8(fields.refusal.map_or(0, |(request, _)| request))
         .u8(fields.refusal.map_or(0, |(_, objection)| objection))
-        .i16(fields.bus.map_or(-1, i16::from));
+        .i16(fields.bus.map_or(-1, i16::from))
+        .i16(event.group.map_or(-1, i16::from));
 }
 
 /// Encodes a [`FRAME`].

@@ -177,11 +177,13 @@ impl Recording {
 
 fn describe(machine: &Machine) -> BTreeMap<String, String> {
     let list = |names: &mut dyn Iterator<Item = &String>| names.cloned().collect::<Vec<_>>().join("\n");
-    BTreeMap::from([
+    let described = [
         ("version".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
         ("machine".to_owned(), machine.name.clone()),
         ("cycle_ns".to_owned(), machine.cycle_ns.to_string()),
         ("axes".to_owned(), list(&mut machine.axes.iter().map(|axis| &axis.name))),
         ("buses".to_owned(), list(&mut machine.buses.iter().map(|bus| &bus.name))),
-    ])
+    ];
+    let groups = (!machine.groups.is_empty()).then(|| ("groups".to_owned(), machine.groups.join("\n")));
+    described.into_iter().chain(groups).collect()
 }

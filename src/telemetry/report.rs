@@ -235,8 +235,8 @@ pub struct RunOutcome {
     pub last: Snapshot,
     /// The time for which the buses were open. The bus load refers to it.
     pub buses_open_ns: Nanoseconds,
-    /// The targets of the program's last move, in rad (m); `None` takes the last set-points.
-    pub targets: Option<Vec<f64>>,
+    /// The targets of the program's last moves, in rad (m), an axis each; `None` and an absent one take the last set-point.
+    pub targets: Vec<Option<f64>>,
     /// Why the run ended before its program.
     pub stop: Option<StopReason>,
 }
@@ -254,7 +254,7 @@ impl RunReport {
         let (machine, statistics, last) = (&log.machine, &log.statistics, &outcome.last);
         let covered_ns = statistics.last_ns.saturating_sub(statistics.first_ns) + machine.cycle_ns;
         let axis = |(index, (description, axis)): (usize, (&AxisDescription, &AxisStatistics))| {
-            let target = outcome.targets.as_ref().and_then(|targets| targets.get(index).copied());
+            let target = outcome.targets.get(index).copied().flatten();
             AxisReport::new(description, axis, statistics.first_ns, target)
         };
         let bus = |(description, health)| BusReport::new(description, health, outcome.buses_open_ns);

@@ -207,6 +207,7 @@ mod tests {
             is_commanded: true,
             axis_count: 1,
             axes: [axis; MAX_AXES],
+            ..CycleRecord::default()
         }
     }
 

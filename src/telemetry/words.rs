@@ -73,8 +73,17 @@ fn mode(number: f64) -> String {
     format!("mode {number:.0} ({name})")
 }
 
-/// An event as one line, without its time.
+/// An event as one line, without its time. Where there are several groups, the line begins with the one that it concerns, unless
+/// it concerns an axis that it names.
 pub fn event(event: &Event, machine: &Machine) -> String {
+    let is_of_axis = matches!(event.kind, EventKind::DriveState { .. } | EventKind::Emergency { .. });
+    match event.group.filter(|_| machine.groups.len() > 1 && !is_of_axis) {
+        Some(group) => format!("{}: {}", machine.group_name(group), what_happened(event, machine)),
+        None => what_happened(event, machine),
+    }
+}
+
+fn what_happened(event: &Event, machine: &Machine) -> String {
     match event.kind {
         EventKind::PhaseChanged { from, to } => format!("{} → {}", phase(from), phase(to)),
         EventKind::Stop(reason) => format!("stop: {}", stop(&reason, machine)),
@@ -146,12 +155,13 @@ mod tests {
             cycle_ns: 1_000_000,
             axes: vec![axis("shoulder", Unit::Radian), axis("slide", Unit::Metre)],
             buses: vec![BusDescription { name: "left".to_owned(), interface: "can0".to_owned() }],
+            groups: vec![],
         }
     }
 
     #[test]
     fn events_read_as_sentences() {
-        let words = |kind| event(&Event { slot: 1, at_ns: 2, kind }, &machine());
+        let words = |kind| event(&Event { slot: 1, at_ns: 2, group: Some(0), kind }, &machine());
         assert_eq!(
             words(EventKind::PhaseChanged { from: Phase::Enabling, to: Phase::Holding }),
             "enabling → holding"

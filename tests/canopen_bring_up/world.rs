@@ -112,6 +112,7 @@ pub fn config(axes: &[(usize, u8)]) -> Config {
         },
         buses: (0..buses).map(bus).collect(),
         axes: axes.iter().enumerate().map(|(number, (bus, node))| axis(number, *bus, *node)).collect(),
+        groups: vec![],
         program: Program { repeat: 1, moves: vec![] },
         telemetry: Telemetry {
             directory: PathBuf::from("runs"),

@@ -146,6 +146,7 @@ impl World {
         let position = config.axes.iter().map(|axis| axis.simulated.initial_position).collect();
         config.program.repeat = 1;
         config.program.moves = vec![ProgramMove {
+            group: 0,
             target: ProgramTarget::Position(position),
             velocity_scale: 1.0,
             acceleration_scale: 1.0,

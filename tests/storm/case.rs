@@ -175,6 +175,7 @@ fn vary_program(dice: &mut Dice, config: &mut Config, has_client: bool) {
 
 fn random_move(dice: &mut Dice, target: ProgramTarget) -> ProgramMove {
     ProgramMove {
+        group: 0,
         target,
         velocity_scale: dice.between(0.2, 1.0),
         acceleration_scale: dice.between(0.2, 1.0),

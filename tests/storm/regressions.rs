@@ -14,6 +14,7 @@ fn moving(name: &'static str, text: &str) -> Case {
     let mut config = load(name);
     let to = config.axes.iter().map(|axis| 0.75 * axis.limits.position_max);
     config.program.moves = vec![ProgramMove {
+        group: 0,
         target: ProgramTarget::Position(to.collect()),
         velocity_scale: 1.0,
         acceleration_scale: 1.0,

@@ -20,7 +20,7 @@ fn outcome(last: Snapshot, stop: Option<StopReason>) -> RunOutcome {
         },
         last,
         buses_open_ns: 40_000_000,
-        targets: None,
+        targets: vec![],
         stop,
     }
 }
@@ -104,7 +104,7 @@ fn the_report_has_the_keys_of_the_contract_with_the_values_of_the_run() {
 #[test]
 fn the_report_of_a_finished_program_has_no_stop_and_has_its_targets() {
     let (log, last) = run_and_summarise(None);
-    let outcome = RunOutcome { targets: Some(vec![17.0, 17.4375]), ..outcome(last, None) };
+    let outcome = RunOutcome { targets: vec![Some(17.0), Some(17.4375)], ..outcome(last, None) };
     let report = RunReport::new(&log, &outcome);
     assert_eq!(serde_json::to_value(&report).unwrap()["stop"], Value::Null);
     assert_eq!((report.axes[1].target_position, report.axes[1].final_error_counts), (17.4375, Some(0.0)));

@@ -28,6 +28,7 @@ pub const STOP: StopReason = StopReason {
 
 pub fn sides(records: usize) -> (RtSide, HostSide, LogSide) {
     channels(&ChannelSizes {
+        groups: 1,
         stream: Default::default(),
         axes: 2,
         buses: 1,
@@ -53,6 +54,7 @@ pub fn machine() -> Machine {
         cycle_ns: CYCLE_NS,
         axes: vec![axis("shoulder", Unit::Radian), axis("slide", Unit::Metre)],
         buses: vec![BusDescription { name: "left".to_owned(), interface: "can0".to_owned() }],
+        groups: vec![],
     }
 }
 
@@ -106,11 +108,12 @@ pub fn cycle(slot: u64) -> CycleRecord {
         is_commanded: slot != 3,
         axis_count: 2,
         axes,
+        ..CycleRecord::default()
     }
 }
 
 pub fn event(slot: u64, kind: EventKind) -> Event {
-    Event { slot, at_ns: EPOCH_NS + slot * CYCLE_NS, kind }
+    Event { slot, at_ns: EPOCH_NS + slot * CYCLE_NS, group: Some(0), kind }
 }
 
 /// Hands over the cycles of these slots, and drains the logger after each.

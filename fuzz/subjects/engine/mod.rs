@@ -15,7 +15,8 @@ use takt::controller::assemble;
 use takt_rt::{
     BusHealth, BusSet, BusState, Command, CycleInput, CycleRecord, CycleTiming, Deadline, Dialect,
     DriveState, Engine, Event, Frame, HostInterface, LookAhead, MAX_AXES, OperationMode, Phase, Received,
-    Request, RequestEnvelope, RequestId, SendBatch, Snapshot, StreamPoint, StreamSample, StreamWish,
+    Request, RequestEnvelope, RequestId, RequestTarget, SendBatch, Snapshot, StreamPoint, StreamSample,
+    StreamWish,
 };
 
 use super::input::Input;
@@ -118,7 +119,7 @@ impl HostInterface for Hall {
         let request = self.requests.pop_front()?;
         self.asked += 1;
         self.is_retired |= request == Request::InhibitEnable;
-        Some(RequestEnvelope { id: RequestId(self.asked), request })
+        Some(RequestEnvelope { id: RequestId(self.asked), target: RequestTarget::All, request })
     }
 
     fn begin_stream(&mut self, _group: u8) {
@@ -278,7 +279,7 @@ impl Machine {
         self.slot += 1;
         let now_ns = self.now_ns();
         self.report();
-        let before = self.engine.phase();
+        let before = self.engine.phase(0).unwrap_or_default();
         let mut held_back = self.held_back;
         if disturbed == Disturbed::Blocked {
             (0..self.buses.len()).for_each(|bus| held_back.insert(bus));
@@ -316,7 +317,7 @@ impl Machine {
 
     fn note(&mut self, asked: u64) {
         let journey = &mut self.journey;
-        let phase = self.engine.phase();
+        let phase = self.engine.phase(0).unwrap_or_default();
         if journey.phases.last() != Some(&phase) {
             journey.phases.push(phase);
         }
@@ -357,7 +358,7 @@ impl Machine {
 
     /// The drives take what was sent to them, and what was sent is looked at.
     fn obey(&mut self, sent: &[SendBatch], before: Phase, has_acted: bool) {
-        let (phase, period_s) = (self.engine.phase(), self.period_s());
+        let (phase, period_s) = (self.engine.phase(0).unwrap_or_default(), self.period_s());
         for index in 0..self.config.axes.len() {
             let (axis, drive) = (&self.config.axes[index], &mut self.drives[index]);
             if let Some((_, cycles)) = self.targets[index].as_mut().filter(|_| has_acted) {

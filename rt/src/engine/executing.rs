@@ -70,7 +70,8 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
     /// Asks the host for what the trajectories want in the next cycle, and tells it which of them are needed.
     pub(super) fn sample_trajectories(&mut self, host: &mut impl HostInterface<AXES, BUSES>) {
         let period_s = self.shared.period_s;
-        for (number, group) in (0..).zip(&mut self.groups) {
+        for group in &mut self.groups {
+            let number = group.number;
             let GroupState::Executing(execution) = &mut group.state else {
                 host.keep_trajectories(number, [None; 2]);
                 continue;
@@ -83,14 +84,14 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
 }
 
 impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
-    /// Begins a trajectory of the host. `number` is that of the group.
+    /// Begins a trajectory of the host.
     pub(super) fn begin_execution(
         &mut self,
-        number: u8,
         id: RequestId,
         (trajectory, start): (TrajectoryId, ExecutionStart),
         host: &mut impl HostInterface<AXES, BUSES>,
     ) -> Handled {
+        let number = self.group.number;
         // Asked for in any case, so that the host gets it back in any case.
         let first = host.trajectory(number, trajectory, 0.0);
         self.require_phase(&[Phase::Holding, Phase::Moving])?;
@@ -101,7 +102,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
                 self.require_phase(&[Phase::Holding])?;
                 let here = |axis: &Axis| axis.set_point();
                 self.check_first(&first, here)?;
-                self.shared.snapshot.motions.begin(id, None, |axis| axis.is_none());
+                self.shared.snapshot.motions.begin(id, number, None, |axis| axis.is_none());
                 self.group.stop = None;
                 let execution =
                     Execution { motion: id, trajectory, cycles: 0, successor: None, wanted: None };
@@ -120,7 +121,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
                 let then = then.filter(|_| cycles > execution.cycles).ok_or(RejectReason::TooLate)?;
                 self.check_first(&first, |axis| axis.own(&then.states))?;
                 if !is_same_motion {
-                    self.shared.snapshot.motions.begin(id, None, |_| false);
+                    self.shared.snapshot.motions.begin(id, number, None, |_| false);
                 }
                 let motion = if is_same_motion { execution.motion } else { id };
                 let successor = Successor { trajectory, motion, after_cycles: cycles };
@@ -170,7 +171,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
 
     /// The last point has been reached. One that is passed in motion goes over into a stop.
     fn end_execution(&mut self, last: &[State]) {
-        self.shared.finish_motions();
+        self.finish_motions();
         let mut states = self.axes.iter().zip(last).filter(|(axis, _)| !axis.is_profile());
         if states.any(|(_, state)| state.velocity != 0.0) {
             self.begin_stop(StopCause::Requested, Origin::Group, StopCategory::Two);

@@ -26,6 +26,27 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
             self.shared.foreign_frame = None;
         }
     }
+
+    /// Stops the groups that stop with one that does, for the same reason, and those that stop with these. A stop that begins in
+    /// the step of a cycle stops the others in the next one.
+    pub(super) fn couple_stops(&mut self) {
+        for _ in 0..self.groups.len() {
+            for number in 0..self.groups.len() as u8 {
+                let untold = self.groups.get_mut(usize::from(number)).and_then(|group| group.untold.take());
+                if let Some(stop) = untold {
+                    self.stop_coupled(number, &stop);
+                }
+            }
+        }
+    }
+
+    fn stop_coupled(&mut self, with: u8, stop: &StopReason) {
+        self.for_each_group(|group| {
+            if group.group.stops_with.contains(&with) && group.group.state.has_power() {
+                group.begin_stop(stop.cause, stop.origin, stop.category);
+            }
+        });
+    }
 }
 
 impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
@@ -153,10 +174,14 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
                 // A reset that is under way is not for this fault.
                 self.group.fault_reset_cycles = 0;
             }
-            self.shared.emit(EventKind::Stop(reason));
-            self.shared.snapshot.motions.end_all(MotionState::Stopped(reason), |_| {});
+            self.emit(EventKind::Stop(reason));
+            self.shared.snapshot.motions.end_all(self.group.number, MotionState::Stopped(reason), |_| {});
         }
-        if present.is_none_or(|present| wanted < present.category) {
+        let is_harder = present.is_none_or(|present| wanted < present.category);
+        if is_harder || kept.is_none() {
+            self.group.untold = Some(reason);
+        }
+        if is_harder {
             self.carry_out(wanted);
         }
     }

@@ -2,19 +2,26 @@
 
 use core::ops::Range;
 
+use arrayvec::ArrayVec;
+
 use super::shared::Shared;
 use super::state::GroupState;
 use super::unsent_steps::UnsentSteps;
 use crate::axis::Axis;
 use crate::bus_set::BusSet;
 use crate::group_trajectory::{GroupTrajectory, Profiles};
-use crate::record::EventKind;
+use crate::motion_reports::MotionState;
+use crate::record::{Event, EventKind, MAX_GROUPS};
 use crate::source::StreamSample;
 use crate::stop::StopReason;
 
 /// What belongs to one group.
 #[derive(Clone, Debug)]
 pub(super) struct Group<const AXES: usize, const BUSES: usize> {
+    /// Its number.
+    pub(super) number: u8,
+    /// The groups that stop this one, too, when they stop, by their numbers.
+    pub(super) stops_with: ArrayVec<u8, MAX_GROUPS>,
     /// Where its axes stand among those of the engine, which has them beside each other.
     pub(super) places: Range<usize>,
     /// The buses that concern it.
@@ -32,6 +39,8 @@ pub(super) struct Group<const AXES: usize, const BUSES: usize> {
     pub(super) fault_reset_cycles: u32,
     pub(super) commands: Commands,
     pub(super) unsent: UnsentSteps<BUSES>,
+    /// The stop that has begun, or has become harder, and of which the groups that stop with this one do not know yet.
+    pub(super) untold: Option<StopReason>,
 }
 
 /// What becomes of the commands of a cycle.
@@ -45,8 +54,10 @@ pub(super) enum Commands {
 
 impl<const AXES: usize, const BUSES: usize> Group<AXES, BUSES> {
     /// A passive group.
-    pub(super) fn new(places: Range<usize>, buses: BusSet) -> Self {
+    pub(super) fn new(number: u8, places: Range<usize>, buses: BusSet) -> Self {
         Self {
+            number,
+            stops_with: ArrayVec::new(),
             places,
             buses,
             state: GroupState::Passive,
@@ -57,6 +68,7 @@ impl<const AXES: usize, const BUSES: usize> Group<AXES, BUSES> {
             fault_reset_cycles: 0,
             commands: Commands::None,
             unsent: UnsentSteps::default(),
+            untold: None,
         }
     }
 
@@ -93,8 +105,23 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
         let (from, to) = (self.group.state.phase(), state.phase());
         self.group.state = state;
         if from != to {
-            self.shared.emit(EventKind::PhaseChanged { from, to });
+            self.emit(EventKind::PhaseChanged { from, to });
             self.group.state_cycles = 0;
         }
+    }
+
+    /// Emits an event that concerns the group.
+    pub(super) fn emit(&mut self, kind: EventKind) {
+        self.shared.emit(Some(self.group.number), kind);
+    }
+
+    /// The motions of the group have reached their targets.
+    pub(super) fn finish_motions(&mut self) {
+        let (number, shared) = (self.group.number, &mut *self.shared);
+        let (slot, at_ns, group) = (shared.present_slot(), shared.now_ns, Some(number));
+        let events = &mut shared.events;
+        shared.snapshot.motions.end_all(number, MotionState::Finished, |request| {
+            events.push(Event { slot, at_ns, group, kind: EventKind::MotionFinished { request } });
+        });
     }
 }

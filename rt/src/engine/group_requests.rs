@@ -12,7 +12,6 @@ use crate::group_trajectory::Leg;
 use crate::phase::Phase;
 use crate::plan::{PlanError, State};
 use crate::profile::ProfileTarget;
-use crate::record::EventKind;
 use crate::request::{Move, ProfileMove, RejectReason, Request, RequestId};
 use crate::source::StreamSample;
 use crate::stop::{Origin, StopCause};
@@ -21,17 +20,39 @@ use crate::time::Nanoseconds;
 use crate::watch::TimingLevel;
 
 impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
-    /// Handles what was asked of the group.
+    /// Whether the group can do now what was asked of it. What its numbers say is checked when it is carried out.
+    pub(super) fn check_request(&self, request: &Request<AXES>) -> Handled {
+        match request {
+            Request::Activate => self.require_phase(&[Phase::Passive]),
+            Request::Enable if self.shared.requested.ending >= Ending::EnableInhibited => {
+                Err(RejectReason::EnableInhibited.into())
+            }
+            Request::Enable => {
+                self.require_phase(&[Phase::Disabled])?;
+                self.require_no_fault()
+            }
+            Request::Move(_) | Request::SetProfileTarget(_) => {
+                self.require_phase(&[Phase::Holding, Phase::Moving])?;
+                self.require_no_fault()
+            }
+            Request::Stream => self.check_stream(),
+            Request::Disable if self.group.state == GroupState::Passive => Err(RejectReason::Phase.into()),
+            Request::ResetFaults => self.require_phase(&[Phase::Disabled, Phase::Holding]),
+            _ => Ok(()),
+        }
+    }
+
+    /// Carries out what was asked of the group, after [`GroupContext::check`].
     pub(super) fn try_request(&mut self, id: RequestId, request: &Request<AXES>) -> Handled {
         match request {
-            Request::Activate => self.activate()?,
-            Request::Enable => self.begin_enabling()?,
+            Request::Activate => self.activate(),
+            Request::Enable => self.begin_enabling(),
             Request::Move(parameters) => self.begin_move(id, parameters)?,
             Request::SetProfileTarget(target) => self.set_profile_target(id, target)?,
-            Request::Stream => self.begin_stream()?,
+            Request::Stream => self.begin_stream(),
             Request::Stop(category) => self.begin_stop(StopCause::Requested, Origin::Group, *category),
-            Request::Disable => self.begin_disabling()?,
-            Request::ResetFaults => self.reset_faults()?,
+            Request::Disable => self.begin_disabling(),
+            Request::ResetFaults => self.reset_faults(),
             // The engine has handled what concerns all groups, or the host.
             Request::Sync(_)
             | Request::TimeOfDay { .. }
@@ -50,7 +71,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
     }
 
     fn axis_mut(&mut self, number: u8) -> Result<&mut Axis, Rejection> {
-        let unknown = RejectReason::UnknownAxis { axis: number, axes: self.axes.len() as u8 };
+        let unknown = RejectReason::UnknownAxis { axis: number, axes: self.shared.snapshot.axis_count };
         self.axes.iter_mut().find(|axis| axis.number() == number).ok_or(unknown.into())
     }
 
@@ -58,55 +79,40 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
     pub(super) fn require_no_fault(&self) -> Handled {
         match self.group.stop.filter(|stop| !stop.is_requested()) {
             Some(stop) => {
-                Err(Rejection { reason: RejectReason::StopLatched { rule: stop.rule() }, axis: stop.axis() })
+                Err(Rejection { axis: stop.axis(), ..RejectReason::StopLatched { rule: stop.rule() }.into() })
             }
             None => Ok(()),
         }
     }
 
-    fn activate(&mut self) -> Handled {
-        self.require_phase(&[Phase::Passive])?;
+    fn activate(&mut self) {
         self.axes.iter_mut().for_each(Axis::start_from_actual);
         self.enter(GroupState::Disabled);
-        Ok(())
     }
 
-    fn begin_enabling(&mut self) -> Handled {
-        if self.shared.requested.ending >= Ending::EnableInhibited {
-            return Err(RejectReason::EnableInhibited.into());
-        }
-        self.require_phase(&[Phase::Disabled])?;
-        self.require_no_fault()?;
+    fn begin_enabling(&mut self) {
         self.group.stop = None;
-        self.forget_observations();
+        self.axes.iter_mut().for_each(Axis::begin_watch);
         if let Some(heartbeat) = &mut self.shared.heartbeat {
             heartbeat.hasten();
         }
         self.enter(GroupState::Enabling);
-        Ok(())
     }
 
-    /// Forgets what was observed while nothing could move.
-    fn forget_observations(&mut self) {
-        self.axes.iter_mut().for_each(Axis::begin_watch);
-        self.shared.foreign_frame = None;
-        self.shared.slots.forgive();
-        if let Some(level) = self.shared.slots.changed_level() {
-            self.shared.emit(EventKind::Timing { level });
-        }
-    }
-
-    fn begin_stream(&mut self) -> Handled {
+    fn check_stream(&self) -> Handled {
         self.require_phase(&[Phase::Holding])?;
         self.require_no_fault()?;
         if self.shared.slots.level() >= TimingLevel::Degraded {
             let (missed, _) = self.shared.slots.unforgiven();
             return Err(RejectReason::MissedSlots { missed, limit: self.shared.slots.degraded() }.into());
         }
+        Ok(())
+    }
+
+    fn begin_stream(&mut self) {
         self.group.stop = None;
         self.group.stream = StreamSample::default();
         self.enter(GroupState::Streaming(Stream::Requested));
-        Ok(())
     }
 
     fn enter_motion(&mut self) {
@@ -115,8 +121,6 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
     }
 
     fn begin_move(&mut self, id: RequestId, parameters: &Move<AXES>) -> Handled {
-        self.require_phase(&[Phase::Holding, Phase::Moving])?;
-        self.require_no_fault()?;
         check_scales(parameters)?;
         let target_of = |axis: &Axis| (axis.own(&parameters.target), axis.own(&parameters.target_velocity));
         for axis in self.axes.iter() {
@@ -159,7 +163,10 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
                 self.axes.iter().filter(|axis| axis.parameters().law == ControlLaw::ProfilePosition);
             positioned.any(|axis| axis.number() == number)
         };
-        self.shared.snapshot.motions.begin(id, None, |axis| axis.is_none_or(is_positioned));
+        self.shared
+            .snapshot
+            .motions
+            .begin(id, self.group.number, None, |axis| axis.is_none_or(is_positioned));
         self.enter_motion();
         Ok(())
     }
@@ -177,11 +184,9 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
     }
 
     fn set_profile_target(&mut self, id: RequestId, wanted: &ProfileMove) -> Handled {
-        self.require_phase(&[Phase::Holding, Phase::Moving])?;
         if matches!(self.group.state, GroupState::Executing(_)) {
             return Err(RejectReason::Phase.into());
         }
-        self.require_no_fault()?;
         check_profile_target(self.axis_mut(wanted.axis)?, wanted.target)
             .map_err(|reason| reason.of_axis(wanted.axis))?;
         // The other axes stay where they are, not where the last trajectory ended.
@@ -191,30 +196,26 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
         self.axis_mut(wanted.axis)?.set_profile_target(wanted.target, wanted.valid_until_ns);
         let is_position = matches!(wanted.target, ProfileTarget::Position(_));
         let takes_over = |axis: Option<u8>| axis.map_or(is_position, |axis| axis == wanted.axis);
-        self.shared.snapshot.motions.begin(id, Some(wanted.axis), takes_over);
+        self.shared.snapshot.motions.begin(id, self.group.number, Some(wanted.axis), takes_over);
         self.enter_motion();
         Ok(())
     }
 
-    fn begin_disabling(&mut self) -> Handled {
+    fn begin_disabling(&mut self) {
         match self.group.state {
-            GroupState::Passive => return Err(RejectReason::Phase.into()),
-            GroupState::Disabled | GroupState::Disabling(_) => {}
+            GroupState::Passive | GroupState::Disabled | GroupState::Disabling(_) => {}
             _ if self.must_come_to_rest() || self.group.state == GroupState::Stopping => {
                 self.begin_stop(StopCause::Requested, Origin::Group, StopCategory::One);
             }
             _ => self.enter(GroupState::Disabling(PowerRemoval::Shutdown)),
         }
-        Ok(())
     }
 
-    fn reset_faults(&mut self) -> Handled {
-        self.require_phase(&[Phase::Disabled, Phase::Holding])?;
+    fn reset_faults(&mut self) {
         if self.group.state == GroupState::Disabled {
             self.group.fault_reset_cycles = 3 * FAULT_RESET_CYCLES;
             self.axes.iter_mut().for_each(Axis::begin_fault_reset);
         }
         self.group.stop = None;
-        Ok(())
     }
 }

@@ -45,7 +45,7 @@ use crate::bus_set::BusSet;
 use crate::dispatch::Dispatch;
 use crate::frame::Frame;
 use crate::group_trajectory::ProfileStore;
-use crate::host::HostInterface;
+use crate::host::{GroupSnapshot, HostInterface};
 use crate::phase::Phase;
 use crate::port::BusHealth;
 use crate::record::{CycleTiming, EventKind, MAX_AXES, MAX_BUSES, MAX_GROUPS};
@@ -53,8 +53,9 @@ use crate::time::Nanoseconds;
 use group::{Commands, Group, GroupContext};
 use parameters::{axes_of, dispatch_of};
 use shared::{Ending, Shared};
+use state::GroupState;
 
-pub use parameters::{BusParameters, CycleCount, EngineParameters, Heartbeat, SetUpError};
+pub use parameters::{BusParameters, CycleCount, EngineParameters, GroupParameters, Heartbeat, SetUpError};
 pub use sense::Receiver;
 
 /// The most frames that the engine hands to one bus in one cycle.
@@ -105,7 +106,11 @@ pub enum Deadline {
 ///
 /// impl HostInterface<1, 1> for Host {
 ///     fn request(&mut self) -> Option<RequestEnvelope<1>> {
-///         self.requests.pop().map(|request| RequestEnvelope { id: RequestId(0), request })
+///         self.requests.pop().map(|request| RequestEnvelope {
+///             id: RequestId(0),
+///             target: RequestTarget::All,
+///             request,
+///         })
 ///     }
 ///     fn publish(&mut self, snapshot: &Snapshot<1, 1>) {
 ///         self.phase = snapshot.phase;
@@ -161,6 +166,7 @@ pub enum Deadline {
 /// let mut engine: Engine<1, 1> = Engine::new(EngineParameters {
 ///     period_ns: 1_000_000,
 ///     axes: [axis].into_iter().collect(),
+///     groups: Default::default(),
 ///     buses: [bus].into_iter().collect(),
 ///     heartbeat: None,
 ///     time_cycles: None,
@@ -215,8 +221,16 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
     /// A parameter that is not possible. Everything that the engine relies on is checked here.
     pub fn new(parameters: EngineParameters<AXES, BUSES>) -> Result<Self, SetUpError> {
         parameters.validate()?;
-        let mut groups = ArrayVec::new();
-        groups.push(Group::new(0..parameters.axes.len(), BusSet::first(parameters.buses.len())));
+        let mut groups: ArrayVec<Group<AXES, BUSES>, MAX_GROUPS> = ArrayVec::new();
+        let mut first = 0;
+        for (number, axes) in (0..).zip(parameters.axes_of_groups()) {
+            let places = first..first + axes.len();
+            first = places.end;
+            groups.push(Group::new(number, places, parameters.buses_of(&axes)));
+        }
+        for (group, own) in groups.iter_mut().zip(&parameters.groups) {
+            group.stops_with = own.stops_with.clone();
+        }
         Ok(Self {
             dispatch: dispatch_of(&parameters)?,
             axes: axes_of(&parameters),
@@ -236,12 +250,12 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         self.shared.period_ns
     }
 
-    /// What the group is doing.
-    pub fn phase(&self) -> Phase {
-        self.groups.first().map_or(Phase::Passive, |group| group.state.phase())
+    /// What a group is doing; `None` if there is no such group.
+    pub fn phase(&self, group: u8) -> Option<Phase> {
+        self.groups.get(usize::from(group)).map(|group| group.state.phase())
     }
 
-    /// The axes.
+    /// The axes, group by group: see [`Axis::number`].
     pub fn axes(&self) -> &[Axis] {
         &self.axes
     }
@@ -257,6 +271,8 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         self.handle_requests(host);
         self.sample_streams(input.slot_start_ns, host);
         self.check_faults(input.buses);
+        self.couple_stops();
+        self.probe_late_drives();
         self.sample_trajectories(host);
         self.for_each_group(|group| {
             group.step();
@@ -299,16 +315,20 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         let shared = &mut self.shared;
         shared.slots.end(is_late);
         if is_late {
-            shared.emit(EventKind::MissedSlots { count: 1 });
+            shared.emit(None, EventKind::MissedSlots { count: 1 });
         }
         shared.dropped += shared.events.drain(|event| host.event(event));
         shared.record.timing = CycleTiming { missed_slots: shared.slots.missed_now, ..timing };
         shared.record.is_commanded = is_commanded;
-        if let Some(group) = self.groups.first() {
-            shared.record.phase = group.state.phase();
+        for (group, phase) in self.groups.iter().zip(&mut shared.record.group_phases) {
+            *phase = group.state.phase();
         }
-        for (axis, record) in self.axes.iter().zip(&mut shared.record.axes) {
-            axis.record(shared.period_s, record);
+        let [first, ..] = shared.record.group_phases;
+        shared.record.phase = first;
+        for axis in &self.axes {
+            if let Some(record) = shared.record.axes.get_mut(usize::from(axis.number())) {
+                axis.record(shared.period_s, record);
+            }
         }
         shared.dropped += u64::from(!host.record(&shared.record));
         self.show(timing.slot, now_ns, buses);
@@ -323,14 +343,23 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         snapshot.missed_slots = shared.slots.missed;
         snapshot.timing = shared.slots.level();
         snapshot.dropped = shared.dropped;
-        if let Some(group) = self.groups.first() {
+        let streaming = self.groups.iter().find(|group| matches!(group.state, GroupState::Streaming(_)));
+        if let Some(group) = streaming.or(self.groups.first()) {
             snapshot.stream = group.stream_report();
-            snapshot.phase = group.state.phase();
-            snapshot.remaining_s = group.remaining_s();
-            snapshot.stop = group.stop;
         }
-        for (axis, shown) in self.axes.iter().zip(&mut snapshot.axes) {
-            axis.show(shown);
+        for (group, shown) in self.groups.iter().zip(&mut snapshot.groups) {
+            *shown = GroupSnapshot {
+                phase: group.state.phase(),
+                remaining_s: group.remaining_s(),
+                stop: group.stop,
+            };
+        }
+        let [GroupSnapshot { phase, remaining_s, stop }, ..] = snapshot.groups;
+        (snapshot.phase, snapshot.remaining_s, snapshot.stop) = (phase, remaining_s, stop);
+        for axis in &self.axes {
+            if let Some(shown) = snapshot.axes.get_mut(usize::from(axis.number())) {
+                axis.show(shown);
+            }
         }
         for (shown, health) in snapshot.buses.iter_mut().zip(buses) {
             *shown = *health;

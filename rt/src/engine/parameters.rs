@@ -1,12 +1,13 @@
-//! Everything about the group that does not change while it runs, and how it is checked.
+//! Everything about the controller that does not change while it runs, and how it is checked.
 
 use arrayvec::ArrayVec;
 
 use super::SEND_BATCH;
 use crate::axis::{Axis, AxisParameters, AxisParametersError};
+use crate::bus_set::BusSet;
 use crate::dispatch::{Dispatch, IdTaken};
 use crate::frame::Id;
-use crate::record::{MAX_AXES, MAX_BUSES};
+use crate::record::{MAX_AXES, MAX_BUSES, MAX_GROUPS};
 use crate::stop::StopCategories;
 use crate::time::{NANOSECONDS_PER_SECOND, Nanoseconds};
 use crate::watch::TimingLadder;
@@ -36,13 +37,24 @@ pub struct Heartbeat {
     pub timeout_cycles: u32,
 }
 
-/// Everything about the group that does not change while it runs.
+/// A group of axes, which start, move, stop and fault together.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct GroupParameters<const AXES: usize = MAX_AXES> {
+    /// Its axes, by their numbers.
+    pub axes: ArrayVec<u8, AXES>,
+    /// The groups that stop this one, too, when they stop, by their numbers.
+    pub stops_with: ArrayVec<u8, MAX_GROUPS>,
+}
+
+/// Everything about the controller that does not change while it runs.
 #[derive(Clone, Debug)]
 pub struct EngineParameters<const AXES: usize = MAX_AXES, const BUSES: usize = MAX_BUSES> {
     /// The period of the cycle.
     pub period_ns: Nanoseconds,
     /// The axes.
     pub axes: ArrayVec<AxisParameters, AXES>,
+    /// The groups, each axis in one of them. Without any, all axes are one group.
+    pub groups: ArrayVec<GroupParameters<AXES>, MAX_GROUPS>,
     /// The buses.
     pub buses: ArrayVec<BusParameters, BUSES>,
     /// The heartbeat, if one is sent.
@@ -101,6 +113,32 @@ pub enum SetUpError {
         axis: usize,
         /// The node ID.
         node: u8,
+    },
+    /// A group has no axis.
+    EmptyGroup {
+        /// The group.
+        group: usize,
+    },
+    /// A group names an axis that is not there.
+    UnknownGroupAxis {
+        /// The group.
+        group: usize,
+        /// The number of the axis.
+        axis: usize,
+    },
+    /// An axis is in no group, or in more than one.
+    GroupsOfAxis {
+        /// The axis.
+        axis: usize,
+        /// How many groups it is in.
+        groups: usize,
+    },
+    /// A group is to stop with one that is not there, or with itself.
+    StopsWith {
+        /// The group.
+        group: usize,
+        /// The number of the group that it is to stop with.
+        with: usize,
     },
     /// A number of cycles is zero where at least one must pass.
     NoCycles {
@@ -162,6 +200,14 @@ impl core::fmt::Display for SetUpError {
             Self::DuplicateNodeId { axis, node } => {
                 write!(f, "axis {axis}: another node has its node ID, {node}")
             }
+            Self::EmptyGroup { group } => write!(f, "group {group} has no axis"),
+            Self::UnknownGroupAxis { group, axis } => {
+                write!(f, "group {group} names axis {axis}, which does not exist")
+            }
+            Self::GroupsOfAxis { axis, groups } => {
+                write!(f, "axis {axis} is in {groups} groups: it must be in one")
+            }
+            Self::StopsWith { group, with } => write!(f, "group {group} cannot stop with group {with}"),
             Self::NoCycles { of } => write!(f, "at least one cycle must pass ({of:?})"),
             Self::IdTaken { axis, id } => write!(f, "axis {axis}: identifier {id:?} is in use already"),
             Self::TooManyFrames { bus, frames, limit } => {
@@ -190,6 +236,7 @@ impl<const AXES: usize, const BUSES: usize> EngineParameters<AXES, BUSES> {
         if self.axes.is_empty() {
             return Err(SetUpError::NoAxis);
         }
+        self.validate_groups()?;
         self.validate_cycles()?;
         for (axis, own) in self.axes.iter().enumerate() {
             self.validate_axis(axis, own)?;
@@ -213,6 +260,53 @@ impl<const AXES: usize, const BUSES: usize> EngineParameters<AXES, BUSES> {
             }
         }
         Ok(())
+    }
+
+    fn validate_groups(&self) -> Result<(), SetUpError> {
+        for (group, own) in self.groups.iter().enumerate() {
+            if own.axes.is_empty() {
+                return Err(SetUpError::EmptyGroup { group });
+            }
+            let unknown =
+                own.axes.iter().map(|axis| usize::from(*axis)).find(|axis| *axis >= self.axes.len());
+            if let Some(axis) = unknown {
+                return Err(SetUpError::UnknownGroupAxis { group, axis });
+            }
+            let mut with = own.stops_with.iter().map(|with| usize::from(*with));
+            if let Some(with) = with.find(|with| *with >= self.groups.len() || *with == group) {
+                return Err(SetUpError::StopsWith { group, with });
+            }
+        }
+        for axis in 0..self.axes.len() {
+            let all = self.groups.iter().flat_map(|group| &group.axes);
+            let groups = all.filter(|number| usize::from(**number) == axis).count();
+            if groups != 1 && !self.groups.is_empty() {
+                return Err(SetUpError::GroupsOfAxis { axis, groups });
+            }
+        }
+        Ok(())
+    }
+
+    /// The numbers of the axes of each group; without groups, of all axes.
+    pub(super) fn axes_of_groups(&self) -> impl Iterator<Item = ArrayVec<u8, AXES>> {
+        let all = self.groups.is_empty().then(|| (0..self.axes.len() as u8).collect());
+        self.groups.iter().map(|group| group.axes.clone()).chain(all)
+    }
+
+    fn bus_of(&self, axis: u8) -> Option<usize> {
+        self.axes.get(usize::from(axis)).map(|axis| usize::from(axis.bus))
+    }
+
+    /// The buses that concern a group: those with an axis of it, and those without any axis.
+    pub(super) fn buses_of(&self, axes: &[u8]) -> BusSet {
+        let has_others = |bus: usize| self.axes.iter().any(|axis| usize::from(axis.bus) == bus);
+        let mut buses = BusSet::default();
+        for bus in 0..self.buses.len() {
+            if axes.iter().any(|axis| self.bus_of(*axis) == Some(bus)) || !has_others(bus) {
+                buses.insert(bus);
+            }
+        }
+        buses
     }
 
     fn validate_cycles(&self) -> Result<(), SetUpError> {
@@ -248,33 +342,41 @@ impl<const AXES: usize, const BUSES: usize> EngineParameters<AXES, BUSES> {
     }
 }
 
-/// The axes. The set-points of those on faster buses wait for those on the slowest: a joint is where the trajectory was two
-/// cycles of its bus ago.
+/// The axes, those of a group beside each other. The set-points of those on faster buses wait for those of their group on its
+/// slowest: a joint is where the trajectory was two cycles of its bus ago.
 pub(super) fn axes_of<const AXES: usize, const BUSES: usize>(
     parameters: &EngineParameters<AXES, BUSES>,
 ) -> ArrayVec<Axis, AXES> {
-    let mut axes: ArrayVec<Axis, AXES> =
-        (0..).zip(&parameters.axes).map(|(number, own)| Axis::new(number, own.clone())).collect();
+    let mut axes = ArrayVec::new();
     let divider =
         |axis: &Axis| parameters.buses.get(usize::from(axis.parameters().bus)).map_or(1, |bus| bus.divider);
-    // A drive in a profile mode gets no set-points, so that no other axis waits for it.
-    let slowest = axes.iter().filter(|axis| !axis.is_profile()).map(divider).max().unwrap_or(1);
     let period_s = parameters.period_ns as f64 / NANOSECONDS_PER_SECOND as f64;
-    for axis in &mut axes {
-        axis.delay_set_points(slowest.saturating_sub(divider(axis)).saturating_mul(2));
-        axis.set_cycle(period_s * f64::from(divider(axis)));
+    for numbers in parameters.axes_of_groups() {
+        let own = |number: &u8| parameters.axes.get(usize::from(*number)).cloned();
+        let mut group: ArrayVec<Axis, AXES> =
+            numbers.iter().filter_map(|number| Some(Axis::new(*number, own(number)?))).collect();
+        // A drive in a profile mode gets no set-points, so that no other axis waits for it.
+        let slowest = group.iter().filter(|axis| !axis.is_profile()).map(divider).max().unwrap_or(1);
+        for axis in &mut group {
+            axis.delay_set_points(slowest.saturating_sub(divider(axis)).saturating_mul(2));
+            axis.set_cycle(period_s * f64::from(divider(axis)));
+        }
+        axes.extend(group);
     }
     axes
 }
 
-/// The owner of each identifier, on each bus.
+/// The owner of each identifier, on each bus: the place of an axis among those of the engine.
 pub(super) fn dispatch_of<const AXES: usize, const BUSES: usize>(
     parameters: &EngineParameters<AXES, BUSES>,
 ) -> Result<[Dispatch; BUSES], SetUpError> {
     let mut dispatch: [Dispatch; BUSES] = core::array::from_fn(|_| Dispatch::default());
-    for (axis, own) in parameters.axes.iter().enumerate() {
+    for (place, number) in (0..).zip(parameters.axes_of_groups().flatten()) {
+        let axis = usize::from(number);
+        let own = parameters.axes.get(axis).ok_or(SetUpError::NoAxis)?;
         let table = dispatch.get_mut(usize::from(own.bus));
-        enter(table.ok_or(SetUpError::UnknownBus { axis })?, axis, own)?;
+        let taken = |taken: IdTaken| SetUpError::IdTaken { axis, id: taken.id };
+        enter(table.ok_or(SetUpError::UnknownBus { axis })?, place, own).map_err(taken)?;
     }
     for (bus, table) in parameters.buses.iter().zip(&mut dispatch) {
         table.foreign(NMT);
@@ -286,18 +388,17 @@ pub(super) fn dispatch_of<const AXES: usize, const BUSES: usize>(
     Ok(dispatch)
 }
 
-fn enter(table: &mut Dispatch, axis: usize, own: &AxisParameters) -> Result<(), SetUpError> {
-    let taken = |taken: IdTaken| SetUpError::IdTaken { axis, id: taken.id };
-    table.emergency(Id::canopen(0x080, own.node), axis as u8).map_err(taken)?;
-    for (number, pdo) in own.feedback.iter().enumerate() {
-        table.feedback(pdo.id, axis as u8, number as u8).map_err(taken)?;
+fn enter(table: &mut Dispatch, place: u8, own: &AxisParameters) -> Result<(), IdTaken> {
+    table.emergency(Id::canopen(0x080, own.node), place)?;
+    for (number, pdo) in (0..).zip(&own.feedback) {
+        table.feedback(pdo.id, place, number)?;
     }
-    table.error_control(Id::canopen(0x700, own.node), axis as u8).map_err(taken)?;
+    table.error_control(Id::canopen(0x700, own.node), place)?;
     for command in &own.commands {
         table.foreign(command.pdo.id);
     }
     for id in &own.unused {
-        table.unused(*id, axis as u8).map_err(taken)?;
+        table.unused(*id, place)?;
     }
     Ok(())
 }

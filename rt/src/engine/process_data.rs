@@ -16,35 +16,35 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
     /// in one direction, an object has no use or value, or an identifier has another one. Then nothing is changed.
     pub(super) fn set_process_data(&mut self, data: &AxisProcessData) -> Result<(), Rejection> {
         self.require_phase_of(data.axis, &[Phase::Passive])?;
-        let index = usize::from(data.axis);
+        let place = self.place_of(data.axis)?;
         let bus = usize::from(self.axis_mut(data.axis)?.parameters().bus);
-        self.exchange(data, index, bus).map_err(|reason| reason.of_axis(data.axis))
+        self.exchange(data, place, bus).map_err(|reason| reason.of_axis(data.axis))
     }
 
-    fn exchange(&mut self, data: &AxisProcessData, index: usize, bus: usize) -> Result<(), RejectReason> {
+    fn exchange(&mut self, data: &AxisProcessData, place: usize, bus: usize) -> Result<(), RejectReason> {
         let commands = data.commands.iter().flatten().map(command);
         let commands: ArrayVec<CommandPdo, MAX_PDOS> =
             commands.collect::<Result<_, _>>().map_err(unmapped)?;
         let feedback = data.feedback.iter().flatten().map(feedback);
         let feedback: ArrayVec<Pdo, MAX_PDOS> = feedback.collect::<Result<_, _>>().map_err(unmapped)?;
-        let frames = self.frames_beside(index, bus) + commands.len();
+        let frames = self.frames_beside(place, bus) + commands.len();
         if frames > SEND_BATCH {
             return Err(RejectReason::TooManyFrames { frames: frames as u16, limit: SEND_BATCH as u16 });
         }
         // An engine has a table for every bus of an axis, and a place for every axis in it.
-        let (Some(table), Some(axis)) = (self.dispatch.get_mut(bus), self.axes.get_mut(index)) else {
+        let (Some(table), Some(axis)) = (self.dispatch.get_mut(bus), self.axes.get_mut(place)) else {
             return Err(RejectReason::NoProcessData);
         };
         if commands.is_empty() || feedback.is_empty() {
             return Err(RejectReason::NoProcessData);
         }
-        let mut changed = table.clone();
-        changed.forget_process_data(data.axis);
+        let (mut changed, entry) = (table.clone(), place as u8);
+        changed.forget_process_data(entry);
         for (number, pdo) in (0..).zip(&feedback) {
-            changed.feedback(pdo.id, data.axis, number).map_err(taken)?;
+            changed.feedback(pdo.id, entry, number).map_err(taken)?;
         }
         for id in data.unused.iter().flatten() {
-            changed.unused(*id, data.axis).map_err(taken)?;
+            changed.unused(*id, entry).map_err(taken)?;
         }
         for command in &commands {
             changed.foreign(command.pdo.id);
@@ -55,12 +55,12 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
     }
 
     /// The most frames of a bus in one cycle, without the set-points of one axis.
-    fn frames_beside(&self, index: usize, bus: usize) -> usize {
+    fn frames_beside(&self, place: usize, bus: usize) -> usize {
         let others = self
             .axes
             .iter()
             .enumerate()
-            .filter(|(other, axis)| *other != index && usize::from(axis.parameters().bus) == bus);
+            .filter(|(other, axis)| *other != place && usize::from(axis.parameters().bus) == bus);
         OTHER_FRAMES + others.map(|(_, axis)| axis.parameters().commands.len()).sum::<usize>()
     }
 }

@@ -1,5 +1,7 @@
 //! What is asked of the controller. What is asked of one of its groups goes on to `group_requests`.
 
+use core::ops::Range;
+
 use super::Engine;
 use super::shared::Ending;
 use super::targets::Rejection;
@@ -7,13 +9,13 @@ use crate::axis::Axis;
 use crate::host::HostInterface;
 use crate::phase::Phase;
 use crate::record::EventKind;
-use crate::request::{RejectReason, Request, RequestEnvelope, RequestError, RequestId};
+use crate::request::{
+    ExecutionStart, RejectReason, Request, RequestEnvelope, RequestError, RequestId, RequestTarget,
+    TrajectoryId,
+};
 
 /// Requests that are handled in one cycle; the rest waits, so that a flood of them costs a bounded time.
 const REQUESTS_PER_CYCLE: usize = 4;
-
-/// The first group.
-const FIRST: u8 = 0;
 
 /// Done, or why not; nothing has changed then.
 pub(super) type Handled = Result<(), Rejection>;
@@ -31,20 +33,28 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         envelope: &RequestEnvelope<AXES>,
         host: &mut impl HostInterface<AXES, BUSES>,
     ) {
-        let RequestEnvelope { id, request } = envelope;
-        let rejected = self.try_request(*id, request, host).err().map(|Rejection { reason, axis }| {
-            RequestError { request: request.kind(), reason, axis, phase: self.phase() }
+        let RequestEnvelope { id, target, request } = envelope;
+        let rejection = self.try_request(*id, *target, request, host).err();
+        let of_group = rejection.and_then(|Rejection { axis, group, .. }| {
+            group.or_else(|| axis.and_then(|axis| self.group_of(axis).ok()))
+        });
+        let rejected = rejection.map(|Rejection { reason, axis, .. }| RequestError {
+            request: request.kind(),
+            reason,
+            axis,
+            phase: self.phase(of_group.unwrap_or(0)).unwrap_or_default(),
         });
         self.shared.snapshot.answers.note(*id, rejected);
         if let Some(rejected) = rejected {
             self.shared.snapshot.rejected += 1;
-            self.shared.emit(EventKind::Rejected(rejected));
+            self.shared.emit(of_group, EventKind::Rejected(rejected));
         }
     }
 
     fn try_request(
         &mut self,
         id: RequestId,
+        target: RequestTarget,
         request: &Request<AXES>,
         host: &mut impl HostInterface<AXES, BUSES>,
     ) -> Handled {
@@ -68,12 +78,9 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
             | Request::Stream
             | Request::Stop(_)
             | Request::Disable
-            | Request::ResetFaults => {
-                self.group(FIRST).map_or(Ok(()), |mut group| group.try_request(id, request))?;
-            }
+            | Request::ResetFaults => self.ask_groups(id, target, request)?,
             Request::Execute { trajectory, start } => {
-                let (group, execution) = (self.group(FIRST), (*trajectory, *start));
-                group.map_or(Ok(()), |mut group| group.begin_execution(FIRST, id, execution, host))?;
+                self.execute(id, target, request, (*trajectory, *start), host)?
             }
             Request::InhibitEnable => {
                 self.shared.requested.ending = self.shared.requested.ending.max(Ending::EnableInhibited)
@@ -83,16 +90,102 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         Ok(())
     }
 
+    /// Hands a request to the groups that it is for. Where one of them rejects it, none carries it out.
+    fn ask_groups(&mut self, id: RequestId, target: RequestTarget, request: &Request<AXES>) -> Handled {
+        for number in self.asked_groups(target, request)? {
+            let rejection = self.group(number).and_then(|group| group.check_request(request).err());
+            if let Some(rejection) = rejection {
+                return Err(Rejection { group: Some(number), ..rejection });
+            }
+        }
+        if *request == Request::Enable && !self.groups.iter().any(|group| group.state.has_power()) {
+            self.forget_observations();
+        }
+        for number in self.asked_groups(target, request)? {
+            if let Some(mut group) = self.group(number) {
+                group
+                    .try_request(id, request)
+                    .map_err(|rejection| Rejection { group: Some(number), ..rejection })?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Forgets what was observed while nothing could move.
+    fn forget_observations(&mut self) {
+        self.shared.foreign_frame = None;
+        self.shared.slots.forgive();
+        if let Some(level) = self.shared.slots.changed_level() {
+            self.shared.emit(None, EventKind::Timing { level });
+        }
+    }
+
+    /// Begins a trajectory of the host. It is asked for in any case, so that the host gets it back in any case.
+    fn execute(
+        &mut self,
+        id: RequestId,
+        target: RequestTarget,
+        request: &Request<AXES>,
+        execution: (TrajectoryId, ExecutionStart),
+        host: &mut impl HostInterface<AXES, BUSES>,
+    ) -> Handled {
+        let asked = self.asked_groups(target, request);
+        if asked.is_err() {
+            let _ = host.trajectory(0, execution.0, 0.0);
+        }
+        let number = asked?.start;
+        let Some(mut group) = self.group(number) else { return Ok(()) };
+        let begun = group.begin_execution(id, execution, host);
+        begun.map_err(|rejection| Rejection { group: Some(number), ..rejection })
+    }
+
+    /// The numbers of the groups that a request is for.
+    fn asked_groups(&self, target: RequestTarget, request: &Request<AXES>) -> Result<Range<u8>, Rejection> {
+        let groups = self.groups.len() as u8;
+        let of_axis = match request {
+            Request::SetProfileTarget(wanted) => Some(self.group_of(wanted.axis)?),
+            _ => None,
+        };
+        let asked = match target {
+            RequestTarget::Group(group) if group >= groups => {
+                return Err(RejectReason::UnknownGroup { group, groups }.into());
+            }
+            RequestTarget::Group(asked) => Some(asked),
+            RequestTarget::All => of_axis,
+        };
+        match (asked, of_axis, request) {
+            (Some(asked), Some(of_axis), _) if asked != of_axis => {
+                Err(RejectReason::OtherGroup { asked, of_axis }.into())
+            }
+            (Some(asked), ..) => Ok(asked..asked + 1),
+            (None, _, Request::Move(_) | Request::Stream | Request::Execute { .. }) if groups > 1 => {
+                Err(RejectReason::GroupNotNamed { groups }.into())
+            }
+            (None, ..) => Ok(0..groups),
+        }
+    }
+
+    /// The group of an axis.
+    fn group_of(&self, axis: u8) -> Result<u8, Rejection> {
+        let place = self.place_of(axis)?;
+        let group = self.groups.iter().find(|group| group.places.contains(&place));
+        Ok(group.map_or(0, |group| group.number))
+    }
+
+    /// Where an axis stands among those of the engine.
+    pub(super) fn place_of(&self, axis: u8) -> Result<usize, Rejection> {
+        let unknown = RejectReason::UnknownAxis { axis, axes: self.axes.len() as u8 };
+        self.axes.iter().position(|own| own.number() == axis).ok_or(unknown.into())
+    }
+
     /// Checks the phase of the group of an axis.
     pub(super) fn require_phase_of(&self, axis: u8, possible: &[Phase]) -> Handled {
-        let place = self.axes.iter().position(|own| own.number() == axis);
-        let group = self.groups.iter().find(|group| place.is_some_and(|place| group.places.contains(&place)));
-        require_phase(group.map_or(Phase::Passive, |group| group.state.phase()), possible)
+        require_phase(self.phase(self.group_of(axis)?).unwrap_or_default(), possible)
     }
 
     pub(super) fn axis_mut(&mut self, number: u8) -> Result<&mut Axis, Rejection> {
-        let unknown = RejectReason::UnknownAxis { axis: number, axes: self.axes.len() as u8 };
-        self.axes.iter_mut().find(|axis| axis.number() == number).ok_or(unknown.into())
+        let (place, axes) = (self.place_of(number)?, self.axes.len() as u8);
+        self.axes.get_mut(place).ok_or(RejectReason::UnknownAxis { axis: number, axes }.into())
     }
 
     /// What is commanded in per mille of the rated torque must not leap: it changes without power only.

@@ -22,18 +22,18 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
     pub fn receive(&mut self, bus: usize, received: &Received) -> Receiver {
         let Some(table) = self.dispatch.get(bus) else { return Receiver::Engine };
         match table.destination(&received.frame) {
-            Destination::Feedback { axis, pdo } => {
-                if let Some(axis) = self.axes.get_mut(usize::from(axis)) {
+            Destination::Feedback { axis: place, pdo } => {
+                if let Some(axis) = self.axes.get_mut(usize::from(place)) {
                     // A frame that is too short counts as not received: the age of the feedback shows it.
                     let _ = axis.receive(pdo.into(), &received.frame, received.at_ns);
                 }
                 return Receiver::Engine;
             }
             Destination::Unused => return Receiver::Engine,
-            Destination::Emergency { axis } => self.receive_emergency(axis, received),
-            Destination::ErrorControl { axis } => {
+            Destination::Emergency { axis: place } => self.receive_emergency(place.into(), received),
+            Destination::ErrorControl { axis: place } => {
                 let state = received.frame.payload().first().copied();
-                if let (Some(axis), Some(state)) = (self.axes.get_mut(usize::from(axis)), state) {
+                if let (Some(axis), Some(state)) = (self.axes.get_mut(usize::from(place)), state) {
                     axis.receive_error_control(state);
                 }
             }
@@ -46,14 +46,24 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         Receiver::Host
     }
 
-    fn receive_emergency(&mut self, axis: u8, received: &Received) {
+    fn receive_emergency(&mut self, place: usize, received: &Received) {
         let [low, high, register, manufacturer @ ..] = received.frame.first_word().to_le_bytes();
         let code = u16::from_le_bytes([low, high]);
-        if let Some(axis) = self.axes.get_mut(usize::from(axis)) {
-            axis.receive_emergency(code);
-        }
-        let kind = EventKind::Emergency { axis, code, register, manufacturer };
-        self.shared.events.push(Event { slot: self.shared.present_slot(), at_ns: received.at_ns, kind });
+        let group = self.group_at(place);
+        let Some(axis) = self.axes.get_mut(place) else { return };
+        axis.receive_emergency(code);
+        let kind = EventKind::Emergency { axis: axis.number(), code, register, manufacturer };
+        self.shared.events.push(Event {
+            slot: self.shared.present_slot(),
+            at_ns: received.at_ns,
+            group,
+            kind,
+        });
+    }
+
+    /// The number of the group of the axis at a place.
+    fn group_at(&self, place: usize) -> Option<u8> {
+        self.groups.iter().find(|group| group.places.contains(&place)).map(|group| group.number)
     }
 
     /// Takes what another master has told the nodes of a bus.
@@ -79,10 +89,10 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         self.shared.deadline = Deadline::Met;
         let elapsed = self.shared.slots.begin(input.slot);
         if self.shared.slots.missed_now > 0 {
-            self.shared.emit(EventKind::MissedSlots { count: self.shared.slots.missed_now });
+            self.shared.emit(None, EventKind::MissedSlots { count: self.shared.slots.missed_now });
         }
         if let Some(level) = self.shared.slots.changed_level() {
-            self.shared.emit(EventKind::Timing { level });
+            self.shared.emit(None, EventKind::Timing { level });
         }
         if let Some(heartbeat) = &mut self.shared.heartbeat {
             heartbeat.pass(elapsed);
@@ -94,14 +104,16 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         let elapsed_s = self.shared.period_s * elapsed as f64;
         let asked_by_sync = core::mem::take(&mut self.shared.asked_by_sync);
         let Shared { snapshot, buses, requested, .. } = &mut self.shared;
-        for (axis, shown) in self.axes.iter_mut().zip(&mut snapshot.axes) {
+        for axis in &mut self.axes {
             // A drive that was not asked, because the thread was late or the bus behind, has not missed its answer.
             let is_unasked = requested.sync
                 && axis.parameters().feedback_since == FeedbackSince::Sync
                 && !asked_by_sync.contains(axis.parameters().bus.into());
             let bus = buses.get(usize::from(axis.parameters().bus));
             if bus.is_some_and(|bus| has_cycle(bus, input.slot)) && !is_unasked {
-                if axis.begin_cycle(elapsed_s) {
+                let has_reported = axis.begin_cycle(elapsed_s);
+                let shown = snapshot.axes.get_mut(usize::from(axis.number()));
+                if let Some(shown) = shown.filter(|_| has_reported) {
                     (shown.feedback_slot, shown.feedback_ns) = (input.slot, input.now_ns);
                 }
                 if axis.parameters().feedback_since != FeedbackSince::Sync {
@@ -117,14 +129,13 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
 
     /// Emits an event for each drive whose state has changed since the last record.
     fn report_drive_states(&mut self) {
-        for index in 0..self.axes.len() {
-            let (Some(axis), Some(recorded)) = (self.axes.get(index), self.shared.record.axes.get(index))
-            else {
-                continue;
-            };
-            let (state, statusword) = (axis.drive_state(), axis.statusword());
-            if recorded.drive_state != state {
-                self.shared.emit(EventKind::DriveState { axis: index as u8, state, statusword });
+        for place in 0..self.axes.len() {
+            let Some(axis) = self.axes.get(place) else { continue };
+            let (number, state, statusword) = (axis.number(), axis.drive_state(), axis.statusword());
+            let recorded = self.shared.record.axes.get(usize::from(number));
+            if recorded.is_some_and(|recorded| recorded.drive_state != state) {
+                let kind = EventKind::DriveState { axis: number, state, statusword };
+                self.shared.emit(self.group_at(place), kind);
             }
         }
     }

@@ -12,7 +12,6 @@ use crate::axis::Axis;
 use crate::bus_set::BusSet;
 use crate::frame::Id;
 use crate::host::Snapshot;
-use crate::motion_reports::MotionState;
 use crate::record::{CycleRecord, Event, EventKind};
 use crate::stop::StopCategories;
 use crate::time::{NANOSECONDS_PER_SECOND, Nanoseconds};
@@ -77,6 +76,7 @@ pub(super) enum Ending {
 impl<const AXES: usize, const BUSES: usize> Shared<AXES, BUSES> {
     pub(super) fn new(parameters: EngineParameters<AXES, BUSES>) -> Self {
         let (axis_count, bus_count) = (parameters.axes.len() as u8, parameters.buses.len() as u8);
+        let group_count = parameters.groups.len().max(1) as u8;
         let slowest_divider = parameters.buses.iter().map(|bus| bus.divider).max().unwrap_or(1);
         let buses = parameters.buses.len();
         let heartbeat = |heartbeat| HeartbeatProducer::new(heartbeat, buses, slowest_divider);
@@ -99,14 +99,15 @@ impl<const AXES: usize, const BUSES: usize> Shared<AXES, BUSES> {
             time: parameters.time_cycles.map(TimeProducer::new),
             events: Outbox::default(),
             dropped: 0,
-            record: CycleRecord { axis_count, ..CycleRecord::default() },
-            snapshot: Snapshot { axis_count, bus_count, ..Snapshot::default() },
+            record: CycleRecord { axis_count, group_count, ..CycleRecord::default() },
+            snapshot: Snapshot { axis_count, bus_count, group_count, ..Snapshot::default() },
             buses: parameters.buses,
         }
     }
 
-    pub(super) fn emit(&mut self, kind: EventKind) {
-        self.events.push(Event { slot: self.present_slot(), at_ns: self.now_ns, kind });
+    /// Emits an event that concerns a group; `None`: the controller as a whole.
+    pub(super) fn emit(&mut self, group: Option<u8>, kind: EventKind) {
+        self.events.push(Event { slot: self.present_slot(), at_ns: self.now_ns, group, kind });
     }
 
     pub(super) fn present_slot(&self) -> u64 {
@@ -116,13 +117,5 @@ impl<const AXES: usize, const BUSES: usize> Shared<AXES, BUSES> {
     /// Slots in one cycle of the bus of an axis.
     pub(super) fn divider_of(&self, axis: &Axis) -> u32 {
         self.buses.get(usize::from(axis.parameters().bus)).map_or(1, |bus| bus.divider)
-    }
-
-    /// The motions in progress have reached their targets.
-    pub(super) fn finish_motions(&mut self) {
-        let (slot, at_ns, events) = (self.present_slot(), self.now_ns, &mut self.events);
-        self.snapshot.motions.end_all(MotionState::Finished, |request| {
-            events.push(Event { slot, at_ns, kind: EventKind::MotionFinished { request } });
-        });
     }
 }

@@ -5,9 +5,11 @@
 
 use arrayvec::ArrayVec;
 
-use super::group::{Commands, GroupContext};
+use super::Engine;
+use super::group::{Commands, Group, GroupContext};
 use super::state::{GroupState, PowerRemoval};
 use crate::axis::{Axis, FeedbackSince};
+use crate::bus_set::BusSet;
 use crate::fault::Fault;
 use crate::plan::State;
 use crate::stop::{Origin, StopCause};
@@ -22,6 +24,42 @@ const ATTEMPTS: usize = 3;
 
 /// The first thing that keeps a step from being made.
 pub(super) type Failure = (Origin, Fault);
+
+impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
+    /// Skips what requests feedback from drives that have not answered every time in their own cycle, a SYNC of their bus or a
+    /// set-point, where a group is being enabled: before its drives are enabled, that disturbs nothing. A SYNC that moves the
+    /// drives of another group is not skipped.
+    pub(super) fn probe_late_drives(&mut self) {
+        let is_due = |group: &Group<AXES, BUSES>| {
+            group.state == GroupState::Enabling && group.state_cycles.is_multiple_of(PROBE_AGAIN_CYCLES)
+        };
+        if !self.groups.iter().any(is_due) {
+            return;
+        }
+        let (mut probed, mut in_motion) = (BusSet::default(), BusSet::default());
+        for group in &self.groups {
+            if is_due(group) {
+                probed = probed.with(group.buses);
+            } else if group.state.has_power()
+                && !matches!(group.state, GroupState::Enabling | GroupState::Holding)
+            {
+                in_motion = in_motion.with(group.buses);
+            }
+        }
+        for group in &self.groups {
+            let axes = self.axes.get_mut(group.places.clone()).unwrap_or_default();
+            for axis in axes.iter_mut().filter(|axis| axis.is_reply_unverified()) {
+                let bus = usize::from(axis.parameters().bus);
+                match axis.parameters().feedback_since {
+                    FeedbackSince::SetPoint if is_due(group) => axis.skip_next_set_point(),
+                    FeedbackSince::SetPoint => {}
+                    _ if probed.without(in_motion).contains(bus) => self.shared.skip_sync.insert(bus),
+                    _ => {}
+                }
+            }
+        }
+    }
+}
 
 impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
     /// Makes the next set-points, unless those of the last cycles have still to leave, or every bus is behind.
@@ -82,24 +120,9 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
 
     fn step_enabling(&mut self) {
         self.hold();
-        self.probe_late_drives();
         self.axes.iter_mut().for_each(|axis| axis.prepare_to_enable(self.shared.period_s));
         if self.axes.iter().all(|axis| axis.is_power_granted() && axis.is_enabled()) {
             self.enter(GroupState::Holding);
-        }
-    }
-
-    /// Skips what requests feedback from a drive that has not answered every time in its own cycle, a SYNC of its bus or a
-    /// set-point: before the drives are enabled, that disturbs nothing.
-    fn probe_late_drives(&mut self) {
-        if !self.group.state_cycles.is_multiple_of(PROBE_AGAIN_CYCLES) {
-            return;
-        }
-        for axis in self.axes.iter_mut().filter(|axis| axis.is_reply_unverified()) {
-            match axis.parameters().feedback_since {
-                FeedbackSince::SetPoint => axis.skip_next_set_point(),
-                _ => self.shared.skip_sync.insert(axis.parameters().bus.into()),
-            }
         }
     }
 
@@ -126,7 +149,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
         }
         if !is_reported {
             self.group.state = GroupState::Moving { is_reported: true };
-            self.shared.finish_motions();
+            self.finish_motions();
         }
         if is_passing {
             self.begin_stop(StopCause::Requested, Origin::Group, StopCategory::Two);

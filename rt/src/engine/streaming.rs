@@ -33,7 +33,8 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         slot_start_ns: Nanoseconds,
         host: &mut impl HostInterface<AXES, BUSES>,
     ) {
-        for (number, group) in (0..).zip(&mut self.groups) {
+        for group in &mut self.groups {
+            let number = group.number;
             let GroupState::Streaming(stream) = &mut group.state else { continue };
             if *stream == Stream::Requested {
                 host.begin_stream(number);
@@ -89,7 +90,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
     fn enter_stream(&mut self, stream: Stream) {
         if self.group.state != GroupState::Streaming(stream) {
             self.group.state = GroupState::Streaming(stream);
-            self.shared.emit(EventKind::Stream { state: stream.shown() });
+            self.emit(EventKind::Stream { state: stream.shown() });
         }
     }
 

@@ -11,18 +11,20 @@ use crate::request::{Move, RejectReason};
 pub(super) struct Rejection {
     pub reason: RejectReason,
     pub axis: Option<u8>,
+    /// The group that rejects it; `None` if none was asked.
+    pub group: Option<u8>,
 }
 
 impl From<RejectReason> for Rejection {
     fn from(reason: RejectReason) -> Self {
-        Self { reason, axis: None }
+        Self { reason, axis: None, group: None }
     }
 }
 
 impl RejectReason {
     /// This reason, for an axis.
     pub(super) const fn of_axis(self, axis: u8) -> Rejection {
-        Rejection { reason: self, axis: Some(axis) }
+        Rejection { reason: self, axis: Some(axis), group: None }
     }
 }
 

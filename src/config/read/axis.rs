@@ -41,6 +41,11 @@ pub struct ReadAxis {
 }
 
 impl ReadAxis {
+    /// The bytes of its header.
+    pub fn header(&self) -> Range<usize> {
+        self.header.clone()
+    }
+
     /// What a move needs to know of it.
     pub fn view(&self) -> AxisView<'_> {
         AxisView {

@@ -7,6 +7,7 @@ mod axis;
 mod bus;
 mod control;
 pub(crate) mod entry;
+mod group;
 mod limits;
 mod machine;
 mod program;
@@ -80,7 +81,8 @@ fn read<'a>(document: &'a DeTable<'a>, problems: &'a Problems) -> Option<Config>
     let machine = axis::Machine { buses: &buses, cycle_ns: cycle.period_ns, master_node: master.node };
     let axes = axis::axes(axes, &machine);
 
-    let program = program::program(root.section("program"), &axes);
+    let groups = group::groups(root.sections("group"), &axes, problems);
+    let program = program::program(root.section("program"), &axes, &groups);
     root.finish();
 
     let axes: Option<Vec<_>> = axes.into_iter().map(|axis| axis.axis).collect();
@@ -95,6 +97,7 @@ fn read<'a>(document: &'a DeTable<'a>, problems: &'a Problems) -> Option<Config>
         master,
         buses: buses.into_iter().map(|bus| bus.bus).collect::<Option<_>>()?,
         axes: axes?,
+        groups: groups.into_iter().map(group::ReadGroup::group).collect::<Option<_>>()?,
         program,
         telemetry,
         simulation,

@@ -2,6 +2,7 @@
 
 use super::axis::ReadAxis;
 use super::entry::Entry;
+use super::group::{ReadGroup, group_of};
 use super::section::Section;
 use crate::config::defaults;
 use crate::config::model::{Program, ProgramMove, ProgramTarget};
@@ -11,10 +12,10 @@ use crate::config::ranges;
 use crate::config::rules::program::{self as rules, AxisView};
 use crate::config::spot::Spot;
 
-pub fn program(mut section: Section<'_>, axes: &[ReadAxis]) -> Program {
+pub fn program(mut section: Section<'_>, axes: &[ReadAxis], groups: &[ReadGroup]) -> Program {
     let repeat = section.get("repeat").and_then(|entry| entry.integer(ranges::REPEAT));
-    let moves =
-        section.sections("move").into_iter().filter_map(|section| program_move(section, axes)).collect();
+    let moves = section.sections("move").into_iter();
+    let moves = moves.filter_map(|section| program_move(section, axes, groups)).collect();
     section.finish();
     Program {
         repeat: repeat.and_then(|repeat| u32::try_from(repeat).ok()).unwrap_or(defaults::REPEAT),
@@ -22,8 +23,24 @@ pub fn program(mut section: Section<'_>, axes: &[ReadAxis]) -> Program {
     }
 }
 
-fn program_move(mut section: Section<'_>, axes: &[ReadAxis]) -> Option<ProgramMove> {
-    let target = program_target(&mut section, axes);
+fn program_move(mut section: Section<'_>, axes: &[ReadAxis], groups: &[ReadGroup]) -> Option<ProgramMove> {
+    let group = group_of(&mut section, groups);
+    let own = group.and_then(|group| groups.get(group));
+    let moved = Moved {
+        axes: match own {
+            Some(own) => own.axes.iter().filter_map(|axis| axes.get(*axis)).collect(),
+            None => axes.iter().collect(),
+        },
+        group: own.and_then(|own| own.name.as_deref()),
+    };
+    // How many targets there must be is known only with the group and all of its axes.
+    let is_group_known = groups.is_empty() || own.is_some_and(|own| own.is_whole);
+    let target = if is_group_known {
+        program_target(&mut section, &moved)
+    } else {
+        ["to", "speed", "torque", "for"].into_iter().for_each(|key| drop(section.get(key)));
+        None
+    };
     let mut share =
         |key| section.get(key).and_then(|entry: Entry<'_>| entry.quantity(Quantity::FRACTION, ranges::SCALE));
     let (velocity_scale, acceleration_scale) = (share("velocity"), share("acceleration"));
@@ -31,6 +48,7 @@ fn program_move(mut section: Section<'_>, axes: &[ReadAxis]) -> Option<ProgramMo
     let (minimum_duration_s, dwell_s) = (seconds("minimum_duration"), seconds("dwell"));
     section.finish();
     Some(ProgramMove {
+        group: group?,
         target: target?,
         velocity_scale: velocity_scale.unwrap_or(1.0),
         acceleration_scale: acceleration_scale.unwrap_or(1.0),
@@ -43,8 +61,14 @@ fn duration(entry: &Entry<'_>) -> Option<f64> {
     entry.quantity(Quantity::DURATION, rules::duration_bounds())
 }
 
+/// The axes that a move moves, in their order, and the name of their group.
+struct Moved<'a> {
+    axes: Vec<&'a ReadAxis>,
+    group: Option<&'a str>,
+}
+
 /// One of `to`, `speed` and `torque`; the latter two last for a time.
-fn program_target(section: &mut Section<'_>, axes: &[ReadAxis]) -> Option<ProgramTarget> {
+fn program_target(section: &mut Section<'_>, moved: &Moved<'_>) -> Option<ProgramTarget> {
     let (to, speed, torque) = (section.get("to"), section.get("speed"), section.get("torque"));
     let lasting = section.get("for");
     let ignored = |entry: &Option<Entry<'_>>, beside, belongs| {
@@ -64,14 +88,14 @@ fn program_target(section: &mut Section<'_>, axes: &[ReadAxis]) -> Option<Progra
         (Some(entry), torque) => {
             ignored(&to, "speed", one_of);
             ignored(&torque, "speed", one_of);
-            let velocity = target(&entry, axes, |axis| axis.quantities.velocity, rules::speed)
+            let velocity = target(&entry, moved, |axis| axis.quantities.velocity, rules::speed)
                 .filter(|all| rules::some_axis_is_driven(&entry.spot, all));
             let duration_s = duration_s(section);
             Some(ProgramTarget::Velocity { velocity: velocity?, duration_s: duration_s? })
         }
         (None, Some(entry)) => {
             ignored(&to, "torque", one_of);
-            let torque = target(&entry, axes, |axis| axis.quantities.effort, rules::torque)
+            let torque = target(&entry, moved, |axis| axis.quantities.effort, rules::torque)
                 .filter(|all| rules::some_axis_is_driven(&entry.spot, all));
             let duration_s = duration_s(section);
             Some(ProgramTarget::Torque { torque: torque?, duration_s: duration_s? })
@@ -84,7 +108,7 @@ fn program_target(section: &mut Section<'_>, axes: &[ReadAxis]) -> Option<Progra
                 "to",
                 "`for` belongs to `speed` or `torque`; `dwell` is standstill after a move",
             );
-            target(&entry, axes, |axis| axis.quantities.position, rules::position)
+            target(&entry, moved, |axis| axis.quantities.position, rules::position)
                 .map(ProgramTarget::Position)
         }
     }
@@ -92,15 +116,15 @@ fn program_target(section: &mut Section<'_>, axes: &[ReadAxis]) -> Option<Progra
 
 fn target(
     entry: &Entry<'_>,
-    axes: &[ReadAxis],
+    moved: &Moved<'_>,
     quantity: fn(&ReadAxis) -> Quantity,
     check: fn(&Spot<'_>, f64, &AxisView<'_>),
 ) -> Option<Vec<f64>> {
-    let entries = if entry.is_list() { entry.list()? } else { vec![entry.clone(); axes.len()] };
-    if !rules::count(&entry.spot, entries.len(), axes.len()) {
+    let entries = if entry.is_list() { entry.list()? } else { vec![entry.clone(); moved.axes.len()] };
+    if !rules::count(&entry.spot, entries.len(), moved.axes.len(), moved.group) {
         return None;
     }
-    let read = entries.iter().zip(axes).map(|(entry, axis)| {
+    let read = entries.iter().zip(&moved.axes).map(|(entry, axis)| {
         let value = entry.unbounded(quantity(axis))?;
         check(&entry.spot, value, &axis.view());
         Some(value)

@@ -4,6 +4,7 @@
 pub mod axis;
 pub mod bus;
 pub mod cycle;
+pub mod group;
 pub mod limits;
 mod loop_stability;
 pub mod loops;
@@ -40,7 +41,8 @@ impl Config {
         simulation::validate(&self.simulation, self.cycle.period_ns, &whole.within("simulation"));
         bus::validate(self, &whole);
         axis::validate(self, &whole);
-        program::validate(&self.program, &self.axes, &whole);
+        group::validate(self, &whole);
+        program::validate(self, &whole);
         if problems.is_empty() {
             Ok(())
         } else {

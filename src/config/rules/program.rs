@@ -1,8 +1,8 @@
 //! The program of moves.
 
-use super::Fields;
+use super::{Fields, group};
 use crate::config::bounds::Bounds;
-use crate::config::model::{Axis, Control, Limits, Program, ProgramMove, ProgramTarget};
+use crate::config::model::{Axis, Config, Control, Limits, ProgramMove, ProgramTarget};
 use crate::config::problem_kind::ProblemKind;
 use crate::config::quantities::Quantities;
 use crate::config::quantity::Quantity;
@@ -11,15 +11,20 @@ use crate::config::spot::Spot;
 
 use super::limits::contains;
 
-pub fn validate(program: &Program, axes: &[Axis], whole: &Fields<'_>) {
-    let fields = whole.within("program");
+pub fn validate(config: &Config, whole: &Fields<'_>) {
+    let (program, fields) = (&config.program, whole.within("program"));
     // `Program::default()` is no program; it repeats nothing.
     if !program.moves.is_empty() || program.repeat != 0 {
         fields.at("repeat").integer(program.repeat, &ranges::REPEAT);
     }
     for (index, present) in program.moves.iter().enumerate() {
         let fields = fields.element("move", "program.moves", index, "");
-        validate_target(present, axes, &fields);
+        if present.group > 0 && present.group >= config.groups.len() {
+            let known: Vec<&str> = config.groups.iter().map(|group| group.name.as_str()).collect();
+            fields.at("group").report(group::unknown("group", &present.group.to_string(), &known));
+            continue;
+        }
+        validate_target(present, config, &fields);
         fields.at("velocity").quantity(present.velocity_scale, Quantity::FRACTION, ranges::SCALE);
         fields.at("acceleration").quantity(present.acceleration_scale, Quantity::FRACTION, ranges::SCALE);
         for (key, value) in [("minimum_duration", present.minimum_duration_s), ("dwell", present.dwell_s)] {
@@ -28,10 +33,13 @@ pub fn validate(program: &Program, axes: &[Axis], whole: &Fields<'_>) {
     }
 }
 
-fn validate_target(present: &ProgramMove, axes: &[Axis], fields: &Fields<'_>) {
+fn validate_target(present: &ProgramMove, config: &Config, fields: &Fields<'_>) {
+    let numbers = config.axes_of_group(present.group);
+    let axes: Vec<&Axis> = numbers.iter().filter_map(|axis| config.axes.get(*axis)).collect();
+    let group = config.groups.get(present.group).map(|group| group.name.as_str());
     let of_axes = |key, values: &[f64], check: &dyn Fn(&Spot<'_>, f64, &AxisView<'_>)| {
         let spot = fields.at(key);
-        let is_sound = count(&spot, values.len(), axes.len());
+        let is_sound = count(&spot, values.len(), axes.len(), group);
         if is_sound {
             axes.iter().zip(values).for_each(|(axis, value)| check(&spot, *value, &AxisView::of(axis)));
         }
@@ -77,10 +85,10 @@ impl<'a> AxisView<'a> {
     }
 }
 
-/// A target for every axis.
-pub fn count(spot: &Spot<'_>, given: usize, axes: usize) -> bool {
+/// A target for every axis of the group that moves, which is named where there are several.
+pub fn count(spot: &Spot<'_>, given: usize, axes: usize, group: Option<&str>) -> bool {
     if given != axes {
-        spot.report(ProblemKind::TargetCount { given, axes });
+        spot.report(ProblemKind::TargetCount { given, axes, group: group.map(str::to_owned) });
     }
     given == axes
 }

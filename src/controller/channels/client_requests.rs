@@ -15,7 +15,7 @@
 use std::sync::Arc;
 
 use crossbeam::utils::CachePadded;
-use takt_rt::{Request, RequestEnvelope, RequestId, StopCategory};
+use takt_rt::{MAX_GROUPS, Request, RequestEnvelope, RequestId, RequestTarget, StopCategory};
 
 use super::primitives::{AtomicCell, AtomicU64, Ordering};
 use super::request_numbers::RequestNumbers;
@@ -62,10 +62,13 @@ impl MotionEnd {
 /// used by one thread at a time: by the client that has claimed it, or by the real-time thread once it is ready.
 struct Slot {
     number: AtomicU64,
-    request: AtomicCell<Option<Box<Request>>>,
+    request: AtomicCell<Option<Box<Addressed>>>,
 }
 
-/// The stops of one kind. 0 stands for none.
+/// A request, and who it is for.
+type Addressed = (RequestTarget, Request);
+
+/// The stops of one kind for one target. 0 stands for none.
 struct StopWord {
     /// The newest one that was asked for and not taken yet.
     asked: AtomicU64,
@@ -79,27 +82,32 @@ struct Shared {
     free: CachePadded<AtomicU64>,
     /// A bit for each slot: it holds a request for the real-time thread.
     ready: CachePadded<AtomicU64>,
-    stops: CachePadded<[StopWord; MotionEnd::ALL.len()]>,
+    /// Those for all groups, then those for each group, in the order of [`MotionEnd::ALL`].
+    stops: CachePadded<Box<[StopWord]>>,
     slots: Box<[Slot]>,
 }
 
-/// The channel for so many waiting requests (at most [`WAITING_AT_MOST`]), as its two ends.
-pub fn client_requests(numbers: RequestNumbers, waiting: usize) -> (ClientRequests, TakenRequests) {
-    let slot =
-        || Slot { number: AtomicU64::new(0), request: AtomicCell::new(Some(Box::new(Request::Sync(false)))) };
+/// The channel for so many waiting requests (at most [`WAITING_AT_MOST`]) to so many groups, as its two ends. A single group needs no
+/// stops of its own.
+pub fn client_requests(
+    numbers: RequestNumbers,
+    waiting: usize,
+    groups: usize,
+) -> (ClientRequests, TakenRequests) {
+    let empty = || Box::new((RequestTarget::All, Request::Sync(false)));
+    let slot = || Slot { number: AtomicU64::new(0), request: AtomicCell::new(Some(empty())) };
+    let targets = if groups > 1 { 1 + groups.min(MAX_GROUPS) } else { 1 };
+    let stop = || StopWord { asked: AtomicU64::new(0), taken: AtomicU64::new(0) };
     let slots: Box<[Slot]> = (0..waiting.min(WAITING_AT_MOST)).map(|_| slot()).collect();
     let all = (0..slots.len()).fold(0, |bits, slot| bits | 1 << slot);
     let shared = Arc::new(Shared {
         numbers,
         free: CachePadded::new(AtomicU64::new(all)),
         ready: CachePadded::new(AtomicU64::new(0)),
-        stops: CachePadded::new(
-            [(); MotionEnd::ALL.len()]
-                .map(|()| StopWord { asked: AtomicU64::new(0), taken: AtomicU64::new(0) }),
-        ),
+        stops: CachePadded::new((0..targets * MotionEnd::ALL.len()).map(|_| stop()).collect()),
         slots,
     });
-    let stopped = RequestId::default();
+    let stopped = [RequestId::default(); 1 + MAX_GROUPS];
     (ClientRequests { shared: Arc::clone(&shared) }, TakenRequests { shared, stopped })
 }
 
@@ -110,40 +118,52 @@ pub struct ClientRequests {
 }
 
 impl ClientRequests {
-    /// Submits a request. `None` if too many requests wait already.
+    /// Submits a request for all groups. `None` if too many requests wait already.
     pub fn submit(&self, request: Request) -> Option<RequestId> {
+        self.submit_to(RequestTarget::All, request)
+    }
+
+    /// Submits a request. `None` if too many requests wait already.
+    pub fn submit_to(&self, target: RequestTarget, request: Request) -> Option<RequestId> {
         let (bit, slot) = self.claim()?;
         let id = self.shared.numbers.next();
         slot.number.store(id.0, Ordering::Relaxed);
         if let Some(mut place) = slot.request.take() {
-            *place = request;
+            *place = (target, request);
             slot.request.store(Some(place));
         }
         self.shared.ready.fetch_or(bit, Ordering::Release);
         Some(id)
     }
 
+    /// Requests a stop of all groups: see [`ClientRequests::stop_of`].
+    pub fn stop(&self, end: MotionEnd) -> RequestId {
+        self.stop_of(RequestTarget::All, end)
+    }
+
     /// Requests a stop. It always finds room, and is taken before all requests that are submitted after it. A later one of the
     /// same kind takes its place if the real-time thread has not taken it yet; see [`ClientRequests::taken_as`].
-    pub fn stop(&self, end: MotionEnd) -> RequestId {
+    pub fn stop_of(&self, target: RequestTarget, end: MotionEnd) -> RequestId {
         let id = self.shared.numbers.next();
-        if let Some(stop) = self.shared.stops.get(end.number()) {
+        if let Some(stop) = self.shared.stop(target, end) {
             stop.asked.fetch_max(id.0, Ordering::Release);
         }
         id
     }
 
     /// The stop that the real-time thread has taken for this one: itself, or a later one of its kind.
-    pub fn taken_as(&self, end: MotionEnd, id: RequestId) -> Option<RequestId> {
-        let stop = self.shared.stops.get(end.number())?;
+    pub fn taken_as(&self, target: RequestTarget, end: MotionEnd, id: RequestId) -> Option<RequestId> {
+        let stop = self.shared.stop(target, end)?;
         let taken = RequestId(stop.taken.load(Ordering::Acquire));
         (taken >= id).then_some(taken)
     }
 
-    /// The newest stop that the real-time thread has taken, of any kind. It has discarded all requests with a smaller number
-    /// that had not been taken until then.
-    pub fn newest_stop(&self) -> RequestId {
-        let taken = self.shared.stops.iter().map(|stop| stop.taken.load(Ordering::Acquire));
+    /// The newest stop that the real-time thread has taken, of any kind, and that concerns requests for this target. It has discarded
+    /// all of these with a smaller number that had not been taken until then.
+    pub fn newest_stop(&self, target: RequestTarget) -> RequestId {
+        let of_targets = self.shared.stops.chunks(MotionEnd::ALL.len()).enumerate();
+        let stops = of_targets.filter(|(place, _)| concerns(*place, target)).flat_map(|(_, stops)| stops);
+        let taken = stops.map(|stop| stop.taken.load(Ordering::Acquire));
         RequestId(taken.max().unwrap_or(0))
     }
 
@@ -170,8 +190,8 @@ impl ClientRequests {
 /// The end of the real-time thread.
 pub struct TakenRequests {
     shared: Arc<Shared>,
-    /// The newest stop that was taken. Requests with smaller numbers are discarded.
-    stopped: RequestId,
+    /// The newest stop that was taken for all groups, and for each. Requests with smaller numbers that it concerns are discarded.
+    stopped: [RequestId; 1 + MAX_GROUPS],
 }
 
 impl TakenRequests {
@@ -185,7 +205,9 @@ impl TakenRequests {
             }
             let (id, slot) = self.oldest(&mut ready)?;
             let envelope = self.empty(id, slot, ready);
-            if id > self.stopped {
+            let target = envelope.map_or(RequestTarget::All, |envelope| envelope.target);
+            let stops = self.stopped.iter().enumerate();
+            if stops.filter(|(place, _)| concerns(*place, target)).all(|(_, stop)| id > *stop) {
                 return envelope;
             }
         }
@@ -211,7 +233,11 @@ impl TakenRequests {
     /// Copies the request of a slot, and gives the slot back to the clients.
     fn empty(&self, id: RequestId, slot: &Slot, bit: u64) -> Option<RequestEnvelope> {
         let place = slot.request.take();
-        let envelope = place.as_ref().map(|request| RequestEnvelope { id, request: **request });
+        let envelope = place.as_deref().map(|(target, request)| RequestEnvelope {
+            id,
+            target: *target,
+            request: *request,
+        });
         slot.request.store(place);
         self.shared.ready.fetch_and(!bit, Ordering::Relaxed);
         self.shared.free.fetch_or(bit, Ordering::Release);
@@ -220,20 +246,45 @@ impl TakenRequests {
 
     /// The oldest stop that was asked for.
     fn take_stop(&mut self) -> Option<RequestEnvelope> {
-        let asked = self.shared.stops.iter().zip(MotionEnd::ALL);
-        let asked = asked.map(|(stop, end)| (stop.asked.load(Ordering::Relaxed), stop, end));
-        let (_, stop, end) = asked.filter(|(id, ..)| *id > 0).min_by_key(|(id, ..)| *id)?;
+        let asked = self.shared.stops.iter().enumerate();
+        let asked = asked.map(|(place, stop)| (stop.asked.load(Ordering::Relaxed), stop, place));
+        let (_, stop, place) = asked.filter(|(id, ..)| *id > 0).min_by_key(|(id, ..)| *id)?;
+        let end = *MotionEnd::ALL.get(place % MotionEnd::ALL.len())?;
+        let target_place = place / MotionEnd::ALL.len();
         let id = RequestId(stop.asked.swap(0, Ordering::Acquire));
-        self.stopped = self.stopped.max(id);
+        if let Some(stopped) = self.stopped.get_mut(target_place) {
+            *stopped = (*stopped).max(id);
+        }
         // Only this thread writes it. A stop that was numbered before the last one may be asked for after it.
         let newest = stop.taken.load(Ordering::Relaxed).max(id.0);
         stop.taken.store(newest, Ordering::Release);
-        Some(RequestEnvelope { id, request: end.request() })
+        let group = target_place.checked_sub(1).and_then(|group| u8::try_from(group).ok());
+        let target = group.map_or(RequestTarget::All, RequestTarget::Group);
+        Some(RequestEnvelope { id, target, request: end.request() })
     }
 }
 
+impl Shared {
+    fn stop(&self, target: RequestTarget, end: MotionEnd) -> Option<&StopWord> {
+        self.stops.get(place_of(target) * MotionEnd::ALL.len() + end.number())
+    }
+}
+
+/// The place of a target among the stops.
+const fn place_of(target: RequestTarget) -> usize {
+    match target {
+        RequestTarget::All => 0,
+        RequestTarget::Group(group) => 1 + group as usize,
+    }
+}
+
+/// Whether the stops at a place concern the requests for a target.
+fn concerns(place: usize, target: RequestTarget) -> bool {
+    place == 0 || target == RequestTarget::All || place == place_of(target)
+}
+
 // A cell with a lock inside could stop the real-time thread.
-const _: () = assert!(AtomicCell::<Option<Box<Request>>>::is_lock_free());
+const _: () = assert!(AtomicCell::<Option<Box<Addressed>>>::is_lock_free());
 
 #[cfg(test)]
 mod tests {
@@ -242,7 +293,7 @@ mod tests {
     use std::thread;
 
     fn channel() -> (ClientRequests, TakenRequests) {
-        client_requests(RequestNumbers::default(), WAITING_AT_MOST)
+        client_requests(RequestNumbers::default(), WAITING_AT_MOST, 2)
     }
 
     fn position(counts: i32) -> Request {
@@ -269,13 +320,13 @@ mod tests {
         let flood: Vec<RequestId> = (0..1_000).filter_map(|n| client.submit(position(n))).collect();
         assert_eq!(flood.len(), WAITING_AT_MOST);
         let stop = client.stop(MotionEnd::Stop(StopCategory::Two));
-        assert_eq!(client.newest_stop(), RequestId(0), "it has not been taken yet");
+        assert_eq!(client.newest_stop(RequestTarget::All), RequestId(0), "it has not been taken yet");
         assert_eq!(
             taken(&mut rt),
             [(stop.0, Request::Stop(StopCategory::Two))],
             "nothing that came before it is taken"
         );
-        assert_eq!(client.newest_stop(), stop);
+        assert_eq!(client.newest_stop(RequestTarget::All), stop);
         let after = client.submit(Request::Enable).unwrap();
         assert!(flood.iter().all(|id| *id < stop) && after > stop);
         assert_eq!(taken(&mut rt), [(after.0, Request::Enable)]);
@@ -304,8 +355,27 @@ mod tests {
             MotionEnd::ALL.iter().map(|end| (newest[end.number()].0, end.request())).collect();
         assert_eq!(taken(&mut rt), expected);
         let (first, later) = (RequestId(1), newest[0]);
-        assert_eq!(client.taken_as(MotionEnd::ALL[0], first), Some(later));
-        assert_eq!(client.taken_as(MotionEnd::ALL[0], RequestId(newest[3].0 + 1)), None);
+        assert_eq!(client.taken_as(RequestTarget::All, MotionEnd::ALL[0], first), Some(later));
+        assert_eq!(client.taken_as(RequestTarget::All, MotionEnd::ALL[0], RequestId(newest[3].0 + 1)), None);
+    }
+
+    #[test]
+    fn a_stop_of_one_group_discards_what_was_asked_of_it_and_nothing_that_was_asked_of_another() {
+        let (client, mut rt) = channel();
+        let (arm, gripper) = (RequestTarget::Group(0), RequestTarget::Group(1));
+        let of_arm = client.submit_to(arm, position(1)).unwrap();
+        let of_gripper = client.submit_to(gripper, position(2)).unwrap();
+        let of_all = client.submit(Request::Enable).unwrap();
+        let end = MotionEnd::Stop(StopCategory::One);
+        let stop = client.stop_of(gripper, end);
+        let after = client.submit_to(gripper, position(3)).unwrap();
+        let taken: Vec<_> = std::iter::from_fn(|| rt.take()).collect();
+        let ids: Vec<_> = taken.iter().map(|envelope| envelope.id).collect();
+        assert_eq!(ids, [stop, of_arm, after]);
+        assert_eq!(taken.iter().map(|envelope| envelope.target).collect::<Vec<_>>(), [gripper, arm, gripper]);
+        assert_eq!((client.newest_stop(gripper), client.newest_stop(arm)), (stop, RequestId(0)));
+        assert!(of_gripper < client.newest_stop(gripper) && of_all < client.newest_stop(RequestTarget::All));
+        assert_eq!(client.taken_as(gripper, end, stop), Some(stop));
     }
 
     #[test]

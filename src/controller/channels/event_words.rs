@@ -25,7 +25,8 @@ pub fn put_event(event: &Event, words: &mut Words<'_>) {
     words.put(event.slot);
     words.put(event.at_ns);
     let mut put_kind = |kind, [a, b, c, d, e]: [u8; 5]| {
-        words.put(u64::from_le_bytes([kind, a, b, c, d, e, 0, 0]));
+        let group = event.group.map_or(0, |group| group.saturating_add(1));
+        words.put(u64::from_le_bytes([kind, a, b, c, d, e, group, 0]));
     };
     match &event.kind {
         EventKind::PhaseChanged { from, to } => put_kind(PHASE_CHANGED, [*from as u8, *to as u8, 0, 0, 0]),
@@ -61,7 +62,7 @@ pub fn put_event(event: &Event, words: &mut Words<'_>) {
 
 pub fn take_event(words: &mut Words<'_>) -> Event {
     let (slot, at_ns) = (words.take(), words.take());
-    let [kind, a, b, c, d, ..] = words.take().to_le_bytes();
+    let [kind, a, b, c, d, _, group, _] = words.take().to_le_bytes();
     let kind = match kind {
         PHASE_CHANGED => EventKind::PhaseChanged { from: phase_of(a), to: phase_of(b) },
         STOP => EventKind::Stop(take_stop(words)),
@@ -85,7 +86,7 @@ pub fn take_event(words: &mut Words<'_>) -> Event {
         }
         _ => EventKind::Rejected(take_rejection(words).unwrap_or(NO_REJECTION)),
     };
-    Event { slot, at_ns, kind }
+    Event { slot, at_ns, group: group.checked_sub(1), kind }
 }
 
 /// In place of a rejection that was overwritten while it was read.
@@ -102,7 +103,7 @@ mod tests {
     use crate::controller::channels::latest::latest;
     use crate::controller::channels::words::tests::{rejections, stop_reasons};
     use proptest::prelude::*;
-    use takt_rt::DriveState;
+    use takt_rt::{DriveState, MAX_GROUPS};
 
     fn kinds() -> impl Strategy<Value = EventKind> {
         let phases = || prop::sample::select(&Phase::ALL[..]);
@@ -130,8 +131,13 @@ mod tests {
 
     proptest! {
         #[test]
-        fn an_event_comes_out_as_it_went_in(kind in kinds(), slot in any::<u64>(), at_ns in any::<u64>()) {
-            let event = Event { slot, at_ns, kind };
+        fn an_event_comes_out_as_it_went_in(
+            kind in kinds(),
+            slot in any::<u64>(),
+            at_ns in any::<u64>(),
+            group in prop::option::of(0..MAX_GROUPS as u8),
+        ) {
+            let event = Event { slot, at_ns, group, kind };
             let (mut writer, reader) = latest(EVENT_WORDS);
             writer.write(|words| put_event(&event, words));
             prop_assert_eq!(reader.read(1, take_event), Some(event));

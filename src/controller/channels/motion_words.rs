@@ -17,13 +17,14 @@ const REPLACED: u64 = 4;
 pub fn put_motions(motions: &MotionReports, words: &mut Words<'_>) {
     for report in motions.iter() {
         let axis = report.axis.map_or(0, |axis| u64::from(axis) << 8 | 1 << 16);
+        let group = u64::from(report.group) << 24;
         let state = match report.state {
             MotionState::InProgress => IN_PROGRESS,
             MotionState::Finished => FINISHED,
             MotionState::Stopped(_) => STOPPED,
             MotionState::Replaced { .. } => REPLACED,
         };
-        words.put(state | axis);
+        words.put(state | axis | group);
         words.put(report.request.0);
         match report.state {
             MotionState::InProgress | MotionState::Finished => {}
@@ -51,7 +52,7 @@ pub fn take_motions(words: &mut Words<'_>) -> MotionReports {
             _ => MotionState::Replaced { by: RequestId(words.take()) },
         };
         let axis = (packed >> 16 & 1 == 1).then_some((packed >> 8) as u8);
-        *place = Some(MotionReport { request, axis, state });
+        *place = Some(MotionReport { request, group: (packed >> 24) as u8, axis, state });
     }
     motions
 }

@@ -72,7 +72,7 @@ mod tests {
     use takt_rt::EventKind;
 
     fn event(slot: u64) -> Event {
-        Event { slot, at_ns: slot * 1_000, kind: EventKind::MissedSlots { count: slot } }
+        Event { slot, at_ns: slot * 1_000, group: None, kind: EventKind::MissedSlots { count: slot } }
     }
 
     fn slots(reader: &mut EventReader) -> Vec<u64> {

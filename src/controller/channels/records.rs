@@ -40,6 +40,8 @@ impl RecordProducer {
         };
         slot.timing = record.timing;
         slot.phase = record.phase;
+        slot.group_phases = record.group_phases;
+        slot.group_count = record.group_count;
         slot.is_commanded = record.is_commanded;
         slot.axis_count = record.axis_count;
         if let Some(axes) = slot.axes.get_mut(..record.axes().len()) {
@@ -78,13 +80,15 @@ impl RecordConsumer {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use takt_rt::{AxisRecord, CycleTiming, MAX_AXES, Phase};
+    use takt_rt::{AxisRecord, CycleTiming, MAX_AXES, MAX_GROUPS, Phase};
 
     fn record(slot: u64, axis_count: u8) -> CycleRecord {
         let axis = AxisRecord { position: slot as f64, ..AxisRecord::default() };
         CycleRecord {
             timing: CycleTiming { slot, ..CycleTiming::default() },
             phase: Phase::Moving,
+            group_phases: [Phase::Moving; MAX_GROUPS],
+            group_count: 2,
             is_commanded: true,
             axis_count,
             axes: [axis; MAX_AXES],
@@ -98,6 +102,7 @@ mod tests {
             assert!(producer.push(&record(slot, 6)));
             let arrived = consumer.next(|arrived| *arrived).unwrap();
             assert_eq!((arrived.timing.slot, arrived.phase), (slot, Phase::Moving));
+            assert_eq!(arrived.group_phases(), [Phase::Moving; 2]);
             assert_eq!(arrived.axes(), record(slot, 6).axes());
             assert_eq!(arrived.axes().len(), 6);
         }

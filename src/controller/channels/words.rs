@@ -1,18 +1,21 @@
 //! The layout of a snapshot in 64-bit words.
 
 use takt_rt::{
-    Answers, AxisSnapshot, BusHealth, BusState, DriveState, MAX_AXES, MAX_BUSES, MotionReports, Origin,
-    Phase, RejectReason, RequestError, RequestId, RequestKind, Rule, Snapshot, StopCategory, StopCause,
-    StopReason, StreamCounts, StreamReport, StreamState, TimingLevel,
+    Answers, AxisSnapshot, BusHealth, BusState, DriveState, GroupSnapshot, MAX_AXES, MAX_BUSES, MAX_GROUPS,
+    MotionReports, Origin, Phase, RejectReason, RequestError, RequestId, RequestKind, Rule, Snapshot,
+    StopCategory, StopCause, StopReason, StreamCounts, StreamReport, StreamState, TimingLevel,
 };
 
 use super::latest::Words;
 use super::motion_words::{MOTION_WORDS, put_motions, take_motions};
 
 /// The largest number of words of a snapshot of so many axes and buses.
-pub const fn snapshot_words(axes: usize, buses: usize) -> usize {
-    22 + MOTION_WORDS + 4 * Answers::EXPLAINED + AXIS_WORDS * axes + 7 * buses
+pub const fn snapshot_words(groups: usize, axes: usize, buses: usize) -> usize {
+    16 + MOTION_WORDS + 4 * Answers::EXPLAINED + GROUP_WORDS * groups + AXIS_WORDS * axes + 7 * buses
 }
+
+/// The largest number of words of a group of a snapshot: its phase, the time left, and a stop.
+const GROUP_WORDS: usize = 2 + 4;
 
 /// The number of words of an axis of a snapshot.
 const AXIS_WORDS: usize = 11;
@@ -40,6 +43,8 @@ pub const NO_SNAPSHOT: Snapshot = Snapshot {
     motions: MotionReports { reports: [None; MotionReports::CAPACITY] },
     remaining_s: 0.0,
     stop: None,
+    group_count: 1,
+    groups: [GroupSnapshot { phase: Phase::Passive, remaining_s: 0.0, stop: None }; MAX_GROUPS],
     axis_count: 0,
     axes: [AxisSnapshot {
         position_set: 0.0,
@@ -75,12 +80,7 @@ pub const NO_SNAPSHOT: Snapshot = Snapshot {
 pub fn put_snapshot(snapshot: &Snapshot, words: &mut Words<'_>) {
     words.put(snapshot.slot);
     words.put(snapshot.at_ns);
-    words.put(pack([
-        snapshot.phase as u8,
-        snapshot.axis_count,
-        snapshot.bus_count,
-        u8::from(snapshot.stop.is_some()) | (snapshot.timing as u8) << 1,
-    ]));
+    words.put(pack([snapshot.group_count, snapshot.axis_count, snapshot.bus_count, snapshot.timing as u8]));
     words.put(snapshot.missed_slots);
     words.put(snapshot.steps);
     put_stream(&snapshot.stream, words);
@@ -88,10 +88,7 @@ pub fn put_snapshot(snapshot: &Snapshot, words: &mut Words<'_>) {
     words.put(snapshot.rejected);
     put_answers(&snapshot.answers, words);
     put_motions(&snapshot.motions, words);
-    words.put_f64(snapshot.remaining_s);
-    if let Some(stop) = snapshot.stop {
-        put_stop(&stop, words);
-    }
+    snapshot.groups().iter().for_each(|group| put_group(group, words));
     for axis in snapshot.axes.iter().take(snapshot.axis_count.into()) {
         put_axis(axis, words);
     }
@@ -102,25 +99,28 @@ pub fn put_snapshot(snapshot: &Snapshot, words: &mut Words<'_>) {
 
 pub fn take_snapshot(words: &mut Words<'_>) -> Snapshot {
     let (slot, at_ns, packed) = (words.take(), words.take(), words.take());
-    let [phase, axis_count, bus_count, flags] = unpack(packed);
+    let [group_count, axis_count, bus_count, timing] = unpack(packed);
     let mut snapshot = Snapshot {
         slot,
         at_ns,
-        phase: phase_of(phase),
         missed_slots: words.take(),
         steps: words.take(),
         stream: take_stream(words),
-        timing: TimingLevel::ALL.get(usize::from(flags >> 1)).copied().unwrap_or_default(),
+        timing: TimingLevel::ALL.get(usize::from(timing)).copied().unwrap_or_default(),
         dropped: words.take(),
         rejected: words.take(),
         answers: take_answers(words),
         motions: take_motions(words),
-        remaining_s: words.take_f64(),
-        stop: (flags & 1 == 1).then(|| take_stop(words)),
+        group_count,
         axis_count,
         bus_count,
         ..NO_SNAPSHOT
     };
+    for group in snapshot.groups.iter_mut().take(group_count.into()) {
+        *group = take_group(words);
+    }
+    let [GroupSnapshot { phase, remaining_s, stop }, ..] = snapshot.groups;
+    (snapshot.phase, snapshot.remaining_s, snapshot.stop) = (phase, remaining_s, stop);
     for axis in snapshot.axes.iter_mut().take(axis_count.into()) {
         *axis = take_axis(words);
     }
@@ -128,6 +128,23 @@ pub fn take_snapshot(words: &mut Words<'_>) -> Snapshot {
         *bus = take_bus(words);
     }
     snapshot
+}
+
+fn put_group(group: &GroupSnapshot, words: &mut Words<'_>) {
+    words.put(pack([group.phase as u8, u8::from(group.stop.is_some()), 0, 0]));
+    words.put_f64(group.remaining_s);
+    if let Some(stop) = group.stop {
+        put_stop(&stop, words);
+    }
+}
+
+fn take_group(words: &mut Words<'_>) -> GroupSnapshot {
+    let [phase, is_stopped, ..] = unpack(words.take());
+    GroupSnapshot {
+        phase: phase_of(phase),
+        remaining_s: words.take_f64(),
+        stop: (is_stopped == 1).then(|| take_stop(words)),
+    }
 }
 
 fn put_answers(answers: &Answers, words: &mut Words<'_>) {
@@ -371,8 +388,9 @@ pub(super) mod tests {
             stop_reasons().prop_map(MotionState::Stopped),
             any::<u64>().prop_map(|by| MotionState::Replaced { by: RequestId(by) }),
         ];
-        let reports = (any::<u64>(), any::<Option<u8>>(), states)
-            .prop_map(|(request, axis, state)| MotionReport { request: RequestId(request), axis, state });
+        let reports = (any::<u64>(), any::<u8>(), any::<Option<u8>>(), states).prop_map(
+            |(request, group, axis, state)| MotionReport { request: RequestId(request), group, axis, state },
+        );
         prop::collection::vec(reports, 0..=MotionReports::CAPACITY)
             .prop_map(|reports| MotionReports { reports: std::array::from_fn(|at| reports.get(at).copied()) })
     }
@@ -421,25 +439,30 @@ pub(super) mod tests {
         )
     }
 
+    fn groups() -> impl Strategy<Value = GroupSnapshot> {
+        let phases = prop::sample::select(&Phase::ALL[..]);
+        (phases, any::<f64>(), prop::option::of(stop_reasons()))
+            .prop_map(|(phase, remaining_s, stop)| GroupSnapshot { phase, remaining_s, stop })
+    }
+
     fn snapshots() -> impl Strategy<Value = Snapshot> {
         let counted = (
             prop::collection::vec(axes(), 0..=MAX_AXES),
             prop::collection::vec(buses(), 0..=MAX_BUSES),
-            prop::option::of(stop_reasons()),
-            prop::sample::select(&Phase::ALL[..]),
+            prop::collection::vec(groups(), 1..=MAX_GROUPS),
         );
         let refusals = prop::collection::vec((any::<u64>(), rejections()), 0..=Answers::EXPLAINED);
         let answers = (any::<(u64, u64, u128, u128)>(), refusals, motions());
-        (counted, any::<(u64, u64, u64, u64, u64, f64)>(), answers).prop_map(
+        (counted, any::<(u64, u64, u64, u64, u64)>(), answers).prop_map(
             |(
-                (axes, buses, stop, phase),
-                (slot, at_ns, missed_slots, steps, dropped, remaining_s),
+                (axes, buses, groups),
+                (slot, at_ns, missed_slots, steps, dropped),
                 ((refused, newest, taken_up, refused_bits), refusals, motions),
             )| {
                 let mut snapshot = Snapshot {
                     slot,
                     at_ns,
-                    phase,
+                    phase: groups[0].phase,
                     missed_slots,
                     steps,
                     dropped,
@@ -453,12 +476,14 @@ pub(super) mod tests {
                         }),
                     },
                     motions,
-                    remaining_s,
-                    stop,
+                    remaining_s: groups[0].remaining_s,
+                    stop: groups[0].stop,
+                    group_count: groups.len() as u8,
                     axis_count: axes.len() as u8,
                     bus_count: buses.len() as u8,
                     ..NO_SNAPSHOT
                 };
+                snapshot.groups[..groups.len()].copy_from_slice(&groups);
                 snapshot.axes[..axes.len()].copy_from_slice(&axes);
                 snapshot.buses[..buses.len()].copy_from_slice(&buses);
                 snapshot
@@ -469,7 +494,7 @@ pub(super) mod tests {
     proptest! {
         #[test]
         fn a_snapshot_comes_out_as_it_went_in(before in snapshots(), snapshot in snapshots()) {
-            let words = snapshot_words(MAX_AXES, MAX_BUSES);
+            let words = snapshot_words(MAX_GROUPS, MAX_AXES, MAX_BUSES);
             let (mut writer, reader) = latest(words);
             // The rest of an earlier, longer value in a slot must have no effect.
             (0..4).for_each(|_| writer.write(|words| put_snapshot(&before, words)));
@@ -479,7 +504,11 @@ pub(super) mod tests {
 
         #[test]
         fn a_snapshot_fits_the_words_reckoned_for_it(snapshot in snapshots()) {
-            let words = snapshot_words(snapshot.axis_count.into(), snapshot.bus_count.into());
+            let words = snapshot_words(
+                snapshot.group_count.into(),
+                snapshot.axis_count.into(),
+                snapshot.bus_count.into(),
+            );
             let (mut writer, reader) = latest(words);
             writer.write(|words| put_snapshot(&snapshot, words));
             prop_assert_eq!(reader.attempt(0, take_snapshot), Attempt::Whole(snapshot, 1));

@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use takt_rt::{
-    Answer, ControlLaw, MAX_AXES, Move, ProfileMove, ProfileTarget, Request, RequestId, Snapshot,
-    StopCategory,
+    Answer, ControlLaw, MAX_AXES, Move, ProfileMove, ProfileTarget, Request, RequestId, RequestTarget,
+    Snapshot, StopCategory,
 };
 
 use super::Handle;
@@ -30,14 +30,27 @@ impl Handle {
     /// # Errors
     /// See [`CommandError`]; nothing has changed then.
     pub fn move_with(&self, target: &[f64], options: MoveOptions) -> Result<MotionId, CommandError> {
-        if target.len() != self.axes().len() {
-            return Err(CommandError::Count { given: target.len(), axes: self.axes().len() });
-        }
-        for (axis, value) in self.axes().iter().zip(target) {
-            within(axis, *value, axis.limits.position_min, axis.limits.position_max)?;
+        let axes: Vec<usize> = (0..self.axes().len()).collect();
+        self.move_axes(RequestTarget::All, &axes, target, options)
+    }
+
+    /// Moves the axes with these numbers, which are those of the group that is asked.
+    pub(super) fn move_axes(
+        &self,
+        group: RequestTarget,
+        axes: &[usize],
+        target: &[f64],
+        options: MoveOptions,
+    ) -> Result<MotionId, CommandError> {
+        if target.len() != axes.len() {
+            return Err(CommandError::Count { given: target.len(), axes: axes.len() });
         }
         let mut all = [0.0; MAX_AXES];
-        all.iter_mut().zip(target).for_each(|(to, from)| *to = *from);
+        for (index, value) in axes.iter().zip(target) {
+            let (Some(axis), Some(to)) = (self.axes().get(*index), all.get_mut(*index)) else { continue };
+            within(axis, *value, axis.limits.position_min, axis.limits.position_max)?;
+            *to = *value;
+        }
         let request = Request::Move(Move {
             target: all,
             target_velocity: [0.0; MAX_AXES],
@@ -45,7 +58,7 @@ impl Handle {
             acceleration_scale: options.acceleration_scale,
             minimum_duration_s: options.minimum_duration_s,
         });
-        self.submit(request).map(MotionId)
+        self.begin_motion(group, request)
     }
 
     /// Gives a drive in profile velocity a velocity (rad/s or m/s). Unless it is given again within `valid_for`, the group
@@ -83,10 +96,14 @@ impl Handle {
     /// # Errors
     /// [`CommandError::Ended`].
     pub fn stop(&self, category: StopCategory) -> Result<(), CommandError> {
+        self.stop_of(RequestTarget::All, category)
+    }
+
+    pub(super) fn stop_of(&self, target: RequestTarget, category: StopCategory) -> Result<(), CommandError> {
         if self.has_ended() {
             return Err(CommandError::Ended);
         }
-        self.0.clients.stop(MotionEnd::Stop(category));
+        self.0.clients.stop_of(target, MotionEnd::Stop(category));
         Ok(())
     }
 
@@ -95,12 +112,16 @@ impl Handle {
     /// # Errors
     /// [`CommandError::Refused`], [`CommandError::Ended`].
     pub fn disable(&self) -> Result<(), CommandError> {
+        self.disable_of(RequestTarget::All)
+    }
+
+    pub(super) fn disable_of(&self, target: RequestTarget) -> Result<(), CommandError> {
         if self.has_ended() {
             return Err(CommandError::Ended);
         }
-        let id = self.0.clients.stop(MotionEnd::Disable);
+        let id = self.0.clients.stop_of(target, MotionEnd::Disable);
         // A later request to disable may have been taken in place of this one. Then its answer counts.
-        self.wait_for_answer(|_| Ok(self.0.clients.taken_as(MotionEnd::Disable, id)))
+        self.wait_for_answer(|_| Ok(self.0.clients.taken_as(target, MotionEnd::Disable, id)))
     }
 
     /// Begins to enable the axes again: after [`Handle::disable`], or after a fault and [`Handle::reset_faults`].
@@ -137,20 +158,25 @@ impl Handle {
     ) -> Result<MotionId, CommandError> {
         // The number of an existing axis fits.
         let wanted = ProfileMove { axis: axis as u8, target, valid_until_ns: expiry_ns(valid_for) };
-        self.submit(Request::SetProfileTarget(wanted)).map(MotionId)
+        self.begin_motion(self.group_of(axis), Request::SetProfileTarget(wanted))
+    }
+
+    /// Submits a request for all groups and waits until it is granted.
+    pub(super) fn request(&self, request: Request) -> Result<(), CommandError> {
+        self.request_of(RequestTarget::All, request)
     }
 
     /// Submits a request and waits until it is granted.
-    pub(super) fn request(&self, request: Request) -> Result<(), CommandError> {
-        let id = self.submit(request)?;
-        self.wait_for_grant(id)
+    pub(super) fn request_of(&self, target: RequestTarget, request: Request) -> Result<(), CommandError> {
+        let id = self.submit(target, request)?;
+        self.wait_for_grant(target, id)
     }
 
     /// Waits until a request that was submitted is granted.
-    pub(super) fn wait_for_grant(&self, id: RequestId) -> Result<(), CommandError> {
+    pub(super) fn wait_for_grant(&self, target: RequestTarget, id: RequestId) -> Result<(), CommandError> {
         self.wait_for_answer(|state| {
             let is_answered = state.answers.of(id) != Answer::None;
-            if !is_answered && self.is_discarded(id, state) {
+            if !is_answered && self.is_discarded(target, id, state) {
                 Err(CommandError::Overtaken)
             } else {
                 Ok(Some(id))
@@ -158,12 +184,23 @@ impl Handle {
         })
     }
 
+    fn begin_motion(&self, target: RequestTarget, request: Request) -> Result<MotionId, CommandError> {
+        Ok(MotionId { request: self.submit(target, request)?, target })
+    }
+
+    /// The group of an axis, by whose stops what is asked of the axis is discarded.
+    fn group_of(&self, axis: usize) -> RequestTarget {
+        let group = self.groups().iter().position(|group| group.axes.contains(&axis));
+        let group = group.and_then(|group| u8::try_from(group).ok());
+        group.filter(|_| self.groups().len() > 1).map_or(RequestTarget::All, RequestTarget::Group)
+    }
+
     /// Submits a request. It is taken in the next cycle, unless many others wait.
-    pub(super) fn submit(&self, request: Request) -> Result<RequestId, CommandError> {
+    pub(super) fn submit(&self, target: RequestTarget, request: Request) -> Result<RequestId, CommandError> {
         if self.0.life.is_ending() {
             return Err(CommandError::Ended);
         }
-        self.0.clients.submit(request).ok_or(CommandError::Full { waiting: WAITING_AT_MOST })
+        self.0.clients.submit_to(target, request).ok_or(CommandError::Full { waiting: WAITING_AT_MOST })
     }
 
     /// Waits until a request is granted. `taken` is the request whose answer counts, once that is known.

@@ -76,6 +76,14 @@ pub enum CommandError {
         /// The number of axes.
         axes: usize,
     },
+    /// There is no group of this name.
+    #[error("there is no group {name:?}: the groups are: {}", groups.join(", "))]
+    NoSuchGroup {
+        /// The name.
+        name: String,
+        /// The names of the groups; none where all axes are one group.
+        groups: Vec<String>,
+    },
     /// The value is outside the limits of the axis, or not a number.
     #[error("{axis}: {value} is not within its limits, {lowest} to {highest}")]
     OutsideLimits {

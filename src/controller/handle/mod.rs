@@ -25,6 +25,7 @@
 mod commands;
 mod error;
 mod events;
+mod group;
 mod life;
 mod messages;
 mod motion;
@@ -43,7 +44,7 @@ use takt_rt::{Phase, Snapshot, StopCategory};
 use super::channels::{ClientRequests, EventReader, MotionEnd, Observer, Streamer};
 use super::outcome::{Interrupt, Outcome};
 use super::session::{self, RemoteHandles, Session, SessionError, SessionOptions};
-use crate::config::{Axis, Config};
+use crate::config::{Axis, Config, Group};
 use crate::telemetry::{Machine, Notice};
 use life::Life;
 use messages::Messages;
@@ -51,6 +52,7 @@ use trajectory::Trajectories;
 
 pub use error::{CommandError, MotionError, Refused, StartFailure, Stopped, WaitError};
 pub use events::Events;
+pub use group::GroupHandle;
 pub use motion::{MotionId, MoveOptions};
 pub use stream::{StreamError, StreamHandle};
 pub use trajectory::TrajectoryProgress;
@@ -74,7 +76,8 @@ impl Controller {
     pub fn start(config: Config, options: SessionOptions) -> Result<Self, StartFailure> {
         let (handles_in, handles_out) = mpsc::sync_channel(1);
         let (life, messages) = (Arc::<Life>::default(), Arc::<Messages>::default());
-        let (axes, machine) = (config.axes.clone(), Machine::of(&config));
+        let (axes, groups) = (config.axes.clone(), config.groups.clone());
+        let machine = Machine::of(&config);
         let thread = {
             let (life, messages) = (Arc::clone(&life), Arc::clone(&messages));
             let notify = move |notice: &Notice| match notice {
@@ -95,6 +98,7 @@ impl Controller {
         let trajectories = Trajectories::new(trajectories);
         let handle = Handle(Arc::new(Shared {
             axes,
+            groups,
             machine,
             realtime,
             clients,
@@ -172,6 +176,7 @@ pub struct Handle(Arc<Shared>);
 
 struct Shared {
     axes: Vec<Axis>,
+    groups: Vec<Group>,
     machine: Machine,
     realtime: ThreadReport,
     clients: ClientRequests,
@@ -187,6 +192,11 @@ impl Handle {
     /// The axes, in the order of the configuration.
     pub fn axes(&self) -> &[Axis] {
         &self.0.axes
+    }
+
+    /// The groups of the configuration; none where all axes are one group.
+    pub fn groups(&self) -> &[Group] {
+        &self.0.groups
     }
 
     /// The names of the parts of the machine, for texts about events and states.

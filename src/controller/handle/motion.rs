@@ -2,19 +2,23 @@
 
 use std::time::Duration;
 
-use takt_rt::{Answer, MotionState, RequestId, Snapshot};
+use takt_rt::{Answer, MotionState, RequestId, RequestTarget, Snapshot};
 
 use super::Handle;
 use super::error::{MotionError, Refused, Stopped, WaitError};
 
 /// Identifies a motion, for [`Handle::wait`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct MotionId(pub(super) RequestId);
+pub struct MotionId {
+    pub(super) request: RequestId,
+    /// Which stops discard it.
+    pub(super) target: RequestTarget,
+}
 
 impl MotionId {
     /// The request that began it.
     pub const fn request(self) -> RequestId {
-        self.0
+        self.request
     }
 }
 
@@ -57,7 +61,11 @@ impl Handle {
     }
 
     /// How a motion has ended, by a state.
-    fn result_in(&self, state: &Snapshot, MotionId(request): MotionId) -> Option<Result<(), MotionError>> {
+    fn result_in(
+        &self,
+        state: &Snapshot,
+        MotionId { request, target }: MotionId,
+    ) -> Option<Result<(), MotionError>> {
         let machine = self.machine();
         let result = match (state.motions.of(request), state.answers.of(request)) {
             (Some(MotionState::InProgress), _) => return None,
@@ -67,15 +75,15 @@ impl Handle {
             (None, Answer::Rejected(refusal)) => Err(Refused::new(refusal, machine).into()),
             (None, Answer::Granted) => Err(MotionError::Forgotten),
             (None, Answer::None) if state.answers.have_forgotten(request) => Err(MotionError::Forgotten),
-            (None, Answer::None) if self.is_discarded(request, state) => Err(MotionError::Overtaken),
+            (None, Answer::None) if self.is_discarded(target, request, state) => Err(MotionError::Overtaken),
             (None, Answer::None) => return None,
         };
         Some(result)
     }
 
     /// Whether a stop has discarded a request that has no answer in this state.
-    pub(super) fn is_discarded(&self, request: RequestId, state: &Snapshot) -> bool {
-        let stop = self.0.clients.newest_stop();
+    pub(super) fn is_discarded(&self, target: RequestTarget, request: RequestId, state: &Snapshot) -> bool {
+        let stop = self.0.clients.newest_stop(target);
         // Every request that was taken before the stop has its answer in the first state that has that of the stop.
         let has_stopped = state.answers.of(stop) != Answer::None || state.answers.have_forgotten(stop);
         request < stop && has_stopped

@@ -6,7 +6,7 @@ use std::time::Duration;
 use takt_rt::plan::State;
 use takt_rt::{
     AxisLimits, ExecutionStart, MotionState, NANOSECONDS_PER_SECOND, RejectReason, Request, RequestId,
-    TrajectoryId,
+    RequestTarget, TrajectoryId,
 };
 
 use super::Handle;
@@ -22,6 +22,9 @@ const FIRST_MARGIN_S: f64 = 0.02;
 const LONGEST_MARGIN_S: f64 = 1.0;
 /// A trajectory that has been granted takes the place of the present one within this time, unless the motion ends before.
 const TAKING_OVER: Duration = Duration::from_secs(5);
+
+/// A trajectory is one of all axes.
+const TARGET: RequestTarget = RequestTarget::All;
 
 /// The trajectories of the handles of a controller.
 pub(super) struct Trajectories {
@@ -149,7 +152,7 @@ impl Handle {
     /// How far a trajectory under way is: the time on its path in seconds, of how many, and the present rate.
     pub fn trajectory_progress(&self, motion: MotionId) -> Option<TrajectoryProgress> {
         let trajectories = self.0.trajectories.lock();
-        let present = self.under_way(&trajectories).filter(|present| present.motion == motion.0)?;
+        let present = self.under_way(&trajectories).filter(|present| present.motion == motion.request)?;
         let trajectory = present.given.trajectory();
         let path_time = trajectory.path_time(present.given.at_s());
         Some(TrajectoryProgress {
@@ -161,11 +164,11 @@ impl Handle {
 
     fn change_rate(
         &self,
-        MotionId(motion): MotionId,
+        motion: MotionId,
         wanted: impl Fn(&Present) -> (f64, bool),
     ) -> Result<(), CommandError> {
         let mut trajectories = self.0.trajectories.lock();
-        let present = self.under_way(&trajectories).filter(|present| present.motion == motion);
+        let present = self.under_way(&trajectories).filter(|present| present.motion == motion.request);
         let present = present.ok_or(CommandError::NoTrajectory)?;
         let (rate, is_paused) = wanted(&present);
         if !(rate.is_finite() && rate > 0.0) {
@@ -228,7 +231,7 @@ impl Handle {
         self.take_back_discarded(trajectories);
         let given = Arc::new(GivenTrajectory::new(trajectory));
         let id = giver.give(0, &given).ok_or(CommandError::Full { waiting: trajectories.submitted.len() })?;
-        let request = match self.submit(Request::Execute { trajectory: id, start }) {
+        let request = match self.submit(TARGET, Request::Execute { trajectory: id, start }) {
             Ok(request) => request,
             Err(error) => {
                 giver.take_back(id);
@@ -236,7 +239,7 @@ impl Handle {
             }
         };
         trajectories.submitted.push((id, request));
-        self.wait_for_grant(request)?;
+        self.wait_for_grant(TARGET, request)?;
         let motion = same.map_or(request, |same| same.motion);
         let (rate, is_paused) = same.map_or((1.0, false), |same| (same.rate, same.is_paused));
         trajectories.present = Some(Present { motion, id, given: Arc::clone(&given), rate, is_paused });
@@ -245,14 +248,14 @@ impl Handle {
             let is_under_way = state.motions.of(motion) == Some(MotionState::InProgress);
             (given.at_s() > 0.0 || !is_under_way).then_some(())
         });
-        Ok(MotionId(motion))
+        Ok(MotionId { request: motion, target: TARGET })
     }
 
     /// Takes trajectories back whose requests a stop has discarded.
     fn take_back_discarded(&self, trajectories: &mut TrajectoryState) {
         let state = self.state();
         trajectories.submitted.retain(|(id, request)| {
-            let is_discarded = self.is_discarded(*request, &state);
+            let is_discarded = self.is_discarded(TARGET, *request, &state);
             if is_discarded {
                 self.0.trajectories.giver.take_back(*id);
             }

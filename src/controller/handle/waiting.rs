@@ -65,12 +65,13 @@ impl Handle {
         }
     }
 
-    /// Waits until the group is in a phase.
+    /// Waits until every group is in a phase.
     ///
     /// # Errors
     /// [`WaitError::NotInTime`] after `at_most`, [`WaitError::Ended`].
     pub fn wait_for(&self, phase: Phase, at_most: Duration) -> Result<(), WaitError> {
-        self.wait_until(at_most, |state| (state.phase == phase).then_some(()))
+        let is_there = |state: &Snapshot| state.groups().iter().all(|group| group.phase == phase);
+        self.wait_until(at_most, |state| is_there(state).then_some(()))
     }
 
     /// Waits until `find` finds something in a state. It looks at one state of each cycle, or of each millisecond if the period is

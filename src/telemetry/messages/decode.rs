@@ -194,7 +194,7 @@ mod tests {
             (EventKind::Stop(of_a_bus), Some(EventKind::Stop(of_no_bus)), Some(EventKind::Stop(of_no_bus))),
         ] {
             let mut encoder = CdrEncoder::default();
-            encode_event(&Event { slot: 77, at_ns: 88, kind }, "in words", &mut encoder);
+            encode_event(&Event { slot: 77, at_ns: 88, group: Some(1), kind }, "in words", &mut encoder);
             for (missing, kind) in [(2, without_bus), (4, without_both)] {
                 let earlier = decode_event(&encoder.bytes()[..encoder.bytes().len() - missing]);
                 let expected = RecordedEvent { slot: 77, at_ns: 88, text: "in words".to_owned(), kind };
@@ -219,7 +219,7 @@ mod tests {
             EventKind::Stream { state: StreamState::Dry },
             EventKind::Rejected(REFUSAL),
         ] {
-            encode_event(&Event { slot: 77, at_ns: 88, kind }, "in words", &mut encoder);
+            encode_event(&Event { slot: 77, at_ns: 88, group: Some(1), kind }, "in words", &mut encoder);
             let expected =
                 RecordedEvent { slot: 77, at_ns: 88, text: "in words".to_owned(), kind: Some(kind) };
             assert_eq!(decode_event(encoder.bytes()), Some(expected));

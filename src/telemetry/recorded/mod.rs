@@ -10,7 +10,7 @@ use std::io::{self, BufReader};
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
-use takt_rt::{AxisRecord, CycleRecord, CycleTiming, EventKind, MAX_BUSES, Nanoseconds, Phase};
+use takt_rt::{AxisRecord, CycleRecord, CycleTiming, EventKind, MAX_BUSES, MAX_GROUPS, Nanoseconds, Phase};
 
 use super::black_box;
 use super::history::OnBus;
@@ -128,7 +128,13 @@ impl Recorded {
         let mut recorded = Self {
             path: path.to_owned(),
             version: String::new(),
-            machine: Machine { name: String::new(), cycle_ns: 0, axes: Vec::new(), buses: Vec::new() },
+            machine: Machine {
+                name: String::new(),
+                cycle_ns: 0,
+                axes: Vec::new(),
+                buses: Vec::new(),
+                groups: Vec::new(),
+            },
             incidents: Vec::new(),
             events: Vec::new(),
             health: Vec::new(),
@@ -175,6 +181,8 @@ impl Recorded {
                 let bus = |line: &str| BusDescription { name: name(line), interface: String::new() };
                 let buses = described.get("buses").map_or("", String::as_str);
                 self.machine.buses = buses.lines().take(MAX_BUSES).map(bus).collect();
+                let groups = described.get("groups").map_or("", String::as_str);
+                self.machine.groups = groups.lines().take(MAX_GROUPS).map(name).collect();
             }
             Item::Incident(incident) => {
                 self.incidents

@@ -83,6 +83,17 @@ fn reason(rejected: &RequestError, machine: &Machine) -> String {
         RejectReason::MinimumDuration { duration_s } => {
             format!("{duration_s} s is not a possible shortest duration")
         }
+        RejectReason::UnknownGroup { group, groups } => {
+            format!("there is no group {group}: there are {groups}, counted from 0")
+        }
+        RejectReason::GroupNotNamed { .. } => {
+            format!("it is for one group, and must name it: {}", machine.groups.join(", "))
+        }
+        RejectReason::OtherGroup { asked, of_axis } => format!(
+            "{axis} is in the group {}, not in {}",
+            machine.group_name(of_axis),
+            machine.group_name(asked)
+        ),
         RejectReason::NoTrajectory => format!("no trajectory within the limits of {axis} leads there"),
         RejectReason::RatedTorque { torque } => {
             format!("{torque} {force} is not a possible rated torque of {axis}")
@@ -124,7 +135,7 @@ mod tests {
             limits: SetPointMagnitudes::default(),
         };
         let axes = vec![axis("shoulder", Unit::Radian), axis("slide", Unit::Metre)];
-        Machine { name: "arm".to_owned(), cycle_ns: 1_000_000, axes, buses: vec![] }
+        Machine { name: "arm".to_owned(), cycle_ns: 1_000_000, axes, buses: vec![], groups: vec![] }
     }
 
     fn text(reason: RejectReason, axis: Option<u8>) -> String {

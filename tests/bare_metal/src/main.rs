@@ -8,7 +8,7 @@ use core::f64::consts::TAU;
 use takt_rt::{
     AxisLimits, AxisParameters, BusHealth, BusParameters, BusSet, CommandPdo, ControlLaw, CycleInput,
     CycleTiming, Deadline, Dialect, Engine, EngineParameters, FeedbackSince, Frame, HostInterface, Id,
-    Follow, MappedObject, Mapping, Pdo, Phase, Received, Request, RequestEnvelope, RequestId, Scale,
+    Follow, MappedObject, Mapping, Pdo, Phase, Received, Request, RequestEnvelope, RequestId, RequestTarget, Scale,
     ScaleParameters, SendBatch, StopCategories, TimingLadder,
 };
 
@@ -35,7 +35,13 @@ impl HostInterface<1, 1> for Silent {
     fn request(&mut self) -> Option<RequestEnvelope<1>> {
         let numbered = self.requests.iter_mut().zip(1..);
         numbered
-            .filter_map(|(place, id)| Some(RequestEnvelope { id: RequestId(id), request: place.take()? }))
+            .filter_map(|(place, id)| {
+                Some(RequestEnvelope {
+                    id: RequestId(id),
+                    target: RequestTarget::All,
+                    request: place.take()?,
+                })
+            })
             .next()
     }
 }
@@ -94,6 +100,7 @@ fn cycles() -> Option<Phase> {
     let parameters = EngineParameters {
         period_ns: 1_000_000,
         axes: [axis()?].into_iter().collect(),
+        groups: Default::default(),
         buses: [bus].into_iter().collect(),
         heartbeat: None,
         time_cycles: None,
@@ -122,7 +129,7 @@ fn cycles() -> Option<Phase> {
         engine.encode(0, Deadline::Met, &mut host, &mut batch);
         engine.finish(CycleTiming { slot, ..CycleTiming::default() }, at_ns, &health, &mut host);
     }
-    Some(engine.phase())
+    engine.phase(0)
 }
 
 /// Called by the C start-up code.

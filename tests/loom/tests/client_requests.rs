@@ -5,12 +5,12 @@ use loom::thread;
 use takt_loom::all_relaxed;
 use takt_loom::client_requests::{ClientRequests, MotionEnd, TakenRequests, client_requests};
 use takt_loom::request_numbers::RequestNumbers;
-use takt_rt::{Request, StopCategory};
+use takt_rt::{Request, RequestTarget, StopCategory};
 
 const STOP: MotionEnd = MotionEnd::Stop(StopCategory::Two);
 
 fn channel(slots: usize) -> (ClientRequests, TakenRequests) {
-    client_requests(RequestNumbers::default(), slots)
+    client_requests(RequestNumbers::default(), slots, 1)
 }
 
 fn request(counts: i32) -> Request {
@@ -102,8 +102,8 @@ fn each_of_two_stops_at_once_is_taken_or_stands_for_the_other() {
         taken.extend(take(&mut rt, 3));
         assert!(taken == [0] || taken == [0, 0], "{taken:?}");
         let newest = ids.into_iter().max().unwrap();
-        assert!(ids.iter().all(|id| observer.taken_as(STOP, *id) == Some(newest)));
-        assert_eq!(observer.newest_stop(), newest);
+        assert!(ids.iter().all(|id| observer.taken_as(RequestTarget::All, STOP, *id) == Some(newest)));
+        assert_eq!(observer.newest_stop(RequestTarget::All), newest);
     });
 }
 
@@ -111,7 +111,7 @@ fn each_of_two_stops_at_once_is_taken_or_stands_for_the_other() {
 #[should_panic(expected = "Causality violation")]
 fn with_every_access_relaxed_the_slots_fail() {
     loom::model(|| {
-        let requests = all_relaxed::client_requests::client_requests(RequestNumbers::default(), 1);
+        let requests = all_relaxed::client_requests::client_requests(RequestNumbers::default(), 1, 1);
         let (client, mut rt) = requests;
         let submitting = thread::spawn(move || client.submit(request(1)));
         let _ = rt.take();

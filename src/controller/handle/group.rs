@@ -1,0 +1,118 @@
+//! One group of several: a gripper beside an arm. What is asked of it concerns no other group.
+
+use std::time::Duration;
+
+use takt_rt::{GroupSnapshot, Phase, Request, RequestTarget, StopCategory};
+
+use super::Handle;
+use super::error::{CommandError, WaitError};
+use super::motion::{MotionId, MoveOptions};
+
+/// Commands and observes one group of a running controller, from any thread. Clones are cheap and equal. The drives in profile velocity
+/// and profile torque are commanded by [`Handle::velocity`] and [`Handle::torque`]: the axis names its group.
+#[derive(Clone)]
+pub struct GroupHandle {
+    handle: Handle,
+    number: u8,
+    axes: Vec<usize>,
+}
+
+impl Handle {
+    /// The group with this name in the configuration.
+    ///
+    /// # Errors
+    /// [`CommandError::NoSuchGroup`].
+    pub fn group(&self, name: &str) -> Result<GroupHandle, CommandError> {
+        let found = (0..).zip(self.groups()).find(|(_, group)| group.name == name);
+        let (number, group) = found.ok_or_else(|| CommandError::NoSuchGroup {
+            name: name.to_owned(),
+            groups: self.groups().iter().map(|group| group.name.clone()).collect(),
+        })?;
+        Ok(GroupHandle { handle: self.clone(), number, axes: group.axes.clone() })
+    }
+}
+
+impl GroupHandle {
+    /// The numbers of its axes, in the order in which the configuration names them in the group.
+    pub fn axes(&self) -> &[usize] {
+        &self.axes
+    }
+
+    /// What it is doing, the time left of its present move, and why it has stopped, after the newest complete cycle.
+    pub fn state(&self) -> GroupSnapshot {
+        let state = self.handle.state();
+        state.groups().get(usize::from(self.number)).copied().unwrap_or_default()
+    }
+
+    /// As [`Handle::move_to`], with a target for each axis of the group, in the order of [`GroupHandle::axes`].
+    ///
+    /// # Errors
+    /// See [`CommandError`]; nothing has changed then.
+    pub fn move_to(&self, target: &[f64]) -> Result<MotionId, CommandError> {
+        self.move_with(target, MoveOptions::default())
+    }
+
+    /// As [`Handle::move_with`], with a target for each axis of the group, in the order of [`GroupHandle::axes`].
+    ///
+    /// # Errors
+    /// See [`CommandError`]; nothing has changed then.
+    pub fn move_with(&self, target: &[f64], options: MoveOptions) -> Result<MotionId, CommandError> {
+        self.handle.move_axes(self.target(), &self.axes, target, options)
+    }
+
+    /// As [`Handle::begin_stream`]. The points have an entry for each axis of the controller; the group follows those of its own. There
+    /// is one stream: a group that begins to follow it while another one does discards the points that wait.
+    ///
+    /// # Errors
+    /// See [`Handle::begin_stream`].
+    pub fn begin_stream(&self) -> Result<(), CommandError> {
+        self.handle.request_of(self.target(), Request::Stream)
+    }
+
+    /// As [`Handle::stop`]; it discards the waiting requests for this group, and for all of them.
+    ///
+    /// # Errors
+    /// [`CommandError::Ended`].
+    pub fn stop(&self, category: StopCategory) -> Result<(), CommandError> {
+        self.handle.stop_of(self.target(), category)
+    }
+
+    /// As [`Handle::disable`].
+    ///
+    /// # Errors
+    /// [`CommandError::Refused`], [`CommandError::Ended`].
+    pub fn disable(&self) -> Result<(), CommandError> {
+        self.handle.disable_of(self.target())
+    }
+
+    /// As [`Handle::enable`]. The other groups may be in motion.
+    ///
+    /// # Errors
+    /// See [`Handle::enable`].
+    pub fn enable(&self) -> Result<(), CommandError> {
+        self.handle.request_of(self.target(), Request::Enable)
+    }
+
+    /// As [`Handle::reset_faults`].
+    ///
+    /// # Errors
+    /// See [`Handle::reset_faults`].
+    pub fn reset_faults(&self) -> Result<(), CommandError> {
+        self.handle.request_of(self.target(), Request::ResetFaults)
+    }
+
+    /// Waits until the group is in a phase.
+    ///
+    /// # Errors
+    /// [`WaitError::NotInTime`] after `at_most`, [`WaitError::Ended`].
+    pub fn wait_for(&self, phase: Phase, at_most: Duration) -> Result<(), WaitError> {
+        let number = usize::from(self.number);
+        self.handle.wait_until(at_most, |state| {
+            state.groups().get(number).is_some_and(|group| group.phase == phase).then_some(())
+        })
+    }
+
+    const fn target(&self) -> RequestTarget {
+        RequestTarget::Group(self.number)
+    }
+}
