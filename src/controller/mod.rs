@@ -15,7 +15,7 @@ mod virtual_time;
 
 pub use handle::{
     CommandError, Controller, Events, GroupHandle, Handle, MotionError, MotionId, MoveOptions, Refused,
-    StartFailure, Stopped, StreamError, StreamHandle, WaitError,
+    StartFailure, Stopped, StreamError, StreamHandle, TrajectoryProgress, WaitError,
 };
 pub use outcome::{Interrupt, Outcome, Progress};
 pub use program::{ProgramRunner, ProgramStep};

@@ -169,6 +169,11 @@ impl Handle {
     /// Submits a request and waits until it is granted.
     pub(super) fn request_of(&self, target: RequestTarget, request: Request) -> Result<(), CommandError> {
         let id = self.submit(target, request)?;
+        self.wait_for_grant(target, id)
+    }
+
+    /// Waits until a request that was submitted is granted.
+    pub(super) fn wait_for_grant(&self, target: RequestTarget, id: RequestId) -> Result<(), CommandError> {
         self.wait_for_answer(|state| {
             let is_answered = state.answers.of(id) != Answer::None;
             if !is_answered && self.is_discarded(target, id, state) {
@@ -191,7 +196,7 @@ impl Handle {
     }
 
     /// Submits a request. It is taken in the next cycle, unless many others wait.
-    fn submit(&self, target: RequestTarget, request: Request) -> Result<RequestId, CommandError> {
+    pub(super) fn submit(&self, target: RequestTarget, request: Request) -> Result<RequestId, CommandError> {
         if self.0.life.is_ending() {
             return Err(CommandError::Ended);
         }

@@ -15,6 +15,13 @@ pub struct MotionId {
     pub(super) target: RequestTarget,
 }
 
+impl MotionId {
+    /// The request that began it.
+    pub const fn request(self) -> RequestId {
+        self.request
+    }
+}
+
 /// Parameters of a move.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MoveOptions {
