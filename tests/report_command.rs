@@ -198,7 +198,7 @@ fn run_with_a_lost_bus(bus: &str, restart: &str, folder: &Path) -> (LogSummary, 
         realtime: RealtimeReport::default(),
         last: run.snapshot(),
         buses_open_ns: 1_000_000_000,
-        targets: None,
+        targets: vec![],
         stop: Some(stop),
     };
     (logger.finish(), outcome)
