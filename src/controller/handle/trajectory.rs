@@ -164,7 +164,7 @@ impl Handle {
 
     fn change_rate(
         &self,
-        motion: MotionId,
+        MotionId { request: motion, .. }: MotionId,
         wanted: impl Fn(&Present) -> (f64, bool),
     ) -> Result<(), CommandError> {
         let mut trajectories = self.0.trajectories.lock();
@@ -231,7 +231,7 @@ impl Handle {
         self.take_back_discarded(trajectories);
         let given = Arc::new(GivenTrajectory::new(trajectory));
         let id = giver.give(0, &given).ok_or(CommandError::Full { waiting: trajectories.submitted.len() })?;
-        let request = match self.submit(TARGET, Request::Execute { trajectory: id, start }) {
+        let request = match self.submit(RequestTarget::All, Request::Execute { trajectory: id, start }) {
             Ok(request) => request,
             Err(error) => {
                 giver.take_back(id);
@@ -239,7 +239,7 @@ impl Handle {
             }
         };
         trajectories.submitted.push((id, request));
-        self.wait_for_grant(TARGET, request)?;
+        self.wait_for_grant(RequestTarget::All, request)?;
         let motion = same.map_or(request, |same| same.motion);
         let (rate, is_paused) = same.map_or((1.0, false), |same| (same.rate, same.is_paused));
         trajectories.present = Some(Present { motion, id, given: Arc::clone(&given), rate, is_paused });
@@ -248,14 +248,14 @@ impl Handle {
             let is_under_way = state.motions.of(motion) == Some(MotionState::InProgress);
             (given.at_s() > 0.0 || !is_under_way).then_some(())
         });
-        Ok(MotionId { request: motion, target: TARGET })
+        Ok(MotionId { request: motion, target: RequestTarget::All })
     }
 
     /// Takes trajectories back whose requests a stop has discarded.
     fn take_back_discarded(&self, trajectories: &mut TrajectoryState) {
         let state = self.state();
         trajectories.submitted.retain(|(id, request)| {
-            let is_discarded = self.is_discarded(TARGET, *request, &state);
+            let is_discarded = self.is_discarded(RequestTarget::All, *request, &state);
             if is_discarded {
                 self.0.trajectories.giver.take_back(*id);
             }
