@@ -31,6 +31,8 @@ fn streaming_within(limits: AxisLimits, law: ControlLaw, on_violation: OnViolati
     rig.move_to(0.0);
     rig.run_until(Phase::Holding, 5_000);
     rig.run(500);
+    let mut numbers = 0;
+    let _ = numbers;
     rig.request(Request::Stream);
     rig
 }
@@ -266,6 +268,54 @@ fn a_stream_near_its_limits_that_is_slower_than_the_cycle_is_followed_within_all
             assert!(farthest < 2e-3, "{what}: {farthest:e}");
             assert!(last < 1e-9, "{what}: {last:e} at the end");
         }
+    }
+}
+
+/// Numbers that look random, the same ones in each run: xorshift.
+struct Numbers(u64);
+
+impl Numbers {
+    fn below(&mut self, end: u64) -> u64 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        self.0 % end
+    }
+}
+
+/// A swing whose commands stay away for some cycles again and again, and in the end for good. What has fallen behind such a
+/// stream catches up with it by all that the limits allow.
+#[test]
+fn a_stream_that_is_caught_up_with_is_stopped_within_the_limits_when_its_commands_stay_away_again() {
+    let period_s = PERIOD_NS as f64 * 1e-9;
+    for (seed, jerk) in (1..).zip([30.0, 60.0, 100.0, 200.0].repeat(100)) {
+        let mut numbers = Numbers(seed);
+        let limits = AxisLimits { jerk, ..LIMITS };
+        let (speed, acceleration) = (0.85 * limits.velocity, 0.4 * limits.acceleration);
+        let rate = acceleration / speed;
+        let mut rig = streaming_within(limits, ControlLaw::Position, OnViolation::Clamp);
+        let mut absent_cycles = 0;
+        for cycle in 1..=1000 {
+            if absent_cycles == 0 && numbers.below(3) == 0 {
+                absent_cycles = 1 + numbers.below(20);
+            }
+            if absent_cycles == 0 {
+                let time_s = f64::from(cycle) * period_s;
+                // It begins gently.
+                let share = (time_s / 0.5).min(1.0);
+                let share = share * share * share * (10.0 + share * (6.0 * share - 15.0));
+                let position = share * speed / rate * (1.0 - (rate * time_s).cos());
+                let valid_until_ns = rig.clock.now_ns + 50 * PERIOD_NS;
+                rig.host.stream =
+                    Some(StreamCommand { valid_until_ns, set_points: [State::rest(position); MAX_AXES] });
+            }
+            absent_cycles = absent_cycles.saturating_sub(1);
+            rig.run(1);
+        }
+        rig.run(2000);
+        rig.assert_limits_kept();
+        // A stop whose first step breaks a limit would take the power.
+        assert_eq!(rig.phase(), Phase::Holding, "{seed}: {:?}", rig.stops());
     }
 }
 

@@ -133,6 +133,18 @@ impl Axis {
         }
     }
 
+    /// Slows the set-point down as fast as the limits of velocity, acceleration and position allow, whatever the jerk, and
+    /// leaves it where it stands: for a motion that no planned stop ends. A set-point that just stayed would be a leap.
+    pub fn slow_down(&mut self, period_s: f64) {
+        let [last, before_last, _] = self.set_points.positions();
+        if !self.is_enabled() || last == before_last {
+            return self.stay();
+        }
+        let wish_to_stop = State::rest(f64::NAN);
+        let next = guard::clamp(&self.parameters.limits, &self.steps(&wish_to_stop, period_s));
+        self.advance(next);
+    }
+
     /// Whether the set-point is where the joint is, but for one step within the limits.
     pub fn is_on_joint(&self, period_s: f64) -> bool {
         (self.joint.position() - self.set_point().position).abs()

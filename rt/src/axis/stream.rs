@@ -3,7 +3,7 @@
 use super::Axis;
 use crate::fault::Fault;
 use crate::group_trajectory::stop_limits;
-use crate::guard::{StreamCommands, braking_distance};
+use crate::guard::{StreamCommands, braking_distance, keeps_velocity};
 use crate::plan::{self, Limits, Problem, Profile, State};
 
 /// Steps before a set-point in its third difference.
@@ -110,6 +110,7 @@ impl Axis {
             let lowest = position - braking_distance(limits, -velocity, -acceleration);
             highest <= limits.position_max.max(start.position)
                 && lowest >= limits.position_min.min(start.position)
+                && keeps_velocity(limits, next)
         };
         let is_within = |next: &State| {
             can_stop(next)

@@ -12,7 +12,7 @@ use crate::plan::State;
 
 pub use commands::StreamCommands;
 pub use following_error::FollowingErrorGuard;
-pub use stopping_bound::braking_distance;
+pub use stopping_bound::{braking_distance, keeps_velocity};
 pub use stream::{OnViolation, SetPointSteps, check_braking, check_jerk, clamp};
 
 /// What an axis may never be asked to do. rad (m) and seconds.

@@ -12,7 +12,7 @@ pub(super) const ROUNDINGS: f64 = 64.0;
 
 /// Relative to the limits that a stop must be able to keep: half of what [`check`](super::check) allows, so that every step of
 /// the stop passes it.
-const BRAKING_TOLERANCE: f64 = TOLERANCE / 2.0;
+pub(super) const BRAKING_TOLERANCE: f64 = TOLERANCE / 2.0;
 
 /// What is done with a command of a stream that breaks a limit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -112,7 +112,7 @@ impl SetPointSteps {
     }
 }
 
-fn mirrored(state: &State) -> State {
+pub(super) fn mirrored(state: &State) -> State {
     State { position: -state.position, velocity: -state.velocity, acceleration: -state.acceleration }
 }
 
