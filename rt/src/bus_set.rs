@@ -27,6 +27,11 @@ impl BusSet {
         Self(self.0 & !other.0)
     }
 
+    /// The buses of both sets.
+    pub const fn union(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+
     /// Whether no bus is in the set.
     pub const fn is_empty(self) -> bool {
         self.0 == 0

@@ -118,6 +118,14 @@ impl<const AXES: usize, const BUSES: usize> Shared<AXES, BUSES> {
         self.buses.get(usize::from(axis.parameters().bus)).map_or(1, |bus| bus.divider)
     }
 
+    /// The buses that have a cycle in this slot.
+    pub(super) fn buses_in_cycle(&self, slot: u64) -> BusSet {
+        let mut in_cycle = BusSet::default();
+        let numbers = self.buses.iter().enumerate().filter(|(_, bus)| has_cycle(bus, slot));
+        numbers.for_each(|(number, _)| in_cycle.insert(number));
+        in_cycle
+    }
+
     /// Whether the bus of an axis has SYNC, feedback and set-points in this slot.
     pub(super) fn has_cycle_of(&self, axis: &Axis, slot: u64) -> bool {
         self.buses.get(usize::from(axis.parameters().bus)).is_some_and(|bus| has_cycle(bus, slot))
