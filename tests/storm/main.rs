@@ -12,6 +12,7 @@ mod concern;
 mod coverage;
 mod dice;
 mod fingerprint;
+mod heartbeat;
 mod invariants;
 mod machine;
 mod overload;
