@@ -21,6 +21,7 @@ const PUSHES: u64 = 32;
 
 fn sides(axes: usize) -> (RtSide, HostSide, LogSide) {
     channels(&ChannelSizes {
+        stream: Default::default(),
         axes,
         buses: axes.div_ceil(3),
         records: RECORDS,

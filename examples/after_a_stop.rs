@@ -79,10 +79,10 @@ fn is_enabled_again(arm: &mut Controller) -> bool {
     (0..RESETS).any(|_| {
         thread::sleep(BETWEEN_ATTEMPTS);
         let is_granted = arm.disable().is_ok()
-            && arm.wait_for(Phase::Disabled, Duration::from_secs(10))
+            && arm.wait_for(Phase::Disabled, Duration::from_secs(10)).is_ok()
             && arm.reset_faults().is_ok()
             && arm.enable().is_ok();
-        is_granted && arm.wait_for(Phase::Holding, Duration::from_secs(1))
+        is_granted && arm.wait_for(Phase::Holding, Duration::from_secs(1)).is_ok()
     })
 }
 

@@ -61,6 +61,7 @@ fn main() {
     let repetitions: u32 = repetitions;
     let buses = usize::from(axes).div_ceil(3);
     let (mut rt, _host, mut log) = channels(&ChannelSizes {
+        stream: Default::default(),
         axes: axes.into(),
         buses,
         records: 64,

@@ -17,7 +17,10 @@
 //! - [`telemetry`]: the logger that empties the rings: statistics, recordings, the report.
 //! - [`doctor`] and [`jitter`]: whether a machine is fit for it, and how evenly it paces the loop.
 //!
-//! To embed takt, see `examples/` and [`controller::Controller`].
+//! # To embed takt
+//! A program depends on this crate alone: what it needs of `takt_rt` is re-exported. It makes or reads a [`Config`], starts a
+//! [`Controller`], and commands and observes it through [`Handle`]s, from any thread. `examples/` has a short program for
+//! each way to move. Every error is readable when `main` returns it: see [`Error`].
 #![deny(unsafe_code)]
 
 pub mod bus;
@@ -27,9 +30,31 @@ pub mod config;
 pub mod controller;
 pub mod doctor;
 pub mod drive;
+mod error;
 pub mod faults;
 pub mod jitter;
+pub mod play;
 pub mod printable;
 pub mod sim;
 pub mod telemetry;
 mod text_file;
+pub mod trajectory;
+
+pub use bus::ownership::IfOwned;
+pub use config::{Config, ConfigError};
+pub use controller::session::{Session, SessionError, SessionOptions};
+pub use controller::{
+    CommandError, Controller, Events, Handle, MotionError, MotionId, MoveOptions, Outcome, Refused,
+    StartFailure, Stopped, StreamError, StreamHandle, VirtualRun, WaitError,
+};
+pub use error::{Error, Result};
+pub use faults::{FaultInjector, Scenario};
+pub use telemetry::{Notice, RecordingDestination};
+
+/// What runs inside the real-time thread: its types as they come out of a [`Handle`], and the planner.
+pub use takt_rt as rt;
+pub use takt_rt::{
+    AxisPoint, AxisSnapshot, BusHealth, DriveState, Event, EventKind, Origin, Phase, RejectReason,
+    RequestError, RequestId, Rule, Snapshot, StopCategory, StopCause, StopReason, StreamCounts, StreamReport,
+    StreamState, TimingLevel, linux::ThreadReport, plan,
+};

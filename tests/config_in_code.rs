@@ -3,7 +3,8 @@
 use std::time::Duration;
 
 use takt::config::{
-    Axis, Bus, Config, Control, Feedback, Interface, Program, ProgramMove, ProgramTarget, Travel,
+    Axis, Bus, Config, Control, DriveFamily, Feedback, Interface, Limits, Program, ProgramMove,
+    ProgramTarget, StreamDelay, Travel,
 };
 use takt::controller::session::SessionOptions;
 use takt::controller::{Controller, VirtualRun, assemble};
@@ -46,6 +47,11 @@ const CASES: &[Case] = &[
     ("falling ladder", |c| c.missed_slots.stop = 1, &["`cycle.missed_slots.stop` cannot be 1", "50 to"]),
     ("endless ladder", |c| c.missed_slots.degraded = u32::MAX, &["`cycle.missed_slots.degraded`"]),
     ("no leak", |c| c.missed_slots.leak_slots = 0, &["`cycle.missed_slots.leak_slots` cannot be 0"]),
+    (
+        "stream delay",
+        |c| c.stream_delay = StreamDelay::Fixed(2_000_000_000),
+        &["`stream.delay` cannot be 2 s", "0 s to 1 s"],
+    ),
     ("priority", |c| c.realtime.priority = Some(0), &["`realtime.priority` cannot be 0", "1 to 99"]),
     ("priority", |c| c.realtime.priority = Some(255), &["`realtime.priority` cannot be 255"]),
     ("CPU", |c| c.realtime.cpu = Some(usize::MAX), &["`realtime.cpu` cannot be 18446744073709551615"]),
@@ -145,7 +151,7 @@ const CASES: &[Case] = &[
     ("feedback", |c| axis(c).feedback = vec![Feedback::Torque; 2], &[AXIS, "is in `axis.feedback` twice"]),
     ("feedback delay", |c| axis(c).feedback_delay_ns = u64::MAX, &[AXIS, "`axis.feedback_delay`"]),
     ("own heartbeat", |c| axis(c).heartbeat_ns = Some(0), &[AXIS, "`axis.heartbeat` cannot be 0 s"]),
-    ("interpolation", |c| axis(c).drive = takt::config::DriveFamily::YzAim, &[AXIS, "`axis.mode` cannot be"]),
+    ("interpolation", |c| axis(c).drive = DriveFamily::YzAim, &[AXIS, "`axis.mode` cannot be"]),
     (
         "gain",
         |c| axis(c).control = Control::Velocity { position_gain: f64::NAN },
@@ -313,11 +319,81 @@ fn no_axis_whatever_its_mode_is_sent_where_it_cannot_be() {
     config.telemetry.is_recorded = false;
     config.telemetry.black_box_ns = None;
     config.program = Program { repeat: 1, moves: vec![] };
-    let mut controller = Controller::start(config, SessionOptions::default()).unwrap();
+    let controller = Controller::start(config, SessionOptions::default()).unwrap();
     for target in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e9, -1e9] {
         assert!(controller.move_to(&[target]).is_err(), "{target}");
     }
     let there = controller.move_to(&[0.0]).unwrap();
     controller.wait(there, Duration::from_secs(10)).unwrap();
     controller.finish().unwrap();
+}
+
+fn limits() -> Limits {
+    Limits {
+        position_min: 0.1,
+        position_max: 0.9,
+        velocity: 0.5,
+        acceleration: 2.0,
+        deceleration: 2.0,
+        jerk: f64::INFINITY,
+        torque: 20.0,
+    }
+}
+
+/// A file with only what is required, and the same made in code.
+fn made_and_read(drive: DriveFamily, axis: &str, period: &str, change: fn(Axis) -> Axis, period_ns: u64) {
+    let text = format!(
+        "name = \"m\"\n[cycle]\nperiod = \"{period}\"\n[[bus]]\nname = \"can\"\n[[axis]]\nname = \"j\"\nbus = \"can\"\n\
+         node = 3\ndrive = \"{}\"\n{axis}\n\
+         limits = {{ position = [0.1, 0.9], velocity = 0.5, acceleration = 2.0, torque = 20 }}\n",
+        drive.word()
+    );
+    let read = Config::parse("m.toml", &text).unwrap();
+    let axis = change(Axis::new("j", 0, 3, drive, limits()));
+    let made =
+        Config::new("m", vec![Bus::new("can", Interface::Simulated)], vec![axis]).with_period(period_ns);
+    assert_eq!(made, read);
+    made.validate().unwrap();
+}
+
+#[test]
+fn a_configuration_made_in_code_has_the_defaults_of_a_file() {
+    use DriveFamily::{ErobCanopen, YzAim};
+    made_and_read(ErobCanopen, "", "1 ms", |axis| axis, 1_000_000);
+    made_and_read(ErobCanopen, "", "4 ms", |axis| axis, 4_000_000);
+    made_and_read(YzAim, "", "2 ms", |axis| axis, 2_000_000);
+    let linear = |axis: Axis| Axis { gear_ratio: 2.0, ..axis.linear(0.01) };
+    made_and_read(
+        ErobCanopen,
+        "travel = \"linear\"\nlead = \"10 mm\"\ngear_ratio = 2",
+        "1 ms",
+        linear,
+        1_000_000,
+    );
+    let csv = |axis: Axis| axis.with_control(Control::Velocity { position_gain: 20.0 });
+    made_and_read(ErobCanopen, "mode = \"csv\"", "1 ms", csv, 1_000_000);
+    let cst = |axis: Axis| {
+        axis.with_control(Control::Torque {
+            stiffness: 1600.0,
+            damping: 80.0,
+            inertia: 1.0,
+            viscous_friction: 1.0,
+            coulomb_friction: 0.5,
+        })
+    };
+    made_and_read(ErobCanopen, "mode = \"cst\"", "1 ms", cst, 1_000_000);
+}
+
+#[test]
+fn a_configuration_made_in_code_moves_an_arm() {
+    let joint = |name: &str, node| Axis::new(name, 0, node, DriveFamily::ErobCanopen, limits());
+    let mut config = Config::new(
+        "arm",
+        vec![Bus::new("can", Interface::Simulated)],
+        vec![joint("shoulder", 1), Axis { reversed: true, ..joint("elbow", 2) }],
+    );
+    config.telemetry.is_recorded = false;
+    let arm = Controller::start(config, SessionOptions::default()).unwrap();
+    let motion = arm.move_to(&[0.3, 0.2]).unwrap();
+    assert_eq!(arm.wait(motion, Duration::from_secs(30)), Ok(()));
 }

@@ -141,6 +141,8 @@ cases! {
         "record = true" => "recording = true", at "recording": UnknownKey { nearest: Some("record"), .. },
         "transmission_type = 1" => "transmision_type = 1", at "transmision": UnknownKey { nearest: Some("transmission_type"), .. },
         "transmission_type = 1" => "node = 3", at "node = 3": UnknownKey { key, .. } if key == "axis.node",
+        "transmission_type = 1" => "on_violation = \"clamp\"", at "on_violation": Replaced { key, by } if key == "axis.on_violation" && by.contains("follow = \"smooth\""),
+        "[realtime]" => "[stream]\ndelay = \"2 s\"\n[realtime]", at "\"2 s\"": OutOfRange { key, .. } if key == "stream.delay",
         "[defaults.axis]" => "[defaults.bus]\n[defaults.axis]", at "[defaults.bus]": UnknownKey { key, .. } if key == "defaults.bus",
     }
 

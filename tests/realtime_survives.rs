@@ -19,10 +19,9 @@ use takt::telemetry::{
     BlackBoxOptions, Incident, Logger, LoggerOptions, LoggerThread, Machine, Notice, Recorded, WallClock,
 };
 use takt_rt::linux::MonotonicClock;
-use takt_rt::plan;
 use takt_rt::{
-    BusHealth, BusPort, Clock, EventKind, Frame, MAX_AXES, Phase, ReceiveBatch, Request, Snapshot,
-    StopCategory, StreamCommand,
+    BusHealth, BusPort, Clock, EventKind, Frame, Phase, ReceiveBatch, Request, Snapshot, StopCategory,
+    StreamPoint,
 };
 
 fn arm(directory: &Path) -> Config {
@@ -123,14 +122,15 @@ fn a_stuck_logger_loses_only_records_and_frames_and_they_are_counted() {
 fn a_client_that_floods_the_queue_and_the_stream_does_not_prevent_the_end_of_the_program() {
     let folder = tempfile::tempdir().unwrap();
     let config = arm(folder.path());
-    let command = StreamCommand { valid_until_ns: u64::MAX, set_points: [plan::State::default(); MAX_AXES] };
+    let point = StreamPoint { at_ns: u64::MAX, ..StreamPoint::default() };
     let refused = Cell::new(0_u64);
     let left = run(
         &config,
         |port| port,
         |host| {
             for _ in 0..100 {
-                host.stream(&command);
+                // It is full soon, since nothing streams.
+                let _ = host.streamer().push(&[point]);
                 // Requests that are granted at any time and change nothing.
                 if host.request(Request::Sync(true)).is_err() {
                     refused.set(refused.get() + 1);

@@ -212,6 +212,39 @@ fn after_a_stop_for_a_bus_an_axis_on_that_bus_is_shown() {
     }
 }
 
+#[test]
+fn cycles_without_feedback_are_shown_as_such_and_not_as_the_last_values() {
+    let folder = tempfile::tempdir().unwrap();
+    let recording = recording_of_a_lost_bus("wrist", folder.path());
+    let svg = folder.path().join("stop.svg");
+    let output = report(&recording, &["--cycles", "4", "--svg", svg.to_str().unwrap()]);
+    assert_eq!(output.status.code(), Some(0), "{}", errors(&output));
+    let text = text(&output);
+    let row = text.lines().find(|line| line.contains("no feedback")).expect(&text);
+    assert!(
+        row.contains("(") && row.contains("operation enabled)") && row.ends_with(char::is_numeric),
+        "{row}"
+    );
+    assert!(text.lines().all(|line| line.chars().count() <= 100), "{text}");
+
+    let told = json(&report(&recording, &["--cycles", "4", "--json"]));
+    let cycles = told["axis"]["cycles"].as_array().unwrap();
+    let is_silent = |cycle: &&Value| cycle["feedback_age"].as_u64() > Some(0);
+    assert!(cycles.iter().any(|cycle| is_silent(&cycle)), "{cycles:?}");
+    for cycle in cycles {
+        let reported = ["position", "velocity", "following_error"].map(|key| cycle[key].is_null());
+        assert_eq!(reported, [is_silent(&cycle); 3], "{cycle}");
+    }
+
+    let svg = fs::read_to_string(svg).unwrap();
+    assert!(svg.contains("grey: no feedback") && svg.contains("fill=\"#ddd\""), "{svg}");
+    // The curves of what is commanded go on: of position and velocity, and three of the timing.
+    let whole = svg.lines().filter(|line| line.starts_with("<polyline"));
+    let longest = whole.clone().map(|line| line.matches(',').count()).max().unwrap();
+    let (whole, cut): (Vec<_>, Vec<_>) = whole.partition(|line| line.matches(',').count() == longest);
+    assert!(whole.len() == 5 && cut.len() >= 3, "{} whole and {} cut", whole.len(), cut.len());
+}
+
 /// The author of the file must not be able to control the terminal.
 #[test]
 fn control_characters_of_a_recording_are_not_printed() {
@@ -386,6 +419,7 @@ fn a_length_that_a_file_lies_about_costs_no_memory() {
 fn many_short_cycles_and_a_long_name_take_no_more_memory_than_the_file() {
     let folder = tempfile::tempdir().unwrap();
     let sizes = ChannelSizes {
+        stream: Default::default(),
         axes: 0,
         buses: 1,
         records: 1024,

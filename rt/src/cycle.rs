@@ -97,7 +97,16 @@ impl Cycle {
         let behind = take_feedback(engine, ports, wake.now_ns, host);
         let health = health_of::<P, BUSES>(ports);
         let began_ns = clock.now_ns();
-        engine.compute(&CycleInput { slot: timing.slot, now_ns: began_ns, buses: &health, behind }, host);
+        engine.compute(
+            &CycleInput {
+                slot: timing.slot,
+                slot_start_ns: timing.slot_start_ns,
+                now_ns: began_ns,
+                buses: &health,
+                behind,
+            },
+            host,
+        );
         let ready_ns = clock.now_ns();
         timing.compute_ns = ready_ns.saturating_sub(began_ns);
         let deadline = match sync_deadline {

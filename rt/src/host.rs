@@ -6,10 +6,10 @@ use crate::cia402;
 use crate::frame::Frame;
 use crate::motion_reports::MotionReports;
 use crate::phase::Phase;
-use crate::plan;
 use crate::port::{BusHealth, Received};
 use crate::record::{CycleRecord, Event, MAX_AXES, MAX_BUSES};
-use crate::request::RequestEnvelope;
+use crate::request::{RequestEnvelope, TrajectoryId};
+use crate::source::{StreamReport, StreamSample, TrajectorySample};
 use crate::stop::StopReason;
 use crate::time::Nanoseconds;
 use crate::watch::TimingLevel;
@@ -22,11 +22,29 @@ pub trait HostInterface<const AXES: usize = MAX_AXES, const BUSES: usize = MAX_B
         None
     }
 
-    /// The newest streamed command, if one has come since the last call. Asked for in each cycle in which the group streams,
-    /// and in no other.
-    fn stream(&mut self) -> Option<StreamCommand<AXES>> {
+    /// A stream of a group was asked for, and begins: what was streamed before is over.
+    fn begin_stream(&mut self, _group: u8) {}
+
+    /// What the stream of a group wants in the slot that begins at this time. Asked for once in each slot in which the group
+    /// streams, and in no other. [`crate::LookAhead`] makes it of points.
+    fn stream(&mut self, _group: u8, _slot_start_ns: Nanoseconds) -> StreamSample<AXES> {
+        StreamSample::default()
+    }
+
+    /// What a trajectory wants of a group so many seconds after its beginning. Asked for once in each cycle in which the group is
+    /// on it, and when a [`Request::Execute`](crate::Request::Execute) is handled. `None` if there is no such trajectory, or it is
+    /// one for another group.
+    fn trajectory(
+        &mut self,
+        _group: u8,
+        _trajectory: TrajectoryId,
+        _at_s: f64,
+    ) -> Option<TrajectorySample<AXES>> {
         None
     }
+
+    /// Called once in each cycle for each group: of the trajectories that the group has asked for, only these are still needed.
+    fn keep_trajectories(&mut self, _group: u8, _needed: [Option<TrajectoryId>; 2]) {}
 
     /// The oldest service frame (NMT, SDO …) that waits to be sent on this bus. Not asked for while the bus cannot take it.
     fn service_frame(&mut self, _bus: usize) -> Option<Frame> {
@@ -52,16 +70,6 @@ pub trait HostInterface<const AXES: usize = MAX_AXES, const BUSES: usize = MAX_B
     fn publish(&mut self, _snapshot: &Snapshot<AXES, BUSES>) {}
 }
 
-/// One streamed set-point for every axis, with the time at which it loses its meaning.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StreamCommand<const AXES: usize = MAX_AXES> {
-    /// When this command expires; after that the group decelerates and holds.
-    pub valid_until_ns: Nanoseconds,
-    /// Position, velocity and acceleration, an axis each. The position counts; the others are fed forward as far as they
-    /// agree with its steps and the limits.
-    pub set_points: [plan::State; AXES],
-}
-
 /// The state of the controller after a cycle, for any number of observers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Snapshot<const AXES: usize = MAX_AXES, const BUSES: usize = MAX_BUSES> {
@@ -77,8 +85,8 @@ pub struct Snapshot<const AXES: usize = MAX_AXES, const BUSES: usize = MAX_BUSES
     pub steps: u64,
     /// How late the controller has been of late.
     pub timing: TimingLevel,
-    /// Set-points of streams that were replaced by the nearest ones within the limits, since the start.
-    pub clamped: u64,
+    /// The stream, or the last one.
+    pub stream: StreamReport,
     /// Events and records that found no room, since the start.
     pub dropped: u64,
     /// Requests that were rejected, since the start.
@@ -101,6 +109,18 @@ pub struct Snapshot<const AXES: usize = MAX_AXES, const BUSES: usize = MAX_BUSES
     pub buses: [BusHealth; BUSES],
 }
 
+impl<const AXES: usize, const BUSES: usize> Snapshot<AXES, BUSES> {
+    /// The axes that count.
+    pub fn axes(&self) -> &[AxisSnapshot] {
+        self.axes.get(..self.axis_count.into()).unwrap_or(&self.axes)
+    }
+
+    /// The buses that count.
+    pub fn buses(&self) -> &[BusHealth] {
+        self.buses.get(..self.bus_count.into()).unwrap_or(&self.buses)
+    }
+}
+
 impl<const AXES: usize, const BUSES: usize> Default for Snapshot<AXES, BUSES> {
     fn default() -> Self {
         Self {
@@ -110,7 +130,7 @@ impl<const AXES: usize, const BUSES: usize> Default for Snapshot<AXES, BUSES> {
             missed_slots: 0,
             steps: 0,
             timing: TimingLevel::Normal,
-            clamped: 0,
+            stream: StreamReport::default(),
             dropped: 0,
             rejected: 0,
             answers: Answers::default(),
@@ -130,10 +150,23 @@ impl<const AXES: usize, const BUSES: usize> Default for Snapshot<AXES, BUSES> {
 pub struct AxisSnapshot {
     /// Set-point (rad or m).
     pub position_set: f64,
+    /// Set-point of the velocity (rad/s or m/s).
+    pub velocity_set: f64,
+    /// Torque that is sent (N·m or N): the command in CST, else the feed-forward; 0 when none is sent.
+    pub torque_set: f64,
     /// Actual position (rad or m).
     pub position: f64,
-    /// Actual velocity (rad/s or m/s).
+    /// Actual velocity (rad/s or m/s): reported, or else derived from the positions.
     pub velocity: f64,
+    /// Distance between the set-point that was in force at the SYNC of the last feedback and the position reported for it
+    /// (rad or m).
+    pub following_error: f64,
+    /// Object 6077 (N·m or N); `None` if the drive does not report it.
+    pub torque: Option<f64>,
+    /// Object 6078, in thousandths of the rated current; `None` if the drive does not report it.
+    pub current_per_mille: Option<i16>,
+    /// Object 6061, the mode of operation that the drive shows; `None` if the drive does not report it.
+    pub mode: Option<i8>,
     /// Object 6041.
     pub statusword: u16,
     /// What it says of the drive.
@@ -145,4 +178,22 @@ pub struct AxisSnapshot {
     /// SYNCs, or set-points where it answers these, that the drive has left without an answer, or has not answered yet. One that stays so may have been lost, or
     /// every answer since then comes so many cycles late: that is looked into whenever the group is enabled.
     pub unanswered: u16,
+    /// Cycles of its bus since its last feedback, with those in which it was not asked for any.
+    pub feedback_age: u16,
+    /// The slot of the last feedback; everything that the drive reports is from then, or older. 0 before the first one.
+    pub feedback_slot: u64,
+    /// The time at which the last feedback was taken; 0 before the first one.
+    pub feedback_ns: Nanoseconds,
+}
+
+impl AxisSnapshot {
+    /// Whether what the drive reports is not from its last cycle: it has not reported yet, or has left out a cycle.
+    pub const fn is_stale(&self) -> bool {
+        !self.is_heard || self.feedback_age > 0
+    }
+
+    /// How old what the drive reports is at a time; `None` if it has not reported yet.
+    pub fn feedback_age_ns(&self, now_ns: Nanoseconds) -> Option<Nanoseconds> {
+        self.is_heard.then(|| now_ns.saturating_sub(self.feedback_ns))
+    }
 }

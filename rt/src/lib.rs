@@ -50,6 +50,7 @@ mod port;
 mod profile;
 mod record;
 mod request;
+mod source;
 mod stop;
 mod stop_category;
 mod time;
@@ -71,8 +72,8 @@ pub use engine::{
 };
 pub use fault::{Fault, Rule};
 pub use frame::{Frame, FrameError, FrameKind, Id};
-pub use guard::{AxisLimits, LimitError, OnViolation, braking_distance};
-pub use host::{AxisSnapshot, HostInterface, Snapshot, StreamCommand};
+pub use guard::{AxisLimits, LimitError, braking_distance};
+pub use host::{AxisSnapshot, HostInterface, Snapshot};
 pub use motion_reports::{MotionReport, MotionReports, MotionState};
 pub use pdo::{
     CommandSlot, FeedbackSlot, MAX_OBJECTS, MAX_PDOS, MappedObject, Mapping, MappingError, ProcessImage,
@@ -83,8 +84,13 @@ pub use port::{BusHealth, BusPort, BusState, Clock, Outgoing, RECEIVE_BATCH, Rec
 pub use profile::ProfileTarget;
 pub use record::{AxisRecord, CycleRecord, CycleTiming, Event, EventKind, MAX_AXES, MAX_BUSES, MAX_GROUPS};
 pub use request::{
-    AxisProcessData, MappedPdo, Move, ProfileMove, RejectReason, Request, RequestEnvelope, RequestError,
-    RequestId, RequestKind,
+    AxisProcessData, ExecutionStart, MappedPdo, Move, ProfileMove, RejectReason, Request, RequestEnvelope,
+    RequestError, RequestId, RequestKind, TrajectoryId,
+};
+pub use source::{
+    AxisPoint, AxisTarget, Follow, LookAhead, LookAheadParameters, POINTS_AT_MOST, PathTime, PointError,
+    PointRole, Polynomial, StreamCounts, StreamDelay, StreamPoint, StreamReport, StreamSample, StreamState,
+    StreamWish, TimeLawPhase, TrajectorySample, TrajectoryView, follow,
 };
 pub use stop::{Origin, StopCategories, StopCause, StopReason};
 pub use stop_category::StopCategory;

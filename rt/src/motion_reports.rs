@@ -53,8 +53,9 @@ impl Default for MotionReports {
 impl MotionReports {
     /// How many motions are remembered that have ended.
     pub const ENDED: usize = 8;
-    /// There is room for a motion of each axis and one of the group, all in progress, beside those that have ended.
-    pub const CAPACITY: usize = MAX_AXES + 1 + Self::ENDED;
+    /// There is room for a motion of each axis, one of the group, and one that is to take its place, all in progress, beside those
+    /// that have ended.
+    pub const CAPACITY: usize = MAX_AXES + 2 + Self::ENDED;
 
     /// What has become of the motion that a request began. `None` if the request began no motion, or one that has ended and
     /// was followed by many others.
@@ -78,6 +79,15 @@ impl MotionReports {
         self.reports.rotate_right(1);
         if let Some(newest) = self.reports.first_mut() {
             *newest = Some(MotionReport { request, axis, state: MotionState::InProgress });
+        }
+    }
+
+    /// A motion that has begun to wait takes the place of one in progress.
+    pub fn replace(&mut self, replaced: RequestId, by: RequestId) {
+        for report in self.reports.iter_mut().flatten() {
+            if report.request == replaced && report.is_in_progress() {
+                report.state = MotionState::Replaced { by };
+            }
         }
     }
 

@@ -92,6 +92,8 @@ pub enum FeedbackSlot {
     Velocity,
     /// 6077
     Torque,
+    /// 6078
+    Current,
     /// 603F
     ErrorCode,
     /// An object that takt has no use for.
@@ -122,6 +124,7 @@ impl FeedbackSlot {
             (0x6064, 0) => Self::Position,
             (0x606C, 0) => Self::Velocity,
             (0x6077, 0) => Self::Torque,
+            (0x6078, 0) => Self::Current,
             (0x603F, 0) => Self::ErrorCode,
             _ => Self::Ignored,
         }

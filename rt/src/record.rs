@@ -3,6 +3,7 @@
 use crate::cia402;
 use crate::phase::Phase;
 use crate::request::{RequestError, RequestId};
+use crate::source::StreamState;
 use crate::stop::StopReason;
 use crate::time::Nanoseconds;
 use crate::watch::TimingLevel;
@@ -63,7 +64,7 @@ pub struct AxisRecord {
     pub statusword: u16,
     /// Object 603F if it is mapped or was announced by an emergency message; else 0.
     pub error_code: u16,
-    /// Cycles since the drive last reported in time.
+    /// Cycles of its bus since the drive last reported in time, with those in which it was not asked.
     pub feedback_age: u16,
     /// The command on the wire in drive units: counts, counts/s or per mille, by mode.
     pub command_raw: i32,
@@ -128,6 +129,11 @@ pub enum EventKind {
     },
     /// A stop began; one for each stop, and a second one when a fault comes up on the way of a stop that was asked for.
     Stop(StopReason),
+    /// A stream has begun, has run dry, or goes on again.
+    Stream {
+        /// What it is doing from now on.
+        state: StreamState,
+    },
     /// A motion has reached its target.
     MotionFinished {
         /// The request that began it.

@@ -63,6 +63,13 @@ pub enum Request<const AXES: usize = MAX_AXES> {
     /// Follow [`HostInterface::stream`](crate::HostInterface::stream). A command that was written before counts, unless it has
     /// expired by the cycle that takes this request up.
     Stream,
+    /// Carry out a trajectory of the host: see [`HostInterface::trajectory`](crate::HostInterface::trajectory).
+    Execute {
+        /// Which.
+        trajectory: TrajectoryId,
+        /// When it begins.
+        start: ExecutionStart,
+    },
     /// Stop by this category.
     Stop(StopCategory),
     /// Bring every drive to ready to switch on, decelerating first if need be.
@@ -89,6 +96,7 @@ impl<const AXES: usize> Request<AXES> {
             Self::Move(_) => RequestKind::Move,
             Self::SetProfileTarget(_) => RequestKind::SetProfileTarget,
             Self::Stream => RequestKind::Stream,
+            Self::Execute { .. } => RequestKind::Execute,
             Self::Stop(_) => RequestKind::Stop,
             Self::Disable => RequestKind::Disable,
             Self::ResetFaults => RequestKind::ResetFaults,
@@ -96,6 +104,26 @@ impl<const AXES: usize> Request<AXES> {
             Self::Shutdown => RequestKind::Shutdown,
         }
     }
+}
+
+/// The number under which the host has a trajectory.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct TrajectoryId(pub u64);
+
+/// When a trajectory begins.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ExecutionStart {
+    /// In this cycle. The group must hold its position, and the trajectory must begin there.
+    Now,
+    /// In place of another trajectory, where that one is at a later cycle.
+    After {
+        /// The present trajectory.
+        trajectory: TrajectoryId,
+        /// So many cycles of the present trajectory are carried out before.
+        cycles: u64,
+        /// Whether it is the same motion, at another speed along its path. Otherwise it replaces that motion.
+        is_same_motion: bool,
+    },
 }
 
 /// The process data of one axis, to replace what it was set up with.
@@ -183,11 +211,13 @@ pub enum RequestKind {
     InhibitEnable = 13,
     /// The end of the loop.
     Shutdown = 14,
+    /// A trajectory.
+    Execute = 15,
 }
 
 impl RequestKind {
     /// Every kind, in the order of their numbers.
-    pub const ALL: [Self; 15] = [
+    pub const ALL: [Self; 16] = [
         Self::Sync,
         Self::TimeOfDay,
         Self::RatedTorque,
@@ -203,6 +233,7 @@ impl RequestKind {
         Self::ResetFaults,
         Self::InhibitEnable,
         Self::Shutdown,
+        Self::Execute,
     ];
 }
 
@@ -315,11 +346,24 @@ pub enum RejectReason {
     },
     /// The drives are not told the time of day.
     NoTime,
+    /// The host has no trajectory under this number.
+    UnknownTrajectory,
+    /// A trajectory does not begin where the axis is, or not at its velocity and acceleration.
+    StartMismatch {
+        /// Where it begins.
+        position: f64,
+        /// Where the axis is then.
+        present: f64,
+    },
+    /// The cycle at which a trajectory was to take the place of another one has passed, or that one is not under way.
+    TooLate,
+    /// Another trajectory is already to take the place of the present one.
+    SuccessorPending,
 }
 
 impl RejectReason {
     /// One of each, in the order of their numbers, with numbers of no meaning.
-    pub const ALL: [Self; 22] = [
+    pub const ALL: [Self; 26] = [
         Self::Phase,
         Self::StopLatched { rule: Rule::FollowingError },
         Self::EnableInhibited,
@@ -342,6 +386,10 @@ impl RejectReason {
         Self::NoTime,
         Self::TooManyObjects,
         Self::TooManyFrames { frames: 1, limit: 2 },
+        Self::UnknownTrajectory,
+        Self::StartMismatch { position: 1.0, present: 2.0 },
+        Self::TooLate,
+        Self::SuccessorPending,
     ];
 
     /// The number that stands for it in recordings.
@@ -369,6 +417,10 @@ impl RejectReason {
             Self::NoTime => 19,
             Self::TooManyObjects => 20,
             Self::TooManyFrames { .. } => 21,
+            Self::UnknownTrajectory => 22,
+            Self::StartMismatch { .. } => 23,
+            Self::TooLate => 24,
+            Self::SuccessorPending => 25,
         }
     }
 
@@ -391,7 +443,11 @@ impl RejectReason {
             Self::Mapping { object } => (object.parameter().into(), 0.0),
             Self::IdTaken { id } => (id.value().into(), 0.0),
             Self::TooManyFrames { frames, limit } => (frames.into(), limit.into()),
-            Self::Phase
+            Self::StartMismatch { position, present } => (position, present),
+            Self::UnknownTrajectory
+            | Self::TooLate
+            | Self::SuccessorPending
+            | Self::Phase
             | Self::EnableInhibited
             | Self::NoTrajectory
             | Self::NoProcessData
@@ -425,6 +481,10 @@ impl RejectReason {
             19 => Self::NoTime,
             20 => Self::TooManyObjects,
             21 => Self::TooManyFrames { frames: asked as u16, limit: allowed as u16 },
+            22 => Self::UnknownTrajectory,
+            23 => Self::StartMismatch { position: asked, present: allowed },
+            24 => Self::TooLate,
+            25 => Self::SuccessorPending,
             _ => return None,
         })
     }
@@ -483,6 +543,17 @@ impl core::fmt::Display for RejectReason {
             Self::IdTaken { id } => write!(f, "identifier {id:?} is in use"),
             Self::TooManyFrames { frames, limit } => write!(f, "{frames} frames in a cycle; {limit} fit"),
             Self::NoTime => f.write_str("TIME is not sent"),
+            Self::UnknownTrajectory => f.write_str("the host has no such trajectory"),
+            Self::StartMismatch { position, present } => {
+                write!(
+                    f,
+                    "the trajectory begins at {position} while the axis is at {present}, or not at its velocity"
+                )
+            }
+            Self::TooLate => f.write_str("the cycle at which the trajectory was to begin has passed"),
+            Self::SuccessorPending => {
+                f.write_str("another trajectory is already to take the place of the present one")
+            }
         }
     }
 }

@@ -5,8 +5,8 @@ mod fixture;
 
 use fixture::{PERIOD_NS, Rig, parameters};
 use takt_rt::{
-    BusState, EventKind, Frame, Id, MappedObject, Mapping, OnViolation, Origin, Phase, RejectReason, Request,
-    Rule, StopCategory, TimingLevel,
+    BusState, EventKind, Frame, Id, MappedObject, Mapping, Origin, Phase, RejectReason, Request, Rule,
+    StopCategory, TimingLevel,
 };
 
 fn moving() -> Rig {
@@ -176,67 +176,4 @@ fn the_category_of_a_rule_is_the_configured_one() {
     assert_eq!(configured(StopCategory::Two), Phase::Holding);
     assert_eq!(configured(StopCategory::One), Phase::Disabled);
     assert_eq!(configured(StopCategory::Zero), Phase::Disabled);
-}
-
-#[test]
-fn a_stream_that_asks_for_too_much_is_followed_as_far_as_the_limits_go_where_it_is_to_be_clamped() {
-    let mut parameters = parameters(3);
-    parameters.axes.iter_mut().for_each(|axis| axis.on_violation = OnViolation::Clamp);
-    let mut rig = Rig::of(parameters).enable();
-    rig.move_to(0.0);
-    rig.run_until(Phase::Holding, 5_000);
-    rig.request(Request::Stream);
-    rig.stream(0.0, 0.0, 5 * PERIOD_NS);
-    rig.run(2);
-    for _ in 0..3_000 {
-        rig.stream(9.0, 0.0, 5 * PERIOD_NS);
-        rig.run(1);
-    }
-    assert!(rig.stops().is_empty());
-    assert!(rig.host.snapshot.clamped > 3_000);
-    let reached = rig.host.snapshot.axes[0].position_set;
-    assert!((2.9..=3.0).contains(&reached), "{reached}");
-    rig.assert_limits_kept();
-}
-
-#[test]
-fn a_stream_that_could_not_stop_before_its_limit_any_more_is_stopped_in_time() {
-    let mut rig = Rig::enabled(1);
-    rig.move_to(2.0);
-    rig.run_until(Phase::Holding, 5_000);
-    rig.request(Request::Stream);
-    let period_s = PERIOD_NS as f64 * 1e-9;
-    let (mut position, mut velocity) = (2.0, 0.0_f64);
-    for _ in 0..2_000 {
-        velocity = (velocity + 5.0 * period_s).min(1.9);
-        position += velocity * period_s;
-        rig.stream(position, velocity, 5 * PERIOD_NS);
-        rig.run(1);
-    }
-    assert_eq!(reason(&rig).0, Rule::PositionLimit);
-    assert_eq!(rig.phase(), Phase::Holding);
-    let rest = rig.host.snapshot.axes[0].position_set;
-    assert!(rest <= 3.0 + 1e-6 && rest > 2.9, "{rest}");
-    rig.assert_limits_kept();
-}
-
-#[test]
-fn a_stream_that_lies_about_its_velocity_is_stopped_from_the_velocity_that_it_has() {
-    let mut rig = Rig::enabled(1);
-    rig.move_to(0.0);
-    rig.run_until(Phase::Holding, 5_000);
-    rig.request(Request::Stream);
-    let period_s = PERIOD_NS as f64 * 1e-9;
-    let (mut position, mut velocity) = (0.0, 0.0_f64);
-    for _ in 0..300 {
-        velocity = (velocity + 5.0 * period_s).min(1.0);
-        position += velocity * period_s;
-        rig.stream(position, 0.0, 5 * PERIOD_NS);
-        rig.run(1);
-    }
-    rig.stream(position + 0.1, 0.0, 5 * PERIOD_NS);
-    rig.run_until(Phase::Holding, 1_000);
-    let stops = rig.stops();
-    assert_eq!((stops.len(), stops[0].category), (1, StopCategory::Two), "{stops:?}");
-    rig.assert_limits_kept();
 }

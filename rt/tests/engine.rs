@@ -2,12 +2,12 @@
 
 mod fixture;
 
-use fixture::{PERIOD_NS, Rig, jerk_limited, move_to, parameters, scale};
+use fixture::{Rig, jerk_limited, move_to, parameters, scale};
 use proptest::prelude::*;
 use takt_rt::{
-    Answer, AxisParameters, AxisParametersError, BusState, ControlLaw, DriveState, Engine, EventKind, Frame,
-    Id, MAX_AXES, Move, OperationMode, Origin, Phase, ProfileMove, ProfileTarget, RejectReason, Request,
-    RequestId, Rule, SetUpError, StopCategory,
+    Answer, AxisParameters, AxisParametersError, BusState, ControlLaw, DriveState, Engine, EventKind, Follow,
+    Frame, Id, MAX_AXES, Move, OperationMode, Origin, Phase, ProfileMove, ProfileTarget, RejectReason,
+    Request, RequestId, Rule, SetUpError, StopCategory,
 };
 
 fn rules(rig: &Rig) -> Vec<Rule> {
@@ -206,10 +206,11 @@ fn a_rated_torque_is_a_positive_one_of_an_axis_that_is_there() {
 
 #[test]
 fn what_is_latched_or_on_its_way_out_says_so_when_it_refuses() {
-    let mut rig = Rig::enabled(3);
-    rig.stream(2.0, 0.0, PERIOD_NS * 100);
+    let mut parameters = parameters(3);
+    parameters.axes.iter_mut().for_each(|axis| axis.follow = Follow::Exact);
+    let mut rig = Rig::of(parameters).enable();
+    rig.stream(2.0, 0.0);
     rig.request(Request::Stream);
-    rig.stream(2.0, 0.0, PERIOD_NS * 100);
     rig.run(5);
     assert_eq!((rig.phase(), rig.stops()[0].rule()), (Phase::Holding, Rule::StartPose));
     for request in [Request::Stream, Request::Move(move_to(0.1)), profile(0, ProfileTarget::Velocity(0.1))] {
@@ -453,54 +454,6 @@ fn nothing_is_queued_behind_set_points_that_wait_for_the_wire() {
 }
 
 #[test]
-fn a_stream_is_followed_while_it_lasts_and_its_end_is_a_stop_at_the_limits() {
-    let mut rig = Rig::enabled(3);
-    rig.move_to(0.0);
-    rig.run_until(Phase::Holding, 5_000);
-    rig.request(Request::Stream);
-    let period_s = PERIOD_NS as f64 * 1e-9;
-    let (mut position, mut velocity) = (0.0, 0.0_f64);
-    for _ in 0..200 {
-        velocity = (velocity + 5.0 * period_s).min(0.5);
-        position += velocity * period_s;
-        rig.stream(position, velocity, 5 * PERIOD_NS);
-        rig.run(1);
-        assert_eq!(rig.phase(), Phase::Streaming);
-        assert_eq!(rig.host.snapshot.axes[0].position_set, position);
-    }
-    rig.run(4);
-    assert_eq!(rig.phase(), Phase::Streaming, "a few lost commands are bridged at the last velocity");
-    rig.run_until(Phase::Holding, 200);
-    assert_eq!(rules(&rig), [Rule::StaleCommand]);
-    rig.assert_limits_kept();
-    rig.move_to(0.0);
-    assert_eq!(rig.phase(), Phase::Holding, "a stale stream is latched");
-    rig.request(Request::ResetFaults);
-    rig.move_to(0.0);
-    assert_eq!(rig.phase(), Phase::Moving);
-}
-
-#[test]
-fn a_stream_may_not_jump() {
-    for (bad, rule) in [
-        (0.1, Rule::StartPose),
-        (0.01, Rule::VelocityLimit),
-        (f64::NAN, Rule::NotFinite),
-        (0.001, Rule::AccelerationLimit),
-    ] {
-        let mut rig = Rig::enabled(1);
-        rig.move_to(0.0);
-        rig.run_until(Phase::Holding, 5_000);
-        rig.request(Request::Stream);
-        rig.stream(bad, 0.0, 5 * PERIOD_NS);
-        rig.run(2);
-        assert_eq!(rules(&rig), [rule]);
-        assert_eq!(rig.phase(), Phase::Holding);
-        rig.assert_limits_kept();
-    }
-}
-
-#[test]
 fn impossible_parameters_are_refused_with_the_axis() {
     let with = |change: fn(&mut AxisParameters)| {
         let mut parameters = parameters(2);
@@ -572,7 +525,7 @@ proptest! {
                 4 => rig.clock.lateness_ns.extend([0, 7_300_000]),
                 5 => {
                     let at = rig.host.snapshot.axes[0].position_set + step;
-                    rig.stream(at, step * 10.0, 3 * PERIOD_NS);
+                    rig.stream(at, step * 10.0);
                 }
                 _ => {}
             }

@@ -212,3 +212,31 @@ fn a_joint_is_no_faster_because_its_drive_is_asked_late() {
         }
     }
 }
+
+/// The age in the last record, the same in the last snapshot, and how many slots ago the last feedback was.
+fn ages(rig: &Rig) -> (u16, u16, u64) {
+    let (record, snapshot) = (rig.host.records.last().unwrap(), rig.host.snapshot);
+    let shown = snapshot.axes[0];
+    assert_eq!(shown.is_stale(), shown.feedback_age > 0);
+    (record.axes[0].feedback_age, shown.feedback_age, snapshot.slot - shown.feedback_slot)
+}
+
+#[test]
+fn feedback_is_shown_with_its_age_also_in_cycles_in_which_none_was_asked_for() {
+    let mut rig = moving();
+    assert_eq!(ages(&rig), (0, 0, 0));
+    for age in 1..=3 {
+        rig.drive(0).is_silent = true;
+        rig.run(1);
+        assert_eq!(ages(&rig), (age, age, age.into()));
+    }
+    rig.drive(0).is_silent = false;
+    rig.run(1);
+    assert_eq!(ages(&rig), (0, 0, 0));
+    // Behind a frame that the bus has not taken, no SYNC is sent: no drive is asked, and none has missed its answer.
+    rig.buses[0].unconfirmed = 1;
+    rig.run(3);
+    let (record, shown, slots) = ages(&rig);
+    assert!(record >= 2 && record == shown && u64::from(record) == slots, "{record} {shown} {slots}");
+    assert!(rig.engine.axes()[0].feedback_age() < record);
+}

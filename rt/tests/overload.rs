@@ -4,10 +4,7 @@
 mod fixture;
 
 use fixture::{PERIOD_NS, Rig, parameters};
-use takt_rt::{
-    Engine, Frame, Id, MAX_AXES, MappedObject, Mapping, Pdo, Phase, Request, Rule, SetUpError, StreamCommand,
-    plan,
-};
+use takt_rt::{Engine, Frame, Id, MAX_AXES, MappedObject, Mapping, Pdo, Phase, Request, Rule, SetUpError};
 
 /// Object 6040 = 0 (disable voltage), as an SDO download.
 const DISABLE_VOLTAGE_BY_SDO: [u8; 8] = [0x2B, 0x40, 0x60, 0, 0, 0, 0, 0];
@@ -150,24 +147,6 @@ fn frames_that_do_not_fit_into_one_batch_are_refused_at_set_up() {
     };
     assert_eq!(with(15), None);
     assert_eq!(with(20), Some(SetUpError::TooManyFrames { bus: 0, frames: 83, limit: 64 }));
-}
-
-#[test]
-fn a_command_that_was_written_before_the_stream_was_asked_for_begins_it_wherever_the_cycle_ends() {
-    for cycles_between in 0..3 {
-        let mut rig = Rig::enabled(1);
-        let position = rig.host.snapshot.axes[0].position_set;
-        let command = StreamCommand {
-            valid_until_ns: rig.clock.now_ns + 20 * PERIOD_NS,
-            set_points: [plan::State { position, velocity: 0.0, acceleration: 0.0 }; MAX_AXES],
-        };
-        rig.host.stream = Some(command);
-        rig.run(cycles_between);
-        rig.request(Request::Stream);
-        assert!(rig.host.stream.is_none(), "{cycles_between}: it is taken when the stream begins");
-        rig.run(30);
-        assert_eq!(rig.stops()[0].rule(), Rule::StaleCommand, "it has begun, and it expires");
-    }
 }
 
 #[test]

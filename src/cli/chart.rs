@@ -41,6 +41,8 @@ pub struct Panel {
     pub curves: Vec<Curve>,
     /// Values that are drawn as dashed lines.
     pub limits: Vec<(f64, &'static str)>,
+    /// Spans of time that are shaded, in seconds.
+    pub shaded: Vec<(f64, f64)>,
 }
 
 /// A curve.
@@ -48,7 +50,7 @@ pub struct Panel {
 pub struct Curve {
     /// Its colour.
     pub colour: &'static str,
-    /// Times in seconds and values. Values that are not finite are left out.
+    /// Times in seconds and values. Where a value is not finite, the curve has a gap.
     pub points: Vec<(f64, f64)>,
 }
 
@@ -92,6 +94,14 @@ impl Chart {
         // A line at a limit must not lie on the frame.
         let y = |value: f64| top + MARGIN + (PANEL - 2.0 * MARGIN) * (1.0 - (value - low) / span);
         let bottom = top + PANEL;
+        for (from, to) in &panel.shaded {
+            // A single cycle is visible, too.
+            let (x, width) = (self.x(*from), (self.x(*to) - self.x(*from)).max(1.0));
+            let _ = writeln!(
+                svg,
+                "<rect x=\"{x:.2}\" y=\"{top}\" width=\"{width:.2}\" height=\"{PANEL}\" fill=\"#ddd\"/>"
+            );
+        }
         // Writing to a string cannot fail.
         let _ = writeln!(
             svg,
@@ -139,15 +149,18 @@ impl Chart {
             );
         }
         for Curve { colour, points } in &panel.curves {
-            let finite = points.iter().filter(|(_, value)| value.is_finite());
-            let points: String = finite.fold(String::new(), |mut points, (time_s, value)| {
-                let _ = write!(points, "{:.2},{:.2} ", self.x(*time_s), y(*value));
-                points
-            });
-            let _ = writeln!(
-                svg,
-                "<polyline points=\"{points}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"1.5\"/>"
-            );
+            // Points without a value between them are one line.
+            let lines = points.split(|(_, value)| !value.is_finite()).filter(|line| !line.is_empty());
+            for line in lines {
+                let points: String = line.iter().fold(String::new(), |mut points, (time_s, value)| {
+                    let _ = write!(points, "{:.2},{:.2} ", self.x(*time_s), y(*value));
+                    points
+                });
+                let _ = writeln!(
+                    svg,
+                    "<polyline points=\"{points}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"1.5\"/>"
+                );
+            }
         }
     }
 }
@@ -195,5 +208,18 @@ mod tests {
         let chart = Chart { span_s: (0.0, 1.0), panels: vec![panel, Panel::default()], ..Chart::default() };
         let svg = chart.draw();
         assert!(!svg.contains("NaN") && !svg.contains("inf") && svg.contains("a &lt; b"), "{svg}");
+    }
+
+    #[test]
+    fn a_curve_has_a_gap_where_a_value_is_missing_and_a_span_of_time_can_be_shaded() {
+        let values = [1.0, 2.0, f64::NAN, f64::NAN, 5.0, 6.0];
+        let points = (0..6).map(|at| (f64::from(at), values[at as usize])).collect();
+        let curves = vec![Curve { colour: COLOURS[0], points }];
+        let panel = Panel { curves, shaded: vec![(2.0, 3.0)], ..Panel::default() };
+        let svg = Chart { span_s: (0.0, 5.0), panels: vec![panel], ..Chart::default() }.draw();
+        let lines: Vec<&str> = svg.lines().filter(|line| line.starts_with("<polyline")).collect();
+        assert_eq!(lines.len(), 2, "{svg}");
+        assert!(lines.iter().all(|line| line.matches(',').count() == 2), "{svg}");
+        assert_eq!(svg.matches("fill=\"#ddd\"").count(), 1, "{svg}");
     }
 }

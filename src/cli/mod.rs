@@ -16,6 +16,7 @@ mod jitter;
 mod lss;
 mod ownership;
 mod plan;
+mod play;
 mod print;
 mod report;
 mod run;
@@ -42,6 +43,7 @@ enum Command {
     Report(report::Arguments),
     Check(check::Arguments),
     Plan(plan::Arguments),
+    Play(play::Arguments),
     Sim(sim::Arguments),
     Doctor(doctor::Arguments),
     Drive(drive::Arguments),
@@ -58,6 +60,7 @@ impl CommandLine {
             Command::Report(arguments) => report::run(&arguments),
             Command::Check(arguments) => check::run(&arguments),
             Command::Plan(arguments) => plan::run(&arguments),
+            Command::Play(arguments) => play::run(&arguments),
             Command::Sim(arguments) => sim::run(&arguments),
             Command::Doctor(arguments) => doctor::run(&arguments),
             Command::Drive(arguments) => drive::run(&arguments),

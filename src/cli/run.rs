@@ -19,7 +19,7 @@ use takt::faults::{FaultEvents, FaultInjector, Scenario, ScenarioError, Scenario
 use takt::telemetry::{
     Machine, Notice, RealtimeReport, RecordingDestination, RunEnd, RunOutcome, RunReport, words,
 };
-use takt_rt::{Event, EventKind, StopReason};
+use takt_rt::{Event, EventKind, Snapshot, StopReason};
 
 use super::configuration::{self, BusOverride};
 use super::exit::Exit;
@@ -106,7 +106,7 @@ pub fn run(arguments: Arguments) -> Exit {
         if_owned: ownership::if_owned(arguments.take_over),
     };
     let notify = notices(&bar, Machine::of(&config));
-    let mut throttled_bar = ThrottledBar::new(bar.clone());
+    let mut throttled_bar = ThrottledBar::new(bar.clone(), Machine::of(&config));
     let mut full_queues = FullQueues::new(&config);
     let mut fault_events = FaultEvents::default();
     let mut tell = || {
@@ -116,7 +116,7 @@ pub fn run(arguments: Arguments) -> Exit {
         news.iter().for_each(|fault_event| bar.suspend(|| say!("takt: {fault_event}")));
     };
     let session = session::run(&config, options, notify, |snapshot, progress| {
-        throttled_bar.show(&progress);
+        throttled_bar.show(&progress, snapshot);
         full_queues.poll(snapshot).for_each(|hint| bar.suspend(|| say!("takt: {hint}")));
         tell();
         signals.next()
@@ -283,24 +283,27 @@ fn progress_bar(config: &Config) -> ProgressBar {
 /// A progress bar that is updated at most ten times a second.
 struct ThrottledBar {
     bar: ProgressBar,
+    machine: Machine,
     last: Option<(Instant, Progress)>,
 }
 
 impl ThrottledBar {
     const INTERVAL: Duration = Duration::from_millis(100);
 
-    fn new(bar: ProgressBar) -> Self {
-        Self { bar, last: None }
+    fn new(bar: ProgressBar, machine: Machine) -> Self {
+        Self { bar, machine, last: None }
     }
 
-    fn show(&mut self, progress: &Progress) {
+    fn show(&mut self, progress: &Progress, snapshot: &Snapshot) {
         if self.last.as_ref().is_some_and(|(at, _)| at.elapsed() < Self::INTERVAL) {
             return;
         }
         if let Some(fraction) = progress.fraction {
             self.bar.set_position((fraction * BAR_STEPS as f64) as u64);
         }
-        self.bar.set_message(progress.what.clone());
+        let silence =
+            words::silence(snapshot, &self.machine).map_or(String::new(), |text| format!("; {text}"));
+        self.bar.set_message(format!("{}{silence}", progress.what));
         self.last = Some((Instant::now(), progress.clone()));
     }
 }

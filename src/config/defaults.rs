@@ -1,7 +1,8 @@
 //! What holds where a file says nothing. `configs/reference.toml` shows every one of these values, and a test
 //! compares it with them.
 
-use super::model::Identity;
+use super::model::{Axis, Control, DriveFamily, Feedback, Identity, Limits, PdoMapping, Travel};
+use super::ranges;
 
 /// `[cycle] period`
 pub const PERIOD_NS: u64 = 1_000_000;
@@ -127,3 +128,108 @@ pub const SEED: u64 = 1;
 pub const LONGEST_GAP_NS: u64 = 2_000_000;
 /// `[simulation] stops_for_missed_slots`
 pub const STOPS_FOR_MISSED_SLOTS: bool = false;
+
+/// `[cycle] command_phase`
+pub fn command_phase_ns(period_ns: u64) -> u64 {
+    (COMMAND_PHASE * period_ns as f64).round() as u64
+}
+
+/// `[simulation] longest_gap`
+pub fn longest_gap_ns(period_ns: u64) -> u64 {
+    LONGEST_GAP_NS.max(period_ns.saturating_mul(2))
+}
+
+/// `[master] heartbeat`. A drive that would go on moving without the controller is to notice soon that it is gone.
+pub fn master_heartbeat_ns(axes: &[Axis], period_ns: u64) -> u64 {
+    if axes.iter().any(|axis| goes_on_alone(&axis.control)) {
+        // The heartbeat leaves in a cycle, in whole milliseconds.
+        URGENT_HEARTBEAT_NS.max(period_ns.next_multiple_of(1_000_000))
+    } else {
+        MASTER_HEARTBEAT_NS
+    }
+}
+
+/// Whether a drive in this mode keeps a speed or a torque when the controller is gone.
+fn goes_on_alone(control: &Control) -> bool {
+    matches!(
+        control,
+        Control::Velocity { .. } | Control::Torque { .. } | Control::ProfileVelocity | Control::ProfileTorque
+    )
+}
+
+/// `[master] heartbeat_timeout`
+pub fn heartbeat_timeout_ns(heartbeat_ns: Option<u64>) -> u64 {
+    let at_most_ns = (ranges::HEARTBEAT_TIMEOUT_S.end() * 1e9) as u64;
+    heartbeat_ns.map_or(HEARTBEAT_TIMEOUT_NS, |heartbeat_ns| {
+        heartbeat_ns.saturating_mul(HEARTBEATS_IN_TIMEOUT).min(at_most_ns)
+    })
+}
+
+/// `[axis.identity]`
+pub const fn identity(drive: DriveFamily) -> Identity {
+    match drive {
+        DriveFamily::ErobCanopen => EROB_IDENTITY,
+        DriveFamily::YzAim => YZ_AIM_IDENTITY,
+    }
+}
+
+/// `[[axis]] mode`
+pub const fn control(drive: DriveFamily) -> Control {
+    match drive {
+        DriveFamily::ErobCanopen => Control::Position,
+        DriveFamily::YzAim => Control::Interpolated,
+    }
+}
+
+/// `[[axis]] mapping`. The PDOs of a YZ-AIM cannot be mapped.
+pub const fn mapping(drive: DriveFamily) -> PdoMapping {
+    match drive {
+        DriveFamily::ErobCanopen => PdoMapping::Written,
+        DriveFamily::YzAim => PdoMapping::AsStored,
+    }
+}
+
+/// `[[axis]] feedback`. A drive whose PDOs are written reports its mode of operation (object 6061). Nothing else shows that another
+/// master has changed the mode.
+pub fn feedback(mapping: PdoMapping) -> Vec<Feedback> {
+    match mapping {
+        PdoMapping::Written => vec![Feedback::OperationMode],
+        PdoMapping::AsStored => vec![],
+    }
+}
+
+/// `[[axis]] start_tolerance`
+pub const fn start_tolerance(travel: Travel) -> f64 {
+    match travel {
+        Travel::Rotary => START_TOLERANCE_RAD,
+        Travel::Linear { .. } => START_TOLERANCE_M,
+    }
+}
+
+/// `[axis.following_error] limit`
+pub const fn following_error(travel: Travel) -> f64 {
+    match travel {
+        Travel::Rotary => FOLLOWING_ERROR_RAD,
+        Travel::Linear { .. } => FOLLOWING_ERROR_M,
+    }
+}
+
+/// `[[axis]] target_tolerance`. In CST the loop has no integral part: static friction holds the joint off its target by
+/// friction / stiffness at most.
+pub fn target_tolerance(travel: Travel, control: &Control) -> f64 {
+    let own = match travel {
+        Travel::Rotary => TARGET_TOLERANCE_RAD,
+        Travel::Linear { .. } => TARGET_TOLERANCE_M,
+    };
+    match control {
+        Control::Torque { stiffness, coulomb_friction, .. } => {
+            own.max(TARGET_TOLERANCE_PER_FRICTION * coulomb_friction / stiffness)
+        }
+        _ => own,
+    }
+}
+
+/// `[axis.simulated] initial_position`: 0, or the limit nearest to it.
+pub fn initial_position(limits: &Limits) -> f64 {
+    0.0_f64.max(limits.position_min).min(limits.position_max)
+}

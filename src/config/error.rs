@@ -3,7 +3,7 @@
 use std::fmt;
 use std::ops::Range;
 
-use miette::{Diagnostic, LabeledSpan, SourceCode};
+use miette::{Diagnostic, GraphicalReportHandler, GraphicalTheme, LabeledSpan, SourceCode};
 use thiserror::Error;
 
 use crate::canopen::dcf::DcfError;
@@ -20,11 +20,9 @@ const SHOWN_AT_MOST: usize = 20;
 const LONGEST_SPAN: usize = 200;
 
 /// A configuration that cannot be used, with its first twenty problems in the order of the file. `miette` shows each of them
-/// with its line.
-#[derive(Debug)]
+/// with its line, and so does `Debug`, which is what `main` prints of an error that `?` hands it.
 pub struct ConfigError(Box<Inner>);
 
-#[derive(Debug)]
 struct Inner {
     name: String,
     /// The text of the file; `None` where the configuration was made in code or could not be read.
@@ -148,6 +146,13 @@ impl fmt::Display for ConfigError {
             write!(f, "; {problem} ({})", problem.kind.help())?;
         }
         Ok(())
+    }
+}
+
+impl fmt::Debug for ConfigError {
+    /// The problems at their lines.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        GraphicalReportHandler::new_themed(GraphicalTheme::unicode_nocolor()).render_report(f, self)
     }
 }
 

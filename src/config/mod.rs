@@ -7,6 +7,7 @@
 pub(crate) mod bounds;
 pub(crate) mod defaults;
 mod error;
+mod in_code;
 mod interface;
 mod model;
 mod problem_kind;
@@ -19,6 +20,7 @@ mod source_view;
 mod spelling;
 pub(crate) mod spot;
 
+use std::fmt;
 use std::path::Path;
 
 pub use error::{ConfigError, Location, Problem};
@@ -69,7 +71,7 @@ impl Config {
 }
 
 /// Why a bus cannot be connected to another interface.
-#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[derive(Clone, PartialEq, Eq, Error)]
 pub enum OverrideError {
     /// There is no such bus.
     #[error("there is no bus called {name:?}; the buses are: {known}")]
@@ -94,4 +96,11 @@ pub enum OverrideError {
         /// The bus that it belongs to.
         bus: String,
     },
+}
+
+impl fmt::Debug for OverrideError {
+    /// For `main`: the sentence.
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(self, formatter)
+    }
 }

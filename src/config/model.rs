@@ -13,7 +13,7 @@ pub use takt_rt::AxisLimits as Limits;
 pub use takt_rt::ControlLaw as Control;
 use takt_rt::Dialect;
 
-pub use takt_rt::{OnViolation, StopCategories};
+pub use takt_rt::{Follow, StopCategories, StreamDelay};
 
 use super::defaults;
 use crate::canopen::dcf::DeviceConfiguration;
@@ -29,6 +29,8 @@ pub struct Config {
     pub missed_slots: MissedSlots,
     /// How each rule stops the group. Default: see [`takt_rt::Rule::default_category`].
     pub stops: StopCategories,
+    /// How far a stream runs behind the stamps of its points; up to 1 s. Default: as far as the points ask for.
+    pub stream_delay: StreamDelay,
     /// What is asked of the operating system.
     pub realtime: Realtime,
     /// This controller as a CANopen node.
@@ -172,8 +174,8 @@ pub struct Axis {
     /// How far from its target a program may leave the joint and still be finished: rad (m). Default 0.01 rad or 1 mm; in CST
     /// 1.5 · coulomb_friction / stiffness where that is more, since static friction holds a joint off its target there.
     pub target_tolerance: f64,
-    /// What is done with set-points of a stream that break a limit. Default: the group stops.
-    pub on_violation: OnViolation,
+    /// What is done with a stream that asks for more than the limits allow. Default: the axis follows as far as they go.
+    pub follow: Follow,
     /// Cycles without feedback before the group stops. Default 5.
     pub missed_feedback_cycles: u16,
     /// Transmission type of the PDOs (1 = every SYNC). Default 1.

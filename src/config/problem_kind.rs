@@ -46,6 +46,14 @@ pub enum ProblemKind {
         /// When it means something.
         belongs: &'static str,
     },
+    /// A key of an earlier version.
+    #[error("`{key}` has been replaced")]
+    Replaced {
+        /// The key.
+        key: String,
+        /// What to write now.
+        by: &'static str,
+    },
     /// A key that is needed and not there.
     #[error("`{key}` is missing")]
     MissingKey {
@@ -266,6 +274,7 @@ impl ProblemKind {
                 format!("allowed here: {}", known.join(", "))
             }
             Self::Ignored { belongs, .. } => (*belongs).into(),
+            Self::Replaced { by, .. } => format!("write {by}"),
             Self::MissingKey { says, .. } => (*says).into(),
             Self::WrongType { expected, .. } => format!("write {expected}"),
             Self::NotAQuantity { quantity, .. } | Self::WrongUnit { quantity, .. } => {
@@ -319,6 +328,7 @@ impl ProblemKind {
             Self::NotText | Self::Syntax { .. } => "here",
             Self::UnknownKey { .. } => "not known here",
             Self::Ignored { .. } => "means nothing here",
+            Self::Replaced { .. } => "is not a key any more",
             Self::MissingKey { .. } => "missing in here",
             Self::WrongType { .. } => "wrong type",
             Self::UnknownUnit { .. } | Self::WrongUnit { .. } => "wrong unit",

@@ -9,6 +9,8 @@ use super::bounds::Bounds;
 pub const PERIOD_S: RangeInclusive<f64> = 250e-6..=0.1;
 /// `cycle.command_phase`, as a fraction of the period: the cycle must leave room on both sides of it.
 pub const COMMAND_PHASE: RangeInclusive<f64> = 0.05..=0.95;
+/// `stream.delay`
+pub const STREAM_DELAY_S: RangeInclusive<f64> = 0.0..=1.0;
 /// `cycle.missed_slots`, each step and the leak.
 pub const MISSED_SLOTS: Range<i64> = 1..1_000_001;
 

@@ -1,8 +1,11 @@
 //! Makes the engine and the slot plan from a configuration.
 
+use std::fmt;
+
 use takt_rt::{
-    AxisParameters, BusParameters, CommandPdo, Engine, EngineParameters, FeedbackSince, Heartbeat, Id,
-    Mapping, MappingError, Pdo, Scale, ScaleError, ScaleParameters, SetUpError, SlotPlan, TimingLadder,
+    AxisLimits, AxisParameters, BusParameters, CommandPdo, Engine, EngineParameters, FeedbackSince, Follow,
+    Heartbeat, Id, LookAheadParameters, MAX_AXES, Mapping, MappingError, Pdo, Scale, ScaleError,
+    ScaleParameters, SetUpError, SlotPlan, TimingLadder,
 };
 
 use crate::config::{Axis, Config, ConfigError, DriveFamily, Interface};
@@ -18,7 +21,7 @@ const NOT_TRANSMITTED_NS: u64 = 4_000_000;
 const SERVICE_FRAMES_PASSIVE: usize = 6;
 
 /// Why the real-time thread cannot execute a configuration.
-#[derive(Debug, thiserror::Error)]
+#[derive(thiserror::Error)]
 pub enum AssembleError {
     /// A value that cannot be: see [`Config::validate`].
     #[error(transparent)]
@@ -42,6 +45,16 @@ pub enum AssembleError {
     /// The engine rejects its parameters.
     #[error("the cycle cannot be set up ({0:?})")]
     Engine(SetUpError),
+}
+
+impl fmt::Debug for AssembleError {
+    /// For `main`: the sentence, or the problems of a configuration.
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Configuration(error) => fmt::Debug::fmt(error, formatter),
+            other => fmt::Display::fmt(other, formatter),
+        }
+    }
 }
 
 /// The plan of a slot.
@@ -132,7 +145,7 @@ fn axis_parameters(
         scale: scale(axis).map_err(|error| AssembleError::Scale { axis: index, error })?,
         limits: axis.limits,
         start_tolerance: axis.start_tolerance,
-        on_violation: axis.on_violation,
+        follow: axis.follow,
         // A heartbeat that is a little late is not lost.
         heartbeat_timeout_cycles: axis.heartbeat_ns.map(|period_ns| cycles(3 * period_ns)),
         following_error_limit: axis.following_error.limit,
@@ -168,4 +181,17 @@ pub fn scale(axis: &Axis) -> Result<Scale, ScaleError> {
         zero_counts: axis.zero_counts.into(),
         rated_torque: axis.simulated.rated_torque,
     })
+}
+
+/// How the streams of a configuration are looked ahead. What is to be followed exactly is not limited before it is checked.
+pub fn look_ahead(config: &Config) -> LookAheadParameters {
+    let limits = config.axes.iter().map(|axis| match axis.follow {
+        Follow::Smooth => axis.limits,
+        Follow::Exact => AxisLimits::NONE,
+    });
+    LookAheadParameters {
+        limits: limits.take(MAX_AXES).collect(),
+        period_ns: config.cycle.period_ns,
+        delay: config.stream_delay,
+    }
 }

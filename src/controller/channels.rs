@@ -2,43 +2,63 @@
 //! their three sides.
 //!
 //! ```text
-//! HostSide ── requests, newest streamed command, service frames ──▶ RtSide (takt_rt::HostInterface)
-//! HostSide ◀── service frames, newest snapshot (any number of observers) ── RtSide
+//! HostSide ── requests, trajectories, service frames ──▶ RtSide (takt_rt::HostInterface)
+//! clients  ── requests, stops, trajectories, points of a stream, from any number of threads ──▶ RtSide
+//! HostSide ◀── service frames, newest snapshot, last events (any number of observers) ── RtSide
+//! clients  ◀── trajectories that are done with ── RtSide
 //! LogSide  ◀── cycle records, events ── RtSide
 //! ```
 //!
 //! No call on [`RtSide`] allocates, locks or waits, even if another thread is preempted in the middle of a call.
 
+mod client_requests;
+mod event_words;
 mod latest;
 mod motion_words;
+mod observed_events;
 mod primitives;
 mod records;
 mod request_numbers;
 mod ring;
+mod stream;
+mod trajectories;
 mod words;
 
+use std::sync::Arc;
+
 use takt_rt::{
-    CycleRecord, Event, Frame, HostInterface, Received, Request, RequestEnvelope, RequestId, Snapshot,
-    StreamCommand,
+    CycleRecord, Event, ExecutionStart, Frame, HostInterface, LookAheadParameters, Nanoseconds, Received,
+    Request, RequestEnvelope, RequestId, Snapshot, StreamSample, TrajectoryId, TrajectorySample,
 };
 
+use super::assemble;
 use crate::config::Config;
+use client_requests::{TakenRequests, client_requests};
 use latest::{Attempt, Reader, Writer};
+use observed_events::{EventWriter, observed_events};
 use records::{RecordConsumer, RecordProducer};
+use stream::{StreamReceiver, stream_channel};
+use trajectories::TrajectoryTaker;
 
+pub use client_requests::{ClientRequests, MotionEnd, WAITING_AT_MOST};
+pub use observed_events::EventReader;
 pub use request_numbers::RequestNumbers;
 pub use ring::{Consumer, Producer, ring};
+pub use stream::Streamer;
+pub use trajectories::{GivenTrajectory, TrajectoryGiver};
 
 /// The capacity of each channel.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug)]
 pub struct ChannelSizes {
+    /// How streams are looked ahead.
+    pub stream: LookAheadParameters,
     /// Axes of the controller, up to [`takt_rt::MAX_AXES`].
     pub axes: usize,
     /// Buses of the controller, up to [`takt_rt::MAX_BUSES`].
     pub buses: usize,
     /// Cycle records that wait for the logger.
     pub records: usize,
-    /// Events that wait for the logger.
+    /// Events that wait for the logger, and events that an observer can be behind.
     pub events: usize,
     /// Requests that wait for the next cycle.
     pub requests: usize,
@@ -53,6 +73,7 @@ impl ChannelSizes {
     /// the events of a second in which the logger is late.
     pub fn of(config: &Config) -> Self {
         Self {
+            stream: assemble::look_ahead(config),
             axes: config.axes.len(),
             buses: config.buses.len(),
             records: config.telemetry.ring_records,
@@ -83,27 +104,36 @@ pub enum ChannelError {
 /// Makes the channels, and allocates and touches all their memory.
 pub fn channels(sizes: &ChannelSizes) -> (RtSide, HostSide, LogSide) {
     let (request_in, request_out) = ring(sizes.requests);
-    let (stream_in, stream_out) = latest::latest(words::stream_words(sizes.axes));
+    let (streamer, stream) = stream_channel(sizes.stream.clone());
     let (snapshot_in, snapshot_out) = latest::latest(words::snapshot_words(sizes.axes, sizes.buses));
     let (service_in, service_out) = (0..sizes.buses).map(|_| ring(sizes.service_out)).unzip();
     let (received_in, received_out) = ring(sizes.service_in);
     let (record_in, record_out) = records::record_ring(sizes.records);
     let (event_in, event_out) = ring(sizes.events);
+    let (giver, taker) = trajectories::trajectories();
+    let (observed_in, observed_out) = observed_events(sizes.events);
+    let numbers = RequestNumbers::default();
+    let (clients, taken) = client_requests(numbers.clone(), WAITING_AT_MOST);
     let rt = RtSide {
-        axes: sizes.axes,
         requests: request_out,
-        stream: stream_out,
-        stream_seen: 0,
+        clients: taken,
+        is_client_next: true,
+        stream,
+        trajectories: taker,
         service: service_out,
         received: received_in,
         records: record_in,
         events: event_in,
+        observed: observed_in,
         snapshot: snapshot_in,
     };
     let host = HostSide {
         requests: request_in,
-        numbers: RequestNumbers::default(),
-        streamer: Some(Streamer { axes: sizes.axes, stream: stream_in }),
+        trajectories: giver,
+        numbers,
+        clients,
+        observed: observed_out,
+        streamer,
         service: service_in,
         received: received_out,
         observer: Observer { snapshot: snapshot_out },
@@ -113,39 +143,45 @@ pub fn channels(sizes: &ChannelSizes) -> (RtSide, HostSide, LogSide) {
 
 /// The real-time thread's side.
 pub struct RtSide {
-    axes: usize,
     requests: Consumer<RequestEnvelope>,
-    stream: Reader,
-    stream_seen: u64,
+    clients: TakenRequests,
+    /// Whether a client's request comes before the next one of the host. They alternate, so that no flood of the one holds up
+    /// the other.
+    is_client_next: bool,
+    stream: StreamReceiver,
+    trajectories: TrajectoryTaker,
     service: Vec<Consumer<Frame>>,
     received: Producer<(usize, Received)>,
     records: RecordProducer,
     events: Producer<Event>,
+    observed: EventWriter,
     snapshot: Writer,
 }
 
-/// Attempts to read the streamed command in one cycle. One is enough, unless the host writes several commands within the
-/// fraction of a microsecond that a read takes.
-const STREAM_ATTEMPTS: usize = 3;
-
 impl HostInterface for RtSide {
     fn request(&mut self) -> Option<RequestEnvelope> {
-        self.requests.pop()
+        self.is_client_next = !self.is_client_next;
+        if self.is_client_next {
+            self.requests.pop().or_else(|| self.clients.take())
+        } else {
+            self.clients.take().or_else(|| self.requests.pop())
+        }
     }
 
-    fn stream(&mut self) -> Option<StreamCommand> {
-        for _ in 0..STREAM_ATTEMPTS {
-            let decode = |words: &mut latest::Words<'_>| words::take_stream(self.axes, words);
-            match self.stream.attempt(self.stream_seen, decode) {
-                Attempt::Whole(command, number) => {
-                    self.stream_seen = number;
-                    return Some(command);
-                }
-                Attempt::Nothing => return None,
-                Attempt::Torn => {}
-            }
-        }
-        None
+    fn begin_stream(&mut self, _group: u8) {
+        self.stream.begin();
+    }
+
+    fn stream(&mut self, _group: u8, slot_start_ns: Nanoseconds) -> StreamSample {
+        self.stream.sample(slot_start_ns)
+    }
+
+    fn trajectory(&mut self, group: u8, trajectory: TrajectoryId, at_s: f64) -> Option<TrajectorySample> {
+        self.trajectories.sample(group, trajectory, at_s)
+    }
+
+    fn keep_trajectories(&mut self, group: u8, needed: [Option<TrajectoryId>; 2]) {
+        self.trajectories.keep(group, needed);
     }
 
     fn service_frame(&mut self, bus: usize) -> Option<Frame> {
@@ -161,6 +197,7 @@ impl HostInterface for RtSide {
     }
 
     fn event(&mut self, event: &Event) -> bool {
+        self.observed.write(event);
         self.events.push(*event)
     }
 
@@ -173,7 +210,10 @@ impl HostInterface for RtSide {
 pub struct HostSide {
     requests: Producer<RequestEnvelope>,
     numbers: RequestNumbers,
-    streamer: Option<Streamer>,
+    trajectories: TrajectoryGiver,
+    clients: ClientRequests,
+    observed: EventReader,
+    streamer: Streamer,
     service: Vec<Producer<Frame>>,
     received: Consumer<(usize, Received)>,
     observer: Observer,
@@ -198,22 +238,46 @@ impl HostSide {
         if self.requests.push(envelope) { Ok(()) } else { Err(ChannelError::Full) }
     }
 
+    /// Asks for a trajectory of the group to be carried out. Returns the number of the request.
+    ///
+    /// # Errors
+    /// [`ChannelError::Full`]; nothing is sent then.
+    pub fn execute(
+        &mut self,
+        given: &Arc<GivenTrajectory>,
+        start: ExecutionStart,
+    ) -> Result<RequestId, ChannelError> {
+        let trajectory = self.trajectories.give(0, given).ok_or(ChannelError::Full)?;
+        let requested = self.request(Request::Execute { trajectory, start });
+        if requested.is_err() {
+            self.trajectories.take_back(trajectory);
+        }
+        requested
+    }
+
+    /// The end that gives trajectories, for another thread.
+    pub fn trajectories(&self) -> TrajectoryGiver {
+        self.trajectories.clone()
+    }
+
     /// The source of request ids.
     pub fn numbers(&self) -> RequestNumbers {
         self.numbers.clone()
     }
 
-    /// Replaces the streamed command. The real-time thread takes the newest one at its next cycle. Set-points beyond the axes
-    /// of the controller are ignored.
-    pub fn stream(&mut self, command: &StreamCommand) {
-        if let Some(streamer) = &mut self.streamer {
-            streamer.stream(command);
-        }
+    /// The way for requests from other threads.
+    pub fn clients(&self) -> ClientRequests {
+        self.clients.clone()
     }
 
-    /// The streaming end, for another thread. Afterwards [`HostSide::stream`] does nothing.
-    pub fn take_streamer(&mut self) -> Option<Streamer> {
-        self.streamer.take()
+    /// The events from now on, for another thread.
+    pub fn events(&self) -> EventReader {
+        self.observed.from_now_on()
+    }
+
+    /// The writing end of the points of a stream, for any thread.
+    pub fn streamer(&self) -> Streamer {
+        self.streamer.clone()
     }
 
     /// Queues a service frame. It is sent after the set-points of a later cycle.
@@ -239,19 +303,6 @@ impl HostSide {
     /// A handle to the state for another thread.
     pub fn observer(&self) -> Observer {
         self.observer.clone()
-    }
-}
-
-/// The writing end of the streamed commands. The real-time thread takes the newest one.
-pub struct Streamer {
-    axes: usize,
-    stream: Writer,
-}
-
-impl Streamer {
-    /// Replaces the streamed command. Set-points beyond the axes of the controller are ignored.
-    pub fn stream(&mut self, command: &StreamCommand) {
-        self.stream.write(|words| words::put_stream(command, self.axes, words));
     }
 }
 
@@ -312,19 +363,24 @@ impl LogSide {
 mod tests {
     use super::*;
     use takt_rt::Id;
-    use takt_rt::plan;
-    use takt_rt::{EventKind, MAX_AXES, Phase, StopCategory};
+    use takt_rt::{EventKind, Phase, StopCategory};
 
-    const SIZES: ChannelSizes =
-        ChannelSizes { axes: 2, buses: 2, records: 4, events: 2, requests: 2, service_out: 2, service_in: 2 };
-
-    fn command(valid_until_ns: u64) -> StreamCommand {
-        StreamCommand { valid_until_ns, set_points: [plan::State::default(); MAX_AXES] }
+    fn sizes() -> ChannelSizes {
+        ChannelSizes {
+            stream: LookAheadParameters::default(),
+            axes: 2,
+            buses: 2,
+            records: 4,
+            events: 2,
+            requests: 2,
+            service_out: 2,
+            service_in: 2,
+        }
     }
 
     #[test]
     fn requests_arrive_in_order_and_one_too_many_is_an_error() {
-        let (mut rt, mut host, _log) = channels(&SIZES);
+        let (mut rt, mut host, _log) = channels(&sizes());
         let first = host.request(Request::Enable).unwrap();
         let second = host.request(Request::Stop(StopCategory::Two)).unwrap();
         assert!(first < second);
@@ -336,17 +392,18 @@ mod tests {
     }
 
     #[test]
-    fn only_the_newest_streamed_command_is_seen_and_only_once() {
-        let (mut rt, mut host, _log) = channels(&SIZES);
-        assert_eq!(rt.stream(), None);
-        (1..=9).for_each(|valid_until_ns| host.stream(&command(valid_until_ns)));
-        assert_eq!(rt.stream(), Some(command(9)));
-        assert_eq!(rt.stream(), None);
+    fn neither_the_host_nor_a_client_holds_up_the_other() {
+        let (mut rt, mut host, _log) = channels(&sizes());
+        let client = host.clients();
+        let own: Vec<_> = (0..2).map(|_| host.request(Request::Enable).unwrap()).collect();
+        let theirs: Vec<_> = (0..4).map(|_| client.submit(Request::ResetFaults).unwrap()).collect();
+        let taken: Vec<_> = std::iter::from_fn(|| rt.request()).map(|envelope| envelope.id).collect();
+        assert_eq!(taken, [theirs[0], own[0], theirs[1], own[1], theirs[2], theirs[3]]);
     }
 
     #[test]
     fn service_frames_keep_to_their_bus_in_both_directions() {
-        let (mut rt, mut host, _log) = channels(&SIZES);
+        let (mut rt, mut host, _log) = channels(&sizes());
         let frame = Frame::of(Id::canopen(0x600, 5), [0x40, 0x00, 0x10, 0x00]);
         host.send_service(1, frame).unwrap();
         assert_eq!(host.send_service(2, frame), Err(ChannelError::NoSuchBus { bus: 2, buses: 2 }));
@@ -362,7 +419,7 @@ mod tests {
 
     #[test]
     fn every_observer_sees_the_newest_snapshot() {
-        let (mut rt, host, _log) = channels(&SIZES);
+        let (mut rt, host, _log) = channels(&sizes());
         let observer = host.observer();
         assert_eq!(observer.snapshot(), words::NO_SNAPSHOT);
         let snapshot = Snapshot { slot: 9, phase: Phase::Holding, axis_count: 2, ..words::NO_SNAPSHOT };
@@ -372,14 +429,17 @@ mod tests {
 
     #[test]
     fn the_log_side_gets_records_and_events_and_the_numbers_of_dropped_ones() {
-        let (mut rt, _host, mut log) = channels(&SIZES);
+        let (mut rt, host, mut log) = channels(&sizes());
         let record = CycleRecord { axis_count: 2, ..CycleRecord::default() };
         assert_eq!((0..6).filter(|_| rt.record(&record)).count(), 4);
+        let mut observer = host.events();
         let event =
             |slot| Event { slot, at_ns: 0, kind: EventKind::MotionFinished { request: RequestId(1) } };
         assert_eq!((0..3).filter(|slot| rt.event(&event(*slot))).count(), 2);
         assert_eq!(log.next_record(|seen| *seen), Some(record));
         assert_eq!(log.take_event(), Some(event(0)));
+        assert_eq!(observer.by_ref().map(|seen| seen.slot).collect::<Vec<_>>(), [1, 2]);
+        assert_eq!((observer.missed(), log.events_dropped()), (1, 1));
         assert_eq!((log.records_written(), log.records_dropped(), log.events_dropped()), (4, 2, 1));
     }
 }

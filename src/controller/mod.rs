@@ -14,7 +14,8 @@ mod time_of_day;
 mod virtual_time;
 
 pub use handle::{
-    CommandError, Controller, MotionError, MotionId, MoveOptions, Refused, StartFailure, Stopped,
+    CommandError, Controller, Events, Handle, MotionError, MotionId, MoveOptions, Refused, StartFailure,
+    Stopped, StreamError, StreamHandle, WaitError,
 };
 pub use outcome::{Interrupt, Outcome, Progress};
 pub use program::{ProgramRunner, ProgramStep};

@@ -50,6 +50,13 @@ pub enum Outcome {
         /// How far it may be: rad (m).
         tolerance: f64,
     },
+    /// The program is done, but the drive of a joint has not reported where the joint is.
+    PositionNotReported {
+        /// The axis.
+        axis: usize,
+        /// The slot of its last report.
+        since_slot: u64,
+    },
     /// A motion of another client has replaced a move of the program; counted from 1.
     MoveReplaced {
         /// The move.
@@ -104,6 +111,13 @@ impl Outcome {
                     name(*axis),
                     distance.abs(),
                     tolerance
+                )
+            }
+            Self::PositionNotReported { axis, since_slot } => {
+                format!(
+                    "{}: the program is done, but the drive has not reported since slot {since_slot}, so it is not known where \
+                     the joint is",
+                    name(*axis)
                 )
             }
             Self::CallbackPanicked { message } => {

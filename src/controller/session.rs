@@ -1,15 +1,15 @@
 //! A run in real time, from the configuration to its result.
 
+use std::fmt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, mpsc};
 use std::time::Duration;
 
-use takt_rt::linux::MonotonicClock;
+use takt_rt::linux::{MonotonicClock, ThreadReport};
 use takt_rt::{Clock, Request, Snapshot, StopCategory};
 
 use super::assemble::{self, AssembleError};
-use super::channels::{ChannelSizes, Observer, RequestNumbers, Streamer, channels};
-use super::handle::WaitingRequests;
+use super::channels::{ChannelSizes, ClientRequests, EventReader, HostSide, Observer, Streamer, channels};
 use super::outcome::{Interrupt, Outcome, Progress};
 use super::realtime_thread::{self, Begun, Ended, LoopParts, StartError};
 use super::sleep_alignment;
@@ -65,7 +65,7 @@ pub struct Session {
 }
 
 /// Why a run did not begin.
-#[derive(Debug, thiserror::Error)]
+#[derive(thiserror::Error)]
 pub enum SessionError {
     /// The configuration cannot be executed.
     #[error(transparent)]
@@ -82,6 +82,16 @@ pub enum SessionError {
     /// The real-time thread could not be started.
     #[error(transparent)]
     Start(#[from] StartError),
+}
+
+impl fmt::Debug for SessionError {
+    /// For `main`: the sentence, or the problems of a configuration.
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Assemble(error) => fmt::Debug::fmt(error, formatter),
+            other => fmt::Display::fmt(other, formatter),
+        }
+    }
 }
 
 /// Runs the program of a configuration. The logger calls `notify` from its thread. `watch` is called about once in a
@@ -101,31 +111,40 @@ pub fn run(
     run_with(config, options, notify, watch, None)
 }
 
-/// A client in another thread that commands the group, in place of the program.
-pub(super) struct Remote {
-    /// The requests of the client.
-    pub requests: Arc<WaitingRequests>,
-    /// Takes the client's handles once the real-time thread runs.
-    pub handles: mpsc::SyncSender<RemoteHandles>,
-}
-
-/// The handles of a client to a running controller.
+/// What the clients of a running controller command and observe it by.
 pub(super) struct RemoteHandles {
     /// Reads the state.
     pub observer: Observer,
-    /// Sends streamed set-points.
+    /// Sends the points of a stream.
     pub streamer: Streamer,
-    /// Gives the ids of requests.
-    pub numbers: RequestNumbers,
+    /// Sends requests.
+    pub clients: ClientRequests,
+    /// Reads the events.
+    pub events: EventReader,
+    /// The result of the real-time set-up.
+    pub realtime: ThreadReport,
 }
 
-/// The same as [`run`]. With a remote, the group executes its requests instead of a program.
+impl RemoteHandles {
+    /// `None` if they were taken before.
+    fn of(host: &mut HostSide, begun: &Begun) -> Option<Self> {
+        Some(Self {
+            observer: host.observer(),
+            streamer: host.streamer(),
+            clients: host.clients(),
+            events: host.events(),
+            realtime: begun.report,
+        })
+    }
+}
+
+/// The same as [`run`]. With somebody who takes handles, the group executes the requests of handles instead of a program.
 pub(super) fn run_with(
     config: &Config,
     options: SessionOptions,
     notify: Box<dyn FnMut(&Notice) + Send>,
     watch: impl FnMut(&Snapshot, Progress) -> Option<Interrupt>,
-    remote: Option<Remote>,
+    remote: Option<mpsc::SyncSender<RemoteHandles>>,
 ) -> Result<Session, SessionError> {
     config.validate_on_this_machine().map_err(AssembleError::from)?;
     let ownership = Ownership::of(config, options.if_owned)?;
@@ -138,7 +157,7 @@ fn lead_as_owner(
     options: SessionOptions,
     notify: Box<dyn FnMut(&Notice) + Send>,
     mut watch: impl FnMut(&Snapshot, Progress) -> Option<Interrupt>,
-    remote: Option<Remote>,
+    remote: Option<mpsc::SyncSender<RemoteHandles>>,
     mut ownership: Ownership,
 ) -> Result<Session, SessionError> {
     let mut clock = MonotonicClock::default();
@@ -185,13 +204,9 @@ fn lead_as_owner(
         }
     };
     let begun = running.begun();
-    if let (Some(remote), Some(streamer)) = (&remote, host.take_streamer()) {
+    if let (Some(remote), Some(handles)) = (remote, RemoteHandles::of(&mut host, &begun)) {
         // This fails only if the client has given up. It has then asked the run to end.
-        let _ = remote.handles.send(RemoteHandles {
-            observer: host.observer(),
-            streamer,
-            numbers: host.numbers(),
-        });
+        let _ = remote.send(handles);
     }
     let mut time_of_day = TimeOfDayKeeper::of(config);
     let mut time_request = None;
@@ -202,9 +217,6 @@ fn lead_as_owner(
         let now_ns = clock.now_ns();
         let time = time_of_day.poll(now_ns, || WallClock::starting_now(now_ns));
         time_request = time.or(time_request).filter(|time| host.request(*time).is_err());
-        if let Some(remote) = &remote {
-            remote.requests.hand_over(|envelope| host.submit(envelope).is_ok());
-        }
         if let Some(fault_injector) = &options.fault_injector {
             fault_injector.observe(&host.snapshot());
         }
@@ -249,7 +261,10 @@ fn lead_as_owner(
             (Outcome::Interrupted, None, Some(process)) => Outcome::TakenOver { process },
             (outcome, ..) => outcome,
         };
-    let is_done = matches!(outcome, Outcome::Finished | Outcome::OffTarget { .. });
+    let is_done = matches!(
+        outcome,
+        Outcome::Finished | Outcome::OffTarget { .. } | Outcome::PositionNotReported { .. }
+    );
     let target = supervisor.target().filter(|_| is_done && options.duration_ns.is_none());
     Ok(Session {
         snapshot: host.snapshot(),

@@ -167,6 +167,7 @@ impl EventFields {
                 manufacturer,
                 ..none
             },
+            EventKind::Stream { state } => Self { kind: 8, value: f64::from(state as u8), ..none },
             EventKind::MissedSlots { count } => Self { kind: 5, missed_slots: count, ..none },
             EventKind::Timing { level } => Self { kind: 7, timing_level: level as u8, ..none },
             EventKind::Rejected(refused) => Self {
@@ -245,7 +246,7 @@ mod tests {
     use super::*;
     use takt_rt::{
         DriveState, Fault, Origin, Phase, RejectReason, RequestError, RequestId, RequestKind, Rule,
-        StopCategory, StopCause, StopReason, TimingLevel,
+        StopCategory, StopCause, StopReason, StreamState, TimingLevel,
     };
 
     /// The constants of a definition that stand in front of `field`, with the names as Rust writes them.
@@ -325,6 +326,7 @@ mod tests {
                 phase: Phase::Moving,
             }),
             EventKind::Timing { level: TimingLevel::Normal },
+            EventKind::Stream { state: StreamState::Dry },
         ];
         let encoded = kinds.map(|kind| {
             let name = format!("{kind:?}");

@@ -284,12 +284,23 @@ fn axis_row(axis: &AxisReport) -> String {
             }
             _ => ("never enabled".to_owned(), String::new()),
         };
-    // Rounding first and then adding 0 avoids "-0".
-    let rounded = (axis.final_position * 1e5).round() / 1e5 + 0.0;
-    let position = format!("{rounded:.5} {}", axis.unit);
-    let off = format!("{:+.1}", axis.final_error_counts);
     let name = shortened(&axis.name, 16);
-    format!("{name:<16}{largest:>16}   {circumstances:<36}{position:>16}{off:>12}")
+    let end = final_columns(axis);
+    let width = 64_usize.saturating_sub(circumstances.chars().count());
+    format!("{name:<16}{largest:>16}   {circumstances}{end:>width$}")
+}
+
+/// The final position and the counts that it is off its target, if the drive has reported it.
+fn final_columns(axis: &AxisReport) -> String {
+    let (Some(position), Some(off)) = (axis.final_position, axis.final_error_counts) else {
+        return axis
+            .final_report_slot
+            .map_or_else(|| " never reported".to_owned(), |slot| format!(" not reported since slot {slot}"));
+    };
+    // Rounding first and then adding 0 avoids "-0".
+    let rounded = (position * 1e5).round() / 1e5 + 0.0;
+    let (position, off) = (format!("{rounded:.5} {}", axis.unit), format!("{off:+.1}"));
+    format!("{position:>16}{off:>12}")
 }
 
 /// A fraction of a limit, as text.

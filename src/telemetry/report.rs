@@ -123,12 +123,14 @@ pub struct AxisReport {
     /// The largest values as fractions of their limits: 1 means that a limit was reached. The jerk is `null` if it is not
     /// limited.
     pub set_point_part: SetPointParts,
-    /// The last position while enabled.
-    pub final_position: f64,
+    /// The last position while enabled; `None` if the drive did not report it.
+    pub final_position: Option<f64>,
+    /// The slot of the last position that the drive reported while enabled; `None` if it has never reported.
+    pub final_report_slot: Option<u64>,
     /// The target of the last move.
     pub target_position: f64,
-    /// The difference between the two in counts of the encoder.
-    pub final_error_counts: f64,
+    /// The difference between the final position and the target in counts of the encoder; `None` if that is not known.
+    pub final_error_counts: Option<f64>,
 }
 
 /// The largest derivatives of an axis' set-points as fractions of their limits.
@@ -309,7 +311,8 @@ impl AxisReport {
     ) -> Self {
         let largest = axis.following_error_max;
         let target_position = target.unwrap_or(axis.position_set);
-        let error_counts = (axis.position - target_position) * description.counts_per_unit;
+        let final_position = axis.is_reported.then_some(axis.position);
+        let error_counts = |position: f64| (position - target_position) * description.counts_per_unit;
         Self {
             name: description.name.clone(),
             unit: description.unit.symbol(),
@@ -319,10 +322,12 @@ impl AxisReport {
             set_point_max: axis.set_point_max,
             limits: description.limits,
             set_point_part: SetPointParts::new(&axis.set_point_max, &description.limits),
-            final_position: axis.position,
+            final_position,
+            final_report_slot: axis.reported_slot,
             target_position,
             // Adding 0 turns -0 into 0.
-            final_error_counts: (error_counts * 10.0).round() / 10.0 + 0.0,
+            final_error_counts: final_position
+                .map(|position| (error_counts(position) * 10.0).round() / 10.0 + 0.0),
         }
     }
 }
@@ -372,7 +377,8 @@ impl TelemetryReport {
 }
 
 impl StopReport {
-    fn new(stop: &StopReason, machine: &Machine) -> Self {
+    /// A stop, with the names of the machine.
+    pub fn new(stop: &StopReason, machine: &Machine) -> Self {
         Self {
             category: stop.category as u8,
             reason: words::stop_cause(stop, machine),

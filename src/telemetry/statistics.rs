@@ -96,8 +96,12 @@ pub struct AxisStatistics {
     pub set_point_max: SetPointMagnitudes,
     /// The last set-point while enabled, in rad (m). If the axis was never enabled, the last one of the run.
     pub position_set: f64,
-    /// The position reported together with it.
+    /// The position reported together with it; if the drive did not report any more, its last position before.
     pub position: f64,
+    /// The slot in which that position was reported; `None` if the drive has never reported.
+    pub reported_slot: Option<u64>,
+    /// Whether the drive still reported in the cycle of that set-point.
+    pub is_reported: bool,
     was_enabled: bool,
 }
 
@@ -107,7 +111,11 @@ impl AxisStatistics {
         let is_enabled = is_enabled(phase);
         if is_enabled || !self.was_enabled {
             self.position_set = axis.position_set;
-            self.position = axis.position;
+            self.is_reported = axis.feedback_age == 0;
+            if self.is_reported {
+                self.position = axis.position;
+                self.reported_slot = Some(timing.slot);
+            }
         }
         if !is_enabled {
             return;
@@ -263,5 +271,21 @@ mod tests {
         statistics.add(&record(3, Phase::Disabled, axis(0.8, 0.8)));
         assert_eq!((statistics.axes[0].position_set, statistics.axes[0].position), (1.0, 0.99));
         assert_eq!((statistics.cycles, statistics.first_ns, statistics.last_ns), (3, 1_000_000, 3_000_000));
+    }
+
+    #[test]
+    fn the_final_position_is_known_to_be_that_of_an_earlier_slot_if_the_drive_has_fallen_silent() {
+        let mut statistics = Statistics::new(1);
+        let axis = |position, feedback_age| AxisRecord { position, feedback_age, ..AxisRecord::default() };
+        statistics.add(&record(1, Phase::Enabling, axis(0.0, 7)));
+        let known = statistics.axes[0];
+        assert_eq!((known.reported_slot, known.is_reported), (None, false));
+        statistics.add(&record(2, Phase::Moving, axis(0.7, 0)));
+        statistics.add(&record(3, Phase::Moving, axis(0.7, 1)));
+        statistics.add(&record(4, Phase::Stopping, axis(0.7, 2)));
+        // Without power the joint may fall anywhere: this is not its final position.
+        statistics.add(&record(5, Phase::Disabled, axis(0.1, 0)));
+        let known = statistics.axes[0];
+        assert_eq!((known.position, known.reported_slot, known.is_reported), (0.7, Some(2), false));
     }
 }

@@ -1,6 +1,9 @@
 //! The texts of stops, phases, events and rejections, with the names of the axes and the units of the values.
 
-use takt_rt::{DriveState, Event, EventKind, OperationMode, Phase, Rule, StopCategory, TimingLevel};
+use takt_rt::{
+    AxisSnapshot, DriveState, Event, EventKind, OperationMode, Phase, Rule, Snapshot, StopCategory,
+    StreamState, TimingLevel,
+};
 
 use super::machine::Machine;
 
@@ -76,6 +79,12 @@ pub fn event(event: &Event, machine: &Machine) -> String {
         EventKind::PhaseChanged { from, to } => format!("{} → {}", phase(from), phase(to)),
         EventKind::Stop(reason) => format!("stop: {}", stop(&reason, machine)),
         EventKind::MotionFinished { request } => format!("motion {} finished", request.0),
+        EventKind::Stream { state: StreamState::Idle } => "stream: over".to_owned(),
+        EventKind::Stream { state: StreamState::Awaited } => "stream: awaited".to_owned(),
+        EventKind::Stream { state: StreamState::Following } => "stream: followed".to_owned(),
+        EventKind::Stream { state: StreamState::Dry } => {
+            "stream: the points have run out, the axes come to rest".to_owned()
+        }
         EventKind::DriveState { axis, state: to, statusword } => {
             format!("{}: {} (statusword 0x{statusword:04X})", machine.axis_name(axis), state(to))
         }
@@ -97,6 +106,24 @@ pub fn event(event: &Event, machine: &Machine) -> String {
         EventKind::MissedSlots { count } => format!("{count} slots were missed: the thread was late"),
         EventKind::Rejected(rejected) => rejection(&rejected, machine),
     }
+}
+
+/// The axes whose drives do not report at present, and since when, for a line of status; `None` if every drive reports, or if none
+/// is asked yet.
+pub fn silence(snapshot: &Snapshot, machine: &Machine) -> Option<String> {
+    if snapshot.phase == Phase::Passive {
+        return None;
+    }
+    let silent = |(number, axis): (u8, &AxisSnapshot)| {
+        let name = machine.axis_name(number);
+        match axis.feedback_age_ns(snapshot.at_ns) {
+            _ if !axis.is_stale() => None,
+            None => Some(format!("{name} (never)")),
+            Some(age_ns) => Some(format!("{name} ({} ms ago)", age_ns / 1_000_000)),
+        }
+    };
+    let silent: Vec<String> = (0..).zip(snapshot.axes()).filter_map(silent).collect();
+    (!silent.is_empty()).then(|| format!("no feedback from {}", silent.join(", ")))
 }
 
 #[cfg(test)]
@@ -152,5 +179,20 @@ mod tests {
             })),
             "enabling was rejected: not possible while moving"
         );
+    }
+
+    #[test]
+    fn drives_that_do_not_report_are_named_with_how_long_ago_they_did() {
+        let mut snapshot = Snapshot { at_ns: 90_000_000, axis_count: 2, ..Snapshot::default() };
+        snapshot.axes[0] =
+            AxisSnapshot { is_heard: true, feedback_ns: 78_000_000, ..AxisSnapshot::default() };
+        assert_eq!(silence(&snapshot, &machine()), None, "in bring-up no drive reports yet");
+        snapshot.phase = Phase::Moving;
+        assert_eq!(silence(&snapshot, &machine()).as_deref(), Some("no feedback from slide (never)"));
+        snapshot.axes[0].feedback_age = 12;
+        snapshot.axes[1].is_heard = true;
+        assert_eq!(silence(&snapshot, &machine()).as_deref(), Some("no feedback from shoulder (12 ms ago)"));
+        snapshot.axes[0].feedback_age = 0;
+        assert_eq!(silence(&snapshot, &machine()), None);
     }
 }

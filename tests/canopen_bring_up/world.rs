@@ -92,6 +92,7 @@ impl World {
 pub fn config(axes: &[(usize, u8)]) -> Config {
     let buses = axes.iter().map(|(bus, _)| bus + 1).max().unwrap_or(0);
     Config {
+        stream_delay: Default::default(),
         name: "test".into(),
         cycle: Cycle { period_ns: 1_000_000, command_phase_ns: 550_000 },
         missed_slots: MissedSlots { warning: 10, degraded: 100, stop: 500, leak_slots: 10 },
@@ -165,7 +166,7 @@ fn axis(number: usize, bus: usize, node: u8) -> Axis {
         answers_sync: true,
         target_tolerance: 0.01,
         start_tolerance: 0.02,
-        on_violation: Default::default(),
+        follow: Default::default(),
         feedback_delay_ns: 20_000,
         heartbeat_ns: Some(50_000_000),
         identity: Identity::default(),

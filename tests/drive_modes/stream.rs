@@ -1,14 +1,13 @@
 //! A stream of set-points that ends in a stop.
 
-use takt_rt::plan::State;
-use takt_rt::{DriveState, MAX_AXES, Phase, Request, StopCategory, StreamCommand};
+use takt_rt::{AxisPoint, DriveState, MAX_AXES, Phase, PointRole, Request, StopCategory, StreamPoint};
 
-use crate::world::{MILLISECOND_NS, World, load};
+use crate::world::{World, load};
 
 const CYCLE_S: f64 = 0.001;
 
 /// The joint, with an acceleration that grows in this direction until the cycle in which these stops are asked for; the
-/// stream says of its velocity that there is none. Returns the positions up to when the drive is disabled, or holds.
+/// stream gives positions alone. Returns the positions up to when the drive is disabled, or holds.
 fn streamed_positions(direction: f64, stops: &[StopCategory]) -> Vec<f64> {
     let mut world = World::holding(load("erob-modes/erob-csp.toml"));
     let jerk = 0.9 * world.config.axes[0].limits.jerk * direction;
@@ -17,10 +16,10 @@ fn streamed_positions(direction: f64, stops: &[StopCategory]) -> Vec<f64> {
     let mut positions = vec![begun; 3];
     for cycle in 1..=80 {
         let time_s = f64::from(cycle) * CYCLE_S;
-        let mut set_points = [State::default(); MAX_AXES];
-        set_points[0].position = begun + jerk * time_s.powi(3) / 6.0;
-        let valid_until_ns = world.run.snapshot().at_ns + 20 * MILLISECOND_NS;
-        world.run.host().stream(&StreamCommand { valid_until_ns, set_points });
+        let mut axes = [AxisPoint::default(); MAX_AXES];
+        axes[0].position = begun + jerk * time_s.powi(3) / 6.0;
+        let at_ns = world.run.snapshot().at_ns;
+        world.run.host().streamer().push(&[StreamPoint { at_ns, role: PointRole::Single, axes }]).unwrap();
         world.run_for(1);
         positions.push(world.run.snapshot().axes[0].position_set);
     }

@@ -1,6 +1,6 @@
 //! A case: everything that its seed decides.
 
-use takt::config::{Config, Control, OnViolation, ProgramMove, ProgramTarget};
+use takt::config::{Config, Control, Follow, ProgramMove, ProgramTarget};
 use takt::controller::Interrupt;
 use takt::faults::Scenario;
 
@@ -38,7 +38,7 @@ pub struct Hardship {
     pub neglect: u64,
     /// Whether clients go on asking for things to the last cycle, though the run is on its way out.
     pub are_clients_stubborn: bool,
-    /// Whether streams are led near their limits, say what they like of their velocity, and miss commands in a row.
+    /// Whether streams are led near their limits and beyond, and say what they like of their velocity.
     pub are_streams_wild: bool,
 }
 
@@ -89,7 +89,7 @@ impl Case {
         let mut config = machine::any(&mut dice, faults > 0 && NEEDS_EROB.contains(&first));
         config = crowd.unwrap_or(config);
         if dice.chance(0.2) {
-            config.axes.iter_mut().for_each(|axis| axis.on_violation = OnViolation::Clamp);
+            config.axes.iter_mut().for_each(|axis| axis.follow = Follow::Exact);
         }
         let is_serving = dice.chance(0.35);
         let clients = if is_serving || dice.chance(0.5) { dice.pick(&[1, 1, 2, 3]) } else { 0 };

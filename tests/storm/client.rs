@@ -1,11 +1,11 @@
 //! Somebody who asks the group for anything at any time.
 
 use takt::config::{Config, Control};
-use takt_rt::plan::State;
 use takt_rt::{
-    MAX_AXES, Move, Phase, ProfileMove, ProfileTarget, Request, Snapshot, StopCategory, StreamCommand,
+    MAX_AXES, Move, Phase, ProfileMove, ProfileTarget, Request, Snapshot, StopCategory, StreamPoint,
 };
 
+use crate::client_stream::ClientStream;
 use crate::dice::Dice;
 
 /// What has been asked of the group up to a cycle, as far as invariants depend on it.
@@ -24,60 +24,15 @@ const REQUESTS_AT_MOST: usize = 24;
 #[derive(Default)]
 pub struct Wishes {
     pub requests: Vec<Request>,
-    pub stream: Option<StreamCommand>,
+    pub points: Vec<StreamPoint>,
     /// How much too late the next wake-up is.
     pub late_ns: u64,
-}
-
-/// A stream under way.
-#[derive(Clone, Copy)]
-struct Stream {
-    cycles_left: usize,
-    begun: [f64; MAX_AXES],
-    elapsed_s: f64,
-    swing: f64,
-    badness: Badness,
-    wildness: Option<Wildness>,
-}
-
-/// What makes a stream harder to follow.
-#[derive(Clone, Copy)]
-struct Wildness {
-    /// The share of the limits of velocity and acceleration to which it goes.
-    share: f64,
-    words: Words,
-    /// How likely it is that commands stay away from a cycle on, and for how many cycles.
-    absence: f64,
-    absent_cycles: usize,
-    /// So many are still to stay away.
-    absent: usize,
-}
-
-/// What a stream says of its velocity and acceleration.
-#[derive(Clone, Copy, PartialEq)]
-enum Words {
-    True,
-    Velocity,
-    Nothing,
-    False,
-}
-
-#[derive(Clone, Copy, PartialEq)]
-enum Badness {
-    None,
-    Leap,
-    NotFinite,
-    Fast,
-    /// Some commands do not come.
-    Patchy,
-    /// They come when they have expired.
-    Stale,
 }
 
 pub struct Client {
     dice: Dice,
     restlessness: f64,
-    stream: Option<Stream>,
+    stream: Option<ClientStream>,
     are_streams_wild: bool,
 }
 
@@ -89,7 +44,9 @@ impl Client {
 
     /// What it wants after a cycle.
     pub fn wishes(&mut self, config: &Config, snapshot: &Snapshot) -> Wishes {
-        let mut wishes = Wishes { stream: self.streamed(config, snapshot), ..Wishes::default() };
+        let points =
+            self.stream.as_mut().map_or_else(Vec::new, |stream| stream.points(config, snapshot.at_ns));
+        let mut wishes = Wishes { points, ..Wishes::default() };
         if !self.dice.chance(self.restlessness) {
             return wishes;
         }
@@ -178,96 +135,11 @@ impl Client {
     }
 
     fn begin_stream(&mut self, config: &Config, snapshot: &Snapshot) {
-        let mut begun = [0.0; MAX_AXES];
-        for (begun, axis) in begun.iter_mut().zip(&snapshot.axes[..config.axes.len()]) {
-            *begun = axis.position_set;
-        }
-        if self.dice.chance(0.05) {
-            begun[0] += 1.0;
-        }
-        let badness = self.dice.pick(&[
-            Badness::None,
-            Badness::None,
-            Badness::None,
-            Badness::Leap,
-            Badness::NotFinite,
-            Badness::Fast,
-            Badness::Patchy,
-            Badness::Stale,
-        ]);
-        let (cycles_left, swing) = (1 + self.dice.below(1000), self.dice.between(-0.5, 0.5));
-        let wildness = self.are_streams_wild.then(|| self.wildness());
-        self.stream = Some(Stream { cycles_left, begun, elapsed_s: 0.0, swing, badness, wildness });
-    }
-
-    fn wildness(&mut self) -> Wildness {
-        Wildness {
-            share: self.dice.pick(&[0.3, 0.7, 0.9, 0.98]),
-            words: self.dice.pick(&[Words::True, Words::Velocity, Words::Nothing, Words::False]),
-            absence: self.dice.pick(&[0.0, 0.01, 0.1, 0.3]),
-            absent_cycles: self.dice.pick(&[1, 1, 2, 5, 20]),
-            absent: 0,
-        }
-    }
-
-    /// A swing to and fro from where the axes were, well within their limits as long as it is a good one.
-    fn streamed(&mut self, config: &Config, snapshot: &Snapshot) -> Option<StreamCommand> {
-        let stream = self.stream.as_mut()?;
-        let period_s = config.cycle.period_ns as f64 * 1e-9;
-        stream.elapsed_s += period_s;
-        stream.cycles_left = stream.cycles_left.saturating_sub(1);
-        let is_last = stream.cycles_left == 0;
-        let rate = if stream.badness == Badness::Fast { 12.0 } else { 3.0 };
-        let mut set_points = [State::default(); MAX_AXES];
-        for (index, axis) in config.axes.iter().enumerate() {
-            let limits = &axis.limits;
-            let (amplitude, rate) = match stream.wildness {
-                // At both limits in turn.
-                Some(Wildness { share, .. }) => {
-                    let highest = limits.acceleration.min(limits.deceleration);
-                    let way = share * limits.velocity * limits.velocity / highest;
-                    (way.copysign(stream.swing), highest / limits.velocity)
-                }
-                None => (stream.swing * limits.velocity.min(limits.acceleration) / 6.0, rate),
-            };
-            // Eases in with no velocity, no acceleration and little jerk.
-            let ease = (stream.elapsed_s / 0.5).min(1.0);
-            let ease = ease * ease * ease * (10.0 + ease * (6.0 * ease - 15.0));
-            let phase = rate * stream.elapsed_s;
-            let position = stream.begun[index] + amplitude * ease * (1.0 - phase.cos());
-            let velocity = amplitude * ease * rate * phase.sin();
-            let acceleration = amplitude * ease * rate * rate * phase.cos();
-            set_points[index] = match stream.wildness.map(|wild| wild.words) {
-                Some(Words::True) => State { position, velocity, acceleration },
-                Some(Words::Nothing) => State { position, ..State::default() },
-                Some(Words::False) => {
-                    State { position, velocity: -3.0 * velocity, acceleration: 1e3 * velocity }
-                }
-                Some(Words::Velocity) | None => State { position, velocity, acceleration: 0.0 },
-            };
-        }
-        if is_last {
-            match stream.badness {
-                Badness::Leap => set_points[0].position += 0.5,
-                Badness::NotFinite => set_points[0].position = f64::NAN,
-                Badness::None | Badness::Fast | Badness::Patchy | Badness::Stale => {}
-            }
-        }
-        let mut is_left_out = stream.badness == Badness::Patchy && self.dice.chance(0.2);
-        if let Some(wild) = &mut stream.wildness {
-            if wild.absent == 0 && self.dice.chance(wild.absence) {
-                wild.absent = 1 + self.dice.below(wild.absent_cycles);
-            }
-            is_left_out |= wild.absent > 0;
-            wild.absent = wild.absent.saturating_sub(1);
-        }
-        let is_stale = stream.badness == Badness::Stale && is_last;
-        let at_ns = if is_stale { 0 } else { snapshot.at_ns };
-        let valid_until_ns = at_ns + self.dice.between(0.5, 30.0) as u64 * config.cycle.period_ns;
-        if is_last {
-            self.stream = None;
-        }
-        (!is_left_out).then_some(StreamCommand { valid_until_ns, set_points })
+        let positions: Vec<f64> =
+            snapshot.axes[..config.axes.len()].iter().map(|axis| axis.position_set).collect();
+        let dice = self.dice.split(snapshot.slot);
+        self.stream =
+            Some(ClientStream::new(dice, config, snapshot.at_ns, &positions, self.are_streams_wild));
     }
 }
 

@@ -125,10 +125,10 @@ fn axis(dice: &mut Dice, name: &str, bus: usize, node: usize, bus_us: usize, is_
     };
     let mut text = format!(
         "[[axis]]\nname = \"{name}\"\nbus = \"bus{bus}\"\nnode = {node}\ndrive = \"{family}\"\nmode = \"{mode}\"\n\
-         reversed = {}\nmissed_feedback_cycles = {}\non_violation = \"{}\"\n",
+         reversed = {}\nmissed_feedback_cycles = {}\nfollow = \"{}\"\n",
         dice.chance(0.5),
         dice.pick(&[3, 5, 5, 10]),
-        if dice.chance(0.3) { "clamp" } else { "reject" },
+        if dice.chance(0.3) { "exact" } else { "smooth" },
     );
     if dice.chance(0.2) {
         text.push_str("heartbeat = \"50 ms\"\n");

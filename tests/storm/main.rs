@@ -8,6 +8,7 @@
 mod bounds;
 mod case;
 mod client;
+mod client_stream;
 mod concern;
 mod coverage;
 mod dice;

@@ -243,8 +243,10 @@ impl Clients {
                     let id = world.run.host().request(*request).ok();
                     self.awaited_resets.extend(id.filter(|_| *request == Request::ResetFaults));
                 }
-                if let Some(command) = wishes.stream {
-                    world.run.host().stream(&command);
+                let streamer = world.run.host().streamer();
+                for point in &wishes.points {
+                    // Nobody takes the points of a stream that was not granted.
+                    let _ = streamer.push(std::slice::from_ref(point));
                 }
                 world.run.clock().stall(wishes.late_ns);
             }

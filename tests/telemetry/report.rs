@@ -77,13 +77,16 @@ fn the_report_has_the_keys_of_the_contract_with_the_values_of_the_run() {
     assert_eq!(report["realtime"], expected);
     let expected = json!({
         "name": "slide", "unit": "m", "following_error_max": 1.0625, "following_error_at_s": 0.017,
-        "following_error_velocity": 1.5, "final_position": 17.4375, "target_position": 17.5,
+        "following_error_velocity": 1.5, "final_position": 17.4375, "final_report_slot": 17, "target_position": 17.5,
         "final_error_counts": -5215.2,
         "set_point_max": { "velocity": 1.5, "acceleration": 2.5, "jerk": 40.0 },
         "limits": { "velocity": 2.0, "acceleration": 10.0, "jerk": 50.0 },
         "set_point_part": { "velocity": 0.75, "acceleration": 0.25, "jerk": 0.8 },
     });
     assert_eq!(report["axes"][1], expected);
+    // The drive of the other axis has not reported.
+    let other = &report["axes"][0];
+    assert_eq!([&other["final_position"], &other["final_error_counts"]], [&Value::Null; 2]);
     let expected = json!({
         "name": "left", "interface": "can0", "load_percent": 50.0, "tx_frames": 80, "rx_frames": 40,
         "tx_overruns": 5, "rx_overruns": 0, "errors": 6, "state": "error passive",
@@ -104,7 +107,7 @@ fn the_report_of_a_finished_program_has_no_stop_and_has_its_targets() {
     let outcome = RunOutcome { targets: Some(vec![17.0, 17.4375]), ..outcome(last, None) };
     let report = RunReport::new(&log, &outcome);
     assert_eq!(serde_json::to_value(&report).unwrap()["stop"], Value::Null);
-    assert_eq!((report.axes[1].target_position, report.axes[1].final_error_counts), (17.4375, 0.0));
+    assert_eq!((report.axes[1].target_position, report.axes[1].final_error_counts), (17.4375, Some(0.0)));
     assert_eq!(report.axes[0].target_position, 17.0);
 }
 
@@ -126,6 +129,7 @@ fn the_text_has_every_part_of_the_report() {
         "slide was 0.2500 m from its set-point (allowed: 0.1250 m) while moving (slot 7)",
         "missed slots             3 of 23",
         "slide                1062.500 mm   0.02 s, +1.50 m/s = 708.3 ms late         17.43750 m     -5215.2",
+        "shoulder           1062.500 mrad   0.02 s, +1.50 rad/s = 708.3 ms late               never reported",
         "slide                    75.00 %         25.00 %         80.00 %",
         "left            can0           50.0 %          80          40          5        6  error passive",
         "18 records, 2 dropped",

@@ -28,6 +28,7 @@ pub const STOP: StopReason = StopReason {
 
 pub fn sides(records: usize) -> (RtSide, HostSide, LogSide) {
     channels(&ChannelSizes {
+        stream: Default::default(),
         axes: 2,
         buses: 1,
         records,
@@ -67,7 +68,7 @@ pub fn options(recording: Option<RecordingDestination>) -> LoggerOptions {
     }
 }
 
-/// A cycle in which every field has a different value.
+/// A cycle in which every field has a different value. The first drive has not reported for a cycle.
 pub fn cycle(slot: u64) -> CycleRecord {
     let mut axes = [AxisRecord::default(); MAX_AXES];
     for (axis, record) in axes.iter_mut().take(2).enumerate() {
@@ -86,7 +87,7 @@ pub fn cycle(slot: u64) -> CycleRecord {
             drive_state: DriveState::OperationEnabled,
             statusword: 0x1637,
             error_code: 0x7305,
-            feedback_age: axis as u16,
+            feedback_age: 1 - axis as u16,
             command_raw: -(slot as i32),
             position_raw: i32::MIN + axis as i32,
         };

@@ -4,8 +4,8 @@ use takt::config::Config;
 use takt::drive::ProcessData;
 use takt_rt::plan;
 use takt_rt::{
-    Engine, Id, MAX_AXES, MappedObject, Move, ProfileMove, ProfileTarget, Request, StopCategory,
-    StreamCommand,
+    AxisPoint, AxisTarget, Engine, Id, MAX_AXES, MappedObject, Move, PointRole, ProfileMove, ProfileTarget,
+    Request, StopCategory, StreamPoint, StreamWish,
 };
 
 use super::super::input::Input;
@@ -110,22 +110,32 @@ fn nowhere() -> Move {
     }
 }
 
-/// A stream near the present set-points, or anywhere.
-pub fn stream(engine: &Engine, now_ns: u64, input: &mut Input<'_>) -> StreamCommand {
+/// A point of a stream near the present set-points, or anywhere, meant for any time.
+pub fn point(engine: &Engine, now_ns: u64, input: &mut Input<'_>) -> StreamPoint {
     let is_near = input.byte() > 32;
-    let valid_until_ns = now_ns + 1_000_000 * u64::from(input.byte());
+    let at_ns = match input.byte() {
+        255 => u64::from_le_bytes(input.bytes()),
+        late_ms @ 200..=254 => now_ns.saturating_sub(1_000_000 * u64::from(late_ms - 200)),
+        early_ms => now_ns + 1_000_000 * u64::from(early_ms),
+    };
     // From steps that the jerk limits allow from rest to ones that nothing allows.
-    let largest_step = STREAM_STEP * f64::from(1u32 << (input.byte() % 20));
-    let mut set_points = [plan::State::default(); MAX_AXES];
-    for (axis, point) in engine.axes().iter().zip(&mut set_points) {
+    let scale = input.byte();
+    let largest_step = STREAM_STEP * f64::from(1u32 << (scale % 20));
+    let role = match scale / 64 {
+        0 => PointRole::Chunk { is_first: scale.is_multiple_of(2), is_last: scale.is_multiple_of(5) },
+        _ => PointRole::Single,
+    };
+    let mut axes = [AxisPoint::default(); MAX_AXES];
+    for (axis, point) in engine.axes().iter().zip(&mut axes) {
         *point = if is_near {
             let step = f64::from(input.byte() as i8) / 128.0 * largest_step;
-            plan::State { position: axis.set_point().position + step, ..plan::State::default() }
+            AxisPoint::position(axis.set_point().position + step)
         } else {
-            plan::State { position: input.number(), velocity: input.number(), acceleration: input.number() }
+            let (position, velocity, acceleration) = (input.number(), input.number(), input.number());
+            AxisPoint { position, velocity: Some(velocity), acceleration: Some(acceleration) }
         };
     }
-    StreamCommand { valid_until_ns, set_points }
+    StreamPoint { at_ns, role, axes }
 }
 
 /// A smooth way of every axis from where it is, in so many cycles: within the limits, or up to four times beyond them.
@@ -133,19 +143,15 @@ pub struct Sweep {
     from: [f64; MAX_AXES],
     by: [f64; MAX_AXES],
     cycles: u32,
-    valid_ns: u64,
 }
 
 impl Sweep {
     pub fn new(engine: &Engine, period_s: f64, input: &mut Input<'_>) -> Self {
         let cycles = u32::from(input.byte()) + 2;
         let duration_s = f64::from(cycles) * period_s;
-        let mut sweep = Self {
-            from: [0.0; MAX_AXES],
-            by: [0.0; MAX_AXES],
-            cycles,
-            valid_ns: 500_000 * u64::from(input.byte()),
-        };
+        let mut sweep = Self { from: [0.0; MAX_AXES], by: [0.0; MAX_AXES], cycles };
+        // Kept inputs have a byte here that is not used any more.
+        input.byte();
         let strength = f64::from(input.byte()) / 64.0;
         for ((axis, from), by) in engine.axes().iter().zip(&mut sweep.from).zip(&mut sweep.by) {
             let limits = &axis.parameters().limits;
@@ -159,18 +165,18 @@ impl Sweep {
         sweep
     }
 
-    /// Every command of it.
+    /// Every cycle of it.
     pub fn cycles(&self) -> std::ops::RangeInclusive<u32> {
         1..=self.cycles
     }
 
-    pub fn command(&self, cycle: u32, now_ns: u64) -> StreamCommand {
+    pub fn wish(&self, cycle: u32) -> StreamWish {
         let part = f64::from(cycle) / f64::from(self.cycles);
         let way = part.powi(3) * (10.0 - 15.0 * part + 6.0 * part * part);
-        let mut set_points = [plan::State::default(); MAX_AXES];
-        for (point, (from, by)) in set_points.iter_mut().zip(self.from.iter().zip(&self.by)) {
-            point.position = from + by * way;
+        let mut targets = [AxisTarget::default(); MAX_AXES];
+        for (target, (from, by)) in targets.iter_mut().zip(self.from.iter().zip(&self.by)) {
+            *target = AxisTarget::Position(plan::State::rest(from + by * way));
         }
-        StreamCommand { valid_until_ns: now_ns + self.valid_ns, set_points }
+        StreamWish::Targets(targets)
     }
 }

@@ -14,8 +14,8 @@ use takt::config::{Config, Control};
 use takt::controller::assemble;
 use takt_rt::{
     BusHealth, BusSet, BusState, Command, CycleInput, CycleRecord, CycleTiming, Deadline, Dialect,
-    DriveState, Engine, Event, Frame, HostInterface, OperationMode, Phase, Received, Request,
-    RequestEnvelope, RequestId, SendBatch, Snapshot, StreamCommand,
+    DriveState, Engine, Event, Frame, HostInterface, LookAhead, MAX_AXES, OperationMode, Phase, Received,
+    Request, RequestEnvelope, RequestId, SendBatch, Snapshot, StreamPoint, StreamSample, StreamWish,
 };
 
 use super::input::Input;
@@ -82,17 +82,35 @@ pub fn run(bytes: &[u8]) -> Journey {
 }
 
 /// The other side of the host interface.
-#[derive(Default)]
 struct Hall {
     requests: VecDeque<Request>,
     asked: u64,
-    stream: Option<StreamCommand>,
+    /// What the stream wants in the next cycle, in place of its points.
+    wish: Option<StreamWish>,
+    points: Box<LookAhead<MAX_AXES, Vec<StreamPoint>>>,
     services: VecDeque<Frame>,
     events: Vec<Event>,
     is_retired: bool,
     /// Whether set-points left with the last cycle, by its record.
     is_commanded: bool,
     snapshot: Snapshot,
+}
+
+impl Hall {
+    fn new(config: &Config) -> Self {
+        let points = vec![StreamPoint::default(); 32];
+        Self {
+            requests: VecDeque::new(),
+            asked: 0,
+            wish: None,
+            points: Box::new(LookAhead::new(points, assemble::look_ahead(config))),
+            services: VecDeque::new(),
+            events: vec![],
+            is_retired: false,
+            is_commanded: false,
+            snapshot: Snapshot::default(),
+        }
+    }
 }
 
 impl HostInterface for Hall {
@@ -103,8 +121,13 @@ impl HostInterface for Hall {
         Some(RequestEnvelope { id: RequestId(self.asked), request })
     }
 
-    fn stream(&mut self) -> Option<StreamCommand> {
-        self.stream.take()
+    fn begin_stream(&mut self, _group: u8) {
+        self.points.begin();
+    }
+
+    fn stream(&mut self, _group: u8, slot_start_ns: u64) -> StreamSample {
+        let sample = self.points.sample(slot_start_ns);
+        StreamSample { wish: self.wish.take().unwrap_or(sample.wish), ..sample }
     }
 
     fn service_frame(&mut self, _bus: usize) -> Option<Frame> {
@@ -151,7 +174,7 @@ impl Machine {
         Self {
             config,
             engine: assemble::engine(config).expect("the example is sound"),
-            hall: Hall::default(),
+            hall: Hall::new(config),
             drives: drive::drives(config),
             watch: Watch::new(config),
             targets: vec![None; config.axes.len()],
@@ -177,7 +200,7 @@ impl Machine {
             4 | 5 => {
                 let sweep = asking::Sweep::new(&self.engine, self.period_s(), input);
                 for cycle in sweep.cycles() {
-                    self.hall.stream = Some(sweep.command(cycle, self.now_ns()));
+                    self.hall.wish = Some(sweep.wish(cycle));
                     self.cycle(Disturbed::No);
                 }
             }
@@ -196,7 +219,11 @@ impl Machine {
                 let request = asking::request(self.config, self.now_ns(), input);
                 self.hall.requests.push_back(request);
             }
-            11 => self.hall.stream = Some(asking::stream(&self.engine, self.now_ns(), input)),
+            11 => {
+                let point = asking::point(&self.engine, self.now_ns(), input);
+                // One that is of no use is counted.
+                let _ = self.hall.points.insert(&point, self.now_ns());
+            }
             12 => {
                 let states =
                     [BusState::ErrorActive, BusState::ErrorPassive, BusState::BusOff, BusState::Down];
@@ -239,7 +266,7 @@ impl Machine {
                 let drive = usize::from(input.byte()) % self.drives.len();
                 self.drives[drive].is_late = !self.drives[drive].is_late;
             }
-            _ => self.hall.services.push_back(input.frame()),
+            _ => self.serve(input.frame()),
         }
     }
 
@@ -257,7 +284,13 @@ impl Machine {
             (0..self.buses.len()).for_each(|bus| held_back.insert(bus));
         }
         let asked = self.hall.asked;
-        let input = CycleInput { slot: self.slot, now_ns, buses: &self.buses, behind: held_back };
+        let input = CycleInput {
+            slot: self.slot,
+            slot_start_ns: now_ns,
+            now_ns,
+            buses: &self.buses,
+            behind: held_back,
+        };
         self.engine.compute(&input, &mut self.hall);
         let deadline = if disturbed == Disturbed::Late { Deadline::Missed } else { Deadline::Met };
         let mut sent = vec![SendBatch::new(); self.buses.len()];
@@ -296,6 +329,13 @@ impl Machine {
         }
         journey.taken += asked;
         journey.refused = self.hall.snapshot.rejected;
+    }
+
+    /// The host wants to send a frame: any one but process data, which are the engine's alone.
+    fn serve(&mut self, frame: Frame) {
+        if !self.drives.iter().any(|drive| drive.is_commanded_by(frame.id())) {
+            self.hall.services.push_back(frame);
+        }
     }
 
     /// SYNC, and what the drives say to it.

@@ -26,6 +26,8 @@ pub struct Watch {
     phase: Phase,
     is_retired: bool,
     refused: u64,
+    /// Cycles in which the set-points went on.
+    steps: u64,
     /// The reason of the last stop, as its event gave it.
     reported: Option<StopReason>,
     stopping_cycles: u32,
@@ -47,6 +49,7 @@ impl Watch {
             phase: Phase::Passive,
             is_retired: false,
             refused: 0,
+            steps: 0,
             reported: None,
             stopping_cycles: 0,
             stopping_at_most: (patience_s * 1e9 / config.cycle.period_ns as f64) as u32,
@@ -65,7 +68,7 @@ impl Watch {
         assert_eq!(self.phase, snapshot.phase);
         assert_eq!(self.refused, snapshot.rejected, "a rejection without an event");
         self.look_at_stop(snapshot, has_acted);
-        if has_acted {
+        if snapshot.steps != std::mem::replace(&mut self.steps, snapshot.steps) {
             self.look_at_set_points(engine);
         }
     }

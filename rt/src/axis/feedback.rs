@@ -95,14 +95,15 @@ impl Axis {
         self.reception.pass(elapsed_s);
     }
 
-    /// Begins a command phase with what has arrived. `elapsed_s` is the time since the last slot.
-    pub fn begin_cycle(&mut self, elapsed_s: f64) {
+    /// Begins a command phase with what has arrived. `elapsed_s` is the time since the last slot. Returns whether the feedback
+    /// of this cycle is complete.
+    pub fn begin_cycle(&mut self, elapsed_s: f64) -> bool {
         self.reception.pass(elapsed_s);
         if !self.late_reply.pass(self.reception.has_any()) {
-            return;
+            return false;
         }
         let pdos = self.parameters.feedback.len();
-        let Some(span) = self.reception.complete(pdos, self.parameters.feedback_since) else { return };
+        let Some(span) = self.reception.complete(pdos, self.parameters.feedback_since) else { return false };
         let scale = &self.parameters.scale;
         let counts = self.feedback.feedback(FeedbackSlot::Position);
         let velocity = self
@@ -117,6 +118,7 @@ impl Axis {
         }
         let behind = self.set_points.due().position - self.joint.position();
         self.following.set_error(if self.is_profile() { 0.0 } else { behind });
+        true
     }
 
     /// Takes the position that the drive has reported by SDO, unless it reports by process data.
@@ -130,12 +132,22 @@ impl Axis {
         self.parameters.feedback.iter().any(|pdo| pdo.mapping.carries(slot))
     }
 
+    /// The last value of an object that the drive reports; `None` if it does not report it, or has not reported yet.
+    fn reported(&self, slot: FeedbackSlot) -> Option<i32> {
+        (self.is_heard() && self.reports(slot)).then(|| self.feedback.feedback(slot))
+    }
+
     /// Whether the drive has reported at all.
     pub fn is_heard(&self) -> bool {
         self.joint.is_heard()
     }
 
-    /// Cycles of the bus since the drive last reported in time.
+    /// Cycles of the bus since the drive last reported in time, with those in which it was not asked.
+    pub fn cycles_since_report(&self) -> u16 {
+        self.reception.cycles_since_report()
+    }
+
+    /// Cycles of the bus in which the drive was asked and did not report in time, since its last report.
     pub fn feedback_age(&self) -> u16 {
         self.reception.age_cycles()
     }
@@ -168,10 +180,23 @@ impl Axis {
     /// The mode of operation (object 6061) that the drive shows, if it differs from ours. A drive that has not reported yet
     /// shows none.
     pub fn foreign_mode(&self) -> Option<i8> {
-        let is_shown = self.is_heard() && self.reports(FeedbackSlot::OperationModeDisplay);
-        let shown = self.feedback.feedback(FeedbackSlot::OperationModeDisplay) as i8;
         let ours = self.parameters.law.operation_mode() as i8;
-        (is_shown && shown != ours).then_some(shown)
+        self.mode().filter(|shown| *shown != ours)
+    }
+
+    /// The mode of operation (object 6061) that the drive shows, if it reports it.
+    pub fn mode(&self) -> Option<i8> {
+        self.reported(FeedbackSlot::OperationModeDisplay).map(|mode| mode as i8)
+    }
+
+    /// The torque (N·m or N) that the drive reports in object 6077, if it does.
+    pub fn torque(&self) -> Option<f64> {
+        self.reported(FeedbackSlot::Torque).map(|torque| self.parameters.scale.torque_from_per_mille(torque))
+    }
+
+    /// The current that the drive reports in object 6078, in thousandths of the rated current, if it does.
+    pub fn current_per_mille(&self) -> Option<i16> {
+        self.reported(FeedbackSlot::Current).map(|current| current as i16)
     }
 
     /// The actual position (rad or m): the last plausible one.

@@ -40,6 +40,7 @@ use arrayvec::ArrayVec;
 
 use crate::cia402::DriveState;
 use crate::guard::FollowingErrorGuard;
+use crate::host::AxisSnapshot;
 use crate::pdo::{CommandSlot, FeedbackSlot, MAX_PDOS, ProcessImage};
 use crate::record::AxisRecord;
 use crate::watch::{DuplicateNodeDetector, NodeMonitor};
@@ -53,7 +54,6 @@ use profile_mode::ProfileMode;
 use reception::Reception;
 use sdo_fallback::SdoFallback;
 use set_points::SetPoints;
-use stream::StreamFollower;
 
 pub use feedback::Jump;
 pub use parameters::{AxisParameters, AxisParametersError, CommandPdo, FeedbackSince, Pdo};
@@ -69,7 +69,8 @@ pub struct Axis {
     command: ProcessImage,
     feedback: ProcessImage,
     set_points: SetPoints,
-    stream: StreamFollower,
+    /// Where the axis rests while a stream has run dry.
+    stream_rest: f64,
     profile: ProfileMode,
     joint: JointEstimate,
     following: FollowingErrorGuard,
@@ -99,7 +100,7 @@ impl Axis {
             command,
             feedback: ProcessImage::default(),
             set_points: SetPoints::default(),
-            stream: StreamFollower::default(),
+            stream_rest: 0.0,
             profile: ProfileMode::default(),
             joint: JointEstimate::default(),
             following,
@@ -216,6 +217,30 @@ impl Axis {
         self.drive_state() == DriveState::OperationEnabled && self.power != Power::LatchedOff
     }
 
+    /// Shows the state to observers. `shown` keeps when the drive reported last.
+    pub(crate) fn show(&self, shown: &mut AxisSnapshot) {
+        let set_point = self.set_point();
+        *shown = AxisSnapshot {
+            position_set: set_point.position,
+            velocity_set: set_point.velocity,
+            torque_set: self.torque_set,
+            position: self.joint.position(),
+            velocity: self.joint.velocity(),
+            following_error: self.following.error(),
+            torque: self.torque(),
+            current_per_mille: self.current_per_mille(),
+            mode: self.mode(),
+            statusword: self.statusword(),
+            drive_state: self.drive_state(),
+            error_code: self.error_code(),
+            is_heard: self.is_heard(),
+            unanswered: self.unanswered(),
+            feedback_age: self.cycles_since_report(),
+            feedback_slot: shown.feedback_slot,
+            feedback_ns: shown.feedback_ns,
+        };
+    }
+
     /// What this cycle leaves behind.
     pub fn record(&self, period_s: f64, record: &mut AxisRecord) {
         let torque = self.feedback.feedback(FeedbackSlot::Torque);
@@ -234,7 +259,7 @@ impl Axis {
             controlword: self.controlword(),
             statusword: self.statusword(),
             error_code: self.error_code(),
-            feedback_age: self.feedback_age(),
+            feedback_age: self.cycles_since_report(),
             command_raw: self.command.command(self.parameters.law.target_slot()),
             position_raw: self.feedback.feedback(FeedbackSlot::Position),
         };

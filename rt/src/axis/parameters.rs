@@ -5,8 +5,9 @@ use arrayvec::ArrayVec;
 use crate::control::{ControlLaw, GainError};
 use crate::dialect::Dialect;
 use crate::frame::Id;
-use crate::guard::{AxisLimits, LimitError, OnViolation};
+use crate::guard::{AxisLimits, LimitError};
 use crate::pdo::{MAX_PDOS, Mapping, TransmissionType};
+use crate::source::Follow;
 use crate::units::Scale;
 
 /// A PDO: its identifier and its compiled mapping.
@@ -74,10 +75,10 @@ pub struct AxisParameters {
     pub scale: Scale,
     /// What it may never be asked to do.
     pub limits: AxisLimits,
-    /// How far from the joint a stream may begin (rad or m).
+    /// How far from the joint a stream that is followed exactly may begin (rad or m).
     pub start_tolerance: f64,
-    /// What is done with set-points of a stream that break a limit.
-    pub on_violation: OnViolation,
+    /// What is done with a stream that asks for more than the limits allow.
+    pub follow: Follow,
     /// Slots without a heartbeat of the node that are allowed; `None` where it sends none.
     pub heartbeat_timeout_cycles: Option<u32>,
     /// Following error that is allowed at any time (rad or m).
@@ -161,13 +162,13 @@ impl AxisParameters {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::pdo::MappedObject;
     use crate::units::ScaleParameters;
     use core::f64::consts::TAU;
 
-    fn parameters() -> AxisParameters {
+    pub fn parameters() -> AxisParameters {
         let pdo = |id, objects: &[MappedObject], compile: fn(&[MappedObject]) -> Result<Mapping, _>| Pdo {
             id,
             mapping: compile(objects).unwrap(),
@@ -204,7 +205,7 @@ mod tests {
                 torque: 40.0,
             },
             start_tolerance: 0.01,
-            on_violation: OnViolation::Reject,
+            follow: Follow::Smooth,
             heartbeat_timeout_cycles: None,
             following_error_limit: 0.1,
             following_error_cycles: 10,

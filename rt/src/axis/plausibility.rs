@@ -56,11 +56,13 @@ impl PlausibilityCheck {
             self.accept(reported);
             return Plausibility::Plausible { velocity: 0.0 };
         };
-        let sources = [Some((accepted, self.accepted_s)), self.rejected.map(|from| (from, elapsed_s))];
-        let source = sources
-            .into_iter()
-            .flatten()
-            .find(|(from, seconds)| (reported - from).abs() <= bound.within(*seconds));
+        let is_reached = |from: f64, seconds: f64| (reported - from).abs() <= bound.within(seconds);
+        let source = if is_reached(accepted, self.accepted_s) {
+            Some((accepted, self.accepted_s))
+        } else {
+            let rejected = self.rejected.map(|from| (from, elapsed_s));
+            rejected.filter(|(from, seconds)| is_reached(*from, *seconds))
+        };
         match source {
             Some((from, seconds)) => {
                 self.accept(reported);

@@ -113,7 +113,14 @@ impl Reception {
         }
     }
 
-    /// Cycles of the bus since the last complete feedback.
+    /// Cycles of the bus since the last complete feedback, with those in which none was asked for.
+    pub(super) fn cycles_since_report(&self) -> u16 {
+        // The sum of many periods may be a little less than their multiple.
+        const ROUNDING: f64 = 1e-6;
+        (self.span_s / self.cycle_s + ROUNDING) as u16
+    }
+
+    /// Cycles of the bus since the last complete feedback, in which it was asked for.
     pub(super) const fn age_cycles(&self) -> u16 {
         self.age_cycles
     }

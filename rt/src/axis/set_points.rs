@@ -6,6 +6,7 @@ use super::power::Power;
 use crate::fault::Fault;
 use crate::guard::{self, SetPointSteps};
 use crate::plan::State;
+use crate::source::Follow;
 
 /// The set-points of an axis, on their way from the source to the drive.
 #[derive(Clone, Debug, Default)]
@@ -86,17 +87,17 @@ impl Axis {
         self.set_points.newest()
     }
 
-    /// Gives the newest set-point the velocity and the acceleration that its steps show. Used when a stream ends: what it said
-    /// of its velocity may be wrong, where it has led is known. Whatever is planned from now on goes on from that.
+    /// Gives the newest set-point the velocity and the acceleration that its steps show, where a stream was followed exactly:
+    /// what it said of its velocity may be wrong, where it has led is known. Whatever is planned from now on goes on from that.
     pub fn derive_from_steps(&mut self, period_s: f64) {
-        if self.is_profile() {
+        if self.is_profile() || self.parameters.follow == Follow::Smooth {
             return;
         }
         self.set_points.refine_newest(self.state_by_steps(period_s));
     }
 
     /// The state of the newest set-point, as the steps to it show it.
-    pub(super) fn state_by_steps(&self, period_s: f64) -> State {
+    fn state_by_steps(&self, period_s: f64) -> State {
         let [newest, last, before] = self.set_points.positions();
         let steps = SetPointSteps { sent: [last, before, before], next: newest, period_s };
         steps.state(&self.parameters.limits)
@@ -133,16 +134,22 @@ impl Axis {
         }
     }
 
-    /// Slows the set-point down as fast as the limits of velocity, acceleration and position allow, whatever the jerk, and
-    /// leaves it where it stands: for a motion that no planned stop ends. A set-point that just stayed would be a leap.
+    /// Slows the set-point down by its deceleration limit, whatever the jerk, and leaves it where it stands: for a motion that no
+    /// planned stop ends. A set-point that just stayed would leap to a standstill.
     pub fn slow_down(&mut self, period_s: f64) {
         let [last, before_last, _] = self.set_points.positions();
         if !self.is_enabled() || last == before_last {
             return self.stay();
         }
-        let wish_to_stop = State::rest(f64::NAN);
-        let next = guard::clamp(&self.parameters.limits, &self.steps(&wish_to_stop, period_s));
-        self.advance(next);
+        let most = self.parameters.limits.deceleration * period_s;
+        let last_velocity = (last - before_last) / period_s;
+        let change = -last_velocity.clamp(-most, most);
+        let velocity = last_velocity + change;
+        self.advance(State {
+            position: last + velocity * period_s,
+            velocity,
+            acceleration: change / period_s,
+        });
     }
 
     /// Whether the set-point is where the joint is, but for one step within the limits.
@@ -167,12 +174,6 @@ impl Axis {
         let limits = &self.parameters.limits;
         guard::check_jerk(limits.jerk, &self.steps(next, period_s))?;
         guard::check_braking(limits, &self.steps(next, period_s))
-    }
-
-    /// The set-point within the limits that is nearest to one of a stream.
-    pub fn clamped(&mut self, next: &State, period_s: f64) -> State {
-        self.follow_commands();
-        guard::clamp(&self.parameters.limits, &self.steps(next, period_s))
     }
 
     /// A set-point of a stream, of which the position counts: what it says of its velocity and acceleration is fed forward
@@ -218,5 +219,40 @@ impl Axis {
     pub fn advance(&mut self, next: State) {
         let next = if self.is_profile() { self.shown_set_point() } else { next };
         self.set_points.push(next);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::parameters::tests::parameters;
+    use super::*;
+    use crate::frame::{Frame, Id};
+
+    const PERIOD_S: f64 = 1e-3;
+
+    #[test]
+    fn a_set_point_that_no_planned_stop_ends_slows_down_within_its_limit_and_stays() {
+        let limits = parameters().limits;
+        for direction in [1.0, -1.0] {
+            let mut axis = Axis::new(0, parameters());
+            axis.set_cycle(PERIOD_S);
+            axis.request_feedback(0);
+            axis.receive(0, &Frame::of(Id::canopen(0x180, 5), [0x37, 0x02]), 1).unwrap();
+            axis.begin_cycle(PERIOD_S);
+            assert!(axis.is_enabled());
+            let step = direction * limits.velocity * PERIOD_S;
+            (0..3).for_each(|cycle| axis.advance(State::rest(f64::from(cycle) * step)));
+            let (mut last, mut last_step) = (axis.set_point().position, step);
+            for _ in 0..300 {
+                axis.slow_down(PERIOD_S);
+                let here = axis.set_point().position;
+                let acceleration = (here - last - last_step) / (PERIOD_S * PERIOD_S);
+                assert!(acceleration.abs() <= limits.deceleration * (1.0 + 1e-6), "{acceleration}");
+                (last, last_step) = (here, here - last);
+            }
+            assert_eq!((last_step, axis.set_point().velocity), (0.0, 0.0));
+            let way = direction * limits.velocity * limits.velocity / (2.0 * limits.deceleration);
+            assert!((last - 2.0 * step - way).abs() < 2e-3, "{last}");
+        }
     }
 }

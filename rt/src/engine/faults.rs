@@ -181,7 +181,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
     /// Whether a stop has something to bring to rest. A joint in profile torque may begin to move by itself.
     pub(super) fn is_under_way(&self) -> bool {
         match self.group.state {
-            GroupState::Moving { .. } | GroupState::Streaming(_) => true,
+            GroupState::Moving { .. } | GroupState::Executing(_) | GroupState::Streaming(_) => true,
             GroupState::Holding => self.axes.iter().any(Axis::is_coasting),
             _ => false,
         }

@@ -9,6 +9,7 @@ use crate::axis::Axis;
 use crate::bus_set::BusSet;
 use crate::group_trajectory::{GroupTrajectory, Profiles};
 use crate::record::EventKind;
+use crate::source::StreamSample;
 use crate::stop::StopReason;
 
 /// What belongs to one group.
@@ -19,6 +20,8 @@ pub(super) struct Group<const AXES: usize, const BUSES: usize> {
     /// The buses that concern it.
     pub(super) buses: BusSet,
     pub(super) state: GroupState<AXES>,
+    /// What its stream wants in this slot, while it streams.
+    pub(super) stream: StreamSample<AXES>,
     /// Cycles since the state was entered.
     pub(super) state_cycles: u32,
     /// What is planned, while the group moves or stops.
@@ -47,6 +50,7 @@ impl<const AXES: usize, const BUSES: usize> Group<AXES, BUSES> {
             places,
             buses,
             state: GroupState::Passive,
+            stream: StreamSample::default(),
             state_cycles: 0,
             motion: GroupTrajectory::default(),
             stop: None,
@@ -60,6 +64,7 @@ impl<const AXES: usize, const BUSES: usize> Group<AXES, BUSES> {
     pub(super) fn remaining_s(&self) -> f64 {
         match self.state {
             GroupState::Moving { .. } | GroupState::Stopping => self.motion.remaining_s(),
+            GroupState::Executing(execution) => execution.wanted.map_or(0.0, |wanted| wanted.remaining_s),
             _ => 0.0,
         }
     }

@@ -14,6 +14,7 @@ use crate::plan::{PlanError, State};
 use crate::profile::ProfileTarget;
 use crate::record::EventKind;
 use crate::request::{Move, ProfileMove, RejectReason, Request, RequestId};
+use crate::source::StreamSample;
 use crate::stop::{Origin, StopCause};
 use crate::stop_category::StopCategory;
 use crate::time::Nanoseconds;
@@ -31,19 +32,20 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
             Request::Stop(category) => self.begin_stop(StopCause::Requested, Origin::Group, *category),
             Request::Disable => self.begin_disabling()?,
             Request::ResetFaults => self.reset_faults()?,
-            // The engine has handled what concerns all groups.
+            // The engine has handled what concerns all groups, or the host.
             Request::Sync(_)
             | Request::TimeOfDay { .. }
             | Request::RatedTorque { .. }
             | Request::ProcessData(_)
             | Request::Position { .. }
+            | Request::Execute { .. }
             | Request::InhibitEnable
             | Request::Shutdown => {}
         }
         Ok(())
     }
 
-    fn require_phase(&self, possible: &[Phase]) -> Handled {
+    pub(super) fn require_phase(&self, possible: &[Phase]) -> Handled {
         require_phase(self.group.state.phase(), possible)
     }
 
@@ -53,7 +55,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
     }
 
     /// A fault that has stopped the group must be reset before anything moves.
-    fn require_no_fault(&self) -> Handled {
+    pub(super) fn require_no_fault(&self) -> Handled {
         match self.group.stop.filter(|stop| !stop.is_requested()) {
             Some(stop) => {
                 Err(Rejection { reason: RejectReason::StopLatched { rule: stop.rule() }, axis: stop.axis() })
@@ -102,8 +104,8 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
             return Err(RejectReason::MissedSlots { missed, limit: self.shared.slots.degraded() }.into());
         }
         self.group.stop = None;
-        self.axes.iter_mut().for_each(Axis::begin_stream);
-        self.enter(GroupState::Streaming(Stream::Awaited));
+        self.group.stream = StreamSample::default();
+        self.enter(GroupState::Streaming(Stream::Requested));
         Ok(())
     }
 
@@ -176,6 +178,9 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
 
     fn set_profile_target(&mut self, id: RequestId, wanted: &ProfileMove) -> Handled {
         self.require_phase(&[Phase::Holding, Phase::Moving])?;
+        if matches!(self.group.state, GroupState::Executing(_)) {
+            return Err(RejectReason::Phase.into());
+        }
         self.require_no_fault()?;
         check_profile_target(self.axis_mut(wanted.axis)?, wanted.target)
             .map_err(|reason| reason.of_axis(wanted.axis))?;

@@ -11,13 +11,15 @@
 //! - `requests` handles what was asked for, `group_requests` what was asked of a group; `targets` checks the targets;
 //!   `process_data` exchanges mappings;
 //! - `faults` looks for the first thing that is wrong, and begins stops;
-//! - `step` makes the next set-points of the phase that the group is in (`state` has the table of phases);
+//! - `step` makes the next set-points of the phase that the group is in (`state` has the table of phases), `streaming` those
+//!   of a stream, `executing` those of a trajectory;
 //! - `encode` makes frames of them, and decides what may leave; `sdo_fallback` stops drives that PDOs do not reach.
 //!
 //! Events wait in an outbox until [`Engine::finish`] hands them to the host.
 
 mod backlog;
 mod encode;
+mod executing;
 mod faults;
 mod group;
 mod group_requests;
@@ -32,6 +34,7 @@ mod shared;
 mod slots;
 mod state;
 mod step;
+mod streaming;
 mod targets;
 mod unsent_steps;
 
@@ -42,7 +45,7 @@ use crate::bus_set::BusSet;
 use crate::dispatch::Dispatch;
 use crate::frame::Frame;
 use crate::group_trajectory::ProfileStore;
-use crate::host::{AxisSnapshot, HostInterface};
+use crate::host::HostInterface;
 use crate::phase::Phase;
 use crate::port::BusHealth;
 use crate::record::{CycleTiming, EventKind, MAX_AXES, MAX_BUSES, MAX_GROUPS};
@@ -65,6 +68,8 @@ pub type SendBatch = ArrayVec<Frame, SEND_BATCH>;
 pub struct CycleInput<'a> {
     /// The slot.
     pub slot: u64,
+    /// Its start on the grid: the time that its set-points stand for.
+    pub slot_start_ns: Nanoseconds,
     /// The time.
     pub now_ns: Nanoseconds,
     /// The state of each bus.
@@ -141,7 +146,7 @@ pub enum Deadline {
 ///         torque: 40.0,
 ///     },
 ///     start_tolerance: 0.02,
-///     on_violation: OnViolation::Reject,
+///     follow: Follow::Smooth,
 ///     heartbeat_timeout_cycles: None,
 ///     following_error_limit: 0.1,
 ///     following_error_cycles: 50,
@@ -180,7 +185,7 @@ pub enum Deadline {
 ///         engine.receive(0, &Received { frame, at_ns: now_ns });
 ///     }
 ///     let buses = [BusHealth::default()];
-///     engine.compute(&CycleInput { slot, now_ns, buses: &buses, behind: BusSet::default() }, &mut host);
+///     engine.compute(&CycleInput { slot, slot_start_ns: now_ns, now_ns, buses: &buses, behind: BusSet::default() }, &mut host);
 ///     let mut batch = SendBatch::new();
 ///     engine.encode(0, Deadline::Met, &mut host, &mut batch);
 ///     // It obeys the controlword, the first two bytes of its command.
@@ -250,7 +255,9 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
     pub fn compute(&mut self, input: &CycleInput<'_>, host: &mut impl HostInterface<AXES, BUSES>) {
         self.sense(input);
         self.handle_requests(host);
+        self.sample_streams(input.slot_start_ns, host);
         self.check_faults(input.buses);
+        self.sample_trajectories(host);
         self.for_each_group(|group| {
             group.step();
             group.update_sdo_fallback();
@@ -317,21 +324,13 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         snapshot.timing = shared.slots.level();
         snapshot.dropped = shared.dropped;
         if let Some(group) = self.groups.first() {
+            snapshot.stream = group.stream_report();
             snapshot.phase = group.state.phase();
             snapshot.remaining_s = group.remaining_s();
             snapshot.stop = group.stop;
         }
         for (axis, shown) in self.axes.iter().zip(&mut snapshot.axes) {
-            *shown = AxisSnapshot {
-                position_set: axis.set_point().position,
-                position: axis.position(),
-                velocity: axis.velocity(),
-                statusword: axis.statusword(),
-                drive_state: axis.drive_state(),
-                error_code: axis.error_code(),
-                is_heard: axis.is_heard(),
-                unanswered: axis.unanswered(),
-            };
+            axis.show(shown);
         }
         for (shown, health) in snapshot.buses.iter_mut().zip(buses) {
             *shown = *health;

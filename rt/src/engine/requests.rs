@@ -2,7 +2,6 @@
 
 use super::Engine;
 use super::shared::Ending;
-use super::state::GroupState;
 use super::targets::Rejection;
 use crate::axis::Axis;
 use crate::host::HostInterface;
@@ -23,25 +22,18 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
     pub(super) fn handle_requests(&mut self, host: &mut impl HostInterface<AXES, BUSES>) {
         for _ in 0..REQUESTS_PER_CYCLE {
             let Some(envelope) = host.request() else { break };
-            self.handle_request(&envelope);
-        }
-        let now_ns = self.shared.now_ns;
-        for group in &mut self.groups {
-            if let GroupState::Streaming(stream) = &mut group.state
-                && let Some(command) = host.stream()
-            {
-                stream.receive(command, now_ns);
-            }
+            self.handle_request(&envelope, host);
         }
     }
 
-    fn handle_request(&mut self, envelope: &RequestEnvelope<AXES>) {
+    fn handle_request(
+        &mut self,
+        envelope: &RequestEnvelope<AXES>,
+        host: &mut impl HostInterface<AXES, BUSES>,
+    ) {
         let RequestEnvelope { id, request } = envelope;
-        let rejected = self.try_request(*id, request).err().map(|Rejection { reason, axis }| RequestError {
-            request: request.kind(),
-            reason,
-            axis,
-            phase: self.phase(),
+        let rejected = self.try_request(*id, request, host).err().map(|Rejection { reason, axis }| {
+            RequestError { request: request.kind(), reason, axis, phase: self.phase() }
         });
         self.shared.snapshot.answers.note(*id, rejected);
         if let Some(rejected) = rejected {
@@ -50,7 +42,12 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         }
     }
 
-    fn try_request(&mut self, id: RequestId, request: &Request<AXES>) -> Handled {
+    fn try_request(
+        &mut self,
+        id: RequestId,
+        request: &Request<AXES>,
+        host: &mut impl HostInterface<AXES, BUSES>,
+    ) -> Handled {
         match request {
             Request::Sync(is_on) => {
                 if *is_on && !self.shared.requested.sync {
@@ -73,6 +70,10 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
             | Request::Disable
             | Request::ResetFaults => {
                 self.group(FIRST).map_or(Ok(()), |mut group| group.try_request(id, request))?;
+            }
+            Request::Execute { trajectory, start } => {
+                let (group, execution) = (self.group(FIRST), (*trajectory, *start));
+                group.map_or(Ok(()), |mut group| group.begin_execution(FIRST, id, execution, host))?;
             }
             Request::InhibitEnable => {
                 self.shared.requested.ending = self.shared.requested.ending.max(Ending::EnableInhibited)

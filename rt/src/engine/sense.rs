@@ -1,6 +1,7 @@
 //! What the cycle begins with: the slot, the frames that have arrived, and what the drives report by them.
 
-use super::{CycleInput, Deadline, Engine};
+use super::shared::Shared;
+use super::{CycleInput, Deadline, Engine, has_cycle};
 use crate::axis::{Axis, FeedbackSince};
 use crate::dispatch::Destination;
 use crate::frame::Frame;
@@ -92,13 +93,17 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         self.shared.backlog.pass(input.behind, self.shared.buses_in_cycle(input.slot));
         let elapsed_s = self.shared.period_s * elapsed as f64;
         let asked_by_sync = core::mem::take(&mut self.shared.asked_by_sync);
-        for axis in &mut self.axes {
+        let Shared { snapshot, buses, requested, .. } = &mut self.shared;
+        for (axis, shown) in self.axes.iter_mut().zip(&mut snapshot.axes) {
             // A drive that was not asked, because the thread was late or the bus behind, has not missed its answer.
-            let is_unasked = self.shared.requested.sync
+            let is_unasked = requested.sync
                 && axis.parameters().feedback_since == FeedbackSince::Sync
                 && !asked_by_sync.contains(axis.parameters().bus.into());
-            if self.shared.has_cycle_of(axis, input.slot) && !is_unasked {
-                axis.begin_cycle(elapsed_s);
+            let bus = buses.get(usize::from(axis.parameters().bus));
+            if bus.is_some_and(|bus| has_cycle(bus, input.slot)) && !is_unasked {
+                if axis.begin_cycle(elapsed_s) {
+                    (shown.feedback_slot, shown.feedback_ns) = (input.slot, input.now_ns);
+                }
                 if axis.parameters().feedback_since != FeedbackSince::Sync {
                     axis.expect_feedback(input.now_ns);
                 }

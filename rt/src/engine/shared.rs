@@ -126,11 +126,6 @@ impl<const AXES: usize, const BUSES: usize> Shared<AXES, BUSES> {
         in_cycle
     }
 
-    /// Whether the bus of an axis has SYNC, feedback and set-points in this slot.
-    pub(super) fn has_cycle_of(&self, axis: &Axis, slot: u64) -> bool {
-        self.buses.get(usize::from(axis.parameters().bus)).is_some_and(|bus| has_cycle(bus, slot))
-    }
-
     /// The motions in progress have reached their targets.
     pub(super) fn finish_motions(&mut self) {
         let (slot, at_ns, events) = (self.present_slot(), self.now_ns, &mut self.events);

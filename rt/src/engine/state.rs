@@ -7,7 +7,7 @@
 //! Disabled   Request::Enable                                                         Enabling
 //! Enabling   every drive shows operation enabled                                     Holding
 //!            a stop, Request::Disable                                                Disabling
-//! Holding    Request::Move, Request::SetProfileTarget                                Moving
+//! Holding    Request::Move, Request::SetProfileTarget, Request::Execute              Moving
 //!            Request::Stream                                                         Streaming
 //!            Request::Disable, a stop of category 1 or 0                             Stopping, Disabling
 //! Moving     the targets are reached                                                 Holding
@@ -20,8 +20,8 @@
 //!
 //! A number in brackets is a stop category of IEC 60204-1.
 
+use super::executing::Execution;
 use crate::cia402::Goal;
-use crate::host::StreamCommand;
 use crate::phase::Phase;
 
 /// What the group is doing.
@@ -35,22 +35,24 @@ pub(super) enum GroupState<const AXES: usize> {
         /// Whether the end of the motion has been reported; a velocity or a torque goes on after that.
         is_reported: bool,
     },
-    Streaming(Stream<AXES>),
+    /// On a trajectory of the host.
+    Executing(Execution<AXES>),
+    Streaming(Stream),
     Stopping,
     Disabling(PowerRemoval),
 }
 
-/// What a stream has brought so far.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Stream<const AXES: usize> {
-    /// No command yet: the set-points stay.
+/// How far a stream has come.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Stream {
+    /// It was asked for, and the host has yet to be told.
+    Requested,
+    /// No point has come yet: the set-points stay.
     Awaited,
-    /// The first command has come, and has yet to be checked against where the joints are.
-    Begins(StreamCommand<AXES>),
-    /// A command has come, and has yet to be made set-points of.
-    Follows(StreamCommand<AXES>),
-    /// No newer command has come than this one: the motion of the stream goes on, up to its expiry.
-    Continues(StreamCommand<AXES>),
+    /// The axes follow the points.
+    Following,
+    /// The points have run out: the axes come to rest.
+    Dry,
 }
 
 /// How the power is taken.
@@ -70,7 +72,7 @@ impl<const AXES: usize> GroupState<AXES> {
             Self::Disabled => Phase::Disabled,
             Self::Enabling => Phase::Enabling,
             Self::Holding => Phase::Holding,
-            Self::Moving { .. } => Phase::Moving,
+            Self::Moving { .. } | Self::Executing(_) => Phase::Moving,
             Self::Streaming(_) => Phase::Streaming,
             Self::Stopping => Phase::Stopping,
             Self::Disabling(_) => Phase::Disabling,
@@ -82,9 +84,12 @@ impl<const AXES: usize> GroupState<AXES> {
         match self {
             Self::Passive | Self::Disabled | Self::Disabling(PowerRemoval::Shutdown) => Goal::Disabled,
             Self::Disabling(PowerRemoval::DisableVoltage) => Goal::NoVoltage,
-            Self::Enabling | Self::Holding | Self::Moving { .. } | Self::Streaming(_) | Self::Stopping => {
-                Goal::Enabled
-            }
+            Self::Enabling
+            | Self::Holding
+            | Self::Moving { .. }
+            | Self::Executing(_)
+            | Self::Streaming(_)
+            | Self::Stopping => Goal::Enabled,
         }
     }
 

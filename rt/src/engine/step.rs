@@ -6,15 +6,12 @@
 use arrayvec::ArrayVec;
 
 use super::group::{Commands, GroupContext};
-use super::state::{GroupState, PowerRemoval, Stream};
+use super::state::{GroupState, PowerRemoval};
 use crate::axis::{Axis, FeedbackSince};
 use crate::fault::Fault;
-use crate::guard::OnViolation;
-use crate::host::StreamCommand;
 use crate::plan::State;
 use crate::stop::{Origin, StopCause};
 use crate::stop_category::StopCategory;
-use crate::time::Nanoseconds;
 
 /// Cycles from one probe for late drives to the next: their silence must have been received.
 const PROBE_AGAIN_CYCLES: u32 = 64;
@@ -24,18 +21,7 @@ const CATCHING_UP_S: f64 = 0.5;
 const ATTEMPTS: usize = 3;
 
 /// The first thing that keeps a step from being made.
-type Failure = (Origin, Fault);
-
-impl<const AXES: usize> Stream<AXES> {
-    /// Takes the newest command. One that has expired before the stream begins is none.
-    pub(super) fn receive(&mut self, command: StreamCommand<AXES>, now_ns: Nanoseconds) {
-        *self = match self {
-            Self::Awaited if command.valid_until_ns < now_ns => Self::Awaited,
-            Self::Awaited | Self::Begins(_) => Self::Begins(command),
-            Self::Follows(_) | Self::Continues(_) => Self::Follows(command),
-        };
-    }
-}
+pub(super) type Failure = (Origin, Fault);
 
 impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
     /// Makes the next set-points, unless those of the last cycles have still to leave, or every bus is behind.
@@ -76,6 +62,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
             GroupState::Disabled | GroupState::Holding => self.hold(),
             GroupState::Enabling => self.step_enabling(),
             GroupState::Moving { is_reported } => self.step_move(is_reported)?,
+            GroupState::Executing(execution) => self.step_execution(&execution)?,
             GroupState::Streaming(stream) => self.step_stream(stream)?,
             GroupState::Stopping => self.step_stop()?,
             GroupState::Disabling(_) => {
@@ -87,7 +74,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
     }
 
     /// Enabled axes stay on their set-point; the set-point of the others follows them.
-    fn hold(&mut self) {
+    pub(super) fn hold(&mut self) {
         for axis in self.axes.iter_mut() {
             if axis.is_enabled() { axis.stay() } else { axis.follow_actual(self.shared.period_s) }
         }
@@ -191,12 +178,12 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
         self.group.motion.states(&self.profiles).collect()
     }
 
-    fn check(&self, next: &[State]) -> Result<(), Failure> {
+    pub(super) fn check(&self, next: &[State]) -> Result<(), Failure> {
         self.first_fault(next, |axis, state| axis.check(state, self.shared.period_s))
     }
 
     /// The first axis that follows set-points and whose next one does not pass a check.
-    fn first_fault(
+    pub(super) fn first_fault(
         &self,
         next: &[State],
         check: impl Fn(&Axis, &State) -> Result<(), Fault>,
@@ -209,7 +196,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
         Ok(())
     }
 
-    fn take_set_points(&mut self, next: &[State]) {
+    pub(super) fn take_set_points(&mut self, next: &[State]) {
         for (axis, state) in self.axes.iter_mut().zip(next) {
             if axis.is_enabled() { axis.advance(*state) } else { axis.stay() }
         }
@@ -256,63 +243,6 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
         self.group.motion.cancel();
         self.axes.iter_mut().for_each(Axis::release_latch);
         self.enter(GroupState::Disabled);
-    }
-
-    fn step_stream(&mut self, stream: Stream<AXES>) -> Result<(), Failure> {
-        let (command, is_new) = match stream {
-            Stream::Awaited => return self.await_stream(),
-            Stream::Begins(command) | Stream::Follows(command) => (command, true),
-            Stream::Continues(command) => (command, false),
-        };
-        if self.shared.now_ns > command.valid_until_ns {
-            let age_cycles = (self.shared.now_ns - command.valid_until_ns).div_ceil(self.shared.period_ns);
-            return Err((Origin::Group, Fault::StaleCommand { age_cycles }));
-        }
-        if matches!(stream, Stream::Begins(_)) {
-            let first: ArrayVec<State, AXES> =
-                self.axes.iter().map(|axis| axis.own(&command.set_points)).collect();
-            self.first_fault(&first, Axis::check_start)?;
-        }
-        let next = self.streamed(&command.set_points, is_new)?;
-        self.check(&next)?;
-        self.take_set_points(&next);
-        self.group.state = GroupState::Streaming(Stream::Continues(command));
-        Ok(())
-    }
-
-    fn await_stream(&mut self) -> Result<(), Failure> {
-        let (cycles, limit) = (self.group.state_cycles, self.shared.enable_timeout_cycles);
-        if cycles > limit {
-            return Err((Origin::Group, Fault::StreamNotBegun { cycles, limit }));
-        }
-        self.hold();
-        self.axes.iter_mut().for_each(Axis::await_stream);
-        Ok(())
-    }
-
-    /// The next set-points of a stream, each within all limits.
-    fn streamed(&mut self, commands: &[State], are_new: bool) -> Result<ArrayVec<State, AXES>, Failure> {
-        let period_s = self.shared.period_s;
-        let mut next: ArrayVec<State, AXES> = ArrayVec::new();
-        for axis in self.axes.iter_mut() {
-            let command = &axis.own(commands);
-            if !axis.is_enabled() || axis.is_profile() {
-                next.push(*command);
-                continue;
-            }
-            let streamed = axis.streamed(are_new.then_some(command), period_s);
-            next.push(match (streamed, axis.parameters().on_violation) {
-                (Ok(set_point), _) => set_point,
-                (Err(_), OnViolation::Clamp) => {
-                    self.shared.snapshot.clamped += 1;
-                    axis.clamped(command, period_s)
-                }
-                (Err(fault), OnViolation::Reject) => {
-                    return Err((Origin::Axis(axis.number()), fault));
-                }
-            });
-        }
-        Ok(next)
     }
 }
 

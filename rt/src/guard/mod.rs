@@ -1,6 +1,5 @@
 //! The guard: the last check of every set-point, whatever its source, before it becomes a frame.
 
-mod commands;
 mod following_error;
 #[cfg(test)]
 mod planned;
@@ -10,10 +9,9 @@ mod stream;
 use crate::fault::Fault;
 use crate::plan::State;
 
-pub use commands::StreamCommands;
 pub use following_error::FollowingErrorGuard;
-pub use stopping_bound::{braking_distance, keeps_velocity};
-pub use stream::{OnViolation, SetPointSteps, check_braking, check_jerk, clamp};
+pub use stopping_bound::braking_distance;
+pub use stream::{SetPointSteps, check_braking, check_jerk};
 
 /// What an axis may never be asked to do. rad (m) and seconds.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -90,6 +88,17 @@ impl core::fmt::Display for LimitError {
 }
 
 impl AxisLimits {
+    /// No limit at all. No axis may have these; they are for what is not to be limited before it is checked.
+    pub const NONE: Self = Self {
+        position_min: f64::NEG_INFINITY,
+        position_max: f64::INFINITY,
+        velocity: f64::INFINITY,
+        acceleration: f64::INFINITY,
+        deceleration: f64::INFINITY,
+        jerk: f64::INFINITY,
+        torque: f64::INFINITY,
+    };
+
     /// Checks that every limit is a number that can be kept.
     pub fn validate(&self) -> Result<(), LimitError> {
         let positive = |value: f64| value > 0.0 && value.is_finite();

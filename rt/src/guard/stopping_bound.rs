@@ -1,7 +1,6 @@
 //! How fast and how far a joint goes on at least, however hard it is stopped.
 
 use super::AxisLimits;
-use super::stream::{BRAKING_TOLERANCE, mirrored};
 use crate::plan::State;
 
 /// What a joint reaches at least towards positive positions if it is stopped from now on, as fast as the limits allow.
@@ -24,13 +23,6 @@ impl StoppingBound {
             position: position + braking_distance(limits, velocity, acceleration),
         }
     }
-}
-
-/// Whether a joint in this state becomes no faster than its velocity limit, but for rounding, while its acceleration is taken
-/// back as fast as the jerk limit allows.
-pub fn keeps_velocity(limits: &AxisLimits, state: &State) -> bool {
-    let most = limits.velocity * (1.0 + BRAKING_TOLERANCE);
-    [*state, mirrored(state)].iter().all(|state| StoppingBound::of(state, limits).velocity <= most)
 }
 
 /// How far a joint goes on at least towards positive positions, however hard it is stopped at the limits; 0 if it does not.

@@ -8,21 +8,11 @@ use crate::plan::State;
 
 /// By how much a position may be off, relative to it or to 1 rad: whoever samples a trajectory adds up times and evaluates
 /// polynomials, each with a rounding. The third difference divides what comes of it by the cube of the period.
-pub(super) const ROUNDINGS: f64 = 64.0;
+const ROUNDINGS: f64 = 64.0;
 
 /// Relative to the limits that a stop must be able to keep: half of what [`check`](super::check) allows, so that every step of
 /// the stop passes it.
-pub(super) const BRAKING_TOLERANCE: f64 = TOLERANCE / 2.0;
-
-/// What is done with a command of a stream that breaks a limit.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum OnViolation {
-    /// The group stops.
-    #[default]
-    Reject,
-    /// A set-point within the limits, on the way to the command, takes its place and is counted.
-    Clamp,
-}
+const BRAKING_TOLERANCE: f64 = TOLERANCE / 2.0;
 
 /// Set-points of the last three cycles, newest first, and the one that is to follow.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -112,7 +102,7 @@ impl SetPointSteps {
     }
 }
 
-pub(super) fn mirrored(state: &State) -> State {
+fn mirrored(state: &State) -> State {
     State { position: -state.position, velocity: -state.velocity, acceleration: -state.acceleration }
 }
 
@@ -173,54 +163,6 @@ pub fn check_braking(limits: &AxisLimits, steps: &SetPointSteps) -> Result<(), F
     Direction::both(steps, limits).try_for_each(|direction| direction.check())
 }
 
-/// The set-point nearest to the one asked for that keeps the limits of velocity and acceleration, and from which a stop
-/// at all limits, that of the jerk too, stays within those of the position. A target that is no number counts as the
-/// wish to stop.
-pub fn clamp(limits: &AxisLimits, steps: &SetPointSteps) -> State {
-    let (period_s, last, last_velocity) = (steps.period_s, steps.sent[0], steps.last_velocity());
-    let wanted = if steps.next.is_finite() { steps.velocity() } else { 0.0 };
-    let speeding_up = limits.acceleration * period_s;
-    let slowing_down = limits.deceleration * period_s;
-    let (lowest, highest) = match last_velocity > 0.0 {
-        true => ((last_velocity - slowing_down).max(-speeding_up), last_velocity + speeding_up),
-        false => (last_velocity - speeding_up, (last_velocity + slowing_down).min(speeding_up)),
-    };
-    let at = |velocity: f64| SetPointSteps { next: last + velocity * period_s, ..*steps };
-    let is_within = |steps: SetPointSteps, farthest: f64| {
-        let bound = StoppingBound::of(&steps.braked_end(limits), limits);
-        bound.position <= farthest && bound.velocity <= limits.velocity
-    };
-    let is_low_enough = |velocity: f64| is_within(at(velocity), limits.position_max);
-    let is_high_enough = |velocity: f64| is_within(at(velocity).mirrored(), -limits.position_min);
-    let within = wanted.clamp(-limits.velocity, limits.velocity).max(lowest).min(highest);
-    // The limit that the joint goes towards has the last word.
-    let velocity = match last_velocity > 0.0 {
-        true => nearest(nearest(within, highest, is_high_enough), lowest, is_low_enough),
-        false => nearest(nearest(within, lowest, is_low_enough), highest, is_high_enough),
-    };
-    State {
-        position: last + velocity * period_s,
-        velocity,
-        acceleration: (velocity - last_velocity) / period_s,
-    }
-}
-
-/// Halvings of an interval until what is left of it is rounding.
-const HALVINGS: u32 = 48;
-
-/// The value nearest to `wanted`, on the way to `end`, that is possible; `end` if none before it is.
-fn nearest(wanted: f64, end: f64, is_possible: impl Fn(f64) -> bool) -> f64 {
-    if is_possible(wanted) {
-        return wanted;
-    }
-    let (mut impossible, mut possible) = (wanted, end);
-    for _ in 0..HALVINGS {
-        let middle = 0.5 * (impossible + possible);
-        if is_possible(middle) { possible = middle } else { impossible = middle }
-    }
-    possible
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -268,43 +210,6 @@ mod tests {
     }
 
     proptest! {
-        #[test]
-        fn whatever_is_asked_for_the_clamped_course_passes_the_guard_and_stays_inside(
-            targets in prop::collection::vec(prop_oneof![-5.0f64..5.0, Just(f64::NAN), Just(1e300)], 1..400),
-        ) {
-            let mut sent = [0.0; 3];
-            for target in targets.into_iter().flat_map(|target| [target; 5]) {
-                let next = clamp(&LIMITS, &SetPointSteps { sent, next: target, period_s: PERIOD_S });
-                let passed = guard::check(&LIMITS, PERIOD_S, sent[1], sent[0], &next);
-                prop_assert!(passed.is_ok(), "{passed:?}");
-                prop_assert!(LIMITS.contain(next.position), "{next:?}");
-                sent = [next.position, sent[0], sent[1]];
-            }
-        }
-
-        #[test]
-        fn a_clamped_course_can_be_stopped_at_the_limit_of_the_jerk_within_those_of_the_position(
-            targets in prop::collection::vec((-5.0f64..5.0, 1usize..60), 1..40),
-        ) {
-            let limits = AxisLimits { jerk: 150.0, ..LIMITS };
-            let mut sent = [0.0; 3];
-            for target in targets.into_iter().flat_map(|(target, times)| core::iter::repeat_n(target, times)) {
-                let steps = SetPointSteps { sent, next: target, period_s: PERIOD_S };
-                let next = clamp(&limits, &steps);
-                prop_assert!(guard::check(&limits, PERIOD_S, sent[1], sent[0], &next).is_ok());
-                sent = [next.position, sent[0], sent[1]];
-            }
-            let last = SetPointSteps { sent: [sent[1], sent[2], sent[2]], next: sent[0], period_s: PERIOD_S };
-            let (mut store, mut motion) = (ProfileStore::<4>::default(), GroupTrajectory::default());
-            let mut profiles = store.of(0..1).unwrap();
-            motion.stop(&mut profiles, [(last.state(&limits), &limits)].into_iter()).unwrap();
-            while !motion.is_finished() {
-                motion.advance(PERIOD_S);
-                let position = motion.states(&profiles).next().unwrap().position;
-                prop_assert!((-1.000_001..=2.000_001).contains(&position), "{position}");
-            }
-        }
-
         #[test]
         fn a_stop_from_wherever_a_stream_may_go_leaps_in_none_of_its_rates(
             jerks in prop::collection::vec((-1.0f64..=1.0, 1usize..200), 1..40),

@@ -14,8 +14,7 @@ use super::travel::{counting, travel};
 use crate::canopen::dcf::DeviceConfiguration;
 use crate::config::defaults;
 use crate::config::model::{
-    Axis, Control, DriveFamily, Feedback, Identity, Interface, Limits, OnViolation, PdoMapping,
-    SimulatedJoint, Travel,
+    Axis, DriveFamily, Feedback, Follow, Identity, Interface, Limits, PdoMapping, SimulatedJoint, Travel,
 };
 use crate::config::problem_kind::ProblemKind;
 use crate::config::quantities::Quantities;
@@ -115,7 +114,7 @@ fn axis(mut section: Section<'_>, machine: &Machine<'_>, earlier: &[ReadAxis]) -
     let q = Quantities::of(travel.unwrap_or(Travel::Rotary));
     let counting = counting(&mut section, drive, travel);
     let limits = limits(section.section("limits"), q, counting.as_ref());
-    let following_error = following_error(section.section("following_error"), q);
+    let following_error = following_error(section.section("following_error"), q, travel);
     let simulated = simulated(section.section("simulated"), q, limits.as_ref(), name.as_deref());
     let transmission_type = transmission_type(&mut section);
     let period_ns = machine.period_ns(bus);
@@ -141,9 +140,9 @@ fn axis(mut section: Section<'_>, machine: &Machine<'_>, earlier: &[ReadAxis]) -
         |key| section.get(key).and_then(|entry: Entry<'_>| entry.quantity(q.position, q.ranges.deviation));
     let start_tolerance = tolerance("start_tolerance");
     let target_tolerance = tolerance("target_tolerance");
-    let on_violation = section
-        .get("on_violation")
-        .and_then(|entry| entry.choice(&[("reject", OnViolation::Reject), ("clamp", OnViolation::Clamp)]));
+    let follow = section
+        .get("follow")
+        .and_then(|entry| entry.choice(&[("smooth", Follow::Smooth), ("exact", Follow::Exact)]));
     let missed =
         section.get("missed_feedback_cycles").and_then(|entry| entry.integer(ranges::MISSED_FEEDBACK_CYCLES));
     let feedback_delay =
@@ -170,12 +169,10 @@ fn axis(mut section: Section<'_>, machine: &Machine<'_>, earlier: &[ReadAxis]) -
             zero_counts: counting.zero_counts,
             limits: limits?,
             following_error,
-            start_tolerance: start_tolerance.unwrap_or(match travel {
-                Travel::Rotary => defaults::START_TOLERANCE_RAD,
-                Travel::Linear { .. } => defaults::START_TOLERANCE_M,
-            }),
-            target_tolerance: target_tolerance.unwrap_or_else(|| default_target_tolerance(travel, &control)),
-            on_violation: on_violation.unwrap_or_default(),
+            start_tolerance: start_tolerance.unwrap_or(defaults::start_tolerance(travel)),
+            target_tolerance: target_tolerance
+                .unwrap_or_else(|| defaults::target_tolerance(travel, &control)),
+            follow: follow.unwrap_or_default(),
             missed_feedback_cycles: missed
                 .and_then(|cycles| u16::try_from(cycles).ok())
                 .unwrap_or(defaults::MISSED_FEEDBACK_CYCLES),
@@ -192,20 +189,6 @@ fn axis(mut section: Section<'_>, machine: &Machine<'_>, earlier: &[ReadAxis]) -
     };
     let axis = build();
     ReadAxis { name, quantities: q, limits, axis, place, header }
-}
-
-/// In CST the loop has no integral part: static friction holds the joint off its target by friction / stiffness at most.
-fn default_target_tolerance(travel: Travel, control: &Control) -> f64 {
-    let own = match travel {
-        Travel::Rotary => defaults::TARGET_TOLERANCE_RAD,
-        Travel::Linear { .. } => defaults::TARGET_TOLERANCE_M,
-    };
-    match control {
-        Control::Torque { stiffness, coulomb_friction, .. } => {
-            own.max(defaults::TARGET_TOLERANCE_PER_FRICTION * coulomb_friction / stiffness)
-        }
-        _ => own,
-    }
 }
 
 fn bus_index(entry: &Entry<'_>, buses: &[ReadBus<'_>]) -> Option<usize> {
@@ -260,9 +243,7 @@ fn simulated(
         coulomb_friction: coulomb_friction.unwrap_or(defaults::COULOMB_FRICTION),
         rated_torque,
         peak_torque: peak_torque.unwrap_or(defaults::PEAK_TO_RATED_TORQUE * rated_torque),
-        initial_position: initial.unwrap_or_else(|| {
-            limits.map_or(0.0, |limits| 0.0_f64.max(limits.position_min).min(limits.position_max))
-        }),
+        initial_position: initial.unwrap_or_else(|| limits.map_or(0.0, defaults::initial_position)),
         power_up_ns: power_up_ns.unwrap_or(defaults::POWER_UP_NS),
     }
 }
@@ -276,16 +257,13 @@ fn mapping(section: &mut Section<'_>, drive: Option<DriveFamily>) -> PdoMapping 
         }
         Some(mapping)
     });
-    let is_fixed = drive == Some(DriveFamily::YzAim);
-    read.unwrap_or(if is_fixed { PdoMapping::AsStored } else { PdoMapping::Written })
+    read.unwrap_or(drive.map_or(PdoMapping::Written, defaults::mapping))
 }
 
-/// A drive whose PDOs are written reports its mode of operation (object 6061) unless another list is given. Nothing else shows that
-/// another master has changed the mode.
 fn feedback(section: &mut Section<'_>, drive: Option<DriveFamily>, mapping: PdoMapping) -> Vec<Feedback> {
     let choices = Feedback::ALL.map(|feedback| (feedback.word(), feedback));
     let Some(entry) = section.get("feedback") else {
-        return if mapping == PdoMapping::Written { vec![Feedback::OperationMode] } else { vec![] };
+        return defaults::feedback(mapping);
     };
     let mut feedback = vec![];
     for entry in entry.list().into_iter().flatten() {
@@ -311,11 +289,7 @@ fn dcf(entry: &Entry<'_>, node: Option<u8>) -> Option<DeviceConfiguration> {
 }
 
 fn identity(mut section: Section<'_>, drive: Option<DriveFamily>) -> Identity {
-    let default = match drive {
-        Some(DriveFamily::ErobCanopen) => defaults::EROB_IDENTITY,
-        Some(DriveFamily::YzAim) => defaults::YZ_AIM_IDENTITY,
-        None => Identity::default(),
-    };
+    let default = drive.map_or(Identity::default(), defaults::identity);
     let mut value = |key, default| match section.get(key) {
         None => default,
         Some(entry) if entry.is_word("any") => None,

@@ -41,8 +41,7 @@ pub fn control(
             entry.choice(&own).flatten()
         }
         (Some(entry), _) => entry.choice(&modes).flatten(),
-        (None, Some(DriveFamily::YzAim)) => Some(Control::Interpolated),
-        (None, _) => Some(Control::Position),
+        (None, drive) => Some(drive.map_or(Control::Position, defaults::control)),
     };
     if let Some(surroundings) = surroundings {
         match control {

@@ -3,9 +3,8 @@
 use super::entry::Entry;
 use super::section::Section;
 use crate::config::defaults;
-use crate::config::model::{FollowingError, Limits};
+use crate::config::model::{FollowingError, Limits, Travel};
 use crate::config::quantities::{Counting, Quantities};
-use crate::config::quantity::Quantity;
 use crate::config::ranges;
 use crate::config::rules;
 
@@ -59,17 +58,12 @@ fn position_range(entry: &Entry<'_>, q: Quantities) -> Option<[f64; 2]> {
     Some([low?, high?])
 }
 
-pub fn following_error(mut section: Section<'_>, q: Quantities) -> FollowingError {
+pub fn following_error(mut section: Section<'_>, q: Quantities, travel: Option<Travel>) -> FollowingError {
     let limit = section.get("limit").and_then(|entry| entry.quantity(q.position, q.ranges.deviation));
     let time_ns = section.get("time").and_then(|entry| entry.nanoseconds(ranges::FOLLOWING_ERROR_TIME_S));
     section.finish();
-    let default = if q.position == Quantity::ANGLE {
-        defaults::FOLLOWING_ERROR_RAD
-    } else {
-        defaults::FOLLOWING_ERROR_M
-    };
     FollowingError {
-        limit: limit.unwrap_or(default),
+        limit: limit.unwrap_or(defaults::following_error(travel.unwrap_or(Travel::Rotary))),
         time_ns: time_ns.unwrap_or(defaults::FOLLOWING_ERROR_TIME_NS),
     }
 }

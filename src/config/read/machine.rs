@@ -1,4 +1,4 @@
-//! The sections that exist once: `[cycle]`, `[realtime]`, `[master]`, `[telemetry]`, `[simulation]`.
+//! The sections that exist once: `[cycle]`, `[stream]`, `[realtime]`, `[master]`, `[telemetry]`, `[simulation]`.
 
 use std::path::PathBuf;
 
@@ -7,7 +7,7 @@ use super::section::Section;
 use crate::bus::schedule::automatic_command_phase;
 use crate::config::bounds::Bounds;
 use crate::config::defaults;
-use crate::config::model::{Axis, Config, Control, Cycle, Master, Realtime, Simulation, Telemetry};
+use crate::config::model::{Axis, Config, Cycle, Master, Realtime, Simulation, StreamDelay, Telemetry};
 use crate::config::problem_kind::ProblemKind;
 use crate::config::quantity::Quantity;
 use crate::config::ranges;
@@ -25,8 +25,8 @@ pub fn cycle(mut section: Section<'_>) -> (Cycle, Option<Entry<'_>>) {
         entry => (None, entry.and_then(|entry| fraction_of_period(&entry, period_ns))),
     };
     section.finish();
-    let default_phase = (defaults::COMMAND_PHASE * period_ns as f64).round() as u64;
-    (Cycle { period_ns, command_phase_ns: command_phase.unwrap_or(default_phase) }, automatic)
+    let command_phase_ns = command_phase.unwrap_or_else(|| defaults::command_phase_ns(period_ns));
+    (Cycle { period_ns, command_phase_ns }, automatic)
 }
 
 /// Resolves `command_phase = "auto"`, once everything else that counts is known.
@@ -48,6 +48,14 @@ fn fraction_of_period(entry: &Entry<'_>, period_ns: u64) -> Option<u64> {
     } else {
         rules::cycle::command_phase(&entry.spot, entry.unbounded(Quantity::DURATION)?, period_ns)
     }
+}
+
+/// `[stream]`
+pub fn stream_delay(mut section: Section<'_>) -> StreamDelay {
+    let delay = section.get("delay").filter(|entry| !entry.is_word("auto"));
+    let fixed = delay.and_then(|entry| entry.nanoseconds(ranges::STREAM_DELAY_S)).map(StreamDelay::Fixed);
+    section.finish();
+    fixed.unwrap_or_default()
 }
 
 pub fn realtime(mut section: Section<'_>, period_ns: u64) -> Realtime {
@@ -107,33 +115,15 @@ pub fn master(mut section: Section<'_>) -> ReadMaster<'_> {
 }
 
 impl ReadMaster<'_> {
-    /// The whole of it, once the axes are known. A drive that would go on moving without the controller is to notice soon
-    /// that it is gone.
+    /// The whole of it, once the axes are known.
     pub fn complete(self, axes: &[Axis], period_ns: u64) -> Master {
-        let is_urgent = axes.iter().any(|axis| goes_on_alone(&axis.control));
-        let default_ns = if is_urgent {
-            // The heartbeat leaves in a cycle, in whole milliseconds.
-            defaults::URGENT_HEARTBEAT_NS.max(period_ns.next_multiple_of(1_000_000))
-        } else {
-            defaults::MASTER_HEARTBEAT_NS
-        };
-        let heartbeat_ns = self.heartbeat_ns.unwrap_or(Some(default_ns));
-        let timeout_at_most_ns = (ranges::HEARTBEAT_TIMEOUT_S.end() * 1e9) as u64;
-        let default_timeout_ns = heartbeat_ns.map_or(defaults::HEARTBEAT_TIMEOUT_NS, |heartbeat_ns| {
-            (heartbeat_ns * defaults::HEARTBEATS_IN_TIMEOUT).min(timeout_at_most_ns)
-        });
-        let heartbeat_timeout_ns = self.heartbeat_timeout_ns.unwrap_or(default_timeout_ns);
+        let default_ns = || Some(defaults::master_heartbeat_ns(axes, period_ns));
+        let heartbeat_ns = self.heartbeat_ns.unwrap_or_else(default_ns);
+        let heartbeat_timeout_ns =
+            self.heartbeat_timeout_ns.unwrap_or_else(|| defaults::heartbeat_timeout_ns(heartbeat_ns));
         rules::master::outlasts_heartbeat(&self.timeout_spot, heartbeat_timeout_ns, heartbeat_ns);
         Master { node: self.node, heartbeat_ns, heartbeat_timeout_ns, time_ns: self.time_ns }
     }
-}
-
-/// Whether a drive in this mode keeps a speed or a torque when the controller is gone.
-fn goes_on_alone(control: &Control) -> bool {
-    matches!(
-        control,
-        Control::Velocity { .. } | Control::Torque { .. } | Control::ProfileVelocity | Control::ProfileTorque
-    )
 }
 
 /// A node ID of CANopen.
@@ -188,7 +178,7 @@ pub fn simulation(mut section: Section<'_>, period_ns: u64) -> Simulation {
     section.finish();
     Simulation {
         seed: seed.unwrap_or(defaults::SEED),
-        longest_gap_ns: longest_gap_ns.unwrap_or(defaults::LONGEST_GAP_NS.max(2 * period_ns)),
+        longest_gap_ns: longest_gap_ns.unwrap_or_else(|| defaults::longest_gap_ns(period_ns)),
         stops_for_missed_slots,
     }
 }

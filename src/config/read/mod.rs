@@ -62,6 +62,7 @@ fn read<'a>(document: &'a DeTable<'a>, problems: &'a Problems) -> Option<Config>
     let missed_slots = stops::missed_slots(cycle.section("missed_slots"));
     let (cycle, automatic_phase) = machine::cycle(cycle);
     let stops = stops::stops(root.section("stops"));
+    let stream_delay = machine::stream_delay(root.section("stream"));
     let realtime = machine::realtime(root.section("realtime"), cycle.period_ns);
     let master = machine::master(root.section("master"));
     let telemetry = machine::telemetry(root.section("telemetry"));
@@ -89,6 +90,7 @@ fn read<'a>(document: &'a DeTable<'a>, problems: &'a Problems) -> Option<Config>
         cycle,
         missed_slots,
         stops,
+        stream_delay,
         realtime,
         master,
         buses: buses.into_iter().map(|bus| bus.bus).collect::<Option<_>>()?,

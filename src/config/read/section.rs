@@ -11,6 +11,12 @@ use crate::config::spelling;
 use crate::config::spot::{Problems, Spot};
 use crate::printable::excerpt;
 
+/// Keys of earlier versions, and what to write in their place.
+const REPLACED: [(&str, &str); 1] = [(
+    "on_violation",
+    "follow = \"smooth\", as closely as the limits allow, or follow = \"exact\", a stop for what breaks a limit",
+)];
+
 /// The most unknown keys of a table for which the key that was meant is looked for. No more problems are shown anyway.
 const SUGGESTED_AT_MOST: usize = 20;
 
@@ -141,6 +147,12 @@ impl<'a> Section<'a> {
             let mut unknown: Vec<_> = keys.filter(is_unknown).collect();
             unknown.sort_by_key(|key| key.span().start);
             for (index, key) in unknown.into_iter().enumerate() {
+                let replaced = REPLACED.iter().find(|(old, _)| old == key.get_ref());
+                if let Some((_, by)) = replaced {
+                    let key_path = self.path_of(key.get_ref());
+                    self.problems.report(ProblemKind::Replaced { key: key_path, by }, key.span());
+                    continue;
+                }
                 // Looking for the key that was meant takes long, and only the first problems are shown.
                 let nearest = (index < SUGGESTED_AT_MOST).then(|| {
                     let absent = known.iter().copied().filter(|known| find(table, known).is_none());

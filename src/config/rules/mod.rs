@@ -14,8 +14,9 @@ pub mod simulation;
 pub mod telemetry;
 
 use super::error::ConfigError;
-use super::model::Config;
+use super::model::{Config, StreamDelay};
 use super::problem_kind::ProblemKind;
+use super::ranges;
 use super::spot::{Problems, Spot};
 use crate::printable::excerpt;
 
@@ -30,6 +31,9 @@ impl Config {
         let whole = Fields { prefix: String::new(), of: String::new(), problems: &problems };
         name(&whole.at("name"), &self.name);
         cycle::validate(&self.cycle, &self.missed_slots, &whole.within("cycle"));
+        if let StreamDelay::Fixed(delay_ns) = self.stream_delay {
+            whole.at("stream.delay").duration(delay_ns, ranges::STREAM_DELAY_S);
+        }
         realtime::validate(&self.realtime, self.cycle.period_ns, &whole.within("realtime"));
         master::validate(&self.master, &whole.within("master"));
         telemetry::validate(&self.telemetry, &whole.within("telemetry"));

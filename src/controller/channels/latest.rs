@@ -1,8 +1,8 @@
-//! The newest value, from one writer to any number of readers. The writer never waits, and no reader can disturb it. A
-//! reader gets a whole value, or knows that it did not.
+//! The newest value, or the last few, from one writer to any number of readers. The writer never waits, and no reader can
+//! disturb it. A reader gets a whole value, or knows that it did not.
 //!
 //! A value is an array of 64-bit atomic words, so that no reader sees half a word and no `unsafe` is needed. It is a
-//! sequence lock (Boehm, "Can seqlocks get along with programming language memory models?", MSPC 2012) over four slots in
+//! sequence lock (Boehm, "Can seqlocks get along with programming language memory models?", MSPC 2012) over several slots in
 //! turn. A reader uses the last complete slot, so it need not wait for a writer that was preempted during a write. A read
 //! is torn only if the writer has reached the same slot again meanwhile.
 
@@ -11,24 +11,39 @@ use std::sync::Arc;
 
 use super::primitives::{AtomicU64, Ordering, fence};
 
+/// The slots of a mailbox for the newest value.
 const SLOTS: u64 = 4;
 
 struct Shared {
-    /// How many values have been completed; value `n` is in slot `n % SLOTS`.
+    /// How many values have been completed; value `n` is in slot `n` modulo the number of slots.
     completed: AtomicU64,
     slots: Box<[Box<[AtomicU64]>]>,
 }
 
 impl Shared {
     fn slot(&self, number: u64) -> &[AtomicU64] {
-        self.slots.get((number % SLOTS) as usize).map_or(&[], |slot| slot)
+        self.slots.get((number % self.slot_count()) as usize).map_or(&[], |slot| slot)
+    }
+
+    fn slot_count(&self) -> u64 {
+        self.slots.len() as u64
+    }
+
+    /// How many values the writer can complete after a value before it begins to overwrite that value.
+    fn kept_after(&self) -> u64 {
+        self.slot_count() - 2
     }
 }
 
-/// A mailbox for values of up to `words` words, as its two ends.
+/// A mailbox for the newest value, of up to `words` words, as its two ends.
 pub fn latest(words: usize) -> (Writer, Reader) {
+    last(words, SLOTS)
+}
+
+/// The same with room for so many values (at least 2). All of them but one can be read at any time.
+pub fn last(words: usize, slots: u64) -> (Writer, Reader) {
     let slot = || (0..words).map(|_| AtomicU64::new(0)).collect();
-    let slots = (0..SLOTS).map(|_| slot()).collect();
+    let slots = (0..slots.max(2)).map(|_| slot()).collect();
     let shared = Arc::new(Shared { completed: AtomicU64::new(0), slots });
     (Writer { shared: Arc::clone(&shared), completed: 0 }, Reader { shared })
 }
@@ -71,15 +86,29 @@ pub enum Attempt<T> {
 impl Reader {
     /// One attempt to read a value newer than number `seen` (0 = any). Never waits.
     pub fn attempt<T>(&self, seen: u64, decode: impl FnOnce(&mut Words<'_>) -> T) -> Attempt<T> {
-        let number = self.shared.completed.load(Ordering::Acquire);
+        let number = self.completed();
         if number <= seen {
             return Attempt::Nothing;
         }
+        self.read(number, decode).map_or(Attempt::Torn, |value| Attempt::Whole(value, number))
+    }
+
+    /// The number of the newest value; 0 before the first one.
+    pub fn completed(&self) -> u64 {
+        self.shared.completed.load(Ordering::Acquire)
+    }
+
+    /// The number of the oldest value that can be read after the newest one of [`Reader::completed`].
+    pub fn oldest(&self, completed: u64) -> u64 {
+        completed.saturating_sub(self.shared.kept_after()).max(1)
+    }
+
+    /// Reads a value that [`Reader::completed`] has counted. `None` if the writer has begun to overwrite it.
+    pub fn read<T>(&self, number: u64, decode: impl FnOnce(&mut Words<'_>) -> T) -> Option<T> {
         let value = decode(&mut Words(self.shared.slot(number).iter()));
         fence(Ordering::Acquire);
-        // The writer begins to overwrite this slot after it has completed the SLOTS − 1 values that follow.
         let completed = self.shared.completed.load(Ordering::Relaxed);
-        if completed - number < SLOTS - 1 { Attempt::Whole(value, number) } else { Attempt::Torn }
+        (completed - number <= self.shared.kept_after()).then_some(value)
     }
 }
 
@@ -150,6 +179,22 @@ mod tests {
             });
             assert_eq!(attempt != Attempt::Torn, is_whole, "overtaken by {overtaken_by}");
         }
+    }
+
+    #[test]
+    fn all_values_but_one_can_be_read_at_any_time() {
+        const SLOTS: u64 = 5;
+        let (mut writer, reader) = last(1, SLOTS);
+        for number in 1..=12 {
+            writer.write(|words| {
+                words.put(number);
+                let completed = number - 1;
+                let kept = reader.oldest(completed)..=completed;
+                assert!(kept.clone().all(|kept| reader.read(kept, |words| words.take()) == Some(kept)));
+                assert_eq!(kept.count() as u64, completed.min(SLOTS - 1));
+            });
+        }
+        assert_eq!(reader.read(8, |words| words.take()), None);
     }
 
     #[test]

@@ -3,4 +3,5 @@
 
 pub use std::sync::atomic::{AtomicU64, Ordering, fence};
 
+pub use crossbeam::atomic::AtomicCell;
 pub use crossbeam::queue::ArrayQueue;

@@ -58,6 +58,13 @@ impl<T> Producer<T> {
         true
     }
 
+    /// The number of items that there is room for now.
+    pub fn room(&mut self) -> usize {
+        self.popped = self.shared.popped.load(Ordering::Acquire);
+        let waiting = (self.pushed - self.popped) as usize;
+        self.shared.queue.capacity().saturating_sub(waiting)
+    }
+
     /// Counts an item that was dropped before it came here.
     pub fn count_dropped(&mut self) {
         self.dropped += 1;

@@ -1,10 +1,9 @@
-//! The layout of a snapshot and of a streamed command in 64-bit words.
+//! The layout of a snapshot in 64-bit words.
 
-use takt_rt::plan;
 use takt_rt::{
     Answers, AxisSnapshot, BusHealth, BusState, DriveState, MAX_AXES, MAX_BUSES, MotionReports, Origin,
     Phase, RejectReason, RequestError, RequestId, RequestKind, Rule, Snapshot, StopCategory, StopCause,
-    StopReason, StreamCommand, TimingLevel,
+    StopReason, StreamCounts, StreamReport, StreamState, TimingLevel,
 };
 
 use super::latest::Words;
@@ -12,13 +11,11 @@ use super::motion_words::{MOTION_WORDS, put_motions, take_motions};
 
 /// The largest number of words of a snapshot of so many axes and buses.
 pub const fn snapshot_words(axes: usize, buses: usize) -> usize {
-    18 + MOTION_WORDS + 4 * Answers::EXPLAINED + 4 * axes + 7 * buses
+    22 + MOTION_WORDS + 4 * Answers::EXPLAINED + AXIS_WORDS * axes + 7 * buses
 }
 
-/// The number of words of a streamed command for so many axes.
-pub const fn stream_words(axes: usize) -> usize {
-    1 + 3 * axes
-}
+/// The number of words of an axis of a snapshot.
+const AXIS_WORDS: usize = 11;
 
 /// The snapshot before the first cycle: passive, of no axes and no buses.
 pub const NO_SNAPSHOT: Snapshot = Snapshot {
@@ -28,7 +25,10 @@ pub const NO_SNAPSHOT: Snapshot = Snapshot {
     missed_slots: 0,
     steps: 0,
     timing: TimingLevel::Normal,
-    clamped: 0,
+    stream: StreamReport {
+        state: StreamState::Idle,
+        counts: StreamCounts { lag_ns: 0, points: 0, late_points: 0, lost_points: 0 },
+    },
     dropped: 0,
     rejected: 0,
     answers: Answers {
@@ -43,13 +43,22 @@ pub const NO_SNAPSHOT: Snapshot = Snapshot {
     axis_count: 0,
     axes: [AxisSnapshot {
         position_set: 0.0,
+        velocity_set: 0.0,
+        torque_set: 0.0,
         position: 0.0,
         velocity: 0.0,
+        following_error: 0.0,
+        torque: None,
+        current_per_mille: None,
+        mode: None,
         statusword: 0,
         drive_state: DriveState::NotReadyToSwitchOn,
         error_code: 0,
         is_heard: false,
         unanswered: 0,
+        feedback_age: 0,
+        feedback_slot: 0,
+        feedback_ns: 0,
     }; MAX_AXES],
     bus_count: 0,
     buses: [BusHealth {
@@ -74,7 +83,7 @@ pub fn put_snapshot(snapshot: &Snapshot, words: &mut Words<'_>) {
     ]));
     words.put(snapshot.missed_slots);
     words.put(snapshot.steps);
-    words.put(snapshot.clamped);
+    put_stream(&snapshot.stream, words);
     words.put(snapshot.dropped);
     words.put(snapshot.rejected);
     put_answers(&snapshot.answers, words);
@@ -100,7 +109,7 @@ pub fn take_snapshot(words: &mut Words<'_>) -> Snapshot {
         phase: phase_of(phase),
         missed_slots: words.take(),
         steps: words.take(),
-        clamped: words.take(),
+        stream: take_stream(words),
         timing: TimingLevel::ALL.get(usize::from(flags >> 1)).copied().unwrap_or_default(),
         dropped: words.take(),
         rejected: words.take(),
@@ -133,14 +142,34 @@ fn put_answers(answers: &Answers, words: &mut Words<'_>) {
             words.put(0);
             return;
         };
-        let axis = refused.axis.map_or(0, |axis| u64::from(axis) << 32 | 1 << 40);
-        let kinds = pack([refused.request as u8, refused.reason.number(), refused.phase as u8, 1]);
-        let (asked, allowed) = refused.reason.numbers();
-        words.put(kinds | axis);
+        put_rejection(refused, words);
         words.put(*id);
-        words.put_f64(asked);
-        words.put_f64(allowed);
     }
+}
+
+pub fn put_rejection(refused: &RequestError, words: &mut Words<'_>) {
+    let axis = refused.axis.map_or(0, |axis| u64::from(axis) << 32 | 1 << 40);
+    let kinds = pack([refused.request as u8, refused.reason.number(), refused.phase as u8, 1]);
+    let (asked, allowed) = refused.reason.numbers();
+    words.put(kinds | axis);
+    words.put_f64(asked);
+    words.put_f64(allowed);
+}
+
+/// `None` at the end of the rejections.
+pub fn take_rejection(words: &mut Words<'_>) -> Option<RequestError> {
+    let packed = words.take();
+    let [request, reason, phase, is_there] = unpack(packed);
+    if is_there == 0 {
+        return None;
+    }
+    let (asked, allowed) = (words.take_f64(), words.take_f64());
+    Some(RequestError {
+        request: RequestKind::ALL.get(usize::from(request)).copied().unwrap_or(RequestKind::Shutdown),
+        reason: RejectReason::from_numbers(reason, asked, allowed).unwrap_or(RejectReason::Phase),
+        axis: (packed >> 40 & 1 == 1).then_some((packed >> 32) as u8),
+        phase: phase_of(phase),
+    })
 }
 
 fn take_answers(words: &mut Words<'_>) -> Answers {
@@ -148,46 +177,23 @@ fn take_answers(words: &mut Words<'_>) -> Answers {
     let mut bits = || u128::from(words.take()) | u128::from(words.take()) << 64;
     let mut answers = Answers { newest, taken_up: bits(), rejected: bits(), ..Answers::default() };
     for place in &mut answers.rejections {
-        let packed = words.take();
-        let [request, reason, phase, is_there] = unpack(packed);
-        if is_there == 0 {
-            break;
-        }
+        let Some(rejected) = take_rejection(words) else { break };
         let id = RequestId(words.take());
-        let (asked, allowed) = (words.take_f64(), words.take_f64());
-        let rejected = RequestError {
-            request: RequestKind::ALL.get(usize::from(request)).copied().unwrap_or(RequestKind::Shutdown),
-            reason: RejectReason::from_numbers(reason, asked, allowed).unwrap_or(RejectReason::Phase),
-            axis: (packed >> 40 & 1 == 1).then_some((packed >> 32) as u8),
-            phase: phase_of(phase),
-        };
         *place = Some((id, rejected));
     }
     answers
 }
 
-pub fn put_stream(command: &StreamCommand, axes: usize, words: &mut Words<'_>) {
-    words.put(command.valid_until_ns);
-    for set_point in command.set_points.iter().take(axes) {
-        words.put_f64(set_point.position);
-        words.put_f64(set_point.velocity);
-        words.put_f64(set_point.acceleration);
-    }
+fn put_stream(stream: &StreamReport, words: &mut Words<'_>) {
+    let StreamCounts { lag_ns, points, late_points, lost_points } = stream.counts;
+    words.put(stream.state as u64);
+    [lag_ns, points, late_points, lost_points].into_iter().for_each(|word| words.put(word));
 }
 
-pub fn take_stream(axes: usize, words: &mut Words<'_>) -> StreamCommand {
-    let mut command = StreamCommand {
-        valid_until_ns: words.take(),
-        set_points: [plan::State { position: 0.0, velocity: 0.0, acceleration: 0.0 }; MAX_AXES],
-    };
-    for set_point in command.set_points.iter_mut().take(axes) {
-        *set_point = plan::State {
-            position: words.take_f64(),
-            velocity: words.take_f64(),
-            acceleration: words.take_f64(),
-        };
-    }
-    command
+fn take_stream(words: &mut Words<'_>) -> StreamReport {
+    let state = StreamState::ALL.get(words.take() as usize).copied().unwrap_or_default();
+    let [lag_ns, points, late_points, lost_points] = [(); 4].map(|()| words.take());
+    StreamReport { state, counts: StreamCounts { lag_ns, points, late_points, lost_points } }
 }
 
 pub fn put_stop(stop: &StopReason, words: &mut Words<'_>) {
@@ -227,28 +233,53 @@ pub fn take_stop(words: &mut Words<'_>) -> StopReason {
 }
 
 fn put_axis(axis: &AxisSnapshot, words: &mut Words<'_>) {
-    words.put_f64(axis.position_set);
-    words.put_f64(axis.position);
-    words.put_f64(axis.velocity);
+    let numbers = [
+        axis.position_set,
+        axis.velocity_set,
+        axis.torque_set,
+        axis.position,
+        axis.velocity,
+        axis.following_error,
+        axis.torque.unwrap_or_default(),
+    ];
+    numbers.into_iter().for_each(|number| words.put_f64(number));
     let is_heard = u64::from(axis.is_heard) << 32;
     let drive_state = (axis.drive_state as u64) << 40;
     let unanswered = u64::from(axis.unanswered) << 48;
     let words_of_drive = u64::from(axis.statusword) | u64::from(axis.error_code) << 16;
     words.put(words_of_drive | is_heard | drive_state | unanswered);
+    let current = u64::from(axis.current_per_mille.unwrap_or_default() as u16) << 16;
+    let mode = u64::from(axis.mode.unwrap_or_default() as u8) << 32;
+    let are_reported = [axis.torque.is_some(), axis.current_per_mille.is_some(), axis.mode.is_some()];
+    let reported = are_reported.iter().rev().fold(0, |bits, is_reported| bits << 1 | u64::from(*is_reported));
+    words.put(u64::from(axis.feedback_age) | current | mode | reported << 40);
+    words.put(axis.feedback_slot);
+    words.put(axis.feedback_ns);
 }
 
 fn take_axis(words: &mut Words<'_>) -> AxisSnapshot {
-    let (position_set, position, velocity) = (words.take_f64(), words.take_f64(), words.take_f64());
-    let packed = words.take();
+    let [position_set, velocity_set, torque_set, position, velocity, following_error, torque] =
+        [(); 7].map(|()| words.take_f64());
+    let (packed, reported) = (words.take(), words.take());
+    let is_reported = |bit: u32| reported >> (40 + bit) & 1 == 1;
     AxisSnapshot {
         position_set,
+        velocity_set,
+        torque_set,
         position,
         velocity,
+        following_error,
+        torque: is_reported(0).then_some(torque),
+        current_per_mille: is_reported(1).then_some((reported >> 16) as i16),
+        mode: is_reported(2).then_some((reported >> 32) as i8),
         statusword: packed as u16,
         drive_state: drive_state_of((packed >> 40) as u8),
         error_code: (packed >> 16) as u16,
         is_heard: packed >> 32 & 1 == 1,
         unanswered: (packed >> 48) as u16,
+        feedback_age: reported as u16,
+        feedback_slot: words.take(),
+        feedback_ns: words.take(),
     }
 }
 
@@ -281,11 +312,11 @@ fn take_bus(words: &mut Words<'_>) -> BusHealth {
     }
 }
 
-fn phase_of(number: u8) -> Phase {
+pub fn phase_of(number: u8) -> Phase {
     Phase::ALL.get(usize::from(number)).copied().unwrap_or_default()
 }
 
-fn drive_state_of(number: u8) -> DriveState {
+pub fn drive_state_of(number: u8) -> DriveState {
     DriveState::ALL.get(usize::from(number)).copied().unwrap_or_default()
 }
 
@@ -298,13 +329,13 @@ fn unpack(word: u64) -> [u8; 4] {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::controller::channels::latest::{Attempt, latest};
     use proptest::prelude::*;
     use takt_rt::{MotionReport, MotionState};
 
-    fn stop_reasons() -> impl Strategy<Value = StopReason> {
+    pub fn stop_reasons() -> impl Strategy<Value = StopReason> {
         let categories = prop::sample::select(vec![StopCategory::Zero, StopCategory::One, StopCategory::Two]);
         let (rules, phases) = (prop::sample::select(&Rule::ALL[..]), prop::sample::select(&Phase::ALL[..]));
         let origins = prop_oneof![
@@ -325,7 +356,7 @@ mod tests {
         )
     }
 
-    fn rejections() -> impl Strategy<Value = RequestError> {
+    pub fn rejections() -> impl Strategy<Value = RequestError> {
         let requests = prop::sample::select(&RequestKind::ALL[..]);
         let reasons = prop::sample::select(&RejectReason::ALL[..]);
         let phases = prop::sample::select(&Phase::ALL[..]);
@@ -348,23 +379,31 @@ mod tests {
 
     fn axes() -> impl Strategy<Value = AxisSnapshot> {
         let states = prop::sample::select(&DriveState::ALL[..]);
-        (any::<(f64, f64, f64, u16, u16, bool, u16)>(), states).prop_map(
-            |(
-                (position_set, position, velocity, statusword, error_code, is_heard, unanswered),
+        let reported = any::<(Option<f64>, Option<i16>, Option<i8>, u16, u16, bool, u16, u16, [u64; 2])>();
+        (any::<[f64; 6]>(), reported, states).prop_map(|(numbers, reported, drive_state)| {
+            let [position_set, velocity_set, torque_set, position, velocity, following_error] = numbers;
+            let (torque, current_per_mille, mode, statusword, error_code, is_heard, unanswered, age, at) =
+                reported;
+            AxisSnapshot {
+                position_set,
+                velocity_set,
+                torque_set,
+                position,
+                velocity,
+                following_error,
+                torque,
+                current_per_mille,
+                mode,
+                statusword,
                 drive_state,
-            )| {
-                AxisSnapshot {
-                    position_set,
-                    position,
-                    velocity,
-                    statusword,
-                    drive_state,
-                    error_code,
-                    is_heard,
-                    unanswered,
-                }
-            },
-        )
+                error_code,
+                is_heard,
+                unanswered,
+                feedback_age: age,
+                feedback_slot: at[0],
+                feedback_ns: at[1],
+            }
+        })
     }
 
     fn buses() -> impl Strategy<Value = BusHealth> {
@@ -444,21 +483,6 @@ mod tests {
             let (mut writer, reader) = latest(words);
             writer.write(|words| put_snapshot(&snapshot, words));
             prop_assert_eq!(reader.attempt(0, take_snapshot), Attempt::Whole(snapshot, 1));
-        }
-
-        #[test]
-        fn a_streamed_command_comes_out_as_it_went_in(
-            valid_until_ns in any::<u64>(),
-            numbers in prop::collection::vec(any::<[f64; 3]>(), 1..=MAX_AXES),
-        ) {
-            let axes = numbers.len();
-            let mut command = StreamCommand { valid_until_ns, set_points: Default::default() };
-            for (to, [position, velocity, acceleration]) in command.set_points.iter_mut().zip(numbers) {
-                *to = plan::State { position, velocity, acceleration };
-            }
-            let (mut writer, reader) = latest(stream_words(axes));
-            writer.write(|words| put_stream(&command, axes, words));
-            prop_assert_eq!(reader.attempt(0, |words| take_stream(axes, words)), Attempt::Whole(command, 1));
         }
     }
 }

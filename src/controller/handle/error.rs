@@ -141,7 +141,28 @@ pub enum MotionError {
     Ended,
 }
 
-/// `main` prints the error that `?` hands it by `Debug`. A session, for example, would be hundreds of lines.
+/// Why a wait has not ended with what it was for.
+#[derive(Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum WaitError {
+    /// It did not happen in time.
+    #[error("what was waited for has not happened in time")]
+    NotInTime,
+    /// The controller has ended.
+    #[error("the controller has ended")]
+    Ended,
+}
+
+impl fmt::Debug for StartFailure {
+    /// A session would be hundreds of lines.
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Session(error) => fmt::Debug::fmt(error, formatter),
+            other => fmt::Display::fmt(other, formatter),
+        }
+    }
+}
+
+/// `main` prints the error that `?` hands it by `Debug`.
 macro_rules! debug_as_displayed {
     ($($error:ty),*) => {$(
         impl fmt::Debug for $error {
@@ -152,4 +173,4 @@ macro_rules! debug_as_displayed {
     )*};
 }
 
-debug_as_displayed!(StartFailure, Refused, Stopped, CommandError, MotionError);
+debug_as_displayed!(Refused, Stopped, CommandError, MotionError, WaitError);

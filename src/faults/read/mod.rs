@@ -4,6 +4,7 @@
 mod common;
 mod kind;
 
+use std::fmt;
 use std::path::Path;
 
 use toml::de::DeTable;
@@ -19,7 +20,7 @@ use crate::printable::printable_path;
 const FAULTS_AT_MOST: usize = 64;
 
 /// Why a scenario cannot be used.
-#[derive(Debug, thiserror::Error, miette::Diagnostic)]
+#[derive(thiserror::Error, miette::Diagnostic)]
 pub enum ScenarioError {
     /// The file cannot be read.
     #[error("the scenario {path} cannot be read: {reason}")]
@@ -33,6 +34,16 @@ pub enum ScenarioError {
     #[error(transparent)]
     #[diagnostic(transparent)]
     Wrong(#[from] ConfigError),
+}
+
+impl fmt::Debug for ScenarioError {
+    /// For `main`: the sentence, or the problems of the file.
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Wrong(error) => fmt::Debug::fmt(error, formatter),
+            unreadable @ Self::Unreadable { .. } => fmt::Display::fmt(unreadable, formatter),
+        }
+    }
 }
 
 impl Scenario {

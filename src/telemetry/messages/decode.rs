@@ -3,7 +3,7 @@
 use takt_rt::{
     AxisRecord, BusHealth, BusState, CycleRecord, CycleTiming, DriveState, EventKind, Origin, Phase,
     RejectReason, RequestError, RequestId, RequestKind, Rule, StopCategory, StopCause, StopReason,
-    TimingLevel,
+    StreamState, TimingLevel,
 };
 
 use super::EventFields;
@@ -156,6 +156,7 @@ impl EventFields {
                 phase: phase(self.phase_from)?,
             }),
             7 => EventKind::Timing { level: *TimingLevel::ALL.get(usize::from(self.timing_level))? },
+            8 => EventKind::Stream { state: *StreamState::ALL.get(self.value as usize)? },
             _ => return None,
         })
     }
@@ -215,6 +216,7 @@ mod tests {
             EventKind::Timing { level: TimingLevel::Degraded },
             EventKind::Emergency { axis: 1, code: 0x7305, register: 0x21, manufacturer: [1, 2, 3, 4, 5] },
             EventKind::MissedSlots { count: 30 },
+            EventKind::Stream { state: StreamState::Dry },
             EventKind::Rejected(REFUSAL),
         ] {
             encode_event(&Event { slot: 77, at_ns: 88, kind }, "in words", &mut encoder);

@@ -78,23 +78,23 @@ pub struct AxisCycle {
     pub phase: &'static str,
     /// The set-point.
     pub position_set: f64,
-    /// The position that the drive reported.
-    pub position: f64,
+    /// The position that the drive reported; `None` in a cycle without feedback.
+    pub position: Option<f64>,
     /// The velocity set-point.
     pub velocity_set: f32,
-    /// Actual velocity.
-    pub velocity: f32,
-    /// Distance between the set-point in force and the position reported for it.
-    pub following_error: f32,
-    /// Object 6041.
+    /// Actual velocity; `None` in a cycle without feedback.
+    pub velocity: Option<f32>,
+    /// Distance between the set-point in force and the position reported for it; `None` in a cycle without feedback.
+    pub following_error: Option<f32>,
+    /// Object 6041, as last reported.
     pub statusword: u16,
     /// The state of the drive that the statusword shows.
     pub state: &'static str,
     /// Object 6040.
     pub controlword: u16,
-    /// Object 603F.
+    /// Object 603F, as last reported.
     pub error_code: u16,
-    /// Cycles since the drive last reported.
+    /// Cycles since the drive last reported; 0 in a cycle with feedback.
     pub feedback_age: u16,
 }
 
@@ -222,14 +222,15 @@ impl RecordingReport {
 
 impl AxisCycle {
     fn new(cycle: &RecordedCycle, axis: &AxisRecord) -> Self {
+        let is_fresh = axis.feedback_age == 0;
         Self {
             slot: cycle.timing.slot,
             phase: words::phase(cycle.phase),
             position_set: axis.position_set,
-            position: axis.position,
+            position: is_fresh.then_some(axis.position),
             velocity_set: axis.velocity_set,
-            velocity: axis.velocity,
-            following_error: axis.following_error,
+            velocity: is_fresh.then_some(axis.velocity),
+            following_error: is_fresh.then_some(axis.following_error),
             statusword: axis.statusword,
             state: words::state(axis.drive_state),
             controlword: axis.controlword,

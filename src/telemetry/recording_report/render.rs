@@ -147,16 +147,17 @@ fn cut(row: &str) -> String {
 impl AxisCycle {
     fn row(&self) -> String {
         let status = format!("{:04X} {}", self.statusword, self.state);
+        let reported = match (self.position, self.velocity, self.following_error) {
+            (Some(position), Some(velocity), Some(error)) => {
+                format!("{position:>10.5}{velocity:>+9.3}{:>+9.3}  {status:<28}", error * 1e3)
+            }
+            // What was reported last is in an earlier row.
+            _ => format!("{:>28}  {:<28}", "no feedback", format!("({status})")),
+        };
+        let controlword = format!("{:04X}", self.controlword);
         format!(
-            "{:>8} {:<9}{:>10.5}{:>10.5}{:>+9.3}{:>+9.3}  {status:<28}{:>6}{:>4}",
-            self.slot,
-            self.phase,
-            self.position_set,
-            self.position,
-            self.velocity,
-            self.following_error * 1e3,
-            format!("{:04X}", self.controlword),
-            self.feedback_age,
+            "{:>8} {:<9}{:>10.5}{reported}{controlword:>6}{:>4}",
+            self.slot, self.phase, self.position_set, self.feedback_age
         )
     }
 }

@@ -18,6 +18,7 @@ pub const fn request(kind: RequestKind) -> &'static str {
         RequestKind::Move => "the move",
         RequestKind::SetProfileTarget => "the target",
         RequestKind::Stream => "the stream",
+        RequestKind::Execute => "the trajectory",
         RequestKind::Stop => "the stop",
         RequestKind::Disable => "disabling",
         RequestKind::ResetFaults => "the fault reset",
@@ -96,6 +97,14 @@ fn reason(rejected: &RequestError, machine: &Machine) -> String {
             format!("the bus of {axis} would need {frames} frames in a cycle, and {limit} fit")
         }
         RejectReason::NoTime => "the drives are not told the time (`time` of [master])".to_owned(),
+        RejectReason::UnknownTrajectory => "there is no such trajectory".to_owned(),
+        RejectReason::StartMismatch { position, present } => format!(
+            "it begins at {position:.6} {length} while {axis} is at {present:.6} {length}, or at another velocity"
+        ),
+        RejectReason::TooLate => "the cycle at which it was to begin has passed".to_owned(),
+        RejectReason::SuccessorPending => {
+            "another trajectory is already to take the place of the present one".to_owned()
+        }
     }
 }
 

@@ -8,7 +8,7 @@ use core::f64::consts::TAU;
 use takt_rt::{
     AxisLimits, AxisParameters, BusHealth, BusParameters, BusSet, CommandPdo, ControlLaw, CycleInput,
     CycleTiming, Deadline, Dialect, Engine, EngineParameters, FeedbackSince, Frame, HostInterface, Id,
-    MappedObject, Mapping, OnViolation, Pdo, Phase, Received, Request, RequestEnvelope, RequestId, Scale,
+    Follow, MappedObject, Mapping, Pdo, Phase, Received, Request, RequestEnvelope, RequestId, Scale,
     ScaleParameters, SendBatch, StopCategories, TimingLadder,
 };
 
@@ -76,7 +76,7 @@ fn axis() -> Option<AxisParameters> {
             torque: 40.0,
         },
         start_tolerance: 0.02,
-        on_violation: OnViolation::Reject,
+        follow: Follow::Smooth,
         heartbeat_timeout_cycles: None,
         following_error_limit: 0.1,
         following_error_cycles: 50,
@@ -115,7 +115,7 @@ fn cycles() -> Option<Phase> {
         engine.sync(0, slot, at_ns);
         engine.receive(0, &Received { frame, at_ns });
         engine.compute(
-            &CycleInput { slot, now_ns: at_ns, buses: &health, behind: BusSet::default() },
+            &CycleInput { slot, slot_start_ns: at_ns, now_ns: at_ns, buses: &health, behind: BusSet::default() },
             &mut host,
         );
         let mut batch = SendBatch::new();

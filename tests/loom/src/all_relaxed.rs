@@ -1,12 +1,20 @@
-//! The mailbox and the ring with every access relaxed. The fences are the real ones.
+//! The mailbox, the ring and the requests of clients with every access relaxed. The fences are the real ones.
+
+#[path = "../../../src/controller/channels/client_requests.rs"]
+pub mod client_requests;
 
 #[path = "../../../src/controller/channels/latest.rs"]
 pub mod latest;
 #[path = "../../../src/controller/channels/ring.rs"]
 pub mod ring;
 
+mod request_numbers {
+    pub use crate::request_numbers::RequestNumbers;
+}
+
 mod primitives {
     pub use crate::array_queue::ArrayQueue;
+    pub use crate::atomic_cell::AtomicCell;
     pub use loom::sync::atomic::{Ordering, fence};
 
     pub struct AtomicU64(loom::sync::atomic::AtomicU64);
@@ -22,6 +30,32 @@ mod primitives {
 
         pub fn store(&self, value: u64, _: Ordering) {
             self.0.store(value, Ordering::Relaxed);
+        }
+
+        pub fn swap(&self, value: u64, _: Ordering) -> u64 {
+            self.0.swap(value, Ordering::Relaxed)
+        }
+
+        pub fn fetch_or(&self, bits: u64, _: Ordering) -> u64 {
+            self.0.fetch_or(bits, Ordering::Relaxed)
+        }
+
+        pub fn fetch_and(&self, bits: u64, _: Ordering) -> u64 {
+            self.0.fetch_and(bits, Ordering::Relaxed)
+        }
+
+        pub fn fetch_max(&self, value: u64, _: Ordering) -> u64 {
+            self.0.fetch_max(value, Ordering::Relaxed)
+        }
+
+        pub fn compare_exchange_weak(
+            &self,
+            current: u64,
+            new: u64,
+            _: Ordering,
+            _: Ordering,
+        ) -> Result<u64, u64> {
+            self.0.compare_exchange_weak(current, new, Ordering::Relaxed, Ordering::Relaxed)
         }
     }
 }

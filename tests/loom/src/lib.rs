@@ -5,7 +5,7 @@
 //! the channels. It keeps the last seven values of an atomic, and no test here writes more. It does not model load
 //! buffering: a load never sees a store that is executed later. The mailbox has no such executions, since only one end
 //! stores. The ring has none either: an end stores for the other end with release, and no earlier access of its thread can
-//! come after a release store.
+//! come after a release store. The same holds for the requests of clients: they change hands by a release of a bit.
 //!
 //! [`without_fences`] and [`all_relaxed`] are the same sources without the ordering. They must fail: that shows that the
 //! tests detect a missing ordering.
@@ -14,16 +14,22 @@
 
 pub mod all_relaxed;
 mod array_queue;
+mod atomic_cell;
 pub mod without_fences;
 
+#[path = "../../../src/controller/channels/client_requests.rs"]
+pub mod client_requests;
 #[path = "../../../src/controller/channels/latest.rs"]
 pub mod latest;
 #[path = "../../../src/controller/channels/records.rs"]
 pub mod records;
+#[path = "../../../src/controller/channels/request_numbers.rs"]
+pub mod request_numbers;
 #[path = "../../../src/controller/channels/ring.rs"]
 pub mod ring;
 
 mod primitives {
     pub use crate::array_queue::ArrayQueue;
+    pub use crate::atomic_cell::AtomicCell;
     pub use loom::sync::atomic::{AtomicU64, Ordering, fence};
 }

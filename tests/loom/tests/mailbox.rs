@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use loom::thread;
-use takt_loom::latest::{Attempt, Reader, Words, Writer, latest};
+use takt_loom::latest::{Attempt, Reader, Words, Writer, last, latest};
 use takt_loom::{all_relaxed, without_fences};
 
 const WORDS: usize = 2;
@@ -123,6 +123,32 @@ fn a_writer_does_not_wait_for_a_reader_that_was_preempted_in_the_middle_of_a_val
             assert_eq!(follow(&reader, 1), (1 + values, 0));
         });
     }
+}
+
+#[test]
+fn of_the_last_few_values_each_is_read_whole_or_known_to_be_lost() {
+    loom::model(|| {
+        let (mut writer, reader) = last(WORDS, 3);
+        let reading = thread::spawn(move || {
+            let (mut next, mut seen) = (1, 0);
+            for _ in 0..2 {
+                let completed = reader.completed();
+                next = next.max(reader.oldest(completed));
+                if next <= completed
+                    && let Some(value) = reader.read(next, take)
+                {
+                    assert_eq!(value, [next; WORDS], "words of two values");
+                    (next, seen) = (next + 1, seen + 1);
+                }
+            }
+            (next, seen, reader)
+        });
+        (1..=4).for_each(|number| write(&mut writer, number));
+        let (next, seen, reader) = reading.join().unwrap();
+        assert!(seen < next);
+        let rest: Vec<_> = (reader.oldest(4)..=4).map(|number| reader.read(number, take)).collect();
+        assert_eq!(rest, [3, 4].map(|number| Some([number; WORDS])));
+    });
 }
 
 /// The same as above, in short, for a mailbox without its ordering.

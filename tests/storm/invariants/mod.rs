@@ -7,6 +7,7 @@ mod power;
 mod releases;
 mod set_points;
 mod stops;
+mod streams;
 
 use takt::config::Config;
 use takt::sim::Observation;
@@ -79,6 +80,7 @@ impl Invariants {
         }
         origins::check(seen)?;
         motion::check(seen)?;
+        streams::check(seen)?;
         self.stops.check(seen)?;
         self.releases.check(seen)?;
         self.power.check(seen)?;

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use takt::config::{Axis, Config, OnViolation};
+use takt::config::{Axis, Config};
 use takt::controller::assemble;
 use takt_rt::{DriveState, Event, EventKind, Phase, Scale};
 
@@ -45,8 +45,6 @@ pub struct SetPoints {
     sent_slot: u64,
     /// What the last cycle was: the phase, and where the set-point was.
     last: Option<(Phase, f64)>,
-    /// Cycles in which the trajectory went on since the last one whose jerk is not limited.
-    kept: u32,
 }
 
 impl SetPoints {
@@ -66,7 +64,6 @@ impl SetPoints {
             steps: 0,
             sent_slot: 0,
             last: None,
-            kept: u32::MAX,
         }
     }
 
@@ -74,7 +71,6 @@ impl SetPoints {
         let axis = &seen.config.axes[index];
         let steps = seen.snapshot.steps - std::mem::replace(&mut self.steps, seen.snapshot.steps);
         self.cycles += steps as u32;
-        self.note_jerk(seen, axis, steps);
         self.check_rates(seen, index)?;
         self.check_wire(seen, index)?;
         if axis.control.is_profile() {
@@ -125,17 +121,6 @@ impl SetPoints {
         Ok(())
     }
 
-    /// A stream that is clamped is held to the limits of velocity and acceleration, and not to that of the jerk. Whatever else is
-    /// sent keeps it, also the stop that begins in the midst of such a stream.
-    fn note_jerk(&mut self, seen: &Seen<'_>, axis: &Axis, steps: u64) {
-        let is_streaming = seen.record.phase == Phase::Streaming;
-        if is_streaming && axis.on_violation == OnViolation::Clamp {
-            self.kept = 0;
-        } else if steps > 0 {
-            self.kept = self.kept.saturating_add(1);
-        }
-    }
-
     /// The planned set-point, by differences of what was sent, and what is on the wire of it.
     fn check_point(&self, axis: &Axis, next: &Point) -> Result<(), String> {
         let Some(last) = self.points[0] else { return Ok(()) };
@@ -183,9 +168,7 @@ impl SetPoints {
         }
         let Some(oldest) = self.points[2] else { return Ok(()) };
         let is_even = next.cycles == last.cycles && last.cycles == before.cycles;
-        // Over steps of several cycles it is a weighted mean of those over one: so far back as to the first of them.
-        let is_kept = self.kept > 3 * next.cycles.saturating_sub(1);
-        if is_even && is_kept && limits.jerk.is_finite() {
+        if is_even && limits.jerk.is_finite() {
             let oldest_velocity = (before.position - oldest.position) / before_s;
             let jerk = (acceleration - (last_velocity - oldest_velocity) / span_s) / span_s;
             if jerk.abs() > limits.jerk * (1.0 + ROUNDING) + 8.0 * noise / span_s.powi(3) {

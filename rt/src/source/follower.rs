@@ -1,0 +1,105 @@
+//! The next set-point of an axis that follows a moving target within its limits.
+//!
+//! Every set-point is reached from the one before it with constant jerk, or by a motion of the planner. So the limits of
+//! velocity, acceleration and jerk hold between set-points too, and in every finite difference of them.
+
+use crate::group_trajectory::stop_limits;
+use crate::guard::{AxisLimits, braking_distance};
+use crate::plan::{PlanError, Problem, State};
+
+/// How fast what is left of a small error goes away, in seconds.
+const SETTLING_S: f64 = 0.01;
+/// The time in which the acceleration limit would be reached by the jerk that corrects a small error at most, as a multiple of
+/// [`SETTLING_S`].
+const CORRECTING: f64 = 5.0;
+
+/// The set-point one period after `start`, on the way to `target`, which is where the target will be then.
+///
+/// What starts where it can be stopped within the limits ends where it can be stopped within them. A target that moves within
+/// the limits is followed to the last bit of what the change of its jerk leaves; one that leaps is reached as fast as the limits
+/// allow, without overshoot.
+///
+/// # Errors
+/// What is no number, or no number that can be planned with.
+pub fn follow(start: &State, target: &State, limits: &AxisLimits, period_s: f64) -> Result<State, PlanError> {
+    match corrected(start, target, limits, period_s) {
+        Some(next) => Ok(next),
+        None => tracked(start, target, limits, period_s),
+    }
+}
+
+/// The set-point with the jerk of the target and a little more, which takes a small error back. `None` where the error is not
+/// small, or a limit is near: that takes a plan.
+///
+/// The jerk feeds the errors back that the target would leave at the end of the period: so that both poles of what remains of
+/// them are real, and nothing overshoots or rings.
+fn corrected(start: &State, target: &State, limits: &AxisLimits, period_s: f64) -> Option<State> {
+    let h = period_s;
+    let coasting = start.after(h);
+    // Errors at the end of the period, in the units of the position.
+    let by_position = target.position - coasting.position;
+    let by_velocity = (target.velocity - coasting.velocity) * h;
+    let by_acceleration = (target.acceleration - start.acceleration) * h * h;
+    // What the jerk of the target makes of them, if it is where it was expected.
+    let (off_position, off_velocity) =
+        (by_position - by_acceleration / 6.0, by_velocity - by_acceleration / 2.0);
+    let share = (h / SETTLING_S).min(1.0);
+    let (position_gain, velocity_gain) = (share * share, share * (2.0 - share));
+    let cubed = h * h * h;
+    let correction = (position_gain * off_position.abs() + velocity_gain * off_velocity.abs()) / cubed;
+    let steepest = limits.acceleration.min(limits.deceleration);
+    // What is no number is not small either.
+    let is_small = correction <= limits.jerk.min(steepest / (CORRECTING * SETTLING_S));
+    if !is_small {
+        return None;
+    }
+    let jerk = (by_acceleration + position_gain * off_position + velocity_gain * off_velocity) / cubed;
+    if jerk.abs() > limits.jerk {
+        return None;
+    }
+    let next = State {
+        position: coasting.position + jerk * cubed / 6.0,
+        velocity: coasting.velocity + jerk * h * h / 2.0,
+        acceleration: start.acceleration + jerk * h,
+    };
+    is_safe(start, &next, limits, h).then_some(next)
+}
+
+/// Whether a set-point keeps the limits, and can be stopped within them.
+fn is_safe(start: &State, next: &State, limits: &AxisLimits, period_s: f64) -> bool {
+    let State { position, velocity, acceleration } = *next;
+    let steepest = limits.acceleration.max(limits.deceleration);
+    let (rising, falling) = limits.rising_and_falling(velocity);
+    if acceleration > rising || -acceleration > falling || start.acceleration.abs() > steepest {
+        return false;
+    }
+    let step = position - start.position;
+    // What the acceleration still adds to the velocity before the jerk has taken it back.
+    let gain = acceleration * acceleration / (2.0 * limits.jerk);
+    let fastest = velocity.abs() + if velocity * acceleration >= 0.0 { gain } else { 0.0 };
+    if fastest.max(gain - velocity.abs()) > limits.velocity || step.abs() > limits.velocity * period_s {
+        return false;
+    }
+    // From the fastest velocity with the highest acceleration.
+    let farthest = braking_bound(limits);
+    if position + farthest <= limits.position_max && position - farthest >= limits.position_min {
+        return true;
+    }
+    let highest = position + braking_distance(limits, velocity, acceleration);
+    let lowest = position - braking_distance(limits, -velocity, -acceleration);
+    highest <= limits.position_max.max(start.position) && lowest >= limits.position_min.min(start.position)
+}
+
+/// More than any stop within the limits needs.
+fn braking_bound(limits: &AxisLimits) -> f64 {
+    let slowest = limits.acceleration.min(limits.deceleration);
+    let steepest = limits.acceleration.max(limits.deceleration);
+    let building_up_s = if limits.jerk.is_finite() { 2.0 * steepest / limits.jerk } else { 0.0 };
+    limits.velocity * (limits.velocity / slowest + building_up_s)
+}
+
+/// The set-point on the fastest way to meet the target.
+fn tracked(start: &State, target: &State, limits: &AxisLimits, period_s: f64) -> Result<State, PlanError> {
+    Problem { start: *start, target: target.after(-period_s), limits: stop_limits(start, limits) }
+        .track(period_s)
+}

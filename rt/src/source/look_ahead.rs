@@ -1,0 +1,457 @@
+//! The points of a stream in the order of their stamps, and what they want at a time.
+
+use arrayvec::ArrayVec;
+
+use super::delay::{DelayEstimator, StreamDelay};
+use super::interpolation::{BEGIN, WINDOW, Window};
+use super::target::{AxisPoint, AxisTarget, PointRole, StreamCounts, StreamPoint, StreamSample, StreamWish};
+use crate::guard::AxisLimits;
+use crate::plan::State;
+use crate::record::MAX_AXES;
+use crate::time::{NANOSECONDS_PER_SECOND, Nanoseconds};
+
+/// The most points that a [`LookAhead`] can hold.
+pub const POINTS_AT_MOST: usize = 512;
+
+/// A point that is meant for a time so far ahead, or so long ago, is not meant.
+const FARTHEST_NS: u64 = 60 * NANOSECONDS_PER_SECOND;
+/// Points before the present ones that the motion between these depends on.
+const PAST_POINTS: usize = 2;
+/// So many more may be there before they are removed together.
+const PAST_POINTS_KEPT: usize = 8;
+/// Behind its last point a motion goes on at its velocity for one interval, but no longer than this.
+const COASTING_NS: i64 = 100_000_000;
+/// A stream that has run dry for more intervals than this begins anew with the next point.
+const PAUSE_INTERVALS: i64 = 4;
+/// As [`PAUSE_INTERVALS`], in time: both have to have passed.
+const PAUSE_NS: i64 = 100_000_000;
+/// After a single point the next one is waited for so long before the stream counts as dry.
+const SINGLE_POINT_NS: u64 = 500_000_000;
+
+/// What does not change while a [`LookAhead`] is used.
+#[derive(Clone, Debug)]
+pub struct LookAheadParameters<const AXES: usize = MAX_AXES> {
+    /// The limits of the axes that count. Points that ask for more are led to, and not along the motion between them. Without
+    /// limits, they are followed to the letter.
+    pub limits: ArrayVec<AxisLimits, AXES>,
+    /// The period of the slots in which it is sampled.
+    pub period_ns: Nanoseconds,
+    /// How far behind the stamps it runs.
+    pub delay: StreamDelay,
+}
+
+impl<const AXES: usize> Default for LookAheadParameters<AXES> {
+    /// Of no axes, sampled once in a millisecond.
+    fn default() -> Self {
+        let period_ns = NANOSECONDS_PER_SECOND / 1000;
+        Self { limits: ArrayVec::new(), period_ns, delay: StreamDelay::Automatic }
+    }
+}
+
+/// Why a point cannot be used.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PointError {
+    /// A number of it is not finite.
+    NotFinite {
+        /// The axis.
+        axis: u8,
+    },
+    /// It is meant for a time more than a minute from now.
+    FarAway,
+    /// It has come so late that nothing depends on it any more.
+    Late,
+    /// There is no room, and it is the farthest of all.
+    Full,
+}
+
+impl core::error::Error for PointError {}
+
+impl core::fmt::Display for PointError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::NotFinite { axis } => write!(f, "a number for axis {axis} is not finite"),
+            Self::FarAway => f.write_str("the point is meant for a time more than a minute from now"),
+            Self::Late => f.write_str("the point has come after everything that depends on it"),
+            Self::Full => f.write_str("there is no room for a point so far ahead"),
+        }
+    }
+}
+
+/// Where a stream is among its points.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Playback {
+    /// No point has come.
+    Awaited,
+    /// The axes are led to the first point, and wait there for its time.
+    Leading,
+    /// The axes follow the points.
+    Following,
+    /// The points have run out.
+    Dry,
+}
+
+/// The points of a stream, in whatever order they have come. [`LookAhead::sample`] says what they want in a slot.
+///
+/// `P` is the storage: a slice, an array or a box of points. At most [`POINTS_AT_MOST`] of them are used.
+///
+/// ```
+/// use takt_rt::{AxisLimits, AxisPoint, AxisTarget, LookAhead, LookAheadParameters, StreamDelay, StreamPoint, StreamWish};
+///
+/// let limits = [AxisLimits::NONE].into_iter().collect();
+/// let parameters = LookAheadParameters { limits, period_ns: 1_000_000, delay: StreamDelay::Fixed(40_000_000) };
+/// let mut stream = LookAhead::<1, _>::new([StreamPoint::default(); 64], parameters);
+/// for number in 0..20 {
+///     // 0.1 rad/s, every 10 ms.
+///     let axes = [AxisPoint::position(0.001 * f64::from(number))];
+///     let point = StreamPoint { at_ns: 10_000_000 * number as u64, axes, ..StreamPoint::default() };
+///     stream.insert(&point, 0).unwrap();
+/// }
+/// let StreamWish::Targets([AxisTarget::Position(wanted)]) = stream.sample(145_000_000).wish else { panic!() };
+/// assert!((wanted.position - 0.0105).abs() < 1e-12 && (wanted.velocity - 0.1).abs() < 1e-12);
+/// ```
+#[derive(Clone, Debug)]
+pub struct LookAhead<const AXES: usize, P> {
+    points: P,
+    /// The stamps of the points, in their order.
+    stamps_ns: [Nanoseconds; POINTS_AT_MOST],
+    /// In which place of the storage each of them is; behind those that are used, the free places.
+    places: [u16; POINTS_AT_MOST],
+    count: usize,
+    capacity: usize,
+    limits: ArrayVec<AxisLimits, AXES>,
+    delay: DelayEstimator,
+    playback: Playback,
+    /// The time of the last sample.
+    sampled_ns: Option<Nanoseconds>,
+    /// When the last point came.
+    arrived_ns: Nanoseconds,
+    /// When the last arrival was that was looked at for how late points come.
+    judged_ns: Option<Nanoseconds>,
+    /// The stamp of the last point of a chunk that is not complete.
+    open_chunk_ns: Option<Nanoseconds>,
+    counts: StreamCounts,
+}
+
+impl<const AXES: usize, P> LookAhead<AXES, P>
+where
+    P: AsRef<[StreamPoint<AXES>]> + AsMut<[StreamPoint<AXES>]>,
+{
+    /// One without points. What is in the storage does not matter.
+    pub fn new(points: P, parameters: LookAheadParameters<AXES>) -> Self {
+        let capacity = points.as_ref().len().min(POINTS_AT_MOST);
+        Self {
+            points,
+            stamps_ns: [0; POINTS_AT_MOST],
+            places: core::array::from_fn(|place| place as u16),
+            count: 0,
+            capacity,
+            limits: parameters.limits,
+            delay: DelayEstimator::new(parameters.period_ns, parameters.delay),
+            playback: Playback::Awaited,
+            sampled_ns: None,
+            arrived_ns: 0,
+            judged_ns: None,
+            open_chunk_ns: None,
+            counts: StreamCounts::default(),
+        }
+    }
+
+    /// A stream begins: forgets the one before it.
+    pub fn begin(&mut self) {
+        self.count = 0;
+        self.delay.restart();
+        self.playback = Playback::Awaited;
+        (self.sampled_ns, self.judged_ns, self.open_chunk_ns) = (None, None, None);
+        self.counts = StreamCounts::default();
+    }
+
+    /// How the stream has gone so far.
+    pub fn counts(&self) -> StreamCounts {
+        StreamCounts { lag_ns: self.delay.present_ns(), ..self.counts }
+    }
+
+    fn stamps(&self) -> &[Nanoseconds] {
+        self.stamps_ns.get(..self.count).unwrap_or_default()
+    }
+
+    fn stamp(&self, index: usize) -> Nanoseconds {
+        self.stamps_ns.get(index).copied().unwrap_or(0)
+    }
+
+    fn last_stamp(&self) -> Option<Nanoseconds> {
+        self.stamps().last().copied()
+    }
+
+    fn point(&self, index: usize) -> Option<&StreamPoint<AXES>> {
+        let place = self.places.get(index).copied()?;
+        self.points.as_ref().get(usize::from(place))
+    }
+
+    /// The time of the points that stands for a time of the slots.
+    fn play_time(&self, at_ns: Nanoseconds) -> Nanoseconds {
+        at_ns.saturating_sub(self.delay.present_ns())
+    }
+
+    /// Takes a point that has come at this time. Points may come in any order; times may not go back.
+    ///
+    /// # Errors
+    /// Why it is of no use. It is counted then, and nothing else has changed.
+    pub fn insert(&mut self, point: &StreamPoint<AXES>, now_ns: Nanoseconds) -> Result<(), PointError> {
+        let result = self.try_insert(point, now_ns);
+        self.counts.points += 1;
+        match result {
+            Ok(()) => {}
+            Err(PointError::Late) => self.counts.late_points += 1,
+            Err(_) => self.counts.lost_points += 1,
+        }
+        result
+    }
+
+    fn try_insert(&mut self, point: &StreamPoint<AXES>, now_ns: Nanoseconds) -> Result<(), PointError> {
+        if let Some(axis) = point.axes.iter().take(self.limits.len()).position(|axis| !axis.is_finite()) {
+            return Err(PointError::NotFinite { axis: axis as u8 });
+        }
+        let stamp_ns = point.at_ns;
+        if stamp_ns.abs_diff(now_ns) > FARTHEST_NS {
+            return Err(PointError::FarAway);
+        }
+        self.note_arrival(point, now_ns);
+        self.begin_after_pause(stamp_ns, now_ns);
+        let played_ns = self.play_time(now_ns);
+        let mut index = self.stamps().partition_point(|stamp| *stamp < stamp_ns);
+        let is_late = stamp_ns < played_ns && self.playback != Playback::Awaited;
+        let present = self.stamps().partition_point(|stamp| *stamp <= played_ns);
+        if is_late && index + 1 < present && self.playback == Playback::Following {
+            self.go_on_with_chunk(point, index);
+            return Err(PointError::Late);
+        }
+        index = self.go_on_with_chunk(point, index);
+        if self.stamps().get(index) == Some(&stamp_ns) {
+            self.put(index, point);
+        } else {
+            self.make_room(index)?;
+            self.put_new(index, point);
+            self.note_interval(index);
+        }
+        self.counts.late_points += u64::from(is_late);
+        self.arrived_ns = now_ns;
+        if self.playback == Playback::Awaited {
+            self.playback = Playback::Leading;
+        }
+        Ok(())
+    }
+
+    /// Removes what a chunk takes the place of up to this point of it. Returns the index for the point.
+    fn go_on_with_chunk(&mut self, point: &StreamPoint<AXES>, index: usize) -> usize {
+        let PointRole::Chunk { is_first, is_last } = point.role else { return index };
+        let mut index = index;
+        if let (Some(before_ns), false) = (self.open_chunk_ns, is_first) {
+            let from = self.stamps().partition_point(|stamp| *stamp <= before_ns);
+            self.remove(from, index);
+            index = from.min(index);
+        }
+        if is_last {
+            self.remove(index, self.count);
+        }
+        self.open_chunk_ns = (!is_last).then_some(point.at_ns);
+        index
+    }
+
+    /// Learns from an arrival how late points come. Those of one chunk come together, and so do those of one slot.
+    fn note_arrival(&mut self, point: &StreamPoint<AXES>, now_ns: Nanoseconds) {
+        let is_inside = matches!(point.role, PointRole::Chunk { is_first: false, .. });
+        if is_inside || self.judged_ns.replace(now_ns) == Some(now_ns) {
+            return;
+        }
+        let Some(last_ns) = self.last_stamp() else { return };
+        let is_chunk = matches!(point.role, PointRole::Chunk { .. });
+        if point.at_ns <= last_ns && !is_chunk {
+            return;
+        }
+        let apart = |from_ns: u64, to_ns: u64| to_ns.wrapping_sub(from_ns) as i64;
+        let interval_ns = match self.delay.interval_ns() {
+            0 => apart(last_ns, point.at_ns).max(0),
+            known => known,
+        };
+        // Whoever has paused is not late.
+        let late_ns = apart(point.at_ns, now_ns).saturating_add(interval_ns);
+        let behind_ns = apart(last_ns, now_ns);
+        if self.delay.interval_ns() == 0 {
+            self.delay.note_interval(interval_ns);
+        }
+        self.delay.note_arrival(behind_ns.min(late_ns));
+    }
+
+    fn note_interval(&mut self, index: usize) {
+        let is_farthest = index + 1 == self.count;
+        if let (true, Some(before)) = (is_farthest, index.checked_sub(1)) {
+            self.delay.note_interval(self.stamp(index).saturating_sub(self.stamp(before)) as i64);
+        }
+    }
+
+    /// What had been played before a pause has nothing to do with what comes after it.
+    fn begin_after_pause(&mut self, stamp_ns: Nanoseconds, now_ns: Nanoseconds) {
+        if self.playback != Playback::Dry {
+            return;
+        }
+        self.delay.settle();
+        let Some(last_ns) = self.last_stamp() else { return };
+        let pause_ns = self.delay.interval_ns().saturating_mul(PAUSE_INTERVALS).max(PAUSE_NS).unsigned_abs();
+        let has_paused = stamp_ns.saturating_sub(last_ns) > pause_ns;
+        if has_paused {
+            self.count = 0;
+            self.playback = Playback::Leading;
+        } else if stamp_ns > last_ns && self.play_time(now_ns) < stamp_ns {
+            self.playback = Playback::Following;
+        }
+    }
+
+    /// Room for a point at this index, if need be in place of the farthest one.
+    fn make_room(&mut self, index: usize) -> Result<(), PointError> {
+        if self.count < self.capacity {
+            return Ok(());
+        }
+        if index >= self.count {
+            return Err(PointError::Full);
+        }
+        self.count -= 1;
+        self.counts.lost_points += 1;
+        Ok(())
+    }
+
+    fn put(&mut self, index: usize, point: &StreamPoint<AXES>) {
+        let Some(place) = self.places.get(index).copied() else { return };
+        if let Some(kept) = self.points.as_mut().get_mut(usize::from(place)) {
+            *kept = *point;
+        }
+    }
+
+    fn put_new(&mut self, index: usize, point: &StreamPoint<AXES>) {
+        let end = self.count + 1;
+        if let (Some(places), Some(stamps)) =
+            (self.places.get_mut(index..end), self.stamps_ns.get_mut(index..end))
+        {
+            // The first free place comes to the index.
+            places.rotate_right(1);
+            stamps.rotate_right(1);
+            if let Some(stamp) = stamps.first_mut() {
+                *stamp = point.at_ns;
+            }
+            self.count = end;
+            self.put(index, point);
+        }
+    }
+
+    /// Removes the points with these indices.
+    fn remove(&mut self, from: usize, to: usize) {
+        if from >= to || to > self.count {
+            return;
+        }
+        if let (Some(places), Some(stamps)) =
+            (self.places.get_mut(from..self.count), self.stamps_ns.get_mut(from..self.count))
+        {
+            places.rotate_left(to - from);
+            stamps.rotate_left(to - from);
+            self.count -= to - from;
+        }
+    }
+
+    /// What the points want of every axis in the slot of this time. Ask for it once a slot: time goes on with it.
+    pub fn sample(&mut self, at_ns: Nanoseconds) -> StreamSample<AXES> {
+        let elapsed_ns = self.sampled_ns.map_or(0, |last_ns| at_ns.saturating_sub(last_ns));
+        self.sampled_ns = Some(at_ns);
+        match self.playback {
+            Playback::Following => self.delay.advance(elapsed_ns),
+            Playback::Awaited | Playback::Leading | Playback::Dry => self.delay.settle(),
+        }
+        StreamSample { wish: self.wish(at_ns), counts: self.counts() }
+    }
+
+    fn wish(&mut self, at_ns: Nanoseconds) -> StreamWish<AXES> {
+        let (Some(first_ns), Some(last_ns)) = (self.stamps().first().copied(), self.last_stamp()) else {
+            return StreamWish::Awaited;
+        };
+        let played_ns = self.play_time(at_ns);
+        if self.playback == Playback::Leading && (self.count == 1 || played_ns <= first_ns) {
+            let is_alone = self.count == 1;
+            let waited_ns = at_ns.saturating_sub(self.arrived_ns.max(first_ns));
+            if is_alone && waited_ns > SINGLE_POINT_NS {
+                self.playback = Playback::Dry;
+                return StreamWish::Dry(self.at_rest(0));
+            }
+            return StreamWish::Targets(self.at_rest(0));
+        }
+        let coasting_ns = self.delay.interval_ns().min(COASTING_NS).unsigned_abs();
+        if played_ns > last_ns.saturating_add(coasting_ns) || self.count == 1 {
+            self.playback = Playback::Dry;
+            return StreamWish::Dry(self.at_rest(self.count - 1));
+        }
+        if self.playback == Playback::Dry {
+            return StreamWish::Dry(self.at_rest(self.count - 1));
+        }
+        self.playback = Playback::Following;
+        StreamWish::Targets(self.interpolated(played_ns))
+    }
+
+    fn at_rest(&self, index: usize) -> [AxisTarget; AXES] {
+        let mut targets = [AxisTarget::default(); AXES];
+        if let Some(point) = self.point(index) {
+            for (target, axis) in targets.iter_mut().zip(&point.axes).take(self.limits.len()) {
+                *target = AxisTarget::Position(State::rest(axis.position));
+            }
+        }
+        targets
+    }
+
+    /// The motion between the points at a time, or behind the last one.
+    fn interpolated(&mut self, played_ns: Nanoseconds) -> [AxisTarget; AXES] {
+        let behind = self.stamps().partition_point(|stamp| *stamp <= played_ns);
+        // From the last but one on there is nothing behind the interval.
+        let begin = behind.saturating_sub(1).min(self.count.saturating_sub(2));
+        let begin = self.forget_past(begin);
+        let mut stamps_ns = [0; WINDOW];
+        let mut points: [Option<&StreamPoint<AXES>>; WINDOW] = [None; WINDOW];
+        let (mut from, mut to) = (WINDOW, 0);
+        for (place, (stamp_ns, point)) in stamps_ns.iter_mut().zip(&mut points).enumerate() {
+            let Some(index) = (begin + place).checked_sub(BEGIN).filter(|index| *index < self.count) else {
+                continue;
+            };
+            (*stamp_ns, *point) = (self.stamp(index), self.point(index));
+            (from, to) = (from.min(place), place + 1);
+        }
+        let last_ns = stamps_ns.get(BEGIN + 1).copied().unwrap_or(0);
+        let coasted_s = played_ns.saturating_sub(last_ns) as f64 / NANOSECONDS_PER_SECOND as f64;
+        let window = Window::new(&stamps_ns, from, to, played_ns.min(last_ns));
+        let rate = self.delay.time_rate();
+        let mut targets = [AxisTarget::default(); AXES];
+        for (axis, (target, limits)) in targets.iter_mut().zip(&self.limits).enumerate() {
+            let mut of_axis = [AxisPoint::default(); WINDOW];
+            for (to, point) in of_axis.iter_mut().zip(&points) {
+                if let Some(point) = point.and_then(|point| point.axes.get(axis)) {
+                    *to = *point;
+                }
+            }
+            let state = if coasted_s > 0.0 {
+                State { acceleration: 0.0, ..window.end_state(&of_axis) }.after(coasted_s)
+            } else {
+                window.state(&of_axis, limits)
+            };
+            *target = AxisTarget::Position(State {
+                position: state.position,
+                velocity: state.velocity * rate,
+                acceleration: state.acceleration * rate * rate,
+            });
+        }
+        targets
+    }
+
+    /// Removes the points that nothing depends on any more. Returns the new index of the present one.
+    fn forget_past(&mut self, present: usize) -> usize {
+        let past = present.saturating_sub(PAST_POINTS);
+        if past < PAST_POINTS_KEPT && self.count < self.capacity {
+            return present;
+        }
+        self.remove(0, past);
+        present - past
+    }
+}

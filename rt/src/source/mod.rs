@@ -1,0 +1,29 @@
+//! Where set-points come from when neither holding nor a move makes them: streams and trajectories.
+//!
+//! ```text
+//! points, stamped ──▶ LookAhead ── interpolation, some delay behind ──▶ StreamSample ──▶ follow ──▶ set-point
+//!                     (on the host's side of the interface)              (once a slot)    (the engine)
+//! ```
+//!
+//! - `target`: what is wanted of an axis, in a point and in a slot;
+//! - `look_ahead`: [`LookAhead`] keeps the points in the order of their stamps, and says what they want in a slot;
+//! - `delay`: how far behind the stamps it has to run so that the points do not run out, learnt from their arrival;
+//! - `interpolation`: the motion between points;
+//! - `follower`: the next set-point of an axis on its way to what is wanted, within every limit;
+//! - `trajectory`: set-points that were checked as a whole before they begin.
+
+mod delay;
+mod follower;
+mod interpolation;
+mod look_ahead;
+mod target;
+mod trajectory;
+
+pub use delay::StreamDelay;
+pub use follower::follow;
+pub use look_ahead::{LookAhead, LookAheadParameters, POINTS_AT_MOST, PointError};
+pub use target::{
+    AxisPoint, AxisTarget, Follow, PointRole, StreamCounts, StreamPoint, StreamReport, StreamSample,
+    StreamState, StreamWish,
+};
+pub use trajectory::{PathTime, Polynomial, TimeLawPhase, TrajectorySample, TrajectoryView};

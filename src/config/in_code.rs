@@ -1,0 +1,194 @@
+//! A configuration that is made in code, with the same defaults as one that is read from a file.
+//!
+//! ```
+//! use takt::config::{Axis, Bus, Config, DriveFamily, Interface, Limits};
+//!
+//! let limits = Limits {
+//!     position_min: -2.9,
+//!     position_max: 2.9,
+//!     velocity: 2.0,
+//!     acceleration: 8.0,
+//!     deceleration: 8.0,
+//!     jerk: 100.0,
+//!     torque: 87.0,
+//! };
+//! let joint = |name: &str, node| Axis::new(name, 0, node, DriveFamily::ErobCanopen, limits);
+//! let shoulder = Axis { reversed: true, ..joint("shoulder", 1) };
+//! let config = Config::new("arm", vec![Bus::new("can", Interface::Simulated)], vec![shoulder, joint("elbow", 2)]);
+//! config.validate()?;
+//! # Ok::<(), takt::ConfigError>(())
+//! ```
+//!
+//! Every field is public. Whoever starts with a configuration checks it first, by the rules of the reader of files.
+
+use std::path::PathBuf;
+
+use takt_rt::{Follow, StopCategories, StreamDelay};
+
+use super::defaults;
+use super::model::{
+    Axis, Bus, Config, Control, Cycle, DriveFamily, FollowingError, Interface, Limits, Master, MissedSlots,
+    Program, Realtime, SimulatedJoint, Simulation, Telemetry, Travel,
+};
+
+impl Config {
+    /// A controller of these axes on these buses, without a program. The period is 1 ms: see [`Config::with_period`].
+    pub fn new(name: impl Into<String>, buses: Vec<Bus>, axes: Vec<Axis>) -> Self {
+        let config = Self {
+            name: name.into(),
+            cycle: Cycle { period_ns: 0, command_phase_ns: 0 },
+            missed_slots: MissedSlots::default(),
+            stops: StopCategories::default(),
+            realtime: Realtime::default(),
+            master: Master {
+                node: defaults::MASTER_NODE,
+                heartbeat_ns: None,
+                heartbeat_timeout_ns: defaults::HEARTBEAT_TIMEOUT_NS,
+                time_ns: None,
+            },
+            stream_delay: StreamDelay::default(),
+            buses,
+            axes,
+            program: Program { repeat: defaults::REPEAT, moves: vec![] },
+            telemetry: Telemetry::default(),
+            simulation: Simulation {
+                seed: defaults::SEED,
+                longest_gap_ns: 0,
+                stops_for_missed_slots: defaults::STOPS_FOR_MISSED_SLOTS,
+            },
+        };
+        config.with_period(defaults::PERIOD_NS)
+    }
+
+    /// Sets the period of the cycle, and the values whose defaults depend on it: the command phase, the heartbeat of the
+    /// controller and its time-out, the longest gap of the simulation.
+    #[must_use]
+    pub fn with_period(mut self, period_ns: u64) -> Self {
+        self.cycle = Cycle { period_ns, command_phase_ns: defaults::command_phase_ns(period_ns) };
+        self.master.heartbeat_ns = Some(defaults::master_heartbeat_ns(&self.axes, period_ns.max(1)));
+        self.master.heartbeat_timeout_ns = defaults::heartbeat_timeout_ns(self.master.heartbeat_ns);
+        self.simulation.longest_gap_ns = defaults::longest_gap_ns(period_ns);
+        self
+    }
+}
+
+impl Default for MissedSlots {
+    fn default() -> Self {
+        Self {
+            warning: defaults::MISSED_SLOTS_WARNING,
+            degraded: defaults::MISSED_SLOTS_DEGRADED,
+            stop: defaults::MISSED_SLOTS_STOP,
+            leak_slots: defaults::MISSED_SLOTS_LEAK_SLOTS,
+        }
+    }
+}
+
+impl Default for Realtime {
+    fn default() -> Self {
+        Self {
+            priority: Some(defaults::PRIORITY),
+            cpu: None,
+            lock_memory: defaults::LOCK_MEMORY,
+            hold_dma_latency: defaults::HOLD_DMA_LATENCY,
+            spin_guard_ns: None,
+        }
+    }
+}
+
+impl Default for Telemetry {
+    fn default() -> Self {
+        Self {
+            directory: PathBuf::from(defaults::DIRECTORY),
+            is_recorded: true,
+            is_candump_written: false,
+            black_box_ns: Some(defaults::BLACK_BOX_NS),
+            ring_records: defaults::RING_RECORDS,
+        }
+    }
+}
+
+impl Bus {
+    /// A classic bus of 1 Mbit/s with the cycle of the controller.
+    pub fn new(name: impl Into<String>, interface: Interface) -> Self {
+        Self {
+            name: name.into(),
+            interface,
+            divider: 1,
+            bit_rate: defaults::BIT_RATE,
+            data_bit_rate: None,
+            restart_ms: defaults::RESTART_MS,
+            service_frames_per_cycle: defaults::SERVICE_FRAMES_PER_CYCLE,
+            sdo_while_enabled: defaults::SDO_WHILE_ENABLED,
+        }
+    }
+}
+
+impl Axis {
+    /// A rotary axis in the usual mode of its family: an index into the buses, a node ID from 1 to 127, and limits in rad.
+    pub fn new(name: impl Into<String>, bus: usize, node: u8, drive: DriveFamily, limits: Limits) -> Self {
+        let (travel, control, mapping) = (Travel::Rotary, defaults::control(drive), defaults::mapping(drive));
+        Self {
+            name: name.into(),
+            bus,
+            node,
+            drive,
+            control,
+            travel,
+            counts_per_turn: drive.counts_per_turn(),
+            gear_ratio: defaults::GEAR_RATIO,
+            reversed: false,
+            zero_counts: 0,
+            limits,
+            following_error: FollowingError {
+                limit: defaults::following_error(travel),
+                time_ns: defaults::FOLLOWING_ERROR_TIME_NS,
+            },
+            start_tolerance: defaults::start_tolerance(travel),
+            target_tolerance: defaults::target_tolerance(travel, &control),
+            follow: Follow::default(),
+            missed_feedback_cycles: defaults::MISSED_FEEDBACK_CYCLES,
+            transmission_type: defaults::TRANSMISSION_TYPE,
+            mapping,
+            feedback: defaults::feedback(mapping),
+            answers_sync: defaults::ANSWERS_SYNC,
+            feedback_delay_ns: defaults::FEEDBACK_DELAY_NS,
+            heartbeat_ns: None,
+            identity: defaults::identity(drive),
+            dcf: None,
+            simulated: SimulatedJoint::within(&limits),
+        }
+    }
+
+    /// The same as a linear axis with a lead in m, and limits in m. Sets the tolerances of a linear axis.
+    #[must_use]
+    pub fn linear(mut self, lead_m: f64) -> Self {
+        self.travel = Travel::Linear { lead_m };
+        self.following_error.limit = defaults::following_error(self.travel);
+        self.start_tolerance = defaults::start_tolerance(self.travel);
+        self.target_tolerance = defaults::target_tolerance(self.travel, &self.control);
+        self
+    }
+
+    /// The same in another mode. In CST the target tolerance allows for static friction.
+    #[must_use]
+    pub fn with_control(mut self, control: Control) -> Self {
+        self.control = control;
+        self.target_tolerance = defaults::target_tolerance(self.travel, &control);
+        self
+    }
+}
+
+impl SimulatedJoint {
+    /// A joint with these limits.
+    pub fn within(limits: &Limits) -> Self {
+        Self {
+            inertia: defaults::INERTIA,
+            viscous_friction: defaults::VISCOUS_FRICTION,
+            coulomb_friction: defaults::COULOMB_FRICTION,
+            rated_torque: limits.torque,
+            peak_torque: defaults::PEAK_TO_RATED_TORQUE * limits.torque,
+            initial_position: defaults::initial_position(limits),
+            power_up_ns: defaults::POWER_UP_NS,
+        }
+    }
+}

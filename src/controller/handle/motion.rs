@@ -1,0 +1,76 @@
+//! Motions that are under way, and how they end.
+
+use std::time::Duration;
+
+use takt_rt::{Answer, MotionState, RequestId, Snapshot};
+
+use super::Handle;
+use super::error::{MotionError, Refused, Stopped, WaitError};
+
+/// Identifies a motion, for [`Handle::wait`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct MotionId(pub(super) RequestId);
+
+/// Parameters of a move.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MoveOptions {
+    /// Fraction of the velocity limits, above 0 up to 1.
+    pub velocity_scale: f64,
+    /// Fraction of the acceleration and jerk limits, above 0 up to 1.
+    pub acceleration_scale: f64,
+    /// The shortest duration of the move, in seconds.
+    pub minimum_duration_s: f64,
+}
+
+impl Default for MoveOptions {
+    fn default() -> Self {
+        Self { velocity_scale: 1.0, acceleration_scale: 1.0, minimum_duration_s: 0.0 }
+    }
+}
+
+impl Handle {
+    /// Waits until a motion has reached its targets: until the axes are at rest there, or a velocity or torque is reached. The
+    /// result is that of this motion, independent of what the group did before and after it. It comes with the cycle in which the
+    /// motion ends, however it ends: done, replaced, stopped or refused.
+    ///
+    /// # Errors
+    /// See [`MotionError`].
+    pub fn wait(&self, motion: MotionId, at_most: Duration) -> Result<(), MotionError> {
+        match self.wait_until(at_most, |state| self.result_in(state, motion)) {
+            Ok(result) => result,
+            Err(WaitError::NotInTime) => Err(MotionError::NotInTime),
+            Err(WaitError::Ended) => Err(MotionError::Ended),
+        }
+    }
+
+    /// How a motion has ended; `None` while it is under way. Does not wait.
+    pub fn result_of(&self, motion: MotionId) -> Option<Result<(), MotionError>> {
+        let has_ended = self.has_ended();
+        self.result_in(&self.state(), motion).or_else(|| has_ended.then_some(Err(MotionError::Ended)))
+    }
+
+    /// How a motion has ended, by a state.
+    fn result_in(&self, state: &Snapshot, MotionId(request): MotionId) -> Option<Result<(), MotionError>> {
+        let machine = self.machine();
+        let result = match (state.motions.of(request), state.answers.of(request)) {
+            (Some(MotionState::InProgress), _) => return None,
+            (Some(MotionState::Finished), _) => Ok(()),
+            (Some(MotionState::Stopped(reason)), _) => Err(Stopped::new(reason, machine).into()),
+            (Some(MotionState::Replaced { .. }), _) => Err(MotionError::Replaced),
+            (None, Answer::Rejected(refusal)) => Err(Refused::new(refusal, machine).into()),
+            (None, Answer::Granted) => Err(MotionError::Forgotten),
+            (None, Answer::None) if state.answers.have_forgotten(request) => Err(MotionError::Forgotten),
+            (None, Answer::None) if self.is_discarded(request, state) => Err(MotionError::Overtaken),
+            (None, Answer::None) => return None,
+        };
+        Some(result)
+    }
+
+    /// Whether a stop has discarded a request that has no answer in this state.
+    pub(super) fn is_discarded(&self, request: RequestId, state: &Snapshot) -> bool {
+        let stop = self.0.clients.newest_stop();
+        // Every request that was taken before the stop has its answer in the first state that has that of the stop.
+        let has_stopped = state.answers.of(stop) != Answer::None || state.answers.have_forgotten(stop);
+        request < stop && has_stopped
+    }
+}

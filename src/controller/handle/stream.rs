@@ -1,0 +1,139 @@
+//! Streams: points stamped with the time that they are meant for, from any thread.
+
+use std::time::Duration;
+
+use takt_rt::linux::MonotonicClock;
+use takt_rt::{AxisPoint, Clock, MAX_AXES, Nanoseconds, PointRole, Request, StreamPoint, StreamReport};
+
+use super::Handle;
+use super::error::CommandError;
+
+/// Why points were not taken; none of them was, then.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum StreamError {
+    /// A point needs an entry for each axis.
+    #[error("there are {axes} axes, and the point has entries for {given}")]
+    Count {
+        /// The entries.
+        given: usize,
+        /// The axes.
+        axes: usize,
+    },
+    /// A number is infinite or none.
+    #[error("point {point} has a number that is not finite for axis {axis}: {value:?}")]
+    NotFinite {
+        /// Which point, from 0 on.
+        point: usize,
+        /// Which axis, from 0 on.
+        axis: usize,
+        /// What is given for it.
+        value: AxisPoint,
+    },
+    /// Too many points wait: the group does not stream, or gets more than it can look ahead.
+    #[error("too many points wait for the controller: does it stream?")]
+    Full,
+    /// The controller has ended, or is about to.
+    #[error("the controller has ended")]
+    Ended,
+}
+
+/// Hands points to the stream of a controller, from any thread. Clones are cheap and equal.
+///
+/// Stamps are in nanoseconds of the clock that [`StreamHandle::now_ns`] shows. The set-points run behind the stamps by
+/// [`lag`](StreamHandle::lag), which depends on the interval of the points, on how late they come, and on the configuration
+/// (`[stream] delay`).
+///
+/// A group follows the points from [`Handle::begin_stream`] on.
+#[derive(Clone)]
+pub struct StreamHandle(Handle);
+
+impl StreamHandle {
+    /// The present time on the clock of the stamps: `CLOCK_MONOTONIC`.
+    pub fn now_ns() -> Nanoseconds {
+        MonotonicClock::default().now_ns()
+    }
+
+    /// Takes a point that is meant for a time: a number for each axis, or an [`AxisPoint`] with velocity and acceleration.
+    /// Points may come early, late, and in any order. One with the stamp of another one takes its place.
+    ///
+    /// # Errors
+    /// See [`StreamError`].
+    pub fn push<P: Copy + Into<AxisPoint>>(&self, at_ns: Nanoseconds, axes: &[P]) -> Result<(), StreamError> {
+        let axes = self.entries(0, axes)?;
+        let point = StreamPoint { at_ns, role: PointRole::Single, axes };
+        self.0.0.streamer.push(&[point]).map_err(|_| StreamError::Full)
+    }
+
+    /// The same as [`StreamHandle::push`] for a point that is meant for now.
+    ///
+    /// # Errors
+    /// See [`StreamError`].
+    pub fn push_now<P: Copy + Into<AxisPoint>>(&self, axes: &[P]) -> Result<(), StreamError> {
+        self.push(Self::now_ns(), axes)
+    }
+
+    /// Takes a chunk: points at equal intervals, the first of which is meant for `from_ns`. It takes the place of every earlier
+    /// point from there on.
+    ///
+    /// # Errors
+    /// See [`StreamError`].
+    pub fn push_chunk<P: Copy + Into<AxisPoint>, A: AsRef<[P]>>(
+        &self,
+        from_ns: Nanoseconds,
+        interval: Duration,
+        points: &[A],
+    ) -> Result<(), StreamError> {
+        let entries = |(index, axes): (usize, &A)| self.entries(index, axes.as_ref());
+        let points = points.iter().enumerate().map(entries).collect::<Result<Vec<_>, _>>()?;
+        let interval_ns = u64::try_from(interval.as_nanos()).unwrap_or(u64::MAX);
+        self.0.0.streamer.push_chunk(from_ns, interval_ns, &points).map_err(|_| StreamError::Full)
+    }
+
+    /// What the stream is doing, how far it is behind the stamps, and how many points have come, came late or were lost.
+    pub fn report(&self) -> StreamReport {
+        self.0.state().stream
+    }
+
+    /// How far the set-points are behind the stamps now.
+    pub fn lag(&self) -> Duration {
+        Duration::from_nanos(self.report().counts.lag_ns)
+    }
+
+    fn entries<P: Copy + Into<AxisPoint>>(
+        &self,
+        point: usize,
+        axes: &[P],
+    ) -> Result<[AxisPoint; MAX_AXES], StreamError> {
+        if self.0.0.life.is_ending() {
+            return Err(StreamError::Ended);
+        }
+        let expected = self.0.axes().len();
+        if axes.len() != expected {
+            return Err(StreamError::Count { given: axes.len(), axes: expected });
+        }
+        let mut all = [AxisPoint::default(); MAX_AXES];
+        for (axis, (to, from)) in all.iter_mut().zip(axes).enumerate() {
+            *to = (*from).into();
+            if !to.is_finite() {
+                return Err(StreamError::NotFinite { point, axis, value: *to });
+            }
+        }
+        Ok(all)
+    }
+}
+
+impl Handle {
+    /// Begins to follow the points of [`Handle::stream`]. The first one must come within the enable time-out. The axes are led to it
+    /// within their limits; where an axis is to `follow = "exact"`, it must be near the joint.
+    ///
+    /// # Errors
+    /// [`CommandError::Refused`] unless the group holds its position and is punctual, [`CommandError::Full`], [`CommandError::Ended`].
+    pub fn begin_stream(&self) -> Result<(), CommandError> {
+        self.request(Request::Stream)
+    }
+
+    /// A handle to stream points by, for any thread.
+    pub fn stream(&self) -> StreamHandle {
+        StreamHandle(self.clone())
+    }
+}

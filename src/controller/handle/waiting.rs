@@ -1,0 +1,127 @@
+//! Waiting for cycles. The real-time thread does nothing for those who wait: it wakes no one and sees no one. They sleep until
+//! the next state is expected, and look.
+//!
+//! A cycle shows its state when its set-points have been sent, after about six tenths of the slot. A sleep that ends then does not
+//! disturb the next SYNC; see [`sleep_alignment`](crate::controller::sleep_alignment).
+
+use std::time::Duration;
+
+use takt_rt::linux::MonotonicClock;
+use takt_rt::{Clock, Nanoseconds, Phase, Snapshot};
+
+use super::Handle;
+use super::error::WaitError;
+
+/// How much later than the last one the next state is looked for, beyond the period. It covers the usual jitter of a cycle.
+const MARGIN_NS: Nanoseconds = 20_000;
+/// Time from one look to the next while a state is overdue, and before the first one.
+const OVERDUE_NS: Nanoseconds = 100_000;
+/// The shortest time from one look to the next of a wait for anything else than the next cycle.
+const LOOK_NS: Nanoseconds = 1_000_000;
+
+/// When a wait is to end.
+pub(super) struct Deadline(Nanoseconds);
+
+impl Deadline {
+    pub(super) fn after(at_most: Duration) -> Self {
+        let at_most_ns = Nanoseconds::try_from(at_most.as_nanos()).unwrap_or(Nanoseconds::MAX);
+        Self(now_ns().saturating_add(at_most_ns))
+    }
+}
+
+pub(super) fn now_ns() -> Nanoseconds {
+    MonotonicClock::default().now_ns()
+}
+
+impl Handle {
+    /// Waits for the next cycle to be complete, and returns the state after it.
+    ///
+    /// The thread wakes 20 µs after the time at which the state is expected, plus the wake-up latency that the operating system gives it.
+    /// An ordinary thread on Linux has 50 µs of timer slack beside. To miss no cycle, use [`Handle::cycle_after`].
+    ///
+    /// # Errors
+    /// [`WaitError::NotInTime`] after `at_most`, [`WaitError::Ended`].
+    pub fn next_cycle(&self, at_most: Duration) -> Result<Snapshot, WaitError> {
+        self.cycle_after(self.state().slot, at_most)
+    }
+
+    /// Waits for a state that is newer than that of `slot`, and returns it. If there is one already, it does not wait. The newest state
+    /// is returned: if its slot is not the next one, the caller was too slow, or the loop has missed slots.
+    ///
+    /// # Errors
+    /// [`WaitError::NotInTime`] after `at_most`, [`WaitError::Ended`].
+    pub fn cycle_after(&self, slot: u64, at_most: Duration) -> Result<Snapshot, WaitError> {
+        let deadline = Deadline::after(at_most);
+        loop {
+            let has_ended = self.has_ended();
+            let state = self.state();
+            if state.slot > slot {
+                return Ok(state);
+            }
+            if has_ended {
+                return Err(WaitError::Ended);
+            }
+            self.sleep_until_cycle(&state, self.period_ns(), &deadline)?;
+        }
+    }
+
+    /// Waits until the group is in a phase.
+    ///
+    /// # Errors
+    /// [`WaitError::NotInTime`] after `at_most`, [`WaitError::Ended`].
+    pub fn wait_for(&self, phase: Phase, at_most: Duration) -> Result<(), WaitError> {
+        self.wait_until(at_most, |state| (state.phase == phase).then_some(()))
+    }
+
+    /// Waits until `find` finds something in a state. It looks at one state of each cycle, or of each millisecond if the period is
+    /// shorter.
+    ///
+    /// # Errors
+    /// [`WaitError::NotInTime`] after `at_most`, [`WaitError::Ended`].
+    pub fn wait_until<T>(
+        &self,
+        at_most: Duration,
+        mut find: impl FnMut(&Snapshot) -> Option<T>,
+    ) -> Result<T, WaitError> {
+        let deadline = Deadline::after(at_most);
+        loop {
+            // This is read before the state, so that the state includes the last cycle before the end.
+            let has_ended = self.has_ended();
+            let state = self.state();
+            if let Some(found) = find(&state) {
+                return Ok(found);
+            }
+            if has_ended {
+                return Err(WaitError::Ended);
+            }
+            self.sleep_until_look(&state, &deadline)?;
+        }
+    }
+
+    /// Sleeps until a later state is expected, at least a millisecond later.
+    pub(super) fn sleep_until_look(&self, state: &Snapshot, deadline: &Deadline) -> Result<(), WaitError> {
+        let period_ns = self.period_ns().max(1);
+        self.sleep_until_cycle(state, LOOK_NS.div_ceil(period_ns) * period_ns, deadline)
+    }
+
+    /// Sleeps until the state is expected that comes so long after this one.
+    fn sleep_until_cycle(
+        &self,
+        state: &Snapshot,
+        later_ns: Nanoseconds,
+        deadline: &Deadline,
+    ) -> Result<(), WaitError> {
+        let now_ns = now_ns();
+        if now_ns >= deadline.0 {
+            return Err(WaitError::NotInTime);
+        }
+        let expected_ns = state.at_ns.saturating_add(later_ns).saturating_add(MARGIN_NS);
+        let look_ns = expected_ns.max(now_ns.saturating_add(OVERDUE_NS));
+        MonotonicClock::default().wait_until(look_ns.min(deadline.0));
+        Ok(())
+    }
+
+    fn period_ns(&self) -> Nanoseconds {
+        self.machine().cycle_ns
+    }
+}

@@ -1,0 +1,19 @@
+//! Playing points from a file into the arm: `takt play`.
+//!
+//! [`PlayFile`] is what the file says. [`FileTrajectory`] makes one checked trajectory of it. A [`Stage`] is an arm in virtual time
+//! or in real time, and [`execute`] leads it to the first point and through the file. [`SetPointLog`] keeps what was commanded.
+
+mod error;
+mod file;
+mod in_virtual_time;
+mod performance;
+mod set_points;
+mod table;
+mod trajectory;
+
+pub use error::{FileProblem, PlayFileError};
+pub use file::{JointColumns, JointPoint, PlayFile, PlayRow, read};
+pub use in_virtual_time::VirtualStage;
+pub use performance::{APPROACH_SCALE, PlayError, Stage, execute};
+pub use set_points::{ArmedFrom, AxisMaxima, SetPointLog};
+pub use trajectory::FileTrajectory;

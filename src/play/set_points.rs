@@ -1,0 +1,285 @@
+//! The set-points that were commanded while a file was played: one row a cycle into a file, and the largest of their rates.
+
+use std::io::{self, Write};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use serde::Serialize;
+use takt_rt::{CycleRecord, Phase};
+
+/// Cycles at rest that are kept after the end: a third difference has three more set-points before it.
+const RESTING_ROWS: u32 = 3;
+
+/// The largest rates of an axis, as the guard takes them: by the differences of the set-points from cycle to cycle.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct AxisMaxima {
+    /// The name of the axis.
+    pub name: String,
+    /// rad/s (m/s)
+    pub velocity_max: f64,
+    /// rad/s² (m/s²)
+    pub acceleration_max: f64,
+    /// rad/s³ (m/s³)
+    pub jerk_max: f64,
+}
+
+/// From which slot on a motion counts: the first that begins there. Set by whoever begins it.
+#[derive(Clone, Debug)]
+pub struct ArmedFrom(Arc<AtomicU64>);
+
+impl Default for ArmedFrom {
+    fn default() -> Self {
+        Self(Arc::new(AtomicU64::new(u64::MAX)))
+    }
+}
+
+impl ArmedFrom {
+    /// The next motion that begins in this slot or later counts.
+    pub fn set(&self, slot: u64) {
+        self.0.store(slot, Ordering::Release);
+    }
+
+    fn has_come(&self, slot: u64) -> bool {
+        slot >= self.0.load(Ordering::Acquire)
+    }
+}
+
+/// Takes the records of a run, one after the other.
+pub struct SetPointLog {
+    out: Option<Box<dyn Write + Send>>,
+    failure: Option<io::Error>,
+    armed: ArmedFrom,
+    /// The time of the set-points from which the motion begins.
+    begins_s: f64,
+    period_s: f64,
+    stage: Stage,
+    maxima: Vec<AxisMaxima>,
+    /// The positions of the last three rows of each axis, the newest first.
+    last: Vec<[f64; 3]>,
+}
+
+enum Stage {
+    /// The motion has not begun; the record of the last cycle.
+    Waiting(Option<Box<CycleRecord>>),
+    /// It began after this slot.
+    Playing {
+        after_slot: u64,
+    },
+    Resting {
+        after_slot: u64,
+        rows: u32,
+    },
+    Over,
+}
+
+impl SetPointLog {
+    /// A log for axes with these names. `begins_s` is the time of the set-points from which the motion begins.
+    pub fn new(
+        axes: &[String],
+        period_ns: u64,
+        begins_s: f64,
+        armed: ArmedFrom,
+        out: Option<Box<dyn Write + Send>>,
+    ) -> Self {
+        let maxima = axes.iter().map(|name| AxisMaxima {
+            name: name.clone(),
+            velocity_max: 0.0,
+            acceleration_max: 0.0,
+            jerk_max: 0.0,
+        });
+        let mut log = Self {
+            out,
+            failure: None,
+            armed,
+            begins_s,
+            period_s: period_ns as f64 / 1e9,
+            stage: Stage::Waiting(None),
+            maxima: maxima.collect(),
+            last: Vec::new(),
+        };
+        let columns = ["", ".velocity", ".acceleration"]
+            .iter()
+            .flat_map(|suffix| axes.iter().map(move |axis| quoted(&format!("{axis}{suffix}"))));
+        let header = ["t".to_owned()].into_iter().chain(columns).collect::<Vec<_>>().join(",");
+        log.write(&header);
+        log
+    }
+
+    /// Takes the record of the next cycle. Set-points that were not sent leave no row.
+    pub fn add(&mut self, record: &CycleRecord) {
+        if !record.is_commanded {
+            return;
+        }
+        let slot = record.timing.slot;
+        let is_at_rest = record.phase == Phase::Holding;
+        let is_in_motion = matches!(record.phase, Phase::Moving | Phase::Streaming | Phase::Stopping);
+        match &mut self.stage {
+            Stage::Waiting(last) => {
+                let was_at_rest = last.as_ref().filter(|last| last.phase == Phase::Holding);
+                if let Some(first) = was_at_rest.filter(|_| is_in_motion && self.armed.has_come(slot)) {
+                    let (first, after_slot) = (first.clone(), slot.saturating_sub(1));
+                    self.stage = Stage::Playing { after_slot };
+                    self.row(&first, 0);
+                    self.row(record, 1);
+                } else {
+                    *last = Some(Box::new(*record));
+                }
+            }
+            Stage::Playing { after_slot } => {
+                let after_slot = *after_slot;
+                if is_at_rest {
+                    self.stage = Stage::Resting { after_slot, rows: 0 };
+                } else if !is_in_motion && record.phase != Phase::Disabling {
+                    self.stage = Stage::Over;
+                    return;
+                }
+                self.row(record, slot.saturating_sub(after_slot));
+            }
+            Stage::Resting { after_slot, rows } => {
+                let (after_slot, rows) = (*after_slot, *rows + 1);
+                self.stage = Stage::Resting { after_slot, rows };
+                if is_at_rest {
+                    self.row(record, slot.saturating_sub(after_slot));
+                }
+                if !is_at_rest || rows >= RESTING_ROWS {
+                    self.stage = Stage::Over;
+                }
+            }
+            Stage::Over => {}
+        }
+    }
+
+    /// Whether the motion has ended, and all of it is here.
+    pub fn is_over(&self) -> bool {
+        matches!(self.stage, Stage::Over)
+    }
+
+    /// The largest rates, and the first error of writing.
+    pub fn finish(mut self) -> (Vec<AxisMaxima>, Option<io::Error>) {
+        if let Some(out) = &mut self.out
+            && let Err(error) = out.flush()
+        {
+            self.failure.get_or_insert(error);
+        }
+        (self.maxima, self.failure)
+    }
+
+    fn row(&mut self, record: &CycleRecord, cycle: u64) {
+        let axes = record.axes();
+        if self.last.is_empty() {
+            // The motion begins from rest.
+            self.last = axes.iter().map(|axis| [axis.position_set; 3]).collect();
+        }
+        let period_s = self.period_s;
+        for ((axis, last), maxima) in axes.iter().zip(&mut self.last).zip(&mut self.maxima) {
+            let (next, [p0, p1, p2]) = (axis.position_set, *last);
+            let largest = |most: &mut f64, value: f64| *most = most.max(value.abs());
+            largest(&mut maxima.velocity_max, (next - p0) / period_s);
+            largest(&mut maxima.acceleration_max, (next - 2.0 * p0 + p1) / (period_s * period_s));
+            largest(&mut maxima.jerk_max, (next - 3.0 * (p0 - p1) - p2) / (period_s * period_s * period_s));
+            *last = [next, p0, p1];
+        }
+        if self.out.is_none() {
+            return;
+        }
+        let mut line = format!("{:.9}", self.begins_s + cycle as f64 * period_s);
+        for axis in axes {
+            line += &format!(",{}", axis.position_set);
+        }
+        for rate in
+            axes.iter().map(|axis| axis.velocity_set).chain(axes.iter().map(|axis| axis.acceleration_set))
+        {
+            line += &format!(",{rate}");
+        }
+        self.write(&line);
+    }
+
+    /// Writes a line; after a failure, none.
+    fn write(&mut self, line: &str) {
+        if self.failure.is_some() {
+            return;
+        }
+        if let Some(out) = &mut self.out {
+            self.failure = writeln!(out, "{line}").err();
+        }
+    }
+}
+
+/// A name as a cell.
+fn quoted(name: &str) -> String {
+    if name.contains([',', '"', '\n', '\r']) {
+        format!("\"{}\"", name.replace('"', "\"\""))
+    } else {
+        name.to_owned()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::Mutex;
+
+    #[derive(Clone, Default)]
+    struct Shared(Arc<Mutex<Vec<u8>>>);
+
+    impl Write for Shared {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            self.0.lock().unwrap().write(bytes)
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    fn record(slot: u64, phase: Phase, position: f64) -> CycleRecord {
+        let mut record = CycleRecord { phase, is_commanded: true, axis_count: 1, ..CycleRecord::default() };
+        record.timing.slot = slot;
+        record.axes[0].position_set = position;
+        record
+    }
+
+    #[test]
+    fn the_motion_that_begins_when_armed_is_kept_with_the_rest_on_both_sides() {
+        let (out, armed) = (Shared::default(), ArmedFrom::default());
+        let sink: Box<dyn Write + Send> = Box::new(out.clone());
+        let mut log = SetPointLog::new(&["a,b".to_owned()], 1_000_000, 2.0, armed.clone(), Some(sink));
+        // The way to the first point is not kept.
+        log.add(&record(1, Phase::Holding, 0.0));
+        log.add(&record(2, Phase::Moving, 0.5));
+        log.add(&record(3, Phase::Holding, 1.0));
+        armed.set(4);
+        log.add(&record(4, Phase::Holding, 1.0));
+        log.add(&record(5, Phase::Moving, 1.001));
+        log.add(&CycleRecord { is_commanded: false, ..record(6, Phase::Moving, 9.0) });
+        log.add(&record(7, Phase::Moving, 1.003));
+        (8..20).for_each(|slot| log.add(&record(slot, Phase::Holding, 1.003)));
+        assert!(log.is_over());
+        let (maxima, failure) = log.finish();
+        assert!(failure.is_none());
+        let close = |value: f64, expected: f64| (value - expected).abs() < 1e-6 * expected;
+        assert!(close(maxima[0].velocity_max, 2.0) && close(maxima[0].acceleration_max, 2_000.0));
+        assert!(close(maxima[0].jerk_max, 3e6), "{}", maxima[0].jerk_max);
+        let text = String::from_utf8(out.0.lock().unwrap().clone()).unwrap();
+        let expected = "t,\"a,b\",\"a,b.velocity\",\"a,b.acceleration\"\n2.000000000,1,0,0\n2.001000000,1.001,0,0\n\
+            2.003000000,1.003,0,0\n2.004000000,1.003,0,0\n2.005000000,1.003,0,0\n2.006000000,1.003,0,0\n\
+            2.007000000,1.003,0,0\n";
+        assert_eq!(text, expected);
+    }
+
+    #[test]
+    fn a_file_that_cannot_be_written_is_told_in_the_end() {
+        struct Full;
+        impl Write for Full {
+            fn write(&mut self, _: &[u8]) -> io::Result<usize> {
+                Err(io::Error::other("no space"))
+            }
+
+            fn flush(&mut self) -> io::Result<()> {
+                Ok(())
+            }
+        }
+        let log = SetPointLog::new(&[], 1_000_000, 0.0, ArmedFrom::default(), Some(Box::new(Full)));
+        assert_eq!(log.finish().1.unwrap().to_string(), "no space");
+    }
+}

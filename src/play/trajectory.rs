@@ -1,0 +1,133 @@
+//! The rows of a file as one trajectory.
+
+use takt_rt::plan::State;
+
+use super::error::{FileProblem, PlayFileError};
+use super::file::{JointPoint, PlayFile, PlayRow};
+use crate::config::Axis;
+use crate::trajectory::{AxisPoints, Trajectory, TrajectoryConditions, TrajectoryError};
+
+/// The rows of a file by the times that they are meant for.
+#[derive(Clone, Debug)]
+pub struct FileTrajectory {
+    /// Since the first point.
+    times_s: Vec<f64>,
+    /// When the first point is meant for.
+    begins_s: f64,
+    /// The lines of the rows.
+    lines: Vec<usize>,
+    /// The points of each axis; `None` for one that the file does not name.
+    axes: Vec<Option<AxisPoints>>,
+}
+
+impl FileTrajectory {
+    /// Takes the rows of a file.
+    ///
+    /// # Errors
+    /// A column of torques, which no trajectory has, or a row without a velocity or acceleration that others have.
+    pub fn new(file: &PlayFile, axes: usize) -> Result<Self, PlayFileError> {
+        if file.torque_column.is_some() {
+            let words = "a trajectory takes no torques; play the file without --trajectory".to_owned();
+            let problem = FileProblem::Trajectory { joint: None, words };
+            return Err(PlayFileError { line: 1, column: file.torque_column, problem });
+        }
+        let mut rows: Vec<&PlayRow> = file.rows.iter().collect();
+        rows.sort_by(|one, other| one.at_s.total_cmp(&other.at_s));
+        let begins_s = rows.first().map_or(0.0, |row| row.at_s);
+        let mut of_axes = vec![None; axes];
+        for (joint, columns) in file.joints.iter().enumerate() {
+            let values = |of: fn(&JointPoint) -> Option<f64>| -> Vec<f64> {
+                // One that is missing is none that is finite: the check of the trajectory names its point.
+                rows.iter().map(|row| row.points.get(joint).and_then(of).unwrap_or(f64::NAN)).collect()
+            };
+            let points = AxisPoints {
+                positions: values(|point| Some(point.position)),
+                velocities: columns.has_velocity.then(|| values(|point| point.velocity)),
+                accelerations: columns.has_acceleration.then(|| values(|point| point.acceleration)),
+            };
+            if let Some(place) = of_axes.get_mut(columns.axis) {
+                *place = Some(points);
+            }
+        }
+        Ok(Self {
+            times_s: rows.iter().map(|row| row.at_s - begins_s).collect(),
+            begins_s,
+            lines: rows.iter().map(|row| row.line).collect(),
+            axes: of_axes,
+        })
+    }
+
+    /// When its first point is meant for.
+    pub fn begins_s(&self) -> f64 {
+        self.begins_s
+    }
+
+    /// The first position of each axis that the file names.
+    pub fn first(&self) -> Vec<Option<f64>> {
+        let first = |points: &Option<AxisPoints>| points.as_ref()?.positions.first().copied();
+        self.axes.iter().map(first).collect()
+    }
+
+    /// The trajectory from these positions, at rest. Axes that the file does not name stay.
+    ///
+    /// # Errors
+    /// The first thing that is wrong, at its line.
+    pub fn trajectory(
+        &self,
+        positions: &[f64],
+        axes: &[Axis],
+        period_s: f64,
+    ) -> Result<Trajectory, PlayFileError> {
+        let points: Vec<AxisPoints> = self
+            .axes
+            .iter()
+            .zip(positions)
+            .map(|(points, position)| {
+                points.clone().unwrap_or_else(|| AxisPoints::standing(*position, self.times_s.len()))
+            })
+            .collect();
+        let start: Vec<State> = positions.iter().map(|position| State::rest(*position)).collect();
+        let limits: Vec<_> = axes.iter().map(|axis| axis.limits).collect();
+        let conditions = TrajectoryConditions { start: &start, limits: &limits, period_s };
+        Trajectory::of_axes(&self.times_s, &points, &conditions).map_err(|error| self.problem(&error, axes))
+    }
+
+    /// Checks the file before anything moves: the axes that it names will begin at its first point, and the others do not move.
+    ///
+    /// # Errors
+    /// The first thing that is wrong, at its line.
+    pub fn check(&self, axes: &[Axis], period_s: f64) -> Result<Trajectory, PlayFileError> {
+        let inside = |axis: &Axis| 0.5 * (axis.limits.position_min + axis.limits.position_max);
+        let positions: Vec<f64> = self
+            .first()
+            .iter()
+            .zip(axes)
+            .map(|(first, axis)| first.unwrap_or_else(|| inside(axis)))
+            .collect();
+        self.trajectory(&positions, axes, period_s)
+    }
+
+    fn problem(&self, error: &TrajectoryError, axes: &[Axis]) -> PlayFileError {
+        // What concerns no point concerns the end.
+        let point = error.point().unwrap_or(self.lines.len().saturating_sub(1));
+        let line = self.lines.get(point).copied().unwrap_or(1);
+        let joint = error.axis().and_then(|axis| axes.get(axis)).map(|axis| axis.name.clone());
+        let words = match *error {
+            TrajectoryError::NotFinite { quantity, .. } => {
+                format!("its {quantity} is missing, and other rows have one")
+            }
+            TrajectoryError::TimeOrder { time_s, .. } => {
+                format!("another row is meant for {} s too", time_s + self.begins_s)
+            }
+            TrajectoryError::Limit { broken, time_s, value, limit, .. } => {
+                let at_s = time_s + self.begins_s;
+                format!("the {broken} {value:.6} at {at_s:.6} s is beyond the limit of {limit:.6}")
+            }
+            TrajectoryError::Start { quantity, given, .. } => {
+                format!("the trajectory begins at rest, and this row has the {quantity} {given}")
+            }
+            _ => error.words(),
+        };
+        PlayFileError { line, column: None, problem: FileProblem::Trajectory { joint, words } }
+    }
+}

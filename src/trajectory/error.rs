@@ -1,0 +1,234 @@
+//! Why a trajectory is refused.
+
+use std::fmt;
+
+/// What of a point is meant.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum PointQuantity {
+    /// Its position.
+    Position,
+    /// Its velocity.
+    Velocity,
+    /// Its acceleration.
+    Acceleration,
+}
+
+impl fmt::Display for PointQuantity {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Position => "position",
+            Self::Velocity => "velocity",
+            Self::Acceleration => "acceleration",
+        })
+    }
+}
+
+/// The limit that a motion breaks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum BrokenLimit {
+    /// The lowest or the highest position.
+    Position,
+    /// The highest speed.
+    Velocity,
+    /// The highest acceleration, while the speed rises.
+    Acceleration,
+    /// The highest deceleration, while the speed falls.
+    Deceleration,
+    /// The highest jerk.
+    Jerk,
+}
+
+impl fmt::Display for BrokenLimit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Position => "position",
+            Self::Velocity => "velocity",
+            Self::Acceleration => "acceleration",
+            Self::Deceleration => "deceleration",
+            Self::Jerk => "jerk",
+        })
+    }
+}
+
+/// Why a trajectory is refused: the first thing that is wrong with it. Points and axes are counted from 0. Positions in rad (m),
+/// and seconds. Nothing has changed then.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum TrajectoryError {
+    /// There is no point.
+    NoPoint,
+    /// A point has values for another number of axes than there are. Velocities and accelerations may be missing.
+    Count {
+        /// The point.
+        point: usize,
+        /// Of what.
+        quantity: PointQuantity,
+        /// How many there are.
+        given: usize,
+        /// How many axes there are.
+        axes: usize,
+    },
+    /// A point has no value of a kind that another point has, or accelerations without velocities.
+    Missing {
+        /// The point.
+        point: usize,
+        /// The axis.
+        axis: usize,
+        /// Of what.
+        quantity: PointQuantity,
+    },
+    /// A value is infinite or not a number.
+    NotFinite {
+        /// The point.
+        point: usize,
+        /// The axis.
+        axis: usize,
+        /// What it is a value of.
+        quantity: PointQuantity,
+        /// The value.
+        value: f64,
+    },
+    /// A time is negative, infinite or not a number.
+    Time {
+        /// The point.
+        point: usize,
+        /// Its time.
+        time_s: f64,
+    },
+    /// A point is not later than the one before.
+    TimeOrder {
+        /// The point.
+        point: usize,
+        /// Its time.
+        time_s: f64,
+        /// The time of the one before.
+        previous_s: f64,
+    },
+    /// The motion does not go on from where the axis is. A first point later than 0 leaves time to go there.
+    Start {
+        /// The axis.
+        axis: usize,
+        /// Of what.
+        quantity: PointQuantity,
+        /// What the first point has.
+        given: f64,
+        /// What the axis has.
+        present: f64,
+    },
+    /// A limit is broken on the way to a point, or at it.
+    Limit {
+        /// The point.
+        point: usize,
+        /// The axis.
+        axis: usize,
+        /// The limit.
+        broken: BrokenLimit,
+        /// When, in seconds after the beginning.
+        time_s: f64,
+        /// The value that is beyond the limit.
+        value: f64,
+        /// The limit, with the sign of the value.
+        limit: f64,
+    },
+    /// The last point has an acceleration, which would end in a step.
+    EndAcceleration {
+        /// The axis.
+        axis: usize,
+        /// The acceleration.
+        acceleration: f64,
+    },
+    /// The last point is passed in motion, and the axis would come to rest outside its position limits.
+    NoRoomToStop {
+        /// The axis.
+        axis: usize,
+        /// Where it would come to rest.
+        rest: f64,
+        /// The limit.
+        limit: f64,
+    },
+}
+
+impl TrajectoryError {
+    /// The point that it concerns.
+    pub const fn point(&self) -> Option<usize> {
+        match *self {
+            Self::Count { point, .. }
+            | Self::Missing { point, .. }
+            | Self::NotFinite { point, .. }
+            | Self::Time { point, .. }
+            | Self::TimeOrder { point, .. }
+            | Self::Limit { point, .. } => Some(point),
+            Self::Start { .. } => Some(0),
+            Self::NoPoint | Self::EndAcceleration { .. } | Self::NoRoomToStop { .. } => None,
+        }
+    }
+
+    /// The axis that it concerns.
+    pub const fn axis(&self) -> Option<usize> {
+        match *self {
+            Self::Missing { axis, .. }
+            | Self::NotFinite { axis, .. }
+            | Self::Start { axis, .. }
+            | Self::Limit { axis, .. }
+            | Self::EndAcceleration { axis, .. }
+            | Self::NoRoomToStop { axis, .. } => Some(axis),
+            Self::NoPoint | Self::Count { .. } | Self::Time { .. } | Self::TimeOrder { .. } => None,
+        }
+    }
+
+    /// What is wrong, without the point and the axis.
+    pub fn words(&self) -> String {
+        match *self {
+            Self::NoPoint => "a trajectory needs at least one point".to_owned(),
+            Self::Count { quantity, given, axes, .. } => {
+                format!("{given} values of {quantity} are given for {axes} axes")
+            }
+            Self::Missing { quantity, .. } => {
+                let others = match quantity {
+                    PointQuantity::Position => "each point needs one",
+                    PointQuantity::Velocity => {
+                        "all points or none have one, and those with accelerations need one"
+                    }
+                    PointQuantity::Acceleration => "all points or none have one",
+                };
+                format!("its {quantity} is missing: {others}")
+            }
+            Self::NotFinite { quantity, value, .. } => format!("its {quantity} is {value}"),
+            Self::Time { time_s, .. } => {
+                format!("its time is {time_s} s; a time is a finite number of seconds from 0 on")
+            }
+            Self::TimeOrder { time_s, previous_s, .. } => {
+                format!("its time, {time_s} s, is not later than that of the point before, {previous_s} s")
+            }
+            Self::Start { quantity, given, present, .. } => format!(
+                "the trajectory begins with the {quantity} {given}, and the present one is {present}; give the first point \
+                 a time after 0, or go there first"
+            ),
+            Self::Limit { broken, time_s, value, limit, .. } => {
+                format!("{broken} {value:.6} at {time_s:.6} s is beyond the limit of {limit:.6}")
+            }
+            Self::EndAcceleration { acceleration, .. } => {
+                format!("the last point has the acceleration {acceleration}; it must have none")
+            }
+            Self::NoRoomToStop { rest, limit, .. } => format!(
+                "the last point is passed in motion, and a stop behind it ends at {rest:.6}, beyond the limit of {limit:.6}"
+            ),
+        }
+    }
+}
+
+impl fmt::Display for TrajectoryError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(point) = self.point() {
+            write!(f, "points[{point}]")?;
+        }
+        match (self.point(), self.axis()) {
+            (Some(_), Some(axis)) => write!(f, ", axis {axis}: ")?,
+            (None, Some(axis)) => write!(f, "axis {axis}: ")?,
+            (Some(_), None) => f.write_str(": ")?,
+            (None, None) => {}
+        }
+        f.write_str(&self.words())
+    }
+}
+
+impl std::error::Error for TrajectoryError {}

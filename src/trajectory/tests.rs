@@ -1,0 +1,227 @@
+use super::*;
+use proptest::prelude::*;
+
+const LIMITS: AxisLimits = AxisLimits {
+    position_min: -2.0,
+    position_max: 2.0,
+    velocity: 2.0,
+    acceleration: 8.0,
+    deceleration: 12.0,
+    jerk: 150.0,
+    torque: 40.0,
+};
+const PERIOD_S: f64 = 0.001;
+
+fn point(time_s: f64, positions: &[f64]) -> TrajectoryPoint {
+    TrajectoryPoint { time_s, positions: positions.to_vec(), ..TrajectoryPoint::default() }
+}
+
+fn with_velocity(time_s: f64, position: f64, velocity: f64) -> TrajectoryPoint {
+    TrajectoryPoint { velocities: vec![velocity], ..point(time_s, &[position]) }
+}
+
+fn from(start: &[State], points: &[TrajectoryPoint]) -> Result<Trajectory, TrajectoryError> {
+    let limits = vec![LIMITS; start.len()];
+    Trajectory::new(points, &TrajectoryConditions { start, limits: &limits, period_s: PERIOD_S })
+}
+
+fn from_rest(points: &[TrajectoryPoint]) -> Result<Trajectory, TrajectoryError> {
+    from(&[State::rest(0.0)], points)
+}
+
+#[test]
+fn a_trajectory_goes_through_its_points_at_their_times_and_ends_at_rest() {
+    let points = [point(1.0, &[0.5]), point(1.8, &[0.8]), point(3.0, &[0.1])];
+    let trajectory = from_rest(&points).unwrap();
+    assert_eq!(trajectory.duration_s(), 3.0);
+    for point in &points {
+        assert_eq!(trajectory.sample(point.time_s).states[0].position, point.positions[0]);
+    }
+    assert_eq!(trajectory.sample(0.0).states[0], State::rest(0.0));
+    assert_eq!(trajectory.sample(3.0).states[0], State::rest(0.1));
+    assert_eq!(trajectory.sample(9.0).states[0], State::rest(0.1));
+}
+
+#[test]
+fn what_is_wrong_with_points_is_named_with_the_first_of_them() {
+    let refused = |points: &[TrajectoryPoint]| from_rest(points).unwrap_err();
+    assert_eq!(refused(&[]), TrajectoryError::NoPoint);
+    let time = TrajectoryError::Time { point: 0, time_s: -0.5 };
+    assert_eq!(refused(&[point(-0.5, &[0.0])]), time);
+    assert!(matches!(refused(&[point(f64::NAN, &[0.0])]), TrajectoryError::Time { point: 0, .. }));
+    let order = TrajectoryError::TimeOrder { point: 2, time_s: 1.0, previous_s: 1.0 };
+    assert_eq!(refused(&[point(0.5, &[0.0]), point(1.0, &[0.0]), point(1.0, &[0.0])]), order);
+    let count = TrajectoryError::Count { point: 1, quantity: PointQuantity::Position, given: 2, axes: 1 };
+    assert_eq!(refused(&[point(0.5, &[0.0]), point(1.0, &[0.0, 0.0])]), count);
+    let missing = TrajectoryError::Missing { point: 1, axis: 0, quantity: PointQuantity::Velocity };
+    assert_eq!(refused(&[with_velocity(0.5, 0.0, 0.0), point(1.0, &[0.0])]), missing);
+    let accelerated = TrajectoryPoint { accelerations: vec![0.0], ..point(0.5, &[0.0]) };
+    let missing = TrajectoryError::Missing { point: 0, axis: 0, quantity: PointQuantity::Velocity };
+    assert_eq!(refused(&[accelerated]), missing);
+    let infinite = refused(&[point(0.5, &[0.0]), point(1.0, &[f64::INFINITY])]);
+    let value = f64::INFINITY;
+    let expected = TrajectoryError::NotFinite { point: 1, axis: 0, quantity: PointQuantity::Position, value };
+    assert_eq!(infinite, expected);
+    let close = refused(&[point(0.5, &[0.0]), point(0.5 + 1e-15, &[0.1])]);
+    assert!(matches!(close, TrajectoryError::Limit { point: 1, axis: 0, .. }), "{close:?}");
+    assert_eq!(count.to_string(), "points[1]: 2 values of position are given for 1 axes",);
+}
+
+#[test]
+fn a_first_point_at_the_beginning_must_be_where_the_axis_is() {
+    let error = from_rest(&[point(0.0, &[0.01]), point(1.0, &[0.1])]).unwrap_err();
+    let expected =
+        TrajectoryError::Start { axis: 0, quantity: PointQuantity::Position, given: 0.01, present: 0.0 };
+    assert_eq!(error, expected);
+    let error = from_rest(&[with_velocity(0.0, 0.0, 0.2), with_velocity(1.0, 0.1, 0.0)]).unwrap_err();
+    assert!(matches!(error, TrajectoryError::Start { quantity: PointQuantity::Velocity, .. }));
+    // Rounding in a file is not a step: the trajectory begins exactly where the axis is.
+    let begun = from_rest(&[point(0.0, &[1e-7]), point(1.0, &[0.1])]).unwrap();
+    assert_eq!(begun.sample(0.0).states[0], State::rest(0.0));
+}
+
+#[test]
+fn a_trajectory_goes_on_from_an_axis_in_motion_without_a_step() {
+    let start = State { position: 0.2, velocity: 0.5, acceleration: -1.0 };
+    for points in [
+        vec![point(1.0, &[0.5]), point(2.0, &[0.6])],
+        vec![with_velocity(1.0, 0.5, 0.2), with_velocity(2.0, 0.6, 0.0)],
+    ] {
+        let trajectory = from(&[start], &points).unwrap();
+        assert_eq!(trajectory.sample(0.0).states[0], start);
+    }
+}
+
+#[test]
+fn the_way_to_the_first_point_and_each_later_one_is_checked() {
+    let limit_of = |points: &[TrajectoryPoint]| match from_rest(points).unwrap_err() {
+        TrajectoryError::Limit { point, broken, .. } => (point, broken),
+        error => panic!("{error}"),
+    };
+    assert_eq!(limit_of(&[point(0.2, &[1.0])]), (0, BrokenLimit::Velocity));
+    assert_eq!(limit_of(&[point(2.0, &[1.0]), point(4.0, &[2.1])]), (1, BrokenLimit::Position));
+    assert_eq!(limit_of(&[point(0.0, &[0.0]), point(0.2, &[0.05])]), (1, BrokenLimit::Jerk));
+    assert_eq!(limit_of(&[point(0.0, &[0.0]), point(0.55, &[0.5])]), (1, BrokenLimit::Acceleration));
+}
+
+#[test]
+fn the_last_point_may_be_passed_in_motion_where_there_is_room_for_a_stop() {
+    let passing = |position: f64| from_rest(&[with_velocity(2.0, position, 1.0)]);
+    let trajectory = passing(1.0).unwrap();
+    assert_eq!(trajectory.sample(2.0).states[0], State { position: 1.0, velocity: 1.0, acceleration: 0.0 });
+    let error = passing(1.95).unwrap_err();
+    assert!(matches!(error, TrajectoryError::NoRoomToStop { axis: 0, limit: 2.0, .. }), "{error:?}");
+    let accelerated = TrajectoryPoint { accelerations: vec![0.5], ..with_velocity(2.0, 1.0, 0.0) };
+    let error = from_rest(&[accelerated]).unwrap_err();
+    assert_eq!(error, TrajectoryError::EndAcceleration { axis: 0, acceleration: 0.5 });
+}
+
+#[test]
+fn an_axis_that_a_trajectory_does_not_move_is_known() {
+    let trajectory = from(&[State::rest(0.0), State::rest(0.3)], &[point(1.0, &[0.2, 0.3])]).unwrap();
+    assert!(trajectory.moves(0) && !trajectory.moves(1));
+}
+
+/// What the guard of the real-time thread says of the set-points that a trajectory makes, beyond it the third difference, and
+/// whether it stays within the limits of the position.
+fn broken_by_samples(trajectory: &Trajectory, axis: usize) -> Option<String> {
+    let cycles = (trajectory.duration_s() / PERIOD_S).ceil() as u32 + 4;
+    let at = |cycle: u32| trajectory.sample(f64::from(cycle) * PERIOD_S).states[axis].position;
+    let mut sent = [at(0); 3];
+    for cycle in 1..=cycles {
+        let next = at(cycle);
+        let velocity = (next - sent[0]) / PERIOD_S;
+        let acceleration = (next - 2.0 * sent[0] + sent[1]) / (PERIOD_S * PERIOD_S);
+        let jerk = (next - 3.0 * sent[0] + 3.0 * sent[1] - sent[2]) / PERIOD_S.powi(3);
+        let steepest = LIMITS.acceleration.max(LIMITS.deceleration);
+        let is_kept = (LIMITS.position_min..=LIMITS.position_max).contains(&next)
+            && velocity.abs() <= LIMITS.velocity * (1.0 + 1e-6)
+            && acceleration.abs()
+                <= steepest * (1.0 + 1e-6) + 4.0 * f64::EPSILON * 3.0 / (PERIOD_S * PERIOD_S)
+            && jerk.abs() <= LIMITS.jerk * (1.0 + 1e-6) + 64.0 * f64::EPSILON * 3.0 / PERIOD_S.powi(3);
+        if !is_kept {
+            return Some(format!("cycle {cycle}: {next} {velocity} {acceleration} {jerk}"));
+        }
+        sent = [next, sent[0], sent[1]];
+    }
+    None
+}
+
+/// Random points of two axes, from gentle to violent, with velocities or without.
+fn random_points() -> impl Strategy<Value = Vec<TrajectoryPoint>> {
+    let step = (0.05f64..1.5, [-1.0f64..1.0, -1.0f64..1.0], [-1.0f64..1.0, -1.0f64..1.0]);
+    (prop::collection::vec(step, 1..12), 0.02f64..1.5, any::<bool>()).prop_map(
+        |(steps, size, has_velocities)| {
+            let mut time_s = 0.0;
+            let count = steps.len();
+            let points = steps.into_iter().enumerate().map(|(index, (step, positions, velocities))| {
+                time_s += step;
+                let end = if index + 1 == count { 0.0 } else { 1.0 };
+                let velocities =
+                    if has_velocities { velocities.map(|v| v * size * end).to_vec() } else { vec![] };
+                TrajectoryPoint { velocities, ..point(time_s, &positions.map(|position| position * size)) }
+            });
+            points.collect()
+        },
+    )
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(600))]
+
+    #[test]
+    fn what_passes_the_check_passes_the_guard_in_every_cycle(points in random_points()) {
+        let start = [State::rest(0.0), State::rest(0.1)];
+        if let Ok(trajectory) = from(&start, &points) {
+            for axis in 0..2 {
+                prop_assert_eq!(broken_by_samples(&trajectory, axis), None);
+            }
+        }
+    }
+
+    #[test]
+    fn what_breaks_a_limit_is_refused_at_the_first_point_and_axis_that_samples_show(points in random_points()) {
+        let start = [State::rest(0.0), State::rest(0.1)];
+        let loose = AxisLimits {
+            position_min: -1e9, position_max: 1e9, velocity: 1e9, acceleration: 1e9, deceleration: 1e9, jerk: 1e12, torque: 1.0,
+        };
+        let conditions = TrajectoryConditions { start: &start, limits: &[loose; 2], period_s: PERIOD_S };
+        let path = Trajectory::new(&points, &conditions).unwrap().path;
+        // For each way to a point and each axis: by how much samples of it are beyond the limits.
+        let excess = |point: usize, axis: usize| {
+            let polynomial = path.polynomials[point * 2 + axis];
+            let duration_s = path.times_s[point + 1] - path.times_s[point];
+            (0..=400).map(|step| {
+                let time_s = duration_s * f64::from(step) / 400.0;
+                let State { position, velocity, acceleration } = polynomial.state(time_s);
+                let steepest = if velocity * acceleration >= 0.0 { LIMITS.acceleration } else { LIMITS.deceleration };
+                [
+                    position.abs() / LIMITS.position_max, velocity.abs() / LIMITS.velocity, acceleration.abs() / steepest,
+                    polynomial.jerk(time_s).abs() / LIMITS.jerk,
+                ].into_iter().fold(0.0, f64::max)
+            }).fold(0.0, f64::max)
+        };
+        // What the points say by themselves comes before what the polynomials make of them.
+        let own = |point: usize, axis: usize| {
+            let [before, this] = [point, point + 1].map(|knot| path.polynomials[knot * 2 + axis].state(0.0));
+            let speed = (this.position - before.position) / (path.times_s[point + 1] - path.times_s[point]);
+            (this.position.abs() / LIMITS.position_max)
+                .max(speed.abs() / LIMITS.velocity)
+                .max(this.velocity.abs() / LIMITS.velocity * f64::from(u8::from(!points[0].velocities.is_empty())))
+        };
+        let places = || (0..points.len()).flat_map(|point| [(point, 0), (point, 1)]);
+        let first = places().map(|(point, axis)| (point, axis, own(point, axis)))
+            .chain(places().map(|(point, axis)| (point, axis, excess(point, axis))))
+            .find(|(_, _, excess)| *excess > 0.98);
+        match (first, from(&start, &points)) {
+            // Too near to the limit for samples to tell.
+            (Some((_, _, excess)), _) if excess < 1.02 => {}
+            (None, result) => prop_assert!(result.is_ok(), "{result:?}"),
+            (Some((point, axis, _)), result) => {
+                let error = result.unwrap_err();
+                let is_limit = matches!(error, TrajectoryError::Limit { .. });
+                prop_assert!(is_limit && error.point() == Some(point) && error.axis() == Some(axis), "{error:?}");
+            }
+        }
+    }
+}
