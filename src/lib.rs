@@ -45,11 +45,12 @@ pub use config::{Config, ConfigError};
 pub use controller::session::{Session, SessionError, SessionOptions};
 pub use controller::{
     CommandError, Controller, Events, Handle, MotionError, MotionId, MoveOptions, Outcome, Refused,
-    StartFailure, Stopped, StreamError, StreamHandle, VirtualRun, WaitError,
+    StartFailure, Stopped, StreamError, StreamHandle, TrajectoryProgress, VirtualRun, WaitError,
 };
 pub use error::{Error, Result};
 pub use faults::{FaultInjector, Scenario};
 pub use telemetry::{Notice, RecordingDestination};
+pub use trajectory::{Trajectory, TrajectoryError, TrajectoryPoint};
 
 /// What runs inside the real-time thread: its types as they come out of a [`Handle`], and the planner.
 pub use takt_rt as rt;

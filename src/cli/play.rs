@@ -1,24 +1,30 @@
 //! `takt play`: points from a file into the arm.
 
 use std::fs::File;
-use std::io::{BufWriter, Write};
+use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+use std::time::Duration;
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 use serde::Serialize;
 
+use takt::bus::schedule;
 use takt::config::Config;
-use takt::controller::Outcome;
+use takt::controller::realtime_thread::StartError;
+use takt::controller::session::{SessionError, SessionOptions};
+use takt::controller::{Controller, Outcome, StartFailure};
 use takt::play::{
-    ArmedFrom, AxisMaxima, FileTrajectory, PlayError, PlayFile, PlayFileError, SetPointLog, VirtualStage,
-    execute,
+    ArmedFrom, AxisMaxima, FileStream, FileTrajectory, PlayError, PlayFile, PlayFileError, RealStage,
+    SetPointLog, SharedSetPointLog, Stage, StreamSummary, VirtualStage, execute, stream,
 };
 use takt::telemetry::{Machine, StopReport, words};
-use takt_rt::StopReason;
+use takt_rt::{Follow, NANOSECONDS_PER_SECOND, StopReason, StreamDelay};
 
-use super::configuration;
+use super::configuration::{self, BusOverride};
 use super::exit::Exit;
 use super::interruption;
+use super::ownership;
 use super::print;
 use super::usage_error::UsageError;
 
@@ -32,18 +38,78 @@ pub struct Arguments {
     config: PathBuf,
     /// The points (CSV)
     file: PathBuf,
+    /// What is done where the points ask for more than the limits allow: smooth follows as closely as they go, exact stops
+    #[arg(long, value_enum, conflicts_with = "trajectory")]
+    follow: Option<FollowArgument>,
+    /// How far the set-points run behind the times of the points, in seconds [default: as the points and their lateness need]
+    #[arg(long, value_name = "S", conflicts_with = "trajectory", allow_negative_numbers = true, value_parser = delay)]
+    delay: Option<Duration>,
     /// Execute the rows, by the times that they are meant for, as one trajectory that is checked as a whole before it starts
     #[arg(long)]
     trajectory: bool,
     /// Play to simulated drives in virtual time, as fast as possible: every run is the same, bit for bit
-    #[arg(long = "virtual")]
+    #[arg(long = "virtual", conflicts_with_all = ["buses", "take_over", "require_realtime"])]
     is_virtual: bool,
     /// Write what was commanded to this file, a row a cycle
     #[arg(long, value_name = "SETPOINTS.csv")]
     out: Option<PathBuf>,
+    /// Connect a bus to another interface than the configuration says: sim, can0, vcan0 …
+    #[arg(long = "bus", value_name = "NAME=INTERFACE")]
+    buses: Vec<BusOverride>,
+    /// Have another takt of this host that commands one of the buses stop in control first, and take them over
+    #[arg(long)]
+    take_over: bool,
+    /// End with exit code 3 before anything moves if the system refuses a step of the real-time set-up
+    #[arg(long)]
+    require_realtime: bool,
     /// Print the result as one JSON object
     #[arg(long)]
     json: bool,
+}
+
+/// `--follow`
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum FollowArgument {
+    Smooth,
+    Exact,
+}
+
+/// The longest delay that the configuration allows.
+const LONGEST_DELAY_S: f64 = 1.0;
+
+fn delay(text: &str) -> Result<Duration, String> {
+    let number: f64 = text.parse().map_err(|_| format!("`{text}` is not a number of seconds"))?;
+    if (0.0..=LONGEST_DELAY_S).contains(&number) {
+        Ok(Duration::from_secs_f64(number))
+    } else {
+        Err(format!("a delay is a number of seconds from 0 to {LONGEST_DELAY_S}"))
+    }
+}
+
+/// What is played.
+enum Piece {
+    Trajectory(FileTrajectory),
+    Stream(FileStream),
+}
+
+impl Piece {
+    /// The time of the set-points from which a trajectory begins. A stream has the clock of its file.
+    fn begins_s(&self) -> f64 {
+        match self {
+            Self::Trajectory(trajectory) => trajectory.begins_s(),
+            Self::Stream(_) => 0.0,
+        }
+    }
+
+    fn play(&self, stage: &mut impl Stage, armed: &ArmedFrom) -> Result<StreamSummary, PlayError> {
+        match self {
+            // A trajectory has no late points, and its set-points are on time.
+            Self::Trajectory(trajectory) => {
+                execute(stage, trajectory, armed).map(|()| StreamSummary::default())
+            }
+            Self::Stream(file) => stream(stage, file, armed),
+        }
+    }
 }
 
 /// The result.
@@ -55,6 +121,8 @@ struct Printed {
     failure: Option<String>,
     points: usize,
     late_points: u64,
+    /// Points that found no room, or could not be used.
+    lost_points: u64,
     lag_s: f64,
     lag_max_s: f64,
     axes: Vec<AxisMaxima>,
@@ -76,42 +144,36 @@ struct PlaceOfProblem {
 
 /// Plays the file.
 pub fn run(arguments: &Arguments) -> Exit {
-    let config = match configuration::load(&arguments.config, &[]) {
+    let mut config = match configuration::load(&arguments.config, &arguments.buses) {
         Ok(config) => config,
         Err(error) => return error.print(arguments.json),
     };
+    if let Some(follow) = arguments.follow {
+        let follow = match follow {
+            FollowArgument::Smooth => Follow::Smooth,
+            FollowArgument::Exact => Follow::Exact,
+        };
+        config.axes.iter_mut().for_each(|axis| axis.follow = follow);
+    }
+    if let Some(delay) = arguments.delay {
+        config.stream_delay = StreamDelay::Fixed(delay.as_nanos() as u64);
+    }
     if let Err(error) = config.validate() {
         return UsageError::from(error).print(arguments.json);
     }
-    let wrong_file = |error: &PlayFileError| print_problem(&arguments.file, error, arguments.json);
-    let names: Vec<String> = config.axes.iter().map(|axis| axis.name.clone()).collect();
-    let bytes = match takt::play::read(&arguments.file) {
-        Ok(bytes) => bytes,
-        Err(error) => {
-            let words = format!("cannot read {}: {error}", arguments.file.display());
-            return UsageError::from(words).print(arguments.json);
-        }
-    };
-    let file = match PlayFile::parse(&bytes, &names) {
-        Ok(file) => file,
-        Err(error) => return wrong_file(&error),
-    };
-    if !arguments.trajectory || !arguments.is_virtual {
-        return UsageError::from("takt play needs --trajectory and --virtual so far").print(arguments.json);
+    if !arguments.is_virtual
+        && let Err(refused) = schedule::verify(&config)
+    {
+        return UsageError::from(refused.to_string()).print(arguments.json);
     }
-    let period_s = config.cycle.period_ns as f64 / 1e9;
-    let trajectory = FileTrajectory::new(&file, config.axes.len())
-        .and_then(|trajectory| trajectory.check(&config.axes, period_s).map(|_| trajectory));
-    let trajectory = match trajectory {
-        Ok(trajectory) => trajectory,
-        Err(error) => return wrong_file(&error),
+    let (file, piece) = match read(arguments, &config) {
+        Ok(read) => read,
+        Err(exit) => return exit,
     };
     let out = match arguments.out.as_deref().map(create).transpose() {
         Ok(out) => out,
         Err(words) => return UsageError::from(words).print(arguments.json),
     };
-    let armed = ArmedFrom::default();
-    let log = SetPointLog::new(&names, config.cycle.period_ns, trajectory.begins_s(), armed.clone(), out);
     let interrupted = match interruption::watch() {
         Ok(interrupted) => interrupted,
         Err(error) => {
@@ -119,16 +181,127 @@ pub fn run(arguments: &Arguments) -> Exit {
             return Exit::Stopped;
         }
     };
-    let mut stage = match VirtualStage::new(&config, log, &interrupted) {
-        Ok(stage) => stage,
-        Err(error) => return UsageError::from(error.to_string()).print(arguments.json),
+    let armed = ArmedFrom::default();
+    let names: Vec<String> = config.axes.iter().map(|axis| axis.name.clone()).collect();
+    let log = SetPointLog::new(&names, config.cycle.period_ns, piece.begins_s(), armed.clone(), out);
+    let played = if arguments.is_virtual {
+        play_in_virtual_time(&config, &piece, log, &armed, &interrupted)
+    } else {
+        play_in_real_time(arguments, config.clone(), &piece, log, &armed, &interrupted)
     };
-    let result = execute(&mut stage, &trajectory, &config.axes, period_s, &armed);
+    match played {
+        Ok(played) => report(arguments, &config, &file, played),
+        Err(error) => refuse(&error, arguments.json),
+    }
+}
+
+/// The file, and what is to be played of it.
+fn read(arguments: &Arguments, config: &Config) -> Result<(PlayFile, Piece), Exit> {
+    let wrong_file = |error: PlayFileError| print_problem(&arguments.file, &error, arguments.json);
+    let bytes = takt::play::read(&arguments.file).map_err(|error| {
+        let words = format!("cannot read {}: {error}", arguments.file.display());
+        UsageError::from(words).print(arguments.json)
+    })?;
+    let names: Vec<String> = config.axes.iter().map(|axis| axis.name.clone()).collect();
+    let file = PlayFile::parse(&bytes, &names).map_err(wrong_file)?;
+    if !arguments.trajectory {
+        let stream = FileStream::new(&file, &config.axes).map_err(wrong_file)?;
+        return Ok((file, Piece::Stream(stream)));
+    }
+    let trajectory = FileTrajectory::new(&file, config.axes.len()).map_err(wrong_file)?;
+    let period_s = config.cycle.period_ns as f64 / NANOSECONDS_PER_SECOND as f64;
+    trajectory.check(&config.axes, period_s).map_err(wrong_file)?;
+    Ok((file, Piece::Trajectory(trajectory)))
+}
+
+/// What came of it.
+struct Played {
+    result: Result<StreamSummary, PlayError>,
+    /// How the run ended, where that was not because the file was over.
+    outcome: Option<Outcome>,
+    last_stop: Option<StopReason>,
+    axes: Vec<AxisMaxima>,
+    not_written: Option<io::Error>,
+}
+
+/// Why nothing was played.
+enum Refused {
+    Words(String),
+    Session(SessionError),
+}
+
+fn play_in_virtual_time(
+    config: &Config,
+    piece: &Piece,
+    log: SetPointLog,
+    armed: &ArmedFrom,
+    interrupted: &AtomicBool,
+) -> Result<Played, Refused> {
+    let stage = VirtualStage::new(config, log, interrupted);
+    let mut stage = stage.map_err(|error| Refused::Words(error.to_string()))?;
+    let result = piece.play(&mut stage, armed);
     let (outcome, snapshot, log) = stage.finish();
     let (axes, not_written) = log.finish();
-    let machine = Machine::of(&config);
-    let (exit, stop, failure) = ending(result, outcome, snapshot.stop, &machine, &arguments.file);
-    let exit = match (&not_written, &arguments.out) {
+    Ok(Played { result, outcome, last_stop: snapshot.stop, axes, not_written })
+}
+
+fn play_in_real_time(
+    arguments: &Arguments,
+    config: Config,
+    piece: &Piece,
+    log: SetPointLog,
+    armed: &ArmedFrom,
+    interrupted: &AtomicBool,
+) -> Result<Played, Refused> {
+    let log = SharedSetPointLog::new(log);
+    let each_cycle = log.clone();
+    let options = SessionOptions {
+        is_realtime_required: arguments.require_realtime,
+        if_owned: ownership::if_owned(arguments.take_over),
+        each_cycle: Some(Box::new(move |record| each_cycle.add(record))),
+        ..SessionOptions::default()
+    };
+    let (result, session, was_interrupted) = match Controller::start(config, options) {
+        Ok(controller) => {
+            let mut stage = RealStage::new(controller, log.clone(), interrupted);
+            let result = piece.play(&mut stage, armed);
+            let was_interrupted = stage.was_interrupted();
+            (result, stage.finish(), was_interrupted)
+        }
+        Err(StartFailure::NotEnabled(session)) => (Err(PlayError::Ended), Ok(*session), false),
+        Err(StartFailure::Session(error)) => return Err(Refused::Session(error)),
+        Err(error @ StartFailure::Died) => return Err(Refused::Words(error.to_string())),
+    };
+    let session = session.map_err(|error| Refused::Words(error.to_string()))?;
+    let (axes, not_written) = log.finish();
+    let outcome = match session.outcome {
+        Outcome::Finished if was_interrupted => Some(Outcome::Interrupted),
+        Outcome::Finished => None,
+        outcome => Some(outcome),
+    };
+    Ok(Played { result, outcome, last_stop: session.snapshot.stop, axes, not_written })
+}
+
+fn refuse(error: &Refused, is_json: bool) -> Exit {
+    match error {
+        Refused::Words(words) => UsageError::from(words.clone()).print(is_json),
+        Refused::Session(SessionError::Claim(error)) => ownership::usage_error(error).print(is_json),
+        Refused::Session(error) => {
+            let exit = UsageError::from(error.to_string()).print(is_json);
+            if matches!(error, SessionError::Start(StartError::Refused(_))) {
+                Exit::RealtimeRefused
+            } else {
+                exit
+            }
+        }
+    }
+}
+
+fn report(arguments: &Arguments, config: &Config, file: &PlayFile, played: Played) -> Exit {
+    let machine = Machine::of(config);
+    let summary = played.result.clone().unwrap_or_default();
+    let (exit, stop, failure) = ending(played.result, played.outcome, played.last_stop, &machine);
+    let exit = match (&played.not_written, &arguments.out) {
         (Some(error), Some(path)) => {
             say!("takt: {} cannot be written: {error}", path.display());
             exit.and_failed()
@@ -139,13 +312,13 @@ pub fn run(arguments: &Arguments) -> Exit {
         stop: stop.map(|stop| StopReport::new(&stop, &machine)),
         failure,
         points: file.rows.len(),
-        // A trajectory has no late points, and its set-points are on time.
-        late_points: 0,
-        lag_s: 0.0,
-        lag_max_s: 0.0,
-        axes,
+        late_points: summary.late_points,
+        lost_points: summary.lost_points,
+        lag_s: summary.lag_ns as f64 / 1e9,
+        lag_max_s: summary.lag_max_ns as f64 / 1e9,
+        axes: played.axes,
     };
-    if arguments.json { print::json(&printed, exit) } else { print::text(&text(&printed, &config), exit) }
+    if arguments.json { print::json(&printed, exit) } else { print::text(&text(&printed, config), exit) }
 }
 
 /// Creates the file before anything moves.
@@ -168,11 +341,10 @@ fn print_problem(path: &Path, error: &PlayFileError, is_json: bool) -> Exit {
 
 /// The exit code, the stop, and the failure in words.
 fn ending(
-    result: Result<(), PlayError>,
+    result: Result<StreamSummary, PlayError>,
     outcome: Option<Outcome>,
     last_stop: Option<StopReason>,
     machine: &Machine,
-    path: &Path,
 ) -> (Exit, Option<StopReason>, Option<String>) {
     match (result, outcome) {
         (_, Some(Outcome::Interrupted | Outcome::TakenOver { .. })) => (Exit::Interrupted, last_stop, None),
@@ -180,19 +352,19 @@ fn ending(
             (Exit::Stopped, Some(stop), None)
         }
         (Err(PlayError::Ended), Some(outcome)) => (Exit::Stopped, None, Some(outcome.words(machine))),
-        (Err(error), _) => (Exit::Stopped, None, Some(failure(error, machine, path))),
-        (Ok(()), _) => (Exit::Done, None, None),
+        (Err(error), _) => (Exit::Stopped, None, Some(failure(error, machine))),
+        (Ok(_), _) => (Exit::Done, None, None),
     }
 }
 
-fn failure(error: PlayError, machine: &Machine, path: &Path) -> String {
+fn failure(error: PlayError, machine: &Machine) -> String {
     match error {
         PlayError::Ended => "the run has ended".to_owned(),
         PlayError::Stopped(stop) => words::stop(&stop, machine),
         PlayError::Replaced => "another client has moved the arm".to_owned(),
         PlayError::Refused(Some(refusal)) => words::rejection(&refusal, machine),
         PlayError::Refused(None) => "a request was refused; the reason is no longer known".to_owned(),
-        PlayError::File(error) => format!("{}: {error}", path.display()),
+        PlayError::Command(words) => words,
     }
 }
 
@@ -205,9 +377,10 @@ fn text(printed: &Printed, config: &Config) -> String {
         text += &format!("{failure}\n");
     }
     text += &format!(
-        "{} points, {} late; lag {:.1} ms, {:.1} ms at most\n",
+        "{} points, {} late, {} lost; lag {:.1} ms, {:.1} ms at most\n",
         printed.points,
         printed.late_points,
+        printed.lost_points,
         printed.lag_s * 1e3,
         printed.lag_max_s * 1e3
     );

@@ -102,6 +102,7 @@ pub fn run(arguments: Arguments) -> Exit {
         duration_ns: arguments.duration.map(|duration| duration.as_nanos() as u64),
         recording: arguments.record.map(RecordingDestination::File),
         is_realtime_required: arguments.require_realtime,
+        each_cycle: None,
         fault_injector: fault_injector.clone(),
         if_owned: ownership::if_owned(arguments.take_over),
     };

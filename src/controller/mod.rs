@@ -15,7 +15,7 @@ mod virtual_time;
 
 pub use handle::{
     CommandError, Controller, Events, Handle, MotionError, MotionId, MoveOptions, Refused, StartFailure,
-    Stopped, StreamError, StreamHandle, WaitError,
+    Stopped, StreamError, StreamHandle, TrajectoryProgress, WaitError,
 };
 pub use outcome::{Interrupt, Outcome, Progress};
 pub use program::{ProgramRunner, ProgramStep};

@@ -9,7 +9,9 @@ use takt_rt::linux::{MonotonicClock, ThreadReport};
 use takt_rt::{Clock, Request, Snapshot, StopCategory};
 
 use super::assemble::{self, AssembleError};
-use super::channels::{ChannelSizes, ClientRequests, EventReader, HostSide, Observer, Streamer, channels};
+use super::channels::{
+    ChannelSizes, ClientRequests, EventReader, HostSide, Observer, Streamer, TrajectoryGiver, channels,
+};
 use super::outcome::{Interrupt, Outcome, Progress};
 use super::realtime_thread::{self, Begun, Ended, LoopParts, StartError};
 use super::sleep_alignment;
@@ -21,7 +23,7 @@ use crate::bus::trace::Trace;
 use crate::config::Config;
 use crate::faults::FaultInjector;
 use crate::telemetry::{
-    BlackBoxOptions, Incident, LogSummary, Logger, LoggerOptions, LoggerThread, Machine, Notice,
+    BlackBoxOptions, EachCycle, Incident, LogSummary, Logger, LoggerOptions, LoggerThread, Machine, Notice,
     RecordingDestination, WallClock, panic_message,
 };
 
@@ -37,6 +39,8 @@ pub struct SessionOptions {
     pub recording: Option<RecordingDestination>,
     /// Whether a refused step of the real-time set-up ends the run before anything moves.
     pub is_realtime_required: bool,
+    /// Called by the logger's thread with the record of each cycle. It must not panic.
+    pub each_cycle: Option<EachCycle>,
     /// Faults that are injected into the buses.
     pub fault_injector: Option<Arc<FaultInjector>>,
     /// What happens when another process of this host is the master of a bus already.
@@ -119,6 +123,8 @@ pub(super) struct RemoteHandles {
     pub streamer: Streamer,
     /// Sends requests.
     pub clients: ClientRequests,
+    /// Gives trajectories.
+    pub trajectories: TrajectoryGiver,
     /// Reads the events.
     pub events: EventReader,
     /// The result of the real-time set-up.
@@ -132,6 +138,7 @@ impl RemoteHandles {
             observer: host.observer(),
             streamer: host.streamer(),
             clients: host.clients(),
+            trajectories: host.trajectories(),
             events: host.events(),
             realtime: begun.report,
         })
@@ -186,8 +193,8 @@ fn lead_as_owner(
         traces,
     };
     // The logger's thread starts first, so that it does not inherit the real-time priority.
-    let logger =
-        LoggerThread::start(Logger::new(log, logger_options, notify)).map_err(SessionError::Logger)?;
+    let logger = Logger::new(log, logger_options, notify).with_each_cycle(options.each_cycle);
+    let logger = LoggerThread::start(logger).map_err(SessionError::Logger)?;
     let parts = LoopParts {
         engine,
         plan: assemble::slot_plan(config),

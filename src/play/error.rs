@@ -94,8 +94,8 @@ pub enum FileProblem {
         /// What it is.
         text: String,
     },
-    /// The rows cannot be executed as a trajectory.
-    Trajectory {
+    /// The rows cannot be played.
+    Rows {
         /// The name of the joint concerned.
         joint: Option<String>,
         /// Why not.
@@ -143,8 +143,8 @@ impl fmt::Display for FileProblem {
                 "rows stand in the order of their arrival: this one arrives at {arrive_s} s, and the one above it at {previous_s} s"
             ),
             Self::Chunk { text } => write!(f, "the number of a chunk is a whole number: `{text}`"),
-            Self::Trajectory { joint: Some(joint), words } => write!(f, "{joint}: {words}"),
-            Self::Trajectory { joint: None, words } => f.write_str(words),
+            Self::Rows { joint: Some(joint), words } => write!(f, "{joint}: {words}"),
+            Self::Rows { joint: None, words } => f.write_str(words),
         }
     }
 }

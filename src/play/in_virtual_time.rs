@@ -3,22 +3,29 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use takt_rt::{ExecutionStart, MAX_AXES, Move, Request, RequestId, Snapshot};
+use takt_rt::plan::State;
+use takt_rt::{
+    AxisLimits, ExecutionStart, MAX_AXES, Move, NANOSECONDS_PER_SECOND, Nanoseconds, Request, RequestId,
+    Snapshot, StopCategory, StreamPoint,
+};
 
-use super::performance::{APPROACH_SCALE, Stage};
+use super::performance::{APPROACH_SCALE, MakeTrajectory, PlayError, Stage};
 use super::set_points::SetPointLog;
 use crate::config::Config;
 use crate::controller::assemble::AssembleError;
 use crate::controller::channels::{GivenTrajectory, LogSide};
 use crate::controller::{Interrupt, Outcome, VirtualRun};
 use crate::sim::SimulatedBus;
-use crate::trajectory::Trajectory;
+use crate::trajectory::TrajectoryConditions;
 
 /// An arm of simulated drives in virtual time.
 pub struct VirtualStage<'a> {
     run: VirtualRun<SimulatedBus>,
     log: LogSide,
     set_points: SetPointLog,
+    limits: Vec<AxisLimits>,
+    period_s: f64,
+    period_ns: Nanoseconds,
     interrupted: &'a AtomicBool,
     was_interrupted: bool,
 }
@@ -36,7 +43,16 @@ impl<'a> VirtualStage<'a> {
         config.validate()?;
         let ports = (0..config.buses.len()).map(|bus| SimulatedBus::new(config, bus)).collect();
         let (run, log) = VirtualRun::serving(config, ports)?;
-        Ok(Self { run, log, set_points, interrupted, was_interrupted: false })
+        Ok(Self {
+            run,
+            log,
+            set_points,
+            limits: config.axes.iter().map(|axis| axis.limits).collect(),
+            period_s: config.cycle.period_ns as f64 / NANOSECONDS_PER_SECOND as f64,
+            period_ns: config.cycle.period_ns.max(1),
+            interrupted,
+            was_interrupted: false,
+        })
     }
 
     fn step(&mut self) -> bool {
@@ -64,10 +80,6 @@ impl<'a> VirtualStage<'a> {
         let snapshot = self.run.snapshot();
         (outcome, snapshot, self.set_points)
     }
-
-    fn request(&mut self, request: Request) -> Option<RequestId> {
-        self.run.host().request(request).ok()
-    }
 }
 
 impl Stage for VirtualStage<'_> {
@@ -79,20 +91,46 @@ impl Stage for VirtualStage<'_> {
         self.step() && !self.was_interrupted
     }
 
-    fn move_to(&mut self, target: &[f64]) -> Option<RequestId> {
+    fn move_to(&mut self, target: &[f64]) -> Result<RequestId, PlayError> {
         let mut all = [0.0; MAX_AXES];
         all.iter_mut().zip(target).for_each(|(to, from)| *to = *from);
-        self.request(Request::Move(Move {
+        let request = Request::Move(Move {
             target: all,
             target_velocity: [0.0; MAX_AXES],
             velocity_scale: APPROACH_SCALE,
             acceleration_scale: APPROACH_SCALE,
             minimum_duration_s: 0.0,
-        }))
+        });
+        self.run.host().request(request).map_err(|error| PlayError::Command(error.to_string()))
     }
 
-    fn execute(&mut self, trajectory: Trajectory) -> Option<RequestId> {
+    fn execute(&mut self, make: MakeTrajectory<'_>) -> Result<RequestId, PlayError> {
+        let axes = self.run.snapshot().axes;
+        let start: Vec<State> =
+            axes.iter().take(self.limits.len()).map(|axis| State::rest(axis.position_set)).collect();
+        let conditions =
+            TrajectoryConditions { start: &start, limits: &self.limits, period_s: self.period_s };
+        let trajectory = make(&conditions).map_err(|error| PlayError::Command(error.to_string()))?;
         let given = Arc::new(GivenTrajectory::new(trajectory));
-        self.run.host().execute(&given, ExecutionStart::Now).ok()
+        let executed = self.run.host().execute(&given, ExecutionStart::Now);
+        executed.map_err(|error| PlayError::Command(error.to_string()))
+    }
+
+    fn begin_stream(&mut self) -> Result<RequestId, PlayError> {
+        self.run.host().request(Request::Stream).map_err(|error| PlayError::Command(error.to_string()))
+    }
+
+    fn push(&mut self, points: &[StreamPoint]) -> bool {
+        self.run.host().streamer().push(points).is_ok()
+    }
+
+    fn stop(&mut self) -> Result<(), PlayError> {
+        let requested = self.run.host().request(Request::Stop(StopCategory::Two));
+        requested.map(drop).map_err(|error| PlayError::Command(error.to_string()))
+    }
+
+    /// The beginning of the next slot. The slots of virtual time begin at multiples of the period.
+    fn time_ns(&mut self) -> Nanoseconds {
+        (self.run.snapshot().at_ns / self.period_ns + 1) * self.period_ns
     }
 }

@@ -5,15 +5,19 @@
 
 mod error;
 mod file;
+mod in_real_time;
 mod in_virtual_time;
 mod performance;
 mod set_points;
+mod stream;
 mod table;
 mod trajectory;
 
 pub use error::{FileProblem, PlayFileError};
 pub use file::{JointColumns, JointPoint, PlayFile, PlayRow, read};
+pub use in_real_time::{RealStage, SharedSetPointLog};
 pub use in_virtual_time::VirtualStage;
-pub use performance::{APPROACH_SCALE, PlayError, Stage, execute};
+pub use performance::{APPROACH_SCALE, MakeTrajectory, PlayError, Stage, StreamSummary, execute, stream};
 pub use set_points::{ArmedFrom, AxisMaxima, SetPointLog};
+pub use stream::FileStream;
 pub use trajectory::FileTrajectory;

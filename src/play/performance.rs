@@ -1,15 +1,20 @@
 //! A performance: from an arm that is enabled to the end of the file, whatever brings the arm from cycle to cycle.
 
-use takt_rt::{Answer, MotionState, Phase, RequestError, RequestId, Snapshot, StopReason};
+use takt_rt::{
+    Answer, MotionState, Nanoseconds, Phase, RequestError, RequestId, Snapshot, StopReason, StreamPoint,
+    StreamState,
+};
 
-use super::error::PlayFileError;
 use super::set_points::ArmedFrom;
+use super::stream::FileStream;
 use super::trajectory::FileTrajectory;
-use crate::config::Axis;
-use crate::trajectory::Trajectory;
+use crate::trajectory::{Trajectory, TrajectoryConditions, TrajectoryError};
 
 /// The fraction of the limits with which the arm is led to the first point.
 pub const APPROACH_SCALE: f64 = 0.3;
+
+/// Makes a trajectory from where the axes are.
+pub type MakeTrajectory<'a> = &'a dyn Fn(&TrajectoryConditions<'_>) -> Result<Trajectory, TrajectoryError>;
 
 /// An arm that is enabled.
 pub trait Stage {
@@ -19,11 +24,35 @@ pub trait Stage {
     /// Lets some time pass. Returns whether the run goes on: it ends by itself, or because it is interrupted.
     fn pass(&mut self) -> bool;
 
-    /// Begins a move of every axis to rest, within [`APPROACH_SCALE`]. `None` if the run has ended.
-    fn move_to(&mut self, target: &[f64]) -> Option<RequestId>;
+    /// Begins a move of every axis to rest, within [`APPROACH_SCALE`].
+    ///
+    /// # Errors
+    /// See [`PlayError`].
+    fn move_to(&mut self, target: &[f64]) -> Result<RequestId, PlayError>;
 
-    /// Begins a trajectory. `None` if the run has ended.
-    fn execute(&mut self, trajectory: Trajectory) -> Option<RequestId>;
+    /// Begins a trajectory, which is made from where the axes are.
+    ///
+    /// # Errors
+    /// See [`PlayError`].
+    fn execute(&mut self, make: MakeTrajectory<'_>) -> Result<RequestId, PlayError>;
+
+    /// Begins to follow the points of [`Stage::push`].
+    ///
+    /// # Errors
+    /// See [`PlayError`].
+    fn begin_stream(&mut self) -> Result<RequestId, PlayError>;
+
+    /// Hands points over, all or none. Returns whether there was room.
+    fn push(&mut self, points: &[StreamPoint]) -> bool;
+
+    /// Asks for a stop of category 2.
+    ///
+    /// # Errors
+    /// See [`PlayError`].
+    fn stop(&mut self) -> Result<(), PlayError>;
+
+    /// The time on the clock of the stamps up to which rows have arrived.
+    fn time_ns(&mut self) -> Nanoseconds;
 }
 
 /// Why a performance ended before the end of the file.
@@ -37,39 +66,114 @@ pub enum PlayError {
     Replaced,
     /// The real-time thread has refused a request.
     Refused(Option<RequestError>),
-    /// From where the arm stands now, the file cannot be executed.
-    File(PlayFileError),
+    /// A command failed; the words say why.
+    Command(String),
 }
 
 /// Leads the arm to the first point of the file, and executes it.
 ///
 /// # Errors
 /// See [`PlayError`].
-pub fn execute(
+pub fn execute(stage: &mut impl Stage, file: &FileTrajectory, armed: &ArmedFrom) -> Result<(), PlayError> {
+    approach(stage, &file.first())?;
+    armed.set(stage.snapshot().slot + 1);
+    let motion = stage.execute(&|conditions| file.trajectory(conditions))?;
+    wait(stage, motion)
+}
+
+/// How a stream has gone.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct StreamSummary {
+    /// Points that came too late for their time.
+    pub late_points: u64,
+    /// Points that found no room, or could not be used.
+    pub lost_points: u64,
+    /// How far the set-points were behind the stamps in the end.
+    pub lag_ns: Nanoseconds,
+    /// The same at most.
+    pub lag_max_ns: Nanoseconds,
+}
+
+/// Time from the beginning of the stream to the time 0 of the file.
+const START_NS: Nanoseconds = 20_000_000;
+/// The arm comes to rest within this time after the last row.
+const COMING_TO_REST_S: f64 = 20.0;
+/// The arm rests if its set-points have not changed for so many looks.
+const RESTING_LOOKS: u32 = 20;
+
+/// Leads the arm to the first point of the file, and hands the rows over as they arrive. Ends with the arm at rest.
+///
+/// # Errors
+/// See [`PlayError`].
+pub fn stream(
     stage: &mut impl Stage,
-    file: &FileTrajectory,
-    axes: &[Axis],
-    period_s: f64,
+    file: &FileStream,
     armed: &ArmedFrom,
-) -> Result<(), PlayError> {
+) -> Result<StreamSummary, PlayError> {
+    approach(stage, file.first())?;
+    let standing = stage.snapshot();
+    let request = stage.begin_stream()?;
+    let start_ns = stage.time_ns() + START_NS;
+    armed.set_time(start_ns);
+    let mut summary = StreamSummary::default();
+    let (mut handed, mut resting, mut last) = (0, 0, standing);
+    loop {
+        let since_start_s = (stage.time_ns() as f64 - start_ns as f64) / 1e9;
+        while handed < file.arrived(since_start_s)
+            && file.batch(handed, start_ns, &standing).is_none_or(|points| stage.push(&points))
+        {
+            handed += 1;
+        }
+        pass(stage)?;
+        let snapshot = stage.snapshot();
+        if let Answer::Rejected(refusal) = snapshot.answers.of(request) {
+            return Err(PlayError::Refused(refusal));
+        }
+        if let Some(stop) = snapshot.stop.filter(|stop| !stop.is_requested()) {
+            wait_for_rest(stage)?;
+            return Err(PlayError::Stopped(stop));
+        }
+        if snapshot.slot == last.slot {
+            continue;
+        }
+        let counts = snapshot.stream.counts;
+        summary.late_points = summary.late_points.max(counts.late_points);
+        summary.lost_points = summary.lost_points.max(counts.lost_points);
+        if snapshot.stream.state == StreamState::Following {
+            summary.lag_ns = counts.lag_ns;
+            summary.lag_max_ns = summary.lag_max_ns.max(counts.lag_ns);
+        }
+        let is_still =
+            snapshot.axes.iter().zip(&last.axes).all(|(now, before)| now.position_set == before.position_set);
+        resting = if is_still { resting + 1 } else { 0 };
+        last = snapshot;
+        let is_over = since_start_s > file.end_s();
+        let has_run_dry = snapshot.stream.state == StreamState::Dry && resting > RESTING_LOOKS;
+        if is_over && (has_run_dry || since_start_s > file.end_s() + COMING_TO_REST_S) {
+            stage.stop()?;
+            wait_for_rest(stage)?;
+            return Ok(summary);
+        }
+    }
+}
+
+/// Waits until the arm is enabled, and leads the axes that the file names to their first positions.
+fn approach(stage: &mut impl Stage, first: &[Option<f64>]) -> Result<(), PlayError> {
     while stage.snapshot().phase != Phase::Holding {
         pass(stage)?;
     }
-    let snapshot = stage.snapshot();
-    let target: Vec<f64> = file
-        .first()
-        .iter()
-        .zip(&snapshot.axes)
-        .map(|(first, axis)| first.unwrap_or(axis.position_set))
-        .collect();
-    let approach = stage.move_to(&target).ok_or(PlayError::Ended)?;
-    wait(stage, approach)?;
-    let snapshot = stage.snapshot();
-    let positions: Vec<f64> = snapshot.axes.iter().take(axes.len()).map(|axis| axis.position_set).collect();
-    let trajectory = file.trajectory(&positions, axes, period_s).map_err(PlayError::File)?;
-    armed.set(snapshot.slot + 1);
-    let motion = stage.execute(trajectory).ok_or(PlayError::Ended)?;
+    let axes = stage.snapshot().axes;
+    let target: Vec<f64> =
+        first.iter().zip(&axes).map(|(first, axis)| first.unwrap_or(axis.position_set)).collect();
+    let motion = stage.move_to(&target)?;
     wait(stage, motion)
+}
+
+fn wait_for_rest(stage: &mut impl Stage) -> Result<(), PlayError> {
+    while !matches!(stage.snapshot().phase, Phase::Holding | Phase::Disabled | Phase::Passive) {
+        pass(stage)?;
+    }
+    Ok(())
 }
 
 fn pass(stage: &mut impl Stage) -> Result<(), PlayError> {

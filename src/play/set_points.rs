@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use serde::Serialize;
-use takt_rt::{CycleRecord, Phase};
+use takt_rt::{CycleRecord, Nanoseconds, Phase};
 
 /// Cycles at rest that are kept after the end: a third difference has three more set-points before it.
 const RESTING_ROWS: u32 = 3;
@@ -23,24 +23,41 @@ pub struct AxisMaxima {
     pub jerk_max: f64,
 }
 
-/// From which slot on a motion counts: the first that begins there. Set by whoever begins it.
+/// From when on set-points count. Set by whoever begins the motion.
 #[derive(Clone, Debug)]
-pub struct ArmedFrom(Arc<AtomicU64>);
+pub struct ArmedFrom {
+    /// The first motion that begins in this slot or later counts.
+    slot: Arc<AtomicU64>,
+    /// Every set-point of a slot that begins at this time or later counts.
+    time_ns: Arc<AtomicU64>,
+}
 
 impl Default for ArmedFrom {
     fn default() -> Self {
-        Self(Arc::new(AtomicU64::new(u64::MAX)))
+        let never = || Arc::new(AtomicU64::new(u64::MAX));
+        Self { slot: never(), time_ns: never() }
     }
 }
 
 impl ArmedFrom {
     /// The next motion that begins in this slot or later counts.
     pub fn set(&self, slot: u64) {
-        self.0.store(slot, Ordering::Release);
+        self.slot.store(slot, Ordering::Release);
+    }
+
+    /// Set-points of slots that begin at this time or later count; it is the time 0 of the rows.
+    pub fn set_time(&self, time_ns: Nanoseconds) {
+        self.time_ns.store(time_ns, Ordering::Release);
     }
 
     fn has_come(&self, slot: u64) -> bool {
-        slot >= self.0.load(Ordering::Acquire)
+        slot >= self.slot.load(Ordering::Acquire)
+    }
+
+    /// The time 0 of the rows, once a slot begins there or later.
+    fn time_that_has_come(&self, slot_start_ns: Nanoseconds) -> Option<Nanoseconds> {
+        let time_ns = self.time_ns.load(Ordering::Acquire);
+        (slot_start_ns >= time_ns).then_some(time_ns)
     }
 }
 
@@ -52,23 +69,26 @@ pub struct SetPointLog {
     /// The time of the set-points from which the motion begins.
     begins_s: f64,
     period_s: f64,
-    stage: Stage,
+    stage: LogStage,
     maxima: Vec<AxisMaxima>,
     /// The positions of the last three rows of each axis, the newest first.
     last: Vec<[f64; 3]>,
 }
 
-enum Stage {
+/// Where the times of the rows begin.
+#[derive(Clone, Copy)]
+enum Zero {
+    /// At the set-points of this slot, from which a motion began.
+    Slot(u64),
+    /// At this time.
+    Time(Nanoseconds),
+}
+
+enum LogStage {
     /// The motion has not begun; the record of the last cycle.
     Waiting(Option<Box<CycleRecord>>),
-    /// It began after this slot.
-    Playing {
-        after_slot: u64,
-    },
-    Resting {
-        after_slot: u64,
-        rows: u32,
-    },
+    Playing(Zero),
+    Resting(Zero, u32),
     Over,
 }
 
@@ -93,7 +113,7 @@ impl SetPointLog {
             armed,
             begins_s,
             period_s: period_ns as f64 / 1e9,
-            stage: Stage::Waiting(None),
+            stage: LogStage::Waiting(None),
             maxima: maxima.collect(),
             last: Vec::new(),
         };
@@ -110,48 +130,55 @@ impl SetPointLog {
         if !record.is_commanded {
             return;
         }
-        let slot = record.timing.slot;
+        let (slot, slot_start_ns) = (record.timing.slot, record.timing.slot_start_ns);
         let is_at_rest = record.phase == Phase::Holding;
         let is_in_motion = matches!(record.phase, Phase::Moving | Phase::Streaming | Phase::Stopping);
         match &mut self.stage {
-            Stage::Waiting(last) => {
+            LogStage::Waiting(last) => {
+                if let Some(time_ns) = self.armed.time_that_has_come(slot_start_ns) {
+                    let zero = Zero::Time(time_ns);
+                    self.stage = LogStage::Playing(zero);
+                    return self.row(record, zero);
+                }
                 let was_at_rest = last.as_ref().filter(|last| last.phase == Phase::Holding);
                 if let Some(first) = was_at_rest.filter(|_| is_in_motion && self.armed.has_come(slot)) {
-                    let (first, after_slot) = (first.clone(), slot.saturating_sub(1));
-                    self.stage = Stage::Playing { after_slot };
-                    self.row(&first, 0);
-                    self.row(record, 1);
+                    let zero = Zero::Slot(slot.saturating_sub(1));
+                    let mut first = first.clone();
+                    first.timing.slot = slot.saturating_sub(1);
+                    self.stage = LogStage::Playing(zero);
+                    self.row(&first, zero);
+                    self.row(record, zero);
                 } else {
                     *last = Some(Box::new(*record));
                 }
             }
-            Stage::Playing { after_slot } => {
-                let after_slot = *after_slot;
+            LogStage::Playing(zero) => {
+                let zero = *zero;
                 if is_at_rest {
-                    self.stage = Stage::Resting { after_slot, rows: 0 };
+                    self.stage = LogStage::Resting(zero, 0);
                 } else if !is_in_motion && record.phase != Phase::Disabling {
-                    self.stage = Stage::Over;
+                    self.stage = LogStage::Over;
                     return;
                 }
-                self.row(record, slot.saturating_sub(after_slot));
+                self.row(record, zero);
             }
-            Stage::Resting { after_slot, rows } => {
-                let (after_slot, rows) = (*after_slot, *rows + 1);
-                self.stage = Stage::Resting { after_slot, rows };
+            LogStage::Resting(zero, rows) => {
+                let (zero, rows) = (*zero, *rows + 1);
+                self.stage = LogStage::Resting(zero, rows);
                 if is_at_rest {
-                    self.row(record, slot.saturating_sub(after_slot));
+                    self.row(record, zero);
                 }
                 if !is_at_rest || rows >= RESTING_ROWS {
-                    self.stage = Stage::Over;
+                    self.stage = LogStage::Over;
                 }
             }
-            Stage::Over => {}
+            LogStage::Over => {}
         }
     }
 
     /// Whether the motion has ended, and all of it is here.
     pub fn is_over(&self) -> bool {
-        matches!(self.stage, Stage::Over)
+        matches!(self.stage, LogStage::Over)
     }
 
     /// The largest rates, and the first error of writing.
@@ -164,7 +191,7 @@ impl SetPointLog {
         (self.maxima, self.failure)
     }
 
-    fn row(&mut self, record: &CycleRecord, cycle: u64) {
+    fn row(&mut self, record: &CycleRecord, zero: Zero) {
         let axes = record.axes();
         if self.last.is_empty() {
             // The motion begins from rest.
@@ -182,7 +209,11 @@ impl SetPointLog {
         if self.out.is_none() {
             return;
         }
-        let mut line = format!("{:.9}", self.begins_s + cycle as f64 * period_s);
+        let at_s = match zero {
+            Zero::Slot(slot) => self.begins_s + record.timing.slot.saturating_sub(slot) as f64 * period_s,
+            Zero::Time(time_ns) => record.timing.slot_start_ns.saturating_sub(time_ns) as f64 / 1e9,
+        };
+        let mut line = format!("{at_s:.9}");
         for axis in axes {
             line += &format!(",{}", axis.position_set);
         }

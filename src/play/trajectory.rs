@@ -28,7 +28,7 @@ impl FileTrajectory {
     pub fn new(file: &PlayFile, axes: usize) -> Result<Self, PlayFileError> {
         if file.torque_column.is_some() {
             let words = "a trajectory takes no torques; play the file without --trajectory".to_owned();
-            let problem = FileProblem::Trajectory { joint: None, words };
+            let problem = FileProblem::Rows { joint: None, words };
             return Err(PlayFileError { line: 1, column: file.torque_column, problem });
         }
         let mut rows: Vec<&PlayRow> = file.rows.iter().collect();
@@ -68,43 +68,30 @@ impl FileTrajectory {
         self.axes.iter().map(first).collect()
     }
 
-    /// The trajectory from these positions, at rest. Axes that the file does not name stay.
+    /// The trajectory from where the axes are. Axes that the file does not name stay.
     ///
     /// # Errors
-    /// The first thing that is wrong, at its line.
-    pub fn trajectory(
-        &self,
-        positions: &[f64],
-        axes: &[Axis],
-        period_s: f64,
-    ) -> Result<Trajectory, PlayFileError> {
-        let points: Vec<AxisPoints> = self
-            .axes
-            .iter()
-            .zip(positions)
-            .map(|(points, position)| {
-                points.clone().unwrap_or_else(|| AxisPoints::standing(*position, self.times_s.len()))
-            })
-            .collect();
-        let start: Vec<State> = positions.iter().map(|position| State::rest(*position)).collect();
-        let limits: Vec<_> = axes.iter().map(|axis| axis.limits).collect();
-        let conditions = TrajectoryConditions { start: &start, limits: &limits, period_s };
-        Trajectory::of_axes(&self.times_s, &points, &conditions).map_err(|error| self.problem(&error, axes))
+    /// The first thing that is wrong.
+    pub fn trajectory(&self, conditions: &TrajectoryConditions<'_>) -> Result<Trajectory, TrajectoryError> {
+        let points = self.axes.iter().zip(conditions.start).map(|(points, start)| {
+            points.clone().unwrap_or_else(|| AxisPoints::standing(start.position, self.times_s.len()))
+        });
+        Trajectory::of_axes(&self.times_s, &points.collect::<Vec<_>>(), conditions)
     }
 
     /// Checks the file before anything moves: the axes that it names will begin at its first point, and the others do not move.
     ///
     /// # Errors
     /// The first thing that is wrong, at its line.
-    pub fn check(&self, axes: &[Axis], period_s: f64) -> Result<Trajectory, PlayFileError> {
+    pub fn check(&self, axes: &[Axis], period_s: f64) -> Result<(), PlayFileError> {
         let inside = |axis: &Axis| 0.5 * (axis.limits.position_min + axis.limits.position_max);
-        let positions: Vec<f64> = self
-            .first()
-            .iter()
-            .zip(axes)
-            .map(|(first, axis)| first.unwrap_or_else(|| inside(axis)))
-            .collect();
-        self.trajectory(&positions, axes, period_s)
+        let first = self.first();
+        let start =
+            first.iter().zip(axes).map(|(first, axis)| State::rest(first.unwrap_or_else(|| inside(axis))));
+        let start: Vec<State> = start.collect();
+        let limits: Vec<_> = axes.iter().map(|axis| axis.limits).collect();
+        let conditions = TrajectoryConditions { start: &start, limits: &limits, period_s };
+        self.trajectory(&conditions).map(drop).map_err(|error| self.problem(&error, axes))
     }
 
     fn problem(&self, error: &TrajectoryError, axes: &[Axis]) -> PlayFileError {
@@ -128,6 +115,6 @@ impl FileTrajectory {
             }
             _ => error.words(),
         };
-        PlayFileError { line, column: None, problem: FileProblem::Trajectory { joint, words } }
+        PlayFileError { line, column: None, problem: FileProblem::Rows { joint, words } }
     }
 }

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::sync::{Arc, OnceLock};
 
 use mcap::McapError;
-use takt_rt::{Event, Nanoseconds};
+use takt_rt::{CycleRecord, Event, Nanoseconds};
 
 use super::black_box::{BlackBox, BlackBoxOptions, Incident, reason};
 use super::candump::CandumpLog;
@@ -21,6 +21,9 @@ use super::words;
 use crate::bus::trace::Trace;
 use crate::controller::channels::LogSide;
 use crate::printable::printable_path;
+
+/// What is to be done with the record of each cycle.
+pub type EachCycle = Box<dyn FnMut(&CycleRecord) + Send>;
 
 /// Settings of a logger.
 pub struct LoggerOptions {
@@ -93,6 +96,7 @@ pub struct Logger {
     recording: Option<Recording>,
     candump: Option<CandumpLog>,
     black_box: Option<BlackBox>,
+    each_cycle: Option<EachCycle>,
     traces: Vec<Trace>,
     paths: [Option<PathBuf>; 2],
     not_written: Vec<String>,
@@ -114,6 +118,7 @@ impl Logger {
             recording: None,
             candump: None,
             black_box,
+            each_cycle: None,
             traces,
             paths: [None, None],
             not_written: Vec::new(),
@@ -132,6 +137,12 @@ impl Logger {
             }
         }
         logger
+    }
+
+    /// Also calls this with the record of each cycle, in the thread that drains. It must not panic.
+    #[must_use]
+    pub fn with_each_cycle(self, each_cycle: Option<EachCycle>) -> Self {
+        Self { each_cycle, ..self }
     }
 
     fn begin_recording(&mut self, destination: RecordingDestination, stem: &str, wall_clock: WallClock) {
@@ -174,6 +185,9 @@ impl Logger {
         let mut failure = None;
         while let Some(written) = self.source.next_record(|record| {
             self.statistics.add(record);
+            if let Some(each_cycle) = &mut self.each_cycle {
+                each_cycle(record);
+            }
             if let Some(black_box) = &mut self.black_box {
                 black_box.cycle(record);
             }

@@ -27,6 +27,8 @@ mod interpolation;
 mod point;
 #[cfg(test)]
 mod tests;
+mod time_law;
+mod waypoints;
 
 use std::sync::Arc;
 
@@ -37,6 +39,7 @@ use interpolation::Knots;
 
 pub use error::{BrokenLimit, PointQuantity, TrajectoryError};
 pub use point::{AxisPoints, TrajectoryPoint};
+pub use time_law::RateError;
 
 /// By how much a first point at the time 0 may be off the present set-point (rad or m): it is taken for the same.
 const SAME_POSITION: f64 = 1e-6;
@@ -61,6 +64,8 @@ struct Path {
     times_s: Vec<f64>,
     /// For each point a polynomial of each axis.
     polynomials: Vec<Polynomial>,
+    /// The place of the first point that was given: 1 where the path begins before it, where the axes are.
+    first: usize,
 }
 
 /// A trajectory that keeps every limit.
@@ -121,8 +126,8 @@ impl Trajectory {
             .zip(conditions.limits)
             .map(|((points, start), limits)| polynomials(&knot_times, points, start, limits))
             .collect();
-        let path = Path::new(knot_times, &of_axes);
-        path.check(conditions.limits, first)?;
+        let path = Path::new(knot_times, &of_axes, first);
+        path.check(conditions.limits)?;
         for (axis, (points, limits)) in columns.iter().zip(conditions.limits).enumerate() {
             check_end(axis, points, limits, conditions.period_s)?;
         }
@@ -137,6 +142,11 @@ impl Trajectory {
     /// The time to the last point, in seconds; infinite if the trajectory pauses.
     pub fn duration_s(&self) -> f64 {
         self.duration_s
+    }
+
+    /// The time of the last point on the path, in seconds: the duration at the rate 1.
+    pub fn path_duration_s(&self) -> f64 {
+        self.path.duration_s()
     }
 
     /// The number of axes.
@@ -169,27 +179,27 @@ impl Trajectory {
 
 impl Path {
     /// A path of these axes. Behind the last point it goes on as it is there.
-    fn new(times_s: Vec<f64>, of_axes: &[(Vec<Polynomial>, Polynomial)]) -> Self {
+    fn new(times_s: Vec<f64>, of_axes: &[(Vec<Polynomial>, Polynomial)], first: usize) -> Self {
         let axes = of_axes.len();
         let mut polynomials = Vec::with_capacity(times_s.len() * axes);
         for point in 0..times_s.len() {
             polynomials.extend(of_axes.iter().map(|(ways, end)| ways.get(point).unwrap_or(end)));
         }
-        Self { axes, times_s, polynomials }
+        Self { axes, times_s, polynomials, first }
     }
 
     fn duration_s(&self) -> f64 {
         self.times_s.last().copied().unwrap_or(0.0)
     }
 
-    /// Checks every polynomial. `first` is 1 where the first point was not given but is where the axes are.
-    fn check(&self, limits: &[AxisLimits], first: usize) -> Result<(), TrajectoryError> {
+    /// Checks every polynomial.
+    fn check(&self, limits: &[AxisLimits]) -> Result<(), TrajectoryError> {
         for (index, times_s) in self.times_s.windows(2).enumerate() {
             let polynomials = self.polynomials.iter().skip(index * self.axes);
             for (axis, (polynomial, limits)) in polynomials.zip(limits).enumerate() {
                 if let Some(found) = check::violation(polynomial, times_s[1] - times_s[0], limits) {
                     let check::Violation { broken, time_s, value, limit } = found;
-                    let point = index + 1 - first;
+                    let point = index + 1 - self.first;
                     let time_s = times_s[0] + time_s;
                     return Err(TrajectoryError::Limit { point, axis, broken, time_s, value, limit });
                 }
@@ -237,7 +247,7 @@ fn check_values(points: usize, axes: &[AxisPoints]) -> Result<(), TrajectoryErro
 }
 
 /// Checks what the points say by themselves, and the mean speeds between them: what breaks a limit there breaks it however one
-/// goes from point to point, and is the reason for what polynomials do around it. `first` is as for [`Path::check`].
+/// goes from point to point, and is the reason for what polynomials do around it. `first` is that of the path.
 fn check_points(
     times_s: &[f64],
     axes: &[AxisPoints],

@@ -225,3 +225,198 @@ proptest! {
         }
     }
 }
+
+/// The largest use of a limit that samples of a trajectory show, by differences of positions with a small step.
+fn largest_use(trajectory: &Trajectory, axes: usize, limits: &AxisLimits) -> f64 {
+    let step_s = 1e-3;
+    let end_s = trajectory.duration_s().min(30.0) + 0.01;
+    let count = (end_s / step_s) as usize;
+    let mut most: f64 = 0.0;
+    for axis in 0..axes {
+        let p: Vec<f64> =
+            (0..count).map(|k| trajectory.sample(k as f64 * step_s).states[axis].position).collect();
+        for four in p.windows(4) {
+            let velocity = (four[1] - four[0]) / step_s;
+            let acceleration = (four[2] - 2.0 * four[1] + four[0]) / (step_s * step_s);
+            let jerk = (four[3] - 3.0 * four[2] + 3.0 * four[1] - four[0]) / step_s.powi(3);
+            let steepest =
+                if velocity * acceleration > 0.0 { limits.acceleration } else { limits.deceleration };
+            most = most
+                .max(velocity.abs() / limits.velocity)
+                .max(acceleration.abs() / steepest.max(limits.acceleration.min(limits.deceleration)))
+                .max(jerk.abs() / limits.jerk);
+        }
+    }
+    most
+}
+
+const EVEN: AxisLimits = AxisLimits { deceleration: 8.0, ..LIMITS };
+
+fn even_limits(axes: usize) -> Vec<AxisLimits> {
+    vec![EVEN; axes]
+}
+
+/// A path of two axes there and back.
+fn there_and_back() -> Trajectory {
+    let start = [State::rest(0.0), State::rest(0.1)];
+    let points = [point(1.0, &[0.8, 0.0]), point(1.7, &[0.4, 0.5]), point(2.6, &[0.0, 0.1])];
+    let conditions = TrajectoryConditions { start: &start, limits: &even_limits(2), period_s: PERIOD_S };
+    Trajectory::new(&points, &conditions).unwrap()
+}
+
+#[test]
+fn a_pause_comes_to_rest_on_the_path_and_a_resumption_goes_on_to_its_end() {
+    let written = there_and_back();
+    for at_s in [0.05, 0.3, 0.5, 0.9, 1.3, 1.9] {
+        let pausing = written.at_rate(at_s, 0.0, &even_limits(2)).unwrap();
+        assert_eq!(pausing.sample(0.0).states, written.sample(at_s).states, "without a step");
+        assert_eq!(pausing.duration_s(), f64::INFINITY);
+        let rest = pausing.sample(20.0);
+        assert!(rest.states.iter().all(|state| state.velocity == 0.0 && state.acceleration == 0.0));
+        let stopped_s = pausing.path_time(20.0).path_s;
+        assert_eq!(rest.states[0].position, written.sample(stopped_s).states[0].position, "on the path");
+        assert!(stopped_s - at_s < 0.6, "{at_s}: {stopped_s}");
+        assert!(largest_use(&pausing, 2, &EVEN) < 1.0 + 1e-4, "{at_s}");
+        let resumed = pausing.at_rate(20.0, 1.0, &even_limits(2)).unwrap();
+        assert_eq!(resumed.sample(0.0).states, rest.states);
+        let end = resumed.sample(resumed.duration_s()).states;
+        assert!((end[0].position, end[0].velocity) == (0.0, 0.0) && end[1].position == 0.1, "{end:?}");
+        assert!(largest_use(&resumed, 2, &EVEN) < 1.0 + 1e-4, "{at_s}");
+    }
+}
+
+#[test]
+fn a_lower_rate_takes_longer_and_a_higher_one_is_refused_where_a_limit_is_in_the_way() {
+    let written = there_and_back();
+    let limits = even_limits(2);
+    let slow = written.at_rate(0.2, 0.5, &limits).unwrap();
+    let expected = 2.0 * (written.duration_s() - 0.2);
+    assert!(slow.duration_s() < expected && slow.duration_s() > 0.9 * expected, "{}", slow.duration_s());
+    assert!(largest_use(&slow, 2, &EVEN) < 1.0 + 1e-4);
+    // From the middle of a change to another rate.
+    let faster = slow.at_rate(0.05, 0.8, &limits).unwrap();
+    assert_eq!(faster.sample(0.0).states, slow.sample(0.05).states);
+    assert!(faster.duration_s() < slow.duration_s() - 0.05);
+    assert!(largest_use(&faster, 2, &EVEN) < 1.0 + 1e-4);
+    let quick = written.at_rate(0.2, 1.05, &limits).unwrap();
+    assert!(quick.duration_s() < written.duration_s() - 0.2);
+    assert!(largest_use(&quick, 2, &EVEN) < 1.0 + 1e-4);
+    let refused = written.at_rate(0.2, 3.0, &limits).unwrap_err();
+    assert!(matches!(refused, RateError::Limit { .. }), "{refused:?}");
+    for rate in [-0.1, f64::NAN, f64::INFINITY] {
+        assert!(matches!(written.at_rate(0.2, rate, &limits), Err(RateError::NotARate { .. })));
+    }
+    assert_eq!(written.at_rate(2.7, 0.5, &limits), Err(RateError::Over));
+}
+
+#[test]
+fn the_same_rate_changes_nothing() {
+    let written = there_and_back();
+    let same = written.at_rate(0.7, 1.0, &even_limits(2)).unwrap();
+    for at_s in [0.0, 0.4, 1.9, 3.0] {
+        assert_eq!(same.sample(at_s).states, written.sample(0.7 + at_s).states);
+    }
+}
+
+fn through(waypoints: &[Vec<f64>], start: &[f64]) -> Result<Trajectory, TrajectoryError> {
+    let start: Vec<State> = start.iter().map(|position| State::rest(*position)).collect();
+    let limits = even_limits(start.len());
+    Trajectory::through(
+        waypoints,
+        &TrajectoryConditions { start: &start, limits: &limits, period_s: PERIOD_S },
+    )
+}
+
+/// The time of moves from rest to rest through all waypoints.
+fn stopping_s(waypoints: &[Vec<f64>], start: &[f64]) -> f64 {
+    use takt_rt::plan::{Limits, PlanOptions, Problem, Profile, synchronised};
+    let limits = Limits::symmetric(EVEN.velocity, EVEN.acceleration, EVEN.jerk);
+    let mut from = start.to_vec();
+    let mut sum_s = 0.0;
+    for to in waypoints {
+        let problems: Vec<Problem> = from
+            .iter()
+            .zip(to)
+            .map(|(from, to)| Problem { start: State::rest(*from), target: State::rest(*to), limits })
+            .collect();
+        let mut profiles = vec![Profile::hold(0.0); problems.len()];
+        sum_s += synchronised(&problems, &mut profiles, PlanOptions::default()).unwrap();
+        from.clone_from(to);
+    }
+    sum_s
+}
+
+#[test]
+fn waypoints_are_passed_without_stopping_within_all_limits() {
+    let waypoints = [vec![0.5, 0.2], vec![0.9, 0.6], vec![1.2, 0.3], vec![1.5, 0.0]];
+    let trajectory = through(&waypoints, &[0.0, 0.0]).unwrap();
+    let times: Vec<f64> = trajectory.view().times_s.to_vec();
+    // The start and a free point are before the first of them, and each interval has eight parts.
+    for (waypoint, time_s) in waypoints.iter().take(3).zip(times.iter().step_by(8).skip(2)) {
+        let states = trajectory.sample(*time_s).states;
+        assert!((0..2).all(|axis| (states[axis].position - waypoint[axis]).abs() < 1e-12));
+        assert!(states[0].velocity > 0.5, "{states:?}");
+    }
+    let end = trajectory.sample(trajectory.duration_s()).states;
+    assert_eq!((end[0], end[1]), (State::rest(1.5), State::rest(0.0)));
+    let used = largest_use(&trajectory, 2, &EVEN);
+    assert!(used < 1.0 + 1e-4 && used > 0.97, "{used}");
+    assert!(trajectory.duration_s() < 0.8 * stopping_s(&waypoints, &[0.0, 0.0]));
+}
+
+#[test]
+fn a_single_waypoint_is_reached_nearly_as_fast_as_by_a_move() {
+    for way in [0.01, 0.1, 0.5, 1.5] {
+        let trajectory = through(&[vec![way]], &[0.0]).unwrap();
+        let ratio = trajectory.duration_s() / stopping_s(&[vec![way]], &[0.0]);
+        assert!((0.999..1.15).contains(&ratio), "{way}: {ratio}");
+    }
+}
+
+#[test]
+fn waypoints_that_cannot_be_passed_are_named() {
+    let error = through(&[vec![0.5], vec![2.5], vec![1.0]], &[0.0]).unwrap_err();
+    assert_eq!((error.point(), error.axis()), (Some(1), Some(0)));
+    assert!(matches!(error, TrajectoryError::Limit { broken: BrokenLimit::Position, .. }));
+    // The spline swings out beyond the limit between waypoints that keep it.
+    let error = through(&[vec![1.99], vec![1.9], vec![0.0]], &[0.0]).unwrap_err();
+    assert!(matches!(error, TrajectoryError::Limit { broken: BrokenLimit::Position, .. }), "{error:?}");
+    assert!(matches!(through(&[vec![0.5], vec![]], &[0.0]), Err(TrajectoryError::Count { point: 1, .. })));
+    assert!(matches!(through(&[vec![f64::NAN]], &[0.0]), Err(TrajectoryError::NotFinite { point: 0, .. })));
+    assert_eq!(through(&[], &[0.0]), Err(TrajectoryError::NoPoint));
+    let standing = through(&[vec![0.3], vec![0.3]], &[0.3]).unwrap();
+    assert_eq!((standing.duration_s(), standing.sample(1.0).states[0]), (0.0, State::rest(0.3)));
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(60))]
+
+    #[test]
+    fn random_waypoints_are_passed_within_the_limits_or_refused_for_the_position(
+        waypoints in prop::collection::vec([-1.6f64..1.6, -1.6f64..1.6], 1..8),
+    ) {
+        let waypoints: Vec<Vec<f64>> = waypoints.into_iter().map(|waypoint| waypoint.to_vec()).collect();
+        match through(&waypoints, &[0.0, 0.0]) {
+            Ok(trajectory) => {
+                prop_assert!(largest_use(&trajectory, 2, &EVEN) < 1.0 + 1e-3);
+                prop_assert!(trajectory.duration_s() < 1.3 * stopping_s(&waypoints, &[0.0, 0.0]) + 0.2);
+            }
+            Err(error) => {
+                let is_position = matches!(error, TrajectoryError::Limit { broken: BrokenLimit::Position, .. });
+                prop_assert!(is_position, "{error:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_pause_from_anywhere_keeps_the_limits(at_s in 0.0f64..2.55, rate in 0.0f64..1.0) {
+        let written = there_and_back();
+        let limits = even_limits(2);
+        if let Ok(changed) = written.at_rate(at_s, rate, &limits) {
+            prop_assert_eq!(changed.sample(0.0).states, written.sample(at_s).states);
+            prop_assert!(largest_use(&changed, 2, &EVEN) < 1.0 + 1e-3);
+        } else {
+            prop_assert!(at_s > 2.0, "{at_s}");
+        }
+    }
+}

@@ -143,6 +143,11 @@ impl Handle {
     /// Submits a request and waits until it is granted.
     pub(super) fn request(&self, request: Request) -> Result<(), CommandError> {
         let id = self.submit(request)?;
+        self.wait_for_grant(id)
+    }
+
+    /// Waits until a request that was submitted is granted.
+    pub(super) fn wait_for_grant(&self, id: RequestId) -> Result<(), CommandError> {
         self.wait_for_answer(|state| {
             let is_answered = state.answers.of(id) != Answer::None;
             if !is_answered && self.is_discarded(id, state) {

@@ -6,6 +6,7 @@ use takt_rt::{RequestError, StopReason};
 
 use crate::controller::session::{Session, SessionError};
 use crate::telemetry::{Machine, words};
+use crate::trajectory::{RateError, TrajectoryError};
 
 /// Why a controller could not be started.
 #[derive(thiserror::Error)]
@@ -101,6 +102,15 @@ pub enum CommandError {
         /// The number of waiting requests.
         waiting: usize,
     },
+    /// The points of a trajectory break a limit, or are wrong. Axes and points are counted from 0.
+    #[error(transparent)]
+    Trajectory(#[from] TrajectoryError),
+    /// The rate of a trajectory cannot be changed so.
+    #[error(transparent)]
+    Rate(#[from] RateError),
+    /// The motion is not a trajectory under way.
+    #[error("the motion is not a trajectory under way")]
+    NoTrajectory,
     /// The real-time thread has refused it.
     #[error(transparent)]
     Refused(#[from] Refused),

@@ -29,6 +29,7 @@ mod life;
 mod messages;
 mod motion;
 mod stream;
+mod trajectory;
 mod waiting;
 
 use std::ops::Deref;
@@ -46,11 +47,13 @@ use crate::config::{Axis, Config};
 use crate::telemetry::{Machine, Notice};
 use life::Life;
 use messages::Messages;
+use trajectory::Trajectories;
 
 pub use error::{CommandError, MotionError, Refused, StartFailure, Stopped, WaitError};
 pub use events::Events;
 pub use motion::{MotionId, MoveOptions};
 pub use stream::{StreamError, StreamHandle};
+pub use trajectory::TrajectoryProgress;
 
 /// The drives must be enabled within this time. It covers the power-up time of all drives.
 const ENABLE_TIMEOUT: Duration = Duration::from_secs(60);
@@ -88,7 +91,8 @@ impl Controller {
         };
         let thread = thread.map_err(SessionError::Logger)?;
         let Ok(remote) = handles_out.recv() else { return Err(failed(thread)) };
-        let RemoteHandles { observer, streamer, clients, events, realtime } = remote;
+        let RemoteHandles { observer, streamer, clients, trajectories, events, realtime } = remote;
+        let trajectories = Trajectories::new(trajectories);
         let handle = Handle(Arc::new(Shared {
             axes,
             machine,
@@ -97,6 +101,7 @@ impl Controller {
             observer,
             events,
             streamer,
+            trajectories,
             messages,
             life,
         }));
@@ -159,7 +164,8 @@ impl Drop for Controller {
 
 /// Commands and observes a running controller, from any thread. Clones are cheap and equal.
 ///
-/// No command waits for a lock that another thread could hold; only clients that push points of a stream wait for each other.
+/// No command waits for a lock that another thread could hold, with two exceptions: clients that push points of a stream wait for
+/// each other, and so do commands of trajectories.
 /// [`Handle::stop`] is wait-free, so it may also be called in a signal handler.
 #[derive(Clone)]
 pub struct Handle(Arc<Shared>);
@@ -172,6 +178,7 @@ struct Shared {
     observer: Observer,
     events: EventReader,
     streamer: Streamer,
+    trajectories: Trajectories,
     messages: Arc<Messages>,
     life: Arc<Life>,
 }

@@ -11,6 +11,13 @@ use super::error::{MotionError, Refused, Stopped, WaitError};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct MotionId(pub(super) RequestId);
 
+impl MotionId {
+    /// The request that began it.
+    pub const fn request(self) -> RequestId {
+        self.0
+    }
+}
+
 /// Parameters of a move.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MoveOptions {

@@ -89,6 +89,24 @@ impl StreamHandle {
         self.0.0.streamer.push_chunk(from_ns, interval_ns, &points).map_err(|_| StreamError::Full)
     }
 
+    /// Takes points that are stamped already, with an entry for each axis: all of them, or none.
+    ///
+    /// # Errors
+    /// See [`StreamError`].
+    pub fn push_points(&self, points: &[StreamPoint]) -> Result<(), StreamError> {
+        if self.0.0.life.is_ending() {
+            return Err(StreamError::Ended);
+        }
+        let axes = self.0.axes().len();
+        for (number, point) in points.iter().enumerate() {
+            let mut entries = point.axes.iter().take(axes).enumerate();
+            if let Some((axis, value)) = entries.find(|(_, entry)| !entry.is_finite()) {
+                return Err(StreamError::NotFinite { point: number, axis, value: *value });
+            }
+        }
+        self.0.0.streamer.push(points).map_err(|_| StreamError::Full)
+    }
+
     /// What the stream is doing, how far it is behind the stamps, and how many points have come, came late or were lost.
     pub fn report(&self) -> StreamReport {
         self.0.state().stream

@@ -1,0 +1,291 @@
+//! Trajectories: points with times, along which the speed may be changed, and which may be paused and resumed.
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use takt_rt::plan::State;
+use takt_rt::{
+    AxisLimits, ExecutionStart, MotionState, NANOSECONDS_PER_SECOND, RejectReason, Request, RequestId,
+    TrajectoryId,
+};
+
+use super::Handle;
+use super::error::CommandError;
+use super::motion::MotionId;
+use crate::config::Axis;
+use crate::controller::channels::{GivenTrajectory, TrajectoryGiver};
+use crate::trajectory::{Trajectory, TrajectoryConditions, TrajectoryError, TrajectoryPoint};
+
+/// By how much later than now a trajectory takes the place of another one: first, and at most. It must have been computed and handed
+/// over by then.
+const FIRST_MARGIN_S: f64 = 0.02;
+const LONGEST_MARGIN_S: f64 = 1.0;
+/// A trajectory that has been granted takes the place of the present one within this time, unless the motion ends before.
+const TAKING_OVER: Duration = Duration::from_secs(5);
+
+/// The trajectories of the handles of a controller.
+pub(super) struct Trajectories {
+    giver: TrajectoryGiver,
+    state: Mutex<TrajectoryState>,
+}
+
+#[derive(Default)]
+struct TrajectoryState {
+    /// The trajectory that was granted last.
+    present: Option<Present>,
+    /// Those whose requests may not have been taken yet.
+    submitted: Vec<(TrajectoryId, RequestId)>,
+}
+
+/// A trajectory that was granted.
+#[derive(Clone)]
+struct Present {
+    motion: RequestId,
+    id: TrajectoryId,
+    given: Arc<GivenTrajectory>,
+    /// The rate that it has while it is not paused.
+    rate: f64,
+    is_paused: bool,
+}
+
+impl Trajectories {
+    pub(super) fn new(giver: TrajectoryGiver) -> Self {
+        Self { giver, state: Mutex::default() }
+    }
+
+    /// Commands of trajectories wait for one another; no other call needs this lock.
+    fn lock(&self) -> MutexGuard<'_, TrajectoryState> {
+        // A panic of another holder of the lock leaves the state consistent.
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Handle {
+    /// Starts a trajectory through points with times, as ROS' `JointTrajectory` has them: see [`Trajectory::new`]. All of it is checked
+    /// before: what breaks a limit anywhere is refused, with the first point, axis and limit.
+    ///
+    /// While the axes hold, a first point at the time 0 must be where they are; with a later one the trajectory goes there first.
+    /// While another trajectory is under way, this one takes its place without a step, 20 ms later or as soon as it is computed: its
+    /// first point then needs a time after 0. Returns when the real-time thread has granted it.
+    ///
+    /// # Errors
+    /// [`CommandError::Trajectory`], [`CommandError::Refused`] in any other motion, and see [`CommandError`]; nothing has changed then.
+    pub fn execute(&self, points: &[TrajectoryPoint]) -> Result<MotionId, CommandError> {
+        self.execute_with(|conditions| Trajectory::new(points, conditions))
+    }
+
+    /// The same, for a trajectory that `make` makes from where the axes are when it begins. It is called again if that took too
+    /// long.
+    ///
+    /// # Errors
+    /// As [`Handle::execute`].
+    pub fn execute_with(
+        &self,
+        make: impl Fn(&TrajectoryConditions<'_>) -> Result<Trajectory, TrajectoryError>,
+    ) -> Result<MotionId, CommandError> {
+        let mut trajectories = self.0.trajectories.lock();
+        let Some(present) = self.under_way(&trajectories) else {
+            let start: Vec<State> = self
+                .axes()
+                .iter()
+                .zip(&self.state().axes)
+                .map(|(_, axis)| State::rest(axis.position_set))
+                .collect();
+            let trajectory = self.made(&start, &make)?;
+            return self.begin(&mut trajectories, trajectory, ExecutionStart::Now, None);
+        };
+        let start = |at_s: f64| -> Vec<State> {
+            let states = present.given.trajectory().sample(at_s).states;
+            self.axes().iter().zip(states).map(|(_, state)| state).collect()
+        };
+        self.take_over(&mut trajectories, &present, None, |at_s| self.made(&start(at_s), &make))
+    }
+
+    fn made(
+        &self,
+        start: &[State],
+        make: impl Fn(&TrajectoryConditions<'_>) -> Result<Trajectory, TrajectoryError>,
+    ) -> Result<Trajectory, CommandError> {
+        let limits = self.limits();
+        let period_s = self.period_s();
+        let trajectory = make(&TrajectoryConditions { start, limits: &limits, period_s })?;
+        let moves = |(index, axis): &(usize, &Axis)| axis.control.is_profile() && trajectory.moves(*index);
+        match self.axes().iter().enumerate().find(moves) {
+            Some((_, axis)) => Err(CommandError::WrongMode {
+                axis: axis.name.clone(),
+                needed: "a mode that follows set-points",
+            }),
+            None => Ok(trajectory),
+        }
+    }
+
+    /// Changes the speed along the path of a trajectory: 1 as it was written, 0.5 half as fast. The path stays the same, and all limits
+    /// are kept: the change is a ramp that is as short as they allow. Of a trajectory that is paused, it is the speed after
+    /// [`Handle::resume`]. Returns when the change begins.
+    ///
+    /// # Errors
+    /// [`CommandError::Rate`] for what the limits do not allow, [`CommandError::NoTrajectory`] if that motion is not a trajectory under way,
+    /// and see [`CommandError`]. The trajectory goes on as before then.
+    pub fn set_speed(&self, motion: MotionId, rate: f64) -> Result<(), CommandError> {
+        self.change_rate(motion, |present| (rate, present.is_paused))
+    }
+
+    /// Brings the axes to rest on the path of a trajectory. Returns when they begin to slow down.
+    ///
+    /// # Errors
+    /// As [`Handle::set_speed`].
+    pub fn pause(&self, motion: MotionId) -> Result<(), CommandError> {
+        self.change_rate(motion, |present| (present.rate, true))
+    }
+
+    /// Goes on with a trajectory that was paused. Returns when it does.
+    ///
+    /// # Errors
+    /// As [`Handle::set_speed`].
+    pub fn resume(&self, motion: MotionId) -> Result<(), CommandError> {
+        self.change_rate(motion, |present| (present.rate, false))
+    }
+
+    /// How far a trajectory under way is: the time on its path in seconds, of how many, and the present rate.
+    pub fn trajectory_progress(&self, motion: MotionId) -> Option<TrajectoryProgress> {
+        let trajectories = self.0.trajectories.lock();
+        let present = self.under_way(&trajectories).filter(|present| present.motion == motion.0)?;
+        let trajectory = present.given.trajectory();
+        let path_time = trajectory.path_time(present.given.at_s());
+        Some(TrajectoryProgress {
+            path_s: path_time.path_s,
+            of_s: trajectory.path_duration_s(),
+            rate: path_time.rate,
+        })
+    }
+
+    fn change_rate(
+        &self,
+        MotionId(motion): MotionId,
+        wanted: impl Fn(&Present) -> (f64, bool),
+    ) -> Result<(), CommandError> {
+        let mut trajectories = self.0.trajectories.lock();
+        let present = self.under_way(&trajectories).filter(|present| present.motion == motion);
+        let present = present.ok_or(CommandError::NoTrajectory)?;
+        let (rate, is_paused) = wanted(&present);
+        if !(rate.is_finite() && rate > 0.0) {
+            return Err(crate::trajectory::RateError::NotARate { rate }.into());
+        }
+        let next = Present { rate, is_paused, ..present.clone() };
+        let actual = |of: &Present| if of.is_paused { 0.0 } else { of.rate };
+        if actual(&next) == actual(&present) {
+            trajectories.present = Some(next);
+            return Ok(());
+        }
+        let limits = self.limits();
+        let (wanted, of) = (actual(&next), present.given.trajectory());
+        self.take_over(&mut trajectories, &present, Some(&next), |at_s| {
+            Ok(of.at_rate(at_s, wanted, &limits)?)
+        })?;
+        Ok(())
+    }
+
+    /// Lets a trajectory take the place of the present one at a cycle that is near, and waits until it has. `same` is for the same motion:
+    /// how it goes on.
+    fn take_over(
+        &self,
+        trajectories: &mut TrajectoryState,
+        present: &Present,
+        same: Option<&Present>,
+        make: impl Fn(f64) -> Result<Trajectory, CommandError>,
+    ) -> Result<MotionId, CommandError> {
+        let period_s = self.period_s();
+        let mut margin_s = FIRST_MARGIN_S;
+        loop {
+            let cycles = ((present.given.at_s() + margin_s) / period_s).ceil();
+            let trajectory = make(cycles * period_s)?;
+            let start = ExecutionStart::After {
+                trajectory: present.id,
+                cycles: cycles as u64,
+                is_same_motion: same.is_some(),
+            };
+            match self.begin(trajectories, trajectory, start, same) {
+                Err(CommandError::Refused(refused))
+                    if refused.refusal.map(|refusal| refusal.reason) == Some(RejectReason::TooLate)
+                        && margin_s < LONGEST_MARGIN_S =>
+                {
+                    margin_s *= 2.0;
+                }
+                begun => return begun,
+            }
+        }
+    }
+
+    /// Hands a trajectory over, and waits until it is granted and has begun.
+    fn begin(
+        &self,
+        trajectories: &mut TrajectoryState,
+        trajectory: Trajectory,
+        start: ExecutionStart,
+        same: Option<&Present>,
+    ) -> Result<MotionId, CommandError> {
+        let giver = &self.0.trajectories.giver;
+        self.take_back_discarded(trajectories);
+        let given = Arc::new(GivenTrajectory::new(trajectory));
+        let id = giver.give(0, &given).ok_or(CommandError::Full { waiting: trajectories.submitted.len() })?;
+        let request = match self.submit(Request::Execute { trajectory: id, start }) {
+            Ok(request) => request,
+            Err(error) => {
+                giver.take_back(id);
+                return Err(error);
+            }
+        };
+        trajectories.submitted.push((id, request));
+        self.wait_for_grant(request)?;
+        let motion = same.map_or(request, |same| same.motion);
+        let (rate, is_paused) = same.map_or((1.0, false), |same| (same.rate, same.is_paused));
+        trajectories.present = Some(Present { motion, id, given: Arc::clone(&given), rate, is_paused });
+        // Until then nothing else can take the place of the present one. The motion may end before.
+        let _ = self.wait_until(TAKING_OVER, |state| {
+            let is_under_way = state.motions.of(motion) == Some(MotionState::InProgress);
+            (given.at_s() > 0.0 || !is_under_way).then_some(())
+        });
+        Ok(MotionId(motion))
+    }
+
+    /// Takes trajectories back whose requests a stop has discarded.
+    fn take_back_discarded(&self, trajectories: &mut TrajectoryState) {
+        let state = self.state();
+        trajectories.submitted.retain(|(id, request)| {
+            let is_discarded = self.is_discarded(*request, &state);
+            if is_discarded {
+                self.0.trajectories.giver.take_back(*id);
+            }
+            !is_discarded && state.answers.of(*request) == takt_rt::Answer::None
+        });
+        self.0.trajectories.giver.release();
+    }
+
+    /// The trajectory under way.
+    fn under_way(&self, trajectories: &TrajectoryState) -> Option<Present> {
+        let state = self.state();
+        let is_under_way =
+            |present: &&Present| state.motions.of(present.motion) == Some(MotionState::InProgress);
+        trajectories.present.as_ref().filter(is_under_way).cloned()
+    }
+
+    fn limits(&self) -> Vec<AxisLimits> {
+        self.axes().iter().map(|axis| axis.limits).collect()
+    }
+
+    /// As the engine computes it.
+    fn period_s(&self) -> f64 {
+        self.machine().cycle_ns as f64 / NANOSECONDS_PER_SECOND as f64
+    }
+}
+
+/// How far a trajectory is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TrajectoryProgress {
+    /// The time on the path, in seconds: that of the point that is passed now.
+    pub path_s: f64,
+    /// The time of its last point.
+    pub of_s: f64,
+    /// Seconds of the path in a second: 1 as it was written, 0 while it is paused.
+    pub rate: f64,
+}

@@ -1,0 +1,181 @@
+//! The rows of a file as a stream: each handed over when it arrives, stamped with the time that it is meant for.
+
+use takt_rt::{AxisPoint, MAX_AXES, Nanoseconds, PointRole, Snapshot, StreamPoint};
+
+use super::error::{FileProblem, PlayFileError};
+use super::file::{PlayFile, PlayRow};
+use crate::config::Axis;
+
+/// Nanoseconds in a second, to and from the seconds of a file.
+const NANOSECONDS: f64 = 1e9;
+
+/// The rows of a file in the order of their arrival.
+#[derive(Clone, Debug)]
+pub struct FileStream {
+    /// The axis of each joint that the file names.
+    axes: Vec<usize>,
+    batches: Vec<Batch>,
+    first: Vec<Option<f64>>,
+}
+
+/// Points that arrive together: one by itself, or a chunk.
+#[derive(Clone, Debug)]
+struct Batch {
+    /// Since the start, in seconds.
+    arrive_s: f64,
+    is_chunk: bool,
+    /// Since the start, and a point for each joint.
+    points: Vec<(f64, Vec<AxisPoint>)>,
+}
+
+impl FileStream {
+    /// Takes the rows of a file. A chunk arrives with its last row.
+    ///
+    /// # Errors
+    /// A column of torques, which no stream takes so far, or a first point outside the position limits.
+    pub fn new(file: &PlayFile, axes: &[Axis]) -> Result<Self, PlayFileError> {
+        if file.torque_column.is_some() {
+            let words = "streams take no torques so far".to_owned();
+            let problem = FileProblem::Rows { joint: None, words };
+            return Err(PlayFileError { line: 1, column: file.torque_column, problem });
+        }
+        let mut first = vec![None; axes.len()];
+        let earliest = file.rows.iter().min_by(|one, other| one.at_s.total_cmp(&other.at_s));
+        if let Some(row) = earliest {
+            for (joint, point) in file.joints.iter().zip(&row.points) {
+                check_first(row, axes.get(joint.axis), point.position)?;
+                if let Some(place) = first.get_mut(joint.axis) {
+                    *place = Some(point.position);
+                }
+            }
+        }
+        let axes = file.joints.iter().map(|joint| joint.axis).collect();
+        Ok(Self { axes, batches: batches(&file.rows), first })
+    }
+
+    /// The first position of each axis that the file names: that of the row that is meant for the earliest time.
+    pub(super) fn first(&self) -> &[Option<f64>] {
+        &self.first
+    }
+
+    /// When everything has arrived, and the time of every row has come, in seconds after the start.
+    pub(super) fn end_s(&self) -> f64 {
+        let times = self
+            .batches
+            .iter()
+            .flat_map(|batch| batch.points.iter().map(|(at_s, _)| *at_s).chain([batch.arrive_s]));
+        times.fold(0.0, f64::max)
+    }
+
+    /// How many batches have arrived so long after the start.
+    pub(super) fn arrived(&self, since_start_s: f64) -> usize {
+        self.batches.partition_point(|batch| batch.arrive_s <= since_start_s)
+    }
+
+    /// The points of a batch for every axis. Axes that the file does not name stay where `snapshot` has them.
+    pub(super) fn batch(
+        &self,
+        number: usize,
+        start_ns: Nanoseconds,
+        snapshot: &Snapshot,
+    ) -> Option<Vec<StreamPoint>> {
+        let Batch { is_chunk, points, .. } = self.batches.get(number)?;
+        let standing: [AxisPoint; MAX_AXES] =
+            std::array::from_fn(|axis| AxisPoint::position(snapshot.axes[axis].position_set));
+        let count = points.len();
+        let stamped = points.iter().enumerate().map(|(index, (at_s, joints))| {
+            let mut axes = standing;
+            for (axis, point) in self.axes.iter().zip(joints) {
+                if let Some(place) = axes.get_mut(*axis) {
+                    *place = *point;
+                }
+            }
+            let role = if *is_chunk {
+                PointRole::Chunk { is_first: index == 0, is_last: index + 1 == count }
+            } else {
+                PointRole::Single
+            };
+            let since_start_ns = (at_s * NANOSECONDS).round() as i64;
+            StreamPoint { at_ns: start_ns.saturating_add_signed(since_start_ns), role, axes }
+        });
+        Some(stamped.collect())
+    }
+}
+
+/// The arm is led to the first point, so that it must be within the limits.
+fn check_first(row: &PlayRow, axis: Option<&Axis>, position: f64) -> Result<(), PlayFileError> {
+    let Some(axis) = axis.filter(|axis| !axis.limits.contain(position)) else { return Ok(()) };
+    let (lowest, highest) = (axis.limits.position_min, axis.limits.position_max);
+    let words = format!(
+        "the arm is led to this point first, and the position {position} is not within the limits, {lowest} to {highest}"
+    );
+    let problem = FileProblem::Rows { joint: Some(axis.name.clone()), words };
+    Err(PlayFileError { line: row.line, column: None, problem })
+}
+
+/// The rows by arrival; those of a chunk together, in the order of their stamps.
+fn batches(rows: &[PlayRow]) -> Vec<Batch> {
+    let mut batches: Vec<(Option<u64>, Batch)> = Vec::new();
+    for row in rows {
+        let points = row.points.iter().map(|point| AxisPoint {
+            position: point.position,
+            velocity: point.velocity,
+            acceleration: point.acceleration,
+        });
+        let point = (row.at_s, points.collect());
+        let chunk =
+            row.chunk.and_then(|chunk| batches.iter_mut().rev().find(|(other, _)| *other == Some(chunk)));
+        match chunk {
+            Some((_, batch)) => {
+                batch.arrive_s = row.arrive_s;
+                batch.points.push(point);
+            }
+            None => {
+                let (is_chunk, points) = (row.chunk.is_some(), vec![point]);
+                batches.push((row.chunk, Batch { arrive_s: row.arrive_s, is_chunk, points }));
+            }
+        }
+    }
+    let mut batches: Vec<Batch> = batches.into_iter().map(|(_, batch)| batch).collect();
+    for batch in &mut batches {
+        batch.points.sort_by(|one, other| one.0.total_cmp(&other.0));
+    }
+    batches.sort_by(|one, other| one.arrive_s.total_cmp(&other.arrive_s));
+    batches
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(arrive_s: f64, at_s: f64, chunk: Option<u64>) -> PlayRow {
+        let points = vec![super::super::file::JointPoint { position: at_s, ..Default::default() }];
+        PlayRow { line: 2, arrive_s, at_s, chunk, points }
+    }
+
+    #[test]
+    fn rows_that_share_a_chunk_arrive_with_the_last_of_them_in_the_order_of_their_stamps() {
+        let rows = [
+            row(0.0, 0.1, None),
+            row(0.1, 0.5, Some(4)),
+            row(0.2, 0.4, Some(4)),
+            row(0.2, 0.3, None),
+            row(0.3, 0.6, Some(5)),
+        ];
+        let batches = batches(&rows);
+        let arrivals: Vec<f64> = batches.iter().map(|batch| batch.arrive_s).collect();
+        assert_eq!(arrivals, [0.0, 0.2, 0.2, 0.3]);
+        let chunk: Vec<f64> = batches[1].points.iter().map(|(at_s, _)| *at_s).collect();
+        assert_eq!((batches[1].is_chunk, chunk), (true, vec![0.4, 0.5]));
+        assert!(!batches[0].is_chunk && !batches[2].is_chunk && batches[3].is_chunk);
+        let stream = FileStream { axes: vec![1], batches, first: vec![] };
+        assert_eq!((stream.arrived(0.1), stream.arrived(0.2), stream.end_s()), (1, 3, 0.6));
+        let mut snapshot = Snapshot::default();
+        snapshot.axes[0].position_set = 7.0;
+        let points = stream.batch(1, 1_000_000_000, &snapshot).unwrap();
+        let stamps: Vec<u64> = points.iter().map(|point| point.at_ns).collect();
+        assert_eq!(stamps, [1_400_000_000, 1_500_000_000]);
+        assert_eq!(points[0].role, PointRole::Chunk { is_first: true, is_last: false });
+        assert_eq!((points[0].axes[0].position, points[0].axes[1].position), (7.0, 0.4));
+    }
+}
