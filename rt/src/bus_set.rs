@@ -27,8 +27,8 @@ impl BusSet {
         Self(self.0 & !other.0)
     }
 
-    /// The buses of this set and of another.
-    pub const fn with(self, other: Self) -> Self {
+    /// The buses of both sets.
+    pub const fn union(self, other: Self) -> Self {
         Self(self.0 | other.0)
     }
 

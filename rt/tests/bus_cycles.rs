@@ -80,6 +80,24 @@ fn from_rest_to_rest_the_axes_stay_on_a_straight_line_whatever_their_limits() {
 }
 
 #[test]
+fn a_slow_bus_that_is_behind_in_each_of_its_cycles_and_catches_up_between_them_is_stopped_by_sdo() {
+    let mut rig = Rig::of(two_rates()).enable();
+    rig.move_to(2.0);
+    rig.run(300);
+    for _ in 0..4_000 {
+        let is_between = rig.host.snapshot.slot.is_multiple_of(2);
+        rig.buses[1].unconfirmed = usize::from(!is_between);
+        rig.run(1);
+    }
+    let stops: Vec<_> = rig.stops().iter().map(|stop| (stop.rule(), stop.origin)).collect();
+    assert_eq!(stops, [(Rule::NotTransmitted, Origin::Bus(1))]);
+    assert_eq!(rig.phase(), Phase::Disabled);
+    for axis in 3..6 {
+        assert!(!rig.drive(axis).state.has_torque(), "axis {axis}: {:?}", rig.drive(axis).state);
+    }
+}
+
+#[test]
 fn missed_feedback_is_counted_in_cycles_of_the_own_bus() {
     let mut rig = Rig::of(two_rates()).enable();
     rig.drive(4).is_silent = true;

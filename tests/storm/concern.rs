@@ -9,6 +9,8 @@ use takt::faults::{
 };
 use takt::sim::Defect;
 
+use crate::heartbeat::MissedHeartbeat;
+
 /// What can no longer be expected of a joint.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Concern {
@@ -26,8 +28,8 @@ pub struct Concern {
     pub is_crowded: bool,
     /// Something pushes the joint for as long as it lasts, also in the end.
     pub is_loaded: bool,
-    /// The loop is late, and the heartbeat may stay away for so long that its drive reports a fault.
-    pub is_watchdog_due: bool,
+    /// Whether its drive has missed the heartbeat, and stops by itself.
+    pub missed_heartbeat: MissedHeartbeat,
     /// Since when nothing that is sent to its drive gets there any more: ns.
     pub unreachable_since_ns: Option<u64>,
 }
@@ -42,7 +44,7 @@ impl Concern {
             is_cut_off: self.is_cut_off || other.is_cut_off,
             is_crowded: self.is_crowded || other.is_crowded,
             is_loaded: self.is_loaded || other.is_loaded,
-            is_watchdog_due: self.is_watchdog_due || other.is_watchdog_due,
+            missed_heartbeat: self.missed_heartbeat.max(other.missed_heartbeat),
             unreachable_since_ns: self.unreachable_since_ns.or(other.unreachable_since_ns),
         }
     }
@@ -85,7 +87,7 @@ impl Concerns {
     pub fn crowd(&mut self) {
         self.by_bus.fill(true);
         for concern in &mut self.by_axis {
-            (concern.is_crowded, concern.is_watchdog_due) = (true, true);
+            concern.is_crowded = true;
         }
     }
 
@@ -102,11 +104,18 @@ impl Concerns {
     pub fn clog(&mut self, bus: usize, now_ns: u64, is_for_ever: bool) {
         self.by_bus[bus] = true;
         for (concern, _) in self.by_axis.iter_mut().zip(&self.bus_of_axis).filter(|(_, of)| **of == bus) {
-            (concern.is_present, concern.is_crowded, concern.is_watchdog_due) = (true, true, true);
+            (concern.is_present, concern.is_crowded) = (true, true);
             concern.is_cut_off |= is_for_ever;
             if is_for_ever {
                 concern.unreachable_since_ns.get_or_insert(now_ns);
             }
+        }
+    }
+
+    /// Takes which drives have missed the heartbeat, an entry an axis.
+    pub fn note_missed_heartbeats(&mut self, missed: impl Iterator<Item = MissedHeartbeat>) {
+        for (concern, missed) in self.by_axis.iter_mut().zip(missed) {
+            concern.missed_heartbeat = missed;
         }
     }
 
@@ -183,7 +192,7 @@ fn concern(axis: &Axis, fault: &takt::faults::ScenarioFault) -> Concern {
         is_crowded: matches!(fault.effect, Effect::Foreign(_)),
         is_driven_by_others: is_own && (matches!(fault.kind, "load" | "foreign-set-points") || is_led_astray),
         is_loaded: is_own && fault.kind == "load",
-        is_watchdog_due: false,
+        missed_heartbeat: MissedHeartbeat::No,
         unreachable_since_ns: None,
     }
 }

@@ -54,6 +54,8 @@ fn read(name: &str) -> Config {
 
 fn ready(mut config: Config) -> Config {
     config.axes.iter_mut().for_each(|axis| axis.simulated.power_up_ns = 5_000_000);
+    // The drives go on while the controller is away, as real ones do.
+    config.simulation.longest_gap_ns = 60_000_000_000;
     config.telemetry.ring_records = RECORDS;
     config
 }

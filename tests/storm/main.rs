@@ -13,6 +13,7 @@ mod concern;
 mod coverage;
 mod dice;
 mod fingerprint;
+mod heartbeat;
 mod invariants;
 mod machine;
 mod overload;

@@ -183,7 +183,7 @@ const FAILED_IN_HARDSHIP: [(u64, &str); 9] = [
 ];
 
 /// The same of those on a machine that has too little time.
-const FAILED_IN_OVERLOAD: [(u64, &str); 3] = [
+const FAILED_IN_OVERLOAD: [(u64, &str); 12] = [
     (
         424_242_620,
         "A drive reported a fault for want of the heartbeat of a machine that was late in every cycle",
@@ -193,6 +193,39 @@ const FAILED_IN_OVERLOAD: [(u64, &str); 3] = [
         "A slow bus sent three steps in one of its cycles, after commands that were ready too late",
     ),
     (424_246_056, "Set-points that had still to leave were counted as steps of the trajectory"),
+    (
+        987_601_957,
+        "A stream was caught up with so fast that its stop broke the velocity limit, and the set-point stood still at once",
+    ),
+    (
+        20_261_139_288,
+        "A slow bus was behind in each of its cycles and caught up between them: nothing stopped its drives, nor the stop",
+    ),
+    (
+        20_261_130_161,
+        "The simulated drives paused while the controller was away, and their own reaction took too long",
+    ),
+    (
+        20_261_137_250,
+        "A YZ-AIM that had missed the heartbeat took its power, and lost it when its alarm was over",
+    ),
+    (20_261_158_104, "A YZ-AIM missed the heartbeat after SYNC had been late, and took its power in a stop"),
+    (
+        20_261_144_365,
+        "A YZ-AIM missed the heartbeat of a machine that computed too slowly, and took its power in a move",
+    ),
+    (
+        20_261_139_125,
+        "The heartbeat of an eRob that had missed ours said that it is stopped: it had no fault of its own",
+    ),
+    (
+        20_261_159_993,
+        "A drive said that it is stopped after the client had held the thread up, while it was to be enabled",
+    ),
+    (
+        20_261_129_837,
+        "A drive said that it is stopped while it was to be enabled on a machine that computed too slowly",
+    ),
 ];
 
 #[test]

@@ -17,6 +17,7 @@ use crate::case::Case;
 use crate::client::{Client, RecentRequests, is_open};
 use crate::concern::Concerns;
 use crate::fingerprint::Fingerprint;
+use crate::heartbeat::Heartbeats;
 use crate::invariants::{Invariants, REST, Seen};
 use crate::tap::Tap;
 use crate::wire::Wire;
@@ -70,7 +71,8 @@ impl World {
             std::mem::swap(sent, &mut port.sent);
         }
         self.truth.clear();
-        self.truth.extend(config.axes.iter().map(|axis| ports[axis.bus].observe(axis.node)));
+        let at_ns = self.snapshot.at_ns;
+        self.truth.extend(config.axes.iter().map(|axis| ports[axis.bus].observe(at_ns, axis.node)));
         self.events.clear();
         while let Some(event) = self.log.take_event() {
             self.events.push(event);
@@ -117,6 +119,7 @@ pub fn play(case: &Case) -> Result<Done, String> {
     let mut invariants = Invariants::new(config);
     let mut concerns = Concerns::new(config, &fault_injector);
     let mut wire = Wire::new(config);
+    let mut heartbeats = Heartbeats::new(config);
     let mut clients = Clients::new(case);
     let mut fingerprint = Fingerprint::default();
     let mut outcomes: Vec<FaultOutcome> = vec![];
@@ -132,6 +135,8 @@ pub fn play(case: &Case) -> Result<Done, String> {
         let wrong =
             |snapshot: &Snapshot, what: String| format!("cycle {cycles}, {:?}: {what}", snapshot.phase);
         wire.read(&world.sent);
+        heartbeats.observe(&world.sent, world.snapshot.at_ns, &world.truth);
+        concerns.note_missed_heartbeats(heartbeats.missed());
         concerns.observe(&fault_injector, |fault| {
             outcomes
                 .iter_mut()
@@ -252,6 +257,7 @@ impl Clients {
 /// Some time after the controller has gone, whatever it could not stop has been stopped by its own watchdog.
 fn at_rest(case: &Case, concerns: &mut Concerns, world: &mut World) -> Result<(), String> {
     let end_ns = world.snapshot.at_ns;
+    let rest_ns = end_ns + WATCHDOG_MS * 1_000_000;
     let mut batch = ReceiveBatch::new();
     for now_ns in (1..=WATCHDOG_MS).map(|passed_ms| end_ns + passed_ms * 1_000_000) {
         for port in world.run.ports() {
@@ -262,7 +268,7 @@ fn at_rest(case: &Case, concerns: &mut Concerns, world: &mut World) -> Result<()
     // A fault may have begun in that time.
     concerns.observe(&world.fault_injector, |_| ());
     for (axis, concern) in case.config.axes.iter().zip(&concerns.by_axis) {
-        let truth = world.run.ports()[axis.bus].observe(axis.node);
+        let truth = world.run.ports()[axis.bus].observe(rest_ns, axis.node);
         let is_driven = truth.state == DriveState::OperationEnabled;
         // Nothing stops a drive that has no watchdog any more and that no frame reaches.
         let is_beyond_reach = concern.is_unwatched && concern.is_cut_off;

@@ -32,8 +32,9 @@ impl Tap {
         }
     }
 
-    /// The truth about a drive.
-    pub fn observe(&mut self, node: u8) -> Observation {
+    /// The truth about a drive at this time. A bus on which nothing was sent has not got that far yet.
+    pub fn observe(&mut self, now_ns: u64, node: u8) -> Observation {
+        self.port.unconfirmed(now_ns);
         self.port.simulated_mut().unwrap().observe(node).unwrap()
     }
 }

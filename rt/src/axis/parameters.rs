@@ -162,13 +162,13 @@ impl AxisParameters {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::pdo::MappedObject;
     use crate::units::ScaleParameters;
     use core::f64::consts::TAU;
 
-    fn parameters() -> AxisParameters {
+    pub fn parameters() -> AxisParameters {
         let pdo = |id, objects: &[MappedObject], compile: fn(&[MappedObject]) -> Result<Mapping, _>| Pdo {
             id,
             mapping: compile(objects).unwrap(),

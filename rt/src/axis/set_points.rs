@@ -134,6 +134,24 @@ impl Axis {
         }
     }
 
+    /// Slows the set-point down by its deceleration limit, whatever the jerk, and leaves it where it stands: for a motion that no
+    /// planned stop ends. A set-point that just stayed would leap to a standstill.
+    pub fn slow_down(&mut self, period_s: f64) {
+        let [last, before_last, _] = self.set_points.positions();
+        if !self.is_enabled() || last == before_last {
+            return self.stay();
+        }
+        let most = self.parameters.limits.deceleration * period_s;
+        let last_velocity = (last - before_last) / period_s;
+        let change = -last_velocity.clamp(-most, most);
+        let velocity = last_velocity + change;
+        self.advance(State {
+            position: last + velocity * period_s,
+            velocity,
+            acceleration: change / period_s,
+        });
+    }
+
     /// Whether the set-point is where the joint is, but for one step within the limits.
     pub fn is_on_joint(&self, period_s: f64) -> bool {
         (self.joint.position() - self.set_point().position).abs()
@@ -201,5 +219,40 @@ impl Axis {
     pub fn advance(&mut self, next: State) {
         let next = if self.is_profile() { self.shown_set_point() } else { next };
         self.set_points.push(next);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::parameters::tests::parameters;
+    use super::*;
+    use crate::frame::{Frame, Id};
+
+    const PERIOD_S: f64 = 1e-3;
+
+    #[test]
+    fn a_set_point_that_no_planned_stop_ends_slows_down_within_its_limit_and_stays() {
+        let limits = parameters().limits;
+        for direction in [1.0, -1.0] {
+            let mut axis = Axis::new(0, parameters());
+            axis.set_cycle(PERIOD_S);
+            axis.request_feedback(0);
+            axis.receive(0, &Frame::of(Id::canopen(0x180, 5), [0x37, 0x02]), 1).unwrap();
+            axis.begin_cycle(PERIOD_S);
+            assert!(axis.is_enabled());
+            let step = direction * limits.velocity * PERIOD_S;
+            (0..3).for_each(|cycle| axis.advance(State::rest(f64::from(cycle) * step)));
+            let (mut last, mut last_step) = (axis.set_point().position, step);
+            for _ in 0..300 {
+                axis.slow_down(PERIOD_S);
+                let here = axis.set_point().position;
+                let acceleration = (here - last - last_step) / (PERIOD_S * PERIOD_S);
+                assert!(acceleration.abs() <= limits.deceleration * (1.0 + 1e-6), "{acceleration}");
+                (last, last_step) = (here, here - last);
+            }
+            assert_eq!((last_step, axis.set_point().velocity), (0.0, 0.0));
+            let way = direction * limits.velocity * limits.velocity / (2.0 * limits.deceleration);
+            assert!((last - 2.0 * step - way).abs() < 2e-3, "{last}");
+        }
     }
 }

@@ -1,4 +1,7 @@
 //! Own frames that have not got onto the wire, bus by bus.
+//!
+//! A bus is judged in the slots in which it has a cycle, and stays as it was in the slots between. A slow bus that is behind
+//! whenever its set-points are due would otherwise seem to catch up again and again, though none of them ever leaves.
 
 use arrayvec::ArrayVec;
 
@@ -9,12 +12,14 @@ use crate::bus_set::BusSet;
 pub(super) struct Backlog<const BUSES: usize> {
     /// The buses on which own frames of an earlier cycle wait for the wire.
     behind: BusSet,
-    /// The interfaces that had no room for a frame since the last cycle.
+    /// The same as it was found in the last slot in which each bus had a cycle.
+    found_behind: BusSet,
+    /// The interfaces that had no room for a frame since their buses' last cycles.
     not_taken: BusSet,
     buses: ArrayVec<BusBacklog, BUSES>,
 }
 
-/// One bus, in cycles in a row.
+/// One bus, in slots in a row.
 #[derive(Clone, Copy, Debug, Default)]
 struct BusBacklog {
     /// It was behind.
@@ -27,18 +32,24 @@ impl<const BUSES: usize> Backlog<BUSES> {
     /// For so many buses.
     pub(super) fn new(buses: usize) -> Self {
         let buses = core::iter::repeat_n(BusBacklog::default(), buses.min(BUSES)).collect();
-        Self { behind: BusSet::default(), not_taken: BusSet::default(), buses }
+        Self {
+            behind: BusSet::default(),
+            found_behind: BusSet::default(),
+            not_taken: BusSet::default(),
+            buses,
+        }
     }
 
-    /// Takes the buses that are behind in this cycle.
-    pub(super) fn pass(&mut self, behind: BusSet) {
-        self.behind = behind;
-        let not_taken = core::mem::take(&mut self.not_taken);
+    /// Takes the buses that are behind in this slot, in which these buses have a cycle.
+    pub(super) fn pass(&mut self, behind: BusSet, in_cycle: BusSet) {
+        self.found_behind = behind.union(self.found_behind.without(in_cycle));
+        self.behind = self.found_behind;
         for (bus, own) in self.buses.iter_mut().enumerate() {
-            let is_behind = behind.contains(bus);
+            let is_behind = self.behind.contains(bus);
             own.behind_cycles = counted(own.behind_cycles, is_behind);
-            own.blocked_cycles = counted(own.blocked_cycles, is_behind || not_taken.contains(bus));
+            own.blocked_cycles = counted(own.blocked_cycles, is_behind || self.not_taken.contains(bus));
         }
+        self.not_taken = self.not_taken.without(in_cycle);
     }
 
     /// Takes the buses that have caught up since.
@@ -46,9 +57,9 @@ impl<const BUSES: usize> Backlog<BUSES> {
         self.behind = self.behind.without(caught_up);
     }
 
-    /// Takes the interfaces that had no room for all frames of a cycle.
+    /// Takes the interfaces that had no room for all frames of a slot.
     pub(super) fn note_not_taken(&mut self, buses: BusSet) {
-        self.not_taken = buses;
+        self.not_taken = self.not_taken.union(buses);
     }
 
     /// The buses that are behind.
@@ -56,12 +67,12 @@ impl<const BUSES: usize> Backlog<BUSES> {
         self.behind
     }
 
-    /// Cycles in a row in which a bus was behind.
+    /// Slots in a row in which a bus was behind.
     pub(super) fn behind_cycles(&self, bus: usize) -> u32 {
         self.buses.get(bus).map_or(0, |bus| bus.behind_cycles)
     }
 
-    /// The one of these buses that has been behind, or without room, for the longest time, and the cycles in a row.
+    /// The one of these buses that has been behind, or without room, for the longest time, and the slots in a row.
     pub(super) fn longest_blocked(&self, buses: BusSet) -> (usize, u32) {
         let blocked = self.buses.iter().map(|bus| bus.blocked_cycles).enumerate().rev();
         blocked.filter(|(bus, _)| buses.contains(*bus)).max_by_key(|(_, cycles)| *cycles).unwrap_or_default()
@@ -83,15 +94,17 @@ mod tests {
         set
     }
 
+    const ALL: BusSet = BusSet::first(3);
+
     #[test]
     fn buses_that_are_behind_one_after_the_other_are_not_taken_for_one() {
         let mut backlog: Backlog<3> = Backlog::new(3);
         for cycle in 0..30 {
-            backlog.pass(set(cycle % 3));
-            assert!(backlog.longest_blocked(BusSet::first(3)).1 <= 1);
+            backlog.pass(set(cycle % 3), ALL);
+            assert!(backlog.longest_blocked(ALL).1 <= 1);
         }
-        (0..4).for_each(|_| backlog.pass(set(1)));
-        assert_eq!((backlog.longest_blocked(BusSet::first(3)), backlog.behind_cycles(1)), ((1, 4), 4));
+        (0..4).for_each(|_| backlog.pass(set(1), ALL));
+        assert_eq!((backlog.longest_blocked(ALL), backlog.behind_cycles(1)), ((1, 4), 4));
     }
 
     #[test]
@@ -99,14 +112,32 @@ mod tests {
         let mut backlog: Backlog<2> = Backlog::new(2);
         for cycles in 1..5 {
             backlog.note_not_taken(set(0));
-            backlog.pass(BusSet::default());
-            assert_eq!(
-                (backlog.longest_blocked(BusSet::first(3)), backlog.behind_cycles(0)),
-                ((0, cycles), 0)
-            );
+            backlog.pass(BusSet::default(), ALL);
+            assert_eq!((backlog.longest_blocked(ALL), backlog.behind_cycles(0)), ((0, cycles), 0));
         }
         backlog.note_not_taken(BusSet::default());
-        backlog.pass(BusSet::default());
-        assert_eq!(backlog.longest_blocked(BusSet::first(3)).1, 0);
+        backlog.pass(BusSet::default(), ALL);
+        assert_eq!(backlog.longest_blocked(ALL).1, 0);
+    }
+
+    #[test]
+    fn a_slow_bus_stays_as_it_was_in_its_last_cycle() {
+        let (fast, slow) = (set(0), set(1));
+        let in_cycle = |slot: u32| if slot.is_multiple_of(2) { fast.union(slow) } else { fast };
+        for is_behind in [true, false] {
+            let mut backlog: Backlog<2> = Backlog::new(2);
+            for slot in 0..10 {
+                // Between its cycles it has caught up, or its interface has room.
+                let is_due = slot % 2 == 0;
+                let behind = if is_behind && is_due { slow } else { BusSet::default() };
+                backlog.pass(behind, in_cycle(slot));
+                backlog.note_not_taken(if !is_behind && is_due { slow } else { BusSet::default() });
+                let blocked = slot + u32::from(is_behind);
+                assert_eq!(backlog.longest_blocked(ALL).1, blocked, "{is_behind}, slot {slot}");
+            }
+            backlog.pass(BusSet::default(), in_cycle(10));
+            backlog.pass(BusSet::default(), in_cycle(11));
+            assert_eq!(backlog.longest_blocked(ALL).1, 0);
+        }
     }
 }

@@ -100,7 +100,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         if let Some(time) = &mut self.shared.time {
             time.pass(elapsed, input.now_ns);
         }
-        self.shared.backlog.pass(input.behind);
+        self.shared.backlog.pass(input.behind, self.shared.buses_in_cycle(input.slot));
         let elapsed_s = self.shared.period_s * elapsed as f64;
         let asked_by_sync = core::mem::take(&mut self.shared.asked_by_sync);
         let Shared { snapshot, buses, requested, .. } = &mut self.shared;

@@ -2,12 +2,12 @@
 
 use arrayvec::ArrayVec;
 
-use super::Deadline;
 use super::backlog::Backlog;
 use super::heartbeat::HeartbeatProducer;
 use super::outbox::Outbox;
 use super::parameters::{BusParameters, EngineParameters};
 use super::slots::SlotWatch;
+use super::{Deadline, has_cycle};
 use crate::axis::Axis;
 use crate::bus_set::BusSet;
 use crate::frame::Id;
@@ -117,5 +117,13 @@ impl<const AXES: usize, const BUSES: usize> Shared<AXES, BUSES> {
     /// Slots in one cycle of the bus of an axis.
     pub(super) fn divider_of(&self, axis: &Axis) -> u32 {
         self.buses.get(usize::from(axis.parameters().bus)).map_or(1, |bus| bus.divider)
+    }
+
+    /// The buses that have a cycle in this slot.
+    pub(super) fn buses_in_cycle(&self, slot: u64) -> BusSet {
+        let mut in_cycle = BusSet::default();
+        let numbers = self.buses.iter().enumerate().filter(|(_, bus)| has_cycle(bus, slot));
+        numbers.for_each(|(number, _)| in_cycle.insert(number));
+        in_cycle
     }
 }

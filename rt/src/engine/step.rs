@@ -39,11 +39,11 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         let (mut probed, mut in_motion) = (BusSet::default(), BusSet::default());
         for group in &self.groups {
             if is_due(group) {
-                probed = probed.with(group.buses);
+                probed = probed.union(group.buses);
             } else if group.state.has_power()
                 && !matches!(group.state, GroupState::Enabling | GroupState::Holding)
             {
-                in_motion = in_motion.with(group.buses);
+                in_motion = in_motion.union(group.buses);
             }
         }
         for group in &self.groups {
@@ -225,14 +225,14 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
         }
     }
 
-    /// What is still on its way to rest goes on as far as the guard agrees, and everything else stays where it is. No set-point
-    /// follows a joint: a drive whose statusword is false still obeys.
+    /// What is still on its way to rest goes on as far as the guard agrees. Everything else stays where it is, or slows down at
+    /// its limits until it stands. No set-point follows a joint: a drive whose statusword is false still obeys.
     fn come_to_rest(&mut self) {
         if !self.group.motion.is_finished() && self.follow_motion().is_ok() {
             return;
         }
         self.group.motion.cancel();
-        self.axes.iter_mut().for_each(Axis::stay);
+        self.axes.iter_mut().for_each(|axis| axis.slow_down(self.shared.period_s));
     }
 
     /// Ends the disabling when no drive is waited for any more. A drive that does not show that it has obeyed is not waited

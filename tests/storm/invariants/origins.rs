@@ -1,8 +1,12 @@
 //! What a stop is said to concern is what it concerns: the axis that has the fault, the bus on which it is.
 
-use takt_rt::{EventKind, Origin, Rule, StopReason};
+use takt_rt::{EventKind, Fault, Origin, Rule, StopCause, StopReason};
 
 use super::Seen;
+use crate::heartbeat::MissedHeartbeat;
+
+/// What a drive that has missed the heartbeat says in its own: of its node the eRob, of its alarm the YZ-AIM.
+const STOPPED: u8 = 4;
 
 pub fn check(seen: &Seen<'_>) -> Result<(), String> {
     let mut reasons = seen.events.iter().filter_map(|event| match event.kind {
@@ -15,8 +19,11 @@ pub fn check(seen: &Seen<'_>) -> Result<(), String> {
 fn check_reason(seen: &Seen<'_>, reason: &StopReason) -> Result<(), String> {
     let is_troubled =
         |axis: u8| seen.concerns.get(usize::from(axis)).is_some_and(|concern| concern.is_present);
-    let is_watchdog_due =
-        |axis: u8| seen.concerns.get(usize::from(axis)).is_some_and(|concern| concern.is_watchdog_due);
+    let has_missed_heartbeat = |axis: u8| {
+        seen.concerns
+            .get(usize::from(axis))
+            .is_some_and(|concern| concern.missed_heartbeat != MissedHeartbeat::No)
+    };
     let is_crowded = |axis: u8| {
         let is_overloaded =
             seen.config.axes.get(usize::from(axis)).is_some_and(|axis| seen.overloaded_buses[axis.bus]);
@@ -38,7 +45,14 @@ fn check_reason(seen: &Seen<'_>, reason: &StopReason) -> Result<(), String> {
             Origin::Axis(_),
         ) => true,
         (Rule::MissedFeedback, Origin::Axis(axis)) if is_crowded(axis) => true,
-        (Rule::DriveFault, Origin::Axis(axis)) if is_watchdog_due(axis) => true,
+        // An eRob stops its node: it has no process data any more, and says so. A YZ-AIM shows an alarm.
+        (
+            Rule::DriveFault | Rule::MissedFeedback | Rule::EmergencyMessage | Rule::DriveDisabled,
+            Origin::Axis(axis),
+        ) if has_missed_heartbeat(axis) => true,
+        (Rule::NodeNotOperational, Origin::Axis(axis)) if has_missed_heartbeat(axis) => {
+            reason.cause == StopCause::Fault(Fault::NodeNotOperational { state: STOPPED })
+        }
         (
             Rule::FollowingError
             | Rule::MissedFeedback

@@ -4,6 +4,7 @@ use takt::sim::Observation;
 use takt_rt::StopCategory;
 
 use super::Seen;
+use crate::heartbeat::MissedHeartbeat;
 
 /// A joint slower than this fraction of its velocity limit may lose its torque.
 const SLOW: f64 = 0.02;
@@ -36,7 +37,10 @@ impl Releases {
             let speed = before.velocity.abs();
             // It has gone on slowing down since the last look.
             let slow = SLOW * axis.limits.velocity + axis.limits.deceleration * elapsed_s;
-            if (is_released || is_braked) && !self.is_cut && !concern.is_present && speed > slow {
+            // A drive that has missed the heartbeat stops by its own fault reaction, and is not enabled again after it.
+            let is_own_reaction = concern.missed_heartbeat == MissedHeartbeat::Shown;
+            let is_taken = (is_released || is_braked) && !self.is_cut && !is_own_reaction;
+            if is_taken && !concern.is_present && speed > slow {
                 return Err(format!(
                     "{}: power taken at {speed} of {}: {now:?}, {:?}",
                     axis.name, axis.limits.velocity, seen.snapshot.stop
