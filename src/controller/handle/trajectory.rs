@@ -23,9 +23,6 @@ const LONGEST_MARGIN_S: f64 = 1.0;
 /// A trajectory that has been granted takes the place of the present one within this time, unless the motion ends before.
 const TAKING_OVER: Duration = Duration::from_secs(5);
 
-/// A trajectory is one of all axes.
-const TARGET: RequestTarget = RequestTarget::All;
-
 /// The trajectories of the handles of a controller.
 pub(super) struct Trajectories {
     giver: TrajectoryGiver,
@@ -168,7 +165,7 @@ impl Handle {
         wanted: impl Fn(&Present) -> (f64, bool),
     ) -> Result<(), CommandError> {
         let mut trajectories = self.0.trajectories.lock();
-        let present = self.under_way(&trajectories).filter(|present| present.motion == motion.request);
+        let present = self.under_way(&trajectories).filter(|present| present.motion == motion);
         let present = present.ok_or(CommandError::NoTrajectory)?;
         let (rate, is_paused) = wanted(&present);
         if !(rate.is_finite() && rate > 0.0) {
