@@ -5,18 +5,20 @@
 //! cargo run --release --example virtual_time configs/arm6-erob.toml
 //! ```
 
-use std::path::PathBuf;
+use std::path::Path;
 
-use miette::IntoDiagnostic;
-use takt::config::Config;
-use takt::controller::VirtualRun;
+use takt::{Config, VirtualRun};
 
 const CYCLES_AT_MOST: u64 = 10_000_000;
 
-fn main() -> miette::Result<()> {
-    let path = std::env::args().nth(1).map_or_else(|| PathBuf::from("configs/arm6-erob.toml"), PathBuf::from);
-    let config = Config::load(&path)?;
-    let (mut run, _log) = VirtualRun::simulated(&config).into_diagnostic()?;
+fn main() -> takt::Result {
+    let path = std::env::args().nth(1).unwrap_or_else(|| "configs/arm6-erob.toml".to_owned());
+    run(Config::load(Path::new(&path))?)
+}
+
+/// Runs the program of the configuration, and looks at every cycle.
+pub fn run(config: Config) -> takt::Result {
+    let (mut run, _log) = VirtualRun::simulated(&config)?;
     let mut largest = vec![0.0_f64; config.axes.len()];
     let outcome = run.run(CYCLES_AT_MOST, |run| {
         for (largest, axis) in largest.iter_mut().zip(run.snapshot().axes) {

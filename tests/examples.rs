@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use takt::Config;
+use takt::{Config, Scenario};
 
 /// The programs that read the configuration of an arm, or of a joint.
 macro_rules! programs {
@@ -14,11 +14,14 @@ macro_rules! programs {
 }
 
 programs! {
+    after_a_stop: "../examples/after_a_stop.rs",
     config_in_code: "../examples/config_in_code.rs",
     embed: "../examples/embed.rs",
     profile_modes: "../examples/profile_modes.rs",
     stream: "../examples/stream.rs",
     supervise: "../examples/supervise.rs",
+    trajectory: "../examples/trajectory.rs",
+    virtual_time: "../examples/virtual_time.rs",
 }
 
 fn config(name: &str) -> Config {
@@ -52,4 +55,22 @@ fn a_circle_is_streamed() {
 #[test]
 fn three_threads_move_watch_and_print() {
     supervise::run(config("arm6-erob.toml")).unwrap();
+}
+
+#[test]
+fn after_each_stop_the_arm_is_enabled_again() {
+    let config = config("arm6-erob.toml");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/faults/bus-off.toml");
+    let scenario = Scenario::load(&path, &config).unwrap();
+    assert!(after_a_stop::run(config, 4.0, Some(scenario)).unwrap() > 0, "the fault stops the arm");
+}
+
+#[test]
+fn a_program_runs_in_virtual_time() {
+    virtual_time::run(config("arm6-erob.toml")).unwrap();
+}
+
+#[test]
+fn a_trajectory_is_executed_slowed_down_and_paused() {
+    trajectory::run(config("arm6-erob.toml")).unwrap();
 }

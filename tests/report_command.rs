@@ -14,8 +14,8 @@ use takt::controller::{Outcome, VirtualRun};
 use takt::faults::{FaultInjector, Scenario};
 use takt::sim::SimulatedBus;
 use takt::telemetry::{
-    BlackBoxOptions, BusDescription, Logger, LoggerOptions, Machine, Recorded, RecordingDestination,
-    WallClock,
+    BlackBoxOptions, BusDescription, Emphasis, LogSummary, Logger, LoggerOptions, Machine, RealtimeReport,
+    Recorded, RecordingDestination, RunEnd, RunOutcome, RunReport, WallClock,
 };
 use takt_rt::{CycleRecord, HostInterface, Rule};
 use tempfile::TempDir;
@@ -167,9 +167,14 @@ fn the_cycles_that_are_read_are_those_that_were_recorded() {
 
 /// A recording of the arm in virtual time, one of whose buses is lost in motion.
 fn recording_of_a_lost_bus(bus: &str, folder: &Path) -> PathBuf {
+    run_with_a_lost_bus(bus, "0.1 s", folder).0.recording.unwrap()
+}
+
+/// What the logger has of that run, and the stop.
+fn run_with_a_lost_bus(bus: &str, restart: &str, folder: &Path) -> (LogSummary, RunOutcome) {
     let config = Config::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/arm6-erob.toml")).unwrap();
     let fault = format!(
-        "[[fault]]\nkind = \"bus-off\"\nbus = {bus:?}\nwhen = \"moving\"\nat = \"300 ms\"\nrestart = \"0.1 s\""
+        "[[fault]]\nkind = \"bus-off\"\nbus = {bus:?}\nwhen = \"moving\"\nat = \"300 ms\"\nrestart = {restart:?}"
     );
     let scenario = Scenario::parse("scenario", &fault, &config).unwrap();
     let (mut run, log) = VirtualRun::with_faults(&config, Arc::new(FaultInjector::new(scenario))).unwrap();
@@ -186,8 +191,38 @@ fn recording_of_a_lost_bus(bus: &str, folder: &Path) -> PathBuf {
     let outcome = run.run(60_000, |_| {
         logger.drain();
     });
-    assert!(matches!(outcome, Some(Outcome::Stopped(stop)) if stop.rule() == Rule::BusLost), "{outcome:?}");
-    logger.finish().recording.unwrap()
+    let Some(Outcome::Stopped(stop)) = outcome else { panic!("{outcome:?}") };
+    assert_eq!(stop.rule(), Rule::BusLost);
+    let outcome = RunOutcome {
+        ended: RunEnd::Stopped,
+        realtime: RealtimeReport::default(),
+        last: run.snapshot(),
+        buses_open_ns: 1_000_000_000,
+        targets: None,
+        stop: Some(stop),
+    };
+    (logger.finish(), outcome)
+}
+
+#[test]
+fn the_last_position_of_a_drive_that_has_fallen_silent_is_not_its_final_position() {
+    let folder = tempfile::tempdir().unwrap();
+    let (log, outcome) = run_with_a_lost_bus("wrist", "60 s", folder.path());
+    let lost_in = outcome.stop.unwrap().slot;
+    let report = RunReport::new(&log, &outcome);
+    let told = serde_json::to_value(&report).unwrap();
+    let text = report.render(Emphasis::None);
+    for (number, axis) in told["axes"].as_array().unwrap().iter().enumerate() {
+        let is_lost = number >= 3;
+        assert_eq!(
+            [axis["final_position"].is_null(), axis["final_error_counts"].is_null()],
+            [is_lost; 2],
+            "{axis}"
+        );
+        let reported = axis["final_report_slot"].as_u64().unwrap();
+        let is_shown = text.contains(&format!("not reported since slot {reported}"));
+        assert_eq!((reported <= lost_in, is_shown), (is_lost, is_lost), "{axis}, lost in {lost_in}\n{text}");
+    }
 }
 
 #[test]

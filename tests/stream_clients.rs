@@ -29,7 +29,8 @@ fn stream_beside_load(rate_hz: u32, lasting: Duration) -> String {
     let home = std::array::from_fn(|joint| state.axes[joint].position_set);
     let (is_over, mut events) = (&AtomicBool::new(false), arm.events());
     let busy = 2 * thread::available_parallelism().map_or(2, usize::from);
-    let mut latest = Duration::ZERO;
+    let is_stop = |event: &Event| matches!(event.kind, EventKind::Stop(_));
+    let (mut latest, mut stops) = (Duration::ZERO, Vec::new());
     thread::scope(|scope| {
         for _ in 0..busy {
             scope.spawn(|| {
@@ -50,13 +51,12 @@ fn stream_beside_load(rate_hz: u32, lasting: Duration) -> String {
             // After a long pause of this thread, what is left of its backlog finds no room at once: those points are lost.
             let _ = stream.push(stamp_ns, &sine(&home, due.as_secs_f64()));
             due += period;
+            stops.extend(events.by_ref().filter(is_stop));
             thread::sleep(due.saturating_sub(begun.elapsed()));
         }
         is_over.store(true, Ordering::Relaxed);
     });
-    let is_stop = |event: &Event| matches!(event.kind, EventKind::Stop(_));
-    let stops: Vec<String> =
-        events.by_ref().filter(is_stop).map(|event| arm.events().words(&event)).collect();
+    stops.extend(events.by_ref().filter(is_stop));
     let state = arm.state();
     assert!(stops.is_empty() && events.missed() == 0, "{rate_hz} Hz: {stops:?}, {} missed", events.missed());
     assert_eq!((state.phase, state.stop), (Phase::Streaming, None), "{rate_hz} Hz");

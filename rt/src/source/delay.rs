@@ -162,3 +162,70 @@ impl DelayEstimator {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MILLISECOND_NS: i64 = 1_000_000;
+
+    fn estimator(intervals_ms: i64, behind_ms: &[i64]) -> DelayEstimator {
+        let mut estimator = DelayEstimator::new(1_000_000, StreamDelay::Automatic);
+        (0..INTERVALS).for_each(|_| estimator.note_interval(intervals_ms * MILLISECOND_NS));
+        behind_ms.iter().for_each(|behind_ms| estimator.note_arrival(behind_ms * MILLISECOND_NS));
+        estimator.settle();
+        estimator
+    }
+
+    #[test]
+    fn the_delay_is_a_little_more_than_two_intervals_where_points_come_in_time() {
+        // 10 ms that are waited for, 10 ms more, and some room; in whole periods.
+        assert_eq!(estimator(10, &[10; 100]).present_ns(), 23_000_000);
+        assert_eq!(estimator(1, &[1; 100]).present_ns(), 4_000_000);
+        assert_eq!(estimator(10, &[-500; 100]).present_ns(), 0, "they come ahead of their time");
+    }
+
+    #[test]
+    fn one_late_arrival_does_not_make_the_delay_longer_but_two_do() {
+        let mut arrivals = [10; 50];
+        arrivals[20] = 200;
+        assert_eq!(estimator(10, &arrivals).present_ns(), 23_000_000);
+        arrivals[40] = 150;
+        assert_eq!(estimator(10, &arrivals).present_ns(), 163_000_000);
+    }
+
+    #[test]
+    fn points_that_are_lost_do_not_make_the_interval_longer() {
+        let mut estimator = estimator(10, &[10; 10]);
+        for interval_ms in [10, 20, 10, 30, 10, 20, 10, 20] {
+            estimator.note_interval(interval_ms * MILLISECOND_NS);
+        }
+        assert_eq!(estimator.interval_ns(), 10 * MILLISECOND_NS);
+    }
+
+    #[test]
+    fn the_delay_grows_and_shrinks_without_a_jolt_to_where_it_is_to_be() {
+        let mut estimator = estimator(10, &[10; 100]);
+        for (behind_ms, expected_ns) in [(100, 113_000_000), (10, 23_000_000)] {
+            (0..100).for_each(|_| estimator.note_arrival(behind_ms * MILLISECOND_NS));
+            let mut last = estimator.time_rate();
+            let mut last_ns = estimator.present_ns();
+            for _ in 0..6_000 {
+                estimator.advance(1_000_000);
+                let rate = estimator.time_rate();
+                assert!((rate - last).abs() < 0.06 && (0.75..=1.031).contains(&rate), "{last} to {rate}");
+                assert!(estimator.present_ns().abs_diff(last_ns) <= 250_001);
+                (last, last_ns) = (rate, estimator.present_ns());
+            }
+            assert_eq!((estimator.present_ns(), estimator.time_rate()), (expected_ns, 1.0));
+        }
+    }
+
+    #[test]
+    fn a_delay_that_was_asked_for_stays() {
+        let mut estimator = DelayEstimator::new(1_000_000, StreamDelay::Fixed(40_000_000));
+        (0..100).for_each(|_| estimator.note_arrival(500 * MILLISECOND_NS));
+        estimator.advance(1_000_000);
+        assert_eq!((estimator.present_ns(), estimator.time_rate()), (40_000_000, 1.0));
+    }
+}

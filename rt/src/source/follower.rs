@@ -81,13 +81,20 @@ fn is_safe(start: &State, next: &State, limits: &AxisLimits, period_s: f64) -> b
         return false;
     }
     // From the fastest velocity with the highest acceleration.
-    let farthest = braking_bound(limits);
+    let (farthest, limits) = (braking_bound(limits), &both_ways(limits));
     if position + farthest <= limits.position_max && position - farthest >= limits.position_min {
         return true;
     }
     let highest = position + braking_distance(limits, velocity, acceleration);
     let lowest = position - braking_distance(limits, -velocity, -acceleration);
     highest <= limits.position_max.max(start.position) && lowest >= limits.position_min.min(start.position)
+}
+
+/// The limits with the smaller one of acceleration and deceleration for both. Which of them holds changes where the joint turns
+/// round, and what was possible to stop before must be so behind it.
+fn both_ways(limits: &AxisLimits) -> AxisLimits {
+    let smaller = limits.acceleration.min(limits.deceleration);
+    AxisLimits { acceleration: smaller, deceleration: smaller, ..*limits }
 }
 
 /// More than any stop within the limits needs.
@@ -100,6 +107,72 @@ fn braking_bound(limits: &AxisLimits) -> f64 {
 
 /// The set-point on the fastest way to meet the target.
 fn tracked(start: &State, target: &State, limits: &AxisLimits, period_s: f64) -> Result<State, PlanError> {
-    Problem { start: *start, target: target.after(-period_s), limits: stop_limits(start, limits) }
+    Problem { start: *start, target: target.after(-period_s), limits: stop_limits(start, &both_ways(limits)) }
         .track(period_s)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const PERIOD_S: f64 = 0.001;
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(60))]
+
+        #[test]
+        fn whatever_the_target_does_no_difference_of_the_set_points_is_beyond_a_limit(
+            targets in prop::collection::vec((-2.5f64..2.5, -5.0f64..5.0, -30.0f64..30.0, 1usize..300), 1..30),
+            (acceleration, deceleration) in prop::sample::select(&[(8.0, 8.0), (10.0, 20.0), (20.0, 10.0)][..]),
+            jerk in prop_oneof![50.0f64..1000.0, Just(f64::INFINITY)],
+        ) {
+            let limits = AxisLimits {
+                position_min: -1.0,
+                position_max: 2.0,
+                velocity: 3.0,
+                acceleration,
+                deceleration,
+                jerk,
+                torque: 50.0,
+            };
+            let steepest = acceleration.max(deceleration);
+            let mut state = State::rest(0.0);
+            let mut set = [0.0; 4];
+            for (position, velocity, acceleration, cycles) in targets {
+                let mut target = State { position, velocity, acceleration };
+                for _ in 0..cycles {
+                    target = target.after(PERIOD_S);
+                    state = follow(&state, &target, &limits, PERIOD_S).unwrap();
+                    set = [state.position, set[0], set[1], set[2]];
+                    let [newest, last, before, oldest] = set;
+                    let difference = (newest - last) / PERIOD_S;
+                    prop_assert!(difference.abs() <= 3.0 * (1.0 + 1e-9), "velocity {difference}");
+                    let difference = (newest - 2.0 * last + before) / PERIOD_S.powi(2);
+                    prop_assert!(difference.abs() <= steepest * (1.0 + 1e-6), "acceleration {difference}");
+                    let difference = (newest - 3.0 * last + 3.0 * before - oldest) / PERIOD_S.powi(3);
+                    prop_assert!(difference.abs() <= jerk * (1.0 + 1e-5) + 1e-4, "jerk {difference}");
+                    prop_assert!((-1.0 - 1e-6..=2.0 + 1e-6).contains(&newest), "position {newest}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_no_number_is_an_error() {
+        let limits = AxisLimits {
+            position_min: -1.0,
+            position_max: 2.0,
+            velocity: 3.0,
+            acceleration: 8.0,
+            deceleration: 8.0,
+            jerk: 100.0,
+            torque: 50.0,
+        };
+        let bad = State { velocity: f64::NAN, ..State::default() };
+        assert!(matches!(
+            follow(&State::default(), &bad, &limits, PERIOD_S),
+            Err(PlanError::NotFinite { axis: 0, .. })
+        ));
+    }
 }

@@ -35,14 +35,12 @@ pub(super) struct Window {
     rates: [f64; WINDOW - 1],
     /// One divided by the time from the point before to the point behind.
     span_rates: [f64; WINDOW],
-    /// From the beginning of the interval to now, in seconds.
-    since_begin_s: f64,
 }
 
 impl Window {
     /// The window with points at these times, in the places `from..to`. Both ends of the interval have to be among them, and
     /// no two may be at the same time.
-    pub(super) fn new(stamps_ns: &[u64; WINDOW], from: usize, to: usize, at_ns: u64) -> Self {
+    pub(super) fn new(stamps_ns: &[u64; WINDOW], from: usize, to: usize) -> Self {
         let seconds = |from_ns: u64, to_ns: u64| {
             to_ns.wrapping_sub(from_ns) as i64 as f64 / NANOSECONDS_PER_SECOND as f64
         };
@@ -55,44 +53,60 @@ impl Window {
             steps_s,
             rates: steps_s.map(|step_s| 1.0 / step_s),
             span_rates: [0.0, 1.0 / (h0 + h1), 1.0 / (h1 + h2), 1.0 / (h2 + h3), 1.0 / (h3 + h4), 0.0],
-            since_begin_s: seconds(t2, at_ns),
         }
     }
 
-    /// Where an axis with these points is to be now, how fast, and with what acceleration.
+    /// The motion of an axis with these points through the interval.
+    pub(super) fn piece(&self, points: &[AxisPoint; WINDOW], limits: &AxisLimits) -> Piece {
+        let differences = Differences::of(self, points);
+        let (begin, end) = (differences.knot(BEGIN), differences.knot(END));
+        let quintic = Quintic::between(&begin, &end, self.steps_s[BEGIN]);
+        let velocity = minmod(end.velocity, differences.mean_velocity());
+        Piece {
+            is_within_jerk: quintic.highest_jerk() <= limits.jerk,
+            quintic,
+            end,
+            arrival: State { velocity, acceleration: 0.0, ..end },
+        }
+    }
+}
+
+/// The motion of an axis between two points.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Piece {
+    quintic: Quintic,
+    is_within_jerk: bool,
+    end: State,
+    /// How the axis is to arrive at the end if it cannot follow.
+    arrival: State,
+}
+
+impl Piece {
+    /// Where the axis is to be some time after the beginning, how fast, and with what acceleration.
     ///
     /// Where the motion between two points takes more than the limits allow, it cannot be followed, and who tries to meet it
-    /// overshoots behind it. There it is the motion with which the axis is to arrive at the next point.
-    pub(super) fn state(&self, points: &[AxisPoint; WINDOW], limits: &AxisLimits) -> State {
-        let differences = Differences::of(self, points);
-        let begin = differences.knot(BEGIN);
-        if self.since_begin_s <= 0.0 {
-            return begin;
+    /// overshoots behind it. There it is the motion with which the axis is to arrive at the next point. Behind the end it
+    /// goes on at its velocity.
+    pub(super) fn state(&self, time_s: f64, limits: &AxisLimits) -> State {
+        let duration_s = self.quintic.duration_s;
+        if time_s > duration_s {
+            return State { acceleration: 0.0, ..self.end }.after(time_s - duration_s);
         }
-        let end = differences.knot(END);
-        let duration_s = self.steps_s[BEGIN];
-        let quintic = Quintic::between(&begin, &end, duration_s);
-        let state = quintic.state(self.since_begin_s);
-        if state.velocity.abs() <= limits.velocity
-            && state.acceleration.abs() <= limits.acceleration.max(limits.deceleration)
-            && quintic.highest_jerk() <= limits.jerk
-        {
-            return state;
-        }
-        let velocity = minmod(end.velocity, differences.mean_velocity());
-        State { velocity, acceleration: 0.0, ..end }.after(self.since_begin_s - duration_s)
-    }
-
-    /// The state of an axis at the end of the interval.
-    pub(super) fn end_state(&self, points: &[AxisPoint; WINDOW]) -> State {
-        Differences::of(self, points).knot(END)
+        let state = self.quintic.state(time_s.max(0.0));
+        let is_within = self.is_within_jerk
+            && state.velocity.abs() <= limits.velocity
+            && state.acceleration.abs() <= limits.acceleration.max(limits.deceleration);
+        if is_within { state } else { self.arrival.after(time_s - duration_s) }
     }
 }
 
 /// The polynomial of the fifth degree from one state to another.
+#[derive(Clone, Copy, Debug, Default)]
 struct Quintic {
-    begin: State,
+    begin: f64,
     duration_s: f64,
+    /// One divided by the duration.
+    rate: f64,
     /// The coefficients from the first to the fifth power of the time, in units of the duration.
     coefficients: [f64; 5],
 }
@@ -111,20 +125,20 @@ impl Quintic {
             -15.0 * way + 7.0 * gain - change,
             6.0 * way - 3.0 * gain + 0.5 * change,
         ];
-        Self { begin: *begin, duration_s, coefficients }
+        Self { begin: begin.position, duration_s, rate: 1.0 / h, coefficients }
     }
 
     /// Some time after the beginning.
     fn state(&self, time_s: f64) -> State {
         let [c1, c2, c3, c4, c5] = self.coefficients;
-        let (h, u) = (self.duration_s, time_s / self.duration_s);
+        let (rate, u) = (self.rate, time_s * self.rate);
         let position = u * (c1 + u * (c2 + u * (c3 + u * (c4 + u * c5))));
         let velocity = c1 + u * (2.0 * c2 + u * (3.0 * c3 + u * (4.0 * c4 + u * 5.0 * c5)));
         let acceleration = 2.0 * c2 + u * (6.0 * c3 + u * (12.0 * c4 + u * 20.0 * c5));
         State {
-            position: self.begin.position + position,
-            velocity: velocity / h,
-            acceleration: acceleration / (h * h),
+            position: self.begin + position,
+            velocity: velocity * rate,
+            acceleration: acceleration * rate * rate,
         }
     }
 
@@ -135,7 +149,7 @@ impl Quintic {
         // Where the parabola has its vertex, if that is on the way.
         let vertex = -0.2 * c4 / c5;
         let inner = if vertex > 0.0 && vertex < 1.0 { jerk(vertex) } else { 0.0 };
-        jerk(0.0).max(jerk(1.0)).max(inner) / (self.duration_s * self.duration_s * self.duration_s)
+        jerk(0.0).max(jerk(1.0)).max(inner) * self.rate * self.rate * self.rate
     }
 }
 
@@ -190,23 +204,29 @@ impl<'a> Differences<'a> {
         let point = self.points.get(place).copied().unwrap_or_default();
         let (before, here, behind) =
             (self.second(place.wrapping_sub(1)), self.second(place), self.second(place + 1));
-        let estimated = self.velocity_estimate(place);
-        let velocity = self.limited_velocity(place, point.velocity.unwrap_or(estimated));
-        let steepest = |room: f64| {
+        let is_smooth = self.is_smooth(place);
+        let velocity = match point.velocity {
+            Some(given) => self.limited_velocity(place, given),
+            // What is estimated from a smooth motion needs no limit.
+            None if is_smooth => self.velocity_estimate(place),
+            None => self.limited_velocity(place, self.velocity_estimate(place)),
+        };
+        let limited = |given: f64| {
             let largest = [before, here, behind].into_iter().flatten().fold(0.0, |a: f64, b| a.max(b.abs()));
-            2.0 * room * largest
+            let steepest = 2.0 * ACCELERATION_ROOM * largest;
+            given.clamp(-steepest, steepest)
         };
         let acceleration = match (point.acceleration, here) {
-            (Some(given), _) => given.clamp(-steepest(ACCELERATION_ROOM), steepest(ACCELERATION_ROOM)),
+            (Some(given), _) => limited(given),
             (None, Some(here)) => {
-                let estimated = self.acceleration_by_velocities(place).unwrap_or(2.0 * here);
+                let estimated = self.acceleration_by_velocities(place).map_or(2.0 * here, limited);
                 // One that is alone among its neighbours is a corner, or belongs to a step.
                 let bound = match (before, behind) {
                     (Some(before), Some(behind)) => minmod(minmod(before, here), behind),
                     (Some(beside), None) | (None, Some(beside)) => minmod(beside, here),
                     (None, None) => 0.0,
                 };
-                if self.is_smooth(place) { estimated } else { minmod(estimated, 4.0 * bound) }
+                if is_smooth { estimated } else { minmod(estimated, 4.0 * bound) }
             }
             (None, None) => 0.0,
         };

@@ -3,8 +3,8 @@
 use arrayvec::ArrayVec;
 
 use super::delay::{DelayEstimator, StreamDelay};
-use super::interpolation::{BEGIN, WINDOW, Window};
-use super::target::{AxisPoint, AxisTarget, PointRole, StreamCounts, StreamPoint, StreamSample, StreamWish};
+use super::interpolation::{BEGIN, Piece, WINDOW, Window};
+use super::target::{AxisTarget, PointRole, StreamCounts, StreamPoint, StreamSample, StreamWish};
 use crate::guard::AxisLimits;
 use crate::plan::State;
 use crate::record::MAX_AXES;
@@ -130,6 +130,11 @@ pub struct LookAhead<const AXES: usize, P> {
     /// The stamp of the last point of a chunk that is not complete.
     open_chunk_ns: Option<Nanoseconds>,
     counts: StreamCounts,
+    /// How often the points have changed.
+    revision: u64,
+    /// The motions of the present interval, and for what they were made: the points, and the beginning of the interval.
+    pieces: [Piece; AXES],
+    pieces_of: Option<(u64, Nanoseconds)>,
 }
 
 impl<const AXES: usize, P> LookAhead<AXES, P>
@@ -153,12 +158,16 @@ where
             judged_ns: None,
             open_chunk_ns: None,
             counts: StreamCounts::default(),
+            revision: 0,
+            pieces: [Piece::default(); AXES],
+            pieces_of: None,
         }
     }
 
     /// A stream begins: forgets the one before it.
     pub fn begin(&mut self) {
         self.count = 0;
+        self.revision += 1;
         self.delay.restart();
         self.playback = Playback::Awaited;
         (self.sampled_ns, self.judged_ns, self.open_chunk_ns) = (None, None, None);
@@ -299,7 +308,7 @@ where
         let pause_ns = self.delay.interval_ns().saturating_mul(PAUSE_INTERVALS).max(PAUSE_NS).unsigned_abs();
         let has_paused = stamp_ns.saturating_sub(last_ns) > pause_ns;
         if has_paused {
-            self.count = 0;
+            self.remove(0, self.count);
             self.playback = Playback::Leading;
         } else if stamp_ns > last_ns && self.play_time(now_ns) < stamp_ns {
             self.playback = Playback::Following;
@@ -315,11 +324,13 @@ where
             return Err(PointError::Full);
         }
         self.count -= 1;
+        self.revision += 1;
         self.counts.lost_points += 1;
         Ok(())
     }
 
     fn put(&mut self, index: usize, point: &StreamPoint<AXES>) {
+        self.revision += 1;
         let Some(place) = self.places.get(index).copied() else { return };
         if let Some(kept) = self.points.as_mut().get_mut(usize::from(place)) {
             *kept = *point;
@@ -347,6 +358,7 @@ where
         if from >= to || to > self.count {
             return;
         }
+        self.revision += 1;
         if let (Some(places), Some(stamps)) =
             (self.places.get_mut(from..self.count), self.stamps_ns.get_mut(from..self.count))
         {
@@ -409,33 +421,16 @@ where
         // From the last but one on there is nothing behind the interval.
         let begin = behind.saturating_sub(1).min(self.count.saturating_sub(2));
         let begin = self.forget_past(begin);
-        let mut stamps_ns = [0; WINDOW];
-        let mut points: [Option<&StreamPoint<AXES>>; WINDOW] = [None; WINDOW];
-        let (mut from, mut to) = (WINDOW, 0);
-        for (place, (stamp_ns, point)) in stamps_ns.iter_mut().zip(&mut points).enumerate() {
-            let Some(index) = (begin + place).checked_sub(BEGIN).filter(|index| *index < self.count) else {
-                continue;
-            };
-            (*stamp_ns, *point) = (self.stamp(index), self.point(index));
-            (from, to) = (from.min(place), place + 1);
+        let begin_ns = self.stamp(begin);
+        if self.pieces_of != Some((self.revision, begin_ns)) {
+            self.update_pieces(begin);
+            self.pieces_of = Some((self.revision, begin_ns));
         }
-        let last_ns = stamps_ns.get(BEGIN + 1).copied().unwrap_or(0);
-        let coasted_s = played_ns.saturating_sub(last_ns) as f64 / NANOSECONDS_PER_SECOND as f64;
-        let window = Window::new(&stamps_ns, from, to, played_ns.min(last_ns));
+        let since_begin_s = played_ns.wrapping_sub(begin_ns) as i64 as f64 / NANOSECONDS_PER_SECOND as f64;
         let rate = self.delay.time_rate();
         let mut targets = [AxisTarget::default(); AXES];
-        for (axis, (target, limits)) in targets.iter_mut().zip(&self.limits).enumerate() {
-            let mut of_axis = [AxisPoint::default(); WINDOW];
-            for (to, point) in of_axis.iter_mut().zip(&points) {
-                if let Some(point) = point.and_then(|point| point.axes.get(axis)) {
-                    *to = *point;
-                }
-            }
-            let state = if coasted_s > 0.0 {
-                State { acceleration: 0.0, ..window.end_state(&of_axis) }.after(coasted_s)
-            } else {
-                window.state(&of_axis, limits)
-            };
+        for (target, (piece, limits)) in targets.iter_mut().zip(self.pieces.iter().zip(&self.limits)) {
+            let state = piece.state(since_begin_s, limits);
             *target = AxisTarget::Position(State {
                 position: state.position,
                 velocity: state.velocity * rate,
@@ -445,13 +440,117 @@ where
         targets
     }
 
+    /// Makes the motions of the interval that begins with this point.
+    fn update_pieces(&mut self, begin: usize) {
+        let mut stamps_ns = [0; WINDOW];
+        let mut places = [0; WINDOW];
+        let (mut from, mut to) = (WINDOW, 0);
+        for (place, (stamp_ns, of_storage)) in stamps_ns.iter_mut().zip(&mut places).enumerate() {
+            let Some(index) = (begin + place).checked_sub(BEGIN).filter(|index| *index < self.count) else {
+                continue;
+            };
+            *stamp_ns = self.stamp(index);
+            *of_storage = self.places.get(index).copied().map_or(0, usize::from);
+            (from, to) = (from.min(place), place + 1);
+        }
+        let window = Window::new(&stamps_ns, from, to);
+        let storage = self.points.as_ref();
+        for (axis, (piece, limits)) in self.pieces.iter_mut().zip(&self.limits).enumerate() {
+            let points = places.map(|place| {
+                let point = storage.get(place).and_then(|point| point.axes.get(axis));
+                point.copied().unwrap_or_default()
+            });
+            *piece = window.piece(&points, limits);
+        }
+    }
+
     /// Removes the points that nothing depends on any more. Returns the new index of the present one.
     fn forget_past(&mut self, present: usize) -> usize {
         let past = present.saturating_sub(PAST_POINTS);
         if past < PAST_POINTS_KEPT && self.count < self.capacity {
             return present;
         }
+        // The motion of the present interval stays as it is.
+        let revision = self.revision;
         self.remove(0, past);
+        self.revision = revision;
         present - past
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::source::AxisPoint;
+
+    const MILLISECOND_NS: u64 = 1_000_000;
+
+    fn look_ahead(capacity: usize) -> LookAhead<1, [StreamPoint<1>; 8]> {
+        let parameters = LookAheadParameters {
+            limits: [AxisLimits::NONE].into_iter().collect(),
+            period_ns: MILLISECOND_NS,
+            delay: StreamDelay::Fixed(0),
+        };
+        let mut look_ahead = LookAhead::new([StreamPoint::default(); 8], parameters);
+        look_ahead.capacity = capacity;
+        look_ahead
+    }
+
+    fn point(at_ms: u64, position: f64) -> StreamPoint<1> {
+        let axes = [AxisPoint::position(position)];
+        StreamPoint { at_ns: at_ms * MILLISECOND_NS, role: PointRole::Single, axes }
+    }
+
+    fn stamps_ms(look_ahead: &LookAhead<1, [StreamPoint<1>; 8]>) -> impl Iterator<Item = (u64, f64)> + '_ {
+        (0..look_ahead.count).map(|index| {
+            let point = look_ahead.point(index).unwrap();
+            assert_eq!(point.at_ns, look_ahead.stamp(index));
+            (point.at_ns / MILLISECOND_NS, point.axes[0].position)
+        })
+    }
+
+    #[test]
+    fn points_stand_in_the_order_of_their_stamps_and_the_last_one_of_a_stamp_counts() {
+        let mut look_ahead = look_ahead(8);
+        for (at_ms, position) in [(30, 3.0), (10, 1.0), (20, 2.0), (40, 4.0), (20, 2.5)] {
+            assert_eq!(look_ahead.insert(&point(at_ms, position), 0), Ok(()));
+        }
+        assert!(stamps_ms(&look_ahead).eq([(10, 1.0), (20, 2.5), (30, 3.0), (40, 4.0)]));
+    }
+
+    #[test]
+    fn without_room_the_farthest_point_is_the_one_that_is_lost() {
+        let mut look_ahead = look_ahead(3);
+        for at_ms in [10, 20, 30] {
+            look_ahead.insert(&point(at_ms, 0.0), 0).unwrap();
+        }
+        assert_eq!(look_ahead.insert(&point(40, 0.0), 0), Err(PointError::Full));
+        assert_eq!(look_ahead.insert(&point(15, 0.0), 0), Ok(()));
+        assert!(stamps_ms(&look_ahead).map(|(at_ms, _)| at_ms).eq([10, 15, 20]));
+        assert_eq!(look_ahead.counts().lost_points, 2);
+    }
+
+    #[test]
+    fn a_chunk_takes_the_place_of_what_came_before_from_its_first_stamp_on() {
+        let mut look_ahead = look_ahead(8);
+        for at_ms in [10, 20, 30, 40, 50] {
+            look_ahead.insert(&point(at_ms, 1.0), 0).unwrap();
+        }
+        for (at_ms, is_first, is_last) in [(25, true, false), (35, false, false), (45, false, true)] {
+            let role = PointRole::Chunk { is_first, is_last };
+            look_ahead.insert(&StreamPoint { role, ..point(at_ms, 2.0) }, 0).unwrap();
+        }
+        let expected = [(10, 1.0), (20, 1.0), (25, 2.0), (35, 2.0), (45, 2.0)];
+        assert!(stamps_ms(&look_ahead).eq(expected), "{:?}", look_ahead.stamps());
+    }
+
+    #[test]
+    fn what_cannot_be_used_is_counted_and_changes_nothing() {
+        let mut look_ahead = look_ahead(8);
+        look_ahead.insert(&point(10, 1.0), 0).unwrap();
+        assert_eq!(look_ahead.insert(&point(20, f64::NAN), 0), Err(PointError::NotFinite { axis: 0 }));
+        assert_eq!(look_ahead.insert(&point(90_000, 1.0), 0), Err(PointError::FarAway));
+        assert!(stamps_ms(&look_ahead).eq([(10, 1.0)]));
+        assert_eq!((look_ahead.counts().points, look_ahead.counts().lost_points), (3, 2));
     }
 }

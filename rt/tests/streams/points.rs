@@ -168,12 +168,14 @@ fn a_joint_is_led_to_a_stream_that_begins_far_from_it() {
 
 #[test]
 fn what_a_standing_stream_says_of_its_velocity_moves_nothing() {
-    for (velocity, acceleration) in [(1e9, None), (1.5, Some(-1e9)), (-1.5, Some(9.0))] {
-        let axis = AxisPoint { position: 0.0, velocity: Some(velocity), acceleration };
-        let points: Vec<Arrival> = (0..100)
-            .map(|number| 0.02 * f64::from(number))
-            .map(|time_s| single(time_s, time_s, axis))
-            .collect();
+    for (velocity, acceleration) in [(1e9, None), (1.5, Some(-1e9)), (-1.5, Some(9.0)), (0.5, None)] {
+        let point = |number: i32| {
+            // Another one in each point.
+            let velocity = Some(velocity * f64::from(number % 7 - 2));
+            let time_s = 0.02 * f64::from(number);
+            single(time_s, time_s, AxisPoint { position: 0.0, velocity, acceleration })
+        };
+        let points: Vec<Arrival> = (0..100).map(point).collect();
         let streamed = stream(&points, Follow::Smooth, StreamDelay::Automatic, 1.9);
         assert!(streamed.set.iter().all(|(_, set)| set.abs() < 1e-12));
     }
@@ -309,8 +311,9 @@ proptest! {
         let mut count = 0;
         for number in 0..(1.5 * rate_hz) as u32 {
             let time_s = f64::from(number) / rate_hz;
-            let lost = random() < loss;
-            let at_s = time_s + random() * jitter / rate_hz;
+            // The first one comes in time for the stream to begin.
+            let (lost, late) = (random() < loss, random() * jitter / rate_hz);
+            let (lost, at_s) = if number == 0 { (false, 0.0) } else { (lost, time_s + late) };
             if lost {
                 continue;
             }

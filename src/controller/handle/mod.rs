@@ -164,7 +164,8 @@ impl Drop for Controller {
 
 /// Commands and observes a running controller, from any thread. Clones are cheap and equal.
 ///
-/// No command waits for a lock that another thread could hold; only clients that push points of a stream wait for each other.
+/// No command waits for a lock that another thread could hold, with two exceptions: clients that push points of a stream wait for
+/// each other, and so do commands of trajectories.
 /// [`Handle::stop`] is wait-free, so it may also be called in a signal handler.
 #[derive(Clone)]
 pub struct Handle(Arc<Shared>);

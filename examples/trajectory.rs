@@ -1,0 +1,52 @@
+//! Trajectories: points with times, checked as a whole before they start, carried out exactly, slowed down and paused on the
+//! path; and waypoints that the controller plans through without stopping.
+//!
+//! ```text
+//! cargo run --release --example trajectory configs/arm6-erob.toml
+//! ```
+
+use std::path::Path;
+use std::thread;
+use std::time::Duration;
+
+use takt::{Config, Controller, SessionOptions, Trajectory, TrajectoryPoint};
+
+const PATIENCE: Duration = Duration::from_secs(60);
+
+fn main() -> takt::Result {
+    let path = std::env::args().nth(1).unwrap_or_else(|| "configs/arm6-erob.toml".to_owned());
+    run(Config::load(Path::new(&path))?)
+}
+
+/// Executes a trajectory, slower in between, and goes back through waypoints.
+pub fn run(config: Config) -> takt::Result {
+    let arm = Controller::start(config, SessionOptions::default())?;
+    let home: Vec<f64> = arm.state().axes().iter().map(|axis| axis.position_set).collect();
+    let from_home = |offset: f64| -> Vec<f64> { home.iter().map(|home| home + offset).collect() };
+    let point =
+        |time_s, offset| TrajectoryPoint { time_s, positions: from_home(offset), ..Default::default() };
+
+    // A spline through the points, since they come without velocities.
+    let points = [point(1.0, 0.05), point(2.0, 0.0), point(3.0, -0.05)];
+    let motion = arm.execute(&points)?;
+    arm.set_speed(motion, 0.5)?;
+    arm.pause(motion)?;
+    thread::sleep(Duration::from_millis(200));
+    if let Some(progress) = arm.trajectory_progress(motion) {
+        println!("paused near {:.2} s of {:.2} s", progress.path_s, progress.of_s);
+    }
+    arm.resume(motion)?;
+    arm.wait(motion, PATIENCE)?;
+
+    // What breaks a limit anywhere is refused before anything moves.
+    match arm.execute(&[point(0.01, 0.05)]) {
+        Err(refused) => println!("refused: {refused}"),
+        Ok(_) => println!("this arm is very fast"),
+    }
+
+    let waypoints = [from_home(0.02), from_home(0.05), home.clone()];
+    let motion = arm.execute_with(|conditions| Trajectory::through(&waypoints, conditions))?;
+    arm.wait(motion, PATIENCE)?;
+    println!("back at the beginning");
+    Ok(())
+}
