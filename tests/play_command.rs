@@ -249,6 +249,15 @@ fn a_file_that_cannot_be_read_or_written_is_refused_before_anything_moves() {
 }
 
 #[test]
+fn the_file_that_is_played_is_not_written_over() {
+    let place = Place::new();
+    place.write(reaching(false));
+    let output = place.play(&["--trajectory", "--virtual", "--out", "./points.csv"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert_eq!(fs::read_to_string(place.path("points.csv")).unwrap(), reaching(false));
+}
+
+#[test]
 fn a_full_disk_is_told_and_is_no_success() {
     let place = Place::new();
     place.write(reaching(false));
@@ -256,4 +265,133 @@ fn a_full_disk_is_told_and_is_no_success() {
     assert_eq!(output.status.code(), Some(1));
     assert!(String::from_utf8_lossy(&output.stderr).contains("/dev/full cannot be written"));
     assert_eq!(json(&output)["stop"], Value::Null);
+}
+
+/// 0.2 rad there and back in two seconds each, of joint 3, as often as asked for; from 0, at rest.
+fn swing(at_s: f64) -> f64 {
+    0.1 * (1.0 - (std::f64::consts::PI * at_s.clamp(0.0, 4.0)).cos())
+}
+
+/// The swing as a stream at 50 Hz, each row at its time.
+fn swinging() -> String {
+    let rows = (0..=200).map(|step| {
+        let at_s = f64::from(step) / 50.0;
+        format!("{at_s},{at_s},{}\n", swing(at_s))
+    });
+    format!("arrive,at,joint3\n{}", rows.collect::<String>())
+}
+
+/// Plays a stream in virtual time. Returns the report, and what was commanded.
+fn streamed(place: &Place, options: &[&str]) -> (Value, Vec<Vec<f64>>) {
+    let output = place.play(&[&["--virtual", "--json", "--out", "out.csv"], options].concat());
+    assert_eq!(output.status.code(), Some(0), "{output:?}");
+    let text = fs::read_to_string(place.path("out.csv")).unwrap();
+    let rows = text.lines().skip(1).map(|line| line.split(',').map(|cell| cell.parse().unwrap()).collect());
+    (json(&output), rows.collect())
+}
+
+/// The largest distance of what was commanded from the swing so much earlier.
+fn distance(rows: &[Vec<f64>], lag_s: f64) -> f64 {
+    let inside = rows.iter().filter(|row| (1.0..4.0).contains(&(row[0] - lag_s)));
+    inside.map(|row| (row[3] - swing(row[0] - lag_s)).abs()).fold(0.0, f64::max)
+}
+
+#[test]
+fn a_stream_follows_the_rows_behind_by_the_lag_that_is_told() {
+    let place = Place::new();
+    place.write(swinging());
+    let (report, rows) = streamed(&place, &[]);
+    let lag_s = report["lag_s"].as_f64().unwrap();
+    assert!(lag_s > 0.0 && lag_s <= report["lag_max_s"].as_f64().unwrap());
+    assert!(distance(&rows, lag_s) < 5e-4, "{} at {lag_s}", distance(&rows, lag_s));
+    assert_eq!((rows[0][0], &report["stop"], &report["points"]), (0.0, &Value::Null, &Value::from(201)));
+    let (report, rows) = streamed(&place, &["--delay", "0.1"]);
+    assert_eq!(report["lag_s"].as_f64(), Some(0.1));
+    assert!(distance(&rows, 0.1) < 5e-4, "{}", distance(&rows, 0.1));
+    let again = || fs::read(place.path("out.csv")).unwrap();
+    let (first, _) = (again(), streamed(&place, &["--delay", "0.1"]));
+    assert_eq!(first, again(), "bit for bit");
+}
+
+#[test]
+fn later_chunks_take_the_place_of_what_earlier_ones_said_of_the_future() {
+    let place = Place::new();
+    let mut text = String::from("arrive,at,joint3,chunk\n");
+    for chunk in 0..20 {
+        for step in 0..30 {
+            let at_s = f64::from(chunk) * 0.2 + f64::from(step) / 50.0;
+            // What is far in the future is wrong at first.
+            let wrong = if step < 20 { 0.0 } else { 0.05 };
+            writeln!(text, "{},{at_s},{},{chunk}", f64::from(chunk) * 0.2, swing(at_s) + wrong).unwrap();
+        }
+    }
+    place.write(text);
+    let (report, rows) = streamed(&place, &["--delay", "0.02"]);
+    assert!(distance(&rows[..3_000], 0.02) < 2e-3, "{}", distance(&rows[..3_000], 0.02));
+    assert_eq!(report["stop"], Value::Null);
+}
+
+#[test]
+fn a_step_is_followed_within_the_limits_or_stops_the_arm_as_asked() {
+    let place = Place::new();
+    place.write("arrive,at,joint3\n0,0.1,0\n0.1,0.2,0\n0.2,0.3,0.5\n0.3,0.4,0.5\n0.4,0.5,0.5\n1.5,1.6,0.5\n");
+    let (report, rows) = streamed(&place, &["--follow", "smooth"]);
+    let axis = &report["axes"][2];
+    let largest = ["velocity_max", "acceleration_max", "jerk_max"].map(|key| axis[key].as_f64().unwrap());
+    let limits = [2.3925, 8.0, 100.0];
+    assert!(largest.iter().zip(limits).all(|(largest, limit)| *largest <= limit * 1.000_01), "{largest:?}");
+    assert!((rows.last().unwrap()[3] - 0.5).abs() < 1e-6);
+    let output = place.play(&["--virtual", "--json", "--follow", "exact"]);
+    assert_eq!(output.status.code(), Some(1), "{output:?}");
+    assert!(json(&output)["stop"]["reason"].is_string());
+}
+
+#[test]
+fn a_first_point_outside_the_limits_is_refused_at_its_line() {
+    let place = Place::new();
+    place.write("arrive,at,joint3\n0,0.1,0\n0.1,0.05,2.5\n");
+    let output = place.play(&["--virtual"]);
+    assert_eq!(output.status.code(), Some(2));
+    let words = String::from_utf8(output.stderr).unwrap();
+    assert!(words.contains("line 3: joint3: the arm is led to this point first"), "{words}");
+}
+
+#[test]
+fn a_trajectory_in_real_time_commands_what_it_commands_in_virtual_time() {
+    let place = Place::new();
+    place.write("arrive,at,joint3\n0,0,0\n0,0.5,0.1\n0,0.8,0.05\n");
+    let (_, rows) = place.commanded();
+    let output = place.play(&["--trajectory", "--json", "--out", "real.csv"]);
+    assert_eq!(output.status.code(), Some(0), "{output:?}");
+    let text = fs::read_to_string(place.path("real.csv")).unwrap();
+    let real: Vec<String> =
+        text.lines().skip(1).map(|line| line.split(',').nth(3).unwrap().to_owned()).collect();
+    let expected: Vec<String> = rows.iter().map(|row| row[3].to_string()).collect();
+    assert_eq!(real, expected);
+}
+
+#[test]
+fn an_interruption_stops_the_arm_in_control() {
+    let place = Place::new();
+    place.write("arrive,at,joint3\n0,0,0\n0,30,0.5\n0,60,0\n");
+    let child = Command::new(env!("CARGO_BIN_EXE_takt"))
+        .arg("play")
+        .arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/arm6-erob.toml"))
+        .arg(place.path("points.csv"))
+        .args(["--trajectory", "--json", "--out", "out.csv"])
+        .current_dir(place.folder.path())
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    // Rows are written in blocks: the first of them means that the arm moves.
+    while fs::metadata(place.path("out.csv")).map_or(0, |file| file.len()) < 10_000 {
+        std::thread::sleep(std::time::Duration::from_millis(10));
+    }
+    let pid = nix::unistd::Pid::from_raw(i32::try_from(child.id()).unwrap());
+    nix::sys::signal::kill(pid, nix::sys::signal::Signal::SIGINT).unwrap();
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(130), "{output:?}");
+    assert_eq!(json(&output)["stop"]["category"], 2);
 }

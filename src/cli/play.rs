@@ -170,6 +170,10 @@ pub fn run(arguments: &Arguments) -> Exit {
         Ok(read) => read,
         Err(exit) => return exit,
     };
+    let is_same = |out: &Path| matches!((out.canonicalize(), arguments.file.canonicalize()), (Ok(out), Ok(file)) if out == file);
+    if arguments.out.as_deref().is_some_and(is_same) {
+        return UsageError::from("--out names the file that is to be played").print(arguments.json);
+    }
     let out = match arguments.out.as_deref().map(create).transpose() {
         Ok(out) => out,
         Err(words) => return UsageError::from(words).print(arguments.json),

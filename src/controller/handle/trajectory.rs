@@ -101,6 +101,15 @@ impl Handle {
         self.take_over(&mut trajectories, &present, None, |at_s| self.made(&start(at_s), &make))
     }
 
+    /// Starts a trajectory from where the axes hold through waypoints, without stopping, to rest at the last one: as fast as a spline
+    /// through them can be within all limits. Each waypoint has a position (rad or m) for each axis. See [`Trajectory::through`].
+    ///
+    /// # Errors
+    /// As [`Handle::execute`], and [`CommandError::Trajectory`] in motion.
+    pub fn move_through(&self, waypoints: &[Vec<f64>]) -> Result<MotionId, CommandError> {
+        self.execute_with(|conditions| Trajectory::through(waypoints, conditions))
+    }
+
     fn made(
         &self,
         start: &[State],
