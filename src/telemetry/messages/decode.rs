@@ -80,7 +80,8 @@ pub fn decode_event(message: &[u8]) -> Option<RecordedEvent> {
         },
         bus: if fields.is_over() { None } else { u8::try_from(fields.i16()?).ok() },
     };
-    Some(RecordedEvent { slot, at_ns, text, kind: of_kind.kind(slot) })
+    let group = if fields.is_over() { None } else { u8::try_from(fields.i16()?).ok() };
+    Some(RecordedEvent { slot, at_ns, group, text, kind: of_kind.kind(slot) })
 }
 
 /// Decodes a [`BUS`](super::BUS).
@@ -184,7 +185,7 @@ mod tests {
         phase: Phase::Holding,
     };
 
-    /// The last four bytes are two for the rejection and two for the bus.
+    /// The last six bytes are two for the rejection, two for the bus, and two for the group.
     #[test]
     fn an_event_of_an_earlier_version_is_read_without_its_later_fields() {
         let of_a_bus = StopReason { origin: Origin::Bus(1), ..STOP };
@@ -195,9 +196,10 @@ mod tests {
         ] {
             let mut encoder = CdrEncoder::default();
             encode_event(&Event { slot: 77, at_ns: 88, group: Some(1), kind }, "in words", &mut encoder);
-            for (missing, kind) in [(2, without_bus), (4, without_both)] {
+            for (missing, kind) in [(2, Some(kind)), (4, without_bus), (6, without_both)] {
                 let earlier = decode_event(&encoder.bytes()[..encoder.bytes().len() - missing]);
-                let expected = RecordedEvent { slot: 77, at_ns: 88, text: "in words".to_owned(), kind };
+                let expected =
+                    RecordedEvent { slot: 77, at_ns: 88, group: None, text: "in words".to_owned(), kind };
                 assert_eq!(earlier, Some(expected), "{missing} bytes less");
             }
         }
@@ -220,8 +222,13 @@ mod tests {
             EventKind::Rejected(REFUSAL),
         ] {
             encode_event(&Event { slot: 77, at_ns: 88, group: Some(1), kind }, "in words", &mut encoder);
-            let expected =
-                RecordedEvent { slot: 77, at_ns: 88, text: "in words".to_owned(), kind: Some(kind) };
+            let expected = RecordedEvent {
+                slot: 77,
+                at_ns: 88,
+                group: Some(1),
+                text: "in words".to_owned(),
+                kind: Some(kind),
+            };
             assert_eq!(decode_event(encoder.bytes()), Some(expected));
             assert_eq!(decode_event(&encoder.bytes()[..encoder.bytes().len() - 1]), None);
         }
