@@ -347,21 +347,25 @@ impl<const AXES: usize, const BUSES: usize> EngineParameters<AXES, BUSES> {
 pub(super) fn axes_of<const AXES: usize, const BUSES: usize>(
     parameters: &EngineParameters<AXES, BUSES>,
 ) -> ArrayVec<Axis, AXES> {
-    let mut axes = ArrayVec::new();
+    let mut axes: ArrayVec<Axis, AXES> = ArrayVec::new();
     let divider =
         |axis: &Axis| parameters.buses.get(usize::from(axis.parameters().bus)).map_or(1, |bus| bus.divider);
     let period_s = parameters.period_ns as f64 / NANOSECONDS_PER_SECOND as f64;
     for numbers in parameters.axes_of_groups() {
-        let own = |number: &u8| parameters.axes.get(usize::from(*number)).cloned();
-        let mut group: ArrayVec<Axis, AXES> =
-            numbers.iter().filter_map(|number| Some(Axis::new(*number, own(number)?))).collect();
+        let first = axes.len();
+        // In place, without an array of axes beside this one on the stack.
+        for number in numbers {
+            if let Some(own) = parameters.axes.get(usize::from(number)) {
+                axes.push(Axis::new(number, own.clone()));
+            }
+        }
+        let group = axes.get_mut(first..).unwrap_or_default();
         // A drive in a profile mode gets no set-points, so that no other axis waits for it.
         let slowest = group.iter().filter(|axis| !axis.is_profile()).map(divider).max().unwrap_or(1);
-        for axis in &mut group {
+        for axis in group {
             axis.delay_set_points(slowest.saturating_sub(divider(axis)).saturating_mul(2));
             axis.set_cycle(period_s * f64::from(divider(axis)));
         }
-        axes.extend(group);
     }
     axes
 }
