@@ -249,6 +249,23 @@ fn a_file_that_cannot_be_read_or_written_is_refused_before_anything_moves() {
 }
 
 #[test]
+fn a_joint_whose_drive_plans_its_own_profile_cannot_be_played() {
+    let place = Place::new();
+    place.write("arrive,at,joint\n0,0,0\n0,1,0.1\n");
+    for mode in [&["--trajectory", "--virtual"][..], &["--virtual"]] {
+        let output = Command::new(env!("CARGO_BIN_EXE_takt"))
+            .arg("play")
+            .arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/erob-modes/erob-pv.toml"))
+            .arg(place.path("points.csv"))
+            .args(mode)
+            .output()
+            .unwrap();
+        assert_eq!(output.status.code(), Some(2), "{output:?}");
+        assert!(String::from_utf8_lossy(&output.stderr).contains("`joint` is in a profile mode"));
+    }
+}
+
+#[test]
 fn the_file_that_is_played_is_not_written_over() {
     let place = Place::new();
     place.write(reaching(false));

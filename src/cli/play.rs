@@ -208,6 +208,7 @@ fn read(arguments: &Arguments, config: &Config) -> Result<(PlayFile, Piece), Exi
     })?;
     let names: Vec<String> = config.axes.iter().map(|axis| axis.name.clone()).collect();
     let file = PlayFile::parse(&bytes, &names).map_err(wrong_file)?;
+    file.check_modes(&config.axes).map_err(wrong_file)?;
     if !arguments.trajectory {
         let stream = FileStream::new(&file, &config.axes).map_err(wrong_file)?;
         return Ok((file, Piece::Stream(stream)));

@@ -56,6 +56,11 @@ pub enum FileProblem {
         /// The one that is missing.
         needed: String,
     },
+    /// The drive of a joint plans its own profile, and follows no set-points.
+    OwnProfile {
+        /// The joint.
+        joint: String,
+    },
     /// A row has more or fewer cells than the header.
     CellCount {
         /// How many it has.
@@ -129,6 +134,10 @@ impl fmt::Display for FileProblem {
             ),
             Self::RepeatedColumn { name } => write!(f, "the column `{name}` comes twice"),
             Self::WithoutColumn { name, needed } => write!(f, "the column `{name}` needs one of `{needed}`"),
+            Self::OwnProfile { joint } => write!(
+                f,
+                "`{joint}` is in a profile mode, in which its drive follows no set-points: use mode csp, csv, cst or ip"
+            ),
             Self::CellCount { cells, columns } => {
                 write!(f, "this row has {cells} cells, and the header has {columns} columns")
             }

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use super::error::{FileProblem, PlayFileError};
 use super::table::{self, Cell};
+use crate::config::Axis;
 use crate::text_file;
 
 /// Longer than thirty years is a slip, and would not fit the clock in nanoseconds.
@@ -126,6 +127,23 @@ impl PlayFile {
             return Err(PlayFileError { line: header.line + 1, column: None, problem: FileProblem::NoRow });
         }
         Ok(Self { torque_column: header.torque_column(), joints: header.joints, rows: read })
+    }
+}
+
+impl PlayFile {
+    /// Checks that the drives of all joints that it names follow set-points.
+    ///
+    /// # Errors
+    /// The first joint whose drive plans its own profile.
+    pub fn check_modes(&self, axes: &[Axis]) -> Result<(), PlayFileError> {
+        let of = |joint: &JointColumns| axes.get(joint.axis).filter(|axis| axis.control.is_profile());
+        match self.joints.iter().find_map(of) {
+            Some(axis) => {
+                let problem = FileProblem::OwnProfile { joint: axis.name.clone() };
+                Err(PlayFileError { line: 1, column: None, problem })
+            }
+            None => Ok(()),
+        }
     }
 }
 
