@@ -45,7 +45,7 @@ pub const AXIS: MessageType = MessageType {
 pub const EVENT: MessageType = MessageType {
     name: "takt_msgs/msg/Event",
     definition: include_str!("messages/Event.msg"),
-    later_fields: &[1, 3],
+    later_fields: &[1, 2, 4],
 };
 
 /// A frame on a bus.
@@ -276,11 +276,11 @@ mod tests {
             let fields = layout(EVENT.definition);
             fields[..fields.len() - missing].join("\n")
         };
-        assert!([0, 1, 3].iter().all(|missing| EVENT.can_be_read_as(&earlier(*missing))));
-        assert!(!EVENT.can_be_read_as(&earlier(2)) && !EVENT.can_be_read_as(&earlier(4)));
+        assert!([0, 1, 2, 4].iter().all(|missing| EVENT.can_be_read_as(&earlier(*missing))));
+        assert!(!EVENT.can_be_read_as(&earlier(3)) && !EVENT.can_be_read_as(&earlier(5)));
         assert!(!EVENT.can_be_read_as(&(earlier(0) + "\nuint8 another")));
         assert!(EVENT.can_be_read_as(&EVENT.definition.replace("uint8 reason", "uint8 objection")));
-        let other = earlier(3).replace("uint64 slot", "uint32 slot");
+        let other = earlier(4).replace("uint64 slot", "uint32 slot");
         assert!(!EVENT.can_be_read_as(&other) && !CYCLE.can_be_read_as(""));
     }
 

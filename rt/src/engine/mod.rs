@@ -91,7 +91,7 @@ pub enum Deadline {
 /// The axes of a controller, in groups that each move together.
 ///
 /// `AXES` and `BUSES` are the most axes and buses that there is room for. An engine needs about 5 kB for each axis, 4 kB for each
-/// bus, and 7 kB beside: 21 kB for two axes on one bus, 229 kB for 32 axes on 16 buses.
+/// bus, and 11 kB beside: 25 kB for two axes on one bus, 246 kB for 32 axes on 16 buses.
 ///
 /// # The order of calls
 /// In each slot, once each: [`Engine::sync`] for every bus, and its frame is sent; [`Engine::receive`] for every frame that has
