@@ -106,7 +106,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         batch: &mut SendBatch,
     ) {
         let Some(parameters) = self.shared.buses.get(bus) else { return };
-        let is_passive = self.groups.iter().all(|group| group.state == GroupState::Passive);
+        let is_passive = self.groups.iter().all(|group| matches!(group.state, GroupState::Passive));
         let budget =
             if is_passive { parameters.service_frames_passive } else { parameters.service_frames_active };
         let may_serve = self.may_leave(bus, deadline, Purpose::Operate);
@@ -150,14 +150,14 @@ impl<const AXES: usize, const BUSES: usize> Group<AXES, BUSES> {
     /// before its joint is at rest with its target there, nor before it watches the controller by the heartbeat.
     fn goal_of(&self, axis: &Axis, shared: &Shared<AXES, BUSES>) -> Goal {
         let goal = self.state.goal();
-        let is_shutting_down = self.state == GroupState::Disabling(PowerRemoval::Shutdown);
+        let is_shutting_down = matches!(self.state, GroupState::Disabling(PowerRemoval::Shutdown));
         if is_shutting_down && axis.must_quick_stop() {
             return Goal::QuickStop;
         }
         if goal != Goal::Enabled {
             return goal;
         }
-        let is_stopping = self.state == GroupState::Stopping;
+        let is_stopping = matches!(self.state, GroupState::Stopping);
         // A drive that PDOs do not reach is told the same by SDO.
         if axis.is_pdo_unreachable() || is_stopping && axis.stops_by_itself() {
             return Goal::QuickStop;

@@ -80,7 +80,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
 
     fn check_enable_timeout(&mut self) {
         let (cycles, limit) = (self.group.state_cycles, self.shared.enable_timeout_cycles);
-        if self.group.state != GroupState::Enabling || cycles <= limit {
+        if !matches!(self.group.state, GroupState::Enabling) || cycles <= limit {
             return;
         }
         let late = self.axes.iter().find(|axis| !axis.is_enabled());
@@ -128,7 +128,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
         let check = AxisCheck {
             // It stops by its own quick stop, which ends without torque.
             may_be_disabled: matches!(state, GroupState::Enabling | GroupState::Disabling(_))
-                || *state == GroupState::Stopping && axis.stops_by_itself(),
+                || matches!(state, GroupState::Stopping) && axis.stops_by_itself(),
             is_fault_expected: is_resetting,
             is_mode_free: matches!(state, GroupState::Disabling(_)),
             is_in_operation: !matches!(state, GroupState::Enabling | GroupState::Disabling(_)),
@@ -146,7 +146,8 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
     /// set-point: it takes the power, by SDO.
     fn take_power_if_cut_off(&mut self) {
         let is_cut_off = self.shared.slots.late_cycles > self.shared.not_transmitted_cycles;
-        if let Some(stop) = self.group.stop.filter(|_| is_cut_off && self.group.state == GroupState::Stopping)
+        if let Some(stop) =
+            self.group.stop.filter(|_| is_cut_off && matches!(self.group.state, GroupState::Stopping))
         {
             self.begin_stop(stop.cause, stop.origin, StopCategory::Zero);
         }
@@ -200,7 +201,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
     /// holds those that are still behind their set-points.
     pub(super) fn must_come_to_rest(&self) -> bool {
         self.is_under_way()
-            || self.group.state == GroupState::Holding && self.axes.iter().any(Axis::is_catching_up)
+            || matches!(self.group.state, GroupState::Holding) && self.axes.iter().any(Axis::is_catching_up)
     }
 
     /// Whether a stop has something to bring to rest. A joint in profile torque may begin to move by itself.

@@ -36,7 +36,9 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
                 self.require_no_fault()
             }
             Request::Stream => self.check_stream(),
-            Request::Disable if self.group.state == GroupState::Passive => Err(RejectReason::Phase.into()),
+            Request::Disable if matches!(self.group.state, GroupState::Passive) => {
+                Err(RejectReason::Phase.into())
+            }
             Request::ResetFaults => self.require_phase(&[Phase::Disabled, Phase::Holding]),
             _ => Ok(()),
         }
@@ -190,7 +192,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
         check_profile_target(self.axis_mut(wanted.axis)?, wanted.target)
             .map_err(|reason| reason.of_axis(wanted.axis))?;
         // The other axes stay where they are, not where the last trajectory ended.
-        if self.group.state == GroupState::Holding {
+        if matches!(self.group.state, GroupState::Holding) {
             self.plan_standstill().map_err(|error| self.plan_rejection(error, 0.0))?;
         }
         self.axis_mut(wanted.axis)?.set_profile_target(wanted.target, wanted.valid_until_ns);
@@ -204,7 +206,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
     fn begin_disabling(&mut self) {
         match self.group.state {
             GroupState::Passive | GroupState::Disabled | GroupState::Disabling(_) => {}
-            _ if self.must_come_to_rest() || self.group.state == GroupState::Stopping => {
+            _ if self.must_come_to_rest() || matches!(self.group.state, GroupState::Stopping) => {
                 self.begin_stop(StopCause::Requested, Origin::Group, StopCategory::One);
             }
             _ => self.enter(GroupState::Disabling(PowerRemoval::Shutdown)),
@@ -212,7 +214,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
     }
 
     fn reset_faults(&mut self) {
-        if self.group.state == GroupState::Disabled {
+        if matches!(self.group.state, GroupState::Disabled) {
             self.group.fault_reset_cycles = 3 * FAULT_RESET_CYCLES;
             self.axes.iter_mut().for_each(Axis::begin_fault_reset);
         }

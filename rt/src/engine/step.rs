@@ -31,7 +31,8 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
     /// drives of another group is not skipped.
     pub(super) fn probe_late_drives(&mut self) {
         let is_due = |group: &Group<AXES, BUSES>| {
-            group.state == GroupState::Enabling && group.state_cycles.is_multiple_of(PROBE_AGAIN_CYCLES)
+            matches!(group.state, GroupState::Enabling)
+                && group.state_cycles.is_multiple_of(PROBE_AGAIN_CYCLES)
         };
         if !self.groups.iter().any(is_due) {
             return;
@@ -86,7 +87,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
         for _ in 0..ATTEMPTS {
             match self.step_phase() {
                 Ok(()) => return,
-                Err((origin, fault)) if self.group.state == GroupState::Stopping => {
+                Err((origin, fault)) if matches!(self.group.state, GroupState::Stopping) => {
                     self.begin_stop(StopCause::Fault(fault), origin, StopCategory::Zero);
                 }
                 Err((origin, fault)) => self.fail(origin, fault),
