@@ -9,7 +9,7 @@ use std::path::Path;
 use std::thread;
 use std::time::Duration;
 
-use takt::{Config, Controller, SessionOptions, Trajectory, TrajectoryPoint};
+use takt::{Config, Controller, SessionOptions, TrajectoryPoint};
 
 const PATIENCE: Duration = Duration::from_secs(60);
 
@@ -45,7 +45,7 @@ pub fn run(config: Config) -> takt::Result {
     }
 
     let waypoints = [from_home(0.02), from_home(0.05), home.clone()];
-    let motion = arm.execute_with(|conditions| Trajectory::through(&waypoints, conditions))?;
+    let motion = arm.move_through(&waypoints)?;
     arm.wait(motion, PATIENCE)?;
     println!("back at the beginning");
     Ok(())

@@ -17,7 +17,6 @@ programs! {
     after_a_stop: "../examples/after_a_stop.rs",
     config_in_code: "../examples/config_in_code.rs",
     embed: "../examples/embed.rs",
-    execute: "../examples/execute.rs",
     profile_modes: "../examples/profile_modes.rs",
     stream: "../examples/stream.rs",
     supervise: "../examples/supervise.rs",
@@ -46,11 +45,6 @@ fn a_configuration_in_code_moves_two_joints() {
 fn drives_that_plan_by_themselves_get_velocities_and_torques() {
     profile_modes::run(config("erob-modes/erob-pv.toml")).unwrap();
     profile_modes::run(config("erob-modes/erob-pt.toml")).unwrap();
-}
-
-#[test]
-fn a_trajectory_is_executed_paused_and_resumed() {
-    execute::run(config("arm6-erob.toml")).unwrap();
 }
 
 #[test]

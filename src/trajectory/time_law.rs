@@ -213,10 +213,10 @@ impl Path {
         for _ in 0..INTERVALS_AT_MOST {
             let Some((from_s, to_s)) = left.pop() else { return true };
             match self.bounds_keep_limits(phase, from_s, to_s, limits) {
-                Judgement::Kept => {}
-                Judgement::Broken => return false,
-                Judgement::Open if to_s - from_s < SHORTEST_INTERVAL_S => return false,
-                Judgement::Open => {
+                IntervalCheck::Kept => {}
+                IntervalCheck::Broken => return false,
+                IntervalCheck::Open if to_s - from_s < SHORTEST_INTERVAL_S => return false,
+                IntervalCheck::Open => {
                     let middle_s = 0.5 * (from_s + to_s);
                     left.extend([(middle_s, to_s), (from_s, middle_s)]);
                 }
@@ -231,26 +231,26 @@ impl Path {
         from_s: f64,
         to_s: f64,
         limits: &[AxisLimits],
-    ) -> Judgement {
+    ) -> IntervalCheck {
         let law = LawBounds::of(phase, from_s, to_s);
         if law.middle.rate < -TOLERANCE {
-            return Judgement::Broken;
+            return IntervalCheck::Broken;
         }
         if law.rate.low < -TOLERANCE {
-            return Judgement::Open;
+            return IntervalCheck::Open;
         }
-        let mut judgement = Judgement::Kept;
+        let mut check = IntervalCheck::Kept;
         for (axis, limits) in limits.iter().enumerate().take(self.axes) {
             let (middle, around) = self.derivatives(axis, &law);
             let at_middle = Rates::of(&middle, &law.at_middle());
             if !at_middle.keep(limits) {
-                return Judgement::Broken;
+                return IntervalCheck::Broken;
             }
             if !Rates::of(&around, &law.around()).keep(limits) {
-                judgement = Judgement::Open;
+                check = IntervalCheck::Open;
             }
         }
-        judgement
+        check
     }
 
     /// The first three derivatives of the path of an axis, in the middle of an interval and all over it.
@@ -279,7 +279,7 @@ impl Path {
 }
 
 /// What is known of the limits on an interval.
-enum Judgement {
+enum IntervalCheck {
     Kept,
     Broken,
     Open,
