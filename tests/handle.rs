@@ -388,9 +388,14 @@ fn command(handle: &Handle, own: usize, is_over: &AtomicBool) -> usize {
             }
         };
         let result = handle.wait(motion, PATIENCE);
+        // `Forgotten`: the operating system has paused this thread while the others began many motions.
         let ends = matches!(
             result,
-            Ok(()) | Err(MotionError::Replaced | MotionError::Stopped(_) | MotionError::Overtaken)
+            Ok(())
+                | Err(MotionError::Replaced
+                    | MotionError::Stopped(_)
+                    | MotionError::Overtaken
+                    | MotionError::Forgotten)
         );
         // A move during the deceleration of a stop is refused.
         let is_refused = matches!(&result, Err(MotionError::Refused(refused)) if refused.refusal.is_none_or(|why| why.phase == Phase::Stopping));
