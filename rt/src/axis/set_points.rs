@@ -142,7 +142,6 @@ impl Axis {
         if !self.is_enabled() || last == before_last {
             return self.stay();
         }
-        self.derive_from_steps(period_s);
         let next = match self.stopping(period_s) {
             Some(next) if self.check(&next, period_s).is_ok() => next,
             _ => self.decelerating(period_s),
