@@ -19,6 +19,7 @@ pub const fn request(kind: RequestKind) -> &'static str {
         RequestKind::SetProfileTarget => "the target",
         RequestKind::Stream => "the stream",
         RequestKind::Execute => "the trajectory",
+        RequestKind::RunCallback => "the callback",
         RequestKind::Stop => "the stop",
         RequestKind::Disable => "disabling",
         RequestKind::ResetFaults => "the fault reset",
@@ -109,6 +110,7 @@ fn reason(rejected: &RequestError, machine: &Machine) -> String {
         }
         RejectReason::NoTime => "the drives are not told the time (`time` of [master])".to_owned(),
         RejectReason::UnknownTrajectory => "there is no such trajectory".to_owned(),
+        RejectReason::UnknownCallback => "there is no such callback".to_owned(),
         RejectReason::StartMismatch { position, present } => format!(
             "it begins at {position:.6} {length} while {axis} is at {present:.6} {length}, or at another velocity"
         ),
