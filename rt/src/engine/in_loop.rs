@@ -126,7 +126,9 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
             missed_slots: slots - 1,
             budget_ns: in_loop.run.budget_ns,
             set_points_due_ns: input.set_points_due_ns,
+            time_left_ns: 0,
         };
+        let cycle = cycle.beginning_at(input.now_ns);
         let (callback, targets) = (in_loop.callback(), &mut shared.callback_targets);
         let returned = host.callback(self.group.number, callback, &cycle, &shared.snapshot.axes, targets);
         in_loop.returns(input.slot, returned);

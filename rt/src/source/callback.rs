@@ -39,15 +39,18 @@ pub struct CallbackCycle {
     pub missed_slots: u64,
     /// How long the call may take.
     pub budget_ns: Nanoseconds,
-    /// The time at which the set-points of the cycle must be ready. The budget may reach beyond it when the cycle began late.
+    /// The time at which the set-points of the cycle must be ready.
     pub set_points_due_ns: Nanoseconds,
+    /// How long this call may take, at its beginning: less than the budget when the cycle began late.
+    pub time_left_ns: Nanoseconds,
 }
 
 impl CallbackCycle {
-    /// The time left for a call that begins at `now_ns`: to the end of its budget, or until the set-points must be ready.
-    pub const fn time_left_ns(&self, now_ns: Nanoseconds) -> Nanoseconds {
-        let until_due_ns = self.set_points_due_ns.saturating_sub(now_ns);
-        if until_due_ns < self.budget_ns { until_due_ns } else { self.budget_ns }
+    /// The same, with the time that is left for a call that begins at `begun_ns`: its budget, or until the set-points must be ready.
+    pub const fn beginning_at(self, begun_ns: Nanoseconds) -> Self {
+        let until_due_ns = self.set_points_due_ns.saturating_sub(begun_ns);
+        let time_left_ns = if until_due_ns < self.budget_ns { until_due_ns } else { self.budget_ns };
+        Self { time_left_ns, ..self }
     }
 }
 
@@ -139,6 +142,6 @@ mod tests {
     #[test]
     fn what_is_left_is_the_shorter_one_of_the_budget_and_of_the_time_until_the_set_points_are_due() {
         let cycle = CallbackCycle { budget_ns: 100, set_points_due_ns: 1_000, ..CallbackCycle::default() };
-        assert_eq!([700, 950, 1_100].map(|now_ns| cycle.time_left_ns(now_ns)), [100, 50, 0]);
+        assert_eq!([700, 950, 1_100].map(|now_ns| cycle.beginning_at(now_ns).time_left_ns), [100, 50, 0]);
     }
 }
