@@ -11,6 +11,7 @@
 //!
 //! No call on [`RtSide`] allocates, locks or waits, even if another thread is preempted in the middle of a call.
 
+mod callback_panic;
 mod callback_record;
 mod callbacks;
 mod client_requests;

@@ -1,6 +1,5 @@
 //! Callbacks on their way to the real-time thread, their calls there, and their way back: the loop borrows them, and never frees one.
 
-use std::any::Any;
 use std::ops::Index;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -12,9 +11,9 @@ use takt_rt::{
     MAX_AXES, Nanoseconds, PositionSequence,
 };
 
+use super::callback_panic::{self, CaughtPanic};
 use super::callback_record::CallbackRecord;
 use super::lending::{Borrower, Lender, lending};
-use crate::telemetry::panic_message;
 
 /// A function that leads a group from inside the real-time thread.
 pub type LoopCallback = dyn FnMut(&CallbackState<'_>, &CallbackCycle, &mut CallbackCommand<'_>) + Send;
@@ -100,7 +99,7 @@ pub struct GivenCallback {
     sequences: Vec<Option<PositionSequence>>,
     body: Box<LoopCallback>,
     record: Arc<CallbackRecord>,
-    panic: Option<Box<dyn Any + Send>>,
+    panic: Option<CaughtPanic>,
 }
 
 impl GivenCallback {
@@ -141,9 +140,8 @@ impl GivenCallback {
         let Self { numbers, positions, body, .. } = self;
         let state = CallbackState { axes, numbers };
         let mut command = CallbackCommand { targets, numbers, positions, is_finished: false };
-        // After a panic the function is not called again, so its broken state has no effect.
-        if let Err(payload) = catch_unwind(AssertUnwindSafe(|| body(&state, cycle, &mut command))) {
-            self.panic = Some(payload);
+        if let Err(panic) = callback_panic::catch(|| body(&state, cycle, &mut command)) {
+            self.panic = Some(panic);
             return CallbackOutcome::Panicked;
         }
         if command.is_finished {
@@ -176,7 +174,7 @@ impl GivenCallback {
 impl Drop for GivenCallback {
     /// Comes back from the real-time thread, or was not taken: keeps what it panicked with, for people.
     fn drop(&mut self) {
-        let message = self.panic.take().map(|payload| panic_message(&*payload));
+        let message = self.panic.take().map(|panic| panic.message());
         self.record.end(message);
     }
 }
@@ -205,6 +203,7 @@ impl CallbackGiver {
     /// Gives a callback, and returns its number. `None` if too many are with the real-time thread.
     pub fn give(&self, given: GivenCallback) -> Option<CallbackId> {
         self.release();
+        callback_panic::keep_hooks_away();
         self.0.lend(Box::new(given)).ok().map(CallbackId)
     }
 

@@ -151,7 +151,7 @@ pub enum MotionError {
     /// The callback has panicked, and the group has stopped.
     #[error("the callback has panicked ({message}): {stopped}")]
     CallbackPanicked {
-        /// The message of the panic.
+        /// The message of the panic, and where it was.
         message: String,
         /// The stop.
         stopped: Stopped,

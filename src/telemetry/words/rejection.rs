@@ -53,7 +53,9 @@ fn reason(rejected: &RequestError, machine: &Machine) -> String {
         }
         RejectReason::EnableInhibited => "the run is ending".to_owned(),
         RejectReason::MissedSlots { missed, limit } => {
-            format!("{missed} slots were missed recently, and a stream needs fewer than {limit}")
+            format!(
+                "{missed} slots were missed recently, and a stream or a callback needs fewer than {limit}"
+            )
         }
         RejectReason::UnknownAxis { axis, axes } => {
             format!("there is no axis {axis}: there are {axes}, counted from 0")
