@@ -103,6 +103,26 @@ pub enum Fault {
         /// Object 6060.
         expected: OperationMode,
     },
+    /// A torque or an impedance was wanted of an axis in a mode that has none: only in cyclic synchronous torque the loop is
+    /// closed here.
+    NoTorqueInMode {
+        /// The mode of the axis, object 6060.
+        mode: OperationMode,
+    },
+    /// A stiffness was wanted that is negative, or more than the axis allows.
+    StiffnessLimit {
+        /// N·m/rad.
+        stiffness: f64,
+        /// The highest stiffness.
+        limit: f64,
+    },
+    /// A damping was wanted that is negative, or more than the axis allows.
+    DampingLimit {
+        /// N·m·s/rad.
+        damping: f64,
+        /// The highest damping.
+        limit: f64,
+    },
     /// A drive in profile position does not acknowledge its target.
     NotAcknowledged {
         /// Cycles of its bus.
@@ -235,10 +255,16 @@ pub enum Rule {
     BusErrorPassive = 25,
     /// [`Fault::ImplausibleFeedback`].
     ImplausibleFeedback = 26,
+    /// [`Fault::NoTorqueInMode`].
+    NoTorqueInMode = 27,
+    /// [`Fault::StiffnessLimit`].
+    StiffnessLimit = 28,
+    /// [`Fault::DampingLimit`].
+    DampingLimit = 29,
     /// [`Fault::CallbackOverrun`].
-    CallbackOverrun = 27,
+    CallbackOverrun = 30,
     /// [`Fault::CallbackPanicked`].
-    CallbackPanicked = 28,
+    CallbackPanicked = 31,
 }
 
 impl Fault {
@@ -258,6 +284,9 @@ impl Fault {
             Self::DriveFault { .. } => Rule::DriveFault,
             Self::DriveDisabled { .. } => Rule::DriveDisabled,
             Self::ModeChanged { .. } => Rule::ModeChanged,
+            Self::NoTorqueInMode { .. } => Rule::NoTorqueInMode,
+            Self::StiffnessLimit { .. } => Rule::StiffnessLimit,
+            Self::DampingLimit { .. } => Rule::DampingLimit,
             Self::NotAcknowledged { .. } => Rule::NotAcknowledged,
             Self::EnableTimeout { .. } => Rule::EnableTimeout,
             Self::NoTrajectory => Rule::NoTrajectory,
@@ -294,6 +323,9 @@ impl Fault {
             Self::DriveFault { error_code: code } | Self::EmergencyMessage { code } => (code.into(), 0.0),
             Self::DriveDisabled { statusword } => (statusword.into(), 0.0),
             Self::ModeChanged { shown, expected } => (shown.into(), (expected as i8).into()),
+            Self::NoTorqueInMode { mode } => ((mode as i8).into(), 0.0),
+            Self::StiffnessLimit { stiffness, limit } => (stiffness, limit),
+            Self::DampingLimit { damping, limit } => (damping, limit),
             Self::StreamNotBegun { cycles, limit }
             | Self::NotAcknowledged { cycles, limit }
             | Self::EnableTimeout { cycles, limit }
@@ -335,6 +367,9 @@ impl Fault {
             Rule::ModeChanged => {
                 Self::ModeChanged { shown: seen as i8, expected: OperationMode::from_number(allowed as i8)? }
             }
+            Rule::NoTorqueInMode => Self::NoTorqueInMode { mode: OperationMode::from_number(seen as i8)? },
+            Rule::StiffnessLimit => Self::StiffnessLimit { stiffness: seen, limit: allowed },
+            Rule::DampingLimit => Self::DampingLimit { damping: seen, limit: allowed },
             Rule::NotAcknowledged => Self::NotAcknowledged { cycles: seen as u32, limit: allowed as u32 },
             Rule::EnableTimeout => Self::EnableTimeout { cycles: seen as u32, limit: allowed as u32 },
             Rule::NoTrajectory => Self::NoTrajectory,
@@ -358,7 +393,7 @@ impl Fault {
 
 impl Rule {
     /// Every rule, in the order of their numbers.
-    pub const ALL: [Self; 29] = [
+    pub const ALL: [Self; 32] = [
         Self::Requested,
         Self::NotFinite,
         Self::PositionLimit,
@@ -386,6 +421,9 @@ impl Rule {
         Self::JerkLimit,
         Self::BusErrorPassive,
         Self::ImplausibleFeedback,
+        Self::NoTorqueInMode,
+        Self::StiffnessLimit,
+        Self::DampingLimit,
         Self::CallbackOverrun,
         Self::CallbackPanicked,
     ];
@@ -420,6 +458,9 @@ impl Rule {
             Self::JerkLimit => "jerk_limit",
             Self::BusErrorPassive => "bus_error_passive",
             Self::ImplausibleFeedback => "implausible_feedback",
+            Self::NoTorqueInMode => "no_torque_in_mode",
+            Self::StiffnessLimit => "stiffness_limit",
+            Self::DampingLimit => "damping_limit",
             Self::CallbackOverrun => "callback_overrun",
             Self::CallbackPanicked => "callback_panicked",
         }
@@ -439,6 +480,9 @@ impl Rule {
             | Self::NoTrajectory
             | Self::StartPose
             | Self::JerkLimit
+            | Self::NoTorqueInMode
+            | Self::StiffnessLimit
+            | Self::DampingLimit
             | Self::BusErrorPassive
             | Self::CallbackOverrun
             | Self::CallbackPanicked => StopCategory::Two,

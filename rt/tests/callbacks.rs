@@ -63,7 +63,7 @@ fn lead(
 }
 
 fn at(state: State) -> Option<AxisTarget> {
-    Some(AxisTarget::Position(state))
+    Some(state.into())
 }
 
 fn state_of(rig: &Rig, motion: RequestId) -> MotionState {

@@ -166,6 +166,8 @@ fn axis(number: usize, bus: usize, node: u8) -> Axis {
         mapping: PdoMapping::Written,
         answers_sync: true,
         target_tolerance: 0.01,
+        compliance: Compliance { stiffness_max: 0.0, damping_max: 0.0, torque_rise_ns: 100_000_000 },
+        feed_forward: FeedForward::None,
         start_tolerance: 0.02,
         follow: Default::default(),
         feedback_delay_ns: 20_000,

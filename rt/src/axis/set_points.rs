@@ -3,10 +3,17 @@
 use super::Axis;
 use super::delay::SetPointDelay;
 use super::power::Power;
+use crate::control::TorqueDemand;
 use crate::fault::Fault;
-use crate::guard::{self, SetPointSteps};
-use crate::plan::State;
+use crate::group_trajectory::stop_limits;
+use crate::guard::{self, SetPointSteps, braking_distance};
+use crate::plan::{self, Profile, State};
 use crate::source::Follow;
+
+/// How far the velocity of a joint on a spring may overshoot its limit.
+const VELOCITY_OVERSHOOT: f64 = 1.2;
+/// Cycles from the report of a joint to the first set-point of a stop that it is reason for.
+const REACTION_CYCLES: f64 = 3.0;
 
 /// The set-points of an axis, on their way from the source to the drive.
 #[derive(Clone, Debug, Default)]
@@ -56,6 +63,21 @@ impl SetPoints {
         self.newest = [State::rest(position); 3];
         self.delay.fill(self.newest[0]);
         self.sent = self.newest;
+    }
+
+    /// Goes on evenly from where a joint is reported, as if it had always been on its way like that. The set-point that the
+    /// report belongs to was sent two cycles ago.
+    pub(super) fn begin_at(&mut self, position: f64, velocity: f64, period_s: f64) {
+        let delayed = self.delay.cycles() as f64;
+        let ahead = |cycles: f64| State {
+            position: position + velocity * cycles * period_s,
+            velocity,
+            acceleration: 0.0,
+        };
+        let newest = delayed + 2.0;
+        self.newest = [ahead(newest), ahead(newest - 1.0), ahead(newest - 2.0)];
+        self.delay.fill_with(|ago| ahead(newest - ago as f64));
+        self.sent = [ahead(1.0), ahead(0.0), ahead(-1.0)];
     }
 
     /// Rests where the newest set-point is. What waits to be sent is still sent: a drive that obeys although it says otherwise
@@ -134,22 +156,36 @@ impl Axis {
         }
     }
 
-    /// Slows the set-point down by its deceleration limit, whatever the jerk, and leaves it where it stands: for a motion that no
-    /// planned stop ends. A set-point that just stayed would leap to a standstill.
+    /// Goes on by one cycle on the fastest stop of this axis alone, and leaves the set-point where it stands: for a group whose
+    /// planned stop cannot be followed any more. A set-point that just stayed would leap to a standstill.
     pub fn slow_down(&mut self, period_s: f64) {
         let [last, before_last, _] = self.set_points.positions();
         if !self.is_enabled() || last == before_last {
             return self.stay();
         }
+        let next = match self.stopping(period_s) {
+            Some(next) if self.check(&next, period_s).is_ok() => next,
+            _ => self.decelerating(period_s),
+        };
+        self.advance(next);
+    }
+
+    /// The next set-point of the fastest stop within the limits, if one can be planned.
+    fn stopping(&self, period_s: f64) -> Option<State> {
+        let (start, mut profile) = (self.set_point(), Profile::hold(0.0));
+        let limits = stop_limits(&start, &self.parameters.limits);
+        plan::stop(&[start], &[limits], core::slice::from_mut(&mut profile)).ok()?;
+        Some(profile.sample(period_s))
+    }
+
+    /// The next set-point with the deceleration limit, whatever the jerk.
+    fn decelerating(&self, period_s: f64) -> State {
+        let [last, before_last, _] = self.set_points.positions();
         let most = self.parameters.limits.deceleration * period_s;
         let last_velocity = (last - before_last) / period_s;
         let change = -last_velocity.clamp(-most, most);
         let velocity = last_velocity + change;
-        self.advance(State {
-            position: last + velocity * period_s,
-            velocity,
-            acceleration: change / period_s,
-        });
+        State { position: last + velocity * period_s, velocity, acceleration: change / period_s }
     }
 
     /// Whether the set-point is where the joint is, but for one step within the limits.
@@ -163,10 +199,51 @@ impl Axis {
         self.following.clear();
     }
 
-    /// Checks the next set-point against the guard.
+    /// Lets the set-point begin anew where the joint is, as fast as that moves.
+    pub(super) fn begin_on_joint(&mut self, period_s: f64) {
+        let fastest = self.parameters.limits.velocity;
+        let velocity = self.joint.velocity().clamp(-fastest, fastest);
+        self.set_points.begin_at(self.joint.position(), velocity, period_s);
+        self.following.clear();
+    }
+
+    /// Checks the next set-point against the guard; and where the joint need not be on its set-point, the joint too.
     pub fn check(&self, next: &State, period_s: f64) -> Result<(), Fault> {
+        match self.torque_loop.demand() {
+            TorqueDemand::Law { .. } => {}
+            TorqueDemand::Impedance { .. } => self.check_joint(
+                VELOCITY_OVERSHOOT * self.parameters.limits.velocity,
+                self.parameters.following_error_limit,
+                period_s,
+            )?,
+            TorqueDemand::Torque(_) => {
+                return self.check_joint(self.parameters.limits.velocity, 0.0, period_s);
+            }
+        }
         let [last, before_last, _] = self.set_points.positions();
         guard::check(&self.parameters.limits, period_s, before_last, last, next)
+    }
+
+    /// Checks that the joint is not too fast, and can still be stopped before its position limits, or so far behind them.
+    fn check_joint(&self, fastest: f64, room: f64, period_s: f64) -> Result<(), Fault> {
+        let limits = &self.parameters.limits;
+        let (position, velocity) = (self.joint.position(), self.joint.velocity());
+        if velocity.abs() > fastest {
+            return Err(Fault::VelocityLimit { velocity, limit: fastest });
+        }
+        // A stop begins ahead of the report by the cycles that it takes to be obeyed.
+        let begin = position + REACTION_CYCLES * velocity * period_s;
+        let way = braking_distance(limits, velocity.abs(), 0.0);
+        let (rest, limit) = if velocity > 0.0 {
+            (begin + way, limits.position_max)
+        } else {
+            (begin - way, limits.position_min)
+        };
+        let beyond = if velocity > 0.0 { rest - limit } else { limit - rest };
+        if velocity != 0.0 && beyond > room {
+            return Err(Fault::PositionLimit { position: rest, limit });
+        }
+        Ok(())
     }
 
     /// Checks the next set-point of a stream, beyond [`Axis::check`].
@@ -215,8 +292,12 @@ impl Axis {
         self.set_points.set_delay(cycles);
     }
 
-    /// Takes the next set-point. In a profile mode there is none: the target stays.
+    /// Takes the next set-point. In a profile mode there is none: the target stays. Where a torque drives the joint, the
+    /// set-point is on it already.
     pub fn advance(&mut self, next: State) {
+        if self.torque_loop.is_torque() {
+            return;
+        }
         let next = if self.is_profile() { self.shown_set_point() } else { next };
         self.set_points.push(next);
     }
@@ -224,22 +305,54 @@ impl Axis {
 
 #[cfg(test)]
 mod tests {
+    use super::super::AxisParameters;
     use super::super::parameters::tests::parameters;
     use super::*;
     use crate::frame::{Frame, Id};
+    use crate::guard::AxisLimits;
 
     const PERIOD_S: f64 = 1e-3;
+
+    fn enabled(limits: AxisLimits) -> Axis {
+        let mut axis = Axis::new(0, AxisParameters { limits, ..parameters() });
+        axis.set_cycle(PERIOD_S);
+        axis.request_feedback(0);
+        axis.receive(0, &Frame::of(Id::canopen(0x180, 5), [0x37, 0x02]), 1).unwrap();
+        axis.begin_cycle(PERIOD_S);
+        assert!(axis.is_enabled());
+        axis
+    }
+
+    #[test]
+    fn an_axis_that_stops_alone_keeps_its_limits_of_acceleration_and_jerk() {
+        let limits = AxisLimits { jerk: 100.0, ..parameters().limits };
+        for (direction, acceleration) in [(1.0, 0.0), (1.0, 5.0), (-1.0, 5.0), (-1.0, 0.0)] {
+            let mut axis = enabled(limits);
+            let start = State { position: 0.1, velocity: direction, acceleration };
+            (0..4).for_each(|cycle| axis.advance(start.after(f64::from(cycle - 3) * PERIOD_S)));
+            let [newest, last, before] = axis.set_points.positions();
+            let mut sent = [newest, last, before];
+            for _ in 0..1000 {
+                axis.slow_down(PERIOD_S);
+                let next = axis.set_point().position;
+                let velocities =
+                    [next - sent[0], sent[0] - sent[1], sent[1] - sent[2]].map(|way| way / PERIOD_S);
+                let accelerations = [velocities[0] - velocities[1], velocities[1] - velocities[2]]
+                    .map(|change| change / PERIOD_S);
+                let jerk = (accelerations[0] - accelerations[1]) / PERIOD_S;
+                assert!(accelerations[0].abs() <= limits.deceleration * (1.0 + 1e-6), "{accelerations:?}");
+                assert!(jerk.abs() <= limits.jerk * (1.0 + 1e-4), "{jerk}");
+                sent = [next, sent[0], sent[1]];
+            }
+            assert_eq!(axis.set_point().velocity, 0.0);
+        }
+    }
 
     #[test]
     fn a_set_point_that_no_planned_stop_ends_slows_down_within_its_limit_and_stays() {
         let limits = parameters().limits;
         for direction in [1.0, -1.0] {
-            let mut axis = Axis::new(0, parameters());
-            axis.set_cycle(PERIOD_S);
-            axis.request_feedback(0);
-            axis.receive(0, &Frame::of(Id::canopen(0x180, 5), [0x37, 0x02]), 1).unwrap();
-            axis.begin_cycle(PERIOD_S);
-            assert!(axis.is_enabled());
+            let mut axis = enabled(limits);
             let step = direction * limits.velocity * PERIOD_S;
             (0..3).for_each(|cycle| axis.advance(State::rest(f64::from(cycle) * step)));
             let (mut last, mut last_step) = (axis.set_point().position, step);

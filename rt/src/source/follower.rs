@@ -17,14 +17,27 @@ const CORRECTING: f64 = 5.0;
 ///
 /// What starts where it can be stopped within the limits ends where it can be stopped within them. A target that moves within
 /// the limits is followed to the last bit of what the change of its jerk leaves; one that leaps is reached as fast as the limits
-/// allow, without overshoot.
+/// allow, without overshoot. A target beyond a position limit is followed as far as the limit; so an axis that starts beyond the
+/// limit comes back to it, and never moves farther out.
 ///
 /// # Errors
 /// What is no number, or no number that can be planned with.
 pub fn follow(start: &State, target: &State, limits: &AxisLimits, period_s: f64) -> Result<State, PlanError> {
-    match corrected(start, target, limits, period_s) {
+    let target = within_range(target, limits);
+    match corrected(start, &target, limits, period_s) {
         Some(next) => Ok(next),
-        None => tracked(start, target, limits, period_s),
+        None => tracked(start, &target, limits, period_s),
+    }
+}
+
+/// The target, or rest at the position limit beyond which it is.
+fn within_range(target: &State, limits: &AxisLimits) -> State {
+    if target.position > limits.position_max {
+        State::rest(limits.position_max)
+    } else if target.position < limits.position_min {
+        State::rest(limits.position_min)
+    } else {
+        *target
     }
 }
 
@@ -66,7 +79,7 @@ fn corrected(start: &State, target: &State, limits: &AxisLimits, period_s: f64) 
 }
 
 /// Whether a set-point keeps the limits, and can be stopped within them.
-fn is_safe(start: &State, next: &State, limits: &AxisLimits, period_s: f64) -> bool {
+pub(super) fn is_safe(start: &State, next: &State, limits: &AxisLimits, period_s: f64) -> bool {
     let State { position, velocity, acceleration } = *next;
     let steepest = limits.acceleration.max(limits.deceleration);
     let (rising, falling) = limits.rising_and_falling(velocity);
@@ -153,6 +166,36 @@ mod tests {
                     let difference = (newest - 3.0 * last + 3.0 * before - oldest) / PERIOD_S.powi(3);
                     prop_assert!(difference.abs() <= jerk * (1.0 + 1e-5) + 1e-4, "jerk {difference}");
                     prop_assert!((-1.0 - 1e-6..=2.0 + 1e-6).contains(&newest), "position {newest}");
+                }
+            }
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(60))]
+
+        #[test]
+        fn an_axis_beyond_a_position_limit_comes_back_and_never_moves_farther_out(
+            targets in prop::collection::vec((1.5f64..3.0, -0.5f64..0.5, 1usize..40), 1..60),
+            jerk in prop_oneof![50.0f64..1000.0, Just(f64::INFINITY)],
+        ) {
+            let limits = AxisLimits {
+                position_min: -1.0,
+                position_max: 2.0,
+                velocity: 3.0,
+                acceleration: 8.0,
+                deceleration: 8.0,
+                jerk,
+                torque: 50.0,
+            };
+            let mut state = State::rest(2.5);
+            for (position, velocity, cycles) in targets {
+                let mut target = State { position, velocity, acceleration: 0.0 };
+                for _ in 0..cycles {
+                    target = target.after(PERIOD_S);
+                    let next = follow(&state, &target, &limits, PERIOD_S).unwrap();
+                    prop_assert!(next.position <= state.position.max(2.0 + 1e-6), "{state:?} {next:?}");
+                    state = next;
                 }
             }
         }

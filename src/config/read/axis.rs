@@ -14,7 +14,8 @@ use super::travel::{counting, travel};
 use crate::canopen::dcf::DeviceConfiguration;
 use crate::config::defaults;
 use crate::config::model::{
-    Axis, DriveFamily, Feedback, Follow, Identity, Interface, Limits, PdoMapping, SimulatedJoint, Travel,
+    Axis, DriveFamily, FeedForward, Feedback, Follow, Identity, Interface, Limits, PdoMapping,
+    SimulatedJoint, Travel,
 };
 use crate::config::problem_kind::ProblemKind;
 use crate::config::quantities::Quantities;
@@ -173,6 +174,8 @@ fn axis(mut section: Section<'_>, machine: &Machine<'_>, earlier: &[ReadAxis]) -
             reversed: counting.reversed,
             zero_counts: counting.zero_counts,
             limits: limits?,
+            compliance: defaults::compliance(&control),
+            feed_forward: FeedForward::default(),
             following_error,
             start_tolerance: start_tolerance.unwrap_or(defaults::start_tolerance(travel)),
             target_tolerance: target_tolerance

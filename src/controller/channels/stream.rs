@@ -111,7 +111,7 @@ mod tests {
     }
 
     fn wanted(sample: &StreamSample) -> f64 {
-        let StreamWish::Targets([AxisTarget::Position(first), ..]) = sample.wish else {
+        let StreamWish::Targets([AxisTarget::Position { state: first, .. }, ..]) = sample.wish else {
             panic!("{:?}", sample.wish)
         };
         first.position

@@ -51,7 +51,8 @@ fn check_reason(seen: &Seen<'_>, reason: &StopReason) -> Result<(), String> {
             Origin::Axis(axis),
         ) if has_missed_heartbeat(axis) => true,
         (Rule::NodeNotOperational, Origin::Axis(axis)) if has_missed_heartbeat(axis) => {
-            reason.cause == StopCause::Fault(Fault::NodeNotOperational { state: STOPPED })
+            is_troubled(axis)
+                || reason.cause == StopCause::Fault(Fault::NodeNotOperational { state: STOPPED })
         }
         (
             Rule::FollowingError
