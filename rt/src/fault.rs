@@ -3,6 +3,7 @@
 use crate::cia402::OperationMode;
 use crate::frame::Id;
 use crate::stop_category::StopCategory;
+use crate::time::Nanoseconds;
 
 /// What made the group stop without anybody asking for it. Lengths are in rad (m for a linear axis) and their derivatives.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -185,6 +186,15 @@ pub enum Fault {
         /// As many are too many.
         limit: u32,
     },
+    /// A call of the owner's callback has taken longer than it may.
+    CallbackOverrun {
+        /// How long it took.
+        spent_ns: Nanoseconds,
+        /// How long it may take.
+        budget_ns: Nanoseconds,
+    },
+    /// The owner's callback has panicked.
+    CallbackPanicked,
 }
 
 /// What is broken by a fault, without the numbers: the key of a configuration and the number of a recording.
@@ -245,12 +255,16 @@ pub enum Rule {
     BusErrorPassive = 25,
     /// [`Fault::ImplausibleFeedback`].
     ImplausibleFeedback = 26,
+    /// [`Fault::CallbackOverrun`].
+    CallbackOverrun = 27,
+    /// [`Fault::CallbackPanicked`].
+    CallbackPanicked = 28,
     /// [`Fault::NoTorqueInMode`].
-    NoTorqueInMode = 27,
+    NoTorqueInMode = 29,
     /// [`Fault::StiffnessLimit`].
-    StiffnessLimit = 28,
+    StiffnessLimit = 30,
     /// [`Fault::DampingLimit`].
-    DampingLimit = 29,
+    DampingLimit = 31,
 }
 
 impl Fault {
@@ -286,6 +300,8 @@ impl Fault {
             Self::DuplicateNode { .. } => Rule::DuplicateNode,
             Self::ForeignMaster { .. } => Rule::ForeignMaster,
             Self::TimingUnfit { .. } => Rule::TimingUnfit,
+            Self::CallbackOverrun { .. } => Rule::CallbackOverrun,
+            Self::CallbackPanicked => Rule::CallbackPanicked,
         }
     }
 
@@ -319,7 +335,12 @@ impl Fault {
             Self::NodeNotOperational { state } => (state.into(), 0.0),
             Self::DuplicateNode { node } => (node.into(), 0.0),
             Self::ForeignMaster { id } => (id.value().into(), 0.0),
-            Self::NoTrajectory | Self::BusLost | Self::BusErrorPassive | Self::UnexpectedBootUp => (0.0, 0.0),
+            Self::CallbackOverrun { spent_ns, budget_ns } => (spent_ns as f64, budget_ns as f64),
+            Self::NoTrajectory
+            | Self::BusLost
+            | Self::BusErrorPassive
+            | Self::UnexpectedBootUp
+            | Self::CallbackPanicked => (0.0, 0.0),
         }
     }
 
@@ -362,13 +383,17 @@ impl Fault {
             Rule::DuplicateNode => Self::DuplicateNode { node: seen as u8 },
             Rule::ForeignMaster => Self::ForeignMaster { id: Id::base(seen as u32).ok()? },
             Rule::TimingUnfit => Self::TimingUnfit { missed: seen as u32, limit: allowed as u32 },
+            Rule::CallbackOverrun => {
+                Self::CallbackOverrun { spent_ns: seen as u64, budget_ns: allowed as u64 }
+            }
+            Rule::CallbackPanicked => Self::CallbackPanicked,
         })
     }
 }
 
 impl Rule {
     /// Every rule, in the order of their numbers.
-    pub const ALL: [Self; 30] = [
+    pub const ALL: [Self; 32] = [
         Self::Requested,
         Self::NotFinite,
         Self::PositionLimit,
@@ -396,6 +421,8 @@ impl Rule {
         Self::JerkLimit,
         Self::BusErrorPassive,
         Self::ImplausibleFeedback,
+        Self::CallbackOverrun,
+        Self::CallbackPanicked,
         Self::NoTorqueInMode,
         Self::StiffnessLimit,
         Self::DampingLimit,
@@ -431,6 +458,8 @@ impl Rule {
             Self::JerkLimit => "jerk_limit",
             Self::BusErrorPassive => "bus_error_passive",
             Self::ImplausibleFeedback => "implausible_feedback",
+            Self::CallbackOverrun => "callback_overrun",
+            Self::CallbackPanicked => "callback_panicked",
             Self::NoTorqueInMode => "no_torque_in_mode",
             Self::StiffnessLimit => "stiffness_limit",
             Self::DampingLimit => "damping_limit",
@@ -454,7 +483,9 @@ impl Rule {
             | Self::NoTorqueInMode
             | Self::StiffnessLimit
             | Self::DampingLimit
-            | Self::BusErrorPassive => StopCategory::Two,
+            | Self::BusErrorPassive
+            | Self::CallbackOverrun
+            | Self::CallbackPanicked => StopCategory::Two,
             Self::FollowingError
             | Self::MissedFeedback
             | Self::DriveFault

@@ -91,8 +91,9 @@ pub use request::{
     RequestError, RequestId, RequestKind, RequestTarget, TrajectoryId,
 };
 pub use source::{
-    AxisPoint, AxisTarget, Follow, LookAhead, LookAheadParameters, POINTS_AT_MOST, PathTime, PointError,
-    PointRole, Polynomial, PositionPoint, StreamCounts, StreamDelay, StreamPoint, StreamReport, StreamSample,
+    AxisPoint, AxisTarget, CallbackCycle, CallbackId, CallbackOutcome, CallbackReturn, CallbackRun, Follow,
+    LookAhead, LookAheadParameters, POINTS_AT_MOST, PathTime, PointError, PointRole, Polynomial,
+    PositionPoint, PositionSequence, StreamCounts, StreamDelay, StreamPoint, StreamReport, StreamSample,
     StreamState, StreamWish, TimeLawPhase, TrajectorySample, TrajectoryView, follow, follow_velocity,
 };
 pub use stop::{Origin, StopCategories, StopCause, StopReason};

@@ -44,6 +44,7 @@ use crate::guard::FollowingErrorGuard;
 use crate::host::AxisSnapshot;
 use crate::pdo::{CommandSlot, FeedbackSlot, MAX_PDOS, ProcessImage};
 use crate::record::AxisRecord;
+use crate::source::Follow;
 use crate::watch::{DuplicateNodeDetector, NodeMonitor};
 
 use controlword::ControlwordSender;
@@ -73,7 +74,9 @@ pub struct Axis {
     command: ProcessImage,
     feedback: ProcessImage,
     set_points: SetPoints,
-    /// Where the axis rests while a stream has run dry.
+    /// What is done with a target beyond the limits, by what leads the axis now.
+    follow: Follow,
+    /// Where the axis rests while a stream has run dry, or a callback commands nothing.
     stream_rest: f64,
     torque_loop: TorqueLoop,
     profile: ProfileMode,
@@ -101,6 +104,7 @@ impl Axis {
         let mut command = ProcessImage::default();
         command.set(CommandSlot::OperationMode, parameters.law.operation_mode() as i32);
         Self {
+            follow: parameters.follow,
             parameters,
             command,
             feedback: ProcessImage::default(),

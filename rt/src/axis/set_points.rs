@@ -115,7 +115,7 @@ impl Axis {
     /// Gives the newest set-point the velocity and the acceleration that its steps show, where a stream was followed exactly:
     /// what it said of its velocity may be wrong, where it has led is known. Whatever is planned from now on goes on from that.
     pub fn derive_from_steps(&mut self, period_s: f64) {
-        if self.is_profile() || self.parameters.follow == Follow::Smooth {
+        if self.is_profile() || self.follow == Follow::Smooth {
             return;
         }
         self.set_points.refine_newest(self.state_by_steps(period_s));

@@ -47,6 +47,11 @@ impl Axis {
         }
     }
 
+    /// From now on targets beyond the limits are treated so; `None` as it is configured.
+    pub fn follow_as(&mut self, follow: Option<Follow>) {
+        self.follow = follow.unwrap_or(self.parameters.follow);
+    }
+
     /// The next set-point on the way to where the axis rests while a stream has run dry.
     ///
     /// # Errors
@@ -140,7 +145,7 @@ impl Axis {
     }
 
     fn led_to(&self, wanted: &State, period_s: f64) -> Result<State, Fault> {
-        match self.parameters.follow {
+        match self.follow {
             Follow::Smooth => self.followed(wanted, period_s),
             Follow::Exact => self.exact(wanted, period_s),
         }
@@ -148,7 +153,7 @@ impl Axis {
 
     fn led_by(&self, velocity: f64, acceleration: f64, period_s: f64) -> Result<State, Fault> {
         let here = self.set_point();
-        match self.parameters.follow {
+        match self.follow {
             Follow::Smooth => {
                 follow_velocity(&here, velocity, acceleration, &self.parameters.limits, period_s)
                     .map_err(|error| fault_of(&error, velocity))

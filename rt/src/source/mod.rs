@@ -1,4 +1,4 @@
-//! Where set-points come from when neither holding nor a move makes them: streams and trajectories.
+//! Where set-points come from when neither holding nor a move makes them: streams, trajectories and callbacks.
 //!
 //! ```text
 //! points, stamped ──▶ LookAhead ── interpolation, some delay behind ──▶ StreamSample ──▶ follow ──▶ set-point
@@ -11,9 +11,11 @@
 //! - `axis_piece`: what an axis is to do between two points, and `interpolation`: the motion between positions;
 //! - `follower`: the next set-point of an axis on its way to what is wanted, within every limit;
 //! - `velocity`: the same on its way to a velocity;
-//! - `trajectory`: set-points that were checked as a whole before they begin.
+//! - `trajectory`: set-points that were checked as a whole before they begin;
+//! - `callback`: the owner's function in the real-time thread.
 
 mod axis_piece;
+mod callback;
 mod delay;
 mod follower;
 mod interpolation;
@@ -22,6 +24,9 @@ mod target;
 mod trajectory;
 mod velocity;
 
+pub use callback::{
+    CallbackCycle, CallbackId, CallbackOutcome, CallbackReturn, CallbackRun, PositionSequence,
+};
 pub use delay::StreamDelay;
 pub use follower::follow;
 pub use look_ahead::{LookAhead, LookAheadParameters, POINTS_AT_MOST, PointError};
