@@ -255,16 +255,16 @@ pub enum Rule {
     BusErrorPassive = 25,
     /// [`Fault::ImplausibleFeedback`].
     ImplausibleFeedback = 26,
-    /// [`Fault::NoTorqueInMode`].
-    NoTorqueInMode = 27,
-    /// [`Fault::StiffnessLimit`].
-    StiffnessLimit = 28,
-    /// [`Fault::DampingLimit`].
-    DampingLimit = 29,
     /// [`Fault::CallbackOverrun`].
-    CallbackOverrun = 30,
+    CallbackOverrun = 27,
     /// [`Fault::CallbackPanicked`].
-    CallbackPanicked = 31,
+    CallbackPanicked = 28,
+    /// [`Fault::NoTorqueInMode`].
+    NoTorqueInMode = 29,
+    /// [`Fault::StiffnessLimit`].
+    StiffnessLimit = 30,
+    /// [`Fault::DampingLimit`].
+    DampingLimit = 31,
 }
 
 impl Fault {
@@ -421,11 +421,11 @@ impl Rule {
         Self::JerkLimit,
         Self::BusErrorPassive,
         Self::ImplausibleFeedback,
+        Self::CallbackOverrun,
+        Self::CallbackPanicked,
         Self::NoTorqueInMode,
         Self::StiffnessLimit,
         Self::DampingLimit,
-        Self::CallbackOverrun,
-        Self::CallbackPanicked,
     ];
 
     /// Its word in configurations and reports.
@@ -458,11 +458,11 @@ impl Rule {
             Self::JerkLimit => "jerk_limit",
             Self::BusErrorPassive => "bus_error_passive",
             Self::ImplausibleFeedback => "implausible_feedback",
+            Self::CallbackOverrun => "callback_overrun",
+            Self::CallbackPanicked => "callback_panicked",
             Self::NoTorqueInMode => "no_torque_in_mode",
             Self::StiffnessLimit => "stiffness_limit",
             Self::DampingLimit => "damping_limit",
-            Self::CallbackOverrun => "callback_overrun",
-            Self::CallbackPanicked => "callback_panicked",
         }
     }
 

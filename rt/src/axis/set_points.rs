@@ -12,6 +12,9 @@ use crate::source::Follow;
 
 /// How far the velocity of a joint on a spring may overshoot its limit.
 const VELOCITY_OVERSHOOT: f64 = 1.2;
+/// A velocity that is too high for a stop in time is made lower by this factor, down to this share of it.
+const SLOWED_DOWN: f64 = 0.9;
+const SLOWEST_SHARE: f64 = 0.01;
 /// Cycles from the report of a joint to the first set-point of a stop that it is reason for.
 const REACTION_CYCLES: f64 = 3.0;
 
@@ -199,12 +202,35 @@ impl Axis {
         self.following.clear();
     }
 
-    /// Lets the set-point begin anew where the joint is, as fast as that moves.
+    /// Lets the set-point begin anew where the joint is, as fast as that moves, but for what no stop within the limits would
+    /// end in time.
     pub(super) fn begin_on_joint(&mut self, period_s: f64) {
-        let fastest = self.parameters.limits.velocity;
-        let velocity = self.joint.velocity().clamp(-fastest, fastest);
-        self.set_points.begin_at(self.joint.position(), velocity, period_s);
+        let limits = &self.parameters.limits;
+        let position = self.joint.position();
+        let mut velocity = self.joint.velocity().clamp(-limits.velocity, limits.velocity);
+        let slowest = velocity.abs() * SLOWEST_SHARE;
+        while velocity != 0.0
+            && self.beyond_limit(position, velocity, period_s).is_some_and(|(_, by)| by > 0.0)
+        {
+            velocity = if velocity.abs() > slowest { velocity * SLOWED_DOWN } else { 0.0 };
+        }
+        self.set_points.begin_at(position, velocity, period_s);
         self.following.clear();
+    }
+
+    /// Where a joint would rest that is stopped now, and by how much that is beyond its position limit; `None` where it stands.
+    /// A stop begins ahead of the report by the cycles that it takes to be obeyed.
+    fn beyond_limit(&self, position: f64, velocity: f64, period_s: f64) -> Option<(f64, f64)> {
+        let limits = &self.parameters.limits;
+        let begin = position + REACTION_CYCLES * velocity * period_s;
+        let way = braking_distance(limits, velocity.abs(), 0.0);
+        if velocity > 0.0 {
+            Some((begin + way, begin + way - limits.position_max))
+        } else if velocity < 0.0 {
+            Some((begin - way, limits.position_min - (begin - way)))
+        } else {
+            None
+        }
     }
 
     /// Checks the next set-point against the guard; and where the joint need not be on its set-point, the joint too.
@@ -231,19 +257,13 @@ impl Axis {
         if velocity.abs() > fastest {
             return Err(Fault::VelocityLimit { velocity, limit: fastest });
         }
-        // A stop begins ahead of the report by the cycles that it takes to be obeyed.
-        let begin = position + REACTION_CYCLES * velocity * period_s;
-        let way = braking_distance(limits, velocity.abs(), 0.0);
-        let (rest, limit) = if velocity > 0.0 {
-            (begin + way, limits.position_max)
-        } else {
-            (begin - way, limits.position_min)
-        };
-        let beyond = if velocity > 0.0 { rest - limit } else { limit - rest };
-        if velocity != 0.0 && beyond > room {
-            return Err(Fault::PositionLimit { position: rest, limit });
+        match self.beyond_limit(position, velocity, period_s) {
+            Some((rest, by)) if by > room => {
+                let limit = if velocity > 0.0 { limits.position_max } else { limits.position_min };
+                Err(Fault::PositionLimit { position: rest, limit })
+            }
+            _ => Ok(()),
         }
-        Ok(())
     }
 
     /// Checks the next set-point of a stream, beyond [`Axis::check`].
