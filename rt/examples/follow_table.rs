@@ -18,8 +18,8 @@ use rsruckig::prelude::{InputParameter, OutputParameter, ThrowErrorHandler};
 use rsruckig::trackig::{TargetState, Trackig};
 use takt_rt::plan::State;
 use takt_rt::{
-    AxisLimits, AxisPoint, LookAhead, LookAheadParameters, MAX_AXES, PointRole, Request, StreamDelay,
-    StreamPoint,
+    AxisLimits, AxisPoint, LookAhead, LookAheadParameters, MAX_AXES, PointRole, PositionPoint, Request,
+    StreamDelay, StreamPoint,
 };
 
 #[path = "../tests/fixture/mod.rs"]
@@ -130,7 +130,7 @@ struct Arrival {
     at_s: f64,
     stamp_s: f64,
     role: PointRole,
-    axis: AxisPoint,
+    axis: PositionPoint,
 }
 
 fn arrivals(motion: &Motion, says_velocity: bool, rate_hz: f64, way: Way) -> Vec<Arrival> {
@@ -139,7 +139,7 @@ fn arrivals(motion: &Motion, says_velocity: bool, rate_hz: f64, way: Way) -> Vec
     let axis = |time_s: f64| {
         let state = (motion.at)(time_s);
         let velocity = says_velocity.then_some(state.velocity);
-        AxisPoint { position: state.position, velocity, acceleration: None }
+        PositionPoint { position: state.position, velocity, acceleration: None }
     };
     let mut all = vec![];
     if way == Way::Chunks {
@@ -220,7 +220,8 @@ fn followed(motion: &Motion, arrivals: &[Arrival]) -> (Followed, Vec<f64>) {
         let now_ns = begun_ns + u64::from(cycle) * PERIOD_NS;
         while let Some(arrival) = waiting.next_if(|arrival| arrival.at_s <= time_s) {
             let at_ns = begun_ns + (arrival.stamp_s * 1e9).round() as u64;
-            let point = StreamPoint { at_ns, role: arrival.role, axes: [arrival.axis; MAX_AXES] };
+            let point =
+                StreamPoint { at_ns, role: arrival.role, axes: [AxisPoint::motion(arrival.axis); MAX_AXES] };
             if let Some(points) = &mut rig.host.points {
                 // One that comes too late is counted.
                 let _ = points.insert(&point, now_ns);

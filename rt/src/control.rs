@@ -100,6 +100,33 @@ pub struct LoopInput {
     pub velocity: f64,
 }
 
+/// What makes the torque of an axis. rad and N·m, or m and N.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum TorqueDemand {
+    /// The loop of the control law, or that of the drive.
+    Law {
+        /// What is fed forward beside it.
+        torque: f64,
+    },
+    /// The loop of the control law with another spring and damper.
+    Impedance {
+        /// N·m/rad
+        stiffness: f64,
+        /// N·m·s/rad
+        damping: f64,
+        /// What is fed forward beside it.
+        torque: f64,
+    },
+    /// No loop: this torque.
+    Torque(f64),
+}
+
+impl Default for TorqueDemand {
+    fn default() -> Self {
+        Self::Law { torque: 0.0 }
+    }
+}
+
 impl ControlLaw {
     /// Checks that every gain is a finite number, and not negative.
     pub fn validate(&self) -> Result<(), GainError> {
@@ -148,30 +175,42 @@ impl ControlLaw {
         }
     }
 
-    /// The target of this cycle in drive units, and the torque (N·m, N) that is commanded with it, 0 where none is.
+    /// The torque (N·m, N) that is commanded beside the loops of the drive: where it closes them all, what is fed forward.
+    pub fn torque(&self, input: &LoopInput, demand: &TorqueDemand) -> f64 {
+        let (stiffness, damping, fed_forward) = match (*self, *demand) {
+            (_, TorqueDemand::Torque(torque)) => return torque,
+            (Self::Torque { stiffness, damping, .. }, TorqueDemand::Law { torque }) => {
+                (stiffness, damping, torque)
+            }
+            (_, TorqueDemand::Impedance { stiffness, damping, torque }) => (stiffness, damping, torque),
+            (_, TorqueDemand::Law { torque }) => (0.0, 0.0, torque),
+        };
+        let Self::Torque { inertia, viscous_friction, coulomb_friction, .. } = *self else {
+            return fed_forward;
+        };
+        let direction = (input.set.velocity / COULOMB_FADE).clamp(-1.0, 1.0);
+        stiffness * (input.due.position - input.position)
+            + damping * (input.due.velocity - input.velocity)
+            + inertia * input.set.acceleration
+            + viscous_friction * input.set.velocity
+            + coulomb_friction * direction
+            + fed_forward
+    }
+
+    /// The target of this cycle in drive units, with the torque that is commanded.
     /// In a profile mode the set-point itself is not for the wire: see `profile`.
-    pub fn target(&self, input: &LoopInput, scale: &Scale, limits: &AxisLimits) -> (i32, f64) {
+    pub fn target(&self, input: &LoopInput, torque: f64, scale: &Scale, limits: &AxisLimits) -> i32 {
         match *self {
             Self::Position | Self::Interpolated | Self::ProfilePosition => {
-                (scale.position_to_counts(input.set.position), 0.0)
+                scale.position_to_counts(input.set.position)
             }
-            Self::ProfileVelocity => (scale.velocity_to_drive(input.set.velocity), 0.0),
-            Self::ProfileTorque => (0, 0.0),
+            Self::ProfileVelocity => scale.velocity_to_drive(input.set.velocity),
+            Self::ProfileTorque => 0,
             Self::Velocity { position_gain } => {
                 let velocity = input.set.velocity + position_gain * (input.due.position - input.position);
-                let velocity = velocity.clamp(-limits.velocity, limits.velocity);
-                (scale.velocity_to_drive(velocity), 0.0)
+                scale.velocity_to_drive(velocity.clamp(-limits.velocity, limits.velocity))
             }
-            Self::Torque { stiffness, damping, inertia, viscous_friction, coulomb_friction } => {
-                let direction = (input.set.velocity / COULOMB_FADE).clamp(-1.0, 1.0);
-                let torque = stiffness * (input.due.position - input.position)
-                    + damping * (input.due.velocity - input.velocity)
-                    + inertia * input.set.acceleration
-                    + viscous_friction * input.set.velocity
-                    + coulomb_friction * direction;
-                let torque = torque.clamp(-limits.torque, limits.torque);
-                (scale.torque_to_per_mille(torque), torque)
-            }
+            Self::Torque { .. } => scale.torque_to_per_mille(torque),
         }
     }
 
@@ -227,15 +266,19 @@ mod tests {
     #[test]
     fn the_velocity_loop_adds_the_position_error_to_the_feed_forward() {
         let law = ControlLaw::Velocity { position_gain: 10.0 };
-        let (raw, _) = law.target(&input(0.01, 0.5), &scale(), &LIMITS);
+        let raw = law.target(&input(0.01, 0.5), 0.0, &scale(), &LIMITS);
         assert_eq!(raw, scale().velocity_to_drive(0.6));
     }
 
     #[test]
-    fn velocity_and_torque_are_held_inside_their_limits() {
+    fn the_velocity_is_held_inside_its_limit() {
         let law = ControlLaw::Velocity { position_gain: 10.0 };
-        let (raw, _) = law.target(&input(-5.0, 0.0), &scale(), &LIMITS);
+        let raw = law.target(&input(-5.0, 0.0), 0.0, &scale(), &LIMITS);
         assert_eq!(raw, scale().velocity_to_drive(-2.0));
+    }
+
+    #[test]
+    fn the_torque_loop_takes_its_gains_from_the_law_or_from_the_demand() {
         let law = ControlLaw::Torque {
             stiffness: 1000.0,
             damping: 10.0,
@@ -243,11 +286,23 @@ mod tests {
             viscous_friction: 1.0,
             coulomb_friction: 2.0,
         };
-        let (_, torque) = law.target(&input(1.0, 0.5), &scale(), &LIMITS);
-        assert_eq!(torque, 40.0);
-        let (raw, torque) = law.target(&input(0.01, 0.5), &scale(), &LIMITS);
-        assert!((torque - (10.0 + 5.0 + 0.6 + 0.5 + 2.0)).abs() < 1e-12);
-        assert_eq!(raw, scale().torque_to_per_mille(torque));
+        let input = input(0.01, 0.5);
+        let torque = |demand| law.torque(&input, &demand);
+        let fed_forward = 0.6 + 0.5 + 2.0;
+        assert!((torque(TorqueDemand::default()) - (10.0 + 5.0 + fed_forward)).abs() < 1e-12);
+        assert!((torque(TorqueDemand::Law { torque: -3.0 }) - (12.0 + fed_forward)).abs() < 1e-12);
+        let soft = TorqueDemand::Impedance { stiffness: 100.0, damping: 2.0, torque: 4.0 };
+        assert!((torque(soft) - (1.0 + 1.0 + 4.0 + fed_forward)).abs() < 1e-12);
+        assert_eq!(torque(TorqueDemand::Torque(7.0)), 7.0);
+        assert_eq!(law.target(&input, 7.0, &scale(), &LIMITS), scale().torque_to_per_mille(7.0));
+    }
+
+    #[test]
+    fn where_the_drive_closes_the_loops_only_the_torque_that_is_fed_forward_is_commanded() {
+        let demand = TorqueDemand::Law { torque: 3.0 };
+        for law in [ControlLaw::Position, ControlLaw::Velocity { position_gain: 10.0 }] {
+            assert_eq!(law.torque(&input(0.01, 0.5), &demand), 3.0);
+        }
     }
 
     #[test]

@@ -103,6 +103,26 @@ pub enum Fault {
         /// Object 6060.
         expected: OperationMode,
     },
+    /// A torque or an impedance was wanted of an axis in a mode that has none: only in cyclic synchronous torque the loop is
+    /// closed here.
+    NoTorqueInMode {
+        /// The mode of the axis, object 6060.
+        mode: OperationMode,
+    },
+    /// A stiffness was wanted that is negative, or more than the axis allows.
+    StiffnessLimit {
+        /// N·m/rad.
+        stiffness: f64,
+        /// The highest stiffness.
+        limit: f64,
+    },
+    /// A damping was wanted that is negative, or more than the axis allows.
+    DampingLimit {
+        /// N·m·s/rad.
+        damping: f64,
+        /// The highest damping.
+        limit: f64,
+    },
     /// A drive in profile position does not acknowledge its target.
     NotAcknowledged {
         /// Cycles of its bus.
@@ -239,6 +259,12 @@ pub enum Rule {
     CallbackOverrun = 27,
     /// [`Fault::CallbackPanicked`].
     CallbackPanicked = 28,
+    /// [`Fault::NoTorqueInMode`].
+    NoTorqueInMode = 29,
+    /// [`Fault::StiffnessLimit`].
+    StiffnessLimit = 30,
+    /// [`Fault::DampingLimit`].
+    DampingLimit = 31,
 }
 
 impl Fault {
@@ -258,6 +284,9 @@ impl Fault {
             Self::DriveFault { .. } => Rule::DriveFault,
             Self::DriveDisabled { .. } => Rule::DriveDisabled,
             Self::ModeChanged { .. } => Rule::ModeChanged,
+            Self::NoTorqueInMode { .. } => Rule::NoTorqueInMode,
+            Self::StiffnessLimit { .. } => Rule::StiffnessLimit,
+            Self::DampingLimit { .. } => Rule::DampingLimit,
             Self::NotAcknowledged { .. } => Rule::NotAcknowledged,
             Self::EnableTimeout { .. } => Rule::EnableTimeout,
             Self::NoTrajectory => Rule::NoTrajectory,
@@ -294,6 +323,9 @@ impl Fault {
             Self::DriveFault { error_code: code } | Self::EmergencyMessage { code } => (code.into(), 0.0),
             Self::DriveDisabled { statusword } => (statusword.into(), 0.0),
             Self::ModeChanged { shown, expected } => (shown.into(), (expected as i8).into()),
+            Self::NoTorqueInMode { mode } => ((mode as i8).into(), 0.0),
+            Self::StiffnessLimit { stiffness, limit } => (stiffness, limit),
+            Self::DampingLimit { damping, limit } => (damping, limit),
             Self::StreamNotBegun { cycles, limit }
             | Self::NotAcknowledged { cycles, limit }
             | Self::EnableTimeout { cycles, limit }
@@ -335,6 +367,9 @@ impl Fault {
             Rule::ModeChanged => {
                 Self::ModeChanged { shown: seen as i8, expected: OperationMode::from_number(allowed as i8)? }
             }
+            Rule::NoTorqueInMode => Self::NoTorqueInMode { mode: OperationMode::from_number(seen as i8)? },
+            Rule::StiffnessLimit => Self::StiffnessLimit { stiffness: seen, limit: allowed },
+            Rule::DampingLimit => Self::DampingLimit { damping: seen, limit: allowed },
             Rule::NotAcknowledged => Self::NotAcknowledged { cycles: seen as u32, limit: allowed as u32 },
             Rule::EnableTimeout => Self::EnableTimeout { cycles: seen as u32, limit: allowed as u32 },
             Rule::NoTrajectory => Self::NoTrajectory,
@@ -358,7 +393,7 @@ impl Fault {
 
 impl Rule {
     /// Every rule, in the order of their numbers.
-    pub const ALL: [Self; 29] = [
+    pub const ALL: [Self; 32] = [
         Self::Requested,
         Self::NotFinite,
         Self::PositionLimit,
@@ -388,6 +423,9 @@ impl Rule {
         Self::ImplausibleFeedback,
         Self::CallbackOverrun,
         Self::CallbackPanicked,
+        Self::NoTorqueInMode,
+        Self::StiffnessLimit,
+        Self::DampingLimit,
     ];
 
     /// Its word in configurations and reports.
@@ -422,6 +460,9 @@ impl Rule {
             Self::ImplausibleFeedback => "implausible_feedback",
             Self::CallbackOverrun => "callback_overrun",
             Self::CallbackPanicked => "callback_panicked",
+            Self::NoTorqueInMode => "no_torque_in_mode",
+            Self::StiffnessLimit => "stiffness_limit",
+            Self::DampingLimit => "damping_limit",
         }
     }
 
@@ -439,6 +480,9 @@ impl Rule {
             | Self::NoTrajectory
             | Self::StartPose
             | Self::JerkLimit
+            | Self::NoTorqueInMode
+            | Self::StiffnessLimit
+            | Self::DampingLimit
             | Self::BusErrorPassive
             | Self::CallbackOverrun
             | Self::CallbackPanicked => StopCategory::Two,

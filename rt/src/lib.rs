@@ -60,10 +60,13 @@ mod watch;
 mod wire;
 
 pub use answers::{Answer, Answers};
-pub use axis::{Axis, AxisParameters, AxisParametersError, CommandPdo, FeedbackSince, Jump, Pdo};
+pub use axis::{
+    Axis, AxisParameters, AxisParametersError, CommandPdo, FeedForward, FeedbackSince, Jump, Pdo,
+    TorqueLimits,
+};
 pub use bus_set::BusSet;
 pub use cia402::{Command, DriveState, Goal, OperationMode, controlword, statusword};
-pub use control::{ControlLaw, Gain, GainError, LoopInput};
+pub use control::{ControlLaw, Gain, GainError, LoopInput, TorqueDemand};
 pub use cycle::{Cycle, Flow, SlotPlan};
 pub use dialect::Dialect;
 pub use engine::{
@@ -90,8 +93,8 @@ pub use request::{
 pub use source::{
     AxisPoint, AxisTarget, CallbackCycle, CallbackId, CallbackOutcome, CallbackReturn, CallbackRun, Follow,
     LookAhead, LookAheadParameters, POINTS_AT_MOST, PathTime, PointError, PointRole, Polynomial,
-    PositionSequence, StreamCounts, StreamDelay, StreamPoint, StreamReport, StreamSample, StreamState,
-    StreamWish, TimeLawPhase, TrajectorySample, TrajectoryView, follow,
+    PositionPoint, PositionSequence, StreamCounts, StreamDelay, StreamPoint, StreamReport, StreamSample,
+    StreamState, StreamWish, TimeLawPhase, TrajectorySample, TrajectoryView, follow, follow_velocity,
 };
 pub use stop::{Origin, StopCategories, StopCause, StopReason};
 pub use stop_category::StopCategory;

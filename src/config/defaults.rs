@@ -1,7 +1,7 @@
 //! What holds where a file says nothing. `configs/reference.toml` shows every one of these values, and a test
 //! compares it with them.
 
-use super::model::{Axis, Control, DriveFamily, Feedback, Identity, Limits, PdoMapping, Travel};
+use super::model::{Axis, Compliance, Control, DriveFamily, Feedback, Identity, Limits, PdoMapping, Travel};
 use super::ranges;
 
 /// `[cycle] period`
@@ -70,6 +70,8 @@ pub const MISSED_FEEDBACK_CYCLES: u16 = 5;
 pub const TRANSMISSION_TYPE: u8 = 1;
 /// `[[axis]] feedback_delay`
 pub const FEEDBACK_DELAY_NS: u64 = 20_000;
+/// `[axis.torque_loop] torque_rise`
+pub const TORQUE_RISE_NS: u64 = 100_000_000;
 /// `[[axis]] start_tolerance` of a rotary axis in rad.
 pub const START_TOLERANCE_RAD: f64 = 0.02;
 /// `[[axis]] start_tolerance` of a linear axis in m.
@@ -227,6 +229,15 @@ pub fn target_tolerance(travel: Travel, control: &Control) -> f64 {
         }
         _ => own,
     }
+}
+
+/// `[axis.torque_loop] stiffness_max`, `damping_max` and `torque_rise`: no more than the axis' own loop.
+pub const fn compliance(control: &Control) -> Compliance {
+    let (stiffness_max, damping_max) = match *control {
+        Control::Torque { stiffness, damping, .. } => (stiffness, damping),
+        _ => (0.0, 0.0),
+    };
+    Compliance { stiffness_max, damping_max, torque_rise_ns: TORQUE_RISE_NS }
 }
 
 /// `[axis.simulated] initial_position`: 0, or the limit nearest to it.

@@ -23,7 +23,7 @@
 
 use std::path::PathBuf;
 
-use takt_rt::{Follow, StopCategories, StreamDelay};
+use takt_rt::{FeedForward, Follow, StopCategories, StreamDelay};
 
 use super::defaults;
 use super::model::{
@@ -140,6 +140,8 @@ impl Axis {
             reversed: false,
             zero_counts: 0,
             limits,
+            compliance: defaults::compliance(&control),
+            feed_forward: FeedForward::default(),
             following_error: FollowingError {
                 limit: defaults::following_error(travel),
                 time_ns: defaults::FOLLOWING_ERROR_TIME_NS,
@@ -170,10 +172,12 @@ impl Axis {
         self
     }
 
-    /// The same in another mode. In CST the target tolerance allows for static friction.
+    /// The same in another mode. In CST the target tolerance allows for static friction, and an impedance has the gains of the
+    /// loop at most.
     #[must_use]
     pub fn with_control(mut self, control: Control) -> Self {
         self.control = control;
+        self.compliance = defaults::compliance(&control);
         self.target_tolerance = defaults::target_tolerance(self.travel, &control);
         self
     }
@@ -186,6 +190,7 @@ impl SimulatedJoint {
             inertia: defaults::INERTIA,
             viscous_friction: defaults::VISCOUS_FRICTION,
             coulomb_friction: defaults::COULOMB_FRICTION,
+            gravity: 0.0,
             rated_torque: limits.torque,
             peak_torque: defaults::PEAK_TO_RATED_TORQUE * limits.torque,
             initial_position: defaults::initial_position(limits),

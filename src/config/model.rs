@@ -13,7 +13,7 @@ pub use takt_rt::AxisLimits as Limits;
 pub use takt_rt::ControlLaw as Control;
 use takt_rt::Dialect;
 
-pub use takt_rt::{Follow, StopCategories, StreamDelay};
+pub use takt_rt::{FeedForward, Follow, StopCategories, StreamDelay};
 
 use super::defaults;
 use crate::canopen::dcf::DeviceConfiguration;
@@ -163,6 +163,17 @@ pub enum Interface {
     SocketCan(String),
 }
 
+/// What a source may ask of the torque loop of an axis: of an impedance, and of how fast a torque changes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Compliance {
+    /// The highest stiffness of an impedance: N·m/rad (N/m). Default: that of the axis' own loop; 0 where it has none.
+    pub stiffness_max: f64,
+    /// The highest damping of an impedance: N·m·s/rad (N·s/m). Default: that of the axis' own loop; 0 where it has none.
+    pub damping_max: f64,
+    /// The time in which the torque goes from zero to its limit when a source asks for that. Default 100 ms.
+    pub torque_rise_ns: u64,
+}
+
 /// One axis.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Axis {
@@ -188,6 +199,10 @@ pub struct Axis {
     pub zero_counts: i32,
     /// What may never be exceeded.
     pub limits: Limits,
+    /// What a source may ask of the torque loop. Default: no more than the gains of the axis' own loop.
+    pub compliance: Compliance,
+    /// What is sent to the drive beside its target. Default: nothing.
+    pub feed_forward: FeedForward,
     /// How far the joint may be from its set-point.
     pub following_error: FollowingError,
     /// How far from the joint a stream of set-points may begin: rad (m). Default 0.02 rad or 0.002 m.
@@ -447,6 +462,8 @@ pub struct SimulatedJoint {
     pub viscous_friction: f64,
     /// N·m (N). Default 0.5.
     pub coulomb_friction: f64,
+    /// The torque of gravity a quarter turn from 0, where the joint hangs: N·m (the weight of a linear axis: N). Default 0.
+    pub gravity: f64,
     /// What the drive calls rated torque (object 6076): N·m (N). Default: the torque limit.
     pub rated_torque: f64,
     /// Peak torque: N·m (N). Default: three times the rated torque.

@@ -5,11 +5,12 @@ use std::fmt;
 use arrayvec::ArrayVec;
 use takt_rt::{
     AxisLimits, AxisParameters, BusParameters, CommandPdo, Engine, EngineParameters, FeedbackSince, Follow,
-    GroupParameters, Heartbeat, Id, LookAheadParameters, MAX_AXES, MAX_GROUPS, Mapping, MappingError, Pdo,
-    Scale, ScaleError, ScaleParameters, SetUpError, SlotPlan, TimingLadder,
+    GroupParameters, Heartbeat, Id, LookAheadParameters, MAX_AXES, MAX_GROUPS, Mapping, MappingError,
+    NANOSECONDS_PER_SECOND, Pdo, Scale, ScaleError, ScaleParameters, SetUpError, SlotPlan, TimingLadder,
+    TorqueLimits,
 };
 
-use crate::config::{Axis, Config, ConfigError, DriveFamily, Interface};
+use crate::config::{Axis, Compliance, Config, ConfigError, DriveFamily, Interface};
 use crate::controller::channels::{AxisPlaces, GroupStream};
 use crate::drive::{PdoPlan, ProcessData, yz_aim};
 
@@ -157,6 +158,8 @@ fn axis_parameters(
         law: axis.control,
         scale: scale(axis).map_err(|error| AssembleError::Scale { axis: index, error })?,
         limits: axis.limits,
+        torque_limits: torque_limits(axis),
+        feed_forward: axis.feed_forward,
         start_tolerance: axis.start_tolerance,
         follow: axis.follow,
         // A heartbeat that is a little late is not lost.
@@ -165,6 +168,15 @@ fn axis_parameters(
         following_error_cycles: cycles(axis.following_error.time_ns),
         missed_feedback_cycles: axis.missed_feedback_cycles,
     })
+}
+
+fn torque_limits(axis: &Axis) -> TorqueLimits {
+    let Compliance { stiffness_max, damping_max, torque_rise_ns } = axis.compliance;
+    TorqueLimits {
+        stiffness: stiffness_max,
+        damping: damping_max,
+        rate: axis.limits.torque * NANOSECONDS_PER_SECOND as f64 / torque_rise_ns.max(1) as f64,
+    }
 }
 
 /// Transmission types up to this one answer SYNC (CiA 301, 7.5.2.36).

@@ -1,9 +1,9 @@
 //! The rows of a file as a stream: each handed over when it arrives, stamped with the time that it is meant for.
 
-use takt_rt::{AxisPoint, MAX_AXES, Nanoseconds, PointRole, Snapshot, StreamPoint};
+use takt_rt::{AxisPoint, MAX_AXES, Nanoseconds, PointRole, PositionPoint, Snapshot, StreamPoint};
 
 use super::error::{FileProblem, PlayFileError};
-use super::file::{PlayFile, PlayRow};
+use super::file::{JointPoint, PlayFile, PlayRow};
 use super::groups::PlayedGroup;
 use crate::config::{Axis, Config};
 use crate::controller::channels::AxisPlaces;
@@ -128,10 +128,9 @@ fn check_first(row: &PlayRow, axis: Option<&Axis>, position: f64) -> Result<(), 
 fn batches(rows: &[PlayRow]) -> Vec<Batch> {
     let mut batches: Vec<(Option<u64>, Batch)> = Vec::new();
     for row in rows {
-        let points = row.points.iter().map(|point| AxisPoint {
-            position: point.position,
-            velocity: point.velocity,
-            acceleration: point.acceleration,
+        let points = row.points.iter().map(|point| {
+            let JointPoint { position, velocity, acceleration, .. } = *point;
+            AxisPoint::motion(PositionPoint { position, velocity, acceleration })
         });
         let point = (row.at_s, points.collect());
         let chunk =
@@ -160,7 +159,7 @@ mod tests {
     use super::*;
 
     fn row(arrive_s: f64, at_s: f64, chunk: Option<u64>) -> PlayRow {
-        let points = vec![super::super::file::JointPoint { position: at_s, ..Default::default() }];
+        let points = vec![JointPoint { position: at_s, ..Default::default() }];
         PlayRow { line: 2, arrive_s, at_s, chunk, points }
     }
 
@@ -188,6 +187,6 @@ mod tests {
         let stamps: Vec<u64> = points.iter().map(|point| point.at_ns).collect();
         assert_eq!(stamps, [1_400_000_000, 1_500_000_000]);
         assert_eq!(points[0].role, PointRole::Chunk { is_first: true, is_last: false });
-        assert_eq!((points[0].axes[0].position, points[0].axes[1].position), (7.0, 0.4));
+        assert_eq!((points[0].axes[0], points[0].axes[1]), (7.0.into(), 0.4.into()));
     }
 }

@@ -17,7 +17,7 @@ fn streamed_positions(direction: f64, stops: &[StopCategory]) -> Vec<f64> {
     for cycle in 1..=80 {
         let time_s = f64::from(cycle) * CYCLE_S;
         let mut axes = [AxisPoint::default(); MAX_AXES];
-        axes[0].position = begun + jerk * time_s.powi(3) / 6.0;
+        axes[0] = (begun + jerk * time_s.powi(3) / 6.0).into();
         let at_ns = world.run.snapshot().at_ns;
         world.run.host().streamer().push(&[StreamPoint { at_ns, role: PointRole::Single, axes }]).unwrap();
         world.run_for(1);

@@ -1,6 +1,7 @@
 //! Points that somebody streams: of every kind, rate and disorder.
 
 use takt::config::Config;
+use takt_rt::plan::State;
 use takt_rt::{AxisPoint, MAX_AXES, PointRole, StreamPoint};
 
 use crate::dice::Dice;
@@ -161,14 +162,12 @@ impl ClientStream {
             axes[index] = match self.words {
                 Words::Nothing => AxisPoint::position(position),
                 Words::Velocity => AxisPoint::moving(position, velocity),
-                Words::All => {
-                    AxisPoint { position, velocity: Some(velocity), acceleration: Some(acceleration) }
-                }
-                Words::False => AxisPoint {
+                Words::All => AxisPoint::from(State { position, velocity, acceleration }),
+                Words::False => AxisPoint::from(State {
                     position,
-                    velocity: Some(-3.0 * velocity),
-                    acceleration: Some(1e3 * velocity),
-                },
+                    velocity: -3.0 * velocity,
+                    acceleration: 1e3 * velocity,
+                }),
             };
         }
         axes
@@ -177,8 +176,13 @@ impl ClientStream {
     fn spoil(&mut self, point: &mut StreamPoint) {
         match self.badness {
             Badness::None | Badness::Flood => {}
-            Badness::Leap => point.axes[0].position += self.dice.between(-1.0, 1.0),
-            Badness::NotFinite => point.axes[0].position = f64::NAN,
+            Badness::Leap => {
+                let leap = self.dice.between(-1.0, 1.0);
+                if let AxisPoint::Position { motion, .. } = &mut point.axes[0] {
+                    motion.position += leap;
+                }
+            }
+            Badness::NotFinite => point.axes[0] = f64::NAN.into(),
             Badness::FarStamp => point.at_ns = self.dice.pick(&[0, 1, u64::MAX, u64::MAX / 2]),
         }
     }

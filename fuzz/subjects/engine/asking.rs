@@ -132,7 +132,7 @@ pub fn point(engine: &Engine, now_ns: u64, input: &mut Input<'_>) -> StreamPoint
             AxisPoint::position(axis.set_point().position + step)
         } else {
             let (position, velocity, acceleration) = (input.number(), input.number(), input.number());
-            AxisPoint { position, velocity: Some(velocity), acceleration: Some(acceleration) }
+            AxisPoint::from(plan::State { position, velocity, acceleration })
         };
     }
     StreamPoint { at_ns, role, axes }
@@ -175,7 +175,7 @@ impl Sweep {
         let way = part.powi(3) * (10.0 - 15.0 * part + 6.0 * part * part);
         let mut targets = [AxisTarget::default(); MAX_AXES];
         for (target, (from, by)) in targets.iter_mut().zip(self.from.iter().zip(&self.by)) {
-            *target = AxisTarget::Position(plan::State::rest(from + by * way));
+            *target = AxisTarget::position(plan::State::rest(from + by * way));
         }
         StreamWish::Targets(targets)
     }

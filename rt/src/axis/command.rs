@@ -1,6 +1,7 @@
 //! What is sent to the drive of an axis.
 
 use super::late_reply::SetPointSkip;
+use super::torque_loop::TorqueLoop;
 use super::{Axis, CommandPdo};
 use crate::cia402::{Goal, controlword};
 use crate::control::{ControlLaw, LoopInput};
@@ -29,9 +30,12 @@ impl Axis {
     }
 
     /// The target in drive units, and the torque that is commanded with it.
-    fn target(&self, is_enabled: bool) -> (i32, f64) {
+    fn target(&mut self, is_enabled: bool) -> (i32, f64) {
         let parameters = &self.parameters;
         let law = parameters.law;
+        if !is_enabled {
+            self.torque_loop = TorqueLoop::default();
+        }
         if law.is_profile() {
             return (self.profile.target_raw(), self.profile.torque());
         }
@@ -44,7 +48,11 @@ impl Axis {
             position: self.joint.position(),
             velocity: self.joint.velocity(),
         };
-        law.target(&input, &parameters.scale, &parameters.limits)
+        // Nothing, where an unlimited rate meets a period that is not known: `max` leaves out what is no number.
+        let fade = (parameters.torque_limits.rate * self.reception.cycle_s()).max(0.0);
+        let limit = parameters.limits.torque;
+        let torque = self.torque_loop.next(&law, &input, limit, fade);
+        (law.target(&input, torque, &parameters.scale, &parameters.limits), torque)
     }
 
     /// The set-point of this cycle requests the feedback of a drive that answers set-points, unless it is skipped.

@@ -30,11 +30,23 @@ impl SetPointDelay {
         self.cycles = (cycles as usize).min(LENGTH - 1);
     }
 
+    /// How many cycles set-points wait.
+    pub fn cycles(&self) -> usize {
+        self.cycles
+    }
+
     /// As if the axis had always been there. Only the places in use are written, since this is done in every cycle of an axis
     /// that is not enabled.
     pub fn fill(&mut self, state: State) {
         self.newest = self.cycles;
         self.line.iter_mut().take(self.cycles + 1).for_each(|place| *place = state);
+    }
+
+    /// As if the set-points had always been these: by how many cycles ago they were the newest.
+    pub fn fill_with(&mut self, ago: impl Fn(usize) -> State) {
+        self.newest = self.cycles;
+        let places = self.line.iter_mut().take(self.cycles + 1).rev().enumerate();
+        places.for_each(|(cycles, place)| *place = ago(cycles));
     }
 
     /// Takes the set-point of this cycle.

@@ -1,7 +1,7 @@
 //! One axis: what its drive reported, where it is to be, and the numbers that go onto the wire.
 //!
 //! The parts of an [`Axis`], a file each: `set_points` and `delay` (where it is to be, and the guard),
-//! `stream` (the set-points of a stream),
+//! `stream` (what a source wants, and the set-points that come of it), `torque_loop` (the torque where it is made here),
 //! `profile_mode` (targets instead of set-points), `joint` and `plausibility` (where the joint is), `reception` and
 //! `late_reply` (which feedback has arrived, and in time), `drive_report` (state and errors), `power`, `controlword`,
 //! `sdo_fallback` (the controlword when process data do not arrive), `command` (the frames), `rest` (has the joint stopped).
@@ -35,6 +35,7 @@ mod rest;
 mod sdo_fallback;
 mod set_points;
 mod stream;
+mod torque_loop;
 
 use arrayvec::ArrayVec;
 
@@ -55,9 +56,12 @@ use profile_mode::ProfileMode;
 use reception::Reception;
 use sdo_fallback::SdoFallback;
 use set_points::SetPoints;
+use torque_loop::TorqueLoop;
 
 pub use feedback::Jump;
-pub use parameters::{AxisParameters, AxisParametersError, CommandPdo, FeedbackSince, Pdo};
+pub use parameters::{
+    AxisParameters, AxisParametersError, CommandPdo, FeedForward, FeedbackSince, Pdo, TorqueLimits,
+};
 
 /// Cycles of its bus after which a drive has obeyed a controlword and has said so.
 const SETTLED_CYCLES: u32 = 4;
@@ -74,6 +78,7 @@ pub struct Axis {
     follow: Follow,
     /// Where the axis rests while a stream has run dry, or a callback commands nothing.
     stream_rest: f64,
+    torque_loop: TorqueLoop,
     profile: ProfileMode,
     joint: JointEstimate,
     following: FollowingErrorGuard,
@@ -105,6 +110,7 @@ impl Axis {
             feedback: ProcessImage::default(),
             set_points: SetPoints::default(),
             stream_rest: 0.0,
+            torque_loop: TorqueLoop::default(),
             profile: ProfileMode::default(),
             joint: JointEstimate::default(),
             following,
@@ -179,7 +185,9 @@ impl Axis {
         self.node_monitor.pass();
         self.duplicate_node.pass();
         self.report.pass();
-        if self.feedback_age() == 0 {
+        if self.torque_loop.is_compliant() {
+            self.following.restart();
+        } else if self.feedback_age() == 0 {
             self.following.pass();
         }
     }

@@ -49,6 +49,35 @@ pub enum FeedbackSince {
     CommandPhase,
 }
 
+/// What a source may ask of an axis whose torque is made here. rad and N·m, or m and N.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TorqueLimits {
+    /// The highest stiffness of an impedance: N·m/rad.
+    pub stiffness: f64,
+    /// The highest damping of an impedance: N·m·s/rad.
+    pub damping: f64,
+    /// The highest rate at which the torque follows what is asked for: N·m/s. A change of gains counts, too.
+    pub rate: f64,
+}
+
+impl TorqueLimits {
+    /// No limit at all.
+    pub const NONE: Self = Self { stiffness: f64::INFINITY, damping: f64::INFINITY, rate: f64::INFINITY };
+}
+
+/// What is sent to a drive beside its target, where its process data have room for it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum FeedForward {
+    /// Nothing: zero is sent.
+    #[default]
+    None,
+    /// The velocity of the set-point, as the velocity offset (object 60B1) of a drive that follows positions.
+    Velocity,
+    /// The same, and the torque that a source feeds forward, as the torque offset (object 60B2) of a drive that follows
+    /// positions or velocities.
+    VelocityAndTorque,
+}
+
 /// Everything about an axis that does not change while it runs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AxisParameters {
@@ -75,6 +104,10 @@ pub struct AxisParameters {
     pub scale: Scale,
     /// What it may never be asked to do.
     pub limits: AxisLimits,
+    /// What a source may ask of it where its torque is made here.
+    pub torque_limits: TorqueLimits,
+    /// What is sent beside the target.
+    pub feed_forward: FeedForward,
     /// How far from the joint a stream that is followed exactly may begin (rad or m).
     pub start_tolerance: f64,
     /// What is done with a stream that asks for more than the limits allow.
@@ -106,6 +139,11 @@ pub enum AxisParametersError {
     Limit(LimitError),
     /// A gain is not a number that can be used.
     Gain(GainError),
+    /// A highest stiffness or damping, or the rate of the torque, is negative or no number.
+    TorqueLimit {
+        /// What it is.
+        value: f64,
+    },
     /// The limit of the following error is not a positive number.
     FollowingErrorLimit {
         /// What it is.
@@ -127,6 +165,9 @@ impl core::fmt::Display for AxisParametersError {
             Self::NoPdo => f.write_str("there must be a PDO to the drive and one from it"),
             Self::Limit(error) => error.fmt(f),
             Self::Gain(error) => error.fmt(f),
+            Self::TorqueLimit { value } => {
+                write!(f, "a highest stiffness, damping or rate of the torque must not be negative: {value}")
+            }
             Self::FollowingErrorLimit { value } => {
                 write!(f, "the limit of the following error must be a positive number: {value}")
             }
@@ -148,6 +189,12 @@ impl AxisParameters {
         }
         self.limits.validate().map_err(AxisParametersError::Limit)?;
         self.law.validate().map_err(AxisParametersError::Gain)?;
+        let TorqueLimits { stiffness, damping, rate } = self.torque_limits;
+        if let Some(value) =
+            [stiffness, damping, rate].into_iter().find(|value| value.is_nan() || *value < 0.0)
+        {
+            return Err(AxisParametersError::TorqueLimit { value });
+        }
         let value = self.following_error_limit;
         // An infinite one is no limit, which is allowed; what is no number would be none unseen.
         if value.is_nan() || value <= 0.0 {
@@ -204,6 +251,8 @@ pub(super) mod tests {
                 jerk: f64::INFINITY,
                 torque: 40.0,
             },
+            torque_limits: TorqueLimits::NONE,
+            feed_forward: FeedForward::None,
             start_tolerance: 0.01,
             follow: Follow::Smooth,
             heartbeat_timeout_cycles: None,
@@ -234,6 +283,8 @@ pub(super) mod tests {
             let error = error_of(|axis| axis.following_error_limit = bad);
             assert!(matches!(error, AxisParametersError::FollowingErrorLimit { .. }));
         }
+        let error = error_of(|axis| axis.torque_limits.rate = -1.0);
+        assert_eq!(error, AxisParametersError::TorqueLimit { value: -1.0 });
         let error = error_of(|axis| axis.start_tolerance = f64::NAN);
         assert!(matches!(error, AxisParametersError::StartTolerance { .. }));
     }

@@ -3,11 +3,20 @@
 use super::Axis;
 use super::delay::SetPointDelay;
 use super::power::Power;
+use crate::control::TorqueDemand;
 use crate::fault::Fault;
 use crate::group_trajectory::stop_limits;
-use crate::guard::{self, SetPointSteps};
+use crate::guard::{self, SetPointSteps, braking_distance};
 use crate::plan::{self, Profile, State};
 use crate::source::Follow;
+
+/// How far the velocity of a joint on a spring may overshoot its limit.
+const VELOCITY_OVERSHOOT: f64 = 1.2;
+/// A velocity that is too high for a stop in time is made lower by this factor, down to this share of it.
+const SLOWED_DOWN: f64 = 0.9;
+const SLOWEST_SHARE: f64 = 0.01;
+/// Cycles from the report of a joint to the first set-point of a stop that it is reason for.
+const REACTION_CYCLES: f64 = 3.0;
 
 /// The set-points of an axis, on their way from the source to the drive.
 #[derive(Clone, Debug, Default)]
@@ -57,6 +66,21 @@ impl SetPoints {
         self.newest = [State::rest(position); 3];
         self.delay.fill(self.newest[0]);
         self.sent = self.newest;
+    }
+
+    /// Goes on evenly from where a joint is reported, as if it had always been on its way like that. The set-point that the
+    /// report belongs to was sent two cycles ago.
+    pub(super) fn begin_at(&mut self, position: f64, velocity: f64, period_s: f64) {
+        let delayed = self.delay.cycles() as f64;
+        let ahead = |cycles: f64| State {
+            position: position + velocity * cycles * period_s,
+            velocity,
+            acceleration: 0.0,
+        };
+        let newest = delayed + 2.0;
+        self.newest = [ahead(newest), ahead(newest - 1.0), ahead(newest - 2.0)];
+        self.delay.fill_with(|ago| ahead(newest - ago as f64));
+        self.sent = [ahead(1.0), ahead(0.0), ahead(-1.0)];
     }
 
     /// Rests where the newest set-point is. What waits to be sent is still sent: a drive that obeys although it says otherwise
@@ -178,10 +202,68 @@ impl Axis {
         self.following.clear();
     }
 
-    /// Checks the next set-point against the guard.
+    /// Lets the set-point begin anew where the joint is, as fast as that moves, but for what no stop within the limits would
+    /// end in time.
+    pub(super) fn begin_on_joint(&mut self, period_s: f64) {
+        let limits = &self.parameters.limits;
+        let position = self.joint.position();
+        let mut velocity = self.joint.velocity().clamp(-limits.velocity, limits.velocity);
+        let slowest = velocity.abs() * SLOWEST_SHARE;
+        while velocity != 0.0
+            && self.beyond_limit(position, velocity, period_s).is_some_and(|(_, by)| by > 0.0)
+        {
+            velocity = if velocity.abs() > slowest { velocity * SLOWED_DOWN } else { 0.0 };
+        }
+        self.set_points.begin_at(position, velocity, period_s);
+        self.following.clear();
+    }
+
+    /// Where a joint would rest that is stopped now, and by how much that is beyond its position limit; `None` where it stands.
+    /// A stop begins ahead of the report by the cycles that it takes to be obeyed.
+    fn beyond_limit(&self, position: f64, velocity: f64, period_s: f64) -> Option<(f64, f64)> {
+        let limits = &self.parameters.limits;
+        let begin = position + REACTION_CYCLES * velocity * period_s;
+        let way = braking_distance(limits, velocity.abs(), 0.0);
+        if velocity > 0.0 {
+            Some((begin + way, begin + way - limits.position_max))
+        } else if velocity < 0.0 {
+            Some((begin - way, limits.position_min - (begin - way)))
+        } else {
+            None
+        }
+    }
+
+    /// Checks the next set-point against the guard; and where the joint need not be on its set-point, the joint too.
     pub fn check(&self, next: &State, period_s: f64) -> Result<(), Fault> {
+        match self.torque_loop.demand() {
+            TorqueDemand::Law { .. } => {}
+            TorqueDemand::Impedance { .. } => self.check_joint(
+                VELOCITY_OVERSHOOT * self.parameters.limits.velocity,
+                self.parameters.following_error_limit,
+                period_s,
+            )?,
+            TorqueDemand::Torque(_) => {
+                return self.check_joint(self.parameters.limits.velocity, 0.0, period_s);
+            }
+        }
         let [last, before_last, _] = self.set_points.positions();
         guard::check(&self.parameters.limits, period_s, before_last, last, next)
+    }
+
+    /// Checks that the joint is not too fast, and can still be stopped before its position limits, or so far behind them.
+    fn check_joint(&self, fastest: f64, room: f64, period_s: f64) -> Result<(), Fault> {
+        let limits = &self.parameters.limits;
+        let (position, velocity) = (self.joint.position(), self.joint.velocity());
+        if velocity.abs() > fastest {
+            return Err(Fault::VelocityLimit { velocity, limit: fastest });
+        }
+        match self.beyond_limit(position, velocity, period_s) {
+            Some((rest, by)) if by > room => {
+                let limit = if velocity > 0.0 { limits.position_max } else { limits.position_min };
+                Err(Fault::PositionLimit { position: rest, limit })
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Checks the next set-point of a stream, beyond [`Axis::check`].
@@ -230,8 +312,12 @@ impl Axis {
         self.set_points.set_delay(cycles);
     }
 
-    /// Takes the next set-point. In a profile mode there is none: the target stays.
+    /// Takes the next set-point. In a profile mode there is none: the target stays. Where a torque drives the joint, the
+    /// set-point is on it already.
     pub fn advance(&mut self, next: State) {
+        if self.torque_loop.is_torque() {
+            return;
+        }
         let next = if self.is_profile() { self.shown_set_point() } else { next };
         self.set_points.push(next);
     }

@@ -258,7 +258,10 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
     pub(super) fn plan_stop(&mut self) -> Result<(), PlanError> {
         self.axes.iter_mut().for_each(Axis::begin_stop);
         if matches!(self.group.state, GroupState::Streaming(_) | GroupState::InLoop(_)) {
-            self.axes.iter_mut().for_each(|axis| axis.derive_from_steps(self.shared.period_s));
+            for axis in self.axes.iter_mut() {
+                axis.derive_from_steps(self.shared.period_s);
+                axis.end_stream(self.shared.period_s);
+            }
         }
         self.group.motion.stop(
             &mut self.profiles,

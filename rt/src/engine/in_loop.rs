@@ -36,6 +36,9 @@ pub(super) struct InLoop {
     resting: u32,
 }
 
+/// To come to rest wherever the joint can.
+const HOLD: AxisTarget = AxisTarget::Velocity { velocity: 0.0, acceleration: 0.0 };
+
 const _: () = assert!(MAX_AXES <= u32::BITS as usize, "each axis has a bit");
 
 impl InLoop {
@@ -155,11 +158,12 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
                     axis.streamed(&target, period_s)
                 }
                 None => {
-                    if resting & bit == 0 {
-                        axis.begin_rest(&AxisTarget::Position(axis.set_point()), period_s);
-                    }
+                    let begun = match resting & bit {
+                        0 => axis.begin_rest(&HOLD, period_s),
+                        _ => Ok(()),
+                    };
                     resting |= bit;
-                    axis.resting(period_s)
+                    begun.and_then(|()| axis.resting(period_s))
                 }
             };
             next.push(of_axis.map_err(|fault| (Origin::Axis(axis.number()), fault))?);

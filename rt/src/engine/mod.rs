@@ -152,6 +152,8 @@ pub enum Deadline {
 ///         jerk: 200.0,
 ///         torque: 40.0,
 ///     },
+///     torque_limits: TorqueLimits::NONE,
+///     feed_forward: FeedForward::None,
 ///     start_tolerance: 0.02,
 ///     follow: Follow::Smooth,
 ///     heartbeat_timeout_cycles: None,

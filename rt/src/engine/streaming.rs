@@ -54,7 +54,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
                 self.await_stream()
             }
             // Whoever has begun to lead the axes lets them come to rest.
-            StreamWish::Awaited => self.run_dry(before, |axis| AxisTarget::Position(axis.set_point())),
+            StreamWish::Awaited => self.run_dry(before, |axis| axis.set_point().into()),
             StreamWish::Targets(targets) => {
                 if matches!(before, Stream::Requested | Stream::Awaited) {
                     self.check_start(targets)?;
@@ -71,7 +71,8 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
         if before != Stream::Dry {
             for axis in self.axes.iter_mut() {
                 let last = last_of(axis);
-                axis.begin_rest(&last, self.shared.period_s);
+                axis.begin_rest(&last, self.shared.period_s)
+                    .map_err(|fault| (Origin::Axis(axis.number()), fault))?;
             }
         }
         self.enter_stream(Stream::Dry);
@@ -99,9 +100,10 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
         let first: ArrayVec<State, AXES> = self
             .axes
             .iter()
-            .map(|axis| {
-                let AxisTarget::Position(first) = axis.own(targets);
-                first
+            .map(|axis| match axis.own(targets) {
+                AxisTarget::Position { state, .. } | AxisTarget::Impedance { state, .. } => state,
+                // They begin wherever the joint is.
+                AxisTarget::Velocity { .. } | AxisTarget::Torque(_) => State::rest(axis.position()),
             })
             .collect();
         self.first_fault(&first, |axis, first| match axis.parameters().follow {
@@ -110,10 +112,10 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
         })
     }
 
-    fn stream_to(&mut self, next_of: impl Fn(&Axis, f64) -> Result<State, Fault>) -> Result<(), Failure> {
+    fn stream_to(&mut self, next_of: impl Fn(&mut Axis, f64) -> Result<State, Fault>) -> Result<(), Failure> {
         let period_s = self.shared.period_s;
         let mut next: ArrayVec<State, AXES> = ArrayVec::new();
-        for axis in self.axes.iter() {
+        for axis in self.axes.iter_mut() {
             let is_led = axis.is_enabled() && !axis.is_profile();
             let of_axis = if is_led { next_of(axis, period_s) } else { Ok(axis.set_point()) };
             next.push(of_axis.map_err(|fault| (Origin::Axis(axis.number()), fault))?);

@@ -79,7 +79,7 @@ fn corrected(start: &State, target: &State, limits: &AxisLimits, period_s: f64) 
 }
 
 /// Whether a set-point keeps the limits, and can be stopped within them.
-fn is_safe(start: &State, next: &State, limits: &AxisLimits, period_s: f64) -> bool {
+pub(super) fn is_safe(start: &State, next: &State, limits: &AxisLimits, period_s: f64) -> bool {
     let State { position, velocity, acceleration } = *next;
     let steepest = limits.acceleration.max(limits.deceleration);
     let (rising, falling) = limits.rising_and_falling(velocity);

@@ -6,7 +6,7 @@
 //! shape: behind a step it does not overshoot, and what stands still stays. The limit of a velocity is that of Huynh ("Accurate
 //! monotone cubic interpolation", SIAM J. Numer. Anal. 30, 1993), which flattens no extremum of a smooth motion.
 
-use super::target::AxisPoint;
+use super::target::PositionPoint;
 use crate::guard::AxisLimits;
 use crate::plan::State;
 use crate::time::NANOSECONDS_PER_SECOND;
@@ -16,7 +16,7 @@ pub(super) const WINDOW: usize = 6;
 /// The place of the point with which the interval begins.
 pub(super) const BEGIN: usize = 2;
 /// The place of the point with which it ends.
-const END: usize = BEGIN + 1;
+pub(super) const END: usize = BEGIN + 1;
 
 /// How much larger than the second differences around it an acceleration that is given may be.
 const ACCELERATION_ROOM: f64 = 1.5;
@@ -56,8 +56,21 @@ impl Window {
         }
     }
 
+    /// The same window with fewer points.
+    pub(super) fn narrowed(&self, from: usize, to: usize) -> Self {
+        Self { from: self.from.max(from), to: self.to.min(to), ..*self }
+    }
+
+    /// The motion of an axis that has no position at the beginning of the interval: with which it arrives at its end.
+    pub(super) fn arrival(&self, end: &PositionPoint) -> Piece {
+        let velocity = end.velocity.unwrap_or(0.0);
+        let end = State { position: end.position, velocity, acceleration: 0.0 };
+        let quintic = Quintic { duration_s: self.steps_s[BEGIN], ..Quintic::default() };
+        Piece { is_within_jerk: false, quintic, end, arrival: end }
+    }
+
     /// The motion of an axis with these points through the interval.
-    pub(super) fn piece(&self, points: &[AxisPoint; WINDOW], limits: &AxisLimits) -> Piece {
+    pub(super) fn piece(&self, points: &[PositionPoint; WINDOW], limits: &AxisLimits) -> Piece {
         let differences = Differences::of(self, points);
         let (begin, end) = (differences.knot(BEGIN), differences.knot(END));
         let quintic = Quintic::between(&begin, &end, self.steps_s[BEGIN]);
@@ -167,7 +180,7 @@ fn minmod(a: f64, b: f64) -> f64 {
 /// The divided differences of the positions of an axis.
 struct Differences<'a> {
     window: &'a Window,
-    points: &'a [AxisPoint; WINDOW],
+    points: &'a [PositionPoint; WINDOW],
     /// From each point to the next one: velocities.
     first: [f64; WINDOW - 1],
     /// At each point between two others: half an acceleration. Elsewhere nothing is known.
@@ -175,7 +188,7 @@ struct Differences<'a> {
 }
 
 impl<'a> Differences<'a> {
-    fn of(window: &'a Window, points: &'a [AxisPoint; WINDOW]) -> Self {
+    fn of(window: &'a Window, points: &'a [PositionPoint; WINDOW]) -> Self {
         let mut first = [0.0; WINDOW - 1];
         for ((first, rate), ends) in first.iter_mut().zip(&window.rates).zip(points.windows(2)) {
             if let [begin, end] = ends {

@@ -2,11 +2,11 @@
 
 use arrayvec::ArrayVec;
 
+use super::axis_piece::{AxisPiece, IntervalTime};
 use super::delay::{DelayEstimator, StreamDelay};
-use super::interpolation::{BEGIN, Piece, WINDOW, Window};
-use super::target::{AxisTarget, PointRole, StreamCounts, StreamPoint, StreamSample, StreamWish};
+use super::interpolation::{BEGIN, WINDOW, Window};
+use super::target::{AxisPoint, AxisTarget, PointRole, StreamCounts, StreamPoint, StreamSample, StreamWish};
 use crate::guard::AxisLimits;
-use crate::plan::State;
 use crate::record::MAX_AXES;
 use crate::time::{NANOSECONDS_PER_SECOND, Nanoseconds};
 
@@ -106,7 +106,7 @@ enum Playback {
 ///     let point = StreamPoint { at_ns: 10_000_000 * number as u64, axes, ..StreamPoint::default() };
 ///     stream.insert(&point, 0).unwrap();
 /// }
-/// let StreamWish::Targets([AxisTarget::Position(wanted)]) = stream.sample(145_000_000).wish else { panic!() };
+/// let StreamWish::Targets([AxisTarget::Position { state: wanted, .. }]) = stream.sample(145_000_000).wish else { panic!() };
 /// assert!((wanted.position - 0.0105).abs() < 1e-12 && (wanted.velocity - 0.1).abs() < 1e-12);
 /// ```
 #[derive(Clone, Debug)]
@@ -133,7 +133,7 @@ pub struct LookAhead<const AXES: usize, P> {
     /// How often the points have changed.
     revision: u64,
     /// The motions of the present interval, and for what they were made: the points, and the beginning of the interval.
-    pieces: [Piece; AXES],
+    pieces: [AxisPiece; AXES],
     pieces_of: Option<(u64, Nanoseconds)>,
 }
 
@@ -159,7 +159,7 @@ where
             open_chunk_ns: None,
             counts: StreamCounts::default(),
             revision: 0,
-            pieces: [Piece::default(); AXES],
+            pieces: [AxisPiece::default(); AXES],
             pieces_of: None,
         }
     }
@@ -409,7 +409,7 @@ where
         let mut targets = [AxisTarget::default(); AXES];
         if let Some(point) = self.point(index) {
             for (target, axis) in targets.iter_mut().zip(&point.axes).take(self.limits.len()) {
-                *target = AxisTarget::Position(State::rest(axis.position));
+                *target = axis.at_rest();
             }
         }
         targets
@@ -426,16 +426,15 @@ where
             self.update_pieces(begin);
             self.pieces_of = Some((self.revision, begin_ns));
         }
-        let since_begin_s = played_ns.wrapping_sub(begin_ns) as i64 as f64 / NANOSECONDS_PER_SECOND as f64;
-        let rate = self.delay.time_rate();
+        let seconds = |duration_ns: u64| duration_ns as i64 as f64 / NANOSECONDS_PER_SECOND as f64;
+        let time = IntervalTime {
+            since_begin_s: seconds(played_ns.wrapping_sub(begin_ns)),
+            rate: 1.0 / seconds(self.stamp(begin + 1).wrapping_sub(begin_ns)),
+            time_rate: self.delay.time_rate(),
+        };
         let mut targets = [AxisTarget::default(); AXES];
         for (target, (piece, limits)) in targets.iter_mut().zip(self.pieces.iter().zip(&self.limits)) {
-            let state = piece.state(since_begin_s, limits);
-            *target = AxisTarget::Position(State {
-                position: state.position,
-                velocity: state.velocity * rate,
-                acceleration: state.acceleration * rate * rate,
-            });
+            *target = piece.target(&time, limits);
         }
         targets
     }
@@ -455,12 +454,13 @@ where
         }
         let window = Window::new(&stamps_ns, from, to);
         let storage = self.points.as_ref();
+        let unknown = AxisPoint::default();
         for (axis, (piece, limits)) in self.pieces.iter_mut().zip(&self.limits).enumerate() {
             let points = places.map(|place| {
                 let point = storage.get(place).and_then(|point| point.axes.get(axis));
-                point.copied().unwrap_or_default()
+                point.unwrap_or(&unknown)
             });
-            *piece = window.piece(&points, limits);
+            *piece = AxisPiece::new(&window, &points, limits);
         }
     }
 
@@ -505,7 +505,7 @@ mod tests {
         (0..look_ahead.count).map(|index| {
             let point = look_ahead.point(index).unwrap();
             assert_eq!(point.at_ns, look_ahead.stamp(index));
-            (point.at_ns / MILLISECOND_NS, point.axes[0].position)
+            (point.at_ns / MILLISECOND_NS, point.axes[0].position_point().unwrap().position)
         })
     }
 

@@ -14,9 +14,9 @@ pub enum Follow {
     Exact,
 }
 
-/// What a point of a stream says of one axis. rad (m) and seconds.
+/// What a point says of the position of an axis. rad (m) and seconds.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct AxisPoint {
+pub struct PositionPoint {
     /// Where it is to be.
     pub position: f64,
     /// How fast; `None` takes it from the points beside.
@@ -25,21 +25,132 @@ pub struct AxisPoint {
     pub acceleration: Option<f64>,
 }
 
+impl PositionPoint {
+    fn is_finite(&self) -> bool {
+        let are_finite = |value: Option<f64>| value.is_none_or(f64::is_finite);
+        self.position.is_finite() && are_finite(self.velocity) && are_finite(self.acceleration)
+    }
+}
+
+/// What a point of a stream says of one axis. rad and N·m (m and N), and seconds.
+///
+/// Between two points of the same kind everything changes evenly. Between two of different kinds the axis does what the later
+/// one says.
+///
+/// ```
+/// use takt_rt::AxisPoint;
+///
+/// let stiff = AxisPoint::moving(0.5, 0.1);
+/// let with_gravity = AxisPoint::position(0.5).with_torque(4.0);
+/// let soft = AxisPoint::position(0.5).with_impedance(50.0, 3.0);
+/// let turning = AxisPoint::Velocity(0.2);
+/// let pushing = AxisPoint::Torque(4.0);
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum AxisPoint {
+    /// It is to be somewhere.
+    Position {
+        /// Where, and how it moves there.
+        motion: PositionPoint,
+        /// The torque that is fed forward.
+        torque: f64,
+    },
+    /// It is held at a position by a spring and a damper.
+    Impedance {
+        /// Where, and how that moves.
+        motion: PositionPoint,
+        /// kp: N·m/rad.
+        stiffness: f64,
+        /// kd: N·m·s/rad.
+        damping: f64,
+        /// The torque that is fed forward.
+        torque: f64,
+    },
+    /// It is to move at this velocity.
+    Velocity(f64),
+    /// It is driven by this torque.
+    Torque(f64),
+}
+
 impl AxisPoint {
     /// A position alone.
     pub const fn position(position: f64) -> Self {
-        Self { position, velocity: None, acceleration: None }
+        Self::motion(PositionPoint { position, velocity: None, acceleration: None })
     }
 
     /// A position with its velocity.
     pub const fn moving(position: f64, velocity: f64) -> Self {
-        Self { position, velocity: Some(velocity), acceleration: None }
+        Self::motion(PositionPoint { position, velocity: Some(velocity), acceleration: None })
+    }
+
+    /// A position with what is known of its velocity and acceleration.
+    pub const fn motion(motion: PositionPoint) -> Self {
+        Self::Position { motion, torque: 0.0 }
+    }
+
+    /// The same with this torque: fed forward at a position, in place of the other one at a torque. A velocity has none.
+    #[must_use]
+    pub const fn with_torque(self, torque: f64) -> Self {
+        match self {
+            Self::Position { motion, .. } => Self::Position { motion, torque },
+            Self::Impedance { motion, stiffness, damping, .. } => {
+                Self::Impedance { motion, stiffness, damping, torque }
+            }
+            Self::Velocity(_) => self,
+            Self::Torque(_) => Self::Torque(torque),
+        }
+    }
+
+    /// The same position, held by a spring (kp, N·m/rad) and a damper (kd, N·m·s/rad). What has no position stays as it is.
+    #[must_use]
+    pub const fn with_impedance(self, stiffness: f64, damping: f64) -> Self {
+        match self {
+            Self::Position { motion, torque } | Self::Impedance { motion, torque, .. } => {
+                Self::Impedance { motion, stiffness, damping, torque }
+            }
+            Self::Velocity(_) | Self::Torque(_) => self,
+        }
+    }
+
+    /// What it says of the position, if it says anything of it.
+    pub const fn position_point(&self) -> Option<&PositionPoint> {
+        match self {
+            Self::Position { motion, .. } | Self::Impedance { motion, .. } => Some(motion),
+            Self::Velocity(_) | Self::Torque(_) => None,
+        }
+    }
+
+    /// What it wants of an axis that is to stay as the point has it.
+    pub const fn at_rest(&self) -> AxisTarget {
+        match *self {
+            Self::Position { motion, torque } => {
+                AxisTarget::Position { state: State::rest(motion.position), torque }
+            }
+            Self::Impedance { motion, stiffness, damping, torque } => {
+                let state = State::rest(motion.position);
+                AxisTarget::Impedance { state, stiffness, damping, torque }
+            }
+            Self::Velocity(_) => AxisTarget::Velocity { velocity: 0.0, acceleration: 0.0 },
+            Self::Torque(torque) => AxisTarget::Torque(torque),
+        }
     }
 
     /// Whether every number of it is one.
     pub fn is_finite(&self) -> bool {
-        let are_finite = |value: Option<f64>| value.is_none_or(f64::is_finite);
-        self.position.is_finite() && are_finite(self.velocity) && are_finite(self.acceleration)
+        match self {
+            Self::Position { motion, torque } => motion.is_finite() && torque.is_finite(),
+            Self::Impedance { motion, stiffness, damping, torque } => {
+                let are_finite = stiffness.is_finite() && damping.is_finite() && torque.is_finite();
+                motion.is_finite() && are_finite
+            }
+            Self::Velocity(value) | Self::Torque(value) => value.is_finite(),
+        }
+    }
+}
+
+impl Default for AxisPoint {
+    fn default() -> Self {
+        Self::position(0.0)
     }
 }
 
@@ -51,11 +162,11 @@ impl From<f64> for AxisPoint {
 
 impl From<State> for AxisPoint {
     fn from(state: State) -> Self {
-        Self {
+        Self::motion(PositionPoint {
             position: state.position,
             velocity: Some(state.velocity),
             acceleration: Some(state.acceleration),
-        }
+        })
     }
 }
 
@@ -75,7 +186,7 @@ pub enum PointRole {
     },
 }
 
-/// A point of a stream: where every axis is to be at a time.
+/// A point of a stream: what every axis is to do at a time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StreamPoint<const AXES: usize = MAX_AXES> {
     /// The time that it is meant for.
@@ -92,16 +203,58 @@ impl<const AXES: usize> Default for StreamPoint<AXES> {
     }
 }
 
-/// What a source wants of an axis in one slot.
+/// What a source wants of an axis in one slot. rad and N·m (m and N), and seconds.
+///
+/// A position or a velocity is followed within the limits of velocity, acceleration and jerk, and within those of the position.
+/// An impedance and a torque need an axis whose loop is closed here: cyclic synchronous torque. What changes in a torque or a
+/// gain takes effect at the rate that the axis allows for its torque.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum AxisTarget {
     /// To be in this state of motion at the end of the slot.
-    Position(State),
+    Position {
+        /// Where, how fast, and with what acceleration.
+        state: State,
+        /// The torque that is fed forward.
+        torque: f64,
+    },
+    /// To be held by a spring and a damper at a position that is in this state of motion at the end of the slot.
+    Impedance {
+        /// Where, how fast, and with what acceleration.
+        state: State,
+        /// kp: N·m/rad.
+        stiffness: f64,
+        /// kd: N·m·s/rad.
+        damping: f64,
+        /// The torque that is fed forward.
+        torque: f64,
+    },
+    /// To move like this at the end of the slot.
+    Velocity {
+        /// How fast.
+        velocity: f64,
+        /// With what acceleration.
+        acceleration: f64,
+    },
+    /// To be driven by this torque.
+    Torque(f64),
+}
+
+impl AxisTarget {
+    /// A state of motion, with no torque fed forward.
+    pub const fn position(state: State) -> Self {
+        Self::Position { state, torque: 0.0 }
+    }
+}
+
+impl From<State> for AxisTarget {
+    fn from(state: State) -> Self {
+        Self::position(state)
+    }
 }
 
 impl Default for AxisTarget {
     fn default() -> Self {
-        Self::Position(State::default())
+        Self::position(State::default())
     }
 }
 

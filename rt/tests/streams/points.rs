@@ -4,8 +4,8 @@ use super::super::fixture::{PERIOD_NS, Rig, jerk_limited};
 use proptest::prelude::*;
 use takt_rt::plan::State;
 use takt_rt::{
-    AxisLimits, AxisPoint, Follow, LookAhead, LookAheadParameters, MAX_AXES, Phase, PointRole, Request,
-    StreamDelay, StreamPoint, StreamState,
+    AxisLimits, AxisPoint, Follow, LookAhead, LookAheadParameters, MAX_AXES, Phase, PointRole, PositionPoint,
+    Request, StreamDelay, StreamPoint, StreamState,
 };
 
 const PERIOD_S: f64 = PERIOD_NS as f64 * 1e-9;
@@ -173,7 +173,7 @@ fn what_a_standing_stream_says_of_its_velocity_moves_nothing() {
             // Another one in each point.
             let velocity = Some(velocity * f64::from(number % 7 - 2));
             let time_s = 0.02 * f64::from(number);
-            single(time_s, time_s, AxisPoint { position: 0.0, velocity, acceleration })
+            single(time_s, time_s, AxisPoint::motion(PositionPoint { position: 0.0, velocity, acceleration }))
         };
         let points: Vec<Arrival> = (0..100).map(point).collect();
         let streamed = stream(&points, Follow::Smooth, StreamDelay::Automatic, 1.9);
@@ -323,7 +323,7 @@ proptest! {
             let axis = match says {
                 0 => AxisPoint::position(position),
                 1 => AxisPoint::moving(position, velocity),
-                2 => AxisPoint { acceleration: Some(-1e3 * velocity), ..AxisPoint::moving(position, -5.0 * velocity) },
+                2 => AxisPoint::from(State { position, velocity: -5.0 * velocity, acceleration: -1e3 * velocity }),
                 _ => AxisPoint::from(State { position, velocity, acceleration: 0.0 }),
             };
             let role = match count % (chunk + 1) {

@@ -14,7 +14,8 @@ use super::travel::{counting, travel};
 use crate::canopen::dcf::DeviceConfiguration;
 use crate::config::defaults;
 use crate::config::model::{
-    Axis, DriveFamily, Feedback, Follow, Identity, Interface, Limits, PdoMapping, SimulatedJoint, Travel,
+    Axis, DriveFamily, FeedForward, Feedback, Follow, Identity, Interface, Limits, PdoMapping,
+    SimulatedJoint, Travel,
 };
 use crate::config::problem_kind::ProblemKind;
 use crate::config::quantities::Quantities;
@@ -173,6 +174,8 @@ fn axis(mut section: Section<'_>, machine: &Machine<'_>, earlier: &[ReadAxis]) -
             reversed: counting.reversed,
             zero_counts: counting.zero_counts,
             limits: limits?,
+            compliance: defaults::compliance(&control),
+            feed_forward: FeedForward::default(),
             following_error,
             start_tolerance: start_tolerance.unwrap_or(defaults::start_tolerance(travel)),
             target_tolerance: target_tolerance
@@ -230,6 +233,7 @@ fn simulated(
     let inertia = value("inertia", q.inertia, ranges.inertia);
     let viscous_friction = value("viscous_friction", q.damping, ranges.viscous_friction);
     let coulomb_friction = value("coulomb_friction", q.effort, ranges.friction);
+    let gravity = value("gravity", q.effort, ranges.friction);
     let rated_torque = value("rated_torque", q.effort, ranges.effort);
     let peak_torque = value("peak_torque", q.effort, ranges.effort);
     let power_up_ns = section.get("power_up").and_then(|entry| entry.nanoseconds(ranges::POWER_UP_S));
@@ -246,6 +250,7 @@ fn simulated(
         inertia: inertia.unwrap_or(defaults::INERTIA),
         viscous_friction: viscous_friction.unwrap_or(defaults::VISCOUS_FRICTION),
         coulomb_friction: coulomb_friction.unwrap_or(defaults::COULOMB_FRICTION),
+        gravity: gravity.unwrap_or(0.0),
         rated_torque,
         peak_torque: peak_torque.unwrap_or(defaults::PEAK_TO_RATED_TORQUE * rated_torque),
         initial_position: initial.unwrap_or_else(|| limits.map_or(0.0, defaults::initial_position)),

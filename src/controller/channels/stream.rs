@@ -172,7 +172,7 @@ mod tests {
     }
 
     fn wanted(sample: &StreamSample) -> f64 {
-        let StreamWish::Targets([AxisTarget::Position(first), ..]) = sample.wish else {
+        let StreamWish::Targets([AxisTarget::Position { state: first, .. }, ..]) = sample.wish else {
             panic!("{:?}", sample.wish)
         };
         first.position
@@ -223,7 +223,7 @@ mod tests {
         let (streamer, mut receivers) = stream_channels(&[group(&[2, 0]), group(&[1])]);
         let wanted = |receiver: &mut StreamReceiver, axis: usize| {
             let StreamWish::Targets(targets) = receiver.sample(20 * MILLISECOND_NS).wish else { panic!() };
-            let AxisTarget::Position(state) = targets[axis];
+            let AxisTarget::Position { state, .. } = targets[axis] else { panic!("{targets:?}") };
             state.position
         };
         let point = |at_ms: u64, positions: [f64; 3]| {

@@ -78,6 +78,16 @@ pub fn stop_cause(stop: &StopReason, machine: &Machine) -> String {
             mode(shown.into()),
             mode((expected as i8).into())
         ),
+        Fault::NoTorqueInMode { mode: own } => format!(
+            "a torque or an impedance was wanted of {axis}, which is in {} and takes them in CST alone",
+            mode((own as i8).into())
+        ),
+        Fault::StiffnessLimit { stiffness, limit } => {
+            format!("a stiffness of {stiffness:.3} was wanted of {axis} (allowed: 0 to {limit:.3})")
+        }
+        Fault::DampingLimit { damping, limit } => {
+            format!("a damping of {damping:.3} was wanted of {axis} (allowed: 0 to {limit:.3})")
+        }
         Fault::NotAcknowledged { limit, .. } => {
             format!("the drive of {axis} did not acknowledge its target within {}", cycles(limit))
         }

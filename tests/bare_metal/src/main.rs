@@ -7,9 +7,9 @@ use core::f64::consts::TAU;
 
 use takt_rt::{
     AxisLimits, AxisParameters, BusHealth, BusParameters, BusSet, CommandPdo, ControlLaw, CycleInput,
-    CycleTiming, Deadline, Dialect, Engine, EngineParameters, FeedbackSince, Frame, HostInterface, Id,
+    CycleTiming, Deadline, Dialect, Engine, EngineParameters, FeedForward, FeedbackSince, Frame, HostInterface, Id,
     Follow, MappedObject, Mapping, Pdo, Phase, Received, Request, RequestEnvelope, RequestId, RequestTarget, Scale,
-    ScaleParameters, SendBatch, StopCategories, TimingLadder,
+    ScaleParameters, SendBatch, StopCategories, TimingLadder, TorqueLimits,
 };
 
 // The C library gives the program its entry; nothing else of it is used.
@@ -81,6 +81,8 @@ fn axis() -> Option<AxisParameters> {
             jerk: f64::INFINITY,
             torque: 40.0,
         },
+        torque_limits: TorqueLimits::NONE,
+        feed_forward: FeedForward::None,
         start_tolerance: 0.02,
         follow: Follow::Smooth,
         heartbeat_timeout_cycles: None,
