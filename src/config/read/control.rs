@@ -3,7 +3,7 @@
 use super::section::Section;
 use crate::config::bounds::Bounds;
 use crate::config::defaults;
-use crate::config::model::{Control, DriveFamily, SimulatedJoint};
+use crate::config::model::{Compliance, Control, DriveFamily, SimulatedJoint};
 use crate::config::quantities::Quantities;
 use crate::config::quantity::Quantity;
 use crate::config::ranges;
@@ -12,19 +12,22 @@ use crate::drive::yz_aim;
 
 /// The mode, with the gains of the loop that it needs. The gains of the other loops are read and not used, so that the mode
 /// can be changed in one line. Without the surroundings, whose period could not be read, no loop is judged.
+///
+/// With it comes what a source may ask of the torque loop.
 pub fn control(
     section: &mut Section<'_>,
     drive: Option<DriveFamily>,
     q: Quantities,
     joint: &SimulatedJoint,
     surroundings: Option<&Surroundings>,
-) -> Option<Control> {
+) -> Option<(Control, Compliance)> {
     let period_s =
         surroundings.map_or(defaults::PERIOD_NS, |surroundings| surroundings.period_ns) as f64 / 1e9;
     let mut velocity_section = section.section("velocity_loop");
     let mut torque_section = section.section("torque_loop");
     let velocity_loop = velocity_loop(&mut velocity_section, period_s);
     let (torque_loop, origin) = torque_loop(&mut torque_section, q, joint, period_s).unzip();
+    let asked = AskedCompliance::read(&mut torque_section, q);
     let modes = [
         ("csp", Some(Control::Position)),
         ("csv", velocity_loop),
@@ -58,7 +61,39 @@ pub fn control(
     }
     velocity_section.finish();
     torque_section.finish();
-    control
+    control.map(|control| (control, asked.of(&control)))
+}
+
+/// The limits of what a source may ask of the torque loop, as far as the file gives them.
+struct AskedCompliance {
+    stiffness_max: Option<f64>,
+    damping_max: Option<f64>,
+    torque_rise_ns: Option<u64>,
+}
+
+impl AskedCompliance {
+    fn read(section: &mut Section<'_>, q: Quantities) -> Self {
+        Self {
+            stiffness_max: section
+                .get("stiffness_max")
+                .and_then(|entry| entry.quantity(q.stiffness, q.ranges.stiffness)),
+            damping_max: section
+                .get("damping_max")
+                .and_then(|entry| entry.quantity(q.damping, q.ranges.damping)),
+            torque_rise_ns: section
+                .get("torque_rise")
+                .and_then(|entry| entry.nanoseconds(ranges::TORQUE_RISE_S)),
+        }
+    }
+
+    fn of(&self, control: &Control) -> Compliance {
+        let default = defaults::compliance(control);
+        Compliance {
+            stiffness_max: self.stiffness_max.unwrap_or(default.stiffness_max),
+            damping_max: self.damping_max.unwrap_or(default.damping_max),
+            torque_rise_ns: self.torque_rise_ns.unwrap_or(default.torque_rise_ns),
+        }
+    }
 }
 
 /// `None` where a gain is wrong.

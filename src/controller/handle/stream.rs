@@ -7,6 +7,7 @@ use takt_rt::{AxisPoint, Clock, MAX_AXES, Nanoseconds, PointRole, Request, Strea
 
 use super::Handle;
 use super::error::CommandError;
+use crate::controller::point_check::{PointRefusal, check_point};
 
 /// Why points were not taken; none of them was, then.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -19,15 +20,15 @@ pub enum StreamError {
         /// The axes.
         axes: usize,
     },
-    /// A number is infinite or none.
-    #[error("point {point} has a number that is not finite for axis {axis}: {value:?}")]
-    NotFinite {
+    /// An axis does not take what a point says of it.
+    #[error("axis {axis} does not take point {point}: {reason}")]
+    Refused {
         /// Which point, from 0 on.
         point: usize,
         /// Which axis, from 0 on.
         axis: usize,
-        /// What is given for it.
-        value: AxisPoint,
+        /// Why.
+        reason: PointRefusal,
     },
     /// Too many points wait: the group does not stream, or gets more than it can look ahead.
     #[error("too many points wait for the controller: does it stream?")]
@@ -53,8 +54,8 @@ impl StreamHandle {
         MonotonicClock::default().now_ns()
     }
 
-    /// Takes a point that is meant for a time: a number for each axis, or an [`AxisPoint`] with velocity and acceleration.
-    /// Points may come early, late, and in any order. One with the stamp of another one takes its place.
+    /// Takes a point that is meant for a time: for each axis a position, or an [`AxisPoint`] with more than that, or with something
+    /// else: a velocity, a torque, or an impedance. Points may come early, late, and in any order. One with the stamp of another one takes its place.
     ///
     /// # Errors
     /// See [`StreamError`].
@@ -97,11 +98,9 @@ impl StreamHandle {
         if self.0.0.life.is_ending() {
             return Err(StreamError::Ended);
         }
-        let axes = self.0.axes().len();
         for (number, point) in points.iter().enumerate() {
-            let mut entries = point.axes.iter().take(axes).enumerate();
-            if let Some((axis, value)) = entries.find(|(_, entry)| !entry.is_finite()) {
-                return Err(StreamError::NotFinite { point: number, axis, value: *value });
+            for (axis, entry) in point.axes.iter().enumerate().take(self.0.axes().len()) {
+                self.check(number, axis, entry)?;
             }
         }
         self.0.0.streamer.push(points).map_err(|_| StreamError::Full)
@@ -132,11 +131,14 @@ impl StreamHandle {
         let mut all = [AxisPoint::default(); MAX_AXES];
         for (axis, (to, from)) in all.iter_mut().zip(axes).enumerate() {
             *to = (*from).into();
-            if !to.is_finite() {
-                return Err(StreamError::NotFinite { point, axis, value: *to });
-            }
+            self.check(point, axis, to)?;
         }
         Ok(all)
+    }
+
+    fn check(&self, point: usize, axis: usize, entry: &AxisPoint) -> Result<(), StreamError> {
+        let Some(of_axis) = self.0.axes().get(axis) else { return Ok(()) };
+        check_point(of_axis, entry).map_err(|reason| StreamError::Refused { point, axis, reason })
     }
 }
 
