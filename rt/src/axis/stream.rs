@@ -114,6 +114,9 @@ impl Axis {
         self.check_demand(&demand)?;
         if matches!(demand, TorqueDemand::Law { .. }) && self.torque_loop.is_compliant() {
             self.give_up_compliance(period_s);
+        } else if matches!(demand, TorqueDemand::Torque(_)) && !self.torque_loop.is_torque() {
+            // The set-point leaves for the joint, and with it goes what the loop has made of their distance.
+            self.torque_loop.resume();
         }
         self.torque_loop.set(demand);
         Ok(())
