@@ -51,10 +51,17 @@ pub fn control(
             Some(Control::Velocity { position_gain }) => {
                 loops::velocity_loop(&velocity_section.spot("position_gain"), position_gain, surroundings);
             }
-            Some(Control::Torque { stiffness, damping, inertia, .. }) => {
+            Some(law @ Control::Torque { stiffness, damping, inertia, .. }) => {
                 let gains = TorqueLoop { stiffness, damping, inertia, simulated_inertia: joint.inertia };
                 let origin = origin.unwrap_or(Origin::Gains);
                 gains.check(q, surroundings, |key| torque_section.spot(key), origin);
+                if asked.has_gains() {
+                    // The stiffest spring that a stream may ask for must not swing either.
+                    let Compliance { stiffness_max, damping_max, .. } = asked.of(&law);
+                    let gains = TorqueLoop { stiffness: stiffness_max, damping: damping_max, ..gains };
+                    let at = |key| torque_section.spot(AskedCompliance::key_of(key));
+                    gains.check(q, surroundings, at, Origin::Gains);
+                }
             }
             _ => {}
         }
@@ -83,6 +90,19 @@ impl AskedCompliance {
             torque_rise_ns: section
                 .get("torque_rise")
                 .and_then(|entry| entry.nanoseconds(ranges::TORQUE_RISE_S)),
+        }
+    }
+
+    fn has_gains(&self) -> bool {
+        self.stiffness_max.is_some() || self.damping_max.is_some()
+    }
+
+    /// The key of the highest value of a gain.
+    fn key_of(gain: &'static str) -> &'static str {
+        match gain {
+            "stiffness" => "stiffness_max",
+            "damping" => "damping_max",
+            other => other,
         }
     }
 
