@@ -33,7 +33,7 @@ fn a_torque_moves_the_joint_and_the_stream_that_runs_dry_leaves_it_held() {
     let moving = world.observe(0);
     assert!(moving.velocity > 0.2, "{moving:?}");
     world.run_for(2_000);
-    assert_eq!(world.run.snapshot().stream.state, StreamState::Dry);
+    assert_eq!(world.run.snapshot().groups[0].stream.state, StreamState::Dry);
     let rest = world.observe(0);
     assert!(rest.velocity.abs() < 1e-3 && rest.position < moving.position + 0.3, "{rest:?}");
     stream(&mut world, AxisPoint::Torque(-1.0), 500);
