@@ -45,8 +45,8 @@ pub use config::{Config, ConfigError};
 pub use controller::session::{Session, SessionError, SessionOptions};
 pub use controller::{
     CallbackCommand, CallbackHandle, CallbackOptions, CallbackState, CallbackTimes, CommandError, Controller,
-    Events, GroupHandle, Handle, MotionError, MotionId, MoveOptions, Outcome, Refused, StartFailure, Stopped,
-    StreamError, StreamHandle, TrajectoryProgress, VirtualRun, WaitError,
+    Events, GroupHandle, Handle, MotionError, MotionId, MoveOptions, Outcome, PointRefusal, Refused,
+    StartFailure, Stopped, StreamError, StreamHandle, TrajectoryProgress, VirtualRun, WaitError,
 };
 pub use error::{Error, Result};
 pub use faults::{FaultInjector, Scenario};

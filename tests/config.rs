@@ -296,3 +296,44 @@ fn the_default_heartbeat_is_faster_where_a_drive_would_go_on_moving() {
     }
     assert_eq!(times("csp", "[master]\nheartbeat = \"60 s\""), (Some(60_000), 65_535));
 }
+
+#[test]
+fn what_a_stream_may_ask_of_the_torque_loop_is_that_of_the_loop_unless_it_is_given() {
+    let axis = |keys: &str| with(&format!("mode = \"cst\"\n[axis.torque_loop]\n{keys}")).axes[0].clone();
+    let by_default = axis("bandwidth = 10\n").compliance;
+    assert_eq!((by_default.stiffness_max, by_default.damping_max), (100.0, 20.0));
+    assert_eq!(by_default.torque_rise_ns, 100_000_000);
+    let given = axis("stiffness_max = \"2 kNm/rad\"\ndamping_max = 90\ntorque_rise = \"20 ms\"\n").compliance;
+    assert_eq!((given.stiffness_max, given.damping_max, given.torque_rise_ns), (2000.0, 90.0, 20_000_000));
+}
+
+#[test]
+fn a_stream_may_not_be_allowed_to_make_a_loop_swing() {
+    let text = format!("{SMALL}\nmode = \"cst\"\n[axis.torque_loop]\nstiffness_max = 1000000\n");
+    let error = format!("{:?}", Config::parse("small.toml", &text).unwrap_err().problems());
+    assert!(error.contains("axis.torque_loop.stiffness_max"), "{error}");
+}
+
+#[test]
+fn what_is_fed_forward_goes_into_the_process_data() {
+    use takt::drive::ProcessData;
+    let lengths = |mode: &str, feed_forward: &str| -> Vec<usize> {
+        let keys = format!("mode = {mode:?}\nfeed_forward = {feed_forward:?}");
+        let config = with(&keys);
+        ProcessData::of(&config.axes[0]).commands.iter().map(|pdo| pdo.length()).collect()
+    };
+    assert_eq!(lengths("csp", "none"), [6]);
+    assert_eq!(lengths("csp", "torque"), [8]);
+    assert_eq!(lengths("csp", "velocity"), [6, 4]);
+    assert_eq!(lengths("csp", "velocity-and-torque"), [8, 4]);
+    assert_eq!(lengths("csv", "velocity-and-torque"), [8]);
+    assert_eq!(lengths("cst", "velocity-and-torque"), [4]);
+    assert_eq!(lengths("pp", "velocity-and-torque"), [6]);
+}
+
+#[test]
+fn a_drive_whose_process_data_are_fixed_takes_nothing_beside_its_target() {
+    let text = SMALL.replace("erob-canopen", "yz-aim") + "\nfeed_forward = \"torque\"\n";
+    let error = format!("{:?}", Config::parse("small.toml", &text).unwrap_err().problems());
+    assert!(error.contains("axis.feed_forward"), "{error}");
+}

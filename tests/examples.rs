@@ -15,6 +15,7 @@ macro_rules! programs {
 
 programs! {
     after_a_stop: "../examples/after_a_stop.rs",
+    compliance: "../examples/compliance.rs",
     config_in_code: "../examples/config_in_code.rs",
     embed: "../examples/embed.rs",
     gravity_compensation: "../examples/gravity_compensation.rs",
@@ -37,6 +38,11 @@ fn config(name: &str) -> Config {
 #[test]
 fn the_first_program_moves_an_arm() {
     embed::run(config("arm6-erob.toml")).unwrap();
+}
+
+#[test]
+fn a_joint_is_soft_then_driven_by_a_torque_and_then_turns() {
+    compliance::run(config("erob-modes/erob-cst.toml")).unwrap();
 }
 
 #[test]

@@ -9,8 +9,8 @@ use takt::rt::RequestKind;
 use takt::rt::linux::{Policy, Step};
 use takt::{
     CommandError, Config, Controller, DriveState, Event, EventKind, Events, Handle, MotionError, MoveOptions,
-    Outcome, Phase, Rule, SessionOptions, Snapshot, StartFailure, StopCategory, StreamError, StreamHandle,
-    StreamState, WaitError,
+    Outcome, Phase, PointRefusal, Rule, SessionOptions, Snapshot, StartFailure, StopCategory, StreamError,
+    StreamHandle, StreamState, WaitError,
 };
 
 const PATIENCE: Duration = Duration::from_secs(30);
@@ -514,7 +514,10 @@ fn points_from_two_threads_are_followed_and_the_end_of_them_is_reported() {
         assert!((axis.position_set - home - 0.05).abs() < 5e-3, "{} from {home}", axis.position_set);
     }
     assert!(matches!(arm.stream().push_now(&[0.0; 5]), Err(StreamError::Count { given: 5, axes: 6 })));
-    assert!(matches!(arm.stream().push_now(&[f64::NAN; 6]), Err(StreamError::NotFinite { axis: 0, .. })));
+    assert!(matches!(
+        arm.stream().push_now(&[f64::NAN; 6]),
+        Err(StreamError::Refused { axis: 0, reason: PointRefusal::NotFinite { .. }, .. })
+    ));
     arm.stop(StopCategory::Two).unwrap();
     assert_eq!(arm.wait_for(Phase::Holding, PATIENCE), Ok(()));
 }

@@ -417,6 +417,53 @@ fn an_interruption_stops_the_arm_in_control() {
     assert_eq!(json(&output)["stop"]["category"], 2);
 }
 
+/// The swing with a torque that is fed forward, in the arm's configuration with one line replaced.
+fn with_torques(place: &Place, line: [&str; 2], torque: &str) -> Output {
+    let config = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/arm6-erob.toml");
+    let text = fs::read_to_string(config).unwrap().replacen(line[0], line[1], 1);
+    fs::write(place.path("arm.toml"), text).unwrap();
+    let rows = swinging().replace("joint3\n", "joint3,joint3.torque\n");
+    let with = |line: &str| if line.contains("joint") { line.to_owned() } else { format!("{line},{torque}") };
+    place.write(rows.lines().map(with).collect::<Vec<_>>().join("\n"));
+    Command::new(env!("CARGO_BIN_EXE_takt"))
+        .arg("play")
+        .args([place.path("arm.toml"), place.path("points.csv")])
+        .args(["--virtual", "--json"])
+        .current_dir(place.folder.path())
+        .stdin(Stdio::null())
+        .output()
+        .unwrap()
+}
+
+#[test]
+fn a_column_of_torques_is_fed_forward_where_the_drive_takes_it() {
+    let place = Place::new();
+    for line in [
+        ["mode = \"csp\"", "mode = \"cst\""],
+        ["mode = \"csp\"", "mode = \"csp\"\nfeed_forward = \"torque\""],
+    ] {
+        let output = with_torques(&place, line, "3");
+        assert_eq!(output.status.code(), Some(0), "{output:?}");
+        assert_eq!(json(&output)["stop"], Value::Null);
+    }
+}
+
+#[test]
+fn a_torque_that_a_joint_does_not_take_is_named_with_its_line_the_joint_and_what_is_allowed() {
+    let place = Place::new();
+    let as_it_is = ["mode = \"csp\"", "mode = \"csp\""];
+    let torque_loop = ["mode = \"csp\"", "mode = \"cst\""];
+    for (line, torque, words) in [
+        (as_it_is, "3", "feed_forward = \\\"torque\\\""),
+        (torque_loop, "88", "a torque of 88 is beyond the limit of 87"),
+    ] {
+        let output = with_torques(&place, line, torque);
+        assert_eq!(output.status.code(), Some(2), "{output:?}");
+        let said = String::from_utf8(output.stdout).unwrap();
+        assert!(said.contains(words) && said.contains("joint3"), "{said}");
+    }
+}
+
 /// An arm of three joints and a finger, each a group, whose drives follow positions.
 fn arm_and_finger(place: &Place) -> PathBuf {
     let text = include_str!("../configs/arm-and-gripper.toml").replace("mode = \"pt\" ", "mode = \"csp\"");

@@ -72,8 +72,10 @@ pub enum CommandSlot {
     TargetVelocity,
     /// 6071
     TargetTorque,
-    /// 60B1 and 60B2, the offsets of velocity and torque: there are none, and zero is sent.
-    Offset,
+    /// 60B1
+    VelocityOffset,
+    /// 60B2
+    TorqueOffset,
     /// An object without a value. A gap in a mapping is filled with zero, anything else is refused.
     Zero,
 }
@@ -109,7 +111,8 @@ impl CommandSlot {
             (0x607A, 0) => Self::TargetPosition,
             (0x60FF, 0) => Self::TargetVelocity,
             (0x6071, 0) => Self::TargetTorque,
-            (0x60B1 | 0x60B2, 0) => Self::Offset,
+            (0x60B1, 0) => Self::VelocityOffset,
+            (0x60B2, 0) => Self::TorqueOffset,
             _ => Self::Zero,
         }
     }

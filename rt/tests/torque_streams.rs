@@ -85,6 +85,26 @@ fn a_torque_is_reached_at_its_rate_and_drives_the_joint() {
 }
 
 #[test]
+fn a_torque_begins_from_what_the_position_loop_has_made_against_a_load() {
+    let mut rig = streaming();
+    rig.stream(0.0, 0.0);
+    rig.drive(0).load = -16.0;
+    rig.run(1_000);
+    rig.host.records.clear();
+    rig.stream_target(AxisTarget::Torque(16.0));
+    rig.run(200);
+    assert_torque_steps_within(&rig, RATE * PERIOD_S * 1.001);
+    assert_eq!((torque(&rig), causes(&rig)), (16.0, vec![]));
+    // And back, where only the set-point that begins anew can be felt.
+    rig.host.records.clear();
+    rig.stream_target(AxisTarget::Torque(10.0));
+    rig.run(50);
+    rig.request(Request::Stop(StopCategory::Two));
+    rig.run(1_000);
+    assert_torque_steps_within(&rig, 2.5);
+}
+
+#[test]
 fn a_joint_that_a_torque_drives_is_stopped_before_its_position_limit() {
     for sign in [1.0, -1.0] {
         let mut rig = streaming();

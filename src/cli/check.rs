@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use clap::Args;
 use serde::Serialize;
 use takt::bus::schedule::{self, BusSchedule};
-use takt::config::{Axis, Config, Control, Travel};
+use takt::config::{Axis, Compliance, Config, Control, FeedForward, Travel};
 
 use super::exit::Exit;
 use super::print;
@@ -71,6 +71,10 @@ struct AxisCheck {
     torque: f64,
     following_error: f64,
     following_error_time_ns: u64,
+    /// What is sent beside the target.
+    feed_forward: &'static str,
+    /// What a stream may ask of the torque loop; `None` where it is not closed here.
+    compliance: Option<ComplianceCheck>,
     /// How far off its target a program may leave it.
     target_tolerance: f64,
     /// What it does when the controller is gone.
@@ -82,6 +86,27 @@ struct AxisCheck {
     counts_per_cycle: f64,
     /// The lowest and the highest count within the limits.
     counts_range: [f64; 2],
+}
+
+/// What a stream may ask of a torque loop that is closed here, in N·m (N), rad (m) and seconds.
+#[derive(Clone, PartialEq, Serialize)]
+struct ComplianceCheck {
+    stiffness_max: f64,
+    damping_max: f64,
+    /// How fast the torque follows what is asked for.
+    torque_rate: f64,
+}
+
+impl ComplianceCheck {
+    fn of(axis: &Axis) -> Option<Self> {
+        let Compliance { stiffness_max, damping_max, torque_rise_ns } = axis.compliance;
+        let torque_rate = axis.limits.torque / (torque_rise_ns.max(1) as f64 / 1e9);
+        matches!(axis.control, Control::Torque { .. }).then_some(Self {
+            stiffness_max,
+            damping_max,
+            torque_rate,
+        })
+    }
 }
 
 impl Check {
@@ -130,6 +155,13 @@ impl AxisCheck {
             torque: axis.limits.torque,
             following_error: axis.following_error.limit,
             following_error_time_ns: axis.following_error.time_ns,
+            feed_forward: match axis.feed_forward {
+                FeedForward::None => "none",
+                FeedForward::Velocity => "velocity",
+                FeedForward::Torque => "torque",
+                FeedForward::VelocityAndTorque => "velocity-and-torque",
+            },
+            compliance: ComplianceCheck::of(axis),
             target_tolerance: axis.target_tolerance,
             without_controller: Unattended::of(axis, config),
             counts_per_unit,

@@ -47,6 +47,8 @@ pub const TRANSMISSION_TYPE: Range<i64> = 1..256;
 pub const MISSED_FEEDBACK_CYCLES: Range<i64> = 1..1001;
 /// `axis.feedback_delay`, in seconds.
 pub const FEEDBACK_DELAY_S: RangeInclusive<f64> = 0.0..=0.01;
+/// `axis.torque_loop.torque_rise`, in seconds.
+pub const TORQUE_RISE_S: RangeInclusive<f64> = 0.001..=10.0;
 /// `axis.following_error.time`, in seconds.
 pub const FOLLOWING_ERROR_TIME_S: RangeInclusive<f64> = 0.0..=10.0;
 /// `axis.simulated.power_up`, in seconds.

@@ -5,6 +5,7 @@ pub mod assemble;
 pub mod channels;
 mod handle;
 mod outcome;
+mod point_check;
 mod program;
 pub mod realtime_thread;
 pub mod session;
@@ -20,6 +21,7 @@ pub use handle::{
     WaitError,
 };
 pub use outcome::{Interrupt, Outcome, Progress};
+pub use point_check::{PointRefusal, check_point};
 pub use program::{ProgramRunner, ProgramStep};
 pub use supervisor::Supervisor;
 pub use virtual_time::{VirtualClock, VirtualRun};

@@ -233,7 +233,8 @@ fn ratings(list: &mut StepList, axis: &Axis) {
         "ratings",
         "torque cannot be commanded without the drive's rated torque: choose another control mode",
     );
-    let is_torque_sent = axis.control.target_slot() == CommandSlot::TargetTorque;
+    let is_torque_sent =
+        axis.control.target_slot() == CommandSlot::TargetTorque || axis.feed_forward.has_torque();
     let torque = if is_torque_sent { Check::Positive } else { Check::Any };
     list.read(objects::MOTOR_RATED_CURRENT, Check::Any, Fact::RatedCurrent);
     list.read(objects::MOTOR_RATED_TORQUE, torque, Fact::RatedTorque);

@@ -12,6 +12,8 @@ const CONTROLWORD: MappedObject = MappedObject::new(0x6040, 0, 16);
 const TARGET_POSITION: MappedObject = MappedObject::new(0x607A, 0, 32);
 const TARGET_VELOCITY: MappedObject = MappedObject::new(0x60FF, 0, 32);
 const TARGET_TORQUE: MappedObject = MappedObject::new(0x6071, 0, 16);
+const VELOCITY_OFFSET: MappedObject = MappedObject::new(0x60B1, 0, 32);
+const TORQUE_OFFSET: MappedObject = MappedObject::new(0x60B2, 0, 16);
 const OPERATION_MODE: MappedObject = MappedObject::new(0x6060, 0, 8);
 const STATUSWORD: MappedObject = MappedObject::new(0x6041, 0, 16);
 const POSITION: MappedObject = MappedObject::new(0x6064, 0, 32);
@@ -82,7 +84,19 @@ impl ProcessData {
             CommandSlot::TargetTorque => TARGET_TORQUE,
             _ => TARGET_POSITION,
         };
-        vec![CONTROLWORD, target]
+        let (follows_position, follows_torque) = (target == TARGET_POSITION, target == TARGET_TORQUE);
+        let mut objects = vec![CONTROLWORD, target];
+        if axis.control.is_profile() {
+            return objects;
+        }
+        // It fits beside the target.
+        if axis.feed_forward.has_torque() && !follows_torque {
+            objects.push(TORQUE_OFFSET);
+        }
+        if axis.feed_forward.has_velocity() && follows_position {
+            objects.push(VELOCITY_OFFSET);
+        }
+        objects
     }
 
     /// The objects that a drive with free mapping must send in every cycle.
@@ -90,20 +104,10 @@ impl ProcessData {
         [STATUSWORD, POSITION].into_iter().chain(axis.feedback.iter().copied().map(mapped)).collect()
     }
 
-    /// Maps a drive with free mapping: the command in one PDO, the feedback in as many as it needs, statusword and
+    /// Maps a drive with free mapping: command and feedback in as many PDOs as they need, controlword and target, statusword and
     /// position first.
     fn mapped_freely(axis: &Axis) -> Self {
-        let mut feedback = vec![vec![]];
-        for object in Self::needed_feedback(axis) {
-            let used: u32 =
-                feedback.last().into_iter().flatten().map(|o: &MappedObject| u32::from(o.bits)).sum();
-            if used + u32::from(object.bits) > PDO_BITS {
-                feedback.push(vec![]);
-            }
-            if let Some(objects) = feedback.last_mut() {
-                objects.push(object);
-            }
-        }
+        let (commands, feedback) = (packed(Self::needed_commands(axis)), packed(Self::needed_feedback(axis)));
         let transmission_type = axis.transmission_type;
         let receive = |number, objects| PdoPlan {
             transmission_type,
@@ -114,7 +118,7 @@ impl ProcessData {
             ..pdo(PdoDirection::Transmit, number, axis.node, objects, TransmissionType::EveryCycle)
         };
         Self {
-            commands: vec![receive(1, Self::needed_commands(axis))],
+            commands: (1..).zip(commands).map(|(number, objects)| receive(number, objects)).collect(),
             feedback: (1..).zip(feedback).map(transmit).collect(),
             unused: vec![],
         }
@@ -175,6 +179,21 @@ impl ProcessData {
             self.commands.iter().find(|command| command.transmission == TransmissionType::EveryCycle)?;
         self.unused.iter().find(|pdo| pdo.number == command.number)
     }
+}
+
+/// Objects in their order in as few PDOs as that takes.
+fn packed(objects: Vec<MappedObject>) -> Vec<Vec<MappedObject>> {
+    let mut pdos: Vec<Vec<MappedObject>> = vec![vec![]];
+    for object in objects {
+        let used: u32 = pdos.last().into_iter().flatten().map(|object| u32::from(object.bits)).sum();
+        if used + u32::from(object.bits) > PDO_BITS {
+            pdos.push(vec![]);
+        }
+        if let Some(last) = pdos.last_mut() {
+            last.push(object);
+        }
+    }
+    pdos
 }
 
 fn pdo(

@@ -255,7 +255,8 @@ fn check_values(pdo: &PdoConfiguration, needed: &[MappedObject]) -> Result<(), M
                 CommandSlot::OperationMode
                     | CommandSlot::TargetVelocity
                     | CommandSlot::TargetTorque
-                    | CommandSlot::Offset
+                    | CommandSlot::VelocityOffset
+                    | CommandSlot::TorqueOffset
             )
     };
     match pdo.objects.iter().find(|object| !has_value(object)) {

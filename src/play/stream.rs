@@ -7,6 +7,7 @@ use super::file::{JointPoint, PlayFile, PlayRow};
 use super::groups::PlayedGroup;
 use crate::config::{Axis, Config};
 use crate::controller::channels::AxisPlaces;
+use crate::controller::check_point;
 
 /// Nanoseconds in a second, to and from the seconds of a file.
 const NANOSECONDS: f64 = 1e9;
@@ -35,12 +36,13 @@ impl FileStream {
     /// Takes the rows of a file. A chunk arrives with its last row.
     ///
     /// # Errors
-    /// A column of torques, which no stream takes so far, or a first point outside the position limits.
+    /// A point that its axis does not take, as one with a torque where none is fed forward, or a first point outside the
+    /// position limits.
     pub fn new(file: &PlayFile, config: &Config) -> Result<Self, PlayFileError> {
-        if file.torque_column.is_some() {
-            let words = "streams take no torques so far".to_owned();
-            let problem = FileProblem::Rows { joint: None, words };
-            return Err(PlayFileError { line: 1, column: file.torque_column, problem });
+        for row in &file.rows {
+            for (joint, point) in file.joints.iter().zip(&row.points) {
+                check(row, config.axes.get(joint.axis), point)?;
+            }
         }
         let mut first = vec![None; config.axes.len()];
         let earliest = file.rows.iter().min_by(|one, other| one.at_s.total_cmp(&other.at_s));
@@ -113,6 +115,20 @@ impl FileStream {
     }
 }
 
+fn check(row: &PlayRow, axis: Option<&Axis>, point: &JointPoint) -> Result<(), PlayFileError> {
+    let Some(axis) = axis else { return Ok(()) };
+    check_point(axis, &point_of(point)).map_err(|reason| {
+        let problem = FileProblem::Rows { joint: Some(axis.name.clone()), words: reason.to_string() };
+        PlayFileError { line: row.line, column: None, problem }
+    })
+}
+
+/// What a stream gets of a row for a joint. Its torque is fed forward.
+fn point_of(point: &JointPoint) -> AxisPoint {
+    let JointPoint { position, velocity, acceleration, torque } = *point;
+    AxisPoint::motion(PositionPoint { position, velocity, acceleration }).with_torque(torque.unwrap_or(0.0))
+}
+
 /// The arm is led to the first point, so that it must be within the limits.
 fn check_first(row: &PlayRow, axis: Option<&Axis>, position: f64) -> Result<(), PlayFileError> {
     let Some(axis) = axis.filter(|axis| !axis.limits.contain(position)) else { return Ok(()) };
@@ -128,11 +144,7 @@ fn check_first(row: &PlayRow, axis: Option<&Axis>, position: f64) -> Result<(), 
 fn batches(rows: &[PlayRow]) -> Vec<Batch> {
     let mut batches: Vec<(Option<u64>, Batch)> = Vec::new();
     for row in rows {
-        let points = row.points.iter().map(|point| {
-            let JointPoint { position, velocity, acceleration, .. } = *point;
-            AxisPoint::motion(PositionPoint { position, velocity, acceleration })
-        });
-        let point = (row.at_s, points.collect());
+        let point = (row.at_s, row.points.iter().map(point_of).collect());
         let chunk =
             row.chunk.and_then(|chunk| batches.iter_mut().rev().find(|(other, _)| *other == Some(chunk)));
         match chunk {

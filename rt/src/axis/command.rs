@@ -2,7 +2,7 @@
 
 use super::late_reply::SetPointSkip;
 use super::torque_loop::TorqueLoop;
-use super::{Axis, CommandPdo};
+use super::{Axis, AxisParameters, CommandPdo, FeedForward};
 use crate::cia402::{Goal, controlword};
 use crate::control::{ControlLaw, LoopInput};
 use crate::frame::Frame;
@@ -35,6 +35,8 @@ impl Axis {
         let law = parameters.law;
         if !is_enabled {
             self.torque_loop = TorqueLoop::default();
+            self.command.set(CommandSlot::VelocityOffset, 0);
+            self.command.set(CommandSlot::TorqueOffset, 0);
         }
         if law.is_profile() {
             return (self.profile.target_raw(), self.profile.torque());
@@ -52,7 +54,25 @@ impl Axis {
         let fade = (parameters.torque_limits.rate * self.reception.cycle_s()).max(0.0);
         let limit = parameters.limits.torque;
         let torque = self.torque_loop.next(&law, &input, limit, fade);
-        (law.target(&input, torque, &parameters.scale, &parameters.limits), torque)
+        let raw = law.target(&input, torque, &parameters.scale, &parameters.limits);
+        if parameters.feed_forward != FeedForward::None {
+            self.set_offsets(input.set.velocity, torque);
+        }
+        (raw, torque)
+    }
+
+    /// Sets what the drive adds in its own loops: its velocity loop has the velocity of the set-point already where it follows
+    /// velocities, and its torque loop the torque where it follows torques.
+    fn set_offsets(&mut self, velocity: f64, torque: f64) {
+        let AxisParameters { law, feed_forward, scale, .. } = &self.parameters;
+        let follows_position = law.target_slot() == CommandSlot::TargetPosition;
+        let follows_torque = law.target_slot() == CommandSlot::TargetTorque;
+        if feed_forward.has_velocity() && follows_position {
+            self.command.set(CommandSlot::VelocityOffset, scale.velocity_to_drive(velocity));
+        }
+        if feed_forward.has_torque() && !follows_torque {
+            self.command.set(CommandSlot::TorqueOffset, scale.torque_to_per_mille(torque));
+        }
     }
 
     /// The set-point of this cycle requests the feedback of a drive that answers set-points, unless it is skipped.

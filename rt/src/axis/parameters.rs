@@ -73,9 +73,23 @@ pub enum FeedForward {
     None,
     /// The velocity of the set-point, as the velocity offset (object 60B1) of a drive that follows positions.
     Velocity,
-    /// The same, and the torque that a source feeds forward, as the torque offset (object 60B2) of a drive that follows
-    /// positions or velocities.
+    /// The torque that a source feeds forward, as the torque offset (object 60B2) of a drive that follows positions or
+    /// velocities.
+    Torque,
+    /// Both.
     VelocityAndTorque,
+}
+
+impl FeedForward {
+    /// Whether the velocity of the set-point is sent.
+    pub const fn has_velocity(self) -> bool {
+        matches!(self, Self::Velocity | Self::VelocityAndTorque)
+    }
+
+    /// Whether a torque that is fed forward is sent.
+    pub const fn has_torque(self) -> bool {
+        matches!(self, Self::Torque | Self::VelocityAndTorque)
+    }
 }
 
 /// Everything about an axis that does not change while it runs.

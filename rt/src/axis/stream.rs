@@ -28,7 +28,7 @@ impl Axis {
     pub fn streamed(&mut self, target: &AxisTarget, period_s: f64) -> Result<State, Fault> {
         match *target {
             AxisTarget::Position { ref state, torque } => {
-                self.set_demand(TorqueDemand::Law { torque }, period_s)?;
+                self.set_demand(self.fed_forward(torque), period_s)?;
                 self.led_to(state, period_s)
             }
             AxisTarget::Impedance { ref state, stiffness, damping, torque } => {
@@ -69,7 +69,7 @@ impl Axis {
     pub fn begin_rest(&mut self, last: &AxisTarget, period_s: f64) -> Result<(), Fault> {
         self.derive_from_steps(period_s);
         let (demand, last) = match *last {
-            AxisTarget::Position { state, torque } => (TorqueDemand::Law { torque }, Some(state.position)),
+            AxisTarget::Position { state, torque } => (self.fed_forward(torque), Some(state.position)),
             AxisTarget::Impedance { state, stiffness, damping, torque } => {
                 (TorqueDemand::Impedance { stiffness, damping, torque }, Some(state.position))
             }
@@ -100,6 +100,13 @@ impl Axis {
         self.torque_loop.set(TorqueDemand::default());
     }
 
+    /// The law with a torque beside it, where that goes anywhere. What is no number is left to the check.
+    fn fed_forward(&self, torque: f64) -> TorqueDemand {
+        let is_taken = matches!(self.parameters.law, ControlLaw::Torque { .. })
+            || self.parameters.feed_forward.has_torque();
+        TorqueDemand::Law { torque: if is_taken || !torque.is_finite() { torque } else { 0.0 } }
+    }
+
     fn set_demand(&mut self, demand: TorqueDemand, period_s: f64) -> Result<(), Fault> {
         if demand == *self.torque_loop.demand() {
             return Ok(());
@@ -107,6 +114,9 @@ impl Axis {
         self.check_demand(&demand)?;
         if matches!(demand, TorqueDemand::Law { .. }) && self.torque_loop.is_compliant() {
             self.give_up_compliance(period_s);
+        } else if matches!(demand, TorqueDemand::Torque(_)) && !self.torque_loop.is_torque() {
+            // The set-point leaves for the joint, and with it goes what the loop has made of their distance.
+            self.torque_loop.resume();
         }
         self.torque_loop.set(demand);
         Ok(())

@@ -7,7 +7,7 @@ use takt::bus::schedule::{BusSchedule, MessageSchedule};
 use takt::config::{Bus, Config};
 use takt::printable::printable_path;
 
-use super::{AxisCheck, Check};
+use super::{AxisCheck, Check, ComplianceCheck};
 use crate::cli::table::Table;
 
 /// The whole text.
@@ -22,7 +22,11 @@ pub fn whole(check: &Check, config: &Config) -> String {
         automatic(check),
     );
     let axes = alike(&check.axes, is_shown_alike);
-    let _ = write!(text, "\nLimits\n{}\nUnits\n{}", limits_table(&axes), units_table(&axes));
+    let _ = write!(text, "\nLimits\n{}", limits_table(&axes));
+    if let Some(table) = torque_table(&axes) {
+        let _ = write!(text, "\nTorque that streams may ask for\n{table}");
+    }
+    let _ = write!(text, "\nUnits\n{}", units_table(&axes));
     let _ = write!(
         text,
         "\nIf the controller is gone at full speed (kill -9, a broken cable)\n{}",
@@ -148,6 +152,33 @@ fn limits_table(axes: &[&[AxisCheck]]) -> Table {
         ]);
     }
     table
+}
+
+/// The axes of which a stream may want a torque, an impedance, or a torque that is fed forward; `None` without one.
+fn torque_table(axes: &[&[AxisCheck]]) -> Option<Table> {
+    let mut table =
+        Table::new(["axis", "as", "sent beside the target", ">stiffness", ">damping", ">torque per second"]);
+    let mut has_rows = false;
+    for (group, axis) in axes.iter().filter_map(|group| Some((group, group.first()?))) {
+        let number = |of: fn(&ComplianceCheck) -> f64| {
+            axis.compliance
+                .as_ref()
+                .map_or(String::new(), |compliance| format!("up to {:.1}", of(compliance)))
+        };
+        if axis.compliance.is_none() && axis.feed_forward == "none" {
+            continue;
+        }
+        has_rows = true;
+        table.row([
+            counted_span(group.iter().map(|axis| axis.name.as_str())),
+            if axis.compliance.is_some() { "target" } else { "offset" }.to_owned(),
+            axis.feed_forward.to_owned(),
+            number(|compliance| compliance.stiffness_max),
+            number(|compliance| compliance.damping_max),
+            number(|compliance| compliance.torque_rate),
+        ]);
+    }
+    has_rows.then_some(table)
 }
 
 fn units_table(axes: &[&[AxisCheck]]) -> Table {

@@ -129,7 +129,7 @@ fn axis(mut section: Section<'_>, machine: &Machine<'_>, earlier: &[ReadAxis]) -
         let is_simulated = interface == Some(&Interface::Simulated);
         Surroundings::new(period_ns, transmission_type, simulated.inertia, is_simulated)
     });
-    let control = control(&mut section, drive, q, &simulated, surroundings.as_ref());
+    let (control, compliance) = control(&mut section, drive, q, &simulated, surroundings.as_ref()).unzip();
     if drive == Some(DriveFamily::YzAim) {
         if let (Some(control), Some(period_ns), Some(bus)) = (control, period_ns, machine.bus(bus)) {
             rules::axis::interpolation_period(&bus.spot, control, period_ns);
@@ -141,6 +141,7 @@ fn axis(mut section: Section<'_>, machine: &Machine<'_>, earlier: &[ReadAxis]) -
     }
     let mapping = mapping(&mut section, drive);
     let feedback = feedback(&mut section, drive, mapping);
+    let feed_forward = feed_forward(&mut section, drive);
     let answers_sync = boolean(&mut section, "answers_sync", defaults::ANSWERS_SYNC);
     let mut tolerance =
         |key| section.get(key).and_then(|entry: Entry<'_>| entry.quantity(q.position, q.ranges.deviation));
@@ -174,8 +175,8 @@ fn axis(mut section: Section<'_>, machine: &Machine<'_>, earlier: &[ReadAxis]) -
             reversed: counting.reversed,
             zero_counts: counting.zero_counts,
             limits: limits?,
-            compliance: defaults::compliance(&control),
-            feed_forward: FeedForward::default(),
+            compliance: compliance?,
+            feed_forward,
             following_error,
             start_tolerance: start_tolerance.unwrap_or(defaults::start_tolerance(travel)),
             target_tolerance: target_tolerance
@@ -282,6 +283,21 @@ fn feedback(section: &mut Section<'_>, drive: Option<DriveFamily>, mapping: PdoM
         feedback.push(object);
     }
     feedback
+}
+
+fn feed_forward(section: &mut Section<'_>, drive: Option<DriveFamily>) -> FeedForward {
+    let choices = [
+        ("none", FeedForward::None),
+        ("velocity", FeedForward::Velocity),
+        ("torque", FeedForward::Torque),
+        ("velocity-and-torque", FeedForward::VelocityAndTorque),
+    ];
+    let read = section.get("feed_forward").and_then(|entry| {
+        let feed_forward = entry.choice(&choices)?;
+        rules::axis::feed_forward(&entry.spot, drive, feed_forward);
+        Some(feed_forward)
+    });
+    read.unwrap_or_default()
 }
 
 fn transmission_type(section: &mut Section<'_>) -> u8 {

@@ -3,7 +3,7 @@
 use super::section::Section;
 use crate::config::bounds::Bounds;
 use crate::config::defaults;
-use crate::config::model::{Control, DriveFamily, SimulatedJoint};
+use crate::config::model::{Compliance, Control, DriveFamily, SimulatedJoint};
 use crate::config::quantities::Quantities;
 use crate::config::quantity::Quantity;
 use crate::config::ranges;
@@ -12,19 +12,22 @@ use crate::drive::yz_aim;
 
 /// The mode, with the gains of the loop that it needs. The gains of the other loops are read and not used, so that the mode
 /// can be changed in one line. Without the surroundings, whose period could not be read, no loop is judged.
+///
+/// With it comes what a source may ask of the torque loop.
 pub fn control(
     section: &mut Section<'_>,
     drive: Option<DriveFamily>,
     q: Quantities,
     joint: &SimulatedJoint,
     surroundings: Option<&Surroundings>,
-) -> Option<Control> {
+) -> Option<(Control, Compliance)> {
     let period_s =
         surroundings.map_or(defaults::PERIOD_NS, |surroundings| surroundings.period_ns) as f64 / 1e9;
     let mut velocity_section = section.section("velocity_loop");
     let mut torque_section = section.section("torque_loop");
     let velocity_loop = velocity_loop(&mut velocity_section, period_s);
     let (torque_loop, origin) = torque_loop(&mut torque_section, q, joint, period_s).unzip();
+    let asked = AskedCompliance::read(&mut torque_section, q);
     let modes = [
         ("csp", Some(Control::Position)),
         ("csv", velocity_loop),
@@ -48,17 +51,69 @@ pub fn control(
             Some(Control::Velocity { position_gain }) => {
                 loops::velocity_loop(&velocity_section.spot("position_gain"), position_gain, surroundings);
             }
-            Some(Control::Torque { stiffness, damping, inertia, .. }) => {
+            Some(law @ Control::Torque { stiffness, damping, inertia, .. }) => {
                 let gains = TorqueLoop { stiffness, damping, inertia, simulated_inertia: joint.inertia };
                 let origin = origin.unwrap_or(Origin::Gains);
                 gains.check(q, surroundings, |key| torque_section.spot(key), origin);
+                if asked.has_gains() {
+                    // The stiffest spring that a stream may ask for must not swing either.
+                    let Compliance { stiffness_max, damping_max, .. } = asked.of(&law);
+                    let gains = TorqueLoop { stiffness: stiffness_max, damping: damping_max, ..gains };
+                    let at = |key| torque_section.spot(AskedCompliance::key_of(key));
+                    gains.check(q, surroundings, at, Origin::Gains);
+                }
             }
             _ => {}
         }
     }
     velocity_section.finish();
     torque_section.finish();
-    control
+    control.map(|control| (control, asked.of(&control)))
+}
+
+/// The limits of what a source may ask of the torque loop, as far as the file gives them.
+struct AskedCompliance {
+    stiffness_max: Option<f64>,
+    damping_max: Option<f64>,
+    torque_rise_ns: Option<u64>,
+}
+
+impl AskedCompliance {
+    fn read(section: &mut Section<'_>, q: Quantities) -> Self {
+        Self {
+            stiffness_max: section
+                .get("stiffness_max")
+                .and_then(|entry| entry.quantity(q.stiffness, q.ranges.stiffness)),
+            damping_max: section
+                .get("damping_max")
+                .and_then(|entry| entry.quantity(q.damping, q.ranges.damping)),
+            torque_rise_ns: section
+                .get("torque_rise")
+                .and_then(|entry| entry.nanoseconds(ranges::TORQUE_RISE_S)),
+        }
+    }
+
+    fn has_gains(&self) -> bool {
+        self.stiffness_max.is_some() || self.damping_max.is_some()
+    }
+
+    /// The key of the highest value of a gain.
+    fn key_of(gain: &'static str) -> &'static str {
+        match gain {
+            "stiffness" => "stiffness_max",
+            "damping" => "damping_max",
+            other => other,
+        }
+    }
+
+    fn of(&self, control: &Control) -> Compliance {
+        let default = defaults::compliance(control);
+        Compliance {
+            stiffness_max: self.stiffness_max.unwrap_or(default.stiffness_max),
+            damping_max: self.damping_max.unwrap_or(default.damping_max),
+            torque_rise_ns: self.torque_rise_ns.unwrap_or(default.torque_rise_ns),
+        }
+    }
 }
 
 /// `None` where a gain is wrong.

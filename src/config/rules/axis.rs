@@ -5,7 +5,7 @@ use takt_rt::MAX_AXES;
 use super::loops::Surroundings;
 use super::{Fields, limits, loops, master, name, simulation};
 use crate::config::model::{
-    Axis, Config, Control, DriveFamily, Feedback, Interface, Limits, PdoMapping, Travel,
+    Axis, Config, Control, DriveFamily, FeedForward, Feedback, Interface, Limits, PdoMapping, Travel,
 };
 use crate::config::problem_kind::ProblemKind;
 use crate::config::quantities::{Counting, Quantities};
@@ -187,6 +187,16 @@ pub fn feedback(spot: &Spot<'_>, drive: Option<DriveFamily>, object: Feedback, e
     }
     if earlier.contains(&object) {
         spot.report(ProblemKind::Repeated { key: spot.key.clone(), given });
+    }
+}
+
+/// The PDOs of a YZ-AIM have no room for anything beside the target.
+pub fn feed_forward(spot: &Spot<'_>, drive: Option<DriveFamily>, feed_forward: FeedForward) {
+    if drive == Some(DriveFamily::YzAim) && feed_forward != FeedForward::None {
+        spot.report_range(
+            "an offset".to_owned(),
+            "\"none\", since the PDOs of a YZ-AIM are fixed".to_owned(),
+        );
     }
 }
 

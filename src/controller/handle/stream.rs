@@ -11,6 +11,7 @@ use takt_rt::{
 use super::error::CommandError;
 use super::{GroupHandle, Handle};
 use crate::controller::channels::chunk;
+use crate::controller::point_check::{PointRefusal, check_point};
 
 /// Why points were not taken; none of them was, then.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -23,15 +24,15 @@ pub enum StreamError {
         /// The axes.
         axes: usize,
     },
-    /// A number is infinite or none.
-    #[error("point {point} has a number that is not finite for axis {axis}: {value:?}")]
-    NotFinite {
+    /// An axis does not take what a point says of it.
+    #[error("axis {axis} does not take point {point}: {reason}")]
+    Refused {
         /// Which point, from 0 on.
         point: usize,
         /// Which axis, from 0 on.
         axis: usize,
-        /// What is given for it.
-        value: AxisPoint,
+        /// Why.
+        reason: PointRefusal,
     },
     /// Too many points wait: the group does not stream, or gets more than it can look ahead.
     #[error("too many points wait for the controller: does it stream?")]
@@ -69,8 +70,8 @@ impl StreamHandle {
         MonotonicClock::default().now_ns()
     }
 
-    /// Takes a point that is meant for a time: a number for each axis, or an [`AxisPoint`] with velocity and acceleration.
-    /// Points may come early, late, and in any order. One with the stamp of another one takes its place.
+    /// Takes a point that is meant for a time: for each axis a position, or an [`AxisPoint`] with more than that, or with something
+    /// else: a velocity, a torque, or an impedance. Points may come early, late, and in any order. One with the stamp of another one takes its place.
     ///
     /// # Errors
     /// See [`StreamError`].
@@ -113,9 +114,8 @@ impl StreamHandle {
             return Err(StreamError::Ended);
         }
         for (number, point) in points.iter().enumerate() {
-            let mut entries = point.axes.iter().take(self.axis_count()).enumerate();
-            if let Some((axis, value)) = entries.find(|(_, entry)| !entry.is_finite()) {
-                return Err(StreamError::NotFinite { point: number, axis, value: *value });
+            for (axis, entry) in point.axes.iter().enumerate().take(self.axis_count()) {
+                self.check(number, axis, entry)?;
             }
         }
         self.hand_over(points)
@@ -171,11 +171,22 @@ impl StreamHandle {
         let mut all = [AxisPoint::default(); MAX_AXES];
         for (axis, (to, from)) in all.iter_mut().zip(axes).enumerate() {
             *to = (*from).into();
-            if !to.is_finite() {
-                return Err(StreamError::NotFinite { point, axis, value: *to });
-            }
+            self.check(point, axis, to)?;
         }
         Ok(all)
+    }
+
+    fn check(&self, point: usize, axis: usize, entry: &AxisPoint) -> Result<(), StreamError> {
+        let number = match self.to {
+            StreamTarget::All => Some(axis),
+            StreamTarget::Group { number, .. } => match self.handle.groups().get(usize::from(number)) {
+                Some(group) => group.axes.get(axis).copied(),
+                // All axes are one group.
+                None => Some(axis),
+            },
+        };
+        let Some(of_axis) = number.and_then(|number| self.handle.axes().get(number)) else { return Ok(()) };
+        check_point(of_axis, entry).map_err(|reason| StreamError::Refused { point, axis, reason })
     }
 }
 

@@ -1,0 +1,150 @@
+//! Whether an axis takes what a point of a stream says of it, before the point is handed over.
+
+use takt_rt::{AxisPoint, OperationMode};
+
+use crate::config::{Axis, Control};
+
+/// Why an axis does not take a point. rad and N·m, or m and N.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum PointRefusal {
+    /// A number is infinite or none.
+    #[error("a number is not finite: {value:?}")]
+    NotFinite {
+        /// What is given.
+        value: AxisPoint,
+    },
+    /// A torque or an impedance needs a loop that is closed here.
+    #[error("a torque or an impedance needs mode \"cst\", and the axis is in {mode:?}")]
+    NoTorqueInMode {
+        /// Its mode.
+        mode: OperationMode,
+    },
+    /// The drive closes the loops, and takes no torque beside its target.
+    #[error(
+        "a torque is fed forward, and the drive takes none: that needs feed_forward = \"torque\", or mode \"cst\""
+    )]
+    NoFeedForward,
+    /// A torque is beyond the limit of the axis.
+    #[error("a torque of {torque} is beyond the limit of {limit}")]
+    Torque {
+        /// What is given.
+        torque: f64,
+        /// The limit of the axis.
+        limit: f64,
+    },
+    /// A stiffness is negative, or more than the axis allows.
+    #[error("a stiffness of {stiffness} is not within 0 to {limit} (stiffness_max)")]
+    Stiffness {
+        /// What is given.
+        stiffness: f64,
+        /// What the axis allows.
+        limit: f64,
+    },
+    /// A damping is negative, or more than the axis allows.
+    #[error("a damping of {damping} is not within 0 to {limit} (damping_max)")]
+    Damping {
+        /// What is given.
+        damping: f64,
+        /// What the axis allows.
+        limit: f64,
+    },
+}
+
+/// Checks that an axis takes a point. Positions and velocities are led to within the limits, whatever they are.
+///
+/// # Errors
+/// What it does not take.
+pub fn check_point(axis: &Axis, point: &AxisPoint) -> Result<(), PointRefusal> {
+    if !point.is_finite() {
+        return Err(PointRefusal::NotFinite { value: *point });
+    }
+    let has_torque_loop = matches!(axis.control, Control::Torque { .. });
+    let within = |torque: f64| {
+        let limit = axis.limits.torque;
+        if torque.abs() <= limit { Ok(()) } else { Err(PointRefusal::Torque { torque, limit }) }
+    };
+    let torque_loop = || {
+        let mode = axis.control.operation_mode();
+        if has_torque_loop { Ok(()) } else { Err(PointRefusal::NoTorqueInMode { mode }) }
+    };
+    match *point {
+        AxisPoint::Position { torque, .. } if torque != 0.0 => {
+            let takes_torque = has_torque_loop || axis.feed_forward.has_torque();
+            if takes_torque { within(torque) } else { Err(PointRefusal::NoFeedForward) }
+        }
+        AxisPoint::Position { .. } | AxisPoint::Velocity(_) => Ok(()),
+        AxisPoint::Torque(torque) => torque_loop().and_then(|()| within(torque)),
+        AxisPoint::Impedance { stiffness, damping, torque, .. } => {
+            torque_loop()?;
+            let (highest, strongest) = (axis.compliance.stiffness_max, axis.compliance.damping_max);
+            if !(0.0..=highest).contains(&stiffness) {
+                return Err(PointRefusal::Stiffness { stiffness, limit: highest });
+            }
+            if !(0.0..=strongest).contains(&damping) {
+                return Err(PointRefusal::Damping { damping, limit: strongest });
+            }
+            within(torque)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::{DriveFamily, FeedForward, Limits};
+
+    fn axis(control: Control) -> Axis {
+        let limits = Limits {
+            position_min: -1.0,
+            position_max: 1.0,
+            velocity: 1.0,
+            acceleration: 5.0,
+            deceleration: 5.0,
+            jerk: 50.0,
+            torque: 20.0,
+        };
+        Axis::new("joint", 0, 1, DriveFamily::ErobCanopen, limits).with_control(control)
+    }
+
+    const CST: Control = Control::Torque {
+        stiffness: 1600.0,
+        damping: 80.0,
+        inertia: 1.0,
+        viscous_friction: 1.0,
+        coulomb_friction: 0.5,
+    };
+
+    #[test]
+    fn each_mode_takes_its_own_kinds_of_points() {
+        let (csp, cst) = (axis(Control::Position), axis(CST));
+        let soft = AxisPoint::position(0.1).with_impedance(100.0, 10.0);
+        for point in [AxisPoint::position(0.1), AxisPoint::Velocity(9.0)] {
+            assert_eq!((check_point(&csp, &point), check_point(&cst, &point)), (Ok(()), Ok(())));
+        }
+        for point in [AxisPoint::Torque(5.0), soft] {
+            let mode = OperationMode::CyclicSynchronousPosition;
+            assert_eq!(check_point(&csp, &point), Err(PointRefusal::NoTorqueInMode { mode }));
+            assert_eq!(check_point(&cst, &point), Ok(()));
+        }
+        let fed_forward = AxisPoint::position(0.1).with_torque(3.0);
+        assert_eq!(check_point(&csp, &fed_forward), Err(PointRefusal::NoFeedForward));
+        assert_eq!(check_point(&cst, &fed_forward), Ok(()));
+        let csp = Axis { feed_forward: FeedForward::Torque, ..csp };
+        assert_eq!(check_point(&csp, &fed_forward), Ok(()));
+    }
+
+    #[test]
+    fn what_is_beyond_a_limit_is_refused_with_the_limit() {
+        let cst = axis(CST);
+        let refusal = |point: AxisPoint| check_point(&cst, &point).unwrap_err();
+        let torque = PointRefusal::Torque { torque: -20.1, limit: 20.0 };
+        assert_eq!(refusal(AxisPoint::Torque(-20.1)), torque);
+        assert_eq!(refusal(AxisPoint::position(0.0).with_torque(-20.1)), torque);
+        let soft = AxisPoint::position(0.0);
+        let stiffness = PointRefusal::Stiffness { stiffness: 1601.0, limit: 1600.0 };
+        assert_eq!(refusal(soft.with_impedance(1601.0, 1.0)), stiffness);
+        let damping = PointRefusal::Damping { damping: -1.0, limit: 80.0 };
+        assert_eq!(refusal(soft.with_impedance(1.0, -1.0)), damping);
+        assert!(matches!(refusal(f64::NAN.into()), PointRefusal::NotFinite { .. }));
+    }
+}
