@@ -107,7 +107,8 @@ impl Axis {
         let scale = &self.parameters.scale;
         let counts = self.feedback.feedback(FeedbackSlot::Position);
         let velocity = self
-            .reports(FeedbackSlot::Velocity)
+            .reported_slots
+            .contains(FeedbackSlot::Velocity)
             .then(|| scale.velocity_from_drive(self.feedback.feedback(FeedbackSlot::Velocity)));
         let velocity_limit = self.parameters.limits.velocity;
         if self.joint.take_report(counts, velocity, span, scale, velocity_limit) {
@@ -128,13 +129,9 @@ impl Axis {
         }
     }
 
-    fn reports(&self, slot: FeedbackSlot) -> bool {
-        self.parameters.feedback.iter().any(|pdo| pdo.mapping.carries(slot))
-    }
-
     /// The last value of an object that the drive reports; `None` if it does not report it, or has not reported yet.
     fn reported(&self, slot: FeedbackSlot) -> Option<i32> {
-        (self.is_heard() && self.reports(slot)).then(|| self.feedback.feedback(slot))
+        (self.is_heard() && self.reported_slots.contains(slot)).then(|| self.feedback.feedback(slot))
     }
 
     /// Whether the drive has reported at all.

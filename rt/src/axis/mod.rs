@@ -41,7 +41,7 @@ use arrayvec::ArrayVec;
 use crate::cia402::DriveState;
 use crate::guard::FollowingErrorGuard;
 use crate::host::AxisSnapshot;
-use crate::pdo::{CommandSlot, FeedbackSlot, MAX_PDOS, ProcessImage};
+use crate::pdo::{CommandSlot, FeedbackSlot, FeedbackSlots, MAX_PDOS, ProcessImage};
 use crate::record::AxisRecord;
 use crate::watch::{DuplicateNodeDetector, NodeMonitor};
 
@@ -68,6 +68,8 @@ pub struct Axis {
     /// The numbers that are sent, and those that were received.
     command: ProcessImage,
     feedback: ProcessImage,
+    /// Which numbers the drive reports.
+    reported_slots: FeedbackSlots,
     set_points: SetPoints,
     /// Where the axis rests while a stream has run dry.
     stream_rest: f64,
@@ -96,6 +98,7 @@ impl Axis {
         let mut command = ProcessImage::default();
         command.set(CommandSlot::OperationMode, parameters.law.operation_mode() as i32);
         Self {
+            reported_slots: slots_of(&parameters.feedback),
             parameters,
             command,
             feedback: ProcessImage::default(),
@@ -156,6 +159,7 @@ impl Axis {
         feedback: ArrayVec<Pdo, MAX_PDOS>,
     ) {
         self.parameters.commands = commands;
+        self.reported_slots = slots_of(&feedback);
         self.parameters.feedback = feedback;
         self.reception.drop_arrived();
     }
@@ -264,4 +268,8 @@ impl Axis {
             position_raw: self.feedback.feedback(FeedbackSlot::Position),
         };
     }
+}
+
+fn slots_of(feedback: &[Pdo]) -> FeedbackSlots {
+    FeedbackSlots::of(feedback.iter().map(|pdo| &pdo.mapping))
 }
