@@ -274,6 +274,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         self.couple_stops();
         self.probe_late_drives();
         self.sample_trajectories(host);
+        self.shared.stopped_by_sdo = BusSet::default();
         self.for_each_group(|group| {
             group.step();
             group.update_sdo_fallback();

@@ -39,6 +39,8 @@ pub(super) struct Shared<const AXES: usize, const BUSES: usize> {
     pub(super) skip_sync: BusSet,
     /// The buses whose drives have been asked for feedback by SYNC in this slot.
     pub(super) asked_by_sync: BusSet,
+    /// The buses with drives that are stopped by SDO in this slot.
+    pub(super) stopped_by_sdo: BusSet,
     /// The bus and the identifier of a frame that only this controller may send.
     pub(super) foreign_frame: Option<(u8, Id)>,
     pub(super) heartbeat: Option<HeartbeatProducer<BUSES>>,
@@ -94,6 +96,7 @@ impl<const AXES: usize, const BUSES: usize> Shared<AXES, BUSES> {
             backlog: Backlog::new(buses),
             skip_sync: BusSet::default(),
             asked_by_sync: BusSet::default(),
+            stopped_by_sdo: BusSet::default(),
             foreign_frame: None,
             heartbeat: parameters.heartbeat.map(heartbeat),
             time: parameters.time_cycles.map(TimeProducer::new),
