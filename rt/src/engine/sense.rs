@@ -27,9 +27,21 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
                     // A frame that is too short counts as not received: the age of the feedback shows it.
                     let _ = axis.receive(pdo.into(), &received.frame, received.at_ns);
                 }
-                return Receiver::Engine;
+                Receiver::Engine
             }
-            Destination::Unused => return Receiver::Engine,
+            Destination::Unused => Receiver::Engine,
+            destination => {
+                self.receive_message(bus, destination, received);
+                Receiver::Host
+            }
+        }
+    }
+
+    /// Takes a frame that is no process data: a rare one.
+    #[cold]
+    fn receive_message(&mut self, bus: usize, destination: Destination, received: &Received) {
+        match destination {
+            Destination::Feedback { .. } | Destination::Unused => {}
             Destination::Emergency { axis: place } => self.receive_emergency(place.into(), received),
             Destination::ErrorControl { axis: place } => {
                 let state = received.frame.payload().first().copied();
@@ -43,7 +55,6 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
             }
             Destination::Service => self.receive_sdo_response(bus, &received.frame),
         }
-        Receiver::Host
     }
 
     fn receive_emergency(&mut self, place: usize, received: &Received) {
