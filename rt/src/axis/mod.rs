@@ -221,51 +221,50 @@ impl Axis {
         self.drive_state() == DriveState::OperationEnabled && self.power != Power::LatchedOff
     }
 
-    /// Shows the state to observers. `shown` keeps when the drive reported last.
-    pub(crate) fn show(&self, shown: &mut AxisSnapshot) {
+    /// What this cycle leaves behind, for the record and for observers. `shown` keeps when the drive reported last.
+    pub(crate) fn report(&self, period_s: f64, record: &mut AxisRecord, shown: &mut AxisSnapshot) {
         let set_point = self.set_point();
+        let (position, velocity) = (self.joint.position(), self.joint.velocity());
+        let (statusword, drive_state) = (self.statusword(), self.drive_state());
+        let (error_code, feedback_age) = (self.error_code(), self.cycles_since_report());
+        let following_error = self.following.error();
+        let torque_raw = self.feedback.feedback(FeedbackSlot::Torque);
+        *record = AxisRecord {
+            position_set: set_point.position,
+            position,
+            drive_state,
+            velocity_set: set_point.velocity as f32,
+            acceleration_set: set_point.acceleration as f32,
+            jerk_set: (self.set_points.acceleration_change() / period_s) as f32,
+            velocity: velocity as f32,
+            torque_set: self.torque_set as f32,
+            torque: self.parameters.scale.torque_from_per_mille(torque_raw) as f32,
+            following_error: following_error as f32,
+            controlword: self.controlword(),
+            statusword,
+            error_code,
+            feedback_age,
+            command_raw: self.command.command(self.parameters.law.target_slot()),
+            position_raw: self.feedback.feedback(FeedbackSlot::Position),
+        };
         *shown = AxisSnapshot {
             position_set: set_point.position,
             velocity_set: set_point.velocity,
             torque_set: self.torque_set,
-            position: self.joint.position(),
-            velocity: self.joint.velocity(),
-            following_error: self.following.error(),
+            position,
+            velocity,
+            following_error,
             torque: self.torque(),
             current_per_mille: self.current_per_mille(),
             mode: self.mode(),
-            statusword: self.statusword(),
-            drive_state: self.drive_state(),
-            error_code: self.error_code(),
+            statusword,
+            drive_state,
+            error_code,
             is_heard: self.is_heard(),
             unanswered: self.unanswered(),
-            feedback_age: self.cycles_since_report(),
+            feedback_age,
             feedback_slot: shown.feedback_slot,
             feedback_ns: shown.feedback_ns,
-        };
-    }
-
-    /// What this cycle leaves behind.
-    pub fn record(&self, period_s: f64, record: &mut AxisRecord) {
-        let torque = self.feedback.feedback(FeedbackSlot::Torque);
-        let set_point = self.set_point();
-        *record = AxisRecord {
-            position_set: set_point.position,
-            position: self.joint.position(),
-            drive_state: self.drive_state(),
-            velocity_set: set_point.velocity as f32,
-            acceleration_set: set_point.acceleration as f32,
-            jerk_set: (self.set_points.acceleration_change() / period_s) as f32,
-            velocity: self.joint.velocity() as f32,
-            torque_set: self.torque_set as f32,
-            torque: self.parameters.scale.torque_from_per_mille(torque) as f32,
-            following_error: self.following.error() as f32,
-            controlword: self.controlword(),
-            statusword: self.statusword(),
-            error_code: self.error_code(),
-            feedback_age: self.cycles_since_report(),
-            command_raw: self.command.command(self.parameters.law.target_slot()),
-            position_raw: self.feedback.feedback(FeedbackSlot::Position),
         };
     }
 }

@@ -327,8 +327,10 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         let [first, ..] = shared.record.group_phases;
         shared.record.phase = first;
         for axis in &self.axes {
-            if let Some(record) = shared.record.axes.get_mut(usize::from(axis.number())) {
-                axis.record(shared.period_s, record);
+            let number = usize::from(axis.number());
+            let (records, shown) = (&mut shared.record.axes, &mut shared.snapshot.axes);
+            if let (Some(record), Some(shown)) = (records.get_mut(number), shown.get_mut(number)) {
+                axis.report(shared.period_s, record, shown);
             }
         }
         shared.dropped += u64::from(!host.record(&shared.record));
@@ -357,11 +359,6 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         }
         let [GroupSnapshot { phase, remaining_s, stop }, ..] = snapshot.groups;
         (snapshot.phase, snapshot.remaining_s, snapshot.stop) = (phase, remaining_s, stop);
-        for axis in &self.axes {
-            if let Some(shown) = snapshot.axes.get_mut(usize::from(axis.number())) {
-                axis.show(shown);
-            }
-        }
         for (shown, health) in snapshot.buses.iter_mut().zip(buses) {
             *shown = *health;
         }
