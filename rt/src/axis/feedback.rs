@@ -157,6 +157,7 @@ impl Axis {
 
     /// Where the joint has been reported in this cycle, if it cannot have got there. The report is accepted when the next one
     /// agrees with it.
+    #[inline]
     pub fn jump(&self) -> Option<Jump> {
         self.joint.jump().filter(|_| self.feedback_age() == 0)
     }
@@ -207,6 +208,7 @@ impl Axis {
     }
 
     /// What is wrong with the node, by its error control messages.
+    #[inline]
     pub fn node_fault(&self) -> Option<NodeFault> {
         self.node_monitor.fault(self.parameters.heartbeat_timeout_cycles)
     }
