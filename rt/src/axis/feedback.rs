@@ -177,6 +177,7 @@ impl Axis {
 
     /// The mode of operation (object 6061) that the drive shows, if it differs from ours. A drive that has not reported yet
     /// shows none.
+    #[inline]
     pub fn foreign_mode(&self) -> Option<i8> {
         let ours = self.parameters.law.operation_mode() as i8;
         self.mode().filter(|shown| *shown != ours)
