@@ -44,8 +44,9 @@ pub use bus::ownership::IfOwned;
 pub use config::{Config, ConfigError};
 pub use controller::session::{Session, SessionError, SessionOptions};
 pub use controller::{
-    CommandError, Controller, Events, GroupHandle, Handle, MotionError, MotionId, MoveOptions, Outcome,
-    Refused, StartFailure, Stopped, StreamError, StreamHandle, TrajectoryProgress, VirtualRun, WaitError,
+    CallbackCommand, CallbackHandle, CallbackOptions, CallbackState, CallbackTimes, CommandError, Controller,
+    Events, GroupHandle, Handle, MotionError, MotionId, MoveOptions, Outcome, Refused, StartFailure, Stopped,
+    StreamError, StreamHandle, TrajectoryProgress, VirtualRun, WaitError,
 };
 pub use error::{Error, Result};
 pub use faults::{FaultInjector, Scenario};
@@ -55,7 +56,7 @@ pub use trajectory::{Trajectory, TrajectoryError, TrajectoryPoint};
 /// What runs inside the real-time thread: its types as they come out of a [`Handle`], and the planner.
 pub use takt_rt as rt;
 pub use takt_rt::{
-    AxisPoint, AxisSnapshot, BusHealth, DriveState, Event, EventKind, Origin, Phase, RejectReason,
-    RequestError, RequestId, Rule, Snapshot, StopCategory, StopCause, StopReason, StreamCounts, StreamReport,
-    StreamState, TimingLevel, linux::ThreadReport, plan,
+    AxisPoint, AxisSnapshot, BusHealth, CallbackCycle, DriveState, Event, EventKind, Follow, Origin, Phase,
+    RejectReason, RequestError, RequestId, Rule, Snapshot, StopCategory, StopCause, StopReason, StreamCounts,
+    StreamReport, StreamState, TimingLevel, linux::ThreadReport, plan,
 };

@@ -101,6 +101,7 @@ impl Cycle {
             &CycleInput {
                 slot: timing.slot,
                 slot_start_ns: timing.slot_start_ns,
+                set_points_due_ns: timing.slot_start_ns + self.plan.latest_set_points_ns,
                 now_ns: began_ns,
                 buses: &health,
                 behind,

@@ -3,6 +3,7 @@
 use crate::cia402::OperationMode;
 use crate::frame::Id;
 use crate::stop_category::StopCategory;
+use crate::time::Nanoseconds;
 
 /// What made the group stop without anybody asking for it. Lengths are in rad (m for a linear axis) and their derivatives.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -165,6 +166,15 @@ pub enum Fault {
         /// As many are too many.
         limit: u32,
     },
+    /// A call of the owner's callback has taken longer than it may.
+    CallbackOverrun {
+        /// How long it took.
+        spent_ns: Nanoseconds,
+        /// How long it may take.
+        budget_ns: Nanoseconds,
+    },
+    /// The owner's callback has panicked.
+    CallbackPanicked,
 }
 
 /// What is broken by a fault, without the numbers: the key of a configuration and the number of a recording.
@@ -225,6 +235,10 @@ pub enum Rule {
     BusErrorPassive = 25,
     /// [`Fault::ImplausibleFeedback`].
     ImplausibleFeedback = 26,
+    /// [`Fault::CallbackOverrun`].
+    CallbackOverrun = 27,
+    /// [`Fault::CallbackPanicked`].
+    CallbackPanicked = 28,
 }
 
 impl Fault {
@@ -257,6 +271,8 @@ impl Fault {
             Self::DuplicateNode { .. } => Rule::DuplicateNode,
             Self::ForeignMaster { .. } => Rule::ForeignMaster,
             Self::TimingUnfit { .. } => Rule::TimingUnfit,
+            Self::CallbackOverrun { .. } => Rule::CallbackOverrun,
+            Self::CallbackPanicked => Rule::CallbackPanicked,
         }
     }
 
@@ -287,7 +303,12 @@ impl Fault {
             Self::NodeNotOperational { state } => (state.into(), 0.0),
             Self::DuplicateNode { node } => (node.into(), 0.0),
             Self::ForeignMaster { id } => (id.value().into(), 0.0),
-            Self::NoTrajectory | Self::BusLost | Self::BusErrorPassive | Self::UnexpectedBootUp => (0.0, 0.0),
+            Self::CallbackOverrun { spent_ns, budget_ns } => (spent_ns as f64, budget_ns as f64),
+            Self::NoTrajectory
+            | Self::BusLost
+            | Self::BusErrorPassive
+            | Self::UnexpectedBootUp
+            | Self::CallbackPanicked => (0.0, 0.0),
         }
     }
 
@@ -327,13 +348,17 @@ impl Fault {
             Rule::DuplicateNode => Self::DuplicateNode { node: seen as u8 },
             Rule::ForeignMaster => Self::ForeignMaster { id: Id::base(seen as u32).ok()? },
             Rule::TimingUnfit => Self::TimingUnfit { missed: seen as u32, limit: allowed as u32 },
+            Rule::CallbackOverrun => {
+                Self::CallbackOverrun { spent_ns: seen as u64, budget_ns: allowed as u64 }
+            }
+            Rule::CallbackPanicked => Self::CallbackPanicked,
         })
     }
 }
 
 impl Rule {
     /// Every rule, in the order of their numbers.
-    pub const ALL: [Self; 27] = [
+    pub const ALL: [Self; 29] = [
         Self::Requested,
         Self::NotFinite,
         Self::PositionLimit,
@@ -361,6 +386,8 @@ impl Rule {
         Self::JerkLimit,
         Self::BusErrorPassive,
         Self::ImplausibleFeedback,
+        Self::CallbackOverrun,
+        Self::CallbackPanicked,
     ];
 
     /// Its word in configurations and reports.
@@ -393,6 +420,8 @@ impl Rule {
             Self::JerkLimit => "jerk_limit",
             Self::BusErrorPassive => "bus_error_passive",
             Self::ImplausibleFeedback => "implausible_feedback",
+            Self::CallbackOverrun => "callback_overrun",
+            Self::CallbackPanicked => "callback_panicked",
         }
     }
 
@@ -410,7 +439,9 @@ impl Rule {
             | Self::NoTrajectory
             | Self::StartPose
             | Self::JerkLimit
-            | Self::BusErrorPassive => StopCategory::Two,
+            | Self::BusErrorPassive
+            | Self::CallbackOverrun
+            | Self::CallbackPanicked => StopCategory::Two,
             Self::FollowingError
             | Self::MissedFeedback
             | Self::DriveFault

@@ -9,7 +9,9 @@ use crate::phase::Phase;
 use crate::port::{BusHealth, Received};
 use crate::record::{CycleRecord, Event, MAX_AXES, MAX_BUSES, MAX_GROUPS};
 use crate::request::{RequestEnvelope, TrajectoryId};
-use crate::source::{StreamReport, StreamSample, TrajectorySample};
+use crate::source::{
+    AxisTarget, CallbackCycle, CallbackId, CallbackReturn, StreamReport, StreamSample, TrajectorySample,
+};
 use crate::stop::StopReason;
 use crate::time::Nanoseconds;
 use crate::watch::TimingLevel;
@@ -45,6 +47,28 @@ pub trait HostInterface<const AXES: usize = MAX_AXES, const BUSES: usize = MAX_B
 
     /// Called once in each cycle for each group: of the trajectories that the group has asked for, only these are still needed.
     fn keep_trajectories(&mut self, _group: u8, _needed: [Option<TrajectoryId>; 2]) {}
+
+    /// A [`Request::RunCallback`](crate::Request::RunCallback) for a group is handled: whether there is such a callback for it.
+    fn take_callback(&mut self, _group: u8, _callback: CallbackId) -> bool {
+        false
+    }
+
+    /// Calls the callback that leads a group: once in each cycle in which its set-points go on. `axes` shows those of the group as they
+    /// have just reported. `targets` is empty, and takes what is wanted of each of them at the end of the slot; an axis without a target
+    /// comes to rest and holds. A call that takes longer than its budget is a stop.
+    fn callback(
+        &mut self,
+        _group: u8,
+        _callback: CallbackId,
+        _cycle: &CallbackCycle,
+        _axes: &[AxisSnapshot; AXES],
+        _targets: &mut [Option<AxisTarget>; AXES],
+    ) -> CallbackReturn {
+        CallbackReturn::default()
+    }
+
+    /// Called once in each cycle for each group: of the callbacks that the group has taken, only this one is still needed.
+    fn keep_callback(&mut self, _group: u8, _needed: Option<CallbackId>) {}
 
     /// The oldest service frame (NMT, SDO …) that waits to be sent on this bus. Not asked for while the bus cannot take it.
     fn service_frame(&mut self, _bus: usize) -> Option<Frame> {

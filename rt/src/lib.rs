@@ -88,8 +88,9 @@ pub use request::{
     RequestError, RequestId, RequestKind, RequestTarget, TrajectoryId,
 };
 pub use source::{
-    AxisPoint, AxisTarget, Follow, LookAhead, LookAheadParameters, POINTS_AT_MOST, PathTime, PointError,
-    PointRole, Polynomial, StreamCounts, StreamDelay, StreamPoint, StreamReport, StreamSample, StreamState,
+    AxisPoint, AxisTarget, CallbackCycle, CallbackId, CallbackOutcome, CallbackReturn, CallbackRun, Follow,
+    LookAhead, LookAheadParameters, POINTS_AT_MOST, PathTime, PointError, PointRole, Polynomial,
+    PositionSequence, StreamCounts, StreamDelay, StreamPoint, StreamReport, StreamSample, StreamState,
     StreamWish, TimeLawPhase, TrajectorySample, TrajectoryView, follow,
 };
 pub use stop::{Origin, StopCategories, StopCause, StopReason};

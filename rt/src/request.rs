@@ -7,6 +7,7 @@ use crate::pdo::{MAX_OBJECTS, MAX_PDOS, MappedObject, TransmissionType};
 use crate::phase::Phase;
 use crate::profile::ProfileTarget;
 use crate::record::MAX_AXES;
+use crate::source::CallbackRun;
 use crate::stop_category::StopCategory;
 use crate::time::Nanoseconds;
 
@@ -30,7 +31,7 @@ pub struct RequestEnvelope<const AXES: usize = MAX_AXES> {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum RequestTarget {
     /// Every group: all of them do it, or none. A motion of several groups does not exist: where there is more than one,
-    /// [`Request::Move`] and [`Request::Stream`] must name theirs.
+    /// [`Request::Move`], [`Request::Stream`] and the like must name theirs.
     #[default]
     All,
     /// The group with this number.
@@ -84,6 +85,9 @@ pub enum Request<const AXES: usize = MAX_AXES> {
         /// When it begins.
         start: ExecutionStart,
     },
+    /// Let a callback of the host lead the group: see [`HostInterface::callback`](crate::HostInterface::callback). It may take the place
+    /// of another one.
+    RunCallback(CallbackRun),
     /// Stop by this category.
     Stop(StopCategory),
     /// Bring every drive to ready to switch on, decelerating first if need be.
@@ -111,6 +115,7 @@ impl<const AXES: usize> Request<AXES> {
             Self::SetProfileTarget(_) => RequestKind::SetProfileTarget,
             Self::Stream => RequestKind::Stream,
             Self::Execute { .. } => RequestKind::Execute,
+            Self::RunCallback(_) => RequestKind::RunCallback,
             Self::Stop(_) => RequestKind::Stop,
             Self::Disable => RequestKind::Disable,
             Self::ResetFaults => RequestKind::ResetFaults,
@@ -227,11 +232,13 @@ pub enum RequestKind {
     Shutdown = 14,
     /// A trajectory.
     Execute = 15,
+    /// A callback.
+    RunCallback = 16,
 }
 
 impl RequestKind {
     /// Every kind, in the order of their numbers.
-    pub const ALL: [Self; 16] = [
+    pub const ALL: [Self; 17] = [
         Self::Sync,
         Self::TimeOfDay,
         Self::RatedTorque,
@@ -248,6 +255,7 @@ impl RequestKind {
         Self::InhibitEnable,
         Self::Shutdown,
         Self::Execute,
+        Self::RunCallback,
     ];
 }
 
@@ -392,11 +400,13 @@ pub enum RejectReason {
         /// The group that the axis is in.
         of_axis: u8,
     },
+    /// The host has no callback under this number.
+    UnknownCallback,
 }
 
 impl RejectReason {
     /// One of each, in the order of their numbers, with numbers of no meaning.
-    pub const ALL: [Self; 29] = [
+    pub const ALL: [Self; 30] = [
         Self::Phase,
         Self::StopLatched { rule: Rule::FollowingError },
         Self::EnableInhibited,
@@ -426,6 +436,7 @@ impl RejectReason {
         Self::UnknownGroup { group: 1, groups: 2 },
         Self::GroupNotNamed { groups: 2 },
         Self::OtherGroup { asked: 1, of_axis: 2 },
+        Self::UnknownCallback,
     ];
 
     /// The number that stands for it in recordings.
@@ -460,6 +471,7 @@ impl RejectReason {
             Self::UnknownGroup { .. } => 26,
             Self::GroupNotNamed { .. } => 27,
             Self::OtherGroup { .. } => 28,
+            Self::UnknownCallback => 29,
         }
     }
 
@@ -487,6 +499,7 @@ impl RejectReason {
             Self::OtherGroup { asked, of_axis } => (asked.into(), of_axis.into()),
             Self::StartMismatch { position, present } => (position, present),
             Self::UnknownTrajectory
+            | Self::UnknownCallback
             | Self::TooLate
             | Self::SuccessorPending
             | Self::Phase
@@ -530,6 +543,7 @@ impl RejectReason {
             26 => Self::UnknownGroup { group: asked as u8, groups: allowed as u8 },
             27 => Self::GroupNotNamed { groups: asked as u8 },
             28 => Self::OtherGroup { asked: asked as u8, of_axis: allowed as u8 },
+            29 => Self::UnknownCallback,
             _ => return None,
         })
     }
@@ -596,6 +610,7 @@ impl core::fmt::Display for RejectReason {
                 write!(f, "the axis is in group {of_axis}, not in group {asked}")
             }
             Self::UnknownTrajectory => f.write_str("the host has no such trajectory"),
+            Self::UnknownCallback => f.write_str("the host has no such callback"),
             Self::StartMismatch { position, present } => {
                 write!(
                     f,

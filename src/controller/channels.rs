@@ -11,9 +11,13 @@
 //!
 //! No call on [`RtSide`] allocates, locks or waits, even if another thread is preempted in the middle of a call.
 
+mod callback_panic;
+mod callback_record;
+mod callbacks;
 mod client_requests;
 mod event_words;
 mod latest;
+mod lending;
 mod motion_words;
 mod observed_events;
 mod primitives;
@@ -27,13 +31,14 @@ mod words;
 use std::sync::Arc;
 
 use takt_rt::{
-    CycleRecord, Event, ExecutionStart, Frame, HostInterface, LookAheadParameters, Nanoseconds, Received,
-    Request, RequestEnvelope, RequestId, RequestTarget, Snapshot, StreamSample, TrajectoryId,
-    TrajectorySample,
+    AxisSnapshot, AxisTarget, CallbackCycle, CallbackId, CallbackReturn, CallbackRun, CycleRecord, Event,
+    ExecutionStart, Frame, HostInterface, LookAheadParameters, MAX_AXES, Nanoseconds, Received, Request,
+    RequestEnvelope, RequestId, RequestTarget, Snapshot, StreamSample, TrajectoryId, TrajectorySample,
 };
 
 use super::assemble;
 use crate::config::Config;
+use callbacks::CallbackTaker;
 use client_requests::{TakenRequests, client_requests};
 use latest::{Attempt, Reader, Writer};
 use observed_events::{EventWriter, observed_events};
@@ -41,6 +46,10 @@ use records::{RecordConsumer, RecordProducer};
 use stream::{StreamReceiver, stream_channel};
 use trajectories::TrajectoryTaker;
 
+pub use callback_record::{CallbackRecord, CallbackTimes};
+pub use callbacks::{
+    CallbackClock, CallbackCommand, CallbackGiver, CallbackState, GivenCallback, LoopCallback,
+};
 pub use client_requests::{ClientRequests, MotionEnd, WAITING_AT_MOST};
 pub use observed_events::EventReader;
 pub use request_numbers::RequestNumbers;
@@ -116,6 +125,7 @@ pub fn channels(sizes: &ChannelSizes) -> (RtSide, HostSide, LogSide) {
     let (record_in, record_out) = records::record_ring(sizes.records);
     let (event_in, event_out) = ring(sizes.events);
     let (giver, taker) = trajectories::trajectories();
+    let (callback_giver, callback_taker) = callbacks::callbacks();
     let (observed_in, observed_out) = observed_events(sizes.events);
     let numbers = RequestNumbers::default();
     let (clients, taken) = client_requests(numbers.clone(), WAITING_AT_MOST, sizes.groups);
@@ -125,6 +135,7 @@ pub fn channels(sizes: &ChannelSizes) -> (RtSide, HostSide, LogSide) {
         is_client_next: true,
         stream,
         trajectories: taker,
+        callbacks: callback_taker,
         service: service_out,
         received: received_in,
         records: record_in,
@@ -135,6 +146,7 @@ pub fn channels(sizes: &ChannelSizes) -> (RtSide, HostSide, LogSide) {
     let host = HostSide {
         requests: request_in,
         trajectories: giver,
+        callbacks: callback_giver,
         numbers,
         clients,
         observed: observed_out,
@@ -155,12 +167,20 @@ pub struct RtSide {
     is_client_next: bool,
     stream: StreamReceiver,
     trajectories: TrajectoryTaker,
+    callbacks: CallbackTaker,
     service: Vec<Consumer<Frame>>,
     received: Producer<(usize, Received)>,
     records: RecordProducer,
     events: Producer<Event>,
     observed: EventWriter,
     snapshot: Writer,
+}
+
+impl RtSide {
+    /// From now on the calls of callbacks are measured so.
+    pub fn measure_callbacks_by(&mut self, clock: CallbackClock) {
+        self.callbacks.measure_by(clock);
+    }
 }
 
 impl HostInterface for RtSide {
@@ -187,6 +207,25 @@ impl HostInterface for RtSide {
 
     fn keep_trajectories(&mut self, group: u8, needed: [Option<TrajectoryId>; 2]) {
         self.trajectories.keep(group, needed);
+    }
+
+    fn take_callback(&mut self, group: u8, callback: CallbackId) -> bool {
+        self.callbacks.take(group, callback)
+    }
+
+    fn callback(
+        &mut self,
+        group: u8,
+        callback: CallbackId,
+        cycle: &CallbackCycle,
+        axes: &[AxisSnapshot; MAX_AXES],
+        targets: &mut [Option<AxisTarget>; MAX_AXES],
+    ) -> CallbackReturn {
+        self.callbacks.call(group, callback, cycle, axes, targets)
+    }
+
+    fn keep_callback(&mut self, group: u8, needed: Option<CallbackId>) {
+        self.callbacks.keep(group, needed);
     }
 
     fn service_frame(&mut self, bus: usize) -> Option<Frame> {
@@ -216,6 +255,7 @@ pub struct HostSide {
     requests: Producer<RequestEnvelope>,
     numbers: RequestNumbers,
     trajectories: TrajectoryGiver,
+    callbacks: CallbackGiver,
     clients: ClientRequests,
     observed: EventReader,
     streamer: Streamer,
@@ -258,6 +298,36 @@ impl HostSide {
             self.trajectories.take_back(trajectory);
         }
         requested
+    }
+
+    /// Asks for a callback to lead its group, as `run` says but for the number. Returns the number of the request.
+    ///
+    /// # Errors
+    /// [`ChannelError::Full`]; nothing is sent then.
+    pub fn run_callback(
+        &mut self,
+        given: GivenCallback,
+        run: CallbackRun,
+    ) -> Result<RequestId, ChannelError> {
+        let target = RequestTarget::Group(given.group());
+        let callback = self.callbacks.give(given).ok_or(ChannelError::Full)?;
+        let id = self.numbers.next();
+        let request = Request::RunCallback(CallbackRun { callback, ..run });
+        let submitted = self.submit(RequestEnvelope { id, target, request });
+        if submitted.is_err() {
+            self.callbacks.take_back(callback);
+        }
+        submitted.map(|()| id)
+    }
+
+    /// Frees the callbacks that the real-time thread needs no longer.
+    pub fn free_callbacks(&self) {
+        self.callbacks.release();
+    }
+
+    /// The end that gives callbacks, for another thread.
+    pub fn callbacks(&self) -> CallbackGiver {
+        self.callbacks.clone()
     }
 
     /// The end that gives trajectories, for another thread.

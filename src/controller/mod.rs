@@ -13,9 +13,11 @@ mod supervisor;
 mod time_of_day;
 mod virtual_time;
 
+pub use channels::{CallbackCommand, CallbackState, CallbackTimes};
 pub use handle::{
-    CommandError, Controller, Events, GroupHandle, Handle, MotionError, MotionId, MoveOptions, Refused,
-    StartFailure, Stopped, StreamError, StreamHandle, TrajectoryProgress, WaitError,
+    CallbackHandle, CallbackOptions, CommandError, Controller, Events, GroupHandle, Handle, MotionError,
+    MotionId, MoveOptions, Refused, StartFailure, Stopped, StreamError, StreamHandle, TrajectoryProgress,
+    WaitError,
 };
 pub use outcome::{Interrupt, Outcome, Progress};
 pub use program::{ProgramRunner, ProgramStep};

@@ -10,7 +10,8 @@ use takt_rt::{Clock, Request, Snapshot, StopCategory};
 
 use super::assemble::{self, AssembleError};
 use super::channels::{
-    ChannelSizes, ClientRequests, EventReader, HostSide, Observer, Streamer, TrajectoryGiver, channels,
+    CallbackGiver, ChannelSizes, ClientRequests, EventReader, HostSide, Observer, Streamer, TrajectoryGiver,
+    channels,
 };
 use super::outcome::{Interrupt, Outcome, Progress};
 use super::realtime_thread::{self, Begun, Ended, LoopParts, StartError};
@@ -126,6 +127,8 @@ pub(super) struct RemoteHandles {
     pub clients: ClientRequests,
     /// Gives trajectories.
     pub trajectories: TrajectoryGiver,
+    /// Gives callbacks.
+    pub callbacks: CallbackGiver,
     /// Reads the events.
     pub events: EventReader,
     /// The result of the real-time set-up.
@@ -140,6 +143,7 @@ impl RemoteHandles {
             streamer: host.streamer(),
             clients: host.clients(),
             trajectories: host.trajectories(),
+            callbacks: host.callbacks(),
             events: host.events(),
             realtime: begun.report,
         })
@@ -222,6 +226,7 @@ fn lead_as_owner(
     let mut taken_over_by = None;
     while !running.is_finished() {
         supervisor.poll(clock.now_ns(), &mut host);
+        host.free_callbacks();
         let now_ns = clock.now_ns();
         let time = time_of_day.poll(now_ns, || WallClock::starting_now(now_ns));
         time_request = time.or(time_request).filter(|time| host.request(*time).is_err());

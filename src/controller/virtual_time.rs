@@ -6,7 +6,7 @@ use std::sync::Arc;
 use takt_rt::{BusPort, Clock, Cycle, Engine, Flow, Grid, Snapshot, Wake};
 
 use super::assemble::{self, AssembleError};
-use super::channels::{ChannelSizes, HostSide, LogSide, RtSide, channels};
+use super::channels::{CallbackClock, ChannelSizes, HostSide, LogSide, RtSide, channels};
 use super::outcome::{Interrupt, Outcome};
 use super::supervisor::Supervisor;
 use super::time_of_day::TimeOfDayKeeper;
@@ -156,7 +156,8 @@ impl<P: BusPort> VirtualRun<P> {
         ports: Vec<P>,
     ) -> Result<(Self, LogSide), AssembleError> {
         let engine = Box::new(assemble::engine(config)?);
-        let (rt, host, log) = channels(&ChannelSizes::of(config));
+        let (mut rt, host, log) = channels(&ChannelSizes::of(config));
+        rt.measure_callbacks_by(CallbackClock::Virtual(0));
         let period_ns = config.cycle.period_ns.max(1);
         let grid =
             Grid::new(period_ns, period_ns).unwrap_or_else(|| unreachable!("the period is at least 1 ns"));
@@ -187,6 +188,7 @@ impl<P: BusPort> VirtualRun<P> {
         if self.cycles_since_poll >= self.poll_interval {
             self.cycles_since_poll = 0;
             self.supervisor.poll(self.clock.now_ns, &mut self.host);
+            self.host.free_callbacks();
         }
         if let Some(time) = self.time_of_day.poll(self.clock.now_ns, || WallClock::fixed(VIRTUAL_EPOCH_NS)) {
             // If the queue is full, the next one follows in a minute.
@@ -214,6 +216,11 @@ impl<P: BusPort> VirtualRun<P> {
     /// From now on the life cycle is polled only once in so many cycles, as on a busy computer: its thread is not real-time.
     pub fn poll_life_cycle_every(&mut self, cycles: u64) {
         self.poll_interval = cycles;
+    }
+
+    /// From now on each call of a callback takes so long, of which the clock sees nothing: see [`VirtualClock::compute_for`].
+    pub fn take_for_callbacks(&mut self, ns: u64) {
+        self.rt.measure_callbacks_by(CallbackClock::Virtual(ns));
     }
 
     /// Asks the run to end.

@@ -94,6 +94,7 @@ fn what_happened(event: &Event, machine: &Machine) -> String {
         EventKind::Stream { state: StreamState::Dry } => {
             "stream: the points have run out, the axes come to rest".to_owned()
         }
+        EventKind::Stream { state: StreamState::Callback } => "a callback leads the axes".to_owned(),
         EventKind::DriveState { axis, state: to, statusword } => {
             format!("{}: {} (statusword 0x{statusword:04X})", machine.axis_name(axis), state(to))
         }

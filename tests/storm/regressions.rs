@@ -155,7 +155,11 @@ const FAILED_ONCE: [(u64, &str); 22] = [
 ];
 
 /// The same of those that are played with their hardships.
-const FAILED_IN_HARDSHIP: [(u64, &str); 9] = [
+const FAILED_IN_HARDSHIP: [(u64, &str); 10] = [
+    (
+        31_122_035_928,
+        "A joint beyond a position limit was streamed outward by the rounding of its way back, and its stop failed",
+    ),
     (
         424_242_380,
         "Two buses that were behind in turn were taken for one that does not transmit, and the wrong one was named",

@@ -288,6 +288,7 @@ impl Machine {
         let input = CycleInput {
             slot: self.slot,
             slot_start_ns: now_ns,
+            set_points_due_ns: now_ns,
             now_ns,
             buses: &self.buses,
             behind: held_back,

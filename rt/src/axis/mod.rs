@@ -43,6 +43,7 @@ use crate::guard::FollowingErrorGuard;
 use crate::host::AxisSnapshot;
 use crate::pdo::{CommandSlot, FeedbackSlot, FeedbackSlots, MAX_PDOS, ProcessImage};
 use crate::record::AxisRecord;
+use crate::source::Follow;
 use crate::watch::{DuplicateNodeDetector, NodeMonitor};
 
 use controlword::ControlwordSender;
@@ -71,7 +72,9 @@ pub struct Axis {
     /// Which numbers the drive reports.
     reported_slots: FeedbackSlots,
     set_points: SetPoints,
-    /// Where the axis rests while a stream has run dry.
+    /// What is done with a target beyond the limits, by what leads the axis now.
+    follow: Follow,
+    /// Where the axis rests while a stream has run dry, or a callback commands nothing.
     stream_rest: f64,
     profile: ProfileMode,
     joint: JointEstimate,
@@ -99,6 +102,7 @@ impl Axis {
         command.set(CommandSlot::OperationMode, parameters.law.operation_mode() as i32);
         Self {
             reported_slots: slots_of(&parameters.feedback),
+            follow: parameters.follow,
             parameters,
             command,
             feedback: ProcessImage::default(),
@@ -221,50 +225,53 @@ impl Axis {
         self.drive_state() == DriveState::OperationEnabled && self.power != Power::LatchedOff
     }
 
-    /// What this cycle leaves behind, for the record and for observers. `shown` keeps when the drive reported last.
-    pub(crate) fn report(&self, period_s: f64, record: &mut AxisRecord, shown: &mut AxisSnapshot) {
+    /// Shows the state to observers. `shown` keeps when the drive reported last.
+    #[inline]
+    pub(crate) fn show(&self, shown: &mut AxisSnapshot) {
         let set_point = self.set_point();
-        let (position, velocity) = (self.joint.position(), self.joint.velocity());
-        let (statusword, drive_state) = (self.statusword(), self.drive_state());
-        let (error_code, feedback_age) = (self.error_code(), self.cycles_since_report());
-        let following_error = self.following.error();
-        let torque_raw = self.feedback.feedback(FeedbackSlot::Torque);
-        *record = AxisRecord {
-            position_set: set_point.position,
-            position,
-            drive_state,
-            velocity_set: set_point.velocity as f32,
-            acceleration_set: set_point.acceleration as f32,
-            jerk_set: (self.set_points.acceleration_change() / period_s) as f32,
-            velocity: velocity as f32,
-            torque_set: self.torque_set as f32,
-            torque: self.parameters.scale.torque_from_per_mille(torque_raw) as f32,
-            following_error: following_error as f32,
-            controlword: self.controlword(),
-            statusword,
-            error_code,
-            feedback_age,
-            command_raw: self.command.command(self.parameters.law.target_slot()),
-            position_raw: self.feedback.feedback(FeedbackSlot::Position),
-        };
         *shown = AxisSnapshot {
             position_set: set_point.position,
             velocity_set: set_point.velocity,
             torque_set: self.torque_set,
-            position,
-            velocity,
-            following_error,
+            position: self.joint.position(),
+            velocity: self.joint.velocity(),
+            following_error: self.following.error(),
             torque: self.torque(),
             current_per_mille: self.current_per_mille(),
             mode: self.mode(),
-            statusword,
-            drive_state,
-            error_code,
+            statusword: self.statusword(),
+            drive_state: self.drive_state(),
+            error_code: self.error_code(),
             is_heard: self.is_heard(),
             unanswered: self.unanswered(),
-            feedback_age,
+            feedback_age: self.cycles_since_report(),
             feedback_slot: shown.feedback_slot,
             feedback_ns: shown.feedback_ns,
+        };
+    }
+
+    /// What this cycle leaves behind, beside what is shown of it.
+    #[inline]
+    pub(crate) fn record(&self, period_s: f64, shown: &AxisSnapshot, record: &mut AxisRecord) {
+        let torque = self.feedback.feedback(FeedbackSlot::Torque);
+        let acceleration = self.set_point().acceleration;
+        *record = AxisRecord {
+            position_set: shown.position_set,
+            position: shown.position,
+            drive_state: shown.drive_state,
+            velocity_set: shown.velocity_set as f32,
+            acceleration_set: acceleration as f32,
+            jerk_set: (self.set_points.acceleration_change() / period_s) as f32,
+            velocity: shown.velocity as f32,
+            torque_set: shown.torque_set as f32,
+            torque: self.parameters.scale.torque_from_per_mille(torque) as f32,
+            following_error: shown.following_error as f32,
+            controlword: self.controlword(),
+            statusword: shown.statusword,
+            error_code: shown.error_code,
+            feedback_age: shown.feedback_age,
+            command_raw: self.command.command(self.parameters.law.target_slot()),
+            position_raw: self.feedback.feedback(FeedbackSlot::Position),
         };
     }
 }

@@ -4,8 +4,9 @@ use super::Axis;
 use super::delay::SetPointDelay;
 use super::power::Power;
 use crate::fault::Fault;
+use crate::group_trajectory::stop_limits;
 use crate::guard::{self, SetPointSteps};
-use crate::plan::State;
+use crate::plan::{self, Profile, State};
 use crate::source::Follow;
 
 /// The set-points of an axis, on their way from the source to the drive.
@@ -90,7 +91,7 @@ impl Axis {
     /// Gives the newest set-point the velocity and the acceleration that its steps show, where a stream was followed exactly:
     /// what it said of its velocity may be wrong, where it has led is known. Whatever is planned from now on goes on from that.
     pub fn derive_from_steps(&mut self, period_s: f64) {
-        if self.is_profile() || self.parameters.follow == Follow::Smooth {
+        if self.is_profile() || self.follow == Follow::Smooth {
             return;
         }
         self.set_points.refine_newest(self.state_by_steps(period_s));
@@ -134,22 +135,36 @@ impl Axis {
         }
     }
 
-    /// Slows the set-point down by its deceleration limit, whatever the jerk, and leaves it where it stands: for a motion that no
-    /// planned stop ends. A set-point that just stayed would leap to a standstill.
+    /// Goes on by one cycle on the fastest stop of this axis alone, and leaves the set-point where it stands: for a group whose
+    /// planned stop cannot be followed any more. A set-point that just stayed would leap to a standstill.
     pub fn slow_down(&mut self, period_s: f64) {
         let [last, before_last, _] = self.set_points.positions();
         if !self.is_enabled() || last == before_last {
             return self.stay();
         }
+        let next = match self.stopping(period_s) {
+            Some(next) if self.check(&next, period_s).is_ok() => next,
+            _ => self.decelerating(period_s),
+        };
+        self.advance(next);
+    }
+
+    /// The next set-point of the fastest stop within the limits, if one can be planned.
+    fn stopping(&self, period_s: f64) -> Option<State> {
+        let (start, mut profile) = (self.set_point(), Profile::hold(0.0));
+        let limits = stop_limits(&start, &self.parameters.limits);
+        plan::stop(&[start], &[limits], core::slice::from_mut(&mut profile)).ok()?;
+        Some(profile.sample(period_s))
+    }
+
+    /// The next set-point with the deceleration limit, whatever the jerk.
+    fn decelerating(&self, period_s: f64) -> State {
+        let [last, before_last, _] = self.set_points.positions();
         let most = self.parameters.limits.deceleration * period_s;
         let last_velocity = (last - before_last) / period_s;
         let change = -last_velocity.clamp(-most, most);
         let velocity = last_velocity + change;
-        self.advance(State {
-            position: last + velocity * period_s,
-            velocity,
-            acceleration: change / period_s,
-        });
+        State { position: last + velocity * period_s, velocity, acceleration: change / period_s }
     }
 
     /// Whether the set-point is where the joint is, but for one step within the limits.
@@ -224,22 +239,54 @@ impl Axis {
 
 #[cfg(test)]
 mod tests {
+    use super::super::AxisParameters;
     use super::super::parameters::tests::parameters;
     use super::*;
     use crate::frame::{Frame, Id};
+    use crate::guard::AxisLimits;
 
     const PERIOD_S: f64 = 1e-3;
+
+    fn enabled(limits: AxisLimits) -> Axis {
+        let mut axis = Axis::new(0, AxisParameters { limits, ..parameters() });
+        axis.set_cycle(PERIOD_S);
+        axis.request_feedback(0);
+        axis.receive(0, &Frame::of(Id::canopen(0x180, 5), [0x37, 0x02]), 1).unwrap();
+        axis.begin_cycle(PERIOD_S);
+        assert!(axis.is_enabled());
+        axis
+    }
+
+    #[test]
+    fn an_axis_that_stops_alone_keeps_its_limits_of_acceleration_and_jerk() {
+        let limits = AxisLimits { jerk: 100.0, ..parameters().limits };
+        for (direction, acceleration) in [(1.0, 0.0), (1.0, 5.0), (-1.0, 5.0), (-1.0, 0.0)] {
+            let mut axis = enabled(limits);
+            let start = State { position: 0.1, velocity: direction, acceleration };
+            (0..4).for_each(|cycle| axis.advance(start.after(f64::from(cycle - 3) * PERIOD_S)));
+            let [newest, last, before] = axis.set_points.positions();
+            let mut sent = [newest, last, before];
+            for _ in 0..1000 {
+                axis.slow_down(PERIOD_S);
+                let next = axis.set_point().position;
+                let velocities =
+                    [next - sent[0], sent[0] - sent[1], sent[1] - sent[2]].map(|way| way / PERIOD_S);
+                let accelerations = [velocities[0] - velocities[1], velocities[1] - velocities[2]]
+                    .map(|change| change / PERIOD_S);
+                let jerk = (accelerations[0] - accelerations[1]) / PERIOD_S;
+                assert!(accelerations[0].abs() <= limits.deceleration * (1.0 + 1e-6), "{accelerations:?}");
+                assert!(jerk.abs() <= limits.jerk * (1.0 + 1e-4), "{jerk}");
+                sent = [next, sent[0], sent[1]];
+            }
+            assert_eq!(axis.set_point().velocity, 0.0);
+        }
+    }
 
     #[test]
     fn a_set_point_that_no_planned_stop_ends_slows_down_within_its_limit_and_stays() {
         let limits = parameters().limits;
         for direction in [1.0, -1.0] {
-            let mut axis = Axis::new(0, parameters());
-            axis.set_cycle(PERIOD_S);
-            axis.request_feedback(0);
-            axis.receive(0, &Frame::of(Id::canopen(0x180, 5), [0x37, 0x02]), 1).unwrap();
-            axis.begin_cycle(PERIOD_S);
-            assert!(axis.is_enabled());
+            let mut axis = enabled(limits);
             let step = direction * limits.velocity * PERIOD_S;
             (0..3).for_each(|cycle| axis.advance(State::rest(f64::from(cycle) * step)));
             let (mut last, mut last_step) = (axis.set_point().position, step);

@@ -13,7 +13,7 @@ impl Axis {
     /// What is no number; and where the stream is to be followed exactly, the limit that it breaks.
     pub fn streamed(&self, target: &AxisTarget, period_s: f64) -> Result<State, Fault> {
         let AxisTarget::Position(wanted) = target;
-        match self.parameters.follow {
+        match self.follow {
             Follow::Smooth => self.followed(wanted, period_s),
             Follow::Exact => {
                 self.check(wanted, period_s)?;
@@ -21,6 +21,11 @@ impl Axis {
                 Ok(self.agreeing(wanted, period_s))
             }
         }
+    }
+
+    /// From now on targets beyond the limits are treated so; `None` as it is configured.
+    pub fn follow_as(&mut self, follow: Option<Follow>) {
+        self.follow = follow.unwrap_or(self.parameters.follow);
     }
 
     /// The next set-point on the way to where the axis rests while a stream has run dry.

@@ -200,7 +200,10 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
     /// Whether a stop has something to bring to rest. A joint in profile torque may begin to move by itself.
     pub(super) fn is_under_way(&self) -> bool {
         match self.group.state {
-            GroupState::Moving { .. } | GroupState::Executing(_) | GroupState::Streaming(_) => true,
+            GroupState::Moving { .. }
+            | GroupState::Executing(_)
+            | GroupState::Streaming(_)
+            | GroupState::InLoop(_) => true,
             GroupState::Holding => self.axes.iter().any(Axis::is_coasting),
             _ => false,
         }
@@ -245,9 +248,9 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
         )
     }
 
-    fn plan_stop(&mut self) -> Result<(), PlanError> {
+    pub(super) fn plan_stop(&mut self) -> Result<(), PlanError> {
         self.axes.iter_mut().for_each(Axis::begin_stop);
-        if matches!(self.group.state, GroupState::Streaming(_)) {
+        if matches!(self.group.state, GroupState::Streaming(_) | GroupState::InLoop(_)) {
             self.axes.iter_mut().for_each(|axis| axis.derive_from_steps(self.shared.period_s));
         }
         self.group.motion.stop(

@@ -31,6 +31,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
                 self.require_phase(&[Phase::Disabled])?;
                 self.require_no_fault()
             }
+            Request::Move(_) if matches!(self.group.state, GroupState::InLoop(_)) => self.require_no_fault(),
             Request::Move(_) | Request::SetProfileTarget(_) => {
                 self.require_phase(&[Phase::Holding, Phase::Moving])?;
                 self.require_no_fault()
@@ -62,6 +63,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
             | Request::ProcessData(_)
             | Request::Position { .. }
             | Request::Execute { .. }
+            | Request::RunCallback(_)
             | Request::InhibitEnable
             | Request::Shutdown => {}
         }
@@ -104,6 +106,11 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
     fn check_stream(&self) -> Handled {
         self.require_phase(&[Phase::Holding])?;
         self.require_no_fault()?;
+        self.require_punctuality()
+    }
+
+    /// What comes from outside in every slot needs slots that are not missed.
+    pub(super) fn require_punctuality(&self) -> Handled {
         if self.shared.slots.level() >= TimingLevel::Degraded {
             let (missed, _) = self.shared.slots.unforgiven();
             return Err(RejectReason::MissedSlots { missed, limit: self.shared.slots.degraded() }.into());
@@ -114,6 +121,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
     fn begin_stream(&mut self) {
         self.group.stop = None;
         self.group.stream = StreamSample::default();
+        self.axes.iter_mut().for_each(|axis| axis.follow_as(None));
         self.enter(GroupState::Streaming(Stream::Requested));
     }
 
@@ -129,6 +137,10 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
             let (position, velocity) = target_of(axis);
             check_target(axis, position, velocity, self.shared.period_s)
                 .map_err(|reason| reason.of_axis(axis.number()))?;
+        }
+        // It may take the place of a callback.
+        if matches!(self.group.state, GroupState::InLoop(_)) {
+            self.axes.iter_mut().for_each(|axis| axis.derive_from_steps(self.shared.period_s));
         }
         let legs = self.axes.iter().map(|axis| {
             let (position, velocity) = target_of(axis);

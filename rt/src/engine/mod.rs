@@ -12,7 +12,7 @@
 //!   `process_data` exchanges mappings;
 //! - `faults` looks for the first thing that is wrong, and begins stops;
 //! - `step` makes the next set-points of the phase that the group is in (`state` has the table of phases), `streaming` those
-//!   of a stream, `executing` those of a trajectory;
+//!   of a stream, `executing` those of a trajectory, `in_loop` those of a callback;
 //! - `encode` makes frames of them, and decides what may leave; `sdo_fallback` stops drives that PDOs do not reach.
 //!
 //! Events wait in an outbox until [`Engine::finish`] hands them to the host.
@@ -24,6 +24,7 @@ mod faults;
 mod group;
 mod group_requests;
 mod heartbeat;
+mod in_loop;
 mod outbox;
 mod parameters;
 mod process_data;
@@ -53,7 +54,6 @@ use crate::time::Nanoseconds;
 use group::{Commands, Group, GroupContext};
 use parameters::{axes_of, dispatch_of};
 use shared::{Ending, Shared};
-use state::GroupState;
 
 pub use parameters::{BusParameters, CycleCount, EngineParameters, GroupParameters, Heartbeat, SetUpError};
 pub use sense::Receiver;
@@ -71,6 +71,8 @@ pub struct CycleInput<'a> {
     pub slot: u64,
     /// Its start on the grid: the time that its set-points stand for.
     pub slot_start_ns: Nanoseconds,
+    /// The time at which its set-points must be ready.
+    pub set_points_due_ns: Nanoseconds,
     /// The time.
     pub now_ns: Nanoseconds,
     /// The state of each bus.
@@ -191,7 +193,15 @@ pub enum Deadline {
 ///         engine.receive(0, &Received { frame, at_ns: now_ns });
 ///     }
 ///     let buses = [BusHealth::default()];
-///     engine.compute(&CycleInput { slot, slot_start_ns: now_ns, now_ns, buses: &buses, behind: BusSet::default() }, &mut host);
+///     let input = CycleInput {
+///         slot,
+///         slot_start_ns: now_ns,
+///         set_points_due_ns: now_ns + 800_000,
+///         now_ns,
+///         buses: &buses,
+///         behind: BusSet::default(),
+///     };
+///     engine.compute(&input, &mut host);
 ///     let mut batch = SendBatch::new();
 ///     engine.encode(0, Deadline::Met, &mut host, &mut batch);
 ///     // It obeys the controlword, the first two bytes of its command.
@@ -276,7 +286,8 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         self.sample_trajectories(host);
         self.shared.stopped_by_sdo = BusSet::default();
         self.for_each_group(|group| {
-            group.step();
+            group.step(input, host);
+            host.keep_callback(group.group.number, group.group.state.callback());
             group.update_sdo_fallback();
             group.group.state_cycles = group.group.state_cycles.saturating_add(1);
         });
@@ -330,7 +341,8 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
             let number = usize::from(axis.number());
             let (records, shown) = (&mut shared.record.axes, &mut shared.snapshot.axes);
             if let (Some(record), Some(shown)) = (records.get_mut(number), shown.get_mut(number)) {
-                axis.report(shared.period_s, record, shown);
+                axis.show(shown);
+                axis.record(shared.period_s, shown, record);
             }
         }
         shared.dropped += u64::from(!host.record(&shared.record));
@@ -346,7 +358,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         snapshot.missed_slots = shared.slots.missed;
         snapshot.timing = shared.slots.level();
         snapshot.dropped = shared.dropped;
-        let streaming = self.groups.iter().find(|group| matches!(group.state, GroupState::Streaming(_)));
+        let streaming = self.groups.iter().find(|group| group.state.phase() == Phase::Streaming);
         if let Some(group) = streaming.or(self.groups.first()) {
             snapshot.stream = group.stream_report();
         }

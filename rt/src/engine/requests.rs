@@ -13,6 +13,7 @@ use crate::request::{
     ExecutionStart, RejectReason, Request, RequestEnvelope, RequestError, RequestId, RequestTarget,
     TrajectoryId,
 };
+use crate::source::CallbackRun;
 
 /// Requests that are handled in one cycle; the rest waits, so that a flood of them costs a bounded time.
 const REQUESTS_PER_CYCLE: usize = 4;
@@ -82,6 +83,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
             Request::Execute { trajectory, start } => {
                 self.execute(id, target, request, (*trajectory, *start), host)?
             }
+            Request::RunCallback(run) => self.run_callback(id, target, request, run, host)?,
             Request::InhibitEnable => {
                 self.shared.requested.ending = self.shared.requested.ending.max(Ending::EnableInhibited)
             }
@@ -139,6 +141,25 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         begun.map_err(|rejection| Rejection { group: Some(number), ..rejection })
     }
 
+    /// Lets a callback of the host lead a group. It is taken in any case, so that the host gets it back in any case.
+    fn run_callback(
+        &mut self,
+        id: RequestId,
+        target: RequestTarget,
+        request: &Request<AXES>,
+        run: &CallbackRun,
+        host: &mut impl HostInterface<AXES, BUSES>,
+    ) -> Handled {
+        let asked = self.asked_groups(target, request);
+        if asked.is_err() {
+            host.take_callback(0, run.callback);
+        }
+        let number = asked?.start;
+        let Some(mut group) = self.group(number) else { return Ok(()) };
+        let begun = group.begin_in_loop(id, run, host);
+        begun.map_err(|rejection| Rejection { group: Some(number), ..rejection })
+    }
+
     /// The numbers of the groups that a request is for.
     fn asked_groups(&self, target: RequestTarget, request: &Request<AXES>) -> Result<Range<u8>, Rejection> {
         let groups = self.groups.len() as u8;
@@ -158,9 +179,11 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
                 Err(RejectReason::OtherGroup { asked, of_axis }.into())
             }
             (Some(asked), ..) => Ok(asked..asked + 1),
-            (None, _, Request::Move(_) | Request::Stream | Request::Execute { .. }) if groups > 1 => {
-                Err(RejectReason::GroupNotNamed { groups }.into())
-            }
+            (
+                None,
+                _,
+                Request::Move(_) | Request::Stream | Request::Execute { .. } | Request::RunCallback(_),
+            ) if groups > 1 => Err(RejectReason::GroupNotNamed { groups }.into()),
             (None, ..) => Ok(0..groups),
         }
     }

@@ -13,6 +13,7 @@ use crate::bus_set::BusSet;
 use crate::frame::Id;
 use crate::host::Snapshot;
 use crate::record::{CycleRecord, Event, EventKind};
+use crate::source::AxisTarget;
 use crate::stop::StopCategories;
 use crate::time::{NANOSECONDS_PER_SECOND, Nanoseconds};
 use crate::time_of_day::TimeProducer;
@@ -46,6 +47,8 @@ pub(super) struct Shared<const AXES: usize, const BUSES: usize> {
     pub(super) heartbeat: Option<HeartbeatProducer<BUSES>>,
     pub(super) time: Option<TimeProducer>,
 
+    /// What the callbacks want of the axes, by their numbers. It counts in the cycle in which a callback was called.
+    pub(super) callback_targets: [Option<AxisTarget>; AXES],
     pub(super) events: Outbox,
     /// Events, records and frames that found no room.
     pub(super) dropped: u64,
@@ -100,6 +103,7 @@ impl<const AXES: usize, const BUSES: usize> Shared<AXES, BUSES> {
             foreign_frame: None,
             heartbeat: parameters.heartbeat.map(heartbeat),
             time: parameters.time_cycles.map(TimeProducer::new),
+            callback_targets: [None; AXES],
             events: Outbox::default(),
             dropped: 0,
             record: CycleRecord { axis_count, group_count, ..CycleRecord::default() },

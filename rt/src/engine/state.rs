@@ -8,11 +8,12 @@
 //! Enabling   every drive shows operation enabled                                     Holding
 //!            a stop, Request::Disable                                                Disabling
 //! Holding    Request::Move, Request::SetProfileTarget, Request::Execute              Moving
-//!            Request::Stream                                                         Streaming
+//!            Request::Stream, Request::RunCallback                                   Streaming
 //!            Request::Disable, a stop of category 1 or 0                             Stopping, Disabling
 //! Moving     the targets are reached                                                 Holding
 //!            Request::Disable, a stop                                                Stopping, Disabling (0)
 //! Streaming  Request::Disable, a stop                                                Stopping, Disabling (0)
+//!            Request::Move takes the place of a callback, or the callback is over    Moving
 //! Stopping   the joints are at rest                                                  Holding (2), Disabling (1)
 //!            it gets harder (category 0)                                             Disabling
 //! Disabling  no drive shows torque any more, or the patience is over                 Disabled
@@ -21,8 +22,10 @@
 //! A number in brackets is a stop category of IEC 60204-1.
 
 use super::executing::Execution;
+use super::in_loop::InLoop;
 use crate::cia402::Goal;
 use crate::phase::Phase;
+use crate::source::CallbackId;
 
 /// What the group is doing.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,6 +41,8 @@ pub(super) enum GroupState<const AXES: usize> {
     /// On a trajectory of the host.
     Executing(Execution<AXES>),
     Streaming(Stream),
+    /// Led by a callback of the host.
+    InLoop(InLoop),
     Stopping,
     Disabling(PowerRemoval),
 }
@@ -73,7 +78,7 @@ impl<const AXES: usize> GroupState<AXES> {
             Self::Enabling => Phase::Enabling,
             Self::Holding => Phase::Holding,
             Self::Moving { .. } | Self::Executing(_) => Phase::Moving,
-            Self::Streaming(_) => Phase::Streaming,
+            Self::Streaming(_) | Self::InLoop(_) => Phase::Streaming,
             Self::Stopping => Phase::Stopping,
             Self::Disabling(_) => Phase::Disabling,
         }
@@ -89,7 +94,16 @@ impl<const AXES: usize> GroupState<AXES> {
             | Self::Moving { .. }
             | Self::Executing(_)
             | Self::Streaming(_)
+            | Self::InLoop(_)
             | Self::Stopping => Goal::Enabled,
+        }
+    }
+
+    /// The callback that is still needed.
+    pub(super) const fn callback(&self) -> Option<CallbackId> {
+        match self {
+            Self::InLoop(in_loop) => Some(in_loop.callback()),
+            _ => None,
         }
     }
 

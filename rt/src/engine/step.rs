@@ -5,12 +5,13 @@
 
 use arrayvec::ArrayVec;
 
-use super::Engine;
 use super::group::{Commands, Group, GroupContext};
 use super::state::{GroupState, PowerRemoval};
+use super::{CycleInput, Engine};
 use crate::axis::{Axis, FeedbackSince};
 use crate::bus_set::BusSet;
 use crate::fault::Fault;
+use crate::host::HostInterface;
 use crate::plan::State;
 use crate::stop::{Origin, StopCause};
 use crate::stop_category::StopCategory;
@@ -64,7 +65,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
 
 impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
     /// Makes the next set-points, unless those of the last cycles have still to leave, or every bus is behind.
-    pub(super) fn step(&mut self) {
+    pub(super) fn step(&mut self, input: &CycleInput<'_>, host: &mut impl HostInterface<AXES, BUSES>) {
         let (own, behind) = (self.group.buses, self.shared.backlog.behind());
         // A group that stops does not wait for the wire any longer, whatever it stops for.
         let is_over_waiting = self.group.stop.is_some()
@@ -84,6 +85,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
             self.group.unsent.count(on_time);
             self.shared.snapshot.steps += 1;
         }
+        self.call_in_loop(input, host);
         for _ in 0..ATTEMPTS {
             match self.step_phase() {
                 Ok(()) => return,
@@ -103,6 +105,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
             GroupState::Moving { is_reported } => self.step_move(is_reported)?,
             GroupState::Executing(execution) => self.step_execution(&execution)?,
             GroupState::Streaming(stream) => self.step_stream(stream)?,
+            GroupState::InLoop(in_loop) => self.step_in_loop(in_loop)?,
             GroupState::Stopping => self.step_stop()?,
             GroupState::Disabling(_) => {
                 self.come_to_rest();
@@ -127,7 +130,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
         }
     }
 
-    fn step_move(&mut self, is_reported: bool) -> Result<(), Failure> {
+    pub(super) fn step_move(&mut self, is_reported: bool) -> Result<(), Failure> {
         for axis in self.axes.iter() {
             let expired_ns = axis.expired_ns(self.shared.now_ns);
             if expired_ns > 0 {

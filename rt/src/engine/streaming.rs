@@ -129,6 +129,7 @@ impl<const AXES: usize, const BUSES: usize> Group<AXES, BUSES> {
     pub(super) fn stream_report(&self) -> StreamReport {
         let state = match self.state {
             GroupState::Streaming(stream) => stream.shown(),
+            GroupState::InLoop(_) => StreamState::Callback,
             _ => StreamState::Idle,
         };
         StreamReport { state, counts: self.stream.counts }

@@ -17,15 +17,28 @@ const CORRECTING: f64 = 5.0;
 ///
 /// What starts where it can be stopped within the limits ends where it can be stopped within them. A target that moves within
 /// the limits is followed to the last bit of what the change of its jerk leaves; one that leaps is reached as fast as the limits
-/// allow, without overshoot.
+/// allow, without overshoot. A target beyond a position limit is followed as far as the limit; so an axis that starts beyond the
+/// limit comes back to it, and never moves farther out.
 ///
 /// # Errors
 /// What is no number, or no number that can be planned with.
 pub fn follow(start: &State, target: &State, limits: &AxisLimits, period_s: f64) -> Result<State, PlanError> {
-    match corrected(start, target, limits, period_s) {
+    let target = within_range(start, target, limits);
+    match corrected(start, &target, limits, period_s) {
         Some(next) => Ok(next),
-        None => tracked(start, target, limits, period_s),
+        None => tracked(start, &target, limits, period_s),
     }
+}
+
+/// The target; or rest at the position limit that it is beyond. A start beyond a limit comes back first, and does not meet the
+/// velocity of the target before.
+fn within_range(start: &State, target: &State, limits: &AxisLimits) -> State {
+    let is_within = |position: f64| (limits.position_min..=limits.position_max).contains(&position);
+    let are_rates_finite = target.velocity.is_finite() && target.acceleration.is_finite();
+    if !are_rates_finite || is_within(target.position) && is_within(start.position) {
+        return *target;
+    }
+    State::rest(target.position.clamp(limits.position_min, limits.position_max))
 }
 
 /// The set-point with the jerk of the target and a little more, which takes a small error back. `None` where the error is not
@@ -153,6 +166,37 @@ mod tests {
                     let difference = (newest - 3.0 * last + 3.0 * before - oldest) / PERIOD_S.powi(3);
                     prop_assert!(difference.abs() <= jerk * (1.0 + 1e-5) + 1e-4, "jerk {difference}");
                     prop_assert!((-1.0 - 1e-6..=2.0 + 1e-6).contains(&newest), "position {newest}");
+                }
+            }
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(60))]
+
+        #[test]
+        fn an_axis_beyond_a_position_limit_comes_back_and_never_moves_farther_out(
+            targets in prop::collection::vec((1.5f64..3.0, -0.5f64..3.0, 1usize..40), 1..60),
+            out in prop_oneof![0.0f64..1e-4, 0.0f64..0.5],
+            jerk in prop_oneof![50.0f64..1000.0, Just(f64::INFINITY)],
+        ) {
+            let limits = AxisLimits {
+                position_min: -1.0,
+                position_max: 2.0,
+                velocity: 3.0,
+                acceleration: 8.0,
+                deceleration: 8.0,
+                jerk,
+                torque: 50.0,
+            };
+            let mut state = State::rest(2.0 + out);
+            for (position, velocity, cycles) in targets {
+                let mut target = State { position, velocity, acceleration: 0.0 };
+                for _ in 0..cycles {
+                    target = target.after(PERIOD_S);
+                    let next = follow(&state, &target, &limits, PERIOD_S).unwrap();
+                    prop_assert!(next.position <= state.position.max(2.0 + 1e-9), "{state:?} {next:?}");
+                    state = next;
                 }
             }
         }

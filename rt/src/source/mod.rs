@@ -1,4 +1,4 @@
-//! Where set-points come from when neither holding nor a move makes them: streams and trajectories.
+//! Where set-points come from when neither holding nor a move makes them: streams, trajectories and callbacks.
 //!
 //! ```text
 //! points, stamped ──▶ LookAhead ── interpolation, some delay behind ──▶ StreamSample ──▶ follow ──▶ set-point
@@ -10,8 +10,10 @@
 //! - `delay`: how far behind the stamps it has to run so that the points do not run out, learnt from their arrival;
 //! - `interpolation`: the motion between points;
 //! - `follower`: the next set-point of an axis on its way to what is wanted, within every limit;
-//! - `trajectory`: set-points that were checked as a whole before they begin.
+//! - `trajectory`: set-points that were checked as a whole before they begin;
+//! - `callback`: the owner's function in the real-time thread.
 
+mod callback;
 mod delay;
 mod follower;
 mod interpolation;
@@ -19,6 +21,9 @@ mod look_ahead;
 mod target;
 mod trajectory;
 
+pub use callback::{
+    CallbackCycle, CallbackId, CallbackOutcome, CallbackReturn, CallbackRun, PositionSequence,
+};
 pub use delay::StreamDelay;
 pub use follower::follow;
 pub use look_ahead::{LookAhead, LookAheadParameters, POINTS_AT_MOST, PointError};

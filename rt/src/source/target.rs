@@ -117,11 +117,13 @@ pub enum StreamState {
     Following,
     /// The points have run out: the axes come to rest, and go on when points come again.
     Dry,
+    /// No points lead the axes: a callback does.
+    Callback,
 }
 
 impl StreamState {
     /// Every state, in the order of their numbers.
-    pub const ALL: [Self; 4] = [Self::Idle, Self::Awaited, Self::Following, Self::Dry];
+    pub const ALL: [Self; 5] = [Self::Idle, Self::Awaited, Self::Following, Self::Dry, Self::Callback];
 
     /// Its name, for people.
     pub const fn name(self) -> &'static str {
@@ -130,6 +132,7 @@ impl StreamState {
             Self::Awaited => "awaited",
             Self::Following => "following",
             Self::Dry => "dry",
+            Self::Callback => "callback",
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Errors of an embedded controller. Their `Debug` text is their `Display` text, so that `?` in `main` prints a sentence.
 
 use std::fmt;
+use std::time::Duration;
 
 use takt_rt::{RequestError, StopReason};
 
@@ -116,6 +117,17 @@ pub enum CommandError {
     /// The rate of a trajectory cannot be changed so.
     #[error(transparent)]
     Rate(#[from] RateError),
+    /// A callback may not take so long, or not so short.
+    #[error("a call of a callback cannot have {budget:?}: set-points must be ready within {longest:?}")]
+    Budget {
+        /// The budget.
+        budget: Duration,
+        /// The longest one.
+        longest: Duration,
+    },
+    /// Too many callbacks are with the real-time thread.
+    #[error("too many callbacks are with the real-time thread")]
+    TooManyCallbacks,
     /// The motion is not a trajectory under way.
     #[error("the motion is not a trajectory under way")]
     NoTrajectory,
@@ -136,6 +148,14 @@ pub enum CommandError {
 /// Why a motion did not reach its targets.
 #[derive(Clone, PartialEq, thiserror::Error)]
 pub enum MotionError {
+    /// The callback has panicked, and the group has stopped.
+    #[error("the callback has panicked ({message}): {stopped}")]
+    CallbackPanicked {
+        /// The message of the panic, and where it was.
+        message: String,
+        /// The stop.
+        stopped: Stopped,
+    },
     /// The group has stopped.
     #[error(transparent)]
     Stopped(#[from] Stopped),

@@ -2,11 +2,13 @@
 
 use std::time::Duration;
 
-use takt_rt::{GroupSnapshot, Phase, Request, RequestTarget, StopCategory};
+use takt_rt::{CallbackCycle, GroupSnapshot, Phase, Request, RequestTarget, StopCategory};
 
 use super::Handle;
 use super::error::{CommandError, WaitError};
+use super::in_loop::{CallbackHandle, CallbackOptions};
 use super::motion::{MotionId, MoveOptions};
+use crate::controller::channels::{CallbackCommand, CallbackState};
 
 /// Commands and observes one group of a running controller, from any thread. Clones are cheap and equal. The drives in profile velocity
 /// and profile torque are commanded by [`Handle::velocity`] and [`Handle::torque`]: the axis names its group.
@@ -67,6 +69,29 @@ impl GroupHandle {
     /// See [`Handle::begin_stream`].
     pub fn begin_stream(&self) -> Result<(), CommandError> {
         self.handle.request_of(self.target(), Request::Stream)
+    }
+
+    /// As [`Handle::in_loop`]: the function sees and commands the axes of the group, in the order of [`GroupHandle::axes`].
+    ///
+    /// # Errors
+    /// See [`Handle::in_loop`].
+    pub fn in_loop(
+        &self,
+        callback: impl FnMut(&CallbackState<'_>, &CallbackCycle, &mut CallbackCommand<'_>) + Send + 'static,
+    ) -> Result<CallbackHandle, CommandError> {
+        self.in_loop_with(CallbackOptions::default(), callback)
+    }
+
+    /// As [`Handle::in_loop_with`].
+    ///
+    /// # Errors
+    /// See [`Handle::in_loop`].
+    pub fn in_loop_with(
+        &self,
+        options: CallbackOptions,
+        callback: impl FnMut(&CallbackState<'_>, &CallbackCycle, &mut CallbackCommand<'_>) + Send + 'static,
+    ) -> Result<CallbackHandle, CommandError> {
+        self.handle.lead_in_loop((self.target(), self.number), &self.axes, options, callback)
     }
 
     /// As [`Handle::stop`]; it discards the waiting requests for this group, and for all of them.

@@ -26,6 +26,7 @@ mod commands;
 mod error;
 mod events;
 mod group;
+mod in_loop;
 mod life;
 mod messages;
 mod motion;
@@ -41,11 +42,13 @@ use std::time::Duration;
 use takt_rt::linux::ThreadReport;
 use takt_rt::{Phase, Snapshot, StopCategory};
 
+use super::assemble;
 use super::channels::{ClientRequests, EventReader, MotionEnd, Observer, Streamer};
 use super::outcome::{Interrupt, Outcome};
 use super::session::{self, RemoteHandles, Session, SessionError, SessionOptions};
 use crate::config::{Axis, Config, Group};
 use crate::telemetry::{Machine, Notice};
+use in_loop::Callbacks;
 use life::Life;
 use messages::Messages;
 use trajectory::Trajectories;
@@ -53,6 +56,7 @@ use trajectory::Trajectories;
 pub use error::{CommandError, MotionError, Refused, StartFailure, Stopped, WaitError};
 pub use events::Events;
 pub use group::GroupHandle;
+pub use in_loop::{CallbackHandle, CallbackOptions};
 pub use motion::{MotionId, MoveOptions};
 pub use stream::{StreamError, StreamHandle};
 pub use trajectory::TrajectoryProgress;
@@ -77,7 +81,7 @@ impl Controller {
         let (handles_in, handles_out) = mpsc::sync_channel(1);
         let (life, messages) = (Arc::<Life>::default(), Arc::<Messages>::default());
         let (axes, groups) = (config.axes.clone(), config.groups.clone());
-        let machine = Machine::of(&config);
+        let (machine, plan) = (Machine::of(&config), assemble::slot_plan(&config));
         let thread = {
             let (life, messages) = (Arc::clone(&life), Arc::clone(&messages));
             let notify = move |notice: &Notice| match notice {
@@ -94,7 +98,7 @@ impl Controller {
         };
         let thread = thread.map_err(SessionError::Logger)?;
         let Ok(remote) = handles_out.recv() else { return Err(failed(thread)) };
-        let RemoteHandles { observer, streamer, clients, trajectories, events, realtime } = remote;
+        let RemoteHandles { observer, streamer, clients, trajectories, callbacks, events, realtime } = remote;
         let trajectories = Trajectories::new(trajectories);
         let handle = Handle(Arc::new(Shared {
             axes,
@@ -106,6 +110,7 @@ impl Controller {
             events,
             streamer,
             trajectories,
+            callbacks: Callbacks::new(callbacks, &plan),
             messages,
             life,
         }));
@@ -184,6 +189,7 @@ struct Shared {
     events: EventReader,
     streamer: Streamer,
     trajectories: Trajectories,
+    callbacks: Callbacks,
     messages: Arc<Messages>,
     life: Arc<Life>,
 }

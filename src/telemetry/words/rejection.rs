@@ -19,6 +19,7 @@ pub const fn request(kind: RequestKind) -> &'static str {
         RequestKind::SetProfileTarget => "the target",
         RequestKind::Stream => "the stream",
         RequestKind::Execute => "the trajectory",
+        RequestKind::RunCallback => "the callback",
         RequestKind::Stop => "the stop",
         RequestKind::Disable => "disabling",
         RequestKind::ResetFaults => "the fault reset",
@@ -52,7 +53,9 @@ fn reason(rejected: &RequestError, machine: &Machine) -> String {
         }
         RejectReason::EnableInhibited => "the run is ending".to_owned(),
         RejectReason::MissedSlots { missed, limit } => {
-            format!("{missed} slots were missed recently, and a stream needs fewer than {limit}")
+            format!(
+                "{missed} slots were missed recently, and a stream or a callback needs fewer than {limit}"
+            )
         }
         RejectReason::UnknownAxis { axis, axes } => {
             format!("there is no axis {axis}: there are {axes}, counted from 0")
@@ -109,6 +112,7 @@ fn reason(rejected: &RequestError, machine: &Machine) -> String {
         }
         RejectReason::NoTime => "the drives are not told the time (`time` of [master])".to_owned(),
         RejectReason::UnknownTrajectory => "there is no such trajectory".to_owned(),
+        RejectReason::UnknownCallback => "there is no such callback".to_owned(),
         RejectReason::StartMismatch { position, present } => format!(
             "it begins at {position:.6} {length} while {axis} is at {present:.6} {length}, or at another velocity"
         ),

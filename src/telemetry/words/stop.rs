@@ -102,6 +102,12 @@ pub fn stop_cause(stop: &StopReason, machine: &Machine) -> String {
         Fault::TimingUnfit { missed, limit } => {
             format!("the controller misses its slots too often: {missed} recently (allowed: {limit})")
         }
+        Fault::CallbackOverrun { spent_ns, budget_ns } => format!(
+            "the callback took {:.1} µs (allowed: {:.1} µs)",
+            spent_ns as f64 * 1e-3,
+            budget_ns as f64 * 1e-3
+        ),
+        Fault::CallbackPanicked => "the callback panicked".to_owned(),
         Fault::BusErrorPassive => format!("{bus} is error-passive: almost no frame gets through"),
         Fault::BusLost => format!("{bus} is bus-off or its interface is down"),
         Fault::EnableTimeout { limit, .. } => format!(

@@ -122,7 +122,14 @@ fn cycles() -> Option<Phase> {
         engine.sync(0, slot, at_ns);
         engine.receive(0, &Received { frame, at_ns });
         engine.compute(
-            &CycleInput { slot, slot_start_ns: at_ns, now_ns: at_ns, buses: &health, behind: BusSet::default() },
+            &CycleInput {
+                slot,
+                slot_start_ns: at_ns,
+                set_points_due_ns: at_ns,
+                now_ns: at_ns,
+                buses: &health,
+                behind: BusSet::default(),
+            },
             &mut host,
         );
         let mut batch = SendBatch::new();

@@ -1,6 +1,6 @@
 //! What a stop is said to concern is what it concerns: the axis that has the fault, the bus on which it is.
 
-use takt_rt::{EventKind, Fault, Origin, Rule, StopCause, StopReason};
+use takt_rt::{ControlLaw, EventKind, Fault, Origin, Rule, StopCause, StopReason};
 
 use super::Seen;
 use crate::heartbeat::MissedHeartbeat;
@@ -29,6 +29,12 @@ fn check_reason(seen: &Seen<'_>, reason: &StopReason) -> Result<(), String> {
             seen.config.axes.get(usize::from(axis)).is_some_and(|axis| seen.overloaded_buses[axis.bus]);
         is_overloaded || seen.concerns.get(usize::from(axis)).is_some_and(|concern| concern.is_crowded)
     };
+    let is_loop_closed_here = |axis: u8| {
+        let axis = seen.config.axes.get(usize::from(axis));
+        axis.is_some_and(|axis| {
+            matches!(axis.control, ControlLaw::Velocity { .. } | ControlLaw::Torque { .. })
+        })
+    };
     let is_right = match (reason.rule(), reason.origin) {
         // What is asked of the group, and how it is paced.
         (Rule::Requested | Rule::TimingUnfit, Origin::Group) => true,
@@ -45,13 +51,16 @@ fn check_reason(seen: &Seen<'_>, reason: &StopReason) -> Result<(), String> {
             Origin::Axis(_),
         ) => true,
         (Rule::MissedFeedback, Origin::Axis(axis)) if is_crowded(axis) => true,
+        // A joint swings where the machine is too late to close its loop.
+        (Rule::FollowingError, Origin::Axis(axis)) if is_crowded(axis) && is_loop_closed_here(axis) => true,
         // An eRob stops its node: it has no process data any more, and says so. A YZ-AIM shows an alarm.
         (
             Rule::DriveFault | Rule::MissedFeedback | Rule::EmergencyMessage | Rule::DriveDisabled,
             Origin::Axis(axis),
         ) if has_missed_heartbeat(axis) => true,
         (Rule::NodeNotOperational, Origin::Axis(axis)) if has_missed_heartbeat(axis) => {
-            reason.cause == StopCause::Fault(Fault::NodeNotOperational { state: STOPPED })
+            is_troubled(axis)
+                || reason.cause == StopCause::Fault(Fault::NodeNotOperational { state: STOPPED })
         }
         (
             Rule::FollowingError

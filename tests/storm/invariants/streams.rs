@@ -1,4 +1,5 @@
-//! A stream that is followed as closely as the limits allow stops the group for none of its points.
+//! A stream that is followed as closely as the limits allow stops the group for none of its points. A drive in a profile mode
+//! follows none: its joint may be pushed beyond a limit.
 
 use takt::config::Follow;
 use takt_rt::{EventKind, Origin, Phase, Rule};
@@ -20,7 +21,8 @@ pub fn check(seen: &Seen<'_>) -> Result<(), String> {
         );
         let Origin::Axis(axis) = stop.origin else { continue };
         let axis = &seen.config.axes[usize::from(axis)];
-        if stop.phase == Phase::Streaming && is_for_a_point && axis.follow == Follow::Smooth {
+        let is_followed = axis.follow == Follow::Smooth && !axis.control.is_profile();
+        if stop.phase == Phase::Streaming && is_for_a_point && is_followed {
             return Err(format!("{}: stopped for a point of a smooth stream: {stop:?}", axis.name));
         }
     }
