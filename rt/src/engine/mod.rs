@@ -17,6 +17,7 @@
 //!
 //! Events wait in an outbox until [`Engine::finish`] hands them to the host.
 
+mod axis_places;
 mod backlog;
 mod encode;
 mod executing;
