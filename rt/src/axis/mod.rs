@@ -178,6 +178,7 @@ impl Axis {
     }
 
     /// Lets a slot pass for what is watched over time. Comes after [`Axis::begin_cycle`] or [`Axis::wait`].
+    #[inline]
     pub fn watch(&mut self) {
         self.watch_stall();
         self.node_monitor.pass();
