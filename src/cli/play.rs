@@ -210,10 +210,10 @@ fn read(arguments: &Arguments, config: &Config) -> Result<(PlayFile, Piece), Exi
     let file = PlayFile::parse(&bytes, &names).map_err(wrong_file)?;
     file.check_modes(&config.axes).map_err(wrong_file)?;
     if !arguments.trajectory {
-        let stream = FileStream::new(&file, &config.axes).map_err(wrong_file)?;
+        let stream = FileStream::new(&file, config).map_err(wrong_file)?;
         return Ok((file, Piece::Stream(stream)));
     }
-    let trajectory = FileTrajectory::new(&file, config.axes.len()).map_err(wrong_file)?;
+    let trajectory = FileTrajectory::new(&file, config).map_err(wrong_file)?;
     let period_s = config.cycle.period_ns as f64 / NANOSECONDS_PER_SECOND as f64;
     trajectory.check(&config.axes, period_s).map_err(wrong_file)?;
     Ok((file, Piece::Trajectory(trajectory)))
