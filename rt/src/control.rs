@@ -150,6 +150,7 @@ impl ControlLaw {
 
     /// The target of this cycle in drive units, and the torque (N·m, N) that is commanded with it, 0 where none is.
     /// In a profile mode the set-point itself is not for the wire: see `profile`.
+    #[inline]
     pub fn target(&self, input: &LoopInput, scale: &Scale, limits: &AxisLimits) -> (i32, f64) {
         match *self {
             Self::Position | Self::Interpolated | Self::ProfilePosition => {

@@ -35,7 +35,7 @@ pub struct MotionReport {
 
 impl MotionReport {
     fn is_in_progress(&self) -> bool {
-        self.state == MotionState::InProgress
+        matches!(self.state, MotionState::InProgress)
     }
 
     fn is_under_way_in(&self, group: u8) -> bool {

@@ -64,6 +64,7 @@ impl Axis {
 
     /// Takes feedback PDO number `pdo` (from 0) that arrived at `at_ns`. One that is late changes nothing, nor one that is
     /// too short.
+    #[inline]
     pub fn receive(&mut self, pdo: usize, frame: &Frame, at_ns: Nanoseconds) -> Result<(), TooShort> {
         if pdo == 0 {
             self.late_reply.note_reply();
