@@ -77,7 +77,7 @@ impl FileStream {
     }
 
     /// The groups that it plays.
-    pub(super) fn groups(&self) -> &[PlayedGroup] {
+    pub fn groups(&self) -> &[PlayedGroup] {
         &self.groups
     }
 

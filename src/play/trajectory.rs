@@ -68,7 +68,7 @@ impl FileTrajectory {
     }
 
     /// The group of its axes.
-    pub(super) fn group(&self) -> &PlayedGroup {
+    pub fn group(&self) -> &PlayedGroup {
         &self.group
     }
 
