@@ -180,8 +180,7 @@ impl Axis {
     /// shows none.
     #[inline]
     pub fn foreign_mode(&self) -> Option<i8> {
-        let ours = self.parameters.law.operation_mode() as i8;
-        self.mode().filter(|shown| *shown != ours)
+        self.mode().filter(|shown| *shown != self.parameters.law.operation_mode() as i8)
     }
 
     /// The mode of operation (object 6061) that the drive shows, if it reports it.

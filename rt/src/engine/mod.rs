@@ -375,7 +375,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
     }
 }
 
-/// Whether a bus has SYNC, feedback and set-points in this slot.
+/// Whether a bus has SYNC, feedback and set-points in this slot. Most have them in each, which takes no division to see.
 const fn has_cycle(bus: &BusParameters, slot: u64) -> bool {
-    slot.is_multiple_of(bus.divider as u64)
+    bus.divider == 1 || slot.is_multiple_of(bus.divider as u64)
 }
