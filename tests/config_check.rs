@@ -274,3 +274,18 @@ fn what_an_axis_does_without_the_controller_is_told_for_its_mode() {
         assert_eq!(told.contains("FOR EVER"), !matches!(mode, "csp" | "pp"), "{mode}: {told}");
     }
 }
+
+#[test]
+fn groups_are_shown_with_their_axes_and_whose_stops_stop_them() {
+    let path = configs().join("arm-and-gripper.toml");
+    let text = standard_output(&check(&path, &[]));
+    assert!(text.contains("Groups\n"), "{text}");
+    let gripper = text.lines().find(|line| line.trim_start().starts_with("gripper")).unwrap();
+    assert!(gripper.contains("finger") && gripper.contains("arm"), "{gripper}");
+    let groups = &json(&check(&path, &["--json"]))["groups"];
+    assert_eq!(groups[0]["axes"], serde_json::json!(["base", "shoulder", "elbow"]));
+    assert_eq!(
+        (&groups[1]["name"], &groups[1]["stops_with"]),
+        (&"gripper".into(), &serde_json::json!(["arm"]))
+    );
+}

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use clap::Args;
 use serde::Serialize;
 use takt::bus::schedule::{self, BusSchedule};
-use takt::config::{Axis, Compliance, Config, Control, FeedForward, Travel};
+use takt::config::{Axis, Compliance, Config, Control, FeedForward, Group, Travel};
 
 use super::exit::Exit;
 use super::print;
@@ -49,8 +49,31 @@ struct Check {
     command_phase_ns: u64,
     /// The value of `command_phase = "auto"`; `None` where no command phase suits every bus.
     automatic_command_phase_ns: Option<u64>,
+    /// The groups; none where all axes are one.
+    groups: Vec<GroupCheck>,
     axes: Vec<AxisCheck>,
     buses: Vec<BusSchedule>,
+}
+
+/// A group of axes, by names.
+#[derive(Clone, PartialEq, Serialize)]
+struct GroupCheck {
+    name: String,
+    axes: Vec<String>,
+    /// The groups whose stops stop this one, too.
+    stops_with: Vec<String>,
+}
+
+impl GroupCheck {
+    fn of(config: &Config, group: &Group) -> Self {
+        let axes = group.axes.iter().filter_map(|axis| config.axes.get(*axis));
+        let others = group.stops_with.iter().filter_map(|other| config.groups.get(*other));
+        Self {
+            name: group.name.clone(),
+            axes: axes.map(|axis| axis.name.clone()).collect(),
+            stops_with: others.map(|other| other.name.clone()).collect(),
+        }
+    }
 }
 
 /// Limits and units of an axis, in rad (m), seconds and N·m (N).
@@ -118,6 +141,7 @@ impl Check {
             cycle_ns: config.cycle.period_ns,
             command_phase_ns: config.cycle.command_phase_ns,
             automatic_command_phase_ns: schedule::automatic_command_phase(config).ok(),
+            groups: config.groups.iter().map(|group| GroupCheck::of(config, group)).collect(),
             axes: config.axes.iter().map(|axis| AxisCheck::of(axis, config)).collect(),
             buses,
         }

@@ -7,7 +7,7 @@ use takt::bus::schedule::{BusSchedule, MessageSchedule};
 use takt::config::{Bus, Config};
 use takt::printable::printable_path;
 
-use super::{AxisCheck, Check, ComplianceCheck};
+use super::{AxisCheck, Check, ComplianceCheck, GroupCheck};
 use crate::cli::table::Table;
 
 /// The whole text.
@@ -21,6 +21,9 @@ pub fn whole(check: &Check, config: &Config) -> String {
         microseconds(check.command_phase_ns),
         automatic(check),
     );
+    if !check.groups.is_empty() {
+        let _ = write!(text, "\nGroups\n{}", groups_table(&check.groups));
+    }
     let axes = alike(&check.axes, is_shown_alike);
     let _ = write!(text, "\nLimits\n{}", limits_table(&axes));
     if let Some(table) = torque_table(&axes) {
@@ -51,6 +54,14 @@ pub fn whole(check: &Check, config: &Config) -> String {
     );
     let _ = writeln!(text, "\n{}", verdict(check));
     text
+}
+
+fn groups_table(groups: &[GroupCheck]) -> Table {
+    let mut table = Table::new(["group", "axes", "stops with"]);
+    for group in groups {
+        table.row([group.name.clone(), group.axes.join(", "), group.stops_with.join(", ")]);
+    }
+    table
 }
 
 /// What the configuration files of the axes have written, and what of them is left out.
