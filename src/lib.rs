@@ -56,7 +56,7 @@ pub use trajectory::{Trajectory, TrajectoryError, TrajectoryPoint};
 /// What runs inside the real-time thread: its types as they come out of a [`Handle`], and the planner.
 pub use takt_rt as rt;
 pub use takt_rt::{
-    AxisPoint, AxisSnapshot, BusHealth, CallbackCycle, DriveState, Event, EventKind, Follow, Origin, Phase,
-    RejectReason, RequestError, RequestId, Rule, Snapshot, StopCategory, StopCause, StopReason, StreamCounts,
-    StreamReport, StreamState, TimingLevel, linux::ThreadReport, plan,
+    AxisPoint, AxisSnapshot, AxisTarget, BusHealth, CallbackCycle, DriveState, Event, EventKind, Follow,
+    Origin, Phase, RejectReason, RequestError, RequestId, Rule, Snapshot, StopCategory, StopCause,
+    StopReason, StreamCounts, StreamReport, StreamState, TimingLevel, linux::ThreadReport, plan,
 };

@@ -18,6 +18,9 @@ programs! {
     compliance: "../examples/compliance.rs",
     config_in_code: "../examples/config_in_code.rs",
     embed: "../examples/embed.rs",
+    gravity_compensation: "../examples/gravity_compensation.rs",
+    hand_guiding: "../examples/hand_guiding.rs",
+    impedance: "../examples/impedance.rs",
     profile_modes: "../examples/profile_modes.rs",
     stream: "../examples/stream.rs",
     supervise: "../examples/supervise.rs",
@@ -79,4 +82,23 @@ fn a_program_runs_in_virtual_time() {
 #[test]
 fn a_trajectory_is_executed_slowed_down_and_paused() {
     trajectory::run(config("arm6-erob.toml")).unwrap();
+}
+
+#[test]
+fn an_arm_that_carries_its_own_weight_floats() {
+    let farthest = gravity_compensation::run(config("arm6-erob-cst.toml")).unwrap();
+    assert!(farthest < 0.05, "it has moved by {farthest} rad");
+}
+
+#[test]
+fn a_joint_on_a_spring_gives_way_and_comes_back() {
+    let (farthest, away) = impedance::run(config("arm6-erob-cst.toml")).unwrap();
+    // 20 Nm bend 200 Nm/rad by 0.1 rad; static friction takes a tenth of it, and holds the joint off in the end.
+    assert!((0.08..0.11).contains(&farthest) && away < 0.02, "{farthest} rad, then {away} rad");
+}
+
+#[test]
+fn an_arm_is_guided_by_hand_and_replays_it() {
+    let (guided, off) = hand_guiding::run(config("arm6-erob-cst.toml")).unwrap();
+    assert!(guided > 0.1 && off < 0.02, "guided by {guided} rad, {off} rad off");
 }

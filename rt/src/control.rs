@@ -199,6 +199,7 @@ impl ControlLaw {
 
     /// The target of this cycle in drive units, with the torque that is commanded.
     /// In a profile mode the set-point itself is not for the wire: see `profile`.
+    #[inline]
     pub fn target(&self, input: &LoopInput, torque: f64, scale: &Scale, limits: &AxisLimits) -> i32 {
         match *self {
             Self::Position | Self::Interpolated | Self::ProfilePosition => {

@@ -137,6 +137,7 @@ impl Frame {
     }
 
     /// A classic data frame of the first `length` of these bytes; of all of them if it is larger.
+    #[inline]
     pub(crate) fn packed(id: Id, bytes: [u8; 8], length: usize) -> Self {
         let length = length.min(bytes.len());
         let unused_bits = 64 - 8 * length as u32;
@@ -150,6 +151,7 @@ impl Frame {
     }
 
     /// A classic data frame of 0 to 8 bytes. The compiler checks the length.
+    #[inline]
     pub fn of<const N: usize>(id: Id, bytes: [u8; N]) -> Self {
         const { assert!(N <= 8) };
         Self::filled(id, FrameKind::Data, &bytes)
@@ -178,6 +180,7 @@ impl Frame {
         Ok(Self::filled(id, kind, bytes))
     }
 
+    #[inline]
     fn filled(id: Id, kind: FrameKind, bytes: &[u8]) -> Self {
         let mut data = [0; Self::MAX_BYTES];
         for (to, from) in data.iter_mut().zip(bytes) {

@@ -35,7 +35,7 @@ pub struct MotionReport {
 
 impl MotionReport {
     fn is_in_progress(&self) -> bool {
-        self.state == MotionState::InProgress
+        matches!(self.state, MotionState::InProgress)
     }
 
     fn is_under_way_in(&self, group: u8) -> bool {
@@ -74,7 +74,8 @@ impl MotionReports {
         self.reports.iter().map_while(Option::as_ref)
     }
 
-    /// Begins a motion of a group. Those of that group in progress whose axis (`None`: all of it) it takes over are replaced.
+    /// Begins a motion of a group. Those of that group in progress whose axis (`None`: all of it) it takes over are replaced. What
+    /// is in progress is kept, and the newest that have ended.
     pub fn begin(
         &mut self,
         request: RequestId,
@@ -82,13 +83,27 @@ impl MotionReports {
         axis: Option<u8>,
         takes_over: impl Fn(Option<u8>) -> bool,
     ) {
-        for report in self.reports.iter_mut().flatten() {
+        let (mut ended, mut kept) = (0, 0);
+        for index in 0..Self::CAPACITY {
+            let Some(report) = self.reports.get_mut(index).and_then(Option::as_mut) else { break };
             if report.is_under_way_in(group) && takes_over(report.axis) {
                 report.state = MotionState::Replaced { by: request };
             }
+            let is_in_progress = report.is_in_progress();
+            ended += usize::from(!is_in_progress);
+            // What is not kept gathers at the end.
+            if is_in_progress || ended <= Self::ENDED {
+                if kept < index {
+                    self.reports.swap(kept, index);
+                }
+                kept += 1;
+            }
         }
-        self.forget_old();
-        self.reports.rotate_right(1);
+        let forgotten = self.reports.iter_mut().skip(kept);
+        forgotten.take_while(|report| report.is_some()).for_each(|report| *report = None);
+        if let Some(with_newest) = self.reports.get_mut(..(kept + 1).min(Self::CAPACITY)) {
+            with_newest.rotate_right(1);
+        }
         if let Some(newest) = self.reports.first_mut() {
             *newest = Some(MotionReport { request, group, axis, state: MotionState::InProgress });
         }
@@ -108,21 +123,6 @@ impl MotionReports {
         for report in self.reports.iter_mut().flatten().filter(|report| report.is_under_way_in(group)) {
             report.state = state;
             ended(report.request);
-        }
-    }
-
-    /// Keeps what is in progress, and the newest that have ended.
-    fn forget_old(&mut self) {
-        let (mut ended, mut kept) = (0, 0);
-        for index in 0..Self::CAPACITY {
-            let Some(report) = self.reports.get_mut(index).and_then(Option::take) else { break };
-            ended += usize::from(!report.is_in_progress());
-            if report.is_in_progress() || ended <= Self::ENDED {
-                if let Some(place) = self.reports.get_mut(kept) {
-                    *place = Some(report);
-                }
-                kept += 1;
-            }
         }
     }
 }

@@ -138,6 +138,23 @@ impl FeedbackSlot {
     }
 }
 
+/// A set of the numbers that an axis may report.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct FeedbackSlots(u8);
+
+impl FeedbackSlots {
+    /// The numbers that these feedback mappings fill together.
+    pub(crate) fn of<'a>(mappings: impl IntoIterator<Item = &'a Mapping>) -> Self {
+        let fields = mappings.into_iter().flat_map(|mapping| &mapping.fields);
+        Self(fields.fold(0, |slots, field| slots | 1 << (field.slot & 7)))
+    }
+
+    /// Whether a number is in the set.
+    pub(crate) const fn contains(self, slot: FeedbackSlot) -> bool {
+        self.0 >> slot as u8 & 1 == 1
+    }
+}
+
 const IMAGE_SLOTS: usize = 8;
 
 /// The numbers of one direction of an axis, in drive units. Unsigned 32-bit objects keep their bit pattern.
@@ -269,11 +286,6 @@ impl Mapping {
     /// The length of the payload in bytes.
     pub fn length(&self) -> usize {
         self.bytes.into()
-    }
-
-    /// Whether a feedback mapping fills this slot.
-    pub fn carries(&self, slot: FeedbackSlot) -> bool {
-        self.fields.iter().any(|field| field.slot == slot as u8)
     }
 
     /// Packs the image into a payload, of which the first [`Mapping::length`] bytes count.

@@ -244,6 +244,7 @@ impl NodeMonitor {
     }
 
     /// What is wrong, with the longest silence that is allowed; `None` where no heartbeat is expected.
+    #[inline]
     pub fn fault(&self, timeout_cycles: Option<u32>) -> Option<NodeFault> {
         match self.error_control {
             ErrorControl::BootedUp => Some(NodeFault::BootUp),

@@ -95,3 +95,18 @@ fn what_cannot_be_exchanged_or_comes_too_late_is_refused_and_changes_nothing() {
     rig.run_until(Phase::Holding, 5_000);
     assert_eq!(rig.stops(), []);
 }
+
+#[test]
+fn a_torque_that_the_drive_maps_beside_what_was_expected_is_shown() {
+    let torque = MappedObject::new(0x6077, 0, 16);
+    let mut rig = Rig::new(1);
+    rig.host.requests.extend([Request::Sync(true), Request::Activate]);
+    rig.run(20);
+    assert_eq!(rig.host.snapshot.axes[0].torque, None);
+    let mut rig = Rig::new(1);
+    let reported = data(&[CONTROLWORD, TARGET], &[STATUSWORD, torque]);
+    rig.host.requests.extend([Request::ProcessData(reported), Request::Sync(true), Request::Activate]);
+    rig.run(20);
+    // The low bytes of the drive's position, 1000 counts, stand where the torque is: its rated one.
+    assert_eq!(rig.host.snapshot.axes[0].torque, Some(31.0));
+}

@@ -190,6 +190,7 @@ impl SimulatedJoint {
             inertia: defaults::INERTIA,
             viscous_friction: defaults::VISCOUS_FRICTION,
             coulomb_friction: defaults::COULOMB_FRICTION,
+            gravity: 0.0,
             rated_torque: limits.torque,
             peak_torque: defaults::PEAK_TO_RATED_TORQUE * limits.torque,
             initial_position: defaults::initial_position(limits),

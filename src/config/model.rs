@@ -462,6 +462,8 @@ pub struct SimulatedJoint {
     pub viscous_friction: f64,
     /// N·m (N). Default 0.5.
     pub coulomb_friction: f64,
+    /// The torque of gravity a quarter turn from 0, where the joint hangs: N·m (the weight of a linear axis: N). Default 0.
+    pub gravity: f64,
     /// What the drive calls rated torque (object 6076): N·m (N). Default: the torque limit.
     pub rated_torque: f64,
     /// Peak torque: N·m (N). Default: three times the rated torque.

@@ -6,6 +6,7 @@ use takt_rt::{DriveState, Frame, Nanoseconds};
 
 use super::defect::{Defect, Unsupported};
 use super::mailbox::Mailbox;
+use super::plant::Gravity;
 
 /// A simulated drive on a CAN bus. Time never runs backwards between calls, and no call allocates memory.
 pub trait Drive: Send {
@@ -30,6 +31,9 @@ pub trait Drive: Send {
     /// Cuts the supply and restores it at once: the drive boots with its saved parameters. The joint keeps its
     /// position, and the brake stops it.
     fn power_cycle(&mut self, now_ns: Nanoseconds, mailbox: &mut Mailbox);
+
+    /// From now on gravity loads the joint so.
+    fn set_gravity(&mut self, gravity: Gravity);
 
     /// Sets the external load torque on the joint: N·m (N). It lasts until it is set again.
     fn set_load_torque(&mut self, torque: f64);

@@ -23,21 +23,44 @@ pub struct EndStops {
     pub highest: f64,
 }
 
+/// How gravity loads a joint.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Gravity {
+    /// Not at all.
+    #[default]
+    None,
+    /// As a pendulum that hangs at 0: by this torque (N·m) a quarter turn from there.
+    Pendulum(f64),
+    /// By this force (N) against the direction of the axis, everywhere.
+    Weight(f64),
+}
+
+impl Gravity {
+    fn torque(self, position: f64) -> f64 {
+        match self {
+            Self::None => 0.0,
+            Self::Pendulum(torque) => -torque * position.sin(),
+            Self::Weight(force) => -force,
+        }
+    }
+}
+
 /// The mechanical state of a joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Joint {
     parameters: JointParameters,
     position: f64,
     velocity: f64,
-    /// External torque: gravity, contact.
+    /// External torque: contact.
     load_torque: f64,
+    gravity: Gravity,
     stops: Option<EndStops>,
 }
 
 impl Joint {
     /// A joint at rest.
     pub fn new(parameters: JointParameters, position: f64) -> Self {
-        Self { parameters, position, velocity: 0.0, load_torque: 0.0, stops: None }
+        Self { parameters, position, velocity: 0.0, load_torque: 0.0, gravity: Gravity::None, stops: None }
     }
 
     /// The same joint with end stops, which stop it without rebound.
@@ -60,6 +83,11 @@ impl Joint {
         self.load_torque = torque;
     }
 
+    /// From now on gravity loads the joint so.
+    pub fn set_gravity(&mut self, gravity: Gravity) {
+        self.gravity = gravity;
+    }
+
     /// Stops at once, like a joint that hits an obstacle.
     pub fn halt(&mut self) {
         self.velocity = 0.0;
@@ -73,7 +101,7 @@ impl Joint {
     pub fn step(&mut self, duration_s: f64, motor_torque: f64, is_braked: bool) {
         let brake = if is_braked { self.parameters.brake_torque } else { 0.0 };
         let friction = self.parameters.coulomb_friction + brake;
-        let torque = motor_torque + self.load_torque;
+        let torque = motor_torque + self.load_torque + self.gravity.torque(self.position);
         let mut left_s = duration_s;
         if self.velocity != 0.0 {
             let ended = self.accelerated(torque - friction.copysign(self.velocity), left_s);
@@ -139,6 +167,24 @@ mod tests {
     const PARAMETERS: JointParameters =
         JointParameters { inertia: 0.3, viscous_friction: 2.0, coulomb_friction: 4.0, brake_torque: 60.0 };
     const STEP_S: f64 = 125e-6;
+
+    #[test]
+    fn gravity_pulls_a_pendulum_to_zero_and_a_weight_down() {
+        let free = JointParameters { coulomb_friction: 0.0, ..PARAMETERS };
+        let settled = |gravity: Gravity, position: f64| {
+            let mut joint = Joint::new(free, position);
+            joint.set_gravity(gravity);
+            (0..20_000).for_each(|_| joint.step(0.001, 0.0, false));
+            joint
+        };
+        for position in [1.0, -2.5] {
+            let hanging = settled(Gravity::Pendulum(3.0), position);
+            assert!(hanging.position().abs() < 1e-3, "{}", hanging.position());
+        }
+        // It falls as fast as viscous friction lets it.
+        let falling = settled(Gravity::Weight(3.0), 0.0);
+        assert!((falling.velocity() + 3.0 / free.viscous_friction).abs() < 1e-6, "{}", falling.velocity());
+    }
 
     #[test]
     fn a_torque_below_the_friction_moves_nothing() {

@@ -11,8 +11,9 @@ use super::defect::{Defect, Unsupported};
 use super::drive::{Drive, DriveFault, Observation};
 use super::erob::{ErobJoint, ErobParameters};
 use super::medium::{FrameOnWire, Medium, WireBitRates};
+use super::plant::Gravity;
 use super::yz_aim::{YzAimJoint, YzAimParameters};
-use crate::config::{Axis, Config, DriveFamily};
+use crate::config::{Axis, Config, DriveFamily, Travel};
 
 /// Capacity of the interface's transmit queue.
 const TRANSMIT_QUEUE: usize = 256;
@@ -41,8 +42,17 @@ pub struct SimulatedBus {
     now_ns: Nanoseconds,
 }
 
-/// The drive that simulates an axis.
+/// The drive that simulates an axis, under its gravity.
 fn simulated(axis: &Axis, config: &Config) -> Box<dyn Drive> {
+    let mut drive = weightless(axis, config);
+    drive.set_gravity(match axis.travel {
+        Travel::Rotary => Gravity::Pendulum(axis.simulated.gravity),
+        Travel::Linear { .. } => Gravity::Weight(axis.simulated.gravity),
+    });
+    drive
+}
+
+fn weightless(axis: &Axis, config: &Config) -> Box<dyn Drive> {
     let simulation = &config.simulation;
     match axis.drive {
         DriveFamily::ErobCanopen => Box::new(ErobJoint::new(ErobParameters::of(axis, simulation))),

@@ -178,6 +178,7 @@ fn axis(number: usize, bus: usize, node: u8) -> Axis {
             inertia: 0.1,
             viscous_friction: 0.1,
             coulomb_friction: 0.1,
+            gravity: 0.0,
             rated_torque: 31.0,
             peak_torque: 60.0,
             initial_position: 0.0,

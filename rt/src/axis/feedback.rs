@@ -64,6 +64,7 @@ impl Axis {
 
     /// Takes feedback PDO number `pdo` (from 0) that arrived at `at_ns`. One that is late changes nothing, nor one that is
     /// too short.
+    #[inline]
     pub fn receive(&mut self, pdo: usize, frame: &Frame, at_ns: Nanoseconds) -> Result<(), TooShort> {
         if pdo == 0 {
             self.late_reply.note_reply();
@@ -107,7 +108,8 @@ impl Axis {
         let scale = &self.parameters.scale;
         let counts = self.feedback.feedback(FeedbackSlot::Position);
         let velocity = self
-            .reports(FeedbackSlot::Velocity)
+            .reported_slots
+            .contains(FeedbackSlot::Velocity)
             .then(|| scale.velocity_from_drive(self.feedback.feedback(FeedbackSlot::Velocity)));
         let velocity_limit = self.parameters.limits.velocity;
         if self.joint.take_report(counts, velocity, span, scale, velocity_limit) {
@@ -128,13 +130,9 @@ impl Axis {
         }
     }
 
-    fn reports(&self, slot: FeedbackSlot) -> bool {
-        self.parameters.feedback.iter().any(|pdo| pdo.mapping.carries(slot))
-    }
-
     /// The last value of an object that the drive reports; `None` if it does not report it, or has not reported yet.
     fn reported(&self, slot: FeedbackSlot) -> Option<i32> {
-        (self.is_heard() && self.reports(slot)).then(|| self.feedback.feedback(slot))
+        (self.is_heard() && self.reported_slots.contains(slot)).then(|| self.feedback.feedback(slot))
     }
 
     /// Whether the drive has reported at all.
@@ -160,6 +158,7 @@ impl Axis {
 
     /// Where the joint has been reported in this cycle, if it cannot have got there. The report is accepted when the next one
     /// agrees with it.
+    #[inline]
     pub fn jump(&self) -> Option<Jump> {
         self.joint.jump().filter(|_| self.feedback_age() == 0)
     }
@@ -179,9 +178,9 @@ impl Axis {
 
     /// The mode of operation (object 6061) that the drive shows, if it differs from ours. A drive that has not reported yet
     /// shows none.
+    #[inline]
     pub fn foreign_mode(&self) -> Option<i8> {
-        let ours = self.parameters.law.operation_mode() as i8;
-        self.mode().filter(|shown| *shown != ours)
+        self.mode().filter(|shown| *shown != self.parameters.law.operation_mode() as i8)
     }
 
     /// The mode of operation (object 6061) that the drive shows, if it reports it.
@@ -210,6 +209,7 @@ impl Axis {
     }
 
     /// What is wrong with the node, by its error control messages.
+    #[inline]
     pub fn node_fault(&self) -> Option<NodeFault> {
         self.node_monitor.fault(self.parameters.heartbeat_timeout_cycles)
     }

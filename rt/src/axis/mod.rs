@@ -42,7 +42,7 @@ use arrayvec::ArrayVec;
 use crate::cia402::DriveState;
 use crate::guard::FollowingErrorGuard;
 use crate::host::AxisSnapshot;
-use crate::pdo::{CommandSlot, FeedbackSlot, MAX_PDOS, ProcessImage};
+use crate::pdo::{CommandSlot, FeedbackSlot, FeedbackSlots, MAX_PDOS, ProcessImage};
 use crate::record::AxisRecord;
 use crate::source::Follow;
 use crate::watch::{DuplicateNodeDetector, NodeMonitor};
@@ -73,6 +73,8 @@ pub struct Axis {
     /// The numbers that are sent, and those that were received.
     command: ProcessImage,
     feedback: ProcessImage,
+    /// Which numbers the drive reports.
+    reported_slots: FeedbackSlots,
     set_points: SetPoints,
     /// What is done with a target beyond the limits, by what leads the axis now.
     follow: Follow,
@@ -104,6 +106,7 @@ impl Axis {
         let mut command = ProcessImage::default();
         command.set(CommandSlot::OperationMode, parameters.law.operation_mode() as i32);
         Self {
+            reported_slots: slots_of(&parameters.feedback),
             follow: parameters.follow,
             parameters,
             command,
@@ -166,6 +169,7 @@ impl Axis {
         feedback: ArrayVec<Pdo, MAX_PDOS>,
     ) {
         self.parameters.commands = commands;
+        self.reported_slots = slots_of(&feedback);
         self.parameters.feedback = feedback;
         self.reception.drop_arrived();
     }
@@ -180,6 +184,7 @@ impl Axis {
     }
 
     /// Lets a slot pass for what is watched over time. Comes after [`Axis::begin_cycle`] or [`Axis::wait`].
+    #[inline]
     pub fn watch(&mut self) {
         self.watch_stall();
         self.node_monitor.pass();
@@ -230,6 +235,7 @@ impl Axis {
     }
 
     /// Shows the state to observers. `shown` keeps when the drive reported last.
+    #[inline]
     pub(crate) fn show(&self, shown: &mut AxisSnapshot) {
         let set_point = self.set_point();
         *shown = AxisSnapshot {
@@ -253,27 +259,32 @@ impl Axis {
         };
     }
 
-    /// What this cycle leaves behind.
-    pub fn record(&self, period_s: f64, record: &mut AxisRecord) {
+    /// What this cycle leaves behind, beside what is shown of it.
+    #[inline]
+    pub(crate) fn record(&self, period_s: f64, shown: &AxisSnapshot, record: &mut AxisRecord) {
         let torque = self.feedback.feedback(FeedbackSlot::Torque);
-        let set_point = self.set_point();
+        let acceleration = self.set_point().acceleration;
         *record = AxisRecord {
-            position_set: set_point.position,
-            position: self.joint.position(),
-            drive_state: self.drive_state(),
-            velocity_set: set_point.velocity as f32,
-            acceleration_set: set_point.acceleration as f32,
+            position_set: shown.position_set,
+            position: shown.position,
+            drive_state: shown.drive_state,
+            velocity_set: shown.velocity_set as f32,
+            acceleration_set: acceleration as f32,
             jerk_set: (self.set_points.acceleration_change() / period_s) as f32,
-            velocity: self.joint.velocity() as f32,
-            torque_set: self.torque_set as f32,
+            velocity: shown.velocity as f32,
+            torque_set: shown.torque_set as f32,
             torque: self.parameters.scale.torque_from_per_mille(torque) as f32,
-            following_error: self.following.error() as f32,
+            following_error: shown.following_error as f32,
             controlword: self.controlword(),
-            statusword: self.statusword(),
-            error_code: self.error_code(),
-            feedback_age: self.cycles_since_report(),
+            statusword: shown.statusword,
+            error_code: shown.error_code,
+            feedback_age: shown.feedback_age,
             command_raw: self.command.command(self.parameters.law.target_slot()),
             position_raw: self.feedback.feedback(FeedbackSlot::Position),
         };
     }
+}
+
+fn slots_of(feedback: &[Pdo]) -> FeedbackSlots {
+    FeedbackSlots::of(feedback.iter().map(|pdo| &pdo.mapping))
 }

@@ -213,6 +213,7 @@ impl Axis {
 
     /// For how long the velocity or torque that the drive is asked for has been expired; 0 if it is valid or there is
     /// none.
+    #[inline]
     pub fn expired_ns(&self, now_ns: Nanoseconds) -> Nanoseconds {
         self.profile.expired_ns(now_ns)
     }

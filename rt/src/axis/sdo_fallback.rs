@@ -44,6 +44,7 @@ impl SdoFallback {
     }
 
     /// Lets a slot pass in which the drive is to have this controlword, or needs none.
+    #[inline]
     fn pass(&mut self, wanted: Option<u16>) {
         if self.word() != wanted {
             *self =
@@ -114,6 +115,7 @@ impl Axis {
     }
 
     /// Lets a slot pass in which the drive is to have this controlword by SDO, or needs none.
+    #[inline]
     pub fn command_by_service(&mut self, word: Option<u16>) {
         self.sdo_fallback.pass(word);
     }

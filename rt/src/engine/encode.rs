@@ -53,7 +53,8 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         }
         self.shared.asked_by_sync.insert(bus);
         let is_skipped = self.shared.skip_sync.take(bus);
-        for axis in self.axes_of(bus) {
+        for place in self.shared.places_on(bus).iter() {
+            let Some(axis) = self.axes.get_mut(place) else { break };
             match axis.parameters().feedback_since {
                 FeedbackSince::Sync if is_skipped => axis.skip_request(now_ns),
                 FeedbackSince::Sync => axis.request_feedback(now_ns),
@@ -91,8 +92,10 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
 
     fn encode_heartbeat_and_time(&mut self, bus: usize, batch: &mut SendBatch) {
         let heartbeat = self.shared.heartbeat.as_mut().and_then(|heartbeat| heartbeat.take(bus));
-        let time = self.shared.time.and_then(|time| time.message());
-        for frame in heartbeat.into_iter().chain(time) {
+        if let Some(frame) = heartbeat {
+            self.push(frame, batch);
+        }
+        if let Some(frame) = self.shared.time.as_ref().and_then(|time| time.message()) {
             self.push(frame, batch);
         }
     }
@@ -135,10 +138,15 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
             return;
         }
         self.group.unsent.clear(bus);
-        for axis in self.axes.iter_mut().filter(|axis| usize::from(axis.parameters().bus) == bus) {
-            axis.command(self.group.goal_of(axis, self.shared), self.group.fault_reset_word(axis));
-            let lost = axis.frames().filter(|frame| batch.try_push(*frame).is_err()).count();
-            self.shared.dropped += lost as u64;
+        let reset_word = self.group.fault_reset_word();
+        for place in self.shared.places_on(bus).iter() {
+            let own_place = place.checked_sub(self.group.places.start);
+            let Some(axis) = own_place.and_then(|place| self.axes.get_mut(place)) else { continue };
+            let reset_word = reset_word.filter(|_| axis.drive_state().is_faulted());
+            axis.command(self.group.goal_of(axis, self.shared), reset_word);
+            for frame in axis.frames() {
+                self.shared.dropped += u64::from(batch.try_push(frame).is_err());
+            }
         }
     }
 }
@@ -176,14 +184,13 @@ impl<const AXES: usize, const BUSES: usize> Group<AXES, BUSES> {
         if may_be_enabled { Goal::Enabled } else { Goal::Disabled }
     }
 
-    /// The controlword of a fault reset, for a drive that is at fault. Bit 7 is low first, so that what follows is an edge
+    /// The controlword of a fault reset, for the drives that are at fault. Bit 7 is low first, so that what follows is an edge
     /// whatever was sent before; in the end the drives have time to answer.
-    fn fault_reset_word(&self, axis: &Axis) -> Option<u16> {
-        let word = match self.fault_reset_cycles.div_ceil(FAULT_RESET_CYCLES) {
-            0 | 1 => return None,
-            2 => controlword::FAULT_RESET,
-            _ => controlword::DISABLE_VOLTAGE,
-        };
-        axis.drive_state().is_faulted().then_some(word)
+    fn fault_reset_word(&self) -> Option<u16> {
+        match self.fault_reset_cycles.div_ceil(FAULT_RESET_CYCLES) {
+            0 | 1 => None,
+            2 => Some(controlword::FAULT_RESET),
+            _ => Some(controlword::DISABLE_VOLTAGE),
+        }
     }
 }

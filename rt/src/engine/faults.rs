@@ -1,7 +1,8 @@
 //! What is wrong with the group, and how it stops.
 
 use super::Engine;
-use super::group::GroupContext;
+use super::group::{Group, GroupContext};
+use super::shared::Shared;
 use super::state::{GroupState, PowerRemoval};
 use crate::axis::Axis;
 use crate::control::ControlLaw;
@@ -58,11 +59,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
         self.check_buses(buses);
         self.check_timing();
         self.check_transmission();
-        for index in 0..self.axes.len() {
-            if let Some((axis, fault)) = self.check_axis(index) {
-                self.fail(Origin::Axis(axis), fault);
-            }
-        }
+        self.check_axes();
         self.check_enable_timeout();
         self.take_power_if_cut_off();
     }
@@ -121,25 +118,21 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
         self.fail(Origin::Bus(bus as u8), Fault::NotTransmitted { cycles, limit });
     }
 
-    fn check_axis(&mut self, index: usize) -> Option<(u8, Fault)> {
-        let state = &self.group.state;
-        let axis = self.axes.get_mut(index)?;
-        let is_resetting = self.group.fault_reset_cycles > 0 && axis.is_being_reset();
-        let check = AxisCheck {
-            // It stops by its own quick stop, which ends without torque.
-            may_be_disabled: matches!(state, GroupState::Enabling | GroupState::Disabling(_))
-                || matches!(state, GroupState::Stopping) && axis.stops_by_itself(),
-            is_fault_expected: is_resetting,
-            is_mode_free: matches!(state, GroupState::Disabling(_)),
-            is_in_operation: !matches!(state, GroupState::Enabling | GroupState::Disabling(_)),
-            // An axis counts in cycles of its bus.
-            acknowledge_limit: self.shared.acknowledge_timeout_cycles.div_ceil(self.shared.divider_of(axis)),
-        };
-        // Whatever else is wrong with the drive: it is not enabled again.
-        if check.is_disabled(axis) || check.is_faulted(axis) {
-            axis.latch_off();
+    /// Checks every axis. A fault that comes up changes what is expected of those behind it.
+    fn check_axes(&mut self) {
+        let mut expected = Expectation::of(self.group);
+        for index in 0..self.axes.len() {
+            let Some(axis) = self.axes.get_mut(index) else { break };
+            // Whatever else is wrong with the drive: it is not enabled again.
+            if expected.is_disabled(axis) || expected.is_faulted(axis) {
+                axis.latch_off();
+            }
+            if let Some(fault) = expected.fault_of(axis, self.shared) {
+                let number = axis.number();
+                self.fail(Origin::Axis(number), fault);
+                expected = Expectation::of(self.group);
+            }
         }
-        check.fault_of(axis).map(|fault| (axis.number(), fault))
     }
 
     /// A stop whose commands have not left for too long, because the thread is always late, does not wait for a punctual
@@ -274,36 +267,58 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
     }
 }
 
-/// What is expected of an axis in the present state of the group.
-struct AxisCheck {
-    /// Whether its drive may be out of operation enabled.
+/// What is expected of the axes in the present state of their group.
+struct Expectation {
+    /// Whether the drives may be out of operation enabled.
     may_be_disabled: bool,
-    /// Whether the fault that it shows is being reset.
-    is_fault_expected: bool,
-    /// Whether its mode of operation may be any.
+    /// The same of those that stop by their own quick stop, which ends without torque.
+    may_have_quick_stopped: bool,
+    /// Whether faults are being reset.
+    is_resetting: bool,
+    /// Whether the modes of operation may be any.
     is_mode_free: bool,
-    /// Whether it is held or moved.
+    /// Whether the axes are held or moved.
     is_in_operation: bool,
-    /// Cycles of its bus within which a target must be acknowledged.
-    acknowledge_limit: u32,
 }
 
-impl AxisCheck {
-    fn is_disabled(&self, axis: &Axis) -> bool {
-        !self.may_be_disabled && !axis.is_enabled()
+impl Expectation {
+    fn of<const AXES: usize, const BUSES: usize>(group: &Group<AXES, BUSES>) -> Self {
+        let is_disabling = matches!(group.state, GroupState::Disabling(_));
+        let may_be_disabled = is_disabling || matches!(group.state, GroupState::Enabling);
+        Self {
+            may_be_disabled,
+            may_have_quick_stopped: matches!(group.state, GroupState::Stopping),
+            is_resetting: group.fault_reset_cycles > 0,
+            is_mode_free: is_disabling,
+            is_in_operation: !may_be_disabled,
+        }
     }
 
+    #[inline]
+    fn is_disabled(&self, axis: &Axis) -> bool {
+        let may_be_disabled = self.may_be_disabled || self.may_have_quick_stopped && axis.stops_by_itself();
+        !axis.is_enabled() && !may_be_disabled
+    }
+
+    #[inline]
     fn is_faulted(&self, axis: &Axis) -> bool {
-        axis.drive_state().is_faulted() && !self.is_fault_expected
+        axis.drive_state().is_faulted() && !(self.is_resetting && axis.is_being_reset())
     }
 
     /// The first thing that is wrong with an axis.
-    fn fault_of(&self, axis: &mut Axis) -> Option<Fault> {
-        self.communication_fault(axis)
-            .or_else(|| if self.is_in_operation { self.operation_fault(axis) } else { None })
+    fn fault_of<const AXES: usize, const BUSES: usize>(
+        &self,
+        axis: &Axis,
+        shared: &Shared<AXES, BUSES>,
+    ) -> Option<Fault> {
+        match self.communication_fault(axis) {
+            None if self.is_in_operation => self.operation_fault(axis, shared),
+            fault => fault,
+        }
     }
 
     /// What must be right whenever a drive may have torque.
+    #[inline]
     fn communication_fault(&self, axis: &Axis) -> Option<Fault> {
         let limit = axis.parameters().missed_feedback_cycles;
         if axis.feedback_age() > limit {
@@ -332,7 +347,11 @@ impl AxisCheck {
     }
 
     /// What must be right while an axis is held or moved.
-    fn operation_fault(&self, axis: &mut Axis) -> Option<Fault> {
+    fn operation_fault<const AXES: usize, const BUSES: usize>(
+        &self,
+        axis: &Axis,
+        shared: &Shared<AXES, BUSES>,
+    ) -> Option<Fault> {
         if let Some(code) = axis.unexplained_emergency() {
             return Some(Fault::EmergencyMessage { code });
         }
@@ -342,9 +361,13 @@ impl AxisCheck {
         if let Some(jump) = axis.jump() {
             return Some(Fault::ImplausibleFeedback { distance: jump.distance, reachable: jump.reach });
         }
-        let (cycles, limit) = (axis.unacknowledged_cycles(), self.acknowledge_limit);
-        if cycles > limit {
-            return Some(Fault::NotAcknowledged { cycles, limit });
+        let cycles = axis.unacknowledged_cycles();
+        if cycles > 0 {
+            // An axis counts in cycles of its bus.
+            let limit = shared.acknowledge_timeout_cycles.div_ceil(shared.divider_of(axis));
+            if cycles > limit {
+                return Some(Fault::NotAcknowledged { cycles, limit });
+            }
         }
         let checked = axis.check_following().and_then(|()| axis.check_profile());
         checked.err()

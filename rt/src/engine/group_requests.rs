@@ -140,7 +140,10 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
         }
         // It may take the place of a callback.
         if matches!(self.group.state, GroupState::InLoop(_)) {
-            self.axes.iter_mut().for_each(|axis| axis.derive_from_steps(self.shared.period_s));
+            for axis in self.axes.iter_mut() {
+                axis.derive_from_steps(self.shared.period_s);
+                axis.end_stream(self.shared.period_s);
+            }
         }
         let legs = self.axes.iter().map(|axis| {
             let (position, velocity) = target_of(axis);

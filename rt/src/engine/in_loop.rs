@@ -17,7 +17,8 @@ use crate::plan::State;
 use crate::record::{EventKind, MAX_AXES};
 use crate::request::{RejectReason, RequestId};
 use crate::source::{
-    CallbackCycle, CallbackId, CallbackOutcome, CallbackReturn, CallbackRun, StreamSample, StreamState,
+    AxisTarget, CallbackCycle, CallbackId, CallbackOutcome, CallbackReturn, CallbackRun, StreamSample,
+    StreamState,
 };
 use crate::stop::Origin;
 
@@ -34,6 +35,9 @@ pub(super) struct InLoop {
     /// The axes that rest because nothing is commanded of them, a bit each.
     resting: u32,
 }
+
+/// To come to rest wherever the joint can.
+const HOLD: AxisTarget = AxisTarget::Velocity { velocity: 0.0, acceleration: 0.0 };
 
 const _: () = assert!(MAX_AXES <= u32::BITS as usize, "each axis has a bit");
 
@@ -154,13 +158,12 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
                     axis.streamed(&target, period_s)
                 }
                 None => {
-                    if resting & bit == 0 {
-                        let here = axis.set_point().into();
-                        axis.begin_rest(&here, period_s)
-                            .map_err(|fault| (Origin::Axis(axis.number()), fault))?;
-                    }
+                    let begun = match resting & bit {
+                        0 => axis.begin_rest(&HOLD, period_s),
+                        _ => Ok(()),
+                    };
                     resting |= bit;
-                    axis.resting(period_s)
+                    begun.and_then(|()| axis.resting(period_s))
                 }
             };
             next.push(of_axis.map_err(|fault| (Origin::Axis(axis.number()), fault))?);

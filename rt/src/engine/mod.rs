@@ -17,6 +17,7 @@
 //!
 //! Events wait in an outbox until [`Engine::finish`] hands them to the host.
 
+mod axis_places;
 mod backlog;
 mod encode;
 mod executing;
@@ -286,6 +287,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         self.couple_stops();
         self.probe_late_drives();
         self.sample_trajectories(host);
+        self.shared.stopped_by_sdo = BusSet::default();
         self.for_each_group(|group| {
             group.step(input, host);
             host.keep_callback(group.group.number, group.group.state.callback());
@@ -339,8 +341,11 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         let [first, ..] = shared.record.group_phases;
         shared.record.phase = first;
         for axis in &self.axes {
-            if let Some(record) = shared.record.axes.get_mut(usize::from(axis.number())) {
-                axis.record(shared.period_s, record);
+            let number = usize::from(axis.number());
+            let (records, shown) = (&mut shared.record.axes, &mut shared.snapshot.axes);
+            if let (Some(record), Some(shown)) = (records.get_mut(number), shown.get_mut(number)) {
+                axis.show(shown);
+                axis.record(shared.period_s, shown, record);
             }
         }
         shared.dropped += u64::from(!host.record(&shared.record));
@@ -366,18 +371,13 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         }
         let [GroupSnapshot { phase, remaining_s, stop, .. }, ..] = snapshot.groups;
         (snapshot.phase, snapshot.remaining_s, snapshot.stop) = (phase, remaining_s, stop);
-        for axis in &self.axes {
-            if let Some(shown) = snapshot.axes.get_mut(usize::from(axis.number())) {
-                axis.show(shown);
-            }
-        }
         for (shown, health) in snapshot.buses.iter_mut().zip(buses) {
             *shown = *health;
         }
     }
 }
 
-/// Whether a bus has SYNC, feedback and set-points in this slot.
+/// Whether a bus has SYNC, feedback and set-points in this slot. Most have them in each, which takes no division to see.
 const fn has_cycle(bus: &BusParameters, slot: u64) -> bool {
-    slot.is_multiple_of(bus.divider as u64)
+    bus.divider == 1 || slot.is_multiple_of(bus.divider as u64)
 }

@@ -5,6 +5,7 @@
 use super::Engine;
 use super::group::GroupContext;
 use super::state::GroupState;
+use crate::axis::Axis;
 use crate::cia402::controlword;
 use crate::frame::Frame;
 use crate::time::{NANOSECONDS_PER_SECOND, Nanoseconds};
@@ -19,24 +20,26 @@ const OBEYING_NS: Nanoseconds = NANOSECONDS_PER_SECOND / 20;
 impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
     /// Decides which drives are to be stopped by SDO.
     pub(super) fn update_sdo_fallback(&mut self) {
-        let has_power = self.group.state.has_power();
-        let is_disabling = matches!(self.group.state, GroupState::Disabling(_));
-        let is_overdue =
-            Nanoseconds::from(self.group.state_cycles).saturating_mul(self.shared.period_ns) > OBEYING_NS;
-        let is_always_late = self.shared.slots.late_cycles > self.shared.not_transmitted_cycles;
-        for axis in self.axes.iter_mut() {
+        let Self { group, axes, shared, .. } = self;
+        let has_power = group.state.has_power();
+        let is_disabling = matches!(group.state, GroupState::Disabling(_));
+        let is_overdue = Nanoseconds::from(group.state_cycles).saturating_mul(shared.period_ns) > OBEYING_NS;
+        let is_always_late = shared.slots.late_cycles > shared.not_transmitted_cycles;
+        let must_be_switched_off = |axis: &Axis| {
+            let behind_cycles = shared.backlog.behind_cycles(axis.parameters().bus.into());
+            let is_cut_off = is_always_late || behind_cycles > shared.not_transmitted_cycles;
+            // Whether such a drive receives its PDOs is not known.
+            let is_silent = axis.feedback_age() > axis.parameters().missed_feedback_cycles;
+            axis.is_pdo_unreachable()
+                || axis.drive_state().has_torque() && (is_cut_off || is_silent && is_overdue)
+        };
+        for axis in axes.iter_mut() {
             if has_power {
                 axis.note_pdo_reachability();
             }
-            let behind_cycles = self.shared.backlog.behind_cycles(axis.parameters().bus.into());
-            let is_cut_off = is_always_late || behind_cycles > self.shared.not_transmitted_cycles;
-            // Whether such a drive receives its PDOs is not known.
-            let is_silent = axis.feedback_age() > axis.parameters().missed_feedback_cycles;
-            let is_to_be_switched_off = axis.is_pdo_unreachable()
-                || axis.drive_state().has_torque() && (is_cut_off || is_silent && is_overdue);
             let word = if !has_power {
                 None
-            } else if is_disabling && is_to_be_switched_off {
+            } else if is_disabling && must_be_switched_off(axis) {
                 Some(controlword::DISABLE_VOLTAGE)
             } else if axis.is_pdo_unreachable() {
                 Some(axis.sdo_stop_word())
@@ -44,6 +47,9 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
                 None
             };
             axis.command_by_service(word);
+            if word.is_some() {
+                shared.stopped_by_sdo.insert(axis.parameters().bus.into());
+            }
         }
     }
 }
@@ -51,6 +57,9 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
 impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
     /// The frame that is due for a drive on a bus.
     pub(super) fn sdo_fallback_frame(&mut self, bus: usize) -> Option<Frame> {
+        if !self.shared.stopped_by_sdo.contains(bus) {
+            return None;
+        }
         // Every other drive has its turn before one is told again: two frames each, one in a slot.
         let turns = 2 * self.axes.len() as u32;
         let repeat_slots =

@@ -1,8 +1,9 @@
 //! What the cycle begins with: the slot, the frames that have arrived, and what the drives report by them.
 
-use super::shared::Shared;
-use super::{CycleInput, Deadline, Engine, has_cycle};
+use super::group::Group;
+use super::{CycleInput, Deadline, Engine};
 use crate::axis::{Axis, FeedbackSince};
+use crate::bus_set::BusSet;
 use crate::dispatch::Destination;
 use crate::frame::Frame;
 use crate::port::Received;
@@ -27,9 +28,21 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
                     // A frame that is too short counts as not received: the age of the feedback shows it.
                     let _ = axis.receive(pdo.into(), &received.frame, received.at_ns);
                 }
-                return Receiver::Engine;
+                Receiver::Engine
             }
-            Destination::Unused => return Receiver::Engine,
+            Destination::Unused => Receiver::Engine,
+            destination => {
+                self.receive_message(bus, destination, received);
+                Receiver::Host
+            }
+        }
+    }
+
+    /// Takes a frame that is no process data: a rare one.
+    #[cold]
+    fn receive_message(&mut self, bus: usize, destination: Destination, received: &Received) {
+        match destination {
+            Destination::Feedback { .. } | Destination::Unused => {}
             Destination::Emergency { axis: place } => self.receive_emergency(place.into(), received),
             Destination::ErrorControl { axis: place } => {
                 let state = received.frame.payload().first().copied();
@@ -43,13 +56,12 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
             }
             Destination::Service => self.receive_sdo_response(bus, &received.frame),
         }
-        Receiver::Host
     }
 
     fn receive_emergency(&mut self, place: usize, received: &Received) {
         let [low, high, register, manufacturer @ ..] = received.frame.first_word().to_le_bytes();
         let code = u16::from_le_bytes([low, high]);
-        let group = self.group_at(place);
+        let group = group_at(&self.groups, place);
         let Some(axis) = self.axes.get_mut(place) else { return };
         axis.receive_emergency(code);
         let kind = EventKind::Emergency { axis: axis.number(), code, register, manufacturer };
@@ -59,11 +71,6 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
             group,
             kind,
         });
-    }
-
-    /// The number of the group of the axis at a place.
-    fn group_at(&self, place: usize) -> Option<u8> {
-        self.groups.iter().find(|group| group.places.contains(&place)).map(|group| group.number)
     }
 
     /// Takes what another master has told the nodes of a bus.
@@ -100,23 +107,31 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         if let Some(time) = &mut self.shared.time {
             time.pass(elapsed, input.now_ns);
         }
-        self.shared.backlog.pass(input.behind, self.shared.buses_in_cycle(input.slot));
+        let in_cycle = self.shared.buses_in_cycle(input.slot);
+        self.shared.backlog.pass(input.behind, in_cycle);
         let elapsed_s = self.shared.period_s * elapsed as f64;
         let asked_by_sync = core::mem::take(&mut self.shared.asked_by_sync);
-        let Shared { snapshot, buses, requested, .. } = &mut self.shared;
-        for axis in &mut self.axes {
-            // A drive that was not asked, because the thread was late or the bus behind, has not missed its answer.
-            let is_unasked = requested.sync
-                && axis.parameters().feedback_since == FeedbackSince::Sync
-                && !asked_by_sync.contains(axis.parameters().bus.into());
-            let bus = buses.get(usize::from(axis.parameters().bus));
-            if bus.is_some_and(|bus| has_cycle(bus, input.slot)) && !is_unasked {
-                let has_reported = axis.begin_cycle(elapsed_s);
-                let shown = snapshot.axes.get_mut(usize::from(axis.number()));
-                if let Some(shown) = shown.filter(|_| has_reported) {
-                    (shown.feedback_slot, shown.feedback_ns) = (input.slot, input.now_ns);
+        // A drive that was not asked, because the thread was late or the bus behind, has not missed its answer.
+        let unasked =
+            if self.shared.requested.sync { in_cycle.without(asked_by_sync) } else { BusSet::default() };
+        let to_answer_sync = in_cycle.without(unasked);
+        for (place, axis) in self.axes.iter_mut().enumerate() {
+            let is_asked_by_sync = axis.parameters().feedback_since == FeedbackSince::Sync;
+            let to_report = if is_asked_by_sync { to_answer_sync } else { in_cycle };
+            if to_report.contains(axis.parameters().bus.into()) {
+                let known_state = axis.drive_state();
+                if axis.begin_cycle(elapsed_s) {
+                    let number = axis.number();
+                    if let Some(shown) = self.shared.snapshot.axes.get_mut(usize::from(number)) {
+                        (shown.feedback_slot, shown.feedback_ns) = (input.slot, input.now_ns);
+                    }
+                    let (state, statusword) = (axis.drive_state(), axis.statusword());
+                    if state != known_state {
+                        let kind = EventKind::DriveState { axis: number, state, statusword };
+                        self.shared.emit(group_at(&self.groups, place), kind);
+                    }
                 }
-                if axis.parameters().feedback_since != FeedbackSince::Sync {
+                if !is_asked_by_sync {
                     axis.expect_feedback(input.now_ns);
                 }
             } else {
@@ -124,19 +139,13 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
             }
             axis.watch();
         }
-        self.report_drive_states();
     }
+}
 
-    /// Emits an event for each drive whose state has changed since the last record.
-    fn report_drive_states(&mut self) {
-        for place in 0..self.axes.len() {
-            let Some(axis) = self.axes.get(place) else { continue };
-            let (number, state, statusword) = (axis.number(), axis.drive_state(), axis.statusword());
-            let recorded = self.shared.record.axes.get(usize::from(number));
-            if recorded.is_some_and(|recorded| recorded.drive_state != state) {
-                let kind = EventKind::DriveState { axis: number, state, statusword };
-                self.shared.emit(self.group_at(place), kind);
-            }
-        }
-    }
+/// The number of the group of the axis at a place.
+fn group_at<const AXES: usize, const BUSES: usize>(
+    groups: &[Group<AXES, BUSES>],
+    place: usize,
+) -> Option<u8> {
+    groups.iter().find(|group| group.places.contains(&place)).map(|group| group.number)
 }

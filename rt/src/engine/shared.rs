@@ -2,6 +2,7 @@
 
 use arrayvec::ArrayVec;
 
+use super::axis_places::AxisPlaces;
 use super::backlog::Backlog;
 use super::heartbeat::HeartbeatProducer;
 use super::outbox::Outbox;
@@ -28,6 +29,8 @@ pub(super) struct Shared<const AXES: usize, const BUSES: usize> {
     pub(super) acknowledge_timeout_cycles: u32,
     pub(super) categories: StopCategories,
     pub(super) buses: ArrayVec<BusParameters, BUSES>,
+    /// The axes on each bus.
+    places_on: [AxisPlaces; BUSES],
     pub(super) requested: Requested,
     /// Whether the commands of this cycle were ready in time, as far as is known.
     pub(super) deadline: Deadline,
@@ -40,6 +43,8 @@ pub(super) struct Shared<const AXES: usize, const BUSES: usize> {
     pub(super) skip_sync: BusSet,
     /// The buses whose drives have been asked for feedback by SYNC in this slot.
     pub(super) asked_by_sync: BusSet,
+    /// The buses with drives that are stopped by SDO in this slot.
+    pub(super) stopped_by_sdo: BusSet,
     /// The bus and the identifier of a frame that only this controller may send.
     pub(super) foreign_frame: Option<(u8, Id)>,
     pub(super) heartbeat: Option<HeartbeatProducer<BUSES>>,
@@ -83,6 +88,13 @@ impl<const AXES: usize, const BUSES: usize> Shared<AXES, BUSES> {
         let slowest_divider = parameters.buses.iter().map(|bus| bus.divider).max().unwrap_or(1);
         let buses = parameters.buses.len();
         let heartbeat = |heartbeat| HeartbeatProducer::new(heartbeat, buses, slowest_divider);
+        let mut places_on = [AxisPlaces::default(); BUSES];
+        for (place, number) in parameters.axes_of_groups().flatten().enumerate() {
+            let axis = parameters.axes.get(usize::from(number));
+            if let Some(places) = axis.and_then(|axis| places_on.get_mut(usize::from(axis.bus))) {
+                places.insert(place);
+            }
+        }
         Self {
             period_ns: parameters.period_ns,
             period_s: parameters.period_ns as f64 / NANOSECONDS_PER_SECOND as f64,
@@ -97,6 +109,7 @@ impl<const AXES: usize, const BUSES: usize> Shared<AXES, BUSES> {
             backlog: Backlog::new(buses),
             skip_sync: BusSet::default(),
             asked_by_sync: BusSet::default(),
+            stopped_by_sdo: BusSet::default(),
             foreign_frame: None,
             heartbeat: parameters.heartbeat.map(heartbeat),
             time: parameters.time_cycles.map(TimeProducer::new),
@@ -106,6 +119,7 @@ impl<const AXES: usize, const BUSES: usize> Shared<AXES, BUSES> {
             record: CycleRecord { axis_count, group_count, ..CycleRecord::default() },
             snapshot: Snapshot { axis_count, bus_count, group_count, ..Snapshot::default() },
             buses: parameters.buses,
+            places_on,
         }
     }
 
@@ -116,6 +130,11 @@ impl<const AXES: usize, const BUSES: usize> Shared<AXES, BUSES> {
 
     pub(super) fn present_slot(&self) -> u64 {
         self.slots.present.unwrap_or(0)
+    }
+
+    /// The axes on a bus, by their places among those of the engine.
+    pub(super) fn places_on(&self, bus: usize) -> AxisPlaces {
+        self.places_on.get(bus).copied().unwrap_or_default()
     }
 
     /// Slots in one cycle of the bus of an axis.

@@ -32,6 +32,7 @@ impl SlotWatch {
     }
 
     /// Begins the cycle of a slot. Returns the slots since the one before: 1 if none was skipped.
+    #[inline]
     pub(super) fn begin(&mut self, slot: u64) -> u64 {
         let elapsed = self.present.map_or(1, |last| slot.saturating_sub(last));
         self.present = Some(slot);

@@ -234,6 +234,7 @@ fn simulated(
     let inertia = value("inertia", q.inertia, ranges.inertia);
     let viscous_friction = value("viscous_friction", q.damping, ranges.viscous_friction);
     let coulomb_friction = value("coulomb_friction", q.effort, ranges.friction);
+    let gravity = value("gravity", q.effort, ranges.friction);
     let rated_torque = value("rated_torque", q.effort, ranges.effort);
     let peak_torque = value("peak_torque", q.effort, ranges.effort);
     let power_up_ns = section.get("power_up").and_then(|entry| entry.nanoseconds(ranges::POWER_UP_S));
@@ -250,6 +251,7 @@ fn simulated(
         inertia: inertia.unwrap_or(defaults::INERTIA),
         viscous_friction: viscous_friction.unwrap_or(defaults::VISCOUS_FRICTION),
         coulomb_friction: coulomb_friction.unwrap_or(defaults::COULOMB_FRICTION),
+        gravity: gravity.unwrap_or(0.0),
         rated_torque,
         peak_torque: peak_torque.unwrap_or(defaults::PEAK_TO_RATED_TORQUE * rated_torque),
         initial_position: initial.unwrap_or_else(|| limits.map_or(0.0, defaults::initial_position)),

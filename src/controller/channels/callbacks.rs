@@ -60,9 +60,28 @@ impl CallbackCommand<'_> {
         self.set(axis, None, Some(position));
     }
 
-    /// To be at a position with a velocity and an acceleration (rad, rad/s and rad/s², or m).
-    pub fn motion(&mut self, axis: usize, motion: State) {
-        self.set(axis, Some(AxisTarget::position(motion)), None);
+    /// To move at a velocity (rad/s or m/s), within the limits, those of the position included.
+    pub fn velocity(&mut self, axis: usize, velocity: f64) {
+        self.target(axis, AxisTarget::Velocity { velocity, acceleration: 0.0 });
+    }
+
+    /// To be driven by a torque (N·m or N), without any loop. Only an axis in cyclic synchronous torque can be. Its velocity and its
+    /// position limits are still guarded.
+    pub fn torque(&mut self, axis: usize, torque: f64) {
+        self.target(axis, AxisTarget::Torque(torque));
+    }
+
+    /// To be held by a spring and a damper at a position (rad or m), with a torque that is fed forward (N·m or N): stiffness in N·m/rad,
+    /// damping in N·m·s/rad (N/m, N·s/m). Only an axis in cyclic synchronous torque can be, with gains up to those of its configuration. The
+    /// position is led to within the limits.
+    pub fn impedance(&mut self, axis: usize, position: f64, stiffness: f64, damping: f64, torque: f64) {
+        self.target(axis, AxisTarget::Impedance { state: State::rest(position), stiffness, damping, torque });
+    }
+
+    /// Anything that an axis can be asked for: a position with a velocity, an acceleration, and a torque that is fed forward; and the
+    /// like.
+    pub fn target(&mut self, axis: usize, target: impl Into<AxisTarget>) {
+        self.set(axis, Some(target.into()), None);
     }
 
     /// To come to rest and hold.
@@ -166,7 +185,7 @@ impl GivenCallback {
             };
             let sequence =
                 sequence.get_or_insert_with(|| PositionSequence::at_rest(axes[*number].position_set));
-            targets[*number] = Some(AxisTarget::position(sequence.next(position, limits, period_s)));
+            targets[*number] = Some(sequence.next(position, limits, period_s).into());
         }
     }
 }

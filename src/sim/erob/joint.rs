@@ -18,7 +18,7 @@ use super::sdo::ErobSdoServer;
 use crate::sim::defect::{Defect, Unsupported};
 use crate::sim::drive::{Drive, DriveFault, Observation};
 use crate::sim::mailbox::Mailbox;
-use crate::sim::plant::Joint;
+use crate::sim::plant::{Gravity, Joint};
 use crate::sim::random::Random;
 use crate::sim::servo::Servo;
 
@@ -312,6 +312,10 @@ impl Drive for ErobJoint {
         mailbox.clear();
         self.start(now_ns);
         self.schedule(now_ns);
+    }
+
+    fn set_gravity(&mut self, gravity: Gravity) {
+        self.joint.set_gravity(gravity);
     }
 
     fn set_load_torque(&mut self, torque: f64) {

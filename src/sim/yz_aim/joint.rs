@@ -24,7 +24,7 @@ use super::sdo::YzAimSdoServer;
 use crate::sim::defect::{Defect, Unsupported};
 use crate::sim::drive::{Drive, DriveFault, NodeState, Observation};
 use crate::sim::mailbox::Mailbox;
-use crate::sim::plant::Joint;
+use crate::sim::plant::{Gravity, Joint};
 use crate::sim::random::Random;
 use crate::sim::servo::Servo;
 use load_monitor::LoadMonitor;
@@ -341,6 +341,10 @@ impl Drive for YzAimJoint {
         mailbox.clear();
         self.power_up(now_ns);
         self.schedule(now_ns);
+    }
+
+    fn set_gravity(&mut self, gravity: Gravity) {
+        self.joint.set_gravity(gravity);
     }
 
     fn set_load_torque(&mut self, torque: f64) {
