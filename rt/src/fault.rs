@@ -323,7 +323,7 @@ impl Fault {
             Self::DriveFault { error_code: code } | Self::EmergencyMessage { code } => (code.into(), 0.0),
             Self::DriveDisabled { statusword } => (statusword.into(), 0.0),
             Self::ModeChanged { shown, expected } => (shown.into(), (expected as i8).into()),
-            Self::NoTorqueInMode { mode } => ((mode as i8).into(), 0.0),
+            Self::NoTorqueInMode { mode } => (0.0, (mode as i8).into()),
             Self::StiffnessLimit { stiffness, limit } => (stiffness, limit),
             Self::DampingLimit { damping, limit } => (damping, limit),
             Self::StreamNotBegun { cycles, limit }
@@ -367,7 +367,7 @@ impl Fault {
             Rule::ModeChanged => {
                 Self::ModeChanged { shown: seen as i8, expected: OperationMode::from_number(allowed as i8)? }
             }
-            Rule::NoTorqueInMode => Self::NoTorqueInMode { mode: OperationMode::from_number(seen as i8)? },
+            Rule::NoTorqueInMode => Self::NoTorqueInMode { mode: OperationMode::from_number(allowed as i8)? },
             Rule::StiffnessLimit => Self::StiffnessLimit { stiffness: seen, limit: allowed },
             Rule::DampingLimit => Self::DampingLimit { damping: seen, limit: allowed },
             Rule::NotAcknowledged => Self::NotAcknowledged { cycles: seen as u32, limit: allowed as u32 },
