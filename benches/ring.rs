@@ -7,7 +7,7 @@ use std::io;
 use std::time::{Duration, Instant};
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use takt::controller::channels::{ChannelSizes, HostSide, LogSide, RtSide, channels};
+use takt::controller::channels::{ChannelSizes, GroupStream, HostSide, LogSide, RtSide, channels};
 use takt::telemetry::{
     AxisDescription, Logger, LoggerOptions, Machine, RecordingDestination, SetPointMagnitudes, Unit,
     WallClock,
@@ -21,8 +21,7 @@ const PUSHES: u64 = 32;
 
 fn sides(axes: usize) -> (RtSide, HostSide, LogSide) {
     channels(&ChannelSizes {
-        groups: 1,
-        stream: Default::default(),
+        groups: vec![GroupStream::default()],
         axes,
         buses: axes.div_ceil(3),
         records: RECORDS,

@@ -8,7 +8,7 @@
 use std::hint::black_box;
 
 use takt::bus::trace::traced;
-use takt::controller::channels::{ChannelSizes, channels};
+use takt::controller::channels::{ChannelSizes, GroupStream, channels};
 use takt_rt::{BusHealth, BusPort, CycleRecord, Frame, HostInterface, Id, ReceiveBatch, Received, Snapshot};
 
 /// A bus with drives that answer SYNC.
@@ -61,8 +61,7 @@ fn main() {
     let repetitions: u32 = repetitions;
     let buses = usize::from(axes).div_ceil(3);
     let (mut rt, _host, mut log) = channels(&ChannelSizes {
-        groups: 1,
-        stream: Default::default(),
+        groups: vec![GroupStream::default()],
         axes: axes.into(),
         buses,
         records: 64,

@@ -5,8 +5,8 @@ use std::time::Duration;
 
 use takt::controller::VirtualRun;
 use takt::controller::{MotionError, Outcome};
-use takt::{CommandError, Config, Controller, SessionOptions};
-use takt_rt::{EventKind, Phase, Rule, StopCategory};
+use takt::{AxisPoint, CommandError, Config, Controller, SessionOptions, StreamHandle, TrajectoryPoint};
+use takt_rt::{ControlLaw, EventKind, Phase, Rule, StopCategory, StreamState};
 
 const LONG: Duration = Duration::from_secs(20);
 
@@ -88,5 +88,92 @@ fn what_is_meant_for_one_group_says_so_where_it_cannot_be_for_all() {
     let arm = controller.group("arm").unwrap();
     assert!(matches!(arm.move_to(&[0.1; 4]), Err(CommandError::Count { given: 4, axes: 3 })));
     assert_eq!(arm.axes(), [0, 1, 2]);
+    controller.finish().unwrap();
+}
+
+/// As the configuration, with a gripper that follows positions.
+fn with_positions() -> Config {
+    let mut config = config();
+    config.axes[3].control = ControlLaw::Position;
+    config.program.moves.retain(|program_move| program_move.group == 0);
+    config
+}
+
+const MILLISECOND_NS: u64 = 1_000_000;
+
+#[test]
+fn each_group_follows_a_stream_of_its_own() {
+    let controller = Controller::start(with_positions(), SessionOptions::default()).unwrap();
+    let (arm, gripper) = (controller.group("arm").unwrap(), controller.group("gripper").unwrap());
+    arm.begin_stream().unwrap();
+    let now_ns = StreamHandle::now_ns();
+    let at = |number: u64| now_ns + (100 + 10 * number) * MILLISECOND_NS;
+    for number in 0..40 {
+        let position = 0.002 * number.min(30) as f64;
+        arm.stream().push(at(number), &[position, -position, 0.0]).unwrap();
+    }
+    gripper.begin_stream().unwrap();
+    gripper.stream().push(at(0), &[AxisPoint::moving(0.0, 0.0)]).unwrap();
+    gripper.stream().push(at(20), &[AxisPoint::moving(0.1, 0.0)]).unwrap();
+    let refused = arm.stream().push(at(0), &[0.0; 4]).unwrap_err().to_string();
+    assert_eq!(refused, "there are 3 axes, and the point has entries for 4");
+    let rests = |state: &takt::Snapshot| {
+        let are_dry = state.groups().iter().all(|group| group.stream.state == StreamState::Dry);
+        (are_dry && state.axes().iter().all(|axis| axis.velocity_set.abs() < 1e-6)).then_some(*state)
+    };
+    let state = controller.wait_until(LONG, rests).unwrap();
+    let counts = [0, 1].map(|group: usize| state.groups[group].stream.counts.points);
+    assert_eq!(counts, [40, 2]);
+    let expected = [0.06, -0.06, 0.0, 0.1];
+    for (axis, expected) in state.axes().iter().zip(expected) {
+        assert!((axis.position_set - expected).abs() < 1e-3, "{axis:?} for {expected}");
+    }
+    assert_eq!((arm.stream().report().counts.points, gripper.stream().report().counts.points), (40, 2));
+    controller.finish().unwrap();
+}
+
+#[test]
+fn a_group_is_carried_along_a_trajectory_while_the_other_one_streams() {
+    let controller = Controller::start(with_positions(), SessionOptions::default()).unwrap();
+    let (arm, gripper) = (controller.group("arm").unwrap(), controller.group("gripper").unwrap());
+    arm.begin_stream().unwrap();
+    let point = TrajectoryPoint { time_s: 0.8, positions: vec![0.2], ..TrajectoryPoint::default() };
+    let motion = gripper.execute(&[point]).unwrap();
+    controller.set_speed(motion, 0.8).unwrap();
+    assert!(controller.trajectory_progress(motion).unwrap().of_s == 0.8);
+    controller.wait(motion, LONG).unwrap();
+    let state = controller.state();
+    assert!((state.axes[3].position_set - 0.2).abs() < 1e-9);
+    assert_eq!(
+        state.groups().iter().map(|group| group.phase).collect::<Vec<_>>(),
+        [Phase::Streaming, Phase::Holding]
+    );
+
+    arm.stop(StopCategory::Two).unwrap();
+    arm.wait_for(Phase::Holding, LONG).unwrap();
+    let motion = arm.move_through(&[vec![0.1, 0.0, 0.1], vec![0.2, 0.1, 0.0]]).unwrap();
+    controller.wait(motion, LONG).unwrap();
+    assert!((controller.state().axes[0].position_set - 0.2).abs() < 1e-9);
+
+    let refused = controller.move_through(&[vec![0.1; 4]]).unwrap_err();
+    assert_eq!(refused.to_string(), "it is for one group, and must name it: arm, gripper");
+    controller.finish().unwrap();
+}
+
+#[test]
+fn the_only_group_of_a_configuration_is_stopped_by_its_name() {
+    let mut config = Config::load(Path::new("configs/single-erob.toml")).unwrap();
+    config.telemetry.is_recorded = false;
+    config.telemetry.black_box_ns = None;
+    config.groups = vec![takt::config::Group { name: "joint".to_owned(), axes: vec![0], stops_with: vec![] }];
+    let controller = Controller::start(config, SessionOptions::default()).unwrap();
+    let joint = controller.group("joint").unwrap();
+    let motion = joint.move_to(&[0.5]).unwrap();
+    joint.wait_for(Phase::Moving, LONG).unwrap();
+    joint.stop(StopCategory::One).unwrap();
+    assert!(matches!(controller.wait(motion, LONG), Err(MotionError::Stopped(_))));
+    joint.wait_for(Phase::Disabled, LONG).unwrap();
+    joint.enable().unwrap();
+    joint.wait_for(Phase::Holding, LONG).unwrap();
     controller.finish().unwrap();
 }

@@ -509,7 +509,7 @@ fn points_from_two_threads_are_followed_and_the_end_of_them_is_reported() {
     std::thread::sleep(Duration::from_millis(300));
     let state = arm.state();
     assert_eq!((state.phase, state.stop), (Phase::Streaming, None));
-    assert_eq!(state.stream.counts.points, 50);
+    assert_eq!(state.groups[0].stream.counts.points, 50);
     for (axis, home) in state.axes.iter().zip(&home) {
         assert!((axis.position_set - home - 0.05).abs() < 5e-3, "{} from {home}", axis.position_set);
     }

@@ -90,7 +90,7 @@ fn a_function_leads_an_arm_from_inside_the_real_time_thread_without_the_heap_and
     });
     let callback = callback.unwrap();
     let state = arm.state();
-    assert_eq!((state.phase, state.stream.state), (Phase::Streaming, StreamState::Callback));
+    assert_eq!((state.phase, state.groups[0].stream.state), (Phase::Streaming, StreamState::Callback));
     assert_eq!(callback.result(), None);
     assert_eq!(callback.wait(PATIENCE), Ok(()));
     assert_eq!((arm.state().phase, arm.state().stop), (Phase::Holding, None));

@@ -27,9 +27,13 @@ impl Place {
     }
 
     fn play(&self, options: &[&str]) -> Output {
+        self.play_on(&Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/arm6-erob.toml"), options)
+    }
+
+    fn play_on(&self, config: &Path, options: &[&str]) -> Output {
         Command::new(env!("CARGO_BIN_EXE_takt"))
             .arg("play")
-            .arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/arm6-erob.toml"))
+            .arg(config)
             .arg(self.path("points.csv"))
             .args(options)
             .current_dir(self.folder.path())
@@ -411,4 +415,61 @@ fn an_interruption_stops_the_arm_in_control() {
     let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(130), "{output:?}");
     assert_eq!(json(&output)["stop"]["category"], 2);
+}
+
+/// An arm of three joints and a finger, each a group, whose drives follow positions.
+fn arm_and_finger(place: &Place) -> PathBuf {
+    let text = include_str!("../configs/arm-and-gripper.toml").replace("mode = \"pt\" ", "mode = \"csp\"");
+    let (machine, _program) = text.split_once("# The moves of a group").unwrap();
+    let path = place.path("machine.toml");
+    fs::write(&path, machine).unwrap();
+    path
+}
+
+#[test]
+fn the_groups_of_the_joints_that_a_file_names_follow_it_at_the_same_times() {
+    let place = Place::new();
+    let machine = arm_and_finger(&place);
+    let mut text = String::from("arrive,at,shoulder,finger\n");
+    for step in 0..=50 {
+        let (at, (position, _)) = (f64::from(step) * 0.02, reach(f64::from(step) / 50.0));
+        writeln!(text, "{at},{},{},{}", at + 0.05, 0.3 * position, 0.2 * position).unwrap();
+    }
+    place.write(text);
+    let output = place.play_on(&machine, &["--virtual", "--json", "--out", "out.csv"]);
+    assert_eq!(output.status.code(), Some(0), "{output:?}");
+    let (report, out) = (json(&output), fs::read_to_string(place.path("out.csv")).unwrap());
+    assert_eq!(
+        (&report["points"], &report["late_points"], &report["stop"]),
+        (&51.into(), &0.into(), &Value::Null)
+    );
+    let rows: Vec<Vec<f64>> = (out.lines().skip(1))
+        .map(|line| line.split(',').map(|cell| cell.parse().unwrap()).collect())
+        .collect();
+    // t, base, shoulder, elbow, finger. The two move in the same proportion in every cycle, and the others hold.
+    for row in &rows {
+        assert!((row[2] / 0.3 - row[4] / 0.2).abs() < 2e-3, "{row:?}");
+        assert!(row[1].abs() < 1e-3 && row[3].abs() < 1e-3, "{row:?}");
+    }
+    let last = rows.last().unwrap();
+    assert!((last[2] - 0.3).abs() < 1e-3 && (last[4] - 0.2).abs() < 1e-3, "{last:?}");
+}
+
+#[test]
+fn a_trajectory_is_for_one_group_and_says_whose_joints_it_names() {
+    let place = Place::new();
+    let machine = arm_and_finger(&place);
+    place.write("arrive,at,shoulder,finger\n0,1,0.1,0.1\n0,2,0.2,0.2\n");
+    let output = place.play_on(&machine, &["--trajectory", "--virtual"]);
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    let expected = "a trajectory is for one group: this joint is of \"gripper\", and another one of \"arm\"";
+    assert!(said.contains("finger") && said.contains(expected), "{said}");
+
+    place.write("arrive,at,finger\n0,1,0.1\n0,2,0.2\n");
+    let output = place.play_on(&machine, &["--trajectory", "--virtual", "--out", "out.csv"]);
+    assert_eq!(output.status.code(), Some(0), "{output:?}");
+    let out = fs::read_to_string(place.path("out.csv")).unwrap();
+    let last: Vec<f64> = out.lines().last().unwrap().split(',').map(|cell| cell.parse().unwrap()).collect();
+    assert!((last[4] - 0.2).abs() < 1e-6, "{last:?}");
 }

@@ -9,7 +9,7 @@ use mcap::records::op;
 use serde_json::Value;
 use takt::bus::trace::traced;
 use takt::config::Config;
-use takt::controller::channels::{ChannelSizes, channels};
+use takt::controller::channels::{ChannelSizes, GroupStream, channels};
 use takt::controller::{Outcome, VirtualRun};
 use takt::faults::{FaultInjector, Scenario};
 use takt::sim::SimulatedBus;
@@ -454,8 +454,7 @@ fn a_length_that_a_file_lies_about_costs_no_memory() {
 fn many_short_cycles_and_a_long_name_take_no_more_memory_than_the_file() {
     let folder = tempfile::tempdir().unwrap();
     let sizes = ChannelSizes {
-        groups: 1,
-        stream: Default::default(),
+        groups: vec![GroupStream::default()],
         axes: 0,
         buses: 1,
         records: 1024,

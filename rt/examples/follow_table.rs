@@ -230,13 +230,13 @@ fn followed(motion: &Motion, arrivals: &[Arrival]) -> (Followed, Vec<f64>) {
         rig.run(1);
         let set_point = rig.engine.axes()[0].set_point().position;
         set.push(set_point);
-        let played_s = time_s - rig.host.snapshot.stream.counts.lag_ns as f64 * 1e-9;
+        let played_s = time_s - rig.host.snapshot.groups[0].stream.counts.lag_ns as f64 * 1e-9;
         if played_s > motion.from_s.max(0.0) {
             error = error.max((set_point - (motion.at)(played_s).position).abs());
         }
     }
     let (beyond, jerk) = differences(&set, (motion.from_s / PERIOD_S) as usize + 200);
-    let lag_ms = rig.host.snapshot.stream.counts.lag_ns as f64 * 1e-6;
+    let lag_ms = rig.host.snapshot.groups[0].stream.counts.lag_ns as f64 * 1e-6;
     (Followed { stops: rig.stops().len(), beyond, error_mrad: error * 1e3, lag_ms, jerk }, set)
 }
 

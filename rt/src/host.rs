@@ -109,8 +109,6 @@ pub struct Snapshot<const AXES: usize = MAX_AXES, const BUSES: usize = MAX_BUSES
     pub steps: u64,
     /// How late the controller has been of late.
     pub timing: TimingLevel,
-    /// The stream, or the last one.
-    pub stream: StreamReport,
     /// Events and records that found no room, since the start.
     pub dropped: u64,
     /// Requests that were rejected, since the start.
@@ -158,7 +156,6 @@ impl<const AXES: usize, const BUSES: usize> Default for Snapshot<AXES, BUSES> {
             missed_slots: 0,
             steps: 0,
             timing: TimingLevel::Normal,
-            stream: StreamReport::default(),
             dropped: 0,
             rejected: 0,
             answers: Answers::default(),
@@ -191,6 +188,8 @@ pub struct GroupSnapshot {
     pub remaining_s: f64,
     /// Why it stopped or is stopping; `None` again after it has been re-enabled.
     pub stop: Option<StopReason>,
+    /// Its stream, or the last one.
+    pub stream: StreamReport,
 }
 
 /// One axis after a cycle.

@@ -108,7 +108,10 @@ fn what_a_callback_commands_is_where_the_axis_is_at_the_end_of_the_slot_and_the_
                 });
                 COMMANDED
             });
-        assert_eq!((rig.phase(), rig.host.snapshot.stream.state), (Phase::Streaming, StreamState::Callback));
+        assert_eq!(
+            (rig.phase(), rig.host.snapshot.groups[0].stream.state),
+            (Phase::Streaming, StreamState::Callback)
+        );
         assert_eq!(state_of(&rig, begun), MotionState::InProgress);
         rig.run(999);
         // A thousand calls are half a turn.

@@ -123,7 +123,7 @@ fn a_stream_of_torques_that_runs_dry_leaves_the_joint_held_and_goes_on_without_a
     let moving_at = position(&rig);
     rig.host.wish = Some(StreamWish::Dry([AxisTarget::Torque(5.0); MAX_AXES]));
     rig.run(1_000);
-    assert_eq!(rig.host.snapshot.stream.state, StreamState::Dry);
+    assert_eq!(rig.host.snapshot.groups[0].stream.state, StreamState::Dry);
     assert!(rig.engine.axes()[0].velocity().abs() < 0.01);
     let way = position(&rig) - moving_at;
     assert!((0.0..0.3).contains(&way), "{way}");
@@ -134,7 +134,7 @@ fn a_stream_of_torques_that_runs_dry_leaves_the_joint_held_and_goes_on_without_a
     rig.run(1_000);
     rig.stream_target(AxisTarget::Torque(-2.0));
     rig.run(300);
-    assert_eq!((rig.host.snapshot.stream.state, torque(&rig)), (StreamState::Following, -2.0));
+    assert_eq!((rig.host.snapshot.groups[0].stream.state, torque(&rig)), (StreamState::Following, -2.0));
     assert_eq!(causes(&rig), []);
     assert_torque_steps_within(&rig, 2.5);
 }

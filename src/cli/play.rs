@@ -15,8 +15,8 @@ use takt::controller::realtime_thread::StartError;
 use takt::controller::session::{SessionError, SessionOptions};
 use takt::controller::{Controller, Outcome, StartFailure};
 use takt::play::{
-    ArmedFrom, AxisMaxima, FileStream, FileTrajectory, PlayError, PlayFile, PlayFileError, RealStage,
-    SetPointLog, SharedSetPointLog, Stage, StreamSummary, VirtualStage, execute, stream,
+    ArmedFrom, AxisMaxima, FileStream, FileTrajectory, PlayError, PlayFile, PlayFileError, PlayedGroup,
+    RealStage, SetPointLog, SharedSetPointLog, Stage, StreamSummary, VirtualStage, execute, stream,
 };
 use takt::telemetry::{Machine, StopReport, words};
 use takt_rt::{Follow, NANOSECONDS_PER_SECOND, StopReason, StreamDelay};
@@ -98,6 +98,13 @@ impl Piece {
         match self {
             Self::Trajectory(trajectory) => trajectory.begins_s(),
             Self::Stream(_) => 0.0,
+        }
+    }
+
+    fn groups(&self) -> &[PlayedGroup] {
+        match self {
+            Self::Trajectory(trajectory) => std::slice::from_ref(trajectory.group()),
+            Self::Stream(file) => file.groups(),
         }
     }
 
@@ -187,7 +194,8 @@ pub fn run(arguments: &Arguments) -> Exit {
     };
     let armed = ArmedFrom::default();
     let names: Vec<String> = config.axes.iter().map(|axis| axis.name.clone()).collect();
-    let log = SetPointLog::new(&names, config.cycle.period_ns, piece.begins_s(), armed.clone(), out);
+    let log = SetPointLog::new(&names, config.cycle.period_ns, piece.begins_s(), armed.clone(), out)
+        .of_groups(piece.groups().iter().map(|group| group.number));
     let played = if arguments.is_virtual {
         play_in_virtual_time(&config, &piece, log, &armed, &interrupted)
     } else {
@@ -210,10 +218,10 @@ fn read(arguments: &Arguments, config: &Config) -> Result<(PlayFile, Piece), Exi
     let file = PlayFile::parse(&bytes, &names).map_err(wrong_file)?;
     file.check_modes(&config.axes).map_err(wrong_file)?;
     if !arguments.trajectory {
-        let stream = FileStream::new(&file, &config.axes).map_err(wrong_file)?;
+        let stream = FileStream::new(&file, config).map_err(wrong_file)?;
         return Ok((file, Piece::Stream(stream)));
     }
-    let trajectory = FileTrajectory::new(&file, config.axes.len()).map_err(wrong_file)?;
+    let trajectory = FileTrajectory::new(&file, config).map_err(wrong_file)?;
     let period_s = config.cycle.period_ns as f64 / NANOSECONDS_PER_SECOND as f64;
     trajectory.check(&config.axes, period_s).map_err(wrong_file)?;
     Ok((file, Piece::Trajectory(trajectory)))

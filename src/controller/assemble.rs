@@ -11,6 +11,7 @@ use takt_rt::{
 };
 
 use crate::config::{Axis, Compliance, Config, ConfigError, DriveFamily, Interface};
+use crate::controller::channels::{AxisPlaces, GroupStream};
 use crate::drive::{PdoPlan, ProcessData, yz_aim};
 
 /// How long the drives may take from the first controlword to operation enabled.
@@ -207,9 +208,19 @@ pub fn scale(axis: &Axis) -> Result<Scale, ScaleError> {
     })
 }
 
-/// How the streams of a configuration are looked ahead. What is to be followed exactly is not limited before it is checked.
-pub fn look_ahead(config: &Config) -> LookAheadParameters {
-    let limits = config.axes.iter().map(|axis| match axis.follow {
+/// The stream of each group of a configuration.
+pub fn streams(config: &Config) -> Vec<GroupStream> {
+    let stream = |group: usize| {
+        let axes = config.axes_of_group(group);
+        let look_ahead = look_ahead(config, &axes);
+        GroupStream { axes: AxisPlaces::new(axes), look_ahead }
+    };
+    (0..config.groups.len().max(1)).map(stream).collect()
+}
+
+/// How a stream for these axes is looked ahead. What is to be followed exactly is not limited before it is checked.
+pub fn look_ahead(config: &Config, axes: &[usize]) -> LookAheadParameters {
+    let limits = axes.iter().filter_map(|axis| config.axes.get(*axis)).map(|axis| match axis.follow {
         Follow::Smooth => axis.limits,
         Follow::Exact => AxisLimits::NONE,
     });

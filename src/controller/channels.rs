@@ -11,6 +11,7 @@
 //!
 //! No call on [`RtSide`] allocates, locks or waits, even if another thread is preempted in the middle of a call.
 
+mod axis_places;
 mod callback_panic;
 mod callback_record;
 mod callbacks;
@@ -32,8 +33,8 @@ use std::sync::Arc;
 
 use takt_rt::{
     AxisSnapshot, AxisTarget, CallbackCycle, CallbackId, CallbackReturn, CallbackRun, CycleRecord, Event,
-    ExecutionStart, Frame, HostInterface, LookAheadParameters, MAX_AXES, Nanoseconds, Received, Request,
-    RequestEnvelope, RequestId, RequestTarget, Snapshot, StreamSample, TrajectoryId, TrajectorySample,
+    ExecutionStart, Frame, HostInterface, MAX_AXES, Nanoseconds, Received, Request, RequestEnvelope,
+    RequestId, RequestTarget, Snapshot, StreamSample, TrajectoryId, TrajectorySample,
 };
 
 use super::assemble;
@@ -43,9 +44,10 @@ use client_requests::{TakenRequests, client_requests};
 use latest::{Attempt, Reader, Writer};
 use observed_events::{EventWriter, observed_events};
 use records::{RecordConsumer, RecordProducer};
-use stream::{StreamReceiver, stream_channel};
+use stream::{StreamReceiver, stream_channels};
 use trajectories::TrajectoryTaker;
 
+pub use axis_places::AxisPlaces;
 pub use callback_record::{CallbackRecord, CallbackTimes};
 pub use callbacks::{
     CallbackClock, CallbackCommand, CallbackGiver, CallbackState, GivenCallback, LoopCallback,
@@ -54,16 +56,14 @@ pub use client_requests::{ClientRequests, MotionEnd, WAITING_AT_MOST};
 pub use observed_events::EventReader;
 pub use request_numbers::RequestNumbers;
 pub use ring::{Consumer, Producer, ring};
-pub use stream::Streamer;
+pub use stream::{GroupStream, Streamer, chunk};
 pub use trajectories::{GivenTrajectory, TrajectoryGiver};
 
 /// The capacity of each channel.
 #[derive(Clone, Debug)]
 pub struct ChannelSizes {
-    /// Groups of the controller, up to [`takt_rt::MAX_GROUPS`].
-    pub groups: usize,
-    /// How streams are looked ahead.
-    pub stream: LookAheadParameters,
+    /// The stream of each group of the controller, up to [`takt_rt::MAX_GROUPS`].
+    pub groups: Vec<GroupStream>,
     /// Axes of the controller, up to [`takt_rt::MAX_AXES`].
     pub axes: usize,
     /// Buses of the controller, up to [`takt_rt::MAX_BUSES`].
@@ -85,8 +85,7 @@ impl ChannelSizes {
     /// the events of a second in which the logger is late.
     pub fn of(config: &Config) -> Self {
         Self {
-            groups: config.groups.len().max(1),
-            stream: assemble::look_ahead(config),
+            groups: assemble::streams(config),
             axes: config.axes.len(),
             buses: config.buses.len(),
             records: config.telemetry.ring_records,
@@ -117,9 +116,9 @@ pub enum ChannelError {
 /// Makes the channels, and allocates and touches all their memory.
 pub fn channels(sizes: &ChannelSizes) -> (RtSide, HostSide, LogSide) {
     let (request_in, request_out) = ring(sizes.requests);
-    let (streamer, stream) = stream_channel(sizes.stream.clone());
+    let (streamer, streams) = stream_channels(&sizes.groups);
     let (snapshot_in, snapshot_out) =
-        latest::latest(words::snapshot_words(sizes.groups, sizes.axes, sizes.buses));
+        latest::latest(words::snapshot_words(sizes.groups.len(), sizes.axes, sizes.buses));
     let (service_in, service_out) = (0..sizes.buses).map(|_| ring(sizes.service_out)).unzip();
     let (received_in, received_out) = ring(sizes.service_in);
     let (record_in, record_out) = records::record_ring(sizes.records);
@@ -128,12 +127,12 @@ pub fn channels(sizes: &ChannelSizes) -> (RtSide, HostSide, LogSide) {
     let (callback_giver, callback_taker) = callbacks::callbacks();
     let (observed_in, observed_out) = observed_events(sizes.events);
     let numbers = RequestNumbers::default();
-    let (clients, taken) = client_requests(numbers.clone(), WAITING_AT_MOST, sizes.groups);
+    let (clients, taken) = client_requests(numbers.clone(), WAITING_AT_MOST, sizes.groups.len());
     let rt = RtSide {
         requests: request_out,
         clients: taken,
         is_client_next: true,
-        stream,
+        streams,
         trajectories: taker,
         callbacks: callback_taker,
         service: service_out,
@@ -165,7 +164,7 @@ pub struct RtSide {
     /// Whether a client's request comes before the next one of the host. They alternate, so that no flood of the one holds up
     /// the other.
     is_client_next: bool,
-    stream: StreamReceiver,
+    streams: Vec<StreamReceiver>,
     trajectories: TrajectoryTaker,
     callbacks: CallbackTaker,
     service: Vec<Consumer<Frame>>,
@@ -193,12 +192,15 @@ impl HostInterface for RtSide {
         }
     }
 
-    fn begin_stream(&mut self, _group: u8) {
-        self.stream.begin();
+    fn begin_stream(&mut self, group: u8) {
+        if let Some(stream) = self.streams.get_mut(usize::from(group)) {
+            stream.begin();
+        }
     }
 
-    fn stream(&mut self, _group: u8, slot_start_ns: Nanoseconds) -> StreamSample {
-        self.stream.sample(slot_start_ns)
+    fn stream(&mut self, group: u8, slot_start_ns: Nanoseconds) -> StreamSample {
+        let stream = self.streams.get_mut(usize::from(group));
+        stream.map_or_else(StreamSample::default, |stream| stream.sample(slot_start_ns))
     }
 
     fn trajectory(&mut self, group: u8, trajectory: TrajectoryId, at_s: f64) -> Option<TrajectorySample> {
@@ -271,8 +273,16 @@ impl HostSide {
     /// # Errors
     /// [`ChannelError::Full`]; the request is not sent then.
     pub fn request(&mut self, request: Request) -> Result<RequestId, ChannelError> {
+        self.request_of(RequestTarget::All, request)
+    }
+
+    /// The same, for one group.
+    ///
+    /// # Errors
+    /// [`ChannelError::Full`]; the request is not sent then.
+    pub fn request_of(&mut self, target: RequestTarget, request: Request) -> Result<RequestId, ChannelError> {
         let id = self.numbers.next();
-        self.submit(RequestEnvelope { id, target: RequestTarget::All, request }).map(|()| id)
+        self.submit(RequestEnvelope { id, target, request }).map(|()| id)
     }
 
     /// Sends a request with an id of [`HostSide::numbers`].
@@ -283,17 +293,18 @@ impl HostSide {
         if self.requests.push(envelope) { Ok(()) } else { Err(ChannelError::Full) }
     }
 
-    /// Asks for a trajectory of the group to be carried out. Returns the number of the request.
+    /// Asks for a trajectory of a group to be carried out. Returns the number of the request.
     ///
     /// # Errors
     /// [`ChannelError::Full`]; nothing is sent then.
     pub fn execute(
         &mut self,
+        group: u8,
         given: &Arc<GivenTrajectory>,
         start: ExecutionStart,
     ) -> Result<RequestId, ChannelError> {
-        let trajectory = self.trajectories.give(0, given).ok_or(ChannelError::Full)?;
-        let requested = self.request(Request::Execute { trajectory, start });
+        let trajectory = self.trajectories.give(group, given).ok_or(ChannelError::Full)?;
+        let requested = self.request_of(RequestTarget::Group(group), Request::Execute { trajectory, start });
         if requested.is_err() {
             self.trajectories.take_back(trajectory);
         }
@@ -350,7 +361,7 @@ impl HostSide {
         self.observed.from_now_on()
     }
 
-    /// The writing end of the points of a stream, for any thread.
+    /// The writing ends of the points of streams, for any thread.
     pub fn streamer(&self) -> Streamer {
         self.streamer.clone()
     }
@@ -437,8 +448,8 @@ impl LogSide {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use takt_rt::Id;
     use takt_rt::{EventKind, Phase, StopCategory};
+    use takt_rt::{Id, LookAheadParameters};
 
     fn envelope(id: RequestId, request: Request) -> RequestEnvelope {
         RequestEnvelope { id, target: RequestTarget::All, request }
@@ -446,8 +457,10 @@ mod tests {
 
     fn sizes() -> ChannelSizes {
         ChannelSizes {
-            stream: LookAheadParameters::default(),
-            groups: 1,
+            groups: vec![GroupStream {
+                axes: AxisPlaces::new(vec![0, 1]),
+                look_ahead: LookAheadParameters::default(),
+            }],
             axes: 2,
             buses: 2,
             records: 4,

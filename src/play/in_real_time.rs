@@ -8,10 +8,11 @@ use std::time::{Duration, Instant};
 
 use takt_rt::{CycleRecord, Nanoseconds, RequestId, Snapshot, StopCategory, StreamPoint};
 
+use super::groups::PlayedGroup;
 use super::performance::{APPROACH_SCALE, MakeTrajectory, PlayError, Stage};
 use super::set_points::{AxisMaxima, SetPointLog};
 use crate::controller::session::Session;
-use crate::controller::{Controller, MoveOptions, StartFailure, StreamHandle};
+use crate::controller::{Controller, GroupHandle, MoveOptions, StartFailure, StreamHandle};
 
 /// The time from one look at the state to the next.
 const LOOK: Duration = Duration::from_millis(1);
@@ -68,6 +69,10 @@ impl<'a> RealStage<'a> {
         Self { controller, set_points, interrupted, was_interrupted: false }
     }
 
+    fn group(&self, group: &PlayedGroup) -> GroupHandle {
+        self.controller.group_of_number(group.number)
+    }
+
     /// Whether it was interrupted.
     pub const fn was_interrupted(&self) -> bool {
         self.was_interrupted
@@ -97,30 +102,29 @@ impl Stage for RealStage<'_> {
         !self.was_interrupted && !self.controller.has_ended()
     }
 
-    fn move_to(&mut self, target: &[f64]) -> Result<RequestId, PlayError> {
-        let target = target.get(..self.controller.axes().len()).unwrap_or(target);
+    fn move_to(&mut self, group: &PlayedGroup, target: &[f64]) -> Result<RequestId, PlayError> {
         let options = MoveOptions {
             velocity_scale: APPROACH_SCALE,
             acceleration_scale: APPROACH_SCALE,
             ..MoveOptions::default()
         };
-        let motion = self.controller.move_with(target, options);
+        let motion = self.group(group).move_with(&group.pick(target), options);
         motion.map(|motion| motion.request()).map_err(|error| PlayError::Command(error.to_string()))
     }
 
-    fn execute(&mut self, make: MakeTrajectory<'_>) -> Result<RequestId, PlayError> {
-        let motion = self.controller.execute_with(make);
+    fn execute(&mut self, group: &PlayedGroup, make: MakeTrajectory<'_>) -> Result<RequestId, PlayError> {
+        let motion = self.group(group).execute_with(make);
         motion.map(|motion| motion.request()).map_err(|error| PlayError::Command(error.to_string()))
     }
 
-    fn begin_stream(&mut self) -> Result<RequestId, PlayError> {
-        self.controller.begin_stream().map_err(|error| PlayError::Command(error.to_string()))?;
+    fn begin_stream(&mut self, group: &PlayedGroup) -> Result<RequestId, PlayError> {
+        self.group(group).begin_stream().map_err(|error| PlayError::Command(error.to_string()))?;
         // It has been granted.
         Ok(RequestId::default())
     }
 
-    fn push(&mut self, points: &[StreamPoint]) -> bool {
-        self.controller.stream().push_points(points).is_ok()
+    fn push(&mut self, group: &PlayedGroup, points: &[StreamPoint]) -> bool {
+        self.group(group).stream().push_points(points).is_ok()
     }
 
     fn stop(&mut self) -> Result<(), PlayError> {

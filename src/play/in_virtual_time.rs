@@ -6,14 +6,15 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use takt_rt::plan::State;
 use takt_rt::{
     AxisLimits, ExecutionStart, MAX_AXES, Move, NANOSECONDS_PER_SECOND, Nanoseconds, Request, RequestId,
-    Snapshot, StopCategory, StreamPoint,
+    RequestTarget, Snapshot, StopCategory, StreamPoint,
 };
 
+use super::groups::PlayedGroup;
 use super::performance::{APPROACH_SCALE, MakeTrajectory, PlayError, Stage};
 use super::set_points::SetPointLog;
 use crate::config::Config;
 use crate::controller::assemble::AssembleError;
-use crate::controller::channels::{GivenTrajectory, LogSide};
+use crate::controller::channels::{AxisPlaces, GivenTrajectory, LogSide};
 use crate::controller::{Interrupt, Outcome, VirtualRun};
 use crate::sim::SimulatedBus;
 use crate::trajectory::TrajectoryConditions;
@@ -55,6 +56,11 @@ impl<'a> VirtualStage<'a> {
         })
     }
 
+    fn request(&mut self, group: &PlayedGroup, request: Request) -> Result<RequestId, PlayError> {
+        let requested = self.run.host().request_of(RequestTarget::Group(group.number), request);
+        requested.map_err(|error| PlayError::Command(error.to_string()))
+    }
+
     fn step(&mut self) -> bool {
         if self.interrupted.swap(false, Ordering::Relaxed) {
             self.was_interrupted = true;
@@ -91,7 +97,7 @@ impl Stage for VirtualStage<'_> {
         self.step() && !self.was_interrupted
     }
 
-    fn move_to(&mut self, target: &[f64]) -> Result<RequestId, PlayError> {
+    fn move_to(&mut self, group: &PlayedGroup, target: &[f64]) -> Result<RequestId, PlayError> {
         let mut all = [0.0; MAX_AXES];
         all.iter_mut().zip(target).for_each(|(to, from)| *to = *from);
         let request = Request::Move(Move {
@@ -101,27 +107,27 @@ impl Stage for VirtualStage<'_> {
             acceleration_scale: APPROACH_SCALE,
             minimum_duration_s: 0.0,
         });
-        self.run.host().request(request).map_err(|error| PlayError::Command(error.to_string()))
+        self.request(group, request)
     }
 
-    fn execute(&mut self, make: MakeTrajectory<'_>) -> Result<RequestId, PlayError> {
-        let axes = self.run.snapshot().axes;
-        let start: Vec<State> =
-            axes.iter().take(self.limits.len()).map(|axis| State::rest(axis.position_set)).collect();
-        let conditions =
-            TrajectoryConditions { start: &start, limits: &self.limits, period_s: self.period_s };
+    fn execute(&mut self, group: &PlayedGroup, make: MakeTrajectory<'_>) -> Result<RequestId, PlayError> {
+        let axes = group.pick(&self.run.snapshot().axes);
+        let start: Vec<State> = axes.iter().map(|axis| State::rest(axis.position_set)).collect();
+        let limits = group.pick(&self.limits);
+        let conditions = TrajectoryConditions { start: &start, limits: &limits, period_s: self.period_s };
         let trajectory = make(&conditions).map_err(|error| PlayError::Command(error.to_string()))?;
-        let given = Arc::new(GivenTrajectory::new(trajectory));
-        let executed = self.run.host().execute(&given, ExecutionStart::Now);
+        let places = AxisPlaces::new(group.axes.clone());
+        let given = Arc::new(GivenTrajectory::new(trajectory, places));
+        let executed = self.run.host().execute(group.number, &given, ExecutionStart::Now);
         executed.map_err(|error| PlayError::Command(error.to_string()))
     }
 
-    fn begin_stream(&mut self) -> Result<RequestId, PlayError> {
-        self.run.host().request(Request::Stream).map_err(|error| PlayError::Command(error.to_string()))
+    fn begin_stream(&mut self, group: &PlayedGroup) -> Result<RequestId, PlayError> {
+        self.request(group, Request::Stream)
     }
 
-    fn push(&mut self, points: &[StreamPoint]) -> bool {
-        self.run.host().streamer().push(points).is_ok()
+    fn push(&mut self, group: &PlayedGroup, points: &[StreamPoint]) -> bool {
+        self.run.host().streamer().push_to(group.number, points).is_ok()
     }
 
     fn stop(&mut self) -> Result<(), PlayError> {

@@ -5,6 +5,7 @@
 
 mod error;
 mod file;
+mod groups;
 mod in_real_time;
 mod in_virtual_time;
 mod performance;
@@ -15,6 +16,7 @@ mod trajectory;
 
 pub use error::{FileProblem, PlayFileError};
 pub use file::{JointColumns, JointPoint, PlayFile, PlayRow, read};
+pub use groups::PlayedGroup;
 pub use in_real_time::{RealStage, SharedSetPointLog};
 pub use in_virtual_time::VirtualStage;
 pub use performance::{APPROACH_SCALE, MakeTrajectory, PlayError, Stage, StreamSummary, execute, stream};

@@ -73,6 +73,8 @@ pub struct SetPointLog {
     maxima: Vec<AxisMaxima>,
     /// The positions of the last three rows of each axis, the newest first.
     last: Vec<[f64; 3]>,
+    /// The groups that play.
+    groups: Vec<u8>,
 }
 
 /// Where the times of the rows begin.
@@ -116,6 +118,7 @@ impl SetPointLog {
             stage: LogStage::Waiting(None),
             maxima: maxima.collect(),
             last: Vec::new(),
+            groups: vec![0],
         };
         let columns = ["", ".velocity", ".acceleration"]
             .iter()
@@ -125,14 +128,33 @@ impl SetPointLog {
         log
     }
 
+    /// A log that begins and ends with the motion of these groups, and not with that of the first one.
+    pub fn of_groups(self, groups: impl Iterator<Item = u8>) -> Self {
+        Self { groups: groups.collect(), ..self }
+    }
+
+    /// Whether every group that plays is in such a phase.
+    fn are_all(&self, record: &CycleRecord, is_such: impl Fn(Phase) -> bool) -> bool {
+        let phases = self.groups.iter().filter_map(|group| record.group_phases.get(usize::from(*group)));
+        phases.copied().all(is_such)
+    }
+
     /// Takes the record of the next cycle. Set-points that were not sent leave no row.
     pub fn add(&mut self, record: &CycleRecord) {
         if !record.is_commanded {
             return;
         }
         let (slot, slot_start_ns) = (record.timing.slot, record.timing.slot_start_ns);
-        let is_at_rest = record.phase == Phase::Holding;
-        let is_in_motion = matches!(record.phase, Phase::Moving | Phase::Streaming | Phase::Stopping);
+        let is_holding = |phase| phase == Phase::Holding;
+        let is_moved = |phase| matches!(phase, Phase::Moving | Phase::Streaming | Phase::Stopping);
+        let is_at_rest = self.are_all(record, is_holding);
+        let is_in_motion = !self.are_all(record, |phase| !is_moved(phase));
+        let is_over = !self
+            .are_all(record, |phase| is_moved(phase) || matches!(phase, Phase::Holding | Phase::Disabling));
+        let was_at_rest = match &self.stage {
+            LogStage::Waiting(Some(last)) => self.are_all(last, is_holding),
+            _ => false,
+        };
         match &mut self.stage {
             LogStage::Waiting(last) => {
                 if let Some(time_ns) = self.armed.time_that_has_come(slot_start_ns) {
@@ -140,8 +162,11 @@ impl SetPointLog {
                     self.stage = LogStage::Playing(zero);
                     return self.row(record, zero);
                 }
-                let was_at_rest = last.as_ref().filter(|last| last.phase == Phase::Holding);
-                if let Some(first) = was_at_rest.filter(|_| is_in_motion && self.armed.has_come(slot)) {
+                if let Some(first) = last
+                    .as_ref()
+                    .filter(|_| was_at_rest)
+                    .filter(|_| is_in_motion && self.armed.has_come(slot))
+                {
                     let zero = Zero::Slot(slot.saturating_sub(1));
                     let mut first = first.clone();
                     first.timing.slot = slot.saturating_sub(1);
@@ -156,7 +181,7 @@ impl SetPointLog {
                 let zero = *zero;
                 if is_at_rest {
                     self.stage = LogStage::Resting(zero, 0);
-                } else if !is_in_motion && record.phase != Phase::Disabling {
+                } else if !is_in_motion && is_over {
                     self.stage = LogStage::Over;
                     return;
                 }
@@ -265,6 +290,7 @@ mod tests {
 
     fn record(slot: u64, phase: Phase, position: f64) -> CycleRecord {
         let mut record = CycleRecord { phase, is_commanded: true, axis_count: 1, ..CycleRecord::default() };
+        record.group_phases[0] = phase;
         record.timing.slot = slot;
         record.axes[0].position_set = position;
         record

@@ -4,7 +4,9 @@ use takt_rt::{AxisPoint, MAX_AXES, Nanoseconds, PointRole, PositionPoint, Snapsh
 
 use super::error::{FileProblem, PlayFileError};
 use super::file::{JointPoint, PlayFile, PlayRow};
-use crate::config::Axis;
+use super::groups::PlayedGroup;
+use crate::config::{Axis, Config};
+use crate::controller::channels::AxisPlaces;
 
 /// Nanoseconds in a second, to and from the seconds of a file.
 const NANOSECONDS: f64 = 1e9;
@@ -14,6 +16,7 @@ const NANOSECONDS: f64 = 1e9;
 pub struct FileStream {
     /// The axis of each joint that the file names.
     axes: Vec<usize>,
+    groups: Vec<PlayedGroup>,
     batches: Vec<Batch>,
     first: Vec<Option<f64>>,
 }
@@ -33,24 +36,25 @@ impl FileStream {
     ///
     /// # Errors
     /// A column of torques, which no stream takes so far, or a first point outside the position limits.
-    pub fn new(file: &PlayFile, axes: &[Axis]) -> Result<Self, PlayFileError> {
+    pub fn new(file: &PlayFile, config: &Config) -> Result<Self, PlayFileError> {
         if file.torque_column.is_some() {
             let words = "streams take no torques so far".to_owned();
             let problem = FileProblem::Rows { joint: None, words };
             return Err(PlayFileError { line: 1, column: file.torque_column, problem });
         }
-        let mut first = vec![None; axes.len()];
+        let mut first = vec![None; config.axes.len()];
         let earliest = file.rows.iter().min_by(|one, other| one.at_s.total_cmp(&other.at_s));
         if let Some(row) = earliest {
             for (joint, point) in file.joints.iter().zip(&row.points) {
-                check_first(row, axes.get(joint.axis), point.position)?;
+                check_first(row, config.axes.get(joint.axis), point.position)?;
                 if let Some(place) = first.get_mut(joint.axis) {
                     *place = Some(point.position);
                 }
             }
         }
-        let axes = file.joints.iter().map(|joint| joint.axis).collect();
-        Ok(Self { axes, batches: batches(&file.rows), first })
+        let axes: Vec<usize> = file.joints.iter().map(|joint| joint.axis).collect();
+        let groups = PlayedGroup::of(config, &axes);
+        Ok(Self { axes, groups, batches: batches(&file.rows), first })
     }
 
     /// The first position of each axis that the file names: that of the row that is meant for the earliest time.
@@ -72,17 +76,23 @@ impl FileStream {
         self.batches.partition_point(|batch| batch.arrive_s <= since_start_s)
     }
 
-    /// The points of a batch for every axis. Axes that the file does not name stay where `snapshot` has them.
+    /// The groups that it plays.
+    pub fn groups(&self) -> &[PlayedGroup] {
+        &self.groups
+    }
+
+    /// The points of a batch for every axis of a group. Axes that the file does not name stay where `snapshot` has them.
     pub(super) fn batch(
         &self,
         number: usize,
+        group: &PlayedGroup,
         start_ns: Nanoseconds,
         snapshot: &Snapshot,
     ) -> Option<Vec<StreamPoint>> {
         let Batch { is_chunk, points, .. } = self.batches.get(number)?;
         let standing: [AxisPoint; MAX_AXES] =
             std::array::from_fn(|axis| AxisPoint::position(snapshot.axes[axis].position_set));
-        let count = points.len();
+        let (count, places) = (points.len(), AxisPlaces::new(group.axes.clone()));
         let stamped = points.iter().enumerate().map(|(index, (at_s, joints))| {
             let mut axes = standing;
             for (axis, point) in self.axes.iter().zip(joints) {
@@ -96,6 +106,7 @@ impl FileStream {
                 PointRole::Single
             };
             let since_start_ns = (at_s * NANOSECONDS).round() as i64;
+            let axes = places.pick(&axes);
             StreamPoint { at_ns: start_ns.saturating_add_signed(since_start_ns), role, axes }
         });
         Some(stamped.collect())
@@ -167,11 +178,12 @@ mod tests {
         let chunk: Vec<f64> = batches[1].points.iter().map(|(at_s, _)| *at_s).collect();
         assert_eq!((batches[1].is_chunk, chunk), (true, vec![0.4, 0.5]));
         assert!(!batches[0].is_chunk && !batches[2].is_chunk && batches[3].is_chunk);
-        let stream = FileStream { axes: vec![1], batches, first: vec![] };
+        let stream = FileStream { axes: vec![1], groups: vec![], batches, first: vec![] };
+        let group = PlayedGroup { number: 0, axes: vec![0, 1] };
         assert_eq!((stream.arrived(0.1), stream.arrived(0.2), stream.end_s()), (1, 3, 0.6));
         let mut snapshot = Snapshot::default();
         snapshot.axes[0].position_set = 7.0;
-        let points = stream.batch(1, 1_000_000_000, &snapshot).unwrap();
+        let points = stream.batch(1, &group, 1_000_000_000, &snapshot).unwrap();
         let stamps: Vec<u64> = points.iter().map(|point| point.at_ns).collect();
         assert_eq!(stamps, [1_400_000_000, 1_500_000_000]);
         assert_eq!(points[0].role, PointRole::Chunk { is_first: true, is_last: false });

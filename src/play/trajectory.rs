@@ -4,7 +4,8 @@ use takt_rt::plan::State;
 
 use super::error::{FileProblem, PlayFileError};
 use super::file::{JointPoint, PlayFile, PlayRow};
-use crate::config::Axis;
+use super::groups::PlayedGroup;
+use crate::config::{Axis, Config};
 use crate::trajectory::{AxisPoints, Trajectory, TrajectoryConditions, TrajectoryError};
 
 /// The rows of a file by the times that they are meant for.
@@ -16,25 +17,33 @@ pub struct FileTrajectory {
     begins_s: f64,
     /// The lines of the rows.
     lines: Vec<usize>,
-    /// The points of each axis; `None` for one that the file does not name.
+    /// The points of each axis of the controller; `None` for one that the file does not name.
     axes: Vec<Option<AxisPoints>>,
+    /// The group of the axes that it names.
+    group: PlayedGroup,
 }
 
 impl FileTrajectory {
     /// Takes the rows of a file.
     ///
     /// # Errors
-    /// A column of torques, which no trajectory has, or a row without a velocity or acceleration that others have.
-    pub fn new(file: &PlayFile, axes: usize) -> Result<Self, PlayFileError> {
+    /// A column of torques, which no trajectory has, joints of several groups, or a row without a velocity or acceleration that
+    /// others have.
+    pub fn new(file: &PlayFile, config: &Config) -> Result<Self, PlayFileError> {
         if file.torque_column.is_some() {
             let words = "a trajectory takes no torques; play the file without --trajectory".to_owned();
             let problem = FileProblem::Rows { joint: None, words };
             return Err(PlayFileError { line: 1, column: file.torque_column, problem });
         }
+        let named: Vec<usize> = file.joints.iter().map(|joint| joint.axis).collect();
+        let group = match &PlayedGroup::of(config, &named)[..] {
+            [group] => group.clone(),
+            groups => return Err(several_groups(config, groups, &named)),
+        };
         let mut rows: Vec<&PlayRow> = file.rows.iter().collect();
         rows.sort_by(|one, other| one.at_s.total_cmp(&other.at_s));
         let begins_s = rows.first().map_or(0.0, |row| row.at_s);
-        let mut of_axes = vec![None; axes];
+        let mut of_axes = vec![None; config.axes.len()];
         for (joint, columns) in file.joints.iter().enumerate() {
             let values = |of: fn(&JointPoint) -> Option<f64>| -> Vec<f64> {
                 // One that is missing is none that is finite: the check of the trajectory names its point.
@@ -54,7 +63,13 @@ impl FileTrajectory {
             begins_s,
             lines: rows.iter().map(|row| row.line).collect(),
             axes: of_axes,
+            group,
         })
+    }
+
+    /// The group of its axes.
+    pub fn group(&self) -> &PlayedGroup {
+        &self.group
     }
 
     /// When its first point is meant for.
@@ -68,13 +83,15 @@ impl FileTrajectory {
         self.axes.iter().map(first).collect()
     }
 
-    /// The trajectory from where the axes are. Axes that the file does not name stay.
+    /// The trajectory of the group from where its axes are. Axes that the file does not name stay.
     ///
     /// # Errors
     /// The first thing that is wrong.
     pub fn trajectory(&self, conditions: &TrajectoryConditions<'_>) -> Result<Trajectory, TrajectoryError> {
-        let points = self.axes.iter().zip(conditions.start).map(|(points, start)| {
-            points.clone().unwrap_or_else(|| AxisPoints::standing(start.position, self.times_s.len()))
+        let own = self.group.axes.iter().map(|axis| self.axes.get(*axis).and_then(Option::as_ref));
+        let points = own.zip(conditions.start).map(|(points, start)| {
+            let standing = || AxisPoints::standing(start.position, self.times_s.len());
+            points.cloned().unwrap_or_else(standing)
         });
         Trajectory::of_axes(&self.times_s, &points.collect::<Vec<_>>(), conditions)
     }
@@ -85,16 +102,17 @@ impl FileTrajectory {
     /// The first thing that is wrong, at its line.
     pub fn check(&self, axes: &[Axis], period_s: f64) -> Result<(), PlayFileError> {
         let inside = |axis: &Axis| 0.5 * (axis.limits.position_min + axis.limits.position_max);
-        let first = self.first();
+        let own: Vec<&Axis> = self.group.axes.iter().filter_map(|axis| axes.get(*axis)).collect();
+        let first = self.group.pick(&self.first());
         let start =
-            first.iter().zip(axes).map(|(first, axis)| State::rest(first.unwrap_or_else(|| inside(axis))));
+            first.iter().zip(&own).map(|(first, axis)| State::rest(first.unwrap_or_else(|| inside(axis))));
         let start: Vec<State> = start.collect();
-        let limits: Vec<_> = axes.iter().map(|axis| axis.limits).collect();
+        let limits: Vec<_> = own.iter().map(|axis| axis.limits).collect();
         let conditions = TrajectoryConditions { start: &start, limits: &limits, period_s };
-        self.trajectory(&conditions).map(drop).map_err(|error| self.problem(&error, axes))
+        self.trajectory(&conditions).map(drop).map_err(|error| self.problem(&error, &own))
     }
 
-    fn problem(&self, error: &TrajectoryError, axes: &[Axis]) -> PlayFileError {
+    fn problem(&self, error: &TrajectoryError, axes: &[&Axis]) -> PlayFileError {
         // What concerns no point concerns the end.
         let point = error.point().unwrap_or(self.lines.len().saturating_sub(1));
         let line = self.lines.get(point).copied().unwrap_or(1);
@@ -117,4 +135,21 @@ impl FileTrajectory {
         };
         PlayFileError { line, column: None, problem: FileProblem::Rows { joint, words } }
     }
+}
+
+/// The joints of one trajectory are of one group: those of several would not begin in the same cycle, nor stop together.
+fn several_groups(config: &Config, groups: &[PlayedGroup], named: &[usize]) -> PlayFileError {
+    let name = |group: &PlayedGroup| {
+        config.groups.get(usize::from(group.number)).map_or("", |group| group.name.as_str())
+    };
+    let [first, second] = [0, 1].map(|number: usize| groups.get(number));
+    let joint = second.and_then(|group| named.iter().find(|axis| group.axes.contains(axis)));
+    let joint = joint.and_then(|axis| config.axes.get(*axis)).map(|axis| axis.name.clone());
+    let words = format!(
+        "a trajectory is for one group: this joint is of \"{}\", and another one of \"{}\"; play the file without --trajectory, or \
+         a file for each group",
+        second.map_or("", name),
+        first.map_or("", name),
+    );
+    PlayFileError { line: 1, column: None, problem: FileProblem::Rows { joint, words } }
 }

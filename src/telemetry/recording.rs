@@ -36,7 +36,8 @@ pub struct Recording {
     event_channel: u16,
     axis_channels: Vec<u16>,
     bus_channels: Vec<BusChannels>,
-    last_phase: Phase,
+    /// Whether a group was stopping in the last cycle.
+    was_stopping: bool,
 }
 
 /// The channels of one bus.
@@ -91,7 +92,7 @@ impl Recording {
             event_channel,
             axis_channels,
             bus_channels: Vec::new(),
-            last_phase: Phase::default(),
+            was_stopping: false,
         })
     }
 
@@ -151,8 +152,9 @@ impl Recording {
             self.write(channel, slot, start_ns)?;
         }
         // The cycles before a stop show its cause: they are in the file from now on.
-        let begins_to_stop = record.phase == Phase::Stopping && self.last_phase != Phase::Stopping;
-        self.last_phase = record.phase;
+        let is_stopping = record.group_phases().contains(&Phase::Stopping);
+        let was_stopping = std::mem::replace(&mut self.was_stopping, is_stopping);
+        let begins_to_stop = is_stopping && !was_stopping;
         if begins_to_stop { self.writer.flush() } else { Ok(()) }
     }
 

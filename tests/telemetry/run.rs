@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 use std::sync::{Arc, Mutex};
 
-use takt::controller::channels::{ChannelSizes, HostSide, LogSide, RtSide, channels};
+use takt::controller::channels::{ChannelSizes, GroupStream, HostSide, LogSide, RtSide, channels};
 use takt::telemetry::{
     AxisDescription, BusDescription, Logger, LoggerOptions, Machine, Notice, RecordingDestination,
     SetPointMagnitudes, Unit, WallClock,
@@ -28,8 +28,7 @@ pub const STOP: StopReason = StopReason {
 
 pub fn sides(records: usize) -> (RtSide, HostSide, LogSide) {
     channels(&ChannelSizes {
-        groups: 1,
-        stream: Default::default(),
+        groups: vec![GroupStream::default()],
         axes: 2,
         buses: 1,
         records,

@@ -104,7 +104,7 @@ impl Hall {
             requests: VecDeque::new(),
             asked: 0,
             wish: None,
-            points: Box::new(LookAhead::new(points, assemble::look_ahead(config))),
+            points: Box::new(LookAhead::new(points, assemble::look_ahead(config, &config.axes_of_group(0)))),
             services: VecDeque::new(),
             events: vec![],
             is_retired: false,

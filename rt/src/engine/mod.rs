@@ -356,18 +356,15 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         snapshot.missed_slots = shared.slots.missed;
         snapshot.timing = shared.slots.level();
         snapshot.dropped = shared.dropped;
-        let streaming = self.groups.iter().find(|group| group.state.phase() == Phase::Streaming);
-        if let Some(group) = streaming.or(self.groups.first()) {
-            snapshot.stream = group.stream_report();
-        }
         for (group, shown) in self.groups.iter().zip(&mut snapshot.groups) {
             *shown = GroupSnapshot {
                 phase: group.state.phase(),
                 remaining_s: group.remaining_s(),
                 stop: group.stop,
+                stream: group.stream_report(),
             };
         }
-        let [GroupSnapshot { phase, remaining_s, stop }, ..] = snapshot.groups;
+        let [GroupSnapshot { phase, remaining_s, stop, .. }, ..] = snapshot.groups;
         (snapshot.phase, snapshot.remaining_s, snapshot.stop) = (phase, remaining_s, stop);
         for axis in &self.axes {
             if let Some(shown) = snapshot.axes.get_mut(usize::from(axis.number())) {

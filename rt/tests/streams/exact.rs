@@ -244,7 +244,10 @@ fn a_stream_that_runs_dry_comes_to_rest_and_goes_on_only_from_where_it_rests() {
         }
         rig.dry_up(position);
         rig.run(500);
-        assert_eq!((rig.phase(), rig.host.snapshot.stream.state), (Phase::Streaming, StreamState::Dry));
+        assert_eq!(
+            (rig.phase(), rig.host.snapshot.groups[0].stream.state),
+            (Phase::Streaming, StreamState::Dry)
+        );
         let rest = rig.engine.axes()[0].set_point();
         // From 1 rad/s at 10 rad/s².
         assert!(rest.velocity == 0.0 && (rest.position - position - 0.05).abs() < 1e-3, "{rest:?}");

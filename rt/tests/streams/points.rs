@@ -64,7 +64,7 @@ fn stream(arrivals: &[Arrival], follow: Follow, delay: StreamDelay, duration_s: 
         rig.run(1);
         let record = rig.host.records.last().unwrap();
         let since_ns = record.timing.slot_start_ns as f64 - begun_ns as f64;
-        let lag_ns = rig.host.snapshot.stream.counts.lag_ns as f64;
+        let lag_ns = rig.host.snapshot.groups[0].stream.counts.lag_ns as f64;
         set.push(((since_ns - lag_ns) * 1e-9, record.axes[0].position_set));
     }
     assert_differences_kept(&rig);
@@ -119,7 +119,7 @@ fn a_sine_of_any_rate_is_followed_within_half_a_milliradian_of_itself_so_far_beh
             assert_eq!((streamed.rig.stops(), streamed.rig.phase()), (vec![], Phase::Streaming));
             let error = streamed.error(sine, 1.0, 5.5);
             assert!(error < 2e-5, "{rate_hz} Hz: {error:e}");
-            let lag_s = streamed.rig.host.snapshot.stream.counts.lag_ns as f64 * 1e-9;
+            let lag_s = streamed.rig.host.snapshot.groups[0].stream.counts.lag_ns as f64 * 1e-9;
             assert!(lag_s < 2.3 / rate_hz + 3e-3, "{rate_hz} Hz: {lag_s} s behind");
         }
     }
@@ -133,7 +133,7 @@ fn the_set_points_are_as_far_behind_as_was_asked_for() {
         // They come early enough.
         points.iter_mut().for_each(|point| point.at_s -= 0.06);
         let streamed = stream(&points, Follow::Smooth, delay, 5.0);
-        assert_eq!(streamed.rig.host.snapshot.stream.counts.lag_ns, delay_ms * 1_000_000);
+        assert_eq!(streamed.rig.host.snapshot.groups[0].stream.counts.lag_ns, delay_ms * 1_000_000);
         let error = streamed.error(sine, 1.0, 4.7);
         assert!(error < 2e-5, "{delay_ms} ms: {error:e}");
     }
@@ -260,7 +260,7 @@ fn a_chunk_replaces_the_future_of_the_one_before() {
     let streamed = stream(&points, Follow::Smooth, StreamDelay::Automatic, 1.0);
     let error = streamed.error(down, 0.7, 0.95);
     assert!(error < 1e-6, "{error:e}");
-    assert_eq!(streamed.rig.host.snapshot.stream.counts.points, 60);
+    assert_eq!(streamed.rig.host.snapshot.groups[0].stream.counts.points, 60);
 }
 
 #[test]
@@ -269,7 +269,7 @@ fn a_stream_that_pauses_comes_to_rest_and_goes_on() {
     points.retain(|point| !(2.0..3.5).contains(&point.at_s));
     let streamed = stream(&points, Follow::Smooth, StreamDelay::Automatic, 7.5);
     assert_eq!((streamed.rig.stops(), streamed.rig.phase()), (vec![], Phase::Streaming));
-    assert_eq!(streamed.rig.host.snapshot.stream.state, StreamState::Following);
+    assert_eq!(streamed.rig.host.snapshot.groups[0].stream.state, StreamState::Following);
     let standing: Vec<f64> =
         streamed.set.iter().filter(|(time_s, _)| (2.7..3.4).contains(time_s)).map(|(_, set)| *set).collect();
     assert!(standing.len() > 500 && standing.windows(2).all(|set| set[0] == set[1]));
@@ -282,7 +282,7 @@ fn points_that_are_all_late_make_the_stream_run_farther_behind() {
     points.iter_mut().filter(|point| point.at_s > 2.0).for_each(|point| point.at_s += 0.15);
     let streamed = stream(&points, Follow::Smooth, StreamDelay::Automatic, 7.5);
     assert_eq!((streamed.rig.stops(), streamed.rig.phase()), (vec![], Phase::Streaming));
-    let counts = streamed.rig.host.snapshot.stream.counts;
+    let counts = streamed.rig.host.snapshot.groups[0].stream.counts;
     assert!(counts.lag_ns > 150_000_000, "{counts:?}");
     assert!(streamed.error(sine, 4.0, 7.0) < 2e-5);
 }

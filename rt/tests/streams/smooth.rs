@@ -32,11 +32,14 @@ fn assert_differences_kept(rig: &Rig, jerk: f64) {
 fn a_stream_that_is_asked_for_and_never_begins_is_a_stop() {
     let mut rig = streaming(JERK);
     rig.run(450);
-    assert_eq!((rig.phase(), rig.host.snapshot.stream.state), (Phase::Streaming, StreamState::Awaited));
+    assert_eq!(
+        (rig.phase(), rig.host.snapshot.groups[0].stream.state),
+        (Phase::Streaming, StreamState::Awaited)
+    );
     rig.run(100);
     let stops = rig.stops();
     assert_eq!((stops.len(), stops[0].rule(), stops[0].category), (1, Rule::StaleCommand, StopCategory::Two));
-    assert_eq!((rig.phase(), rig.host.snapshot.stream.state), (Phase::Holding, StreamState::Idle));
+    assert_eq!((rig.phase(), rig.host.snapshot.groups[0].stream.state), (Phase::Holding, StreamState::Idle));
 }
 
 #[test]
@@ -123,12 +126,12 @@ fn a_stream_that_runs_dry_comes_to_rest_says_so_and_goes_on_without_a_bump() {
     rig.run(600);
     let rest = rig.engine.axes()[0].set_point();
     assert!(rest.velocity.abs() < 1e-9 && rest.position > position, "{rest:?}");
-    assert_eq!((rig.phase(), rig.host.snapshot.stream.state), (Phase::Streaming, StreamState::Dry));
+    assert_eq!((rig.phase(), rig.host.snapshot.groups[0].stream.state), (Phase::Streaming, StreamState::Dry));
     rig.run(5_000);
     assert_eq!(rig.engine.axes()[0].set_point().position, rest.position, "it does not come back");
     rig.stream(position + 0.1, 0.0);
     rig.run(1_000);
-    assert_eq!(rig.host.snapshot.stream.state, StreamState::Following);
+    assert_eq!(rig.host.snapshot.groups[0].stream.state, StreamState::Following);
     let states: Vec<StreamState> = (rig.host.events.iter())
         .filter_map(|event| match event.kind {
             EventKind::Stream { state } => Some(state),

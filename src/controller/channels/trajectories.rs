@@ -14,6 +14,7 @@ use std::sync::Arc;
 use arrayvec::ArrayVec;
 use takt_rt::{TrajectoryId, TrajectorySample};
 
+use super::axis_places::AxisPlaces;
 use super::primitives::{AtomicCell, AtomicU64, Ordering};
 use crate::trajectory::Trajectory;
 
@@ -28,14 +29,15 @@ const CLAIMED: u64 = u64::MAX;
 #[derive(Debug)]
 pub struct GivenTrajectory {
     trajectory: Trajectory,
+    axes: AxisPlaces,
     /// The time of the newest cycle, in seconds after the beginning, as bits.
     at_s: AtomicU64,
 }
 
 impl GivenTrajectory {
-    /// One that has yet to begin.
-    pub fn new(trajectory: Trajectory) -> Self {
-        Self { trajectory, at_s: AtomicU64::new(0.0_f64.to_bits()) }
+    /// One of the axes of a group, in the order of the group, that has yet to begin.
+    pub fn new(trajectory: Trajectory, axes: AxisPlaces) -> Self {
+        Self { trajectory, axes, at_s: AtomicU64::new(0.0_f64.to_bits()) }
     }
 
     /// The trajectory.
@@ -135,7 +137,9 @@ impl TrajectoryTaker {
         let is_wanted = |held: &&mut Held| held.id == id && held.handed.group == group;
         let held = self.held.iter_mut().find(is_wanted)?;
         held.asked_s = at_s;
-        Some(held.handed.given.trajectory.sample(at_s))
+        let GivenTrajectory { trajectory, axes, .. } = &*held.handed.given;
+        let sample = trajectory.sample(at_s);
+        Some(TrajectorySample { states: axes.spread(sample.states), ..sample })
     }
 
     fn take(&mut self, id: TrajectoryId) -> Option<()> {
@@ -184,7 +188,10 @@ mod tests {
         let start = [State::rest(position)];
         let conditions = TrajectoryConditions { start: &start, limits: &limits, period_s: 0.001 };
         let point = TrajectoryPoint { time_s: 1.0, positions: vec![position], ..TrajectoryPoint::default() };
-        Arc::new(GivenTrajectory::new(Trajectory::new(&[point], &conditions).unwrap()))
+        Arc::new(GivenTrajectory::new(
+            Trajectory::new(&[point], &conditions).unwrap(),
+            AxisPlaces::new(vec![0]),
+        ))
     }
 
     #[test]

@@ -11,11 +11,11 @@ use super::motion_words::{MOTION_WORDS, put_motions, take_motions};
 
 /// The largest number of words of a snapshot of so many axes and buses.
 pub const fn snapshot_words(groups: usize, axes: usize, buses: usize) -> usize {
-    16 + MOTION_WORDS + 4 * Answers::EXPLAINED + GROUP_WORDS * groups + AXIS_WORDS * axes + 7 * buses
+    11 + MOTION_WORDS + 4 * Answers::EXPLAINED + GROUP_WORDS * groups + AXIS_WORDS * axes + 7 * buses
 }
 
-/// The largest number of words of a group of a snapshot: its phase, the time left, and a stop.
-const GROUP_WORDS: usize = 2 + 4;
+/// The largest number of words of a group of a snapshot: its phase, the time left, its stream, and a stop.
+const GROUP_WORDS: usize = 2 + 5 + 4;
 
 /// The number of words of an axis of a snapshot.
 const AXIS_WORDS: usize = 11;
@@ -28,10 +28,6 @@ pub const NO_SNAPSHOT: Snapshot = Snapshot {
     missed_slots: 0,
     steps: 0,
     timing: TimingLevel::Normal,
-    stream: StreamReport {
-        state: StreamState::Idle,
-        counts: StreamCounts { lag_ns: 0, points: 0, late_points: 0, lost_points: 0 },
-    },
     dropped: 0,
     rejected: 0,
     answers: Answers {
@@ -44,7 +40,15 @@ pub const NO_SNAPSHOT: Snapshot = Snapshot {
     remaining_s: 0.0,
     stop: None,
     group_count: 1,
-    groups: [GroupSnapshot { phase: Phase::Passive, remaining_s: 0.0, stop: None }; MAX_GROUPS],
+    groups: [GroupSnapshot {
+        phase: Phase::Passive,
+        remaining_s: 0.0,
+        stop: None,
+        stream: StreamReport {
+            state: StreamState::Idle,
+            counts: StreamCounts { lag_ns: 0, points: 0, late_points: 0, lost_points: 0 },
+        },
+    }; MAX_GROUPS],
     axis_count: 0,
     axes: [AxisSnapshot {
         position_set: 0.0,
@@ -83,7 +87,6 @@ pub fn put_snapshot(snapshot: &Snapshot, words: &mut Words<'_>) {
     words.put(pack([snapshot.group_count, snapshot.axis_count, snapshot.bus_count, snapshot.timing as u8]));
     words.put(snapshot.missed_slots);
     words.put(snapshot.steps);
-    put_stream(&snapshot.stream, words);
     words.put(snapshot.dropped);
     words.put(snapshot.rejected);
     put_answers(&snapshot.answers, words);
@@ -105,7 +108,6 @@ pub fn take_snapshot(words: &mut Words<'_>) -> Snapshot {
         at_ns,
         missed_slots: words.take(),
         steps: words.take(),
-        stream: take_stream(words),
         timing: TimingLevel::ALL.get(usize::from(timing)).copied().unwrap_or_default(),
         dropped: words.take(),
         rejected: words.take(),
@@ -119,7 +121,7 @@ pub fn take_snapshot(words: &mut Words<'_>) -> Snapshot {
     for group in snapshot.groups.iter_mut().take(group_count.into()) {
         *group = take_group(words);
     }
-    let [GroupSnapshot { phase, remaining_s, stop }, ..] = snapshot.groups;
+    let [GroupSnapshot { phase, remaining_s, stop, .. }, ..] = snapshot.groups;
     (snapshot.phase, snapshot.remaining_s, snapshot.stop) = (phase, remaining_s, stop);
     for axis in snapshot.axes.iter_mut().take(axis_count.into()) {
         *axis = take_axis(words);
@@ -133,6 +135,7 @@ pub fn take_snapshot(words: &mut Words<'_>) -> Snapshot {
 fn put_group(group: &GroupSnapshot, words: &mut Words<'_>) {
     words.put(pack([group.phase as u8, u8::from(group.stop.is_some()), 0, 0]));
     words.put_f64(group.remaining_s);
+    put_stream(&group.stream, words);
     if let Some(stop) = group.stop {
         put_stop(&stop, words);
     }
@@ -143,6 +146,7 @@ fn take_group(words: &mut Words<'_>) -> GroupSnapshot {
     GroupSnapshot {
         phase: phase_of(phase),
         remaining_s: words.take_f64(),
+        stream: take_stream(words),
         stop: (is_stopped == 1).then(|| take_stop(words)),
     }
 }
@@ -441,8 +445,15 @@ pub(super) mod tests {
 
     fn groups() -> impl Strategy<Value = GroupSnapshot> {
         let phases = prop::sample::select(&Phase::ALL[..]);
-        (phases, any::<f64>(), prop::option::of(stop_reasons()))
-            .prop_map(|(phase, remaining_s, stop)| GroupSnapshot { phase, remaining_s, stop })
+        (phases, any::<f64>(), prop::option::of(stop_reasons()), streams())
+            .prop_map(|(phase, remaining_s, stop, stream)| GroupSnapshot { phase, remaining_s, stop, stream })
+    }
+
+    fn streams() -> impl Strategy<Value = StreamReport> {
+        (prop::sample::select(&StreamState::ALL[..]), any::<[u64; 4]>()).prop_map(|(state, counts)| {
+            let [lag_ns, points, late_points, lost_points] = counts;
+            StreamReport { state, counts: StreamCounts { lag_ns, points, late_points, lost_points } }
+        })
     }
 
     fn snapshots() -> impl Strategy<Value = Snapshot> {

@@ -128,6 +128,12 @@ pub enum CommandError {
     /// Too many callbacks are with the real-time thread.
     #[error("too many callbacks are with the real-time thread")]
     TooManyCallbacks,
+    /// It is for one group, and there are several.
+    #[error("it is for one group, and must name it: {}", groups.join(", "))]
+    SeveralGroups {
+        /// The names of the groups.
+        groups: Vec<String>,
+    },
     /// The motion is not a trajectory under way.
     #[error("the motion is not a trajectory under way")]
     NoTrajectory,

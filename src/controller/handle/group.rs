@@ -14,9 +14,9 @@ use crate::controller::channels::{CallbackCommand, CallbackState};
 /// and profile torque are commanded by [`Handle::velocity`] and [`Handle::torque`]: the axis names its group.
 #[derive(Clone)]
 pub struct GroupHandle {
-    handle: Handle,
-    number: u8,
-    axes: Vec<usize>,
+    pub(super) handle: Handle,
+    pub(super) number: u8,
+    pub(super) axes: Vec<usize>,
 }
 
 impl Handle {
@@ -31,6 +31,24 @@ impl Handle {
             groups: self.groups().iter().map(|group| group.name.clone()).collect(),
         })?;
         Ok(GroupHandle { handle: self.clone(), number, axes: group.axes.clone() })
+    }
+
+    /// The group with this number; all axes, where the configuration has no groups.
+    pub(crate) fn group_of_number(&self, number: u8) -> GroupHandle {
+        let axes = match self.groups().get(usize::from(number)) {
+            Some(group) => group.axes.clone(),
+            None => (0..self.axes().len()).collect(),
+        };
+        GroupHandle { handle: self.clone(), number, axes }
+    }
+
+    /// The only group that there is.
+    pub(super) fn only_group(&self) -> Result<GroupHandle, CommandError> {
+        if self.groups().len() > 1 {
+            let groups = self.groups().iter().map(|group| group.name.clone()).collect();
+            return Err(CommandError::SeveralGroups { groups });
+        }
+        Ok(self.group_of_number(0))
     }
 }
 
@@ -60,15 +78,6 @@ impl GroupHandle {
     /// See [`CommandError`]; nothing has changed then.
     pub fn move_with(&self, target: &[f64], options: MoveOptions) -> Result<MotionId, CommandError> {
         self.handle.move_axes(self.target(), &self.axes, target, options)
-    }
-
-    /// As [`Handle::begin_stream`]. The points have an entry for each axis of the controller; the group follows those of its own. There
-    /// is one stream: a group that begins to follow it while another one does discards the points that wait.
-    ///
-    /// # Errors
-    /// See [`Handle::begin_stream`].
-    pub fn begin_stream(&self) -> Result<(), CommandError> {
-        self.handle.request_of(self.target(), Request::Stream)
     }
 
     /// As [`Handle::in_loop`]: the function sees and commands the axes of the group, in the order of [`GroupHandle::axes`].
@@ -137,7 +146,8 @@ impl GroupHandle {
         })
     }
 
-    const fn target(&self) -> RequestTarget {
-        RequestTarget::Group(self.number)
+    /// Whom its requests are for. What is asked of the only group is asked of all.
+    pub(super) fn target(&self) -> RequestTarget {
+        if self.handle.groups().len() > 1 { RequestTarget::Group(self.number) } else { RequestTarget::All }
     }
 }

@@ -3,10 +3,14 @@
 use std::time::Duration;
 
 use takt_rt::linux::MonotonicClock;
-use takt_rt::{AxisPoint, Clock, MAX_AXES, Nanoseconds, PointRole, Request, StreamPoint, StreamReport};
+use takt_rt::{
+    AxisPoint, Clock, GroupSnapshot, MAX_AXES, Nanoseconds, PointRole, Request, StreamPoint, StreamReport,
+    StreamState,
+};
 
-use super::Handle;
 use super::error::CommandError;
+use super::{GroupHandle, Handle};
+use crate::controller::channels::chunk;
 
 /// Why points were not taken; none of them was, then.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -37,15 +41,27 @@ pub enum StreamError {
     Ended,
 }
 
-/// Hands points to the stream of a controller, from any thread. Clones are cheap and equal.
+/// Hands points to the stream of a group, or to those of all groups, from any thread. Clones are cheap and equal.
 ///
 /// Stamps are in nanoseconds of the clock that [`StreamHandle::now_ns`] shows. The set-points run behind the stamps by
 /// [`lag`](StreamHandle::lag), which depends on the interval of the points, on how late they come, and on the configuration
 /// (`[stream] delay`).
 ///
-/// A group follows the points from [`Handle::begin_stream`] on.
+/// A group follows its points from [`Handle::begin_stream`] or [`GroupHandle::begin_stream`] on.
 #[derive(Clone)]
-pub struct StreamHandle(Handle);
+pub struct StreamHandle {
+    handle: Handle,
+    to: StreamTarget,
+}
+
+/// Whose stream gets the points.
+#[derive(Clone)]
+enum StreamTarget {
+    /// A point has an entry for each axis of the controller.
+    All,
+    /// A point has an entry for each axis of this group, in the order of the group.
+    Group { number: u8, axes: usize },
+}
 
 impl StreamHandle {
     /// The present time on the clock of the stamps: `CLOCK_MONOTONIC`.
@@ -60,8 +76,7 @@ impl StreamHandle {
     /// See [`StreamError`].
     pub fn push<P: Copy + Into<AxisPoint>>(&self, at_ns: Nanoseconds, axes: &[P]) -> Result<(), StreamError> {
         let axes = self.entries(0, axes)?;
-        let point = StreamPoint { at_ns, role: PointRole::Single, axes };
-        self.0.0.streamer.push(&[point]).map_err(|_| StreamError::Full)
+        self.hand_over(&[StreamPoint { at_ns, role: PointRole::Single, axes }])
     }
 
     /// The same as [`StreamHandle::push`] for a point that is meant for now.
@@ -86,7 +101,7 @@ impl StreamHandle {
         let entries = |(index, axes): (usize, &A)| self.entries(index, axes.as_ref());
         let points = points.iter().enumerate().map(entries).collect::<Result<Vec<_>, _>>()?;
         let interval_ns = u64::try_from(interval.as_nanos()).unwrap_or(u64::MAX);
-        self.0.0.streamer.push_chunk(from_ns, interval_ns, &points).map_err(|_| StreamError::Full)
+        self.hand_over(&chunk(from_ns, interval_ns, &points))
     }
 
     /// Takes points that are stamped already, with an entry for each axis: all of them, or none.
@@ -94,22 +109,30 @@ impl StreamHandle {
     /// # Errors
     /// See [`StreamError`].
     pub fn push_points(&self, points: &[StreamPoint]) -> Result<(), StreamError> {
-        if self.0.0.life.is_ending() {
+        if self.handle.0.life.is_ending() {
             return Err(StreamError::Ended);
         }
-        let axes = self.0.axes().len();
         for (number, point) in points.iter().enumerate() {
-            let mut entries = point.axes.iter().take(axes).enumerate();
+            let mut entries = point.axes.iter().take(self.axis_count()).enumerate();
             if let Some((axis, value)) = entries.find(|(_, entry)| !entry.is_finite()) {
                 return Err(StreamError::NotFinite { point: number, axis, value: *value });
             }
         }
-        self.0.0.streamer.push(points).map_err(|_| StreamError::Full)
+        self.hand_over(points)
     }
 
-    /// What the stream is doing, how far it is behind the stamps, and how many points have come, came late or were lost.
+    /// What the stream is doing, how far it is behind the stamps, and how many points have come, came late or were lost. Of the
+    /// streams of several groups, it is the first that a group follows.
     pub fn report(&self) -> StreamReport {
-        self.0.state().stream
+        let state = self.handle.state();
+        let first = match self.to {
+            StreamTarget::Group { number, .. } => state.groups().get(usize::from(number)),
+            StreamTarget::All => {
+                let followed = |group: &&GroupSnapshot| group.stream.state != StreamState::Idle;
+                state.groups().iter().find(followed).or(state.groups().first())
+            }
+        };
+        first.map_or_else(StreamReport::default, |group| group.stream)
     }
 
     /// How far the set-points are behind the stamps now.
@@ -117,15 +140,31 @@ impl StreamHandle {
         Duration::from_nanos(self.report().counts.lag_ns)
     }
 
+    fn hand_over(&self, points: &[StreamPoint]) -> Result<(), StreamError> {
+        let streamer = &self.handle.0.streamer;
+        let handed = match self.to {
+            StreamTarget::All => streamer.push(points),
+            StreamTarget::Group { number, .. } => streamer.push_to(number, points),
+        };
+        handed.map_err(|_| StreamError::Full)
+    }
+
+    fn axis_count(&self) -> usize {
+        match self.to {
+            StreamTarget::All => self.handle.axes().len(),
+            StreamTarget::Group { axes, .. } => axes,
+        }
+    }
+
     fn entries<P: Copy + Into<AxisPoint>>(
         &self,
         point: usize,
         axes: &[P],
     ) -> Result<[AxisPoint; MAX_AXES], StreamError> {
-        if self.0.0.life.is_ending() {
+        if self.handle.0.life.is_ending() {
             return Err(StreamError::Ended);
         }
-        let expected = self.0.axes().len();
+        let expected = self.axis_count();
         if axes.len() != expected {
             return Err(StreamError::Count { given: axes.len(), axes: expected });
         }
@@ -141,7 +180,7 @@ impl StreamHandle {
 }
 
 impl Handle {
-    /// Begins to follow the points of [`Handle::stream`]. The first one must come within the enable time-out. The axes are led to it
+    /// Every group begins to follow the points of [`Handle::stream`]. The first one must come within the enable time-out. The axes are led to it
     /// within their limits; where an axis is to `follow = "exact"`, it must be near the joint.
     ///
     /// # Errors
@@ -150,8 +189,24 @@ impl Handle {
         self.request(Request::Stream)
     }
 
-    /// A handle to stream points by, for any thread.
+    /// A handle to stream points for all axes by, for any thread.
     pub fn stream(&self) -> StreamHandle {
-        StreamHandle(self.clone())
+        StreamHandle { handle: self.clone(), to: StreamTarget::All }
+    }
+}
+
+impl GroupHandle {
+    /// The group begins to follow the points of [`GroupHandle::stream`]; the other groups go on with what they do.
+    ///
+    /// # Errors
+    /// See [`Handle::begin_stream`].
+    pub fn begin_stream(&self) -> Result<(), CommandError> {
+        self.handle.request_of(self.target(), Request::Stream)
+    }
+
+    /// A handle to stream points for the axes of the group by, in the order of [`GroupHandle::axes`], for any thread.
+    pub fn stream(&self) -> StreamHandle {
+        let to = StreamTarget::Group { number: self.number, axes: self.axes.len() };
+        StreamHandle { handle: self.handle.clone(), to }
     }
 }

@@ -5,15 +5,15 @@ use std::time::Duration;
 
 use takt_rt::plan::State;
 use takt_rt::{
-    AxisLimits, ExecutionStart, MotionState, NANOSECONDS_PER_SECOND, RejectReason, Request, RequestId,
-    RequestTarget, TrajectoryId,
+    AxisLimits, ExecutionStart, MAX_GROUPS, MotionState, NANOSECONDS_PER_SECOND, RejectReason, Request,
+    RequestId, RequestTarget, TrajectoryId,
 };
 
-use super::Handle;
 use super::error::CommandError;
 use super::motion::MotionId;
+use super::{GroupHandle, Handle};
 use crate::config::Axis;
-use crate::controller::channels::{GivenTrajectory, TrajectoryGiver};
+use crate::controller::channels::{AxisPlaces, GivenTrajectory, TrajectoryGiver};
 use crate::trajectory::{Trajectory, TrajectoryConditions, TrajectoryError, TrajectoryPoint};
 
 /// By how much later than now a trajectory takes the place of another one: first, and at most. It must have been computed and handed
@@ -26,7 +26,8 @@ const TAKING_OVER: Duration = Duration::from_secs(5);
 /// The trajectories of the handles of a controller.
 pub(super) struct Trajectories {
     giver: TrajectoryGiver,
-    state: Mutex<TrajectoryState>,
+    /// Those of each group.
+    groups: [Mutex<TrajectoryState>; MAX_GROUPS],
 }
 
 #[derive(Default)]
@@ -50,13 +51,15 @@ struct Present {
 
 impl Trajectories {
     pub(super) fn new(giver: TrajectoryGiver) -> Self {
-        Self { giver, state: Mutex::default() }
+        Self { giver, groups: Default::default() }
     }
 
-    /// Commands of trajectories wait for one another; no other call needs this lock.
-    fn lock(&self) -> MutexGuard<'_, TrajectoryState> {
+    /// Commands of trajectories of a group wait for one another; no other call needs this lock.
+    fn lock(&self, group: u8) -> MutexGuard<'_, TrajectoryState> {
+        let [first, ..] = &self.groups;
+        let state = self.groups.get(usize::from(group)).unwrap_or(first);
         // A panic of another holder of the lock leaves the state consistent.
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+        state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -69,9 +72,10 @@ impl Handle {
     /// first point then needs a time after 0. Returns when the real-time thread has granted it.
     ///
     /// # Errors
-    /// [`CommandError::Trajectory`], [`CommandError::Refused`] in any other motion, and see [`CommandError`]; nothing has changed then.
+    /// [`CommandError::Trajectory`], [`CommandError::Refused`] in any other motion, [`CommandError::SeveralGroups`] where
+    /// [`GroupHandle::execute`] is meant, and see [`CommandError`]; nothing has changed then.
     pub fn execute(&self, points: &[TrajectoryPoint]) -> Result<MotionId, CommandError> {
-        self.execute_with(|conditions| Trajectory::new(points, conditions))
+        self.only_group()?.execute(points)
     }
 
     /// The same, for a trajectory that `make` makes from where the axes are when it begins. It is called again if that took too
@@ -83,22 +87,7 @@ impl Handle {
         &self,
         make: impl Fn(&TrajectoryConditions<'_>) -> Result<Trajectory, TrajectoryError>,
     ) -> Result<MotionId, CommandError> {
-        let mut trajectories = self.0.trajectories.lock();
-        let Some(present) = self.under_way(&trajectories) else {
-            let start: Vec<State> = self
-                .axes()
-                .iter()
-                .zip(&self.state().axes)
-                .map(|(_, axis)| State::rest(axis.position_set))
-                .collect();
-            let trajectory = self.made(&start, &make)?;
-            return self.begin(&mut trajectories, trajectory, ExecutionStart::Now, None);
-        };
-        let start = |at_s: f64| -> Vec<State> {
-            let states = present.given.trajectory().sample(at_s).states;
-            self.axes().iter().zip(states).map(|(_, state)| state).collect()
-        };
-        self.take_over(&mut trajectories, &present, None, |at_s| self.made(&start(at_s), &make))
+        self.only_group()?.execute_with(make)
     }
 
     /// Starts a trajectory from where the axes hold through waypoints, without stopping, to rest at the last one: as fast as a spline
@@ -106,6 +95,103 @@ impl Handle {
     ///
     /// # Errors
     /// As [`Handle::execute`], and [`CommandError::Trajectory`] in motion.
+    pub fn move_through(&self, waypoints: &[Vec<f64>]) -> Result<MotionId, CommandError> {
+        self.only_group()?.move_through(waypoints)
+    }
+
+    /// Changes the speed along the path of a trajectory: 1 as it was written, 0.5 half as fast. The path stays the same, and all limits
+    /// are kept: the change is a ramp that is as short as they allow. Of a trajectory that is paused, it is the speed after
+    /// [`Handle::resume`]. Returns when the change begins.
+    ///
+    /// # Errors
+    /// [`CommandError::Rate`] for what the limits do not allow, [`CommandError::NoTrajectory`] if that motion is not a trajectory under way,
+    /// and see [`CommandError`]. The trajectory goes on as before then.
+    pub fn set_speed(&self, motion: MotionId, rate: f64) -> Result<(), CommandError> {
+        self.group_of_motion(motion).change_rate(motion, |present| (rate, present.is_paused))
+    }
+
+    /// Brings the axes to rest on the path of a trajectory. Returns when they begin to slow down.
+    ///
+    /// # Errors
+    /// As [`Handle::set_speed`].
+    pub fn pause(&self, motion: MotionId) -> Result<(), CommandError> {
+        self.group_of_motion(motion).change_rate(motion, |present| (present.rate, true))
+    }
+
+    /// Goes on with a trajectory that was paused. Returns when it does.
+    ///
+    /// # Errors
+    /// As [`Handle::set_speed`].
+    pub fn resume(&self, motion: MotionId) -> Result<(), CommandError> {
+        self.group_of_motion(motion).change_rate(motion, |present| (present.rate, false))
+    }
+
+    /// How far a trajectory under way is: the time on its path in seconds, of how many, and the present rate.
+    pub fn trajectory_progress(&self, motion: MotionId) -> Option<TrajectoryProgress> {
+        let group = self.group_of_motion(motion);
+        let trajectories = self.0.trajectories.lock(group.number);
+        let present = self.under_way(&trajectories).filter(|present| present.motion == motion.request)?;
+        let trajectory = present.given.trajectory();
+        let path_time = trajectory.path_time(present.given.at_s());
+        Some(TrajectoryProgress {
+            path_s: path_time.path_s,
+            of_s: trajectory.path_duration_s(),
+            rate: path_time.rate,
+        })
+    }
+
+    fn group_of_motion(&self, motion: MotionId) -> GroupHandle {
+        self.group_of_number(match motion.target {
+            RequestTarget::Group(number) => number,
+            RequestTarget::All => 0,
+        })
+    }
+
+    /// The trajectory under way.
+    fn under_way(&self, trajectories: &TrajectoryState) -> Option<Present> {
+        let state = self.state();
+        let is_under_way =
+            |present: &&Present| state.motions.of(present.motion) == Some(MotionState::InProgress);
+        trajectories.present.as_ref().filter(is_under_way).cloned()
+    }
+}
+
+impl GroupHandle {
+    /// As [`Handle::execute`], for the axes of the group in the order of [`GroupHandle::axes`]; errors count them so, too.
+    ///
+    /// # Errors
+    /// See [`Handle::execute`].
+    pub fn execute(&self, points: &[TrajectoryPoint]) -> Result<MotionId, CommandError> {
+        self.execute_with(|conditions| Trajectory::new(points, conditions))
+    }
+
+    /// As [`Handle::execute_with`], for the axes of the group in the order of [`GroupHandle::axes`].
+    ///
+    /// # Errors
+    /// See [`Handle::execute`].
+    pub fn execute_with(
+        &self,
+        make: impl Fn(&TrajectoryConditions<'_>) -> Result<Trajectory, TrajectoryError>,
+    ) -> Result<MotionId, CommandError> {
+        let mut trajectories = self.handle.0.trajectories.lock(self.number);
+        let Some(present) = self.handle.under_way(&trajectories) else {
+            let state = self.handle.state();
+            let standing = |axis: &usize| state.axes().get(*axis).map(|axis| State::rest(axis.position_set));
+            let start: Vec<State> = self.axes.iter().filter_map(standing).collect();
+            let trajectory = self.made(&start, &make)?;
+            return self.begin(&mut trajectories, trajectory, ExecutionStart::Now, None);
+        };
+        let start = |at_s: f64| -> Vec<State> {
+            let states = present.given.trajectory().sample(at_s).states;
+            self.axes.iter().zip(states).map(|(_, state)| state).collect()
+        };
+        self.take_over(&mut trajectories, &present, None, |at_s| self.made(&start(at_s), &make))
+    }
+
+    /// As [`Handle::move_through`], for the axes of the group in the order of [`GroupHandle::axes`].
+    ///
+    /// # Errors
+    /// See [`Handle::move_through`].
     pub fn move_through(&self, waypoints: &[Vec<f64>]) -> Result<MotionId, CommandError> {
         self.execute_with(|conditions| Trajectory::through(waypoints, conditions))
     }
@@ -119,7 +205,7 @@ impl Handle {
         let period_s = self.period_s();
         let trajectory = make(&TrajectoryConditions { start, limits: &limits, period_s })?;
         let moves = |(index, axis): &(usize, &Axis)| axis.control.is_profile() && trajectory.moves(*index);
-        match self.axes().iter().enumerate().find(moves) {
+        match self.own_axes().enumerate().find(moves) {
             Some((_, axis)) => Err(CommandError::WrongMode {
                 axis: axis.name.clone(),
                 needed: "a mode that follows set-points",
@@ -128,53 +214,13 @@ impl Handle {
         }
     }
 
-    /// Changes the speed along the path of a trajectory: 1 as it was written, 0.5 half as fast. The path stays the same, and all limits
-    /// are kept: the change is a ramp that is as short as they allow. Of a trajectory that is paused, it is the speed after
-    /// [`Handle::resume`]. Returns when the change begins.
-    ///
-    /// # Errors
-    /// [`CommandError::Rate`] for what the limits do not allow, [`CommandError::NoTrajectory`] if that motion is not a trajectory under way,
-    /// and see [`CommandError`]. The trajectory goes on as before then.
-    pub fn set_speed(&self, motion: MotionId, rate: f64) -> Result<(), CommandError> {
-        self.change_rate(motion, |present| (rate, present.is_paused))
-    }
-
-    /// Brings the axes to rest on the path of a trajectory. Returns when they begin to slow down.
-    ///
-    /// # Errors
-    /// As [`Handle::set_speed`].
-    pub fn pause(&self, motion: MotionId) -> Result<(), CommandError> {
-        self.change_rate(motion, |present| (present.rate, true))
-    }
-
-    /// Goes on with a trajectory that was paused. Returns when it does.
-    ///
-    /// # Errors
-    /// As [`Handle::set_speed`].
-    pub fn resume(&self, motion: MotionId) -> Result<(), CommandError> {
-        self.change_rate(motion, |present| (present.rate, false))
-    }
-
-    /// How far a trajectory under way is: the time on its path in seconds, of how many, and the present rate.
-    pub fn trajectory_progress(&self, motion: MotionId) -> Option<TrajectoryProgress> {
-        let trajectories = self.0.trajectories.lock();
-        let present = self.under_way(&trajectories).filter(|present| present.motion == motion.request)?;
-        let trajectory = present.given.trajectory();
-        let path_time = trajectory.path_time(present.given.at_s());
-        Some(TrajectoryProgress {
-            path_s: path_time.path_s,
-            of_s: trajectory.path_duration_s(),
-            rate: path_time.rate,
-        })
-    }
-
     fn change_rate(
         &self,
         MotionId { request: motion, .. }: MotionId,
         wanted: impl Fn(&Present) -> (f64, bool),
     ) -> Result<(), CommandError> {
-        let mut trajectories = self.0.trajectories.lock();
-        let present = self.under_way(&trajectories).filter(|present| present.motion == motion);
+        let mut trajectories = self.handle.0.trajectories.lock(self.number);
+        let present = self.handle.under_way(&trajectories).filter(|present| present.motion == motion);
         let present = present.ok_or(CommandError::NoTrajectory)?;
         let (rate, is_paused) = wanted(&present);
         if !(rate.is_finite() && rate > 0.0) {
@@ -233,11 +279,13 @@ impl Handle {
         start: ExecutionStart,
         same: Option<&Present>,
     ) -> Result<MotionId, CommandError> {
-        let giver = &self.0.trajectories.giver;
+        let giver = &self.handle.0.trajectories.giver;
         self.take_back_discarded(trajectories);
-        let given = Arc::new(GivenTrajectory::new(trajectory));
-        let id = giver.give(0, &given).ok_or(CommandError::Full { waiting: trajectories.submitted.len() })?;
-        let request = match self.submit(RequestTarget::All, Request::Execute { trajectory: id, start }) {
+        let given = Arc::new(GivenTrajectory::new(trajectory, AxisPlaces::new(self.axes.clone())));
+        let id = giver
+            .give(self.number, &given)
+            .ok_or(CommandError::Full { waiting: trajectories.submitted.len() })?;
+        let request = match self.handle.submit(self.target(), Request::Execute { trajectory: id, start }) {
             Ok(request) => request,
             Err(error) => {
                 giver.take_back(id);
@@ -245,46 +293,42 @@ impl Handle {
             }
         };
         trajectories.submitted.push((id, request));
-        self.wait_for_grant(RequestTarget::All, request)?;
+        self.handle.wait_for_grant(self.target(), request)?;
         let motion = same.map_or(request, |same| same.motion);
         let (rate, is_paused) = same.map_or((1.0, false), |same| (same.rate, same.is_paused));
         trajectories.present = Some(Present { motion, id, given: Arc::clone(&given), rate, is_paused });
         // Until then nothing else can take the place of the present one. The motion may end before.
-        let _ = self.wait_until(TAKING_OVER, |state| {
+        let _ = self.handle.wait_until(TAKING_OVER, |state| {
             let is_under_way = state.motions.of(motion) == Some(MotionState::InProgress);
             (given.at_s() > 0.0 || !is_under_way).then_some(())
         });
-        Ok(MotionId { request: motion, target: RequestTarget::All })
+        Ok(MotionId { request: motion, target: self.target() })
     }
 
     /// Takes trajectories back whose requests a stop has discarded.
     fn take_back_discarded(&self, trajectories: &mut TrajectoryState) {
-        let state = self.state();
+        let state = self.handle.state();
         trajectories.submitted.retain(|(id, request)| {
-            let is_discarded = self.is_discarded(RequestTarget::All, *request, &state);
+            let is_discarded = self.handle.is_discarded(self.target(), *request, &state);
             if is_discarded {
-                self.0.trajectories.giver.take_back(*id);
+                self.handle.0.trajectories.giver.take_back(*id);
             }
             !is_discarded && state.answers.of(*request) == takt_rt::Answer::None
         });
-        self.0.trajectories.giver.release();
-    }
-
-    /// The trajectory under way.
-    fn under_way(&self, trajectories: &TrajectoryState) -> Option<Present> {
-        let state = self.state();
-        let is_under_way =
-            |present: &&Present| state.motions.of(present.motion) == Some(MotionState::InProgress);
-        trajectories.present.as_ref().filter(is_under_way).cloned()
+        self.handle.0.trajectories.giver.release();
     }
 
     fn limits(&self) -> Vec<AxisLimits> {
-        self.axes().iter().map(|axis| axis.limits).collect()
+        self.own_axes().map(|axis| axis.limits).collect()
+    }
+
+    fn own_axes(&self) -> impl Iterator<Item = &Axis> {
+        self.axes.iter().filter_map(|axis| self.handle.axes().get(*axis))
     }
 
     /// As the engine computes it.
     fn period_s(&self) -> f64 {
-        self.machine().cycle_ns as f64 / NANOSECONDS_PER_SECOND as f64
+        self.handle.machine().cycle_ns as f64 / NANOSECONDS_PER_SECOND as f64
     }
 }
 
