@@ -183,6 +183,7 @@ const CASES: &[Case] = &[
         |c| axis(c).simulated.coulomb_friction = f64::NAN,
         &[AXIS, "`axis.simulated.coulomb_friction`"],
     ),
+    ("gravity", |c| axis(c).simulated.gravity = -1.0, &[AXIS, "`axis.simulated.gravity`"]),
     ("rated torque", |c| axis(c).simulated.rated_torque = 0.0, &[AXIS, "`axis.simulated.rated_torque`"]),
     ("peak torque", |c| axis(c).simulated.peak_torque = f64::NAN, &[AXIS, "`axis.simulated.peak_torque`"]),
     ("beginning", |c| axis(c).simulated.initial_position = 9.0, &[AXIS, "cannot begin at 9 rad"]),

@@ -1,7 +1,7 @@
 //! Runs a fixed number of cycles of the engine, or packs and unpacks PDOs, for counting instructions; see
 //! `benches/instructions`.
 //!
-//! The first argument names the work: `cycle-AXES`, `replan-AXES`, `stream-AXES`, `pack` or `unpack`. The second one says how often
+//! The first argument names the work: `cycle-AXES`, `replan-AXES`, `stream-AXES`, `callback-AXES`, `pack` or `unpack`. The second one says how often
 //! it is repeated. The difference between two repetition counts does not contain the start-up.
 
 use std::hint::black_box;
@@ -23,7 +23,8 @@ fn main() {
     let Ok(axes) = axes.parse() else { usage() };
     match name {
         "cycle" | "replan" => cycles(axes, name == "replan", repetitions),
-        "stream" => streamed_cycles(axes, repetitions),
+        "stream" => led_cycles(Thinking::streaming(axes), repetitions),
+        "callback" => led_cycles(Thinking::in_loop(axes), repetitions),
         "pack" => pack(repetitions),
         "unpack" => unpack(repetitions),
         _ => usage(),
@@ -31,7 +32,9 @@ fn main() {
 }
 
 fn usage() -> ! {
-    eprintln!("usage: cycle_instructions cycle-AXES|replan-AXES|stream-AXES|pack|unpack REPETITIONS");
+    eprintln!(
+        "usage: cycle_instructions cycle-AXES|replan-AXES|stream-AXES|callback-AXES|pack|unpack REPETITIONS"
+    );
     std::process::exit(2);
 }
 
@@ -45,8 +48,7 @@ fn cycles(axes: usize, is_replanned: bool, repetitions: u32) {
     }
 }
 
-fn streamed_cycles(axes: usize, repetitions: u32) {
-    let mut thinking = Thinking::streaming(axes);
+fn led_cycles(mut thinking: Thinking, repetitions: u32) {
     for _ in 0..repetitions {
         black_box(thinking.cycle());
     }

@@ -6,7 +6,7 @@ use std::sync::{Arc, mpsc};
 use std::time::Duration;
 
 use takt_rt::linux::{MonotonicClock, ThreadReport};
-use takt_rt::{Clock, Request, Snapshot, StopCategory};
+use takt_rt::{Clock, Request, SlotPlan, Snapshot, StopCategory};
 
 use super::assemble::{self, AssembleError};
 use super::channels::{
@@ -129,6 +129,8 @@ pub(super) struct RemoteHandles {
     pub trajectories: TrajectoryGiver,
     /// Gives callbacks.
     pub callbacks: CallbackGiver,
+    /// The times within a slot.
+    pub plan: SlotPlan,
     /// Reads the events.
     pub events: EventReader,
     /// The result of the real-time set-up.
@@ -137,13 +139,14 @@ pub(super) struct RemoteHandles {
 
 impl RemoteHandles {
     /// `None` if they were taken before.
-    fn of(host: &mut HostSide, begun: &Begun) -> Option<Self> {
+    fn of(host: &mut HostSide, plan: SlotPlan, begun: &Begun) -> Option<Self> {
         Some(Self {
             observer: host.observer(),
             streamer: host.streamer(),
             clients: host.clients(),
             trajectories: host.trajectories(),
             callbacks: host.callbacks(),
+            plan,
             events: host.events(),
             realtime: begun.report,
         })
@@ -216,7 +219,9 @@ fn lead_as_owner(
         }
     };
     let begun = running.begun();
-    if let (Some(remote), Some(handles)) = (remote, RemoteHandles::of(&mut host, &begun)) {
+    if let (Some(remote), Some(handles)) =
+        (remote, RemoteHandles::of(&mut host, assemble::slot_plan(config), &begun))
+    {
         // This fails only if the client has given up. It has then asked the run to end.
         let _ = remote.send(handles);
     }

@@ -26,6 +26,8 @@ pub struct Case {
     pub broken_off: Option<u64>,
     pub hardship: Hardship,
     pub overload: Overload,
+    /// Whether callbacks lead the groups, too.
+    pub has_callbacks: bool,
     pub dice: Dice,
 }
 
@@ -119,6 +121,7 @@ impl Case {
             broken_off,
             hardship,
             overload,
+            has_callbacks: false,
             dice,
         }
     }

@@ -8,6 +8,7 @@
 mod bounds;
 mod case;
 mod client;
+mod client_callback;
 mod client_stream;
 mod concern;
 mod coverage;
@@ -24,11 +25,14 @@ mod tap;
 mod weather;
 mod wire;
 
+use std::collections::BTreeSet;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread;
 use std::time::Instant;
+
+use takt_rt::Rule;
 
 use case::Case;
 use coverage::Coverage;
@@ -38,6 +42,8 @@ use run::{Done, play};
 const CYCLES: u64 = 1_040_000;
 /// Which seeds are played depends on the first one and the number of cycles alone, not on the number of processors.
 const SHARDS: u64 = 16;
+/// Of storms in which callbacks lead the groups.
+const CALLBACK_CASES: u64 = 120;
 /// A shard ends after so many failures.
 const FAILURES_AT_MOST: usize = 5;
 
@@ -131,4 +137,20 @@ fn the_same_seed_is_the_same_storm_bit_for_bit() {
     let all: Vec<[u64; 2]> = (1_000_000..1_000_024).map(fingerprints).collect();
     assert!(all.iter().all(|[first, second]| first == second), "{all:?}");
     assert!(all.windows(2).all(|pair| pair[0] != pair[1]), "the fingerprint sees something: {all:?}");
+}
+
+#[test]
+fn the_invariants_hold_where_callbacks_lead_the_groups_overrun_and_panic() {
+    let mut stops = BTreeSet::new();
+    let first = number("TAKT_STORM_FIRST").unwrap_or(0);
+    for seed in first..first + CALLBACK_CASES {
+        let case = Case { has_callbacks: true, ..Case::of(seed) };
+        match play(&case) {
+            Ok(done) => stops.extend(done.stops),
+            Err(wrong) => panic!("seed {seed}, with callbacks: {} {wrong}\n{}", case.config.name, case.text),
+        }
+    }
+    for rule in [Rule::CallbackOverrun, Rule::CallbackPanicked] {
+        assert!(stops.contains(rule.key()), "never: {rule:?}");
+    }
 }

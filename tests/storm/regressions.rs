@@ -32,6 +32,7 @@ fn moving(name: &'static str, text: &str) -> Case {
         interrupt: Interrupt::Controlled,
         broken_off: None,
         hardship: Hardship::default(),
+        has_callbacks: false,
         overload: Overload::default(),
         dice: Dice::new(0),
     }

@@ -1,5 +1,6 @@
 //! One case from power-up to the end.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use takt::bus::port::Port;
@@ -15,6 +16,7 @@ use takt_rt::{
 
 use crate::case::Case;
 use crate::client::{Client, RecentRequests, is_open};
+use crate::client_callback::CallbackClient;
 use crate::concern::Concerns;
 use crate::fingerprint::Fingerprint;
 use crate::heartbeat::Heartbeats;
@@ -104,6 +106,8 @@ pub struct Done {
     pub fingerprint: u64,
     /// Every fault that has begun.
     pub outcomes: Vec<FaultOutcome>,
+    /// The rules of all stops.
+    pub stops: BTreeSet<&'static str>,
     /// Whether the drives could not be brought up.
     pub is_bring_up_failed: bool,
 }
@@ -123,6 +127,7 @@ pub fn play(case: &Case) -> Result<Done, String> {
     let mut clients = Clients::new(case);
     let mut fingerprint = Fingerprint::default();
     let mut outcomes: Vec<FaultOutcome> = vec![];
+    let mut stops = BTreeSet::new();
     let at_most = case.length + (END_AT_MOST_S * 1e9 / config.cycle.period_ns as f64) as u64;
     let (mut enabled, mut cycles) = (None, 0);
     let mut goes_on = true;
@@ -151,6 +156,10 @@ pub fn play(case: &Case) -> Result<Done, String> {
             });
         });
         note_stop(&world.events, &mut outcomes);
+        stops.extend(world.events.iter().filter_map(|event| match event.kind {
+            EventKind::Stop(reason) => Some(reason.rule().key()),
+            _ => None,
+        }));
         clients.note_answers(&world.snapshot);
         fingerprint.take_cycle(&world);
         let World { log, snapshot, truth, events, .. } = &mut world;
@@ -192,7 +201,7 @@ pub fn play(case: &Case) -> Result<Done, String> {
     }
     at_rest(case, &mut concerns, &mut world)?;
     let is_bring_up_failed = matches!(world.run.supervisor().outcome(), Some(Outcome::BringUpFailed(_)));
-    Ok(Done { cycles, fingerprint: fingerprint.value(), outcomes, is_bring_up_failed })
+    Ok(Done { cycles, fingerprint: fingerprint.value(), outcomes, stops, is_bring_up_failed })
 }
 
 fn note_stop(events: &[Event], outcomes: &mut [FaultOutcome]) {
@@ -210,6 +219,7 @@ fn note_stop(events: &[Event], outcomes: &mut [FaultOutcome]) {
 /// Those who ask for things, all through one queue.
 struct Clients {
     all: Vec<Client>,
+    callbacks: Option<CallbackClient>,
     asked: RecentRequests,
     /// Resets of faults that wait in the queue. Each counts when it is granted: a fault may come up before that, and is reset too.
     awaited_resets: Vec<RequestId>,
@@ -221,7 +231,14 @@ impl Clients {
         let all = (0..case.clients as u64)
             .map(|number| Client::new(case.dice.split(number), case.hardship.are_streams_wild))
             .collect();
-        Self { all, asked: RecentRequests::default(), awaited_resets: vec![], since_reset: u64::MAX }
+        let callbacks = case.has_callbacks.then(|| CallbackClient::new(case.dice.split(u64::MAX - 3)));
+        Self {
+            all,
+            callbacks,
+            asked: RecentRequests::default(),
+            awaited_resets: vec![],
+            since_reset: u64::MAX,
+        }
     }
 
     /// Looks which resets have been granted in the last cycle.
@@ -237,6 +254,9 @@ impl Clients {
         let snapshot = &world.snapshot;
         let is_waited_for = snapshot.phase == Phase::Passive || !case.is_serving && !is_open(snapshot);
         if is_raging && !is_waited_for {
+            if let Some(callbacks) = &mut self.callbacks {
+                callbacks.act(&case.config, snapshot, &mut world.run);
+            }
             for client in &mut self.all {
                 let wishes = client.wishes(&case.config, snapshot);
                 for request in &wishes.requests {

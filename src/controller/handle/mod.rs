@@ -42,7 +42,6 @@ use std::time::Duration;
 use takt_rt::linux::ThreadReport;
 use takt_rt::{Phase, Snapshot, StopCategory};
 
-use super::assemble;
 use super::channels::{ClientRequests, EventReader, MotionEnd, Observer, Streamer};
 use super::outcome::{Interrupt, Outcome};
 use super::session::{self, RemoteHandles, Session, SessionError, SessionOptions};
@@ -81,7 +80,7 @@ impl Controller {
         let (handles_in, handles_out) = mpsc::sync_channel(1);
         let (life, messages) = (Arc::<Life>::default(), Arc::<Messages>::default());
         let (axes, groups) = (config.axes.clone(), config.groups.clone());
-        let (machine, plan) = (Machine::of(&config), assemble::slot_plan(&config));
+        let machine = Machine::of(&config);
         let thread = {
             let (life, messages) = (Arc::clone(&life), Arc::clone(&messages));
             let notify = move |notice: &Notice| match notice {
@@ -98,7 +97,8 @@ impl Controller {
         };
         let thread = thread.map_err(SessionError::Logger)?;
         let Ok(remote) = handles_out.recv() else { return Err(failed(thread)) };
-        let RemoteHandles { observer, streamer, clients, trajectories, callbacks, events, realtime } = remote;
+        let RemoteHandles { observer, streamer, clients, trajectories, callbacks, plan, events, realtime } =
+            remote;
         let trajectories = Trajectories::new(trajectories);
         let handle = Handle(Arc::new(Shared {
             axes,

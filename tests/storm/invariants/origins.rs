@@ -37,7 +37,10 @@ fn check_reason(seen: &Seen<'_>, reason: &StopReason) -> Result<(), String> {
     };
     let is_right = match (reason.rule(), reason.origin) {
         // What is asked of the group, and how it is paced.
-        (Rule::Requested | Rule::TimingUnfit, Origin::Group) => true,
+        (
+            Rule::Requested | Rule::TimingUnfit | Rule::CallbackOverrun | Rule::CallbackPanicked,
+            Origin::Group,
+        ) => true,
         // A stream is one of the group, a velocity or a torque one of an axis.
         (Rule::StaleCommand, Origin::Group | Origin::Axis(_)) => true,
         // Set-points break a limit in good weather too.
