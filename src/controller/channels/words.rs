@@ -364,15 +364,13 @@ pub(super) mod tests {
             any::<u8>().prop_map(Origin::Axis),
             any::<u8>().prop_map(Origin::Bus)
         ];
-        // Numbers that every fault can have: the operation modes are 8 to 10.
+        // Among them numbers that every fault can have: the operation modes are 8 to 10.
         let numbers = (0u8..100, 8u8..=10, any::<u64>());
-        (categories, rules, origins, numbers, phases).prop_map(
-            |(category, rule, origin, (seen, allowed, slot), phase)| StopReason {
-                category,
-                cause: StopCause::from_numbers(rule, seen.into(), allowed.into()).unwrap(),
-                origin,
-                slot,
-                phase,
+        (categories, rules, origins, numbers, phases).prop_filter_map(
+            "what was seen is no operation mode",
+            |(category, rule, origin, (seen, allowed, slot), phase)| {
+                let cause = StopCause::from_numbers(rule, seen.into(), allowed.into())?;
+                Some(StopReason { category, cause, origin, slot, phase })
             },
         )
     }
