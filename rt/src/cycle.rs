@@ -37,7 +37,7 @@ impl SlotPlan {
     /// The usual plan for a period: SYNC within a tenth of it, set-points ready no later than a quarter of it
     /// after the command phase begins.
     pub const fn usual(period_ns: Nanoseconds, command_phase_ns: Nanoseconds) -> Self {
-        let quarter = command_phase_ns + period_ns / 4;
+        let quarter = command_phase_ns.saturating_add(period_ns / 4);
         let end = period_ns / 20 * 19;
         Self {
             latest_sync_ns: period_ns / 10,
