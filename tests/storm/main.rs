@@ -39,7 +39,7 @@ use coverage::Coverage;
 use run::{Done, play};
 
 /// In all of the shards together.
-const CYCLES: u64 = 2_000_000;
+const CYCLES: u64 = 10_000_000;
 /// Which seeds are played depends on the first one and the number of cycles alone, not on the number of processors.
 const SHARDS: u64 = 16;
 /// Of storms in which callbacks lead the groups.

@@ -289,7 +289,8 @@ fn at_rest(case: &Case, concerns: &mut Concerns, world: &mut World) -> Result<()
     concerns.observe(&world.fault_injector, |_| ());
     for (axis, concern) in case.config.axes.iter().zip(&concerns.by_axis) {
         let truth = world.run.ports()[axis.bus].observe(rest_ns, axis.node);
-        let is_driven = truth.state == DriveState::OperationEnabled;
+        // Set-points of another master enable a drive again whose node somebody has started.
+        let is_driven = truth.state == DriveState::OperationEnabled && !concern.is_driven_by_others;
         // Nothing stops a drive that has no watchdog any more and that no frame reaches.
         let is_beyond_reach = concern.is_unwatched && concern.is_cut_off;
         if (truth.velocity.abs() > REST || is_driven) && !concern.is_loaded && !is_beyond_reach {
