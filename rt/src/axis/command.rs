@@ -31,13 +31,12 @@ impl Axis {
 
     /// The target in drive units, and the torque that is commanded with it.
     fn target(&mut self, is_enabled: bool) -> (i32, f64) {
-        let parameters = &self.parameters;
-        let law = parameters.law;
         if !is_enabled {
             self.torque_loop = TorqueLoop::default();
             self.command.set(CommandSlot::VelocityOffset, 0);
             self.command.set(CommandSlot::TorqueOffset, 0);
         }
+        let AxisParameters { law, scale, limits, torque_limits, feed_forward, .. } = &self.parameters;
         if law.is_profile() {
             return (self.profile.target_raw(), self.profile.torque());
         }
@@ -50,12 +49,17 @@ impl Axis {
             position: self.joint.position(),
             velocity: self.joint.velocity(),
         };
-        // Nothing, where an unlimited rate meets a period that is not known: `max` leaves out what is no number.
-        let fade = (parameters.torque_limits.rate * self.reception.cycle_s()).max(0.0);
-        let limit = parameters.limits.torque;
-        let torque = self.torque_loop.next(&law, &input, limit, fade);
-        let raw = law.target(&input, torque, &parameters.scale, &parameters.limits);
-        if parameters.feed_forward != FeedForward::None {
+        // Where nobody takes a torque, none is wanted either.
+        let is_torque_taken = law.target_slot() == CommandSlot::TargetTorque || feed_forward.has_torque();
+        let torque = if is_torque_taken {
+            // Nothing, where an unlimited rate meets a period that is not known: `max` leaves out what is no number.
+            let fade = (torque_limits.rate * self.reception.cycle_s()).max(0.0);
+            self.torque_loop.next(law, &input, limits.torque, fade)
+        } else {
+            0.0
+        };
+        let raw = law.target(&input, torque, scale, limits);
+        if *feed_forward != FeedForward::None {
             self.set_offsets(input.set.velocity, torque);
         }
         (raw, torque)
