@@ -21,7 +21,7 @@ impl Axis {
     /// Begins to wait for the feedback of a cycle. What arrived before `now_ns` and has not been used is too late for its
     /// own cycle, and is no feedback of this one.
     pub fn expect_feedback(&mut self, now_ns: Nanoseconds) {
-        self.reception.expect(now_ns);
+        self.reception.begin_request(now_ns);
     }
 
     /// SYNC begins: no drive has been asked for feedback yet.

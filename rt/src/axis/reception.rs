@@ -46,7 +46,7 @@ impl Reception {
     }
 
     /// Begins to wait for the feedback of a cycle. What arrived earlier and has not been used is dropped.
-    pub(super) fn expect(&mut self, now_ns: Nanoseconds) {
+    pub(super) fn begin_request(&mut self, now_ns: Nanoseconds) {
         self.expected_since_ns = now_ns;
         self.arrived = 0;
     }
@@ -139,7 +139,7 @@ mod tests {
     #[test]
     fn feedback_is_complete_when_every_pdo_of_the_cycle_has_arrived() {
         let mut reception = reception();
-        reception.expect(100);
+        reception.begin_request(100);
         assert!(!reception.is_in_time(99) && reception.is_in_time(100));
         assert!(!reception.note_arrival(1));
         assert!(reception.note_arrival(1), "it comes twice");
