@@ -11,7 +11,7 @@ use takt_rt::{
 };
 
 use crate::config::{Axis, Compliance, Config, ConfigError, DriveFamily, Interface};
-use crate::controller::channels::{AxisPlaces, GroupStream};
+use crate::controller::channels::{GroupAxes, GroupStream};
 use crate::drive::{PdoPlan, ProcessData, yz_aim};
 
 /// How long the drives may take from the first controlword to operation enabled.
@@ -213,7 +213,7 @@ pub fn streams(config: &Config) -> Vec<GroupStream> {
     let stream = |group: usize| {
         let axes = config.axes_of_group(group);
         let look_ahead = look_ahead(config, &axes);
-        GroupStream { axes: AxisPlaces::new(axes), look_ahead }
+        GroupStream { axes: GroupAxes::new(axes), look_ahead }
     };
     (0..config.groups.len().max(1)).map(stream).collect()
 }

@@ -11,12 +11,12 @@
 //!
 //! No call on [`RtSide`] allocates, locks or waits, even if another thread is preempted in the middle of a call.
 
-mod axis_places;
 mod callback_panic;
 mod callback_record;
 mod callbacks;
 mod client_requests;
 mod event_words;
+mod group_axes;
 mod latest;
 mod lending;
 mod motion_words;
@@ -47,12 +47,12 @@ use records::{RecordConsumer, RecordProducer};
 use stream::{StreamReceiver, stream_channels};
 use trajectories::TrajectoryTaker;
 
-pub use axis_places::AxisPlaces;
 pub use callback_record::{CallbackRecord, CallbackTimes};
 pub use callbacks::{
     CallbackClock, CallbackCommand, CallbackGiver, CallbackState, GivenCallback, LoopCallback,
 };
 pub use client_requests::{ClientRequests, MotionEnd, WAITING_AT_MOST};
+pub use group_axes::GroupAxes;
 pub use observed_events::EventReader;
 pub use request_numbers::RequestNumbers;
 pub use ring::{Consumer, Producer, ring};
@@ -458,7 +458,7 @@ mod tests {
     fn sizes() -> ChannelSizes {
         ChannelSizes {
             groups: vec![GroupStream {
-                axes: AxisPlaces::new(vec![0, 1]),
+                axes: GroupAxes::new(vec![0, 1]),
                 look_ahead: LookAheadParameters::default(),
             }],
             axes: 2,

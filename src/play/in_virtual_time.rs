@@ -14,7 +14,7 @@ use super::performance::{APPROACH_SCALE, MakeTrajectory, PlayError, Stage};
 use super::set_points::SetPointLog;
 use crate::config::Config;
 use crate::controller::assemble::AssembleError;
-use crate::controller::channels::{AxisPlaces, GivenTrajectory, LogSide};
+use crate::controller::channels::{GivenTrajectory, GroupAxes, LogSide};
 use crate::controller::{Interrupt, Outcome, VirtualRun};
 use crate::sim::SimulatedBus;
 use crate::trajectory::TrajectoryConditions;
@@ -116,7 +116,7 @@ impl Stage for VirtualStage<'_> {
         let limits = group.pick(&self.limits);
         let conditions = TrajectoryConditions { start: &start, limits: &limits, period_s: self.period_s };
         let trajectory = make(&conditions).map_err(|error| PlayError::Command(error.to_string()))?;
-        let places = AxisPlaces::new(group.axes.clone());
+        let places = GroupAxes::new(group.axes.clone());
         let given = Arc::new(GivenTrajectory::new(trajectory, places));
         let executed = self.run.host().execute(group.number, &given, ExecutionStart::Now);
         executed.map_err(|error| PlayError::Command(error.to_string()))

@@ -6,7 +6,7 @@ use super::error::{FileProblem, PlayFileError};
 use super::file::{JointPoint, PlayFile, PlayRow};
 use super::groups::PlayedGroup;
 use crate::config::{Axis, Config};
-use crate::controller::channels::AxisPlaces;
+use crate::controller::channels::GroupAxes;
 use crate::controller::check_point;
 
 /// Nanoseconds in a second, to and from the seconds of a file.
@@ -94,7 +94,7 @@ impl FileStream {
         let Batch { is_chunk, points, .. } = self.batches.get(number)?;
         let standing: [AxisPoint; MAX_AXES] =
             std::array::from_fn(|axis| AxisPoint::position(snapshot.axes[axis].position_set));
-        let (count, places) = (points.len(), AxisPlaces::new(group.axes.clone()));
+        let (count, places) = (points.len(), GroupAxes::new(group.axes.clone()));
         let stamped = points.iter().enumerate().map(|(index, (at_s, joints))| {
             let mut axes = standing;
             for (axis, point) in self.axes.iter().zip(joints) {

@@ -11,7 +11,7 @@ use takt_rt::{
 };
 
 use super::ChannelError;
-use super::axis_places::AxisPlaces;
+use super::group_axes::GroupAxes;
 use super::ring::{Consumer, Producer, ring};
 
 /// Points that the real-time thread takes in one cycle. The rest waits, so that a flood of them costs a bounded time.
@@ -25,7 +25,7 @@ const LOOK_AHEAD_POINTS: usize = 256;
 #[derive(Clone, Debug, Default)]
 pub struct GroupStream {
     /// The axes of the group.
-    pub axes: AxisPlaces,
+    pub axes: GroupAxes,
     /// How its points are looked ahead, with its axes in the order of the group.
     pub look_ahead: LookAheadParameters,
 }
@@ -35,7 +35,7 @@ pub struct GroupStream {
 pub struct Streamer(Arc<[StreamWriter]>);
 
 struct StreamWriter {
-    axes: AxisPlaces,
+    axes: GroupAxes,
     points: Mutex<Producer<StreamPoint>>,
 }
 
@@ -117,7 +117,7 @@ impl Streamer {
 
 /// The real-time thread's end of the stream of a group.
 pub struct StreamReceiver {
-    axes: AxisPlaces,
+    axes: GroupAxes,
     waiting: Consumer<StreamPoint>,
     look_ahead: Box<LookAhead<MAX_AXES, Box<[StreamPoint]>>>,
 }
@@ -157,7 +157,7 @@ mod tests {
         let limits = axes.iter().map(|_| AxisLimits::NONE).collect();
         let delay = StreamDelay::Fixed(0);
         GroupStream {
-            axes: AxisPlaces::new(axes.to_vec()),
+            axes: GroupAxes::new(axes.to_vec()),
             look_ahead: LookAheadParameters { limits, period_ns: MILLISECOND_NS, delay },
         }
     }

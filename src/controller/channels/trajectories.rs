@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use takt_rt::{TrajectoryId, TrajectorySample};
 
-use super::axis_places::AxisPlaces;
+use super::group_axes::GroupAxes;
 use super::lending::{Borrower, Lender, lending};
 use super::primitives::{AtomicU64, Ordering};
 use crate::trajectory::Trajectory;
@@ -13,14 +13,14 @@ use crate::trajectory::Trajectory;
 #[derive(Debug)]
 pub struct GivenTrajectory {
     trajectory: Trajectory,
-    axes: AxisPlaces,
+    axes: GroupAxes,
     /// The time of the newest cycle, in seconds after the beginning, as bits.
     at_s: AtomicU64,
 }
 
 impl GivenTrajectory {
     /// One of the axes of a group, in the order of the group, that has yet to begin.
-    pub fn new(trajectory: Trajectory, axes: AxisPlaces) -> Self {
+    pub fn new(trajectory: Trajectory, axes: GroupAxes) -> Self {
         Self { trajectory, axes, at_s: AtomicU64::new(0.0_f64.to_bits()) }
     }
 
@@ -123,7 +123,7 @@ mod tests {
         let point = TrajectoryPoint { time_s: 1.0, positions: vec![position], ..TrajectoryPoint::default() };
         Arc::new(GivenTrajectory::new(
             Trajectory::new(&[point], &conditions).unwrap(),
-            AxisPlaces::new(vec![0]),
+            GroupAxes::new(vec![0]),
         ))
     }
 

@@ -13,7 +13,7 @@ use super::error::CommandError;
 use super::motion::MotionId;
 use super::{GroupHandle, Handle};
 use crate::config::Axis;
-use crate::controller::channels::{AxisPlaces, GivenTrajectory, TrajectoryGiver};
+use crate::controller::channels::{GivenTrajectory, GroupAxes, TrajectoryGiver};
 use crate::trajectory::{Trajectory, TrajectoryConditions, TrajectoryError, TrajectoryPoint};
 
 /// By how much later than now a trajectory takes the place of another one: first, and at most. It must have been computed and handed
@@ -281,7 +281,7 @@ impl GroupHandle {
     ) -> Result<MotionId, CommandError> {
         let giver = &self.handle.0.trajectories.giver;
         self.take_back_discarded(trajectories);
-        let given = Arc::new(GivenTrajectory::new(trajectory, AxisPlaces::new(self.axes.clone())));
+        let given = Arc::new(GivenTrajectory::new(trajectory, GroupAxes::new(self.axes.clone())));
         let id = giver
             .give(self.number, &given)
             .ok_or(CommandError::Full { waiting: trajectories.submitted.len() })?;

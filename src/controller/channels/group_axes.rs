@@ -4,13 +4,13 @@ use takt_rt::MAX_AXES;
 
 /// The numbers of the axes of a group in the controller, in the order of the group.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct AxisPlaces {
+pub struct GroupAxes {
     places: Vec<usize>,
     /// Whether each axis has the same number in the group as in the controller.
     are_own: bool,
 }
 
-impl AxisPlaces {
+impl GroupAxes {
     /// The places of the axes with these numbers.
     pub fn new(places: Vec<usize>) -> Self {
         let are_own = places.iter().enumerate().all(|(own, place)| own == *place);
@@ -52,12 +52,12 @@ mod tests {
 
     #[test]
     fn what_is_spread_is_picked_again_in_the_order_of_the_group() {
-        let places = AxisPlaces::new(vec![5, 2, 3]);
+        let places = GroupAxes::new(vec![5, 2, 3]);
         let mut of_group = [0; MAX_AXES];
         of_group[..3].copy_from_slice(&[10, 20, 30]);
         let all = places.spread(of_group);
         assert_eq!(all[..7], [0, 0, 20, 30, 0, 10, 0]);
         assert_eq!((places.pick(&all), places.count()), (of_group, 3));
-        assert_eq!(AxisPlaces::new(vec![0, 1]).spread(of_group), of_group);
+        assert_eq!(GroupAxes::new(vec![0, 1]).spread(of_group), of_group);
     }
 }
