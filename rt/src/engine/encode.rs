@@ -8,7 +8,7 @@ use super::shared::Shared;
 use super::state::{GroupState, PowerRemoval};
 use super::{Deadline, Engine, SendBatch, has_cycle};
 use crate::axis::{Axis, FeedbackSince};
-use crate::bus_set::BusSet;
+use crate::bit_set::BitSet;
 use crate::cia402::{Goal, controlword};
 use crate::frame::Frame;
 use crate::host::HostInterface;
@@ -34,12 +34,12 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
 
     /// The buses that were behind in the last cycle: before [`Engine::sync`], whoever drives the engine may look again, and name
     /// those that have caught up since by [`Engine::note_caught_up`].
-    pub fn behind(&self) -> BusSet {
+    pub fn behind(&self) -> BitSet {
         self.shared.backlog.behind()
     }
 
     /// Takes the buses that have caught up since the last cycle.
-    pub fn note_caught_up(&mut self, buses: BusSet) {
+    pub fn note_caught_up(&mut self, buses: BitSet) {
         self.shared.backlog.clear(buses);
     }
 
@@ -65,7 +65,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
     }
 
     /// These interfaces had no room for all that they were handed: set-points may be missing.
-    pub fn not_taken(&mut self, buses: BusSet) {
+    pub fn not_taken(&mut self, buses: BitSet) {
         self.shared.backlog.note_not_taken(buses);
     }
 

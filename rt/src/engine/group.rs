@@ -8,7 +8,7 @@ use super::shared::Shared;
 use super::state::GroupState;
 use super::unsent_steps::UnsentSteps;
 use crate::axis::Axis;
-use crate::bus_set::BusSet;
+use crate::bit_set::BitSet;
 use crate::group_trajectory::{GroupTrajectory, Profiles};
 use crate::motion_reports::MotionState;
 use crate::record::{Event, EventKind, MAX_GROUPS};
@@ -25,7 +25,7 @@ pub(super) struct Group<const AXES: usize, const BUSES: usize> {
     /// Where its axes stand among those of the engine, which has them beside each other.
     pub(super) places: Range<usize>,
     /// The buses that concern it.
-    pub(super) buses: BusSet,
+    pub(super) buses: BitSet,
     pub(super) state: GroupState<AXES>,
     /// What its stream wants in this slot, while it streams.
     pub(super) stream: StreamSample<AXES>,
@@ -54,7 +54,7 @@ pub(super) enum Commands {
 
 impl<const AXES: usize, const BUSES: usize> Group<AXES, BUSES> {
     /// A passive group.
-    pub(super) fn new(number: u8, places: Range<usize>, buses: BusSet) -> Self {
+    pub(super) fn new(number: u8, places: Range<usize>, buses: BitSet) -> Self {
         Self {
             number,
             stops_with: ArrayVec::new(),

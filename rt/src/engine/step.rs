@@ -9,7 +9,7 @@ use super::group::{Commands, Group, GroupContext};
 use super::state::{GroupState, PowerRemoval};
 use super::{CycleInput, Engine};
 use crate::axis::{Axis, FeedbackSince};
-use crate::bus_set::BusSet;
+use crate::bit_set::BitSet;
 use crate::fault::Fault;
 use crate::host::HostInterface;
 use crate::plan::State;
@@ -38,7 +38,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         if !self.groups.iter().any(is_due) {
             return;
         }
-        let (mut probed, mut in_motion) = (BusSet::default(), BusSet::default());
+        let (mut probed, mut in_motion) = (BitSet::default(), BitSet::default());
         for group in &self.groups {
             if is_due(group) {
                 probed = probed.union(group.buses);
