@@ -74,8 +74,13 @@ impl<const BUSES: usize> Backlog<BUSES> {
 
     /// The one of these buses that has been behind, or without room, for the longest time, and the slots in a row.
     pub(super) fn longest_blocked(&self, buses: BitSet) -> (usize, u32) {
-        let blocked = self.buses.iter().map(|bus| bus.blocked_cycles).enumerate().rev();
-        blocked.filter(|(bus, _)| buses.contains(*bus)).max_by_key(|(_, cycles)| *cycles).unwrap_or_default()
+        let mut longest = (0, 0);
+        for (bus, own) in self.buses.iter().enumerate().filter(|(bus, _)| buses.contains(*bus)) {
+            if own.blocked_cycles > longest.1 {
+                longest = (bus, own.blocked_cycles);
+            }
+        }
+        longest
     }
 }
 
