@@ -11,6 +11,7 @@ use crate::pdo::{CommandSlot, TransmissionType};
 impl Axis {
     /// Writes the command of this cycle of the axis' bus: the target, and one step of the drive towards `goal`, unless another
     /// controlword is to be sent.
+    #[inline]
     pub fn command(&mut self, goal: Goal, other_word: Option<u16>) {
         let is_enabled = self.is_enabled();
         let word = other_word.unwrap_or_else(|| self.word_towards(goal));
@@ -30,6 +31,7 @@ impl Axis {
     }
 
     /// The target in drive units, and the torque that is commanded with it.
+    #[inline]
     fn target(&mut self, is_enabled: bool) -> (i32, f64) {
         if !is_enabled {
             self.torque_loop = TorqueLoop::default();
@@ -97,6 +99,7 @@ impl Axis {
     }
 
     /// The controlword that brings the drive one step nearer to `goal`.
+    #[inline]
     fn word_towards(&self, goal: Goal) -> u16 {
         let last = self.controlwords.last();
         let is_on_its_way_up = goal == Goal::Enabled && !self.is_enabled();
@@ -107,6 +110,7 @@ impl Axis {
     }
 
     /// The bits that the mode of operation adds to the controlword of an enabled drive.
+    #[inline]
     fn mode_bits(&mut self) -> u16 {
         let has_handshake = self.parameters.dialect.acknowledges_set_points();
         match self.parameters.law {

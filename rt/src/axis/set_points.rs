@@ -41,6 +41,7 @@ impl SetPoints {
     }
 
     /// The positions of this cycle, the last, and the one before.
+    #[inline]
     pub(super) fn positions(&self) -> [f64; 3] {
         self.newest.map(|state| state.position)
     }
@@ -234,6 +235,7 @@ impl Axis {
     }
 
     /// Checks the next set-point against the guard; and where the joint need not be on its set-point, the joint too.
+    #[inline]
     pub fn check(&self, next: &State, period_s: f64) -> Result<(), Fault> {
         match self.torque_loop.demand() {
             TorqueDemand::Law { .. } => {}
