@@ -18,7 +18,7 @@ impl Axis {
         let is_kept = is_enabled && goal == Goal::Enabled;
         let spacing_cycles = self.parameters.controlword_spacing_cycles;
         self.controlwords.take(word, spacing_cycles, is_kept, self.drive_state().has_torque());
-        self.set_points.send();
+        self.send_set_point(is_enabled);
         self.request_by_set_point();
         if !is_enabled {
             self.profile.rest(self.parameters.law.idle(self.joint.position_counts()));
@@ -28,6 +28,16 @@ impl Axis {
         self.command.set(self.parameters.law.target_slot(), raw);
         let mode_bits = if is_enabled { self.mode_bits() } else { 0 };
         self.command.set(CommandSlot::Controlword, (word | mode_bits).into());
+    }
+
+    /// Sends the set-point that is due. A drive that follows positions gets no longer way than that of one cycle of its bus.
+    #[inline]
+    fn send_set_point(&mut self, is_enabled: bool) {
+        if is_enabled && matches!(self.parameters.law, ControlLaw::Position | ControlLaw::Interpolated) {
+            self.set_points.send_within(self.parameters.limits.velocity, self.reception.cycle_s());
+        } else {
+            self.set_points.send();
+        }
     }
 
     /// The target in drive units, and the torque that is commanded with it.
