@@ -255,7 +255,7 @@ fn play_in_virtual_time(
     let result = piece.play(&mut stage, armed);
     let (outcome, snapshot, log) = stage.finish();
     let (axes, not_written) = log.finish();
-    Ok(Played { result, outcome, last_stop: snapshot.stop, axes, not_written })
+    Ok(Played { result, outcome, last_stop: snapshot.first_stop(), axes, not_written })
 }
 
 fn play_in_real_time(
@@ -292,7 +292,7 @@ fn play_in_real_time(
         Outcome::Finished => None,
         outcome => Some(outcome),
     };
-    Ok(Played { result, outcome, last_stop: session.snapshot.stop, axes, not_written })
+    Ok(Played { result, outcome, last_stop: session.snapshot.first_stop(), axes, not_written })
 }
 
 fn refuse(error: &Refused, is_json: bool) -> Exit {

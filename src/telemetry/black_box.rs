@@ -143,6 +143,8 @@ pub struct BlackBox {
     wall_clock: WallClock,
     started_ns: Nanoseconds,
     drives: Vec<Option<DriveState>>,
+    /// The group of each axis.
+    groups: Vec<usize>,
     open: Option<OpenFile>,
     files: Vec<PathBuf>,
     replaced: u64,
@@ -164,6 +166,7 @@ impl BlackBox {
             wall_clock,
             started_ns,
             drives: vec![None; machine.axes.len()],
+            groups: machine.groups_of_axes(),
             open: None,
             files: Vec::new(),
             replaced: 0,
@@ -190,7 +193,7 @@ impl BlackBox {
             EventKind::Stop(stop) if stop.rule() != Rule::Requested => Some(Incident::Stop(stop)),
             EventKind::DriveState { axis, state, .. } => {
                 let known = self.drives.get_mut(usize::from(axis))?.replace(state);
-                let phase = self.history.last_phase();
+                let phase = self.history.last_phase(*self.groups.get(usize::from(axis))?);
                 // While the group is enabled, the engine stops it and reports the fault. During bring-up, a fault is an old one.
                 let is_new = known.is_some_and(|known| !known.is_faulted()) && state.is_faulted();
                 let code = self.history.last_error_code(axis.into());

@@ -113,7 +113,7 @@ impl Logger {
         let black_box = black_box.map(|options| BlackBox::new(options, &machine, wall_clock, started_ns));
         let mut logger = Self {
             source,
-            statistics: Statistics::new(machine.axes.len()),
+            statistics: Statistics::new(machine.groups_of_axes()),
             machine,
             recording: None,
             candump: None,

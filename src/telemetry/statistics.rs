@@ -79,7 +79,7 @@ pub struct FollowingErrorMaximum {
     pub error: f64,
     /// Start of the cycle in which it was seen.
     pub at_ns: Nanoseconds,
-    /// The phase of the group then.
+    /// The phase of its group then.
     pub phase: Phase,
     /// The velocity set-point then, in rad/s (m/s).
     pub velocity_set: f64,
@@ -106,8 +106,8 @@ pub struct AxisStatistics {
 }
 
 impl AxisStatistics {
-    fn add(&mut self, cycle: &CycleRecord, axis: &AxisRecord) {
-        let (timing, phase) = (&cycle.timing, cycle.phase);
+    fn add(&mut self, cycle: &CycleRecord, phase: Phase, axis: &AxisRecord) {
+        let timing = &cycle.timing;
         let is_enabled = is_enabled(phase);
         if is_enabled || !self.was_enabled {
             self.position_set = axis.position_set;
@@ -168,12 +168,14 @@ pub struct Statistics {
     pub sent: Latency,
     /// The axes in the order of the configuration.
     pub axes: Vec<AxisStatistics>,
+    /// The group of each axis.
+    groups: Vec<usize>,
 }
 
 impl Statistics {
-    /// Statistics for so many axes.
-    pub fn new(axes: usize) -> Self {
-        Self { axes: vec![AxisStatistics::default(); axes], ..Self::default() }
+    /// Statistics for axes in these groups.
+    pub fn new(groups: Vec<usize>) -> Self {
+        Self { axes: vec![AxisStatistics::default(); groups.len()], groups, ..Self::default() }
     }
 
     /// Adds a cycle.
@@ -189,8 +191,9 @@ impl Statistics {
         self.sync.add(timing.sync_ns);
         self.compute.add(timing.compute_ns);
         self.sent.add(timing.sent_ns);
-        for (statistics, axis) in self.axes.iter_mut().zip(record.axes()) {
-            statistics.add(record, axis);
+        for ((statistics, axis), group) in self.axes.iter_mut().zip(record.axes()).zip(&self.groups) {
+            let phase = record.groups.get(*group).map_or(Phase::Passive, |group| group.phase);
+            statistics.add(record, phase, axis);
         }
     }
 }
@@ -198,12 +201,12 @@ impl Statistics {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use takt_rt::{CycleTiming, MAX_AXES};
+    use takt_rt::{CycleTiming, GroupRecord, MAX_AXES, MAX_GROUPS};
 
     fn record(slot: u64, phase: Phase, axis: AxisRecord) -> CycleRecord {
         CycleRecord {
             timing: CycleTiming { slot, slot_start_ns: slot * 1_000_000, ..CycleTiming::default() },
-            phase,
+            groups: [GroupRecord { phase, ..GroupRecord::default() }; MAX_GROUPS],
             is_commanded: true,
             axis_count: 1,
             axes: [axis; MAX_AXES],
@@ -247,7 +250,7 @@ mod tests {
 
     #[test]
     fn the_largest_following_error_is_that_of_an_enabled_axis_with_its_circumstances() {
-        let mut statistics = Statistics::new(1);
+        let mut statistics = Statistics::new(vec![0]);
         let axis = |following_error, velocity_set| AxisRecord {
             following_error,
             velocity_set,
@@ -264,7 +267,7 @@ mod tests {
 
     #[test]
     fn the_final_position_is_the_last_one_under_power() {
-        let mut statistics = Statistics::new(1);
+        let mut statistics = Statistics::new(vec![0]);
         let axis = |position_set, position| AxisRecord { position_set, position, ..AxisRecord::default() };
         statistics.add(&record(1, Phase::Disabled, axis(0.5, 0.5)));
         assert_eq!(statistics.axes[0].position, 0.5);
@@ -276,7 +279,7 @@ mod tests {
 
     #[test]
     fn the_final_position_is_known_to_be_that_of_an_earlier_slot_if_the_drive_has_fallen_silent() {
-        let mut statistics = Statistics::new(1);
+        let mut statistics = Statistics::new(vec![0]);
         let axis = |position, feedback_age| AxisRecord { position, feedback_age, ..AxisRecord::default() };
         statistics.add(&record(1, Phase::Enabling, axis(0.0, 7)));
         let known = statistics.axes[0];

@@ -26,13 +26,12 @@ impl CallbackClient {
     pub fn act(&mut self, config: &Config, snapshot: &Snapshot, run: &mut VirtualRun<Tap>) {
         let spent_ns = if self.dice.chance(0.002) { 2 * BUDGET_NS } else { BUDGET_NS };
         run.take_for_callbacks(spent_ns);
-        let chance = if snapshot.phase == Phase::Holding { 0.1 } else { 0.003 };
+        let group = self.dice.below(snapshot.groups().len());
+        let chance = if snapshot.groups()[group].phase == Phase::Holding { 0.1 } else { 0.003 };
         if !self.dice.chance(chance) {
             return;
         }
-        let group = self.dice.below(config.groups.len().max(1));
-        let all = || (0..config.axes.len()).collect();
-        let axes: Vec<usize> = config.groups.get(group).map_or_else(all, |group| group.axes.clone());
+        let axes = config.axes_of_group(group);
         let limits: Vec<(usize, AxisLimits)> =
             axes.iter().map(|axis| (*axis, config.axes[*axis].limits)).collect();
         let body = body(self.dice.split(snapshot.slot), limits.iter().map(|(_, limits)| *limits).collect());

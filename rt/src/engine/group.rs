@@ -11,9 +11,10 @@ use crate::axis::Axis;
 use crate::bus_set::BusSet;
 use crate::group_trajectory::{GroupTrajectory, Profiles};
 use crate::motion_reports::MotionState;
-use crate::record::{Event, EventKind, MAX_GROUPS};
+use crate::record::{Event, EventKind, GroupRecord, MAX_GROUPS, RecordedStop};
 use crate::source::StreamSample;
 use crate::stop::StopReason;
+use crate::time::Nanoseconds;
 
 /// What belongs to one group.
 #[derive(Clone, Debug)]
@@ -29,6 +30,8 @@ pub(super) struct Group<const AXES: usize, const BUSES: usize> {
     pub(super) state: GroupState<AXES>,
     /// What its stream wants in this slot, while it streams.
     pub(super) stream: StreamSample<AXES>,
+    /// How long the call of its callback took in this cycle; `None` if none was called.
+    pub(super) callback_ns: Option<Nanoseconds>,
     /// Cycles since the state was entered.
     pub(super) state_cycles: u32,
     /// What is planned, while the group moves or stops.
@@ -39,6 +42,8 @@ pub(super) struct Group<const AXES: usize, const BUSES: usize> {
     pub(super) fault_reset_cycles: u32,
     pub(super) commands: Commands,
     pub(super) unsent: UnsentSteps<BUSES>,
+    /// Cycles in which its set-points went on.
+    pub(super) steps: u64,
     /// The stop that has begun, or has become harder, and of which the groups that stop with this one do not know yet.
     pub(super) untold: Option<StopReason>,
 }
@@ -62,12 +67,14 @@ impl<const AXES: usize, const BUSES: usize> Group<AXES, BUSES> {
             buses,
             state: GroupState::Passive,
             stream: StreamSample::default(),
+            callback_ns: None,
             state_cycles: 0,
             motion: GroupTrajectory::default(),
             stop: None,
             fault_reset_cycles: 0,
             commands: Commands::None,
             unsent: UnsentSteps::default(),
+            steps: 0,
             untold: None,
         }
     }
@@ -78,6 +85,15 @@ impl<const AXES: usize, const BUSES: usize> Group<AXES, BUSES> {
             GroupState::Moving { .. } | GroupState::Stopping => self.motion.remaining_s(),
             GroupState::Executing(execution) => execution.wanted.map_or(0.0, |wanted| wanted.remaining_s),
             _ => 0.0,
+        }
+    }
+
+    /// What the record of the cycle says of it.
+    pub(super) fn record(&self) -> GroupRecord {
+        GroupRecord {
+            phase: self.state.phase(),
+            stop: self.stop.as_ref().map(RecordedStop::of),
+            callback_ns: self.callback_ns,
         }
     }
 

@@ -116,7 +116,7 @@ pub enum Deadline {
 ///         })
 ///     }
 ///     fn publish(&mut self, snapshot: &Snapshot<1, 1>) {
-///         self.phase = snapshot.phase;
+///         self.phase = snapshot.groups()[0].phase;
 ///     }
 /// }
 ///
@@ -335,11 +335,9 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         shared.dropped += shared.events.drain(|event| host.event(event));
         shared.record.timing = CycleTiming { missed_slots: shared.slots.missed_now, ..timing };
         shared.record.is_commanded = is_commanded;
-        for (group, phase) in self.groups.iter().zip(&mut shared.record.group_phases) {
-            *phase = group.state.phase();
+        for (group, record) in self.groups.iter().zip(&mut shared.record.groups) {
+            *record = group.record();
         }
-        let [first, ..] = shared.record.group_phases;
-        shared.record.phase = first;
         for axis in &self.axes {
             let number = usize::from(axis.number());
             let (records, shown) = (&mut shared.record.axes, &mut shared.snapshot.axes);
@@ -367,10 +365,9 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
                 remaining_s: group.remaining_s(),
                 stop: group.stop,
                 stream: group.stream_report(),
+                steps: group.steps,
             };
         }
-        let [GroupSnapshot { phase, remaining_s, stop, .. }, ..] = snapshot.groups;
-        (snapshot.phase, snapshot.remaining_s, snapshot.stop) = (phase, remaining_s, stop);
         for (shown, health) in snapshot.buses.iter_mut().zip(buses) {
             *shown = *health;
         }

@@ -5,7 +5,7 @@ mod render;
 use std::path::PathBuf;
 
 use serde::Serialize;
-use takt_rt::{AxisRecord, EventKind};
+use takt_rt::{AxisRecord, EventKind, Phase};
 
 use super::machine::SetPointMagnitudes;
 use super::recorded::{Cause, Recorded, RecordedCycle, RecordedError};
@@ -74,7 +74,7 @@ pub struct AxisCycles {
 pub struct AxisCycle {
     /// The slot.
     pub slot: u64,
-    /// The phase of the group.
+    /// The phase of its group.
     pub phase: &'static str,
     /// The set-point.
     pub position_set: f64,
@@ -151,7 +151,10 @@ impl RecordingReport {
         let window = recorded.cycles(&recorded.slots_around_cause(cycles.saturating_sub(1), 0))?;
         let shown = axis.or_else(|| recorded.axis(None)).and_then(|axis| {
             let description = machine.axes.get(axis)?;
-            let row = |cycle: &RecordedCycle| Some(AxisCycle::new(cycle, cycle.axes.get(axis)?));
+            let row = |cycle: &RecordedCycle| {
+                let group = cycle.groups.get(description.group).copied().unwrap_or_default();
+                Some(AxisCycle::new(cycle, group.phase, cycle.axes.get(axis)?))
+            };
             Some(AxisCycles {
                 name: description.name.clone(),
                 unit: description.unit.symbol(),
@@ -221,11 +224,11 @@ impl RecordingReport {
 }
 
 impl AxisCycle {
-    fn new(cycle: &RecordedCycle, axis: &AxisRecord) -> Self {
+    fn new(cycle: &RecordedCycle, phase: Phase, axis: &AxisRecord) -> Self {
         let is_fresh = axis.feedback_age == 0;
         Self {
             slot: cycle.timing.slot,
-            phase: words::phase(cycle.phase),
+            phase: words::phase(phase),
             position_set: axis.position_set,
             position: is_fresh.then_some(axis.position),
             velocity_set: axis.velocity_set,

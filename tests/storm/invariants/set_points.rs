@@ -39,7 +39,7 @@ pub struct SetPoints {
     coasting: f64,
     /// Cycles in which the trajectory went on since the last set-point.
     cycles: u32,
-    /// Since the start.
+    /// Those of its group since the start.
     steps: u64,
     /// The slot of the last set-point.
     sent_slot: u64,
@@ -69,7 +69,8 @@ impl SetPoints {
 
     pub fn check(&mut self, seen: &Seen<'_>, index: usize) -> Result<(), String> {
         let axis = &seen.config.axes[index];
-        let steps = seen.snapshot.steps - std::mem::replace(&mut self.steps, seen.snapshot.steps);
+        let all_steps = seen.group_of(index).steps;
+        let steps = all_steps - std::mem::replace(&mut self.steps, all_steps);
         self.cycles += steps as u32;
         self.check_rates(seen, index)?;
         self.check_wire(seen, index)?;
@@ -88,11 +89,11 @@ impl SetPoints {
             self.planned.push_front(record.position_set);
             self.planned.truncate(self.delay_cycles + 1);
         }
-        let phase = seen.record.phase;
+        let phase = seen.phase_of(index);
         if let Some((Phase::Holding, position)) = self.last
             && phase == Phase::Holding
             && position != record.position_set
-            && !is_asked_to_move(seen.events)
+            && !is_asked_to_move(seen.events_of(seen.groups[index]))
         {
             return Err(format!("holding, and from {position} to {}", record.position_set));
         }
@@ -235,7 +236,7 @@ impl SetPoints {
     }
 }
 
-/// Whether the group has left standstill in this cycle, if only for a move that ends in it.
-fn is_asked_to_move(events: &[Event]) -> bool {
-    events.iter().any(|event| matches!(event.kind, EventKind::PhaseChanged { from: Phase::Holding, .. }))
+/// Whether a group with these events has left standstill in this cycle, if only for a move that ends in it.
+fn is_asked_to_move<'a>(mut events: impl Iterator<Item = &'a Event>) -> bool {
+    events.any(|event| matches!(event.kind, EventKind::PhaseChanged { from: Phase::Holding, .. }))
 }
