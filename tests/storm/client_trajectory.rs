@@ -9,8 +9,8 @@ use takt::controller::channels::{GivenTrajectory, GroupAxes};
 use takt::trajectory::{Trajectory, TrajectoryConditions, TrajectoryPoint};
 use takt_rt::plan::State;
 use takt_rt::{
-    AxisLimits, ExecutionStart, MAX_GROUPS, MotionState, Phase, Request, RequestId, RequestTarget, Snapshot,
-    TrajectoryId,
+    Answer, AxisLimits, ExecutionStart, MAX_GROUPS, MotionState, Phase, Request, RequestId, RequestTarget,
+    Snapshot, TrajectoryId,
 };
 
 use crate::dice::Dice;
@@ -29,15 +29,23 @@ struct Present {
 pub struct TrajectoryClient {
     dice: Dice,
     present: [Option<Present>; MAX_GROUPS],
+    /// Requests whose grant has still to be seen, and how many were granted.
+    awaited: Vec<RequestId>,
+    pub begun: u64,
 }
 
 impl TrajectoryClient {
     pub fn new(dice: Dice) -> Self {
-        Self { dice, present: Default::default() }
+        Self { dice, present: Default::default(), awaited: vec![], begun: 0 }
     }
 
     /// Asks for a trajectory now and then, mostly when it can begin.
     pub fn act(&mut self, config: &Config, snapshot: &Snapshot, run: &mut VirtualRun<Tap>) {
+        let answers = &snapshot.answers;
+        self.begun +=
+            self.awaited.iter().filter(|request| answers.of(**request) == Answer::Granted).count() as u64;
+        self.awaited
+            .retain(|request| answers.of(*request) == Answer::None && !answers.have_forgotten(*request));
         let group = self.dice.below(snapshot.groups().len());
         let chance = match snapshot.groups()[group].phase {
             Phase::Holding => 0.1,
@@ -68,6 +76,7 @@ impl TrajectoryClient {
         let request = Request::Execute { trajectory: id, start };
         match run.host().request_of(RequestTarget::Group(group as u8), request) {
             Ok(request) => {
+                self.awaited.push(request);
                 let is_same = matches!(start, ExecutionStart::After { is_same_motion: true, .. });
                 let present = self.present[group].take().filter(|_| is_same);
                 let motion = present.map_or(request, |present| present.motion);

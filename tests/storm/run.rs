@@ -11,7 +11,7 @@ use takt::faults::{FaultInjector, Scenario, ScenarioFault};
 use takt::sim::{Observation, SimulatedBus};
 use takt_rt::{
     Answer, BusPort, DriveState, Event, EventKind, Frame, Phase, ReceiveBatch, Request, RequestId,
-    RequestTarget, Rule, Snapshot,
+    RequestTarget, Rule, Snapshot, StreamState,
 };
 
 use crate::case::Case;
@@ -109,6 +109,9 @@ pub struct Done {
     pub outcomes: Vec<FaultOutcome>,
     /// The rules of all stops.
     pub stops: BTreeSet<&'static str>,
+    /// How often a callback, and a checked trajectory, has begun to lead a group.
+    pub callbacks: u64,
+    pub trajectories: u64,
     /// Whether the drives could not be brought up.
     pub is_bring_up_failed: bool,
 }
@@ -131,7 +134,7 @@ pub fn play(case: &Case) -> Result<Done, String> {
     let mut outcomes: Vec<FaultOutcome> = vec![];
     let mut stops = BTreeSet::new();
     let at_most = case.length + (END_AT_MOST_S * 1e9 / config.cycle.period_ns as f64) as u64;
-    let (mut enabled, mut cycles) = (None, 0);
+    let (mut enabled, mut cycles, mut callbacks) = (None, 0, 0);
     let mut goes_on = true;
     let mut overload_dice = case.dice.split(u64::MAX - 2);
     world.run.poll_life_cycle_every(case.hardship.neglect.max(1));
@@ -159,6 +162,8 @@ pub fn play(case: &Case) -> Result<Done, String> {
             });
         });
         note_stop(&world.events, &mut outcomes);
+        let is_callback = |event: &&Event| event.kind == EventKind::Stream { state: StreamState::Callback };
+        callbacks += world.events.iter().filter(is_callback).count() as u64;
         stops.extend(world.events.iter().filter_map(|event| match event.kind {
             EventKind::Stop(reason) => Some(reason.rule().key()),
             _ => None,
@@ -205,7 +210,9 @@ pub fn play(case: &Case) -> Result<Done, String> {
     }
     at_rest(case, &mut concerns, &mut world)?;
     let is_bring_up_failed = matches!(world.run.supervisor().outcome(), Some(Outcome::BringUpFailed(_)));
-    Ok(Done { cycles, fingerprint: fingerprint.value(), outcomes, stops, is_bring_up_failed })
+    let trajectories = clients.trajectories.map_or(0, |client| client.begun);
+    let fingerprint = fingerprint.value();
+    Ok(Done { cycles, fingerprint, outcomes, stops, callbacks, trajectories, is_bring_up_failed })
 }
 
 fn phases_of(snapshot: &Snapshot) -> Vec<Phase> {

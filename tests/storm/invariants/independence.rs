@@ -67,9 +67,12 @@ impl Independence {
                 let is_own = match stop.origin {
                     Origin::Group => true,
                     Origin::Axis(axis) => sources.contains(&seen.groups[usize::from(axis)]),
-                    Origin::Bus(bus) => (0..seen.config.axes.len()).any(|axis| {
-                        seen.config.axes[axis].bus == usize::from(bus) && sources.contains(&seen.groups[axis])
-                    }),
+                    Origin::Bus(bus) => {
+                        let is_on_it = |axis: &usize| seen.config.axes[*axis].bus == usize::from(bus);
+                        let mut on_it = (0..seen.groups.len()).filter(is_on_it).peekable();
+                        // A bus without any axis concerns every group.
+                        on_it.peek().is_none() || on_it.any(|axis| sources.contains(&seen.groups[axis]))
+                    }
                 };
                 if !is_own {
                     return Err(format!("group {group} stops for what does not concern it: {stop:?}"));

@@ -84,7 +84,7 @@ pub struct Invariants {
 impl Invariants {
     pub fn new(config: &Config) -> Self {
         let groups = 0..config.groups.len().max(1);
-        let set_points = config.axes.iter().map(|axis| SetPoints::new(config, axis));
+        let set_points = (0..config.axes.len()).map(|axis| SetPoints::new(config, axis));
         Self {
             set_points: set_points.collect(),
             power: Power::new(config),

@@ -30,7 +30,7 @@ pub struct SetPoints {
     /// What was sent to the enabled drive, newest first.
     points: [Option<Point>; 3],
     /// Where the trajectory has led, newest first. What is on the wire is so many cycles old: an axis on a faster bus waits
-    /// for those that follow set-points on slower ones.
+    /// for those of its group that follow set-points on slower ones.
     planned: VecDeque<f64>,
     delay_cycles: usize,
     /// The last position on the wire while the drive really was enabled, and in which slot.
@@ -48,9 +48,11 @@ pub struct SetPoints {
 }
 
 impl SetPoints {
-    pub fn new(config: &Config, axis: &Axis) -> Self {
+    pub fn new(config: &Config, number: usize) -> Self {
         let divider = |axis: &Axis| config.buses[axis.bus].divider;
-        let follow = config.axes.iter().filter(|axis| !axis.control.is_profile());
+        let (axis, group) = (&config.axes[number], config.axes_of_group(config.group_of_axis(number)));
+        let own = group.iter().map(|axis| &config.axes[*axis]);
+        let follow = own.filter(|axis| !axis.control.is_profile());
         let slowest = follow.map(divider).max().unwrap_or(1).max(divider(axis));
         Self {
             scale: assemble::scale(axis).unwrap(),
