@@ -185,6 +185,7 @@ pub fn play(case: &Case) -> Result<Done, String> {
                 troubled_buses: &concerns.by_bus,
                 overloaded_buses: &concerns.is_overloaded,
                 asked: &clients.asked,
+                are_torques_commanded: case.has_callbacks,
                 has_faults: !case.scenario.faults.is_empty(),
             })
         };

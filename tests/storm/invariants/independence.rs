@@ -109,7 +109,8 @@ impl Independence {
         Ok(())
     }
 
-    /// On a punctual machine, a group on buses with which nothing is wrong goes on in every cycle, whatever the others do.
+    /// On a punctual machine, an enabled group on buses with which nothing is wrong goes on in every cycle, whatever the
+    /// others do.
     fn check_progress(&mut self, seen: &Seen<'_>) -> Result<(), String> {
         let timing = &seen.record.timing;
         let is_punctual =
@@ -124,11 +125,10 @@ impl Independence {
                 !seen.troubled_buses[bus] && !seen.overloaded_buses[bus] && !seen.concerns[axis].is_crowded
             };
             let mut own = (0..seen.groups.len()).filter(|axis| seen.groups[*axis] == number);
-            if now.phase != Phase::Passive
-                && before.phase != Phase::Passive
-                && own.all(is_sound)
-                && now.steps != before.steps + 1
-            {
+            let leads = |phase: Phase| {
+                matches!(phase, Phase::Holding | Phase::Moving | Phase::Streaming | Phase::Stopping)
+            };
+            if leads(before.phase) && leads(now.phase) && own.all(is_sound) && now.steps != before.steps + 1 {
                 let steps = now.steps - before.steps;
                 return Err(format!("group {number}: {steps} steps in a cycle, {:?}", now.phase));
             }

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use takt::config::{Axis, Config};
+use takt::config::{Axis, Config, Control};
 use takt::controller::assemble;
 use takt_rt::{DriveState, Event, EventKind, Phase, Scale};
 
@@ -98,6 +98,12 @@ impl SetPoints {
             && !is_asked_to_move(seen.events_of(seen.groups[index]))
         {
             return Err(format!("holding, and from {position} to {}", record.position_set));
+        }
+        // What is planned behind a torque or an impedance begins where the joint is.
+        let was_streaming = matches!(self.last, Some((Phase::Streaming, _)));
+        let may_be_off = seen.are_torques_commanded && matches!(axis.control, Control::Torque { .. });
+        if may_be_off && (was_streaming || phase == Phase::Streaming) {
+            self.points = [None; 3];
         }
         self.last = Some((phase, record.position_set));
         let sent = &seen.sent[index];
