@@ -10,6 +10,7 @@ use super::unsent_steps::UnsentSteps;
 use crate::axis::Axis;
 use crate::bus_set::BusSet;
 use crate::group_trajectory::{GroupTrajectory, Profiles};
+use crate::host::GroupSnapshot;
 use crate::motion_reports::MotionState;
 use crate::record::{Event, EventKind, GroupRecord, MAX_GROUPS, RecordedStop};
 use crate::source::StreamSample;
@@ -88,13 +89,18 @@ impl<const AXES: usize, const BUSES: usize> Group<AXES, BUSES> {
         }
     }
 
-    /// What the record of the cycle says of it.
-    pub(super) fn record(&self) -> GroupRecord {
-        GroupRecord {
-            phase: self.state.phase(),
-            stop: self.stop.as_ref().map(RecordedStop::of),
-            callback_ns: self.callback_ns,
-        }
+    /// Shows what the group did in the cycle.
+    pub(super) fn show(&self, record: &mut GroupRecord, snapshot: &mut GroupSnapshot) {
+        let phase = self.state.phase();
+        let stop = self.stop.as_ref().map(RecordedStop::of);
+        *record = GroupRecord { phase, stop, callback_ns: self.callback_ns };
+        *snapshot = GroupSnapshot {
+            phase,
+            remaining_s: self.remaining_s(),
+            stop: self.stop,
+            stream: self.stream_report(),
+            steps: self.steps,
+        };
     }
 
     /// Ends the cycle, whose commands have left, or were ready too late.

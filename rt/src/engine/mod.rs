@@ -47,7 +47,7 @@ use crate::bus_set::BusSet;
 use crate::dispatch::Dispatch;
 use crate::frame::Frame;
 use crate::group_trajectory::ProfileStore;
-use crate::host::{GroupSnapshot, HostInterface};
+use crate::host::HostInterface;
 use crate::phase::Phase;
 use crate::port::BusHealth;
 use crate::record::{CycleTiming, EventKind, MAX_AXES, MAX_BUSES, MAX_GROUPS};
@@ -325,9 +325,14 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         host: &mut impl HostInterface<AXES, BUSES>,
     ) {
         let is_late = self.shared.deadline == Deadline::Missed;
-        let is_commanded = !is_late && self.groups.iter().any(|group| group.commands == Commands::Made);
-        self.groups.iter_mut().for_each(|group| group.end_cycle(is_late));
         let shared = &mut self.shared;
+        let mut is_commanded = false;
+        let shown = shared.record.groups.iter_mut().zip(&mut shared.snapshot.groups);
+        for (group, (record, snapshot)) in self.groups.iter_mut().zip(shown) {
+            is_commanded |= !is_late && group.commands == Commands::Made;
+            group.end_cycle(is_late);
+            group.show(record, snapshot);
+        }
         shared.slots.end(is_late);
         if is_late {
             shared.emit(None, EventKind::MissedSlots { count: 1 });
@@ -335,9 +340,6 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         shared.dropped += shared.events.drain(|event| host.event(event));
         shared.record.timing = CycleTiming { missed_slots: shared.slots.missed_now, ..timing };
         shared.record.is_commanded = is_commanded;
-        for (group, record) in self.groups.iter().zip(&mut shared.record.groups) {
-            *record = group.record();
-        }
         for axis in &self.axes {
             let number = usize::from(axis.number());
             let (records, shown) = (&mut shared.record.axes, &mut shared.snapshot.axes);
@@ -359,15 +361,6 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         snapshot.missed_slots = shared.slots.missed;
         snapshot.timing = shared.slots.level();
         snapshot.dropped = shared.dropped;
-        for (group, shown) in self.groups.iter().zip(&mut snapshot.groups) {
-            *shown = GroupSnapshot {
-                phase: group.state.phase(),
-                remaining_s: group.remaining_s(),
-                stop: group.stop,
-                stream: group.stream_report(),
-                steps: group.steps,
-            };
-        }
         for (shown, health) in snapshot.buses.iter_mut().zip(buses) {
             *shown = *health;
         }
