@@ -11,7 +11,7 @@ use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 use takt_rt::{
-    AxisRecord, CycleRecord, CycleTiming, EventKind, GroupRecord, MAX_BUSES, MAX_GROUPS, Nanoseconds,
+    AxisRecord, CycleRecord, CycleTiming, EventKind, GroupRecord, MAX_BUSES, MAX_GROUPS, Nanoseconds, Phase,
 };
 
 use super::black_box;
@@ -113,6 +113,8 @@ pub struct Recorded {
     pub events: Vec<RecordedEvent>,
     /// Every change of the health of a bus, with the number of the bus.
     pub health: Vec<(usize, TracedHealth)>,
+    /// What each group was doing in the last cycle.
+    pub last_phases: Vec<Phase>,
     /// Timing and following errors of the whole recording.
     pub statistics: Statistics,
     /// The lowest and the highest slot. In a damaged file, slots may be out of order.
@@ -142,6 +144,7 @@ impl Recorded {
             incidents: Vec::new(),
             events: Vec::new(),
             health: Vec::new(),
+            last_phases: Vec::new(),
             statistics: Statistics::default(),
             slots: None,
             wall_clock: None,
@@ -198,6 +201,8 @@ impl Recorded {
                     self.statistics = Statistics::new(axes.values().map(|axis| axis.group).collect());
                 }
                 self.statistics.add(record);
+                self.last_phases.clear();
+                self.last_phases.extend(record.groups().iter().map(|group| group.phase));
                 self.wall_clock =
                     self.wall_clock.or_else(|| Some(WallClock::fixed(log_time_ns.saturating_sub(start_ns))));
                 let (first, last) = self.slots.unwrap_or((slot, slot));
