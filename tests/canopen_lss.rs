@@ -5,7 +5,7 @@ use takt::canopen::lss::{
     BitTiming, Inquiry, LssAddress, LssBusy, LssError, LssMaster, LssMode, LssOutcome, LssResult, LssTask,
     LssTiming,
 };
-use takt::sim::lss::LssDevice;
+use takt::sim::lss::{LssDevice, LssStack};
 use takt_rt::Frame;
 
 const MILLISECOND_NS: u64 = 1_000_000;
@@ -163,6 +163,47 @@ fn an_identity_assembled_from_lost_replies_is_rejected() {
     assert_eq!(outcome, Err(LssError::ScanLost));
 }
 
+/// The identities that a scan finds, each one after the last.
+fn found_in_turn(bus: &mut Bus) -> Vec<LssAddress> {
+    let mut found: Vec<LssAddress> = vec![];
+    loop {
+        let task = found.last().map_or(LssTask::FastScan([None; 4]), |last| LssTask::FastScanAfter(*last));
+        match bus.run(task).unwrap() {
+            LssOutcome::Device(address) => found.push(address),
+            _ => return found,
+        }
+        assert_eq!(bus.run(LssTask::SwitchGlobal(LssMode::Waiting)), Ok(LssOutcome::Done));
+    }
+}
+
+#[test]
+fn a_found_device_is_excluded_by_its_identity_though_it_gets_no_node_id() {
+    for stack in [LssStack::Standard, LssStack::CanOpenNode] {
+        let mut bus = unconfigured(&[7, 8, 0xFFFF_FFFF]);
+        bus.devices.push(LssDevice::new(LssAddress { vendor: 0xFFFF_FFFF, ..address(0) }, None));
+        bus.devices.push(LssDevice::new(LssAddress { revision: 0x101, ..address(0) }, None));
+        for device in &mut bus.devices {
+            device.stack = stack;
+        }
+        let serials: Vec<_> =
+            found_in_turn(&mut bus).iter().map(|found| (found.vendor, found.revision, found.serial)).collect();
+        let expected =
+            [(0x331, 0x100, 7), (0x331, 0x100, 8), (0x331, 0x100, 0xFFFF_FFFF), (0x331, 0x101, 0)];
+        assert_eq!(serials[..4], expected, "{stack:?}");
+        assert_eq!(serials[4..], [(0xFFFF_FFFF, 0x100, 0)], "{stack:?}");
+        assert!(bus.boot_ups.is_empty());
+    }
+}
+
+#[test]
+fn a_canopennode_device_in_configuration_state_replies_to_every_scan_request() {
+    let mut bus = unconfigured(&[7]);
+    bus.devices[0].stack = LssStack::CanOpenNode;
+    assert_eq!(bus.run(LssTask::FastScan([None; 4])), Ok(LssOutcome::Device(address(7))));
+    let phantom = LssAddress::default();
+    assert_eq!(bus.run(LssTask::FastScan([None; 4])), Ok(LssOutcome::Device(phantom)));
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(40))]
     #[test]
@@ -175,5 +216,20 @@ proptest! {
         prop_assert_eq!(bus.run(LssTask::FastScan([None; 4])), Ok(LssOutcome::Device(lowest)));
         let obeying = bus.devices.iter().filter(|device| device.mode() == LssMode::Configuration).count();
         prop_assert_eq!(obeying, 1);
+    }
+
+    #[test]
+    fn scans_after_each_found_device_find_all_of_any_identities_in_order(
+        identities in prop::collection::btree_set(any::<[u32; 4]>(), 1..5),
+        is_canopen_node: bool,
+    ) {
+        let devices = identities.iter().map(|values| {
+            let mut device = LssDevice::new(LssAddress::from_values(*values), None);
+            device.stack = if is_canopen_node { LssStack::CanOpenNode } else { LssStack::Standard };
+            device
+        });
+        let mut bus = Bus::new(devices);
+        let expected: Vec<_> = identities.iter().copied().map(LssAddress::from_values).collect();
+        prop_assert_eq!(found_in_turn(&mut bus), expected);
     }
 }
