@@ -64,8 +64,10 @@ damping = "20 Nm s/rad"
 [axis.identity]
 vendor = 0x5A65726F
 
-[axis.simulated]
+[axis.joint]
 inertia = "1 kg m^2"
+
+[axis.simulated]
 initial_position = "10 deg"
 
 [[axis]]
@@ -135,6 +137,9 @@ cases! {
         "node = 127" => "id = 127", at "id = 127": UnknownKey { nearest: None, known, .. } if known.contains(&"node"),
         "interface = \"sim\"" => "iface = \"sim\"", at "iface": UnknownKey { nearest: Some("interface"), .. },
         "mode = \"csp\"" => "Mode = \"csp\"", at "Mode": UnknownKey { nearest: Some("mode"), .. },
+        "initial_position" => "coulomb_friction = 1\ninitial_position", at "coulomb_friction":
+            Replaced { by: "it in [axis.joint]: real drives obey it too", .. },
+        "initial_position" => "power_up = \"1 s\"\ninitial_position", at "power_up": Replaced { .. },
         "inertia = \"1 kg" => "inertias = \"1 kg", at "inertias": UnknownKey { nearest: Some("inertia"), .. },
         "dwell" => "dwel", at "dwel =": UnknownKey { key, nearest: Some("dwell"), .. } if key == "program.move.dwel",
         "seed" => "sead", at "sead": UnknownKey { nearest: Some("seed"), .. },

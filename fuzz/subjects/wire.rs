@@ -122,7 +122,7 @@ fn one_drive() -> &'static Config {
         let mut config = Config::parse("single-erob.toml", text).expect("the example is valid");
         config.axes.iter_mut().for_each(|axis| {
             axis.node = NODE;
-            axis.simulated.power_up_ns = 100_000;
+            axis.power_up_ns = 100_000;
         });
         config
     })
@@ -135,7 +135,7 @@ fn one_yz_aim() -> &'static Config {
         let mut config = Config::parse("gantry-yz-aim.toml", text).expect("the example is valid");
         config.axes.truncate(1);
         config.axes[0].node = NODE;
-        config.axes[0].simulated.power_up_ns = 100_000;
+        config.axes[0].power_up_ns = 100_000;
         config
     })
 }

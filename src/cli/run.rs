@@ -85,6 +85,7 @@ pub fn run(arguments: Arguments) -> Exit {
     if let Err(refused) = schedule::verify(&config) {
         return UsageError::from(refused.to_string()).print(arguments.json);
     }
+    config.warnings().iter().for_each(|warning| say!("takt: warning: {warning}"));
     let fault_injector =
         match arguments.faults.as_deref().map(|path| fault_injector(path, &config)).transpose() {
             Ok(fault_injector) => fault_injector,

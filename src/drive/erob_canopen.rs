@@ -27,6 +27,19 @@ pub fn error_words(code: ErrorCode) -> &'static str {
     if code == MULTI_TURN_BATTERY { "battery voltage of the multi-turn encoder low" } else { code.words() }
 }
 
+/// An error code with its name.
+pub fn error_text(code: ErrorCode) -> String {
+    format!("0x{:04X} ({})", code.0, error_words(code))
+}
+
+/// The cure of an error that is this drive's own.
+pub fn error_advice(code: ErrorCode) -> Option<&'static str> {
+    (code == MULTI_TURN_BATTERY).then_some(
+        "replace the battery, then use `clear-fault --yes`; this also clears the turn count, so the joint's zero \
+         must be set again",
+    )
+}
+
 /// The vendor's own protocol of firmware without CANopen. The request 0x0002 reads the position and changes nothing.
 /// Above node ID 63 its identifiers are those of other nodes' SDO.
 pub(super) fn other_protocol(node: u8) -> Option<OtherProtocol> {

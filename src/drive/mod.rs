@@ -8,6 +8,7 @@
 mod axis_run;
 mod bring_up;
 pub mod erob_canopen;
+mod error_words;
 mod facts;
 mod failure;
 mod process_data;
@@ -17,8 +18,9 @@ mod step_list;
 pub mod yz_aim;
 
 pub use bring_up::{BringUp, BringUpProgress, BringUpTiming, NotConfigured, Shutdown, Stage};
+pub use error_words::{error_cure, error_words};
 pub use facts::{AxisFacts, DeviceIdentity, DeviceTexts};
 pub use failure::{AxisFailure, BringUpError, Content, FailureCause, ProbeResult};
 pub use process_data::{PdoPlan, ProcessData};
 pub use reported_mapping::MappingProblem;
-pub use step::{Access, Check, mode_words};
+pub use step::{Access, Check};

@@ -4,6 +4,8 @@
 //! The PDO mapping is fixed. The drive has no mode display (6061) and no emergency messages, and it does not answer SDO
 //! requests for unknown objects.
 
+mod alarm;
+
 use takt_rt::{Nanoseconds, controlword};
 
 use super::bring_up::BringUpTiming;
@@ -13,6 +15,8 @@ use crate::canopen::nmt::{NmtCommand, NmtState};
 use crate::canopen::object::{DataType, Object};
 use crate::canopen::objects::{self, PdoDirection, PdoParameters};
 use crate::config::{Axis, Config, Control};
+
+pub use alarm::{Alarm, Clearing};
 
 /// Pause between controlwords while enabling; a drive that has just booted ignores controlwords that follow sooner.
 pub const CONTROLWORD_SPACING_NS: Nanoseconds = 20_000_000;

@@ -138,7 +138,7 @@ mod tests {
     /// interface differs from a real one.
     fn connected() -> (LiveDrives, SocketCanPort) {
         let mut config = Config::load(Path::new("configs/arm6-erob.toml")).unwrap();
-        config.axes.iter_mut().for_each(|axis| axis.simulated.power_up_ns = 1_000_000);
+        config.axes.iter_mut().for_each(|axis| axis.power_up_ns = 1_000_000);
         let (ours, theirs) = UnixDatagram::pair().unwrap();
         let port = |socket: &UnixDatagram| SocketCanPort::new(socket.as_raw_fd(), 1_000_000, None).unwrap();
         (LiveDrives::new(&config, 0, port(&ours)), port(&theirs))

@@ -17,6 +17,7 @@ use super::machine::Machine;
 use super::messages::{self, MessageType};
 use super::wall_clock::WallClock;
 use crate::bus::trace::{TracedFrame, TracedHealth};
+use crate::config::DriveFamily;
 
 /// A chunk is written to the file as a whole. It holds a third of a second of six axes at 1 ms. A crash of the computer
 /// loses at most that.
@@ -72,6 +73,7 @@ impl Recording {
                 ("index".to_owned(), index.to_string()),
                 ("name".to_owned(), description.name.clone()),
                 ("unit".to_owned(), description.unit.symbol().to_owned()),
+                ("drive".to_owned(), description.family.map_or("", DriveFamily::word).to_owned()),
                 ("plans_own_profile".to_owned(), description.plans_own_profile.to_string()),
                 ("counts_per_unit".to_owned(), description.counts_per_unit.to_string()),
                 ("velocity_limit".to_owned(), description.limits.velocity.to_string()),

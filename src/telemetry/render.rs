@@ -80,6 +80,9 @@ impl RunReport {
                 line(text, &format!("{}  {verdict} after {run}", emphasis.heading(&self.machine)));
                 let reason = format!("{} while {} (slot {})", stop.reason, stop.phase, stop.slot);
                 wrap(text, &emphasis.bad("why"), 3, &[reason]);
+                if let Some(cure) = stop.cure {
+                    wrap(text, "try", 3, &[cure.to_owned()]);
+                }
             }
         }
     }

@@ -222,6 +222,8 @@ pub struct StopReport {
     pub slot: u64,
     /// The phase of the group.
     pub phase: &'static str,
+    /// The cure, where a drive has reported an error.
+    pub cure: Option<&'static str>,
 }
 
 /// The data of a report that the logger does not have.
@@ -389,6 +391,7 @@ impl StopReport {
             limit: stop.cause.numbers().1,
             slot: stop.slot,
             phase: words::phase(stop.phase),
+            cure: words::stop_cure(stop, machine),
         }
     }
 }

@@ -43,6 +43,7 @@ pub fn machine() -> Machine {
     let axis = |name: &str, unit| AxisDescription {
         name: name.to_owned(),
         bus: None,
+        family: None,
         unit,
         plans_own_profile: false,
         counts_per_unit: 83_443.0,

@@ -2,7 +2,6 @@
 
 use takt_rt::Nanoseconds;
 
-use super::alarm::Alarm;
 use super::objects::{ACCELERATION, VELOCITY};
 use super::reading::{self, TENTHS};
 use super::words::{self, control};
@@ -14,6 +13,7 @@ use crate::commission::motion_profile::DriveProfile;
 use crate::commission::report::Report;
 use crate::commission::sdo_session::SdoSession;
 use crate::commission::target::TargetDrive;
+use crate::drive::yz_aim::Alarm;
 
 /// Pause between controlwords; a drive that has just booted ignores controlwords that follow sooner.
 const CONTROL_NS: Nanoseconds = 20_000_000;

@@ -29,14 +29,9 @@ pub fn validate_joint(
     axis: &str,
     fields: &Fields<'_>,
 ) {
-    fields.at("inertia").quantity(joint.inertia, q.inertia, q.ranges.inertia);
-    fields.at("viscous_friction").quantity(joint.viscous_friction, q.damping, q.ranges.viscous_friction);
-    fields.at("coulomb_friction").quantity(joint.coulomb_friction, q.effort, q.ranges.friction);
     fields.at("gravity").quantity(joint.gravity, q.effort, q.ranges.friction);
-    fields.at("rated_torque").quantity(joint.rated_torque, q.effort, q.ranges.effort);
     fields.at("peak_torque").quantity(joint.peak_torque, q.effort, q.ranges.effort);
     initial_position(&fields.at("initial_position"), joint.initial_position, q, limits, axis);
-    fields.at("power_up").duration(joint.power_up_ns, ranges::POWER_UP_S);
 }
 
 pub fn initial_position(spot: &Spot<'_>, position: f64, q: Quantities, limits: Option<&Limits>, axis: &str) {
