@@ -3,7 +3,10 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use takt::config::{Config, Control, Feedback, Interface, OverrideError, ProblemKind, ProgramTarget, Travel};
+use takt::config::{
+    Config, Control, Feedback, Interface, OverrideError, PowerUpState, ProblemKind, ProgramTarget, Travel,
+};
+use takt::sim::yz_aim::YzAimParameters;
 
 /// The configurations that come with takt; other folders in there hold other things.
 fn configs() -> Vec<PathBuf> {
@@ -352,4 +355,17 @@ fn an_axis_in_cst_on_a_real_bus_must_give_the_mechanics_of_its_joint() {
     assert!(error.contains("joint.inertia` is missing"), "{error}");
     lacking.axes[0].control = Control::Position;
     assert!(lacking.validate().is_ok());
+}
+
+#[test]
+fn a_simulated_yz_aim_may_power_up_operational() {
+    let text = fs::read_to_string(config("gantry-yz-aim.toml")).unwrap();
+    let operational = "[defaults.axis.simulated]\npower_up = \"operational\"\n\n[defaults.axis.joint]";
+    let gantry = parse(&text.replace("[defaults.axis.joint]", operational));
+    for axis in &gantry.axes {
+        assert_eq!(axis.simulated.power_up, PowerUpState::Operational);
+        let unit = YzAimParameters::of(axis, 1_000_000, &gantry.simulation);
+        assert!(unit.starts_operational);
+    }
+    assert_eq!(parse(&text).axes[0].simulated.power_up, PowerUpState::PreOperational);
 }

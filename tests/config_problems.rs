@@ -139,7 +139,8 @@ cases! {
         "mode = \"csp\"" => "Mode = \"csp\"", at "Mode": UnknownKey { nearest: Some("mode"), .. },
         "initial_position" => "coulomb_friction = 1\ninitial_position", at "coulomb_friction":
             Replaced { by: "it in [axis.joint]: real drives obey it too", .. },
-        "initial_position" => "power_up = \"1 s\"\ninitial_position", at "power_up": Replaced { .. },
+        "initial_position" => "power_up = \"1 s\"\ninitial_position", at "\"1 s\"": Replaced { .. },
+        "initial_position" => "power_up = \"operational\"\ninitial_position", at "\"operational\"": OutOfRange { .. },
         "inertia = \"1 kg" => "inertias = \"1 kg", at "inertias": UnknownKey { nearest: Some("inertia"), .. },
         "dwell" => "dwel", at "dwel =": UnknownKey { key, nearest: Some("dwell"), .. } if key == "program.move.dwel",
         "seed" => "sead", at "sead": UnknownKey { nearest: Some("seed"), .. },

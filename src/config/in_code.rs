@@ -28,7 +28,7 @@ use takt_rt::{FeedForward, Follow, StopCategories, StreamDelay};
 use super::defaults;
 use super::model::{
     Axis, Bus, Config, Control, Cycle, DriveFamily, FollowingError, Interface, Joint, Limits, Master,
-    MissedSlots, Program, Realtime, SimulatedJoint, Simulation, Telemetry, Travel,
+    MissedSlots, PowerUpState, Program, Realtime, SimulatedJoint, Simulation, Telemetry, Travel,
 };
 
 impl Config {
@@ -216,6 +216,7 @@ impl SimulatedJoint {
             gravity: 0.0,
             peak_torque: defaults::PEAK_TO_RATED_TORQUE * rated_torque,
             initial_position: defaults::initial_position(limits),
+            power_up: PowerUpState::default(),
         }
     }
 }

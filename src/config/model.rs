@@ -475,6 +475,16 @@ pub struct Joint {
     pub rated_torque: Option<f64>,
 }
 
+/// The NMT state of a simulated YZ-AIM after power-up. The manual does not say which one real units have.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum PowerUpState {
+    /// Pre-operational, as CiA 301 has it.
+    #[default]
+    PreOperational,
+    /// Operational, as programs for these drives seem to expect.
+    Operational,
+}
+
 /// What stands in for an axis on a simulated bus, beside its joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SimulatedJoint {
@@ -484,4 +494,6 @@ pub struct SimulatedJoint {
     pub peak_torque: f64,
     /// Position at power-up: rad (m). Default 0, or the limit nearest to it.
     pub initial_position: f64,
+    /// The NMT state after power-up; only a YZ-AIM can be operational. Default: pre-operational.
+    pub power_up: PowerUpState,
 }

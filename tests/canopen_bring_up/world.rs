@@ -181,6 +181,11 @@ fn axis(number: usize, bus: usize, node: u8) -> Axis {
             coulomb_friction: Some(0.1),
             rated_torque: Some(31.0),
         },
-        simulated: SimulatedJoint { gravity: 0.0, peak_torque: 60.0, initial_position: 0.0 },
+        simulated: SimulatedJoint {
+            gravity: 0.0,
+            peak_torque: 60.0,
+            initial_position: 0.0,
+            power_up: PowerUpState::PreOperational,
+        },
     }
 }

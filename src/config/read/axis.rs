@@ -15,10 +15,11 @@ use crate::canopen::dcf::DeviceConfiguration;
 use crate::config::defaults;
 use crate::config::model::{
     Axis, DriveFamily, FeedForward, Feedback, Follow, Identity, Interface, Joint, Limits, PdoMapping,
-    SimulatedJoint, Travel,
+    PowerUpState, SimulatedJoint, Travel,
 };
 use crate::config::problem_kind::ProblemKind;
 use crate::config::quantities::Quantities;
+use crate::config::quantity::Quantity;
 use crate::config::ranges;
 use crate::config::rules;
 use crate::config::rules::loops::Surroundings;
@@ -126,7 +127,7 @@ fn axis(mut section: Section<'_>, machine: &Machine<'_>, earlier: &[ReadAxis]) -
     let joint = joint(&mut joint_section, q);
     let rated_torque = joint.rated_torque.or(limits.map(|limits| limits.torque)).unwrap_or(1.0);
     let simulated =
-        simulated(section.section("simulated"), q, limits.as_ref(), rated_torque, name.as_deref());
+        simulated(section.section("simulated"), q, limits.as_ref(), rated_torque, drive, name.as_deref());
     let transmission_type = transmission_type(&mut section);
     let period_ns = machine.period_ns(bus);
     let surroundings = period_ns.map(|period_ns| {
@@ -249,6 +250,7 @@ fn simulated(
     q: Quantities,
     limits: Option<&Limits>,
     rated_torque: f64,
+    drive: Option<DriveFamily>,
     name: Option<&str>,
 ) -> SimulatedJoint {
     let mut value = |key, quantity, bounds| {
@@ -263,11 +265,29 @@ fn simulated(
         rules::simulation::initial_position(&entry.spot, position, q, limits, name);
         Some(position)
     });
+    let power_up = section.get("power_up").and_then(|entry| {
+        let choices =
+            [("pre-operational", PowerUpState::PreOperational), ("operational", PowerUpState::Operational)];
+        let is_duration = entry.is_quantity(Quantity::DURATION);
+        if is_duration {
+            entry.report(ProblemKind::Replaced {
+                key: entry.spot.key.clone(),
+                by: "the time in [[axis]], before its tables: power_up = \"200 ms\"",
+            });
+            return None;
+        }
+        let power_up = entry.choice(&choices)?;
+        if let Some(drive) = drive {
+            rules::simulation::power_up(&entry.spot, drive, power_up);
+        }
+        Some(power_up)
+    });
     section.finish();
     SimulatedJoint {
         gravity: gravity.unwrap_or(0.0),
         peak_torque: peak_torque.unwrap_or(defaults::PEAK_TO_RATED_TORQUE * rated_torque),
         initial_position: initial.unwrap_or_else(|| limits.map_or(0.0, defaults::initial_position)),
+        power_up: power_up.unwrap_or_default(),
     }
 }
 

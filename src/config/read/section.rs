@@ -13,7 +13,7 @@ use crate::printable::excerpt;
 
 /// Keys of earlier versions, with the table that they were in where the same key has another place now, and what to write
 /// instead.
-const REPLACED: [(Option<&str>, &str, &str); 6] = [
+const REPLACED: [(Option<&str>, &str, &str); 5] = [
     (
         None,
         "on_violation",
@@ -23,11 +23,6 @@ const REPLACED: [(Option<&str>, &str, &str); 6] = [
     (Some("simulated"), "viscous_friction", "it in [axis.joint]: real drives obey it too"),
     (Some("simulated"), "coulomb_friction", "it in [axis.joint]: real drives obey it too"),
     (Some("simulated"), "rated_torque", "it in [axis.joint]: real drives obey it too"),
-    (
-        Some("simulated"),
-        "power_up",
-        "it in [[axis]], before its tables: commissioning waits for real drives too",
-    ),
 ];
 
 /// The most unknown keys of a table for which the key that was meant is looked for. No more problems are shown anyway.

@@ -106,7 +106,14 @@ fn validate_motion(axis: &Axis, config: &Config, fields: &Fields<'_>) {
     }
     fields.at("power_up").duration(axis.power_up_ns, ranges::POWER_UP_S);
     validate_joint(&axis.joint, q, &fields.within("joint"));
-    simulation::validate_joint(&axis.simulated, q, limits, &axis.name, &fields.within("simulated"));
+    simulation::validate_joint(
+        &axis.simulated,
+        q,
+        limits,
+        &axis.name,
+        axis.drive,
+        &fields.within("simulated"),
+    );
 
     let period_ns = config.bus_cycle(axis.bus).period_ns;
     mode(&fields.at("mode"), axis.drive, axis.control);

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use takt_rt::Nanoseconds;
 
-use crate::config::{Axis, Control, Simulation, Travel};
+use crate::config::{Axis, Control, PowerUpState, Simulation, Travel};
 use crate::sim::homing_switches::{HomingSwitches, Switch};
 use crate::sim::plant::{Encoder, EndStops, JointParameters};
 
@@ -277,6 +277,7 @@ impl YzAimParameters {
             maximum_speed_rpm: 3000.0,
             special_function: if axis.control == Control::Interpolated { 7 } else { 0 },
             power_up_ns: axis.power_up_ns,
+            starts_operational: own.power_up == PowerUpState::Operational,
             feedback_delay_ns: axis.feedback_delay_ns,
             seed: simulation.seed,
             ..Self::new(axis.node, Model::Aim57x30C, gearing, joint)

@@ -27,8 +27,8 @@ pub(super) fn write_field(dictionary: &mut ErobDictionary, at: usize, value: u32
 fn check_range(at: usize, value: u32) -> Result<(), ErobAbortCode> {
     let is_in_range = match at {
         at::ERROR_HISTORY => value == 0,
-        // Bit 30: the drive cannot produce SYNC. Bit 29: it has no 29-bit identifiers.
-        at::SYNC_ID => value & 0x6000_0000 == 0 && value & 0x7FF != 0,
+        // Bit 29: it has no 29-bit identifiers.
+        at::SYNC_ID => value & 0x2000_0000 == 0 && value & 0x7FF != 0,
         at::CONSUMER_HEARTBEAT => value >> 16 <= 127,
         at::ERROR_BEHAVIOUR => value <= 2,
         at::OPERATION_MODE => value <= 10,
@@ -96,6 +96,7 @@ impl ErobJoint {
             at::TARGET_POSITION => self.motion.latch(&self.dictionary),
             at::OPERATION_MODE => self.follow_mode(),
             at::PRODUCER_HEARTBEAT => self.network.schedule_heartbeat(now_ns, &self.dictionary),
+            at::SYNC_ID | at::CYCLE_PERIOD => self.network.schedule_sync(now_ns, &self.dictionary),
             at::CONSUMER_HEARTBEAT => self.network.stop_master_monitor(),
             at::BATTERY_RESET if self.dictionary.get(at) == 1 => {
                 self.has_battery_fault = false;
