@@ -184,7 +184,7 @@ const CASES: &[Case] = &[
         &[AXIS, "`axis.joint.coulomb_friction`"],
     ),
     ("gravity", |c| axis(c).simulated.gravity = -1.0, &[AXIS, "`axis.simulated.gravity`"]),
-    ("rated torque", |c| axis(c).joint.rated_torque = Some(0.0), &[AXIS, "`axis.rated_torque()`"]),
+    ("rated torque", |c| axis(c).joint.rated_torque = Some(0.0), &[AXIS, "`axis.joint.rated_torque`"]),
     ("peak torque", |c| axis(c).simulated.peak_torque = f64::NAN, &[AXIS, "`axis.simulated.peak_torque`"]),
     ("beginning", |c| axis(c).simulated.initial_position = 9.0, &[AXIS, "cannot begin at 9 rad"]),
     (

@@ -449,12 +449,12 @@ Error:
 
 Error: 
   × the node ID 1 is already taken on the bus "left"
-    ╭─[machine.toml:66:8]
- 65 │ bus = "left"
- 66 │ node = 1
+    ╭─[machine.toml:68:8]
+ 67 │ bus = "left"
+ 68 │ node = 1
     ·        ┬
     ·        ╰── again; first in line 33
- 67 │ limits = { position = [-1, 1], velocity = 1.0, acceleration = 5, torque = 20 }
+ 69 │ limits = { position = [-1, 1], velocity = 1.0, acceleration = 5, torque = 20 }
     ╰────
   help: give each node of a bus a node ID of its own, 1 to 127; on every bus, [master] node is the
         ID of the controller

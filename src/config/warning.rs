@@ -1,4 +1,5 @@
-//! What a configuration may say and hardly means: values that are possible, and that a person has most likely mistaken.
+//! What a configuration may say and hardly means: values that are possible, and that a person has most likely mistaken or
+//! would miss.
 
 use std::f64::consts::TAU;
 use std::fmt;
@@ -6,6 +7,8 @@ use std::fmt;
 use super::model::{Axis, Config, Control, DriveFamily, ProgramTarget, Travel};
 use super::quantities::{Counting, Quantities};
 use super::quantity::Short;
+use crate::canopen::object::ObjectAddress;
+use crate::drive;
 
 /// A rotary axis that goes round more often than this is unusual.
 const USUAL_TURNS: f64 = 2.0;
@@ -51,6 +54,11 @@ pub enum WarningKind {
     VelocityInDegrees {
         /// The limit.
         velocity: f64,
+    },
+    /// A value of the configuration file that bring-up overwrites, because the controller needs another one.
+    Overwritten {
+        /// The object.
+        object: ObjectAddress,
     },
     /// A velocity of a program that the drive cannot have exactly.
     RoundedVelocity {
@@ -107,6 +115,10 @@ impl fmt::Display for WarningKind {
                 f,
                 "`limits.velocity` looks like degrees: a number without a unit is in rad/s; write \"{velocity} deg/s\""
             ),
+            Self::Overwritten { object } => write!(
+                f,
+                "bring-up overwrites the value that `dcf` has for {object}, because the controller needs another one"
+            ),
             Self::RoundedVelocity { commanded, rounded } => write!(
                 f,
                 "its drive takes whole numbers of r/min only: the program's velocity of {commanded} becomes {rounded}"
@@ -155,6 +167,8 @@ impl Config {
         for (index, axis) in self.axes.iter().enumerate() {
             let mut kinds = of_axis(axis);
             kinds.extend(self.rounded_velocities(index, axis));
+            let overwritten = drive::overwritten(self, axis);
+            kinds.extend(overwritten.into_iter().map(|object| WarningKind::Overwritten { object }));
             warnings.extend(kinds.into_iter().map(|kind| Warning { axis: axis.name.clone(), kind }));
         }
         warnings

@@ -3,8 +3,8 @@
 
 use takt_rt::{CommandSlot, Frame, Id, Nanoseconds, controlword};
 
-use super::axis_run::OtherProtocol;
 use super::bring_up::BringUpTiming;
+use super::identifiers::OtherProtocol;
 use super::process_data::{PdoPlan, ProcessData, pdo_id};
 use super::step::{Action, Check, Condition, Fact, ProcedureStep, ReadBack, TextFact, ValueSource};
 use super::step_list::{StepList, counts, rounded_up, watched_heartbeat};
@@ -135,7 +135,7 @@ fn come_to_rest(list: &mut StepList, axis: &Axis, timing: &BringUpTiming) {
     list.read(objects::ERROR_CODE, Check::Any, Fact::ErrorCode);
     list.condition = Condition::HasTorque;
     let deceleration = counts(axis, axis.limits.deceleration);
-    list.write_optional(objects::QUICK_STOP_DECELERATION, deceleration);
+    list.write_unless_in_file(axis, objects::QUICK_STOP_DECELERATION, deceleration);
     list.write(objects::CONTROLWORD, controlword::QUICK_STOP.into());
     let stopping_ns = (axis.limits.velocity / axis.limits.deceleration * 1e9) as Nanoseconds;
     list.push(Action::Await {
@@ -256,7 +256,8 @@ fn ratings(list: &mut StepList, axis: &Axis) {
 }
 
 /// Sets the drive's limits beyond those of the controller, which acts first. Sets the drive's profile to the axis'
-/// limits, because the defaults are very slow (6081 = 10000 count/s); the cyclic modes use it too.
+/// limits, because the defaults are very slow (6081 = 10000 count/s); the cyclic modes use it too. What the axis' configuration
+/// file has for them holds instead.
 fn limits(list: &mut StepList, axis: &Axis) {
     list.begin("limits", "choose limits for this axis that its drive accepts");
     let limits = &axis.limits;
@@ -264,14 +265,14 @@ fn limits(list: &mut StepList, axis: &Axis) {
     if target == CommandSlot::TargetPosition {
         // In profile position mode the drive follows its own profile, so its following error is not limited here.
         let error = if axis.control.is_profile() { f64::INFINITY } else { 2.0 * axis.following_error.limit };
-        list.write_optional(FOLLOWING_ERROR_WINDOW, counts(axis, error).min(i32::MAX.into()));
-        list.write_optional(objects::PROFILE_VELOCITY, counts(axis, limits.velocity));
+        list.write_unless_in_file(axis, FOLLOWING_ERROR_WINDOW, counts(axis, error).min(i32::MAX.into()));
+        list.write_unless_in_file(axis, objects::PROFILE_VELOCITY, counts(axis, limits.velocity));
     }
     if target != CommandSlot::TargetTorque {
-        list.write_optional(objects::PROFILE_ACCELERATION, counts(axis, limits.acceleration));
-        list.write_optional(objects::PROFILE_DECELERATION, counts(axis, limits.deceleration));
+        list.write_unless_in_file(axis, objects::PROFILE_ACCELERATION, counts(axis, limits.acceleration));
+        list.write_unless_in_file(axis, objects::PROFILE_DECELERATION, counts(axis, limits.deceleration));
     }
-    list.write_optional(objects::QUICK_STOP_DECELERATION, counts(axis, limits.deceleration));
+    list.write_unless_in_file(axis, objects::QUICK_STOP_DECELERATION, counts(axis, limits.deceleration));
 }
 
 /// Sets the target to the actual position. Enabling with an old target would make the axis jump.

@@ -17,7 +17,6 @@ use super::machine::Machine;
 use super::messages::{self, MessageType};
 use super::wall_clock::WallClock;
 use crate::bus::trace::{TracedFrame, TracedHealth};
-use crate::config::DriveFamily;
 
 /// A chunk is written to the file as a whole. It holds a third of a second of six axes at 1 ms. A crash of the computer
 /// loses at most that.
@@ -73,13 +72,13 @@ impl Recording {
                 ("index".to_owned(), index.to_string()),
                 ("name".to_owned(), description.name.clone()),
                 ("unit".to_owned(), description.unit.symbol().to_owned()),
-                ("drive".to_owned(), description.family.map_or("", DriveFamily::word).to_owned()),
                 ("plans_own_profile".to_owned(), description.plans_own_profile.to_string()),
                 ("counts_per_unit".to_owned(), description.counts_per_unit.to_string()),
                 ("velocity_limit".to_owned(), description.limits.velocity.to_string()),
                 ("acceleration_limit".to_owned(), description.limits.acceleration.to_string()),
                 ("jerk_limit".to_owned(), description.limits.jerk.to_string()),
             ]);
+            metadata.extend(description.family.map(|family| ("drive".to_owned(), family.word().to_owned())));
             metadata.extend(description.bus.clone().map(|bus| ("bus".to_owned(), bus)));
             axis_channels.push(channel(axis, &format!("/axis/{}", description.name), &metadata)?);
         }

@@ -223,6 +223,7 @@ pub struct StopReport {
     /// The phase of the group.
     pub phase: &'static str,
     /// The cure, where a drive has reported an error.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub cure: Option<&'static str>,
 }
 

@@ -1,8 +1,8 @@
 //! `takt lss`: node IDs and bit rates for devices that are set up by their identity.
 
 mod output;
+mod simulated_device;
 
-use std::str::FromStr;
 use std::sync::atomic::Ordering;
 
 use clap::{Args, Subcommand};
@@ -13,7 +13,7 @@ use takt::canopen::lss::{BitTiming, Inquiry, LssAddress, LssOutcome, LssTask};
 use takt::commission::layer_settings::{DeviceSelection, LayerSettingFailure, LayerSettings, NO_NODE};
 use takt::config::{Interface, Quantity};
 use takt::controller::VirtualClock;
-use takt::sim::lss::{LssBus, LssDevice, LssStack};
+use takt::sim::lss::{LssBus, LssDevice};
 use takt_rt::linux::MonotonicClock;
 use takt_rt::{BusPort, Clock, Nanoseconds};
 
@@ -21,6 +21,8 @@ use super::exit::Exit;
 use super::interruption;
 use super::usage_error::UsageError;
 use output::{Device, Output, Report};
+pub use simulated_device::SimulatedDevice;
+use simulated_device::{address, node};
 
 /// The time in milliseconds after which the kernel restarts a controller that is bus-off.
 const RESTART_MS: u32 = 100;
@@ -131,66 +133,6 @@ fn timing(text: &str) -> Result<BitTiming, String> {
     let rate = bit_rate(text)?;
     BitTiming::of(rate)
         .ok_or_else(|| "LSS knows 10, 20, 50, 125, 250, 500, 800 kbit/s and 1 Mbit/s".to_owned())
-}
-
-fn node(text: &str) -> Result<u8, String> {
-    let wrong = || "a node ID is 1 to 127, or none".to_owned();
-    if text == "none" {
-        return Ok(NO_NODE);
-    }
-    text.parse().ok().filter(|node| (1..=127).contains(node)).ok_or_else(wrong)
-}
-
-fn address(text: &str) -> Result<LssAddress, String> {
-    let number = |text: &str| match text.strip_prefix("0x").or_else(|| text.strip_prefix("0X")) {
-        Some(digits) => u32::from_str_radix(digits, 16).ok(),
-        None => text.parse().ok(),
-    };
-    let values: Option<Vec<u32>> = text.split(':').map(number).collect();
-    let values = values.and_then(|values| <[u32; 4]>::try_from(values).ok());
-    values.map(LssAddress::from_values).ok_or_else(|| {
-        "write it as VENDOR:PRODUCT:REVISION:SERIAL, for example 0x331:1:0x100:12345".to_owned()
-    })
-}
-
-#[derive(Clone, Copy, Debug)]
-struct SimulatedDevice {
-    address: LssAddress,
-    node: Option<u8>,
-    stack: LssStack,
-    boots: bool,
-}
-
-impl From<SimulatedDevice> for LssDevice {
-    fn from(SimulatedDevice { address, node, stack, boots }: SimulatedDevice) -> Self {
-        let mut device = Self::new(address, node);
-        device.stack = stack;
-        device.boots = boots;
-        device
-    }
-}
-
-impl FromStr for SimulatedDevice {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
-        let mut words = text.split(',');
-        let text = words.next().unwrap_or_default();
-        let (identity, number) = match text.split_once('@') {
-            Some((identity, number)) => (identity, Some(node(number)?)),
-            None => (text, None),
-        };
-        let (mut stack, mut boots) = (LssStack::Standard, true);
-        for word in words {
-            match word {
-                "canopennode" => stack = LssStack::CanOpenNode,
-                "no-boot-up" => boots = false,
-                _ => return Err(format!("`{word}` is no behaviour: canopennode, no-boot-up")),
-            }
-        }
-        let node = number.filter(|node| *node != NO_NODE);
-        Ok(Self { address: address(identity)?, node, stack, boots })
-    }
 }
 
 /// Runs it.
