@@ -212,3 +212,17 @@ fn bad_words_are_refused_before_anything_is_sent() {
         assert!(output.stdout.is_empty());
     }
 }
+
+#[test]
+fn an_lss_device_needs_a_bus_with_a_real_interface_in_the_simulator_of_drives() {
+    for (device, words) in [
+        ("1:2:3:4", "--lss: the bus `can` has no real interface"),
+        ("wrist=1:2:3:4@5,canopennode", "--lss: the bus `wrist` has no real interface"),
+        ("1:2:3", "VENDOR:PRODUCT:REVISION:SERIAL"),
+    ] {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_takt"));
+        let output = command.args(["sim", "configs/single-erob.toml", "--lss", device]).output().unwrap();
+        ends_with(2, &output);
+        assert!(errors(&output).contains(words), "{words}: {}", errors(&output));
+    }
+}

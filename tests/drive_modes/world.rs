@@ -201,6 +201,11 @@ impl World {
         self.run.supervisor().outcome().cloned()
     }
 
+    /// The axes whose drives showed an error during the shut-down, with its code.
+    pub fn drive_errors(&self) -> &[(usize, u16)] {
+        self.run.supervisor().drive_errors()
+    }
+
     pub fn phase(&self) -> Phase {
         self.run.snapshot().phase
     }

@@ -36,7 +36,6 @@ mod objects;
 mod process_data;
 mod sdo;
 
-pub use dictionary::ErobAbortCode;
 pub use joint::ErobJoint;
 pub use objects::{ErobAccess, ErobDataType, ErobObject, OBJECTS};
 
