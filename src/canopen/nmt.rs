@@ -120,10 +120,6 @@ impl ErrorControl {
 mod tests {
     use super::*;
 
-    fn heartbeat(state: NmtState) -> Frame {
-        ErrorControl { node: 2, state }.frame()
-    }
-
     #[test]
     fn commands_are_encoded_as_in_the_standard() {
         assert_eq!(format!("{:?}", NmtCommand::ResetCommunication.frame(NmtTarget::Node(2))), "000#8202");
@@ -159,6 +155,4 @@ mod tests {
         assert_eq!(ErrorControl::decode(&Frame::of(Id::canopen(0x700, 0), [5])), None);
         assert_eq!(ErrorControl::decode(&Frame::of(Id::canopen(0x680, 0), [5])), None);
     }
-
-
 }

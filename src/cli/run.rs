@@ -227,7 +227,8 @@ fn report(config: &Config, session: &Session, as_json: bool) -> Exit {
 
 fn drive_errors(session: &Session) -> Vec<DriveError> {
     let machine = &session.log.machine;
-    let errors = session.drive_errors.iter().filter_map(|(axis, code)| Some((u8::try_from(*axis).ok()?, *code)));
+    let errors =
+        session.drive_errors.iter().filter_map(|(axis, code)| Some((u8::try_from(*axis).ok()?, *code)));
     let error = |(axis, code)| DriveError {
         axis: machine.axis_name(axis),
         error: machine.drive_error(axis, code),
