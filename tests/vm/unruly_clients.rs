@@ -12,7 +12,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use takt::{Config, Controller, Event, EventKind, Handle, RecordingDestination, SessionOptions, StreamHandle};
+use takt::{
+    Config, Controller, Event, EventKind, Handle, RecordingDestination, SessionOptions, StreamHandle,
+};
 
 /// From one point to the next.
 const INTERVAL: Duration = Duration::from_millis(10);
@@ -109,7 +111,8 @@ fn begin_and_die(handle: &Handle, motion: &Motion) {
 /// The arguments of `takt run`, as far as the laboratory gives them.
 fn arguments() -> Result<(Config, SessionOptions, Duration), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
-    let path = arguments.next().ok_or("usage: unruly_clients CONFIG [--bus NAME=INTERFACE]... --duration S")?;
+    let path =
+        arguments.next().ok_or("usage: unruly_clients CONFIG [--bus NAME=INTERFACE]... --duration S")?;
     let mut config = Config::load(Path::new(&path))?;
     let (mut options, mut lasting) = (SessionOptions::default(), Duration::from_secs(2));
     while let Some(option) = arguments.next() {
