@@ -80,6 +80,7 @@ fn logger(criterion: &mut Criterion) {
         let axis = |index| AxisDescription {
             name: format!("joint{index}"),
             bus: None,
+            group: 0,
             unit: Unit::Radian,
             plans_own_profile: false,
             counts_per_unit: 83_443.0,

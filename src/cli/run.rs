@@ -213,7 +213,7 @@ fn report(config: &Config, session: &Session, as_json: bool) -> Exit {
 fn stop_of(session: &Session) -> Option<StopReason> {
     match session.outcome {
         Outcome::Stopped(stop) => Some(stop),
-        Outcome::Interrupted | Outcome::TakenOver { .. } => session.snapshot.stop,
+        Outcome::Interrupted | Outcome::TakenOver { .. } => session.snapshot.first_stop(),
         _ => None,
     }
 }

@@ -29,6 +29,8 @@ pub struct AxisDescription {
     pub name: String,
     /// The name of its bus; `None` in a recording of an earlier version without this name.
     pub bus: Option<String>,
+    /// The number of its group; 0 where all axes are one group.
+    pub group: usize,
     /// The unit of its position.
     pub unit: Unit,
     /// Whether its drive plans its own profile to a target (a profile mode), instead of following set-points.
@@ -99,7 +101,10 @@ impl Machine {
         Self {
             name: config.name.clone(),
             cycle_ns: config.cycle.period_ns,
-            axes: config.axes.iter().map(|axis| AxisDescription::of(axis, config)).collect(),
+            axes: (0..)
+                .zip(&config.axes)
+                .map(|(number, axis)| AxisDescription::of(number, axis, config))
+                .collect(),
             buses: config.buses.iter().map(bus).collect(),
             groups: config.groups.iter().map(|group| group.name.clone()).collect(),
         }
@@ -120,6 +125,11 @@ impl Machine {
         self.groups.get(usize::from(group)).map_or_else(|| format!("group {group}"), Clone::clone)
     }
 
+    /// The number of the group of each axis.
+    pub fn groups_of_axes(&self) -> Vec<usize> {
+        self.axes.iter().map(|axis| axis.group).collect()
+    }
+
     /// Whether the drive of an axis plans its own profile, instead of following set-points.
     pub fn plans_own_profile(&self, axis: u8) -> bool {
         self.axes.get(usize::from(axis)).is_some_and(|axis| axis.plans_own_profile)
@@ -133,7 +143,7 @@ impl Machine {
 
 impl AxisDescription {
     /// The description of an axis of a configuration.
-    pub fn of(axis: &Axis, config: &Config) -> Self {
+    pub fn of(number: usize, axis: &Axis, config: &Config) -> Self {
         let (unit, travel_per_turn) = match axis.travel {
             Travel::Rotary => (Unit::Radian, TAU),
             Travel::Linear { lead_m } => (Unit::Metre, lead_m),
@@ -141,6 +151,7 @@ impl AxisDescription {
         Self {
             name: axis.name.clone(),
             bus: config.buses.get(axis.bus).map(|bus| bus.name.clone()),
+            group: config.group_of_axis(number),
             unit,
             plans_own_profile: matches!(
                 axis.control,

@@ -133,6 +133,7 @@ mod tests {
         let axis = |name: &str, unit| AxisDescription {
             name: name.to_owned(),
             bus: None,
+            group: 0,
             unit,
             plans_own_profile: false,
             counts_per_unit: 1.0,
