@@ -67,7 +67,7 @@ fn the_same_program_runs_in_cyclic_synchronous_torque() {
     let errors = run_and_measure(&config);
     for (error, axis) in errors.iter().zip(&config.axes) {
         let Control::Torque { stiffness, .. } = axis.control else { panic!("{} is not in CST", axis.name) };
-        let bound = axis.simulated.coulomb_friction / stiffness * axis.counts_per_turn / TAU;
+        let bound = axis.joint.coulomb_friction() / stiffness * axis.counts_per_turn / TAU;
         assert!(error.abs() <= bound + 2.0, "{}: {error} counts, at most {bound} are friction", axis.name);
     }
 }
@@ -169,7 +169,8 @@ fn the_same_configuration_gives_the_same_run_bit_for_bit() {
     let mut config = load("arm6-erob.toml");
     config.program.moves.truncate(1);
     assert_eq!(fingerprint(&config), fingerprint(&config));
-    config.axes[0].simulated.coulomb_friction *= 1.001;
+    let joint = &mut config.axes[0].joint;
+    joint.coulomb_friction = joint.coulomb_friction.map(|friction| friction * 1.001);
     assert_ne!(
         fingerprint(&config),
         fingerprint(&load("arm6-erob.toml")),

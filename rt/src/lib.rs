@@ -28,7 +28,7 @@
 
 mod answers;
 mod axis;
-mod bus_set;
+mod bit_set;
 mod cia402;
 mod control;
 mod cycle;
@@ -64,7 +64,7 @@ pub use axis::{
     Axis, AxisParameters, AxisParametersError, CommandPdo, FeedForward, FeedbackSince, Jump, Pdo,
     TorqueLimits,
 };
-pub use bus_set::BusSet;
+pub use bit_set::BitSet;
 pub use cia402::{Command, DriveState, Goal, OperationMode, controlword, statusword};
 pub use control::{ControlLaw, Gain, GainError, LoopInput, TorqueDemand};
 pub use cycle::{Cycle, Flow, SlotPlan};

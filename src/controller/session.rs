@@ -60,6 +60,8 @@ pub struct Session {
     pub targets: Vec<Option<f64>>,
     /// The axes whose drives did not answer during the shut-down: see [`Supervisor::unreached`].
     pub unreached: Vec<usize>,
+    /// The axes whose drives showed an error during the shut-down, with its code: see [`Supervisor::drive_errors`].
+    pub drive_errors: Vec<(usize, u16)>,
     /// The result of the real-time set-up.
     pub begun: Begun,
     /// Measurements of the loop; `None` if its thread panicked.
@@ -288,6 +290,7 @@ fn lead_as_owner(
         snapshot: host.snapshot(),
         targets: if has_arrived { supervisor.targets() } else { vec![] },
         unreached: supervisor.unreached().to_vec(),
+        drive_errors: supervisor.drive_errors().to_vec(),
         outcome,
         begun,
         ended,

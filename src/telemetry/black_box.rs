@@ -91,7 +91,8 @@ impl Incident {
                     slot: *slot,
                     phase: *phase,
                 };
-                format!("{} while {}", words::stop_cause(&as_stop, machine), words::phase(*phase))
+                let cause = words::stop_cause(&as_stop, machine);
+                format!("{cause} while {}; try: {}", words::phase(*phase), machine.drive_cure(*axis, *code))
             }
             Self::ThreadDied => "the real-time thread ended by itself".to_owned(),
             Self::CallbackPanicked(message) => format!("a function of the caller panicked: {message}"),

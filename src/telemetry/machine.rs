@@ -5,7 +5,8 @@ use std::f64::consts::TAU;
 use serde::Serialize;
 use takt_rt::ControlLaw;
 
-use crate::config::{Axis, Config, Interface, Travel};
+use crate::config::{Axis, Config, DriveFamily, Interface, Travel};
+use crate::drive;
 
 /// Names and units of a controller.
 #[derive(Clone, Debug, PartialEq)]
@@ -31,6 +32,8 @@ pub struct AxisDescription {
     pub bus: Option<String>,
     /// The number of its group; 0 where all axes are one group.
     pub group: usize,
+    /// The family of its drive, which its error codes belong to; `None` in a recording of an earlier version.
+    pub family: Option<DriveFamily>,
     /// The unit of its position.
     pub unit: Unit,
     /// Whether its drive plans its own profile to a target (a profile mode), instead of following set-points.
@@ -135,6 +138,20 @@ impl Machine {
         self.axes.get(usize::from(axis)).is_some_and(|axis| axis.plans_own_profile)
     }
 
+    /// An error code of the drive of an axis, in words.
+    pub fn drive_error(&self, axis: u8, code: u16) -> String {
+        drive::error_words(self.family(axis), code)
+    }
+
+    /// The cure of an error of the drive of an axis.
+    pub fn drive_cure(&self, axis: u8, code: u16) -> &'static str {
+        drive::error_cure(self.family(axis), code)
+    }
+
+    fn family(&self, axis: u8) -> Option<DriveFamily> {
+        self.axes.get(usize::from(axis)).and_then(|axis| axis.family)
+    }
+
     /// The unit of an axis.
     pub fn axis_unit(&self, axis: u8) -> Unit {
         self.axes.get(usize::from(axis)).map_or(Unit::Radian, |axis| axis.unit)
@@ -152,6 +169,7 @@ impl AxisDescription {
             name: axis.name.clone(),
             bus: config.buses.get(axis.bus).map(|bus| bus.name.clone()),
             group: config.group_of_axis(number),
+            family: Some(axis.drive),
             unit,
             plans_own_profile: matches!(
                 axis.control,

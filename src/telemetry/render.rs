@@ -80,6 +80,9 @@ impl RunReport {
                 line(text, &format!("{}  {verdict} after {run}", emphasis.heading(&self.machine)));
                 let group = stop.group.as_ref().map_or_else(String::new, |group| format!("{group}: "));
                 wrap(text, &emphasis.bad("why"), 3, &[group + &stop_words(stop)]);
+                if let Some(cure) = stop.cure {
+                    wrap(text, "try", 3, &[cure.to_owned()]);
+                }
             }
         }
         self.group_lines(text, emphasis);

@@ -243,6 +243,9 @@ pub struct StopReport {
     pub slot: u64,
     /// The phase of the group.
     pub phase: &'static str,
+    /// The cure, where a drive has reported an error.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cure: Option<&'static str>,
 }
 
 /// The data of a report that the logger does not have.
@@ -436,6 +439,7 @@ impl StopReport {
             limit: stop.cause.numbers().1,
             slot: stop.slot,
             phase: words::phase(stop.phase),
+            cure: words::stop_cure(stop, machine),
         }
     }
 }

@@ -23,7 +23,7 @@ pub fn arm() -> Config {
     let mut config = Config::load(&folder().join("arm6-erob.toml")).unwrap();
     config.program.moves.truncate(2);
     config.axes.iter_mut().for_each(|axis| {
-        axis.simulated.power_up_ns = 5_000_000;
+        axis.power_up_ns = 5_000_000;
         axis.feedback = vec![Feedback::OperationMode];
     });
     config

@@ -24,7 +24,7 @@ const COMMANDS: [&str; 3] = ["reset-communication", "pre-operational", "stop"];
 
 fn machine(name: &str) -> Config {
     let mut config = Config::load(&folder().join(format!("{name}.toml"))).unwrap();
-    config.axes.iter_mut().for_each(|axis| axis.simulated.power_up_ns = 5_000_000);
+    config.axes.iter_mut().for_each(|axis| axis.power_up_ns = 5_000_000);
     config
 }
 

@@ -45,7 +45,7 @@ fn latched(run: &VirtualRun<Port>) -> Option<StopReason> {
 
 fn machines() -> [Config; 2] {
     let mut gantry = Config::load(&folder().join("gantry-yz-aim.toml")).unwrap();
-    gantry.axes.iter_mut().for_each(|axis| axis.simulated.power_up_ns = 5_000_000);
+    gantry.axes.iter_mut().for_each(|axis| axis.power_up_ns = 5_000_000);
     [arm(), gantry]
 }
 

@@ -34,9 +34,9 @@ pub fn to_rest_distance(axes: &[Axis], axis: &Axis) -> f64 {
 /// How long a joint goes on at most whose drive has no brake, when its power is cut at full speed: until friction has
 /// stopped it.
 pub fn coasting_s(axis: &Axis) -> f64 {
-    let joint = &axis.simulated;
+    let joint = &axis.joint;
     match axis.drive {
-        DriveFamily::YzAim => axis.limits.velocity * joint.inertia / joint.coulomb_friction,
+        DriveFamily::YzAim => axis.limits.velocity * joint.inertia() / joint.coulomb_friction(),
         DriveFamily::ErobCanopen => 0.0,
     }
 }

@@ -189,7 +189,7 @@ const FAILED_IN_HARDSHIP: [(u64, &str); 10] = [
 ];
 
 /// The same of those on a machine that has too little time.
-const FAILED_IN_OVERLOAD: [(u64, &str); 12] = [
+const FAILED_IN_OVERLOAD: [(u64, &str); 13] = [
     (
         424_242_620,
         "A drive reported a fault for want of the heartbeat of a machine that was late in every cycle",
@@ -231,6 +231,10 @@ const FAILED_IN_OVERLOAD: [(u64, &str); 12] = [
     (
         20_261_129_837,
         "A drive said that it is stopped while it was to be enabled on a machine that computed too slowly",
+    ),
+    (
+        20_280_045_733,
+        "A bus that had been behind for two cycles sent the way of three in one, faster than the velocity limit",
     ),
 ];
 

@@ -49,6 +49,7 @@ pub fn machine() -> Machine {
         name: name.to_owned(),
         bus: None,
         group: 0,
+        family: None,
         unit,
         plans_own_profile: false,
         counts_per_unit: 83_443.0,

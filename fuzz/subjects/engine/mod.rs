@@ -14,7 +14,7 @@ use std::sync::OnceLock;
 use takt::config::{Config, Control};
 use takt::controller::assemble;
 use takt_rt::{
-    AxisSnapshot, AxisTarget, BusHealth, BusSet, BusState, CallbackCycle, CallbackId, CallbackReturn,
+    AxisSnapshot, AxisTarget, BitSet, BusHealth, BusState, CallbackCycle, CallbackId, CallbackReturn,
     Command, CycleInput, CycleRecord, CycleTiming, Deadline, Dialect, DriveState, Engine, Event, Frame,
     HostInterface, LookAhead, MAX_AXES, OperationMode, Phase, Received, Request, RequestEnvelope, RequestId,
     RequestTarget, SendBatch, Snapshot, StreamPoint, StreamSample, StreamWish,
@@ -194,7 +194,7 @@ struct Machine {
     slot: u64,
     journey: Journey,
     buses: Vec<BusHealth>,
-    held_back: BusSet,
+    held_back: BitSet,
 }
 
 impl Machine {
@@ -209,7 +209,7 @@ impl Machine {
             slot: 0,
             journey: Journey { phases: vec![Phase::Passive], ..Journey::default() },
             buses: vec![BusHealth::default(); config.buses.len()],
-            held_back: BusSet::default(),
+            held_back: BitSet::default(),
         }
     }
 
@@ -305,7 +305,7 @@ impl Machine {
         }
         match kind % 4 {
             0 => {
-                let mut full = BusSet::default();
+                let mut full = BitSet::default();
                 full.insert(self.slot as usize % self.buses.len());
                 self.engine.not_taken(full);
             }

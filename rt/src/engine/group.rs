@@ -8,8 +8,8 @@ use super::shared::Shared;
 use super::state::GroupState;
 use super::unsent_steps::UnsentSteps;
 use crate::axis::Axis;
-use crate::bus_set::BusSet;
-use crate::group_trajectory::{GroupTrajectory, Profiles};
+use crate::bit_set::BitSet;
+use crate::group_trajectory::{GroupTrajectory, ProfileStore};
 use crate::host::GroupSnapshot;
 use crate::motion_reports::MotionState;
 use crate::record::{Event, EventKind, GroupRecord, MAX_GROUPS, RecordedStop};
@@ -27,7 +27,7 @@ pub(super) struct Group<const AXES: usize, const BUSES: usize> {
     /// Where its axes stand among those of the engine, which has them beside each other.
     pub(super) places: Range<usize>,
     /// The buses that concern it.
-    pub(super) buses: BusSet,
+    pub(super) buses: BitSet,
     pub(super) state: GroupState<AXES>,
     /// What its stream wants in this slot, while it streams.
     pub(super) stream: StreamSample<AXES>,
@@ -60,17 +60,17 @@ pub(super) enum Commands {
 
 impl<const AXES: usize, const BUSES: usize> Group<AXES, BUSES> {
     /// A passive group.
-    pub(super) fn new(number: u8, places: Range<usize>, buses: BusSet) -> Self {
+    pub(super) fn new(number: u8, places: Range<usize>, buses: BitSet) -> Self {
         Self {
             number,
             stops_with: ArrayVec::new(),
+            motion: GroupTrajectory::new(places.clone()),
             places,
             buses,
             state: GroupState::Passive,
             stream: StreamSample::default(),
             callback_ns: None,
             state_cycles: 0,
-            motion: GroupTrajectory::default(),
             stop: None,
             fault_reset_cycles: 0,
             commands: Commands::None,
@@ -116,8 +116,8 @@ pub(super) struct GroupContext<'a, const AXES: usize, const BUSES: usize> {
     pub(super) group: &'a mut Group<AXES, BUSES>,
     /// Its axes.
     pub(super) axes: &'a mut [Axis],
-    /// Their planned motions, in the same order.
-    pub(super) profiles: Profiles<'a, AXES>,
+    /// The planned motions of the axes of all groups.
+    pub(super) profiles: &'a mut ProfileStore<AXES>,
     pub(super) shared: &'a mut Shared<AXES, BUSES>,
 }
 

@@ -17,7 +17,6 @@
 //!
 //! Events wait in an outbox until [`Engine::finish`] hands them to the host.
 
-mod axis_places;
 mod backlog;
 mod encode;
 mod executing;
@@ -43,7 +42,7 @@ mod unsent_steps;
 use arrayvec::ArrayVec;
 
 use crate::axis::Axis;
-use crate::bus_set::BusSet;
+use crate::bit_set::BitSet;
 use crate::dispatch::Dispatch;
 use crate::frame::Frame;
 use crate::group_trajectory::ProfileStore;
@@ -79,7 +78,7 @@ pub struct CycleInput<'a> {
     /// The state of each bus.
     pub buses: &'a [BusHealth],
     /// The buses on which own frames of an earlier cycle still wait for the wire.
-    pub behind: BusSet,
+    pub behind: BitSet,
 }
 
 /// Whether the set-points of a cycle were ready in time.
@@ -202,7 +201,7 @@ pub enum Deadline {
 ///         set_points_due_ns: now_ns + 800_000,
 ///         now_ns,
 ///         buses: &buses,
-///         behind: BusSet::default(),
+///         behind: BitSet::default(),
 ///     };
 ///     engine.compute(&input, &mut host);
 ///     let mut batch = SendBatch::new();
@@ -287,7 +286,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         self.couple_stops();
         self.probe_late_drives();
         self.sample_trajectories(host);
-        self.shared.stopped_by_sdo = BusSet::default();
+        self.shared.stopped_by_sdo = BitSet::default();
         self.for_each_group(|group| {
             group.step(input, host);
             host.keep_callback(group.group.number, group.group.state.callback());
@@ -301,7 +300,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         let group = self.groups.get_mut(usize::from(number))?;
         Some(GroupContext {
             axes: self.axes.get_mut(group.places.clone())?,
-            profiles: self.profiles.of(group.places.clone())?,
+            profiles: &mut self.profiles,
             group,
             shared: &mut self.shared,
         })
@@ -309,10 +308,9 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
 
     /// Lets every group act, one after the other.
     fn for_each_group(&mut self, mut act: impl FnMut(&mut GroupContext<'_, AXES, BUSES>)) {
-        for number in 0..self.groups.len() as u8 {
-            if let Some(mut group) = self.group(number) {
-                act(&mut group);
-            }
+        for group in &mut self.groups {
+            let Some(axes) = self.axes.get_mut(group.places.clone()) else { continue };
+            act(&mut GroupContext { group, axes, profiles: &mut self.profiles, shared: &mut self.shared });
         }
     }
 

@@ -3,7 +3,7 @@
 use super::section::Section;
 use crate::config::bounds::Bounds;
 use crate::config::defaults;
-use crate::config::model::{Compliance, Control, DriveFamily, SimulatedJoint};
+use crate::config::model::{Compliance, Control, DriveFamily, Joint};
 use crate::config::quantities::Quantities;
 use crate::config::quantity::Quantity;
 use crate::config::ranges;
@@ -18,7 +18,7 @@ pub fn control(
     section: &mut Section<'_>,
     drive: Option<DriveFamily>,
     q: Quantities,
-    joint: &SimulatedJoint,
+    joint: &Joint,
     surroundings: Option<&Surroundings>,
 ) -> Option<(Control, Compliance)> {
     let period_s =
@@ -52,7 +52,7 @@ pub fn control(
                 loops::velocity_loop(&velocity_section.spot("position_gain"), position_gain, surroundings);
             }
             Some(law @ Control::Torque { stiffness, damping, inertia, .. }) => {
-                let gains = TorqueLoop { stiffness, damping, inertia, simulated_inertia: joint.inertia };
+                let gains = TorqueLoop { stiffness, damping, inertia, simulated_inertia: joint.inertia() };
                 let origin = origin.unwrap_or(Origin::Gains);
                 gains.check(q, surroundings, |key| torque_section.spot(key), origin);
                 if asked.has_gains() {
@@ -128,7 +128,7 @@ fn velocity_loop(section: &mut Section<'_>, period_s: f64) -> Option<Control> {
 fn torque_loop(
     section: &mut Section<'_>,
     q: Quantities,
-    joint: &SimulatedJoint,
+    joint: &Joint,
     period_s: f64,
 ) -> Option<(Control, Origin)> {
     let mut value = |key, quantity, bounds: Bounds, default: Option<f64>| match section.get(key) {
@@ -137,16 +137,16 @@ fn torque_loop(
     };
     let default_bandwidth = Some(defaults::torque_loop_bandwidth(period_s));
     let bandwidth = value("bandwidth", Quantity::GAIN, ranges::BANDWIDTH, default_bandwidth);
-    let inertia = value("inertia", q.inertia, q.ranges.fed_forward_inertia, Some(joint.inertia));
+    let inertia = value("inertia", q.inertia, q.ranges.fed_forward_inertia, Some(joint.inertia()));
     let by_bandwidth = |gain: fn(f64, f64) -> f64| Some(gain(inertia?, bandwidth?));
     let default_stiffness = by_bandwidth(|inertia, bandwidth| inertia * bandwidth * bandwidth);
     let default_damping = by_bandwidth(|inertia, bandwidth| 2.0 * inertia * bandwidth);
     let stiffness = value("stiffness", q.stiffness, q.ranges.stiffness, default_stiffness);
     let damping = value("damping", q.damping, q.ranges.damping, default_damping);
     let viscous_friction =
-        value("viscous_friction", q.damping, q.ranges.viscous_friction, Some(joint.viscous_friction));
+        value("viscous_friction", q.damping, q.ranges.viscous_friction, Some(joint.viscous_friction()));
     let coulomb_friction =
-        value("coulomb_friction", q.effort, q.ranges.friction, Some(joint.coulomb_friction));
+        value("coulomb_friction", q.effort, q.ranges.friction, Some(joint.coulomb_friction()));
     let are_given = [stiffness != default_stiffness, damping != default_damping];
     let origin = match bandwidth {
         Some(bandwidth) if are_given == [false; 2] => Origin::Bandwidth(bandwidth),

@@ -272,7 +272,7 @@ impl AxisCycle {
             velocity: is_fresh.then_some(axis.velocity),
             following_error: is_fresh.then_some(axis.following_error),
             statusword: axis.statusword,
-            state: words::state(axis.drive_state),
+            state: axis.drive_state.name(),
             controlword: axis.controlword,
             error_code: axis.error_code,
             feedback_age: axis.feedback_age,

@@ -134,6 +134,7 @@ mod tests {
             name: name.to_owned(),
             bus: None,
             group: 0,
+            family: None,
             unit,
             plans_own_profile: false,
             counts_per_unit: 1.0,

@@ -15,6 +15,8 @@ struct Point {
     position: f64,
     /// As it went onto the wire; `None` where the wire carries no position.
     counts: Option<i32>,
+    /// Whether the wire carries the one that was planned for this time.
+    is_meant: bool,
     /// Since the set-point before: cycles in which the trajectory went on.
     cycles: u32,
 }
@@ -124,24 +126,41 @@ impl SetPoints {
         if cycles == 0 {
             return Ok(());
         }
-        let point = Point { position: record.position_set, counts: sent.position, cycles };
+        let meant = self.planned.get(self.delay_cycles).map(|due| self.scale.position_to_counts(*due));
+        let is_meant = meant.is_none() || sent.position == meant;
+        let point = Point { position: record.position_set, counts: sent.position, is_meant, cycles };
+        self.check_on_way(axis, &point, meant, nominal_s)?;
         self.check_point(axis, &point)?;
         self.points = [Some(point), self.points[0], self.points[1]];
         Ok(())
     }
 
+    /// What is on the wire is the set-point that is meant. After some that could not leave, it is on the way there at the velocity
+    /// limit: a drive does not get the way of several cycles in one.
+    fn check_on_way(
+        &self,
+        axis: &Axis,
+        next: &Point,
+        meant: Option<i32>,
+        cycle_s: f64,
+    ) -> Result<(), String> {
+        let before = self.points[0].and_then(|last| last.counts);
+        let (Some(counts), Some(before), Some(meant)) = (next.counts, before, meant) else { return Ok(()) };
+        let farthest = axis.limits.velocity * cycle_s * self.scale.resolution();
+        let (way, whole) = (i64::from(counts) - i64::from(before), i64::from(meant) - i64::from(before));
+        let is_on_way = way.signum() == whole.signum()
+            && way.abs() < whole.abs()
+            && way.unsigned_abs() as f64 >= farthest - 1.0;
+        if counts == meant || counts == before || is_on_way {
+            Ok(())
+        } else {
+            Err(format!("{counts} counts on the wire for {meant}"))
+        }
+    }
+
     /// The planned set-point, by differences of what was sent, and what is on the wire of it.
     fn check_point(&self, axis: &Axis, next: &Point) -> Result<(), String> {
         let Some(last) = self.points[0] else { return Ok(()) };
-        if let (Some(counts), Some(before)) = (next.counts, last.counts) {
-            let meant = self.planned.get(self.delay_cycles).map(|due| self.scale.position_to_counts(*due));
-            if let Some(meant) = meant
-                && counts != meant
-                && counts != before
-            {
-                return Err(format!("{counts} counts on the wire for {meant}"));
-            }
-        }
         let limits = &axis.limits;
         let noise = 8.0 * f64::EPSILON * (1.0 + next.position.abs());
         let step_s = |point: &Point| f64::from(point.cycles) * self.period_s;
@@ -166,6 +185,7 @@ impl SetPoints {
             return Err(format!("set-point with acceleration {acceleration} beyond {limit}"));
         }
         if next.cycles == last.cycles
+            && [next, &last, &before].iter().all(|point| point.is_meant)
             && let (Some(newest), Some(newer), Some(older)) = (next.counts, last.counts, before.counts)
         {
             // Each of the three is rounded by up to half a count, the one in the middle counts twice.
