@@ -85,7 +85,10 @@ pub use pdo::{
 pub use phase::Phase;
 pub use port::{BusHealth, BusPort, BusState, Clock, Outgoing, RECEIVE_BATCH, ReceiveBatch, Received, Wake};
 pub use profile::ProfileTarget;
-pub use record::{AxisRecord, CycleRecord, CycleTiming, Event, EventKind, MAX_AXES, MAX_BUSES, MAX_GROUPS};
+pub use record::{
+    AxisRecord, CycleRecord, CycleTiming, Event, EventKind, GroupRecord, MAX_AXES, MAX_BUSES, MAX_GROUPS,
+    RecordedStop,
+};
 pub use request::{
     AxisProcessData, ExecutionStart, MappedPdo, Move, ProfileMove, RejectReason, Request, RequestEnvelope,
     RequestError, RequestId, RequestKind, RequestTarget, TrajectoryId,

@@ -244,7 +244,7 @@ fn drive_errors(session: &Session) -> Vec<DriveError> {
 fn stop_of(session: &Session) -> Option<StopReason> {
     match session.outcome {
         Outcome::Stopped(stop) => Some(stop),
-        Outcome::Interrupted | Outcome::TakenOver { .. } => session.snapshot.stop,
+        Outcome::Interrupted | Outcome::TakenOver { .. } => session.snapshot.first_stop(),
         _ => None,
     }
 }

@@ -79,6 +79,11 @@ impl Config {
         }
     }
 
+    /// The group of an axis, an index into [`Config::groups`]; without groups, the only one.
+    pub fn group_of_axis(&self, axis: usize) -> usize {
+        self.groups.iter().position(|group| group.axes.contains(&axis)).unwrap_or(0)
+    }
+
     /// The cycle of a bus: as the controller's, or a multiple of it. A bus that is not there has the controller's.
     pub fn bus_cycle(&self, bus: usize) -> Cycle {
         let divider = self.buses.get(bus).map_or(1, |bus| bus.divider.max(1));

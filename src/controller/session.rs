@@ -353,7 +353,7 @@ mod tests {
             // Without an end, so that only the other one ends it.
             let options = SessionOptions { duration_ns: Some(600_000_000_000), ..SessionOptions::default() };
             let watch = |snapshot: &Snapshot, _| {
-                has_moved.fetch_or(snapshot.phase == Phase::Moving, Ordering::Relaxed);
+                has_moved.fetch_or(snapshot.groups[0].phase == Phase::Moving, Ordering::Relaxed);
                 None
             };
             let session = lead_as_owner(&config, options, Box::new(|_| {}), watch, None, ownership).unwrap();
@@ -366,12 +366,12 @@ mod tests {
             "{:?}",
             session.outcome
         );
-        let stop = session.snapshot.stop.expect("it was stopped");
+        let stop = session.snapshot.groups[0].stop.expect("it was stopped");
         assert_eq!((stop.category, stop.phase), (StopCategory::Two, Phase::Moving));
         assert!(
-            matches!(session.snapshot.phase, Phase::Disabled | Phase::Passive),
+            matches!(session.snapshot.groups[0].phase, Phase::Disabled | Phase::Passive),
             "{:?}",
-            session.snapshot.phase
+            session.snapshot.groups[0].phase
         );
     }
 }

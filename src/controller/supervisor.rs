@@ -489,7 +489,7 @@ fn is_every_group_off(snapshot: &Snapshot) -> bool {
 /// The phase of the first group that is in one which it should have left.
 fn stuck_phase(snapshot: &Snapshot, should_be_left: impl Fn(Phase) -> bool) -> Phase {
     let mut groups = snapshot.groups().iter().map(|group| group.phase);
-    groups.find(|phase| should_be_left(*phase)).unwrap_or(snapshot.phase)
+    groups.find(|phase| should_be_left(*phase)).unwrap_or_default()
 }
 
 /// Passes the frames of a procedure to the service channel. If the channel is full, the frame is lost as on a disturbed bus,

@@ -30,6 +30,8 @@ pub struct AxisDescription {
     pub name: String,
     /// The name of its bus; `None` in a recording of an earlier version without this name.
     pub bus: Option<String>,
+    /// The number of its group; 0 where all axes are one group.
+    pub group: usize,
     /// The family of its drive, which its error codes belong to; `None` in a recording of an earlier version.
     pub family: Option<DriveFamily>,
     /// The unit of its position.
@@ -102,7 +104,10 @@ impl Machine {
         Self {
             name: config.name.clone(),
             cycle_ns: config.cycle.period_ns,
-            axes: config.axes.iter().map(|axis| AxisDescription::of(axis, config)).collect(),
+            axes: (0..)
+                .zip(&config.axes)
+                .map(|(number, axis)| AxisDescription::of(number, axis, config))
+                .collect(),
             buses: config.buses.iter().map(bus).collect(),
             groups: config.groups.iter().map(|group| group.name.clone()).collect(),
         }
@@ -121,6 +126,11 @@ impl Machine {
     /// The name of a group; its number if it is unknown.
     pub fn group_name(&self, group: u8) -> String {
         self.groups.get(usize::from(group)).map_or_else(|| format!("group {group}"), Clone::clone)
+    }
+
+    /// The number of the group of each axis.
+    pub fn groups_of_axes(&self) -> Vec<usize> {
+        self.axes.iter().map(|axis| axis.group).collect()
     }
 
     /// Whether the drive of an axis plans its own profile, instead of following set-points.
@@ -150,7 +160,7 @@ impl Machine {
 
 impl AxisDescription {
     /// The description of an axis of a configuration.
-    pub fn of(axis: &Axis, config: &Config) -> Self {
+    pub fn of(number: usize, axis: &Axis, config: &Config) -> Self {
         let (unit, travel_per_turn) = match axis.travel {
             Travel::Rotary => (Unit::Radian, TAU),
             Travel::Linear { lead_m } => (Unit::Metre, lead_m),
@@ -158,6 +168,7 @@ impl AxisDescription {
         Self {
             name: axis.name.clone(),
             bus: config.buses.get(axis.bus).map(|bus| bus.name.clone()),
+            group: config.group_of_axis(number),
             family: Some(axis.drive),
             unit,
             plans_own_profile: matches!(

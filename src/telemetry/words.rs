@@ -99,7 +99,7 @@ fn what_happened(event: &Event, machine: &Machine) -> String {
 /// The axes whose drives do not report at present, and since when, for a line of status; `None` if every drive reports, or if none
 /// is asked yet.
 pub fn silence(snapshot: &Snapshot, machine: &Machine) -> Option<String> {
-    if snapshot.phase == Phase::Passive {
+    if snapshot.groups().iter().all(|group| group.phase == Phase::Passive) {
         return None;
     }
     let silent = |(number, axis): (u8, &AxisSnapshot)| {
@@ -126,6 +126,7 @@ mod tests {
         let axis = |name: &str, unit| AxisDescription {
             name: name.to_owned(),
             bus: None,
+            group: 0,
             family: Some(DriveFamily::ErobCanopen),
             unit,
             plans_own_profile: false,
@@ -180,7 +181,7 @@ mod tests {
         snapshot.axes[0] =
             AxisSnapshot { is_heard: true, feedback_ns: 78_000_000, ..AxisSnapshot::default() };
         assert_eq!(silence(&snapshot, &machine()), None, "in bring-up no drive reports yet");
-        snapshot.phase = Phase::Moving;
+        snapshot.groups[0].phase = Phase::Moving;
         assert_eq!(silence(&snapshot, &machine()).as_deref(), Some("no feedback from slide (never)"));
         snapshot.axes[0].feedback_age = 12;
         snapshot.axes[1].is_heard = true;

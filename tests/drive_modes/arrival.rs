@@ -14,7 +14,7 @@ fn errors_at_rest(name: &str) -> Vec<Vec<f64>> {
     let outcome = world.run_to_the_end(|world| {
         let snapshot = world.run.snapshot();
         let finished = world.finished_motions().checked_sub(1);
-        let Some(finished) = finished.filter(|_| snapshot.phase == Phase::Holding) else { return };
+        let Some(finished) = finished.filter(|_| snapshot.groups[0].phase == Phase::Holding) else { return };
         let ProgramTarget::Position(target) = &moves[finished].target else {
             panic!("{name} has no targets")
         };

@@ -207,7 +207,7 @@ impl World {
     }
 
     pub fn phase(&self) -> Phase {
-        self.run.snapshot().phase
+        self.run.snapshot().groups[0].phase
     }
 
     pub fn request(&mut self, request: Request) -> RequestId {

@@ -92,8 +92,8 @@ pub fn play_scenario(config: &Config, scenario: Scenario) -> Played {
         }
         events.extend(fault_events.next(&fault_injector).iter().map(ToString::to_string));
         let snapshot = run.snapshot();
-        if phases.last() != Some(&snapshot.phase) {
-            phases.push(snapshot.phase);
+        if phases.last() != Some(&snapshot.groups[0].phase) {
+            phases.push(snapshot.groups[0].phase);
         }
         let now = enabled_set_points(config, run);
         let period_s = config.cycle.period_ns as f64 * 1e-9;

@@ -63,7 +63,7 @@ fn enabled(config: &Config, lost: Option<usize>) -> (VirtualRun<LossyBus>, usize
     let buses = (0..config.buses.len()).map(|bus| SimulatedBus::new(config, bus));
     let ports = buses.map(|bus| LossyBus { bus, heartbeat, lost, heartbeats: 0 }).collect();
     let (mut run, _) = VirtualRun::new(config, ports).unwrap();
-    while run.snapshot().phase != Phase::Moving {
+    while run.snapshot().groups[0].phase != Phase::Moving {
         assert!(run.step(), "{}: it ends before it moves", config.name);
     }
     let heartbeats = run.ports()[0].heartbeats;

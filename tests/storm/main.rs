@@ -10,6 +10,7 @@ mod case;
 mod client;
 mod client_callback;
 mod client_stream;
+mod client_trajectory;
 mod concern;
 mod coverage;
 mod dice;

@@ -33,6 +33,7 @@ fn moving(name: &'static str, text: &str) -> Case {
         broken_off: None,
         hardship: Hardship::default(),
         has_callbacks: false,
+        has_trajectories: false,
         overload: Overload::default(),
         dice: Dice::new(0),
     }
@@ -240,7 +241,7 @@ const FAILED_IN_OVERLOAD: [(u64, &str); 13] = [
 #[test]
 fn storms_that_have_failed_in_overload_pass() {
     for (seed, what) in FAILED_IN_OVERLOAD {
-        let played = play(&Case::of(seed));
+        let played = play(&Case::in_overload(seed));
         assert!(played.is_ok(), "{seed}, {what}: {played:?}");
     }
 }

@@ -74,6 +74,17 @@ fn every_field_can_be_read_by_the_schema_in_the_file() {
             assert_eq!(*fields, expected.map(|(name, value)| (name.to_owned(), value)).into());
         }
     }
+    let (_, group) = &messages(&recording, "/group/all")[3];
+    let expected = [
+        ("slot", number(3)),
+        ("phase", number(4)),
+        ("is_stopped", number(0)),
+        ("category", number(0)),
+        ("rule", number(0)),
+        ("is_called", number(0)),
+        ("callback_ns", number(0)),
+    ];
+    assert_eq!(*group, expected.map(|(name, value)| (name.to_owned(), value)).into());
     let (_, times) = &messages(&recording, "/cycle")[3];
     let expected = [
         ("slot", number(3)),
@@ -124,11 +135,12 @@ fn a_recording_has_an_index_and_the_description_of_the_machine() {
     let recording = record();
     let summary = mcap::Summary::read(&recording).unwrap().unwrap();
     let statistics = summary.stats.unwrap();
-    assert_eq!((statistics.message_count, statistics.channel_count), (20 * 3 + 4, 4));
+    assert_eq!((statistics.message_count, statistics.channel_count), (20 * 4 + 4, 5));
     let slide = summary.channels.values().find(|channel| channel.topic == "/axis/slide").unwrap();
     let expected = [
         ("acceleration_limit", "10"),
         ("counts_per_unit", "83443"),
+        ("group", "0"),
         ("index", "1"),
         ("jerk_limit", "50"),
         ("name", "slide"),

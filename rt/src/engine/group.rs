@@ -12,9 +12,10 @@ use crate::bit_set::BitSet;
 use crate::group_trajectory::{GroupTrajectory, ProfileStore};
 use crate::host::GroupSnapshot;
 use crate::motion_reports::MotionState;
-use crate::record::{Event, EventKind, MAX_GROUPS};
+use crate::record::{Event, EventKind, GroupRecord, MAX_GROUPS, RecordedStop};
 use crate::source::StreamSample;
 use crate::stop::StopReason;
+use crate::time::Nanoseconds;
 
 /// What belongs to one group.
 #[derive(Clone, Debug)]
@@ -30,6 +31,8 @@ pub(super) struct Group<const AXES: usize, const BUSES: usize> {
     pub(super) state: GroupState<AXES>,
     /// What its stream wants in this slot, while it streams.
     pub(super) stream: StreamSample<AXES>,
+    /// How long the call of its callback took in this cycle; `None` if none was called.
+    pub(super) callback_ns: Option<Nanoseconds>,
     /// Cycles since the state was entered.
     pub(super) state_cycles: u32,
     /// What is planned, while the group moves or stops.
@@ -40,6 +43,8 @@ pub(super) struct Group<const AXES: usize, const BUSES: usize> {
     pub(super) fault_reset_cycles: u32,
     pub(super) commands: Commands,
     pub(super) unsent: UnsentSteps<BUSES>,
+    /// Cycles in which its set-points went on.
+    pub(super) steps: u64,
     /// The stop that has begun, or has become harder, and of which the groups that stop with this one do not know yet.
     pub(super) untold: Option<StopReason>,
 }
@@ -64,11 +69,13 @@ impl<const AXES: usize, const BUSES: usize> Group<AXES, BUSES> {
             buses,
             state: GroupState::Passive,
             stream: StreamSample::default(),
+            callback_ns: None,
             state_cycles: 0,
             stop: None,
             fault_reset_cycles: 0,
             commands: Commands::None,
             unsent: UnsentSteps::default(),
+            steps: 0,
             untold: None,
         }
     }
@@ -82,14 +89,18 @@ impl<const AXES: usize, const BUSES: usize> Group<AXES, BUSES> {
         }
     }
 
-    /// What observers see of it.
-    pub(super) fn snapshot(&self) -> GroupSnapshot {
-        GroupSnapshot {
-            phase: self.state.phase(),
+    /// Shows what the group did in the cycle.
+    pub(super) fn show(&self, record: &mut GroupRecord, snapshot: &mut GroupSnapshot) {
+        let phase = self.state.phase();
+        let stop = self.stop.as_ref().map(RecordedStop::of);
+        *record = GroupRecord { phase, stop, callback_ns: self.callback_ns };
+        *snapshot = GroupSnapshot {
+            phase,
             remaining_s: self.remaining_s(),
             stop: self.stop,
             stream: self.stream_report(),
-        }
+            steps: self.steps,
+        };
     }
 
     /// Ends the cycle, whose commands have left, or were ready too late.

@@ -133,6 +133,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
         let cycle = cycle.beginning_at(input.now_ns);
         let (callback, targets) = (in_loop.callback(), &mut shared.callback_targets);
         let returned = host.callback(self.group.number, callback, &cycle, &shared.snapshot.axes, targets);
+        self.group.callback_ns = Some(returned.spent_ns);
         in_loop.returns(input.slot, returned);
     }
 

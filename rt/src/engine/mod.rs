@@ -46,7 +46,7 @@ use crate::bit_set::BitSet;
 use crate::dispatch::Dispatch;
 use crate::frame::Frame;
 use crate::group_trajectory::ProfileStore;
-use crate::host::{GroupSnapshot, HostInterface};
+use crate::host::HostInterface;
 use crate::phase::Phase;
 use crate::port::BusHealth;
 use crate::record::{CycleTiming, EventKind, MAX_AXES, MAX_BUSES, MAX_GROUPS};
@@ -115,7 +115,7 @@ pub enum Deadline {
 ///         })
 ///     }
 ///     fn publish(&mut self, snapshot: &Snapshot<1, 1>) {
-///         self.phase = snapshot.phase;
+///         self.phase = snapshot.groups()[0].phase;
 ///     }
 /// }
 ///
@@ -325,12 +325,11 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         let is_late = self.shared.deadline == Deadline::Missed;
         let shared = &mut self.shared;
         let mut is_commanded = false;
-        let shown = shared.record.group_phases.iter_mut().zip(&mut shared.snapshot.groups);
-        for (group, (phase, snapshot)) in self.groups.iter_mut().zip(shown) {
+        let shown = shared.record.groups.iter_mut().zip(&mut shared.snapshot.groups);
+        for (group, (record, snapshot)) in self.groups.iter_mut().zip(shown) {
             is_commanded |= !is_late && group.commands == Commands::Made;
             group.end_cycle(is_late);
-            *snapshot = group.snapshot();
-            *phase = snapshot.phase;
+            group.show(record, snapshot);
         }
         shared.slots.end(is_late);
         if is_late {
@@ -339,8 +338,6 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         shared.dropped += shared.events.drain(|event| host.event(event));
         shared.record.timing = CycleTiming { missed_slots: shared.slots.missed_now, ..timing };
         shared.record.is_commanded = is_commanded;
-        let [first, ..] = shared.record.group_phases;
-        shared.record.phase = first;
         for axis in &self.axes {
             let number = usize::from(axis.number());
             let (records, shown) = (&mut shared.record.axes, &mut shared.snapshot.axes);
@@ -362,8 +359,6 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         snapshot.missed_slots = shared.slots.missed;
         snapshot.timing = shared.slots.level();
         snapshot.dropped = shared.dropped;
-        let [GroupSnapshot { phase, remaining_s, stop, .. }, ..] = snapshot.groups;
-        (snapshot.phase, snapshot.remaining_s, snapshot.stop) = (phase, remaining_s, stop);
         for (shown, health) in snapshot.buses.iter_mut().zip(buses) {
             *shown = *health;
         }

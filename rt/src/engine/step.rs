@@ -67,6 +67,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
     /// Makes the next set-points, unless those of the last cycles have still to leave, or every bus is behind.
     #[inline]
     pub(super) fn step(&mut self, input: &CycleInput<'_>, host: &mut impl HostInterface<AXES, BUSES>) {
+        self.group.callback_ns = None;
         let (own, behind) = (self.group.buses, self.shared.backlog.behind());
         // A group that stops does not wait for the wire any longer, whatever it stops for.
         let is_over_waiting = self.group.stop.is_some()
@@ -84,7 +85,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
         }
         if self.group.commands == Commands::Made {
             self.group.unsent.count(on_time);
-            self.shared.snapshot.steps += 1;
+            self.group.steps += 1;
         }
         self.call_in_loop(input, host);
         for _ in 0..ATTEMPTS {

@@ -133,6 +133,7 @@ mod tests {
         let axis = |name: &str, unit| AxisDescription {
             name: name.to_owned(),
             bus: None,
+            group: 0,
             family: None,
             unit,
             plans_own_profile: false,

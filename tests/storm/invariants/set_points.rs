@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use takt::config::{Axis, Config};
+use takt::config::{Axis, Config, Control};
 use takt::controller::assemble;
 use takt_rt::{DriveState, Event, EventKind, Phase, Scale};
 
@@ -32,7 +32,7 @@ pub struct SetPoints {
     /// What was sent to the enabled drive, newest first.
     points: [Option<Point>; 3],
     /// Where the trajectory has led, newest first. What is on the wire is so many cycles old: an axis on a faster bus waits
-    /// for those that follow set-points on slower ones.
+    /// for those of its group that follow set-points on slower ones.
     planned: VecDeque<f64>,
     delay_cycles: usize,
     /// The last position on the wire while the drive really was enabled, and in which slot.
@@ -41,7 +41,7 @@ pub struct SetPoints {
     coasting: f64,
     /// Cycles in which the trajectory went on since the last set-point.
     cycles: u32,
-    /// Since the start.
+    /// Those of its group since the start.
     steps: u64,
     /// The slot of the last set-point.
     sent_slot: u64,
@@ -50,9 +50,11 @@ pub struct SetPoints {
 }
 
 impl SetPoints {
-    pub fn new(config: &Config, axis: &Axis) -> Self {
+    pub fn new(config: &Config, number: usize) -> Self {
         let divider = |axis: &Axis| config.buses[axis.bus].divider;
-        let follow = config.axes.iter().filter(|axis| !axis.control.is_profile());
+        let (axis, group) = (&config.axes[number], config.axes_of_group(config.group_of_axis(number)));
+        let own = group.iter().map(|axis| &config.axes[*axis]);
+        let follow = own.filter(|axis| !axis.control.is_profile());
         let slowest = follow.map(divider).max().unwrap_or(1).max(divider(axis));
         Self {
             scale: assemble::scale(axis).unwrap(),
@@ -71,7 +73,8 @@ impl SetPoints {
 
     pub fn check(&mut self, seen: &Seen<'_>, index: usize) -> Result<(), String> {
         let axis = &seen.config.axes[index];
-        let steps = seen.snapshot.steps - std::mem::replace(&mut self.steps, seen.snapshot.steps);
+        let all_steps = seen.group_of(index).steps;
+        let steps = all_steps - std::mem::replace(&mut self.steps, all_steps);
         self.cycles += steps as u32;
         self.check_rates(seen, index)?;
         self.check_wire(seen, index)?;
@@ -90,13 +93,19 @@ impl SetPoints {
             self.planned.push_front(record.position_set);
             self.planned.truncate(self.delay_cycles + 1);
         }
-        let phase = seen.record.phase;
+        let phase = seen.phase_of(index);
         if let Some((Phase::Holding, position)) = self.last
             && phase == Phase::Holding
             && position != record.position_set
-            && !is_asked_to_move(seen.events)
+            && !is_asked_to_move(seen.events_of(seen.groups[index]))
         {
             return Err(format!("holding, and from {position} to {}", record.position_set));
+        }
+        // What is planned behind a torque or an impedance begins where the joint is.
+        let was_streaming = matches!(self.last, Some((Phase::Streaming, _)));
+        let may_be_off = seen.are_torques_commanded && matches!(axis.control, Control::Torque { .. });
+        if may_be_off && (was_streaming || phase == Phase::Streaming) {
+            self.points = [None; 3];
         }
         self.last = Some((phase, record.position_set));
         let sent = &seen.sent[index];
@@ -255,7 +264,7 @@ impl SetPoints {
     }
 }
 
-/// Whether the group has left standstill in this cycle, if only for a move that ends in it.
-fn is_asked_to_move(events: &[Event]) -> bool {
-    events.iter().any(|event| matches!(event.kind, EventKind::PhaseChanged { from: Phase::Holding, .. }))
+/// Whether a group with these events has left standstill in this cycle, if only for a move that ends in it.
+fn is_asked_to_move<'a>(mut events: impl Iterator<Item = &'a Event>) -> bool {
+    events.any(|event| matches!(event.kind, EventKind::PhaseChanged { from: Phase::Holding, .. }))
 }
