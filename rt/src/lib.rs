@@ -61,8 +61,8 @@ mod wire;
 
 pub use answers::{Answer, Answers};
 pub use axis::{
-    Axis, AxisParameters, AxisParametersError, CommandPdo, FeedForward, FeedbackSince, Jump, Pdo,
-    TorqueLimits,
+    Axis, AxisParameters, AxisParametersError, CommandPdo, FeedForward, FeedbackSince, Jump, ModeChanges,
+    ModeCondition, Pdo, TorqueLimits,
 };
 pub use bus_set::BusSet;
 pub use cia402::{Command, DriveState, Goal, OperationMode, controlword, statusword};
@@ -87,8 +87,8 @@ pub use port::{BusHealth, BusPort, BusState, Clock, Outgoing, RECEIVE_BATCH, Rec
 pub use profile::ProfileTarget;
 pub use record::{AxisRecord, CycleRecord, CycleTiming, Event, EventKind, MAX_AXES, MAX_BUSES, MAX_GROUPS};
 pub use request::{
-    AxisProcessData, ExecutionStart, MappedPdo, Move, ProfileMove, RejectReason, Request, RequestEnvelope,
-    RequestError, RequestId, RequestKind, RequestTarget, TrajectoryId,
+    AxisProcessData, ExecutionStart, MappedPdo, ModeChange, Move, ProfileMove, RejectReason, Request,
+    RequestEnvelope, RequestError, RequestId, RequestKind, RequestTarget, TrajectoryId,
 };
 pub use source::{
     AxisPoint, AxisTarget, CallbackCycle, CallbackId, CallbackOutcome, CallbackReturn, CallbackRun, Follow,

@@ -12,13 +12,14 @@
 //!   `process_data` exchanges mappings;
 //! - `faults` looks for the first thing that is wrong, and begins stops;
 //! - `step` makes the next set-points of the phase that the group is in (`state` has the table of phases), `streaming` those
-//!   of a stream, `executing` those of a trajectory, `in_loop` those of a callback;
+//!   of a stream, `executing` those of a trajectory, `in_loop` those of a callback; `changing_mode` changes modes of operation;
 //! - `encode` makes frames of them, and decides what may leave; `sdo_fallback` stops drives that PDOs do not reach.
 //!
 //! Events wait in an outbox until [`Engine::finish`] hands them to the host.
 
 mod axis_places;
 mod backlog;
+mod changing_mode;
 mod encode;
 mod executing;
 mod faults;
@@ -134,6 +135,7 @@ pub enum Deadline {
 ///     dialect: Dialect::Cia402,
 ///     controlword_spacing_cycles: 0,
 ///     law: ControlLaw::Position,
+///     mode_changes: ModeChanges::default(),
 ///     scale: Scale::new(ScaleParameters {
 ///         counts_per_turn: 524_288.0,
 ///         velocity_units_per_turn: 524_288.0,

@@ -8,7 +8,7 @@ use core::f64::consts::TAU;
 use takt_rt::{
     AxisLimits, AxisParameters, BusHealth, BusParameters, BusSet, CommandPdo, ControlLaw, CycleInput,
     CycleTiming, Deadline, Dialect, Engine, EngineParameters, FeedForward, FeedbackSince, Frame, HostInterface, Id,
-    Follow, MappedObject, Mapping, Pdo, Phase, Received, Request, RequestEnvelope, RequestId, RequestTarget, Scale,
+    Follow, MappedObject, Mapping, ModeChanges, Pdo, Phase, Received, Request, RequestEnvelope, RequestId, RequestTarget, Scale,
     ScaleParameters, SendBatch, StopCategories, TimingLadder, TorqueLimits,
 };
 
@@ -71,6 +71,7 @@ fn axis() -> Option<AxisParameters> {
         feedback_since: FeedbackSince::Sync,
         unused: Default::default(),
         law: ControlLaw::Position,
+        mode_changes: ModeChanges::default(),
         scale: Scale::new(scale).ok()?,
         limits: AxisLimits {
             position_min: -3.0,
