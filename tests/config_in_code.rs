@@ -421,7 +421,13 @@ fn a_configuration_made_in_code_has_the_defaults_of_a_file() {
     };
     made_and_read(ErobCanopen, "mode = \"cst\"", "1 ms", cst, 1_000_000);
     let changing = |axis: Axis| {
-        let torque = cst(axis.clone()).control;
+        let torque = Control::Torque {
+            stiffness: 1600.0,
+            damping: 80.0,
+            inertia: 1.0,
+            viscous_friction: 1.0,
+            coulomb_friction: 0.5,
+        };
         axis.with_other_modes(vec![Control::Velocity { position_gain: 20.0 }, torque])
     };
     let modes = "modes = [\"csp\", \"csv\", \"cst\"]";

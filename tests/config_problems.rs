@@ -172,7 +172,6 @@ cases! {
         "mode = \"csp\"" => "modes = [\"csv\", \"csp\", \"csv\"]", at "modes": Repeated { key, given } if key == "axis.modes" && given == "csv",
         "mode = \"csp\"" => "mode = \"pp\"\nmodes = [\"csv\"]", at "modes": OutOfRange { key, value, .. } if key == "axis.modes" && value.contains("another mode than"),
         "mode = \"csp\"" => "modes = [\"csv\"]\nvelocity_loop = { position_gain = \"900 1/s\" }", at "position_gain": OutOfRange { key, .. } if key == "axis.velocity_loop.position_gain",
-        "damping = \"20 Nm s/rad\"\n\n[axis.identity]\nvendor = 0x5A65726F" => "damping = \"0.1 Nm s/rad\"\nstiffness = \"20000 Nm/rad\"\n[[axis]]\nname = \"x\"\nbus = \"left\"\nnode = 9\nmodes = [\"cst\"]\nlimits = { position = [-1, 1], velocity = 1.0, acceleration = 5, torque = 20 }\ntorque_loop = { damping = 0 }\n", at "torque_loop = { damping = 0 }": OutOfRange { key, .. } if key == "axis.torque_loop.damping",
     }
 
     wrong_units_are_named {

@@ -28,6 +28,8 @@ pub struct Case {
     pub overload: Overload,
     /// Whether callbacks lead the groups, too.
     pub has_callbacks: bool,
+    /// Whether somebody changes modes of operation, too.
+    pub has_mode_changes: bool,
     pub dice: Dice,
 }
 
@@ -122,6 +124,7 @@ impl Case {
             hardship,
             overload,
             has_callbacks: false,
+            has_mode_changes: false,
             dice,
         }
     }

@@ -17,6 +17,7 @@ use takt_rt::{
 use crate::case::Case;
 use crate::client::{Client, RecentRequests, is_open};
 use crate::client_callback::CallbackClient;
+use crate::client_mode::ModeClient;
 use crate::concern::Concerns;
 use crate::fingerprint::Fingerprint;
 use crate::heartbeat::Heartbeats;
@@ -108,6 +109,8 @@ pub struct Done {
     pub outcomes: Vec<FaultOutcome>,
     /// The rules of all stops.
     pub stops: BTreeSet<&'static str>,
+    /// Cycles in which an axis moved in another mode of operation than its first.
+    pub changed_cycles: u64,
     /// Whether the drives could not be brought up.
     pub is_bring_up_failed: bool,
 }
@@ -128,6 +131,7 @@ pub fn play(case: &Case) -> Result<Done, String> {
     let mut fingerprint = Fingerprint::default();
     let mut outcomes: Vec<FaultOutcome> = vec![];
     let mut stops = BTreeSet::new();
+    let mut changed_cycles = 0;
     let at_most = case.length + (END_AT_MOST_S * 1e9 / config.cycle.period_ns as f64) as u64;
     let (mut enabled, mut cycles) = (None, 0);
     let mut goes_on = true;
@@ -161,6 +165,7 @@ pub fn play(case: &Case) -> Result<Done, String> {
             _ => None,
         }));
         clients.note_answers(&world.snapshot);
+        changed_cycles += u64::from(moves_in_other_mode(config, &world.snapshot));
         fingerprint.take_cycle(&world);
         let World { log, snapshot, truth, events, .. } = &mut world;
         let mut look = |record: &_| {
@@ -201,7 +206,14 @@ pub fn play(case: &Case) -> Result<Done, String> {
     }
     at_rest(case, &mut concerns, &mut world)?;
     let is_bring_up_failed = matches!(world.run.supervisor().outcome(), Some(Outcome::BringUpFailed(_)));
-    Ok(Done { cycles, fingerprint: fingerprint.value(), outcomes, stops, is_bring_up_failed })
+    let fingerprint = fingerprint.value();
+    Ok(Done { cycles, fingerprint, outcomes, stops, changed_cycles, is_bring_up_failed })
+}
+
+fn moves_in_other_mode(config: &Config, snapshot: &Snapshot) -> bool {
+    let mut axes = config.axes.iter().zip(&snapshot.axes);
+    matches!(snapshot.phase, Phase::Moving | Phase::Streaming)
+        && axes.any(|(axis, shown)| shown.mode_set != axis.control.operation_mode() as i8)
 }
 
 fn note_stop(events: &[Event], outcomes: &mut [FaultOutcome]) {
@@ -220,6 +232,7 @@ fn note_stop(events: &[Event], outcomes: &mut [FaultOutcome]) {
 struct Clients {
     all: Vec<Client>,
     callbacks: Option<CallbackClient>,
+    modes: Option<ModeClient>,
     asked: RecentRequests,
     /// Resets of faults that wait in the queue. Each counts when it is granted: a fault may come up before that, and is reset too.
     awaited_resets: Vec<RequestId>,
@@ -232,9 +245,11 @@ impl Clients {
             .map(|number| Client::new(case.dice.split(number), case.hardship.are_streams_wild))
             .collect();
         let callbacks = case.has_callbacks.then(|| CallbackClient::new(case.dice.split(u64::MAX - 3)));
+        let modes = case.has_mode_changes.then(|| ModeClient::new(case.dice.split(u64::MAX - 4)));
         Self {
             all,
             callbacks,
+            modes,
             asked: RecentRequests::default(),
             awaited_resets: vec![],
             since_reset: u64::MAX,
@@ -256,6 +271,9 @@ impl Clients {
         if is_raging && !is_waited_for {
             if let Some(callbacks) = &mut self.callbacks {
                 callbacks.act(&case.config, snapshot, &mut world.run);
+            }
+            if let Some(modes) = &mut self.modes {
+                modes.act(&case.config, snapshot, &mut world.run);
             }
             for client in &mut self.all {
                 let wishes = client.wishes(&case.config, snapshot);

@@ -12,6 +12,7 @@ use crate::control::ControlLaw;
 use crate::fault::Fault;
 use crate::pdo::{CommandSlot, FeedbackSlot, MappedObject};
 use crate::phase::Phase;
+use crate::record::EventKind;
 use crate::request::{ModeChange, RejectReason, RequestId};
 use crate::stop::Origin;
 
@@ -56,7 +57,11 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
     /// One cycle of waiting for the drives to show their new modes. The set-points stay.
     pub(super) fn step_mode_change(&mut self, at: AtRest) -> Result<(), Failure> {
         if self.axes.iter().all(|axis| !axis.is_changing_mode() || axis.shows_commanded_mode()) {
-            self.axes.iter_mut().for_each(Axis::end_mode_change);
+            for axis in self.axes.iter_mut().filter(|axis| axis.is_changing_mode()) {
+                axis.end_mode_change();
+                let (number, mode) = (axis.number(), axis.parameters().law.operation_mode());
+                self.shared.emit(Some(self.group.number), EventKind::Mode { axis: number, mode });
+            }
             self.leave_mode_change(at);
             self.finish_motions();
         } else if let Some(failure) = self.late_mode() {

@@ -32,7 +32,8 @@ fn check_reason(seen: &Seen<'_>, reason: &StopReason) -> Result<(), String> {
     let is_loop_closed_here = |axis: u8| {
         let axis = seen.config.axes.get(usize::from(axis));
         axis.is_some_and(|axis| {
-            matches!(axis.control, ControlLaw::Velocity { .. } | ControlLaw::Torque { .. })
+            let mut laws = axis.controls();
+            laws.any(|law| matches!(law, ControlLaw::Velocity { .. } | ControlLaw::Torque { .. }))
         })
     };
     let is_right = match (reason.rule(), reason.origin) {
@@ -71,6 +72,7 @@ fn check_reason(seen: &Seen<'_>, reason: &StopReason) -> Result<(), String> {
             | Rule::DriveFault
             | Rule::DriveDisabled
             | Rule::ModeChanged
+            | Rule::ModeNotShown
             | Rule::EnableTimeout
             | Rule::NotAcknowledged
             | Rule::NodeLost
