@@ -100,7 +100,7 @@ pub enum Request<const AXES: usize = MAX_AXES> {
     Disable,
     /// Clear latched faults: raise controlword bit 7 for some cycles. Refused while any drive is enabled.
     ResetFaults,
-    /// Refuse to enable from now on, whoever asks: the run is ending, and the drives' watchdogs are about to be switched off.
+    /// Refuse to enable and to change modes from now on, whoever asks, and end a change that is under way: the run is ending, and the drives' watchdogs are about to be switched off.
     InhibitEnable,
     /// Leave the loop after this cycle. The drives get no more set-points.
     Shutdown,

@@ -382,6 +382,20 @@ fn a_stop_of_category_two_leaves_a_change_under_way() {
 }
 
 #[test]
+fn a_run_that_ends_ends_a_change_and_begins_none() {
+    let mut rig = disabled(ModeCondition::Disabled);
+    rig.drive(0).modes.after_cycles = None;
+    let request = ask(&mut rig, CSV);
+    rig.request(Request::InhibitEnable);
+    assert!(matches!(result(&rig, request), Some(MotionState::Stopped(reason)) if reason.is_requested()));
+    assert_eq!(refusal(&mut rig, to(CSV)), Some(RejectReason::EnableInhibited));
+    // As when the drives leave NMT operational.
+    rig.drive(0).is_silent = true;
+    rig.run(2 * TIMEOUT_CYCLES as usize);
+    assert_eq!((stop_causes(&rig), commanded(&rig).0), (vec![StopCause::Requested], CSP as i8));
+}
+
+#[test]
 fn a_drive_that_leaves_its_new_mode_by_itself_is_a_fault_against_that_mode() {
     let mut rig = holding(ModeCondition::AtRest);
     change(&mut rig, CSV);

@@ -99,10 +99,8 @@ impl Axis {
     #[inline(never)]
     pub(super) fn command_other_modes(&mut self, is_enabled: bool) {
         let Self { parameters, command, .. } = self;
-        let position = match is_enabled {
-            true => parameters.scale.position_to_counts(self.set_points.sent_now().position),
-            false => self.joint.position_counts(),
-        };
+        // Of a drive that is not enabled it follows the joint within the limits, as in CSP.
+        let position = parameters.scale.position_to_counts(self.set_points.sent_now().position);
         for law in &parameters.mode_changes.laws {
             command.set(law.target_slot(), law.idle(position));
         }

@@ -3,6 +3,7 @@
 
 use super::group::GroupContext;
 use super::requests::Handled;
+use super::shared::Ending;
 use super::state::{AtRest, GroupState};
 use super::step::Failure;
 use super::targets::Rejection;
@@ -14,22 +15,22 @@ use crate::pdo::{CommandSlot, FeedbackSlot, MappedObject};
 use crate::phase::Phase;
 use crate::record::EventKind;
 use crate::request::{ModeChange, RejectReason, RequestId};
-use crate::stop::Origin;
+use crate::stop::{Origin, StopCause};
+use crate::stop_category::StopCategory;
 
 impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
     /// Whether every axis that is to change its mode can.
     pub(super) fn check_mode_change(&self, change: &ModeChange<AXES>) -> Handled {
+        if self.shared.requested.ending >= Ending::EnableInhibited {
+            return Err(RejectReason::EnableInhibited.into());
+        }
         self.require_phase(&[Phase::Disabled, Phase::Holding])?;
         self.require_no_fault()?;
         let is_enabled = matches!(self.group.state, GroupState::Holding);
         for axis in self.axes.iter() {
             if let Some(mode) = other_mode(axis, change) {
-                let checked = check_law(axis, mode).and_then(|law| check_mapping(axis, law, is_enabled));
-                let checked = checked.and_then(|()| match is_enabled {
-                    true => check_rest(axis, self.shared.period_s),
-                    false => Ok(()),
-                });
-                checked.map_err(|reason| -> Rejection { reason.of_axis(axis.number()) })?;
+                check_axis(axis, mode, is_enabled.then_some(self.shared.period_s))
+                    .map_err(|reason| -> Rejection { reason.of_axis(axis.number()) })?;
             }
         }
         Ok(())
@@ -56,7 +57,11 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
 
     /// One cycle of waiting for the drives to show their new modes. The set-points stay.
     pub(super) fn step_mode_change(&mut self, at: AtRest) -> Result<(), Failure> {
-        if self.axes.iter().all(|axis| !axis.is_changing_mode() || axis.shows_commanded_mode()) {
+        if at == AtRest::Disabled && self.shared.requested.ending >= Ending::EnableInhibited {
+            // The run is ending: soon the drives exchange no process data any more.
+            self.cancel_mode_change(at);
+            self.begin_stop(StopCause::Requested, Origin::Group, StopCategory::Two);
+        } else if self.axes.iter().all(|axis| !axis.is_changing_mode() || axis.shows_commanded_mode()) {
             for axis in self.axes.iter_mut().filter(|axis| axis.is_changing_mode()) {
                 axis.end_mode_change();
                 let (number, mode) = (axis.number(), axis.parameters().law.operation_mode());
@@ -106,8 +111,14 @@ fn other_mode<const AXES: usize>(axis: &Axis, change: &ModeChange<AXES>) -> Opti
     axis.own(&change.modes).filter(|mode| *mode != axis.parameters().law.operation_mode())
 }
 
-fn check_law(axis: &Axis, mode: OperationMode) -> Result<&ControlLaw, RejectReason> {
-    axis.law_for(mode).ok_or(RejectReason::UnknownMode { mode })
+/// Checks that an axis can change to a mode; where it is enabled, with the period of the cycle.
+fn check_axis(axis: &Axis, mode: OperationMode, enabled_period_s: Option<f64>) -> Result<(), RejectReason> {
+    let law = axis.law_for(mode).ok_or(RejectReason::UnknownMode { mode })?;
+    if enabled_period_s.is_some() && axis.parameters().mode_changes.condition == ModeCondition::Disabled {
+        return Err(RejectReason::NotDisabled);
+    }
+    check_mapping(axis, law, enabled_period_s.is_some())?;
+    enabled_period_s.map_or(Ok(()), |period_s| check_rest(axis, period_s))
 }
 
 /// Checks that the process data carry what the change needs. A drive that is enabled must tell the torque that holds its joint,
@@ -131,9 +142,6 @@ fn check_mapping(axis: &Axis, law: &ControlLaw, is_enabled: bool) -> Result<(), 
 
 /// Checks that the mode of an enabled drive can change without a bump.
 fn check_rest(axis: &Axis, period_s: f64) -> Result<(), RejectReason> {
-    if axis.parameters().mode_changes.condition == ModeCondition::Disabled {
-        return Err(RejectReason::NotDisabled);
-    }
     if !axis.is_at_rest() {
         return Err(RejectReason::NotAtRest { velocity: axis.velocity() });
     }
