@@ -100,5 +100,11 @@ fn waypoints_are_passed_by_the_handle_too() {
     let motion = arm.move_through(&waypoints).unwrap();
     assert_eq!(arm.wait(motion, PATIENCE), Ok(()));
     assert!((here(&arm)[5] - from[5] - 0.3).abs() < 1e-12);
+    // In motion it goes on from there.
+    let first = arm.move_through(std::slice::from_ref(&from)).unwrap();
+    let second = arm.move_through(&waypoints).unwrap();
+    assert_eq!(arm.wait(first, PATIENCE), Err(MotionError::Replaced));
+    assert_eq!(arm.wait(second, PATIENCE), Ok(()));
+    assert!((here(&arm)[5] - from[5] - 0.3).abs() < 1e-12);
     arm.finish().unwrap();
 }

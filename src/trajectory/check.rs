@@ -117,32 +117,6 @@ fn is_beyond(value: f64, limit: f64) -> bool {
     value.is_nan() || value.abs() > limit * (1.0 + TOLERANCE)
 }
 
-/// By how much all times must be longer for an axis to be at some limit of velocity, acceleration or jerk on this polynomial, and
-/// beyond none.
-pub(super) fn scale_to_limits(polynomial: &Polynomial, duration_s: f64, limits: &AxisLimits) -> f64 {
-    let of = Derivatives::of(polynomial);
-    let most = |coefficients: &[f64], times: &mut dyn Iterator<Item = f64>| {
-        times.fold(0.0, |most: f64, time_s| most.max(value(coefficients, time_s).abs()))
-    };
-    let ends = [0.0, duration_s];
-    let turns = sign_changes(&of.velocity, duration_s);
-    let velocity =
-        most(&of.velocity, &mut sign_changes(&of.acceleration, duration_s).into_iter().chain(ends));
-    let jerk = most(&of.jerk, &mut sign_changes(&of.snap, duration_s).into_iter().chain(ends));
-    let extrema = sign_changes(&of.jerk, duration_s);
-    let borders = turns.iter().copied().chain(ends).chain(extrema);
-    let acceleration = borders.fold(0.0, |most: f64, time_s| {
-        let (velocity, acceleration) = (value(&of.velocity, time_s), value(&of.acceleration, time_s));
-        let limit = match velocity * acceleration {
-            along if along > 0.0 => limits.acceleration,
-            along if along < 0.0 => limits.deceleration,
-            _ => limits.acceleration.min(limits.deceleration),
-        };
-        most.max(acceleration.abs() / limit)
-    });
-    (velocity / limits.velocity).max(acceleration.sqrt()).max((jerk / limits.jerk).cbrt())
-}
-
 /// Speeding up and slowing down have limits of their own. Between two changes of the direction the acceleration has its extrema
 /// at the ends and where the jerk changes its sign.
 fn acceleration_violation(

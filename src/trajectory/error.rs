@@ -129,6 +129,13 @@ pub enum TrajectoryError {
         /// The limit, with the sign of the value.
         limit: f64,
     },
+    /// A waypoint cannot be reached from the present motion within the limits.
+    Unreachable {
+        /// The waypoint.
+        point: usize,
+        /// The axis.
+        axis: usize,
+    },
     /// The last point has an acceleration, which would end in a step.
     EndAcceleration {
         /// The axis.
@@ -156,7 +163,8 @@ impl TrajectoryError {
             | Self::NotFinite { point, .. }
             | Self::Time { point, .. }
             | Self::TimeOrder { point, .. }
-            | Self::Limit { point, .. } => Some(point),
+            | Self::Limit { point, .. }
+            | Self::Unreachable { point, .. } => Some(point),
             Self::Start { .. } => Some(0),
             Self::NoPoint | Self::EndAcceleration { .. } | Self::NoRoomToStop { .. } => None,
         }
@@ -169,6 +177,7 @@ impl TrajectoryError {
             | Self::NotFinite { axis, .. }
             | Self::Start { axis, .. }
             | Self::Limit { axis, .. }
+            | Self::Unreachable { axis, .. }
             | Self::EndAcceleration { axis, .. }
             | Self::NoRoomToStop { axis, .. } => Some(axis),
             Self::NoPoint | Self::Count { .. } | Self::Time { .. } | Self::TimeOrder { .. } => None,
@@ -205,6 +214,9 @@ impl TrajectoryError {
             ),
             Self::Limit { broken, time_s, value, limit, .. } => {
                 format!("{broken} {value:.6} at {time_s:.6} s is beyond the limit of {limit:.6}")
+            }
+            Self::Unreachable { .. } => {
+                "it cannot be reached from the present motion within the limits".to_owned()
             }
             Self::EndAcceleration { acceleration, .. } => {
                 format!("the last point has the acceleration {acceleration}; it must have none")

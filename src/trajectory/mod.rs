@@ -24,6 +24,7 @@ mod check;
 mod error;
 mod extrema;
 mod interpolation;
+mod passing;
 mod point;
 #[cfg(test)]
 mod tests;
@@ -58,14 +59,14 @@ pub struct TrajectoryConditions<'a> {
 }
 
 /// The way of every axis from point to point. It goes on behind the last one at the velocity there.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 struct Path {
     axes: usize,
     times_s: Vec<f64>,
     /// For each point a polynomial of each axis.
     polynomials: Vec<Polynomial>,
-    /// The place of the first point that was given: 1 where the path begins before it, where the axes are.
-    first: usize,
+    /// For each of them the point, of those that were given, to which it leads.
+    points: Vec<usize>,
 }
 
 /// A trajectory that keeps every limit.
@@ -126,7 +127,7 @@ impl Trajectory {
             .zip(conditions.limits)
             .map(|((points, start), limits)| polynomials(&knot_times, points, start, limits))
             .collect();
-        let path = Path::new(knot_times, &of_axes, first);
+        let path = Path::new(&knot_times, &of_axes, first);
         path.check(conditions.limits)?;
         for (axis, (points, limits)) in columns.iter().zip(conditions.limits).enumerate() {
             check_end(axis, points, limits, conditions.period_s)?;
@@ -178,14 +179,27 @@ impl Trajectory {
 }
 
 impl Path {
-    /// A path of these axes. Behind the last point it goes on as it is there.
-    fn new(times_s: Vec<f64>, of_axes: &[(Vec<Polynomial>, Polynomial)], first: usize) -> Self {
-        let axes = of_axes.len();
-        let mut polynomials = Vec::with_capacity(times_s.len() * axes);
-        for point in 0..times_s.len() {
-            polynomials.extend(of_axes.iter().map(|(ways, end)| ways.get(point).unwrap_or(end)));
+    /// A path of these axes. Behind the last point it goes on as it is there. `first` is the place of the first point that was given:
+    /// 1 where the path begins before it, where the axes are.
+    fn new(times_s: &[f64], of_axes: &[(Vec<Polynomial>, Polynomial)], first: usize) -> Self {
+        let mut path = Self { axes: of_axes.len(), ..Self::default() };
+        for (index, time_s) in times_s.iter().enumerate() {
+            let polynomials = of_axes.iter().map(|(ways, end)| *ways.get(index).unwrap_or(end));
+            path.push(*time_s, (index + 1).min(times_s.len() - 1) - first, polynomials);
         }
-        Self { axes, times_s, polynomials, first }
+        path
+    }
+
+    /// Goes on from this time on along these polynomials, to this one of the points that were given.
+    fn push(&mut self, from_s: f64, point: usize, polynomials: impl Iterator<Item = Polynomial>) {
+        self.times_s.push(from_s);
+        self.points.push(point);
+        self.polynomials.extend(polynomials);
+    }
+
+    /// The point, of those that were given, to which a polynomial leads.
+    fn point(&self, index: usize) -> usize {
+        self.points.get(index).copied().unwrap_or(0)
     }
 
     fn duration_s(&self) -> f64 {
@@ -199,7 +213,7 @@ impl Path {
             for (axis, (polynomial, limits)) in polynomials.zip(limits).enumerate() {
                 if let Some(found) = check::violation(polynomial, times_s[1] - times_s[0], limits) {
                     let check::Violation { broken, time_s, value, limit } = found;
-                    let point = index + 1 - self.first;
+                    let point = self.point(index);
                     let time_s = times_s[0] + time_s;
                     return Err(TrajectoryError::Limit { point, axis, broken, time_s, value, limit });
                 }

@@ -184,9 +184,9 @@ fn duration_s(law: &[TimeLawPhase], end_s: f64) -> f64 {
 impl Path {
     /// Checks what is left of the path at a constant rate, by its exact extrema.
     fn check_rate(&self, from_s: f64, rate: f64, limits: &[AxisLimits]) -> Result<(), RateError> {
-        for (point, times_s) in self.times_s.windows(2).enumerate().filter(|(_, times_s)| times_s[1] > from_s)
+        for (index, times_s) in self.times_s.windows(2).enumerate().filter(|(_, times_s)| times_s[1] > from_s)
         {
-            let polynomials = self.polynomials.iter().skip(point * self.axes);
+            let polynomials = self.polynomials.iter().skip(index * self.axes);
             for (axis, (polynomial, limits)) in polynomials.zip(limits).enumerate() {
                 let mut factor = 1.0 / rate;
                 let scaled = polynomial.0.map(|coefficient| {
@@ -197,7 +197,7 @@ impl Path {
                 if let Some(found) = check::violation(&Polynomial(scaled), duration_s, limits) {
                     return Err(RateError::Limit {
                         rate,
-                        point: point + 1 - self.first,
+                        point: self.point(index),
                         axis,
                         broken: found.broken,
                     });

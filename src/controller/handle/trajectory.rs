@@ -90,11 +90,12 @@ impl Handle {
         self.only_group()?.execute_with(make)
     }
 
-    /// Starts a trajectory from where the axes hold through waypoints, without stopping, to rest at the last one: as fast as a spline
-    /// through them can be within all limits. Each waypoint has a position (rad or m) for each axis. See [`Trajectory::through`].
+    /// Starts a trajectory through waypoints, without stopping, to rest at the last one, in nearly the shortest time that the limits
+    /// allow. Each waypoint has a position (rad or m) for each axis. It begins where the axes hold, or takes the place of a trajectory
+    /// under way as [`Handle::execute`] does. See [`Trajectory::through`].
     ///
     /// # Errors
-    /// As [`Handle::execute`], and [`CommandError::Trajectory`] in motion.
+    /// As [`Handle::execute`].
     pub fn move_through(&self, waypoints: &[Vec<f64>]) -> Result<MotionId, CommandError> {
         self.only_group()?.move_through(waypoints)
     }
