@@ -27,9 +27,6 @@ impl Axis {
         self.command.set(self.parameters.law.target_slot(), raw);
         let mode_bits = if is_enabled { self.mode_bits() } else { 0 };
         self.command.set(CommandSlot::Controlword, (word | mode_bits).into());
-        if !self.parameters.mode_changes.laws.is_empty() {
-            self.command_other_modes(is_enabled);
-        }
     }
 
     /// The target in drive units, and the torque that is commanded with it.
@@ -64,6 +61,7 @@ impl Axis {
     }
 
     /// What the loops that are closed here compare in this cycle.
+    #[inline]
     pub(super) fn loop_input(&self) -> LoopInput {
         LoopInput {
             set: self.set_points.sent_now(),

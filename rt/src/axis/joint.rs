@@ -37,6 +37,7 @@ pub(super) struct JointEstimate {
 impl JointEstimate {
     /// Takes the position that a report gives in counts, and the velocity if it gives one. Where the joint cannot be it is
     /// not taken to be. Returns whether the position has become known by this.
+    #[inline]
     pub(super) fn take_report(
         &mut self,
         counts: i32,

@@ -95,9 +95,10 @@ impl Axis {
         self.command.set(CommandSlot::OperationMode, self.parameters.law.operation_mode() as i32);
     }
 
-    /// Writes the targets of the modes that the axis is not in, as far as its law is concerned.
+    /// Writes the targets of the modes that the axis is not in, beside the command of its own law. Comes after [`Axis::command`].
     #[inline(never)]
-    pub(super) fn command_other_modes(&mut self, is_enabled: bool) {
+    pub fn command_other_modes(&mut self) {
+        let is_enabled = self.is_enabled();
         let Self { parameters, command, .. } = self;
         // Of a drive that is not enabled it follows the joint within the limits, as in CSP.
         let position = parameters.scale.position_to_counts(self.set_points.sent_now().position);

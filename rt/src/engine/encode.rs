@@ -144,6 +144,9 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
             let Some(axis) = own_place.and_then(|place| self.axes.get_mut(place)) else { continue };
             let reset_word = reset_word.filter(|_| axis.drive_state().is_faulted());
             axis.command(self.group.goal_of(axis, self.shared), reset_word);
+            if self.group.has_other_modes {
+                axis.command_other_modes();
+            }
             for frame in axis.frames() {
                 self.shared.dropped += u64::from(batch.try_push(frame).is_err());
             }

@@ -26,6 +26,8 @@ pub(super) struct Group<const AXES: usize, const BUSES: usize> {
     pub(super) places: Range<usize>,
     /// The buses that concern it.
     pub(super) buses: BusSet,
+    /// Whether the mode of any of its axes may be changed.
+    pub(super) has_other_modes: bool,
     pub(super) state: GroupState<AXES>,
     /// What its stream wants in this slot, while it streams.
     pub(super) stream: StreamSample<AXES>,
@@ -60,6 +62,7 @@ impl<const AXES: usize, const BUSES: usize> Group<AXES, BUSES> {
             stops_with: ArrayVec::new(),
             places,
             buses,
+            has_other_modes: false,
             state: GroupState::Passive,
             stream: StreamSample::default(),
             state_cycles: 0,

@@ -241,7 +241,10 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         for (number, axes) in (0..).zip(parameters.axes_of_groups()) {
             let places = first..first + axes.len();
             first = places.end;
-            groups.push(Group::new(number, places, parameters.buses_of(&axes)));
+            let mut group = Group::new(number, places, parameters.buses_of(&axes));
+            let mut own = axes.iter().filter_map(|axis| parameters.axes.get(usize::from(*axis)));
+            group.has_other_modes = own.any(|axis| !axis.mode_changes.laws.is_empty());
+            groups.push(group);
         }
         for (group, own) in groups.iter_mut().zip(&parameters.groups) {
             group.stops_with = own.stops_with.clone();
