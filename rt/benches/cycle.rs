@@ -25,6 +25,10 @@ fn cycle(criterion: &mut Criterion) {
             let mut thinking = Thinking::streaming(axes);
             bencher.iter(|| black_box(thinking.cycle()));
         });
+        group.bench_function(BenchmarkId::new("on a trajectory", axes), |bencher| {
+            let mut thinking = Thinking::executing(axes);
+            bencher.iter(|| black_box(thinking.cycle()));
+        });
         group.bench_function(BenchmarkId::new("led by a callback", axes), |bencher| {
             let mut thinking = Thinking::in_loop(axes);
             bencher.iter(|| black_box(thinking.cycle()));

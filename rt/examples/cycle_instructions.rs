@@ -1,8 +1,8 @@
 //! Runs a fixed number of cycles of the engine, or packs and unpacks PDOs, for counting instructions; see
 //! `benches/instructions`.
 //!
-//! The first argument names the work: `cycle-AXES`, `replan-AXES`, `stream-AXES`, `callback-AXES`, `pack` or `unpack`. The second one says how often
-//! it is repeated. The difference between two repetition counts does not contain the start-up.
+//! The first argument names the work: `cycle-AXES`, `replan-AXES`, `stream-AXES`, `trajectory-AXES`,
+//! `callback-AXES`, `pack` or `unpack`. The second one says how often it is repeated. The difference between two repetition counts does not contain the start-up.
 
 use std::hint::black_box;
 
@@ -24,6 +24,7 @@ fn main() {
     match name {
         "cycle" | "replan" => cycles(axes, name == "replan", repetitions),
         "stream" => led_cycles(Thinking::streaming(axes), repetitions),
+        "trajectory" => led_cycles(Thinking::executing(axes), repetitions),
         "callback" => led_cycles(Thinking::in_loop(axes), repetitions),
         "pack" => pack(repetitions),
         "unpack" => unpack(repetitions),
@@ -33,7 +34,7 @@ fn main() {
 
 fn usage() -> ! {
     eprintln!(
-        "usage: cycle_instructions cycle-AXES|replan-AXES|stream-AXES|callback-AXES|pack|unpack REPETITIONS"
+        "usage: cycle_instructions cycle-AXES|replan-AXES|stream-AXES|trajectory-AXES|callback-AXES|pack|unpack REPETITIONS"
     );
     std::process::exit(2);
 }

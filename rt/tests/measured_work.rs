@@ -52,3 +52,14 @@ fn the_group_that_a_callback_leads_is_led_for_as_long_as_it_is_measured() {
         }
     }
 }
+
+#[test]
+fn the_group_on_a_trajectory_is_on_one_for_as_long_as_it_is_measured() {
+    for axes in [1, 6, 32] {
+        let mut thinking = Thinking::executing(axes);
+        for cycle in 0..10_000 {
+            thinking.cycle();
+            assert!(thinking.is_moving(), "{axes} axes, in cycle {cycle}");
+        }
+    }
+}
