@@ -10,9 +10,9 @@ use takt_rt::OperationMode::{
     CyclicSynchronousPosition as CSP, CyclicSynchronousTorque as CST, CyclicSynchronousVelocity as CSV,
 };
 use takt_rt::{
-    ControlLaw, DriveState, Fault, Frame, Id, MAX_AXES, MappedObject, ModeChange, ModeChanges, ModeCondition,
-    MotionState, OperationMode, Phase, RejectReason, Request, RequestId, RequestKind, Rule, StopCategory,
-    StopCause,
+    ControlLaw, DriveState, Fault, FeedForward, Frame, Id, MAX_AXES, MappedObject, Mapping, ModeChange,
+    ModeChanges, ModeCondition, MotionState, OperationMode, Phase, RejectReason, Request, RequestId,
+    RequestKind, Rule, StopCategory, StopCause,
 };
 
 const PERIOD_S: f64 = PERIOD_NS as f64 * 1e-9;
@@ -165,6 +165,47 @@ fn the_torque_begins_at_what_the_drive_has_reported_and_a_stream_takes_it_over_a
     }
     let (_, _, _, raw) = commanded(&rig);
     assert!((f64::from(raw) - 387.0).abs() < 40.0, "{raw}");
+}
+
+#[test]
+fn the_torque_that_holds_the_load_goes_over_into_the_offset_of_csp_and_back() {
+    let mut parameters = parameters(1);
+    let laws = ArrayVec::from([VELOCITY, TORQUE]);
+    let modes = ModeChanges { laws, condition: ModeCondition::AtRest, timeout_cycles: TIMEOUT_CYCLES };
+    let mut axis = changeable_axis(ControlLaw::Position, modes, 0, 1);
+    let objects =
+        [(0x60FF, 32), (0x6071, 16), (0x60B2, 16)].map(|(index, bits)| MappedObject::new(index, 0, bits));
+    axis.commands[1].pdo.mapping = Mapping::commands(&objects).unwrap();
+    axis.feed_forward = FeedForward::Torque;
+    parameters.axes[0] = axis;
+    let mut rig = Rig::of(parameters);
+    rig.drive(0).modes = TakenModes { while_enabled: true, after_cycles: Some(3) };
+    rig.drive(0).load = GRAVITY;
+    let mut rig = rig.enable();
+    rig.run(20);
+    let place = rig.drive(0).position;
+    let torques = |rig: &Rig| {
+        let sent = rig.buses[0].sent.iter().rfind(|sent| sent.1.id() == Id::canopen(0x300, 1)).unwrap();
+        let [.., t0, t1, o0, o1] = sent.1.first_word().to_le_bytes();
+        [[t0, t1], [o0, o1]].map(|bytes| f64::from(i16::from_le_bytes(bytes)) * 0.031)
+    };
+    let holds = |torque: f64| (torque + GRAVITY).abs() < 1.2;
+    change(&mut rig, CST);
+    for mode in [CSP, CST, CSP] {
+        let request = ask(&mut rig, mode);
+        while result(&rig, request) == Some(MotionState::InProgress) {
+            let [target, offset] = torques(&rig);
+            assert!(holds(target + offset), "on the way to {mode:?}: {target} {offset}");
+            rig.run(1);
+        }
+        rig.run(100);
+        let [target, offset] = torques(&rig);
+        let (held_by, other) = if mode == CSP { (offset, target) } else { (target, offset) };
+        assert!(holds(held_by) && other == 0.0, "{mode:?}: {target} {offset}");
+        let moved = rig.drive(0).position - place;
+        assert!(moved.abs() <= 10, "{mode:?}: {moved} counts");
+    }
+    assert_eq!(rig.stops(), vec![]);
 }
 
 #[test]

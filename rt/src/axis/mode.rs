@@ -39,7 +39,7 @@ impl Axis {
         laws.into_iter().find(|law| law.operation_mode() == mode)
     }
 
-    /// Whether the process data of the drive carry a number in every cycle.
+    /// Whether the process data of the drive carry a number to it.
     pub fn sends(&self, slot: CommandSlot) -> bool {
         self.parameters.commands.iter().any(|command| command.pdo.mapping.sends(slot))
     }
