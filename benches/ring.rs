@@ -80,6 +80,8 @@ fn logger(criterion: &mut Criterion) {
         let axis = |index| AxisDescription {
             name: format!("joint{index}"),
             bus: None,
+            group: 0,
+            family: None,
             unit: Unit::Radian,
             plans_own_profile: false,
             counts_per_unit: 83_443.0,

@@ -5,8 +5,10 @@ use takt::canopen::lss::{
     BitTiming, Inquiry, LssAddress, LssBusy, LssError, LssMaster, LssMode, LssOutcome, LssResult, LssTask,
     LssTiming,
 };
-use takt::sim::lss::LssDevice;
-use takt_rt::Frame;
+use takt::commission::layer_settings::{ImplausibleIdentity, LayerSettingFailure, LayerSettings};
+use takt::controller::VirtualClock;
+use takt::sim::lss::{LssBus, LssDevice, LssStack};
+use takt_rt::{BusHealth, BusPort, Frame, Nanoseconds, ReceiveBatch};
 
 const MILLISECOND_NS: u64 = 1_000_000;
 
@@ -163,6 +165,109 @@ fn an_identity_assembled_from_lost_replies_is_rejected() {
     assert_eq!(outcome, Err(LssError::ScanLost));
 }
 
+/// The identities that a scan finds, each one after the last.
+fn found_in_turn(bus: &mut Bus) -> Vec<LssAddress> {
+    let mut found: Vec<LssAddress> = vec![];
+    loop {
+        let task = found.last().map_or(LssTask::FastScan([None; 4]), |last| LssTask::FastScanAfter(*last));
+        match bus.run(task).unwrap() {
+            LssOutcome::Device(address) => found.push(address),
+            _ => return found,
+        }
+        assert_eq!(bus.run(LssTask::SwitchGlobal(LssMode::Waiting)), Ok(LssOutcome::Done));
+    }
+}
+
+#[test]
+fn a_found_device_is_excluded_by_its_identity_though_it_gets_no_node_id() {
+    for stack in [LssStack::Standard, LssStack::CanOpenNode] {
+        let mut bus = unconfigured(&[7, 8, 0xFFFF_FFFF]);
+        bus.devices.push(LssDevice::new(LssAddress { vendor: 0xFFFF_FFFF, ..address(0) }, None));
+        bus.devices.push(LssDevice::new(LssAddress { revision: 0x101, ..address(0) }, None));
+        for device in &mut bus.devices {
+            device.stack = stack;
+        }
+        let serials: Vec<_> = found_in_turn(&mut bus)
+            .iter()
+            .map(|found| (found.vendor, found.revision, found.serial))
+            .collect();
+        let expected = [(0x331, 0x100, 7), (0x331, 0x100, 8), (0x331, 0x100, 0xFFFF_FFFF), (0x331, 0x101, 0)];
+        assert_eq!(serials[..4], expected, "{stack:?}");
+        assert_eq!(serials[4..], [(0xFFFF_FFFF, 0x100, 0)], "{stack:?}");
+        assert!(bus.boot_ups.is_empty());
+    }
+}
+
+#[test]
+fn a_canopennode_device_in_configuration_state_replies_to_every_scan_request() {
+    let mut bus = unconfigured(&[7]);
+    bus.devices[0].stack = LssStack::CanOpenNode;
+    assert_eq!(bus.run(LssTask::FastScan([None; 4])), Ok(LssOutcome::Device(address(7))));
+    let phantom = LssAddress::default();
+    assert_eq!(bus.run(LssTask::FastScan([None; 4])), Ok(LssOutcome::Device(phantom)));
+}
+
+/// Runs this on simulated devices.
+fn with_settings<P: BusPort, T>(
+    port: &mut P,
+    work: impl FnOnce(&mut LayerSettings<'_, P, VirtualClock>) -> T,
+) -> T {
+    let mut clock = VirtualClock::default();
+    let (mut is_interrupted, mut see) = (|| false, |_, _| {});
+    work(&mut LayerSettings::new(port, &mut clock, &mut is_interrupted, &mut see))
+}
+
+#[test]
+fn a_node_id_that_two_devices_took_is_taken_back() {
+    let mut bus = LssBus::new([1, 2].map(|serial| LssDevice::new(address(serial), None)));
+    let outcome = with_settings(&mut bus, |settings| {
+        settings.perform(LssTask::SwitchGlobal(LssMode::Configuration)).unwrap();
+        let outcome = settings.configure_node(5, None);
+        settings.release(None).unwrap();
+        outcome
+    });
+    assert_eq!(outcome, Err(LayerSettingFailure::SeveralDevices { replies: 2, is_undone: true }));
+    assert!(bus.devices().iter().all(|device| device.node().is_none()));
+}
+
+/// A bus on which the command to leave configuration state is lost.
+struct Stuck(LssBus);
+
+impl BusPort for Stuck {
+    fn send(&mut self, now_ns: Nanoseconds, frames: &[Frame]) -> usize {
+        let kept: Vec<Frame> =
+            frames.iter().filter(|frame| frame.payload()[..2] != [4, 0]).copied().collect();
+        self.0.send(now_ns, &kept);
+        frames.len()
+    }
+
+    fn receive(&mut self, now_ns: Nanoseconds, batch: &mut ReceiveBatch) {
+        self.0.receive(now_ns, batch);
+    }
+
+    fn unconfirmed(&mut self, now_ns: Nanoseconds) -> usize {
+        self.0.unconfirmed(now_ns)
+    }
+
+    fn health(&mut self) -> BusHealth {
+        self.0.health()
+    }
+}
+
+#[test]
+fn a_device_that_stays_in_configuration_state_is_not_found_twice() {
+    let mut device = LssDevice::new(address(7), None);
+    device.stack = LssStack::CanOpenNode;
+    let mut bus = Stuck(LssBus::new([device]));
+    with_settings(&mut bus, |settings| {
+        assert_eq!(settings.scan(None), Ok(Some(address(7))));
+        let repeated = LayerSettingFailure::Implausible(ImplausibleIdentity::Repeated);
+        assert_eq!(settings.scan(Some(address(7))), Err(repeated));
+        let unconfirmed = LayerSettingFailure::Implausible(ImplausibleIdentity::Unconfirmed);
+        assert_eq!(settings.scan(Some(address(8))), Err(unconfirmed));
+    });
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(40))]
     #[test]
@@ -175,5 +280,20 @@ proptest! {
         prop_assert_eq!(bus.run(LssTask::FastScan([None; 4])), Ok(LssOutcome::Device(lowest)));
         let obeying = bus.devices.iter().filter(|device| device.mode() == LssMode::Configuration).count();
         prop_assert_eq!(obeying, 1);
+    }
+
+    #[test]
+    fn scans_after_each_found_device_find_all_of_any_identities_in_order(
+        identities in prop::collection::btree_set(any::<[u32; 4]>(), 1..5),
+        is_canopen_node: bool,
+    ) {
+        let devices = identities.iter().map(|values| {
+            let mut device = LssDevice::new(LssAddress::from_values(*values), None);
+            device.stack = if is_canopen_node { LssStack::CanOpenNode } else { LssStack::Standard };
+            device
+        });
+        let mut bus = Bus::new(devices);
+        let expected: Vec<_> = identities.iter().copied().map(LssAddress::from_values).collect();
+        prop_assert_eq!(found_in_turn(&mut bus), expected);
     }
 }

@@ -3,7 +3,10 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use takt::config::{Config, Control, Feedback, Interface, OverrideError, ProblemKind, ProgramTarget, Travel};
+use takt::config::{
+    Config, Control, Feedback, Interface, OverrideError, PowerUpState, ProblemKind, ProgramTarget, Travel,
+};
+use takt::sim::yz_aim::YzAimParameters;
 
 /// The configurations that come with takt; other folders in there hold other things.
 fn configs() -> Vec<PathBuf> {
@@ -78,12 +81,12 @@ fn the_arm_is_the_one_of_the_field_notes() {
 #[test]
 fn the_joints_of_the_arm_have_the_torque_for_their_acceleration_and_speed() {
     for axis in load(&config("arm6-erob.toml")).axes {
-        let (joint, limits) = (axis.simulated, axis.limits);
-        let needed = joint.inertia * limits.acceleration
-            + joint.viscous_friction * limits.velocity
-            + joint.coulomb_friction;
-        assert!(needed <= joint.rated_torque, "{} needs {needed} N·m", axis.name);
-        assert!(joint.peak_torque >= limits.torque, "{}", axis.name);
+        let (joint, limits) = (axis.joint, axis.limits);
+        let needed = joint.inertia() * limits.acceleration
+            + joint.viscous_friction() * limits.velocity
+            + joint.coulomb_friction();
+        assert!(needed <= axis.rated_torque(), "{} needs {needed} N·m", axis.name);
+        assert!(axis.simulated.peak_torque >= limits.torque, "{}", axis.name);
     }
 }
 
@@ -203,7 +206,7 @@ fn an_axis_overrides_the_defaults_key_by_key() {
 #[test]
 fn the_gains_of_the_torque_loop_follow_from_inertia_and_bandwidth() {
     let torque_loop = "[axis.torque_loop]\nbandwidth = 10\ninertia = 2\nviscous_friction = 3\n";
-    let joint = "[axis.simulated]\ninertia = 7\ncoulomb_friction = \"300 mNm\"\n";
+    let joint = "[axis.joint]\ninertia = 7\ncoulomb_friction = \"300 mNm\"\n";
     assert_eq!(with(&format!("{torque_loop}{joint}")).axes[0].control, Control::Position);
     assert_eq!(
         with(&format!("mode = \"cst\"\n{torque_loop}{joint}")).axes[0].control,
@@ -336,4 +339,33 @@ fn a_drive_whose_process_data_are_fixed_takes_nothing_beside_its_target() {
     let text = SMALL.replace("erob-canopen", "yz-aim") + "\nfeed_forward = \"torque\"\n";
     let error = format!("{:?}", Config::parse("small.toml", &text).unwrap_err().problems());
     assert!(error.contains("axis.feed_forward"), "{error}");
+}
+
+#[test]
+fn an_axis_in_cst_on_a_real_bus_must_give_the_mechanics_of_its_joint() {
+    let joint = "[axis.joint]\ninertia = 7\nviscous_friction = 0\ncoulomb_friction = \"300 mNm\"\n";
+    let mut given = with(&format!("mode = \"cst\"\n{joint}"));
+    let mut lacking = with(&format!("mode = \"cst\"\n{}", joint.replace("inertia = 7\n", "")));
+    for config in [&mut given, &mut lacking] {
+        assert!(config.validate().is_ok());
+        config.buses[0].interface = Interface::SocketCan("can0".to_owned());
+    }
+    assert!(given.validate().is_ok(), "{:?}", given.validate());
+    let error = lacking.validate().unwrap_err().to_string();
+    assert!(error.contains("joint.inertia` is missing"), "{error}");
+    lacking.axes[0].control = Control::Position;
+    assert!(lacking.validate().is_ok());
+}
+
+#[test]
+fn a_simulated_yz_aim_may_power_up_operational() {
+    let text = fs::read_to_string(config("gantry-yz-aim.toml")).unwrap();
+    let operational = "[defaults.axis.simulated]\npower_up = \"operational\"\n\n[defaults.axis.joint]";
+    let gantry = parse(&text.replace("[defaults.axis.joint]", operational));
+    for axis in &gantry.axes {
+        assert_eq!(axis.simulated.power_up, PowerUpState::Operational);
+        let unit = YzAimParameters::of(axis, 1_000_000, &gantry.simulation);
+        assert!(unit.starts_operational);
+    }
+    assert_eq!(parse(&text).axes[0].simulated.power_up, PowerUpState::PreOperational);
 }

@@ -308,3 +308,60 @@ fn groups_are_shown_with_their_axes_and_whose_stops_stop_them() {
         (&"gripper".into(), &serde_json::json!(["arm"]))
     );
 }
+
+/// The warnings about the arm with a change.
+fn warnings(change: impl Fn(String) -> String) -> Vec<String> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("changed.toml");
+    let arm = std::fs::read_to_string(configs().join("arm6-erob.toml")).unwrap();
+    std::fs::write(&path, change(arm)).unwrap();
+    let output = check(&path, &["--json"]);
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    let words = json(&output)["warnings"].as_array().unwrap().clone();
+    let words: Vec<String> = words.iter().map(|word| word.as_str().unwrap().to_owned()).collect();
+    let text = standard_output(&check(&path, &[]));
+    assert!(words.iter().all(|warning| text.contains(warning)), "{text}");
+    words
+}
+
+#[test]
+fn a_gear_ratio_of_the_gear_inside_an_erob_is_warned_about() {
+    let geared = |ratio: &str| {
+        let line = format!("drive = \"erob-canopen\"\ngear_ratio = {ratio}");
+        move |arm: String| arm.replacen("drive = \"erob-canopen\"", &line, 1)
+    };
+    let fast = warnings(geared("100"));
+    assert!(!fast.is_empty());
+    assert!(fast[0].contains("times a second") && fast[0].contains("`gear_ratio = 100`"), "{fast:?}");
+    assert!(fast[0].contains("the drive counts turns of its output"), "{fast:?}");
+    let slow = warnings(geared("50"));
+    assert!(slow[0].contains("leave `gear_ratio` at 1"), "{slow:?}");
+}
+
+#[test]
+fn limits_that_look_like_degrees_are_warned_about() {
+    let changed = |find: &'static str, with: &'static str| move |arm: String| arm.replacen(find, with, 1);
+    let limits = "position = [-2.9671, 2.9671]";
+    let range = warnings(changed(limits, "position = [-90, 90]"));
+    assert_eq!(range.len(), 1, "{range:?}");
+    assert!(range[0].contains("range of 28.6479 turns"), "{range:?}");
+    assert!(range[0].contains("[\"-90 deg\", \"90 deg\"]"), "{range:?}");
+    let turns = warnings(changed(limits, "position = [-7.5, 7.5]"));
+    assert!(turns[0].contains("range of 2.38732 turns: check its unit"), "{turns:?}");
+    let fast = "velocity = 30, acceleration = 100";
+    let velocity = warnings(changed("velocity = \"2.3925 rad/s\", acceleration = \"8 rad/s^2\"", fast));
+    assert!(velocity[0].contains("write \"30 deg/s\""), "{velocity:?}");
+}
+
+#[test]
+fn no_configuration_that_comes_with_takt_is_warned_about() {
+    for file in std::fs::read_dir(configs()).unwrap() {
+        let path = file.unwrap().path();
+        if path.extension().is_none_or(|extension| extension != "toml") {
+            continue;
+        }
+        let Ok(config) = takt::config::Config::load(&path) else { continue };
+        let words: Vec<String> = config.warnings().iter().map(ToString::to_string).collect();
+        assert_eq!(words, Vec::<String>::new(), "{}", path.display());
+    }
+}

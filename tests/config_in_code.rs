@@ -211,17 +211,17 @@ const CASES: &[Case] = &[
     ),
     (
         "inertia",
-        |c| axis(c).simulated.inertia = f64::NAN,
-        &[AXIS, "`axis.simulated.inertia` cannot be NaN kg m^2"],
+        |c| axis(c).joint.inertia = Some(f64::NAN),
+        &[AXIS, "`axis.joint.inertia` cannot be NaN kg m^2"],
     ),
-    ("friction", |c| axis(c).simulated.viscous_friction = -1.0, &[AXIS, "`axis.simulated.viscous_friction`"]),
+    ("friction", |c| axis(c).joint.viscous_friction = Some(-1.0), &[AXIS, "`axis.joint.viscous_friction`"]),
     (
         "friction",
-        |c| axis(c).simulated.coulomb_friction = f64::NAN,
-        &[AXIS, "`axis.simulated.coulomb_friction`"],
+        |c| axis(c).joint.coulomb_friction = Some(f64::NAN),
+        &[AXIS, "`axis.joint.coulomb_friction`"],
     ),
     ("gravity", |c| axis(c).simulated.gravity = -1.0, &[AXIS, "`axis.simulated.gravity`"]),
-    ("rated torque", |c| axis(c).simulated.rated_torque = 0.0, &[AXIS, "`axis.simulated.rated_torque`"]),
+    ("rated torque", |c| axis(c).joint.rated_torque = Some(0.0), &[AXIS, "`axis.joint.rated_torque`"]),
     ("peak torque", |c| axis(c).simulated.peak_torque = f64::NAN, &[AXIS, "`axis.simulated.peak_torque`"]),
     ("beginning", |c| axis(c).simulated.initial_position = 9.0, &[AXIS, "cannot begin at 9 rad"]),
     (
@@ -229,7 +229,7 @@ const CASES: &[Case] = &[
         |c| axis(c).simulated.initial_position = f64::NAN,
         &[AXIS, "`axis.simulated.initial_position`"],
     ),
-    ("power-up", |c| axis(c).simulated.power_up_ns = u64::MAX, &[AXIS, "`axis.simulated.power_up`"]),
+    ("power-up", |c| axis(c).power_up_ns = u64::MAX, &[AXIS, "`axis.power_up`"]),
     ("no repeat", |c| c.program.repeat = 0, &["`program.repeat` cannot be 0"]),
     (
         "targets",
@@ -310,7 +310,7 @@ fn a_file_and_a_field_with_the_same_value_are_refused_in_the_same_words() {
         ("[master]\nheartbeat_timeout = \"50 ms\"\n", |c| c.master.heartbeat_timeout_ns = 50_000_000),
         ("[telemetry]\nring_records = 1\n", |c| c.telemetry.ring_records = 1),
         ("[simulation]\nlongest_gap = \"61 s\"\n", |c| c.simulation.longest_gap_ns = 61_000_000_000),
-        ("[defaults.axis.simulated]\ninertia = 1e30\n", |c| c.axes[0].simulated.inertia = 1e30),
+        ("[defaults.axis.joint]\ninertia = 1e30\n", |c| c.axes[0].joint.inertia = Some(1e30)),
         ("[defaults.axis.following_error]\nlimit = 0\n", |c| c.axes[0].following_error.limit = 0.0),
         ("[defaults.axis]\ntransmission_type = 250\n", |c| c.axes[0].transmission_type = 250),
     ];

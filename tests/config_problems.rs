@@ -64,8 +64,10 @@ damping = "20 Nm s/rad"
 [axis.identity]
 vendor = 0x5A65726F
 
-[axis.simulated]
+[axis.joint]
 inertia = "1 kg m^2"
+
+[axis.simulated]
 initial_position = "10 deg"
 
 [[axis]]
@@ -135,6 +137,10 @@ cases! {
         "node = 127" => "id = 127", at "id = 127": UnknownKey { nearest: None, known, .. } if known.contains(&"node"),
         "interface = \"sim\"" => "iface = \"sim\"", at "iface": UnknownKey { nearest: Some("interface"), .. },
         "mode = \"csp\"" => "Mode = \"csp\"", at "Mode": UnknownKey { nearest: Some("mode"), .. },
+        "initial_position" => "coulomb_friction = 1\ninitial_position", at "coulomb_friction":
+            Replaced { by: "it in [axis.joint]: real drives obey it too", .. },
+        "initial_position" => "power_up = \"1 s\"\ninitial_position", at "\"1 s\"": Replaced { .. },
+        "initial_position" => "power_up = \"operational\"\ninitial_position", at "\"operational\"": OutOfRange { .. },
         "inertia = \"1 kg" => "inertias = \"1 kg", at "inertias": UnknownKey { nearest: Some("inertia"), .. },
         "dwell" => "dwel", at "dwel =": UnknownKey { key, nearest: Some("dwell"), .. } if key == "program.move.dwel",
         "seed" => "sead", at "sead": UnknownKey { nearest: Some("seed"), .. },
@@ -451,12 +457,12 @@ Error:
 
 Error: 
   × the node ID 1 is already taken on the bus "left"
-    ╭─[machine.toml:66:8]
- 65 │ bus = "left"
- 66 │ node = 1
+    ╭─[machine.toml:68:8]
+ 67 │ bus = "left"
+ 68 │ node = 1
     ·        ┬
     ·        ╰── again; first in line 33
- 67 │ limits = { position = [-1, 1], velocity = 1.0, acceleration = 5, torque = 20 }
+ 69 │ limits = { position = [-1, 1], velocity = 1.0, acceleration = 5, torque = 20 }
     ╰────
   help: give each node of a bus a node ID of its own, 1 to 127; on every bus, [master] node is the
         ID of the controller

@@ -31,7 +31,7 @@ fn run_and_measure(config: &Config) -> Vec<f64> {
     let outcome = run.run(CYCLES_AT_MOST, |run| {
         let snapshot = run.snapshot();
         let targets: Option<Vec<f64>> = run.supervisor().targets().into_iter().collect();
-        if let (Phase::Holding, Some(target)) = (snapshot.phase, targets) {
+        if let (Phase::Holding, Some(target)) = (snapshot.groups[0].phase, targets) {
             errors = target
                 .iter()
                 .zip(&snapshot.axes)
@@ -67,7 +67,7 @@ fn the_same_program_runs_in_cyclic_synchronous_torque() {
     let errors = run_and_measure(&config);
     for (error, axis) in errors.iter().zip(&config.axes) {
         let Control::Torque { stiffness, .. } = axis.control else { panic!("{} is not in CST", axis.name) };
-        let bound = axis.simulated.coulomb_friction / stiffness * axis.counts_per_turn / TAU;
+        let bound = axis.joint.coulomb_friction() / stiffness * axis.counts_per_turn / TAU;
         assert!(error.abs() <= bound + 2.0, "{}: {error} counts, at most {bound} are friction", axis.name);
     }
 }
@@ -93,14 +93,14 @@ fn after_a_run_every_drive_is_disabled_and_at_rest() {
 fn ctrl_c_during_a_move_stops_in_control_and_disables() {
     let config = load("arm6-erob.toml");
     let mut run = start(&config);
-    while run.snapshot().phase != Phase::Moving {
+    while run.snapshot().groups[0].phase != Phase::Moving {
         assert!(run.step());
     }
     run.run(300, |_| {});
     run.interrupt(Interrupt::Controlled);
     let mut phases = vec![];
     let outcome = run.run(CYCLES_AT_MOST, |run| {
-        let phase = run.snapshot().phase;
+        let phase = run.snapshot().groups[0].phase;
         if phases.last() != Some(&phase) {
             phases.push(phase);
         }
@@ -117,7 +117,7 @@ fn a_second_ctrl_c_removes_the_power_and_the_run_ends_when_it_is_off() {
         let config = load(name);
         for first in [Some(Interrupt::Controlled), None] {
             let mut run = start(&config);
-            while run.snapshot().phase != Phase::Moving {
+            while run.snapshot().groups[0].phase != Phase::Moving {
                 assert!(run.step());
             }
             run.run(300, |_| {});
@@ -169,7 +169,8 @@ fn the_same_configuration_gives_the_same_run_bit_for_bit() {
     let mut config = load("arm6-erob.toml");
     config.program.moves.truncate(1);
     assert_eq!(fingerprint(&config), fingerprint(&config));
-    config.axes[0].simulated.coulomb_friction *= 1.001;
+    let joint = &mut config.axes[0].joint;
+    joint.coulomb_friction = joint.coulomb_friction.map(|friction| friction * 1.001);
     assert_ne!(
         fingerprint(&config),
         fingerprint(&load("arm6-erob.toml")),
@@ -186,7 +187,7 @@ fn after_an_hour_of_motion_the_axis_still_reaches_its_targets_exactly() {
     let mut holding = 0;
     let outcome = run.run(4_500_000, |run| {
         let snapshot = run.snapshot();
-        holding = if snapshot.phase == Phase::Holding { holding + 1 } else { 0 };
+        holding = if snapshot.groups[0].phase == Phase::Holding { holding + 1 } else { 0 };
         // The joint has settled a tenth of a second after each move.
         if let (100, [Some(target)]) = (holding, &run.supervisor().targets()[..]) {
             let counts = (snapshot.axes[0].position - target) * config.axes[0].counts_per_turn / TAU;
@@ -218,14 +219,14 @@ fn stalls_of_the_computer_are_counted_and_the_program_still_finishes() {
 /// Runs into a move, injects a fault, and runs on to the end.
 fn run_and_inject(config: &Config, inject: impl FnOnce(&mut SimulatedBus)) -> (Option<Outcome>, Vec<Phase>) {
     let mut run = start(config);
-    while run.snapshot().phase != Phase::Moving {
+    while run.snapshot().groups[0].phase != Phase::Moving {
         assert!(run.step());
     }
     run.run(300, |_| {});
     inject(&mut run.ports()[0]);
     let mut phases = vec![];
     let outcome = run.run(CYCLES_AT_MOST, |run| {
-        let phase = run.snapshot().phase;
+        let phase = run.snapshot().groups[0].phase;
         if phases.last() != Some(&phase) {
             phases.push(phase);
         }
@@ -292,7 +293,7 @@ fn after_the_controller_was_killed_the_drives_of_every_family_stop_by_themselves
     for name in ["arm6-erob.toml", "gantry-yz-aim.toml"] {
         let config = load(name);
         let mut run = start(&config);
-        while run.snapshot().phase != Phase::Moving {
+        while run.snapshot().groups[0].phase != Phase::Moving {
             assert!(run.step());
         }
         run.run(300, |_| {});
@@ -349,7 +350,7 @@ fn drives_of_a_killed_controller_are_brought_up_again() {
     ] {
         let config = load(name);
         let mut killed = start(&config);
-        while killed.snapshot().phase != Phase::Moving {
+        while killed.snapshot().groups[0].phase != Phase::Moving {
             assert!(killed.step());
         }
         killed.run(300, |_| {});
@@ -373,7 +374,7 @@ fn a_refused_request_of_another_client_does_not_end_the_program() {
     let config = load("arm6-erob.toml");
     let mut run = start(&config);
     let outcome = run.run(CYCLES_AT_MOST, |run| {
-        if run.snapshot().phase == Phase::Moving {
+        if run.snapshot().groups[0].phase == Phase::Moving {
             // Enabled axes cannot be enabled.
             let _ = run.host().request(Request::Enable);
         }
@@ -397,7 +398,7 @@ fn a_client_that_keeps_moving_the_group_does_not_prevent_the_end_of_the_run() {
     let config = load("arm6-erob.toml");
     let ports = (0..config.buses.len()).map(|bus| SimulatedBus::new(&config, bus)).collect();
     let mut run = VirtualRun::serving(&config, ports).unwrap().0;
-    while run.snapshot().phase != Phase::Holding {
+    while run.snapshot().groups[0].phase != Phase::Holding {
         assert!(run.step());
     }
     let here = run.snapshot().axes.map(|axis| axis.position_set);
@@ -423,11 +424,11 @@ fn a_group_that_a_client_moves_before_the_life_cycle_sees_it_hold_goes_on() {
     let config = load("arm6-erob.toml");
     let ports = (0..config.buses.len()).map(|bus| SimulatedBus::new(&config, bus)).collect();
     let mut run = VirtualRun::serving(&config, ports).unwrap().0;
-    while run.snapshot().phase != Phase::Enabling {
+    while run.snapshot().groups[0].phase != Phase::Enabling {
         assert!(run.step());
     }
     run.poll_life_cycle_every(50);
-    while run.snapshot().phase != Phase::Holding {
+    while run.snapshot().groups[0].phase != Phase::Holding {
         assert!(run.step());
     }
     let mut target = run.snapshot().axes.map(|axis| axis.position_set);
@@ -435,12 +436,12 @@ fn a_group_that_a_client_moves_before_the_life_cycle_sees_it_hold_goes_on() {
     let slow_move = move_to(target, 20.0);
     let motion = run.host().request(Request::Move(slow_move)).unwrap();
     run.run(2, |_| {});
-    assert_eq!(run.snapshot().phase, Phase::Moving);
+    assert_eq!(run.snapshot().groups[0].phase, Phase::Moving);
     // This is longer than the enable time-out.
     run.run(25_000, |_| {});
-    assert_eq!(run.snapshot().phase, Phase::Holding);
+    assert_eq!(run.snapshot().groups[0].phase, Phase::Holding);
     let snapshot = run.snapshot();
-    assert_eq!((snapshot.motions.of(motion), snapshot.stop), (Some(MotionState::Finished), None));
+    assert_eq!((snapshot.motions.of(motion), snapshot.groups[0].stop), (Some(MotionState::Finished), None));
     run.interrupt(Interrupt::Controlled);
     assert_eq!(run.run(CYCLES_AT_MOST, |_| {}), Some(Outcome::Interrupted));
 }
@@ -449,7 +450,7 @@ fn a_group_that_a_client_moves_before_the_life_cycle_sees_it_hold_goes_on() {
 fn the_answer_to_a_request_is_found_by_its_id_with_the_reason_of_a_refusal() {
     let config = load("arm6-erob.toml");
     let mut run = start(&config);
-    while run.snapshot().phase != Phase::Moving {
+    while run.snapshot().groups[0].phase != Phase::Moving {
         assert!(run.step());
     }
     let refused = run.host().request(Request::Enable).unwrap();
@@ -468,7 +469,7 @@ fn a_fault_during_disabling_is_the_outcome_of_the_run() {
     let mut run = start(&config);
     let mut is_disturbed = false;
     let outcome = run.run(CYCLES_AT_MOST, |run| {
-        if run.snapshot().phase == Phase::Disabling && !is_disturbed {
+        if run.snapshot().groups[0].phase == Phase::Disabling && !is_disturbed {
             is_disturbed = true;
             let now_ns = run.clock().now_ns();
             assert!(run.ports()[0].send_foreign(now_ns, &Frame::of(Id::canopen(0x080, 0), [])));

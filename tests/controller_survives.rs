@@ -64,7 +64,7 @@ impl Place {
         let Ok(mut files) = fs::read_dir(self.runs()) else { return false };
         let recorded = files.next().and_then(|file| Recorded::open(&file.unwrap().path()).ok());
         let cycles = recorded.and_then(|recorded| recorded.cycles(&(0..=u64::MAX)).ok()).unwrap_or_default();
-        cycles.last().is_some_and(|last| last.phase == Phase::Moving)
+        cycles.last().is_some_and(|last| last.groups[0].phase == Phase::Moving)
     }
 
     fn files(&self) -> Vec<PathBuf> {
@@ -290,5 +290,5 @@ fn a_process_that_is_paused_for_too_long_stops_the_arm_without_a_jump_and_counts
 
 /// Whether the drives follow set-points.
 fn is_enabled(record: &RecordedCycle) -> bool {
-    matches!(record.phase, Phase::Holding | Phase::Moving | Phase::Stopping)
+    matches!(record.groups[0].phase, Phase::Holding | Phase::Moving | Phase::Stopping)
 }

@@ -47,6 +47,19 @@ fn the_same_comes_as_one_json_object() {
 }
 
 #[test]
+fn a_pdo_is_valid_or_not_whether_its_node_id_is_known_or_not() {
+    let valid = |arguments: &[&str]| -> Vec<(Value, bool)> {
+        let output = takt(&[&["configs/eds/erob-canopen.eds", "--json"], arguments].concat());
+        let json: Value = serde_json::from_slice(&output.stdout).unwrap();
+        let pdos = json["pdos"].as_array().unwrap();
+        pdos.iter().map(|pdo| (pdo["number"].clone(), pdo["is_valid"].as_bool().unwrap())).collect()
+    };
+    let known = valid(&["--node", "2"]);
+    assert!(known.iter().any(|(_, is_valid)| *is_valid) && known.iter().any(|(_, is_valid)| !is_valid));
+    assert_eq!(valid(&[]), known);
+}
+
+#[test]
 fn a_repaired_file_is_printed_and_the_warning_shows_its_line() {
     let odd = file(ODD);
     let path = odd.path().to_str().unwrap();

@@ -49,7 +49,7 @@ fn an_impossible_command_is_an_error_before_it_is_sent() {
     assert!(matches!(arm.velocity(0, 99.0, PATIENCE), Err(CommandError::OutsideLimits { .. })));
     assert!(matches!(arm.velocity(0, f64::NAN, PATIENCE), Err(CommandError::OutsideLimits { .. })));
     assert_eq!(arm.velocity(7, 0.1, PATIENCE), Err(CommandError::NoSuchAxis { axis: 7, axes: 1 }));
-    assert_eq!((arm.state().phase, arm.state().stop), (Phase::Holding, None));
+    assert_eq!((arm.state().groups[0].phase, arm.state().groups[0].stop), (Phase::Holding, None));
 }
 
 #[test]
@@ -57,13 +57,13 @@ fn a_velocity_is_reached_and_ended_and_an_expired_one_stops_the_group() {
     let joint = start("erob-modes/erob-pv.toml");
     let going = joint.velocity(0, 0.5, PATIENCE).unwrap();
     assert_eq!(joint.wait(going, PATIENCE), Ok(()));
-    assert_eq!(joint.state().phase, Phase::Moving);
+    assert_eq!(joint.state().groups[0].phase, Phase::Moving);
     let ending = joint.velocity(0, 0.0, PATIENCE).unwrap();
     assert_eq!(joint.wait(ending, PATIENCE), Ok(()));
     joint.velocity(0, 0.2, Duration::from_millis(300)).unwrap();
     let _ = joint.wait_for(Phase::Stopping, PATIENCE);
     assert_eq!(joint.wait_for(Phase::Holding, PATIENCE), Ok(()));
-    assert_eq!(joint.state().stop.map(|stop| stop.rule()), Some(Rule::StaleCommand));
+    assert_eq!(joint.state().groups[0].stop.map(|stop| stop.rule()), Some(Rule::StaleCommand));
 }
 
 #[test]
@@ -74,10 +74,10 @@ fn after_a_fault_each_request_is_refused_with_the_reason_until_the_fault_is_rese
     joint.begin_stream().unwrap();
     joint.stream().push_now(&[1.0]).unwrap();
     let begun = std::time::Instant::now();
-    while joint.state().stop.is_none() && begun.elapsed() < PATIENCE {
+    while joint.state().groups[0].stop.is_none() && begun.elapsed() < PATIENCE {
         std::thread::sleep(Duration::from_millis(1));
     }
-    assert_eq!(joint.state().stop.map(|stop| stop.rule()), Some(Rule::StartPose));
+    assert_eq!(joint.state().groups[0].stop.map(|stop| stop.rule()), Some(Rule::StartPose));
     assert_eq!(joint.wait_for(Phase::Holding, PATIENCE), Ok(()));
     let refused = joint.move_to(&[0.2]).unwrap();
     let Err(MotionError::Refused(refused)) = joint.wait(refused, PATIENCE) else { panic!("it was granted") };
@@ -130,7 +130,7 @@ fn a_stop_does_not_wait_behind_a_flood_of_requests() {
     let slot = joint.state().slot;
     joint.stop(StopCategory::One).unwrap();
     assert_eq!(joint.wait_for(Phase::Disabled, PATIENCE), Ok(()));
-    let stop = joint.state().stop.unwrap();
+    let stop = joint.state().groups[0].stop.unwrap();
     assert_eq!((stop.rule(), stop.category), (Rule::Requested, StopCategory::One));
     assert!(stop.slot - slot < 2_000, "{} slots after its request", stop.slot - slot);
     assert!(joint.wait(last, PATIENCE).is_err());
@@ -473,7 +473,7 @@ fn many_threads_command_stop_wait_and_observe_at_once() {
                 while !is_over.load(Ordering::Relaxed) {
                     *stops += events.filter(is_stop).count();
                     let state = handle.cycle_after(slot, PATIENCE).unwrap();
-                    assert!(state.slot > slot && state.phase != Phase::Disabled);
+                    assert!(state.slot > slot && state.groups[0].phase != Phase::Disabled);
                     slot = state.slot;
                 }
             })
@@ -543,7 +543,7 @@ fn points_from_two_threads_are_followed_and_the_end_of_them_is_reported() {
     }
     std::thread::sleep(Duration::from_millis(300));
     let state = arm.state();
-    assert_eq!((state.phase, state.stop), (Phase::Streaming, None));
+    assert_eq!((state.groups[0].phase, state.groups[0].stop), (Phase::Streaming, None));
     assert_eq!(state.groups[0].stream.counts.points, 50);
     for (axis, home) in state.axes.iter().zip(&home) {
         assert!((axis.position_set - home - 0.05).abs() < 5e-3, "{} from {home}", axis.position_set);

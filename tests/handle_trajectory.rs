@@ -41,7 +41,7 @@ fn a_trajectory_is_carried_out_paused_slowed_down_resumed_and_replaced() {
         |arm: &Controller| arm.trajectory_progress(motion).is_some_and(|progress| progress.rate == 0.0);
     arm.wait_until(PATIENCE, |_| at_rest(&arm).then_some(())).unwrap();
     let paused = arm.state();
-    assert_eq!(paused.phase, Phase::Moving);
+    assert_eq!(paused.groups[0].phase, Phase::Moving);
     let progress = arm.trajectory_progress(motion).unwrap();
     assert!(progress.path_s > 0.0 && progress.path_s < progress.of_s);
     assert_eq!(progress.of_s, 2.0);
@@ -61,7 +61,7 @@ fn a_trajectory_is_carried_out_paused_slowed_down_resumed_and_replaced() {
     let second = arm.execute(&[point(&arm, 1.5, 0.0)]).unwrap();
     assert_eq!(arm.wait(first, PATIENCE), Err(MotionError::Replaced));
     assert_eq!(arm.wait(second, PATIENCE), Ok(()));
-    assert_eq!((arm.state().phase, arm.state().stop), (Phase::Holding, None));
+    assert_eq!((arm.state().groups[0].phase, arm.state().groups[0].stop), (Phase::Holding, None));
     arm.finish().unwrap();
 }
 

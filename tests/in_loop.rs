@@ -90,10 +90,13 @@ fn a_function_leads_an_arm_from_inside_the_real_time_thread_without_the_heap_and
     });
     let callback = callback.unwrap();
     let state = arm.state();
-    assert_eq!((state.phase, state.groups[0].stream.state), (Phase::Streaming, StreamState::Callback));
+    assert_eq!(
+        (state.groups[0].phase, state.groups[0].stream.state),
+        (Phase::Streaming, StreamState::Callback)
+    );
     assert_eq!(callback.result(), None);
     assert_eq!(callback.wait(PATIENCE), Ok(()));
-    assert_eq!((arm.state().phase, arm.state().stop), (Phase::Holding, None));
+    assert_eq!((arm.state().groups[0].phase, arm.state().groups[0].stop), (Phase::Holding, None));
     for (axis, home) in arm.state().axes().iter().zip(&home) {
         assert!((axis.position_set - home - 0.04).abs() < 0.005, "{} from {home}", axis.position_set);
     }
@@ -228,7 +231,7 @@ fn moves_stops_and_other_functions_take_the_place_of_one_and_a_dropped_handle_do
     let first_motion = first.motion();
     drop(first);
     thread::sleep(Duration::from_millis(100));
-    assert_eq!((joint.state().phase, joint.result_of(first_motion)), (Phase::Streaming, None));
+    assert_eq!((joint.state().groups[0].phase, joint.result_of(first_motion)), (Phase::Streaming, None));
     let second = joint.in_loop_with(PATIENT, to(-0.2)).unwrap();
     assert_eq!(joint.result_of(first_motion), Some(Err(MotionError::Replaced)));
     thread::sleep(Duration::from_millis(100));
@@ -284,7 +287,7 @@ fn holding() -> VirtualRun<SimulatedBus> {
     let config = config("single-erob.toml");
     let ports = vec![SimulatedBus::new(&config, 0)];
     let mut run = VirtualRun::serving(&config, ports).unwrap().0;
-    while run.snapshot().phase != Phase::Holding {
+    while run.snapshot().groups[0].phase != Phase::Holding {
         assert!(run.step());
     }
     run
@@ -308,13 +311,13 @@ fn in_virtual_time_a_call_takes_no_time_unless_it_is_said_how_long() {
         command.position(0, 0.2);
     });
     (0..500).for_each(|_| assert!(run.step()));
-    assert_eq!((run.snapshot().phase, record.times().longest), (Phase::Streaming, Duration::ZERO));
+    assert_eq!((run.snapshot().groups[0].phase, record.times().longest), (Phase::Streaming, Duration::ZERO));
     run.take_for_callbacks(BUDGET_NS);
     (0..50).for_each(|_| assert!(run.step()));
-    assert_eq!(run.snapshot().phase, Phase::Streaming);
+    assert_eq!(run.snapshot().groups[0].phase, Phase::Streaming);
     run.take_for_callbacks(BUDGET_NS + 1);
     (0..2).for_each(|_| assert!(run.step()));
-    let stop = run.snapshot().stop.unwrap();
+    let stop = run.snapshot().groups[0].stop.unwrap();
     assert_eq!(stop.rule(), Rule::CallbackOverrun);
     assert_eq!(run.snapshot().motions.of(motion), Some(MotionState::Stopped(stop)));
     assert!(record.is_over());

@@ -60,6 +60,74 @@ fn a_device_that_gets_a_node_id_boots_with_it() {
     assert_eq!(named["device"]["serial"], 0xFFFF_FFFE_u32);
 }
 
+fn three_canopennode_devices(arguments: &[&str]) -> Output {
+    let devices = ["0x331:1:0x100:0x1234", "0x331:1:0x101:0", "0x332:1:0:0xFFFFFFFF"];
+    let devices = devices.map(|identity| format!("{identity},canopennode"));
+    let simulated = devices.iter().flat_map(|device| ["--simulate", device.as_str()]);
+    lss(&["--bus", "sim"].into_iter().chain(simulated).chain(arguments.iter().copied()).collect::<Vec<_>>())
+}
+
+#[test]
+fn a_scan_finds_all_of_three_devices_that_answer_every_scan_request_in_configuration_state() {
+    let output = three_canopennode_devices(&["scan"]);
+    ends_with(0, &output);
+    let text = said(&output);
+    for identity in ["0x00000331:0x00000001:0x00000100:0x00001234", "0x00000101:0x00000000", "0xFFFFFFFF"] {
+        assert!(text.contains(identity), "{identity}: {text}");
+    }
+    assert!(text.contains("3 devices") && !text.contains("note"), "{text}");
+}
+
+#[test]
+fn a_scan_that_finds_an_identity_of_zeros_ends_with_a_remark() {
+    let output = lss(&["--bus", "sim", "--simulate", "0:0:0:0", "--simulate", FIRST, "--json", "scan"]);
+    ends_with(0, &output);
+    let object: Value = serde_json::from_str(&said(&output)).unwrap();
+    assert_eq!(object["result"]["devices"].as_array().map(Vec::len), Some(0));
+    let remark = object["result"]["remark"].as_str().unwrap();
+    assert!(remark.contains("identity of zeros"), "{remark}");
+    let output = lss(&["--bus", "sim", "--simulate", "0:0:0:0", "set-id", "3"]);
+    ends_with(1, &output);
+    assert!(errors(&output).contains("identity of zeros"), "{}", errors(&output));
+}
+
+#[test]
+fn two_devices_are_refused_where_only_one_was_meant() {
+    for action in [&["set-id", "5"][..], &["set-bitrate", "500 kbit/s"], &["store"], &["inquire"]] {
+        let output = simulated(&[&["--only"], action].concat());
+        ends_with(1, &output);
+        let words = errors(&output);
+        assert!(
+            words.contains("3 devices answered, though --only means one: nothing was changed"),
+            "{words}"
+        );
+        assert!(words.contains("try: name the device by --device"), "{words}");
+    }
+    let output = simulated(&["--only", "--verbose", "set-id", "5"]);
+    assert!(!errors(&output).contains("7E5#1105"), "no node ID was configured: {}", errors(&output));
+}
+
+#[test]
+fn a_boot_up_that_does_not_come_is_said() {
+    let device = format!("{FIRST},no-boot-up");
+    let output = lss(&["--bus", "sim", "--simulate", &device, "set-id", "5"]);
+    ends_with(0, &output);
+    assert!(said(&output).contains("no boot-up message with this node ID"), "{}", said(&output));
+    assert!(!said(&output).contains("booted "), "{}", said(&output));
+}
+
+#[test]
+fn the_wait_of_a_scan_is_an_option() {
+    let duration = |wait: &str| {
+        let output = simulated(&["--verbose", "--scan-wait", wait, "scan"]);
+        ends_with(0, &output);
+        let last = errors(&output).lines().last().unwrap().trim().to_owned();
+        last.split_whitespace().next().unwrap().parse::<f64>().unwrap()
+    };
+    let (short, long) = (duration("2 ms"), duration("100 ms"));
+    assert!(long > 30.0 * short, "simulated time: {short} s and {long} s");
+}
+
 #[test]
 fn a_device_that_had_a_node_id_keeps_it_until_it_is_reset_and_this_is_said() {
     let identity = KNOWN.split('@').next().unwrap();
@@ -134,11 +202,27 @@ fn bad_words_are_refused_before_anything_is_sent() {
             vec!["--bus", "sim", "--simulate", FIRST, "--only", "--device", FIRST, "inquire"],
             "cannot be used with",
         ),
+        (vec!["--bus", "sim", "--simulate", FIRST, "--scan-wait", "5 s", "scan"], "1 ms to 1 s"),
+        (vec!["--bus", "sim", "--simulate", "1:2:3:4,quiet", "scan"], "canopennode, no-boot-up"),
         (vec!["scan"], "--bus"),
     ] {
         let output = lss(&arguments);
         ends_with(2, &output);
         assert!(errors(&output).contains(words), "{words}: {}", errors(&output));
         assert!(output.stdout.is_empty());
+    }
+}
+
+#[test]
+fn an_lss_device_needs_a_bus_with_a_real_interface_in_the_simulator_of_drives() {
+    for (device, words) in [
+        ("1:2:3:4", "--lss: the bus `can` has no real interface"),
+        ("wrist=1:2:3:4@5,canopennode", "--lss: the bus `wrist` has no real interface"),
+        ("1:2:3", "VENDOR:PRODUCT:REVISION:SERIAL"),
+    ] {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_takt"));
+        let output = command.args(["sim", "configs/single-erob.toml", "--lss", device]).output().unwrap();
+        ends_with(2, &output);
+        assert!(errors(&output).contains(words), "{words}: {}", errors(&output));
     }
 }

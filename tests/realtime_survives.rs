@@ -198,8 +198,8 @@ fn after_a_panic_of_the_real_time_thread_its_last_cycles_and_frames_are_in_the_b
 /// After the panic, the group was stopped in category 1, and its drives are without power.
 fn assert_stopped_in_control(session: &Session, message: &str) {
     assert_eq!(session.outcome, Outcome::CallbackPanicked { message: message.to_owned() });
-    assert_eq!(session.snapshot.stop.map(|stop| stop.category), Some(StopCategory::One));
-    assert_eq!(session.snapshot.phase, Phase::Disabled);
+    assert_eq!(session.snapshot.groups[0].stop.map(|stop| stop.category), Some(StopCategory::One));
+    assert_eq!(session.snapshot.groups[0].phase, Phase::Disabled);
     assert!(session.ended.is_some(), "the real-time thread has ended regularly");
     let recorded = Recorded::open(&session.log.black_boxes.files[0]).unwrap();
     assert_eq!(recorded.cause().unwrap().rule, "callback_panicked");
@@ -215,7 +215,7 @@ fn a_panic_of_the_callers_watch_is_caught_and_stops_the_group_in_category_1() {
     let config = arm(folder.path());
     let mut calls_in_motion = 0;
     let session = session::run(&config, SessionOptions::default(), Box::new(|_| {}), |snapshot, _| {
-        calls_in_motion += u32::from(snapshot.phase == Phase::Moving);
+        calls_in_motion += u32::from(snapshot.groups[0].phase == Phase::Moving);
         assert!(calls_in_motion < 100, "a mistake in watch");
         None
     });
@@ -234,7 +234,7 @@ fn a_panic_of_the_callers_notify_is_caught_and_stops_the_group_in_category_1() {
     };
     let mut last_watched = Phase::Passive;
     let session = session::run(&config, SessionOptions::default(), Box::new(notify), |snapshot, _| {
-        last_watched = snapshot.phase;
+        last_watched = snapshot.groups[0].phase;
         None
     });
     assert_stopped_in_control(&session.unwrap(), "a mistake in notify");

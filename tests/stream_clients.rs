@@ -59,7 +59,7 @@ fn stream_beside_load(rate_hz: u32, lasting: Duration) -> String {
     stops.extend(events.by_ref().filter(is_stop));
     let state = arm.state();
     assert!(stops.is_empty() && events.missed() == 0, "{rate_hz} Hz: {stops:?}, {} missed", events.missed());
-    assert_eq!((state.phase, state.stop), (Phase::Streaming, None), "{rate_hz} Hz");
+    assert_eq!((state.groups[0].phase, state.groups[0].stop), (Phase::Streaming, None), "{rate_hz} Hz");
     format!(
         "{rate_hz} Hz for {lasting:?} beside {busy} busy threads: no stop; a point was {latest:?} late, {:?}, {} slots missed",
         arm.stream().report().counts,

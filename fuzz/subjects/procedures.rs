@@ -66,7 +66,7 @@ fn configurations() -> &'static [Config; 3] {
         [erob, &stored, include_str!("../../configs/gantry-yz-aim.toml")].map(|text| {
             let mut config = Config::parse("example", text).expect("the example is valid");
             config.axes.truncate(1);
-            config.axes[0].simulated.power_up_ns = 1_000_000;
+            config.axes[0].power_up_ns = 1_000_000;
             config
         })
     })

@@ -50,6 +50,8 @@ fn play(scenario: Scenario) {
             assert!(port.send(at_ns + 500_000, &set_points) <= set_points.len());
             port.health();
         }
-        fault_injector.observe(&Snapshot { phase, at_ns: at_ns + 510_000, ..Snapshot::default() });
+        let mut snapshot = Snapshot { at_ns: at_ns + 510_000, ..Snapshot::default() };
+        snapshot.groups[0].phase = phase;
+        fault_injector.observe(&snapshot);
     }
 }

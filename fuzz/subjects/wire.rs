@@ -4,10 +4,9 @@ use std::sync::OnceLock;
 
 use takt::canopen::emcy::Emergency;
 use takt::canopen::lss::{LssRequest, LssResponse};
-use takt::canopen::nmt::{ErrorControl, HeartbeatConsumer, NmtCommand};
+use takt::canopen::nmt::{ErrorControl, NmtCommand};
 use takt::canopen::object::ObjectAddress;
 use takt::canopen::sdo::{SdoClient, SdoRequest, SdoResponse, SdoTiming, Transfer};
-use takt::canopen::sync::Sync;
 use takt::canopen::time::TimeOfDay;
 use takt::config::Config;
 use takt::sim::SimulatedBus;
@@ -63,16 +62,7 @@ fn decode(mut input: Input<'_>) {
         if let Some(time) = TimeOfDay::decode(&frame) {
             assert_eq!(TimeOfDay::decode(&time.frame()), Some(time), "{frame:?}");
         }
-        if let Some(sync) = Sync::decode(&frame) {
-            let before = Sync { counter: input.bytes::<1>().first().copied() };
-            sync.missing_since(before, input.byte());
-        }
         DriveState::decode(frame.first_word() as u16);
-        let mut consumer = HeartbeatConsumer::new(NODE, 1_000_000);
-        for now_ns in [0, u64::from(input.word()), u64::MAX] {
-            let _ = consumer.receive(now_ns, &frame);
-            let _ = consumer.poll(now_ns);
-        }
     }
 }
 
@@ -122,7 +112,7 @@ fn one_drive() -> &'static Config {
         let mut config = Config::parse("single-erob.toml", text).expect("the example is valid");
         config.axes.iter_mut().for_each(|axis| {
             axis.node = NODE;
-            axis.simulated.power_up_ns = 100_000;
+            axis.power_up_ns = 100_000;
         });
         config
     })
@@ -135,7 +125,7 @@ fn one_yz_aim() -> &'static Config {
         let mut config = Config::parse("gantry-yz-aim.toml", text).expect("the example is valid");
         config.axes.truncate(1);
         config.axes[0].node = NODE;
-        config.axes[0].simulated.power_up_ns = 100_000;
+        config.axes[0].power_up_ns = 100_000;
         config
     })
 }

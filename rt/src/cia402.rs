@@ -27,6 +27,21 @@ pub enum DriveState {
 }
 
 impl DriveState {
+    /// Its name in CiA 402.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::NotReadyToSwitchOn => "not ready to switch on",
+            Self::SwitchOnDisabled => "switch on disabled",
+            Self::ReadyToSwitchOn => "ready to switch on",
+            Self::SwitchedOn => "switched on",
+            Self::OperationEnabled => "operation enabled",
+            Self::QuickStopActive => "quick stop active",
+            Self::FaultReactionActive => "fault reaction active",
+            Self::Fault => "fault",
+            Self::Undefined => "no state of CiA 402",
+        }
+    }
+
     /// Every state, in the order of their numbers.
     pub const ALL: [Self; 9] = [
         Self::NotReadyToSwitchOn,
@@ -231,6 +246,21 @@ pub enum OperationMode {
 }
 
 impl OperationMode {
+    /// Its name in CiA 402.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::ProfilePosition => "profile position",
+            Self::Velocity => "velocity",
+            Self::ProfileVelocity => "profile velocity",
+            Self::ProfileTorque => "profile torque",
+            Self::Homing => "homing",
+            Self::InterpolatedPosition => "interpolated position",
+            Self::CyclicSynchronousPosition => "cyclic synchronous position",
+            Self::CyclicSynchronousVelocity => "cyclic synchronous velocity",
+            Self::CyclicSynchronousTorque => "cyclic synchronous torque",
+        }
+    }
+
     /// Every mode, in the order of their numbers.
     pub const ALL: [Self; 9] = [
         Self::ProfilePosition,

@@ -13,7 +13,7 @@
 
 use arrayvec::ArrayVec;
 
-use crate::bus_set::BusSet;
+use crate::bit_set::BitSet;
 use crate::engine::{CycleInput, Deadline, Engine, Receiver, SendBatch};
 use crate::frame::Frame;
 use crate::host::HostInterface;
@@ -179,14 +179,14 @@ fn send<P: BusPort, const N: usize, const BUSES: usize>(
     ports: &mut [P],
     batches: &[ArrayVec<Frame, N>; BUSES],
     now_ns: Nanoseconds,
-) -> BusSet {
+) -> BitSet {
     let mut taken = [0; BUSES];
     let entries = ports.iter_mut().zip(batches).zip(&mut taken).filter(|((_, frames), _)| !frames.is_empty());
     let mut outgoing: ArrayVec<Outgoing<'_, P>, BUSES> =
         entries.map(|((port, frames), taken)| Outgoing { port, frames, taken }).collect();
     P::send_together(now_ns, &mut outgoing);
     drop(outgoing);
-    let mut not_taken = BusSet::default();
+    let mut not_taken = BitSet::default();
     for (bus, (frames, taken)) in batches.iter().zip(&taken).enumerate() {
         if *taken < frames.len() {
             not_taken.insert(bus);
@@ -203,7 +203,7 @@ fn look_again<const AXES: usize, const BUSES: usize, P: BusPort>(
     host: &mut impl HostInterface<AXES, BUSES>,
 ) {
     let was_behind = engine.behind();
-    let mut caught_up = BusSet::default();
+    let mut caught_up = BitSet::default();
     for (bus, port) in ports.iter_mut().enumerate().filter(|(bus, _)| was_behind.contains(*bus)) {
         receive(engine, bus, port, now_ns, host);
         if port.unconfirmed(now_ns) == 0 {
@@ -219,8 +219,8 @@ fn take_feedback<const AXES: usize, const BUSES: usize, P: BusPort>(
     ports: &mut [P],
     now_ns: Nanoseconds,
     host: &mut impl HostInterface<AXES, BUSES>,
-) -> BusSet {
-    let mut behind = BusSet::default();
+) -> BitSet {
+    let mut behind = BitSet::default();
     for (bus, port) in ports.iter_mut().enumerate() {
         receive(engine, bus, port, now_ns, host);
         if port.unconfirmed(now_ns) > 0 {

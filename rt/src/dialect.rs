@@ -32,6 +32,7 @@ impl Dialect {
 
     /// The controlword after `last` that leads a drive in `state` towards `goal`. A YZ-AIM does not show how far it has come,
     /// so the next controlword follows from the last one: 06, 07, 0F, and 06 again if the drive is still not enabled.
+    #[inline]
     pub const fn controlword(self, state: DriveState, goal: Goal, last: u16) -> u16 {
         match (self, goal, state) {
             (Self::YzAim, Goal::Enabled, DriveState::OperationEnabled) => controlword::ENABLE_OPERATION,

@@ -24,23 +24,11 @@ impl<const AXES: usize> Default for ProfileStore<AXES> {
     }
 }
 
-impl<const AXES: usize> ProfileStore<AXES> {
-    /// Those of the axes of one group, which stand beside each other; `None` if there are not so many.
-    pub fn of(&mut self, places: Range<usize>) -> Option<Profiles<'_, AXES>> {
-        Some(Profiles { first: self.first.get_mut(places.clone())?, second: self.second.get_mut(places)? })
-    }
-}
-
-/// The planned motions of the axes of one group.
-#[derive(Debug)]
-pub struct Profiles<'a, const AXES: usize> {
-    first: &'a mut [Profile],
-    second: &'a mut [Profile],
-}
-
 /// The trajectory that a group is on: the time on the motions of its axes, which are in a [`ProfileStore`].
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct GroupTrajectory {
+    /// Where the axes of the group stand in the store, beside each other.
+    places: Range<usize>,
     is_second_present: bool,
     duration_s: f64,
     time_s: f64,
@@ -66,24 +54,27 @@ impl<'a> Leg<'a> {
 }
 
 impl GroupTrajectory {
+    /// None yet, of a group whose axes stand here among those of the store.
+    pub const fn new(places: Range<usize>) -> Self {
+        Self { places, is_second_present: false, duration_s: 0.0, time_s: 0.0 }
+    }
+
     /// Plans a coordinated move within fractions of the limits: on a straight line from rest to rest, and otherwise where
     /// that takes no longer. On error the present motion goes on.
     pub fn move_to<'a, const AXES: usize>(
         &mut self,
-        profiles: &mut Profiles<'_, AXES>,
+        profiles: &mut ProfileStore<AXES>,
         legs: impl Iterator<Item = Leg<'a>>,
         velocity_scale: f64,
         acceleration_scale: f64,
         minimum_duration_s: f64,
     ) -> Result<(), PlanError> {
-        let problems: ArrayVec<Problem, AXES> = legs
-            .take(AXES)
-            .map(|leg| Problem {
-                start: leg.start,
-                target: leg.target,
-                limits: move_limits(&leg, velocity_scale, acceleration_scale),
-            })
-            .collect();
+        let mut problems: ArrayVec<Problem, AXES> = ArrayVec::new();
+        problems.extend(legs.take(AXES).map(|leg| Problem {
+            start: leg.start,
+            target: leg.target,
+            limits: move_limits(&leg, velocity_scale, acceleration_scale),
+        }));
         let is_at_rest = |state: &State| state.velocity == 0.0 && state.acceleration == 0.0;
         let is_from_rest_to_rest =
             problems.iter().all(|problem| is_at_rest(&problem.start) && is_at_rest(&problem.target));
@@ -101,7 +92,7 @@ impl GroupTrajectory {
     /// Plans the fastest coordinated stop. On error the present motion goes on.
     pub fn stop<'a, const AXES: usize>(
         &mut self,
-        profiles: &mut Profiles<'_, AXES>,
+        profiles: &mut ProfileStore<AXES>,
         axes: impl Iterator<Item = (State, &'a AxisLimits)>,
     ) -> Result<(), PlanError> {
         let mut starts: ArrayVec<State, AXES> = ArrayVec::new();
@@ -116,8 +107,9 @@ impl GroupTrajectory {
     }
 
     /// Where the next trajectory is planned.
-    fn free<'a, const AXES: usize>(&self, profiles: &'a mut Profiles<'_, AXES>) -> &'a mut [Profile] {
-        if self.is_second_present { profiles.first } else { profiles.second }
+    fn free<'a, const AXES: usize>(&self, profiles: &'a mut ProfileStore<AXES>) -> &'a mut [Profile] {
+        let free = if self.is_second_present { &mut profiles.first } else { &mut profiles.second };
+        free.get_mut(self.places.clone()).unwrap_or_default()
     }
 
     /// The trajectory that was planned last becomes the present one.
@@ -139,12 +131,12 @@ impl GroupTrajectory {
 
     /// Where the axes are to be now, in their order. Targets that are passed at speed are passed between two cycles: in the
     /// one after it the axes have gone on at that speed.
-    pub fn states<const AXES: usize>(&self, profiles: &Profiles<'_, AXES>) -> impl Iterator<Item = State> {
-        let since_end_s = self.time_s - self.duration_s;
+    pub fn states<const AXES: usize>(&self, profiles: &ProfileStore<AXES>) -> impl Iterator<Item = State> {
+        let (time_s, since_end_s) = (self.time_s, self.time_s - self.duration_s);
         let present = if self.is_second_present { &profiles.second } else { &profiles.first };
-        present.iter().map(move |profile| {
+        present.get(self.places.clone()).unwrap_or_default().iter().map(move |profile| {
             // By the end of all, so that none is a rounding short of its own.
-            let time_s = if since_end_s < 0.0 { self.time_s } else { profile.duration_s() + since_end_s };
+            let time_s = if since_end_s < 0.0 { time_s } else { profile.duration_s() + since_end_s };
             profile.sample(time_s)
         })
     }
@@ -222,8 +214,7 @@ mod tests {
     fn a_move_that_is_to_be_gentle_takes_a_high_acceleration_back_before_the_velocity_limit() {
         let start = State { position: 0.0, velocity: 1.9, acceleration: 4.0 };
         let target = State { position: 2.5, ..State::default() };
-        let (mut store, mut motion) = (ProfileStore::<2>::default(), GroupTrajectory::default());
-        let mut profiles = store.of(0..1).unwrap();
+        let (mut profiles, mut motion) = (ProfileStore::<2>::default(), GroupTrajectory::new(0..1));
         motion
             .move_to(&mut profiles, [Leg { start, target, limits: &LIMITS }].into_iter(), 1.0, 0.1, 0.0)
             .unwrap();
@@ -240,8 +231,7 @@ mod tests {
         let slow = AxisLimits { deceleration: 1.0, ..LIMITS };
         for jerk in [100.0, f64::INFINITY] {
             let (quick, slow) = (AxisLimits { jerk, ..LIMITS }, AxisLimits { jerk, ..slow });
-            let (mut store, mut motion) = (ProfileStore::<2>::default(), GroupTrajectory::default());
-            let mut profiles = store.of(0..2).unwrap();
+            let (mut profiles, mut motion) = (ProfileStore::<2>::default(), GroupTrajectory::new(0..2));
             // 0.5 rad/s at 8 rad/s² take less than 0.06 rad; in the 2 s of the other axis they would take 0.5 rad.
             motion.stop(&mut profiles, [(at(2.9, 0.5), &quick), (at(0.0, 2.0), &slow)].into_iter()).unwrap();
             let mut farthest: f64 = 2.9;
@@ -259,8 +249,7 @@ mod tests {
             let limits = AxisLimits { jerk, ..LIMITS };
             let start = State::default();
             let target = State { position: 0.333, velocity: 1.1, acceleration: 0.0 };
-            let (mut store, mut motion) = (ProfileStore::<2>::default(), GroupTrajectory::default());
-            let mut profiles = store.of(0..1).unwrap();
+            let (mut profiles, mut motion) = (ProfileStore::<2>::default(), GroupTrajectory::new(0..1));
             motion
                 .move_to(&mut profiles, [Leg { start, target, limits: &limits }].into_iter(), 0.7, 0.7, 0.0)
                 .unwrap();

@@ -101,12 +101,8 @@ pub struct Snapshot<const AXES: usize = MAX_AXES, const BUSES: usize = MAX_BUSES
     pub slot: u64,
     /// The time at which it was made.
     pub at_ns: Nanoseconds,
-    /// What the first group is doing: the only one, unless there are several.
-    pub phase: Phase,
     /// Slots that passed unused since the start.
     pub missed_slots: u64,
-    /// Cycles in which the set-points went on, since the start. In the others the last ones had still to leave, or none can.
-    pub steps: u64,
     /// How late the controller has been of late.
     pub timing: TimingLevel,
     /// Events and records that found no room, since the start.
@@ -117,11 +113,7 @@ pub struct Snapshot<const AXES: usize = MAX_AXES, const BUSES: usize = MAX_BUSES
     pub answers: Answers,
     /// What became of the last motions.
     pub motions: MotionReports,
-    /// Planned time left of the present move or stop of the first group, in seconds.
-    pub remaining_s: f64,
-    /// Why the first group stopped or is stopping; `None` again after it has been re-enabled.
-    pub stop: Option<StopReason>,
-    /// How many of `groups` count.
+    /// How many of `groups` count: at least one.
     pub group_count: u8,
     /// Every group, in the order of the configuration.
     pub groups: [GroupSnapshot; MAX_GROUPS],
@@ -152,16 +144,12 @@ impl<const AXES: usize, const BUSES: usize> Default for Snapshot<AXES, BUSES> {
         Self {
             slot: 0,
             at_ns: 0,
-            phase: Phase::default(),
             missed_slots: 0,
-            steps: 0,
             timing: TimingLevel::Normal,
             dropped: 0,
             rejected: 0,
             answers: Answers::default(),
             motions: MotionReports::default(),
-            remaining_s: 0.0,
-            stop: None,
             group_count: 1,
             groups: [GroupSnapshot::default(); MAX_GROUPS],
             axis_count: 0,
@@ -177,6 +165,11 @@ impl<const AXES: usize, const BUSES: usize> Snapshot<AXES, BUSES> {
     pub fn groups(&self) -> &[GroupSnapshot] {
         self.groups.get(..self.group_count.into()).unwrap_or(&self.groups)
     }
+
+    /// The stop that began first, of any group.
+    pub fn first_stop(&self) -> Option<StopReason> {
+        self.groups().iter().filter_map(|group| group.stop).min_by_key(|stop| stop.slot)
+    }
 }
 
 /// One group after a cycle.
@@ -190,6 +183,8 @@ pub struct GroupSnapshot {
     pub stop: Option<StopReason>,
     /// Its stream, or the last one.
     pub stream: StreamReport,
+    /// Cycles in which its set-points went on, since the start. In the others the last ones had still to leave, or none can.
+    pub steps: u64,
 }
 
 /// One axis after a cycle.

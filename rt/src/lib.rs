@@ -28,7 +28,7 @@
 
 mod answers;
 mod axis;
-mod bus_set;
+mod bit_set;
 mod cia402;
 mod control;
 mod cycle;
@@ -64,7 +64,7 @@ pub use axis::{
     Axis, AxisParameters, AxisParametersError, CommandPdo, FeedForward, FeedbackSince, Jump, ModeChanges,
     ModeCondition, Pdo, TorqueLimits,
 };
-pub use bus_set::BusSet;
+pub use bit_set::BitSet;
 pub use cia402::{Command, DriveState, Goal, OperationMode, controlword, statusword};
 pub use control::{ControlLaw, Gain, GainError, LoopInput, TorqueDemand};
 pub use cycle::{Cycle, Flow, SlotPlan};
@@ -85,7 +85,10 @@ pub use pdo::{
 pub use phase::Phase;
 pub use port::{BusHealth, BusPort, BusState, Clock, Outgoing, RECEIVE_BATCH, ReceiveBatch, Received, Wake};
 pub use profile::ProfileTarget;
-pub use record::{AxisRecord, CycleRecord, CycleTiming, Event, EventKind, MAX_AXES, MAX_BUSES, MAX_GROUPS};
+pub use record::{
+    AxisRecord, CycleRecord, CycleTiming, Event, EventKind, GroupRecord, MAX_AXES, MAX_BUSES, MAX_GROUPS,
+    RecordedStop,
+};
 pub use request::{
     AxisProcessData, ExecutionStart, MappedPdo, ModeChange, Move, ProfileMove, RejectReason, Request,
     RequestEnvelope, RequestError, RequestId, RequestKind, RequestTarget, TrajectoryId,

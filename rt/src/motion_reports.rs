@@ -43,7 +43,7 @@ impl MotionReport {
     }
 }
 
-/// The motions in progress, and the last [`MotionReports::ENDED`] of those that have ended.
+/// The motions in progress, and of those of each group that have ended the last [`MotionReports::ENDED`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MotionReports {
     /// The newest first, without gaps.
@@ -57,14 +57,14 @@ impl Default for MotionReports {
 }
 
 impl MotionReports {
-    /// How many motions are remembered that have ended.
+    /// How many motions of a group are remembered that have ended.
     pub const ENDED: usize = 8;
     /// There is room for a motion of each axis, and for one of each group and one that is to take its place, all in progress,
     /// beside those that have ended.
-    pub const CAPACITY: usize = MAX_AXES + 2 * MAX_GROUPS + Self::ENDED;
+    pub const CAPACITY: usize = MAX_AXES + (2 + Self::ENDED) * MAX_GROUPS;
 
     /// What has become of the motion that a request began. `None` if the request began no motion, or one that has ended and
-    /// was followed by many others.
+    /// was followed by many others of its group.
     pub fn of(&self, request: RequestId) -> Option<MotionState> {
         self.iter().find(|report| report.request == request).map(|report| report.state)
     }
@@ -75,7 +75,7 @@ impl MotionReports {
     }
 
     /// Begins a motion of a group. Those of that group in progress whose axis (`None`: all of it) it takes over are replaced. What
-    /// is in progress is kept, and the newest that have ended.
+    /// is in progress is kept, and the newest of each group that have ended.
     pub fn begin(
         &mut self,
         request: RequestId,
@@ -83,16 +83,19 @@ impl MotionReports {
         axis: Option<u8>,
         takes_over: impl Fn(Option<u8>) -> bool,
     ) {
-        let (mut ended, mut kept) = (0, 0);
+        let (mut ended, mut kept) = ([0; MAX_GROUPS], 0);
         for index in 0..Self::CAPACITY {
             let Some(report) = self.reports.get_mut(index).and_then(Option::as_mut) else { break };
             if report.is_under_way_in(group) && takes_over(report.axis) {
                 report.state = MotionState::Replaced { by: request };
             }
-            let is_in_progress = report.is_in_progress();
-            ended += usize::from(!is_in_progress);
+            let is_kept = report.is_in_progress()
+                || ended.get_mut(usize::from(report.group)).is_some_and(|ended| {
+                    *ended += 1;
+                    *ended <= Self::ENDED
+                });
             // What is not kept gathers at the end.
-            if is_in_progress || ended <= Self::ENDED {
+            if is_kept {
                 if kept < index {
                     self.reports.swap(kept, index);
                 }
@@ -180,6 +183,21 @@ mod tests {
         let remembered: Vec<u64> =
             reports.iter().filter(|report| report.axis.is_none()).map(|report| report.request.0).collect();
         assert_eq!(remembered, (1_091..1_100).rev().collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn what_became_of_a_motion_is_not_forgotten_for_those_of_another_group() {
+        let mut reports = MotionReports::default();
+        for group in 0..MAX_GROUPS as u8 {
+            for request in 0..100 {
+                reports.begin(RequestId(1_000 * u64::from(group) + request), group, None, WHOLE);
+                reports.end_all(group, MotionState::Finished, |_| {});
+            }
+        }
+        for group in 0..MAX_GROUPS as u64 {
+            let remembered = (0..100).filter(|request| of(&reports, 1_000 * group + request).is_some());
+            assert_eq!(remembered.count(), MotionReports::ENDED + usize::from(group + 1 == 8), "{group}");
+        }
     }
 
     #[test]

@@ -1,10 +1,12 @@
 //! What one cycle leaves behind: a record of fixed size, copied to the logger through a lock-free ring.
 
 use crate::cia402::{self, OperationMode};
+use crate::fault::Rule;
 use crate::phase::Phase;
 use crate::request::{RequestError, RequestId};
 use crate::source::StreamState;
 use crate::stop::StopReason;
+use crate::stop_category::StopCategory;
 use crate::time::Nanoseconds;
 use crate::watch::TimingLevel;
 
@@ -72,17 +74,42 @@ pub struct AxisRecord {
     pub position_raw: i32,
 }
 
+/// One group in one cycle.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct GroupRecord {
+    /// What it was doing.
+    pub phase: Phase,
+    /// Why it was stopping or had stopped.
+    pub stop: Option<RecordedStop>,
+    /// How long the call of the callback that leads it took; `None` if none was called.
+    pub callback_ns: Option<Nanoseconds>,
+}
+
+/// What a cycle says of a stop. The event of its beginning says the rest.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RecordedStop {
+    /// How hard it is by now.
+    pub category: StopCategory,
+    /// The rule that was broken.
+    pub rule: Rule,
+}
+
+impl RecordedStop {
+    /// What a cycle says of this stop.
+    pub const fn of(stop: &StopReason) -> Self {
+        Self { category: stop.category, rule: stop.rule() }
+    }
+}
+
 /// One cycle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CycleRecord<const AXES: usize = MAX_AXES> {
     /// When.
     pub timing: CycleTiming,
-    /// What the first group was doing: the only one, unless there are several.
-    pub phase: Phase,
-    /// What every group was doing.
-    pub group_phases: [Phase; MAX_GROUPS],
-    /// How many of `group_phases` count.
+    /// How many of `groups` count: at least one.
     pub group_count: u8,
+    /// Every group, in the order of the configuration.
+    pub groups: [GroupRecord; MAX_GROUPS],
     /// Whether set-points were sent in this cycle; if not, the drives hold the last ones.
     pub is_commanded: bool,
     /// How many of `axes` count.
@@ -95,9 +122,8 @@ impl<const AXES: usize> Default for CycleRecord<AXES> {
     fn default() -> Self {
         Self {
             timing: CycleTiming::default(),
-            phase: Phase::default(),
-            group_phases: [Phase::default(); MAX_GROUPS],
             group_count: 1,
+            groups: [GroupRecord::default(); MAX_GROUPS],
             is_commanded: false,
             axis_count: 0,
             axes: [AxisRecord::default(); AXES],
@@ -106,9 +132,9 @@ impl<const AXES: usize> Default for CycleRecord<AXES> {
 }
 
 impl<const AXES: usize> CycleRecord<AXES> {
-    /// What each group was doing.
-    pub fn group_phases(&self) -> &[Phase] {
-        self.group_phases.get(..self.group_count.into()).unwrap_or(&self.group_phases)
+    /// The groups that count.
+    pub fn groups(&self) -> &[GroupRecord] {
+        self.groups.get(..self.group_count.into()).unwrap_or(&self.groups)
     }
 
     /// The axes that count.

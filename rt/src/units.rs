@@ -129,6 +129,7 @@ impl Scale {
     }
 
     /// Position (rad or m) to counts, to the nearest; beyond 32 bits the nearest end.
+    #[inline]
     pub fn position_to_counts(&self, position: f64) -> i32 {
         nearest(position * self.counts_per_unit + self.zero_counts)
     }
@@ -160,6 +161,7 @@ impl Scale {
 }
 
 /// The nearest 32-bit integer. The cast saturates and takes NaN to 0, so no value can panic or wrap.
+#[inline]
 fn nearest(value: f64) -> i32 {
     libm::rint(value) as i32
 }

@@ -212,3 +212,39 @@ fn a_slow_bus_that_missed_its_slot_sends_the_way_of_one_of_its_cycles_and_not_mo
         }
     }
 }
+
+#[test]
+fn a_bus_that_was_behind_sends_the_way_of_one_of_its_cycles_and_not_more() {
+    for (cycles_behind, jerk) in [(1, 100.0), (2, f64::INFINITY), (4, 100.0)] {
+        // At full speed, and on the way from it to rest.
+        for before in [300, 760, 800] {
+            let mut own = parameters(6);
+            own.axes.iter_mut().for_each(|axis| axis.limits.jerk = jerk);
+            let mut rig = Rig::of(own).enable();
+            rig.move_to(1.25);
+            rig.run(before);
+            rig.buses[0].unconfirmed = 1;
+            rig.run(cycles_behind);
+            rig.buses[0].unconfirmed = 0;
+            let mut last = rig.drive(0).position;
+            let mut fastest = 0;
+            while rig.phase() == Phase::Moving {
+                rig.run(1);
+                let position = rig.drive(0).position;
+                fastest = fastest.max((position - last).abs());
+                last = position;
+            }
+            rig.run(100);
+            let count = scale().resolution();
+            let allowed = LIMITS.velocity * PERIOD_NS as f64 * 1e-9 * count + 1.0;
+            assert!(f64::from(fastest) > 0.2 * allowed, "it is under way: {fastest} of {allowed}");
+            assert!(
+                f64::from(fastest) <= allowed,
+                "{fastest} of {allowed} counts, {cycles_behind}, {before}"
+            );
+            // It has caught up.
+            assert_eq!(rig.drive(0).position, scale().position_to_counts(1.25));
+            assert_eq!(rig.stops(), []);
+        }
+    }
+}

@@ -352,7 +352,7 @@ fn a_fault_of_one_axis_stops_all_with_one_reason_and_needs_a_reset() {
     rig.run(30);
     rig.request(Request::Enable);
     rig.run_until(Phase::Holding, 50);
-    assert_eq!(rig.host.snapshot.stop, None);
+    assert_eq!(rig.host.snapshot.groups[0].stop, None);
 }
 
 #[test]

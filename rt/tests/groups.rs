@@ -131,10 +131,8 @@ fn each_group_has_its_own_motion_by_the_numbers_of_the_controllers_axes() {
     let snapshot = &rig.host.snapshot;
     let [first, second, third] = [0, 1, 2].map(|group| snapshot.groups()[group].remaining_s);
     assert!(second == 0.0 && 0.0 < first && first < third, "{first} {second} {third}");
-    assert_eq!(
-        rig.host.records.last().unwrap().group_phases(),
-        [Phase::Moving, Phase::Holding, Phase::Moving]
-    );
+    let recorded = rig.host.records.last().unwrap().groups().iter();
+    assert!(recorded.map(|group| group.phase).eq([Phase::Moving, Phase::Holding, Phase::Moving]));
     [0, 2].iter().for_each(|group| run_until(&mut rig, *group, Phase::Holding, 2_000));
     for axis in [0, 1, 2, 5] {
         assert!((rig.host.snapshot.axes[axis].position - wanted.target[axis]).abs() < 1e-4, "axis {axis}");

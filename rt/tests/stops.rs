@@ -62,7 +62,7 @@ fn a_fault_on_the_way_of_a_stop_that_was_asked_for_takes_its_place_and_must_be_r
         // The fault itself asks for category 1; what was asked for stays where it is harder.
         let hardest = category.min(StopCategory::One);
         assert_eq!(told(&rig), [(Rule::Requested, category), (Rule::UnexpectedBootUp, hardest)]);
-        let shown = rig.host.snapshot.stop.unwrap();
+        let shown = rig.host.snapshot.groups[0].stop.unwrap();
         assert_eq!((shown.rule(), shown.axis(), shown.category), (Rule::UnexpectedBootUp, Some(1), hardest));
         rig.run_until(Phase::Disabled, 3_000);
         rig.assert_limits_kept();
@@ -104,7 +104,7 @@ fn what_is_asked_for_on_the_way_of_a_fault_does_not_take_its_place() {
     rig.request(Request::Stop(StopCategory::Two));
     rig.run(2);
     assert_eq!(told(&rig), [(Rule::UnexpectedBootUp, StopCategory::One)]);
-    let shown = rig.host.snapshot.stop.unwrap();
+    let shown = rig.host.snapshot.groups[0].stop.unwrap();
     assert_eq!((shown.rule(), shown.category), (Rule::UnexpectedBootUp, StopCategory::Zero));
     rig.run_until(Phase::Disabled, 3_000);
 }
@@ -150,14 +150,15 @@ fn an_error_passive_bus_that_goes_bus_off_makes_the_stop_harder_and_stays_its_on
         ] {
             let mut rig = error_passive_then_off(category, after);
             assert_eq!(rig.phase(), at_once, "{category:?} after {after} cycles");
-            let shown = rig.host.snapshot.stop.unwrap();
+            let shown = rig.host.snapshot.groups[0].stop.unwrap();
             assert_eq!(
                 (shown.rule(), shown.phase, shown.category),
                 (Rule::BusErrorPassive, Phase::Moving, category)
             );
             let begun = rig.host.records.len();
             rig.run_until(Phase::Disabled, 3_000);
-            let is_held = rig.host.records[begun..].iter().any(|record| record.phase == Phase::Holding);
+            let is_held =
+                rig.host.records[begun..].iter().any(|record| record.groups[0].phase == Phase::Holding);
             assert!(!is_held, "{category:?} after {after} cycles: held under power");
             assert_eq!(told(&rig), [(Rule::BusErrorPassive, StopCategory::Two)]);
             rig.assert_limits_kept();
@@ -173,7 +174,7 @@ fn a_bus_that_comes_back_from_bus_off_to_error_passive_does_not_soften_the_stop(
     for state in [BusState::BusOff, BusState::ErrorPassive, BusState::ErrorActive] {
         rig.buses[0].state = state;
         rig.run(20);
-        let shown = rig.host.snapshot.stop.unwrap();
+        let shown = rig.host.snapshot.groups[0].stop.unwrap();
         assert_eq!((shown.rule(), shown.category), (Rule::BusLost, StopCategory::One));
     }
     rig.run_until(Phase::Disabled, 3_000);
@@ -285,7 +286,7 @@ fn nobody_waits_for_a_joint_that_does_not_follow() {
     rig.move_to(2.0);
     rig.run_until(Phase::Stopping, 300);
     assert_eq!(rig.stops()[0].rule(), Rule::FollowingError);
-    let planned_cycles = (rig.host.snapshot.remaining_s * 1e9 / PERIOD_NS as f64).ceil() as usize;
+    let planned_cycles = (rig.host.snapshot.groups[0].remaining_s * 1e9 / PERIOD_NS as f64).ceil() as usize;
     rig.run_until(Phase::Disabling, planned_cycles + 2);
 }
 

@@ -2,7 +2,7 @@
 
 mod fixture;
 
-use fixture::{FRICTION, INERTIA, LIMITS, PERIOD_NS, Rig, axis_in, parameters};
+use fixture::{FRICTION, INERTIA, LIMITS, PERIOD_S, Rig, axis_in, parameters};
 use proptest::prelude::*;
 use takt_rt::plan::State;
 use takt_rt::{
@@ -10,7 +10,6 @@ use takt_rt::{
     StreamState, StreamWish, TorqueLimits,
 };
 
-const PERIOD_S: f64 = PERIOD_NS as f64 * 1e-9;
 /// N·m/s
 const RATE: f64 = 400.0;
 

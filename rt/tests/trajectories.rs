@@ -92,7 +92,10 @@ fn a_trajectory_is_carried_out_exactly_and_reported_when_it_is_finished() {
         }
         if cycle < 1_001 {
             assert_eq!((rig.phase(), state(&rig, request)), (Phase::Moving, Some(MotionState::InProgress)));
-            assert!((rig.host.snapshot.remaining_s - (1.0005 - f64::from(cycle) * PERIOD_S)).abs() < 1e-12);
+            assert!(
+                (rig.host.snapshot.groups[0].remaining_s - (1.0005 - f64::from(cycle) * PERIOD_S)).abs()
+                    < 1e-12
+            );
             rig.run(1);
         }
     }

@@ -8,7 +8,9 @@ use takt_rt::Id;
 use takt_rt::linux::SocketCanPort;
 use thiserror::Error;
 
+use crate::canopen::function_code;
 use crate::config::Config;
+use crate::drive::identifiers;
 
 /// Bytes that the kernel reserves for one frame that waits in the buffer of a socket. The frame with its bookkeeping takes 768 bytes
 /// on Linux 6.1, and up to 960 since 6.3.
@@ -36,17 +38,17 @@ pub struct SocketCanOptions {
 }
 
 impl SocketCanOptions {
-    /// The options of the master on bus number `bus` of a configuration. They let pass every identifier that CANopen gives to the
-    /// nodes on this bus (CiA 301, 7.3.3), in both directions.
+    /// The options of the master on bus number `bus` of a configuration. They let pass every identifier that the drives on this
+    /// bus use, in both directions.
     pub fn of_master(config: &Config, bus: usize) -> Self {
-        let nodes = config.axes.iter().filter(|axis| axis.bus == bus).map(|axis| axis.node);
-        let functions = (1..=0xE).map(|function| function << 7);
-        let of_node = |node: u8| functions.clone().map(move |function| Id::canopen(function, node));
-        let broadcast = [NMT, SYNC, TIME].map(|function| Id::canopen(function, 0));
-        let own = Id::canopen(HEARTBEAT, config.master.node);
+        let axes = config.axes.iter().filter(|axis| axis.bus == bus);
+        let of_drives = axes.flat_map(|axis| identifiers(axis.drive, axis.node));
+        let broadcast = [function_code::NMT, function_code::SYNC, function_code::TIME];
+        let broadcast = broadcast.map(|function| Id::canopen(function, 0));
+        let own = Id::canopen(function_code::ERROR_CONTROL, config.master.node);
         let settings = config.buses.get(bus);
         Self {
-            identifiers: nodes.flat_map(of_node).chain(broadcast).chain([own]).collect(),
+            identifiers: of_drives.chain(broadcast).chain([own]).collect(),
             bit_rate: settings.map_or(1_000_000, |bus| bus.bit_rate),
             data_bit_rate: settings.and_then(|bus| bus.data_bit_rate),
             // The frames of all buses: the kernel may charge one socket with frames that others send in the same call, and
@@ -56,11 +58,6 @@ impl SocketCanOptions {
         }
     }
 }
-
-const NMT: u16 = 0x000;
-const SYNC: u16 = 0x080;
-const TIME: u16 = 0x100;
-const HEARTBEAT: u16 = 0x700;
 
 /// The most set-point frames of an axis in a cycle: a drive has four receive PDOs.
 const COMMANDS_PER_AXIS: usize = 4;
@@ -170,7 +167,10 @@ mod tests {
         for function in [0x080, 0x180, 0x200, 0x480, 0x500, 0x580, 0x600, 0x700] {
             assert!(options.identifiers.contains(&Id::canopen(function, node)), "{function:X}");
         }
-        for id in [Id::canopen(NMT, 0), Id::canopen(SYNC, 0), Id::canopen(HEARTBEAT, config.master.node)] {
+        // The request and the reply of the probe for the vendor's own protocol.
+        let other = [0x640, 0x5C0].map(|base| Id::base(base + u32::from(node)).unwrap());
+        let own = Id::canopen(0x700, config.master.node);
+        for id in [Id::canopen(0x000, 0), Id::canopen(0x080, 0), own].into_iter().chain(other) {
             assert!(options.identifiers.contains(&id), "{id:?}");
         }
         let elsewhere = config.axes.iter().find(|axis| axis.bus == 1).map(|axis| axis.node).unwrap();

@@ -5,8 +5,7 @@
 //! - [`sdo`]: service data objects: the messages, and a client that transfers one object at a time, expedited,
 //!   segmented or in blocks.
 //! - [`emcy`]: emergency messages and the names of their codes.
-//! - [`sync`]: the SYNC message; [`time`]: the TIME message.
-//! - [`heartbeat`]: heartbeat consumers.
+//! - [`time`]: the TIME message.
 //! - [`lss`]: layer setting services: node IDs and bit rates.
 //! - [`dcf`]: the values that a configuration file writes to a device, and their order.
 //! - [`eds`]: electronic data sheets and device configuration files.
@@ -16,7 +15,6 @@
 pub mod dcf;
 pub mod eds;
 pub mod emcy;
-pub mod heartbeat;
 pub mod lss;
 pub mod nmt;
 pub mod object;
@@ -24,17 +22,22 @@ pub mod objects;
 pub mod pdo_configuration;
 pub mod pdo_reader;
 pub mod sdo;
-pub mod sync;
 pub mod time;
 
 /// Function codes of the pre-defined connection set (CiA 301, 7.3.3), to which the node ID is added.
 pub mod function_code {
+    /// Network management, without a node ID.
+    pub const NMT: u16 = 0x000;
     /// SYNC, without a node ID.
     pub const SYNC: u16 = 0x080;
     /// TIME, without a node ID.
     pub const TIME: u16 = 0x100;
     /// EMCY of a device.
     pub const EMERGENCY: u16 = 0x080;
+    /// TPDO 1 to 4.
+    pub const TPDO: [u16; 4] = [0x180, 0x280, 0x380, 0x480];
+    /// RPDO 1 to 4.
+    pub const RPDO: [u16; 4] = [0x200, 0x300, 0x400, 0x500];
     /// SDO server to client.
     pub const SDO_RESPONSE: u16 = 0x580;
     /// SDO client to server.

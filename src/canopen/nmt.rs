@@ -3,7 +3,7 @@
 
 use std::fmt;
 
-use takt_rt::{Frame, Id, Nanoseconds};
+use takt_rt::{Frame, Id};
 
 use super::{function_code, node_of};
 
@@ -116,82 +116,9 @@ impl ErrorControl {
     }
 }
 
-/// Monitors the heartbeat of one node (CiA 301, 7.2.8.2.2.2), from its first message on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct HeartbeatConsumer {
-    node: u8,
-    timeout_ns: Nanoseconds,
-    state: Option<NmtState>,
-    received_at_ns: Nanoseconds,
-    is_lost: bool,
-}
-
-/// An event of a heartbeat consumer.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum HeartbeatEvent {
-    /// The node has booted: its configuration over the bus is lost.
-    BootUp,
-    /// The node has changed its state. Also the first message, and the first one after a loss.
-    Changed {
-        /// The state before; `None` if it was not known.
-        from: Option<NmtState>,
-        /// The state now.
-        to: NmtState,
-    },
-    /// The heartbeat timed out.
-    Lost {
-        /// The last reported state.
-        last: NmtState,
-        /// Time since the last message.
-        silence_ns: Nanoseconds,
-    },
-}
-
-impl HeartbeatConsumer {
-    /// Monitors `node` with this timeout.
-    pub const fn new(node: u8, timeout_ns: Nanoseconds) -> Self {
-        Self { node, timeout_ns, state: None, received_at_ns: 0, is_lost: false }
-    }
-
-    /// The last reported state; `None` before the first message and after a loss.
-    pub fn state(&self) -> Option<NmtState> {
-        self.state.filter(|_| !self.is_lost)
-    }
-
-    /// Receives a frame at `now_ns`; other frames are ignored.
-    pub fn receive(&mut self, now_ns: Nanoseconds, frame: &Frame) -> Option<HeartbeatEvent> {
-        let message = ErrorControl::decode(frame).filter(|message| message.node == self.node)?;
-        let from = self.state();
-        self.state = Some(message.state);
-        self.received_at_ns = now_ns;
-        self.is_lost = false;
-        match message.state {
-            NmtState::BootUp => Some(HeartbeatEvent::BootUp),
-            to if from == Some(to) => None,
-            to => Some(HeartbeatEvent::Changed { from, to }),
-        }
-    }
-
-    /// Returns once that the heartbeat has timed out.
-    pub fn poll(&mut self, now_ns: Nanoseconds) -> Option<HeartbeatEvent> {
-        let last = self.state()?;
-        let silence_ns = now_ns.saturating_sub(self.received_at_ns);
-        // A node that has only booted may not produce a heartbeat yet.
-        if last == NmtState::BootUp || silence_ns <= self.timeout_ns {
-            return None;
-        }
-        self.is_lost = true;
-        Some(HeartbeatEvent::Lost { last, silence_ns })
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn heartbeat(state: NmtState) -> Frame {
-        ErrorControl { node: 2, state }.frame()
-    }
 
     #[test]
     fn commands_are_encoded_as_in_the_standard() {
@@ -227,30 +154,5 @@ mod tests {
         assert_eq!(read(&[5, 0]), None);
         assert_eq!(ErrorControl::decode(&Frame::of(Id::canopen(0x700, 0), [5])), None);
         assert_eq!(ErrorControl::decode(&Frame::of(Id::canopen(0x680, 0), [5])), None);
-    }
-
-    #[test]
-    fn a_consumer_reports_changes_and_each_timeout_once() {
-        let mut consumer = HeartbeatConsumer::new(2, 100);
-        assert_eq!(consumer.poll(1_000), None, "not monitored before the first message");
-        assert_eq!(consumer.receive(1_000, &heartbeat(NmtState::BootUp)), Some(HeartbeatEvent::BootUp));
-        assert_eq!(consumer.poll(5_000), None, "a boot-up message alone does not start monitoring");
-        let changed = HeartbeatEvent::Changed { from: Some(NmtState::BootUp), to: NmtState::PreOperational };
-        assert_eq!(consumer.receive(5_000, &heartbeat(NmtState::PreOperational)), Some(changed));
-        assert_eq!(consumer.receive(5_050, &heartbeat(NmtState::PreOperational)), None);
-        assert_eq!(consumer.poll(5_150), None);
-        let lost = HeartbeatEvent::Lost { last: NmtState::PreOperational, silence_ns: 101 };
-        assert_eq!(consumer.poll(5_151), Some(lost));
-        assert_eq!((consumer.poll(9_000), consumer.state()), (None, None));
-        let back = HeartbeatEvent::Changed { from: None, to: NmtState::Operational };
-        assert_eq!(consumer.receive(9_000, &heartbeat(NmtState::Operational)), Some(back));
-        assert_eq!(consumer.state(), Some(NmtState::Operational));
-    }
-
-    #[test]
-    fn a_consumer_ignores_other_nodes() {
-        let mut consumer = HeartbeatConsumer::new(2, 100);
-        let other = ErrorControl { node: 3, state: NmtState::Operational }.frame();
-        assert_eq!((consumer.receive(0, &other), consumer.state()), (None, None));
     }
 }

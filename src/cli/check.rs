@@ -54,6 +54,8 @@ struct Check {
     groups: Vec<GroupCheck>,
     axes: Vec<AxisCheck>,
     buses: Vec<BusSchedule>,
+    /// What is possible and implausible.
+    warnings: Vec<String>,
 }
 
 /// A group of axes, by names.
@@ -162,6 +164,7 @@ impl Check {
             groups: config.groups.iter().map(|group| GroupCheck::of(config, group)).collect(),
             axes: config.axes.iter().map(|axis| AxisCheck::of(axis, config)).collect(),
             buses,
+            warnings: config.warnings().iter().map(ToString::to_string).collect(),
         }
     }
 }

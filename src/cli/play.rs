@@ -19,7 +19,7 @@ use takt::play::{
     RealStage, SetPointLog, SharedSetPointLog, Stage, StreamSummary, VirtualStage, execute, stream,
 };
 use takt::telemetry::{Machine, StopReport, words};
-use takt_rt::{Follow, NANOSECONDS_PER_SECOND, StopReason, StreamDelay};
+use takt_rt::{Follow, NANOSECONDS_PER_SECOND, Snapshot, StopReason, StreamDelay};
 
 use super::configuration::{self, BusOverride};
 use super::exit::Exit;
@@ -232,7 +232,8 @@ struct Played {
     result: Result<StreamSummary, PlayError>,
     /// How the run ended, where that was not because the file was over.
     outcome: Option<Outcome>,
-    last_stop: Option<StopReason>,
+    /// The state at the end.
+    last: Snapshot,
     axes: Vec<AxisMaxima>,
     not_written: Option<io::Error>,
 }
@@ -255,7 +256,7 @@ fn play_in_virtual_time(
     let result = piece.play(&mut stage, armed);
     let (outcome, snapshot, log) = stage.finish();
     let (axes, not_written) = log.finish();
-    Ok(Played { result, outcome, last_stop: snapshot.stop, axes, not_written })
+    Ok(Played { result, outcome, last: snapshot, axes, not_written })
 }
 
 fn play_in_real_time(
@@ -292,7 +293,7 @@ fn play_in_real_time(
         Outcome::Finished => None,
         outcome => Some(outcome),
     };
-    Ok(Played { result, outcome, last_stop: session.snapshot.stop, axes, not_written })
+    Ok(Played { result, outcome, last: session.snapshot, axes, not_written })
 }
 
 fn refuse(error: &Refused, is_json: bool) -> Exit {
@@ -313,7 +314,7 @@ fn refuse(error: &Refused, is_json: bool) -> Exit {
 fn report(arguments: &Arguments, config: &Config, file: &PlayFile, played: Played) -> Exit {
     let machine = Machine::of(config);
     let summary = played.result.clone().unwrap_or_default();
-    let (exit, stop, failure) = ending(played.result, played.outcome, played.last_stop, &machine);
+    let (exit, stop, failure) = ending(played.result, played.outcome, played.last.first_stop(), &machine);
     let exit = match (&played.not_written, &arguments.out) {
         (Some(error), Some(path)) => {
             say!("takt: {} cannot be written: {error}", path.display());
@@ -322,7 +323,7 @@ fn report(arguments: &Arguments, config: &Config, file: &PlayFile, played: Playe
         _ => exit,
     };
     let printed = Printed {
-        stop: stop.map(|stop| StopReport::new(&stop, &machine)),
+        stop: stop.map(|stop| StopReport::new(&stop, &played.last, &machine)),
         failure,
         points: file.rows.len(),
         late_points: summary.late_points,

@@ -66,6 +66,16 @@ struct Printed<'a> {
     failure: Option<String>,
     /// The axes whose drives could not be reached in the end.
     unreached: Vec<&'a str>,
+    /// The errors that drives showed in the end.
+    drive_errors: Vec<DriveError>,
+}
+
+/// The error that a drive shows.
+#[derive(Serialize)]
+struct DriveError {
+    axis: String,
+    error: String,
+    cure: &'static str,
 }
 
 /// Real-time set-up that was required and refused, as an object.
@@ -85,6 +95,7 @@ pub fn run(arguments: Arguments) -> Exit {
     if let Err(refused) = schedule::verify(&config) {
         return UsageError::from(refused.to_string()).print(arguments.json);
     }
+    config.warnings().iter().for_each(|warning| say!("takt: warning: {warning}"));
     let fault_injector =
         match arguments.faults.as_deref().map(|path| fault_injector(path, &config)).transpose() {
             Ok(fault_injector) => fault_injector,
@@ -191,10 +202,14 @@ fn report(config: &Config, session: &Session, as_json: bool) -> Exit {
     if !unreached.is_empty() {
         say!("takt: {}", unreachable(&unreached, &config.master));
     }
+    let drive_errors = drive_errors(session);
+    drive_errors.iter().for_each(|DriveError { axis, error, cure }| {
+        say!("takt: {axis}: the drive shows {error}; try: {cure}");
+    });
     let failure = failure(config, session);
     let exit = if report.telemetry.not_written.is_empty() { exit } else { exit.and_failed() };
     if as_json {
-        return print::json(&Printed { report: &report, failure, unreached }, exit);
+        return print::json(&Printed { report: &report, failure, unreached, drive_errors }, exit);
     }
     match failure {
         Some(failure) if ended == RunEnd::TakenOver => {
@@ -210,10 +225,22 @@ fn report(config: &Config, session: &Session, as_json: bool) -> Exit {
     }
 }
 
+fn drive_errors(session: &Session) -> Vec<DriveError> {
+    let machine = &session.log.machine;
+    let errors =
+        session.drive_errors.iter().filter_map(|(axis, code)| Some((u8::try_from(*axis).ok()?, *code)));
+    let error = |(axis, code)| DriveError {
+        axis: machine.axis_name(axis),
+        error: machine.drive_error(axis, code),
+        cure: machine.drive_cure(axis, code),
+    };
+    errors.map(error).collect()
+}
+
 fn stop_of(session: &Session) -> Option<StopReason> {
     match session.outcome {
         Outcome::Stopped(stop) => Some(stop),
-        Outcome::Interrupted | Outcome::TakenOver { .. } => session.snapshot.stop,
+        Outcome::Interrupted | Outcome::TakenOver { .. } => session.snapshot.first_stop(),
         _ => None,
     }
 }

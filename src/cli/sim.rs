@@ -1,6 +1,7 @@
 //! `takt sim`: the configured drives, simulated on real interfaces.
 
 use std::path::PathBuf;
+use std::str::FromStr;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
@@ -16,6 +17,7 @@ use takt::sim::LiveDrives;
 use super::configuration::{self, BusOverride};
 use super::exit::Exit;
 use super::interruption;
+use super::lss::SimulatedDevice;
 use super::usage_error::UsageError;
 
 /// Put the drives of a configuration, simulated, on real interfaces, for any master to talk to.
@@ -26,6 +28,30 @@ pub struct Arguments {
     /// Connect a bus to another interface than the configuration says: can0, vcan0 …
     #[arg(long = "bus", value_name = "NAME=INTERFACE")]
     buses: Vec<BusOverride>,
+    /// Put a device beside the drives that has LSS and nothing else: [BUS=]IDENTITY, as in `takt lss --simulate`
+    ///
+    /// Without BUS it is on the first bus that has a real interface.
+    #[arg(long = "lss", value_name = "[BUS=]DEVICE")]
+    lss_devices: Vec<LssOnBus>,
+}
+
+/// A device with LSS, and the name of its bus.
+#[derive(Clone, Debug)]
+struct LssOnBus {
+    bus: Option<String>,
+    device: SimulatedDevice,
+}
+
+impl FromStr for LssOnBus {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let (bus, device) = match text.split_once('=') {
+            Some((bus, device)) => (Some(bus.to_owned()), device),
+            None => (None, text),
+        };
+        Ok(Self { bus, device: device.parse()? })
+    }
 }
 
 /// Runs until Ctrl-C or SIGTERM.
@@ -42,10 +68,21 @@ pub fn run(arguments: &Arguments) -> Exit {
     if let Err(error) = config.validate() {
         return UsageError::from(error).print(false);
     }
-    let drives = match open(&config) {
+    let mut drives = match open(&config) {
         Ok(drives) => drives,
         Err(error) => return UsageError::from(error.to_string()).print(false),
     };
+    for LssOnBus { bus, device } in &arguments.lss_devices {
+        let is_its_bus = |(name, _): &&mut (String, LiveDrives)| bus.as_ref().is_none_or(|bus| bus == name);
+        match drives.iter_mut().find(is_its_bus) {
+            Some((_, drives)) => drives.add_lss_device((*device).into()),
+            None => {
+                let bus = bus.as_deref().unwrap_or_else(|| first_bus(&config));
+                return UsageError::from(format!("--lss: the bus `{bus}` has no real interface"))
+                    .print(false);
+            }
+        }
+    }
     if drives.is_empty() {
         say!("takt: no bus has a real interface; name one, for example: --bus {}=vcan0", first_bus(&config));
         return Exit::Usage;

@@ -1,15 +1,12 @@
 //! First contact with a drive: checks that it answers SDO requests, and that its vendor ID is the expected one.
 
-use takt_rt::{Frame, Id};
-
 use super::failure::Failure;
-use super::family::Family;
 use super::sdo_session::SdoSession;
 use super::target::TargetDrive;
 use crate::canopen::nmt::NmtCommand;
 use crate::canopen::objects::{DEVICE_TYPE, VENDOR_ID};
 use crate::canopen::sdo::SdoError;
-use crate::drive::Access;
+use crate::drive::{self, Access};
 
 /// How long to wait for an answer in the vendor's own protocol.
 const OTHER_PROTOCOL_NS: u64 = 50_000_000;
@@ -54,17 +51,11 @@ pub async fn connect_family(c: &SdoSession, target: &TargetDrive) -> Result<(), 
     if received == expected { Ok(()) } else { Err(Failure::OtherDrive { family, expected, received }) }
 }
 
-/// Checks for eRob firmware without CANopen. Such firmware answers the vendor's command 0x0002 (read position), which
-/// changes nothing. Above node ID 63 the request would use the SDO identifiers of other nodes.
+/// Checks for firmware without CANopen, by a request in the vendor's own protocol that changes nothing.
 async fn other_protocol(c: &SdoSession, target: &TargetDrive) -> Result<Option<&'static str>, Failure> {
-    let node = target.node;
-    if target.family != Family::ErobCanopen || !(1..=63).contains(&node) {
-        return Ok(None);
-    }
-    let id = |base: u32| Id::base(base + u32::from(node));
-    let (Ok(question), Ok(answer)) = (id(0x640), id(0x5C0)) else { return Ok(None) };
-    c.send(Frame::of(question, [0x00, 0x02]));
+    let Some(other) = drive::other_protocol(target.family, target.node) else { return Ok(None) };
+    c.send(other.request);
     let collected = c.collect_frames(OTHER_PROTOCOL_NS).await?;
-    let has_answered = collected.iter().any(|frame| frame.id() == answer);
-    Ok(has_answered.then_some("vendor's custom CAN protocol"))
+    let has_answered = collected.iter().any(|frame| frame.id() == other.answer);
+    Ok(has_answered.then_some(other.name))
 }

@@ -12,9 +12,6 @@ use crate::canopen::sdo::SdoTiming;
 pub use crate::config::DriveFamily as Family;
 
 impl Family {
-    /// Every family.
-    pub const ALL: [Self; 2] = [Self::ErobCanopen, Self::YzAim];
-
     /// Vendor ID, object 1018:1.
     pub const fn vendor_id(self) -> u32 {
         match self {

@@ -6,7 +6,9 @@ use std::collections::VecDeque;
 use takt_rt::{BusPort, Clock, Frame, Nanoseconds, ReceiveBatch};
 
 use super::bus_session::SessionEvent;
-use crate::canopen::lss::{LssAddress, LssError, LssMaster, LssMode, LssOutcome, LssTask, LssTiming};
+use crate::canopen::lss::{
+    Inquiry, LssAddress, LssError, LssMaster, LssMode, LssOutcome, LssResponse, LssTask, LssTiming,
+};
 use crate::canopen::nmt::{ErrorControl, NmtState};
 
 /// Interval between two polls of the bus.
@@ -15,6 +17,11 @@ const POLL_NS: Nanoseconds = 500_000;
 const BOOT_UP_NS: Nanoseconds = 2_000_000_000;
 /// Longest time that the last frame may take to leave.
 const DRAIN_NS: Nanoseconds = 10_000_000;
+/// Time within which every device replies to the same request.
+const FURTHER_REPLIES_NS: Nanoseconds = 100_000_000;
+
+/// The node ID of a device that is not configured (CiA 305).
+pub const NO_NODE: u8 = 255;
 
 /// Why an LSS operation failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -25,9 +32,37 @@ pub enum LayerSettingFailure {
     /// No device without a node ID answers.
     #[error("no device without a node ID answers")]
     NoDevice,
+    /// A fastscan found an identity that no device can have.
+    #[error(transparent)]
+    Implausible(#[from] ImplausibleIdentity),
+    /// More than one device replied to a request that was meant for the only device on the bus.
+    #[error(
+        "{replies} devices answered, though --only means one: {}",
+        if *is_undone { "the node ID was taken back" } else { "nothing was changed" }
+    )]
+    SeveralDevices {
+        /// The number of replies.
+        replies: usize,
+        /// Whether a node ID had been configured and was taken back.
+        is_undone: bool,
+    },
     /// It was interrupted.
     #[error("interrupted")]
     Interrupted,
+}
+
+/// An identity that a fastscan found and that no device can have: devices replied to what they should have ignored.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ImplausibleIdentity {
+    /// All four values are 0.
+    #[error("a device answers every request of the scan, so that an identity of zeros was found")]
+    Zero,
+    /// The device in configuration state was found before.
+    #[error("the scan found a device again")]
+    Repeated,
+    /// The device in configuration state reports another identity.
+    #[error("the scan found an identity that its device does not confirm")]
+    Unconfirmed,
 }
 
 /// The device to select.
@@ -47,10 +82,14 @@ pub struct LayerSettings<'a, P, C> {
     clock: &'a mut C,
     is_interrupted: &'a mut dyn FnMut() -> bool,
     see: &'a mut dyn FnMut(Nanoseconds, SessionEvent),
+    timing: LssTiming,
     master: LssMaster,
+    /// The number of LSS replies since the last task began.
+    replies: usize,
     began_ns: Nanoseconds,
     outgoing: VecDeque<Frame>,
-    booted: Option<u8>,
+    /// The nodes that have sent a boot-up message since the devices were released.
+    booted: Vec<u8>,
 }
 
 impl<'a, P: BusPort, C: Clock> LayerSettings<'a, P, C> {
@@ -62,8 +101,27 @@ impl<'a, P: BusPort, C: Clock> LayerSettings<'a, P, C> {
         see: &'a mut dyn FnMut(Nanoseconds, SessionEvent),
     ) -> Self {
         let began_ns = clock.now_ns();
-        let master = LssMaster::new(LssTiming::default());
-        Self { port, clock, is_interrupted, see, master, began_ns, outgoing: VecDeque::new(), booted: None }
+        let timing = LssTiming::default();
+        let master = LssMaster::new(timing);
+        let outgoing = VecDeque::new();
+        Self {
+            port,
+            clock,
+            is_interrupted,
+            see,
+            timing,
+            master,
+            replies: 0,
+            began_ns,
+            outgoing,
+            booted: vec![],
+        }
+    }
+
+    /// Waits this long for the reply to each request of a fastscan.
+    pub fn with_scan_timeout(mut self, scan_timeout_ns: Nanoseconds) -> Self {
+        self.timing.scan_timeout_ns = scan_timeout_ns;
+        self
     }
 
     /// Runs one LSS task.
@@ -72,7 +130,8 @@ impl<'a, P: BusPort, C: Clock> LayerSettings<'a, P, C> {
     /// The task failed or was interrupted.
     pub fn perform(&mut self, task: LssTask) -> Result<LssOutcome, LayerSettingFailure> {
         // An interrupted task leaves its master in mid-task, so each task gets a new one.
-        self.master = LssMaster::new(LssTiming::default());
+        self.master = LssMaster::new(self.timing);
+        self.replies = 0;
         let _ = self.master.start(task);
         loop {
             self.poll_bus();
@@ -83,6 +142,45 @@ impl<'a, P: BusPort, C: Clock> LayerSettings<'a, P, C> {
                 return Err(LayerSettingFailure::Interrupted);
             }
         }
+    }
+
+    /// Runs one LSS task with a single reply, and waits for the replies of further devices. Returns their number too.
+    fn perform_counting(&mut self, task: LssTask) -> Result<(LssOutcome, usize), LayerSettingFailure> {
+        let outcome = self.perform(task)?;
+        self.poll_for(FURTHER_REPLIES_NS, |_| false)?;
+        Ok((outcome, self.replies))
+    }
+
+    /// Makes sure that only one device is in configuration state: it reads the identity, and counts the replies. A device
+    /// without this service is taken for one device.
+    fn confirm_only(&mut self) -> Result<(), LayerSettingFailure> {
+        let mut has_reply = false;
+        for inquiry in [Inquiry::Vendor, Inquiry::Product, Inquiry::Revision, Inquiry::Serial] {
+            match self.perform_counting(LssTask::Inquire(inquiry)) {
+                Ok((_, 1)) => has_reply = true,
+                Ok((_, replies)) => {
+                    return Err(LayerSettingFailure::SeveralDevices { replies, is_undone: false });
+                }
+                // Replies that differ destroy each other on the wire.
+                Err(LayerSettingFailure::Task(LssError::NoReply { .. })) if !has_reply => return Ok(()),
+                Err(failure) => return Err(failure),
+            }
+        }
+        Ok(())
+    }
+
+    /// Configures the node ID of the device in configuration state, which has the node ID `before` now. When more than
+    /// one device replies, their node IDs are taken back.
+    ///
+    /// # Errors
+    /// More than one device replied, or the task failed.
+    pub fn configure_node(&mut self, node: u8, before: Option<u8>) -> Result<(), LayerSettingFailure> {
+        let (_, replies) = self.perform_counting(LssTask::ConfigureNode(node))?;
+        if replies > 1 {
+            self.perform(LssTask::ConfigureNode(before.unwrap_or(NO_NODE)))?;
+            return Err(LayerSettingFailure::SeveralDevices { replies, is_undone: true });
+        }
+        Ok(())
     }
 
     /// Switches the selected device to LSS configuration state and all others to waiting. Returns its identity, if
@@ -99,44 +197,71 @@ impl<'a, P: BusPort, C: Clock> LayerSettings<'a, P, C> {
             }
             DeviceSelection::Only => {
                 self.perform(LssTask::SwitchGlobal(LssMode::Configuration))?;
+                self.confirm_only()?;
                 Ok(None)
             }
-            DeviceSelection::Unconfigured => match self.scan()? {
+            DeviceSelection::Unconfigured => match self.scan(None)? {
                 Some(address) => Ok(Some(address)),
                 None => Err(LayerSettingFailure::NoDevice),
             },
         }
     }
 
-    /// Finds one device without a node ID that is not yet in configuration state, and switches it there. `None`: there
-    /// is no such device.
+    /// Switches all devices to waiting state, finds the device without a node ID that has the lowest identity above
+    /// `after`, and switches it to configuration state. `None`: there is no such device.
     ///
     /// # Errors
-    /// Answers were lost, or the scan was interrupted.
-    pub fn scan(&mut self) -> Result<Option<LssAddress>, LayerSettingFailure> {
-        match self.perform(LssTask::FastScan([None; 4]))? {
-            LssOutcome::Device(address) => Ok(Some(address)),
-            _ => Ok(None),
+    /// The identity is implausible, replies were lost, or the scan was interrupted.
+    pub fn scan(&mut self, after: Option<LssAddress>) -> Result<Option<LssAddress>, LayerSettingFailure> {
+        self.perform(LssTask::SwitchGlobal(LssMode::Waiting))?;
+        let task = after.map_or(LssTask::FastScan([None; 4]), LssTask::FastScanAfter);
+        let LssOutcome::Device(found) = self.perform(task)? else { return Ok(None) };
+        if found == LssAddress::default() {
+            return Err(ImplausibleIdentity::Zero.into());
+        }
+        match self.perform(LssTask::InquireAddress) {
+            Ok(LssOutcome::Device(address)) if Some(address) == after => {
+                Err(ImplausibleIdentity::Repeated.into())
+            }
+            Ok(LssOutcome::Device(address)) if address != found => {
+                Err(ImplausibleIdentity::Unconfirmed.into())
+            }
+            // A device may lack this service.
+            Ok(_) | Err(LayerSettingFailure::Task(LssError::NoReply { .. })) => Ok(Some(found)),
+            Err(failure) => Err(failure),
         }
     }
 
-    /// Switches all devices to LSS waiting state. With `is_boot_up_awaited`, waits for the boot-up message of a device
-    /// that has just got a node ID, and returns that node ID.
+    /// Switches all devices to LSS waiting state. With `awaited`, waits for the boot-up message of the device that has
+    /// just got this node ID, and returns whether it has come.
     ///
     /// # Errors
     /// It was interrupted.
-    pub fn release(&mut self, is_boot_up_awaited: bool) -> Result<Option<u8>, LayerSettingFailure> {
-        self.booted = None;
+    pub fn release(&mut self, awaited: Option<u8>) -> Result<bool, LayerSettingFailure> {
+        self.booted.clear();
         self.perform(LssTask::SwitchGlobal(LssMode::Waiting))?;
-        let waiting_ns = if is_boot_up_awaited { BOOT_UP_NS } else { DRAIN_NS };
-        let until_ns = self.clock.now_ns().saturating_add(waiting_ns);
-        while self.booted.is_none() && self.clock.now_ns() < until_ns {
+        let Some(node) = awaited else {
+            self.poll_for(DRAIN_NS, |_| false)?;
+            return Ok(false);
+        };
+        self.poll_for(BOOT_UP_NS, |settings| settings.booted.contains(&node))?;
+        Ok(self.booted.contains(&node))
+    }
+
+    /// Polls the bus for this time, or until `is_done`.
+    fn poll_for(
+        &mut self,
+        duration_ns: Nanoseconds,
+        is_done: impl Fn(&Self) -> bool,
+    ) -> Result<(), LayerSettingFailure> {
+        let until_ns = self.clock.now_ns().saturating_add(duration_ns);
+        while !is_done(self) && self.clock.now_ns() < until_ns {
             self.poll_bus();
             if (self.is_interrupted)() {
                 return Err(LayerSettingFailure::Interrupted);
             }
         }
-        Ok(self.booted)
+        Ok(())
     }
 
     fn poll_bus(&mut self) {
@@ -147,10 +272,11 @@ impl<'a, P: BusPort, C: Clock> LayerSettings<'a, P, C> {
         for received in &batch {
             (self.see)(at_ns, SessionEvent::Received(received.frame));
             self.master.receive(&received.frame);
+            self.replies += usize::from(LssResponse::decode(&received.frame).is_some());
             if let Some(ErrorControl { node, state: NmtState::BootUp }) =
                 ErrorControl::decode(&received.frame)
             {
-                self.booted = Some(node);
+                self.booted.push(node);
             }
         }
         while let Some(frame) = self.master.poll(now_ns) {

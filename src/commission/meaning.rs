@@ -9,11 +9,23 @@ use crate::canopen::emcy::Emergency;
 use crate::canopen::nmt::{ErrorControl, NmtCommand, NmtState, NmtTarget};
 use crate::canopen::object::{DataType, Object, ObjectAddress};
 use crate::canopen::sdo::{SdoRequest, SdoResponse};
+use crate::drive;
 
 /// Describes a frame on the bus of `target`.
 pub fn of(target: &TargetDrive, frame: &Frame) -> String {
     if let Some((command, target)) = NmtCommand::decode(frame) {
         return nmt(command, target);
+    }
+    // Its identifiers are those of the SDO of another node, but SDO frames have eight bytes.
+    if let Some(other) = drive::other_protocol(target.family, target.node)
+        && frame.payload().len() < 8
+    {
+        if frame.id() == other.request.id() {
+            return format!("request in the {}", other.name);
+        }
+        if frame.id() == other.answer {
+            return format!("reply in the {}", other.name);
+        }
     }
     if let Some((node, request)) = SdoRequest::decode(frame) {
         return at_node(target, node, requested(target, &request));
@@ -130,10 +142,24 @@ fn other(target: &TargetDrive, frame: &Frame) -> String {
         0x300 => "RPDO2",
         0x400 => "RPDO3",
         0x500 => "RPDO4",
-        0x580 if node < 64 && frame.payload().len() < 8 => "reply in the vendor's own protocol",
-        0x640..=0x67F => "request in the vendor's own protocol",
         _ => "unknown",
     };
     let words = target.family.process_data_words(target, frame).unwrap_or_else(|| kind.to_owned());
     if node == u32::from(target.node) { words } else { format!("node {node}: {kind}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use takt_rt::Id;
+
+    use super::*;
+
+    #[test]
+    fn frames_of_the_vendors_own_protocol_are_named_as_such() {
+        let target = TargetDrive::unconfigured(2, Family::ErobCanopen).unwrap();
+        let words = |id: u32, bytes: &[u8]| of(&target, &Frame::data(Id::base(id).unwrap(), bytes).unwrap());
+        assert_eq!(words(0x642, &[0, 2]), "request in the vendor's custom CAN protocol");
+        assert_eq!(words(0x5C2, &[0, 0, 1, 2, 0x3E]), "reply in the vendor's custom CAN protocol");
+        assert!(words(0x642, &[0x40, 0, 0x10, 0, 0, 0, 0, 0]).starts_with("node 66: read"));
+    }
 }

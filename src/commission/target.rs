@@ -6,7 +6,7 @@ use takt_rt::{Nanoseconds, Scale, ScaleError, ScaleParameters};
 
 use super::failure::Failure;
 use super::family::Family;
-use crate::config::{Axis, Limits, Quantity, Travel};
+use crate::config::{Axis, Limits, Quantity, Travel, is_rounded};
 use crate::controller::assemble;
 
 /// A value as the user wrote it.
@@ -56,7 +56,7 @@ impl TargetDrive {
             counts_per_turn: axis.counts_per_turn,
             scale: assemble::scale(axis)?,
             limits: Some(axis.limits),
-            patience_ns: PATIENCE_NS.saturating_add(axis.simulated.power_up_ns),
+            patience_ns: PATIENCE_NS.saturating_add(axis.power_up_ns),
         })
     }
 
@@ -160,6 +160,21 @@ impl TargetDrive {
         }
     }
 
+    /// A remark where the drive cannot have this velocity exactly: it takes whole numbers.
+    pub fn rounding(&self, velocity: CommandValue) -> Option<String> {
+        let CommandValue::Joint(commanded) = velocity else { return None };
+        let rounded = self.velocity(self.velocity_raw(velocity) as f64);
+        let shown = |velocity| self.velocity_quantity().show(velocity);
+        is_rounded(commanded, rounded).then(|| {
+            format!(
+                "the drive takes whole numbers only: {} becomes {}, {} in its unit",
+                shown(commanded),
+                shown(rounded),
+                self.velocity_raw(velocity)
+            )
+        })
+    }
+
     /// Acceleration in drive units, at least 1.
     pub fn acceleration_raw(&self, acceleration: CommandValue) -> i64 {
         self.velocity_raw(acceleration).abs().max(1)
@@ -250,5 +265,20 @@ mod tests {
         let yz_aim = TargetDrive::unconfigured(1, Family::YzAim).unwrap();
         assert_eq!(yz_aim.velocity_raw(CommandValue::Joint(-0.001)), -1);
         assert_eq!(yz_aim.velocity_raw(CommandValue::Joint(0.0)), 0);
+    }
+
+    #[test]
+    fn a_velocity_that_a_drive_rounds_is_remarked_with_both_values() {
+        let yz_aim = TargetDrive::unconfigured(1, Family::YzAim).unwrap();
+        let remark = yz_aim.rounding(CommandValue::Joint(20_f64.to_radians())).unwrap();
+        assert!(
+            remark.contains("(20 deg/s) becomes") && remark.contains("(18 deg/s), 3 in its unit"),
+            "{remark}"
+        );
+        assert_eq!(yz_aim.rounding(CommandValue::Joint(18_f64.to_radians())), None);
+        assert_eq!(yz_aim.rounding(CommandValue::Joint(0.0)), None);
+        assert_eq!(yz_aim.rounding(CommandValue::Drive(3)), None);
+        let erob = TargetDrive::unconfigured(1, Family::ErobCanopen).unwrap();
+        assert_eq!(erob.rounding(CommandValue::Joint(20_f64.to_radians())), None);
     }
 }

@@ -103,15 +103,15 @@ pub fn torque_loop_bandwidth(period_s: f64) -> f64 {
     (0.15 / period_s).min(40.0)
 }
 
-/// `[axis.simulated] inertia` in kg·m² (kg).
+/// `[axis.joint] inertia` in kg·m² (kg).
 pub const INERTIA: f64 = 1.0;
-/// `[axis.simulated] viscous_friction` in N·m·s/rad (N·s/m).
+/// `[axis.joint] viscous_friction` in N·m·s/rad (N·s/m).
 pub const VISCOUS_FRICTION: f64 = 1.0;
-/// `[axis.simulated] coulomb_friction` in N·m (N).
+/// `[axis.joint] coulomb_friction` in N·m (N).
 pub const COULOMB_FRICTION: f64 = 0.5;
 /// `[axis.simulated] peak_torque` in rated torques, as object 60B2 of the eRob allows (±3000 per mille).
 pub const PEAK_TO_RATED_TORQUE: f64 = 3.0;
-/// `[axis.simulated] power_up`. A real eRob asks for 8 s.
+/// `[[axis]] power_up`. A real eRob asks for 8 s.
 pub const POWER_UP_NS: u64 = 200_000_000;
 
 /// `[program] repeat`

@@ -27,8 +27,8 @@ use takt_rt::{FeedForward, Follow, StopCategories, StreamDelay};
 
 use super::defaults;
 use super::model::{
-    Axis, Bus, Config, Control, Cycle, DriveFamily, FollowingError, Interface, Limits, Master, MissedSlots,
-    Program, Realtime, SimulatedJoint, Simulation, Telemetry, Travel,
+    Axis, Bus, Config, Control, Cycle, DriveFamily, FollowingError, Interface, Joint, Limits, Master,
+    MissedSlots, PowerUpState, Program, Realtime, SimulatedJoint, Simulation, Telemetry, Travel,
 };
 
 impl Config {
@@ -159,7 +159,9 @@ impl Axis {
             heartbeat_ns: None,
             identity: defaults::identity(drive),
             dcf: None,
-            simulated: SimulatedJoint::within(&limits),
+            power_up_ns: defaults::POWER_UP_NS,
+            joint: Joint::default(),
+            simulated: SimulatedJoint::within(&limits, limits.torque),
         }
     }
 
@@ -198,18 +200,38 @@ impl Axis {
     }
 }
 
+impl Joint {
+    /// Rotor and load at the joint: kg·m² (kg).
+    pub fn inertia(&self) -> f64 {
+        self.inertia.unwrap_or(defaults::INERTIA)
+    }
+
+    /// N·m·s/rad (N·s/m)
+    pub fn viscous_friction(&self) -> f64 {
+        self.viscous_friction.unwrap_or(defaults::VISCOUS_FRICTION)
+    }
+
+    /// N·m (N)
+    pub fn coulomb_friction(&self) -> f64 {
+        self.coulomb_friction.unwrap_or(defaults::COULOMB_FRICTION)
+    }
+}
+
+impl Axis {
+    /// The rated torque of the drive at the joint, as long as the drive has not reported its own: N·m (N).
+    pub fn rated_torque(&self) -> f64 {
+        self.joint.rated_torque.unwrap_or(self.limits.torque)
+    }
+}
+
 impl SimulatedJoint {
-    /// A joint with these limits.
-    pub fn within(limits: &Limits) -> Self {
+    /// A joint with these limits and this rated torque.
+    pub fn within(limits: &Limits, rated_torque: f64) -> Self {
         Self {
-            inertia: defaults::INERTIA,
-            viscous_friction: defaults::VISCOUS_FRICTION,
-            coulomb_friction: defaults::COULOMB_FRICTION,
             gravity: 0.0,
-            rated_torque: limits.torque,
-            peak_torque: defaults::PEAK_TO_RATED_TORQUE * limits.torque,
+            peak_torque: defaults::PEAK_TO_RATED_TORQUE * rated_torque,
             initial_position: defaults::initial_position(limits),
-            power_up_ns: defaults::POWER_UP_NS,
+            power_up: PowerUpState::default(),
         }
     }
 }

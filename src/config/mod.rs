@@ -19,6 +19,7 @@ mod rules;
 mod source_view;
 mod spelling;
 pub(crate) mod spot;
+mod warning;
 
 use std::fmt;
 use std::path::Path;
@@ -28,6 +29,7 @@ pub use interface::InterfaceError;
 pub use model::*;
 pub use problem_kind::ProblemKind;
 pub use quantity::{Dimension, Quantity, QuantityError};
+pub use warning::{Warning, WarningKind, is_rounded};
 
 use thiserror::Error;
 

@@ -79,6 +79,11 @@ impl Config {
         }
     }
 
+    /// The group of an axis, an index into [`Config::groups`]; without groups, the only one.
+    pub fn group_of_axis(&self, axis: usize) -> usize {
+        self.groups.iter().position(|group| group.axes.contains(&axis)).unwrap_or(0)
+    }
+
     /// The cycle of a bus: as the controller's, or a multiple of it. A bus that is not there has the controller's.
     pub fn bus_cycle(&self, bus: usize) -> Cycle {
         let divider = self.buses.get(bus).map_or(1, |bus| bus.divider.max(1));
@@ -237,7 +242,11 @@ pub struct Axis {
     /// What a configuration file (DCF or concise DCF) has written to the drive at bring-up, before the controller writes
     /// what it needs itself. Default: none.
     pub dcf: Option<DeviceConfiguration>,
-    /// The drive and joint that stand in on a simulated bus.
+    /// From power-up of the drive to its first answer; commissioning waits for it. Default 200 ms.
+    pub power_up_ns: u64,
+    /// The mechanics of the joint.
+    pub joint: Joint,
+    /// What stands in on a simulated bus, beside the joint.
     pub simulated: SimulatedJoint,
 }
 
@@ -268,6 +277,9 @@ impl Travel {
 }
 
 impl DriveFamily {
+    /// Every family.
+    pub const ALL: [Self; 2] = [Self::ErobCanopen, Self::YzAim];
+
     /// The word for it in a configuration.
     pub const fn word(self) -> &'static str {
         match self {
@@ -474,23 +486,40 @@ pub struct Simulation {
     pub stops_for_missed_slots: bool,
 }
 
-/// The drive and joint that stand in for an axis on a simulated bus.
+/// The mechanics of a joint. The torque loop of CST feeds them forward, and the simulated joint obeys them. An axis in CST on a
+/// real bus must give inertia and friction; elsewhere there are defaults.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Joint {
+    /// Rotor and load at the joint: kg·m² (kg). Default 1.
+    pub inertia: Option<f64>,
+    /// N·m·s/rad (N·s/m). Default 1.
+    pub viscous_friction: Option<f64>,
+    /// N·m (N). Default 0.5.
+    pub coulomb_friction: Option<f64>,
+    /// The rated torque of the drive at the joint: N·m (N). What the drive reports (object 6076) goes before it. Default: the
+    /// torque limit.
+    pub rated_torque: Option<f64>,
+}
+
+/// The NMT state of a simulated YZ-AIM after power-up. The manual does not say which one real units have.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum PowerUpState {
+    /// Pre-operational, as CiA 301 has it.
+    #[default]
+    PreOperational,
+    /// Operational, as programs for these drives seem to expect.
+    Operational,
+}
+
+/// What stands in for an axis on a simulated bus, beside its joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SimulatedJoint {
-    /// Rotor and load at the joint: kg·m² (kg). Default 1.
-    pub inertia: f64,
-    /// N·m·s/rad (N·s/m). Default 1.
-    pub viscous_friction: f64,
-    /// N·m (N). Default 0.5.
-    pub coulomb_friction: f64,
     /// The torque of gravity a quarter turn from 0, where the joint hangs: N·m (the weight of a linear axis: N). Default 0.
     pub gravity: f64,
-    /// What the drive calls rated torque (object 6076): N·m (N). Default: the torque limit.
-    pub rated_torque: f64,
     /// Peak torque: N·m (N). Default: three times the rated torque.
     pub peak_torque: f64,
     /// Position at power-up: rad (m). Default 0, or the limit nearest to it.
     pub initial_position: f64,
-    /// From power-up to the first answer. Default 200 ms.
-    pub power_up_ns: u64,
+    /// The NMT state after power-up; only a YZ-AIM can be operational. Default: pre-operational.
+    pub power_up: PowerUpState,
 }

@@ -51,7 +51,7 @@ pub const FEEDBACK_DELAY_S: RangeInclusive<f64> = 0.0..=0.01;
 pub const TORQUE_RISE_S: RangeInclusive<f64> = 0.001..=10.0;
 /// `axis.following_error.time`, in seconds.
 pub const FOLLOWING_ERROR_TIME_S: RangeInclusive<f64> = 0.0..=10.0;
-/// `axis.simulated.power_up`, in seconds.
+/// `axis.power_up`, in seconds.
 pub const POWER_UP_S: RangeInclusive<f64> = 0.0..=60.0;
 /// `axis.counts_per_turn`
 pub const COUNTS_PER_TURN: Bounds = Bounds::Plausible {

@@ -211,7 +211,7 @@ pub fn scale(axis: &Axis) -> Result<Scale, ScaleError> {
         travel_per_turn: axis.travel.per_turn(),
         reversed: axis.reversed,
         zero_counts: axis.zero_counts.into(),
-        rated_torque: axis.simulated.rated_torque,
+        rated_torque: axis.rated_torque(),
     })
 }
 

@@ -515,7 +515,7 @@ mod tests {
         let (mut rt, host, _log) = channels(&sizes());
         let observer = host.observer();
         assert_eq!(observer.snapshot(), words::NO_SNAPSHOT);
-        let mut snapshot = Snapshot { slot: 9, phase: Phase::Holding, axis_count: 2, ..words::NO_SNAPSHOT };
+        let mut snapshot = Snapshot { slot: 9, axis_count: 2, ..words::NO_SNAPSHOT };
         snapshot.groups[0].phase = Phase::Holding;
         rt.publish(&snapshot);
         assert_eq!((observer.snapshot(), host.snapshot()), (snapshot, snapshot));

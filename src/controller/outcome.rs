@@ -89,8 +89,13 @@ impl Outcome {
             Self::Stopped(stop) => words::stop(stop, machine),
             Self::BringUpFailed(error) => error.to_string(),
             Self::FaultPersists { axis, code } => {
-                let axis = name(*axis);
-                format!("{axis}: the drive is in a fault ({code:#06x}) that a fault reset does not clear")
+                let number = u8::try_from(*axis).unwrap_or(u8::MAX);
+                format!(
+                    "{}: the drive is in a fault, {}, that a fault reset does not clear; try: {}",
+                    name(*axis),
+                    machine.drive_error(number, *code),
+                    machine.drive_cure(number, *code)
+                )
             }
             Self::NotHeard { axis } => format!(
                 "{}: the drive is operational but sends no feedback; is another master changing its PDOs?",

@@ -269,7 +269,7 @@ mod tests {
 
     /// The state after these requests have begun motions that reached their targets.
     fn finished(requests: &[RequestId]) -> Snapshot {
-        let mut snapshot = Snapshot { phase: Phase::Holding, ..Snapshot::default() };
+        let mut snapshot = Snapshot::default();
         for request in requests {
             snapshot.answers.note(*request, None);
             snapshot.motions.begin(*request, 0, None, |_| false);
@@ -338,9 +338,9 @@ mod tests {
         let speeds = |first, second| (ProfileTarget::Velocity(first), ProfileTarget::Velocity(second));
         let (spin, first, second) = asked(runner.poll(0, &finished(&[])));
         assert_eq!((first, second), speeds(0.3, 0.5));
-        let one_of_two = Snapshot { phase: Phase::Moving, ..finished(&spin[..1]) };
+        let one_of_two = finished(&spin[..1]);
         assert_eq!(runner.poll(400_000_000, &one_of_two), ProgramStep::Wait);
-        let driving = Snapshot { phase: Phase::Moving, ..finished(&spin) };
+        let driving = finished(&spin);
         assert_eq!(runner.poll(500_000_000, &driving), ProgramStep::Wait);
         assert_eq!(runner.poll(2_499_000_000, &driving), ProgramStep::Wait);
         let (rest, first, second) = asked(runner.poll(2_500_000_000, &driving));
@@ -377,7 +377,7 @@ mod tests {
         let mut runner = Running::new(&program(1));
         let (request, first) = runner.begin(0, &finished(&[])).unwrap();
         assert_eq!((first.velocity_scale, first.acceleration_scale), (0.5, 0.25));
-        let mut moving = Snapshot { phase: Phase::Moving, ..finished(&[]) };
+        let mut moving = finished(&[]);
         moving.motions.begin(request, 0, None, |_| true);
         for now_s in 0..100 {
             assert_eq!(runner.poll(now_s * 1_000_000_000, &moving), ProgramStep::Wait);

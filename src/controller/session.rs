@@ -60,6 +60,8 @@ pub struct Session {
     pub targets: Vec<Option<f64>>,
     /// The axes whose drives did not answer during the shut-down: see [`Supervisor::unreached`].
     pub unreached: Vec<usize>,
+    /// The axes whose drives showed an error during the shut-down, with its code: see [`Supervisor::drive_errors`].
+    pub drive_errors: Vec<(usize, u16)>,
     /// The result of the real-time set-up.
     pub begun: Begun,
     /// Measurements of the loop; `None` if its thread panicked.
@@ -288,6 +290,7 @@ fn lead_as_owner(
         snapshot: host.snapshot(),
         targets: if has_arrived { supervisor.targets() } else { vec![] },
         unreached: supervisor.unreached().to_vec(),
+        drive_errors: supervisor.drive_errors().to_vec(),
         outcome,
         begun,
         ended,
@@ -350,7 +353,7 @@ mod tests {
             // Without an end, so that only the other one ends it.
             let options = SessionOptions { duration_ns: Some(600_000_000_000), ..SessionOptions::default() };
             let watch = |snapshot: &Snapshot, _| {
-                has_moved.fetch_or(snapshot.phase == Phase::Moving, Ordering::Relaxed);
+                has_moved.fetch_or(snapshot.groups[0].phase == Phase::Moving, Ordering::Relaxed);
                 None
             };
             let session = lead_as_owner(&config, options, Box::new(|_| {}), watch, None, ownership).unwrap();
@@ -363,12 +366,12 @@ mod tests {
             "{:?}",
             session.outcome
         );
-        let stop = session.snapshot.stop.expect("it was stopped");
+        let stop = session.snapshot.groups[0].stop.expect("it was stopped");
         assert_eq!((stop.category, stop.phase), (StopCategory::Two, Phase::Moving));
         assert!(
-            matches!(session.snapshot.phase, Phase::Disabled | Phase::Passive),
+            matches!(session.snapshot.groups[0].phase, Phase::Disabled | Phase::Passive),
             "{:?}",
-            session.snapshot.phase
+            session.snapshot.groups[0].phase
         );
     }
 }

@@ -62,6 +62,8 @@ pub struct Supervisor {
     outcome: Option<Outcome>,
     /// See [`Supervisor::unreached`].
     unreached: Vec<usize>,
+    /// See [`Supervisor::drive_errors`].
+    drive_errors: Vec<(usize, u16)>,
     deadline_ns: Option<u64>,
     duration_ns: Option<u64>,
     /// Whether a client commands the group, in place of the program.
@@ -90,6 +92,7 @@ impl Supervisor {
             interrupt: None,
             outcome: None,
             unreached: Vec::new(),
+            drive_errors: Vec::new(),
             deadline_ns: None,
             duration_ns,
             is_serving: false,
@@ -115,6 +118,12 @@ impl Supervisor {
     /// The axes whose drives were brought up and did not answer during the shut-down. It is unknown whether they have stopped.
     pub fn unreached(&self) -> &[usize] {
         &self.unreached
+    }
+
+    /// The axes whose drives showed an error during the shut-down, with its code. A drive without an error code in its
+    /// process data tells it there alone.
+    pub fn drive_errors(&self) -> &[(usize, u16)] {
+        &self.drive_errors
     }
 
     /// The data that the drives have reported about themselves; empty before they are configured.
@@ -384,9 +393,16 @@ impl Supervisor {
         self.shutdown.poll(now_ns, &mut service_sender(host));
         let outcome = self.shutdown.outcome();
         if outcome.is_some() || elapsed_ns > STAGE_TIMEOUT_NS {
-            if let (Some(Err(error)), false) = (outcome, self.facts.is_empty()) {
-                let silent = error.failures.into_iter().filter(|failure| failure.cause.is_silence());
-                self.unreached = silent.map(|failure| failure.axis).collect();
+            match outcome {
+                Some(Err(error)) if !self.facts.is_empty() => {
+                    let silent = error.failures.into_iter().filter(|failure| failure.cause.is_silence());
+                    self.unreached = silent.map(|failure| failure.axis).collect();
+                }
+                Some(Ok(facts)) => {
+                    let codes = facts.iter().map(|facts| facts.error_code.0).enumerate();
+                    self.drive_errors = codes.filter(|(_, code)| *code != 0).collect();
+                }
+                _ => {}
             }
             self.request(Request::Sync(false));
             self.request(Request::Shutdown);
@@ -473,7 +489,7 @@ fn is_every_group_off(snapshot: &Snapshot) -> bool {
 /// The phase of the first group that is in one which it should have left.
 fn stuck_phase(snapshot: &Snapshot, should_be_left: impl Fn(Phase) -> bool) -> Phase {
     let mut groups = snapshot.groups().iter().map(|group| group.phase);
-    groups.find(|phase| should_be_left(*phase)).unwrap_or(snapshot.phase)
+    groups.find(|phase| should_be_left(*phase)).unwrap_or_default()
 }
 
 /// Passes the frames of a procedure to the service channel. If the channel is full, the frame is lost as on a disturbed bus,

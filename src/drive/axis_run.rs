@@ -3,10 +3,11 @@
 
 mod answers;
 
-use takt_rt::{Frame, Id, Nanoseconds};
+use takt_rt::{Frame, Nanoseconds};
 
 use super::facts::AxisFacts;
 use super::failure::FailureCause;
+use super::identifiers::OtherProtocol;
 use super::step::{Action, Condition, ProcedureStep, ValueSource};
 use crate::canopen::dcf::Download;
 use crate::canopen::emcy::Emergency;
@@ -20,16 +21,6 @@ use crate::config::Axis;
 const AWAIT_PAUSE_NS: Nanoseconds = 5_000_000;
 /// Number of restarts after which a procedure that can begin again gives up.
 const MAX_RESTARTS: u8 = 3;
-
-/// Another protocol that the drive may use instead of CANopen.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct OtherProtocol {
-    pub name: &'static str,
-    /// A request that changes nothing in the drive.
-    pub request: Frame,
-    /// The identifier of the reply.
-    pub answer: Id,
-}
 
 /// What happens when a step fails or the drive restarts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -16,8 +16,10 @@ use super::axis_run::{AxisRun, Policy};
 use super::erob_canopen;
 use super::facts::AxisFacts;
 use super::failure::{AxisFailure, BringUpError};
-use super::step::ProcedureStep;
+use super::identifiers::other_protocol;
+use super::step::{Action, ProcedureStep, ValueSource};
 use super::yz_aim;
+use crate::canopen::object::ObjectAddress;
 use crate::canopen::sdo;
 use crate::config::{Axis, Config, DriveFamily};
 
@@ -79,6 +81,37 @@ pub struct BringUp {
 #[error("the drives are not configured yet, or have already been started")]
 pub struct NotConfigured;
 
+/// The steps from any state to configured, without torque.
+fn configure(config: &Config, axis: &Axis, timing: &BringUpTiming) -> Vec<ProcedureStep> {
+    match axis.drive {
+        DriveFamily::ErobCanopen => erob_canopen::configure(config, axis, timing),
+        DriveFamily::YzAim => yz_aim::configure(config, axis, timing),
+    }
+}
+
+/// The objects to which bring-up writes another value than the configuration file of an axis (`dcf`) has for them.
+pub fn overwritten(config: &Config, axis: &Axis) -> Vec<ObjectAddress> {
+    let Some(file) = &axis.dcf else { return vec![] };
+    let steps = configure(config, axis, &BringUpTiming::default());
+    let after_file = steps.iter().skip_while(|step| !matches!(step.action, Action::WriteBytes(_)));
+    // The last write of each object counts: a PDO is made invalid before it is made valid.
+    let mut last: Vec<(ObjectAddress, ValueSource)> = vec![];
+    for step in after_file {
+        if let Action::Write { object, value, .. } = step.action {
+            last.retain(|(address, _)| *address != object.address);
+            last.push((object.address, value));
+        }
+    }
+    let is_other = |(address, value): &(ObjectAddress, ValueSource)| {
+        let in_file = file.downloads.iter().rev().find(|download| download.object == *address);
+        in_file.is_some_and(|download| match value {
+            ValueSource::Value(value) => !value.to_le_bytes().starts_with(&download.data),
+            ValueSource::ActualPosition => true,
+        })
+    };
+    last.into_iter().filter(is_other).map(|(address, _)| address).collect()
+}
+
 impl BringUp {
     /// Begins with [`Stage::Configure`] for every axis. Nothing is sent before [`BringUp::poll`].
     pub fn new(config: &Config) -> Self {
@@ -88,12 +121,8 @@ impl BringUp {
     /// As [`BringUp::new`], with other timeouts.
     pub fn with_timing(config: &Config, timing: BringUpTiming) -> Self {
         let group = Group::new(config, |axis| {
-            let (steps, other_protocol) = match axis.drive {
-                DriveFamily::ErobCanopen => {
-                    (erob_canopen::configure(config, axis, &timing), erob_canopen::other_protocol(axis.node))
-                }
-                DriveFamily::YzAim => (yz_aim::configure(config, axis, &timing), None),
-            };
+            let steps = configure(config, axis, &timing);
+            let other_protocol = other_protocol(axis.drive, axis.node);
             // The first step is the reset; a drive that has restarted does not need it again.
             AxisRun::new(axis, timing.sdo, steps, Policy::RestartFrom(1), other_protocol)
         });

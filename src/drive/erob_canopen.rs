@@ -3,8 +3,8 @@
 
 use takt_rt::{CommandSlot, Frame, Id, Nanoseconds, controlword};
 
-use super::axis_run::OtherProtocol;
 use super::bring_up::BringUpTiming;
+use super::identifiers::OtherProtocol;
 use super::process_data::{PdoPlan, ProcessData, pdo_id};
 use super::step::{Action, Check, Condition, Fact, ProcedureStep, ReadBack, TextFact, ValueSource};
 use super::step_list::{StepList, counts, rounded_up, watched_heartbeat};
@@ -25,6 +25,19 @@ const FOLLOWING_ERROR_WINDOW: Object = Object::new(0x6065, 0, DataType::I32, "fo
 /// The name of an error code, with this drive's own codes.
 pub fn error_words(code: ErrorCode) -> &'static str {
     if code == MULTI_TURN_BATTERY { "battery voltage of the multi-turn encoder low" } else { code.words() }
+}
+
+/// An error code with its name.
+pub fn error_text(code: ErrorCode) -> String {
+    format!("0x{:04X} ({})", code.0, error_words(code))
+}
+
+/// The cure of an error that is this drive's own.
+pub fn error_advice(code: ErrorCode) -> Option<&'static str> {
+    (code == MULTI_TURN_BATTERY).then_some(
+        "replace the battery, then use `clear-fault --yes`; this also clears the turn count, so the joint's zero \
+         must be set again",
+    )
 }
 
 /// The vendor's own protocol of firmware without CANopen. The request 0x0002 reads the position and changes nothing.
@@ -124,7 +137,7 @@ fn come_to_rest(list: &mut StepList, axis: &Axis, timing: &BringUpTiming) {
     list.read(objects::ERROR_CODE, Check::Any, Fact::ErrorCode);
     list.condition = Condition::HasTorque;
     let deceleration = counts(axis, axis.limits.deceleration);
-    list.write_optional(objects::QUICK_STOP_DECELERATION, deceleration);
+    list.write_unless_in_file(axis, objects::QUICK_STOP_DECELERATION, deceleration);
     list.write(objects::CONTROLWORD, controlword::QUICK_STOP.into());
     let stopping_ns = (axis.limits.velocity / axis.limits.deceleration * 1e9) as Nanoseconds;
     list.push(Action::Await {
@@ -249,21 +262,22 @@ fn has_target(axis: &Axis, target: CommandSlot) -> bool {
 }
 
 /// Sets the drive's limits beyond those of the controller, which acts first. Sets the drive's profile to the axis'
-/// limits, because the defaults are very slow (6081 = 10000 count/s); the cyclic modes use it too.
+/// limits, because the defaults are very slow (6081 = 10000 count/s); the cyclic modes use it too. What the axis' configuration
+/// file has for them holds instead.
 fn limits(list: &mut StepList, axis: &Axis) {
     list.begin("limits", "choose limits for this axis that its drive accepts");
     let limits = &axis.limits;
     if has_target(axis, CommandSlot::TargetPosition) {
         // In profile position mode the drive follows its own profile, so its following error is not limited here.
         let error = if axis.control.is_profile() { f64::INFINITY } else { 2.0 * axis.following_error.limit };
-        list.write_optional(FOLLOWING_ERROR_WINDOW, counts(axis, error).min(i32::MAX.into()));
-        list.write_optional(objects::PROFILE_VELOCITY, counts(axis, limits.velocity));
+        list.write_unless_in_file(axis, FOLLOWING_ERROR_WINDOW, counts(axis, error).min(i32::MAX.into()));
+        list.write_unless_in_file(axis, objects::PROFILE_VELOCITY, counts(axis, limits.velocity));
     }
     if has_target(axis, CommandSlot::TargetPosition) || has_target(axis, CommandSlot::TargetVelocity) {
-        list.write_optional(objects::PROFILE_ACCELERATION, counts(axis, limits.acceleration));
-        list.write_optional(objects::PROFILE_DECELERATION, counts(axis, limits.deceleration));
+        list.write_unless_in_file(axis, objects::PROFILE_ACCELERATION, counts(axis, limits.acceleration));
+        list.write_unless_in_file(axis, objects::PROFILE_DECELERATION, counts(axis, limits.deceleration));
     }
-    list.write_optional(objects::QUICK_STOP_DECELERATION, counts(axis, limits.deceleration));
+    list.write_unless_in_file(axis, objects::QUICK_STOP_DECELERATION, counts(axis, limits.deceleration));
 }
 
 /// Sets the target to the actual position. Enabling with an old target would make the axis jump.

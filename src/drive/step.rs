@@ -165,7 +165,7 @@ impl Check {
             Self::Masked { value, mask } => format!("{} in the bits 0x{mask:08X}", object.show(value)),
             Self::Profile(profile) => format!("a device of profile CiA {profile}"),
             Self::Supports(mode) => {
-                format!("bit {} ({})", mode.supported_bit().trailing_zeros(), mode_words(mode))
+                format!("bit {} ({})", mode.supported_bit().trailing_zeros(), mode.name())
             }
             Self::NoTorque => "a state without torque".into(),
             Self::AtMost(limit) => format!("standstill (at most {limit})"),
@@ -180,26 +180,11 @@ impl Check {
             Self::Supports(_) => {
                 let supported =
                     OperationMode::ALL.into_iter().filter(|mode| Self::Supports(*mode).passes(value));
-                let names: Vec<&str> = supported.map(mode_words).collect();
+                let names: Vec<&str> = supported.map(OperationMode::name).collect();
                 Some(if names.is_empty() { "no mode at all".into() } else { names.join(", ") })
             }
             _ => None,
         }
-    }
-}
-
-/// The name of a mode of operation in CiA 402.
-pub fn mode_words(mode: OperationMode) -> &'static str {
-    match mode {
-        OperationMode::ProfilePosition => "profile position",
-        OperationMode::Velocity => "velocity",
-        OperationMode::ProfileVelocity => "profile velocity",
-        OperationMode::ProfileTorque => "profile torque",
-        OperationMode::Homing => "homing",
-        OperationMode::InterpolatedPosition => "interpolated position",
-        OperationMode::CyclicSynchronousPosition => "cyclic synchronous position",
-        OperationMode::CyclicSynchronousVelocity => "cyclic synchronous velocity",
-        OperationMode::CyclicSynchronousTorque => "cyclic synchronous torque",
     }
 }
 

@@ -105,7 +105,7 @@ impl StepList {
         self.push(Action::Read { object, check: Check::Any, keep: Some(keep), is_optional: true });
     }
 
-    /// Writes the axis' configuration file (`dcf`). It comes first, so that the controller's own settings override it.
+    /// Writes the axis' configuration file (`dcf`). It comes first, so that what the controller needs overrides it.
     pub fn configuration_file(&mut self, axis: &Axis) {
         self.begin(
             "configuration file",
@@ -152,6 +152,14 @@ impl StepList {
 
     pub fn write_optional(&mut self, object: Object, value: i64) {
         self.write_with(object, value, ReadBack::No, true);
+    }
+
+    /// Writes a setting of the drive that the configuration file of the axis may have otherwise: the file wins.
+    pub fn write_unless_in_file(&mut self, axis: &Axis, object: Object, value: i64) {
+        let mut downloads = axis.dcf.iter().flat_map(|file| &file.downloads);
+        if !downloads.any(|download| download.object == object.address) {
+            self.write_optional(object, value);
+        }
     }
 
     pub fn write_cob_id(&mut self, parameters: PdoParameters, value: u32) {

@@ -4,6 +4,8 @@
 //! The PDO mapping is fixed. The drive has no mode display (6061) and no emergency messages, and it does not answer SDO
 //! requests for unknown objects.
 
+mod alarm;
+
 use takt_rt::{Nanoseconds, controlword};
 
 use super::bring_up::BringUpTiming;
@@ -14,6 +16,8 @@ use crate::canopen::object::{DataType, Object};
 use crate::canopen::objects::{self, PdoDirection, PdoParameters};
 use crate::config::{Axis, Config, Control};
 
+pub use alarm::{Alarm, Clearing};
+
 /// Pause between controlwords while enabling; a drive that has just booted ignores controlwords that follow sooner.
 pub const CONTROLWORD_SPACING_NS: Nanoseconds = 20_000_000;
 /// The only period of interpolated position mode (manual, 5.10.3).
@@ -21,7 +25,9 @@ pub const INTERPOLATION_PERIOD_NS: Nanoseconds = 2_000_000;
 /// The highest value of 6081 and 60FF, in r/min.
 pub const HIGHEST_SPEED_RPM: f64 = 3000.0;
 /// At this value of 6083 and above the drive uses no ramp (4.3).
-const NO_RAMP: i64 = 60_000;
+pub const NO_RAMP: i64 = 60_000;
+/// Below this speed the drive counts as standing: 1 r/min, in the 0.1 r/min of object 606C by SDO (A27).
+pub const STANDSTILL: i64 = 10;
 /// Special function 2619: interpolation over CANopen.
 const INTERPOLATION: i64 = 7;
 /// Statusword bits 0 and 1 (switched on) are clear.
@@ -89,8 +95,7 @@ fn come_to_rest(list: &mut StepList, axis: &Axis, timing: &BringUpTiming) {
     list.write(objects::CONTROLWORD, (controlword::ENABLE_OPERATION | controlword::HALT).into());
     list.push(Action::Await {
         object: objects::VELOCITY_ACTUAL_VALUE,
-        // 606C has units of 0.1 r/min by SDO.
-        check: Check::AtMost(100),
+        check: Check::AtMost(STANDSTILL),
         keep: None,
         within_ns: timing.confirm_timeout_ns,
     });

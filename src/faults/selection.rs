@@ -4,6 +4,7 @@ use std::ops::RangeInclusive;
 
 use takt_rt::Frame;
 
+use crate::canopen::function_code;
 use crate::sim::random::Random;
 
 /// The direction of a frame, seen from the controller.
@@ -39,15 +40,16 @@ pub enum FrameFunction {
 
 impl FrameFunction {
     /// Whether an identifier has this function.
-    pub const fn includes(self, id: u32) -> bool {
+    pub fn includes(self, id: u32) -> bool {
+        let is_of = |functions: &[u16]| functions.iter().any(|function| id & !0x7F == u32::from(*function));
         match self {
-            Self::Nmt => id == 0x000,
-            Self::Sync => id == 0x080,
-            Self::Emergency => matches!(id, 0x081..=0x0FF),
-            Self::Tpdo => matches!(id & !0x7F, 0x180 | 0x280 | 0x380 | 0x480),
-            Self::Rpdo => matches!(id & !0x7F, 0x200 | 0x300 | 0x400 | 0x500),
-            Self::Sdo => matches!(id & !0x7F, 0x580 | 0x600),
-            Self::Heartbeat => matches!(id & !0x7F, 0x700),
+            Self::Nmt => id == u32::from(function_code::NMT),
+            Self::Sync => id == u32::from(function_code::SYNC),
+            Self::Emergency => is_of(&[function_code::EMERGENCY]) && id != u32::from(function_code::SYNC),
+            Self::Tpdo => is_of(&function_code::TPDO),
+            Self::Rpdo => is_of(&function_code::RPDO),
+            Self::Sdo => is_of(&[function_code::SDO_RESPONSE, function_code::SDO_REQUEST]),
+            Self::Heartbeat => is_of(&[function_code::ERROR_CONTROL]),
         }
     }
 }

@@ -45,14 +45,16 @@ impl TriggerTimes {
                 trigger.store(snapshot.at_ns, Ordering::Relaxed);
             }
         };
-        match snapshot.phase {
-            Phase::Holding => note(&self.enabled_ns),
-            Phase::Moving | Phase::Streaming => {
-                note(&self.enabled_ns);
-                note(&self.moving_ns);
+        for group in snapshot.groups() {
+            match group.phase {
+                Phase::Holding => note(&self.enabled_ns),
+                Phase::Moving | Phase::Streaming => {
+                    note(&self.enabled_ns);
+                    note(&self.moving_ns);
+                }
+                Phase::Stopping => note(&self.stopping_ns),
+                Phase::Passive | Phase::Disabled | Phase::Enabling | Phase::Disabling => {}
             }
-            Phase::Stopping => note(&self.stopping_ns),
-            Phase::Passive | Phase::Disabled | Phase::Enabling | Phase::Disabling => {}
         }
     }
 
@@ -75,7 +77,11 @@ mod tests {
     #[test]
     fn only_the_first_occurrence_of_a_trigger_counts() {
         let trigger_times = TriggerTimes::default();
-        let seen = |phase, at_ns| Snapshot { phase, at_ns, ..Snapshot::default() };
+        let seen = |phase, at_ns| {
+            let mut snapshot = Snapshot { at_ns, ..Snapshot::default() };
+            snapshot.groups[0].phase = phase;
+            snapshot
+        };
         trigger_times.observe(&seen(Phase::Enabling, 1));
         assert_eq!(trigger_times.at_ns(Trigger::Enabled), None);
         for (phase, at_ns) in

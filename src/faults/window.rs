@@ -165,7 +165,9 @@ mod tests {
         let window = Window { trigger: Trigger::Moving, after_ns: 10, lasts_ns: Some(5) };
         let (mut timer, trigger_times) = timer(window);
         assert_eq!(timer.poll(100), Edge::None);
-        trigger_times.observe(&Snapshot { phase: Phase::Moving, at_ns: 100, ..Snapshot::default() });
+        let mut moving = Snapshot { at_ns: 100, ..Snapshot::default() };
+        moving.groups[0].phase = Phase::Moving;
+        trigger_times.observe(&moving);
         let edges = [109, 110, 114, 115, 200].map(|now_ns| timer.poll(now_ns));
         assert_eq!(edges, [Edge::None, Edge::Began, Edge::None, Edge::Ended, Edge::None]);
         assert_eq!((timer.progress().began_ns(), timer.progress().ended_ns()), (Some(110), Some(115)));

@@ -151,7 +151,7 @@ pub fn measure(
     let _ = host.request(Request::Sync(has_bus));
     let running = realtime_thread::start(realtime_thread::thread_config(&options.realtime), work)?;
     let begun = running.begun();
-    let mut statistics = Statistics::new(0);
+    let mut statistics = Statistics::new(vec![]);
     while !running.is_finished() {
         collect(&mut log, &mut statistics, options.cycles);
         let done = statistics.cycles + log.records_dropped();

@@ -135,8 +135,8 @@ impl SetPointLog {
 
     /// Whether every group that plays is in such a phase.
     fn are_all(&self, record: &CycleRecord, is_such: impl Fn(Phase) -> bool) -> bool {
-        let phases = self.groups.iter().filter_map(|group| record.group_phases.get(usize::from(*group)));
-        phases.copied().all(is_such)
+        let mut own = self.groups.iter().filter_map(|group| record.groups.get(usize::from(*group)));
+        own.all(|group| is_such(group.phase))
     }
 
     /// Takes the record of the next cycle. Set-points that were not sent leave no row.
@@ -289,8 +289,8 @@ mod tests {
     }
 
     fn record(slot: u64, phase: Phase, position: f64) -> CycleRecord {
-        let mut record = CycleRecord { phase, is_commanded: true, axis_count: 1, ..CycleRecord::default() };
-        record.group_phases[0] = phase;
+        let mut record = CycleRecord { is_commanded: true, axis_count: 1, ..CycleRecord::default() };
+        record.groups[0].phase = phase;
         record.timing.slot = slot;
         record.axes[0].position_set = position;
         record

@@ -7,6 +7,7 @@ use takt_rt::linux::{MonotonicClock, SocketCanPort};
 use takt_rt::{BusHealth, BusPort, Clock, Nanoseconds, ReceiveBatch};
 
 use super::drive::Drive;
+use super::lss::LssDevice;
 use super::mailbox::{Mailbox, QueueOrder};
 use super::port::{DRIVE_MAILBOX, drives_of};
 use crate::config::Config;
@@ -19,6 +20,8 @@ const LONGEST_WAIT_NS: Nanoseconds = 20_000_000;
 pub struct LiveDrives {
     port: SocketCanPort,
     stations: Vec<(Box<dyn Drive>, Mailbox)>,
+    /// Devices that have LSS and nothing else. Their frames follow those of the drives.
+    lss_devices: Vec<(LssDevice, Mailbox)>,
     /// Frames in arbitration order, each with the index of its sender; the port takes them next.
     leaving: Vec<(usize, Frame)>,
     /// Start of the drives' time.
@@ -34,9 +37,19 @@ impl LiveDrives {
         Self {
             port,
             stations: stations.collect(),
+            lss_devices: vec![],
             leaving: vec![],
             epoch_ns: MonotonicClock::default().now_ns(),
         }
+    }
+
+    /// Puts a device beside the drives that has LSS and nothing else. It boots if it has a node ID.
+    pub fn add_lss_device(&mut self, mut device: LssDevice) {
+        let mut mailbox = Mailbox::new(QueueOrder::FirstInFirstOut, DRIVE_MAILBOX);
+        if let Some(boot_up) = device.power_cycle() {
+            mailbox.push(boot_up);
+        }
+        self.lss_devices.push((device, mailbox));
     }
 
     /// Runs until `is_stopped`. Sleeps while there is nothing to do.
@@ -99,11 +112,22 @@ impl LiveDrives {
                 drive.receive(now_ns, frame, mailbox);
             }
         }
+        for (device, mailbox) in &mut self.lss_devices {
+            // The replies of LSS devices are no requests, so a device may hear its own.
+            if let Some(reply) = device.receive(frame) {
+                mailbox.push(reply);
+            }
+        }
     }
 
     fn send_frames(&mut self, now_ns: Nanoseconds) {
         if self.leaving.is_empty() {
             for (index, (_, mailbox)) in self.stations.iter_mut().enumerate() {
+                while let Some(frame) = mailbox.pop() {
+                    self.leaving.push((index, frame));
+                }
+            }
+            for (index, (_, mailbox)) in (self.stations.len()..).zip(&mut self.lss_devices) {
                 while let Some(frame) = mailbox.pop() {
                     self.leaving.push((index, frame));
                 }
@@ -133,12 +157,13 @@ mod tests {
     use takt_rt::Id;
 
     use super::*;
+    use crate::canopen::lss::{LssAddress, LssRequest, LssResponse};
 
     /// The drives of the first bus of a configuration on one end of a socket pair, and the other end. Only the
     /// interface differs from a real one.
     fn connected() -> (LiveDrives, SocketCanPort) {
         let mut config = Config::load(Path::new("configs/arm6-erob.toml")).unwrap();
-        config.axes.iter_mut().for_each(|axis| axis.simulated.power_up_ns = 1_000_000);
+        config.axes.iter_mut().for_each(|axis| axis.power_up_ns = 1_000_000);
         let (ours, theirs) = UnixDatagram::pair().unwrap();
         let port = |socket: &UnixDatagram| SocketCanPort::new(socket.as_raw_fd(), 1_000_000, None).unwrap();
         (LiveDrives::new(&config, 0, port(&ours)), port(&theirs))
@@ -171,6 +196,20 @@ mod tests {
         assert_eq!(answer[0].id(), Id::canopen(0x580, nodes[1]));
         assert_eq!(answer[0].payload()[..4], [0x43, 0x00, 0x10, 0]);
         assert_eq!(drives.health().rx_frames, 1);
+    }
+
+    #[test]
+    fn lss_devices_beside_the_drives_answer_a_scan() {
+        let (mut drives, mut master) = connected();
+        let device = |serial| LssDevice::new(LssAddress { vendor: 1, product: 2, revision: 3, serial }, None);
+        drives.add_lss_device(device(1));
+        drives.add_lss_device(device(2));
+        let boot_ups = drives.nodes().count();
+        received(&mut drives, &mut master, boot_ups);
+        let begin = LssRequest::FastScan { value: 0, lowest_bit: 0x80, part: 0, next: 0 };
+        assert_eq!(master.send(0, &[begin.frame()]), 1);
+        let answers = received(&mut drives, &mut master, 2);
+        assert!(answers.iter().all(|frame| LssResponse::decode(frame) == Some(LssResponse::Identified)));
     }
 
     #[test]

@@ -19,6 +19,17 @@ struct Settings {
     bit_timing: BitTiming,
 }
 
+/// How a device treats requests for which CiA 305 leaves room.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum LssStack {
+    /// A device in configuration state ignores fastscan requests.
+    #[default]
+    Standard,
+    /// As CANopenNode 4: a device in configuration state replies to every fastscan request, whatever identity it asks
+    /// for. The two identify services are missing.
+    CanOpenNode,
+}
+
 /// A simulated LSS device.
 #[derive(Clone, Copy, Debug)]
 pub struct LssDevice {
@@ -37,6 +48,10 @@ pub struct LssDevice {
     scan_part: u8,
     /// Whether it supports the store service.
     pub can_store: bool,
+    /// Its treatment of fastscan requests.
+    pub stack: LssStack,
+    /// Whether it boots when it has got a node ID, as CiA 305 demands.
+    pub boots: bool,
 }
 
 impl LssDevice {
@@ -53,6 +68,8 @@ impl LssDevice {
             identified: 0,
             scan_part: 0,
             can_store: true,
+            stack: LssStack::Standard,
+            boots: true,
         }
     }
 
@@ -73,7 +90,8 @@ impl LssDevice {
 
     /// Cuts and restores the supply: the stored settings take effect, and the device boots if it has a node ID.
     pub fn power_cycle(&mut self) -> Option<Frame> {
-        *self = Self { can_store: self.can_store, ..Self::new(self.address, None).with(self.stored) };
+        let Self { can_store, stack, boots, .. } = *self;
+        *self = Self { can_store, stack, boots, ..Self::new(self.address, None).with(self.stored) };
         self.boot_up()
     }
 
@@ -84,9 +102,16 @@ impl LssDevice {
     /// Receives a frame of the master and returns the response.
     pub fn receive(&mut self, frame: &Frame) -> Option<Frame> {
         let request = LssRequest::decode(frame)?;
+        let is_canopen_node = self.stack == LssStack::CanOpenNode;
         let answer = match request {
             LssRequest::SwitchGlobal(mode) => return self.switch(mode),
             LssRequest::SwitchSelective { part, value } => self.select(part, value)?,
+            LssRequest::IdentifyRemote { .. } | LssRequest::IdentifyUnconfigured if is_canopen_node => {
+                return None;
+            }
+            LssRequest::FastScan { .. } if is_canopen_node && self.mode == LssMode::Configuration => {
+                LssResponse::Identified
+            }
             LssRequest::IdentifyRemote { part, value } => self.identify(part, value)?,
             LssRequest::IdentifyUnconfigured if self.active.node.is_none() => {
                 LssResponse::IdentifiedUnconfigured
@@ -136,7 +161,7 @@ impl LssDevice {
             return None;
         }
         self.active.node = self.pending.node;
-        self.boot_up()
+        self.boots.then(|| self.boot_up()).flatten()
     }
 
     fn boot_up(&self) -> Option<Frame> {

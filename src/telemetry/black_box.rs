@@ -44,8 +44,13 @@ pub struct BlackBoxOptions {
 /// What makes the black box write a file.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Incident {
-    /// The group stopped for a fault.
-    Stop(StopReason),
+    /// A group stopped for a fault.
+    Stop {
+        /// Which.
+        group: Option<u8>,
+        /// Why.
+        stop: StopReason,
+    },
     /// A drive reports a fault while the group is not enabled: no stop follows.
     Drive {
         /// The axis.
@@ -67,7 +72,7 @@ impl Incident {
     /// Its key, for the name of the file.
     pub fn key(&self) -> &'static str {
         match self {
-            Self::Stop(stop) => words::rule_key(stop.rule()),
+            Self::Stop { stop, .. } => words::rule_key(stop.rule()),
             Self::Drive { .. } => words::rule_key(Rule::DriveFault),
             Self::ThreadDied => "thread_died",
             Self::CallbackPanicked(_) => "callback_panicked",
@@ -77,7 +82,7 @@ impl Incident {
     /// A sentence that says what happened.
     pub fn words(&self, machine: &Machine) -> String {
         match self {
-            Self::Stop(stop) => words::stop(stop, machine),
+            Self::Stop { stop, .. } => words::stop(stop, machine),
             Self::Drive { axis, code, slot, phase } => {
                 let as_stop = StopReason {
                     category: StopCategory::Zero,
@@ -86,7 +91,8 @@ impl Incident {
                     slot: *slot,
                     phase: *phase,
                 };
-                format!("{} while {}", words::stop_cause(&as_stop, machine), words::phase(*phase))
+                let cause = words::stop_cause(&as_stop, machine);
+                format!("{cause} while {}; try: {}", words::phase(*phase), machine.drive_cure(*axis, *code))
             }
             Self::ThreadDied => "the real-time thread ended by itself".to_owned(),
             Self::CallbackPanicked(message) => format!("a function of the caller panicked: {message}"),
@@ -104,7 +110,10 @@ impl Incident {
             metadata.insert(key.to_owned(), value);
         };
         match self {
-            Self::Stop(stop) => {
+            Self::Stop { group, stop } => {
+                if let Some(group) = group.filter(|_| machine.groups.len() > 1) {
+                    add("group", machine.group_name(group));
+                }
                 add("slot", stop.slot.to_string());
                 add("category", (stop.category as u8).to_string());
                 add("phase", words::phase(stop.phase).to_owned());
@@ -143,6 +152,8 @@ pub struct BlackBox {
     wall_clock: WallClock,
     started_ns: Nanoseconds,
     drives: Vec<Option<DriveState>>,
+    /// The group of each axis.
+    groups: Vec<usize>,
     open: Option<OpenFile>,
     files: Vec<PathBuf>,
     replaced: u64,
@@ -164,6 +175,7 @@ impl BlackBox {
             wall_clock,
             started_ns,
             drives: vec![None; machine.axes.len()],
+            groups: machine.groups_of_axes(),
             open: None,
             files: Vec::new(),
             replaced: 0,
@@ -187,10 +199,12 @@ impl BlackBox {
         self.history.event(event);
         self.write(|recording| recording.event(event, text));
         match event.kind {
-            EventKind::Stop(stop) if stop.rule() != Rule::Requested => Some(Incident::Stop(stop)),
+            EventKind::Stop(stop) if stop.rule() != Rule::Requested => {
+                Some(Incident::Stop { group: event.group, stop })
+            }
             EventKind::DriveState { axis, state, .. } => {
                 let known = self.drives.get_mut(usize::from(axis))?.replace(state);
-                let phase = self.history.last_phase();
+                let phase = self.history.last_phase(*self.groups.get(usize::from(axis))?);
                 // While the group is enabled, the engine stops it and reports the fault. During bring-up, a fault is an old one.
                 let is_new = known.is_some_and(|known| !known.is_faulted()) && state.is_faulted();
                 let code = self.history.last_error_code(axis.into());

@@ -3,7 +3,8 @@
 use std::collections::VecDeque;
 
 use takt_rt::{
-    AxisRecord, CycleRecord, CycleTiming, Event, Frame, FrameKind, Id, MAX_AXES, Nanoseconds, Phase,
+    AxisRecord, CycleRecord, CycleTiming, Event, Frame, FrameKind, GroupRecord, Id, MAX_AXES, MAX_GROUPS,
+    Nanoseconds, Phase,
 };
 
 use crate::bus::trace::{TracedFrame, TracedHealth};
@@ -20,7 +21,8 @@ const HEALTH_CHANGES: usize = 4096;
 #[derive(Clone, Copy)]
 struct Times {
     timing: CycleTiming,
-    phase: Phase,
+    group_count: u8,
+    groups: [GroupRecord; MAX_GROUPS],
     is_commanded: bool,
 }
 
@@ -88,7 +90,12 @@ impl History {
             self.cycles.pop_front();
             self.axes.drain(..self.axis_count.min(self.axes.len()));
         }
-        let times = Times { timing: record.timing, phase: record.phase, is_commanded: record.is_commanded };
+        let times = Times {
+            timing: record.timing,
+            group_count: record.group_count,
+            groups: record.groups,
+            is_commanded: record.is_commanded,
+        };
         self.cycles.push_back(times);
         let absent = std::iter::repeat(AxisRecord::default());
         self.axes.extend(record.axes().iter().copied().chain(absent).take(self.axis_count));
@@ -133,10 +140,11 @@ impl History {
     }
 
     fn record(&self, index: usize) -> Option<CycleRecord> {
-        let Times { timing, phase, is_commanded } = *self.cycles.get(index)?;
+        let Times { timing, group_count, groups, is_commanded } = *self.cycles.get(index)?;
         let mut record = CycleRecord {
             timing,
-            phase,
+            group_count,
+            groups,
             is_commanded,
             axis_count: self.axis_count as u8,
             ..CycleRecord::default()
@@ -153,9 +161,10 @@ impl History {
         self.axes.get(last + axis).map_or(0, |axis| axis.error_code)
     }
 
-    /// The phase of the last cycle.
-    pub fn last_phase(&self) -> Phase {
-        self.cycles.back().map_or(Phase::Passive, |times| times.phase)
+    /// The phase of a group in the last cycle.
+    pub fn last_phase(&self, group: usize) -> Phase {
+        let last = self.cycles.back().and_then(|times| times.groups.get(group));
+        last.map_or(Phase::Passive, |group| group.phase)
     }
 
     /// The slot and the start of the last cycle.
@@ -271,7 +280,8 @@ mod tests {
     const CYCLE_NS: Nanoseconds = 1_000_000;
 
     fn record(slot: u64) -> CycleRecord {
-        let mut record = CycleRecord { axis_count: 2, phase: Phase::Moving, ..CycleRecord::default() };
+        let mut record = CycleRecord { axis_count: 2, group_count: 2, ..CycleRecord::default() };
+        record.groups[1].phase = Phase::Moving;
         record.timing = CycleTiming { slot, slot_start_ns: slot * CYCLE_NS, ..CycleTiming::default() };
         record.axes[0].position = slot as f64;
         record.axes[1].error_code = slot as u16;

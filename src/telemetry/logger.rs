@@ -113,7 +113,7 @@ impl Logger {
         let black_box = black_box.map(|options| BlackBox::new(options, &machine, wall_clock, started_ns));
         let mut logger = Self {
             source,
-            statistics: Statistics::new(machine.axes.len()),
+            statistics: Statistics::new(machine.groups_of_axes()),
             machine,
             recording: None,
             candump: None,
@@ -220,8 +220,8 @@ impl Logger {
         }
         // A stop names the file. The drive fault that caused the stop may be seen after the power was removed: that is not
         // a second incident.
-        incidents.sort_by_key(|incident| !matches!(incident, Incident::Stop(_)));
-        if matches!(incidents.first(), Some(Incident::Stop(_))) {
+        incidents.sort_by_key(|incident| !matches!(incident, Incident::Stop { .. }));
+        if matches!(incidents.first(), Some(Incident::Stop { .. })) {
             incidents.retain(|incident| !matches!(incident, Incident::Drive { .. }));
         }
         incidents.iter().for_each(|incident| self.incident(incident));

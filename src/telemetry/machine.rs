@@ -5,7 +5,8 @@ use std::f64::consts::TAU;
 use serde::Serialize;
 use takt_rt::ControlLaw;
 
-use crate::config::{Axis, Config, Interface, Travel};
+use crate::config::{Axis, Config, DriveFamily, Interface, Travel};
+use crate::drive;
 
 /// Names and units of a controller.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,6 +30,10 @@ pub struct AxisDescription {
     pub name: String,
     /// The name of its bus; `None` in a recording of an earlier version without this name.
     pub bus: Option<String>,
+    /// The number of its group; 0 where all axes are one group.
+    pub group: usize,
+    /// The family of its drive, which its error codes belong to; `None` in a recording of an earlier version.
+    pub family: Option<DriveFamily>,
     /// The unit of its position.
     pub unit: Unit,
     /// Whether its drive plans its own profile to a target (a profile mode), instead of following set-points.
@@ -99,7 +104,10 @@ impl Machine {
         Self {
             name: config.name.clone(),
             cycle_ns: config.cycle.period_ns,
-            axes: config.axes.iter().map(|axis| AxisDescription::of(axis, config)).collect(),
+            axes: (0..)
+                .zip(&config.axes)
+                .map(|(number, axis)| AxisDescription::of(number, axis, config))
+                .collect(),
             buses: config.buses.iter().map(bus).collect(),
             groups: config.groups.iter().map(|group| group.name.clone()).collect(),
         }
@@ -120,9 +128,28 @@ impl Machine {
         self.groups.get(usize::from(group)).map_or_else(|| format!("group {group}"), Clone::clone)
     }
 
+    /// The number of the group of each axis.
+    pub fn groups_of_axes(&self) -> Vec<usize> {
+        self.axes.iter().map(|axis| axis.group).collect()
+    }
+
     /// Whether the drive of an axis plans its own profile, instead of following set-points.
     pub fn plans_own_profile(&self, axis: u8) -> bool {
         self.axes.get(usize::from(axis)).is_some_and(|axis| axis.plans_own_profile)
+    }
+
+    /// An error code of the drive of an axis, in words.
+    pub fn drive_error(&self, axis: u8, code: u16) -> String {
+        drive::error_words(self.family(axis), code)
+    }
+
+    /// The cure of an error of the drive of an axis.
+    pub fn drive_cure(&self, axis: u8, code: u16) -> &'static str {
+        drive::error_cure(self.family(axis), code)
+    }
+
+    fn family(&self, axis: u8) -> Option<DriveFamily> {
+        self.axes.get(usize::from(axis)).and_then(|axis| axis.family)
     }
 
     /// The unit of an axis.
@@ -133,7 +160,7 @@ impl Machine {
 
 impl AxisDescription {
     /// The description of an axis of a configuration.
-    pub fn of(axis: &Axis, config: &Config) -> Self {
+    pub fn of(number: usize, axis: &Axis, config: &Config) -> Self {
         let (unit, travel_per_turn) = match axis.travel {
             Travel::Rotary => (Unit::Radian, TAU),
             Travel::Linear { lead_m } => (Unit::Metre, lead_m),
@@ -141,6 +168,8 @@ impl AxisDescription {
         Self {
             name: axis.name.clone(),
             bus: config.buses.get(axis.bus).map(|bus| bus.name.clone()),
+            group: config.group_of_axis(number),
+            family: Some(axis.drive),
             unit,
             plans_own_profile: matches!(
                 axis.control,

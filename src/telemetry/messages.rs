@@ -3,12 +3,12 @@
 
 mod decode;
 
-use takt_rt::{AxisRecord, CycleRecord, Event, EventKind, FrameKind};
+use takt_rt::{AxisRecord, CycleRecord, Event, EventKind, FrameKind, GroupRecord};
 
 use super::cdr::CdrEncoder;
 use crate::bus::trace::{TracedFrame, TracedHealth};
 
-pub use decode::{decode_axis, decode_bus, decode_cycle, decode_event};
+pub use decode::{decode_axis, decode_bus, decode_cycle, decode_event, decode_group};
 
 /// A message type: its name, and its definition in the ROS 2 interface language.
 pub struct MessageType {
@@ -31,6 +31,13 @@ impl MessageType {
 pub const CYCLE: MessageType = MessageType {
     name: "takt_msgs/msg/Cycle",
     definition: include_str!("messages/Cycle.msg"),
+    later_fields: &[],
+};
+
+/// One group in a cycle.
+pub const GROUP: MessageType = MessageType {
+    name: "takt_msgs/msg/Group",
+    definition: include_str!("messages/Group.msg"),
     later_fields: &[],
 };
 
@@ -63,7 +70,7 @@ pub const BUS: MessageType = MessageType {
 };
 
 /// The messages that the reader of recordings knows.
-pub const READ: [&MessageType; 4] = [&CYCLE, &AXIS, &EVENT, &BUS];
+pub const READ: [&MessageType; 5] = [&CYCLE, &GROUP, &AXIS, &EVENT, &BUS];
 
 /// The lines of a definition that determine the layout: all but comments and constants.
 fn layout(definition: &str) -> Vec<&str> {
@@ -75,7 +82,7 @@ fn layout(definition: &str) -> Vec<&str> {
 
 /// Encodes a [`CYCLE`].
 pub fn encode_cycle(record: &CycleRecord, encoder: &mut CdrEncoder) {
-    let timing = &record.timing;
+    let (timing, [first, ..]) = (&record.timing, &record.groups);
     encoder
         .begin()
         .u64(timing.slot)
@@ -85,8 +92,21 @@ pub fn encode_cycle(record: &CycleRecord, encoder: &mut CdrEncoder) {
         .u64(timing.compute_ns)
         .u64(timing.sent_ns)
         .u64(timing.missed_slots)
-        .u8(record.phase as u8)
+        .u8(first.phase as u8)
         .u8(record.is_commanded.into());
+}
+
+/// Encodes a [`GROUP`].
+pub fn encode_group(slot: u64, group: &GroupRecord, encoder: &mut CdrEncoder) {
+    encoder
+        .begin()
+        .u64(slot)
+        .u8(group.phase as u8)
+        .u8(group.stop.is_some().into())
+        .u8(group.stop.map_or(0, |stop| stop.category as u8))
+        .u8(group.stop.map_or(0, |stop| stop.rule as u8))
+        .u8(group.callback_ns.is_some().into())
+        .u64(group.callback_ns.unwrap_or(0));
 }
 
 /// Encodes an [`AXIS`].
@@ -291,6 +311,7 @@ mod tests {
     fn the_constants_in_the_schemas_are_those_of_the_records() {
         let phases = Phase::ALL.map(|phase| (format!("{phase:?}"), phase as u8));
         assert_eq!(constants(&CYCLE, "phase"), phases);
+        assert_eq!(constants(&GROUP, "phase"), phases);
         let states = DriveState::ALL.map(|state| (format!("{state:?}"), state as u8));
         assert_eq!(constants(&AXIS, "state"), states);
         assert_eq!(

@@ -1,4 +1,5 @@
-//! The MCAP recording: `/cycle` with the times, `/axis/<name>` for each axis, and `/events`. A black box also has
+//! The MCAP recording: `/cycle` with the times, `/group/<name>` for each group, `/axis/<name>` for each axis, and `/events`.
+//! Without configured groups the only one is `/group/all`. A black box also has
 //! `/bus/<name>` with the health of each bus, and `/frames/<name>`. The time of a message is a time of day: that of its
 //! event or frame, or the start of its slot.
 
@@ -25,6 +26,9 @@ const CHUNK_BYTES: u64 = 256 * 1024;
 /// The name of the metadata record that describes the machine.
 pub const METADATA: &str = "takt";
 
+/// The name of the group of all axes, where no groups are configured.
+const ONLY_GROUP: &str = "all";
+
 /// A recording that is being written.
 pub struct Recording {
     /// Its name in messages.
@@ -34,6 +38,7 @@ pub struct Recording {
     wall_clock: WallClock,
     cycle_channel: u16,
     event_channel: u16,
+    group_channels: Vec<u16>,
     axis_channels: Vec<u16>,
     bus_channels: Vec<BusChannels>,
     /// Whether a group was stopping in the last cycle.
@@ -61,16 +66,25 @@ impl Recording {
             |message: &MessageType| writer.add_schema(message.name, "ros2msg", message.definition.as_bytes());
         let (cycle, axis, event) =
             (schema(&messages::CYCLE)?, schema(&messages::AXIS)?, schema(&messages::EVENT)?);
+        let group = schema(&messages::GROUP)?;
         let mut channel = |schema, topic: &str, metadata: &BTreeMap<_, _>| {
             writer.add_channel(schema, topic, "cdr", metadata)
         };
         let cycle_channel = channel(cycle, "/cycle", &BTreeMap::new())?;
         let event_channel = channel(event, "/events", &BTreeMap::new())?;
+        let mut group_channels = Vec::new();
+        let only = [ONLY_GROUP.to_owned()];
+        let names = if machine.groups.is_empty() { &only[..] } else { &machine.groups };
+        for (index, name) in names.iter().enumerate() {
+            let metadata = BTreeMap::from([("index".to_owned(), index.to_string())]);
+            group_channels.push(channel(group, &format!("/group/{name}"), &metadata)?);
+        }
         let mut axis_channels = Vec::new();
         for (index, description) in machine.axes.iter().enumerate() {
             let mut metadata = BTreeMap::from([
                 ("index".to_owned(), index.to_string()),
                 ("name".to_owned(), description.name.clone()),
+                ("group".to_owned(), description.group.to_string()),
                 ("unit".to_owned(), description.unit.symbol().to_owned()),
                 ("plans_own_profile".to_owned(), description.plans_own_profile.to_string()),
                 ("counts_per_unit".to_owned(), description.counts_per_unit.to_string()),
@@ -78,6 +92,7 @@ impl Recording {
                 ("acceleration_limit".to_owned(), description.limits.acceleration.to_string()),
                 ("jerk_limit".to_owned(), description.limits.jerk.to_string()),
             ]);
+            metadata.extend(description.family.map(|family| ("drive".to_owned(), family.word().to_owned())));
             metadata.extend(description.bus.clone().map(|bus| ("bus".to_owned(), bus)));
             axis_channels.push(channel(axis, &format!("/axis/{}", description.name), &metadata)?);
         }
@@ -90,6 +105,7 @@ impl Recording {
             wall_clock,
             cycle_channel,
             event_channel,
+            group_channels,
             axis_channels,
             bus_channels: Vec::new(),
             was_stopping: false,
@@ -146,13 +162,17 @@ impl Recording {
         let (slot, start_ns) = (record.timing.slot, record.timing.slot_start_ns);
         messages::encode_cycle(record, &mut self.encoder);
         self.write(self.cycle_channel, slot, start_ns)?;
+        for (group, channel) in record.groups().iter().zip(self.group_channels.clone()) {
+            messages::encode_group(slot, group, &mut self.encoder);
+            self.write(channel, slot, start_ns)?;
+        }
         for (index, axis) in record.axes().iter().enumerate() {
             let Some(&channel) = self.axis_channels.get(index) else { break };
             messages::encode_axis(slot, axis, &mut self.encoder);
             self.write(channel, slot, start_ns)?;
         }
         // The cycles before a stop show its cause: they are in the file from now on.
-        let is_stopping = record.group_phases().contains(&Phase::Stopping);
+        let is_stopping = record.groups().iter().any(|group| group.phase == Phase::Stopping);
         let was_stopping = std::mem::replace(&mut self.was_stopping, is_stopping);
         let begins_to_stop = is_stopping && !was_stopping;
         if begins_to_stop { self.writer.flush() } else { Ok(()) }

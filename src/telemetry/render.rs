@@ -4,8 +4,8 @@
 use std::fmt::Write;
 
 use super::report::{
-    AxisReport, BusReport, DECADES, LatencyReport, RANGES_PER_DECADE, RealtimeReport, RunEnd, RunReport,
-    SetPointParts,
+    AxisReport, BusReport, DECADES, GroupReport, LatencyReport, RANGES_PER_DECADE, RealtimeReport, RunEnd,
+    RunReport, SetPointParts, StopReport,
 };
 use crate::printable::{printable, printable_path};
 
@@ -78,9 +78,28 @@ impl RunReport {
             Some(stop) => {
                 let verdict = emphasis.bad(&format!("✗ category {} stop", stop.category));
                 line(text, &format!("{}  {verdict} after {run}", emphasis.heading(&self.machine)));
-                let reason = format!("{} while {} (slot {})", stop.reason, stop.phase, stop.slot);
-                wrap(text, &emphasis.bad("why"), 3, &[reason]);
+                let group = stop.group.as_ref().map_or_else(String::new, |group| format!("{group}: "));
+                wrap(text, &emphasis.bad("why"), 3, &[group + &stop_words(stop)]);
+                if let Some(cure) = stop.cure {
+                    wrap(text, "try", 3, &[cure.to_owned()]);
+                }
             }
+        }
+        self.group_lines(text, emphasis);
+    }
+
+    /// Whether each of several groups has stopped, and why.
+    fn group_lines(&self, text: &mut String, emphasis: Emphasis) {
+        let group = |group: &GroupReport| {
+            let stop = group.stop.as_ref().map_or_else(
+                || "no stop".to_owned(),
+                |stop| format!("category {} stop: {}", stop.category, stop_words(stop)),
+            );
+            format!("{}: {stop}", group.name)
+        };
+        if !self.groups.is_empty() {
+            let lines: Vec<String> = self.groups.iter().map(group).collect();
+            wrap(text, &emphasis.heading("groups"), 6, &lines);
         }
     }
 
@@ -88,13 +107,9 @@ impl RunReport {
         line(text, "");
         histograms(text, emphasis, &self.wake_ns, &self.sync_ns);
         line(text, "");
-        let rows = [
-            ("wake-up", &self.wake_ns),
-            ("SYNC release", &self.sync_ns),
-            ("computing", &self.compute_ns),
-            ("set-points out at", &self.sent_ns),
-        ];
-        latency_table(text, emphasis, &rows);
+        let cycle = [&self.wake_ns, &self.sync_ns, &self.compute_ns, &self.sent_ns];
+        let groups = self.groups.iter().map(|group| (group.name.as_str(), group.callback_ns.as_ref()));
+        cycle_latencies(text, emphasis, cycle, self.callback_ns.as_ref(), groups);
         missed_slots(text, emphasis, self.missed_slots, self.cycles);
     }
 
@@ -184,6 +199,32 @@ pub(crate) fn histograms(text: &mut String, emphasis: Emphasis, wake: &LatencyRe
         let both = format!("{left:<HISTOGRAM_COLUMNS$} {right}");
         line(text, &if row == 0 { emphasis.heading(&both) } else { both });
     }
+}
+
+/// A table of the latencies of a cycle: wake-up, SYNC, computing, and set-points; then the callbacks, where one was called. Where
+/// several groups have called some, each of these has a row.
+pub(crate) fn cycle_latencies<'a>(
+    text: &mut String,
+    emphasis: Emphasis,
+    [wake, sync, compute, sent]: [&LatencyReport; 4],
+    callback: Option<&'a LatencyReport>,
+    groups: impl Iterator<Item = (&'a str, Option<&'a LatencyReport>)>,
+) {
+    let groups: Vec<(String, &LatencyReport)> = groups
+        .filter_map(|(name, callback)| Some((shortened(&format!("callback, {name}"), 20), callback?)))
+        .collect();
+    let mut rows =
+        vec![("wake-up", wake), ("SYNC release", sync), ("computing", compute), ("set-points out at", sent)];
+    match &groups[..] {
+        [] | [_] => rows.extend(callback.map(|callback| ("callback", callback))),
+        several => rows.extend(several.iter().map(|(name, callback)| (name.as_str(), *callback))),
+    }
+    latency_table(text, emphasis, &rows);
+}
+
+/// Why a group stopped, what it was doing, and when.
+fn stop_words(stop: &StopReport) -> String {
+    format!("{} while {} (slot {})", stop.reason, stop.phase, stop.slot)
 }
 
 /// A table with one row for each latency.

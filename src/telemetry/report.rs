@@ -50,16 +50,34 @@ pub struct RunReport {
     pub compute_ns: LatencyReport,
     /// Time from the start of the slot until the last set-point was handed over.
     pub sent_ns: LatencyReport,
+    /// How long the calls of callbacks took; absent if none was called.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub callback_ns: Option<LatencyReport>,
     /// What the operating system granted.
     pub realtime: RealtimeReport,
+    /// The groups in the order of the configuration; absent where all axes are one group.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub groups: Vec<GroupReport>,
     /// The axes in the order of the configuration.
     pub axes: Vec<AxisReport>,
     /// The buses in the order of the configuration.
     pub buses: Vec<BusReport>,
     /// What was recorded.
     pub telemetry: TelemetryReport,
-    /// Why the run ended before its program; `None` if the program finished.
+    /// Why the run ended before its program: the first stop of any group; `None` if the program finished.
     pub stop: Option<StopReport>,
+}
+
+/// One group of several.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct GroupReport {
+    /// Its name in the configuration.
+    pub name: String,
+    /// Why it had stopped at the end; `None` if nothing stopped it, or the program finished.
+    pub stop: Option<StopReport>,
+    /// How long the calls of its callbacks took; absent if none was called.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub callback_ns: Option<LatencyReport>,
 }
 
 /// The distribution of a time in nanoseconds; minimum and maximum are exact, quantiles have three digits.
@@ -210,6 +228,9 @@ pub struct StopReport {
     pub reason: String,
     /// The key of the rule: `following_error` …
     pub rule: &'static str,
+    /// The group that stopped; absent where all axes are one group.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub group: Option<String>,
     /// The axis concerned.
     pub axis: Option<String>,
     /// The bus concerned.
@@ -222,6 +243,9 @@ pub struct StopReport {
     pub slot: u64,
     /// The phase of the group.
     pub phase: &'static str,
+    /// The cure, where a drive has reported an error.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cure: Option<&'static str>,
 }
 
 /// The data of a report that the logger does not have.
@@ -270,13 +294,32 @@ impl RunReport {
             sync_ns: LatencyReport::new(&statistics.sync),
             compute_ns: LatencyReport::new(&statistics.compute),
             sent_ns: LatencyReport::new(&statistics.sent),
+            callback_ns: statistics.callback().as_ref().map(LatencyReport::new),
+            groups: groups(log, outcome),
             realtime: outcome.realtime.clone(),
             axes: machine.axes.iter().zip(&statistics.axes).enumerate().map(axis).collect(),
             buses: machine.buses.iter().zip(&last.buses).map(bus).collect(),
             telemetry: TelemetryReport::new(log),
-            stop: outcome.stop.as_ref().map(|stop| StopReport::new(stop, machine)),
+            stop: outcome.stop.as_ref().map(|stop| StopReport::new(stop, last, machine)),
         }
     }
+}
+
+/// The groups, where there are several. What was asked for is a stop of a group only in a run that did not finish.
+fn groups(log: &LogSummary, outcome: &RunOutcome) -> Vec<GroupReport> {
+    if log.machine.groups.len() < 2 {
+        return vec![];
+    }
+    let group = |(number, name): (usize, &String)| {
+        let stop = outcome.last.groups().get(number).and_then(|group| group.stop);
+        let stop = stop.filter(|stop| !stop.is_requested() || outcome.stop.is_some());
+        GroupReport {
+            name: name.clone(),
+            stop: stop.map(|stop| StopReport::of_group(&stop, Some(number), &log.machine)),
+            callback_ns: log.statistics.callback_of(number).map(LatencyReport::new),
+        }
+    };
+    log.machine.groups.iter().enumerate().map(group).collect()
 }
 
 fn seconds(ns: Nanoseconds) -> f64 {
@@ -377,9 +420,16 @@ impl TelemetryReport {
 }
 
 impl StopReport {
-    /// A stop, with the names of the machine.
-    pub fn new(stop: &StopReason, machine: &Machine) -> Self {
+    /// A stop, with the names of the machine. The last state shows which group it has stopped.
+    pub fn new(stop: &StopReason, last: &Snapshot, machine: &Machine) -> Self {
+        let group = last.groups().iter().position(|group| group.stop.as_ref() == Some(stop));
+        Self::of_group(stop, group, machine)
+    }
+
+    fn of_group(stop: &StopReason, group: Option<usize>, machine: &Machine) -> Self {
+        let several = (machine.groups.len() > 1).then_some(&machine.groups);
         Self {
+            group: several.zip(group).and_then(|(groups, group)| groups.get(group)).cloned(),
             category: stop.category as u8,
             reason: words::stop_cause(stop, machine),
             rule: words::rule_key(stop.rule()),
@@ -389,6 +439,7 @@ impl StopReport {
             limit: stop.cause.numbers().1,
             slot: stop.slot,
             phase: words::phase(stop.phase),
+            cure: words::stop_cure(stop, machine),
         }
     }
 }

@@ -36,6 +36,17 @@ impl Latency {
         self.max_ns = self.max_ns.max(ns);
     }
 
+    /// Adds the times of another distribution.
+    fn add_all(&mut self, other: &Self) {
+        if let (Some(own), Some(other)) = (&mut self.histogram, &other.histogram) {
+            // Both have the same bounds, so that every time finds its place.
+            let _ = own.add(other);
+        }
+        self.count += other.count;
+        self.min_ns = self.min_ns.min(other.min_ns);
+        self.max_ns = self.max_ns.max(other.max_ns);
+    }
+
     /// The number of times that were added.
     pub fn count(&self) -> u64 {
         self.count
@@ -79,7 +90,7 @@ pub struct FollowingErrorMaximum {
     pub error: f64,
     /// Start of the cycle in which it was seen.
     pub at_ns: Nanoseconds,
-    /// The phase of the group then.
+    /// The phase of its group then.
     pub phase: Phase,
     /// The velocity set-point then, in rad/s (m/s).
     pub velocity_set: f64,
@@ -106,8 +117,8 @@ pub struct AxisStatistics {
 }
 
 impl AxisStatistics {
-    fn add(&mut self, cycle: &CycleRecord, axis: &AxisRecord) {
-        let (timing, phase) = (&cycle.timing, cycle.phase);
+    fn add(&mut self, cycle: &CycleRecord, phase: Phase, axis: &AxisRecord) {
+        let timing = &cycle.timing;
         let is_enabled = is_enabled(phase);
         if is_enabled || !self.was_enabled {
             self.position_set = axis.position_set;
@@ -166,14 +177,43 @@ pub struct Statistics {
     pub compute: Latency,
     /// [`CycleTiming::sent_ns`](takt_rt::CycleTiming::sent_ns)
     pub sent: Latency,
+    /// The callbacks of each group; `None`, or absent, where none was called.
+    callbacks: Vec<Option<Latency>>,
     /// The axes in the order of the configuration.
     pub axes: Vec<AxisStatistics>,
+    /// The group of each axis.
+    groups: Vec<usize>,
 }
 
 impl Statistics {
-    /// Statistics for so many axes.
-    pub fn new(axes: usize) -> Self {
-        Self { axes: vec![AxisStatistics::default(); axes], ..Self::default() }
+    /// Statistics for axes in these groups.
+    pub fn new(groups: Vec<usize>) -> Self {
+        Self { axes: vec![AxisStatistics::default(); groups.len()], groups, ..Self::default() }
+    }
+
+    /// How long the calls of the callbacks of a group took; `None` if none was called.
+    pub fn callback_of(&self, group: usize) -> Option<&Latency> {
+        self.callbacks.get(group).and_then(Option::as_ref)
+    }
+
+    /// The same of all groups.
+    pub fn callback(&self) -> Option<Latency> {
+        self.callbacks.iter().flatten().fold(None, |all: Option<Latency>, group| match all {
+            Some(mut all) => {
+                all.add_all(group);
+                Some(all)
+            }
+            None => Some(group.clone()),
+        })
+    }
+
+    fn add_callback(&mut self, group: usize, callback_ns: Nanoseconds) {
+        if self.callbacks.len() <= group {
+            self.callbacks.resize(group + 1, None);
+        }
+        if let Some(callback) = self.callbacks.get_mut(group) {
+            callback.get_or_insert_default().add(callback_ns);
+        }
     }
 
     /// Adds a cycle.
@@ -189,8 +229,14 @@ impl Statistics {
         self.sync.add(timing.sync_ns);
         self.compute.add(timing.compute_ns);
         self.sent.add(timing.sent_ns);
-        for (statistics, axis) in self.axes.iter_mut().zip(record.axes()) {
-            statistics.add(record, axis);
+        for (group, recorded) in record.groups().iter().enumerate() {
+            if let Some(callback_ns) = recorded.callback_ns {
+                self.add_callback(group, callback_ns);
+            }
+        }
+        for ((statistics, axis), group) in self.axes.iter_mut().zip(record.axes()).zip(&self.groups) {
+            let phase = record.groups.get(*group).map_or(Phase::Passive, |group| group.phase);
+            statistics.add(record, phase, axis);
         }
     }
 }
@@ -198,12 +244,12 @@ impl Statistics {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use takt_rt::{CycleTiming, MAX_AXES};
+    use takt_rt::{CycleTiming, GroupRecord, MAX_AXES, MAX_GROUPS};
 
     fn record(slot: u64, phase: Phase, axis: AxisRecord) -> CycleRecord {
         CycleRecord {
             timing: CycleTiming { slot, slot_start_ns: slot * 1_000_000, ..CycleTiming::default() },
-            phase,
+            groups: [GroupRecord { phase, ..GroupRecord::default() }; MAX_GROUPS],
             is_commanded: true,
             axis_count: 1,
             axes: [axis; MAX_AXES],
@@ -247,7 +293,7 @@ mod tests {
 
     #[test]
     fn the_largest_following_error_is_that_of_an_enabled_axis_with_its_circumstances() {
-        let mut statistics = Statistics::new(1);
+        let mut statistics = Statistics::new(vec![0]);
         let axis = |following_error, velocity_set| AxisRecord {
             following_error,
             velocity_set,
@@ -263,8 +309,40 @@ mod tests {
     }
 
     #[test]
+    fn an_axis_is_judged_by_the_phase_of_its_own_group() {
+        let mut statistics = Statistics::new(vec![1]);
+        let axis = AxisRecord { following_error: 0.5, ..AxisRecord::default() };
+        let mut of_two = CycleRecord { group_count: 2, ..record(1, Phase::Disabled, axis) };
+        of_two.groups[0].phase = Phase::Moving;
+        statistics.add(&of_two);
+        assert_eq!(statistics.axes[0].following_error_max, None);
+        of_two.groups[1].phase = Phase::Holding;
+        statistics.add(&of_two);
+        assert_eq!(statistics.axes[0].following_error_max.unwrap().phase, Phase::Holding);
+    }
+
+    #[test]
+    fn calls_of_callbacks_are_counted_for_each_group_and_for_all() {
+        let mut statistics = Statistics::new(vec![0]);
+        let mut cycle = CycleRecord { group_count: 3, ..record(1, Phase::Streaming, AxisRecord::default()) };
+        statistics.add(&cycle);
+        assert!(statistics.callback().is_none(), "none was called");
+        for callback_ns in [10, 20, 30] {
+            cycle.groups[0].callback_ns = Some(callback_ns);
+            cycle.groups[2].callback_ns = (callback_ns > 10).then_some(100 * callback_ns);
+            statistics.add(&cycle);
+        }
+        let seen = |latency: &Latency| (latency.count(), latency.min_ns(), latency.max_ns());
+        assert_eq!(seen(statistics.callback_of(0).unwrap()), (3, 10, 30));
+        assert!(statistics.callback_of(1).is_none());
+        assert_eq!(seen(statistics.callback_of(2).unwrap()), (2, 2_000, 3_000));
+        let all = statistics.callback().unwrap();
+        assert_eq!((seen(&all), all.quantile_ns(0.5)), ((5, 10, 3_000), 30));
+    }
+
+    #[test]
     fn the_final_position_is_the_last_one_under_power() {
-        let mut statistics = Statistics::new(1);
+        let mut statistics = Statistics::new(vec![0]);
         let axis = |position_set, position| AxisRecord { position_set, position, ..AxisRecord::default() };
         statistics.add(&record(1, Phase::Disabled, axis(0.5, 0.5)));
         assert_eq!(statistics.axes[0].position, 0.5);
@@ -276,7 +354,7 @@ mod tests {
 
     #[test]
     fn the_final_position_is_known_to_be_that_of_an_earlier_slot_if_the_drive_has_fallen_silent() {
-        let mut statistics = Statistics::new(1);
+        let mut statistics = Statistics::new(vec![0]);
         let axis = |position, feedback_age| AxisRecord { position, feedback_age, ..AxisRecord::default() };
         statistics.add(&record(1, Phase::Enabling, axis(0.0, 7)));
         let known = statistics.axes[0];

@@ -1,8 +1,8 @@
 //! The texts of stops, phases, events and rejections, with the names of the axes and the units of the values.
 
 use takt_rt::{
-    AxisSnapshot, DriveState, Event, EventKind, OperationMode, Phase, Rule, Snapshot, StopCategory,
-    StreamState, TimingLevel,
+    AxisSnapshot, Event, EventKind, OperationMode, Phase, Rule, Snapshot, StopCategory, StreamState,
+    TimingLevel,
 };
 
 use super::machine::Machine;
@@ -11,7 +11,7 @@ mod rejection;
 mod stop;
 
 pub use rejection::{rejection, request};
-pub use stop::{stop, stop_cause};
+pub use stop::{stop, stop_cause, stop_cure};
 
 /// The name of a phase: "moving".
 pub const fn phase(phase: Phase) -> &'static str {
@@ -41,36 +41,12 @@ pub const fn category(category: StopCategory) -> &'static str {
     }
 }
 
-/// The name of a drive state (CiA 402).
-pub const fn state(state: DriveState) -> &'static str {
-    match state {
-        DriveState::NotReadyToSwitchOn => "not ready to switch on",
-        DriveState::SwitchOnDisabled => "switch on disabled",
-        DriveState::ReadyToSwitchOn => "ready to switch on",
-        DriveState::SwitchedOn => "switched on",
-        DriveState::OperationEnabled => "operation enabled",
-        DriveState::QuickStopActive => "quick stop active",
-        DriveState::FaultReactionActive => "fault reaction active",
-        DriveState::Fault => "fault",
-        DriveState::Undefined => "no state of CiA 402",
-    }
-}
-
 /// The name of a mode of operation, with its number (object 6060).
 fn mode(number: f64) -> String {
-    let name = match OperationMode::from_number(number as i8) {
-        Some(OperationMode::ProfilePosition) => "profile position",
-        Some(OperationMode::Velocity) => "velocity",
-        Some(OperationMode::ProfileVelocity) => "profile velocity",
-        Some(OperationMode::ProfileTorque) => "profile torque",
-        Some(OperationMode::Homing) => "homing",
-        Some(OperationMode::InterpolatedPosition) => "interpolated position",
-        Some(OperationMode::CyclicSynchronousPosition) => "cyclic synchronous position",
-        Some(OperationMode::CyclicSynchronousVelocity) => "cyclic synchronous velocity",
-        Some(OperationMode::CyclicSynchronousTorque) => "cyclic synchronous torque",
-        None => return format!("mode {number:.0}"),
-    };
-    format!("mode {number:.0} ({name})")
+    match OperationMode::from_number(number as i8) {
+        Some(mode) => format!("mode {number:.0} ({})", mode.name()),
+        None => format!("mode {number:.0}"),
+    }
 }
 
 /// An event as one line, without its time. Where there are several groups, the line begins with the one that it concerns, unless
@@ -99,7 +75,7 @@ fn what_happened(event: &Event, machine: &Machine) -> String {
         }
         EventKind::Stream { state: StreamState::Callback } => "a callback leads the axes".to_owned(),
         EventKind::DriveState { axis, state: to, statusword } => {
-            format!("{}: {} (statusword 0x{statusword:04X})", machine.axis_name(axis), state(to))
+            format!("{}: {} (statusword 0x{statusword:04X})", machine.axis_name(axis), to.name())
         }
         EventKind::Mode { axis, mode: new } => {
             format!("{}: changed to {}", machine.axis_name(axis), mode((new as i8).into()))
@@ -108,9 +84,11 @@ fn what_happened(event: &Event, machine: &Machine) -> String {
             format!("{}: emergency message: no error any more", machine.axis_name(axis))
         }
         EventKind::Emergency { axis, code, register, manufacturer: [a, b, c, d, e] } => format!(
-            "{}: emergency message: error 0x{code:04X}, register 0x{register:02X}, \
-             manufacturer {a:02X} {b:02X} {c:02X} {d:02X} {e:02X}",
-            machine.axis_name(axis)
+            "{}: emergency message: error {}, register 0x{register:02X}, \
+             manufacturer {a:02X} {b:02X} {c:02X} {d:02X} {e:02X}; try: {}",
+            machine.axis_name(axis),
+            machine.drive_error(axis, code),
+            machine.drive_cure(axis, code)
         ),
         EventKind::Timing { level: TimingLevel::Normal } => "missed slots: normal again".to_owned(),
         EventKind::Timing { level: TimingLevel::Warning } => "missed slots: many".to_owned(),
@@ -127,7 +105,7 @@ fn what_happened(event: &Event, machine: &Machine) -> String {
 /// The axes whose drives do not report at present, and since when, for a line of status; `None` if every drive reports, or if none
 /// is asked yet.
 pub fn silence(snapshot: &Snapshot, machine: &Machine) -> Option<String> {
-    if snapshot.phase == Phase::Passive {
+    if snapshot.groups().iter().all(|group| group.phase == Phase::Passive) {
         return None;
     }
     let silent = |(number, axis): (u8, &AxisSnapshot)| {
@@ -145,13 +123,17 @@ pub fn silence(snapshot: &Snapshot, machine: &Machine) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::config::DriveFamily;
     use crate::telemetry::machine::{AxisDescription, BusDescription, SetPointMagnitudes, Unit};
+    use takt_rt::DriveState;
     use takt_rt::{RejectReason, RequestError, RequestKind};
 
     pub(super) fn machine() -> Machine {
         let axis = |name: &str, unit| AxisDescription {
             name: name.to_owned(),
             bus: None,
+            group: 0,
+            family: Some(DriveFamily::ErobCanopen),
             unit,
             plans_own_profile: false,
             counts_per_unit: 1.0,
@@ -184,7 +166,8 @@ mod tests {
                 register: 0x21,
                 manufacturer: [1, 2, 3, 4, 0xFF]
             }),
-            "slide: emergency message: error 0x7305, register 0x21, manufacturer 01 02 03 04 FF"
+            "slide: emergency message: error 0x7305 (incremental sensor 1 fault), register 0x21, \
+             manufacturer 01 02 03 04 FF; try: check the encoder and its cable, then power-cycle the drive"
         );
         assert_eq!(
             words(EventKind::Mode { axis: 0, mode: OperationMode::CyclicSynchronousVelocity }),
@@ -208,7 +191,7 @@ mod tests {
         snapshot.axes[0] =
             AxisSnapshot { is_heard: true, feedback_ns: 78_000_000, ..AxisSnapshot::default() };
         assert_eq!(silence(&snapshot, &machine()), None, "in bring-up no drive reports yet");
-        snapshot.phase = Phase::Moving;
+        snapshot.groups[0].phase = Phase::Moving;
         assert_eq!(silence(&snapshot, &machine()).as_deref(), Some("no feedback from slide (never)"));
         snapshot.axes[0].feedback_age = 12;
         snapshot.axes[1].is_heard = true;

@@ -175,15 +175,18 @@ fn axis(number: usize, bus: usize, node: u8) -> Axis {
         heartbeat_ns: Some(50_000_000),
         identity: Identity::default(),
         dcf: None,
+        power_up_ns: 0,
+        joint: Joint {
+            inertia: Some(0.1),
+            viscous_friction: Some(0.1),
+            coulomb_friction: Some(0.1),
+            rated_torque: Some(31.0),
+        },
         simulated: SimulatedJoint {
-            inertia: 0.1,
-            viscous_friction: 0.1,
-            coulomb_friction: 0.1,
             gravity: 0.0,
-            rated_torque: 31.0,
             peak_torque: 60.0,
             initial_position: 0.0,
-            power_up_ns: 0,
+            power_up: PowerUpState::PreOperational,
         },
     }
 }

@@ -14,7 +14,7 @@ fn errors_at_rest(name: &str) -> Vec<Vec<f64>> {
     let outcome = world.run_to_the_end(|world| {
         let snapshot = world.run.snapshot();
         let finished = world.finished_motions().checked_sub(1);
-        let Some(finished) = finished.filter(|_| snapshot.phase == Phase::Holding) else { return };
+        let Some(finished) = finished.filter(|_| snapshot.groups[0].phase == Phase::Holding) else { return };
         let ProgramTarget::Position(target) = &moves[finished].target else {
             panic!("{name} has no targets")
         };
@@ -63,7 +63,7 @@ fn an_erob_reaches_every_target_in_cyclic_synchronous_velocity() {
 fn an_erob_reaches_every_target_in_cyclic_synchronous_torque() {
     let axis = &load("erob-modes/erob-cst.toml").axes[0];
     let takt::config::Control::Torque { stiffness, .. } = axis.control else { panic!("{:?}", axis.control) };
-    let friction = axis.simulated.coulomb_friction / stiffness * counts_per_unit(axis);
+    let friction = axis.joint.coulomb_friction() / stiffness * counts_per_unit(axis);
     assert_all_arrive("erob-modes/erob-cst.toml", friction + 2.0);
 }
 

@@ -54,7 +54,7 @@ fn moved(config: Config) -> Motion {
     let outcome = world.run_to_the_end(|world| {
         let snapshot = world.run.snapshot();
         let position = world.observe(0).position;
-        if world.finished_motions() == 1 && snapshot.phase == Phase::Holding {
+        if world.finished_motions() == 1 && snapshot.groups[0].phase == Phase::Holding {
             held_s += period_s;
             off = position - 0.5;
             if held_s > 0.5 {

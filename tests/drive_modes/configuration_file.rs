@@ -94,3 +94,24 @@ fn a_value_that_a_yz_aim_refuses_is_named_with_its_reason() {
         assert!(text.contains(part), "{part} is not in: {text}");
     }
 }
+
+#[test]
+fn the_file_wins_over_the_settings_of_bring_up_and_what_is_overwritten_is_said() {
+    let mut config = parse(include_str!("../../configs/single-erob.toml"));
+    let node = config.axes[0].node;
+    // A quick-stop deceleration, and two heartbeat times: the own one is what the controller writes, too.
+    let file = entry("6085", 7, "123456") + &entry("1016sub1", 7, "0x007F03E8") + &entry("1017", 6, "0");
+    let dictionary = eds::parse("joint.dcf", file.as_bytes()).unwrap().dictionary;
+    config.axes[0].dcf = Some(DeviceConfiguration::of(Path::new("joint.dcf"), &dictionary, node));
+    let words: Vec<String> = config.warnings().iter().map(ToString::to_string).collect();
+    let [warning] = &words[..] else { panic!("{words:?}") };
+    assert!(warning.contains("overwrites the value that `dcf` has for 1016:01"), "{warning}");
+    let mut world = World::new(config);
+    assert_eq!(world.run_to_the_end(|_| {}), Outcome::Finished, "{:?}", world.stops());
+    let sent = world.port(0).sent.iter().map(|(_, frame, _)| frame);
+    let to_drive = sent.filter(|frame| frame.id().value() == id(0x600, node));
+    let written: Vec<_> =
+        to_drive.filter(|frame| frame.payload().starts_with(&[0x23, 0x85, 0x60, 0])).collect();
+    assert_eq!(written.len(), 1, "{written:?}");
+    assert_eq!(written[0].payload()[4..], 123_456_u32.to_le_bytes());
+}

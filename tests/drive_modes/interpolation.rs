@@ -13,8 +13,9 @@ const HEARTBEAT: u32 = 0x77F;
 
 /// The gantry with its axes at one position in the beginning, which is within the limits of all of them.
 fn gantry_at(position: &str) -> Config {
-    let simulated = format!("[defaults.axis.simulated]\ninitial_position = \"{position}\"");
-    let text = text_of("gantry-yz-aim.toml").replace("[defaults.axis.simulated]", &simulated);
+    let simulated =
+        format!("[defaults.axis.simulated]\ninitial_position = \"{position}\"\n\n[defaults.axis.joint]");
+    let text = text_of("gantry-yz-aim.toml").replace("[defaults.axis.joint]", &simulated);
     parse(&text.replace("[\"-200 mm\", \"0 mm\"]", "[\"-200 mm\", \"600 mm\"]"))
 }
 

@@ -25,7 +25,7 @@ fn last_torque(world: &mut World) -> i16 {
 #[test]
 fn torque_is_converted_by_the_rated_torque_that_the_drive_reports() {
     let config = load("erob-modes/erob-pt.toml");
-    let configured = config.axes[0].simulated.rated_torque;
+    let configured = config.axes[0].rated_torque();
     let (config, buses) = erob_with(config, |parameters| parameters.rated_torque = 2.0 * configured);
     let mut world = World::holding_on(config, buses);
     world.drive_to(0, ProfileTarget::Torque(2.0));

@@ -3,7 +3,7 @@
 use takt::config::Config;
 use takt::controller::Outcome;
 use takt::sim::yz_aim::{Quirks, YzAimJoint, YzAimParameters};
-use takt::sim::{Drive, SimulatedBus, WireBitRates};
+use takt::sim::{Drive, DriveFault, SimulatedBus, WireBitRates};
 use takt_rt::Phase;
 
 use crate::world::{World, counts_per_unit, id, load};
@@ -94,4 +94,14 @@ fn a_gantry_that_does_not_answer_sync_is_heard_by_its_answers_to_targets() {
         let answers_to_sync = count(&mut world, axis as u8 + 1).2;
         assert_eq!(answers_to_sync, 0);
     }
+}
+
+#[test]
+fn the_alarm_of_a_yz_aim_is_known_after_the_run_though_its_process_data_have_no_error_code() {
+    let mut world = World::holding(load("gantry-yz-aim.toml"));
+    let node = world.config.axes[0].node;
+    world.port(0).bus.inject_fault(node, DriveFault::BlockedRotor).unwrap();
+    let outcome = world.run_to_the_end(|_| ());
+    assert!(matches!(outcome, Outcome::Stopped(_)), "{outcome:?}");
+    assert_eq!(world.drive_errors(), [(0, 0x12)]);
 }

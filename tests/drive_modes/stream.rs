@@ -29,7 +29,9 @@ fn streamed_positions(direction: f64, stops: &[StopCategory]) -> Vec<f64> {
     }
     while world.step() {
         let snapshot = world.run.snapshot();
-        if snapshot.axes[0].drive_state != DriveState::OperationEnabled || snapshot.phase == Phase::Holding {
+        if snapshot.axes[0].drive_state != DriveState::OperationEnabled
+            || snapshot.groups[0].phase == Phase::Holding
+        {
             break;
         }
         positions.push(snapshot.axes[0].position_set);

@@ -23,7 +23,7 @@ position = [-20, 20]
 velocity = "137 deg/s"
 acceleration = 20
 torque = "87 Nm"
-[axis.simulated]
+[axis.joint]
 coulomb_friction = 0
 [[program.move]]
 {step}

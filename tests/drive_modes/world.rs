@@ -112,7 +112,7 @@ position = ["0 mm", "800 mm"]
 velocity = "0.15 m/s"
 acceleration = "1 m/s^2"
 torque = "300 N"
-[axis.simulated]
+[axis.joint]
 inertia = "4 kg"
 viscous_friction = "20 N s/m"
 coulomb_friction = "5 N"
@@ -201,8 +201,13 @@ impl World {
         self.run.supervisor().outcome().cloned()
     }
 
+    /// The axes whose drives showed an error during the shut-down, with its code.
+    pub fn drive_errors(&self) -> &[(usize, u16)] {
+        self.run.supervisor().drive_errors()
+    }
+
     pub fn phase(&self) -> Phase {
-        self.run.snapshot().phase
+        self.run.snapshot().groups[0].phase
     }
 
     pub fn request(&mut self, request: Request) -> RequestId {

@@ -23,7 +23,7 @@ pub fn arm() -> Config {
     let mut config = Config::load(&folder().join("arm6-erob.toml")).unwrap();
     config.program.moves.truncate(2);
     config.axes.iter_mut().for_each(|axis| {
-        axis.simulated.power_up_ns = 5_000_000;
+        axis.power_up_ns = 5_000_000;
         axis.feedback = vec![Feedback::OperationMode];
     });
     config
@@ -92,8 +92,8 @@ pub fn play_scenario(config: &Config, scenario: Scenario) -> Played {
         }
         events.extend(fault_events.next(&fault_injector).iter().map(ToString::to_string));
         let snapshot = run.snapshot();
-        if phases.last() != Some(&snapshot.phase) {
-            phases.push(snapshot.phase);
+        if phases.last() != Some(&snapshot.groups[0].phase) {
+            phases.push(snapshot.groups[0].phase);
         }
         let now = enabled_set_points(config, run);
         let period_s = config.cycle.period_ns as f64 * 1e-9;

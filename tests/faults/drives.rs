@@ -9,7 +9,7 @@ use takt_rt::{BusPort, Frame, Id, ReceiveBatch};
 fn bus() -> SimulatedBus {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/arm6-erob.toml");
     let mut config = Config::load(&path).unwrap();
-    config.axes.iter_mut().for_each(|axis| axis.simulated.power_up_ns = 1_000_000);
+    config.axes.iter_mut().for_each(|axis| axis.power_up_ns = 1_000_000);
     config.simulation.longest_gap_ns = u64::MAX;
     let mut bus = SimulatedBus::new(&config, 0);
     received(&mut bus, 0);

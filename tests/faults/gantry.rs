@@ -11,7 +11,7 @@ use crate::arm::{folder, play};
 fn gantry() -> Config {
     let mut config = Config::load(&folder().join("gantry-yz-aim.toml")).unwrap();
     config.program.moves.truncate(2);
-    config.axes.iter_mut().for_each(|axis| axis.simulated.power_up_ns = 5_000_000);
+    config.axes.iter_mut().for_each(|axis| axis.power_up_ns = 5_000_000);
     config
 }
 

@@ -46,7 +46,7 @@ fn answering_set_points() -> Config {
     let mut config = Config::load(&folder().join("gantry-yz-aim.toml")).unwrap();
     config.program.moves.truncate(1);
     for axis in &mut config.axes {
-        axis.simulated.power_up_ns = 5_000_000;
+        axis.power_up_ns = 5_000_000;
         axis.answers_sync = false;
     }
     config

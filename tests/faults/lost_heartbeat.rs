@@ -50,7 +50,7 @@ impl BusPort for LossyBus {
 /// The first axis of a machine, with a long heartbeat period of the controller.
 fn machine(name: &str) -> Config {
     let mut config = Config::load(&folder().join(format!("{name}.toml"))).unwrap();
-    config.axes.iter_mut().for_each(|axis| axis.simulated.power_up_ns = 5 * MILLISECOND_NS);
+    config.axes.iter_mut().for_each(|axis| axis.power_up_ns = 5 * MILLISECOND_NS);
     config.master.heartbeat_ns = Some(20_000 * MILLISECOND_NS);
     config.master.heartbeat_timeout_ns = 50_000 * MILLISECOND_NS;
     config
@@ -63,7 +63,7 @@ fn enabled(config: &Config, lost: Option<usize>) -> (VirtualRun<LossyBus>, usize
     let buses = (0..config.buses.len()).map(|bus| SimulatedBus::new(config, bus));
     let ports = buses.map(|bus| LossyBus { bus, heartbeat, lost, heartbeats: 0 }).collect();
     let (mut run, _) = VirtualRun::new(config, ports).unwrap();
-    while run.snapshot().phase != Phase::Moving {
+    while run.snapshot().groups[0].phase != Phase::Moving {
         assert!(run.step(), "{}: it ends before it moves", config.name);
     }
     let heartbeats = run.ports()[0].heartbeats;

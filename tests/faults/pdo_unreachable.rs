@@ -24,7 +24,7 @@ const COMMANDS: [&str; 3] = ["reset-communication", "pre-operational", "stop"];
 
 fn machine(name: &str) -> Config {
     let mut config = Config::load(&folder().join(format!("{name}.toml"))).unwrap();
-    config.axes.iter_mut().for_each(|axis| axis.simulated.power_up_ns = 5_000_000);
+    config.axes.iter_mut().for_each(|axis| axis.power_up_ns = 5_000_000);
     config
 }
 
@@ -62,7 +62,7 @@ fn a_pdo_unreachable_drive_is_stopped_and_disabled_by_sdo_before_the_shutdown() 
             let mut run = run_until_fault(&config, command);
             let began_ns = run.snapshot().at_ns;
             let mut ended_ns = None;
-            while run.snapshot().phase != Phase::Disabled {
+            while run.snapshot().groups[0].phase != Phase::Disabled {
                 assert!(run.step(), "{name}, {command}: never disabled");
                 let drive = first_drive(&config, &mut run);
                 if !drive.state.has_torque() {

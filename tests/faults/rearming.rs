@@ -24,7 +24,7 @@ fn faulted(config: &Config, kind: &str) -> VirtualRun<Port> {
     let (mut run, _) = VirtualRun::serving(config, ports).unwrap();
     run_until(&mut run, |run| {
         fault_injector.observe(&run.snapshot());
-        latched(run).is_some() && run.snapshot().phase == Phase::Disabled
+        latched(run).is_some() && run.snapshot().groups[0].phase == Phase::Disabled
     });
     run
 }
@@ -40,12 +40,12 @@ fn run_until(run: &mut VirtualRun<Port>, is_there: impl Fn(&VirtualRun<Port>) ->
 }
 
 fn latched(run: &VirtualRun<Port>) -> Option<StopReason> {
-    run.snapshot().stop.filter(|stop| stop.rule() != Rule::Requested)
+    run.snapshot().groups[0].stop.filter(|stop| stop.rule() != Rule::Requested)
 }
 
 fn machines() -> [Config; 2] {
     let mut gantry = Config::load(&folder().join("gantry-yz-aim.toml")).unwrap();
-    gantry.axes.iter_mut().for_each(|axis| axis.simulated.power_up_ns = 5_000_000);
+    gantry.axes.iter_mut().for_each(|axis| axis.power_up_ns = 5_000_000);
     [arm(), gantry]
 }
 
@@ -57,7 +57,7 @@ fn a_group_that_is_reset_and_enabled_at_once_holds_again() {
         (0..200).for_each(|_| assert!(run.step()));
         run.host().request(Request::ResetFaults).unwrap();
         run.host().request(Request::Enable).unwrap();
-        run_until(&mut run, |run| run.snapshot().phase == Phase::Holding);
+        run_until(&mut run, |run| run.snapshot().groups[0].phase == Phase::Holding);
         assert_eq!(latched(&run), None, "{}", config.name);
     }
 }
@@ -69,8 +69,8 @@ fn a_fault_that_a_reset_does_not_clear_stops_the_group_again_with_its_code() {
     let first = latched(&run).unwrap();
     run.host().request(Request::ResetFaults).unwrap();
     run.host().request(Request::Enable).unwrap();
-    run_until(&mut run, |run| run.snapshot().phase == Phase::Enabling);
-    run_until(&mut run, |run| run.snapshot().phase == Phase::Disabled);
+    run_until(&mut run, |run| run.snapshot().groups[0].phase == Phase::Enabling);
+    run_until(&mut run, |run| run.snapshot().groups[0].phase == Phase::Disabled);
     let again = latched(&run).unwrap();
     assert_eq!((again.rule(), again.axis()), (Rule::DriveFault, Some(0)));
     let fault = StopCause::Fault(Fault::DriveFault { error_code: 0x730F });

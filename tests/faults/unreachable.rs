@@ -28,7 +28,7 @@ fn ended(config: &Config, fault: &str) -> Ended {
     let mut disabled_ns = None;
     while run.step() {
         if fault_injector.progress().any(|(_, progress)| progress.began_ns().is_some())
-            && run.snapshot().phase == Phase::Disabled
+            && run.snapshot().groups[0].phase == Phase::Disabled
         {
             disabled_ns = disabled_ns.or(Some(run.snapshot().at_ns));
         }

@@ -189,7 +189,7 @@ fn config() -> Config {
     (linear.reversed, linear.travel, linear.gear_ratio) = (false, Travel::Linear { lead_m: 0.01 }, 2.0);
     for axis in [first, reversed, linear] {
         axis.simulated.initial_position = 0.5;
-        axis.simulated.power_up_ns = 0;
+        axis.power_up_ns = 0;
     }
     config
 }

@@ -165,6 +165,29 @@ fn sync_may_have_another_identifier() {
 }
 
 #[test]
+fn a_drive_told_to_produce_sync_sends_it_in_its_period_and_acts_on_it() {
+    let mut bench = Bench::new();
+    bench.write(0x1800, 2, 1, 1).unwrap();
+    bench.write(0x1006, 0, 4, 2000).unwrap();
+    bench.run_ms(20);
+    assert!(bench.take(0x080).is_empty(), "without bit 30 it is no producer");
+    bench.write(0x1005, 0, 4, 0x4000_0080).unwrap();
+    assert_eq!(bench.read(0x1005, 0), Ok(0x4000_0080));
+    bench.nmt(0x01);
+    bench.take(0x080);
+    bench.take(0x185);
+    bench.run_ms(20);
+    assert_eq!((bench.take(0x080).len(), bench.take(0x185).len()), (10, 10));
+    bench.nmt(0x02);
+    bench.take(0x080);
+    bench.run_ms(20);
+    assert!(bench.take(0x080).is_empty(), "a stopped node is silent");
+    bench.nmt(0x82);
+    bench.run_ms(20);
+    assert!(bench.take(0x080).is_empty(), "the reset has restored the default of 1005");
+}
+
+#[test]
 fn the_position_is_sampled_at_sync_and_not_at_transmission() {
     let mut bench = Bench::new();
     bench.enable(9, 0x60FF_0020, 0);

@@ -46,7 +46,7 @@ fn every_refusal_has_its_own_abort_code() {
     assert_eq!(bench.write(0x1029, 1, 1, 3), Err(VALUE));
     assert_eq!(bench.write(0x60B2, 0, 2, 3001), Err(VALUE));
     assert_eq!(bench.write(0x60B2, 0, 2, -3000), Ok(()));
-    assert_eq!(bench.write(0x1005, 0, 4, 0x4000_0080), Err(VALUE));
+    assert_eq!(bench.write(0x1005, 0, 4, 0x2000_0080), Err(VALUE));
     assert_eq!(bench.write(0x1010, 1, 4, 1), Err(0x0800_0020));
     // A download without a size is accepted with the size of the object.
     assert_eq!(bench.sdo([0x22, 0x60, 0x60, 0, 3, 0xFF, 0xFF, 0xFF])[0], 0x60);

@@ -16,27 +16,27 @@ fn stopping_s(axis: &Axis) -> f64 {
     limits.velocity / limits.deceleration + if turning_s.is_finite() { turning_s } else { 0.0 }
 }
 
-/// The longest trajectory of a stop: that of the slowest axis, since they stop together.
-pub fn planned_s(config: &Config) -> f64 {
-    config.axes.iter().map(stopping_s).fold(0.0, f64::max)
+/// The longest trajectory of a stop of these axes: that of the slowest one, since they stop together.
+pub fn planned_s(axes: &[Axis]) -> f64 {
+    axes.iter().map(stopping_s).fold(0.0, f64::max)
 }
 
-/// From the reason of a stop to rest of every joint that obeys.
-pub fn to_rest_s(config: &Config) -> f64 {
-    planned_s(config) + LAG_S
+/// From the reason of a stop of these axes to rest of every joint that obeys.
+pub fn to_rest_s(axes: &[Axis]) -> f64 {
+    planned_s(axes) + LAG_S
 }
 
 /// How far a joint may travel until then: rad (m).
-pub fn to_rest_distance(config: &Config, axis: &Axis) -> f64 {
-    axis.limits.velocity * (to_rest_s(config) + LAG_S) / 2.0
+pub fn to_rest_distance(axes: &[Axis], axis: &Axis) -> f64 {
+    axis.limits.velocity * (to_rest_s(axes) + LAG_S) / 2.0
 }
 
 /// How long a joint goes on at most whose drive has no brake, when its power is cut at full speed: until friction has
 /// stopped it.
 pub fn coasting_s(axis: &Axis) -> f64 {
-    let joint = &axis.simulated;
+    let joint = &axis.joint;
     match axis.drive {
-        DriveFamily::YzAim => axis.limits.velocity * joint.inertia / joint.coulomb_friction,
+        DriveFamily::YzAim => axis.limits.velocity * joint.inertia() / joint.coulomb_friction(),
         DriveFamily::ErobCanopen => 0.0,
     }
 }
@@ -44,7 +44,7 @@ pub fn coasting_s(axis: &Axis) -> f64 {
 /// From the moment from which nothing gets to a drive any more until it has no torque: it misses the heartbeats, and its own
 /// reaction brings the joint to rest.
 pub fn unreached_s(config: &Config) -> f64 {
-    WATCHDOG_AT_MOST_S + to_rest_s(config)
+    WATCHDOG_AT_MOST_S + to_rest_s(&config.axes)
 }
 
 /// The most cycles in a phase that must pass by itself.

@@ -1,6 +1,6 @@
 //! A case: everything that its seed decides.
 
-use takt::config::{Config, Control, Follow, ProgramMove, ProgramTarget};
+use takt::config::{Axis, Config, Control, Follow, Group, ProgramMove, ProgramTarget};
 use takt::controller::Interrupt;
 use takt::faults::Scenario;
 
@@ -30,6 +30,8 @@ pub struct Case {
     pub has_callbacks: bool,
     /// Whether somebody changes modes of operation, too.
     pub has_mode_changes: bool,
+    /// Whether somebody has checked trajectories carried out.
+    pub has_trajectories: bool,
     pub dice: Dice,
 }
 
@@ -58,6 +60,18 @@ pub fn scenario(text: &str, config: &Config) -> Scenario {
 
 impl Case {
     pub fn of(seed: u64) -> Self {
+        let mut case = Self::in_overload(seed);
+        let mut dice = Dice::new(seed).split(u64::MAX - 4);
+        if case.config.axes.len() > 1 && dice.chance(0.3) {
+            case.divide(&mut dice);
+        }
+        case.has_trajectories = dice.chance(0.3);
+        case.has_callbacks = dice.chance(0.15);
+        case
+    }
+
+    /// One whose axes are one group, which nothing but moves and streams leads.
+    pub fn in_overload(seed: u64) -> Self {
         let mut case = Self::in_hardship(seed);
         let mut dice = Dice::new(seed).split(u64::MAX - 1);
         if dice.chance(0.25) {
@@ -125,8 +139,29 @@ impl Case {
             overload,
             has_callbacks: false,
             has_mode_changes: false,
+            has_trajectories: false,
             dice,
         }
+    }
+
+    /// Divides the axes into groups, each with moves of its own; some of them stop with others.
+    pub fn divide(&mut self, dice: &mut Dice) {
+        let mut axes: Vec<usize> = (0..self.config.axes.len()).collect();
+        for place in (1..axes.len()).rev() {
+            axes.swap(place, dice.below(place + 1));
+        }
+        let count = if axes.len() > 2 { dice.pick(&[2, 2, 3]) } else { 2 };
+        let (are_coupled, mut groups) = (dice.chance(0.4), vec![]);
+        for (number, axis) in axes.drain(..count).enumerate() {
+            let mut stops_with: Vec<usize> = (0..count).filter(|other| *other != number).collect();
+            stops_with.retain(|_| are_coupled && dice.chance(0.5));
+            groups.push(Group { name: format!("group{number}"), axes: vec![axis], stops_with });
+        }
+        for axis in axes {
+            groups[dice.below(count)].axes.push(axis);
+        }
+        self.config.groups = groups;
+        vary_program(dice, &mut self.config, self.clients > 0);
     }
 
     fn harden(&mut self, dice: &mut Dice) {
@@ -160,28 +195,33 @@ impl Case {
     }
 }
 
-/// Random moves; beside a client the program holds still where the axes are.
+/// Random moves of each group; beside a client the program holds still where the axes are.
 fn vary_program(dice: &mut Dice, config: &mut Config, has_client: bool) {
-    let here = config.axes.iter().map(|axis| axis.simulated.initial_position).collect();
     config.program.repeat = 1;
-    config.program.moves = match has_client {
-        true => vec![ProgramMove { dwell_s: 3600.0, ..random_move(dice, ProgramTarget::Position(here)) }],
-        false => {
-            let count = 1 + dice.below(4);
-            let target = |dice: &mut Dice| random_target(dice, config);
-            (0..count)
-                .map(|_| target(dice))
-                .collect::<Vec<_>>()
-                .into_iter()
-                .map(|to| random_move(dice, to))
-                .collect()
-        }
-    };
+    config.program.moves.clear();
+    for group in 0..config.groups.len().max(1) {
+        let axes: Vec<&Axis> = config.axes_of_group(group).iter().map(|axis| &config.axes[*axis]).collect();
+        let moves = match has_client {
+            true => {
+                let here = axes.iter().map(|axis| axis.simulated.initial_position).collect();
+                vec![ProgramMove {
+                    dwell_s: 3600.0,
+                    ..random_move(dice, group, ProgramTarget::Position(here))
+                }]
+            }
+            false => {
+                let count = 1 + dice.below(4);
+                let targets: Vec<ProgramTarget> = (0..count).map(|_| random_target(dice, &axes)).collect();
+                targets.into_iter().map(|target| random_move(dice, group, target)).collect()
+            }
+        };
+        config.program.moves.extend(moves);
+    }
 }
 
-fn random_move(dice: &mut Dice, target: ProgramTarget) -> ProgramMove {
+fn random_move(dice: &mut Dice, group: usize, target: ProgramTarget) -> ProgramMove {
     ProgramMove {
-        group: 0,
+        group,
         target,
         velocity_scale: dice.between(0.2, 1.0),
         acceleration_scale: dice.between(0.2, 1.0),
@@ -190,12 +230,11 @@ fn random_move(dice: &mut Dice, target: ProgramTarget) -> ProgramMove {
     }
 }
 
-fn random_target(dice: &mut Dice, config: &Config) -> ProgramTarget {
-    let axes = &config.axes;
+fn random_target(dice: &mut Dice, axes: &[&Axis]) -> ProgramTarget {
     let are_driven = |control: Control| axes.iter().any(|axis| axis.control == control);
     let duration_s = dice.between(0.1, 1.0);
     if are_driven(Control::ProfileVelocity) && dice.chance(0.6) {
-        let speed = |axis: &takt::config::Axis, dice: &mut Dice| match axis.control {
+        let speed = |axis: &Axis, dice: &mut Dice| match axis.control {
             Control::ProfileVelocity => dice.between(-1.0, 1.0) * axis.limits.velocity,
             _ => 0.0,
         };
@@ -205,7 +244,7 @@ fn random_target(dice: &mut Dice, config: &Config) -> ProgramTarget {
         };
     }
     if are_driven(Control::ProfileTorque) && dice.chance(0.6) {
-        let torque = |axis: &takt::config::Axis, dice: &mut Dice| match axis.control {
+        let torque = |axis: &Axis, dice: &mut Dice| match axis.control {
             Control::ProfileTorque => dice.between(-0.1, 0.1) * axis.limits.torque,
             _ => 0.0,
         };

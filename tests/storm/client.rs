@@ -1,14 +1,15 @@
-//! Somebody who asks the group for anything at any time.
+//! Somebody who asks the groups for anything at any time.
 
 use takt::config::{Config, Control};
 use takt_rt::{
-    MAX_AXES, Move, Phase, ProfileMove, ProfileTarget, Request, Snapshot, StopCategory, StreamPoint,
+    GroupSnapshot, MAX_AXES, MAX_GROUPS, Move, Phase, ProfileMove, ProfileTarget, Request, RequestTarget,
+    Snapshot, StopCategory, StreamPoint,
 };
 
 use crate::client_stream::ClientStream;
 use crate::dice::Dice;
 
-/// What has been asked of the group up to a cycle, as far as invariants depend on it.
+/// What has been asked of a group up to a cycle, as far as invariants depend on it.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct RecentRequests {
     /// A reset of faults that somebody has asked for was granted in this cycle.
@@ -23,8 +24,9 @@ const REQUESTS_AT_MOST: usize = 24;
 /// What the client wants in a cycle.
 #[derive(Default)]
 pub struct Wishes {
-    pub requests: Vec<Request>,
-    pub points: Vec<StreamPoint>,
+    pub requests: Vec<(RequestTarget, Request)>,
+    /// Each for the stream of a group.
+    pub points: Vec<(u8, StreamPoint)>,
     /// How much too late the next wake-up is.
     pub late_ns: u64,
 }
@@ -32,20 +34,24 @@ pub struct Wishes {
 pub struct Client {
     dice: Dice,
     restlessness: f64,
-    stream: Option<ClientStream>,
+    /// The last stream of each group.
+    streams: [Option<ClientStream>; MAX_GROUPS],
     are_streams_wild: bool,
 }
 
 impl Client {
     pub fn new(mut dice: Dice, are_streams_wild: bool) -> Self {
         let restlessness = dice.pick(&[0.002, 0.01, 0.05, 0.2]);
-        Self { dice, restlessness, stream: None, are_streams_wild }
+        Self { dice, restlessness, streams: Default::default(), are_streams_wild }
     }
 
     /// What it wants after a cycle.
     pub fn wishes(&mut self, config: &Config, snapshot: &Snapshot) -> Wishes {
-        let points =
-            self.stream.as_mut().map_or_else(Vec::new, |stream| stream.points(config, snapshot.at_ns));
+        let mut points = vec![];
+        for (group, stream) in (0..).zip(&mut self.streams) {
+            let come = stream.iter_mut().flat_map(|stream| stream.points(snapshot.at_ns));
+            points.extend(come.map(|point| (group, point)));
+        }
         let mut wishes = Wishes { points, ..Wishes::default() };
         if !self.dice.chance(self.restlessness) {
             return wishes;
@@ -62,9 +68,23 @@ impl Client {
         wishes
     }
 
-    fn request(&mut self, config: &Config, snapshot: &Snapshot) -> Request {
+    /// For one of the groups, mostly; some do not say for which one, or are wrong about it.
+    fn request(&mut self, config: &Config, snapshot: &Snapshot) -> (RequestTarget, Request) {
+        if config.groups.len() < 2 {
+            return (RequestTarget::All, self.request_of(config, snapshot, 0));
+        }
+        let group = self.dice.below(config.groups.len());
+        let target = match self.dice.below(64) {
+            0 => RequestTarget::Group(self.dice.below(MAX_GROUPS) as u8),
+            1..=6 => RequestTarget::All,
+            _ => RequestTarget::Group(group as u8),
+        };
+        (target, self.request_of(config, snapshot, group))
+    }
+
+    fn request_of(&mut self, config: &Config, snapshot: &Snapshot, group: usize) -> Request {
         // Whoever finds the group stopped and disabled mostly wants it back, though not always in the right order.
-        if snapshot.phase == Phase::Disabled && self.dice.chance(0.8) {
+        if snapshot.groups()[group].phase == Phase::Disabled && self.dice.chance(0.8) {
             return if self.dice.chance(0.5) { Request::Enable } else { Request::ResetFaults };
         }
         match self.dice.below(24) {
@@ -75,10 +95,10 @@ impl Client {
             4..=5 => Request::ResetFaults,
             6 => Request::Activate,
             7..=11 => {
-                self.begin_stream(config, snapshot);
+                self.begin_stream(config, snapshot, group);
                 Request::Stream
             }
-            12..=14 => self.profile_target(config, snapshot),
+            12..=14 => self.profile_target(config, snapshot, group),
             _ => self.random_move(config),
         }
     }
@@ -115,8 +135,9 @@ impl Client {
         })
     }
 
-    fn profile_target(&mut self, config: &Config, snapshot: &Snapshot) -> Request {
-        let axis = self.dice.below(config.axes.len());
+    fn profile_target(&mut self, config: &Config, snapshot: &Snapshot, group: usize) -> Request {
+        let axes = config.axes_of_group(group);
+        let axis = axes[self.dice.below(axes.len())];
         let limits = &config.axes[axis].limits;
         let share = self.dice.between(-1.1, 1.1);
         let fitting = match config.axes[axis].control {
@@ -134,17 +155,22 @@ impl Client {
         Request::SetProfileTarget(ProfileMove { axis: axis as u8, target, valid_until_ns })
     }
 
-    fn begin_stream(&mut self, config: &Config, snapshot: &Snapshot) {
-        let positions: Vec<f64> =
-            snapshot.axes[..config.axes.len()].iter().map(|axis| axis.position_set).collect();
+    fn begin_stream(&mut self, config: &Config, snapshot: &Snapshot, group: usize) {
         let dice = self.dice.split(snapshot.slot);
-        self.stream =
-            Some(ClientStream::new(dice, config, snapshot.at_ns, &positions, self.are_streams_wild));
+        let numbers = config.axes_of_group(group);
+        let positions = numbers.iter().map(|axis| snapshot.axes[*axis].position_set).collect();
+        let axes = numbers.iter().map(|axis| config.axes[*axis].clone()).collect();
+        let period_s = config.cycle.period_ns as f64 * 1e-9;
+        let begun = (snapshot.at_ns, positions);
+        self.streams[group] = Some(ClientStream::new(dice, axes, period_s, begun, self.are_streams_wild));
     }
 }
 
-/// Whether the group can be asked for something beside a program: nothing has stopped it by itself.
-pub fn is_open(snapshot: &Snapshot) -> bool {
-    let has_own_stop = snapshot.stop.is_some_and(|stop| stop.rule() != takt_rt::Rule::Requested);
-    snapshot.phase != Phase::Passive && !has_own_stop
+/// Whether the groups can be asked for something beside a program: nothing has stopped one by itself.
+pub fn are_open(snapshot: &Snapshot) -> bool {
+    let is_open = |group: &GroupSnapshot| {
+        let has_own_stop = group.stop.is_some_and(|stop| stop.rule() != takt_rt::Rule::Requested);
+        group.phase != Phase::Passive && !has_own_stop
+    };
+    snapshot.groups().iter().all(is_open)
 }

@@ -1,6 +1,6 @@
 //! Somebody whose callbacks lead the group anywhere within reason, take too long now and then, and panic.
 
-use takt::config::Config;
+use takt::config::{Axis, Compliance, Config, Control};
 use takt::controller::VirtualRun;
 use takt::controller::channels::GivenCallback;
 use takt::{CallbackCommand, CallbackCycle, CallbackState};
@@ -26,16 +26,16 @@ impl CallbackClient {
     pub fn act(&mut self, config: &Config, snapshot: &Snapshot, run: &mut VirtualRun<Tap>) {
         let spent_ns = if self.dice.chance(0.002) { 2 * BUDGET_NS } else { BUDGET_NS };
         run.take_for_callbacks(spent_ns);
-        let chance = if snapshot.phase == Phase::Holding { 0.1 } else { 0.003 };
+        let group = self.dice.below(snapshot.groups().len());
+        let chance = if snapshot.groups()[group].phase == Phase::Holding { 0.1 } else { 0.003 };
         if !self.dice.chance(chance) {
             return;
         }
-        let group = self.dice.below(config.groups.len().max(1));
-        let all = || (0..config.axes.len()).collect();
-        let axes: Vec<usize> = config.groups.get(group).map_or_else(all, |group| group.axes.clone());
+        let axes = config.axes_of_group(group);
         let limits: Vec<(usize, AxisLimits)> =
             axes.iter().map(|axis| (*axis, config.axes[*axis].limits)).collect();
-        let body = body(self.dice.split(snapshot.slot), limits.iter().map(|(_, limits)| *limits).collect());
+        let led = axes.iter().map(|axis| Led::of(&config.axes[*axis])).collect();
+        let body = body(self.dice.split(snapshot.slot), led);
         let parameters = CallbackRun {
             callback: CallbackId(0),
             budget_ns: BUDGET_NS,
@@ -47,18 +47,53 @@ impl CallbackClient {
     }
 }
 
+/// An axis as a callback leads it.
+struct Led {
+    limits: AxisLimits,
+    /// The highest gains of an impedance, in cyclic torque; no other mode takes a torque.
+    gains: Option<(f64, f64)>,
+    wish: Wish,
+}
+
 #[derive(Clone, Copy)]
 enum Wish {
     Nothing,
     Position(f64),
     Velocity(f64),
+    Torque(f64),
+    Impedance { position: f64, stiffness: f64, damping: f64, torque: f64 },
+}
+
+impl Led {
+    fn of(axis: &Axis) -> Self {
+        let Compliance { stiffness_max, damping_max, .. } = axis.compliance;
+        let has_torque = matches!(axis.control, Control::Torque { .. });
+        Self {
+            limits: axis.limits,
+            gains: has_torque.then_some((stiffness_max, damping_max)),
+            wish: Wish::Nothing,
+        }
+    }
+
+    /// Anything that its mode allows, beyond the limits of its motion too.
+    fn any_wish(&self, dice: &mut Dice) -> Wish {
+        let limits = &self.limits;
+        let position = dice.between(1.2 * limits.position_min, 1.2 * limits.position_max);
+        let velocity = dice.between(-1.5, 1.5) * limits.velocity;
+        let of_motion = [Wish::Nothing, Wish::Position(position), Wish::Velocity(velocity)];
+        let Some((stiffness, damping)) = self.gains.filter(|_| dice.chance(0.5)) else {
+            return dice.pick(&of_motion);
+        };
+        let torque = dice.between(-0.2, 0.2) * limits.torque;
+        let [stiffness, damping] = [stiffness, damping].map(|most| dice.between(0.0, 1.0) * most);
+        dice.pick(&[Wish::Torque(torque), Wish::Impedance { position, stiffness, damping, torque }])
+    }
 }
 
 fn body(
     mut dice: Dice,
-    limits: Vec<AxisLimits>,
+    mut axes: Vec<Led>,
 ) -> impl FnMut(&CallbackState<'_>, &CallbackCycle, &mut CallbackCommand<'_>) + Send {
-    let mut wishes = vec![Wish::Nothing; limits.len()];
     let mut elapsed_s = 0.0;
     move |_, cycle, command| {
         elapsed_s += cycle.dt_s;
@@ -66,17 +101,18 @@ fn body(
         if dice.chance(0.002) || elapsed_s > LONGEST_S {
             command.finish();
         }
-        for (axis, (wish, limits)) in wishes.iter_mut().zip(&limits).enumerate() {
+        for (axis, led) in axes.iter_mut().enumerate() {
             if dice.chance(0.02) {
-                // Beyond the limits, too.
-                let position = dice.between(1.2 * limits.position_min, 1.2 * limits.position_max);
-                let velocity = dice.between(-1.5, 1.5) * limits.velocity;
-                *wish = dice.pick(&[Wish::Nothing, Wish::Position(position), Wish::Velocity(velocity)]);
+                led.wish = led.any_wish(&mut dice);
             }
-            match *wish {
+            match led.wish {
                 Wish::Nothing => command.hold(axis),
                 Wish::Position(position) => command.position(axis, position),
                 Wish::Velocity(velocity) => command.velocity(axis, velocity),
+                Wish::Torque(torque) => command.torque(axis, torque),
+                Wish::Impedance { position, stiffness, damping, torque } => {
+                    command.impedance(axis, position, stiffness, damping, torque);
+                }
             }
         }
     }

@@ -2,7 +2,7 @@
 
 use takt::config::{Axis, Config, Control};
 use takt::controller::VirtualRun;
-use takt_rt::{MAX_AXES, ModeChange, OperationMode, Phase, Request, Snapshot};
+use takt_rt::{MAX_AXES, ModeChange, OperationMode, Phase, Request, RequestTarget, Snapshot};
 
 use crate::dice::Dice;
 use crate::tap::Tap;
@@ -25,13 +25,13 @@ pub fn let_modes_change(config: &mut Config) {
 }
 
 fn torque_loop(axis: &Axis) -> Control {
-    let inertia = axis.simulated.inertia;
+    let inertia = axis.joint.inertia();
     Control::Torque {
         stiffness: 900.0 * inertia,
         damping: 60.0 * inertia,
         inertia,
-        viscous_friction: axis.simulated.viscous_friction,
-        coulomb_friction: axis.simulated.coulomb_friction,
+        viscous_friction: axis.joint.viscous_friction(),
+        coulomb_friction: axis.joint.coulomb_friction(),
     }
 }
 
@@ -45,14 +45,18 @@ impl ModeClient {
     }
 
     pub fn act(&mut self, config: &Config, snapshot: &Snapshot, run: &mut VirtualRun<Tap>) {
-        let chance = if snapshot.phase == Phase::Disabled { 0.1 } else { 0.003 };
+        let group = self.dice.below(config.groups.len().max(1));
+        let target =
+            if config.groups.is_empty() { RequestTarget::All } else { RequestTarget::Group(group as u8) };
+        let phase = snapshot.groups().get(group).map(|group| group.phase);
+        let chance = if phase == Some(Phase::Disabled) { 0.1 } else { 0.003 };
         if self.dice.chance(chance) {
             let modes = self.modes(config);
             // Without room it is not asked for.
-            let _ = run.host().request(Request::ChangeMode(ModeChange { modes }));
+            let _ = run.host().request_of(target, Request::ChangeMode(ModeChange { modes }));
         }
-        if snapshot.phase == Phase::Holding && self.dice.chance(0.005) {
-            let _ = run.host().request(Request::Disable);
+        if phase == Some(Phase::Holding) && self.dice.chance(0.005) {
+            let _ = run.host().request_of(target, Request::Disable);
         }
     }
 

@@ -1,6 +1,6 @@
 //! Points that somebody streams: of every kind, rate and disorder.
 
-use takt::config::Config;
+use takt::config::Axis;
 use takt_rt::plan::State;
 use takt_rt::{AxisPoint, MAX_AXES, PointRole, StreamPoint};
 
@@ -31,6 +31,8 @@ enum Badness {
 /// A stream under way.
 pub struct ClientStream {
     dice: Dice,
+    /// The axes of the group.
+    axes: Vec<Axis>,
     begun_ns: u64,
     begun: Vec<f64>,
     /// The next point is meant for so long after the beginning, in seconds.
@@ -53,15 +55,19 @@ pub struct ClientStream {
 }
 
 impl ClientStream {
-    /// One from where the axes are.
-    pub fn new(mut dice: Dice, config: &Config, begun_ns: u64, positions: &[f64], is_wild: bool) -> Self {
-        let mut begun = positions.to_vec();
+    /// One from now on and from where the axes of the group are.
+    pub fn new(
+        mut dice: Dice,
+        axes: Vec<Axis>,
+        period_s: f64,
+        (begun_ns, mut begun): (u64, Vec<f64>),
+        is_wild: bool,
+    ) -> Self {
         if dice.chance(0.1) {
             // They have to be led there.
-            let limits = &config.axes[0].limits;
+            let limits = &axes[0].limits;
             begun[0] = dice.between(limits.position_min, limits.position_max);
         }
-        let period_s = config.cycle.period_ns as f64 * 1e-9;
         let is_chunked = dice.chance(0.3);
         Self {
             begun_ns,
@@ -91,14 +97,15 @@ impl ClientStream {
             loss: dice.pick(&[0.0, 0.0, 0.05, 0.3]),
             chunk: if is_chunked { 2 + dice.below(40) } else { 1 },
             on_way: vec![],
+            axes,
             dice,
         }
     }
 
     /// The points that have come up to this time.
-    pub fn points(&mut self, config: &Config, now_ns: u64) -> Vec<StreamPoint> {
+    pub fn points(&mut self, now_ns: u64) -> Vec<StreamPoint> {
         while self.next_s <= now_ns.saturating_sub(self.begun_ns) as f64 * 1e-9 && self.next_s < self.end_s {
-            self.send(config);
+            self.send();
         }
         let mut come = vec![];
         self.on_way.retain(|(at_ns, point)| {
@@ -111,7 +118,7 @@ impl ClientStream {
     }
 
     /// Sends the next point, or the next chunk.
-    fn send(&mut self, config: &Config) {
+    fn send(&mut self) {
         let from_s = self.next_s;
         let late_s = self.latency_s + self.dice.between(0.0, 1.0) * self.jitter * self.interval_s;
         let arrives_ns = self.time_ns(from_s + late_s);
@@ -127,8 +134,7 @@ impl ClientStream {
                 1 => PointRole::Single,
                 _ => PointRole::Chunk { is_first: number == 0, is_last: number + 1 == count },
             };
-            let mut point =
-                StreamPoint { at_ns: self.time_ns(stamp_s), role, axes: self.axes(config, meant_s) };
+            let mut point = StreamPoint { at_ns: self.time_ns(stamp_s), role, axes: self.axes(meant_s) };
             if self.dice.chance(0.02) {
                 self.spoil(&mut point);
             }
@@ -144,9 +150,9 @@ impl ClientStream {
     }
 
     /// A swing to and fro from where the axes were.
-    fn axes(&self, config: &Config, time_s: f64) -> [AxisPoint; MAX_AXES] {
+    fn axes(&self, time_s: f64) -> [AxisPoint; MAX_AXES] {
         let mut axes = [AxisPoint::default(); MAX_AXES];
-        for (index, axis) in config.axes.iter().enumerate() {
+        for (index, axis) in self.axes.iter().enumerate() {
             let limits = &axis.limits;
             let highest = limits.acceleration.min(limits.deceleration);
             // At both limits in turn, with a share of 1.

@@ -39,6 +39,11 @@ pub struct Coverage {
     serving: u64,
     several_clients: u64,
     several_faults: u64,
+    several_groups: u64,
+    coupled_groups: u64,
+    /// How often a callback, and a checked trajectory, has begun to lead a group.
+    callbacks: u64,
+    trajectories: u64,
 }
 
 impl Coverage {
@@ -48,6 +53,11 @@ impl Coverage {
         self.serving += u64::from(case.is_serving);
         self.several_clients += u64::from(case.clients > 1);
         self.several_faults += u64::from(done.outcomes.len() > 1);
+        self.several_groups += u64::from(case.config.groups.len() > 1);
+        let are_coupled = case.config.groups.iter().any(|group| !group.stops_with.is_empty());
+        self.coupled_groups += u64::from(are_coupled);
+        self.callbacks += done.callbacks;
+        self.trajectories += done.trajectories;
         for axis in &case.config.axes {
             let period_us =
                 case.config.cycle.period_ns * u64::from(case.config.buses[axis.bus].divider) / 1000;
@@ -81,6 +91,10 @@ impl Coverage {
         self.serving += other.serving;
         self.several_clients += other.several_clients;
         self.several_faults += other.several_faults;
+        self.several_groups += other.several_groups;
+        self.coupled_groups += other.coupled_groups;
+        self.callbacks += other.callbacks;
+        self.trajectories += other.trajectories;
         for (kind, situations) in &other.situations {
             let sum = self.situations.entry(kind).or_default();
             sum.bringing_up += situations.bringing_up;
@@ -122,6 +136,10 @@ impl Coverage {
             (self.serving, "a group that clients command"),
             (self.several_clients, "several clients"),
             (self.several_faults, "several faults"),
+            (self.several_groups, "several groups"),
+            (self.coupled_groups, "groups that stop with others"),
+            (self.callbacks, "a callback that leads a group"),
+            (self.trajectories, "a checked trajectory"),
             (
                 self.situations.values().map(|situations| situations.enabling).sum(),
                 "a fault while the axes are being enabled",
@@ -136,10 +154,19 @@ impl Coverage {
 
     pub fn table(&self) -> String {
         let mut text = format!(
-            "{} cycles, {} cases: {} with clients in charge, {} with several clients, {} with several faults\n\n\
+            "{} cycles, {} cases: {} with clients in charge, {} with several clients, {} with several faults, \
+             {} with several groups ({} coupled); {} callbacks, {} trajectories\n\n\
              | Fault | Cases | Bring-up | Enabling | Holding | Moving | Ending | Reactions |\n\
              |---|---|---|---|---|---|---|---|\n",
-            self.cycles, self.cases, self.serving, self.several_clients, self.several_faults,
+            self.cycles,
+            self.cases,
+            self.serving,
+            self.several_clients,
+            self.several_faults,
+            self.several_groups,
+            self.coupled_groups,
+            self.callbacks,
+            self.trajectories,
         );
         for kind in KINDS {
             let situations = self.situations.get(kind).cloned().unwrap_or_default();

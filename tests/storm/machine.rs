@@ -53,7 +53,7 @@ fn read(name: &str) -> Config {
 }
 
 fn ready(mut config: Config) -> Config {
-    config.axes.iter_mut().for_each(|axis| axis.simulated.power_up_ns = 5_000_000);
+    config.axes.iter_mut().for_each(|axis| axis.power_up_ns = 5_000_000);
     // The drives go on while the controller is away, as real ones do.
     config.simulation.longest_gap_ns = 60_000_000_000;
     config.telemetry.ring_records = RECORDS;
@@ -160,7 +160,7 @@ fn axis(dice: &mut Dice, name: &str, bus: usize, node: usize, bus_us: usize, is_
         text,
         "[axis.limits]\nposition = [{lowest:.4}, {:.4}]\nvelocity = {velocity:.4}\nacceleration = {acceleration:.4}\n\
          deceleration = {deceleration:.4}\njerk = {jerk}\ntorque = {torque:.1}\n[axis.simulated]\n\
-         initial_position = {:.4}\n",
+         initial_position = {:.4}\n[axis.joint]\n",
         lowest + travel,
         lowest + dice.between(0.05, 0.95) * travel,
     );

@@ -11,6 +11,7 @@ mod client;
 mod client_callback;
 mod client_mode;
 mod client_stream;
+mod client_trajectory;
 mod concern;
 mod coverage;
 mod dice;

@@ -34,6 +34,7 @@ fn moving(name: &'static str, text: &str) -> Case {
         hardship: Hardship::default(),
         has_callbacks: false,
         has_mode_changes: false,
+        has_trajectories: false,
         overload: Overload::default(),
         dice: Dice::new(0),
     }
@@ -189,7 +190,7 @@ const FAILED_IN_HARDSHIP: [(u64, &str); 10] = [
 ];
 
 /// The same of those on a machine that has too little time.
-const FAILED_IN_OVERLOAD: [(u64, &str); 12] = [
+const FAILED_IN_OVERLOAD: [(u64, &str); 13] = [
     (
         424_242_620,
         "A drive reported a fault for want of the heartbeat of a machine that was late in every cycle",
@@ -232,12 +233,16 @@ const FAILED_IN_OVERLOAD: [(u64, &str); 12] = [
         20_261_129_837,
         "A drive said that it is stopped while it was to be enabled on a machine that computed too slowly",
     ),
+    (
+        20_280_045_733,
+        "A bus that had been behind for two cycles sent the way of three in one, faster than the velocity limit",
+    ),
 ];
 
 #[test]
 fn storms_that_have_failed_in_overload_pass() {
     for (seed, what) in FAILED_IN_OVERLOAD {
-        let played = play(&Case::of(seed));
+        let played = play(&Case::in_overload(seed));
         assert!(played.is_ok(), "{seed}, {what}: {played:?}");
     }
 }

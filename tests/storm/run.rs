@@ -4,20 +4,21 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use takt::bus::port::Port;
-use takt::config::Config;
+use takt::config::{Axis, Config};
 use takt::controller::channels::LogSide;
 use takt::controller::{Outcome, VirtualRun};
-use takt::faults::{FaultInjector, Scenario};
+use takt::faults::{FaultInjector, Scenario, ScenarioFault};
 use takt::sim::{Observation, SimulatedBus};
 use takt_rt::{
-    Answer, BusPort, DriveState, Event, EventKind, Frame, Phase, ReceiveBatch, Request, RequestId, Rule,
-    Snapshot,
+    Answer, BusPort, DriveState, Event, EventKind, Frame, Phase, ReceiveBatch, Request, RequestId,
+    RequestTarget, Rule, Snapshot, StreamState,
 };
 
 use crate::case::Case;
-use crate::client::{Client, RecentRequests, is_open};
+use crate::client::{Client, RecentRequests, are_open};
 use crate::client_callback::CallbackClient;
 use crate::client_mode::ModeClient;
+use crate::client_trajectory::TrajectoryClient;
 use crate::concern::Concerns;
 use crate::fingerprint::Fingerprint;
 use crate::heartbeat::Heartbeats;
@@ -89,11 +90,11 @@ impl World {
 pub struct FaultOutcome {
     /// Its number in the scenario.
     pub fault: usize,
-    /// What the group was doing when it began.
+    /// What the first group that it concerns was doing when it began.
     pub phase: Phase,
     /// Whether the axes had been enabled before.
     pub is_brought_up: bool,
-    /// The first stop that the group made by itself from then on, unless another fault came between.
+    /// The first stop that a group made by itself from then on, unless another fault came between.
     pub stop: Option<Rule>,
     /// Another fault came before anything stopped.
     is_overtaken: bool,
@@ -111,6 +112,9 @@ pub struct Done {
     pub stops: BTreeSet<&'static str>,
     /// Cycles in which an axis moved in another mode of operation than its first.
     pub changed_cycles: u64,
+    /// How often a callback, and a checked trajectory, has begun to lead a group.
+    pub callbacks: u64,
+    pub trajectories: u64,
     /// Whether the drives could not be brought up.
     pub is_bring_up_failed: bool,
 }
@@ -128,25 +132,27 @@ pub fn play(case: &Case) -> Result<Done, String> {
     let mut wire = Wire::new(config);
     let mut heartbeats = Heartbeats::new(config);
     let mut clients = Clients::new(case);
+    let groups: Vec<usize> = (0..config.axes.len()).map(|axis| config.group_of_axis(axis)).collect();
     let mut fingerprint = Fingerprint::default();
     let mut outcomes: Vec<FaultOutcome> = vec![];
     let mut stops = BTreeSet::new();
     let mut changed_cycles = 0;
     let at_most = case.length + (END_AT_MOST_S * 1e9 / config.cycle.period_ns as f64) as u64;
-    let (mut enabled, mut cycles) = (None, 0);
+    let (mut enabled, mut cycles, mut callbacks) = (None, 0, 0);
     let mut goes_on = true;
     let mut overload_dice = case.dice.split(u64::MAX - 2);
     world.run.poll_life_cycle_every(case.hardship.neglect.max(1));
     while goes_on {
-        let phase = world.snapshot.phase;
+        let before = world.snapshot;
         goes_on = world.step(config);
         cycles += 1;
         let wrong =
-            |snapshot: &Snapshot, what: String| format!("cycle {cycles}, {:?}: {what}", snapshot.phase);
+            |snapshot: &Snapshot, what: String| format!("cycle {cycles}, {:?}: {what}", phases_of(snapshot));
         wire.read(&world.sent);
         heartbeats.observe(&world.sent, world.snapshot.at_ns, &world.truth);
         concerns.note_missed_heartbeats(heartbeats.missed());
         concerns.observe(&fault_injector, |fault| {
+            let phase = before.groups()[concerned_group(config, &case.scenario.faults[fault])].phase;
             outcomes
                 .iter_mut()
                 .filter(|outcomes| outcomes.stop.is_none())
@@ -160,6 +166,8 @@ pub fn play(case: &Case) -> Result<Done, String> {
             });
         });
         note_stop(&world.events, &mut outcomes);
+        let is_callback = |event: &&Event| event.kind == EventKind::Stream { state: StreamState::Callback };
+        callbacks += world.events.iter().filter(is_callback).count() as u64;
         stops.extend(world.events.iter().filter_map(|event| match event.kind {
             EventKind::Stop(reason) => Some(reason.rule().key()),
             _ => None,
@@ -172,6 +180,7 @@ pub fn play(case: &Case) -> Result<Done, String> {
             fingerprint.take_record(record);
             invariants.check(&Seen {
                 config,
+                groups: &groups,
                 snapshot,
                 record,
                 sent: &wire.values,
@@ -180,7 +189,8 @@ pub fn play(case: &Case) -> Result<Done, String> {
                 concerns: &concerns.by_axis,
                 troubled_buses: &concerns.by_bus,
                 overloaded_buses: &concerns.is_overloaded,
-                asked: clients.asked,
+                asked: &clients.asked,
+                are_torques_commanded: case.has_callbacks,
                 has_faults: !case.scenario.faults.is_empty(),
             })
         };
@@ -190,7 +200,7 @@ pub fn play(case: &Case) -> Result<Done, String> {
         if cycles > at_most {
             return Err(wrong(snapshot, "the run does not end".to_owned()));
         }
-        if enabled.is_none() && snapshot.phase == Phase::Holding {
+        if enabled.is_none() && snapshot.groups().iter().all(|group| group.phase == Phase::Holding) {
             enabled = Some(cycles);
         }
         if case.broken_off == Some(cycles) || enabled.is_some_and(|enabled| cycles == enabled + case.length) {
@@ -206,14 +216,39 @@ pub fn play(case: &Case) -> Result<Done, String> {
     }
     at_rest(case, &mut concerns, &mut world)?;
     let is_bring_up_failed = matches!(world.run.supervisor().outcome(), Some(Outcome::BringUpFailed(_)));
+    let trajectories = clients.trajectories.map_or(0, |client| client.begun);
     let fingerprint = fingerprint.value();
-    Ok(Done { cycles, fingerprint, outcomes, stops, changed_cycles, is_bring_up_failed })
+    Ok(Done {
+        cycles,
+        fingerprint,
+        outcomes,
+        stops,
+        changed_cycles,
+        callbacks,
+        trajectories,
+        is_bring_up_failed,
+    })
 }
 
 fn moves_in_other_mode(config: &Config, snapshot: &Snapshot) -> bool {
-    let mut axes = config.axes.iter().zip(&snapshot.axes);
-    matches!(snapshot.phase, Phase::Moving | Phase::Streaming)
-        && axes.any(|(axis, shown)| shown.mode_set != axis.control.operation_mode() as i8)
+    (0..).zip(snapshot.groups()).any(|(group, shown)| {
+        let mut axes = config.axes_of_group(group).into_iter();
+        let is_other =
+            |axis: usize| snapshot.axes[axis].mode_set != config.axes[axis].control.operation_mode() as i8;
+        matches!(shown.phase, Phase::Moving | Phase::Streaming) && axes.any(is_other)
+    })
+}
+
+fn phases_of(snapshot: &Snapshot) -> Vec<Phase> {
+    snapshot.groups().iter().map(|group| group.phase).collect()
+}
+
+/// The first group that a fault concerns: that of its axis, or of the first axis on its bus.
+fn concerned_group(config: &Config, fault: &ScenarioFault) -> usize {
+    let is_named = |axis: &Axis| fault.location == format!("axis {}", axis.name);
+    let named = config.axes.iter().position(is_named);
+    let axis = named.or_else(|| config.axes.iter().position(|axis| axis.bus == fault.bus));
+    config.group_of_axis(axis.unwrap_or(0))
 }
 
 fn note_stop(events: &[Event], outcomes: &mut [FaultOutcome]) {
@@ -233,10 +268,13 @@ struct Clients {
     all: Vec<Client>,
     callbacks: Option<CallbackClient>,
     modes: Option<ModeClient>,
-    asked: RecentRequests,
+    trajectories: Option<TrajectoryClient>,
+    /// Of each group.
+    asked: Vec<RecentRequests>,
     /// Resets of faults that wait in the queue. Each counts when it is granted: a fault may come up before that, and is reset too.
-    awaited_resets: Vec<RequestId>,
-    since_reset: u64,
+    awaited_resets: Vec<(RequestId, RequestTarget)>,
+    /// Cycles since the last one was granted to each group.
+    since_reset: Vec<u64>,
 }
 
 impl Clients {
@@ -245,49 +283,65 @@ impl Clients {
             .map(|number| Client::new(case.dice.split(number), case.hardship.are_streams_wild))
             .collect();
         let callbacks = case.has_callbacks.then(|| CallbackClient::new(case.dice.split(u64::MAX - 3)));
-        let modes = case.has_mode_changes.then(|| ModeClient::new(case.dice.split(u64::MAX - 4)));
+        let modes = case.has_mode_changes.then(|| ModeClient::new(case.dice.split(u64::MAX - 5)));
+        let trajectories =
+            case.has_trajectories.then(|| TrajectoryClient::new(case.dice.split(u64::MAX - 4)));
+        let groups = case.config.groups.len().max(1);
         Self {
             all,
             callbacks,
             modes,
-            asked: RecentRequests::default(),
+            trajectories,
+            asked: vec![RecentRequests::default(); groups],
             awaited_resets: vec![],
-            since_reset: u64::MAX,
+            since_reset: vec![u64::MAX; groups],
         }
     }
 
     /// Looks which resets have been granted in the last cycle.
     fn note_answers(&mut self, snapshot: &Snapshot) {
         let answers = &snapshot.answers;
-        self.asked.has_reset = self.awaited_resets.iter().any(|id| answers.of(*id) == Answer::Granted);
-        self.awaited_resets.retain(|id| answers.of(*id) == Answer::None && !answers.have_forgotten(*id));
-        self.since_reset = if self.asked.has_reset { 0 } else { self.since_reset.saturating_add(1) };
-        self.asked.has_reset_lately = self.since_reset < RESET_CYCLES;
+        for (group, (asked, since_reset)) in (0..).zip(self.asked.iter_mut().zip(&mut self.since_reset)) {
+            asked.has_reset = self.awaited_resets.iter().any(|(id, target)| {
+                let is_for_it =
+                    matches!(target, RequestTarget::All) || *target == RequestTarget::Group(group);
+                is_for_it && answers.of(*id) == Answer::Granted
+            });
+            *since_reset = if asked.has_reset { 0 } else { since_reset.saturating_add(1) };
+            asked.has_reset_lately = *since_reset < RESET_CYCLES;
+        }
+        self.awaited_resets.retain(|(id, _)| answers.of(*id) == Answer::None && !answers.have_forgotten(*id));
     }
 
     fn act(&mut self, case: &Case, world: &mut World, is_raging: bool) {
         let snapshot = &world.snapshot;
-        let is_waited_for = snapshot.phase == Phase::Passive || !case.is_serving && !is_open(snapshot);
-        if is_raging && !is_waited_for {
-            if let Some(callbacks) = &mut self.callbacks {
-                callbacks.act(&case.config, snapshot, &mut world.run);
+        let is_passive = snapshot.groups().iter().any(|group| group.phase == Phase::Passive);
+        let is_waited_for = is_passive || !case.is_serving && !are_open(snapshot);
+        if !is_raging || is_waited_for {
+            return;
+        }
+        if let Some(callbacks) = &mut self.callbacks {
+            callbacks.act(&case.config, snapshot, &mut world.run);
+        }
+        if let Some(modes) = &mut self.modes {
+            modes.act(&case.config, snapshot, &mut world.run);
+        }
+        if let Some(trajectories) = &mut self.trajectories {
+            trajectories.act(&case.config, snapshot, &mut world.run);
+        }
+        for client in &mut self.all {
+            let wishes = client.wishes(&case.config, snapshot);
+            for (target, request) in &wishes.requests {
+                let id = world.run.host().request_of(*target, *request).ok();
+                let reset = id.filter(|_| *request == Request::ResetFaults);
+                self.awaited_resets.extend(reset.map(|id| (id, *target)));
             }
-            if let Some(modes) = &mut self.modes {
-                modes.act(&case.config, snapshot, &mut world.run);
+            let streamer = world.run.host().streamer();
+            for (group, point) in &wishes.points {
+                // Nobody takes the points of a stream that was not granted.
+                let _ = streamer.push_to(*group, std::slice::from_ref(point));
             }
-            for client in &mut self.all {
-                let wishes = client.wishes(&case.config, snapshot);
-                for request in &wishes.requests {
-                    let id = world.run.host().request(*request).ok();
-                    self.awaited_resets.extend(id.filter(|_| *request == Request::ResetFaults));
-                }
-                let streamer = world.run.host().streamer();
-                for point in &wishes.points {
-                    // Nobody takes the points of a stream that was not granted.
-                    let _ = streamer.push(std::slice::from_ref(point));
-                }
-                world.run.clock().stall(wishes.late_ns);
-            }
+            world.run.clock().stall(wishes.late_ns);
         }
     }
 }

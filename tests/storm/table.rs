@@ -146,7 +146,7 @@ fn most_kinds_of_fault_stop_a_machine_in_motion_and_every_stop_ends_in_the_time_
         if is_printed {
             println!("{text}");
         }
-        let bound_ms = bounds::to_rest_s(&config) * 1e3;
+        let bound_ms = bounds::to_rest_s(&config.axes) * 1e3;
         assert!(rest_ms.len() >= stops_at_least, "{text}");
         assert!(rest_ms.iter().all(|ms| *ms <= bound_ms), "beyond {bound_ms} ms:\n{text}");
     }

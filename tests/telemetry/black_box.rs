@@ -10,7 +10,7 @@ use takt_rt::{
 };
 
 use crate::reader::{Value, messages};
-use crate::run::{CYCLE_NS, EPOCH_NS, Notices, STOP, UNIX_AT_ZERO_NS, cycle, event, options, sides};
+use crate::run::{CYCLE_NS, EPOCH_NS, Notices, STOP, UNIX_AT_ZERO_NS, all_in, cycle, event, options, sides};
 
 /// A bus on which a drive answers every SYNC, until the bus fails.
 struct Bus {
@@ -250,7 +250,7 @@ fn a_new_drive_fault_without_power_is_an_incident_and_an_old_one_is_not() {
     };
     let disabled = |run: &mut Run, count: u64| {
         for _ in 0..count {
-            let record = CycleRecord { phase: Phase::Disabled, ..cycle(run.slot) };
+            let record = CycleRecord { groups: all_in(Phase::Disabled), ..cycle(run.slot) };
             assert!(run.rt.record(&record));
             run.logger.drain();
             run.slot += 1;
@@ -288,7 +288,7 @@ fn a_drive_fault_that_stops_the_group_is_one_incident_even_if_it_is_seen_after_t
         EventKind::DriveState { axis: 1, state: DriveState::decode(0x0008), statusword: 0x0008 },
     ));
     run.stop(Rule::DriveFault);
-    run.rt.record(&CycleRecord { phase: Phase::Disabled, ..cycle(10) });
+    run.rt.record(&CycleRecord { groups: all_in(Phase::Disabled), ..cycle(10) });
     let summary = run.finish();
     let bytes = fs::read(&summary.black_boxes.files[0]).unwrap();
     assert_eq!((summary.black_boxes.files.len(), metadata(&bytes).len()), (1, 1));

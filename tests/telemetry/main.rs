@@ -2,6 +2,7 @@
 
 mod black_box;
 mod failures;
+mod groups;
 mod reader;
 mod recording;
 mod report;

@@ -74,6 +74,17 @@ fn every_field_can_be_read_by_the_schema_in_the_file() {
             assert_eq!(*fields, expected.map(|(name, value)| (name.to_owned(), value)).into());
         }
     }
+    let (_, group) = &messages(&recording, "/group/all")[3];
+    let expected = [
+        ("slot", number(3)),
+        ("phase", number(4)),
+        ("is_stopped", number(0)),
+        ("category", number(0)),
+        ("rule", number(0)),
+        ("is_called", number(0)),
+        ("callback_ns", number(0)),
+    ];
+    assert_eq!(*group, expected.map(|(name, value)| (name.to_owned(), value)).into());
     let (_, times) = &messages(&recording, "/cycle")[3];
     let expected = [
         ("slot", number(3)),
@@ -97,7 +108,8 @@ fn events_are_recorded_as_text_and_as_numbers() {
         "holding → moving",
         "stop: slide was 0.2500 m from its set-point (allowed: 0.1250 m) while moving; \
          category 1: decelerated, then power removed",
-        "slide: emergency message: error 0x7305, register 0x21, manufacturer 01 02 03 04 05",
+        "slide: emergency message: error 0x7305 (incremental sensor 1 fault), register 0x21, \
+         manufacturer 01 02 03 04 05; try: check the encoder and its cable, then power-cycle the drive",
         "the move was rejected while holding: slide cannot go to 1.2500 m, beyond its position limit of 0.7500 m",
     ];
     assert_eq!(texts, expected.map(|text| Value::Text(text.to_owned())));
@@ -123,11 +135,12 @@ fn a_recording_has_an_index_and_the_description_of_the_machine() {
     let recording = record();
     let summary = mcap::Summary::read(&recording).unwrap().unwrap();
     let statistics = summary.stats.unwrap();
-    assert_eq!((statistics.message_count, statistics.channel_count), (20 * 3 + 4, 4));
+    assert_eq!((statistics.message_count, statistics.channel_count), (20 * 4 + 4, 5));
     let slide = summary.channels.values().find(|channel| channel.topic == "/axis/slide").unwrap();
     let expected = [
         ("acceleration_limit", "10"),
         ("counts_per_unit", "83443"),
+        ("group", "0"),
         ("index", "1"),
         ("jerk_limit", "50"),
         ("name", "slide"),

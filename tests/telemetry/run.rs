@@ -9,8 +9,8 @@ use takt::telemetry::{
     SetPointMagnitudes, Unit, WallClock,
 };
 use takt_rt::{
-    AxisRecord, CycleRecord, CycleTiming, DriveState, Event, EventKind, Fault, HostInterface, MAX_AXES,
-    Origin, Phase, StopCategory, StopCause, StopReason,
+    AxisRecord, CycleRecord, CycleTiming, DriveState, Event, EventKind, Fault, GroupRecord, HostInterface,
+    MAX_AXES, MAX_GROUPS, Origin, Phase, StopCategory, StopCause, StopReason,
 };
 
 /// 2023-11-14 22:13:20 UTC
@@ -39,10 +39,17 @@ pub fn sides(records: usize) -> (RtSide, HostSide, LogSide) {
     })
 }
 
+/// Groups that are all in this phase.
+pub fn all_in(phase: Phase) -> [GroupRecord; MAX_GROUPS] {
+    [GroupRecord { phase, ..GroupRecord::default() }; MAX_GROUPS]
+}
+
 pub fn machine() -> Machine {
     let axis = |name: &str, unit| AxisDescription {
         name: name.to_owned(),
         bus: None,
+        group: 0,
+        family: None,
         unit,
         plans_own_profile: false,
         counts_per_unit: 83_443.0,
@@ -103,7 +110,7 @@ pub fn cycle(slot: u64) -> CycleRecord {
             sent_ns: 4000 + slot,
             missed_slots: u64::from(slot == 3),
         },
-        phase: Phase::Moving,
+        groups: all_in(Phase::Moving),
         is_commanded: slot != 3,
         axis_count: 2,
         axes,

@@ -199,11 +199,12 @@ impl ObedientDrive {
                 return;
             }
             Control::Torque { .. } | Control::ProfileTorque => {
-                let joint = &self.axis.simulated;
+                let joint = &self.axis.joint;
                 let direction = (self.velocity / COULOMB_FADE).clamp(-1.0, 1.0);
-                let friction = joint.viscous_friction * self.velocity + joint.coulomb_friction * direction;
+                let friction =
+                    joint.viscous_friction() * self.velocity + joint.coulomb_friction() * direction;
                 let torque = self.scale.torque_from_per_mille(self.target_torque);
-                self.velocity += (torque - friction) / joint.inertia * period_s;
+                self.velocity += (torque - friction) / joint.inertia() * period_s;
                 self.position += self.velocity * period_s;
                 return;
             }

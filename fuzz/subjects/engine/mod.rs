@@ -13,7 +13,7 @@ use std::sync::OnceLock;
 use takt::config::{Config, Control};
 use takt::controller::assemble;
 use takt_rt::{
-    BusHealth, BusSet, BusState, Command, CycleInput, CycleRecord, CycleTiming, Deadline, Dialect,
+    BitSet, BusHealth, BusState, Command, CycleInput, CycleRecord, CycleTiming, Deadline, Dialect,
     DriveState, Engine, Event, Frame, HostInterface, LookAhead, MAX_AXES, OperationMode, Phase, Received,
     Request, RequestEnvelope, RequestId, RequestTarget, SendBatch, Snapshot, StreamPoint, StreamSample,
     StreamWish,
@@ -167,7 +167,7 @@ struct Machine {
     slot: u64,
     journey: Journey,
     buses: Vec<BusHealth>,
-    held_back: BusSet,
+    held_back: BitSet,
 }
 
 impl Machine {
@@ -182,7 +182,7 @@ impl Machine {
             slot: 0,
             journey: Journey { phases: vec![Phase::Passive], ..Journey::default() },
             buses: vec![BusHealth::default(); config.buses.len()],
-            held_back: BusSet::default(),
+            held_back: BitSet::default(),
         }
     }
 
@@ -253,7 +253,7 @@ impl Machine {
     fn disturb(&mut self, input: &mut Input<'_>) {
         match input.byte() % 4 {
             0 => {
-                let mut full = BusSet::default();
+                let mut full = BitSet::default();
                 full.insert(self.slot as usize % self.buses.len());
                 self.engine.not_taken(full);
             }

@@ -65,10 +65,10 @@ impl Watch {
     pub fn look(&mut self, engine: &Engine, events: &[Event], snapshot: &Snapshot, has_acted: bool) {
         events.iter().for_each(|event| self.hear(event));
         assert_eq!(self.phase, engine.phase(0).unwrap_or_default(), "a phase without an event");
-        assert_eq!(self.phase, snapshot.phase);
+        assert_eq!(self.phase, snapshot.groups[0].phase);
         assert_eq!(self.refused, snapshot.rejected, "a rejection without an event");
         self.look_at_stop(snapshot, has_acted);
-        if snapshot.steps != std::mem::replace(&mut self.steps, snapshot.steps) {
+        if snapshot.groups[0].steps != std::mem::replace(&mut self.steps, snapshot.groups[0].steps) {
             self.look_at_set_points(engine);
         }
     }
@@ -112,13 +112,15 @@ impl Watch {
     }
 
     fn look_at_stop(&mut self, snapshot: &Snapshot, has_acted: bool) {
-        let is_latched = snapshot.stop.is_some_and(|stop| stop.rule() != Rule::Requested);
+        let is_latched = snapshot.groups[0].stop.is_some_and(|stop| stop.rule() != Rule::Requested);
         if is_latched {
-            let (is_on_way, stop) =
-                (matches!(self.phase, Phase::Enabling | Phase::Moving | Phase::Streaming), snapshot.stop);
+            let (is_on_way, stop) = (
+                matches!(self.phase, Phase::Enabling | Phase::Moving | Phase::Streaming),
+                snapshot.groups[0].stop,
+            );
             assert!(!is_on_way, "{:?} in spite of {stop:?}", self.phase);
         }
-        if let Some(stop) = snapshot.stop {
+        if let Some(stop) = snapshot.groups[0].stop {
             let reported = self.reported.expect("a stop without an event");
             assert_eq!(
                 (reported.rule(), reported.origin, reported.slot),
@@ -127,12 +129,12 @@ impl Watch {
             assert!(stop.category <= reported.category, "{stop:?} was {reported:?}");
         }
         if self.phase == Phase::Stopping {
-            assert!(snapshot.stop.is_some(), "a stop without a reason");
+            assert!(snapshot.groups[0].stop.is_some(), "a stop without a reason");
             self.stopping_cycles += u32::from(has_acted);
             assert!(
                 self.stopping_cycles <= self.stopping_at_most,
                 "the stop does not end: {:?}",
-                snapshot.stop
+                snapshot.groups[0].stop
             );
         }
     }

@@ -11,13 +11,14 @@ use crate::pdo::{CommandSlot, TransmissionType};
 impl Axis {
     /// Writes the command of this cycle of the axis' bus: the target, and one step of the drive towards `goal`, unless another
     /// controlword is to be sent.
+    #[inline]
     pub fn command(&mut self, goal: Goal, other_word: Option<u16>) {
         let is_enabled = self.is_enabled();
         let word = other_word.unwrap_or_else(|| self.word_towards(goal));
         let is_kept = is_enabled && goal == Goal::Enabled;
         let spacing_cycles = self.parameters.controlword_spacing_cycles;
         self.controlwords.take(word, spacing_cycles, is_kept, self.drive_state().has_torque());
-        self.set_points.send();
+        self.send_set_point(is_enabled);
         self.request_by_set_point();
         if !is_enabled {
             self.profile.rest(self.parameters.law.idle(self.joint.position_counts()));
@@ -29,7 +30,18 @@ impl Axis {
         self.command.set(CommandSlot::Controlword, (word | mode_bits).into());
     }
 
+    /// Sends the set-point that is due. A drive that follows positions gets no longer way than that of one cycle of its bus.
+    #[inline]
+    fn send_set_point(&mut self, is_enabled: bool) {
+        if is_enabled && matches!(self.parameters.law, ControlLaw::Position | ControlLaw::Interpolated) {
+            self.set_points.send_within(self.parameters.limits.velocity, self.reception.cycle_s());
+        } else {
+            self.set_points.send();
+        }
+    }
+
     /// The target in drive units, and the torque that is commanded with it.
+    #[inline]
     fn target(&mut self, is_enabled: bool) -> (i32, f64) {
         if !is_enabled {
             self.torque_loop = TorqueLoop::default();
@@ -103,6 +115,7 @@ impl Axis {
     }
 
     /// The controlword that brings the drive one step nearer to `goal`.
+    #[inline]
     fn word_towards(&self, goal: Goal) -> u16 {
         let last = self.controlwords.last();
         let is_on_its_way_up = goal == Goal::Enabled && !self.is_enabled();
@@ -113,6 +126,7 @@ impl Axis {
     }
 
     /// The bits that the mode of operation adds to the controlword of an enabled drive.
+    #[inline]
     fn mode_bits(&mut self) -> u16 {
         let has_handshake = self.parameters.dialect.acknowledges_set_points();
         match self.parameters.law {

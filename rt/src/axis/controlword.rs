@@ -20,6 +20,7 @@ pub(super) struct ControlwordSender {
 impl ControlwordSender {
     /// Takes the controlword of this cycle. With a spacing, one that has not changed is sent again after so many cycles,
     /// unless `is_kept`: the drive is enabled, as it is to be.
+    #[inline]
     pub(super) fn take(&mut self, word: u16, spacing_cycles: u32, is_kept: bool, has_torque: bool) {
         // A drive that is not to be enabled is told so again and again, whatever it seems to show: the frame before may have
         // been lost, and the statusword may have been another node's.

@@ -98,6 +98,7 @@ impl Axis {
 
     /// Begins a command phase with what has arrived. `elapsed_s` is the time since the last slot. Returns whether the feedback
     /// of this cycle is complete.
+    #[inline]
     pub fn begin_cycle(&mut self, elapsed_s: f64) -> bool {
         self.reception.pass(elapsed_s);
         if !self.late_reply.pass(self.reception.has_any()) {

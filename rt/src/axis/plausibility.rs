@@ -50,6 +50,7 @@ pub(super) struct PlausibilityCheck {
 
 impl PlausibilityCheck {
     /// Takes a report, so many seconds after the one before.
+    #[inline]
     pub(super) fn judge(&mut self, reported: f64, elapsed_s: f64, bound: TravelBound) -> Plausibility {
         self.accepted_s += elapsed_s;
         let Some(accepted) = self.accepted else {

@@ -80,6 +80,7 @@ impl ProfileMode {
         }
     }
 
+    #[inline]
     fn expired_ns(&self, now_ns: Nanoseconds) -> Nanoseconds {
         let until = self.target.filter(|_| self.is_moving_on_command()).map(|timed| timed.valid_until_ns);
         until.map_or(0, |until_ns| now_ns.saturating_sub(until_ns))
@@ -224,6 +225,7 @@ impl Axis {
     }
 
     /// Counts for how long a drive in profile position has stood still before its target.
+    #[inline]
     pub(super) fn watch_stall(&mut self) {
         let is_under_way = self.parameters.law == ControlLaw::ProfilePosition
             && self.profile.target().is_some()
@@ -235,6 +237,7 @@ impl Axis {
 
     /// Watches what the drive makes of its target, since no set-point passes the guard: the joint must be able to come
     /// to rest before a position limit, and keep to its velocity limit.
+    #[inline]
     pub fn check_profile(&self) -> Result<(), Fault> {
         let limits = &self.parameters.limits;
         if !self.is_profile() || self.feedback_age() > 0 {

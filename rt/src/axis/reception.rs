@@ -80,6 +80,7 @@ impl Reception {
     }
 
     /// Ends the reception of a cycle in which so many PDOs were to arrive. `None` if they have not all arrived.
+    #[inline]
     pub(super) fn complete(&mut self, pdos: usize, since: FeedbackSince) -> Option<ReportSpan> {
         let expected = (1u8 << pdos.min(7)) - 1;
         if self.arrived & expected != expected {

@@ -18,6 +18,9 @@ const SLOWEST_SHARE: f64 = 0.01;
 /// Cycles from the report of a joint to the first set-point of a stop that it is reason for.
 const REACTION_CYCLES: f64 = 3.0;
 
+/// By how much a step may be longer than the velocity limit allows, relative to it: the guard lets half of that pass.
+const STEP_ROUNDING: f64 = 2e-6;
+
 /// The set-points of an axis, on their way from the source to the drive.
 #[derive(Clone, Debug, Default)]
 pub(super) struct SetPoints {
@@ -41,6 +44,7 @@ impl SetPoints {
     }
 
     /// The positions of this cycle, the last, and the one before.
+    #[inline]
     pub(super) fn positions(&self) -> [f64; 3] {
         self.newest.map(|state| state.position)
     }
@@ -92,7 +96,27 @@ impl SetPoints {
 
     /// Begins a command: the set-point that is due is sent.
     pub(super) fn send(&mut self) {
-        self.sent = [self.delay.due(), self.sent[0], self.sent[1]];
+        self.note_sent(self.delay.due());
+    }
+
+    /// Begins a command of a drive that follows set-points: the one that is due is sent, or one on the way to it. Where some could
+    /// not leave before, the drive does not get the way of several cycles in one.
+    #[inline]
+    pub(super) fn send_within(&mut self, velocity_limit: f64, cycle_s: f64) {
+        let (due, last) = (self.delay.due(), self.sent[0].position);
+        let farthest = velocity_limit * cycle_s;
+        let way = due.position - last;
+        let next = if way.abs() > farthest * (1.0 + STEP_ROUNDING) {
+            let velocity = velocity_limit.copysign(way);
+            State { position: last + farthest.copysign(way), velocity, acceleration: 0.0 }
+        } else {
+            due
+        };
+        self.note_sent(next);
+    }
+
+    fn note_sent(&mut self, state: State) {
+        self.sent = [state, self.sent[0], self.sent[1]];
     }
 
     /// The set-point that is sent in this cycle; it takes effect at the next SYNC.
@@ -234,6 +258,7 @@ impl Axis {
     }
 
     /// Checks the next set-point against the guard; and where the joint need not be on its set-point, the joint too.
+    #[inline]
     pub fn check(&self, next: &State, period_s: f64) -> Result<(), Fault> {
         match self.torque_loop.demand() {
             TorqueDemand::Law { .. } => {}

@@ -5,17 +5,17 @@
 
 use arrayvec::ArrayVec;
 
-use crate::bus_set::BusSet;
+use crate::bit_set::BitSet;
 
 /// The buses that are behind, and for how long.
 #[derive(Clone, Debug)]
 pub(super) struct Backlog<const BUSES: usize> {
     /// The buses on which own frames of an earlier cycle wait for the wire.
-    behind: BusSet,
+    behind: BitSet,
     /// The same as it was found in the last slot in which each bus had a cycle.
-    found_behind: BusSet,
+    found_behind: BitSet,
     /// The interfaces that had no room for a frame since their buses' last cycles.
-    not_taken: BusSet,
+    not_taken: BitSet,
     buses: ArrayVec<BusBacklog, BUSES>,
 }
 
@@ -33,15 +33,15 @@ impl<const BUSES: usize> Backlog<BUSES> {
     pub(super) fn new(buses: usize) -> Self {
         let buses = core::iter::repeat_n(BusBacklog::default(), buses.min(BUSES)).collect();
         Self {
-            behind: BusSet::default(),
-            found_behind: BusSet::default(),
-            not_taken: BusSet::default(),
+            behind: BitSet::default(),
+            found_behind: BitSet::default(),
+            not_taken: BitSet::default(),
             buses,
         }
     }
 
     /// Takes the buses that are behind in this slot, in which these buses have a cycle.
-    pub(super) fn pass(&mut self, behind: BusSet, in_cycle: BusSet) {
+    pub(super) fn pass(&mut self, behind: BitSet, in_cycle: BitSet) {
         self.found_behind = behind.union(self.found_behind.without(in_cycle));
         self.behind = self.found_behind;
         for (bus, own) in self.buses.iter_mut().enumerate() {
@@ -53,17 +53,17 @@ impl<const BUSES: usize> Backlog<BUSES> {
     }
 
     /// Takes the buses that have caught up since.
-    pub(super) fn clear(&mut self, caught_up: BusSet) {
+    pub(super) fn clear(&mut self, caught_up: BitSet) {
         self.behind = self.behind.without(caught_up);
     }
 
     /// Takes the interfaces that had no room for all frames of a slot.
-    pub(super) fn note_not_taken(&mut self, buses: BusSet) {
+    pub(super) fn note_not_taken(&mut self, buses: BitSet) {
         self.not_taken = self.not_taken.union(buses);
     }
 
     /// The buses that are behind.
-    pub(super) const fn behind(&self) -> BusSet {
+    pub(super) const fn behind(&self) -> BitSet {
         self.behind
     }
 
@@ -73,9 +73,14 @@ impl<const BUSES: usize> Backlog<BUSES> {
     }
 
     /// The one of these buses that has been behind, or without room, for the longest time, and the slots in a row.
-    pub(super) fn longest_blocked(&self, buses: BusSet) -> (usize, u32) {
-        let blocked = self.buses.iter().map(|bus| bus.blocked_cycles).enumerate().rev();
-        blocked.filter(|(bus, _)| buses.contains(*bus)).max_by_key(|(_, cycles)| *cycles).unwrap_or_default()
+    pub(super) fn longest_blocked(&self, buses: BitSet) -> (usize, u32) {
+        let mut longest = (0, 0);
+        for (bus, own) in self.buses.iter().enumerate().filter(|(bus, _)| buses.contains(*bus)) {
+            if own.blocked_cycles > longest.1 {
+                longest = (bus, own.blocked_cycles);
+            }
+        }
+        longest
     }
 }
 
@@ -88,13 +93,13 @@ const fn counted(cycles: u32, goes_on: bool) -> u32 {
 mod tests {
     use super::*;
 
-    fn set(bus: usize) -> BusSet {
-        let mut set = BusSet::default();
+    fn set(bus: usize) -> BitSet {
+        let mut set = BitSet::default();
         set.insert(bus);
         set
     }
 
-    const ALL: BusSet = BusSet::first(3);
+    const ALL: BitSet = BitSet::first(3);
 
     #[test]
     fn buses_that_are_behind_one_after_the_other_are_not_taken_for_one() {
@@ -112,11 +117,11 @@ mod tests {
         let mut backlog: Backlog<2> = Backlog::new(2);
         for cycles in 1..5 {
             backlog.note_not_taken(set(0));
-            backlog.pass(BusSet::default(), ALL);
+            backlog.pass(BitSet::default(), ALL);
             assert_eq!((backlog.longest_blocked(ALL), backlog.behind_cycles(0)), ((0, cycles), 0));
         }
-        backlog.note_not_taken(BusSet::default());
-        backlog.pass(BusSet::default(), ALL);
+        backlog.note_not_taken(BitSet::default());
+        backlog.pass(BitSet::default(), ALL);
         assert_eq!(backlog.longest_blocked(ALL).1, 0);
     }
 
@@ -129,14 +134,14 @@ mod tests {
             for slot in 0..10 {
                 // Between its cycles it has caught up, or its interface has room.
                 let is_due = slot % 2 == 0;
-                let behind = if is_behind && is_due { slow } else { BusSet::default() };
+                let behind = if is_behind && is_due { slow } else { BitSet::default() };
                 backlog.pass(behind, in_cycle(slot));
-                backlog.note_not_taken(if !is_behind && is_due { slow } else { BusSet::default() });
+                backlog.note_not_taken(if !is_behind && is_due { slow } else { BitSet::default() });
                 let blocked = slot + u32::from(is_behind);
                 assert_eq!(backlog.longest_blocked(ALL).1, blocked, "{is_behind}, slot {slot}");
             }
-            backlog.pass(BusSet::default(), in_cycle(10));
-            backlog.pass(BusSet::default(), in_cycle(11));
+            backlog.pass(BitSet::default(), in_cycle(10));
+            backlog.pass(BitSet::default(), in_cycle(11));
             assert_eq!(backlog.longest_blocked(ALL).1, 0);
         }
     }

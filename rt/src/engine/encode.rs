@@ -3,12 +3,12 @@
 //! One rule decides, in one place ([`Engine::may_leave`]): after its deadline, or behind a backlog, nothing leaves except what
 //! stops the drives.
 
-use super::group::{Commands, Group, GroupContext};
+use super::group::{Commands, Group};
 use super::shared::Shared;
 use super::state::{GroupState, PowerRemoval};
 use super::{Deadline, Engine, SendBatch, has_cycle};
 use crate::axis::{Axis, FeedbackSince};
-use crate::bus_set::BusSet;
+use crate::bit_set::BitSet;
 use crate::cia402::{Goal, controlword};
 use crate::frame::Frame;
 use crate::host::HostInterface;
@@ -34,12 +34,12 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
 
     /// The buses that were behind in the last cycle: before [`Engine::sync`], whoever drives the engine may look again, and name
     /// those that have caught up since by [`Engine::note_caught_up`].
-    pub fn behind(&self) -> BusSet {
+    pub fn behind(&self) -> BitSet {
         self.shared.backlog.behind()
     }
 
     /// Takes the buses that have caught up since the last cycle.
-    pub fn note_caught_up(&mut self, buses: BusSet) {
+    pub fn note_caught_up(&mut self, buses: BitSet) {
         self.shared.backlog.clear(buses);
     }
 
@@ -65,7 +65,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
     }
 
     /// These interfaces had no room for all that they were handed: set-points may be missing.
-    pub fn not_taken(&mut self, buses: BusSet) {
+    pub fn not_taken(&mut self, buses: BitSet) {
         self.shared.backlog.note_not_taken(buses);
     }
 
@@ -80,7 +80,10 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
     ) {
         self.shared.deadline = deadline;
         if self.may_leave(bus, deadline, Purpose::Operate) {
-            self.for_each_group(|group| group.encode_set_points(bus, batch));
+            for group in &mut self.groups {
+                let Some(axes) = self.axes.get_mut(group.places.clone()) else { continue };
+                group.encode_set_points(bus, axes, &mut self.shared, batch);
+            }
             self.encode_heartbeat_and_time(bus, batch);
         }
         self.encode_services(bus, deadline, host, batch);
@@ -127,34 +130,39 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
     }
 }
 
-impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
+impl<const AXES: usize, const BUSES: usize> Group<AXES, BUSES> {
     /// Controlwords and set-points, where the bus has a cycle in this slot.
-    fn encode_set_points(&mut self, bus: usize, batch: &mut SendBatch) {
-        if self.group.commands != Commands::Made || !self.group.buses.contains(bus) {
+    #[inline]
+    fn encode_set_points(
+        &mut self,
+        bus: usize,
+        axes: &mut [Axis],
+        shared: &mut Shared<AXES, BUSES>,
+        batch: &mut SendBatch,
+    ) {
+        if self.commands != Commands::Made || !self.buses.contains(bus) {
             return;
         }
-        let slot = self.shared.present_slot();
-        if !self.shared.buses.get(bus).is_some_and(|bus| has_cycle(bus, slot)) {
+        let slot = shared.present_slot();
+        if !shared.buses.get(bus).is_some_and(|bus| has_cycle(bus, slot)) {
             return;
         }
-        self.group.unsent.clear(bus);
-        let reset_word = self.group.fault_reset_word();
-        for place in self.shared.places_on(bus).iter() {
-            let own_place = place.checked_sub(self.group.places.start);
-            let Some(axis) = own_place.and_then(|place| self.axes.get_mut(place)) else { continue };
-            let reset_word = reset_word.filter(|_| axis.drive_state().is_faulted());
-            axis.command(self.group.goal_of(axis, self.shared), reset_word);
-            if self.group.has_other_modes {
+        self.unsent.clear(bus);
+        for place in shared.places_on(bus).iter() {
+            let own_place = place.checked_sub(self.places.start);
+            let Some(axis) = own_place.and_then(|place| axes.get_mut(place)) else { continue };
+            let is_faulted = axis.drive_state().is_faulted();
+            let reset_word = if is_faulted { self.fault_reset_word() } else { None };
+            axis.command(self.goal_of(axis, shared), reset_word);
+            if self.has_other_modes {
                 axis.command_other_modes();
             }
             for frame in axis.frames() {
-                self.shared.dropped += u64::from(batch.try_push(frame).is_err());
+                shared.dropped += u64::from(batch.try_push(frame).is_err());
             }
         }
     }
-}
 
-impl<const AXES: usize, const BUSES: usize> Group<AXES, BUSES> {
     /// Where a drive is led in this cycle.
     ///
     /// A drive that falls out of operation enabled is not enabled again by what the others are still to do. None is enabled

@@ -155,7 +155,8 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
         let Some(wanted) = execution.wanted else {
             return Err((Origin::Group, Fault::StaleCommand { age_cycles: 1 }));
         };
-        let next: ArrayVec<State, AXES> = self.axes.iter().map(|axis| axis.own(&wanted.states)).collect();
+        let mut next: ArrayVec<State, AXES> = ArrayVec::new();
+        next.extend(self.axes.iter().map(|axis| axis.own(&wanted.states)));
         self.check(&next)?;
         self.take_set_points(&next);
         let following = execution.next();

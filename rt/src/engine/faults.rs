@@ -23,7 +23,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
     pub(super) fn check_faults(&mut self, buses: &[BusHealth]) {
         self.for_each_group(|group| group.check_faults(buses));
         // While no drive has power it stays, until a group is enabled.
-        if self.groups.iter().any(|group| group.state.has_power()) {
+        if self.shared.foreign_frame.is_some() && self.groups.iter().any(|group| group.state.has_power()) {
             self.shared.foreign_frame = None;
         }
     }
@@ -31,6 +31,9 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
     /// Stops the groups that stop with one that does, for the same reason, and those that stop with these. A stop that begins in
     /// the step of a cycle stops the others in the next one.
     pub(super) fn couple_stops(&mut self) {
+        if self.groups.iter().all(|group| group.untold.is_none()) {
+            return;
+        }
         for _ in 0..self.groups.len() {
             for number in 0..self.groups.len() as u8 {
                 let untold = self.groups.get_mut(usize::from(number)).and_then(|group| group.untold.take());
@@ -52,6 +55,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
 
 impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
     /// Begins a stop for everything that is wrong while drives may have torque.
+    #[inline]
     pub(super) fn check_faults(&mut self, buses: &[BusHealth]) {
         if !self.group.state.has_power() {
             return;
@@ -246,7 +250,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
     /// Every axis stays on its set-point.
     pub(super) fn plan_standstill(&mut self) -> Result<(), PlanError> {
         self.group.motion.stop(
-            &mut self.profiles,
+            self.profiles,
             self.axes.iter().map(|axis| {
                 let standing = State { position: axis.set_point().position, ..State::default() };
                 (standing, &axis.parameters().limits)
@@ -263,7 +267,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
             }
         }
         self.group.motion.stop(
-            &mut self.profiles,
+            self.profiles,
             self.axes.iter().map(|axis| {
                 let here = axis.set_point();
                 let standing = State { position: here.position, ..State::default() };
@@ -312,6 +316,7 @@ impl Expectation {
     }
 
     /// The first thing that is wrong with an axis.
+    #[inline]
     fn fault_of<const AXES: usize, const BUSES: usize>(
         &self,
         axis: &Axis,
@@ -353,6 +358,7 @@ impl Expectation {
     }
 
     /// What must be right while an axis is held or moved.
+    #[inline]
     fn operation_fault<const AXES: usize, const BUSES: usize>(
         &self,
         axis: &Axis,

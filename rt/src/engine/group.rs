@@ -8,12 +8,14 @@ use super::shared::Shared;
 use super::state::GroupState;
 use super::unsent_steps::UnsentSteps;
 use crate::axis::Axis;
-use crate::bus_set::BusSet;
-use crate::group_trajectory::{GroupTrajectory, Profiles};
+use crate::bit_set::BitSet;
+use crate::group_trajectory::{GroupTrajectory, ProfileStore};
+use crate::host::GroupSnapshot;
 use crate::motion_reports::MotionState;
-use crate::record::{Event, EventKind, MAX_GROUPS};
+use crate::record::{Event, EventKind, GroupRecord, MAX_GROUPS, RecordedStop};
 use crate::source::StreamSample;
 use crate::stop::StopReason;
+use crate::time::Nanoseconds;
 
 /// What belongs to one group.
 #[derive(Clone, Debug)]
@@ -25,12 +27,14 @@ pub(super) struct Group<const AXES: usize, const BUSES: usize> {
     /// Where its axes stand among those of the engine, which has them beside each other.
     pub(super) places: Range<usize>,
     /// The buses that concern it.
-    pub(super) buses: BusSet,
+    pub(super) buses: BitSet,
     /// Whether the mode of any of its axes may be changed.
     pub(super) has_other_modes: bool,
     pub(super) state: GroupState<AXES>,
     /// What its stream wants in this slot, while it streams.
     pub(super) stream: StreamSample<AXES>,
+    /// How long the call of its callback took in this cycle; `None` if none was called.
+    pub(super) callback_ns: Option<Nanoseconds>,
     /// Cycles since the state was entered.
     pub(super) state_cycles: u32,
     /// What is planned, while the group moves or stops.
@@ -41,6 +45,8 @@ pub(super) struct Group<const AXES: usize, const BUSES: usize> {
     pub(super) fault_reset_cycles: u32,
     pub(super) commands: Commands,
     pub(super) unsent: UnsentSteps<BUSES>,
+    /// Cycles in which its set-points went on.
+    pub(super) steps: u64,
     /// The stop that has begun, or has become harder, and of which the groups that stop with this one do not know yet.
     pub(super) untold: Option<StopReason>,
 }
@@ -56,21 +62,23 @@ pub(super) enum Commands {
 
 impl<const AXES: usize, const BUSES: usize> Group<AXES, BUSES> {
     /// A passive group.
-    pub(super) fn new(number: u8, places: Range<usize>, buses: BusSet) -> Self {
+    pub(super) fn new(number: u8, places: Range<usize>, buses: BitSet) -> Self {
         Self {
             number,
             stops_with: ArrayVec::new(),
+            motion: GroupTrajectory::new(places.clone()),
             places,
             buses,
             has_other_modes: false,
             state: GroupState::Passive,
             stream: StreamSample::default(),
+            callback_ns: None,
             state_cycles: 0,
-            motion: GroupTrajectory::default(),
             stop: None,
             fault_reset_cycles: 0,
             commands: Commands::None,
             unsent: UnsentSteps::default(),
+            steps: 0,
             untold: None,
         }
     }
@@ -82,6 +90,20 @@ impl<const AXES: usize, const BUSES: usize> Group<AXES, BUSES> {
             GroupState::Executing(execution) => execution.wanted.map_or(0.0, |wanted| wanted.remaining_s),
             _ => 0.0,
         }
+    }
+
+    /// Shows what the group did in the cycle.
+    pub(super) fn show(&self, record: &mut GroupRecord, snapshot: &mut GroupSnapshot) {
+        let phase = self.state.phase();
+        let stop = self.stop.as_ref().map(RecordedStop::of);
+        *record = GroupRecord { phase, stop, callback_ns: self.callback_ns };
+        *snapshot = GroupSnapshot {
+            phase,
+            remaining_s: self.remaining_s(),
+            stop: self.stop,
+            stream: self.stream_report(),
+            steps: self.steps,
+        };
     }
 
     /// Ends the cycle, whose commands have left, or were ready too late.
@@ -97,8 +119,8 @@ pub(super) struct GroupContext<'a, const AXES: usize, const BUSES: usize> {
     pub(super) group: &'a mut Group<AXES, BUSES>,
     /// Its axes.
     pub(super) axes: &'a mut [Axis],
-    /// Their planned motions, in the same order.
-    pub(super) profiles: Profiles<'a, AXES>,
+    /// The planned motions of the axes of all groups.
+    pub(super) profiles: &'a mut ProfileStore<AXES>,
     pub(super) shared: &'a mut Shared<AXES, BUSES>,
 }
 

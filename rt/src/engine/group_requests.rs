@@ -166,7 +166,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
         self.group
             .motion
             .move_to(
-                &mut self.profiles,
+                self.profiles,
                 legs,
                 parameters.velocity_scale,
                 parameters.acceleration_scale,

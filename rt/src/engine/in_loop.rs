@@ -10,11 +10,12 @@ use super::group::GroupContext;
 use super::requests::Handled;
 use super::state::GroupState;
 use super::step::Failure;
+use crate::bit_set::BitSet;
 use crate::fault::Fault;
 use crate::host::HostInterface;
 use crate::phase::Phase;
 use crate::plan::State;
-use crate::record::{EventKind, MAX_AXES};
+use crate::record::EventKind;
 use crate::request::{RejectReason, RequestId};
 use crate::source::{
     AxisTarget, CallbackCycle, CallbackId, CallbackOutcome, CallbackReturn, CallbackRun, StreamSample,
@@ -32,19 +33,17 @@ pub(super) struct InLoop {
     returned: CallbackReturn,
     /// Calls in a row that have taken too long.
     overruns: u32,
-    /// The axes that rest because nothing is commanded of them, a bit each.
-    resting: u32,
+    /// The axes that rest because nothing is commanded of them, by their numbers.
+    resting: BitSet,
 }
 
 /// To come to rest wherever the joint can.
 const HOLD: AxisTarget = AxisTarget::Velocity { velocity: 0.0, acceleration: 0.0 };
 
-const _: () = assert!(MAX_AXES <= u32::BITS as usize, "each axis has a bit");
-
 impl InLoop {
-    const fn new(run: CallbackRun) -> Self {
+    fn new(run: CallbackRun) -> Self {
         let returned = CallbackReturn { outcome: CallbackOutcome::Missing, spent_ns: 0 };
-        Self { run, called_in: None, returned, overruns: 0, resting: 0 }
+        Self { run, called_in: None, returned, overruns: 0, resting: BitSet::default() }
     }
 
     /// The callback that is still needed.
@@ -134,6 +133,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
         let cycle = cycle.beginning_at(input.now_ns);
         let (callback, targets) = (in_loop.callback(), &mut shared.callback_targets);
         let returned = host.callback(self.group.number, callback, &cycle, &shared.snapshot.axes, targets);
+        self.group.callback_ns = Some(returned.spent_ns);
         in_loop.returns(input.slot, returned);
     }
 
@@ -149,20 +149,20 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
         let mut next: ArrayVec<State, AXES> = ArrayVec::new();
         let period_s = self.shared.period_s;
         for axis in self.axes.iter_mut() {
-            let (target, bit) = (axis.own(&self.shared.callback_targets), 1 << (axis.number() & 31));
+            let (target, number) = (axis.own(&self.shared.callback_targets), axis.number().into());
             let is_led = axis.is_enabled() && !axis.is_profile();
             let of_axis = match target {
                 _ if !is_led => Ok(axis.set_point()),
                 Some(target) => {
-                    resting &= !bit;
+                    resting.take(number);
                     axis.streamed(&target, period_s)
                 }
                 None => {
-                    let begun = match resting & bit {
-                        0 => axis.begin_rest(&HOLD, period_s),
-                        _ => Ok(()),
+                    let begun = match resting.contains(number) {
+                        false => axis.begin_rest(&HOLD, period_s),
+                        true => Ok(()),
                     };
-                    resting |= bit;
+                    resting.insert(number);
                     begun.and_then(|()| axis.resting(period_s))
                 }
             };

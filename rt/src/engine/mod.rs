@@ -17,7 +17,6 @@
 //!
 //! Events wait in an outbox until [`Engine::finish`] hands them to the host.
 
-mod axis_places;
 mod backlog;
 mod changing_mode;
 mod encode;
@@ -44,11 +43,11 @@ mod unsent_steps;
 use arrayvec::ArrayVec;
 
 use crate::axis::Axis;
-use crate::bus_set::BusSet;
+use crate::bit_set::BitSet;
 use crate::dispatch::Dispatch;
 use crate::frame::Frame;
 use crate::group_trajectory::ProfileStore;
-use crate::host::{GroupSnapshot, HostInterface};
+use crate::host::HostInterface;
 use crate::phase::Phase;
 use crate::port::BusHealth;
 use crate::record::{CycleTiming, EventKind, MAX_AXES, MAX_BUSES, MAX_GROUPS};
@@ -80,7 +79,7 @@ pub struct CycleInput<'a> {
     /// The state of each bus.
     pub buses: &'a [BusHealth],
     /// The buses on which own frames of an earlier cycle still wait for the wire.
-    pub behind: BusSet,
+    pub behind: BitSet,
 }
 
 /// Whether the set-points of a cycle were ready in time.
@@ -117,7 +116,7 @@ pub enum Deadline {
 ///         })
 ///     }
 ///     fn publish(&mut self, snapshot: &Snapshot<1, 1>) {
-///         self.phase = snapshot.phase;
+///         self.phase = snapshot.groups()[0].phase;
 ///     }
 /// }
 ///
@@ -204,7 +203,7 @@ pub enum Deadline {
 ///         set_points_due_ns: now_ns + 800_000,
 ///         now_ns,
 ///         buses: &buses,
-///         behind: BusSet::default(),
+///         behind: BitSet::default(),
 ///     };
 ///     engine.compute(&input, &mut host);
 ///     let mut batch = SendBatch::new();
@@ -292,7 +291,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         self.couple_stops();
         self.probe_late_drives();
         self.sample_trajectories(host);
-        self.shared.stopped_by_sdo = BusSet::default();
+        self.shared.stopped_by_sdo = BitSet::default();
         self.for_each_group(|group| {
             group.step(input, host);
             host.keep_callback(group.group.number, group.group.state.callback());
@@ -306,7 +305,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         let group = self.groups.get_mut(usize::from(number))?;
         Some(GroupContext {
             axes: self.axes.get_mut(group.places.clone())?,
-            profiles: self.profiles.of(group.places.clone())?,
+            profiles: &mut self.profiles,
             group,
             shared: &mut self.shared,
         })
@@ -314,10 +313,9 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
 
     /// Lets every group act, one after the other.
     fn for_each_group(&mut self, mut act: impl FnMut(&mut GroupContext<'_, AXES, BUSES>)) {
-        for number in 0..self.groups.len() as u8 {
-            if let Some(mut group) = self.group(number) {
-                act(&mut group);
-            }
+        for group in &mut self.groups {
+            let Some(axes) = self.axes.get_mut(group.places.clone()) else { continue };
+            act(&mut GroupContext { group, axes, profiles: &mut self.profiles, shared: &mut self.shared });
         }
     }
 
@@ -330,9 +328,14 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         host: &mut impl HostInterface<AXES, BUSES>,
     ) {
         let is_late = self.shared.deadline == Deadline::Missed;
-        let is_commanded = !is_late && self.groups.iter().any(|group| group.commands == Commands::Made);
-        self.groups.iter_mut().for_each(|group| group.end_cycle(is_late));
         let shared = &mut self.shared;
+        let mut is_commanded = false;
+        let shown = shared.record.groups.iter_mut().zip(&mut shared.snapshot.groups);
+        for (group, (record, snapshot)) in self.groups.iter_mut().zip(shown) {
+            is_commanded |= !is_late && group.commands == Commands::Made;
+            group.end_cycle(is_late);
+            group.show(record, snapshot);
+        }
         shared.slots.end(is_late);
         if is_late {
             shared.emit(None, EventKind::MissedSlots { count: 1 });
@@ -340,11 +343,6 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         shared.dropped += shared.events.drain(|event| host.event(event));
         shared.record.timing = CycleTiming { missed_slots: shared.slots.missed_now, ..timing };
         shared.record.is_commanded = is_commanded;
-        for (group, phase) in self.groups.iter().zip(&mut shared.record.group_phases) {
-            *phase = group.state.phase();
-        }
-        let [first, ..] = shared.record.group_phases;
-        shared.record.phase = first;
         for axis in &self.axes {
             let number = usize::from(axis.number());
             let (records, shown) = (&mut shared.record.axes, &mut shared.snapshot.axes);
@@ -366,16 +364,6 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         snapshot.missed_slots = shared.slots.missed;
         snapshot.timing = shared.slots.level();
         snapshot.dropped = shared.dropped;
-        for (group, shown) in self.groups.iter().zip(&mut snapshot.groups) {
-            *shown = GroupSnapshot {
-                phase: group.state.phase(),
-                remaining_s: group.remaining_s(),
-                stop: group.stop,
-                stream: group.stream_report(),
-            };
-        }
-        let [GroupSnapshot { phase, remaining_s, stop, .. }, ..] = snapshot.groups;
-        (snapshot.phase, snapshot.remaining_s, snapshot.stop) = (phase, remaining_s, stop);
         for (shown, health) in snapshot.buses.iter_mut().zip(buses) {
             *shown = *health;
         }

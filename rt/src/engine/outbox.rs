@@ -23,7 +23,8 @@ impl Outbox {
 
     /// Hands out every event, and returns how many were lost: those without room here, and those that `take` did not take.
     pub(super) fn drain(&mut self, mut take: impl FnMut(&Event) -> bool) -> u64 {
-        let not_taken = self.events.drain(..).filter(|event| !take(event)).count() as u64;
+        let not_taken = self.events.iter().filter(|event| !take(event)).count() as u64;
+        self.events.clear();
         not_taken + core::mem::take(&mut self.lost)
     }
 }

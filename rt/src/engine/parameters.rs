@@ -4,7 +4,7 @@ use arrayvec::ArrayVec;
 
 use super::SEND_BATCH;
 use crate::axis::{Axis, AxisParameters, AxisParametersError};
-use crate::bus_set::BusSet;
+use crate::bit_set::BitSet;
 use crate::dispatch::{Dispatch, IdTaken};
 use crate::frame::Id;
 use crate::record::{MAX_AXES, MAX_BUSES, MAX_GROUPS};
@@ -298,9 +298,9 @@ impl<const AXES: usize, const BUSES: usize> EngineParameters<AXES, BUSES> {
     }
 
     /// The buses that concern a group: those with an axis of it, and those without any axis.
-    pub(super) fn buses_of(&self, axes: &[u8]) -> BusSet {
+    pub(super) fn buses_of(&self, axes: &[u8]) -> BitSet {
         let has_others = |bus: usize| self.axes.iter().any(|axis| usize::from(axis.bus) == bus);
-        let mut buses = BusSet::default();
+        let mut buses = BitSet::default();
         for bus in 0..self.buses.len() {
             if axes.iter().any(|axis| self.bus_of(*axis) == Some(bus)) || !has_others(bus) {
                 buses.insert(bus);

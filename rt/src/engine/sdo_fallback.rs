@@ -19,6 +19,7 @@ const OBEYING_NS: Nanoseconds = NANOSECONDS_PER_SECOND / 20;
 
 impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
     /// Decides which drives are to be stopped by SDO.
+    #[inline]
     pub(super) fn update_sdo_fallback(&mut self) {
         let Self { group, axes, shared, .. } = self;
         let has_power = group.state.has_power();

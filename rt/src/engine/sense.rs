@@ -3,7 +3,7 @@
 use super::group::Group;
 use super::{CycleInput, Deadline, Engine};
 use crate::axis::{Axis, FeedbackSince};
-use crate::bus_set::BusSet;
+use crate::bit_set::BitSet;
 use crate::dispatch::Destination;
 use crate::frame::Frame;
 use crate::port::Received;
@@ -113,7 +113,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         let asked_by_sync = core::mem::take(&mut self.shared.asked_by_sync);
         // A drive that was not asked, because the thread was late or the bus behind, has not missed its answer.
         let unasked =
-            if self.shared.requested.sync { in_cycle.without(asked_by_sync) } else { BusSet::default() };
+            if self.shared.requested.sync { in_cycle.without(asked_by_sync) } else { BitSet::default() };
         let to_answer_sync = in_cycle.without(unasked);
         for (place, axis) in self.axes.iter_mut().enumerate() {
             let is_asked_by_sync = axis.parameters().feedback_since == FeedbackSince::Sync;

@@ -2,7 +2,6 @@
 
 use arrayvec::ArrayVec;
 
-use super::axis_places::AxisPlaces;
 use super::backlog::Backlog;
 use super::heartbeat::HeartbeatProducer;
 use super::outbox::Outbox;
@@ -10,7 +9,7 @@ use super::parameters::{BusParameters, EngineParameters};
 use super::slots::SlotWatch;
 use super::{Deadline, has_cycle};
 use crate::axis::Axis;
-use crate::bus_set::BusSet;
+use crate::bit_set::BitSet;
 use crate::frame::Id;
 use crate::host::Snapshot;
 use crate::record::{CycleRecord, Event, EventKind};
@@ -30,7 +29,7 @@ pub(super) struct Shared<const AXES: usize, const BUSES: usize> {
     pub(super) categories: StopCategories,
     pub(super) buses: ArrayVec<BusParameters, BUSES>,
     /// The axes on each bus.
-    places_on: [AxisPlaces; BUSES],
+    places_on: [BitSet; BUSES],
     pub(super) requested: Requested,
     /// Whether the commands of this cycle were ready in time, as far as is known.
     pub(super) deadline: Deadline,
@@ -40,11 +39,11 @@ pub(super) struct Shared<const AXES: usize, const BUSES: usize> {
     pub(super) slots: SlotWatch,
     pub(super) backlog: Backlog<BUSES>,
     /// The buses whose next SYNC is skipped, because a drive on them has to show that its answers are not late.
-    pub(super) skip_sync: BusSet,
+    pub(super) skip_sync: BitSet,
     /// The buses whose drives have been asked for feedback by SYNC in this slot.
-    pub(super) asked_by_sync: BusSet,
+    pub(super) asked_by_sync: BitSet,
     /// The buses with drives that are stopped by SDO in this slot.
-    pub(super) stopped_by_sdo: BusSet,
+    pub(super) stopped_by_sdo: BitSet,
     /// The bus and the identifier of a frame that only this controller may send.
     pub(super) foreign_frame: Option<(u8, Id)>,
     pub(super) heartbeat: Option<HeartbeatProducer<BUSES>>,
@@ -88,7 +87,7 @@ impl<const AXES: usize, const BUSES: usize> Shared<AXES, BUSES> {
         let slowest_divider = parameters.buses.iter().map(|bus| bus.divider).max().unwrap_or(1);
         let buses = parameters.buses.len();
         let heartbeat = |heartbeat| HeartbeatProducer::new(heartbeat, buses, slowest_divider);
-        let mut places_on = [AxisPlaces::default(); BUSES];
+        let mut places_on = [BitSet::default(); BUSES];
         for (place, number) in parameters.axes_of_groups().flatten().enumerate() {
             let axis = parameters.axes.get(usize::from(number));
             if let Some(places) = axis.and_then(|axis| places_on.get_mut(usize::from(axis.bus))) {
@@ -107,9 +106,9 @@ impl<const AXES: usize, const BUSES: usize> Shared<AXES, BUSES> {
             now_ns: 0,
             slots: SlotWatch::new(parameters.timing),
             backlog: Backlog::new(buses),
-            skip_sync: BusSet::default(),
-            asked_by_sync: BusSet::default(),
-            stopped_by_sdo: BusSet::default(),
+            skip_sync: BitSet::default(),
+            asked_by_sync: BitSet::default(),
+            stopped_by_sdo: BitSet::default(),
             foreign_frame: None,
             heartbeat: parameters.heartbeat.map(heartbeat),
             time: parameters.time_cycles.map(TimeProducer::new),
@@ -133,7 +132,7 @@ impl<const AXES: usize, const BUSES: usize> Shared<AXES, BUSES> {
     }
 
     /// The axes on a bus, by their places among those of the engine.
-    pub(super) fn places_on(&self, bus: usize) -> AxisPlaces {
+    pub(super) fn places_on(&self, bus: usize) -> BitSet {
         self.places_on.get(bus).copied().unwrap_or_default()
     }
 
@@ -143,8 +142,8 @@ impl<const AXES: usize, const BUSES: usize> Shared<AXES, BUSES> {
     }
 
     /// The buses that have a cycle in this slot.
-    pub(super) fn buses_in_cycle(&self, slot: u64) -> BusSet {
-        let mut in_cycle = BusSet::default();
+    pub(super) fn buses_in_cycle(&self, slot: u64) -> BitSet {
+        let mut in_cycle = BitSet::default();
         let numbers = self.buses.iter().enumerate().filter(|(_, bus)| has_cycle(bus, slot));
         numbers.for_each(|(number, _)| in_cycle.insert(number));
         in_cycle

@@ -31,7 +31,10 @@ use crate::phase::Phase;
 use crate::source::CallbackId;
 
 /// What the group is doing.
+// With a byte of its own that tells the states apart: it is looked at many times in each cycle, and otherwise the compiler
+// packs it into the payloads.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(u8)]
 pub(super) enum GroupState<const AXES: usize> {
     Passive,
     Disabled,

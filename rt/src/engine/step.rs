@@ -9,7 +9,7 @@ use super::group::{Commands, Group, GroupContext};
 use super::state::{GroupState, PowerRemoval};
 use super::{CycleInput, Engine};
 use crate::axis::{Axis, FeedbackSince};
-use crate::bus_set::BusSet;
+use crate::bit_set::BitSet;
 use crate::fault::Fault;
 use crate::host::HostInterface;
 use crate::plan::State;
@@ -38,7 +38,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         if !self.groups.iter().any(is_due) {
             return;
         }
-        let (mut probed, mut in_motion) = (BusSet::default(), BusSet::default());
+        let (mut probed, mut in_motion) = (BitSet::default(), BitSet::default());
         for group in &self.groups {
             if is_due(group) {
                 probed = probed.union(group.buses);
@@ -65,7 +65,9 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
 
 impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
     /// Makes the next set-points, unless those of the last cycles have still to leave, or every bus is behind.
+    #[inline]
     pub(super) fn step(&mut self, input: &CycleInput<'_>, host: &mut impl HostInterface<AXES, BUSES>) {
+        self.group.callback_ns = None;
         let (own, behind) = (self.group.buses, self.shared.backlog.behind());
         // A group that stops does not wait for the wire any longer, whatever it stops for.
         let is_over_waiting = self.group.stop.is_some()
@@ -83,7 +85,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
         }
         if self.group.commands == Commands::Made {
             self.group.unsent.count(on_time);
-            self.shared.snapshot.steps += 1;
+            self.group.steps += 1;
         }
         self.call_in_loop(input, host);
         for _ in 0..ATTEMPTS {
@@ -131,6 +133,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
         }
     }
 
+    #[inline(always)]
     pub(super) fn step_move(&mut self, is_reported: bool) -> Result<(), Failure> {
         for axis in self.axes.iter() {
             let expired_ns = axis.expired_ns(self.shared.now_ns);
@@ -148,7 +151,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
 
     /// The planned part of a move is over; drives in profile modes may still be on their way.
     fn end_move(&mut self, is_reported: bool) {
-        let is_passing = self.group.motion.states(&self.profiles).any(|state| state.velocity != 0.0);
+        let is_passing = self.group.motion.states(self.profiles).any(|state| state.velocity != 0.0);
         if !is_passing && !self.axes.iter().all(Axis::is_target_reached) {
             return;
         }
@@ -194,16 +197,16 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
     }
 
     /// Goes on by one period on the planned motion.
+    #[inline(always)]
     fn follow_motion(&mut self) -> Result<(), Failure> {
         self.group.motion.advance(self.shared.period_s);
-        let next = self.planned();
+        let mut next: ArrayVec<State, AXES> = ArrayVec::new();
+        for state in self.group.motion.states(self.profiles) {
+            next.push(state);
+        }
         self.check(&next)?;
         self.take_set_points(&next);
         Ok(())
-    }
-
-    fn planned(&self) -> ArrayVec<State, AXES> {
-        self.group.motion.states(&self.profiles).collect()
     }
 
     pub(super) fn check(&self, next: &[State]) -> Result<(), Failure> {
@@ -211,6 +214,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
     }
 
     /// The first axis that follows set-points and whose next one does not pass a check.
+    #[inline]
     pub(super) fn first_fault(
         &self,
         next: &[State],

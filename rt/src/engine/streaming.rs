@@ -48,35 +48,32 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
 impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
     /// The next set-points of a stream, which has come so far before this slot.
     pub(super) fn step_stream(&mut self, before: Stream) -> Result<(), Failure> {
-        let wish = self.group.stream.wish;
-        match &wish {
-            StreamWish::Awaited if matches!(before, Stream::Requested | Stream::Awaited) => {
-                self.await_stream()
-            }
-            // Whoever has begun to lead the axes lets them come to rest.
-            StreamWish::Awaited => self.run_dry(before, |axis| axis.set_point().into()),
-            StreamWish::Targets(targets) => {
-                if matches!(before, Stream::Requested | Stream::Awaited) {
-                    self.check_start(targets)?;
+        let has_begun = matches!(before, Stream::Following | Stream::Dry);
+        match self.group.stream.wish {
+            StreamWish::Awaited if !has_begun => self.await_stream(),
+            StreamWish::Targets(_) => {
+                if !has_begun {
+                    self.check_start()?;
                 }
                 self.enter_stream(Stream::Following);
-                self.stream_to(|axis, period_s| axis.streamed(&axis.own(targets), period_s))
+                self.stream_to(|axis, wish, period_s| axis.streamed(&wanted_of(axis, wish), period_s))
             }
-            StreamWish::Dry(last) => self.run_dry(before, |axis| axis.own(last)),
+            // A stream that has begun to lead the axes lets them come to rest.
+            StreamWish::Awaited | StreamWish::Dry(_) => self.run_dry(before),
         }
     }
 
     /// The points have run out: the axes come to rest.
-    fn run_dry(&mut self, before: Stream, last_of: impl Fn(&Axis) -> AxisTarget) -> Result<(), Failure> {
+    fn run_dry(&mut self, before: Stream) -> Result<(), Failure> {
         if before != Stream::Dry {
             for axis in self.axes.iter_mut() {
-                let last = last_of(axis);
+                let last = wanted_of(axis, &self.group.stream.wish);
                 axis.begin_rest(&last, self.shared.period_s)
                     .map_err(|fault| (Origin::Axis(axis.number()), fault))?;
             }
         }
         self.enter_stream(Stream::Dry);
-        self.stream_to(Axis::resting)
+        self.stream_to(|axis, _, period_s| axis.resting(period_s))
     }
 
     fn await_stream(&mut self) -> Result<(), Failure> {
@@ -96,11 +93,11 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
     }
 
     /// A stream that is followed exactly begins where the joints are. To any other one they are led.
-    fn check_start(&self, targets: &[AxisTarget; AXES]) -> Result<(), Failure> {
+    fn check_start(&self) -> Result<(), Failure> {
         let first: ArrayVec<State, AXES> = self
             .axes
             .iter()
-            .map(|axis| match axis.own(targets) {
+            .map(|axis| match wanted_of(axis, &self.group.stream.wish) {
                 AxisTarget::Position { state, .. } | AxisTarget::Impedance { state, .. } => state,
                 // They begin wherever the joint is.
                 AxisTarget::Velocity { .. } | AxisTarget::Torque(_) => State::rest(axis.position()),
@@ -112,17 +109,29 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
         })
     }
 
-    fn stream_to(&mut self, next_of: impl Fn(&mut Axis, f64) -> Result<State, Fault>) -> Result<(), Failure> {
+    fn stream_to(
+        &mut self,
+        next_of: impl Fn(&mut Axis, &StreamWish<AXES>, f64) -> Result<State, Fault>,
+    ) -> Result<(), Failure> {
+        let wish = &self.group.stream.wish;
         let period_s = self.shared.period_s;
         let mut next: ArrayVec<State, AXES> = ArrayVec::new();
         for axis in self.axes.iter_mut() {
             let is_led = axis.is_enabled() && !axis.is_profile();
-            let of_axis = if is_led { next_of(axis, period_s) } else { Ok(axis.set_point()) };
+            let of_axis = if is_led { next_of(axis, wish, period_s) } else { Ok(axis.set_point()) };
             next.push(of_axis.map_err(|fault| (Origin::Axis(axis.number()), fault))?);
         }
         self.check(&next)?;
         self.take_set_points(&next);
         Ok(())
+    }
+}
+
+/// What a stream wants of an axis: to stay on its set-point where the stream says nothing.
+fn wanted_of<const AXES: usize>(axis: &Axis, wish: &StreamWish<AXES>) -> AxisTarget {
+    match wish {
+        StreamWish::Awaited => axis.set_point().into(),
+        StreamWish::Targets(targets) | StreamWish::Dry(targets) => axis.own(targets),
     }
 }
 

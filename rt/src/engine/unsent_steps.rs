@@ -4,7 +4,7 @@
 //! would have gathered: the set-points then stay where they are until the bus has sent them.
 
 use super::BusParameters;
-use crate::bus_set::BusSet;
+use crate::bit_set::BitSet;
 
 /// Steps since the last set-points that have left, a bus each.
 #[derive(Clone, Debug)]
@@ -19,13 +19,13 @@ impl<const BUSES: usize> Default for UnsentSteps<BUSES> {
 impl<const BUSES: usize> UnsentSteps<BUSES> {
     /// Whether one of those that are on time has yet to send the way of one of its cycles. The others do not wait for a bus
     /// that is behind.
-    pub(super) fn are_enough(&self, buses: &[BusParameters], on_time: BusSet) -> bool {
+    pub(super) fn are_enough(&self, buses: &[BusParameters], on_time: BitSet) -> bool {
         let mut unsent = buses.iter().zip(&self.0).enumerate().filter(|(bus, _)| on_time.contains(*bus));
         unsent.any(|(_, (bus, steps))| *steps >= bus.divider)
     }
 
     /// The set-points have made a step.
-    pub(super) fn count(&mut self, on_time: BusSet) {
+    pub(super) fn count(&mut self, on_time: BitSet) {
         for bus in on_time.iter() {
             if let Some(steps) = self.0.get_mut(bus) {
                 *steps = steps.saturating_add(1);
@@ -57,7 +57,7 @@ mod tests {
 
     #[test]
     fn a_bus_of_every_second_slot_gathers_two_steps_and_no_third() {
-        let (buses, both) = ([bus(1), bus(2)], BusSet::first(2));
+        let (buses, both) = ([bus(1), bus(2)], BitSet::first(2));
         let mut unsent = UnsentSteps::<2>::default();
         unsent.count(both);
         assert!(unsent.are_enough(&buses, both), "the fast bus has yet to send its step");
@@ -70,7 +70,7 @@ mod tests {
 
     #[test]
     fn nobody_waits_for_a_bus_that_is_behind() {
-        let (on_time, none) = (BusSet::first(1), BusSet::default());
+        let (on_time, none) = (BitSet::first(1), BitSet::default());
         let mut unsent = UnsentSteps::<1>::default();
         unsent.count(none);
         assert!(!unsent.are_enough(&[bus(1)], on_time));

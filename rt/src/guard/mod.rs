@@ -145,6 +145,7 @@ const TOLERANCE: f64 = 1e-6;
 ///
 /// Velocity and acceleration are judged by what the drive will see, the differences of the positions, and not by
 /// what the set-point says of itself. Outside the position limits a step is allowed only if it leads back.
+#[inline]
 pub fn check(
     limits: &AxisLimits,
     period_s: f64,

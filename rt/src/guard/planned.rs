@@ -94,8 +94,7 @@ proptest! {
         let mut streams: Vec<Stream> =
             all.iter().map(|limits| Stream::at_rest(0.0, *limits, period_s)).collect();
         let mut states = vec![State::default(); all.len()];
-        let (mut store, mut motion) = (ProfileStore::<4>::default(), GroupTrajectory::default());
-        let mut profiles = store.of(0..all.len()).unwrap();
+        let (mut profiles, mut motion) = (ProfileStore::<4>::default(), GroupTrajectory::new(0..all.len()));
         // To rest where the last one is passed at speed.
         for (share, speed, cycles) in targets.into_iter().chain([(0.5, 0.0, usize::MAX)]) {
             let legs = all.iter().zip(&states).map(|(limits, start)| Leg {
@@ -143,8 +142,7 @@ proptest! {
         };
         let steepest = limits.acceleration.max(limits.deceleration);
         let mut stream = Stream::at_rest(0.0, limits, period_s);
-        let (mut store, mut motion) = (ProfileStore::<4>::default(), GroupTrajectory::default());
-        let mut profiles = store.of(0..1).unwrap();
+        let (mut profiles, mut motion) = (ProfileStore::<4>::default(), GroupTrajectory::new(0..1));
         let mut state = State::default();
         let targets = targets.into_iter().map(|(share, _, cycles)| (share, cycles));
         let positions = targets.flat_map(|(share, cycles)| {

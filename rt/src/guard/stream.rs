@@ -231,8 +231,7 @@ mod tests {
                 }
             }
             let last = SetPointSteps { sent: [sent[1], sent[2], sent[2]], next: sent[0], period_s: PERIOD_S };
-            let (mut store, mut motion) = (ProfileStore::<4>::default(), GroupTrajectory::default());
-            let mut profiles = store.of(0..1).unwrap();
+            let (mut profiles, mut motion) = (ProfileStore::<4>::default(), GroupTrajectory::new(0..1));
             motion.stop(&mut profiles, [(last.state(&limits), &limits)].into_iter()).unwrap();
             while !motion.is_finished() {
                 motion.advance(PERIOD_S);

@@ -22,6 +22,7 @@ pub struct Phase {
 
 impl Phase {
     /// The state `elapsed_s` seconds after the start of the phase.
+    #[inline]
     pub fn sample(&self, elapsed_s: f64) -> State {
         integrate(&self.start, self.jerk, elapsed_s)
     }
@@ -366,6 +367,16 @@ impl Profile {
             *slot = Blocked { after_s, before_s };
             self.blocked_count += 1;
         }
+    }
+
+    /// Takes over the motion of another profile. The minimum duration and the blocked intervals stay.
+    pub(super) fn take_motion(&mut self, other: &Self) {
+        self.starts_s = other.starts_s;
+        // Most profiles have far fewer phases than there is room for.
+        for (own, phase) in self.phases.iter_mut().zip(&other.phases).take(other.count) {
+            *own = *phase;
+        }
+        (self.count, self.duration_s, self.end) = (other.count, other.duration_s, other.end);
     }
 
     /// Multiplies the profile by `ratio`, and moves it to this start position and this target.

@@ -111,12 +111,10 @@ impl Line {
     /// Lets all axes follow the profile of the reference axis.
     pub(super) fn follow(&self, reference: &Profile, problems: &[Problem], profiles: &mut [Profile]) {
         for (axis, (problem, profile)) in problems.iter().zip(profiles.iter_mut()).enumerate() {
-            let (minimum_s, blocked) = profile.possible();
-            *profile = *reference;
+            profile.take_motion(reference);
             if axis != self.reference {
                 profile.scale(self.ratio(problem), problem.start.position, problem.target);
             }
-            profile.set_possible(minimum_s, blocked);
         }
     }
 

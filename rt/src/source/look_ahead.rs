@@ -376,12 +376,15 @@ where
             Playback::Following => self.delay.advance(elapsed_ns),
             Playback::Awaited | Playback::Leading | Playback::Dry => self.delay.settle(),
         }
-        StreamSample { wish: self.wish(at_ns), counts: self.counts() }
+        let mut sample = StreamSample { wish: StreamWish::Awaited, counts: self.counts() };
+        // Written where it is to be: it is large.
+        self.put_wish(at_ns, &mut sample.wish);
+        sample
     }
 
-    fn wish(&mut self, at_ns: Nanoseconds) -> StreamWish<AXES> {
+    fn put_wish(&mut self, at_ns: Nanoseconds, wish: &mut StreamWish<AXES>) {
         let (Some(first_ns), Some(last_ns)) = (self.stamps().first().copied(), self.last_stamp()) else {
-            return StreamWish::Awaited;
+            return;
         };
         let played_ns = self.play_time(at_ns);
         if self.playback == Playback::Leading && (self.count == 1 || played_ns <= first_ns) {
@@ -389,20 +392,22 @@ where
             let waited_ns = at_ns.saturating_sub(self.arrived_ns.max(first_ns));
             if is_alone && waited_ns > SINGLE_POINT_NS {
                 self.playback = Playback::Dry;
-                return StreamWish::Dry(self.at_rest(0));
+                *wish = StreamWish::Dry(self.at_rest(0));
+            } else {
+                *wish = StreamWish::Targets(self.at_rest(0));
             }
-            return StreamWish::Targets(self.at_rest(0));
+            return;
         }
         let coasting_ns = self.delay.interval_ns().min(COASTING_NS).unsigned_abs();
         if played_ns > last_ns.saturating_add(coasting_ns) || self.count == 1 {
             self.playback = Playback::Dry;
-            return StreamWish::Dry(self.at_rest(self.count - 1));
         }
         if self.playback == Playback::Dry {
-            return StreamWish::Dry(self.at_rest(self.count - 1));
+            *wish = StreamWish::Dry(self.at_rest(self.count - 1));
+        } else {
+            self.playback = Playback::Following;
+            *wish = StreamWish::Targets(self.interpolated(played_ns));
         }
-        self.playback = Playback::Following;
-        StreamWish::Targets(self.interpolated(played_ns))
     }
 
     fn at_rest(&self, index: usize) -> [AxisTarget; AXES] {

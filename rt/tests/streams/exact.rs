@@ -1,10 +1,9 @@
 //! `Follow::Exact`: every set-point is what the stream wants, or a fault.
 
-use super::super::fixture::{LIMITS, PERIOD_NS, Rig, axis_in, parameters};
+use super::super::fixture::{LIMITS, PERIOD_S, Rig, axis_in, parameters};
 use takt_rt::plan::{self, Limits, Problem, Profile, State};
 use takt_rt::{AxisLimits, ControlLaw, Follow, Phase, Request, Rule, StopCategory, StreamState};
 
-const PERIOD_S: f64 = PERIOD_NS as f64 * 1e-9;
 const VELOCITY: ControlLaw = ControlLaw::Velocity { position_gain: 20.0 };
 const TORQUE: ControlLaw = ControlLaw::Torque {
     stiffness: 400.0,

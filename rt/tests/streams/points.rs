@@ -1,6 +1,6 @@
 //! Points through the look-ahead to the set-points of the engine: any rate, jitter, loss, disorder, chunks.
 
-use super::super::fixture::{PERIOD_NS, Rig, jerk_limited};
+use super::super::fixture::{PERIOD_NS, PERIOD_S, Rig, jerk_limited};
 use proptest::prelude::*;
 use takt_rt::plan::State;
 use takt_rt::{
@@ -8,7 +8,6 @@ use takt_rt::{
     Request, StreamDelay, StreamPoint, StreamState,
 };
 
-const PERIOD_S: f64 = PERIOD_NS as f64 * 1e-9;
 const JERK: f64 = 100.0;
 
 /// A point, and when it arrives.
@@ -67,17 +66,8 @@ fn stream(arrivals: &[Arrival], follow: Follow, delay: StreamDelay, duration_s: 
         let lag_ns = rig.host.snapshot.groups[0].stream.counts.lag_ns as f64;
         set.push(((since_ns - lag_ns) * 1e-9, record.axes[0].position_set));
     }
-    assert_differences_kept(&rig);
+    rig.assert_differences_kept(JERK);
     Streamed { rig, set }
-}
-
-fn assert_differences_kept(rig: &Rig) {
-    rig.assert_limits_kept();
-    let set: Vec<f64> = rig.host.records.iter().map(|record| record.axes[0].position_set).collect();
-    for (index, set) in set.windows(4).enumerate() {
-        let jerk = (set[3] - 3.0 * set[2] + 3.0 * set[1] - set[0]).abs() / PERIOD_S.powi(3);
-        assert!(jerk <= JERK * (1.0 + 1e-5) + 1e-4, "jerk {jerk} in cycle {index}");
-    }
 }
 
 impl Streamed {

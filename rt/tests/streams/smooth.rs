@@ -1,10 +1,9 @@
 //! `Follow::Smooth`: whatever a stream wants is followed as closely as the limits allow.
 
-use super::super::fixture::{LIMITS, PERIOD_NS, Rig, jerk_limited};
+use super::super::fixture::{LIMITS, PERIOD_S, Rig, jerk_limited};
 use takt_rt::plan::State;
 use takt_rt::{EventKind, Phase, Request, Rule, StopCategory, StreamState};
 
-const PERIOD_S: f64 = PERIOD_NS as f64 * 1e-9;
 const JERK: f64 = 100.0;
 
 /// Axes that are asked for a stream, standing at 0.
@@ -16,16 +15,6 @@ fn streaming(jerk: f64) -> Rig {
     rig.host.records.clear();
     rig.request(Request::Stream);
     rig
-}
-
-/// Checks that no finite difference of the set-points is beyond its limit.
-fn assert_differences_kept(rig: &Rig, jerk: f64) {
-    rig.assert_limits_kept();
-    let set: Vec<f64> = rig.host.records.iter().map(|record| record.axes[0].position_set).collect();
-    for (index, set) in set.windows(4).enumerate() {
-        let highest = (set[3] - 3.0 * set[2] + 3.0 * set[1] - set[0]).abs() / PERIOD_S.powi(3);
-        assert!(highest <= jerk * (1.0 + 1e-5) + 1e-4, "jerk {highest} in cycle {index}");
-    }
 }
 
 #[test]
@@ -50,7 +39,7 @@ fn a_step_is_made_at_the_limits_and_not_overshot() {
             rig.stream(step, 0.0);
             rig.run(3_000);
             assert_eq!(rig.stops(), []);
-            assert_differences_kept(&rig, jerk);
+            rig.assert_differences_kept(jerk);
             let set = rig.host.records.iter().map(|record| record.axes[0].position_set);
             let farthest = set.fold(0.0, f64::max);
             assert!(farthest <= step + 1e-9, "{farthest} for {step}");
@@ -70,7 +59,7 @@ fn a_target_beyond_a_position_limit_is_approached_up_to_the_limit() {
         (reached.position - LIMITS.position_max).abs() < 1e-6 && reached.velocity.abs() < 1e-9,
         "{reached:?}"
     );
-    assert_differences_kept(&rig, JERK);
+    rig.assert_differences_kept(JERK);
 }
 
 #[test]
@@ -88,7 +77,7 @@ fn a_moving_target_is_met_and_followed_to_a_nanoradian() {
             let error = (rig.engine.axes()[0].set_point().position - wanted.position).abs();
             assert!(cycle < 2_000 || error < 2e-9, "{error:e} in cycle {cycle}");
         }
-        assert_differences_kept(&rig, jerk);
+        rig.assert_differences_kept(jerk);
     }
 }
 
@@ -109,7 +98,7 @@ fn what_is_no_number_stops_the_group_where_it_can() {
             (stops.len(), stops[0].rule(), stops[0].category),
             (1, Rule::NotFinite, StopCategory::Two)
         );
-        assert_differences_kept(&rig, JERK);
+        rig.assert_differences_kept(JERK);
     }
 }
 
@@ -140,7 +129,7 @@ fn a_stream_that_runs_dry_comes_to_rest_says_so_and_goes_on_without_a_bump() {
         .collect();
     assert_eq!(states, [StreamState::Following, StreamState::Dry, StreamState::Following]);
     assert_eq!(rig.stops(), []);
-    assert_differences_kept(&rig, JERK);
+    rig.assert_differences_kept(JERK);
 }
 
 #[test]
@@ -151,7 +140,7 @@ fn an_axis_that_is_behind_its_stream_goes_on_to_the_last_point_when_the_stream_r
     rig.dry_up(0.7);
     rig.run(2_000);
     assert!((rig.engine.axes()[0].set_point().position - 0.7).abs() < 1e-9);
-    assert_differences_kept(&rig, JERK);
+    rig.assert_differences_kept(JERK);
 }
 
 #[test]
@@ -177,6 +166,6 @@ fn a_stop_in_the_midst_of_a_stream_keeps_every_limit() {
         rig.request(Request::Stop(StopCategory::Two));
         rig.run(1_500);
         assert_eq!((rig.stops().len(), rig.phase()), (1, Phase::Holding));
-        assert_differences_kept(&rig, JERK);
+        rig.assert_differences_kept(JERK);
     }
 }

@@ -5,18 +5,13 @@ use std::fmt;
 
 use takt_rt::{Frame, FrameKind, Id, Nanoseconds};
 
+use crate::canopen::function_code;
 use crate::canopen::nmt::{NmtCommand, NmtTarget};
 use crate::config::{Config, defaults};
 use crate::drive::ProcessData;
 
-const NMT: u16 = 0x000;
-const SYNC: u16 = 0x080;
-const SDO_REQUEST: u16 = 0x600;
-const HEARTBEAT: u16 = 0x700;
 /// Requests of an LSS master (CiA 305).
 const LSS_REQUEST: u32 = 0x7E5;
-/// RPDO 1 to 4 of the pre-defined connection set (CiA 301, 7.3.3).
-const RPDO: [u16; 4] = [0x200, 0x300, 0x400, 0x500];
 
 /// The shortest listening time. The default heartbeat of takt (100 ms) comes three times in it, and so does SYNC at the
 /// longest period of a cycle (100 ms).
@@ -77,18 +72,20 @@ impl MasterTraffic {
         if frame.kind() != FrameKind::Data || id.is_extended() {
             return None;
         }
-        let activity = if id == Id::canopen(SYNC, 0) {
+        let activity = if id == Id::canopen(function_code::SYNC, 0) {
             MasterActivity::Sync
-        } else if id == Id::canopen(NMT, 0) {
+        } else if id == Id::canopen(function_code::NMT, 0) {
             MasterActivity::Nmt(NmtCommand::decode(frame))
         } else if id.value() == LSS_REQUEST {
             MasterActivity::LayerSetting
-        } else if id == Id::canopen(HEARTBEAT, self.master) && !self.drives.contains(&self.master) {
+        } else if id == Id::canopen(function_code::ERROR_CONTROL, self.master)
+            && !self.drives.contains(&self.master)
+        {
             MasterActivity::Heartbeat { node: self.master }
         } else if let Some((_, node)) = self.set_points.iter().find(|(known, _)| *known == id) {
             MasterActivity::SetPoints { node: *node }
         } else {
-            let is_request_to = |node: &&u8| id == Id::canopen(SDO_REQUEST, **node);
+            let is_request_to = |node: &&u8| id == Id::canopen(function_code::SDO_REQUEST, **node);
             let node = *self.drives.iter().find(is_request_to).filter(|_| is_sdo_download(frame))?;
             MasterActivity::SdoWrite { node }
         };
@@ -97,7 +94,7 @@ impl MasterTraffic {
 }
 
 fn rpdos(node: u8) -> impl Iterator<Item = (Id, u8)> {
-    RPDO.into_iter().map(move |function| (Id::canopen(function, node), node))
+    function_code::RPDO.into_iter().map(move |function| (Id::canopen(function, node), node))
 }
 
 /// Whether an SDO request writes (CiA 301, 7.2.4.3): client command specifier 0 and 1 (download), 6 (block download).
@@ -144,9 +141,9 @@ impl fmt::Display for HeardMaster {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.activity {
             MasterActivity::Sync => write!(f, "SYNC")?,
-            MasterActivity::Nmt(None) => write!(f, "an NMT command")?,
+            MasterActivity::Nmt(None) => write!(f, "an function_code::NMT command")?,
             MasterActivity::Nmt(Some((command, target))) => {
-                write!(f, "the NMT command `{}` to ", command_name(command))?;
+                write!(f, "the function_code::NMT command `{}` to ", command_name(command))?;
                 match target {
                     NmtTarget::All => write!(f, "all nodes")?,
                     NmtTarget::Node(node) => write!(f, "node {node}")?,
@@ -241,9 +238,13 @@ mod tests {
     fn what_only_a_master_sends_is_recognised_with_its_meaning() {
         is_a_master(0x080, &[], "SYNC (identifier 080)");
         is_a_master(0x080, &[7], "SYNC (identifier 080)");
-        is_a_master(0x000, &[0x81, 0], "the NMT command `reset node` to all nodes (identifier 000)");
-        is_a_master(0x000, &[0x01, 3], "the NMT command `start` to node 3 (identifier 000)");
-        is_a_master(0x000, &[9], "an NMT command (identifier 000)");
+        is_a_master(
+            0x000,
+            &[0x81, 0],
+            "the function_code::NMT command `reset node` to all nodes (identifier 000)",
+        );
+        is_a_master(0x000, &[0x01, 3], "the function_code::NMT command `start` to node 3 (identifier 000)");
+        is_a_master(0x000, &[9], "an function_code::NMT command (identifier 000)");
         is_a_master(
             0x77F,
             &[5],

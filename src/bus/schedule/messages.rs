@@ -4,6 +4,7 @@ use serde::Serialize;
 use takt_rt::{Id, TIME_ID, TransmissionType};
 
 use crate::bus::frame_time::FrameShape;
+use crate::canopen::function_code;
 use crate::config::{Axis, Config, DriveFamily, Master};
 use crate::drive::{PdoPlan, ProcessData};
 
@@ -92,7 +93,13 @@ pub(super) fn messages(config: &Config, bus_index: usize) -> Vec<BusMessage> {
     let mut messages = vec![message(MessageKind::Sync, None, Id::canopen(0x080, 0), 0, period_ns)];
     let Master { node, heartbeat_ns, time_ns, .. } = config.master;
     let heartbeat = heartbeat_ns.map(|period_ns| {
-        message(MessageKind::MasterHeartbeat, None, Id::canopen(0x700, node), HEARTBEAT_BYTES, period_ns)
+        message(
+            MessageKind::MasterHeartbeat,
+            None,
+            Id::canopen(function_code::ERROR_CONTROL, node),
+            HEARTBEAT_BYTES,
+            period_ns,
+        )
     });
     let time = time_ns.map(|period_ns| message(MessageKind::Time, None, TIME_ID, TIME_BYTES, period_ns));
     // They are sent in a cycle of the controller, so up to one cycle late.
@@ -154,7 +161,7 @@ fn axis_messages(index: usize, axis: &Axis, period_ns: u64) -> Vec<BusMessage> {
     let every_cycle = data.commands.iter().filter(|pdo| pdo.transmission == TransmissionType::EveryCycle);
     messages.extend(every_cycle.map(|pdo| of_axis(MessageKind::SetPoint, pdo, period_ns)));
     messages.extend(axis.heartbeat_ns.map(|heartbeat_ns| {
-        let id = Id::canopen(0x700, axis.node);
+        let id = Id::canopen(function_code::ERROR_CONTROL, axis.node);
         message(MessageKind::DriveHeartbeat, Some(index), id, HEARTBEAT_BYTES, heartbeat_ns)
     }));
     messages
@@ -164,10 +171,20 @@ fn axis_messages(index: usize, axis: &Axis, period_ns: u64) -> Vec<BusMessage> {
 /// the controller's heartbeat comes in addition.
 /// A drive answers after 0.3 to 1 ms, so two of its answers may follow each other more closely than a cycle.
 fn sdo(index: usize, axis: &Axis, period_ns: u64) -> [BusMessage; 2] {
-    let request =
-        message(MessageKind::SdoRequest, Some(index), Id::canopen(0x600, axis.node), SDO_BYTES, period_ns);
-    let response =
-        message(MessageKind::SdoResponse, Some(index), Id::canopen(0x580, axis.node), SDO_BYTES, period_ns);
+    let request = message(
+        MessageKind::SdoRequest,
+        Some(index),
+        Id::canopen(function_code::SDO_REQUEST, axis.node),
+        SDO_BYTES,
+        period_ns,
+    );
+    let response = message(
+        MessageKind::SdoResponse,
+        Some(index),
+        Id::canopen(function_code::SDO_RESPONSE, axis.node),
+        SDO_BYTES,
+        period_ns,
+    );
     [
         BusMessage { deadline_ns: None, ..request },
         BusMessage { deadline_ns: None, jitter_ns: period_ns, ..response },

@@ -6,7 +6,7 @@ use std::ops::Range;
 use super::data_type::DataTypeCode;
 use super::value::Value;
 use crate::canopen::object::ObjectAddress;
-use crate::canopen::objects::{PdoDirection, PdoParameters};
+use crate::canopen::objects::{PDO_INVALID, PdoDirection, PdoParameters};
 use crate::canopen::pdo_configuration::PdoConfiguration;
 
 /// A device and its objects.
@@ -312,7 +312,14 @@ impl ObjectDictionary {
                 let number = object.index - first + 1;
                 let parameters = PdoParameters::at(direction, number);
                 let read = |address| u32::try_from(self.number(address, node)?).ok();
-                pdos.extend(PdoConfiguration::read(direction, number, parameters, read));
+                let mut pdo = PdoConfiguration::read(direction, number, parameters, read);
+                if let Some(pdo) = &mut pdo {
+                    // Bit 31 does not depend on the node ID.
+                    let cob_id = parameters.cob_id().address;
+                    let of_any_node = self.number(cob_id, node.or(Some(1)));
+                    pdo.is_valid = of_any_node.is_some_and(|cob_id| cob_id & i128::from(PDO_INVALID) == 0);
+                }
+                pdos.extend(pdo);
             }
         }
         pdos

@@ -40,6 +40,9 @@ pub enum LssTask {
     IdentifyUnconfigured,
     /// Finds a device without a node ID and switches it to configuration state.
     FastScan(KnownIdentity),
+    /// Finds the device without a node ID whose identity is the lowest above this one, and switches it to
+    /// configuration state. All devices must be in waiting state. The device with this identity must still be on the bus.
+    FastScanAfter(LssAddress),
 }
 
 /// The result of a task.
@@ -254,6 +257,7 @@ impl Kind {
                 sequence(vec![LssRequest::IdentifyUnconfigured], ExpectedReply::Existence)
             }
             LssTask::FastScan(known) => Self::Scan(FastScan::new(known)),
+            LssTask::FastScanAfter(address) => Self::Scan(FastScan::after(address)),
         }
     }
 }

@@ -1,8 +1,8 @@
 //! `takt lss`: node IDs and bit rates for devices that are set up by their identity.
 
 mod output;
+mod simulated_device;
 
-use std::str::FromStr;
 use std::sync::atomic::Ordering;
 
 use clap::{Args, Subcommand};
@@ -10,30 +10,31 @@ use clap::{Args, Subcommand};
 use takt::bus::ownership::{BusClaim, IfOwned, MasterTraffic, Ownership};
 use takt::bus::{InterfaceSettings, SocketCanOptions, open_socketcan};
 use takt::canopen::lss::{BitTiming, Inquiry, LssAddress, LssOutcome, LssTask};
-use takt::commission::layer_settings::{DeviceSelection, LayerSettingFailure, LayerSettings};
+use takt::commission::layer_settings::{DeviceSelection, LayerSettingFailure, LayerSettings, NO_NODE};
 use takt::config::{Interface, Quantity};
 use takt::controller::VirtualClock;
 use takt::sim::lss::{LssBus, LssDevice};
 use takt_rt::linux::MonotonicClock;
-use takt_rt::{BusPort, Clock};
+use takt_rt::{BusPort, Clock, Nanoseconds};
 
 use super::exit::Exit;
 use super::interruption;
 use super::usage_error::UsageError;
 use output::{Device, Output, Report};
+pub use simulated_device::SimulatedDevice;
+use simulated_device::{address, node};
 
 /// The time in milliseconds after which the kernel restarts a controller that is bus-off.
 const RESTART_MS: u32 = 100;
 /// A bus cannot have more devices than there are node IDs.
 const MOST_DEVICES: usize = 127;
-/// The node ID of a device that is not configured (CiA 305).
-const NO_NODE: u8 = 255;
 
 /// Give devices their node ID and bit rate by their identity (LSS, CiA 305)
 ///
 /// The device is the one with the identity after --device, or the only one on the bus (--only), or else one without a
 /// node ID, which a scan finds. What is set is forgotten at power-down unless --store is given. Neither eRob nor
-/// YZ-AIM has LSS: theirs are `takt drive … set-id` and `set-bitrate`.
+/// YZ-AIM has LSS: a YZ-AIM has `takt drive … set-id` and `set-bitrate`; the node ID of an eRob is set with the vendor's
+/// tool or its own CAN protocol, and its bit rate is always 1 Mbit/s.
 #[derive(Args, Debug)]
 #[command(subcommand_value_name = "ACTION", subcommand_help_heading = "Actions")]
 pub struct Arguments {
@@ -49,7 +50,15 @@ pub struct Arguments {
     /// The only device on the bus, whatever it is
     #[arg(long, global = true, conflicts_with = "device")]
     only: bool,
+    /// The time to wait for the answer to each of the 130 requests of a scan
+    ///
+    /// Longer waits are for slow devices and slow adapters: a device that answers too late is lost.
+    #[arg(long, value_name = "TIME", global = true, value_parser = scan_wait, default_value = "20 ms")]
+    scan_wait: Nanoseconds,
     /// A device on a simulated bus: IDENTITY, or IDENTITY@NODE where it has a node ID already
+    ///
+    /// Behind a comma it gets a behaviour: `canopennode` answers every scan request in configuration state,
+    /// `no-boot-up` does not boot with its new node ID.
     #[arg(long, value_name = "DEVICE", global = true)]
     simulate: Vec<SimulatedDevice>,
     /// Show every frame
@@ -114,48 +123,16 @@ fn bit_rate(text: &str) -> Result<u32, String> {
     rate.map(|rate| rate as u32).ok_or_else(|| "write it as \"500 kbit/s\", at most 1 Mbit/s".to_owned())
 }
 
+fn scan_wait(text: &str) -> Result<Nanoseconds, String> {
+    let seconds = Quantity::DURATION.parse(text).ok().filter(|seconds| (0.001..=1.0).contains(seconds));
+    let wait = seconds.map(|seconds| (seconds * 1e9).round() as Nanoseconds);
+    wait.ok_or_else(|| "write it as \"50 ms\", 1 ms to 1 s".to_owned())
+}
+
 fn timing(text: &str) -> Result<BitTiming, String> {
     let rate = bit_rate(text)?;
     BitTiming::of(rate)
         .ok_or_else(|| "LSS knows 10, 20, 50, 125, 250, 500, 800 kbit/s and 1 Mbit/s".to_owned())
-}
-
-fn node(text: &str) -> Result<u8, String> {
-    let wrong = || "a node ID is 1 to 127, or none".to_owned();
-    if text == "none" {
-        return Ok(NO_NODE);
-    }
-    text.parse().ok().filter(|node| (1..=127).contains(node)).ok_or_else(wrong)
-}
-
-fn address(text: &str) -> Result<LssAddress, String> {
-    let number = |text: &str| match text.strip_prefix("0x").or_else(|| text.strip_prefix("0X")) {
-        Some(digits) => u32::from_str_radix(digits, 16).ok(),
-        None => text.parse().ok(),
-    };
-    let values: Option<Vec<u32>> = text.split(':').map(number).collect();
-    let values = values.and_then(|values| <[u32; 4]>::try_from(values).ok());
-    values.map(LssAddress::from_values).ok_or_else(|| {
-        "write it as VENDOR:PRODUCT:REVISION:SERIAL, for example 0x331:1:0x100:12345".to_owned()
-    })
-}
-
-#[derive(Clone, Copy, Debug)]
-struct SimulatedDevice {
-    address: LssAddress,
-    node: Option<u8>,
-}
-
-impl FromStr for SimulatedDevice {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
-        let (identity, number) = match text.split_once('@') {
-            Some((identity, number)) => (identity, Some(node(number)?)),
-            None => (text, None),
-        };
-        Ok(Self { address: address(identity)?, node: number.filter(|node| *node != NO_NODE) })
-    }
 }
 
 /// Runs it.
@@ -175,7 +152,7 @@ pub fn run(arguments: &Arguments) -> Exit {
         }
         Interface::Simulated => {
             let devices = arguments.simulate.iter();
-            let mut bus = LssBus::new(devices.map(|device| LssDevice::new(device.address, device.node)));
+            let mut bus = LssBus::new(devices.copied().map(LssDevice::from));
             lead(arguments, &mut bus, &mut VirtualClock::default(), is_interrupted)
         }
         Interface::SocketCan(_) if !arguments.simulate.is_empty() => {
@@ -221,7 +198,8 @@ fn lead(
         }
     };
     let mut report = Report::default();
-    let mut settings = LayerSettings::new(port, clock, &mut is_interrupted, &mut see);
+    let mut settings =
+        LayerSettings::new(port, clock, &mut is_interrupted, &mut see).with_scan_timeout(arguments.scan_wait);
     let outcome = carry_out(arguments, &mut settings, &mut report);
     output.finish(&report, outcome)
 }
@@ -231,16 +209,19 @@ fn carry_out<P: BusPort, C: Clock>(
     settings: &mut LayerSettings<'_, P, C>,
     report: &mut Report,
 ) -> Result<(), LayerSettingFailure> {
-    let mut is_boot_up_awaited = false;
-    let outcome = act(arguments, settings, report, &mut is_boot_up_awaited);
+    let mut awaited = None;
+    let outcome = act(arguments, settings, report, &mut awaited);
     if report.is_activated {
         // A frame at the old bit rate would only disturb the devices at the new one.
         return outcome;
     }
     // In every case, no device is left in the LSS state configuration.
-    let released = settings.release(is_boot_up_awaited && outcome.is_ok());
+    let awaited = awaited.filter(|_| outcome.is_ok());
+    let has_booted = settings.release(awaited);
     outcome?;
-    report.booted_node = released?;
+    let has_booted = has_booted?;
+    report.booted_node = awaited.filter(|_| has_booted);
+    report.is_boot_up_missing = awaited.is_some() && !has_booted;
     Ok(())
 }
 
@@ -248,7 +229,7 @@ fn act<P: BusPort, C: Clock>(
     arguments: &Arguments,
     settings: &mut LayerSettings<'_, P, C>,
     report: &mut Report,
-    is_boot_up_awaited: &mut bool,
+    awaited: &mut Option<u8>,
 ) -> Result<(), LayerSettingFailure> {
     let choice = match (arguments.device, arguments.only) {
         (Some(address), _) => DeviceSelection::Identity(address),
@@ -259,16 +240,22 @@ fn act<P: BusPort, C: Clock>(
     match arguments.action {
         Action::Wait => return Ok(()),
         Action::Scan => {
-            settings.release(false)?;
-            let mut devices = vec![];
-            while let Some(address) = settings.scan()? {
-                devices.push(Device::from(address));
-                report.devices = Some(devices.clone());
-                if devices.len() >= MOST_DEVICES {
-                    break;
+            let devices = report.devices.insert(vec![]);
+            let mut last = None;
+            while devices.len() < MOST_DEVICES {
+                match settings.scan(last) {
+                    Ok(Some(address)) => {
+                        devices.push(Device::from(address));
+                        last = Some(address);
+                    }
+                    Ok(None) => break,
+                    Err(LayerSettingFailure::Implausible(identity)) => {
+                        report.remark = Some(identity.to_string());
+                        break;
+                    }
+                    Err(failure) => return Err(failure),
                 }
             }
-            report.devices = Some(devices);
             return Ok(());
         }
         Action::Inquire => {
@@ -282,10 +269,10 @@ fn act<P: BusPort, C: Clock>(
         Action::SetId { id, store } => {
             report.device = settings.select(choice)?.map(Device::from);
             let before = node_of(settings)?;
-            settings.perform(LssTask::ConfigureNode(id))?;
+            settings.configure_node(id, before)?;
             report.node = (id != NO_NODE).then_some(id);
             // A device that had a node ID before keeps it until it is reset.
-            *is_boot_up_awaited = before.is_none() && report.node.is_some();
+            *awaited = report.node.filter(|_| before.is_none());
             report.is_reset_needed = before.is_some();
             is_stored = store;
         }

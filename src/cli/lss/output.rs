@@ -38,6 +38,9 @@ pub struct Report {
     /// The devices that a scan has found.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub devices: Option<Vec<Device>>,
+    /// Why the scan ended before all devices were found.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub remark: Option<String>,
     /// The device that was meant, where it is known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub device: Option<Device>,
@@ -55,6 +58,8 @@ pub struct Report {
     /// The node ID with which a device has booted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub booted_node: Option<u8>,
+    /// Whether a boot-up message was due and has not come.
+    pub is_boot_up_missing: bool,
 }
 
 /// Shows the result.
@@ -101,6 +106,10 @@ fn advice(failure: LayerSettingFailure) -> Option<&'static str> {
             Some("the device does not support this value or cannot store")
         }
         LayerSettingFailure::Task(LssError::ScanLost) => Some("scan again; the bus may be busy or disturbed"),
+        LayerSettingFailure::Implausible(_) => Some("switch the devices off and on, then try again"),
+        LayerSettingFailure::SeveralDevices { .. } => {
+            Some("name the device by --device, or leave a single device on the bus")
+        }
         LayerSettingFailure::Interrupted => None,
     }
 }
@@ -145,10 +154,20 @@ fn text(report: &Report) -> String {
             count => format!("{count} devices"),
         });
     }
+    lines.extend(report.remark.as_ref().map(|remark| {
+        format!("note: the scan ended early: {remark}; switch the devices off and on, then scan again")
+    }));
     lines.extend(report.device.map(|device| format!("device       {}", device.words())));
     lines.extend(report.node.map(|node| format!("node ID      {node}")));
     lines.extend(report.bit_rate.map(|rate| format!("bit rate     {} kbit/s", rate / 1000)));
     lines.extend(report.booted_node.map(|node| format!("booted       as node {node}")));
+    if report.is_boot_up_missing {
+        lines.push(
+            "note: the device has sent no boot-up message with this node ID; switch it off and on, and look whether it \
+             comes"
+                .to_owned(),
+        );
+    }
     if report.is_stored {
         lines.push("stored       yes".to_owned());
     }

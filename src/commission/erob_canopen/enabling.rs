@@ -12,7 +12,6 @@ use crate::commission::motion_profile::DriveProfile;
 use crate::commission::report::Report;
 use crate::commission::sdo_session::SdoSession;
 use crate::commission::target::{CommandValue, TargetDrive};
-use crate::drive::mode_words;
 
 /// Longest time for a CiA 402 state change after a controlword; releasing the brake takes part of it.
 const STATE_NS: Nanoseconds = 2_000_000_000;
@@ -48,7 +47,7 @@ pub async fn prepare(
     let supported = c.read(&SUPPORTED_DRIVE_MODES).await? as u32;
     if supported & mode.supported_bit() == 0 {
         return Err(Failure::Unsupported {
-            what: format!("this drive has no {} mode", mode_words(mode)),
+            what: format!("this drive has no {} mode", mode.name()),
             instead: format!("6502 names {}", modes_words(supported)),
         });
     }

@@ -3,7 +3,7 @@
 use takt_rt::{DriveState, Nanoseconds, controlword};
 
 use super::enabling::state;
-use super::reading::{advice, error_code, in_words, summary};
+use super::reading::{cure, error_code, summary};
 use super::upkeep::clear_turns;
 use crate::canopen::objects::*;
 use crate::commission::contact;
@@ -11,7 +11,7 @@ use crate::commission::failure::Failure;
 use crate::commission::report::Report;
 use crate::commission::sdo_session::SdoSession;
 use crate::commission::target::TargetDrive;
-use crate::drive::erob_canopen::MULTI_TURN_BATTERY;
+use crate::drive::erob_canopen::{MULTI_TURN_BATTERY, error_text};
 
 /// Controlword bit 7 must stay set for several cycles of the drive.
 const EDGE_NS: Nanoseconds = 50_000_000;
@@ -29,7 +29,7 @@ pub async fn clear(c: &SdoSession, s: &TargetDrive, is_confirmed: bool) -> Resul
         return Ok(report);
     }
     let code = error_code(c).await?;
-    report.add("fault", "fault", format!("0x{:04X}", code.0), in_words(code));
+    report.add("fault", "fault", format!("0x{:04X}", code.0), error_text(code));
     if code == MULTI_TURN_BATTERY {
         if !is_confirmed {
             return Err(Failure::NeedsConsent {
@@ -51,8 +51,7 @@ pub async fn clear(c: &SdoSession, s: &TargetDrive, is_confirmed: bool) -> Resul
     match cleared {
         Err(Failure::NotInTime { .. }) => {
             let code = error_code(c).await?;
-            let known = advice(code).or(Some("remove its cause; if it stays, power-cycle the drive"));
-            return Err(Failure::FaultPersists { what: in_words(code), advice: known });
+            return Err(Failure::FaultPersists { what: error_text(code), advice: Some(cure(code)) });
         }
         other => other?,
     };

@@ -3,8 +3,8 @@
 use takt_rt::DriveState;
 
 use super::objects::*;
-use super::reading::{self, in_words};
-use super::state::{modes_words, state_words, statusword_words};
+use super::reading;
+use super::state::{modes_words, statusword_words};
 use crate::canopen::emcy::ErrorCode;
 use crate::canopen::objects::*;
 use crate::commission::contact;
@@ -12,7 +12,7 @@ use crate::commission::failure::Failure;
 use crate::commission::report::Report;
 use crate::commission::sdo_session::SdoSession;
 use crate::commission::target::TargetDrive;
-use crate::drive::mode_words;
+use crate::drive::erob_canopen::error_text;
 use serde_json::json;
 use takt_rt::OperationMode;
 
@@ -80,11 +80,11 @@ async fn condition(
     c.step("condition");
     let reading = reading::read(c, s, rated).await?;
     let word = reading.statusword;
-    report.add("state", "state", state_words(DriveState::decode(word)), statusword_words(word));
+    report.add("state", "state", DriveState::decode(word).name(), statusword_words(word));
     report.add("statusword", "statusword", word, format!("0x{word:04X}"));
     let mode = c.read(&MODES_OF_OPERATION_DISPLAY).await?;
     let known = i8::try_from(mode).ok().and_then(OperationMode::from_number);
-    report.add("mode", "mode", mode, known.map_or("none", mode_words));
+    report.add("mode", "mode", mode, known.map_or("none", OperationMode::name));
     let (position, counts) = (reading.position, reading.position_counts);
     let shown = format!("{} ({counts} counts)", s.position_quantity().show(position));
     report.add("position", "position", position, shown);
@@ -106,9 +106,9 @@ async fn condition(
 async fn errors(c: &SdoSession, report: &mut Report) -> Result<(), Failure> {
     c.step("errors");
     let code = ErrorCode(c.read(&ERROR_CODE).await? as u16);
-    report.add("error_code", "error", code.0, in_words(code));
-    if let Some(advice) = reading::advice(code) {
-        c.note(advice);
+    report.add("error_code", "error", code.0, error_text(code));
+    if code != ErrorCode::NONE {
+        c.note(reading::cure(code));
     }
     let count = c.read_optional(&ERROR_HISTORY_COUNT).await?.unwrap_or(0);
     let mut history = vec![];
@@ -118,7 +118,7 @@ async fn errors(c: &SdoSession, report: &mut Report) -> Result<(), Failure> {
         }
     }
     let codes: Vec<u16> = history.iter().map(|code| code.0).collect();
-    let words: Vec<String> = history.into_iter().map(in_words).collect();
+    let words: Vec<String> = history.into_iter().map(error_text).collect();
     let text = if words.is_empty() { "empty".to_owned() } else { words.join(", ") };
     report.add("error_history", "error history", json!(codes), text);
     Ok(())

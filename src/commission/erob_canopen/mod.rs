@@ -61,7 +61,7 @@ fn unsupported(task: &Task) -> Failure {
         ),
         Task::Gear { .. } => (
             "an eRob has no electronic gear",
-            "it counts its output; scale with `gear_ratio` in the configuration",
+            "it counts turns of its output; `gear_ratio` in the configuration is for a transmission behind it",
         ),
         Task::AutoHome { .. } => ("an eRob does not move by itself at power-up", "move it with `move`"),
         _ => (

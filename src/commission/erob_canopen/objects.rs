@@ -1,10 +1,11 @@
 //! Object dictionary of an eRob with CANopen firmware, with units (vendor's EDS, CiA 402, field experience).
 
+use crate::canopen::emcy::ErrorCode;
 use crate::canopen::object::{DataType, Object};
 use crate::canopen::objects::*;
 use crate::commission::dictionary::{ObjectEntry, ObjectUnit};
 use crate::commission::target::TargetDrive;
-use crate::drive::mode_words;
+use crate::drive::erob_canopen::error_words;
 
 use super::state;
 use takt_rt::{Frame, Id, OperationMode};
@@ -142,11 +143,11 @@ pub fn meaning(object: &Object, value: i64) -> Option<String> {
         0x6041 => Some(state::statusword_words(value as u16)),
         0x6060 | 0x6061 => {
             let mode = i8::try_from(value).ok().and_then(OperationMode::from_number)?;
-            Some(mode_words(mode).to_owned())
+            Some(mode.name().to_owned())
         }
         0x6502 => Some(state::modes_words(value as u32)),
-        0x603F => Some(state::error_words(value as u16).to_owned()),
-        0x1003 if object.address.subindex > 0 => Some(state::error_words(value as u16).to_owned()),
+        0x603F => Some(error_words(ErrorCode(value as u16)).to_owned()),
+        0x1003 if object.address.subindex > 0 => Some(error_words(ErrorCode(value as u16)).to_owned()),
         0x1001 => Some(crate::canopen::emcy::ErrorRegister(value as u8).to_string()),
         0x1016 if object.address.subindex == 1 => Some(match value & 0xFFFF {
             0 => "heartbeat watchdog off".to_owned(),

@@ -3,7 +3,6 @@
 use takt_rt::{DriveState, Nanoseconds};
 
 use super::objects::TORQUE_ACTUAL_VALUE;
-use super::state::{error_words, state_words};
 use crate::canopen::emcy::ErrorCode;
 use crate::canopen::objects::*;
 use crate::commission::contact;
@@ -13,7 +12,9 @@ use crate::commission::polling;
 use crate::commission::report::Report;
 use crate::commission::sdo_session::SdoSession;
 use crate::commission::target::TargetDrive;
-use crate::drive::erob_canopen::MULTI_TURN_BATTERY;
+use crate::config::DriveFamily;
+use crate::drive::erob_canopen::error_text;
+use crate::drive::error_cure;
 
 /// The rated torque (6076) in N·m; `None` when the drive does not report it.
 pub async fn rated_torque(c: &SdoSession) -> Result<Option<f64>, Failure> {
@@ -41,7 +42,7 @@ pub async fn read(c: &SdoSession, s: &TargetDrive, rated: Option<f64>) -> Result
         torque: torque(s, rated, per_mille),
         current_a: None,
         statusword: word,
-        state: state_words(DriveState::decode(word)),
+        state: DriveState::decode(word).name(),
     })
 }
 
@@ -63,7 +64,7 @@ pub async fn read_enabled(
 /// The current fault as a failure.
 pub async fn fault(c: &SdoSession) -> Result<Failure, Failure> {
     let code = error_code(c).await?;
-    Ok(Failure::Faulted { what: in_words(code), advice: advice(code) })
+    Ok(Failure::Faulted { what: error_text(code), advice: Some(cure(code)) })
 }
 
 /// The error code (603F); when it is zero, the code of the last emergency message.
@@ -72,17 +73,9 @@ pub async fn error_code(c: &SdoSession) -> Result<ErrorCode, Failure> {
     Ok(if code == ErrorCode::NONE { c.emergency().map_or(code, |emergency| emergency.code) } else { code })
 }
 
-/// The error code with its meaning.
-pub fn in_words(code: ErrorCode) -> String {
-    format!("0x{:04X} ({})", code.0, error_words(code.0))
-}
-
-/// The remedy for an error.
-pub fn advice(code: ErrorCode) -> Option<&'static str> {
-    (code == MULTI_TURN_BATTERY).then_some(
-        "replace the battery, then use `clear-fault --yes`; this also clears the turn count, so the joint's zero \
-         must be set again",
-    )
+/// The cure of an error.
+pub fn cure(code: ErrorCode) -> &'static str {
+    error_cure(Some(DriveFamily::ErobCanopen), code.0)
 }
 
 /// `watch`

@@ -2,26 +2,8 @@
 
 use takt_rt::{Command, DriveState, OperationMode, controlword, statusword};
 
-use crate::canopen::emcy::ErrorCode;
-use crate::drive::{erob_canopen, mode_words};
-
 /// The signature for 1010:1: "save" in little-endian order.
 pub const SAVE_SIGNATURE: i64 = 0x6576_6173;
-
-/// The name of a CiA 402 state.
-pub const fn state_words(state: DriveState) -> &'static str {
-    match state {
-        DriveState::NotReadyToSwitchOn => "not ready to switch on",
-        DriveState::SwitchOnDisabled => "switch on disabled",
-        DriveState::ReadyToSwitchOn => "ready to switch on",
-        DriveState::SwitchedOn => "switched on",
-        DriveState::OperationEnabled => "operation enabled",
-        DriveState::QuickStopActive => "quick stop active",
-        DriveState::FaultReactionActive => "fault reaction active",
-        DriveState::Fault => "fault",
-        DriveState::Undefined => "undefined",
-    }
-}
 
 /// State and bits of a statusword. Bits 7 and 12 are often set without a reason on this drive.
 pub fn statusword_words(word: u16) -> String {
@@ -32,7 +14,7 @@ pub fn statusword_words(word: u16) -> String {
         (statusword::BIT_13, "following error"),
     ];
     let set = bits.iter().filter(|(bit, _)| word & bit != 0).map(|(_, name)| *name);
-    let words: Vec<&str> = std::iter::once(state_words(DriveState::decode(word))).chain(set).collect();
+    let words: Vec<&str> = std::iter::once(DriveState::decode(word).name()).chain(set).collect();
     words.join(", ")
 }
 
@@ -59,12 +41,7 @@ pub fn controlword_words(word: u16) -> String {
 /// The names of the modes in object 6502.
 pub fn modes_words(supported: u32) -> String {
     let modes = OperationMode::ALL.into_iter().filter(|mode| supported & mode.supported_bit() != 0);
-    modes.map(mode_words).collect::<Vec<_>>().join(", ")
-}
-
-/// The name of an error code.
-pub fn error_words(code: u16) -> &'static str {
-    erob_canopen::error_words(ErrorCode(code))
+    modes.map(OperationMode::name).collect::<Vec<_>>().join(", ")
 }
 
 #[cfg(test)]

@@ -3,7 +3,6 @@
 
 use takt_rt::Nanoseconds;
 
-use super::alarm::{Alarm, Clearing};
 use super::enabling::statusword;
 use super::objects::*;
 use super::words::{self, control};
@@ -15,6 +14,7 @@ use crate::commission::failure::Failure;
 use crate::commission::report::Report;
 use crate::commission::sdo_session::SdoSession;
 use crate::commission::target::TargetDrive;
+use crate::drive::yz_aim::{Alarm, Clearing};
 
 /// Time until the drive has processed a controlword.
 const CONTROL_NS: Nanoseconds = 20_000_000;

@@ -2,7 +2,6 @@
 
 use takt_rt::Nanoseconds;
 
-use super::alarm::Alarm;
 use super::objects::{ACCELERATION, VELOCITY};
 use super::reading::{self, TENTHS};
 use super::words::{self, control};
@@ -14,6 +13,7 @@ use crate::commission::motion_profile::DriveProfile;
 use crate::commission::report::Report;
 use crate::commission::sdo_session::SdoSession;
 use crate::commission::target::TargetDrive;
+use crate::drive::yz_aim::{Alarm, NO_RAMP, STANDSTILL};
 
 /// Pause between controlwords; a drive that has just booted ignores controlwords that follow sooner.
 const CONTROL_NS: Nanoseconds = 20_000_000;
@@ -27,10 +27,6 @@ const REST_NS: Nanoseconds = 200_000_000;
 const RAMP_NS: Nanoseconds = 2_000_000_000;
 /// Time given to a halt, which the drive may ignore.
 const HALT_NS: Nanoseconds = 300_000_000;
-/// Standstill threshold in r/min.
-const STANDING_RPM: f64 = 1.0;
-/// At this value of 6083 and above the drive uses no ramp: it stops as fast as it can.
-const NO_RAMP: i64 = 60_000;
 /// Node ID of this program's heartbeat, which the drive consumes.
 const MASTER: u8 = 127;
 /// Heartbeat period and the drive's heartbeat timeout (object 1016:01).
@@ -162,7 +158,7 @@ async fn standstill(c: &SdoSession, patience_ns: Nanoseconds) -> Result<(), Fail
     let velocity = (c.read(&VELOCITY).await? as f64 * TENTHS).abs();
     let acceleration = c.read(&ACCELERATION).await?.clamp(1, NO_RAMP);
     let ramp_ns = (velocity / acceleration as f64 * 1e9) as Nanoseconds;
-    let is_standing = |velocity: i64| (velocity as f64 * TENTHS).abs() <= STANDING_RPM;
+    let is_standing = |velocity: i64| velocity.abs() <= STANDSTILL;
     c.wait_for(&VELOCITY, "standstill", ramp_ns.saturating_add(patience_ns), is_standing).await?;
     c.pause(REST_NS).await
 }

@@ -1,7 +1,6 @@
 //! YZ-AIM integrated servos, CANopen edition (manual 1.62), commissioned by SDO with one task at a time. The drive
 //! does not answer requests for unknown objects: neither a reply nor an abort comes.
 
-mod alarm;
 mod clearing;
 mod enabling;
 mod homing;

@@ -81,6 +81,7 @@ pub async fn position(
     profile: MotionProfile,
     keeps_enabled: bool,
 ) -> Result<Report, Failure> {
+    note_rounding(c, s, profile.velocity);
     let profile = drive_profile(s, &profile)?;
     polling::check_target(c, s, kind).await?;
     let work = async {
@@ -186,6 +187,7 @@ pub async fn velocity(
 ) -> Result<Report, Failure> {
     let raw = s.velocity_raw(velocity);
     s.check_velocity(raw)?;
+    note_rounding(c, s, Some(velocity));
     let profile = drive_profile(s, &MotionProfile { velocity: None, ..profile })?;
     with_torque(c, s, keeps_enabled, run_at(c, s, raw, profile, duration_ns)).await
 }
@@ -199,6 +201,7 @@ pub async fn continuous(
     duration_ns: Option<Nanoseconds>,
     keeps_enabled: bool,
 ) -> Result<Report, Failure> {
+    note_rounding(c, s, profile.velocity);
     let profile = drive_profile(s, &profile)?;
     let speed = profile.velocity.ok_or(Failure::Missing {
         what: "--velocity",
@@ -234,6 +237,13 @@ async fn run_at(
     enabling::ramp_down(c).await?;
     let ended = c.read(&POSITION_ACTUAL_VALUE).await?;
     Ok(polling::run_report(s, raw, fastest, began, ended))
+}
+
+/// Says that the drive cannot have a commanded velocity exactly.
+fn note_rounding(c: &SdoSession, s: &TargetDrive, velocity: Option<CommandValue>) {
+    if let Some(remark) = velocity.and_then(|velocity| s.rounding(velocity)) {
+        c.note(remark);
+    }
 }
 
 /// The drive has one acceleration for both directions: the lower of the two is used.

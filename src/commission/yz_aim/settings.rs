@@ -9,13 +9,12 @@ use crate::commission::failure::Failure;
 use crate::commission::report::Report;
 use crate::commission::sdo_session::SdoSession;
 use crate::commission::target::TargetDrive;
+use crate::drive::yz_aim::NO_RAMP;
 
 /// 2619 = 6: return to the multi-turn zero at power-up.
 const RETURN_TO_ZERO: i64 = 6;
 /// 2619 = 7: interpolation.
 const INTERPOLATION: i64 = 7;
-/// 6083 = 60000: no ramp. Its last digit 0 sets the speed of the return to zero: 100 r/min.
-const NO_RAMP: i64 = 60_000;
 
 /// `gains`
 pub async fn gains(

@@ -3,7 +3,6 @@
 
 use takt_rt::Nanoseconds;
 
-use super::alarm::Alarm;
 use super::enabling::refuse_enabled;
 use super::objects::*;
 use super::reading;
@@ -14,6 +13,7 @@ use crate::commission::report::Report;
 use crate::commission::scan;
 use crate::commission::sdo_session::SdoSession;
 use crate::commission::target::TargetDrive;
+use crate::drive::yz_aim::Alarm;
 
 /// Timeout of storing; the manual gives no time.
 const STORING_NS: Nanoseconds = 10_000_000_000;

@@ -14,11 +14,12 @@ use super::travel::{counting, travel};
 use crate::canopen::dcf::DeviceConfiguration;
 use crate::config::defaults;
 use crate::config::model::{
-    Axis, Control, DriveFamily, FeedForward, Feedback, Follow, Identity, Interface, Limits, PdoMapping,
-    SimulatedJoint, Travel,
+    Axis, DriveFamily, FeedForward, Feedback, Follow, Identity, Interface, Joint, Limits, PdoMapping,
+    PowerUpState, SimulatedJoint, Travel,
 };
 use crate::config::problem_kind::ProblemKind;
 use crate::config::quantities::Quantities;
+use crate::config::quantity::Quantity;
 use crate::config::ranges;
 use crate::config::rules;
 use crate::config::rules::loops::Surroundings;
@@ -121,16 +122,26 @@ fn axis(mut section: Section<'_>, machine: &Machine<'_>, earlier: &[ReadAxis]) -
     let counting = counting(&mut section, drive, travel);
     let limits = limits(section.section("limits"), q, counting.as_ref());
     let following_error = following_error(section.section("following_error"), q, travel);
-    let simulated = simulated(section.section("simulated"), q, limits.as_ref(), name.as_deref());
+    let power_up = section.get("power_up").and_then(|entry| entry.nanoseconds(ranges::POWER_UP_S));
+    let mut joint_section = section.section("joint");
+    let joint = joint(&mut joint_section, q);
+    let rated_torque = joint.rated_torque.or(limits.map(|limits| limits.torque)).unwrap_or(1.0);
+    let simulated =
+        simulated(section.section("simulated"), q, limits.as_ref(), rated_torque, drive, name.as_deref());
     let transmission_type = transmission_type(&mut section);
     let period_ns = machine.period_ns(bus);
     let surroundings = period_ns.map(|period_ns| {
         let interface = machine.bus(bus).and_then(|bus| bus.bus.as_ref()).map(|bus| &bus.interface);
         let is_simulated = interface == Some(&Interface::Simulated);
-        Surroundings::new(period_ns, transmission_type, simulated.inertia, is_simulated)
+        Surroundings::new(period_ns, transmission_type, joint.inertia(), is_simulated)
     });
-    let modes = modes(&mut section, drive, q, &simulated, surroundings.as_ref());
+    let modes = modes(&mut section, drive, q, &joint, surroundings.as_ref());
     let control = modes.as_ref().map(|modes| modes.control);
+    if let (Some(modes), Some(surroundings)) = (&modes, &surroundings) {
+        let is_simulated = surroundings.is_simulated();
+        rules::axis::joint(&modes.all(), &joint, is_simulated, |key| joint_section.spot(key));
+    }
+    joint_section.finish();
     if drive == Some(DriveFamily::YzAim) {
         if let (Some(control), Some(period_ns), Some(bus)) = (control, period_ns, machine.bus(bus)) {
             rules::axis::interpolation_period(&bus.spot, control, period_ns);
@@ -164,7 +175,7 @@ fn axis(mut section: Section<'_>, machine: &Machine<'_>, earlier: &[ReadAxis]) -
     let build = || {
         let (bus, node) = place?;
         let (travel, modes, counting) = (travel?, modes?, counting?);
-        let controls: Vec<Control> = std::iter::once(modes.control).chain(modes.others.clone()).collect();
+        let controls = modes.all();
         Some(Axis {
             name: name.clone()?,
             bus,
@@ -196,6 +207,8 @@ fn axis(mut section: Section<'_>, machine: &Machine<'_>, earlier: &[ReadAxis]) -
             heartbeat_ns,
             identity,
             dcf,
+            power_up_ns: power_up.unwrap_or(defaults::POWER_UP_NS),
+            joint,
             simulated,
         })
     };
@@ -224,41 +237,61 @@ fn check_node(entry: &Entry<'_>, node: u8, bus: Option<usize>, machine: &Machine
     }
 }
 
+fn joint(section: &mut Section<'_>, q: Quantities) -> Joint {
+    let mut value = |key, quantity, bounds| {
+        section.get(key).and_then(|entry: Entry<'_>| entry.quantity(quantity, bounds))
+    };
+    Joint {
+        inertia: value("inertia", q.inertia, q.ranges.inertia),
+        viscous_friction: value("viscous_friction", q.damping, q.ranges.viscous_friction),
+        coulomb_friction: value("coulomb_friction", q.effort, q.ranges.friction),
+        rated_torque: value("rated_torque", q.effort, q.ranges.effort),
+    }
+}
+
 fn simulated(
     mut section: Section<'_>,
     q: Quantities,
     limits: Option<&Limits>,
+    rated_torque: f64,
+    drive: Option<DriveFamily>,
     name: Option<&str>,
 ) -> SimulatedJoint {
     let mut value = |key, quantity, bounds| {
         section.get(key).and_then(|entry: Entry<'_>| entry.quantity(quantity, bounds))
     };
     let ranges = q.ranges;
-    let inertia = value("inertia", q.inertia, ranges.inertia);
-    let viscous_friction = value("viscous_friction", q.damping, ranges.viscous_friction);
-    let coulomb_friction = value("coulomb_friction", q.effort, ranges.friction);
     let gravity = value("gravity", q.effort, ranges.friction);
-    let rated_torque = value("rated_torque", q.effort, ranges.effort);
     let peak_torque = value("peak_torque", q.effort, ranges.effort);
-    let power_up_ns = section.get("power_up").and_then(|entry| entry.nanoseconds(ranges::POWER_UP_S));
     let initial = section.get("initial_position").and_then(|entry| {
         let position = entry.unbounded(q.position)?;
         let name = name.unwrap_or_default();
         rules::simulation::initial_position(&entry.spot, position, q, limits, name);
         Some(position)
     });
+    let power_up = section.get("power_up").and_then(|entry| {
+        let choices =
+            [("pre-operational", PowerUpState::PreOperational), ("operational", PowerUpState::Operational)];
+        let is_duration = entry.is_quantity(Quantity::DURATION);
+        if is_duration {
+            entry.report(ProblemKind::Replaced {
+                key: entry.spot.key.clone(),
+                by: "the time in [[axis]], before its tables: power_up = \"200 ms\"",
+            });
+            return None;
+        }
+        let power_up = entry.choice(&choices)?;
+        if let Some(drive) = drive {
+            rules::simulation::power_up(&entry.spot, drive, power_up);
+        }
+        Some(power_up)
+    });
     section.finish();
-    let torque_limit = limits.map_or(1.0, |limits| limits.torque);
-    let rated_torque = rated_torque.unwrap_or(torque_limit);
     SimulatedJoint {
-        inertia: inertia.unwrap_or(defaults::INERTIA),
-        viscous_friction: viscous_friction.unwrap_or(defaults::VISCOUS_FRICTION),
-        coulomb_friction: coulomb_friction.unwrap_or(defaults::COULOMB_FRICTION),
         gravity: gravity.unwrap_or(0.0),
-        rated_torque,
         peak_torque: peak_torque.unwrap_or(defaults::PEAK_TO_RATED_TORQUE * rated_torque),
         initial_position: initial.unwrap_or_else(|| limits.map_or(0.0, defaults::initial_position)),
-        power_up_ns: power_up_ns.unwrap_or(defaults::POWER_UP_NS),
+        power_up: power_up.unwrap_or_default(),
     }
 }
 

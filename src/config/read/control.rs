@@ -3,7 +3,7 @@
 use super::section::Section;
 use crate::config::bounds::Bounds;
 use crate::config::defaults;
-use crate::config::model::{Compliance, Control, DriveFamily, SimulatedJoint};
+use crate::config::model::{Compliance, Control, DriveFamily, Joint};
 use crate::config::quantities::Quantities;
 use crate::config::quantity::Quantity;
 use crate::config::ranges;
@@ -21,13 +21,20 @@ pub struct Modes {
     pub compliance: Compliance,
 }
 
+impl Modes {
+    /// All of them.
+    pub fn all(&self) -> Vec<Control> {
+        std::iter::once(self.control).chain(self.others.clone()).collect()
+    }
+}
+
 /// The modes. The gains of loops that none of them needs are read and not used, so that the mode can be changed in one line.
 /// Without the surroundings, whose period could not be read, no loop is judged.
 pub fn modes(
     section: &mut Section<'_>,
     drive: Option<DriveFamily>,
     q: Quantities,
-    joint: &SimulatedJoint,
+    joint: &Joint,
     surroundings: Option<&Surroundings>,
 ) -> Option<Modes> {
     let period_s =
@@ -63,7 +70,7 @@ pub fn modes(
                 loops::velocity_loop(&velocity_section.spot("position_gain"), position_gain, surroundings);
             }
             Control::Torque { stiffness, damping, inertia, .. } => {
-                let gains = TorqueLoop { stiffness, damping, inertia, simulated_inertia: joint.inertia };
+                let gains = TorqueLoop { stiffness, damping, inertia, simulated_inertia: joint.inertia() };
                 let origin = origin.unwrap_or(Origin::Gains);
                 gains.check(q, surroundings, |key| torque_section.spot(key), origin);
                 if asked.has_gains() {
@@ -173,7 +180,7 @@ fn velocity_loop(section: &mut Section<'_>, period_s: f64) -> Option<Control> {
 fn torque_loop(
     section: &mut Section<'_>,
     q: Quantities,
-    joint: &SimulatedJoint,
+    joint: &Joint,
     period_s: f64,
 ) -> Option<(Control, Origin)> {
     let mut value = |key, quantity, bounds: Bounds, default: Option<f64>| match section.get(key) {
@@ -182,16 +189,16 @@ fn torque_loop(
     };
     let default_bandwidth = Some(defaults::torque_loop_bandwidth(period_s));
     let bandwidth = value("bandwidth", Quantity::GAIN, ranges::BANDWIDTH, default_bandwidth);
-    let inertia = value("inertia", q.inertia, q.ranges.fed_forward_inertia, Some(joint.inertia));
+    let inertia = value("inertia", q.inertia, q.ranges.fed_forward_inertia, Some(joint.inertia()));
     let by_bandwidth = |gain: fn(f64, f64) -> f64| Some(gain(inertia?, bandwidth?));
     let default_stiffness = by_bandwidth(|inertia, bandwidth| inertia * bandwidth * bandwidth);
     let default_damping = by_bandwidth(|inertia, bandwidth| 2.0 * inertia * bandwidth);
     let stiffness = value("stiffness", q.stiffness, q.ranges.stiffness, default_stiffness);
     let damping = value("damping", q.damping, q.ranges.damping, default_damping);
     let viscous_friction =
-        value("viscous_friction", q.damping, q.ranges.viscous_friction, Some(joint.viscous_friction));
+        value("viscous_friction", q.damping, q.ranges.viscous_friction, Some(joint.viscous_friction()));
     let coulomb_friction =
-        value("coulomb_friction", q.effort, q.ranges.friction, Some(joint.coulomb_friction));
+        value("coulomb_friction", q.effort, q.ranges.friction, Some(joint.coulomb_friction()));
     let are_given = [stiffness != default_stiffness, damping != default_damping];
     let origin = match bandwidth {
         Some(bandwidth) if are_given == [false; 2] => Origin::Bandwidth(bandwidth),

@@ -83,6 +83,11 @@ impl<'a> Entry<'a> {
         matches!(self.value, DeValue::Integer(_) | DeValue::Float(_))
     }
 
+    /// Whether this is a number with a unit of this quantity.
+    pub fn is_quantity(&self, quantity: Quantity) -> bool {
+        matches!(self.value, DeValue::String(text) if quantity.parse(text).is_ok())
+    }
+
     /// Whether this is a list.
     pub fn is_list(&self) -> bool {
         matches!(self.value, DeValue::Array(_))

@@ -11,11 +11,19 @@ use crate::config::spelling;
 use crate::config::spot::{Problems, Spot};
 use crate::printable::excerpt;
 
-/// Keys of earlier versions, and what to write in their place.
-const REPLACED: [(&str, &str); 1] = [(
-    "on_violation",
-    "follow = \"smooth\", as closely as the limits allow, or follow = \"exact\", a stop for what breaks a limit",
-)];
+/// Keys of earlier versions, with the table that they were in where the same key has another place now, and what to write
+/// instead.
+const REPLACED: [(Option<&str>, &str, &str); 5] = [
+    (
+        None,
+        "on_violation",
+        "follow = \"smooth\", as closely as the limits allow, or follow = \"exact\", a stop for what breaks a limit",
+    ),
+    (Some("simulated"), "inertia", "it in [axis.joint]: real drives obey it too"),
+    (Some("simulated"), "viscous_friction", "it in [axis.joint]: real drives obey it too"),
+    (Some("simulated"), "coulomb_friction", "it in [axis.joint]: real drives obey it too"),
+    (Some("simulated"), "rated_torque", "it in [axis.joint]: real drives obey it too"),
+];
 
 /// The most unknown keys of a table for which the key that was meant is looked for. No more problems are shown anyway.
 const SUGGESTED_AT_MOST: usize = 20;
@@ -147,8 +155,11 @@ impl<'a> Section<'a> {
             let mut unknown: Vec<_> = keys.filter(is_unknown).collect();
             unknown.sort_by_key(|key| key.span().start);
             for (index, key) in unknown.into_iter().enumerate() {
-                let replaced = REPLACED.iter().find(|(old, _)| old == key.get_ref());
-                if let Some((_, by)) = replaced {
+                let name = self.path.rsplit('.').next();
+                let replaced = REPLACED.iter().find(|(place, old, _)| {
+                    old == key.get_ref() && place.is_none_or(|place| name == Some(place))
+                });
+                if let Some((_, _, by)) = replaced {
                     let key_path = self.path_of(key.get_ref());
                     self.problems.report(ProblemKind::Replaced { key: key_path, by }, key.span());
                     continue;

@@ -5,7 +5,7 @@ use takt_rt::{MAX_AXES, OperationMode};
 use super::loops::Surroundings;
 use super::{Fields, limits, loops, master, name, simulation};
 use crate::config::model::{
-    Axis, Config, Control, DriveFamily, FeedForward, Feedback, Interface, Limits, PdoMapping, Travel,
+    Axis, Config, Control, DriveFamily, FeedForward, Feedback, Interface, Joint, Limits, PdoMapping, Travel,
 };
 use crate::config::problem_kind::ProblemKind;
 use crate::config::quantities::{Counting, Quantities};
@@ -104,7 +104,16 @@ fn validate_motion(axis: &Axis, config: &Config, fields: &Fields<'_>) {
     {
         fields.at(key).quantity(value, q.position, q.ranges.deviation);
     }
-    simulation::validate_joint(&axis.simulated, q, limits, &axis.name, &fields.within("simulated"));
+    fields.at("power_up").duration(axis.power_up_ns, ranges::POWER_UP_S);
+    validate_joint(&axis.joint, q, &fields.within("joint"));
+    simulation::validate_joint(
+        &axis.simulated,
+        q,
+        limits,
+        &axis.name,
+        axis.drive,
+        &fields.within("simulated"),
+    );
 
     let period_ns = config.bus_cycle(axis.bus).period_ns;
     mode(&fields.at("mode"), axis.drive, axis.control);
@@ -116,11 +125,64 @@ fn validate_motion(axis: &Axis, config: &Config, fields: &Fields<'_>) {
     }
     let is_simulated = config.buses.get(axis.bus).is_some_and(|bus| bus.interface == Interface::Simulated);
     let surroundings =
-        Surroundings::new(period_ns, axis.transmission_type, axis.simulated.inertia, is_simulated);
+        Surroundings::new(period_ns, axis.transmission_type, axis.joint.inertia(), is_simulated);
     for control in axis.controls() {
-        loops::validate(*control, q, axis.simulated.inertia, &surroundings, fields);
+        loops::validate(*control, q, axis.joint.inertia(), &surroundings, fields);
     }
+    let controls: Vec<Control> = axis.controls().copied().collect();
+    joint(&controls, &axis.joint, is_simulated, |key| fields.within("joint").at(key));
     validate_other_modes(axis, &fields.at("modes"));
+}
+
+fn validate_joint(joint: &Joint, q: Quantities, fields: &Fields<'_>) {
+    let ranges = q.ranges;
+    let values = [
+        ("inertia", joint.inertia, q.inertia, ranges.inertia),
+        ("viscous_friction", joint.viscous_friction, q.damping, ranges.viscous_friction),
+        ("coulomb_friction", joint.coulomb_friction, q.effort, ranges.friction),
+        ("rated_torque", joint.rated_torque, q.effort, ranges.effort),
+    ];
+    for (key, value, quantity, bounds) in values {
+        if let Some(value) = value {
+            fields.at(key).quantity(value, quantity, bounds);
+        }
+    }
+}
+
+/// The torque loop of CST feeds the joint's mechanics forward. On a real bus they are those of a real joint, and no default
+/// suits it.
+pub fn joint<'a>(
+    controls: &[Control],
+    joint: &Joint,
+    is_simulated: bool,
+    at: impl Fn(&'static str) -> Spot<'a>,
+) {
+    if is_simulated || !controls.iter().any(|control| matches!(control, Control::Torque { .. })) {
+        return;
+    }
+    let needed = [
+        (
+            "inertia",
+            joint.inertia,
+            "rotor and load at the joint, which mode \"cst\" feeds forward on a real bus",
+        ),
+        (
+            "viscous_friction",
+            joint.viscous_friction,
+            "which mode \"cst\" feeds forward on a real bus; 0 for none",
+        ),
+        (
+            "coulomb_friction",
+            joint.coulomb_friction,
+            "which mode \"cst\" feeds forward on a real bus; 0 for none",
+        ),
+    ];
+    for (key, value, says) in needed {
+        if value.is_none() {
+            let spot = at(key);
+            spot.report(ProblemKind::MissingKey { key: spot.key.clone(), says });
+        }
+    }
 }
 
 fn validate_counting(axis: &Axis, fields: &Fields<'_>) -> bool {

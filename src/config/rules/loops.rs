@@ -32,6 +32,11 @@ impl Surroundings {
         }
     }
 
+    /// Whether the joint is a simulated one.
+    pub const fn is_simulated(&self) -> bool {
+        self.simulated_inertia.is_some()
+    }
+
     fn period_s(&self) -> f64 {
         self.period_ns as f64 / 1e9
     }

@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 use super::Fields;
 use super::limits::contains;
 use crate::config::bounds::Bounds;
-use crate::config::model::{Limits, SimulatedJoint, Simulation};
+use crate::config::model::{DriveFamily, Limits, PowerUpState, SimulatedJoint, Simulation};
 use crate::config::problem_kind::ProblemKind;
 use crate::config::quantities::Quantities;
 use crate::config::ranges;
@@ -27,16 +27,24 @@ pub fn validate_joint(
     q: Quantities,
     limits: Option<&Limits>,
     axis: &str,
+    drive: DriveFamily,
     fields: &Fields<'_>,
 ) {
-    fields.at("inertia").quantity(joint.inertia, q.inertia, q.ranges.inertia);
-    fields.at("viscous_friction").quantity(joint.viscous_friction, q.damping, q.ranges.viscous_friction);
-    fields.at("coulomb_friction").quantity(joint.coulomb_friction, q.effort, q.ranges.friction);
     fields.at("gravity").quantity(joint.gravity, q.effort, q.ranges.friction);
-    fields.at("rated_torque").quantity(joint.rated_torque, q.effort, q.ranges.effort);
     fields.at("peak_torque").quantity(joint.peak_torque, q.effort, q.ranges.effort);
     initial_position(&fields.at("initial_position"), joint.initial_position, q, limits, axis);
-    fields.at("power_up").duration(joint.power_up_ns, ranges::POWER_UP_S);
+    power_up(&fields.at("power_up"), drive, joint.power_up);
+}
+
+/// Only a YZ-AIM may power up operational: the manual of the eRob says that it is pre-operational.
+pub fn power_up(spot: &Spot<'_>, drive: DriveFamily, power_up: PowerUpState) {
+    if power_up == PowerUpState::Operational && drive != DriveFamily::YzAim {
+        spot.report(ProblemKind::OutOfRange {
+            key: spot.key.clone(),
+            value: "\"operational\"".to_owned(),
+            allowed: "\"pre-operational\"; only a YZ-AIM may power up operational".to_owned(),
+        });
+    }
 }
 
 pub fn initial_position(spot: &Spot<'_>, position: f64, q: Quantities, limits: Option<&Limits>, axis: &str) {

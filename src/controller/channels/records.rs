@@ -39,9 +39,10 @@ impl RecordProducer {
             return false;
         };
         slot.timing = record.timing;
-        slot.phase = record.phase;
-        slot.group_phases = record.group_phases;
         slot.group_count = record.group_count;
+        if let Some(groups) = slot.groups.get_mut(..record.groups().len()) {
+            groups.copy_from_slice(record.groups());
+        }
         slot.is_commanded = record.is_commanded;
         slot.axis_count = record.axis_count;
         if let Some(axes) = slot.axes.get_mut(..record.axes().len()) {
@@ -80,15 +81,14 @@ impl RecordConsumer {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use takt_rt::{AxisRecord, CycleTiming, MAX_AXES, MAX_GROUPS, Phase};
+    use takt_rt::{AxisRecord, CycleTiming, GroupRecord, MAX_AXES, MAX_GROUPS, Phase};
 
     fn record(slot: u64, axis_count: u8) -> CycleRecord {
         let axis = AxisRecord { position: slot as f64, ..AxisRecord::default() };
         CycleRecord {
             timing: CycleTiming { slot, ..CycleTiming::default() },
-            phase: Phase::Moving,
-            group_phases: [Phase::Moving; MAX_GROUPS],
             group_count: 2,
+            groups: [GroupRecord { phase: Phase::Moving, ..GroupRecord::default() }; MAX_GROUPS],
             is_commanded: true,
             axis_count,
             axes: [axis; MAX_AXES],
@@ -101,8 +101,9 @@ mod tests {
         for slot in 0..10 {
             assert!(producer.push(&record(slot, 6)));
             let arrived = consumer.next(|arrived| *arrived).unwrap();
-            assert_eq!((arrived.timing.slot, arrived.phase), (slot, Phase::Moving));
-            assert_eq!(arrived.group_phases(), [Phase::Moving; 2]);
+            assert_eq!(arrived.timing.slot, slot);
+            assert_eq!(arrived.groups(), record(slot, 6).groups());
+            assert_eq!(arrived.groups().len(), 2);
             assert_eq!(arrived.axes(), record(slot, 6).axes());
             assert_eq!(arrived.axes().len(), 6);
         }

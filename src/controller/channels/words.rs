@@ -11,11 +11,11 @@ use super::motion_words::{MOTION_WORDS, put_motions, take_motions};
 
 /// The largest number of words of a snapshot of so many axes and buses.
 pub const fn snapshot_words(groups: usize, axes: usize, buses: usize) -> usize {
-    11 + MOTION_WORDS + 4 * Answers::EXPLAINED + GROUP_WORDS * groups + AXIS_WORDS * axes + 7 * buses
+    10 + MOTION_WORDS + 4 * Answers::EXPLAINED + GROUP_WORDS * groups + AXIS_WORDS * axes + 7 * buses
 }
 
-/// The largest number of words of a group of a snapshot: its phase, the time left, its stream, and a stop.
-const GROUP_WORDS: usize = 2 + 5 + 4;
+/// The largest number of words of a group of a snapshot: its phase, the time left, its steps, its stream, and a stop.
+const GROUP_WORDS: usize = 3 + 5 + 4;
 
 /// The number of words of an axis of a snapshot.
 const AXIS_WORDS: usize = 11;
@@ -24,9 +24,7 @@ const AXIS_WORDS: usize = 11;
 pub const NO_SNAPSHOT: Snapshot = Snapshot {
     slot: 0,
     at_ns: 0,
-    phase: Phase::Passive,
     missed_slots: 0,
-    steps: 0,
     timing: TimingLevel::Normal,
     dropped: 0,
     rejected: 0,
@@ -37,8 +35,6 @@ pub const NO_SNAPSHOT: Snapshot = Snapshot {
         rejections: [None; Answers::EXPLAINED],
     },
     motions: MotionReports { reports: [None; MotionReports::CAPACITY] },
-    remaining_s: 0.0,
-    stop: None,
     group_count: 1,
     groups: [GroupSnapshot {
         phase: Phase::Passive,
@@ -48,6 +44,7 @@ pub const NO_SNAPSHOT: Snapshot = Snapshot {
             state: StreamState::Idle,
             counts: StreamCounts { lag_ns: 0, points: 0, late_points: 0, lost_points: 0 },
         },
+        steps: 0,
     }; MAX_GROUPS],
     axis_count: 0,
     axes: [AxisSnapshot {
@@ -87,7 +84,6 @@ pub fn put_snapshot(snapshot: &Snapshot, words: &mut Words<'_>) {
     words.put(snapshot.at_ns);
     words.put(pack([snapshot.group_count, snapshot.axis_count, snapshot.bus_count, snapshot.timing as u8]));
     words.put(snapshot.missed_slots);
-    words.put(snapshot.steps);
     words.put(snapshot.dropped);
     words.put(snapshot.rejected);
     put_answers(&snapshot.answers, words);
@@ -108,7 +104,6 @@ pub fn take_snapshot(words: &mut Words<'_>) -> Snapshot {
         slot,
         at_ns,
         missed_slots: words.take(),
-        steps: words.take(),
         timing: TimingLevel::ALL.get(usize::from(timing)).copied().unwrap_or_default(),
         dropped: words.take(),
         rejected: words.take(),
@@ -122,8 +117,6 @@ pub fn take_snapshot(words: &mut Words<'_>) -> Snapshot {
     for group in snapshot.groups.iter_mut().take(group_count.into()) {
         *group = take_group(words);
     }
-    let [GroupSnapshot { phase, remaining_s, stop, .. }, ..] = snapshot.groups;
-    (snapshot.phase, snapshot.remaining_s, snapshot.stop) = (phase, remaining_s, stop);
     for axis in snapshot.axes.iter_mut().take(axis_count.into()) {
         *axis = take_axis(words);
     }
@@ -136,6 +129,7 @@ pub fn take_snapshot(words: &mut Words<'_>) -> Snapshot {
 fn put_group(group: &GroupSnapshot, words: &mut Words<'_>) {
     words.put(pack([group.phase as u8, u8::from(group.stop.is_some()), 0, 0]));
     words.put_f64(group.remaining_s);
+    words.put(group.steps);
     put_stream(&group.stream, words);
     if let Some(stop) = group.stop {
         put_stop(&stop, words);
@@ -147,6 +141,7 @@ fn take_group(words: &mut Words<'_>) -> GroupSnapshot {
     GroupSnapshot {
         phase: phase_of(phase),
         remaining_s: words.take_f64(),
+        steps: words.take(),
         stream: take_stream(words),
         stop: (is_stopped == 1).then(|| take_stop(words)),
     }
@@ -449,8 +444,15 @@ pub(super) mod tests {
 
     fn groups() -> impl Strategy<Value = GroupSnapshot> {
         let phases = prop::sample::select(&Phase::ALL[..]);
-        (phases, any::<f64>(), prop::option::of(stop_reasons()), streams())
-            .prop_map(|(phase, remaining_s, stop, stream)| GroupSnapshot { phase, remaining_s, stop, stream })
+        (phases, any::<f64>(), prop::option::of(stop_reasons()), streams(), any::<u64>()).prop_map(
+            |(phase, remaining_s, stop, stream, steps)| GroupSnapshot {
+                phase,
+                remaining_s,
+                stop,
+                stream,
+                steps,
+            },
+        )
     }
 
     fn streams() -> impl Strategy<Value = StreamReport> {
@@ -468,18 +470,16 @@ pub(super) mod tests {
         );
         let refusals = prop::collection::vec((any::<u64>(), rejections()), 0..=Answers::EXPLAINED);
         let answers = (any::<(u64, u64, u128, u128)>(), refusals, motions());
-        (counted, any::<(u64, u64, u64, u64, u64)>(), answers).prop_map(
+        (counted, any::<(u64, u64, u64, u64)>(), answers).prop_map(
             |(
                 (axes, buses, groups),
-                (slot, at_ns, missed_slots, steps, dropped),
+                (slot, at_ns, missed_slots, dropped),
                 ((refused, newest, taken_up, refused_bits), refusals, motions),
             )| {
                 let mut snapshot = Snapshot {
                     slot,
                     at_ns,
-                    phase: groups[0].phase,
                     missed_slots,
-                    steps,
                     dropped,
                     rejected: refused,
                     answers: Answers {
@@ -491,8 +491,6 @@ pub(super) mod tests {
                         }),
                     },
                     motions,
-                    remaining_s: groups[0].remaining_s,
-                    stop: groups[0].stop,
                     group_count: groups.len() as u8,
                     axis_count: axes.len() as u8,
                     bus_count: buses.len() as u8,

@@ -1,42 +1,10 @@
 //! The values of the object dictionary, and the non-volatile memory.
 
+use crate::sim::sdo_reply::AbortCode;
+
 use super::objects::{ErobAccess, ErobDataType, Missing, OBJECTS, find, place};
 
-/// The SDO abort codes of this drive (CiA 301, 7.2.4.3.17).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u32)]
-pub enum ErobAbortCode {
-    /// Toggle bit not alternated.
-    Toggle = 0x0503_0000,
-    /// Command specifier not valid or unknown.
-    Command = 0x0504_0001,
-    /// Attempt to read a write-only object.
-    WriteOnly = 0x0601_0001,
-    /// Attempt to write a read-only object.
-    ReadOnly = 0x0601_0002,
-    /// Object does not exist in the object dictionary.
-    NoObject = 0x0602_0000,
-    /// Object cannot be mapped to the PDO.
-    NotMappable = 0x0604_0041,
-    /// The number and length of the objects to be mapped would exceed PDO length.
-    PdoTooLong = 0x0604_0042,
-    /// Data type does not match, length of service parameter too high.
-    LengthTooHigh = 0x0607_0012,
-    /// Data type does not match, length of service parameter too low.
-    LengthTooLow = 0x0607_0013,
-    /// Sub-index does not exist.
-    NoSubindex = 0x0609_0011,
-    /// Invalid value for parameter.
-    Value = 0x0609_0030,
-    /// Data cannot be transferred or stored to the application.
-    CannotStore = 0x0800_0020,
-    /// Data cannot be transferred or stored to the application because of the present device state.
-    DeviceState = 0x0800_0022,
-    /// No data available.
-    NoData = 0x0800_0024,
-}
-
-impl From<Missing> for ErobAbortCode {
+impl From<Missing> for AbortCode {
     fn from(missing: Missing) -> Self {
         match missing {
             Missing::Index => Self::NoObject,
@@ -86,15 +54,15 @@ impl ErobDictionary {
     }
 
     /// The position of an entry for a read access.
-    pub fn for_reading(index: u16, subindex: u8) -> Result<usize, ErobAbortCode> {
+    pub fn for_reading(index: u16, subindex: u8) -> Result<usize, AbortCode> {
         let at = find(index, subindex)?;
-        if OBJECTS[at].access == ErobAccess::WriteOnly { Err(ErobAbortCode::WriteOnly) } else { Ok(at) }
+        if OBJECTS[at].access == ErobAccess::WriteOnly { Err(AbortCode::WriteOnly) } else { Ok(at) }
     }
 
     /// The position of an entry for a write access.
-    pub fn for_writing(index: u16, subindex: u8) -> Result<usize, ErobAbortCode> {
+    pub fn for_writing(index: u16, subindex: u8) -> Result<usize, AbortCode> {
         let at = find(index, subindex)?;
-        if OBJECTS[at].access == ErobAccess::ReadOnly { Err(ErobAbortCode::ReadOnly) } else { Ok(at) }
+        if OBJECTS[at].access == ErobAccess::ReadOnly { Err(AbortCode::ReadOnly) } else { Ok(at) }
     }
 
     /// The bits of an entry.

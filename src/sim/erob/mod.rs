@@ -36,7 +36,6 @@ mod objects;
 mod process_data;
 mod sdo;
 
-pub use dictionary::ErobAbortCode;
 pub use joint::ErobJoint;
 pub use objects::{ErobAccess, ErobDataType, ErobObject, OBJECTS};
 
@@ -90,9 +89,9 @@ impl ErobParameters {
         Self {
             node: axis.node,
             joint: JointParameters {
-                inertia: joint.inertia,
-                viscous_friction: joint.viscous_friction,
-                coulomb_friction: joint.coulomb_friction,
+                inertia: axis.joint.inertia(),
+                viscous_friction: axis.joint.viscous_friction(),
+                coulomb_friction: axis.joint.coulomb_friction(),
                 brake_torque: 2.0 * joint.peak_torque,
             },
             encoder: Encoder {
@@ -101,10 +100,10 @@ impl ErobParameters {
             },
             counts_per_turn: axis.counts_per_turn,
             initial_position: joint.initial_position,
-            rated_torque: joint.rated_torque,
+            rated_torque: axis.rated_torque(),
             peak_torque: joint.peak_torque,
             highest_velocity: 1.5 * axis.limits.velocity,
-            power_up_ns: joint.power_up_ns,
+            power_up_ns: axis.power_up_ns,
             feedback_delay_ns: axis.feedback_delay_ns,
             has_battery: true,
             has_interpolated_position: axis.control == Control::Interpolated,

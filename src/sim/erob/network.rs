@@ -1,4 +1,4 @@
-//! NMT state, boot-up, heartbeat producer and consumer, node guarding (CiA 301, 7.2.8, 7.3.2).
+//! NMT state, boot-up, heartbeat producer and consumer, SYNC producer, node guarding (CiA 301, 7.2.8, 7.3.2).
 
 use takt_rt::Nanoseconds;
 
@@ -9,6 +9,9 @@ use crate::sim::drive::NodeState;
 const RESET_COMMUNICATION_NS: Nanoseconds = 500_000;
 const NEVER: Nanoseconds = Nanoseconds::MAX;
 const MILLISECOND_NS: Nanoseconds = 1_000_000;
+const MICROSECOND_NS: Nanoseconds = 1000;
+/// Object 1005, bit 30: the node produces SYNC.
+const SYNC_PRODUCER: u32 = 1 << 30;
 
 /// What the drive resets after an NMT command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,6 +29,8 @@ pub struct ErobNetwork {
     state: NodeState,
     boot_ns: Nanoseconds,
     heartbeat_ns: Nanoseconds,
+    /// When the next SYNC is due; [`NEVER`] while the node does not produce it.
+    sync_ns: Nanoseconds,
     /// Deadline of the master's next heartbeat; [`NEVER`] until the first one.
     master_deadline_ns: Nanoseconds,
     /// Deadline of the next node guarding request.
@@ -41,6 +46,7 @@ impl ErobNetwork {
             state: NodeState::Initialising,
             boot_ns,
             heartbeat_ns: NEVER,
+            sync_ns: NEVER,
             master_deadline_ns: NEVER,
             guard_deadline_ns: NEVER,
             guard_toggle: false,
@@ -59,7 +65,8 @@ impl ErobNetwork {
 
     /// The time of the next action.
     pub fn due_ns(&self) -> Nanoseconds {
-        self.boot_ns.min(self.heartbeat_ns).min(self.master_deadline_ns).min(self.guard_deadline_ns)
+        let timers = self.boot_ns.min(self.heartbeat_ns).min(self.sync_ns);
+        timers.min(self.master_deadline_ns).min(self.guard_deadline_ns)
     }
 
     /// Boots when it is time. Returns whether the boot-up message is to be sent.
@@ -71,6 +78,7 @@ impl ErobNetwork {
         self.state = NodeState::PreOperational;
         self.guard_toggle = false;
         self.schedule_heartbeat(now_ns, dictionary);
+        self.schedule_sync(now_ns, dictionary);
         true
     }
 
@@ -81,6 +89,25 @@ impl ErobNetwork {
         }
         self.schedule_heartbeat(now_ns, dictionary);
         Some(self.state.code())
+    }
+
+    /// Whether SYNC is due, as the producer of it sends it (object 1005 bit 30, object 1006). A stopped node sends none.
+    pub fn produces_sync(&mut self, now_ns: Nanoseconds, dictionary: &ErobDictionary) -> bool {
+        if now_ns < self.sync_ns {
+            return false;
+        }
+        // The period counts from the time at which SYNC was due, so that it does not drift.
+        let due_ns = self.sync_ns;
+        self.schedule_sync(due_ns, dictionary);
+        self.sync_ns = self.sync_ns.max(now_ns + 1);
+        self.has_services()
+    }
+
+    /// Restarts the SYNC period, as after a write of object 1005 or 1006.
+    pub fn schedule_sync(&mut self, now_ns: Nanoseconds, dictionary: &ErobDictionary) {
+        let period_us = Nanoseconds::from(dictionary.get(at::CYCLE_PERIOD));
+        let is_producer = dictionary.get(at::SYNC_ID) & SYNC_PRODUCER != 0 && period_us > 0;
+        self.sync_ns = if is_producer { now_ns + period_us * MICROSECOND_NS } else { NEVER };
     }
 
     /// Restarts the heartbeat period, as after a write of object 1017.

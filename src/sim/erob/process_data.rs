@@ -2,8 +2,9 @@
 
 use takt_rt::{Frame, Id, MappedObject, Nanoseconds};
 
-use super::dictionary::{ErobAbortCode, ErobDictionary, at};
+use super::dictionary::{ErobDictionary, at};
 use super::objects::{ErobAccess, OBJECTS, find, place};
+use crate::sim::sdo_reply::AbortCode;
 
 /// PDOs in each direction.
 pub const PDOS: usize = 4;
@@ -303,7 +304,7 @@ fn is_measured(at: usize) -> bool {
 ///
 /// The identifier may only change while the PDO is invalid. The mapping may only change while the PDO is invalid, its
 /// entries only while their count is 0.
-pub fn check_parameter(dictionary: &ErobDictionary, at: usize, value: u32) -> Result<(), ErobAbortCode> {
+pub fn check_parameter(dictionary: &ErobDictionary, at: usize, value: u32) -> Result<(), AbortCode> {
     let object = OBJECTS[at];
     let number = usize::from(object.index & 0x1FF).min(PDOS - 1);
     let is_outbound = object.index >= 0x1800;
@@ -315,23 +316,23 @@ pub fn check_parameter(dictionary: &ErobDictionary, at: usize, value: u32) -> Re
     let is_mapping = matches!(object.index & 0xFE00, 0x1600 | 0x1A00);
     match (is_mapping, object.subindex) {
         (false, 1) => check_id(dictionary.get(communication + 1), value),
-        (false, 2) if (241..254).contains(&value) => Err(ErobAbortCode::Value),
+        (false, 2) if (241..254).contains(&value) => Err(AbortCode::Value),
         (false, _) => Ok(()),
-        (true, _) if dictionary.get(communication + 1) & INVALID == 0 => Err(ErobAbortCode::DeviceState),
+        (true, _) if dictionary.get(communication + 1) & INVALID == 0 => Err(AbortCode::DeviceState),
         (true, 0) => check_count(dictionary, mapping, value),
-        (true, _) if dictionary.get(mapping) != 0 => Err(ErobAbortCode::DeviceState),
+        (true, _) if dictionary.get(mapping) != 0 => Err(AbortCode::DeviceState),
         (true, _) if value == 0 => Ok(()),
         (true, _) => check_mapped(value, is_outbound).map(|_| ()),
     }
 }
 
-fn check_id(present: u32, value: u32) -> Result<(), ErobAbortCode> {
+fn check_id(present: u32, value: u32) -> Result<(), AbortCode> {
     let stays_valid = (present | value) & INVALID == 0;
     if stays_valid && (present ^ value) & ID != 0 {
-        return Err(ErobAbortCode::DeviceState);
+        return Err(AbortCode::DeviceState);
     }
     if value & EXTENDED != 0 || value & INVALID == 0 && is_restricted(value & ID) {
-        return Err(ErobAbortCode::Value);
+        return Err(AbortCode::Value);
     }
     Ok(())
 }
@@ -341,25 +342,25 @@ fn is_restricted(id: u32) -> bool {
     matches!(id, 0x000..=0x080 | 0x101..=0x180 | 0x581..=0x5FF | 0x601..=0x67F | 0x6E0..=0x6FF | 0x701..=0x7FF)
 }
 
-fn check_count(dictionary: &ErobDictionary, mapping: usize, count: u32) -> Result<(), ErobAbortCode> {
+fn check_count(dictionary: &ErobDictionary, mapping: usize, count: u32) -> Result<(), AbortCode> {
     if count as usize > MAX_OBJECTS {
-        return Err(ErobAbortCode::PdoTooLong);
+        return Err(AbortCode::PdoTooLong);
     }
     let is_outbound = OBJECTS[mapping].index >= 0x1A00;
     let mut bits = 0;
     for entry in (mapping + 1..).take(count as usize) {
         bits += check_mapped(dictionary.get(entry), is_outbound)?;
     }
-    if bits > MAX_BITS { Err(ErobAbortCode::PdoTooLong) } else { Ok(()) }
+    if bits > MAX_BITS { Err(AbortCode::PdoTooLong) } else { Ok(()) }
 }
 
 /// Checks one mapping entry and returns its length in bits. An empty entry is not mappable.
-fn check_mapped(value: u32, is_outbound: bool) -> Result<u32, ErobAbortCode> {
+fn check_mapped(value: u32, is_outbound: bool) -> Result<u32, AbortCode> {
     let mapped = MappedObject::from_parameter(value);
     let object = OBJECTS[find(mapped.index, mapped.subindex)?];
     let is_allowed = object.is_mappable && (is_outbound || object.access != ErobAccess::ReadOnly);
     if !is_allowed || usize::from(mapped.bits) != 8 * object.data_type.bytes() {
-        return Err(ErobAbortCode::NotMappable);
+        return Err(AbortCode::NotMappable);
     }
     Ok(mapped.bits.into())
 }

@@ -5,8 +5,8 @@
 
 use takt_rt::Nanoseconds;
 
-use super::dictionary::ErobAbortCode;
 use crate::sim::random::Random;
+use crate::sim::sdo_reply::{AbortCode, ReplyBuffer, aborted, addressed, downloaded, uploaded};
 
 /// Range of the response time, as measured on real units.
 const LATENCY_NS: std::ops::Range<Nanoseconds> = 300_000..1_000_000;
@@ -14,13 +14,13 @@ const LATENCY_NS: std::ops::Range<Nanoseconds> = 300_000..1_000_000;
 /// Access to the objects behind the server.
 pub trait ErobObjectAccess {
     /// The value of an entry as little-endian bytes, and their number.
-    fn read(&mut self, index: u16, subindex: u8) -> Result<([u8; 4], usize), ErobAbortCode>;
+    fn read(&mut self, index: u16, subindex: u8) -> Result<([u8; 4], usize), AbortCode>;
 
     /// Checks that an entry can be written, before the value is complete. Returns its size in bytes.
-    fn check_write(&self, index: u16, subindex: u8) -> Result<usize, ErobAbortCode>;
+    fn check_write(&self, index: u16, subindex: u8) -> Result<usize, AbortCode>;
 
     /// Writes an entry with its complete value.
-    fn write(&mut self, index: u16, subindex: u8, value: [u8; 4]) -> Result<(), ErobAbortCode>;
+    fn write(&mut self, index: u16, subindex: u8, value: [u8; 4]) -> Result<(), AbortCode>;
 }
 
 /// A segmented transfer.
@@ -43,49 +43,39 @@ enum Transfer {
     },
 }
 
-/// A response and its due time.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Answer {
-    due_ns: Nanoseconds,
-    bytes: [u8; 8],
-}
-
 /// The server of one node.
 #[derive(Clone, Debug)]
 pub struct ErobSdoServer {
     transfer: Option<Transfer>,
-    answer: Option<Answer>,
-    latency: Random,
+    reply: ReplyBuffer,
     is_upload_segmented: bool,
 }
 
 impl ErobSdoServer {
     /// An idle server. With `is_upload_segmented` it answers every upload in segments, which CiA 301 permits.
     pub fn new(latency: Random, is_upload_segmented: bool) -> Self {
-        Self { transfer: None, answer: None, latency, is_upload_segmented }
+        Self { transfer: None, reply: ReplyBuffer::new(latency, LATENCY_NS), is_upload_segmented }
     }
 
     /// Discards the transfer and the response.
     pub fn reset(&mut self) {
         self.transfer = None;
-        self.answer = None;
+        self.reply.reset();
     }
 
     /// When the pending response is due.
     pub fn due_ns(&self) -> Option<Nanoseconds> {
-        self.answer.map(|answer| answer.due_ns)
+        self.reply.due_ns()
     }
 
     /// The response, when it is due.
     pub fn answer(&mut self, now_ns: Nanoseconds) -> Option<[u8; 8]> {
-        let answer = self.answer.filter(|answer| answer.due_ns <= now_ns)?;
-        self.answer = None;
-        Some(answer.bytes)
+        self.reply.take(now_ns)
     }
 
     /// Takes a request. A request before the last response was sent is lost, because the drive has one buffer.
     pub fn request(&mut self, now_ns: Nanoseconds, request: [u8; 8], access: &mut impl ErobObjectAccess) {
-        if self.answer.is_some() {
+        if self.reply.is_busy() {
             return;
         }
         let index = u16::from_le_bytes([request[1], request[2]]);
@@ -99,13 +89,13 @@ impl ErobSdoServer {
                 self.transfer = None;
                 return;
             }
-            _ => Err(ErobAbortCode::Command),
+            _ => Err(AbortCode::Command),
         };
         let bytes = reply.unwrap_or_else(|code| {
             let (index, subindex) = self.transfer.take().map_or((index, subindex), Transfer::multiplexer);
             aborted(index, subindex, code)
         });
-        self.answer = Some(Answer { due_ns: now_ns + self.latency.within(LATENCY_NS), bytes });
+        self.reply.put(now_ns, Some(bytes));
     }
 
     fn download(
@@ -114,7 +104,7 @@ impl ErobSdoServer {
         index: u16,
         subindex: u8,
         access: &mut impl ErobObjectAccess,
-    ) -> Result<[u8; 8], ErobAbortCode> {
+    ) -> Result<[u8; 8], AbortCode> {
         self.transfer = None;
         let size = access.check_write(index, subindex)?;
         let is_expedited = request[0] & 0b10 != 0;
@@ -126,8 +116,8 @@ impl ErobSdoServer {
             (_, false) => None,
         };
         match announced {
-            Some(announced) if announced > size => return Err(ErobAbortCode::LengthTooHigh),
-            Some(announced) if announced < size => return Err(ErobAbortCode::LengthTooLow),
+            Some(announced) if announced > size => return Err(AbortCode::LengthTooHigh),
+            Some(announced) if announced < size => return Err(AbortCode::LengthTooLow),
             _ => {}
         }
         if is_expedited {
@@ -137,25 +127,25 @@ impl ErobSdoServer {
                 Transfer::Download { index, subindex, size, received: 0, value: [0; 4], toggle: false };
             self.transfer = Some(transfer);
         }
-        Ok(addressed(0x60, index, subindex, [0; 4]))
+        Ok(downloaded(index, subindex))
     }
 
     fn download_segment(
         &mut self,
         request: [u8; 8],
         access: &mut impl ErobObjectAccess,
-    ) -> Result<[u8; 8], ErobAbortCode> {
+    ) -> Result<[u8; 8], AbortCode> {
         let Some(Transfer::Download { index, subindex, size, received, mut value, toggle }) = self.transfer
         else {
-            return Err(ErobAbortCode::Command);
+            return Err(AbortCode::Command);
         };
         if (request[0] & 0x10 != 0) != toggle {
-            return Err(ErobAbortCode::Toggle);
+            return Err(AbortCode::Toggle);
         }
         let length = 7 - usize::from(request[0] >> 1 & 0b111);
         let ended = received + length;
         if ended > size {
-            return Err(ErobAbortCode::LengthTooHigh);
+            return Err(AbortCode::LengthTooHigh);
         }
         for (to, from) in value.iter_mut().skip(received).zip(request.iter().skip(1).take(length)) {
             *to = *from;
@@ -163,7 +153,7 @@ impl ErobSdoServer {
         let is_last = request[0] & 1 != 0;
         if is_last {
             if ended < size {
-                return Err(ErobAbortCode::LengthTooLow);
+                return Err(AbortCode::LengthTooLow);
             }
             access.write(index, subindex, value)?;
             self.transfer = None;
@@ -180,23 +170,22 @@ impl ErobSdoServer {
         index: u16,
         subindex: u8,
         access: &mut impl ErobObjectAccess,
-    ) -> Result<[u8; 8], ErobAbortCode> {
+    ) -> Result<[u8; 8], AbortCode> {
         self.transfer = None;
         let (value, size) = access.read(index, subindex)?;
         if self.is_upload_segmented {
             self.transfer = Some(Transfer::Upload { index, subindex, size, value });
             return Ok(addressed(0x41, index, subindex, (size as u32).to_le_bytes()));
         }
-        let unused = 4 - size.min(4) as u8;
-        Ok(addressed(0x43 | unused << 2, index, subindex, value))
+        Ok(uploaded(index, subindex, value, size))
     }
 
-    fn upload_segment(&mut self, request: [u8; 8]) -> Result<[u8; 8], ErobAbortCode> {
+    fn upload_segment(&mut self, request: [u8; 8]) -> Result<[u8; 8], AbortCode> {
         let Some(Transfer::Upload { size, value, .. }) = self.transfer else {
-            return Err(ErobAbortCode::Command);
+            return Err(AbortCode::Command);
         };
         if request[0] & 0x10 != 0 {
-            return Err(ErobAbortCode::Toggle);
+            return Err(AbortCode::Toggle);
         }
         let mut answer = [0; 8];
         answer[0] = (7 - size.min(7) as u8) << 1 | 1;
@@ -216,14 +205,4 @@ impl Transfer {
             }
         }
     }
-}
-
-fn addressed(command: u8, index: u16, subindex: u8, data: [u8; 4]) -> [u8; 8] {
-    let [low, high] = index.to_le_bytes();
-    let [a, b, c, d] = data;
-    [command, low, high, subindex, a, b, c, d]
-}
-
-fn aborted(index: u16, subindex: u8, code: ErobAbortCode) -> [u8; 8] {
-    addressed(0x80, index, subindex, (code as u32).to_le_bytes())
 }

@@ -20,12 +20,13 @@ use super::network::YzAimNetwork;
 use super::objects::at;
 use super::parameters::{COUNTS_PER_SECOND_PER_RPM, COUNTS_PER_TURN, YzAimParameters};
 use super::process_data::{YzAimProcessData, report_state_first};
-use super::sdo::YzAimSdoServer;
+use super::sdo::LATENCY_NS;
 use crate::sim::defect::{Defect, Unsupported};
 use crate::sim::drive::{Drive, DriveFault, NodeState, Observation};
 use crate::sim::mailbox::Mailbox;
 use crate::sim::plant::{Gravity, Joint};
 use crate::sim::random::Random;
+use crate::sim::sdo_reply::ReplyBuffer;
 use crate::sim::servo::Servo;
 use load_monitor::LoadMonitor;
 
@@ -51,7 +52,7 @@ pub struct YzAimJoint {
     parameters: YzAimParameters,
     dictionary: YzAimDictionary,
     network: YzAimNetwork,
-    sdo: YzAimSdoServer,
+    sdo: ReplyBuffer,
     process_data: YzAimProcessData,
     device: YzAimDevice,
     alarms: Alarms,
@@ -108,7 +109,7 @@ impl YzAimJoint {
             parameters,
             dictionary,
             network: YzAimNetwork::starting(NEVER, NodeState::PreOperational, false),
-            sdo: YzAimSdoServer::new(random),
+            sdo: ReplyBuffer::new(random, LATENCY_NS),
             process_data: YzAimProcessData::at_rest(),
             device: YzAimDevice::cold(),
             alarms: Alarms::default(),

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use takt_rt::Nanoseconds;
 
-use crate::config::{Axis, Control, Simulation, Travel};
+use crate::config::{Axis, Control, PowerUpState, Simulation, Travel};
 use crate::sim::homing_switches::{HomingSwitches, Switch};
 use crate::sim::plant::{Encoder, EndStops, JointParameters};
 
@@ -254,9 +254,9 @@ impl YzAimParameters {
         };
         let own = &axis.simulated;
         let joint = JointParameters {
-            inertia: own.inertia,
-            viscous_friction: own.viscous_friction,
-            coulomb_friction: own.coulomb_friction,
+            inertia: axis.joint.inertia(),
+            viscous_friction: axis.joint.viscous_friction(),
+            coulomb_friction: axis.joint.coulomb_friction(),
             brake_torque: 0.0,
         };
         let limits = &axis.limits;
@@ -272,11 +272,12 @@ impl YzAimParameters {
                 pu: Some(Switch::above(limits.position_max + margin)),
             },
             initial_position: own.initial_position,
-            rated_torque: own.rated_torque,
+            rated_torque: axis.rated_torque(),
             peak_torque: own.peak_torque,
             maximum_speed_rpm: 3000.0,
             special_function: if axis.control == Control::Interpolated { 7 } else { 0 },
-            power_up_ns: own.power_up_ns,
+            power_up_ns: axis.power_up_ns,
+            starts_operational: own.power_up == PowerUpState::Operational,
             feedback_delay_ns: axis.feedback_delay_ns,
             seed: simulation.seed,
             ..Self::new(axis.node, Model::Aim57x30C, gearing, joint)

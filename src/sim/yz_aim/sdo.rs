@@ -1,27 +1,12 @@
-//! The SDO server: expedited transfers, one at a time (manual 5.05).
+//! The requests to the SDO server: expedited transfers, one at a time (manual 5.05). The manual names no abort codes; the
+//! drive uses those of CiA 301.
 
 use takt_rt::Nanoseconds;
 
-use crate::sim::random::Random;
+use crate::sim::sdo_reply::{AbortCode, aborted, downloaded, uploaded};
 
 /// Range of the response time, as measured on real units: about 0.3 ms.
-const LATENCY_NS: std::ops::Range<Nanoseconds> = 270_000..330_000;
-
-/// The abort codes. The manual names none; these are those of CiA 301, 7.2.4.3.17.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u32)]
-pub enum YzAimAbortCode {
-    /// Command specifier not valid or unknown.
-    Command = 0x0504_0001,
-    /// Attempt to write a read-only object.
-    ReadOnly = 0x0601_0002,
-    /// Object does not exist in the object dictionary.
-    NoObject = 0x0602_0000,
-    /// Data type does not match, length of service parameter does not match.
-    Length = 0x0607_0010,
-    /// Invalid value for parameter.
-    Value = 0x0609_0030,
-}
+pub const LATENCY_NS: std::ops::Range<Nanoseconds> = 270_000..330_000;
 
 /// A decoded request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -75,62 +60,16 @@ impl Addressed {
 
     /// The response to a read request.
     pub fn value(&self, value: [u8; 4], size: usize) -> [u8; 8] {
-        self.answer(0x43 | (4 - size.min(4) as u8) << 2, value)
+        uploaded(self.index, self.subindex, value, size)
     }
 
     /// The response to a write request.
     pub fn written(&self) -> [u8; 8] {
-        self.answer(0x60, [0; 4])
+        downloaded(self.index, self.subindex)
     }
 
     /// The abort response.
-    pub fn refused(&self, code: YzAimAbortCode) -> [u8; 8] {
-        self.answer(0x80, (code as u32).to_le_bytes())
-    }
-
-    fn answer(&self, command: u8, [a, b, c, d]: [u8; 4]) -> [u8; 8] {
-        let [low, high] = self.index.to_le_bytes();
-        [command, low, high, self.subindex, a, b, c, d]
-    }
-}
-
-/// The server, with one buffer for the response. Requests are lost while it is full.
-#[derive(Clone, Copy, Debug)]
-pub struct YzAimSdoServer {
-    pending: Option<(Nanoseconds, Option<[u8; 8]>)>,
-    latency: Random,
-}
-
-impl YzAimSdoServer {
-    /// An idle server.
-    pub fn new(latency: Random) -> Self {
-        Self { pending: None, latency }
-    }
-
-    /// Discards the response.
-    pub fn reset(&mut self) {
-        self.pending = None;
-    }
-
-    /// Whether a request is being processed; a further one is lost.
-    pub fn is_busy(&self) -> bool {
-        self.pending.is_some()
-    }
-
-    /// Queues the response; a request without a response takes the same time.
-    pub fn answer(&mut self, now_ns: Nanoseconds, answer: Option<[u8; 8]>) {
-        self.pending = Some((now_ns + self.latency.within(LATENCY_NS), answer));
-    }
-
-    /// When the current request is finished.
-    pub fn due_ns(&self) -> Option<Nanoseconds> {
-        self.pending.map(|(due_ns, _)| due_ns)
-    }
-
-    /// The response, when it is due.
-    pub fn take(&mut self, now_ns: Nanoseconds) -> Option<[u8; 8]> {
-        let (_, answer) = self.pending.filter(|(due_ns, _)| *due_ns <= now_ns)?;
-        self.pending = None;
-        answer
+    pub fn refused(&self, code: AbortCode) -> [u8; 8] {
+        aborted(self.index, self.subindex, code)
     }
 }

@@ -1,9 +1,9 @@
 //! Decodes the messages of a recording.
 
 use takt_rt::{
-    AxisRecord, BusHealth, BusState, CycleRecord, CycleTiming, DriveState, EventKind, OperationMode, Origin,
-    Phase, RejectReason, RequestError, RequestId, RequestKind, Rule, StopCategory, StopCause, StopReason,
-    StreamState, TimingLevel,
+    AxisRecord, BusHealth, BusState, CycleRecord, CycleTiming, DriveState, EventKind, GroupRecord,
+    OperationMode, Origin, Phase, RecordedStop, RejectReason, RequestError, RequestId, RequestKind, Rule,
+    StopCategory, StopCause, StopReason, StreamState, TimingLevel,
 };
 
 use super::EventFields;
@@ -24,7 +24,23 @@ pub fn decode_cycle(message: &[u8]) -> Option<CycleRecord> {
         missed_slots: fields.u64()?,
     };
     let (phase, is_commanded) = (phase(fields.u8()?)?, fields.u8()? != 0);
-    Some(CycleRecord { timing, phase, is_commanded, ..CycleRecord::default() })
+    let mut record = CycleRecord { timing, is_commanded, ..CycleRecord::default() };
+    // Recordings of earlier versions have no messages of the groups.
+    record.groups[0].phase = phase;
+    Some(record)
+}
+
+/// Decodes a [`GROUP`](super::GROUP), with its slot.
+pub fn decode_group(message: &[u8]) -> Option<(u64, GroupRecord)> {
+    let mut fields = CdrDecoder::begin(message)?;
+    let (slot, phase) = (fields.u64()?, phase(fields.u8()?)?);
+    let (is_stopped, category, rule) = (fields.u8()? != 0, fields.u8()?, fields.u8()?);
+    let stop = match is_stopped {
+        true => Some(RecordedStop { category: stop_category(category)?, rule: stop_rule(rule)? }),
+        false => None,
+    };
+    let (is_called, callback_ns) = (fields.u8()? != 0, fields.u64()?);
+    Some((slot, GroupRecord { phase, stop, callback_ns: is_called.then_some(callback_ns) }))
 }
 
 /// Decodes an [`AXIS`](super::AXIS), with its slot.
@@ -109,6 +125,14 @@ fn drive_state(number: u8) -> Option<DriveState> {
     DriveState::ALL.get(usize::from(number)).copied()
 }
 
+fn stop_category(number: u8) -> Option<StopCategory> {
+    CATEGORIES.get(usize::from(number)).copied()
+}
+
+fn stop_rule(number: u8) -> Option<Rule> {
+    Rule::ALL.get(usize::from(number)).copied()
+}
+
 fn phase(number: u8) -> Option<Phase> {
     Phase::ALL.get(usize::from(number)).copied()
 }
@@ -127,12 +151,8 @@ impl EventFields {
         Some(match self.kind {
             0 => EventKind::PhaseChanged { from: phase(self.phase_from)?, to: phase(self.phase_to)? },
             1 => EventKind::Stop(StopReason {
-                category: *CATEGORIES.get(usize::from(self.category))?,
-                cause: StopCause::from_numbers(
-                    *Rule::ALL.get(usize::from(self.rule))?,
-                    self.value,
-                    self.limit,
-                )?,
+                category: stop_category(self.category)?,
+                cause: StopCause::from_numbers(stop_rule(self.rule)?, self.value, self.limit)?,
                 origin: self.origin(),
                 slot,
                 phase: phase(self.phase_from)?,
@@ -168,7 +188,7 @@ impl EventFields {
 mod tests {
     use super::*;
     use crate::telemetry::cdr::CdrEncoder;
-    use crate::telemetry::messages::encode_event;
+    use crate::telemetry::messages::{encode_event, encode_group};
     use takt_rt::{Event, Fault};
 
     const STOP: StopReason = StopReason {
@@ -203,6 +223,17 @@ mod tests {
                     RecordedEvent { slot: 77, at_ns: 88, group: None, text: "in words".to_owned(), kind };
                 assert_eq!(earlier, Some(expected), "{missing} bytes less");
             }
+        }
+    }
+
+    #[test]
+    fn a_group_is_read_as_it_was_written() {
+        let mut encoder = CdrEncoder::default();
+        let stop = Some(RecordedStop { category: StopCategory::One, rule: Rule::CallbackOverrun });
+        for (stop, callback_ns) in [(None, None), (stop, None), (stop, Some(0)), (None, Some(70_000))] {
+            let group = GroupRecord { phase: Phase::Streaming, stop, callback_ns };
+            encode_group(77, &group, &mut encoder);
+            assert_eq!(decode_group(encoder.bytes()), Some((77, group)));
         }
     }
 

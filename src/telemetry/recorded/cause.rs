@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 use serde::Serialize;
 use takt_rt::{EventKind, Rule, StopReason};
 
-use super::Recorded;
+use super::{Recorded, RecordedEvent};
 use crate::telemetry::words;
 
 /// Why the group stopped.
@@ -17,6 +17,9 @@ pub struct Cause {
     pub rule: String,
     /// IEC 60204-1: 0, 1 or 2; `None` if the group did not move.
     pub category: Option<u8>,
+    /// The group that stopped; absent where all axes are one group.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub group: Option<String>,
     /// The axis concerned.
     pub axis: Option<String>,
     /// The bus concerned.
@@ -42,6 +45,7 @@ impl Recorded {
                 reason: text("reason").unwrap_or_default(),
                 rule: text("rule").unwrap_or_default(),
                 category: number("category").map(|category| category as u8),
+                group: text("group"),
                 axis: text("axis"),
                 bus: text("bus"),
                 value: number("value"),
@@ -50,18 +54,30 @@ impl Recorded {
                 phase: text("phase"),
             });
         }
+        self.first_stop(|_| true)
+    }
+
+    /// Why a group stopped: its first stop for a fault, or else its first one on request.
+    pub fn cause_of_group(&self, group: usize) -> Option<Cause> {
+        self.first_stop(|event| event.group.map(usize::from) == Some(group))
+    }
+
+    /// The first stop for a fault of these events, or else the first one on request.
+    fn first_stop(&self, is_meant: impl Fn(&RecordedEvent) -> bool) -> Option<Cause> {
         let stops = || {
-            self.events.iter().filter_map(|event| match event.kind {
-                Some(EventKind::Stop(stop)) => Some((event.slot, stop)),
+            self.events.iter().filter(|event| is_meant(event)).filter_map(|event| match event.kind {
+                Some(EventKind::Stop(stop)) => Some((event, stop)),
                 _ => None,
             })
         };
         let unrequested = stops().find(|(_, stop)| stop.rule() != Rule::Requested);
-        unrequested.or_else(|| stops().next()).map(|(slot, stop)| self.cause_of(slot, &stop))
+        unrequested.or_else(|| stops().next()).map(|(event, stop)| self.cause_of(event, &stop))
     }
 
-    fn cause_of(&self, slot: u64, stop: &StopReason) -> Cause {
+    fn cause_of(&self, event: &RecordedEvent, stop: &StopReason) -> Cause {
+        let group = event.group.filter(|_| self.machine.groups.len() > 1);
         Cause {
+            group: group.map(|group| self.machine.group_name(group)),
             reason: words::stop(stop, &self.machine),
             rule: words::rule_key(stop.rule()).to_owned(),
             category: Some(stop.category as u8),
@@ -69,7 +85,7 @@ impl Recorded {
             bus: stop.origin.bus().map(|bus| self.machine.bus_name(bus)),
             value: Some(stop.cause.numbers().0),
             limit: Some(stop.cause.numbers().1),
-            slot,
+            slot: event.slot,
             phase: Some(words::phase(stop.phase).to_owned()),
         }
     }

@@ -10,7 +10,9 @@ use std::io::{self, BufReader};
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
-use takt_rt::{AxisRecord, CycleRecord, CycleTiming, EventKind, MAX_BUSES, MAX_GROUPS, Nanoseconds, Phase};
+use takt_rt::{
+    AxisRecord, CycleRecord, CycleTiming, EventKind, GroupRecord, MAX_BUSES, MAX_GROUPS, Nanoseconds, Phase,
+};
 
 use super::black_box;
 use super::history::OnBus;
@@ -20,6 +22,7 @@ use super::recording;
 use super::statistics::Statistics;
 use super::wall_clock::WallClock;
 use crate::bus::trace::TracedHealth;
+use crate::config::DriveFamily;
 use crate::printable::printable;
 use records::Record;
 
@@ -80,8 +83,8 @@ pub struct RecordedEvent {
 pub struct RecordedCycle {
     /// When.
     pub timing: CycleTiming,
-    /// The phase of the group.
-    pub phase: Phase,
+    /// The groups in the order of the configuration.
+    pub groups: Vec<GroupRecord>,
     /// Whether set-points were sent in this cycle.
     pub is_commanded: bool,
     /// The axes in the order of the configuration.
@@ -90,9 +93,9 @@ pub struct RecordedCycle {
 
 impl RecordedCycle {
     fn of(record: &CycleRecord) -> Self {
-        let CycleRecord { timing, phase, is_commanded, .. } = *record;
+        let CycleRecord { timing, is_commanded, .. } = *record;
         // No room for axes that are not there: a recording has millions of cycles.
-        Self { timing, phase, is_commanded, axes: record.axes().to_vec() }
+        Self { timing, groups: record.groups().to_vec(), is_commanded, axes: record.axes().to_vec() }
     }
 }
 
@@ -111,6 +114,8 @@ pub struct Recorded {
     pub events: Vec<RecordedEvent>,
     /// Every change of the health of a bus, with the number of the bus.
     pub health: Vec<(usize, TracedHealth)>,
+    /// What each group was doing in the last cycle.
+    pub last_phases: Vec<Phase>,
     /// Timing and following errors of the whole recording.
     pub statistics: Statistics,
     /// The lowest and the highest slot. In a damaged file, slots may be out of order.
@@ -140,6 +145,7 @@ impl Recorded {
             incidents: Vec::new(),
             events: Vec::new(),
             health: Vec::new(),
+            last_phases: Vec::new(),
             statistics: Statistics::default(),
             slots: None,
             wall_clock: None,
@@ -164,7 +170,7 @@ impl Recorded {
         let mut cycles = Vec::new();
         let mut copy = Self { warnings: Vec::new(), ..self.clone() };
         copy.read(|_, item| {
-            if let Item::Cycle(record, _) = item
+            if let Item::Cycle { record, .. } = item
                 && slots.contains(&record.timing.slot)
             {
                 cycles.push(RecordedCycle::of(record));
@@ -190,12 +196,14 @@ impl Recorded {
                 self.incidents
                     .push(incident.into_iter().map(|(key, text)| (key, printable(&text))).collect());
             }
-            Item::Cycle(record, log_time_ns) => {
+            Item::Cycle { record, log_time_ns, axes } => {
                 let (slot, start_ns) = (record.timing.slot, record.timing.slot_start_ns);
                 if self.statistics.cycles == 0 {
-                    self.statistics = Statistics::new(record.axis_count.into());
+                    self.statistics = Statistics::new(axes.values().map(|axis| axis.group).collect());
                 }
                 self.statistics.add(record);
+                self.last_phases.clear();
+                self.last_phases.extend(record.groups().iter().map(|group| group.phase));
                 self.wall_clock =
                     self.wall_clock.or_else(|| Some(WallClock::fixed(log_time_ns.saturating_sub(start_ns))));
                 let (first, last) = self.slots.unwrap_or((slot, slot));
@@ -249,8 +257,13 @@ fn name(text: &str) -> String {
 enum Item<'a> {
     Machine(BTreeMap<String, String>),
     Incident(BTreeMap<String, String>),
-    /// With its time of day.
-    Cycle(&'a CycleRecord, u64),
+    Cycle {
+        record: &'a CycleRecord,
+        /// Its time of day.
+        log_time_ns: u64,
+        /// The axes that the recording has, by their numbers.
+        axes: &'a BTreeMap<usize, AxisDescription>,
+    },
     Event(RecordedEvent),
     Health(OnBus<TracedHealth>),
 }
@@ -259,6 +272,7 @@ enum Item<'a> {
 #[derive(Clone, Copy)]
 enum Carries {
     Cycles,
+    Group(usize),
     Axis(usize),
     Events,
     Health(usize),
@@ -322,10 +336,13 @@ impl Decoder {
         let carries = match (schema.name, index) {
             (message, _) if message == messages::CYCLE.name => Carries::Cycles,
             (message, _) if message == messages::EVENT.name => Carries::Events,
+            (message, Some(index)) if message == messages::GROUP.name => Carries::Group(index),
             (message, Some(index)) if message == messages::AXIS.name => {
                 let description = AxisDescription {
                     name: name(text("name")),
                     bus: metadata.get("bus").map(|bus| name(bus)),
+                    group: text("group").parse().unwrap_or(0),
+                    family: DriveFamily::ALL.into_iter().find(|family| family.word() == text("drive")),
                     unit: if text("unit") == Unit::Metre.symbol() { Unit::Metre } else { Unit::Radian },
                     // Recordings of earlier versions do not have it.
                     plans_own_profile: text("plans_own_profile") == "true",
@@ -362,6 +379,14 @@ impl Decoder {
                     self.finish(give);
                 }
             }
+            Carries::Group(index) => {
+                let (slot, group) = messages::decode_group(data)?;
+                let (record, ..) = self.cycle.as_mut()?;
+                if record.timing.slot == slot {
+                    *record.groups.get_mut(index)? = group;
+                    record.group_count = record.group_count.max(u8::try_from(index + 1).ok()?);
+                }
+            }
             Carries::Axis(index) => {
                 let (slot, axis) = messages::decode_axis(data)?;
                 let (record, _, seen) = self.cycle.as_mut()?;
@@ -383,7 +408,7 @@ impl Decoder {
         if let Some((record, log_time_ns, seen)) = self.cycle.take()
             && seen == self.axes.len()
         {
-            give(Item::Cycle(&record, log_time_ns));
+            give(Item::Cycle { record: &record, log_time_ns, axes: &self.axes });
         }
     }
 }

@@ -5,7 +5,7 @@ mod render;
 use std::path::PathBuf;
 
 use serde::Serialize;
-use takt_rt::{AxisRecord, EventKind};
+use takt_rt::{AxisRecord, EventKind, Phase};
 
 use super::machine::SetPointMagnitudes;
 use super::recorded::{Cause, Recorded, RecordedCycle, RecordedError};
@@ -36,6 +36,9 @@ pub struct RecordingReport {
     pub warnings: Vec<String>,
     /// Why the group stopped; `None` if it did not.
     pub cause: Option<Cause>,
+    /// The groups in the order of the configuration; absent where all axes are one group.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub groups: Vec<GroupSummary>,
     /// The axis of the cause, or the one that was asked for; `None` if there is no cycle.
     pub axis: Option<AxisCycles>,
     /// The events around the cause, or the last ones.
@@ -50,12 +53,29 @@ pub struct RecordingReport {
     pub compute_ns: LatencyReport,
     /// Time from the start of the slot until the last set-point was handed over.
     pub sent_ns: LatencyReport,
+    /// How long the calls of callbacks took; absent if none was called.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub callback_ns: Option<LatencyReport>,
     /// Slots that passed unused.
     pub missed_slots: u64,
     /// The axes in the order of the configuration.
     pub axes: Vec<AxisSummary>,
     /// The changes of the buses' health. Only a black box has them.
     pub buses: Vec<BusChange>,
+}
+
+/// One group of several over the whole recording.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct GroupSummary {
+    /// Its name.
+    pub name: String,
+    /// What it was doing in the last cycle; `None` without a cycle, and in a recording of an earlier version.
+    pub phase: Option<&'static str>,
+    /// Why it stopped first; `None` if it did not.
+    pub stop: Option<Cause>,
+    /// How long the calls of its callbacks took; absent if none was called.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub callback_ns: Option<LatencyReport>,
 }
 
 /// The cycles of one axis before the cause.
@@ -74,7 +94,7 @@ pub struct AxisCycles {
 pub struct AxisCycle {
     /// The slot.
     pub slot: u64,
-    /// The phase of the group.
+    /// The phase of its group.
     pub phase: &'static str,
     /// The set-point.
     pub position_set: f64,
@@ -151,7 +171,10 @@ impl RecordingReport {
         let window = recorded.cycles(&recorded.slots_around_cause(cycles.saturating_sub(1), 0))?;
         let shown = axis.or_else(|| recorded.axis(None)).and_then(|axis| {
             let description = machine.axes.get(axis)?;
-            let row = |cycle: &RecordedCycle| Some(AxisCycle::new(cycle, cycle.axes.get(axis)?));
+            let row = |cycle: &RecordedCycle| {
+                let group = cycle.groups.get(description.group).copied().unwrap_or_default();
+                Some(AxisCycle::new(cycle, group.phase, cycle.axes.get(axis)?))
+            };
             Some(AxisCycles {
                 name: description.name.clone(),
                 unit: description.unit.symbol(),
@@ -175,6 +198,10 @@ impl RecordingReport {
         };
         let emergencies =
             (0..events.len()).filter(is_emergency).filter_map(|index| events.get(index).cloned()).collect();
+        let groups = match &machine.groups[..] {
+            [] | [_] => vec![],
+            several => several.iter().enumerate().map(|group| GroupSummary::new(recorded, group)).collect(),
+        };
         let cause = recorded.cause();
         let end = match &cause {
             Some(cause) => events.partition_point(|event| event.slot <= cause.slot) + EVENTS.1,
@@ -206,6 +233,7 @@ impl RecordingReport {
             is_black_box: !recorded.incidents.is_empty(),
             warnings: recorded.warnings.clone(),
             cause,
+            groups,
             axis: shown,
             events: events.into_iter().take(end).skip(begin).collect(),
             emergencies,
@@ -213,6 +241,7 @@ impl RecordingReport {
             sync_ns: LatencyReport::new(&statistics.sync),
             compute_ns: LatencyReport::new(&statistics.compute),
             sent_ns: LatencyReport::new(&statistics.sent),
+            callback_ns: statistics.callback().as_ref().map(LatencyReport::new),
             missed_slots: statistics.missed_slots,
             axes: axes.collect(),
             buses: buses.collect(),
@@ -220,19 +249,30 @@ impl RecordingReport {
     }
 }
 
+impl GroupSummary {
+    fn new(recorded: &Recorded, (number, name): (usize, &String)) -> Self {
+        Self {
+            name: name.clone(),
+            phase: recorded.last_phases.get(number).map(|phase| words::phase(*phase)),
+            stop: recorded.cause_of_group(number),
+            callback_ns: recorded.statistics.callback_of(number).map(LatencyReport::new),
+        }
+    }
+}
+
 impl AxisCycle {
-    fn new(cycle: &RecordedCycle, axis: &AxisRecord) -> Self {
+    fn new(cycle: &RecordedCycle, phase: Phase, axis: &AxisRecord) -> Self {
         let is_fresh = axis.feedback_age == 0;
         Self {
             slot: cycle.timing.slot,
-            phase: words::phase(cycle.phase),
+            phase: words::phase(phase),
             position_set: axis.position_set,
             position: is_fresh.then_some(axis.position),
             velocity_set: axis.velocity_set,
             velocity: is_fresh.then_some(axis.velocity),
             following_error: is_fresh.then_some(axis.following_error),
             statusword: axis.statusword,
-            state: words::state(axis.drive_state),
+            state: axis.drive_state.name(),
             controlword: axis.controlword,
             error_code: axis.error_code,
             feedback_age: axis.feedback_age,

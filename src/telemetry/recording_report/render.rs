@@ -4,8 +4,8 @@ use std::fmt::Write;
 
 use takt_rt::Rule;
 
-use super::{AxisCycle, RecordingReport};
-use crate::telemetry::render::{self, Emphasis, latency_table, line, missed_slots, wrap};
+use super::{AxisCycle, GroupSummary, RecordingReport};
+use crate::telemetry::render::{self, Emphasis, cycle_latencies, line, missed_slots, wrap};
 use crate::telemetry::report::SetPointParts;
 use crate::telemetry::words;
 
@@ -35,20 +35,33 @@ impl RecordingReport {
             }
             None => wrap(&mut text, "stop", 4, &["none".to_owned()]),
         }
+        self.group_lines(&mut text, emphasis);
         self.axis_cycles(&mut text, emphasis);
         self.event_table(&mut text, emphasis);
         line(&mut text, "");
-        let rows = [
-            ("wake-up", &self.wake_ns),
-            ("SYNC release", &self.sync_ns),
-            ("computing", &self.compute_ns),
-            ("set-points out at", &self.sent_ns),
-        ];
-        latency_table(&mut text, emphasis, &rows);
+        let cycle = [&self.wake_ns, &self.sync_ns, &self.compute_ns, &self.sent_ns];
+        let groups = self.groups.iter().map(|group| (group.name.as_str(), group.callback_ns.as_ref()));
+        cycle_latencies(&mut text, emphasis, cycle, self.callback_ns.as_ref(), groups);
         missed_slots(&mut text, emphasis, self.missed_slots, self.cycles);
         self.axis_table(&mut text, emphasis);
         self.bus_table(&mut text, emphasis);
         text
+    }
+
+    /// Why each of several groups stopped first, and what it was doing in the end.
+    fn group_lines(&self, text: &mut String, emphasis: Emphasis) {
+        let group = |group: &GroupSummary| {
+            let stop = group
+                .stop
+                .as_ref()
+                .map_or_else(|| "no stop".to_owned(), |stop| format!("{} (slot {})", stop.reason, stop.slot));
+            let end = group.phase.map_or_else(String::new, |phase| format!("; {phase} at the end"));
+            format!("{}: {stop}{end}", group.name)
+        };
+        if !self.groups.is_empty() {
+            let lines: Vec<String> = self.groups.iter().map(group).collect();
+            wrap(text, &emphasis.heading("groups"), 6, &lines);
+        }
     }
 
     fn axis_cycles(&self, text: &mut String, emphasis: Emphasis) {

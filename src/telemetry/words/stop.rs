@@ -69,7 +69,9 @@ pub fn stop_cause(stop: &StopReason, machine: &Machine) -> String {
         Fault::DriveFault { error_code: 0 } => {
             format!("the drive of {axis} reports a fault without an error code")
         }
-        Fault::DriveFault { error_code } => format!("the drive of {axis} reports fault 0x{error_code:04X}"),
+        Fault::DriveFault { error_code } => {
+            format!("the drive of {axis} reports fault {}", drive_error(stop, machine, error_code))
+        }
         Fault::DriveDisabled { statusword } => {
             format!("the drive of {axis} left operation enabled by itself (statusword 0x{statusword:04X})")
         }
@@ -104,7 +106,8 @@ pub fn stop_cause(stop: &StopReason, machine: &Machine) -> String {
         }
         Fault::UnexpectedBootUp => format!("the drive of {axis} started anew during its work"),
         Fault::EmergencyMessage { code } => {
-            format!("the drive of {axis} sent emergency message 0x{code:04X} and shows no fault")
+            let error = drive_error(stop, machine, code);
+            format!("the drive of {axis} sent emergency message {error} and shows no fault")
         }
         Fault::DuplicateNode { node } => {
             format!("two nodes answer with the node ID of {axis}, {node}: its feedback comes twice")
@@ -147,9 +150,29 @@ fn cycles(count: impl Into<u32>) -> String {
     }
 }
 
-/// The full text of a stop: cause, phase, and category.
+/// An error code of the drive that stopped the group.
+fn drive_error(stop: &StopReason, machine: &Machine, code: u16) -> String {
+    machine.drive_error(stop.axis().unwrap_or(u8::MAX), code)
+}
+
+/// The cure, where a drive has stopped the group and its error is known.
+pub fn stop_cure(stop: &StopReason, machine: &Machine) -> Option<&'static str> {
+    let StopCause::Fault(Fault::DriveFault { error_code: code } | Fault::EmergencyMessage { code }) =
+        stop.cause
+    else {
+        return None;
+    };
+    Some(machine.drive_cure(stop.axis()?, code))
+}
+
+/// The full text of a stop: cause, phase, category, and cure where one is known.
 pub fn stop(stop: &StopReason, machine: &Machine) -> String {
-    format!("{} while {}; {}", stop_cause(stop, machine), phase(stop.phase), category(stop.category))
+    let text =
+        format!("{} while {}; {}", stop_cause(stop, machine), phase(stop.phase), category(stop.category));
+    match stop_cure(stop, machine) {
+        Some(cure) => format!("{text}; try: {cure}"),
+        None => text,
+    }
 }
 
 #[cfg(test)]
@@ -228,7 +251,7 @@ mod tests {
                 Origin::Axis(0),
                 0x730F.into(),
                 0.0,
-                "the drive of shoulder reports fault 0x730F",
+                "the drive of shoulder reports fault 0x730F (battery voltage of the multi-turn encoder low)",
             ),
             (
                 Rule::DriveDisabled,
@@ -293,7 +316,7 @@ mod tests {
                 Origin::Axis(0),
                 0x4310.into(),
                 0.0,
-                "the drive of shoulder sent emergency message 0x4310 and shows no fault",
+                "the drive of shoulder sent emergency message 0x4310 (excess temperature of the drive) and shows no fault",
             ),
             (
                 Rule::ForeignMaster,
@@ -335,6 +358,14 @@ mod tests {
             stop(&reason(Rule::Requested, Origin::Group, 0.0, 0.0), &machine()),
             "a stop was requested while moving; category 1: decelerated, then power removed"
         );
+    }
+
+    #[test]
+    fn the_text_of_a_stop_for_a_drive_fault_ends_with_its_cure() {
+        let text = |code: u16| stop(&reason(Rule::DriveFault, Origin::Axis(0), code.into(), 0.0), &machine());
+        assert!(text(0x730F).ends_with("the joint's zero must be set again"), "{}", text(0x730F));
+        assert!(text(0x8611).contains("; try: look for a blocked or overloaded joint"), "{}", text(0x8611));
+        assert!(text(0).contains("; try: `takt drive … info` reads"), "{}", text(0));
     }
 
     #[test]

@@ -6,10 +6,10 @@
 use core::f64::consts::TAU;
 
 use takt_rt::{
-    AxisLimits, AxisParameters, BusHealth, BusParameters, BusSet, CommandPdo, ControlLaw, CycleInput,
-    CycleTiming, Deadline, Dialect, Engine, EngineParameters, FeedForward, FeedbackSince, Frame, HostInterface, Id,
-    Follow, MappedObject, Mapping, ModeChanges, Pdo, Phase, Received, Request, RequestEnvelope, RequestId, RequestTarget, Scale,
-    ScaleParameters, SendBatch, StopCategories, TimingLadder, TorqueLimits,
+    AxisLimits, AxisParameters, BitSet, BusHealth, BusParameters, CommandPdo, ControlLaw, CycleInput,
+    CycleTiming, Deadline, Dialect, Engine, EngineParameters, FeedForward, FeedbackSince, Follow, Frame,
+    HostInterface, Id, MappedObject, Mapping, ModeChanges, Pdo, Phase, Received, Request, RequestEnvelope,
+    RequestId, RequestTarget, Scale, ScaleParameters, SendBatch, StopCategories, TimingLadder, TorqueLimits,
 };
 
 // The C library gives the program its entry; nothing else of it is used.
@@ -131,7 +131,7 @@ fn cycles() -> Option<Phase> {
                 set_points_due_ns: at_ns,
                 now_ns: at_ns,
                 buses: &health,
-                behind: BusSet::default(),
+                behind: BitSet::default(),
             },
             &mut host,
         );

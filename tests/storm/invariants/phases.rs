@@ -1,48 +1,55 @@
-//! The group's state machine: it never stays where it must pass, and every stop has one reason.
+//! The state machine of a group: it never stays where it must pass, and every stop has one reason.
 
-use takt::config::{Config, Control};
+use takt::config::{Axis, Config, Control};
 use takt_rt::{EventKind, Phase, Rule};
 
 use super::Seen;
 use crate::bounds;
 
-#[derive(Default)]
 pub struct Phases {
+    group: usize,
+    axes: Vec<Axis>,
     phase: Phase,
     cycles: u64,
     is_latched: bool,
 }
 
 impl Phases {
+    pub fn new(config: &Config, group: usize) -> Self {
+        let axes = config.axes_of_group(group).iter().map(|axis| config.axes[*axis].clone()).collect();
+        Self { group, axes, phase: Phase::default(), cycles: 0, is_latched: false }
+    }
+
     pub fn check(&mut self, seen: &Seen<'_>) -> Result<(), String> {
         self.check_reasons(seen)?;
-        let phase = seen.snapshot.phase;
+        let phase = seen.snapshot.groups()[self.group].phase;
         if phase == self.phase {
             self.cycles += 1;
         } else {
             (self.phase, self.cycles) = (phase, 0);
         }
-        match longest_s(phase, seen.config) {
+        match longest_s(phase, &self.axes) {
             Some(longest_s) if self.cycles > bounds::cycles(seen.config, longest_s) => {
-                Err(format!("{phase:?} for {} cycles: stuck", self.cycles))
+                Err(format!("group {}: {phase:?} for {} cycles: stuck", self.group, self.cycles))
             }
             _ => Ok(()),
         }
     }
 
     fn check_reasons(&mut self, seen: &Seen<'_>) -> Result<(), String> {
-        let shown = seen.snapshot.stop.filter(|stop| stop.rule() != Rule::Requested);
+        let (group, asked) = (&seen.snapshot.groups()[self.group], &seen.asked[self.group]);
+        let shown = group.stop.filter(|stop| stop.rule() != Rule::Requested);
         let was_latched = self.is_latched;
-        for event in seen.events {
+        for event in seen.events_of(self.group) {
             match event.kind {
                 EventKind::Stop(reason) if reason.rule() != Rule::Requested => {
-                    if self.is_latched && !seen.asked.has_reset_lately {
-                        return Err(format!("a second reason: {reason:?}, shown {:?}", seen.snapshot.stop));
+                    if self.is_latched && !asked.has_reset_lately {
+                        return Err(format!("a second reason: {reason:?}, shown {:?}", group.stop));
                     }
                     self.is_latched = true;
                 }
                 EventKind::PhaseChanged { to: Phase::Enabling, .. }
-                    if was_latched && !seen.asked.has_reset_lately =>
+                    if was_latched && !asked.has_reset_lately =>
                 {
                     return Err("enabling while a fault is latched".to_owned());
                 }
@@ -50,7 +57,7 @@ impl Phases {
             }
         }
         if self.is_latched && shown.is_none() {
-            if !seen.asked.has_reset_lately {
+            if !asked.has_reset_lately {
                 return Err("the reason of a stop is gone without a reset".to_owned());
             }
             self.is_latched = false;
@@ -58,8 +65,8 @@ impl Phases {
         if shown.is_some() && !self.is_latched {
             return Err(format!("no event has reported {shown:?}"));
         }
-        let must_have_reason = seen.snapshot.phase == Phase::Stopping;
-        match must_have_reason && seen.snapshot.stop.is_none() {
+        let must_have_reason = group.phase == Phase::Stopping;
+        match must_have_reason && group.stop.is_none() {
             true => Err("it stops without a reason".to_owned()),
             false => Ok(()),
         }
@@ -67,16 +74,16 @@ impl Phases {
 }
 
 /// How long a phase that must pass by itself may last.
-fn longest_s(phase: Phase, config: &Config) -> Option<f64> {
+fn longest_s(phase: Phase, axes: &[Axis]) -> Option<f64> {
     match phase {
         Phase::Passive | Phase::Disabled | Phase::Holding => None,
         // A velocity or a torque may be asked for again and again.
-        Phase::Moving if config.axes.iter().any(|axis| axis.control.is_profile()) => None,
+        Phase::Moving if axes.iter().any(|axis| axis.control.is_profile()) => None,
         Phase::Moving => Some(30.0),
         Phase::Streaming => Some(10.0),
         Phase::Enabling => Some(5.2),
-        Phase::Stopping => Some(2.0 * bounds::to_rest_s(config) + 1.0),
-        Phase::Disabling => Some(5.2 + bounds::to_rest_s(config)),
+        Phase::Stopping => Some(2.0 * bounds::to_rest_s(axes) + 1.0),
+        Phase::Disabling => Some(5.2 + bounds::to_rest_s(axes)),
     }
 }
 

@@ -1,5 +1,6 @@
 //! Nothing is enabled, reset or moved that should not be.
 
+use takt::config::{Axis, Config};
 use takt_rt::{DriveState, Event, EventKind, Phase, Rule};
 
 use super::{REST, Seen};
@@ -31,6 +32,11 @@ struct Watched {
 
 pub struct Power {
     axes: Vec<Watched>,
+    groups: Vec<WatchedGroup>,
+}
+
+struct WatchedGroup {
+    axes: Vec<Axis>,
     has_enabled: bool,
     since_enabling: u64,
     /// Cycles for which the group has been disabled.
@@ -39,10 +45,10 @@ pub struct Power {
     is_reset_awaited: bool,
 }
 
-impl Power {
-    pub fn new(axes: usize) -> Self {
+impl WatchedGroup {
+    fn new(config: &Config, group: usize) -> Self {
         Self {
-            axes: vec![Watched::default(); axes],
+            axes: config.axes_of_group(group).iter().map(|axis| config.axes[*axis].clone()).collect(),
             has_enabled: false,
             since_enabling: u64::MAX,
             disabled: 0,
@@ -50,21 +56,37 @@ impl Power {
         }
     }
 
-    pub fn check(&mut self, seen: &Seen<'_>) -> Result<(), String> {
-        let phase = seen.record.phase;
+    fn observe(&mut self, seen: &Seen<'_>, group: usize) {
+        let phase = seen.record.groups()[group].phase;
         // The life cycle's own reset comes before that, and may not be over when a client is quicker to ask for the rest.
         self.has_enabled |= !matches!(phase, Phase::Passive | Phase::Disabled | Phase::Enabling);
         let is_enabling = phase == Phase::Enabling;
         self.since_enabling = if is_enabling { 0 } else { self.since_enabling.saturating_add(1) };
         let is_fault =
             |event: &Event| matches!(event.kind, EventKind::Stop(reason) if reason.rule() != Rule::Requested);
-        if seen.events.iter().any(is_fault) {
+        if seen.events_of(group).any(is_fault) {
             self.is_reset_awaited = false;
-        } else if seen.asked.has_reset {
+        } else if seen.asked[group].has_reset {
             self.is_reset_awaited = true;
         }
         let is_disabled = matches!(phase, Phase::Disabled | Phase::Passive);
         self.disabled = if is_disabled { self.disabled + 1 } else { 0 };
+    }
+}
+
+impl Power {
+    pub fn new(config: &Config) -> Self {
+        let groups = 0..config.groups.len().max(1);
+        Self {
+            axes: vec![Watched::default(); config.axes.len()],
+            groups: groups.map(|group| WatchedGroup::new(config, group)).collect(),
+        }
+    }
+
+    pub fn check(&mut self, seen: &Seen<'_>) -> Result<(), String> {
+        for (number, group) in self.groups.iter_mut().enumerate() {
+            group.observe(seen, number);
+        }
         for index in 0..self.axes.len() {
             let checked = self
                 .check_controlword(seen, index)
@@ -79,18 +101,18 @@ impl Power {
     /// A drive is enabled only while the group is being enabled, and reset only when that was asked for.
     fn check_controlword(&mut self, seen: &Seen<'_>, index: usize) -> Result<(), String> {
         let Some(word) = seen.sent[index].controlword else { return Ok(()) };
-        let (phase, new) = (seen.record.phase, level(word));
+        let (group, phase, new) = (&self.groups[seen.groups[index]], seen.phase_of(index), level(word));
         let last = std::mem::replace(&mut self.axes[index].level, new);
         // The last of them may follow the phase: it ends as soon as the drives show that they are enabled.
-        if new >= SWITCHED_ON && new > last && self.since_enabling > OBEYING_CYCLES {
+        if new >= SWITCHED_ON && new > last && group.since_enabling > OBEYING_CYCLES {
             return Err(format!("enabled by controlword {word:#06x} in phase {phase:?}"));
         }
         if new >= SWITCHED_ON && matches!(phase, Phase::Disabled | Phase::Passive) {
             return Err(format!("controlword {word:#06x} in a disabled group"));
         }
         let is_reset = word & FAULT_RESET != 0;
-        let is_asked_for = self.is_reset_awaited || seen.asked.has_reset_lately;
-        match is_reset && self.has_enabled && !is_asked_for {
+        let is_asked_for = group.is_reset_awaited || seen.asked[seen.groups[index]].has_reset_lately;
+        match is_reset && group.has_enabled && !is_asked_for {
             true => Err(format!("reset by controlword {word:#06x}, which was not asked for")),
             false => Ok(()),
         }
@@ -99,14 +121,15 @@ impl Power {
     /// A disabled group has no enabled drive, and soon no joint that moves.
     fn check_disabled(&self, seen: &Seen<'_>, index: usize) -> Result<(), String> {
         let (concern, truth) = (&seen.concerns[index], &seen.truth[index]);
-        if concern.is_present || self.disabled <= OBEYING_CYCLES {
+        let group = &self.groups[seen.groups[index]];
+        if concern.is_present || group.disabled <= OBEYING_CYCLES {
             return Ok(());
         }
         if truth.state == DriveState::OperationEnabled {
-            return Err(format!("enabled, {} cycles after the group was disabled", self.disabled));
+            return Err(format!("enabled, {} cycles after the group was disabled", group.disabled));
         }
-        let to_rest_s = bounds::to_rest_s(seen.config) + bounds::coasting_s(&seen.config.axes[index]);
-        let is_late = self.disabled > bounds::cycles(seen.config, to_rest_s);
+        let to_rest_s = bounds::to_rest_s(&group.axes) + bounds::coasting_s(&seen.config.axes[index]);
+        let is_late = group.disabled > bounds::cycles(seen.config, to_rest_s);
         match is_late && truth.velocity.abs() > REST {
             true => Err(format!("{} in a disabled group", truth.velocity)),
             false => Ok(()),

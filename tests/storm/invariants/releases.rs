@@ -13,24 +13,26 @@ pub struct Releases {
     axes: Vec<Option<Observation>>,
     /// When they were looked at last.
     seen_ns: u64,
-    /// Whether the power has been cut at once since the group was last enabled.
-    is_cut: bool,
+    /// Whether the power of each axis has been cut at once since its group was last enabled.
+    is_cut: Vec<bool>,
 }
 
 impl Releases {
     pub fn new(axes: usize) -> Self {
-        Self { axes: vec![None; axes], seen_ns: 0, is_cut: false }
+        Self { axes: vec![None; axes], seen_ns: 0, is_cut: vec![false; axes] }
     }
 
     pub fn check(&mut self, seen: &Seen<'_>) -> Result<(), String> {
-        match seen.snapshot.stop {
-            Some(stop) => self.is_cut |= stop.category == StopCategory::Zero,
-            None => self.is_cut = false,
+        for (axis, is_cut) in self.is_cut.iter_mut().enumerate() {
+            *is_cut = match seen.group_of(axis).stop {
+                Some(stop) => *is_cut || stop.category == StopCategory::Zero,
+                None => false,
+            };
         }
         let now_ns = seen.snapshot.at_ns;
         let elapsed_s = (now_ns - std::mem::replace(&mut self.seen_ns, now_ns)) as f64 * 1e-9;
         let axes = seen.config.axes.iter().zip(seen.truth).zip(seen.concerns);
-        for (last, ((axis, now), concern)) in self.axes.iter_mut().zip(axes) {
+        for (number, (last, ((axis, now), concern))) in self.axes.iter_mut().zip(axes).enumerate() {
             let Some(before) = last.replace(*now) else { continue };
             let is_released = before.state.has_torque() && !now.state.has_torque();
             let is_braked = !before.is_braked && now.is_braked;
@@ -39,11 +41,13 @@ impl Releases {
             let slow = SLOW * axis.limits.velocity + axis.limits.deceleration * elapsed_s;
             // A drive that has missed the heartbeat stops by its own fault reaction, and is not enabled again after it.
             let is_own_reaction = concern.missed_heartbeat == MissedHeartbeat::Shown;
-            let is_taken = (is_released || is_braked) && !self.is_cut && !is_own_reaction;
+            let is_taken = (is_released || is_braked) && !self.is_cut[number] && !is_own_reaction;
             if is_taken && !concern.is_present && speed > slow {
                 return Err(format!(
                     "{}: power taken at {speed} of {}: {now:?}, {:?}",
-                    axis.name, axis.limits.velocity, seen.snapshot.stop
+                    axis.name,
+                    axis.limits.velocity,
+                    seen.group_of(number).stop
                 ));
             }
         }

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use takt::config::{Axis, Config};
+use takt::config::{Axis, Config, Control};
 use takt::controller::assemble;
 use takt_rt::{DriveState, Event, EventKind, Phase, Scale};
 
@@ -15,6 +15,8 @@ struct Point {
     position: f64,
     /// As it went onto the wire; `None` where the wire carries no position.
     counts: Option<i32>,
+    /// Whether the wire carries the one that was planned for this time.
+    is_meant: bool,
     /// Since the set-point before: cycles in which the trajectory went on.
     cycles: u32,
 }
@@ -30,7 +32,7 @@ pub struct SetPoints {
     /// What was sent to the enabled drive, newest first.
     points: [Option<Point>; 3],
     /// Where the trajectory has led, newest first. What is on the wire is so many cycles old: an axis on a faster bus waits
-    /// for those that follow set-points on slower ones.
+    /// for those of its group that follow set-points on slower ones.
     planned: VecDeque<f64>,
     delay_cycles: usize,
     /// The last position on the wire while the drive really was enabled, and in which slot.
@@ -39,7 +41,7 @@ pub struct SetPoints {
     coasting: f64,
     /// Cycles in which the trajectory went on since the last set-point.
     cycles: u32,
-    /// Since the start.
+    /// Those of its group since the start.
     steps: u64,
     /// The slot of the last set-point.
     sent_slot: u64,
@@ -48,9 +50,11 @@ pub struct SetPoints {
 }
 
 impl SetPoints {
-    pub fn new(config: &Config, axis: &Axis) -> Self {
+    pub fn new(config: &Config, number: usize) -> Self {
         let divider = |axis: &Axis| config.buses[axis.bus].divider;
-        let follow = config.axes.iter().filter(|axis| !axis.control.is_profile());
+        let (axis, group) = (&config.axes[number], config.axes_of_group(config.group_of_axis(number)));
+        let own = group.iter().map(|axis| &config.axes[*axis]);
+        let follow = own.filter(|axis| !axis.control.is_profile());
         let slowest = follow.map(divider).max().unwrap_or(1).max(divider(axis));
         Self {
             scale: assemble::scale(axis).unwrap(),
@@ -69,7 +73,8 @@ impl SetPoints {
 
     pub fn check(&mut self, seen: &Seen<'_>, index: usize) -> Result<(), String> {
         let axis = &seen.config.axes[index];
-        let steps = seen.snapshot.steps - std::mem::replace(&mut self.steps, seen.snapshot.steps);
+        let all_steps = seen.group_of(index).steps;
+        let steps = all_steps - std::mem::replace(&mut self.steps, all_steps);
         self.cycles += steps as u32;
         self.check_rates(seen, index)?;
         self.check_wire(seen, index)?;
@@ -88,13 +93,19 @@ impl SetPoints {
             self.planned.push_front(record.position_set);
             self.planned.truncate(self.delay_cycles + 1);
         }
-        let phase = seen.record.phase;
+        let phase = seen.phase_of(index);
         if let Some((Phase::Holding, position)) = self.last
             && phase == Phase::Holding
             && position != record.position_set
-            && !is_asked_to_move(seen.events)
+            && !is_asked_to_move(seen.events_of(seen.groups[index]))
         {
             return Err(format!("holding, and from {position} to {}", record.position_set));
+        }
+        // What is planned behind a torque or an impedance begins where the joint is.
+        let was_streaming = matches!(self.last, Some((Phase::Streaming, _)));
+        let may_be_off = seen.are_torques_commanded && matches!(axis.control, Control::Torque { .. });
+        if may_be_off && (was_streaming || phase == Phase::Streaming) {
+            self.points = [None; 3];
         }
         self.last = Some((phase, record.position_set));
         let sent = &seen.sent[index];
@@ -115,24 +126,41 @@ impl SetPoints {
         if cycles == 0 {
             return Ok(());
         }
-        let point = Point { position: record.position_set, counts: sent.position, cycles };
+        let meant = self.planned.get(self.delay_cycles).map(|due| self.scale.position_to_counts(*due));
+        let is_meant = meant.is_none() || sent.position == meant;
+        let point = Point { position: record.position_set, counts: sent.position, is_meant, cycles };
+        self.check_on_way(axis, &point, meant, nominal_s)?;
         self.check_point(axis, &point)?;
         self.points = [Some(point), self.points[0], self.points[1]];
         Ok(())
     }
 
+    /// What is on the wire is the set-point that is meant. After some that could not leave, it is on the way there at the velocity
+    /// limit: a drive does not get the way of several cycles in one.
+    fn check_on_way(
+        &self,
+        axis: &Axis,
+        next: &Point,
+        meant: Option<i32>,
+        cycle_s: f64,
+    ) -> Result<(), String> {
+        let before = self.points[0].and_then(|last| last.counts);
+        let (Some(counts), Some(before), Some(meant)) = (next.counts, before, meant) else { return Ok(()) };
+        let farthest = axis.limits.velocity * cycle_s * self.scale.resolution();
+        let (way, whole) = (i64::from(counts) - i64::from(before), i64::from(meant) - i64::from(before));
+        let is_on_way = way.signum() == whole.signum()
+            && way.abs() < whole.abs()
+            && way.unsigned_abs() as f64 >= farthest - 1.0;
+        if counts == meant || counts == before || is_on_way {
+            Ok(())
+        } else {
+            Err(format!("{counts} counts on the wire for {meant}"))
+        }
+    }
+
     /// The planned set-point, by differences of what was sent, and what is on the wire of it.
     fn check_point(&self, axis: &Axis, next: &Point) -> Result<(), String> {
         let Some(last) = self.points[0] else { return Ok(()) };
-        if let (Some(counts), Some(before)) = (next.counts, last.counts) {
-            let meant = self.planned.get(self.delay_cycles).map(|due| self.scale.position_to_counts(*due));
-            if let Some(meant) = meant
-                && counts != meant
-                && counts != before
-            {
-                return Err(format!("{counts} counts on the wire for {meant}"));
-            }
-        }
         let limits = &axis.limits;
         let noise = 8.0 * f64::EPSILON * (1.0 + next.position.abs());
         let step_s = |point: &Point| f64::from(point.cycles) * self.period_s;
@@ -157,6 +185,7 @@ impl SetPoints {
             return Err(format!("set-point with acceleration {acceleration} beyond {limit}"));
         }
         if next.cycles == last.cycles
+            && [next, &last, &before].iter().all(|point| point.is_meant)
             && let (Some(newest), Some(newer), Some(older)) = (next.counts, last.counts, before.counts)
         {
             // Each of the three is rounded by up to half a count, the one in the middle counts twice.
@@ -235,7 +264,7 @@ impl SetPoints {
     }
 }
 
-/// Whether the group has left standstill in this cycle, if only for a move that ends in it.
-fn is_asked_to_move(events: &[Event]) -> bool {
-    events.iter().any(|event| matches!(event.kind, EventKind::PhaseChanged { from: Phase::Holding, .. }))
+/// Whether a group with these events has left standstill in this cycle, if only for a move that ends in it.
+fn is_asked_to_move<'a>(mut events: impl Iterator<Item = &'a Event>) -> bool {
+    events.any(|event| matches!(event.kind, EventKind::PhaseChanged { from: Phase::Holding, .. }))
 }

@@ -1,5 +1,6 @@
 //! A stop is over within the time and the distance that are stated of it.
 
+use takt::config::{Axis, Config};
 use takt_rt::{Phase, StopCategory};
 
 use super::phases::is_unbounded;
@@ -7,6 +8,10 @@ use super::{REST, Seen};
 use crate::bounds;
 
 pub struct Stops {
+    group: usize,
+    /// The axes of the group: all of them stop together.
+    numbers: Vec<usize>,
+    axes: Vec<Axis>,
     /// Where each joint was when the present stop began.
     positions: Vec<f64>,
     /// Cycles since the stop under way began.
@@ -16,19 +21,21 @@ pub struct Stops {
 }
 
 impl Stops {
-    pub fn new(axes: usize) -> Self {
-        Self { positions: vec![0.0; axes], cycles: None, is_cut: false }
+    pub fn new(config: &Config, group: usize) -> Self {
+        let numbers = config.axes_of_group(group);
+        let axes: Vec<Axis> = numbers.iter().map(|axis| config.axes[*axis].clone()).collect();
+        Self { group, numbers, positions: vec![0.0; axes.len()], axes, cycles: None, is_cut: false }
     }
 
     pub fn check(&mut self, seen: &Seen<'_>) -> Result<(), String> {
-        let config = seen.config;
-        match (seen.snapshot.phase, self.cycles) {
+        let (config, group) = (seen.config, &seen.snapshot.groups()[self.group]);
+        match (group.phase, self.cycles) {
             (Phase::Moving | Phase::Streaming | Phase::Enabling, _) => self.cycles = None,
             (Phase::Stopping, None) => {
                 (self.cycles, self.is_cut) = (Some(0), false);
-                let positions = self.positions.iter_mut().zip(seen.truth);
-                positions.for_each(|(position, truth)| *position = truth.position);
-                let (planned_s, stated_s) = (seen.snapshot.remaining_s, bounds::planned_s(config));
+                let positions = self.positions.iter_mut().zip(&self.numbers);
+                positions.for_each(|(position, axis)| *position = seen.truth[*axis].position);
+                let (planned_s, stated_s) = (group.remaining_s, bounds::planned_s(&self.axes));
                 if planned_s > stated_s {
                     return Err(format!("a stop of {planned_s} s, beyond the {stated_s} s that are stated"));
                 }
@@ -37,16 +44,18 @@ impl Stops {
             _ => {}
         }
         let Some(cycles) = self.cycles else { return Ok(()) };
-        self.is_cut |= seen.snapshot.stop.is_some_and(|stop| stop.category == StopCategory::Zero);
-        for (index, axis) in
-            config.axes.iter().enumerate().filter(|(index, _)| !seen.concerns[*index].is_present)
-        {
-            let truth = &seen.truth[index];
-            let travelled = (truth.position - self.positions[index]).abs();
+        self.is_cut |= group.stop.is_some_and(|stop| stop.category == StopCategory::Zero);
+        for (place, axis) in self.axes.iter().enumerate() {
+            let number = self.numbers[place];
+            if seen.concerns[number].is_present {
+                continue;
+            }
+            let truth = &seen.truth[number];
+            let travelled = (truth.position - self.positions[place]).abs();
             // The controller has no more part in where a joint coasts to.
             let coasting_s = if self.is_cut { bounds::coasting_s(axis) } else { 0.0 };
-            let is_over = cycles > bounds::cycles(config, bounds::to_rest_s(config) + coasting_s);
-            let limit = bounds::to_rest_distance(config, axis) + axis.limits.velocity * coasting_s / 2.0;
+            let is_over = cycles > bounds::cycles(config, bounds::to_rest_s(&self.axes) + coasting_s);
+            let limit = bounds::to_rest_distance(&self.axes, axis) + axis.limits.velocity * coasting_s / 2.0;
             if travelled > limit && !is_unbounded(&axis.control) {
                 return Err(format!("{}: {travelled} since the stop began, beyond {limit}", axis.name));
             }

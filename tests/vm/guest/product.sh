@@ -1,6 +1,7 @@
 # takt itself, with `takt sim` as the other side, its SYNC seen by a listener of its own: six axes on two virtual
 # interfaces, idle and under load, at 1 ms and 2 ms, with and without the spin guard; and three axes on the two emulated
-# controllers. TAKT names the program; CYCLES, LOAD_CYCLES and OTHER_CYCLES set how long. Leaves product.txt (the table, and
+# controllers; and a stream, beside clients that behave badly. TAKT and UNRULY_CLIENTS name the programs; CYCLES, LOAD_CYCLES and
+# OTHER_CYCLES set how long. Leaves product.txt (the table, and
 # when set-points and feedback were on the wire), jitter.txt (`takt jitter`), system_calls.txt, the recordings of SYNC and
 # the reports. Fails when a mean period drifts, a slot was missed, a period deviates further above what cyclictest finds than
 # is allowed, a set-point missed its slot, feedback was late, or there were more system calls than there may be.
@@ -54,17 +55,18 @@ wire_verdict() { # PERIOD_US LOG RECORDING
     return $status
 }
 
+program=("$TAKT" run)
 measure() { # NAME idle|load CYCLES ALLOWANCE PERIOD_US CONFIG LISTEN INTERFACE...
     local name=$1 load=$2 count=$3 allowance=$4 period=$5 config=$6 listen=$7 seconds found listener witness status filters buses log
     shift 7
-    log=$OUT/takt-$(basename "$config" .toml)-$load-$listen
+    log=$OUT/$(basename "${program[0]}")-$(basename "$config" .toml)-$load-$listen
     # SYNC begins with the bring-up, so that the motion lasts longer than the recording.
     seconds=$((count * period / 1000000 + 1))
     buses="--bus base=$1 ${2:+--bus wrist=$2}"
     filters=$(printf '%s,080:7FF,180:780,200:780 ' "$@")
     chrt --fifo 1 candump -L -r 4000000 $filters > "$log.wire" & witness=$!
     record "$listen" "$count" "$log.log" & listener=$!
-    chrt --other 0 "$TAKT" run "$config" $buses --require-realtime --duration $seconds --record "$log.mcap" > "$log.txt" 2>&1
+    chrt --other 0 "${program[@]}" "$config" $buses --require-realtime --duration $seconds --record "$log.mcap" > "$log.txt" 2>&1
     status=$?
     kill $witness; wait $witness
     [ $status = 0 ] || { cat "$log.txt"; kill $listener; return $status; }
@@ -76,6 +78,12 @@ measure() { # NAME idle|load CYCLES ALLOWANCE PERIOD_US CONFIG LISTEN INTERFACE.
     rm -f "$log.wire" "$log.mcap"
     verdict "$period" "${found[0]}" "${found[1]}" "${found[5]}" "${found[6]}" $((latency_max + allowance)) || status=1
     return $status
+}
+
+# A stream, beside clients that flood, stall, observe without a pause, and die.
+beside_clients() { # idle|load ALLOWANCE
+    local program=("$UNRULY_CLIENTS")
+    measure "takt, bad clients" "$1" "$other_cycles" "$2" 1000 "$arm" vcan0 vcan0 vcan1
 }
 
 # Both ways of waiting, as takt itself sees them.
@@ -117,6 +125,7 @@ drives_on 70 "$arm" vcan0 vcan1
 try measure "takt" idle "$cycles" $idle_allowance 1000 "$arm" vcan0 vcan0 vcan1
 try measure "takt, sleep only" idle "$(at_most_ten_thousand "$other_cycles")" $any 1000 "$arm_sleep" vcan0 vcan0 vcan1
 try measure "takt, 2 ms" idle "$other_cycles" $idle_allowance 2000 "$arm_2ms" vcan0 vcan0 vcan1
+try beside_clients idle $idle_allowance
 try system_calls
 try jitter idle
 
@@ -125,6 +134,7 @@ machine load "$load_cycles"
 try measure "takt" load "$load_cycles" $load_allowance 1000 "$arm" vcan0 vcan0 vcan1
 try measure "takt, sleep only" load "$(at_most_ten_thousand "$other_cycles")" $any 1000 "$arm_sleep" vcan0 vcan0 vcan1
 try measure "takt, 2 ms" load "$other_cycles" $load_allowance 2000 "$arm_2ms" vcan0 vcan0 vcan1
+try beside_clients load $load_allowance
 try jitter load
 load_off
 drives_off

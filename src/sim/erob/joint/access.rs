@@ -3,9 +3,10 @@
 use takt_rt::{DriveState, Nanoseconds};
 
 use super::ErobJoint;
-use crate::sim::erob::dictionary::{ErobAbortCode, ErobDictionary, at};
+use crate::sim::erob::dictionary::{ErobDictionary, at};
 use crate::sim::erob::objects::OBJECTS;
 use crate::sim::erob::{process_data, sdo};
+use crate::sim::sdo_reply::AbortCode;
 
 /// The signature for object 1010:1.
 const SAVE_SIGNATURE: u32 = u32::from_le_bytes(*b"save");
@@ -24,18 +25,18 @@ pub(super) fn write_field(dictionary: &mut ErobDictionary, at: usize, value: u32
 }
 
 /// Checks the range of an entry.
-fn check_range(at: usize, value: u32) -> Result<(), ErobAbortCode> {
+fn check_range(at: usize, value: u32) -> Result<(), AbortCode> {
     let is_in_range = match at {
         at::ERROR_HISTORY => value == 0,
-        // Bit 30: the drive cannot produce SYNC. Bit 29: it has no 29-bit identifiers.
-        at::SYNC_ID => value & 0x6000_0000 == 0 && value & 0x7FF != 0,
+        // Bit 29: it has no 29-bit identifiers.
+        at::SYNC_ID => value & 0x2000_0000 == 0 && value & 0x7FF != 0,
         at::CONSUMER_HEARTBEAT => value >> 16 <= 127,
         at::ERROR_BEHAVIOUR => value <= 2,
         at::OPERATION_MODE => value <= 10,
         at::TORQUE_OFFSET => (-3000..=3000).contains(&i32::from(value as u16 as i16)),
         _ => true,
     };
-    if is_in_range { Ok(()) } else { Err(ErobAbortCode::Value) }
+    if is_in_range { Ok(()) } else { Err(AbortCode::Value) }
 }
 
 /// The object dictionary as the SDO server accesses it.
@@ -45,25 +46,25 @@ pub(super) struct Objects<'a> {
 }
 
 impl sdo::ErobObjectAccess for Objects<'_> {
-    fn read(&mut self, index: u16, subindex: u8) -> Result<([u8; 4], usize), ErobAbortCode> {
+    fn read(&mut self, index: u16, subindex: u8) -> Result<([u8; 4], usize), AbortCode> {
         let at = ErobDictionary::for_reading(index, subindex)?;
         let history = self.module.dictionary.get(at::ERROR_HISTORY);
         if OBJECTS[at].index == 0x1003 && u32::from(subindex) > history {
-            return Err(ErobAbortCode::NoData);
+            return Err(AbortCode::NoData);
         }
         self.module.measure();
         Ok((self.module.dictionary.get(at).to_le_bytes(), OBJECTS[at].data_type.bytes()))
     }
 
-    fn check_write(&self, index: u16, subindex: u8) -> Result<usize, ErobAbortCode> {
+    fn check_write(&self, index: u16, subindex: u8) -> Result<usize, AbortCode> {
         let at = ErobDictionary::for_writing(index, subindex)?;
         if at == at::OPERATION_MODE && self.module.device.state().has_torque() {
-            return Err(ErobAbortCode::DeviceState);
+            return Err(AbortCode::DeviceState);
         }
         Ok(OBJECTS[at].data_type.bytes())
     }
 
-    fn write(&mut self, index: u16, subindex: u8, value: [u8; 4]) -> Result<(), ErobAbortCode> {
+    fn write(&mut self, index: u16, subindex: u8, value: [u8; 4]) -> Result<(), AbortCode> {
         let at = ErobDictionary::for_writing(index, subindex)?;
         let size = OBJECTS[at].data_type.bytes();
         let value = u32::from_le_bytes(value) & (u32::MAX >> (32 - 8 * size));
@@ -72,7 +73,7 @@ impl sdo::ErobObjectAccess for Objects<'_> {
         match index {
             0x1010 => {
                 if value != SAVE_SIGNATURE {
-                    return Err(ErobAbortCode::CannotStore);
+                    return Err(AbortCode::CannotStore);
                 }
                 module.save_ns = *now_ns + SAVE_NS;
                 return Ok(());
@@ -96,6 +97,7 @@ impl ErobJoint {
             at::TARGET_POSITION => self.motion.latch(&self.dictionary),
             at::OPERATION_MODE => self.follow_mode(),
             at::PRODUCER_HEARTBEAT => self.network.schedule_heartbeat(now_ns, &self.dictionary),
+            at::SYNC_ID | at::CYCLE_PERIOD => self.network.schedule_sync(now_ns, &self.dictionary),
             at::CONSUMER_HEARTBEAT => self.network.stop_master_monitor(),
             at::BATTERY_RESET if self.dictionary.get(at) == 1 => {
                 self.has_battery_fault = false;

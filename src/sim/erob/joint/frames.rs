@@ -138,6 +138,15 @@ impl ErobJoint {
         if let Some(byte) = self.network.heartbeat(now_ns, &self.dictionary) {
             mailbox.push(Frame::of(Id::canopen(0x700, node), [byte]));
         }
+        if self.network.produces_sync(now_ns, &self.dictionary) {
+            if let Ok(id) = Id::base(self.dictionary.get(at::SYNC_ID) & 0x7FF) {
+                mailbox.push(Frame::of(id, []));
+            }
+            // The producer acts on its own SYNC.
+            if self.network.state() == NodeState::Operational {
+                self.take_sync(now_ns);
+            }
+        }
         if self.network.has_services() {
             if let Some(answer) = self.sdo.answer(now_ns) {
                 mailbox.push(Frame::of(Id::canopen(0x580, node), answer));

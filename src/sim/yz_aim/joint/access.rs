@@ -3,10 +3,11 @@
 use takt_rt::{Nanoseconds, controlword};
 
 use super::YzAimJoint;
+use crate::sim::sdo_reply::AbortCode;
 use crate::sim::yz_aim::dictionary::decode;
 use crate::sim::yz_aim::objects::{OBJECTS, YzAimObject, at, find};
 use crate::sim::yz_aim::process_data::{PDO4, RPDO_MAPPING, YzAimProcessData};
-use crate::sim::yz_aim::sdo::{Addressed, YzAimAbortCode, YzAimRequest};
+use crate::sim::yz_aim::sdo::{Addressed, YzAimRequest};
 
 /// Whether an entry accepts a value.
 fn is_in_range(at: usize, value: i64) -> bool {
@@ -28,10 +29,10 @@ impl YzAimJoint {
         let Some(addressed) = Addressed::decode(payload) else { return };
         let answer = match (addressed.request, find(addressed.index, addressed.subindex)) {
             (YzAimRequest::Abort, _) => return,
-            (YzAimRequest::Other, _) => Some(addressed.refused(YzAimAbortCode::Command)),
+            (YzAimRequest::Other, _) => Some(addressed.refused(AbortCode::Command)),
             (_, None) => {
                 let is_silent = self.parameters.quirks.is_silent_on_unknown_objects;
-                (!is_silent).then(|| addressed.refused(YzAimAbortCode::NoObject))
+                (!is_silent).then(|| addressed.refused(AbortCode::NoObject))
             }
             (YzAimRequest::Read, Some(at)) => {
                 self.measure();
@@ -43,7 +44,7 @@ impl YzAimJoint {
                 Some(written.map_or_else(|code| addressed.refused(code), |()| addressed.written()))
             }
         };
-        self.sdo.answer(now_ns, answer);
+        self.sdo.put(now_ns, answer);
     }
 
     fn write(
@@ -52,17 +53,17 @@ impl YzAimJoint {
         at: usize,
         data: [u8; 4],
         size: Option<usize>,
-    ) -> Result<(), YzAimAbortCode> {
+    ) -> Result<(), AbortCode> {
         let object = OBJECTS[at];
         if !self.is_writable(object) {
-            return Err(YzAimAbortCode::ReadOnly);
+            return Err(AbortCode::ReadOnly);
         }
         if size.is_some_and(|size| size != object.bytes()) {
-            return Err(YzAimAbortCode::Length);
+            return Err(AbortCode::Length);
         }
         let value = decode(at, data);
         if !is_in_range(at, value) {
-            return Err(YzAimAbortCode::Value);
+            return Err(AbortCode::Value);
         }
         let before = self.dictionary.get(at);
         self.dictionary.set(at, value);

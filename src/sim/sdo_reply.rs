@@ -1,0 +1,108 @@
+//! What the SDO servers of all simulated drives share: the abort codes, the layout of the replies, and the one buffer from
+//! which a reply leaves after the latency of the drive.
+
+use std::ops::Range;
+
+use takt_rt::Nanoseconds;
+
+use super::random::Random;
+
+/// The SDO abort codes of the simulated drives (CiA 301, 7.2.4.3.17).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum AbortCode {
+    /// Toggle bit not alternated.
+    Toggle = 0x0503_0000,
+    /// Command specifier not valid or unknown.
+    Command = 0x0504_0001,
+    /// Attempt to read a write-only object.
+    WriteOnly = 0x0601_0001,
+    /// Attempt to write a read-only object.
+    ReadOnly = 0x0601_0002,
+    /// Object does not exist in the object dictionary.
+    NoObject = 0x0602_0000,
+    /// Object cannot be mapped to the PDO.
+    NotMappable = 0x0604_0041,
+    /// The number and length of the objects to be mapped would exceed PDO length.
+    PdoTooLong = 0x0604_0042,
+    /// Data type does not match, length of service parameter does not match.
+    Length = 0x0607_0010,
+    /// Data type does not match, length of service parameter too high.
+    LengthTooHigh = 0x0607_0012,
+    /// Data type does not match, length of service parameter too low.
+    LengthTooLow = 0x0607_0013,
+    /// Sub-index does not exist.
+    NoSubindex = 0x0609_0011,
+    /// Invalid value for parameter.
+    Value = 0x0609_0030,
+    /// Data cannot be transferred or stored to the application.
+    CannotStore = 0x0800_0020,
+    /// Data cannot be transferred or stored to the application because of the present device state.
+    DeviceState = 0x0800_0022,
+    /// No data available.
+    NoData = 0x0800_0024,
+}
+
+/// A reply with the index and subindex of its object.
+pub fn addressed(command: u8, index: u16, subindex: u8, [a, b, c, d]: [u8; 4]) -> [u8; 8] {
+    let [low, high] = index.to_le_bytes();
+    [command, low, high, subindex, a, b, c, d]
+}
+
+/// The reply to an upload whose value fits in it.
+pub fn uploaded(index: u16, subindex: u8, value: [u8; 4], size: usize) -> [u8; 8] {
+    addressed(0x43 | (4 - size.min(4) as u8) << 2, index, subindex, value)
+}
+
+/// The reply to a download that is accepted.
+pub fn downloaded(index: u16, subindex: u8) -> [u8; 8] {
+    addressed(0x60, index, subindex, [0; 4])
+}
+
+/// An abort.
+pub fn aborted(index: u16, subindex: u8, code: AbortCode) -> [u8; 8] {
+    addressed(0x80, index, subindex, (code as u32).to_le_bytes())
+}
+
+/// The one buffer of a server. While it is full, requests are lost.
+#[derive(Clone, Debug)]
+pub struct ReplyBuffer {
+    /// When the request is finished, and its reply, if it gets one.
+    pending: Option<(Nanoseconds, Option<[u8; 8]>)>,
+    latency: Random,
+    range_ns: Range<Nanoseconds>,
+}
+
+impl ReplyBuffer {
+    /// An empty buffer whose replies take a time in this range.
+    pub fn new(latency: Random, range_ns: Range<Nanoseconds>) -> Self {
+        Self { pending: None, latency, range_ns }
+    }
+
+    /// Discards the reply.
+    pub fn reset(&mut self) {
+        self.pending = None;
+    }
+
+    /// Whether a request is being processed; a further one is lost.
+    pub fn is_busy(&self) -> bool {
+        self.pending.is_some()
+    }
+
+    /// Queues the reply; a request without a reply takes the same time.
+    pub fn put(&mut self, now_ns: Nanoseconds, reply: Option<[u8; 8]>) {
+        self.pending = Some((now_ns + self.latency.within(self.range_ns.clone()), reply));
+    }
+
+    /// When the current request is finished.
+    pub fn due_ns(&self) -> Option<Nanoseconds> {
+        self.pending.map(|(due_ns, _)| due_ns)
+    }
+
+    /// The reply, when it is due.
+    pub fn take(&mut self, now_ns: Nanoseconds) -> Option<[u8; 8]> {
+        let (_, reply) = self.pending.filter(|(due_ns, _)| *due_ns <= now_ns)?;
+        self.pending = None;
+        reply
+    }
+}

@@ -1,0 +1,133 @@
+//! Clients that behave badly beside the loop, for the jitter measurements of the laboratory.
+//!
+//! One streams a motion at 100 Hz, and stalls for a third of a second in every two. One hands over the same motion without a pause, as
+//! fast as it can. Two observe without a pause. One after another begins to stream and panics on the way. All have ordinary
+//! priority. The program takes the arguments of `takt run`, and ends with an error if the group has stopped.
+
+use std::error::Error;
+use std::f64::consts::TAU;
+use std::hint::black_box;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use takt::{
+    Config, Controller, Event, EventKind, Handle, RecordingDestination, SessionOptions, StreamHandle,
+};
+
+/// From one point to the next.
+const INTERVAL: Duration = Duration::from_millis(10);
+
+/// A gentle motion of every joint, to and fro.
+struct Motion {
+    home: Vec<f64>,
+    begun: Instant,
+}
+
+impl Motion {
+    fn after(&self, since: Duration) -> Vec<f64> {
+        let since_s = since.as_secs_f64();
+        let amplitude = 0.1 * (since_s / 2.0).min(1.0).powi(3);
+        self.home.iter().map(|home| home + amplitude * (TAU * 0.25 * since_s).sin()).collect()
+    }
+
+    fn now(&self) -> Vec<f64> {
+        self.after(self.begun.elapsed())
+    }
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let (config, options, lasting) = arguments()?;
+    let arm = Controller::start(config, options)?;
+    let home = arm.state().axes().iter().map(|axis| axis.position_set).collect();
+    // Those that panic here are meant to.
+    std::panic::set_hook(Box::new(|_| {}));
+    arm.begin_stream()?;
+    let motion = &Motion { home, begun: Instant::now() };
+    let (is_over, mut events) = (&AtomicBool::new(false), arm.events());
+    let mut stops = Vec::new();
+    thread::scope(|scope| {
+        let until_over = |client: fn(&Handle, &Motion)| {
+            let handle = arm.handle();
+            scope.spawn(move || {
+                while !is_over.load(Ordering::Relaxed) {
+                    client(&handle, motion);
+                }
+            });
+        };
+        for client in [lead, flood, observe, observe, begin_and_die] {
+            until_over(client);
+        }
+        while motion.begun.elapsed() < lasting {
+            thread::sleep(INTERVAL);
+            let is_stop = |event: &Event| matches!(event.kind, EventKind::Stop(_));
+            stops.extend(events.by_ref().filter(is_stop));
+        }
+        is_over.store(true, Ordering::Relaxed);
+    });
+    let report = arm.stream().report();
+    let session = arm.finish()?;
+    println!("{:?}\n{} records, {} dropped", report.counts, session.log.records, session.log.records_dropped);
+    if stops.is_empty() { Ok(()) } else { Err(format!("the group has stopped: {stops:?}").into()) }
+}
+
+/// Streams for two seconds, and stalls for a third of a second.
+fn lead(handle: &Handle, motion: &Motion) {
+    let stream = handle.stream();
+    for _ in 0..200 {
+        // Where the other client has filled the look-ahead, there is no room.
+        let _ = stream.push_now(&motion.now());
+        thread::sleep(INTERVAL);
+    }
+    thread::sleep(Duration::from_millis(333));
+}
+
+/// Hands over the next fifth of a second.
+fn flood(handle: &Handle, motion: &Motion) {
+    let since = motion.begun.elapsed();
+    let chunk: Vec<Vec<f64>> = (0..20).map(|index| motion.after(since + INTERVAL * index)).collect();
+    let _ = handle.stream().push_chunk(StreamHandle::now_ns(), INTERVAL, &chunk);
+}
+
+fn observe(handle: &Handle, _motion: &Motion) {
+    black_box(handle.state());
+    black_box(handle.events().count());
+}
+
+/// A client that panics while it streams.
+fn begin_and_die(handle: &Handle, motion: &Motion) {
+    let (handle, point) = (handle.clone(), motion.now());
+    let client = thread::spawn(move || {
+        let (stream, _events) = (handle.stream(), handle.events());
+        for _ in 0..10 {
+            let _ = stream.push_now(&point);
+        }
+        panic!("this client dies");
+    });
+    assert!(client.join().is_err());
+}
+
+/// The arguments of `takt run`, as far as the laboratory gives them.
+fn arguments() -> Result<(Config, SessionOptions, Duration), Box<dyn Error>> {
+    let mut arguments = std::env::args().skip(1);
+    let path =
+        arguments.next().ok_or("usage: unruly_clients CONFIG [--bus NAME=INTERFACE]... --duration S")?;
+    let mut config = Config::load(Path::new(&path))?;
+    let (mut options, mut lasting) = (SessionOptions::default(), Duration::from_secs(2));
+    while let Some(option) = arguments.next() {
+        let mut value = || arguments.next().ok_or(format!("{option} needs a value"));
+        match option.as_str() {
+            "--bus" => {
+                let value = value()?;
+                let (name, interface) = value.split_once('=').ok_or("--bus NAME=INTERFACE")?;
+                config.override_interface(name, interface)?;
+            }
+            "--duration" => lasting = Duration::from_secs_f64(value()?.parse()?),
+            "--record" => options.recording = Some(RecordingDestination::File(PathBuf::from(value()?))),
+            "--require-realtime" => options.is_realtime_required = true,
+            _ => return Err(format!("there is no option {option}").into()),
+        }
+    }
+    Ok((config, options, lasting))
+}
